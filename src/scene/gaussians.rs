@@ -1,0 +1,58 @@
+//! Host copy of the model: a structure of arrays, one row per Gaussian.
+
+/// Zeroth spherical-harmonics basis constant, 1 / (2 sqrt(pi)).
+pub const SH_C0: f64 = 0.28209479177387814;
+
+/// The Gaussians of a scene, parameters stored before activation as in the standard 3DGS PLY.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Gaussians {
+    /// World positions, [N, 3].
+    pub means: Vec<[f32; 3]>,
+    /// Rotations (w, x, y, z), not necessarily of unit length, [N, 4].
+    pub quats: Vec<[f32; 4]>,
+    /// Natural logarithms of the standard deviations, [N, 3].
+    pub scales: Vec<[f32; 3]>,
+    /// Opacity before the sigmoid, [N].
+    pub opacities: Vec<f32>,
+    /// Degree-0 colour coefficients, [N, 3] (r, g, b).
+    pub sh0: Vec<[f32; 3]>,
+    /// Coefficients above degree 0, [N, coefficients - 1] triples (r, g, b), coefficient-major.
+    pub sh_rest: Vec<[f32; 3]>,
+    /// Degree of the spherical harmonics, 0 to 3.
+    pub sh_degree: u32,
+    /// Object ids, [N], 0 = unlabelled; `None` for a scene that knows no labels.
+    pub labels: Option<Vec<u32>>,
+}
+
+impl Gaussians {
+    /// Number of Gaussians.
+    pub fn len(&self) -> usize {
+        self.means.len()
+    }
+
+    /// True without any Gaussian.
+    pub fn is_empty(&self) -> bool {
+        self.means.is_empty()
+    }
+
+    /// Coefficients per Gaussian and channel above degree 0: 0, 3, 8 or 15.
+    pub fn rest_per_gaussian(&self) -> usize {
+        ((self.sh_degree + 1) * (self.sh_degree + 1) - 1) as usize
+    }
+
+    /// Keeps the rows for which `keep` holds, in order.
+    pub fn filtered(&self, mut keep: impl FnMut(usize) -> bool) -> Self {
+        let rows: Vec<usize> = (0..self.len()).filter(|&row| keep(row)).collect();
+        let rest = self.rest_per_gaussian();
+        Self {
+            means: rows.iter().map(|&r| self.means[r]).collect(),
+            quats: rows.iter().map(|&r| self.quats[r]).collect(),
+            scales: rows.iter().map(|&r| self.scales[r]).collect(),
+            opacities: rows.iter().map(|&r| self.opacities[r]).collect(),
+            sh0: rows.iter().map(|&r| self.sh0[r]).collect(),
+            sh_rest: rows.iter().flat_map(|&r| self.sh_rest[r * rest..(r + 1) * rest].iter().copied()).collect(),
+            sh_degree: self.sh_degree,
+            labels: self.labels.as_ref().map(|labels| rows.iter().map(|&r| labels[r]).collect()),
+        }
+    }
+}

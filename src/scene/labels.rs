@@ -1,0 +1,47 @@
+//! Object ids: 0 is unlabelled, 1 to 65535 are objects.
+
+/// Id of a Gaussian or pixel that belongs to no object.
+pub const UNLABELLED: u32 = 0;
+
+/// Largest id that a mask or a Gaussian can carry.
+pub const LABEL_MAX: u32 = 65_535;
+
+/// An id per pixel, row-major.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct LabelMap {
+    /// Width, px.
+    pub width: u32,
+    /// Height, px.
+    pub height: u32,
+    /// Ids, [height, width].
+    pub ids: Vec<u16>,
+}
+
+impl LabelMap {
+    /// The id at column `x` and row `y`.
+    pub fn at(&self, x: u32, y: u32) -> u16 {
+        self.ids[(y * self.width + x) as usize]
+    }
+
+    /// The ids that occur, sorted, without 0.
+    pub fn objects(&self) -> Vec<u16> {
+        let mut seen = vec![false; 65_536];
+        self.ids.iter().for_each(|&id| seen[usize::from(id)] = true);
+        (1..=u16::MAX).filter(|&id| seen[usize::from(id)]).collect()
+    }
+}
+
+/// Display colour of an id: hues a golden ratio apart, 0 is black.
+pub fn label_colour(id: u32) -> [u8; 3] {
+    if id == UNLABELLED {
+        return [0; 3];
+    }
+    let hue = (f64::from(id) * 0.618_033_988_749_895).fract() * 6.0;
+    let saturation = if id % 2 == 0 { 0.55 } else { 0.95 };
+    let channel = |offset: f64| {
+        let k = (offset + hue) % 6.0;
+        let value = 1.0 - saturation * k.min(4.0 - k).clamp(0.0, 1.0);
+        (value * 255.0).round() as u8
+    };
+    [channel(5.0), channel(3.0), channel(1.0)]
+}

@@ -1,0 +1,11 @@
+//! Plain host data of a scene: cameras, Gaussians, labels, views. No Vulkan, no files.
+
+pub mod camera;
+pub mod gaussians;
+pub mod labels;
+pub mod view;
+
+pub use camera::Camera;
+pub use gaussians::Gaussians;
+pub use labels::{LabelMap, UNLABELLED};
+pub use view::{Dataset, Photo, Point, View};
