@@ -7,8 +7,8 @@
 #include "blend_tile.glsl"
 // blend_backward — walk one tile of one layer back to front and write one gradient record per (splat, tile) pair.
 // Work:    one subgroup (= workgroup) a tile, jobs as in blend_forward.
-// Reads:   step, counters; tile_starts, tile_ends; sorted_splats, slots [I]; splats [V,3]; image [P] (w =
-//          transmittance), last [P]; v_image [P]; variant labels: layer_tiles, layer_state
+// Reads:   step; tile_starts [layers * T]; sorted_splats, slots [I]; splats [V,3]; image [P] (w = transmittance),
+//          last [P]; v_image [P]; variant labels: counters, layer_tiles, layer_state
 // Writes:  v_instances [I,3] at the pair's slot: v_mean2d (px), v_conic; v_log_opacity, v_colour; stamp of the step
 //          (records without the current stamp were not walked and count as 0)
 // Math:    p = dL/d ln alpha = w (u - s) with u = colour . g and s the colour behind, times g; geometry and opacity
@@ -17,19 +17,18 @@
 // Mirror:  tests/reference/blend.rs::blend_backward
 
 READ1(0, StepUniforms, step);
-READ1(1, Counters, counters);
-FETCHU(2, tile_starts);
-FETCHU(3, tile_ends);
-FETCHU(4, sorted_splats);
-FETCHU(5, slots);
-FETCH4(6, splats);
-FETCH4(7, image);
-FETCHU(8, last);
-FETCH4(9, v_image);
-WRITE(10, vec4, v_instances);
+FETCHU(1, tile_starts);
+FETCHU(2, sorted_splats);
+FETCHU(3, slots);
+FETCH4(4, splats);
+FETCH4(5, image);
+FETCHU(6, last);
+FETCH4(7, v_image);
+WRITE(8, vec4, v_instances);
 #ifdef LABELS
-FETCHU(11, layer_tiles);
-READ(12, uvec2, layer_state);
+READ1(9, Counters, counters);
+FETCHU(10, layer_tiles);
+READ(11, uvec2, layer_state);
 #include "label_state.glsl"
 #endif
 

@@ -43,8 +43,10 @@ impl fmt::Display for Finding {
 /// One `.comp` file.
 #[derive(Clone, Debug)]
 pub struct Shader {
-    /// File name without extension.
+    /// File name without extension, or the name of a sibling that `variants.txt` makes from the same file.
     pub stem: String,
+    /// File name without extension.
+    pub file_stem: String,
     /// Path as messages write it: `glsl/family/stem.comp`.
     pub path: String,
     /// Its text.
@@ -59,7 +61,7 @@ impl Shader {
         self.source
             .lines()
             .find_map(|line| {
-                line.trim_start_matches('/').trim().strip_prefix(self.stem.as_str())?.trim().strip_prefix('—')
+                line.trim_start_matches('/').trim().strip_prefix(self.file_stem.as_str())?.trim().strip_prefix('—')
             })
             .map(str::trim)
             .filter(|sentence| !sentence.is_empty())
@@ -186,36 +188,48 @@ fn find(glsl: &Path) -> Result<Vec<Shader>, Vec<Finding>> {
             findings.push(Finding::new(path.clone(), format!("{} has the same stem", twin.path)));
         }
         let variants = vec![Variant { name: stem.clone(), ..Variant::default() }];
-        shaders.push(Shader { stem, path, source: read(&file)?, variants });
+        shaders.push(Shader { file_stem: stem.clone(), stem, path, source: read(&file)?, variants });
     }
     shaders.sort_by(|a, b| a.stem.cmp(&b.stem));
     if findings.is_empty() { Ok(shaders) } else { Err(findings) }
 }
 
-fn declare_variants(glsl: &Path, shaders: &mut [Shader]) -> Result<(), Vec<Finding>> {
+fn declare_variants(glsl: &Path, shaders: &mut Vec<Shader>) -> Result<(), Vec<Finding>> {
     let file = glsl.join("variants.txt");
     if !file.exists() {
         return Ok(());
     }
     let name = message_path(glsl, &file);
     let mut findings = Vec::new();
-    for line in variants::parse(&name, &read(&file)?)? {
-        let full = format!("{}_{}", line.stem, line.suffix);
+    let lines = variants::parse(&name, &read(&file)?)?;
+    for line in &lines {
         let place = format!("{name}:{}", line.line);
+        let full = if line.sibling { line.suffix.clone() } else { format!("{}_{}", line.stem, line.suffix) };
         if shaders.iter().any(|shader| shader.stem == full) {
             findings.push(Finding::new(place.clone(), format!("`{full}` is a shader's name already")));
         }
-        match shaders.iter_mut().find(|shader| shader.stem == line.stem) {
-            Some(shader) => shader.variants.push(Variant {
-                name: full,
-                suffix: line.suffix,
-                defines: line.defines,
-                ..Variant::default()
-            }),
-            None => findings.push(Finding::new(place, format!("there is no shader `{}`", line.stem))),
+        if line.stem != "*" && !shaders.iter().any(|shader| shader.stem == line.stem) {
+            findings.push(Finding::new(place, format!("there is no shader `{}`", line.stem)));
+            continue;
+        }
+        if line.sibling {
+            declare_sibling(shaders, line);
+        } else {
+            shaders.iter_mut().filter(|shader| line.applies_to(shader)).for_each(|shader| {
+                let defines = [shader.variants[0].defines.clone(), line.defines.clone()].concat();
+                let name = format!("{}_{}", shader.stem, line.suffix);
+                shader.variants.push(Variant { name, suffix: line.suffix.clone(), defines, ..Variant::default() });
+            });
         }
     }
+    shaders.sort_by(|a, b| a.stem.cmp(&b.stem));
     if findings.is_empty() { Ok(()) } else { Err(findings) }
+}
+
+fn declare_sibling(shaders: &mut Vec<Shader>, line: &variants::VariantLine) {
+    let Some(base) = shaders.iter().find(|shader| shader.stem == line.stem).cloned() else { return };
+    let variant = Variant { name: line.suffix.clone(), defines: line.defines.clone(), ..Variant::default() };
+    shaders.push(Shader { stem: line.suffix.clone(), variants: vec![variant], ..base });
 }
 
 /// Compiles and reflects all variants, on all cores.

@@ -1,7 +1,9 @@
 //! Parser of `glsl/variants.txt`: which shaders are compiled more than once, and with which macros.
 //!
-//! `stem + suffix: DEFINE OTHER=4` compiles `stem.comp` once more as `stem_suffix`. Every stem has its base variant
-//! without macros; it needs no line. `#` begins a comment.
+//! `stem + suffix: DEFINE OTHER=4` compiles `stem.comp` once more as `stem_suffix`, with the same interface.
+//! `* + suffix: DEFINE` does so for every shader that fetches through FETCH4 or FETCHU.
+//! `sibling = stem: DEFINE` makes a shader of its own, with an interface of its own, from the same file.
+//! Every stem has its base variant without macros; it needs no line. `#` begins a comment.
 
 use super::compile::Define;
 use super::{Finding, is_snake_case};
@@ -10,14 +12,24 @@ use std::collections::BTreeSet;
 /// One line of the file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct VariantLine {
-    /// Stem of the shader file.
+    /// Stem of the shader file, or `*`.
     pub stem: String,
-    /// What the variant is called after the stem.
+    /// What the variant is called after the stem; for a sibling its own stem.
     pub suffix: String,
+    /// Whether the line makes a sibling.
+    pub sibling: bool,
     /// Macros that it is compiled with.
     pub defines: Vec<Define>,
     /// Line number from 1.
     pub line: usize,
+}
+
+impl VariantLine {
+    /// Whether the line adds a variant to this shader.
+    pub fn applies_to(&self, shader: &super::Shader) -> bool {
+        let fetches = || ["FETCH4(", "FETCHU("].iter().any(|word| shader.source.contains(word));
+        !self.sibling && (self.stem == shader.stem || (self.stem == "*" && fetches()))
+    }
 }
 
 /// All lines of the text; `name` is what messages call the file.
@@ -46,7 +58,10 @@ pub fn parse(name: &str, text: &str) -> Result<Vec<VariantLine>, Vec<Finding>> {
 
 fn parse_line(content: &str, line: usize) -> Option<VariantLine> {
     let (name, macros) = content.split_once(':')?;
-    let (stem, suffix) = name.split_once('+')?;
+    let (sibling, stem, suffix) = match name.split_once('=') {
+        Some((suffix, stem)) => (true, stem, suffix),
+        None => name.split_once('+').map(|(stem, suffix)| (false, stem, suffix))?,
+    };
     let (stem, suffix) = (stem.trim().to_owned(), suffix.trim().to_owned());
     let defines: Vec<Define> = macros
         .split_whitespace()
@@ -55,6 +70,7 @@ fn parse_line(content: &str, line: usize) -> Option<VariantLine> {
             None => (text.to_owned(), None),
         })
         .collect();
-    let good = is_snake_case(&stem) && is_snake_case(&suffix) && suffix != "base" && !defines.is_empty();
-    good.then_some(VariantLine { stem, suffix, defines, line })
+    let named = is_snake_case(&stem) || (stem == "*" && !sibling);
+    let good = named && is_snake_case(&suffix) && suffix != "base" && !defines.is_empty();
+    good.then_some(VariantLine { stem, suffix, sibling, defines, line })
 }
