@@ -1,6 +1,6 @@
 //! The rules that every shader keeps. Each breach is a [`Finding`] that stops the build.
 
-use super::reflect::{Interface, Kind};
+use super::interface::{Interface, Kind};
 use super::{Finding, Shader, Variant, constants, is_snake_case};
 use std::collections::BTreeMap;
 
