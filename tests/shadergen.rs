@@ -184,9 +184,11 @@ fn another_set_than_0_is_found() {
 
 #[test]
 fn a_binding_that_is_not_used_is_found() {
-    probe("READ(1, uint, idle);", "", &["probe.comp:8", "binding 1 `idle` is not used by probe"]);
+    probe("READ(1, uint, idle);", "", &["probe.comp:8", "binding 1 `idle` is used by no variant of probe"]);
     let code = "uint unused = idle[3]; if (false) words[1] = unused;";
-    probe("READ(1, uint, idle);", code, &["binding 1 `idle` is not used"]);
+    probe("READ(1, uint, idle);", code, &["binding 1 `idle` is used by no variant"]);
+    let text = small("READ(1, uint, busy);", "#ifdef OTHER\n    words[1] = busy[0];\n    #endif");
+    assert!(generate(&[("test/probe.comp", &text), ("variants.txt", "probe + other: OTHER\n")]).is_ok());
 }
 
 #[test]
