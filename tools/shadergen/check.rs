@@ -1,6 +1,6 @@
 //! The rules that every shader keeps. Each breach is a [`Finding`] that stops the build.
 
-use super::reflect::{Interface, Kind};
+use super::interface::{Interface, Kind};
 use super::{Finding, Shader, Variant, constants, is_snake_case};
 use std::collections::BTreeMap;
 
@@ -124,8 +124,11 @@ fn interface(shader: &Shader, variant: &Variant) -> Vec<Finding> {
         if binding.set != 0 {
             breach(name, format!("`{name}` is in set {}; only set 0 is used", binding.set));
         }
-        if !variant.used.contains(&binding.binding) {
-            breach(name, format!("binding {} `{name}` is not used by {}; remove it", binding.binding, variant.name));
+        // Variants share one interface, so a binding that one variant needs is declared in all of them.
+        if !shader.variants.iter().any(|variant| variant.used.contains(&binding.binding)) {
+            let rule =
+                format!("binding {} `{name}` is used by no variant of {}; remove it", binding.binding, shader.stem);
+            breach(name, rule);
         }
         if bindings[..index].iter().any(|other| other.binding == binding.binding) {
             breach(name, format!("binding {} is declared twice", binding.binding));

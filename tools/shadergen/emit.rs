@@ -1,7 +1,7 @@
 //! Writes the Rust side of the shaders.
 
 use super::constants::Constant;
-use super::reflect::{Access, Binding, Kind, SpecConstant, Struct};
+use super::interface::{Access, Binding, Kind, SpecConstant, Struct};
 use super::{Shader, Variant};
 use std::collections::BTreeMap;
 use std::fmt::Write;

@@ -5,10 +5,12 @@ pub mod check;
 pub mod compile;
 pub mod constants;
 pub mod emit;
+pub mod interface;
 pub mod reflect;
 pub mod variants;
 
 use compile::{Define, GlslCompiler, Purpose};
+use interface::Interface;
 use std::collections::BTreeSet;
 use std::fmt;
 use std::fs;
@@ -80,7 +82,7 @@ pub struct Variant {
     /// The module that ships.
     pub words: Vec<u32>,
     /// What the module without optimisation declares.
-    pub interface: reflect::Interface,
+    pub interface: Interface,
     /// Binding numbers that the shipped module touches.
     pub used: BTreeSet<u32>,
 }
