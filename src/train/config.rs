@@ -216,7 +216,10 @@ impl TrainConfig {
             return Err(Error::usage("--sh-degree", format!("is {}, the highest degree is 3", self.sh_degree)));
         }
         if self.test_every == 1 {
-            return Err(Error::usage("--test-every", "is 1, which leaves no view to train on; 2 or more, or --no-test"));
+            return Err(Error::usage(
+                "--test-every",
+                "is 1, which leaves no view to train on; 2 or more, or --no-test",
+            ));
         }
         self.check_ranges()
     }
