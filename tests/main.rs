@@ -1,3 +1,6 @@
 //! Integration tests, one binary.
 
+mod config;
+mod metrics;
 mod shadergen;
+mod synth;
