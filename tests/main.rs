@@ -1,1 +1,11 @@
 //! Integration tests, one binary.
+
+#[allow(dead_code, reason = "mirrors are complete; not every test needs every part")]
+mod reference;
+#[allow(dead_code, reason = "helpers are shared by tests that come and go")]
+mod support;
+
+mod compare_self;
+mod gradient;
+mod labels;
+mod mirrors;
