@@ -1,6 +1,15 @@
 //! Integration tests, one binary.
 
+#[allow(dead_code, reason = "mirrors are complete; not every test needs every part")]
+mod reference;
+#[allow(dead_code, reason = "helpers are shared by tests that come and go")]
+mod support;
+
+mod compare_self;
 mod config;
+mod gradient;
+mod labels;
 mod metrics;
+mod mirrors;
 mod shadergen;
 mod synth;

@@ -1,0 +1,4 @@
+//! Helpers of the tests: predicates and scenes.
+
+pub mod compare;
+pub mod scenes;
