@@ -1,0 +1,6 @@
+//! What tests share.
+
+pub mod device;
+pub mod toy;
+
+pub use device::device;
