@@ -11,5 +11,6 @@ mod gradient;
 mod labels;
 mod metrics;
 mod mirrors;
+mod sched;
 mod shadergen;
 mod synth;
