@@ -1,4 +1,17 @@
 //! Integration tests, one binary.
 
-mod sched;
+#[allow(dead_code, reason = "mirrors are complete; not every test needs every part")]
+mod reference;
+#[allow(dead_code, reason = "helpers are shared by tests that come and go")]
 mod support;
+
+mod compare_self;
+mod config;
+mod gradient;
+mod labels;
+mod metrics;
+mod mirrors;
+mod plan;
+mod sched;
+mod shadergen;
+mod synth;

@@ -1,0 +1,166 @@
+//! Photo loss (L1 and SSIM) and label loss, with their gradients by the image.
+
+use super::Rules;
+
+/// A photo with the pixels that count.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Photo {
+    /// Width and height, px.
+    pub size: (usize, usize),
+    /// [height, width], linear 0 to 1.
+    pub colours: Vec<[f64; 3]>,
+    /// [height, width]; false where the photo has no source.
+    pub valid: Vec<bool>,
+}
+
+impl Photo {
+    /// Three times the number of pixels that count: the denominator of every loss.
+    pub fn elements(&self) -> f64 {
+        3.0 * self.valid.iter().filter(|&&valid| valid).count() as f64
+    }
+
+    /// From an RGBA8 photo.
+    pub fn from_scene(photo: &labelgs::scene::Photo) -> Self {
+        let colour = |p: &[u8; 4]| [p[0], p[1], p[2]].map(|v| f64::from(v) / 255.0);
+        Self {
+            size: (photo.width as usize, photo.height as usize),
+            colours: photo.rgba.iter().map(colour).collect(),
+            valid: photo.rgba.iter().map(|p| p[3] != 0).collect(),
+        }
+    }
+}
+
+/// A loss with its gradient by the image.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Loss {
+    /// Mean absolute difference.
+    pub l1: f64,
+    /// Mean structural similarity.
+    pub ssim: f64,
+    /// Weighted sum that is trained on.
+    pub value: f64,
+    /// Gradient of `value` by the image, [height, width].
+    pub v_image: Vec<[f64; 3]>,
+    /// Smallest absolute difference: distance to the kink of L1.
+    pub margin: f64,
+}
+
+/// Gaussian window of unit sum, [2 reach + 1].
+pub fn window(rules: &Rules) -> Vec<f64> {
+    let reach = rules.ssim_reach as f64;
+    let raw: Vec<f64> = (0..=2 * rules.ssim_reach)
+        .map(|i| (-(i as f64 - reach).powi(2) / (2.0 * rules.ssim_sigma.powi(2))).exp())
+        .collect();
+    let sum: f64 = raw.iter().sum();
+    raw.iter().map(|v| v / sum).collect()
+}
+
+/// Window mean of a plane with zeros outside it. The window is symmetric, so this is its own adjoint.
+pub fn blur(plane: &[f64], (width, height): (usize, usize), window: &[f64]) -> Vec<f64> {
+    let reach = (window.len() / 2) as isize;
+    let along = |plane: &[f64], horizontal: bool| -> Vec<f64> {
+        let at = |x: isize, y: isize| {
+            let inside = x >= 0 && y >= 0 && x < width as isize && y < height as isize;
+            if inside { plane[y as usize * width + x as usize] } else { 0.0 }
+        };
+        let mean = |index: usize| {
+            let (x, y) = ((index % width) as isize, (index / width) as isize);
+            let tap = |(i, weight): (usize, &f64)| {
+                let offset = i as isize - reach;
+                weight * if horizontal { at(x + offset, y) } else { at(x, y + offset) }
+            };
+            window.iter().enumerate().map(tap).sum()
+        };
+        (0..width * height).map(mean).collect()
+    };
+    along(&along(plane, true), false)
+}
+
+/// SSIM of two planes: the map, and the gradient by the first plane of sum(weights * map).
+pub fn ssim(rules: &Rules, size: (usize, usize), x: &[f64], y: &[f64], weights: &[f64]) -> (Vec<f64>, Vec<f64>) {
+    let window = window(rules);
+    let product = |a: &[f64], b: &[f64]| -> Vec<f64> { a.iter().zip(b).map(|(a, b)| a * b).collect() };
+    let mean = |plane: &[f64]| blur(plane, size, &window);
+    let (mu_x, mu_y) = (mean(x), mean(y));
+    let (xx, yy, xy) = (mean(&product(x, x)), mean(&product(y, y)), mean(&product(x, y)));
+    let count = x.len();
+    let (mut map, mut v_mu, mut v_xx, mut v_xy) =
+        (vec![0.0; count], vec![0.0; count], vec![0.0; count], vec![0.0; count]);
+    for i in 0..count {
+        let (mx, my) = (mu_x[i], mu_y[i]);
+        let luminance = 2.0 * mx * my + rules.ssim_c1;
+        let contrast = 2.0 * (xy[i] - mx * my) + rules.ssim_c2;
+        let energy = mx * mx + my * my + rules.ssim_c1;
+        let spread = (xx[i] - mx * mx) + (yy[i] - my * my) + rules.ssim_c2;
+        map[i] = luminance * contrast / (energy * spread);
+        // By x's mean, mean square and mean product, each taken as an independent quantity.
+        v_mu[i] = weights[i]
+            * (2.0 * my * (contrast - luminance) / (energy * spread)
+                - 2.0 * mx * map[i] * (1.0 / energy - 1.0 / spread));
+        v_xx[i] = -weights[i] * map[i] / spread;
+        v_xy[i] = weights[i] * 2.0 * luminance / (energy * spread);
+    }
+    let (b_mu, b_xx, b_xy) = (mean(&v_mu), mean(&v_xx), mean(&v_xy));
+    let gradient = (0..count).map(|i| b_mu[i] + 2.0 * x[i] * b_xx[i] + y[i] * b_xy[i]).collect();
+    (map, gradient)
+}
+
+/// -1, 0 or 1; 0 at 0.
+pub fn sign(value: f64) -> f64 {
+    if value == 0.0 { 0.0 } else { value.signum() }
+}
+
+/// 0.8 L1 + 0.2 (1 - SSIM) over the pixels that count; both images are 0 elsewhere.
+pub fn photo_loss(rules: &Rules, image: &[[f64; 3]], photo: &Photo) -> Loss {
+    let elements = photo.elements();
+    let mut loss = Loss { v_image: vec![[0.0; 3]; image.len()], margin: f64::INFINITY, ..Loss::default() };
+    if elements == 0.0 {
+        return loss;
+    }
+    let valid: Vec<f64> = photo.valid.iter().map(|&v| f64::from(u8::from(v))).collect();
+    for channel in 0..3 {
+        let plane = |colours: &[[f64; 3]]| -> Vec<f64> {
+            colours.iter().zip(&valid).map(|(colour, valid)| if *valid > 0.0 { colour[channel] } else { 0.0 }).collect()
+        };
+        let (x, y) = (plane(image), plane(&photo.colours));
+        let (map, v_ssim) = ssim(rules, photo.size, &x, &y, &valid);
+        for i in (0..image.len()).filter(|&i| photo.valid[i]) {
+            let difference = x[i] - y[i];
+            loss.l1 += difference.abs() / elements;
+            loss.ssim += map[i] / elements;
+            loss.margin = loss.margin.min(difference.abs());
+            loss.v_image[i][channel] = (rules.l1_weight * sign(difference) - rules.dssim_weight * v_ssim[i]) / elements;
+        }
+    }
+    loss.value = rules.l1_weight * loss.l1 + rules.dssim_weight * (1.0 - loss.ssim);
+    loss
+}
+
+/// One object of a step: its label and the labels that hide it in this view.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct ObjectSlot {
+    /// Label of the object, not 0.
+    pub label: u32,
+    /// Labels in front of it: their pixels say nothing about it.
+    pub occluders: Vec<u32>,
+}
+
+/// |U_k (R_k - M_k I)| over the pixels that count, times the label weight. `image` is R_k over black.
+pub fn label_loss(rules: &Rules, image: &[[f64; 3]], photo: &Photo, label_map: &[u32], slot: &ObjectSlot) -> Loss {
+    let elements = photo.elements();
+    let mut loss = Loss { v_image: vec![[0.0; 3]; image.len()], margin: f64::INFINITY, ..Loss::default() };
+    for i in (0..image.len()).filter(|&i| photo.valid[i] && !slot.occluders.contains(&label_map[i])) {
+        for channel in 0..3 {
+            let target = if label_map[i] == slot.label { photo.colours[i][channel] } else { 0.0 };
+            let difference = image[i][channel] - target;
+            loss.l1 += difference.abs() / elements;
+            loss.v_image[i][channel] = rules.label_weight * sign(difference) / elements;
+            // An untouched pixel outside the mask is 0 on both sides and stays so: no kink there.
+            if difference != 0.0 {
+                loss.margin = loss.margin.min(difference.abs());
+            }
+        }
+    }
+    loss.value = rules.label_weight * loss.l1;
+    loss
+}
