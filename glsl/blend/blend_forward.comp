@@ -10,7 +10,8 @@
 //          variant labels: layer_tiles; target [P] RGBA8; view_labels [P]; layer_occluders; label_from_layer;
 //          gaussian_from_splat [V]
 // Writes:  image [P] linear RGB over the background, w = final transmittance; last [P] = 1 + index of the last splat
-//          that contributed, within the tile's list (0: none); variant main: main_splat [P], main_weight_depth [P];
+//          that contributed, within the tile's list (0: none); variant main: main_gaussian [P] (NO_SPLAT: none) and
+//          main_weight_depth [P] (weight, weighted sum of z);
 //          variant labels: layer_state [slots, pixels of a tile] (transmittance, last and signs of the loss gradient),
 //          layer_loss [slots], label_keys [N] (integer maximum, any order)
 // Math:    LabelGS eq. 5; alpha <= ALPHA_MAX; a pair counts where alpha >= ALPHA_MIN, tested on the exponent; a pixel
@@ -29,8 +30,9 @@ FETCH4(5, splats);
 WRITE(6, vec4, image);
 WRITE(7, uint, last);
 #ifdef MAIN
-WRITE(8, uint, main_splat);
+WRITE(8, uint, main_gaussian);
 WRITE(9, vec2, main_weight_depth);
+FETCHU(10, gaussian_from_splat);
 #endif
 #ifdef LABELS
 FETCHU(8, layer_tiles);
@@ -187,7 +189,7 @@ void main() {
             image[p] = vec4(vec3(cr[k], cg[k], cb[k]) + transmittance * u.background, transmittance);
             last[p] = final_[k];
 #ifdef MAIN
-            main_splat[p] = main_[k];
+            main_gaussian[p] = main_[k] == NO_SPLAT ? NO_SPLAT : fetchu(gaussian_from_splat, main_[k]);
             main_weight_depth[p] = vec2(best[k], depth[k]);
 #endif
 #ifdef LABELS

@@ -33,7 +33,8 @@ pub fn blend_forward_main(b: &mut Builder) {
     pass!(b, texel blend_forward_main {
         step: Buf::STEP, counters: Buf::COUNTERS, tile_starts: Buf::TILE_STARTS, tile_ends: Buf::TILE_ENDS,
         sorted_splats: Buf::SORTED_SPLATS, splats: Buf::SPLATS, image: Buf::IMAGE, last: Buf::LAST,
-        main_splat: Buf::MAIN_SPLAT, main_weight_depth: Buf::MAIN_WEIGHT_DEPTH,
+        main_gaussian: Buf::MAIN_GAUSSIAN, main_weight_depth: Buf::MAIN_WEIGHT_DEPTH,
+        gaussian_from_splat: GAUSSIAN_FROM_SPLAT,
     } [subgroup_size: subgroup, tile_width: tile_width, tile_height: tile_height], args(constants::ARGS_BLEND));
 }
 

@@ -23,6 +23,9 @@ pub fn sort(b: &mut Builder, buffers: SortBuffers, bits: u32, count: Count, iden
         let (from, to) = ((pass % 2) as usize, 1 - (pass % 2) as usize);
         let shift = pass * digit_bits;
         let digit_bits = digit_bits.min(32 - shift);
+        // The first pass of an identity sort reads no values; the keys stand in for the buffer that nothing wrote yet.
+        let identity_now = identity && pass == 0;
+        let values_in = if identity_now { buffers.keys[from] } else { buffers.values[from] };
         pass!(b, texel radix_count {
             step: Buf::STEP, counters: Buf::COUNTERS, failure: Buf::FAILURE, keys_in: buffers.keys[from],
             histogram: Buf::SORT_HISTOGRAM,
@@ -31,10 +34,10 @@ pub fn sort(b: &mut Builder, buffers: SortBuffers, bits: u32, count: Count, iden
             [subgroup_size: subgroup, cells: lanes << digit_bits], ONE);
         pass!(b, texel radix_scatter {
             step: Buf::STEP, counters: Buf::COUNTERS, failure: Buf::FAILURE, keys_in: buffers.keys[from],
-            values_in: buffers.values[from], histogram: Buf::SORT_HISTOGRAM, keys_out: buffers.keys[to],
+            values_in: values_in, histogram: Buf::SORT_HISTOGRAM, keys_out: buffers.keys[to],
             values_out: buffers.values[to],
         } [subgroup_size: subgroup, count_source: count as u32, lanes: lanes, shift: shift, digit_bits: digit_bits,
-            identity: u32::from(identity && pass == 0)], groups);
+            identity: u32::from(identity_now)], groups);
     }
     let last = (passes % 2) as usize;
     (buffers.keys[last], buffers.values[last])
