@@ -1,4 +1,4 @@
-//! The table of buffers: every buffer the engine owns is declared once, here, by [`buffers!`].
+//! What a table of buffers is made of; the table itself is `plan/table.rs`.
 //!
 //! A buffer is a plane of equal elements. What it is bound as (read, written, texel) stands in the shaders; where it
 //! lies in memory is decided by the planner from its class.
@@ -118,11 +118,4 @@ macro_rules! buffers {
             $(#[doc = $doc] pub const $ident: $crate::plan::Buf = $crate::plan::Buf(BufferIndex::$ident as u16);)*
         }
     };
-}
-
-buffers! {
-    MEANS "means": 16, Domain::Gaussians, Class::Model, Some(TexelFormat::Rgba32Sfloat), "Centre in world units and opacity logit [N,4].";
-    SCALES "scales": 16, Domain::Gaussians, Class::Model, Some(TexelFormat::Rgba32Sfloat), "Natural logarithms of the three scales, and 0 [N,4].";
-    QUATS "quats": 16, Domain::Gaussians, Class::Model, Some(TexelFormat::Rgba32Sfloat), "Rotation quaternion (w, x, y, z) [N,4].";
-    LABELS "labels": 4, Domain::Gaussians, Class::Model, Some(TexelFormat::R32Uint), "Label of each Gaussian, 0 is unlabelled [N].";
 }

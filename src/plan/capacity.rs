@@ -5,66 +5,81 @@
 pub enum Domain {
     /// A single element.
     One,
-    /// Rows of the model.
-    Gaussians,
-    /// Visible Gaussians of one view.
-    Splats,
-    /// Pairs of splat and tile.
-    Instances,
-    /// Tiles of all layers: the full image and each sampled object.
-    VirtualTiles,
-    /// Tiles of one layer.
-    LayerTiles,
-    /// Pixels of one image.
-    Pixels,
-    /// Pixels of all layers.
-    LayerPixels,
-    /// Counters of the radix sort: digits times workgroups.
-    SortLanes,
-    /// Partial sums of the scan.
-    ScanLanes,
-    /// Label ids.
-    Labels,
     /// A fixed number, whatever the capacity.
     Fixed(u32),
+    /// Rows of the model.
+    Gaussians,
+    /// Rows of the model with moments: all in training, none elsewhere.
+    Trained,
+    /// Rows of the model with labels: all if the scene knows labels, else none.
+    Labelled,
+    /// Pairs of splat and tile, over all layers.
+    Instances,
+    /// Pairs of splat and tile with gradients: all in training, none elsewhere.
+    TrainedInstances,
+    /// Tiles of all layers: the full image and each sampled object.
+    VirtualTiles,
+    /// Tiles of object layers that hold a splat.
+    LayerTiles,
+    /// Pixels of those tiles.
+    LayerPixels,
+    /// Pixels of the largest image.
+    Pixels,
+    /// Pixels of the largest label map; none if the scene knows no labels.
+    LabelledPixels,
+    /// Label ids, 0 included.
+    Labels,
+    /// Layers of a step: the scene, and the objects that are sampled.
+    Layers,
+    /// Words of the bit sets of occluders: layers times labels over 32.
+    OccluderWords,
+    /// Partial sums of the scan.
+    ScanLanes,
+    /// Counters of the radix sort: digits times lanes.
+    SortCells,
+    /// Partial sums of the photo loss.
+    LossPartials,
 }
 
 impl Domain {
     /// Plural noun for messages and tables.
     pub fn name(self) -> &'static str {
         match self {
-            Self::One => "one",
+            Self::One | Self::Fixed(_) => "elements",
             Self::Gaussians => "gaussians",
-            Self::Splats => "splats",
+            Self::Trained => "gaussians in training",
+            Self::Labelled => "labelled gaussians",
             Self::Instances => "instances",
+            Self::TrainedInstances => "instances in training",
             Self::VirtualTiles => "virtual tiles",
-            Self::LayerTiles => "tiles",
-            Self::Pixels => "pixels",
+            Self::LayerTiles => "layer tiles",
             Self::LayerPixels => "layer pixels",
-            Self::SortLanes => "sort lanes",
-            Self::ScanLanes => "scan lanes",
+            Self::Pixels => "pixels",
+            Self::LabelledPixels => "labelled pixels",
             Self::Labels => "labels",
-            Self::Fixed(_) => "fixed",
+            Self::Layers => "layers",
+            Self::OccluderWords => "occluder words",
+            Self::ScanLanes => "scan lanes",
+            Self::SortCells => "sort cells",
+            Self::LossPartials => "loss partials",
         }
     }
 
     /// What the user can do when at most `fits` elements fit.
     pub fn cure(self, fits: u64) -> String {
+        let name = self.name();
         match self {
-            Self::Gaussians | Self::Splats => {
+            Self::Gaussians | Self::Trained | Self::Labelled => {
                 format!("lower --max-gaussians to {fits} or use another device")
             }
-            Self::Instances | Self::SortLanes | Self::ScanLanes => {
-                format!(
-                    "at most {fits} {} fit; lower --max-gaussians or the image size, or use another device",
-                    self.name()
-                )
+            Self::Instances | Self::TrainedInstances | Self::ScanLanes | Self::SortCells => {
+                format!("at most {fits} {name} fit; lower --max-gaussians, use smaller images or another device")
             }
-            Self::VirtualTiles | Self::LayerTiles | Self::Pixels | Self::LayerPixels => {
-                format!("at most {fits} {} fit; use smaller images or another device", self.name())
+            Self::Labels | Self::Layers | Self::OccluderWords => {
+                format!("at most {fits} {name} fit; use fewer labels or another device")
             }
-            Self::Labels => format!("at most {fits} labels fit; use fewer labels or another device"),
             Self::One | Self::Fixed(_) => "use another device".to_owned(),
+            _ => format!("at most {fits} {name} fit; use smaller images or another device"),
         }
     }
 }
@@ -74,24 +89,40 @@ impl Domain {
 pub struct Capacity {
     /// Rows of the model.
     pub gaussians: u64,
-    /// Visible Gaussians of one view.
-    pub splats: u64,
-    /// Pairs of splat and tile.
+    /// Rows of the model with moments: all in training, none elsewhere.
+    pub trained: u64,
+    /// Rows of the model with labels: all if the scene knows labels, else none.
+    pub labelled: u64,
+    /// Pairs of splat and tile, over all layers.
     pub instances: u64,
-    /// Tiles of all layers.
+    /// Pairs of splat and tile with gradients: all in training, none elsewhere.
+    pub trained_instances: u64,
+    /// Tiles of all layers: the full image and each sampled object.
     pub virtual_tiles: u64,
-    /// Tiles of one layer.
+    /// Tiles of object layers that hold a splat.
     pub layer_tiles: u64,
-    /// Pixels of one image.
-    pub pixels: u64,
-    /// Pixels of all layers.
+    /// Pixels of those tiles.
     pub layer_pixels: u64,
-    /// Counters of the radix sort.
-    pub sort_lanes: u64,
+    /// Pixels of the largest image.
+    pub pixels: u64,
+    /// Pixels of the largest label map; none if the scene knows no labels.
+    pub labelled_pixels: u64,
+    /// Label ids, 0 included.
+    pub labels: u64,
+    /// Layers of a step: the scene, and the objects that are sampled.
+    pub layers: u64,
+    /// Words of the bit sets of occluders: layers times labels over 32.
+    pub occluder_words: u64,
     /// Partial sums of the scan.
     pub scan_lanes: u64,
-    /// Label ids.
-    pub labels: u64,
+    /// Counters of the radix sort: digits times lanes.
+    pub sort_cells: u64,
+    /// Partial sums of the photo loss.
+    pub loss_partials: u64,
+    /// Lanes of the radix sort, each with its own counters.
+    pub sort_lanes: u64,
+    /// Segments that the longest list of a tile may have.
+    pub segments: u64,
 }
 
 impl Capacity {
@@ -99,17 +130,23 @@ impl Capacity {
     pub fn count(&self, domain: Domain) -> u64 {
         match domain {
             Domain::One => 1,
+            Domain::Fixed(count) => u64::from(count),
             Domain::Gaussians => self.gaussians,
-            Domain::Splats => self.splats,
+            Domain::Trained => self.trained,
+            Domain::Labelled => self.labelled,
             Domain::Instances => self.instances,
+            Domain::TrainedInstances => self.trained_instances,
             Domain::VirtualTiles => self.virtual_tiles,
             Domain::LayerTiles => self.layer_tiles,
-            Domain::Pixels => self.pixels,
             Domain::LayerPixels => self.layer_pixels,
-            Domain::SortLanes => self.sort_lanes,
-            Domain::ScanLanes => self.scan_lanes,
+            Domain::Pixels => self.pixels,
+            Domain::LabelledPixels => self.labelled_pixels,
             Domain::Labels => self.labels,
-            Domain::Fixed(count) => u64::from(count),
+            Domain::Layers => self.layers,
+            Domain::OccluderWords => self.occluder_words,
+            Domain::ScanLanes => self.scan_lanes,
+            Domain::SortCells => self.sort_cells,
+            Domain::LossPartials => self.loss_partials,
         }
     }
 

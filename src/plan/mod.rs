@@ -13,14 +13,16 @@ mod limits;
 pub mod memory;
 pub mod pass;
 mod report;
+mod table;
 
 pub use barrier::{Barrier, Touch, Use, Uses};
-pub use buffers::{Buf, BufferDecl, Class, TABLE, TexelFormat};
+pub use buffers::{Buf, BufferDecl, Class, TexelFormat};
 pub use capacity::{Capacity, Domain};
 pub use lifetime::Life;
 pub use limits::Limits;
 pub use memory::{MemoryReport, MemoryRow};
 pub use pass::{Grid, PassDecl, PassList, Work};
+pub use table::TABLE;
 
 use crate::error::{Error, Result};
 use crate::shaders::BindingKind;
