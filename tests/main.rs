@@ -11,7 +11,10 @@ mod gradient;
 mod labels;
 mod metrics;
 mod mirrors;
+<<<<<<< HEAD
 mod plan;
+=======
+>>>>>>> main
 mod sched;
 mod shadergen;
 mod synth;

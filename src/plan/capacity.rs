@@ -5,6 +5,41 @@
 pub enum Domain {
     /// A single element.
     One,
+<<<<<<< HEAD
+=======
+    /// Rows of the model; visible splats are at most as many.
+    Gaussians,
+    /// Rows with optimiser state: the same as Gaussians, or 0 where nothing is trained.
+    Trained,
+    /// Rows with labels: the same as Gaussians, or 0 in a scene without masks.
+    Labelled,
+    /// Pairs of splat and tile.
+    Instances,
+    /// Pairs with a gradient record: the same as Instances, or 0 where nothing is trained.
+    TrainedInstances,
+    /// Tiles of all layers: the scene and each sampled object.
+    VirtualTiles,
+    /// Tiles of object layers that hold a splat.
+    LayerTiles,
+    /// Pixels of those tiles.
+    LayerPixels,
+    /// Pixels of one image.
+    Pixels,
+    /// Pixels with labels: the same as Pixels, or 0 in a scene without masks.
+    LabelledPixels,
+    /// Label ids, 0 included.
+    Labels,
+    /// Layers, the scene included.
+    Layers,
+    /// Words of occluder bits of all layers.
+    OccluderWords,
+    /// Cells of the histogram of the sort.
+    SortCells,
+    /// Lanes of the scan.
+    ScanLanes,
+    /// Partial sums of the loss.
+    LossPartials,
+>>>>>>> main
     /// A fixed number, whatever the capacity.
     Fixed(u32),
     /// Rows of the model.
@@ -47,10 +82,17 @@ impl Domain {
         match self {
             Self::One | Self::Fixed(_) => "elements",
             Self::Gaussians => "gaussians",
+<<<<<<< HEAD
             Self::Trained => "gaussians in training",
             Self::Labelled => "labelled gaussians",
             Self::Instances => "instances",
             Self::TrainedInstances => "instances in training",
+=======
+            Self::Trained => "trained",
+            Self::Labelled => "labelled",
+            Self::Instances => "instances",
+            Self::TrainedInstances => "trained instances",
+>>>>>>> main
             Self::VirtualTiles => "virtual tiles",
             Self::LayerTiles => "layer tiles",
             Self::LayerPixels => "layer pixels",
@@ -59,9 +101,16 @@ impl Domain {
             Self::Labels => "labels",
             Self::Layers => "layers",
             Self::OccluderWords => "occluder words",
+<<<<<<< HEAD
             Self::ScanLanes => "scan lanes",
             Self::SortCells => "sort cells",
             Self::LossPartials => "loss partials",
+=======
+            Self::SortCells => "sort cells",
+            Self::ScanLanes => "scan lanes",
+            Self::LossPartials => "loss partials",
+            Self::Fixed(_) => "fixed",
+>>>>>>> main
         }
     }
 
@@ -72,11 +121,25 @@ impl Domain {
             Self::Gaussians | Self::Trained | Self::Labelled => {
                 format!("lower --max-gaussians to {fits} or use another device")
             }
+<<<<<<< HEAD
             Self::Instances | Self::TrainedInstances | Self::ScanLanes | Self::SortCells => {
                 format!("at most {fits} {name} fit; lower --max-gaussians, use smaller images or another device")
             }
             Self::Labels | Self::Layers | Self::OccluderWords => {
                 format!("at most {fits} {name} fit; use fewer labels or another device")
+=======
+            Self::Instances | Self::TrainedInstances | Self::SortCells | Self::ScanLanes => {
+                format!(
+                    "at most {fits} {} fit; lower --max-gaussians or --max-resolution, or use another device",
+                    self.name()
+                )
+            }
+            Self::Pixels | Self::LabelledPixels | Self::VirtualTiles | Self::LossPartials => {
+                format!("at most {fits} {} fit; lower --max-resolution or use another device", self.name())
+            }
+            Self::LayerTiles | Self::LayerPixels | Self::Labels | Self::Layers | Self::OccluderWords => {
+                format!("at most {fits} {} fit; lower --label-samples or use another device", self.name())
+>>>>>>> main
             }
             Self::One | Self::Fixed(_) => "use another device".to_owned(),
             _ => format!("at most {fits} {name} fit; use smaller images or another device"),
@@ -87,8 +150,9 @@ impl Domain {
 /// The most there may be of each domain; decides the size of every buffer.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Capacity {
-    /// Rows of the model.
+    /// Rows of the model; visible splats are at most as many.
     pub gaussians: u64,
+<<<<<<< HEAD
     /// Rows of the model with moments: all in training, none elsewhere.
     pub trained: u64,
     /// Rows of the model with labels: all if the scene knows labels, else none.
@@ -98,11 +162,23 @@ pub struct Capacity {
     /// Pairs of splat and tile with gradients: all in training, none elsewhere.
     pub trained_instances: u64,
     /// Tiles of all layers: the full image and each sampled object.
+=======
+    /// Rows with optimiser state: the same as Gaussians, or 0 where nothing is trained.
+    pub trained: u64,
+    /// Rows with labels: the same as Gaussians, or 0 in a scene without masks.
+    pub labelled: u64,
+    /// Pairs of splat and tile.
+    pub instances: u64,
+    /// Pairs with a gradient record: the same as Instances, or 0 where nothing is trained.
+    pub trained_instances: u64,
+    /// Tiles of all layers: the scene and each sampled object.
+>>>>>>> main
     pub virtual_tiles: u64,
     /// Tiles of object layers that hold a splat.
     pub layer_tiles: u64,
     /// Pixels of those tiles.
     pub layer_pixels: u64,
+<<<<<<< HEAD
     /// Pixels of the largest image.
     pub pixels: u64,
     /// Pixels of the largest label map; none if the scene knows no labels.
@@ -122,6 +198,27 @@ pub struct Capacity {
     /// Lanes of the radix sort, each with its own counters.
     pub sort_lanes: u64,
     /// Segments that the longest list of a tile may have.
+=======
+    /// Pixels of one image.
+    pub pixels: u64,
+    /// Pixels with labels: the same as Pixels, or 0 in a scene without masks.
+    pub labelled_pixels: u64,
+    /// Label ids, 0 included.
+    pub labels: u64,
+    /// Layers, the scene included.
+    pub layers: u64,
+    /// Words of occluder bits of all layers.
+    pub occluder_words: u64,
+    /// Cells of the histogram of the sort.
+    pub sort_cells: u64,
+    /// Lanes of the scan.
+    pub scan_lanes: u64,
+    /// Partial sums of the loss.
+    pub loss_partials: u64,
+    /// Lanes of the sort; no buffer counts them.
+    pub sort_lanes: u64,
+    /// Dispatches that one walk of a tile's list may take; no buffer counts them.
+>>>>>>> main
     pub segments: u64,
 }
 
@@ -144,9 +241,16 @@ impl Capacity {
             Domain::Labels => self.labels,
             Domain::Layers => self.layers,
             Domain::OccluderWords => self.occluder_words,
+<<<<<<< HEAD
             Domain::ScanLanes => self.scan_lanes,
             Domain::SortCells => self.sort_cells,
             Domain::LossPartials => self.loss_partials,
+=======
+            Domain::SortCells => self.sort_cells,
+            Domain::ScanLanes => self.scan_lanes,
+            Domain::LossPartials => self.loss_partials,
+            Domain::Fixed(count) => u64::from(count),
+>>>>>>> main
         }
     }
 

@@ -17,6 +17,10 @@ mod table;
 
 pub use barrier::{Barrier, Touch, Use, Uses};
 pub use buffers::{Buf, BufferDecl, Class, TexelFormat};
+<<<<<<< HEAD
+=======
+pub use table::TABLE;
+>>>>>>> main
 pub use capacity::{Capacity, Domain};
 pub use lifetime::Life;
 pub use limits::Limits;

@@ -1,4 +1,4 @@
-//! Helpers of the tests: the device, toy shaders, predicates and scenes.
+//! What the tests share: a device, comparison predicates, small scenes, toy shaders.
 
 pub mod compare;
 pub mod device;
