@@ -11,10 +11,7 @@ mod gradient;
 mod labels;
 mod metrics;
 mod mirrors;
-<<<<<<< HEAD
 mod plan;
-=======
->>>>>>> main
 mod sched;
 mod shadergen;
 mod synth;

@@ -5,8 +5,6 @@
 pub enum Domain {
     /// A single element.
     One,
-<<<<<<< HEAD
-=======
     /// Rows of the model; visible splats are at most as many.
     Gaussians,
     /// Rows with optimiser state: the same as Gaussians, or 0 where nothing is trained.
@@ -39,60 +37,20 @@ pub enum Domain {
     ScanLanes,
     /// Partial sums of the loss.
     LossPartials,
->>>>>>> main
     /// A fixed number, whatever the capacity.
     Fixed(u32),
-    /// Rows of the model.
-    Gaussians,
-    /// Rows of the model with moments: all in training, none elsewhere.
-    Trained,
-    /// Rows of the model with labels: all if the scene knows labels, else none.
-    Labelled,
-    /// Pairs of splat and tile, over all layers.
-    Instances,
-    /// Pairs of splat and tile with gradients: all in training, none elsewhere.
-    TrainedInstances,
-    /// Tiles of all layers: the full image and each sampled object.
-    VirtualTiles,
-    /// Tiles of object layers that hold a splat.
-    LayerTiles,
-    /// Pixels of those tiles.
-    LayerPixels,
-    /// Pixels of the largest image.
-    Pixels,
-    /// Pixels of the largest label map; none if the scene knows no labels.
-    LabelledPixels,
-    /// Label ids, 0 included.
-    Labels,
-    /// Layers of a step: the scene, and the objects that are sampled.
-    Layers,
-    /// Words of the bit sets of occluders: layers times labels over 32.
-    OccluderWords,
-    /// Partial sums of the scan.
-    ScanLanes,
-    /// Counters of the radix sort: digits times lanes.
-    SortCells,
-    /// Partial sums of the photo loss.
-    LossPartials,
 }
 
 impl Domain {
     /// Plural noun for messages and tables.
     pub fn name(self) -> &'static str {
         match self {
-            Self::One | Self::Fixed(_) => "elements",
+            Self::One => "one",
             Self::Gaussians => "gaussians",
-<<<<<<< HEAD
-            Self::Trained => "gaussians in training",
-            Self::Labelled => "labelled gaussians",
-            Self::Instances => "instances",
-            Self::TrainedInstances => "instances in training",
-=======
             Self::Trained => "trained",
             Self::Labelled => "labelled",
             Self::Instances => "instances",
             Self::TrainedInstances => "trained instances",
->>>>>>> main
             Self::VirtualTiles => "virtual tiles",
             Self::LayerTiles => "layer tiles",
             Self::LayerPixels => "layer pixels",
@@ -101,33 +59,19 @@ impl Domain {
             Self::Labels => "labels",
             Self::Layers => "layers",
             Self::OccluderWords => "occluder words",
-<<<<<<< HEAD
-            Self::ScanLanes => "scan lanes",
-            Self::SortCells => "sort cells",
-            Self::LossPartials => "loss partials",
-=======
             Self::SortCells => "sort cells",
             Self::ScanLanes => "scan lanes",
             Self::LossPartials => "loss partials",
             Self::Fixed(_) => "fixed",
->>>>>>> main
         }
     }
 
     /// What the user can do when at most `fits` elements fit.
     pub fn cure(self, fits: u64) -> String {
-        let name = self.name();
         match self {
             Self::Gaussians | Self::Trained | Self::Labelled => {
                 format!("lower --max-gaussians to {fits} or use another device")
             }
-<<<<<<< HEAD
-            Self::Instances | Self::TrainedInstances | Self::ScanLanes | Self::SortCells => {
-                format!("at most {fits} {name} fit; lower --max-gaussians, use smaller images or another device")
-            }
-            Self::Labels | Self::Layers | Self::OccluderWords => {
-                format!("at most {fits} {name} fit; use fewer labels or another device")
-=======
             Self::Instances | Self::TrainedInstances | Self::SortCells | Self::ScanLanes => {
                 format!(
                     "at most {fits} {} fit; lower --max-gaussians or --max-resolution, or use another device",
@@ -139,10 +83,8 @@ impl Domain {
             }
             Self::LayerTiles | Self::LayerPixels | Self::Labels | Self::Layers | Self::OccluderWords => {
                 format!("at most {fits} {} fit; lower --label-samples or use another device", self.name())
->>>>>>> main
             }
             Self::One | Self::Fixed(_) => "use another device".to_owned(),
-            _ => format!("at most {fits} {name} fit; use smaller images or another device"),
         }
     }
 }
@@ -152,17 +94,6 @@ impl Domain {
 pub struct Capacity {
     /// Rows of the model; visible splats are at most as many.
     pub gaussians: u64,
-<<<<<<< HEAD
-    /// Rows of the model with moments: all in training, none elsewhere.
-    pub trained: u64,
-    /// Rows of the model with labels: all if the scene knows labels, else none.
-    pub labelled: u64,
-    /// Pairs of splat and tile, over all layers.
-    pub instances: u64,
-    /// Pairs of splat and tile with gradients: all in training, none elsewhere.
-    pub trained_instances: u64,
-    /// Tiles of all layers: the full image and each sampled object.
-=======
     /// Rows with optimiser state: the same as Gaussians, or 0 where nothing is trained.
     pub trained: u64,
     /// Rows with labels: the same as Gaussians, or 0 in a scene without masks.
@@ -172,33 +103,11 @@ pub struct Capacity {
     /// Pairs with a gradient record: the same as Instances, or 0 where nothing is trained.
     pub trained_instances: u64,
     /// Tiles of all layers: the scene and each sampled object.
->>>>>>> main
     pub virtual_tiles: u64,
     /// Tiles of object layers that hold a splat.
     pub layer_tiles: u64,
     /// Pixels of those tiles.
     pub layer_pixels: u64,
-<<<<<<< HEAD
-    /// Pixels of the largest image.
-    pub pixels: u64,
-    /// Pixels of the largest label map; none if the scene knows no labels.
-    pub labelled_pixels: u64,
-    /// Label ids, 0 included.
-    pub labels: u64,
-    /// Layers of a step: the scene, and the objects that are sampled.
-    pub layers: u64,
-    /// Words of the bit sets of occluders: layers times labels over 32.
-    pub occluder_words: u64,
-    /// Partial sums of the scan.
-    pub scan_lanes: u64,
-    /// Counters of the radix sort: digits times lanes.
-    pub sort_cells: u64,
-    /// Partial sums of the photo loss.
-    pub loss_partials: u64,
-    /// Lanes of the radix sort, each with its own counters.
-    pub sort_lanes: u64,
-    /// Segments that the longest list of a tile may have.
-=======
     /// Pixels of one image.
     pub pixels: u64,
     /// Pixels with labels: the same as Pixels, or 0 in a scene without masks.
@@ -218,7 +127,6 @@ pub struct Capacity {
     /// Lanes of the sort; no buffer counts them.
     pub sort_lanes: u64,
     /// Dispatches that one walk of a tile's list may take; no buffer counts them.
->>>>>>> main
     pub segments: u64,
 }
 
@@ -227,7 +135,6 @@ impl Capacity {
     pub fn count(&self, domain: Domain) -> u64 {
         match domain {
             Domain::One => 1,
-            Domain::Fixed(count) => u64::from(count),
             Domain::Gaussians => self.gaussians,
             Domain::Trained => self.trained,
             Domain::Labelled => self.labelled,
@@ -241,16 +148,10 @@ impl Capacity {
             Domain::Labels => self.labels,
             Domain::Layers => self.layers,
             Domain::OccluderWords => self.occluder_words,
-<<<<<<< HEAD
-            Domain::ScanLanes => self.scan_lanes,
-            Domain::SortCells => self.sort_cells,
-            Domain::LossPartials => self.loss_partials,
-=======
             Domain::SortCells => self.sort_cells,
             Domain::ScanLanes => self.scan_lanes,
             Domain::LossPartials => self.loss_partials,
             Domain::Fixed(count) => u64::from(count),
->>>>>>> main
         }
     }
 
