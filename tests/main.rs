@@ -11,6 +11,7 @@ mod gradient;
 mod labels;
 mod metrics;
 mod mirrors;
+mod plan;
 mod sched;
 mod shadergen;
 mod synth;

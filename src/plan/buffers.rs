@@ -1,4 +1,4 @@
-//! The table of buffers: every buffer the engine owns is declared once, here, by [`buffers!`].
+//! What a table of buffers is made of; the table itself is `plan/table.rs`.
 //!
 //! A buffer is a plane of equal elements. What it is bound as (read, written, texel) stands in the shaders; where it
 //! lies in memory is decided by the planner from its class.
