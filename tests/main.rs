@@ -8,4 +8,5 @@ mod support;
 mod compare_self;
 mod gradient;
 mod labels;
+mod mirror_mutants;
 mod mirrors;

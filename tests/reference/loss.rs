@@ -41,8 +41,19 @@ pub struct Loss {
     pub value: f64,
     /// Gradient of `value` by the image, [height, width].
     pub v_image: Vec<[f64; 3]>,
-    /// Smallest absolute difference: distance to the kink of L1.
-    pub margin: f64,
+    /// Smallest absolute difference of a pixel's channels: distance to the kink of L1, [height, width].
+    pub margins: Vec<f64>,
+}
+
+impl Loss {
+    fn empty(pixels: usize) -> Self {
+        Self { v_image: vec![[0.0; 3]; pixels], margins: vec![f64::INFINITY; pixels], ..Self::default() }
+    }
+
+    /// Smallest margin of all pixels.
+    pub fn margin(&self) -> f64 {
+        self.margins.iter().copied().fold(f64::INFINITY, f64::min)
+    }
 }
 
 /// Gaussian window of unit sum, [2 reach + 1].
@@ -113,7 +124,7 @@ pub fn sign(value: f64) -> f64 {
 /// 0.8 L1 + 0.2 (1 - SSIM) over the pixels that count; both images are 0 elsewhere.
 pub fn photo_loss(rules: &Rules, image: &[[f64; 3]], photo: &Photo) -> Loss {
     let elements = photo.elements();
-    let mut loss = Loss { v_image: vec![[0.0; 3]; image.len()], margin: f64::INFINITY, ..Loss::default() };
+    let mut loss = Loss::empty(image.len());
     if elements == 0.0 {
         return loss;
     }
@@ -128,7 +139,7 @@ pub fn photo_loss(rules: &Rules, image: &[[f64; 3]], photo: &Photo) -> Loss {
             let difference = x[i] - y[i];
             loss.l1 += difference.abs() / elements;
             loss.ssim += map[i] / elements;
-            loss.margin = loss.margin.min(difference.abs());
+            loss.margins[i] = loss.margins[i].min(difference.abs());
             loss.v_image[i][channel] = (rules.l1_weight * sign(difference) - rules.dssim_weight * v_ssim[i]) / elements;
         }
     }
@@ -148,7 +159,7 @@ pub struct ObjectSlot {
 /// |U_k (R_k - M_k I)| over the pixels that count, times the label weight. `image` is R_k over black.
 pub fn label_loss(rules: &Rules, image: &[[f64; 3]], photo: &Photo, label_map: &[u32], slot: &ObjectSlot) -> Loss {
     let elements = photo.elements();
-    let mut loss = Loss { v_image: vec![[0.0; 3]; image.len()], margin: f64::INFINITY, ..Loss::default() };
+    let mut loss = Loss::empty(image.len());
     for i in (0..image.len()).filter(|&i| photo.valid[i] && !slot.occluders.contains(&label_map[i])) {
         for channel in 0..3 {
             let target = if label_map[i] == slot.label { photo.colours[i][channel] } else { 0.0 };
@@ -157,7 +168,7 @@ pub fn label_loss(rules: &Rules, image: &[[f64; 3]], photo: &Photo, label_map: &
             loss.v_image[i][channel] = rules.label_weight * sign(difference) / elements;
             // An untouched pixel outside the mask is 0 on both sides and stays so: no kink there.
             if difference != 0.0 {
-                loss.margin = loss.margin.min(difference.abs());
+                loss.margins[i] = loss.margins[i].min(difference.abs());
             }
         }
     }
