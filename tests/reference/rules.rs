@@ -178,7 +178,7 @@ pub fn mutants() -> Vec<Mutant> {
         ("prune_scale_after", Densify, |r| r.prune_scale_after = 100),
         ("reset_opacity", Reset, |r| r.reset_opacity *= 1.03),
     ];
-    let lift: (&'static str, Family, Change) = ("lift_threshold", Lift, |r| r.lift_threshold *= 1.1);
+    let lift: (&'static str, Family, Change) = ("lift_threshold", Lift, |r| r.lift_threshold *= 0.75);
     let changed = |(name, family, change): (&'static str, Family, Change)| {
         let mut rules = Rules::default();
         change(&mut rules);
