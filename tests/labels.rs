@@ -1,7 +1,7 @@
 //! What labels must do, on the mirrors: weights and thresholds, the lift, densification, the label loss, object layers.
 
 use crate::reference::blend::{Blended, Contribution, Trace, blend_backward, blend_forward, shade};
-use crate::reference::densify::{Origin, Population, densify};
+use crate::reference::densify::{Origin, Population, accumulate, densify, mark};
 use crate::reference::lift::{Masks, lift, lift_resolve, pixel_of, vote_key};
 use crate::reference::loss::{ObjectSlot, Photo, label_loss};
 use crate::reference::model::flatten;
@@ -181,6 +181,7 @@ fn densification_carries_labels_and_keeps_order() {
     ];
     check("origins", exact(&after.origins, &origins));
     check("labels", exact(&after.model.labels, &[1, 2, 2, 3, 3, 5, 5]));
+    check("counts", exact(&mark(&Rules::default(), &before, 1.0, 3001), &[1, 2, 2, 0, 2, 0]));
     let moments: Vec<f64> = after.m.iter().map(|m| m.opacity).collect();
     assert_eq!(moments, [1.0, 2.0, 0.0, 0.0, 0.0, 0.0, 0.0], "only rows that were there keep their moments");
     assert_eq!(after.model.rows[1], after.model.rows[2], "a clone stands where its parent stands");
@@ -190,6 +191,15 @@ fn densification_carries_labels_and_keeps_order() {
 
     let early = densify(&Rules::default(), &before, 1.0, 3000, noise);
     assert_eq!(early.model.labels, [1, 2, 2, 3, 3, 5, 5, 6, 6], "large rows stay until after step 3000");
+}
+
+#[test]
+fn densification_counts_the_views_that_see_a_gaussian() {
+    let mut all = population();
+    accumulate(&mut all, &[1e-3, 2e-3, 0.0, 0.0, 0.0, 0.0], &[true, true, true, false, false, false]);
+    assert_eq!(all.gradient_count, [4.0, 4.0, 4.0, 0.0, 3.0, 3.0]);
+    assert_eq!(all.gradient_sum[1], 9e-4 + 2e-3);
+    assert_eq!(all.gradient_sum[2..], [9e-4, 0.0, 9e-4, 9e-4]);
 }
 
 #[test]

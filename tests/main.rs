@@ -6,7 +6,11 @@ mod reference;
 mod support;
 
 mod compare_self;
+mod config;
 mod gradient;
 mod labels;
+mod metrics;
 mod mirror_mutants;
 mod mirrors;
+mod shadergen;
+mod synth;

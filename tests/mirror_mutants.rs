@@ -2,7 +2,7 @@
 
 use crate::gradient::differences;
 use crate::reference::adam::{Optimised, Rates, adam};
-use crate::reference::densify::{densify, reset_opacity};
+use crate::reference::densify::{densify, opacity_reset};
 use crate::reference::lift::{Masks, centres_of, lift};
 use crate::reference::model::ROW_FLOATS;
 use crate::reference::rules::{Family, mutants};
@@ -41,7 +41,7 @@ fn outcome(family: Family, rules: &Rules, (s, model): &(Scene, Model)) -> Vec<f6
         }
         Family::Reset => {
             let (mut row, mut m, mut u) = (Row { opacity: 2.0, ..Row::default() }, Row::default(), Row::default());
-            reset_opacity(rules, &mut row, &mut m, &mut u);
+            opacity_reset(rules, &mut row, &mut m, &mut u);
             vec![row.opacity]
         }
         Family::Lift => {

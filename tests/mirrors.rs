@@ -2,12 +2,14 @@
 
 use crate::reference::adam::{Optimised, Rates, adam, falling_rate};
 use crate::reference::blend::{blend_forward, centre, shade, trace};
-use crate::reference::loss::{Photo, blur, photo_loss, ssim, window};
+use crate::reference::loss::{Photo, blur, photo_loss, ssim, ssim_backward, window};
 use crate::reference::project::{Splat, normalised, project_all, project_forward, rotation};
-use crate::reference::scan::{compact, scan};
+use crate::reference::scan::{compact, exclusive_scan};
 use crate::reference::sort::{depth_sort, radix_sort};
 use crate::reference::step::splats_of;
-use crate::reference::tile::{TileGrid, counted_tiles, cull, emit_instances, exponent, tile_ranges, touched_tiles};
+use crate::reference::tile::{
+    TileGrid, counted_tiles, cull, emit_instances, exponent, tile_lengths, tile_ranges, tiles_within, touched_tiles,
+};
 use crate::reference::{Model, Row, Rules, sh};
 use crate::support::compare::{Tolerance, check, close, exact};
 use crate::support::scenes::{Scene, Shape, dot, generator, plain_camera, scene, uniform};
@@ -131,6 +133,9 @@ fn tiles_of_an_ellipse() {
         let (touched, _) = touched_tiles(&rules, splat, &grid);
         let counted = counted_tiles(&rules, splat, &grid);
         assert!(counted.iter().all(|tile| touched.contains(tile)));
+        let wider = tiles_within(&rules, splat, &grid, 0.5);
+        assert!(touched.iter().all(|tile| wider.contains(tile)));
+        assert_eq!(tiles_within(&rules, splat, &grid, 0.0), touched);
         touched_count += touched.len();
         only_between += touched.len() - counted.len();
         for tile in 0..grid.count() {
@@ -172,9 +177,11 @@ fn instances_and_ranges() {
 fn orders_and_sums() {
     assert_eq!(depth_sort(&[3.0, 1.0, 2.0, 1.0]), [1, 3, 2, 0]);
     assert_eq!(radix_sort(&[5, 1, 5, 0, 1]), [3, 1, 4, 0, 2]);
-    assert_eq!(scan(&[3, 0, 2, 7]), (vec![0, 3, 3, 5], 12));
+    assert_eq!(exclusive_scan(&[3, 0, 2, 7]), (vec![0, 3, 3, 5], 12));
     assert_eq!(compact(&[0, 4, 0, 1]), [1, 3]);
-    assert_eq!(tile_ranges(&[0, 0, 3], 4), [[0, 2], [0, 0], [0, 0], [2, 3]]);
+    let ranges = tile_ranges(&[0, 0, 3], 4);
+    assert_eq!(ranges, [[0, 2], [0, 0], [0, 0], [2, 3]]);
+    assert_eq!(tile_lengths(&ranges), (2, vec![true, false, false, true]));
 }
 
 /// SSIM at one pixel from its definition: weighted means, variances and covariance of the 11 x 11 window.
@@ -202,11 +209,11 @@ fn ssim_is_its_definition() {
     let (rules, mut random, size) = (Rules::default(), generator(9), (17, 14));
     let mut plane = || -> Vec<f64> { (0..17 * 14).map(|_| uniform(&mut random, 0.0, 1.0)).collect() };
     let (x, y) = (plane(), plane());
-    let (map, _) = ssim(&rules, size, &x, &y, &[1.0; 17 * 14]);
+    let map = ssim(&rules, size, &x, &y);
     let direct: Vec<f64> =
         (0..17 * 14).map(|i| ssim_at(&rules, size, &x, &y, ((i % 17) as isize, (i / 17) as isize))).collect();
     check("ssim", close(&map, &direct, EQUAL));
-    let (same, v) = ssim(&rules, size, &x, &x, &[1.0; 17 * 14]);
+    let (same, v) = (ssim(&rules, size, &x, &x), ssim_backward(&rules, size, &x, &x, &[1.0; 17 * 14]));
     check("ssim of a copy", close(&same, &[1.0; 17 * 14], EQUAL));
     assert!(v.iter().all(|v| v.abs() < 1e-9), "a copy is the maximum");
     let w = window(&rules);

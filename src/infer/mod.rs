@@ -1,1 +1,10 @@
-//! (to be written)
+//! What to do with a trained model: choose labels, filter Gaussians, score, write pictures. Plain arrays only; whoever
+//! renders hands them in.
+
+pub mod choose;
+pub mod metrics;
+pub mod occlusion;
+pub mod output;
+pub mod scores;
+pub mod select;
+pub mod ssim;

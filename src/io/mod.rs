@@ -1,1 +1,75 @@
-//! (to be written)
+//! Files to scenes and back.
+//!
+//! [`open`] reads a captured scene, [`ply`] the model, [`image`] and [`mask`] pixels, [`camera_json`] single cameras;
+//! [`init`] makes the first Gaussians of a scene. All output goes through [`atomic`].
+
+pub mod atomic;
+pub mod camera_json;
+mod colmap;
+pub mod image;
+pub mod init;
+pub mod lens;
+mod listing;
+mod load;
+pub mod mask;
+pub mod ply;
+mod resample;
+mod transforms;
+
+use crate::error::{Error, Result};
+use crate::scene::Dataset;
+use std::path::{Path, PathBuf};
+
+pub use init::initial_gaussians;
+
+/// What to read of a scene, and how.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LoadOptions {
+    /// Folder of id images; none are read without it.
+    pub masks: Option<PathBuf>,
+    /// Bound on the longest side of photos, px.
+    pub max_resolution: Option<u32>,
+    /// Every how many-th photo by name is held out (the first, then every K-th); `None` holds out nothing. A scene
+    /// with a split of its own keeps it.
+    pub test_every: Option<u32>,
+    /// Colour behind transparent photos, components from 0 to 1.
+    pub background: [f32; 3],
+    /// Whether photos are decoded. Their sizes are read in any case.
+    pub photos: bool,
+}
+
+impl Default for LoadOptions {
+    fn default() -> Self {
+        Self { masks: None, max_resolution: None, test_every: Some(8), background: [0.0; 3], photos: true }
+    }
+}
+
+/// Reads the scene in the folder `scene`: a COLMAP model (`sparse/0`, `sparse`, `colmap/sparse/0` or the folder
+/// itself; it wins over the others), or `transforms_train.json` with `transforms_test.json`, or `transforms.json`.
+/// A path to one `.json` file reads that file.
+///
+/// Views come undistorted and resized, each with a pinhole camera of its own size; see [`LoadOptions`] and the notes
+/// of the result. Undistortion keeps focal lengths and principal point: pixels for which the photo has no source get
+/// alpha 0 and the id 0. Listed photos without a file are skipped before the split.
+pub fn open(scene: &Path, options: &LoadOptions) -> Result<Dataset> {
+    if options.max_resolution == Some(0) {
+        return Err(Error::usage("--max-resolution", "0 px leaves no image; expected 1 or more"));
+    }
+    if scene.is_file() {
+        let root = scene.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        return load::load(root, transforms::list_file(root, scene)?, options);
+    }
+    if !scene.is_dir() {
+        return Err(Error::data(scene, "", "there is no such folder; expected the folder of a scene"));
+    }
+    let listing = match colmap::list(scene)? {
+        Some(listing) => Some(listing),
+        None => transforms::list(scene)?,
+    };
+    let Some(listing) = listing else {
+        let problem = "holds no scene: expected a COLMAP model (cameras and images, .bin or .txt, in sparse/0, sparse \
+                       or colmap/sparse/0) or transforms.json or transforms_train.json";
+        return Err(Error::data(scene, "", problem));
+    };
+    load::load(scene, listing, options)
+}

@@ -1,1 +1,5 @@
-//! (to be written)
+//! Training.
+
+pub mod config;
+
+pub use config::TrainConfig;

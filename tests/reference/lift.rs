@@ -44,9 +44,9 @@ pub fn border_distance(at: [f64; 2]) -> f64 {
     at.iter().map(|v| (v - v.round()).abs()).fold(f64::INFINITY, f64::min)
 }
 
-/// 16 bits of weight above 16 bits of label.
+/// 16 bits of weight (rounded down) above 16 bits of label.
 pub fn vote_key(weight: f64, label: u32) -> u32 {
-    ((weight * 65_535.0 + 0.5).floor() as u32) << 16 | label
+    ((weight * 65_535.0).floor() as u32) << 16 | label
 }
 
 /// Votes of one scene image. `centres[gaussian]` is its centre in the view, px; `None` where it is not drawn.

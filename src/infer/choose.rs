@@ -1,0 +1,70 @@
+//! From a mask in one view to labels.
+
+use crate::scene::{LabelMap, UNLABELLED};
+use crate::{Error, Result};
+
+/// A label that a mask touches.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Candidate {
+    /// The label.
+    pub label: u32,
+    /// Pixels of the label inside the mask.
+    pub inside: u64,
+    /// Pixels of the label in the whole view.
+    pub pixels: u64,
+}
+
+/// Labels with a pixel inside the mask, most pixels inside first.
+pub fn candidates(map: &LabelMap, mask: &[bool]) -> Vec<Candidate> {
+    let mut counts = vec![(0_u64, 0_u64); 65_536];
+    for (&id, &inside) in map.ids.iter().zip(mask) {
+        let (within, all) = &mut counts[usize::from(id)];
+        *all += 1;
+        *within += u64::from(inside);
+    }
+    let mut found: Vec<Candidate> = (0_u32..)
+        .zip(counts)
+        .filter(|&(label, (inside, _))| label != UNLABELLED && inside > 0)
+        .map(|(label, (inside, pixels))| Candidate { label, inside, pixels })
+        .collect();
+    found.sort_by_key(|candidate| (std::cmp::Reverse(candidate.inside), candidate.label));
+    found
+}
+
+/// The paper's rule: labels with more than half of their pixels of the view inside the mask, sorted. May be empty.
+pub fn choose_labels(map: &LabelMap, mask: &[bool]) -> Vec<u32> {
+    let mut labels: Vec<u32> = candidates(map, mask)
+        .iter()
+        .filter(|candidate| 2 * candidate.inside > candidate.pixels)
+        .map(|candidate| candidate.label)
+        .collect();
+    labels.sort_unstable();
+    labels
+}
+
+/// [`choose_labels`], or an error that names `argument` and lists the labels that came closest.
+pub fn require_labels(argument: &str, map: &LabelMap, mask: &[bool]) -> Result<Vec<u32>> {
+    if mask.len() != map.ids.len() {
+        let problem = format!("has {} pixels, the view has {} x {}", mask.len(), map.width, map.height);
+        return Err(Error::usage(argument, problem));
+    }
+    let labels = choose_labels(map, mask);
+    if !labels.is_empty() {
+        return Ok(labels);
+    }
+    let near: Vec<String> = candidates(map, mask)
+        .iter()
+        .take(8)
+        .map(|c| format!("{} ({} of its {} pixels are inside)", c.label, c.inside, c.pixels))
+        .collect();
+    let problem = if near.is_empty() {
+        "covers no pixel of any label in this view; draw it over an object".to_owned()
+    } else {
+        format!(
+            "selects nothing, because no label has more than half of its pixels inside; it touches {}; \
+             widen it or name one with --labels",
+            near.join(", ")
+        )
+    };
+    Err(Error::usage(argument, problem))
+}

@@ -1,0 +1,84 @@
+//! Scores of one image against another. Colours are r, g, b in 0 to 1; everything is summed in f64.
+
+use crate::scene::Photo;
+
+/// Opacity above which a pixel counts as covered by an object that is rendered alone.
+pub const COVERED: f32 = 0.5;
+/// Channel value above which the paper counts a pixel as covered, on black.
+pub const PAPER_COVERED: f32 = 0.01;
+
+/// Peak signal-to-noise ratio of a mean squared error, dB; infinite for equal images.
+pub fn psnr_of(mean_squared_error: f64) -> f64 {
+    -10.0 * mean_squared_error.log10()
+}
+
+/// PSNR of a render against a photo, dB: the render clamped to 0..1, one mean squared error over all channels of the
+/// photo's valid pixels. NaN for a photo without a valid pixel.
+pub fn psnr(render: &[[f32; 3]], photo: &Photo) -> f64 {
+    let (mut sum, mut count) = (0.0, 0_u64);
+    for (colour, &[r, g, b, valid]) in render.iter().zip(&photo.rgba) {
+        if valid == 0 {
+            continue;
+        }
+        for (&value, truth) in colour.iter().zip([r, g, b]) {
+            let difference = f64::from(value.clamp(0.0, 1.0)) - f64::from(truth) / 255.0;
+            sum += difference * difference;
+        }
+        count += 3;
+    }
+    psnr_of(sum / count as f64)
+}
+
+/// Pixels that two masks share, and pixels of either.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Overlap {
+    /// In both.
+    pub both: u64,
+    /// In one or the other.
+    pub either: u64,
+}
+
+impl Overlap {
+    /// Counts over pairs (predicted, true).
+    pub fn count(pairs: impl IntoIterator<Item = (bool, bool)>) -> Self {
+        pairs.into_iter().fold(Self::default(), |sum, (a, b)| Self {
+            both: sum.both + u64::from(a && b),
+            either: sum.either + u64::from(a || b),
+        })
+    }
+
+    /// Intersection over union; `None` where both masks are empty.
+    pub fn iou(&self) -> Option<f64> {
+        (self.either > 0).then(|| self.both as f64 / self.either as f64)
+    }
+}
+
+/// What the paper's evaluation says about one object in one view.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PaperScore {
+    /// Intersection over union of "any channel above 0.01" and the mask; `None` where both are empty.
+    pub iou: Option<f64>,
+    /// PSNR per channel over the whole frame against photo times mask, mean of the three, dB.
+    pub psnr: f64,
+}
+
+/// Scores an object, rendered alone on black and not clamped, as the paper's code does. `inside` is the object's mask.
+pub fn paper_score(object: &[[f32; 3]], photo: &Photo, inside: &[bool]) -> PaperScore {
+    let mut squares = [0.0; 3];
+    for ((colour, truth), &inside) in object.iter().zip(&photo.rgba).zip(inside) {
+        for channel in 0..3 {
+            let truth = if inside { f64::from(truth[channel]) / 255.0 } else { 0.0 };
+            squares[channel] += (f64::from(colour[channel]) - truth).powi(2);
+        }
+    }
+    let pixels = object.len() as f64;
+    let psnr = squares.iter().map(|sum| psnr_of(sum / pixels)).sum::<f64>() / 3.0;
+    let covered = object.iter().map(|colour| colour.iter().any(|&value| value > PAPER_COVERED));
+    PaperScore { iou: Overlap::count(covered.zip(inside.iter().copied())).iou(), psnr }
+}
+
+/// Mean of the numbers there are; `None` without any.
+pub fn mean(values: impl IntoIterator<Item = f64>) -> Option<f64> {
+    let (sum, count) = values.into_iter().fold((0.0, 0_u64), |(sum, count), value| (sum + value, count + 1));
+    (count > 0).then(|| sum / count as f64)
+}

@@ -1,0 +1,114 @@
+//! The labels of a model: what there is, and a model of some of them.
+
+use crate::scene::{Gaussians, UNLABELLED};
+use crate::{Error, Result};
+use glam::DVec3;
+use serde::Serialize;
+use std::collections::{BTreeMap, BTreeSet};
+
+/// What a model knows about one label.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct LabelSummary {
+    /// The label; 0 is unlabelled.
+    pub label: u32,
+    /// Number of Gaussians.
+    pub count: u64,
+    /// Sum of their opacities after the sigmoid.
+    pub opacity_mass: f64,
+    /// Smallest coordinates of the means, world.
+    pub min: [f64; 3],
+    /// Largest coordinates of the means, world.
+    pub max: [f64; 3],
+    /// Mean of the means, weighted by opacity, world.
+    pub centre: [f64; 3],
+}
+
+/// One row per label, sorted, 0 (unlabelled) included. A model without labels is all 0.
+pub fn summarise(model: &Gaussians) -> Vec<LabelSummary> {
+    struct Sum {
+        count: u64,
+        mass: f64,
+        min: DVec3,
+        max: DVec3,
+        weighted: DVec3,
+    }
+    let mut sums: BTreeMap<u32, Sum> = BTreeMap::new();
+    for row in 0..model.len() {
+        let start = Sum { count: 0, mass: 0.0, min: DVec3::INFINITY, max: DVec3::NEG_INFINITY, weighted: DVec3::ZERO };
+        let sum = sums.entry(label_of(model, row)).or_insert(start);
+        let mean = DVec3::from_array(model.means[row].map(f64::from));
+        // Never 0, so that invisible Gaussians have a centre too.
+        let opacity = (1.0 / (1.0 + (-f64::from(model.opacities[row])).exp())).max(1e-200);
+        sum.count += 1;
+        sum.mass += opacity;
+        sum.min = sum.min.min(mean);
+        sum.max = sum.max.max(mean);
+        sum.weighted += mean * opacity;
+    }
+    let row = |(label, sum): (u32, Sum)| LabelSummary {
+        label,
+        count: sum.count,
+        opacity_mass: sum.mass,
+        min: sum.min.to_array(),
+        max: sum.max.to_array(),
+        centre: (sum.weighted / sum.mass).to_array(),
+    };
+    sums.into_iter().map(row).collect()
+}
+
+/// The Gaussians of these labels, in order. An error, which lists what there is, if one of the labels does not occur.
+pub fn extract(model: &Gaussians, labels: &[u32]) -> Result<Gaussians> {
+    let wanted = check_labels(model, labels)?;
+    Ok(model.filtered(|row| wanted.contains(&label_of(model, row))))
+}
+
+/// All but the Gaussians of these labels, in order. The same errors as [`extract`], and one if nothing is left.
+pub fn remove(model: &Gaussians, labels: &[u32]) -> Result<Gaussians> {
+    let wanted = check_labels(model, labels)?;
+    let rest = model.filtered(|row| !wanted.contains(&label_of(model, row)));
+    if rest.is_empty() {
+        return Err(Error::usage("--labels", "names every label of the model; nothing would be left"));
+    }
+    Ok(rest)
+}
+
+/// The labels as a set, if each of them occurs in the model.
+pub fn check_labels(model: &Gaussians, labels: &[u32]) -> Result<BTreeSet<u32>> {
+    let known: BTreeSet<u32> = (0..model.len()).map(|row| label_of(model, row)).collect();
+    let wanted: BTreeSet<u32> = labels.iter().copied().collect();
+    let unknown: Vec<String> = wanted.difference(&known).map(u32::to_string).collect();
+    if wanted.is_empty() {
+        return Err(Error::usage("--labels", format!("names no label; {}", there_is(&known))));
+    }
+    if !unknown.is_empty() {
+        let problem = format!("no Gaussian has label {}; {}", unknown.join(", "), there_is(&known));
+        return Err(Error::usage("--labels", problem));
+    }
+    Ok(wanted)
+}
+
+/// Label of a row; 0 in a model without labels.
+fn label_of(model: &Gaussians, row: usize) -> u32 {
+    model.labels.as_ref().map_or(UNLABELLED, |labels| labels[row])
+}
+
+/// "the model has 1-4, 7", for messages.
+fn there_is(known: &BTreeSet<u32>) -> String {
+    let objects: Vec<u32> = known.iter().copied().filter(|&label| label != UNLABELLED).collect();
+    if objects.is_empty() {
+        return "the model has no labelled Gaussian; train it with masks".to_owned();
+    }
+    let mut ranges: Vec<(u32, u32)> = Vec::new();
+    for label in objects {
+        match ranges.last_mut() {
+            Some((_, last)) if *last + 1 == label => *last = label,
+            _ => ranges.push((label, label)),
+        }
+    }
+    let texts: Vec<String> = ranges
+        .iter()
+        .map(|&(first, last)| if first == last { first.to_string() } else { format!("{first}-{last}") })
+        .collect();
+    let zero = if known.contains(&UNLABELLED) { ", and 0 for the unlabelled" } else { "" };
+    format!("the model has {}{zero}", texts.join(", "))
+}

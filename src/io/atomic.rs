@@ -1,0 +1,93 @@
+//! Files that are either the old one or the complete new one, whatever happens in between.
+
+use crate::error::{Error, Result};
+use std::fs::{self, File};
+use std::io::{self, BufWriter, Write};
+use std::path::{Path, PathBuf};
+
+const PREFIX: &str = ".labelgs-";
+const SUFFIX: &str = ".tmp";
+
+/// Writes `path` through `body` so that no crash leaves a partial file: a temporary file in the same folder is
+/// filled, flushed and synced, then renamed, and the folder is synced. Missing folders are made. A symbolic link is
+/// followed; a device or pipe is written directly. On an error the previous file is untouched.
+pub fn write(path: impl AsRef<Path>, body: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> Result<()> {
+    let path = path.as_ref();
+    write_inner(path, body).map_err(Error::write(path))
+}
+
+fn write_inner(path: &Path, body: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> io::Result<()> {
+    let target = follow(path)?;
+    match fs::metadata(&target) {
+        Ok(found) if found.is_dir() => return Err(io::Error::new(io::ErrorKind::IsADirectory, "it is a folder")),
+        Ok(found) if !found.is_file() => return fill(&File::options().write(true).open(&target)?, body),
+        _ => {}
+    }
+    let folder = match target.parent() {
+        Some(parent) if !parent.as_os_str().is_empty() => parent,
+        _ => Path::new("."),
+    };
+    fs::create_dir_all(folder)?;
+    let temporary = temporary_in(folder)?;
+    fill(temporary.as_file(), body)?;
+    temporary.as_file().sync_all()?;
+    temporary.persist(&target).map_err(|failed| failed.error)?;
+    sync_folder(folder)
+}
+
+/// The file that a chain of symbolic links ends at, so that a rename replaces it and not the link.
+fn follow(path: &Path) -> io::Result<PathBuf> {
+    match fs::symlink_metadata(path) {
+        Ok(found) if found.file_type().is_symlink() => fs::canonicalize(path),
+        _ => Ok(path.to_owned()),
+    }
+}
+
+fn temporary_in(folder: &Path) -> io::Result<tempfile::NamedTempFile> {
+    let prefix = format!("{PREFIX}{}-", std::process::id());
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(&prefix).suffix(SUFFIX);
+    #[cfg(unix)]
+    {
+        // The crate makes private files; ours replace ordinary output, so the umask decides.
+        use std::os::unix::fs::PermissionsExt;
+        builder.permissions(fs::Permissions::from_mode(0o666));
+    }
+    builder.tempfile_in(folder)
+}
+
+fn fill(file: &File, body: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> io::Result<()> {
+    let mut buffered = BufWriter::with_capacity(1 << 18, file);
+    body(&mut buffered)?;
+    // Dropping a BufWriter loses the error of its last write, so the flush is spelled out.
+    buffered.flush()
+}
+
+#[cfg(unix)]
+fn sync_folder(folder: &Path) -> io::Result<()> {
+    File::open(folder)?.sync_all()
+}
+
+#[cfg(not(unix))]
+fn sync_folder(_folder: &Path) -> io::Result<()> {
+    Ok(())
+}
+
+/// Removes the temporary files that killed runs of this program left in `folder`; returns how many. Files of
+/// processes that still live are kept, and where liveness cannot be told (no `/proc`) nothing is removed.
+pub fn remove_stale(folder: impl AsRef<Path>) -> usize {
+    let processes = Path::new("/proc");
+    if !processes.join("self").exists() {
+        return 0;
+    }
+    let Ok(entries) = fs::read_dir(folder) else { return 0 };
+    let stale = entries.flatten().filter(|entry| {
+        let name = entry.file_name();
+        let process = name
+            .to_str()
+            .and_then(|name| name.strip_prefix(PREFIX)?.strip_suffix(SUFFIX)?.split_once('-'))
+            .and_then(|(process, _)| process.parse::<u32>().ok());
+        process.is_some_and(|process| !processes.join(process.to_string()).exists())
+    });
+    stale.filter(|entry| fs::remove_file(entry.path()).is_ok()).count()
+}

@@ -1,0 +1,82 @@
+//! Single cameras as JSON, and the `cameras.json` that 3DGS viewers read.
+
+use super::atomic;
+use super::lens::Lens;
+use super::listing::{check_camera, rotation_of};
+use super::transforms::affine;
+use crate::error::{Error, Result};
+use crate::scene::Camera;
+use glam::DMat3;
+use serde::{Deserialize, Serialize};
+use std::path::Path;
+
+/// A camera file: `w2c` is camera-from-world, row-major, OpenCV axes.
+#[derive(Debug, Deserialize)]
+struct CameraFile {
+    w2c: Vec<Vec<f64>>,
+    fx: f64,
+    fy: f64,
+    cx: f64,
+    cy: f64,
+    #[serde(rename = "W")]
+    width: u32,
+    #[serde(rename = "H")]
+    height: u32,
+}
+
+/// Reads `{"w2c": 4x4 row-major with OpenCV axes, "fx", "fy", "cx", "cy", "W", "H"}`.
+pub fn read_camera(path: impl AsRef<Path>) -> Result<Camera> {
+    let path = path.as_ref();
+    let text = std::fs::read_to_string(path).map_err(Error::read(path))?;
+    let file: CameraFile = serde_json::from_str(&text).map_err(|error| {
+        let expected = "expected {\"w2c\": 4x4 rows, \"fx\", \"fy\", \"cx\", \"cy\", \"W\", \"H\"}";
+        Error::data(path, format!("line {}", error.line()), format!("{error}; {expected}"))
+    })?;
+    let refuse =
+        || Error::data(path, "w2c", "is no camera-from-world pose: 4 x 4 numbers, the upper left 3 x 3 a rotation");
+    let pose = affine(&file.w2c).ok_or_else(refuse)?;
+    let matrix: DMat3 = pose.matrix3.into();
+    let rotation = rotation_of(matrix).ok_or_else(refuse)?;
+    // A pose with a scale would need its translation scaled too; nothing writes one.
+    if (matrix.determinant() - 1.0).abs() > 1e-2 {
+        return Err(refuse());
+    }
+    let CameraFile { fx, fy, cx, cy, width, height, .. } = file;
+    let camera = Camera { rotation, translation: pose.translation.into(), fx, fy, cx, cy, width, height };
+    check_camera(path, "", &camera, &Lens::default())?;
+    Ok(camera)
+}
+
+/// An entry of `cameras.json`; the order of the fields is that of 3DGS, with the principal point added.
+#[derive(Debug, Serialize)]
+struct Entry<'a> {
+    id: usize,
+    img_name: &'a str,
+    width: u32,
+    height: u32,
+    position: [f64; 3],
+    rotation: [[f64; 3]; 3],
+    fy: f64,
+    fx: f64,
+    cx: f64,
+    cy: f64,
+}
+
+/// Writes the `cameras.json` of 3DGS: name, size, centre and rows of the world-from-camera rotation of each camera.
+pub fn write_cameras<'a>(path: impl AsRef<Path>, cameras: &[(&'a str, &Camera)]) -> Result<()> {
+    let entry = |(id, &(img_name, camera)): (usize, &(&'a str, &Camera))| Entry {
+        id,
+        img_name,
+        width: camera.width,
+        height: camera.height,
+        position: camera.centre().to_array(),
+        // Columns of camera-from-world are rows of world-from-camera.
+        rotation: camera.rotation.to_cols_array_2d(),
+        fy: camera.fy,
+        fx: camera.fx,
+        cx: camera.cx,
+        cy: camera.cy,
+    };
+    let entries: Vec<Entry> = cameras.iter().enumerate().map(entry).collect();
+    atomic::write(path, |out| Ok(serde_json::to_writer_pretty(out, &entries)?))
+}

@@ -1,0 +1,126 @@
+//! COLMAP sparse models: `cameras`, `images` and `points3D`, binary or text.
+//!
+//! Poses are camera-from-world with OpenCV axes, and COLMAP's pixel (0, 0) has its centre at (0.5, 0.5): both as
+//! here, so nothing is converted. The `rigs` and `frames` files of newer versions are not needed and not read.
+
+mod binary;
+mod model;
+mod text;
+
+use super::listing::{Listed, Listing, check_camera, find_file, relative_path};
+use crate::error::{Error, Result};
+use crate::scene::{Camera, Point};
+use glam::{DMat3, DQuat, DVec3};
+use model::{CameraRecord, ImageRecord};
+use std::collections::{HashMap, HashSet};
+use std::path::{Path, PathBuf};
+
+/// Where a model may lie below the scene, in order of preference.
+const FOLDERS: [&str; 4] = ["sparse/0", "sparse", "colmap/sparse/0", "."];
+
+/// The three files of a model.
+struct Files {
+    folder: PathBuf,
+    extension: &'static str,
+}
+
+/// Finds a model below `root`; binary is preferred to text.
+fn find(root: &Path) -> Option<Files> {
+    FOLDERS.iter().find_map(|folder| {
+        let folder = root.join(folder);
+        ["bin", "txt"].into_iter().find_map(|extension| {
+            let both = ["cameras", "images"].iter().all(|stem| folder.join(stem).with_extension(extension).is_file());
+            both.then(|| Files { folder: folder.clone(), extension })
+        })
+    })
+}
+
+/// Reads the model of the scene at `root`, if it has one.
+pub(crate) fn list(root: &Path) -> Result<Option<Listing>> {
+    let Some(files) = find(root) else { return Ok(None) };
+    let path = |stem: &str| files.folder.join(stem).with_extension(files.extension);
+    let binary = files.extension == "bin";
+    let (cameras_path, images_path, points_path) = (path("cameras"), path("images"), path("points3D"));
+    let cameras = if binary { binary::cameras(&cameras_path) } else { text::cameras(&cameras_path) }?;
+    let images = if binary { binary::images(&images_path) } else { text::images(&images_path) }?;
+    let mut notes = Vec::new();
+    let points = match (points_path.is_file(), binary) {
+        (false, _) => Vec::new(),
+        (true, true) => binary::points(&points_path)?,
+        (true, false) => text::points(&points_path)?,
+    };
+    let points = finite(points, &mut notes);
+    if files.folder.ends_with("sparse/0") && files.folder.with_file_name("1").is_dir() {
+        notes.push(format!("only the model {} is used; its neighbours are ignored", files.folder.display()));
+    }
+    let views = join(root, &cameras_path, &cameras, &images_path, &images)?;
+    Ok(Some(Listing { source: images_path, views, points, notes, missing: Vec::new() }))
+}
+
+fn finite(mut points: Vec<Point>, notes: &mut Vec<String>) -> Vec<Point> {
+    let before = points.len();
+    points.retain(|point| point.position.is_finite());
+    if points.len() < before {
+        notes.push(format!("left out {} of {before} points whose position is not finite", before - points.len()));
+    }
+    points
+}
+
+/// Gives each image its camera.
+fn join(
+    root: &Path,
+    cameras_path: &Path,
+    cameras: &[CameraRecord],
+    images_path: &Path,
+    images: &[ImageRecord],
+) -> Result<Vec<Listed>> {
+    let mut by_id = HashMap::new();
+    for camera in cameras {
+        if by_id.insert(camera.id, camera).is_some() {
+            return Err(Error::data(cameras_path, format!("camera {}", camera.id), "is listed twice"));
+        }
+    }
+    let (mut ids, mut names) = (HashSet::new(), HashSet::new());
+    let mut views = Vec::with_capacity(images.len());
+    for image in images {
+        let place = format!("image {} (`{}`)", image.id, image.name);
+        if !ids.insert(image.id) || !names.insert(image.name.as_str()) {
+            return Err(Error::data(images_path, place, "has an id or a name that was listed before"));
+        }
+        let Some(camera) = by_id.get(&image.camera) else {
+            let problem = format!("uses camera {}, which {} does not list", image.camera, cameras_path.display());
+            return Err(Error::data(images_path, place, problem));
+        };
+        views.push(listed(root, images_path, &place, image, cameras_path, camera)?);
+    }
+    Ok(views)
+}
+
+fn listed(
+    root: &Path,
+    images_path: &Path,
+    place: &str,
+    image: &ImageRecord,
+    cameras_path: &Path,
+    record: &CameraRecord,
+) -> Result<Listed> {
+    let [w, x, y, z] = image.quaternion;
+    let quaternion = DQuat::from_xyzw(x, y, z, w);
+    let length = quaternion.length();
+    if !(length.is_finite() && length > 1e-9) {
+        return Err(Error::data(images_path, place, "its rotation is zero or not finite"));
+    }
+    let (mut camera, lens) = record.intrinsics(cameras_path)?;
+    camera.rotation = DMat3::from_quat(quaternion.normalize());
+    camera.translation = DVec3::from_array(image.translation);
+    check_camera(
+        cameras_path,
+        &format!("camera {}", record.id),
+        &Camera { translation: DVec3::ZERO, ..camera.clone() },
+        &lens,
+    )?;
+    check_camera(images_path, place, &camera, &lens)?;
+    let relative = relative_path(images_path, root, &image.name)?;
+    let photo = find_file(root, &["images", "."], &relative, &[""]);
+    Ok(Listed { name: image.name.clone(), photo, camera, lens, test: None })
+}

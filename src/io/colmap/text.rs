@@ -1,0 +1,130 @@
+//! The text files: a record a line, `#` starts a comment.
+
+use super::model::{CameraRecord, ImageRecord, MODELS, check_supported};
+use crate::error::{Error, Result};
+use crate::scene::Point;
+use glam::DVec3;
+use std::fs::File;
+use std::io::{BufRead, BufReader};
+use std::path::Path;
+use std::str::FromStr;
+
+/// Lines with their numbers from 1.
+fn lines(path: &Path) -> Result<impl Iterator<Item = Result<(usize, String)>>> {
+    let file = BufReader::new(File::open(path).map_err(Error::read(path))?);
+    let path = path.to_owned();
+    Ok(file.lines().enumerate().map(move |(index, line)| Ok((index + 1, line.map_err(Error::read(&path))?))))
+}
+
+fn is_record(line: &str) -> bool {
+    let line = line.trim();
+    !line.is_empty() && !line.starts_with('#')
+}
+
+/// The words of a line, taken one by one.
+struct Words<'a> {
+    path: &'a Path,
+    number: usize,
+    rest: &'a str,
+}
+
+impl<'a> Words<'a> {
+    fn error(&self, problem: impl Into<String>) -> Error {
+        Error::data(self.path, format!("line {}", self.number), problem)
+    }
+
+    fn word(&mut self, what: &str) -> Result<&'a str> {
+        let rest = self.rest.trim_start();
+        if rest.is_empty() {
+            return Err(self.error(format!("the line ends where {what} is expected")));
+        }
+        let (word, rest) = rest.split_once(|c: char| c.is_ascii_whitespace()).unwrap_or((rest, ""));
+        self.rest = rest;
+        Ok(word)
+    }
+
+    fn number<T: FromStr>(&mut self, what: &str) -> Result<T> {
+        let word = self.word(what)?;
+        word.parse().map_err(|_| self.error(format!("`{word}` is no {what}")))
+    }
+
+    fn numbers<const N: usize>(&mut self, what: &str) -> Result<[f64; N]> {
+        let mut values = [0.0; N];
+        for value in &mut values {
+            *value = self.number(what)?;
+        }
+        Ok(values)
+    }
+}
+
+/// Reads `cameras.txt`.
+pub(super) fn cameras(path: &Path) -> Result<Vec<CameraRecord>> {
+    let mut all = Vec::new();
+    for line in lines(path)? {
+        let (number, line) = line?;
+        if !is_record(&line) {
+            continue;
+        }
+        let mut words = Words { path, number, rest: line.trim() };
+        let (id, name) = (words.number("camera id")?, words.word("a camera model")?);
+        let Some(model) = MODELS.iter().position(|model| model.0 == name) else {
+            return Err(
+                words.error(format!("camera {id} has the unknown model {name}; run `colmap image_undistorter`"))
+            );
+        };
+        check_supported(path, &format!("line {number}, camera {id}"), model)?;
+        let (width, height) = (words.number("width")?, words.number("height")?);
+        let mut parameters = Vec::new();
+        while !words.rest.trim().is_empty() {
+            parameters.push(words.number("camera parameter")?);
+        }
+        all.push(CameraRecord { id, model, width, height, parameters });
+    }
+    Ok(all)
+}
+
+/// Reads `images.txt`: two lines an image, the second with its observations, which may be empty.
+pub(super) fn images(path: &Path) -> Result<Vec<ImageRecord>> {
+    let mut all = Vec::new();
+    let mut lines = lines(path)?;
+    while let Some(line) = lines.next() {
+        let (number, line) = line?;
+        if !is_record(&line) {
+            continue;
+        }
+        let mut words = Words { path, number, rest: line.trim() };
+        let id = words.number("image id")?;
+        let (quaternion, translation) = (words.numbers("rotation")?, words.numbers("translation")?);
+        let camera = words.number("camera id")?;
+        // The rest of the line is the name: it may hold spaces.
+        let name = words.rest.trim().to_owned();
+        if name.is_empty() {
+            return Err(words.error("the line ends where the image name is expected"));
+        }
+        all.push(ImageRecord { id, quaternion, translation, camera, name });
+        if let Some(observations) = lines.next() {
+            observations?;
+        }
+    }
+    Ok(all)
+}
+
+/// Reads `points3D.txt`, without the tracks.
+pub(super) fn points(path: &Path) -> Result<Vec<Point>> {
+    let mut all = Vec::new();
+    for line in lines(path)? {
+        let (number, line) = line?;
+        if !is_record(&line) {
+            continue;
+        }
+        let mut words = Words { path, number, rest: line.trim() };
+        words.word("a point id")?;
+        let position = DVec3::from_array(words.numbers("coordinate")?);
+        let mut colour = [0u8; 3];
+        for value in &mut colour {
+            *value = words.number("colour from 0 to 255")?;
+        }
+        all.push(Point { position, colour });
+    }
+    Ok(all)
+}

@@ -1,0 +1,123 @@
+//! Pixels in files: photos in, PNG and EXR out.
+
+use super::atomic;
+use crate::error::{Error, Result};
+use crate::scene::Photo;
+use exr::prelude::{AnyChannel, AnyChannels, Encoding, FlatSamples, Image, Layer, LayerAttributes, WritableImage};
+use image::{ImageDecoder, ImageReader};
+use std::io::Cursor;
+use std::path::Path;
+
+/// Most pixels that an image may have; larger ones are refused before they are decoded.
+pub const PIXELS_MAX: u64 = 1 << 28;
+
+/// Refuses sizes of zero or beyond [`PIXELS_MAX`].
+pub(crate) fn check_size(path: &Path, (width, height): (u32, u32)) -> Result<()> {
+    let pixels = u64::from(width) * u64::from(height);
+    if pixels == 0 || pixels > PIXELS_MAX {
+        let problem = format!("{width} x {height} px; between 1 and {PIXELS_MAX} pixels are supported");
+        return Err(Error::data(path, "", problem));
+    }
+    Ok(())
+}
+
+fn reader(path: &Path) -> Result<ImageReader<std::io::BufReader<std::fs::File>>> {
+    // The kind is guessed from the first bytes, so a PNG called .jpg is read all the same.
+    let mut reader = ImageReader::open(path).and_then(ImageReader::with_guessed_format).map_err(Error::read(path))?;
+    let mut limits = image::Limits::default();
+    limits.max_alloc = Some(PIXELS_MAX * 16);
+    reader.limits(limits);
+    Ok(reader)
+}
+
+/// Width and height from the header alone, px.
+pub fn photo_size(path: impl AsRef<Path>) -> Result<(u32, u32)> {
+    let path = path.as_ref();
+    reader(path)?.into_dimensions().map_err(|error| Error::data(path, "", format!("cannot be decoded: {error}")))
+}
+
+/// Reads a PNG or JPEG as 8-bit RGB. Transparency is blended over `background` (components from 0 to 1), so all
+/// pixels have alpha 255. Grey and 16-bit photos are widened and narrowed. An EXIF orientation is ignored, as
+/// COLMAP does: poses belong to the stored pixels.
+pub fn read_photo(path: impl AsRef<Path>, background: [f32; 3]) -> Result<Photo> {
+    let path = path.as_ref();
+    let undecodable = |error: image::ImageError| Error::data(path, "", format!("cannot be decoded: {error}"));
+    let decoder = reader(path)?.into_decoder().map_err(undecodable)?;
+    let (width, height) = decoder.dimensions();
+    check_size(path, (width, height))?;
+    let transparent = decoder.color_type().has_alpha();
+    let pixels = image::DynamicImage::from_decoder(decoder).map_err(undecodable)?.into_rgba8();
+    let mut rgba: Vec<[u8; 4]> = bytemuck::allocation::try_cast_vec(pixels.into_raw())
+        .unwrap_or_else(|(_, bytes)| bytemuck::allocation::pod_collect_to_vec(&bytes));
+    if transparent {
+        let background = background.map(|value| f64::from(value) * 255.0);
+        rgba.iter_mut().for_each(|texel| *texel = over(*texel, background));
+    }
+    Ok(Photo { width, height, rgba })
+}
+
+fn over([r, g, b, a]: [u8; 4], background: [f64; 3]) -> [u8; 4] {
+    let alpha = f64::from(a) / 255.0;
+    let blend = |c: u8, b: f64| (f64::from(c) * alpha + b * (1.0 - alpha)).round().clamp(0.0, 255.0) as u8;
+    [blend(r, background[0]), blend(g, background[1]), blend(b, background[2]), 255]
+}
+
+/// Writes an 8-bit RGB PNG, `pixels` row-major.
+pub fn write_png_rgb8(path: impl AsRef<Path>, width: u32, height: u32, pixels: &[[u8; 3]]) -> Result<()> {
+    write_png(path.as_ref(), (width, height), png::ColorType::Rgb, png::BitDepth::Eight, bytemuck::cast_slice(pixels))
+}
+
+/// Writes a 16-bit grey PNG, such as an id map, `pixels` row-major.
+pub fn write_png_grey16(path: impl AsRef<Path>, width: u32, height: u32, pixels: &[u16]) -> Result<()> {
+    let bytes: Vec<u8> = pixels.iter().flat_map(|value| value.to_be_bytes()).collect();
+    write_png(path.as_ref(), (width, height), png::ColorType::Grayscale, png::BitDepth::Sixteen, &bytes)
+}
+
+fn write_png(
+    path: &Path,
+    (width, height): (u32, u32),
+    colour: png::ColorType,
+    depth: png::BitDepth,
+    bytes: &[u8],
+) -> Result<()> {
+    atomic::write(path, |out| {
+        let mut encoder = png::Encoder::new(out, width, height);
+        encoder.set_color(colour);
+        encoder.set_depth(depth);
+        let mut writer = encoder.write_header()?;
+        writer.write_image_data(bytes)?;
+        Ok(writer.finish()?)
+    })
+}
+
+/// Writes an EXR with the channels R, G and B, 32-bit floats, `pixels` row-major.
+pub fn write_exr_rgb(path: impl AsRef<Path>, width: u32, height: u32, pixels: &[[f32; 3]]) -> Result<()> {
+    let channel = |name: &'static str, index: usize| (name, pixels.iter().map(|pixel| pixel[index]).collect());
+    write_exr(path.as_ref(), (width, height), vec![channel("R", 0), channel("G", 1), channel("B", 2)])
+}
+
+/// Writes an EXR with the single channel Y, 32-bit floats, `pixels` row-major.
+pub fn write_exr_y(path: impl AsRef<Path>, width: u32, height: u32, pixels: &[f32]) -> Result<()> {
+    write_exr(path.as_ref(), (width, height), vec![("Y", pixels.to_vec())])
+}
+
+fn write_exr(path: &Path, (width, height): (u32, u32), channels: Vec<(&'static str, Vec<f32>)>) -> Result<()> {
+    let expected = u64::from(width) * u64::from(height);
+    if channels.iter().any(|(_, samples)| samples.len() as u64 != expected) {
+        return Err(Error::Bug(format!("{} does not get {width} x {height} pixels", path.display())));
+    }
+    let channels = channels.into_iter().map(|(name, samples)| AnyChannel::new(name, FlatSamples::F32(samples)));
+    let layer = Layer::new(
+        (width as usize, height as usize),
+        LayerAttributes::default(),
+        Encoding::SMALL_LOSSLESS,
+        AnyChannels::sort(channels.collect()),
+    );
+    // The crate wants a seekable writer and the atomic one is a stream.
+    let mut bytes = Cursor::new(Vec::new());
+    Image::from_layer(layer)
+        .write()
+        .to_buffered(&mut bytes)
+        .map_err(|error| Error::write(path)(std::io::Error::other(error.to_string())))?;
+    atomic::write(path, |out| out.write_all(bytes.get_ref()))
+}

@@ -1,0 +1,78 @@
+//! The first Gaussians of a scene: on its points, or where its cameras look if it has none.
+
+mod random;
+mod region;
+
+use crate::error::{Error, Result};
+use crate::scene::gaussians::SH_C0;
+use crate::scene::{Dataset, Gaussians, Point};
+use kiddo::{ImmutableKdTree, SquaredEuclidean};
+use rayon::prelude::*;
+use std::num::NonZero;
+
+/// Opacity of a new Gaussian.
+const OPACITY: f64 = 0.1;
+/// Smallest mean squared distance to the neighbours, world units squared.
+const DISTANCE2_MIN: f64 = 1e-7;
+/// Neighbours that decide the size of a Gaussian.
+const NEIGHBOURS: usize = 3;
+/// With fewer points a scene counts as one without points.
+const POINTS_MIN: usize = 16;
+/// A sensible number of Gaussians for a scene without points.
+pub const RANDOM_COUNT: usize = 50_000;
+
+/// Gaussians to start training from: SH degree 3 with only the constant colour set, opacity 0.1, no rotation, the
+/// same size in all directions, namely the root mean square distance to the three nearest neighbours, no labels.
+///
+/// They stand on the points of the scene. Without points (or with fewer than 16), `count_if_no_points` of them are
+/// spread over the space that the training cameras see in common; see [`random`](self::random) for where and how.
+pub fn initial_gaussians(dataset: &Dataset, seed: u64, count_if_no_points: usize) -> Result<Gaussians> {
+    if dataset.points.len() >= POINTS_MIN {
+        return from_points(&dataset.points, dataset.extent());
+    }
+    let mut points = random::points(dataset, seed, count_if_no_points)?;
+    points.extend_from_slice(&dataset.points);
+    from_points(&points, dataset.extent())
+}
+
+/// One Gaussian per point, in their order.
+fn from_points(points: &[Point], extent: f64) -> Result<Gaussians> {
+    let logit = (OPACITY / (1.0 - OPACITY)).ln() as f32;
+    let count = points.len();
+    let scale = |distance2: f64| [(0.5 * distance2.max(DISTANCE2_MIN).ln()) as f32; 3];
+    let constant = |value: u8| ((f64::from(value) / 255.0 - 0.5) / SH_C0) as f32;
+    let mut gaussians = Gaussians {
+        means: points.iter().map(|point| point.position.as_vec3().to_array()).collect(),
+        quats: vec![[1.0, 0.0, 0.0, 0.0]; count],
+        scales: neighbour_distances2(points, extent)?.into_iter().map(scale).collect(),
+        opacities: vec![logit; count],
+        sh0: points.iter().map(|point| point.colour.map(constant)).collect(),
+        sh_degree: 3,
+        ..Gaussians::default()
+    };
+    gaussians.sh_rest = vec![[0.0; 3]; count * gaussians.rest_per_gaussian()];
+    Ok(gaussians)
+}
+
+/// Mean squared distance of each point to its three nearest neighbours; to fewer where there are fewer, and a
+/// hundredth of the scene for a lone point.
+fn neighbour_distances2(points: &[Point], extent: f64) -> Result<Vec<f64>> {
+    let positions: Vec<[f64; 3]> = points.iter().map(|point| point.position.to_array()).collect();
+    let nearest = NEIGHBOURS.min(positions.len().saturating_sub(1));
+    // One more than wanted, because a point is its own nearest neighbour.
+    let Some(asked) = NonZero::new(nearest + 1).filter(|_| nearest > 0) else {
+        return Ok(vec![(extent * 0.01).powi(2); positions.len()]);
+    };
+    let tree: ImmutableKdTree<f64, 3> = ImmutableKdTree::new_from_slice(&positions)
+        .map_err(|error| Error::Bug(format!("the k-d tree of the points failed: {error:?}")))?;
+    let mean = |(index, position): (usize, &[f64; 3])| {
+        let found = tree.query(position).nearest_n::<SquaredEuclidean<f64>>(asked).execute();
+        // Among many points at one place the point itself may be missing from the answer.
+        let others = found.iter().filter(|item| item.item as usize != index).take(nearest);
+        others.map(|item| item.distance).sum::<f64>() / nearest as f64
+    };
+    Ok(positions.par_iter().enumerate().map(mean).collect())
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,79 @@
+//! Where the cameras of a scene look.
+
+use crate::scene::{Camera, View};
+use glam::{DMat3, DVec3};
+
+/// The space that is worth filling with Gaussians.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Region {
+    /// Cameras around a subject: the ball around the point nearest to all optical axes that the typical
+    /// camera sees whole.
+    Ball {
+        /// World position.
+        centre: DVec3,
+        /// World units.
+        radius: f64,
+    },
+    /// Cameras that look the same way, or outwards: what lies before them between two depths.
+    Frusta {
+        /// World units.
+        near: f64,
+        /// World units.
+        far: f64,
+    },
+}
+
+/// Direction of the optical axis in world space.
+pub(super) fn axis(camera: &Camera) -> DVec3 {
+    camera.rotation.transpose() * DVec3::Z
+}
+
+/// Sine of the angle from the optical axis to the nearest edge of the image.
+fn narrow_sine(camera: &Camera) -> f64 {
+    let side = |f: f64, c: f64, size: u32| c.min(f64::from(size) - c).max(0.0) / f;
+    let tangent = side(camera.fx, camera.cx, camera.width).min(side(camera.fy, camera.cy, camera.height));
+    tangent / (1.0 + tangent * tangent).sqrt()
+}
+
+fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied().unwrap_or(0.0)
+}
+
+/// Finds the region of `views`; `extent` is the radius of their cameras.
+pub(super) fn find(views: &[View], extent: f64) -> Region {
+    let cameras: Vec<&Camera> = views.iter().map(|view| &view.camera).collect();
+    if let Some(centre) = nearest_to_axes(&cameras) {
+        let sees = |camera: &&&Camera| {
+            let at = camera.to_camera(centre);
+            let pixel = camera.project(at);
+            at.z > 0.0
+                && (0.0..f64::from(camera.width)).contains(&pixel.x)
+                && (0.0..f64::from(camera.height)).contains(&pixel.y)
+        };
+        let inward = cameras.iter().filter(sees).count();
+        let radius = median(cameras.iter().map(|c| c.centre().distance(centre) * narrow_sine(c)).collect());
+        if inward * 4 >= cameras.len() * 3 && radius > 0.0 {
+            return Region::Ball { centre, radius };
+        }
+    }
+    // Nothing tells the depth of the scene but the spread of the cameras: 3DGS captures have their subject a few
+    // of these away.
+    Region::Frusta { near: 0.5 * extent, far: 10.0 * extent }
+}
+
+/// The point with the least sum of squared distances to the optical axes, if they determine it well.
+fn nearest_to_axes(cameras: &[&Camera]) -> Option<DVec3> {
+    let (mut matrix, mut right) = (DMat3::ZERO, DVec3::ZERO);
+    for camera in cameras {
+        let (direction, centre) = (axis(camera), camera.centre());
+        let across = DMat3::IDENTITY
+            - DMat3::from_cols(direction * direction.x, direction * direction.y, direction * direction.z);
+        matrix += across;
+        right += across * centre;
+    }
+    matrix *= 1.0 / cameras.len().max(1) as f64;
+    right /= cameras.len().max(1) as f64;
+    // The matrix has trace 2 and, for parallel axes, determinant 0; axes 20 degrees around a common one give 0.06.
+    (matrix.determinant() > 0.01).then(|| matrix.inverse() * right)
+}

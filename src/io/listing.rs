@@ -1,0 +1,113 @@
+//! What a scene lists before any pixel is read, and the checks that all formats share.
+
+use super::lens::Lens;
+use crate::error::{Error, Result};
+use crate::scene::{Camera, Point};
+use glam::{DMat3, DQuat, DVec3};
+use std::path::{Component, Path, PathBuf};
+
+/// Largest side of a camera, px.
+const SIDE_MAX: u32 = 1 << 17;
+
+/// One photo as listed.
+#[derive(Clone, Debug)]
+pub(crate) struct Listed {
+    /// Name relative to the folder of photos.
+    pub(crate) name: String,
+    /// Its file, or `None` if there is none.
+    pub(crate) photo: Option<PathBuf>,
+    /// Camera at the size that the data set states.
+    pub(crate) camera: Camera,
+    /// Lens of the photo.
+    pub(crate) lens: Lens,
+    /// The split that the data set itself gives: true for held-out.
+    pub(crate) test: Option<bool>,
+}
+
+/// A scene before any pixel is read.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Listing {
+    /// The file that lists the photos, for messages.
+    pub(crate) source: PathBuf,
+    pub(crate) views: Vec<Listed>,
+    /// Names of photos without a file that could not even be made a camera of.
+    pub(crate) missing: Vec<String>,
+    pub(crate) points: Vec<Point>,
+    pub(crate) notes: Vec<String>,
+}
+
+/// Refuses cameras that no image can be made with. `place` names the camera in `path`.
+pub(crate) fn check_camera(path: &Path, place: &str, camera: &Camera, lens: &Lens) -> Result<()> {
+    let refuse = |problem: String| Err(Error::data(path, place, problem));
+    let Camera { fx, fy, cx, cy, width, height, .. } = *camera;
+    if width == 0 || height == 0 || width > SIDE_MAX || height > SIDE_MAX {
+        return refuse(format!("image size {width} x {height} px; sides from 1 to {SIDE_MAX} are supported"));
+    }
+    if !(fx > 0.0 && fy > 0.0 && fx.is_finite() && fy.is_finite()) {
+        return refuse(format!("focal lengths {fx} and {fy} px; both must be positive numbers"));
+    }
+    // Half of the side over the focal length is the tangent of half the field of view.
+    let widest = (f64::from(width) / fx).max(f64::from(height) / fy);
+    if widest > 1e4 {
+        return refuse(format!(
+            "focal lengths {fx} and {fy} px make a field of view of 180 degrees; a pinhole ends before"
+        ));
+    }
+    if !(0.0..=f64::from(width)).contains(&cx) || !(0.0..=f64::from(height)).contains(&cy) {
+        return refuse(format!("principal point ({cx}, {cy}) lies outside the image of {width} x {height} px"));
+    }
+    if !lens.is_finite() {
+        return refuse("a distortion coefficient is not a number".into());
+    }
+    if !camera.translation.is_finite() || !camera.rotation.is_finite() {
+        return refuse("the pose is not finite".into());
+    }
+    Ok(())
+}
+
+/// The rotation nearest to `matrix`, which may carry a uniform scale; `None` if it is no rotation.
+pub(crate) fn rotation_of(matrix: DMat3) -> Option<DMat3> {
+    let determinant = matrix.determinant();
+    if !(determinant.is_finite() && determinant > 0.0) {
+        return None;
+    }
+    let unit = matrix * (1.0 / determinant.cbrt());
+    let gram = unit.transpose() * unit - DMat3::IDENTITY;
+    if gram.to_cols_array().iter().any(|value| !(value.abs() < 1e-2)) {
+        return None;
+    }
+    Some(DMat3::from_quat(DQuat::from_mat3(&unit).normalize()))
+}
+
+/// Camera-from-world of an OpenCV camera-to-world pose.
+pub(crate) fn invert_pose(rotation: DMat3, centre: DVec3) -> (DMat3, DVec3) {
+    let inverse = rotation.transpose();
+    (inverse, -(inverse * centre))
+}
+
+/// `name` as a path below the scene. Paths that leave the scene are refused.
+pub(crate) fn relative_path(source: &Path, root: &Path, name: &str) -> Result<PathBuf> {
+    let mut path = PathBuf::from(name);
+    if let Ok(inside) = path.strip_prefix(root) {
+        path = inside.to_owned();
+    }
+    let leaves = path.components().any(|part| !matches!(part, Component::Normal(_) | Component::CurDir));
+    if leaves || path.as_os_str().is_empty() || name.contains('\0') {
+        let problem = "lies outside the scene folder; list photos by paths relative to it, without `..`";
+        return Err(Error::data(source, format!("photo `{name}`"), problem));
+    }
+    Ok(path.components().filter(|part| *part != Component::CurDir).collect())
+}
+
+/// The first of `folders` (below `root`) that holds `relative`, with one of `extensions` added.
+pub(crate) fn find_file(root: &Path, folders: &[&str], relative: &Path, extensions: &[&str]) -> Option<PathBuf> {
+    folders.iter().find_map(|folder| {
+        let path = root.join(folder).join(relative);
+        extensions.iter().find_map(|extension| {
+            let mut candidate = path.clone().into_os_string();
+            candidate.push(extension);
+            let candidate = PathBuf::from(candidate);
+            candidate.is_file().then_some(candidate)
+        })
+    })
+}

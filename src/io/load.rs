@@ -1,0 +1,200 @@
+//! From a listing to a data set: split, decode, undistort, resize, masks.
+
+use super::LoadOptions;
+use super::image::{check_size, photo_size, read_photo};
+use super::listing::{Listed, Listing};
+use super::mask::{MaskFolder, read_checked};
+use super::resample::{bounded_size, resample_ids, same_aspect, shrink_photo, undistort_photo};
+use crate::error::{Error, Result};
+use crate::scene::{Camera, Dataset, LabelMap, Photo, View};
+use rayon::prelude::*;
+use std::path::Path;
+use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
+
+/// Most problems that one message lists.
+const LISTED_MAX: usize = 20;
+
+/// Loads what `listing` lists.
+pub(crate) fn load(root: &Path, mut listing: Listing, options: &LoadOptions) -> Result<Dataset> {
+    let mut notes = std::mem::take(&mut listing.notes);
+    let mut views = existing(&listing, options, &mut notes)?;
+    views.sort_by(|a, b| a.name.cmp(&b.name));
+    let test = split(&views, options.test_every, &mut notes)?;
+    let masks = options.masks.as_deref().map(|folder| MaskFolder::new(folder, views.iter().map(|v| v.name.as_str())));
+    let masks = masks.transpose()?;
+    let resampled = AtomicUsize::new(0);
+    let loaded: Vec<Result<View>> =
+        views.par_iter().map(|view| load_view(view, options, masks.as_ref(), &resampled)).collect();
+    let loaded = all_or_one_error(root, loaded)?;
+    if let Some(masks) = &masks {
+        let without: Vec<&str> = loaded.iter().filter(|v| v.mask.is_none()).map(|view| view.name.as_str()).collect();
+        if without.len() == loaded.len() {
+            return Err(masks.nothing_found(&loaded[0].name));
+        }
+        if !without.is_empty() {
+            notes.push(format!("{} of {} photos have no mask: {}", without.len(), loaded.len(), shortened(&without)));
+        }
+    }
+    if resampled.load(Relaxed) > 0 {
+        let count = resampled.load(Relaxed);
+        notes.push(format!("{count} masks differ in size from their photos and were scaled (nearest id)"));
+    }
+    if views.iter().any(|view| !view.lens.is_pinhole()) {
+        notes.push("photos and masks were undistorted to a pinhole camera; pixels without a source are ignored".into());
+    }
+    let mut dataset = Dataset { root: root.to_owned(), points: listing.points, notes, ..Dataset::default() };
+    for (view, test) in loaded.into_iter().zip(test) {
+        if test { dataset.test.push(view) } else { dataset.train.push(view) }
+    }
+    Ok(dataset)
+}
+
+fn shortened(names: &[&str]) -> String {
+    let shown = names.iter().take(3).copied().collect::<Vec<_>>().join(", ");
+    if names.len() > 3 { format!("{shown}, ...") } else { shown }
+}
+
+/// The views whose photo exists. Without photos asked for and without any there, all views that state their size.
+fn existing(listing: &Listing, options: &LoadOptions, notes: &mut Vec<String>) -> Result<Vec<Listed>> {
+    let total = listing.views.len() + listing.missing.len();
+    if total == 0 {
+        return Err(Error::data(&listing.source, "", "lists no photo"));
+    }
+    let found = listing.views.iter().filter(|view| view.photo.is_some()).count();
+    if found == 0 && !options.photos && !listing.views.is_empty() {
+        notes.push("no listed photo exists; cameras have the sizes that the data set states".into());
+        return Ok(listing.views.clone());
+    }
+    let absent = listing.views.iter().filter(|view| view.photo.is_none()).map(|view| view.name.as_str());
+    let absent: Vec<&str> = absent.chain(listing.missing.iter().map(String::as_str)).collect();
+    if absent.len() * 2 > total {
+        let problem = format!(
+            "{} of {total} listed photos do not exist (such as {}); expected in `images` or at the listed path below \
+             the scene",
+            absent.len(),
+            shortened(&absent)
+        );
+        return Err(Error::data(&listing.source, "photos", problem));
+    }
+    if !absent.is_empty() {
+        let (count, names) = (absent.len(), shortened(&absent));
+        notes.push(format!("{count} of {total} listed photos do not exist and are skipped: {names}"));
+    }
+    Ok(listing.views.iter().filter(|view| view.photo.is_some()).cloned().collect())
+}
+
+/// Which of the views, sorted by name, are held out.
+fn split(views: &[Listed], every: Option<u32>, notes: &mut Vec<String>) -> Result<Vec<bool>> {
+    if views.iter().all(|view| view.test.is_some()) {
+        return Ok(views.iter().map(|view| view.test == Some(true)).collect());
+    }
+    let Some(every) = every else { return Ok(vec![false; views.len()]) };
+    if every == 0 {
+        return Err(Error::usage("--test-every", "0 holds out nothing and everything; expected 1 or more"));
+    }
+    if views.len() == 1 && every > 1 {
+        notes.push("the only photo is used for training; nothing is held out".into());
+        return Ok(vec![false]);
+    }
+    Ok((0..views.len()).map(|index| index % every as usize == 0).collect())
+}
+
+/// The views, or one error that lists all that failed.
+fn all_or_one_error(root: &Path, loaded: Vec<Result<View>>) -> Result<Vec<View>> {
+    let total = loaded.len();
+    let mut views = Vec::with_capacity(total);
+    let mut errors = Vec::new();
+    for view in loaded {
+        match view {
+            Ok(view) => views.push(view),
+            Err(error) => errors.push(error),
+        }
+    }
+    match errors.len() {
+        0 => Ok(views),
+        1 => Err(errors.remove(0)),
+        count => {
+            let shown: Vec<String> = errors.iter().take(LISTED_MAX).map(ToString::to_string).collect();
+            let more = if count > LISTED_MAX { format!("\n  and {} more", count - LISTED_MAX) } else { String::new() };
+            let problem = format!("{count} of {total} views cannot be used:\n  {}{more}", shown.join("\n  "));
+            Err(Error::data(root, "", problem))
+        }
+    }
+}
+
+fn load_view(
+    listed: &Listed,
+    options: &LoadOptions,
+    masks: Option<&MaskFolder>,
+    resampled: &AtomicUsize,
+) -> Result<View> {
+    let original = at_photo_size(listed)?;
+    let size = bounded_size((original.width, original.height), options.max_resolution);
+    let photo = match &listed.photo {
+        Some(path) if options.photos => Some(load_photo(path, listed, &original, size, options.background)?),
+        _ => None,
+    };
+    let mask = match masks.and_then(|masks| masks.find(&listed.name)) {
+        Some(path) => Some(load_mask(&path, listed, &original, size, resampled)?),
+        None => None,
+    };
+    Ok(View { name: listed.name.clone(), camera: original.resized(size.0, size.1), photo, mask })
+}
+
+/// The camera at the size of the photo's file, which may be a scaled version of what the data set states.
+fn at_photo_size(listed: &Listed) -> Result<Camera> {
+    let Some(path) = &listed.photo else { return Ok(listed.camera.clone()) };
+    let size = photo_size(path)?;
+    check_size(path, size)?;
+    let camera = &listed.camera;
+    if !same_aspect(size, (camera.width, camera.height)) {
+        let problem = format!(
+            "the photo has {} x {} px and its camera {} x {} px, which no scale explains; use the photos that the \
+             cameras were made for (an EXIF orientation is ignored on purpose, poses belong to the stored pixels)",
+            size.0, size.1, camera.width, camera.height
+        );
+        return Err(Error::data(path, "", problem));
+    }
+    Ok(camera.resized(size.0, size.1))
+}
+
+fn load_photo(
+    path: &Path,
+    listed: &Listed,
+    original: &Camera,
+    (width, height): (u32, u32),
+    background: [f32; 3],
+) -> Result<Photo> {
+    let mut photo = read_photo(path, background)?;
+    if !listed.lens.is_pinhole() {
+        photo = undistort_photo(&photo, original, &listed.lens);
+    }
+    if (width, height) != (photo.width, photo.height) {
+        photo = shrink_photo(&photo, width, height);
+    }
+    Ok(photo)
+}
+
+fn load_mask(
+    path: &Path,
+    listed: &Listed,
+    original: &Camera,
+    size: (u32, u32),
+    resampled: &AtomicUsize,
+) -> Result<LabelMap> {
+    let photo = (original.width, original.height);
+    let ids = read_checked(path, |found| {
+        if same_aspect(found, photo) {
+            return Ok(());
+        }
+        let problem = format!(
+            "the mask has {} x {} px and its photo {} x {} px, which no scale explains; make masks of the same photos",
+            found.0, found.1, photo.0, photo.1
+        );
+        Err(Error::data(path, "", problem))
+    })?;
+    if (ids.width, ids.height) != photo {
+        resampled.fetch_add(1, Relaxed);
+    }
+    Ok(resample_ids(&ids, original, &listed.lens, size))
+}

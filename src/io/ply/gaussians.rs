@@ -1,0 +1,222 @@
+//! The standard 3DGS PLY, with `property uint label` as its last column where the scene has labels.
+
+use super::table::Table;
+use crate::error::{Error, Result};
+use crate::io::atomic;
+use crate::scene::Gaussians;
+use crate::scene::labels::LABEL_MAX;
+use ply_rs_bw::ply::{Addable, DefaultElement, ElementDef, Encoding, Header, PropertyDef, PropertyType, ScalarType};
+use ply_rs_bw::writer::Writer;
+use std::io::{self, Write};
+use std::path::Path;
+
+/// Columns that every 3DGS PLY has, in the order in which rows are decoded.
+const REQUIRED: [&str; 14] = [
+    "x", "y", "z", "f_dc_0", "f_dc_1", "f_dc_2", "opacity", "scale_0", "scale_1", "scale_2", "rot_0", "rot_1", "rot_2",
+    "rot_3",
+];
+
+/// Largest log-scale whose exponential is finite in f32.
+const LOG_SCALE_MAX: f32 = 88.0;
+
+/// A scene read from a PLY.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ReadPly {
+    /// The usable rows.
+    pub gaussians: Gaussians,
+    /// Rows left out because a value was not finite, a rotation zero or a size beyond f32.
+    pub dropped: u64,
+    /// What a person should know about the file, a line each.
+    pub notes: Vec<String>,
+}
+
+/// Reads a 3DGS PLY: little-endian, big-endian or ascii, columns by name in any order and of any scalar type, SH
+/// degree by the number of `f_rest_*` (0, 9, 24 or 45, channel-major), `label` if there is one. Other columns are
+/// ignored. Rows with values that cannot be rendered are dropped and counted; a label that is no whole number from
+/// 0 to 65535 is an error.
+pub fn read_gaussians(path: impl AsRef<Path>) -> Result<ReadPly> {
+    let path = path.as_ref();
+    let table = Table::open(path)?;
+    let sh_degree = sh_degree(path, &table)?;
+    if table.names().any(|name| name == "red") && !table.names().any(|name| name == "f_dc_0") {
+        let problem = "holds coloured points, not Gaussians: it has `red` and no `f_dc_0`; train on them first";
+        return Err(Error::data(path, "header", problem));
+    }
+    let mut read = ReadPly::default();
+    read.gaussians.sh_degree = sh_degree;
+    let rest = read.gaussians.rest_per_gaussian();
+    let rest_names: Vec<String> = (0..rest * 3).map(|index| format!("f_rest_{index}")).collect();
+    let mut columns = REQUIRED.to_vec();
+    columns.extend(rest_names.iter().map(String::as_str));
+    let labelled = table.names().any(|name| name == "label");
+    if labelled {
+        columns.push("label");
+        read.gaussians.labels = Some(Vec::new());
+    }
+    let mut dropped = Dropped::default();
+    let mut total = 0;
+    let odd = table.for_each(&columns, |index, row| {
+        total = index + 1;
+        let label = if labelled { Some(label_of(path, index, row[row.len() - 1])?) } else { None };
+        push_row(&mut read.gaussians, &mut dropped, &row[..14 + rest * 3], label);
+        Ok(())
+    })?;
+    read.dropped = dropped.total();
+    if read.dropped > 0 {
+        read.notes.push(format!("left out {} of {total} Gaussians: {}", read.dropped, dropped.reasons()));
+    }
+    if odd.extra_bytes > 0 {
+        read.notes.push(format!("{} bytes after the last Gaussian were ignored", odd.extra_bytes));
+    }
+    Ok(read)
+}
+
+/// Degree from the number of `f_rest_*` columns.
+fn sh_degree(path: &Path, table: &Table) -> Result<u32> {
+    let count = table.names().filter(|name| name.starts_with("f_rest_")).count();
+    match count {
+        0 => Ok(0),
+        9 => Ok(1),
+        24 => Ok(2),
+        45 => Ok(3),
+        _ => {
+            let problem = format!("{count} `f_rest_` properties; 0, 9, 24 or 45 (SH degree 0 to 3) are supported");
+            Err(Error::data(path, "header", problem))
+        }
+    }
+}
+
+fn label_of(path: &Path, index: u64, value: f64) -> Result<u32> {
+    if value.fract() == 0.0 && (0.0..=f64::from(LABEL_MAX)).contains(&value) {
+        return Ok(value as u32);
+    }
+    let problem =
+        format!("label {value} is not a whole number from 0 (unlabelled) to {LABEL_MAX}; renumber the labels");
+    Err(Error::data(path, format!("vertex {index}"), problem))
+}
+
+/// Rows left out, by reason.
+#[derive(Default)]
+struct Dropped {
+    not_finite: u64,
+    no_rotation: u64,
+    too_large: u64,
+}
+
+impl Dropped {
+    fn total(&self) -> u64 {
+        self.not_finite + self.no_rotation + self.too_large
+    }
+
+    fn reasons(&self) -> String {
+        let all = [
+            (self.not_finite, "with a value that is not finite"),
+            (self.no_rotation, "with a zero rotation"),
+            (self.too_large, "with an infinite size"),
+        ];
+        let some: Vec<String> = all.iter().filter(|r| r.0 > 0).map(|(count, why)| format!("{count} {why}")).collect();
+        some.join(", ")
+    }
+}
+
+/// Appends a row in the order of [`REQUIRED`] and `f_rest_*`, or counts why it is left out.
+fn push_row(to: &mut Gaussians, dropped: &mut Dropped, row: &[f64], label: Option<u32>) {
+    let value = |index: usize| row[index] as f32;
+    if (0..row.len()).any(|index| !value(index).is_finite()) {
+        dropped.not_finite += 1;
+        return;
+    }
+    let scales = [value(7), value(8), value(9)];
+    if scales.iter().any(|&scale| scale > LOG_SCALE_MAX) {
+        dropped.too_large += 1;
+        return;
+    }
+    let Some(quat) = rotation([row[10], row[11], row[12], row[13]]) else {
+        dropped.no_rotation += 1;
+        return;
+    };
+    to.means.push([value(0), value(1), value(2)]);
+    to.sh0.push([value(3), value(4), value(5)]);
+    to.opacities.push(value(6));
+    to.scales.push(scales);
+    to.quats.push(quat);
+    let rest = to.rest_per_gaussian();
+    to.sh_rest.extend((0..rest).map(|k| [value(14 + k), value(14 + rest + k), value(14 + 2 * rest + k)]));
+    if let (Some(labels), Some(label)) = (to.labels.as_mut(), label) {
+        labels.push(label);
+    }
+}
+
+/// The rotation as stored; normalised only if its squared length would leave f32. `None` for zero.
+fn rotation(quat: [f64; 4]) -> Option<[f32; 4]> {
+    let length = quat.iter().map(|v| v * v).sum::<f64>().sqrt();
+    if length == 0.0 {
+        return None;
+    }
+    let usual = (1e-6..=1e6).contains(&length);
+    Some(quat.map(|v| if usual { v as f32 } else { (v / length) as f32 }))
+}
+
+/// Writes the standard 3DGS PLY (little-endian, no comments, normals zero), with `label` as last column only if
+/// the scene has labels. Rows that are not finite are left out; returns how many. The file appears complete or
+/// not at all.
+pub fn write_gaussians(path: impl AsRef<Path>, gaussians: &Gaussians) -> Result<u64> {
+    let (count, rest) = (gaussians.len(), gaussians.rest_per_gaussian());
+    let lengths = [gaussians.quats.len(), gaussians.scales.len(), gaussians.opacities.len(), gaussians.sh0.len()];
+    let labels_fit = gaussians.labels.as_ref().is_none_or(|labels| labels.len() == count);
+    if lengths.iter().any(|&n| n != count) || gaussians.sh_rest.len() != count * rest || !labels_fit {
+        return Err(Error::Bug(format!("the columns of {count} Gaussians differ in length")));
+    }
+    let finite: Vec<usize> = (0..count).filter(|&row| is_finite(gaussians, row)).collect();
+    let header = header(finite.len(), rest * 3, gaussians.labels.is_some());
+    atomic::write(path, |out| {
+        // The header goes through a buffer because the crate wants a sized writer.
+        let mut text = Vec::new();
+        Writer::<DefaultElement>::new().write_header(&mut text, &header)?;
+        out.write_all(&text)?;
+        let mut bytes = Vec::with_capacity((18 + rest * 3) * 4);
+        finite.iter().try_for_each(|&row| write_row(out, &mut bytes, gaussians, row))
+    })?;
+    Ok((count - finite.len()) as u64)
+}
+
+fn is_finite(g: &Gaussians, row: usize) -> bool {
+    let rest = g.rest_per_gaussian();
+    let triples = [g.means[row], g.scales[row], g.sh0[row]];
+    triples.iter().chain(&g.sh_rest[row * rest..(row + 1) * rest]).all(|t| t.iter().all(|v| v.is_finite()))
+        && g.quats[row].iter().all(|v| v.is_finite())
+        && g.opacities[row].is_finite()
+}
+
+fn header(count: usize, rest: usize, labelled: bool) -> Header {
+    let mut names: Vec<String> = ["x", "y", "z", "nx", "ny", "nz"].map(String::from).to_vec();
+    names.extend((0..3).map(|k| format!("f_dc_{k}")));
+    names.extend((0..rest).map(|k| format!("f_rest_{k}")));
+    names.push("opacity".into());
+    names.extend((0..3).map(|k| format!("scale_{k}")));
+    names.extend((0..4).map(|k| format!("rot_{k}")));
+    let mut vertex = ElementDef::new("vertex".into());
+    vertex.count = count;
+    names.into_iter().for_each(|n| vertex.properties.add(PropertyDef::new(n, PropertyType::Scalar(ScalarType::Float))));
+    if labelled {
+        vertex.properties.add(PropertyDef::new("label".into(), PropertyType::Scalar(ScalarType::UInt)));
+    }
+    let mut header = Header::new();
+    header.encoding = Encoding::BinaryLittleEndian;
+    header.elements.add(vertex);
+    header
+}
+
+fn write_row(out: &mut dyn Write, bytes: &mut Vec<u8>, g: &Gaussians, row: usize) -> io::Result<()> {
+    bytes.clear();
+    let rest = g.rest_per_gaussian();
+    let triples = &g.sh_rest[row * rest..(row + 1) * rest];
+    let head = g.means[row].into_iter().chain([0.0; 3]).chain(g.sh0[row]);
+    let channels = (0..3).flat_map(|channel| triples.iter().map(move |triple| triple[channel]));
+    let tail = [g.opacities[row]].into_iter().chain(g.scales[row]).chain(g.quats[row]);
+    head.chain(channels).chain(tail).for_each(|value| bytes.extend_from_slice(&value.to_le_bytes()));
+    if let Some(labels) = &g.labels {
+        bytes.extend_from_slice(&labels[row].to_le_bytes());
+    }
+    out.write_all(bytes)
+}

@@ -1,0 +1,43 @@
+//! Plain coloured points.
+
+use super::table::Table;
+use crate::error::{Error, Result};
+use crate::scene::Point;
+use glam::DVec3;
+use std::path::Path;
+
+/// Reads points from a PLY with `x y z` and, if it has them, `red green blue`: integers from 0 to 255, or floats,
+/// which count as 0 to 1 unless one of them is larger. Points without colour are mid-grey. Points that are not
+/// finite are left out.
+pub fn read_points(path: impl AsRef<Path>) -> Result<Vec<Point>> {
+    let path = path.as_ref();
+    let table = Table::open(path)?;
+    let mut columns = vec!["x", "y", "z"];
+    let colours = ["red", "green", "blue"];
+    let coloured = colours.iter().all(|colour| table.names().any(|name| name == *colour));
+    let floats = coloured && table.is_float("red");
+    if coloured {
+        columns.extend(colours);
+    }
+    let mut rows: Vec<([f64; 3], [f64; 3])> = Vec::new();
+    table.for_each(&columns, |index, row| {
+        let mut colour = [128.0; 3];
+        if coloured {
+            colour.copy_from_slice(&row[3..6]);
+        }
+        if colour.iter().any(|value| !value.is_finite()) {
+            return Err(Error::data(path, format!("vertex {index}"), "a colour that is not a number"));
+        }
+        if row[..3].iter().all(|value| value.is_finite()) {
+            rows.push(([row[0], row[1], row[2]], colour));
+        }
+        Ok(())
+    })?;
+    let unit = floats && rows.iter().all(|(_, colour)| colour.iter().all(|&value| value <= 1.0));
+    let scale = if unit { 255.0 } else { 1.0 };
+    let point = |(position, colour): ([f64; 3], [f64; 3])| Point {
+        position: DVec3::from_array(position),
+        colour: colour.map(|value| (value * scale).round().clamp(0.0, 255.0) as u8),
+    };
+    Ok(rows.into_iter().map(point).collect())
+}

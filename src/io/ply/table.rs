@@ -1,0 +1,284 @@
+//! The `vertex` element of a PLY file as rows of selected columns.
+
+use crate::error::{Error, Result};
+use ply_rs_bw::parser::{Parser, Reader};
+use ply_rs_bw::ply::{DefaultElement, ElementDef, Encoding, Header, PropertyType, ScalarType};
+use std::fs::File;
+use std::io::{BufRead, BufReader, Read};
+use std::path::{Path, PathBuf};
+
+/// Longest header that is read; a 3DGS header takes about 1.5 KiB.
+const HEADER_MAX: u64 = 64 * 1024;
+/// Longest line of an ascii row.
+const LINE_MAX: u64 = 64 * 1024;
+
+/// An open PLY file, its header understood and its `vertex` rows not yet read.
+pub(super) struct Table {
+    path: PathBuf,
+    file: BufReader<File>,
+    encoding: Encoding,
+    vertex: ElementDef,
+    /// Elements before `vertex`, whose rows are skipped.
+    before: Vec<ElementDef>,
+    after: bool,
+    header_bytes: u64,
+    file_bytes: u64,
+}
+
+/// One column of a row: where it lies and what it is.
+struct Column {
+    index: usize,
+    offset: usize,
+    scalar: ScalarType,
+}
+
+fn size_of(scalar: &ScalarType) -> usize {
+    match scalar {
+        ScalarType::Char | ScalarType::UChar => 1,
+        ScalarType::Short | ScalarType::UShort => 2,
+        ScalarType::Int | ScalarType::UInt | ScalarType::Float => 4,
+        ScalarType::Double => 8,
+    }
+}
+
+/// The scalar at the head of `bytes` as f64, which holds every PLY scalar exactly.
+fn decode(scalar: &ScalarType, bytes: &[u8], big_endian: bool) -> f64 {
+    macro_rules! number {
+        ($type:ty, $bytes:expr) => {{
+            let mut raw = [0u8; size_of::<$type>()];
+            raw.copy_from_slice(&$bytes[..size_of::<$type>()]);
+            if big_endian { <$type>::from_be_bytes(raw) as f64 } else { <$type>::from_le_bytes(raw) as f64 }
+        }};
+    }
+    use std::mem::size_of;
+    match scalar {
+        ScalarType::Char => number!(i8, bytes),
+        ScalarType::UChar => number!(u8, bytes),
+        ScalarType::Short => number!(i16, bytes),
+        ScalarType::UShort => number!(u16, bytes),
+        ScalarType::Int => number!(i32, bytes),
+        ScalarType::UInt => number!(u32, bytes),
+        ScalarType::Float => number!(f32, bytes),
+        ScalarType::Double => number!(f64, bytes),
+    }
+}
+
+impl Table {
+    /// Opens `path` and reads its header.
+    pub(super) fn open(path: &Path) -> Result<Self> {
+        let file = File::open(path).map_err(Error::read(path))?;
+        let file_bytes = file.metadata().map_err(Error::read(path))?.len();
+        let mut file = BufReader::with_capacity(1 << 18, file);
+        let text = header_bytes(path, &mut file)?;
+        let header = parse_header(path, &text)?;
+        let mut elements: Vec<ElementDef> = header.elements.into_iter().map(|(_, element)| element).collect();
+        if elements.iter().any(|element| element.properties.contains_key("packed_position")) {
+            let cure = "a compressed PLY; decode it first, for example with `splat-transform in.ply out.ply`";
+            return Err(Error::data(path, "header", cure));
+        }
+        let Some(at) = elements.iter().position(|element| element.name == "vertex") else {
+            return Err(Error::data(
+                path,
+                "header",
+                "has no element `vertex`; this is not a file of Gaussians or points",
+            ));
+        };
+        let after = elements.len() > at + 1;
+        let vertex = elements.swap_remove(at);
+        elements.truncate(at);
+        let header_bytes = text.len() as u64;
+        Ok(Self {
+            path: path.to_owned(),
+            file,
+            encoding: header.encoding,
+            vertex,
+            before: elements,
+            after,
+            header_bytes,
+            file_bytes,
+        })
+    }
+
+    /// Names of the vertex properties in the order of the file.
+    pub(super) fn names(&self) -> impl Iterator<Item = &str> {
+        self.vertex.properties.iter().map(|(_, property)| property.name.as_str())
+    }
+
+    /// True if the property exists and is `float` or `double`.
+    pub(super) fn is_float(&self, name: &str) -> bool {
+        self.vertex
+            .properties
+            .get(name)
+            .is_some_and(|p| matches!(p.data_type, PropertyType::Scalar(ScalarType::Float | ScalarType::Double)))
+    }
+
+    /// Calls `row` with the values of `columns` for each vertex, as f64, in order.
+    pub(super) fn for_each(
+        mut self,
+        columns: &[&str],
+        mut row: impl FnMut(u64, &[f64]) -> Result<()>,
+    ) -> Result<Notes> {
+        let located = self.locate(columns)?;
+        match self.encoding {
+            Encoding::Ascii => self.ascii_rows(&located, &mut row),
+            Encoding::BinaryBigEndian => self.binary_rows(&located, true, &mut row),
+            Encoding::BinaryLittleEndian => self.binary_rows(&located, false, &mut row),
+        }
+    }
+
+    fn locate(&self, columns: &[&str]) -> Result<Vec<Column>> {
+        let missing: Vec<&str> = columns.iter().copied().filter(|&c| !self.vertex.properties.contains_key(c)).collect();
+        if !missing.is_empty() {
+            let problem = format!("`vertex` lacks the properties {}", missing.join(" "));
+            return Err(Error::data(&self.path, "header", problem));
+        }
+        let layout = layout_of(&self.path, &self.vertex)?;
+        let column = |name: &&str| {
+            let index = self.vertex.properties.keys().position(|key| key == name).unwrap_or_default();
+            Column { index, offset: layout[index].0, scalar: layout[index].1.clone() }
+        };
+        Ok(columns.iter().map(column).collect())
+    }
+
+    fn binary_rows(
+        &mut self,
+        columns: &[Column],
+        big_endian: bool,
+        row: &mut impl FnMut(u64, &[f64]) -> Result<()>,
+    ) -> Result<Notes> {
+        let mut needed = u128::from(self.header_bytes);
+        let mut skip = 0u128;
+        for element in &self.before {
+            skip += stride_of(&layout_of(&self.path, element)?) as u128 * element.count as u128;
+        }
+        let layout = layout_of(&self.path, &self.vertex)?;
+        let stride = stride_of(&layout);
+        needed += skip + stride as u128 * self.vertex.count as u128;
+        if needed > u128::from(self.file_bytes) {
+            let problem = format!(
+                "the header promises {} vertices of {stride} bytes, which takes {needed} bytes; the file has {}; \
+                 it was cut short or its header is wrong",
+                self.vertex.count, self.file_bytes
+            );
+            return Err(Error::data(&self.path, "header", problem));
+        }
+        self.file.seek_relative(skip as i64).map_err(Error::read(&self.path))?;
+        let mut bytes = vec![0u8; stride];
+        let mut values = vec![0.0; columns.len()];
+        for index in 0..self.vertex.count as u64 {
+            self.file.read_exact(&mut bytes).map_err(Error::read(&self.path))?;
+            for (value, column) in values.iter_mut().zip(columns) {
+                *value = decode(&column.scalar, &bytes[column.offset..], big_endian);
+            }
+            row(index, &values)?;
+        }
+        let extra = u128::from(self.file_bytes) - needed;
+        Ok(Notes { extra_bytes: if self.after { 0 } else { extra as u64 } })
+    }
+
+    fn ascii_rows(&mut self, columns: &[Column], row: &mut impl FnMut(u64, &[f64]) -> Result<()>) -> Result<Notes> {
+        let skip: u128 = self.before.iter().map(|element| element.count as u128).sum();
+        let mut line = Vec::new();
+        for _ in 0..skip {
+            self.line(&mut line, "an element before `vertex`")?;
+        }
+        let (width, mut values) = (self.vertex.properties.len(), vec![0.0; columns.len()]);
+        for index in 0..self.vertex.count as u64 {
+            self.line(&mut line, &format!("vertex {index}"))?;
+            let problem = |problem: String| Error::data(&self.path, format!("vertex {index}"), problem);
+            let text = str::from_utf8(&line).map_err(|_| problem("is not text".into()))?;
+            let words: Vec<&str> = text.split_ascii_whitespace().collect();
+            if words.len() != width {
+                return Err(problem(format!("has {} values, the header declares {width}", words.len())));
+            }
+            for (value, column) in values.iter_mut().zip(columns) {
+                let word = words[column.index];
+                *value = word.parse().map_err(|_| problem(format!("`{word}` is not a number")))?;
+            }
+            row(index, &values)?;
+        }
+        Ok(Notes { extra_bytes: 0 })
+    }
+
+    /// The next line with something on it.
+    fn line(&mut self, line: &mut Vec<u8>, what: &str) -> Result<()> {
+        loop {
+            line.clear();
+            let mut limited = (&mut self.file).take(LINE_MAX);
+            let read = limited.read_until(b'\n', line).map_err(Error::read(&self.path))?;
+            if read == 0 {
+                return Err(Error::data(&self.path, what, "the file ends before it; it was cut short"));
+            }
+            if read as u64 == LINE_MAX {
+                return Err(Error::data(&self.path, what, format!("a line is longer than {LINE_MAX} bytes")));
+            }
+            if line.iter().any(|byte| !byte.is_ascii_whitespace()) {
+                return Ok(());
+            }
+        }
+    }
+}
+
+/// What was odd about the rows.
+pub(super) struct Notes {
+    /// Bytes after the last declared element.
+    pub(super) extra_bytes: u64,
+}
+
+/// Reads up to and with the `end_header` line, at most [`HEADER_MAX`] bytes.
+fn header_bytes(path: &Path, file: &mut impl BufRead) -> Result<Vec<u8>> {
+    let mut text = Vec::new();
+    let mut limited = file.take(HEADER_MAX);
+    loop {
+        let start = text.len();
+        let read = limited.read_until(b'\n', &mut text).map_err(Error::read(path))?;
+        let line = text[start..].trim_ascii_end();
+        if start == 0 && line != b"ply" {
+            return Err(Error::data(path, "byte 0", "does not start with `ply`; this is not a PLY file"));
+        }
+        if line == b"end_header" && text.ends_with(b"\n") {
+            return Ok(text);
+        }
+        if read == 0 {
+            let problem = format!("no `end_header` line within the first {} bytes", text.len());
+            return Err(Error::data(path, "header", problem));
+        }
+    }
+}
+
+fn parse_header(path: &Path, text: &[u8]) -> Result<Header> {
+    let problem = |problem: String| Error::data(path, "header", problem);
+    if text.contains(&0) || str::from_utf8(text).is_err() {
+        return Err(problem("is not text".into()));
+    }
+    let header = Parser::<DefaultElement>::new()
+        .read_header(&mut Reader::new(text))
+        .map_err(|error| problem(error.to_string().split_whitespace().collect::<Vec<_>>().join(" ")))?;
+    // The crate keeps the last of two properties with one name, which would move every later column.
+    let declared = text.split(|&byte| byte == b'\n').filter(|line| line.trim_ascii().starts_with(b"property")).count();
+    let kept: usize = header.elements.values().map(|element| element.properties.len()).sum();
+    let elements = text.split(|&byte| byte == b'\n').filter(|line| line.trim_ascii().starts_with(b"element")).count();
+    if declared != kept || elements != header.elements.len() {
+        return Err(problem("declares an element or a property twice".into()));
+    }
+    Ok(header)
+}
+
+/// Offset and scalar of each property of a binary row; lists are refused.
+fn layout_of(path: &Path, element: &ElementDef) -> Result<Vec<(usize, ScalarType)>> {
+    let mut offset = 0;
+    let mut layout = Vec::with_capacity(element.properties.len());
+    for property in element.properties.values() {
+        let PropertyType::Scalar(scalar) = &property.data_type else {
+            let problem = format!("list property `{}` in element `{}` is not supported", property.name, element.name);
+            return Err(Error::data(path, "header", problem));
+        };
+        layout.push((offset, scalar.clone()));
+        offset += size_of(scalar);
+    }
+    Ok(layout)
+}
+
+fn stride_of(layout: &[(usize, ScalarType)]) -> usize {
+    layout.last().map_or(0, |(offset, scalar)| offset + size_of(scalar))
+}

@@ -1,0 +1,162 @@
+//! Photos and id maps at another size or through another lens.
+//!
+//! Photos are undistorted with bilinear interpolation at their own size and then shrunk by an exact area average.
+//! Ids are never mixed: each target pixel takes the id at its centre, through size and lens in one step.
+
+use super::lens::Lens;
+use crate::scene::{Camera, LabelMap, Photo};
+use glam::DVec2;
+use rayon::prelude::*;
+
+/// The size with `longest` px at the longest side, if the given one is larger: the one rounding rule for cameras,
+/// photos and masks.
+pub fn bounded_size((width, height): (u32, u32), longest: Option<u32>) -> (u32, u32) {
+    let Some(longest) = longest.filter(|&longest| longest < width.max(height)) else { return (width, height) };
+    let scale = f64::from(longest) / f64::from(width.max(height));
+    let side = |side: u32| ((f64::from(side) * scale).round() as u32).max(1);
+    (side(width), side(height))
+}
+
+/// True if the two sizes differ by a scale only: shrinking the larger to the smaller, the sides agree within 1 px.
+pub fn same_aspect(a: (u32, u32), b: (u32, u32)) -> bool {
+    let along = |from: (u32, u32), to: (u32, u32)| {
+        let height = f64::from(from.1) * f64::from(to.0) / f64::from(from.0);
+        let width = f64::from(from.0) * f64::from(to.1) / f64::from(from.1);
+        (height - f64::from(to.1)).abs() <= 1.0 || (width - f64::from(to.0)).abs() <= 1.0
+    };
+    let smaller_first = u64::from(a.0) * u64::from(a.1) <= u64::from(b.0) * u64::from(b.1);
+    if smaller_first { along(b, a) } else { along(a, b) }
+}
+
+/// Maps pixels of the pinhole image of `camera` to the photo taken through `lens` with the same intrinsics.
+pub struct Undistortion<'a> {
+    camera: &'a Camera,
+    lens: &'a Lens,
+    valid_radius: f64,
+}
+
+impl<'a> Undistortion<'a> {
+    /// `camera` has the size of the photo.
+    pub fn new(camera: &'a Camera, lens: &'a Lens) -> Self {
+        let far = |f: f64, c: f64, side: u32| (c.max(f64::from(side) - c) / f).abs();
+        let corner = DVec2::new(far(camera.fx, camera.cx, camera.width), far(camera.fy, camera.cy, camera.height));
+        Self { camera, lens, valid_radius: lens.valid_radius(corner.length().max(1e-9)) }
+    }
+
+    /// Photo position of the pinhole position `pixel`, both in px with centres at halves; `None` outside the photo.
+    pub fn source(&self, pixel: DVec2) -> Option<DVec2> {
+        let camera = self.camera;
+        if self.lens.is_pinhole() {
+            return Some(pixel);
+        }
+        let ideal = DVec2::new((pixel.x - camera.cx) / camera.fx, (pixel.y - camera.cy) / camera.fy);
+        if ideal.length() > self.valid_radius {
+            return None;
+        }
+        let bent = self.lens.distort(ideal);
+        let at = DVec2::new(bent.x * camera.fx + camera.cx, bent.y * camera.fy + camera.cy);
+        let inside = (0.0..f64::from(camera.width)).contains(&at.x) && (0.0..f64::from(camera.height)).contains(&at.y);
+        inside.then_some(at)
+    }
+}
+
+/// The pinhole photo with the intrinsics of `camera`, which has the photo's size. Pixels without a source are
+/// black with alpha 0.
+pub fn undistort_photo(photo: &Photo, camera: &Camera, lens: &Lens) -> Photo {
+    let map = Undistortion::new(camera, lens);
+    let row = |y: u32| {
+        let map = &map;
+        (0..photo.width).map(move |x| {
+            let pixel = DVec2::new(f64::from(x) + 0.5, f64::from(y) + 0.5);
+            map.source(pixel).map_or([0; 4], |at| bilinear(photo, at))
+        })
+    };
+    let rgba = (0..photo.height).into_par_iter().flat_map_iter(row).collect();
+    Photo { width: photo.width, height: photo.height, rgba }
+}
+
+/// Colour between the four nearest pixel centres; the border continues outwards by its half pixel.
+fn bilinear(photo: &Photo, at: DVec2) -> [u8; 4] {
+    let split = |value: f64, side: u32| {
+        let value = (value - 0.5).clamp(0.0, f64::from(side - 1));
+        let low = value.floor();
+        (low as u32, (low as u32 + 1).min(side - 1), value - low)
+    };
+    let ((x0, x1, fx), (y0, y1, fy)) = (split(at.x, photo.width), split(at.y, photo.height));
+    let texel = |x: u32, y: u32| photo.rgba[y as usize * photo.width as usize + x as usize];
+    let (a, b, c, d) = (texel(x0, y0), texel(x1, y0), texel(x0, y1), texel(x1, y1));
+    let mut colour = [255u8; 4];
+    for channel in 0..3 {
+        let [a, b, c, d] = [a, b, c, d].map(|texel| f64::from(texel[channel]));
+        let (top, bottom) = (a + (b - a) * fx, c + (d - c) * fx);
+        colour[channel] = (top + (bottom - top) * fy).round() as u8;
+    }
+    colour
+}
+
+/// Along one side: the first source pixel of each target pixel and the weights from there on, which sum to 1.
+fn spans(from: u32, to: u32) -> Vec<(usize, Vec<f64>)> {
+    let ratio = f64::from(from) / f64::from(to);
+    let span = |index: u32| {
+        let (start, end) = (f64::from(index) * ratio, f64::from(index + 1) * ratio);
+        let first = start.floor();
+        let last = (end.ceil().min(f64::from(from)) as u32).max(first as u32 + 1);
+        let overlap = |pixel: u32| (end.min(f64::from(pixel + 1)) - start.max(f64::from(pixel))).max(0.0) / ratio;
+        (first as usize, (first as u32..last).map(overlap).collect())
+    };
+    (0..to).map(span).collect()
+}
+
+/// The photo shrunk to `width` x `height` px: each target pixel is the mean over its exact box of source pixels,
+/// fractions included, over those with alpha 255. It has alpha 255 if they cover at least half of the box.
+pub fn shrink_photo(photo: &Photo, width: u32, height: u32) -> Photo {
+    if (width, height) == (photo.width, photo.height) {
+        return photo.clone();
+    }
+    let (columns, rows) = (spans(photo.width, width), spans(photo.height, height));
+    let row = |(top, weights): &(usize, Vec<f64>)| -> Vec<[u8; 4]> {
+        columns.iter().map(|(left, across)| mean(photo, (*left, across), (*top, weights))).collect()
+    };
+    let rgba = rows.par_iter().flat_map_iter(row).collect();
+    Photo { width, height, rgba }
+}
+
+fn mean(photo: &Photo, (left, across): (usize, &[f64]), (top, down): (usize, &[f64])) -> [u8; 4] {
+    let (mut sum, mut covered) = ([0.0f64; 3], 0.0);
+    for (y, weight_y) in down.iter().enumerate() {
+        let start = (top + y) * photo.width as usize + left;
+        for (texel, weight_x) in photo.rgba[start..start + across.len()].iter().zip(across) {
+            let weight = if texel[3] == 255 { weight_x * weight_y } else { 0.0 };
+            covered += weight;
+            (0..3).for_each(|channel| sum[channel] += weight * f64::from(texel[channel]));
+        }
+    }
+    if covered < 0.5 - 1e-9 {
+        return [0; 4];
+    }
+    let [r, g, b] = sum.map(|value| (value / covered).round().clamp(0.0, 255.0) as u8);
+    [r, g, b, 255]
+}
+
+/// The id map that belongs to a photo of size `width` x `height` px, made from a map of the distorted photo at any
+/// scale. `camera` is that of the photo at its own size. Pixels without a source are 0.
+pub fn resample_ids(ids: &LabelMap, camera: &Camera, lens: &Lens, (width, height): (u32, u32)) -> LabelMap {
+    if lens.is_pinhole() && (ids.width, ids.height) == (width, height) {
+        return ids.clone();
+    }
+    let map = Undistortion::new(camera, lens);
+    let to_photo = DVec2::new(f64::from(camera.width) / f64::from(width), f64::from(camera.height) / f64::from(height));
+    let to_ids =
+        DVec2::new(f64::from(ids.width) / f64::from(camera.width), f64::from(ids.height) / f64::from(camera.height));
+    let row = |y: u32| {
+        let map = &map;
+        (0..width).map(move |x| {
+            let pixel = DVec2::new(f64::from(x) + 0.5, f64::from(y) + 0.5) * to_photo;
+            map.source(pixel).map_or(0, |at| {
+                let at = at * to_ids;
+                ids.at((at.x as u32).min(ids.width - 1), (at.y as u32).min(ids.height - 1))
+            })
+        })
+    };
+    LabelMap { width, height, ids: (0..height).into_par_iter().flat_map_iter(row).collect() }
+}

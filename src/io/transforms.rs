@@ -1,0 +1,266 @@
+//! `transforms.json` in the styles of Blender, instant-ngp and nerfstudio.
+//!
+//! Poses are camera-to-world with OpenGL axes (y up, looking along -z) and become camera-from-world with OpenCV
+//! axes. The world stays that of `transform_matrix`: nerfstudio's `applied_transform` is already part of it.
+
+use super::lens::Lens;
+use super::listing::{Listed, Listing, check_camera, find_file, invert_pose, relative_path, rotation_of};
+use super::{image, ply};
+use crate::error::{Error, Result};
+use crate::scene::{Camera, Point};
+use glam::{DAffine3, DMat3, DVec3};
+use serde::Deserialize;
+use std::collections::HashSet;
+use std::path::{Path, PathBuf};
+
+/// Endings tried for a photo that is listed without one.
+const EXTENSIONS: [&str; 7] = ["", ".png", ".jpg", ".jpeg", ".PNG", ".JPG", ".JPEG"];
+
+/// Intrinsics, of the whole file or of one frame.
+#[derive(Clone, Debug, Default, Deserialize)]
+struct Intrinsics {
+    camera_angle_x: Option<f64>,
+    camera_angle_y: Option<f64>,
+    fl_x: Option<f64>,
+    fl_y: Option<f64>,
+    cx: Option<f64>,
+    cy: Option<f64>,
+    w: Option<f64>,
+    h: Option<f64>,
+    k1: Option<f64>,
+    k2: Option<f64>,
+    k3: Option<f64>,
+    k4: Option<f64>,
+    p1: Option<f64>,
+    p2: Option<f64>,
+    camera_model: Option<String>,
+    is_fisheye: Option<bool>,
+}
+
+impl Intrinsics {
+    /// The frame's own values, and those of the file where it has none.
+    fn or(&self, file: &Self) -> Self {
+        macro_rules! merged {
+            ($($field:ident)*) => { Self { $($field: self.$field.clone().or(file.$field.clone())),* } };
+        }
+        merged!(camera_angle_x camera_angle_y fl_x fl_y cx cy w h k1 k2 k3 k4 p1 p2 camera_model is_fisheye)
+    }
+}
+
+#[derive(Debug, Deserialize)]
+struct Frame {
+    file_path: String,
+    transform_matrix: Vec<Vec<f64>>,
+    mask_path: Option<String>,
+    #[serde(flatten)]
+    intrinsics: Intrinsics,
+}
+
+#[derive(Debug, Deserialize)]
+struct Transforms {
+    frames: Vec<Frame>,
+    ply_file_path: Option<String>,
+    applied_transform: Option<Vec<Vec<f64>>>,
+    #[serde(flatten)]
+    intrinsics: Intrinsics,
+}
+
+/// Reads the scene at `root`, if it has transforms: `transforms_train.json` and `transforms_test.json` with their
+/// split, or else `transforms.json`, or else `transforms_train.json` alone.
+pub(crate) fn list(root: &Path) -> Result<Option<Listing>> {
+    let file = |name: &str| Some(root.join(name)).filter(|path| path.is_file());
+    let (train, test) = (file("transforms_train.json"), file("transforms_test.json"));
+    let files = match (train, test, file("transforms.json")) {
+        (Some(train), Some(test), _) => vec![(train, Some(false)), (test, Some(true))],
+        (_, _, Some(all)) => vec![(all, None)],
+        (Some(train), None, None) => vec![(train, None)],
+        _ => return Ok(None),
+    };
+    let mut listing = Listing { source: files[0].0.clone(), ..Listing::default() };
+    for (path, test) in files {
+        read(root, &path, test, &mut listing)?;
+    }
+    strip_folder(&mut listing);
+    Ok(Some(listing))
+}
+
+/// Reads one given file.
+pub(crate) fn list_file(root: &Path, path: &Path) -> Result<Listing> {
+    let mut listing = Listing { source: path.to_owned(), ..Listing::default() };
+    read(root, path, None, &mut listing)?;
+    strip_folder(&mut listing);
+    Ok(listing)
+}
+
+fn read(root: &Path, path: &Path, test: Option<bool>, listing: &mut Listing) -> Result<()> {
+    let text = std::fs::read_to_string(path).map_err(Error::read(path))?;
+    let transforms: Transforms = serde_json::from_str(&text)
+        .map_err(|error| Error::data(path, format!("line {}", error.line()), error.to_string()))?;
+    let mut seen = HashSet::new();
+    let mut repeated = 0;
+    let first = listing.views.len();
+    for (index, frame) in transforms.frames.iter().enumerate() {
+        let place = format!("frame {index} (`{}`)", frame.file_path);
+        match listed(root, path, &place, frame, &transforms.intrinsics)? {
+            Some(view) if seen.insert(view.name.clone()) => listing.views.push(Listed { test, ..view }),
+            Some(_) => repeated += 1,
+            None => listing.missing.push(frame.file_path.clone()),
+        }
+    }
+    if repeated > 0 {
+        listing
+            .notes
+            .push(format!("{repeated} frames of {} list a photo a second time and are skipped", path.display()));
+    }
+    if transforms.frames.iter().any(|frame| frame.mask_path.is_some()) {
+        listing.notes.push("`mask_path` of the frames is not used; id images are given by a folder of masks".into());
+    }
+    if let Some(name) = &transforms.ply_file_path {
+        let points = relative_path(path, root, &name.replace('\\', "/"))?;
+        let points = root.join(points);
+        if points.is_file() {
+            let read = ply::read_points(&points)?;
+            let applied = transforms.applied_transform.as_deref();
+            let (views, notes) = (&listing.views[first..], &mut listing.notes);
+            listing.points.extend(in_the_frame_of(views, read, path, applied, notes)?);
+        } else {
+            listing.notes.push(format!("ply_file_path names {}, which does not exist", points.display()));
+        }
+    }
+    Ok(())
+}
+
+/// The view of a frame; `None` if its photo does not exist and nothing tells its size.
+fn listed(root: &Path, path: &Path, place: &str, frame: &Frame, file: &Intrinsics) -> Result<Option<Listed>> {
+    let name = frame.file_path.replace('\\', "/");
+    let relative = relative_path(path, root, &name)?;
+    let photo = find_file(root, &[".", "images"], &relative, &EXTENSIONS);
+    let intrinsics = frame.intrinsics.or(file);
+    let lens = lens(path, place, &intrinsics)?;
+    let size = match (intrinsics.w, intrinsics.h, &photo) {
+        (Some(w), Some(h), _) => (side(path, place, w)?, side(path, place, h)?),
+        (_, _, Some(photo)) => image::photo_size(photo)?,
+        _ => return Ok(None),
+    };
+    let (rotation, translation) = pose(path, place, &frame.transform_matrix)?;
+    let mut camera = camera(path, place, &intrinsics, size)?;
+    (camera.rotation, camera.translation) = (rotation, translation);
+    check_camera(path, place, &camera, &lens)?;
+    let mut name = relative.to_string_lossy().into_owned();
+    // A photo listed without ending gets that of its file, or `frame.0001` would lose its number later on.
+    if let Some(found) = photo.as_ref().and_then(|photo| photo.to_str()) {
+        name.push_str(EXTENSIONS.iter().rev().find(|ext| found.ends_with(&format!("{name}{ext}"))).unwrap_or(&""));
+    }
+    Ok(Some(Listed { name, photo, camera, lens, test: None }))
+}
+
+fn side(path: &Path, place: &str, value: f64) -> Result<u32> {
+    if value.fract() == 0.0 && (1.0..=f64::from(u32::MAX)).contains(&value) {
+        return Ok(value as u32);
+    }
+    Err(Error::data(path, place, format!("image side {value} is no positive whole number")))
+}
+
+fn lens(path: &Path, place: &str, i: &Intrinsics) -> Result<Lens> {
+    let k = |value: Option<f64>| value.unwrap_or(0.0);
+    let model = i.camera_model.as_deref().unwrap_or("OPENCV");
+    let fisheye = i.is_fisheye == Some(true);
+    match model {
+        "PINHOLE" | "SIMPLE_PINHOLE" | "PERSPECTIVE" if !fisheye => Ok(Lens::default()),
+        "OPENCV" | "SIMPLE_RADIAL" | "RADIAL" if !fisheye => {
+            let numerator = [k(i.k1), k(i.k2), k(i.k3), k(i.k4)];
+            Ok(Lens { numerator, denominator: [0.0; 3], tangential: [k(i.p1), k(i.p2)] })
+        }
+        _ => {
+            let name = if fisheye { "is_fisheye" } else { model };
+            let problem = format!(
+                "camera model {name} is not supported (supported: PINHOLE, SIMPLE_PINHOLE, SIMPLE_RADIAL, RADIAL, \
+                 OPENCV); undistort the photos first, for example with `colmap image_undistorter`"
+            );
+            Err(Error::data(path, place, problem))
+        }
+    }
+}
+
+/// Intrinsics at an identity pose. The focal lengths come from `fl_x`, `fl_y` or the field of view, each for the
+/// other where one is missing; the principal point is the middle if none is given.
+fn camera(path: &Path, place: &str, i: &Intrinsics, (width, height): (u32, u32)) -> Result<Camera> {
+    let (w, h) = (f64::from(width), f64::from(height));
+    let from_angle = |side: f64, angle: f64| side / 2.0 / (angle / 2.0).tan();
+    let fx = i.fl_x.or(i.camera_angle_x.map(|angle| from_angle(w, angle)));
+    // With fl_x alone fy is the same; an angle is used only where no length is given for its side.
+    let fy = i.fl_y.or(if i.fl_x.is_none() { i.camera_angle_y.map(|angle| from_angle(h, angle)) } else { None });
+    let (fx, fy) = match (fx, fy) {
+        (Some(fx), Some(fy)) => (fx, fy),
+        (Some(f), None) | (None, Some(f)) => (f, f),
+        (None, None) => {
+            let problem = "no focal length: neither `fl_x` nor `camera_angle_x` is given";
+            return Err(Error::data(path, place, problem));
+        }
+    };
+    let (cx, cy) = (i.cx.unwrap_or(w / 2.0), i.cy.unwrap_or(h / 2.0));
+    Ok(Camera { rotation: DMat3::IDENTITY, translation: DVec3::ZERO, fx, fy, cx, cy, width, height })
+}
+
+/// Rows of a 3x4 or 4x4 matrix.
+pub(crate) fn affine(rows: &[Vec<f64>]) -> Option<DAffine3> {
+    if !(3..=4).contains(&rows.len()) || rows.iter().any(|row| row.len() != 4 || row.iter().any(|v| !v.is_finite())) {
+        return None;
+    }
+    let column = |index: usize| DVec3::new(rows[0][index], rows[1][index], rows[2][index]);
+    Some(DAffine3 { matrix3: DMat3::from_cols(column(0), column(1), column(2)).into(), translation: column(3).into() })
+}
+
+fn pose(path: &Path, place: &str, rows: &[Vec<f64>]) -> Result<(DMat3, DVec3)> {
+    let problem = "transform_matrix is no camera-to-world pose: 4 x 4 numbers, the upper left 3 x 3 a rotation";
+    let refuse = || Error::data(path, place, problem);
+    let matrix = affine(rows).ok_or_else(refuse)?;
+    let rotation = rotation_of(matrix.matrix3.into()).ok_or_else(refuse)?;
+    // OpenGL looks along -z with y up, OpenCV along z with y down.
+    let rotation = rotation * DMat3::from_diagonal(DVec3::new(1.0, -1.0, -1.0));
+    Ok(invert_pose(rotation, matrix.translation.into()))
+}
+
+/// The points in the world of the poses. nerfstudio writes them there; its early versions wrote them before
+/// `applied_transform`. Whichever lets the cameras see more of them is right.
+fn in_the_frame_of(
+    views: &[Listed],
+    points: Vec<Point>,
+    path: &Path,
+    applied: Option<&[Vec<f64>]>,
+    notes: &mut Vec<String>,
+) -> Result<Vec<Point>> {
+    let Some(rows) = applied else { return Ok(points) };
+    let Some(matrix) = affine(rows) else {
+        return Err(Error::data(path, "applied_transform", "is no 3 x 4 or 4 x 4 matrix of numbers"));
+    };
+    let moved = points.iter().map(|p| Point { position: matrix.transform_point3(p.position.into()).into(), ..*p });
+    let moved: Vec<Point> = moved.collect();
+    if seen(views, &moved) as f64 > 1.2 * seen(views, &points) as f64 {
+        notes.push("applied_transform was applied to the points, which fit the cameras only so".into());
+        return Ok(moved);
+    }
+    Ok(points)
+}
+
+/// How often some of the points fall into some of the views.
+fn seen(views: &[Listed], points: &[Point]) -> usize {
+    let some_views: Vec<&Camera> = views.iter().step_by(views.len() / 50 + 1).map(|view| &view.camera).collect();
+    let some_points = points.iter().step_by(points.len() / 2000 + 1);
+    let inside = |camera: &&&Camera, point: &Point| {
+        let at = camera.to_camera(point.position);
+        let pixel = camera.project(at);
+        at.z > 0.0
+            && (0.0..f64::from(camera.width)).contains(&pixel.x)
+            && (0.0..f64::from(camera.height)).contains(&pixel.y)
+    };
+    some_points.map(|point| some_views.iter().filter(|camera| inside(camera, point)).count()).sum()
+}
+
+/// Takes a leading `images/` off the names if all have it, so that names mean the same as in a COLMAP scene.
+fn strip_folder(listing: &mut Listing) {
+    let path: PathBuf = "images".into();
+    if listing.views.iter().all(|view| Path::new(&view.name).strip_prefix(&path).is_ok()) {
+        listing.views.iter_mut().for_each(|view| view.name = view.name["images/".len()..].to_owned());
+    }
+}

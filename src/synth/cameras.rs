@@ -1,0 +1,42 @@
+//! Cameras on a dome around the scene, looking in.
+
+use super::{SynthOptions, hash01};
+use crate::scene::Camera;
+use glam::{DMat3, DQuat, DVec3};
+use std::f64::consts::TAU;
+
+/// Distance to the point that all cameras look at.
+const DISTANCE: f64 = 4.0;
+/// Elevations of the three rings, degrees.
+const ELEVATIONS: [f64; 3] = [16.0, 33.0, 52.0];
+
+/// One camera per view: once around, every third at the same height, so that a held-out view has neighbours near by.
+pub fn ring_of_cameras(options: &SynthOptions) -> Vec<Camera> {
+    (0..options.views).map(|view| camera(options, view)).collect()
+}
+
+fn camera(options: &SynthOptions, view: u32) -> Camera {
+    let random = |what: u64| hash01(options.seed, 3, u64::from(view), what) - 0.5;
+    let azimuth = TAU * (f64::from(view) + 0.3 * random(0)) / f64::from(options.views);
+    let elevation = (ELEVATIONS[(view % 3) as usize] + 4.0 * random(1)).to_radians();
+    let target = DVec3::new(0.1 * random(2), 0.1 * random(3), 0.42);
+    let outward = DVec3::new(azimuth.cos() * elevation.cos(), azimuth.sin() * elevation.cos(), elevation.sin());
+    let centre = target + outward * (DISTANCE * (1.0 + 0.1 * random(4)));
+    let forward = -outward;
+    let right = forward.cross(DVec3::Z).normalize();
+    let down = forward.cross(right);
+    // Through the quaternion, because that is what the files hold.
+    let rotation = DMat3::from_quat(DQuat::from_mat3(&DMat3::from_cols(right, down, forward).transpose()).normalize());
+    let (width, height) = (f64::from(options.width), f64::from(options.height));
+    let focal = 1.08 * width.min(height * 4.0 / 3.0);
+    Camera {
+        rotation,
+        translation: -(rotation * centre),
+        fx: focal,
+        fy: focal,
+        cx: width / 2.0,
+        cy: height / 2.0,
+        width: options.width,
+        height: options.height,
+    }
+}

@@ -1,0 +1,68 @@
+//! The sparse cloud that a structure-from-motion tool would have found, with the views that see each point.
+
+use super::SynthOptions;
+use super::trace::ray;
+use super::world::World;
+use crate::scene::{Camera, Point};
+use glam::{DVec2, DVec3};
+use rand::{Rng, SeedableRng};
+use rand_pcg::Pcg64;
+
+/// Standard deviation of a point's error, in units of its distance.
+const NOISE: f64 = 0.0015;
+
+/// A point and where it is seen.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Seen {
+    /// Place and colour.
+    pub point: Point,
+    /// View number and place in its image, px.
+    pub track: Vec<(u32, DVec2)>,
+}
+
+/// Points on visible surfaces, as dense as pixels see them; each is seen by two views or more.
+pub fn sample(world: &World, cameras: &[Camera], options: &SynthOptions) -> Vec<Seen> {
+    let mut random = Pcg64::seed_from_u64(options.seed);
+    let mut found = Vec::new();
+    // A scene of few views may have fewer points than asked for; never search for ever.
+    for _ in 0..u64::from(options.points) * 4 {
+        if found.len() >= options.points as usize || cameras.is_empty() {
+            break;
+        }
+        let camera = &cameras[random.random_range(0..cameras.len())];
+        let (x, y) =
+            (random.random::<f64>() * f64::from(camera.width), random.random::<f64>() * f64::from(camera.height));
+        let hit = world.hit(camera.centre(), ray(camera, x, y));
+        let mut normal = || {
+            // Sum of uniform numbers: close enough to a normal one, and the same on every machine.
+            (0..12).map(|_| random.random::<f64>()).sum::<f64>() - 6.0
+        };
+        let error = DVec3::new(normal(), normal(), normal()) * (NOISE * hit.distance);
+        let colour = world.colour(&hit, [0.0; 2]).to_array().map(|value| (value * 255.0).round() as u8);
+        let point = Point { position: hit.place + error, colour };
+        let track: Vec<_> = cameras
+            .iter()
+            .enumerate()
+            .filter_map(|(view, camera)| sees(world, camera, hit.place).map(|place| (view as u32, place)))
+            .collect();
+        if track.len() >= 2 {
+            found.push(Seen { point, track });
+        }
+    }
+    found
+}
+
+/// Where a camera sees a place on a surface, if it does.
+fn sees(world: &World, camera: &Camera, place: DVec3) -> Option<DVec2> {
+    let own = camera.to_camera(place);
+    if own.z <= 0.0 {
+        return None;
+    }
+    let pixel = camera.project(own);
+    let inside = pixel.cmpge(DVec2::ZERO).all()
+        && pixel.cmplt(DVec2::new(f64::from(camera.width), f64::from(camera.height))).all();
+    let towards = place - camera.centre();
+    let distance = towards.length();
+    let free = || world.hit(camera.centre(), towards / distance).distance > distance * (1.0 - 1e-6);
+    (inside && free()).then_some(pixel)
+}

@@ -1,0 +1,140 @@
+//! Solid shapes around their own origin, and where a ray meets them.
+
+use glam::DVec3;
+
+/// A solid, centred at the origin of its own frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Shape {
+    /// Ellipsoid of these radii.
+    Ball(DVec3),
+    /// Box of these half sizes.
+    Block(DVec3),
+    /// Box of these half sizes, thickened by a radius; with one half size other than 0 a capsule.
+    RoundBlock(DVec3, f64),
+    /// Upright cylinder: radius, half height.
+    Cylinder(f64, f64),
+    /// Lying torus: radius of the ring, radius of its tube.
+    Ring(f64, f64),
+}
+
+/// Where a ray enters a shape.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Entry {
+    /// Distance along the ray.
+    pub distance: f64,
+    /// Outward unit normal.
+    pub normal: DVec3,
+}
+
+impl Shape {
+    /// Radius of a sphere around the origin that holds the shape.
+    pub fn bound(&self) -> f64 {
+        match *self {
+            Self::Ball(radii) => radii.max_element(),
+            Self::Block(half) => half.length(),
+            Self::RoundBlock(half, radius) => half.length() + radius,
+            Self::Cylinder(radius, half) => radius.hypot(half),
+            Self::Ring(ring, tube) => ring + tube,
+        }
+    }
+
+    /// First entry of the ray from `origin` (outside the shape) along the unit vector `direction`.
+    pub fn enter(&self, origin: DVec3, direction: DVec3) -> Option<Entry> {
+        let (near, far) = sphere_span(origin, direction, self.bound() * 1.0001)?;
+        if far <= 0.0 {
+            return None;
+        }
+        match *self {
+            Self::Ball(radii) => enter_ball(origin, direction, radii),
+            Self::Block(half) => enter_block(origin, direction, half),
+            Self::Cylinder(radius, half) => enter_cylinder(origin, direction, radius, half),
+            Self::RoundBlock(half, radius) => {
+                let distance_to = |p: DVec3| {
+                    let q = p.abs() - half;
+                    q.max(DVec3::ZERO).length() + q.max_element().min(0.0) - radius
+                };
+                march(distance_to, origin, direction, near.max(0.0), far)
+            }
+            Self::Ring(ring, tube) => {
+                let distance_to = |p: DVec3| (p.truncate().length() - ring).hypot(p.z) - tube;
+                march(distance_to, origin, direction, near.max(0.0), far)
+            }
+        }
+    }
+}
+
+/// Distances at which a ray enters and leaves a sphere around the origin.
+fn sphere_span(origin: DVec3, direction: DVec3, radius: f64) -> Option<(f64, f64)> {
+    let b = origin.dot(direction);
+    let discriminant = b * b - origin.length_squared() + radius * radius;
+    if discriminant < 0.0 {
+        return None;
+    }
+    let root = discriminant.sqrt();
+    Some((-b - root, -b + root))
+}
+
+fn enter_ball(origin: DVec3, direction: DVec3, radii: DVec3) -> Option<Entry> {
+    // In the frame where the ellipsoid is a unit sphere the direction is no longer of unit length.
+    let (o, d) = (origin / radii, direction / radii);
+    let length = d.length();
+    let (near, _) = sphere_span(o, d / length, 1.0)?;
+    let distance = near / length;
+    (distance > 0.0)
+        .then(|| Entry { distance, normal: ((origin + direction * distance) / (radii * radii)).normalize() })
+}
+
+fn enter_block(origin: DVec3, direction: DVec3, half: DVec3) -> Option<Entry> {
+    let inverse = direction.recip();
+    let (a, b) = ((-half - origin) * inverse, (half - origin) * inverse);
+    let (low, high) = (a.min(b), a.max(b));
+    let (distance, leave) = (low.max_element(), high.min_element());
+    if distance > leave || distance <= 0.0 {
+        return None;
+    }
+    let axis = low.max_position();
+    let mut normal = DVec3::ZERO;
+    normal[axis] = -direction[axis].signum();
+    Some(Entry { distance, normal })
+}
+
+fn enter_cylinder(origin: DVec3, direction: DVec3, radius: f64, half: f64) -> Option<Entry> {
+    let (o, d) = (origin.truncate(), direction.truncate());
+    let a = d.length_squared();
+    if a > 1e-18 {
+        let (b, c) = (o.dot(d) / a, (o.length_squared() - radius * radius) / a);
+        let discriminant = b * b - c;
+        if discriminant < 0.0 {
+            return None;
+        }
+        let distance = -b - discriminant.sqrt();
+        let at = origin + direction * distance;
+        if distance > 0.0 && at.z.abs() <= half {
+            return Some(Entry { distance, normal: (at.truncate() / radius).extend(0.0) });
+        }
+    }
+    let distance = (-half * direction.z.signum() - origin.z) / direction.z;
+    let at = origin + direction * distance;
+    (distance > 0.0 && at.truncate().length_squared() <= radius * radius)
+        .then(|| Entry { distance, normal: DVec3::new(0.0, 0.0, -direction.z.signum()) })
+}
+
+/// Sphere tracing between two distances with an exact signed distance.
+fn march(distance_to: impl Fn(DVec3) -> f64, origin: DVec3, direction: DVec3, near: f64, far: f64) -> Option<Entry> {
+    const CLOSE: f64 = 1e-7;
+    let mut distance = near;
+    for _ in 0..200 {
+        let gap = distance_to(origin + direction * distance);
+        if gap < CLOSE {
+            let at = origin + direction * distance;
+            let slope = |axis: DVec3| distance_to(at + axis * 1e-5) - distance_to(at - axis * 1e-5);
+            let normal = DVec3::new(slope(DVec3::X), slope(DVec3::Y), slope(DVec3::Z)).normalize();
+            return Some(Entry { distance, normal });
+        }
+        distance += gap;
+        if distance > far {
+            return None;
+        }
+    }
+    None
+}

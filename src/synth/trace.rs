@@ -1,0 +1,94 @@
+//! One picture: colour over the pixel, ids, depth and whole objects at its centre.
+
+use super::hash01;
+use super::world::World;
+use crate::scene::Camera;
+use glam::DVec3;
+use rayon::prelude::*;
+
+/// Samples along each side of a pixel.
+const SIDE: u32 = 3;
+
+/// Everything known about a view, row-major.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Picture {
+    /// Width, px.
+    pub width: u32,
+    /// Height, px.
+    pub height: u32,
+    /// Colour, the mean over the pixel.
+    pub rgb: Vec<[u8; 3]>,
+    /// Id of what the pixel's centre sees, 0 = ground or sky.
+    pub ids: Vec<u8>,
+    /// z in the camera's frame of what the pixel's centre sees, world units.
+    pub depth: Vec<f32>,
+    /// For each object of the world in order: does it cover the pixel's centre if it stands alone?
+    pub whole: Vec<Vec<bool>>,
+}
+
+/// What the centre of a pixel knows.
+struct Pixel {
+    rgb: [u8; 3],
+    id: u8,
+    depth: f32,
+}
+
+/// Renders view number `view`; the number only moves the samples within a pixel.
+pub fn picture(world: &World, camera: &Camera, view: u32) -> Picture {
+    let (width, height) = (camera.width, camera.height);
+    let pixels: Vec<Pixel> = (0..width * height)
+        .into_par_iter()
+        .map(|index| pixel(world, camera, view, index % width, index / width))
+        .collect();
+    let origin = camera.centre();
+    let whole = world
+        .objects
+        .iter()
+        .map(|object| {
+            (0..width * height)
+                .into_par_iter()
+                .map(|index| {
+                    let ray = ray(camera, f64::from(index % width) + 0.5, f64::from(index / width) + 0.5);
+                    object.distance(origin, ray).is_some()
+                })
+                .collect()
+        })
+        .collect();
+    Picture {
+        width,
+        height,
+        rgb: pixels.iter().map(|p| p.rgb).collect(),
+        ids: pixels.iter().map(|p| p.id).collect(),
+        depth: pixels.iter().map(|p| p.depth).collect(),
+        whole,
+    }
+}
+
+/// Unit direction, world, of the ray through a place of the image.
+pub fn ray(camera: &Camera, x: f64, y: f64) -> DVec3 {
+    let own = DVec3::new((x - camera.cx) / camera.fx, (y - camera.cy) / camera.fy, 1.0);
+    (camera.rotation.transpose() * own).normalize()
+}
+
+fn pixel(world: &World, camera: &Camera, view: u32, x: u32, y: u32) -> Pixel {
+    let origin = camera.centre();
+    let mut sum = DVec3::ZERO;
+    for sample in 0..SIDE * SIDE {
+        let random = |what: u64| hash01(u64::from(view), u64::from(y) << 32 | u64::from(x), u64::from(sample), what);
+        let (column, row) = (sample % SIDE, sample / SIDE);
+        let within = |cell: u32, what: u64| (f64::from(cell) + random(what)) / f64::from(SIDE);
+        let direction = ray(camera, f64::from(x) + within(column, 0), f64::from(y) + within(row, 1));
+        let hit = world.hit(origin, direction);
+        // The spots on the light are the same in every pixel: shadows have no noise that differs between views.
+        let spot = |cell: u32| (f64::from(cell) + 0.5) / f64::from(SIDE) * 2.0 - 1.0;
+        sum += world.colour(&hit, [spot(column), spot(row)]);
+    }
+    let mean = sum / f64::from(SIDE * SIDE);
+    let direction = ray(camera, f64::from(x) + 0.5, f64::from(y) + 0.5);
+    let centre = world.hit(origin, direction);
+    Pixel {
+        rgb: mean.to_array().map(|value| (value * 255.0).round() as u8),
+        id: world.id(&centre),
+        depth: camera.to_camera(centre.place).z as f32,
+    }
+}

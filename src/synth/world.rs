@@ -1,0 +1,166 @@
+//! Objects on a textured ground under a sky: what a ray sees.
+
+use super::material::{Material, noise};
+use super::shape::Shape;
+use super::{Preset, hash01, presets};
+use glam::{DQuat, DVec3};
+
+/// Radius of the sky, a real surface around the scene: what is far must be learnable too.
+const SKY_RADIUS: f64 = 9.0;
+/// Radii between which the ground takes the colour of the horizon.
+const HAZE: (f64, f64) = (2.2, 6.5);
+
+/// A labelled object.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Object {
+    /// Id in the masks, from 1.
+    pub id: u8,
+    /// Name.
+    pub name: &'static str,
+    /// Shape in its own frame.
+    pub shape: Shape,
+    /// Centre, world.
+    pub position: DVec3,
+    /// World from own frame.
+    pub rotation: DQuat,
+    /// Colour.
+    pub material: Material,
+}
+
+impl Object {
+    /// Place and direction in the object's own frame.
+    fn to_own(&self, origin: DVec3, direction: DVec3) -> (DVec3, DVec3) {
+        let back = self.rotation.conjugate();
+        (back * (origin - self.position), back * direction)
+    }
+
+    /// Distance at which a ray meets the object alone.
+    pub fn distance(&self, origin: DVec3, direction: DVec3) -> Option<f64> {
+        let (origin, direction) = self.to_own(origin, direction);
+        self.shape.enter(origin, direction).map(|entry| entry.distance)
+    }
+}
+
+/// What a ray meets first.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Surface {
+    /// The object of this index.
+    Object(usize),
+    /// The ground, z = 0.
+    Ground,
+    /// The sky.
+    Sky,
+}
+
+/// Where a ray ends.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Hit {
+    /// Distance along the ray.
+    pub distance: f64,
+    /// Place, world.
+    pub place: DVec3,
+    /// Unit normal, world.
+    pub normal: DVec3,
+    /// On what.
+    pub surface: Surface,
+}
+
+/// The whole scene.
+#[derive(Clone, Debug, PartialEq)]
+pub struct World {
+    /// Objects, ids 1, 2, .. in order.
+    pub objects: Vec<Object>,
+    /// Unit vector to the light.
+    light: DVec3,
+    /// Two unit vectors across it.
+    light_sides: [DVec3; 2],
+    seed: u64,
+}
+
+impl World {
+    /// The scene of a preset; the seed changes colours, offsets and the direction of the light.
+    pub fn new(preset: Preset, seed: u64) -> Self {
+        let turn = 0.6 + hash01(seed, 2, 0, 0);
+        let light = DVec3::new(turn.cos() * 0.5, turn.sin() * 0.5, 0.87).normalize();
+        let side = light.cross(DVec3::Y).normalize();
+        Self { objects: presets::objects(preset, seed), light, light_sides: [side, light.cross(side)], seed }
+    }
+
+    /// Id of what a ray met: 0 for ground and sky.
+    pub fn id(&self, hit: &Hit) -> u8 {
+        match hit.surface {
+            Surface::Object(index) => self.objects[index].id,
+            Surface::Ground | Surface::Sky => 0,
+        }
+    }
+
+    /// Follows a ray to the first surface. `origin` is above the ground and inside the sky.
+    pub fn hit(&self, origin: DVec3, direction: DVec3) -> Hit {
+        let mut best = ground_or_sky(origin, direction);
+        for (index, object) in self.objects.iter().enumerate() {
+            let (own_origin, own_direction) = object.to_own(origin, direction);
+            if let Some(entry) = object.shape.enter(own_origin, own_direction)
+                && entry.distance < best.distance
+            {
+                best.distance = entry.distance;
+                best.normal = object.rotation * entry.normal;
+                best.surface = Surface::Object(index);
+            }
+        }
+        best.place = origin + direction * best.distance;
+        best
+    }
+
+    /// Colour that leaves a surface in every direction alike, 0 to 1. `spot` in -1 to 1 picks the place on the light, so
+    /// that an average over spots has soft shadows.
+    pub fn colour(&self, hit: &Hit, spot: [f64; 2]) -> DVec3 {
+        let albedo = match hit.surface {
+            Surface::Sky => return sky_colour(hit.place),
+            Surface::Ground => self.ground_albedo(hit.place),
+            Surface::Object(index) => {
+                let object = &self.objects[index];
+                object.material.albedo(object.to_own(hit.place, hit.normal).0)
+            }
+        };
+        let to_light =
+            (self.light + (self.light_sides[0] * spot[0] + self.light_sides[1] * spot[1]) * 0.09).normalize();
+        let facing = hit.normal.dot(to_light).max(0.0);
+        let start = hit.place + hit.normal * 1e-4;
+        let lit = facing > 0.0 && !self.objects.iter().any(|object| object.distance(start, to_light).is_some());
+        let ambient = 0.42 * (0.8 + 0.2 * hit.normal.z);
+        let shaded = albedo * (ambient + if lit { 0.62 * facing } else { 0.0 });
+        let haze = match hit.surface {
+            Surface::Ground => smooth(HAZE.0, HAZE.1, hit.place.truncate().length()),
+            _ => 0.0,
+        };
+        shaded.lerp(sky_colour(DVec3::X), haze).clamp(DVec3::ZERO, DVec3::ONE)
+    }
+
+    fn ground_albedo(&self, place: DVec3) -> DVec3 {
+        let tile = (place / 0.55 + 0.21).floor();
+        let odd = (tile.x + tile.y).rem_euclid(2.0);
+        let base = DVec3::new(0.62, 0.58, 0.5).lerp(DVec3::new(0.46, 0.47, 0.45), odd);
+        base * (0.75 + 0.5 * noise(place / 0.35, self.seed + 77))
+    }
+}
+
+fn ground_or_sky(origin: DVec3, direction: DVec3) -> Hit {
+    let b = origin.dot(direction);
+    let sky = -b + (b * b - origin.length_squared() + SKY_RADIUS * SKY_RADIUS).max(0.0).sqrt();
+    let ground = -origin.z / direction.z;
+    if direction.z < 0.0 && ground < sky {
+        return Hit { distance: ground, place: DVec3::ZERO, normal: DVec3::Z, surface: Surface::Ground };
+    }
+    Hit { distance: sky, place: DVec3::ZERO, normal: -direction, surface: Surface::Sky }
+}
+
+/// From the haze of the horizon to a blue zenith.
+fn sky_colour(place: DVec3) -> DVec3 {
+    let height = (place.z / SKY_RADIUS).clamp(0.0, 1.0);
+    DVec3::new(0.78, 0.82, 0.86).lerp(DVec3::new(0.36, 0.55, 0.82), height.powf(0.6))
+}
+
+fn smooth(low: f64, high: f64, value: f64) -> f64 {
+    let t = ((value - low) / (high - low)).clamp(0.0, 1.0);
+    t * t * (3.0 - 2.0 * t)
+}

@@ -1,0 +1,180 @@
+//! The files of a made scene: COLMAP model, pictures, masks, depth, names.
+
+use super::points::Seen;
+use super::trace::Picture;
+use super::world::World;
+use super::{SynthOptions, picture, points, ring_of_cameras, view_name};
+use crate::scene::Camera;
+use crate::scene::labels::label_colour;
+use crate::{Error, Result};
+use glam::DQuat;
+use serde::Serialize;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// What was made.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Summary {
+    /// Folder of the scene.
+    pub scene: PathBuf,
+    /// Number of views.
+    pub views: u32,
+    /// Number of points.
+    pub points: usize,
+    /// Id and name of each object.
+    pub objects: Vec<(u8, String)>,
+}
+
+/// Makes a scene and writes it into `folder`, which must be empty or new. `after_view` is told how many views are
+/// done and may stop the work with an error.
+pub fn write(options: &SynthOptions, folder: &Path, after_view: &dyn Fn(u32) -> Result<()>) -> Result<Summary> {
+    if options.width == 0 || options.height == 0 || options.width > 16_384 || options.height > 16_384 {
+        return Err(Error::usage("--size", "both sides need 1 to 16384 px"));
+    }
+    if options.views == 0 || options.views > 10_000 {
+        return Err(Error::usage("--views", "needs 1 to 10000"));
+    }
+    let world = World::new(options.preset, options.seed);
+    let cameras = ring_of_cameras(options);
+    create_folders(folder, &world)?;
+    write_labels(folder, &world)?;
+    let seen = points::sample(&world, &cameras, options);
+    write_colmap(folder, &cameras, &seen)?;
+    for (index, camera) in cameras.iter().enumerate() {
+        write_view(folder, index, &world, &picture(&world, camera, index as u32))?;
+        after_view(index as u32 + 1)?;
+    }
+    Ok(Summary {
+        scene: folder.to_owned(),
+        views: options.views,
+        points: seen.len(),
+        objects: world.objects.iter().map(|object| (object.id, object.name.to_owned())).collect(),
+    })
+}
+
+fn create_folders(folder: &Path, world: &World) -> Result<()> {
+    if fs::read_dir(folder).is_ok_and(|mut entries| entries.next().is_some()) {
+        return Err(Error::usage("DIR", format!("{} is not empty; name a new folder", folder.display())));
+    }
+    let amodal = world.objects.iter().map(|object| format!("amodal/{}", object.id));
+    let names = ["images", "sparse/0", "masks", "depth"].map(str::to_owned);
+    for name in names.into_iter().chain(amodal) {
+        let path = folder.join(name);
+        fs::create_dir_all(&path).map_err(Error::write(&path))?;
+    }
+    Ok(())
+}
+
+fn write_labels(folder: &Path, world: &World) -> Result<()> {
+    #[derive(Serialize)]
+    struct Label {
+        id: u8,
+        name: &'static str,
+        colour: [u8; 3],
+    }
+    let rows: Vec<Label> = world
+        .objects
+        .iter()
+        .map(|object| Label { id: object.id, name: object.name, colour: label_colour(u32::from(object.id)) })
+        .collect();
+    let text = serde_json::to_string_pretty(&rows).map_err(|error| Error::Bug(error.to_string()))?;
+    save(&folder.join("labels.json"), format!("{text}\n").as_bytes())
+}
+
+fn write_view(folder: &Path, index: usize, world: &World, made: &Picture) -> Result<()> {
+    let name = view_name(index);
+    let size = (made.width, made.height);
+    save_png(&folder.join("images").join(&name), size, png::ColorType::Rgb, made.rgb.as_flattened())?;
+    save_png(&folder.join("masks").join(&name), size, png::ColorType::Grayscale, &made.ids)?;
+    for (object, whole) in world.objects.iter().zip(&made.whole) {
+        let path = folder.join("amodal").join(object.id.to_string()).join(&name);
+        let bytes: Vec<u8> = whole.iter().map(|&covered| if covered { 255 } else { 0 }).collect();
+        save_png(&path, size, png::ColorType::Grayscale, &bytes)?;
+    }
+    save_depth(&folder.join("depth").join(format!("{index:03}.exr")), made)
+}
+
+fn save(path: &Path, bytes: &[u8]) -> Result<()> {
+    fs::write(path, bytes).map_err(Error::write(path))
+}
+
+fn save_png(path: &Path, (width, height): (u32, u32), colour: png::ColorType, bytes: &[u8]) -> Result<()> {
+    let mut file = Vec::new();
+    let mut encoder = png::Encoder::new(&mut file, width, height);
+    encoder.set_color(colour);
+    encoder.set_depth(png::BitDepth::Eight);
+    let encoded = encoder.write_header().and_then(|mut writer| writer.write_image_data(bytes));
+    encoded.map_err(|error| crate::Error::Write { path: path.to_owned(), source: std::io::Error::other(error) })?;
+    save(path, &file)
+}
+
+fn save_depth(path: &Path, made: &Picture) -> Result<()> {
+    use exr::prelude::*;
+    let size = (made.width as usize, made.height as usize);
+    let samples = FlatSamples::F32(made.depth.clone());
+    let channels = AnyChannels::sort(std::iter::once(AnyChannel::new("Y", samples)).collect());
+    let layer = Layer::new(size, LayerAttributes::default(), Encoding::SMALL_LOSSLESS, channels);
+    let mut bytes = std::io::Cursor::new(Vec::new());
+    Image::from_layer(layer).write().to_buffered(&mut bytes).map_err(|error| crate::Error::Write {
+        path: path.to_owned(),
+        source: std::io::Error::other(error.to_string()),
+    })?;
+    save(path, bytes.get_ref())
+}
+
+/// `cameras.bin`, `images.bin` and `points3D.bin`, little-endian as COLMAP writes them.
+fn write_colmap(folder: &Path, cameras: &[Camera], seen: &[Seen]) -> Result<()> {
+    let folder = folder.join("sparse/0");
+    if let Some(camera) = cameras.first() {
+        let mut bytes = Vec::new();
+        bytes.extend(1_u64.to_le_bytes());
+        bytes.extend(1_u32.to_le_bytes());
+        // Model 1 is PINHOLE: fx, fy, cx, cy.
+        bytes.extend(1_u32.to_le_bytes());
+        bytes.extend(u64::from(camera.width).to_le_bytes());
+        bytes.extend(u64::from(camera.height).to_le_bytes());
+        [camera.fx, camera.fy, camera.cx, camera.cy].iter().for_each(|value| bytes.extend(value.to_le_bytes()));
+        save(&folder.join("cameras.bin"), &bytes)?;
+    }
+    let mut observed: Vec<Vec<(f64, f64, u64)>> = vec![Vec::new(); cameras.len()];
+    let mut points = Vec::new();
+    points.extend((seen.len() as u64).to_le_bytes());
+    for (index, seen) in seen.iter().enumerate() {
+        let id = index as u64 + 1;
+        points.extend(id.to_le_bytes());
+        seen.point.position.to_array().iter().for_each(|value| points.extend(value.to_le_bytes()));
+        points.extend(seen.point.colour);
+        // Mean reprojection error, px.
+        points.extend(0.5_f64.to_le_bytes());
+        points.extend((seen.track.len() as u64).to_le_bytes());
+        for &(view, place) in &seen.track {
+            let list = &mut observed[view as usize];
+            points.extend((view + 1).to_le_bytes());
+            points.extend((list.len() as u32).to_le_bytes());
+            list.push((place.x, place.y, id));
+        }
+    }
+    save(&folder.join("points3D.bin"), &points)?;
+    save(&folder.join("images.bin"), &images_bin(cameras, &observed))
+}
+
+fn images_bin(cameras: &[Camera], observed: &[Vec<(f64, f64, u64)>]) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    bytes.extend((cameras.len() as u64).to_le_bytes());
+    for (index, (camera, observed)) in cameras.iter().zip(observed).enumerate() {
+        let q = DQuat::from_mat3(&camera.rotation);
+        bytes.extend((index as u32 + 1).to_le_bytes());
+        [q.w, q.x, q.y, q.z].iter().for_each(|value| bytes.extend(value.to_le_bytes()));
+        camera.translation.to_array().iter().for_each(|value| bytes.extend(value.to_le_bytes()));
+        bytes.extend(1_u32.to_le_bytes());
+        bytes.extend(view_name(index).as_bytes());
+        bytes.push(0);
+        bytes.extend((observed.len() as u64).to_le_bytes());
+        for &(x, y, point) in observed {
+            bytes.extend(x.to_le_bytes());
+            bytes.extend(y.to_le_bytes());
+            bytes.extend(point.to_le_bytes());
+        }
+    }
+    bytes
+}

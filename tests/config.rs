@@ -1,0 +1,36 @@
+//! Schedules and checks of the training configuration.
+
+use labelgs::train::TrainConfig;
+
+#[test]
+fn schedules_follow_the_reference() {
+    let config = TrainConfig::default();
+    assert!((config.position_lr(0) - 1.6e-4).abs() < 1e-12);
+    assert!((config.position_lr(15_000) - 1.6e-5).abs() < 1e-12);
+    assert!((config.position_lr(90_000) - 1.6e-6).abs() < 1e-12);
+    assert_eq!([999, 1000, 2000, 3000, 9000].map(|step| config.sh_degree_at(step)), [0, 1, 2, 3, 3]);
+    let densifies: Vec<u32> = (1..=800).filter(|&step| config.densifies_at(step)).collect();
+    assert_eq!(densifies, [600, 700, 800]);
+    let resets: Vec<u32> = (1..=15_000).filter(|&step| config.resets_opacity_at(step)).collect();
+    assert_eq!(resets, [3000, 6000, 9000, 12_000]);
+    assert!(!config.labels_at(999) && config.labels_at(1000));
+    assert!((config.feature_rest_lr() - 1.25e-4).abs() < 1e-15);
+}
+
+#[test]
+fn nonsense_is_refused_by_flag() {
+    let broken = [
+        (TrainConfig { iterations: 0, ..Default::default() }, "--iterations"),
+        (TrainConfig { label_threshold: f32::NAN, ..Default::default() }, "--label-threshold"),
+        (TrainConfig { label_threshold: 1.5, ..Default::default() }, "--label-threshold"),
+        (TrainConfig { sh_degree: 4, ..Default::default() }, "--sh-degree"),
+        (TrainConfig { test_every: 1, ..Default::default() }, "--test-every"),
+        (TrainConfig { opacity_lr: -1.0, ..Default::default() }, "--opacity-lr"),
+        (TrainConfig { background: [0.0, 0.0, 2.0], ..Default::default() }, "--background"),
+    ];
+    for (config, flag) in broken {
+        let message = config.check().expect_err(flag).to_string();
+        assert!(message.starts_with(flag), "{message}");
+    }
+    TrainConfig::default().check().expect("the defaults are sound");
+}
