@@ -12,5 +12,6 @@ mod labels;
 mod metrics;
 mod mirror_mutants;
 mod mirrors;
+mod sched;
 mod shadergen;
 mod synth;

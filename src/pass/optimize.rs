@@ -39,7 +39,8 @@ const fn attribute(planes: [Buf; 3], gradient: Buf, stride: u32, rate: u32, from
 
 /// One Adam update of the attributes that are active.
 pub fn adam(b: &mut Builder) {
-    for a in ATTRIBUTES.iter().filter(|a| a.from_degree <= b.sh_degree) {
+    let degree = b.sh_degree;
+    for a in ATTRIBUTES.iter().filter(|a| a.from_degree <= degree) {
         pass!(b, texel adam {
             step: Buf::STEP, failure: Buf::FAILURE, splat_from_gaussian: Buf::SPLAT_FROM_GAUSSIAN,
             gradients: a.gradient, parameters: a.planes[0], first_moments: a.planes[1], second_moments: a.planes[2],
