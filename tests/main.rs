@@ -10,6 +10,7 @@ mod config;
 mod gradient;
 mod labels;
 mod metrics;
+mod mirror_mutants;
 mod mirrors;
 mod plan;
 mod sched;
