@@ -8,6 +8,7 @@ mod support;
 mod compare_self;
 mod config;
 mod gradient;
+mod io;
 mod labels;
 mod metrics;
 mod mirror_mutants;

@@ -74,6 +74,3 @@ fn neighbour_distances2(points: &[Point], extent: f64) -> Result<Vec<f64>> {
     };
     Ok(positions.par_iter().enumerate().map(mean).collect())
 }
-
-#[cfg(test)]
-mod tests;
