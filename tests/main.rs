@@ -3,4 +3,5 @@
 mod cli;
 mod config;
 mod metrics;
+mod output;
 mod synth;
