@@ -2,6 +2,7 @@
 #![deny(unsafe_code)]
 
 pub mod cli;
+pub mod engine;
 pub mod error;
 pub mod gpu;
 pub mod infer;

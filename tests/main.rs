@@ -1,7 +1,20 @@
 //! Integration tests, one binary.
 
+#[allow(dead_code, reason = "mirrors are complete; not every test needs every part")]
+mod reference;
+#[allow(dead_code, reason = "helpers are shared by tests that come and go")]
+mod support;
+
 mod cli;
+mod compare_self;
 mod config;
+mod gradient;
+mod labels;
 mod metrics;
+mod mirror_mutants;
+mod mirrors;
 mod output;
+mod plan;
+mod sched;
+mod shadergen;
 mod synth;

@@ -1,1 +1,199 @@
-//! (to be written)
+//! Thin layer over Vulkan: one instance, one device, one compute queue, and owners of the objects made from them.
+//!
+//! Everything that Vulkan asks the caller to guarantee is guaranteed here or in `sched/recorder.rs`, so that the rest
+//! of the crate is safe code. Objects hold an `Arc<Gpu>`: no handle outlives its device.
+// Vulkan is a foreign interface: every call is unsafe. This module and the recorder are the only places for it.
+#![allow(unsafe_code)]
+
+mod call;
+mod capabilities;
+mod command;
+mod crash;
+mod descriptor;
+mod devices;
+mod instance;
+mod limits;
+mod local_size;
+mod memory;
+mod pipeline;
+mod query;
+mod select;
+mod timeline;
+
+pub use capabilities::{Capabilities, DeviceKind, Need, Subgroup};
+pub use devices::devices_report;
+pub use instance::{Message, Validation};
+pub use limits::Limits;
+pub use memory::{Buffer, MemoryKind};
+
+pub(crate) use call::vk_call;
+pub(crate) use command::CommandBuffer;
+pub(crate) use crash::Markers;
+pub(crate) use descriptor::{Binding, BufferView, DescriptorPool};
+pub(crate) use pipeline::{Pipeline, PipelineKey};
+pub(crate) use query::QueryPool;
+pub(crate) use timeline::Timeline;
+
+use crate::error::{Error, Result};
+use ash::vk;
+use gpu_allocator::vulkan::{Allocator, AllocatorCreateDesc};
+use instance::Instance;
+use std::collections::HashMap;
+use std::sync::{Arc, Mutex, MutexGuard};
+
+/// How to open a device.
+#[derive(Clone, Debug, Default)]
+pub struct GpuOptions {
+    /// Index, part of the name, or UUID of the device; the most capable one if none.
+    pub device: Option<String>,
+    /// Validation layer.
+    pub validation: Validation,
+    /// Bounds checks of the driver on every buffer access.
+    pub robust_buffer_access: bool,
+    /// Subgroup size to pin; the device's default if none.
+    pub subgroup_size: Option<u32>,
+}
+
+impl GpuOptions {
+    /// Options from `LABELGS_DEVICE`, `LABELGS_VALIDATION` (`off`, `on`, `sync`, `gpu`) and `LABELGS_SUBGROUP_SIZE`.
+    pub fn from_env() -> Result<Self> {
+        let set = |name| std::env::var(name).ok().filter(|value| !value.is_empty());
+        let validation = set("LABELGS_VALIDATION").map(|value| value.parse()).transpose()?.unwrap_or_default();
+        let subgroup_size = set("LABELGS_SUBGROUP_SIZE")
+            .map(|value| value.parse().map_err(|_| Error::usage("LABELGS_SUBGROUP_SIZE", "a whole number is expected")))
+            .transpose()?;
+        Ok(Self { device: set("LABELGS_DEVICE"), validation, subgroup_size, ..Self::default() })
+    }
+}
+
+/// An opened device.
+pub struct Gpu {
+    pipelines: Mutex<HashMap<PipelineKey, Arc<Pipeline>>>,
+    allocator: Mutex<Option<Allocator>>,
+    queue: Mutex<vk::Queue>,
+    names: Option<ash::ext::debug_utils::Device>,
+    device: ash::Device,
+    capabilities: Capabilities,
+    // Declared last: fields are dropped in this order, and `Drop` destroys the device before them.
+    instance: Instance,
+}
+
+impl Gpu {
+    /// Opens a device; fails with the list of devices and what each lacks.
+    pub fn new(options: &GpuOptions) -> Result<Arc<Self>> {
+        let instance = Instance::new(options.validation)?;
+        let (physical, mut capabilities) = select::pick(&instance, options.device.as_deref())?;
+        capabilities.subgroup.pin(options.subgroup_size)?;
+        let device = select::open(&instance, physical, &capabilities, options.robust_buffer_access)?;
+        // SAFETY: the family was found on this device, and one queue of it was created with the device.
+        let queue = unsafe { device.get_device_queue(capabilities.queue_family, 0) };
+        let allocator = Allocator::new(&AllocatorCreateDesc {
+            instance: instance.raw().clone(),
+            device: device.clone(),
+            physical_device: physical,
+            debug_settings: gpu_allocator::AllocatorDebugSettings::default(),
+            buffer_device_address: false,
+            allocation_sizes: gpu_allocator::AllocationSizes::new(64 << 20, 16 << 20),
+        });
+        let allocator = allocator.map_err(|error| {
+            // SAFETY: nothing was made from the device yet.
+            unsafe { device.destroy_device(None) };
+            Error::NoDevice(format!("the memory allocator does not start: {error}"))
+        })?;
+        let names = instance.has_debug_utils().then(|| ash::ext::debug_utils::Device::new(instance.raw(), &device));
+        Ok(Arc::new(Self {
+            pipelines: Mutex::new(HashMap::new()),
+            allocator: Mutex::new(Some(allocator)),
+            queue: Mutex::new(queue),
+            names,
+            device,
+            capabilities,
+            instance,
+        }))
+    }
+
+    /// What the device is and can do.
+    pub fn capabilities(&self) -> &Capabilities {
+        &self.capabilities
+    }
+
+    /// Limits of the device.
+    pub fn limits(&self) -> &Limits {
+        &self.capabilities.limits
+    }
+
+    /// Subgroup size of pipelines whose shaders use subgroups.
+    pub fn subgroup_size(&self) -> u32 {
+        self.capabilities.subgroup.size
+    }
+
+    /// True if the "device" is the host's processor.
+    pub fn is_cpu(&self) -> bool {
+        self.capabilities.is_cpu()
+    }
+
+    /// Messages of the validation layer so far.
+    pub fn messages(&self) -> Vec<Message> {
+        self.instance.messages()
+    }
+
+    /// True if the validation layer was found and is on.
+    pub fn is_validated(&self) -> bool {
+        self.instance.is_validated()
+    }
+
+    /// Waits until the device has nothing to do.
+    pub fn wait_idle(&self) -> Result<()> {
+        let _queue = lock(&self.queue);
+        // SAFETY: the queue's lock is held, so nothing is submitted meanwhile.
+        vk_call("vkDeviceWaitIdle", || unsafe { self.device.device_wait_idle() })
+    }
+
+    /// Submits a command buffer; the timeline reaches `value` when it is done.
+    pub(crate) fn submit(&self, command: &CommandBuffer, timeline: &Timeline, value: u64) -> Result<()> {
+        let (commands, semaphores, values) = ([command.raw()], [timeline.raw()], [value]);
+        let mut signal = vk::TimelineSemaphoreSubmitInfo::default().signal_semaphore_values(&values);
+        let info =
+            vk::SubmitInfo::default().command_buffers(&commands).signal_semaphores(&semaphores).push_next(&mut signal);
+        let queue = lock(&self.queue);
+        // SAFETY: the scheduler submits recorded command buffers that are not pending, with growing values.
+        vk_call("vkQueueSubmit", || unsafe { self.device.queue_submit(*queue, &[info], vk::Fence::null()) })
+    }
+
+    /// The device's functions, for the modules that may be unsafe.
+    pub(crate) fn raw(&self) -> &ash::Device {
+        &self.device
+    }
+
+    /// Gives an object a name in messages of the validation layer.
+    fn name_object<H: vk::Handle>(&self, handle: H, name: &str) {
+        let (Some(names), Ok(name)) = (&self.names, std::ffi::CString::new(name)) else { return };
+        let info = vk::DebugUtilsObjectNameInfoEXT::default().object_handle(handle).object_name(&name);
+        // SAFETY: the handle is alive. A failure loses a name and nothing else.
+        let _ = unsafe { names.set_debug_utils_object_name(&info) };
+    }
+}
+
+impl Drop for Gpu {
+    fn drop(&mut self) {
+        // A lost device reports an error here; it is destroyed all the same.
+        let _ = self.wait_idle();
+        lock(&self.pipelines).clear();
+        // The allocator frees its blocks with the device's functions, so it goes first.
+        drop(lock(&self.allocator).take());
+        // SAFETY: every object made from the device holds an `Arc` of this, so none is left; pipelines and memory were
+        // destroyed above.
+        unsafe { self.device.destroy_device(None) };
+    }
+}
+
+impl std::fmt::Debug for Gpu {
+    fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        formatter.debug_tuple("Gpu").field(&self.capabilities.name).finish()
+    }
+}
+
+/// A lock that a panic elsewhere does not take away: what these guard is valid between any two statements.
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(std::sync::PoisonError::into_inner)
+}

@@ -1,6 +1,7 @@
 //! What to do with a trained model: choose labels, filter Gaussians, score, write pictures. Plain arrays only; whoever
 //! renders hands them in.
 
+pub mod render;
 pub mod choose;
 pub mod metrics;
 pub mod occlusion;

@@ -1,1 +1,99 @@
-//! (to be written)
+//! What the engine does, as lists of GPU passes. Declares, never records.
+//!
+//! [`training_step`] is the table of contents of the engine.
+
+mod blend;
+pub mod build;
+mod densify;
+mod gather;
+pub mod loss;
+mod lift;
+mod optimize;
+mod project;
+mod scan;
+pub mod shape;
+mod sort;
+mod tile;
+
+pub use build::Builder;
+pub use optimize::ATTRIBUTES;
+pub use shape::KernelShape;
+
+use crate::pass;
+use crate::plan::{Buf, Capacity, PassList};
+
+/// What a recorded list depends on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Variant {
+    /// Object layers and lift are in the list.
+    pub labels: bool,
+    /// Active degree of the spherical harmonics.
+    pub sh_degree: u32,
+    /// Largest image, px; bounds the grids of the loss.
+    pub size: (u32, u32),
+    /// Parameters are updated at the end.
+    pub update: bool,
+}
+
+fn begin<'a>(name: &str, shape: &'a KernelShape, capacity: &'a Capacity, labels: bool, sh_degree: u32) -> Builder<'a> {
+    let mut b = Builder { shape, capacity, labels, sh_degree, list: PassList::new(name) };
+    pass!(b, step_begin { step: Buf::STEP, counters: Buf::COUNTERS, dispatch_args: Buf::DISPATCH_ARGS } [],
+        build::ONE);
+    b
+}
+
+fn end(mut b: Builder) -> PassList {
+    b.list.copy(Buf::COUNTERS, Buf::REPORT, 0);
+    b.list.copy(Buf::FAILURE, Buf::REPORT_FAILURE, 0);
+    b.list
+}
+
+/// One optimiser step on one view.
+pub fn training_step(shape: &KernelShape, capacity: &Capacity, variant: Variant) -> PassList {
+    let mut b = begin("training step", shape, capacity, variant.labels, variant.sh_degree);
+    project::visible_splats(&mut b);
+    let slots = tile::bin_splats(&mut b);
+    blend::blend_forward(&mut b);
+    loss::photo_loss(&mut b, variant.size.0, variant.size.1);
+    blend::blend_backward(&mut b, slots);
+    gather::gather(&mut b);
+    project::project_backward(&mut b);
+    if variant.update {
+        optimize::adam(&mut b);
+    }
+    if variant.labels {
+        lift::resolve(&mut b);
+    }
+    end(b)
+}
+
+/// One picture of the scene: colour, transmittance, main Gaussian and its weight, depth.
+pub fn render_view(shape: &KernelShape, capacity: &Capacity, sh_degree: u32) -> PassList {
+    let mut b = begin("render", shape, capacity, false, sh_degree);
+    project::visible_splats(&mut b);
+    tile::bin_splats(&mut b);
+    blend::blend_forward_main(&mut b);
+    end(b)
+}
+
+/// How many Gaussians densification would leave.
+pub fn densify_count(shape: &KernelShape, capacity: &Capacity) -> PassList {
+    let mut b = begin("densify: count", shape, capacity, false, 0);
+    densify::mark(&mut b);
+    end(b)
+}
+
+/// Densification; the model must have room for the count that [`densify_count`] found.
+pub fn densify_apply(shape: &KernelShape, capacity: &Capacity, labels: bool) -> PassList {
+    let mut b = begin("densify", shape, capacity, labels, 0);
+    densify::mark(&mut b);
+    densify::apply(&mut b);
+    end(b)
+}
+
+/// Opacity reset.
+pub fn opacity_reset(shape: &KernelShape, capacity: &Capacity) -> PassList {
+    let mut b = begin("opacity reset", shape, capacity, false, 0);
+    optimize::opacity_reset(&mut b);
+    end(b)
+}

@@ -1,0 +1,159 @@
+#version 460
+#include "layout.glsl"
+#include "constants.glsl"
+#include "step.glsl"
+#include "dispatch.glsl"
+#include "record.glsl"
+#include "blend_tile.glsl"
+// blend_backward — walk one tile of one layer back to front and write one gradient record per (splat, tile) pair.
+// Work:    one subgroup (= workgroup) a tile, jobs as in blend_forward.
+// Reads:   step; tile_starts [layers * T]; sorted_splats, slots [I]; splats [V,3]; image [P] (w = transmittance),
+//          last [P]; v_image [P]; variant labels: counters, layer_tiles, layer_state
+// Writes:  v_instances [I,3] at the pair's slot: v_mean2d (px), v_conic; v_log_opacity, v_colour; stamp of the step
+//          (records without the current stamp were not walked and count as 0)
+// Math:    p = dL/d ln alpha = w (u - s) with u = colour . g and s the colour behind, times g; geometry and opacity
+//          gradients are linear in six moments of p about the tile's centre. T by division. Clamped alpha: p = 0.
+// Order:   fixed, bitwise reproducible.
+// Mirror:  tests/reference/blend.rs::blend_backward
+
+READ1(0, StepUniforms, step);
+FETCHU(1, tile_starts);
+FETCHU(2, sorted_splats);
+FETCHU(3, slots);
+FETCH4(4, splats);
+FETCH4(5, image);
+FETCHU(6, last);
+FETCH4(7, v_image);
+WRITE(8, vec4, v_instances);
+#ifdef LABELS
+READ1(9, Counters, counters);
+FETCHU(10, layer_tiles);
+READ(11, uvec2, layer_state);
+#include "label_state.glsl"
+#endif
+
+void main() {
+    StepUniforms u = step;
+    uint jobs = u.tile_count;
+#ifdef LABELS
+    jobs += counters.layer_tile_count;
+#endif
+    uint group = linear_group_id();
+    if (group >= jobs) {
+        return;
+    }
+    uint job = interleave(group, jobs);
+    uint virtual_tile = job, layer_slot = 0u;
+#ifdef LABELS
+    if (job >= u.tile_count) {
+        layer_slot = job - u.tile_count;
+        virtual_tile = fetchu(layer_tiles, layer_slot);
+    }
+#endif
+    TileJob t = locate(job, virtual_tile, layer_slot, u);
+    uint lane = gl_LocalInvocationID.x;
+    uint list_start = fetchu(tile_starts, virtual_tile);
+    vec2 corner = vec2(float(t.x - (lane % TILE_WIDTH)), float((t.tile / u.tiles_x) * TILE_HEIGHT));
+
+    float T[ROWS], behind[ROWS], g0[ROWS], g1[ROWS], g2[ROWS];
+    uint final_[ROWS];
+    uint deepest = 0u;
+    [[unroll]] for (uint k = 0u; k < ROWS; k++) {
+        bool inside = t.x < u.width && t.y0 + k < u.height;
+        uint p = inside ? (t.y0 + k) * u.width + t.x : 0u;
+        vec3 g = vec3(0.0);
+        T[k] = 1.0;
+        final_[k] = 0u;
+        behind[k] = 0.0;
+#ifdef LABELS
+        if (t.layer != 0u) {
+            uvec2 state = layer_state[layer_pixel(t, k)];
+            T[k] = uintBitsToFloat(state.x);
+            final_[k] = state.y & LAST_MASK;
+            g = unpack_signs(state.y) * (u.label_weight * u.loss_scale);
+        } else
+#endif
+        {
+            T[k] = fetch4(image, p).w;
+            final_[k] = inside ? fetchu(last, p) : 0u;
+            g = fetch4(v_image, p).xyz;
+            behind[k] = dot(u.background, g);
+        }
+        g0[k] = g.x;
+        g1[k] = g.y;
+        g2[k] = g.z;
+        deepest = max(deepest, final_[k]);
+    }
+    deepest = subgroup_max(deepest);
+
+    vec2 centre = vec2(float(TILE_WIDTH), float(TILE_HEIGHT)) * 0.5;
+    float qx = t.px - centre.x;
+    float qy0 = t.row0 + 0.5 * float(ROWS - 1u) - centre.y; // middle of the lane's rows
+    const float middle = 0.5 * float(ROWS - 1u);
+    uint batches = (deepest + SUBGROUP_SIZE - 1u) / SUBGROUP_SIZE;
+    for (uint batch = batches; batch > 0u; batch--) {
+        uint base = (batch - 1u) * SUBGROUP_SIZE; // within the list
+        uint count = min(SUBGROUP_SIZE, deepest - base);
+        uint at = list_start + min(base + lane, deepest - 1u);
+        uint index = fetchu(sorted_splats, at);
+        vec4 r0 = fetch4(splats, 3u * index), r1 = fetch4(splats, 3u * index + 1u), r2 = fetch4(splats, 3u * index + 2u);
+        TileSplat mine = TileSplat(r0.x - corner.x, r0.y - corner.y, r0.z, r0.w, r1.x, r1.y, vec3(r1.zw, r2.x), 0.0);
+        float o0 = 0.0, ox = 0.0, oy = 0.0, oxx = 0.0, oxy = 0.0, oyy = 0.0, or_ = 0.0, og = 0.0, ob = 0.0;
+        for (uint back = count; back > 0u; back--) {
+            uint j = back - 1u;
+            TileSplat s = broadcast(mine, j);
+            uint position = base + j + 1u;
+            float dx = s.x - t.px;
+            float ax = s.lo + s.a * dx * dx, bx = s.b * dx;
+            float dy0 = s.y - t.row0;
+            float m0 = 0.0, m1 = 0.0, m2 = 0.0, vr = 0.0, vg = 0.0, vb = 0.0;
+            [[unroll]] for (uint k = 0u; k < ROWS; k++) {
+                float dy = dy0 - float(k);
+                precise float e = ax + dy * (bx + s.c * dy);
+                float raw = exp2(max(e, -20.0));
+                float alpha = min(ALPHA_MAX, raw);
+                alpha = e < LOG2_ALPHA_MIN || position > final_[k] ? 0.0 : alpha;
+                float light = s.colour.x * g0[k] + s.colour.y * g1[k] + s.colour.z * g2[k];
+                T[k] = T[k] / (1.0 - alpha);
+                float w = alpha * T[k];
+                float difference = light - behind[k];
+                float p = raw >= ALPHA_MAX ? 0.0 : w * difference;
+                behind[k] += alpha * difference;
+                float y = float(k) - middle;
+                m0 += p;
+                m1 += p * y;
+                m2 += p * (y * y);
+                vr += w * g0[k];
+                vg += w * g1[k];
+                vb += w * g2[k];
+            }
+            float my = m1 + qy0 * m0, myy = m2 + qy0 * (2.0 * m1 + qy0 * m0);
+            float s0 = subgroup_sum(m0), sx = subgroup_sum(m0 * qx), sy = subgroup_sum(my);
+            float sxx = subgroup_sum(m0 * qx * qx), sxy = subgroup_sum(my * qx), syy = subgroup_sum(myy);
+            float sr = subgroup_sum(vr), sg = subgroup_sum(vg), sb = subgroup_sum(vb);
+            bool me = lane == j;
+            o0 = me ? s0 : o0;
+            ox = me ? sx : ox;
+            oy = me ? sy : oy;
+            oxx = me ? sxx : oxx;
+            oxy = me ? sxy : oxy;
+            oyy = me ? syy : oyy;
+            or_ = me ? sr : or_;
+            og = me ? sg : og;
+            ob = me ? sb : ob;
+        }
+        // moments about the tile's centre to gradients of the lane's own splat
+        vec2 d = vec2(mine.x, mine.y) - centre;
+        vec3 conic = conic_from_exponent(vec3(mine.a, mine.b, mine.c));
+        float Sx = d.x * o0 - ox, Sy = d.y * o0 - oy;
+        float Sxx = d.x * (d.x * o0 - 2.0 * ox) + oxx;
+        float Sxy = d.x * (d.y * o0 - oy) - d.y * ox + oxy;
+        float Syy = d.y * (d.y * o0 - 2.0 * oy) + oyy;
+        if (lane < count) {
+            uint slot = 3u * fetchu(slots, at);
+            v_instances[slot] = vec4(-(conic.x * Sx + conic.y * Sy), -(conic.y * Sx + conic.z * Sy), -0.5 * Sxx, -Sxy);
+            v_instances[slot + 1u] = vec4(-0.5 * Syy, o0, or_, og);
+            v_instances[slot + 2u] = vec4(ob, uintBitsToFloat(u.stamp), 0.0, 0.0);
+        }
+    }
+}

@@ -1,0 +1,202 @@
+#version 460
+#include "layout.glsl"
+#include "constants.glsl"
+#include "step.glsl"
+#include "dispatch.glsl"
+#include "blend_tile.glsl"
+// blend_forward — alpha-blend one tile of one layer front to back.
+// Work:    one subgroup (= workgroup) a tile: the scene's tiles, then (variant labels) the occupied layer tiles.
+// Reads:   step, counters; tile_starts, tile_ends [layers * T]; sorted_splats [I]; splats [V,3]
+//          variant labels: layer_tiles; target [P] RGBA8; view_labels [P]; layer_occluders; label_from_layer;
+//          gaussian_from_splat [V]
+// Writes:  image [P] linear RGB over the background, w = final transmittance; last [P] = 1 + index of the last splat
+//          that contributed, within the tile's list (0: none); variant main: main_gaussian [P] (NO_SPLAT: none) and
+//          main_weight_depth [P] (weight, weighted sum of z);
+//          variant labels: layer_state [slots, pixels of a tile] (transmittance, last and signs of the loss gradient),
+//          layer_loss [slots], label_keys [N] (integer maximum, any order)
+// Math:    LabelGS eq. 5; alpha <= ALPHA_MAX; a pair counts where alpha >= ALPHA_MIN, tested on the exponent; a pixel
+//          stops before the splat that would take its transmittance below TRANSMITTANCE_MIN (3DGS).
+//          Layers: eq. 8 and 9, black background; the L1 gradient of a layer is local to the pixel, so its sign is
+//          taken here. Lift: eq. 6 and 7.
+// Order:   fixed, bitwise reproducible.
+// Mirror:  tests/reference/blend.rs::blend_forward
+
+READ1(0, StepUniforms, step);
+INOUT1(1, Counters, counters);
+FETCHU(2, tile_starts);
+FETCHU(3, tile_ends);
+FETCHU(4, sorted_splats);
+FETCH4(5, splats);
+WRITE(6, vec4, image);
+WRITE(7, uint, last);
+#ifdef MAIN
+WRITE(8, uint, main_gaussian);
+WRITE(9, vec2, main_weight_depth);
+FETCHU(10, gaussian_from_splat);
+#endif
+#ifdef LABELS
+FETCHU(8, layer_tiles);
+FETCH4(9, target);
+FETCHU(10, view_labels);
+READ(11, uint, layer_occluders);
+READ(12, uint, label_from_layer);
+FETCHU(13, gaussian_from_splat);
+WRITE(14, uvec2, layer_state);
+WRITE(15, float, layer_loss);
+INOUT(16, uint, label_keys);
+FETCHU(17, layer_from_label);
+#endif
+
+#ifdef LABELS
+#include "label_state.glsl"
+#include "label_rules.glsl"
+#endif
+
+void main() {
+    StepUniforms u = step;
+    uint layer_count = counters.layer_tile_count;
+    uint jobs = u.tile_count;
+#ifdef LABELS
+    jobs += layer_count;
+#endif
+    uint group = linear_group_id();
+    if (group >= jobs) {
+        return;
+    }
+    uint job = interleave(group, jobs);
+    uint virtual_tile = job, slot = 0u;
+#ifdef LABELS
+    if (job >= u.tile_count) {
+        slot = job - u.tile_count;
+        virtual_tile = fetchu(layer_tiles, slot);
+    }
+#endif
+    TileJob t = locate(job, virtual_tile, slot, u);
+    uint lane = gl_LocalInvocationID.x;
+    uint list_start = fetchu(tile_starts, virtual_tile), list_end = fetchu(tile_ends, virtual_tile);
+    uint begin = min(list_start + SEGMENT * SEGMENT_LENGTH, list_end);
+    uint end = min(begin + SEGMENT_LENGTH, list_end);
+    vec2 corner = vec2(float(t.x - (gl_LocalInvocationID.x % TILE_WIDTH)), float((t.tile / u.tiles_x) * TILE_HEIGHT));
+
+    float T[ROWS], cr[ROWS], cg[ROWS], cb[ROWS];
+    uint final_[ROWS];
+#if defined(MAIN) || defined(LABELS)
+    float best[ROWS];
+    uint main_[ROWS];
+#endif
+#ifdef MAIN
+    float depth[ROWS];
+#endif
+    [[unroll]] for (uint k = 0u; k < ROWS; k++) {
+        bool inside = t.x < u.width && t.y0 + k < u.height;
+#ifdef LABELS
+        if (t.layer != 0u && inside) {
+            uint p = (t.y0 + k) * u.width + t.x;
+            inside = fetch4(target, p).w > 0.5 && !occluded(t.layer, fetchu(view_labels, p), u);
+        }
+#endif
+        T[k] = inside ? 1.0 : -1.0; // the sign says whether the pixel still takes splats
+        cr[k] = 0.0;
+        cg[k] = 0.0;
+        cb[k] = 0.0;
+        final_[k] = 0u;
+#if defined(MAIN) || defined(LABELS)
+        best[k] = 0.0;
+        main_[k] = NO_SPLAT;
+#endif
+#ifdef MAIN
+        depth[k] = 0.0;
+#endif
+    }
+
+    uint walked = 0u;
+    for (uint base = begin; base < end; base += SUBGROUP_SIZE) {
+        float live = T[0];
+        [[unroll]] for (uint k = 1u; k < ROWS; k++) {
+            live = max(live, T[k]);
+        }
+        if (subgroup_max(live) <= 0.0) {
+            break;
+        }
+        uint count = min(SUBGROUP_SIZE, end - base);
+        walked += count;
+        uint index = fetchu(sorted_splats, min(base + lane, end - 1u));
+        vec4 r0 = fetch4(splats, 3u * index), r1 = fetch4(splats, 3u * index + 1u), r2 = fetch4(splats, 3u * index + 2u);
+        TileSplat mine = TileSplat(r0.x - corner.x, r0.y - corner.y, r0.z, r0.w, r1.x, r1.y, vec3(r1.zw, r2.x), r2.y);
+        for (uint j = 0u; j < count; j++) {
+            TileSplat s = broadcast(mine, j);
+#if defined(MAIN) || defined(LABELS)
+            uint id = subgroupShuffle(index, j);
+#endif
+            uint position = base - list_start + j + 1u;
+            float dx = s.x - t.px;
+            float ax = s.lo + s.a * dx * dx, bx = s.b * dx;
+            float dy0 = s.y - t.row0;
+            [[unroll]] for (uint k = 0u; k < ROWS; k++) {
+                float dy = dy0 - float(k);
+                precise float e = ax + dy * (bx + s.c * dy);
+                float alpha = min(ALPHA_MAX, exp2(max(e, -20.0)));
+                alpha = e < LOG2_ALPHA_MIN ? 0.0 : alpha;
+                precise float next = T[k] * (1.0 - alpha);
+                bool takes = next >= TRANSMITTANCE_MIN;
+                float w = takes ? alpha * T[k] : 0.0;
+                cr[k] += s.colour.x * w;
+                cg[k] += s.colour.y * w;
+                cb[k] += s.colour.z * w;
+                T[k] = takes ? next : -abs(T[k]);
+                final_[k] = w > 0.0 ? position : final_[k];
+#ifdef MAIN
+                depth[k] += s.z * w;
+#endif
+#if defined(MAIN) || defined(LABELS)
+                bool main_now = w > best[k];
+                best[k] = main_now ? w : best[k];
+                main_[k] = main_now ? id : main_[k];
+#endif
+            }
+        }
+    }
+    if (lane == 0u && walked > 0u) {
+        atomicAdd(counters.processed_low, walked);
+    }
+
+#ifdef LABELS
+    if (t.layer != 0u) {
+        float loss = 0.0;
+        uint label = label_from_layer[t.layer];
+        [[unroll]] for (uint k = 0u; k < ROWS; k++) {
+            bool inside = t.x < u.width && t.y0 + k < u.height;
+            uint p = inside ? (t.y0 + k) * u.width + t.x : 0u;
+            uint here = fetchu(view_labels, p);
+            vec4 photo = fetch4(target, p);
+            vec3 wanted = here == label ? photo.xyz : vec3(0.0);
+            bool counts = inside && photo.w > 0.5 && !occluded(t.layer, here, u);
+            vec3 difference = counts ? vec3(cr[k], cg[k], cb[k]) - wanted : vec3(0.0);
+            loss += abs(difference.x) + abs(difference.y) + abs(difference.z);
+            layer_state[layer_pixel(t, k)] = uvec2(floatBitsToUint(abs(T[k])), final_[k] | pack_signs(difference));
+        }
+        loss = subgroup_sum(loss);
+        if (lane == 0u) {
+            layer_loss[slot] = loss;
+        }
+        return;
+    }
+#endif
+    [[unroll]] for (uint k = 0u; k < ROWS; k++) {
+        if (t.x < u.width && t.y0 + k < u.height) {
+            uint p = (t.y0 + k) * u.width + t.x;
+            float transmittance = abs(T[k]);
+            image[p] = vec4(vec3(cr[k], cg[k], cb[k]) + transmittance * u.background, transmittance);
+            last[p] = final_[k];
+#ifdef MAIN
+            main_gaussian[p] = main_[k] == NO_SPLAT ? NO_SPLAT : fetchu(gaussian_from_splat, main_[k]);
+            main_weight_depth[p] = vec2(best[k], depth[k]);
+#endif
+#ifdef LABELS
+            if (u.lift != 0u && best[k] >= u.label_threshold) {
+                lift(p, main_[k], best[k], u);
+            }
+#endif
+        }
+    }
+}

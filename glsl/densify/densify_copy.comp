@@ -1,0 +1,36 @@
+#version 460
+#include "layout.glsl"
+#include "constants.glsl"
+#include "step.glsl"
+#include "dispatch.glsl"
+#include "densify_rules.glsl"
+// densify_copy — carry one attribute, or one moment, over to the densified model.
+// Work:    one vec4 of one old Gaussian an invocation; STRIDE vec4 a Gaussian.
+// Reads:   step; old_values [N,STRIDE]; densify_actions [N]; child_offsets [N]
+// Writes:  values [new N,STRIDE]. MOMENTS: new Gaussians start at 0; the parent of a clone keeps its own.
+// Mirror:  tests/reference/densify.rs::densify
+
+layout(constant_id = 14) const uint STRIDE = 1;
+layout(constant_id = 16) const uint MOMENTS = 0;
+layout(local_size_x = 64) in;
+READ1(0, StepUniforms, step);
+FETCH4(1, old_values);
+FETCHU(2, densify_actions);
+FETCHU(3, child_offsets);
+WRITE(4, vec4, values);
+
+void main() {
+    uint e = linear_group_id() * 64u + gl_LocalInvocationID.x;
+    uint i = e / STRIDE;
+    if (i >= step.gaussian_count) {
+        return;
+    }
+    uint action = fetchu(densify_actions, i), to = fetchu(child_offsets, i) * STRIDE + (e - i * STRIDE);
+    vec4 v = fetch4(old_values, e);
+    if (action != ACTION_PRUNE) {
+        values[to] = MOMENTS != 0u && action == ACTION_SPLIT ? vec4(0.0) : v;
+    }
+    if (action == ACTION_CLONE || action == ACTION_SPLIT) {
+        values[to + STRIDE] = MOMENTS != 0u ? vec4(0.0) : v;
+    }
+}

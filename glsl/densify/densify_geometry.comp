@@ -1,0 +1,51 @@
+#version 460
+#include "layout.glsl"
+#include "constants.glsl"
+#include "step.glsl"
+#include "dispatch.glsl"
+#include "gaussian.glsl"
+#include "densify_rules.glsl"
+#include "random.glsl"
+// densify_geometry — write positions, scales and rotations of the densified model.
+// Work:    64 old Gaussians a workgroup; children stand next to each other at their parent's place in the order.
+// Reads:   step; old_means, old_scales, old_quats [N]; densify_stats [N]; child_offsets [N]
+// Writes:  means, scales, quats [new N]; densify_actions [N]
+// Math:    clone: exact copy; split: mean + R (s * normal), ln s - ln 1.6 (3DGS).
+// Mirror:  tests/reference/densify.rs::densify
+
+layout(local_size_x = 64) in;
+READ1(0, StepUniforms, step);
+FETCH4(1, old_means);
+FETCH4(2, old_scales);
+FETCH4(3, old_quats);
+READ(4, vec2, densify_stats);
+FETCHU(5, child_offsets);
+WRITE(6, vec4, means);
+WRITE(7, vec4, scales);
+WRITE(8, vec4, quats);
+WRITE(9, uint, densify_actions);
+
+void main() {
+    StepUniforms u = step;
+    uint i = linear_group_id() * 64u + gl_LocalInvocationID.x;
+    if (i >= u.gaussian_count) {
+        return;
+    }
+    vec4 mean = fetch4(old_means, i), scale = fetch4(old_scales, i), quat = fetch4(old_quats, i);
+    uint action = densify_action(u, mean.w, scale.xyz, densify_stats[i]);
+    densify_actions[i] = action;
+    uint to = fetchu(child_offsets, i);
+    mat3 rotation = rotation_from_quat(quat * inversesqrt(max(dot(quat, quat), 1e-24)));
+    for (uint child = 0u; child < children(action); child++) {
+        vec4 m = mean, s = scale;
+        if (action == ACTION_SPLIT) {
+            vec3 draw = vec3(normal_draw(u.seed, i, 3u * child), normal_draw(u.seed, i, 3u * child + 1u),
+                normal_draw(u.seed, i, 3u * child + 2u));
+            m.xyz += rotation * (exp(scale.xyz) * draw);
+            s.xyz -= SPLIT_SHRINK;
+        }
+        means[to + child] = m;
+        scales[to + child] = s;
+        quats[to + child] = quat;
+    }
+}

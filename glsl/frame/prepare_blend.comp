@@ -1,0 +1,28 @@
+#version 460
+#include "layout.glsl"
+#include "constants.glsl"
+#include "step.glsl"
+#include "dispatch.glsl"
+// prepare_blend — size the blend dispatches: all tiles of the scene, then the occupied tiles of the object layers.
+// Work:    one invocation.
+// Reads:   step, counters
+// Writes:  dispatch_args (blend); failure (sticky bits)
+// Mirror:  none (bookkeeping; tests/overflow.rs)
+
+layout(local_size_x = 1) in;
+layout(constant_id = 3) const uint LAYER_TILE_CAPACITY = 0;
+layout(constant_id = 4) const uint LONGEST_LIST = 0; // splats that the recorded segments of the blend loops can walk
+READ1(0, StepUniforms, step);
+READ1(1, Counters, counters);
+INOUT(2, uint, dispatch_args);
+INOUT1(3, uint, failure);
+
+void main() {
+    uint layers = counters.layer_tile_count;
+    uint failed = (layers > LAYER_TILE_CAPACITY ? FAILED_LAYER_TILES : 0u)
+        | (counters.longest_list > LONGEST_LIST ? FAILED_SEGMENTS : 0u);
+    failure |= failed;
+    uvec3 groups = folded_groups(failed != 0u ? 0u : step.tile_count + layers);
+    dispatch_args[ARGS_BLEND] = groups.x;
+    dispatch_args[ARGS_BLEND + 1u] = groups.y;
+}

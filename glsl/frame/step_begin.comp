@@ -1,0 +1,33 @@
+#version 460
+#include "layout.glsl"
+#include "constants.glsl"
+#include "step.glsl"
+#include "dispatch.glsl"
+// step_begin — clear the counters and size the dispatches that depend on the number of Gaussians.
+// Work:    one invocation.
+// Reads:   step
+// Writes:  counters; dispatch_args (all entries; those of later stages 0)
+// Mirror:  none (bookkeeping; every later pass fails without it)
+
+layout(local_size_x = 1) in;
+READ1(0, StepUniforms, step);
+WRITE1(1, Counters, counters);
+WRITE(2, uint, dispatch_args);
+
+void put(uint at, uvec3 groups) {
+    dispatch_args[at] = groups.x;
+    dispatch_args[at + 1u] = groups.y;
+    dispatch_args[at + 2u] = groups.z;
+}
+
+void main() {
+    counters = Counters(0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0.0, 0.0, 0.0);
+    uint n = step.gaussian_count;
+    put(ARGS_GAUSSIANS, folded_groups((n + 63u) / 64u));
+    put(ARGS_SH1, folded_groups((n * 3u + 63u) / 64u));
+    put(ARGS_SH2, folded_groups((n * 4u + 63u) / 64u));
+    put(ARGS_SH3, folded_groups((n * 6u + 63u) / 64u));
+    put(ARGS_SPLATS, uvec3(0u, 1u, 1u));
+    put(ARGS_INSTANCES, uvec3(0u, 1u, 1u));
+    put(ARGS_BLEND, uvec3(0u, 1u, 1u));
+}

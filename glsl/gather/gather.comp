@@ -1,0 +1,61 @@
+#version 460
+#include "layout.glsl"
+#include "constants.glsl"
+#include "step.glsl"
+#include "dispatch.glsl"
+// gather — add up the gradient records of each splat, in slot order; note the densification statistic.
+// Work:    64 splats a workgroup.
+// Reads:   step, counters, failure; tiles_touched, instance_offsets [V]; v_instances [I,3];
+//          gaussian_from_splat [V]; variant labels: labels [N], layer_from_label
+// Writes:  v_splats [V,3]: v_mean2d (px), v_conic xy..; v_conic z, v_log_opacity, v_colour rg; v_colour b
+//          densify_stats [N] += (|scene v_mean2d| in NDC units, 1)
+// Math:    the statistic sees the scene layer only, never the label loss.
+// Order:   fixed, bitwise reproducible; no atomics.
+// Mirror:  tests/reference/blend.rs::blend_backward, densify.rs::accumulate
+
+layout(local_size_x = 64) in;
+READ1(0, StepUniforms, step);
+READ1(1, Counters, counters);
+READ1(2, uint, failure);
+FETCHU(3, tiles_touched);
+FETCHU(4, instance_offsets);
+FETCH4(5, v_instances);
+FETCHU(6, gaussian_from_splat);
+WRITE(7, vec4, v_splats);
+INOUT(8, vec2, densify_stats);
+#ifdef LABELS
+FETCHU(9, labels);
+FETCHU(10, layer_from_label);
+#endif
+
+void main() {
+    uint s = linear_group_id() * 64u + gl_LocalInvocationID.x;
+    if (s >= counters.visible_count || failure != 0u) {
+        return;
+    }
+    uint stamp = step.stamp;
+    uint total = fetchu(tiles_touched, s), first = fetchu(instance_offsets, s), gaussian = fetchu(gaussian_from_splat, s);
+    uint scene = total;
+#ifdef LABELS
+    scene = fetchu(layer_from_label, fetchu(labels, gaussian)) != 0u ? total / 2u : total;
+#endif
+    vec4 a = vec4(0.0), b = vec4(0.0);
+    float c = 0.0;
+    vec2 scene_mean = vec2(0.0);
+    for (uint k = 0u; k < total; k++) {
+        uint at = 3u * (first + k);
+        vec4 ra = fetch4(v_instances, at), rb = fetch4(v_instances, at + 1u), rc = fetch4(v_instances, at + 2u);
+        bool current = floatBitsToUint(rc.y) == stamp;
+        a += current ? ra : vec4(0.0);
+        b += current ? rb : vec4(0.0);
+        c += current ? rc.x : 0.0;
+        scene_mean += current && k < scene ? ra.xy : vec2(0.0);
+    }
+    v_splats[3u * s] = a;
+    v_splats[3u * s + 1u] = b;
+    v_splats[3u * s + 2u] = vec4(c, 0.0, 0.0, 0.0);
+    if (total > 0u) {
+        float size = length(scene_mean * vec2(0.5 * float(step.width), 0.5 * float(step.height)));
+        densify_stats[gaussian] += vec2(size, 1.0);
+    }
+}

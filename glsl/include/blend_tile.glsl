@@ -1,0 +1,65 @@
+// What the blend passes share: one subgroup owns one tile of one layer. A lane owns ROWS pixels of one column, in
+// registers; splats are loaded one per lane and broadcast by shuffle. No shared memory, no barriers.
+
+#include "subgroup.glsl"
+layout(constant_id = 1) const uint TILE_WIDTH = 8;
+layout(constant_id = 2) const uint TILE_HEIGHT = 8;
+layout(constant_id = 12) const uint SEGMENT = 0;        // which part of long lists this dispatch walks
+layout(constant_id = 13) const uint SEGMENT_LENGTH = 40960; // lavapipe ends loops after 65,535 rounds in all
+layout(local_size_x_id = 0) in;
+
+const uint ROWS = TILE_WIDTH * TILE_HEIGHT / SUBGROUP_SIZE;
+
+struct TileJob {
+    bool some;
+    uint layer;   // 0: the scene
+    uint tile;    // within the layer
+    uint virtual_tile;
+    uint slot;    // index among the occupied layer tiles
+    uint x, y0;   // the lane's column and first row, px
+    float px;     // centre of the lane's column relative to the tile's left edge
+    float row0;   // first row of the lane relative to the tile's top edge
+};
+
+// Neighbouring tiles cost about the same, so the even ones make the first half of the groups and the odd ones the
+// second: devices that split a dispatch into fixed halves get two halves of equal cost.
+uint interleave(uint i, uint n) {
+    uint half_ = (n + 1u) / 2u;
+    return i < half_ ? 2u * i : 2u * (i - half_) + 1u;
+}
+
+TileJob locate(uint job, uint virtual_tile, uint slot, StepUniforms u) {
+    TileJob t;
+    t.some = true;
+    t.virtual_tile = virtual_tile;
+    t.slot = slot;
+    t.layer = virtual_tile / u.tile_count;
+    t.tile = virtual_tile % u.tile_count;
+    uint lane = gl_LocalInvocationID.x;
+    uint column = lane % TILE_WIDTH, band = lane / TILE_WIDTH;
+    t.x = (t.tile % u.tiles_x) * TILE_WIDTH + column;
+    t.y0 = (t.tile / u.tiles_x) * TILE_HEIGHT + band * ROWS;
+    t.px = float(column) + 0.5;
+    t.row0 = float(band * ROWS) + 0.5;
+    return t;
+}
+
+// One splat's exponent form relative to the tile's corner, as loaded by one lane.
+struct TileSplat {
+    float x, y, a, b, c, lo;
+    vec3 colour;
+    float z;
+};
+
+TileSplat broadcast(TileSplat s, uint lane) {
+    TileSplat r;
+    r.x = subgroupShuffle(s.x, lane);
+    r.y = subgroupShuffle(s.y, lane);
+    r.a = subgroupShuffle(s.a, lane);
+    r.b = subgroupShuffle(s.b, lane);
+    r.c = subgroupShuffle(s.c, lane);
+    r.lo = subgroupShuffle(s.lo, lane);
+    r.colour = vec3(subgroupShuffle(s.colour.x, lane), subgroupShuffle(s.colour.y, lane), subgroupShuffle(s.colour.z, lane));
+    r.z = subgroupShuffle(s.z, lane);
+    return r;
+}

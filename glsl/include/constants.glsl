@@ -1,0 +1,26 @@
+// Every constant of the algorithm, once. Exported to Rust by the build; the f64 mirrors widen these f32 values.
+
+const float ALPHA_MIN = 1.0 / 255.0;         // a pair with less opacity at a pixel does not count (3DGS)
+const float LOG2_ALPHA_MIN = log2(ALPHA_MIN);
+const float ALPHA_MAX = 0.99;                // clamp of a pair's opacity (3DGS)
+const float TRANSMITTANCE_MIN = 1e-4;        // a pixel stops before the splat that would go below (3DGS)
+const float COV2D_BLUR = 0.3;                // px^2 on the diagonal of the projected covariance (3DGS)
+const float SSIM_C1 = 0.01 * 0.01;
+const float SSIM_C2 = 0.03 * 0.03;
+const float ADAM_BETA1 = 0.9;
+const float ADAM_BETA2 = 0.999;
+const float ADAM_EPSILON = 1e-15;
+const float OPACITY_RESET_LOGIT = -4.5951198501345898; // logit(0.01)
+const float SPLIT_SHRINK = 0.47000362924573558;        // ln 1.6
+const float LN2 = 0.69314718055994531;
+const uint NO_SPLAT = 0xffffffffu;
+const uint KEY_INVISIBLE = 0xffffffffu;
+
+// Entries of dispatch_args, 3 words each (VkDispatchIndirectCommand).
+const uint ARGS_GAUSSIANS = 0u;
+const uint ARGS_SPLATS = 3u;
+const uint ARGS_INSTANCES = 6u;
+const uint ARGS_BLEND = 9u;
+const uint ARGS_SH1 = 12u;
+const uint ARGS_SH2 = 15u;
+const uint ARGS_SH3 = 18u;

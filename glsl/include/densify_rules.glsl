@@ -1,0 +1,21 @@
+// What densification decides for one Gaussian. One function for counting and for applying.
+
+const uint ACTION_PRUNE = 0u;
+const uint ACTION_KEEP = 1u;
+const uint ACTION_CLONE = 2u;
+const uint ACTION_SPLIT = 3u;
+
+uint densify_action(StepUniforms u, float logit, vec3 log_scale, vec2 stats) {
+    float gradient = stats.y > 0.0 ? stats.x / stats.y : 0.0;
+    float size = exp(max(log_scale.x, max(log_scale.y, log_scale.z)));
+    bool grows = gradient >= u.densify_threshold && u.densify_threshold > 0.0;
+    bool splits = grows && size > u.densify_scale;
+    float child = splits ? exp(max(log_scale.x, max(log_scale.y, log_scale.z)) - SPLIT_SHRINK) : size;
+    bool drop = exp2(-log2(1.0 + exp(-clamp(logit, -30.0, 30.0)))) < u.prune_opacity
+        || (u.prune_big != 0u && child > u.prune_scale);
+    return drop ? ACTION_PRUNE : splits ? ACTION_SPLIT : grows ? ACTION_CLONE : ACTION_KEEP;
+}
+
+uint children(uint action) {
+    return action == ACTION_PRUNE ? 0u : action == ACTION_KEEP ? 1u : 2u;
+}

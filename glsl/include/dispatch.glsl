@@ -1,0 +1,11 @@
+// One-dimensional work folded over two axes, because an axis holds at most 65,535 groups.
+
+const uint FOLD = 32768u;
+
+uint linear_group_id() {
+    return gl_WorkGroupID.y * FOLD + gl_WorkGroupID.x;
+}
+
+uvec3 folded_groups(uint groups) {
+    return groups <= FOLD ? uvec3(groups, groups > 0u ? 1u : 0u, 1u) : uvec3(FOLD, (groups + FOLD - 1u) / FOLD, 1u);
+}

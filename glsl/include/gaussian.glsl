@@ -1,0 +1,57 @@
+// Projection of one Gaussian: the forward quantities that project_forward writes and project_backward needs again.
+
+struct Projection {
+    vec3 view;      // mean in camera space
+    vec2 slope;     // x/z and y/z, clamped
+    vec2 slope_raw; // the same before the clamp
+    vec3 t0, t1;    // rows of J W (2x3)
+    mat3 rotation;  // of the Gaussian; columns are its axes in world space
+    vec3 sigma;     // standard deviations
+    vec3 m0, m1;    // rows of M = J W R S; cov2d = M M^T + blur
+    vec3 cov;       // xx, xy, yy with blur
+    vec3 conic;     // A, B, C
+};
+
+mat3 rotation_from_quat(vec4 q) { // unit (w, x, y, z)
+    float w = q.x, x = q.y, y = q.z, z = q.w;
+    return mat3(
+        1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + w * z), 2.0 * (x * z - w * y),
+        2.0 * (x * y - w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z + w * x),
+        2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y));
+}
+
+// The difference to the camera first, the rotation second: scenes far from the origin keep their digits.
+vec3 to_view(StepUniforms step, vec3 mean) {
+    vec3 d = mean - step.camera_centre;
+    return vec3(dot(step.view_row0, d), dot(step.view_row1, d), dot(step.view_row2, d));
+}
+
+Projection project_gaussian(StepUniforms step, vec3 mean, vec3 log_scale, vec4 quat) {
+    Projection p;
+    p.view = to_view(step, mean);
+    float inv_z = 1.0 / p.view.z;
+    p.slope_raw = p.view.xy * inv_z;
+    p.slope = clamp(p.slope_raw, vec2(step.clamp_x_min, step.clamp_y_min), vec2(step.clamp_x_max, step.clamp_y_max));
+    p.t0 = step.fx * inv_z * (step.view_row0 - p.slope.x * step.view_row2);
+    p.t1 = step.fy * inv_z * (step.view_row1 - p.slope.y * step.view_row2);
+    p.rotation = rotation_from_quat(quat * inversesqrt(max(dot(quat, quat), 1e-24)));
+    p.sigma = exp(log_scale);
+    p.m0 = (p.t0 * p.rotation) * p.sigma;
+    p.m1 = (p.t1 * p.rotation) * p.sigma;
+    float a = dot(p.m0, p.m0), b = dot(p.m0, p.m1), c = dot(p.m1, p.m1);
+    vec3 crossed = cross(p.m0, p.m1);
+    // Cauchy-Binet: every term is >= 0, so needles keep a correct, positive determinant.
+    float det = dot(crossed, crossed) + COV2D_BLUR * (a + c) + COV2D_BLUR * COV2D_BLUR;
+    p.cov = vec3(a + COV2D_BLUR, b, c + COV2D_BLUR);
+    p.conic = vec3(p.cov.z, -b, p.cov.x) / det;
+    return p;
+}
+
+// log2 of the sigmoid, without a rounded sigmoid in between.
+float log2_opacity(float logit) {
+    return -log2(1.0 + exp(-clamp(logit, -30.0, 30.0)));
+}
+
+bool finite(float x) { // by the exponent bits: drivers fold x - x
+    return (floatBitsToUint(x) & 0x7f800000u) != 0x7f800000u;
+}

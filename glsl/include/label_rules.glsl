@@ -1,0 +1,26 @@
+// Rules of the labels: which pixels are hidden from an object, and the lift.
+
+// U_k(v) = 0: the pixel belongs to an object that hides this layer's object.
+bool occluded(uint layer, uint label, StepUniforms u) {
+    uint word = layer_occluders[layer * u.occluder_words + (label >> 5)];
+    return ((word >> (label & 31u)) & 1u) != 0u;
+}
+
+// Main-Gaussian labelling with the projection filter: pixel p of a sampled object votes for the Gaussian that
+// dominates it. Keys order by weight, then label, so the maximum does not depend on the order of the votes.
+void lift(uint p, uint splat, float weight, StepUniforms u) {
+    uint label = fetchu(view_labels, p);
+    if (label == 0u || fetchu(layer_from_label, label) == 0u) {
+        return;
+    }
+    vec2 centre = floor(fetch4(splats, 3u * splat).xy);
+    bool inside = all(greaterThanEqual(centre, vec2(0.0))) && all(lessThan(centre, vec2(float(u.width), float(u.height))));
+    if (!inside) {
+        return;
+    }
+    if (u.gpf != 0u && fetchu(view_labels, uint(centre.y) * u.width + uint(centre.x)) != label) {
+        return;
+    }
+    uint key = (uint(weight * 65535.0) << 16) | label;
+    atomicMax(label_keys[fetchu(gaussian_from_splat, splat)], key);
+}

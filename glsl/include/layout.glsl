@@ -1,0 +1,47 @@
+// Extensions and the words in which every shader declares its interface. First include of every .comp file.
+//
+// A storage block has exactly one member, and the member's name is the buffer's name in GLSL and in Rust:
+//   READ(0, vec4, means)       readonly array       WRITE, INOUT likewise
+//   READ1(1, Counters, counts) one readonly struct  WRITE1, INOUT1 likewise
+//   FETCH4(2, quats)           array of vec4 that is only read by fetch4(quats, i); a texel buffer if TEXEL is defined
+//   FETCHU(3, labels)          array of uint, likewise with fetchu(labels, i)
+//   PUSH { uint count; } push; push constants
+//   SPEC(0, uint, WIDTH, 8)    specialisation constant
+#ifndef LAYOUT_GLSL
+#define LAYOUT_GLSL
+
+#extension GL_EXT_scalar_block_layout : require
+#extension GL_EXT_samplerless_texture_functions : require
+#extension GL_EXT_control_flow_attributes : require
+#extension GL_KHR_shader_subgroup_basic : require
+#extension GL_KHR_shader_subgroup_vote : require
+#extension GL_KHR_shader_subgroup_arithmetic : require
+#extension GL_KHR_shader_subgroup_ballot : require
+#extension GL_KHR_shader_subgroup_shuffle : require
+
+#define STORAGE(number, access) layout(scalar, set = 0, binding = number) access buffer
+
+#define READ(number, T, name) STORAGE(number, readonly) name##_block { T name[]; }
+#define WRITE(number, T, name) STORAGE(number, writeonly) name##_block { T name[]; }
+#define INOUT(number, T, name) STORAGE(number, ) name##_block { T name[]; }
+
+#define READ1(number, T, name) STORAGE(number, readonly) name##_block { T name; }
+#define WRITE1(number, T, name) STORAGE(number, writeonly) name##_block { T name; }
+#define INOUT1(number, T, name) STORAGE(number, ) name##_block { T name; }
+
+#ifdef TEXEL
+#define FETCH4(number, name) layout(set = 0, binding = number) uniform textureBuffer name
+#define FETCHU(number, name) layout(set = 0, binding = number) uniform utextureBuffer name
+#define fetch4(name, i) texelFetch(name, int(i))
+#define fetchu(name, i) texelFetch(name, int(i)).x
+#else
+#define FETCH4(number, name) READ(number, vec4, name)
+#define FETCHU(number, name) READ(number, uint, name)
+#define fetch4(name, i) name[i]
+#define fetchu(name, i) name[i]
+#endif
+
+#define PUSH layout(push_constant, scalar) uniform push_block
+#define SPEC(number, T, name, value) layout(constant_id = number) const T name = value
+
+#endif

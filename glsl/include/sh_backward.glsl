@@ -1,0 +1,51 @@
+// Gradients through the spherical harmonics: to the direction, and to the coefficients of splat s.
+
+vec3 sh_direction_gradient(uint i, vec3 direction, vec3 v_colour) {
+    vec3 v = vec3(0.0);
+    if (SH_DEGREE == 0u) {
+        return v;
+    }
+    vec3 g[15];
+    sh_basis_gradient(direction, g);
+    v += g[0] * dot(v_colour, band1(i, 0u)) + g[1] * dot(v_colour, band1(i, 1u)) + g[2] * dot(v_colour, band1(i, 2u));
+    if (SH_DEGREE >= 2u) {
+        vec4 a = fetch4(sh2, 4u * i), b = fetch4(sh2, 4u * i + 1u), d = fetch4(sh2, 4u * i + 2u), e = fetch4(sh2, 4u * i + 3u);
+        v += g[3] * dot(v_colour, a.xyz) + g[4] * dot(v_colour, vec3(a.w, b.xy)) + g[5] * dot(v_colour, vec3(b.zw, d.x))
+            + g[6] * dot(v_colour, d.yzw) + g[7] * dot(v_colour, e.xyz);
+    }
+    if (SH_DEGREE >= 3u) {
+        vec4 a = fetch4(sh3, 6u * i), b = fetch4(sh3, 6u * i + 1u), d = fetch4(sh3, 6u * i + 2u);
+        vec4 e = fetch4(sh3, 6u * i + 3u), f = fetch4(sh3, 6u * i + 4u), h = fetch4(sh3, 6u * i + 5u);
+        v += g[8] * dot(v_colour, a.xyz) + g[9] * dot(v_colour, vec3(a.w, b.xy)) + g[10] * dot(v_colour, vec3(b.zw, d.x))
+            + g[11] * dot(v_colour, d.yzw) + g[12] * dot(v_colour, e.xyz) + g[13] * dot(v_colour, vec3(e.w, f.xy))
+            + g[14] * dot(v_colour, vec3(f.zw, h.x));
+    }
+    return v;
+}
+
+void store_sh_gradient(uint s, float basis[15], vec3 v) {
+    v_sh0[s] = vec4(SH_C0 * v, 0.0);
+    if (SH_DEGREE >= 1u) {
+        vec3 a = basis[0] * v, b = basis[1] * v, c = basis[2] * v;
+        v_sh1[3u * s] = vec4(a, b.x);
+        v_sh1[3u * s + 1u] = vec4(b.yz, c.xy);
+        v_sh1[3u * s + 2u] = vec4(c.z, 0.0, 0.0, 0.0);
+    }
+    if (SH_DEGREE >= 2u) {
+        vec3 a = basis[3] * v, b = basis[4] * v, c = basis[5] * v, d = basis[6] * v, e = basis[7] * v;
+        v_sh2[4u * s] = vec4(a, b.x);
+        v_sh2[4u * s + 1u] = vec4(b.yz, c.xy);
+        v_sh2[4u * s + 2u] = vec4(c.z, d);
+        v_sh2[4u * s + 3u] = vec4(e, 0.0);
+    }
+    if (SH_DEGREE >= 3u) {
+        vec3 a = basis[8] * v, b = basis[9] * v, c = basis[10] * v, d = basis[11] * v;
+        vec3 e = basis[12] * v, f = basis[13] * v, g = basis[14] * v;
+        v_sh3[6u * s] = vec4(a, b.x);
+        v_sh3[6u * s + 1u] = vec4(b.yz, c.xy);
+        v_sh3[6u * s + 2u] = vec4(c.z, d);
+        v_sh3[6u * s + 3u] = vec4(e, f.x);
+        v_sh3[6u * s + 4u] = vec4(f.yz, g.xy);
+        v_sh3[6u * s + 5u] = vec4(g.z, 0.0, 0.0, 0.0);
+    }
+}

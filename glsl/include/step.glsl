@@ -1,0 +1,48 @@
+// What changes every step, written by the host into the step's slot; and what the device reports back.
+
+struct StepUniforms {
+    vec3 view_row0;         // rows of the rotation of camera_from_world
+    vec3 view_row1;
+    vec3 view_row2;
+    vec3 camera_centre;     // world
+    float fx, fy, cx, cy;   // px
+    float clamp_x_min, clamp_x_max, clamp_y_min, clamp_y_max; // limits of x/z and y/z in the Jacobian
+    float near;             // world; a Gaussian counts where z > near
+    uint width, height;     // px
+    uint tiles_x, tile_count;
+    uint gaussian_count;
+    uint layer_count;       // sampled objects of this step: layers 1..layer_count
+    vec3 background;
+    float lambda_dssim;
+    float loss_scale;       // 1 / (3 valid pixels)
+    float label_weight;     // lambda_2
+    float label_threshold;  // lift where the main weight is at least this
+    uint lift;              // 1: labels are lifted in this step
+    uint gpf;               // 1: projection filter on
+    uint occluder_words;    // words of occluder bits per layer
+    uint stamp;             // differs from step to step, never 0
+    float adam_correction1, adam_correction2; // 1 / (1 - beta^t)
+    vec4 rate_means;        // xyz: position rate, w: opacity rate
+    float rate_scales, rate_quats, rate_sh0, rate_sh_rest;
+    float densify_threshold, densify_scale, prune_scale, prune_opacity; // scales in world units
+    uint prune_big;
+    uint seed;
+};
+
+struct Counters {
+    uint visible_count;     // splats of this view
+    uint instance_count;    // (splat, tile) pairs over all layers; what was needed, even beyond capacity
+    uint layer_tile_count;  // tiles of object layers that hold a splat
+    uint longest_list;      // splats in the fullest tile
+    uint nonfinite_count;   // Gaussians whose gradient was not finite and was dropped
+    uint densified_count;   // Gaussians after densification
+    uint processed_low;     // (pixel, splat) pairs walked by blend_forward, in units of tile pixels
+    uint processed_layers;  // the same for object layers
+    uint cloned_count, split_count, pruned_count;
+    float loss_l1, loss_ssim, loss_label; // sums, not yet divided
+};
+
+// Bits of the sticky failure word; passes that change the model do nothing while it is not 0.
+const uint FAILED_INSTANCES = 1u;
+const uint FAILED_LAYER_TILES = 2u;
+const uint FAILED_SEGMENTS = 4u;

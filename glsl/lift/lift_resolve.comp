@@ -1,0 +1,31 @@
+#version 460
+#include "layout.glsl"
+#include "constants.glsl"
+#include "step.glsl"
+#include "dispatch.glsl"
+// lift_resolve — the label with the highest key of this step becomes the label of the Gaussian.
+// Work:    64 Gaussians a workgroup.
+// Reads:   step, failure; label_keys [N]
+// Writes:  labels [N] where a key was voted; label_keys [N] = 0
+// Math:    LabelGS eq. 6 and 7; without the filter the larger weight wins, then the larger label.
+// Mirror:  tests/reference/lift.rs::lift
+
+layout(local_size_x = 64) in;
+READ1(0, StepUniforms, step);
+READ1(1, uint, failure);
+INOUT(2, uint, label_keys);
+WRITE(3, uint, labels);
+
+void main() {
+    uint i = linear_group_id() * 64u + gl_LocalInvocationID.x;
+    if (i >= step.gaussian_count) {
+        return;
+    }
+    uint key = label_keys[i];
+    if (key != 0u) {
+        label_keys[i] = 0u;
+        if (failure == 0u) {
+            labels[i] = key & 0xffffu;
+        }
+    }
+}

@@ -1,0 +1,39 @@
+#version 460
+#include "layout.glsl"
+#include "constants.glsl"
+#include "step.glsl"
+// loss_reduce — add up the loss sums of the photo, and (variant labels) of the object layers.
+// Work:    one workgroup of one subgroup; lane i adds every W-th value, then a butterfly.
+// Reads:   loss_partials [PARTIALS]; variant labels: layer_loss [counters.layer_tile_count]
+// Writes:  counters.loss_l1, loss_ssim, loss_label
+// Order:   fixed, bitwise reproducible.
+// Mirror:  tests/reference/loss.rs::photo_loss
+
+#include "subgroup.glsl"
+layout(constant_id = 6) const uint PARTIALS = 1;
+layout(local_size_x_id = 0) in;
+READ(0, vec2, loss_partials);
+INOUT1(1, Counters, counters);
+#ifdef LABELS
+READ(2, float, layer_loss);
+#endif
+
+void main() {
+    uint lane = gl_LocalInvocationID.x;
+    vec2 sum = vec2(0.0);
+    for (uint i = lane; i < PARTIALS; i += SUBGROUP_SIZE) {
+        sum += loss_partials[i];
+    }
+    float l1 = subgroup_sum(sum.x), ssim = subgroup_sum(sum.y), label = 0.0;
+#ifdef LABELS
+    for (uint i = lane; i < counters.layer_tile_count; i += SUBGROUP_SIZE) {
+        label += layer_loss[i];
+    }
+    label = subgroup_sum(label);
+#endif
+    if (lane == 0u) {
+        counters.loss_l1 = l1;
+        counters.loss_ssim = ssim;
+        counters.loss_label = label;
+    }
+}

@@ -1,0 +1,55 @@
+#version 460
+#include "layout.glsl"
+#include "constants.glsl"
+#include "step.glsl"
+// ssim_rows — second of four: horizontal window, the SSIM value and its derivatives by the filtered moments.
+// Work:    x: 64 rows a workgroup, y: strips of STRIP columns, z: channel.
+// Reads:   step; moments [3, P]; target [P] (alpha 0: the value does not count)
+// Writes:  v_moments [3, P] vec4: d ssim / d mean x, / d mean (x^2 + y^2), / d mean x y, and the value; 0 where left out
+// Math:    ((2 mx my + C1)(2 sxy + C2)) / ((mx^2 + my^2 + C1)(sxx + syy + C2))
+// Mirror:  tests/reference/loss.rs::ssim
+
+layout(local_size_x = 64) in;
+READ1(0, StepUniforms, step);
+FETCH4(1, moments);
+FETCH4(2, target);
+WRITE(3, vec4, v_moments);
+#include "window.glsl"
+
+void main() {
+    uint width = step.width, height = step.height;
+    uint y = gl_GlobalInvocationID.x, x0 = gl_WorkGroupID.y * STRIP, channel = gl_WorkGroupID.z;
+    if (y >= height) {
+        return;
+    }
+    uint plane = channel * (width * height) + y * width;
+    vec4 sum[STRIP];
+    [[unroll]] for (uint k = 0u; k < STRIP; k++) {
+        sum[k] = vec4(0.0);
+    }
+    [[unroll]] for (int r = 0; r < int(STRIP) + 10; r++) {
+        int x = int(x0) + r - 5;
+        bool inside = x >= 0 && x < int(width);
+        vec4 m = fetch4(moments, plane + (inside ? uint(x) : 0u));
+        m = inside ? m : vec4(0.0);
+        [[unroll]] for (int k = 0; k < int(STRIP); k++) {
+            if (r >= k && r - k <= 10) {
+                sum[k] += WINDOW[r - k] * m;
+            }
+        }
+    }
+    [[unroll]] for (uint k = 0u; k < STRIP; k++) {
+        uint x = x0 + k;
+        if (x < width) {
+            float mx = sum[k].x, my = sum[k].y;
+            float squares = mx * mx + my * my, product = mx * my;
+            float a = 2.0 * product + SSIM_C1, b = 2.0 * (sum[k].w - product) + SSIM_C2;
+            float c = squares + SSIM_C1, d = sum[k].z - squares + SSIM_C2;
+            float inv = 1.0 / (c * d);
+            float value = a * b * inv;
+            float v_mean = 2.0 * my * (b - a) * inv + 2.0 * mx * value * (1.0 / d - 1.0 / c);
+            bool counts = fetch4(target, y * width + x).w > 0.5;
+            v_moments[plane + x] = counts ? vec4(v_mean, -value / d, 2.0 * a * inv, value) : vec4(0.0);
+        }
+    }
+}

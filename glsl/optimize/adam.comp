@@ -1,0 +1,42 @@
+#version 460
+#include "layout.glsl"
+#include "constants.glsl"
+#include "step.glsl"
+#include "dispatch.glsl"
+// adam — one Adam update of one attribute of all Gaussians; a Gaussian that is not visible has gradient 0.
+// Work:    one vec4 of one Gaussian an invocation; STRIDE vec4 a Gaussian.
+// Reads:   step, failure; splat_from_gaussian [N]; gradients [V,STRIDE]
+// Writes:  parameters, first_moments, second_moments [N,STRIDE]
+// Math:    Kingma and Ba; beta 0.9 / 0.999, epsilon 1e-15, no weight decay; rates by RATE.
+// Mirror:  tests/reference/adam.rs::adam
+
+layout(constant_id = 14) const uint STRIDE = 1;
+layout(constant_id = 15) const uint RATE = 0; // 0 means, 1 scales, 2 quats, 3 sh0, 4 higher bands
+layout(local_size_x = 64) in;
+READ1(0, StepUniforms, step);
+READ1(1, uint, failure);
+FETCHU(2, splat_from_gaussian);
+FETCH4(3, gradients);
+INOUT(4, vec4, parameters);
+INOUT(5, vec4, first_moments);
+INOUT(6, vec4, second_moments);
+
+void main() {
+    StepUniforms u = step;
+    uint e = linear_group_id() * 64u + gl_LocalInvocationID.x;
+    uint i = e / STRIDE;
+    if (i >= u.gaussian_count || failure != 0u) {
+        return;
+    }
+    uint s = fetchu(splat_from_gaussian, i);
+    vec4 g = fetch4(gradients, s == NO_SPLAT ? 0u : s * STRIDE + (e - i * STRIDE));
+    g = s == NO_SPLAT ? vec4(0.0) : g;
+    vec4 rate = RATE == 0u ? u.rate_means
+        : vec4(RATE == 1u ? u.rate_scales : RATE == 2u ? u.rate_quats : RATE == 3u ? u.rate_sh0 : u.rate_sh_rest);
+    vec4 m = ADAM_BETA1 * first_moments[e] + (1.0 - ADAM_BETA1) * g;
+    vec4 v = ADAM_BETA2 * second_moments[e] + (1.0 - ADAM_BETA2) * g * g;
+    vec4 update = rate * (m * u.adam_correction1) / (sqrt(v * u.adam_correction2) + ADAM_EPSILON);
+    parameters[e] -= update;
+    first_moments[e] = m;
+    second_moments[e] = v;
+}

@@ -1,0 +1,46 @@
+#version 460
+#include "layout.glsl"
+#include "constants.glsl"
+#include "step.glsl"
+#include "dispatch.glsl"
+#include "gaussian.glsl"
+// cull — drop Gaussians that cannot count at any pixel: behind the near plane, too transparent, or surely off the image.
+// Work:    64 Gaussians a workgroup.
+// Reads:   step; means [N] (xyz world, w opacity logit); scales [N] (ln)
+// Writes:  depth_keys [N]: bits of z, or KEY_INVISIBLE; splat_from_gaussian [N] = NO_SPLAT
+// Math:    |cov2d| <= |J|^2 max(s)^2 + blur; radius where alpha falls to ALPHA_MIN. Conservative, never drops a splat
+//          that project_forward would give a tile.
+// Mirror:  tests/reference/project.rs::cull
+
+layout(local_size_x = 64) in;
+READ1(0, StepUniforms, step);
+FETCH4(1, means);
+FETCH4(2, scales);
+WRITE(3, uint, depth_keys);
+WRITE(4, uint, splat_from_gaussian);
+
+void main() {
+    StepUniforms u = step;
+    uint i = linear_group_id() * 64u + gl_LocalInvocationID.x;
+    if (i >= u.gaussian_count) {
+        return;
+    }
+    vec4 mean = fetch4(means, i);
+    vec3 view = to_view(u, mean.xyz);
+    float log2_o = log2_opacity(mean.w);
+    vec3 s = fetch4(scales, i).xyz;
+    float sigma = exp(max(s.x, max(s.y, s.z)));
+    float inv_z = 1.0 / view.z;
+    vec2 limit = max(abs(vec2(u.clamp_x_min, u.clamp_y_min)), abs(vec2(u.clamp_x_max, u.clamp_y_max)));
+    vec2 focal = vec2(u.fx, u.fy);
+    vec2 stretch = focal * inv_z * sigma;
+    vec2 variance = stretch * stretch * (1.0 + limit * limit) + COV2D_BLUR;
+    float reach = 2.0 * LN2 * (log2_o - LOG2_ALPHA_MIN);
+    vec2 radius = sqrt(variance * max(reach, 0.0)) * 1.001 + 0.5;
+    vec2 centre = focal * view.xy * inv_z + vec2(u.cx, u.cy);
+    bool inside = all(greaterThanEqual(centre + radius, vec2(0.0)))
+        && all(lessThanEqual(centre - radius, vec2(float(u.width), float(u.height))));
+    bool visible = view.z > u.near && reach > 0.0 && inside && finite(view.z);
+    depth_keys[i] = visible ? floatBitsToUint(view.z) : KEY_INVISIBLE;
+    splat_from_gaussian[i] = NO_SPLAT;
+}

@@ -1,0 +1,77 @@
+#version 460
+#include "layout.glsl"
+#include "constants.glsl"
+#include "step.glsl"
+#include "dispatch.glsl"
+#include "gaussian.glsl"
+#include "sh.glsl"
+#include "record.glsl"
+#include "ellipse.glsl"
+// project_forward — project the visible Gaussians, colour them, count the tiles each one touches.
+// Work:    64 splats a workgroup, splats in depth order.
+// Reads:   step, counters; gaussian_from_splat [V]; means, scales, quats, sh0 [N]; sh1 [N,3], sh2 [N,4], sh3 [N,6];
+//          variant labels: labels [N], layer_from_label
+// Writes:  splats [V,3] (record.glsl); tiles_touched [V] over all layers; splat_from_gaussian [N]
+// Math:    EWA splatting with Cauchy-Binet determinant; SH colour, clamped at 0; ellipse.glsl for the tiles.
+// Mirror:  tests/reference/project.rs::project_forward
+
+layout(constant_id = 11) const uint SH_DEGREE = 3;
+layout(local_size_x = 64) in;
+READ1(0, StepUniforms, step);
+READ1(1, Counters, counters);
+FETCHU(2, gaussian_from_splat);
+FETCH4(3, means);
+FETCH4(4, scales);
+FETCH4(5, quats);
+FETCH4(6, sh0);
+FETCH4(7, sh1);
+FETCH4(8, sh2);
+FETCH4(9, sh3);
+WRITE(10, vec4, splats);
+WRITE(11, uint, tiles_touched);
+WRITE(12, uint, splat_from_gaussian);
+#ifdef LABELS
+FETCHU(13, labels);
+FETCHU(14, layer_from_label);
+#endif
+
+#include "sh_fetch.glsl"
+
+void main() {
+    StepUniforms u = step;
+    uint s = linear_group_id() * 64u + gl_LocalInvocationID.x;
+    if (s >= counters.visible_count) {
+        return;
+    }
+    uint i = fetchu(gaussian_from_splat, s);
+    vec4 mean = fetch4(means, i);
+    Projection p = project_gaussian(u, mean.xyz, fetch4(scales, i).xyz, fetch4(quats, i));
+    vec3 q = exponent_from_conic(p.conic);
+    float log2_o = log2_opacity(mean.w);
+    vec2 centre = vec2(u.fx, u.fy) * p.slope_raw + vec2(u.cx, u.cy);
+    float reach = 2.0 * LN2 * (log2_o - LOG2_ALPHA_MIN);
+    vec2 extent = sqrt(p.cov.xz * max(reach, 0.0)) * 1.0001 + 0.01;
+    vec3 direction = normalize(mean.xyz - u.camera_centre);
+    float basis[15];
+    sh_basis(direction, SH_DEGREE, basis);
+    vec3 colour = max(sh_colour(i, basis), 0.0);
+
+    TileRect rect = tile_rect(u, centre, extent);
+    uint touched = 0u, tx = rect.x_min, ty = rect.y_min;
+    bool sane = finite(centre.x + centre.y + q.x + q.y + q.z + log2_o + colour.x + colour.y + colour.z);
+    uint candidates = sane ? rect.count : 0u;
+    for (uint k = 0u; k < candidates; k++) {
+        touched += tile_touched(u, tx, ty, centre, q, log2_o) ? 1u : 0u;
+        bool wrap = tx == rect.x_max;
+        tx = wrap ? rect.x_min : tx + 1u;
+        ty += wrap ? 1u : 0u;
+    }
+#ifdef LABELS
+    touched *= fetchu(layer_from_label, fetchu(labels, i)) != 0u ? 2u : 1u;
+#endif
+    splats[3u * s] = vec4(centre, q.x, q.y);
+    splats[3u * s + 1u] = vec4(q.z, log2_o, colour.x, colour.y);
+    splats[3u * s + 2u] = vec4(colour.z, p.view.z, extent);
+    tiles_touched[s] = touched;
+    splat_from_gaussian[i] = s;
+}

@@ -1,0 +1,36 @@
+#version 460
+#include "layout.glsl"
+#include "constants.glsl"
+#include "step.glsl"
+#include "count.glsl"
+// scan_reduce — first of three: each lane adds up its contiguous share of the values.
+// Work:    LANES lanes over all workgroups; lane i owns values [i c, (i+1) c), c = ceil(n / LANES).
+// Reads:   step, counters, failure; values [n] (variant flag: counts values that are not KEY_INVISIBLE)
+// Writes:  partials [LANES]
+// Order:   exact integers, same in every run.
+// Mirror:  tests/reference/scan.rs::exclusive_scan
+
+layout(constant_id = 0) const uint SUBGROUP_SIZE = 8;
+layout(constant_id = 6) const uint LANES = 64;
+layout(local_size_x_id = 0) in;
+READ1(0, StepUniforms, step);
+READ1(1, Counters, counters);
+READ1(2, uint, failure);
+FETCHU(3, values);
+WRITE(4, uint, partials);
+
+void main() {
+    uint n = item_count(step, counters, failure);
+    uint lane = gl_GlobalInvocationID.x;
+    uint share = (n + LANES - 1u) / LANES;
+    uint begin = min(lane * share, n), end = min(begin + share, n);
+    uint sum = 0u;
+    for (uint i = begin; i < end; i++) {
+        uint v = fetchu(values, i);
+#ifdef FLAG
+        v = v != KEY_INVISIBLE ? 1u : 0u;
+#endif
+        sum += v;
+    }
+    partials[lane] = sum;
+}

@@ -1,0 +1,45 @@
+#version 460
+#include "layout.glsl"
+#include "constants.glsl"
+#include "step.glsl"
+// scan_spine — second of three: exclusive scan of the lanes' sums, and the total into a counter.
+// Work:    one workgroup of one subgroup.
+// Reads:   partials [LANES]
+// Writes:  partials [LANES] (exclusive); counters (the field that TOTAL names)
+// Order:   exact integers, same in every run.
+// Mirror:  tests/reference/scan.rs::exclusive_scan
+
+layout(constant_id = 0) const uint SUBGROUP_SIZE = 8;
+layout(constant_id = 6) const uint LANES = 64;
+layout(constant_id = 7) const uint TOTAL = 0; // 0 visible, 1 instances, 2 layer tiles, 3 densified
+layout(local_size_x_id = 0) in;
+INOUT(0, uint, partials);
+INOUT1(1, Counters, counters);
+
+void main() {
+    uint lane = gl_LocalInvocationID.x;
+    uint share = (LANES + SUBGROUP_SIZE - 1u) / SUBGROUP_SIZE;
+    uint begin = min(lane * share, LANES), end = min(begin + share, LANES);
+    uint sum = 0u;
+    for (uint i = begin; i < end; i++) {
+        sum += partials[i];
+    }
+    uint running = subgroupExclusiveAdd(sum);
+    if (lane == SUBGROUP_SIZE - 1u) {
+        uint total = running + sum;
+        if (TOTAL == 0u) {
+            counters.visible_count = total;
+        } else if (TOTAL == 1u) {
+            counters.instance_count = total;
+        } else if (TOTAL == 2u) {
+            counters.layer_tile_count = total;
+        } else {
+            counters.densified_count = total;
+        }
+    }
+    for (uint i = begin; i < end; i++) {
+        uint v = partials[i];
+        partials[i] = running;
+        running += v;
+    }
+}

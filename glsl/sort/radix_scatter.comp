@@ -1,0 +1,47 @@
+#version 460
+#include "layout.glsl"
+#include "constants.glsl"
+#include "step.glsl"
+#include "count.glsl"
+// radix_scatter — move keys and values to their places for one digit; stable.
+// Work:    as radix_count.
+// Reads:   step, counters, failure; keys_in [n], values_in [n] (IDENTITY: the value is the index); histogram (scanned)
+// Writes:  keys_out [n], values_out [n]
+// Order:   exact integers, same in every run.
+// Mirror:  tests/reference/sort.rs::radix_sort
+
+layout(constant_id = 0) const uint SUBGROUP_SIZE = 8;
+layout(constant_id = 6) const uint LANES = 32;
+layout(constant_id = 8) const uint SHIFT = 0;
+layout(constant_id = 9) const uint DIGIT_BITS = 8;
+layout(constant_id = 10) const uint IDENTITY = 0;
+layout(local_size_x_id = 0) in;
+const uint DIGITS = 1u << DIGIT_BITS;
+shared uint table[DIGITS * SUBGROUP_SIZE];
+READ1(0, StepUniforms, step);
+READ1(1, Counters, counters);
+READ1(2, uint, failure);
+FETCHU(3, keys_in);
+FETCHU(4, values_in);
+FETCHU(5, histogram);
+WRITE(6, uint, keys_out);
+WRITE(7, uint, values_out);
+
+void main() {
+    uint n = item_count(step, counters, failure);
+    uint lane = gl_GlobalInvocationID.x, column = gl_LocalInvocationID.x;
+    uint share = (n + LANES - 1u) / LANES;
+    uint begin = min(lane * share, n), end = min(begin + share, n);
+    for (uint d = 0u; d < DIGITS; d++) {
+        table[d * SUBGROUP_SIZE + column] = fetchu(histogram, d * LANES + lane);
+    }
+    for (uint i = begin; i < end; i++) {
+        uint key = fetchu(keys_in, i);
+        uint value = IDENTITY != 0u ? i : fetchu(values_in, i);
+        uint cell = bitfieldExtract(key, int(SHIFT), int(DIGIT_BITS)) * SUBGROUP_SIZE + column;
+        uint to = table[cell];
+        table[cell] = to + 1u;
+        keys_out[to] = key;
+        values_out[to] = value;
+    }
+}

@@ -1,0 +1,27 @@
+#version 460
+#include "layout.glsl"
+#include "constants.glsl"
+#include "step.glsl"
+// layer_list — list the occupied tiles of the object layers.
+// Work:    one tile of one layer an invocation.
+// Reads:   step, failure; layer_occupied, layer_offsets [layers * T]
+// Writes:  layer_tiles [occupied] (layer * T + tile)
+// Mirror:  tests/reference/scan.rs::compact
+
+layout(local_size_x = 64) in;
+layout(constant_id = 3) const uint LAYER_TILE_CAPACITY = 0;
+READ1(0, StepUniforms, step);
+READ1(1, uint, failure);
+FETCHU(2, layer_occupied);
+FETCHU(3, layer_offsets);
+WRITE(4, uint, layer_tiles);
+
+void main() {
+    uint t = gl_GlobalInvocationID.x;
+    if (t < step.tile_count * (step.layer_count + 1u) && failure == 0u && fetchu(layer_occupied, t) != 0u) {
+        uint to = fetchu(layer_offsets, t);
+        if (to < LAYER_TILE_CAPACITY) {
+            layer_tiles[to] = t;
+        }
+    }
+}

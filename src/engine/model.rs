@@ -1,0 +1,80 @@
+//! The model between its host form and the device's planes of vec4.
+
+use crate::error::Result;
+use crate::plan::Buf;
+use crate::scene::Gaussians;
+use crate::sched::Scheduler;
+
+/// Bands above degree 0: plane, vec4 per Gaussian, first coefficient among the rest, coefficients.
+const BANDS: [(Buf, usize, usize, usize); 3] = [(Buf::SH1, 3, 0, 3), (Buf::SH2, 4, 3, 5), (Buf::SH3, 6, 8, 7)];
+
+/// Planes that hold state of the optimiser.
+const STATE: [Buf; 15] = [
+    Buf::M_MEANS, Buf::M_SCALES, Buf::M_QUATS, Buf::M_SH0, Buf::M_SH1, Buf::M_SH2, Buf::M_SH3, Buf::U_MEANS,
+    Buf::U_SCALES, Buf::U_QUATS, Buf::U_SH0, Buf::U_SH1, Buf::U_SH2, Buf::U_SH3, Buf::DENSIFY_STATS,
+];
+
+/// Writes the planes; optimiser state becomes 0.
+pub fn upload(sched: &mut Scheduler, model: &Gaussians, labels: bool) -> Result<()> {
+    let with = |rows: &[[f32; 3]], last: &dyn Fn(usize) -> f32| -> Vec<[f32; 4]> {
+        rows.iter().enumerate().map(|(i, &[x, y, z])| [x, y, z, last(i)]).collect()
+    };
+    sched.upload(Buf::MEANS, 0, 0, &with(&model.means, &|i| model.opacities[i]))?;
+    sched.upload(Buf::SCALES, 0, 0, &with(&model.scales, &|_| 0.0))?;
+    sched.upload(Buf::QUATS, 0, 0, &model.quats)?;
+    sched.upload(Buf::SH0, 0, 0, &with(&model.sh0, &|_| 0.0))?;
+    let rest = model.rest_per_gaussian();
+    for (plane, stride, first, count) in BANDS {
+        let mut words = vec![0.0_f32; model.len() * stride * 4];
+        if first < rest {
+            for (row, out) in words.chunks_exact_mut(stride * 4).enumerate() {
+                let from = row * rest + first;
+                out[..count * 3].copy_from_slice(model.sh_rest[from..from + count].as_flattened());
+            }
+        }
+        sched.upload(plane, 0, 0, &words)?;
+    }
+    for plane in STATE {
+        sched.fill(plane, 0)?;
+    }
+    if labels {
+        let zeros;
+        let ids = match &model.labels {
+            Some(ids) => ids,
+            None => {
+                zeros = vec![0; model.len()];
+                &zeros
+            }
+        };
+        sched.upload(Buf::LABELS, 0, 0, ids)?;
+    }
+    Ok(())
+}
+
+/// Reads the planes of `count` Gaussians.
+pub fn download(sched: &mut Scheduler, count: usize, sh_degree: u32, labels: bool) -> Result<Gaussians> {
+    let xyz = |rows: &[[f32; 4]]| rows.iter().map(|&[x, y, z, _]| [x, y, z]).collect::<Vec<_>>();
+    let means = sched.download::<[f32; 4]>(Buf::MEANS, 0, 0, count)?;
+    let mut model = Gaussians {
+        means: xyz(&means),
+        opacities: means.iter().map(|row| row[3]).collect(),
+        scales: xyz(&sched.download::<[f32; 4]>(Buf::SCALES, 0, 0, count)?),
+        quats: sched.download::<[f32; 4]>(Buf::QUATS, 0, 0, count)?,
+        sh0: xyz(&sched.download::<[f32; 4]>(Buf::SH0, 0, 0, count)?),
+        sh_degree,
+        ..Gaussians::default()
+    };
+    let rest = model.rest_per_gaussian();
+    model.sh_rest = vec![[0.0; 3]; count * rest];
+    for (plane, stride, first, coefficients) in BANDS.into_iter().filter(|band| band.2 < rest) {
+        let words = sched.download::<f32>(plane, 0, 0, count * stride * 4)?;
+        for (row, words) in words.chunks_exact(stride * 4).enumerate() {
+            let to = row * rest + first;
+            model.sh_rest[to..to + coefficients].as_flattened_mut().copy_from_slice(&words[..coefficients * 3]);
+        }
+    }
+    if labels {
+        model.labels = Some(sched.download::<u32>(Buf::LABELS, 0, 0, count)?);
+    }
+    Ok(model)
+}

@@ -1,0 +1,39 @@
+//! From a camera to what the shaders read.
+
+use crate::pass::KernelShape;
+use crate::scene::Camera;
+use crate::shaders::structs::StepUniforms;
+use bytemuck::Zeroable;
+
+/// Share of half the image by which the Jacobian's slopes may leave the image (3DGS clamps at 1.3 tan(fov / 2)).
+const SLOPE_MARGIN: f64 = 0.3;
+
+/// The camera's part of the uniforms; everything else is 0.
+pub fn view_uniforms(camera: &Camera, shape: &KernelShape, near: f32, background: [f32; 3], count: u32) -> StepUniforms {
+    let (width, height) = (f64::from(camera.width), f64::from(camera.height));
+    let (margin_x, margin_y) = (SLOPE_MARGIN * 0.5 * width / camera.fx, SLOPE_MARGIN * 0.5 * height / camera.fy);
+    let (tiles_x, tiles_y) = shape.tiles(camera.width, camera.height);
+    let row = |index| camera.rotation.row(index).as_vec3().to_array();
+    StepUniforms {
+        view_row0: row(0),
+        view_row1: row(1),
+        view_row2: row(2),
+        camera_centre: camera.centre().as_vec3().to_array(),
+        fx: camera.fx as f32,
+        fy: camera.fy as f32,
+        cx: camera.cx as f32,
+        cy: camera.cy as f32,
+        clamp_x_min: (-camera.cx / camera.fx - margin_x) as f32,
+        clamp_x_max: ((width - camera.cx) / camera.fx + margin_x) as f32,
+        clamp_y_min: (-camera.cy / camera.fy - margin_y) as f32,
+        clamp_y_max: ((height - camera.cy) / camera.fy + margin_y) as f32,
+        near,
+        width: camera.width,
+        height: camera.height,
+        tiles_x,
+        tile_count: tiles_x * tiles_y,
+        gaussian_count: count,
+        background,
+        ..StepUniforms::zeroed()
+    }
+}

@@ -1,0 +1,240 @@
+//! The questions behind [`Capabilities`], and the text of `labelgs devices`.
+
+use super::capabilities::{Capabilities, Features, Need, Subgroup};
+use super::instance::{Instance, Validation};
+use super::limits::Limits;
+use super::select;
+use crate::error::Result;
+use ash::vk;
+use std::fmt::Write;
+
+/// Subgroup operations that the kernels are written with.
+const SUBGROUP_OPERATIONS: vk::SubgroupFeatureFlags = vk::SubgroupFeatureFlags::from_raw(
+    vk::SubgroupFeatureFlags::BASIC.as_raw() | vk::SubgroupFeatureFlags::SHUFFLE.as_raw(),
+);
+
+/// Features of the device that we know of.
+pub(super) fn features(instance: &ash::Instance, physical: vk::PhysicalDevice, size_control: bool) -> Features {
+    let mut eleven = vk::PhysicalDeviceVulkan11Features::default();
+    let mut twelve = vk::PhysicalDeviceVulkan12Features::default();
+    let mut control = vk::PhysicalDeviceSubgroupSizeControlFeatures::default();
+    // SAFETY: the handle comes from this instance.
+    let version = unsafe { instance.get_physical_device_properties(physical) }.api_version;
+    let mut all = vk::PhysicalDeviceFeatures2::default();
+    if version >= vk::API_VERSION_1_2 {
+        all = all.push_next(&mut eleven).push_next(&mut twelve);
+    }
+    if size_control {
+        all = all.push_next(&mut control);
+    }
+    // SAFETY: the chained structs are known to the device's version and extensions.
+    unsafe { instance.get_physical_device_features2(physical, &mut all) };
+    let core = all.features;
+    let on = |flag: vk::Bool32| flag == vk::TRUE;
+    Features {
+        shader_int64: on(core.shader_int64),
+        shader_int16: on(core.shader_int16),
+        shader_int8: on(twelve.shader_int8),
+        storage_16bit: on(eleven.storage_buffer16_bit_access),
+        storage_8bit: on(twelve.storage_buffer8_bit_access),
+        float16: on(twelve.shader_float16),
+        memory_model: on(twelve.vulkan_memory_model) && on(twelve.vulkan_memory_model_device_scope),
+        scalar: on(twelve.scalar_block_layout),
+        timeline: on(twelve.timeline_semaphore),
+        robust: on(core.robust_buffer_access),
+        size_control: on(control.subgroup_size_control),
+        full_subgroups: on(control.compute_full_subgroups),
+    }
+}
+
+/// The queue family to use: one that computes without drawing, as it is the least busy, else any that computes.
+pub(super) fn compute_family(families: &[vk::QueueFamilyProperties]) -> Option<(u32, vk::QueueFamilyProperties)> {
+    let computes = |family: &&(u32, vk::QueueFamilyProperties)| family.1.queue_flags.contains(vk::QueueFlags::COMPUTE);
+    let numbered = families.iter().enumerate().map(|(index, family)| (index as u32, *family)).collect::<Vec<_>>();
+    let draws = |family: &&(u32, vk::QueueFamilyProperties)| family.1.queue_flags.contains(vk::QueueFlags::GRAPHICS);
+    // A family without timestamps is only taken if there is no other.
+    let rank =
+        |family: &&(u32, vk::QueueFamilyProperties)| (family.1.timestamp_valid_bits == 0, draws(family), family.0);
+    numbered.iter().filter(computes).min_by_key(rank).copied()
+}
+
+/// Size of the largest heap of the device, and how much of it we may use.
+pub(super) fn memory(instance: &ash::Instance, physical: vk::PhysicalDevice, has_budget: bool) -> (u64, u64) {
+    let mut budget = vk::PhysicalDeviceMemoryBudgetPropertiesEXT::default();
+    let mut all = vk::PhysicalDeviceMemoryProperties2::default();
+    if has_budget {
+        all = all.push_next(&mut budget);
+    }
+    // SAFETY: the handle comes from this instance, and the chained struct is known to the device.
+    unsafe { instance.get_physical_device_memory_properties2(physical, &mut all) };
+    let heaps = all.memory_properties;
+    let local = |heap: &vk::MemoryHeap| heap.flags.contains(vk::MemoryHeapFlags::DEVICE_LOCAL);
+    let heaps = heaps.memory_heaps.iter().take(heaps.memory_heap_count as usize).enumerate();
+    let Some((index, heap)) = heaps.filter(|(_, heap)| local(heap)).max_by_key(|(_, heap)| heap.size) else {
+        return (0, 0);
+    };
+    // Beyond its budget a driver may swap, slow down or lose the device, so a part stays free.
+    let free = if has_budget { budget.heap_budget[index].min(heap.size) } else { heap.size };
+    (heap.size, free / 100 * 90)
+}
+
+/// Limits in our words.
+pub(super) fn limits(
+    core: &vk::PhysicalDeviceLimits,
+    eleven: &vk::PhysicalDeviceVulkan11Properties<'_>,
+    max_buffer: u64,
+    (heap, max_memory): (u64, u64),
+    timestamp_bits: u32,
+) -> Limits {
+    Limits {
+        max_storage_range: u64::from(core.max_storage_buffer_range),
+        max_texel_elements: u64::from(core.max_texel_buffer_elements),
+        storage_alignment: core.min_storage_buffer_offset_alignment,
+        texel_alignment: core.min_texel_buffer_offset_alignment,
+        max_groups: core.max_compute_work_group_count,
+        max_group_size: core.max_compute_work_group_size,
+        max_invocations: core.max_compute_work_group_invocations,
+        max_shared: core.max_compute_shared_memory_size,
+        max_allocation: eleven.max_memory_allocation_size.min(max_buffer),
+        max_push: core.max_push_constants_size,
+        max_storage_buffers: core
+            .max_per_stage_descriptor_storage_buffers
+            .min(core.max_descriptor_set_storage_buffers)
+            .min(core.max_per_stage_resources),
+        max_texel_buffers: core
+            .max_per_stage_descriptor_sampled_images
+            .min(core.max_descriptor_set_sampled_images)
+            .min(core.max_per_stage_resources),
+        heap,
+        max_memory,
+        timestamp_period: if timestamp_bits == 0 { 0.0 } else { core.timestamp_period },
+        timestamp_bits,
+    }
+}
+
+/// Subgroups in our words.
+pub(super) fn subgroup(
+    eleven: &vk::PhysicalDeviceVulkan11Properties<'_>,
+    control: &vk::PhysicalDeviceSubgroupSizeControlProperties<'_>,
+    features: &Features,
+) -> Subgroup {
+    let compute = vk::ShaderStageFlags::COMPUTE;
+    let is_pinned = features.size_control && control.required_subgroup_size_stages.contains(compute);
+    let in_compute = eleven.subgroup_supported_stages.contains(compute);
+    let none = vk::SubgroupFeatureFlags::empty();
+    let size = eleven.subgroup_size;
+    let (min, max) = if is_pinned { (control.min_subgroup_size, control.max_subgroup_size) } else { (size, size) };
+    Subgroup {
+        size: size.clamp(min, max),
+        min,
+        max,
+        max_per_group: if is_pinned { control.max_compute_workgroup_subgroups } else { u32::MAX },
+        is_pinned,
+        operations: if in_compute { eleven.subgroup_supported_operations } else { none },
+    }
+}
+
+/// Requirements and options against what was found.
+pub(super) fn needs(found: &Capabilities, has_queue: bool) -> Vec<Need> {
+    let (limits, features, subgroup) = (&found.limits, &found.features, &found.subgroup);
+    let (major, minor, patch) = found.api_version;
+    let yes = |flag: bool| if flag { "yes" } else { "no" }.to_owned();
+    let need = |what, is_met, needed: &str, found: String, reason| Need {
+        what,
+        is_required: true,
+        needed: needed.to_owned(),
+        found,
+        is_met,
+        reason,
+    };
+    let wish = |what, is_met, found: String, reason| Need {
+        what,
+        is_required: false,
+        needed: "wished".to_owned(),
+        found,
+        is_met,
+        reason,
+    };
+    let pins = format!("{} of {}..{}", subgroup.size, subgroup.min, subgroup.max);
+    let shuffles = subgroup.operations.contains(SUBGROUP_OPERATIONS);
+    vec![
+        need("Vulkan", (major, minor) >= (1, 2), "1.2", format!("{major}.{minor}.{patch}"), "everything"),
+        need("compute queue", has_queue, "yes", yes(has_queue), "everything"),
+        need("scalarBlockLayout", features.scalar, "yes", yes(features.scalar), "one layout for shaders and host"),
+        need("timelineSemaphore", features.timeline, "yes", yes(features.timeline), "two steps in flight"),
+        need("subgroup shuffle in compute", shuffles, "yes", yes(shuffles), "blending without shared memory"),
+        need("subgroup size", subgroup.size >= 8, "8", subgroup.size.to_string(), "one tile per subgroup"),
+        need(
+            "workgroup size",
+            limits.max_invocations >= 256,
+            "256",
+            limits.max_invocations.to_string(),
+            "scan and sort",
+        ),
+        need(
+            "shared memory",
+            limits.max_shared >= 16_384,
+            "16384 B",
+            format!("{} B", limits.max_shared),
+            "scan and sort",
+        ),
+        need(
+            "push constants",
+            limits.max_push >= 128,
+            "128 B",
+            format!("{} B", limits.max_push),
+            "parameters of passes",
+        ),
+        need(
+            "storage buffers per shader",
+            limits.max_storage_buffers >= 16,
+            "16",
+            limits.max_storage_buffers.to_string(),
+            "bindings of the largest pass",
+        ),
+        wish("pinned subgroup size", subgroup.is_pinned, pins, "else the driver's default is hoped for"),
+        wish(
+            "storage binding of 1 GiB",
+            limits.max_storage_range >= 1 << 30,
+            format!("{} B", limits.max_storage_range),
+            "bounds the number of Gaussians",
+        ),
+        wish(
+            "timestamps",
+            limits.timestamp_bits > 0,
+            format!("{} bits, {} ns", limits.timestamp_bits, limits.timestamp_period),
+            "time of each pass",
+        ),
+        wish("shaderInt64", features.shader_int64, yes(features.shader_int64), "wide label votes"),
+    ]
+}
+
+/// All devices with their table of needs, as text.
+pub fn devices_report() -> Result<String> {
+    let instance = Instance::new(Validation::Off)?;
+    let mut text = String::new();
+    for (_, device) in select::all(&instance)? {
+        let (major, minor, patch) = device.api_version;
+        let _ = writeln!(text, "{}: {} ({:?}, Vulkan {major}.{minor}.{patch})", device.index, device.name, device.kind);
+        let _ = writeln!(text, "   driver {} {}", device.driver_name, device.driver_info);
+        let _ = writeln!(text, "   uuid   {}", device.uuid_text());
+        let (heap, usable) = (device.limits.heap >> 20, device.limits.max_memory >> 20);
+        let _ = writeln!(text, "   memory {heap} MiB, {usable} MiB may be used");
+        for need in &device.needs {
+            let mark = match (need.is_met, need.is_required) {
+                (true, _) => "ok",
+                (false, true) => "MISSING",
+                (false, false) => "none",
+            };
+            let (what, needed, found) = (need.what, &need.needed, &need.found);
+            let _ = writeln!(text, "   {mark:<8}{what:<28} needed {needed:<8} found {found:<18} {}", need.reason);
+        }
+        let missing = device.missing();
+        let verdict = if missing.is_empty() { "usable" } else { "not usable" };
+        let _ = writeln!(text, "   {verdict}");
+    }
+    if text.is_empty() {
+        text.push_str("no Vulkan device found\n");
+    }
+    Ok(text)
+}

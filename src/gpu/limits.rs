@@ -1,0 +1,87 @@
+//! Limits of a device that decide sizes.
+
+use crate::error::{Error, Result};
+
+/// What a device can hold and run at most.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Limits {
+    /// Largest storage buffer binding, in bytes.
+    pub max_storage_range: u64,
+    /// Largest texel buffer view, in texels.
+    pub max_texel_elements: u64,
+    /// Alignment of storage bindings, in bytes.
+    pub storage_alignment: u64,
+    /// Alignment of texel views, in bytes.
+    pub texel_alignment: u64,
+    /// Workgroups per axis of a dispatch.
+    pub max_groups: [u32; 3],
+    /// Invocations per axis of a workgroup.
+    pub max_group_size: [u32; 3],
+    /// Invocations of a workgroup.
+    pub max_invocations: u32,
+    /// Bytes of shared memory of a workgroup.
+    pub max_shared: u32,
+    /// Largest allocation and buffer, in bytes.
+    pub max_allocation: u64,
+    /// Bytes of push constants.
+    pub max_push: u32,
+    /// Storage buffers of one shader.
+    pub max_storage_buffers: u32,
+    /// Texel buffers of one shader.
+    pub max_texel_buffers: u32,
+    /// Size of the device's largest own heap, in bytes.
+    pub heap: u64,
+    /// Memory that the engine may use, in bytes: part of what the driver says is free, or of the heap.
+    pub max_memory: u64,
+    /// Nanoseconds of one timestamp tick; 0 if compute queues have no timestamps.
+    pub timestamp_period: f32,
+    /// Bits of a timestamp that count.
+    pub timestamp_bits: u32,
+}
+
+impl Limits {
+    /// Lowers limits to what `LABELGS_LIMIT_SSBO`, `_TEXELS`, `_ALLOCATION` and `_MEMORY` say (numbers with K, M or G),
+    /// so that a small device can be tried out on a large one.
+    pub(super) fn lower_by_env(&mut self) -> Result<()> {
+        for (name, limit) in [
+            ("LABELGS_LIMIT_SSBO", &mut self.max_storage_range),
+            ("LABELGS_LIMIT_TEXELS", &mut self.max_texel_elements),
+            ("LABELGS_LIMIT_ALLOCATION", &mut self.max_allocation),
+            ("LABELGS_LIMIT_MEMORY", &mut self.max_memory),
+        ] {
+            if let Ok(text) = std::env::var(name) {
+                let problem = || Error::usage(name, format!("{text} is no size; a number with K, M or G is expected"));
+                *limit = (*limit).min(parse_size(&text).ok_or_else(problem)?);
+            }
+        }
+        Ok(())
+    }
+}
+
+/// A number with an optional binary unit.
+fn parse_size(text: &str) -> Option<u64> {
+    let (digits, shift) = match text.strip_suffix(['K', 'k']) {
+        Some(digits) => (digits, 10),
+        None => match text.strip_suffix(['M', 'm']) {
+            Some(digits) => (digits, 20),
+            None => text.strip_suffix(['G', 'g']).map_or((text, 0), |digits| (digits, 30)),
+        },
+    };
+    digits.parse::<u64>().ok()?.checked_mul(1 << shift)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::parse_size;
+
+    #[test]
+    fn sizes_have_binary_units() {
+        assert_eq!(parse_size("17"), Some(17));
+        assert_eq!(parse_size("4K"), Some(4096));
+        assert_eq!(parse_size("1m"), Some(1 << 20));
+        assert_eq!(parse_size("3G"), Some(3 << 30));
+        for wrong in ["", "M", "-1", "1.5M", "1T", "99999999999999G"] {
+            assert_eq!(parse_size(wrong), None, "{wrong}");
+        }
+    }
+}

@@ -1,0 +1,134 @@
+//! Buffers and their memory.
+
+use super::call::vk_call;
+use super::{Gpu, lock};
+use crate::error::{Error, Result};
+use ash::vk;
+use gpu_allocator::vulkan::{Allocation, AllocationCreateDesc, AllocationScheme};
+use gpu_allocator::{AllocationError, MemoryLocation};
+use std::sync::Arc;
+
+/// Who uses the memory of a buffer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum MemoryKind {
+    /// The device only.
+    Device,
+    /// Written by the host, read by the device.
+    Upload,
+    /// Written by the device, read by the host.
+    Download,
+}
+
+/// A buffer with its memory; freed when dropped.
+pub struct Buffer {
+    gpu: Arc<Gpu>,
+    name: String,
+    handle: vk::Buffer,
+    bytes: u64,
+    allocation: Option<Allocation>,
+}
+
+impl Buffer {
+    /// Allocates a buffer.
+    pub fn new(gpu: &Arc<Gpu>, name: &str, bytes: u64, kind: MemoryKind) -> Result<Self> {
+        let usage = vk::BufferUsageFlags::STORAGE_BUFFER
+            | vk::BufferUsageFlags::UNIFORM_TEXEL_BUFFER
+            | vk::BufferUsageFlags::INDIRECT_BUFFER
+            | vk::BufferUsageFlags::TRANSFER_SRC
+            | vk::BufferUsageFlags::TRANSFER_DST;
+        let info = vk::BufferCreateInfo::default().size(bytes).usage(usage);
+        // SAFETY: the device is alive, the size is not 0 (the planner makes room for at least one element).
+        let handle = vk_call("vkCreateBuffer", || unsafe { gpu.raw().create_buffer(&info, None) })?;
+        // From here on, dropping `buffer` destroys the handle.
+        let mut buffer = Self { gpu: Arc::clone(gpu), name: name.to_owned(), handle, bytes, allocation: None };
+        // SAFETY: the handle was just made by this device.
+        let requirements = unsafe { gpu.raw().get_buffer_memory_requirements(handle) };
+        let location = match kind {
+            MemoryKind::Device => MemoryLocation::GpuOnly,
+            MemoryKind::Upload => MemoryLocation::CpuToGpu,
+            MemoryKind::Download => MemoryLocation::GpuToCpu,
+        };
+        let scheme = AllocationScheme::GpuAllocatorManaged;
+        let wanted = AllocationCreateDesc { name, requirements, location, linear: true, allocation_scheme: scheme };
+        let allocated = match lock(&gpu.allocator).as_mut() {
+            Some(allocator) => allocator.allocate(&wanted),
+            None => Err(AllocationError::Internal("the device is being destroyed".to_owned())),
+        };
+        let allocation = allocated.map_err(|error| buffer.out_of_memory(error))?;
+        let allocation = buffer.allocation.insert(allocation);
+        // SAFETY: fresh memory of the right type and size; nothing else is bound to it or to the buffer.
+        vk_call("vkBindBufferMemory", || unsafe {
+            gpu.raw().bind_buffer_memory(handle, allocation.memory(), allocation.offset())
+        })?;
+        gpu.name_object(handle, name);
+        Ok(buffer)
+    }
+
+    fn out_of_memory(&self, error: AllocationError) -> Error {
+        match error {
+            AllocationError::OutOfMemory | AllocationError::NoCompatibleMemoryTypeFound => Error::OutOfMemory {
+                what: self.name.clone(),
+                needed: self.bytes,
+                limit_name: "the largest heap of this device (of which that much is no longer free)".to_owned(),
+                limit: self.gpu.limits().heap,
+                cure: "lower --max-gaussians, use smaller images or free memory of the device".to_owned(),
+            },
+            other => Error::Bug(format!("memory of {}: {other}", self.name)),
+        }
+    }
+
+    /// Size in bytes.
+    pub fn bytes(&self) -> u64 {
+        self.bytes
+    }
+
+    /// The handle, for descriptors and commands.
+    pub(crate) fn raw(&self) -> vk::Buffer {
+        self.handle
+    }
+
+    /// Copies bytes to memory that the host sees. The caller sees to it that the device does not use them meanwhile.
+    pub(crate) fn write(&self, offset: u64, data: &[u8]) -> Result<()> {
+        let to = self.mapped(offset, data.len())?;
+        // SAFETY: `mapped` checked the range; the source is host memory of the same length, and as a Rust slice it does
+        // not overlap memory of the device.
+        unsafe { std::ptr::copy_nonoverlapping(data.as_ptr(), to, data.len()) };
+        Ok(())
+    }
+
+    /// Copies bytes from memory that the host sees. The caller sees to it that the device does not write them meanwhile.
+    pub(crate) fn read(&self, offset: u64, data: &mut [u8]) -> Result<()> {
+        let from = self.mapped(offset, data.len())?;
+        // SAFETY: as in `write`.
+        unsafe { std::ptr::copy_nonoverlapping(from.cast_const(), data.as_mut_ptr(), data.len()) };
+        Ok(())
+    }
+
+    fn mapped(&self, offset: u64, length: usize) -> Result<*mut u8> {
+        let inside = offset.checked_add(length as u64).is_some_and(|end| end <= self.bytes);
+        let pointer = self.allocation.as_ref().and_then(Allocation::mapped_ptr);
+        match pointer {
+            // SAFETY: the offset lies in the mapped range, as just checked.
+            Some(pointer) if inside => Ok(unsafe { pointer.as_ptr().cast::<u8>().add(offset as usize) }),
+            Some(_) => Err(Error::Bug(format!("{length} bytes at {offset} are outside of {}", self.name))),
+            None => Err(Error::Bug(format!("memory of {} is not visible to the host", self.name))),
+        }
+    }
+}
+
+impl Drop for Buffer {
+    fn drop(&mut self) {
+        // SAFETY: made by this device; the scheduler waits for the device before it drops buffers.
+        unsafe { self.gpu.raw().destroy_buffer(self.handle, None) };
+        if let (Some(allocation), Some(allocator)) = (self.allocation.take(), lock(&self.gpu.allocator).as_mut()) {
+            // Freeing fails only for memory of another allocator.
+            let _ = allocator.free(allocation);
+        }
+    }
+}
+
+impl std::fmt::Debug for Buffer {
+    fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(formatter, "Buffer({}, {} bytes)", self.name, self.bytes)
+    }
+}

@@ -1,0 +1,184 @@
+//! Compute pipelines.
+
+use super::call::vk_call;
+use super::local_size::local_size;
+use super::{Gpu, lock};
+use crate::error::{Error, Result};
+use crate::shaders::{BindingDesc, BindingKind, ShaderDesc};
+use ash::vk;
+use std::sync::Arc;
+
+/// What makes a pipeline different from others.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+pub(crate) struct PipelineKey {
+    name: &'static str,
+    /// Address of the SPIR-V: tests may have two shaders of one name.
+    spirv: usize,
+    spec: Vec<u32>,
+    subgroup_size: Option<u32>,
+}
+
+/// A compute pipeline with its layouts.
+pub(crate) struct Pipeline {
+    device: ash::Device,
+    shader: &'static ShaderDesc,
+    set_layout: vk::DescriptorSetLayout,
+    layout: vk::PipelineLayout,
+    handle: vk::Pipeline,
+}
+
+impl Gpu {
+    /// The pipeline of a shader with these specialisation constants (empty for the defaults), made on first use.
+    pub(crate) fn pipeline(&self, shader: &'static ShaderDesc, spec: &[u32]) -> Result<Arc<Pipeline>> {
+        let spec =
+            if spec.is_empty() { shader.spec.iter().map(|constant| constant.default).collect() } else { spec.to_vec() };
+        let pinned = shader.uses_subgroups && self.capabilities.subgroup.is_pinned;
+        let subgroup_size = pinned.then_some(self.capabilities.subgroup.size);
+        let spirv = shader.spirv.as_ptr() as usize;
+        let key = PipelineKey { name: shader.name, spirv, spec, subgroup_size };
+        if let Some(pipeline) = lock(&self.pipelines).get(&key) {
+            return Ok(Arc::clone(pipeline));
+        }
+        // Made outside of the lock: it may take long, and two equal ones do no harm.
+        let pipeline = Arc::new(Pipeline::new(self, shader, &key.spec, subgroup_size)?);
+        Ok(Arc::clone(lock(&self.pipelines).entry(key).or_insert(pipeline)))
+    }
+
+    /// Fails if the workgroup of a shader is too large, which drivers answer in their own ways.
+    fn check_workgroup(&self, shader: &ShaderDesc, spec: &[u32], subgroup_size: Option<u32>) -> Result<Option<u32>> {
+        let Some(size) = local_size(shader, spec) else { return Ok(None) };
+        let limits = self.limits();
+        let invocations = size.iter().map(|&count| u64::from(count)).product::<u64>();
+        let subgroups = u64::from(subgroup_size.unwrap_or(1)) * u64::from(self.capabilities.subgroup.max_per_group);
+        let most = u64::from(limits.max_invocations).min(if subgroup_size.is_some() { subgroups } else { u64::MAX });
+        let fits = size.iter().zip(&limits.max_group_size).all(|(count, limit)| (1..=*limit).contains(count));
+        if fits && invocations <= most {
+            return Ok(Some(size[0]));
+        }
+        let name = shader.name;
+        Err(Error::NoDevice(format!("shader {name} has workgroups of {size:?}, the device takes {most} invocations")))
+    }
+}
+
+impl Pipeline {
+    fn new(gpu: &Gpu, shader: &'static ShaderDesc, spec: &[u32], subgroup_size: Option<u32>) -> Result<Self> {
+        let width = gpu.check_workgroup(shader, spec, subgroup_size)?;
+        let device = gpu.raw().clone();
+        // From here on, dropping `pipeline` destroys what it holds; destroying a null handle does nothing.
+        let mut pipeline = Self {
+            device,
+            shader,
+            set_layout: vk::DescriptorSetLayout::null(),
+            layout: vk::PipelineLayout::null(),
+            handle: vk::Pipeline::null(),
+        };
+        pipeline.make_layouts()?;
+        let (words, rest) = shader.spirv.as_chunks::<4>();
+        if !rest.is_empty() || words.is_empty() {
+            let name = shader.name;
+            return Err(Error::Bug(format!("the SPIR-V of {name} has {} bytes", shader.spirv.len())));
+        }
+        let words = words.iter().map(|word| u32::from_le_bytes(*word)).collect::<Vec<_>>();
+        let info = vk::ShaderModuleCreateInfo::default().code(&words);
+        // SAFETY: the SPIR-V comes from the shader compiler of the build.
+        let module = vk_call("vkCreateShaderModule", || unsafe { gpu.raw().create_shader_module(&info, None) })?;
+        let full = gpu.capabilities.features.full_subgroups
+            && subgroup_size.zip(width).is_some_and(|(size, width)| width % size == 0);
+        let made = pipeline.make(module, spec, subgroup_size, full);
+        // SAFETY: pipelines do not need their modules once they are made.
+        unsafe { gpu.raw().destroy_shader_module(module, None) };
+        made?;
+        gpu.name_object(pipeline.handle, shader.name);
+        Ok(pipeline)
+    }
+
+    fn make_layouts(&mut self) -> Result<()> {
+        let bindings = self.shader.bindings.iter().map(|binding| {
+            let kind = match binding.kind {
+                BindingKind::Storage => vk::DescriptorType::STORAGE_BUFFER,
+                BindingKind::Texel => vk::DescriptorType::UNIFORM_TEXEL_BUFFER,
+            };
+            vk::DescriptorSetLayoutBinding::default()
+                .binding(binding.binding)
+                .descriptor_type(kind)
+                .descriptor_count(1)
+                .stage_flags(vk::ShaderStageFlags::COMPUTE)
+        });
+        let bindings = bindings.collect::<Vec<_>>();
+        let info = vk::DescriptorSetLayoutCreateInfo::default().bindings(&bindings);
+        // SAFETY: the device is alive; here and below all pointers live until the call returns.
+        self.set_layout = vk_call("vkCreateDescriptorSetLayout", || unsafe {
+            self.device.create_descriptor_set_layout(&info, None)
+        })?;
+        let layouts = [self.set_layout];
+        let ranges = [vk::PushConstantRange {
+            stage_flags: vk::ShaderStageFlags::COMPUTE,
+            offset: 0,
+            size: self.shader.push_bytes,
+        }];
+        let ranges = if self.shader.push_bytes == 0 { &[][..] } else { &ranges[..] };
+        let info = vk::PipelineLayoutCreateInfo::default().set_layouts(&layouts).push_constant_ranges(ranges);
+        // SAFETY: as above.
+        self.layout = vk_call("vkCreatePipelineLayout", || unsafe { self.device.create_pipeline_layout(&info, None) })?;
+        Ok(())
+    }
+
+    fn make(&mut self, module: vk::ShaderModule, spec: &[u32], size: Option<u32>, full: bool) -> Result<()> {
+        let entries = self.shader.spec.iter().enumerate().map(|(index, constant)| vk::SpecializationMapEntry {
+            constant_id: constant.id,
+            offset: index as u32 * 4,
+            size: 4,
+        });
+        let entries = entries.collect::<Vec<_>>();
+        let spec = vk::SpecializationInfo::default().map_entries(&entries).data(bytemuck::cast_slice(spec));
+        let mut required = vk::PipelineShaderStageRequiredSubgroupSizeCreateInfo::default()
+            .required_subgroup_size(size.unwrap_or_default());
+        let mut stage = vk::PipelineShaderStageCreateInfo::default()
+            .stage(vk::ShaderStageFlags::COMPUTE)
+            .module(module)
+            .name(c"main")
+            .specialization_info(&spec);
+        if size.is_some() {
+            stage = stage.push_next(&mut required);
+        }
+        if full {
+            stage = stage.flags(vk::PipelineShaderStageCreateFlags::REQUIRE_FULL_SUBGROUPS);
+        }
+        let infos = [vk::ComputePipelineCreateInfo::default().stage(stage).layout(self.layout)];
+        // SAFETY: module and layout are alive and made for the same shader.
+        let made = vk_call("vkCreateComputePipelines", || {
+            unsafe { self.device.create_compute_pipelines(vk::PipelineCache::null(), &infos, None) }
+                .map_err(|(_, result)| result)
+        })?;
+        self.handle = made.first().copied().unwrap_or_default();
+        Ok(())
+    }
+
+    pub(crate) fn raw(&self) -> vk::Pipeline {
+        self.handle
+    }
+
+    pub(crate) fn layout(&self) -> vk::PipelineLayout {
+        self.layout
+    }
+
+    pub(super) fn set_layout(&self) -> vk::DescriptorSetLayout {
+        self.set_layout
+    }
+
+    pub(super) fn bindings(&self) -> &'static [BindingDesc] {
+        self.shader.bindings
+    }
+}
+
+impl Drop for Pipeline {
+    fn drop(&mut self) {
+        // SAFETY: the cache in `Gpu` keeps every pipeline until the device is idle and about to be destroyed; null
+        // handles are ignored.
+        unsafe {
+            self.device.destroy_pipeline(self.handle, None);
+            self.device.destroy_pipeline_layout(self.layout, None);
+            self.device.destroy_descriptor_set_layout(self.set_layout, None);
+        }
+    }
+}

@@ -1,0 +1,96 @@
+//! Choice of the physical device, and its opening.
+
+use super::call::vk_call;
+use super::capabilities::Capabilities;
+use super::instance::Instance;
+use crate::error::{Error, Result};
+use ash::vk;
+
+/// All devices, in the loader's order.
+pub(super) fn all(instance: &Instance) -> Result<Vec<(vk::PhysicalDevice, Capabilities)>> {
+    // SAFETY: the instance is alive.
+    let devices = vk_call("vkEnumeratePhysicalDevices", || unsafe { instance.raw().enumerate_physical_devices() })?;
+    let probe = |(index, device)| Ok((device, Capabilities::probe(instance.raw(), index, device)?));
+    devices.into_iter().enumerate().map(probe).collect()
+}
+
+/// The device that was asked for by index, UUID or part of its name; else the best that meets the requirements.
+pub(super) fn pick(instance: &Instance, wanted: Option<&str>) -> Result<(vk::PhysicalDevice, Capabilities)> {
+    let mut devices = all(instance)?;
+    let listing = devices.iter().map(|(_, device)| line(device)).collect::<Vec<_>>().join("; ");
+    if devices.is_empty() {
+        return Err(Error::NoDevice("the Vulkan loader knows no device; install a Vulkan driver".to_owned()));
+    }
+    if let Some(wanted) = wanted {
+        devices.retain(|(_, device)| matches(device, wanted));
+        if devices.is_empty() {
+            return Err(Error::NoDevice(format!("none is called {wanted}; there are {listing}")));
+        }
+    }
+    devices.retain(|(_, device)| device.missing().is_empty());
+    let best = devices.into_iter().min_by_key(|(_, device)| (device.kind, device.index));
+    best.ok_or_else(|| Error::NoDevice(format!("none meets the requirements: {listing}")))
+}
+
+fn matches(device: &Capabilities, wanted: &str) -> bool {
+    let uuid = wanted.replace('-', "").to_lowercase();
+    match wanted.parse::<usize>() {
+        Ok(index) if wanted.len() < 4 => device.index == index,
+        _ => device.name.to_lowercase().contains(&wanted.to_lowercase()) || device.uuid_text() == uuid,
+    }
+}
+
+fn line(device: &Capabilities) -> String {
+    let missing = device.missing();
+    let lacks = missing.iter().map(|need| format!("{} (needed {}, found {})", need.what, need.needed, need.found));
+    let lacks = lacks.collect::<Vec<_>>().join(", ");
+    let lacks = if lacks.is_empty() { "usable".to_owned() } else { format!("lacks {lacks}") };
+    format!("{}: {}, {lacks}", device.index, device.name)
+}
+
+/// Creates the logical device with one compute queue and what it has of the features we know.
+pub(super) fn open(
+    instance: &Instance,
+    physical: vk::PhysicalDevice,
+    capabilities: &Capabilities,
+    robust: bool,
+) -> Result<ash::Device> {
+    let features = &capabilities.features;
+    let core = vk::PhysicalDeviceFeatures::default()
+        .robust_buffer_access(robust && features.robust)
+        .shader_int64(features.shader_int64)
+        .shader_int16(features.shader_int16);
+    let mut eleven = vk::PhysicalDeviceVulkan11Features::default().storage_buffer16_bit_access(features.storage_16bit);
+    let mut twelve = vk::PhysicalDeviceVulkan12Features::default()
+        .scalar_block_layout(true)
+        .timeline_semaphore(true)
+        .shader_int8(features.shader_int8)
+        .shader_float16(features.float16)
+        .storage_buffer8_bit_access(features.storage_8bit)
+        .vulkan_memory_model(features.memory_model)
+        .vulkan_memory_model_device_scope(features.memory_model);
+    let mut control = vk::PhysicalDeviceSubgroupSizeControlFeatures::default()
+        .subgroup_size_control(features.size_control)
+        .compute_full_subgroups(features.full_subgroups);
+    let priorities = [1.0];
+    let queues = [vk::DeviceQueueCreateInfo::default()
+        .queue_family_index(capabilities.queue_family)
+        .queue_priorities(&priorities)];
+    let extensions = if capabilities.size_control_is_extension {
+        vec![ash::ext::subgroup_size_control::NAME.as_ptr()]
+    } else {
+        Vec::new()
+    };
+    let mut info = vk::DeviceCreateInfo::default()
+        .queue_create_infos(&queues)
+        .enabled_features(&core)
+        .enabled_extension_names(&extensions)
+        .push_next(&mut eleven)
+        .push_next(&mut twelve);
+    if features.size_control {
+        info = info.push_next(&mut control);
+    }
+    // SAFETY: every feature and extension was found on the device; all pointers live until the call returns.
+    let created = vk_call("vkCreateDevice", || unsafe { instance.raw().create_device(physical, &info, None) });
+    created.map_err(|error| Error::NoDevice(format!("{} cannot be opened: {error}", capabilities.name)))
+}

@@ -1,0 +1,48 @@
+//! Timeline semaphores: a number that grows as submits finish.
+
+use super::Gpu;
+use super::call::vk_call;
+use crate::error::Result;
+use ash::vk;
+use std::sync::Arc;
+
+/// A timeline semaphore that starts at 0.
+pub(crate) struct Timeline {
+    gpu: Arc<Gpu>,
+    handle: vk::Semaphore,
+}
+
+impl Timeline {
+    pub(crate) fn new(gpu: &Arc<Gpu>) -> Result<Self> {
+        let mut kind = vk::SemaphoreTypeCreateInfo::default().semaphore_type(vk::SemaphoreType::TIMELINE);
+        let info = vk::SemaphoreCreateInfo::default().push_next(&mut kind);
+        // SAFETY: the feature is on, it is required of every device.
+        let handle = vk_call("vkCreateSemaphore", || unsafe { gpu.raw().create_semaphore(&info, None) })?;
+        Ok(Self { gpu: Arc::clone(gpu), handle })
+    }
+
+    pub(super) fn raw(&self) -> vk::Semaphore {
+        self.handle
+    }
+
+    /// Blocks until the value is reached.
+    pub(crate) fn wait(&self, value: u64) -> Result<()> {
+        let (handles, values) = ([self.handle], [value]);
+        let info = vk::SemaphoreWaitInfo::default().semaphores(&handles).values(&values);
+        // SAFETY: the handle is alive.
+        vk_call("vkWaitSemaphores", || unsafe { self.gpu.raw().wait_semaphores(&info, u64::MAX) })
+    }
+
+    /// The value reached so far.
+    pub(crate) fn value(&self) -> Result<u64> {
+        // SAFETY: the handle is alive.
+        vk_call("vkGetSemaphoreCounterValue", || unsafe { self.gpu.raw().get_semaphore_counter_value(self.handle) })
+    }
+}
+
+impl Drop for Timeline {
+    fn drop(&mut self) {
+        // SAFETY: the scheduler waits for what it submitted before it drops its timeline.
+        unsafe { self.gpu.raw().destroy_semaphore(self.handle, None) };
+    }
+}

@@ -1,0 +1,46 @@
+//! Clone, split and prune on the device: mark and count, then rewrite every attribute in a new order.
+
+use super::build::{Builder, Count, args, over_gaussians};
+use super::optimize::ATTRIBUTES;
+use super::scan::{self, Total};
+use crate::pass;
+use crate::plan::Buf;
+
+/// Decides for each Gaussian and counts the result.
+pub fn mark(b: &mut Builder) {
+    pass!(b, texel densify_mark {
+        step: Buf::STEP, means: Buf::MEANS, scales: Buf::SCALES, densify_stats: Buf::DENSIFY_STATS,
+        children_counts: Buf::CHILDREN_COUNTS, counters: Buf::COUNTERS,
+    } [], over_gaussians());
+    scan::scan(b, Buf::CHILDREN_COUNTS, Buf::CHILD_OFFSETS, Count::Gaussians, Total::Densified);
+}
+
+/// Rewrites the model; needs [`mark`] before it in the same list.
+pub fn apply(b: &mut Builder) {
+    b.list.copy(Buf::MEANS, Buf::OLD_MEANS, 0);
+    b.list.copy(Buf::SCALES, Buf::OLD_SCALES, 0);
+    b.list.copy(Buf::QUATS, Buf::OLD_QUATS, 0);
+    pass!(b, texel densify_geometry {
+        step: Buf::STEP, old_means: Buf::OLD_MEANS, old_scales: Buf::OLD_SCALES, old_quats: Buf::OLD_QUATS,
+        densify_stats: Buf::DENSIFY_STATS, child_offsets: Buf::CHILD_OFFSETS, means: Buf::MEANS, scales: Buf::SCALES,
+        quats: Buf::QUATS, densify_actions: Buf::DENSIFY_ACTIONS,
+    } [], over_gaussians());
+    for a in &ATTRIBUTES {
+        let geometry = [Buf::MEANS, Buf::SCALES, Buf::QUATS].contains(&a.planes[0]);
+        for (index, &plane) in a.planes.iter().enumerate().skip(usize::from(geometry)) {
+            b.list.copy(plane, Buf::OLD_VALUES, 0);
+            pass!(b, texel densify_copy {
+                step: Buf::STEP, old_values: Buf::OLD_VALUES, densify_actions: Buf::DENSIFY_ACTIONS,
+                child_offsets: Buf::CHILD_OFFSETS, values: plane,
+            } [stride: a.stride, moments: u32::from(index > 0)], args(a.args));
+        }
+    }
+    if b.labels {
+        b.list.copy(Buf::LABELS, Buf::OLD_LABELS, 0);
+        pass!(b, texel densify_labels {
+            step: Buf::STEP, old_labels: Buf::OLD_LABELS, densify_actions: Buf::DENSIFY_ACTIONS,
+            child_offsets: Buf::CHILD_OFFSETS, labels: Buf::LABELS,
+        } [], over_gaussians());
+    }
+    b.list.fill(Buf::DENSIFY_STATS, 0);
+}

@@ -1,0 +1,61 @@
+//! From Gaussians to splats in depth order, and gradients back.
+
+use super::build::{Builder, Count, ONE, over_gaussians, over_splats};
+use super::scan::{self, Total};
+use super::sort::{self, SortBuffers};
+use crate::pass;
+use crate::plan::Buf;
+
+/// Sorted Gaussian indices of the visible splats; the depth sort has an even number of passes.
+pub const GAUSSIAN_FROM_SPLAT: Buf = Buf::DEPTH_VALUES_A;
+
+/// Lists the visible Gaussians in depth order and projects them.
+pub fn visible_splats(b: &mut Builder) {
+    pass!(b, texel cull {
+        step: Buf::STEP, means: Buf::MEANS, scales: Buf::SCALES, depth_keys: Buf::DEPTH_KEYS,
+        splat_from_gaussian: Buf::SPLAT_FROM_GAUSSIAN,
+    } [], over_gaussians());
+    scan::scan_visible(b, Buf::DEPTH_KEYS, Buf::VISIBLE_OFFSETS);
+    pass!(b, prepare_splats { counters: Buf::COUNTERS, dispatch_args: Buf::DISPATCH_ARGS } [], ONE);
+    pass!(b, texel compact {
+        step: Buf::STEP, depth_keys: Buf::DEPTH_KEYS, visible_offsets: Buf::VISIBLE_OFFSETS,
+        keys_out: Buf::DEPTH_KEYS_A, values_out: Buf::DEPTH_VALUES_A,
+    } [], over_gaussians());
+    let buffers = SortBuffers {
+        keys: [Buf::DEPTH_KEYS_A, Buf::DEPTH_KEYS_B],
+        values: [Buf::DEPTH_VALUES_A, Buf::DEPTH_VALUES_B],
+    };
+    let (_, sorted) = sort::sort(b, buffers, 32, Count::Splats, false);
+    debug_assert_eq!(sorted, GAUSSIAN_FROM_SPLAT);
+    project_forward(b);
+    scan::scan(b, Buf::TILES_TOUCHED, Buf::INSTANCE_OFFSETS, Count::Splats, Total::Instances);
+}
+
+fn project_forward(b: &mut Builder) {
+    let (tile_width, tile_height, sh_degree) = (b.shape.tile_width, b.shape.tile_height, b.sh_degree);
+    if b.labels {
+        pass!(b, texel project_forward_labels {
+            step: Buf::STEP, counters: Buf::COUNTERS, gaussian_from_splat: GAUSSIAN_FROM_SPLAT, means: Buf::MEANS,
+            scales: Buf::SCALES, quats: Buf::QUATS, sh0: Buf::SH0, sh1: Buf::SH1, sh2: Buf::SH2, sh3: Buf::SH3,
+            splats: Buf::SPLATS, tiles_touched: Buf::TILES_TOUCHED, splat_from_gaussian: Buf::SPLAT_FROM_GAUSSIAN,
+            labels: Buf::LABELS, layer_from_label: Buf::LAYER_FROM_LABEL,
+        } [tile_width: tile_width, tile_height: tile_height, sh_degree: sh_degree], over_splats());
+    } else {
+        pass!(b, texel project_forward {
+            step: Buf::STEP, counters: Buf::COUNTERS, gaussian_from_splat: GAUSSIAN_FROM_SPLAT, means: Buf::MEANS,
+            scales: Buf::SCALES, quats: Buf::QUATS, sh0: Buf::SH0, sh1: Buf::SH1, sh2: Buf::SH2, sh3: Buf::SH3,
+            splats: Buf::SPLATS, tiles_touched: Buf::TILES_TOUCHED, splat_from_gaussian: Buf::SPLAT_FROM_GAUSSIAN,
+        } [tile_width: tile_width, tile_height: tile_height, sh_degree: sh_degree], over_splats());
+    }
+}
+
+/// Gradients of the splats back to the parameters of their Gaussians.
+pub fn project_backward(b: &mut Builder) {
+    let sh_degree = b.sh_degree;
+    pass!(b, texel project_backward {
+        step: Buf::STEP, failure: Buf::FAILURE, gaussian_from_splat: GAUSSIAN_FROM_SPLAT, means: Buf::MEANS,
+        scales: Buf::SCALES, quats: Buf::QUATS, sh0: Buf::SH0, sh1: Buf::SH1, sh2: Buf::SH2, sh3: Buf::SH3,
+        v_splats: Buf::V_SPLATS, v_means: Buf::V_MEANS, v_scales: Buf::V_SCALES, v_quats: Buf::V_QUATS,
+        v_sh0: Buf::V_SH0, v_sh1: Buf::V_SH1, v_sh2: Buf::V_SH2, v_sh3: Buf::V_SH3, counters: Buf::COUNTERS,
+    } [sh_degree: sh_degree], over_splats());
+}

@@ -1,0 +1,64 @@
+//! Which variant of the kernels a device gets: subgroup size, tile, texel or storage reads, digits of the sort.
+
+use crate::shaders::ShaderDesc;
+
+/// Shape of the kernels, fixed for a device.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct KernelShape {
+    /// Invocations of a subgroup: 8, 16, 32 or 64.
+    pub subgroup: u32,
+    /// Tile width, px.
+    pub tile_width: u32,
+    /// Tile height, px.
+    pub tile_height: u32,
+    /// Hot reads go through texel buffers.
+    pub texel: bool,
+    /// Bits of a digit of the radix sort.
+    pub digit_bits: u32,
+    /// Workgroups of the sort and scan passes, at least.
+    pub lane_groups: u32,
+}
+
+/// Splats that one dispatch of a blend pass may walk in a tile: lavapipe ends all loops of an invocation after 65,535
+/// rounds, and a walk of n splats costs n rounds and one more for each subgroup's load.
+pub const SEGMENT_LENGTH: u32 = 40_960;
+
+impl KernelShape {
+    /// The shape for a subgroup size; `cpu` says that the device is a processor.
+    pub fn new(subgroup: u32, cpu: bool) -> Self {
+        let (tile_width, tile_height) = match subgroup {
+            ..=8 => (8, 8),
+            16 => (16, 8),
+            _ => (16, 16),
+        };
+        Self {
+            subgroup,
+            tile_width,
+            tile_height,
+            texel: cpu,
+            digit_bits: if subgroup <= 16 { 8 } else { 4 },
+            lane_groups: if cpu { 4 } else { 128 },
+        }
+    }
+
+    /// Tiles in a row and in a column of an image.
+    pub fn tiles(&self, width: u32, height: u32) -> (u32, u32) {
+        (width.div_ceil(self.tile_width), height.div_ceil(self.tile_height))
+    }
+
+    /// Pixels of a tile.
+    pub fn tile_pixels(&self) -> u32 {
+        self.tile_width * self.tile_height
+    }
+
+    /// Lanes of a sort or scan over at most `items`; no lane walks more than 30,000 of them.
+    pub fn lanes(&self, items: u64) -> u32 {
+        let groups = items.div_ceil(u64::from(self.subgroup) * 30_000) as u32;
+        groups.next_multiple_of(2).max(self.lane_groups) * self.subgroup
+    }
+
+    /// The variant for this device.
+    pub fn pick(&self, base: &'static ShaderDesc, texel: &'static ShaderDesc) -> &'static ShaderDesc {
+        if self.texel { texel } else { base }
+    }
+}

@@ -1,0 +1,44 @@
+//! Stable radix sort of (key, value) pairs by the low bits of the key.
+
+use super::build::{Builder, Count, ONE};
+use crate::pass;
+use crate::plan::{Buf, Grid};
+
+/// Two pairs of buffers that the passes of a sort go back and forth between.
+#[derive(Clone, Copy, Debug)]
+pub struct SortBuffers {
+    /// Keys; the input stands in the first.
+    pub keys: [Buf; 2],
+    /// Values.
+    pub values: [Buf; 2],
+}
+
+/// Sorts by the low `bits` bits; with `identity` the values are the places of the keys before the sort. Returns the
+/// buffers that hold the sorted keys and values.
+pub fn sort(b: &mut Builder, buffers: SortBuffers, bits: u32, count: Count, identity: bool) -> (Buf, Buf) {
+    let (subgroup, digit_bits, lanes) = (b.shape.subgroup, b.shape.digit_bits, b.capacity.sort_lanes as u32);
+    let groups = Grid::Groups(lanes / subgroup, 1, 1);
+    let passes = bits.div_ceil(digit_bits).max(1);
+    for pass in 0..passes {
+        let (from, to) = ((pass % 2) as usize, 1 - (pass % 2) as usize);
+        let shift = pass * digit_bits;
+        let digit_bits = digit_bits.min(32 - shift);
+        // The first pass of an identity sort reads no values; the keys stand in for the buffer that nothing wrote yet.
+        let identity_now = identity && pass == 0;
+        let values_in = if identity_now { buffers.keys[from] } else { buffers.values[from] };
+        pass!(b, texel radix_count {
+            step: Buf::STEP, counters: Buf::COUNTERS, failure: Buf::FAILURE, keys_in: buffers.keys[from],
+            histogram: Buf::SORT_HISTOGRAM,
+        } [subgroup_size: subgroup, count_source: count as u32, lanes: lanes, shift: shift, digit_bits: digit_bits], groups);
+        pass!(b, radix_scan { histogram: Buf::SORT_HISTOGRAM }
+            [subgroup_size: subgroup, cells: lanes << digit_bits], ONE);
+        pass!(b, texel radix_scatter {
+            step: Buf::STEP, counters: Buf::COUNTERS, failure: Buf::FAILURE, keys_in: buffers.keys[from],
+            values_in: values_in, histogram: Buf::SORT_HISTOGRAM, keys_out: buffers.keys[to],
+            values_out: buffers.values[to],
+        } [subgroup_size: subgroup, count_source: count as u32, lanes: lanes, shift: shift, digit_bits: digit_bits,
+            identity: u32::from(identity_now)], groups);
+    }
+    let last = (passes % 2) as usize;
+    (buffers.keys[last], buffers.values[last])
+}

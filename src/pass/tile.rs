@@ -1,0 +1,78 @@
+//! Which splats each tile holds, front to back, for the scene and for each object layer.
+
+use super::build::{Builder, Count, ONE, args, over_splats};
+use super::project::GAUSSIAN_FROM_SPLAT;
+use super::scan::{self, Total};
+use super::shape::SEGMENT_LENGTH;
+use super::sort::{self, SortBuffers};
+use crate::pass;
+use crate::plan::{Buf, Grid};
+use crate::shaders::constants;
+
+/// Lists the (splat, tile) pairs, sorts them by layer and tile, and finds each tile's range. Returns the buffer that
+/// holds the slots (places before the sort) of the sorted pairs.
+pub fn bin_splats(b: &mut Builder) -> Buf {
+    let instances = b.capacity.instances as u32;
+    pass!(b, prepare_instances {
+        counters: Buf::COUNTERS, dispatch_args: Buf::DISPATCH_ARGS, failure: Buf::FAILURE,
+    } [instance_capacity: instances], ONE);
+    emit_instances(b);
+    let buffers = SortBuffers {
+        keys: [Buf::TILE_KEYS_A, Buf::TILE_KEYS_B],
+        values: [Buf::TILE_VALUES_A, Buf::TILE_VALUES_B],
+    };
+    let bits = 64 - b.capacity.virtual_tiles.saturating_sub(1).leading_zeros();
+    let (keys, slots) = sort::sort(b, buffers, bits, Count::Instances, true);
+    b.list.fill(Buf::TILE_STARTS, 0);
+    b.list.fill(Buf::TILE_ENDS, 0);
+    pass!(b, texel tile_ranges {
+        counters: Buf::COUNTERS, failure: Buf::FAILURE, tile_keys: keys, slots: slots,
+        splat_from_instance: Buf::SPLAT_FROM_INSTANCE, tile_starts: Buf::TILE_STARTS, tile_ends: Buf::TILE_ENDS,
+        sorted_splats: Buf::SORTED_SPLATS,
+    } [], args(constants::ARGS_INSTANCES));
+    tile_lengths(b);
+    let layer_tiles = b.capacity.layer_tiles as u32;
+    pass!(b, prepare_blend {
+        step: Buf::STEP, counters: Buf::COUNTERS, dispatch_args: Buf::DISPATCH_ARGS, failure: Buf::FAILURE,
+    } [layer_tile_capacity: layer_tiles, longest_list: SEGMENT_LENGTH * b.capacity.segments as u32], ONE);
+    slots
+}
+
+fn emit_instances(b: &mut Builder) {
+    let (tile_width, tile_height) = (b.shape.tile_width, b.shape.tile_height);
+    if b.labels {
+        pass!(b, texel emit_instances_labels {
+            step: Buf::STEP, counters: Buf::COUNTERS, failure: Buf::FAILURE, splats: Buf::SPLATS,
+            tiles_touched: Buf::TILES_TOUCHED, instance_offsets: Buf::INSTANCE_OFFSETS, tile_keys: Buf::TILE_KEYS_A,
+            splat_from_instance: Buf::SPLAT_FROM_INSTANCE, gaussian_from_splat: GAUSSIAN_FROM_SPLAT,
+            labels: Buf::LABELS, layer_from_label: Buf::LAYER_FROM_LABEL,
+        } [tile_width: tile_width, tile_height: tile_height], over_splats());
+    } else {
+        pass!(b, texel emit_instances {
+            step: Buf::STEP, counters: Buf::COUNTERS, failure: Buf::FAILURE, splats: Buf::SPLATS,
+            tiles_touched: Buf::TILES_TOUCHED, instance_offsets: Buf::INSTANCE_OFFSETS, tile_keys: Buf::TILE_KEYS_A,
+            splat_from_instance: Buf::SPLAT_FROM_INSTANCE,
+        } [tile_width: tile_width, tile_height: tile_height], over_splats());
+    }
+}
+
+fn tile_lengths(b: &mut Builder) {
+    let groups = Grid::Groups((b.capacity.virtual_tiles as u32).div_ceil(64), 1, 1);
+    if !b.labels {
+        pass!(b, texel tile_lengths {
+            step: Buf::STEP, failure: Buf::FAILURE, tile_starts: Buf::TILE_STARTS, tile_ends: Buf::TILE_ENDS,
+            counters: Buf::COUNTERS,
+        } [], groups);
+        return;
+    }
+    pass!(b, texel tile_lengths_labels {
+        step: Buf::STEP, failure: Buf::FAILURE, tile_starts: Buf::TILE_STARTS, tile_ends: Buf::TILE_ENDS,
+        counters: Buf::COUNTERS, layer_occupied: Buf::LAYER_OCCUPIED,
+    } [], groups);
+    scan::scan(b, Buf::LAYER_OCCUPIED, Buf::LAYER_OFFSETS, Count::VirtualTiles, Total::LayerTiles);
+    let layer_tiles = b.capacity.layer_tiles as u32;
+    pass!(b, texel layer_list {
+        step: Buf::STEP, failure: Buf::FAILURE, layer_occupied: Buf::LAYER_OCCUPIED,
+        layer_offsets: Buf::LAYER_OFFSETS, layer_tiles: Buf::LAYER_TILES,
+    } [layer_tile_capacity: layer_tiles], groups);
+}

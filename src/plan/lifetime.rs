@@ -1,0 +1,56 @@
+//! First and last use of each buffer in a list.
+
+use super::barrier::BufferUse;
+use super::buffers::{BufferDecl, Class};
+use crate::error::{Error, Result};
+
+/// The items between which a buffer's contents matter, both inclusive.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Life {
+    /// First item that touches it.
+    pub first: usize,
+    /// Last item that touches it.
+    pub last: usize,
+}
+
+impl Life {
+    /// True if both are alive during some item.
+    pub fn overlaps(self, other: Self) -> bool {
+        self.first <= other.last && other.first <= self.last
+    }
+}
+
+pub(super) fn lives(buffers: usize, uses: &[Vec<BufferUse>]) -> Vec<Option<Life>> {
+    let mut lives = vec![None::<Life>; buffers];
+    for (item, uses) in uses.iter().enumerate() {
+        for touched in uses {
+            let life = lives[touched.buf.index()].get_or_insert(Life { first: item, last: item });
+            life.last = item;
+        }
+    }
+    lives
+}
+
+/// Scratch that is only read when it is first touched holds whatever its bytes held before: a forgotten pass.
+pub(super) fn check_written_first(
+    table: &'static [BufferDecl],
+    labels: &[String],
+    uses: &[Vec<BufferUse>],
+) -> Result<()> {
+    let mut written = vec![false; table.len()];
+    for (item, uses) in uses.iter().enumerate() {
+        for touched in uses.iter().filter(|touched| touched.kind.writes()) {
+            written[touched.buf.index()] = true;
+        }
+        for touched in uses {
+            let decl = &table[touched.buf.index()];
+            if decl.class == Class::Step && !written[touched.buf.index()] {
+                let (label, name) = (&labels[item], decl.name);
+                return Err(Error::Bug(format!(
+                    "{label} reads the scratch buffer {name} before anything has written it"
+                )));
+            }
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,127 @@
+//! Passes as declarations: which shader, which buffers, how many workgroups.
+
+use super::buffers::Buf;
+use crate::shaders::ShaderDesc;
+
+/// How many workgroups a pass runs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Grid {
+    /// Known when the list is prepared.
+    Groups(u32, u32, u32),
+    /// Written by an earlier pass: three u32 at this byte offset of the buffer.
+    Indirect(Buf, u32),
+}
+
+/// One dispatch.
+#[derive(Clone, Debug)]
+pub struct PassDecl {
+    /// Name in reports, timings and crash messages; the shader's name unless given.
+    pub label: String,
+    /// The shader variant.
+    pub shader: &'static ShaderDesc,
+    /// Buffers in the order of the shader's bindings.
+    pub buffers: Vec<Buf>,
+    /// Words of the specialisation constants in the order of `ShaderDesc::spec`; empty for the defaults.
+    pub spec: Vec<u32>,
+    /// Push constants, recorded once.
+    pub push: Vec<u8>,
+    /// Number of workgroups.
+    pub grid: Grid,
+}
+
+impl PassDecl {
+    /// A pass with default specialisation constants and no push constants.
+    pub fn new(shader: &'static ShaderDesc, buffers: Vec<Buf>, grid: Grid) -> Self {
+        Self { label: shader.name.to_owned(), shader, buffers, spec: Vec::new(), push: Vec::new(), grid }
+    }
+
+    /// Sets the specialisation constants.
+    #[must_use]
+    pub fn spec(mut self, words: Vec<u32>) -> Self {
+        self.spec = words;
+        self
+    }
+
+    /// Sets the push constants.
+    #[must_use]
+    pub fn push(mut self, bytes: impl Into<Vec<u8>>) -> Self {
+        self.push = bytes.into();
+        self
+    }
+
+    /// Sets the push constants from a plain struct.
+    #[must_use]
+    pub fn push_pod<T: bytemuck::NoUninit>(self, push: &T) -> Self {
+        self.push(bytemuck::bytes_of(push))
+    }
+
+    /// Sets the name in reports.
+    #[must_use]
+    pub fn label(mut self, label: impl Into<String>) -> Self {
+        self.label = label.into();
+        self
+    }
+}
+
+/// One item of a pass list.
+#[derive(Clone, Debug)]
+pub enum Work {
+    /// A dispatch.
+    Pass(PassDecl),
+    /// Every word of a buffer is set.
+    Fill {
+        /// The buffer.
+        buf: Buf,
+        /// The word.
+        word: u32,
+    },
+    /// The first bytes of a buffer are copied to the start of another.
+    Copy {
+        /// Source.
+        from: Buf,
+        /// Destination.
+        to: Buf,
+        /// Number of bytes, a multiple of 4; 0 copies as much as both hold.
+        bytes: u64,
+    },
+}
+
+impl From<PassDecl> for Work {
+    fn from(pass: PassDecl) -> Self {
+        Self::Pass(pass)
+    }
+}
+
+/// A list of work that is planned, recorded and replayed as one.
+#[derive(Clone, Debug, Default)]
+pub struct PassList {
+    /// Name in reports and messages.
+    pub name: String,
+    /// The work, in order.
+    pub work: Vec<Work>,
+}
+
+impl PassList {
+    /// An empty list.
+    pub fn new(name: impl Into<String>) -> Self {
+        Self { name: name.into(), work: Vec::new() }
+    }
+
+    /// Appends a dispatch.
+    pub fn pass(&mut self, pass: PassDecl) -> &mut Self {
+        self.work.push(Work::Pass(pass));
+        self
+    }
+
+    /// Appends a fill.
+    pub fn fill(&mut self, buf: Buf, word: u32) -> &mut Self {
+        self.work.push(Work::Fill { buf, word });
+        self
+    }
+
+    /// Appends a copy of `bytes` bytes, or of as much as both buffers hold if 0.
+    pub fn copy(&mut self, from: Buf, to: Buf, bytes: u64) -> &mut Self {
+        self.work.push(Work::Copy { from, to, bytes });
+        self
+    }
+}

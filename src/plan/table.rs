@@ -1,0 +1,98 @@
+//! THE table: every buffer of the engine, its element, its length, its life. Grep for a name to read its story.
+
+use super::buffers::{Class, TexelFormat};
+use super::capacity::Domain;
+use crate::shaders::structs::{Counters, StepUniforms};
+
+const VEC4: Option<TexelFormat> = Some(TexelFormat::Rgba32Sfloat);
+const WORD: Option<TexelFormat> = Some(TexelFormat::R32Uint);
+
+crate::buffers! {
+    STEP "step": size_of::<StepUniforms>() as u32, Domain::One, Class::Slot, None, "What changes every step (glsl/include/step.glsl).";
+    TARGET "target": 4, Domain::Pixels, Class::Slot, Some(TexelFormat::Rgba8Unorm), "The photo [P] RGBA8; alpha 0: left out.";
+    VIEW_LABELS "view_labels": 4, Domain::LabelledPixels, Class::Slot, WORD, "Visible object of each pixel [P].";
+    LAYER_FROM_LABEL "layer_from_label": 4, Domain::Labels, Class::Slot, WORD, "Layer of each label id, 0: not sampled in this step.";
+    LABEL_FROM_LAYER "label_from_layer": 4, Domain::Layers, Class::Slot, WORD, "Label id of each layer; layer 0 is the scene.";
+    LAYER_OCCLUDERS "layer_occluders": 4, Domain::OccluderWords, Class::Slot, WORD, "For each layer a bit per label id: set where that object hides the layer's.";
+    REPORT "report": size_of::<Counters>() as u32, Domain::One, Class::Report, None, "Counters of a step, for the host.";
+    REPORT_FAILURE "report_failure": 4, Domain::One, Class::Report, None, "The failure word after a step, for the host.";
+
+    MEANS "means": 16, Domain::Gaussians, Class::Model, VEC4, "Positions [N] (x, y, z world, opacity logit).";
+    SCALES "scales": 16, Domain::Gaussians, Class::Model, VEC4, "ln of the standard deviations [N] (x, y, z, 0).";
+    QUATS "quats": 16, Domain::Gaussians, Class::Model, VEC4, "Rotations [N] (w, x, y, z).";
+    SH0 "sh0": 16, Domain::Gaussians, Class::Model, VEC4, "Degree 0 of the colour [N] (r, g, b, 0).";
+    SH1 "sh1": 48, Domain::Gaussians, Class::Model, VEC4, "Degree 1 [N,3 vec4]: 9 floats, coefficient-major rgb, then 3 of padding.";
+    SH2 "sh2": 64, Domain::Gaussians, Class::Model, VEC4, "Degree 2 [N,4 vec4]: 15 floats and 1 of padding.";
+    SH3 "sh3": 96, Domain::Gaussians, Class::Model, VEC4, "Degree 3 [N,6 vec4]: 21 floats and 3 of padding.";
+    M_MEANS "m_means": 16, Domain::Trained, Class::Model, VEC4, "First moments of means.";
+    M_SCALES "m_scales": 16, Domain::Trained, Class::Model, VEC4, "First moments of scales.";
+    M_QUATS "m_quats": 16, Domain::Trained, Class::Model, VEC4, "First moments of quats.";
+    M_SH0 "m_sh0": 16, Domain::Trained, Class::Model, VEC4, "First moments of sh0.";
+    M_SH1 "m_sh1": 48, Domain::Trained, Class::Model, VEC4, "First moments of sh1.";
+    M_SH2 "m_sh2": 64, Domain::Trained, Class::Model, VEC4, "First moments of sh2.";
+    M_SH3 "m_sh3": 96, Domain::Trained, Class::Model, VEC4, "First moments of sh3.";
+    U_MEANS "u_means": 16, Domain::Trained, Class::Model, VEC4, "Second moments of means.";
+    U_SCALES "u_scales": 16, Domain::Trained, Class::Model, VEC4, "Second moments of scales.";
+    U_QUATS "u_quats": 16, Domain::Trained, Class::Model, VEC4, "Second moments of quats.";
+    U_SH0 "u_sh0": 16, Domain::Trained, Class::Model, VEC4, "Second moments of sh0.";
+    U_SH1 "u_sh1": 48, Domain::Trained, Class::Model, VEC4, "Second moments of sh1.";
+    U_SH2 "u_sh2": 64, Domain::Trained, Class::Model, VEC4, "Second moments of sh2.";
+    U_SH3 "u_sh3": 96, Domain::Trained, Class::Model, VEC4, "Second moments of sh3.";
+    LABELS "labels": 4, Domain::Labelled, Class::Model, WORD, "Object of each Gaussian [N], 0: unlabelled.";
+    DENSIFY_STATS "densify_stats": 8, Domain::Trained, Class::Model, None, "Sum of screen gradients and number of views since the last densification [N].";
+    LABEL_KEYS "label_keys": 4, Domain::Labelled, Class::Kept, None, "Votes of a step [N]: weight in the high half, label in the low; 0: none.";
+    FAILURE "failure": 4, Domain::One, Class::Kept, None, "Sticky bits; passes that change the model do nothing while one is set.";
+    V_INSTANCES "v_instances": 48, Domain::TrainedInstances, Class::Kept, VEC4, "Gradient record of each (splat, tile) pair [I,3 vec4], valid where its stamp is the step's.";
+
+    COUNTERS "counters": size_of::<Counters>() as u32, Domain::One, Class::Kept, None, "Counts of this step (glsl/include/step.glsl).";
+    DISPATCH_ARGS "dispatch_args": 4, Domain::Fixed(24), Class::Step, None, "Indirect dispatch arguments (ARGS_ words of constants.glsl).";
+    DEPTH_KEYS "depth_keys": 4, Domain::Gaussians, Class::Step, WORD, "Bits of z, or KEY_INVISIBLE [N].";
+    VISIBLE_OFFSETS "visible_offsets": 4, Domain::Gaussians, Class::Step, WORD, "Place among the visible [N].";
+    SPLAT_FROM_GAUSSIAN "splat_from_gaussian": 4, Domain::Gaussians, Class::Step, WORD, "Splat of each Gaussian, or NO_SPLAT [N].";
+    DEPTH_KEYS_A "depth_keys_a": 4, Domain::Gaussians, Class::Step, WORD, "Depth keys of the visible, before and after each two passes of the sort [V].";
+    DEPTH_KEYS_B "depth_keys_b": 4, Domain::Gaussians, Class::Step, WORD, "Depth keys between two passes of the sort [V].";
+    DEPTH_VALUES_A "gaussian_from_splat": 4, Domain::Gaussians, Class::Step, WORD, "Gaussian of each splat, in depth order after the sort [V].";
+    DEPTH_VALUES_B "depth_values_b": 4, Domain::Gaussians, Class::Step, WORD, "Gaussians between two passes of the sort [V].";
+    SCAN_PARTIALS "scan_partials": 4, Domain::ScanLanes, Class::Step, None, "Sum of each lane's share.";
+    SORT_HISTOGRAM "sort_histogram": 4, Domain::SortCells, Class::Step, WORD, "Counts by digit and lane.";
+    SPLATS "splats": 48, Domain::Gaussians, Class::Step, VEC4, "Projected Gaussians in depth order [V,3 vec4] (glsl/include/record.glsl).";
+    TILES_TOUCHED "tiles_touched": 4, Domain::Gaussians, Class::Step, WORD, "Tiles of each splat over all layers [V].";
+    INSTANCE_OFFSETS "instance_offsets": 4, Domain::Gaussians, Class::Step, WORD, "First slot of each splat [V].";
+    TILE_KEYS_A "tile_keys_a": 4, Domain::Instances, Class::Step, WORD, "Layer and tile of each pair [I].";
+    TILE_KEYS_B "tile_keys_b": 4, Domain::Instances, Class::Step, WORD, "The same between two passes of the sort [I].";
+    TILE_VALUES_A "tile_values_a": 4, Domain::Instances, Class::Step, WORD, "Slot of each pair during the sort [I].";
+    TILE_VALUES_B "tile_values_b": 4, Domain::Instances, Class::Step, WORD, "Slot of each pair during the sort [I].";
+    SPLAT_FROM_INSTANCE "splat_from_instance": 4, Domain::Instances, Class::Step, WORD, "Splat of each slot [I].";
+    SORTED_SPLATS "sorted_splats": 4, Domain::Instances, Class::Step, WORD, "Splats by layer, tile and depth [I].";
+    TILE_STARTS "tile_starts": 4, Domain::VirtualTiles, Class::Step, WORD, "First sorted pair of each tile of each layer.";
+    TILE_ENDS "tile_ends": 4, Domain::VirtualTiles, Class::Step, WORD, "One past the last.";
+    LAYER_OCCUPIED "layer_occupied": 4, Domain::VirtualTiles, Class::Step, WORD, "1 where an object layer's tile holds a splat.";
+    LAYER_OFFSETS "layer_offsets": 4, Domain::VirtualTiles, Class::Step, WORD, "Place among the occupied.";
+    LAYER_TILES "layer_tiles": 4, Domain::LayerTiles, Class::Step, WORD, "The occupied tiles of object layers.";
+    LAYER_STATE "layer_state": 8, Domain::LayerPixels, Class::Step, None, "Transmittance, last splat and gradient signs of each pixel of an occupied layer tile.";
+    LAYER_LOSS "layer_loss": 4, Domain::LayerTiles, Class::Step, None, "Label loss of each occupied layer tile, not scaled.";
+    IMAGE "image": 16, Domain::Pixels, Class::Step, VEC4, "The picture [P] (r, g, b over the background, final transmittance).";
+    LAST "last": 4, Domain::Pixels, Class::Step, WORD, "1 + index of the last splat of the tile's list that contributed [P].";
+    MAIN_GAUSSIAN "main_gaussian": 4, Domain::Pixels, Class::Step, None, "Gaussian with the largest weight, or NO_SPLAT [P].";
+    MAIN_WEIGHT_DEPTH "main_weight_depth": 8, Domain::Pixels, Class::Step, None, "Its weight, and the weighted sum of z over all splats [P].";
+    SSIM_A "ssim_a": 48, Domain::Pixels, Class::Step, VEC4, "Moments, then filtered derivative maps [3,P vec4].";
+    SSIM_B "ssim_b": 48, Domain::Pixels, Class::Step, VEC4, "Derivatives of SSIM by its moments, and its value [3,P vec4].";
+    V_IMAGE "v_image": 16, Domain::Pixels, Class::Step, VEC4, "Gradient of the photo loss by the picture [P].";
+    LOSS_PARTIALS "loss_partials": 8, Domain::LossPartials, Class::Step, None, "Sums of |x - y| and of SSIM by strips.";
+    V_SPLATS "v_splats": 48, Domain::Gaussians, Class::Step, VEC4, "Gradients of the splats [V,3 vec4].";
+    V_MEANS "v_means": 16, Domain::Gaussians, Class::Step, VEC4, "Gradients of means [V].";
+    V_SCALES "v_scales": 16, Domain::Gaussians, Class::Step, VEC4, "Gradients of scales [V].";
+    V_QUATS "v_quats": 16, Domain::Gaussians, Class::Step, VEC4, "Gradients of quats [V].";
+    V_SH0 "v_sh0": 16, Domain::Gaussians, Class::Step, VEC4, "Gradients of sh0 [V].";
+    V_SH1 "v_sh1": 48, Domain::Gaussians, Class::Step, VEC4, "Gradients of sh1 [V].";
+    V_SH2 "v_sh2": 64, Domain::Gaussians, Class::Step, VEC4, "Gradients of sh2 [V].";
+    V_SH3 "v_sh3": 96, Domain::Gaussians, Class::Step, VEC4, "Gradients of sh3 [V].";
+    CHILDREN_COUNTS "children_counts": 4, Domain::Gaussians, Class::Step, WORD, "What each Gaussian becomes: 0, 1 or 2 [N].";
+    CHILD_OFFSETS "child_offsets": 4, Domain::Gaussians, Class::Step, WORD, "Place of the first child [N].";
+    DENSIFY_ACTIONS "densify_actions": 4, Domain::Gaussians, Class::Step, WORD, "Decision for each Gaussian [N].";
+    OLD_MEANS "old_means": 16, Domain::Gaussians, Class::Step, VEC4, "Means before densification.";
+    OLD_SCALES "old_scales": 16, Domain::Gaussians, Class::Step, VEC4, "Scales before densification.";
+    OLD_QUATS "old_quats": 16, Domain::Gaussians, Class::Step, VEC4, "Quats before densification.";
+    OLD_VALUES "old_values": 96, Domain::Gaussians, Class::Step, VEC4, "One attribute before densification.";
+    OLD_LABELS "old_labels": 4, Domain::Labelled, Class::Step, WORD, "Labels before densification.";
+}

@@ -1,0 +1,371 @@
+//! Front-to-back blending of splats at pixels, its gradient, and the object layers.
+
+use super::Rules;
+use super::project::{Splat, SplatGradient};
+use super::tile::exponent;
+
+/// Distances to the nearest decision that would have gone the other way.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Margins {
+    /// Exponent to the smallest that counts, log2 units.
+    pub cut: f64,
+    /// Remaining transmittance to the one that stops, relative.
+    pub stop: f64,
+    /// Unclamped alpha to the largest alpha, relative; matters for gradients only.
+    pub clamp: f64,
+    /// Largest weight to the second largest, relative; matters for the main Gaussian only.
+    pub main: f64,
+}
+
+impl Default for Margins {
+    fn default() -> Self {
+        let far = f64::INFINITY;
+        Self { cut: far, stop: far, clamp: far, main: far }
+    }
+}
+
+impl Margins {
+    /// For colour, depth and transmittance.
+    pub fn image(&self) -> f64 {
+        self.cut.min(self.stop)
+    }
+
+    /// For gradients.
+    pub fn gradient(&self) -> f64 {
+        self.image().min(self.clamp)
+    }
+}
+
+/// One splat that is blended at a pixel.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Contribution {
+    /// Place in the list of splats.
+    pub splat: usize,
+    /// Clamped alpha.
+    pub alpha: f64,
+    /// Transmittance in front of it.
+    pub transmittance: f64,
+    /// True where alpha was cut to the largest.
+    pub clamped: bool,
+}
+
+impl Contribution {
+    /// alpha T.
+    pub fn weight(&self) -> f64 {
+        self.alpha * self.transmittance
+    }
+}
+
+/// All that happens along the ray of one pixel.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Trace {
+    /// Front to back.
+    pub contributions: Vec<Contribution>,
+    /// Left for the background.
+    pub transmittance: f64,
+    /// Nearest decisions (without `main`).
+    pub margins: Margins,
+    /// True where the transmittance rule ended the ray.
+    pub stopped: bool,
+}
+
+/// Half the width and height of the box around {alpha >= alpha_min}, px; `None` where it is empty.
+pub fn reach(rules: &Rules, splat: &Splat) -> Option<[f64; 2]> {
+    let level = 2.0 * (splat.opacity / rules.alpha_min).ln();
+    let [a, b, c] = splat.conic;
+    let det = a * c - b * b;
+    (level > -0.1).then(|| [c, a].map(|other| (level.max(0.0) * other / det).sqrt()))
+}
+
+/// Splats with their boxes (one pixel wider than exact, so that margins near the border are seen).
+struct Boxed<'a> {
+    splats: &'a [Splat],
+    reaches: Vec<[f64; 2]>,
+}
+
+impl<'a> Boxed<'a> {
+    fn new(rules: &Rules, splats: &'a [Splat]) -> Self {
+        let reaches = splats.iter().map(|s| reach(rules, s).map_or([-1.0; 2], |r| r.map(|v| v + 1.0)));
+        Self { splats, reaches: reaches.collect() }
+    }
+
+    fn near(&self, at: [f64; 2]) -> impl Iterator<Item = (usize, &Splat)> {
+        let inside = move |place: usize, splat: &Splat| {
+            (splat.mean2d[0] - at[0]).abs() <= self.reaches[place][0]
+                && (splat.mean2d[1] - at[1]).abs() <= self.reaches[place][1]
+        };
+        self.splats.iter().enumerate().filter(move |(place, splat)| inside(*place, splat))
+    }
+}
+
+/// Blends `splats` (nearest first) at a position; places refer to the iterator's numbers.
+pub fn trace<'a>(rules: &Rules, splats: impl Iterator<Item = (usize, &'a Splat)>, at: [f64; 2]) -> Trace {
+    let mut ray = Trace { transmittance: 1.0, ..Trace::default() };
+    for (place, splat) in splats {
+        if !ray.blend(rules, place, splat, at) {
+            break;
+        }
+    }
+    ray
+}
+
+impl Trace {
+    /// Adds one splat; false where the ray ends before it.
+    fn blend(&mut self, rules: &Rules, place: usize, splat: &Splat, at: [f64; 2]) -> bool {
+        let above = exponent(splat, at) - rules.exponent_min();
+        self.margins.cut = self.margins.cut.min(above.abs());
+        if above < 0.0 {
+            return true;
+        }
+        let raw = exponent(splat, at).exp2();
+        let alpha = raw.min(rules.alpha_max);
+        self.margins.clamp = self.margins.clamp.min((raw / rules.alpha_max - 1.0).abs());
+        let after = self.transmittance * (1.0 - alpha);
+        self.margins.stop = self.margins.stop.min((after / rules.transmittance_min - 1.0).abs());
+        if after < rules.transmittance_min {
+            self.stopped = true;
+            return false;
+        }
+        let (transmittance, clamped) = (self.transmittance, raw > rules.alpha_max);
+        self.contributions.push(Contribution { splat: place, alpha, transmittance, clamped });
+        self.transmittance = after;
+        true
+    }
+}
+
+/// What blending leaves at a pixel.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pixel {
+    /// Sum of alpha T c, plus what is left of the background.
+    pub colour: [f64; 3],
+    /// Transmittance behind the last splat; 1 - alpha of the pixel.
+    pub transmittance: f64,
+    /// Sum of alpha T z, world units, not normalised.
+    pub depth: f64,
+    /// Gaussian of the largest weight, the nearer of equals; -1 without any.
+    pub main: i32,
+    /// Largest weight.
+    pub main_weight: f64,
+    /// Place of the last blended splat in the list, plus 1; 0 without any.
+    pub last: usize,
+    /// Blended splats.
+    pub count: usize,
+    /// Nearest decisions.
+    pub margins: Margins,
+}
+
+/// An image of pixels, row-major.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Blended {
+    /// Width and height, px.
+    pub size: (usize, usize),
+    /// [height, width].
+    pub pixels: Vec<Pixel>,
+}
+
+impl Blended {
+    /// The colours alone.
+    pub fn colours(&self) -> Vec<[f64; 3]> {
+        self.pixels.iter().map(|pixel| pixel.colour).collect()
+    }
+}
+
+/// Sums up a ray.
+pub fn shade(splats: &[Splat], ray: &Trace, background: [f64; 3]) -> Pixel {
+    let mut pixel = Pixel {
+        colour: background.map(|channel| channel * ray.transmittance),
+        transmittance: ray.transmittance,
+        depth: 0.0,
+        main: -1,
+        main_weight: 0.0,
+        last: ray.contributions.last().map_or(0, |c| c.splat + 1),
+        count: ray.contributions.len(),
+        margins: ray.margins,
+    };
+    let mut second = 0.0_f64;
+    for contribution in &ray.contributions {
+        let (splat, weight) = (&splats[contribution.splat], contribution.weight());
+        (0..3).for_each(|channel| pixel.colour[channel] += weight * splat.colour[channel]);
+        pixel.depth += weight * splat.depth;
+        if weight > pixel.main_weight {
+            second = pixel.main_weight;
+            (pixel.main, pixel.main_weight) = (splat.gaussian as i32, weight);
+        } else {
+            second = second.max(weight);
+        }
+    }
+    if pixel.main >= 0 {
+        pixel.margins.main = 1.0 - second / pixel.main_weight;
+    }
+    pixel
+}
+
+/// Centre of pixel number `index`.
+pub fn centre(index: usize, width: usize) -> [f64; 2] {
+    [(index % width) as f64 + 0.5, (index / width) as f64 + 0.5]
+}
+
+/// Blends depth-ordered splats over a background.
+pub fn blend_forward(rules: &Rules, splats: &[Splat], size: (usize, usize), background: [f64; 3]) -> Blended {
+    let boxed = Boxed::new(rules, splats);
+    let pixel = |index: usize| {
+        let at = centre(index, size.0);
+        shade(splats, &trace(rules, boxed.near(at), at), background)
+    };
+    Blended { size, pixels: (0..size.0 * size.1).map(pixel).collect() }
+}
+
+/// Gradients of splats, and how near a decision that bears on each was.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SplatGradients {
+    /// By splat, in the order of the list.
+    pub values: Vec<SplatGradient>,
+    /// Smallest gradient margin of the pixels that each splat counts in.
+    pub margins: Vec<f64>,
+}
+
+/// Gradients of depth-ordered splats for the gradient of the image.
+pub fn blend_backward(
+    rules: &Rules,
+    splats: &[Splat],
+    size: (usize, usize),
+    background: [f64; 3],
+    v_image: &[[f64; 3]],
+) -> SplatGradients {
+    layer_backward(rules, &Boxed::new(rules, splats), |_| true, size, background, v_image)
+}
+
+/// The gradient of a layer that holds the splats of `member`; the others get 0.
+fn layer_backward(
+    rules: &Rules,
+    boxed: &Boxed,
+    member: impl Fn(&Splat) -> bool,
+    size: (usize, usize),
+    background: [f64; 3],
+    v_image: &[[f64; 3]],
+) -> SplatGradients {
+    let count = boxed.splats.len();
+    let mut out = SplatGradients { values: vec![SplatGradient::default(); count], margins: vec![f64::INFINITY; count] };
+    for (index, &v_colour) in v_image.iter().enumerate() {
+        let at = centre(index, size.0);
+        let near = || boxed.near(at).filter(|(_, splat)| member(splat));
+        let ray = trace(rules, near(), at);
+        ray_backward(boxed.splats, &ray, at, background, v_colour, &mut out.values);
+        for (place, splat) in near() {
+            let above = exponent(splat, at) - rules.exponent_min();
+            let of_ray = if above >= 0.0 { ray.margins.gradient() } else { f64::INFINITY };
+            out.margins[place] = out.margins[place].min(of_ray).min(above.abs());
+        }
+    }
+    out
+}
+
+/// Smallest of the pixels' values at which each splat is large enough to count (hidden or not), by splat.
+pub fn smallest_over_pixels(rules: &Rules, splats: &[Splat], size: (usize, usize), values: &[f64]) -> Vec<f64> {
+    let boxed = Boxed::new(rules, splats);
+    let mut out = vec![f64::INFINITY; splats.len()];
+    for (index, &value) in values.iter().enumerate() {
+        let at = centre(index, size.0);
+        for (place, splat) in boxed.near(at) {
+            if exponent(splat, at) >= rules.exponent_min() {
+                out[place] = out[place].min(value);
+            }
+        }
+    }
+    out
+}
+
+fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
+    a.iter().zip(b).map(|(x, y)| x * y).sum()
+}
+
+/// Adds one ray's share. With C = sum w_i c_i + T b: dC/d alpha_i = T_i c_i - (everything behind i) / (1 - alpha_i).
+fn ray_backward(
+    splats: &[Splat],
+    ray: &Trace,
+    at: [f64; 2],
+    background: [f64; 3],
+    v_colour: [f64; 3],
+    v_splats: &mut [SplatGradient],
+) {
+    let mut behind = ray.transmittance * dot(background, v_colour);
+    for contribution in ray.contributions.iter().rev() {
+        let splat = &splats[contribution.splat];
+        let v = &mut v_splats[contribution.splat];
+        let (alpha, weight) = (contribution.alpha, contribution.weight());
+        let own = dot(splat.colour, v_colour);
+        let v_alpha = contribution.transmittance * own - behind / (1.0 - alpha);
+        behind += weight * own;
+        (0..3).for_each(|channel| v.colour[channel] += weight * v_colour[channel]);
+        if contribution.clamped {
+            continue;
+        }
+        v.opacity += alpha / splat.opacity * v_alpha;
+        let v_power = alpha * v_alpha;
+        let (dx, dy) = (splat.mean2d[0] - at[0], splat.mean2d[1] - at[1]);
+        let [a, b, c] = splat.conic;
+        v.conic[0] -= 0.5 * dx * dx * v_power;
+        v.conic[1] -= dx * dy * v_power;
+        v.conic[2] -= 0.5 * dy * dy * v_power;
+        v.mean2d[0] -= (a * dx + b * dy) * v_power;
+        v.mean2d[1] -= (b * dx + c * dy) * v_power;
+    }
+}
+
+/// Scene and objects in one walk along each ray: layer 0 blends every splat over `background`, layer 1 + j only the
+/// splats of `slots[j]` over black, each with its own transmittance.
+pub fn blend_layers_forward(
+    rules: &Rules,
+    splats: &[Splat],
+    labels: &[u32],
+    slots: &[u32],
+    size: (usize, usize),
+    background: [f64; 3],
+) -> Vec<Blended> {
+    let boxed = Boxed::new(rules, splats);
+    let mut layers = vec![Blended { size, pixels: Vec::new() }; slots.len() + 1];
+    for index in 0..size.0 * size.1 {
+        let at = centre(index, size.0);
+        let mut rays = vec![Trace { transmittance: 1.0, ..Trace::default() }; layers.len()];
+        for (place, splat) in boxed.near(at) {
+            let label = labels[splat.gaussian];
+            for (layer, ray) in rays.iter_mut().enumerate() {
+                if !ray.stopped && (layer == 0 || slots[layer - 1] == label) {
+                    ray.blend(rules, place, splat, at);
+                }
+            }
+        }
+        for (layer, ray) in rays.iter().enumerate() {
+            let behind = if layer == 0 { background } else { [0.0; 3] };
+            layers[layer].pixels.push(shade(splats, ray, behind));
+        }
+    }
+    layers
+}
+
+/// Gradients of all layers: the scene's share alone, and the sum over the object layers.
+pub fn blend_layers_backward(
+    rules: &Rules,
+    splats: &[Splat],
+    labels: &[u32],
+    slots: &[u32],
+    size: (usize, usize),
+    background: [f64; 3],
+    v_layers: &[Vec<[f64; 3]>],
+) -> (SplatGradients, SplatGradients) {
+    let boxed = Boxed::new(rules, splats);
+    let scene = layer_backward(rules, &boxed, |_| true, size, background, &v_layers[0]);
+    let mut objects = SplatGradients {
+        values: vec![SplatGradient::default(); splats.len()],
+        margins: vec![f64::INFINITY; splats.len()],
+    };
+    for (slot, &label) in slots.iter().enumerate() {
+        let member = |splat: &Splat| labels[splat.gaussian] == label;
+        let layer = layer_backward(rules, &boxed, member, size, [0.0; 3], &v_layers[slot + 1]);
+        for place in 0..splats.len() {
+            objects.values[place] = objects.values[place].plus(&layer.values[place]);
+            objects.margins[place] = objects.margins[place].min(layer.margins[place]);
+        }
+    }
+    (scene, objects)
+}

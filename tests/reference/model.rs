@@ -1,0 +1,145 @@
+//! Rows of parameters, and the same rows as gradients or moments.
+
+use labelgs::scene::Gaussians;
+use std::ops::Range;
+
+/// Floats per Gaussian.
+pub const ROW_FLOATS: usize = 59;
+
+/// The parameters of one Gaussian before activation (or their gradients, or their moments).
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Row {
+    /// World position.
+    pub mean: [f64; 3],
+    /// Rotation (w, x, y, z), of any length but 0.
+    pub quat: [f64; 4],
+    /// Natural logarithms of the standard deviations.
+    pub scale: [f64; 3],
+    /// Logit of the opacity.
+    pub opacity: f64,
+    /// Colour coefficients (r, g, b); those above the active degree are not read.
+    pub sh: [[f64; 3]; 16],
+}
+
+/// A run of a row's floats that the engine keeps in one buffer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Group {
+    /// Position.
+    Means,
+    /// Rotation.
+    Quats,
+    /// Log-scales.
+    Scales,
+    /// Opacity logit.
+    Opacities,
+    /// Degree 0.
+    Sh0,
+    /// Degree 1.
+    Sh1,
+    /// Degree 2.
+    Sh2,
+    /// Degree 3.
+    Sh3,
+}
+
+impl Group {
+    /// All groups, in row order.
+    pub const ALL: [Self; 8] =
+        [Self::Means, Self::Quats, Self::Scales, Self::Opacities, Self::Sh0, Self::Sh1, Self::Sh2, Self::Sh3];
+
+    /// Where the group stands in `Row::floats`.
+    pub fn range(self) -> Range<usize> {
+        match self {
+            Self::Means => 0..3,
+            Self::Quats => 3..7,
+            Self::Scales => 7..10,
+            Self::Opacities => 10..11,
+            Self::Sh0 => 11..14,
+            Self::Sh1 => 14..23,
+            Self::Sh2 => 23..38,
+            Self::Sh3 => 38..59,
+        }
+    }
+}
+
+impl Row {
+    /// mean, quat, scale, opacity, sh (coefficient-major).
+    pub fn floats(&self) -> [f64; ROW_FLOATS] {
+        let mut out = [0.0; ROW_FLOATS];
+        out[0..3].copy_from_slice(&self.mean);
+        out[3..7].copy_from_slice(&self.quat);
+        out[7..10].copy_from_slice(&self.scale);
+        out[10] = self.opacity;
+        out[11..].copy_from_slice(self.sh.as_flattened());
+        out
+    }
+
+    /// The inverse of `floats`.
+    pub fn from_floats(floats: &[f64; ROW_FLOATS]) -> Self {
+        let mut row = Self { opacity: floats[10], ..Self::default() };
+        row.mean.copy_from_slice(&floats[0..3]);
+        row.quat.copy_from_slice(&floats[3..7]);
+        row.scale.copy_from_slice(&floats[7..10]);
+        row.sh.as_flattened_mut().copy_from_slice(&floats[11..]);
+        row
+    }
+
+    /// The sum of two rows.
+    pub fn plus(&self, other: &Self) -> Self {
+        let (mut floats, others) = (self.floats(), other.floats());
+        floats.iter_mut().zip(others).for_each(|(a, b)| *a += b);
+        Self::from_floats(&floats)
+    }
+}
+
+/// One group of all rows, [N, group].
+pub fn flatten(rows: &[Row], group: Group) -> Vec<f64> {
+    rows.iter().flat_map(|row| row.floats()[group.range()].to_vec()).collect()
+}
+
+/// Gaussians with their labels.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Model {
+    /// Parameters, [N].
+    pub rows: Vec<Row>,
+    /// Object ids, [N], 0 = unlabelled.
+    pub labels: Vec<u32>,
+    /// Active degree of the spherical harmonics, 0 to 3.
+    pub sh_degree: u32,
+}
+
+impl Model {
+    /// The same numbers, widened.
+    pub fn from_gaussians(gaussians: &Gaussians) -> Self {
+        let rest = gaussians.rest_per_gaussian();
+        let row = |i: usize| {
+            let mut sh = [[0.0; 3]; 16];
+            sh[0] = gaussians.sh0[i].map(f64::from);
+            for k in 0..rest {
+                sh[k + 1] = gaussians.sh_rest[i * rest + k].map(f64::from);
+            }
+            Row {
+                mean: gaussians.means[i].map(f64::from),
+                quat: gaussians.quats[i].map(f64::from),
+                scale: gaussians.scales[i].map(f64::from),
+                opacity: f64::from(gaussians.opacities[i]),
+                sh,
+            }
+        };
+        Self {
+            rows: (0..gaussians.len()).map(row).collect(),
+            labels: gaussians.labels.clone().unwrap_or_else(|| vec![0; gaussians.len()]),
+            sh_degree: gaussians.sh_degree,
+        }
+    }
+
+    /// The rows for which `keep` holds, in order.
+    pub fn filtered(&self, keep: impl Fn(usize) -> bool) -> Self {
+        let kept: Vec<usize> = (0..self.rows.len()).filter(|&i| keep(i)).collect();
+        Self {
+            rows: kept.iter().map(|&i| self.rows[i]).collect(),
+            labels: kept.iter().map(|&i| self.labels[i]).collect(),
+            sh_degree: self.sh_degree,
+        }
+    }
+}

@@ -1,0 +1,188 @@
+//! Every constant of the method, as the f32 value that the engine uses, widened to f64.
+
+/// Constants of all passes.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Rules {
+    /// Camera-space depth at and below which a Gaussian is not drawn, world units.
+    pub near: f64,
+    /// Added to the diagonal of the 2-D covariance, px^2.
+    pub dilation: f64,
+    /// How far outside the image x/z and y/z may go in the Jacobian, in units of tan(fov/2).
+    pub jacobian_margin: f64,
+    /// Smallest alpha that counts.
+    pub alpha_min: f64,
+    /// Largest alpha.
+    pub alpha_max: f64,
+    /// A splat that would leave less than this is not drawn, nor anything behind it.
+    pub transmittance_min: f64,
+    /// Added to the colour of the spherical harmonics.
+    pub colour_bias: f64,
+    /// Spherical-harmonics factor, degree 0.
+    pub sh_c0: f64,
+    /// Spherical-harmonics factor, degree 1.
+    pub sh_c1: f64,
+    /// Spherical-harmonics factors, degree 2, in the order xy, yz, 2zz-xx-yy, xz, xx-yy.
+    pub sh_c2: [f64; 5],
+    /// Spherical-harmonics factors, degree 3, in the order of `sh::basis`.
+    pub sh_c3: [f64; 7],
+    /// Weight of the absolute difference in the photo loss.
+    pub l1_weight: f64,
+    /// Weight of 1 - SSIM in the photo loss.
+    pub dssim_weight: f64,
+    /// Weight of the label loss (lambda 2).
+    pub label_weight: f64,
+    /// Standard deviation of the SSIM window, px.
+    pub ssim_sigma: f64,
+    /// Reach of the SSIM window from its centre, px (window = 2 reach + 1).
+    pub ssim_reach: usize,
+    /// Stabiliser of the SSIM luminance term.
+    pub ssim_c1: f64,
+    /// Stabiliser of the SSIM contrast term.
+    pub ssim_c2: f64,
+    /// Decay of Adam's first moment.
+    pub adam_beta1: f64,
+    /// Decay of Adam's second moment.
+    pub adam_beta2: f64,
+    /// Added to Adam's denominator.
+    pub adam_eps: f64,
+    /// Mean 2-D gradient (NDC units) from which a Gaussian is cloned or split.
+    pub densify_gradient: f64,
+    /// Largest scale that is cloned; larger ones are split, in units of the scene extent.
+    pub percent_dense: f64,
+    /// A split child has this fraction of its parent's scale, as a divisor.
+    pub split_shrink: f64,
+    /// Gaussians below this opacity are removed.
+    pub prune_opacity: f64,
+    /// Gaussians above this scale are removed, in units of the scene extent.
+    pub prune_scale: f64,
+    /// Large Gaussians are removed after this step.
+    pub prune_scale_after: u32,
+    /// Ceiling of an opacity reset.
+    pub reset_opacity: f64,
+    /// Weight from which a main Gaussian takes the label of its pixel.
+    pub lift_threshold: f64,
+}
+
+/// The f32 constant as f64.
+pub fn wide(value: f32) -> f64 {
+    f64::from(value)
+}
+
+impl Default for Rules {
+    fn default() -> Self {
+        Self {
+            near: wide(0.2),
+            dilation: wide(0.3),
+            jacobian_margin: wide(0.3),
+            alpha_min: wide(1.0 / 255.0),
+            alpha_max: wide(0.99),
+            transmittance_min: wide(1e-4),
+            colour_bias: wide(0.5),
+            sh_c0: wide(0.282_094_79),
+            sh_c1: wide(0.488_602_5),
+            sh_c2: [1.092_548_4, -1.092_548_4, 0.315_391_57, -1.092_548_4, 0.546_274_2].map(wide),
+            sh_c3: [-0.590_043_6, 2.890_611_4, -0.457_045_8, 0.373_176_34, -0.457_045_8, 1.445_305_7, -0.590_043_6]
+                .map(wide),
+            l1_weight: wide(0.8),
+            dssim_weight: wide(0.2),
+            label_weight: 1.0,
+            ssim_sigma: 1.5,
+            ssim_reach: 5,
+            ssim_c1: wide(0.01 * 0.01),
+            ssim_c2: wide(0.03 * 0.03),
+            adam_beta1: wide(0.9),
+            adam_beta2: wide(0.999),
+            adam_eps: wide(1e-15),
+            densify_gradient: wide(2e-4),
+            percent_dense: wide(0.01),
+            split_shrink: wide(1.6),
+            prune_opacity: wide(0.005),
+            prune_scale: wide(0.1),
+            prune_scale_after: 3000,
+            reset_opacity: wide(0.01),
+            lift_threshold: wide(0.6),
+        }
+    }
+}
+
+impl Rules {
+    /// The exponent (log2 of alpha) at and above which a pair counts.
+    pub fn exponent_min(&self) -> f64 {
+        self.alpha_min.log2()
+    }
+}
+
+/// Where a constant bears.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Family {
+    /// Splats of a view.
+    Project,
+    /// Colour of a splat.
+    Sh,
+    /// Image of a view.
+    Blend,
+    /// Photo and label loss.
+    Loss,
+    /// Optimiser.
+    Adam,
+    /// Cloning, splitting, removing.
+    Densify,
+    /// Opacity reset.
+    Reset,
+    /// Labelling.
+    Lift,
+}
+
+/// A set of rules with one constant changed; a comparison with it must fail.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Mutant {
+    /// Name of the constant.
+    pub name: &'static str,
+    /// Where it bears.
+    pub family: Family,
+    /// All constants, this one changed.
+    pub rules: Rules,
+}
+
+/// One mutant for each constant, most of them off by a few per cent.
+pub fn mutants() -> Vec<Mutant> {
+    use Family::{Adam, Blend, Densify, Lift, Loss, Project, Reset, Sh};
+    type Change = fn(&mut Rules);
+    let changes: [(&'static str, Family, Change); 28] = [
+        ("near", Project, |r| r.near = 3.8),
+        ("dilation", Project, |r| r.dilation *= 1.03),
+        ("jacobian_margin", Project, |r| r.jacobian_margin *= 0.97),
+        ("alpha_min", Blend, |r| r.alpha_min *= 1.03),
+        ("alpha_max", Blend, |r| r.alpha_max *= 0.97),
+        ("transmittance_min", Blend, |r| r.transmittance_min *= 10.0),
+        ("colour_bias", Sh, |r| r.colour_bias *= 1.03),
+        ("sh_c0", Sh, |r| r.sh_c0 *= 1.03),
+        ("sh_c1", Sh, |r| r.sh_c1 *= 1.03),
+        ("sh_c2", Sh, |r| r.sh_c2[2] *= 1.03),
+        ("sh_c3", Sh, |r| r.sh_c3[6] *= 1.03),
+        ("l1_weight", Loss, |r| r.l1_weight *= 1.03),
+        ("dssim_weight", Loss, |r| r.dssim_weight *= 1.03),
+        ("label_weight", Loss, |r| r.label_weight *= 1.03),
+        ("ssim_sigma", Loss, |r| r.ssim_sigma *= 1.03),
+        ("ssim_reach", Loss, |r| r.ssim_reach -= 1),
+        ("ssim_c1", Loss, |r| r.ssim_c1 *= 1.3),
+        ("ssim_c2", Loss, |r| r.ssim_c2 *= 1.3),
+        ("adam_beta1", Adam, |r| r.adam_beta1 *= 0.97),
+        ("adam_beta2", Adam, |r| r.adam_beta2 *= 0.97),
+        ("adam_eps", Adam, |r| r.adam_eps = 1e-8),
+        ("densify_gradient", Densify, |r| r.densify_gradient *= 1.5),
+        ("percent_dense", Densify, |r| r.percent_dense *= 1.5),
+        ("split_shrink", Densify, |r| r.split_shrink *= 1.03),
+        ("prune_opacity", Densify, |r| r.prune_opacity *= 4.0),
+        ("prune_scale", Densify, |r| r.prune_scale *= 0.5),
+        ("prune_scale_after", Densify, |r| r.prune_scale_after = 100),
+        ("reset_opacity", Reset, |r| r.reset_opacity *= 1.03),
+    ];
+    let lift: (&'static str, Family, Change) = ("lift_threshold", Lift, |r| r.lift_threshold *= 0.75);
+    let changed = |(name, family, change): (&'static str, Family, Change)| {
+        let mut rules = Rules::default();
+        change(&mut rules);
+        Mutant { name, family, rules }
+    };
+    changes.into_iter().chain([lift]).map(changed).collect()
+}

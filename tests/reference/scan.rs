@@ -1,0 +1,17 @@
+//! Prefix sums and compaction: exact answers.
+
+/// Sums of all earlier values, and the total.
+pub fn exclusive_scan(values: &[u32]) -> (Vec<u32>, u32) {
+    let mut total = 0_u32;
+    let sums = values.iter().map(|&value| {
+        let before = total;
+        total = total.wrapping_add(value);
+        before
+    });
+    (sums.collect(), total)
+}
+
+/// Places whose flag is not 0, in order.
+pub fn compact(flags: &[u32]) -> Vec<u32> {
+    (0..flags.len()).filter(|&place| flags[place] != 0).map(|place| place as u32).collect()
+}

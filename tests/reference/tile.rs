@@ -1,0 +1,172 @@
+//! Which tiles a splat counts in: by every pixel, and by the continuous test over the rectangle of pixel centres.
+
+use super::Rules;
+use super::project::Splat;
+
+/// log2 of alpha before the clamp at a position, px.
+pub fn exponent(splat: &Splat, at: [f64; 2]) -> f64 {
+    let (dx, dy) = (splat.mean2d[0] - at[0], splat.mean2d[1] - at[1]);
+    let [a, b, c] = splat.conic;
+    splat.opacity.log2() - (0.5 * (a * dx * dx + c * dy * dy) + b * dx * dy) * std::f64::consts::LOG2_E
+}
+
+/// A grid of tiles over an image; the last column and row may be cut by the image border.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct TileGrid {
+    /// Image size, px.
+    pub size: (usize, usize),
+    /// Tile size, px.
+    pub tile: (usize, usize),
+}
+
+impl TileGrid {
+    /// Tiles in a row.
+    pub fn columns(&self) -> usize {
+        self.size.0.div_ceil(self.tile.0)
+    }
+
+    /// Rows of tiles.
+    pub fn rows(&self) -> usize {
+        self.size.1.div_ceil(self.tile.1)
+    }
+
+    /// Tiles of the image.
+    pub fn count(&self) -> usize {
+        self.columns() * self.rows()
+    }
+
+    /// Pixel columns [start, end) of tile column `column`.
+    pub fn span_x(&self, column: usize) -> (usize, usize) {
+        (column * self.tile.0, ((column + 1) * self.tile.0).min(self.size.0))
+    }
+
+    /// Pixel rows [start, end) of tile row `row`.
+    pub fn span_y(&self, row: usize) -> (usize, usize) {
+        (row * self.tile.1, ((row + 1) * self.tile.1).min(self.size.1))
+    }
+}
+
+/// The answer of a continuous test.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Touch {
+    /// True where alpha reaches the minimum somewhere in the rectangle.
+    pub touches: bool,
+    /// Distance of the largest exponent to the cut, log2 units.
+    pub margin: f64,
+}
+
+/// Largest exponent over the rectangle [low, high] of positions, px.
+pub fn largest_exponent(splat: &Splat, low: [f64; 2], high: [f64; 2]) -> f64 {
+    let m = splat.mean2d;
+    let nearest = [m[0].clamp(low[0], high[0]), m[1].clamp(low[1], high[1])];
+    if nearest == m {
+        return exponent(splat, m);
+    }
+    // The form is convex: outside its centre the maximum lies on an edge, at the edge's own best point.
+    let [a, b, c] = splat.conic;
+    let on_vertical = |x: f64| [x, (m[1] + b * (m[0] - x) / c).clamp(low[1], high[1])];
+    let on_horizontal = |y: f64| [(m[0] + b * (m[1] - y) / a).clamp(low[0], high[0]), y];
+    [on_vertical(low[0]), on_vertical(high[0]), on_horizontal(low[1]), on_horizontal(high[1])]
+        .into_iter()
+        .map(|at| exponent(splat, at))
+        .fold(f64::NEG_INFINITY, f64::max)
+}
+
+/// Continuous test of the pixel centres of columns [x0, x1) and rows [y0, y1).
+pub fn touch(rules: &Rules, splat: &Splat, (x0, x1): (usize, usize), (y0, y1): (usize, usize)) -> Touch {
+    let low = [x0 as f64 + 0.5, y0 as f64 + 0.5];
+    let high = [x1 as f64 - 0.5, y1 as f64 - 0.5];
+    let above = largest_exponent(splat, low, high) - rules.exponent_min();
+    Touch { touches: above >= 0.0, margin: above.abs() }
+}
+
+/// Does the splat count anywhere between the outermost pixel centres of the image?
+pub fn cull(rules: &Rules, splat: &Splat, size: (usize, usize)) -> Touch {
+    touch(rules, splat, (0, size.0), (0, size.1))
+}
+
+/// Tiles of the continuous test, in row-major order, and the smallest margin of all tiles.
+pub fn touched_tiles(rules: &Rules, splat: &Splat, grid: &TileGrid) -> (Vec<u32>, f64) {
+    let mut tiles = Vec::new();
+    let mut margin = f64::INFINITY;
+    for row in 0..grid.rows() {
+        for column in 0..grid.columns() {
+            let touch = touch(rules, splat, grid.span_x(column), grid.span_y(row));
+            margin = margin.min(touch.margin);
+            if touch.touches {
+                tiles.push((row * grid.columns() + column) as u32);
+            }
+        }
+    }
+    (tiles, margin)
+}
+
+/// Tiles whose largest exponent is at most `slack` (log2 units) below the cut: an engine that errs on the side of one
+/// tile too many lies between slack 0 and its own.
+pub fn tiles_within(rules: &Rules, splat: &Splat, grid: &TileGrid, slack: f64) -> Vec<u32> {
+    let lower = Rules { alpha_min: rules.alpha_min * (-slack).exp2(), ..rules.clone() };
+    touched_tiles(&lower, splat, grid).0
+}
+
+/// Tiles in which at least one pixel counts, by trying each; always a subset of `touched_tiles`.
+pub fn counted_tiles(rules: &Rules, splat: &Splat, grid: &TileGrid) -> Vec<u32> {
+    let counts = |x: usize, y: usize| exponent(splat, [x as f64 + 0.5, y as f64 + 0.5]) >= rules.exponent_min();
+    let mut tiles = Vec::new();
+    for row in 0..grid.rows() {
+        for column in 0..grid.columns() {
+            let ((x0, x1), (y0, y1)) = (grid.span_x(column), grid.span_y(row));
+            if (y0..y1).any(|y| (x0..x1).any(|x| counts(x, y))) {
+                tiles.push((row * grid.columns() + column) as u32);
+            }
+        }
+    }
+    tiles
+}
+
+/// A splat in a tile of a layer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Instance {
+    /// layer * tiles + tile; layer 0 is the scene, layer 1 + j the object slot j.
+    pub key: u32,
+    /// Place in the depth-ordered list of splats.
+    pub splat: u32,
+}
+
+/// Instances of all splats: by splat, the scene's tiles first, then the same tiles in the splat's object layer.
+/// `slot_of(gaussian)` is the object slot of a labelled Gaussian in this step.
+pub fn emit_instances(
+    rules: &Rules,
+    splats: &[Splat],
+    grid: &TileGrid,
+    slot_of: impl Fn(usize) -> Option<usize>,
+) -> Vec<Instance> {
+    let mut instances = Vec::new();
+    for (index, splat) in splats.iter().enumerate() {
+        let (tiles, _) = touched_tiles(rules, splat, grid);
+        let layers = std::iter::once(0).chain(slot_of(splat.gaussian).map(|slot| slot + 1));
+        for layer in layers {
+            let key = |tile: &u32| (layer * grid.count()) as u32 + tile;
+            instances.extend(tiles.iter().map(|tile| Instance { key: key(tile), splat: index as u32 }));
+        }
+    }
+    instances
+}
+
+/// The longest list, and for each key whether its list holds anything.
+pub fn tile_lengths(ranges: &[[u32; 2]]) -> (u32, Vec<bool>) {
+    let lengths = ranges.iter().map(|[start, end]| end - start);
+    (lengths.clone().max().unwrap_or(0), lengths.map(|length| length > 0).collect())
+}
+
+/// [start, end) of each key in a sorted list of keys; (0, 0) for keys that do not occur.
+pub fn tile_ranges(sorted_keys: &[u32], keys: usize) -> Vec<[u32; 2]> {
+    let mut ranges = vec![[0, 0]; keys];
+    for (place, &key) in sorted_keys.iter().enumerate() {
+        let range = &mut ranges[key as usize];
+        if range[1] == 0 {
+            range[0] = place as u32;
+        }
+        range[1] = place as u32 + 1;
+    }
+    ranges
+}

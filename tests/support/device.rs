@@ -1,0 +1,94 @@
+//! The device of the test process.
+//!
+//! One device for all tests, lent to one test at a time: `device()` holds a lock until its result is dropped. A software
+//! device uses all cores by itself, so turns cost little, and a message of the validation layer belongs to the test
+//! whose turn it is. Dropping the turn fails the test if the layer said anything.
+//!
+//! Without a device, tests that call `device()` return early with a message on stderr; with `LABELGS_REQUIRE_VULKAN=1`
+//! they fail instead. `LABELGS_DEVICE` chooses a device, `LABELGS_VALIDATION` (`off`, `on`, `sync`, `gpu`) what the layer
+//! checks, if it is installed; `sync` unless given.
+
+use labelgs::gpu::{Gpu, GpuOptions, Validation};
+use std::ops::Deref;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
+
+static TURN: Mutex<()> = Mutex::new(());
+
+/// Weak, so that the device is destroyed (and its leaks found) when nobody needs it, not in the middle of `exit`.
+static DEVICE: Mutex<Weak<Gpu>> = Mutex::new(Weak::new());
+
+/// A test's turn with the device.
+pub struct Turn {
+    gpu: Arc<Gpu>,
+    messages_before: usize,
+    _turn: MutexGuard<'static, ()>,
+}
+
+impl Turn {
+    /// The device, to make a scheduler with.
+    pub fn gpu(&self) -> Arc<Gpu> {
+        Arc::clone(&self.gpu)
+    }
+
+    /// Takes note of messages that were expected.
+    #[allow(dead_code)]
+    pub fn forgive(&mut self) {
+        self.messages_before = self.gpu.messages().len();
+    }
+}
+
+impl Deref for Turn {
+    type Target = Arc<Gpu>;
+
+    fn deref(&self) -> &Arc<Gpu> {
+        &self.gpu
+    }
+}
+
+impl Drop for Turn {
+    fn drop(&mut self) {
+        let messages = self.gpu.messages();
+        let new = &messages[self.messages_before.min(messages.len())..];
+        if !new.is_empty() && !std::thread::panicking() {
+            panic!("the validation layer has {} messages: {new:#?}", new.len());
+        }
+    }
+}
+
+/// This test's turn with the device; none, with a message, if there is no device.
+pub fn device() -> Option<Turn> {
+    let turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
+    let mut shared = DEVICE.lock().unwrap_or_else(PoisonError::into_inner);
+    let gpu = match shared.upgrade() {
+        Some(gpu) => gpu,
+        None => {
+            let gpu = open()?;
+            *shared = Arc::downgrade(&gpu);
+            gpu
+        }
+    };
+    let messages_before = gpu.messages().len();
+    Some(Turn { gpu, messages_before, _turn: turn })
+}
+
+/// The options of the shared device.
+pub fn options() -> GpuOptions {
+    let mut options = GpuOptions::from_env().expect("the environment variables of the device are right");
+    if std::env::var_os("LABELGS_VALIDATION").is_none() {
+        options.validation = Validation::Sync;
+    }
+    options
+}
+
+fn open() -> Option<Arc<Gpu>> {
+    match Gpu::new(&options()) {
+        Ok(gpu) => Some(gpu),
+        Err(error) if std::env::var("LABELGS_REQUIRE_VULKAN").is_ok_and(|value| value == "1") => {
+            panic!("LABELGS_REQUIRE_VULKAN=1 and {error}")
+        }
+        Err(error) => {
+            eprintln!("skipped: {error}");
+            None
+        }
+    }
+}

@@ -1,0 +1,76 @@
+//! Parser of `glsl/variants.txt`: which shaders are compiled more than once, and with which macros.
+//!
+//! `stem + suffix: DEFINE OTHER=4` compiles `stem.comp` once more as `stem_suffix`, with the same interface.
+//! `* + suffix: DEFINE` does so for every shader that fetches through FETCH4 or FETCHU.
+//! `sibling = stem: DEFINE` makes a shader of its own, with an interface of its own, from the same file.
+//! Every stem has its base variant without macros; it needs no line. `#` begins a comment.
+
+use super::compile::Define;
+use super::{Finding, is_snake_case};
+use std::collections::BTreeSet;
+
+/// One line of the file.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct VariantLine {
+    /// Stem of the shader file, or `*`.
+    pub stem: String,
+    /// What the variant is called after the stem; for a sibling its own stem.
+    pub suffix: String,
+    /// Whether the line makes a sibling.
+    pub sibling: bool,
+    /// Macros that it is compiled with.
+    pub defines: Vec<Define>,
+    /// Line number from 1.
+    pub line: usize,
+}
+
+impl VariantLine {
+    /// Whether the line adds a variant to this shader.
+    pub fn applies_to(&self, shader: &super::Shader) -> bool {
+        let fetches = || ["FETCH4(", "FETCHU("].iter().any(|word| shader.source.contains(word));
+        !self.sibling && (self.stem == shader.stem || (self.stem == "*" && fetches()))
+    }
+}
+
+/// All lines of the text; `name` is what messages call the file.
+pub fn parse(name: &str, text: &str) -> Result<Vec<VariantLine>, Vec<Finding>> {
+    let mut lines = Vec::new();
+    let mut findings = Vec::new();
+    let mut seen = BTreeSet::new();
+    for (index, raw) in text.lines().enumerate() {
+        let content = raw.split('#').next().unwrap_or("").trim();
+        if content.is_empty() {
+            continue;
+        }
+        let place = format!("{name}:{}", index + 1);
+        match parse_line(content, index + 1) {
+            Some(line) if !seen.insert((line.stem.clone(), line.suffix.clone())) => findings
+                .push(Finding::new(place, format!("variant `{} + {}` is declared twice", line.stem, line.suffix))),
+            Some(line) => lines.push(line),
+            None => findings.push(Finding::new(
+                place,
+                format!("`{content}` is no variant; write `stem + suffix: DEFINE OTHER=4`, the suffix not `base`"),
+            )),
+        }
+    }
+    if findings.is_empty() { Ok(lines) } else { Err(findings) }
+}
+
+fn parse_line(content: &str, line: usize) -> Option<VariantLine> {
+    let (name, macros) = content.split_once(':')?;
+    let (sibling, stem, suffix) = match name.split_once('=') {
+        Some((suffix, stem)) => (true, stem, suffix),
+        None => name.split_once('+').map(|(stem, suffix)| (false, stem, suffix))?,
+    };
+    let (stem, suffix) = (stem.trim().to_owned(), suffix.trim().to_owned());
+    let defines: Vec<Define> = macros
+        .split_whitespace()
+        .map(|text| match text.split_once('=') {
+            Some((define, value)) => (define.to_owned(), Some(value.to_owned())),
+            None => (text.to_owned(), None),
+        })
+        .collect();
+    let named = is_snake_case(&stem) || (stem == "*" && !sibling);
+    let good = named && is_snake_case(&suffix) && suffix != "base" && !defines.is_empty();
+    good.then_some(VariantLine { stem, suffix, sibling, defines, line })
+}
