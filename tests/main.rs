@@ -5,6 +5,7 @@ mod reference;
 #[allow(dead_code, reason = "helpers are shared by tests that come and go")]
 mod support;
 
+mod cli;
 mod compare_self;
 mod config;
 mod gradient;
@@ -13,6 +14,7 @@ mod labels;
 mod metrics;
 mod mirror_mutants;
 mod mirrors;
+mod output;
 mod plan;
 mod sched;
 mod shadergen;

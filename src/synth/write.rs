@@ -22,8 +22,24 @@ pub struct Summary {
     pub views: u32,
     /// Number of points.
     pub points: usize,
-    /// Id and name of each object.
-    pub objects: Vec<(u8, String)>,
+    /// The objects.
+    pub objects: Vec<Label>,
+}
+
+/// Id, name and display colour of an object; `labels.json` is a list of these.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Label {
+    /// Id in the masks.
+    pub id: u8,
+    /// Name.
+    pub name: String,
+    /// Colour in previews.
+    pub colour: [u8; 3],
+}
+
+fn labels(world: &World) -> Vec<Label> {
+    let label = |id: u8, name: &str| Label { id, name: name.to_owned(), colour: label_colour(u32::from(id)) };
+    world.objects.iter().map(|object| label(object.id, object.name)).collect()
 }
 
 /// Makes a scene and writes it into `folder`, which must be empty or new. `after_view` is told how many views are
@@ -38,19 +54,16 @@ pub fn write(options: &SynthOptions, folder: &Path, after_view: &dyn Fn(u32) -> 
     let world = World::new(options.preset, options.seed);
     let cameras = ring_of_cameras(options);
     create_folders(folder, &world)?;
-    write_labels(folder, &world)?;
+    let objects = labels(&world);
+    let text = serde_json::to_string_pretty(&objects).map_err(|error| Error::Bug(error.to_string()))?;
+    save(&folder.join("labels.json"), format!("{text}\n").as_bytes())?;
     let seen = points::sample(&world, &cameras, options);
     write_colmap(folder, &cameras, &seen)?;
     for (index, camera) in cameras.iter().enumerate() {
         write_view(folder, index, &world, &picture(&world, camera, index as u32))?;
         after_view(index as u32 + 1)?;
     }
-    Ok(Summary {
-        scene: folder.to_owned(),
-        views: options.views,
-        points: seen.len(),
-        objects: world.objects.iter().map(|object| (object.id, object.name.to_owned())).collect(),
-    })
+    Ok(Summary { scene: folder.to_owned(), views: options.views, points: seen.len(), objects })
 }
 
 fn create_folders(folder: &Path, world: &World) -> Result<()> {
@@ -64,22 +77,6 @@ fn create_folders(folder: &Path, world: &World) -> Result<()> {
         fs::create_dir_all(&path).map_err(Error::write(&path))?;
     }
     Ok(())
-}
-
-fn write_labels(folder: &Path, world: &World) -> Result<()> {
-    #[derive(Serialize)]
-    struct Label {
-        id: u8,
-        name: &'static str,
-        colour: [u8; 3],
-    }
-    let rows: Vec<Label> = world
-        .objects
-        .iter()
-        .map(|object| Label { id: object.id, name: object.name, colour: label_colour(u32::from(object.id)) })
-        .collect();
-    let text = serde_json::to_string_pretty(&rows).map_err(|error| Error::Bug(error.to_string()))?;
-    save(&folder.join("labels.json"), format!("{text}\n").as_bytes())
 }
 
 fn write_view(folder: &Path, index: usize, world: &World, made: &Picture) -> Result<()> {
