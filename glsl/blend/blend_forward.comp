@@ -36,7 +36,7 @@ FETCHU(10, gaussian_from_splat);
 #endif
 #ifdef LABELS
 FETCHU(8, layer_tiles);
-FETCH4(9, target);
+FETCHC(9, target);
 FETCHU(10, view_labels);
 READ(11, uint, layer_occluders);
 READ(12, uint, label_from_layer);
@@ -92,7 +92,7 @@ void main() {
 #ifdef LABELS
         if (t.layer != 0u && inside) {
             uint p = (t.y0 + k) * u.width + t.x;
-            inside = fetch4(target, p).w > 0.5 && !occluded(t.layer, fetchu(view_labels, p), u);
+            inside = fetchc(target, p).w > 0.5 && !occluded(t.layer, fetchu(view_labels, p), u);
         }
 #endif
         T[k] = inside ? 1.0 : -1.0; // the sign says whether the pixel still takes splats
@@ -168,7 +168,7 @@ void main() {
             bool inside = t.x < u.width && t.y0 + k < u.height;
             uint p = inside ? (t.y0 + k) * u.width + t.x : 0u;
             uint here = fetchu(view_labels, p);
-            vec4 photo = fetch4(target, p);
+            vec4 photo = fetchc(target, p);
             vec3 wanted = here == label ? photo.xyz : vec3(0.0);
             bool counts = inside && photo.w > 0.5 && !occluded(t.layer, here, u);
             vec3 difference = counts ? vec3(cr[k], cg[k], cb[k]) - wanted : vec3(0.0);

@@ -10,9 +10,9 @@ pub mod loss;
 mod lift;
 mod optimize;
 mod project;
-mod scan;
+pub mod scan;
 pub mod shape;
-mod sort;
+pub mod sort;
 mod tile;
 
 pub use build::Builder;
