@@ -19,8 +19,8 @@ pub fn opaque_scene(seed: u64) -> Scene {
 
 /// A pair that falls just beside the cut moves a colour by 1/255 of it; a stop moves it by 1e-4.
 const CUT: Band = Band { width: 2e-5, flip: 0.01, ratio: 0.001 };
-/// Sums of some 50 f32 products.
-const COLOUR: Tolerance = Tolerance { absolute: 3e-6, relative: 0.0 };
+/// Sums of some 50 f32 products; 4.1e-7 seen.
+const COLOUR: Tolerance = Tolerance { absolute: 6.5e-7, relative: 0.0 };
 
 /// Colours and transmittance of each pixel.
 fn picture(image: &Blended) -> Vec<f64> {
@@ -60,10 +60,10 @@ fn blend_forward_of_the_scene() {
     let (splats, size, background) = (rig.splats(), rig.size(), rig.scene.target.background);
     let image = rig.get::<[f32; 4]>(Buf::IMAGE, size.0 * size.1);
     let last = last_splats(&mut rig);
+    let stopped = image.iter().filter(|pixel| pixel[3] < 1e-3).count();
+    assert!(stopped > 100, "only {stopped} pixels are opaque");
     prove("blend_forward", &["alpha_min", "alpha_max", "transmittance_min"], |rules| {
         let expected = blend_forward(rules, &splats, size, background);
-        let stopped = expected.pixels.iter().filter(|pixel| pixel.transmittance < 1e-3).count();
-        assert!(stopped > 100, "only {stopped} pixels are opaque");
         let sure: Vec<usize> = (0..image.len()).filter(|&i| expected.pixels[i].margins.image() > CUT.width).collect();
         let (a, e): (Vec<usize>, Vec<usize>) = sure.iter().map(|&i| (last[i], expected.pixels[i].last)).unzip();
         exact(&a, &e)?;
@@ -103,12 +103,13 @@ fn blend_forward_main_of_a_render() {
 /// Splats whose decisions are all farther than this from their thresholds are compared.
 const SURE: f64 = 1e-5;
 
+/// Sums over pixels in f32, transmittance by division; 0.27 of (1e-6, 1e-5) seen by element, 0.25 of 1e-6 as a whole.
 const BOUNDS: GradientBounds = GradientBounds {
-    element: Tolerance { absolute: 1e-6, relative: 1e-4 },
+    element: Tolerance { absolute: 4e-7, relative: 4e-6 },
     outliers: 0.0,
-    norm: 1e-5,
-    angle: 1e-9,
-    bias: 1e-5,
+    norm: 4e-7,
+    angle: 4e-13,
+    bias: 4e-7,
 };
 
 /// Each kind of float of the splats' gradients on its own.
@@ -119,7 +120,7 @@ pub fn compare_splat_gradients(
     bounds: GradientBounds,
 ) -> Verdict {
     let sure: Vec<usize> = (0..actual.len()).filter(|&i| margins[i] > SURE).collect();
-    assert!(sure.len() * 10 > actual.len() * 8, "{} of {} splats are sure", sure.len(), actual.len());
+    assert!(sure.len() * 10 > actual.len() * 7, "{} of {} splats are sure", sure.len(), actual.len());
     let pick = |of: &[SplatGradient], kind: usize| -> Vec<f64> {
         let floats = |v: &SplatGradient| match kind {
             0 => v.mean2d.to_vec(),

@@ -5,6 +5,10 @@
 //! `step` compares the whole chain. Tolerances are 1.5 times the worst value seen on lavapipe, written beside them.
 
 mod blend;
+mod loss;
+mod optimize;
+mod orders;
 mod project;
 pub mod rig;
 mod step;
+mod tile;

@@ -29,9 +29,9 @@ pub fn all(verdicts: impl IntoIterator<Item = Verdict>) -> Verdict {
     let mut worst = Summary::default();
     for verdict in verdicts {
         let summary = verdict?;
-        let flips = worst.flips + summary.flips;
+        let (flips, whole) = (worst.flips + summary.flips, worst.whole.max(summary.whole));
         worst = if summary.worst > worst.worst { summary } else { worst };
-        worst.flips = flips;
+        (worst.flips, worst.whole) = (flips, whole);
     }
     Ok(worst)
 }
@@ -65,8 +65,8 @@ fn visible_gaussians_in_depth_order() {
                 depths.1.push(projection.splat.depth);
             }
         }
-        // z is a sum of three products of f32 numbers of a few units: some 1e-7 of them.
-        close(&depths.0, &depths.1, Tolerance { absolute: 1e-6, relative: 0.0 })
+        // z is a sum of three f32 products of some 4 units; 1.1e-6 seen at 8.9, 1.5e-7 at 0.5.
+        close(&depths.0, &depths.1, Tolerance { absolute: 2.5e-7, relative: 1.5e-7 })
     });
     let visible = report.counters.visible_count as usize;
     let flags: Vec<u32> = keys.iter().map(|&key| u32::from(key != KEY_INVISIBLE)).collect();
@@ -106,18 +106,19 @@ fn project_forward_of_each_degree() {
                 .map(|s| project_forward(rules, &camera, &model, s.gaussian).map_or(Splat::default(), |p| p.splat))
                 .collect();
             let floats = |of: &[Splat]| of.iter().zip(&expected).flat_map(|(s, e)| splat_floats(s, e)).collect::<Vec<_>>();
-            // Centres are some 50 px times an f32 rounding of a quotient.
-            close(&floats(&splats), &floats(&expected), Tolerance { absolute: 2e-5, relative: 0.0 })
+            // Centres are some 50 px times the roundings of a quotient; 8.9e-6 seen.
+            close(&floats(&splats), &floats(&expected), Tolerance { absolute: 1.4e-5, relative: 0.0 })
         });
     }
 }
 
+/// A chain of f32 products; 0.42 of (1e-6, 1e-5) seen by element, 0.74 of 1e-6 as a whole.
 const BOUNDS: GradientBounds = GradientBounds {
-    element: Tolerance { absolute: 1e-6, relative: 1e-4 },
+    element: Tolerance { absolute: 6.5e-7, relative: 6.5e-6 },
     outliers: 0.0,
-    norm: 1e-5,
-    angle: 1e-9,
-    bias: 1e-5,
+    norm: 1.1e-6,
+    angle: 1.1e-12,
+    bias: 1.1e-6,
 };
 
 /// Each group of floats on its own: their magnitudes have nothing to do with each other.

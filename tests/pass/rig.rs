@@ -267,7 +267,7 @@ pub fn splat_of(gaussian: u32, record: &[f32; 12]) -> Splat {
 #[track_caller]
 pub fn prove(name: &str, bearing: &[&str], compare: impl Fn(&Rules) -> Verdict) {
     let summary = check(name, compare(&Rules::default()));
-    println!("{name}: {:.2} of the tolerance, {} flips", summary.worst, summary.flips);
+    println!("{name}: {:.3}, as a whole {:.3} of the tolerance, {} flips", summary.worst, summary.whole, summary.flips);
     let all = mutants();
     for wanted in bearing {
         let mutant = all.iter().find(|mutant| mutant.name == *wanted).unwrap_or_else(|| panic!("no mutant {wanted}"));
