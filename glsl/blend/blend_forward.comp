@@ -13,7 +13,8 @@
 //          that contributed, within the tile's list (0: none); variant main: main_gaussian [P] (NO_SPLAT: none) and
 //          main_weight_depth [P] (weight, weighted sum of z);
 //          variant labels: layer_state [slots, pixels of a tile] (transmittance, last and signs of the loss gradient),
-//          layer_loss [slots], label_keys [N] (integer maximum, any order)
+//          layer_loss [slots] (label loss less that of an empty picture, which the host knows: tiles that hold no splat
+//          are not walked), label_keys [N] (integer maximum, any order)
 // Math:    LabelGS eq. 5; alpha <= ALPHA_MAX; a pair counts where alpha >= ALPHA_MIN, tested on the exponent; a pixel
 //          stops before the splat that would take its transmittance below TRANSMITTANCE_MIN (3DGS).
 //          Layers: eq. 8 and 9, black background; the L1 gradient of a layer is local to the pixel, so its sign is
@@ -172,7 +173,8 @@ void main() {
             vec3 wanted = here == label ? photo.xyz : vec3(0.0);
             bool counts = inside && photo.w > 0.5 && !occluded(t.layer, here, u);
             vec3 difference = counts ? vec3(cr[k], cg[k], cb[k]) - wanted : vec3(0.0);
-            loss += abs(difference.x) + abs(difference.y) + abs(difference.z);
+            vec3 change = counts ? abs(difference) - wanted : vec3(0.0); // wanted >= 0
+            loss += change.x + change.y + change.z;
             layer_state[layer_pixel(t, k)] = uvec2(floatBitsToUint(abs(T[k])), final_[k] | pack_signs(difference));
         }
         loss = subgroup_sum(loss);

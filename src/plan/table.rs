@@ -70,7 +70,7 @@ crate::buffers! {
     LAYER_OFFSETS "layer_offsets": 4, Domain::VirtualTiles, Class::Step, WORD, "Place among the occupied.";
     LAYER_TILES "layer_tiles": 4, Domain::LayerTiles, Class::Step, WORD, "The occupied tiles of object layers.";
     LAYER_STATE "layer_state": 8, Domain::LayerPixels, Class::Step, None, "Transmittance, last splat and gradient signs of each pixel of an occupied layer tile.";
-    LAYER_LOSS "layer_loss": 4, Domain::LayerTiles, Class::Step, None, "Label loss of each occupied layer tile, not scaled.";
+    LAYER_LOSS "layer_loss": 4, Domain::LayerTiles, Class::Step, None, "Label loss of each occupied layer tile less that of an empty picture, not scaled.";
     IMAGE "image": 16, Domain::Pixels, Class::Step, VEC4, "The picture [P] (r, g, b over the background, final transmittance).";
     LAST "last": 4, Domain::Pixels, Class::Step, WORD, "1 + index of the last splat of the tile's list that contributed [P].";
     MAIN_GAUSSIAN "main_gaussian": 4, Domain::Pixels, Class::Step, None, "Gaussian with the largest weight, or NO_SPLAT [P].";

@@ -5,6 +5,7 @@
 //! `step` compares the whole chain. Tolerances are 1.5 times the worst value seen on lavapipe, written beside them.
 
 mod blend;
+mod labels;
 mod loss;
 mod optimize;
 mod orders;

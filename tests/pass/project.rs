@@ -45,7 +45,7 @@ fn visible_gaussians_in_depth_order() {
     let count = rig.scene.gaussians.len();
     let keys = rig.get::<u32>(Buf::DEPTH_KEYS, count);
     let (model, camera, size) = (rig.model(), rig.scene.camera.clone(), rig.size());
-    prove("cull", &["near", "alpha_min"], |rules| {
+    prove("cull", &["near"], |rules| {
         let mut depths = (Vec::new(), Vec::new());
         for (index, &key) in keys.iter().enumerate() {
             let projection = project_forward(rules, &camera, &model, index);

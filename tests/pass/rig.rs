@@ -79,9 +79,11 @@ pub fn train_view(scene: &Scene) -> TrainView {
     let (width, height) = (camera.width, camera.height);
     let mask = LabelMap { width, height, ids: target.label_map.iter().map(|&id| id as u16).collect() };
     let occluders = |slot: &ObjectSlot| (slot.label as u16, slot.occluders.iter().map(|&id| id as u16).collect());
+    let photo = Photo { width, height, rgba };
     TrainView {
         name: "the view".to_owned(),
-        photo: Photo { width, height, rgba },
+        object_light: job::object_light(&photo, Some(&mask)),
+        photo,
         valid_pixels: target.photo.valid.iter().filter(|&&valid| valid).count() as u64,
         objects: mask.objects(),
         mask: Some(mask),
