@@ -13,10 +13,14 @@ use labelgs::plan::Buf;
 use labelgs::scene::Gaussians;
 use labelgs::train::job;
 
-/// Gaussians large and opaque enough to dominate pixels.
+/// Gaussians large and opaque enough to dominate pixels; masks are three columns, with nothing at the upper border.
 fn dominant(seed: u64) -> Scene {
     let shape = Shape { scales: (0.1, 0.5), opacities: (1.0, 8.0), ..Shape::default() };
-    scene(seed, &Shape { gaussians: 50, width: 61, height: 45, ..shape })
+    let mut s = scene(seed, &Shape { gaussians: 50, width: 61, height: 45, ..shape });
+    for (index, label) in s.target.label_map.iter_mut().enumerate() {
+        *label = if index / 61 < 6 { 0 } else { (index % 61 * 3 / 61 + 1) as u32 };
+    }
+    s
 }
 
 #[test]
