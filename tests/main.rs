@@ -17,5 +17,6 @@ mod mirrors;
 mod output;
 mod plan;
 mod sched;
+mod segments;
 mod shadergen;
 mod synth;

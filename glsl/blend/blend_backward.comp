@@ -31,6 +31,9 @@ FETCHU(10, layer_tiles);
 READ(11, uvec2, layer_state);
 #include "label_state.glsl"
 #endif
+#ifdef SEGMENTED
+INOUT(30, vec2, segment_back); // [jobs, pixels of a tile] (transmittance, light behind)
+#endif
 
 void main() {
     StepUniforms u = step;
@@ -55,6 +58,9 @@ void main() {
     uint list_start = fetchu(tile_starts, virtual_tile);
     vec2 corner = vec2(float(t.x - (lane % TILE_WIDTH)), float((t.tile / u.tiles_x) * TILE_HEIGHT));
 
+#ifdef SEGMENTED
+    uint kept = job * (TILE_WIDTH * TILE_HEIGHT) + lane;
+#endif
     float T[ROWS], behind[ROWS], g0[ROWS], g1[ROWS], g2[ROWS];
     uint final_[ROWS];
     uint deepest = 0u;
@@ -79,6 +85,13 @@ void main() {
             g = fetch4(v_image, p).xyz;
             behind[k] = dot(u.background, g);
         }
+#ifdef SEGMENTED
+        if (SEGMENT + 1u < SEGMENTS) {
+            vec2 state = segment_back[kept + k * SUBGROUP_SIZE];
+            T[k] = state.x;
+            behind[k] = state.y;
+        }
+#endif
         g0[k] = g.x;
         g1[k] = g.y;
         g2[k] = g.z;
@@ -90,8 +103,12 @@ void main() {
     float qx = t.px - centre.x;
     float qy0 = t.row0 + 0.5 * float(ROWS - 1u) - centre.y; // middle of the lane's rows
     const float middle = 0.5 * float(ROWS - 1u);
-    uint batches = (deepest + SUBGROUP_SIZE - 1u) / SUBGROUP_SIZE;
-    for (uint batch = batches; batch > 0u; batch--) {
+    uint batches = (deepest + SUBGROUP_SIZE - 1u) / SUBGROUP_SIZE, first = 0u;
+#ifdef SEGMENTED
+    first = min(SEGMENT * (SEGMENT_LENGTH / SUBGROUP_SIZE), batches);
+    batches = min(first + SEGMENT_LENGTH / SUBGROUP_SIZE, batches);
+#endif
+    for (uint batch = batches; batch > first; batch--) {
         uint base = (batch - 1u) * SUBGROUP_SIZE; // within the list
         uint count = min(SUBGROUP_SIZE, deepest - base);
         uint at = list_start + min(base + lane, deepest - 1u);
@@ -156,4 +173,11 @@ void main() {
             v_instances[slot + 2u] = vec4(ob, uintBitsToFloat(u.stamp), 0.0, 0.0);
         }
     }
+#ifdef SEGMENTED
+    if (SEGMENT > 0u) {
+        [[unroll]] for (uint k = 0u; k < ROWS; k++) {
+            segment_back[kept + k * SUBGROUP_SIZE] = vec2(T[k], behind[k]);
+        }
+    }
+#endif
 }

@@ -73,6 +73,9 @@ crate::buffers! {
     LAYER_LOSS "layer_loss": 4, Domain::LayerTiles, Class::Step, None, "Label loss of each occupied layer tile, not scaled.";
     IMAGE "image": 16, Domain::Pixels, Class::Step, VEC4, "The picture [P] (r, g, b over the background, final transmittance).";
     LAST "last": 4, Domain::Pixels, Class::Step, WORD, "1 + index of the last splat of the tile's list that contributed [P].";
+    SEGMENT_COLOURS "segment_colours": 16, Domain::SegmentPixels, Class::Step, None, "State of each pixel of each job between two segments of a long list (colour, transmittance).";
+    SEGMENT_REST "segment_rest": 16, Domain::SegmentPixels, Class::Step, None, "The same: last splat, main splat, its weight, depth.";
+    SEGMENT_BACK "segment_back": 8, Domain::SegmentPixels, Class::Step, None, "The same on the way back: transmittance, light behind.";
     MAIN_GAUSSIAN "main_gaussian": 4, Domain::Pixels, Class::Step, None, "Gaussian with the largest weight, or NO_SPLAT [P].";
     MAIN_WEIGHT_DEPTH "main_weight_depth": 8, Domain::Pixels, Class::Step, None, "Its weight, and the weighted sum of z over all splats [P].";
     SSIM_A "ssim_a": 48, Domain::Pixels, Class::Step, VEC4, "Moments, then filtered derivative maps [3,P vec4].";
