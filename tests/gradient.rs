@@ -3,7 +3,7 @@
 //! Differences are taken only where every decision is farther from its threshold than the step can move it; the scenes
 //! are chosen (by seed, once) so that this holds, and the tests refuse a scene where it does not.
 
-use crate::reference::blend::{blend_backward, blend_forward};
+use crate::reference::blend::{blend_backward, blend_forward, centre, trace};
 use crate::reference::loss::{label_loss, photo_loss};
 use crate::reference::model::ROW_FLOATS;
 use crate::reference::project::{Splat, SplatGradient, project_backward, project_forward};
@@ -42,15 +42,14 @@ pub fn agree(name: &str, analytic: &[f64], numeric: &[f64]) {
 }
 
 fn small() -> Shape {
-    Shape { gaussians: 9, width: 22, height: 18, objects: 2, sh_degree: 3, scales: (0.08, 0.5) }
+    Shape { gaussians: 9, width: 22, height: 18, objects: 2, sh_degree: 3, scales: (0.08, 0.5), ..Shape::default() }
 }
 
 /// The first scene of a seed range in which no decision is near its threshold.
-fn safe_scene(first: u64, shape: &Shape) -> Scene {
-    let rules = Rules::default();
+fn safe_scene(rules: &Rules, first: u64, shape: &Shape) -> Scene {
     (first..first + 400)
         .map(|seed| scene(seed, shape))
-        .find(|s| step(&rules, &s.camera, &s.model(), &s.target).margin > SAFE)
+        .find(|s| step(rules, &s.camera, &s.model(), &s.target).margin > SAFE)
         .expect("one seed in 400 keeps clear of all thresholds")
 }
 
@@ -121,15 +120,42 @@ fn project() {
     assert!(clamped > 5, "only {clamped} rows reach the clamp");
 }
 
+/// Splats so opaque that alpha is clamped and rays end early.
+fn opaque() -> Shape {
+    Shape { scales: (0.6, 2.0), opacities: (7.0, 12.0), ..small() }
+}
+
+/// Two clamped splats leave 1e-4 but for rounding, right at the usual threshold: take another one.
+fn opaque_rules() -> Rules {
+    Rules { transmittance_min: 3e-4, ..Rules::default() }
+}
+
 #[test]
 fn blend() {
-    let (rules, s) = (Rules::default(), safe_scene(100, &small()));
+    let rules = Rules::default();
+    blend_case(&rules, &safe_scene(&rules, 100, &small()));
+}
+
+#[test]
+fn blend_where_alpha_clamps_and_rays_stop() {
+    let rules = opaque_rules();
+    let s = safe_scene(&rules, 5000, &opaque());
     let splats = splats_of(&project::project_all(&rules, &s.camera, &s.model()));
+    let at = |index: usize| centre(index, s.camera.width as usize);
+    let rays: Vec<_> = (0..22 * 18).map(|i| trace(&rules, splats.iter().enumerate(), at(i))).collect();
+    let clamped = rays.iter().flat_map(|ray| &ray.contributions).filter(|c| c.clamped).count();
+    let stopped = rays.iter().filter(|ray| ray.stopped).count();
+    assert!(clamped > 10 && stopped > 30, "{clamped} clamped pairs, {stopped} stopped rays");
+    blend_case(&rules, &s);
+}
+
+fn blend_case(rules: &Rules, s: &Scene) {
+    let splats = splats_of(&project::project_all(rules, &s.camera, &s.model()));
     let size = (s.camera.width as usize, s.camera.height as usize);
     let mut random = generator(7);
     let v_image: Vec<[f64; 3]> =
         (0..size.0 * size.1).map(|_| [0; 3].map(|_| uniform(&mut random, -1.0, 1.0))).collect();
-    let v = blend_backward(&rules, &splats, size, s.target.background, &v_image);
+    let v = blend_backward(rules, &splats, size, s.target.background, &v_image);
     let analytic: Vec<f64> = v.values.iter().flat_map(gradient_floats).collect();
     let parameters: Vec<f64> = splats.iter().flat_map(splat_floats).collect();
     let numeric = differences(&parameters, |p| {
@@ -142,7 +168,7 @@ fn blend() {
                 ..*s
             })
             .collect();
-        let image = blend_forward(&rules, &moved, size, s.target.background).colours();
+        let image = blend_forward(rules, &moved, size, s.target.background).colours();
         image.as_flattened().iter().zip(v_image.as_flattened()).map(|(c, w)| c * w).sum()
     });
     agree("blend", &analytic, &numeric);
@@ -165,17 +191,29 @@ fn losses() {
     }
 }
 
+fn step_case(rules: &Rules, first: u64, shape: &Shape) {
+    let s = safe_scene(rules, first, shape);
+    let model = s.model();
+    let analytic: Vec<f64> = step(rules, &s.camera, &model, &s.target).rows.iter().flat_map(Row::floats).collect();
+    let parameters: Vec<f64> = model.rows.iter().flat_map(Row::floats).collect();
+    let numeric = differences(&parameters, |p| {
+        let rows = p.as_chunks::<ROW_FLOATS>().0.iter().map(Row::from_floats).collect();
+        step(rules, &s.camera, &Model { rows, ..model.clone() }, &s.target).value
+    });
+    agree("step", &analytic, &numeric);
+}
+
 #[test]
 fn whole_step() {
-    for (first, sh_degree) in [(1000, 3), (2000, 0)] {
-        let (rules, s) = (Rules::default(), safe_scene(first, &Shape { sh_degree, ..small() }));
-        let model = s.model();
-        let analytic: Vec<f64> = step(&rules, &s.camera, &model, &s.target).rows.iter().flat_map(Row::floats).collect();
-        let parameters: Vec<f64> = model.rows.iter().flat_map(Row::floats).collect();
-        let numeric = differences(&parameters, |p| {
-            let rows = p.as_chunks::<ROW_FLOATS>().0.iter().map(Row::from_floats).collect();
-            step(&rules, &s.camera, &Model { rows, ..model.clone() }, &s.target).value
-        });
-        agree("step", &analytic, &numeric);
-    }
+    step_case(&Rules::default(), 1000, &small());
+}
+
+#[test]
+fn whole_step_of_degree_0() {
+    step_case(&Rules::default(), 2000, &Shape { sh_degree: 0, ..small() });
+}
+
+#[test]
+fn whole_step_of_opaque_gaussians() {
+    step_case(&opaque_rules(), 3000, &Shape { gaussians: 6, ..opaque() });
 }

@@ -5,12 +5,16 @@ mod reference;
 #[allow(dead_code, reason = "helpers are shared by tests that come and go")]
 mod support;
 
+mod cli;
 mod compare_self;
 mod config;
 mod gradient;
+mod io;
 mod labels;
 mod metrics;
+mod mirror_mutants;
 mod mirrors;
+mod output;
 mod plan;
 mod sched;
 mod shadergen;

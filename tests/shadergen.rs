@@ -310,3 +310,37 @@ fn bad_lines_of_the_variants_are_found() {
         [("test/probe.comp", text.as_str()), ("test/probe_fast.comp", &twin), ("variants.txt", "probe + fast: F")];
     one_finding(&files, &["variants.txt:1", "`probe_fast` is a shader's name already"]);
 }
+
+#[test]
+fn siblings_have_an_interface_of_their_own_and_a_star_reaches_all_that_fetch() {
+    let fetching = small(
+        "FETCHU(1, keys);\n#ifdef MORE\nREAD(2, uint, more);\n#else\n#define more keys\n#endif",
+        "words[1] = more[0];",
+    );
+    let fetching = fetching
+        .replace("words[1] =", "words[2] = fetchu(keys, 1);\n#ifdef MORE\n    words[1] =")
+        .replace("[0];\n}", "[0];\n#endif\n}");
+    let plain = small("", "").replace("probe —", "plain —");
+    let lines = "wide = probe: MORE\n* + texel: TEXEL\n";
+    let files = [("test/probe.comp", fetching.as_str()), ("test/plain.comp", &plain), ("variants.txt", lines)];
+    let generated = generate(&files).unwrap_or_else(|findings| panic!("{findings:#?}"));
+    let shaders: Vec<_> = generated
+        .shaders
+        .iter()
+        .map(|shader| {
+            let variants: Vec<&str> = shader.variants.iter().map(|variant| variant.name.as_str()).collect();
+            (shader.stem.as_str(), variants, shader.variants[0].interface.bindings.len())
+        })
+        .collect();
+    let expected = [
+        ("plain", vec!["plain"], 1),
+        ("probe", vec!["probe", "probe_texel"], 2),
+        ("wide", vec!["wide", "wide_texel"], 3),
+    ];
+    assert_eq!(shaders, expected);
+    one_finding(
+        &[("test/probe.comp", &plain.replace("plain", "probe")), ("variants.txt", "probe = probe: A")],
+        &["already"],
+    );
+    one_finding(&[("variants.txt", "wide = gone: A")], &["variants.txt:1", "there is no shader `gone`"]);
+}

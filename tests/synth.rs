@@ -1,5 +1,6 @@
 //! The made scene: its pictures, masks, depth and points must agree with each other.
 
+use labelgs::io::LoadOptions;
 use labelgs::scene::Camera;
 use labelgs::synth::{self, Preset, SynthOptions, World, picture, ring_of_cameras};
 use std::collections::BTreeMap;
@@ -119,6 +120,24 @@ fn files_are_complete_and_the_same_every_time() {
     assert_ne!(a[&first.join("images/000.png")], c[&other.join("images/000.png")]);
     let labels: serde_json::Value = serde_json::from_slice(&a[&first.join("labels.json")]).expect("JSON");
     assert_eq!((&labels[0]["id"], &labels[0]["name"]), (&1.into(), &"crate".into()));
+}
+
+#[test]
+fn the_reader_finds_what_was_made() {
+    let folder = tempfile::tempdir().expect("folder");
+    let options = SynthOptions { views: 9, ..small() };
+    synth::write(&options, folder.path(), &|_| Ok(())).expect("written");
+    let load = LoadOptions { masks: Some(folder.path().join("masks")), ..LoadOptions::default() };
+    let read = labelgs::io::open(folder.path(), &load).expect("read");
+    let made = synth::dataset(&options, 8);
+    assert_eq!((read.train.len(), read.test.len()), (7, 2));
+    for (read, made) in read.all().into_iter().zip(made.all()) {
+        assert_eq!((&read.name, &read.photo, &read.mask), (&made.name, &made.photo, &made.mask));
+        let (a, b) = (&read.camera, &made.camera);
+        assert!(a.rotation.abs_diff_eq(b.rotation, 1e-12) && a.translation.abs_diff_eq(b.translation, 1e-12));
+        assert_eq!((a.fx, a.fy, a.cx, a.cy), (b.fx, b.fy, b.cx, b.cy));
+    }
+    assert_eq!(read.points, made.points);
 }
 
 #[test]

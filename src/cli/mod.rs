@@ -1,1 +1,127 @@
-//! (to be written)
+//! The command line: what is typed, what is decided, and a verb per file.
+
+pub mod args;
+pub mod config;
+pub mod devices;
+pub mod eval;
+pub mod interrupt;
+pub mod list;
+pub mod log;
+pub mod plan;
+pub mod profile;
+pub mod render;
+pub mod select;
+pub mod stdout;
+pub mod synth;
+pub mod train;
+pub mod train_args;
+pub mod values;
+
+use crate::scene::Gaussians;
+use crate::{Error, Result};
+use args::{Cli, Command, GlobalArgs};
+use clap::{CommandFactory, FromArgMatches};
+use std::ffi::OsString;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::Path;
+
+/// What every verb gets besides its own arguments.
+#[derive(Clone, Debug, Default)]
+pub struct Context {
+    /// `-q`, `-v` and `--device`.
+    pub global: GlobalArgs,
+    /// `--json` before the verb.
+    pub json: bool,
+}
+
+/// The process: parses `args`, runs the verb, reports an error, returns the exit status.
+pub fn main(args: impl IntoIterator<Item = OsString>) -> u8 {
+    std::panic::set_hook(Box::new(|panic| {
+        let place = panic.location().map_or(String::new(), |place| format!(" at {}:{}", place.file(), place.line()));
+        let payload = panic.payload();
+        let text = payload.downcast_ref::<&str>().copied().or(payload.downcast_ref::<String>().map(String::as_str));
+        let text = text.unwrap_or("panic");
+        let trace = std::backtrace::Backtrace::capture();
+        let trace = match trace.status() {
+            std::backtrace::BacktraceStatus::Captured => format!("\n{trace}"),
+            _ => String::new(),
+        };
+        log::final_error(&Error::Bug(format!("{text}{place}{trace}")));
+    }));
+    let args: Vec<OsString> = args.into_iter().collect();
+    let status = match catch_unwind(AssertUnwindSafe(|| run(args))) {
+        Ok(Ok(())) => 0,
+        Ok(Err(Exit::Clap(error))) => {
+            // A closed pipe while help is printed is no failure.
+            let _ = error.print();
+            error.exit_code()
+        }
+        Ok(Err(Exit::Error(error))) if stdout::is_closed(&error) => 0,
+        Ok(Err(Exit::Error(error))) => {
+            log::final_error(&error);
+            error.exit_status()
+        }
+        Err(_) => 70,
+    };
+    u8::try_from(status).unwrap_or(70)
+}
+
+/// Why a run ended early.
+enum Exit {
+    Clap(clap::Error),
+    Error(Error),
+}
+
+impl From<Error> for Exit {
+    fn from(error: Error) -> Self {
+        Self::Error(error)
+    }
+}
+
+impl From<clap::Error> for Exit {
+    fn from(error: clap::Error) -> Self {
+        Self::Clap(error)
+    }
+}
+
+fn run(args: Vec<OsString>) -> Result<(), Exit> {
+    let cli = Cli::from_arg_matches(&command().try_get_matches_from(args)?)?;
+    log::start(&cli.global);
+    interrupt::install()?;
+    let context = Context { global: cli.global, json: cli.json };
+    match cli.command {
+        Command::Train(args) => train::run(&args, &context),
+        Command::Render(args) => render::run(&args, &context),
+        Command::List(args) => list::run(&args, &context),
+        Command::Extract(args) => select::run(&args, select::Keep::Selected, &context),
+        Command::Remove(args) => select::run(&args, select::Keep::Rest, &context),
+        Command::Eval(args) => eval::run(&args, &context),
+        Command::Synth(args) => synth::run(&args, &context),
+        Command::Devices(args) => devices::run(&args, &context),
+        Command::Plan(args) => plan::run(&args, &context),
+        Command::Profile(args) => profile::run(&args, &context),
+    }?;
+    Ok(())
+}
+
+/// The command with the defaults of training in its help.
+pub fn command() -> clap::Command {
+    let defaults = config::default_texts();
+    Cli::command().mut_subcommand("train", |train| {
+        train.mut_args(|arg| {
+            let Some(default) = arg.get_long().and_then(|long| defaults.get(long)) else { return arg };
+            let help = arg.get_help().map(ToString::to_string).unwrap_or_default();
+            arg.help(format!("{help} [default: {default}]"))
+        })
+    })
+}
+
+/// Reads a model and logs what a person should know about the file.
+pub fn open_model(path: &Path) -> Result<Gaussians> {
+    let read = crate::io::ply::read_gaussians(path)?;
+    read.notes.iter().for_each(|note| tracing::info!("{}: {note}", path.display()));
+    if read.dropped > 0 {
+        tracing::warn!("{}: left out {} Gaussians that cannot be rendered", path.display(), read.dropped);
+    }
+    Ok(read.gaussians)
+}

@@ -7,6 +7,11 @@ pub const COVERED: f32 = 0.5;
 /// Channel value above which the paper counts a pixel as covered, on black.
 pub const PAPER_COVERED: f32 = 0.01;
 
+/// Value of a photo's byte in 0 to 1, in f32 as the device has it, so that an exact render has no error.
+pub fn byte_value(byte: u8) -> f64 {
+    f64::from(f32::from(byte) / 255.0)
+}
+
 /// Peak signal-to-noise ratio of a mean squared error, dB; infinite for equal images.
 pub fn psnr_of(mean_squared_error: f64) -> f64 {
     -10.0 * mean_squared_error.log10()
@@ -21,7 +26,7 @@ pub fn psnr(render: &[[f32; 3]], photo: &Photo) -> f64 {
             continue;
         }
         for (&value, truth) in colour.iter().zip([r, g, b]) {
-            let difference = f64::from(value.clamp(0.0, 1.0)) - f64::from(truth) / 255.0;
+            let difference = f64::from(value.clamp(0.0, 1.0)) - byte_value(truth);
             sum += difference * difference;
         }
         count += 3;
@@ -67,7 +72,7 @@ pub fn paper_score(object: &[[f32; 3]], photo: &Photo, inside: &[bool]) -> Paper
     let mut squares = [0.0; 3];
     for ((colour, truth), &inside) in object.iter().zip(&photo.rgba).zip(inside) {
         for channel in 0..3 {
-            let truth = if inside { f64::from(truth[channel]) / 255.0 } else { 0.0 };
+            let truth = if inside { byte_value(truth[channel]) } else { 0.0 };
             squares[channel] += (f64::from(colour[channel]) - truth).powi(2);
         }
     }

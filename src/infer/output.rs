@@ -1,1 +1,137 @@
-//! (to be written)
+//! Pictures of a view as files named NAME.WHAT.png or NAME.WHAT.exr.
+
+use crate::io::image::{write_exr_rgb, write_exr_y, write_png_grey16, write_png_rgb8};
+use crate::scene::LabelMap;
+use crate::scene::labels::label_colour;
+use crate::{Error, Result};
+use std::path::{Path, PathBuf};
+
+/// A kind of picture.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, clap::ValueEnum)]
+pub enum What {
+    /// Colour.
+    Rgb,
+    /// Mean z of what covers the pixel, world units; the numbers are in the EXR, a PNG is only to look at.
+    Depth,
+    /// Opacity, 0 to 1.
+    Alpha,
+    /// Object ids, 16-bit PNG, and the same in colours.
+    Labels,
+    /// Index of the Gaussian with the largest weight, -1 for none; EXR only.
+    TopId,
+    /// That weight; EXR only.
+    TopWeight,
+}
+
+/// A kind of file.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
+pub enum Format {
+    /// 8 or 16 bits, clamped to 0..1.
+    #[default]
+    Png,
+    /// 32-bit floats as rendered.
+    Exr,
+}
+
+/// What was rendered of a view, row-major; what is `None` is not written.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Pictures<'a> {
+    /// Width, px.
+    pub width: u32,
+    /// Height, px.
+    pub height: u32,
+    /// r, g, b, not clamped.
+    pub rgb: Option<&'a [[f32; 3]]>,
+    /// z, world units; 0 where nothing is.
+    pub depth: Option<&'a [f32]>,
+    /// Opacity, 0 to 1.
+    pub alpha: Option<&'a [f32]>,
+    /// Object ids.
+    pub labels: Option<&'a LabelMap>,
+    /// Index of the Gaussian with the largest weight, -1 for none.
+    pub top_id: Option<&'a [i32]>,
+    /// That weight.
+    pub top_weight: Option<&'a [f32]>,
+}
+
+/// Writes the pictures of the view `stem` into `folder`; returns the files.
+pub fn write_pictures(folder: &Path, stem: &str, pictures: &Pictures, format: Format) -> Result<Vec<PathBuf>> {
+    check_sizes(stem, pictures)?;
+    let (width, height) = (pictures.width, pictures.height);
+    let mut written = Vec::new();
+    let mut path = |what: &str, extension: &str| {
+        let path = folder.join(format!("{stem}.{what}.{extension}"));
+        written.push(path.clone());
+        path
+    };
+    if let Some(rgb) = pictures.rgb {
+        match format {
+            Format::Exr => write_exr_rgb(path("rgb", "exr"), width, height, rgb)?,
+            Format::Png => {
+                let bytes: Vec<[u8; 3]> = rgb.iter().map(|colour| colour.map(to_byte)).collect();
+                write_png_rgb8(path("rgb", "png"), width, height, &bytes)?;
+            }
+        }
+    }
+    if let Some(depth) = pictures.depth {
+        match format {
+            Format::Exr => write_exr_y(path("depth", "exr"), width, height, depth)?,
+            Format::Png => write_png_grey16(path("depth", "png"), width, height, &depth_preview(depth))?,
+        }
+    }
+    if let Some(alpha) = pictures.alpha {
+        match format {
+            Format::Exr => write_exr_y(path("alpha", "exr"), width, height, alpha)?,
+            Format::Png => {
+                let words: Vec<u16> = alpha.iter().map(|&value| to_word(value)).collect();
+                write_png_grey16(path("alpha", "png"), width, height, &words)?;
+            }
+        }
+    }
+    if let Some(labels) = pictures.labels {
+        write_png_grey16(path("labels", "png"), width, height, &labels.ids)?;
+        let colours: Vec<[u8; 3]> = labels.ids.iter().map(|&id| label_colour(u32::from(id))).collect();
+        write_png_rgb8(path("labels-colour", "png"), width, height, &colours)?;
+    }
+    if let Some(ids) = pictures.top_id {
+        let values: Vec<f32> = ids.iter().map(|&id| id as f32).collect();
+        write_exr_y(path("top-id", "exr"), width, height, &values)?;
+    }
+    if let Some(weights) = pictures.top_weight {
+        write_exr_y(path("top-weight", "exr"), width, height, weights)?;
+    }
+    Ok(written)
+}
+
+fn check_sizes(stem: &str, pictures: &Pictures) -> Result<()> {
+    let pixels = pictures.width as usize * pictures.height as usize;
+    let lengths = [
+        pictures.rgb.map(<[_]>::len),
+        pictures.depth.map(<[_]>::len),
+        pictures.alpha.map(<[_]>::len),
+        pictures.labels.map(|labels| labels.ids.len()),
+        pictures.top_id.map(<[_]>::len),
+        pictures.top_weight.map(<[_]>::len),
+    ];
+    match lengths.into_iter().flatten().find(|&length| length != pixels) {
+        None => Ok(()),
+        Some(length) => Err(Error::Bug(format!("a picture of {stem} has {length} pixels instead of {pixels}"))),
+    }
+}
+
+fn to_byte(value: f32) -> u8 {
+    (value.clamp(0.0, 1.0) * 255.0).round() as u8
+}
+
+fn to_word(value: f32) -> u16 {
+    (value.clamp(0.0, 1.0) * 65_535.0).round() as u16
+}
+
+/// Near is bright, far is dark, nothing is black.
+fn depth_preview(depth: &[f32]) -> Vec<u16> {
+    let there = |z: &f32| z.is_finite() && *z > 0.0;
+    let near = depth.iter().copied().filter(there).fold(f32::INFINITY, f32::min);
+    let far = depth.iter().copied().filter(there).fold(0.0, f32::max);
+    let grey = |z: f32| if far > near { 1.0 - 0.9 * (z - near) / (far - near) } else { 1.0 };
+    depth.iter().map(|z| if there(z) { to_word(grey(*z)) } else { 0 }).collect()
+}

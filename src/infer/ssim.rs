@@ -1,6 +1,7 @@
 //! Structural similarity as 3DGS computes it: an 11x11 Gaussian window of standard deviation 1.5, zeros outside the
 //! image, each channel alone, data range 1.
 
+use super::metrics::byte_value;
 use crate::scene::Photo;
 use rayon::prelude::*;
 
@@ -22,7 +23,7 @@ pub fn ssim(render: &[[f32; 3]], photo: &Photo) -> f64 {
         .map(|channel| {
             let masked = |value: f64, index: usize| if valid[index] { value } else { 0.0 };
             let colour = |(index, colour): (usize, &[f32; 3])| masked(colour[channel].clamp(0.0, 1.0).into(), index);
-            let truth = |(index, pixel): (usize, &[u8; 4])| masked(f64::from(pixel[channel]) / 255.0, index);
+            let truth = |(index, pixel): (usize, &[u8; 4])| masked(byte_value(pixel[channel]), index);
             let a: Vec<f64> = render.iter().enumerate().map(colour).collect();
             let b: Vec<f64> = photo.rgba.iter().enumerate().map(truth).collect();
             let map = ssim_map(&a, &b, width, height);

@@ -6,7 +6,6 @@ use super::listing::{check_camera, rotation_of};
 use super::transforms::affine;
 use crate::error::{Error, Result};
 use crate::scene::Camera;
-use glam::DMat3;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
@@ -35,14 +34,13 @@ pub fn read_camera(path: impl AsRef<Path>) -> Result<Camera> {
     let refuse =
         || Error::data(path, "w2c", "is no camera-from-world pose: 4 x 4 numbers, the upper left 3 x 3 a rotation");
     let pose = affine(&file.w2c).ok_or_else(refuse)?;
-    let matrix: DMat3 = pose.matrix3.into();
-    let rotation = rotation_of(matrix).ok_or_else(refuse)?;
+    let rotation = rotation_of(pose.matrix3).ok_or_else(refuse)?;
     // A pose with a scale would need its translation scaled too; nothing writes one.
-    if (matrix.determinant() - 1.0).abs() > 1e-2 {
+    if (pose.matrix3.determinant() - 1.0).abs() > 1e-2 {
         return Err(refuse());
     }
     let CameraFile { fx, fy, cx, cy, width, height, .. } = file;
-    let camera = Camera { rotation, translation: pose.translation.into(), fx, fy, cx, cy, width, height };
+    let camera = Camera { rotation, translation: pose.translation, fx, fy, cx, cy, width, height };
     check_camera(path, "", &camera, &Lens::default())?;
     Ok(camera)
 }

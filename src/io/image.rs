@@ -67,6 +67,11 @@ pub fn write_png_rgb8(path: impl AsRef<Path>, width: u32, height: u32, pixels: &
     write_png(path.as_ref(), (width, height), png::ColorType::Rgb, png::BitDepth::Eight, bytemuck::cast_slice(pixels))
 }
 
+/// Writes an 8-bit grey PNG, `pixels` row-major.
+pub fn write_png_grey8(path: impl AsRef<Path>, width: u32, height: u32, pixels: &[u8]) -> Result<()> {
+    write_png(path.as_ref(), (width, height), png::ColorType::Grayscale, png::BitDepth::Eight, pixels)
+}
+
 /// Writes a 16-bit grey PNG, such as an id map, `pixels` row-major.
 pub fn write_png_grey16(path: impl AsRef<Path>, width: u32, height: u32, pixels: &[u16]) -> Result<()> {
     let bytes: Vec<u8> = pixels.iter().flat_map(|value| value.to_be_bytes()).collect();

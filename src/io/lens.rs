@@ -50,7 +50,8 @@ impl Lens {
         for step in 1..=STEPS {
             let r = limit * f64::from(step) / f64::from(STEPS);
             let bent = r * self.radial(r * r);
-            if !(bent > before) {
+            // A pole of the denominator gives infinities, which end the range too.
+            if bent.is_nan() || bent <= before || bent.is_infinite() {
                 return limit * f64::from(step - 1) / f64::from(STEPS);
             }
             before = bent;

@@ -73,7 +73,7 @@ pub(crate) fn rotation_of(matrix: DMat3) -> Option<DMat3> {
     }
     let unit = matrix * (1.0 / determinant.cbrt());
     let gram = unit.transpose() * unit - DMat3::IDENTITY;
-    if gram.to_cols_array().iter().any(|value| !(value.abs() < 1e-2)) {
+    if gram.to_cols_array().iter().any(|value| value.is_nan() || value.abs() > 1e-2) {
         return None;
     }
     Some(DMat3::from_quat(DQuat::from_mat3(&unit).normalize()))

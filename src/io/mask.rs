@@ -77,10 +77,19 @@ pub(crate) struct MaskFolder {
     folder: PathBuf,
     /// How many photos share a file stem; a flat folder serves only stems that are unique.
     stems: HashMap<String, usize>,
+    /// How many share a path cut at the first dot of the file name, likewise.
+    cut: HashMap<PathBuf, usize>,
 }
 
 fn stem(name: &str) -> String {
     Path::new(name).file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default()
+}
+
+/// The path with the file name cut at its first dot, as Gaussian Grouping does.
+fn cut_at_first_dot(name: &str) -> PathBuf {
+    let path = Path::new(name);
+    let file = path.file_name().map(|file| file.to_string_lossy().into_owned()).unwrap_or_default();
+    path.with_file_name(file.split('.').next().unwrap_or_default())
 }
 
 impl MaskFolder {
@@ -89,23 +98,25 @@ impl MaskFolder {
         if !folder.is_dir() {
             return Err(Error::data(folder, "", "there is no such folder of masks"));
         }
-        let mut stems = HashMap::new();
-        names.for_each(|name| *stems.entry(stem(name)).or_insert(0) += 1);
-        Ok(Self { folder: folder.to_owned(), stems })
+        let (mut stems, mut cut) = (HashMap::new(), HashMap::new());
+        for name in names {
+            *stems.entry(stem(name)).or_insert(0) += 1;
+            *cut.entry(cut_at_first_dot(name)).or_insert(0) += 1;
+        }
+        Ok(Self { folder: folder.to_owned(), stems, cut })
     }
 
     /// Paths at which the mask of `name` may be, in order of preference: the photo's name with `.png` in place of
     /// its extension, with `.png` added, cut at the first dot of the file name, and the first two without
-    /// folders.
+    /// folders; the last three only where no other photo comes to the same name.
     pub(crate) fn candidates(&self, name: &str) -> Vec<PathBuf> {
         let path = Path::new(name);
         let file = path.file_name().map(|file| file.to_string_lossy().into_owned()).unwrap_or_default();
-        let first_dot = file.split('.').next().unwrap_or_default().to_owned();
-        let mut found = vec![
-            self.folder.join(path.with_extension("png")),
-            self.folder.join(format!("{name}.png")),
-            self.folder.join(path.with_file_name(format!("{first_dot}.png"))),
-        ];
+        let mut found = vec![self.folder.join(path.with_extension("png")), self.folder.join(format!("{name}.png"))];
+        let cut = cut_at_first_dot(name);
+        if self.cut.get(&cut) == Some(&1) {
+            found.push(self.folder.join(cut.with_extension("png")));
+        }
         if self.stems.get(&stem(name)) == Some(&1) {
             found.push(self.folder.join(format!("{}.png", stem(name))));
             found.push(self.folder.join(format!("{file}.png")));

@@ -208,17 +208,17 @@ pub(crate) fn affine(rows: &[Vec<f64>]) -> Option<DAffine3> {
         return None;
     }
     let column = |index: usize| DVec3::new(rows[0][index], rows[1][index], rows[2][index]);
-    Some(DAffine3 { matrix3: DMat3::from_cols(column(0), column(1), column(2)).into(), translation: column(3).into() })
+    Some(DAffine3 { matrix3: DMat3::from_cols(column(0), column(1), column(2)), translation: column(3) })
 }
 
 fn pose(path: &Path, place: &str, rows: &[Vec<f64>]) -> Result<(DMat3, DVec3)> {
     let problem = "transform_matrix is no camera-to-world pose: 4 x 4 numbers, the upper left 3 x 3 a rotation";
     let refuse = || Error::data(path, place, problem);
     let matrix = affine(rows).ok_or_else(refuse)?;
-    let rotation = rotation_of(matrix.matrix3.into()).ok_or_else(refuse)?;
+    let rotation = rotation_of(matrix.matrix3).ok_or_else(refuse)?;
     // OpenGL looks along -z with y up, OpenCV along z with y down.
     let rotation = rotation * DMat3::from_diagonal(DVec3::new(1.0, -1.0, -1.0));
-    Ok(invert_pose(rotation, matrix.translation.into()))
+    Ok(invert_pose(rotation, matrix.translation))
 }
 
 /// The points in the world of the poses. nerfstudio writes them there; its early versions wrote them before
@@ -234,7 +234,7 @@ fn in_the_frame_of(
     let Some(matrix) = affine(rows) else {
         return Err(Error::data(path, "applied_transform", "is no 3 x 4 or 4 x 4 matrix of numbers"));
     };
-    let moved = points.iter().map(|p| Point { position: matrix.transform_point3(p.position.into()).into(), ..*p });
+    let moved = points.iter().map(|p| Point { position: matrix.transform_point3(p.position), ..*p });
     let moved: Vec<Point> = moved.collect();
     if seen(views, &moved) as f64 > 1.2 * seen(views, &points) as f64 {
         notes.push("applied_transform was applied to the points, which fit the cameras only so".into());

@@ -14,13 +14,13 @@ mod write;
 pub use cameras::ring_of_cameras;
 pub use trace::{Picture, picture};
 pub use world::{Object, World};
-pub use write::{Summary, write};
+pub use write::{Label, Summary, write};
 
 use crate::scene::{Dataset, LabelMap, Photo, View};
 use serde::{Deserialize, Serialize};
 
 /// Which objects stand in the scene.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
 #[serde(rename_all = "lowercase")]
 pub enum Preset {
     /// Eight objects that touch and hide each other.

@@ -4,6 +4,7 @@ use super::points::Seen;
 use super::trace::Picture;
 use super::world::World;
 use super::{SynthOptions, picture, points, ring_of_cameras, view_name};
+use crate::io::{atomic, image};
 use crate::scene::Camera;
 use crate::scene::labels::label_colour;
 use crate::{Error, Result};
@@ -21,8 +22,24 @@ pub struct Summary {
     pub views: u32,
     /// Number of points.
     pub points: usize,
-    /// Id and name of each object.
-    pub objects: Vec<(u8, String)>,
+    /// The objects.
+    pub objects: Vec<Label>,
+}
+
+/// Id, name and display colour of an object; `labels.json` is a list of these.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Label {
+    /// Id in the masks.
+    pub id: u8,
+    /// Name.
+    pub name: String,
+    /// Colour in previews.
+    pub colour: [u8; 3],
+}
+
+fn labels(world: &World) -> Vec<Label> {
+    let label = |id: u8, name: &str| Label { id, name: name.to_owned(), colour: label_colour(u32::from(id)) };
+    world.objects.iter().map(|object| label(object.id, object.name)).collect()
 }
 
 /// Makes a scene and writes it into `folder`, which must be empty or new. `after_view` is told how many views are
@@ -37,19 +54,16 @@ pub fn write(options: &SynthOptions, folder: &Path, after_view: &dyn Fn(u32) -> 
     let world = World::new(options.preset, options.seed);
     let cameras = ring_of_cameras(options);
     create_folders(folder, &world)?;
-    write_labels(folder, &world)?;
+    let objects = labels(&world);
+    let text = serde_json::to_string_pretty(&objects).map_err(|error| Error::Bug(error.to_string()))?;
+    save(&folder.join("labels.json"), format!("{text}\n").as_bytes())?;
     let seen = points::sample(&world, &cameras, options);
     write_colmap(folder, &cameras, &seen)?;
     for (index, camera) in cameras.iter().enumerate() {
         write_view(folder, index, &world, &picture(&world, camera, index as u32))?;
         after_view(index as u32 + 1)?;
     }
-    Ok(Summary {
-        scene: folder.to_owned(),
-        views: options.views,
-        points: seen.len(),
-        objects: world.objects.iter().map(|object| (object.id, object.name.to_owned())).collect(),
-    })
+    Ok(Summary { scene: folder.to_owned(), views: options.views, points: seen.len(), objects })
 }
 
 fn create_folders(folder: &Path, world: &World) -> Result<()> {
@@ -65,61 +79,21 @@ fn create_folders(folder: &Path, world: &World) -> Result<()> {
     Ok(())
 }
 
-fn write_labels(folder: &Path, world: &World) -> Result<()> {
-    #[derive(Serialize)]
-    struct Label {
-        id: u8,
-        name: &'static str,
-        colour: [u8; 3],
-    }
-    let rows: Vec<Label> = world
-        .objects
-        .iter()
-        .map(|object| Label { id: object.id, name: object.name, colour: label_colour(u32::from(object.id)) })
-        .collect();
-    let text = serde_json::to_string_pretty(&rows).map_err(|error| Error::Bug(error.to_string()))?;
-    save(&folder.join("labels.json"), format!("{text}\n").as_bytes())
-}
-
 fn write_view(folder: &Path, index: usize, world: &World, made: &Picture) -> Result<()> {
     let name = view_name(index);
-    let size = (made.width, made.height);
-    save_png(&folder.join("images").join(&name), size, png::ColorType::Rgb, made.rgb.as_flattened())?;
-    save_png(&folder.join("masks").join(&name), size, png::ColorType::Grayscale, &made.ids)?;
+    let (width, height) = (made.width, made.height);
+    image::write_png_rgb8(folder.join("images").join(&name), width, height, &made.rgb)?;
+    image::write_png_grey8(folder.join("masks").join(&name), width, height, &made.ids)?;
     for (object, whole) in world.objects.iter().zip(&made.whole) {
         let path = folder.join("amodal").join(object.id.to_string()).join(&name);
         let bytes: Vec<u8> = whole.iter().map(|&covered| if covered { 255 } else { 0 }).collect();
-        save_png(&path, size, png::ColorType::Grayscale, &bytes)?;
+        image::write_png_grey8(&path, width, height, &bytes)?;
     }
-    save_depth(&folder.join("depth").join(format!("{index:03}.exr")), made)
+    image::write_exr_y(folder.join("depth").join(format!("{index:03}.exr")), width, height, &made.depth)
 }
 
 fn save(path: &Path, bytes: &[u8]) -> Result<()> {
-    fs::write(path, bytes).map_err(Error::write(path))
-}
-
-fn save_png(path: &Path, (width, height): (u32, u32), colour: png::ColorType, bytes: &[u8]) -> Result<()> {
-    let mut file = Vec::new();
-    let mut encoder = png::Encoder::new(&mut file, width, height);
-    encoder.set_color(colour);
-    encoder.set_depth(png::BitDepth::Eight);
-    let encoded = encoder.write_header().and_then(|mut writer| writer.write_image_data(bytes));
-    encoded.map_err(|error| crate::Error::Write { path: path.to_owned(), source: std::io::Error::other(error) })?;
-    save(path, &file)
-}
-
-fn save_depth(path: &Path, made: &Picture) -> Result<()> {
-    use exr::prelude::*;
-    let size = (made.width as usize, made.height as usize);
-    let samples = FlatSamples::F32(made.depth.clone());
-    let channels = AnyChannels::sort(std::iter::once(AnyChannel::new("Y", samples)).collect());
-    let layer = Layer::new(size, LayerAttributes::default(), Encoding::SMALL_LOSSLESS, channels);
-    let mut bytes = std::io::Cursor::new(Vec::new());
-    Image::from_layer(layer).write().to_buffered(&mut bytes).map_err(|error| crate::Error::Write {
-        path: path.to_owned(),
-        source: std::io::Error::other(error.to_string()),
-    })?;
-    save(path, bytes.get_ref())
+    atomic::write(path, |out| out.write_all(bytes))
 }
 
 /// `cameras.bin`, `images.bin` and `points3D.bin`, little-endian as COLMAP writes them.

@@ -1,5 +1,242 @@
-//! Training.
+//! Training: the loop over steps, and what happens between them.
 
 pub mod config;
+mod densify;
+pub mod job;
+mod occlusion;
+mod sampler;
 
-pub use config::TrainConfig;
+pub use config::{Occlusion, TrainConfig};
+pub use densify::Densified;
+
+use crate::engine::{Engine, LabelRoom, ListKey, Report, Room};
+use crate::error::{Error, Result};
+use crate::gpu::Gpu;
+use crate::pass::Variant;
+use crate::scene::{Dataset, Gaussians};
+use crate::sched::{SchedulerOptions, Ticket};
+use job::{Fixed, Job, TrainView};
+use sampler::ViewOrder;
+use std::collections::VecDeque;
+use std::sync::Arc;
+
+/// What is known about a finished step.
+#[derive(Clone, Copy, Debug)]
+pub struct StepReport {
+    /// Step, from 1.
+    pub step: u32,
+    /// Photo loss: (1 - lambda) L1 + lambda (1 - SSIM).
+    pub loss: f64,
+    /// Label loss, weighted.
+    pub label_loss: f64,
+    /// What the device counted.
+    pub report: Report,
+}
+
+/// A model in training.
+pub struct Trainer {
+    engine: Engine,
+    config: TrainConfig,
+    views: Vec<TrainView>,
+    fixed: Fixed,
+    order: ViewOrder,
+    /// Steps submitted, not yet absorbed; at most one per slot.
+    flying: VecDeque<(Job, Ticket)>,
+    /// Steps submitted so far.
+    step: u32,
+    updates: u32,
+    stamp: u32,
+    max_gaussians: u64,
+}
+
+/// Room for training on a data set.
+pub fn room(dataset: &Dataset, config: &TrainConfig, gaussians: u64) -> Result<Room> {
+    let sizes = dataset.train.iter().chain(&dataset.test).map(|view| (view.camera.width, view.camera.height));
+    let size = sizes.reduce(|a, b| (a.0.max(b.0), a.1.max(b.1)));
+    let size = size.ok_or_else(|| Error::data(&dataset.root, "", "the scene has no view to train on"))?;
+    let objects: Vec<u16> = dataset.train.iter().filter_map(|view| view.mask.as_ref()).flat_map(|m| m.objects()).collect();
+    let most = dataset.train.iter().filter_map(|view| view.mask.as_ref().map(|mask| mask.objects().len())).max();
+    let labels = objects.iter().max().map(|&max_label| LabelRoom {
+        max_label: u32::from(max_label),
+        layers: config.label_samples.min(most.unwrap_or(0) as u32),
+    });
+    Ok(Room { gaussians, size, trained: true, labels })
+}
+
+impl Trainer {
+    /// Puts the initial model on the device. `dataset.train` gives its photos and masks away.
+    pub fn new(
+        gpu: Arc<Gpu>,
+        config: TrainConfig,
+        dataset: &mut Dataset,
+        model: &Gaussians,
+        options: SchedulerOptions,
+    ) -> Result<Self> {
+        config.check()?;
+        let fixed = Fixed { extent: dataset.extent() };
+        let max_gaussians = if config.max_gaussians > 0 { config.max_gaussians } else { u64::from(u32::MAX) };
+        let room = room(dataset, &config, (model.len() as u64 * 2).min(max_gaussians).max(model.len() as u64))?;
+        let views = dataset.train.iter_mut().map(train_view).collect::<Result<Vec<_>>>()?;
+        let mut engine = Engine::new(gpu, room, options)?;
+        engine.upload_model(model)?;
+        let order = ViewOrder::new(config.seed, views.len());
+        Ok(Self {
+            engine, config, views, fixed, order, flying: VecDeque::new(), step: 0, updates: 0, stamp: 0, max_gaussians,
+        })
+    }
+
+    /// The engine, for renders between steps.
+    pub fn engine_mut(&mut self) -> &mut Engine {
+        &mut self.engine
+    }
+
+    /// The configuration.
+    pub fn config(&self) -> &TrainConfig {
+        &self.config
+    }
+
+    /// The training views.
+    pub fn views(&self) -> &[TrainView] {
+        &self.views
+    }
+
+    /// Steps submitted so far.
+    pub fn steps_done(&self) -> u32 {
+        self.step
+    }
+
+    /// Gaussians of the model.
+    pub fn gaussian_count(&self) -> u32 {
+        self.engine.gaussian_count()
+    }
+
+    /// Degree of the spherical harmonics in use.
+    pub fn sh_degree(&self) -> u32 {
+        self.config.sh_degree_at(self.step)
+    }
+
+    /// Reads the model back.
+    pub fn model(&mut self) -> Result<Gaussians> {
+        self.drain()?;
+        self.engine.download_model(self.config.sh_degree)
+    }
+
+    /// One step: submits it and, where the schedule says so, densifies. Returns the reports of steps that are done;
+    /// they lag behind, because two steps are in flight.
+    pub fn step(&mut self) -> Result<Vec<StepReport>> {
+        let step = self.step + 1;
+        let mut done = Vec::new();
+        if self.refreshes_occluders(step) {
+            done.extend(self.drain()?);
+            self.refresh_occluders()?;
+        }
+        let job = self.job(step);
+        if self.flying.len() == crate::plan::SLOTS {
+            done.extend(self.absorb()?);
+        }
+        self.submit(job.clone())?;
+        self.step = step;
+        let last = step >= self.config.iterations;
+        let (densifies, resets) = (self.config.densifies_at(step) && !last, self.config.resets_opacity_at(step) && !last);
+        if densifies || resets {
+            done.extend(self.drain()?);
+            if densifies {
+                let what = self.densify(&job)?;
+                tracing::debug!("step {step}: {what:?}, {} Gaussians", self.gaussian_count());
+                if self.gaussian_count() == 0 {
+                    return Err(Error::Numeric {
+                        quantity: "every Gaussian was pruned; the poses or the photos do not fit together".to_owned(),
+                        step: u64::from(step),
+                        view: self.views[job.view].name.clone(),
+                    });
+                }
+            }
+            if resets {
+                self.reset_opacity(&job)?;
+            }
+        }
+        Ok(done)
+    }
+
+    /// Waits for all steps in flight.
+    pub fn drain(&mut self) -> Result<Vec<StepReport>> {
+        let mut done = Vec::new();
+        while !self.flying.is_empty() {
+            done.extend(self.absorb()?);
+        }
+        Ok(done)
+    }
+
+    fn job(&mut self, step: u32) -> Job {
+        let view = self.order.draw();
+        let labels = self.engine.room().labels.is_some() && self.config.labels_at(step);
+        let samples = if labels { self.config.label_samples as usize } else { 0 };
+        let layers = sampler::sample_objects(self.config.seed, step, &self.views[view].objects, samples);
+        // A densification replaces the parameters that the gradients belong to: no update then (3DGS).
+        let update = !(self.config.densifies_at(step) && step < self.config.iterations);
+        self.updates += u32::from(update);
+        Job { step, view, layers, labels, update, updates: self.updates, stamp: 0 }
+    }
+
+    fn submit(&mut self, mut job: Job) -> Result<()> {
+        self.stamp = self.stamp.wrapping_add(1).max(1);
+        job.stamp = self.stamp;
+        let slot = job.step as usize % crate::plan::SLOTS;
+        let key = self.key(&job);
+        self.engine.list(key)?;
+        let view = &self.views[job.view];
+        let uniforms = job::uniforms(&job, view, &self.config, self.fixed, &self.engine);
+        job::upload(&mut self.engine, slot, uniforms, view, &job)?;
+        let ticket = self.engine.submit(key, slot)?;
+        self.flying.push_back((job, ticket));
+        Ok(())
+    }
+
+    fn key(&self, job: &Job) -> ListKey {
+        ListKey::Train(Variant {
+            labels: job.labels,
+            sh_degree: self.config.sh_degree_at(job.step),
+            size: self.engine.room().size,
+            update: job.update,
+        })
+    }
+
+    /// Waits for the oldest step in flight. If a buffer was too small, the step changed nothing, nor did those after it:
+    /// the buffer grows and they run again.
+    fn absorb(&mut self) -> Result<Option<StepReport>> {
+        let Some((job, ticket)) = self.flying.front().cloned() else { return Ok(None) };
+        self.engine.sched().wait(ticket)?;
+        let report = self.engine.report(job.step as usize % crate::plan::SLOTS)?;
+        if self.engine.recover(&report)? {
+            let again: Vec<Job> = self.flying.drain(..).map(|(job, _)| job).collect();
+            for job in again {
+                self.submit(job)?;
+            }
+            return self.absorb();
+        }
+        self.flying.pop_front();
+        let view = &self.views[job.view];
+        let scale = 1.0 / (3.0 * view.valid_pixels.max(1) as f64);
+        let (counters, lambda) = (&report.counters, f64::from(self.config.lambda_dssim));
+        let l1 = f64::from(counters.loss_l1) * scale;
+        let loss = (1.0 - lambda) * l1 + lambda * (1.0 - f64::from(counters.loss_ssim) * scale);
+        let label_loss = f64::from(counters.loss_label) * scale * f64::from(self.config.label_weight);
+        if !(loss + label_loss).is_finite() {
+            return Err(Error::Numeric {
+                quantity: format!("the loss is {loss}, the label loss {label_loss}"),
+                step: u64::from(job.step),
+                view: view.name.clone(),
+            });
+        }
+        Ok(Some(StepReport { step: job.step, loss, label_loss, report }))
+    }
+}
+
+fn train_view(view: &mut crate::scene::View) -> Result<TrainView> {
+    let photo = view.photo.take().ok_or_else(|| Error::Bug(format!("{} came without its photo", view.name)))?;
+    let valid_pixels = photo.rgba.iter().filter(|pixel| pixel[3] > 127).count() as u64;
+    let mask = view.mask.take();
+    let objects = mask.as_ref().map(crate::scene::LabelMap::objects).unwrap_or_default();
+    let (name, camera) = (view.name.clone(), view.camera.clone());
+    Ok(TrainView { name, camera, photo, valid_pixels, mask, objects, occluders: Default::default() })
+}

@@ -232,22 +232,44 @@ pub fn blend_backward(
     background: [f64; 3],
     v_image: &[[f64; 3]],
 ) -> SplatGradients {
-    let boxed = Boxed::new(rules, splats);
-    let mut out = SplatGradients {
-        values: vec![SplatGradient::default(); splats.len()],
-        margins: vec![f64::INFINITY; splats.len()],
-    };
+    layer_backward(rules, &Boxed::new(rules, splats), |_| true, size, background, v_image)
+}
+
+/// The gradient of a layer that holds the splats of `member`; the others get 0.
+fn layer_backward(
+    rules: &Rules,
+    boxed: &Boxed,
+    member: impl Fn(&Splat) -> bool,
+    size: (usize, usize),
+    background: [f64; 3],
+    v_image: &[[f64; 3]],
+) -> SplatGradients {
+    let count = boxed.splats.len();
+    let mut out = SplatGradients { values: vec![SplatGradient::default(); count], margins: vec![f64::INFINITY; count] };
     for (index, &v_colour) in v_image.iter().enumerate() {
         let at = centre(index, size.0);
-        let ray = trace(rules, boxed.near(at), at);
-        ray_backward(splats, &ray, at, background, v_colour, &mut out.values);
-        for (place, splat) in boxed.near(at) {
-            let own = (exponent(splat, at) - rules.exponent_min()).abs();
-            out.margins[place] = out.margins[place].min(own);
+        let near = || boxed.near(at).filter(|(_, splat)| member(splat));
+        let ray = trace(rules, near(), at);
+        ray_backward(boxed.splats, &ray, at, background, v_colour, &mut out.values);
+        for (place, splat) in near() {
+            let above = exponent(splat, at) - rules.exponent_min();
+            let of_ray = if above >= 0.0 { ray.margins.gradient() } else { f64::INFINITY };
+            out.margins[place] = out.margins[place].min(of_ray).min(above.abs());
         }
-        for contribution in &ray.contributions {
-            let margin = &mut out.margins[contribution.splat];
-            *margin = margin.min(ray.margins.gradient());
+    }
+    out
+}
+
+/// Smallest of the pixels' values at which each splat is large enough to count (hidden or not), by splat.
+pub fn smallest_over_pixels(rules: &Rules, splats: &[Splat], size: (usize, usize), values: &[f64]) -> Vec<f64> {
+    let boxed = Boxed::new(rules, splats);
+    let mut out = vec![f64::INFINITY; splats.len()];
+    for (index, &value) in values.iter().enumerate() {
+        let at = centre(index, size.0);
+        for (place, splat) in boxed.near(at) {
+            if exponent(splat, at) >= rules.exponent_min() {
+                out[place] = out[place].min(value);
+            }
         }
     }
     out
@@ -290,12 +312,6 @@ fn ray_backward(
     }
 }
 
-/// The splats of one label, with their places in the full list.
-pub fn of_label(splats: &[Splat], labels: &[u32], label: u32) -> (Vec<Splat>, Vec<usize>) {
-    let places: Vec<usize> = (0..splats.len()).filter(|&i| labels[splats[i].gaussian] == label).collect();
-    (places.iter().map(|&i| splats[i]).collect(), places)
-}
-
 /// Scene and objects in one walk along each ray: layer 0 blends every splat over `background`, layer 1 + j only the
 /// splats of `slots[j]` over black, each with its own transmittance.
 pub fn blend_layers_forward(
@@ -327,7 +343,7 @@ pub fn blend_layers_forward(
     layers
 }
 
-/// Gradients of all layers in one walk: the scene's share alone, and the sum over the object layers.
+/// Gradients of all layers: the scene's share alone, and the sum over the object layers.
 pub fn blend_layers_backward(
     rules: &Rules,
     splats: &[Splat],
@@ -336,16 +352,19 @@ pub fn blend_layers_backward(
     size: (usize, usize),
     background: [f64; 3],
     v_layers: &[Vec<[f64; 3]>],
-) -> (SplatGradients, Vec<SplatGradient>) {
-    let scene = blend_backward(rules, splats, size, background, &v_layers[0]);
-    let mut objects = vec![SplatGradient::default(); splats.len()];
+) -> (SplatGradients, SplatGradients) {
     let boxed = Boxed::new(rules, splats);
-    for index in 0..size.0 * size.1 {
-        let at = centre(index, size.0);
-        for (slot, &label) in slots.iter().enumerate() {
-            let members = boxed.near(at).filter(|(_, splat)| labels[splat.gaussian] == label);
-            let ray = trace(rules, members, at);
-            ray_backward(splats, &ray, at, [0.0; 3], v_layers[slot + 1][index], &mut objects);
+    let scene = layer_backward(rules, &boxed, |_| true, size, background, &v_layers[0]);
+    let mut objects = SplatGradients {
+        values: vec![SplatGradient::default(); splats.len()],
+        margins: vec![f64::INFINITY; splats.len()],
+    };
+    for (slot, &label) in slots.iter().enumerate() {
+        let member = |splat: &Splat| labels[splat.gaussian] == label;
+        let layer = layer_backward(rules, &boxed, member, size, [0.0; 3], &v_layers[slot + 1]);
+        for place in 0..splats.len() {
+            objects.values[place] = objects.values[place].plus(&layer.values[place]);
+            objects.margins[place] = objects.margins[place].min(layer.margins[place]);
         }
     }
     (scene, objects)

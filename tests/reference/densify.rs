@@ -101,6 +101,22 @@ pub fn densify(
     out
 }
 
+/// Rows that each row before becomes: 0 removed, 1 kept, 2 cloned or split.
+pub fn mark(rules: &Rules, before: &Population, extent: f64, step: u32) -> Vec<u32> {
+    let mut counts = vec![0; before.model.rows.len()];
+    let after = densify(rules, before, extent, step, |_, _, _| 0.0);
+    after.origins.iter().for_each(|(parent, _)| counts[*parent] += 1);
+    counts
+}
+
+/// Adds a view to the statistic: the gradient's norm and one view where the Gaussian is visible.
+pub fn accumulate(population: &mut Population, gradient2d: &[f64], visible: &[bool]) {
+    for index in (0..visible.len()).filter(|&index| visible[index]) {
+        population.gradient_sum[index] += gradient2d[index];
+        population.gradient_count[index] += 1.0;
+    }
+}
+
 impl Densified {
     fn note(&mut self, index: usize, ratio: f64) {
         self.margins[index] = self.margins[index].min((ratio - 1.0).abs());
@@ -122,7 +138,7 @@ impl Densified {
 }
 
 /// Opacity no higher than the reset's ceiling, and no moments of it.
-pub fn reset_opacity(rules: &Rules, row: &mut Row, m: &mut Row, u: &mut Row) {
+pub fn opacity_reset(rules: &Rules, row: &mut Row, m: &mut Row, u: &mut Row) {
     let ceiling = (rules.reset_opacity / (1.0 - rules.reset_opacity)).ln();
     row.opacity = row.opacity.min(ceiling);
     (m.opacity, u.opacity) = (0.0, 0.0);

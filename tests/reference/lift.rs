@@ -2,13 +2,15 @@
 
 use super::Rules;
 use super::blend::Blended;
+use super::project::Splat;
 
 /// What one view votes.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Votes {
     /// Largest key of each Gaussian, [N]: weight quantised to 16 bits, then the label; 0 without a vote.
     pub keys: Vec<u32>,
-    /// Distance of the nearest deciding weight to the threshold (relative) or to the second weight (relative).
+    /// Distance of the nearest decision about each Gaussian, [N]: of its weight to the threshold (relative), of its
+    /// centre to a pixel border (px), of a pixel's blending to another outcome.
     pub margins: Vec<f64>,
 }
 
@@ -23,16 +25,28 @@ pub struct Masks<'a> {
     pub gpf: bool,
 }
 
-/// Column and row of the pixel that holds a position; `None` outside the image.
+/// Centre of each of `count` Gaussians in the view; `None` where it has no splat.
+pub fn centres_of(splats: &[Splat], count: usize) -> Vec<Option<[f64; 2]>> {
+    let mut centres = vec![None; count];
+    splats.iter().for_each(|splat| centres[splat.gaussian] = Some(splat.mean2d));
+    centres
+}
+
+/// Number of the pixel that holds a position; `None` outside the image.
 pub fn pixel_of(at: [f64; 2], size: (usize, usize)) -> Option<usize> {
     let (x, y) = (at[0].floor(), at[1].floor());
     let inside = x >= 0.0 && y >= 0.0 && x < size.0 as f64 && y < size.1 as f64;
     inside.then(|| y as usize * size.0 + x as usize)
 }
 
-/// 16 bits of weight above 16 bits of label.
+/// Distance of a position to the nearest pixel border, px.
+pub fn border_distance(at: [f64; 2]) -> f64 {
+    at.iter().map(|v| (v - v.round()).abs()).fold(f64::INFINITY, f64::min)
+}
+
+/// 16 bits of weight (rounded down) above 16 bits of label.
 pub fn vote_key(weight: f64, label: u32) -> u32 {
-    ((weight * 65_535.0 + 0.5).floor() as u32) << 16 | label
+    ((weight * 65_535.0).floor() as u32) << 16 | label
 }
 
 /// Votes of one scene image. `centres[gaussian]` is its centre in the view, px; `None` where it is not drawn.
@@ -43,17 +57,15 @@ pub fn lift(rules: &Rules, image: &Blended, centres: &[Option<[f64; 2]>], masks:
             continue;
         }
         let gaussian = pixel.main as usize;
+        let border = centres[gaussian].map_or(f64::INFINITY, border_distance);
+        let decided = (pixel.main_weight / rules.lift_threshold - 1.0).abs().min(pixel.margins.image()).min(border);
+        votes.margins[gaussian] = votes.margins[gaussian].min(decided);
         let holder = centres[gaussian].and_then(|centre| pixel_of(centre, image.size));
         let allowed = match holder {
             None => false,
             Some(place) => !masks.gpf || masks.label_map[place] == label,
         };
-        if !allowed {
-            continue;
-        }
-        let margin = (pixel.main_weight / rules.lift_threshold - 1.0).abs();
-        votes.margins[gaussian] = votes.margins[gaussian].min(margin);
-        if pixel.main_weight >= rules.lift_threshold {
+        if allowed && pixel.main_weight >= rules.lift_threshold {
             votes.keys[gaussian] = votes.keys[gaussian].max(vote_key(pixel.main_weight, label));
         }
     }

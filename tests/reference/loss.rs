@@ -41,8 +41,19 @@ pub struct Loss {
     pub value: f64,
     /// Gradient of `value` by the image, [height, width].
     pub v_image: Vec<[f64; 3]>,
-    /// Smallest absolute difference: distance to the kink of L1.
-    pub margin: f64,
+    /// Smallest absolute difference of a pixel's channels: distance to the kink of L1, [height, width].
+    pub margins: Vec<f64>,
+}
+
+impl Loss {
+    fn empty(pixels: usize) -> Self {
+        Self { v_image: vec![[0.0; 3]; pixels], margins: vec![f64::INFINITY; pixels], ..Self::default() }
+    }
+
+    /// Smallest margin of all pixels.
+    pub fn margin(&self) -> f64 {
+        self.margins.iter().copied().fold(f64::INFINITY, f64::min)
+    }
 }
 
 /// Gaussian window of unit sum, [2 reach + 1].
@@ -76,33 +87,66 @@ pub fn blur(plane: &[f64], (width, height): (usize, usize), window: &[f64]) -> V
     along(&along(plane, true), false)
 }
 
-/// SSIM of two planes: the map, and the gradient by the first plane of sum(weights * map).
-pub fn ssim(rules: &Rules, size: (usize, usize), x: &[f64], y: &[f64], weights: &[f64]) -> (Vec<f64>, Vec<f64>) {
+/// Window means of two planes, and SSIM's four factors made of them.
+struct Moments {
+    mu_x: Vec<f64>,
+    mu_y: Vec<f64>,
+    /// 2 mx my + C1.
+    luminance: Vec<f64>,
+    /// 2 sxy + C2.
+    contrast: Vec<f64>,
+    /// mx^2 + my^2 + C1.
+    energy: Vec<f64>,
+    /// sxx + syy + C2.
+    spread: Vec<f64>,
+}
+
+fn ssim_moments(rules: &Rules, size: (usize, usize), x: &[f64], y: &[f64]) -> Moments {
     let window = window(rules);
-    let product = |a: &[f64], b: &[f64]| -> Vec<f64> { a.iter().zip(b).map(|(a, b)| a * b).collect() };
-    let mean = |plane: &[f64]| blur(plane, size, &window);
-    let (mu_x, mu_y) = (mean(x), mean(y));
-    let (xx, yy, xy) = (mean(&product(x, x)), mean(&product(y, y)), mean(&product(x, y)));
-    let count = x.len();
-    let (mut map, mut v_mu, mut v_xx, mut v_xy) =
-        (vec![0.0; count], vec![0.0; count], vec![0.0; count], vec![0.0; count]);
-    for i in 0..count {
-        let (mx, my) = (mu_x[i], mu_y[i]);
-        let luminance = 2.0 * mx * my + rules.ssim_c1;
-        let contrast = 2.0 * (xy[i] - mx * my) + rules.ssim_c2;
-        let energy = mx * mx + my * my + rules.ssim_c1;
-        let spread = (xx[i] - mx * mx) + (yy[i] - my * my) + rules.ssim_c2;
-        map[i] = luminance * contrast / (energy * spread);
-        // By x's mean, mean square and mean product, each taken as an independent quantity.
-        v_mu[i] = weights[i]
-            * (2.0 * my * (contrast - luminance) / (energy * spread)
-                - 2.0 * mx * map[i] * (1.0 / energy - 1.0 / spread));
-        v_xx[i] = -weights[i] * map[i] / spread;
-        v_xy[i] = weights[i] * 2.0 * luminance / (energy * spread);
+    let mean = |a: &[f64], b: &[f64]| -> Vec<f64> {
+        let product: Vec<f64> = a.iter().zip(b).map(|(a, b)| a * b).collect();
+        blur(&product, size, &window)
+    };
+    let (mu_x, mu_y) = (blur(x, size, &window), blur(y, size, &window));
+    let (xx, yy, xy) = (mean(x, x), mean(y, y), mean(x, y));
+    let each = |f: &dyn Fn(usize) -> f64| (0..x.len()).map(f).collect::<Vec<f64>>();
+    Moments {
+        luminance: each(&|i| 2.0 * mu_x[i] * mu_y[i] + rules.ssim_c1),
+        contrast: each(&|i| 2.0 * (xy[i] - mu_x[i] * mu_y[i]) + rules.ssim_c2),
+        energy: each(&|i| mu_x[i] * mu_x[i] + mu_y[i] * mu_y[i] + rules.ssim_c1),
+        spread: each(&|i| (xx[i] - mu_x[i] * mu_x[i]) + (yy[i] - mu_y[i] * mu_y[i]) + rules.ssim_c2),
+        mu_x,
+        mu_y,
     }
-    let (b_mu, b_xx, b_xy) = (mean(&v_mu), mean(&v_xx), mean(&v_xy));
-    let gradient = (0..count).map(|i| b_mu[i] + 2.0 * x[i] * b_xx[i] + y[i] * b_xy[i]).collect();
-    (map, gradient)
+}
+
+impl Moments {
+    fn ssim(&self, i: usize) -> f64 {
+        self.luminance[i] * self.contrast[i] / (self.energy[i] * self.spread[i])
+    }
+}
+
+/// SSIM of two planes at each pixel.
+pub fn ssim(rules: &Rules, size: (usize, usize), x: &[f64], y: &[f64]) -> Vec<f64> {
+    let moments = ssim_moments(rules, size, x, y);
+    (0..x.len()).map(|i| moments.ssim(i)).collect()
+}
+
+/// Gradient by the first plane for the gradient of the map.
+pub fn ssim_backward(rules: &Rules, size: (usize, usize), x: &[f64], y: &[f64], v_map: &[f64]) -> Vec<f64> {
+    let m = ssim_moments(rules, size, x, y);
+    // By x's mean, mean square and mean product, each taken as an independent quantity.
+    let v_mu = |i: usize| {
+        let below = m.energy[i] * m.spread[i];
+        let by_means = 2.0 * m.mu_y[i] * (m.contrast[i] - m.luminance[i]) / below;
+        v_map[i] * (by_means - 2.0 * m.mu_x[i] * m.ssim(i) * (1.0 / m.energy[i] - 1.0 / m.spread[i]))
+    };
+    let v_xx = |i: usize| -v_map[i] * m.ssim(i) / m.spread[i];
+    let v_xy = |i: usize| v_map[i] * 2.0 * m.luminance[i] / (m.energy[i] * m.spread[i]);
+    let window = window(rules);
+    let spread = |f: &dyn Fn(usize) -> f64| blur(&(0..x.len()).map(f).collect::<Vec<_>>(), size, &window);
+    let (b_mu, b_xx, b_xy) = (spread(&v_mu), spread(&v_xx), spread(&v_xy));
+    (0..x.len()).map(|i| b_mu[i] + 2.0 * x[i] * b_xx[i] + y[i] * b_xy[i]).collect()
 }
 
 /// -1, 0 or 1; 0 at 0.
@@ -113,7 +157,7 @@ pub fn sign(value: f64) -> f64 {
 /// 0.8 L1 + 0.2 (1 - SSIM) over the pixels that count; both images are 0 elsewhere.
 pub fn photo_loss(rules: &Rules, image: &[[f64; 3]], photo: &Photo) -> Loss {
     let elements = photo.elements();
-    let mut loss = Loss { v_image: vec![[0.0; 3]; image.len()], margin: f64::INFINITY, ..Loss::default() };
+    let mut loss = Loss::empty(image.len());
     if elements == 0.0 {
         return loss;
     }
@@ -123,12 +167,13 @@ pub fn photo_loss(rules: &Rules, image: &[[f64; 3]], photo: &Photo) -> Loss {
             colours.iter().zip(&valid).map(|(colour, valid)| if *valid > 0.0 { colour[channel] } else { 0.0 }).collect()
         };
         let (x, y) = (plane(image), plane(&photo.colours));
-        let (map, v_ssim) = ssim(rules, photo.size, &x, &y, &valid);
+        let map = ssim(rules, photo.size, &x, &y);
+        let v_ssim = ssim_backward(rules, photo.size, &x, &y, &valid);
         for i in (0..image.len()).filter(|&i| photo.valid[i]) {
             let difference = x[i] - y[i];
             loss.l1 += difference.abs() / elements;
             loss.ssim += map[i] / elements;
-            loss.margin = loss.margin.min(difference.abs());
+            loss.margins[i] = loss.margins[i].min(difference.abs());
             loss.v_image[i][channel] = (rules.l1_weight * sign(difference) - rules.dssim_weight * v_ssim[i]) / elements;
         }
     }
@@ -148,7 +193,7 @@ pub struct ObjectSlot {
 /// |U_k (R_k - M_k I)| over the pixels that count, times the label weight. `image` is R_k over black.
 pub fn label_loss(rules: &Rules, image: &[[f64; 3]], photo: &Photo, label_map: &[u32], slot: &ObjectSlot) -> Loss {
     let elements = photo.elements();
-    let mut loss = Loss { v_image: vec![[0.0; 3]; image.len()], margin: f64::INFINITY, ..Loss::default() };
+    let mut loss = Loss::empty(image.len());
     for i in (0..image.len()).filter(|&i| photo.valid[i] && !slot.occluders.contains(&label_map[i])) {
         for channel in 0..3 {
             let target = if label_map[i] == slot.label { photo.colours[i][channel] } else { 0.0 };
@@ -157,7 +202,7 @@ pub fn label_loss(rules: &Rules, image: &[[f64; 3]], photo: &Photo, label_map: &
             loss.v_image[i][channel] = rules.label_weight * sign(difference) / elements;
             // An untouched pixel outside the mask is 0 on both sides and stays so: no kink there.
             if difference != 0.0 {
-                loss.margin = loss.margin.min(difference.abs());
+                loss.margins[i] = loss.margins[i].min(difference.abs());
             }
         }
     }

@@ -186,16 +186,21 @@ pub fn project_forward(rules: &Rules, camera: &Camera, model: &Model, gaussian: 
     })
 }
 
+/// True where the Gaussian counts somewhere between the outermost pixel centres. A kernel may keep more, never fewer.
+pub fn cull(rules: &Rules, camera: &Camera, model: &Model, gaussian: usize) -> bool {
+    let size = (camera.width as usize, camera.height as usize);
+    project_forward(rules, camera, model, gaussian)
+        .is_some_and(|projection| tile::cull(rules, &projection.splat, size).touches)
+}
+
 /// Splats of every Gaussian that counts somewhere in the image, nearest first, ties by Gaussian index.
 pub fn project_all(rules: &Rules, camera: &Camera, model: &Model) -> Vec<Projection> {
-    let size = (camera.width as usize, camera.height as usize);
-    let mut found: Vec<Projection> = (0..model.rows.len())
+    let found: Vec<Projection> = (0..model.rows.len())
+        .filter(|&gaussian| cull(rules, camera, model, gaussian))
         .filter_map(|gaussian| project_forward(rules, camera, model, gaussian))
-        .filter(|projection| tile::cull(rules, &projection.splat, size).touches)
         .collect();
     let order = sort::depth_sort(&found.iter().map(|p| p.splat.depth).collect::<Vec<_>>());
-    found = order.iter().map(|&i| found[i]).collect();
-    found
+    order.iter().map(|&i| found[i]).collect()
 }
 
 /// Gradient of a row for the gradient of its splat.

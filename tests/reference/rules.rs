@@ -111,3 +111,78 @@ impl Rules {
         self.alpha_min.log2()
     }
 }
+
+/// Where a constant bears.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Family {
+    /// Splats of a view.
+    Project,
+    /// Colour of a splat.
+    Sh,
+    /// Image of a view.
+    Blend,
+    /// Photo and label loss.
+    Loss,
+    /// Optimiser.
+    Adam,
+    /// Cloning, splitting, removing.
+    Densify,
+    /// Opacity reset.
+    Reset,
+    /// Labelling.
+    Lift,
+}
+
+/// A set of rules with one constant changed; a comparison with it must fail.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Mutant {
+    /// Name of the constant.
+    pub name: &'static str,
+    /// Where it bears.
+    pub family: Family,
+    /// All constants, this one changed.
+    pub rules: Rules,
+}
+
+/// One mutant for each constant, most of them off by a few per cent.
+pub fn mutants() -> Vec<Mutant> {
+    use Family::{Adam, Blend, Densify, Lift, Loss, Project, Reset, Sh};
+    type Change = fn(&mut Rules);
+    let changes: [(&'static str, Family, Change); 28] = [
+        ("near", Project, |r| r.near = 3.8),
+        ("dilation", Project, |r| r.dilation *= 1.03),
+        ("jacobian_margin", Project, |r| r.jacobian_margin *= 0.97),
+        ("alpha_min", Blend, |r| r.alpha_min *= 1.03),
+        ("alpha_max", Blend, |r| r.alpha_max *= 0.97),
+        ("transmittance_min", Blend, |r| r.transmittance_min *= 10.0),
+        ("colour_bias", Sh, |r| r.colour_bias *= 1.03),
+        ("sh_c0", Sh, |r| r.sh_c0 *= 1.03),
+        ("sh_c1", Sh, |r| r.sh_c1 *= 1.03),
+        ("sh_c2", Sh, |r| r.sh_c2[2] *= 1.03),
+        ("sh_c3", Sh, |r| r.sh_c3[6] *= 1.03),
+        ("l1_weight", Loss, |r| r.l1_weight *= 1.03),
+        ("dssim_weight", Loss, |r| r.dssim_weight *= 1.03),
+        ("label_weight", Loss, |r| r.label_weight *= 1.03),
+        ("ssim_sigma", Loss, |r| r.ssim_sigma *= 1.03),
+        ("ssim_reach", Loss, |r| r.ssim_reach -= 1),
+        ("ssim_c1", Loss, |r| r.ssim_c1 *= 1.3),
+        ("ssim_c2", Loss, |r| r.ssim_c2 *= 1.3),
+        ("adam_beta1", Adam, |r| r.adam_beta1 *= 0.97),
+        ("adam_beta2", Adam, |r| r.adam_beta2 *= 0.97),
+        ("adam_eps", Adam, |r| r.adam_eps = 1e-8),
+        ("densify_gradient", Densify, |r| r.densify_gradient *= 1.5),
+        ("percent_dense", Densify, |r| r.percent_dense *= 1.5),
+        ("split_shrink", Densify, |r| r.split_shrink *= 1.03),
+        ("prune_opacity", Densify, |r| r.prune_opacity *= 4.0),
+        ("prune_scale", Densify, |r| r.prune_scale *= 0.5),
+        ("prune_scale_after", Densify, |r| r.prune_scale_after = 100),
+        ("reset_opacity", Reset, |r| r.reset_opacity *= 1.03),
+    ];
+    let lift: (&'static str, Family, Change) = ("lift_threshold", Lift, |r| r.lift_threshold *= 0.75);
+    let changed = |(name, family, change): (&'static str, Family, Change)| {
+        let mut rules = Rules::default();
+        change(&mut rules);
+        Mutant { name, family, rules }
+    };
+    changes.into_iter().chain([lift]).map(changed).collect()
+}

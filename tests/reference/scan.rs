@@ -1,7 +1,7 @@
 //! Prefix sums and compaction: exact answers.
 
 /// Sums of all earlier values, and the total.
-pub fn scan(values: &[u32]) -> (Vec<u32>, u32) {
+pub fn exclusive_scan(values: &[u32]) -> (Vec<u32>, u32) {
     let mut total = 0_u32;
     let sums = values.iter().map(|&value| {
         let before = total;

@@ -40,6 +40,8 @@ pub struct StepGradient {
     pub layers: Vec<Blended>,
     /// Distance of the nearest decision of any pass (arg max left out: it bears on no gradient).
     pub margin: f64,
+    /// The same for the decisions that bear on each Gaussian's gradient, [N]; the order of depths left out.
+    pub margins: Vec<f64>,
 }
 
 /// The splats alone.
@@ -65,7 +67,8 @@ pub fn step(rules: &Rules, camera: &Camera, model: &Model, target: &Target) -> S
 
     let mut out = StepGradient {
         value: photo.value + objects.iter().map(|loss| loss.value).sum::<f64>(),
-        margin: smallest_margin(rules, camera, model, &projections, &layers).min(photo.margin),
+        margin: smallest_margin(rules, camera, model, &projections, &layers).min(photo.margin()),
+        margins: vec![f64::INFINITY; model.rows.len()],
         photo,
         objects,
         rows: vec![Row::default(); model.rows.len()],
@@ -74,14 +77,27 @@ pub fn step(rules: &Rules, camera: &Camera, model: &Model, target: &Target) -> S
         splats: projections,
         layers,
     };
-    out.margin = out.objects.iter().fold(out.margin, |least, loss| least.min(loss.margin));
+    out.margin = out.objects.iter().fold(out.margin, |least, loss| least.min(loss.margin()));
+    let kinks = kinks(rules, &splats, size, &out);
     for (place, splat) in splats.iter().enumerate() {
-        let total = scene.values[place].plus(&of_objects[place]);
+        let total = scene.values[place].plus(&of_objects.values[place]);
         out.rows[splat.gaussian] = project::project_backward(rules, camera, model, splat.gaussian, &total);
         out.gradient2d[splat.gaussian] = ndc_norm(&scene.values[place], size);
         out.visible[splat.gaussian] = true;
+        let of_projection = out.splats[place].clamp_margin.min(out.splats[place].colour_margin);
+        let of_blend = scene.margins[place].min(of_objects.margins[place]);
+        out.margins[splat.gaussian] = kinks[place].min(of_projection).min(of_blend);
     }
     out
+}
+
+/// Distance of the pixels under each splat to the kink of a loss, by splat.
+fn kinks(rules: &Rules, splats: &[Splat], size: (usize, usize), out: &StepGradient) -> Vec<f64> {
+    let mut margins = out.photo.margins.clone();
+    for loss in &out.objects {
+        margins.iter_mut().zip(&loss.margins).for_each(|(least, margin)| *least = least.min(*margin));
+    }
+    blend::smallest_over_pixels(rules, splats, size, &margins)
 }
 
 /// Norm of a 2-D mean gradient in NDC units (the image is 2 wide and 2 high).

@@ -101,6 +101,13 @@ pub fn touched_tiles(rules: &Rules, splat: &Splat, grid: &TileGrid) -> (Vec<u32>
     (tiles, margin)
 }
 
+/// Tiles whose largest exponent is at most `slack` (log2 units) below the cut: an engine that errs on the side of one
+/// tile too many lies between slack 0 and its own.
+pub fn tiles_within(rules: &Rules, splat: &Splat, grid: &TileGrid, slack: f64) -> Vec<u32> {
+    let lower = Rules { alpha_min: rules.alpha_min * (-slack).exp2(), ..rules.clone() };
+    touched_tiles(&lower, splat, grid).0
+}
+
 /// Tiles in which at least one pixel counts, by trying each; always a subset of `touched_tiles`.
 pub fn counted_tiles(rules: &Rules, splat: &Splat, grid: &TileGrid) -> Vec<u32> {
     let counts = |x: usize, y: usize| exponent(splat, [x as f64 + 0.5, y as f64 + 0.5]) >= rules.exponent_min();
@@ -143,6 +150,12 @@ pub fn emit_instances(
         }
     }
     instances
+}
+
+/// The longest list, and for each key whether its list holds anything.
+pub fn tile_lengths(ranges: &[[u32; 2]]) -> (u32, Vec<bool>) {
+    let lengths = ranges.iter().map(|[start, end]| end - start);
+    (lengths.clone().max().unwrap_or(0), lengths.map(|length| length > 0).collect())
 }
 
 /// [start, end) of each key in a sorted list of keys; (0, 0) for keys that do not occur.

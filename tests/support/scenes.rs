@@ -1,5 +1,6 @@
 //! Small seeded scenes. Every number is an f32, so that an engine in f32 and a mirror in f64 start from the same.
 
+use crate::reference::densify::Population;
 use crate::reference::loss::{ObjectSlot, Photo};
 use crate::reference::step::Target;
 use crate::reference::{Model, Row};
@@ -23,11 +24,21 @@ pub struct Shape {
     pub sh_degree: u32,
     /// Standard deviations, smallest and largest, world units (the camera looks from about 4).
     pub scales: (f64, f64),
+    /// Opacity logits, smallest and largest.
+    pub opacities: (f64, f64),
 }
 
 impl Default for Shape {
     fn default() -> Self {
-        Self { gaussians: 40, width: 48, height: 40, objects: 3, sh_degree: 3, scales: (0.05, 0.5) }
+        Self {
+            gaussians: 40,
+            width: 48,
+            height: 40,
+            objects: 3,
+            sh_degree: 3,
+            scales: (0.05, 0.5),
+            opacities: (-3.0, 5.0),
+        }
     }
 }
 
@@ -95,7 +106,7 @@ pub fn gaussians(random: &mut Pcg32, shape: &Shape) -> Gaussians {
         let turn = [draw(-1.0, 1.0), draw(-1.0, 1.0), draw(-1.0, 1.0), draw(-1.0, 1.0)];
         out.quats.push(if turn.iter().map(|v| v * v).sum::<f32>() > 0.01 { turn } else { [1.0, 0.0, 0.0, 0.0] });
         out.scales.push([0; 3].map(|_| draw(small, large)));
-        out.opacities.push(draw(-3.0, 5.0));
+        out.opacities.push(draw(shape.opacities.0, shape.opacities.1));
         out.sh0.push([0; 3].map(|_| draw(-0.8, 1.6)));
         (0..out.rest_per_gaussian()).for_each(|_| out.sh_rest.push([0; 3].map(|_| draw(-0.25, 0.25))));
         let label = random.random_range(0..=shape.objects);
@@ -163,4 +174,19 @@ pub fn dot(camera: &Camera, at: [f64; 2], depth: f64, deviation: f64, opacity: f
         opacity: (opacity / (1.0 - opacity)).ln(),
         sh: [[0.0; 3]; 16],
     }
+}
+
+/// Rows for densification in a scene of extent 1: some below and some above each threshold, all with labels.
+pub fn population(seed: u64, count: usize) -> Population {
+    let mut random = generator(seed);
+    let shape = Shape { gaussians: count, scales: (0.002, 0.4), opacities: (-7.0, 3.0), ..Shape::default() };
+    let mut moments = |low: f64, high: f64| -> Vec<Row> {
+        (0..count).map(|_| Row::from_floats(&std::array::from_fn(|_| uniform(&mut random, low, high)))).collect()
+    };
+    let (m, u) = (moments(-1.0, 1.0), moments(0.0, 1.0));
+    let gradient_count: Vec<f64> = (0..count).map(|_| f64::from(random.random_range(0..6))).collect();
+    let mut sum = |views: &f64| round(views * uniform(&mut random, 5e-5_f64.ln(), 1e-3_f64.ln()).exp());
+    let gradient_sum = gradient_count.iter().map(&mut sum).collect();
+    let model = Model::from_gaussians(&gaussians(&mut random, &shape));
+    Population { model, m, u, gradient_sum, gradient_count }
 }

@@ -146,7 +146,7 @@ fn emit_spec(out: &mut String, spec: &[SpecConstant]) {
 
 fn emit_variant(out: &mut String, shader: &Shader, variant: &Variant) {
     let interface = &variant.interface;
-    let doc = if variant.suffix.is_empty() { "The shader without macros.".to_owned() } else { variant.macros() };
+    let doc = if variant.defines.is_empty() { "Compiled without macros.".to_owned() } else { variant.macros() };
     put!(out, "    /// {doc}\n    pub static {}: super::ShaderDesc = super::ShaderDesc {{", static_name(variant));
     put!(out, "        stem: {:?},\n        name: {:?},", shader.stem, variant.name);
     put!(out, "        spirv: include_bytes!(concat!(env!(\"OUT_DIR\"), \"/{}.spv\")),", variant.name);

@@ -3,7 +3,8 @@
 //! `stem + suffix: DEFINE OTHER=4` compiles `stem.comp` once more as `stem_suffix`, with the same interface.
 //! `* + suffix: DEFINE` does so for every shader that fetches through FETCH4 or FETCHU.
 //! `sibling = stem: DEFINE` makes a shader of its own, with an interface of its own, from the same file.
-//! Every stem has its base variant without macros; it needs no line. `#` begins a comment.
+//! Every stem has its base variant without macros; it needs no line. Lines work in order: a `*` reaches the siblings
+//! above it. `#` begins a comment.
 
 use super::compile::Define;
 use super::{Finding, is_snake_case};
@@ -49,7 +50,7 @@ pub fn parse(name: &str, text: &str) -> Result<Vec<VariantLine>, Vec<Finding>> {
             Some(line) => lines.push(line),
             None => findings.push(Finding::new(
                 place,
-                format!("`{content}` is no variant; write `stem + suffix: DEFINE OTHER=4`, the suffix not `base`"),
+                format!("`{content}` is no variant; write `stem + suffix: DEFINE OTHER=4` or `sibling = stem: DEFINE`; `base` is no suffix"),
             )),
         }
     }

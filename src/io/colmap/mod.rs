@@ -120,7 +120,9 @@ fn listed(
         &lens,
     )?;
     check_camera(images_path, place, &camera, &lens)?;
-    let relative = relative_path(images_path, root, &image.name)?;
+    // Models made on Windows may separate folders by backslashes.
+    let name = image.name.replace('\\', "/");
+    let relative = relative_path(images_path, root, &name)?;
     let photo = find_file(root, &["images", "."], &relative, &[""]);
-    Ok(Listed { name: image.name.clone(), photo, camera, lens, test: None })
+    Ok(Listed { name, photo, camera, lens, test: None })
 }

@@ -2,6 +2,7 @@
 
 mod random;
 mod region;
+mod sweep;
 
 use crate::error::{Error, Result};
 use crate::scene::gaussians::SH_C0;
@@ -25,7 +26,7 @@ pub const RANDOM_COUNT: usize = 50_000;
 /// same size in all directions, namely the root mean square distance to the three nearest neighbours, no labels.
 ///
 /// They stand on the points of the scene. Without points (or with fewer than 16), `count_if_no_points` of them are
-/// spread over the space that the training cameras see in common; see [`random`](self::random) for where and how.
+/// placed where the training cameras look and, with photos, where the photos agree on a colour.
 pub fn initial_gaussians(dataset: &Dataset, seed: u64, count_if_no_points: usize) -> Result<Gaussians> {
     if dataset.points.len() >= POINTS_MIN {
         return from_points(&dataset.points, dataset.extent());
@@ -73,6 +74,3 @@ fn neighbour_distances2(points: &[Point], extent: f64) -> Result<Vec<f64>> {
     };
     Ok(positions.par_iter().enumerate().map(mean).collect())
 }
-
-#[cfg(test)]
-mod tests;

@@ -1,13 +1,15 @@
 //! Points for a scene that has none.
 //!
-//! Candidates are drawn in the region that the cameras look at and kept if several of the training cameras see them.
-//! Around a subject, four of five lie in the common ball and the fifth behind it as the cameras see it, evenly in
-//! inverse depth, for the surroundings. Where the border of the photos has one colour throughout (a synthetic scene
-//! over a plain background), there are no surroundings, and a candidate that is seen in the background colour is
-//! free space: what remains is the visual hull. A point gets the mean colour of the pixels it falls on; without
-//! photos its colour is random.
+//! Where the border of the photos has one colour throughout (a synthetic scene over a plain background), candidates
+//! are drawn evenly in the ball that the cameras see in common, and one that is seen in the background colour is free
+//! space: what remains is the visual hull. A point gets the mean colour of the pixels it falls on.
+//!
+//! Elsewhere four of five points come from [`sweep`](super::sweep), which finds the depth of random pixels, and the
+//! rest, even in inverse depth, from anywhere before the cameras. All are seen by three training cameras where there
+//! are as many. Without photos every place before the cameras is as good and colours are random.
 
 use super::region::{self, Region};
+use super::sweep::Sweep;
 use crate::error::{Error, Result};
 use crate::scene::{Camera, Dataset, Photo, Point, View};
 use glam::{DVec2, DVec3};
@@ -17,8 +19,8 @@ use rayon::prelude::*;
 
 /// Candidates are drawn in batches; after this many batches without enough points the tests are eased.
 const BATCHES: usize = 24;
-/// Part of the candidates that is drawn behind the ball.
-const BEHIND: f64 = 0.2;
+/// Part of the points that may lie anywhere before the cameras, if photos tell where most should.
+const ANYWHERE: f64 = 0.2;
 /// Colour difference up to which a pixel counts as background.
 const BACKGROUND_TOLERANCE: u8 = 3;
 /// Views whose border is looked at.
@@ -43,6 +45,10 @@ pub(super) fn points(dataset: &Dataset, seed: u64, count: usize) -> Result<Vec<P
     let mut test = Test { views, seen_by: views.len().min(3), backdrop: backdrop(views) };
     let mut random = Pcg64Mcg::seed_from_u64(seed);
     let mut points = Vec::with_capacity(count);
+    if test.backdrop.is_none() {
+        let found = Sweep::new(views, region.depths()).points(&mut random, count);
+        points.extend(found.into_iter().take(((1.0 - ANYWHERE) * count as f64) as usize));
+    }
     // The tests are eased until they leave enough: no free space, then two cameras, one, none.
     loop {
         for _ in 0..BATCHES {
@@ -50,9 +56,9 @@ pub(super) fn points(dataset: &Dataset, seed: u64, count: usize) -> Result<Vec<P
                 points.truncate(count);
                 return Ok(points);
             }
-            let surroundings = test.backdrop.is_none();
+            let plain = test.backdrop.is_some();
             let drawn: Vec<Point> =
-                (0..count.max(1024)).map(|_| candidate(&mut random, views, region, surroundings)).collect();
+                (0..count.max(1024)).map(|_| candidate(&mut random, views, region, plain)).collect();
             let kept: Vec<Option<Point>> = drawn.par_iter().map(|point| test.judge(*point)).collect();
             points.extend(kept.into_iter().flatten());
         }
@@ -62,19 +68,14 @@ pub(super) fn points(dataset: &Dataset, seed: u64, count: usize) -> Result<Vec<P
     }
 }
 
-/// A point of the region with a random colour.
-fn candidate(random: &mut Pcg64Mcg, views: &[View], region: Region, surroundings: bool) -> Point {
+/// A point with a random colour: in the ball if there is one and nothing around it, else before some camera.
+fn candidate(random: &mut Pcg64Mcg, views: &[View], region: Region, plain: bool) -> Point {
     let colour = random.random::<[u8; 3]>();
     let position = match region {
-        Region::Ball { centre, radius } if surroundings && random.random_bool(BEHIND) => {
+        Region::Ball { centre, radius, .. } if plain => centre + radius * in_unit_ball(random),
+        _ => {
             let camera = &views[random.random_range(0..views.len())].camera;
-            let front = camera.centre().distance(centre) + radius;
-            ahead(random, camera, front, 5.0 * front)
-        }
-        Region::Ball { centre, radius } => centre + radius * in_unit_ball(random),
-        Region::Frusta { near, far } => {
-            let camera = &views[random.random_range(0..views.len())].camera;
-            ahead(random, camera, near, far)
+            ahead(random, camera, region.depths())
         }
     };
     Point { position, colour }
@@ -91,14 +92,13 @@ fn in_unit_ball(random: &mut Pcg64Mcg) -> DVec3 {
 }
 
 /// A point in some pixel of `camera`, evenly in inverse depth between two depths.
-fn ahead(random: &mut Pcg64Mcg, camera: &Camera, near: f64, far: f64) -> DVec3 {
+fn ahead(random: &mut Pcg64Mcg, camera: &Camera, (near, far): (f64, f64)) -> DVec3 {
     let pixel = DVec2::new(
         random.random_range(0.0..f64::from(camera.width)),
         random.random_range(0.0..f64::from(camera.height)),
     );
     let depth = 1.0 / random.random_range(1.0 / far..1.0 / near);
-    let ray = DVec3::new((pixel.x - camera.cx) / camera.fx, (pixel.y - camera.cy) / camera.fy, 1.0);
-    camera.rotation.transpose() * (ray * depth - camera.translation)
+    region::unproject(camera, pixel, depth)
 }
 
 impl Test<'_> {
@@ -106,14 +106,7 @@ impl Test<'_> {
     fn judge(&self, point: Point) -> Option<Point> {
         let (mut seen, mut coloured, mut free, mut sum) = (0, 0u32, 0, [0u32; 3]);
         for view in self.views {
-            let at = view.camera.to_camera(point.position);
-            let pixel = view.camera.project(at);
-            let inside = at.z > 0.0
-                && (0.0..f64::from(view.camera.width)).contains(&pixel.x)
-                && (0.0..f64::from(view.camera.height)).contains(&pixel.y);
-            if !inside {
-                continue;
-            }
+            let Some(pixel) = region::sees(&view.camera, point.position) else { continue };
             seen += 1;
             let Some(texel) = view.photo.as_ref().and_then(|photo| texel(photo, pixel)) else { continue };
             coloured += 1;
@@ -130,7 +123,7 @@ impl Test<'_> {
     }
 }
 
-fn texel(photo: &Photo, pixel: DVec2) -> Option<[u8; 3]> {
+pub(super) fn texel(photo: &Photo, pixel: DVec2) -> Option<[u8; 3]> {
     let [r, g, b, valid] = photo.rgba[pixel.y as usize * photo.width as usize + pixel.x as usize];
     (valid == 255).then_some([r, g, b])
 }

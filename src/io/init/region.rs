@@ -1,7 +1,7 @@
 //! Where the cameras of a scene look.
 
 use crate::scene::{Camera, View};
-use glam::{DMat3, DVec3};
+use glam::{DMat3, DVec2, DVec3};
 
 /// The space that is worth filling with Gaussians.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -13,6 +13,8 @@ pub(super) enum Region {
         centre: DVec3,
         /// World units.
         radius: f64,
+        /// Typical distance of a camera from the centre, world units.
+        distance: f64,
     },
     /// Cameras that look the same way, or outwards: what lies before them between two depths.
     Frusta {
@@ -21,6 +23,32 @@ pub(super) enum Region {
         /// World units.
         far: f64,
     },
+}
+
+impl Region {
+    /// Depths before a camera between which the scene lies.
+    pub(super) fn depths(&self) -> (f64, f64) {
+        match *self {
+            Self::Ball { radius, distance, .. } => (0.4 * distance, 5.0 * (distance + radius)),
+            Self::Frusta { near, far } => (near, far),
+        }
+    }
+}
+
+/// The pixel of `camera` that shows `point`, if its image has one.
+pub(super) fn sees(camera: &Camera, point: DVec3) -> Option<DVec2> {
+    let at = camera.to_camera(point);
+    let pixel = camera.project(at);
+    let inside = at.z > 0.0
+        && (0.0..f64::from(camera.width)).contains(&pixel.x)
+        && (0.0..f64::from(camera.height)).contains(&pixel.y);
+    inside.then_some(pixel)
+}
+
+/// The world point at `depth` behind `pixel`.
+pub(super) fn unproject(camera: &Camera, pixel: DVec2, depth: f64) -> DVec3 {
+    let ray = DVec3::new((pixel.x - camera.cx) / camera.fx, (pixel.y - camera.cy) / camera.fy, 1.0);
+    camera.rotation.transpose() * (ray * depth - camera.translation)
 }
 
 /// Direction of the optical axis in world space.
@@ -44,22 +72,16 @@ fn median(mut values: Vec<f64>) -> f64 {
 pub(super) fn find(views: &[View], extent: f64) -> Region {
     let cameras: Vec<&Camera> = views.iter().map(|view| &view.camera).collect();
     if let Some(centre) = nearest_to_axes(&cameras) {
-        let sees = |camera: &&&Camera| {
-            let at = camera.to_camera(centre);
-            let pixel = camera.project(at);
-            at.z > 0.0
-                && (0.0..f64::from(camera.width)).contains(&pixel.x)
-                && (0.0..f64::from(camera.height)).contains(&pixel.y)
-        };
-        let inward = cameras.iter().filter(sees).count();
+        let inward = cameras.iter().filter(|camera| sees(camera, centre).is_some()).count();
         let radius = median(cameras.iter().map(|c| c.centre().distance(centre) * narrow_sine(c)).collect());
+        let distance = median(cameras.iter().map(|c| c.centre().distance(centre)).collect());
         if inward * 4 >= cameras.len() * 3 && radius > 0.0 {
-            return Region::Ball { centre, radius };
+            return Region::Ball { centre, radius, distance };
         }
     }
-    // Nothing tells the depth of the scene but the spread of the cameras: 3DGS captures have their subject a few
-    // of these away.
-    Region::Frusta { near: 0.5 * extent, far: 10.0 * extent }
+    // Nothing tells the depth of the scene but the spread of the cameras. Between one and fifty times that, evenly in
+    // inverse depth, the shift of a point between the photos grows evenly too.
+    Region::Frusta { near: extent, far: 50.0 * extent }
 }
 
 /// The point with the least sum of squared distances to the optical axes, if they determine it well.
@@ -74,6 +96,6 @@ fn nearest_to_axes(cameras: &[&Camera]) -> Option<DVec3> {
     }
     matrix *= 1.0 / cameras.len().max(1) as f64;
     right /= cameras.len().max(1) as f64;
-    // The matrix has trace 2 and, for parallel axes, determinant 0; axes 20 degrees around a common one give 0.06.
+    // The matrix has trace 2 and, for parallel axes, determinant 0; axes 6 degrees around a common one give 0.01.
     (matrix.determinant() > 0.01).then(|| matrix.inverse() * right)
 }

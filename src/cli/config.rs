@@ -1,0 +1,74 @@
+//! From what was typed to what is done: flag before file before default.
+
+use super::train_args::TrainArgs;
+use crate::io::LoadOptions;
+use crate::train::TrainConfig;
+use crate::{Error, Result};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+/// The configuration of a training run, checked.
+pub fn decide(args: &TrainArgs) -> Result<TrainConfig> {
+    let mut config = match &args.config {
+        Some(path) => read(path)?,
+        None => TrainConfig::default(),
+    };
+    args.apply(&mut config);
+    config.check()?;
+    Ok(config)
+}
+
+/// Reads a configuration file; fields that it does not name keep their defaults.
+pub fn read(path: &Path) -> Result<TrainConfig> {
+    let text = std::fs::read_to_string(path).map_err(Error::read(path))?;
+    toml::from_str(&text).map_err(|error| {
+        let line = error.span().map(|span| text[..span.start].matches('\n').count() + 1);
+        let place = line.map_or(String::new(), |line| format!("line {line}"));
+        Error::data(path, place, error.message().replace('\n', " "))
+    })
+}
+
+/// What ran, as a file that `--config` reads. Facts, such as the device, become comments.
+pub fn dump(config: &TrainConfig, facts: &[(&str, String)]) -> Result<String> {
+    let mut text = format!("# labelgs {}\n", env!("CARGO_PKG_VERSION"));
+    for (name, value) in facts {
+        text += &format!("# {name}: {}\n", value.replace('\n', " "));
+    }
+    let fields = toml::to_string(config).map_err(|error| Error::Bug(format!("configuration: {error}")))?;
+    Ok(text + &fields)
+}
+
+/// How a training run reads its scene.
+pub fn load_options(config: &TrainConfig, masks: Option<PathBuf>) -> LoadOptions {
+    let some = |value: u32| (value > 0).then_some(value);
+    LoadOptions {
+        masks,
+        max_resolution: some(config.max_resolution),
+        test_every: some(config.test_every),
+        background: config.background,
+        photos: true,
+    }
+}
+
+/// Defaults of the flags of `train` as one types them, by flag without dashes.
+pub fn default_texts() -> BTreeMap<String, String> {
+    // TOML prints a f32 as one would type it.
+    let fields = toml::to_string(&TrainConfig::default()).unwrap_or_default();
+    let mut texts: BTreeMap<String, String> = fields
+        .lines()
+        .filter_map(|line| line.split_once(" = "))
+        .map(|(name, value)| (name.replace('_', "-"), typed(name, value)))
+        .collect();
+    texts.insert("feature-rest-lr".into(), "--feature-lr / 20".into());
+    texts
+}
+
+fn typed(name: &str, value: &str) -> String {
+    match (name, value) {
+        ("background", _) => "black".into(),
+        ("save_at", _) => "none".into(),
+        (_, "true") => "on".into(),
+        (_, "false") => "off".into(),
+        _ => value.trim_matches('"').to_owned(),
+    }
+}

@@ -1,0 +1,41 @@
+//! Interrupts: at once by default; a verb that has something to save asks to be told instead.
+
+use crate::{Error, Result};
+use signal_hook::consts::{SIGINT, SIGTERM};
+use signal_hook::flag;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::{Arc, LazyLock};
+
+/// True while the next signal ends the process at once.
+static AT_ONCE: LazyLock<Arc<AtomicBool>> = LazyLock::new(|| Arc::new(AtomicBool::new(true)));
+/// Exit status of the signal that came, or 0.
+static STATUS: LazyLock<Arc<AtomicUsize>> = LazyLock::new(|| Arc::new(AtomicUsize::new(0)));
+
+/// Sets the signal handlers. The order matters: the first signal is noted and arms the exit, the second one exits.
+pub fn install() -> Result<()> {
+    for (signal, status) in [(SIGINT, 130), (SIGTERM, 143)] {
+        flag::register_conditional_shutdown(signal, status, Arc::clone(&AT_ONCE))
+            .and_then(|_| flag::register_usize(signal, Arc::clone(&STATUS), status as usize))
+            .and_then(|_| flag::register(signal, Arc::clone(&AT_ONCE)))
+            .map_err(|error| Error::Bug(format!("signal handler: {error}")))?;
+    }
+    Ok(())
+}
+
+/// From now on the first signal is only noted; the caller looks at [`check`] often. A second one ends the process.
+pub fn note_only() {
+    AT_ONCE.store(false, Ordering::SeqCst);
+}
+
+/// The exit status of a signal that came.
+pub fn status() -> Option<i32> {
+    match STATUS.load(Ordering::SeqCst) {
+        0 => None,
+        status => i32::try_from(status).ok(),
+    }
+}
+
+/// An error if a signal came.
+pub fn check() -> Result<()> {
+    status().map_or(Ok(()), |status| Err(Error::Interrupted(status)))
+}

@@ -1,0 +1,103 @@
+//! Messages on standard error, and a progress bar that they do not tear.
+
+use super::args::GlobalArgs;
+use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget, ProgressStyle};
+use std::io::{IsTerminal, Write};
+use std::sync::LazyLock;
+use std::time::{Duration, Instant};
+use tracing_subscriber::EnvFilter;
+
+/// All bars of the process; log lines are printed above them.
+static BARS: LazyLock<MultiProgress> =
+    LazyLock::new(|| MultiProgress::with_draw_target(ProgressDrawTarget::stderr_with_hz(10)));
+
+/// Time between two plain progress lines.
+const PLAIN_EVERY: Duration = Duration::from_secs(10);
+
+/// Standard error, written while the bars are out of the way.
+struct AboveBars;
+
+impl Write for AboveBars {
+    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+        BARS.suspend(|| std::io::stderr().write(bytes))
+    }
+
+    fn flush(&mut self) -> std::io::Result<()> {
+        std::io::stderr().flush()
+    }
+}
+
+/// Starts logging; `RUST_LOG` wins over the flags. Later calls do nothing.
+pub fn start(args: &GlobalArgs) {
+    let level = match (args.quiet, args.verbose) {
+        (true, _) => "error",
+        (_, 0) => "warn,labelgs=info",
+        (_, 1) => "warn,labelgs=debug",
+        _ => "trace",
+    };
+    let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new(level));
+    let colour = std::io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none_or(|value| value.is_empty());
+    let started = tracing_subscriber::fmt()
+        .with_env_filter(filter)
+        .with_writer(|| AboveBars)
+        .with_ansi(colour)
+        .with_target(false)
+        .without_time()
+        .try_init();
+    // A second start in one process, as tests make, keeps the first.
+    drop(started);
+}
+
+/// Prints the error that ends the process; printed even when quiet.
+pub fn final_error(error: &dyn std::fmt::Display) {
+    BARS.suspend(|| {
+        // There is nowhere to report a closed standard error.
+        let _ = writeln!(std::io::stderr(), "error: {error}");
+    });
+}
+
+/// Progress of long work: a bar on a terminal, otherwise a log line now and then.
+pub struct Progress {
+    bar: Option<ProgressBar>,
+    what: &'static str,
+    total: u64,
+    start: Instant,
+    last: Instant,
+}
+
+impl Progress {
+    /// Progress over `total` things called `what`, such as `steps`.
+    pub fn new(total: u64, what: &'static str, args: &GlobalArgs) -> Self {
+        let bar = (!args.quiet && std::io::stderr().is_terminal()).then(|| {
+            let template = "{bar:30} {pos}/{len} {msg} {per_sec} {eta} left";
+            let style = ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar());
+            BARS.add(ProgressBar::new(total).with_style(style).with_message(what))
+        });
+        let now = Instant::now();
+        Self { bar, what, total, start: now, last: now }
+    }
+
+    /// `done` things are done; `message` tells more, such as the loss, and is only asked when it is shown.
+    pub fn set(&mut self, done: u64, message: impl FnOnce() -> String) {
+        if let Some(bar) = &self.bar {
+            bar.set_position(done);
+            if self.last.elapsed() > Duration::from_millis(100) {
+                self.last = Instant::now();
+                bar.set_message(format!("{} {}", self.what, message()));
+            }
+        } else if self.last.elapsed() > PLAIN_EVERY {
+            self.last = Instant::now();
+            let rate = done as f64 / self.start.elapsed().as_secs_f64();
+            tracing::info!("{done} of {} {} ({rate:.1}/s) {}", self.total, self.what, message());
+        }
+    }
+}
+
+impl Drop for Progress {
+    fn drop(&mut self) {
+        if let Some(bar) = &self.bar {
+            bar.finish_and_clear();
+            BARS.remove(bar);
+        }
+    }
+}

@@ -1,0 +1,86 @@
+//! Densification and opacity reset between steps, with a bound on the number of Gaussians.
+
+use super::Trainer;
+use super::job::Job;
+use crate::engine::ListKey;
+use crate::error::Result;
+use crate::plan::Buf;
+use crate::shaders::structs::{Counters, StepUniforms};
+
+/// What a densification did.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Densified {
+    /// Gaussians cloned.
+    pub cloned: u32,
+    /// Gaussians split.
+    pub split: u32,
+    /// Gaussians removed.
+    pub pruned: u32,
+}
+
+impl Trainer {
+    /// Clones, splits and prunes after `job`, whose statistics are in; all earlier submits are done.
+    pub(super) fn densify(&mut self, job: &Job) -> Result<Densified> {
+        let uniforms = self.densify_uniforms(job);
+        let counted = self.count_densified(uniforms)?;
+        let uniforms = self.bounded(uniforms, counted.densified_count)?;
+        let counted = self.count_densified(uniforms)?;
+        self.engine.make_room_for_gaussians(u64::from(counted.densified_count))?;
+        let list = self.engine.list(ListKey::DensifyApply)?;
+        self.engine.sched_mut().upload(Buf::STEP, 0, 0, &[uniforms])?;
+        self.engine.sched_mut().run(list, 0)?;
+        self.engine.set_gaussian_count(counted.densified_count);
+        Ok(Densified { cloned: counted.cloned_count, split: counted.split_count, pruned: counted.pruned_count })
+    }
+
+    /// Brings all opacities down to at most 0.01.
+    pub(super) fn reset_opacity(&mut self, job: &Job) -> Result<()> {
+        let uniforms = self.densify_uniforms(job);
+        let list = self.engine.list(ListKey::OpacityReset)?;
+        self.engine.sched_mut().upload(Buf::STEP, 0, 0, &[uniforms])?;
+        self.engine.sched_mut().run(list, 0)
+    }
+
+    fn densify_uniforms(&self, job: &Job) -> StepUniforms {
+        let config = &self.config;
+        StepUniforms {
+            densify_threshold: config.densify_grad_threshold,
+            densify_scale: (f64::from(config.percent_dense) * self.fixed.extent) as f32,
+            prune_scale: (f64::from(config.max_scale) * self.fixed.extent) as f32,
+            prune_opacity: config.min_opacity,
+            prune_big: u32::from(config.prunes_large_at(job.step)),
+            seed: (config.seed as u32) ^ job.step.wrapping_mul(0x9e37_79b9),
+            ..super::job::uniforms(job, &self.views[job.view], config, self.fixed, &self.engine)
+        }
+    }
+
+    fn count_densified(&mut self, uniforms: StepUniforms) -> Result<Counters> {
+        let list = self.engine.list(ListKey::DensifyCount)?;
+        self.engine.sched_mut().upload(Buf::STEP, 0, 0, &[uniforms])?;
+        self.engine.sched_mut().run(list, 0)?;
+        Ok(self.engine.report(0)?.counters)
+    }
+
+    /// Raises the gradient threshold until the result fits the bound: those that need it most grow first.
+    fn bounded(&mut self, uniforms: StepUniforms, count: u32) -> Result<StepUniforms> {
+        let bound = self.max_gaussians;
+        if u64::from(count) <= bound {
+            return Ok(uniforms);
+        }
+        let (mut low, mut high) = (uniforms.densify_threshold, uniforms.densify_threshold * 2.0);
+        let with = |threshold| StepUniforms { densify_threshold: threshold, ..uniforms };
+        // Gradients are finite, so some threshold lets nothing grow; 60 doublings span every f32.
+        for _ in 0..60 {
+            if u64::from(self.count_densified(with(high))?.densified_count) <= bound {
+                break;
+            }
+            (low, high) = (high, high * 2.0);
+        }
+        for _ in 0..12 {
+            let middle = 0.5 * (low + high);
+            let fits = u64::from(self.count_densified(with(middle))?.densified_count) <= bound;
+            (low, high) = if fits { (low, middle) } else { (middle, high) };
+        }
+        Ok(with(high))
+    }
+}

@@ -1,0 +1,77 @@
+//! Which view a step takes, and which of its objects; the same for the same seed, on every machine.
+
+use rand::SeedableRng;
+use rand::seq::SliceRandom;
+use rand_pcg::Pcg64Mcg;
+
+/// Stream of the order of views; other streams are the steps themselves.
+const VIEW_STREAM: u64 = u64::MAX;
+
+fn stream(seed: u64, stream: u64) -> Pcg64Mcg {
+    // Two words of state: any two different (seed, stream) give unrelated numbers.
+    let mut state = [0; 16];
+    state[..8].copy_from_slice(&seed.wrapping_mul(0x9e37_79b9_7f4a_7c15).to_le_bytes());
+    state[8..].copy_from_slice(&stream.wrapping_add(1).wrapping_mul(0xbf58_476d_1ce4_e5b9).to_le_bytes());
+    Pcg64Mcg::from_seed(state)
+}
+
+/// Draws views without replacement until all were seen, then starts over (3DGS).
+#[derive(Debug)]
+pub struct ViewOrder {
+    random: Pcg64Mcg,
+    views: usize,
+    stack: Vec<usize>,
+}
+
+impl ViewOrder {
+    /// An order over `views` views.
+    pub fn new(seed: u64, views: usize) -> Self {
+        Self { random: stream(seed, VIEW_STREAM), views, stack: Vec::new() }
+    }
+
+    /// The next view.
+    pub fn draw(&mut self) -> usize {
+        if self.stack.is_empty() {
+            self.stack = (0..self.views).collect();
+            self.stack.shuffle(&mut self.random);
+        }
+        self.stack.pop().unwrap_or(0)
+    }
+}
+
+/// At most `count` of the objects of a view, sorted.
+pub fn sample_objects(seed: u64, step: u32, objects: &[u16], count: usize) -> Vec<u16> {
+    let mut chosen = objects.to_vec();
+    if chosen.len() > count {
+        chosen.shuffle(&mut stream(seed, u64::from(step)));
+        chosen.truncate(count);
+        chosen.sort_unstable();
+    }
+    chosen
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_view_comes_once_in_each_round() {
+        let mut order = ViewOrder::new(7, 5);
+        for _ in 0..3 {
+            let mut round: Vec<usize> = (0..5).map(|_| order.draw()).collect();
+            round.sort_unstable();
+            assert_eq!(round, [0, 1, 2, 3, 4]);
+        }
+    }
+
+    #[test]
+    fn samples_depend_on_seed_and_step_only() {
+        let objects: Vec<u16> = (1..=40).collect();
+        let a = sample_objects(1, 5, &objects, 10);
+        assert_eq!(a, sample_objects(1, 5, &objects, 10));
+        assert_ne!(a, sample_objects(1, 6, &objects, 10));
+        assert_ne!(a, sample_objects(2, 5, &objects, 10));
+        assert!(a.len() == 10 && a.is_sorted());
+        assert_eq!(sample_objects(1, 5, &[3, 9], 10), [3, 9]);
+    }
+}

@@ -1,0 +1,306 @@
+//! The command line: every flag, what goes where, exit statuses.
+
+use assert_cmd::Command;
+use clap::Parser;
+use labelgs::cli::args::{Cli, Command as Verb};
+use labelgs::cli::{command, config};
+use labelgs::io::ply::{read_gaussians, write_gaussians};
+use labelgs::scene::Gaussians;
+use labelgs::train::TrainConfig;
+use labelgs::train::config::Occlusion;
+use serde_json::Value;
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+use std::process::{Output, Stdio};
+use tempfile::TempDir;
+
+fn labelgs(args: &[&str]) -> Output {
+    Command::cargo_bin("labelgs").expect("the tool is built").args(args).output().expect("it runs")
+}
+
+fn text(bytes: &[u8]) -> String {
+    String::from_utf8(bytes.to_vec()).expect("UTF-8")
+}
+
+/// A model of six Gaussians: labels 0, 1, 1, 3, 3, 3.
+fn model(folder: &Path) -> PathBuf {
+    let path = folder.join("model.ply");
+    let gaussians = Gaussians {
+        means: (0..6).map(|i| [i as f32, 0.0, 1.0]).collect(),
+        quats: vec![[1.0, 0.0, 0.0, 0.0]; 6],
+        scales: vec![[-3.0; 3]; 6],
+        opacities: vec![0.0; 6],
+        sh0: vec![[0.5; 3]; 6],
+        sh_rest: Vec::new(),
+        sh_degree: 0,
+        labels: Some(vec![0, 1, 1, 3, 3, 3]),
+    };
+    write_gaussians(&path, &gaussians).expect("written");
+    path
+}
+
+fn folder() -> TempDir {
+    tempfile::tempdir().expect("folder")
+}
+
+fn train(flags: &[&str]) -> labelgs::Result<TrainConfig> {
+    let line = ["labelgs", "train", "scene", "-o", "out"].iter().chain(flags).copied();
+    match Cli::try_parse_from(line).expect("flags").command {
+        Verb::Train(args) => config::decide(&args),
+        other => panic!("{other:?}"),
+    }
+}
+
+#[test]
+fn every_flag_is_explained_once() {
+    let mut root = command();
+    root.build();
+    for verb in root.get_subcommands().filter(|verb| verb.get_name() != "help") {
+        let mut shorts = BTreeSet::new();
+        assert!(verb.get_about().is_some(), "{}", verb.get_name());
+        for arg in verb.get_arguments() {
+            let help = arg.get_help().map(ToString::to_string).unwrap_or_default();
+            let place = format!("{} {}: {help}", verb.get_name(), arg.get_id());
+            assert!(help.len() > 8, "{place}");
+            assert!(arg.get_short().is_none_or(|short| shorts.insert(short)), "{place}: short flag twice");
+        }
+    }
+}
+
+#[test]
+fn every_field_of_the_configuration_has_a_flag_with_its_default() {
+    let root = command();
+    let verb = root.find_subcommand("train").expect("train");
+    let fields = serde_json::to_value(TrainConfig { feature_rest_lr: Some(0.0), ..Default::default() }).expect("JSON");
+    for field in fields.as_object().expect("fields").keys() {
+        let flag = field.replace('_', "-");
+        let arg =
+            verb.get_arguments().find(|arg| arg.get_long() == Some(&flag)).unwrap_or_else(|| panic!("no --{flag}"));
+        let help = arg.get_help().map(ToString::to_string).unwrap_or_default();
+        assert!(help.contains("[default: "), "--{flag}: {help}");
+    }
+    let help = text(&labelgs(&["train", "--help"]).stdout);
+    // Lines are wrapped anywhere.
+    let help = help.split_whitespace().collect::<Vec<_>>().join(" ");
+    for default in ["[default: 15000]", "[default: 0.6]", "[default: 0.00016]", "[default: rendered]", "[default: on]"]
+    {
+        assert!(help.contains(default), "{default} is not in\n{help}");
+    }
+    for heading in ["Run:", "Labels:", "Optimiser:", "Densification:", "Global:"] {
+        assert!(help.contains(heading), "{heading} is not in\n{help}");
+    }
+}
+
+#[test]
+fn every_flag_of_train_changes_its_field() {
+    let typed = [
+        ("--iterations", "7"),
+        ("--max-resolution", "99"),
+        ("--test-every", "5"),
+        ("--seed", "11"),
+        ("--max-gaussians", "2.5M"),
+        ("--background", "0.1,0.2,1"),
+        ("--near", "0.1"),
+        ("--label-from", "3"),
+        ("--label-threshold", "0.7"),
+        ("--gpf", "off"),
+        ("--label-samples", "4"),
+        ("--label-weight", "0.5"),
+        ("--occlusion", "none"),
+        ("--occlusion-every", "10"),
+        ("--lambda-dssim", "0.3"),
+        ("--sh-degree", "1"),
+        ("--sh-degree-interval", "20"),
+        ("--position-lr-init", "1e-3"),
+        ("--position-lr-final", "1e-5"),
+        ("--position-lr-max-steps", "40"),
+        ("--feature-lr", "0.1"),
+        ("--feature-rest-lr", "0.2"),
+        ("--opacity-lr", "0.3"),
+        ("--scaling-lr", "0.4"),
+        ("--rotation-lr", "0.5"),
+        ("--densify-from", "1"),
+        ("--densify-until", "2"),
+        ("--densify-interval", "3"),
+        ("--densify-grad-threshold", "0.1"),
+        ("--percent-dense", "0.2"),
+        ("--min-opacity", "0.01"),
+        ("--max-scale", "0.3"),
+        ("--opacity-reset-interval", "8"),
+        ("--opacity-reset-margin", "9"),
+        ("--save-at", "2000,5000"),
+        ("--preview-every", "6"),
+    ];
+    let all: Vec<&str> = typed.iter().flat_map(|&(flag, value)| [flag, value]).collect();
+    let json = |config: &TrainConfig| serde_json::to_value(config).expect("JSON");
+    let (changed, default) = (json(&train(&all).expect("decided")), json(&TrainConfig::default()));
+    for (field, value) in changed.as_object().expect("fields") {
+        assert_ne!(Some(value), default.get(field), "{field} is out of reach");
+    }
+    assert_eq!(changed["max_gaussians"], 2_500_000);
+    assert_eq!(changed["save_at"], serde_json::json!([2000, 5000]));
+    assert_eq!(train(&["--no-test"]).expect("decided").test_every, 0);
+    assert_eq!(train(&["--background", "white"]).expect("decided").background, [1.0; 3]);
+    assert_eq!(train(&[]).expect("decided"), TrainConfig::default());
+}
+
+#[test]
+fn flag_before_file_before_default() {
+    let folder = folder();
+    let path = folder.path().join("mine.toml");
+    std::fs::write(&path, "iterations = 300\nocclusion = \"none\"\nbackground = [1, 0.5, 0]\n").expect("file");
+    let file = path.to_str().expect("UTF-8");
+    let decided = train(&["--config", file, "--iterations", "400"]).expect("decided");
+    assert_eq!((decided.iterations, decided.occlusion, decided.seed), (400, Occlusion::None, 0));
+    assert_eq!(decided.background, [1.0, 0.5, 0.0]);
+
+    let dumped = config::dump(&decided, &[("device", "a\nb".into())]).expect("TOML");
+    assert!(dumped.contains("# device: a b\n") && dumped.contains("label_threshold = 0.6\n"), "{dumped}");
+    std::fs::write(&path, dumped).expect("file");
+    assert_eq!(config::read(&path).expect("read back"), decided);
+
+    std::fs::write(&path, "iterations = 300\nlambda = 0.2\n").expect("file");
+    let message = config::read(&path).expect_err("unknown field").to_string();
+    assert!(message.contains("line 2") && message.contains("lambda"), "{message}");
+    std::fs::write(&path, "label_threshold = 3\n").expect("file");
+    let error = train(&["--config", file]).expect_err("out of range");
+    assert!(error.to_string().starts_with("--label-threshold"), "{error}");
+}
+
+#[test]
+fn values_that_make_no_sense_are_usage_errors() {
+    let broken: [&[&str]; 10] = [
+        &[],
+        &["paint"],
+        &["list"],
+        &["train", "scene"],
+        &["train", "scene", "-o", "out", "--gpf", "maybe"],
+        &["synth", "x", "--size", "320"],
+        &["extract", "model.ply", "-o", "x.ply"],
+        &["extract", "model.ply", "-o", "x.ply", "--labels", "3-1"],
+        &["render", "model.ply", "-o", "x"],
+        &["profile"],
+    ];
+    for args in broken {
+        let output = labelgs(args);
+        assert_eq!(output.status.code(), Some(2), "{args:?}: {}", text(&output.stderr));
+        assert!(output.stdout.is_empty(), "{args:?}");
+    }
+}
+
+#[test]
+fn help_and_version_are_results() {
+    for args in [&["--help"] as &[&str], &["-h"], &["--version"], &["train", "-h"], &["help", "eval"]] {
+        let output = labelgs(args);
+        assert_eq!((output.status.code(), output.stderr.len()), (Some(0), 0), "{args:?}");
+        assert!(text(&output.stdout).contains("labelgs"), "{args:?}");
+    }
+    assert!(text(&labelgs(&["--help"]).stdout).contains("70 a bug"));
+}
+
+#[test]
+fn list_tells_every_label() {
+    let folder = folder();
+    let model = model(folder.path());
+    let model = model.to_str().expect("UTF-8");
+    let output = labelgs(&["list", model]);
+    assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+    let lines: Vec<String> = text(&output.stdout).lines().map(str::to_owned).collect();
+    assert_eq!(lines.len(), 4);
+    assert!(lines[1].trim_start().starts_with("none") && lines[3].trim_start().starts_with('3'), "{lines:?}");
+    for args in [["list", model, "--json"], ["--json", "list", model]] {
+        let json: Value = serde_json::from_slice(&labelgs(&args).stdout).expect("JSON alone on standard output");
+        assert_eq!((&json["schema_version"], &json["gaussians"]), (&1.into(), &6.into()));
+        assert_eq!((&json["labels"][2]["label"], &json["labels"][2]["count"]), (&3.into(), &3.into()));
+        assert_eq!(json["labels"][2]["centre"], serde_json::json!([4.0, 0.0, 1.0]));
+    }
+}
+
+#[test]
+fn extract_and_remove_write_the_two_parts() {
+    let folder = folder();
+    let model = model(folder.path());
+    let part = folder.path().join("part.ply");
+    let (model, out) = (model.to_str().expect("UTF-8"), part.to_str().expect("UTF-8"));
+    for (verb, expected) in [("extract", vec![0, 3, 3, 3]), ("remove", vec![1, 1])] {
+        let output = labelgs(&[verb, model, "--labels", "3,0", "-o", out, "--json"]);
+        assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+        let json: Value = serde_json::from_slice(&output.stdout).expect("JSON");
+        assert_eq!((&json["gaussians"], &json["of"]), (&expected.len().into(), &6.into()));
+        assert_eq!(read_gaussians(&part).expect("PLY").gaussians.labels, Some(expected));
+    }
+    let before = std::fs::read(&part).expect("file");
+    let output = labelgs(&["extract", model, "--labels", "2,3", "-o", out]);
+    assert_eq!(output.status.code(), Some(2));
+    let message = text(&output.stderr);
+    assert!(message.starts_with("error: --labels: no Gaussian has label 2; the model has 1, 3"), "{message}");
+    assert_eq!(std::fs::read(&part).expect("file"), before, "a failed run leaves the old file");
+}
+
+#[test]
+fn bad_input_and_bad_output_have_their_own_status() {
+    let folder = folder();
+    let model = model(folder.path());
+    let model = model.to_str().expect("UTF-8");
+    let output = labelgs(&["list", "no-such.ply"]);
+    assert_eq!(output.status.code(), Some(3));
+    assert!(text(&output.stderr).contains("no-such.ply"));
+    // A file where a folder is needed.
+    let output = labelgs(&["extract", model, "--labels", "1", "-o", &format!("{model}/part.ply")]);
+    assert_eq!(output.status.code(), Some(7), "{}", text(&output.stderr));
+}
+
+#[test]
+fn synth_makes_a_scene_once() {
+    let folder = folder();
+    let scene = folder.path().join("scene");
+    let scene = scene.to_str().expect("UTF-8");
+    let args = ["synth", scene, "--size", "32x24", "--views", "4", "--points", "20", "--preset", "simple", "--json"];
+    let output = labelgs(&args);
+    assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+    let json: Value = serde_json::from_slice(&output.stdout).expect("JSON");
+    assert_eq!((&json["views"], &json["objects"][1]["name"]), (&4.into(), &"ball".into()));
+    for file in ["images/003.png", "masks/000.png", "amodal/3/001.png", "depth/002.exr", "sparse/0/points3D.bin"] {
+        assert!(Path::new(scene).join(file).is_file(), "{file}");
+    }
+    assert_eq!(labelgs(&args).status.code(), Some(2), "the folder is not empty any more");
+}
+
+#[cfg(unix)]
+#[test]
+fn a_reader_that_has_seen_enough_is_no_failure() {
+    let folder = folder();
+    let model = model(folder.path());
+    let (reader, writer) = std::io::pipe().expect("pipe");
+    drop(reader);
+    let output = std::process::Command::new(env!("CARGO_BIN_EXE_labelgs"))
+        .arg("list")
+        .arg(&model)
+        .stdout(writer)
+        .output()
+        .expect("it runs");
+    assert_eq!((output.status.code(), text(&output.stderr).as_str()), (Some(0), ""));
+}
+
+#[cfg(unix)]
+#[test]
+fn a_signal_has_its_own_status() {
+    for (signal, status) in [("-INT", 130), ("-TERM", 143)] {
+        let folder = folder();
+        let scene = folder.path().join("scene");
+        let mut child = std::process::Command::new(env!("CARGO_BIN_EXE_labelgs"))
+            .args(["synth", "--views", "5000", "--size", "16x12", "--points", "1"])
+            .arg(&scene)
+            .stderr(Stdio::null())
+            .spawn()
+            .expect("it runs");
+        // The handlers are there before the first picture.
+        while !scene.join("images/000.png").exists() {
+            assert_eq!(child.try_wait().expect("child"), None);
+            std::thread::sleep(std::time::Duration::from_millis(5));
+        }
+        let sent = std::process::Command::new("kill").args([signal, &child.id().to_string()]).status();
+        assert!(sent.expect("kill").success());
+        assert_eq!(child.wait().expect("child").code(), Some(status));
+    }
+}

@@ -1,0 +1,10 @@
+//! Files to scenes and back, on fixtures that the tests write themselves.
+
+mod colmap;
+mod fixtures;
+mod init;
+mod masks;
+mod output;
+mod photos;
+mod ply;
+mod transforms;

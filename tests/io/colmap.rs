@@ -1,0 +1,252 @@
+//! COLMAP models, binary and text, whole and damaged.
+
+use super::fixtures::*;
+use glam::{DQuat, DVec3};
+use labelgs::io::{self, LoadOptions};
+use labelgs::scene::Dataset;
+use std::fs;
+
+fn open(scene: &Scene) -> labelgs::Result<Dataset> {
+    io::open(scene.path(), &LoadOptions { test_every: None, ..LoadOptions::default() })
+}
+
+fn check_poses(dataset: &Dataset, names: &[&str]) {
+    assert_eq!(dataset.train.len(), names.len());
+    for (index, name) in names.iter().enumerate() {
+        let view = dataset.train.iter().find(|view| view.name == *name).expect("the view");
+        let ([w, x, y, z], translation) = pose(index);
+        let rotation = DQuat::from_xyzw(x, y, z, w).normalize();
+        let point = DVec3::new(0.3, -0.7, 1.1);
+        let expected = rotation * point + DVec3::from_array(translation);
+        assert!(view.camera.to_camera(point).distance(expected) < 1e-12);
+    }
+    let points: Vec<_> = dataset.points.iter().map(|p| (p.position.to_array(), p.colour)).collect();
+    assert_eq!(points, POINTS);
+}
+
+#[test]
+fn binary_and_text_read_alike_in_every_folder() {
+    let names = ["b 1.png", "sub/a.png", "c.png"];
+    for folder in ["sparse/0", "sparse", "colmap/sparse/0", "."] {
+        for binary in [true, false] {
+            let scene = Scene::new();
+            if binary {
+                scene.colmap_bin(folder, &[pinhole()], &names);
+            } else {
+                scene.colmap_txt(folder, &[pinhole()], &names);
+            }
+            names.iter().for_each(|name| scene.photo(&format!("images/{name}"), 12, 8));
+            let dataset = open(&scene).expect("a scene");
+            check_poses(&dataset, &names);
+            let sorted: Vec<&str> = dataset.train.iter().map(|view| view.name.as_str()).collect();
+            assert_eq!(sorted, ["b 1.png", "c.png", "sub/a.png"]);
+            let camera = &dataset.train[0].camera;
+            assert_eq!((camera.fx, camera.fy, camera.cx, camera.cy), (10.0, 11.0, 5.5, 4.5));
+            assert_eq!(dataset.train[2].stem(), "sub_a");
+        }
+    }
+}
+
+#[test]
+fn binary_wins_over_text_and_photos_may_lie_in_the_root() {
+    let scene = Scene::new();
+    scene.colmap_bin("sparse/0", &[pinhole()], &["a.png"]);
+    scene.colmap_txt("sparse/0", &[pinhole()], &["other.png"]);
+    scene.photo("a.png", 12, 8);
+    assert_eq!(open(&scene).expect("a scene").train[0].name, "a.png");
+}
+
+#[test]
+fn every_camera_model_has_its_meaning_or_is_refused_by_name() {
+    let models: [(u32, &str, &[f64]); 12] = [
+        (0, "SIMPLE_PINHOLE", &[10.0, 6.0, 4.0]),
+        (1, "PINHOLE", &[10.0, 11.0, 6.0, 4.0]),
+        (2, "SIMPLE_RADIAL", &[10.0, 6.0, 4.0, 0.01]),
+        (3, "RADIAL", &[10.0, 6.0, 4.0, 0.01, 0.001]),
+        (4, "OPENCV", &[10.0, 11.0, 6.0, 4.0, 0.01, 0.001, 0.002, 0.003]),
+        (5, "OPENCV_FISHEYE", &[1.0; 8]),
+        (6, "FULL_OPENCV", &[10.0, 11.0, 6.0, 4.0, 0.01, 0.001, 0.002, 0.003, 0.004, 0.01, 0.0, 0.0]),
+        (7, "FOV", &[1.0; 5]),
+        (8, "SIMPLE_RADIAL_FISHEYE", &[1.0; 4]),
+        (9, "RADIAL_FISHEYE", &[1.0; 5]),
+        (10, "THIN_PRISM_FISHEYE", &[1.0; 12]),
+        (11, "RAD_TAN_THIN_PRISM_FISHEYE", &[1.0; 16]),
+    ];
+    for (model, name, parameters) in models {
+        let camera = ColmapCamera { model, name, size: (12, 8), parameters: parameters.to_vec() };
+        for binary in [true, false] {
+            let scene = Scene::new();
+            scene.photo("images/a.png", 12, 8);
+            if binary {
+                scene.colmap_bin("sparse/0", std::slice::from_ref(&camera), &["a.png"]);
+            } else {
+                scene.colmap_txt("sparse/0", std::slice::from_ref(&camera), &["a.png"]);
+            }
+            let result = open(&scene);
+            if matches!(model, 5 | 7..) {
+                let text = refusal(result);
+                assert!(text.contains(name) && text.contains("image_undistorter"), "{text}");
+                continue;
+            }
+            let dataset = result.expect("a scene");
+            let read = &dataset.train[0].camera;
+            assert_eq!((read.fx, read.cx, read.cy), (10.0, 6.0, 4.0));
+            assert_eq!(read.fy, if matches!(model, 1 | 4 | 6) { 11.0 } else { 10.0 });
+            assert_eq!(dataset.notes.iter().any(|note| note.contains("undistorted")), model > 1);
+        }
+    }
+    let scene = Scene::new();
+    scene.colmap_bin("sparse/0", &[ColmapCamera { model: 77, ..pinhole() }], &["a.png"]);
+    assert!(refusal(open(&scene)).contains("unknown model 77"));
+}
+
+#[test]
+fn missing_photos_are_skipped_before_the_split() {
+    let scene = simple(10);
+    fs::remove_file(scene.path().join("images/00.png")).expect("removed");
+    let dataset =
+        io::open(scene.path(), &LoadOptions { test_every: Some(4), ..LoadOptions::default() }).expect("a scene");
+    let test: Vec<&str> = dataset.test.iter().map(|view| view.name.as_str()).collect();
+    assert_eq!(test, ["01.png", "05.png", "09.png"]);
+    assert_eq!(dataset.train.len(), 6);
+    assert_eq!(dataset.notes.iter().filter(|note| note.contains("1 of 10")).count(), 1);
+    (1..6).for_each(|index| fs::remove_file(scene.path().join(format!("images/0{index}.png"))).expect("removed"));
+    assert!(refusal(open(&scene)).contains("6 of 10"));
+}
+
+#[test]
+fn a_single_photo_is_trained_on() {
+    let dataset = io::open(simple(1).path(), &LoadOptions::default()).expect("a scene");
+    assert_eq!((dataset.train.len(), dataset.test.len()), (1, 0));
+    let zero = LoadOptions { test_every: Some(0), ..LoadOptions::default() };
+    assert_eq!(io::open(simple(2).path(), &zero).expect_err("no split").exit_status(), 2);
+}
+
+#[test]
+fn without_photos_cameras_are_enough() {
+    let scene = simple(3);
+    let options = LoadOptions { photos: false, max_resolution: Some(6), ..LoadOptions::default() };
+    let with_files = io::open(scene.path(), &options).expect("a scene");
+    fs::remove_dir_all(scene.path().join("images")).expect("removed");
+    let without = io::open(scene.path(), &options).expect("a scene");
+    assert!(without.all().iter().all(|view| view.photo.is_none()));
+    let cameras = |d: &Dataset| d.all().iter().map(|view| view.camera.clone()).collect::<Vec<_>>();
+    assert_eq!(cameras(&with_files), cameras(&without));
+    assert_eq!(without.train[0].camera.width, 6);
+}
+
+#[test]
+fn damaged_binaries_are_refused_at_every_cut() {
+    for file in ["cameras.bin", "images.bin", "points3D.bin"] {
+        let scene = simple(2);
+        let path = scene.path().join("sparse/0").join(file);
+        let whole = fs::read(&path).expect("bytes");
+        for length in 0..whole.len() {
+            fs::write(&path, &whole[..length]).expect("written");
+            let text = refusal(open(&scene));
+            assert!(text.contains(file) && text.contains("byte "), "{text}");
+        }
+        // A count that no memory holds must end at the end of the file.
+        for count in [u64::MAX, u64::MAX / 2, 1 << 40] {
+            let mut hostile = whole.clone();
+            hostile[..8].copy_from_slice(&count.to_le_bytes());
+            fs::write(&path, &hostile).expect("written");
+            assert!(refusal(open(&scene)).contains(&count.to_string()));
+        }
+    }
+}
+
+#[test]
+fn hostile_records_are_refused() {
+    let scene = simple(1);
+    let images = scene.path().join("sparse/0/images.bin");
+    let points = scene.path().join("sparse/0/points3D.bin");
+    let (good, good_points) = (fs::read(&images).expect("bytes"), fs::read(&points).expect("bytes"));
+    let try_images = |bytes: Vec<u8>| {
+        fs::write(&images, bytes).expect("written");
+        refusal(open(&scene))
+    };
+    let name_at = 8 + 4 + 56 + 4;
+    let patched = |at: usize, with: &[u8]| {
+        let mut bytes = good.clone();
+        bytes[at..at + with.len()].copy_from_slice(with);
+        bytes
+    };
+    assert!(try_images(patched(name_at, &[0xff])).contains("UTF-8"));
+    assert!(try_images(patched(name_at + 7, &(1u64 << 63).to_le_bytes())).contains("observations"));
+    assert!(try_images(patched(8 + 4 + 56, &9u32.to_le_bytes())).contains("camera 9"));
+    assert!(try_images(patched(12, &[0; 32])).contains("rotation"));
+    assert!(try_images(patched(12 + 32, &f64::NAN.to_le_bytes())).contains("finite"));
+    assert!(try_images(patched(name_at, b"../a.p")).contains("outside"));
+    let mut unended = good[..name_at].to_vec();
+    unended.extend([b'x'; 5000]);
+    assert!(try_images(unended).contains("name does not end"));
+    let mut twice = images_bin(&["00.png", "00.png"], 1);
+    assert!(try_images(twice.clone()).contains("listed before"));
+    twice[0] = 0;
+    assert!(try_images(twice).contains("lists no photo"));
+    fs::write(&images, &good).expect("written");
+    let mut track = good_points.clone();
+    track[8 + 8 + 24 + 3 + 8..][..8].copy_from_slice(&u64::MAX.to_le_bytes());
+    fs::write(&points, track).expect("written");
+    assert!(refusal(open(&scene)).contains("track"));
+    let mut not_finite = good_points;
+    not_finite[16..24].copy_from_slice(&f64::INFINITY.to_le_bytes());
+    fs::write(&points, not_finite).expect("written");
+    let dataset = open(&scene).expect("a scene");
+    assert_eq!(dataset.points.len(), 1);
+    assert!(dataset.notes.iter().any(|note| note.contains("1 of 2 points")));
+    fs::remove_file(&points).expect("removed");
+    assert!(open(&scene).expect("a scene without points").points.is_empty());
+}
+
+#[test]
+fn degenerate_cameras_are_refused() {
+    let with = |index: usize, value: f64| {
+        let mut camera = pinhole();
+        camera.parameters[index] = value;
+        let scene = Scene::new();
+        scene.photo("images/a.png", 12, 8);
+        scene.colmap_bin("sparse/0", &[camera], &["a.png"]);
+        refusal(open(&scene))
+    };
+    for value in [0.0, -3.0, f64::NAN, f64::INFINITY, 1e-9] {
+        assert!(with(0, value).contains("camera 1"));
+    }
+    for value in [f64::NAN, -50.0, 50.0] {
+        assert!(with(2, value).contains("principal point"));
+    }
+    let scene = Scene::new();
+    scene.colmap_bin("sparse/0", &[ColmapCamera { size: (u64::MAX, 8), ..pinhole() }], &["a.png"]);
+    assert!(refusal(open(&scene)).contains("18446744073709551615"));
+    let scene = Scene::new();
+    let tiny = ColmapCamera { size: (1, 1), parameters: vec![10.0, 10.0, 0.5, 0.5], ..pinhole() };
+    scene.colmap_bin("sparse/0", &[tiny], &["a.png"]);
+    scene.photo("images/a.png", 1, 1);
+    assert_eq!(open(&scene).expect("a scene").train[0].camera.width, 1);
+}
+
+#[test]
+fn broken_text_names_the_line() {
+    let broken = |file: &str, text: &str| {
+        let scene = Scene::new();
+        scene.colmap_txt("sparse", &[pinhole()], &["a.png"]);
+        scene.photo("images/a.png", 12, 8);
+        scene.write(&format!("sparse/{file}"), text);
+        refusal(open(&scene))
+    };
+    assert!(broken("cameras.txt", "# c\n1 PINHOLE 12 8 10 11 5").contains("4 parameters, 3"));
+    assert!(broken("cameras.txt", "# c\n1 PINHOLE twelve 8").contains("line 2"));
+    assert!(broken("cameras.txt", "1 MAGIC 12 8 1").contains("MAGIC"));
+    assert!(broken("images.txt", "1 1 0 0 0 0 0 0 1\n\n").contains("name"));
+    assert!(broken("images.txt", "1 1 0 0 x 0 0 0 1 a.png\n\n").contains("`x`"));
+    assert!(broken("points3D.txt", "\n1 0 0 0 300 0 0").contains("line 2"));
+}
+
+#[test]
+fn a_folder_without_scene_says_what_was_expected() {
+    let scene = Scene::new();
+    let text = refusal(open(&scene));
+    assert!(text.contains("sparse/0") && text.contains("transforms.json"));
+    assert!(refusal(io::open(&scene.path().join("nowhere"), &LoadOptions::default())).contains("no such folder"));
+}

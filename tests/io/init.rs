@@ -1,0 +1,140 @@
+//! The first Gaussians of a scene.
+
+use glam::{DMat3, DVec3};
+use labelgs::io::initial_gaussians;
+use labelgs::scene::gaussians::SH_C0;
+use labelgs::scene::{Camera, Dataset, Photo, Point, View};
+
+fn point(x: f64, y: f64, z: f64) -> Point {
+    Point { position: DVec3::new(x, y, z), colour: [255, 0, 51] }
+}
+
+/// A camera at `centre` that looks at `target`.
+fn looking(centre: DVec3, target: DVec3) -> Camera {
+    let forward = (target - centre).normalize();
+    let right = forward.cross(DVec3::Y).normalize();
+    let rotation = DMat3::from_cols(right, forward.cross(right), forward).transpose();
+    Camera {
+        rotation,
+        translation: -(rotation * centre),
+        fx: 60.0,
+        fy: 60.0,
+        cx: 32.0,
+        cy: 24.0,
+        width: 64,
+        height: 48,
+    }
+}
+
+fn dataset(cameras: impl IntoIterator<Item = Camera>, shade: impl Fn(&Camera, DVec3) -> [u8; 3]) -> Dataset {
+    let view = |(index, camera): (usize, Camera)| {
+        let ray = |x: u32, y: u32| {
+            let (x, y) = (f64::from(x) + 0.5, f64::from(y) + 0.5);
+            let ray = DVec3::new((x - camera.cx) / camera.fx, (y - camera.cy) / camera.fy, 1.0);
+            (camera.rotation.transpose() * ray).normalize()
+        };
+        let texel = |x, y| {
+            let [r, g, b] = shade(&camera, ray(x, y));
+            [r, g, b, 255]
+        };
+        let rgba =
+            (0..camera.height).flat_map(|y| (0..camera.width).map(move |x| (x, y))).map(|(x, y)| texel(x, y)).collect();
+        let photo = Some(Photo { width: camera.width, height: camera.height, rgba });
+        View { name: format!("{index:02}"), camera, photo, mask: None }
+    };
+    Dataset { train: cameras.into_iter().enumerate().map(view).collect(), ..Dataset::default() }
+}
+
+fn ring(count: usize) -> impl Iterator<Item = Camera> {
+    (0..count).map(move |index| {
+        let angle = std::f64::consts::TAU * index as f64 / count as f64;
+        let height = if index % 2 == 0 { 1.0 } else { -0.5 };
+        looking(DVec3::new(1.0 + 4.0 * angle.cos(), height, 4.0 * angle.sin()), DVec3::new(1.0, 0.0, 0.0))
+    })
+}
+
+#[test]
+fn gaussians_stand_on_the_points() {
+    let mut points: Vec<Point> = (0..20).map(|index| point(f64::from(index * index), 0.0, 0.0)).collect();
+    points.extend([point(1000.0, 0.0, 0.0); 6]);
+    let scene = Dataset { points, ..Dataset::default() };
+    let g = initial_gaussians(&scene, 1, 10).expect("Gaussians");
+    assert_eq!((g.len(), g.sh_degree, g.labels.is_none()), (26, 3, true));
+    assert_eq!(g.sh_rest, vec![[0.0; 3]; 26 * 15]);
+    assert!(g.opacities.iter().all(|&o| (o - (0.1f32 / 0.9).ln()).abs() < 1e-6));
+    assert!(g.quats.iter().all(|&q| q == [1.0, 0.0, 0.0, 0.0]));
+    assert!((f64::from(g.sh0[0][0]) * SH_C0 + 0.5 - 1.0).abs() < 1e-6);
+    assert!((f64::from(g.sh0[0][2]) * SH_C0 + 0.5 - 0.2).abs() < 1e-6);
+    // Neighbours of 9 among the squares: 4, 16 and 1 or 0.
+    let expected = 0.5 * f64::ln((25.0 + 49.0 + 64.0) / 3.0);
+    assert!(g.scales[3].iter().all(|&s| (f64::from(s) - expected).abs() < 1e-6));
+    // Points at one place have the smallest size that is allowed.
+    assert!((f64::from(g.scales[22][0]) - 0.5 * f64::ln(1e-7)).abs() < 1e-5);
+}
+
+#[test]
+fn many_points_at_one_place_are_fine() {
+    let scene = Dataset { points: vec![point(1.0, 2.0, 3.0); 5000], ..Dataset::default() };
+    assert_eq!(initial_gaussians(&scene, 1, 10).expect("Gaussians").len(), 5000);
+}
+
+#[test]
+fn over_a_plain_background_the_visual_hull_remains() {
+    // A ball of radius 0.6 around (1, 0, 0), shaded by direction, over black.
+    let (centre, radius) = (DVec3::new(1.0, 0.0, 0.0), 0.6);
+    let shade = |camera: &Camera, ray: DVec3| {
+        let to = centre - camera.centre();
+        let along = to.dot(ray);
+        let hit = to.length_squared() - along * along < radius * radius;
+        if hit { [200, 120, 60] } else { [0; 3] }
+    };
+    let scene = dataset(ring(16), shade);
+    let g = initial_gaussians(&scene, 7, 800).expect("Gaussians");
+    assert_eq!(g.len(), 800);
+    let distances: Vec<f64> = g.means.iter().map(|m| DVec3::from_array(m.map(f64::from)).distance(centre)).collect();
+    assert!(distances.iter().all(|&d| d < 0.95), "{:?}", distances.iter().copied().fold(0.0, f64::max));
+    let colour = g.sh0[0].map(|c| (f64::from(c) * SH_C0 + 0.5) * 255.0);
+    assert!(colour[0] > colour[1] && colour[1] > colour[2]);
+    assert_eq!(g, initial_gaussians(&scene, 7, 800).expect("Gaussians"));
+    assert_ne!(g, initial_gaussians(&scene, 8, 800).expect("Gaussians"));
+}
+
+#[test]
+fn in_a_room_points_are_swept_onto_the_surfaces() {
+    // A textured wall at z = 6 before cameras in a row.
+    let shade = |camera: &Camera, ray: DVec3| {
+        let at = camera.centre() + ray * ((6.0 - camera.centre().z) / ray.z);
+        let wave = |value: f64| (128.0 + 100.0 * (value * 2.1).sin()) as u8;
+        [wave(at.x + 0.3 * at.y), wave(at.y), wave(0.7 * at.x - at.y + 1.0)]
+    };
+    let cameras = (0..12).map(|index| {
+        let centre = DVec3::new(f64::from(index) * 0.4 - 2.2, f64::from(index % 3) * 0.4, 0.0);
+        looking(centre, centre + DVec3::Z)
+    });
+    let g = initial_gaussians(&dataset(cameras, shade), 3, 1000).expect("Gaussians");
+    assert_eq!(g.len(), 1000);
+    let near = g.means.iter().filter(|mean| (mean[2] - 6.0).abs() < 1.0).count();
+    assert!(near > 500, "{near} of 1000 lie near the wall");
+}
+
+#[test]
+fn odd_rigs_get_their_gaussians() {
+    let same = vec![looking(DVec3::ZERO, DVec3::Z); 2];
+    let outward = (0..8).map(|index| {
+        let angle = std::f64::consts::TAU * f64::from(index) / 8.0;
+        looking(DVec3::ZERO, DVec3::new(angle.cos(), 0.0, angle.sin()))
+    });
+    let noise = |_: &Camera, ray: DVec3| [(ray.x * 991.0) as u8, (ray.y * 991.0) as u8, (ray.z * 991.0) as u8];
+    for (name, cameras) in [("one", same[..1].to_vec()), ("same", same), ("outward", outward.collect())] {
+        let mut scene = dataset(cameras, noise);
+        for photos in [true, false] {
+            if !photos {
+                scene.train.iter_mut().for_each(|view| view.photo = None);
+            }
+            let g = initial_gaussians(&scene, 3, 500).expect("Gaussians");
+            assert_eq!(g.len(), 500, "{name}");
+            assert!(g.means.iter().chain(&g.scales).flatten().all(|value| value.is_finite()), "{name}");
+        }
+    }
+    assert_eq!(initial_gaussians(&Dataset::default(), 1, 10).expect_err("no views").exit_status(), 3);
+}

@@ -1,0 +1,116 @@
+//! Id images: encodings, names, sizes.
+
+use super::fixtures::*;
+use labelgs::io::mask::read_mask;
+use labelgs::io::{self, LoadOptions};
+use labelgs::scene::Dataset;
+use std::fs;
+use std::path::Path;
+
+fn png(path: &Path, size: (u32, u32), colour: png::ColorType, depth: png::BitDepth, bytes: &[u8]) {
+    let mut encoder = png::Encoder::new(fs::File::create(path).expect("a file"), size.0, size.1);
+    encoder.set_color(colour);
+    encoder.set_depth(depth);
+    if colour == png::ColorType::Indexed {
+        // All entries share one colour: whoever reads colours instead of indices loses the ids.
+        encoder.set_palette(vec![9u8; 3 * (1 << (depth as usize).min(8))]);
+    }
+    encoder.write_header().expect("a header").write_image_data(bytes).expect("pixels");
+}
+
+fn open(scene: &Scene, max_resolution: Option<u32>) -> labelgs::Result<Dataset> {
+    let masks = Some(scene.path().join("masks"));
+    io::open(scene.path(), &LoadOptions { masks, max_resolution, test_every: None, ..LoadOptions::default() })
+}
+
+#[test]
+fn ids_are_exact_in_every_encoding() {
+    let scene = Scene::new();
+    let path = scene.at("m.png");
+    let read = |colour, depth, width: u32, bytes: &[u8]| {
+        png(&path, (width, 2), colour, depth, bytes);
+        read_mask(&path).expect("a mask").ids
+    };
+    use png::BitDepth::{Eight, Four, One, Sixteen, Two};
+    use png::ColorType::{Grayscale, Indexed};
+    for colour in [Grayscale, Indexed] {
+        assert_eq!(read(colour, Eight, 3, &[0, 1, 3, 255, 128, 7]), [0, 1, 3, 255, 128, 7]);
+        assert_eq!(read(colour, Four, 3, &[0x1f, 0x20, 0x34, 0x50]), [1, 15, 2, 3, 4, 5]);
+        assert_eq!(read(colour, Two, 5, &[0b00_01_10_11, 0b01_000000, 0xff, 0xff]), [0, 1, 2, 3, 1, 3, 3, 3, 3, 3]);
+        assert_eq!(read(colour, One, 9, &[0b1010_0000, 0x80, 0, 0])[..9], [1, 0, 1, 0, 0, 0, 0, 0, 1]);
+    }
+    let wide = [0u16, 256, 257, 65535, 9000, 1].map(u16::to_be_bytes).concat();
+    assert_eq!(read(Grayscale, Sixteen, 3, &wide), [0, 256, 257, 65535, 9000, 1]);
+}
+
+#[test]
+fn colours_jpegs_and_bombs_are_refused() {
+    let scene = Scene::new();
+    let path = scene.at("m.png");
+    for (colour, samples) in [(png::ColorType::Rgb, 3), (png::ColorType::Rgba, 4), (png::ColorType::GrayscaleAlpha, 2)]
+    {
+        png(&path, (2, 2), colour, png::BitDepth::Eight, &vec![1; 4 * samples]);
+        assert!(refusal(read_mask(&path)).contains("use_short_id"));
+    }
+    png(&path, (40_000, 40_000), png::ColorType::Grayscale, png::BitDepth::One, &vec![0; 5000 * 40_000]);
+    assert!(refusal(read_mask(&path)).contains("40000 x 40000"));
+    fs::write(&path, b"not a png").expect("written");
+    assert!(refusal(read_mask(&path)).contains("PNG"));
+    fs::write(&path, b"").expect("written");
+    refusal(read_mask(&path));
+}
+
+#[test]
+fn masks_are_found_by_every_naming() {
+    let scene = Scene::new();
+    let names = ["a.cam.jpg", "left/b.jpg", "c.jpg", "d.png", "left/e.png", "right/e.png"];
+    scene.colmap_bin("sparse/0", &[pinhole()], &names);
+    names.iter().for_each(|name| scene.photo(&format!("images/{name}"), 12, 8));
+    let files = ["a.png", "b.png", "c.jpg.png", "d.png", "left/e.png", "e.png"];
+    for (index, file) in files.iter().enumerate() {
+        png(
+            &scene.at(&format!("masks/{file}")),
+            (12, 8),
+            png::ColorType::Grayscale,
+            png::BitDepth::Eight,
+            &[index as u8 + 1; 96],
+        );
+    }
+    let dataset = open(&scene, None).expect("a scene");
+    let id = |name: &str| dataset.train.iter().find(|v| v.name == name).and_then(|v| v.mask.as_ref()).map(|m| m.ids[0]);
+    assert_eq!(names.map(id), [Some(1), Some(2), Some(3), Some(4), Some(5), None]);
+    assert!(dataset.notes.iter().any(|note| note.contains("1 of 6 photos have no mask: right/e.png")));
+    fs::remove_dir_all(scene.path().join("masks")).expect("removed");
+    assert!(refusal(open(&scene, None)).contains("no such folder"));
+    fs::create_dir(scene.path().join("masks")).expect("made");
+    assert!(refusal(open(&scene, None)).contains("a.cam.png"));
+}
+
+#[test]
+fn other_sizes_are_scaled_by_nearest_id() {
+    let scene = simple(1);
+    let path = scene.at("masks/00.png");
+    let ids: Vec<u8> = (0..24 * 16).map(|index| if index % 24 < 12 { 7 } else { 200 }).collect();
+    png(&path, (24, 16), png::ColorType::Grayscale, png::BitDepth::Eight, &ids);
+    for (bound, size) in [(None, (12, 8)), (Some(6), (6, 4)), (Some(5), (5, 3))] {
+        let dataset = open(&scene, bound).expect("a scene");
+        let mask = dataset.train[0].mask.as_ref().expect("a mask");
+        assert_eq!((mask.width, mask.height), size);
+        assert_eq!(mask.objects(), [7, 200]);
+        assert!((0..size.1).all(|y| mask.at(0, y) == 7 && mask.at(size.0 - 1, y) == 200));
+        assert!(dataset.notes.iter().any(|note| note.contains("1 masks differ in size")));
+    }
+    png(&path, (12, 12), png::ColorType::Grayscale, png::BitDepth::Eight, &[1; 144]);
+    assert!(refusal(open(&scene, None)).contains("12 x 12"));
+}
+
+#[test]
+fn ids_shrink_with_the_photo() {
+    let scene = simple(1);
+    let ids: Vec<u8> = (0..96).map(|index| (index % 12) as u8).collect();
+    png(&scene.at("masks/00.png"), (12, 8), png::ColorType::Grayscale, png::BitDepth::Eight, &ids);
+    let dataset = open(&scene, Some(4)).expect("a scene");
+    let mask = dataset.train[0].mask.as_ref().expect("a mask");
+    // The pixel under the centre of each target pixel: 1.5, 4.5, 7.5 and 10.5 px from the left.
+    assert_eq!(mask.ids[..4], [1, 4, 7, 10]);
+}

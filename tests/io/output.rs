@@ -1,0 +1,125 @@
+//! Files that the program writes besides PLY, and the atomic writer below them.
+
+use super::fixtures::*;
+use glam::{DMat3, DVec3};
+use labelgs::io::{atomic, camera_json, image as images};
+use labelgs::scene::Camera;
+use std::fs;
+use std::io::Error;
+
+fn entries(scene: &Scene) -> Vec<String> {
+    let mut names: Vec<String> = fs::read_dir(scene.path())
+        .expect("a folder")
+        .flatten()
+        .map(|e| e.file_name().to_string_lossy().into_owned())
+        .collect();
+    names.sort();
+    names
+}
+
+#[test]
+fn a_failed_write_leaves_the_old_file_and_no_litter() {
+    let scene = Scene::new();
+    let path = scene.write("out.bin", b"old");
+    for bytes in 0..4 {
+        let error = atomic::write(&path, |out| {
+            out.write_all(&vec![1; bytes << 18])?;
+            Err(Error::other("disk full"))
+        })
+        .expect_err("the write fails");
+        assert_eq!(error.exit_status(), 7);
+        assert!(error.to_string().contains("out.bin") && error.to_string().contains("disk full"));
+        assert_eq!((fs::read(&path).expect("bytes"), entries(&scene)), (b"old".to_vec(), vec!["out.bin".to_owned()]));
+    }
+    atomic::write(&path, |out| out.write_all(b"new")).expect("written");
+    assert_eq!(fs::read(&path).expect("bytes"), b"new");
+    atomic::write(scene.path().join("deep/er/file"), |out| out.write_all(b"x")).expect("folders are made");
+    assert_eq!(atomic::write(scene.path(), |_| Ok(())).expect_err("a folder").exit_status(), 7);
+}
+
+#[cfg(unix)]
+#[test]
+fn links_and_devices_are_written_through() {
+    use std::os::unix::fs::PermissionsExt;
+    let scene = Scene::new();
+    let target = scene.write("target", b"old");
+    let link = scene.path().join("link");
+    std::os::unix::fs::symlink(&target, &link).expect("a link");
+    atomic::write(&link, |out| out.write_all(b"new")).expect("written");
+    assert!(fs::symlink_metadata(&link).expect("metadata").file_type().is_symlink());
+    assert_eq!(fs::read(&target).expect("bytes"), b"new");
+    assert_eq!(fs::metadata(&target).expect("metadata").permissions().mode() & 0o600, 0o600);
+    atomic::write("/dev/null", |out| out.write_all(b"new")).expect("written");
+    if cfg!(target_os = "linux") {
+        assert_eq!(atomic::write("/dev/full", |out| out.write_all(b"new")).expect_err("full").exit_status(), 7);
+        scene.write(".labelgs-4194305-abc.tmp", b"");
+        scene.write(&format!(".labelgs-{}-abc.tmp", std::process::id()), b"");
+        scene.write(".labelgs-notes.tmp", b"");
+        assert_eq!(atomic::remove_stale(scene.path()), 1);
+        assert_eq!(entries(&scene).len(), 4);
+    }
+}
+
+#[test]
+fn pixels_come_back_from_png_and_exr() {
+    let scene = Scene::new();
+    let pixels: Vec<[u8; 3]> = (0..6).map(|v| [v, 255 - v, 2 * v]).collect();
+    images::write_png_rgb8(scene.at("a.png"), 3, 2, &pixels).expect("written");
+    let back = image::open(scene.at("a.png")).expect("a PNG").into_rgb8();
+    assert_eq!(back.into_raw(), pixels.concat());
+    let ids = [0, 1, 255, 256, 40_000, 65_535];
+    images::write_png_grey16(scene.at("i.png"), 3, 2, &ids).expect("written");
+    assert_eq!(labelgs::io::mask::read_mask(scene.at("i.png")).expect("a mask").ids, ids);
+    let values = [0.0, -1.5, 1e30, 0.1, f32::MIN_POSITIVE, 7.0];
+    images::write_exr_y(scene.at("y.exr"), 3, 2, &values).expect("written");
+    let colours: Vec<[f32; 3]> = values.iter().map(|&v| [v, 2.0, -v]).collect();
+    images::write_exr_rgb(scene.at("c.exr"), 3, 2, &colours).expect("written");
+    let channels = |name: &str| {
+        let image = exr::prelude::read_first_flat_layer_from_file(scene.at(name)).expect("an EXR");
+        let size = image.layer_data.size;
+        let list = image.layer_data.channel_data.list;
+        let list = list.into_iter().map(|c| (c.name.to_string(), c.sample_data.values_as_f32().collect::<Vec<_>>()));
+        ((size.0, size.1), list.collect::<Vec<_>>())
+    };
+    assert_eq!(channels("y.exr"), ((3, 2), vec![("Y".to_owned(), values.to_vec())]));
+    let (_, list) = channels("c.exr");
+    let names: Vec<&str> = list.iter().map(|(name, _)| name.as_str()).collect();
+    assert_eq!(names, ["B", "G", "R"]);
+    assert_eq!((list[2].1.clone(), list[1].1[0]), (values.to_vec(), 2.0));
+    assert_eq!(images::write_exr_y(scene.at("bad.exr"), 3, 3, &values).expect_err("too few").exit_status(), 70);
+}
+
+#[test]
+fn cameras_are_read_and_listed() {
+    let scene = Scene::new();
+    let text = r#"{"w2c": [[0,1,0,1],[-1,0,0,2],[0,0,1,3],[0,0,0,1]], "fx": 10.5, "fy": 11, "cx": 3, "cy": 2.5, "W": 6, "H": 5}"#;
+    let camera = camera_json::read_camera(scene.write("cam.json", text)).expect("a camera");
+    let rotation = DMat3::from_cols(DVec3::new(0.0, -1.0, 0.0), DVec3::new(1.0, 0.0, 0.0), DVec3::Z);
+    let expected = Camera {
+        rotation,
+        translation: DVec3::new(1.0, 2.0, 3.0),
+        fx: 10.5,
+        fy: 11.0,
+        cx: 3.0,
+        cy: 2.5,
+        width: 6,
+        height: 5,
+    };
+    assert!(camera.rotation.abs_diff_eq(rotation, 1e-15));
+    assert_eq!(Camera { rotation, ..camera.clone() }, expected);
+    for (from, to) in
+        [("[0,0,1,3]", "[0,0,-1,3]"), ("\"W\": 6", "\"W\": 0"), ("10.5", "-1"), ("\"fy\": 11,", ""), ("[-1,", "[-2,")]
+    {
+        refusal(camera_json::read_camera(scene.write("bad.json", text.replace(from, to))));
+    }
+    camera_json::write_cameras(scene.at("cameras.json"), &[("a.png", &expected), ("b.png", &expected)])
+        .expect("written");
+    let list: serde_json::Value =
+        serde_json::from_slice(&fs::read(scene.at("cameras.json")).expect("bytes")).expect("JSON");
+    assert_eq!(list[1]["id"], 1);
+    assert_eq!(list[1]["img_name"], "b.png");
+    // World-from-camera is the transpose: its first row is (0, -1, 0); the centre is minus that times (1, 2, 3).
+    assert_eq!(list[0]["rotation"][0], serde_json::json!([0.0, -1.0, 0.0]));
+    assert_eq!(list[0]["position"], serde_json::json!([2.0, -1.0, -3.0]));
+    assert_eq!(list[0]["cx"], 3.0);
+}

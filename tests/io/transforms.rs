@@ -1,0 +1,148 @@
+//! `transforms.json` of Blender, instant-ngp and nerfstudio.
+
+use super::fixtures::*;
+use glam::DVec3;
+use labelgs::io::{self, LoadOptions};
+use labelgs::scene::Dataset;
+
+const IDENTITY: &str = "[[1,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]]";
+
+fn open(scene: &Scene) -> labelgs::Result<Dataset> {
+    io::open(scene.path(), &LoadOptions::default())
+}
+
+fn frame(name: &str, more: &str) -> String {
+    format!(r#"{{"file_path": "{name}", "transform_matrix": {IDENTITY}{more}}}"#)
+}
+
+#[test]
+fn blender_uses_the_given_split_and_blends_alpha() {
+    let scene = Scene::new();
+    let texel = |x: u32, _| image::Rgba([200, 100, 50, if x == 0 { 0 } else { 128 }]);
+    for name in ["train/r_0.png", "train/r_10.png", "test/r_0.png"] {
+        image::RgbaImage::from_fn(4, 4, texel).save(scene.at(name)).expect("a photo");
+    }
+    let text = |names: &[&str]| {
+        let frames: Vec<String> = names.iter().map(|name| frame(name, r#", "rotation": 0.1"#)).collect();
+        format!(r#"{{"camera_angle_x": 1.0, "frames": [{}]}}"#, frames.join(","))
+    };
+    scene.write("transforms_train.json", text(&["./train/r_10", "./train/r_0"]));
+    scene.write("transforms_test.json", text(&["./test/r_0"]));
+    let options = LoadOptions { background: [1.0, 1.0, 0.0], test_every: Some(2), ..LoadOptions::default() };
+    let dataset = io::open(scene.path(), &options).expect("a scene");
+    let names: Vec<&str> = dataset.train.iter().map(|view| view.name.as_str()).collect();
+    assert_eq!((names, dataset.test[0].name.as_str()), (vec!["train/r_0.png", "train/r_10.png"], "test/r_0.png"));
+    let view = &dataset.train[0];
+    let focal = 2.0 / 0.5f64.tan();
+    assert!((view.camera.fx - focal).abs() < 1e-12 && (view.camera.fy - focal).abs() < 1e-12);
+    assert_eq!((view.camera.cx, view.camera.cy), (2.0, 2.0));
+    let photo = view.photo.as_ref().expect("a photo");
+    assert_eq!(photo.rgba[0], [255, 255, 0, 255]);
+    let half = |c: f64, b: f64| (c * 128.0 / 255.0 + b * 127.0 / 255.0).round() as u8;
+    assert_eq!(photo.rgba[1], [half(200.0, 255.0), half(100.0, 255.0), half(50.0, 0.0), 255]);
+}
+
+#[test]
+fn poses_turn_from_opengl_to_opencv() {
+    let scene = Scene::new();
+    scene.photo("images/a.png", 12, 8);
+    let matrix = "[[0,0,1,5],[1,0,0,6],[0,1,0,7],[0,0,0,1]]";
+    let text = format!(r#"{{"fl_x": 10, "frames": [{{"file_path": "images/a.png", "transform_matrix": {matrix}}}]}}"#);
+    scene.write("transforms.json", text);
+    let dataset = open(&scene).expect("a scene");
+    let camera = &dataset.train[0].camera;
+    assert!(camera.centre().distance(DVec3::new(5.0, 6.0, 7.0)) < 1e-12);
+    // The third column is the axis that points backwards: the camera looks along -x of the world here.
+    assert!(camera.to_camera(DVec3::new(3.0, 6.0, 7.0)).distance(DVec3::new(0.0, 0.0, 2.0)) < 1e-12);
+    // The second column points up in the image, where y is negative.
+    assert!(camera.to_camera(DVec3::new(5.0, 6.0, 8.0)).distance(DVec3::new(0.0, -1.0, 0.0)) < 1e-12);
+    assert_eq!((camera.fx, camera.fy, dataset.train[0].name.as_str()), (10.0, 10.0, "a.png"));
+}
+
+#[test]
+fn frames_override_the_file() {
+    let scene = Scene::new();
+    ["images/a.png", "images/b.png"].iter().for_each(|name| scene.photo(name, 12, 8));
+    let frames = [
+        frame("images/a.png", r#", "fl_x": 20.0, "fl_y": 21.0, "cx": 5.0, "cy": 3.0, "k1": 0.1"#),
+        frame("images\\\\b.png", ""),
+        frame("./images/a.png", ""),
+        frame("images/gone.png", r#", "w": 12, "h": 8"#),
+    ];
+    let global =
+        r#""fl_x": 10.0, "w": 12.0, "h": 8.0, "cx": 6.5, "cy": 4.5, "camera_model": "OPENCV", "aabb_scale": 4"#;
+    scene.write("transforms.json", format!(r#"{{{global}, "frames": [{}]}}"#, frames.join(",")));
+    let dataset = io::open(scene.path(), &LoadOptions { test_every: None, ..LoadOptions::default() }).expect("a scene");
+    let [a, b] = &dataset.train[..] else { panic!("two views") };
+    assert_eq!((a.camera.fx, a.camera.fy, a.camera.cx, a.camera.cy), (20.0, 21.0, 5.0, 3.0));
+    assert_eq!((b.camera.fx, b.camera.fy, b.camera.cx, b.camera.cy), (10.0, 10.0, 6.5, 4.5));
+    assert!(dataset.notes.iter().any(|note| note.contains("second time")));
+    assert!(dataset.notes.iter().any(|note| note.contains("1 of 3 listed photos do not exist")));
+}
+
+#[test]
+fn points_come_from_the_ply_in_the_world_of_the_poses() {
+    let points = "ply\nformat ascii 1.0\nelement vertex 2\nproperty double x\nproperty double y\nproperty double z\n\
+                  property uchar red\nproperty uchar green\nproperty uchar blue\nend_header\n0 0 -3 1 2 3\n0.2 0 -4 4 5 6\n";
+    // Seen by a camera at the origin that looks along -z; the second list is the same before `applied_transform`.
+    let turned = points.replace("0 0 -3", "0 -3 0").replace("0.2 0 -4", "0.2 -4 0");
+    for (text, applied, notes) in [
+        (points, "", 0),
+        (points, r#""applied_transform": [[1,0,0,0],[0,0,-1,0],[0,1,0,0]],"#, 0),
+        (turned.as_str(), r#""applied_transform": [[1,0,0,0],[0,0,-1,0],[0,1,0,0]],"#, 1),
+    ] {
+        let scene = Scene::new();
+        scene.photo("images/a.png", 12, 8);
+        scene.write("sparse_pc.ply", text);
+        let frames = frame("images/a.png", "");
+        scene.write(
+            "transforms.json",
+            format!(r#"{{"fl_x": 10, {applied} "ply_file_path": "sparse_pc.ply", "frames": [{frames}]}}"#),
+        );
+        let dataset = open(&scene).expect("a scene");
+        let positions: Vec<DVec3> = dataset.points.iter().map(|point| point.position).collect();
+        assert_eq!(positions, [DVec3::new(0.0, 0.0, -3.0), DVec3::new(0.2, 0.0, -4.0)]);
+        assert_eq!(dataset.points[1].colour, [4, 5, 6]);
+        assert_eq!(dataset.notes.iter().filter(|note| note.contains("applied_transform")).count(), notes);
+    }
+}
+
+#[test]
+fn colmap_wins_and_a_json_can_be_named() {
+    let scene = simple(2);
+    let text = format!(r#"{{"fl_x": 10, "frames": [{}]}}"#, frame("images/00.png", ""));
+    let path = scene.write("transforms.json", text);
+    assert_eq!(open(&scene).expect("a scene").all().len(), 2);
+    assert_eq!(io::open(&path, &LoadOptions::default()).expect("a scene").all().len(), 1);
+}
+
+#[test]
+fn nonsense_is_refused_with_its_place() {
+    let broken = |text: String| {
+        let scene = Scene::new();
+        scene.photo("images/a.png", 12, 8);
+        scene.write("transforms.json", text);
+        refusal(open(&scene))
+    };
+    let one = |more: &str, matrix: &str| {
+        let text = format!(r#"{{"file_path": "images/a.png", "transform_matrix": {matrix}}}"#);
+        broken(format!(r#"{{{more} "frames": [{text}]}}"#))
+    };
+    assert!(one("", IDENTITY).contains("camera_angle_x"));
+    assert!(one(r#""fl_x": -1,"#, IDENTITY).contains("frame 0"));
+    assert!(one(r#""camera_angle_x": 3.2,"#, IDENTITY).contains("focal"));
+    assert!(one(r#""fl_x": 9, "camera_model": "OPENCV_FISHEYE","#, IDENTITY).contains("OPENCV_FISHEYE"));
+    assert!(one(r#""fl_x": 9, "is_fisheye": true,"#, IDENTITY).contains("is_fisheye"));
+    assert!(one(r#""fl_x": 9, "w": 11.5, "h": 8,"#, IDENTITY).contains("11.5"));
+    assert!(one(r#""fl_x": 9,"#, "[[1,0,0,0],[0,1,0,0],[0,0,-1,0],[0,0,0,1]]").contains("rotation"));
+    assert!(one(r#""fl_x": 9,"#, "[[1,0,0,0],[0,1,0,0]]").contains("4 x 4"));
+    assert!(one(r#""fl_x": 9,"#, "[[1,1,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]]").contains("rotation"));
+    assert!(one(r#""fl_x": 9,"#, "[[1,0,0,1e999],[0,1,0,0],[0,0,1,0],[0,0,0,1]]").contains("line 1"));
+    for name in ["../a.png", "/etc/passwd", "images/../../a.png"] {
+        let text = broken(format!(r#"{{"fl_x": 9, "frames": [{}]}}"#, frame(name, "")));
+        assert!(text.contains("outside the scene"), "{text}");
+    }
+    assert!(broken(r#"{"frames": []}"#.into()).contains("lists no photo"));
+    assert!(broken("[".repeat(100_000)).contains("line 1"));
+    assert!(broken(r#"{"frames": [{"file_path": "a"}]}"#.into()).contains("transform_matrix"));
+}
