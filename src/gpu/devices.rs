@@ -5,12 +5,15 @@ use super::instance::{Instance, Validation};
 use super::limits::Limits;
 use super::select;
 use crate::error::Result;
+use crate::shaders::{self, BindingKind, ShaderDesc};
 use ash::vk;
 use std::fmt::Write;
 
 /// Subgroup operations that the kernels are written with.
 const SUBGROUP_OPERATIONS: vk::SubgroupFeatureFlags = vk::SubgroupFeatureFlags::from_raw(
-    vk::SubgroupFeatureFlags::BASIC.as_raw() | vk::SubgroupFeatureFlags::SHUFFLE.as_raw(),
+    vk::SubgroupFeatureFlags::BASIC.as_raw()
+        | vk::SubgroupFeatureFlags::ARITHMETIC.as_raw()
+        | vk::SubgroupFeatureFlags::SHUFFLE.as_raw(),
 );
 
 /// Features of the device that we know of.
@@ -156,13 +159,14 @@ pub(super) fn needs(found: &Capabilities, has_queue: bool) -> Vec<Need> {
         reason,
     };
     let pins = format!("{} of {}..{}", subgroup.size, subgroup.min, subgroup.max);
+    let bindings = shaders::ALL.iter().map(|shader| storage_bindings(shader)).max().unwrap_or(0);
     let shuffles = subgroup.operations.contains(SUBGROUP_OPERATIONS);
     vec![
         need("Vulkan", (major, minor) >= (1, 2), "1.2", format!("{major}.{minor}.{patch}"), "everything"),
         need("compute queue", has_queue, "yes", yes(has_queue), "everything"),
         need("scalarBlockLayout", features.scalar, "yes", yes(features.scalar), "one layout for shaders and host"),
         need("timelineSemaphore", features.timeline, "yes", yes(features.timeline), "two steps in flight"),
-        need("subgroup shuffle in compute", shuffles, "yes", yes(shuffles), "blending without shared memory"),
+        need("subgroup shuffle, arithmetic", shuffles, "yes", yes(shuffles), "blending without shared memory"),
         need("subgroup size", subgroup.size >= 8, "8", subgroup.size.to_string(), "one tile per subgroup"),
         need(
             "workgroup size",
@@ -187,8 +191,8 @@ pub(super) fn needs(found: &Capabilities, has_queue: bool) -> Vec<Need> {
         ),
         need(
             "storage buffers per shader",
-            limits.max_storage_buffers >= 16,
-            "16",
+            limits.max_storage_buffers >= bindings,
+            &bindings.to_string(),
             limits.max_storage_buffers.to_string(),
             "bindings of the largest pass",
         ),
@@ -209,6 +213,10 @@ pub(super) fn needs(found: &Capabilities, has_queue: bool) -> Vec<Need> {
     ]
 }
 
+fn storage_bindings(shader: &ShaderDesc) -> u32 {
+    shader.bindings.iter().filter(|binding| binding.kind == BindingKind::Storage).count() as u32
+}
+
 /// All devices with their table of needs, as text.
 pub fn devices_report() -> Result<String> {
     let instance = Instance::new(Validation::Off)?;
@@ -227,7 +235,7 @@ pub fn devices_report() -> Result<String> {
                 (false, false) => "none",
             };
             let (what, needed, found) = (need.what, &need.needed, &need.found);
-            let _ = writeln!(text, "   {mark:<8}{what:<28} needed {needed:<8} found {found:<18} {}", need.reason);
+            let _ = writeln!(text, "   {mark:<8}{what:<29} needed {needed:<8} found {found:<18} {}", need.reason);
         }
         let missing = device.missing();
         let verdict = if missing.is_empty() { "usable" } else { "not usable" };
