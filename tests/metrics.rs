@@ -238,9 +238,9 @@ fn scores_are_averaged_over_pairs() {
     let whole: Vec<bool> = (0..24).map(|i| i % 12 < 4).collect();
     let alpha: Vec<f32> = (0..24).map(|i| if i % 12 < 2 { 0.8 } else { 0.3 }).collect();
     let object = ObjectRender { colour: &render, alpha: &alpha };
-    view.add_object(1, Some(object), &photo, Some(&mask), Some(&whole)).expect("sizes");
-    view.add_object(2, None, &photo, Some(&mask), None).expect("sizes");
-    view.add_object(9, None, &photo, Some(&mask), None).expect("sizes");
+    view.add_object(1, Some(object), &photo, Some(&mask), Some(&whole), None).expect("sizes");
+    view.add_object(2, None, &photo, Some(&mask), None, None).expect("sizes");
+    view.add_object(9, None, &photo, Some(&mask), None, None).expect("sizes");
     let scores = Scores::new(BTreeMap::from([("a.png".to_owned(), view)]));
     assert_eq!(scores.objects[&1].iou_map, Some(0.5));
     assert_eq!(scores.objects[&2].iou_map, Some(0.8));

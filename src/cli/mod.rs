@@ -10,6 +10,7 @@ pub mod log;
 pub mod plan;
 pub mod profile;
 pub mod render;
+pub mod scene;
 pub mod select;
 pub mod stdout;
 pub mod synth;

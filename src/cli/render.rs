@@ -2,9 +2,84 @@
 
 use super::Context;
 use super::args::RenderArgs;
+use super::scene::{NEAR, open_gpu, open_scene, pick_views, render_engine};
+use super::{open_model, stdout};
+use crate::infer::output::{Format, Pictures, What, write_pictures};
+use crate::infer::render::render;
+use crate::infer::select::{extract, remove};
+use crate::io::camera_json::read_camera;
+use crate::scene::{Camera, Gaussians};
 use crate::{Error, Result};
+use serde_json::json;
 
 /// Renders views.
-pub fn run(_args: &RenderArgs, _context: &Context) -> Result<()> {
-    Err(Error::Bug("not built yet".into()))
+pub fn run(args: &RenderArgs, context: &Context) -> Result<()> {
+    let exr_only = args.what.iter().find(|what| matches!(what, What::TopId | What::TopWeight));
+    if args.format == Format::Png && exr_only.is_some() {
+        return Err(Error::usage("--what", "top-id and top-weight are 32-bit values; say --format exr"));
+    }
+    let model = open_model(&args.model)?;
+    let shown = match (&args.only, &args.without) {
+        (Some(labels), _) => extract(&model, &labels.0)?,
+        (None, Some(labels)) => remove(&model, &labels.0)?,
+        (None, None) => model,
+    };
+    let cameras = cameras(args)?;
+    let gpu = open_gpu(context)?;
+    let mut engine = render_engine(gpu, &shown, cameras.iter().map(|(_, camera)| (camera.width, camera.height)))?;
+    engine.upload_model(&shown)?;
+    let mut files = Vec::new();
+    for (stem, camera) in &cameras {
+        let rendered = render(&mut engine, camera, NEAR, args.background, shown.sh_degree)?;
+        files.extend(write(args, stem, &rendered, &shown)?);
+    }
+    let files: Vec<String> = files.iter().map(|file| file.display().to_string()).collect();
+    if context.json || args.json.json {
+        return stdout::print_json(&json!({ "schema_version": 1, "files": files }));
+    }
+    files.iter().try_for_each(|file| stdout::print(&format!("{file}\n")))
+}
+
+fn cameras(args: &RenderArgs) -> Result<Vec<(String, Camera)>> {
+    if let Some(path) = &args.camera {
+        let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+        return Ok(vec![(stem, read_camera(path)?)]);
+    }
+    let Some(scene) = &args.scene else { return Err(Error::usage("--scene", "--scene or --camera is needed")) };
+    let dataset = open_scene(scene, &args.reading, None, args.background, false)?;
+    let views = pick_views(&dataset, &args.views)?;
+    Ok(views.iter().map(|view| (view.stem(), view.camera.clone())).collect())
+}
+
+fn write(
+    args: &RenderArgs,
+    stem: &str,
+    rendered: &crate::infer::render::Rendered,
+    model: &Gaussians,
+) -> Result<Vec<std::path::PathBuf>> {
+    let asked = |what| args.what.contains(&what);
+    let unlabelled;
+    let map = if asked(What::Labels) {
+        let labels = match &model.labels {
+            Some(labels) => labels,
+            None => {
+                unlabelled = vec![0; model.len()];
+                &unlabelled
+            }
+        };
+        Some(rendered.label_map(labels))
+    } else {
+        None
+    };
+    let pictures = Pictures {
+        width: rendered.width,
+        height: rendered.height,
+        rgb: asked(What::Rgb).then_some(&rendered.rgb),
+        depth: asked(What::Depth).then_some(&rendered.depth),
+        alpha: asked(What::Alpha).then_some(&rendered.alpha),
+        labels: map.as_ref(),
+        top_id: asked(What::TopId).then_some(&rendered.top_id),
+        top_weight: asked(What::TopWeight).then_some(&rendered.top_weight),
+    };
+    write_pictures(&args.output, stem, &pictures, args.format)
 }

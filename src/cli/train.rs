@@ -1,10 +1,185 @@
 //! `labelgs train`.
 
-use super::Context;
+use super::log::Progress;
+use super::scene::{open_gpu, open_with};
 use super::train_args::TrainArgs;
+use super::{Context, config, interrupt, stdout};
+use crate::engine::Engine;
+use crate::gpu::Gpu;
+use crate::infer::evaluate::{Rendering, evaluate};
+use crate::infer::render::render;
+use crate::infer::scores::Scores;
+use crate::io::{atomic, init};
+use crate::scene::{Dataset, Photo, View};
+use crate::sched::SchedulerOptions;
+use crate::train::{self, StepReport, TrainConfig, Trainer, record};
 use crate::{Error, Result};
+use serde_json::json;
+use std::path::Path;
+use std::time::Instant;
 
 /// Trains a model.
-pub fn run(_args: &TrainArgs, _context: &Context) -> Result<()> {
-    Err(Error::Bug("not built yet".into()))
+pub fn run(args: &TrainArgs, context: &Context) -> Result<()> {
+    let config = config::decide(args)?;
+    let out = args.output.as_path();
+    prepare_output(out)?;
+    let mut dataset = open_with(&args.scene, &config::load_options(&config, args.masks.clone()))?;
+    if dataset.train.is_empty() {
+        return Err(Error::data(&args.scene, "", "no view is left to train on; use --no-test or a larger --test-every"));
+    }
+    let gpu = open_gpu(context)?;
+    let mut model = init::initial_gaussians(&dataset, config.seed, init::RANDOM_COUNT)?;
+    bound_start(&mut model, &config);
+    let room = train::room(&dataset, &config, model.len() as u64 * 2)?;
+    let memory = Engine::predict(&gpu, &room)?;
+    tracing::info!(
+        "memory to start with: {:.1} MiB on the device, for {} Gaussians and {} x {} px; it grows with the model",
+        memory.total as f64 / f64::from(1 << 20),
+        room.gaussians,
+        room.size.0,
+        room.size.1
+    );
+    write_run(out, &config, &gpu, args)?;
+    let cameras: Vec<_> = dataset.all().into_iter().map(|view| (view.name.as_str(), &view.camera)).collect();
+    record::save_cameras(out, &cameras)?;
+    let preview = preview_view(&dataset);
+    let mut trainer = Trainer::new(gpu, config.clone(), &mut dataset, &model, SchedulerOptions::default())?;
+    interrupt::note_only();
+    let start = Instant::now();
+    let last = steps(&mut trainer, out, preview.as_ref(), context)?;
+    let seconds = start.elapsed().as_secs_f64();
+    let path = record::save_model(out, trainer.steps_done(), &trainer.model()?)?;
+    if let Some(view) = &preview {
+        preview_now(&mut trainer, out, view)?;
+    }
+    let stopped = interrupt::status();
+    let scores = if stopped.is_none() { score(&mut trainer, &dataset, &config)? } else { None };
+    let summary = json!({
+        "schema_version": 1,
+        "steps": trainer.steps_done(),
+        "seconds": seconds,
+        "gaussians": trainer.gaussian_count(),
+        "loss": last.map(|report| report.loss),
+        "label_loss": last.map(|report| report.label_loss),
+        "model": path.display().to_string(),
+        "test": scores.as_ref().map(|scores| &scores.mean),
+        "views": scores.as_ref().map(|scores| &scores.views),
+    });
+    super::eval::write_json(&out.join("metrics.json"), &summary)?;
+    if let Some(status) = stopped {
+        return Err(Error::Interrupted(status));
+    }
+    if context.json || args.json.json {
+        return stdout::print_json(&summary);
+    }
+    stdout::print(&sentence(&trainer, seconds, scores.as_ref(), &path))
+}
+
+fn sentence(trainer: &Trainer, seconds: f64, scores: Option<&Scores>, path: &Path) -> String {
+    let steps = trainer.steps_done();
+    let mut text = format!("{}: {} Gaussians after {steps} steps in {seconds:.1} s", path.display(), trainer.gaussian_count());
+    if let Some(mean) = scores.map(|scores| &scores.mean) {
+        text += &format!(
+            "; test views: PSNR {:.2} dB, SSIM {:.4}",
+            mean.psnr.unwrap_or(f64::NAN),
+            mean.ssim.unwrap_or(f64::NAN)
+        );
+        if let Some(iou) = mean.objects.iou_map {
+            text += &format!(", IoU of the label map {iou:.3}");
+        }
+    }
+    text + "\n"
+}
+
+/// The loop. A noted signal ends it after the step.
+fn steps(trainer: &mut Trainer, out: &Path, preview: Option<&View>, context: &Context) -> Result<Option<StepReport>> {
+    let config = trainer.config().clone();
+    let mut progress = Progress::new(u64::from(config.iterations), "steps", &context.global);
+    let mut last = None;
+    for step in 1..=config.iterations {
+        let done = trainer.step()?;
+        last = done.last().copied().or(last);
+        progress.set(u64::from(step), || {
+            let (loss, label) = last.map_or((f64::NAN, 0.0), |report| (report.loss, report.label_loss));
+            let label = if label > 0.0 { format!(" label loss {label:.4}") } else { String::new() };
+            format!("loss {loss:.4}{label} {} Gaussians", trainer.gaussian_count())
+        });
+        if step < config.iterations {
+            if config.save_at.contains(&step) {
+                let model = trainer.model()?;
+                record::save_model(out, step, &model)?;
+            }
+            if config.preview_every > 0
+                && step % config.preview_every == 0
+                && let Some(view) = preview
+            {
+                preview_now(trainer, out, view)?;
+            }
+        }
+        if interrupt::status().is_some() {
+            break;
+        }
+    }
+    let done = trainer.drain()?;
+    Ok(done.last().copied().or(last))
+}
+
+/// Refuses an output folder that cannot be used before any work is done.
+fn prepare_output(out: &Path) -> Result<()> {
+    std::fs::create_dir_all(out).map_err(Error::write(out))?;
+    atomic::remove_stale(out);
+    Ok(())
+}
+
+/// No more initial points than `--max-gaussians`: every n-th is kept.
+fn bound_start(model: &mut crate::scene::Gaussians, config: &TrainConfig) {
+    let (count, bound) = (model.len() as u64, config.max_gaussians);
+    if bound > 0 && count > bound {
+        tracing::warn!("{count} initial points, --max-gaussians {bound}: every {:.1}-th is used", count as f64 / bound as f64);
+        // Row i is kept where i * bound / count steps up: an even choice.
+        *model = model.filtered(|row| row as u64 * bound / count != (row as u64 + 1) * bound / count);
+    }
+}
+
+fn write_run(out: &Path, config: &TrainConfig, gpu: &Gpu, args: &TrainArgs) -> Result<()> {
+    let found = gpu.capabilities();
+    let mut facts = vec![
+        ("scene", args.scene.display().to_string()),
+        ("device", format!("{} ({} {})", found.name, found.driver_name, found.driver_info)),
+        ("subgroup size", gpu.subgroup_size().to_string()),
+    ];
+    if let Some(masks) = &args.masks {
+        facts.push(("masks", masks.display().to_string()));
+    }
+    let text = config::dump(config, &facts)?;
+    atomic::write(out.join("config.toml"), |file| file.write_all(text.as_bytes()))
+}
+
+/// The view of the preview pictures: the first held-out one, else the first of all.
+fn preview_view(dataset: &Dataset) -> Option<View> {
+    dataset.test.first().or(dataset.train.first()).cloned()
+}
+
+fn preview_now(trainer: &mut Trainer, out: &Path, view: &View) -> Result<()> {
+    trainer.drain()?;
+    let (degree, config) = (trainer.sh_degree(), trainer.config().clone());
+    let Some(photo) = &view.photo else { return Ok(()) };
+    let photo: &Photo = photo;
+    let rendered = render(trainer.engine_mut(), &view.camera, config.near, config.background, degree)?;
+    let labels = trainer.model()?.labels;
+    let path = out.join("preview").join(format!("{:06}_{}.png", trainer.steps_done(), view.stem()));
+    record::save_preview(&path, photo, &rendered, labels.as_deref())
+}
+
+/// Scores the held-out views, objects too where they have masks.
+fn score(trainer: &mut Trainer, dataset: &Dataset, config: &TrainConfig) -> Result<Option<Scores>> {
+    let views: Vec<&View> = dataset.test.iter().collect();
+    if views.is_empty() {
+        return Ok(None);
+    }
+    let mut model = trainer.model()?;
+    // Bands that were never let in are 0; without them the render is cheaper.
+    model.sh_degree = model.sh_degree.max(trainer.sh_degree());
+    let how = Rendering { near: config.near, background: config.background };
+    evaluate(trainer.engine_mut(), &model, &views, how, &|_, _| Ok(None), &mut || {}).map(Some)
 }

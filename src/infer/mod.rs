@@ -3,6 +3,7 @@
 
 pub mod render;
 pub mod choose;
+pub mod evaluate;
 pub mod metrics;
 pub mod occlusion;
 pub mod output;

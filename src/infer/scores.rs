@@ -65,7 +65,8 @@ impl ViewScores {
     }
 
     /// Scores object `id` rendered alone; `None` for a label without Gaussians, which is an empty picture. `whole` is
-    /// the object's whole outline, where the scene knows it.
+    /// the object's whole outline, where the scene knows it; without it, `hidden` says which pixels belong to objects in
+    /// front of this one, where nobody knows whether it goes on.
     pub fn add_object(
         &mut self,
         id: u32,
@@ -73,13 +74,15 @@ impl ViewScores {
         photo: &Photo,
         mask: Option<&LabelMap>,
         whole: Option<&[bool]>,
+        hidden: Option<&[bool]>,
     ) -> Result<()> {
         let pixels = photo.rgba.len();
         let (black, clear) = (vec![[0.0; 3]; pixels], vec![0.0; pixels]);
         let render = render.unwrap_or(ObjectRender { colour: &black, alpha: &clear });
         let lengths =
             [Some(render.colour.len()), Some(render.alpha.len()), mask.map(|m| m.ids.len()), whole.map(<[bool]>::len)];
-        if lengths.into_iter().flatten().any(|length| length != pixels) {
+        let lengths = lengths.into_iter().chain([hidden.map(<[bool]>::len)]);
+        if lengths.flatten().any(|length| length != pixels) {
             return Err(Error::Bug(format!("pictures of object {id} differ in size from the photo")));
         }
         let visible: Option<Vec<bool>> =
@@ -88,8 +91,10 @@ impl ViewScores {
         let outline = whole.or(visible.as_deref()).filter(|outline| outline.contains(&true));
         let Some(outline) = outline else { return Ok(()) };
         let scores = self.objects.entry(id).or_default();
-        let pairs = render.alpha.iter().zip(outline).zip(&photo.rgba).filter(|(_, pixel)| pixel[3] > 0);
-        scores.iou_object = Overlap::count(pairs.map(|((&alpha, &truth), _)| (alpha > COVERED, truth))).iou();
+        let unknown = |index: usize| whole.is_none() && hidden.is_some_and(|hidden| hidden[index]);
+        let known = (0..pixels).filter(|&index| photo.rgba[index][3] > 0 && !unknown(index));
+        scores.iou_object =
+            Overlap::count(known.map(|index| (render.alpha[index] > COVERED, outline[index]))).iou();
         if let Some(visible) = visible {
             let paper = paper_score(render.colour, photo, &visible);
             (scores.paper_iou, scores.object_psnr) = (paper.iou, Some(paper.psnr));

@@ -4,6 +4,7 @@ pub mod config;
 mod densify;
 pub mod job;
 mod occlusion;
+pub mod record;
 mod sampler;
 
 pub use config::{Occlusion, TrainConfig};

@@ -1,0 +1,92 @@
+//! What the verbs that render share: the device, the scene, its views.
+
+use super::Context;
+use super::args::SceneArgs;
+use crate::engine::{Engine, Room};
+use crate::error::{Error, Result};
+use crate::gpu::{Gpu, GpuOptions};
+use crate::io::{self, LoadOptions};
+use crate::scene::{Dataset, Gaussians, View};
+use crate::sched::SchedulerOptions;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// Near plane of models whose training is not known, world units (3DGS).
+pub const NEAR: f32 = 0.2;
+
+/// Opens the device that was asked for and says which it is.
+pub fn open_gpu(context: &Context) -> Result<Arc<Gpu>> {
+    let mut options = GpuOptions::from_env()?;
+    if let Some(device) = &context.global.device {
+        options.device = Some(device.clone());
+    }
+    let gpu = Gpu::new(&options)?;
+    let found = gpu.capabilities();
+    let cpu = if gpu.is_cpu() { ", a processor: expect it to be slower than a graphics card" } else { "" };
+    tracing::info!("device: {} ({}){cpu}", found.name, found.driver_info);
+    Ok(gpu)
+}
+
+/// Reads a scene and logs what a person should know about it.
+pub fn open_scene(
+    path: &Path,
+    reading: &SceneArgs,
+    masks: Option<PathBuf>,
+    background: [f32; 3],
+    photos: bool,
+) -> Result<Dataset> {
+    let test_every = (reading.test_every > 0).then_some(reading.test_every);
+    let options = LoadOptions { masks, max_resolution: reading.max_resolution, test_every, background, photos };
+    open_with(path, &options)
+}
+
+/// Reads a scene with given options and logs its notes.
+pub fn open_with(path: &Path, options: &LoadOptions) -> Result<Dataset> {
+    let dataset = io::open(path, options)?;
+    dataset.notes.iter().for_each(|note| tracing::warn!("{note}"));
+    tracing::info!(
+        "scene: {} training views, {} test views, {} points",
+        dataset.train.len(),
+        dataset.test.len(),
+        dataset.points.len()
+    );
+    Ok(dataset)
+}
+
+/// The views that `test`, `train`, `all` or a list of names means.
+pub fn pick_views<'a>(dataset: &'a Dataset, which: &str) -> Result<Vec<&'a View>> {
+    let views: Vec<&View> = match which {
+        "test" => dataset.test.iter().collect(),
+        "train" => dataset.train.iter().collect(),
+        "all" => dataset.all(),
+        names => names.split(',').map(|name| find_view(dataset, name.trim())).collect::<Result<_>>()?,
+    };
+    if views.is_empty() {
+        return Err(Error::usage(
+            "--views",
+            format!("the scene has no {which} views; say --views all, or see --test-every"),
+        ));
+    }
+    Ok(views)
+}
+
+/// The view of a name, with or without its extension.
+pub fn find_view<'a>(dataset: &'a Dataset, name: &str) -> Result<&'a View> {
+    let all = dataset.all();
+    let found = all.iter().find(|view| view.name == name || view.stem() == name || without_extension(&view.name) == name);
+    found.copied().ok_or_else(|| {
+        let some: Vec<&str> = all.iter().take(8).map(|view| view.name.as_str()).collect();
+        Error::usage("view", format!("there is no view {name}; the scene has {} ... ({} in all)", some.join(", "), all.len()))
+    })
+}
+
+fn without_extension(name: &str) -> String {
+    Path::new(name).with_extension("").to_string_lossy().into_owned()
+}
+
+/// An engine that renders `model` at up to `size`, the model not yet on it.
+pub fn render_engine(gpu: Arc<Gpu>, model: &Gaussians, sizes: impl Iterator<Item = (u32, u32)>) -> Result<Engine> {
+    let size = sizes.reduce(|a, b| (a.0.max(b.0), a.1.max(b.1))).unwrap_or((1, 1));
+    let room = Room { gaussians: (model.len() as u64).max(1), size, trained: false, labels: None };
+    Engine::new(gpu, room, SchedulerOptions::default())
+}

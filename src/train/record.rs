@@ -1,0 +1,50 @@
+//! Files of a run: the model, the cameras, the previews. Each is written whole or not at all.
+
+use crate::error::Result;
+use crate::infer::render::Rendered;
+use crate::io::{camera_json, image, ply};
+use crate::scene::labels::label_colour;
+use crate::scene::{Camera, Gaussians, Photo};
+use std::path::{Path, PathBuf};
+
+/// Where the model of a step is kept, as the viewers of 3DGS expect it.
+pub fn model_path(out: &Path, step: u32) -> PathBuf {
+    out.join("point_cloud").join(format!("iteration_{step}")).join("point_cloud.ply")
+}
+
+/// Writes the model of a step.
+pub fn save_model(out: &Path, step: u32, model: &Gaussians) -> Result<PathBuf> {
+    let path = model_path(out, step);
+    let left_out = ply::write_gaussians(&path, model)?;
+    if left_out > 0 {
+        tracing::warn!("{}: {left_out} Gaussians are not finite and were left out", path.display());
+    }
+    Ok(path)
+}
+
+/// Writes `cameras.json`.
+pub fn save_cameras(out: &Path, cameras: &[(&str, &Camera)]) -> Result<()> {
+    camera_json::write_cameras(out.join("cameras.json"), cameras)
+}
+
+/// Writes photo, render and (with labels) label map side by side.
+pub fn save_preview(path: &Path, photo: &Photo, rendered: &Rendered, labels: Option<&[u32]>) -> Result<()> {
+    let (width, height) = (rendered.width as usize, rendered.height as usize);
+    let byte = |value: f32| (value.clamp(0.0, 1.0) * 255.0).round() as u8;
+    let map = labels.map(|labels| rendered.label_map(labels));
+    let panels = if map.is_some() { 3 } else { 2 };
+    let mut pixels = vec![[0_u8; 3]; width * panels * height];
+    for y in 0..height {
+        let row = &mut pixels[y * width * panels..][..width * panels];
+        for x in 0..width {
+            let at = y * width + x;
+            let [r, g, b, _] = photo.rgba[at];
+            row[x] = [r, g, b];
+            row[width + x] = rendered.rgb[at].map(byte);
+            if let Some(map) = &map {
+                row[2 * width + x] = label_colour(u32::from(map.ids[at]));
+            }
+        }
+    }
+    image::write_png_rgb8(path, (width * panels) as u32, height as u32, &pixels)
+}
