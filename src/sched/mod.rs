@@ -330,13 +330,18 @@ impl Scheduler {
         if !matches!(error, Error::DeviceLost { .. }) {
             return error;
         }
-        let running = self.lists.iter().flat_map(|list| list.recordings.iter().map(move |one| (one, &list.plan)));
-        let running = running.filter_map(|(recording, plan)| {
+        let marked = self.lists.iter().flat_map(|list| list.recordings.iter().map(move |one| (one, &list.plan)));
+        let marked = marked.filter_map(|(recording, plan)| {
             let item = recording.markers.as_ref()?.last_begun()?;
             Some((recording.busy, format!("{} of list {}", plan.items.get(item)?.label, plan.list.name)))
         });
-        let last = running.max_by_key(|(busy, _)| *busy).map(|(_, pass)| pass);
-        Error::DeviceLost { pass: last.unwrap_or_else(|| "unknown (crash markers are off)".to_owned()) }
+        let pass = match marked.max_by_key(|(busy, _)| *busy) {
+            Some((busy, pass)) if busy == self.submitted => pass,
+            Some((_, pass)) => format!("{pass}, or what came after it"),
+            None if self.options.crash_markers => "none; memory was being set up".to_owned(),
+            None => "unknown (crash markers are off)".to_owned(),
+        };
+        Error::DeviceLost { pass }
     }
 }
 
