@@ -204,7 +204,11 @@ impl Scheduler {
         if ticket.0 == 0 {
             return Ok(());
         }
-        self.timeline.wait(ticket.0).map_err(|error| self.name_pass(error))
+        self.timeline.wait(ticket.0).map_err(|error| {
+            // Whoever gets the error may free what the device was to be done with. A lost device returns at once.
+            let _ = self.gpu.wait_idle();
+            self.name_pass(error)
+        })
     }
 
     /// True if a submit is done.
