@@ -49,6 +49,8 @@ pub fn run(args: &TrainArgs, context: &Context) -> Result<()> {
     let last = steps(&mut trainer, out, preview.as_ref(), context)?;
     let seconds = start.elapsed().as_secs_f64();
     let path = record::save_model(out, trainer.steps_done(), &trainer.model()?)?;
+    // Scoring puts single objects in the model's place.
+    let gaussians = trainer.gaussian_count();
     if let Some(view) = &preview {
         preview_now(&mut trainer, out, view)?;
     }
@@ -58,7 +60,7 @@ pub fn run(args: &TrainArgs, context: &Context) -> Result<()> {
         "schema_version": 1,
         "steps": trainer.steps_done(),
         "seconds": seconds,
-        "gaussians": trainer.gaussian_count(),
+        "gaussians": gaussians,
         "loss": last.map(|report| report.loss),
         "label_loss": last.map(|report| report.label_loss),
         "model": path.display().to_string(),
@@ -72,12 +74,11 @@ pub fn run(args: &TrainArgs, context: &Context) -> Result<()> {
     if context.json || args.json.json {
         return stdout::print_json(&summary);
     }
-    stdout::print(&sentence(&trainer, seconds, scores.as_ref(), &path))
+    stdout::print(&sentence((trainer.steps_done(), gaussians, seconds), scores.as_ref(), &path))
 }
 
-fn sentence(trainer: &Trainer, seconds: f64, scores: Option<&Scores>, path: &Path) -> String {
-    let steps = trainer.steps_done();
-    let mut text = format!("{}: {} Gaussians after {steps} steps in {seconds:.1} s", path.display(), trainer.gaussian_count());
+fn sentence((steps, gaussians, seconds): (u32, u32, f64), scores: Option<&Scores>, path: &Path) -> String {
+    let mut text = format!("{}: {gaussians} Gaussians after {steps} steps in {seconds:.1} s", path.display());
     if let Some(mean) = scores.map(|scores| &scores.mean) {
         text += &format!(
             "; test views: PSNR {:.2} dB, SSIM {:.4}",
