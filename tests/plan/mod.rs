@@ -90,8 +90,7 @@ fn the_text_of_a_small_plan() {
 }
 
 /// All lists of the engine for a small scene.
-fn engine_lists() -> (Capacity, Vec<PassList>) {
-    let shape = KernelShape::new(8, true);
+pub fn engine_lists(shape: KernelShape) -> (Capacity, Vec<PassList>) {
     let capacity = Capacity {
         gaussians: 10_000,
         trained: 10_000,
@@ -126,7 +125,7 @@ fn engine_lists() -> (Capacity, Vec<PassList>) {
 
 #[test]
 fn the_lists_of_the_engine_are_safe() {
-    let (capacity, lists) = engine_lists();
+    let (capacity, lists) = engine_lists(KernelShape::new(8, true));
     for list in &lists {
         for options in checker::all_options() {
             let plan = Plan::new(TABLE, &capacity, list, &Limits::default(), options).unwrap();

@@ -150,3 +150,16 @@ fn nothing_is_left_when_the_device_is_dropped() {
     assert_eq!(log.messages(), vec![]);
     drop(turn);
 }
+
+#[test]
+fn the_lists_of_the_engine_can_be_prepared() {
+    let Some(gpu) = device() else { return };
+    for texel in [false, true] {
+        let shape = labelgs::pass::KernelShape::new(gpu.subgroup_size(), gpu.is_cpu());
+        let (capacity, lists) = crate::plan::engine_lists(labelgs::pass::KernelShape { texel, ..shape });
+        let with = SchedulerOptions { timestamps: true, poison_step: true, ..SchedulerOptions::default() };
+        let mut scheduler = Scheduler::new(gpu.gpu(), labelgs::plan::TABLE, capacity, with).unwrap();
+        let ids = scheduler.prepare_all(&lists.iter().collect::<Vec<_>>()).unwrap();
+        assert_eq!(ids.len(), lists.len());
+    }
+}
