@@ -8,19 +8,11 @@ use crate::shaders::constants;
 
 const GRID: fn() -> Grid = || args(constants::ARGS_BLEND);
 
-/// State between segments starts defined, although the first segment does not read it.
-fn begin_segments(b: &mut Builder, states: &[Buf]) {
-    states.iter().for_each(|&state| {
-        b.list.fill(state, 0);
-    });
-}
-
 /// Blends all tiles front to back; with labels also the object layers, their loss, and the lift.
 pub fn blend_forward(b: &mut Builder) {
     let (subgroup, tile_width, tile_height) = (b.shape.subgroup, b.shape.tile_width, b.shape.tile_height);
     let (segments, length) = (b.capacity.segments as u32, b.shape.segment_length);
     if segments > 1 {
-        begin_segments(b, &[Buf::SEGMENT_COLOURS, Buf::SEGMENT_REST]);
         for segment in 0..segments {
             if b.labels {
                 pass!(b, texel blend_forward_labels_segmented {
@@ -71,7 +63,6 @@ pub fn blend_forward_main(b: &mut Builder) {
             gaussian_from_splat: GAUSSIAN_FROM_SPLAT,
         } [subgroup_size: subgroup, tile_width: tile_width, tile_height: tile_height], GRID());
     } else {
-        begin_segments(b, &[Buf::SEGMENT_COLOURS, Buf::SEGMENT_REST]);
         for segment in 0..segments {
             pass!(b, texel blend_forward_main_segmented {
                 step: Buf::STEP, counters: Buf::COUNTERS, tile_starts: Buf::TILE_STARTS, tile_ends: Buf::TILE_ENDS,
@@ -90,7 +81,6 @@ pub fn blend_backward(b: &mut Builder, slots: Buf) {
     let (subgroup, tile_width, tile_height) = (b.shape.subgroup, b.shape.tile_width, b.shape.tile_height);
     let (segments, length) = (b.capacity.segments as u32, b.shape.segment_length);
     if segments > 1 {
-        begin_segments(b, &[Buf::SEGMENT_BACK]);
         for segment in (0..segments).rev() {
             if b.labels {
                 pass!(b, texel blend_backward_labels_segmented {
