@@ -86,7 +86,7 @@ pub fn blend_backward(b: &mut Builder, slots: Buf) {
                 pass!(b, texel blend_backward_labels_segmented {
                     step: Buf::STEP, tile_starts: Buf::TILE_STARTS, sorted_splats: Buf::SORTED_SPLATS, slots: slots,
                     splats: Buf::SPLATS, image: Buf::IMAGE, last: Buf::LAST, v_image: Buf::V_IMAGE,
-                    v_instances: Buf::V_INSTANCES, counters: Buf::COUNTERS, layer_tiles: Buf::LAYER_TILES,
+                    v_instances_a: Buf::V_INSTANCES_A, v_instances_b: Buf::V_INSTANCES_B, v_instances_c: Buf::V_INSTANCES_C, counters: Buf::COUNTERS, layer_tiles: Buf::LAYER_TILES,
                     layer_state: Buf::LAYER_STATE,
                     segment_back: Buf::SEGMENT_BACK,
                 } [subgroup_size: subgroup, tile_width: tile_width, tile_height: tile_height,
@@ -95,7 +95,7 @@ pub fn blend_backward(b: &mut Builder, slots: Buf) {
                 pass!(b, texel blend_backward_segmented {
                     step: Buf::STEP, tile_starts: Buf::TILE_STARTS, sorted_splats: Buf::SORTED_SPLATS, slots: slots,
                     splats: Buf::SPLATS, image: Buf::IMAGE, last: Buf::LAST, v_image: Buf::V_IMAGE,
-                    v_instances: Buf::V_INSTANCES,
+                    v_instances_a: Buf::V_INSTANCES_A, v_instances_b: Buf::V_INSTANCES_B, v_instances_c: Buf::V_INSTANCES_C,
                     segment_back: Buf::SEGMENT_BACK,
                 } [subgroup_size: subgroup, tile_width: tile_width, tile_height: tile_height,
                     segment: segment, segments: segments, segment_length: length], GRID());
@@ -105,14 +105,14 @@ pub fn blend_backward(b: &mut Builder, slots: Buf) {
         pass!(b, texel blend_backward_labels {
             step: Buf::STEP, tile_starts: Buf::TILE_STARTS, sorted_splats: Buf::SORTED_SPLATS, slots: slots,
             splats: Buf::SPLATS, image: Buf::IMAGE, last: Buf::LAST, v_image: Buf::V_IMAGE,
-            v_instances: Buf::V_INSTANCES, counters: Buf::COUNTERS, layer_tiles: Buf::LAYER_TILES,
+            v_instances_a: Buf::V_INSTANCES_A, v_instances_b: Buf::V_INSTANCES_B, v_instances_c: Buf::V_INSTANCES_C, counters: Buf::COUNTERS, layer_tiles: Buf::LAYER_TILES,
             layer_state: Buf::LAYER_STATE,
         } [subgroup_size: subgroup, tile_width: tile_width, tile_height: tile_height], GRID());
     } else {
         pass!(b, texel blend_backward {
             step: Buf::STEP, tile_starts: Buf::TILE_STARTS, sorted_splats: Buf::SORTED_SPLATS, slots: slots,
             splats: Buf::SPLATS, image: Buf::IMAGE, last: Buf::LAST, v_image: Buf::V_IMAGE,
-            v_instances: Buf::V_INSTANCES,
+            v_instances_a: Buf::V_INSTANCES_A, v_instances_b: Buf::V_INSTANCES_B, v_instances_c: Buf::V_INSTANCES_C,
         } [subgroup_size: subgroup, tile_width: tile_width, tile_height: tile_height], GRID());
     }
 }

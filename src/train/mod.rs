@@ -129,9 +129,14 @@ impl Trainer {
         self.config.sh_degree_at(self.step)
     }
 
-    /// Reads the model back.
+    /// Reads the model back. Steps that failed for want of memory changed nothing in it.
     pub fn model(&mut self) -> Result<Gaussians> {
-        self.drain()?;
+        if let Err(error) = self.drain() {
+            if !matches!(error, Error::OutOfMemory { .. }) {
+                return Err(error);
+            }
+            self.flying.clear();
+        }
         self.engine.download_model(self.config.sh_degree)
     }
 
