@@ -18,5 +18,6 @@ mod output;
 mod pass;
 mod plan;
 mod sched;
+mod segments;
 mod shadergen;
 mod synth;

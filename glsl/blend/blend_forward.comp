@@ -48,6 +48,10 @@ INOUT(16, uint, label_keys);
 FETCHU(17, layer_from_label);
 #endif
 
+#ifdef SEGMENTED
+INOUT(30, vec4, segment_colours); // [jobs, pixels of a tile] (colour, transmittance with the sign of `T`)
+INOUT(31, uvec4, segment_rest);   // (last, main splat, its weight, depth)
+#endif
 #ifdef LABELS
 #include "label_state.glsl"
 #include "label_rules.glsl"
@@ -75,8 +79,13 @@ void main() {
     TileJob t = locate(job, virtual_tile, slot, u);
     uint lane = gl_LocalInvocationID.x;
     uint list_start = fetchu(tile_starts, virtual_tile), list_end = fetchu(tile_ends, virtual_tile);
+#ifdef SEGMENTED
     uint begin = min(list_start + SEGMENT * SEGMENT_LENGTH, list_end);
     uint end = min(begin + SEGMENT_LENGTH, list_end);
+    uint kept = job * (TILE_WIDTH * TILE_HEIGHT) + lane;
+#else
+    uint begin = list_start, end = list_end;
+#endif
     vec2 corner = vec2(float(t.x - (gl_LocalInvocationID.x % TILE_WIDTH)), float((t.tile / u.tiles_x) * TILE_HEIGHT));
 
     float T[ROWS], cr[ROWS], cg[ROWS], cb[ROWS];
@@ -107,6 +116,24 @@ void main() {
 #endif
 #ifdef MAIN
         depth[k] = 0.0;
+#endif
+#ifdef SEGMENTED
+        if (SEGMENT > 0u) {
+            vec4 colour = segment_colours[kept + k * SUBGROUP_SIZE];
+            uvec4 rest = segment_rest[kept + k * SUBGROUP_SIZE];
+            cr[k] = colour.x;
+            cg[k] = colour.y;
+            cb[k] = colour.z;
+            T[k] = colour.w;
+            final_[k] = rest.x;
+#if defined(MAIN) || defined(LABELS)
+            main_[k] = rest.y;
+            best[k] = uintBitsToFloat(rest.z);
+#endif
+#ifdef MAIN
+            depth[k] = uintBitsToFloat(rest.w);
+#endif
+        }
 #endif
     }
 
@@ -160,6 +187,22 @@ void main() {
     if (lane == 0u && walked > 0u) {
         atomicAdd(counters.processed_low, walked);
     }
+#ifdef SEGMENTED
+    if (SEGMENT + 1u < SEGMENTS) {
+        [[unroll]] for (uint k = 0u; k < ROWS; k++) {
+            segment_colours[kept + k * SUBGROUP_SIZE] = vec4(cr[k], cg[k], cb[k], T[k]);
+            uvec4 rest = uvec4(final_[k], NO_SPLAT, 0u, 0u);
+#if defined(MAIN) || defined(LABELS)
+            rest.yz = uvec2(main_[k], floatBitsToUint(best[k]));
+#endif
+#ifdef MAIN
+            rest.w = floatBitsToUint(depth[k]);
+#endif
+            segment_rest[kept + k * SUBGROUP_SIZE] = rest;
+        }
+        return;
+    }
+#endif
 
 #ifdef LABELS
     if (t.layer != 0u) {

@@ -4,9 +4,15 @@
 #include "subgroup.glsl"
 layout(constant_id = 1) const uint TILE_WIDTH = 8;
 layout(constant_id = 2) const uint TILE_HEIGHT = 8;
-layout(constant_id = 12) const uint SEGMENT = 0;        // which part of long lists this dispatch walks
-layout(constant_id = 13) const uint SEGMENT_LENGTH = 40960; // lavapipe ends loops after 65,535 rounds in all
 layout(local_size_x_id = 0) in;
+
+// lavapipe ends all loops of an invocation after 65,535 rounds in all. Lists longer than a segment are walked by several
+// dispatches (SEGMENTED), which hand the state of the pixels on through memory.
+#ifdef SEGMENTED
+layout(constant_id = 12) const uint SEGMENT = 0;
+layout(constant_id = 13) const uint SEGMENTS = 1;
+layout(constant_id = 14) const uint SEGMENT_LENGTH = 40960;
+#endif
 
 const uint ROWS = TILE_WIDTH * TILE_HEIGHT / SUBGROUP_SIZE;
 

@@ -101,6 +101,8 @@ fn derive(shape: &KernelShape, capacity: &mut Capacity, instances: u64, trained:
     capacity.instances = instances;
     capacity.trained_instances = if trained { instances } else { 0 };
     capacity.layer_pixels = capacity.layer_tiles * u64::from(shape.tile_pixels());
+    let jobs = (capacity.pixels.div_ceil(u64::from(shape.tile_pixels())) * 2) + capacity.layer_tiles;
+    capacity.segment_pixels = if capacity.segments > 1 { jobs * u64::from(shape.tile_pixels()) } else { 0 };
     capacity.sort_lanes = u64::from(shape.lanes(instances.max(capacity.gaussians)));
     capacity.sort_cells = capacity.sort_lanes << shape.digit_bits;
     capacity.scan_lanes = 2 * u64::from(shape.lanes(capacity.gaussians.max(capacity.virtual_tiles)));
@@ -116,11 +118,15 @@ impl Engine {
     /// As [`Engine::new`], with kernels of a given shape.
     pub fn with_shape(gpu: Arc<Gpu>, shape: KernelShape, room: Room, options: SchedulerOptions) -> Result<Self> {
         let (tiles_x, tiles_y) = shape.tiles(room.size.0, room.size.1);
-        if tiles_x * tiles_y > 65_000 {
+        // A splat may touch every tile, once more in its object's layer, and one loop walks them (65,535 rounds).
+        let most = if room.labels.is_some() { 32_500 } else { 65_000 };
+        if u64::from(tiles_x) * u64::from(tiles_y) > most {
             return Err(Error::usage(
                 "--max-resolution",
-                format!("{} x {} px make {} tiles, at most 65000 are supported; choose a smaller size",
-                    room.size.0, room.size.1, tiles_x * tiles_y),
+                format!(
+                    "{} x {} px make {tiles_x} x {tiles_y} tiles, at most {most} are supported; choose a smaller size",
+                    room.size.0, room.size.1
+                ),
             ));
         }
         let sched = Scheduler::new(gpu, TABLE, capacity(&shape, &room), options)?;
@@ -250,7 +256,7 @@ impl Engine {
         if u64::from(needed.layer_tile_count) > new.layer_tiles {
             new.layer_tiles = Capacity::grown(new.layer_tiles, u64::from(needed.layer_tile_count));
         }
-        new.segments = new.segments.max(u64::from(needed.longest_list.div_ceil(pass::shape::SEGMENT_LENGTH)));
+        new.segments = new.segments.max(u64::from(needed.longest_list.div_ceil(self.shape.segment_length)));
         let instances = new.instances;
         derive(&self.shape, &mut new, instances, self.room.trained);
         if new == *self.sched.capacity() {

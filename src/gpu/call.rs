@@ -5,18 +5,23 @@ use ash::vk;
 
 /// Calls Vulkan and names the call in the error.
 ///
-/// With the environment variable `LABELGS_FAULT=vkName:n:RESULT` (see [`fault`]) the n-th call of that name fails
-/// without being made, so that every failure can be tested.
+/// With the environment variable `LABELGS_FAULT=vkName:n:RESULT` the n-th call of that name fails without being made, so
+/// that every failure can be tested.
 pub(crate) fn vk_call<T>(call: &'static str, function: impl FnOnce() -> ash::prelude::VkResult<T>) -> Result<T> {
-    let outcome = match fault::of(call) {
+    let outcome = match fault(call) {
         Some(result) => Err(result),
         None => function(),
     };
     outcome.map_err(|result| error(call, result))
 }
 
+/// The fault that this call meets, if one was asked for.
+pub(super) fn fault(call: &str) -> Option<vk::Result> {
+    fault::of(call)
+}
+
 /// The error of a failed call.
-pub(crate) fn error(call: &'static str, result: vk::Result) -> Error {
+fn error(call: &'static str, result: vk::Result) -> Error {
     match result {
         vk::Result::ERROR_DEVICE_LOST => Error::DeviceLost { pass: "unknown".to_owned() },
         _ => Error::Vulkan { call, result },

@@ -72,15 +72,9 @@ impl Subgroup {
     }
 }
 
-/// Optional features that are switched on where the device has them.
+/// Features that are switched on where the device has them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Features {
-    pub(super) shader_int64: bool,
-    pub(super) shader_int16: bool,
-    pub(super) shader_int8: bool,
-    pub(super) storage_16bit: bool,
-    pub(super) storage_8bit: bool,
-    pub(super) float16: bool,
     pub(super) memory_model: bool,
     pub(super) scalar: bool,
     pub(super) timeline: bool,

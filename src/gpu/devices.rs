@@ -5,24 +5,26 @@ use super::instance::{Instance, Validation};
 use super::limits::Limits;
 use super::select;
 use crate::error::Result;
+use crate::shaders::{self, BindingKind, ShaderDesc};
 use ash::vk;
 use std::fmt::Write;
 
 /// Subgroup operations that the kernels are written with.
 const SUBGROUP_OPERATIONS: vk::SubgroupFeatureFlags = vk::SubgroupFeatureFlags::from_raw(
-    vk::SubgroupFeatureFlags::BASIC.as_raw() | vk::SubgroupFeatureFlags::SHUFFLE.as_raw(),
+    vk::SubgroupFeatureFlags::BASIC.as_raw()
+        | vk::SubgroupFeatureFlags::ARITHMETIC.as_raw()
+        | vk::SubgroupFeatureFlags::SHUFFLE.as_raw(),
 );
 
 /// Features of the device that we know of.
 pub(super) fn features(instance: &ash::Instance, physical: vk::PhysicalDevice, size_control: bool) -> Features {
-    let mut eleven = vk::PhysicalDeviceVulkan11Features::default();
     let mut twelve = vk::PhysicalDeviceVulkan12Features::default();
     let mut control = vk::PhysicalDeviceSubgroupSizeControlFeatures::default();
     // SAFETY: the handle comes from this instance.
     let version = unsafe { instance.get_physical_device_properties(physical) }.api_version;
     let mut all = vk::PhysicalDeviceFeatures2::default();
     if version >= vk::API_VERSION_1_2 {
-        all = all.push_next(&mut eleven).push_next(&mut twelve);
+        all = all.push_next(&mut twelve);
     }
     if size_control {
         all = all.push_next(&mut control);
@@ -32,12 +34,6 @@ pub(super) fn features(instance: &ash::Instance, physical: vk::PhysicalDevice, s
     let core = all.features;
     let on = |flag: vk::Bool32| flag == vk::TRUE;
     Features {
-        shader_int64: on(core.shader_int64),
-        shader_int16: on(core.shader_int16),
-        shader_int8: on(twelve.shader_int8),
-        storage_16bit: on(eleven.storage_buffer16_bit_access),
-        storage_8bit: on(twelve.storage_buffer8_bit_access),
-        float16: on(twelve.shader_float16),
         memory_model: on(twelve.vulkan_memory_model) && on(twelve.vulkan_memory_model_device_scope),
         scalar: on(twelve.scalar_block_layout),
         timeline: on(twelve.timeline_semaphore),
@@ -138,75 +134,49 @@ pub(super) fn subgroup(
 pub(super) fn needs(found: &Capabilities, has_queue: bool) -> Vec<Need> {
     let (limits, features, subgroup) = (&found.limits, &found.features, &found.subgroup);
     let (major, minor, patch) = found.api_version;
-    let yes = |flag: bool| if flag { "yes" } else { "no" }.to_owned();
-    let need = |what, is_met, needed: &str, found: String, reason| Need {
-        what,
-        is_required: true,
-        needed: needed.to_owned(),
-        found,
-        is_met,
-        reason,
+    let flag = |what, is_met, reason| need(what, is_met, "yes", if is_met { "yes" } else { "no" }.to_owned(), reason);
+    let least = |what, needed: u32, found: u32, reason| {
+        need(what, found >= needed, &needed.to_string(), found.to_string(), reason)
     };
+    let bindings = shaders::ALL.iter().map(|shader| storage_bindings(shader)).max().unwrap_or(0);
+    let push = shaders::ALL.iter().map(|shader| shader.push_bytes).max().unwrap_or(0);
+    let shuffles = subgroup.operations.contains(SUBGROUP_OPERATIONS);
+    let mut needs = vec![
+        need("Vulkan", (major, minor) >= (1, 2), "1.2", format!("{major}.{minor}.{patch}"), "everything"),
+        flag("compute queue", has_queue, "everything"),
+        flag("scalarBlockLayout", features.scalar, "one layout for shaders and host"),
+        flag("timelineSemaphore", features.timeline, "two steps in flight"),
+        flag("subgroup shuffle, arithmetic", shuffles, "blending without shared memory"),
+        least("subgroup size", 8, subgroup.size, "one tile per subgroup"),
+        least("workgroup size", 256, limits.max_invocations, "scan and sort"),
+        least("push constants, bytes", push, limits.max_push, "parameters of passes"),
+        least("storage buffers per shader", bindings, limits.max_storage_buffers, "bindings of the largest pass"),
+    ];
+    needs.extend(wishes(limits, subgroup));
+    needs
+}
+
+/// What the engine runs without, at a price.
+fn wishes(limits: &Limits, subgroup: &Subgroup) -> [Need; 3] {
     let wish = |what, is_met, found: String, reason| Need {
-        what,
         is_required: false,
-        needed: "wished".to_owned(),
-        found,
-        is_met,
-        reason,
+        ..need(what, is_met, "wished", found, reason)
     };
     let pins = format!("{} of {}..{}", subgroup.size, subgroup.min, subgroup.max);
-    let shuffles = subgroup.operations.contains(SUBGROUP_OPERATIONS);
-    vec![
-        need("Vulkan", (major, minor) >= (1, 2), "1.2", format!("{major}.{minor}.{patch}"), "everything"),
-        need("compute queue", has_queue, "yes", yes(has_queue), "everything"),
-        need("scalarBlockLayout", features.scalar, "yes", yes(features.scalar), "one layout for shaders and host"),
-        need("timelineSemaphore", features.timeline, "yes", yes(features.timeline), "two steps in flight"),
-        need("subgroup shuffle in compute", shuffles, "yes", yes(shuffles), "blending without shared memory"),
-        need("subgroup size", subgroup.size >= 8, "8", subgroup.size.to_string(), "one tile per subgroup"),
-        need(
-            "workgroup size",
-            limits.max_invocations >= 256,
-            "256",
-            limits.max_invocations.to_string(),
-            "scan and sort",
-        ),
-        need(
-            "shared memory",
-            limits.max_shared >= 16_384,
-            "16384 B",
-            format!("{} B", limits.max_shared),
-            "scan and sort",
-        ),
-        need(
-            "push constants",
-            limits.max_push >= 128,
-            "128 B",
-            format!("{} B", limits.max_push),
-            "parameters of passes",
-        ),
-        need(
-            "storage buffers per shader",
-            limits.max_storage_buffers >= 16,
-            "16",
-            limits.max_storage_buffers.to_string(),
-            "bindings of the largest pass",
-        ),
+    let (range, bits, period) = (limits.max_storage_range, limits.timestamp_bits, limits.timestamp_period);
+    [
         wish("pinned subgroup size", subgroup.is_pinned, pins, "else the driver's default is hoped for"),
-        wish(
-            "storage binding of 1 GiB",
-            limits.max_storage_range >= 1 << 30,
-            format!("{} B", limits.max_storage_range),
-            "bounds the number of Gaussians",
-        ),
-        wish(
-            "timestamps",
-            limits.timestamp_bits > 0,
-            format!("{} bits, {} ns", limits.timestamp_bits, limits.timestamp_period),
-            "time of each pass",
-        ),
-        wish("shaderInt64", features.shader_int64, yes(features.shader_int64), "wide label votes"),
+        wish("storage binding of 1 GiB", range >= 1 << 30, format!("{range} B"), "bounds the number of Gaussians"),
+        wish("timestamps", bits > 0, format!("{bits} bits, {period} ns"), "time of each pass"),
     ]
+}
+
+fn need(what: &'static str, is_met: bool, needed: &str, found: String, reason: &'static str) -> Need {
+    Need { what, is_required: true, needed: needed.to_owned(), found, is_met, reason }
+}
+
+fn storage_bindings(shader: &ShaderDesc) -> u32 {
+    shader.bindings.iter().filter(|binding| binding.kind == BindingKind::Storage).count() as u32
 }
 
 /// All devices with their table of needs, as text.
@@ -227,7 +197,7 @@ pub fn devices_report() -> Result<String> {
                 (false, false) => "none",
             };
             let (what, needed, found) = (need.what, &need.needed, &need.found);
-            let _ = writeln!(text, "   {mark:<8}{what:<28} needed {needed:<8} found {found:<18} {}", need.reason);
+            let _ = writeln!(text, "   {mark:<8}{what:<29} needed {needed:<8} found {found:<18} {}", need.reason);
         }
         let missing = device.missing();
         let verdict = if missing.is_empty() { "usable" } else { "not usable" };

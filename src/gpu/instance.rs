@@ -5,7 +5,7 @@ use super::lock;
 use crate::error::{Error, Result};
 use ash::vk;
 use std::ffi::{CStr, c_char, c_void};
-use std::sync::Mutex;
+use std::sync::{Arc, Mutex};
 
 const LAYER: &CStr = c"VK_LAYER_KHRONOS_validation";
 
@@ -51,7 +51,18 @@ pub struct Message {
 /// Messages beyond this number are counted by nobody; a broken kernel makes one per invocation.
 const MESSAGES_KEPT: usize = 1000;
 
-#[derive(Default)]
+/// The messages of the validation layer; outlives the device, as its end has messages too.
+#[derive(Clone, Debug, Default)]
+pub struct MessageLog(Arc<Messages>);
+
+impl MessageLog {
+    /// What was said so far.
+    pub fn messages(&self) -> Vec<Message> {
+        lock(&self.0.0).clone()
+    }
+}
+
+#[derive(Debug, Default)]
 struct Messages(Mutex<Vec<Message>>);
 
 struct Messenger {
@@ -63,8 +74,8 @@ struct Messenger {
 pub(super) struct Instance {
     instance: ash::Instance,
     messenger: Option<Messenger>,
-    /// Boxed, as the messenger keeps a pointer to it.
-    messages: Box<Messages>,
+    /// The messenger keeps a pointer into it.
+    log: MessageLog,
     // Holds the loader library; last, as the functions above live in it.
     _entry: ash::Entry,
 }
@@ -84,15 +95,15 @@ impl Instance {
             let (major, minor) = (vk::api_version_major(version), vk::api_version_minor(version));
             return Err(Error::NoDevice(format!("the Vulkan loader has version {major}.{minor}, 1.2 is needed")));
         }
-        let messages = Box::<Messages>::default();
+        let log = MessageLog::default();
         let validated = validation != Validation::Off && has_layer(&entry)?;
-        let instance = create(&entry, version.min(vk::API_VERSION_1_3), validation, validated, &messages)?;
-        let messenger = validated.then(|| Messenger::new(&entry, &instance, &messages)).transpose();
+        let instance = create(&entry, version.min(vk::API_VERSION_1_3), validation, validated, &log.0)?;
+        let messenger = validated.then(|| Messenger::new(&entry, &instance, &log.0)).transpose();
         let messenger = messenger.inspect_err(|_| {
             // SAFETY: nothing was made from the instance.
             unsafe { instance.destroy_instance(None) };
         })?;
-        Ok(Self { instance, messenger, messages, _entry: entry })
+        Ok(Self { instance, messenger, log, _entry: entry })
     }
 
     pub(super) fn raw(&self) -> &ash::Instance {
@@ -107,8 +118,8 @@ impl Instance {
         self.messenger.is_some()
     }
 
-    pub(super) fn messages(&self) -> Vec<Message> {
-        lock(&self.messages.0).clone()
+    pub(super) fn log(&self) -> &MessageLog {
+        &self.log
     }
 }
 

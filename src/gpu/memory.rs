@@ -1,6 +1,6 @@
 //! Buffers and their memory.
 
-use super::call::vk_call;
+use super::call::{fault, vk_call};
 use super::{Gpu, lock};
 use crate::error::{Error, Result};
 use ash::vk;
@@ -50,9 +50,10 @@ impl Buffer {
         };
         let scheme = AllocationScheme::GpuAllocatorManaged;
         let wanted = AllocationCreateDesc { name, requirements, location, linear: true, allocation_scheme: scheme };
-        let allocated = match lock(&gpu.allocator).as_mut() {
-            Some(allocator) => allocator.allocate(&wanted),
-            None => Err(AllocationError::Internal("the device is being destroyed".to_owned())),
+        let allocated = match (fault("vkAllocateMemory"), lock(&gpu.allocator).as_mut()) {
+            (Some(_), _) => Err(AllocationError::OutOfMemory),
+            (None, Some(allocator)) => allocator.allocate(&wanted),
+            (None, None) => Err(AllocationError::Internal("the device is being destroyed".to_owned())),
         };
         let allocation = allocated.map_err(|error| buffer.out_of_memory(error))?;
         let allocation = buffer.allocation.insert(allocation);

@@ -22,7 +22,7 @@ mod timeline;
 
 pub use capabilities::{Capabilities, DeviceKind, Need, Subgroup};
 pub use devices::devices_report;
-pub use instance::{Message, Validation};
+pub use instance::{Message, MessageLog, Validation};
 pub use limits::Limits;
 pub use memory::{Buffer, MemoryKind};
 
@@ -134,7 +134,12 @@ impl Gpu {
 
     /// Messages of the validation layer so far.
     pub fn messages(&self) -> Vec<Message> {
-        self.instance.messages()
+        self.instance.log().messages()
+    }
+
+    /// The log of the validation layer, to be read after the device is gone.
+    pub fn message_log(&self) -> MessageLog {
+        self.instance.log().clone()
     }
 
     /// True if the validation layer was found and is on.

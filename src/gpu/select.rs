@@ -56,17 +56,10 @@ pub(super) fn open(
     robust: bool,
 ) -> Result<ash::Device> {
     let features = &capabilities.features;
-    let core = vk::PhysicalDeviceFeatures::default()
-        .robust_buffer_access(robust && features.robust)
-        .shader_int64(features.shader_int64)
-        .shader_int16(features.shader_int16);
-    let mut eleven = vk::PhysicalDeviceVulkan11Features::default().storage_buffer16_bit_access(features.storage_16bit);
+    let core = vk::PhysicalDeviceFeatures::default().robust_buffer_access(robust && features.robust);
     let mut twelve = vk::PhysicalDeviceVulkan12Features::default()
         .scalar_block_layout(true)
         .timeline_semaphore(true)
-        .shader_int8(features.shader_int8)
-        .shader_float16(features.float16)
-        .storage_buffer8_bit_access(features.storage_8bit)
         .vulkan_memory_model(features.memory_model)
         .vulkan_memory_model_device_scope(features.memory_model);
     let mut control = vk::PhysicalDeviceSubgroupSizeControlFeatures::default()
@@ -85,7 +78,6 @@ pub(super) fn open(
         .queue_create_infos(&queues)
         .enabled_features(&core)
         .enabled_extension_names(&extensions)
-        .push_next(&mut eleven)
         .push_next(&mut twelve);
     if features.size_control {
         info = info.push_next(&mut control);

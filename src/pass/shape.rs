@@ -17,11 +17,13 @@ pub struct KernelShape {
     pub digit_bits: u32,
     /// Workgroups of the sort and scan passes, at least.
     pub lane_groups: u32,
+    /// Splats that one dispatch of a blend pass walks in a tile; a multiple of the subgroup size.
+    pub segment_length: u32,
 }
 
-/// Splats that one dispatch of a blend pass may walk in a tile: lavapipe ends all loops of an invocation after 65,535
-/// rounds, and a walk of n splats costs n rounds and one more for each subgroup's load.
-pub const SEGMENT_LENGTH: u32 = 40_960;
+/// The longest segment: lavapipe ends all loops of an invocation after 65,535 rounds, and a walk of n splats costs n
+/// rounds and one more for each subgroup's load.
+const SEGMENT_LENGTH: u32 = 40_960;
 
 impl KernelShape {
     /// The shape for a subgroup size; `cpu` says that the device is a processor.
@@ -38,6 +40,7 @@ impl KernelShape {
             texel: cpu,
             digit_bits: if subgroup <= 16 { 8 } else { 4 },
             lane_groups: if cpu { 4 } else { 128 },
+            segment_length: SEGMENT_LENGTH,
         }
     }
 

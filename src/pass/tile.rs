@@ -3,7 +3,6 @@
 use super::build::{Builder, Count, ONE, args, over_splats};
 use super::project::GAUSSIAN_FROM_SPLAT;
 use super::scan::{self, Total};
-use super::shape::SEGMENT_LENGTH;
 use super::sort::{self, SortBuffers};
 use crate::pass;
 use crate::plan::{Buf, Grid};
@@ -32,9 +31,10 @@ pub fn bin_splats(b: &mut Builder) -> Buf {
     } [], args(constants::ARGS_INSTANCES));
     tile_lengths(b);
     let layer_tiles = b.capacity.layer_tiles as u32;
+    let longest = b.shape.segment_length * b.capacity.segments as u32;
     pass!(b, prepare_blend {
         step: Buf::STEP, counters: Buf::COUNTERS, dispatch_args: Buf::DISPATCH_ARGS, failure: Buf::FAILURE,
-    } [layer_tile_capacity: layer_tiles, longest_list: SEGMENT_LENGTH * b.capacity.segments as u32], ONE);
+    } [layer_tile_capacity: layer_tiles, longest_list: longest], ONE);
     slots
 }
 

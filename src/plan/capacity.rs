@@ -37,6 +37,8 @@ pub enum Domain {
     ScanLanes,
     /// Partial sums of the loss.
     LossPartials,
+    /// Pixels of all jobs of the blend passes, or 0 while no tile's list is too long for one dispatch.
+    SegmentPixels,
     /// A fixed number, whatever the capacity.
     Fixed(u32),
 }
@@ -62,6 +64,7 @@ impl Domain {
             Self::SortCells => "sort cells",
             Self::ScanLanes => "scan lanes",
             Self::LossPartials => "loss partials",
+            Self::SegmentPixels => "segment pixels",
             Self::Fixed(_) => "fixed",
         }
     }
@@ -78,7 +81,7 @@ impl Domain {
                     self.name()
                 )
             }
-            Self::Pixels | Self::LabelledPixels | Self::VirtualTiles | Self::LossPartials => {
+            Self::Pixels | Self::LabelledPixels | Self::VirtualTiles | Self::LossPartials | Self::SegmentPixels => {
                 format!("at most {fits} {} fit; lower --max-resolution or use another device", self.name())
             }
             Self::LayerTiles | Self::LayerPixels | Self::Labels | Self::Layers | Self::OccluderWords => {
@@ -124,6 +127,8 @@ pub struct Capacity {
     pub scan_lanes: u64,
     /// Partial sums of the loss.
     pub loss_partials: u64,
+    /// Pixels of all jobs of the blend passes, or 0 while no tile's list is too long for one dispatch.
+    pub segment_pixels: u64,
     /// Lanes of the sort; no buffer counts them.
     pub sort_lanes: u64,
     /// Dispatches that one walk of a tile's list may take; no buffer counts them.
@@ -151,6 +156,7 @@ impl Capacity {
             Domain::SortCells => self.sort_cells,
             Domain::ScanLanes => self.scan_lanes,
             Domain::LossPartials => self.loss_partials,
+            Domain::SegmentPixels => self.segment_pixels,
             Domain::Fixed(count) => u64::from(count),
         }
     }

@@ -4,10 +4,13 @@
 //! lists run in the order of their submits; what is inside of a list is ordered by the plan's barriers.
 
 mod guard;
+pub mod profiler;
 mod recorder;
 mod recording;
 mod storage;
 mod transfer;
+
+pub use profiler::{PassTime, Profiler};
 
 use crate::error::{Error, Result};
 use crate::gpu::{CommandBuffer, Gpu, Timeline};
@@ -201,7 +204,11 @@ impl Scheduler {
         if ticket.0 == 0 {
             return Ok(());
         }
-        self.timeline.wait(ticket.0).map_err(|error| self.name_pass(error))
+        self.timeline.wait(ticket.0).map_err(|error| {
+            // Whoever gets the error may free what the device was to be done with. A lost device returns at once.
+            let _ = self.gpu.wait_idle();
+            self.name_pass(error)
+        })
     }
 
     /// True if a submit is done.
@@ -327,13 +334,18 @@ impl Scheduler {
         if !matches!(error, Error::DeviceLost { .. }) {
             return error;
         }
-        let running = self.lists.iter().flat_map(|list| list.recordings.iter().map(move |one| (one, &list.plan)));
-        let running = running.filter_map(|(recording, plan)| {
+        let marked = self.lists.iter().flat_map(|list| list.recordings.iter().map(move |one| (one, &list.plan)));
+        let marked = marked.filter_map(|(recording, plan)| {
             let item = recording.markers.as_ref()?.last_begun()?;
             Some((recording.busy, format!("{} of list {}", plan.items.get(item)?.label, plan.list.name)))
         });
-        let last = running.max_by_key(|(busy, _)| *busy).map(|(_, pass)| pass);
-        Error::DeviceLost { pass: last.unwrap_or_else(|| "unknown (crash markers are off)".to_owned()) }
+        let pass = match marked.max_by_key(|(busy, _)| *busy) {
+            Some((busy, pass)) if busy == self.submitted => pass,
+            Some((_, pass)) => format!("{pass}, or what came after it"),
+            None if self.options.crash_markers => "none; memory was being set up".to_owned(),
+            None => "unknown (crash markers are off)".to_owned(),
+        };
+        Error::DeviceLost { pass }
     }
 }
 

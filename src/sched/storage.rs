@@ -83,28 +83,31 @@ impl Scheduler {
         self.write_own_guards()
     }
 
-    /// Reallocates what changes its size; Model buffers keep the common prefix.
+    /// Reallocates what changes its size; Model buffers keep the common prefix, all others start afresh.
     ///
     /// Growing buffers go first: should one not fit, those that grew already are merely larger than the old capacities
     /// ask for, and nothing is lost.
     pub(super) fn resize_own(&mut self, capacity: Capacity) -> Result<()> {
-        for index in 0..self.table.len() {
-            if self.grows(index, &capacity)? == Some(true) {
-                self.resize(index, &capacity)?;
-            }
+        let resized = self.resize_those(&capacity, true).and_then(|()| self.resize_those(&capacity, false));
+        if resized.is_ok() {
+            self.capacity = capacity;
         }
-        for index in 0..self.table.len() {
-            if self.grows(index, &capacity)? == Some(false) {
-                self.resize(index, &capacity)?;
-            }
-        }
-        self.capacity = capacity;
         for index in 0..self.table.len() {
             if matches!(self.table[index].class, Class::Kept | Class::Slot | Class::Report) {
                 self.clear(Buf(index as u16))?;
             }
         }
-        self.write_own_guards()
+        self.write_own_guards()?;
+        resized
+    }
+
+    fn resize_those(&mut self, capacity: &Capacity, grow: bool) -> Result<()> {
+        for index in 0..self.table.len() {
+            if self.grows(index, capacity)? == Some(grow) {
+                self.resize(index, capacity)?;
+            }
+        }
+        Ok(())
     }
 
     /// True if a buffer must grow, false if it may shrink, none if it stays.

@@ -13,7 +13,7 @@ pub use densify::Densified;
 use crate::engine::{Engine, LabelRoom, ListKey, Report, Room};
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
-use crate::pass::Variant;
+use crate::pass::{KernelShape, Variant};
 use crate::scene::{Dataset, Gaussians};
 use crate::sched::{SchedulerOptions, Ticket};
 use job::{Fixed, Job, TrainView};
@@ -73,12 +73,25 @@ impl Trainer {
         model: &Gaussians,
         options: SchedulerOptions,
     ) -> Result<Self> {
+        let shape = KernelShape::new(gpu.subgroup_size(), gpu.is_cpu());
+        Self::with_shape(gpu, shape, config, dataset, model, options)
+    }
+
+    /// As [`Trainer::new`], with kernels of a given shape.
+    pub fn with_shape(
+        gpu: Arc<Gpu>,
+        shape: KernelShape,
+        config: TrainConfig,
+        dataset: &mut Dataset,
+        model: &Gaussians,
+        options: SchedulerOptions,
+    ) -> Result<Self> {
         config.check()?;
         let fixed = Fixed { extent: dataset.extent() };
         let max_gaussians = if config.max_gaussians > 0 { config.max_gaussians } else { u64::from(u32::MAX) };
         let room = room(dataset, &config, (model.len() as u64 * 2).min(max_gaussians).max(model.len() as u64))?;
         let views = dataset.train.iter_mut().map(train_view).collect::<Result<Vec<_>>>()?;
-        let mut engine = Engine::new(gpu, room, options)?;
+        let mut engine = Engine::with_shape(gpu, shape, room, options)?;
         engine.upload_model(model)?;
         let order = ViewOrder::new(config.seed, views.len());
         Ok(Self {
@@ -116,9 +129,14 @@ impl Trainer {
         self.config.sh_degree_at(self.step)
     }
 
-    /// Reads the model back.
+    /// Reads the model back. Steps that failed for want of memory changed nothing in it.
     pub fn model(&mut self) -> Result<Gaussians> {
-        self.drain()?;
+        if let Err(error) = self.drain() {
+            if !matches!(error, Error::OutOfMemory { .. }) {
+                return Err(error);
+            }
+            self.flying.clear();
+        }
         self.engine.download_model(self.config.sh_degree)
     }
 

@@ -1,0 +1,106 @@
+//! Times of passes over many steps. Returns values, prints nothing.
+
+use std::collections::HashMap;
+
+/// The first steps of a list include the compilation of its pipelines on some drivers.
+const WARM_UP: usize = 2;
+
+/// Times of one pass label.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PassTime {
+    /// Label of the pass.
+    pub label: String,
+    /// Items of the list with this label.
+    pub items: usize,
+    /// Median over the steps of the time of all its items in a step, ns.
+    pub median: u64,
+    /// The time that nine of ten steps stay below, ns.
+    pub p90: u64,
+    /// Its part of the sum of all medians.
+    pub share: f64,
+}
+
+/// Collects the timings of one list.
+#[derive(Clone, Debug, Default)]
+pub struct Profiler {
+    seen: usize,
+    /// Labels in the order of the list.
+    order: Vec<String>,
+    items: HashMap<String, usize>,
+    samples: HashMap<String, Vec<u64>>,
+}
+
+impl Profiler {
+    /// Nothing collected yet.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Adds what [`Scheduler::timings`](super::Scheduler::timings) gave for a step; the first steps are left out.
+    pub fn add(&mut self, timings: &[(String, u64)]) {
+        self.seen += 1;
+        if self.seen <= WARM_UP || timings.is_empty() {
+            return;
+        }
+        let mut sums: HashMap<&str, (usize, u64)> = HashMap::new();
+        for (label, ns) in timings {
+            let (items, sum) = sums.entry(label).or_default();
+            (*items, *sum) = (*items + 1, *sum + ns);
+            if !self.order.contains(label) {
+                self.order.push(label.clone());
+            }
+        }
+        for (label, (items, sum)) in sums {
+            self.items.insert(label.to_owned(), items);
+            self.samples.entry(label.to_owned()).or_default().push(sum);
+        }
+    }
+
+    /// Steps that count.
+    pub fn steps(&self) -> usize {
+        self.seen.saturating_sub(WARM_UP)
+    }
+
+    /// One row per label, in the order of the list.
+    pub fn rows(&self) -> Vec<PassTime> {
+        let mut rows = Vec::new();
+        for label in &self.order {
+            let Some(samples) = self.samples.get(label) else { continue };
+            let mut samples = samples.clone();
+            samples.sort_unstable();
+            let at = |percent: usize| samples.get((samples.len() - 1) * percent / 100).copied().unwrap_or(0);
+            let items = self.items.get(label).copied().unwrap_or(0);
+            rows.push(PassTime { label: label.clone(), items, median: at(50), p90: at(90), share: 0.0 });
+        }
+        let all = rows.iter().map(|row| row.median).sum::<u64>().max(1) as f64;
+        for row in &mut rows {
+            row.share = row.median as f64 / all;
+        }
+        rows
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Profiler;
+
+    #[test]
+    fn items_of_a_label_are_summed_and_the_first_steps_left_out() {
+        let mut profiler = Profiler::new();
+        for step in 0..12_u64 {
+            let first = if step < 2 { 1_000_000 } else { 10 * step };
+            let timings = [("sort", first), ("scan", 5), ("sort", 100)];
+            profiler.add(&timings.map(|(label, ns)| (label.to_owned(), ns)));
+        }
+        let rows = profiler.rows();
+        assert_eq!(profiler.steps(), 10);
+        let text = rows.iter().map(|row| (row.label.as_str(), row.items, row.median, row.p90)).collect::<Vec<_>>();
+        assert_eq!(text, [("sort", 2, 160, 200), ("scan", 1, 5, 5)]);
+        assert!((rows.iter().map(|row| row.share).sum::<f64>() - 1.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn nothing_collected_is_no_rows() {
+        assert_eq!(Profiler::new().rows(), vec![]);
+    }
+}

@@ -1,0 +1,112 @@
+//! Every failure of Vulkan that tests can ask for ends in an error, never in a crash or a hang.
+
+use super::*;
+use std::process::Command;
+
+const CHILD: &str = "LABELGS_FAULT_CHILD";
+
+/// Does a little of everything; a test of its own so that it can run in a process of its own.
+#[test]
+fn child() {
+    if std::env::var_os(CHILD).is_none() {
+        return;
+    }
+    match work() {
+        Ok(()) => println!("outcome: done"),
+        Err(error) => println!("outcome: {} {error}", error.exit_status()),
+    }
+}
+
+fn work() -> labelgs::Result<()> {
+    let gpu = labelgs::gpu::Gpu::new(&labelgs::gpu::GpuOptions::from_env()?)?;
+    let with = SchedulerOptions { timestamps: true, crash_markers: true, ..SchedulerOptions::default() };
+    let mut scheduler = Scheduler::new(gpu, TABLE, pixels(256), with)?;
+    let mut list = PassList::new("toy");
+    list.fill(A, 5).pass(scaled(A, B, 3, 1, 256).label("three times")).copy(B, REPORT, 0);
+    let id = scheduler.prepare(&list)?;
+    scheduler.run(id, 0)?;
+    let ramp = (0..100).collect::<Vec<u32>>();
+    scheduler.upload(MODEL, 0, 0, &ramp)?;
+    if let Err(error) = scheduler.set_capacity(Capacity { gaussians: 200, ..pixels(512) }) {
+        if error.exit_status() == 5 {
+            // The model is as it was, and the old capacities still work.
+            assert_eq!(scheduler.capacity(), &pixels(256));
+            assert_eq!(scheduler.download_all::<u32>(MODEL, 0)?, ramp);
+            let id = scheduler.prepare(&list)?;
+            scheduler.run(id, 0)?;
+            assert_eq!(scheduler.download_all::<u32>(REPORT, 0)?, vec![16; 256]);
+        }
+        return Err(error);
+    }
+    assert_eq!(scheduler.download::<u32>(MODEL, 0, 0, 100)?, ramp);
+    let id = scheduler.prepare(&list)?;
+    for step in 0..4 {
+        scheduler.submit(id, step % 2)?;
+    }
+    scheduler.wait_all()?;
+    scheduler.timings(id, 0)?;
+    scheduler.download_all::<u32>(REPORT, 0).map(|_| ())
+}
+
+fn outcome(fault: &str) -> String {
+    let program = std::env::current_exe().unwrap();
+    let mut command = Command::new(program);
+    command.args(["--exact", "sched::faults::child", "--nocapture", "--test-threads=1"]);
+    command.env(CHILD, "1").env("LABELGS_FAULT", fault).env("LABELGS_VALIDATION", "off");
+    let output = command.output().unwrap();
+    let text = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert!(output.status.success(), "{fault}: {}\n{text}", output.status);
+    let line = text.lines().find_map(|line| line.split_once("outcome: ").map(|(_, rest)| rest.to_owned()));
+    line.unwrap_or_else(|| panic!("{fault}: no outcome in\n{text}"))
+}
+
+#[test]
+fn failures_become_errors() {
+    let Some(turn) = device() else { return };
+    // The children have devices of their own; the turn keeps the cores free for them.
+    for (fault, expected) in [
+        ("vkNothing:1:DEVICE_LOST", "done"),
+        ("vkCreateInstance:1:HOST_MEMORY", "4 "),
+        ("vkCreateDevice:1:HOST_MEMORY", "4 "),
+        ("vkCreateBuffer:1:DEVICE_MEMORY", "5 "),
+        ("vkAllocateMemory:1:DEVICE_MEMORY", "5 "),
+        ("vkAllocateMemory:4:DEVICE_MEMORY", "5 "),
+        ("vkCreateComputePipelines:1:HOST_MEMORY", "5 "),
+        ("vkAllocateDescriptorSets:1:HOST_MEMORY", "5 "),
+        ("vkCreateQueryPool:1:HOST_MEMORY", "5 "),
+        ("vkEndCommandBuffer:3:HOST_MEMORY", "5 "),
+        ("vkQueueSubmit:1:DEVICE_LOST", "6 "),
+        ("vkWaitSemaphores:2:DEVICE_LOST", "6 "),
+    ] {
+        let outcome = outcome(fault);
+        assert!(outcome.starts_with(expected), "{fault}: {outcome}");
+    }
+    drop(turn);
+}
+
+/// Fails the first, second, third... call of a name, until there is none left; the outcomes.
+fn outcomes(call: &str, result: &str) -> Vec<String> {
+    let all = (1..200).map(|nth| outcome(&format!("{call}:{nth}:{result}")));
+    all.take_while(|outcome| outcome != "done").collect()
+}
+
+#[test]
+fn memory_may_run_out_anywhere() {
+    let Some(turn) = device() else { return };
+    let outcomes = outcomes("vkAllocateMemory", "DEVICE_MEMORY");
+    assert!(outcomes.len() > 20, "{outcomes:?}");
+    assert!(outcomes.iter().all(|outcome| outcome.starts_with("5 ")), "{outcomes:?}");
+    drop(turn);
+}
+
+#[test]
+fn a_device_may_be_lost_anywhere() {
+    let Some(turn) = device() else { return };
+    let mut outcomes = outcomes("vkQueueSubmit", "DEVICE_LOST");
+    outcomes.extend(self::outcomes("vkWaitSemaphores", "DEVICE_LOST"));
+    assert!(outcomes.len() > 30, "{outcomes:?}");
+    assert!(outcomes.iter().all(|outcome| outcome.starts_with("6 ")), "{outcomes:?}");
+    let named = outcomes.iter().filter(|outcome| outcome.contains("is copy b to report of list toy")).count();
+    assert!(named > 0, "some outcome names the last pass: {outcomes:?}");
+    drop(turn);
+}
