@@ -1,5 +1,6 @@
 //! Checks of a pass list against the shaders' interfaces and the device's limits, before anything is planned.
 
+use super::capacity::Domain;
 use super::buffers::{Buf, BufferDecl};
 use super::limits::Limits;
 use super::memory::Size;
@@ -102,7 +103,9 @@ fn check_grid(table: &'static [BufferDecl], sizes: &[Size], pass: &PassDecl, lim
 
 fn check_storage(decl: &BufferDecl, size: Size, binding: &BindingDesc, limits: &Limits) -> Result<()> {
     let (ours, shaders) = (decl.element_bytes, binding.element_bytes);
-    let divides = shaders == 0 || ours.is_multiple_of(shaders);
+    // A struct may span words of a buffer of fixed size; elsewhere wider elements would be read past the last one.
+    let fixed = matches!(decl.domain, Domain::Fixed(_)) && shaders.is_multiple_of(ours);
+    let divides = shaders == 0 || ours.is_multiple_of(shaders) || fixed;
     if !divides || size.bytes < u64::from(shaders) {
         let (name, block, bytes) = (decl.name, binding.name, size.bytes);
         return Err(Error::Bug(format!(

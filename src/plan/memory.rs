@@ -45,6 +45,13 @@ pub fn allocated_bytes(bytes: u64, options: PlanOptions, alignment: u64) -> u64 
     (bytes + if options.guards { GUARD_BYTES } else { 0 }).next_multiple_of(alignment)
 }
 
+/// Bytes allocated for one copy of a buffer with memory of its own; nothing where it has no elements, so that what a run
+/// does not need costs nothing. No list may bind such a buffer.
+pub fn own_bytes(decl: &BufferDecl, capacity: &Capacity, options: PlanOptions, alignment: u64) -> Result<u64> {
+    let bytes = bytes_of(decl, capacity)?;
+    Ok(if capacity.count(decl.domain) == 0 { 0 } else { allocated_bytes(bytes, options, alignment) })
+}
+
 /// One buffer of a [`MemoryReport`].
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct MemoryRow {
@@ -100,7 +107,11 @@ impl MemoryReport {
         let mut rows = Vec::new();
         let mut total = STAGING_BYTES;
         for (index, decl) in table.iter().enumerate() {
-            let one = allocated_bytes(bytes_of(decl, capacity)?, options, limits.alignment());
+            let one = if decl.class == Class::Step {
+                allocated_bytes(bytes_of(decl, capacity)?, options, limits.alignment())
+            } else {
+                own_bytes(decl, capacity, options, limits.alignment())?
+            };
             let bytes = one * decl.class.copies();
             let used = decl.class != Class::Step || plans.iter().any(|plan| plan.placements[index].is_some());
             if decl.class != Class::Step {

@@ -36,6 +36,9 @@ impl Scheduler {
         self.wait_all()?;
         for index in 0..self.table.len() {
             let (decl, buf) = (&self.table[index], Buf(index as u16));
+            if decl.class != Class::Step && self.is_empty(buf)? {
+                continue;
+            }
             let submitted = self.current.is_some_and(|list| self.was_submitted(list));
             if decl.class == Class::Step && !(submitted && self.is_placed(buf)) {
                 continue;

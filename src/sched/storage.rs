@@ -54,21 +54,21 @@ impl Storage {
     }
 }
 
-/// Allocates all copies of a buffer.
+/// Allocates all copies of a buffer; none of a buffer without bytes.
 fn allocate(gpu: &Arc<Gpu>, decl: &BufferDecl, bytes: u64) -> Result<Vec<Buffer>> {
     let kind = match decl.class {
         Class::Model | Class::Kept | Class::Step => MemoryKind::Device,
         Class::Slot => MemoryKind::Upload,
         Class::Report => MemoryKind::Download,
     };
-    (0..decl.class.copies()).map(|_| Buffer::new(gpu, decl.name, bytes, kind)).collect()
+    let copies = if bytes == 0 { 0 } else { decl.class.copies() };
+    (0..copies).map(|_| Buffer::new(gpu, decl.name, bytes, kind)).collect()
 }
 
 impl Scheduler {
     /// Bytes of one copy of a buffer in its VkBuffer.
     fn own_bytes(&self, decl: &BufferDecl, capacity: &Capacity) -> Result<u64> {
-        let bytes = memory::bytes_of(decl, capacity)?;
-        Ok(memory::allocated_bytes(bytes, self.options.plan, self.limits.alignment()))
+        memory::own_bytes(decl, capacity, self.options.plan, self.limits.alignment())
     }
 
     /// Allocates every buffer that is not scratch.
@@ -113,7 +113,10 @@ impl Scheduler {
     /// True if a buffer must grow, false if it may shrink, none if it stays.
     fn grows(&self, index: usize, capacity: &Capacity) -> Result<Option<bool>> {
         let decl = &self.table[index];
-        let Some(now) = self.storage.own[index].first().map(Buffer::bytes) else { return Ok(None) };
+        if decl.class == Class::Step {
+            return Ok(None);
+        }
+        let now = self.storage.own[index].first().map_or(0, Buffer::bytes);
         let wanted = self.own_bytes(decl, capacity)?;
         Ok((wanted != now).then_some(wanted > now))
     }
@@ -125,7 +128,7 @@ impl Scheduler {
         if decl.class != Class::Model {
             // Nothing to keep: the old memory is free for the new.
             let old = std::mem::take(&mut self.storage.own[index]);
-            let old_bytes = old.first().map_or(bytes, Buffer::bytes);
+            let old_bytes = old.first().map_or(0, Buffer::bytes);
             drop(old);
             return match allocate(&self.gpu, decl, bytes) {
                 Ok(copies) => {
@@ -141,12 +144,15 @@ impl Scheduler {
         }
         let fresh = allocate(&self.gpu, decl, bytes)?;
         let old = std::mem::replace(&mut self.storage.own[index], fresh);
+        if bytes == 0 {
+            return Ok(());
+        }
         self.immediately(|recorder, storage, _| {
-            let (old, fresh) = (old.first(), storage.own(buf, 0)?);
+            let fresh = storage.own(buf, 0)?;
+            let Some(old) = old.first() else { return recorder.fill(fresh, 0, bytes, 0) };
             if bytes > keep {
                 recorder.fill(fresh, keep, bytes - keep, 0)?;
             }
-            let old = old.ok_or_else(|| Error::Bug(format!("{} had no memory", decl.name)))?;
             recorder.copy((old, 0), (fresh, 0), keep)
         })
     }

@@ -36,6 +36,9 @@ impl Scheduler {
     pub fn upload<T: Pod>(&mut self, buf: Buf, slot: usize, first: u64, data: &[T]) -> Result<()> {
         let data: &[u8] = bytemuck::cast_slice(data);
         let start = self.range(buf, slot, first, data.len() as u64)?;
+        if data.is_empty() {
+            return Ok(());
+        }
         let class = self.decl(buf)?.class;
         if class.copies() > 1 {
             self.wait_slot(slot)?;
@@ -75,13 +78,17 @@ impl Scheduler {
 
     /// Reads all of a buffer.
     pub fn download_all<T: Pod>(&mut self, buf: Buf, slot: usize) -> Result<Vec<T>> {
-        let count = self.bytes(buf)? as usize / size_of::<T>().max(1);
+        let empty = self.decl(buf)?.class != Class::Step && self.is_empty(buf)?;
+        let count = if empty { 0 } else { self.bytes(buf)? as usize / size_of::<T>().max(1) };
         self.download(buf, slot, 0, count)
     }
 
     /// Sets every word of a buffer, in all its copies; waits for what still uses it.
     pub fn fill(&mut self, buf: Buf, word: u32) -> Result<()> {
         self.wait_all()?;
+        if self.decl(buf)?.class != Class::Step && self.is_empty(buf)? {
+            return Ok(());
+        }
         let bytes = self.bytes(buf)?;
         for copy in 0..self.decl(buf)?.class.copies() as usize {
             let place = self.locate(buf, copy)?;
@@ -96,6 +103,11 @@ impl Scheduler {
     /// Bytes of the elements of a buffer.
     pub fn bytes(&self, buf: Buf) -> Result<u64> {
         memory::bytes_of(self.decl(buf)?, &self.capacity)
+    }
+
+    /// True if the capacities give a buffer no elements, and so no memory of its own.
+    pub(super) fn is_empty(&self, buf: Buf) -> Result<bool> {
+        Ok(self.capacity.count(self.decl(buf)?.domain) == 0)
     }
 
     /// True if the current list touches a scratch buffer.
@@ -115,6 +127,9 @@ impl Scheduler {
     }
 
     fn read_bytes(&mut self, buf: Buf, slot: usize, start: u64, bytes: &mut [u8]) -> Result<()> {
+        if bytes.is_empty() {
+            return Ok(());
+        }
         if self.decl(buf)?.class.copies() > 1 {
             self.wait_slot(slot)?;
             return self.storage.own(buf, slot)?.read(start, bytes);
