@@ -33,18 +33,17 @@
 #ifdef TEXEL
 #define FETCH4(number, name) layout(set = 0, binding = number) uniform textureBuffer name
 #define FETCHU(number, name) layout(set = 0, binding = number) uniform utextureBuffer name
-#define FETCHC(number, name) layout(set = 0, binding = number) uniform textureBuffer name
 #define fetch4(name, i) texelFetch(name, int(i))
 #define fetchu(name, i) texelFetch(name, int(i)).x
-#define fetchc(name, i) texelFetch(name, int(i))
 #else
 #define FETCH4(number, name) READ(number, vec4, name)
 #define FETCHU(number, name) READ(number, uint, name)
-#define FETCHC(number, name) READ(number, uint, name)
 #define fetch4(name, i) name[i]
 #define fetchu(name, i) name[i]
-#define fetchc(name, i) unpackUnorm4x8(name[i])
 #endif
+// Unpacked by the shader, not by the texel unit: the same bits on every device.
+#define FETCHC(number, name) FETCHU(number, name)
+#define fetchc(name, i) unpackUnorm4x8(fetchu(name, i))
 
 #define PUSH layout(push_constant, scalar) uniform push_block
 #define SPEC(number, T, name, value) layout(constant_id = number) const T name = value

@@ -76,11 +76,13 @@ pub fn capacity(shape: &KernelShape, room: &Room) -> Capacity {
     let layers = room.labels.map_or(0, |labels| u64::from(labels.layers));
     let labels = room.labels.map_or(0, |labels| u64::from(labels.max_label) + 1);
     let label_words = if labels > 0 { labels.div_ceil(32) * (layers + 1) } else { 0 };
-    let instances = (room.gaussians * 6).max(tiles * 16);
+    // Lists bind the model even if it is empty.
+    let gaussians = room.gaussians.max(1);
+    let instances = (gaussians * 6).max(tiles * 16);
     let mut capacity = Capacity {
-        gaussians: room.gaussians,
-        trained: if room.trained { room.gaussians } else { 0 },
-        labelled: if labels > 0 { room.gaussians } else { 0 },
+        gaussians,
+        trained: if room.trained { gaussians } else { 0 },
+        labelled: if labels > 0 { gaussians } else { 0 },
         virtual_tiles: tiles * (layers + 1),
         layer_tiles: if layers > 0 { tiles } else { 0 },
         pixels: u64::from(width) * u64::from(height),
@@ -117,6 +119,7 @@ impl Engine {
 
     /// As [`Engine::new`], with kernels of a given shape.
     pub fn with_shape(gpu: Arc<Gpu>, shape: KernelShape, room: Room, options: SchedulerOptions) -> Result<Self> {
+        shape.check()?;
         let (tiles_x, tiles_y) = shape.tiles(room.size.0, room.size.1);
         // A splat may touch every tile, once more in its object's layer, and one loop walks them (65,535 rounds).
         let most = if room.labels.is_some() { 32_500 } else { 65_000 };

@@ -1,5 +1,6 @@
 //! Which variant of the kernels a device gets: subgroup size, tile, texel or storage reads, digits of the sort.
 
+use crate::error::{Error, Result};
 use crate::shaders::ShaderDesc;
 
 /// Shape of the kernels, fixed for a device.
@@ -42,6 +43,15 @@ impl KernelShape {
             lane_groups: if cpu { 4 } else { 128 },
             segment_length: SEGMENT_LENGTH,
         }
+    }
+
+    /// Refuses shapes that the blend kernels cannot take: a lane owns whole pixels of one column of a tile.
+    pub fn check(&self) -> Result<()> {
+        let (width, pixels) = (self.tile_width, self.tile_pixels());
+        if pixels > 0 && self.subgroup.is_multiple_of(width) && pixels.is_multiple_of(self.subgroup) {
+            return Ok(());
+        }
+        Err(Error::Bug(format!("tiles of {width} x {} px do not suit subgroups of {}", self.tile_height, self.subgroup)))
     }
 
     /// Tiles in a row and in a column of an image.

@@ -9,7 +9,7 @@ const WORD: Option<TexelFormat> = Some(TexelFormat::R32Uint);
 
 crate::buffers! {
     STEP "step": size_of::<StepUniforms>() as u32, Domain::One, Class::Slot, None, "What changes every step (glsl/include/step.glsl).";
-    TARGET "target": 4, Domain::Pixels, Class::Slot, Some(TexelFormat::Rgba8Unorm), "The photo [P] RGBA8; alpha 0: left out.";
+    TARGET "target": 4, Domain::Pixels, Class::Slot, WORD, "The photo [P] RGBA8; alpha 0: left out.";
     VIEW_LABELS "view_labels": 4, Domain::LabelledPixels, Class::Slot, WORD, "Visible object of each pixel [P].";
     LAYER_FROM_LABEL "layer_from_label": 4, Domain::Labels, Class::Slot, WORD, "Layer of each label id, 0: not sampled in this step.";
     LABEL_FROM_LAYER "label_from_layer": 4, Domain::Layers, Class::Slot, WORD, "Label id of each layer; layer 0 is the scene.";
