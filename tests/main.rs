@@ -9,6 +9,7 @@ mod cli;
 mod compare_self;
 mod config;
 mod gradient;
+mod invariants;
 mod io;
 mod labels;
 mod metrics;

@@ -248,7 +248,7 @@ fn adam_takes_known_steps() {
     check("first step", close(&first.row.mean, &[-0.1, 0.1, 0.0], Tolerance { absolute: 1e-8, relative: 0.0 }));
     assert!((first.row.opacity - 0.4).abs() < 1e-9);
     let second = adam(&rules, &rates, 2, &first, &Row::default());
-    let (beta1, beta2) = (f64::from(0.9_f32), f64::from(0.999_f32));
+    let (beta1, beta2) = (0.9_f64, 0.999_f64);
     let m = 3.0 * beta1 * (1.0 - beta1) / (1.0 - beta1 * beta1);
     let u = 9.0 * beta2 * (1.0 - beta2) / (1.0 - beta2 * beta2);
     assert!((second.row.mean[0] - (first.row.mean[0] - 0.1 * m / u.sqrt())).abs() < 1e-12);

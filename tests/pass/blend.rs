@@ -5,9 +5,7 @@ use crate::reference::blend::{self, Blended, blend_backward, blend_forward, blen
 use crate::reference::loss::label_loss;
 use crate::reference::project::{Splat, SplatGradient};
 use crate::reference::{Rules, tile};
-use crate::support::compare::{
-    Band, GradientBounds, Tolerance, Verdict, close, close_with_band, exact, gradients,
-};
+use crate::support::compare::{Band, GradientBounds, Tolerance, Verdict, close, close_with_band, exact, gradients};
 use crate::support::device;
 use crate::support::scenes::{Scene, Shape, scene};
 use labelgs::plan::Buf;
@@ -72,7 +70,10 @@ fn blend_forward_of_the_scene() {
     // The list of a render blends the same picture.
     rig.render();
     let rendered = rig.get::<[f32; 4]>(Buf::IMAGE, size.0 * size.1);
-    assert!(bytemuck::cast_slice::<_, u32>(&rendered) == bytemuck::cast_slice::<_, u32>(&image), "render and training agree");
+    assert!(
+        bytemuck::cast_slice::<_, u32>(&rendered) == bytemuck::cast_slice::<_, u32>(&image),
+        "render and training agree"
+    );
 }
 
 #[test]

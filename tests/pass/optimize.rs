@@ -57,7 +57,8 @@ fn adam_of_every_attribute() {
         super::project::all(steps.iter().map(|(step, u, before, gradients, after)| {
             let [means, opacity] = [u.rate_means[0], u.rate_means[3]];
             let rest = u.rate_sh_rest;
-            let rates = Rates([means, u.rate_quats, u.rate_scales, opacity, u.rate_sh0, rest, rest, rest].map(f64::from));
+            let rates =
+                Rates([means, u.rate_quats, u.rate_scales, opacity, u.rate_sh0, rest, rest, rest].map(f64::from));
             let mirror = |(state, gradient)| adam(rules, &rates, *step, state, gradient);
             let expected: Vec<Optimised> = before.iter().zip(gradients).map(mirror).collect();
             compare_updates(after, &expected, &rates)
@@ -86,7 +87,9 @@ fn normal_draw(seed: u32, index: u32, draw: u32) -> f64 {
 fn draws_are_standard_normal() {
     let draws: Vec<f64> = (0..40_000).map(|i| normal_draw(17, i / 6, i % 6)).collect();
     let mean = |f: &dyn Fn(f64) -> f64| draws.iter().map(|&v| f(v)).sum::<f64>() / draws.len() as f64;
-    assert!(mean(&|v| v).abs() < 0.015 && (mean(&|v| v * v) - 1.0).abs() < 0.03 && (mean(&|v| v.powi(4)) - 3.0).abs() < 0.2);
+    assert!(
+        mean(&|v| v).abs() < 0.015 && (mean(&|v| v * v) - 1.0).abs() < 0.03 && (mean(&|v| v.powi(4)) - 3.0).abs() < 0.2
+    );
     let neighbours = draws.windows(2).map(|pair| pair[0] * pair[1]).sum::<f64>() / draws.len() as f64;
     assert!(neighbours.abs() < 0.015);
 }
@@ -160,7 +163,8 @@ fn densify_case(step: u32, bearing: &[&str]) {
         // Everything is copied but the places and scales of children.
         exact(&floats(&after[1]), &floats(rows[1]))?;
         exact(&floats(&after[2]), &floats(rows[2]))?;
-        close(&floats(&after[0]), &floats(rows[0]), Tolerance { absolute: 1e-6, relative: 1e-7 })
+        // 0.23 of (1e-6, 1e-7) seen.
+        close(&floats(&after[0]), &floats(rows[0]), Tolerance { absolute: 3.5e-7, relative: 3.5e-8 })
     });
     assert_eq!(after[0].len() * ROW_FLOATS, count * ROW_FLOATS);
 }
@@ -194,8 +198,8 @@ fn opacity_reset_of_a_population() {
             pairs.0.extend([after.row, after.m, after.u].iter().flat_map(Row::floats));
             pairs.1.extend([row, m, u].iter().flat_map(Row::floats));
         }
-        // The constant is the logit of 0.01, not of the nearest f32.
-        close(&pairs.0, &pairs.1, Tolerance { absolute: 5e-7, relative: 0.0 })
+        // The constant is the logit of 0.01, not of the nearest f32; 8e-8 seen.
+        close(&pairs.0, &pairs.1, Tolerance { absolute: 1.2e-7, relative: 0.0 })
     });
     check("labels", exact(&rig.get::<u32>(Buf::LABELS, 300), &before.model.labels));
 }

@@ -13,9 +13,9 @@ use labelgs::pass::scan::{self, Total};
 use labelgs::pass::sort::{self, SortBuffers};
 use labelgs::pass::{Builder, KernelShape};
 use labelgs::plan::{Buf, Capacity, PassList};
+use labelgs::sched::ListId;
 use labelgs::shaders::constants::KEY_INVISIBLE;
 use labelgs::shaders::structs::{Counters, StepUniforms};
-use labelgs::sched::ListId;
 use rand::Rng;
 
 const ITEMS: usize = 5000;
@@ -58,7 +58,9 @@ const COUNTS: [usize; 7] = [0, 1, 7, 63, 64, 1000, ITEMS];
 fn scan_of_numbers() {
     let Some(turn) = device() else { return };
     let mut engine = engine(turn.gpu());
-    let id = list(&mut engine, |b| scan::scan(b, Buf::TILES_TOUCHED, Buf::INSTANCE_OFFSETS, Count::Splats, Total::Instances));
+    let id = list(&mut engine, |b| {
+        scan::scan(b, Buf::TILES_TOUCHED, Buf::INSTANCE_OFFSETS, Count::Splats, Total::Instances)
+    });
     let mut random = generator(71);
     for count in COUNTS {
         let values: Vec<u32> = (0..count).map(|_| random.random_range(0..900)).collect();

@@ -1,7 +1,7 @@
 //! Culling, compaction, order, projection, and the projection's gradient.
 
 use super::rig::{GRADIENTS, Rig, prove};
-use crate::reference::model::{flatten, ROW_FLOATS};
+use crate::reference::model::{ROW_FLOATS, flatten};
 use crate::reference::project::{Splat, SplatGradient, near_margin, project_backward, project_forward, sigmoid};
 use crate::reference::scan::compact;
 use crate::reference::sort::radix_sort;
@@ -105,7 +105,8 @@ fn project_forward_of_each_degree() {
             let expected: Vec<Splat> = (splats.iter())
                 .map(|s| project_forward(rules, &camera, &model, s.gaussian).map_or(Splat::default(), |p| p.splat))
                 .collect();
-            let floats = |of: &[Splat]| of.iter().zip(&expected).flat_map(|(s, e)| splat_floats(s, e)).collect::<Vec<_>>();
+            let floats =
+                |of: &[Splat]| of.iter().zip(&expected).flat_map(|(s, e)| splat_floats(s, e)).collect::<Vec<_>>();
             // Centres are some 50 px times the roundings of a quotient; 8.9e-6 seen.
             close(&floats(&splats), &floats(&expected), Tolerance { absolute: 1.4e-5, relative: 0.0 })
         });
@@ -125,7 +126,8 @@ const BOUNDS: GradientBounds = GradientBounds {
 pub fn compare_rows(actual: &[Row], expected: &[Row], degree: u32, bounds: GradientBounds) -> Verdict {
     let active = Group::ALL.into_iter().take(5 + degree as usize);
     all(active.map(|group| {
-        gradients(&flatten(actual, group), &flatten(expected, group), bounds).map_err(|text| format!("{group:?}: {text}"))
+        gradients(&flatten(actual, group), &flatten(expected, group), bounds)
+            .map_err(|text| format!("{group:?}: {text}"))
     }))
 }
 

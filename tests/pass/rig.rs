@@ -117,7 +117,8 @@ impl Rig {
             sh_degree: scene.gaussians.sh_degree,
             ..TrainConfig::default()
         };
-        let layers = if labels { scene.target.slots.iter().map(|slot| slot.label as u16).collect() } else { Vec::new() };
+        let layers =
+            if labels { scene.target.slots.iter().map(|slot| slot.label as u16).collect() } else { Vec::new() };
         let job = Job { step: 1, view: 0, layers, labels, update: false, updates: 1, stamp: 7 };
         Self { view: train_view(&scene), engine, scene, job, config, fixed: Fixed { extent: 1.0 }, _turn: turn }
     }
@@ -207,7 +208,9 @@ impl Rig {
     pub fn rows(&mut self, planes: [Buf; 7], count: usize) -> Vec<Row> {
         let mut floats = vec![[0.0; ROW_FLOATS]; count];
         let bands = [true, true, true, true].into_iter().chain((1..=3).map(|band| band <= self.config.sh_degree));
-        for ((plane, (stride, runs)), _) in planes.into_iter().zip(LAYOUT).zip(bands.collect::<Vec<_>>()).filter(|p| p.1) {
+        for ((plane, (stride, runs)), _) in
+            planes.into_iter().zip(LAYOUT).zip(bands.collect::<Vec<_>>()).filter(|p| p.1)
+        {
             let values = self.get::<f32>(plane, count * stride);
             for (row, values) in floats.iter_mut().zip(values.chunks_exact(stride)) {
                 for &(from, to, length) in runs {

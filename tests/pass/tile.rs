@@ -59,8 +59,11 @@ fn tiles_of_splats_and_lists_of_tiles() {
                 exact(&all[tiles.len()..], &moved.collect::<Vec<_>>())?;
             }
             let (least, most) = (touched_tiles(rules, splat, &grid).0, tiles_within(rules, splat, &grid, SLACK));
-            if !tiles.is_sorted() || !least.iter().all(|t| tiles.contains(t)) || !tiles.iter().all(|t| most.contains(t)) {
-                return Err(format!("splat {index}: tiles {tiles:?}, at least {least:?}, at most {most:?} are expected"));
+            if !tiles.is_sorted() || !least.iter().all(|t| tiles.contains(t)) || !tiles.iter().all(|t| most.contains(t))
+            {
+                return Err(format!(
+                    "splat {index}: tiles {tiles:?}, at least {least:?}, at most {most:?} are expected"
+                ));
             }
         }
         Ok(Summary::default())

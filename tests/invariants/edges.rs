@@ -1,0 +1,156 @@
+//! Scenes at the edge: nothing to see, one Gaussian, one pixel, no labels.
+
+use crate::pass::rig::{Rig, readable};
+use crate::reference::Rules;
+use crate::reference::blend::blend_forward;
+use crate::support::compare::{Tolerance, check, close};
+use crate::support::device;
+use crate::support::scenes::{Shape, scene};
+use labelgs::engine::{Engine, LabelRoom, Room};
+use labelgs::infer::render::render;
+use labelgs::plan::{Buf, Work};
+use labelgs::scene::Gaussians;
+
+fn shape(gaussians: usize, width: u32, height: u32) -> Shape {
+    Shape { gaussians, width, height, opacities: (0.0, 4.0), ..Shape::default() }
+}
+
+/// Sizes that are no multiple of a tile, and smaller than one.
+#[test]
+fn pictures_of_any_size() {
+    for (width, height) in [(13, 12), (33, 12), (12, 67)] {
+        let Some(turn) = device() else { return };
+        let mut rig = Rig::new(turn, scene(211, &shape(30, width, height)), true);
+        rig.render();
+        let (splats, size, background) = (rig.splats(), rig.size(), rig.scene.target.background);
+        let image = rig.get::<[f32; 4]>(Buf::IMAGE, size.0 * size.1);
+        let expected = blend_forward(&Rules::default(), &splats, size, background);
+        let actual: Vec<f64> = image.iter().flat_map(|p| [p[0], p[1], p[2]].map(f64::from)).collect();
+        check(
+            "picture",
+            close(&actual, expected.colours().as_flattened(), Tolerance { absolute: 1e-6, relative: 0.0 }),
+        );
+        rig.train();
+    }
+}
+
+#[test]
+fn one_pixel() {
+    let Some(turn) = device() else { return };
+    let mut s = scene(212, &shape(5, 12, 12));
+    s.camera = s.camera.resized(1, 1);
+    s.target.photo.size = (1, 1);
+    s.target.photo.colours.truncate(1);
+    s.target.photo.valid = vec![true];
+    s.target.label_map = vec![1];
+    s.target.slots.truncate(1);
+    let mut rig = Rig::new(turn, s, true);
+    let report = rig.train();
+    assert!(report.counters.loss_l1.is_finite() && report.counters.nonfinite_count == 0);
+}
+
+#[test]
+fn one_gaussian() {
+    let Some(turn) = device() else { return };
+    let mut s = scene(213, &shape(1, 30, 20));
+    s.gaussians.means = vec![[0.0; 3]];
+    let mut rig = Rig::new(turn, s, true);
+    rig.job.update = true;
+    let report = rig.train();
+    assert_eq!(report.counters.visible_count, 1);
+    assert!(rig.gradient_rows()[0].mean.iter().any(|v| *v != 0.0));
+}
+
+/// No gradient, no update, and the picture is the background.
+#[test]
+fn nothing_visible() {
+    let Some(turn) = device() else { return };
+    let mut s = scene(214, &shape(20, 30, 20));
+    s.gaussians.means.iter_mut().for_each(|mean| mean[2] = -50.0);
+    let background = s.target.background.map(|v| v as f32);
+    let mut rig = Rig::new(turn, s, true);
+    rig.job.update = true;
+    let before = rig.get::<u32>(Buf::MEANS, 80);
+    let report = rig.train();
+    assert_eq!((report.counters.visible_count, report.counters.instance_count), (0, 0));
+    let [r, g, b] = background;
+    assert!(rig.get::<[f32; 4]>(Buf::IMAGE, 600).iter().all(|pixel| *pixel == [r, g, b, 1.0]));
+    assert_eq!(rig.get::<u32>(Buf::MEANS, 80), before);
+}
+
+/// Numbers that are none, and that overflow on their way to the screen, spoil nothing beside them.
+#[test]
+fn gaussians_that_are_not_numbers() {
+    let Some(turn) = device() else { return };
+    let mut s = scene(215, &shape(20, 30, 20));
+    s.gaussians.means[3] = [f32::NAN; 3];
+    s.gaussians.scales[5] = [60.0; 3];
+    s.gaussians.scales[6] = [f32::INFINITY; 3];
+    s.gaussians.opacities[7] = f32::NAN;
+    s.gaussians.sh0[8] = [f32::NAN; 3];
+    s.gaussians.quats[9] = [0.0; 4];
+    s.gaussians.means[10] = [1e30, 0.0, 1e30];
+    let mut rig = Rig::new(turn, s, true);
+    rig.job.update = true;
+    let report = rig.train();
+    assert!(rig.get::<f32>(Buf::IMAGE, 2400).iter().all(|v| v.is_finite()));
+    assert!(report.counters.loss_l1.is_finite() && report.counters.loss_label.is_finite());
+    for (index, row) in rig.gradient_rows().iter().enumerate() {
+        assert!(row.floats().iter().all(|v| v.is_finite()), "gradient of Gaussian {index}");
+    }
+}
+
+#[test]
+fn a_model_without_gaussians() {
+    let Some(turn) = device() else { return };
+    let camera = scene(216, &shape(1, 30, 20)).camera;
+    let room = Room { gaussians: 0, size: (30, 20), trained: false, labels: None };
+    let mut engine = Engine::new(turn.gpu(), room, readable()).expect("the engine starts");
+    engine.upload_model(&Gaussians::default()).expect("nothing to upload");
+    let rendered = render(&mut engine, &camera, 0.2, [0.5, 0.25, 0.0], 0).expect("a picture");
+    assert!(rendered.rgb.iter().all(|pixel| *pixel == [0.5, 0.25, 0.0]));
+    assert!(rendered.top_id.iter().all(|&id| id == -1) && rendered.alpha.iter().all(|&alpha| alpha == 0.0));
+    assert!(engine.download_model(0).expect("a model").is_empty());
+}
+
+const LABEL_BUFFERS: [&str; 8] = [
+    "labels",
+    "label_keys",
+    "view_labels",
+    "layer_from_label",
+    "label_from_layer",
+    "layer_occluders",
+    "old_labels",
+    "layer_state",
+];
+
+/// A scene without masks pays nothing for labels.
+#[test]
+fn no_labels_no_cost() {
+    let Some(turn) = device() else { return };
+    let s = scene(217, &shape(40, 30, 20));
+    let mut rig = Rig::new(turn, s, false);
+    rig.job.update = true;
+    rig.train();
+    let key = rig.key();
+    let id = rig.engine.list(key).expect("the list of the step");
+    let memory = rig.engine.sched().memory();
+    let of_labels: u64 = memory.iter().filter(|(name, _)| LABEL_BUFFERS.contains(&name.as_str())).map(|(_, n)| n).sum();
+    assert_eq!(of_labels, 0, "{memory:?}");
+    let plan = rig.engine.sched().plan(id).expect("a plan");
+    for work in &plan.list.work {
+        let Work::Pass(pass) = work else { continue };
+        let named = ["labels", "lift", "layer"].iter().any(|word| pass.shader.name.contains(word));
+        assert!(!named, "{} is in the list", pass.shader.name);
+        for buf in &pass.buffers {
+            assert!(!LABEL_BUFFERS.contains(&plan.table[buf.index()].name), "{} binds labels", pass.shader.name);
+        }
+    }
+    // Nor does a render pay for training.
+    let labels = Some(LabelRoom { max_label: 3, layers: 2 });
+    let room = |trained, labels| Room { gaussians: 1000, size: (64, 48), trained, labels };
+    let total = |room: &Room| Engine::predict(rig.engine.sched().gpu(), room).expect("it fits").total;
+    assert!(
+        total(&room(false, None)) < total(&room(true, None)) && total(&room(true, None)) < total(&room(true, labels))
+    );
+}

@@ -1,0 +1,6 @@
+//! What must not change a result: kernel shapes, memory, barriers, threads, overflows. And scenes at the edge.
+
+mod edges;
+mod processes;
+mod shapes;
+mod training;

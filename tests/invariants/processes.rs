@@ -1,0 +1,69 @@
+//! Runs of this test program in other environments: numbers of threads, and another width of the vectors.
+
+use super::training::train;
+use crate::support::device;
+use labelgs::sched::SchedulerOptions;
+use std::hash::{DefaultHasher, Hash, Hasher};
+use std::process::Command;
+
+/// Set in the children, which then print the hash.
+const CHILD: &str = "LABELGS_TEST_CHILD";
+
+/// Not a test by itself: what the children of the next one run.
+#[test]
+fn hash_of_a_training() {
+    if std::env::var_os(CHILD).is_none() {
+        return;
+    }
+    let Some(turn) = device() else { return };
+    let outcome = train(&turn, SchedulerOptions::default(), |_| ());
+    let mut hasher = DefaultHasher::new();
+    (outcome.ply, outcome.losses).hash(&mut hasher);
+    println!("subgroup {} hash {:016x}", turn.subgroup_size(), hasher.finish());
+}
+
+/// Standard output of some tests of this program with environment variables; they must pass.
+fn child(tests: &[&str], environment: &[(&str, &str)]) -> String {
+    let mut command = Command::new(std::env::current_exe().expect("this program has a path"));
+    command.args(tests).args(["--nocapture", "--test-threads", "1"]).env(CHILD, "1");
+    command.envs(environment.iter().copied());
+    let output = command.output().expect("this program runs again");
+    let text = String::from_utf8_lossy(&output.stdout).into_owned();
+    let errors = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{environment:?}: {text}{errors}");
+    text
+}
+
+/// True if the device is lavapipe, which these variables are for.
+fn is_lavapipe() -> bool {
+    device().is_some_and(|turn| turn.is_cpu())
+}
+
+#[test]
+fn a_training_is_the_same_on_any_number_of_threads() {
+    if std::env::var_os(CHILD).is_some() || !is_lavapipe() {
+        return;
+    }
+    let run = |threads: &str| {
+        let text = child(&["invariants::processes::hash_of_a_training", "--exact"], &[("LP_NUM_THREADS", threads)]);
+        let hash = text.split("hash ").nth(1).and_then(|rest| rest.split_whitespace().next()).map(str::to_owned);
+        hash.unwrap_or_else(|| panic!("no hash in {text}"))
+    };
+    let one = run("1");
+    for threads in ["2", "16"] {
+        assert_eq!(run(threads), one, "{threads} threads");
+    }
+}
+
+/// Subgroups of 16 where the processor has vectors for them (elsewhere the same size again).
+#[test]
+fn passes_agree_with_their_mirrors_on_wide_vectors() {
+    if std::env::var_os(CHILD).is_some() || !is_lavapipe() {
+        return;
+    }
+    let text = child(
+        &["pass::", "invariants::shapes", "invariants::processes::hash_of_a_training"],
+        &[("LP_NATIVE_VECTOR_WIDTH", "512")],
+    );
+    assert!(text.contains("subgroup 16 hash"), "no subgroups of 16: {text}");
+}

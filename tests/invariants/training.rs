@@ -1,0 +1,120 @@
+//! Short trainings with densification, labels and occluders: what may not change their result, to the last bit.
+
+use crate::support::compare::{check, exact};
+use crate::support::device;
+use crate::support::device::Turn;
+use labelgs::io::init::initial_gaussians;
+use labelgs::io::ply::write_gaussians;
+use labelgs::plan::{Capacity, PlanOptions};
+use labelgs::scene::Dataset;
+use labelgs::sched::SchedulerOptions;
+use labelgs::synth::{Preset, SynthOptions, dataset};
+use labelgs::train::{TrainConfig, Trainer};
+
+/// 45 steps in which everything happens: higher degrees, labels, occluders, densification, an opacity reset.
+pub fn config() -> TrainConfig {
+    TrainConfig {
+        iterations: 45,
+        label_from: 4,
+        occlusion_every: 15,
+        sh_degree_interval: 6,
+        densify_from: 5,
+        densify_interval: 8,
+        densify_grad_threshold: 1e-4,
+        opacity_reset_interval: 20,
+        opacity_reset_margin: 10,
+        // Quick enough for labels in so few steps.
+        opacity_lr: 0.3,
+        label_threshold: 0.4,
+        label_samples: 2,
+        ..TrainConfig::default()
+    }
+}
+
+fn small() -> Dataset {
+    let options = SynthOptions { preset: Preset::Simple, width: 72, height: 52, views: 5, points: 400, seed: 3 };
+    dataset(&options, 0)
+}
+
+/// What a training leaves.
+#[derive(Debug, PartialEq)]
+pub struct Outcome {
+    /// The bytes of the PLY.
+    pub ply: Vec<u8>,
+    /// Losses of all steps, as bits.
+    pub losses: Vec<u64>,
+    /// Gaussians before and after.
+    pub counts: (usize, usize),
+    /// Pairs that there was room for in the end.
+    pub instances: u64,
+}
+
+/// Trains; `change` may change the trainer before its first step.
+pub fn train(turn: &Turn, options: SchedulerOptions, change: impl FnOnce(&mut Trainer)) -> Outcome {
+    let mut dataset = small();
+    let config = config();
+    let start = initial_gaussians(&dataset, config.seed, 100).expect("points");
+    let mut trainer = Trainer::new(turn.gpu(), config.clone(), &mut dataset, &start, options).expect("a trainer");
+    change(&mut trainer);
+    let mut losses = Vec::new();
+    for _ in 0..config.iterations {
+        losses.extend(trainer.step().expect("a step").iter().map(|report| (report.loss + report.label_loss).to_bits()));
+    }
+    losses.extend(trainer.drain().expect("the last steps").iter().map(|r| (r.loss + r.label_loss).to_bits()));
+    let model = trainer.model().expect("a model");
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("model.ply");
+    write_gaussians(&path, &model).expect("a PLY");
+    let instances = trainer.engine_mut().sched().capacity().instances;
+    Outcome { instances, ply: std::fs::read(path).expect("the PLY"), losses, counts: (start.len(), model.len()) }
+}
+
+#[track_caller]
+fn same(what: &str, other: &Outcome, first: &Outcome) {
+    assert_eq!(other.counts, first.counts, "{what}: Gaussians");
+    check(what, exact(&other.losses, &first.losses));
+    assert!(other.ply == first.ply, "{what}: the models differ");
+}
+
+/// Far too small for the first step already.
+fn tiny(trainer: &mut Trainer) {
+    let engine = trainer.engine_mut();
+    let old = *engine.sched().capacity();
+    let layer_pixels = u64::from(engine.shape().tile_pixels());
+    let tiny = Capacity { instances: 100, trained_instances: 100, layer_tiles: 1, layer_pixels, ..old };
+    engine.sched_mut().set_capacity(tiny).expect("less fits too");
+}
+
+fn large(trainer: &mut Trainer) {
+    trainer.engine_mut().make_room_for_gaussians(20_000).expect("it fits");
+}
+
+/// The reference run twice; overflows on the way; one barrier before each pass; no shared scratch, and poison in it.
+#[test]
+fn a_training_is_the_same_to_the_last_bit() {
+    let Some(turn) = device() else { return };
+    let plan = PlanOptions::default();
+    let with = |plan: PlanOptions| SchedulerOptions { plan, ..SchedulerOptions::default() };
+    let first = train(&turn, with(plan), |_| ());
+    assert!(first.counts.1 > first.counts.0 + 50, "densification shows: {:?}", first.counts);
+    let labelled = labels_of(&first.ply);
+    assert!(labelled > 10, "only {labelled} Gaussians have labels");
+    same("again", &train(&turn, with(plan), |_| ()), &first);
+    let grown = train(&turn, with(plan), tiny);
+    assert!(grown.instances > 1000, "{} pairs were enough", grown.instances);
+    same("tiny buffers that grow", &grown, &first);
+    same("large buffers", &train(&turn, with(plan), large), &first);
+    same("barriers", &train(&turn, with(PlanOptions { barrier_everywhere: true, ..plan }), |_| ()), &first);
+    let alone = PlanOptions { alias: false, guards: true, ..plan };
+    let poisoned = SchedulerOptions { poison_step: true, ..with(alone) };
+    same("poison", &train(&turn, poisoned, large), &first);
+}
+
+/// Gaussians with a label in the bytes of a PLY.
+fn labels_of(ply: &[u8]) -> usize {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("model.ply");
+    std::fs::write(&path, ply).expect("a file");
+    let read = labelgs::io::ply::read_gaussians(&path).expect("a PLY");
+    read.gaussians.labels.map_or(0, |labels| labels.iter().filter(|&&label| label != 0).count())
+}
