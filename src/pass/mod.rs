@@ -12,12 +12,14 @@ mod optimize;
 mod project;
 mod scan;
 pub mod shape;
+pub mod stage;
 mod sort;
 mod tile;
 
 pub use build::Builder;
 pub use optimize::ATTRIBUTES;
 pub use shape::KernelShape;
+pub use stage::Stage;
 
 use crate::pass;
 use crate::plan::{Buf, Capacity, PassList};
