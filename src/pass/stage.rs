@@ -1,6 +1,6 @@
 //! Which stage of a step a pass belongs to, for reports.
 
-use crate::plan::{Buf, PassList, Work};
+use crate::plan::{Buf, PassList, TABLE, Work};
 
 /// A stage of a training step, in the order of the step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -80,13 +80,13 @@ pub fn stages(list: &PassList) -> Vec<(Stage, String)> {
                     _ => stem.to_owned(),
                 }
             }
-            Work::Fill { .. } => {
+            Work::Fill { buf, .. } => {
                 now = if now == Stage::Sort { Stage::Tile } else { now };
-                "fill".to_owned()
+                format!("fill {}", TABLE[buf.index()].name)
             }
             Work::Copy { to, .. } => {
                 now = if [Buf::REPORT, Buf::REPORT_FAILURE].contains(to) { Stage::Report } else { now };
-                "copy".to_owned()
+                format!("copy to {}", TABLE[to.index()].name)
             }
         };
         named.push((now, name));
