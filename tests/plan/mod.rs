@@ -99,6 +99,7 @@ pub fn engine_lists(shape: KernelShape) -> (Capacity, Vec<PassList>) {
         trained_instances: 100_000,
         virtual_tiles: 4096,
         layer_tiles: 1024,
+        segment_pixels: 1,
         layer_pixels: 65_536,
         pixels: 65_536,
         labelled_pixels: 65_536,
