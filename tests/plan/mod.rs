@@ -111,7 +111,6 @@ pub fn engine_lists(shape: KernelShape) -> (Capacity, Vec<PassList>) {
         loss_partials: 1024,
         sort_lanes: 64,
         segments: 2,
-        segment_pixels: 131_072,
     };
     let variant = Variant { labels: true, sh_degree: 3, size: (256, 256), update: true };
     let lists = vec![
