@@ -15,6 +15,7 @@ mod metrics;
 mod mirror_mutants;
 mod mirrors;
 mod output;
+mod pass;
 mod plan;
 mod sched;
 mod segments;

@@ -9,7 +9,8 @@
 // Work:    one subgroup (= workgroup) a tile, jobs as in blend_forward.
 // Reads:   step; tile_starts [layers * T]; sorted_splats, slots [I]; splats [V,3]; image [P] (w = transmittance),
 //          last [P]; v_image [P]; variant labels: counters, layer_tiles, layer_state
-// Writes:  v_instances [I,3] at the pair's slot: v_mean2d (px), v_conic; v_log_opacity, v_colour; stamp of the step
+// Writes:  v_instances_a, _b, _c [I] at the pair's slot: v_mean2d (px), v_conic xy; v_conic z, v_log_opacity, v_colour rg;
+//          v_colour b, stamp of the step
 //          (records without the current stamp were not walked and count as 0)
 // Math:    p = dL/d ln alpha = w (u - s) with u = colour . g and s the colour behind, times g; geometry and opacity
 //          gradients are linear in six moments of p about the tile's centre. T by division. Clamped alpha: p = 0.
@@ -24,11 +25,13 @@ FETCH4(4, splats);
 FETCH4(5, image);
 FETCHU(6, last);
 FETCH4(7, v_image);
-WRITE(8, vec4, v_instances);
+WRITE(8, vec4, v_instances_a);
+WRITE(9, vec4, v_instances_b);
+WRITE(10, vec4, v_instances_c);
 #ifdef LABELS
-READ1(9, Counters, counters);
-FETCHU(10, layer_tiles);
-READ(11, uvec2, layer_state);
+READ1(11, Counters, counters);
+FETCHU(12, layer_tiles);
+READ(13, uvec2, layer_state);
 #include "label_state.glsl"
 #endif
 #ifdef SEGMENTED
@@ -167,10 +170,10 @@ void main() {
         float Sxy = d.x * (d.y * o0 - oy) - d.y * ox + oxy;
         float Syy = d.y * (d.y * o0 - 2.0 * oy) + oyy;
         if (lane < count) {
-            uint slot = 3u * fetchu(slots, at);
-            v_instances[slot] = vec4(-(conic.x * Sx + conic.y * Sy), -(conic.y * Sx + conic.z * Sy), -0.5 * Sxx, -Sxy);
-            v_instances[slot + 1u] = vec4(-0.5 * Syy, o0, or_, og);
-            v_instances[slot + 2u] = vec4(ob, uintBitsToFloat(u.stamp), 0.0, 0.0);
+            uint slot = fetchu(slots, at);
+            v_instances_a[slot] = vec4(-(conic.x * Sx + conic.y * Sy), -(conic.y * Sx + conic.z * Sy), -0.5 * Sxx, -Sxy);
+            v_instances_b[slot] = vec4(-0.5 * Syy, o0, or_, og);
+            v_instances_c[slot] = vec4(ob, uintBitsToFloat(u.stamp), 0.0, 0.0);
         }
     }
 #ifdef SEGMENTED

@@ -13,7 +13,8 @@
 //          that contributed, within the tile's list (0: none); variant main: main_gaussian [P] (NO_SPLAT: none) and
 //          main_weight_depth [P] (weight, weighted sum of z);
 //          variant labels: layer_state [slots, pixels of a tile] (transmittance, last and signs of the loss gradient),
-//          layer_loss [slots], label_keys [N] (integer maximum, any order)
+//          layer_loss [slots] (label loss less that of an empty picture, which the host knows: tiles that hold no splat
+//          are not walked), label_keys [N] (integer maximum, any order)
 // Math:    LabelGS eq. 5; alpha <= ALPHA_MAX; a pair counts where alpha >= ALPHA_MIN, tested on the exponent; a pixel
 //          stops before the splat that would take its transmittance below TRANSMITTANCE_MIN (3DGS).
 //          Layers: eq. 8 and 9, black background; the L1 gradient of a layer is local to the pixel, so its sign is
@@ -36,7 +37,7 @@ FETCHU(10, gaussian_from_splat);
 #endif
 #ifdef LABELS
 FETCHU(8, layer_tiles);
-FETCH4(9, target);
+FETCHC(9, target);
 FETCHU(10, view_labels);
 READ(11, uint, layer_occluders);
 READ(12, uint, label_from_layer);
@@ -101,7 +102,7 @@ void main() {
 #ifdef LABELS
         if (t.layer != 0u && inside) {
             uint p = (t.y0 + k) * u.width + t.x;
-            inside = fetch4(target, p).w > 0.5 && !occluded(t.layer, fetchu(view_labels, p), u);
+            inside = fetchc(target, p).w > 0.5 && !occluded(t.layer, fetchu(view_labels, p), u);
         }
 #endif
         T[k] = inside ? 1.0 : -1.0; // the sign says whether the pixel still takes splats
@@ -211,11 +212,12 @@ void main() {
             bool inside = t.x < u.width && t.y0 + k < u.height;
             uint p = inside ? (t.y0 + k) * u.width + t.x : 0u;
             uint here = fetchu(view_labels, p);
-            vec4 photo = fetch4(target, p);
+            vec4 photo = fetchc(target, p);
             vec3 wanted = here == label ? photo.xyz : vec3(0.0);
             bool counts = inside && photo.w > 0.5 && !occluded(t.layer, here, u);
             vec3 difference = counts ? vec3(cr[k], cg[k], cb[k]) - wanted : vec3(0.0);
-            loss += abs(difference.x) + abs(difference.y) + abs(difference.z);
+            vec3 change = counts ? abs(difference) - wanted : vec3(0.0); // wanted >= 0
+            loss += change.x + change.y + change.z;
             layer_state[layer_pixel(t, k)] = uvec2(floatBitsToUint(abs(T[k])), final_[k] | pack_signs(difference));
         }
         loss = subgroup_sum(loss);

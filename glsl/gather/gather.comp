@@ -5,7 +5,7 @@
 #include "dispatch.glsl"
 // gather — add up the gradient records of each splat, in slot order; note the densification statistic.
 // Work:    64 splats a workgroup.
-// Reads:   step, counters, failure; tiles_touched, instance_offsets [V]; v_instances [I,3];
+// Reads:   step, counters, failure; tiles_touched, instance_offsets [V]; v_instances_a, _b, _c [I];
 //          gaussian_from_splat [V]; variant labels: labels [N], layer_from_label
 // Writes:  v_splats [V,3]: v_mean2d (px), v_conic xy..; v_conic z, v_log_opacity, v_colour rg; v_colour b
 //          densify_stats [N] += (|scene v_mean2d| in NDC units, 1)
@@ -19,13 +19,15 @@ READ1(1, Counters, counters);
 READ1(2, uint, failure);
 FETCHU(3, tiles_touched);
 FETCHU(4, instance_offsets);
-FETCH4(5, v_instances);
-FETCHU(6, gaussian_from_splat);
-WRITE(7, vec4, v_splats);
-INOUT(8, vec2, densify_stats);
+FETCH4(5, v_instances_a);
+FETCH4(6, v_instances_b);
+FETCH4(7, v_instances_c);
+FETCHU(8, gaussian_from_splat);
+WRITE(9, vec4, v_splats);
+INOUT(10, vec2, densify_stats);
 #ifdef LABELS
-FETCHU(9, labels);
-FETCHU(10, layer_from_label);
+FETCHU(11, labels);
+FETCHU(12, layer_from_label);
 #endif
 
 void main() {
@@ -43,8 +45,8 @@ void main() {
     float c = 0.0;
     vec2 scene_mean = vec2(0.0);
     for (uint k = 0u; k < total; k++) {
-        uint at = 3u * (first + k);
-        vec4 ra = fetch4(v_instances, at), rb = fetch4(v_instances, at + 1u), rc = fetch4(v_instances, at + 2u);
+        uint at = first + k;
+        vec4 ra = fetch4(v_instances_a, at), rb = fetch4(v_instances_b, at), rc = fetch4(v_instances_c, at);
         bool current = floatBitsToUint(rc.y) == stamp;
         a += current ? ra : vec4(0.0);
         b += current ? rb : vec4(0.0);

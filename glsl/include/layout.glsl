@@ -5,6 +5,7 @@
 //   READ1(1, Counters, counts) one readonly struct  WRITE1, INOUT1 likewise
 //   FETCH4(2, quats)           array of vec4 that is only read by fetch4(quats, i); a texel buffer if TEXEL is defined
 //   FETCHU(3, labels)          array of uint, likewise with fetchu(labels, i)
+//   FETCHC(3, target)          array of RGBA8 colours, read by fetchc(target, i) as vec4 in 0 to 1
 //   PUSH { uint count; } push; push constants
 //   SPEC(0, uint, WIDTH, 8)    specialisation constant
 #ifndef LAYOUT_GLSL
@@ -32,13 +33,17 @@
 #ifdef TEXEL
 #define FETCH4(number, name) layout(set = 0, binding = number) uniform textureBuffer name
 #define FETCHU(number, name) layout(set = 0, binding = number) uniform utextureBuffer name
+#define FETCHC(number, name) layout(set = 0, binding = number) uniform textureBuffer name
 #define fetch4(name, i) texelFetch(name, int(i))
 #define fetchu(name, i) texelFetch(name, int(i)).x
+#define fetchc(name, i) texelFetch(name, int(i))
 #else
 #define FETCH4(number, name) READ(number, vec4, name)
 #define FETCHU(number, name) READ(number, uint, name)
+#define FETCHC(number, name) READ(number, uint, name)
 #define fetch4(name, i) name[i]
 #define fetchu(name, i) name[i]
+#define fetchc(name, i) unpackUnorm4x8(name[i])
 #endif
 
 #define PUSH layout(push_constant, scalar) uniform push_block

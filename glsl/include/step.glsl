@@ -39,7 +39,7 @@ struct Counters {
     uint processed_low;     // (pixel, splat) pairs walked by blend_forward, in units of tile pixels
     uint processed_layers;  // the same for object layers
     uint cloned_count, split_count, pruned_count;
-    float loss_l1, loss_ssim, loss_label; // sums, not yet divided
+    float loss_l1, loss_ssim, loss_label; // sums, not yet divided; the label loss less that of empty layers
 };
 
 // Bits of the sticky failure word; passes that change the model do nothing while it is not 0.

@@ -14,7 +14,7 @@ layout(local_size_x = 64) in;
 READ1(0, StepUniforms, step);
 FETCH4(1, v_rows);
 FETCH4(2, image);
-FETCH4(3, target);
+FETCHC(3, target);
 WRITE(4, vec4, v_image);
 WRITE(5, vec2, loss_partials);
 #include "window.glsl"
@@ -49,7 +49,7 @@ void main() {
         [[unroll]] for (uint k = 0u; k < STRIP; k++) {
             bool inside = y0 + k < height;
             uint p = inside ? (y0 + k) * width + column : 0u;
-            vec4 c = fetch4(image, p), t = fetch4(target, p);
+            vec4 c = fetch4(image, p), t = fetchc(target, p);
             float a = c[channel], b = t[channel];
             bool counts = inside && t.w > 0.5;
             float difference = counts ? a - b : 0.0;

@@ -12,7 +12,7 @@
 layout(local_size_x = 64) in;
 READ1(0, StepUniforms, step);
 FETCH4(1, image);
-FETCH4(2, target);
+FETCHC(2, target);
 WRITE(3, vec4, moments);
 #include "window.glsl"
 
@@ -30,7 +30,7 @@ void main() {
         int y = int(y0) + r - 5;
         bool inside = y >= 0 && y < int(height);
         uint p = inside ? uint(y) * width + x : 0u;
-        vec4 t = fetch4(target, p), c = fetch4(image, p);
+        vec4 t = fetchc(target, p), c = fetch4(image, p);
         bool counts = inside && t.w > 0.5;
         float a = counts ? (channel == 0u ? c.x : channel == 1u ? c.y : c.z) : 0.0;
         float b = counts ? (channel == 0u ? t.x : channel == 1u ? t.y : t.z) : 0.0;

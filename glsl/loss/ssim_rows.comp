@@ -12,7 +12,7 @@
 layout(local_size_x = 64) in;
 READ1(0, StepUniforms, step);
 FETCH4(1, moments);
-FETCH4(2, target);
+FETCHC(2, target);
 WRITE(3, vec4, v_moments);
 #include "window.glsl"
 
@@ -48,7 +48,7 @@ void main() {
             float inv = 1.0 / (c * d);
             float value = a * b * inv;
             float v_mean = 2.0 * my * (b - a) * inv + 2.0 * mx * value * (1.0 / d - 1.0 / c);
-            bool counts = fetch4(target, y * width + x).w > 0.5;
+            bool counts = fetchc(target, y * width + x).w > 0.5;
             v_moments[plane + x] = counts ? vec4(v_mean, -value / d, 2.0 * a * inv, value) : vec4(0.0);
         }
     }

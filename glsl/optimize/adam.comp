@@ -5,8 +5,9 @@
 #include "dispatch.glsl"
 // adam — one Adam update of one attribute of all Gaussians; a Gaussian that is not visible has gradient 0.
 // Work:    one vec4 of one Gaussian an invocation; STRIDE vec4 a Gaussian.
-// Reads:   step, failure; splat_from_gaussian [N]; gradients [V,STRIDE]
-// Writes:  parameters, first_moments, second_moments [N,STRIDE]
+// Reads:   step, failure; splat_from_gaussian [N]; gradients [V,STRIDE]; parameters_in, first_moments_in,
+//          second_moments_in [N,STRIDE]
+// Writes:  parameters, first_moments, second_moments [N,STRIDE], the same buffers
 // Math:    Kingma and Ba; beta 0.9 / 0.999, epsilon 1e-15, no weight decay; rates by RATE.
 // Mirror:  tests/reference/adam.rs::adam
 
@@ -17,9 +18,14 @@ READ1(0, StepUniforms, step);
 READ1(1, uint, failure);
 FETCHU(2, splat_from_gaussian);
 FETCH4(3, gradients);
-INOUT(4, vec4, parameters);
-INOUT(5, vec4, first_moments);
-INOUT(6, vec4, second_moments);
+// One buffer, two bindings: read as texels where that is fast, written as storage. An invocation reads its own elements
+// only, before it writes them.
+FETCH4(4, parameters_in);
+FETCH4(5, first_moments_in);
+FETCH4(6, second_moments_in);
+WRITE(7, vec4, parameters);
+WRITE(8, vec4, first_moments);
+WRITE(9, vec4, second_moments);
 
 void main() {
     StepUniforms u = step;
@@ -33,10 +39,10 @@ void main() {
     g = s == NO_SPLAT ? vec4(0.0) : g;
     vec4 rate = RATE == 0u ? u.rate_means
         : vec4(RATE == 1u ? u.rate_scales : RATE == 2u ? u.rate_quats : RATE == 3u ? u.rate_sh0 : u.rate_sh_rest);
-    vec4 m = ADAM_BETA1 * first_moments[e] + (1.0 - ADAM_BETA1) * g;
-    vec4 v = ADAM_BETA2 * second_moments[e] + (1.0 - ADAM_BETA2) * g * g;
+    vec4 m = ADAM_BETA1 * fetch4(first_moments_in, e) + (1.0 - ADAM_BETA1) * g;
+    vec4 v = ADAM_BETA2 * fetch4(second_moments_in, e) + (1.0 - ADAM_BETA2) * g * g;
     vec4 update = rate * (m * u.adam_correction1) / (sqrt(v * u.adam_correction2) + ADAM_EPSILON);
-    parameters[e] -= update;
+    parameters[e] = fetch4(parameters_in, e) - update;
     first_moments[e] = m;
     second_moments[e] = v;
 }

@@ -46,7 +46,7 @@ pub fn run(args: &TrainArgs, context: &Context) -> Result<()> {
     let mut trainer = Trainer::new(gpu, config.clone(), &mut dataset, &model, SchedulerOptions::default())?;
     interrupt::note_only();
     let start = Instant::now();
-    let last = steps(&mut trainer, out, preview.as_ref(), context)?;
+    let last = steps(&mut trainer, out, preview.as_ref(), context).map_err(|error| keep_model(&mut trainer, out, error))?;
     let seconds = start.elapsed().as_secs_f64();
     let path = record::save_model(out, trainer.steps_done(), &trainer.model()?)?;
     // Scoring puts single objects in the model's place.
@@ -123,6 +123,19 @@ fn steps(trainer: &mut Trainer, out: &Path, preview: Option<&View>, context: &Co
     }
     let done = trainer.drain()?;
     Ok(done.last().copied().or(last))
+}
+
+/// A run that memory ended keeps what it has learnt: steps that did not fit changed nothing.
+fn keep_model(trainer: &mut Trainer, out: &Path, error: Error) -> Error {
+    if !matches!(error, Error::OutOfMemory { .. }) {
+        return error;
+    }
+    let step = trainer.steps_done();
+    match trainer.model().and_then(|model| record::save_model(out, step, &model)) {
+        Ok(path) => tracing::warn!("stopped at step {step} of {}; the model so far is {}", trainer.config().iterations, path.display()),
+        Err(second) => tracing::warn!("the model of step {step} could not be saved either: {second}"),
+    }
+    error
 }
 
 /// Refuses an output folder that cannot be used before any work is done.

@@ -8,19 +8,11 @@ use crate::shaders::constants;
 
 const GRID: fn() -> Grid = || args(constants::ARGS_BLEND);
 
-/// State between segments starts defined, although the first segment does not read it.
-fn begin_segments(b: &mut Builder, states: &[Buf]) {
-    states.iter().for_each(|&state| {
-        b.list.fill(state, 0);
-    });
-}
-
 /// Blends all tiles front to back; with labels also the object layers, their loss, and the lift.
 pub fn blend_forward(b: &mut Builder) {
     let (subgroup, tile_width, tile_height) = (b.shape.subgroup, b.shape.tile_width, b.shape.tile_height);
     let (segments, length) = (b.capacity.segments as u32, b.shape.segment_length);
     if segments > 1 {
-        begin_segments(b, &[Buf::SEGMENT_COLOURS, Buf::SEGMENT_REST]);
         for segment in 0..segments {
             if b.labels {
                 pass!(b, texel blend_forward_labels_segmented {
@@ -71,7 +63,6 @@ pub fn blend_forward_main(b: &mut Builder) {
             gaussian_from_splat: GAUSSIAN_FROM_SPLAT,
         } [subgroup_size: subgroup, tile_width: tile_width, tile_height: tile_height], GRID());
     } else {
-        begin_segments(b, &[Buf::SEGMENT_COLOURS, Buf::SEGMENT_REST]);
         for segment in 0..segments {
             pass!(b, texel blend_forward_main_segmented {
                 step: Buf::STEP, counters: Buf::COUNTERS, tile_starts: Buf::TILE_STARTS, tile_ends: Buf::TILE_ENDS,
@@ -90,13 +81,12 @@ pub fn blend_backward(b: &mut Builder, slots: Buf) {
     let (subgroup, tile_width, tile_height) = (b.shape.subgroup, b.shape.tile_width, b.shape.tile_height);
     let (segments, length) = (b.capacity.segments as u32, b.shape.segment_length);
     if segments > 1 {
-        begin_segments(b, &[Buf::SEGMENT_BACK]);
         for segment in (0..segments).rev() {
             if b.labels {
                 pass!(b, texel blend_backward_labels_segmented {
                     step: Buf::STEP, tile_starts: Buf::TILE_STARTS, sorted_splats: Buf::SORTED_SPLATS, slots: slots,
                     splats: Buf::SPLATS, image: Buf::IMAGE, last: Buf::LAST, v_image: Buf::V_IMAGE,
-                    v_instances: Buf::V_INSTANCES, counters: Buf::COUNTERS, layer_tiles: Buf::LAYER_TILES,
+                    v_instances_a: Buf::V_INSTANCES_A, v_instances_b: Buf::V_INSTANCES_B, v_instances_c: Buf::V_INSTANCES_C, counters: Buf::COUNTERS, layer_tiles: Buf::LAYER_TILES,
                     layer_state: Buf::LAYER_STATE,
                     segment_back: Buf::SEGMENT_BACK,
                 } [subgroup_size: subgroup, tile_width: tile_width, tile_height: tile_height,
@@ -105,7 +95,7 @@ pub fn blend_backward(b: &mut Builder, slots: Buf) {
                 pass!(b, texel blend_backward_segmented {
                     step: Buf::STEP, tile_starts: Buf::TILE_STARTS, sorted_splats: Buf::SORTED_SPLATS, slots: slots,
                     splats: Buf::SPLATS, image: Buf::IMAGE, last: Buf::LAST, v_image: Buf::V_IMAGE,
-                    v_instances: Buf::V_INSTANCES,
+                    v_instances_a: Buf::V_INSTANCES_A, v_instances_b: Buf::V_INSTANCES_B, v_instances_c: Buf::V_INSTANCES_C,
                     segment_back: Buf::SEGMENT_BACK,
                 } [subgroup_size: subgroup, tile_width: tile_width, tile_height: tile_height,
                     segment: segment, segments: segments, segment_length: length], GRID());
@@ -115,14 +105,14 @@ pub fn blend_backward(b: &mut Builder, slots: Buf) {
         pass!(b, texel blend_backward_labels {
             step: Buf::STEP, tile_starts: Buf::TILE_STARTS, sorted_splats: Buf::SORTED_SPLATS, slots: slots,
             splats: Buf::SPLATS, image: Buf::IMAGE, last: Buf::LAST, v_image: Buf::V_IMAGE,
-            v_instances: Buf::V_INSTANCES, counters: Buf::COUNTERS, layer_tiles: Buf::LAYER_TILES,
+            v_instances_a: Buf::V_INSTANCES_A, v_instances_b: Buf::V_INSTANCES_B, v_instances_c: Buf::V_INSTANCES_C, counters: Buf::COUNTERS, layer_tiles: Buf::LAYER_TILES,
             layer_state: Buf::LAYER_STATE,
         } [subgroup_size: subgroup, tile_width: tile_width, tile_height: tile_height], GRID());
     } else {
         pass!(b, texel blend_backward {
             step: Buf::STEP, tile_starts: Buf::TILE_STARTS, sorted_splats: Buf::SORTED_SPLATS, slots: slots,
             splats: Buf::SPLATS, image: Buf::IMAGE, last: Buf::LAST, v_image: Buf::V_IMAGE,
-            v_instances: Buf::V_INSTANCES,
+            v_instances_a: Buf::V_INSTANCES_A, v_instances_b: Buf::V_INSTANCES_B, v_instances_c: Buf::V_INSTANCES_C,
         } [subgroup_size: subgroup, tile_width: tile_width, tile_height: tile_height], GRID());
     }
 }

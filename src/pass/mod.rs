@@ -10,10 +10,10 @@ pub mod loss;
 mod lift;
 mod optimize;
 mod project;
-mod scan;
+pub mod scan;
 pub mod shape;
+pub mod sort;
 pub mod stage;
-mod sort;
 mod tile;
 
 pub use build::Builder;

@@ -43,7 +43,8 @@ pub fn adam(b: &mut Builder) {
     for a in ATTRIBUTES.iter().filter(|a| a.from_degree <= degree) {
         pass!(b, texel adam {
             step: Buf::STEP, failure: Buf::FAILURE, splat_from_gaussian: Buf::SPLAT_FROM_GAUSSIAN,
-            gradients: a.gradient, parameters: a.planes[0], first_moments: a.planes[1], second_moments: a.planes[2],
+            gradients: a.gradient, parameters_in: a.planes[0], first_moments_in: a.planes[1],
+            second_moments_in: a.planes[2], parameters: a.planes[0], first_moments: a.planes[1], second_moments: a.planes[2],
         } [stride: a.stride, rate: a.rate], args(a.args));
     }
 }

@@ -102,7 +102,7 @@ fn check_grid(table: &'static [BufferDecl], sizes: &[Size], pass: &PassDecl, lim
 
 fn check_storage(decl: &BufferDecl, size: Size, binding: &BindingDesc, limits: &Limits) -> Result<()> {
     let (ours, shaders) = (decl.element_bytes, binding.element_bytes);
-    let divides = shaders == 0 || ours.is_multiple_of(shaders) || shaders.is_multiple_of(ours);
+    let divides = shaders == 0 || ours.is_multiple_of(shaders);
     if !divides || size.bytes < u64::from(shaders) {
         let (name, block, bytes) = (decl.name, binding.name, size.bytes);
         return Err(Error::Bug(format!(

@@ -42,7 +42,9 @@ crate::buffers! {
     DENSIFY_STATS "densify_stats": 8, Domain::Trained, Class::Model, None, "Sum of screen gradients and number of views since the last densification [N].";
     LABEL_KEYS "label_keys": 4, Domain::Labelled, Class::Kept, None, "Votes of a step [N]: weight in the high half, label in the low; 0: none.";
     FAILURE "failure": 4, Domain::One, Class::Kept, None, "Sticky bits; passes that change the model do nothing while one is set.";
-    V_INSTANCES "v_instances": 48, Domain::TrainedInstances, Class::Kept, VEC4, "Gradient record of each (splat, tile) pair [I,3 vec4], valid where its stamp is the step's.";
+    V_INSTANCES_A "v_instances_a": 16, Domain::TrainedInstances, Class::Kept, VEC4, "Gradient record of each (splat, tile) pair [I]: v_mean2d, v_conic xy.";
+    V_INSTANCES_B "v_instances_b": 16, Domain::TrainedInstances, Class::Kept, VEC4, "The same: v_conic z, v_log_opacity, v_colour rg.";
+    V_INSTANCES_C "v_instances_c": 16, Domain::TrainedInstances, Class::Kept, VEC4, "The same: v_colour b, and the stamp; the record is valid where that is the step's.";
 
     COUNTERS "counters": size_of::<Counters>() as u32, Domain::One, Class::Kept, None, "Counts of this step (glsl/include/step.glsl).";
     DISPATCH_ARGS "dispatch_args": 4, Domain::Fixed(24), Class::Step, None, "Indirect dispatch arguments (ARGS_ words of constants.glsl).";
@@ -70,7 +72,7 @@ crate::buffers! {
     LAYER_OFFSETS "layer_offsets": 4, Domain::VirtualTiles, Class::Step, WORD, "Place among the occupied.";
     LAYER_TILES "layer_tiles": 4, Domain::LayerTiles, Class::Step, WORD, "The occupied tiles of object layers.";
     LAYER_STATE "layer_state": 8, Domain::LayerPixels, Class::Step, None, "Transmittance, last splat and gradient signs of each pixel of an occupied layer tile.";
-    LAYER_LOSS "layer_loss": 4, Domain::LayerTiles, Class::Step, None, "Label loss of each occupied layer tile, not scaled.";
+    LAYER_LOSS "layer_loss": 4, Domain::LayerTiles, Class::Step, None, "Label loss of each occupied layer tile less that of an empty picture, not scaled.";
     IMAGE "image": 16, Domain::Pixels, Class::Step, VEC4, "The picture [P] (r, g, b over the background, final transmittance).";
     LAST "last": 4, Domain::Pixels, Class::Step, WORD, "1 + index of the last splat of the tile's list that contributed [P].";
     SEGMENT_COLOURS "segment_colours": 16, Domain::SegmentPixels, Class::Step, None, "State of each pixel of each job between two segments of a long list (colour, transmittance).";

@@ -37,7 +37,7 @@ pub fn label_colour(id: u32) -> [u8; 3] {
         return [0; 3];
     }
     let hue = (f64::from(id) * 0.618_033_988_749_895).fract() * 6.0;
-    let saturation = if id % 2 == 0 { 0.55 } else { 0.95 };
+    let saturation = if id.is_multiple_of(2) { 0.55 } else { 0.95 };
     let channel = |offset: f64| {
         let k = (offset + hue) % 6.0;
         let value = 1.0 - saturation * k.min(4.0 - k).clamp(0.0, 1.0);

@@ -105,7 +105,7 @@ pub struct TrainConfig {
 
     /// Steps after which the model is saved besides the last one. None.
     pub save_at: Vec<u32>,
-    /// Steps between two preview pictures of a held-out view; 0 makes none. 0.
+    /// Steps between two preview pictures of a held-out view; 0 makes none. 1000.
     pub preview_every: u32,
 }
 
@@ -147,7 +147,7 @@ impl Default for TrainConfig {
             opacity_reset_interval: 3000,
             opacity_reset_margin: 1500,
             save_at: Vec::new(),
-            preview_every: 0,
+            preview_every: 1000,
         }
     }
 }

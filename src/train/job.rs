@@ -25,8 +25,27 @@ pub struct TrainView {
     pub mask: Option<LabelMap>,
     /// Objects of the mask, sorted.
     pub objects: Vec<u16>,
+    /// For each object the sum of r + g + b over its pixels of the photo: the label loss of an empty layer, not scaled.
+    pub object_light: BTreeMap<u16, f64>,
     /// For each object, the objects that hide it in this view.
     pub occluders: BTreeMap<u16, Vec<u16>>,
+}
+
+/// Sum of r + g + b over the pixels of each object.
+pub fn object_light(photo: &Photo, mask: Option<&LabelMap>) -> BTreeMap<u16, f64> {
+    let mut light = BTreeMap::new();
+    for (&id, &[r, g, b, valid]) in mask.into_iter().flat_map(|mask| mask.ids.iter().zip(&photo.rgba)) {
+        if id != 0 && valid > 127 {
+            *light.entry(id).or_insert(0.0) += (f64::from(r) + f64::from(g) + f64::from(b)) / 255.0;
+        }
+    }
+    light
+}
+
+/// Label loss of a step, weighted, from what the device summed up.
+pub fn label_loss(job: &Job, view: &TrainView, config: &TrainConfig, loss_label: f32) -> f64 {
+    let empty: f64 = job.layers.iter().filter_map(|label| view.object_light.get(label)).sum();
+    (f64::from(loss_label) + empty) / (3.0 * view.valid_pixels.max(1) as f64) * f64::from(config.label_weight)
 }
 
 /// What a step needs to be submitted, and submitted again after a buffer had to grow.

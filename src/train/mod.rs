@@ -133,9 +133,14 @@ impl Trainer {
         self.config.sh_degree_at(self.step)
     }
 
-    /// Reads the model back.
+    /// Reads the model back. Steps that failed for want of memory changed nothing in it.
     pub fn model(&mut self) -> Result<Gaussians> {
-        self.drain()?;
+        if let Err(error) = self.drain() {
+            if !matches!(error, Error::OutOfMemory { .. }) {
+                return Err(error);
+            }
+            self.flying.clear();
+        }
         self.engine.download_model(self.config.sh_degree)
     }
 
@@ -239,7 +244,7 @@ impl Trainer {
         let (counters, lambda) = (&report.counters, f64::from(self.config.lambda_dssim));
         let l1 = f64::from(counters.loss_l1) * scale;
         let loss = (1.0 - lambda) * l1 + lambda * (1.0 - f64::from(counters.loss_ssim) * scale);
-        let label_loss = f64::from(counters.loss_label) * scale * f64::from(self.config.label_weight);
+        let label_loss = job::label_loss(&job, view, &self.config, counters.loss_label);
         if !(loss + label_loss).is_finite() {
             return Err(Error::Numeric {
                 quantity: format!("the loss is {loss}, the label loss {label_loss}"),
@@ -257,5 +262,6 @@ fn train_view(view: &mut crate::scene::View) -> Result<TrainView> {
     let mask = view.mask.take();
     let objects = mask.as_ref().map(crate::scene::LabelMap::objects).unwrap_or_default();
     let (name, camera) = (view.name.clone(), view.camera.clone());
-    Ok(TrainView { name, camera, photo, valid_pixels, mask, objects, occluders: Default::default() })
+    let object_light = job::object_light(&photo, mask.as_ref());
+    Ok(TrainView { name, camera, photo, valid_pixels, mask, objects, object_light, occluders: Default::default() })
 }

@@ -90,8 +90,9 @@ impl Default for Rules {
             ssim_reach: 5,
             ssim_c1: wide(0.01 * 0.01),
             ssim_c2: wide(0.03 * 0.03),
-            adam_beta1: wide(0.9),
-            adam_beta2: wide(0.999),
+            // The compiler of the shaders takes 1 - beta from the decimal numbers.
+            adam_beta1: 0.9,
+            adam_beta2: 0.999,
             adam_eps: wide(1e-15),
             densify_gradient: wide(2e-4),
             percent_dense: wide(0.01),

@@ -14,6 +14,8 @@ pub struct Summary {
     pub place: usize,
     /// Elements that were beyond the tolerance for an allowed reason.
     pub flips: usize,
+    /// For gradients: the largest of norm, angle and bias in units of their bounds.
+    pub whole: f64,
 }
 
 /// Panics with the verdict's text.
@@ -73,7 +75,7 @@ pub fn close(actual: &[f64], expected: &[f64], tolerance: Tolerance) -> Verdict 
             return Err(format!("element {place}: {a} where {e} is expected"));
         }
         if error > summary.worst {
-            summary = Summary { worst: error, place, flips: 0 };
+            summary = Summary { worst: error, place, ..Summary::default() };
         }
     }
     if summary.worst > 1.0 {
@@ -186,11 +188,12 @@ pub fn gradients(actual: &[f64], expected: &[f64], bounds: GradientBounds) -> Ve
             summary.worst
         ));
     }
-    whole(actual, expected, bounds)?;
+    summary.whole = whole(actual, expected, bounds)?;
     Ok(summary)
 }
 
-fn whole(actual: &[f64], expected: &[f64], bounds: GradientBounds) -> Result<(), String> {
+fn whole(actual: &[f64], expected: &[f64], bounds: GradientBounds) -> Result<f64, String> {
+    let mut worst = 0.0_f64;
     let pairs = || actual.iter().zip(expected);
     let squared = |values: &[f64]| values.iter().map(|v| v * v).sum::<f64>();
     let (aa, ee) = (squared(actual), squared(expected));
@@ -204,6 +207,7 @@ fn whole(actual: &[f64], expected: &[f64], bounds: GradientBounds) -> Result<(),
         if !(value <= bound) {
             return Err(format!("{name} of the error is {value:.3e}, {bound:.3e} is allowed"));
         }
+        worst = worst.max(value / bound);
     }
-    Ok(())
+    Ok(worst)
 }

@@ -1,7 +1,7 @@
 //! Parser of `glsl/variants.txt`: which shaders are compiled more than once, and with which macros.
 //!
 //! `stem + suffix: DEFINE OTHER=4` compiles `stem.comp` once more as `stem_suffix`, with the same interface.
-//! `* + suffix: DEFINE` does so for every shader that fetches through FETCH4 or FETCHU.
+//! `* + suffix: DEFINE` does so for every shader that fetches through FETCH4, FETCHU or FETCHC.
 //! `sibling = stem: DEFINE` makes a shader of its own, with an interface of its own, from the same file.
 //! Every stem has its base variant without macros; it needs no line. Lines work in order: a `*` reaches the siblings
 //! above it. `#` begins a comment.
@@ -28,7 +28,7 @@ pub struct VariantLine {
 impl VariantLine {
     /// Whether the line adds a variant to this shader.
     pub fn applies_to(&self, shader: &super::Shader) -> bool {
-        let fetches = || ["FETCH4(", "FETCHU("].iter().any(|word| shader.source.contains(word));
+        let fetches = || ["FETCH4(", "FETCHU(", "FETCHC("].iter().any(|word| shader.source.contains(word));
         !self.sibling && (self.stem == shader.stem || (self.stem == "*" && fetches()))
     }
 }

@@ -1,0 +1,216 @@
+//! Blending forward and backward, of the scene and of the object layers.
+
+use super::rig::{Rig, image_margins, prove};
+use crate::reference::blend::{self, Blended, blend_backward, blend_forward, blend_layers_forward};
+use crate::reference::loss::label_loss;
+use crate::reference::project::{Splat, SplatGradient};
+use crate::reference::{Rules, tile};
+use crate::support::compare::{
+    Band, GradientBounds, Tolerance, Verdict, close, close_with_band, exact, gradients,
+};
+use crate::support::device;
+use crate::support::scenes::{Scene, Shape, scene};
+use labelgs::plan::Buf;
+
+/// Faint to opaque, so that pixels stop and alphas are clamped.
+pub fn opaque_scene(seed: u64) -> Scene {
+    scene(seed, &Shape { gaussians: 400, width: 61, height: 45, opacities: (-4.0, 9.0), ..Shape::default() })
+}
+
+/// A pair that falls just beside the cut moves a colour by 1/255 of it; a stop moves it by 1e-4.
+const CUT: Band = Band { width: 2e-5, flip: 0.01, ratio: 0.001 };
+/// Sums of some 50 f32 products; 4.1e-7 seen.
+const COLOUR: Tolerance = Tolerance { absolute: 6.5e-7, relative: 0.0 };
+
+/// Colours and transmittance of each pixel.
+fn picture(image: &Blended) -> Vec<f64> {
+    image.pixels.iter().flat_map(|p| [p.colour[0], p.colour[1], p.colour[2], p.transmittance]).collect()
+}
+
+fn compare_picture(actual: &[[f32; 4]], expected: &Blended) -> Verdict {
+    let actual: Vec<f64> = actual.as_flattened().iter().map(|&v| f64::from(v)).collect();
+    close_with_band(&actual, &picture(expected), &image_margins(expected, 4), (COLOUR, CUT), |_, _| true)
+}
+
+/// The splat at `last` of each pixel's tile list, +1; 0 for none.
+fn last_splats(rig: &mut Rig) -> Vec<usize> {
+    let (shape, (width, _), pixels) = (*rig.engine.shape(), rig.size(), rig.pixels());
+    let counters = rig.engine.report(0).expect("a report").counters;
+    let last = rig.get::<u32>(Buf::LAST, pixels);
+    let sorted = rig.get::<u32>(Buf::SORTED_SPLATS, counters.instance_count as usize);
+    let uniforms = rig.uniforms();
+    let starts = rig.get::<u32>(Buf::TILE_STARTS, uniforms.tile_count as usize);
+    let tile_of = |pixel: usize| {
+        let (x, y) = ((pixel % width) as u32, (pixel / width) as u32);
+        (y / shape.tile_height * uniforms.tiles_x + x / shape.tile_width) as usize
+    };
+    (last.iter().enumerate())
+        .map(|(pixel, &last)| match last {
+            0 => 0,
+            _ => sorted[(starts[tile_of(pixel)] + last - 1) as usize] as usize + 1,
+        })
+        .collect()
+}
+
+#[test]
+fn blend_forward_of_the_scene() {
+    let Some(turn) = device() else { return };
+    let mut rig = Rig::new(turn, opaque_scene(51), false);
+    rig.train();
+    let (splats, size, background) = (rig.splats(), rig.size(), rig.scene.target.background);
+    let image = rig.get::<[f32; 4]>(Buf::IMAGE, size.0 * size.1);
+    let last = last_splats(&mut rig);
+    let stopped = image.iter().filter(|pixel| pixel[3] < 1e-3).count();
+    assert!(stopped > 100, "only {stopped} pixels are opaque");
+    prove("blend_forward", &["alpha_min", "alpha_max", "transmittance_min"], |rules| {
+        let expected = blend_forward(rules, &splats, size, background);
+        let sure: Vec<usize> = (0..image.len()).filter(|&i| expected.pixels[i].margins.image() > CUT.width).collect();
+        let (a, e): (Vec<usize>, Vec<usize>) = sure.iter().map(|&i| (last[i], expected.pixels[i].last)).unzip();
+        exact(&a, &e)?;
+        compare_picture(&image, &expected)
+    });
+    // The list of a render blends the same picture.
+    rig.render();
+    let rendered = rig.get::<[f32; 4]>(Buf::IMAGE, size.0 * size.1);
+    assert!(bytemuck::cast_slice::<_, u32>(&rendered) == bytemuck::cast_slice::<_, u32>(&image), "render and training agree");
+}
+
+#[test]
+fn blend_forward_main_of_a_render() {
+    let Some(turn) = device() else { return };
+    let mut rig = Rig::new(turn, opaque_scene(52), false);
+    rig.render();
+    let (splats, size, background) = (rig.splats(), rig.size(), rig.scene.target.background);
+    let pixels = size.0 * size.1;
+    let image = rig.get::<[f32; 4]>(Buf::IMAGE, pixels);
+    let main = rig.get::<i32>(Buf::MAIN_GAUSSIAN, pixels);
+    let weight_depth = rig.get::<[f32; 2]>(Buf::MAIN_WEIGHT_DEPTH, pixels);
+    prove("blend_forward_main", &["alpha_min", "alpha_max", "transmittance_min"], |rules| {
+        let expected = blend_forward(rules, &splats, size, background);
+        compare_picture(&image, &expected)?;
+        let sure = |i: &usize| expected.pixels[*i].margins.image().min(expected.pixels[*i].margins.main) > CUT.width;
+        let sure: Vec<usize> = (0..pixels).filter(sure).collect();
+        assert!(sure.len() * 100 > pixels * 99, "{} of {pixels} pixels are sure", sure.len());
+        let (a, e): (Vec<i32>, Vec<i32>) = sure.iter().map(|&i| (main[i], expected.pixels[i].main)).unzip();
+        exact(&a, &e)?;
+        let pairs = |i: &usize| [f64::from(weight_depth[*i][0]), f64::from(weight_depth[*i][1]) / 4.0];
+        let mirrored = |i: &usize| [expected.pixels[*i].main_weight, expected.pixels[*i].depth / 4.0];
+        let actual: Vec<f64> = sure.iter().flat_map(pairs).collect();
+        close(&actual, &sure.iter().flat_map(mirrored).collect::<Vec<_>>(), COLOUR)
+    });
+}
+
+/// Splats whose decisions are all farther than this from their thresholds are compared.
+const SURE: f64 = 1e-5;
+
+/// Sums over pixels in f32, transmittance by division; 0.27 of (1e-6, 1e-5) seen by element, 0.25 of 1e-6 as a whole.
+const BOUNDS: GradientBounds = GradientBounds {
+    element: Tolerance { absolute: 4e-7, relative: 4e-6 },
+    outliers: 0.0,
+    norm: 4e-7,
+    angle: 4e-13,
+    bias: 4e-7,
+};
+
+/// Each kind of float of the splats' gradients on its own.
+pub fn compare_splat_gradients(
+    actual: &[SplatGradient],
+    expected: &[SplatGradient],
+    margins: &[f64],
+    bounds: GradientBounds,
+) -> Verdict {
+    let sure: Vec<usize> = (0..actual.len()).filter(|&i| margins[i] > SURE).collect();
+    assert!(sure.len() * 10 > actual.len() * 7, "{} of {} splats are sure", sure.len(), actual.len());
+    let pick = |of: &[SplatGradient], kind: usize| -> Vec<f64> {
+        let floats = |v: &SplatGradient| match kind {
+            0 => v.mean2d.to_vec(),
+            1 => v.conic.to_vec(),
+            2 => vec![v.opacity],
+            _ => v.colour.to_vec(),
+        };
+        sure.iter().flat_map(|&i| floats(&of[i])).collect()
+    };
+    super::project::all(["mean2d", "conic", "opacity", "colour"].into_iter().enumerate().map(|(kind, name)| {
+        gradients(&pick(actual, kind), &pick(expected, kind), bounds).map_err(|text| format!("{name}: {text}"))
+    }))
+}
+
+#[test]
+fn blend_backward_and_gather_of_the_scene() {
+    let Some(turn) = device() else { return };
+    let mut rig = Rig::new(turn, opaque_scene(53), false);
+    rig.train();
+    let (splats, size, background) = (rig.splats(), rig.size(), rig.scene.target.background);
+    let v_image = v_image(&mut rig);
+    let actual = rig.splat_gradients(&splats);
+    prove("blend_backward", &["alpha_min", "alpha_max", "transmittance_min"], |rules| {
+        let expected = blend_backward(rules, &splats, size, background, &v_image);
+        compare_splat_gradients(&actual, &expected.values, &expected.margins, BOUNDS)
+    });
+}
+
+/// Gradient of the photo loss by the image, as the device's loss passes left it.
+fn v_image(rig: &mut Rig) -> Vec<[f64; 3]> {
+    let pixels = rig.pixels();
+    rig.get::<[f32; 4]>(Buf::V_IMAGE, pixels).iter().map(|&[r, g, b, _]| [r, g, b].map(f64::from)).collect()
+}
+
+/// Gradient of every layer: the scene's from the device, the objects' from their mirror (a sign of each difference), and
+/// the distance of each splat to a kink of a label loss.
+fn v_layers(rules: &Rules, rig: &Rig, splats: &[Splat], v_scene: &[[f64; 3]]) -> (Vec<Vec<[f64; 3]>>, Vec<f64>) {
+    let (target, labels, size) = (&rig.scene.target, rig.model().labels, rig.size());
+    let layers = blend_layers_forward(rules, splats, &labels, &rig.slots(), size, target.background);
+    let mut v_layers = vec![v_scene.to_vec()];
+    let mut kinks = vec![f64::INFINITY; size.0 * size.1];
+    for (slot, layer) in target.slots.iter().zip(&layers[1..]) {
+        let loss = label_loss(rules, &layer.colours(), &target.photo, &target.label_map, slot);
+        kinks.iter_mut().zip(&loss.margins).for_each(|(least, margin)| *least = least.min(*margin));
+        v_layers.push(loss.v_image);
+    }
+    (v_layers, blend::smallest_over_pixels(rules, splats, size, &kinks))
+}
+
+/// method.md check 10: one walk over all layers, and its gradient, equal the separate renders of the filtered models.
+#[test]
+fn object_layers_equal_filtered_renders() {
+    let Some(turn) = device() else { return };
+    let mut rig = Rig::new(turn, opaque_scene(54), true);
+    let report = rig.train();
+    assert!(report.counters.layer_tile_count > 10);
+    let splats = rig.splats();
+    let v_scene = v_image(&mut rig);
+    let actual = rig.splat_gradients(&splats);
+    let (labels, slots, size, target) = (rig.model().labels, rig.slots(), rig.size(), rig.scene.target.clone());
+    prove("object layers", &["alpha_min", "alpha_max", "label_weight"], |rules| {
+        let (v_layers, kinks) = v_layers(rules, &rig, &splats, &v_scene);
+        // Separate renders: each object's splats alone, over black.
+        let mut expected = blend_backward(rules, &splats, size, target.background, &v_scene);
+        for (slot, v_image) in slots.iter().zip(&v_layers[1..]) {
+            let members: Vec<usize> = (0..splats.len()).filter(|&i| labels[splats[i].gaussian] == *slot).collect();
+            let alone: Vec<Splat> = members.iter().map(|&i| splats[i]).collect();
+            let layer = blend_backward(rules, &alone, size, [0.0; 3], v_image);
+            for (place, &i) in members.iter().enumerate() {
+                expected.values[i] = expected.values[i].plus(&layer.values[place]);
+                expected.margins[i] = expected.margins[i].min(layer.margins[place]);
+            }
+        }
+        let margins: Vec<f64> = expected.margins.iter().zip(&kinks).map(|(a, b)| a.min(*b)).collect();
+        compare_splat_gradients(&actual, &expected.values, &margins, BOUNDS)
+    });
+}
+
+/// The device's boxes and tile test let nothing through that counts: a pixel outside of a splat's tiles never sees it.
+#[test]
+fn no_tile_misses_a_splat_that_counts() {
+    let Some(turn) = device() else { return };
+    let mut rig = Rig::new(turn, opaque_scene(55), false);
+    rig.train();
+    let (splats, (width, height), shape) = (rig.splats(), rig.size(), *rig.engine.shape());
+    let touched = rig.get::<u32>(Buf::TILES_TOUCHED, splats.len());
+    let grid = tile::TileGrid { size: (width, height), tile: (shape.tile_width as usize, shape.tile_height as usize) };
+    let rules = Rules::default();
+    for (splat, &touched) in splats.iter().zip(&touched) {
+        let least = tile::counted_tiles(&rules, splat, &grid).len() as u32;
+        assert!(touched >= least, "{touched} tiles for a splat that counts in {least}");
+    }
+}

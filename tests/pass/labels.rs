@@ -1,0 +1,256 @@
+//! Lift, label loss, and what labels must not change.
+
+use super::rig::{Rig, prove};
+use crate::reference::blend::{blend_forward, blend_layers_forward};
+use crate::reference::lift::{Masks, centres_of, lift, lift_resolve};
+use crate::reference::loss::{ObjectSlot, Photo, label_loss};
+use crate::reference::step::Target;
+use crate::reference::{Row, Rules};
+use crate::support::compare::{Tolerance, Verdict, check, close, exact};
+use crate::support::device;
+use crate::support::scenes::{Scene, Shape, dot, plain_camera, scene};
+use labelgs::plan::Buf;
+use labelgs::scene::Gaussians;
+use labelgs::train::job;
+
+/// Gaussians large and opaque enough to dominate pixels; masks are three columns, with nothing at the upper border.
+fn dominant(seed: u64) -> Scene {
+    let shape = Shape { scales: (0.1, 0.5), opacities: (1.0, 8.0), ..Shape::default() };
+    let mut s = scene(seed, &Shape { gaussians: 50, width: 61, height: 45, ..shape });
+    for (index, label) in s.target.label_map.iter_mut().enumerate() {
+        *label = if index / 61 < 6 { 0 } else { (index % 61 * 3 / 61 + 1) as u32 };
+    }
+    s
+}
+
+#[test]
+fn lift_with_and_without_the_filter() {
+    for gpf in [true, false] {
+        let Some(turn) = device() else { return };
+        let mut rig = Rig::new(turn, dominant(131), true);
+        rig.config.gpf = gpf;
+        // One object of the masks is not sampled.
+        rig.job.layers.pop();
+        rig.train();
+        let (splats, size, background) = (rig.splats(), rig.size(), rig.scene.target.background);
+        let before = rig.model().labels;
+        let actual = rig.get::<u32>(Buf::LABELS, before.len());
+        let (sampled, label_map) = (rig.slots(), rig.scene.target.label_map.clone());
+        prove(&format!("lift, filter {gpf}"), &["lift_threshold"], |rules| -> Verdict {
+            let image = blend_forward(rules, &splats, size, background);
+            let masks = Masks { label_map: &label_map, sampled: &sampled, gpf };
+            let votes = lift(rules, &image, &centres_of(&splats, before.len()), &masks);
+            let mut expected = before.clone();
+            lift_resolve(&votes, &mut expected);
+            let changed = expected.iter().zip(&before).filter(|(a, b)| a != b).count();
+            assert!(changed > 5, "only {changed} labels change");
+            let sure: Vec<usize> = (0..before.len()).filter(|&i| votes.margins[i] > 1e-5).collect();
+            assert!(sure.len() * 10 > before.len() * 9);
+            let pick = |of: &[u32]| sure.iter().map(|&i| of[i]).collect::<Vec<_>>();
+            exact(&pick(&actual), &pick(&expected))
+        });
+        assert!(rig.get::<u32>(Buf::LABEL_KEYS, before.len()).iter().all(|&key| key == 0), "votes start over");
+    }
+}
+
+#[test]
+fn label_loss_of_a_step() {
+    let Some(turn) = device() else { return };
+    let mut rig = Rig::new(turn, dominant(132), true);
+    let counters = rig.train().counters;
+    let (splats, size, labels, slots) = (rig.splats(), rig.size(), rig.model().labels, rig.slots());
+    let target = rig.scene.target.clone();
+    assert!(target.slots.iter().any(|slot| !slot.occluders.is_empty()));
+    let actual = job::label_loss(&rig.job, &rig.view, &rig.config, counters.loss_label);
+    prove("label loss", &["label_weight"], |rules| {
+        let layers = blend_layers_forward(rules, &splats, &labels, &slots, size, target.background);
+        let losses = target.slots.iter().zip(&layers[1..]);
+        let losses = losses.map(|(slot, layer)| label_loss(rules, &layer.colours(), &target.photo, &target.label_map, slot));
+        close(&[actual], &[losses.map(|loss| loss.value).sum()], Tolerance { absolute: 0.0, relative: 2e-6 })
+    });
+}
+
+/// The statistic of densification sees the scene's layer only.
+#[test]
+fn densification_does_not_see_the_label_loss() {
+    let run = |label_weight: f32| -> Option<(Vec<u32>, Vec<u32>)> {
+        let mut rig = Rig::new(device()?, dominant(133), true);
+        rig.config.label_weight = label_weight;
+        rig.train();
+        let count = rig.scene.gaussians.len();
+        let splats = rig.splats().len();
+        Some((rig.get(Buf::DENSIFY_STATS, 2 * count), rig.get(Buf::V_MEANS, 4 * splats)))
+    };
+    let (Some(without), Some(with)) = (run(0.0), run(1e6)) else { return };
+    assert!(without.0.iter().any(|&v| v != 0));
+    check("densify_stats", exact(&with.0, &without.0));
+    assert_ne!(with.1, without.1, "the label loss reaches the parameters");
+}
+
+/// Colours are those of `sh0`; labels are given.
+fn drawn(rows: &[Row], labels: Vec<u32>, width: u32, height: u32, label_map: Vec<u32>) -> Scene {
+    let narrow = |v: f64| v as f32;
+    let pixels = (width * height) as usize;
+    let objects: std::collections::BTreeSet<u32> = label_map.iter().chain(&labels).copied().filter(|&id| id > 0).collect();
+    Scene {
+        camera: plain_camera(width, height),
+        gaussians: Gaussians {
+            means: rows.iter().map(|r| r.mean.map(narrow)).collect(),
+            quats: rows.iter().map(|r| r.quat.map(narrow)).collect(),
+            scales: rows.iter().map(|r| r.scale.map(narrow)).collect(),
+            opacities: rows.iter().map(|r| narrow(r.opacity)).collect(),
+            sh0: rows.iter().map(|r| r.sh[0].map(narrow)).collect(),
+            sh_rest: Vec::new(),
+            sh_degree: 0,
+            labels: Some(labels),
+        },
+        target: Target {
+            photo: Photo {
+                size: (width as usize, height as usize),
+                colours: vec![[f64::from(128.0_f32 / 255.0); 3]; pixels],
+                valid: vec![true; pixels],
+            },
+            label_map,
+            slots: objects.iter().map(|&label| ObjectSlot { label, occluders: Vec::new() }).collect(),
+            background: [0.0; 3],
+        },
+    }
+}
+
+const SIDE: u32 = 17;
+/// Index of the pixel that holds the dots' centre.
+const MIDDLE: usize = 8 * 17 + 8;
+
+/// Dots one behind the other at the middle of a picture that is all object 7.
+fn on_a_ray(opacities: &[f64]) -> Scene {
+    let camera = plain_camera(SIDE, SIDE);
+    let rows: Vec<Row> =
+        opacities.iter().enumerate().map(|(i, &o)| dot(&camera, [8.5, 8.5], 5.0 + i as f64, 3.0, o)).collect();
+    drawn(&rows, vec![0; rows.len()], SIDE, SIDE, vec![7; (SIDE * SIDE) as usize])
+}
+
+/// method.md check 1.
+#[test]
+fn two_gaussians_on_a_ray() {
+    for (opacities, weight, labels) in [([0.7, 0.9], 0.7, [7, 0]), ([0.5, 0.999], 0.5, [0, 0])] {
+        let Some(turn) = device() else { return };
+        let mut rig = Rig::new(turn, on_a_ray(&opacities), true);
+        rig.render();
+        assert_eq!(rig.get::<u32>(Buf::MAIN_GAUSSIAN, MIDDLE + 1)[MIDDLE], 0, "the near one");
+        let found = f64::from(rig.get::<[f32; 2]>(Buf::MAIN_WEIGHT_DEPTH, MIDDLE + 1)[MIDDLE][0]);
+        check("weight", close(&[found], &[weight], Tolerance { absolute: 1e-6, relative: 0.0 }));
+        rig.train();
+        assert_eq!(rig.get::<u32>(Buf::LABELS, 2), labels);
+    }
+}
+
+/// method.md check 2: what is left behind two saturated splats is below the limit, so the second does not count.
+#[test]
+fn two_saturated_splats_stop() {
+    let Some(turn) = device() else { return };
+    let mut rig = Rig::new(turn, on_a_ray(&[0.9999, 0.9999, 0.5]), false);
+    rig.train();
+    assert_eq!(rig.get::<u32>(Buf::LAST, MIDDLE + 1)[MIDDLE], 1);
+    assert_eq!(rig.get::<[f32; 4]>(Buf::IMAGE, MIDDLE + 1)[MIDDLE][3], 1.0 - 0.99_f32);
+}
+
+/// method.md check 3.
+#[test]
+fn a_pixel_without_a_splat_has_no_main_gaussian() {
+    let Some(turn) = device() else { return };
+    let camera = plain_camera(SIDE, SIDE);
+    let mut s = drawn(&[dot(&camera, [2.5, 2.5], 5.0, 0.5, 0.9)], vec![0], SIDE, SIDE, vec![7; 289]);
+    s.target.background = [0.25, 0.5, 0.75];
+    let mut rig = Rig::new(turn, s, false);
+    rig.render();
+    assert_eq!(rig.get::<i32>(Buf::MAIN_GAUSSIAN, 289)[MIDDLE], -1);
+    assert_eq!(rig.get::<[f32; 2]>(Buf::MAIN_WEIGHT_DEPTH, 289)[MIDDLE], [0.0, 0.0]);
+    assert_eq!(rig.get::<[f32; 4]>(Buf::IMAGE, 289)[MIDDLE], [0.25, 0.5, 0.75, 1.0]);
+    assert_eq!(rig.get::<i32>(Buf::MAIN_GAUSSIAN, 289)[2 * 17 + 2], 0);
+}
+
+/// method.md check 4: centre in mask 1, main pixels in mask 2 only.
+#[test]
+fn a_gaussian_across_two_masks() {
+    for (gpf, expected) in [(true, 0), (false, 2)] {
+        let Some(turn) = device() else { return };
+        let camera = plain_camera(48, 8);
+        let rows = [dot(&camera, [7.5, 4.5], 5.0, 8.0, 0.985), dot(&camera, [10.5, 4.5], 6.0, 60.0, 0.95)];
+        let mask = |x: usize| if x < 14 { 1 } else if x >= 32 { 2 } else { 0 };
+        let s = drawn(&rows, vec![0, 0], 48, 8, (0..48 * 8).map(|i| mask(i % 48)).collect());
+        let mut rig = Rig::new(turn, s, true);
+        rig.config.gpf = gpf;
+        rig.train();
+        assert_eq!(rig.get::<u32>(Buf::LABELS, 2), [1, expected], "filter {gpf}");
+    }
+}
+
+/// method.md check 5, in coordinates where the first pixel reaches from 0 to 1.
+#[test]
+fn a_centre_beside_the_image_lifts_nothing() {
+    for (x, expected) in [(0.1, 7), (-0.1, 0), (-0.7, 0)] {
+        for gpf in [true, false] {
+            let Some(turn) = device() else { return };
+            let camera = plain_camera(SIDE, SIDE);
+            let s = drawn(&[dot(&camera, [x, 8.5], 5.0, 3.0, 0.95)], vec![0], SIDE, SIDE, vec![7; 289]);
+            let mut rig = Rig::new(turn, s, true);
+            rig.config.gpf = gpf;
+            rig.train();
+            assert_eq!(rig.get::<u32>(Buf::LABELS, 1), [expected], "centre at {x}, filter {gpf}");
+        }
+    }
+}
+
+/// method.md check 8: a mask without a Gaussian costs its light and moves nothing.
+#[test]
+fn label_loss_of_an_empty_object() {
+    let Some(turn) = device() else { return };
+    let camera = plain_camera(SIDE, SIDE);
+    let s = drawn(&[dot(&camera, [8.5, 8.5], 5.0, 3.0, 0.4)], vec![0], SIDE, SIDE, vec![7; 289]);
+    let expected = s.target.photo.colours[0][0];
+    let mut rig = Rig::new(turn, s, true);
+    let counters = rig.train().counters;
+    assert_eq!((counters.loss_label, counters.layer_tile_count), (0.0, 0));
+    let loss = job::label_loss(&rig.job, &rig.view, &rig.config, counters.loss_label);
+    check("loss", close(&[loss], &[expected], Tolerance { absolute: 1e-7, relative: 0.0 }));
+    let with: Vec<u32> = rig.get(Buf::V_SPLATS, 12);
+    rig.config.label_weight = 1e6;
+    rig.train();
+    check("gradient", exact(&rig.get::<u32>(Buf::V_SPLATS, 12), &with));
+}
+
+/// method.md check 8: the picture of an object is its photo. A flat layer of opacity 0.5 over black shows half its colour.
+#[test]
+fn label_loss_of_a_right_object() {
+    let Some(turn) = device() else { return };
+    let camera = plain_camera(SIDE, SIDE);
+    let mut row = dot(&camera, [8.5, 8.5], 5.0, 1e4, 0.5);
+    // Degree 0 of the colour: 0.5 + C0 k = 2 * 128 / 255, so that half of it is the photo's 128 / 255.
+    row.sh[0] = [(256.0 / 255.0 - 0.5) / Rules::default().sh_c0; 3];
+    let mut rig = Rig::new(turn, drawn(&[row], vec![7], SIDE, SIDE, vec![7; 289]), true);
+    let counters = rig.train().counters;
+    let loss = job::label_loss(&rig.job, &rig.view, &rig.config, counters.loss_label);
+    check("loss", close(&[loss], &[0.0], Tolerance { absolute: 1e-5, relative: 0.0 }));
+}
+
+/// method.md check 7, U_k on the device: pixels of an occluder say nothing, not even where the object shines through.
+#[test]
+fn pixels_of_occluders_are_left_out() {
+    let Some(turn) = device() else { return };
+    let camera = plain_camera(SIDE, SIDE);
+    let label_map: Vec<u32> = (0..289).map(|i| if i % 17 < 9 { 1 } else { 2 }).collect();
+    let mut s = drawn(&[dot(&camera, [12.5, 8.5], 5.0, 0.4, 0.9)], vec![1], SIDE, SIDE, label_map);
+    s.target.slots[0].occluders = vec![2];
+    let mut rig = Rig::new(turn, s, true);
+    rig.config.label_threshold = 0.99; // the label stays
+    let counters = rig.train().counters;
+    assert!(counters.layer_tile_count > 0 && counters.loss_label == 0.0);
+    let with: Vec<u32> = rig.get(Buf::V_SPLATS, 12);
+    rig.config.label_weight = 0.0;
+    rig.train();
+    check("gradient", exact(&rig.get::<u32>(Buf::V_SPLATS, 12), &with));
+    // Without the occluder the same pixels count.
+    rig.view.occluders.clear();
+    rig.config.label_weight = 1.0;
+    assert!(rig.train().counters.loss_label > 0.0);
+}

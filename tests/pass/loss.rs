@@ -1,0 +1,47 @@
+//! Photo loss: its value, and its gradient by the image.
+
+use super::rig::{Rig, prove};
+use crate::reference::loss::photo_loss;
+use crate::support::compare::{GradientBounds, Tolerance, Verdict, close, gradients};
+use crate::support::device;
+use crate::support::scenes::{Shape, scene};
+use labelgs::plan::Buf;
+
+/// Sums of 121 f32 products of the window, twice; SSIM divides by variances that are small differences.
+const BOUNDS: GradientBounds = GradientBounds {
+    element: Tolerance { absolute: 1e-5, relative: 1e-5 },
+    outliers: 0.0,
+    norm: 1e-5,
+    angle: 1e-10,
+    bias: 1e-5,
+};
+const VALUE: Tolerance = Tolerance { absolute: 1e-6, relative: 0.0 };
+/// Pixels nearer than this to the kink of L1 are left out.
+const KINK: f64 = 1e-6;
+
+/// Sizes below and above a workgroup, none a multiple of a strip.
+#[test]
+fn loss_of_the_photo() {
+    for (seed, width, height) in [(91, 61, 45), (92, 70, 133)] {
+        let Some(turn) = device() else { return };
+        let shape = Shape { gaussians: 150, width, height, ..Shape::default() };
+        let mut rig = Rig::new(turn, scene(seed, &shape), false);
+        let counters = rig.train().counters;
+        let pixels = rig.pixels();
+        let image: Vec<[f64; 3]> =
+            rig.get::<[f32; 4]>(Buf::IMAGE, pixels).iter().map(|&[r, g, b, _]| [r, g, b].map(f64::from)).collect();
+        let v_image = rig.get::<[f32; 4]>(Buf::V_IMAGE, pixels);
+        let photo = &rig.scene.target.photo;
+        let sums = [counters.loss_l1, counters.loss_ssim].map(|v| f64::from(v) / photo.elements());
+        let bearing = ["l1_weight", "dssim_weight", "ssim_sigma", "ssim_reach", "ssim_c1", "ssim_c2"];
+        prove(&format!("photo loss {width}x{height}"), &bearing, |rules| -> Verdict {
+            let expected = photo_loss(rules, &image, photo);
+            let sure: Vec<usize> = (0..pixels).filter(|&i| expected.margins[i] > KINK).collect();
+            let actual = sure.iter().flat_map(|&i| [0, 1, 2].map(|c| f64::from(v_image[i][c]))).collect::<Vec<_>>();
+            let wanted = sure.iter().flat_map(|&i| expected.v_image[i]).collect::<Vec<_>>();
+            let of_gradient = gradients(&actual, &wanted, BOUNDS)?;
+            close(&sums, &[expected.l1, expected.ssim], VALUE)?;
+            Ok(of_gradient)
+        });
+    }
+}

@@ -1,0 +1,146 @@
+//! Scan and sort on numbers of every kind: exact answers.
+
+use super::rig::readable;
+use crate::reference::scan::exclusive_scan;
+use crate::reference::sort::radix_sort;
+use crate::support::compare::{check, exact};
+use crate::support::device;
+use crate::support::scenes::generator;
+use bytemuck::Zeroable;
+use labelgs::engine::{Engine, Room};
+use labelgs::pass::build::Count;
+use labelgs::pass::scan::{self, Total};
+use labelgs::pass::sort::{self, SortBuffers};
+use labelgs::pass::{Builder, KernelShape};
+use labelgs::plan::{Buf, Capacity, PassList};
+use labelgs::shaders::constants::KEY_INVISIBLE;
+use labelgs::shaders::structs::{Counters, StepUniforms};
+use labelgs::sched::ListId;
+use rand::Rng;
+
+const ITEMS: usize = 5000;
+
+fn engine(gpu: std::sync::Arc<labelgs::gpu::Gpu>) -> Engine {
+    let room = Room { gaussians: ITEMS as u64, size: (64, 64), trained: false, labels: None };
+    Engine::new(gpu, room, readable()).expect("the engine starts")
+}
+
+/// Records what `declare` says.
+fn list(engine: &mut Engine, declare: impl FnOnce(&mut Builder)) -> ListId {
+    let (shape, capacity): (KernelShape, Capacity) = (*engine.shape(), *engine.sched().capacity());
+    let list = PassList::new("test");
+    let mut builder = Builder { shape: &shape, capacity: &capacity, labels: false, sh_degree: 0, list };
+    declare(&mut builder);
+    let list = builder.list;
+    engine.sched_mut().prepare(&list).expect("the list is planned")
+}
+
+/// Says that there are so many Gaussians, splats and pairs.
+fn announce(engine: &mut Engine, count: usize) {
+    let count = count as u32;
+    let uniforms = StepUniforms { gaussian_count: count, ..StepUniforms::zeroed() };
+    let counters = Counters { visible_count: count, instance_count: count, ..Counters::zeroed() };
+    engine.sched_mut().upload(Buf::STEP, 0, 0, &[uniforms]).expect("upload");
+    engine.sched_mut().upload(Buf::COUNTERS, 0, 0, &[counters]).expect("upload");
+}
+
+fn get(engine: &mut Engine, buf: Buf, count: usize) -> Vec<u32> {
+    engine.sched_mut().download(buf, 0, 0, count).expect("download")
+}
+
+fn counters(engine: &mut Engine) -> Counters {
+    engine.sched_mut().download::<Counters>(Buf::COUNTERS, 0, 0, 1).expect("download")[0]
+}
+
+const COUNTS: [usize; 7] = [0, 1, 7, 63, 64, 1000, ITEMS];
+
+#[test]
+fn scan_of_numbers() {
+    let Some(turn) = device() else { return };
+    let mut engine = engine(turn.gpu());
+    let id = list(&mut engine, |b| scan::scan(b, Buf::TILES_TOUCHED, Buf::INSTANCE_OFFSETS, Count::Splats, Total::Instances));
+    let mut random = generator(71);
+    for count in COUNTS {
+        let values: Vec<u32> = (0..count).map(|_| random.random_range(0..900)).collect();
+        announce(&mut engine, count);
+        engine.sched_mut().upload(Buf::TILES_TOUCHED, 0, 0, &values).expect("upload");
+        engine.sched_mut().run(id, 0).expect("run");
+        engine.sched_mut().check_guards().expect("no pass writes outside of its buffers");
+        let (offsets, total) = exclusive_scan(&values);
+        check("offsets", exact(&get(&mut engine, Buf::INSTANCE_OFFSETS, count), &offsets));
+        assert_eq!(counters(&mut engine).instance_count, total);
+    }
+}
+
+#[test]
+fn scan_of_visible_keys() {
+    let Some(turn) = device() else { return };
+    let mut engine = engine(turn.gpu());
+    let id = list(&mut engine, |b| scan::scan_visible(b, Buf::DEPTH_KEYS, Buf::VISIBLE_OFFSETS));
+    let mut random = generator(72);
+    for count in COUNTS {
+        let key = |random: &mut rand_pcg::Pcg32| if random.random_bool(0.4) { KEY_INVISIBLE } else { random.random() };
+        let keys: Vec<u32> = (0..count).map(|_| key(&mut random)).collect();
+        announce(&mut engine, count);
+        engine.sched_mut().upload(Buf::DEPTH_KEYS, 0, 0, &keys).expect("upload");
+        engine.sched_mut().run(id, 0).expect("run");
+        let flags: Vec<u32> = keys.iter().map(|&key| u32::from(key != KEY_INVISIBLE)).collect();
+        let (offsets, total) = exclusive_scan(&flags);
+        check("offsets", exact(&get(&mut engine, Buf::VISIBLE_OFFSETS, count), &offsets));
+        assert_eq!(counters(&mut engine).visible_count, total);
+    }
+}
+
+/// All 32 bits, few different keys (equal ones must keep their order), and one key.
+#[test]
+fn sort_of_keys_and_values() {
+    let Some(turn) = device() else { return };
+    let mut engine = engine(turn.gpu());
+    let buffers = SortBuffers {
+        keys: [Buf::DEPTH_KEYS_A, Buf::DEPTH_KEYS_B],
+        values: [Buf::DEPTH_VALUES_A, Buf::DEPTH_VALUES_B],
+    };
+    let mut found = None;
+    let id = list(&mut engine, |b| found = Some(sort::sort(b, buffers, 32, Count::Splats, false)));
+    let (keys_out, values_out) = found.expect("the sort was declared");
+    let mut random = generator(73);
+    for (count, different) in [(ITEMS, u32::MAX), (ITEMS, 3), (ITEMS, 1), (1000, 300), (9, 4), (1, 9), (0, 1)] {
+        let keys: Vec<u32> = (0..count).map(|_| random.random_range(0..different)).collect();
+        let values: Vec<u32> = (0..count as u32).map(|i| i.wrapping_mul(0x9e37_79b9)).collect();
+        announce(&mut engine, count);
+        engine.sched_mut().upload(buffers.keys[0], 0, 0, &keys).expect("upload");
+        engine.sched_mut().upload(buffers.values[0], 0, 0, &values).expect("upload");
+        engine.sched_mut().run(id, 0).expect("run");
+        engine.sched_mut().check_guards().expect("no pass writes outside of its buffers");
+        let order = radix_sort(&keys);
+        let by_order = |of: &[u32]| order.iter().map(|&place| of[place]).collect::<Vec<_>>();
+        check("keys", exact(&get(&mut engine, keys_out, count), &by_order(&keys)));
+        check("values", exact(&get(&mut engine, values_out, count), &by_order(&values)));
+    }
+}
+
+/// From one pass of the sort to all that 32 bits take; the values are the places before the sort.
+#[test]
+fn sort_of_places_by_some_bits() {
+    let Some(turn) = device() else { return };
+    let mut engine = engine(turn.gpu());
+    let mut random = generator(74);
+    for bits in [1, 7, 8, 9, 16, 17, 30] {
+        let buffers = SortBuffers {
+            keys: [Buf::DEPTH_KEYS_A, Buf::DEPTH_KEYS_B],
+            values: [Buf::DEPTH_VALUES_A, Buf::DEPTH_VALUES_B],
+        };
+        let mut found = None;
+        let id = list(&mut engine, |b| found = Some(sort::sort(b, buffers, bits, Count::Splats, true)));
+        let (keys_out, values_out) = found.expect("the sort was declared");
+        let keys: Vec<u32> = (0..ITEMS).map(|_| random.random_range(0..1 << bits)).collect();
+        announce(&mut engine, ITEMS);
+        engine.sched_mut().upload(buffers.keys[0], 0, 0, &keys).expect("upload");
+        engine.sched_mut().run(id, 0).expect("run");
+        let order = radix_sort(&keys);
+        let sorted: Vec<u32> = order.iter().map(|&place| keys[place]).collect();
+        let places: Vec<u32> = order.iter().map(|&place| place as u32).collect();
+        check("keys", exact(&get(&mut engine, keys_out, ITEMS), &sorted));
+        check("places", exact(&get(&mut engine, values_out, ITEMS), &places));
+    }
+}

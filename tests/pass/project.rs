@@ -1,0 +1,156 @@
+//! Culling, compaction, order, projection, and the projection's gradient.
+
+use super::rig::{GRADIENTS, Rig, prove};
+use crate::reference::model::{flatten, ROW_FLOATS};
+use crate::reference::project::{Splat, SplatGradient, near_margin, project_backward, project_forward, sigmoid};
+use crate::reference::scan::compact;
+use crate::reference::sort::radix_sort;
+use crate::reference::{Group, Row, Rules, tile};
+use crate::support::compare::{GradientBounds, Summary, Tolerance, Verdict, check, close, exact, gradients};
+use crate::support::device;
+use crate::support::scenes::{Scene, Shape, scene};
+use labelgs::plan::Buf;
+use labelgs::shaders::constants::KEY_INVISIBLE;
+
+/// Half of the Gaussians far outside, so that slopes are clamped and many are culled; some behind the near plane.
+pub fn wide_scene(seed: u64, sh_degree: u32) -> Scene {
+    let mut s = scene(seed, &Shape { gaussians: 300, sh_degree, ..Shape::default() });
+    for (index, mean) in s.gaussians.means.iter_mut().enumerate().filter(|(index, _)| index % 2 == 0) {
+        let factor = if index % 4 == 0 { 2.0 } else { 4.0 };
+        *mean = mean.map(|v| v * factor);
+        s.gaussians.scales[index].iter_mut().for_each(|v| *v += 0.4);
+    }
+    s.gaussians.opacities.iter_mut().step_by(7).for_each(|v| *v -= 4.0);
+    s
+}
+
+/// (a, e) pairs into one verdict.
+pub fn all(verdicts: impl IntoIterator<Item = Verdict>) -> Verdict {
+    let mut worst = Summary::default();
+    for verdict in verdicts {
+        let summary = verdict?;
+        let (flips, whole) = (worst.flips + summary.flips, worst.whole.max(summary.whole));
+        worst = if summary.worst > worst.worst { summary } else { worst };
+        (worst.flips, worst.whole) = (flips, whole);
+    }
+    Ok(worst)
+}
+
+/// The device drops nothing that counts, and keeps nothing at or behind the near plane or too faint.
+#[test]
+fn visible_gaussians_in_depth_order() {
+    let Some(turn) = device() else { return };
+    let mut rig = Rig::new(turn, wide_scene(11, 3), false);
+    let report = rig.train();
+    let count = rig.scene.gaussians.len();
+    let keys = rig.get::<u32>(Buf::DEPTH_KEYS, count);
+    let (model, camera, size) = (rig.model(), rig.scene.camera.clone(), rig.size());
+    prove("cull", &["near"], |rules| {
+        let mut depths = (Vec::new(), Vec::new());
+        for (index, &key) in keys.iter().enumerate() {
+            let projection = project_forward(rules, &camera, &model, index);
+            let touch = projection.map(|p| tile::cull(rules, &p.splat, size));
+            // f32 decides differently only within its rounding.
+            let counts = touch.is_some_and(|touch| touch.touches && touch.margin > 1e-4);
+            let near = near_margin(rules, &camera, &model.rows[index]);
+            let faint = sigmoid(model.rows[index].opacity) < rules.alpha_min * (1.0 - 1e-5);
+            let may_show = near > -1e-6 && !faint;
+            match (counts && near > 1e-6, key != KEY_INVISIBLE, may_show) {
+                (true, false, _) => return Err(format!("Gaussian {index} counts and was dropped")),
+                (_, true, false) => return Err(format!("Gaussian {index} cannot show and was kept")),
+                _ => {}
+            }
+            if let Some(projection) = projection.filter(|_| key != KEY_INVISIBLE) {
+                depths.0.push(f64::from(f32::from_bits(key)));
+                depths.1.push(projection.splat.depth);
+            }
+        }
+        // z is a sum of three f32 products of some 4 units; 1.1e-6 seen at 8.9, 1.5e-7 at 0.5.
+        close(&depths.0, &depths.1, Tolerance { absolute: 2.5e-7, relative: 1.5e-7 })
+    });
+    let visible = report.counters.visible_count as usize;
+    let flags: Vec<u32> = keys.iter().map(|&key| u32::from(key != KEY_INVISIBLE)).collect();
+    let listed = compact(&flags);
+    assert!(listed.len() == visible && visible > 100 && visible < 280, "{visible} of {count} are visible");
+    let order = radix_sort(&listed.iter().map(|&i| keys[i as usize]).collect::<Vec<_>>());
+    let expected: Vec<u32> = order.iter().map(|&place| listed[place]).collect();
+    check("depth order", exact(&rig.get::<u32>(Buf::DEPTH_VALUES_A, visible), &expected));
+    let mut splat_of = vec![u32::MAX; count];
+    expected.iter().enumerate().for_each(|(splat, &gaussian)| splat_of[gaussian as usize] = splat as u32);
+    check("splat_from_gaussian", exact(&rig.get::<u32>(Buf::SPLAT_FROM_GAUSSIAN, count), &splat_of));
+}
+
+/// Centre, shape relative to its size, log2 of the opacity, colour, depth.
+fn splat_floats(splat: &Splat, scale: &Splat) -> [f64; 10] {
+    let (size_a, size_c) = (scale.conic[0].sqrt(), scale.conic[2].sqrt());
+    let [x, y] = splat.mean2d;
+    // Far outside of the image a px is not worth what it is inside.
+    let [fx, fy] = scale.mean2d.map(|v| 1.0 + (v / 50.0).abs());
+    let [a, b, c] = splat.conic;
+    let [red, green, blue] = splat.colour;
+    let shape = [a / (size_a * size_a), b / (size_a * size_c), c / (size_c * size_c)];
+    [x / fx, y / fy, shape[0], shape[1], shape[2], splat.opacity.log2(), red, green, blue, splat.depth]
+}
+
+#[test]
+fn project_forward_of_each_degree() {
+    for sh_degree in 0..=3 {
+        let Some(turn) = device() else { return };
+        let mut rig = Rig::new(turn, wide_scene(20 + u64::from(sh_degree), sh_degree), false);
+        rig.render();
+        let (splats, model, camera) = (rig.splats(), rig.model(), rig.scene.camera.clone());
+        let mut bearing = vec!["dilation", "jacobian_margin", "colour_bias", "sh_c0"];
+        bearing.extend(&["sh_c1", "sh_c2", "sh_c3"][..sh_degree as usize]);
+        prove(&format!("project_forward, degree {sh_degree}"), &bearing, |rules| {
+            let expected: Vec<Splat> = (splats.iter())
+                .map(|s| project_forward(rules, &camera, &model, s.gaussian).map_or(Splat::default(), |p| p.splat))
+                .collect();
+            let floats = |of: &[Splat]| of.iter().zip(&expected).flat_map(|(s, e)| splat_floats(s, e)).collect::<Vec<_>>();
+            // Centres are some 50 px times the roundings of a quotient; 8.9e-6 seen.
+            close(&floats(&splats), &floats(&expected), Tolerance { absolute: 1.4e-5, relative: 0.0 })
+        });
+    }
+}
+
+/// A chain of f32 products; 0.42 of (1e-6, 1e-5) seen by element, 0.74 of 1e-6 as a whole.
+const BOUNDS: GradientBounds = GradientBounds {
+    element: Tolerance { absolute: 6.5e-7, relative: 6.5e-6 },
+    outliers: 0.0,
+    norm: 1.1e-6,
+    angle: 1.1e-12,
+    bias: 1.1e-6,
+};
+
+/// Each group of floats on its own: their magnitudes have nothing to do with each other.
+pub fn compare_rows(actual: &[Row], expected: &[Row], degree: u32, bounds: GradientBounds) -> Verdict {
+    let active = Group::ALL.into_iter().take(5 + degree as usize);
+    all(active.map(|group| {
+        gradients(&flatten(actual, group), &flatten(expected, group), bounds).map_err(|text| format!("{group:?}: {text}"))
+    }))
+}
+
+#[test]
+fn project_backward_of_each_degree() {
+    for sh_degree in [3, 1] {
+        let Some(turn) = device() else { return };
+        let mut rig = Rig::new(turn, wide_scene(30 + u64::from(sh_degree), sh_degree), false);
+        rig.train();
+        let (splats, model, camera) = (rig.splats(), rig.model(), rig.scene.camera.clone());
+        let v_splats: Vec<SplatGradient> = rig.splat_gradients(&splats);
+        let actual = rig.rows(GRADIENTS, splats.len());
+        assert!(actual.iter().filter(|row| row.floats() != [0.0; ROW_FLOATS]).count() > 60);
+        let mut bearing = vec!["dilation", "jacobian_margin", "sh_c0", "sh_c1"];
+        bearing.extend(&["sh_c2", "sh_c3"][..sh_degree as usize - 1]);
+        prove(&format!("project_backward, degree {sh_degree}"), &bearing, |rules: &Rules| {
+            let (mut found, mut expected) = (Vec::new(), Vec::new());
+            for (place, splat) in splats.iter().enumerate() {
+                let Some(projection) = project_forward(rules, &camera, &model, splat.gaussian) else { continue };
+                if projection.clamp_margin.min(projection.colour_margin) > 1e-5 {
+                    found.push(actual[place]);
+                    expected.push(project_backward(rules, &camera, &model, splat.gaussian, &v_splats[place]));
+                }
+            }
+            compare_rows(&found, &expected, sh_degree, BOUNDS)
+        });
+    }
+}

@@ -1,0 +1,71 @@
+//! A whole step: losses and the gradient of every parameter against the mirror, from the model to the gradient.
+
+use super::project::compare_rows;
+use super::rig::{Rig, prove};
+use crate::reference::rules::{Family, mutants};
+use crate::reference::step::step;
+use crate::reference::{Row, Rules};
+use crate::support::compare::{GradientBounds, Tolerance, Verdict, close};
+use crate::support::device;
+use crate::support::scenes::{Shape, scene};
+
+/// Errors of all passes add up; 0.72 of (1e-6, 5e-5) seen by element, 0.15 of (1e-5, 1e-10) as a whole.
+const BOUNDS: GradientBounds = GradientBounds {
+    element: Tolerance { absolute: 1.1e-6, relative: 5.5e-5 },
+    outliers: 0.0,
+    norm: 2.3e-6,
+    angle: 2.3e-11,
+    bias: 2.3e-6,
+};
+
+/// Gaussians with a decision nearer than this to its threshold are left out.
+const SURE: f64 = 2e-5;
+
+fn case(name: &str, seed: u64, shape: &Shape, labels: bool, bearing: &[&str]) {
+    let Some(turn) = device() else { return };
+    let mut rig = Rig::new(turn, scene(seed, shape), labels);
+    let report = rig.train();
+    let actual = rig.gradient_rows();
+    let (model, camera, mut target) = (rig.model(), rig.scene.camera.clone(), rig.scene.target.clone());
+    if !labels {
+        target.slots.clear();
+    }
+    let scale = 1.0 / target.photo.elements();
+    let sums = [report.counters.loss_l1, report.counters.loss_ssim].map(|v| f64::from(v) * scale);
+    prove(name, bearing, |rules: &Rules| -> Verdict {
+        let expected = step(rules, &camera, &model, &target);
+        let loss = |l1: f64, ssim: f64| rules.l1_weight * l1 + rules.dssim_weight * (1.0 - ssim);
+        close(&[loss(sums[0], sums[1])], &[expected.photo.value], Tolerance { absolute: 1e-5, relative: 0.0 })?;
+        let sure: Vec<usize> = (0..actual.len()).filter(|&i| expected.margins[i] > SURE).collect();
+        assert!(sure.len() * 10 > actual.len() * 6, "{} of {} Gaussians are sure", sure.len(), actual.len());
+        let pick = |rows: &[Row]| sure.iter().map(|&i| rows[i]).collect::<Vec<_>>();
+        compare_rows(&pick(&actual), &pick(&expected.rows), model.sh_degree, BOUNDS)
+    });
+}
+
+fn named(families: &[Family], without: &[&str]) -> Vec<&'static str> {
+    let bears = |m: &crate::reference::rules::Mutant| families.contains(&m.family) && !without.contains(&m.name);
+    mutants().iter().filter(|m| bears(m)).map(|m| m.name).collect()
+}
+
+const ALL: [Family; 4] = [Family::Project, Family::Sh, Family::Blend, Family::Loss];
+
+#[test]
+fn whole_step() {
+    // Nothing in this scene is near a Jacobian's clamp; without labels no label weight bears.
+    let bearing = named(&ALL, &["label_weight", "jacobian_margin"]);
+    case("whole step", 61, &Shape { gaussians: 120, ..Shape::default() }, false, &bearing);
+}
+
+#[test]
+fn whole_step_with_labels() {
+    // Beside the gradients of the label losses, those of C1 are too small to be seen.
+    let bearing = named(&ALL, &["jacobian_margin", "ssim_c1"]);
+    case("whole step with labels", 62, &Shape { gaussians: 120, ..Shape::default() }, true, &bearing);
+}
+
+#[test]
+fn whole_step_of_opaque_gaussians() {
+    let shape = Shape { gaussians: 200, width: 61, height: 45, opacities: (-3.0, 9.0), ..Shape::default() };
+    case("whole step, opaque", 63, &shape, true, &["alpha_max", "transmittance_min", "alpha_min", "dilation"]);
+}

@@ -1,0 +1,91 @@
+//! Which tiles each splat touches, the sorted lists of tiles and layers, and the occupied tiles of the layers.
+
+use super::blend::opaque_scene;
+use super::rig::{Rig, prove};
+use crate::reference::scan::{compact, exclusive_scan};
+use crate::reference::sort::radix_sort;
+use crate::reference::tile::{TileGrid, tile_lengths, tile_ranges, tiles_within, touched_tiles};
+use crate::support::compare::{Summary, check, exact};
+use crate::support::device;
+use labelgs::plan::Buf;
+
+/// Log2 units that the device's test may err on the side of one tile too many: 0.01, and 2e-6 of the exponent's terms.
+const SLACK: f64 = 0.02;
+
+/// The device's sorted pairs: keys and slots.
+fn sorted_pairs(rig: &mut Rig, count: usize) -> (Vec<u32>, Vec<u32>) {
+    let virtual_tiles = rig.engine.sched().capacity().virtual_tiles;
+    let bits = 64 - (virtual_tiles - 1).leading_zeros();
+    let passes = bits.div_ceil(rig.engine.shape().digit_bits);
+    let (keys, values) = if passes.is_multiple_of(2) {
+        (Buf::TILE_KEYS_A, Buf::TILE_VALUES_A)
+    } else {
+        (Buf::TILE_KEYS_B, Buf::TILE_VALUES_B)
+    };
+    (rig.get(keys, count), rig.get(values, count))
+}
+
+#[test]
+fn tiles_of_splats_and_lists_of_tiles() {
+    let Some(turn) = device() else { return };
+    let mut rig = Rig::new(turn, opaque_scene(81), true);
+    let counters = rig.train().counters;
+    let (splats, pairs) = (rig.splats(), counters.instance_count as usize);
+    let (uniforms, shape, labels) = (rig.uniforms(), *rig.engine.shape(), rig.model().labels);
+    let grid = TileGrid { size: rig.size(), tile: (shape.tile_width as usize, shape.tile_height as usize) };
+    let touched = rig.get::<u32>(Buf::TILES_TOUCHED, splats.len());
+    let (offsets, total) = exclusive_scan(&touched);
+    check("instance_offsets", exact(&rig.get::<u32>(Buf::INSTANCE_OFFSETS, splats.len()), &offsets));
+    assert_eq!(counters.instance_count, total);
+
+    let (sorted_keys, slots) = sorted_pairs(&mut rig, pairs);
+    let mut keys = vec![u32::MAX; pairs];
+    slots.iter().zip(&sorted_keys).for_each(|(&slot, &key)| keys[slot as usize] = key);
+    check("order of pairs", exact(&slots, &radix_sort(&keys).iter().map(|&slot| slot as u32).collect::<Vec<_>>()));
+    let splat_from_instance = rig.get::<u32>(Buf::SPLAT_FROM_INSTANCE, pairs);
+    let owners = touched.iter().enumerate().flat_map(|(splat, &n)| std::iter::repeat_n(splat as u32, n as usize));
+    check("splat_from_instance", exact(&splat_from_instance, &owners.collect::<Vec<_>>()));
+
+    let layers = rig.job.layers.clone();
+    let layer_of = |gaussian: usize| layers.iter().position(|&label| u32::from(label) == labels[gaussian]);
+    assert!(splats.iter().any(|s| layer_of(s.gaussian).is_some()) && splats.iter().any(|s| labels[s.gaussian] == 0));
+    prove("tiles of splats", &["alpha_min"], |rules| {
+        for (index, splat) in splats.iter().enumerate() {
+            let all = &keys[offsets[index] as usize..][..touched[index] as usize];
+            let layer = layer_of(splat.gaussian);
+            let tiles = &all[..if layer.is_some() { all.len() / 2 } else { all.len() }];
+            if let Some(layer) = layer {
+                let moved = tiles.iter().map(|tile| (layer as u32 + 1) * uniforms.tile_count + tile);
+                exact(&all[tiles.len()..], &moved.collect::<Vec<_>>())?;
+            }
+            let (least, most) = (touched_tiles(rules, splat, &grid).0, tiles_within(rules, splat, &grid, SLACK));
+            if !tiles.is_sorted() || !least.iter().all(|t| tiles.contains(t)) || !tiles.iter().all(|t| most.contains(t)) {
+                return Err(format!("splat {index}: tiles {tiles:?}, at least {least:?}, at most {most:?} are expected"));
+            }
+        }
+        Ok(Summary::default())
+    });
+    lists(&mut rig, &sorted_keys, &slots, &splat_from_instance);
+}
+
+fn lists(rig: &mut Rig, sorted_keys: &[u32], slots: &[u32], splat_from_instance: &[u32]) {
+    let (uniforms, counters) = (rig.uniforms(), rig.engine.report(0).expect("a report").counters);
+    let virtual_tiles = (uniforms.tile_count * (uniforms.layer_count + 1)) as usize;
+    let ranges = tile_ranges(sorted_keys, virtual_tiles);
+    let starts: Vec<u32> = ranges.iter().map(|range| range[0]).collect();
+    let ends: Vec<u32> = ranges.iter().map(|range| range[1]).collect();
+    check("tile_starts", exact(&rig.get::<u32>(Buf::TILE_STARTS, virtual_tiles), &starts));
+    check("tile_ends", exact(&rig.get::<u32>(Buf::TILE_ENDS, virtual_tiles), &ends));
+    let sorted: Vec<u32> = slots.iter().map(|&slot| splat_from_instance[slot as usize]).collect();
+    check("sorted_splats", exact(&rig.get::<u32>(Buf::SORTED_SPLATS, slots.len()), &sorted));
+    assert!(ranges.iter().all(|&[a, b]| sorted[a as usize..b as usize].is_sorted()), "lists run front to back");
+
+    let (longest, occupied) = tile_lengths(&ranges);
+    assert_eq!(counters.longest_list, longest);
+    let first = uniforms.tile_count as usize;
+    let flags: Vec<u32> = (0..virtual_tiles).map(|tile| u32::from(tile >= first && occupied[tile])).collect();
+    check("layer_occupied", exact(&rig.get::<u32>(Buf::LAYER_OCCUPIED, virtual_tiles), &flags));
+    let listed = compact(&flags);
+    assert_eq!(counters.layer_tile_count as usize, listed.len());
+    check("layer_tiles", exact(&rig.get::<u32>(Buf::LAYER_TILES, listed.len()), &listed));
+}
