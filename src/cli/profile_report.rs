@@ -58,7 +58,8 @@ pub struct Profile {
     passes: Vec<(Stage, PassTime)>,
     stages: Vec<(Stage, PassTime)>,
     device_ms: Spread,
-    counters: Vec<(&'static str, Spread)>,
+    /// Name in JSON, name in the table, values.
+    counters: Vec<(&'static str, &'static str, Spread)>,
     pairs: f64,
     ns_per_pair: [f64; 2],
     steps: Vec<Value>,
@@ -99,8 +100,8 @@ impl Profile {
         times.retain(|times| !times.is_first);
         self.left_out = all - times.len();
         self.clocks = clocks;
-        self.passes = rows(&times, |_, name| name.to_owned());
-        self.stages = rows(&times, |stage, _| stage.name().to_owned());
+        self.passes = rows(&times, |name| name);
+        self.stages = rows(&times, |_| "");
         let sums = times.iter().map(|times| times.items.iter().map(|item| item.2 as f64 / 1e6).sum());
         self.device_ms = spread(sums.collect());
         let walked = |report: &StepReport| {
@@ -108,11 +109,11 @@ impl Profile {
         };
         let counter = |value: &dyn Fn(&StepReport) -> f64| spread(reports.iter().map(value).collect());
         self.counters = vec![
-            ("visible splats", counter(&|step| f64::from(step.report.counters.visible_count))),
-            ("(splat, tile) pairs", counter(&|step| f64::from(step.report.counters.instance_count))),
-            ("tiles of object layers", counter(&|step| f64::from(step.report.counters.layer_tile_count))),
-            ("splats of the fullest tile", counter(&|step| f64::from(step.report.counters.longest_list))),
-            ("(pixel, splat) pairs walked", counter(&walked)),
+            ("visible", "visible splats", counter(&|step| f64::from(step.report.counters.visible_count))),
+            ("instances", "(splat, tile) pairs", counter(&|step| f64::from(step.report.counters.instance_count))),
+            ("layer_tiles", "tiles of object layers", counter(&|step| f64::from(step.report.counters.layer_tile_count))),
+            ("longest_list", "splats of the fullest tile", counter(&|step| f64::from(step.report.counters.longest_list))),
+            ("pairs_walked", "(pixel, splat) pairs walked", counter(&walked)),
         ];
         let counted: HashSet<u32> = times.iter().map(|times| times.step).collect();
         self.pairs = reports.iter().filter(|report| counted.contains(&report.step)).map(walked).sum();
@@ -179,7 +180,7 @@ impl Profile {
         if let Some(cpu) = self.cpu_ms() {
             text += &format!("{:<34} {:>16} {:>10} {cpu:>10.3}\n", "processor time, all threads, ms", "", "");
         }
-        self.counters.iter().for_each(|(name, values)| text += &spread_line(name, *values, 0));
+        self.counters.iter().for_each(|(_, name, values)| text += &spread_line(name, *values, 0));
         text + "\n" + &self.per_pair_text()
     }
 
@@ -191,7 +192,7 @@ impl Profile {
                 "p90_ms": ms(pass.p90), "share": pass.share,
             })
         };
-        let counters = self.counters.iter().map(|(name, values)| (name.to_string(), values.to_json()));
+        let counters = self.counters.iter().map(|(name, _, values)| (name.to_string(), values.to_json()));
         json!({
             "schema_version": 1,
             "device": self.device,
@@ -250,19 +251,23 @@ fn ms(ns: u64) -> f64 {
     ns as f64 / 1e6
 }
 
-/// Rows by what `label` says of an item, in the order of the step.
-fn rows(times: &[StepTimes], label: impl Fn(Stage, &str) -> String) -> Vec<(Stage, PassTime)> {
+/// Rows by stage and by what `label` makes of an item's name, in the order of the step.
+fn rows(times: &[StepTimes], label: impl Fn(&str) -> &str) -> Vec<(Stage, PassTime)> {
     let mut profiler = Profiler::with_warm_up(0);
-    let mut stages: HashMap<String, Stage> = HashMap::new();
+    let mut named: HashMap<String, (Stage, String)> = HashMap::new();
     for times in times {
         let items = times.items.iter().map(|(stage, name, ns)| {
-            let label = label(*stage, name);
-            stages.entry(label.clone()).or_insert(*stage);
-            (label, *ns)
+            let name = label(name);
+            let key = format!("{}: {name}", stage.name());
+            named.entry(key.clone()).or_insert_with(|| (*stage, name.to_owned()));
+            (key, *ns)
         });
         profiler.add(&items.collect::<Vec<_>>());
     }
-    let rows = profiler.rows().into_iter().filter_map(|row| Some((*stages.get(&row.label)?, row)));
+    let rows = profiler.rows().into_iter().filter_map(|row| {
+        let (stage, label) = named.get(&row.label)?.clone();
+        Some((stage, PassTime { label, ..row }))
+    });
     let mut rows: Vec<(Stage, PassTime)> = rows.collect();
     rows.sort_by_key(|(stage, _)| *stage);
     rows
