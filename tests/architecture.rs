@@ -129,7 +129,9 @@ fn with_word(word: &str) -> Vec<String> {
 
 #[test]
 fn unsafe_code_has_two_places() {
-    let elsewhere = with_word("unsafe ").into_iter().filter(|file| !file.starts_with("src/gpu/") && file != "src/sched/recorder.rs");
+    let elsewhere = with_word("unsafe ")
+        .into_iter()
+        .filter(|file| !file.starts_with("src/gpu/") && file != "src/sched/recorder.rs");
     assert_eq!(elsewhere.collect::<Vec<_>>(), Vec::<String>::new());
     assert!(with_word("unsafe ").contains(&"src/sched/recorder.rs".to_owned()), "the search finds what is there");
 }

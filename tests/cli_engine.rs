@@ -55,7 +55,10 @@ fn devices_tells_what_is_needed_and_found() {
     let Some(gpu) = turn() else { return };
     let name = gpu.capabilities().name.clone();
     let table = succeeds(&["devices"]);
-    assert!(table.contains(&name) && table.contains("scalarBlockLayout") && table.contains("kernels subgroups of"), "{table}");
+    assert!(
+        table.contains(&name) && table.contains("scalarBlockLayout") && table.contains("kernels subgroups of"),
+        "{table}"
+    );
     let found = json(&succeeds(&["devices", "--json"]));
     let devices = found["devices"].as_array().expect("a list");
     let device = devices.iter().find(|device| device["name"] == name).expect("the device of the tests");
@@ -70,7 +73,8 @@ fn devices_tells_what_is_needed_and_found() {
 fn plan_adds_up() {
     let args = ["plan", "--gaussians", "2k", "--size", "160x120", "--label-samples", "4", "--sh-degree", "2"];
     let table = succeeds(&args);
-    for part in ["MEMORY", "SCRATCH ARENA", "PASSES", "barrier: cull", "blend_backward_labels", "v_instances", "total"] {
+    for part in ["MEMORY", "SCRATCH ARENA", "PASSES", "barrier: cull", "blend_backward_labels", "v_instances", "total"]
+    {
         assert!(table.contains(part), "{part} is not in\n{table}");
     }
     let plan = json(&succeeds(&[&args[..], &["--json"]].concat()));
@@ -78,12 +82,15 @@ fn plan_adds_up() {
         let rows = plan["memory"]["buffers"].as_array().expect("buffers").iter();
         rows.filter(|row| row["class"] != "step").map(|row| row[key].as_u64().expect("bytes")).sum::<u64>()
     };
-    let pages = plan["memory"]["scratch_pages"].as_array().expect("pages").iter().filter_map(Value::as_u64).sum::<u64>();
+    let pages =
+        plan["memory"]["scratch_pages"].as_array().expect("pages").iter().filter_map(Value::as_u64).sum::<u64>();
     let staging = plan["memory"]["staging"].as_u64().expect("staging");
     assert_eq!(plan["memory"]["total"], sum("bytes") + pages + staging);
-    let names: Vec<&str> = plan["passes"].as_array().expect("passes").iter().filter_map(|pass| pass["name"].as_str()).collect();
+    let names: Vec<&str> =
+        plan["passes"].as_array().expect("passes").iter().filter_map(|pass| pass["name"].as_str()).collect();
     assert!(names[0] == "step_begin" && names.iter().any(|name| name.starts_with("lift_resolve")), "{names:?}");
-    let without = json(&succeeds(&["plan", "--gaussians", "2k", "--size", "160x120", "--label-samples", "0", "--json"]));
+    let without =
+        json(&succeeds(&["plan", "--gaussians", "2k", "--size", "160x120", "--label-samples", "0", "--json"]));
     assert!(without["memory"]["total"].as_u64() < plan["memory"]["total"].as_u64());
     assert!(!without.to_string().contains("lift_resolve"));
 }
@@ -98,7 +105,11 @@ fn a_plan_that_does_not_fit_is_printed_and_fails() {
     }
     assert_eq!(output.status.code(), Some(5), "{}", text(&output.stderr));
     let plan = json(&text(&output.stdout));
-    assert!(plan["fits"] == false && plan["problem"].as_str().is_some_and(|text| text.contains("65536")), "{}", plan["problem"]);
+    assert!(
+        plan["fits"] == false && plan["problem"].as_str().is_some_and(|text| text.contains("65536")),
+        "{}",
+        plan["problem"]
+    );
 }
 
 /// A scene of `labelgs synth`, 96 x 72 px.
@@ -115,14 +126,41 @@ fn profile_times_every_stage() {
     let scene = scene(folder.path());
     let file = folder.path().join("profile.json");
     let masks = format!("{scene}/masks");
-    let args = ["profile", &scene, "--masks", &masks, "--steps", "6", "--warm-up", "3", "--from-step", "4", "--json",
-        file.to_str().expect("UTF-8")];
+    let args = [
+        "profile",
+        &scene,
+        "--masks",
+        &masks,
+        "--steps",
+        "6",
+        "--warm-up",
+        "3",
+        "--from-step",
+        "4",
+        "--json",
+        file.to_str().expect("UTF-8"),
+    ];
     let table = succeeds(&args);
     assert!(table.contains("per (pixel, splat) pair walked, ns: blend forward"), "{table}");
     let found = json(&std::fs::read_to_string(&file).expect("written"));
-    let stages: Vec<&str> = found["stages"].as_array().expect("stages").iter().filter_map(|row| row["stage"].as_str()).collect();
-    assert_eq!(stages, ["project", "sort", "tile", "blend forward", "loss", "blend backward", "gather", "project backward",
-        "optimise", "labels", "report"]);
+    let stages: Vec<&str> =
+        found["stages"].as_array().expect("stages").iter().filter_map(|row| row["stage"].as_str()).collect();
+    assert_eq!(
+        stages,
+        [
+            "project",
+            "sort",
+            "tile",
+            "blend forward",
+            "loss",
+            "blend backward",
+            "gather",
+            "project backward",
+            "optimise",
+            "labels",
+            "report"
+        ]
+    );
     let number = |path: &str| found.pointer(path).and_then(Value::as_f64).unwrap_or_else(|| panic!("{path}: {found}"));
     let shares: f64 = found["passes"].as_array().expect("passes").iter().filter_map(|row| row["share"].as_f64()).sum();
     assert!((shares - 1.0).abs() < 1e-9, "{shares}");
@@ -147,7 +185,8 @@ fn from_a_scene_to_objects_and_pictures() {
     assert!(trained["test"]["psnr"].as_f64() > Some(12.0), "{trained}");
 
     let listed = json(&succeeds(&["list", &out, "--json"]));
-    let labels: Vec<u64> = listed["labels"].as_array().expect("rows").iter().filter_map(|row| row["label"].as_u64()).collect();
+    let labels: Vec<u64> =
+        listed["labels"].as_array().expect("rows").iter().filter_map(|row| row["label"].as_u64()).collect();
     assert!(labels.contains(&2) && listed["gaussians"] == trained["gaussians"], "{listed}");
 
     let scores = json(&succeeds(&["eval", &out, "--scene", &scene, "--masks", &masks, "--json"]));
@@ -159,7 +198,8 @@ fn from_a_scene_to_objects_and_pictures() {
 
     succeeds(&["extract", &out, "--labels", "2", "-o", &object]);
     succeeds(&["remove", &out, "--labels", "2", "-o", &rest]);
-    let (object_model, rest_model) = (read_gaussians(&object).expect("PLY").gaussians, read_gaussians(&rest).expect("PLY").gaussians);
+    let (object_model, rest_model) =
+        (read_gaussians(&object).expect("PLY").gaussians, read_gaussians(&rest).expect("PLY").gaussians);
     assert_eq!(object_model.len() + rest_model.len(), trained["gaussians"].as_u64().expect("a number") as usize);
     assert!(object_model.labels.is_some_and(|labels| labels.iter().all(|&label| label == 2)));
     let unknown = labelgs(&["extract", &out, "--labels", "77", "-o", &object]);
@@ -167,10 +207,21 @@ fn from_a_scene_to_objects_and_pictures() {
 
     let pictures = path("pictures");
     let what = "rgb,depth,alpha,labels,top-id,top-weight";
-    succeeds(&["render", &rest, "--scene", &scene, "--views", "000,005", "--what", what, "--format", "exr", "-o", &pictures]);
-    for file in ["000.rgb.exr", "005.depth.exr", "000.alpha.exr", "005.labels.png", "000.top-id.exr", "000.top-weight.exr"] {
+    succeeds(&[
+        "render", &rest, "--scene", &scene, "--views", "000,005", "--what", what, "--format", "exr", "-o", &pictures,
+    ]);
+    for file in
+        ["000.rgb.exr", "005.depth.exr", "000.alpha.exr", "005.labels.png", "000.top-id.exr", "000.top-weight.exr"]
+    {
         assert!(Path::new(&pictures).join(file).is_file(), "{file}");
     }
-    assert_eq!(labelgs(&["render", &rest, "--scene", &scene, "--views", "nowhere", "-o", &pictures]).status.code(), Some(2));
-    assert_eq!(labelgs(&["render", &scene, "--scene", &scene, "-o", &pictures]).status.code(), Some(3), "no model in there");
+    assert_eq!(
+        labelgs(&["render", &rest, "--scene", &scene, "--views", "nowhere", "-o", &pictures]).status.code(),
+        Some(2)
+    );
+    assert_eq!(
+        labelgs(&["render", &scene, "--scene", &scene, "-o", &pictures]).status.code(),
+        Some(3),
+        "no model in there"
+    );
 }

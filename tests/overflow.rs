@@ -2,12 +2,13 @@
 
 use crate::support::device;
 use labelgs::io::init;
-use labelgs::sched::SchedulerOptions;
 use labelgs::scene::Gaussians;
+use labelgs::sched::SchedulerOptions;
 use labelgs::synth::{Preset, SynthOptions, dataset};
 use labelgs::train::{TrainConfig, Trainer};
 
-const SCENE: SynthOptions = SynthOptions { preset: Preset::Simple, width: 96, height: 72, views: 6, points: 200, seed: 1 };
+const SCENE: SynthOptions =
+    SynthOptions { preset: Preset::Simple, width: 96, height: 72, views: 6, points: 200, seed: 1 };
 
 /// The model after a few steps with labels, in memory that has room for `room` Gaussians from the start; and whether
 /// the pairs of splat and tile had to grow.
@@ -18,8 +19,8 @@ fn trained(gpu: &std::sync::Arc<labelgs::gpu::Gpu>, room: u64) -> (Gaussians, bo
     // Large and opaque: many tiles each, and labels at once.
     model.scales.iter_mut().flatten().for_each(|scale| *scale = -1.2);
     model.opacities.iter_mut().for_each(|logit| *logit = 2.0);
-    let mut trainer =
-        Trainer::new(std::sync::Arc::clone(gpu), config, &mut data, &model, SchedulerOptions::default()).expect("trainer");
+    let mut trainer = Trainer::new(std::sync::Arc::clone(gpu), config, &mut data, &model, SchedulerOptions::default())
+        .expect("trainer");
     trainer.engine_mut().make_room_for_gaussians(room).expect("room");
     let before = trainer.engine_mut().sched().capacity().instances;
     for _ in 0..6 {

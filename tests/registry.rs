@@ -16,7 +16,8 @@ const ROOM: Room =
 fn sources() -> Vec<(String, String)> {
     let families = fs::read_dir(Path::new(ROOT).join("glsl")).expect("glsl").map(|entry| entry.expect("entry").path());
     let files = families.filter(|path| path.is_dir()).flat_map(|folder| fs::read_dir(folder).expect("folder"));
-    let files = files.map(|entry| entry.expect("entry").path()).filter(|path| path.extension().is_some_and(|e| e == "comp"));
+    let files =
+        files.map(|entry| entry.expect("entry").path()).filter(|path| path.extension().is_some_and(|e| e == "comp"));
     let source = |path: PathBuf| {
         let stem = path.file_stem().expect("stem").to_string_lossy().into_owned();
         (stem, fs::read_to_string(path).expect("text"))
@@ -39,7 +40,8 @@ fn lists() -> Vec<(Capacity, PassList)> {
             capacity.segment_pixels = if segments > 1 { 100_000 } else { 0 };
             let size = ROOM.size;
             let mut add = |list| all.push((capacity, list));
-            for (labels, sh_degree, update) in [(true, 3, true), (true, 0, false), (false, 3, true), (false, 1, false)] {
+            for (labels, sh_degree, update) in [(true, 3, true), (true, 0, false), (false, 3, true), (false, 1, false)]
+            {
                 add(pass::training_step(&shape, &capacity, Variant { labels, sh_degree, size, update }));
             }
             add(pass::render_view(&shape, &capacity, 3));
@@ -78,8 +80,13 @@ fn every_mirror_is_there() {
         for part in mirror.split(", ") {
             let (file, function) = part.split_once("::").unwrap_or_else(|| panic!("{stem}: {part} names no function"));
             let file = Path::new(ROOT).join("tests/reference").join(file.trim_start_matches("tests/reference/"));
-            let reference = fs::read_to_string(&file).unwrap_or_else(|error| panic!("{stem}: {}: {error}", file.display()));
-            assert!(reference.contains(&format!("pub fn {function}")), "{stem}: no function {function} in {}", file.display());
+            let reference =
+                fs::read_to_string(&file).unwrap_or_else(|error| panic!("{stem}: {}: {error}", file.display()));
+            assert!(
+                reference.contains(&format!("pub fn {function}")),
+                "{stem}: no function {function} in {}",
+                file.display()
+            );
         }
     }
 }
@@ -134,7 +141,8 @@ fn a_scene_without_masks_pays_nothing_for_labels() {
     let bytes = |room: &Room| {
         let capacity = capacity(&shape, room);
         let lists = Engine::lists_of(&shape, &capacity, room);
-        let report = labelgs::plan::MemoryReport::predict(TABLE, &capacity, &lists, &Limits::default(), PlanOptions::default());
+        let report =
+            labelgs::plan::MemoryReport::predict(TABLE, &capacity, &lists, &Limits::default(), PlanOptions::default());
         let report = report.expect("fits");
         let labels = ["labels", "label_keys", "view_labels", "layer_state"];
         let named = report.rows.iter().filter(|row| labels.contains(&row.name)).map(|row| row.bytes).sum::<u64>();

@@ -20,11 +20,13 @@ pub fn run(args: &DevicesArgs, context: &Context) -> Result<()> {
     }
     match (picked, devices.is_empty()) {
         (Some(_), _) => Ok(()),
-        (None, true) => {
-            Err(Error::NoDevice("the Vulkan loader knows no device; install a Vulkan 1.2 driver, such as Mesa's".into()))
-        }
+        (None, true) => Err(Error::NoDevice(
+            "the Vulkan loader knows no device; install a Vulkan 1.2 driver, such as Mesa's".into(),
+        )),
         (None, false) => Err(Error::NoDevice(match &options.device {
-            Some(wanted) => format!("`{wanted}` names none of the {} listed that meets the requirements", devices.len()),
+            Some(wanted) => {
+                format!("`{wanted}` names none of the {} listed that meets the requirements", devices.len())
+            }
             None => "none of those listed meets the requirements; lines marked MISSING say why".into(),
         })),
     }
@@ -64,7 +66,8 @@ fn reads(shape: &KernelShape) -> &'static str {
 fn to_text(device: &Capabilities, picked: Option<usize>) -> String {
     let (major, minor, patch) = device.api_version;
     let mark = if picked == Some(device.index) { ", used unless --device says otherwise" } else { "" };
-    let mut text = format!("{}: {} ({}, Vulkan {major}.{minor}.{patch}{mark})\n", device.index, device.name, kind(device));
+    let mut text =
+        format!("{}: {} ({}, Vulkan {major}.{minor}.{patch}{mark})\n", device.index, device.name, kind(device));
     text += &format!("   driver  {} {}\n   uuid    {}\n", device.driver_name, device.driver_info, device.uuid_text());
     let (heap, usable) = (device.limits.heap >> 20, device.limits.max_memory >> 20);
     text += &format!("   memory  {heap} MiB, {usable} MiB may be used\n");

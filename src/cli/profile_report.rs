@@ -96,7 +96,8 @@ impl Profile {
     /// Adds what was measured. The first run of a recording, in which drivers compile, counts for no pass.
     pub fn fill(&mut self, clocks: Clocks, reports: &[StepReport], mut times: Vec<StepTimes>) {
         let all = times.len();
-        self.steps = reports.iter().map(|report| self.step_json(report, times.iter().find(|t| t.step == report.step))).collect();
+        self.steps =
+            reports.iter().map(|report| self.step_json(report, times.iter().find(|t| t.step == report.step))).collect();
         times.retain(|times| !times.is_first);
         self.left_out = all - times.len();
         self.clocks = clocks;
@@ -104,15 +105,22 @@ impl Profile {
         self.stages = rows(&times, |_| "");
         let sums = times.iter().map(|times| times.items.iter().map(|item| item.2 as f64 / 1e6).sum());
         self.device_ms = spread(sums.collect());
-        let walked = |report: &StepReport| {
-            f64::from(report.report.counters.processed_low) * f64::from(self.shape.tile_pixels())
-        };
+        let walked =
+            |report: &StepReport| f64::from(report.report.counters.processed_low) * f64::from(self.shape.tile_pixels());
         let counter = |value: &dyn Fn(&StepReport) -> f64| spread(reports.iter().map(value).collect());
         self.counters = vec![
             ("visible", "visible splats", counter(&|step| f64::from(step.report.counters.visible_count))),
             ("instances", "(splat, tile) pairs", counter(&|step| f64::from(step.report.counters.instance_count))),
-            ("layer_tiles", "tiles of object layers", counter(&|step| f64::from(step.report.counters.layer_tile_count))),
-            ("longest_list", "splats of the fullest tile", counter(&|step| f64::from(step.report.counters.longest_list))),
+            (
+                "layer_tiles",
+                "tiles of object layers",
+                counter(&|step| f64::from(step.report.counters.layer_tile_count)),
+            ),
+            (
+                "longest_list",
+                "splats of the fullest tile",
+                counter(&|step| f64::from(step.report.counters.longest_list)),
+            ),
             ("pairs_walked", "(pixel, splat) pairs walked", counter(&walked)),
         ];
         let counted: HashSet<u32> = times.iter().map(|times| times.step).collect();
@@ -146,12 +154,15 @@ impl Profile {
             Some(Workers { count, source }) => format!("times {count} worker threads ({source})"),
             None => "of the whole device".to_owned(),
         };
-        format!("per (pixel, splat) pair walked, ns: blend forward {forward:.3}, blend backward {backward:.3}, {whose}\n")
+        format!(
+            "per (pixel, splat) pair walked, ns: blend forward {forward:.3}, blend backward {backward:.3}, {whose}\n"
+        )
     }
 
     /// The table.
     pub fn to_text(&self) -> String {
-        let (first, last) = (self.from_step + self.warm_up + 1, self.from_step + self.warm_up + self.steps.len() as u32);
+        let (first, last) =
+            (self.from_step + self.warm_up + 1, self.from_step + self.warm_up + self.steps.len() as u32);
         let labels = if self.room.labels.is_some() { "with labels" } else { "without labels" };
         let mode = if self.overlap { "passes overlap" } else { "a barrier before each pass" };
         let (width, height) = self.room.size;
@@ -167,7 +178,8 @@ impl Profile {
             self.counted(),
             self.left_out
         );
-        text += &format!("{:<34} {:>5} {:>10} {:>10} {:>7}\n", "stage and pass", "items", "median ms", "p90 ms", "share");
+        text +=
+            &format!("{:<34} {:>5} {:>10} {:>10} {:>7}\n", "stage and pass", "items", "median ms", "p90 ms", "share");
         for (stage, sum) in &self.stages {
             text += &line(stage.name(), sum);
             for (_, pass) in self.passes.iter().filter(|(of, _)| of == stage) {

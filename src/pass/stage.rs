@@ -144,8 +144,19 @@ mod tests {
         let mut order: Vec<Stage> = named.iter().map(|(stage, _)| *stage).collect();
         order.dedup();
         let expected = [
-            Stage::Project, Stage::Sort, Stage::Project, Stage::Tile, Stage::Sort, Stage::Tile, Stage::BlendForward,
-            Stage::Loss, Stage::BlendBackward, Stage::Gather, Stage::ProjectBackward, Stage::Optimise, Stage::Labels,
+            Stage::Project,
+            Stage::Sort,
+            Stage::Project,
+            Stage::Tile,
+            Stage::Sort,
+            Stage::Tile,
+            Stage::BlendForward,
+            Stage::Loss,
+            Stage::BlendBackward,
+            Stage::Gather,
+            Stage::ProjectBackward,
+            Stage::Optimise,
+            Stage::Labels,
             Stage::Report,
         ];
         assert_eq!(order, expected);
