@@ -5,7 +5,9 @@ mod reference;
 #[allow(dead_code, reason = "helpers are shared by tests that come and go")]
 mod support;
 
+mod architecture;
 mod cli;
+mod cli_engine;
 mod compare_self;
 mod config;
 mod gradient;
@@ -16,8 +18,10 @@ mod metrics;
 mod mirror_mutants;
 mod mirrors;
 mod output;
+mod overflow;
 mod pass;
 mod plan;
+mod registry;
 mod sched;
 mod segments;
 mod shadergen;

@@ -49,19 +49,19 @@ pub enum Command {
     #[command(after_help = "Example: labelgs train garden --masks garden/masks -o out")]
     Train(Box<TrainArgs>),
     /// Render views of a model, or objects of it.
-    #[command(after_help = "Example: labelgs render out/model.ply --scene garden --views test --only 3 -o pictures")]
+    #[command(after_help = "Example: labelgs render out --scene garden --views test --only 3 -o pictures")]
     Render(RenderArgs),
     /// List the labels of a model.
     List(ListArgs),
     /// Write the Gaussians of some labels.
-    #[command(after_help = "Example: labelgs extract out/model.ply --labels 1,4-6 -o object.ply")]
+    #[command(after_help = "Example: labelgs extract out --labels 1,4-6 -o object.ply")]
     Extract(SelectArgs),
     /// Write all but the Gaussians of some labels.
-    #[command(after_help = "Example: labelgs remove out/model.ply --labels 2 -o rest.ply")]
+    #[command(after_help = "Example: labelgs remove out --labels 2 -o rest.ply")]
     Remove(SelectArgs),
     /// Score a model on the views of a scene.
     #[command(
-        after_help = "Example: labelgs eval out/model.ply --scene garden --masks garden/masks --json scores.json"
+        after_help = "Example: labelgs eval out --scene garden --masks garden/masks --json scores.json"
     )]
     Eval(EvalArgs),
     /// Make a posed test scene with masks, whole outlines and depth.
@@ -70,8 +70,10 @@ pub enum Command {
     /// Compare the Vulkan devices with what is required.
     Devices(DevicesArgs),
     /// Print buffers, passes and barriers of a training step without running it.
+    #[command(after_help = "Example: labelgs plan --gaussians 500k --size 960x540 --label-samples 10")]
     Plan(PlanArgs),
     /// Time training steps pass by pass.
+    #[command(after_help = "Example: labelgs profile --synthetic --from-step 500 --steps 50")]
     Profile(ProfileArgs),
 }
 
@@ -98,8 +100,8 @@ pub struct SceneArgs {
 #[derive(Args, Clone, Debug)]
 #[command(group(clap::ArgGroup::new("from").required(true).args(["scene", "camera"])))]
 pub struct RenderArgs {
-    /// The model.
-    #[arg(value_name = "MODEL.ply")]
+    /// The model: a PLY, or the folder that `labelgs train` made.
+    #[arg(value_name = "MODEL")]
     pub model: PathBuf,
     /// Scene whose cameras to use.
     #[arg(long, value_name = "SCENE")]
@@ -139,8 +141,8 @@ pub struct RenderArgs {
 /// `labelgs list`.
 #[derive(Args, Clone, Debug)]
 pub struct ListArgs {
-    /// The model.
-    #[arg(value_name = "MODEL.ply")]
+    /// The model: a PLY, or the folder that `labelgs train` made.
+    #[arg(value_name = "MODEL")]
     pub model: PathBuf,
     /// JSON.
     #[command(flatten)]
@@ -151,8 +153,8 @@ pub struct ListArgs {
 #[derive(Args, Clone, Debug)]
 #[command(group(clap::ArgGroup::new("selection").required(true).args(["labels", "mask"])))]
 pub struct SelectArgs {
-    /// The model.
-    #[arg(value_name = "MODEL.ply")]
+    /// The model: a PLY, or the folder that `labelgs train` made.
+    #[arg(value_name = "MODEL")]
     pub model: PathBuf,
     /// The labels, such as 1,4-6; 0 is what has no label.
     #[arg(long, value_name = "IDS", value_parser = labels)]
@@ -177,8 +179,8 @@ pub struct SelectArgs {
 /// `labelgs eval`.
 #[derive(Args, Clone, Debug)]
 pub struct EvalArgs {
-    /// The model.
-    #[arg(value_name = "MODEL.ply")]
+    /// The model: a PLY, or the folder that `labelgs train` made.
+    #[arg(value_name = "MODEL")]
     pub model: PathBuf,
     /// Scene with the true pictures.
     #[arg(long, value_name = "SCENE")]
@@ -270,18 +272,30 @@ pub struct ProfileArgs {
     /// Scene to time.
     #[arg(value_name = "SCENE")]
     pub scene: Option<PathBuf>,
-    /// Time the scene of `labelgs synth` instead.
+    /// Time the scene of `labelgs synth` instead, with its masks.
     #[arg(long)]
     pub synthetic: bool,
     /// Folder of id masks.
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", conflicts_with = "synthetic")]
     pub masks: Option<PathBuf>,
+    /// Leave out the masks of --synthetic.
+    #[arg(long, requires = "synthetic")]
+    pub no_masks: bool,
     /// Steps to time.
     #[arg(long, value_name = "N", default_value_t = 100, value_parser = clap::value_parser!(u32).range(1..))]
     pub steps: u32,
     /// Steps before the clock starts.
     #[arg(long, value_name = "N", default_value_t = 20)]
     pub warm_up: u32,
+    /// Train so many steps first, so that a trained scene is measured.
+    #[arg(long, value_name = "S", default_value_t = 0)]
+    pub from_step: u32,
+    /// Settings of training in TOML, as config.toml of an earlier run. Labels start at --from-step at the latest.
+    #[arg(long, value_name = "FILE.toml")]
+    pub config: Option<PathBuf>,
+    /// Let passes overlap as in training: the wall clock is then the true one, times of passes are what each added.
+    #[arg(long)]
+    pub overlap: bool,
     /// How the scene is read.
     #[command(flatten)]
     pub reading: SceneArgs,

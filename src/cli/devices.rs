@@ -1,10 +1,121 @@
 //! `labelgs devices`.
 
-use super::Context;
 use super::args::DevicesArgs;
+use super::{Context, stdout};
+use crate::gpu::{self, Capabilities, GpuOptions, Need};
+use crate::pass::KernelShape;
 use crate::{Error, Result};
+use serde_json::{Value, json};
 
-/// Prints the devices.
-pub fn run(_args: &DevicesArgs, _context: &Context) -> Result<()> {
-    Err(Error::Bug("not built yet".into()))
+/// Prints the devices. Fails if none of them can be used.
+pub fn run(args: &DevicesArgs, context: &Context) -> Result<()> {
+    let mut options = GpuOptions::from_env()?;
+    options.device = context.global.device.clone().or(options.device);
+    let (devices, picked) = gpu::devices(&options)?;
+    if context.json || args.json.json {
+        let rows: Vec<Value> = devices.iter().map(|device| to_json(device, picked)).collect();
+        stdout::print_json(&json!({ "schema_version": 1, "devices": rows }))?;
+    } else {
+        devices.iter().try_for_each(|device| stdout::print(&to_text(device, picked)))?;
+    }
+    match (picked, devices.is_empty()) {
+        (Some(_), _) => Ok(()),
+        (None, true) => Err(Error::NoDevice(
+            "the Vulkan loader knows no device; install a Vulkan 1.2 driver, such as Mesa's".into(),
+        )),
+        (None, false) => Err(Error::NoDevice(match &options.device {
+            Some(wanted) => {
+                format!("`{wanted}` names none of the {} listed that meets the requirements", devices.len())
+            }
+            None => "none of those listed meets the requirements; lines marked MISSING say why".into(),
+        })),
+    }
+}
+
+/// The kernels that a device gets.
+pub fn shape_of(device: &Capabilities) -> KernelShape {
+    KernelShape::new(device.subgroup.size, device.is_cpu())
+}
+
+/// The kernels in words.
+pub fn shape_text(shape: &KernelShape) -> String {
+    format!(
+        "subgroups of {}, tiles of {} x {} px, {} reads, sort digits of {} bits",
+        shape.subgroup,
+        shape.tile_width,
+        shape.tile_height,
+        reads(shape),
+        shape.digit_bits
+    )
+}
+
+/// The kernels as JSON.
+pub fn shape_json(shape: &KernelShape) -> Value {
+    json!({
+        "subgroup_size": shape.subgroup,
+        "tile": [shape.tile_width, shape.tile_height],
+        "reads": reads(shape),
+        "digit_bits": shape.digit_bits,
+    })
+}
+
+fn reads(shape: &KernelShape) -> &'static str {
+    if shape.texel { "texel" } else { "storage" }
+}
+
+fn to_text(device: &Capabilities, picked: Option<usize>) -> String {
+    let (major, minor, patch) = device.api_version;
+    let mark = if picked == Some(device.index) { ", used unless --device says otherwise" } else { "" };
+    let mut text =
+        format!("{}: {} ({}, Vulkan {major}.{minor}.{patch}{mark})\n", device.index, device.name, kind(device));
+    text += &format!("   driver  {} {}\n   uuid    {}\n", device.driver_name, device.driver_info, device.uuid_text());
+    let (heap, usable) = (device.limits.heap >> 20, device.limits.max_memory >> 20);
+    text += &format!("   memory  {heap} MiB, {usable} MiB may be used\n");
+    for need in &device.needs {
+        let (what, needed, found) = (need.what, &need.needed, &need.found);
+        text += &format!("   {:<7} {what:<29} needed {needed:<7} found {found:<18} {}\n", state(need), need.reason);
+    }
+    if device.missing().is_empty() {
+        text += &format!("   kernels {}\n", shape_text(&shape_of(device)));
+    } else {
+        text += "   cannot be used\n";
+    }
+    text
+}
+
+fn to_json(device: &Capabilities, picked: Option<usize>) -> Value {
+    let (major, minor, patch) = device.api_version;
+    let usable = device.missing().is_empty();
+    let needs = device.needs.iter().map(|need| {
+        json!({
+            "what": need.what, "required": need.is_required, "needed": need.needed, "found": need.found,
+            "met": need.is_met, "reason": need.reason,
+        })
+    });
+    json!({
+        "index": device.index,
+        "name": device.name,
+        "kind": kind(device),
+        "vulkan": format!("{major}.{minor}.{patch}"),
+        "driver": { "name": device.driver_name, "version": device.driver_info },
+        "uuid": device.uuid_text(),
+        "memory_bytes": device.limits.heap,
+        "usable_memory_bytes": device.limits.max_memory,
+        "needs": needs.collect::<Vec<_>>(),
+        "usable": usable,
+        "picked": picked == Some(device.index),
+        "kernels": usable.then(|| shape_json(&shape_of(device))),
+    })
+}
+
+fn kind(device: &Capabilities) -> String {
+    format!("{:?}", device.kind).to_lowercase()
+}
+
+fn state(need: &Need) -> &'static str {
+    match (need.is_met, need.is_required) {
+        (true, _) => "ok",
+        (false, true) => "MISSING",
+        (false, false) => "no",
+    }
 }

@@ -9,6 +9,7 @@ pub mod list;
 pub mod log;
 pub mod plan;
 pub mod profile;
+mod profile_report;
 pub mod render;
 pub mod scene;
 pub mod select;
@@ -117,8 +118,9 @@ pub fn command() -> clap::Command {
     })
 }
 
-/// Reads a model and logs what a person should know about the file.
+/// Reads a model, or the last one in the folder of a run, and logs what a person should know about the file.
 pub fn open_model(path: &Path) -> Result<Gaussians> {
+    let path = &if path.is_dir() { crate::train::record::latest_model(path)? } else { path.to_owned() };
     let read = crate::io::ply::read_gaussians(path)?;
     read.notes.iter().for_each(|note| tracing::info!("{}: {note}", path.display()));
     if read.dropped > 0 {

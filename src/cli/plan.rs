@@ -1,10 +1,191 @@
 //! `labelgs plan`.
 
-use super::Context;
 use super::args::PlanArgs;
+use super::devices::{shape_json, shape_of, shape_text};
+use super::{Context, stdout};
+use crate::engine::{Engine, LabelRoom, Room, capacity};
+use crate::gpu::{self, GpuOptions};
+use crate::pass::{KernelShape, Variant, training_step};
+use crate::plan::{Capacity, Grid, Limits, MemoryReport, Page, PassList, Plan, PlanOptions, TABLE, Touch, Work};
+use crate::sched::plan_limits;
 use crate::{Error, Result};
+use serde_json::{Value, json};
 
-/// Prints the plan of a step.
-pub fn run(_args: &PlanArgs, _context: &Context) -> Result<()> {
-    Err(Error::Bug("not built yet".into()))
+/// Largest label id that is planned for; ids beyond it cost a few bytes each.
+const MAX_LABEL: u32 = 255;
+
+/// What is planned, and for which device.
+struct Subject {
+    device: Option<String>,
+    shape: KernelShape,
+    limits: Limits,
+    room: Room,
+    capacity: Capacity,
+    list: PassList,
+}
+
+/// Prints the plan of a step. A plan that is too large for the device is printed, and then fails.
+pub fn run(args: &PlanArgs, context: &Context) -> Result<()> {
+    let subject = subject(args, context)?;
+    let (planned, problem) = match planned(&subject, &subject.limits) {
+        Err(error @ Error::OutOfMemory { .. }) => (planned(&subject, &without_sizes(&subject.limits))?, Some(error)),
+        done => (done?, None),
+    };
+    if context.json || args.json.json {
+        stdout::print_json(&to_json(&subject, &planned, problem.as_ref()))?;
+    } else {
+        stdout::print(&to_text(&subject, &planned))?;
+    }
+    problem.map_or(Ok(()), Err)
+}
+
+fn subject(args: &PlanArgs, context: &Context) -> Result<Subject> {
+    let (device, shape, limits) = device(context)?;
+    let labels = (args.label_samples > 0)
+        .then(|| LabelRoom { max_label: MAX_LABEL.max(args.label_samples), layers: args.label_samples });
+    let size = (args.size.0, args.size.1);
+    let room = Room { gaussians: args.gaussians.max(1), size, trained: true, labels };
+    let capacity = capacity(&shape, &room);
+    let variant = Variant { labels: labels.is_some(), sh_degree: args.sh_degree, size, update: true };
+    let list = training_step(&shape, &capacity, variant);
+    Ok(Subject { device, shape, limits, room, capacity, list })
+}
+
+/// The device's name, kernels and limits; without a device those of a software device.
+fn device(context: &Context) -> Result<(Option<String>, KernelShape, Limits)> {
+    let mut options = GpuOptions::from_env()?;
+    options.device = context.global.device.clone().or(options.device);
+    match gpu::devices(&options) {
+        Ok((devices, Some(picked))) => {
+            let device = &devices[picked];
+            Ok((Some(device.name.clone()), shape_of(device), plan_limits(&device.limits)))
+        }
+        Ok((_, None)) if options.device.is_some() => {
+            Err(Error::NoDevice("the device that was asked for cannot be used; see labelgs devices".into()))
+        }
+        Err(error) if options.device.is_some() => Err(error),
+        Ok((_, None)) | Err(Error::NoDevice(_)) => {
+            tracing::warn!("no usable Vulkan device; the plan is for a software device with modest limits");
+            Ok((None, KernelShape::new(8, true), Limits::default()))
+        }
+        Err(error) => Err(error),
+    }
+}
+
+fn planned(subject: &Subject, limits: &Limits) -> Result<(MemoryReport, Plan)> {
+    let lists = Engine::lists_of(&subject.shape, &subject.capacity, &subject.room);
+    let options = PlanOptions::default();
+    let memory = MemoryReport::predict(TABLE, &subject.capacity, &lists, limits, options)?;
+    Ok((memory, Plan::new(TABLE, &subject.capacity, &subject.list, limits, options)?))
+}
+
+/// The same limits with room for everything, to show what would be needed.
+fn without_sizes(limits: &Limits) -> Limits {
+    const MUCH: u64 = 1 << 60;
+    Limits { max_storage_range: MUCH, max_texel_elements: MUCH, max_allocation: MUCH, max_memory: MUCH, ..*limits }
+}
+
+fn to_text(subject: &Subject, (memory, plan): &(MemoryReport, Plan)) -> String {
+    let (room, capacity) = (&subject.room, &subject.capacity);
+    let objects = room.labels.map_or(0, |labels| labels.layers);
+    format!(
+        "Training {} Gaussians on pictures of {} x {} px with {objects} objects per step\n\
+         device:  {}\nkernels: {}\nroom for {} (splat, tile) pairs, {} tiles of object layers\n\n\
+         MEMORY at the start; pairs and tiles of object layers grow when a view needs more\n{}\n\
+         SCRATCH ARENA of the step; buffers whose items do not overlap share bytes\n{}\n\
+         PASSES\n{}",
+        room.gaussians,
+        room.size.0,
+        room.size.1,
+        subject.device.as_deref().unwrap_or("none found, limits assumed"),
+        shape_text(&subject.shape),
+        capacity.instances,
+        capacity.layer_tiles,
+        memory.report(),
+        plan.arena_report(),
+        plan.report(),
+    )
+}
+
+fn to_json(subject: &Subject, (memory, plan): &(MemoryReport, Plan), problem: Option<&Error>) -> Value {
+    let room = &subject.room;
+    let docs = |name| TABLE.iter().find(|decl| decl.name == name).map(|decl| decl.doc);
+    let buffers = memory.rows.iter().map(|row| {
+        json!({
+            "name": row.name, "class": row.class.name(), "elements": row.count, "element_bytes": row.element_bytes,
+            "bytes": row.bytes, "doc": docs(row.name),
+        })
+    });
+    json!({
+        "schema_version": 1,
+        "device": subject.device,
+        "kernels": shape_json(&subject.shape),
+        "gaussians": room.gaussians,
+        "size": [room.size.0, room.size.1],
+        "label_samples": room.labels.map_or(0, |labels| labels.layers),
+        "instances": subject.capacity.instances,
+        "layer_tiles": subject.capacity.layer_tiles,
+        "fits": problem.is_none(),
+        "problem": problem.map(ToString::to_string),
+        "memory": {
+            "buffers": buffers.collect::<Vec<_>>(),
+            "scratch_pages": memory.step_pages,
+            "scratch_without_sharing": memory.step_unaliased,
+            "staging": memory.staging,
+            "total": memory.total,
+        },
+        "scratch": scratch(plan),
+        "barriers": plan.barrier_count(),
+        "passes": passes(plan),
+    })
+}
+
+fn scratch(plan: &Plan) -> Vec<Value> {
+    let places = TABLE.iter().zip(plan.placements.iter().zip(&plan.lives));
+    let rows = places.filter_map(|(decl, (place, life))| {
+        let (place, life) = ((*place)?, (*life)?);
+        match place.page {
+            Page::Step(page) => Some(json!({
+                "name": decl.name, "page": page, "offset": place.offset, "bytes": place.bytes,
+                "first_pass": life.first, "last_pass": life.last,
+            })),
+            Page::Own(_) => None,
+        }
+    });
+    rows.collect()
+}
+
+fn passes(plan: &Plan) -> Vec<Value> {
+    let names = |touches: &[Touch], writes| {
+        let mut names: Vec<&str> = Vec::new();
+        for touch in touches.iter().filter(|touch| touch.kind.writes() == writes) {
+            let name = TABLE[touch.buf.index()].name;
+            if !names.contains(&name) {
+                names.push(name);
+            }
+        }
+        names
+    };
+    let rows = plan.items.iter().zip(&plan.list.work).enumerate().map(|(index, (item, work))| {
+        json!({
+            "index": index,
+            "name": item.label,
+            "groups": groups(work),
+            "reads": names(&item.touches, false),
+            "writes": names(&item.touches, true),
+            "barrier": item.barrier.as_ref().map(|barrier| &barrier.reason),
+        })
+    });
+    rows.collect()
+}
+
+/// Workgroups by axis, `"indirect"` where the device decides, null for copies and fills.
+fn groups(work: &Work) -> Value {
+    match work {
+        Work::Pass(pass) => match pass.grid {
+            Grid::Groups(x, y, z) => json!([x, y, z]),
+            Grid::Indirect(..) => json!("indirect"),
+        },
+        Work::Fill { .. } | Work::Copy { .. } => Value::Null,
+    }
 }

@@ -1,10 +1,135 @@
 //! `labelgs profile`.
 
-use super::Context;
 use super::args::ProfileArgs;
+use super::log::Progress;
+use super::profile_report::{Clocks, Profile, Workers};
+use super::scene::{open_gpu, open_scene};
+use super::{Context, config, stdout};
+use crate::gpu::Gpu;
+use crate::io::init;
+use crate::plan::PlanOptions;
+use crate::scene::Dataset;
+use crate::sched::SchedulerOptions;
+use crate::synth::{self, SynthOptions};
+use crate::train::{StepReport, TrainConfig, Trainer};
 use crate::{Error, Result};
+use std::path::Path;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
 
-/// Times steps.
-pub fn run(_args: &ProfileArgs, _context: &Context) -> Result<()> {
-    Err(Error::Bug("not built yet".into()))
+/// Times steps inside of real training.
+pub fn run(args: &ProfileArgs, context: &Context) -> Result<()> {
+    let config = decide(args)?;
+    let mut dataset = open(args, &config)?;
+    let gpu = open_gpu(context)?;
+    if gpu.limits().timestamp_bits == 0 {
+        return Err(Error::NoDevice("this device has no timestamps on its compute queue".into()));
+    }
+    let mut profile = Profile::new(&gpu, workers(&gpu)?, args);
+    profile.views = dataset.train.len();
+    let model = init::initial_gaussians(&dataset, config.seed, init::RANDOM_COUNT)?;
+    let plan = PlanOptions { barrier_everywhere: !args.overlap, ..PlanOptions::default() };
+    let options = SchedulerOptions { plan, timestamps: true, ..SchedulerOptions::default() };
+    let mut trainer = Trainer::new(Arc::clone(&gpu), config, &mut dataset, &model, options)?;
+    measure(&mut trainer, args, context, &mut profile)?;
+    match &args.json {
+        Some(Some(file)) => super::eval::write_json(file, &profile.to_json())?,
+        Some(None) => stdout::print_json(&profile.to_json())?,
+        None if context.json => stdout::print_json(&profile.to_json())?,
+        None => {}
+    }
+    if context.json || matches!(args.json, Some(None)) { Ok(()) } else { stdout::print(&profile.to_text()) }
+}
+
+/// The configuration: labels are on in every timed step, and no timed step is the last one.
+fn decide(args: &ProfileArgs) -> Result<TrainConfig> {
+    let mut decided = match &args.config {
+        Some(path) => config::read(path)?,
+        None => TrainConfig::default(),
+    };
+    decided.label_from = decided.label_from.min(args.from_step.saturating_add(1));
+    let steps = u64::from(args.from_step) + u64::from(args.warm_up) + u64::from(args.steps) + 1;
+    let steps = u32::try_from(steps).map_err(|_| Error::usage("--steps", "there are too many steps in all"))?;
+    decided.iterations = decided.iterations.max(steps);
+    decided.check()?;
+    Ok(decided)
+}
+
+fn open(args: &ProfileArgs, config: &TrainConfig) -> Result<Dataset> {
+    let mut dataset = match &args.scene {
+        Some(scene) => open_scene(scene, &args.reading, args.masks.clone(), config.background, true)?,
+        None => synth::dataset(&SynthOptions::default(), args.reading.test_every),
+    };
+    if args.no_masks {
+        dataset.train.iter_mut().for_each(|view| view.mask = None);
+    }
+    if dataset.train.is_empty() {
+        let scene = args.scene.as_deref().unwrap_or(Path::new("the built-in scene"));
+        return Err(Error::data(scene, "", "no view is left to train on; use a larger --test-every"));
+    }
+    Ok(dataset)
+}
+
+fn measure(trainer: &mut Trainer, args: &ProfileArgs, context: &Context, profile: &mut Profile) -> Result<()> {
+    let before = args.from_step + args.warm_up;
+    let mut progress = Progress::new(u64::from(before + args.steps), "steps", &context.global);
+    for step in 1..=before {
+        if step == args.from_step + 1 {
+            trainer.keep_times();
+        }
+        trainer.step()?;
+        progress.set(u64::from(step), String::new);
+    }
+    trainer.keep_times();
+    let (wall, cpu) = (Instant::now(), cpu_time());
+    let mut steps = Vec::new();
+    let mut reports = Vec::new();
+    for step in 1..=args.steps {
+        let start = Instant::now();
+        reports.extend(trainer.step()?);
+        steps.push(start.elapsed());
+        progress.set(u64::from(before + step), String::new);
+    }
+    let cpu = cpu_time().zip(cpu).map(|(after, before)| after.saturating_sub(before));
+    let clocks = Clocks { wall: wall.elapsed(), steps, cpu };
+    reports.extend(trainer.drain()?);
+    let timed = |step: u32| step > before;
+    let reports: Vec<StepReport> = reports.into_iter().filter(|report| timed(report.step)).collect();
+    let times = trainer.take_times().into_iter().filter(|times| timed(times.step)).collect();
+    profile.gaussians = trainer.gaussian_count();
+    profile.room = *trainer.engine_mut().room();
+    profile.fill(clocks, &reports, times);
+    Ok(())
+}
+
+/// How many threads of the host run the passes; none on a graphics card.
+fn workers(gpu: &Gpu) -> Result<Option<Workers>> {
+    const NAME: &str = "LP_NUM_THREADS";
+    /// More than these lavapipe does not start.
+    const MOST: usize = 32;
+    if !gpu.is_cpu() {
+        return Ok(None);
+    }
+    let set = std::env::var(NAME).ok().filter(|text| !text.is_empty());
+    let (count, source) = match set {
+        // 0 runs everything on the thread that submits.
+        Some(text) => match text.parse::<usize>() {
+            Ok(count) => (count.max(1), NAME),
+            Err(_) => return Err(Error::usage(NAME, format!("`{text}` is no number of threads"))),
+        },
+        None => (std::thread::available_parallelism().map_or(1, usize::from), "processors of this machine"),
+    };
+    Ok(Some(Workers { count: count.min(MOST), source }))
+}
+
+/// Processor time of this process, user and system, all threads.
+#[cfg(unix)]
+fn cpu_time() -> Option<Duration> {
+    let time = rustix::time::clock_gettime(rustix::time::ClockId::ProcessCPUTime);
+    Some(Duration::new(time.tv_sec.try_into().ok()?, time.tv_nsec.try_into().ok()?))
+}
+
+#[cfg(not(unix))]
+fn cpu_time() -> Option<Duration> {
+    None
 }

@@ -1,13 +1,13 @@
-//! The questions behind [`Capabilities`], and the text of `labelgs devices`.
+//! The questions behind [`Capabilities`], and the list of devices.
 
 use super::capabilities::{Capabilities, Features, Need, Subgroup};
+use super::GpuOptions;
 use super::instance::{Instance, Validation};
 use super::limits::Limits;
 use super::select;
 use crate::error::Result;
 use crate::shaders::{self, BindingKind, ShaderDesc};
 use ash::vk;
-use std::fmt::Write;
 
 /// Subgroup operations that the kernels are written with.
 const SUBGROUP_OPERATIONS: vk::SubgroupFeatureFlags = vk::SubgroupFeatureFlags::from_raw(
@@ -179,32 +179,14 @@ fn storage_bindings(shader: &ShaderDesc) -> u32 {
     shader.bindings.iter().filter(|binding| binding.kind == BindingKind::Storage).count() as u32
 }
 
-/// All devices with their table of needs, as text.
-pub fn devices_report() -> Result<String> {
+/// All devices, and the position of the one that [`Gpu::new`](super::Gpu::new) would take with these options.
+pub fn devices(options: &GpuOptions) -> Result<(Vec<Capabilities>, Option<usize>)> {
     let instance = Instance::new(Validation::Off)?;
-    let mut text = String::new();
-    for (_, device) in select::all(&instance)? {
-        let (major, minor, patch) = device.api_version;
-        let _ = writeln!(text, "{}: {} ({:?}, Vulkan {major}.{minor}.{patch})", device.index, device.name, device.kind);
-        let _ = writeln!(text, "   driver {} {}", device.driver_name, device.driver_info);
-        let _ = writeln!(text, "   uuid   {}", device.uuid_text());
-        let (heap, usable) = (device.limits.heap >> 20, device.limits.max_memory >> 20);
-        let _ = writeln!(text, "   memory {heap} MiB, {usable} MiB may be used");
-        for need in &device.needs {
-            let mark = match (need.is_met, need.is_required) {
-                (true, _) => "ok",
-                (false, true) => "MISSING",
-                (false, false) => "none",
-            };
-            let (what, needed, found) = (need.what, &need.needed, &need.found);
-            let _ = writeln!(text, "   {mark:<8}{what:<29} needed {needed:<8} found {found:<18} {}", need.reason);
-        }
-        let missing = device.missing();
-        let verdict = if missing.is_empty() { "usable" } else { "not usable" };
-        let _ = writeln!(text, "   {verdict}");
+    let mut found: Vec<Capabilities> = select::all(&instance)?.into_iter().map(|(_, device)| device).collect();
+    let picked = select::pick(&instance, options.device.as_deref()).ok().map(|(_, device)| device.index);
+    for device in &mut found {
+        // A device that cannot do the size keeps its own; opening it would say so.
+        let _ = device.subgroup.pin(options.subgroup_size);
     }
-    if text.is_empty() {
-        text.push_str("no Vulkan device found\n");
-    }
-    Ok(text)
+    Ok((found, picked))
 }

@@ -21,7 +21,7 @@ mod select;
 mod timeline;
 
 pub use capabilities::{Capabilities, DeviceKind, Need, Subgroup};
-pub use devices::devices_report;
+pub use devices::devices;
 pub use instance::{Message, MessageLog, Validation};
 pub use limits::Limits;
 pub use memory::{Buffer, MemoryKind};

@@ -13,11 +13,13 @@ mod project;
 pub mod scan;
 pub mod shape;
 pub mod sort;
+pub mod stage;
 mod tile;
 
 pub use build::Builder;
 pub use optimize::ATTRIBUTES;
 pub use shape::KernelShape;
+pub use stage::Stage;
 
 use crate::pass;
 use crate::plan::{Buf, Capacity, PassList};

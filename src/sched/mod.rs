@@ -79,7 +79,11 @@ pub struct Scheduler {
 
 /// The limits of a device in the planner's terms.
 pub fn limits_of(gpu: &Gpu) -> Limits {
-    let limits = gpu.limits();
+    plan_limits(gpu.limits())
+}
+
+/// The same before the device is opened.
+pub fn plan_limits(limits: &crate::gpu::Limits) -> Limits {
     Limits {
         max_storage_range: limits.max_storage_range,
         max_texel_elements: limits.max_texel_elements,

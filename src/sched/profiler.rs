@@ -21,25 +21,37 @@ pub struct PassTime {
 }
 
 /// Collects the timings of one list.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub struct Profiler {
     seen: usize,
+    warm_up: usize,
     /// Labels in the order of the list.
     order: Vec<String>,
     items: HashMap<String, usize>,
     samples: HashMap<String, Vec<u64>>,
 }
 
+impl Default for Profiler {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
 impl Profiler {
     /// Nothing collected yet.
     pub fn new() -> Self {
-        Self::default()
+        Self::with_warm_up(WARM_UP)
+    }
+
+    /// Leaves out the first `warm_up` steps.
+    pub fn with_warm_up(warm_up: usize) -> Self {
+        Self { seen: 0, warm_up, order: Vec::new(), items: HashMap::new(), samples: HashMap::new() }
     }
 
     /// Adds what [`Scheduler::timings`](super::Scheduler::timings) gave for a step; the first steps are left out.
     pub fn add(&mut self, timings: &[(String, u64)]) {
         self.seen += 1;
-        if self.seen <= WARM_UP || timings.is_empty() {
+        if self.seen <= self.warm_up || timings.is_empty() {
             return;
         }
         let mut sums: HashMap<&str, (usize, u64)> = HashMap::new();
@@ -58,7 +70,7 @@ impl Profiler {
 
     /// Steps that count.
     pub fn steps(&self) -> usize {
-        self.seen.saturating_sub(WARM_UP)
+        self.seen.saturating_sub(self.warm_up)
     }
 
     /// One row per label, in the order of the list.

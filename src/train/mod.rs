@@ -6,9 +6,11 @@ pub mod job;
 mod occlusion;
 pub mod record;
 mod sampler;
+mod timing;
 
 pub use config::{Occlusion, TrainConfig};
 pub use densify::Densified;
+pub use timing::StepTimes;
 
 use crate::engine::{Engine, LabelRoom, ListKey, Report, Room};
 use crate::error::{Error, Result};
@@ -48,6 +50,7 @@ pub struct Trainer {
     updates: u32,
     stamp: u32,
     max_gaussians: u64,
+    timing: Option<timing::Timing>,
 }
 
 /// Room for training on a data set.
@@ -96,6 +99,7 @@ impl Trainer {
         let order = ViewOrder::new(config.seed, views.len());
         Ok(Self {
             engine, config, views, fixed, order, flying: VecDeque::new(), step: 0, updates: 0, stamp: 0, max_gaussians,
+            timing: None,
         })
     }
 
@@ -234,6 +238,7 @@ impl Trainer {
             return self.absorb();
         }
         self.flying.pop_front();
+        self.note_times(&job)?;
         let view = &self.views[job.view];
         let scale = 1.0 / (3.0 * view.valid_pixels.max(1) as f64);
         let (counters, lambda) = (&report.counters, f64::from(self.config.lambda_dssim));

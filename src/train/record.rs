@@ -1,6 +1,6 @@
 //! Files of a run: the model, the cameras, the previews. Each is written whole or not at all.
 
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::infer::render::Rendered;
 use crate::io::{camera_json, image, ply};
 use crate::scene::labels::label_colour;
@@ -10,6 +10,17 @@ use std::path::{Path, PathBuf};
 /// Where the model of a step is kept, as the viewers of 3DGS expect it.
 pub fn model_path(out: &Path, step: u32) -> PathBuf {
     out.join("point_cloud").join(format!("iteration_{step}")).join("point_cloud.ply")
+}
+
+/// The model of the latest step in the folder of a run.
+pub fn latest_model(out: &Path) -> Result<PathBuf> {
+    let folder = out.join("point_cloud");
+    let steps = std::fs::read_dir(&folder).into_iter().flatten().flatten();
+    let steps = steps.filter_map(|entry| entry.file_name().to_str()?.strip_prefix("iteration_")?.parse::<u32>().ok());
+    let latest = steps.filter(|&step| model_path(out, step).is_file()).max();
+    latest.map(|step| model_path(out, step)).ok_or_else(|| {
+        Error::data(out, "", "is a folder without point_cloud/iteration_N/point_cloud.ply; name a PLY or the folder of a run")
+    })
 }
 
 /// Writes the model of a step.

@@ -99,6 +99,7 @@ pub fn engine_lists(shape: KernelShape) -> (Capacity, Vec<PassList>) {
         trained_instances: 100_000,
         virtual_tiles: 4096,
         layer_tiles: 1024,
+        segment_pixels: 1,
         layer_pixels: 65_536,
         pixels: 65_536,
         labelled_pixels: 65_536,
@@ -110,7 +111,6 @@ pub fn engine_lists(shape: KernelShape) -> (Capacity, Vec<PassList>) {
         loss_partials: 1024,
         sort_lanes: 64,
         segments: 2,
-        segment_pixels: 131_072,
     };
     let variant = Variant { labels: true, sh_degree: 3, size: (256, 256), update: true };
     let lists = vec![

@@ -114,8 +114,10 @@ fn devices_are_chosen_by_name_index_and_uuid() {
     assert_eq!(error.exit_status(), 4);
     let odd = GpuOptions { subgroup_size: Some(3), ..GpuOptions::default() };
     assert_eq!(Gpu::new(&odd).unwrap_err().exit_status(), 2);
-    let text = labelgs::gpu::devices_report().unwrap();
-    assert!(text.contains(&found.name) && text.contains("scalarBlockLayout") && text.contains("usable"), "{text}");
+    let (devices, picked) = labelgs::gpu::devices(&GpuOptions::default()).unwrap();
+    assert!(picked.is_some_and(|index| devices[index].missing().is_empty()));
+    let listed = devices.iter().find(|device| device.uuid == found.uuid).unwrap();
+    assert_eq!(listed.needs, found.needs);
 }
 
 /// The negative control of all other tests: what the layer says is heard.

@@ -1,0 +1,306 @@
+//! What `labelgs profile` found, as a table and as JSON.
+
+use super::args::ProfileArgs;
+use super::devices::{shape_json, shape_of, shape_text};
+use crate::engine::Room;
+use crate::gpu::Gpu;
+use crate::pass::{KernelShape, Stage};
+use crate::sched::{PassTime, Profiler};
+use crate::train::{StepReport, StepTimes};
+use serde_json::{Value, json};
+use std::collections::{HashMap, HashSet};
+use std::time::Duration;
+
+/// Threads of the host that run the passes.
+#[derive(Clone, Copy, Debug)]
+pub struct Workers {
+    /// How many.
+    pub count: usize,
+    /// Where the number comes from.
+    pub source: &'static str,
+}
+
+/// What the host's clocks say.
+#[derive(Clone, Debug, Default)]
+pub struct Clocks {
+    /// All timed steps, with what came between them.
+    pub wall: Duration,
+    /// Each call of the trainer; two steps are in flight, so a call waits for an earlier step.
+    pub steps: Vec<Duration>,
+    /// Processor time of the process, where the system tells.
+    pub cpu: Option<Duration>,
+}
+
+/// Median and 90th percentile.
+#[derive(Clone, Copy, Debug, Default)]
+struct Spread {
+    median: f64,
+    p90: f64,
+    mean: f64,
+}
+
+/// A profile.
+pub struct Profile {
+    device: String,
+    driver: String,
+    shape: KernelShape,
+    workers: Option<Workers>,
+    overlap: bool,
+    from_step: u32,
+    warm_up: u32,
+    /// Training views.
+    pub views: usize,
+    /// Gaussians at the end.
+    pub gaussians: u32,
+    /// What the memory was sized for.
+    pub room: Room,
+    clocks: Clocks,
+    passes: Vec<(Stage, PassTime)>,
+    stages: Vec<(Stage, PassTime)>,
+    device_ms: Spread,
+    /// Name in JSON, name in the table, values.
+    counters: Vec<(&'static str, &'static str, Spread)>,
+    pairs: f64,
+    ns_per_pair: [f64; 2],
+    steps: Vec<Value>,
+    left_out: usize,
+}
+
+impl Profile {
+    /// An empty one.
+    pub fn new(gpu: &Gpu, workers: Option<Workers>, args: &ProfileArgs) -> Self {
+        let found = gpu.capabilities();
+        Self {
+            device: found.name.clone(),
+            driver: format!("{} {}", found.driver_name, found.driver_info),
+            shape: shape_of(found),
+            workers,
+            overlap: args.overlap,
+            from_step: args.from_step,
+            warm_up: args.warm_up,
+            views: 0,
+            gaussians: 0,
+            room: Room { gaussians: 0, size: (0, 0), trained: true, labels: None },
+            clocks: Clocks::default(),
+            passes: Vec::new(),
+            stages: Vec::new(),
+            device_ms: Spread::default(),
+            counters: Vec::new(),
+            pairs: 0.0,
+            ns_per_pair: [f64::NAN; 2],
+            steps: Vec::new(),
+            left_out: 0,
+        }
+    }
+
+    /// Adds what was measured. The first run of a recording, in which drivers compile, counts for no pass.
+    pub fn fill(&mut self, clocks: Clocks, reports: &[StepReport], mut times: Vec<StepTimes>) {
+        let all = times.len();
+        self.steps =
+            reports.iter().map(|report| self.step_json(report, times.iter().find(|t| t.step == report.step))).collect();
+        times.retain(|times| !times.is_first);
+        self.left_out = all - times.len();
+        self.clocks = clocks;
+        self.passes = rows(&times, |name| name);
+        self.stages = rows(&times, |_| "");
+        let sums = times.iter().map(|times| times.items.iter().map(|item| item.2 as f64 / 1e6).sum());
+        self.device_ms = spread(sums.collect());
+        let walked =
+            |report: &StepReport| f64::from(report.report.counters.processed_low) * f64::from(self.shape.tile_pixels());
+        let counter = |value: &dyn Fn(&StepReport) -> f64| spread(reports.iter().map(value).collect());
+        self.counters = vec![
+            ("visible", "visible splats", counter(&|step| f64::from(step.report.counters.visible_count))),
+            ("instances", "(splat, tile) pairs", counter(&|step| f64::from(step.report.counters.instance_count))),
+            (
+                "layer_tiles",
+                "tiles of object layers",
+                counter(&|step| f64::from(step.report.counters.layer_tile_count)),
+            ),
+            (
+                "longest_list",
+                "splats of the fullest tile",
+                counter(&|step| f64::from(step.report.counters.longest_list)),
+            ),
+            ("pairs_walked", "(pixel, splat) pairs walked", counter(&walked)),
+        ];
+        let counted: HashSet<u32> = times.iter().map(|times| times.step).collect();
+        self.pairs = reports.iter().filter(|report| counted.contains(&report.step)).map(walked).sum();
+        let threads = self.workers.map_or(1.0, |workers| workers.count as f64);
+        self.ns_per_pair = [Stage::BlendForward, Stage::BlendBackward].map(|stage| {
+            let items = times.iter().flat_map(|times| &times.items).filter(|item| item.0 == stage);
+            items.map(|item| item.2 as f64).sum::<f64>() * threads / self.pairs
+        });
+    }
+
+    /// Steps that count for the passes.
+    fn counted(&self) -> usize {
+        self.steps.len() - self.left_out
+    }
+
+    fn host_ms(&self) -> Spread {
+        let mut found = spread(self.clocks.steps.iter().map(|time| time.as_secs_f64() * 1e3).collect());
+        found.mean = self.clocks.wall.as_secs_f64() * 1e3 / self.clocks.steps.len().max(1) as f64;
+        found
+    }
+
+    fn cpu_ms(&self) -> Option<f64> {
+        self.clocks.cpu.map(|time| time.as_secs_f64() * 1e3 / self.clocks.steps.len().max(1) as f64)
+    }
+
+    /// Pairs walked at this device's pace are counted per worker thread, where there are any.
+    fn per_pair_text(&self) -> String {
+        let [forward, backward] = self.ns_per_pair;
+        let whose = match self.workers {
+            Some(Workers { count, source }) => format!("times {count} worker threads ({source})"),
+            None => "of the whole device".to_owned(),
+        };
+        format!(
+            "per (pixel, splat) pair walked, ns: blend forward {forward:.3}, blend backward {backward:.3}, {whose}\n"
+        )
+    }
+
+    /// The table.
+    pub fn to_text(&self) -> String {
+        let (first, last) =
+            (self.from_step + self.warm_up + 1, self.from_step + self.warm_up + self.steps.len() as u32);
+        let labels = if self.room.labels.is_some() { "with labels" } else { "without labels" };
+        let mode = if self.overlap { "passes overlap" } else { "a barrier before each pass" };
+        let (width, height) = self.room.size;
+        let mut text = format!(
+            "device:  {} ({})\nkernels: {}\nsteps {first} to {last} of training {labels}, {} views of up to {width} x \
+             {height} px, {} Gaussians at the end\n{} steps count for the passes, {} first runs of a recording do not; \
+             {mode}\n\n",
+            self.device,
+            self.driver,
+            shape_text(&self.shape),
+            self.views,
+            self.gaussians,
+            self.counted(),
+            self.left_out
+        );
+        text +=
+            &format!("{:<34} {:>5} {:>10} {:>10} {:>7}\n", "stage and pass", "items", "median ms", "p90 ms", "share");
+        for (stage, sum) in &self.stages {
+            text += &line(stage.name(), sum);
+            for (_, pass) in self.passes.iter().filter(|(of, _)| of == stage) {
+                text += &line(&format!("  {}", pass.label), pass);
+            }
+        }
+        text += &format!("\n{:<34} {:>16} {:>10} {:>10}\n", "per step", "median", "p90", "mean");
+        text += &spread_line("passes, ms", self.device_ms, 3);
+        text += &spread_line("host's clock, ms", self.host_ms(), 3);
+        if let Some(cpu) = self.cpu_ms() {
+            text += &format!("{:<34} {:>16} {:>10} {cpu:>10.3}\n", "processor time, all threads, ms", "", "");
+        }
+        self.counters.iter().for_each(|(_, name, values)| text += &spread_line(name, *values, 0));
+        text + "\n" + &self.per_pair_text()
+    }
+
+    /// Everything.
+    pub fn to_json(&self) -> Value {
+        let row = |(stage, pass): &(Stage, PassTime)| {
+            json!({
+                "stage": stage.name(), "name": pass.label, "items": pass.items, "median_ms": ms(pass.median),
+                "p90_ms": ms(pass.p90), "share": pass.share,
+            })
+        };
+        let counters = self.counters.iter().map(|(name, _, values)| (name.to_string(), values.to_json()));
+        json!({
+            "schema_version": 1,
+            "device": self.device,
+            "driver": self.driver,
+            "kernels": shape_json(&self.shape),
+            "worker_threads": self.workers.map(|workers| workers.count),
+            "worker_threads_from": self.workers.map(|workers| workers.source),
+            "barrier_before_each_pass": !self.overlap,
+            "from_step": self.from_step,
+            "warm_up": self.warm_up,
+            "labels": self.room.labels.is_some(),
+            "views": self.views,
+            "size": [self.room.size.0, self.room.size.1],
+            "gaussians": self.gaussians,
+            "steps_counted": self.counted(),
+            "stages": self.stages.iter().map(row).collect::<Vec<_>>(),
+            "passes": self.passes.iter().map(row).collect::<Vec<_>>(),
+            "passes_ms": self.device_ms.to_json(),
+            "host_ms": self.host_ms().to_json(),
+            "processor_ms": self.cpu_ms(),
+            "counters": counters.collect::<serde_json::Map<_, _>>(),
+            "pairs_walked": self.pairs,
+            "ns_per_pair": { "blend_forward": self.ns_per_pair[0], "blend_backward": self.ns_per_pair[1] },
+            "steps": self.steps,
+        })
+    }
+
+    fn step_json(&self, report: &StepReport, times: Option<&StepTimes>) -> Value {
+        let counters = &report.report.counters;
+        let mut stages: HashMap<&str, f64> = HashMap::new();
+        for (stage, _, ns) in times.iter().flat_map(|times| &times.items) {
+            *stages.entry(stage.name()).or_default() += ms(*ns);
+        }
+        json!({
+            "step": report.step,
+            "loss": report.loss,
+            "label_loss": report.label_loss,
+            "visible": counters.visible_count,
+            "instances": counters.instance_count,
+            "layer_tiles": counters.layer_tile_count,
+            "longest_list": counters.longest_list,
+            "pairs_walked": f64::from(counters.processed_low) * f64::from(self.shape.tile_pixels()),
+            "first_run": times.map(|times| times.is_first),
+            "stages_ms": stages,
+        })
+    }
+}
+
+impl Spread {
+    fn to_json(self) -> Value {
+        json!({ "median": self.median, "p90": self.p90, "mean": self.mean })
+    }
+}
+
+fn ms(ns: u64) -> f64 {
+    ns as f64 / 1e6
+}
+
+/// Rows by stage and by what `label` makes of an item's name, in the order of the step.
+fn rows(times: &[StepTimes], label: impl Fn(&str) -> &str) -> Vec<(Stage, PassTime)> {
+    let mut profiler = Profiler::with_warm_up(0);
+    let mut named: HashMap<String, (Stage, String)> = HashMap::new();
+    for times in times {
+        let items = times.items.iter().map(|(stage, name, ns)| {
+            let name = label(name);
+            let key = format!("{}: {name}", stage.name());
+            named.entry(key.clone()).or_insert_with(|| (*stage, name.to_owned()));
+            (key, *ns)
+        });
+        profiler.add(&items.collect::<Vec<_>>());
+    }
+    let rows = profiler.rows().into_iter().filter_map(|row| {
+        let (stage, label) = named.get(&row.label)?.clone();
+        Some((stage, PassTime { label, ..row }))
+    });
+    let mut rows: Vec<(Stage, PassTime)> = rows.collect();
+    rows.sort_by_key(|(stage, _)| *stage);
+    rows
+}
+
+fn spread(mut values: Vec<f64>) -> Spread {
+    values.sort_by(f64::total_cmp);
+    let at = |percent: usize| values.get(values.len().saturating_sub(1) * percent / 100).copied().unwrap_or(f64::NAN);
+    Spread { median: at(50), p90: at(90), mean: values.iter().sum::<f64>() / values.len().max(1) as f64 }
+}
+
+fn line(name: &str, time: &PassTime) -> String {
+    format!(
+        "{name:<34} {:>5} {:>10.3} {:>10.3} {:>6.1}%\n",
+        time.items,
+        ms(time.median),
+        ms(time.p90),
+        time.share * 100.0
+    )
+}
+
+fn spread_line(name: &str, values: Spread, digits: usize) -> String {
+    format!("{name:<34} {:>16.digits$} {:>10.digits$} {:>10.digits$}\n", values.median, values.p90, values.mean)
+}

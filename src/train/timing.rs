@@ -1,0 +1,55 @@
+//! Times of the passes of each step, for `labelgs profile`.
+
+use super::Trainer;
+use super::job::Job;
+use crate::error::Result;
+use crate::pass::Stage;
+use crate::sched::ListId;
+use std::collections::HashSet;
+
+/// Times of the passes of a step.
+#[derive(Clone, Debug, PartialEq)]
+pub struct StepTimes {
+    /// Step, from 1.
+    pub step: u32,
+    /// The first run of a recording: drivers compile then.
+    pub is_first: bool,
+    /// Stage, name and nanoseconds of each item, in order.
+    pub items: Vec<(Stage, String, u64)>,
+}
+
+/// What was collected.
+#[derive(Debug, Default)]
+pub(super) struct Timing {
+    seen: HashSet<(ListId, usize)>,
+    times: Vec<StepTimes>,
+}
+
+impl Trainer {
+    /// From now on the times of steps are kept; the scheduler must have been made with timestamps.
+    pub fn keep_times(&mut self) {
+        self.timing.get_or_insert_default();
+    }
+
+    /// The times of the steps that ended since the last call.
+    pub fn take_times(&mut self) -> Vec<StepTimes> {
+        self.timing.as_mut().map(|timing| std::mem::take(&mut timing.times)).unwrap_or_default()
+    }
+
+    /// Reads the times of a step that has ended and whose slot was not used again.
+    pub(super) fn note_times(&mut self, job: &Job) -> Result<()> {
+        if self.timing.is_none() {
+            return Ok(());
+        }
+        let (key, slot) = (self.key(job), job.step as usize % crate::plan::SLOTS);
+        let id = self.engine.list(key)?;
+        let times = self.engine.sched().timings(id, slot)?;
+        let stages = crate::pass::stage::stages(&self.engine.sched().plan(id)?.list);
+        if let Some(timing) = &mut self.timing {
+            let items = stages.into_iter().zip(times).map(|((stage, name), (_, ns))| (stage, name, ns)).collect();
+            let is_first = timing.seen.insert((id, slot));
+            timing.times.push(StepTimes { step: job.step, is_first, items });
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,151 @@
+//! The shape of the code: floors, lengths, and where the dangerous things may be.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+const ROOT: &str = env!("CARGO_MANIFEST_DIR");
+
+/// A module may use modules of lower floors only; modules of one floor do not know each other.
+const FLOORS: [&[&str]; 8] = [
+    &["error", "lib"],
+    &["shaders", "gpu", "scene"],
+    &["plan", "io"],
+    &["pass"],
+    &["sched"],
+    &["engine"],
+    &["infer", "synth"],
+    &["train"],
+];
+/// Above all floors.
+const TOP: [&str; 2] = ["cli", "main"];
+/// What lies on a lower floor and does not follow the rule, with the reason.
+const EXCEPTIONS: [(&str, &str); 1] = [
+    // Tables of needs come from the shaders' own interfaces.
+    ("gpu", "shaders"),
+];
+
+fn files(folder: &str, extension: &[&str]) -> Vec<(PathBuf, String)> {
+    fn walk(folder: &Path, found: &mut Vec<PathBuf>) {
+        for entry in fs::read_dir(folder).expect("folder") {
+            let path = entry.expect("entry").path();
+            if path.is_dir() { walk(&path, found) } else { found.push(path) }
+        }
+    }
+    let mut found = Vec::new();
+    walk(&Path::new(ROOT).join(folder), &mut found);
+    found.retain(|path| path.extension().is_some_and(|found| extension.iter().any(|wanted| found == *wanted)));
+    found.sort();
+    found.into_iter().map(|path| (path.clone(), fs::read_to_string(path).expect("text"))).collect()
+}
+
+/// Top module of a file of `src`.
+fn module(path: &Path) -> String {
+    let inside = path.strip_prefix(Path::new(ROOT).join("src")).expect("in src");
+    let first = inside.components().next().expect("a component").as_os_str().to_string_lossy().into_owned();
+    first.trim_end_matches(".rs").to_owned()
+}
+
+fn floor(module: &str) -> usize {
+    if TOP.contains(&module) {
+        return FLOORS.len();
+    }
+    FLOORS.iter().position(|modules| modules.contains(&module)).unwrap_or_else(|| panic!("{module} is on no floor"))
+}
+
+/// Modules of this crate that a text names, but for its tests: `crate::name` and `crate::{name, ..}`.
+fn used(text: &str) -> Vec<String> {
+    let code = text.split("#[cfg(test)]").next().unwrap_or_default();
+    let code: String = code.lines().filter(|line| !line.trim_start().starts_with("//")).collect::<Vec<_>>().join("\n");
+    let mut names = Vec::new();
+    for (at, found) in code.match_indices("crate::") {
+        let rest = &code[at + found.len()..];
+        let word = |text: &str| text.chars().take_while(|c| c.is_alphanumeric() || *c == '_').collect::<String>();
+        match rest.strip_prefix('{') {
+            Some(list) => {
+                let list = &list[..list.find("};").unwrap_or(list.len())];
+                let mut depth = 0;
+                for part in list.split_inclusive([',', '{', '}']) {
+                    if depth == 0 {
+                        names.push(word(part.trim_start()));
+                    }
+                    depth += i32::from(part.ends_with('{')) - i32::from(part.ends_with('}'));
+                }
+            }
+            None => names.push(word(rest)),
+        }
+    }
+    // Types that the crate shows at its root, and macros.
+    names.retain(|name| name.chars().next().is_some_and(char::is_lowercase));
+    names
+}
+
+#[test]
+fn imports_are_found_in_any_form() {
+    let text = "use crate::gpu::Gpu;\nuse crate::{Error, Result, plan::{Buf, Limits}, io};\n// crate::cli\ncrate::sched::x();\n\
+                #[cfg(test)]\nmod tests { use crate::train::X; }";
+    assert_eq!(used(text), ["gpu", "plan", "io", "sched"]);
+}
+
+#[test]
+fn modules_use_lower_floors_only() {
+    let mut breaches = Vec::new();
+    for (path, text) in files("src", &["rs"]) {
+        let own = module(&path);
+        for other in used(&text) {
+            let is_macro = other == "buffers" && own == "plan";
+            let allowed = is_macro
+                || other == own
+                || floor(&own) > floor(&other)
+                || EXCEPTIONS.contains(&(own.as_str(), other.as_str()));
+            if !allowed {
+                breaches.push(format!("{} uses {other}", path.display()));
+            }
+        }
+    }
+    assert_eq!(breaches, Vec::<String>::new());
+}
+
+#[test]
+fn files_stay_short() {
+    let sources = files("src", &["rs"]).into_iter().map(|file| (file, 400));
+    let shaders = files("glsl", &["comp", "glsl"]).into_iter().map(|file| (file, 250));
+    let long = sources.chain(shaders).filter_map(|((path, text), most)| {
+        let lines = text.lines().count();
+        (lines > most).then(|| format!("{}: {lines} lines, at most {most}", path.display()))
+    });
+    assert_eq!(long.collect::<Vec<_>>(), Vec::<String>::new());
+}
+
+/// Files with a word, but for comments and the attributes that speak about it.
+fn with_word(word: &str) -> Vec<String> {
+    let has = |text: &str| {
+        let mut lines = text.lines().map(|line| line.split("//").next().unwrap_or_default());
+        lines.any(|line| line.contains(word) && !line.trim_start().starts_with("#!["))
+    };
+    let found = files("src", &["rs"]).into_iter().filter(|(_, text)| has(text));
+    let name = |path: PathBuf| path.strip_prefix(ROOT).expect("inside").to_string_lossy().into_owned();
+    found.map(|(path, _)| name(path)).collect()
+}
+
+#[test]
+fn unsafe_code_has_two_places() {
+    let elsewhere = with_word("unsafe ")
+        .into_iter()
+        .filter(|file| !file.starts_with("src/gpu/") && file != "src/sched/recorder.rs");
+    assert_eq!(elsewhere.collect::<Vec<_>>(), Vec::<String>::new());
+    assert!(with_word("unsafe ").contains(&"src/sched/recorder.rs".to_owned()), "the search finds what is there");
+}
+
+#[test]
+fn commands_are_recorded_in_one_place() {
+    for word in ["cmd_dispatch", "cmd_pipeline_barrier"] {
+        assert_eq!(with_word(word), ["src/sched/recorder.rs"], "{word}");
+    }
+}
+
+#[test]
+fn the_library_prints_nothing() {
+    for word in ["println!", "print!(", "eprint", "dbg!"] {
+        assert_eq!(with_word(word), Vec::<String>::new(), "{word}");
+    }
+}

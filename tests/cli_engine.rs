@@ -1,0 +1,227 @@
+//! The command line with a device: what it can do, what it plans, what it times, and a scene from synth to pictures.
+
+use assert_cmd::Command;
+use labelgs::io::ply::read_gaussians;
+use serde_json::Value;
+use std::path::Path;
+use std::process::Output;
+
+fn labelgs(args: &[&str]) -> Output {
+    let mut command = Command::cargo_bin("labelgs").expect("the tool is built");
+    // The layer is for the tests inside of this process.
+    command.env("LABELGS_VALIDATION", "off").args(args).output().expect("it runs")
+}
+
+/// A turn with the device: several at once would only wait for each other.
+fn turn() -> Option<crate::support::device::Turn> {
+    crate::support::device()
+}
+
+fn text(bytes: &[u8]) -> String {
+    String::from_utf8_lossy(bytes).into_owned()
+}
+
+#[track_caller]
+fn succeeds(args: &[&str]) -> String {
+    let output = labelgs(args);
+    assert_eq!(output.status.code(), Some(0), "{args:?}: {}", text(&output.stderr));
+    text(&output.stdout)
+}
+
+#[track_caller]
+fn json(text: &str) -> Value {
+    serde_json::from_str(text).unwrap_or_else(|error| panic!("{error}: {text}"))
+}
+
+#[test]
+fn without_a_driver_devices_fails_and_plan_does_not() {
+    let run = |args: &[&str]| {
+        let mut command = Command::cargo_bin("labelgs").expect("the tool is built");
+        let nowhere = "/nonexistent/driver.json";
+        command.env("VK_DRIVER_FILES", nowhere).env("VK_ICD_FILENAMES", nowhere).env_remove("LABELGS_DEVICE");
+        command.args(args).output().expect("it runs")
+    };
+    let output = run(&["devices"]);
+    assert_eq!(output.status.code(), Some(4), "{}", text(&output.stderr));
+    assert!(text(&output.stderr).starts_with("error: no usable Vulkan device: "), "{}", text(&output.stderr));
+    let output = run(&["plan", "--gaussians", "1k", "--size", "64x48", "--json"]);
+    assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+    assert_eq!(json(&text(&output.stdout))["device"], Value::Null);
+    assert_eq!(run(&["plan", "--device", "0"]).status.code(), Some(4));
+}
+
+#[test]
+fn devices_tells_what_is_needed_and_found() {
+    let Some(gpu) = turn() else { return };
+    let name = gpu.capabilities().name.clone();
+    let table = succeeds(&["devices"]);
+    assert!(
+        table.contains(&name) && table.contains("scalarBlockLayout") && table.contains("kernels subgroups of"),
+        "{table}"
+    );
+    let found = json(&succeeds(&["devices", "--json"]));
+    let devices = found["devices"].as_array().expect("a list");
+    let device = devices.iter().find(|device| device["name"] == name).expect("the device of the tests");
+    assert!(device["kernels"]["tile"][0].as_u64() >= Some(8) && device["usable"] == true, "{device}");
+    assert_eq!(devices.iter().filter(|device| device["picked"] == true).count(), 1);
+    let output = labelgs(&["devices", "--device", "no such device"]);
+    assert_eq!(output.status.code(), Some(4), "{}", text(&output.stderr));
+    assert!(!output.stdout.is_empty(), "the table is printed all the same");
+}
+
+#[test]
+fn plan_adds_up() {
+    let args = ["plan", "--gaussians", "2k", "--size", "160x120", "--label-samples", "4", "--sh-degree", "2"];
+    let table = succeeds(&args);
+    for part in ["MEMORY", "SCRATCH ARENA", "PASSES", "barrier: cull", "blend_backward_labels", "v_instances", "total"]
+    {
+        assert!(table.contains(part), "{part} is not in\n{table}");
+    }
+    let plan = json(&succeeds(&[&args[..], &["--json"]].concat()));
+    let sum = |key: &str| {
+        let rows = plan["memory"]["buffers"].as_array().expect("buffers").iter();
+        rows.filter(|row| row["class"] != "step").map(|row| row[key].as_u64().expect("bytes")).sum::<u64>()
+    };
+    let pages =
+        plan["memory"]["scratch_pages"].as_array().expect("pages").iter().filter_map(Value::as_u64).sum::<u64>();
+    let staging = plan["memory"]["staging"].as_u64().expect("staging");
+    assert_eq!(plan["memory"]["total"], sum("bytes") + pages + staging);
+    let names: Vec<&str> =
+        plan["passes"].as_array().expect("passes").iter().filter_map(|pass| pass["name"].as_str()).collect();
+    assert!(names[0] == "step_begin" && names.iter().any(|name| name.starts_with("lift_resolve")), "{names:?}");
+    let without =
+        json(&succeeds(&["plan", "--gaussians", "2k", "--size", "160x120", "--label-samples", "0", "--json"]));
+    assert!(without["memory"]["total"].as_u64() < plan["memory"]["total"].as_u64());
+    assert!(!without.to_string().contains("lift_resolve"));
+}
+
+#[test]
+fn a_plan_that_does_not_fit_is_printed_and_fails() {
+    let mut command = Command::cargo_bin("labelgs").expect("the tool is built");
+    let args = ["plan", "--gaussians", "2k", "--size", "160x120", "--json"];
+    let output = command.env("LABELGS_LIMIT_SSBO", "64K").args(args).output().expect("it runs");
+    if crate::support::device().is_none() {
+        return;
+    }
+    assert_eq!(output.status.code(), Some(5), "{}", text(&output.stderr));
+    let plan = json(&text(&output.stdout));
+    assert!(
+        plan["fits"] == false && plan["problem"].as_str().is_some_and(|text| text.contains("65536")),
+        "{}",
+        plan["problem"]
+    );
+}
+
+/// A scene of `labelgs synth`, 96 x 72 px.
+fn scene(folder: &Path) -> String {
+    let scene = folder.join("scene").to_str().expect("UTF-8").to_owned();
+    succeeds(&["synth", &scene, "--preset", "simple", "--size", "96x72", "--views", "12", "--points", "400"]);
+    scene
+}
+
+#[test]
+fn profile_times_every_stage() {
+    let Some(_gpu) = turn() else { return };
+    let folder = tempfile::tempdir().expect("folder");
+    let scene = scene(folder.path());
+    let file = folder.path().join("profile.json");
+    let masks = format!("{scene}/masks");
+    let args = [
+        "profile",
+        &scene,
+        "--masks",
+        &masks,
+        "--steps",
+        "6",
+        "--warm-up",
+        "3",
+        "--from-step",
+        "4",
+        "--json",
+        file.to_str().expect("UTF-8"),
+    ];
+    let table = succeeds(&args);
+    assert!(table.contains("per (pixel, splat) pair walked, ns: blend forward"), "{table}");
+    let found = json(&std::fs::read_to_string(&file).expect("written"));
+    let stages: Vec<&str> =
+        found["stages"].as_array().expect("stages").iter().filter_map(|row| row["stage"].as_str()).collect();
+    assert_eq!(
+        stages,
+        [
+            "project",
+            "sort",
+            "tile",
+            "blend forward",
+            "loss",
+            "blend backward",
+            "gather",
+            "project backward",
+            "optimise",
+            "labels",
+            "report"
+        ]
+    );
+    let number = |path: &str| found.pointer(path).and_then(Value::as_f64).unwrap_or_else(|| panic!("{path}: {found}"));
+    let shares: f64 = found["passes"].as_array().expect("passes").iter().filter_map(|row| row["share"].as_f64()).sum();
+    assert!((shares - 1.0).abs() < 1e-9, "{shares}");
+    assert!(number("/passes_ms/median") > 0.0 && number("/ns_per_pair/blend_backward") > 0.0);
+    assert!(number("/host_ms/mean") >= 0.5 * number("/passes_ms/median"), "the host waits for the passes");
+    assert_eq!(found["steps"].as_array().map(Vec::len), Some(6));
+    assert_eq!(found.pointer("/steps/0/step"), Some(&8.into()));
+    let overlap = json(&succeeds(&["profile", &scene, "--steps", "3", "--warm-up", "2", "--overlap", "--json"]));
+    assert!(overlap["labels"] == false && overlap["barrier_before_each_pass"] == false);
+}
+
+#[test]
+fn from_a_scene_to_objects_and_pictures() {
+    let Some(_gpu) = turn() else { return };
+    let folder = tempfile::tempdir().expect("folder");
+    let scene = scene(folder.path());
+    let path = |name: &str| folder.path().join(name).to_str().expect("UTF-8").to_owned();
+    let (out, masks, object, rest) = (path("out"), format!("{scene}/masks"), path("object.ply"), path("rest.ply"));
+    let train = ["train", &scene, "-o", &out, "--masks", &masks, "--iterations", "150", "--label-from", "60", "--json"];
+    let trained = json(&succeeds(&train));
+    assert_eq!((&trained["steps"], trained["model"].is_string()), (&150.into(), true));
+    assert!(trained["test"]["psnr"].as_f64() > Some(12.0), "{trained}");
+
+    let listed = json(&succeeds(&["list", &out, "--json"]));
+    let labels: Vec<u64> =
+        listed["labels"].as_array().expect("rows").iter().filter_map(|row| row["label"].as_u64()).collect();
+    assert!(labels.contains(&2) && listed["gaussians"] == trained["gaussians"], "{listed}");
+
+    let scores = json(&succeeds(&["eval", &out, "--scene", &scene, "--masks", &masks, "--json"]));
+    assert!(scores["mean"]["psnr"].as_f64() > Some(12.0), "{scores}");
+    assert!(scores["objects"]["2"]["iou_map"].is_number(), "{scores}");
+    let failed = labelgs(&["eval", &out, "--scene", &scene, "--min-psnr", "90"]);
+    assert_eq!(failed.status.code(), Some(1), "{}", text(&failed.stderr));
+    assert!(text(&failed.stdout).contains("PSNR"), "a failed check comes after the scores");
+
+    succeeds(&["extract", &out, "--labels", "2", "-o", &object]);
+    succeeds(&["remove", &out, "--labels", "2", "-o", &rest]);
+    let (object_model, rest_model) =
+        (read_gaussians(&object).expect("PLY").gaussians, read_gaussians(&rest).expect("PLY").gaussians);
+    assert_eq!(object_model.len() + rest_model.len(), trained["gaussians"].as_u64().expect("a number") as usize);
+    assert!(object_model.labels.is_some_and(|labels| labels.iter().all(|&label| label == 2)));
+    let unknown = labelgs(&["extract", &out, "--labels", "77", "-o", &object]);
+    assert_eq!(unknown.status.code(), Some(2), "{}", text(&unknown.stderr));
+
+    let pictures = path("pictures");
+    let what = "rgb,depth,alpha,labels,top-id,top-weight";
+    succeeds(&[
+        "render", &rest, "--scene", &scene, "--views", "000,005", "--what", what, "--format", "exr", "-o", &pictures,
+    ]);
+    for file in
+        ["000.rgb.exr", "005.depth.exr", "000.alpha.exr", "005.labels.png", "000.top-id.exr", "000.top-weight.exr"]
+    {
+        assert!(Path::new(&pictures).join(file).is_file(), "{file}");
+    }
+    assert_eq!(
+        labelgs(&["render", &rest, "--scene", &scene, "--views", "nowhere", "-o", &pictures]).status.code(),
+        Some(2)
+    );
+    assert_eq!(
+        labelgs(&["render", &scene, "--scene", &scene, "-o", &pictures]).status.code(),
+        Some(3),
+        "no model in there"
+    );
+}

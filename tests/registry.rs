@@ -1,0 +1,154 @@
+//! One stem, four places: every shader has its header, its mirror and its pass; every buffer has its pass.
+
+use labelgs::engine::{Engine, LabelRoom, Room, capacity};
+use labelgs::pass::{self, KernelShape, Variant};
+use labelgs::plan::{Capacity, Grid, Limits, PassList, Plan, PlanOptions, TABLE, Work};
+use labelgs::shaders;
+use std::collections::BTreeSet;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+const ROOT: &str = env!("CARGO_MANIFEST_DIR");
+const ROOM: Room =
+    Room { gaussians: 10_000, size: (320, 240), trained: true, labels: Some(LabelRoom { max_label: 40, layers: 8 }) };
+
+/// Stem and text of every compute shader.
+fn sources() -> Vec<(String, String)> {
+    let families = fs::read_dir(Path::new(ROOT).join("glsl")).expect("glsl").map(|entry| entry.expect("entry").path());
+    let files = families.filter(|path| path.is_dir()).flat_map(|folder| fs::read_dir(folder).expect("folder"));
+    let files =
+        files.map(|entry| entry.expect("entry").path()).filter(|path| path.extension().is_some_and(|e| e == "comp"));
+    let source = |path: PathBuf| {
+        let stem = path.file_stem().expect("stem").to_string_lossy().into_owned();
+        (stem, fs::read_to_string(path).expect("text"))
+    };
+    files.map(source).collect()
+}
+
+/// Text of a header line of a shader, such as `Mirror`.
+fn header<'a>(text: &'a str, key: &str) -> Option<&'a str> {
+    text.lines().find_map(|line| line.strip_prefix(&format!("// {key}:"))).map(str::trim)
+}
+
+/// Every list that the engine may run, on two kinds of device.
+fn lists() -> Vec<(Capacity, PassList)> {
+    let mut all = Vec::new();
+    for shape in [KernelShape::new(8, true), KernelShape::new(32, false)] {
+        for segments in [1, 3] {
+            let mut capacity = capacity(&shape, &ROOM);
+            capacity.segments = segments;
+            capacity.segment_pixels = if segments > 1 { 100_000 } else { 0 };
+            let size = ROOM.size;
+            let mut add = |list| all.push((capacity, list));
+            for (labels, sh_degree, update) in [(true, 3, true), (true, 0, false), (false, 3, true), (false, 1, false)]
+            {
+                add(pass::training_step(&shape, &capacity, Variant { labels, sh_degree, size, update }));
+            }
+            add(pass::render_view(&shape, &capacity, 3));
+            add(pass::densify_count(&shape, &capacity));
+            add(pass::densify_apply(&shape, &capacity, true));
+            add(pass::opacity_reset(&shape, &capacity));
+        }
+    }
+    all
+}
+
+#[test]
+fn every_shader_says_what_it_does() {
+    let sources = sources();
+    assert!(sources.len() > 20, "{}", sources.len());
+    for (stem, text) in sources {
+        let title = text.lines().find(|line| line.starts_with("// ")).unwrap_or_default();
+        assert!(title.starts_with(&format!("// {stem} — ")), "{stem}: {title}");
+        for key in ["Work", "Reads", "Writes", "Mirror"] {
+            assert!(header(&text, key).is_some_and(|value| value.len() > 3), "{stem} has no line `// {key}:`");
+        }
+    }
+}
+
+#[test]
+fn every_mirror_is_there() {
+    for (stem, text) in sources() {
+        let mirror = header(&text, "Mirror").expect("see the test above");
+        if let Some(reason) = mirror.strip_prefix("none (") {
+            assert!(reason.len() > 4, "{stem}: without a mirror the reason is needed");
+            // A reason may name the test that stands in for the mirror.
+            let named = reason.split([' ', ')', ';']).filter(|word| word.starts_with("tests/"));
+            named.for_each(|file| assert!(Path::new(ROOT).join(file).is_file(), "{stem}: there is no {file}"));
+            continue;
+        }
+        for part in mirror.split(", ") {
+            let (file, function) = part.split_once("::").unwrap_or_else(|| panic!("{stem}: {part} names no function"));
+            let file = Path::new(ROOT).join("tests/reference").join(file.trim_start_matches("tests/reference/"));
+            let reference =
+                fs::read_to_string(&file).unwrap_or_else(|error| panic!("{stem}: {}: {error}", file.display()));
+            assert!(
+                reference.contains(&format!("pub fn {function}")),
+                "{stem}: no function {function} in {}",
+                file.display()
+            );
+        }
+    }
+}
+
+#[test]
+fn every_shader_runs_in_some_list() {
+    let mut used = BTreeSet::new();
+    for (_, list) in lists() {
+        used.extend(list.work.iter().filter_map(|work| match work {
+            Work::Pass(pass) => Some(pass.shader.name),
+            Work::Fill { .. } | Work::Copy { .. } => None,
+        }));
+    }
+    let unused: Vec<&str> = shaders::ALL.iter().map(|shader| shader.name).filter(|name| !used.contains(name)).collect();
+    assert_eq!(unused, Vec::<&str>::new());
+}
+
+#[test]
+fn every_buffer_is_used_by_some_list() {
+    let mut used = BTreeSet::new();
+    for (_, list) in lists() {
+        for work in &list.work {
+            match work {
+                Work::Pass(pass) => {
+                    used.extend(pass.buffers.iter().copied());
+                    used.extend(if let Grid::Indirect(buf, _) = pass.grid { Some(buf) } else { None });
+                }
+                Work::Fill { buf, .. } => _ = used.insert(*buf),
+                Work::Copy { from, to, .. } => used.extend([*from, *to]),
+            }
+        }
+    }
+    let unused = TABLE.iter().enumerate().filter(|(index, _)| !used.iter().any(|buf| buf.index() == *index));
+    assert_eq!(unused.map(|(_, decl)| decl.name).collect::<Vec<_>>(), Vec::<&str>::new());
+}
+
+#[test]
+fn every_list_can_be_planned_and_printed() {
+    for (capacity, list) in lists() {
+        let plan = Plan::new(TABLE, &capacity, &list, &Limits::default(), PlanOptions::default());
+        let plan = plan.unwrap_or_else(|error| panic!("{}: {error}", list.name));
+        let text = plan.report();
+        assert_eq!(plan.items.len(), list.work.len());
+        assert!(plan.items.iter().all(|item| text.contains(&item.label)), "{text}");
+        assert!(list.work.len() < 2 || plan.barrier_count() > 0, "{}", list.name);
+    }
+}
+
+#[test]
+fn a_scene_without_masks_pays_nothing_for_labels() {
+    let shape = KernelShape::new(8, true);
+    let bytes = |room: &Room| {
+        let capacity = capacity(&shape, room);
+        let lists = Engine::lists_of(&shape, &capacity, room);
+        let report =
+            labelgs::plan::MemoryReport::predict(TABLE, &capacity, &lists, &Limits::default(), PlanOptions::default());
+        let report = report.expect("fits");
+        let labels = ["labels", "label_keys", "view_labels", "layer_state"];
+        let named = report.rows.iter().filter(|row| labels.contains(&row.name)).map(|row| row.bytes).sum::<u64>();
+        (named, report.total)
+    };
+    let (with, without) = (bytes(&ROOM), bytes(&Room { labels: None, ..ROOM }));
+    assert!(without.0 < 2048 && without.0 < with.0, "{without:?} {with:?}");
+    assert!(without.1 < with.1, "{without:?} {with:?}");
+}
