@@ -61,7 +61,12 @@ fn sixty_thousand_gaussians_in_one_tile() {
         for channel in 0..3 {
             // About 900 splats a pixel, each rounded to 6e-8 of a colour near 1 (worst seen 4e-5: splats at the cut).
             let difference = (f64::from(found[channel]) - expected.colour[channel]).abs();
-            assert!(difference < 2e-4, "pixel {pixel} channel {channel}: {} {}", found[channel], expected.colour[channel]);
+            assert!(
+                difference < 2e-4,
+                "pixel {pixel} channel {channel}: {} {}",
+                found[channel],
+                expected.colour[channel]
+            );
         }
         assert!(expected.count > 300, "pixel {pixel} has {} splats; the crowd is too thin", expected.count);
     }

@@ -60,9 +60,7 @@ pub enum Command {
     #[command(after_help = "Example: labelgs remove out --labels 2 -o rest.ply")]
     Remove(SelectArgs),
     /// Score a model on the views of a scene.
-    #[command(
-        after_help = "Example: labelgs eval out --scene garden --masks garden/masks --json scores.json"
-    )]
+    #[command(after_help = "Example: labelgs eval out --scene garden --masks garden/masks --json scores.json")]
     Eval(EvalArgs),
     /// Make a posed test scene with masks, whole outlines and depth.
     #[command(after_help = "Example: labelgs synth scene && labelgs train scene --masks scene/masks -o out")]

@@ -77,12 +77,16 @@ fn table(scores: &Scores) -> String {
     if scores.objects.is_empty() {
         return text;
     }
-    text += &format!("\n{:>10} {:>8} {:>10} {:>9} {:>11}\n", "object", "iou_map", "iou_object", "paper_iou", "object_psnr");
+    text +=
+        &format!("\n{:>10} {:>8} {:>10} {:>9} {:>11}\n", "object", "iou_map", "iou_object", "paper_iou", "object_psnr");
     let rows = scores.objects.iter().map(|(id, scores)| (id.to_string(), scores));
     for (name, row) in rows.chain([("mean".to_owned(), &scores.mean.objects)]) {
         text += &format!(
             "{name:>10} {:>8} {:>10} {:>9} {:>11}\n",
-            number(row.iou_map, 4), number(row.iou_object, 4), number(row.paper_iou, 4), number(row.object_psnr, 2)
+            number(row.iou_map, 4),
+            number(row.iou_object, 4),
+            number(row.paper_iou, 4),
+            number(row.object_psnr, 2)
         );
     }
     text

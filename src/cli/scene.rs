@@ -73,10 +73,14 @@ pub fn pick_views<'a>(dataset: &'a Dataset, which: &str) -> Result<Vec<&'a View>
 /// The view of a name, with or without its extension.
 pub fn find_view<'a>(dataset: &'a Dataset, name: &str) -> Result<&'a View> {
     let all = dataset.all();
-    let found = all.iter().find(|view| view.name == name || view.stem() == name || without_extension(&view.name) == name);
+    let found =
+        all.iter().find(|view| view.name == name || view.stem() == name || without_extension(&view.name) == name);
     found.copied().ok_or_else(|| {
         let some: Vec<&str> = all.iter().take(8).map(|view| view.name.as_str()).collect();
-        Error::usage("view", format!("there is no view {name}; the scene has {} ... ({} in all)", some.join(", "), all.len()))
+        Error::usage(
+            "view",
+            format!("there is no view {name}; the scene has {} ... ({} in all)", some.join(", "), all.len()),
+        )
     })
 }
 

@@ -25,7 +25,11 @@ pub fn run(args: &TrainArgs, context: &Context) -> Result<()> {
     prepare_output(out)?;
     let mut dataset = open_with(&args.scene, &config::load_options(&config, args.masks.clone()))?;
     if dataset.train.is_empty() {
-        return Err(Error::data(&args.scene, "", "no view is left to train on; use --no-test or a larger --test-every"));
+        return Err(Error::data(
+            &args.scene,
+            "",
+            "no view is left to train on; use --no-test or a larger --test-every",
+        ));
     }
     let gpu = open_gpu(context)?;
     let mut model = init::initial_gaussians(&dataset, config.seed, init::RANDOM_COUNT)?;
@@ -46,7 +50,8 @@ pub fn run(args: &TrainArgs, context: &Context) -> Result<()> {
     let mut trainer = Trainer::new(gpu, config.clone(), &mut dataset, &model, SchedulerOptions::default())?;
     interrupt::note_only();
     let start = Instant::now();
-    let last = steps(&mut trainer, out, preview.as_ref(), context).map_err(|error| keep_model(&mut trainer, out, error))?;
+    let last =
+        steps(&mut trainer, out, preview.as_ref(), context).map_err(|error| keep_model(&mut trainer, out, error))?;
     let seconds = start.elapsed().as_secs_f64();
     let path = record::save_model(out, trainer.steps_done(), &trainer.model()?)?;
     // Scoring puts single objects in the model's place.
@@ -132,7 +137,11 @@ fn keep_model(trainer: &mut Trainer, out: &Path, error: Error) -> Error {
     }
     let step = trainer.steps_done();
     match trainer.model().and_then(|model| record::save_model(out, step, &model)) {
-        Ok(path) => tracing::warn!("stopped at step {step} of {}; the model so far is {}", trainer.config().iterations, path.display()),
+        Ok(path) => tracing::warn!(
+            "stopped at step {step} of {}; the model so far is {}",
+            trainer.config().iterations,
+            path.display()
+        ),
         Err(second) => tracing::warn!("the model of step {step} could not be saved either: {second}"),
     }
     error
@@ -149,7 +158,10 @@ fn prepare_output(out: &Path) -> Result<()> {
 fn bound_start(model: &mut crate::scene::Gaussians, config: &TrainConfig) {
     let (count, bound) = (model.len() as u64, config.max_gaussians);
     if bound > 0 && count > bound {
-        tracing::warn!("{count} initial points, --max-gaussians {bound}: every {:.1}-th is used", count as f64 / bound as f64);
+        tracing::warn!(
+            "{count} initial points, --max-gaussians {bound}: every {:.1}-th is used",
+            count as f64 / bound as f64
+        );
         // Row i is kept where i * bound / count steps up: an even choice.
         *model = model.filtered(|row| row as u64 * bound / count != (row as u64 + 1) * bound / count);
     }

@@ -265,8 +265,12 @@ impl Engine {
         if new == *self.sched.capacity() {
             return Err(Error::Bug(format!("failure {} without a need: {needed:?}", report.failure)));
         }
-        tracing::debug!("buffers grow: {} instances, {} layer tiles, {} segments", new.instances, new.layer_tiles,
-            new.segments);
+        tracing::debug!(
+            "buffers grow: {} instances, {} layer tiles, {} segments",
+            new.instances,
+            new.layer_tiles,
+            new.segments
+        );
         self.set_capacity(new)?;
         self.sched.fill(Buf::FAILURE, 0)?;
         Ok(true)

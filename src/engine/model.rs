@@ -10,8 +10,21 @@ const BANDS: [(Buf, usize, usize, usize); 3] = [(Buf::SH1, 3, 0, 3), (Buf::SH2, 
 
 /// Planes that hold state of the optimiser.
 const STATE: [Buf; 15] = [
-    Buf::M_MEANS, Buf::M_SCALES, Buf::M_QUATS, Buf::M_SH0, Buf::M_SH1, Buf::M_SH2, Buf::M_SH3, Buf::U_MEANS,
-    Buf::U_SCALES, Buf::U_QUATS, Buf::U_SH0, Buf::U_SH1, Buf::U_SH2, Buf::U_SH3, Buf::DENSIFY_STATS,
+    Buf::M_MEANS,
+    Buf::M_SCALES,
+    Buf::M_QUATS,
+    Buf::M_SH0,
+    Buf::M_SH1,
+    Buf::M_SH2,
+    Buf::M_SH3,
+    Buf::U_MEANS,
+    Buf::U_SCALES,
+    Buf::U_QUATS,
+    Buf::U_SH0,
+    Buf::U_SH1,
+    Buf::U_SH2,
+    Buf::U_SH3,
+    Buf::DENSIFY_STATS,
 ];
 
 /// Writes the planes; optimiser state becomes 0.

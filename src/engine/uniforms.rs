@@ -9,7 +9,13 @@ use bytemuck::Zeroable;
 const SLOPE_MARGIN: f64 = 0.3;
 
 /// The camera's part of the uniforms; everything else is 0.
-pub fn view_uniforms(camera: &Camera, shape: &KernelShape, near: f32, background: [f32; 3], count: u32) -> StepUniforms {
+pub fn view_uniforms(
+    camera: &Camera,
+    shape: &KernelShape,
+    near: f32,
+    background: [f32; 3],
+    count: u32,
+) -> StepUniforms {
     let (width, height) = (f64::from(camera.width), f64::from(camera.height));
     let (margin_x, margin_y) = (SLOPE_MARGIN * 0.5 * width / camera.fx, SLOPE_MARGIN * 0.5 * height / camera.fy);
     let (tiles_x, tiles_y) = shape.tiles(camera.width, camera.height);

@@ -1,7 +1,7 @@
 //! The questions behind [`Capabilities`], and the list of devices.
 
-use super::capabilities::{Capabilities, Features, Need, Subgroup};
 use super::GpuOptions;
+use super::capabilities::{Capabilities, Features, Need, Subgroup};
 use super::instance::{Instance, Validation};
 use super::limits::Limits;
 use super::select;

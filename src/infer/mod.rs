@@ -1,12 +1,12 @@
 //! What to do with a trained model: choose labels, filter Gaussians, score, write pictures. Plain arrays only; whoever
 //! renders hands them in.
 
-pub mod render;
 pub mod choose;
 pub mod evaluate;
 pub mod metrics;
 pub mod occlusion;
 pub mod output;
+pub mod render;
 pub mod scores;
 pub mod select;
 pub mod ssim;

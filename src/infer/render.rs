@@ -34,12 +34,22 @@ impl Rendered {
 
     /// Depth divided by alpha; 0 where alpha is below one half.
     pub fn mean_depth(&self) -> Vec<f32> {
-        self.depth.iter().zip(&self.alpha).map(|(&depth, &alpha)| if alpha >= 0.5 { depth / alpha } else { 0.0 }).collect()
+        self.depth
+            .iter()
+            .zip(&self.alpha)
+            .map(|(&depth, &alpha)| if alpha >= 0.5 { depth / alpha } else { 0.0 })
+            .collect()
     }
 }
 
 /// Renders the engine's model; grows buffers as needed.
-pub fn render(engine: &mut Engine, camera: &Camera, near: f32, background: [f32; 3], sh_degree: u32) -> Result<Rendered> {
+pub fn render(
+    engine: &mut Engine,
+    camera: &Camera,
+    near: f32,
+    background: [f32; 3],
+    sh_degree: u32,
+) -> Result<Rendered> {
     loop {
         engine.sched().wait_all()?;
         let uniforms = view_uniforms(camera, engine.shape(), near, background, engine.gaussian_count());

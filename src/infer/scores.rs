@@ -93,8 +93,7 @@ impl ViewScores {
         let scores = self.objects.entry(id).or_default();
         let unknown = |index: usize| whole.is_none() && hidden.is_some_and(|hidden| hidden[index]);
         let known = (0..pixels).filter(|&index| photo.rgba[index][3] > 0 && !unknown(index));
-        scores.iou_object =
-            Overlap::count(known.map(|index| (render.alpha[index] > COVERED, outline[index]))).iou();
+        scores.iou_object = Overlap::count(known.map(|index| (render.alpha[index] > COVERED, outline[index]))).iou();
         if let Some(visible) = visible {
             let paper = paper_score(render.colour, photo, &visible);
             (scores.paper_iou, scores.object_psnr) = (paper.iou, Some(paper.psnr));

@@ -51,7 +51,10 @@ impl KernelShape {
         if pixels > 0 && self.subgroup.is_multiple_of(width) && pixels.is_multiple_of(self.subgroup) {
             return Ok(());
         }
-        Err(Error::Bug(format!("tiles of {width} x {} px do not suit subgroups of {}", self.tile_height, self.subgroup)))
+        Err(Error::Bug(format!(
+            "tiles of {width} x {} px do not suit subgroups of {}",
+            self.tile_height, self.subgroup
+        )))
     }
 
     /// Tiles in a row and in a column of an image.

@@ -16,10 +16,8 @@ pub fn bin_splats(b: &mut Builder) -> Buf {
         counters: Buf::COUNTERS, dispatch_args: Buf::DISPATCH_ARGS, failure: Buf::FAILURE,
     } [instance_capacity: instances], ONE);
     emit_instances(b);
-    let buffers = SortBuffers {
-        keys: [Buf::TILE_KEYS_A, Buf::TILE_KEYS_B],
-        values: [Buf::TILE_VALUES_A, Buf::TILE_VALUES_B],
-    };
+    let buffers =
+        SortBuffers { keys: [Buf::TILE_KEYS_A, Buf::TILE_KEYS_B], values: [Buf::TILE_VALUES_A, Buf::TILE_VALUES_B] };
     let bits = 64 - b.capacity.virtual_tiles.saturating_sub(1).leading_zeros();
     let (keys, slots) = sort::sort(b, buffers, bits, Count::Instances, true);
     b.list.fill(Buf::TILE_STARTS, 0);

@@ -17,12 +17,12 @@ mod table;
 
 pub use barrier::{Barrier, Touch, Use, Uses};
 pub use buffers::{Buf, BufferDecl, Class, TexelFormat};
-pub use table::TABLE;
 pub use capacity::{Capacity, Domain};
 pub use lifetime::Life;
 pub use limits::Limits;
 pub use memory::{MemoryReport, MemoryRow};
 pub use pass::{Grid, PassDecl, PassList, Work};
+pub use table::TABLE;
 
 use crate::error::{Error, Result};
 use crate::shaders::BindingKind;

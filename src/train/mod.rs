@@ -58,7 +58,8 @@ pub fn room(dataset: &Dataset, config: &TrainConfig, gaussians: u64) -> Result<R
     let sizes = dataset.train.iter().chain(&dataset.test).map(|view| (view.camera.width, view.camera.height));
     let size = sizes.reduce(|a, b| (a.0.max(b.0), a.1.max(b.1)));
     let size = size.ok_or_else(|| Error::data(&dataset.root, "", "the scene has no view to train on"))?;
-    let objects: Vec<u16> = dataset.train.iter().filter_map(|view| view.mask.as_ref()).flat_map(|m| m.objects()).collect();
+    let objects: Vec<u16> =
+        dataset.train.iter().filter_map(|view| view.mask.as_ref()).flat_map(|m| m.objects()).collect();
     let most = dataset.train.iter().filter_map(|view| view.mask.as_ref().map(|mask| mask.objects().len())).max();
     let labels = objects.iter().max().map(|&max_label| LabelRoom {
         max_label: u32::from(max_label),
@@ -98,7 +99,16 @@ impl Trainer {
         engine.upload_model(model)?;
         let order = ViewOrder::new(config.seed, views.len());
         Ok(Self {
-            engine, config, views, fixed, order, flying: VecDeque::new(), step: 0, updates: 0, stamp: 0, max_gaussians,
+            engine,
+            config,
+            views,
+            fixed,
+            order,
+            flying: VecDeque::new(),
+            step: 0,
+            updates: 0,
+            stamp: 0,
+            max_gaussians,
             timing: None,
         })
     }
@@ -160,7 +170,8 @@ impl Trainer {
         self.submit(job.clone())?;
         self.step = step;
         let last = step >= self.config.iterations;
-        let (densifies, resets) = (self.config.densifies_at(step) && !last, self.config.resets_opacity_at(step) && !last);
+        let (densifies, resets) =
+            (self.config.densifies_at(step) && !last, self.config.resets_opacity_at(step) && !last);
         if densifies || resets {
             done.extend(self.drain()?);
             if densifies {

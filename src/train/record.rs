@@ -19,7 +19,11 @@ pub fn latest_model(out: &Path) -> Result<PathBuf> {
     let steps = steps.filter_map(|entry| entry.file_name().to_str()?.strip_prefix("iteration_")?.parse::<u32>().ok());
     let latest = steps.filter(|&step| model_path(out, step).is_file()).max();
     latest.map(|step| model_path(out, step)).ok_or_else(|| {
-        Error::data(out, "", "is a folder without point_cloud/iteration_N/point_cloud.ply; name a PLY or the folder of a run")
+        Error::data(
+            out,
+            "",
+            "is a folder without point_cloud/iteration_N/point_cloud.ply; name a PLY or the folder of a run",
+        )
     })
 }
 
