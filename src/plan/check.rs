@@ -1,7 +1,7 @@
 //! Checks of a pass list against the shaders' interfaces and the device's limits, before anything is planned.
 
-use super::capacity::Domain;
 use super::buffers::{Buf, BufferDecl};
+use super::capacity::Domain;
 use super::limits::Limits;
 use super::memory::Size;
 use super::name;
