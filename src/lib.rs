@@ -1,4 +1,43 @@
 //! labelgs: label-aware 3D Gaussian Splatting on Vulkan compute.
+//!
+//! # Floors
+//!
+//! A module uses lower ones only (`tests/architecture.rs` reads the `use` lines):
+//!
+//! ```text
+//! cli                    verbs: what is typed, what is decided
+//! train                  the loop over steps, and what happens between them
+//! infer    synth         pictures, scores, selections; a scene with every truth
+//! engine                 a device with a model in its memory
+//! sched                  executes plans: recordings, two slots in flight, transfers
+//! pass                   what the engine does, as lists of GPU passes; no Vulkan
+//! plan     io            sizes, places, barriers (pure); files
+//! shaders  gpu   scene   generated interfaces; a thin layer over Vulkan; plain host data
+//! error
+//! ```
+//!
+//! # Words
+//!
+//! *Gaussian*: a row of the model. *Splat*: its projection in a view. *Instance*: a (splat, tile) pair; its place before
+//! the sort is its *slot*. *Layer*: the scene (0) or one sampled object of the view. *Label*: an object's id, 0 for none.
+//! *Mask*: the visible ids of a photo. *Step*: one update of the parameters. *View*: a posed photo. A gradient is named
+//! `v_` and the value's name, first and second moments `m_` and `u_`.
+//!
+//! The paper's names: B_j is `labels[j]`, M_k a mask, U_k what [`infer::occlusion`] finds, H(G, k) an object layer, GPF the
+//! test of the projected centre in `glsl/include/label_rules.glsl`.
+//!
+//! # Conventions
+//!
+//! World units are the data set's. Camera axes are OpenCV's (x right, y down, z forward); pixel (0, 0) has its centre at
+//! (0.5, 0.5). Quaternions are (w, x, y, z). Opacity and scale are stored before their sigmoid and exponential.
+//!
+//! # Life of a step
+//!
+//! [`train::Trainer::step`] draws a view, writes its photo, masks and uniforms into one of two slots and submits the list
+//! that [`pass::training_step`] declared: cull, sort by depth, project, list (splat, tile) pairs, sort them by layer and
+//! tile, blend forward, loss, blend backward, gather, project backward, Adam. Nothing is read back inside a step; its
+//! report is read when the slot comes round again. A buffer that was too small sets a sticky bit, every later pass leaves
+//! the model alone, the buffer grows, and the steps run again.
 #![deny(unsafe_code)]
 
 pub mod cli;

@@ -185,7 +185,7 @@ void main() {
         }
     }
     if (lane == 0u && walked > 0u) {
-        atomicAdd(counters.processed_low, walked);
+        atomicAdd(counters.walked_splats, walked);
     }
 #ifdef SEGMENTED
     if (SEGMENT + 1u < SEGMENTS) {

@@ -3,68 +3,22 @@
 
 layout(constant_id = 0) const uint SUBGROUP_SIZE = 8;
 
-float subgroup_sum(float v) {
-    if (SUBGROUP_SIZE > 32u) {
-        v = v + subgroupShuffleXor(v, 32u);
+#define BUTTERFLY_STEP(DISTANCE, COMBINE) \
+    if (SUBGROUP_SIZE > DISTANCE) { \
+        v = COMBINE(v, subgroupShuffleXor(v, DISTANCE)); \
     }
-    if (SUBGROUP_SIZE > 16u) {
-        v = v + subgroupShuffleXor(v, 16u);
+#define BUTTERFLY(T, NAME, COMBINE) \
+    T NAME(T v) { \
+        BUTTERFLY_STEP(32u, COMBINE) \
+        BUTTERFLY_STEP(16u, COMBINE) \
+        BUTTERFLY_STEP(8u, COMBINE) \
+        BUTTERFLY_STEP(4u, COMBINE) \
+        BUTTERFLY_STEP(2u, COMBINE) \
+        BUTTERFLY_STEP(1u, COMBINE) \
+        return v; \
     }
-    if (SUBGROUP_SIZE > 8u) {
-        v = v + subgroupShuffleXor(v, 8u);
-    }
-    if (SUBGROUP_SIZE > 4u) {
-        v = v + subgroupShuffleXor(v, 4u);
-    }
-    if (SUBGROUP_SIZE > 2u) {
-        v = v + subgroupShuffleXor(v, 2u);
-    }
-    if (SUBGROUP_SIZE > 1u) {
-        v = v + subgroupShuffleXor(v, 1u);
-    }
-    return v;
-}
+#define PLUS(a, b) ((a) + (b))
 
-float subgroup_max(float v) {
-    if (SUBGROUP_SIZE > 32u) {
-        v = max(v, subgroupShuffleXor(v, 32u));
-    }
-    if (SUBGROUP_SIZE > 16u) {
-        v = max(v, subgroupShuffleXor(v, 16u));
-    }
-    if (SUBGROUP_SIZE > 8u) {
-        v = max(v, subgroupShuffleXor(v, 8u));
-    }
-    if (SUBGROUP_SIZE > 4u) {
-        v = max(v, subgroupShuffleXor(v, 4u));
-    }
-    if (SUBGROUP_SIZE > 2u) {
-        v = max(v, subgroupShuffleXor(v, 2u));
-    }
-    if (SUBGROUP_SIZE > 1u) {
-        v = max(v, subgroupShuffleXor(v, 1u));
-    }
-    return v;
-}
-
-uint subgroup_max(uint v) {
-    if (SUBGROUP_SIZE > 32u) {
-        v = max(v, subgroupShuffleXor(v, 32u));
-    }
-    if (SUBGROUP_SIZE > 16u) {
-        v = max(v, subgroupShuffleXor(v, 16u));
-    }
-    if (SUBGROUP_SIZE > 8u) {
-        v = max(v, subgroupShuffleXor(v, 8u));
-    }
-    if (SUBGROUP_SIZE > 4u) {
-        v = max(v, subgroupShuffleXor(v, 4u));
-    }
-    if (SUBGROUP_SIZE > 2u) {
-        v = max(v, subgroupShuffleXor(v, 2u));
-    }
-    if (SUBGROUP_SIZE > 1u) {
-        v = max(v, subgroupShuffleXor(v, 1u));
-    }
-    return v;
-}
+BUTTERFLY(float, subgroup_sum, PLUS)
+BUTTERFLY(float, subgroup_max, max)
+BUTTERFLY(uint, subgroup_max, max)

@@ -106,7 +106,7 @@ impl Profile {
         let sums = times.iter().map(|times| times.items.iter().map(|item| item.2 as f64 / 1e6).sum());
         self.device_ms = spread(sums.collect());
         let walked =
-            |report: &StepReport| f64::from(report.report.counters.processed_low) * f64::from(self.shape.tile_pixels());
+            |report: &StepReport| f64::from(report.report.counters.walked_splats) * f64::from(self.shape.tile_pixels());
         let counter = |value: &dyn Fn(&StepReport) -> f64| spread(reports.iter().map(value).collect());
         self.counters = vec![
             ("visible", "visible splats", counter(&|step| f64::from(step.report.counters.visible_count))),
@@ -246,7 +246,7 @@ impl Profile {
             "instances": counters.instance_count,
             "layer_tiles": counters.layer_tile_count,
             "longest_list": counters.longest_list,
-            "pairs_walked": f64::from(counters.processed_low) * f64::from(self.shape.tile_pixels()),
+            "pairs_walked": f64::from(counters.walked_splats) * f64::from(self.shape.tile_pixels()),
             "first_run": times.map(|times| times.is_first),
             "stages_ms": stages,
         })
