@@ -3,6 +3,7 @@
 mod colmap;
 mod fixtures;
 mod init;
+mod label_table;
 mod masks;
 mod output;
 mod photos;

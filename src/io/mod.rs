@@ -8,6 +8,7 @@ pub mod camera_json;
 mod colmap;
 pub mod image;
 pub mod init;
+pub mod label_table;
 pub mod lens;
 mod listing;
 mod load;

@@ -138,3 +138,23 @@ fn odd_rigs_get_their_gaussians() {
     }
     assert_eq!(initial_gaussians(&Dataset::default(), 1, 10).expect_err("no views").exit_status(), 3);
 }
+
+#[test]
+fn no_gaussian_of_a_made_up_point_covers_a_picture() {
+    // Few points for a whole room: their neighbours are far, so that only the bound keeps them small.
+    let scene = dataset(ring(8), |_, direction| [(127.0 + 120.0 * direction.x) as u8, 90, 60]);
+    let model = initial_gaussians(&scene, 1, 64).expect("Gaussians");
+    let mut bounded = 0;
+    for (mean, scale) in model.means.iter().zip(&model.scales) {
+        let world = DVec3::from_array(mean.map(f64::from));
+        for view in &scene.train {
+            let (camera, at) = (&view.camera, view.camera.to_camera(world));
+            let pixel = camera.project(at);
+            let inside = at.z > 0.0 && (0.0..64.0).contains(&pixel.x) && (0.0..48.0).contains(&pixel.y);
+            let size = f64::from(scale[0].exp()) / at.z * camera.fx;
+            assert!(!inside || size <= 64.0 * 0.02 * 1.0001, "{size} px at {pixel}");
+            bounded += u32::from(inside && size > 64.0 * 0.0199);
+        }
+    }
+    assert!(bounded > 20, "the bound was reached {bounded} times only");
+}

@@ -17,6 +17,10 @@ const OPACITY: f64 = 0.1;
 const DISTANCE2_MIN: f64 = 1e-7;
 /// Neighbours that decide the size of a Gaussian.
 const NEIGHBOURS: usize = 3;
+/// Largest standard deviation of a Gaussian on a point that was made up, as a part of the longer side of the image in
+/// the nearest camera that sees it. Points in the wide gaps before the cameras would cover whole pictures, and cost more
+/// than all others together; half of this costs quality at first.
+const SIZE_MAX: f64 = 0.02;
 /// With fewer points a scene counts as one without points.
 const POINTS_MIN: usize = 16;
 /// A sensible number of Gaussians for a scene without points.
@@ -26,33 +30,38 @@ pub const RANDOM_COUNT: usize = 50_000;
 /// same size in all directions, namely the root mean square distance to the three nearest neighbours, no labels.
 ///
 /// They stand on the points of the scene. Without points (or with fewer than 16), `count_if_no_points` of them are
-/// placed where the training cameras look and, with photos, where the photos agree on a colour.
+/// placed where the training cameras look and, with photos, where the photos agree on a colour; none is then larger
+/// than a fiftieth of a picture.
 pub fn initial_gaussians(dataset: &Dataset, seed: u64, count_if_no_points: usize) -> Result<Gaussians> {
     if dataset.points.len() >= POINTS_MIN {
-        return from_points(&dataset.points, dataset.extent());
+        return Ok(from_points(&dataset.points, &neighbour_distances2(&dataset.points, dataset.extent())?));
     }
     let mut points = random::points(dataset, seed, count_if_no_points)?;
     points.extend_from_slice(&dataset.points);
-    from_points(&points, dataset.extent())
+    let mut distances2 = neighbour_distances2(&points, dataset.extent())?;
+    distances2.par_iter_mut().zip(&points).for_each(|(distance2, point)| {
+        *distance2 = distance2.min((SIZE_MAX * region::image_side(&dataset.train, point.position)).powi(2));
+    });
+    Ok(from_points(&points, &distances2))
 }
 
-/// One Gaussian per point, in their order.
-fn from_points(points: &[Point], extent: f64) -> Result<Gaussians> {
+/// One Gaussian per point, in their order; `distances2` are their squared sizes.
+fn from_points(points: &[Point], distances2: &[f64]) -> Gaussians {
     let logit = (OPACITY / (1.0 - OPACITY)).ln() as f32;
     let count = points.len();
-    let scale = |distance2: f64| [(0.5 * distance2.max(DISTANCE2_MIN).ln()) as f32; 3];
+    let scale = |&distance2: &f64| [(0.5 * distance2.max(DISTANCE2_MIN).ln()) as f32; 3];
     let constant = |value: u8| ((f64::from(value) / 255.0 - 0.5) / SH_C0) as f32;
     let mut gaussians = Gaussians {
         means: points.iter().map(|point| point.position.as_vec3().to_array()).collect(),
         quats: vec![[1.0, 0.0, 0.0, 0.0]; count],
-        scales: neighbour_distances2(points, extent)?.into_iter().map(scale).collect(),
+        scales: distances2.iter().map(scale).collect(),
         opacities: vec![logit; count],
         sh0: points.iter().map(|point| point.colour.map(constant)).collect(),
         sh_degree: 3,
         ..Gaussians::default()
     };
     gaussians.sh_rest = vec![[0.0; 3]; count * gaussians.rest_per_gaussian()];
-    Ok(gaussians)
+    gaussians
 }
 
 /// Mean squared distance of each point to its three nearest neighbours; to fewer where there are fewer, and a

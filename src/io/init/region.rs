@@ -45,6 +45,16 @@ pub(super) fn sees(camera: &Camera, point: DVec3) -> Option<DVec2> {
     inside.then_some(pixel)
 }
 
+/// What the longer side of an image spans at `point`, world units, in the view where that is least; infinite where no
+/// view sees the point.
+pub(super) fn image_side(views: &[View], point: DVec3) -> f64 {
+    let side = |camera: &Camera| {
+        let sizes = DVec2::new(f64::from(camera.width) / camera.fx, f64::from(camera.height) / camera.fy);
+        sees(camera, point).map(|_| camera.to_camera(point).z * sizes.max_element())
+    };
+    views.iter().filter_map(|view| side(&view.camera)).fold(f64::INFINITY, f64::min)
+}
+
 /// The world point at `depth` behind `pixel`.
 pub(super) fn unproject(camera: &Camera, pixel: DVec2, depth: f64) -> DVec3 {
     let ray = DVec3::new((pixel.x - camera.cx) / camera.fx, (pixel.y - camera.cy) / camera.fy, 1.0);

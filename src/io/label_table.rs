@@ -1,0 +1,120 @@
+//! `labels.json`: what is known about the ids of a folder of masks or of a model, besides the ids themselves.
+//!
+//! It stands in a folder of masks, in the folder of a run, and beside a PLY of its own as `NAME.labels.json`.
+
+use super::atomic;
+use crate::error::{Error, Result};
+use crate::scene::labels::{LABEL_MAX, label_colour};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+
+/// Name of the file in a folder.
+pub const FILE: &str = "labels.json";
+/// Version of the layout that this program writes and reads.
+const SCHEMA_VERSION: u32 = 1;
+
+/// One object.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct LabelEntry {
+    /// Id in masks and models, 1 to 65535.
+    pub id: u32,
+    /// Name for people; unique where it is given.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub name: Option<String>,
+    /// Display colour, sRGB bytes.
+    pub colour: [u8; 3],
+    /// What the source of the masks called it: an id, a colour or a folder.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub source: Option<String>,
+    /// Pixels over all masks; 0 where there are none.
+    #[serde(default)]
+    pub pixels: u64,
+    /// Masks that show it.
+    #[serde(default)]
+    pub views: u32,
+}
+
+impl LabelEntry {
+    /// An object of which only the id is known.
+    pub fn new(id: u32) -> Self {
+        Self { id, name: None, colour: label_colour(id), source: None, pixels: 0, views: 0 }
+    }
+}
+
+/// The objects, sorted by id.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct LabelTable {
+    /// Version of the layout.
+    pub schema_version: u32,
+    /// One entry per id.
+    pub labels: Vec<LabelEntry>,
+}
+
+impl LabelTable {
+    /// A table of these entries, sorted.
+    pub fn new(mut labels: Vec<LabelEntry>) -> Self {
+        labels.sort_by_key(|entry| entry.id);
+        Self { schema_version: SCHEMA_VERSION, labels }
+    }
+
+    /// Reads a table. Another version, an id that no label can have, one that occurs twice and a name that stands
+    /// for two ids are errors.
+    pub fn read(path: &Path) -> Result<Self> {
+        let text = std::fs::read_to_string(path).map_err(Error::read(path))?;
+        let table: Self = serde_json::from_str(&text).map_err(|error| {
+            let expected =
+                r#"expected {"schema_version": 1, "labels": [{"id": 1, "name": "cup", "colour": [r, g, b]}]}"#;
+            Error::data(path, format!("line {}", error.line()), format!("{error}; {expected}"))
+        })?;
+        if table.schema_version != SCHEMA_VERSION {
+            let problem = format!("has version {}, this program reads {SCHEMA_VERSION}", table.schema_version);
+            return Err(Error::data(path, "schema_version", problem));
+        }
+        let (mut ids, mut names) = (BTreeSet::new(), BTreeSet::new());
+        for entry in &table.labels {
+            let place = format!("label {}", entry.id);
+            if entry.id == 0 || entry.id > LABEL_MAX {
+                return Err(Error::data(path, place, format!("labels are from 1 to {LABEL_MAX}")));
+            }
+            if !ids.insert(entry.id) {
+                return Err(Error::data(path, place, "occurs twice; ids must be unique"));
+            }
+            if entry.name.as_ref().is_some_and(|name| !names.insert(name)) {
+                return Err(Error::data(path, place, "has the name of another label; names must be unique"));
+            }
+        }
+        Ok(Self::new(table.labels))
+    }
+
+    /// Writes the table, whole or not at all.
+    pub fn write(&self, path: &Path) -> Result<()> {
+        let text = serde_json::to_string_pretty(self).map_err(|error| Error::Bug(format!("JSON: {error}")))?;
+        atomic::write(path, |out| out.write_all(text.as_bytes()))
+    }
+
+    /// The entry of an id.
+    pub fn entry(&self, id: u32) -> Option<&LabelEntry> {
+        self.labels.binary_search_by_key(&id, |entry| entry.id).ok().map(|at| &self.labels[at])
+    }
+
+    /// The id that has this name, compared without regard to case.
+    pub fn by_name(&self, name: &str) -> Option<u32> {
+        let found = |entry: &&LabelEntry| entry.name.as_ref().is_some_and(|own| own.eq_ignore_ascii_case(name));
+        self.labels.iter().find(found).map(|entry| entry.id)
+    }
+
+    /// Where the table of a model is, if there is one: `NAME.labels.json` beside the PLY, else `labels.json` in the
+    /// folder of the run (for `RUN/point_cloud/iteration_N/point_cloud.ply` and for `RUN` itself).
+    pub fn find_for_model(model: &Path) -> Option<PathBuf> {
+        let beside = Self::beside(model);
+        let run = if model.is_dir() { Some(model) } else { model.ancestors().nth(3) };
+        let of_run = run.map(|run| run.join(FILE));
+        [Some(beside), of_run].into_iter().flatten().find(|path| path.is_file())
+    }
+
+    /// The place for the table of a PLY that is not in the folder of a run.
+    pub fn beside(model: &Path) -> PathBuf {
+        model.with_extension(FILE)
+    }
+}
