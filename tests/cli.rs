@@ -34,6 +34,7 @@ fn model(folder: &Path) -> PathBuf {
         sh_rest: Vec::new(),
         sh_degree: 0,
         labels: Some(vec![0, 1, 1, 3, 3, 3]),
+        label_confidence: None,
     };
     write_gaussians(&path, &gaussians).expect("written");
     path
@@ -102,10 +103,16 @@ fn every_flag_of_train_changes_its_field() {
         ("--background", "0.1,0.2,1"),
         ("--near", "0.1"),
         ("--label-from", "3"),
+        ("--label-rule", "main"),
+        ("--vote-every", "70"),
+        ("--vote-trust", "off"),
+        ("--mask-border", "3"),
         ("--label-threshold", "0.7"),
         ("--gpf", "off"),
         ("--label-samples", "4"),
         ("--label-weight", "0.5"),
+        ("--label-balance", "off"),
+        ("--label-alpha", "0.2"),
         ("--occlusion", "none"),
         ("--occlusion-every", "10"),
         ("--lambda-dssim", "0.3"),

@@ -3,7 +3,7 @@
 //! Differences are taken only where every decision is farther from its threshold than the step can move it; the scenes
 //! are chosen (by seed, once) so that this holds, and the tests refuse a scene where it does not.
 
-use crate::reference::blend::{blend_backward, blend_forward, centre, trace};
+use crate::reference::blend::{Upstream, blend_backward, blend_forward, centre, trace};
 use crate::reference::loss::{label_loss, photo_loss};
 use crate::reference::model::ROW_FLOATS;
 use crate::reference::project::{Splat, SplatGradient, project_backward, project_forward};
@@ -153,8 +153,10 @@ fn blend_case(rules: &Rules, s: &Scene) {
     let splats = splats_of(&project::project_all(rules, &s.camera, &s.model()));
     let size = (s.camera.width as usize, s.camera.height as usize);
     let mut random = generator(7);
-    let v_image: Vec<[f64; 3]> =
-        (0..size.0 * size.1).map(|_| [0; 3].map(|_| uniform(&mut random, -1.0, 1.0))).collect();
+    let mut pixels = |_| [0; 3].map(|_| uniform(&mut random, -1.0, 1.0));
+    let colours: Vec<[f64; 3]> = (0..size.0 * size.1).map(&mut pixels).collect();
+    let alphas: Vec<f64> = (0..size.0 * size.1).map(|i| pixels(i)[0]).collect();
+    let v_image = Upstream { colours, alphas };
     let v = blend_backward(rules, &splats, size, s.target.background, &v_image);
     let analytic: Vec<f64> = v.values.iter().flat_map(gradient_floats).collect();
     let parameters: Vec<f64> = splats.iter().flat_map(splat_floats).collect();
@@ -168,8 +170,10 @@ fn blend_case(rules: &Rules, s: &Scene) {
                 ..*s
             })
             .collect();
-        let image = blend_forward(rules, &moved, size, s.target.background).colours();
-        image.as_flattened().iter().zip(v_image.as_flattened()).map(|(c, w)| c * w).sum()
+        let image = blend_forward(rules, &moved, size, s.target.background);
+        let (colours, alphas) = (image.colours(), image.alphas());
+        let of_colours = colours.as_flattened().iter().zip(v_image.colours.as_flattened()).map(|(c, w)| c * w);
+        of_colours.chain(alphas.iter().zip(&v_image.alphas).map(|(a, w)| a * w)).sum()
     });
     agree("blend", &analytic, &numeric);
 }
@@ -185,9 +189,14 @@ fn losses() {
     let numeric = differences(image.as_flattened(), |p| photo_loss(&rules, &colours(p), &s.target.photo).value);
     agree("photo loss", photo.v_image.as_flattened(), &numeric);
     for slot in &s.target.slots {
-        let value = |image: &[[f64; 3]]| label_loss(&rules, image, &s.target.photo, &s.target.label_map, slot);
-        let numeric = differences(image.as_flattened(), |p| value(&colours(p)).value);
-        agree("label loss", value(&image).v_image.as_flattened(), &numeric);
+        let alphas: Vec<f64> = image.iter().map(|_| uniform(&mut random, 0.1, 0.9)).collect();
+        let loss = |image: &[[f64; 3]], alphas: &[f64]| {
+            label_loss(&rules, (image, alphas), &s.target.photo, &s.target.label_map, slot)
+        };
+        let numeric = differences(image.as_flattened(), |p| loss(&colours(p), &alphas).value);
+        agree("label loss", loss(&image, &alphas).v_image.as_flattened(), &numeric);
+        let numeric = differences(&alphas, |p| loss(&image, p).value);
+        agree("label loss by alpha", &loss(&image, &alphas).v_alpha, &numeric);
     }
 }
 

@@ -3,7 +3,7 @@
 use crate::reference::blend::{Blended, Contribution, Trace, blend_backward, blend_forward, shade};
 use crate::reference::densify::{Origin, Population, accumulate, densify, mark};
 use crate::reference::lift::{Masks, lift, lift_resolve, pixel_of, vote_key};
-use crate::reference::loss::{ObjectSlot, Photo, label_loss};
+use crate::reference::loss::{BORDER, ObjectSlot, Photo, label_loss};
 use crate::reference::model::flatten;
 use crate::reference::project::{Splat, project_all, project_backward};
 use crate::reference::step::{Target, splats_of, step};
@@ -208,9 +208,24 @@ fn label_loss_of_a_right_object_is_0() {
     let (photo, map, slot) = (&s.target.photo, &s.target.label_map, &s.target.slots[0]);
     let image: Vec<[f64; 3]> =
         photo.colours.iter().zip(map).map(|(c, &l)| if l == slot.label { *c } else { BLACK }).collect();
-    let loss = label_loss(&Rules::default(), &image, photo, map, slot);
+    let alphas: Vec<f64> = map.iter().map(|&l| f64::from(u8::from(l == slot.label))).collect();
+    let loss = label_loss(&Rules::default(), (&image, &alphas), photo, map, slot);
     assert_eq!(loss.value, 0.0);
+    assert!(loss.v_alpha.iter().all(|v| *v == 0.0));
     assert!(loss.v_image.iter().all(|v| *v == BLACK));
+}
+
+#[test]
+fn pixels_near_a_contour_say_nothing_and_weights_scale() {
+    let photo = Photo { size: (4, 1), colours: vec![[0.5; 3]; 4], valid: vec![true; 4] };
+    let loss = |map: &[u32], weight: f64| {
+        let slot = ObjectSlot { label: 1, occluders: Vec::new(), weight };
+        label_loss(&Rules::default(), (&[[0.8; 3]; 4], &[0.8; 4]), &photo, map, &slot)
+    };
+    let (all, without) = (loss(&[1, 0, 1, 0], 1.0), loss(&[1, BORDER, 1 | BORDER, 0], 1.0));
+    assert!((all.value - 2.0 * without.value).abs() < 1e-12 && without.value > 0.0);
+    assert_eq!(without.v_image[1..3], [BLACK, BLACK]);
+    assert!((loss(&[1, 0, 1, 0], 2.5).value - 2.5 * all.value).abs() < 1e-12);
 }
 
 #[test]
@@ -224,7 +239,9 @@ fn label_loss_of_an_empty_object_is_its_masked_photo_without_gradient() {
     let (photo, slot) = (&target.photo, &target.slots[0]);
     let inside = |i: &usize| photo.valid[*i] && target.label_map[*i] == slot.label;
     let sum: f64 = (0..photo.valid.len()).filter(inside).map(|i| photo.colours[i].iter().sum::<f64>()).sum();
-    assert!(sum > 0.0 && (out.objects[0].value - sum / photo.elements()).abs() < 1e-12);
+    let pixels = (0..photo.valid.len()).filter(inside).count() as f64;
+    let expected = (sum + 3.0 * Rules::default().label_alpha * pixels) / photo.elements() * slot.weight;
+    assert!(sum > 0.0 && (out.objects[0].value - expected).abs() < 1e-12);
     let without = step(&Rules::default(), &s.camera, &model, &Target { slots: Vec::new(), ..target });
     assert_eq!(out.rows, without.rows);
 }
@@ -232,10 +249,12 @@ fn label_loss_of_an_empty_object_is_its_masked_photo_without_gradient() {
 #[test]
 fn occluded_and_invalid_pixels_say_nothing_about_an_object() {
     let photo = Photo { size: (4, 1), colours: vec![[0.5; 3]; 4], valid: vec![true, true, true, false] };
-    let slot = ObjectSlot { label: 1, occluders: vec![2] };
-    let loss = label_loss(&Rules::default(), &[[0.8; 3]; 4], &photo, &[1, 2, 0, 1], &slot);
-    // Mask: 0.3 off; occluder: left out; elsewhere 0.8 off; invalid: left out of the count, too.
-    assert!((loss.value - (0.3 + 0.8) / 3.0).abs() < 1e-12);
+    let slot = ObjectSlot { label: 1, occluders: vec![2], weight: 1.0 };
+    let rules = Rules { label_alpha: 0.5, ..Rules::default() };
+    let loss = label_loss(&rules, (&[[0.8; 3]; 4], &[0.8; 4]), &photo, &[1, 2, 0, 1], &slot);
+    // Mask: 0.3 off; occluder: left out; elsewhere 0.8 off; invalid: left out of the count, too. Opacity: 0.2 and 0.8 off.
+    assert!((loss.value - (0.3 + 0.8 + 0.5 * (0.2 + 0.8)) / 3.0).abs() < 1e-12);
+    assert_eq!(loss.v_alpha, [-0.5 / 3.0, 0.0, 0.5 / 3.0, 0.0]);
     let v = 1.0 / 9.0;
     assert_eq!(loss.v_image, [[v; 3], BLACK, [v; 3], BLACK]);
 }
@@ -255,9 +274,9 @@ fn object_layers_equal_separate_renders() {
         let image = blend_forward(&rules, &splats, size, BLACK);
         let (ours, theirs) = (out.layers[place + 1].colours(), image.colours());
         check("image", close(ours.as_flattened(), theirs.as_flattened(), EQUAL));
-        let loss = label_loss(&rules, &theirs, &s.target.photo, &s.target.label_map, slot);
+        let loss = label_loss(&rules, (&theirs, &image.alphas()), &s.target.photo, &s.target.label_map, slot);
         assert!((loss.value - out.objects[place].value).abs() < 1e-13 && loss.value > 0.0);
-        let v = blend_backward(&rules, &splats, size, BLACK, &loss.v_image).values;
+        let v = blend_backward(&rules, &splats, size, BLACK, &loss.upstream()).values;
         for (splat, v) in splats.iter().zip(&v) {
             let row = &mut rows[members[splat.gaussian]];
             *row = row.plus(&project_backward(&rules, &s.camera, &alone, splat.gaussian, v));

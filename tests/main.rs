@@ -10,6 +10,7 @@ mod cli;
 mod cli_engine;
 mod compare_self;
 mod config;
+mod decide;
 mod gradient;
 mod invariants;
 mod io;

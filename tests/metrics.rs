@@ -199,6 +199,7 @@ fn model() -> Gaussians {
         sh_rest: Vec::new(),
         sh_degree: 0,
         labels: Some(vec![2, 2, 5, 0]),
+        label_confidence: None,
     }
 }
 

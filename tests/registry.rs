@@ -9,8 +9,12 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 const ROOT: &str = env!("CARGO_MANIFEST_DIR");
-const ROOM: Room =
-    Room { gaussians: 10_000, size: (320, 240), trained: true, labels: Some(LabelRoom { max_label: 40, layers: 8 }) };
+const ROOM: Room = Room {
+    gaussians: 10_000,
+    size: (320, 240),
+    trained: true,
+    labels: Some(LabelRoom { max_label: 40, layers: 8, vote_columns: 9 }),
+};
 
 /// Stem and text of every compute shader.
 fn sources() -> Vec<(String, String)> {
@@ -45,6 +49,7 @@ fn lists() -> Vec<(Capacity, PassList)> {
                 add(pass::training_step(&shape, &capacity, Variant { labels, sh_degree, size, update }));
             }
             add(pass::render_view(&shape, &capacity, 3));
+            add(pass::vote_view(&shape, &capacity, 2));
             add(pass::densify_count(&shape, &capacity));
             add(pass::densify_apply(&shape, &capacity, true));
             add(pass::opacity_reset(&shape, &capacity));

@@ -37,6 +37,7 @@ fn crowd(count: usize) -> (Gaussians, Camera) {
         sh_rest: Vec::new(),
         sh_degree: 0,
         labels: None,
+        label_confidence: None,
     };
     (gaussians, camera)
 }

@@ -8,7 +8,7 @@
 // blend_backward — walk one tile of one layer back to front and write one gradient record per (splat, tile) pair.
 // Work:    one subgroup (= workgroup) a tile, jobs as in blend_forward.
 // Reads:   step; tile_starts [layers * T]; sorted_splats, slots [I]; splats [V,3]; image [P] (w = transmittance),
-//          last [P]; v_image [P]; variant labels: counters, layer_tiles, layer_state
+//          last [P]; v_image [P]; variant labels: counters, layer_tiles, layer_state, layer_weights
 // Writes:  v_instances_a, _b, _c [I] at the pair's slot: v_mean2d (px), v_conic xy; v_conic z, v_log_opacity, v_colour rg;
 //          v_colour b, stamp of the step
 //          (records without the current stamp were not walked and count as 0)
@@ -32,6 +32,7 @@ WRITE(10, vec4, v_instances_c);
 READ1(11, Counters, counters);
 FETCHU(12, layer_tiles);
 READ(13, uvec2, layer_state);
+READ(14, float, layer_weights);
 #include "label_state.glsl"
 #endif
 #ifdef SEGMENTED
@@ -79,7 +80,9 @@ void main() {
             uvec2 state = layer_state[layer_pixel(t, k)];
             T[k] = uintBitsToFloat(state.x);
             final_[k] = state.y & LAST_MASK;
-            g = unpack_signs(state.y) * (u.label_weight * u.loss_scale);
+            vec4 v = unpack_signs(state.y) * (u.label_weight * u.loss_scale * layer_weights[t.layer]);
+            g = v.xyz;
+            behind[k] = -u.label_alpha * v.w; // alpha = 1 - T: as a background of the opposite sign
         } else
 #endif
         {

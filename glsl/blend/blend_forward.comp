@@ -8,7 +8,7 @@
 // Work:    one subgroup (= workgroup) a tile: the scene's tiles, then (variant labels) the occupied layer tiles.
 // Reads:   step, counters; tile_starts, tile_ends [layers * T]; sorted_splats [I]; splats [V,3]
 //          variant labels: layer_tiles; target [P] RGBA8; view_labels [P]; layer_occluders; label_from_layer;
-//          gaussian_from_splat [V]
+//          layer_weights; gaussian_from_splat [V]
 // Writes:  image [P] linear RGB over the background, w = final transmittance; last [P] = 1 + index of the last splat
 //          that contributed, within the tile's list (0: none); variant main: main_gaussian [P] (NO_SPLAT: none) and
 //          main_weight_depth [P] (weight, weighted sum of z);
@@ -17,8 +17,8 @@
 //          are not walked), label_keys [N] (integer maximum, any order)
 // Math:    LabelGS eq. 5; alpha <= ALPHA_MAX; a pair counts where alpha >= ALPHA_MIN, tested on the exponent; a pixel
 //          stops before the splat that would take its transmittance below TRANSMITTANCE_MIN (3DGS).
-//          Layers: eq. 8 and 9, black background; the L1 gradient of a layer is local to the pixel, so its sign is
-//          taken here. Lift: eq. 6 and 7.
+//          Layers: eq. 8 and 9, black background, and an L1 term of alpha against the mask; the L1 gradient of a layer
+//          is local to the pixel, so its sign is taken here. Lift: eq. 6 and 7.
 // Order:   fixed, bitwise reproducible.
 // Mirror:  tests/reference/blend.rs::blend_forward
 
@@ -46,6 +46,7 @@ WRITE(14, uvec2, layer_state);
 WRITE(15, float, layer_loss);
 INOUT(16, uint, label_keys);
 FETCHU(17, layer_from_label);
+READ(18, float, layer_weights);
 #endif
 
 #ifdef SEGMENTED
@@ -102,7 +103,7 @@ void main() {
 #ifdef LABELS
         if (t.layer != 0u && inside) {
             uint p = (t.y0 + k) * u.width + t.x;
-            inside = fetchc(target, p).w > 0.5 && !occluded(t.layer, fetchu(view_labels, p), u);
+            inside = fetchc(target, p).w > 0.5 && !left_out(t.layer, fetchu(view_labels, p), u);
         }
 #endif
         T[k] = inside ? 1.0 : -1.0; // the sign says whether the pixel still takes splats
@@ -213,16 +214,16 @@ void main() {
             uint p = inside ? (t.y0 + k) * u.width + t.x : 0u;
             uint here = fetchu(view_labels, p);
             vec4 photo = fetchc(target, p);
-            vec3 wanted = here == label ? photo.xyz : vec3(0.0);
-            bool counts = inside && photo.w > 0.5 && !occluded(t.layer, here, u);
-            vec3 difference = counts ? vec3(cr[k], cg[k], cb[k]) - wanted : vec3(0.0);
-            vec3 change = counts ? abs(difference) - wanted : vec3(0.0); // wanted >= 0
-            loss += change.x + change.y + change.z;
+            vec4 wanted = here == label ? vec4(photo.xyz, 1.0) : vec4(0.0);
+            bool counts = inside && photo.w > 0.5 && !left_out(t.layer, here, u);
+            vec4 difference = counts ? vec4(cr[k], cg[k], cb[k], 1.0 - abs(T[k])) - wanted : vec4(0.0);
+            vec4 change = counts ? abs(difference) - wanted : vec4(0.0); // wanted >= 0
+            loss += change.x + change.y + change.z + u.label_alpha * change.w;
             layer_state[layer_pixel(t, k)] = uvec2(floatBitsToUint(abs(T[k])), final_[k] | pack_signs(difference));
         }
         loss = subgroup_sum(loss);
         if (lane == 0u) {
-            layer_loss[slot] = loss;
+            layer_loss[slot] = loss * layer_weights[t.layer];
         }
         return;
     }

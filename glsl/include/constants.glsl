@@ -14,6 +14,10 @@ const float OPACITY_RESET_LOGIT = -4.5951198501345898; // logit(0.01)
 const float SPLIT_SHRINK = 0.47000362924573558;        // ln 1.6
 const float LN2 = 0.69314718055994531;
 const uint NO_SPLAT = 0xffffffffu;
+const uint LABEL_MASK = 0xffffu;             // id of a pixel of view_labels; above it:
+const uint LABEL_BORDER = 0x10000u;          // so near to a contour of the mask that it says nothing
+const uint VOTE_NONE = 0xffffffffu;         // column of a pixel that has no say
+const float VOTE_ONE = 65536.0;              // fixed point of the votes for labels
 const uint KEY_INVISIBLE = 0xffffffffu;
 
 // Entries of dispatch_args, 3 words each (VkDispatchIndirectCommand).

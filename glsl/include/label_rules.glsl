@@ -1,7 +1,11 @@
 // Rules of the labels: which pixels are hidden from an object, and the lift.
 
-// U_k(v) = 0: the pixel belongs to an object that hides this layer's object.
-bool occluded(uint layer, uint label, StepUniforms u) {
+// U_k(v) = 0: the pixel belongs to an object that hides this layer's object, or lies too near to a contour.
+bool left_out(uint layer, uint here, StepUniforms u) {
+    if ((here & LABEL_BORDER) != 0u) {
+        return true;
+    }
+    uint label = here & LABEL_MASK;
     uint word = layer_occluders[layer * u.occluder_words + (label >> 5)];
     return ((word >> (label & 31u)) & 1u) != 0u;
 }
@@ -10,7 +14,8 @@ bool occluded(uint layer, uint label, StepUniforms u) {
 // dominates it. Keys order by weight, then label, so the maximum does not depend on the order of the votes.
 void lift(uint p, uint splat, float weight, StepUniforms u) {
     uint label = fetchu(view_labels, p);
-    if (label == 0u || fetchu(layer_from_label, label) == 0u) {
+    // A pixel near a contour has the bit above the label too.
+    if (label == 0u || label > LABEL_MASK || fetchu(layer_from_label, label) == 0u) {
         return;
     }
     vec2 centre = floor(fetch4(splats, 3u * splat).xy);
@@ -18,7 +23,7 @@ void lift(uint p, uint splat, float weight, StepUniforms u) {
     if (!inside) {
         return;
     }
-    if (u.gpf != 0u && fetchu(view_labels, uint(centre.y) * u.width + uint(centre.x)) != label) {
+    if (u.gpf != 0u && (fetchu(view_labels, uint(centre.y) * u.width + uint(centre.x)) & LABEL_MASK) != label) {
         return;
     }
     uint key = (uint(weight * 65535.0) << 16) | label;

@@ -16,6 +16,7 @@ struct StepUniforms {
     float lambda_dssim;
     float loss_scale;       // 1 / (3 valid pixels)
     float label_weight;     // lambda_2
+    float label_alpha;      // weight of the alpha term within the label loss
     float label_threshold;  // lift where the main weight is at least this
     uint lift;              // 1: labels are lifted in this step
     uint gpf;               // 1: projection filter on
@@ -27,6 +28,7 @@ struct StepUniforms {
     float densify_threshold, densify_scale, prune_scale, prune_opacity; // scales in world units
     uint prune_big;
     uint seed;
+    uint vote_columns;      // labels that a sweep counts at once
 };
 
 struct Counters {

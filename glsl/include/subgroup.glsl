@@ -22,3 +22,4 @@ layout(constant_id = 0) const uint SUBGROUP_SIZE = 8;
 BUTTERFLY(float, subgroup_sum, PLUS)
 BUTTERFLY(float, subgroup_max, max)
 BUTTERFLY(uint, subgroup_max, max)
+BUTTERFLY(uint, subgroup_min, min)

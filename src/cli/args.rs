@@ -51,6 +51,9 @@ pub enum Command {
     /// Render views of a model, or objects of it.
     #[command(after_help = "Example: labelgs render out --scene garden --views test --only 3 -o pictures")]
     Render(RenderArgs),
+    /// Give the Gaussians of a trained model, of any trainer, their labels from masks.
+    #[command(after_help = "Example: labelgs label model.ply --scene garden --masks garden/masks -o labelled.ply")]
+    Label(super::label::LabelArgs),
     /// List the labels of a model.
     List(ListArgs),
     /// Write the Gaussians of some labels.

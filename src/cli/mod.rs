@@ -5,6 +5,7 @@ pub mod config;
 pub mod devices;
 pub mod eval;
 pub mod interrupt;
+pub mod label;
 pub mod list;
 pub mod log;
 pub mod plan;
@@ -94,6 +95,7 @@ fn run(args: Vec<OsString>) -> Result<(), Exit> {
     match cli.command {
         Command::Train(args) => train::run(&args, &context),
         Command::Render(args) => render::run(&args, &context),
+        Command::Label(args) => label::run(&args, &context),
         Command::List(args) => list::run(&args, &context),
         Command::Extract(args) => select::run(&args, select::Keep::Selected, &context),
         Command::Remove(args) => select::run(&args, select::Keep::Rest, &context),

@@ -5,6 +5,7 @@ use super::devices::{shape_json, shape_of, shape_text};
 use super::{Context, stdout};
 use crate::engine::{Engine, LabelRoom, Room, capacity};
 use crate::gpu::{self, GpuOptions};
+use crate::infer::ballot::COLUMNS_MAX;
 use crate::pass::{KernelShape, Variant, training_step};
 use crate::plan::{Capacity, Grid, Limits, MemoryReport, Page, PassList, Plan, PlanOptions, TABLE, Touch, Work};
 use crate::sched::plan_limits;
@@ -41,8 +42,11 @@ pub fn run(args: &PlanArgs, context: &Context) -> Result<()> {
 
 fn subject(args: &PlanArgs, context: &Context) -> Result<Subject> {
     let (device, shape, limits) = device(context)?;
-    let labels = (args.label_samples > 0)
-        .then(|| LabelRoom { max_label: MAX_LABEL.max(args.label_samples), layers: args.label_samples });
+    let labels = (args.label_samples > 0).then(|| LabelRoom {
+        max_label: MAX_LABEL.max(args.label_samples),
+        layers: args.label_samples,
+        vote_columns: COLUMNS_MAX,
+    });
     let size = (args.size.0, args.size.1);
     let room = Room { gaussians: args.gaussians.max(1), size, trained: true, labels };
     let capacity = capacity(&shape, &room);

@@ -52,8 +52,9 @@ pub fn run(args: &TrainArgs, context: &Context) -> Result<()> {
     let start = Instant::now();
     let last =
         steps(&mut trainer, out, preview.as_ref(), context).map_err(|error| keep_model(&mut trainer, out, error))?;
+    let model = trainer.labelled_model()?;
     let seconds = start.elapsed().as_secs_f64();
-    let path = record::save_model(out, trainer.steps_done(), &trainer.model()?)?;
+    let path = record::save_model(out, trainer.steps_done(), &model)?;
     // Scoring puts single objects in the model's place.
     let gaussians = trainer.gaussian_count();
     if let Some(view) = &preview {
@@ -112,7 +113,7 @@ fn steps(trainer: &mut Trainer, out: &Path, preview: Option<&View>, context: &Co
         });
         if step < config.iterations {
             if config.save_at.contains(&step) {
-                let model = trainer.model()?;
+                let model = trainer.labelled_model()?;
                 record::save_model(out, step, &model)?;
             }
             if config.preview_every > 0

@@ -4,7 +4,7 @@
 use super::args::JsonFlag;
 use super::values::{colour, count, switch};
 use crate::train::TrainConfig;
-use crate::train::config::Occlusion;
+use crate::train::config::{LabelRule, Occlusion};
 use clap::Args;
 use std::path::PathBuf;
 
@@ -84,6 +84,18 @@ pub struct LabelFlags {
     /// First step with labels.
     #[arg(long, value_name = "STEP")]
     pub label_from: Option<u32>,
+    /// How a Gaussian gets its label.
+    #[arg(long, value_name = "RULE", value_enum)]
+    pub label_rule: Option<LabelRule>,
+    /// Steps between two counts of votes.
+    #[arg(long, value_name = "STEPS")]
+    pub vote_every: Option<u32>,
+    /// Less weight for masks that disagree with all others, on or off.
+    #[arg(long, value_name = "SWITCH", value_parser = switch)]
+    pub vote_trust: Option<bool>,
+    /// Pixels so near to a contour of their mask are left out, px.
+    #[arg(long, value_name = "PX")]
+    pub mask_border: Option<u32>,
     /// Least blending weight at a pixel that gives its label to a Gaussian.
     #[arg(long, value_name = "WEIGHT")]
     pub label_threshold: Option<f32>,
@@ -96,6 +108,12 @@ pub struct LabelFlags {
     /// Weight of the label loss.
     #[arg(long, value_name = "WEIGHT")]
     pub label_weight: Option<f32>,
+    /// Small objects weigh more per pixel than large ones, on or off.
+    #[arg(long, value_name = "SWITCH", value_parser = switch)]
+    pub label_balance: Option<bool>,
+    /// Weight of the alpha term in the label loss.
+    #[arg(long, value_name = "WEIGHT")]
+    pub label_alpha: Option<f32>,
     /// Where occluders come from.
     #[arg(long, value_name = "SOURCE", value_enum)]
     pub occlusion: Option<Occlusion>,
@@ -191,7 +209,9 @@ impl TrainArgs {
         if self.run.no_test {
             config.test_every = 0;
         }
-        take!(config, self.label, label_from label_threshold gpf label_samples label_weight occlusion occlusion_every);
+        take!(config, self.label, label_from label_rule vote_every vote_trust mask_border
+            label_threshold gpf label_samples label_weight label_balance
+            label_alpha occlusion occlusion_every);
         take!(config, self.optimiser, lambda_dssim sh_degree sh_degree_interval position_lr_init position_lr_final
             position_lr_max_steps feature_lr opacity_lr scaling_lr rotation_lr);
         config.feature_rest_lr = self.optimiser.feature_rest_lr.or(config.feature_rest_lr);

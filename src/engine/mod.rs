@@ -20,6 +20,8 @@ pub struct LabelRoom {
     pub max_label: u32,
     /// Objects sampled in one step, at most.
     pub layers: u32,
+    /// Labels that one sweep of votes counts, 0 without votes.
+    pub vote_columns: u32,
 }
 
 /// What the memory of an engine is sized for.
@@ -42,6 +44,8 @@ pub enum ListKey {
     Train(Variant),
     /// One picture, with this degree of the spherical harmonics.
     Render(u32),
+    /// Votes of one view; tiles are walked so many times, four labels each.
+    Vote(u32),
     /// Count of a densification.
     DensifyCount,
     /// Densification.
@@ -88,6 +92,8 @@ pub fn capacity(shape: &KernelShape, room: &Room) -> Capacity {
         pixels: u64::from(width) * u64::from(height),
         labelled_pixels: if labels > 0 { u64::from(width) * u64::from(height) } else { 0 },
         labels,
+        vote_columns: room.labels.map_or(0, |labels| u64::from(labels.vote_columns)),
+        vote_cells: room.labels.map_or(0, |labels| u64::from(labels.vote_columns)) * gaussians,
         layers: if labels > 0 { layers + 1 } else { 0 },
         occluder_words: label_words,
         loss_partials: u64::from(loss::partials(shape.subgroup, width, height)),
@@ -208,6 +214,7 @@ impl Engine {
         let list = match key {
             ListKey::Train(variant) => pass::training_step(shape, capacity, variant),
             ListKey::Render(sh_degree) => pass::render_view(shape, capacity, sh_degree),
+            ListKey::Vote(rounds) => pass::vote_view(shape, capacity, rounds),
             ListKey::DensifyCount => pass::densify_count(shape, capacity),
             ListKey::DensifyApply => pass::densify_apply(shape, capacity, self.room.labels.is_some()),
             ListKey::OpacityReset => pass::opacity_reset(shape, capacity),

@@ -1,7 +1,9 @@
 //! What to do with a trained model: choose labels, filter Gaussians, score, write pictures. Plain arrays only; whoever
 //! renders hands them in.
 
+pub mod ballot;
 pub mod choose;
+pub mod decide;
 pub mod evaluate;
 pub mod metrics;
 pub mod occlusion;

@@ -21,7 +21,7 @@ pub fn blend_forward(b: &mut Builder) {
                     layer_tiles: Buf::LAYER_TILES, target: Buf::TARGET, view_labels: Buf::VIEW_LABELS,
                     layer_occluders: Buf::LAYER_OCCLUDERS, label_from_layer: Buf::LABEL_FROM_LAYER,
                     gaussian_from_splat: GAUSSIAN_FROM_SPLAT, layer_state: Buf::LAYER_STATE, layer_loss: Buf::LAYER_LOSS,
-                    label_keys: Buf::LABEL_KEYS, layer_from_label: Buf::LAYER_FROM_LABEL,
+                    label_keys: Buf::LABEL_KEYS, layer_from_label: Buf::LAYER_FROM_LABEL, layer_weights: Buf::LAYER_WEIGHTS,
                     segment_colours: Buf::SEGMENT_COLOURS, segment_rest: Buf::SEGMENT_REST,
                 } [subgroup_size: subgroup, tile_width: tile_width, tile_height: tile_height,
                     segment: segment, segments: segments, segment_length: length], GRID());
@@ -41,7 +41,7 @@ pub fn blend_forward(b: &mut Builder) {
             layer_tiles: Buf::LAYER_TILES, target: Buf::TARGET, view_labels: Buf::VIEW_LABELS,
             layer_occluders: Buf::LAYER_OCCLUDERS, label_from_layer: Buf::LABEL_FROM_LAYER,
             gaussian_from_splat: GAUSSIAN_FROM_SPLAT, layer_state: Buf::LAYER_STATE, layer_loss: Buf::LAYER_LOSS,
-            label_keys: Buf::LABEL_KEYS, layer_from_label: Buf::LAYER_FROM_LABEL,
+            label_keys: Buf::LABEL_KEYS, layer_from_label: Buf::LAYER_FROM_LABEL, layer_weights: Buf::LAYER_WEIGHTS,
         } [subgroup_size: subgroup, tile_width: tile_width, tile_height: tile_height], GRID());
     } else {
         pass!(b, texel blend_forward {
@@ -87,7 +87,7 @@ pub fn blend_backward(b: &mut Builder, slots: Buf) {
                     step: Buf::STEP, tile_starts: Buf::TILE_STARTS, sorted_splats: Buf::SORTED_SPLATS, slots: slots,
                     splats: Buf::SPLATS, image: Buf::IMAGE, last: Buf::LAST, v_image: Buf::V_IMAGE,
                     v_instances_a: Buf::V_INSTANCES_A, v_instances_b: Buf::V_INSTANCES_B, v_instances_c: Buf::V_INSTANCES_C, counters: Buf::COUNTERS, layer_tiles: Buf::LAYER_TILES,
-                    layer_state: Buf::LAYER_STATE,
+                    layer_state: Buf::LAYER_STATE, layer_weights: Buf::LAYER_WEIGHTS,
                     segment_back: Buf::SEGMENT_BACK,
                 } [subgroup_size: subgroup, tile_width: tile_width, tile_height: tile_height,
                     segment: segment, segments: segments, segment_length: length], GRID());
@@ -106,7 +106,7 @@ pub fn blend_backward(b: &mut Builder, slots: Buf) {
             step: Buf::STEP, tile_starts: Buf::TILE_STARTS, sorted_splats: Buf::SORTED_SPLATS, slots: slots,
             splats: Buf::SPLATS, image: Buf::IMAGE, last: Buf::LAST, v_image: Buf::V_IMAGE,
             v_instances_a: Buf::V_INSTANCES_A, v_instances_b: Buf::V_INSTANCES_B, v_instances_c: Buf::V_INSTANCES_C, counters: Buf::COUNTERS, layer_tiles: Buf::LAYER_TILES,
-            layer_state: Buf::LAYER_STATE,
+            layer_state: Buf::LAYER_STATE, layer_weights: Buf::LAYER_WEIGHTS,
         } [subgroup_size: subgroup, tile_width: tile_width, tile_height: tile_height], GRID());
     } else {
         pass!(b, texel blend_backward {

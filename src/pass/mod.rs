@@ -78,6 +78,15 @@ pub fn render_view(shape: &KernelShape, capacity: &Capacity, sh_degree: u32) -> 
     end(b)
 }
 
+/// What one view says about the label of every Gaussian; a tile is walked `rounds` times, four labels each.
+pub fn vote_view(shape: &KernelShape, capacity: &Capacity, rounds: u32) -> PassList {
+    let mut b = begin("votes", shape, capacity, false, 0);
+    project::visible_splats(&mut b);
+    tile::bin_splats(&mut b);
+    lift::vote(&mut b, rounds);
+    end(b)
+}
+
 /// How many Gaussians densification would leave.
 pub fn densify_count(shape: &KernelShape, capacity: &Capacity) -> PassList {
     let mut b = begin("densify: count", shape, capacity, false, 0);

@@ -27,6 +27,10 @@ pub enum Domain {
     LabelledPixels,
     /// Label ids, 0 included.
     Labels,
+    /// Labels that a sweep of votes counts at once.
+    VoteColumns,
+    /// Gaussians times these.
+    VoteCells,
     /// Layers, the scene included.
     Layers,
     /// Words of occluder bits of all layers.
@@ -59,6 +63,8 @@ impl Domain {
             Self::Pixels => "pixels",
             Self::LabelledPixels => "labelled pixels",
             Self::Labels => "labels",
+            Self::VoteColumns => "vote columns",
+            Self::VoteCells => "vote cells",
             Self::Layers => "layers",
             Self::OccluderWords => "occluder words",
             Self::SortCells => "sort cells",
@@ -72,6 +78,9 @@ impl Domain {
     /// What the user can do when at most `fits` elements fit.
     pub fn cure(self, fits: u64) -> String {
         match self {
+            Self::VoteColumns | Self::VoteCells => {
+                format!("at most {fits} {} fit; lower --max-gaussians or use another device", self.name())
+            }
             Self::Gaussians | Self::Trained | Self::Labelled => {
                 format!("lower --max-gaussians to {fits} or use another device")
             }
@@ -117,6 +126,10 @@ pub struct Capacity {
     pub labelled_pixels: u64,
     /// Label ids, 0 included.
     pub labels: u64,
+    /// Labels that a sweep of votes counts at once.
+    pub vote_columns: u64,
+    /// Gaussians times these.
+    pub vote_cells: u64,
     /// Layers, the scene included.
     pub layers: u64,
     /// Words of occluder bits of all layers.
@@ -151,6 +164,8 @@ impl Capacity {
             Domain::Pixels => self.pixels,
             Domain::LabelledPixels => self.labelled_pixels,
             Domain::Labels => self.labels,
+            Domain::VoteColumns => self.vote_columns,
+            Domain::VoteCells => self.vote_cells,
             Domain::Layers => self.layers,
             Domain::OccluderWords => self.occluder_words,
             Domain::SortCells => self.sort_cells,

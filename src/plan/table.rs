@@ -10,10 +10,12 @@ const WORD: Option<TexelFormat> = Some(TexelFormat::R32Uint);
 crate::buffers! {
     STEP "step": size_of::<StepUniforms>() as u32, Domain::One, Class::Slot, None, "What changes every step (glsl/include/step.glsl).";
     TARGET "target": 4, Domain::Pixels, Class::Slot, WORD, "The photo [P] RGBA8; alpha 0: left out.";
-    VIEW_LABELS "view_labels": 4, Domain::LabelledPixels, Class::Slot, WORD, "Visible object of each pixel [P].";
+    VIEW_LABELS "view_labels": 4, Domain::LabelledPixels, Class::Slot, WORD, "Visible object of each pixel [P], with LABEL_BORDER near a contour; columns in a sweep of votes.";
     LAYER_FROM_LABEL "layer_from_label": 4, Domain::Labels, Class::Slot, WORD, "Layer of each label id, 0: not sampled in this step.";
     LABEL_FROM_LAYER "label_from_layer": 4, Domain::Layers, Class::Slot, WORD, "Label id of each layer; layer 0 is the scene.";
+    LAYER_WEIGHTS "layer_weights": 4, Domain::Layers, Class::Slot, None, "Weight of each layer's label loss.";
     LAYER_OCCLUDERS "layer_occluders": 4, Domain::OccluderWords, Class::Slot, WORD, "For each layer a bit per label id: set where that object hides the layer's.";
+    VOTE_WEIGHTS "vote_weights": 4, Domain::VoteColumns, Class::Slot, None, "Weight of the votes for each label in this view.";
     REPORT "report": size_of::<Counters>() as u32, Domain::One, Class::Report, None, "Counters of a step, for the host.";
     REPORT_FAILURE "report_failure": 4, Domain::One, Class::Report, None, "The failure word after a step, for the host.";
 
@@ -41,6 +43,8 @@ crate::buffers! {
     LABELS "labels": 4, Domain::Labelled, Class::Model, WORD, "Object of each Gaussian [N], 0: unlabelled.";
     DENSIFY_STATS "densify_stats": 8, Domain::Trained, Class::Model, None, "Sum of screen gradients and number of views since the last densification [N].";
     LABEL_KEYS "label_keys": 4, Domain::Labelled, Class::Kept, None, "Votes of a step [N]: weight in the high half, label in the low; 0: none.";
+    VOTES_LOW "votes_low": 4, Domain::VoteCells, Class::Model, None, "Votes of a sweep by Gaussian and label [N, columns], the lower words.";
+    VOTES_HIGH "votes_high": 4, Domain::VoteCells, Class::Model, None, "The higher words.";
     FAILURE "failure": 4, Domain::One, Class::Kept, None, "Sticky bits; passes that change the model do nothing while one is set.";
     V_INSTANCES_A "v_instances_a": 16, Domain::TrainedInstances, Class::Kept, VEC4, "Gradient record of each (splat, tile) pair [I]: v_mean2d, v_conic xy.";
     V_INSTANCES_B "v_instances_b": 16, Domain::TrainedInstances, Class::Kept, VEC4, "The same: v_conic z, v_log_opacity, v_colour rg.";

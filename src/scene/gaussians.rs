@@ -22,6 +22,8 @@ pub struct Gaussians {
     pub sh_degree: u32,
     /// Object ids, [N], 0 = unlabelled; `None` for a scene that knows no labels.
     pub labels: Option<Vec<u32>>,
+    /// How sure each label is, [N], 0 to 1: the share of its votes; `None` where nobody counted votes.
+    pub label_confidence: Option<Vec<f32>>,
 }
 
 impl Gaussians {
@@ -53,6 +55,7 @@ impl Gaussians {
             sh_rest: rows.iter().flat_map(|&r| self.sh_rest[r * rest..(r + 1) * rest].iter().copied()).collect(),
             sh_degree: self.sh_degree,
             labels: self.labels.as_ref().map(|labels| rows.iter().map(|&r| labels[r]).collect()),
+            label_confidence: self.label_confidence.as_ref().map(|shares| rows.iter().map(|&r| shares[r]).collect()),
         }
     }
 }

@@ -29,6 +29,23 @@ impl LabelMap {
         self.ids.iter().for_each(|&id| seen[usize::from(id)] = true);
         (1..=u16::MAX).filter(|&id| seen[usize::from(id)]).collect()
     }
+
+    /// True for the pixels that have another id within `distance` px, in a square around them.
+    pub fn near_contour(&self, distance: u32) -> Vec<bool> {
+        let (width, height) = (self.width as usize, self.height as usize);
+        let distance = distance as usize;
+        // Smallest and largest id over rows, then over columns: a pixel is near a contour where they differ.
+        let window = |at: usize, size: usize| at.saturating_sub(distance)..(at + distance + 1).min(size);
+        let over = |range: std::ops::Range<usize>, index: &dyn Fn(usize) -> usize, low: &[u16], high: &[u16]| {
+            let places = || range.clone().map(index);
+            let low = places().map(|place| low[place]).min().unwrap_or(0);
+            (low, places().map(|place| high[place]).max().unwrap_or(0))
+        };
+        let row = |at: usize| over(window(at % width, width), &|x| at / width * width + x, &self.ids, &self.ids);
+        let (low, high): (Vec<u16>, Vec<u16>) = (0..width * height).map(row).unzip();
+        let column = |at: usize| over(window(at / width, height), &|y| y * width + at % width, &low, &high);
+        (0..width * height).map(column).map(|(low, high)| low != high).collect()
+    }
 }
 
 /// Display colour of an id: hues a golden ratio apart, 0 is black.

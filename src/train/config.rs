@@ -18,6 +18,18 @@ pub enum Occlusion {
     Rendered,
 }
 
+/// How a Gaussian gets its label.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
+#[serde(rename_all = "lowercase")]
+pub enum LabelRule {
+    /// From the pixels of the step's view in which it has most weight; the last view wins (LabelGS).
+    Main,
+    /// From the sums of its weights in the pixels of all views, counted every [`TrainConfig::vote_every`] steps and at
+    /// the end.
+    #[default]
+    Votes,
+}
+
 /// What a training run does, decided. `Default` is the paper's setting.
 ///
 /// Steps count from 1, as in the reference code.
@@ -42,6 +54,15 @@ pub struct TrainConfig {
 
     /// First step that lifts labels and adds the label loss. 1000 (LabelGS): before, the geometry is too rough.
     pub label_from: u32,
+    /// How a Gaussian gets its label. Votes; the paper's rule is `main`, to which the next two settings belong.
+    pub label_rule: LabelRule,
+    /// Steps between two counts of votes. 500.
+    pub vote_every: u32,
+    /// Masks that disagree with what all views made of the model vote with less weight. On.
+    pub vote_trust: bool,
+    /// Pixels so near to a contour of their mask have neither votes nor label loss, px. 0 (masks are taken as exact);
+    /// 2 suits masks of trackers, which work on shrunk photos.
+    pub mask_border: u32,
     /// A Gaussian gets a label only from a pixel where its blending weight is at least this. 0.6 (LabelGS). Higher
     /// labels fewer Gaussians, more surely.
     pub label_threshold: f32,
@@ -51,6 +72,12 @@ pub struct TrainConfig {
     pub label_samples: u32,
     /// Weight of the sum of the label losses of a step. 1.0 (LabelGS code; the paper's lambda 2 has no value).
     pub label_weight: f32,
+    /// Objects weigh as one over the root of their area in the view, so that small ones are not lost beside large ones.
+    /// On; the paper sums over pixels.
+    pub label_balance: bool,
+    /// Weight of an alpha term in the label loss: the object's opacity against its mask. 0.1; the paper has none, and
+    /// dark objects may vanish over black without cost.
+    pub label_alpha: f32,
     /// Source of the occluders whose pixels the label loss leaves out. Rendered depth.
     pub occlusion: Occlusion,
     /// Steps between two looks at the occluders. 1000.
@@ -120,10 +147,16 @@ impl Default for TrainConfig {
             background: [0.0; 3],
             near: 0.2,
             label_from: 1000,
+            label_rule: LabelRule::Votes,
+            vote_every: 500,
+            vote_trust: true,
+            mask_border: 0,
             label_threshold: 0.6,
             gpf: true,
             label_samples: 10,
             label_weight: 1.0,
+            label_balance: true,
+            label_alpha: 0.1,
             occlusion: Occlusion::Rendered,
             occlusion_every: 1000,
             lambda_dssim: 0.2,
@@ -203,6 +236,7 @@ impl TrainConfig {
             ("--iterations", self.iterations),
             ("--label-samples", self.label_samples),
             ("--occlusion-every", self.occlusion_every),
+            ("--vote-every", self.vote_every),
             ("--sh-degree-interval", self.sh_degree_interval),
             ("--position-lr-max-steps", self.position_lr_max_steps),
             ("--densify-interval", self.densify_interval),
@@ -233,6 +267,7 @@ impl TrainConfig {
             ("--background", f64::from(self.background[0]), 0.0, 1.0),
             ("--background", f64::from(self.background[1]), 0.0, 1.0),
             ("--background", f64::from(self.background[2]), 0.0, 1.0),
+            ("--label-alpha", f64::from(self.label_alpha), 0.0, f64::MAX),
             ("--label-weight", f64::from(self.label_weight), 0.0, f64::MAX),
             ("--densify-grad-threshold", f64::from(self.densify_grad_threshold), 0.0, f64::MAX),
             ("--percent-dense", f64::from(self.percent_dense), 0.0, f64::MAX),

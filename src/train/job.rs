@@ -1,14 +1,18 @@
 //! One step as the host prepares it: the uniforms, the photo, the masks.
 
 use super::TrainConfig;
+use super::config::LabelRule;
 use crate::engine::Engine;
 use crate::engine::uniforms::view_uniforms;
 use crate::error::Result;
 use crate::plan::Buf;
 use crate::scene::{Camera, LabelMap, Photo};
-use crate::shaders::constants::{ADAM_BETA1, ADAM_BETA2};
+use crate::shaders::constants::{ADAM_BETA1, ADAM_BETA2, LABEL_BORDER};
 use crate::shaders::structs::StepUniforms;
 use std::collections::BTreeMap;
+
+/// Largest weight of a small object beside large ones.
+const WEIGHT_MAX: f64 = 10.0;
 
 /// A view as training keeps it.
 #[derive(Debug)]
@@ -25,27 +29,68 @@ pub struct TrainView {
     pub mask: Option<LabelMap>,
     /// Objects of the mask, sorted.
     pub objects: Vec<u16>,
-    /// For each object the sum of r + g + b over its pixels of the photo: the label loss of an empty layer, not scaled.
-    pub object_light: BTreeMap<u16, f64>,
+    /// The mask as the device reads it.
+    pub view_labels: Vec<u32>,
+    /// What each object shows of itself.
+    pub shown: BTreeMap<u16, Shown>,
     /// For each object, the objects that hide it in this view.
     pub occluders: BTreeMap<u16, Vec<u16>>,
 }
 
-/// Sum of r + g + b over the pixels of each object.
-pub fn object_light(photo: &Photo, mask: Option<&LabelMap>) -> BTreeMap<u16, f64> {
-    let mut light = BTreeMap::new();
-    for (&id, &[r, g, b, valid]) in mask.into_iter().flat_map(|mask| mask.ids.iter().zip(&photo.rgba)) {
-        if id != 0 && valid > 127 {
-            *light.entry(id).or_insert(0.0) += (f64::from(r) + f64::from(g) + f64::from(b)) / 255.0;
+/// What an object shows in a view.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Shown {
+    /// Sum of r + g + b over its pixels of the photo that the label loss looks at.
+    pub light: f64,
+    /// Number of these pixels.
+    pub pixels: u64,
+}
+
+/// The mask as the device reads it: ids, with [`LABEL_BORDER`] within `border` px of a contour.
+pub fn view_labels(mask: &LabelMap, border: u32) -> Vec<u32> {
+    let ids = mask.ids.iter().map(|&id| u32::from(id));
+    if border == 0 {
+        return ids.collect();
+    }
+    ids.zip(mask.near_contour(border)).map(|(id, near)| if near { id | LABEL_BORDER } else { id }).collect()
+}
+
+/// What each object shows of itself: the label loss of an empty layer.
+pub fn shown_objects(photo: &Photo, view_labels: &[u32]) -> BTreeMap<u16, Shown> {
+    let mut objects: BTreeMap<u16, Shown> = BTreeMap::new();
+    for (&id, &[r, g, b, valid]) in view_labels.iter().zip(&photo.rgba) {
+        if id != 0 && id & LABEL_BORDER == 0 && valid > 127 {
+            let shown = objects.entry(id as u16).or_default();
+            shown.light += (f64::from(r) + f64::from(g) + f64::from(b)) / 255.0;
+            shown.pixels += 1;
         }
     }
-    light
+    objects
+}
+
+/// Weights of the layers of a step: 1, or as one over the root of the object's area, with a mean of 1 over an area of
+/// the mean size and at most [`WEIGHT_MAX`].
+pub fn layer_weights(job: &Job, view: &TrainView, config: &TrainConfig) -> Vec<f32> {
+    let areas: Vec<f64> =
+        job.layers.iter().map(|label| view.shown.get(label).map_or(0.0, |shown| shown.pixels as f64)).collect();
+    let mean = areas.iter().sum::<f64>() / areas.len().max(1) as f64;
+    let weight = |area: f64| if config.label_balance { (mean / area.max(1.0)).sqrt().min(WEIGHT_MAX) } else { 1.0 };
+    areas.into_iter().map(|area| weight(area) as f32).collect()
 }
 
 /// Label loss of a step, weighted, from what the device summed up.
 pub fn label_loss(job: &Job, view: &TrainView, config: &TrainConfig, loss_label: f32) -> f64 {
-    let empty: f64 = job.layers.iter().filter_map(|label| view.object_light.get(label)).sum();
+    let empty = |(label, weight): (&u16, f32)| {
+        let shown = view.shown.get(label).copied().unwrap_or_default();
+        f64::from(weight) * (shown.light + f64::from(alpha_weight(config)) * shown.pixels as f64)
+    };
+    let empty: f64 = job.layers.iter().zip(layer_weights(job, view, config)).map(empty).sum();
     (f64::from(loss_label) + empty) / (3.0 * view.valid_pixels.max(1) as f64) * f64::from(config.label_weight)
+}
+
+/// The alpha term is a mean over pixels, where the others are means over pixels and channels.
+fn alpha_weight(config: &TrainConfig) -> f32 {
+    3.0 * config.label_alpha
 }
 
 /// What a step needs to be submitted, and submitted again after a buffer had to grow.
@@ -86,8 +131,9 @@ pub fn uniforms(job: &Job, view: &TrainView, config: &TrainConfig, fixed: Fixed,
         lambda_dssim: config.lambda_dssim,
         loss_scale: (1.0 / (3.0 * view.valid_pixels.max(1) as f64)) as f32,
         label_weight: config.label_weight,
+        label_alpha: alpha_weight(config),
         label_threshold: config.label_threshold,
-        lift: u32::from(job.labels),
+        lift: u32::from(job.labels && config.label_rule == LabelRule::Main),
         gpf: u32::from(config.gpf),
         occluder_words: labels.div_ceil(32),
         stamp: job.stamp,
@@ -103,21 +149,25 @@ pub fn uniforms(job: &Job, view: &TrainView, config: &TrainConfig, fixed: Fixed,
 }
 
 /// Writes everything of a step into a slot.
-pub fn upload(engine: &mut Engine, slot: usize, uniforms: StepUniforms, view: &TrainView, job: &Job) -> Result<()> {
+pub fn upload(
+    engine: &mut Engine,
+    slot: usize,
+    uniforms: StepUniforms,
+    view: &TrainView,
+    job: &Job,
+    config: &TrainConfig,
+) -> Result<()> {
     let room = engine.room().labels;
     let sched = engine.sched_mut();
     sched.upload(Buf::STEP, slot, 0, &[uniforms])?;
     sched.upload(Buf::TARGET, slot, 0, &view.photo.rgba)?;
     let Some(room) = room.filter(|_| job.labels) else { return Ok(()) };
-    let pixels = view.photo.rgba.len();
-    let ids: Vec<u32> = match &view.mask {
-        Some(mask) => mask.ids.iter().map(|&id| u32::from(id)).collect(),
-        None => vec![0; pixels],
-    };
-    sched.upload(Buf::VIEW_LABELS, slot, 0, &ids)?;
+    sched.upload(Buf::VIEW_LABELS, slot, 0, &view.view_labels)?;
     let words = uniforms.occluder_words as usize;
     let mut layer_from_label = vec![0_u32; room.max_label as usize + 1];
     let mut label_from_layer = vec![0_u32; room.layers as usize + 1];
+    let mut weights = vec![1.0_f32; room.layers as usize + 1];
+    weights.iter_mut().skip(1).zip(layer_weights(job, view, config)).for_each(|(to, weight)| *to = weight);
     let mut hidden = vec![0_u32; words * (room.layers as usize + 1)];
     for (index, &label) in job.layers.iter().enumerate() {
         let layer = index + 1;
@@ -129,5 +179,6 @@ pub fn upload(engine: &mut Engine, slot: usize, uniforms: StepUniforms, view: &T
     }
     sched.upload(Buf::LAYER_FROM_LABEL, slot, 0, &layer_from_label)?;
     sched.upload(Buf::LABEL_FROM_LAYER, slot, 0, &label_from_layer)?;
+    sched.upload(Buf::LAYER_WEIGHTS, slot, 0, &weights)?;
     sched.upload(Buf::LAYER_OCCLUDERS, slot, 0, &hidden)
 }

@@ -7,20 +7,22 @@ mod occlusion;
 pub mod record;
 mod sampler;
 mod timing;
+mod votes;
 
-pub use config::{Occlusion, TrainConfig};
+pub use config::{LabelRule, Occlusion, TrainConfig};
 pub use densify::Densified;
 pub use timing::StepTimes;
 
 use crate::engine::{Engine, LabelRoom, ListKey, Report, Room};
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
+use crate::infer::ballot::columns_for;
 use crate::pass::{KernelShape, Variant};
 use crate::scene::{Dataset, Gaussians};
 use crate::sched::{SchedulerOptions, Ticket};
 use job::{Fixed, Job, TrainView};
 use sampler::ViewOrder;
-use std::collections::VecDeque;
+use std::collections::{BTreeSet, VecDeque};
 use std::sync::Arc;
 
 /// What is known about a finished step.
@@ -50,6 +52,8 @@ pub struct Trainer {
     updates: u32,
     stamp: u32,
     max_gaussians: u64,
+    /// Votes were counted before, so that masks can be compared with their outcome.
+    labelled_once: bool,
     timing: Option<timing::Timing>,
 }
 
@@ -64,6 +68,10 @@ pub fn room(dataset: &Dataset, config: &TrainConfig, gaussians: u64) -> Result<R
     let labels = objects.iter().max().map(|&max_label| LabelRoom {
         max_label: u32::from(max_label),
         layers: config.label_samples.min(most.unwrap_or(0) as u32),
+        vote_columns: match config.label_rule {
+            LabelRule::Votes => columns_for(objects.iter().collect::<BTreeSet<_>>().len()),
+            LabelRule::Main => 0,
+        },
     });
     Ok(Room { gaussians, size, trained: true, labels })
 }
@@ -94,7 +102,8 @@ impl Trainer {
         let fixed = Fixed { extent: dataset.extent() };
         let max_gaussians = if config.max_gaussians > 0 { config.max_gaussians } else { u64::from(u32::MAX) };
         let room = room(dataset, &config, (model.len() as u64 * 2).min(max_gaussians).max(model.len() as u64))?;
-        let views = dataset.train.iter_mut().map(train_view).collect::<Result<Vec<_>>>()?;
+        let views =
+            dataset.train.iter_mut().map(|view| train_view(view, config.mask_border)).collect::<Result<Vec<_>>>()?;
         let mut engine = Engine::with_shape(gpu, shape, room, options)?;
         engine.upload_model(model)?;
         let order = ViewOrder::new(config.seed, views.len());
@@ -109,6 +118,7 @@ impl Trainer {
             updates: 0,
             stamp: 0,
             max_gaussians,
+            labelled_once: false,
             timing: None,
         })
     }
@@ -159,6 +169,10 @@ impl Trainer {
     pub fn step(&mut self) -> Result<Vec<StepReport>> {
         let step = self.step + 1;
         let mut done = Vec::new();
+        if self.counts_votes(step) {
+            done.extend(self.drain()?);
+            self.count_votes()?;
+        }
         if self.refreshes_occluders(step) {
             done.extend(self.drain()?);
             self.refresh_occluders()?;
@@ -220,7 +234,7 @@ impl Trainer {
         self.engine.list(key)?;
         let view = &self.views[job.view];
         let uniforms = job::uniforms(&job, view, &self.config, self.fixed, &self.engine);
-        job::upload(&mut self.engine, slot, uniforms, view, &job)?;
+        job::upload(&mut self.engine, slot, uniforms, view, &job, &self.config)?;
         let ticket = self.engine.submit(key, slot)?;
         self.flying.push_back((job, ticket));
         Ok(())
@@ -267,12 +281,14 @@ impl Trainer {
     }
 }
 
-fn train_view(view: &mut crate::scene::View) -> Result<TrainView> {
+fn train_view(view: &mut crate::scene::View, border: u32) -> Result<TrainView> {
     let photo = view.photo.take().ok_or_else(|| Error::Bug(format!("{} came without its photo", view.name)))?;
     let valid_pixels = photo.rgba.iter().filter(|pixel| pixel[3] > 127).count() as u64;
     let mask = view.mask.take();
     let objects = mask.as_ref().map(crate::scene::LabelMap::objects).unwrap_or_default();
     let (name, camera) = (view.name.clone(), view.camera.clone());
-    let object_light = job::object_light(&photo, mask.as_ref());
-    Ok(TrainView { name, camera, photo, valid_pixels, mask, objects, object_light, occluders: Default::default() })
+    let view_labels = mask.as_ref().map_or_else(|| vec![0; photo.rgba.len()], |mask| job::view_labels(mask, border));
+    let shown = job::shown_objects(&photo, &view_labels);
+    let occluders = Default::default();
+    Ok(TrainView { name, camera, photo, valid_pixels, mask, objects, view_labels, shown, occluders })
 }

@@ -147,7 +147,7 @@ fn no_labels_no_cost() {
         }
     }
     // Nor does a render pay for training.
-    let labels = Some(LabelRoom { max_label: 3, layers: 2 });
+    let labels = Some(LabelRoom { max_label: 3, layers: 2, vote_columns: 0 });
     let room = |trained, labels| Room { gaussians: 1000, size: (64, 48), trained, labels };
     let total = |room: &Room| Engine::predict(rig.engine.sched().gpu(), room).expect("it fits").total;
     assert!(

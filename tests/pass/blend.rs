@@ -1,7 +1,7 @@
 //! Blending forward and backward, of the scene and of the object layers.
 
 use super::rig::{Rig, image_margins, prove};
-use crate::reference::blend::{self, Blended, blend_backward, blend_forward, blend_layers_forward};
+use crate::reference::blend::{self, Blended, Upstream, blend_backward, blend_forward, blend_layers_forward};
 use crate::reference::loss::label_loss;
 use crate::reference::project::{Splat, SplatGradient};
 use crate::reference::{Rules, tile};
@@ -151,22 +151,24 @@ fn blend_backward_and_gather_of_the_scene() {
 }
 
 /// Gradient of the photo loss by the image, as the device's loss passes left it.
-fn v_image(rig: &mut Rig) -> Vec<[f64; 3]> {
+fn v_image(rig: &mut Rig) -> Upstream {
     let pixels = rig.pixels();
-    rig.get::<[f32; 4]>(Buf::V_IMAGE, pixels).iter().map(|&[r, g, b, _]| [r, g, b].map(f64::from)).collect()
+    let rows = rig.get::<[f32; 4]>(Buf::V_IMAGE, pixels);
+    Upstream::of_colours(&rows.iter().map(|&[r, g, b, _]| [r, g, b].map(f64::from)).collect::<Vec<_>>())
 }
 
 /// Gradient of every layer: the scene's from the device, the objects' from their mirror (a sign of each difference), and
 /// the distance of each splat to a kink of a label loss.
-fn v_layers(rules: &Rules, rig: &Rig, splats: &[Splat], v_scene: &[[f64; 3]]) -> (Vec<Vec<[f64; 3]>>, Vec<f64>) {
+fn v_layers(rules: &Rules, rig: &Rig, splats: &[Splat], v_scene: &Upstream) -> (Vec<Upstream>, Vec<f64>) {
     let (target, labels, size) = (&rig.scene.target, rig.model().labels, rig.size());
     let layers = blend_layers_forward(rules, splats, &labels, &rig.slots(), size, target.background);
-    let mut v_layers = vec![v_scene.to_vec()];
+    let mut v_layers = vec![v_scene.clone()];
     let mut kinks = vec![f64::INFINITY; size.0 * size.1];
     for (slot, layer) in target.slots.iter().zip(&layers[1..]) {
-        let loss = label_loss(rules, &layer.colours(), &target.photo, &target.label_map, slot);
+        let picture = (&layer.colours()[..], &layer.alphas()[..]);
+        let loss = label_loss(rules, picture, &target.photo, &target.label_map, slot);
         kinks.iter_mut().zip(&loss.margins).for_each(|(least, margin)| *least = least.min(*margin));
-        v_layers.push(loss.v_image);
+        v_layers.push(loss.upstream());
     }
     (v_layers, blend::smallest_over_pixels(rules, splats, size, &kinks))
 }
@@ -182,7 +184,7 @@ fn object_layers_equal_filtered_renders() {
     let v_scene = v_image(&mut rig);
     let actual = rig.splat_gradients(&splats);
     let (labels, slots, size, target) = (rig.model().labels, rig.slots(), rig.size(), rig.scene.target.clone());
-    prove("object layers", &["alpha_min", "alpha_max", "label_weight"], |rules| {
+    prove("object layers", &["alpha_min", "alpha_max", "label_weight", "label_alpha"], |rules| {
         let (v_layers, kinks) = v_layers(rules, &rig, &splats, &v_scene);
         // Separate renders: each object's splats alone, over black.
         let mut expected = blend_backward(rules, &splats, size, target.background, &v_scene);

@@ -62,11 +62,12 @@ fn label_loss_of_a_step() {
     let target = rig.scene.target.clone();
     assert!(target.slots.iter().any(|slot| !slot.occluders.is_empty()));
     let actual = job::label_loss(&rig.job, &rig.view, &rig.config, counters.loss_label);
-    prove("label loss", &["label_weight"], |rules| {
+    assert!(target.slots.iter().any(|slot| slot.weight != 1.0), "objects of different sizes weigh differently");
+    prove("label loss", &["label_weight", "label_alpha"], |rules| {
         let layers = blend_layers_forward(rules, &splats, &labels, &slots, size, target.background);
-        let losses = target.slots.iter().zip(&layers[1..]);
-        let losses =
-            losses.map(|(slot, layer)| label_loss(rules, &layer.colours(), &target.photo, &target.label_map, slot));
+        let losses = target.slots.iter().zip(&layers[1..]).map(|(slot, layer)| {
+            label_loss(rules, (&layer.colours(), &layer.alphas()), &target.photo, &target.label_map, slot)
+        });
         // An f32 sum less the host's constant; 3e-8 seen.
         close(&[actual], &[losses.map(|loss| loss.value).sum()], Tolerance { absolute: 0.0, relative: 1e-7 })
     });
@@ -106,6 +107,7 @@ fn drawn(rows: &[Row], labels: Vec<u32>, width: u32, height: u32, label_map: Vec
             sh_rest: Vec::new(),
             sh_degree: 0,
             labels: Some(labels),
+            label_confidence: None,
         },
         target: Target {
             photo: Photo {
@@ -114,7 +116,7 @@ fn drawn(rows: &[Row], labels: Vec<u32>, width: u32, height: u32, label_map: Vec
                 valid: vec![true; pixels],
             },
             label_map,
-            slots: objects.iter().map(|&label| ObjectSlot { label, occluders: Vec::new() }).collect(),
+            slots: objects.iter().map(|&label| ObjectSlot { label, occluders: Vec::new(), weight: 1.0 }).collect(),
             background: [0.0; 3],
         },
     }
@@ -220,6 +222,7 @@ fn label_loss_of_an_empty_object() {
     let s = drawn(&[dot(&camera, [8.5, 8.5], 5.0, 3.0, 0.4)], vec![0], SIDE, SIDE, vec![7; 289]);
     let expected = s.target.photo.colours[0][0];
     let mut rig = Rig::new(turn, s, true);
+    rig.config.label_alpha = 0.0;
     let counters = rig.train().counters;
     assert_eq!((counters.loss_label, counters.layer_tile_count), (0.0, 0));
     let loss = job::label_loss(&rig.job, &rig.view, &rig.config, counters.loss_label);
@@ -239,6 +242,7 @@ fn label_loss_of_a_right_object() {
     // Degree 0 of the colour: 0.5 + C0 k = 2 * 128 / 255, so that half of it is the photo's 128 / 255.
     row.sh[0] = [(256.0 / 255.0 - 0.5) / Rules::default().sh_c0; 3];
     let mut rig = Rig::new(turn, drawn(&[row], vec![7], SIDE, SIDE, vec![7; 289]), true);
+    rig.config.label_alpha = 0.0; // it is half transparent
     let counters = rig.train().counters;
     let loss = job::label_loss(&rig.job, &rig.view, &rig.config, counters.loss_label);
     check("loss", close(&[loss], &[0.0], Tolerance { absolute: 1e-5, relative: 0.0 }));

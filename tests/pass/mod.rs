@@ -13,3 +13,4 @@ mod project;
 pub mod rig;
 mod step;
 mod tile;
+mod votes;

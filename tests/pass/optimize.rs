@@ -107,6 +107,7 @@ fn gaussians(population: &Population) -> Gaussians {
         sh_rest: rows.iter().flat_map(|r| r.sh[1..].iter().map(|c| c.map(narrow))).collect(),
         sh_degree: 3,
         labels: Some(population.model.labels.clone()),
+        label_confidence: None,
     }
 }
 

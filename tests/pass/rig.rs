@@ -16,8 +16,8 @@ use labelgs::plan::{Buf, PlanOptions};
 use labelgs::scene::{LabelMap, Photo};
 use labelgs::sched::SchedulerOptions;
 use labelgs::shaders::structs::StepUniforms;
-use labelgs::train::TrainConfig;
 use labelgs::train::job::{self, Fixed, Job, TrainView};
+use labelgs::train::{LabelRule, TrainConfig};
 use std::f64::consts::LN_2;
 
 /// Planes of the parameters in the order of `plane_rows`.
@@ -42,6 +42,9 @@ const LAYOUT: [(usize, &[(usize, usize, usize)]); 7] = [
     (16, &[(0, 23, 15)]),
     (24, &[(0, 38, 21)]),
 ];
+
+/// Labels that the engine counts votes for at once: few, so that sweeps need several rounds.
+pub const VOTE_COLUMNS: u32 = 3;
 
 /// A scene, an engine with its model, and the step that is run.
 pub struct Rig {
@@ -82,7 +85,8 @@ pub fn train_view(scene: &Scene) -> TrainView {
     let photo = Photo { width, height, rgba };
     TrainView {
         name: "the view".to_owned(),
-        object_light: job::object_light(&photo, Some(&mask)),
+        shown: job::shown_objects(&photo, &target.label_map),
+        view_labels: target.label_map.clone(),
         photo,
         valid_pixels: target.photo.valid.iter().filter(|&&valid| valid).count() as u64,
         objects: mask.objects(),
@@ -108,6 +112,7 @@ impl Rig {
             labels: labels.then(|| LabelRoom {
                 max_label: scene.target.label_map.iter().copied().max().unwrap_or(0).max(1),
                 layers: scene.target.slots.len() as u32,
+                vote_columns: VOTE_COLUMNS,
             }),
         };
         let mut engine = Engine::with_shape(turn.gpu(), shape, room, readable()).expect("the engine starts");
@@ -115,12 +120,17 @@ impl Rig {
         let config = TrainConfig {
             background: scene.target.background.map(|v| v as f32),
             sh_degree: scene.gaussians.sh_degree,
+            label_rule: LabelRule::Main,
             ..TrainConfig::default()
         };
         let layers =
             if labels { scene.target.slots.iter().map(|slot| slot.label as u16).collect() } else { Vec::new() };
         let job = Job { step: 1, view: 0, layers, labels, update: false, updates: 1, stamp: 7 };
-        Self { view: train_view(&scene), engine, scene, job, config, fixed: Fixed { extent: 1.0 }, _turn: turn }
+        let view = train_view(&scene);
+        let mut rig = Self { view, engine, scene, job, config, fixed: Fixed { extent: 1.0 }, _turn: turn };
+        let weights = job::layer_weights(&rig.job, &rig.view, &rig.config);
+        rig.scene.target.slots.iter_mut().zip(weights).for_each(|(slot, weight)| slot.weight = f64::from(weight));
+        rig
     }
 
     /// The uniforms of the step.
@@ -144,7 +154,7 @@ impl Rig {
     /// Writes what the host gives to a step.
     fn upload(&mut self) {
         let uniforms = self.uniforms();
-        job::upload(&mut self.engine, 0, uniforms, &self.view, &self.job).expect("upload");
+        job::upload(&mut self.engine, 0, uniforms, &self.view, &self.job, &self.config).expect("upload");
     }
 
     /// Runs a list, again with more memory if that was too small. `upload` writes what the host gives.

@@ -53,7 +53,7 @@ const ALL: [Family; 4] = [Family::Project, Family::Sh, Family::Blend, Family::Lo
 #[test]
 fn whole_step() {
     // Nothing in this scene is near a Jacobian's clamp; without labels no label weight bears.
-    let bearing = named(&ALL, &["label_weight", "jacobian_margin"]);
+    let bearing = named(&ALL, &["label_weight", "label_alpha", "jacobian_margin"]);
     case("whole step", 61, &Shape { gaussians: 120, ..Shape::default() }, false, &bearing);
 }
 

@@ -104,6 +104,8 @@ pub fn engine_lists(shape: KernelShape) -> (Capacity, Vec<PassList>) {
         pixels: 65_536,
         labelled_pixels: 65_536,
         labels: 16,
+        vote_columns: 9,
+        vote_cells: 90_000,
         layers: 4,
         occluder_words: 4,
         scan_lanes: 64,

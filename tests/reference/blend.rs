@@ -168,6 +168,11 @@ impl Blended {
     pub fn colours(&self) -> Vec<[f64; 3]> {
         self.pixels.iter().map(|pixel| pixel.colour).collect()
     }
+
+    /// Opacities of the pixels.
+    pub fn alphas(&self) -> Vec<f64> {
+        self.pixels.iter().map(|pixel| 1.0 - pixel.transmittance).collect()
+    }
 }
 
 /// Sums up a ray.
@@ -224,13 +229,29 @@ pub struct SplatGradients {
     pub margins: Vec<f64>,
 }
 
+/// Gradient of a loss by an image.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Upstream {
+    /// By the colours, [height, width].
+    pub colours: Vec<[f64; 3]>,
+    /// By the opacities, [height, width].
+    pub alphas: Vec<f64>,
+}
+
+impl Upstream {
+    /// Of a loss that looks at colours alone.
+    pub fn of_colours(colours: &[[f64; 3]]) -> Self {
+        Self { colours: colours.to_vec(), alphas: vec![0.0; colours.len()] }
+    }
+}
+
 /// Gradients of depth-ordered splats for the gradient of the image.
 pub fn blend_backward(
     rules: &Rules,
     splats: &[Splat],
     size: (usize, usize),
     background: [f64; 3],
-    v_image: &[[f64; 3]],
+    v_image: &Upstream,
 ) -> SplatGradients {
     layer_backward(rules, &Boxed::new(rules, splats), |_| true, size, background, v_image)
 }
@@ -242,15 +263,15 @@ fn layer_backward(
     member: impl Fn(&Splat) -> bool,
     size: (usize, usize),
     background: [f64; 3],
-    v_image: &[[f64; 3]],
+    v_image: &Upstream,
 ) -> SplatGradients {
     let count = boxed.splats.len();
     let mut out = SplatGradients { values: vec![SplatGradient::default(); count], margins: vec![f64::INFINITY; count] };
-    for (index, &v_colour) in v_image.iter().enumerate() {
+    for (index, (&v_colour, &v_alpha)) in v_image.colours.iter().zip(&v_image.alphas).enumerate() {
         let at = centre(index, size.0);
         let near = || boxed.near(at).filter(|(_, splat)| member(splat));
         let ray = trace(rules, near(), at);
-        ray_backward(boxed.splats, &ray, at, background, v_colour, &mut out.values);
+        ray_backward(boxed.splats, &ray, at, dot(background, v_colour) - v_alpha, v_colour, &mut out.values);
         for (place, splat) in near() {
             let above = exponent(splat, at) - rules.exponent_min();
             let of_ray = if above >= 0.0 { ray.margins.gradient() } else { f64::INFINITY };
@@ -280,15 +301,16 @@ fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
 }
 
 /// Adds one ray's share. With C = sum w_i c_i + T b: dC/d alpha_i = T_i c_i - (everything behind i) / (1 - alpha_i).
+/// `v_transmittance` is the gradient by what is left at the end: b times that of the colour, less that of the opacity.
 fn ray_backward(
     splats: &[Splat],
     ray: &Trace,
     at: [f64; 2],
-    background: [f64; 3],
+    v_transmittance: f64,
     v_colour: [f64; 3],
     v_splats: &mut [SplatGradient],
 ) {
-    let mut behind = ray.transmittance * dot(background, v_colour);
+    let mut behind = ray.transmittance * v_transmittance;
     for contribution in ray.contributions.iter().rev() {
         let splat = &splats[contribution.splat];
         let v = &mut v_splats[contribution.splat];
@@ -351,7 +373,7 @@ pub fn blend_layers_backward(
     slots: &[u32],
     size: (usize, usize),
     background: [f64; 3],
-    v_layers: &[Vec<[f64; 3]>],
+    v_layers: &[Upstream],
 ) -> (SplatGradients, SplatGradients) {
     let boxed = Boxed::new(rules, splats);
     let scene = layer_backward(rules, &boxed, |_| true, size, background, &v_layers[0]);

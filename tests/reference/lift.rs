@@ -1,7 +1,7 @@
 //! Labels from masks: main Gaussian labelling and the Gaussian projection filter.
 
 use super::Rules;
-use super::blend::Blended;
+use super::blend::{Blended, centre, trace};
 use super::project::Splat;
 
 /// What one view votes.
@@ -63,7 +63,7 @@ pub fn lift(rules: &Rules, image: &Blended, centres: &[Option<[f64; 2]>], masks:
         let holder = centres[gaussian].and_then(|centre| pixel_of(centre, image.size));
         let allowed = match holder {
             None => false,
-            Some(place) => !masks.gpf || masks.label_map[place] == label,
+            Some(place) => !masks.gpf || masks.label_map[place] & 0xFFFF == label,
         };
         if allowed && pixel.main_weight >= rules.lift_threshold {
             votes.keys[gaussian] = votes.keys[gaussian].max(vote_key(pixel.main_weight, label));
@@ -79,4 +79,25 @@ pub fn lift_resolve(votes: &Votes, labels: &mut [u32]) {
             *label = key & 0xFFFF;
         }
     }
+}
+
+/// Votes of one view [N, columns], px: sums of blending weights over the pixels of each column, times its weight.
+/// `columns` says for each pixel which column it speaks for, if any.
+pub fn vote(
+    rules: &Rules,
+    splats: &[Splat],
+    size: (usize, usize),
+    count: usize,
+    columns: &[Option<usize>],
+    weights: &[f64],
+) -> Vec<f64> {
+    let mut votes = vec![0.0; count * weights.len()];
+    for (index, column) in columns.iter().enumerate() {
+        let Some(column) = *column else { continue };
+        for contribution in trace(rules, splats.iter().enumerate(), centre(index, size.0)).contributions {
+            let gaussian = splats[contribution.splat].gaussian;
+            votes[gaussian * weights.len() + column] += contribution.weight() * weights[column];
+        }
+    }
+    votes
 }

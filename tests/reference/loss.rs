@@ -1,6 +1,7 @@
 //! Photo loss (L1 and SSIM) and label loss, with their gradients by the image.
 
 use super::Rules;
+use super::blend::Upstream;
 
 /// A photo with the pixels that count.
 #[derive(Clone, Debug, PartialEq)]
@@ -41,13 +42,25 @@ pub struct Loss {
     pub value: f64,
     /// Gradient of `value` by the image, [height, width].
     pub v_image: Vec<[f64; 3]>,
+    /// Gradient of `value` by the opacity, [height, width].
+    pub v_alpha: Vec<f64>,
     /// Smallest absolute difference of a pixel's channels: distance to the kink of L1, [height, width].
     pub margins: Vec<f64>,
 }
 
 impl Loss {
     fn empty(pixels: usize) -> Self {
-        Self { v_image: vec![[0.0; 3]; pixels], margins: vec![f64::INFINITY; pixels], ..Self::default() }
+        Self {
+            v_image: vec![[0.0; 3]; pixels],
+            v_alpha: vec![0.0; pixels],
+            margins: vec![f64::INFINITY; pixels],
+            ..Self::default()
+        }
+    }
+
+    /// Its gradient as the blending takes it.
+    pub fn upstream(&self) -> Upstream {
+        Upstream { colours: self.v_image.clone(), alphas: self.v_alpha.clone() }
     }
 
     /// Smallest margin of all pixels.
@@ -181,31 +194,50 @@ pub fn photo_loss(rules: &Rules, image: &[[f64; 3]], photo: &Photo) -> Loss {
     loss
 }
 
+/// Bit of a label map's pixel that lies too near to a contour to say anything about objects.
+pub const BORDER: u32 = 0x1_0000;
+
 /// One object of a step: its label and the labels that hide it in this view.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct ObjectSlot {
     /// Label of the object, not 0.
     pub label: u32,
     /// Labels in front of it: their pixels say nothing about it.
     pub occluders: Vec<u32>,
+    /// Weight of its loss beside those of other objects.
+    pub weight: f64,
 }
 
-/// |U_k (R_k - M_k I)| over the pixels that count, times the label weight. `image` is R_k over black.
-pub fn label_loss(rules: &Rules, image: &[[f64; 3]], photo: &Photo, label_map: &[u32], slot: &ObjectSlot) -> Loss {
-    let elements = photo.elements();
+/// |U_k (R_k - M_k I)|, and |U_k (alpha_k - M_k)| with its weight, over the pixels that count, times the label weight.
+/// `picture` is R_k over black and alpha_k.
+pub fn label_loss(
+    rules: &Rules,
+    picture: (&[[f64; 3]], &[f64]),
+    photo: &Photo,
+    label_map: &[u32],
+    slot: &ObjectSlot,
+) -> Loss {
+    let (image, alphas) = picture;
+    let pixel_weight = rules.label_weight * slot.weight / photo.elements();
     let mut loss = Loss::empty(image.len());
-    for i in (0..image.len()).filter(|&i| photo.valid[i] && !slot.occluders.contains(&label_map[i])) {
+    let says = |i: usize| label_map[i] & BORDER == 0 && !slot.occluders.contains(&label_map[i]);
+    for i in (0..image.len()).filter(|&i| photo.valid[i] && says(i)) {
+        let inside = label_map[i] == slot.label;
         for channel in 0..3 {
-            let target = if label_map[i] == slot.label { photo.colours[i][channel] } else { 0.0 };
+            let target = if inside { photo.colours[i][channel] } else { 0.0 };
             let difference = image[i][channel] - target;
-            loss.l1 += difference.abs() / elements;
-            loss.v_image[i][channel] = rules.label_weight * sign(difference) / elements;
+            loss.l1 += difference.abs();
+            loss.v_image[i][channel] = pixel_weight * sign(difference);
             // An untouched pixel outside the mask is 0 on both sides and stays so: no kink there.
             if difference != 0.0 {
                 loss.margins[i] = loss.margins[i].min(difference.abs());
             }
         }
+        // Opacity is from 0 to 1, so its sign never turns.
+        let difference = alphas[i] - f64::from(u8::from(inside));
+        loss.l1 += 3.0 * rules.label_alpha * difference.abs();
+        loss.v_alpha[i] = 3.0 * rules.label_alpha * pixel_weight * sign(difference);
     }
-    loss.value = rules.label_weight * loss.l1;
+    loss.value = pixel_weight * loss.l1;
     loss
 }

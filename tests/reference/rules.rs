@@ -31,6 +31,8 @@ pub struct Rules {
     pub dssim_weight: f64,
     /// Weight of the label loss (lambda 2).
     pub label_weight: f64,
+    /// Weight of the alpha term within the label loss.
+    pub label_alpha: f64,
     /// Standard deviation of the SSIM window, px.
     pub ssim_sigma: f64,
     /// Reach of the SSIM window from its centre, px (window = 2 reach + 1).
@@ -86,6 +88,7 @@ impl Default for Rules {
             l1_weight: wide(0.8),
             dssim_weight: wide(0.2),
             label_weight: 1.0,
+            label_alpha: 0.1,
             ssim_sigma: 1.5,
             ssim_reach: 5,
             ssim_c1: wide(0.01 * 0.01),
@@ -149,7 +152,7 @@ pub struct Mutant {
 pub fn mutants() -> Vec<Mutant> {
     use Family::{Adam, Blend, Densify, Lift, Loss, Project, Reset, Sh};
     type Change = fn(&mut Rules);
-    let changes: [(&'static str, Family, Change); 28] = [
+    let changes: [(&'static str, Family, Change); 29] = [
         ("near", Project, |r| r.near = 3.8),
         ("dilation", Project, |r| r.dilation *= 1.03),
         ("jacobian_margin", Project, |r| r.jacobian_margin *= 0.97),
@@ -164,6 +167,7 @@ pub fn mutants() -> Vec<Mutant> {
         ("l1_weight", Loss, |r| r.l1_weight *= 1.03),
         ("dssim_weight", Loss, |r| r.dssim_weight *= 1.03),
         ("label_weight", Loss, |r| r.label_weight *= 1.03),
+        ("label_alpha", Loss, |r| r.label_alpha *= 1.03),
         ("ssim_sigma", Loss, |r| r.ssim_sigma *= 1.03),
         ("ssim_reach", Loss, |r| r.ssim_reach -= 1),
         ("ssim_c1", Loss, |r| r.ssim_c1 *= 1.3),

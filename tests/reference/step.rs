@@ -1,6 +1,6 @@
 //! A whole training step: losses of a view and their gradients by every parameter.
 
-use super::blend::{self, Blended};
+use super::blend::{self, Blended, Upstream};
 use super::loss::{self, Loss, ObjectSlot, Photo};
 use super::project::{self, Projection, Splat, SplatGradient};
 use super::{Model, Row, Rules};
@@ -58,10 +58,12 @@ pub fn step(rules: &Rules, camera: &Camera, model: &Model, target: &Target) -> S
     let layers = blend::blend_layers_forward(rules, &splats, &model.labels, &labels, size, target.background);
     let photo = loss::photo_loss(rules, &layers[0].colours(), &target.photo);
     let objects: Vec<Loss> = (target.slots.iter().zip(&layers[1..]))
-        .map(|(slot, layer)| loss::label_loss(rules, &layer.colours(), &target.photo, &target.label_map, slot))
+        .map(|(slot, layer)| {
+            let picture = (&layer.colours()[..], &layer.alphas()[..]);
+            loss::label_loss(rules, picture, &target.photo, &target.label_map, slot)
+        })
         .collect();
-    let v_layers: Vec<Vec<[f64; 3]>> =
-        std::iter::once(&photo).chain(&objects).map(|loss| loss.v_image.clone()).collect();
+    let v_layers: Vec<Upstream> = std::iter::once(&photo).chain(&objects).map(Loss::upstream).collect();
     let (scene, of_objects) =
         blend::blend_layers_backward(rules, &splats, &model.labels, &labels, size, target.background, &v_layers);
 

@@ -135,7 +135,11 @@ pub fn target(random: &mut Pcg32, shape: &Shape) -> Target {
     }
     let valid = (0..width * height).map(|index| index % width >= width / 12 || index / width >= height / 3).collect();
     let slots = (1..=shape.objects)
-        .map(|label| ObjectSlot { label, occluders: if label % 2 == 0 { vec![label - 1] } else { Vec::new() } })
+        .map(|label| ObjectSlot {
+            label,
+            occluders: if label % 2 == 0 { vec![label - 1] } else { Vec::new() },
+            weight: 1.0,
+        })
         .collect();
     let background = [0; 3].map(|_| uniform(random, 0.0, 1.0));
     Target { photo: Photo { size: (width, height), colours, valid }, label_map, slots, background }

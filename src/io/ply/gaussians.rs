@@ -1,4 +1,5 @@
-//! The standard 3DGS PLY, with `property uint label` as its last column where the scene has labels.
+//! The standard 3DGS PLY, with `property uint label` as its last column where the scene has labels, and before it
+//! `property float label_confidence` where votes were counted.
 
 use super::table::Table;
 use crate::error::{Error, Result};
@@ -53,12 +54,19 @@ pub fn read_gaussians(path: impl AsRef<Path>) -> Result<ReadPly> {
         columns.push("label");
         read.gaussians.labels = Some(Vec::new());
     }
+    let confident = labelled && table.names().any(|name| name == "label_confidence");
+    if confident {
+        columns.push("label_confidence");
+        read.gaussians.label_confidence = Some(Vec::new());
+    }
     let mut dropped = Dropped::default();
     let mut total = 0;
     let odd = table.for_each(&columns, |index, row| {
         total = index + 1;
-        let label = if labelled { Some(label_of(path, index, row[row.len() - 1])?) } else { None };
-        push_row(&mut read.gaussians, &mut dropped, &row[..14 + rest * 3], label);
+        let (row, labelling) = row.split_at(14 + rest * 3);
+        let label = labelling.first().map(|&label| label_of(path, index, label)).transpose()?;
+        let confidence = labelling.get(1).map(|&share| confidence_of(path, index, share)).transpose()?;
+        push_row(&mut read.gaussians, &mut dropped, row, label, confidence);
         Ok(())
     })?;
     read.dropped = dropped.total();
@@ -95,6 +103,14 @@ fn label_of(path: &Path, index: u64, value: f64) -> Result<u32> {
     Err(Error::data(path, format!("vertex {index}"), problem))
 }
 
+fn confidence_of(path: &Path, index: u64, value: f64) -> Result<f32> {
+    if (0.0..=1.0).contains(&value) {
+        return Ok(value as f32);
+    }
+    let problem = format!("label_confidence {value} is not from 0 to 1; leave the column out to do without");
+    Err(Error::data(path, format!("vertex {index}"), problem))
+}
+
 /// Rows left out, by reason.
 #[derive(Default)]
 struct Dropped {
@@ -120,7 +136,7 @@ impl Dropped {
 }
 
 /// Appends a row in the order of [`REQUIRED`] and `f_rest_*`, or counts why it is left out.
-fn push_row(to: &mut Gaussians, dropped: &mut Dropped, row: &[f64], label: Option<u32>) {
+fn push_row(to: &mut Gaussians, dropped: &mut Dropped, row: &[f64], label: Option<u32>, confidence: Option<f32>) {
     let value = |index: usize| row[index] as f32;
     if (0..row.len()).any(|index| !value(index).is_finite()) {
         dropped.not_finite += 1;
@@ -145,6 +161,9 @@ fn push_row(to: &mut Gaussians, dropped: &mut Dropped, row: &[f64], label: Optio
     if let (Some(labels), Some(label)) = (to.labels.as_mut(), label) {
         labels.push(label);
     }
+    if let (Some(shares), Some(share)) = (to.label_confidence.as_mut(), confidence) {
+        shares.push(share);
+    }
 }
 
 /// The rotation as stored; normalised only if its squared length would leave f32. `None` for zero.
@@ -158,17 +177,18 @@ fn rotation(quat: [f64; 4]) -> Option<[f32; 4]> {
 }
 
 /// Writes the standard 3DGS PLY (little-endian, no comments, normals zero), with `label` as last column only if
-/// the scene has labels. Rows that are not finite are left out; returns how many. The file appears complete or
+/// the scene has labels, and `label_confidence` before it only if that is known. Rows that are not finite are left out; returns how many. The file appears complete or
 /// not at all.
 pub fn write_gaussians(path: impl AsRef<Path>, gaussians: &Gaussians) -> Result<u64> {
     let (count, rest) = (gaussians.len(), gaussians.rest_per_gaussian());
     let lengths = [gaussians.quats.len(), gaussians.scales.len(), gaussians.opacities.len(), gaussians.sh0.len()];
-    let labels_fit = gaussians.labels.as_ref().is_none_or(|labels| labels.len() == count);
+    let labels_fit = gaussians.labels.as_ref().is_none_or(|labels| labels.len() == count)
+        && gaussians.label_confidence.as_ref().is_none_or(|shares| shares.len() == count);
     if lengths.iter().any(|&n| n != count) || gaussians.sh_rest.len() != count * rest || !labels_fit {
         return Err(Error::Bug(format!("the columns of {count} Gaussians differ in length")));
     }
     let finite: Vec<usize> = (0..count).filter(|&row| is_finite(gaussians, row)).collect();
-    let header = header(finite.len(), rest * 3, gaussians.labels.is_some());
+    let header = header(finite.len(), rest * 3, gaussians);
     atomic::write(path, |out| {
         // The header goes through a buffer because the crate wants a sized writer.
         let mut text = Vec::new();
@@ -188,7 +208,7 @@ fn is_finite(g: &Gaussians, row: usize) -> bool {
         && g.opacities[row].is_finite()
 }
 
-fn header(count: usize, rest: usize, labelled: bool) -> Header {
+fn header(count: usize, rest: usize, gaussians: &Gaussians) -> Header {
     let mut names: Vec<String> = ["x", "y", "z", "nx", "ny", "nz"].map(String::from).to_vec();
     names.extend((0..3).map(|k| format!("f_dc_{k}")));
     names.extend((0..rest).map(|k| format!("f_rest_{k}")));
@@ -198,7 +218,11 @@ fn header(count: usize, rest: usize, labelled: bool) -> Header {
     let mut vertex = ElementDef::new("vertex".into());
     vertex.count = count;
     names.into_iter().for_each(|n| vertex.properties.add(PropertyDef::new(n, PropertyType::Scalar(ScalarType::Float))));
-    if labelled {
+    if gaussians.labels.is_some() {
+        if gaussians.label_confidence.is_some() {
+            let share = PropertyDef::new("label_confidence".into(), PropertyType::Scalar(ScalarType::Float));
+            vertex.properties.add(share);
+        }
         vertex.properties.add(PropertyDef::new("label".into(), PropertyType::Scalar(ScalarType::UInt)));
     }
     let mut header = Header::new();
@@ -216,6 +240,9 @@ fn write_row(out: &mut dyn Write, bytes: &mut Vec<u8>, g: &Gaussians, row: usize
     let tail = [g.opacities[row]].into_iter().chain(g.scales[row]).chain(g.quats[row]);
     head.chain(channels).chain(tail).for_each(|value| bytes.extend_from_slice(&value.to_le_bytes()));
     if let Some(labels) = &g.labels {
+        if let Some(shares) = &g.label_confidence {
+            bytes.extend_from_slice(&shares[row].to_le_bytes());
+        }
         bytes.extend_from_slice(&labels[row].to_le_bytes());
     }
     out.write_all(bytes)

@@ -1,0 +1,130 @@
+//! `labelgs label`.
+
+use super::args::JsonFlag;
+use super::args::SceneArgs;
+use super::log::Progress;
+use super::scene::{open_gpu, open_scene};
+use super::{Context, open_model, stdout};
+use crate::engine::{Engine, LabelRoom, Room};
+use crate::infer::ballot::{Sweep, Voter, columns_for, sweep};
+use crate::infer::decide::{apply, decide, drop_unsure, trust};
+use crate::infer::render::render;
+use crate::infer::select::summarise;
+use crate::io::ply::write_gaussians;
+use crate::scene::{Gaussians, View};
+use crate::sched::SchedulerOptions;
+use crate::{Error, Result};
+use clap::Args;
+use serde_json::json;
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::PathBuf;
+use std::time::Instant;
+
+/// `labelgs label`.
+#[derive(Args, Clone, Debug)]
+pub struct LabelArgs {
+    /// The model, of any trainer: a PLY, or the folder that `labelgs train` made. Labels that it has are replaced.
+    #[arg(value_name = "MODEL")]
+    pub model: PathBuf,
+    /// Scene with the cameras of the masks.
+    #[arg(long, value_name = "SCENE")]
+    pub scene: PathBuf,
+    /// Folder of id masks, one per view by name.
+    #[arg(long, value_name = "DIR")]
+    pub masks: PathBuf,
+    /// File to write.
+    #[arg(short, long, value_name = "OUT.ply")]
+    pub output: PathBuf,
+    /// Rounds of counting; from the second on, masks that disagree with all others count less.
+    #[arg(long, value_name = "N", default_value_t = 2, value_parser = clap::value_parser!(u32).range(1..=10))]
+    pub rounds: u32,
+    /// Pixels so near to a contour of their mask have no vote, px; 2 suits masks of trackers.
+    #[arg(long, value_name = "PX", default_value_t = 0)]
+    pub mask_border: u32,
+    /// Gaussians whose label has a smaller share of their votes get none.
+    #[arg(long, value_name = "SHARE", default_value_t = 0.0)]
+    pub min_confidence: f32,
+    /// Leave Gaussians that no pixel speaks for without a label, instead of asking their neighbours.
+    #[arg(long)]
+    pub no_complete: bool,
+    /// Gaussians nearer to the camera are not seen, world units.
+    #[arg(long, value_name = "Z", default_value_t = super::scene::NEAR)]
+    pub near: f32,
+    /// How the scene is read; test views have no vote.
+    #[command(flatten)]
+    pub reading: SceneArgs,
+    /// JSON.
+    #[command(flatten)]
+    pub json: JsonFlag,
+}
+
+/// Gives the Gaussians of a trained model their labels.
+pub fn run(args: &LabelArgs, context: &Context) -> Result<()> {
+    let mut model = open_model(&args.model)?;
+    let dataset = open_scene(&args.scene, &args.reading, Some(args.masks.clone()), [0.0; 3], true)?;
+    let views: Vec<&View> = dataset.train.iter().filter(|view| view.mask.is_some()).collect();
+    if views.is_empty() {
+        return Err(Error::data(&args.masks, "", "no training view has a mask here; see --test-every"));
+    }
+    let objects: BTreeSet<u16> = views.iter().filter_map(|view| view.mask.as_ref()).flat_map(|m| m.objects()).collect();
+    let size = views.iter().map(|view| (view.camera.width, view.camera.height));
+    let size = size.reduce(|a, b| (a.0.max(b.0), a.1.max(b.1))).unwrap_or((1, 1));
+    let labels = LabelRoom {
+        max_label: objects.iter().max().map_or(0, |&id| u32::from(id)),
+        layers: 0,
+        vote_columns: columns_for(objects.len()),
+    };
+    let room = Room { gaussians: (model.len() as u64).max(1), size, trained: false, labels: Some(labels) };
+    let gpu = open_gpu(context)?;
+    let start = Instant::now();
+    let mut engine = Engine::new(gpu, room, SchedulerOptions::default())?;
+    engine.upload_model(&model)?;
+    let mut progress = Progress::new(u64::from(args.rounds), "rounds", &context.global);
+    for round in 0..args.rounds {
+        vote(&mut engine, &mut model, &views, args, round > 0)?;
+        progress.set(u64::from(round) + 1, String::new);
+    }
+    drop(progress);
+    drop_unsure(&mut model, args.min_confidence);
+    let seconds = start.elapsed().as_secs_f64();
+    write_gaussians(&args.output, &model)?;
+    let rows = summarise(&model);
+    if context.json || args.json.json {
+        return stdout::print_json(&json!({
+            "schema_version": 1,
+            "output": args.output.display().to_string(),
+            "views": views.len(),
+            "seconds": seconds,
+            "gaussians": model.len(),
+            "labels": rows,
+        }));
+    }
+    let labelled: u64 = rows.iter().filter(|row| row.label != 0).map(|row| row.count).sum();
+    stdout::print(&format!(
+        "{}: {labelled} of {} Gaussians belong to {} objects, by {} views in {seconds:.1} s\n",
+        args.output.display(),
+        model.len(),
+        rows.iter().filter(|row| row.label != 0).count(),
+        views.len()
+    ))
+}
+
+/// One round: counts and decides.
+fn vote(engine: &mut Engine, model: &mut Gaussians, views: &[&View], args: &LabelArgs, judge: bool) -> Result<()> {
+    let mut trusts: Vec<Option<BTreeMap<u16, f32>>> = vec![None; views.len()];
+    if let Some(labels) = model.labels.as_ref().filter(|_| judge) {
+        for (view, to) in views.iter().zip(&mut trusts) {
+            let shown = render(engine, &view.camera, args.near, [0.0; 3], 0)?.label_map(labels);
+            *to = view.mask.as_ref().map(|mask| trust(mask, &shown));
+        }
+    }
+    let voters = views.iter().zip(&trusts).filter_map(|(view, trust)| {
+        let (photo, trust) = (view.photo.as_ref(), trust.as_ref());
+        Some(Voter { camera: &view.camera, mask: view.mask.as_ref()?, photo, trust })
+    });
+    let voters: Vec<Voter> = voters.collect();
+    let ballot = sweep(engine, &voters, Sweep { near: args.near, border: args.mask_border })?;
+    let decision = decide(&ballot, &model.means, !args.no_complete)?;
+    apply(model, decision);
+    Ok(())
+}

@@ -1,0 +1,102 @@
+//! From votes to a label and a confidence for every Gaussian.
+
+use super::ballot::{Ballot, weight};
+use crate::error::{Error, Result};
+use crate::scene::{Gaussians, LabelMap, UNLABELLED};
+use kiddo::{ImmutableKdTree, SquaredEuclidean};
+use rayon::prelude::*;
+use std::collections::BTreeMap;
+use std::num::NonZero;
+
+/// Weight over all views below which a Gaussian's own votes count for less than its neighbours', px. What shows less
+/// than a pixel in all views together is inside an object or behind it, and no pixel speaks for it.
+const EVIDENCE: f64 = 1.0;
+/// Neighbours that speak for it instead.
+const NEIGHBOURS: usize = 8;
+
+/// A label per Gaussian.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Decision {
+    /// Labels [N], 0: no object.
+    pub labels: Vec<u32>,
+    /// Share of the winner in all votes [N], 0 to 1; 0 where nobody voted.
+    pub confidence: Vec<f32>,
+}
+
+/// The label with most votes, the smaller of equals. A Gaussian with little weight of its own asks its nearest
+/// neighbours that have more: the object's inside gets the object's label, so that nothing of it stays behind when it is
+/// taken out (with `complete`; without, it decides by what little it has).
+pub fn decide(ballot: &Ballot, means: &[[f32; 3]], complete: bool) -> Result<Decision> {
+    if ballot.len() != means.len() {
+        return Err(Error::Bug(format!("{} rows of votes for {} Gaussians", ballot.len(), means.len())));
+    }
+    let own: Vec<Vec<f64>> = (0..means.len()).into_par_iter().map(|row| shares(ballot, row)).collect();
+    let totals: Vec<f64> = own.iter().map(|votes| votes.iter().sum()).collect();
+    let winners: Vec<usize> = own.par_iter().map(|votes| winner(votes)).collect();
+    let tree = if complete { tree_of(means, &totals)? } else { None };
+    let decide_row = |row: usize| {
+        let mut votes = own[row].clone();
+        if let Some((tree, rows)) = tree.as_ref().filter(|_| totals[row] < EVIDENCE)
+            && let Some(asked) = NonZero::new(NEIGHBOURS.min(rows.len()))
+        {
+            let at = means[row].map(f64::from);
+            let near = tree.query(&at).nearest_n::<SquaredEuclidean<f64>>(asked).execute();
+            for item in &near {
+                votes[winners[rows[item.item as usize]]] += (EVIDENCE - totals[row]) / asked.get() as f64;
+            }
+        }
+        let (column, total) = (winner(&votes), votes.iter().sum::<f64>());
+        let confidence = if total > 0.0 { votes[column] / total } else { 0.0 };
+        (u32::from(ballot.labels[column]), confidence as f32)
+    };
+    let (labels, confidence) = (0..means.len()).into_par_iter().map(decide_row).unzip();
+    Ok(Decision { labels, confidence })
+}
+
+fn shares(ballot: &Ballot, row: usize) -> Vec<f64> {
+    ballot.row(row).iter().map(|&votes| weight(votes)).collect()
+}
+
+fn winner(votes: &[f64]) -> usize {
+    let best = |best: usize, at: usize| if votes[at] > votes[best] { at } else { best };
+    (0..votes.len()).fold(0, best)
+}
+
+/// The Gaussians with enough weight of their own, as a tree with their rows.
+fn tree_of(means: &[[f32; 3]], totals: &[f64]) -> Result<Option<(ImmutableKdTree<f64, 3>, Vec<usize>)>> {
+    let sure = |&row: &usize| totals[row] >= EVIDENCE && means[row].iter().all(|value| value.is_finite());
+    let rows: Vec<usize> = (0..means.len()).filter(sure).collect();
+    if rows.is_empty() {
+        return Ok(None);
+    }
+    let places: Vec<[f64; 3]> = rows.iter().map(|&row| means[row].map(f64::from)).collect();
+    let tree = ImmutableKdTree::new_from_slice(&places)
+        .map_err(|error| Error::Bug(format!("the k-d tree of the Gaussians failed: {error:?}")))?;
+    Ok(Some((tree, rows)))
+}
+
+/// How far a view's mask can be trusted, by label: the square of the share of the label's pixels where the model, which
+/// all views made, shows the same. A mask whose ids were swapped or merged speaks with little weight in the next count.
+pub fn trust(mask: &LabelMap, rendered: &LabelMap) -> BTreeMap<u16, f32> {
+    let mut counts: BTreeMap<u16, (u64, u64)> = BTreeMap::new();
+    for (&id, &shown) in mask.ids.iter().zip(&rendered.ids) {
+        let (same, all) = counts.entry(id).or_default();
+        *same += u64::from(id == shown);
+        *all += 1;
+    }
+    counts.into_iter().map(|(id, (same, all))| (id, (same as f32 / all as f32).powi(2))).collect()
+}
+
+/// Puts a decision into a model.
+pub fn apply(model: &mut Gaussians, decision: Decision) {
+    model.labels = Some(decision.labels);
+    model.label_confidence = Some(decision.confidence);
+}
+
+/// Labels of little confidence become 0.
+pub fn drop_unsure(model: &mut Gaussians, least: f32) {
+    let (Some(labels), Some(confidence)) = (&mut model.labels, &model.label_confidence) else { return };
+    for (label, _) in labels.iter_mut().zip(confidence).filter(|(_, confidence)| **confidence < least) {
+        *label = UNLABELLED;
+    }
+}

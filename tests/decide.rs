@@ -1,0 +1,64 @@
+//! From votes to labels.
+
+use labelgs::infer::ballot::Ballot;
+use labelgs::infer::decide::{decide, trust};
+use labelgs::scene::LabelMap;
+
+/// A ballot of rows in whole pixels.
+fn ballot(labels: &[u16], rows: &[&[u64]]) -> Ballot {
+    Ballot { labels: labels.to_vec(), votes: rows.iter().flat_map(|row| row.iter().map(|v| v << 16)).collect() }
+}
+
+/// Places in a row, one unit apart.
+fn places(count: usize) -> Vec<[f32; 3]> {
+    (0..count).map(|index| [index as f32, 0.0, 0.0]).collect()
+}
+
+#[test]
+fn most_votes_win_and_the_background_may() {
+    let rows: [&[u64]; 4] = [&[1, 5, 2], &[9, 5, 2], &[0, 3, 3], &[4, 0, 4]];
+    let decision = decide(&ballot(&[0, 7, 9], &rows), &places(4), true).expect("decided");
+    assert_eq!(decision.labels, [7, 0, 7, 0], "equal votes go to the smaller label");
+    assert_eq!(decision.confidence, [0.625, 0.5625, 0.5, 0.5]);
+}
+
+#[test]
+fn who_is_never_seen_asks_the_neighbours() {
+    // The last two rows have no votes: one inside the object, one on the background's side.
+    let rows: [&[u64]; 12] =
+        [&[0, 5], &[0, 5], &[0, 5], &[0, 5], &[0, 5], &[8, 0], &[8, 0], &[8, 0], &[8, 0], &[8, 0], &[0, 0], &[0, 0]];
+    let mut means = places(12);
+    means[10] = [1.5, 0.1, 0.0];
+    means[11] = [7.5, 0.1, 0.0];
+    let complete = decide(&ballot(&[0, 4], &rows), &means, true).expect("decided");
+    assert_eq!(complete.labels[10..], [4, 0]);
+    assert!(complete.confidence[10] > 0.5 && complete.confidence[10] < 1.0);
+    let alone = decide(&ballot(&[0, 4], &rows), &means, false).expect("decided");
+    assert_eq!((alone.labels[10], alone.confidence[10]), (0, 0.0));
+    assert_eq!(alone.labels[..10], complete.labels[..10], "who has votes decides alone");
+}
+
+#[test]
+fn nobody_to_ask_is_no_failure() {
+    let rows: [&[u64]; 2] = [&[0, 0], &[0, 0]];
+    assert_eq!(decide(&ballot(&[0, 4], &rows), &places(2), true).expect("decided").labels, [0, 0]);
+    assert_eq!(decide(&Ballot { labels: vec![0], votes: vec![] }, &[], true).expect("decided").labels, [0_u32; 0]);
+    assert!(decide(&ballot(&[0, 4], &rows), &places(3), true).is_err(), "rows must fit");
+}
+
+#[test]
+fn a_mask_is_trusted_as_far_as_it_agrees() {
+    let map = |ids: &[u16]| LabelMap { width: ids.len() as u32, height: 1, ids: ids.to_vec() };
+    let found = trust(&map(&[0, 0, 1, 1, 2, 2, 2, 2]), &map(&[0, 0, 1, 1, 1, 1, 1, 2]));
+    assert_eq!(found, [(0, 1.0), (1, 1.0), (2, 0.0625)].into());
+}
+
+#[test]
+fn contours_are_found_in_a_square() {
+    let mut map = LabelMap { width: 7, height: 5, ids: vec![0; 35] };
+    map.ids[2 * 7 + 3] = 4;
+    let near = map.near_contour(1);
+    let expected: Vec<bool> = (0..35).map(|i: i32| (i % 7 - 3).abs() <= 1 && (i / 7 - 2).abs() <= 1).collect();
+    assert_eq!(near, expected);
+    assert!(map.near_contour(0).iter().all(|near| !near));
+}

@@ -1,0 +1,83 @@
+//! Votes for labels: the sums of a sweep against the mirror, whatever the number of columns and walks.
+
+use super::rig::{Rig, VOTE_COLUMNS, prove};
+use crate::reference::Rules;
+use crate::reference::lift::vote;
+use crate::support::compare::{Tolerance, check, close};
+use crate::support::device;
+use crate::support::scenes::{Scene, Shape, scene};
+use labelgs::infer::ballot::{Sweep, Voter, sweep, weight};
+use labelgs::scene::{LabelMap, Photo};
+use std::collections::BTreeMap;
+
+/// More labels than a walk counts and than the engine has columns for, many of them in one tile.
+fn patches(seed: u64) -> Scene {
+    let shape = Shape { scales: (0.1, 0.5), opacities: (-1.0, 5.0), ..Shape::default() };
+    let mut s = scene(seed, &Shape { gaussians: 50, width: 45, height: 37, ..shape });
+    for (index, label) in s.target.label_map.iter_mut().enumerate() {
+        let (x, y) = (index % 45, index / 45);
+        // Patches of 3 px: up to nine in a tile of 8 px; some without an object.
+        *label = [0, 2, 3, 5, 7, 8, 11][(x / 3 + 4 * (y / 3)) % 7];
+    }
+    s
+}
+
+fn mask_of(s: &Scene) -> LabelMap {
+    let (width, height) = (s.camera.width, s.camera.height);
+    LabelMap { width, height, ids: s.target.label_map.iter().map(|&id| id as u16).collect() }
+}
+
+#[test]
+fn sums_of_weights_by_label() {
+    let Some(turn) = device() else { return };
+    let mut rig = Rig::new(turn, patches(141), true);
+    rig.render();
+    let (splats, size, count) = (rig.splats(), rig.size(), rig.scene.gaussians.len());
+    let mask = mask_of(&rig.scene);
+    let photo: Photo = rig.view.photo.clone();
+    let camera = rig.scene.camera.clone();
+    let trust = BTreeMap::from([(3_u16, 0.25_f32), (8, 0.0)]);
+    let voter = Voter { camera: &camera, mask: &mask, photo: Some(&photo), trust: Some(&trust) };
+    // Three views that are the same: thrice the votes.
+    let how = Sweep { near: rig.config.near, border: 0 };
+    let ballot = sweep(&mut rig.engine, &[voter, voter, voter], how).expect("votes");
+    assert_eq!(ballot.labels, [0, 2, 3, 5, 7, 8, 11]);
+    assert!(ballot.labels.len() > 2 * VOTE_COLUMNS as usize, "the sweep takes several rounds");
+    let actual: Vec<f64> = ballot.votes.iter().map(|&votes| weight(votes)).collect();
+    let columns: Vec<Option<usize>> = (mask.ids.iter().zip(&photo.rgba))
+        .map(|(id, pixel)| ballot.labels.iter().position(|label| label == id).filter(|_| pixel[3] > 127))
+        .collect();
+    let weights: Vec<f64> =
+        ballot.labels.iter().map(|label| 3.0 * trust.get(label).map_or(1.0, |&weight| f64::from(weight))).collect();
+    assert!(columns.contains(&None), "some pixels have no say");
+    prove("votes", &["alpha_min", "alpha_max"], |rules| {
+        let expected = vote(rules, &splats, size, count, &columns, &weights);
+        // Each tile's sum is rounded to 2^-16; a splat meets up to 30 tiles in each of three views.
+        close(&actual, &expected, Tolerance { absolute: 90.0 * 0.5 / 65_536.0, relative: 1e-5 })
+    });
+}
+
+#[test]
+fn pixels_near_a_contour_have_no_say() {
+    let Some(turn) = device() else { return };
+    let mut rig = Rig::new(turn, patches(142), true);
+    rig.render();
+    let (splats, size, count) = (rig.splats(), rig.size(), rig.scene.gaussians.len());
+    let mut mask = mask_of(&rig.scene);
+    // Two halves, so that something is left beside the contour.
+    let width = mask.width as usize;
+    mask.ids.iter_mut().enumerate().for_each(|(index, id)| *id = if index % width < 20 { 2 } else { 0 });
+    let camera = rig.scene.camera.clone();
+    let voter = Voter { camera: &camera, mask: &mask, photo: None, trust: None };
+    let how = Sweep { near: rig.config.near, border: 2 };
+    let ballot = sweep(&mut rig.engine, &[voter], how).expect("votes");
+    let actual: Vec<f64> = ballot.votes.iter().map(|&votes| weight(votes)).collect();
+    let column = |index: usize| match index % width {
+        0..18 => Some(1),
+        18..22 => None,
+        _ => Some(0),
+    };
+    let columns: Vec<Option<usize>> = (0..mask.ids.len()).map(column).collect();
+    let expected = vote(&Rules::default(), &splats, size, count, &columns, &[1.0, 1.0]);
+    check("votes", close(&actual, &expected, Tolerance { absolute: 30.0 * 0.5 / 65_536.0, relative: 1e-5 }));
+}
