@@ -6,6 +6,7 @@ mod reference;
 mod support;
 
 mod architecture;
+mod associate;
 mod cli;
 mod cli_engine;
 mod compare_self;

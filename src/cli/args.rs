@@ -70,6 +70,8 @@ pub enum Command {
     Synth(SynthArgs),
     /// Compare the Vulkan devices with what is required.
     Devices(DevicesArgs),
+    /// Work on masks before training.
+    Masks(super::masks::MasksArgs),
     /// Print buffers, passes and barriers of a training step without running it.
     #[command(after_help = "Example: labelgs plan --gaussians 500k --size 960x540 --label-samples 10")]
     Plan(PlanArgs),

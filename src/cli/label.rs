@@ -4,17 +4,23 @@ use super::args::JsonFlag;
 use super::args::SceneArgs;
 use super::log::Progress;
 use super::scene::{open_gpu, open_scene};
+use super::values::switch;
 use super::{Context, open_model, stdout};
 use crate::engine::{Engine, LabelRoom, Room};
 use crate::infer::ballot::{Sweep, Voter, columns_for, sweep};
 use crate::infer::decide::{apply, decide, drop_unsure, trust};
+use crate::infer::lift::{Lift, lift};
 use crate::infer::render::render;
 use crate::infer::select::summarise;
 use crate::io::ply::write_gaussians;
-use crate::scene::{Gaussians, View};
+use crate::scene::{Gaussians, UNLABELLED, View};
 use crate::sched::SchedulerOptions;
+use crate::train::LabelRule;
 use crate::{Error, Result};
 use clap::Args;
+use rand::SeedableRng;
+use rand::seq::SliceRandom;
+use rand_pcg::Pcg64Mcg;
 use serde_json::json;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
@@ -35,6 +41,19 @@ pub struct LabelArgs {
     /// File to write.
     #[arg(short, long, value_name = "OUT.ply")]
     pub output: PathBuf,
+    /// How a Gaussian gets its label: by votes, or as the paper's training gives it, from the last of the views (in an
+    /// order drawn by --seed) in which it makes most of a pixel.
+    #[arg(long, value_name = "RULE", value_enum, default_value = "votes")]
+    pub rule: LabelRule,
+    /// Seed of the order of views of the rule `main`.
+    #[arg(long, value_name = "SEED", default_value_t = 0)]
+    pub seed: u64,
+    /// Least blending weight of the rule `main`.
+    #[arg(long, value_name = "WEIGHT", default_value_t = 0.6)]
+    pub label_threshold: f32,
+    /// Gaussian projection filter of the rule `main`, on or off.
+    #[arg(long, value_name = "SWITCH", value_parser = switch, default_value = "on")]
+    pub gpf: bool,
     /// Rounds of counting; from the second on, masks that disagree with all others count less.
     #[arg(long, value_name = "N", default_value_t = 2, value_parser = clap::value_parser!(u32).range(1..=10))]
     pub rounds: u32,
@@ -80,9 +99,13 @@ pub fn run(args: &LabelArgs, context: &Context) -> Result<()> {
     let mut engine = Engine::new(gpu, room, SchedulerOptions::default())?;
     engine.upload_model(&model)?;
     let mut progress = Progress::new(u64::from(args.rounds), "rounds", &context.global);
-    for round in 0..args.rounds {
-        vote(&mut engine, &mut model, &views, args, round > 0)?;
-        progress.set(u64::from(round) + 1, String::new);
+    if args.rule == LabelRule::Main {
+        lift_all(&mut engine, &mut model, &views, args)?;
+    } else {
+        for round in 0..args.rounds {
+            vote(&mut engine, &mut model, &views, args, round > 0)?;
+            progress.set(u64::from(round) + 1, String::new);
+        }
     }
     drop(progress);
     drop_unsure(&mut model, args.min_confidence);
@@ -107,6 +130,22 @@ pub fn run(args: &LabelArgs, context: &Context) -> Result<()> {
         rows.iter().filter(|row| row.label != 0).count(),
         views.len()
     ))
+}
+
+/// Every view writes its labels, one after the other.
+fn lift_all(engine: &mut Engine, model: &mut Gaussians, views: &[&View], args: &LabelArgs) -> Result<()> {
+    let mut order: Vec<usize> = (0..views.len()).collect();
+    order.shuffle(&mut Pcg64Mcg::seed_from_u64(args.seed));
+    let mut labels = vec![UNLABELLED; model.len()];
+    let how = Lift { threshold: args.label_threshold, gpf: args.gpf };
+    for view in order.into_iter().map(|index| views[index]) {
+        let Some(mask) = &view.mask else { continue };
+        let rendered = render(engine, &view.camera, args.near, [0.0; 3], 0)?;
+        lift(&mut labels, &model.means, &view.camera, &rendered, mask, how);
+    }
+    model.labels = Some(labels);
+    model.label_confidence = None;
+    Ok(())
 }
 
 /// One round: counts and decides.

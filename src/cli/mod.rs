@@ -8,6 +8,7 @@ pub mod interrupt;
 pub mod label;
 pub mod list;
 pub mod log;
+pub mod masks;
 pub mod plan;
 pub mod profile;
 mod profile_report;
@@ -102,6 +103,7 @@ fn run(args: Vec<OsString>) -> Result<(), Exit> {
         Command::Eval(args) => eval::run(&args, &context),
         Command::Synth(args) => synth::run(&args, &context),
         Command::Devices(args) => devices::run(&args, &context),
+        Command::Masks(args) => masks::run(&args, &context),
         Command::Plan(args) => plan::run(&args, &context),
         Command::Profile(args) => profile::run(&args, &context),
     }?;

@@ -7,6 +7,7 @@ mod material;
 mod points;
 mod presets;
 mod shape;
+pub mod spoil;
 mod trace;
 mod world;
 mod write;

@@ -1,0 +1,212 @@
+//! `labelgs masks repair`.
+
+use super::write_mask;
+use crate::cli::args::{JsonFlag, SceneArgs};
+use crate::cli::log::Progress;
+use crate::cli::scene::{NEAR, open_gpu, open_scene};
+use crate::cli::{Context, open_model, stdout};
+use crate::engine::{Engine, LabelRoom, Room};
+use crate::infer::associate::{Owners, Segment, associate};
+use crate::infer::ballot::{COLUMNS_MAX, Sweep, Voter, sweep};
+use crate::infer::decide::decide;
+use crate::infer::render::render;
+use crate::infer::repair::{Naming, Repairs, mend, name_groups, rename};
+use crate::io::label_table::{FILE, LabelEntry, LabelTable};
+use crate::scene::{Gaussians, LabelMap, View};
+use crate::sched::SchedulerOptions;
+use crate::{Error, Result};
+use clap::Args;
+use serde_json::json;
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+
+/// `labelgs masks repair`.
+#[derive(Args, Clone, Debug)]
+pub struct RepairArgs {
+    /// Folder of id masks.
+    #[arg(value_name = "MASKS")]
+    pub masks: PathBuf,
+    /// A model of the scene, of any trainer, with or without labels: it tells which masks show the same thing.
+    #[arg(long, value_name = "MODEL")]
+    pub model: PathBuf,
+    /// Scene of the masks.
+    #[arg(long, value_name = "SCENE")]
+    pub scene: PathBuf,
+    /// Folder to write; must be new or empty.
+    #[arg(short, long, value_name = "DIR")]
+    pub output: PathBuf,
+    /// The ids of different views mean nothing to each other, as those of a segmenter of single photos.
+    #[arg(long)]
+    pub per_view: bool,
+    /// Objects that fewer views show are left out.
+    #[arg(long, value_name = "N", default_value_t = 2)]
+    pub min_views: usize,
+    /// Make masks for photos that have none.
+    #[arg(long)]
+    pub make_missing: bool,
+    /// Gaussians nearer to the camera are not seen, world units.
+    #[arg(long, value_name = "Z", default_value_t = NEAR)]
+    pub near: f32,
+    /// How the scene is read; masks of test views are left out.
+    #[command(flatten)]
+    pub reading: SceneArgs,
+    /// JSON.
+    #[command(flatten)]
+    pub json: JsonFlag,
+}
+
+/// Makes masks of all views agree with each other.
+pub fn run(args: &RepairArgs, context: &Context) -> Result<()> {
+    super::refuse_used(&args.output)?;
+    let model = open_model(&args.model)?;
+    let dataset = open_scene(&args.scene, &args.reading, Some(args.masks.clone()), [0.0; 3], true)?;
+    let views: Vec<&View> = dataset.train.iter().collect();
+    if views.iter().all(|view| view.mask.is_none()) {
+        return Err(Error::data(&args.masks, "", "no training view has a mask here; see --test-every"));
+    }
+    let size = views.iter().map(|view| (view.camera.width, view.camera.height));
+    let size = size.reduce(|a, b| (a.0.max(b.0), a.1.max(b.1))).unwrap_or((1, 1));
+    let labels = LabelRoom { max_label: 0, layers: 0, vote_columns: COLUMNS_MAX };
+    let room = Room { gaussians: (model.len() as u64).max(1), size, trained: false, labels: Some(labels) };
+    let mut engine = Engine::new(open_gpu(context)?, room, SchedulerOptions::default())?;
+    engine.upload_model(&model)?;
+    let mut progress = Progress::new(2 * views.len() as u64, "views", &context.global);
+    let mut done = 0;
+    let mut tick = || {
+        done += 1;
+        progress.set(done, String::new);
+    };
+    let (masks, repairs) = repair(&mut engine, &model, &views, args, &mut tick)?;
+    drop(progress);
+    write(&args.output, &args.masks, &views, &masks)?;
+    report(&views, &masks, &repairs, args, context)
+}
+
+/// Masks of the views, where there are any, and what was done to them.
+fn repair(
+    engine: &mut Engine,
+    model: &Gaussians,
+    views: &[&View],
+    args: &RepairArgs,
+    tick: &mut dyn FnMut(),
+) -> Result<(Vec<Option<LabelMap>>, Repairs)> {
+    let how = Sweep { near: args.near, border: 0 };
+    let mut owners = Vec::with_capacity(views.len());
+    for view in views {
+        let voter = view.mask.as_ref().map(|mask| voter(view, mask));
+        owners.push(match voter {
+            Some(voter) => Owners::new(&sweep(engine, &[voter], how)?),
+            None => Owners::default(),
+        });
+        tick();
+    }
+    let mut groups = associate(&owners);
+    groups.retain(|group| group.len() >= args.min_views);
+    let pixels = areas(views);
+    let naming = if args.per_view { Naming::Fresh } else { Naming::Majority };
+    let names = name_groups(&groups, &pixels, naming);
+    let mut repairs = Repairs::default();
+    let changed = names.iter().filter(|((_, old), new)| !args.per_view && old != *new);
+    repairs.renamed.extend(changed.map(|(&segment, &new)| (segment, new)));
+    let renamed: Vec<Option<LabelMap>> = (views.iter().enumerate())
+        .map(|(index, view)| view.mask.as_ref().map(|mask| rename(index, mask, &names)))
+        .collect();
+    // What all renamed masks together make of the model tells what each of them should show.
+    let voters = views.iter().zip(&renamed).filter_map(|(view, mask)| Some(voter(view, mask.as_ref()?)));
+    let voters: Vec<Voter> = voters.collect();
+    let decision = decide(&sweep(engine, &voters, how)?, &model.means, true)?;
+    let mut masks = Vec::with_capacity(views.len());
+    for (index, (view, mask)) in views.iter().zip(&renamed).enumerate() {
+        let shown = render(engine, &view.camera, args.near, [0.0; 3], 0)?.label_map(&decision.labels);
+        masks.push(match mask {
+            Some(mask) => Some(mend(index, mask, &shown, &mut repairs)),
+            None if args.make_missing => {
+                repairs.made.push(index);
+                Some(shown)
+            }
+            None => None,
+        });
+        tick();
+    }
+    Ok((masks, repairs))
+}
+
+fn voter<'a>(view: &'a View, mask: &'a LabelMap) -> Voter<'a> {
+    Voter { camera: &view.camera, mask, photo: view.photo.as_ref(), trust: None }
+}
+
+fn areas(views: &[&View]) -> BTreeMap<Segment, u64> {
+    let mut areas = BTreeMap::new();
+    for (index, view) in views.iter().enumerate() {
+        let ids = view.mask.iter().flat_map(|mask| &mask.ids).filter(|id| **id != 0);
+        ids.for_each(|&id| *areas.entry((index, id)).or_default() += 1);
+    }
+    areas
+}
+
+fn write(folder: &Path, source: &Path, views: &[&View], masks: &[Option<LabelMap>]) -> Result<()> {
+    let mut entries: BTreeMap<u16, LabelEntry> = BTreeMap::new();
+    let known =
+        Some(source.join(FILE)).filter(|path| path.is_file()).map(|path| LabelTable::read(&path)).transpose()?;
+    for (view, mask) in views.iter().zip(masks) {
+        let Some(mask) = mask else { continue };
+        write_mask(&folder.join(Path::new(&view.name).with_extension("png")), mask)?;
+        for id in mask.objects() {
+            let old = known.as_ref().and_then(|table| table.entry(u32::from(id)).cloned());
+            let blank = || LabelEntry { pixels: 0, views: 0, ..old.unwrap_or_else(|| LabelEntry::new(u32::from(id))) };
+            let entry = entries.entry(id).or_insert_with(blank);
+            entry.views += 1;
+            entry.pixels += mask.ids.iter().filter(|&&found| found == id).count() as u64;
+        }
+    }
+    LabelTable::new(entries.into_values().collect()).write(&folder.join(FILE))
+}
+
+fn report(
+    views: &[&View],
+    masks: &[Option<LabelMap>],
+    repairs: &Repairs,
+    args: &RepairArgs,
+    context: &Context,
+) -> Result<()> {
+    let name = |view: usize| views[view].name.as_str();
+    let objects: BTreeSet<u16> = masks.iter().flatten().flat_map(LabelMap::objects).collect();
+    if context.json || args.json.json {
+        let renamed =
+            repairs.renamed.iter().map(|&((view, id), new)| json!({"view": name(view), "id": id, "new": new}));
+        let divided =
+            repairs.divided.iter().map(|((view, id), parts)| json!({"view": name(*view), "id": id, "parts": parts}));
+        let filled = repairs.filled.iter().map(|&(view, id)| json!({"view": name(view), "id": id}));
+        return stdout::print_json(&json!({
+            "schema_version": 1,
+            "output": args.output.display().to_string(),
+            "objects": objects,
+            "renamed": renamed.collect::<Vec<_>>(),
+            "divided": divided.collect::<Vec<_>>(),
+            "filled": filled.collect::<Vec<_>>(),
+            "made": repairs.made.iter().map(|&view| name(view)).collect::<Vec<_>>(),
+        }));
+    }
+    let mut text = String::new();
+    for &((view, id), new) in &repairs.renamed {
+        text += &format!("{}: {id} is {new}\n", name(view));
+    }
+    for ((view, id), parts) in &repairs.divided {
+        let parts: Vec<String> = parts.iter().map(u16::to_string).collect();
+        text += &format!("{}: {id} is {}\n", name(*view), parts.join(" and "));
+    }
+    for &(view, id) in &repairs.filled {
+        text += &format!("{}: {id} was missing\n", name(view));
+    }
+    text += &format!(
+        "{}: {} objects in {} masks; {} masks renamed, {} divided, {} objects filled in, {} masks made\n",
+        args.output.display(),
+        objects.len(),
+        masks.iter().flatten().count(),
+        repairs.renamed.len(),
+        repairs.divided.len(),
+        repairs.filled.len(),
+        repairs.made.len()
+    );
+    stdout::print(&text)
+}

@@ -1,0 +1,69 @@
+//! `labelgs masks spoil`.
+
+use super::write_mask;
+use crate::cli::args::JsonFlag;
+use crate::cli::{Context, stdout};
+use crate::io::mask::read_mask;
+use crate::scene::LabelMap;
+use crate::synth::spoil::{Fault, spoil};
+use crate::{Error, Result};
+use clap::Args;
+use serde_json::json;
+use std::path::{Path, PathBuf};
+
+/// `labelgs masks spoil`.
+#[derive(Args, Clone, Debug)]
+pub struct SpoilArgs {
+    /// Folder of id masks that are right.
+    #[arg(value_name = "MASKS")]
+    pub masks: PathBuf,
+    /// Folder to write; must be new or empty.
+    #[arg(short, long, value_name = "DIR")]
+    pub output: PathBuf,
+    /// The fault.
+    #[arg(long, value_name = "FAULT", value_enum)]
+    pub fault: Fault,
+    /// Share of the views that have it.
+    #[arg(long, value_name = "SHARE", default_value_t = 0.1)]
+    pub share: f64,
+    /// Seed of the draw.
+    #[arg(long, value_name = "SEED", default_value_t = 0)]
+    pub seed: u64,
+    /// JSON.
+    #[command(flatten)]
+    pub json: JsonFlag,
+}
+
+/// Writes masks with faults on purpose.
+pub fn run(args: &SpoilArgs, context: &Context) -> Result<()> {
+    if !(0.0..=1.0).contains(&args.share) {
+        return Err(Error::usage("--share", format!("is {}, needs 0 to 1", args.share)));
+    }
+    super::refuse_used(&args.output)?;
+    let names = pngs(&args.masks)?;
+    let masks: Vec<LabelMap> = names.iter().map(|name| read_mask(args.masks.join(name))).collect::<Result<_>>()?;
+    let spoilt = spoil(&masks, args.fault, args.share, args.seed);
+    let mut changed = 0;
+    for ((name, before), after) in names.iter().zip(&masks).zip(&spoilt) {
+        changed += u32::from(after.as_ref() != Some(before));
+        if let Some(mask) = after {
+            write_mask(&args.output.join(name), mask)?;
+        }
+    }
+    if context.json || args.json.json {
+        return stdout::print_json(&json!({ "schema_version": 1, "masks": names.len(), "changed": changed }));
+    }
+    stdout::print(&format!("{}: {changed} of {} masks changed\n", args.output.display(), names.len()))
+}
+
+/// Names of the PNGs of a folder, sorted.
+fn pngs(folder: &Path) -> Result<Vec<String>> {
+    let entries = std::fs::read_dir(folder).map_err(Error::read(folder))?;
+    let names = entries.flatten().filter_map(|entry| entry.file_name().into_string().ok());
+    let mut names: Vec<String> = names.filter(|name| name.ends_with(".png")).collect();
+    names.sort();
+    if names.is_empty() {
+        return Err(Error::data(folder, "", "holds no PNG; expected a folder of id masks"));
+    }
+    Ok(names)
+}

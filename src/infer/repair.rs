@@ -1,0 +1,132 @@
+//! Masks that agree with each other, from masks that do not and a model that all of them made.
+
+use super::associate::Segment;
+use crate::scene::LabelMap;
+use std::collections::{BTreeMap, BTreeSet};
+
+/// Share of a mask that must be one object for the whole mask to become it; below, the mask covers several objects and
+/// is divided along the model's own borders.
+const ONE_OBJECT: f64 = 0.85;
+/// Share of what the model shows of an object in a view that must lie where the mask has nothing for the object to count
+/// as missed there.
+const MISSED: f64 = 0.6;
+/// Smallest area that is divided off or filled in, as a share of the picture: below are borders, not objects.
+const SMALLEST: f64 = 0.0005;
+
+/// How objects get their ids.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Naming {
+    /// The id that most of the object's pixels have in the masks; what is left over gets the next free ones.
+    Majority,
+    /// 1, 2, .. by size: the ids of different views mean nothing to each other.
+    Fresh,
+}
+
+/// What was done to the masks.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Repairs {
+    /// Masks (view and old id) that got another id, with the new one.
+    pub renamed: Vec<(Segment, u16)>,
+    /// Masks that were divided, with the ids of their parts.
+    pub divided: Vec<(Segment, Vec<u16>)>,
+    /// Objects that a view had missed and now shows.
+    pub filled: Vec<Segment>,
+    /// Views that had no mask and got one from the model.
+    pub made: Vec<usize>,
+}
+
+/// Id of every mask, from its group.
+pub fn name_groups(groups: &[Vec<Segment>], pixels: &BTreeMap<Segment, u64>, naming: Naming) -> BTreeMap<Segment, u16> {
+    let area = |group: &[Segment]| group.iter().map(|segment| pixels.get(segment).copied().unwrap_or(0)).sum::<u64>();
+    let mut by_size: Vec<usize> = (0..groups.len()).collect();
+    by_size.sort_by_key(|&group| (std::cmp::Reverse(area(&groups[group])), groups[group][0]));
+    let mut names: BTreeMap<usize, u16> = BTreeMap::new();
+    let mut taken: BTreeSet<u16> = BTreeSet::new();
+    if naming == Naming::Majority {
+        let mut claims: BTreeMap<(usize, u16), u64> = BTreeMap::new();
+        for (group, segments) in groups.iter().enumerate() {
+            for segment in segments {
+                *claims.entry((group, segment.1)).or_default() += pixels.get(segment).copied().unwrap_or(0);
+            }
+        }
+        let mut claims: Vec<((usize, u16), u64)> = claims.into_iter().collect();
+        claims.sort_by_key(|&(claim, pixels)| (std::cmp::Reverse(pixels), claim));
+        for ((group, id), _) in claims {
+            if !names.contains_key(&group) && taken.insert(id) {
+                names.insert(group, id);
+            }
+        }
+    }
+    let mut free = (1..=u16::MAX).filter(|id| !taken.contains(id));
+    for group in by_size {
+        if !names.contains_key(&group)
+            && let Some(id) = free.next()
+        {
+            names.insert(group, id);
+        }
+    }
+    let named = |(group, segments): (usize, &Vec<Segment>)| {
+        let id = names.get(&group).copied().unwrap_or(0);
+        segments.iter().map(move |&segment| (segment, id)).collect::<Vec<_>>()
+    };
+    groups.iter().enumerate().flat_map(named).collect()
+}
+
+/// The masks with the ids of their groups.
+pub fn rename(view: usize, mask: &LabelMap, names: &BTreeMap<Segment, u16>) -> LabelMap {
+    let new: BTreeMap<u16, u16> =
+        mask.objects().into_iter().map(|id| (id, names.get(&(view, id)).copied().unwrap_or(0))).collect();
+    let ids = mask.ids.iter().map(|id| new.get(id).copied().unwrap_or(0)).collect();
+    LabelMap { ids, ..mask.clone() }
+}
+
+/// Repairs one renamed mask by what the model shows in its view: divides masks that cover several objects, gives masks of
+/// another object its id, and fills in objects that were missed.
+pub fn mend(view: usize, mask: &LabelMap, shown: &LabelMap, repairs: &mut Repairs) -> LabelMap {
+    let smallest = (SMALLEST * mask.ids.len() as f64).max(4.0) as u64;
+    let mut counts: BTreeMap<u16, BTreeMap<u16, u64>> = BTreeMap::new();
+    let mut shows: BTreeMap<u16, u64> = BTreeMap::new();
+    for (&id, &seen) in mask.ids.iter().zip(&shown.ids) {
+        *counts.entry(id).or_default().entry(seen).or_default() += 1;
+        *shows.entry(seen).or_default() += 1;
+    }
+    let mut out = mask.clone();
+    for (&id, seen) in counts.iter().filter(|(id, _)| **id != 0) {
+        let objects: BTreeMap<u16, u64> = seen
+            .iter()
+            .filter(|&(&object, &pixels)| object != 0 && pixels >= smallest)
+            .map(|(&o, &p)| (o, p))
+            .collect();
+        let total: u64 = objects.values().sum();
+        let most = objects.iter().max_by_key(|&(&object, &pixels)| (pixels, std::cmp::Reverse(object)));
+        let Some((&most, &pixels)) = most else { continue };
+        if pixels as f64 >= ONE_OBJECT * total as f64 {
+            if most != id {
+                repairs.renamed.push(((view, id), most));
+                recolour(&mut out, mask, id, |_| most);
+            }
+            continue;
+        }
+        repairs.divided.push(((view, id), objects.keys().copied().collect()));
+        recolour(&mut out, mask, id, |at| if objects.contains_key(&shown.ids[at]) { shown.ids[at] } else { most });
+    }
+    let nothing = counts.get(&0).cloned().unwrap_or_default();
+    for (&object, &pixels) in nothing.iter().filter(|(object, _)| **object != 0) {
+        if pixels >= smallest && pixels as f64 >= MISSED * shows[&object] as f64 {
+            repairs.filled.push((view, object));
+            for (at, to) in out.ids.iter_mut().enumerate() {
+                if mask.ids[at] == 0 && shown.ids[at] == object {
+                    *to = object;
+                }
+            }
+        }
+    }
+    out
+}
+
+/// Gives the pixels of `id` new ids by their place.
+fn recolour(out: &mut LabelMap, mask: &LabelMap, id: u16, new: impl Fn(usize) -> u16) {
+    for (at, to) in out.ids.iter_mut().enumerate().filter(|(at, _)| mask.ids[*at] == id) {
+        *to = new(at);
+    }
+}

@@ -1,0 +1,75 @@
+//! Faults of trackers, made on purpose: to see what a method does with them.
+
+use super::hash01;
+use crate::scene::LabelMap;
+use std::collections::{BTreeMap, BTreeSet};
+
+/// By how much trackers shrink photos before they look at them: 480 of 1080 lines.
+const SHRINK: f64 = 2.25;
+
+/// A fault.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum Fault {
+    /// Two objects have each other's ids in a share of the views.
+    Swap,
+    /// Masks are made on a picture of 1 / 2.25 of the size and enlarged again.
+    Coarse,
+    /// Every view but the first has ids of its own, as a segmenter of single photos gives them.
+    PerView,
+    /// A share of the views has no mask.
+    Missing,
+    /// One object has the id of another in a share of the views.
+    Merge,
+}
+
+/// The masks with a fault; `None` for one that is missing. `share` of the views have it, drawn by `seed`.
+pub fn spoil(masks: &[LabelMap], fault: Fault, share: f64, seed: u64) -> Vec<Option<LabelMap>> {
+    let objects: Vec<u16> = masks.iter().flat_map(LabelMap::objects).collect::<BTreeSet<u16>>().into_iter().collect();
+    let random = |view: usize, number: u64| hash01(seed, view as u64, number, 0x5b011);
+    // As near to the share as whole views come, whatever the numbers drawn.
+    let mut order: Vec<usize> = (0..masks.len()).collect();
+    order.sort_by(|&a, &b| random(a, 0).total_cmp(&random(b, 0)).then(a.cmp(&b)));
+    let drawn: BTreeSet<usize> = order.into_iter().take((share * masks.len() as f64).round() as usize).collect();
+    let pick = |from: &[u16], view: usize, number: u64| {
+        from.get((random(view, number) * from.len() as f64) as usize).copied().unwrap_or(0)
+    };
+    let one = |(view, mask): (usize, &LabelMap)| {
+        let here = mask.objects();
+        let hit = drawn.contains(&view);
+        match fault {
+            Fault::Swap if hit => {
+                let first = pick(&here, view, 1);
+                let others: Vec<u16> = here.iter().copied().filter(|&id| id != first).collect();
+                let second = pick(&others, view, 2);
+                Some(with_ids(mask, &[(first, second), (second, first)].into()))
+            }
+            Fault::Coarse => Some(coarse(mask)),
+            Fault::PerView if view > 0 => {
+                let mut ids: Vec<u16> = (1..=objects.len() as u16 * 4).collect();
+                ids.sort_by(|&a, &b| random(view, u64::from(a)).total_cmp(&random(view, u64::from(b))));
+                Some(with_ids(mask, &here.iter().copied().zip(ids).collect()))
+            }
+            Fault::Missing if hit => None,
+            Fault::Merge if hit && objects.len() > 1 => {
+                let first = pick(&objects, masks.len(), 1);
+                let others: Vec<u16> = objects.iter().copied().filter(|&id| id != first).collect();
+                Some(with_ids(mask, &[(first, pick(&others, masks.len(), 2))].into()))
+            }
+            _ => Some(mask.clone()),
+        }
+    };
+    masks.iter().enumerate().map(one).collect()
+}
+
+fn with_ids(mask: &LabelMap, new: &BTreeMap<u16, u16>) -> LabelMap {
+    // 0 stays nothing, also where a view has too few objects to choose from.
+    let id = |&id: &u16| if id == 0 { 0 } else { new.get(&id).copied().filter(|&id| id != 0).unwrap_or(id) };
+    LabelMap { ids: mask.ids.iter().map(id).collect(), ..mask.clone() }
+}
+
+fn coarse(mask: &LabelMap) -> LabelMap {
+    let (width, height) = (f64::from(mask.width), f64::from(mask.height));
+    let middle = |at: u32, size: f64| (((f64::from(at) / SHRINK).floor() + 0.5) * SHRINK).min(size - 1.0) as u32;
+    let pixels = (0..mask.height).flat_map(|y| (0..mask.width).map(move |x| (x, y)));
+    LabelMap { ids: pixels.map(|(x, y)| mask.at(middle(x, width), middle(y, height))).collect(), ..mask.clone() }
+}
