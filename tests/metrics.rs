@@ -3,7 +3,7 @@
 use labelgs::infer::choose::{candidates, choose_labels, require_labels};
 use labelgs::infer::metrics::{Overlap, paper_score, psnr};
 use labelgs::infer::occlusion::{MARGIN, occluders};
-use labelgs::infer::scores::{ObjectRender, Scores, ViewScores};
+use labelgs::infer::scores::{ObjectRender, ObjectTruth, Scores, ViewScores};
 use labelgs::infer::select::{extract, remove, summarise};
 use labelgs::infer::ssim::{ssim, ssim_map, window};
 use labelgs::scene::{Gaussians, LabelMap, Photo};
@@ -238,9 +238,10 @@ fn scores_are_averaged_over_pairs() {
     let whole: Vec<bool> = (0..24).map(|i| i % 12 < 4).collect();
     let alpha: Vec<f32> = (0..24).map(|i| if i % 12 < 2 { 0.8 } else { 0.3 }).collect();
     let object = ObjectRender { colour: &render, alpha: &alpha };
-    view.add_object(1, Some(object), &photo, Some(&mask), Some(&whole), None).expect("sizes");
-    view.add_object(2, None, &photo, Some(&mask), None, None).expect("sizes");
-    view.add_object(9, None, &photo, Some(&mask), None, None).expect("sizes");
+    let truth = ObjectTruth { photo: &photo, mask: Some(&mask), whole: None, hidden: None, alone: None };
+    view.add_object(1, Some(object), ObjectTruth { whole: Some(&whole), ..truth }).expect("sizes");
+    view.add_object(2, None, truth).expect("sizes");
+    view.add_object(9, None, truth).expect("sizes");
     let scores = Scores::new(BTreeMap::from([("a.png".to_owned(), view)]));
     assert_eq!(scores.objects[&1].iou_map, Some(0.5));
     assert_eq!(scores.objects[&2].iou_map, Some(0.8));
