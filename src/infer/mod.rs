@@ -6,6 +6,7 @@ pub mod choose;
 pub mod compared;
 pub mod crop;
 pub mod evaluate;
+pub mod lpips;
 pub mod metrics;
 pub mod occlusion;
 pub mod output;

@@ -5,8 +5,10 @@ use super::watch::Watcher;
 use super::{EvalArgs, put_out};
 use crate::cli::scene::{NEAR, open_gpu, open_scene, render_engine};
 use crate::cli::{Context, open_model};
+use crate::infer::lpips::Weights;
 use crate::infer::protocol::paint::EnginePainter;
 use crate::infer::protocol::run::{Bench, picture_count, run as run_bench};
+use crate::infer::protocol::score::Distance;
 use crate::infer::protocol::{Ask, By, Layout, Prompt, Protocol};
 use crate::io::label_table::LabelTable;
 use crate::io::truth::{files_below, read_truth};
@@ -27,6 +29,7 @@ pub(super) fn run(protocol: Protocol, args: &EvalArgs, context: &Context) -> Res
     let mut layout = read_layout(protocol, &root, by, args)?;
     keep_objects(&mut layout, &args.objects)?;
     let names = read_names(args, &layout)?;
+    let weights = args.lpips.as_deref().map(Weights::read).transpose()?;
     let model = open_model(&args.model)?;
     if model.labels.is_none() {
         return Err(Error::data(&args.model, "", "the model has no labels; train it with --masks"));
@@ -44,7 +47,7 @@ pub(super) fn run(protocol: Protocol, args: &EvalArgs, context: &Context) -> Res
         names: names.as_ref(),
         labels: &labels,
         truth: &truth,
-        lpips: None,
+        lpips: weights.as_ref().map(|weights| weights as &dyn Distance),
     };
     bench.check(&layout, &root)?;
     let mut watcher = Watcher::new(picture_count(&layout), args.page.as_deref(), context)?;
