@@ -16,7 +16,8 @@ fn a_convolution_equals_the_direct_sum() {
         let layer = Layer { weight: (0..54).map(|i| value(i + 5)).collect(), bias: vec![1.0, -2.0, 0.5] };
         let found = convolve(&input, &layer);
         assert_eq!((found.channels, found.values.len()), (3, 3 * area));
-        for (output, (y, x)) in (0..3).flat_map(|o| (0..height).flat_map(move |y| (0..width).map(move |x| (o, (y, x))))) {
+        for (output, (y, x)) in (0..3).flat_map(|o| (0..height).flat_map(move |y| (0..width).map(move |x| (o, (y, x)))))
+        {
             let mut sum = layer.bias[output];
             for (from, dy, dx) in (0..18).map(|i| (i / 9, i / 3 % 3, i % 3)) {
                 let (row, column) = ((y + dy).wrapping_sub(1), (x + dx).wrapping_sub(1));
@@ -47,7 +48,8 @@ fn write_weights(path: &Path, left_out: &str) {
         }
     }
     let linear = CHANNELS.iter().enumerate();
-    tensors.extend(linear.map(|(i, &count)| (format!("lin{i}.model.1.weight"), vec![1, count, 1, 1], vec![1.0; count])));
+    tensors
+        .extend(linear.map(|(i, &count)| (format!("lin{i}.model.1.weight"), vec![1, count, 1, 1], vec![1.0; count])));
     tensors.retain(|(name, ..)| name != left_out);
     let (mut header, mut offset) = (serde_json::Map::new(), 0);
     for (name, shape, values) in &tensors {
