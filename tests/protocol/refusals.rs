@@ -26,8 +26,8 @@ fn folders_without_the_layout_say_what_is_expected() {
     columns_file(&truth.join("masks/a/x_mask.png"), 0..1);
     columns_file(&truth.join("masks/b/x_mask.png"), 0..1);
     says(Protocol::Nvos, "a, b");
-    columns_file(&truth.join("only.png"), 0..1);
-    let text = message(layout(Protocol::Labelgs, &truth.join("masks"), "fern", By::Prompt));
+    columns_file(&truth.join("one/x/cup.png"), 0..1);
+    let text = message(layout(Protocol::Labelgs, &truth.join("one"), "fern", By::Prompt));
     assert!(text.contains("first frame is the prompt"), "{text}");
 }
 
