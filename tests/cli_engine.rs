@@ -191,10 +191,28 @@ fn from_a_scene_to_objects_and_pictures() {
 
     let scores = json(&succeeds(&["eval", &out, "--scene", &scene, "--masks", &masks, "--json"]));
     assert!(scores["mean"]["psnr"].as_f64() > Some(12.0), "{scores}");
-    assert!(scores["objects"]["2"]["iou_map"].is_number(), "{scores}");
+    for key in ["iou_map", "boundary_iou", "object_ssim"] {
+        assert!(scores["objects"]["2"][key].is_number(), "{key}: {scores}");
+    }
     let failed = labelgs(&["eval", &out, "--scene", &scene, "--min-psnr", "90"]);
     assert_eq!(failed.status.code(), Some(1), "{}", text(&failed.stderr));
     assert!(text(&failed.stdout).contains("PSNR"), "a failed check comes after the scores");
+
+    let (truth, page) = (path("truth"), path("page"));
+    for (view, object) in [("000", 1), ("000", 2), ("008", 1), ("008", 2)] {
+        let mask = labelgs::io::mask::read_mask(format!("{masks}/{view}.png")).expect("a mask");
+        let bytes: Vec<u8> = mask.ids.iter().map(|&id| if id == object { 255 } else { 0 }).collect();
+        let file = format!("{truth}/{view}/{object}.png");
+        labelgs::io::image::write_png_grey8(file, mask.width, mask.height, &bytes).expect("written");
+    }
+    let by_name = ["eval", &out, "--scene", &scene, "--protocol", "lerf-mask", "--truth", &truth, "--page", &page];
+    let found = json(&succeeds(&[&by_name[..], &["--json"]].concat()));
+    assert_eq!((&found["mean"]["pair_count"], &found["missing"]), (&4.into(), &serde_json::json!([])), "{found}");
+    assert!(found["objects"]["2"]["labels"][0] == 2 && found["objects"]["2"]["iou"].is_number(), "{found}");
+    assert!(Path::new(&page).join("00004-difference.png").is_file() && Path::new(&page).join("index.html").is_file());
+    let by_mask = ["eval", &out, "--scene", &scene, "--protocol", "labelgs", "--truth", &truth];
+    let table = succeeds(&by_mask);
+    assert!(table.contains("no weights") && table.contains("mean of objects"), "{table}");
 
     succeeds(&["extract", &out, "--labels", "2", "-o", &object]);
     succeeds(&["remove", &out, "--labels", "2", "-o", &rest]);

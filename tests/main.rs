@@ -23,6 +23,7 @@ mod output;
 mod overflow;
 mod pass;
 mod plan;
+mod protocol;
 mod registry;
 mod sched;
 mod segments;

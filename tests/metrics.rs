@@ -1,11 +1,14 @@
 //! Scores, label choice, occluders and selections against slow or hand-made answers.
 
+use labelgs::infer::boundary::{boundary_iou, rim, rim_width};
 use labelgs::infer::choose::{candidates, choose_labels, require_labels};
+use labelgs::infer::crop::Crop;
 use labelgs::infer::metrics::{Overlap, paper_score, psnr};
 use labelgs::infer::occlusion::{MARGIN, occluders};
-use labelgs::infer::scores::{ObjectRender, Scores, ViewScores};
+use labelgs::infer::scores::{ObjectRender, ObjectTruth, Scores, ViewScores};
 use labelgs::infer::select::{extract, remove, summarise};
 use labelgs::infer::ssim::{ssim, ssim_map, window};
+use labelgs::infer::ssim8::{ssim8, to_bytes};
 use labelgs::scene::{Gaussians, LabelMap, Photo};
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -101,6 +104,122 @@ fn paper_score_by_hand() {
     let expected = (channel(0.01) + channel(0.04 + 0.0004) + channel(0.16)) / 3.0;
     assert!((found.psnr - expected).abs() < 1e-5);
     assert_eq!(found.iou, Some(0.5));
+}
+
+/// A mask of the pixels of `columns` and `rows`, ends excluded.
+fn box_mask(width: usize, height: usize, columns: (usize, usize), rows: (usize, usize)) -> Vec<bool> {
+    let inside = |i: usize| (columns.0..columns.1).contains(&(i % width)) && (rows.0..rows.1).contains(&(i / width));
+    (0..width * height).map(inside).collect()
+}
+
+#[test]
+fn a_rim_is_the_mask_less_its_repeated_erosion() {
+    assert_eq!((rim_width(4, 3), rim_width(1440, 1080), rim_width(100, 75)), (1, 36, 3));
+    let (width, height) = (23, 17);
+    for seed in 0..6 {
+        let mask: Vec<bool> = (0..width * height).map(|i| random(i + 1000 * seed) < 0.97).collect();
+        let mut eroded = mask.clone();
+        for reach in 1..4 {
+            let before = eroded.clone();
+            let keeps = |i: usize| {
+                let (x, y) = ((i % width) as i64, (i / width) as i64);
+                let mut around = (-1..=1).flat_map(|dy| (-1..=1).map(move |dx| (x + dx, y + dy)));
+                around.all(|(x, y)| {
+                    (0..width as i64).contains(&x)
+                        && (0..height as i64).contains(&y)
+                        && before[y as usize * width + x as usize]
+                })
+            };
+            eroded = (0..width * height).map(keeps).collect();
+            let expected: Vec<bool> = mask.iter().zip(&eroded).map(|(&mask, &deep)| mask && !deep).collect();
+            assert_eq!(rim(&mask, width, height, reach), expected, "seed {seed} reach {reach}");
+        }
+    }
+}
+
+#[test]
+fn boundary_iou_by_hand() {
+    // Two squares of 4 x 4 px, one a column further: the rims have 12 pixels each and share 3 above and 3 below.
+    let (truth, found) = (box_mask(10, 10, (2, 6), (2, 6)), box_mask(10, 10, (3, 7), (2, 6)));
+    let overlap = Overlap::count(found.iter().copied().zip(truth.iter().copied()));
+    assert_eq!(overlap.iou(), Some(12.0 / 20.0));
+    assert_eq!(boundary_iou(&found, &truth, (10, 10), |_| true), Some(6.0 / 18.0));
+    // Without the upper half: three shared, of six each.
+    assert_eq!(boundary_iou(&found, &truth, (10, 10), |index| index >= 40), Some(3.0 / 9.0));
+    assert_eq!(boundary_iou(&[false; 100], &[false; 100], (10, 10), |_| true), None);
+    assert_eq!(boundary_iou(&[true; 100], &[true; 100], (10, 10), |_| true), Some(1.0), "the border is a rim");
+}
+
+#[test]
+fn crops_by_hand() {
+    let around = |columns, rows| Crop::around(&box_mask(100, 50, columns, rows), 100, 50);
+    // 20 x 10 px and 15 % on each side: 37 to 63 and 18.5 to 31.5, which has the shape of the image.
+    assert_eq!(around((40, 60), (20, 30)), Some(Crop { start: (37, 18), end: (63, 31) }));
+    // 0 to 11.5 and 0 to 46: 92 % of the height, so 92 px wide about 5.75.
+    let tall = around((0, 10), (0, 40)).expect("a crop");
+    assert_eq!(tall, Crop { start: (0, 0), end: (51, 46) });
+    assert_eq!((tall.size(), tall.indices(100).nth(51)), ((51, 46), Some(100)));
+    assert_eq!(around((0, 100), (0, 50)), Some(Crop { start: (0, 0), end: (100, 50) }));
+    assert_eq!(around((5, 5), (0, 0)), None);
+}
+
+#[test]
+fn ssim_of_bytes_equals_the_direct_sum() {
+    let (width, height) = (11, 9);
+    let byte = |index: usize| (random(index) * 256.0) as u8;
+    let a: Vec<[u8; 3]> = (0..width * height).map(|i| [byte(i), byte(i + 500), byte(i + 900)]).collect();
+    let b: Vec<[u8; 3]> = (0..width * height).map(|i| [byte(i) / 2, byte(i + 500), byte(i + 77)]).collect();
+    let (mut sum, mut count) = (0.0, 0.0);
+    for channel in 0..3 {
+        for (x, y) in (0..height - 6).flat_map(|y| (0..width - 6).map(move |x| (x, y))) {
+            let cells = || (y..y + 7).flat_map(|row| (x..x + 7).map(move |column| row * width + column));
+            let mean = |p: &[[u8; 3]]| cells().map(|i| f64::from(p[i][channel])).sum::<f64>() / 49.0;
+            let (p, q) = (mean(&a), mean(&b));
+            let cov = |s: &[[u8; 3]], m: f64, t: &[[u8; 3]], n: f64| {
+                cells().map(|i| (f64::from(s[i][channel]) - m) * (f64::from(t[i][channel]) - n)).sum::<f64>() / 48.0
+            };
+            let (c1, c2) = (2.55_f64.powi(2), 7.65_f64.powi(2));
+            sum += (2.0 * p * q + c1) * (2.0 * cov(&a, p, &b, q) + c2)
+                / ((p * p + q * q + c1) * (cov(&a, p, &a, p) + cov(&b, q, &b, q) + c2));
+            count += 1.0;
+        }
+    }
+    // The one sums squares, the other squared differences.
+    assert!((ssim8(&a, &b, width, height).expect("large enough") - sum / count).abs() < 1e-9);
+    assert_eq!(ssim8(&a, &a, width, height), Some(1.0));
+    assert_eq!(ssim8(&a[..24], &b[..24], 6, 4), None);
+    assert_eq!(to_bytes([0.5, -1.0, 7.0]), [128, 0, 255]);
+}
+
+#[test]
+fn hidden_parts_are_scored_where_the_truth_is_known() {
+    // Object 1 goes on behind object 2 for two pixels; the last is not a part of it.
+    let photo = Photo { width: 5, height: 1, rgba: vec![[255, 255, 255, 255]; 5] };
+    let mask = map(5, &[1, 1, 2, 2, 2]);
+    let whole = [true, true, true, true, false];
+    let alone = [[255, 0, 0, 255], [255, 0, 0, 255], [255, 0, 0, 255], [0, 255, 0, 128], [9, 9, 9, 0]];
+    let colour = [[1.0; 3], [1.0; 3], [0.9, 0.0, 0.0], [0.0, 128.0 / 255.0, 0.0], [1.0; 3]];
+    let object = ObjectRender { colour: &colour, alpha: &[1.0, 1.0, 0.4, 0.9, 0.7] };
+    let truth =
+        ObjectTruth { photo: &photo, mask: Some(&mask), whole: Some(&whole), hidden: None, alone: Some(&alone) };
+    let scored = |truth| {
+        let mut view = ViewScores::default();
+        view.add_object(1, Some(object), truth).expect("sizes");
+        view.objects[&1]
+    };
+    let found = scored(truth);
+    // Of the pixels of object 2: one found and true, one only true, one only found.
+    assert_eq!(found.iou_hidden, Some(1.0 / 3.0));
+    // One channel of six is off by a tenth.
+    let expected = -10.0 * (0.01_f64 / 6.0).log10();
+    assert!(found.psnr_hidden.is_some_and(|psnr| (psnr - expected).abs() < 1e-5), "{found:?}");
+    assert_eq!(scored(ObjectTruth { alone: None, ..truth }).psnr_hidden, None);
+    let visible_only = scored(ObjectTruth { whole: None, ..truth });
+    assert_eq!((visible_only.iou_hidden, visible_only.psnr_hidden), (None, None));
+    let nothing_hidden = map(5, &[1, 1, 1, 1, 0]);
+    let shown = scored(ObjectTruth { mask: Some(&nothing_hidden), ..truth });
+    assert_eq!((shown.iou_hidden, shown.psnr_hidden), (None, None), "nothing to compare");
+    assert!(found.object_ssim.is_some() && found.iou_object == Some(3.0 / 5.0), "{found:?}");
 }
 
 #[test]
@@ -239,13 +358,16 @@ fn scores_are_averaged_over_pairs() {
     let whole: Vec<bool> = (0..24).map(|i| i % 12 < 4).collect();
     let alpha: Vec<f32> = (0..24).map(|i| if i % 12 < 2 { 0.8 } else { 0.3 }).collect();
     let object = ObjectRender { colour: &render, alpha: &alpha };
-    view.add_object(1, Some(object), &photo, Some(&mask), Some(&whole), None).expect("sizes");
-    view.add_object(2, None, &photo, Some(&mask), None, None).expect("sizes");
-    view.add_object(9, None, &photo, Some(&mask), None, None).expect("sizes");
+    let truth = ObjectTruth { photo: &photo, mask: Some(&mask), whole: None, hidden: None, alone: None };
+    view.add_object(1, Some(object), ObjectTruth { whole: Some(&whole), ..truth }).expect("sizes");
+    view.add_object(2, None, truth).expect("sizes");
+    view.add_object(9, None, truth).expect("sizes");
     let scores = Scores::new(BTreeMap::from([("a.png".to_owned(), view)]));
     assert_eq!(scores.objects[&1].iou_map, Some(0.5));
     assert_eq!(scores.objects[&2].iou_map, Some(0.8));
     assert_eq!(scores.mean.objects.iou_map, Some(0.65));
+    // In two rows every pixel is on a rim.
+    assert_eq!((scores.objects[&1].boundary_iou, scores.mean.objects.boundary_iou), (Some(0.5), Some(0.65)));
     assert_eq!((scores.objects[&1].iou_object, scores.objects[&2].iou_object), (Some(0.5), Some(0.0)));
     assert_eq!(scores.objects[&2].paper_iou, Some(0.0), "an empty object is no full scene");
     assert!(!scores.objects.contains_key(&9), "neither there nor expected");

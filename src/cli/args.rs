@@ -1,5 +1,6 @@
 //! What can be typed. Only what was typed is in here; decisions are made in `config` and in the verbs.
 
+use super::eval::EvalArgs;
 use super::train_args::TrainArgs;
 use super::values::{Labels, Size, colour, count, labels, size};
 use crate::infer::output::{Format, What};
@@ -64,7 +65,7 @@ pub enum Command {
     Remove(SelectArgs),
     /// Score a model on the views of a scene.
     #[command(after_help = "Example: labelgs eval out --scene garden --masks garden/masks --json scores.json")]
-    Eval(EvalArgs),
+    Eval(Box<EvalArgs>),
     /// Make a posed test scene with masks, whole outlines and depth.
     #[command(after_help = "Example: labelgs synth scene && labelgs train scene --masks scene/masks -o out")]
     Synth(SynthArgs),
@@ -177,41 +178,6 @@ pub struct SelectArgs {
     /// JSON.
     #[command(flatten)]
     pub json: JsonFlag,
-}
-
-/// `labelgs eval`.
-#[derive(Args, Clone, Debug)]
-pub struct EvalArgs {
-    /// The model: a PLY, or the folder that `labelgs train` made.
-    #[arg(value_name = "MODEL")]
-    pub model: PathBuf,
-    /// Scene with the true pictures.
-    #[arg(long, value_name = "SCENE")]
-    pub scene: PathBuf,
-    /// Which views: test, train, all, or names with commas between.
-    #[arg(long, value_name = "VIEWS", default_value = "test")]
-    pub views: String,
-    /// Folder of id masks; objects are scored only with it.
-    #[arg(long, value_name = "DIR")]
-    pub masks: Option<PathBuf>,
-    /// Folder of whole outlines, ID/NAME.png; otherwise SCENE/amodal if it is there.
-    #[arg(long, value_name = "DIR")]
-    pub amodal: Option<PathBuf>,
-    /// Colour behind the scene: black, white, or R,G,B from 0 to 1.
-    #[arg(long, value_name = "COLOUR", value_parser = colour, default_value = "black")]
-    pub background: [f32; 3],
-    /// Fail with status 1 if the mean PSNR is lower, dB.
-    #[arg(long, value_name = "DB", help_heading = "Checks")]
-    pub min_psnr: Option<f64>,
-    /// Fail with status 1 if the mean IoU of the label maps is lower.
-    #[arg(long, value_name = "IOU", help_heading = "Checks")]
-    pub min_iou: Option<f64>,
-    /// How the scene is read.
-    #[command(flatten)]
-    pub reading: SceneArgs,
-    /// Write all scores as JSON to FILE; without FILE print them.
-    #[arg(id = "json_file", long = "json", value_name = "FILE", num_args = 0..=1)]
-    pub json: Option<Option<PathBuf>>,
 }
 
 /// `labelgs synth`.

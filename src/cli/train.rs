@@ -208,5 +208,5 @@ fn score(trainer: &mut Trainer, dataset: &Dataset, config: &TrainConfig) -> Resu
     // Bands that were never let in are 0; without them the render is cheaper.
     model.sh_degree = model.sh_degree.max(trainer.sh_degree());
     let how = Rendering { near: config.near, background: config.background };
-    evaluate(trainer.engine_mut(), &model, &views, how, &|_, _| Ok(None), &mut || {}).map(Some)
+    evaluate(trainer.engine_mut(), &model, &views, how, &(), &mut ()).map(Some)
 }

@@ -1,8 +1,10 @@
 //! Scores of a model on posed photos: renders every view, then every object alone.
 
+use super::compared::{Compared, Watch};
+use super::metrics::COVERED;
 use super::occlusion::{MARGIN, occluders};
 use super::render::{Rendered, render};
-use super::scores::{ObjectRender, Scores, ViewScores};
+use super::scores::{ObjectRender, ObjectTruth, Scores, ViewScores};
 use super::select::extract;
 use crate::engine::Engine;
 use crate::error::{Error, Result};
@@ -18,18 +20,31 @@ pub struct Rendering {
     pub background: [f32; 3],
 }
 
-/// Whole outline of an object in a view, where the scene knows it.
-pub type Outline<'a> = dyn Fn(u32, &View) -> Result<Option<Vec<bool>>> + 'a;
+/// What a scene knows about objects beyond what is visible of them.
+pub trait Wholes {
+    /// Whole outline of an object in a view, at the view's size.
+    fn outline(&self, _id: u32, _view: &View) -> Result<Option<Vec<bool>>> {
+        Ok(None)
+    }
+
+    /// Colour and opacity of an object in a view without anything before it, at the view's size.
+    fn alone(&self, _id: u32, _view: &View) -> Result<Option<Vec<[u8; 4]>>> {
+        Ok(None)
+    }
+}
+
+/// Nothing is known.
+impl Wholes for () {}
 
 /// Scores `model` on `views`, which come with photos; objects where the views have masks. The engine's model is
-/// replaced; `tick` is called after each picture.
+/// replaced; `watch` sees each picture.
 pub fn evaluate(
     engine: &mut Engine,
     model: &Gaussians,
     views: &[&View],
     how: Rendering,
-    outline: &Outline,
-    tick: &mut dyn FnMut(),
+    wholes: &dyn Wholes,
+    watch: &mut dyn Watch,
 ) -> Result<Scores> {
     engine.upload_model(model)?;
     let labels = model.labels.as_deref();
@@ -38,9 +53,11 @@ pub fn evaluate(
     for view in views {
         let rendered = render(engine, &view.camera, how.near, how.background, model.sh_degree)?;
         let map = labels.map(|labels| rendered.label_map(labels));
-        scores.push(ViewScores::new(&rendered.rgb, photo(view)?, map.as_ref(), view.mask.as_ref())?);
+        let score = ViewScores::new(&rendered.rgb, photo(view)?, map.as_ref(), view.mask.as_ref())?;
+        let numbers = vec![("PSNR", Some(score.psnr)), ("SSIM", Some(score.ssim))];
+        watch.see(&Compared { numbers, ..Compared::new(&view.name, photo(view)?, &rendered.rgb) })?;
+        scores.push(score);
         hidden.push(hidden_by(view.mask.as_ref(), &rendered));
-        tick();
     }
     for id in objects(views) {
         let part = labels.filter(|labels| labels.contains(&id)).map(|_| extract(model, &[id])).transpose()?;
@@ -53,13 +70,44 @@ pub fn evaluate(
                 None => None,
             };
             let alone = rendered.as_ref().map(|r| ObjectRender { colour: &r.rgb, alpha: &r.alpha });
-            let (whole, photo) = (outline(id, view)?, photo(view)?);
+            let (whole, picture) = (wholes.outline(id, view)?, wholes.alone(id, view)?);
             let unknown = pixels_of(view.mask.as_ref(), hidden[index].get(&(id as u16)));
-            scores[index].add_object(id, alone, photo, view.mask.as_ref(), whole.as_deref(), unknown.as_deref())?;
-            tick();
+            let truth = ObjectTruth {
+                photo: photo(view)?,
+                mask: view.mask.as_ref(),
+                whole: whole.as_deref(),
+                hidden: unknown.as_deref(),
+                alone: picture.as_deref(),
+            };
+            scores[index].add_object(id, alone, truth)?;
+            show(watch, id, view, alone, truth, &scores[index])?;
         }
     }
     Ok(Scores::new(views.iter().map(|view| view.name.clone()).zip(scores).collect()))
+}
+
+/// Shows an object of a view to `watch`, if it has a truth there.
+fn show(
+    watch: &mut dyn Watch,
+    id: u32,
+    view: &View,
+    render: Option<ObjectRender>,
+    truth: ObjectTruth,
+    scores: &ViewScores,
+) -> Result<()> {
+    let (Some(outline), Some(row)) = (truth.outline(id), scores.objects.get(&id)) else { return watch.skip() };
+    let pixels = outline.len();
+    let black = vec![[0.0; 3]; pixels];
+    let (rgb, found) = match render {
+        Some(render) => (render.colour, render.alpha.iter().map(|&alpha| alpha > COVERED).collect()),
+        None => (&black[..], vec![false; pixels]),
+    };
+    watch.see(&Compared {
+        object: Some(id.to_string()),
+        masks: Some((&found, &outline)),
+        numbers: vec![("IoU", row.iou_object), ("boundary IoU", row.boundary_iou), ("PSNR", row.object_psnr)],
+        ..Compared::new(&view.name, truth.photo, rgb)
+    })
 }
 
 /// Pictures that [`evaluate`] renders.

@@ -2,7 +2,9 @@
 //!
 //! Averages over objects are over pairs of view and object, as in the paper's published evaluation.
 
-use super::metrics::{COVERED, Overlap, mean, paper_score, psnr};
+use super::boundary::boundary_iou;
+use super::crop::Crop;
+use super::metrics::{COVERED, Overlap, byte_value, mean, paper_score, psnr, psnr_of};
 use super::ssim::ssim;
 use crate::scene::{LabelMap, Photo};
 use crate::{Error, Result};
@@ -21,6 +23,17 @@ pub struct ObjectScores {
     pub paper_iou: Option<f64>,
     /// PSNR of the object alone on black against photo times mask, by the paper's rule, dB.
     pub object_psnr: Option<f64>,
+    /// Boundary IoU of the rendered label map and the mask of the view.
+    pub boundary_iou: Option<f64>,
+    /// SSIM of the object alone on black against photo times mask over the [`Crop`] around its mask, without the
+    /// pixels at which something hides the object.
+    pub object_ssim: Option<f64>,
+    /// Intersection over union of the object alone (opacity above 0.5) and its whole outline, over the pixels at which
+    /// the mask of the view shows another object.
+    pub iou_hidden: Option<f64>,
+    /// PSNR of the object alone on black against its true picture without occluders, over the pixels of its whole
+    /// outline at which the mask of the view does not show it, dB.
+    pub psnr_hidden: Option<f64>,
 }
 
 /// Scores of one view.
@@ -43,6 +56,40 @@ pub struct ObjectRender<'a> {
     pub alpha: &'a [f32],
 }
 
+/// What is known about an object in a view.
+#[derive(Clone, Copy, Debug)]
+pub struct ObjectTruth<'a> {
+    /// The photo.
+    pub photo: &'a Photo,
+    /// Visible objects.
+    pub mask: Option<&'a LabelMap>,
+    /// The object's whole outline, where the scene knows it.
+    pub whole: Option<&'a [bool]>,
+    /// Pixels of objects in front of this one, where without a whole outline nobody knows whether it goes on.
+    pub hidden: Option<&'a [bool]>,
+    /// Colour and opacity of the object without occluders, where the scene knows it.
+    pub alone: Option<&'a [[u8; 4]]>,
+}
+
+impl ObjectTruth<'_> {
+    /// Which pixels the mask shows the object at; `None` without any.
+    fn visible(&self, id: u32) -> Option<Vec<bool>> {
+        let visible: Vec<bool> = self.mask?.ids.iter().map(|&found| u32::from(found) == id).collect();
+        visible.contains(&true).then_some(visible)
+    }
+
+    /// What the object alone is compared with: its whole outline, or what is visible of it.
+    pub fn outline(&self, id: u32) -> Option<Vec<bool>> {
+        let outline = self.whole.map(<[bool]>::to_vec).or_else(|| self.visible(id));
+        outline.filter(|outline| outline.contains(&true))
+    }
+
+    fn lengths(&self) -> impl Iterator<Item = usize> {
+        let lengths = [self.mask.map(|m| m.ids.len()), self.whole.map(<[_]>::len), self.hidden.map(<[_]>::len)];
+        lengths.into_iter().chain([self.alone.map(<[_]>::len)]).flatten()
+    }
+}
+
 impl ViewScores {
     /// Scores a render, and its label map if both it and the mask of the view are there.
     pub fn new(render: &[[f32; 3]], photo: &Photo, map: Option<&LabelMap>, mask: Option<&LabelMap>) -> Result<Self> {
@@ -52,54 +99,79 @@ impl ViewScores {
             return Err(Error::Bug("render, label map, mask and photo differ in size".into()));
         }
         let mut scores = Self { psnr: psnr(render, photo), ssim: ssim(render, photo), objects: BTreeMap::new() };
-        if let Some(mask) = mask {
-            for id in mask.objects() {
-                let iou_map = map.and_then(|map| {
-                    let ids = map.ids.iter().zip(&mask.ids).zip(&photo.rgba).filter(|(_, pixel)| pixel[3] > 0);
-                    Overlap::count(ids.map(|((&found, &truth), _)| (found == id, truth == id))).iou()
-                });
-                scores.objects.insert(u32::from(id), ObjectScores { iou_map, ..ObjectScores::default() });
+        let valid = |index: usize| photo.rgba[index][3] > 0;
+        for id in mask.into_iter().flat_map(LabelMap::objects) {
+            let mut row = ObjectScores::default();
+            if let (Some(map), Some(mask)) = (map, mask) {
+                let of = |map: &LabelMap| map.ids.iter().map(|&found| found == id).collect::<Vec<bool>>();
+                let (found, truth) = (of(map), of(mask));
+                let pairs = (0..pixels).filter(|&index| valid(index)).map(|index| (found[index], truth[index]));
+                row.iou_map = Overlap::count(pairs).iou();
+                row.boundary_iou = boundary_iou(&found, &truth, (photo.width as usize, photo.height as usize), valid);
             }
+            scores.objects.insert(u32::from(id), row);
         }
         Ok(scores)
     }
 
-    /// Scores object `id` rendered alone; `None` for a label without Gaussians, which is an empty picture. `whole` is
-    /// the object's whole outline, where the scene knows it; without it, `hidden` says which pixels belong to objects in
-    /// front of this one, where nobody knows whether it goes on.
-    pub fn add_object(
-        &mut self,
-        id: u32,
-        render: Option<ObjectRender>,
-        photo: &Photo,
-        mask: Option<&LabelMap>,
-        whole: Option<&[bool]>,
-        hidden: Option<&[bool]>,
-    ) -> Result<()> {
+    /// Scores object `id` rendered alone; `None` for a label without Gaussians, which is an empty picture.
+    pub fn add_object(&mut self, id: u32, render: Option<ObjectRender>, truth: ObjectTruth) -> Result<()> {
+        let photo = truth.photo;
         let pixels = photo.rgba.len();
         let (black, clear) = (vec![[0.0; 3]; pixels], vec![0.0; pixels]);
         let render = render.unwrap_or(ObjectRender { colour: &black, alpha: &clear });
-        let lengths =
-            [Some(render.colour.len()), Some(render.alpha.len()), mask.map(|m| m.ids.len()), whole.map(<[bool]>::len)];
-        let lengths = lengths.into_iter().chain([hidden.map(<[bool]>::len)]);
-        if lengths.flatten().any(|length| length != pixels) {
+        if [render.colour.len(), render.alpha.len()].into_iter().chain(truth.lengths()).any(|length| length != pixels) {
             return Err(Error::Bug(format!("pictures of object {id} differ in size from the photo")));
         }
-        let visible: Option<Vec<bool>> =
-            mask.map(|mask| mask.ids.iter().map(|&found| u32::from(found) == id).collect());
-        let visible = visible.filter(|visible| visible.contains(&true));
-        let outline = whole.or(visible.as_deref()).filter(|outline| outline.contains(&true));
-        let Some(outline) = outline else { return Ok(()) };
+        let Some(outline) = truth.outline(id) else { return Ok(()) };
+        let visible = truth.visible(id);
         let scores = self.objects.entry(id).or_default();
-        let unknown = |index: usize| whole.is_none() && hidden.is_some_and(|hidden| hidden[index]);
-        let known = (0..pixels).filter(|&index| photo.rgba[index][3] > 0 && !unknown(index));
-        scores.iou_object = Overlap::count(known.map(|index| (render.alpha[index] > COVERED, outline[index]))).iou();
+        let unknown = |index: usize| truth.whole.is_none() && truth.hidden.is_some_and(|hidden| hidden[index]);
+        let overlap = |counts: &dyn Fn(usize) -> bool| {
+            let indices = (0..pixels).filter(|&index| photo.rgba[index][3] > 0 && counts(index));
+            Overlap::count(indices.map(|index| (render.alpha[index] > COVERED, outline[index]))).iou()
+        };
+        scores.iou_object = overlap(&|index| !unknown(index));
+        if let (Some(_), Some(mask)) = (truth.whole, truth.mask) {
+            let seen = |index: usize| u32::from(mask.ids[index]);
+            scores.iou_hidden = overlap(&|index| seen(index) != 0 && seen(index) != id);
+            let behind = |index: &usize| outline[*index] && seen(*index) != id && photo.rgba[*index][3] > 0;
+            scores.psnr_hidden =
+                truth.alone.and_then(|alone| psnr_alone(render.colour, alone, (0..pixels).filter(behind)));
+        }
         if let Some(visible) = visible {
             let paper = paper_score(render.colour, photo, &visible);
             (scores.paper_iou, scores.object_psnr) = (paper.iou, Some(paper.psnr));
+            let covered = |index: usize| unknown(index) || (outline[index] && !visible[index]);
+            scores.object_ssim = ssim_around(render.colour, photo, &visible, covered);
         }
         Ok(())
     }
+}
+
+/// PSNR of a render on black, clamped, against colour times opacity over some pixels; `None` for no pixel.
+fn psnr_alone(render: &[[f32; 3]], truth: &[[u8; 4]], pixels: impl Iterator<Item = usize>) -> Option<f64> {
+    let square = |index: usize| {
+        let [r, g, b, opacity] = truth[index].map(byte_value);
+        let truth = [r, g, b].map(|value| value * opacity);
+        (0..3).map(|c| (f64::from(render[index][c].clamp(0.0, 1.0)) - truth[c]).powi(2)).sum::<f64>() / 3.0
+    };
+    mean(pixels.map(square)).map(psnr_of)
+}
+
+/// SSIM of a render against photo times mask in the crop around the mask; pixels with `left_out` do not count.
+fn ssim_around(render: &[[f32; 3]], photo: &Photo, mask: &[bool], left_out: impl Fn(usize) -> bool) -> Option<f64> {
+    let crop = Crop::around(mask, photo.width as usize, photo.height as usize)?;
+    let texel = |index: usize| {
+        let [r, g, b, valid] = photo.rgba[index];
+        let colour = if mask[index] { [r, g, b] } else { [0; 3] };
+        [colour[0], colour[1], colour[2], if left_out(index) { 0 } else { valid }]
+    };
+    let (width, height) = crop.size();
+    let indices = || crop.indices(photo.width as usize);
+    let truth = Photo { width: width as u32, height: height as u32, rgba: indices().map(texel).collect() };
+    let found: Vec<[f32; 3]> = indices().map(|index| render[index]).collect();
+    Some(ssim(&found, &truth)).filter(|value| value.is_finite())
 }
 
 /// Averages over everything.
@@ -171,5 +243,9 @@ fn average(scores: &[ObjectScores]) -> ObjectScores {
         iou_object: over(|scores| scores.iou_object),
         paper_iou: over(|scores| scores.paper_iou),
         object_psnr: over(|scores| scores.object_psnr),
+        boundary_iou: over(|scores| scores.boundary_iou),
+        object_ssim: over(|scores| scores.object_ssim),
+        iou_hidden: over(|scores| scores.iou_hidden),
+        psnr_hidden: over(|scores| scores.psnr_hidden),
     }
 }

@@ -40,20 +40,40 @@ pub fn photo_size(path: impl AsRef<Path>) -> Result<(u32, u32)> {
 /// pixels have alpha 255. Grey and 16-bit photos are widened and narrowed. An EXIF orientation is ignored, as
 /// COLMAP does: poses belong to the stored pixels.
 pub fn read_photo(path: impl AsRef<Path>, background: [f32; 3]) -> Result<Photo> {
-    let path = path.as_ref();
-    let undecodable = |error: image::ImageError| Error::data(path, "", format!("cannot be decoded: {error}"));
-    let decoder = reader(path)?.into_decoder().map_err(undecodable)?;
-    let (width, height) = decoder.dimensions();
-    check_size(path, (width, height))?;
-    let transparent = decoder.color_type().has_alpha();
-    let pixels = image::DynamicImage::from_decoder(decoder).map_err(undecodable)?.into_rgba8();
-    let mut rgba: Vec<[u8; 4]> = bytemuck::allocation::try_cast_vec(pixels.into_raw())
-        .unwrap_or_else(|(_, bytes)| bytemuck::allocation::pod_collect_to_vec(&bytes));
+    let picture = decode(path.as_ref())?;
+    let transparent = picture.color().has_alpha();
+    let mut photo = as_rgba(picture);
     if transparent {
         let background = background.map(|value| f64::from(value) * 255.0);
-        rgba.iter_mut().for_each(|texel| *texel = over(*texel, background));
+        photo.rgba.iter_mut().for_each(|texel| *texel = over(*texel, background));
     }
-    Ok(Photo { width, height, rgba })
+    Ok(photo)
+}
+
+/// Reads a PNG or JPEG as 8-bit RGBA, alpha as it is in the file: opacity, 255 where the file has none.
+pub fn read_rgba(path: impl AsRef<Path>) -> Result<Photo> {
+    Ok(as_rgba(decode(path.as_ref())?))
+}
+
+/// Reads a PNG or JPEG as 8-bit grey, row-major: width, height, values. Colours become their luminance.
+pub fn read_grey(path: impl AsRef<Path>) -> Result<(u32, u32, Vec<u8>)> {
+    let picture = decode(path.as_ref())?;
+    Ok((picture.width(), picture.height(), picture.into_luma8().into_raw()))
+}
+
+fn decode(path: &Path) -> Result<image::DynamicImage> {
+    let undecodable = |error: image::ImageError| Error::data(path, "", format!("cannot be decoded: {error}"));
+    let decoder = reader(path)?.into_decoder().map_err(undecodable)?;
+    check_size(path, decoder.dimensions())?;
+    image::DynamicImage::from_decoder(decoder).map_err(undecodable)
+}
+
+fn as_rgba(picture: image::DynamicImage) -> Photo {
+    let pixels = picture.into_rgba8();
+    let (width, height) = pixels.dimensions();
+    let rgba = bytemuck::allocation::try_cast_vec(pixels.into_raw())
+        .unwrap_or_else(|(_, bytes)| bytemuck::allocation::pod_collect_to_vec(&bytes));
+    Photo { width, height, rgba }
 }
 
 fn over([r, g, b, a]: [u8; 4], background: [f64; 3]) -> [u8; 4] {

@@ -16,9 +16,12 @@ pub mod mask;
 pub mod ply;
 mod resample;
 mod transforms;
+pub mod truth;
 
 use crate::error::{Error, Result};
 use crate::scene::Dataset;
+use lens::Lens;
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 pub use init::initial_gaussians;
@@ -63,14 +66,24 @@ pub fn open(scene: &Path, options: &LoadOptions) -> Result<Dataset> {
     if !scene.is_dir() {
         return Err(Error::data(scene, "", "there is no such folder; expected the folder of a scene"));
     }
+    load::load(scene, list(scene)?, options)
+}
+
+/// What the folder `scene` lists.
+fn list(scene: &Path) -> Result<listing::Listing> {
     let listing = match colmap::list(scene)? {
         Some(listing) => Some(listing),
         None => transforms::list(scene)?,
     };
-    let Some(listing) = listing else {
-        let problem = "holds no scene: expected a COLMAP model (cameras and images, .bin or .txt, in sparse/0, sparse \
-                       or colmap/sparse/0) or transforms.json or transforms_train.json";
-        return Err(Error::data(scene, "", problem));
-    };
-    load::load(scene, listing, options)
+    let problem = "holds no scene: expected a COLMAP model (cameras and images, .bin or .txt, in sparse/0, sparse \
+                   or colmap/sparse/0) or transforms.json or transforms_train.json";
+    listing.ok_or_else(|| Error::data(scene, "", problem))
+}
+
+/// The lenses of the photos that `scene` (as in [`open`]) lists, by the name of the view; those of a pinhole are left
+/// out.
+pub fn lenses(scene: &Path) -> Result<BTreeMap<String, Lens>> {
+    let root = scene.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let listing = if scene.is_file() { transforms::list_file(root, scene)? } else { list(scene)? };
+    Ok(listing.views.into_iter().filter(|view| !view.lens.is_pinhole()).map(|view| (view.name, view.lens)).collect())
 }

@@ -1,0 +1,120 @@
+//! `labelgs eval --protocol`: a published benchmark.
+
+use super::table::bench_table;
+use super::watch::Watcher;
+use super::{EvalArgs, put_out};
+use crate::cli::scene::{NEAR, open_gpu, open_scene, render_engine};
+use crate::cli::{Context, open_model};
+use crate::infer::lpips::Weights;
+use crate::infer::protocol::paint::EnginePainter;
+use crate::infer::protocol::run::{Bench, picture_count, run as run_bench};
+use crate::infer::protocol::score::Distance;
+use crate::infer::protocol::{Ask, By, Layout, Prompt, Protocol};
+use crate::io::label_table::LabelTable;
+use crate::io::truth::{files_below, read_truth};
+use crate::scene::{Dataset, UNLABELLED, View};
+use crate::{Error, Result};
+use std::collections::BTreeSet;
+use std::path::Path;
+
+/// Runs the benchmark.
+pub(super) fn run(protocol: Protocol, args: &EvalArgs, context: &Context) -> Result<()> {
+    if args.compat && !protocol.has_scorer() {
+        let problem = format!("no published scorer of {} is known; it is for labelgs and lerf-mask", protocol.name());
+        return Err(Error::usage("--compat", problem));
+    }
+    let Some(folder) = &args.truth else { return Err(Error::usage("--truth", "--protocol needs it")) };
+    let root = protocol.root(folder);
+    let by = args.by.unwrap_or(protocol.chooses_by());
+    let mut layout = read_layout(protocol, &root, by, args)?;
+    keep_objects(&mut layout, &args.objects)?;
+    let names = read_names(args, &layout)?;
+    let weights = args.lpips.as_deref().map(Weights::read).transpose()?;
+    let model = open_model(&args.model)?;
+    if model.labels.is_none() {
+        return Err(Error::data(&args.model, "", "the model has no labels; train it with --masks"));
+    }
+    let dataset = open_scene(&args.scene, &args.reading, None, [0.0; 3], true)?;
+    let (views, test) = (dataset.all(), test_views(protocol, &dataset, &args.scene));
+    let labels: BTreeSet<u32> = model.labels.iter().flatten().copied().filter(|&label| label != UNLABELLED).collect();
+    let lenses = crate::io::lenses(&args.scene)?;
+    let truth = |file: &Path, view: &View| read_truth(&root.join(file), view, &lenses);
+    let bench = Bench {
+        protocol,
+        compat: args.compat,
+        views: &views,
+        test: &test,
+        names: names.as_ref(),
+        labels: &labels,
+        truth: &truth,
+        lpips: weights.as_ref().map(|weights| weights as &dyn Distance),
+    };
+    bench.check(&layout, &root)?;
+    let mut watcher = Watcher::new(picture_count(&layout), args.page.as_deref(), context)?;
+    let sizes = views.iter().map(|view| (view.camera.width, view.camera.height));
+    let mut engine = render_engine(open_gpu(context)?, &model, sizes)?;
+    let mut painter = EnginePainter::new(&mut engine, &model, NEAR);
+    let report = run_bench(&layout, &bench, &mut painter, &mut watcher)?;
+    let table = bench_table(&report);
+    watcher.finish(&table)?;
+    put_out(&report, &table, args, context)?;
+    report.check(args.min_psnr, args.min_iou)
+}
+
+fn read_layout(protocol: Protocol, root: &Path, by: By, args: &EvalArgs) -> Result<Layout> {
+    let files = files_below(root)?;
+    let list = root.join("classes.txt");
+    let classes = if list.is_file() { Some(std::fs::read_to_string(&list).map_err(Error::read(&list))?) } else { None };
+    // `--scene .` has a name too.
+    let scene = std::fs::canonicalize(&args.scene).unwrap_or_else(|_| args.scene.clone());
+    let scene = scene.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+    protocol.layout(&files, classes.as_deref(), Ask { truth: root, scene: &scene, by })
+}
+
+/// Keeps the objects of `--objects`.
+fn keep_objects(layout: &mut Layout, wanted: &[String]) -> Result<()> {
+    if wanted.is_empty() {
+        return Ok(());
+    }
+    let there: Vec<String> = layout.tasks.iter().map(|task| task.object.clone()).collect();
+    if let Some(unknown) = wanted.iter().find(|name| !there.contains(name)) {
+        let problem = format!("the truth has no object {unknown}; it has {}", there.join(", "));
+        return Err(Error::usage("--objects", problem));
+    }
+    layout.tasks.retain(|task| wanted.contains(&task.object));
+    Ok(())
+}
+
+/// The names of the labels, which objects chosen by name need.
+fn read_names(args: &EvalArgs, layout: &Layout) -> Result<Option<LabelTable>> {
+    let found = args.names.clone().or_else(|| LabelTable::find_for_model(&args.model));
+    let names = found.as_deref().map(LabelTable::read).transpose()?;
+    let named: Vec<&str> =
+        layout.tasks.iter().filter(|task| task.prompt == Prompt::Name).map(|task| task.object.as_str()).collect();
+    let known =
+        |name: &&str| name.parse::<u32>().is_ok() || names.as_ref().is_some_and(|names| names.by_name(name).is_some());
+    if named.is_empty() || named.iter().any(known) {
+        return Ok(names);
+    }
+    let Some((file, table)) = found.zip(names) else {
+        let problem = "the model has no labels.json, and objects are chosen by name; write one, say --names FILE, or \
+                       choose by masks with --by prompt";
+        return Err(Error::data(&args.model, "", problem));
+    };
+    let own: Vec<&str> = table.labels.iter().filter_map(|entry| entry.name.as_deref()).collect();
+    let problem = format!(
+        "names none of the benchmark's objects ({}); it names {}",
+        named.join(", "),
+        if own.is_empty() { "none".to_owned() } else { own.join(", ") }
+    );
+    Err(Error::data(file, "", problem))
+}
+
+/// Test views by name. A benchmark that lists its training photos in `images_train` has the others.
+fn test_views<'a>(protocol: Protocol, dataset: &'a Dataset, scene: &Path) -> Vec<&'a View> {
+    let train = scene.join("images_train");
+    if !protocol.numbers_views() || !train.is_dir() {
+        return dataset.test.iter().collect();
+    }
+    dataset.all().into_iter().filter(|view| !train.join(&view.name).is_file()).collect()
+}

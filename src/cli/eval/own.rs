@@ -1,0 +1,82 @@
+//! Scores by the masks of the scene: photos, visible masks, whole outlines, objects without occluders.
+
+use super::table::own_table;
+use super::watch::Watcher;
+use super::{EvalArgs, put_out};
+use crate::cli::scene::{NEAR, open_gpu, open_scene, pick_views, render_engine};
+use crate::cli::{Context, open_model};
+use crate::infer::evaluate::{Rendering, Wholes, evaluate, picture_count};
+use crate::io::image::read_rgba;
+use crate::io::mask::read_mask;
+use crate::scene::View;
+use crate::{Error, Result};
+use std::path::{Path, PathBuf};
+
+/// Scores a model.
+pub(super) fn run(args: &EvalArgs, context: &Context) -> Result<()> {
+    let model = open_model(&args.model)?;
+    let dataset = open_scene(&args.scene, &args.reading, args.masks.clone(), args.background, true)?;
+    let views = pick_views(&dataset, &args.views)?;
+    let wholes = Folders::find(args)?;
+    let mut watcher = Watcher::new(picture_count(&views), args.page.as_deref(), context)?;
+    let gpu = open_gpu(context)?;
+    let sizes = views.iter().map(|view| (view.camera.width, view.camera.height));
+    let mut engine = render_engine(gpu, &model, sizes)?;
+    let how = Rendering { near: NEAR, background: args.background };
+    let scores = evaluate(&mut engine, &model, &views, how, &wholes, &mut watcher)?;
+    let table = own_table(&scores);
+    watcher.finish(&table)?;
+    put_out(&scores, &table, args, context)?;
+    scores.check(args.min_psnr, args.min_iou)
+}
+
+/// Folders with what is known about whole objects, `ID/NAME.png` in each.
+struct Folders {
+    /// Outlines.
+    amodal: Option<PathBuf>,
+    /// Pictures without occluders.
+    objects: Option<PathBuf>,
+}
+
+impl Folders {
+    fn find(args: &EvalArgs) -> Result<Self> {
+        if let Some(folder) = args.amodal.as_ref().filter(|folder| !folder.is_dir()) {
+            return Err(Error::data(folder, "", "is no folder; --amodal needs a folder with ID/NAME.png"));
+        }
+        let inside = |name: &str| Some(args.scene.join(name)).filter(|folder| folder.is_dir());
+        Ok(Self { amodal: args.amodal.clone().or_else(|| inside("amodal")), objects: inside("objects") })
+    }
+}
+
+impl Wholes for Folders {
+    fn outline(&self, id: u32, view: &View) -> Result<Option<Vec<bool>>> {
+        self.amodal.as_deref().map_or(Ok(None), |folder| read_outline(folder, id, view))
+    }
+
+    fn alone(&self, id: u32, view: &View) -> Result<Option<Vec<[u8; 4]>>> {
+        let Some(file) = self.objects.as_deref().and_then(|folder| file_of(folder, id, view)) else { return Ok(None) };
+        let picture = read_rgba(&file)?;
+        Ok(Some(at_view(view, (picture.width, picture.height), |index| picture.rgba[index])))
+    }
+}
+
+/// The whole outline of an object in a view: `ID/NAME.png`, sized like the view by nearest pixels.
+pub fn read_outline(folder: &Path, id: u32, view: &View) -> Result<Option<Vec<bool>>> {
+    let Some(file) = file_of(folder, id, view) else { return Ok(None) };
+    let map = read_mask(&file)?;
+    Ok(Some(at_view(view, (map.width, map.height), |index| map.ids[index] != 0)))
+}
+
+/// `ID/NAME.png`, if it is there.
+fn file_of(folder: &Path, id: u32, view: &View) -> Option<PathBuf> {
+    let file = folder.join(id.to_string()).join(Path::new(&view.name).with_extension("png"));
+    file.is_file().then_some(file)
+}
+
+/// A picture of `size` at the view's size, each pixel from the nearest one.
+fn at_view<T>(view: &View, size: (u32, u32), value: impl Fn(usize) -> T) -> Vec<T> {
+    let (width, height) = (view.camera.width, view.camera.height);
+    let nearest = |at: u32, side: u32, from: u32| ((f64::from(at) + 0.5) * f64::from(from) / f64::from(side)) as usize;
+    let pixel = |(x, y)| value(nearest(y, height, size.1) * size.0 as usize + nearest(x, width, size.0));
+    (0..height).flat_map(|y| (0..width).map(move |x| (x, y))).map(pixel).collect()
+}

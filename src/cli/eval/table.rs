@@ -1,0 +1,94 @@
+//! Scores as text.
+
+use crate::infer::protocol::report::{Absent, Report};
+use crate::infer::protocol::score::PairScores;
+use crate::infer::scores::Scores;
+
+fn number(value: Option<f64>, digits: usize) -> String {
+    value.map_or("-".to_owned(), |value| format!("{value:.digits$}"))
+}
+
+/// Views, then objects.
+pub(super) fn own_table(scores: &Scores) -> String {
+    let mut text = format!("{:>10} {:>8} {:>8}\n", "view", "PSNR", "SSIM");
+    for (name, view) in &scores.views {
+        text += &format!("{name:>10} {:>8.2} {:>8.4}\n", view.psnr, view.ssim);
+    }
+    text += &format!("{:>10} {:>8} {:>8}\n", "mean", number(scores.mean.psnr, 2), number(scores.mean.ssim, 4));
+    if scores.objects.is_empty() {
+        return text;
+    }
+    text += &format!(
+        "\n{:>10} {:>8} {:>12} {:>10} {:>9} {:>11} {:>11} {:>10} {:>11}\n",
+        "object",
+        "iou_map",
+        "boundary_iou",
+        "iou_object",
+        "paper_iou",
+        "object_psnr",
+        "object_ssim",
+        "iou_hidden",
+        "psnr_hidden"
+    );
+    let rows = scores.objects.iter().map(|(id, scores)| (id.to_string(), scores));
+    for (name, row) in rows.chain([("mean".to_owned(), &scores.mean.objects)]) {
+        text += &format!(
+            "{name:>10} {:>8} {:>12} {:>10} {:>9} {:>11} {:>11} {:>10} {:>11}\n",
+            number(row.iou_map, 4),
+            number(row.boundary_iou, 4),
+            number(row.iou_object, 4),
+            number(row.paper_iou, 4),
+            number(row.object_psnr, 2),
+            number(row.object_ssim, 4),
+            number(row.iou_hidden, 4),
+            number(row.psnr_hidden, 2)
+        );
+    }
+    text
+}
+
+/// Objects, averages, and everything that is not there.
+pub(super) fn bench_table(report: &Report) -> String {
+    let names = report.objects.keys().map(String::len);
+    let wide = names.chain(["mean of objects".len()]).max().unwrap_or_default();
+    let row = |name: &str, scores: &PairScores, labels: &str| {
+        let cells = [
+            number(scores.iou, 4),
+            number(scores.iou_colour, 4),
+            number(scores.boundary_iou, 4),
+            number(scores.accuracy, 4),
+            number(scores.psnr, 2),
+            number(scores.ssim, 4),
+            if report.lpips == "no weights" { "no weights".to_owned() } else { number(scores.lpips, 4) },
+        ];
+        let [iou, colour, rim, accuracy, psnr, ssim, lpips] = cells;
+        format!(
+            "{name:>wide$} {iou:>8} {colour:>10} {rim:>12} {accuracy:>8} {psnr:>7} {ssim:>7} {lpips:>10}  {labels}\n"
+        )
+    };
+    let compat = if report.compat { ", by the published scorer's ways" } else { "" };
+    let mut text = format!("{}{compat}\n", report.protocol);
+    text += &format!(
+        "{:>wide$} {:>8} {:>10} {:>12} {:>8} {:>7} {:>7} {:>10}  labels\n",
+        "object", "iou", "iou_colour", "boundary_iou", "accuracy", "psnr", "ssim", "lpips"
+    );
+    for (name, object) in &report.objects {
+        let labels: Vec<String> = object.labels.iter().map(u32::to_string).collect();
+        text += &row(name, &object.mean, &if labels.is_empty() { "none".to_owned() } else { labels.join(",") });
+    }
+    text += &row("mean of pairs", &report.mean.pairs, "");
+    text += &row("mean of objects", &report.mean.objects, "");
+    let head = &report.headline;
+    text += &format!("headline: {} {} over {}\n", head.key, number(head.iou, 4), head.average);
+    text += &format!("{} pairs of object and frame\n", report.mean.pair_count);
+    report.rules.iter().for_each(|rule| text += &format!("rule: {rule}\n"));
+    report.missing.iter().for_each(|absent| text += &line("missing", absent));
+    report.empty.iter().for_each(|absent| text += &line("empty", absent));
+    report.left_out.iter().for_each(|what| text += &format!("left out: {what}\n"));
+    text
+}
+
+fn line(kind: &str, absent: &Absent) -> String {
+    let frame = absent.frame.as_ref().map_or(String::new(), |frame| format!(" in {frame}"));
+    format!("{kind}: {}{frame}: {}\n", absent.object, absent.reason)
+}

@@ -1,0 +1,52 @@
+//! Boundary IoU (Cheng et al. 2021): the overlap of the rims of two masks, which a large inside cannot drown.
+
+use super::metrics::Overlap;
+
+/// Width of the rim over the diagonal of the image.
+pub const RATIO: f64 = 0.02;
+
+/// Width of the rim, px: [`RATIO`] times the diagonal, rounded, at least 1.
+pub fn rim_width(width: usize, height: usize) -> usize {
+    ((RATIO * (width as f64).hypot(height as f64)).round() as usize).max(1)
+}
+
+/// The pixels of a mask (row-major) with a pixel outside of it at most `reach` px away, diagonals included. What lies
+/// beyond the image is outside. The same as the mask less its erosion by `reach` turns of a 3x3 square.
+pub fn rim(mask: &[bool], width: usize, height: usize, reach: usize) -> Vec<bool> {
+    let rows = eroded(mask, width, height, reach, |line, at| line * width + at);
+    let both = eroded(&rows, height, width, reach, |line, at| at * width + line);
+    mask.iter().zip(&both).map(|(&inside, &deep)| inside && !deep).collect()
+}
+
+/// Erosion along lines of `length` pixels; `place` maps line and position to an index.
+fn eroded(
+    mask: &[bool],
+    length: usize,
+    lines: usize,
+    reach: usize,
+    place: impl Fn(usize, usize) -> usize,
+) -> Vec<bool> {
+    let mut kept = vec![false; mask.len()];
+    for line in 0..lines {
+        let mut run = 0;
+        for at in 0..length {
+            run = if mask[place(line, at)] { run + 1 } else { 0 };
+            if run > 2 * reach {
+                kept[place(line, at - reach)] = true;
+            }
+        }
+    }
+    kept
+}
+
+/// IoU of the rims of two masks over the pixels with `counts`; `None` where neither has a rim there.
+pub fn boundary_iou(
+    found: &[bool],
+    truth: &[bool],
+    (width, height): (usize, usize),
+    counts: impl Fn(usize) -> bool,
+) -> Option<f64> {
+    let reach = rim_width(width, height);
+    let (found, truth) = (rim(found, width, height, reach), rim(truth, width, height, reach));
+    Overlap::count((0..found.len()).filter(|&index| counts(index)).map(|index| (found[index], truth[index]))).iou()
+}

@@ -1,0 +1,66 @@
+//! The weights of LPIPS in a safetensors file.
+//!
+//! The names are those of the two published state dictionaries in one file, 32-bit floats: torchvision's VGG16
+//! `features.N.weight` [outputs, inputs, 3, 3] and `features.N.bias` [outputs] for N of 0, 2, 5, 7, 10, 12, 14, 17, 19, 21,
+//! 24, 26, 28, and LPIPS v0.1 `linK.model.1.weight` [1, channels, 1, 1] for K of 0 to 4 with 64, 128, 256, 512, 512
+//! channels. Other tensors are left alone.
+
+use super::convolution::Layer;
+use super::{CHANNELS, STAGES};
+use crate::error::{Error, Result};
+use safetensors::{Dtype, SafeTensors};
+use std::collections::BTreeMap;
+use std::path::Path;
+
+/// VGG16's convolutions and the weight of each of its features.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Weights {
+    layers: BTreeMap<usize, Layer>,
+    linear: Vec<Vec<f32>>,
+}
+
+impl Weights {
+    /// Reads the file; every tensor must be there with its shape.
+    pub fn read(path: &Path) -> Result<Self> {
+        let bytes = std::fs::read(path).map_err(Error::read(path))?;
+        let file = SafeTensors::deserialize(&bytes)
+            .map_err(|error| Error::data(path, "", format!("is no readable safetensors file: {error}")))?;
+        let tensor = |name: String, shape: &[usize]| floats(path, &file, &name, shape);
+        let mut layers = BTreeMap::new();
+        let mut inputs = 3;
+        for (stage, &outputs) in STAGES.iter().zip(&CHANNELS) {
+            for &number in *stage {
+                let weight = tensor(format!("features.{number}.weight"), &[outputs, inputs, 3, 3])?;
+                let bias = tensor(format!("features.{number}.bias"), &[outputs])?;
+                layers.insert(number, Layer { weight, bias });
+                inputs = outputs;
+            }
+        }
+        let linear = CHANNELS.iter().enumerate();
+        let linear = linear.map(|(index, &count)| tensor(format!("lin{index}.model.1.weight"), &[1, count, 1, 1]));
+        Ok(Self { layers, linear: linear.collect::<Result<_>>()? })
+    }
+
+    pub(super) fn layer(&self, number: usize) -> Result<&Layer> {
+        self.layers.get(&number).ok_or_else(|| Error::Bug(format!("VGG16 has no convolution {number}")))
+    }
+
+    pub(super) fn linear(&self, stage: usize) -> &[f32] {
+        &self.linear[stage]
+    }
+}
+
+fn floats(path: &Path, file: &SafeTensors, name: &str, shape: &[usize]) -> Result<Vec<f32>> {
+    let cure = "expected torchvision's VGG16 `features` and the `lin` layers of LPIPS v0.1 in one file, 32-bit floats";
+    let view = file.tensor(name).map_err(|_| Error::data(path, name, format!("is not there; {cure}")))?;
+    if view.dtype() != Dtype::F32 || view.shape() != shape {
+        let problem = format!("is {:?} {:?} instead of F32 {shape:?}; {cure}", view.dtype(), view.shape());
+        return Err(Error::data(path, name, problem));
+    }
+    let values: Vec<f32> =
+        view.data().chunks_exact(4).map(|four| f32::from_le_bytes([four[0], four[1], four[2], four[3]])).collect();
+    if values.iter().all(|value| value.is_finite()) {
+        return Ok(values);
+    }
+    Err(Error::data(path, name, "holds a number that is not finite"))
+}

@@ -1,0 +1,34 @@
+//! Plain black and white masks: `OBJECT/FRAME.png`, or `FRAME.png` of a single object, which takes the folder's name.
+//!
+//! As in SPIn-NeRF, the first frame is the prompt. It is not scored.
+
+use super::{Ask, Layout, Truth, folders, is_png, stem, tasks};
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+pub(super) fn layout(files: &[PathBuf], ask: Ask) -> Result<Layout, String> {
+    let mut objects: BTreeMap<String, Vec<Truth>> = BTreeMap::new();
+    let mut left_out = Vec::new();
+    for file in files.iter().filter(|file| is_png(file)) {
+        let object = match &folders(file)[..] {
+            [] => ask.truth.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default(),
+            [object] => object.clone(),
+            _ => {
+                left_out.push(format!("{} is neither FRAME.png nor OBJECT/FRAME.png", file.display()));
+                continue;
+            }
+        };
+        objects.entry(object).or_default().push(Truth { frame: stem(file), file: file.clone() });
+    }
+    if objects.is_empty() {
+        return Err("holds no mask; expected FRAME.png, or OBJECT/FRAME.png".into());
+    }
+    // Each object has a first frame of its own.
+    let mut layout = Layout { tasks: Vec::new(), left_out };
+    for (object, truths) in objects {
+        let one = tasks(BTreeMap::from([(object, truths)]), ask);
+        layout.tasks.extend(one.tasks);
+        layout.left_out.extend(one.left_out);
+    }
+    Ok(layout)
+}

@@ -1,0 +1,163 @@
+//! The result of a benchmark, as numbers and as JSON.
+
+use super::Protocol;
+use super::score::PairScores;
+use crate::error::{Error, Result};
+use serde::Serialize;
+use std::collections::BTreeMap;
+
+/// A prediction that is not there.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Absent {
+    /// Name of the object.
+    pub object: String,
+    /// The frame; without one it is every frame of the object.
+    pub frame: Option<String>,
+    /// Why.
+    pub reason: String,
+}
+
+/// An object over its frames.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct ObjectRow {
+    /// The labels that were chosen for it.
+    pub labels: Vec<u32>,
+    /// Frames that count.
+    pub frames: u64,
+    /// Means over those frames.
+    #[serde(flatten)]
+    pub mean: PairScores,
+}
+
+/// Averages of the scene.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Means {
+    /// Over pairs of object and frame.
+    pub pairs: PairScores,
+    /// Over objects of their means over frames.
+    pub objects: PairScores,
+    /// Number of pairs.
+    pub pair_count: u64,
+    /// Number of objects with a pair.
+    pub object_count: u64,
+}
+
+/// The number that the benchmark's tables print.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Headline {
+    /// Which IoU it is: `iou` or `iou_colour`.
+    pub key: &'static str,
+    /// Which average: `pairs` or `objects`.
+    pub average: &'static str,
+    /// Mean IoU.
+    pub iou: Option<f64>,
+    /// Mean PSNR, dB.
+    pub psnr: Option<f64>,
+}
+
+/// Scores of a model in a benchmark; what is not finite becomes null in JSON.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Report {
+    /// Version of this layout.
+    pub schema_version: u32,
+    /// Name of the benchmark.
+    pub protocol: &'static str,
+    /// Whether the published scorer's ways were followed.
+    pub compat: bool,
+    /// The rules, in words.
+    pub rules: Vec<&'static str>,
+    /// `VGG16, v0.1`, or `no weights`.
+    pub lpips: &'static str,
+    /// The number for tables.
+    pub headline: Headline,
+    /// Averages.
+    pub mean: Means,
+    /// Objects by name.
+    pub objects: BTreeMap<String, ObjectRow>,
+    /// Scores by frame and object.
+    pub views: BTreeMap<String, BTreeMap<String, PairScores>>,
+    /// Predictions that could not be made.
+    pub missing: Vec<Absent>,
+    /// Prompts that select nothing.
+    pub empty: Vec<Absent>,
+    /// True masks that the rules leave out.
+    pub left_out: Vec<String>,
+}
+
+const STRICT: [&str; 4] = [
+    "a missing prediction and an empty selection count as 0 (LPIPS as 1)",
+    "iou, boundary_iou and accuracy: opacity above 0.5; iou_colour: any channel above 0.01",
+    "psnr: clamped to 0..1, one error over all channels and pixels of the frame, object on black against photo x mask",
+    "ssim: 11x11 Gaussian window over the whole frame",
+];
+const LABELGS_COMPAT: [&str; 4] = [
+    "an empty selection renders the whole scene",
+    "iou: any channel above 0.01 is the published one, here iou_colour",
+    "psnr: mean of the PSNR of each channel over the whole frame, not clamped",
+    "ssim: 8-bit pictures, uniform 7x7 window, sample covariance, over the whole frame",
+];
+const LERF_MASK_COMPAT: [&str; 3] = [
+    "a missing prediction and an empty selection are left out of the averages",
+    "psnr: mean of the PSNR of each channel over the whole frame, not clamped",
+    "ssim: 8-bit pictures, uniform 7x7 window, sample covariance, over the whole frame",
+];
+
+impl Report {
+    pub(super) fn new(protocol: Protocol, compat: bool, lpips: bool) -> Self {
+        let rules = match (protocol, compat) {
+            (Protocol::Labelgs, true) => LABELGS_COMPAT.to_vec(),
+            (Protocol::LerfMask, true) => LERF_MASK_COMPAT.to_vec(),
+            _ => STRICT.to_vec(),
+        };
+        let lpips = if lpips { "VGG16, v0.1" } else { "no weights" };
+        Self { schema_version: 1, protocol: protocol.name(), compat, rules, lpips, ..Self::default() }
+    }
+
+    pub(super) fn object(&mut self, name: &str, labels: Vec<u32>) {
+        self.objects.entry(name.to_owned()).or_default().labels = labels;
+    }
+
+    pub(super) fn add(&mut self, object: &str, frame: &str, scores: PairScores) {
+        self.views.entry(frame.to_owned()).or_default().insert(object.to_owned(), scores);
+    }
+
+    /// Averages what was added.
+    pub(super) fn finish(&mut self) {
+        for (name, row) in &mut self.objects {
+            let own: Vec<&PairScores> = self.views.values().filter_map(|view| view.get(name)).collect();
+            row.frames = own.len() as u64;
+            row.mean = PairScores::average(own.into_iter());
+        }
+        let counted = || self.objects.values().filter(|row| row.frames > 0);
+        let pairs = || self.views.values().flat_map(BTreeMap::values);
+        self.mean = Means {
+            pairs: PairScores::average(pairs()),
+            objects: PairScores::average(counted().map(|row| &row.mean)),
+            pair_count: pairs().count() as u64,
+            object_count: counted().count() as u64,
+        };
+        let colour = self.compat && self.protocol == Protocol::Labelgs.name();
+        let by_object = self.protocol == Protocol::LerfMask.name();
+        let mean = if by_object { &self.mean.objects } else { &self.mean.pairs };
+        self.headline = Headline {
+            key: if colour { "iou_colour" } else { "iou" },
+            average: if by_object { "objects" } else { "pairs" },
+            iou: if colour { mean.iou_colour } else { mean.iou },
+            psnr: mean.psnr,
+        };
+    }
+
+    /// The checks of `--min-psnr` and `--min-iou` on the headline.
+    pub fn check(&self, min_psnr: Option<f64>, min_iou: Option<f64>) -> Result<()> {
+        let rows = [("PSNR", self.headline.psnr, min_psnr), ("IoU", self.headline.iou, min_iou)];
+        for (what, found, least) in rows {
+            let Some(least) = least else { continue };
+            // A NaN is not enough either.
+            if !found.is_some_and(|found| found >= least) {
+                let found = found.map_or("nothing".to_owned(), |found| format!("{found:.4}"));
+                return Err(Error::Check(format!("mean {what} is {found}, less than {least}")));
+            }
+        }
+        Ok(())
+    }
+}

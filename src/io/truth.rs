@@ -1,0 +1,86 @@
+//! True masks of single objects, as benchmarks ship them: a black and white picture per object and frame.
+
+use super::image::read_grey;
+use super::lens::Lens;
+use super::resample::{resample_ids, same_aspect, shrink_photo};
+use crate::error::{Error, Result};
+use crate::scene::{LabelMap, Photo, View};
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// A mask at the size at which it is compared, row-major.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct TruthMask {
+    /// Width, px.
+    pub width: u32,
+    /// Height, px.
+    pub height: u32,
+    /// True where the object is visible.
+    pub inside: Vec<bool>,
+}
+
+/// Kinds of pictures.
+const EXTENSIONS: [&str; 3] = ["png", "jpg", "jpeg"];
+/// Folders below the given one that [`files_below`] looks into.
+const DEPTH: u32 = 3;
+
+/// The PNG and JPEG files below a folder, relative to it, sorted; hidden ones are left out.
+pub fn files_below(folder: &Path) -> Result<Vec<PathBuf>> {
+    if !folder.is_dir() {
+        return Err(Error::data(folder, "", "there is no such folder of true masks"));
+    }
+    let mut found = Vec::new();
+    collect(folder, Path::new(""), DEPTH, &mut found)?;
+    found.sort();
+    Ok(found)
+}
+
+fn collect(root: &Path, inside: &Path, depth: u32, found: &mut Vec<PathBuf>) -> Result<()> {
+    let folder = root.join(inside);
+    for entry in fs::read_dir(&folder).map_err(Error::read(&folder))? {
+        let name = entry.map_err(Error::read(&folder))?.file_name();
+        let path = inside.join(&name);
+        if name.to_string_lossy().starts_with('.') {
+            continue;
+        }
+        if root.join(&path).is_dir() {
+            if depth > 0 {
+                collect(root, &path, depth - 1, found)?;
+            }
+        } else if path.extension().is_some_and(|found| EXTENSIONS.iter().any(|known| found.eq_ignore_ascii_case(known)))
+        {
+            found.push(path);
+        }
+    }
+    Ok(())
+}
+
+/// Reads the mask of an object in `view`. Inside is a value above 128, or above 0 in a file without a value above 1.
+///
+/// The mask belongs to the photo as it was taken; with the photo's lens in `lenses` it is undistorted. It is compared at
+/// its own size, unless that is larger than the view; then it takes the view's size, each pixel from the nearest one.
+pub fn read_truth(path: &Path, view: &View, lenses: &BTreeMap<String, Lens>) -> Result<TruthMask> {
+    let (width, height, values) = read_grey(path)?;
+    let camera = &view.camera;
+    if !same_aspect((width, height), (camera.width, camera.height)) {
+        let problem = format!(
+            "the mask has {width} x {height} px and view {} {} x {} px, which no scale explains; use masks of the same \
+             photos",
+            view.name, camera.width, camera.height
+        );
+        return Err(Error::data(path, "", problem));
+    }
+    let above = if values.iter().all(|&value| value <= 1) { 0 } else { 128 };
+    let ids = values.iter().map(|&value| u16::from(value > above)).collect();
+    let larger = u64::from(width) * u64::from(height) > u64::from(camera.width) * u64::from(camera.height);
+    let size = if larger { (camera.width, camera.height) } else { (width, height) };
+    let lens = lenses.get(&view.name).copied().unwrap_or_default();
+    let map = resample_ids(&LabelMap { width, height, ids }, camera, &lens, size);
+    Ok(TruthMask { width: map.width, height: map.height, inside: map.ids.iter().map(|&id| id != 0).collect() })
+}
+
+/// A photo shrunk to the size of a mask, which is not larger.
+pub fn photo_at(photo: &Photo, width: u32, height: u32) -> Photo {
+    shrink_photo(photo, width, height)
+}

@@ -1,0 +1,121 @@
+//! Benchmarks: each layout with a known result, absent predictions, the published scorers' ways, broken inputs.
+
+mod layouts;
+mod lpips;
+mod refusals;
+mod rules;
+
+use labelgs::infer::protocol::paint::Painter;
+use labelgs::infer::protocol::report::Report;
+use labelgs::infer::protocol::run::{Bench, run};
+use labelgs::infer::protocol::score::Drawn;
+use labelgs::infer::protocol::{Ask, By, Layout, Protocol};
+use labelgs::io::image::write_png_grey8;
+use labelgs::io::label_table::{LabelEntry, LabelTable};
+use labelgs::io::truth::{files_below, read_truth};
+use labelgs::scene::{Camera, LabelMap, Photo, View};
+use labelgs::{Error, Result};
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
+
+/// Width and height of every picture, px.
+const SIDE: usize = 8;
+
+/// A scene of labels in columns: pixel (x, y) has the label of its column, in every view. Objects have the colour of the
+/// photo, which is 0.8 grey; a label of `dark` is opaque and black.
+pub struct Columns {
+    /// Label of each column.
+    pub labels: [u16; SIDE],
+    /// Labels that are drawn black.
+    pub dark: Vec<u32>,
+}
+
+/// The grey of photos and objects.
+const GREY: u8 = 204;
+
+impl Painter for Columns {
+    fn label_map(&mut self, camera: &Camera) -> Result<LabelMap> {
+        assert_eq!((camera.width, camera.height), (SIDE as u32, SIDE as u32));
+        Ok(LabelMap { width: SIDE as u32, height: SIDE as u32, ids: self.labels.repeat(SIDE) })
+    }
+
+    fn draw(&mut self, labels: Option<&[u32]>, camera: &Camera) -> Result<Drawn> {
+        let map = self.label_map(camera)?;
+        let shown = |&id: &u16| labels.is_none_or(|labels| labels.contains(&u32::from(id)));
+        let grey = |id: &u16| if self.dark.contains(&u32::from(*id)) { 0.0 } else { f32::from(GREY) / 255.0 };
+        let rgb = map.ids.iter().map(|id| if shown(id) { [grey(id); 3] } else { [0.0; 3] }).collect();
+        Ok(Drawn { rgb, alpha: map.ids.iter().map(|id| if shown(id) { 1.0 } else { 0.0 }).collect() })
+    }
+}
+
+impl Columns {
+    /// Columns of bright labels.
+    pub fn new(labels: [u16; SIDE]) -> Self {
+        Self { labels, dark: Vec::new() }
+    }
+}
+
+/// A view with a grey photo.
+pub fn view(name: &str) -> View {
+    let side = SIDE as u32;
+    let camera = Camera {
+        rotation: glam::DMat3::IDENTITY,
+        translation: glam::DVec3::ZERO,
+        fx: 8.0,
+        fy: 8.0,
+        cx: 4.0,
+        cy: 4.0,
+        width: side,
+        height: side,
+    };
+    let photo = Photo { width: side, height: side, rgba: vec![[GREY, GREY, GREY, 255]; SIDE * SIDE] };
+    View { name: name.to_owned(), camera, photo: Some(photo), mask: None }
+}
+
+/// Writes a mask that is white in some columns.
+pub fn columns_file(path: &Path, columns: std::ops::Range<usize>) {
+    let bytes: Vec<u8> = (0..SIDE * SIDE).map(|i| if columns.contains(&(i % SIDE)) { 255 } else { 0 }).collect();
+    write_png_grey8(path, SIDE as u32, SIDE as u32, &bytes).expect("written");
+}
+
+/// The layout of the files in a folder.
+pub fn layout(protocol: Protocol, truth: &Path, scene: &str, by: By) -> Result<Layout> {
+    let classes = std::fs::read_to_string(truth.join("classes.txt")).ok();
+    protocol.layout(&files_below(truth)?, classes.as_deref(), Ask { truth, scene, by })
+}
+
+/// Runs a benchmark on the views of these names, of which those from `test` on are held out.
+pub fn run_on(
+    (protocol, compat, by): (Protocol, bool, By),
+    truth: &Path,
+    (views, test): (&[&str], usize),
+    names: &[(u32, &str)],
+    mut columns: Columns,
+) -> Result<Report> {
+    let layout = layout(protocol, truth, "scene", by)?;
+    let views: Vec<View> = views.iter().map(|name| view(name)).collect();
+    let views: Vec<&View> = views.iter().collect();
+    let entry = |&(id, name): &(u32, &str)| LabelEntry { name: Some(name.to_owned()), ..LabelEntry::new(id) };
+    let names = LabelTable::new(names.iter().map(entry).collect());
+    let labels: BTreeSet<u32> = columns.labels.iter().map(|&id| u32::from(id)).filter(|&id| id != 0).collect();
+    let lenses = BTreeMap::new();
+    let bench = Bench {
+        protocol,
+        compat,
+        views: &views,
+        test: &views[test..],
+        names: Some(&names),
+        labels: &labels,
+        truth: &|file, view| read_truth(&truth.join(file), view, &lenses),
+        lpips: None,
+    };
+    bench.check(&layout, truth)?;
+    run(&layout, &bench, &mut columns, &mut ())
+}
+
+/// What a failure says.
+pub fn message<T: std::fmt::Debug>(result: Result<T>) -> String {
+    let error: Error = result.expect_err("it fails");
+    assert_eq!(error.exit_status(), 3, "{error}");
+    error.to_string()
+}
