@@ -8,6 +8,7 @@ mod support;
 mod architecture;
 mod cli;
 mod cli_engine;
+mod cli_masks;
 mod compare_self;
 mod config;
 mod gradient;
