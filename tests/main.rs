@@ -9,6 +9,7 @@ mod architecture;
 mod associate;
 mod cli;
 mod cli_engine;
+mod cli_masks;
 mod compare_self;
 mod config;
 mod decide;

@@ -1,6 +1,7 @@
 //! What can be typed. Only what was typed is in here; decisions are made in `config` and in the verbs.
 
 use super::eval::EvalArgs;
+use super::masks::MasksArgs;
 use super::train_args::TrainArgs;
 use super::values::{Labels, Size, colour, count, labels, size};
 use crate::infer::output::{Format, What};
@@ -66,13 +67,13 @@ pub enum Command {
     /// Score a model on the views of a scene.
     #[command(after_help = "Example: labelgs eval out --scene garden --masks garden/masks --json scores.json")]
     Eval(Box<EvalArgs>),
+    /// Import, check and repair masks before training.
+    Masks(MasksArgs),
     /// Make a posed test scene with masks, whole outlines and depth.
     #[command(after_help = "Example: labelgs synth scene && labelgs train scene --masks scene/masks -o out")]
     Synth(SynthArgs),
     /// Compare the Vulkan devices with what is required.
     Devices(DevicesArgs),
-    /// Work on masks before training.
-    Masks(super::masks::MasksArgs),
     /// Print buffers, passes and barriers of a training step without running it.
     #[command(after_help = "Example: labelgs plan --gaussians 500k --size 960x540 --label-samples 10")]
     Plan(PlanArgs),

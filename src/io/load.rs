@@ -99,8 +99,8 @@ fn split(views: &[Listed], every: Option<u32>, notes: &mut Vec<String>) -> Resul
     Ok((0..views.len()).map(|index| index % every as usize == 0).collect())
 }
 
-/// The views, or one error that lists all that failed.
-fn all_or_one_error(root: &Path, loaded: Vec<Result<View>>) -> Result<Vec<View>> {
+/// What was made of the views, or one error that lists all that failed.
+pub(crate) fn all_or_one_error<T>(root: &Path, loaded: Vec<Result<T>>) -> Result<Vec<T>> {
     let total = loaded.len();
     let mut views = Vec::with_capacity(total);
     let mut errors = Vec::new();

@@ -17,6 +17,62 @@ fn problem(path: &Path, error: impl std::fmt::Display) -> Error {
     Error::data(path, "", format!("is no readable PNG mask: {error}"))
 }
 
+/// What a PNG says about itself before its pixels.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Header {
+    /// Width and height, px.
+    pub(crate) size: (u32, u32),
+    /// Kind of samples.
+    pub(crate) colour: png::ColorType,
+    /// Bits of a sample.
+    pub(crate) depth: png::BitDepth,
+}
+
+/// A PNG with its samples as they are stored.
+pub(crate) struct Raw {
+    /// Its header.
+    pub(crate) header: Header,
+    bytes: Vec<u8>,
+    line_size: usize,
+}
+
+impl Raw {
+    /// All samples, row-major, the channels of a pixel side by side.
+    pub(crate) fn samples(&self) -> Vec<u16> {
+        let Header { size, colour, depth } = self.header;
+        let per_line = size.0 as usize * colour.samples();
+        let lines = self.bytes.chunks_exact(self.line_size).take(size.1 as usize);
+        lines.flat_map(|line| unpack(line, depth, per_line)).collect()
+    }
+}
+
+fn open(path: &Path) -> Result<(png::Reader<BufReader<File>>, Header)> {
+    let file = File::open(path).map_err(Error::read(path))?;
+    let mut decoder = Decoder::new(BufReader::new(file));
+    // Any other choice expands a palette to colours or drops the low half of 16-bit ids.
+    decoder.set_transformations(png::Transformations::IDENTITY);
+    let reader = decoder.read_info().map_err(|error| problem(path, error))?;
+    let info = reader.info();
+    let header = Header { size: (info.width, info.height), colour: info.color_type, depth: info.bit_depth };
+    check_size(path, header.size)?;
+    Ok((reader, header))
+}
+
+/// Reads the header of a PNG.
+pub(crate) fn read_header(path: &Path) -> Result<Header> {
+    open(path).map(|(_, header)| header)
+}
+
+/// Reads a PNG of any kind, with `accept` asked about the header before a pixel is decoded.
+pub(crate) fn read_raw(path: &Path, accept: impl FnOnce(&Header) -> Result<()>) -> Result<Raw> {
+    let (mut reader, header) = open(path)?;
+    accept(&header)?;
+    let length = reader.output_buffer_size().ok_or_else(|| problem(path, "too large"))?;
+    let mut bytes = vec![0; length];
+    let frame = reader.next_frame(&mut bytes).map_err(|error| problem(path, error))?;
+    Ok(Raw { header, bytes, line_size: frame.line_size })
+}
+
 /// Reads an id image: 8- or 16-bit grey, palette indices, or either with 1, 2 or 4 bits.
 pub fn read_mask(path: impl AsRef<Path>) -> Result<LabelMap> {
     read_checked(path.as_ref(), |_| Ok(()))
@@ -24,31 +80,20 @@ pub fn read_mask(path: impl AsRef<Path>) -> Result<LabelMap> {
 
 /// Like [`read_mask`], with `accept` asked about the size before a pixel is decoded.
 pub(crate) fn read_checked(path: &Path, accept: impl FnOnce((u32, u32)) -> Result<()>) -> Result<LabelMap> {
-    let file = File::open(path).map_err(Error::read(path))?;
-    let mut decoder = Decoder::new(BufReader::new(file));
-    // Any other choice expands a palette to colours or drops the low half of 16-bit ids.
-    decoder.set_transformations(png::Transformations::IDENTITY);
-    let mut reader = decoder.read_info().map_err(|error| problem(path, error))?;
-    let (size, colour, depth) = {
-        let info = reader.info();
-        ((info.width, info.height), info.color_type, info.bit_depth)
-    };
-    check_size(path, size)?;
-    if !matches!(colour, png::ColorType::Grayscale | png::ColorType::Indexed) {
-        let text = format!(
-            "a mask holds one id per pixel as grey value or palette index; this PNG is {colour:?}. Convert it: for \
-             ids coded as R + 256 G + 65536 B write the number as 16-bit grey (DEVA: use --use_short_id), for \
-             display colours use the id image they were made from"
-        );
-        return Err(Error::data(path, "", text));
-    }
-    accept(size)?;
-    let length = reader.output_buffer_size().ok_or_else(|| problem(path, "too large"))?;
-    let mut bytes = vec![0; length];
-    let frame = reader.next_frame(&mut bytes).map_err(|error| problem(path, error))?;
-    let ids = bytes.chunks_exact(frame.line_size).take(size.1 as usize);
-    let ids = ids.flat_map(|line| unpack(line, depth, size.0 as usize)).collect();
-    Ok(LabelMap { width: size.0, height: size.1, ids })
+    let raw = read_raw(path, |header| {
+        if !matches!(header.colour, png::ColorType::Grayscale | png::ColorType::Indexed) {
+            let text = format!(
+                "a mask holds one id per pixel as grey value or palette index; this PNG is {:?}. Convert the folder \
+                 with `labelgs masks import`, which reads ids coded as R + 256 G + 65536 B; for display colours use \
+                 the id image they were made from",
+                header.colour
+            );
+            return Err(Error::data(path, "", text));
+        }
+        accept(header.size)
+    })?;
+    let (width, height) = raw.header.size;
+    Ok(LabelMap { width, height, ids: raw.samples() })
 }
 
 /// The samples of one line.
@@ -72,9 +117,8 @@ fn unpack(line: &[u8], depth: png::BitDepth, width: usize) -> Vec<u16> {
     }
 }
 
-/// Finds the mask of a photo by its name.
-pub(crate) struct MaskFolder {
-    folder: PathBuf,
+/// Which names the mask of a photo may have.
+pub(crate) struct PhotoNames {
     /// How many photos share a file stem; a flat folder serves only stems that are unique.
     stems: HashMap<String, usize>,
     /// How many share a path cut at the first dot of the file name, likewise.
@@ -92,41 +136,60 @@ fn cut_at_first_dot(name: &str) -> PathBuf {
     path.with_file_name(file.split('.').next().unwrap_or_default())
 }
 
+impl PhotoNames {
+    /// `names` are those of all photos of the scene.
+    pub(crate) fn new<'a>(names: impl Iterator<Item = &'a str>) -> Self {
+        let (mut stems, mut cut) = (HashMap::new(), HashMap::new());
+        for name in names {
+            *stems.entry(stem(name)).or_insert(0) += 1;
+            *cut.entry(cut_at_first_dot(name)).or_insert(0) += 1;
+        }
+        Self { stems, cut }
+    }
+
+    /// What the mask of `name` may be called, without `.png`, in order of preference: the photo's name without its
+    /// extension, with it, cut at the first dot of the file name, and the first two without folders; the last three
+    /// only where no other photo comes to the same name.
+    pub(crate) fn keys(&self, name: &str) -> Vec<PathBuf> {
+        let path = Path::new(name);
+        let mut found = vec![path.with_extension(""), path.to_owned()];
+        let cut = cut_at_first_dot(name);
+        if self.cut.get(&cut) == Some(&1) {
+            found.push(cut);
+        }
+        if self.stems.get(&stem(name)) == Some(&1) {
+            found.push(stem(name).into());
+            found.extend(path.file_name().map(PathBuf::from));
+        }
+        found
+    }
+}
+
+/// `key` with `.png` added, whatever dots it has.
+pub(crate) fn with_png(key: &Path) -> PathBuf {
+    let mut name = key.as_os_str().to_owned();
+    name.push(".png");
+    name.into()
+}
+
+/// Finds the mask of a photo by its name.
+pub(crate) struct MaskFolder {
+    folder: PathBuf,
+    names: PhotoNames,
+}
+
 impl MaskFolder {
     /// `names` are those of all photos of the scene.
     pub(crate) fn new<'a>(folder: &Path, names: impl Iterator<Item = &'a str>) -> Result<Self> {
         if !folder.is_dir() {
             return Err(Error::data(folder, "", "there is no such folder of masks"));
         }
-        let (mut stems, mut cut) = (HashMap::new(), HashMap::new());
-        for name in names {
-            *stems.entry(stem(name)).or_insert(0) += 1;
-            *cut.entry(cut_at_first_dot(name)).or_insert(0) += 1;
-        }
-        Ok(Self { folder: folder.to_owned(), stems, cut })
-    }
-
-    /// Paths at which the mask of `name` may be, in order of preference: the photo's name with `.png` in place of
-    /// its extension, with `.png` added, cut at the first dot of the file name, and the first two without
-    /// folders; the last three only where no other photo comes to the same name.
-    pub(crate) fn candidates(&self, name: &str) -> Vec<PathBuf> {
-        let path = Path::new(name);
-        let file = path.file_name().map(|file| file.to_string_lossy().into_owned()).unwrap_or_default();
-        let mut found = vec![self.folder.join(path.with_extension("png")), self.folder.join(format!("{name}.png"))];
-        let cut = cut_at_first_dot(name);
-        if self.cut.get(&cut) == Some(&1) {
-            found.push(self.folder.join(cut.with_extension("png")));
-        }
-        if self.stems.get(&stem(name)) == Some(&1) {
-            found.push(self.folder.join(format!("{}.png", stem(name))));
-            found.push(self.folder.join(format!("{file}.png")));
-        }
-        found
+        Ok(Self { folder: folder.to_owned(), names: PhotoNames::new(names) })
     }
 
     /// The mask file of `name`, if there is one.
     pub(crate) fn find(&self, name: &str) -> Option<PathBuf> {
-        self.candidates(name).into_iter().find(|path| path.is_file())
+        self.names.keys(name).iter().map(|key| self.folder.join(with_png(key))).find(|path| path.is_file())
     }
 
     /// The error for a folder in which no photo has a mask.

@@ -1,6 +1,7 @@
 //! Files to scenes and back.
 //!
 //! [`open`] reads a captured scene, [`ply`] the model, [`image`] and [`mask`] pixels, [`camera_json`] single cameras;
+//! [`masks`] imports and checks whole folders of masks;
 //! [`init`] makes the first Gaussians of a scene. All output goes through [`atomic`].
 
 pub mod atomic;
@@ -13,6 +14,7 @@ pub mod lens;
 mod listing;
 mod load;
 pub mod mask;
+pub mod masks;
 pub mod ply;
 mod resample;
 mod transforms;

@@ -1,11 +1,15 @@
 //! `labelgs masks`: what is done with masks before training.
 
+pub mod check;
+pub mod import;
 pub mod repair;
 pub mod spoil;
 
 use super::Context;
+use crate::cli::scene::open_with;
+use crate::io::LoadOptions;
 use crate::io::image::{write_png_grey8, write_png_grey16};
-use crate::scene::LabelMap;
+use crate::scene::{Dataset, LabelMap};
 use crate::{Error, Result};
 use clap::{Args, Subcommand};
 use std::path::Path;
@@ -21,6 +25,14 @@ pub struct MasksArgs {
 /// What can be done with masks.
 #[derive(Clone, Debug, Subcommand)]
 pub enum MasksVerb {
+    /// Convert masks of trackers and data sets to one id picture per photo, with labels.json.
+    #[command(after_help = "Example: labelgs masks import deva_out --scene garden -o garden/masks")]
+    Import(import::ImportArgs),
+    /// Report missing, mis-sized, mis-named, inverted and nearly empty masks, and ids that come and go.
+    #[command(
+        after_help = "Exit status 1 if anything was found. Example: labelgs masks check garden/masks --scene garden"
+    )]
+    Check(check::CheckArgs),
     /// Make masks of all views agree, by the Gaussians of a trained model that they own.
     #[command(after_help = "Example: labelgs masks repair sam_masks --per-view --model out --scene garden -o masks")]
     Repair(repair::RepairArgs),
@@ -31,9 +43,16 @@ pub enum MasksVerb {
 /// Does it.
 pub fn run(args: &MasksArgs, context: &Context) -> Result<()> {
     match &args.verb {
+        MasksVerb::Import(args) => import::run(args, context),
+        MasksVerb::Check(args) => check::run(args, context),
         MasksVerb::Repair(args) => repair::run(args, context),
         MasksVerb::Spoil(args) => spoil::run(args, context),
     }
+}
+
+/// Reads the scene that masks belong to: names, sizes and cameras of its photos, and its points.
+fn open_photos(scene: &Path) -> Result<Dataset> {
+    open_with(scene, &LoadOptions { photos: false, test_every: None, ..LoadOptions::default() })
 }
 
 /// Refuses a folder that holds something: old masks among new ones would be read as one set.

@@ -1,0 +1,93 @@
+//! `labelgs masks import`.
+
+use super::open_photos;
+use crate::Result;
+use crate::cli::args::JsonFlag;
+use crate::cli::{Context, stdout};
+use crate::io::label_table::LabelEntry;
+use crate::io::masks::{Format, ImportOptions, Imported, Overlap, import};
+use clap::Args;
+use serde_json::json;
+use std::path::PathBuf;
+
+/// `labelgs masks import`.
+#[derive(Args, Clone, Debug)]
+pub struct ImportArgs {
+    /// Folder with the masks, or the folder of a tracker or data set that holds it.
+    #[arg(value_name = "DIR")]
+    pub folder: PathBuf,
+    /// Scene whose photos the masks belong to.
+    #[arg(long, value_name = "SCENE")]
+    pub scene: PathBuf,
+    /// Folder to make; must be new or empty.
+    #[arg(short, long, value_name = "MASKS")]
+    pub output: PathBuf,
+    /// How the masks are to be read; auto fails where two readings fit.
+    #[arg(long, value_name = "FORMAT", value_enum, default_value = "auto")]
+    pub format: Format,
+    /// The pred.json that DEVA wrote with the masks; otherwise that in DIR.
+    #[arg(long, value_name = "FILE")]
+    pub pred: Option<PathBuf>,
+    /// Whose pixels are that two black and white masks share.
+    #[arg(long, value_name = "RULE", value_enum, default_value = "error")]
+    pub overlap: Overlap,
+    /// JSON.
+    #[command(flatten)]
+    pub json: JsonFlag,
+}
+
+/// Imports the masks.
+pub fn run(args: &ImportArgs, context: &Context) -> Result<()> {
+    let dataset = open_photos(&args.scene)?;
+    let options = ImportOptions {
+        folder: args.folder.clone(),
+        format: args.format,
+        pred: args.pred.clone(),
+        overlap: args.overlap,
+    };
+    let done = import(&dataset, &options, &args.output)?;
+    warn(&done);
+    if context.json || args.json.json {
+        return stdout::print_json(&json!({
+            "schema_version": 1,
+            "output": args.output.display().to_string(),
+            "import": done,
+        }));
+    }
+    let pred = done.pred.as_ref().map_or(String::new(), |pred| format!(", {}", pred.display()));
+    let mut text = format!("{}{pred}: {} ({})\n", done.source.display(), done.format.flag(), done.why);
+    text += &format!(
+        "{}: {} masks for {} photos, {} labels, {} bits\n",
+        args.output.display(),
+        done.masks,
+        done.photos,
+        done.labels.len(),
+        done.bits
+    );
+    text += &format!("{:>6} {:>12} {:>6}  {:<24} source\n", "label", "pixels", "views", "name");
+    done.labels.iter().for_each(|entry| text += &line(entry));
+    stdout::print(&text)
+}
+
+fn line(entry: &LabelEntry) -> String {
+    let text = |value: &Option<String>| value.clone().unwrap_or_else(|| "-".to_owned());
+    let (name, source) = (text(&entry.name), text(&entry.source));
+    format!("{:>6} {:>12} {:>6}  {name:<24} {source}\n", entry.id, entry.pixels, entry.views)
+}
+
+fn warn(done: &Imported) {
+    let listed = |names: &[String]| names.join(", ");
+    if !done.masks_without_photo.is_empty() {
+        let names = &done.masks_without_photo;
+        tracing::warn!("{} masks belong to no photo and were left out: {}", names.len(), listed(names));
+    }
+    if !done.photos_without_mask.is_empty() {
+        let names = &done.photos_without_mask;
+        tracing::warn!("{} of {} photos have no mask: {}", names.len(), done.photos, listed(names));
+    }
+    if done.overlaps.pixels > 0 {
+        let (pixels, photos) = (done.overlaps.pixels, done.overlaps.photos);
+        tracing::warn!("{pixels} pixels in {photos} photos belong to two objects and went to one by --overlap");
+    }
+    done.notes.iter().for_each(|note| tracing::warn!("{note}"));
+}

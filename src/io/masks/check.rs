@@ -1,0 +1,245 @@
+//! What looks wrong in masks, by comparing each with those of the other photos. No files in here.
+
+use crate::scene::{Camera, LabelMap, Point};
+use serde::Serialize;
+use std::collections::{BTreeMap, BTreeSet};
+
+/// Share of the border of a picture above which an object surrounds the picture. A little less than all, because the
+/// true object may itself touch the border.
+pub const INVERTED_BORDER: f64 = 0.9;
+/// Share of a picture above which an object covers most of it. Objects of interest rarely do; their surroundings always.
+pub const INVERTED_SHARE: f64 = 0.5;
+/// Border share up to which the same id in the other masks counts as not surrounding them.
+pub const INVERTED_ELSEWHERE: f64 = 0.5;
+/// A mask with less than this part of the usual labelled area is nearly empty: distance and the edge of the picture
+/// change areas by a few times, lost tracks leave nothing or specks.
+pub const EMPTY_MASK: f64 = 0.05;
+/// The same for one object. Lower, because an object may truly show a sliver from behind another.
+pub const EMPTY_OBJECT: f64 = 0.005;
+/// Masks that must show an object before one of them is compared with their median.
+pub const VIEWS_FOR_MEDIAN: usize = 4;
+/// Share of the picture that both neighbours must show of an object for its absence between them to count; less may
+/// truly vanish.
+pub const BLINK_SHARE: f64 = 0.002;
+
+/// What can be wrong.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Problem {
+    /// A photo has no mask.
+    Missing,
+    /// A file belongs to no photo.
+    Misnamed,
+    /// No scale makes the mask the size of the photo.
+    Missized,
+    /// The file holds no ids.
+    Unreadable,
+    /// Object and surroundings look swapped.
+    Inverted,
+    /// Much less is labelled than in the other masks.
+    NearlyEmpty,
+    /// An id is in one mask only.
+    SingleView,
+    /// An id is absent between two masks that show it.
+    Blink,
+}
+
+impl Problem {
+    /// Name for people.
+    pub fn text(self) -> &'static str {
+        match self {
+            Self::Missing => "missing",
+            Self::Misnamed => "misnamed",
+            Self::Missized => "missized",
+            Self::Unreadable => "unreadable",
+            Self::Inverted => "inverted",
+            Self::NearlyEmpty => "nearly-empty",
+            Self::SingleView => "single-view",
+            Self::Blink => "blink",
+        }
+    }
+}
+
+/// One thing that looks wrong.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+pub struct Finding {
+    /// Its kind.
+    pub problem: Problem,
+    /// The photo, if it is about one.
+    pub view: Option<String>,
+    /// The object, if it is about one.
+    pub id: Option<u32>,
+    /// What was found.
+    pub text: String,
+}
+
+/// Pixels of one object in one mask.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+struct Area {
+    pixels: u64,
+    border: u64,
+}
+
+/// What the rules need of one mask.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Look {
+    pixels: u64,
+    border: u64,
+    objects: BTreeMap<u16, Area>,
+    /// The id at the projection of each point of the scene; `None` outside the picture.
+    at_points: Vec<Option<u16>>,
+}
+
+impl Look {
+    /// Measures a mask. `camera` is that of the photo, at any scale; lens distortion is ignored, for the question is
+    /// only what is about where.
+    pub fn new(map: &LabelMap, camera: &Camera, points: &[Point]) -> Self {
+        let mut objects: BTreeMap<u16, Area> = BTreeMap::new();
+        for run in map.ids.chunk_by(|a, b| a == b).filter(|run| run[0] != 0) {
+            objects.entry(run[0]).or_default().pixels += run.len() as u64;
+        }
+        let (width, height) = (map.width, map.height);
+        let rows = [0, height - 1].into_iter().collect::<BTreeSet<u32>>();
+        let columns = [0, width - 1].into_iter().collect::<BTreeSet<u32>>();
+        let horizontal = rows.iter().flat_map(|&y| (0..width).map(move |x| (x, y)));
+        let vertical = columns.iter().flat_map(|&x| (1..height.saturating_sub(1)).map(move |y| (x, y)));
+        let mut border = 0;
+        for (x, y) in horizontal.chain(vertical) {
+            border += 1;
+            if let Some(area) = objects.get_mut(&map.at(x, y)) {
+                area.border += 1;
+            }
+        }
+        let camera = camera.resized(width, height);
+        let at = |point: &Point| {
+            let own = camera.to_camera(point.position);
+            let pixel = camera.project(own);
+            let (x, y) = (pixel.x.floor(), pixel.y.floor());
+            let inside = own.z > 0.0 && x >= 0.0 && y >= 0.0 && x < f64::from(width) && y < f64::from(height);
+            inside.then(|| map.at(x as u32, y as u32))
+        };
+        Self { pixels: map.ids.len() as u64, border, objects, at_points: points.iter().map(at).collect() }
+    }
+
+    /// The ids that occur.
+    pub fn ids(&self) -> impl Iterator<Item = u32> {
+        self.objects.keys().map(|&id| u32::from(id))
+    }
+
+    fn share(&self, id: u16) -> f64 {
+        self.objects.get(&id).map_or(0.0, |area| area.pixels as f64 / self.pixels as f64)
+    }
+
+    fn border_share(&self, id: u16) -> f64 {
+        self.objects.get(&id).map_or(0.0, |area| area.border as f64 / self.border as f64)
+    }
+
+    fn labelled(&self) -> f64 {
+        self.objects.values().map(|area| area.pixels).sum::<u64>() as f64 / self.pixels as f64
+    }
+}
+
+/// What looks wrong in these masks, given with the names of their photos in the order of these names.
+pub fn findings(masks: &[(&str, &Look)]) -> Vec<Finding> {
+    let ids: BTreeSet<u16> = masks.iter().flat_map(|(_, look)| look.objects.keys().copied()).collect();
+    let mut found = nearly_empty_masks(masks);
+    for &id in &ids {
+        found.extend(inverted(masks, id, ids.len() == 1));
+        found.extend(nearly_empty_objects(masks, id));
+        found.extend(single_view(masks, id));
+        found.extend(blinks(masks, id));
+    }
+    found.sort();
+    found
+}
+
+fn finding(problem: Problem, view: &str, id: Option<u16>, text: String) -> Finding {
+    Finding { problem, view: Some(view.to_owned()), id: id.map(u32::from), text }
+}
+
+fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied().unwrap_or(0.0)
+}
+
+fn percent(share: f64) -> String {
+    format!("{:.2} %", share * 100.0)
+}
+
+/// An id that surrounds and fills the picture, and does not surround the other masks or is the only id at all: a scene
+/// has one floor or wall in most views, but an object that is all around in one photo is its surroundings.
+fn inverted(masks: &[(&str, &Look)], id: u16, only: bool) -> Vec<Finding> {
+    let with: Vec<&(&str, &Look)> = masks.iter().filter(|(_, look)| look.objects.contains_key(&id)).collect();
+    let surrounds = |look: &Look| look.border_share(id) >= INVERTED_BORDER && look.share(id) >= INVERTED_SHARE;
+    let elsewhere = |own: &str| {
+        let others = with.iter().filter(|(name, _)| *name != own).map(|(_, look)| look.border_share(id));
+        let others: Vec<f64> = others.collect();
+        !others.is_empty() && median(others) <= INVERTED_ELSEWHERE
+    };
+    let found = with.iter().filter(|(name, look)| surrounds(look) && (only || elsewhere(name)));
+    let text = |look: &Look| {
+        let (share, border) = (percent(look.share(id)), percent(look.border_share(id)));
+        let unlike = if only { "it is the only object" } else { "in the other masks it does not surround the picture" };
+        format!(
+            "covers {share} of the picture and {border} of its border, and {unlike}: object and surroundings swapped?"
+        )
+    };
+    found.map(|(name, look)| finding(Problem::Inverted, name, Some(id), text(look))).collect()
+}
+
+fn nearly_empty_masks(masks: &[(&str, &Look)]) -> Vec<Finding> {
+    let usual = median(masks.iter().map(|(_, look)| look.labelled()).collect());
+    let few = |look: &Look| look.labelled() < usual * EMPTY_MASK;
+    let text = |look: &Look| {
+        format!("{} of the picture is labelled, in the median mask {}", percent(look.labelled()), percent(usual))
+    };
+    let found = masks.iter().filter(|(_, look)| few(look));
+    found.map(|(name, look)| finding(Problem::NearlyEmpty, name, None, text(look))).collect()
+}
+
+fn nearly_empty_objects(masks: &[(&str, &Look)], id: u16) -> Vec<Finding> {
+    let with: Vec<(&str, f64)> =
+        masks.iter().map(|(name, look)| (*name, look.share(id))).filter(|(_, share)| *share > 0.0).collect();
+    if with.len() < VIEWS_FOR_MEDIAN {
+        return Vec::new();
+    }
+    let usual = median(with.iter().map(|(_, share)| *share).collect());
+    let few = with.into_iter().filter(|(_, share)| *share < usual * EMPTY_OBJECT);
+    let text = |share| format!("covers {} of the picture, in the median mask {}", percent(share), percent(usual));
+    few.map(|(name, share)| finding(Problem::NearlyEmpty, name, Some(id), text(share))).collect()
+}
+
+fn single_view(masks: &[(&str, &Look)], id: u16) -> Option<Finding> {
+    let mut with = masks.iter().filter(|(_, look)| look.objects.contains_key(&id));
+    let (name, look) = with.next()?;
+    let text = || {
+        let (share, masks) = (percent(look.share(id)), masks.len());
+        format!("is in this mask only, of {masks}, and covers {share} of it: an object lost and found under two ids?")
+    };
+    (masks.len() > 1 && with.next().is_none()).then(|| finding(Problem::SingleView, name, Some(id), text()))
+}
+
+/// Absence in one mask between neighbours by name that both show the object. Points of the scene that lie on the
+/// object in both neighbours excuse it: if none of them falls into the picture, or if most of those that do fall on
+/// other objects that both neighbours show too, behind which it may be hidden.
+fn blinks(masks: &[(&str, &Look)], id: u16) -> Vec<Finding> {
+    let shown = |look: &Look| look.share(id) >= BLINK_SHARE;
+    let blinking = masks.windows(3).filter(|three| {
+        let [(_, before), (_, between), (_, after)] = three else { return false };
+        let absent = !between.objects.contains_key(&id);
+        absent && shown(before) && shown(after) && !excused(before, between, after, id)
+    });
+    let text = |before: &str, after: &str| format!("is absent here and present in {before} and {after}");
+    blinking.map(|three| finding(Problem::Blink, three[1].0, Some(id), text(three[0].0, three[2].0))).collect()
+}
+
+fn excused(before: &Look, between: &Look, after: &Look, id: u16) -> bool {
+    let sides = before.at_points.iter().zip(&after.at_points);
+    let on_object = sides.zip(&between.at_points).filter(|((a, b), _)| **a == Some(id) && **b == Some(id));
+    let between: Vec<Option<u16>> = on_object.map(|(_, between)| *between).collect();
+    let inside: Vec<u16> = between.iter().copied().flatten().collect();
+    let known = |other: &&u16| before.objects.contains_key(other) && after.objects.contains_key(other);
+    let behind = inside.iter().filter(known).count();
+    // Without any point on the object nothing speaks for it.
+    !between.is_empty() && (inside.is_empty() || behind * 2 > inside.len())
+}

@@ -1,0 +1,190 @@
+//! Which of the known forms a folder of masks has. Two readings that both fit are an error, never a choice.
+
+use super::content::{Kind, read_binary};
+use super::folder::{Claims, Layouts, files, layouts, root};
+use super::pred::Pred;
+use super::{Format, ImportOptions, shortened};
+use crate::error::{Error, Result};
+use crate::io::mask::read_header;
+use rayon::prelude::*;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+/// A folder of masks as it is going to be read.
+pub(super) struct Reading {
+    pub(super) format: Format,
+    /// The folder that really holds the masks.
+    pub(super) root: PathBuf,
+    /// Kind of the id pictures; `None` for black and white ones.
+    pub(super) ids: Option<Kind>,
+    pub(super) claims: Claims,
+    pub(super) pred: Option<Pred>,
+    /// What it was recognised by.
+    pub(super) why: String,
+    /// Classes that `classes.txt` lists and no picture shows.
+    pub(super) notes: Vec<String>,
+}
+
+const NESTED_FLAGS: &str = "--format binary-folders if a folder is an object (OBJECT/NAME.png), --format photo-folders if \
+                            a folder is a photo (NAME/OBJECT.png)";
+
+/// Finds out how the folder is to be read, for the photos of these names.
+pub(super) fn detect(photos: &[&str], options: &ImportOptions) -> Result<Reading> {
+    let root = root(&options.folder, options.format)?;
+    let files = files(&root)?;
+    let layouts = layouts(photos, &files);
+    let pred = options.pred.clone().or_else(|| Pred::find(&root));
+    let pred = pred.as_deref().map(Pred::read).transpose()?;
+    let (format, why) = match options.format {
+        Format::Auto => recognise(&root, &layouts, pred.as_ref(), photos)?,
+        format => (format, "as --format says".to_owned()),
+    };
+    let (claims, ids) = match format {
+        Format::DevaShort | Format::ObjectMask | Format::Auto => (layouts.flat, Some(Kind::Grey8)),
+        Format::DevaLong => (layouts.flat, Some(Kind::Rgb)),
+        Format::Palette => (layouts.flat, Some(Kind::Palette)),
+        Format::Grey16 => (layouts.flat, Some(Kind::Grey16)),
+        Format::BinaryFolders => (layouts.by_object, None),
+        Format::PhotoFolders | Format::LerfMask | Format::ThreeDOvs => (layouts.by_photo, None),
+    };
+    if claims.photos() == 0 {
+        return Err(nothing_found(&root, &files, photos));
+    }
+    if ids.is_none() && options.pred.is_some() {
+        let problem = "belongs to id pictures, and this folder has black and white ones; leave it out";
+        return Err(Error::usage("--pred", problem));
+    }
+    let notes = if format == Format::ThreeDOvs { classes_without_mask(&root, &claims)? } else { Vec::new() };
+    Ok(Reading { format, root, ids, claims, pred: pred.filter(|_| ids.is_some()), why, notes })
+}
+
+fn recognise(root: &Path, layouts: &Layouts, pred: Option<&Pred>, photos: &[&str]) -> Result<(Format, String)> {
+    let Layouts { flat, by_object, by_photo } = layouts;
+    let grey = |claims: &Claims| if claims.photos() == 0 { None } else { Some(first_grey(root, claims)) };
+    let (object_grey, photo_grey) = (grey(by_object), grey(by_photo));
+    let binary = |grey: &Option<Option<String>>| matches!(grey, Some(None));
+    match (flat.photos() > 0, binary(&object_grey), binary(&photo_grey)) {
+        (true, false, false) => flat_format(root, flat, pred),
+        (false, true, false) => {
+            let count = by_object.objects().len();
+            Ok((Format::BinaryFolders, format!("{count} folders hold a black and white picture per photo")))
+        }
+        (false, false, true) => {
+            let named = |name: &str| root.file_name().is_some_and(|found| found == name);
+            let why = format!("{} folders of the names of photos hold black and white pictures", by_photo.photos());
+            Ok(if root.join("classes.txt").is_file() {
+                (Format::ThreeDOvs, format!("{why}, and there is a classes.txt"))
+            } else if named("test_mask") {
+                (Format::LerfMask, format!("{why}, and the folder is called test_mask"))
+            } else {
+                (Format::PhotoFolders, why)
+            })
+        }
+        (false, false, false) => Err(match object_grey.or(photo_grey).flatten() {
+            Some(file) => {
+                let problem = format!(
+                    "pictures in folders must be black and white to be recognised, with one value besides 0, and \
+                     {file} is not. If it has soft edges, say {NESTED_FLAGS}: values in the upper half are then the \
+                     object. Id pictures belong into one folder, named like the photos"
+                );
+                Error::data(root, "", problem)
+            }
+            None => nothing_found(root, &files(root)?, photos),
+        }),
+        (flat_fits, object_fits, photo_fits) => {
+            let readings = [
+                (flat_fits, "NAME.png", flat),
+                (object_fits, "OBJECT/NAME.png", by_object),
+                (photo_fits, "NAME/OBJECT.png", by_photo),
+            ];
+            let fits = readings.iter().filter(|(fits, ..)| *fits);
+            let fits = fits.map(|(_, text, claims)| format!("{text} ({} photos)", claims.photos()));
+            let problem = format!(
+                "can be read in more than one way: {}. Say {NESTED_FLAGS}, or for id pictures one of --format \
+                 deva-short, deva-long, palette and grey16",
+                fits.collect::<Vec<_>>().join(", ")
+            );
+            Err(Error::data(root, "", problem))
+        }
+    }
+}
+
+/// The first picture that is not plainly black and white, if there is one. One that cannot be read is not.
+fn first_grey(root: &Path, claims: &Claims) -> Option<String> {
+    let files: Vec<&str> = claims.files().collect();
+    let grey = files.par_iter().find_first(|file| !read_binary(&root.join(file), |_| Ok(())).is_ok_and(|b| b.sharp));
+    grey.map(|file| (*file).to_owned())
+}
+
+/// The form of id pictures, by their headers.
+fn flat_format(root: &Path, claims: &Claims, pred: Option<&Pred>) -> Result<(Format, String)> {
+    let mut kinds: BTreeMap<Kind, Vec<&str>> = BTreeMap::new();
+    for file in claims.files() {
+        kinds.entry(Kind::of(&read_header(&root.join(file))?)).or_default().push(file);
+    }
+    if kinds.len() > 1 {
+        let counts = kinds.iter().map(|(kind, files)| format!("{} {} ({})", files.len(), kind.text(), files[0]));
+        let problem = format!(
+            "holds pictures of different kinds, {}; ids of different kinds cannot be told to be the same. Keep those \
+             of one kind",
+            counts.collect::<Vec<_>>().join(", ")
+        );
+        return Err(Error::data(root, "", problem));
+    }
+    let Some((kind, files)) = kinds.into_iter().next() else { return Err(Error::Bug("no mask has a kind".into())) };
+    let mut why = format!("{} pictures of the names of photos, all {}", files.len(), kind.text());
+    if let Some(pred) = pred {
+        why += &format!(", with ids of {}", pred.path.display());
+    }
+    let format = match kind {
+        Kind::Grey8 if pred.is_none() && root.file_name().is_some_and(|name| name == "object_mask") => {
+            why += ", and the folder is called object_mask";
+            Format::ObjectMask
+        }
+        Kind::Grey8 => Format::DevaShort,
+        Kind::Grey16 => Format::Grey16,
+        Kind::Palette => Format::Palette,
+        Kind::Rgb if pred.is_some() => Format::DevaLong,
+        Kind::Rgb => {
+            let problem = "holds RGB pictures and no pred.json, so they may be ids as of DEVA or colours for looking \
+                           at. Say --format deva-long if R + 256 G + 65536 B is the id, or --pred with the pred.json of \
+                           the run; colours for looking at cannot be read, import the id pictures that they were made \
+                           from";
+            return Err(Error::data(root, "", problem));
+        }
+        Kind::Other => {
+            let problem = format!("{} is {}, which holds no ids; import the id pictures", files[0], kind.text());
+            return Err(Error::data(root, "", problem));
+        }
+    };
+    Ok((format, why))
+}
+
+fn nothing_found(root: &Path, files: &[String], photos: &[&str]) -> Error {
+    let photo = photos.first().copied().unwrap_or_default();
+    let name = Path::new(photo).with_extension("");
+    let name = name.to_string_lossy();
+    let there = match files {
+        [] => "it is empty".to_owned(),
+        files => format!("it holds {}", shortened(files)),
+    };
+    let problem = format!(
+        "no picture belongs to a photo of the scene: expected for example {name}.png, OBJECT/{name}.png or \
+         {name}/OBJECT.png, and {there}. Masks are named after the photos, and PNG, as JPEG changes ids"
+    );
+    Error::data(root, "", problem)
+}
+
+/// Notes on classes that 3D-OVS lists and of which there is no picture.
+fn classes_without_mask(root: &Path, claims: &Claims) -> Result<Vec<String>> {
+    let path = root.join("classes.txt");
+    if !path.is_file() {
+        return Ok(vec![format!("{} is not there", path.display())]);
+    }
+    let text = std::fs::read_to_string(&path).map_err(Error::read(&path))?;
+    let objects = claims.objects();
+    let lines = text.lines().map(str::trim).filter(|line| !line.is_empty());
+    let without: Vec<&str> = lines.filter(|class| !objects.iter().any(|object| object == class)).collect();
+    let note = || format!("classes.txt lists {} without any mask: {}", without.len(), shortened(&without));
+    Ok(if without.is_empty() { Vec::new() } else { vec![note()] })
+}

@@ -1,0 +1,176 @@
+//! What lies in a folder of masks, and which of it belongs to which photo.
+
+use super::Format;
+use crate::error::{Error, Result};
+use crate::io::mask::PhotoNames;
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+
+/// Folders deeper than this are not looked into; a link to a parent ends there.
+const DEPTH_MAX: usize = 8;
+
+/// Folders in which data sets and trackers keep masks, and what then is typed.
+const KNOWN: [(&str, &[Format]); 4] = [
+    ("Annotations", &[Format::DevaLong, Format::DevaShort, Format::Palette]),
+    ("object_mask", &[Format::ObjectMask]),
+    ("test_mask", &[Format::LerfMask]),
+    ("segmentations", &[Format::ThreeDOvs]),
+];
+
+/// The files below a folder, sorted, by their path in it with `/` between. Hidden ones are left out.
+pub(super) fn files(root: &Path) -> Result<Vec<String>> {
+    let mut found = Vec::new();
+    walk(root, "", 0, &mut found)?;
+    found.sort();
+    Ok(found)
+}
+
+fn walk(folder: &Path, prefix: &str, depth: usize, found: &mut Vec<String>) -> Result<()> {
+    for entry in std::fs::read_dir(folder).map_err(Error::read(folder))? {
+        let path = entry.map_err(Error::read(folder))?.path();
+        let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+        if name.starts_with('.') {
+            continue;
+        }
+        if !path.is_dir() {
+            found.push(format!("{prefix}{name}"));
+        } else if depth < DEPTH_MAX {
+            walk(&path, &format!("{prefix}{name}/"), depth + 1, found)?;
+        }
+    }
+    Ok(())
+}
+
+/// `name` without `.png`, in any case of letters, or `None` for another kind of file.
+pub(super) fn png_key(name: &str) -> Option<&str> {
+    let at = name.len().checked_sub(4)?;
+    name.get(at..)?.eq_ignore_ascii_case(".png").then(|| &name[..at])
+}
+
+/// The folder that really holds the masks: `folder`, or the one in it that is known to.
+pub(super) fn root(folder: &Path, format: Format) -> Result<PathBuf> {
+    if !folder.is_dir() {
+        return Err(Error::data(folder, "", "there is no such folder of masks"));
+    }
+    let inside = KNOWN.iter().filter(|(name, _)| folder.join(name).is_dir());
+    if format != Format::Auto {
+        let fitting = inside.into_iter().find(|(_, formats)| formats.contains(&format));
+        return Ok(fitting.map_or(folder.to_owned(), |(name, _)| folder.join(name)));
+    }
+    let entries = std::fs::read_dir(folder).map_err(Error::read(folder))?;
+    if entries.flatten().any(|entry| png_key(&entry.file_name().to_string_lossy()).is_some()) {
+        return Ok(folder.to_owned());
+    }
+    match *inside.map(|(name, formats)| (*name, formats[0])).collect::<Vec<_>>() {
+        [] => Ok(folder.to_owned()),
+        [(name, _)] => Ok(folder.join(name)),
+        ref several => {
+            let names: Vec<&str> = several.iter().map(|(name, _)| *name).collect();
+            let flags: Vec<String> = several.iter().map(|(_, format)| format!("--format {}", format.flag())).collect();
+            let problem = format!(
+                "holds more than one kind of masks ({}); name one of these folders, or say {}",
+                names.join(", "),
+                flags.join(" or ")
+            );
+            Err(Error::data(folder, "", problem))
+        }
+    }
+}
+
+/// What masks of a photo may be called, without `.png`, for each photo.
+pub(super) fn photo_keys(photos: &[&str]) -> Vec<Vec<String>> {
+    let names = PhotoNames::new(photos.iter().copied());
+    let keys = |photo: &&str| {
+        let keys = names.keys(photo).into_iter();
+        let mut keys: Vec<String> = keys.map(|key| key.to_string_lossy().replace('\\', "/")).collect();
+        // DEVA takes four characters away whatever the extension is: `a.jpeg` becomes `a..png`.
+        keys.extend(photo.len().checked_sub(4).and_then(|at| photo.get(..at)).map(str::to_owned));
+        keys
+    };
+    photos.iter().map(keys).collect()
+}
+
+/// The first key of each photo that is in `there`.
+pub(super) fn claim(keys: &[Vec<String>], there: &BTreeSet<&str>) -> Vec<Option<String>> {
+    keys.iter().map(|keys| keys.iter().find(|key| there.contains(key.as_str())).cloned()).collect()
+}
+
+/// Files by photo for one way in which they may be laid out.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Claims {
+    /// For each photo: its files with the object that each shows; the object is empty where a file shows all.
+    pub(super) of_photo: Vec<Vec<(String, String)>>,
+    /// PNG files that belong to no photo.
+    pub(super) strays: Vec<String>,
+}
+
+impl Claims {
+    /// Photos that have a file.
+    pub(super) fn photos(&self) -> usize {
+        self.of_photo.iter().filter(|files| !files.is_empty()).count()
+    }
+
+    /// All files.
+    pub(super) fn files(&self) -> impl Iterator<Item = &str> {
+        self.of_photo.iter().flatten().map(|(_, file)| file.as_str())
+    }
+
+    /// Names of the objects: in the order of their numbers if all are numbers, otherwise of their letters.
+    pub(super) fn objects(&self) -> Vec<String> {
+        let names: BTreeSet<&String> = self.of_photo.iter().flatten().map(|(object, _)| object).collect();
+        let mut names: Vec<String> = names.into_iter().cloned().collect();
+        if names.iter().all(|name| name.parse::<u64>().is_ok()) {
+            names.sort_by_key(|name| (name.parse::<u64>().unwrap_or(u64::MAX), name.clone()));
+        }
+        names
+    }
+}
+
+fn claims<'a>(
+    keys: &[Vec<String>],
+    files: &[(&'a str, &'a str)],
+    split: impl Fn(&'a str) -> Option<(&'a str, &'a str)>,
+) -> Claims {
+    // Object, then key of the photo, then file.
+    let mut there: BTreeMap<&str, BTreeMap<&str, &str>> = BTreeMap::new();
+    for (key, file) in files {
+        if let Some((object, photo)) = split(key) {
+            there.entry(object).or_default().insert(photo, file);
+        }
+    }
+    let mut of_photo = vec![Vec::new(); keys.len()];
+    let mut claimed = BTreeSet::new();
+    for (object, of_object) in &there {
+        let names = of_object.keys().copied().collect();
+        for (photo, key) in claim(keys, &names).into_iter().enumerate() {
+            if let Some(file) = key.and_then(|key| of_object.get(key.as_str())) {
+                claimed.insert(*file);
+                of_photo[photo].push(((*object).to_owned(), (*file).to_owned()));
+            }
+        }
+    }
+    let strays = files.iter().map(|(_, file)| *file).filter(|file| !claimed.contains(file)).map(str::to_owned);
+    Claims { of_photo, strays: strays.collect() }
+}
+
+/// The three ways to lay out masks.
+pub(super) struct Layouts {
+    /// `NAME.png`.
+    pub(super) flat: Claims,
+    /// `OBJECT/NAME.png`.
+    pub(super) by_object: Claims,
+    /// `NAME/OBJECT.png`.
+    pub(super) by_photo: Claims,
+}
+
+/// All three readings of a list of files.
+pub(super) fn layouts(photos: &[&str], files: &[String]) -> Layouts {
+    let keys = photo_keys(photos);
+    let pngs: Vec<(&str, &str)> =
+        files.iter().filter_map(|file| png_key(file).map(|key| (key, file.as_str()))).collect();
+    Layouts {
+        flat: claims(&keys, &pngs, |key| Some(("", key))),
+        by_object: claims(&keys, &pngs, |key| key.split_once('/')),
+        by_photo: claims(&keys, &pngs, |key| key.rsplit_once('/').map(|(photo, object)| (object, photo))),
+    }
+}

@@ -1,0 +1,304 @@
+//! Masks in any known form to our own.
+//!
+//! Everything is read and checked before the first file is written.
+
+use super::content::{read_binary, read_ids};
+use super::detect::{Reading, detect};
+use super::{Format, ImportOptions, Overlap, shortened};
+use crate::error::{Error, Result};
+use crate::io::label_table::{FILE, LabelEntry, LabelTable};
+use crate::io::load::all_or_one_error;
+use crate::io::mask::with_png;
+use crate::io::{image, resample::same_aspect};
+use crate::scene::labels::LABEL_MAX;
+use crate::scene::{Dataset, View};
+use rayon::prelude::*;
+use serde::Serialize;
+use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::path::{Path, PathBuf};
+
+/// Pixels that more than one black and white mask claimed.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct Overlaps {
+    /// Who got them.
+    pub rule: Overlap,
+    /// Over all photos.
+    pub pixels: u64,
+    /// Photos with any.
+    pub photos: usize,
+}
+
+/// What an import found and made.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Imported {
+    /// How the masks were read.
+    pub format: Format,
+    /// What that was recognised by.
+    pub why: String,
+    /// The folder that really held the masks.
+    pub source: PathBuf,
+    /// The `pred.json` that was used.
+    pub pred: Option<PathBuf>,
+    /// Photos of the scene.
+    pub photos: usize,
+    /// Masks written.
+    pub masks: usize,
+    /// Bits of a pixel in them: 8 or 16.
+    pub bits: u8,
+    /// The labels, as in `labels.json`.
+    pub labels: Vec<LabelEntry>,
+    /// Pixels in several black and white masks.
+    pub overlaps: Overlaps,
+    /// Photos without a mask.
+    pub photos_without_mask: Vec<String>,
+    /// Pictures that belong to no photo.
+    pub masks_without_photo: Vec<String>,
+    /// What else a person should know.
+    pub notes: Vec<String>,
+}
+
+/// Pixels shared by two source ids, the smaller first.
+type Shared = BTreeMap<(u32, u32), u64>;
+
+/// The mask of a photo with ids of the source.
+struct Decoded {
+    size: (u32, u32),
+    ids: Vec<u32>,
+    shared: Shared,
+    /// Black and white pictures that had to be cut at half of their range.
+    cut: usize,
+}
+
+/// What is kept of a mask between the two readings.
+struct Survey {
+    pixels: BTreeMap<u32, u64>,
+    shared: Shared,
+    cut: usize,
+}
+
+/// Imports the masks of the photos of `dataset` into the folder `output`, which must be new or empty.
+pub fn import(dataset: &Dataset, options: &ImportOptions, output: &Path) -> Result<Imported> {
+    if output.exists() && std::fs::read_dir(output).map_err(Error::write(output))?.next().is_some() {
+        return Err(Error::usage("--output", format!("{} is not empty; name a new folder", output.display())));
+    }
+    let views = dataset.all();
+    let names: Vec<&str> = views.iter().map(|view| view.name.as_str()).collect();
+    let reading = detect(&names, options)?;
+    let objects = reading.claims.objects();
+    let decode = |photo: usize| decode(&reading, &objects, photo, views[photo], options.overlap);
+    let with_mask: Vec<usize> = (0..views.len()).filter(|&at| !reading.claims.of_photo[at].is_empty()).collect();
+    let surveys = with_mask.par_iter().map(|&photo| decode(photo).and_then(|decoded| survey(&reading, decoded)));
+    let surveys = all_or_one_error(&reading.root, surveys.collect())?;
+    let overlaps = overlaps(&reading, options.overlap, &surveys, &objects, |at| names[with_mask[at]])?;
+    let (labels, new_ids) = labels(&reading, &surveys, &objects)?;
+
+    let bits = if labels.len() > 255 { 16 } else { 8 };
+    let files = output_names(&names);
+    let written = with_mask.par_iter().map(|&photo| {
+        let decoded = decode(photo)?;
+        // Every id is known from the first reading; 0 is none's.
+        let ids = decoded.ids.iter().map(|id| new_ids.get(id).copied().unwrap_or(0));
+        let (path, (width, height)) = (output.join(&files[photo]), decoded.size);
+        match bits {
+            8 => image::write_png_grey8(path, width, height, &ids.map(|id| id as u8).collect::<Vec<_>>()),
+            _ => image::write_png_grey16(path, width, height, &ids.collect::<Vec<_>>()),
+        }
+    });
+    written.collect::<Vec<Result<()>>>().into_iter().collect::<Result<()>>()?;
+    let table = LabelTable::new(labels);
+    table.write(&output.join(FILE))?;
+
+    let without = (0..views.len()).filter(|&at| reading.claims.of_photo[at].is_empty());
+    let notes = notes(&reading, &surveys, &table);
+    Ok(Imported {
+        photos_without_mask: without.map(|at| names[at].to_owned()).collect(),
+        format: reading.format,
+        why: reading.why,
+        source: reading.root,
+        pred: reading.pred.map(|pred| pred.path),
+        photos: views.len(),
+        masks: with_mask.len(),
+        bits,
+        labels: table.labels,
+        overlaps,
+        masks_without_photo: reading.claims.strays,
+        notes,
+    })
+}
+
+fn decode(reading: &Reading, objects: &[String], photo: usize, view: &View, rule: Overlap) -> Result<Decoded> {
+    let files = &reading.claims.of_photo[photo];
+    let camera = &view.camera;
+    let fits = |path: &Path, found: (u32, u32)| {
+        if same_aspect(found, (camera.width, camera.height)) {
+            return Ok(());
+        }
+        let problem = format!(
+            "the mask has {} x {} px and its photo {} {} x {} px, which no scale explains; make masks of the same photos",
+            found.0, found.1, view.name, camera.width, camera.height
+        );
+        Err(Error::data(path, "", problem))
+    };
+    if let (Some(kind), [(_, file)]) = (reading.ids, files.as_slice()) {
+        let path = reading.root.join(file);
+        let read = read_ids(&path, kind, |found| fits(&path, found))?;
+        return Ok(Decoded { size: read.size, ids: read.ids, shared: Shared::new(), cut: 0 });
+    }
+    let mut layers = Vec::with_capacity(files.len());
+    for (object, file) in files {
+        let path = reading.root.join(file);
+        let mask = read_binary(&path, |found| fits(&path, found))?;
+        let id = objects.iter().position(|name| name == object).map_or(0, |at| at as u32 + 1);
+        layers.push((id, path, mask));
+    }
+    let size = layers.first().map_or((0, 0), |(_, _, mask)| mask.size);
+    if let Some((_, path, mask)) = layers.iter().find(|(_, _, mask)| mask.size != size) {
+        let problem = format!(
+            "has {} x {} px and another mask of {} {} x {} px; masks of a photo need one size",
+            mask.size.0, mask.size.1, view.name, size.0, size.1
+        );
+        return Err(Error::data(path, "", problem));
+    }
+    let cut = layers.iter().filter(|(_, _, mask)| !mask.sharp).count();
+    let mut layers: Vec<(u32, Vec<bool>)> = layers.into_iter().map(|(id, _, mask)| (id, mask.inside)).collect();
+    layers.sort_by_key(|(id, inside)| {
+        let pixels = inside.iter().filter(|&&inside| inside).count();
+        // Painted later is on top.
+        (if rule == Overlap::Smaller { std::cmp::Reverse(pixels) } else { std::cmp::Reverse(0) }, *id)
+    });
+    let (ids, shared) = paint(size, &layers);
+    Ok(Decoded { size, ids, shared, cut })
+}
+
+/// Paints layers over each other.
+fn paint((width, height): (u32, u32), layers: &[(u32, Vec<bool>)]) -> (Vec<u32>, Shared) {
+    let mut ids = vec![0; width as usize * height as usize];
+    let mut shared = Shared::new();
+    for (id, inside) in layers {
+        for (pixel, _) in ids.iter_mut().zip(inside).filter(|(_, inside)| **inside) {
+            if *pixel != 0 {
+                *shared.entry((*id.min(pixel), *id.max(pixel))).or_default() += 1;
+            }
+            *pixel = *id;
+        }
+    }
+    (ids, shared)
+}
+
+fn survey(reading: &Reading, decoded: Decoded) -> Result<Survey> {
+    let mut pixels = BTreeMap::new();
+    // Whole runs at once: neighbours mostly have one id.
+    for run in decoded.ids.chunk_by(|a, b| a == b).filter(|run| run[0] != 0) {
+        *pixels.entry(run[0]).or_default() += run.len() as u64;
+    }
+    if pixels.len() > LABEL_MAX as usize {
+        return Err(too_many(&reading.root, pixels.len()));
+    }
+    Ok(Survey { pixels, shared: decoded.shared, cut: decoded.cut })
+}
+
+fn too_many(root: &Path, count: usize) -> Error {
+    let problem = format!(
+        "{count} different ids, and a label is at most {LABEL_MAX}; if these are colours of a picture and no ids, \
+         import the id pictures, otherwise leave out small tracks before"
+    );
+    Error::data(root, "", problem)
+}
+
+fn overlaps<'a>(
+    reading: &Reading,
+    rule: Overlap,
+    surveys: &[Survey],
+    objects: &[String],
+    name: impl Fn(usize) -> &'a str,
+) -> Result<Overlaps> {
+    let pixels = surveys.iter().flat_map(|survey| survey.shared.values()).sum();
+    let photos = surveys.iter().filter(|survey| !survey.shared.is_empty()).count();
+    let all = surveys.iter().enumerate();
+    let pairs = all.flat_map(|(at, survey)| survey.shared.iter().map(move |(&pair, &count)| (count, at, pair)));
+    let worst = pairs.max_by_key(|&(count, at, pair)| (count, std::cmp::Reverse((at, pair))));
+    if let (Overlap::Error, Some((count, at, (a, b)))) = (rule, worst) {
+        let object = |id: u32| objects.get(id as usize - 1).map_or("", String::as_str);
+        let problem = format!(
+            "{pixels} pixels in {photos} photos belong to more than one object, most of them in {}: {count} of {} and \
+             {}. Say --overlap smaller if the object with fewer pixels in the photo has them, or --overlap later if the \
+             later one by name has",
+            name(at),
+            object(a),
+            object(b)
+        );
+        return Err(Error::data(&reading.root, "", problem));
+    }
+    Ok(Overlaps { rule, pixels, photos })
+}
+
+/// The entries of the new labels, and the new id of each id of the source.
+fn labels(reading: &Reading, surveys: &[Survey], objects: &[String]) -> Result<(Vec<LabelEntry>, HashMap<u32, u16>)> {
+    let black_and_white = reading.ids.is_none();
+    let mut found: BTreeMap<u32, (u64, u32)> = BTreeMap::new();
+    if black_and_white {
+        // An object whose masks are all empty keeps its place, so that ids depend on names alone.
+        found.extend((1..=objects.len() as u32).map(|id| (id, (0, 0))));
+    }
+    for (id, pixels) in surveys.iter().flat_map(|survey| &survey.pixels) {
+        let (sum, views) = found.entry(*id).or_default();
+        (*sum, *views) = (*sum + pixels, *views + 1);
+    }
+    if found.len() > LABEL_MAX as usize {
+        return Err(too_many(&reading.root, found.len()));
+    }
+    if found.values().all(|&(pixels, _)| pixels == 0) {
+        return Err(Error::data(&reading.root, "", "every pixel of every mask is 0, so no object is marked"));
+    }
+    if let Some(pred) = &reading.pred {
+        pred.check(&reading.root, &found.keys().copied().collect())?;
+    }
+    let mut taken = BTreeSet::new();
+    let mut entries = Vec::with_capacity(found.len());
+    for (at, (&source, &(pixels, views))) in found.iter().enumerate() {
+        let name = match &reading.pred {
+            _ if black_and_white => objects.get(source as usize - 1).cloned(),
+            Some(pred) => pred.ids.get(&source).cloned().flatten(),
+            None => None,
+        };
+        let text = if black_and_white { name.clone() } else { Some(source.to_string()) };
+        let name = name.map(|name| unique(name, &mut taken));
+        entries.push(LabelEntry { name, source: text, pixels, views, ..LabelEntry::new(at as u32 + 1) });
+    }
+    let new_ids = found.keys().zip(1..=u16::MAX).map(|(&source, id)| (source, id)).collect();
+    Ok((entries, new_ids))
+}
+
+/// `name`, or with the first number behind it that makes it one of a kind.
+fn unique(name: String, taken: &mut BTreeSet<String>) -> String {
+    let numbered = (2..).map(|number| format!("{name} {number}"));
+    let free = std::iter::once(name.clone()).chain(numbered).find(|name| !taken.contains(name)).unwrap_or(name);
+    taken.insert(free.clone());
+    free
+}
+
+/// Names of the masks: those of the photos with `.png` in place of the extension, or after it where two photos differ
+/// in nothing else.
+fn output_names(photos: &[&str]) -> Vec<PathBuf> {
+    let mut count: HashMap<PathBuf, usize> = HashMap::new();
+    photos.iter().for_each(|name| *count.entry(Path::new(name).with_extension("")).or_default() += 1);
+    let own = |name: &&str| {
+        let bare = Path::new(name).with_extension("");
+        with_png(if count.get(&bare) == Some(&1) { &bare } else { Path::new(name) })
+    };
+    photos.iter().map(own).collect()
+}
+
+fn notes(reading: &Reading, surveys: &[Survey], table: &LabelTable) -> Vec<String> {
+    let mut notes = reading.notes.clone();
+    let cut: usize = surveys.iter().map(|survey| survey.cut).sum();
+    if cut > 0 {
+        notes.push(format!("{cut} masks have more values than black and one other; the upper half of the range is in"));
+    }
+    let empty = table.labels.iter().filter(|entry| entry.pixels == 0).filter_map(|entry| entry.name.clone());
+    let empty: Vec<String> = empty.collect();
+    if !empty.is_empty() {
+        notes.push(format!("{} objects have no pixel in any mask: {}", empty.len(), shortened(&empty)));
+    }
+    notes
+}

@@ -1,0 +1,72 @@
+//! A folder of masks in our own form against its scene.
+
+use super::check::{Finding, Look, Problem, findings};
+use super::folder::files;
+use crate::error::{Error, Result};
+use crate::io::label_table::FILE;
+use crate::io::mask::{MaskFolder, read_header, read_mask};
+use crate::io::resample::same_aspect;
+use crate::scene::{Dataset, View};
+use rayon::prelude::*;
+use serde::Serialize;
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+
+/// What is in a folder of masks, and what is wrong with it.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Report {
+    /// Photos of the scene.
+    pub photos: usize,
+    /// Photos with a usable mask.
+    pub masks: usize,
+    /// Ids in them.
+    pub ids: Vec<u32>,
+    /// What looks wrong, by kind.
+    pub findings: Vec<Finding>,
+}
+
+/// Looks at the masks in `folder` of the photos of `dataset`. What cannot be used is a finding, not an error.
+pub fn inspect(dataset: &Dataset, folder: &Path) -> Result<Report> {
+    let views = dataset.all();
+    let masks = MaskFolder::new(folder, views.iter().map(|view| view.name.as_str()))?;
+    let paths: Vec<Option<PathBuf>> = views.iter().map(|view| masks.find(&view.name)).collect();
+    let looks: Vec<Result<Look, Finding>> =
+        views.par_iter().zip(&paths).map(|(view, path)| look(dataset, view, path.as_deref())).collect();
+
+    let mut found = misnamed(folder, &paths)?;
+    let mut usable = Vec::new();
+    for (view, look) in views.iter().zip(&looks) {
+        match look {
+            Ok(look) => usable.push((view.name.as_str(), look)),
+            Err(finding) => found.push(finding.clone()),
+        }
+    }
+    found.extend(findings(&usable));
+    found.sort();
+    let ids: BTreeSet<u32> = usable.iter().flat_map(|(_, look)| look.ids()).collect();
+    Ok(Report { photos: views.len(), masks: usable.len(), ids: ids.into_iter().collect(), findings: found })
+}
+
+fn look(dataset: &Dataset, view: &View, path: Option<&Path>) -> Result<Look, Finding> {
+    let finding = |problem, text: String| Finding { problem, view: Some(view.name.clone()), id: None, text };
+    let Some(path) = path else { return Err(finding(Problem::Missing, "has no mask".into())) };
+    let unreadable = |error: Error| finding(Problem::Unreadable, error.to_string());
+    let size = read_header(path).map_err(unreadable)?.size;
+    let photo = (view.camera.width, view.camera.height);
+    if !same_aspect(size, photo) {
+        let (mask, photo) = (format!("{} x {} px", size.0, size.1), format!("{} x {} px", photo.0, photo.1));
+        let text = format!("{} has {mask} and the photo {photo}, which no scale explains", path.display());
+        return Err(finding(Problem::Missized, text));
+    }
+    let map = read_mask(path).map_err(unreadable)?;
+    Ok(Look::new(&map, &view.camera, &dataset.points))
+}
+
+/// Files that no photo uses.
+fn misnamed(folder: &Path, used: &[Option<PathBuf>]) -> Result<Vec<Finding>> {
+    let used: BTreeSet<&Path> = used.iter().flatten().map(PathBuf::as_path).collect();
+    let unused = files(folder)?.into_iter().filter(|file| file != FILE && !used.contains(folder.join(file).as_path()));
+    let text = |file: String| format!("{file} belongs to no photo");
+    let finding = |file| Finding { problem: Problem::Misnamed, view: None, id: None, text: text(file) };
+    Ok(unused.map(finding).collect())
+}

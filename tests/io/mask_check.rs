@@ -1,0 +1,190 @@
+//! What `masks check` finds: each kind where it was planted, and nothing in clean masks.
+
+use super::mask_forms::*;
+use labelgs::io::image::write_png_grey8;
+use labelgs::io::masks::check::{Finding, Look, Problem, findings};
+use labelgs::io::masks::{Report, inspect};
+use labelgs::io::{self, LoadOptions};
+use labelgs::scene::{Camera, Dataset, LabelMap, Point};
+use labelgs::synth::{self, SynthOptions};
+use std::fs;
+use std::path::Path;
+use tempfile::TempDir;
+
+const WIDTH: u32 = 96;
+const HEIGHT: u32 = 72;
+
+/// A made scene of 24 views with masks by a ray tracer.
+fn made() -> (TempDir, Dataset) {
+    let folder = tempfile::tempdir().expect("folder");
+    let options = SynthOptions { width: WIDTH, height: HEIGHT, views: 24, points: 800, ..SynthOptions::default() };
+    synth::write(&options, folder.path(), &|_| Ok(())).expect("written");
+    let load = LoadOptions { photos: false, test_every: None, ..LoadOptions::default() };
+    let dataset = io::open(folder.path(), &load).expect("a scene");
+    (folder, dataset)
+}
+
+fn report(folder: &TempDir, dataset: &Dataset) -> Report {
+    inspect(dataset, &folder.path().join("masks")).expect("a report")
+}
+
+/// Changes the ids of one mask.
+fn edit(folder: &TempDir, name: &str, change: impl Fn(usize, u16) -> u16) {
+    let path = folder.path().join("masks").join(name);
+    let map = labelgs::io::mask::read_mask(&path).expect("a mask");
+    let ids: Vec<u8> = map.ids.iter().enumerate().map(|(index, &id)| change(index, id) as u8).collect();
+    write_png_grey8(&path, map.width, map.height, &ids).expect("written");
+}
+
+fn short(findings: &[Finding]) -> Vec<(Problem, Option<&str>, Option<u32>)> {
+    findings.iter().map(|finding| (finding.problem, finding.view.as_deref(), finding.id)).collect()
+}
+
+#[test]
+fn clean_masks_give_nothing() {
+    let (folder, dataset) = made();
+    let report = report(&folder, &dataset);
+    assert_eq!(report.findings, []);
+    assert_eq!((report.photos, report.masks, report.ids), (24, 24, (1..=8).collect::<Vec<u32>>()));
+}
+
+#[test]
+fn files_that_do_not_fit_their_photos_are_found() {
+    let (folder, dataset) = made();
+    let masks = folder.path().join("masks");
+    fs::rename(masks.join("003.png"), masks.join("3.png")).expect("renamed");
+    write_png_grey8(masks.join("005.png"), 72, 72, &[1; 72 * 72]).expect("written");
+    // Half of the size is a scale.
+    write_png_grey8(masks.join("006.png"), WIDTH / 2, HEIGHT / 2, &vec![1; (WIDTH * HEIGHT / 4) as usize])
+        .expect("written");
+    fs::write(masks.join("007.png"), "text").expect("written");
+    png(&masks.join("008.png"), (WIDTH, HEIGHT), png::ColorType::Rgb, png::BitDepth::Eight, &vec![1; 3 * 96 * 72]);
+    fs::write(masks.join("009.jpg"), "text").expect("written");
+    fs::write(masks.join("labels.json"), "belongs here").expect("written");
+    let report = report(&folder, &dataset);
+    let files = report.findings.iter().filter(|finding| finding.problem <= Problem::Unreadable);
+    let files: Vec<Finding> = files.cloned().collect();
+    let expected = [
+        (Problem::Missing, Some("003.png"), None),
+        (Problem::Misnamed, None, None),
+        (Problem::Misnamed, None, None),
+        (Problem::Missized, Some("005.png"), None),
+        (Problem::Unreadable, Some("007.png"), None),
+        (Problem::Unreadable, Some("008.png"), None),
+    ];
+    assert_eq!(short(&files), expected);
+    assert!(files[1].text.contains("009.jpg") && files[2].text.contains("3.png"), "{files:?}");
+    assert!(files[3].text.contains("72 x 72 px") && files[5].text.contains("Rgb"), "{files:?}");
+    assert_eq!(report.masks, 20);
+}
+
+#[test]
+fn a_mask_with_object_and_surroundings_swapped_is_found() {
+    let (folder, dataset) = made();
+    edit(&folder, "004.png", |_, id| if id == 2 { 0 } else { 2 });
+    let found = report(&folder, &dataset).findings;
+    let inverted: Vec<Finding> = found.into_iter().filter(|finding| finding.problem == Problem::Inverted).collect();
+    assert_eq!(short(&inverted), [(Problem::Inverted, Some("004.png"), Some(2))]);
+    // A single object, swapped everywhere.
+    for view in dataset.all() {
+        edit(&folder, &view.name, |_, id| u16::from(id != 1));
+    }
+    let found = report(&folder, &dataset).findings;
+    assert_eq!(found.len(), 24, "{found:?}");
+    assert!(found.iter().all(|finding| finding.problem == Problem::Inverted && finding.id == Some(1)), "{found:?}");
+}
+
+#[test]
+fn nearly_empty_masks_and_objects_are_found() {
+    let (folder, dataset) = made();
+    edit(&folder, "010.png", |_, _| 0);
+    let found = report(&folder, &dataset).findings;
+    let empty: Vec<Finding> = found.into_iter().filter(|finding| finding.problem == Problem::NearlyEmpty).collect();
+    assert_eq!(short(&empty), [(Problem::NearlyEmpty, Some("010.png"), None)]);
+
+    // Five masks of 400 px: an id with half of them, and in one a single pixel, of 0.5 % of 200.
+    let look =
+        |pixels: usize| Look::new(&map(20, 20, |index| if index < pixels { 4 } else { 5 }), &camera(20, 20), &[]);
+    let (usual, speck) = (look(201), look(1));
+    let masks = [("a", &usual), ("b", &usual), ("c", &speck), ("d", &usual), ("e", &usual)];
+    assert_eq!(short(&findings(&masks)), [(Problem::NearlyEmpty, Some("c"), Some(4))]);
+    let few = look(2);
+    let masks = [("a", &usual), ("b", &usual), ("c", &few), ("d", &usual), ("e", &usual)];
+    assert_eq!(findings(&masks), []);
+}
+
+#[test]
+fn an_id_in_one_view_is_found() {
+    let (folder, dataset) = made();
+    edit(&folder, "012.png", |index, id| if index < 300 { 200 } else { id });
+    assert_eq!(short(&report(&folder, &dataset).findings), [(Problem::SingleView, Some("012.png"), Some(200))]);
+}
+
+#[test]
+fn an_id_that_is_lost_for_one_view_is_found() {
+    let (folder, dataset) = made();
+    let mask = |name: &str| labelgs::io::mask::read_mask(folder.path().join("masks").join(name)).expect("a mask");
+    let shown = |id: u16| {
+        ["013.png", "014.png", "015.png"]
+            .iter()
+            .all(|name| mask(name).ids.iter().filter(|&&found| found == id).count() * 100 > (WIDTH * HEIGHT) as usize)
+    };
+    let id = (1..=8).find(|&id| shown(id)).expect("an object in all three views");
+    edit(&folder, "014.png", |_, found| if found == id { 0 } else { found });
+    let found = report(&folder, &dataset).findings;
+    assert_eq!(short(&found), [(Problem::Blink, Some("014.png"), Some(u32::from(id)))]);
+    assert!(found[0].text.contains("013.png and 015.png"), "{found:?}");
+}
+
+fn camera(width: u32, height: u32) -> Camera {
+    crate::support::scenes::plain_camera(width, height)
+}
+
+fn map(width: u32, height: u32, id: impl Fn(usize) -> u16) -> LabelMap {
+    LabelMap { width, height, ids: (0..(width * height) as usize).map(id).collect() }
+}
+
+/// An absence is no blink if the points of the object are out of the picture or behind what all three masks show.
+#[test]
+fn points_excuse_an_absence() {
+    // Points at depth 1 of a camera with a focal length of 100 px: 100 times their place from the middle.
+    let points: Vec<Point> = [[-0.05, 0.0, 1.0], [-0.06, 0.02, 1.0]]
+        .map(|position| Point { position: glam::DVec3::from_array(position), colour: [0; 3] })
+        .to_vec();
+    let left = |inside: u16, outside: u16| map(20, 20, move |index| if index % 20 < 10 { inside } else { outside });
+    let looks = |between: &LabelMap, between_camera: &Camera, points: &[Point]| {
+        let shown = Look::new(&left(3, 5), &camera(20, 20), points);
+        let between = Look::new(between, between_camera, points);
+        findings(&[("a", &shown), ("b", &between), ("c", &shown)])
+    };
+    let here = camera(20, 20);
+    let blink = [(Problem::Blink, Some("b"), Some(3))];
+    assert_eq!(short(&looks(&left(0, 5), &here, &points)), blink);
+    assert_eq!(short(&looks(&left(0, 5), &here, &[])), blink, "without points there is no excuse");
+    assert_eq!(looks(&left(5, 5), &here, &points), [], "behind another object");
+    let away = Camera { translation: glam::DVec3::new(5.0, 0.0, 0.0), ..here.clone() };
+    assert_eq!(looks(&left(0, 5), &away, &points), [], "out of the picture");
+    let behind = Camera { translation: glam::DVec3::new(0.0, 0.0, -3.0), ..here.clone() };
+    assert_eq!(looks(&left(0, 5), &behind, &points), [], "behind the camera");
+    // Covered by an id that the neighbours do not know: another name for the same object.
+    let found = looks(&left(9, 5), &here, &points);
+    assert_eq!(short(&found), [(Problem::SingleView, Some("b"), Some(9)), (Problem::Blink, Some("b"), Some(3))]);
+}
+
+#[test]
+fn pictures_of_one_pixel_and_one_line_are_measured() {
+    for (width, height) in [(1, 1), (5, 1), (1, 5), (2, 2)] {
+        let look = Look::new(&map(width, height, |_| 1), &camera(width, height), &[]);
+        let found = findings(&[("a", &look), ("b", &look)]);
+        assert!(found.iter().all(|finding| finding.problem == Problem::Inverted) && found.len() == 2, "{found:?}");
+    }
+    assert_eq!(findings(&[]), []);
+}
+
+#[test]
+fn no_folder_is_an_error() {
+    let scene = scene();
+    let load = LoadOptions { photos: false, ..LoadOptions::default() };
+    let dataset = io::open(scene.path(), &load).expect("a scene");
+    assert!(super::fixtures::refusal(inspect(&dataset, Path::new("/no/such/folder"))).contains("no such folder"));
+}
