@@ -11,6 +11,7 @@ use std::path::{Path, PathBuf};
 pub fn decide(args: &TrainArgs) -> Result<TrainConfig> {
     let mut config = match &args.config {
         Some(path) => read(path)?,
+        None if args.run.paper => TrainConfig::paper(),
         None => TrainConfig::default(),
     };
     args.apply(&mut config);

@@ -2,7 +2,7 @@
 //! `TrainConfig::default()`.
 
 use super::args::JsonFlag;
-use super::values::{colour, count, switch};
+use super::values::{colour, count, samples, switch};
 use crate::train::TrainConfig;
 use crate::train::config::{LabelRule, Occlusion};
 use clap::Args;
@@ -45,6 +45,9 @@ pub struct TrainArgs {
 #[derive(Args, Clone, Debug)]
 #[command(next_help_heading = "Run")]
 pub struct RunFlags {
+    /// Start from the settings of the LabelGS paper, where ours differ: --label-rule main --label-weight 1.
+    #[arg(long, conflicts_with = "config")]
+    pub paper: bool,
     /// Number of steps, one view each.
     #[arg(long, value_name = "N")]
     pub iterations: Option<u32>,
@@ -103,7 +106,7 @@ pub struct LabelFlags {
     #[arg(long, value_name = "SWITCH", value_parser = switch)]
     pub gpf: Option<bool>,
     /// Objects per step.
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N|all", value_parser = samples)]
     pub label_samples: Option<u32>,
     /// Weight of the label loss.
     #[arg(long, value_name = "WEIGHT")]

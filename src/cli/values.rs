@@ -74,3 +74,11 @@ pub fn switch(text: &str) -> Result<bool, String> {
         _ => Err(format!("`{text}` is neither on nor off")),
     }
 }
+
+/// A number of objects, or `all`.
+pub fn samples(text: &str) -> Result<u32, String> {
+    match text {
+        "all" => Ok(u32::MAX),
+        _ => text.parse().map_err(|_| format!("`{text}` is neither a number of objects nor all")),
+    }
+}

@@ -7,6 +7,8 @@ use std::collections::{BTreeMap, BTreeSet};
 /// Share of a mask that must be one object for the whole mask to become it; below, the mask covers several objects and
 /// is divided along the model's own borders.
 const ONE_OBJECT: f64 = 0.85;
+/// Smallest share of a mask that is divided off as another object: less is a border that the model has elsewhere.
+const PART: f64 = 0.05;
 /// Share of what the model shows of an object in a view that must lie where the mask has nothing for the object to count
 /// as missed there.
 const MISSED: f64 = 0.6;
@@ -92,12 +94,10 @@ pub fn mend(view: usize, mask: &LabelMap, shown: &LabelMap, repairs: &mut Repair
     }
     let mut out = mask.clone();
     for (&id, seen) in counts.iter().filter(|(id, _)| **id != 0) {
-        let objects: BTreeMap<u16, u64> = seen
-            .iter()
-            .filter(|&(&object, &pixels)| object != 0 && pixels >= smallest)
-            .map(|(&o, &p)| (o, p))
-            .collect();
-        let total: u64 = objects.values().sum();
+        let total: u64 = seen.iter().filter(|(object, _)| **object != 0).map(|(_, &pixels)| pixels).sum();
+        let least = smallest.max((PART * total as f64) as u64);
+        let part = |(&object, &pixels): (&u16, &u64)| (object != 0 && pixels >= least).then_some((object, pixels));
+        let objects: BTreeMap<u16, u64> = seen.iter().filter_map(part).collect();
         let most = objects.iter().max_by_key(|&(&object, &pixels)| (pixels, std::cmp::Reverse(object)));
         let Some((&most, &pixels)) = most else { continue };
         if pixels as f64 >= ONE_OBJECT * total as f64 {

@@ -30,7 +30,8 @@ pub enum LabelRule {
     Votes,
 }
 
-/// What a training run does, decided. `Default` is the paper's setting.
+/// What a training run does, decided. `Default` is the paper's setting but for labels, where it is what was measured to
+/// be better; [`TrainConfig::paper`] is the paper's throughout.
 ///
 /// Steps count from 1, as in the reference code.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -70,13 +71,14 @@ pub struct TrainConfig {
     pub gpf: bool,
     /// Objects sampled per step for lift and label loss. 10 (LabelGS), where it bounds memory.
     pub label_samples: u32,
-    /// Weight of the sum of the label losses of a step. 1.0 (LabelGS code; the paper's lambda 2 has no value).
+    /// Weight of the sum of the label losses of a step. 0.3; LabelGS's code has 1.0 (the paper's lambda 2 has no value),
+    /// which costs the whole picture more and makes objects no better.
     pub label_weight: f32,
-    /// Objects weigh as one over the root of their area in the view, so that small ones are not lost beside large ones.
-    /// On; the paper sums over pixels.
+    /// Objects weigh as one over the root of their area in the view. Off (LabelGS): with votes small objects are not lost
+    /// beside large ones, and the weight costs the whole picture.
     pub label_balance: bool,
-    /// Weight of an alpha term in the label loss: the object's opacity against its mask. 0.1; the paper has none, and
-    /// dark objects may vanish over black without cost.
+    /// Weight of an alpha term in the label loss: the object's opacity against its mask. 0 (LabelGS has none). Of use for
+    /// objects as dark as the black behind them, which may vanish without cost.
     pub label_alpha: f32,
     /// Source of the occluders whose pixels the label loss leaves out. Rendered depth.
     pub occlusion: Occlusion,
@@ -154,7 +156,7 @@ impl Default for TrainConfig {
             label_threshold: 0.6,
             gpf: true,
             label_samples: 10,
-            label_weight: 1.0,
+            label_weight: 0.3,
             label_balance: false,
             label_alpha: 0.0,
             occlusion: Occlusion::Rendered,
@@ -186,6 +188,11 @@ impl Default for TrainConfig {
 }
 
 impl TrainConfig {
+    /// The paper's settings where they differ from the default.
+    pub fn paper() -> Self {
+        Self { label_rule: LabelRule::Main, label_weight: 1.0, ..Self::default() }
+    }
+
     /// Learning rate of positions at `step`, before the scene extent.
     pub fn position_lr(&self, step: u32) -> f64 {
         let t = (f64::from(step) / f64::from(self.position_lr_max_steps)).clamp(0.0, 1.0);
