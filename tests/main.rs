@@ -17,6 +17,7 @@ mod labels;
 mod metrics;
 mod mirror_mutants;
 mod mirrors;
+mod occlusion;
 mod output;
 mod overflow;
 mod pass;

@@ -1,5 +1,6 @@
 //! What can be typed. Only what was typed is in here; decisions are made in `config` and in the verbs.
 
+use super::occlusion::OcclusionArgs;
 use super::train_args::TrainArgs;
 use super::values::{Labels, Size, colour, count, labels, size};
 use crate::infer::output::{Format, What};
@@ -62,6 +63,9 @@ pub enum Command {
     /// Score a model on the views of a scene.
     #[command(after_help = "Example: labelgs eval out --scene garden --masks garden/masks --json scores.json")]
     Eval(EvalArgs),
+    /// Find which objects hide which in each view, without training.
+    #[command(after_help = "Example: labelgs occlusion garden --masks garden/masks --model out -o occlusion.json")]
+    Occlusion(OcclusionArgs),
     /// Make a posed test scene with masks, whole outlines and depth.
     #[command(after_help = "Example: labelgs synth scene && labelgs train scene --masks scene/masks -o out")]
     Synth(SynthArgs),

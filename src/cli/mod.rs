@@ -7,6 +7,7 @@ pub mod eval;
 pub mod interrupt;
 pub mod list;
 pub mod log;
+pub mod occlusion;
 pub mod plan;
 pub mod profile;
 mod profile_report;
@@ -98,6 +99,7 @@ fn run(args: Vec<OsString>) -> Result<(), Exit> {
         Command::Extract(args) => select::run(&args, select::Keep::Selected, &context),
         Command::Remove(args) => select::run(&args, select::Keep::Rest, &context),
         Command::Eval(args) => eval::run(&args, &context),
+        Command::Occlusion(args) => occlusion::run(&args, &context),
         Command::Synth(args) => synth::run(&args, &context),
         Command::Devices(args) => devices::run(&args, &context),
         Command::Plan(args) => plan::run(&args, &context),

@@ -1,6 +1,6 @@
 //! Scores of a model on posed photos: renders every view, then every object alone.
 
-use super::occlusion::{MARGIN, occluders};
+use super::occlusion::{Rule, by_contour};
 use super::render::{Rendered, render};
 use super::scores::{ObjectRender, Scores, ViewScores};
 use super::select::extract;
@@ -78,7 +78,7 @@ fn photo(view: &View) -> Result<&crate::scene::Photo> {
 }
 
 fn hidden_by(mask: Option<&LabelMap>, rendered: &Rendered) -> BTreeMap<u16, Vec<u16>> {
-    mask.map(|mask| occluders(mask, &rendered.mean_depth(), MARGIN)).unwrap_or_default()
+    mask.map(|mask| by_contour(mask, &rendered.mean_depth(), Rule::default())).unwrap_or_default()
 }
 
 /// True where the mask shows one of `ids`.

@@ -6,6 +6,8 @@
 pub mod atomic;
 pub mod camera_json;
 mod colmap;
+pub mod depth;
+mod depth_file;
 pub mod image;
 pub mod init;
 pub mod label_table;
@@ -13,12 +15,14 @@ pub mod lens;
 mod listing;
 mod load;
 pub mod mask;
+pub mod occlusion_table;
 pub mod ply;
 mod resample;
 mod transforms;
 
 use crate::error::{Error, Result};
 use crate::scene::Dataset;
+use listing::Listing;
 use std::path::{Path, PathBuf};
 
 pub use init::initial_gaussians;
@@ -56,9 +60,21 @@ pub fn open(scene: &Path, options: &LoadOptions) -> Result<Dataset> {
     if options.max_resolution == Some(0) {
         return Err(Error::usage("--max-resolution", "0 px leaves no image; expected 1 or more"));
     }
+    load::load(folder_of(scene), list(scene)?, options)
+}
+
+/// The folder of a scene that is named by its folder or by one file in it.
+fn folder_of(scene: &Path) -> &Path {
+    if !scene.is_file() {
+        return scene;
+    }
+    scene.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."))
+}
+
+/// What a scene lists.
+fn list(scene: &Path) -> Result<Listing> {
     if scene.is_file() {
-        let root = scene.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
-        return load::load(root, transforms::list_file(root, scene)?, options);
+        return transforms::list_file(folder_of(scene), scene);
     }
     if !scene.is_dir() {
         return Err(Error::data(scene, "", "there is no such folder; expected the folder of a scene"));
@@ -67,10 +83,9 @@ pub fn open(scene: &Path, options: &LoadOptions) -> Result<Dataset> {
         Some(listing) => Some(listing),
         None => transforms::list(scene)?,
     };
-    let Some(listing) = listing else {
+    listing.ok_or_else(|| {
         let problem = "holds no scene: expected a COLMAP model (cameras and images, .bin or .txt, in sparse/0, sparse \
                        or colmap/sparse/0) or transforms.json or transforms_train.json";
-        return Err(Error::data(scene, "", problem));
-    };
-    load::load(scene, listing, options)
+        Error::data(scene, "", problem)
+    })
 }

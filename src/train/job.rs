@@ -5,7 +5,7 @@ use crate::engine::Engine;
 use crate::engine::uniforms::view_uniforms;
 use crate::error::Result;
 use crate::plan::Buf;
-use crate::scene::{Camera, LabelMap, Photo};
+use crate::scene::{Camera, LabelMap, Occluders, Photo};
 use crate::shaders::constants::{ADAM_BETA1, ADAM_BETA2};
 use crate::shaders::structs::StepUniforms;
 use std::collections::BTreeMap;
@@ -28,7 +28,7 @@ pub struct TrainView {
     /// For each object the sum of r + g + b over its pixels of the photo: the label loss of an empty layer, not scaled.
     pub object_light: BTreeMap<u16, f64>,
     /// For each object, the objects that hide it in this view.
-    pub occluders: BTreeMap<u16, Vec<u16>>,
+    pub occluders: Occluders,
 }
 
 /// Sum of r + g + b over the pixels of each object.
