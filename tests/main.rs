@@ -10,6 +10,7 @@ mod cli;
 mod cli_engine;
 mod compare_self;
 mod config;
+mod densify;
 mod gradient;
 mod invariants;
 mod io;

@@ -1,5 +1,7 @@
 //! What can be typed. Only what was typed is in here; decisions are made in `config` and in the verbs.
 
+use super::densify::DensifyArgs;
+use super::masks::MasksCommand;
 use super::occlusion::OcclusionArgs;
 use super::train_args::TrainArgs;
 use super::values::{Labels, Size, colour, count, labels, size};
@@ -66,6 +68,12 @@ pub enum Command {
     /// Find which objects hide which in each view, without training.
     #[command(after_help = "Example: labelgs occlusion garden --masks garden/masks --model out -o occlusion.json")]
     Occlusion(OcclusionArgs),
+    /// Render a smooth video through the photos of a scene, for a tracker of objects.
+    #[command(after_help = "Example: labelgs densify out --scene garden -o video")]
+    Densify(DensifyArgs),
+    /// Prepare masks.
+    #[command(subcommand)]
+    Masks(MasksCommand),
     /// Make a posed test scene with masks, whole outlines and depth.
     #[command(after_help = "Example: labelgs synth scene && labelgs train scene --masks scene/masks -o out")]
     Synth(SynthArgs),

@@ -2,11 +2,13 @@
 
 pub mod args;
 pub mod config;
+pub mod densify;
 pub mod devices;
 pub mod eval;
 pub mod interrupt;
 pub mod list;
 pub mod log;
+pub mod masks;
 pub mod occlusion;
 pub mod plan;
 pub mod profile;
@@ -99,6 +101,8 @@ fn run(args: Vec<OsString>) -> Result<(), Exit> {
         Command::Extract(args) => select::run(&args, select::Keep::Selected, &context),
         Command::Remove(args) => select::run(&args, select::Keep::Rest, &context),
         Command::Eval(args) => eval::run(&args, &context),
+        Command::Densify(args) => densify::run(&args, &context),
+        Command::Masks(command) => masks::run(&command, &context),
         Command::Occlusion(args) => occlusion::run(&args, &context),
         Command::Synth(args) => synth::run(&args, &context),
         Command::Devices(args) => devices::run(&args, &context),

@@ -8,6 +8,7 @@ pub mod camera_json;
 mod colmap;
 pub mod depth;
 mod depth_file;
+pub mod frames;
 pub mod image;
 pub mod init;
 pub mod label_table;
