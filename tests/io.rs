@@ -1,6 +1,7 @@
 //! Files to scenes and back, on fixtures that the tests write themselves.
 
 mod colmap;
+mod depths;
 mod fixtures;
 mod init;
 mod label_table;

@@ -1,16 +1,15 @@
-//! Scores, label choice, occluders and selections against slow or hand-made answers.
+//! Scores, label choice and selections against slow or hand-made answers.
 
 use labelgs::infer::boundary::{boundary_iou, rim, rim_width};
 use labelgs::infer::choose::{candidates, choose_labels, require_labels};
 use labelgs::infer::crop::Crop;
 use labelgs::infer::metrics::{Overlap, paper_score, psnr};
-use labelgs::infer::occlusion::{MARGIN, occluders};
 use labelgs::infer::scores::{ObjectRender, ObjectTruth, Scores, ViewScores};
 use labelgs::infer::select::{extract, remove, summarise};
 use labelgs::infer::ssim::{ssim, ssim_map, window};
 use labelgs::infer::ssim8::{ssim8, to_bytes};
 use labelgs::scene::{Gaussians, LabelMap, Photo};
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 /// A repeatable number in 0 to 1.
 fn random(index: usize) -> f64 {
@@ -236,76 +235,6 @@ fn labels_are_chosen_by_containment() {
     let background = [false, false, false, false, false, false, false, true];
     assert!(require_labels("--mask", &view, &background).is_err());
     assert!(require_labels("--mask", &view, &[true]).is_err());
-}
-
-/// The rule as the method states it: erode, dilate, bands.
-fn occluders_slowly(labels: &LabelMap, depth: &[f32], margin: f64) -> BTreeMap<u16, Vec<u16>> {
-    let (width, height) = (labels.width as i64, labels.height as i64);
-    let around = |index: usize| {
-        let (x, y) = (index as i64 % width, index as i64 / width);
-        (-1..=1).flat_map(move |dy| (-1..=1).map(move |dx| (x + dx, y + dy)))
-    };
-    let inside = |&(x, y): &(i64, i64)| (0..width).contains(&x) && (0..height).contains(&y);
-    let index = |(x, y): (i64, i64)| (y * width + x) as usize;
-    let dilate = |set: &BTreeSet<usize>| -> BTreeSet<usize> {
-        set.iter().flat_map(|&i| around(i).filter(inside).map(index).collect::<Vec<_>>()).collect()
-    };
-    let mean = |set: &BTreeSet<usize>| {
-        let good: Vec<f64> = set.iter().map(|&i| f64::from(depth[i])).filter(|z| z.is_finite() && *z > 0.0).collect();
-        good.iter().sum::<f64>() / good.len() as f64
-    };
-    let mut result = BTreeMap::new();
-    for k in labels.objects() {
-        let region: BTreeSet<usize> = (0..labels.ids.len()).filter(|&i| labels.ids[i] == k).collect();
-        // The border of the image does not erode.
-        let eroded =
-            region.iter().copied().filter(|&i| around(i).filter(inside).map(index).all(|n| region.contains(&n)));
-        let eroded: BTreeSet<usize> = eroded.collect();
-        let inner: BTreeSet<usize> = region.difference(&eroded).copied().collect();
-        let outer: BTreeSet<usize> = dilate(&region).difference(&region).copied().collect();
-        let adjacent: BTreeSet<u16> = outer.iter().map(|&i| labels.ids[i]).filter(|&id| id != 0).collect();
-        let hides = |&other: &u16| {
-            let out: BTreeSet<usize> = outer.iter().copied().filter(|&i| labels.ids[i] == other).collect();
-            let own: BTreeSet<usize> = dilate(&out).intersection(&inner).copied().collect();
-            mean(&out) < mean(&own) * (1.0 - margin)
-        };
-        result.insert(k, adjacent.into_iter().filter(hides).collect());
-    }
-    result
-}
-
-#[test]
-fn three_strips_on_a_ramp() {
-    let labels = map(6, &[1, 1, 2, 2, 3, 3].repeat(4));
-    let depth: Vec<f32> = [1.0, 1.0, 2.0, 2.0, 3.0, 3.0].repeat(4);
-    let found = occluders(&labels, &depth, MARGIN);
-    assert_eq!(found, BTreeMap::from([(1, vec![]), (2, vec![1]), (3, vec![2])]));
-    let flat = occluders(&labels, &[2.0; 24], MARGIN);
-    assert!(flat.values().all(Vec::is_empty));
-    // A step of half a per cent is within the margin.
-    let close: Vec<f32> = [1.0, 1.0, 1.005, 1.005, 2.0, 2.0].repeat(4);
-    assert!(occluders(&labels, &close, MARGIN)[&2].is_empty());
-    assert_eq!(occluders(&labels, &close, 0.0)[&2], [1]);
-    assert!(occluders(&labels, &[f32::NAN; 24], MARGIN).values().all(Vec::is_empty));
-}
-
-#[test]
-fn occluders_equal_the_stated_rule() {
-    for seed in 0..20 {
-        let (width, height) = (13, 9);
-        // Blobs: the nearest of some sites decides.
-        let sites: Vec<_> = (0..7).map(|s| (random(seed * 50 + s) * 13.0, random(seed * 50 + s + 20) * 9.0)).collect();
-        let nearest = |i: usize| {
-            let away = |&(x, y): &(f64, f64)| (x - (i % width) as f64).powi(2) + (y - (i / width) as f64).powi(2);
-            (0..7).min_by(|&a, &b| away(&sites[a]).total_cmp(&away(&sites[b]))).expect("a site")
-        };
-        let ids: Vec<u16> = (0..width * height).map(|i| (nearest(i) % 5) as u16).collect();
-        let depth: Vec<f32> = (0..width * height)
-            .map(|i| if random(i) < 0.1 { 0.0 } else { 1.0 + random(i + seed * 200) as f32 })
-            .collect();
-        let labels = map(width as u32, &ids);
-        assert_eq!(occluders(&labels, &depth, MARGIN), occluders_slowly(&labels, &depth, MARGIN), "seed {seed}");
-    }
 }
 
 fn model() -> Gaussians {

@@ -1,7 +1,9 @@
 //! What can be typed. Only what was typed is in here; decisions are made in `config` and in the verbs.
 
+use super::densify::DensifyArgs;
 use super::eval::EvalArgs;
 use super::masks::MasksArgs;
+use super::occlusion::OcclusionArgs;
 use super::train_args::TrainArgs;
 use super::values::{Labels, Size, colour, count, labels, size};
 use crate::infer::output::{Format, What};
@@ -69,6 +71,12 @@ pub enum Command {
     Eval(Box<EvalArgs>),
     /// Import, check and repair masks before training.
     Masks(MasksArgs),
+    /// Find which objects hide which in each view, without training.
+    #[command(after_help = "Example: labelgs occlusion garden --masks garden/masks --model out -o occlusion.json")]
+    Occlusion(OcclusionArgs),
+    /// Render a smooth video through the photos of a scene, for a tracker of objects.
+    #[command(after_help = "Example: labelgs densify out --scene garden -o video")]
+    Densify(DensifyArgs),
     /// Make a posed test scene with masks, whole outlines and depth.
     #[command(after_help = "Example: labelgs synth scene && labelgs train scene --masks scene/masks -o out")]
     Synth(SynthArgs),

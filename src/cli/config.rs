@@ -2,7 +2,7 @@
 
 use super::train_args::TrainArgs;
 use crate::io::LoadOptions;
-use crate::train::TrainConfig;
+use crate::train::config::{Occlusion, TrainConfig};
 use crate::{Error, Result};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -16,7 +16,21 @@ pub fn decide(args: &TrainArgs) -> Result<TrainConfig> {
     };
     args.apply(&mut config);
     config.check()?;
+    check_occlusion(args, config.occlusion)?;
     Ok(config)
+}
+
+/// The source of the occluders and the files that it needs are typed apart.
+fn check_occlusion(args: &TrainArgs, source: Occlusion) -> Result<()> {
+    match (source, &args.depths, &args.occlusion_file) {
+        (Occlusion::Depth, None, _) => Err(Error::usage("--occlusion", "depth needs the folder: --depths DIR")),
+        (Occlusion::Depth, Some(_), _) => Ok(()),
+        (_, Some(_), _) => Err(Error::usage("--depths", "is only read with --occlusion depth")),
+        (Occlusion::File, _, None) => {
+            Err(Error::usage("--config", "takes the occluders from a file; name it: --occlusion-file FILE"))
+        }
+        _ => Ok(()),
+    }
 }
 
 /// Reads a configuration file; fields that it does not name keep their defaults.

@@ -2,6 +2,7 @@
 
 pub mod args;
 pub mod config;
+pub mod densify;
 pub mod devices;
 pub mod eval;
 pub mod interrupt;
@@ -9,6 +10,7 @@ pub mod label;
 pub mod list;
 pub mod log;
 pub mod masks;
+pub mod occlusion;
 pub mod plan;
 pub mod profile;
 mod profile_report;
@@ -101,6 +103,8 @@ fn run(args: Vec<OsString>) -> Result<(), Exit> {
         Command::Extract(args) => select::run(&args, select::Keep::Selected, &context),
         Command::Remove(args) => select::run(&args, select::Keep::Rest, &context),
         Command::Eval(args) => eval::run(&args, &context),
+        Command::Densify(args) => densify::run(&args, &context),
+        Command::Occlusion(args) => occlusion::run(&args, &context),
         Command::Synth(args) => synth::run(&args, &context),
         Command::Devices(args) => devices::run(&args, &context),
         Command::Masks(args) => masks::run(&args, &context),

@@ -3,12 +3,13 @@
 use super::log::Progress;
 use super::scene::{open_gpu, open_with};
 use super::train_args::TrainArgs;
-use super::{Context, config, interrupt, stdout};
+use super::{Context, config, interrupt, occlusion, stdout};
 use crate::engine::Engine;
 use crate::gpu::Gpu;
 use crate::infer::evaluate::{Rendering, evaluate};
 use crate::infer::render::render;
 use crate::infer::scores::Scores;
+use crate::io::occlusion_table::{self, OcclusionTable};
 use crate::io::{atomic, init};
 use crate::scene::{Dataset, Photo, View};
 use crate::sched::SchedulerOptions;
@@ -31,6 +32,7 @@ pub fn run(args: &TrainArgs, context: &Context) -> Result<()> {
             "no view is left to train on; use --no-test or a larger --test-every",
         ));
     }
+    let occluders = occlusion::for_training(args, &dataset)?;
     let gpu = open_gpu(context)?;
     let mut model = init::initial_gaussians(&dataset, config.seed, init::RANDOM_COUNT)?;
     bound_start(&mut model, &config);
@@ -48,6 +50,13 @@ pub fn run(args: &TrainArgs, context: &Context) -> Result<()> {
     record::save_cameras(out, &cameras)?;
     let preview = preview_view(&dataset);
     let mut trainer = Trainer::new(gpu, config.clone(), &mut dataset, &model, SchedulerOptions::default())?;
+    if let Some(table) = &occluders {
+        let without = trainer.set_occluders(&table.views);
+        if let Some(first) = without.first() {
+            let count = without.len();
+            tracing::warn!("{count} training views have no list of occluders, such as {first}; nothing hides there");
+        }
+    }
     interrupt::note_only();
     let start = Instant::now();
     let last =
@@ -55,6 +64,7 @@ pub fn run(args: &TrainArgs, context: &Context) -> Result<()> {
     let model = trainer.labelled_model()?;
     let seconds = start.elapsed().as_secs_f64();
     let path = record::save_model(out, trainer.steps_done(), &model)?;
+    save_occluders(out, &trainer, occluders.as_ref())?;
     // Scoring puts single objects in the model's place.
     let gaussians = trainer.gaussian_count();
     if let Some(view) = &preview {
@@ -131,6 +141,20 @@ fn steps(trainer: &mut Trainer, out: &Path, preview: Option<&View>, context: &Co
     Ok(done.last().copied().or(last))
 }
 
+/// Writes the occluders that the last step used.
+fn save_occluders(out: &Path, trainer: &Trainer, given: Option<&OcclusionTable>) -> Result<()> {
+    let views = trainer.occluders();
+    if views.is_empty() {
+        return Ok(());
+    }
+    let kind = match (given, trainer.config().occlusion) {
+        (Some(table), _) => &table.kind,
+        (None, train::Occlusion::None) => "none",
+        (None, _) => "rendered",
+    };
+    OcclusionTable::new(kind, views).write(&out.join(occlusion_table::FILE))
+}
+
 /// A run that memory ended keeps what it has learnt: steps that did not fit changed nothing.
 fn keep_model(trainer: &mut Trainer, out: &Path, error: Error) -> Error {
     if !matches!(error, Error::OutOfMemory { .. }) {
@@ -177,6 +201,12 @@ fn write_run(out: &Path, config: &TrainConfig, gpu: &Gpu, args: &TrainArgs) -> R
     ];
     if let Some(masks) = &args.masks {
         facts.push(("masks", masks.display().to_string()));
+    }
+    if let (Some(depths), Some(kind)) = (&args.depths, args.depth_kind) {
+        facts.push(("depths", format!("{} ({kind:?})", depths.display())));
+    }
+    if let Some(file) = &args.occlusion_file {
+        facts.push(("occlusion file", file.display().to_string()));
     }
     let text = config::dump(config, &facts)?;
     atomic::write(out.join("config.toml"), |file| file.write_all(text.as_bytes()))

@@ -3,6 +3,7 @@
 
 use super::args::JsonFlag;
 use super::values::{colour, count, samples, switch};
+use crate::scene::DepthKind;
 use crate::train::TrainConfig;
 use crate::train::config::{LabelRule, Occlusion};
 use clap::Args;
@@ -20,6 +21,15 @@ pub struct TrainArgs {
     /// Folder of id masks, one per view by name; without it the model has no labels.
     #[arg(long, value_name = "DIR")]
     pub masks: Option<PathBuf>,
+    /// Folder of depth maps for --occlusion depth, one per photo by name: 16-bit PNG, EXR, NPY or PFM.
+    #[arg(long, value_name = "DIR", requires = "depth_kind", requires = "masks")]
+    pub depths: Option<PathBuf>,
+    /// What the numbers of --depths mean.
+    #[arg(long, value_name = "KIND", value_enum, requires = "depths")]
+    pub depth_kind: Option<DepthKind>,
+    /// Occluders to use, as `labelgs occlusion` and an earlier run write them.
+    #[arg(long, value_name = "FILE", requires = "masks", conflicts_with_all = ["occlusion", "depths"])]
+    pub occlusion_file: Option<PathBuf>,
     /// Settings in TOML, as config.toml of an earlier run; flags win over it.
     #[arg(long, value_name = "FILE.toml")]
     pub config: Option<PathBuf>,
@@ -215,6 +225,9 @@ impl TrainArgs {
         take!(config, self.label, label_from label_rule vote_every vote_trust mask_border
             label_threshold gpf label_samples label_weight label_balance
             label_alpha occlusion occlusion_every);
+        if self.occlusion_file.is_some() {
+            config.occlusion = Occlusion::File;
+        }
         take!(config, self.optimiser, lambda_dssim sh_degree sh_degree_interval position_lr_init position_lr_final
             position_lr_max_steps feature_lr opacity_lr scaling_lr rotation_lr);
         config.feature_rest_lr = self.optimiser.feature_rest_lr.or(config.feature_rest_lr);

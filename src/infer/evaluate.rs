@@ -2,7 +2,7 @@
 
 use super::compared::{Compared, Watch};
 use super::metrics::COVERED;
-use super::occlusion::{MARGIN, occluders};
+use super::occlusion::{Rule, by_contour};
 use super::render::{Rendered, render};
 use super::scores::{ObjectRender, ObjectTruth, Scores, ViewScores};
 use super::select::extract;
@@ -126,7 +126,7 @@ fn photo(view: &View) -> Result<&crate::scene::Photo> {
 }
 
 fn hidden_by(mask: Option<&LabelMap>, rendered: &Rendered) -> BTreeMap<u16, Vec<u16>> {
-    mask.map(|mask| occluders(mask, &rendered.mean_depth(), MARGIN)).unwrap_or_default()
+    mask.map(|mask| by_contour(mask, &rendered.mean_depth(), Rule::default())).unwrap_or_default()
 }
 
 /// True where the mask shows one of `ids`.

@@ -65,13 +65,8 @@ pub fn write_pictures(folder: &Path, stem: &str, pictures: &Pictures, format: Fo
         path
     };
     if let Some(rgb) = pictures.rgb {
-        match format {
-            Format::Exr => write_exr_rgb(path("rgb", "exr"), width, height, rgb)?,
-            Format::Png => {
-                let bytes: Vec<[u8; 3]> = rgb.iter().map(|colour| colour.map(to_byte)).collect();
-                write_png_rgb8(path("rgb", "png"), width, height, &bytes)?;
-            }
-        }
+        let extension = if format == Format::Png { "png" } else { "exr" };
+        write_rgb(&path("rgb", extension), (width, height), rgb, format)?;
     }
     if let Some(depth) = pictures.depth {
         match format {
@@ -101,6 +96,17 @@ pub fn write_pictures(folder: &Path, stem: &str, pictures: &Pictures, format: Fo
         write_exr_y(path("top-weight", "exr"), width, height, weights)?;
     }
     Ok(written)
+}
+
+/// Writes colours, row-major; a PNG clamps them to 0..1.
+pub fn write_rgb(path: &Path, (width, height): (u32, u32), rgb: &[[f32; 3]], format: Format) -> Result<()> {
+    match format {
+        Format::Exr => write_exr_rgb(path, width, height, rgb),
+        Format::Png => {
+            let bytes: Vec<[u8; 3]> = rgb.iter().map(|colour| colour.map(to_byte)).collect();
+            write_png_rgb8(path, width, height, &bytes)
+        }
+    }
 }
 
 fn check_sizes(stem: &str, pictures: &Pictures) -> Result<()> {

@@ -9,18 +9,36 @@ use crate::scene::Camera;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
-/// A camera file: `w2c` is camera-from-world, row-major, OpenCV axes.
-#[derive(Debug, Deserialize)]
-struct CameraFile {
-    w2c: Vec<Vec<f64>>,
-    fx: f64,
-    fy: f64,
-    cx: f64,
-    cy: f64,
+/// A camera as the file of `labelgs render --camera` holds it.
+#[derive(Clone, Debug, Deserialize, Serialize)]
+pub struct CameraFile {
+    /// Camera-from-world, 4 x 4, row-major, OpenCV axes.
+    pub w2c: Vec<Vec<f64>>,
+    /// Horizontal focal length, px.
+    pub fx: f64,
+    /// Vertical focal length, px.
+    pub fy: f64,
+    /// Principal point, px.
+    pub cx: f64,
+    /// Principal point, px.
+    pub cy: f64,
+    /// Width, px.
     #[serde(rename = "W")]
-    width: u32,
+    pub width: u32,
+    /// Height, px.
     #[serde(rename = "H")]
-    height: u32,
+    pub height: u32,
+}
+
+impl From<&Camera> for CameraFile {
+    fn from(camera: &Camera) -> Self {
+        let row = |axis: usize| {
+            let row = camera.rotation.row(axis);
+            vec![row.x, row.y, row.z, camera.translation[axis]]
+        };
+        let Camera { fx, fy, cx, cy, width, height, .. } = *camera;
+        Self { w2c: vec![row(0), row(1), row(2), vec![0.0, 0.0, 0.0, 1.0]], fx, fy, cx, cy, width, height }
+    }
 }
 
 /// Reads `{"w2c": 4x4 row-major with OpenCV axes, "fx", "fy", "cx", "cy", "W", "H"}`.

@@ -49,7 +49,7 @@ pub(crate) fn load(root: &Path, mut listing: Listing, options: &LoadOptions) -> 
     Ok(dataset)
 }
 
-fn shortened(names: &[&str]) -> String {
+pub(crate) fn shortened(names: &[&str]) -> String {
     let shown = names.iter().take(3).copied().collect::<Vec<_>>().join(", ");
     if names.len() > 3 { format!("{shown}, ...") } else { shown }
 }
@@ -142,7 +142,7 @@ fn load_view(
 }
 
 /// The camera at the size of the photo's file, which may be a scaled version of what the data set states.
-fn at_photo_size(listed: &Listed) -> Result<Camera> {
+pub(crate) fn at_photo_size(listed: &Listed) -> Result<Camera> {
     let Some(path) = &listed.photo else { return Ok(listed.camera.clone()) };
     let size = photo_size(path)?;
     check_size(path, size)?;

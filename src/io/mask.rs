@@ -4,6 +4,7 @@
 //! Colours are never turned into ids: two palette entries may share a colour, and a colour code needs its legend.
 
 use super::image::check_size;
+use super::resample::same_aspect;
 use crate::error::{Error, Result};
 use crate::scene::LabelMap;
 use std::collections::HashMap;
@@ -115,6 +116,11 @@ fn unpack(line: &[u8], depth: png::BitDepth, width: usize) -> Vec<u16> {
             line.chunks_exact(2).take(width).map(|pair| u16::from_be_bytes([pair[0], pair[1]])).collect()
         }
     }
+}
+
+/// True if a mask of the size `found` can serve a photo of the size `photo`: it is a scaled one.
+pub fn mask_size_fits(found: (u32, u32), photo: (u32, u32)) -> bool {
+    same_aspect(found, photo)
 }
 
 /// Which names the mask of a photo may have.

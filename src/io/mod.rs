@@ -7,6 +7,9 @@
 pub mod atomic;
 pub mod camera_json;
 mod colmap;
+pub mod depth;
+mod depth_file;
+pub mod frames;
 pub mod image;
 pub mod init;
 pub mod label_table;
@@ -15,6 +18,7 @@ mod listing;
 mod load;
 pub mod mask;
 pub mod masks;
+pub mod occlusion_table;
 pub mod ply;
 mod resample;
 mod transforms;
@@ -23,6 +27,7 @@ pub mod truth;
 use crate::error::{Error, Result};
 use crate::scene::Dataset;
 use lens::Lens;
+use listing::Listing;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -61,18 +66,25 @@ pub fn open(scene: &Path, options: &LoadOptions) -> Result<Dataset> {
     if options.max_resolution == Some(0) {
         return Err(Error::usage("--max-resolution", "0 px leaves no image; expected 1 or more"));
     }
+    load::load(folder_of(scene), list(scene)?, options)
+}
+
+/// The folder of a scene that is named by its folder or by one file in it.
+fn folder_of(scene: &Path) -> &Path {
+    if !scene.is_file() {
+        return scene;
+    }
+    scene.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."))
+}
+
+/// What a scene lists.
+fn list(scene: &Path) -> Result<Listing> {
     if scene.is_file() {
-        let root = scene.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
-        return load::load(root, transforms::list_file(root, scene)?, options);
+        return transforms::list_file(folder_of(scene), scene);
     }
     if !scene.is_dir() {
         return Err(Error::data(scene, "", "there is no such folder; expected the folder of a scene"));
     }
-    load::load(scene, list(scene)?, options)
-}
-
-/// What the folder `scene` lists.
-fn list(scene: &Path) -> Result<listing::Listing> {
     let listing = match colmap::list(scene)? {
         Some(listing) => Some(listing),
         None => transforms::list(scene)?,
@@ -85,7 +97,10 @@ fn list(scene: &Path) -> Result<listing::Listing> {
 /// The lenses of the photos that `scene` (as in [`open`]) lists, by the name of the view; those of a pinhole are left
 /// out.
 pub fn lenses(scene: &Path) -> Result<BTreeMap<String, Lens>> {
-    let root = scene.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let listing = if scene.is_file() { transforms::list_file(root, scene)? } else { list(scene)? };
-    Ok(listing.views.into_iter().filter(|view| !view.lens.is_pinhole()).map(|view| (view.name, view.lens)).collect())
+    Ok(list(scene)?
+        .views
+        .into_iter()
+        .filter(|view| !view.lens.is_pinhole())
+        .map(|view| (view.name, view.lens))
+        .collect())
 }

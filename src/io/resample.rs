@@ -141,22 +141,35 @@ fn mean(photo: &Photo, (left, across): (usize, &[f64]), (top, down): (usize, &[f
 /// The id map that belongs to a photo of size `width` x `height` px, made from a map of the distorted photo at any
 /// scale. `camera` is that of the photo at its own size. Pixels without a source are 0.
 pub fn resample_ids(ids: &LabelMap, camera: &Camera, lens: &Lens, (width, height): (u32, u32)) -> LabelMap {
-    if lens.is_pinhole() && (ids.width, ids.height) == (width, height) {
-        return ids.clone();
+    let ids = resample_nearest(&ids.ids, (ids.width, ids.height), camera, lens, (width, height), 0);
+    LabelMap { width, height, ids }
+}
+
+/// As [`resample_ids`], for values of any kind; pixels without a source are `nothing`.
+pub fn resample_nearest<T: Copy + Send + Sync>(
+    values: &[T],
+    from: (u32, u32),
+    camera: &Camera,
+    lens: &Lens,
+    (width, height): (u32, u32),
+    nothing: T,
+) -> Vec<T> {
+    if lens.is_pinhole() && from == (width, height) {
+        return values.to_vec();
     }
     let map = Undistortion::new(camera, lens);
     let to_photo = DVec2::new(f64::from(camera.width) / f64::from(width), f64::from(camera.height) / f64::from(height));
-    let to_ids =
-        DVec2::new(f64::from(ids.width) / f64::from(camera.width), f64::from(ids.height) / f64::from(camera.height));
+    let to_values =
+        DVec2::new(f64::from(from.0) / f64::from(camera.width), f64::from(from.1) / f64::from(camera.height));
     let row = |y: u32| {
         let map = &map;
         (0..width).map(move |x| {
             let pixel = DVec2::new(f64::from(x) + 0.5, f64::from(y) + 0.5) * to_photo;
-            map.source(pixel).map_or(0, |at| {
-                let at = at * to_ids;
-                ids.at((at.x as u32).min(ids.width - 1), (at.y as u32).min(ids.height - 1))
+            map.source(pixel).map_or(nothing, |at| {
+                let at = at * to_values;
+                values[((at.y as u32).min(from.1 - 1) * from.0 + (at.x as u32).min(from.0 - 1)) as usize]
             })
         })
     };
-    LabelMap { width, height, ids: (0..height).into_par_iter().flat_map_iter(row).collect() }
+    (0..height).into_par_iter().flat_map_iter(row).collect()
 }

@@ -3,6 +3,9 @@
 /// Id of a Gaussian or pixel that belongs to no object.
 pub const UNLABELLED: u32 = 0;
 
+/// For each object of a view, sorted: the objects that hide a part of it, sorted.
+pub type Occluders = std::collections::BTreeMap<u16, Vec<u16>>;
+
 /// Largest id that a mask or a Gaussian can carry.
 pub const LABEL_MAX: u32 = 65_535;
 

@@ -12,10 +12,15 @@ use serde::{Deserialize, Serialize};
 pub enum Occlusion {
     /// No occluder is known: every pixel outside an object's mask is expected to be black.
     None,
+    /// Monocular depth from files, --depths, by the paper's rule: who is nearer on the average along the contour.
+    Depth,
     /// Depth of the model itself, rendered every [`TrainConfig::occlusion_every`] steps. The paper asks a network for
     /// monocular depth instead.
     #[default]
     Rendered,
+    /// Lists from a file, --occlusion-file.
+    #[value(skip)]
+    File,
 }
 
 /// How a Gaussian gets its label.

@@ -6,7 +6,7 @@ use crate::engine::Engine;
 use crate::engine::uniforms::view_uniforms;
 use crate::error::Result;
 use crate::plan::Buf;
-use crate::scene::{Camera, LabelMap, Photo};
+use crate::scene::{Camera, LabelMap, Occluders, Photo};
 use crate::shaders::constants::{ADAM_BETA1, ADAM_BETA2, LABEL_BORDER};
 use crate::shaders::structs::StepUniforms;
 use std::collections::BTreeMap;
@@ -34,7 +34,7 @@ pub struct TrainView {
     /// What each object shows of itself.
     pub shown: BTreeMap<u16, Shown>,
     /// For each object, the objects that hide it in this view.
-    pub occluders: BTreeMap<u16, Vec<u16>>,
+    pub occluders: Occluders,
 }
 
 /// What an object shows in a view.

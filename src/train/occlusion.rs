@@ -1,11 +1,42 @@
-//! Occluders of each view's objects from the model's own depth, looked at anew every so often.
+//! Occluders of each view's objects: given before the first step, or from the model's own depth, looked at anew every so
+//! often.
 
 use super::{Occlusion, Trainer};
 use crate::error::Result;
-use crate::infer::occlusion::{MARGIN, occluders};
+use crate::infer::occlusion::{Rule, by_contour};
 use crate::infer::render::render;
+use crate::scene::Occluders;
+use std::collections::BTreeMap;
 
 impl Trainer {
+    /// Takes the occluders of views by name. Ids that the view's mask does not show are left out: they have no pixel.
+    /// Returns the names of views with masks that `found` does not have; nothing is known to hide anything there.
+    pub fn set_occluders(&mut self, found: &BTreeMap<String, Occluders>) -> Vec<String> {
+        let mut without = Vec::new();
+        for view in self.views.iter_mut().filter(|view| view.mask.is_some()) {
+            let shown = |label: &u16| view.objects.binary_search(label).is_ok();
+            match found.get(&view.name) {
+                Some(lists) => {
+                    let lists = lists.iter().filter(|(label, _)| shown(label));
+                    let kept = |by: &Vec<u16>| by.iter().copied().filter(|label| shown(label)).collect();
+                    view.occluders = lists.map(|(&label, by)| (label, kept(by))).collect();
+                }
+                None => without.push(view.name.clone()),
+            }
+        }
+        without
+    }
+
+    /// The occluders that the last step used, by name of the view; every object of a view has an entry.
+    pub fn occluders(&self) -> BTreeMap<String, Occluders> {
+        let with_masks = self.views.iter().filter(|view| view.mask.is_some());
+        let lists = with_masks.map(|view| {
+            let list = |&label: &u16| (label, view.occluders.get(&label).cloned().unwrap_or_default());
+            (view.name.clone(), view.objects.iter().map(list).collect())
+        });
+        lists.collect()
+    }
+
     /// True before the steps at which the occluders are looked at.
     pub(super) fn refreshes_occluders(&self, step: u32) -> bool {
         let config = &self.config;
@@ -24,7 +55,7 @@ impl Trainer {
             let view = &self.views[index];
             let Some(mask) = &view.mask else { continue };
             let rendered = render(&mut self.engine, &view.camera, self.config.near, self.config.background, degree)?;
-            let found = occluders(mask, &rendered.mean_depth(), MARGIN);
+            let found = by_contour(mask, &rendered.mean_depth(), Rule::default());
             self.views[index].occluders = found;
         }
         Ok(())

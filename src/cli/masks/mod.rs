@@ -1,6 +1,7 @@
 //! `labelgs masks`: what is done with masks before training.
 
 pub mod check;
+pub mod collect;
 pub mod import;
 pub mod repair;
 pub mod spoil;
@@ -33,6 +34,9 @@ pub enum MasksVerb {
         after_help = "Exit status 1 if anything was found. Example: labelgs masks check garden/masks --scene garden"
     )]
     Check(check::CheckArgs),
+    /// Take the masks of the photos out of a tracker's output on the video of `labelgs densify`.
+    #[command(after_help = "Example: labelgs masks collect tracked --frames video/frames.json -o masks")]
+    Collect(collect::CollectArgs),
     /// Make masks of all views agree, by the Gaussians of a trained model that they own.
     #[command(after_help = "Example: labelgs masks repair sam_masks --per-view --model out --scene garden -o masks")]
     Repair(repair::RepairArgs),
@@ -45,6 +49,7 @@ pub fn run(args: &MasksArgs, context: &Context) -> Result<()> {
     match &args.verb {
         MasksVerb::Import(args) => import::run(args, context),
         MasksVerb::Check(args) => check::run(args, context),
+        MasksVerb::Collect(args) => collect::run(args, context),
         MasksVerb::Repair(args) => repair::run(args, context),
         MasksVerb::Spoil(args) => spoil::run(args, context),
     }

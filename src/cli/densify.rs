@@ -1,0 +1,125 @@
+//! `labelgs densify`: a video between the photos, on which a tracker of objects loses fewer of them.
+
+use super::args::{JsonFlag, SceneArgs};
+use super::log::Progress;
+use super::scene::{NEAR, open_gpu, open_scene, render_engine};
+use super::values::colour;
+use super::{Context, open_model, stdout};
+use crate::infer::output::{Format, write_rgb};
+use crate::infer::render::render;
+use crate::io::frames::{self, Frame, Frames};
+use crate::scene::path::{Between, short_order, video};
+use crate::scene::{Camera, Dataset, View};
+use crate::{Error, Result};
+use clap::{Args, ValueEnum};
+use serde_json::json;
+use std::path::{Path, PathBuf};
+
+/// Order of the photos in the video.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub enum Order {
+    /// A short path through the poses.
+    #[default]
+    Path,
+    /// By name, as the paper.
+    Name,
+}
+
+/// `labelgs densify`.
+#[derive(Args, Clone, Debug)]
+pub struct DensifyArgs {
+    /// The model: a PLY, or the folder that `labelgs train` made.
+    #[arg(value_name = "MODEL")]
+    pub model: PathBuf,
+    /// Scene through whose photos the video goes.
+    #[arg(long, value_name = "SCENE")]
+    pub scene: PathBuf,
+    /// Folder for frames/NNNNN.png and frames.json.
+    #[arg(short, long, value_name = "DIR")]
+    pub output: PathBuf,
+    /// Frames between two photos.
+    #[arg(long, value_name = "N", default_value_t = 9, value_parser = clap::value_parser!(u32).range(..=999))]
+    pub between: u32,
+    /// Order of the photos.
+    #[arg(long, value_name = "ORDER", value_enum, default_value = "path")]
+    pub order: Order,
+    /// As the code of LabelGS: by name, world-to-camera translations interpolated, intrinsics of the photo before.
+    #[arg(long, conflicts_with = "order")]
+    pub compat: bool,
+    /// Let the video go through the test views too; what is tracked then knows them.
+    #[arg(long)]
+    pub include_test: bool,
+    /// Colour behind the scene: black, white, or R,G,B from 0 to 1.
+    #[arg(long, value_name = "COLOUR", value_parser = colour, default_value = "black")]
+    pub background: [f32; 3],
+    /// How the scene is read.
+    #[command(flatten)]
+    pub reading: SceneArgs,
+    /// JSON.
+    #[command(flatten)]
+    pub json: JsonFlag,
+}
+
+/// Renders the video.
+pub fn run(args: &DensifyArgs, context: &Context) -> Result<()> {
+    let model = open_model(&args.model)?;
+    let dataset = open_scene(&args.scene, &args.reading, None, args.background, false)?;
+    let views = ordered_views(args, &dataset)?;
+    let cameras: Vec<&Camera> = views.iter().map(|view| &view.camera).collect();
+    let how = if args.compat { Between::Translations } else { Between::Centres };
+    let stops = video(&cameras, args.between, how);
+    let gpu = open_gpu(context)?;
+    let size = (cameras[0].width, cameras[0].height);
+    let mut engine = render_engine(gpu, &model, std::iter::once(size))?;
+    engine.upload_model(&model)?;
+    let mut progress = Progress::new(stops.len() as u64, "frames", &context.global);
+    let mut written = Vec::new();
+    for (index, stop) in stops.iter().enumerate() {
+        let rendered = render(&mut engine, &stop.camera, NEAR, args.background, model.sh_degree)?;
+        let file = format!("frames/{index:05}.png");
+        write_rgb(&args.output.join(&file), size, &rendered.rgb, Format::Png)?;
+        let photo = stop.camera_index.map(|view| views[view].name.clone());
+        written.push(Frame { file, photo, camera: (&stop.camera).into() });
+        progress.set(index as u64 + 1, String::new);
+    }
+    drop(progress);
+    let path = args.output.join(frames::FILE);
+    // Last, so that it stands for a video that is complete.
+    Frames::new(written).write(&path)?;
+    if context.json || args.json.json {
+        return stdout::print_json(&json!({
+            "schema_version": 1,
+            "frames_json": path.display().to_string(),
+            "frames": stops.len(),
+            "photos": views.len(),
+        }));
+    }
+    stdout::print(&format!("{}: {} frames through {} photos\n", path.display(), stops.len(), views.len()))
+}
+
+/// The views in the order of the video; all have one size, because a tracker needs that.
+fn ordered_views<'a>(args: &DensifyArgs, dataset: &'a Dataset) -> Result<Vec<&'a View>> {
+    let views: Vec<&View> = if args.include_test { dataset.all() } else { dataset.train.iter().collect() };
+    let Some(first) = views.first() else {
+        let cure = "no view is left; use a larger --test-every or --include-test";
+        return Err(Error::data(&args.scene, "", cure));
+    };
+    let size = |view: &View| (view.camera.width, view.camera.height);
+    if let Some(other) = views.iter().find(|view| size(view) != size(first)) {
+        return Err(unequal(&args.scene, first, other));
+    }
+    if args.compat || args.order == Order::Name {
+        return Ok(views);
+    }
+    let cameras: Vec<&Camera> = views.iter().map(|view| &view.camera).collect();
+    Ok(short_order(&cameras).into_iter().map(|index| views[index]).collect())
+}
+
+fn unequal(scene: &Path, a: &View, b: &View) -> Error {
+    let problem = format!(
+        "{} has {} x {} px and {} has {} x {} px; the frames of a video have one size, so scale the photos to one or \
+         track the groups as scenes of their own",
+        a.name, a.camera.width, a.camera.height, b.name, b.camera.width, b.camera.height
+    );
+    Error::data(scene, "photos", problem)
+}

@@ -1,0 +1,111 @@
+//! `labelgs occlusion`, and what training needs of it.
+
+mod source;
+
+pub use source::{for_training, from_depths};
+
+use super::args::JsonFlag;
+use super::log::Progress;
+use super::scene::{NEAR, open_gpu, open_with, render_engine};
+use super::{Context, open_model, stdout};
+use crate::infer::occlusion::{Rule, by_contour, picture};
+use crate::infer::render::render;
+use crate::io::LoadOptions;
+use crate::io::image::write_png_rgb8;
+use crate::io::occlusion_table::OcclusionTable;
+use crate::scene::{DepthKind, LabelMap, Occluders, View};
+use crate::{Error, Result};
+use clap::Args;
+use serde_json::json;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+/// `labelgs occlusion`.
+#[derive(Args, Clone, Debug)]
+#[command(group(clap::ArgGroup::new("from").required(true).args(["depths", "model"])))]
+pub struct OcclusionArgs {
+    /// Folder of the scene (COLMAP or transforms.json), or one .json file.
+    #[arg(value_name = "SCENE")]
+    pub scene: PathBuf,
+    /// Folder of id masks.
+    #[arg(long, value_name = "DIR")]
+    pub masks: PathBuf,
+    /// Folder of depth maps, one per photo by name: 16-bit PNG, EXR, NPY or PFM. Uses the paper's rule.
+    #[arg(long, value_name = "DIR", requires = "depth_kind")]
+    pub depths: Option<PathBuf>,
+    /// What the numbers of --depths mean.
+    #[arg(long, value_name = "KIND", value_enum, requires = "depths")]
+    pub depth_kind: Option<DepthKind>,
+    /// A model whose own depth to use: a PLY, or the folder that `labelgs train` made.
+    #[arg(long, value_name = "MODEL")]
+    pub model: Option<PathBuf>,
+    /// File to write.
+    #[arg(short, long, value_name = "FILE.json")]
+    pub output: PathBuf,
+    /// Folder for a picture of each view, NAME.png: contours are white in front, black behind, grey where neither is.
+    #[arg(long, value_name = "DIR")]
+    pub pictures: Option<PathBuf>,
+    /// Longest side of a picture, px; otherwise its own size.
+    #[arg(long, value_name = "PX", value_parser = clap::value_parser!(u32).range(1..))]
+    pub max_resolution: Option<u32>,
+    /// JSON.
+    #[command(flatten)]
+    pub json: JsonFlag,
+}
+
+/// Finds the occluders of all views with masks.
+pub fn run(args: &OcclusionArgs, context: &Context) -> Result<()> {
+    let options = LoadOptions {
+        masks: Some(args.masks.clone()),
+        max_resolution: args.max_resolution,
+        photos: false,
+        ..LoadOptions::default()
+    };
+    let dataset = open_with(&args.scene, &options)?;
+    let views: Vec<&View> = dataset.all().into_iter().filter(|view| view.mask.is_some()).collect();
+    let table = match (&args.depths, args.depth_kind, &args.model) {
+        (Some(depths), Some(kind), _) => OcclusionTable::new("depth", from_depths(&args.scene, depths, kind, &views)?),
+        (_, _, Some(model)) => OcclusionTable::new("rendered", from_model(model, &views, context)?),
+        _ => return Err(Error::usage("--depths", "--depths with --depth-kind, or --model is needed")),
+    };
+    if let Some(folder) = &args.pictures {
+        views.iter().try_for_each(|view| draw(folder, view, &table))?;
+    }
+    table.write(&args.output)?;
+    let (pairs, output) = (table.pair_count(), args.output.display());
+    if context.json || args.json.json {
+        return stdout::print_json(&json!({
+            "schema_version": 1,
+            "output": output.to_string(),
+            "kind": table.kind,
+            "views": table.views.len(),
+            "pairs": pairs,
+        }));
+    }
+    stdout::print(&format!("{output}: {pairs} pairs of an object and its occluder in {} views\n", table.views.len()))
+}
+
+fn from_model(path: &Path, views: &[&View], context: &Context) -> Result<BTreeMap<String, Occluders>> {
+    let model = open_model(path)?;
+    let gpu = open_gpu(context)?;
+    let mut engine = render_engine(gpu, &model, views.iter().map(|view| (view.camera.width, view.camera.height)))?;
+    engine.upload_model(&model)?;
+    let mut progress = Progress::new(views.len() as u64, "views", &context.global);
+    let mut found = BTreeMap::new();
+    for view in views {
+        let rendered = render(&mut engine, &view.camera, NEAR, [0.0; 3], model.sh_degree)?;
+        found.insert(view.name.clone(), by_contour(mask(view)?, &rendered.mean_depth(), Rule::default()));
+        progress.set(found.len() as u64, String::new);
+    }
+    Ok(found)
+}
+
+fn draw(folder: &Path, view: &View, table: &OcclusionTable) -> Result<()> {
+    let (mask, none) = (mask(view)?, Occluders::new());
+    let pixels = picture(mask, table.views.get(&view.name).unwrap_or(&none));
+    write_png_rgb8(folder.join(format!("{}.png", view.stem())), mask.width, mask.height, &pixels)
+}
+
+fn mask(view: &View) -> Result<&LabelMap> {
+    view.mask.as_ref().ok_or_else(|| Error::Bug(format!("{} came without its mask", view.name)))
+}

@@ -1,0 +1,30 @@
+//! Occluders to look at.
+
+use super::walk;
+use crate::scene::labels::label_colour;
+use crate::scene::{LabelMap, Occluders};
+
+const IN_FRONT: [u8; 3] = [255; 3];
+const BEHIND: [u8; 3] = [0; 3];
+const NEITHER: [u8; 3] = [128; 3];
+
+/// The objects in their colours, a third darker, and along each contour a line of two pixels: white on the side in
+/// front and black on the side behind, or grey where neither hides the other. Chains have no contour and no line.
+pub fn picture(labels: &LabelMap, occluders: &Occluders) -> Vec<[u8; 3]> {
+    let fill = |&id: &u16| label_colour(u32::from(id)).map(|channel| (u16::from(channel) * 2 / 3) as u8);
+    let mut pixels: Vec<[u8; 3]> = labels.ids.iter().map(fill).collect();
+    let hides = |front: u16, back: u16| occluders.get(&back).is_some_and(|by| by.contains(&front));
+    let mut drawn = vec![0_u8; pixels.len()];
+    walk(labels, |own, other, pixel, _| {
+        // Where three objects meet, what is in front of any wins over what is behind.
+        let (rank, colour) = match (hides(own, other), hides(other, own)) {
+            (true, _) => (3, IN_FRONT),
+            (_, true) => (2, BEHIND),
+            _ => (1, NEITHER),
+        };
+        if rank > drawn[pixel] {
+            (drawn[pixel], pixels[pixel]) = (rank, colour);
+        }
+    });
+    pixels
+}

@@ -1,0 +1,56 @@
+//! The paper's rule: whose contour is nearer on the average.
+
+use super::walk;
+use crate::scene::{DepthKind, DepthMap, LabelMap, Occluders};
+use std::collections::BTreeMap;
+
+/// Distances for [`by_mean`], [H, W]; 0 or not a number is none.
+///
+/// Of inverse depth d the paper takes 1 - (d - min) / (max - min), with the extremes of the picture; its nearest pixel
+/// becomes 0 and thereby counts as none. Metric depth stays as it is.
+pub fn distances(map: &DepthMap, kind: DepthKind) -> Vec<f64> {
+    let values = map.values.iter().map(|&value| f64::from(value));
+    match kind {
+        DepthKind::Metric => values.collect(),
+        DepthKind::Inverse => {
+            let finite = || values.clone().filter(|value| value.is_finite());
+            let (low, high) = (finite().fold(f64::INFINITY, f64::min), finite().fold(f64::NEG_INFINITY, f64::max));
+            values.map(|value| 1.0 - (value - low) / (high - low)).collect()
+        }
+    }
+}
+
+/// Sum and count of distances along a contour.
+#[derive(Clone, Copy, Default)]
+struct Band {
+    sum: f64,
+    count: u64,
+}
+
+impl Band {
+    fn mean(&self) -> Option<f64> {
+        (self.count > 0).then(|| self.sum / self.count as f64)
+    }
+}
+
+/// LabelGS, occlusion analysis: k' hides k where they touch and the mean distance of the contour of k' towards k is
+/// less than that of k towards k'. There is no margin, because the scale of the distances is unknown.
+pub fn by_mean(labels: &LabelMap, distance: &[f64]) -> Occluders {
+    let mut bands: BTreeMap<(u16, u16), Band> = BTreeMap::new();
+    walk(labels, |own, other, pixel, _| {
+        let (band, z) = (bands.entry((own, other)).or_default(), distance[pixel]);
+        if z.is_finite() && z > 0.0 {
+            *band = Band { sum: band.sum + z, count: band.count + 1 };
+        }
+    });
+    let mean = |own: u16, other: u16| bands.get(&(own, other)).and_then(Band::mean);
+    let mut hidden_by: Occluders = labels.objects().into_iter().map(|label| (label, Vec::new())).collect();
+    for &(label, other) in bands.keys() {
+        if let (Some(own), Some(theirs)) = (mean(label, other), mean(other, label))
+            && theirs < own
+        {
+            hidden_by.entry(label).or_default().push(other);
+        }
+    }
+    hidden_by
+}

@@ -1,0 +1,40 @@
+//! Which objects hide which, seen in one view: the paper's O_k, from which U_k leaves out the pixels of what hides k.
+//!
+//! [`by_mean`] is the paper's rule for depth that a network guessed from the photo; [`by_contour`] is for depth that
+//! means the same in every pixel, such as the model's own. Both look at the contours between objects: a pixel is on the
+//! contour of k towards k' if its label is k and one of its 8 neighbours is k'. 0 never hides and is never hidden.
+
+mod contour;
+mod draw;
+mod mean;
+
+pub use contour::{Rule, by_contour};
+pub use draw::picture;
+pub use mean::{by_mean, distances};
+
+use crate::scene::LabelMap;
+use std::collections::BTreeMap;
+
+/// Calls `visit(own label, other label, pixel, neighbours)` for each pixel on a contour and each label on its other
+/// side, sorted; `neighbours` are those of its 8 neighbours that have the other label.
+fn walk(labels: &LabelMap, mut visit: impl FnMut(u16, u16, usize, &[usize])) {
+    let (width, height) = (i64::from(labels.width), i64::from(labels.height));
+    let mut others: BTreeMap<u16, Vec<usize>> = BTreeMap::new();
+    for (index, &own) in labels.ids.iter().enumerate() {
+        if own == 0 {
+            continue;
+        }
+        let (x, y) = (index as i64 % width, index as i64 / width);
+        others.clear();
+        for row in (y - 1).max(0)..=(y + 1).min(height - 1) {
+            for column in (x - 1).max(0)..=(x + 1).min(width - 1) {
+                let at = (row * width + column) as usize;
+                let other = labels.ids[at];
+                if other != own && other != 0 {
+                    others.entry(other).or_default().push(at);
+                }
+            }
+        }
+        others.iter().for_each(|(&other, neighbours)| visit(own, other, index, neighbours));
+    }
+}

@@ -1,0 +1,96 @@
+//! Depth maps of the photos of a scene, from a folder.
+//!
+//! A map belongs to a photo as it lies on the disk; it is undistorted and resized as the photo's mask is.
+
+use super::depth_file::{EXTENSIONS, read_depth};
+use super::listing::Listed;
+use super::load::{at_photo_size, shortened};
+use super::resample::{resample_nearest, same_aspect};
+use crate::error::{Error, Result};
+use crate::scene::{DepthMap, View};
+use std::collections::{BTreeMap, HashMap};
+use std::path::{Path, PathBuf};
+
+/// A folder of depth maps and what is needed to bring them to the views of a scene.
+pub struct DepthFolder {
+    folder: PathBuf,
+    listed: BTreeMap<String, Listed>,
+    /// How many photos share a file stem; a map in no folder of its own serves only stems that are unique.
+    stems: HashMap<PathBuf, usize>,
+}
+
+fn stem(name: &str) -> PathBuf {
+    Path::new(name).file_stem().map(PathBuf::from).unwrap_or_default()
+}
+
+impl DepthFolder {
+    /// The maps in `folder` for the photos of `scene`.
+    pub fn open(folder: &Path, scene: &Path) -> Result<Self> {
+        if !folder.is_dir() {
+            return Err(Error::data(folder, "", "there is no such folder of depth maps"));
+        }
+        let listed: BTreeMap<String, Listed> =
+            super::list(scene)?.views.into_iter().map(|view| (view.name.clone(), view)).collect();
+        let mut stems = HashMap::new();
+        listed.keys().for_each(|name| *stems.entry(stem(name)).or_insert(0) += 1);
+        Ok(Self { folder: folder.to_owned(), listed, stems })
+    }
+
+    /// Refuses a folder that lacks the map of one of `views`.
+    pub fn check_complete(&self, views: &[&View]) -> Result<()> {
+        let without: Vec<&str> =
+            views.iter().map(|view| view.name.as_str()).filter(|name| self.find(name).is_none()).collect();
+        if without.is_empty() {
+            return Ok(());
+        }
+        let problem = format!(
+            "{} of {} photos with masks have no depth map: {}; expected files named as the photos, ending in .{}",
+            without.len(),
+            views.len(),
+            shortened(&without),
+            EXTENSIONS.join(", .")
+        );
+        Err(Error::data(&self.folder, "", problem))
+    }
+
+    /// The map of `view`, with its size; pixels that the photo does not cover are holes.
+    pub fn read(&self, view: &View) -> Result<DepthMap> {
+        let (Some(listed), Some(path)) = (self.listed.get(&view.name), self.find(&view.name)) else {
+            return Err(Error::data(&self.folder, &view.name, "has no depth map"));
+        };
+        let map = read_depth(&path)?;
+        let photo = at_photo_size(listed)?;
+        if !same_aspect((map.width, map.height), (photo.width, photo.height)) {
+            let problem = format!(
+                "the depth map has {} x {} px and its photo {} x {} px, which no scale explains; make maps of the same \
+                 photos",
+                map.width, map.height, photo.width, photo.height
+            );
+            return Err(Error::data(&path, "", problem));
+        }
+        let (width, height) = (view.camera.width, view.camera.height);
+        let from = (map.width, map.height);
+        let values = resample_nearest(&map.values, from, &photo, &listed.lens, (width, height), f32::NAN);
+        if !values.iter().any(|value| value.is_finite()) {
+            return Err(Error::data(&path, "", "holds no finite depth"));
+        }
+        Ok(DepthMap { width, height, values })
+    }
+
+    /// The file of a photo: its name with another extension or with one added, then the same without folders.
+    fn find(&self, name: &str) -> Option<PathBuf> {
+        let stem = stem(name);
+        let flat = (self.stems.get(&stem) == Some(&1)).then_some(stem);
+        let file = flat.is_some().then(|| Path::new(name).file_name().map(PathBuf::from)).flatten();
+        let whole = [Some(Path::new(name).with_extension("")), Some(PathBuf::from(name)), flat, file];
+        let candidates = whole.into_iter().flatten().flat_map(|base| {
+            EXTENSIONS.map(|extension| {
+                let mut path = self.folder.join(&base).into_os_string();
+                path.push(".");
+                path.push(extension);
+                PathBuf::from(path)
+            })
+        });
+        candidates.into_iter().find(|path| path.is_file())
+    }
+}

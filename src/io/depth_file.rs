@@ -1,0 +1,171 @@
+//! One depth map in a file: 16-bit PNG, EXR, NPY or PFM. Values are handed on as they are written.
+
+use super::image::check_size;
+use crate::error::{Error, Result};
+use crate::scene::DepthMap;
+use exr::prelude::{MetaData, read_first_flat_layer_from_file};
+use std::fs::File;
+use std::io::BufReader;
+use std::path::Path;
+
+/// Extensions of depth files, the preferred first: a PNG beside another file is often only a picture of it.
+pub(crate) const EXTENSIONS: [&str; 4] = ["exr", "npy", "pfm", "png"];
+
+/// Reads a depth map; the extension tells the kind of file.
+pub(crate) fn read_depth(path: &Path) -> Result<DepthMap> {
+    let extension = path.extension().map(|extension| extension.to_string_lossy().to_lowercase()).unwrap_or_default();
+    match extension.as_str() {
+        "png" => read_png(path),
+        "exr" => read_exr(path),
+        "npy" => read_npy(path),
+        "pfm" => read_pfm(path),
+        _ => Err(Error::data(path, "", "is no depth file; expected 16-bit grey .png, .exr, .npy or .pfm")),
+    }
+}
+
+fn refuse(path: &Path, kind: &str) -> impl Fn(&dyn std::fmt::Display) -> Error {
+    let prefix = format!("is no readable {kind} depth map: ");
+    move |cause| Error::data(path, "", format!("{prefix}{cause}"))
+}
+
+fn read_png(path: &Path) -> Result<DepthMap> {
+    let refuse = refuse(path, "PNG");
+    let file = File::open(path).map_err(Error::read(path))?;
+    let mut reader = png::Decoder::new(BufReader::new(file)).read_info().map_err(|error| refuse(&error))?;
+    let (width, height) = (reader.info().width, reader.info().height);
+    check_size(path, (width, height))?;
+    let (colour, bits) = (reader.info().color_type, reader.info().bit_depth);
+    if (colour, bits) != (png::ColorType::Grayscale, png::BitDepth::Sixteen) {
+        let problem = format!(
+            "is {colour:?} with {} bits; depth needs 16-bit grey, because 256 steps cannot tell near things apart. \
+             Write .npy, .exr, .pfm or 16-bit PNG",
+            bits as u8
+        );
+        return Err(Error::data(path, "", problem));
+    }
+    let mut bytes = vec![0; reader.output_buffer_size().ok_or_else(|| refuse(&"too large"))?];
+    reader.next_frame(&mut bytes).map_err(|error| refuse(&error))?;
+    let values = bytes.chunks_exact(2).map(|pair| f32::from(u16::from_be_bytes([pair[0], pair[1]]))).collect();
+    Ok(DepthMap { width, height, values })
+}
+
+/// The only channel of the first layer, or that of the name Y, Z or R.
+fn read_exr(path: &Path) -> Result<DepthMap> {
+    let refuse = refuse(path, "EXR");
+    if !path.is_file() {
+        return Err(Error::data(path, "", "there is no such file"));
+    }
+    let header = MetaData::read_from_file(path, false).map_err(|error| refuse(&error))?;
+    let size = header.headers.first().map_or((0, 0), |header| (header.layer_size.x(), header.layer_size.y()));
+    let side = |side: usize| u32::try_from(side).unwrap_or(u32::MAX);
+    let (width, height) = (side(size.0), side(size.1));
+    check_size(path, (width, height))?;
+    let image = read_first_flat_layer_from_file(path).map_err(|error| refuse(&error))?;
+    let channels = &image.layer_data.channel_data.list;
+    let named = |name: &str| channels.iter().find(|channel| channel.name.eq(name));
+    let channel = match channels.as_slice() {
+        [only] => Some(only),
+        _ => ["Y", "Z", "R"].into_iter().find_map(named),
+    };
+    let Some(channel) = channel else {
+        return Err(Error::data(path, "channels", "has none of the name Y, Z or R; depth is one channel"));
+    };
+    let values: Vec<f32> = channel.sample_data.values_as_f32().collect();
+    if values.len() as u64 != u64::from(width) * u64::from(height) {
+        return Err(refuse(&"the channel has another size than its picture"));
+    }
+    Ok(DepthMap { width, height, values })
+}
+
+/// A two-dimensional array of floats in C order: rows, then columns. The format is numpy's, versions 1 to 3: magic,
+/// version, length of the header, a Python dictionary of three known keys, then the numbers.
+fn read_npy(path: &Path) -> Result<DepthMap> {
+    let refuse = refuse(path, "NPY");
+    let bytes = std::fs::read(path).map_err(Error::read(path))?;
+    let parts = || {
+        let rest = bytes.strip_prefix(b"\x93NUMPY")?;
+        let (start, length) = match *rest.first()? {
+            1 => (4_usize, usize::from(u16::from_le_bytes([*rest.get(2)?, *rest.get(3)?]))),
+            2 | 3 => (6, u32::from_le_bytes([*rest.get(2)?, *rest.get(3)?, *rest.get(4)?, *rest.get(5)?]) as usize),
+            _ => return None,
+        };
+        Some((std::str::from_utf8(rest.get(start..start.checked_add(length)?)?).ok()?, &rest[start + length..]))
+    };
+    let (header, data) = parts().ok_or_else(|| refuse(&"its header is not numpy's"))?;
+    let field = |key: &str| {
+        let (_, value) = header.split_once(&format!("'{key}':"))?;
+        Some(value.trim_start())
+    };
+    let no = |key: &str| refuse(&format!("its header has no {key}"));
+    let shape = field("shape").and_then(|text| text.strip_prefix('(')?.split_once(')')).ok_or_else(|| no("shape"))?.0;
+    let sides: Vec<&str> = shape.split(',').map(str::trim).filter(|side| !side.is_empty()).collect();
+    let &[height, width] = sides.as_slice() else {
+        return Err(Error::data(path, "shape", format!("is ({shape}); expected (height, width)")));
+    };
+    if !field("fortran_order").ok_or_else(|| no("fortran_order"))?.starts_with("False") {
+        let cure = "the array is in Fortran order; save numpy.ascontiguousarray(depth)";
+        return Err(Error::data(path, "fortran_order", cure));
+    }
+    let side = |side: &str| side.parse().map_err(|_| no("shape of whole numbers"));
+    let (width, height) = (side(width)?, side(height)?);
+    check_size(path, (width, height))?;
+    let kind = field("descr").ok_or_else(|| no("descr"))?;
+    let kind = kind.trim_start_matches('\'').split('\'').next().unwrap_or_default();
+    let (little, each) = match kind {
+        "<f2" | "<f4" | "<f8" => (true, usize::from(kind.as_bytes()[2] - b'0')),
+        ">f2" | ">f4" | ">f8" => (false, usize::from(kind.as_bytes()[2] - b'0')),
+        _ => return Err(Error::data(path, "descr", format!("is {kind}; depth is float16, float32 or float64"))),
+    };
+    let pixels = width as usize * height as usize;
+    if data.len() != pixels * each {
+        return Err(refuse(&format!("{pixels} numbers need {} bytes, it has {}", pixels * each, data.len())));
+    }
+    let value = |number: &[u8]| {
+        let mut eight = [0_u8; 8];
+        eight[..each].copy_from_slice(number);
+        if !little {
+            eight[..each].reverse();
+        }
+        match each {
+            2 => half::f16::from_le_bytes([eight[0], eight[1]]).to_f32(),
+            4 => f32::from_le_bytes([eight[0], eight[1], eight[2], eight[3]]),
+            _ => f64::from_le_bytes(eight) as f32,
+        }
+    };
+    Ok(DepthMap { width, height, values: data.chunks_exact(each).map(value).collect() })
+}
+
+/// `Pf`, width and height, scale (below 0 for little-endian), then rows from the bottom up.
+fn read_pfm(path: &Path) -> Result<DepthMap> {
+    let refuse = refuse(path, "PFM");
+    let bytes = std::fs::read(path).map_err(Error::read(path))?;
+    let mut at = 0;
+    let mut word = || {
+        let start = at + bytes[at..].iter().position(|byte| !byte.is_ascii_whitespace())?;
+        let end = start + bytes[start..].iter().take(32).position(u8::is_ascii_whitespace)?;
+        // One white space ends a word; the one after the scale is the last before the numbers.
+        at = end + 1;
+        std::str::from_utf8(&bytes[start..end]).ok()
+    };
+    match word() {
+        Some("Pf") => {}
+        Some("PF") => return Err(Error::data(path, "", "is a colour PFM; depth needs grey, `Pf`")),
+        _ => return Err(refuse(&"it does not start with `Pf`")),
+    }
+    let mut number = |what: &str| {
+        word().and_then(|word| word.parse::<f64>().ok()).ok_or_else(|| refuse(&format!("its header has no {what}")))
+    };
+    let (width, height, scale) = (number("width")? as u32, number("height")? as u32, number("scale")?);
+    check_size(path, (width, height))?;
+    let (row, expected) = (width as usize * 4, width as usize * height as usize * 4);
+    let numbers = &bytes[at.min(bytes.len())..];
+    if numbers.len() != expected {
+        return Err(refuse(&format!("{width} x {height} px need {expected} bytes, it has {}", numbers.len())));
+    }
+    let float = |four: &[u8]| {
+        let four = [four[0], four[1], four[2], four[3]];
+        if scale < 0.0 { f32::from_le_bytes(four) } else { f32::from_be_bytes(four) }
+    };
+    let values = numbers.chunks_exact(row).rev().flat_map(|row| row.chunks_exact(4).map(float)).collect();
+    Ok(DepthMap { width, height, values })
+}

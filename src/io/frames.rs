@@ -1,0 +1,68 @@
+//! `frames.json`: the frames of a video through the photos of a scene, and which of them stands for which photo.
+
+use super::atomic;
+use super::camera_json::CameraFile;
+use crate::error::{Error, Result};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeSet;
+use std::path::Path;
+
+/// Name of the file in the folder of the video.
+pub const FILE: &str = "frames.json";
+const SCHEMA_VERSION: u32 = 1;
+
+/// One frame.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Frame {
+    /// Its picture, below the folder of the file.
+    pub file: String,
+    /// Name of the photo whose pose it has; null between photos.
+    pub photo: Option<String>,
+    /// Its camera, as `labelgs render --camera` reads one.
+    pub camera: CameraFile,
+}
+
+/// All frames, in the order of the video.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Frames {
+    /// Version of the layout.
+    pub schema_version: u32,
+    /// The frames.
+    pub frames: Vec<Frame>,
+}
+
+impl Frames {
+    /// A video of these frames.
+    pub fn new(frames: Vec<Frame>) -> Self {
+        Self { schema_version: SCHEMA_VERSION, frames }
+    }
+
+    /// Reads a video. Another version, a photo with two frames and a video without photos are errors.
+    pub fn read(path: &Path) -> Result<Self> {
+        let text = std::fs::read_to_string(path).map_err(Error::read(path))?;
+        let video: Self = serde_json::from_str(&text).map_err(|error| {
+            let expected = r#"expected {"schema_version": 1, "frames": [{"file", "photo", "camera"}]}"#;
+            Error::data(path, format!("line {}", error.line()), format!("{error}; {expected}"))
+        })?;
+        if video.schema_version != SCHEMA_VERSION {
+            let problem = format!("has version {}, this program reads {SCHEMA_VERSION}", video.schema_version);
+            return Err(Error::data(path, "schema_version", problem));
+        }
+        let mut seen = BTreeSet::new();
+        for name in video.frames.iter().filter_map(|frame| frame.photo.as_deref()) {
+            if !seen.insert(name) {
+                return Err(Error::data(path, format!("photo {name}"), "has two frames"));
+            }
+        }
+        if seen.is_empty() {
+            return Err(Error::data(path, "frames", "no frame has the pose of a photo"));
+        }
+        Ok(video)
+    }
+
+    /// Writes the video's description, whole or not at all.
+    pub fn write(&self, path: &Path) -> Result<()> {
+        let text = serde_json::to_string_pretty(self).map_err(|error| Error::Bug(format!("JSON: {error}")))?;
+        atomic::write(path, |out| out.write_all(text.as_bytes()))
+    }
+}

@@ -1,0 +1,147 @@
+//! A smooth path through posed cameras: their order, and cameras between two of them.
+
+use super::Camera;
+use glam::{DMat3, DQuat, DVec3};
+
+/// Cameras from which the greedy search starts, at most: more cost more and hardly shorten the path.
+const STARTS: usize = 32;
+/// Least gain that an exchange needs, so that rounding cannot make the search go round in circles.
+const GAIN: f64 = 1e-12;
+
+/// How a camera between two others is made.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Between {
+    /// The centre moves on the straight line and the intrinsics change with it.
+    Centres,
+    /// As the code of LabelGS: the translation of camera-from-world is interpolated, so that the centre may swing off the
+    /// line, and the intrinsics are those of the first camera.
+    Translations,
+}
+
+/// What distances are measured with: centres in units of the cameras' radius, and rotations.
+struct Places {
+    centres: Vec<DVec3>,
+    rotations: Vec<DQuat>,
+}
+
+impl Places {
+    fn new(cameras: &[&Camera]) -> Self {
+        let centres: Vec<DVec3> = cameras.iter().map(|camera| camera.centre()).collect();
+        let mean = centres.iter().sum::<DVec3>() / centres.len().max(1) as f64;
+        let radius = centres.iter().map(|centre| centre.distance(mean)).fold(0.0, f64::max);
+        let unit = if radius > 0.0 { radius } else { 1.0 };
+        let rotations = cameras.iter().map(|camera| DQuat::from_mat3(&camera.rotation).normalize()).collect();
+        Self { centres: centres.iter().map(|centre| *centre / unit).collect(), rotations }
+    }
+
+    /// Distance of the centres plus the angle between the poses in radians: a picture changes about as much when the
+    /// camera turns by a radian as when it goes by the distance to what it looks at, which the radius stands for.
+    fn distance(&self, a: usize, b: usize) -> f64 {
+        let cosine = self.rotations[a].dot(self.rotations[b]).abs().min(1.0);
+        self.centres[a].distance(self.centres[b]) + 2.0 * cosine.acos()
+    }
+}
+
+/// An order of the cameras in which neighbours have similar poses: the shortest of some greedy paths, then every exchange
+/// of two edges (2-opt) that shortens it. The same cameras in the same order give the same result; of both directions
+/// it is that in which the end with the smaller index comes first.
+pub fn short_order(cameras: &[&Camera]) -> Vec<usize> {
+    let (places, count) = (Places::new(cameras), cameras.len());
+    let starts = count.min(STARTS);
+    let paths = (0..starts).map(|start| greedy(&places, start * count / starts));
+    let mut order = paths.min_by(|a, b| length(&places, a).total_cmp(&length(&places, b))).unwrap_or_default();
+    while exchange(&places, &mut order) {}
+    if order.first() > order.last() {
+        order.reverse();
+    }
+    order
+}
+
+fn length(places: &Places, order: &[usize]) -> f64 {
+    order.windows(2).map(|pair| places.distance(pair[0], pair[1])).sum()
+}
+
+/// Always on to the nearest that is left, from `start`.
+fn greedy(places: &Places, start: usize) -> Vec<usize> {
+    let mut left: Vec<usize> = (0..places.centres.len()).filter(|&other| other != start).collect();
+    let mut order = vec![start];
+    let mut last = start;
+    while !left.is_empty() {
+        let away = |&at: &usize| places.distance(last, left[at]);
+        let Some(at) = (0..left.len()).min_by(|a, b| away(a).total_cmp(&away(b))) else { break };
+        last = left.remove(at);
+        order.push(last);
+    }
+    order
+}
+
+/// One round of turning stretches round where that shortens the path; true if any was. The ends are free, so that a
+/// stretch at an end has one edge to lose.
+fn exchange(places: &Places, order: &mut [usize]) -> bool {
+    let mut shorter = false;
+    for first in 0..order.len() {
+        for last in first + 1..order.len() {
+            let edge = |a: Option<usize>, b: Option<usize>| match (a, b) {
+                (Some(a), Some(b)) => places.distance(order[a], order[b]),
+                _ => 0.0,
+            };
+            let (before, after) = (first.checked_sub(1), Some(last + 1).filter(|&at| at < order.len()));
+            let now = edge(before, Some(first)) + edge(Some(last), after);
+            let turned = edge(before, Some(last)) + edge(Some(first), after);
+            if turned < now - GAIN {
+                order[first..=last].reverse();
+                shorter = true;
+            }
+        }
+    }
+    shorter
+}
+
+/// The camera at `t` from 0 to 1 on the way from `a` to `b`; its size is that of `a`. Rotations turn at an even rate on
+/// the short way round, equal ones stay.
+pub fn between(a: &Camera, b: &Camera, t: f64, how: Between) -> Camera {
+    let turn = DQuat::from_mat3(&a.rotation).normalize().slerp(DQuat::from_mat3(&b.rotation).normalize(), t);
+    let rotation = DMat3::from_quat(turn.normalize());
+    let mix = |a: f64, b: f64| a + (b - a) * t;
+    match how {
+        Between::Translations => Camera { rotation, translation: a.translation.lerp(b.translation, t), ..a.clone() },
+        Between::Centres => Camera {
+            rotation,
+            translation: -(rotation * a.centre().lerp(b.centre(), t)),
+            fx: mix(a.fx, b.fx),
+            fy: mix(a.fy, b.fy),
+            cx: mix(a.cx, b.cx),
+            cy: mix(a.cy, b.cy),
+            width: a.width,
+            height: a.height,
+        },
+    }
+}
+
+/// A frame of a video through cameras.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Stop {
+    /// Index of the camera that it stands on; `None` between two.
+    pub camera_index: Option<usize>,
+    /// The camera; that of the index itself, untouched.
+    pub camera: Camera,
+}
+
+/// All frames of a video through `cameras` in their order, with `count` frames between each two: n cameras give
+/// (count + 1)(n - 1) + 1 frames, and camera i is frame (count + 1) i.
+pub fn video(cameras: &[&Camera], count: u32, how: Between) -> Vec<Stop> {
+    let at = |index: usize| Stop { camera_index: Some(index), camera: cameras[index].clone() };
+    let on_the_way = |index: usize| {
+        let (a, b) = (cameras[index], cameras[index + 1]);
+        let part = move |step: u32| f64::from(step) / f64::from(count + 1);
+        (1..=count).map(move |step| Stop { camera_index: None, camera: between(a, b, part(step), how) })
+    };
+    let mut frames = Vec::new();
+    for index in 0..cameras.len() {
+        frames.push(at(index));
+        if index + 1 < cameras.len() {
+            frames.extend(on_the_way(index));
+        }
+    }
+    frames
+}

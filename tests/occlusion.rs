@@ -1,0 +1,257 @@
+//! Who hides whom: both rules against hand-made and slow answers, and against a scene that knows the truth.
+
+use labelgs::infer::occlusion::{Rule, by_contour, by_mean, distances, picture};
+use labelgs::io::occlusion_table::OcclusionTable;
+use labelgs::scene::{DepthKind, DepthMap, LabelMap, Occluders};
+use labelgs::synth::{Preset, SynthOptions, World, ring_of_cameras};
+use std::collections::{BTreeMap, BTreeSet};
+
+/// A repeatable number in 0 to 1.
+fn random(index: usize) -> f64 {
+    let mut word = (index as u64 + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+    word = (word ^ (word >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    ((word ^ (word >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
+}
+
+fn map(width: u32, ids: &[u16]) -> LabelMap {
+    LabelMap { width, height: ids.len() as u32 / width, ids: ids.to_vec() }
+}
+
+fn lists(lists: &[(u16, &[u16])]) -> Occluders {
+    lists.iter().map(|&(label, by)| (label, by.to_vec())).collect()
+}
+
+/// Strips of two columns with the ids 1, 2, .., and a depth for each.
+fn strips(depths: &[f32]) -> (LabelMap, Vec<f32>) {
+    let columns: Vec<u16> = (0..depths.len() * 2).map(|x| x as u16 / 2 + 1).collect();
+    let row: Vec<f32> = columns.iter().map(|&id| depths[usize::from(id) - 1]).collect();
+    (map(columns.len() as u32, &columns.repeat(4)), row.repeat(4))
+}
+
+/// The rule as the method states it: erode, dilate, bands.
+fn by_mean_slowly(labels: &LabelMap, distance: &[f64]) -> Occluders {
+    let (width, height) = (labels.width as i64, labels.height as i64);
+    let around = |index: usize| {
+        let (x, y) = (index as i64 % width, index as i64 / width);
+        (-1..=1).flat_map(move |dy| (-1..=1).map(move |dx| (x + dx, y + dy)))
+    };
+    let inside = |&(x, y): &(i64, i64)| (0..width).contains(&x) && (0..height).contains(&y);
+    let index = |(x, y): (i64, i64)| (y * width + x) as usize;
+    let dilate = |set: &BTreeSet<usize>| -> BTreeSet<usize> {
+        set.iter().flat_map(|&i| around(i).filter(inside).map(index).collect::<Vec<_>>()).collect()
+    };
+    let mean = |set: &BTreeSet<usize>| {
+        let good: Vec<f64> = set.iter().map(|&i| distance[i]).filter(|z| z.is_finite() && *z != 0.0).collect();
+        good.iter().sum::<f64>() / good.len() as f64
+    };
+    let mut result = BTreeMap::new();
+    for k in labels.objects() {
+        let region: BTreeSet<usize> = (0..labels.ids.len()).filter(|&i| labels.ids[i] == k).collect();
+        // The border of the image does not erode.
+        let eroded =
+            region.iter().copied().filter(|&i| around(i).filter(inside).map(index).all(|n| region.contains(&n)));
+        let eroded: BTreeSet<usize> = eroded.collect();
+        let inner: BTreeSet<usize> = region.difference(&eroded).copied().collect();
+        let outer: BTreeSet<usize> = dilate(&region).difference(&region).copied().collect();
+        let adjacent: BTreeSet<u16> = outer.iter().map(|&i| labels.ids[i]).filter(|&id| id != 0).collect();
+        let hides = |&other: &u16| {
+            let out: BTreeSet<usize> = outer.iter().copied().filter(|&i| labels.ids[i] == other).collect();
+            let own: BTreeSet<usize> = dilate(&out).intersection(&inner).copied().collect();
+            mean(&out) < mean(&own)
+        };
+        result.insert(k, adjacent.into_iter().filter(hides).collect());
+    }
+    result
+}
+
+/// Blobs of the ids 0 to 4: the nearest of some sites decides.
+fn blobs(seed: usize, width: usize, height: usize) -> LabelMap {
+    let at = |s: usize, side: usize| random(seed * 50 + s) * side as f64;
+    let sites: Vec<_> = (0..7).map(|s| (at(s, width), at(s + 20, height))).collect();
+    let nearest = |i: usize| {
+        let away = |&(x, y): &(f64, f64)| (x - (i % width) as f64).powi(2) + (y - (i / width) as f64).powi(2);
+        (0..7).min_by(|&a, &b| away(&sites[a]).total_cmp(&away(&sites[b]))).expect("a site")
+    };
+    map(width as u32, &(0..width * height).map(|i| (nearest(i) % 5) as u16).collect::<Vec<_>>())
+}
+
+#[test]
+fn three_strips_on_a_ramp_by_the_papers_rule() {
+    let (labels, metric) = strips(&[1.0, 2.0, 3.0]);
+    let size = |values: Vec<f32>| DepthMap { width: 6, height: 4, values };
+    let metric = distances(&size(metric), DepthKind::Metric);
+    let expected = lists(&[(1, &[]), (2, &[1]), (3, &[2])]);
+    assert_eq!(by_mean(&labels, &metric), expected);
+    // A ramp: one pixel nearer than strip 1, which then has depth besides the one that becomes 0.
+    let ramp: Vec<f32> = [9.0, 8.0, 7.0, 6.0, 5.0, 4.0].repeat(4);
+    assert_eq!(by_mean(&labels, &distances(&size(ramp), DepthKind::Inverse)), expected);
+    for kind in [DepthKind::Metric, DepthKind::Inverse] {
+        let flat = by_mean(&labels, &distances(&size(vec![2.0; 24]), kind));
+        assert_eq!(flat, lists(&[(1, &[]), (2, &[]), (3, &[])]), "{kind:?}");
+    }
+    // No margin: any difference decides, and exactly one of two that touch is in front.
+    let close: Vec<f32> = [1.0, 1.0, 1.0001, 1.0001, 2.0, 2.0].repeat(4);
+    assert_eq!(by_mean(&labels, &distances(&size(close), DepthKind::Metric)), expected);
+}
+
+#[test]
+fn distances_of_inverse_depth_are_the_papers() {
+    let map = DepthMap { width: 5, height: 1, values: vec![2.0, 6.0, 4.0, f32::NAN, 3.0] };
+    let found = distances(&map, DepthKind::Inverse);
+    assert_eq!((&found[..3], found[4]), (&[1.0, 0.0, 0.5][..], 0.75));
+    assert!(found[3].is_nan(), "a hole stays one and is no extreme");
+    // The nearest pixel of the picture is 0 and counts as none: strip 1, made of it alone, hides nothing.
+    let (labels, _) = strips(&[1.0, 2.0]);
+    let inverse = DepthMap { width: 4, height: 4, values: [9.0, 9.0, 5.0, 4.0].repeat(4) };
+    assert!(by_mean(&labels, &distances(&inverse, DepthKind::Inverse)).values().all(Vec::is_empty));
+}
+
+#[test]
+fn the_papers_rule_equals_its_statement() {
+    for seed in 0..20 {
+        let labels = blobs(seed, 13, 9);
+        let hole = |i: usize| [0.0, f32::NAN][i % 2];
+        let metric: Vec<f32> =
+            (0..13 * 9).map(|i| if random(i) < 0.1 { hole(i) } else { 1.0 + random(i + seed * 200) as f32 }).collect();
+        let distance = distances(&DepthMap { width: 13, height: 9, values: metric }, DepthKind::Metric);
+        assert_eq!(by_mean(&labels, &distance), by_mean_slowly(&labels, &distance), "seed {seed}");
+    }
+}
+
+#[test]
+fn a_vote_needs_the_margin_and_the_majority() {
+    let rule = Rule::default();
+    let found = |depths: &[f32]| {
+        let (labels, depth) = strips(depths);
+        by_contour(&labels, &depth, rule)
+    };
+    let nobody = lists(&[(1, &[]), (2, &[])]);
+    assert_eq!(found(&[1.0, 1.1]), lists(&[(1, &[]), (2, &[1])]));
+    assert_eq!(found(&[1.1, 1.0]), lists(&[(1, &[2]), (2, &[])]));
+    assert_eq!(found(&[1.0, 1.01]), nobody, "1 % is within the margin of 2 %");
+    let (labels, mut depth) = strips(&[1.0, 1.01]);
+    assert_eq!(by_contour(&labels, &depth, Rule { margin: 0.005, ..rule })[&2], [1]);
+    // One row of four is far in front: by the mean 1 hides 2, by the vote the other three rows say no.
+    depth[1] = 0.1;
+    assert_eq!(by_contour(&labels, &depth, rule), nobody);
+    let wide: Vec<f64> = depth.iter().map(|&z| f64::from(z)).collect();
+    assert_eq!(by_mean(&labels, &wide)[&2], [1]);
+    // Half is no majority.
+    let (labels, mut depth) = strips(&[1.0, 1.0]);
+    (0..2).for_each(|row| [depth[row * 4], depth[row * 4 + 1]] = [0.5; 2]);
+    let halves = by_contour(&labels, &depth, Rule { majority: 0.6, ..rule });
+    assert_eq!(halves, nobody, "the row beside the step sees both depths, so a little more than half agree");
+}
+
+#[test]
+fn holes_have_no_vote() {
+    let (labels, mut depth) = strips(&[1.0, 2.0]);
+    for hole in [0.0, -1.0, f32::NAN, f32::INFINITY] {
+        // Only the last row is left.
+        (0..3).for_each(|row| depth[row * 4..row * 4 + 4].fill(hole));
+        assert_eq!(by_contour(&labels, &depth, Rule::default())[&2], [1], "{hole}");
+        assert!(by_contour(&labels, &[hole; 16], Rule::default()).values().all(Vec::is_empty), "{hole}");
+    }
+    // Depth on one side only is no comparison.
+    (0..4).for_each(|row| depth[row * 4..row * 4 + 4].copy_from_slice(&[f32::NAN, f32::NAN, 2.0, 2.0]));
+    assert!(by_contour(&labels, &depth, Rule::default()).values().all(Vec::is_empty));
+}
+
+#[test]
+fn occluders_come_in_chains() {
+    let found = |depths: &[f32]| {
+        let (labels, depth) = strips(depths);
+        by_contour(&labels, &depth, Rule::default())
+    };
+    // 4 goes on behind 3, which goes on behind 2, and so on.
+    assert_eq!(found(&[1.0, 2.0, 3.0, 4.0]), lists(&[(1, &[]), (2, &[1]), (3, &[1, 2]), (4, &[1, 2, 3])]));
+    // 2 is in front of both neighbours; they do not hide each other.
+    assert_eq!(found(&[3.0, 1.0, 4.0]), lists(&[(1, &[2]), (2, &[]), (3, &[2])]));
+    // A chain ends at what is not nearer than the object where it goes under: 2 rises from 1.0 at 3 to 9.0 at 1, and 1
+    // hides it there, but at 8.0 it is behind 3.
+    let labels = map(6, &[1, 1, 2, 2, 3, 3].repeat(4));
+    let depth: Vec<f32> = [8.0, 8.0, 9.0, 1.0, 5.0, 5.0].repeat(4);
+    assert_eq!(by_contour(&labels, &depth, Rule::default()), lists(&[(1, &[]), (2, &[1]), (3, &[2])]));
+    // A ring in which each hides the next: no object hides itself, and none that it hides.
+    let labels = map(4, &[1, 1, 2, 2, 1, 1, 2, 2, 1, 3, 3, 2, 3, 3, 3, 3]);
+    let depth = [5.0, 5.0, 1.0, 1.0, 5.0, 5.0, 1.0, 1.0, 3.0, 4.0, 0.5, 3.0, 4.0, 4.0, 4.0, 4.0];
+    for (label, by) in by_contour(&labels, &depth, Rule::default()) {
+        assert!(!by.contains(&label), "{label} hides itself");
+    }
+}
+
+/// True depth of a scene whose whole outlines are known: what hides what is then no matter of opinion.
+#[test]
+fn the_vote_finds_what_hides_in_a_known_scene() {
+    let options = SynthOptions { preset: Preset::Default, width: 160, height: 120, views: 10, points: 1, seed: 1 };
+    let world = World::new(options.preset, options.seed);
+    let (mut both, mut found_pairs, mut true_pairs, mut mean_pairs, mut mean_both) = (0, 0, 0, 0, 0);
+    for (view, camera) in ring_of_cameras(&options).iter().enumerate() {
+        let made = labelgs::synth::picture(&world, camera, view as u32);
+        let labels = map(options.width, &made.ids.iter().map(|&id| u16::from(id)).collect::<Vec<_>>());
+        let mut hidden: BTreeMap<(u16, u16), usize> = BTreeMap::new();
+        for (object, whole) in world.objects.iter().zip(&made.whole) {
+            for (&id, _) in labels.ids.iter().zip(whole).filter(|&(&id, &covered)| covered && id != 0) {
+                *hidden.entry((u16::from(object.id), id)).or_default() += 1;
+            }
+        }
+        let shown = labels.objects();
+        // A few pixels at a silhouette are a matter of rounding.
+        hidden.retain(|&(label, other), &mut pixels| label != other && pixels >= 12 && shown.contains(&label));
+        let pairs = |found: &Occluders| -> BTreeSet<(u16, u16)> {
+            found.iter().flat_map(|(&label, by)| by.iter().map(move |&other| (label, other))).collect()
+        };
+        let truth: BTreeSet<(u16, u16)> = hidden.into_keys().collect();
+        let vote = pairs(&by_contour(&labels, &made.depth, Rule::default()));
+        let wide: Vec<f64> = made.depth.iter().map(|&z| f64::from(z)).collect();
+        let mean = pairs(&by_mean(&labels, &wide));
+        both += vote.intersection(&truth).count();
+        found_pairs += vote.len();
+        mean_both += mean.intersection(&truth).count();
+        mean_pairs += mean.len();
+        true_pairs += truth.len();
+    }
+    eprintln!("true {true_pairs}; vote {found_pairs}, right {both}; mean {mean_pairs}, right {mean_both}");
+    let precision = |right: usize, found: usize| right as f64 / found as f64;
+    assert!(both as f64 >= 0.8 * true_pairs as f64, "{both} of {true_pairs} are found");
+    assert!(precision(both, found_pairs) > precision(mean_both, mean_pairs), "{both}/{found_pairs}");
+}
+
+#[test]
+fn a_picture_shows_the_side_in_front() {
+    let (labels, _) = strips(&[1.0, 2.0, 2.0]);
+    let drawn = picture(&labels, &lists(&[(2, &[1])]));
+    let row: Vec<[u8; 3]> = drawn[..6].to_vec();
+    assert_eq!((row[1], row[2]), ([255; 3], [0; 3]), "1 is in front of 2");
+    assert_eq!((row[3], row[4]), ([128; 3], [128; 3]), "neither of 2 and 3");
+    assert!(row[0] != row[5] && !drawn[0].contains(&255), "fills are the darker colours of the objects");
+}
+
+#[test]
+fn the_table_comes_back_and_nonsense_is_refused() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("occlusion.json");
+    let table =
+        OcclusionTable::new("depth", BTreeMap::from([("a/0.png".to_owned(), lists(&[(1, &[]), (7, &[1, 3])]))]));
+    table.write(&path).expect("written");
+    assert_eq!((OcclusionTable::read(&path).expect("read"), table.pair_count()), (table, 2));
+    let text = std::fs::read_to_string(&path).expect("text");
+    let json: serde_json::Value = serde_json::from_str(&text).expect("JSON");
+    assert_eq!(json["views"]["a/0.png"]["7"], serde_json::json!([1, 3]));
+    let lists = |text: &str| format!(r#"{{"schema_version": 1, "kind": "depth", "views": {{"0.png": {text}}}}}"#);
+    for (text, problem) in [
+        (lists(r#"{"1": [1]}"#), "hides itself"),
+        (lists(r#"{"1": [0]}"#), "0 is no object"),
+        (lists(r#"{"0": [1]}"#), "0 is no object"),
+        (lists(r#"{"x": [1]}"#), "expected"),
+        (lists(r#"{"1": [70000]}"#), "expected"),
+        ("{}".to_owned(), "expected"),
+        (r#"{"schema_version": 2, "kind": "", "views": {}}"#.to_owned(), "version 2"),
+    ] {
+        std::fs::write(&path, &text).expect("written");
+        let error = OcclusionTable::read(&path).expect_err(&text);
+        assert!(error.to_string().contains(problem) && error.exit_status() == 3, "{error}");
+    }
+    std::fs::write(&path, lists(r#"{"2": [9, 4, 9]}"#)).expect("written");
+    assert_eq!(OcclusionTable::read(&path).expect("read").views["0.png"][&2], [4, 9]);
+}
