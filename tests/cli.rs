@@ -233,7 +233,10 @@ fn extract_and_remove_write_the_two_parts() {
     let output = labelgs(&["extract", model, "--labels", "2,3", "-o", out]);
     assert_eq!(output.status.code(), Some(2));
     let message = text(&output.stderr);
-    assert!(message.starts_with("error: --labels: no Gaussian has label 2; the model has 1, 3"), "{message}");
+    assert!(
+        message.starts_with("error: --labels: no Gaussian has label 2; the model has 1 (2 Gaussians), 3"),
+        "{message}"
+    );
     assert_eq!(std::fs::read(&part).expect("file"), before, "a failed run leaves the old file");
 }
 

@@ -7,9 +7,11 @@ mod support;
 
 mod architecture;
 mod cli;
+mod cli_edit;
 mod cli_engine;
 mod compare_self;
 mod config;
+mod edits;
 mod gradient;
 mod invariants;
 mod io;

@@ -1,5 +1,6 @@
 //! Scores, label choice, occluders and selections against slow or hand-made answers.
 
+use labelgs::infer::catalogue::Catalogue;
 use labelgs::infer::choose::{candidates, choose_labels, require_labels};
 use labelgs::infer::metrics::{Overlap, paper_score, psnr};
 use labelgs::infer::occlusion::{MARGIN, occluders};
@@ -112,11 +113,11 @@ fn labels_are_chosen_by_containment() {
     let found: Vec<_> = candidates(&view, &mask).iter().map(|c| (c.label, c.inside, c.pixels)).collect();
     assert_eq!(found, [(1, 2, 3), (2, 1, 2), (3, 1, 2)]);
     let narrow = [false, false, true, false, false, false, false, false];
-    let message = require_labels("--mask", &view, &narrow).expect_err("nothing").to_string();
+    let message = require_labels("--mask", &view, &narrow, &Catalogue::default()).expect_err("nothing").to_string();
     assert!(message.contains("2 (1 of its 2 pixels"), "{message}");
     let background = [false, false, false, false, false, false, false, true];
-    assert!(require_labels("--mask", &view, &background).is_err());
-    assert!(require_labels("--mask", &view, &[true]).is_err());
+    assert!(require_labels("--mask", &view, &background, &Catalogue::default()).is_err());
+    assert!(require_labels("--mask", &view, &[true], &Catalogue::default()).is_err());
 }
 
 /// The rule as the method states it: erode, dilate, bands.

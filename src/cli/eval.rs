@@ -3,7 +3,7 @@
 use super::Context;
 use super::args::EvalArgs;
 use super::log::Progress;
-use super::scene::{NEAR, open_gpu, open_scene, pick_views, render_engine};
+use super::scene::{near_plane, open_gpu, open_scene, pick_views, render_engine};
 use super::{open_model, stdout};
 use crate::infer::evaluate::{Rendering, evaluate, picture_count};
 use crate::infer::scores::Scores;
@@ -24,7 +24,7 @@ pub fn run(args: &EvalArgs, context: &Context) -> Result<()> {
     if let Some(folder) = args.amodal.as_ref().filter(|folder| !folder.is_dir()) {
         return Err(Error::data(folder, "", "is no folder; --amodal needs a folder with ID/NAME.png"));
     }
-    let how = Rendering { near: NEAR, background: args.background };
+    let how = Rendering { near: near_plane(&args.model, args.near)?, background: args.background };
     let outline = |id, view: &View| match &amodal {
         Some(folder) => read_outline(folder, id, view),
         None => Ok(None),

@@ -1,18 +1,24 @@
 //! The command line: what is typed, what is decided, and a verb per file.
 
 pub mod args;
+pub mod choose;
 pub mod config;
 pub mod devices;
 pub mod eval;
 pub mod interrupt;
+pub mod labelled;
 pub mod list;
 pub mod log;
+pub mod merge;
 pub mod plan;
 pub mod profile;
 mod profile_report;
+pub mod recolour;
+pub mod relabel;
 pub mod render;
 pub mod scene;
 pub mod select;
+pub mod split_components;
 pub mod stdout;
 pub mod synth;
 pub mod train;
@@ -95,8 +101,12 @@ fn run(args: Vec<OsString>) -> Result<(), Exit> {
         Command::Train(args) => train::run(&args, &context),
         Command::Render(args) => render::run(&args, &context),
         Command::List(args) => list::run(&args, &context),
-        Command::Extract(args) => select::run(&args, select::Keep::Selected, &context),
-        Command::Remove(args) => select::run(&args, select::Keep::Rest, &context),
+        Command::Extract(args) => select::run_extract(&args, &context),
+        Command::Remove(args) => select::run_remove(&args, &context),
+        Command::Recolour(args) => recolour::run(&args, &context),
+        Command::Relabel(args) => relabel::run(&args, &context),
+        Command::Merge(args) => merge::run(&args, &context),
+        Command::SplitComponents(args) => split_components::run(&args, &context),
         Command::Eval(args) => eval::run(&args, &context),
         Command::Synth(args) => synth::run(&args, &context),
         Command::Devices(args) => devices::run(&args, &context),

@@ -15,6 +15,7 @@ mod load;
 pub mod mask;
 pub mod ply;
 mod resample;
+pub mod run_folder;
 mod transforms;
 
 use crate::error::{Error, Result};
