@@ -169,7 +169,7 @@ fn places_in_views_choose_labels() {
     succeeds(&["synth", scene, "--preset", "simple", "--size", "96x72", "--views", "4", "--points", "20"]);
     let cameras =
         ring_of_cameras(&SynthOptions { width: 96, height: 72, views: 4, points: 20, ..SynthOptions::default() });
-    let places = [[-0.7, 0.0, 0.4], [0.7, 0.0, 0.4], [0.0, 0.0, 1.3]];
+    let places = [[-0.6, -0.5, 0.4], [0.5, 0.7, 0.4], [0.0, 0.0, 1.3]];
     // In the folder of a run, so that its near plane counts.
     let run = folder.path().join("run");
     let ply = run.join("point_cloud/iteration_1/point_cloud.ply");

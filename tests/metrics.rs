@@ -220,7 +220,10 @@ fn extract_and_remove_share_the_model_out() {
     let (object, rest) = (extract(&model(), &[2]).expect("2"), remove(&model(), &[2]).expect("2"));
     assert_eq!((object.labels, rest.labels), (Some(vec![2, 2]), Some(vec![5, 0])));
     let message = extract(&model(), &[2, 7, 9]).expect_err("no 7").to_string();
-    assert!(message.contains("7, 9") && message.contains("2, 5") && message.contains("0 for the"), "{message}");
+    assert!(
+        message.contains("label 7, 9;") && message.contains("2 (2 Gaussians), 5 (1 Gaussians), and 0 for the"),
+        "{message}"
+    );
     assert!(extract(&model(), &[]).is_err());
     assert!(remove(&model(), &[0, 2, 5]).is_err());
     let unlabelled = Gaussians { labels: None, ..model() };

