@@ -240,7 +240,10 @@ fn extract_and_remove_write_the_two_parts() {
     let output = labelgs(&["extract", model, "--labels", "2,3", "-o", out]);
     assert_eq!(output.status.code(), Some(2));
     let message = text(&output.stderr);
-    assert!(message.starts_with("error: --labels: no Gaussian has label 2; the model has 1, 3"), "{message}");
+    assert!(
+        message.starts_with("error: --labels: no Gaussian has label 2; the model has 1 (2 Gaussians), 3"),
+        "{message}"
+    );
     assert_eq!(std::fs::read(&part).expect("file"), before, "a failed run leaves the old file");
 }
 
@@ -267,7 +270,15 @@ fn synth_makes_a_scene_once() {
     assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
     let json: Value = serde_json::from_slice(&output.stdout).expect("JSON");
     assert_eq!((&json["views"], &json["objects"][1]["name"]), (&4.into(), &"ball".into()));
-    for file in ["images/003.png", "masks/000.png", "amodal/3/001.png", "depth/002.exr", "sparse/0/points3D.bin"] {
+    for file in [
+        "images/003.png",
+        "masks/000.png",
+        "amodal/3/001.png",
+        "depth/002.exr",
+        "sparse/0/points3D.bin",
+        "objects/2/002.png",
+        "masks/labels.json",
+    ] {
         assert!(Path::new(scene).join(file).is_file(), "{file}");
     }
     assert_eq!(labelgs(&args).status.code(), Some(2), "the folder is not empty any more");

@@ -1,6 +1,7 @@
 //! Scores, label choice and selections against slow or hand-made answers.
 
 use labelgs::infer::boundary::{boundary_iou, rim, rim_width};
+use labelgs::infer::catalogue::Catalogue;
 use labelgs::infer::choose::{candidates, choose_labels, require_labels};
 use labelgs::infer::crop::Crop;
 use labelgs::infer::metrics::{Overlap, paper_score, psnr};
@@ -230,11 +231,11 @@ fn labels_are_chosen_by_containment() {
     let found: Vec<_> = candidates(&view, &mask).iter().map(|c| (c.label, c.inside, c.pixels)).collect();
     assert_eq!(found, [(1, 2, 3), (2, 1, 2), (3, 1, 2)]);
     let narrow = [false, false, true, false, false, false, false, false];
-    let message = require_labels("--mask", &view, &narrow).expect_err("nothing").to_string();
+    let message = require_labels("--mask", &view, &narrow, &Catalogue::default()).expect_err("nothing").to_string();
     assert!(message.contains("2 (1 of its 2 pixels"), "{message}");
     let background = [false, false, false, false, false, false, false, true];
-    assert!(require_labels("--mask", &view, &background).is_err());
-    assert!(require_labels("--mask", &view, &[true]).is_err());
+    assert!(require_labels("--mask", &view, &background, &Catalogue::default()).is_err());
+    assert!(require_labels("--mask", &view, &[true], &Catalogue::default()).is_err());
 }
 
 fn model() -> Gaussians {
@@ -268,7 +269,10 @@ fn extract_and_remove_share_the_model_out() {
     let (object, rest) = (extract(&model(), &[2]).expect("2"), remove(&model(), &[2]).expect("2"));
     assert_eq!((object.labels, rest.labels), (Some(vec![2, 2]), Some(vec![5, 0])));
     let message = extract(&model(), &[2, 7, 9]).expect_err("no 7").to_string();
-    assert!(message.contains("7, 9") && message.contains("2, 5") && message.contains("0 for the"), "{message}");
+    assert!(
+        message.contains("label 7, 9;") && message.contains("2 (2 Gaussians), 5 (1 Gaussians), and 0 for the"),
+        "{message}"
+    );
     assert!(extract(&model(), &[]).is_err());
     assert!(remove(&model(), &[0, 2, 5]).is_err());
     let unlabelled = Gaussians { labels: None, ..model() };

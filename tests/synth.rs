@@ -1,8 +1,10 @@
 //! The made scene: its pictures, masks, depth and points must agree with each other.
 
 use labelgs::io::LoadOptions;
+use labelgs::io::label_table::LabelTable;
+use labelgs::io::mask::read_mask;
 use labelgs::scene::Camera;
-use labelgs::synth::{self, Preset, SynthOptions, World, picture, ring_of_cameras};
+use labelgs::synth::{self, Picture, Preset, SynthOptions, World, alone, picture, ring_of_cameras};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -114,12 +116,24 @@ fn files_are_complete_and_the_same_every_time() {
     synth::write(&options, &again, &|_| Ok(())).expect("written");
     synth::write(&SynthOptions { seed: 1, ..options }, &other, &|_| Ok(())).expect("written");
     let (a, b, c) = (files(&first), files(&again), files(&other));
-    // Per view a photo, a mask, a depth map and 8 whole objects; 3 of COLMAP; the names.
-    assert_eq!(a.len(), 6 * 11 + 4);
+    // Per view a photo, a mask, a depth map, 8 whole outlines and 8 objects alone; 3 of COLMAP; the names.
+    assert_eq!(a.len(), 6 * 19 + 4);
     assert!(a.values().eq(b.values()), "two runs differ");
     assert_ne!(a[&first.join("images/000.png")], c[&other.join("images/000.png")]);
-    let labels: serde_json::Value = serde_json::from_slice(&a[&first.join("labels.json")]).expect("JSON");
-    assert_eq!((&labels[0]["id"], &labels[0]["name"]), (&1.into(), &"crate".into()));
+    let table = LabelTable::read(&first.join("masks/labels.json")).expect("the names");
+    assert_eq!((table.labels[0].id, table.labels[0].name.as_deref()), (1, Some("crate")));
+    let mut counted = [(0_u64, 0_u32); 9];
+    for view in 0..6 {
+        let mask = read_mask(first.join(format!("masks/{view:03}.png"))).expect("mask");
+        mask.ids.iter().for_each(|&id| counted[usize::from(id)].0 += 1);
+        mask.objects().iter().for_each(|&id| counted[usize::from(id)].1 += 1);
+    }
+    let told: Vec<_> = table.labels.iter().map(|entry| (entry.pixels, entry.views)).collect();
+    assert_eq!(told, counted[1..]);
+    let file = image::open(first.join("objects/2/000.png")).expect("PNG").into_rgba8();
+    let world = World::new(options.preset, options.seed);
+    let made = synth::alone(&world, &ring_of_cameras(&options)[0], 0, 1);
+    assert_eq!(file.into_raw(), made.concat());
 }
 
 #[test]
@@ -147,4 +161,140 @@ fn a_filled_folder_is_left_alone() {
     let error = synth::write(&small(), folder.path(), &|_| Ok(())).expect_err("not empty");
     assert_eq!(error.exit_status(), 2);
     assert!(error.to_string().contains("not empty"), "{error}");
+}
+
+/// True where the mask names `id` in the whole neighbourhood of a pixel.
+fn is_inner(made: &Picture, at: usize, id: u8) -> bool {
+    let (width, height) = (made.width as usize, made.height as usize);
+    let (x, y) = (at % width, at / width);
+    let inside = (1..width - 1).contains(&x) && (1..height - 1).contains(&y);
+    inside && (y - 1..=y + 1).all(|y| (x - 1..=x + 1).all(|x| made.ids[y * width + x] == id))
+}
+
+#[test]
+fn an_object_alone_is_the_photo_where_nothing_hides_it() {
+    let options = SynthOptions { width: 128, height: 96, ..small() };
+    let world = World::new(Preset::Default, 0);
+    for (view, camera) in ring_of_cameras(&options).iter().enumerate().take(3) {
+        let made = picture(&world, camera, view as u32);
+        let (mut compared, mut slivers, mut hidden) = (0, 0, 0);
+        for (index, object) in world.objects.iter().enumerate() {
+            let alone = alone(&world, camera, view as u32, index);
+            for (at, &[r, g, b, alpha]) in alone.iter().enumerate() {
+                assert_eq!(alpha == 255, made.whole[index][at], "alpha is the whole outline");
+                assert!(alpha == 255 || [r, g, b, alpha] == [0; 4], "nothing is black and transparent");
+                if is_inner(&made, at, object.id) {
+                    compared += 1;
+                    slivers += usize::from([r, g, b] != made.rgb[at]);
+                }
+                hidden += usize::from(alpha == 255 && made.ids[at] != object.id && [r, g, b] != made.rgb[at]);
+            }
+        }
+        assert!(compared > 800 && hidden > 100, "{compared} pixels compared, {hidden} hidden ones have own colours");
+        // Tips of other objects that reach between the centres of pixels.
+        assert!(slivers * 200 <= compared, "{slivers} of {compared} pixels of view {view} differ");
+    }
+}
+
+/// The hard scene at half the usual size, which is enough to see it.
+fn hard() -> (World, Vec<Camera>, Vec<Picture>) {
+    let world = World::new(Preset::Hard, 0);
+    let options = SynthOptions { width: 160, height: 120, ..SynthOptions::default() };
+    let cameras: Vec<Camera> = ring_of_cameras(&options).into_iter().step_by(5).collect();
+    let made = cameras.iter().enumerate().map(|(view, camera)| picture(&world, camera, view as u32)).collect();
+    (world, cameras, made)
+}
+
+fn index_of(world: &World, name: &str) -> usize {
+    world.objects.iter().position(|object| object.name == name).unwrap_or_else(|| panic!("no {name}"))
+}
+
+/// Mean length of the runs of `true` along rows of `width`.
+fn mean_run(pixels: &[bool], width: usize) -> f64 {
+    let starts = |row: &[bool]| (0..row.len()).filter(|&x| row[x] && (x == 0 || !row[x - 1])).count();
+    let runs: usize = pixels.chunks(width).map(starts).sum();
+    pixels.iter().filter(|&&pixel| pixel).count() as f64 / runs as f64
+}
+
+#[test]
+fn the_hard_scene_is_hard() {
+    let (world, cameras, made) = hard();
+    let (width, height) = (made[0].width as usize, made[0].height as usize);
+    let views = made.len() as u32 as f64;
+    let seen = |name: &str| {
+        let id = world.objects[index_of(&world, name)].id;
+        made.iter().map(|made| made.ids.iter().filter(|&&pixel| pixel == id).count()).collect::<Vec<_>>()
+    };
+    for object in &world.objects {
+        assert!(seen(object.name).iter().filter(|&&pixels| pixels > 8).count() >= 2, "{} is not seen", object.name);
+    }
+
+    for name in ["fence", "wire"] {
+        let index = index_of(&world, name);
+        let widths = made.iter().map(|made| {
+            let columns: Vec<bool> = (0..width)
+                .flat_map(|x| (0..height).map(move |y| y * width + x))
+                .map(|at| made.whole[index][at])
+                .collect();
+            mean_run(&made.whole[index], width).min(mean_run(&columns, height))
+        });
+        // Twice as many at the usual size.
+        let mean = widths.sum::<f64>() / views;
+        assert!(mean < 2.0, "{name} is {mean} px wide");
+    }
+
+    for name in ["mast", "plank"] {
+        let index = index_of(&world, name);
+        let border =
+            |at: usize| at % width == 0 || at % width == width - 1 || at / width == 0 || at / width == height - 1;
+        let cut = made.iter().filter(|made| (0..width * height).any(|at| border(at) && made.whole[index][at])).count();
+        assert!(cut * 3 >= made.len(), "the border cuts {name} in {cut} of {} views", made.len());
+    }
+
+    let sums = cameras.iter().enumerate().flat_map(|(view, camera)| {
+        alone(&world, camera, view as u32, index_of(&world, "coal")).into_iter().filter(|pixel| pixel[3] == 255)
+    });
+    let coal: Vec<[u8; 4]> = sums.collect();
+    let mean = coal.iter().flat_map(|pixel| pixel[..3].to_vec()).map(f64::from).sum::<f64>() / (3 * coal.len()) as f64;
+    assert!(mean < 8.0, "coal has {mean} of 255");
+
+    for name in ["apple", "die"] {
+        let index = index_of(&world, name);
+        let hidden = seen(name).iter().filter(|&&pixels| pixels == 0).count();
+        assert!(hidden >= 1, "{name} is seen in every view");
+        assert!(made.iter().any(|made| made.whole[index].contains(&true)), "{name} is not even in the picture");
+    }
+}
+
+#[test]
+fn the_flagstone_looks_like_the_ground_and_the_twins_touch() {
+    let (world, cameras, made) = hard();
+    // What the photo shows without the object, where the object was.
+    let change = |name: &str| {
+        let index = index_of(&world, name);
+        let mut without = world.clone();
+        let id = without.objects.remove(index).id;
+        let (mut sum, mut count) = (0.0, 0);
+        for (view, (camera, made)) in cameras.iter().zip(&made).enumerate().take(3) {
+            let empty = picture(&without, camera, view as u32);
+            for at in (0..made.ids.len()).filter(|&at| made.ids[at] == id) {
+                sum += (0..3).map(|c| f64::from(made.rgb[at][c].abs_diff(empty.rgb[at][c]))).sum::<f64>() / 3.0;
+                count += 1;
+            }
+        }
+        sum / f64::from(count)
+    };
+    let (flagstone, bin) = (change("flagstone"), change("bin"));
+    assert!(flagstone < 15.0 && bin > 2.0 * flagstone, "flagstone {flagstone}, bin {bin}");
+
+    let [brick, twin] = ["brick", "twin"].map(|name| world.objects[index_of(&world, name)].id);
+    let touching = made.iter().filter(|made| {
+        let pairs = (1..made.ids.len()).filter(|&at| {
+            (made.ids[at - 1], made.ids[at]) == (brick, twin) || (made.ids[at - 1], made.ids[at]) == (twin, brick)
+        });
+        // The same depth on both sides of the seam.
+        pairs.filter(|&at| (made.depth[at] / made.depth[at - 1] - 1.0).abs() < 0.01).count() > 2
+    });
+    let touching = touching.count();
+    assert!(touching >= 3, "the seam is seen in {touching} views");
 }

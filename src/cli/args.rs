@@ -1,11 +1,18 @@
 //! What can be typed. Only what was typed is in here; decisions are made in `config` and in the verbs.
 
+use super::choose::PromptArgs;
 use super::densify::DensifyArgs;
 use super::eval::EvalArgs;
+use super::labelled::TableArg;
 use super::masks::MasksArgs;
+use super::merge::MergeArgs;
 use super::occlusion::OcclusionArgs;
+use super::recolour::RecolourArgs;
+use super::relabel::RelabelArgs;
+use super::select::{ExtractArgs, SelectArgs};
+use super::split_components::SplitArgs;
 use super::train_args::TrainArgs;
-use super::values::{Labels, Size, colour, count, labels, size};
+use super::values::{Picks, Size, colour, count, picks, size};
 use crate::infer::output::{Format, What};
 use crate::synth::Preset;
 use clap::{Args, Parser, Subcommand};
@@ -62,10 +69,22 @@ pub enum Command {
     List(ListArgs),
     /// Write the Gaussians of some labels.
     #[command(after_help = "Example: labelgs extract out --labels 1,4-6 -o object.ply")]
-    Extract(SelectArgs),
+    Extract(ExtractArgs),
     /// Write all but the Gaussians of some labels.
     #[command(after_help = "Example: labelgs remove out --labels 2 -o rest.ply")]
     Remove(SelectArgs),
+    /// Write a model with another colour on some labels.
+    #[command(after_help = "Example: labelgs recolour out --labels cup --colour 0.9,0.1,0.1 --mix 0.7 -o red.ply")]
+    Recolour(RecolourArgs),
+    /// Write a model with other ids.
+    #[command(after_help = "Example: labelgs relabel out --map 3=7,4=0 -o model.ply")]
+    Relabel(RelabelArgs),
+    /// Write a model in which several labels are one.
+    #[command(after_help = "Example: labelgs merge out --labels 3,5 --name table -o model.ply")]
+    Merge(MergeArgs),
+    /// Write a model in which each connected part of a label is a label of its own.
+    #[command(after_help = "Example: labelgs split-components out --labels 3 --specks drop -o model.ply")]
+    SplitComponents(SplitArgs),
     /// Score a model on the views of a scene.
     #[command(after_help = "Example: labelgs eval out --scene garden --masks garden/masks --json scores.json")]
     Eval(Box<EvalArgs>),
@@ -131,12 +150,15 @@ pub struct RenderArgs {
     /// What to write of each view, with commas between.
     #[arg(long, value_name = "WHAT", value_enum, value_delimiter = ',', default_value = "rgb")]
     pub what: Vec<What>,
-    /// Render only these labels, such as 1,4-6.
-    #[arg(long, value_name = "IDS", value_parser = labels, conflicts_with = "without")]
-    pub only: Option<Labels>,
-    /// Render all but these labels.
-    #[arg(long, value_name = "IDS", value_parser = labels)]
-    pub without: Option<Labels>,
+    /// Render only these labels, such as 1,4-6,cup, or those that --name, --at, --box and --mask choose.
+    #[arg(long, value_name = "LABELS", value_parser = picks, num_args = 0..=1, conflicts_with = "without")]
+    pub only: Option<Option<Picks>>,
+    /// Render all but these labels, or all but those that --name, --at, --box and --mask choose.
+    #[arg(long, value_name = "LABELS", value_parser = picks, num_args = 0..=1)]
+    pub without: Option<Option<Picks>>,
+    /// Labels by name and by place.
+    #[command(flatten)]
+    pub prompts: PromptArgs,
     /// Kind of file.
     #[arg(long, value_name = "FORMAT", value_enum, default_value = "png")]
     pub format: Format,
@@ -157,33 +179,9 @@ pub struct ListArgs {
     /// The model: a PLY, or the folder that `labelgs train` made.
     #[arg(value_name = "MODEL")]
     pub model: PathBuf,
-    /// JSON.
+    /// Names.
     #[command(flatten)]
-    pub json: JsonFlag,
-}
-
-/// `labelgs extract` and `labelgs remove`.
-#[derive(Args, Clone, Debug)]
-#[command(group(clap::ArgGroup::new("selection").required(true).args(["labels", "mask"])))]
-pub struct SelectArgs {
-    /// The model: a PLY, or the folder that `labelgs train` made.
-    #[arg(value_name = "MODEL")]
-    pub model: PathBuf,
-    /// The labels, such as 1,4-6; 0 is what has no label.
-    #[arg(long, value_name = "IDS", value_parser = labels)]
-    pub labels: Option<Labels>,
-    /// A mask in one view: labels with more than half of their pixels under it are chosen. Any pixel that is not 0 is in.
-    #[arg(long, value_name = "FILE", requires = "view", requires = "scene")]
-    pub mask: Option<PathBuf>,
-    /// Name of the view that the mask belongs to.
-    #[arg(long, value_name = "NAME", requires = "mask")]
-    pub view: Option<String>,
-    /// Scene of that view.
-    #[arg(long, value_name = "SCENE", requires = "mask")]
-    pub scene: Option<PathBuf>,
-    /// File to write.
-    #[arg(short, long, value_name = "OBJECT.ply")]
-    pub output: PathBuf,
+    pub table: TableArg,
     /// JSON.
     #[command(flatten)]
     pub json: JsonFlag,

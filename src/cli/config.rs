@@ -35,6 +35,23 @@ fn check_occlusion(args: &TrainArgs, source: Occlusion) -> Result<()> {
 
 /// Reads a configuration file; fields that it does not name keep their defaults.
 pub fn read(path: &Path) -> Result<TrainConfig> {
+    parse(path)
+}
+
+/// The near plane of a run by its configuration; other fields are nobody's business here.
+pub fn near_of(path: &Path) -> Result<f32> {
+    #[derive(serde::Deserialize)]
+    struct Fields {
+        near: Option<f32>,
+    }
+    let near = parse::<Fields>(path)?.near.unwrap_or(TrainConfig::default().near);
+    if !near.is_finite() || near <= 0.0 {
+        return Err(Error::data(path, "near", format!("is {near}, needs more than 0; or say --near")));
+    }
+    Ok(near)
+}
+
+fn parse<T: serde::de::DeserializeOwned>(path: &Path) -> Result<T> {
     let text = std::fs::read_to_string(path).map_err(Error::read(path))?;
     toml::from_str(&text).map_err(|error| {
         let line = error.span().map(|span| text[..span.start].matches('\n').count() + 1);

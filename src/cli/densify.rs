@@ -2,8 +2,8 @@
 
 use super::args::{JsonFlag, SceneArgs};
 use super::log::Progress;
-use super::scene::{NEAR, open_gpu, open_scene, render_engine};
-use super::values::colour;
+use super::scene::{near_plane, open_gpu, open_scene, render_engine};
+use super::values::{colour, near};
 use super::{Context, open_model, stdout};
 use crate::infer::output::{Format, write_rgb};
 use crate::infer::render::render;
@@ -37,6 +37,9 @@ pub struct DensifyArgs {
     /// Folder for frames/NNNNN.png and frames.json.
     #[arg(short, long, value_name = "DIR")]
     pub output: PathBuf,
+    /// Gaussians nearer to the camera are not drawn, world units; otherwise as in the run of the model, otherwise 0.2.
+    #[arg(long, value_name = "Z", value_parser = near)]
+    pub near: Option<f32>,
     /// Frames between two photos.
     #[arg(long, value_name = "N", default_value_t = 9, value_parser = clap::value_parser!(u32).range(..=999))]
     pub between: u32,
@@ -62,7 +65,7 @@ pub struct DensifyArgs {
 
 /// Renders the video.
 pub fn run(args: &DensifyArgs, context: &Context) -> Result<()> {
-    let model = open_model(&args.model)?;
+    let (model, near) = (open_model(&args.model)?, near_plane(&args.model, args.near)?);
     let dataset = open_scene(&args.scene, &args.reading, None, args.background, false)?;
     let views = ordered_views(args, &dataset)?;
     let cameras: Vec<&Camera> = views.iter().map(|view| &view.camera).collect();
@@ -75,7 +78,7 @@ pub fn run(args: &DensifyArgs, context: &Context) -> Result<()> {
     let mut progress = Progress::new(stops.len() as u64, "frames", &context.global);
     let mut written = Vec::new();
     for (index, stop) in stops.iter().enumerate() {
-        let rendered = render(&mut engine, &stop.camera, NEAR, args.background, model.sh_degree)?;
+        let rendered = render(&mut engine, &stop.camera, near, args.background, model.sh_degree)?;
         let file = format!("frames/{index:05}.png");
         write_rgb(&args.output.join(&file), size, &rendered.rgb, Format::Png)?;
         let photo = stop.camera_index.map(|view| views[view].name.clone());

@@ -3,8 +3,8 @@
 use super::args::JsonFlag;
 use super::args::SceneArgs;
 use super::log::Progress;
-use super::scene::{open_gpu, open_scene};
-use super::values::switch;
+use super::scene::{near_plane, open_gpu, open_scene};
+use super::values::{near, switch};
 use super::{Context, open_model, stdout};
 use crate::engine::{Engine, LabelRoom, Room};
 use crate::infer::ballot::{Sweep, Voter, columns_for, sweep};
@@ -12,6 +12,7 @@ use crate::infer::decide::{apply, decide, drop_unsure, trust};
 use crate::infer::lift::{Lift, lift};
 use crate::infer::render::render;
 use crate::infer::select::summarise;
+use crate::io::label_table::{FILE, LabelTable};
 use crate::io::ply::write_gaussians;
 use crate::scene::{Gaussians, UNLABELLED, View};
 use crate::sched::SchedulerOptions;
@@ -66,9 +67,9 @@ pub struct LabelArgs {
     /// Leave Gaussians that no pixel speaks for without a label, instead of asking their neighbours.
     #[arg(long)]
     pub no_complete: bool,
-    /// Gaussians nearer to the camera are not seen, world units.
-    #[arg(long, value_name = "Z", default_value_t = super::scene::NEAR)]
-    pub near: f32,
+    /// Gaussians nearer to the camera are not seen, world units; otherwise as in the run of the model, otherwise 0.2.
+    #[arg(long, value_name = "Z", value_parser = near)]
+    pub near: Option<f32>,
     /// How the scene is read; test views have no vote.
     #[command(flatten)]
     pub reading: SceneArgs,
@@ -79,7 +80,7 @@ pub struct LabelArgs {
 
 /// Gives the Gaussians of a trained model their labels.
 pub fn run(args: &LabelArgs, context: &Context) -> Result<()> {
-    let mut model = open_model(&args.model)?;
+    let (mut model, near) = (open_model(&args.model)?, near_plane(&args.model, args.near)?);
     let dataset = open_scene(&args.scene, &args.reading, Some(args.masks.clone()), [0.0; 3], true)?;
     let views: Vec<&View> = dataset.train.iter().filter(|view| view.mask.is_some()).collect();
     if views.is_empty() {
@@ -100,10 +101,10 @@ pub fn run(args: &LabelArgs, context: &Context) -> Result<()> {
     engine.upload_model(&model)?;
     let mut progress = Progress::new(u64::from(args.rounds), "rounds", &context.global);
     if args.rule == LabelRule::Main {
-        lift_all(&mut engine, &mut model, &views, args)?;
+        lift_all(&mut engine, &mut model, &views, near, args)?;
     } else {
         for round in 0..args.rounds {
-            vote(&mut engine, &mut model, &views, args, round > 0)?;
+            vote(&mut engine, &mut model, &views, (near, round > 0), args)?;
             progress.set(u64::from(round) + 1, String::new);
         }
     }
@@ -111,6 +112,8 @@ pub fn run(args: &LabelArgs, context: &Context) -> Result<()> {
     drop_unsure(&mut model, args.min_confidence);
     let seconds = start.elapsed().as_secs_f64();
     write_gaussians(&args.output, &model)?;
+    let table = Some(args.masks.join(FILE)).filter(|path| path.is_file()).map(|path| LabelTable::read(&path));
+    LabelTable::put(table.transpose()?.as_ref(), &LabelTable::beside(&args.output))?;
     let rows = summarise(&model);
     if context.json || args.json.json {
         return stdout::print_json(&json!({
@@ -133,14 +136,14 @@ pub fn run(args: &LabelArgs, context: &Context) -> Result<()> {
 }
 
 /// Every view writes its labels, one after the other.
-fn lift_all(engine: &mut Engine, model: &mut Gaussians, views: &[&View], args: &LabelArgs) -> Result<()> {
+fn lift_all(engine: &mut Engine, model: &mut Gaussians, views: &[&View], near: f32, args: &LabelArgs) -> Result<()> {
     let mut order: Vec<usize> = (0..views.len()).collect();
     order.shuffle(&mut Pcg64Mcg::seed_from_u64(args.seed));
     let mut labels = vec![UNLABELLED; model.len()];
     let how = Lift { threshold: args.label_threshold, gpf: args.gpf };
     for view in order.into_iter().map(|index| views[index]) {
         let Some(mask) = &view.mask else { continue };
-        let rendered = render(engine, &view.camera, args.near, [0.0; 3], 0)?;
+        let rendered = render(engine, &view.camera, near, [0.0; 3], 0)?;
         lift(&mut labels, &model.means, &view.camera, &rendered, mask, how);
     }
     model.labels = Some(labels);
@@ -148,12 +151,18 @@ fn lift_all(engine: &mut Engine, model: &mut Gaussians, views: &[&View], args: &
     Ok(())
 }
 
-/// One round: counts and decides.
-fn vote(engine: &mut Engine, model: &mut Gaussians, views: &[&View], args: &LabelArgs, judge: bool) -> Result<()> {
+/// One round: judges the masks by the labels of the last one if asked to, counts, decides.
+fn vote(
+    engine: &mut Engine,
+    model: &mut Gaussians,
+    views: &[&View],
+    (near, judge): (f32, bool),
+    args: &LabelArgs,
+) -> Result<()> {
     let mut trusts: Vec<Option<BTreeMap<u16, f32>>> = vec![None; views.len()];
     if let Some(labels) = model.labels.as_ref().filter(|_| judge) {
         for (view, to) in views.iter().zip(&mut trusts) {
-            let shown = render(engine, &view.camera, args.near, [0.0; 3], 0)?.label_map(labels);
+            let shown = render(engine, &view.camera, near, [0.0; 3], 0)?.label_map(labels);
             *to = view.mask.as_ref().map(|mask| trust(mask, &shown));
         }
     }
@@ -162,7 +171,7 @@ fn vote(engine: &mut Engine, model: &mut Gaussians, views: &[&View], args: &Labe
         Some(Voter { camera: &view.camera, mask: view.mask.as_ref()?, photo, trust })
     });
     let voters: Vec<Voter> = voters.collect();
-    let ballot = sweep(engine, &voters, Sweep { near: args.near, border: args.mask_border })?;
+    let ballot = sweep(engine, &voters, Sweep { near, border: args.mask_border })?;
     let decision = decide(&ballot, &model.means, !args.no_complete)?;
     apply(model, decision);
     Ok(())

@@ -1,15 +1,26 @@
 //! `labelgs list`.
 
 use super::args::ListArgs;
-use super::{Context, open_model, stdout};
+use super::labelled::open;
+use super::{Context, stdout};
 use crate::Result;
 use crate::infer::select::{LabelSummary, summarise};
+use serde::Serialize;
 use serde_json::json;
+
+/// A label with its name.
+#[derive(Serialize)]
+struct Row<'a> {
+    #[serde(flatten)]
+    summary: LabelSummary,
+    name: Option<&'a str>,
+}
 
 /// Prints a row per label.
 pub fn run(args: &ListArgs, context: &Context) -> Result<()> {
-    let model = open_model(&args.model)?;
-    let rows = summarise(&model);
+    let (model, known) = open(&args.model, &args.table)?;
+    let rows: Vec<Row> =
+        summarise(&model).into_iter().map(|summary| Row { name: known.name(summary.label), summary }).collect();
     if context.json || args.json.json {
         return stdout::print_json(&json!({
             "schema_version": 1,
@@ -19,15 +30,17 @@ pub fn run(args: &ListArgs, context: &Context) -> Result<()> {
             "labels": rows,
         }));
     }
+    let names = if known.table.is_some() { "  name" } else { "" };
     let mut text =
-        format!("{:>6} {:>10} {:>12}  {:^26}  {:^26}\n", "label", "Gaussians", "opacity mass", "centre", "size");
-    rows.iter().for_each(|row| text += &line(row));
+        format!("{:>6} {:>10} {:>12}  {:^26}  {:^26}{names}\n", "label", "Gaussians", "opacity mass", "centre", "size");
+    rows.iter().for_each(|row| text += &line(&row.summary, row.name));
     stdout::print(&text)
 }
 
-fn line(row: &LabelSummary) -> String {
+fn line(row: &LabelSummary, name: Option<&str>) -> String {
     let triple = |v: [f64; 3]| format!("{:>8.3} {:>8.3} {:>8.3}", v[0], v[1], v[2]);
     let size = [0, 1, 2].map(|axis| row.max[axis] - row.min[axis]);
     let label = if row.label == 0 { "none".to_owned() } else { row.label.to_string() };
-    format!("{label:>6} {:>10} {:>12.1}  {}  {}\n", row.count, row.opacity_mass, triple(row.centre), triple(size))
+    let name = name.map_or(String::new(), |name| format!("  {name}"));
+    format!("{label:>6} {:>10} {:>12.1}  {}  {}{name}\n", row.count, row.opacity_mass, triple(row.centre), triple(size))
 }

@@ -1,22 +1,28 @@
 //! The command line: what is typed, what is decided, and a verb per file.
 
 pub mod args;
+pub mod choose;
 pub mod config;
 pub mod densify;
 pub mod devices;
 pub mod eval;
 pub mod interrupt;
 pub mod label;
+pub mod labelled;
 pub mod list;
 pub mod log;
 pub mod masks;
+pub mod merge;
 pub mod occlusion;
 pub mod plan;
 pub mod profile;
 mod profile_report;
+pub mod recolour;
+pub mod relabel;
 pub mod render;
 pub mod scene;
 pub mod select;
+pub mod split_components;
 pub mod stdout;
 pub mod synth;
 pub mod train;
@@ -100,8 +106,12 @@ fn run(args: Vec<OsString>) -> Result<(), Exit> {
         Command::Render(args) => render::run(&args, &context),
         Command::Label(args) => label::run(&args, &context),
         Command::List(args) => list::run(&args, &context),
-        Command::Extract(args) => select::run(&args, select::Keep::Selected, &context),
-        Command::Remove(args) => select::run(&args, select::Keep::Rest, &context),
+        Command::Extract(args) => select::run_extract(&args, &context),
+        Command::Remove(args) => select::run_remove(&args, &context),
+        Command::Recolour(args) => recolour::run(&args, &context),
+        Command::Relabel(args) => relabel::run(&args, &context),
+        Command::Merge(args) => merge::run(&args, &context),
+        Command::SplitComponents(args) => split_components::run(&args, &context),
         Command::Eval(args) => eval::run(&args, &context),
         Command::Densify(args) => densify::run(&args, &context),
         Command::Occlusion(args) => occlusion::run(&args, &context),

@@ -2,8 +2,9 @@
 
 use super::Context;
 use super::args::RenderArgs;
-use super::scene::{NEAR, open_gpu, open_scene, pick_views, render_engine};
-use super::{open_model, stdout};
+use super::choose::Asked;
+use super::scene::{near_plane, open_gpu, open_scene, pick_views, render_engine};
+use super::{labelled, open_model, stdout};
 use crate::infer::output::{Format, Pictures, What, write_pictures};
 use crate::infer::render::render;
 use crate::infer::select::{extract, remove};
@@ -18,19 +19,15 @@ pub fn run(args: &RenderArgs, context: &Context) -> Result<()> {
     if args.format == Format::Png && exr_only.is_some() {
         return Err(Error::usage("--what", "top-id and top-weight are 32-bit values; say --format exr"));
     }
-    let model = open_model(&args.model)?;
-    let shown = match (&args.only, &args.without) {
-        (Some(labels), _) => extract(&model, &labels.0)?,
-        (None, Some(labels)) => remove(&model, &labels.0)?,
-        (None, None) => model,
-    };
+    let shown = shown(args, context)?;
+    let near = near_plane(&args.model, args.prompts.near)?;
     let cameras = cameras(args)?;
     let gpu = open_gpu(context)?;
     let mut engine = render_engine(gpu, &shown, cameras.iter().map(|(_, camera)| (camera.width, camera.height)))?;
     engine.upload_model(&shown)?;
     let mut files = Vec::new();
     for (stem, camera) in &cameras {
-        let rendered = render(&mut engine, camera, NEAR, args.background, shown.sh_degree)?;
+        let rendered = render(&mut engine, camera, near, args.background, shown.sh_degree)?;
         files.extend(write(args, stem, &rendered, &shown)?);
     }
     let files: Vec<String> = files.iter().map(|file| file.display().to_string()).collect();
@@ -38,6 +35,30 @@ pub fn run(args: &RenderArgs, context: &Context) -> Result<()> {
         return stdout::print_json(&json!({ "schema_version": 1, "files": files }));
     }
     files.iter().try_for_each(|file| stdout::print(&format!("{file}\n")))
+}
+
+/// The part of the model that is to be seen.
+fn shown(args: &RenderArgs, context: &Context) -> Result<Gaussians> {
+    let (flag, picks, part): (_, _, fn(&Gaussians, &[u32]) -> Result<Gaussians>) = match (&args.only, &args.without) {
+        (Some(picks), _) => ("--only", picks, extract),
+        (None, Some(picks)) => ("--without", picks, remove),
+        (None, None) if args.prompts.is_empty() => return open_model(&args.model),
+        (None, None) => {
+            let problem = "or --without is needed to say what becomes of the labels that --name, --at, --box or --mask \
+                           choose";
+            return Err(Error::usage("--only", problem));
+        }
+    };
+    let (model, known) = labelled::open(&args.model, &args.prompts.table)?;
+    let asked = Asked {
+        path: &args.model,
+        model: &model,
+        known: &known,
+        scene: args.scene.as_deref(),
+        max_resolution: args.reading.max_resolution,
+    };
+    let labels = args.prompts.labels(flag, picks.as_ref(), &asked, context)?;
+    part(&model, &labels.into_iter().collect::<Vec<_>>())
 }
 
 fn cameras(args: &RenderArgs) -> Result<Vec<(String, Camera)>> {

@@ -1,18 +1,27 @@
 //! What the verbs that render share: the device, the scene, its views.
 
-use super::Context;
 use super::args::SceneArgs;
+use super::{Context, config};
 use crate::engine::{Engine, Room};
 use crate::error::{Error, Result};
 use crate::gpu::{Gpu, GpuOptions};
-use crate::io::{self, LoadOptions};
+use crate::io::{self, LoadOptions, run_folder};
 use crate::scene::{Dataset, Gaussians, View};
 use crate::sched::SchedulerOptions;
+use crate::train::TrainConfig;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// Near plane of models whose training is not known, world units (3DGS).
-pub const NEAR: f32 = 0.2;
+/// The near plane to render a model with, world units: what was typed, else what the run of the model was trained with
+/// (its config.toml), else 0.2 (3DGS).
+pub fn near_plane(model: &Path, typed: Option<f32>) -> Result<f32> {
+    let of_run = || run_folder::of_model(model).map(|run| run.join(run_folder::CONFIG)).filter(|file| file.is_file());
+    match (typed, of_run()) {
+        (Some(near), _) => Ok(near),
+        (None, Some(file)) => config::near_of(&file),
+        (None, None) => Ok(TrainConfig::default().near),
+    }
+}
 
 /// Opens the device that was asked for and says which it is.
 pub fn open_gpu(context: &Context) -> Result<Arc<Gpu>> {

@@ -1,66 +1,102 @@
 //! `labelgs extract` and `labelgs remove`.
 
-use super::args::{SceneArgs, SelectArgs};
-use super::scene::{NEAR, find_view, open_gpu, open_scene, render_engine};
-use super::{Context, open_model, stdout};
-use crate::infer::choose::require_labels;
-use crate::infer::render::render;
+use super::Context;
+use super::args::JsonFlag;
+use super::choose::ChooseArgs;
+use super::labelled::{Edited, open, wants_json};
+use super::values::{distance, share};
+use crate::Result;
+use crate::infer::components::Grouping;
+use crate::infer::edit::without_specks;
+use crate::infer::rename::keep;
 use crate::infer::select::{extract, remove};
-use crate::io::ply::write_gaussians;
-use crate::scene::Gaussians;
-use crate::{Error, Result};
+use clap::Args;
 use serde_json::json;
+use std::collections::BTreeSet;
+use std::path::PathBuf;
 
-/// Which part of the model is written.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Keep {
-    /// The selected labels.
-    Selected,
-    /// Everything else.
-    Rest,
+/// `labelgs remove`, and most of `labelgs extract`.
+#[derive(Args, Clone, Debug)]
+pub struct SelectArgs {
+    /// The model: a PLY, or the folder that `labelgs train` made.
+    #[arg(value_name = "MODEL")]
+    pub model: PathBuf,
+    /// File to write; names of its labels go to OUT.labels.json beside it.
+    #[arg(short, long, value_name = "OUT.ply")]
+    pub output: PathBuf,
+    /// Which labels.
+    #[command(flatten)]
+    pub choice: ChooseArgs,
+    /// JSON.
+    #[command(flatten)]
+    pub json: JsonFlag,
 }
 
-/// Writes a part of a model.
-pub fn run(args: &SelectArgs, keep: Keep, context: &Context) -> Result<()> {
-    let model = open_model(&args.model)?;
-    let labels = match &args.labels {
-        Some(labels) => labels.0.clone(),
-        None => labels_under_mask(args, &model, context)?,
-    };
-    let part = match keep {
-        Keep::Selected => extract(&model, &labels)?,
-        Keep::Rest => remove(&model, &labels)?,
-    };
-    let left_out = write_gaussians(&args.output, &part)?;
-    let written = part.len() as u64 - left_out;
-    if context.json || args.json.json {
-        return stdout::print_json(&json!({
-            "schema_version": 1,
-            "output": args.output.display().to_string(),
-            "labels": labels,
-            "gaussians": written,
-            "of": model.len(),
-        }));
+/// `labelgs extract`.
+#[derive(Args, Clone, Debug)]
+pub struct ExtractArgs {
+    /// Model, choice and output.
+    #[command(flatten)]
+    pub select: SelectArgs,
+    /// Leave out detached specks: connected parts of a label that are smaller than --min-share.
+    #[arg(long)]
+    pub drop_specks: bool,
+    /// What a speck is.
+    #[command(flatten)]
+    pub grouping: GroupingArgs,
+}
+
+/// What is connected, and what is a speck.
+#[derive(Args, Clone, Debug)]
+#[command(next_help_heading = "Connected parts")]
+pub struct GroupingArgs {
+    /// A part with a smaller share of the label's Gaussians is a speck; the largest part never is.
+    #[arg(long, value_name = "SHARE", value_parser = share, default_value_t = 0.05)]
+    pub min_share: f32,
+    /// Gaussians are connected when their ellipsoids of two standard deviations are at most this far apart, world units.
+    #[arg(long, value_name = "DISTANCE", value_parser = distance, default_value_t = 0.0)]
+    pub gap: f64,
+}
+
+impl GroupingArgs {
+    /// As the components want it.
+    pub fn grouping(&self) -> Grouping {
+        Grouping { gap: self.gap, min_share: f64::from(self.min_share) }
     }
-    stdout::print(&format!("{}: {written} of {} Gaussians\n", args.output.display(), model.len()))
 }
 
-/// The labels that `--mask` in `--view` of `--scene` selects, by the label map of that view (method of the paper).
-fn labels_under_mask(args: &SelectArgs, model: &Gaussians, context: &Context) -> Result<Vec<u32>> {
-    let (Some(mask), Some(name), Some(scene)) = (&args.mask, &args.view, &args.scene) else {
-        return Err(Error::usage("--mask", "needs --view and --scene"));
+/// Writes the chosen labels.
+pub fn run_extract(args: &ExtractArgs, context: &Context) -> Result<()> {
+    let select = &args.select;
+    let (model, known) = open(&select.model, &select.choice.prompts.table)?;
+    let labels = select.choice.labels(&select.model, &model, &known, context)?;
+    let whole = extract(&model, &listed(&labels))?;
+    let part = if args.drop_specks { without_specks(&whole, args.grouping.grouping())? } else { whole.clone() };
+    let edited = Edited {
+        output: &select.output,
+        model: &part,
+        table: known.table.as_ref().map(|table| keep(table, |id| labels.contains(&id))),
+        of: model.len(),
+        labels: &labels,
     };
-    let Some(labels) = &model.labels else {
-        return Err(Error::data(&args.model, "", "the model has no labels; train it with --masks"));
+    edited.finish(wants_json(context, &select.json), json!({ "specks": whole.len() - part.len() }))
+}
+
+/// Writes all but the chosen labels.
+pub fn run_remove(args: &SelectArgs, context: &Context) -> Result<()> {
+    let (model, known) = open(&args.model, &args.choice.prompts.table)?;
+    let labels = args.choice.labels(&args.model, &model, &known, context)?;
+    let part = remove(&model, &listed(&labels))?;
+    let edited = Edited {
+        output: &args.output,
+        model: &part,
+        table: known.table.as_ref().map(|table| keep(table, |id| !labels.contains(&id))),
+        of: model.len(),
+        labels: &labels,
     };
-    let mask_map = crate::io::mask::read_mask(mask)?;
-    let reading = SceneArgs { test_every: 8, max_resolution: Some(mask_map.width.max(mask_map.height)) };
-    let dataset = open_scene(scene, &reading, None, [0.0; 3], false)?;
-    let camera = find_view(&dataset, name)?.camera.resized(mask_map.width, mask_map.height);
-    let gpu = open_gpu(context)?;
-    let mut engine = render_engine(gpu, model, std::iter::once((camera.width, camera.height)))?;
-    engine.upload_model(model)?;
-    let rendered = render(&mut engine, &camera, NEAR, [0.0; 3], model.sh_degree)?;
-    let inside: Vec<bool> = mask_map.ids.iter().map(|&id| id != 0).collect();
-    require_labels("--mask", &rendered.label_map(labels), &inside)
+    edited.finish(wants_json(context, &args.json), json!({}))
+}
+
+fn listed(labels: &BTreeSet<u32>) -> Vec<u32> {
+    labels.iter().copied().collect()
 }

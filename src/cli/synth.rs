@@ -28,7 +28,11 @@ pub fn run(args: &SynthArgs, context: &Context) -> Result<()> {
     if context.json || args.json.json {
         return stdout::print_json(&summary);
     }
-    let objects: Vec<String> = summary.objects.iter().map(|object| format!("{} {}", object.id, object.name)).collect();
+    let objects: Vec<String> = summary
+        .objects
+        .iter()
+        .map(|object| format!("{} {}", object.id, object.name.as_deref().unwrap_or_default()))
+        .collect();
     stdout::print(&format!(
         "{}: {} views of {} x {} px, {} points; objects: {}\n",
         summary.scene.display(),

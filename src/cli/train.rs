@@ -9,8 +9,9 @@ use crate::gpu::Gpu;
 use crate::infer::evaluate::{Rendering, evaluate};
 use crate::infer::render::render;
 use crate::infer::scores::Scores;
+use crate::io::label_table::{self, LabelTable};
 use crate::io::occlusion_table::{self, OcclusionTable};
-use crate::io::{atomic, init};
+use crate::io::{atomic, init, run_folder};
 use crate::scene::{Dataset, Photo, View};
 use crate::sched::SchedulerOptions;
 use crate::train::{self, StepReport, TrainConfig, Trainer, record};
@@ -24,6 +25,7 @@ pub fn run(args: &TrainArgs, context: &Context) -> Result<()> {
     let config = config::decide(args)?;
     let out = args.output.as_path();
     prepare_output(out)?;
+    let names = names(args)?;
     let mut dataset = open_with(&args.scene, &config::load_options(&config, args.masks.clone()))?;
     if dataset.train.is_empty() {
         return Err(Error::data(
@@ -46,6 +48,7 @@ pub fn run(args: &TrainArgs, context: &Context) -> Result<()> {
         room.size.1
     );
     write_run(out, &config, &gpu, args)?;
+    LabelTable::put(names.as_ref(), &out.join(label_table::FILE))?;
     let cameras: Vec<_> = dataset.all().into_iter().map(|view| (view.name.as_str(), &view.camera)).collect();
     record::save_cameras(out, &cameras)?;
     let preview = preview_view(&dataset);
@@ -179,6 +182,12 @@ fn prepare_output(out: &Path) -> Result<()> {
     Ok(())
 }
 
+/// The table of the masks, if they have one: the model keeps the names.
+fn names(args: &TrainArgs) -> Result<Option<LabelTable>> {
+    let path = args.masks.as_ref().map(|masks| masks.join(label_table::FILE)).filter(|path| path.is_file());
+    path.map(|path| LabelTable::read(&path)).transpose()
+}
+
 /// No more initial points than `--max-gaussians`: every n-th is kept.
 fn bound_start(model: &mut crate::scene::Gaussians, config: &TrainConfig) {
     let (count, bound) = (model.len() as u64, config.max_gaussians);
@@ -209,7 +218,7 @@ fn write_run(out: &Path, config: &TrainConfig, gpu: &Gpu, args: &TrainArgs) -> R
         facts.push(("occlusion file", file.display().to_string()));
     }
     let text = config::dump(config, &facts)?;
-    atomic::write(out.join("config.toml"), |file| file.write_all(text.as_bytes()))
+    atomic::write(out.join(run_folder::CONFIG), |file| file.write_all(text.as_bytes()))
 }
 
 /// The view of the preview pictures: the first held-out one, else the first of all.

@@ -1,35 +1,115 @@
 //! Parsers of single values.
 
-/// A list of labels, sorted, each once.
+use crate::infer::catalogue::Pick;
+use crate::scene::labels::LABEL_MAX;
+use std::collections::BTreeMap;
+
+/// Labels by id and by name.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Labels(pub Vec<u32>);
+pub struct Picks(pub Vec<Pick>);
+
+/// A pixel of a view: column and row.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct At {
+    /// Name of the view.
+    pub view: String,
+    /// Column and row.
+    pub pixel: [u32; 2],
+}
+
+/// A box in a view: first column and row, and the ones behind the last.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct BoxAt {
+    /// Name of the view.
+    pub view: String,
+    /// x0, y0, x1, y1.
+    pub corners: [u32; 4],
+}
+
+/// New ids by old ones.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Renumbering(pub BTreeMap<u32, u32>);
 
 /// Width and height, px.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Size(pub u32, pub u32);
 
-/// Labels such as `1,4-6`.
-pub fn labels(text: &str) -> Result<Labels, String> {
-    let id = |text: &str| match text.trim().parse::<u32>() {
-        Ok(id) if id <= crate::scene::labels::LABEL_MAX => Ok(id),
-        _ => Err(format!("`{text}` is no label; labels are whole numbers from 0 to 65535, such as 1,4-6")),
+/// Labels such as `1,4-6,cup`. What has only digits and dashes is an id or a range of ids.
+pub fn picks(text: &str) -> Result<Picks, String> {
+    let pick = |part: &str| {
+        if part.is_empty() {
+            return Err("an empty name; expected ids or names, such as 1,4-6,cup".to_owned());
+        }
+        if !part.chars().all(|c| c.is_ascii_digit() || c == '-' || c == ' ') {
+            return Ok(Pick::Name(part.to_owned()));
+        }
+        let (first, last) = part.split_once('-').unwrap_or((part, part));
+        let (first, last) = (label(first)?, label(last)?);
+        if first > last { Err(format!("`{part}` runs backwards")) } else { Ok(Pick::Ids(first, last)) }
     };
-    let mut ids = std::collections::BTreeSet::new();
+    text.split(',').map(|part| pick(part.trim())).collect::<Result<_, _>>().map(Picks)
+}
+
+/// A label, 0 for none.
+pub fn label(text: &str) -> Result<u32, String> {
+    let id = text.trim().parse().ok().filter(|&id| id <= LABEL_MAX);
+    id.ok_or_else(|| format!("`{text}` is no label; labels are whole numbers from 0 to {LABEL_MAX}, such as 1,4-6"))
+}
+
+/// Old and new labels such as `3=7,4=0`.
+pub fn renumbering(text: &str) -> Result<Renumbering, String> {
+    let mut map = BTreeMap::new();
     for part in text.split(',') {
-        match part.split_once('-') {
-            Some((first, last)) => {
-                let (first, last) = (id(first)?, id(last)?);
-                if first > last {
-                    return Err(format!("`{part}` runs backwards"));
-                }
-                ids.extend(first..=last);
-            }
-            None => {
-                ids.insert(id(part)?);
-            }
+        let (old, new) = part.split_once('=').ok_or_else(|| format!("`{part}` is no OLD=NEW, such as 3=7"))?;
+        let (old, new) = (label(old)?, label(new)?);
+        if map.insert(old, new).is_some() {
+            return Err(format!("{old} gets two new labels"));
         }
     }
-    Ok(Labels(ids.into_iter().collect()))
+    Ok(Renumbering(map))
+}
+
+/// A pixel of a view such as `004:120,80`.
+pub fn at(text: &str) -> Result<At, String> {
+    let (view, pixel) = in_view(text, "VIEW:x,y in whole px, such as 004:120,80")?;
+    Ok(At { view, pixel })
+}
+
+/// A box in a view such as `004:100,60,160,120`.
+pub fn box_at(text: &str) -> Result<BoxAt, String> {
+    let (view, corners) = in_view(text, "VIEW:x0,y0,x1,y1 in whole px, such as 004:100,60,160,120")?;
+    let [x0, y0, x1, y1] = corners;
+    if x0 >= x1 || y0 >= y1 {
+        return Err(format!("`{text}` is empty; the second corner is right of and below the first"));
+    }
+    Ok(BoxAt { view, corners })
+}
+
+/// The name of a view and numbers behind its last colon.
+fn in_view<const N: usize>(text: &str, expected: &str) -> Result<(String, [u32; N]), String> {
+    let wrong = || format!("`{text}` is no {expected}");
+    let (view, numbers) = text.rsplit_once(':').filter(|(view, _)| !view.is_empty()).ok_or_else(wrong)?;
+    let numbers: Option<Vec<u32>> = numbers.split(',').map(|number| number.trim().parse().ok()).collect();
+    let numbers = numbers.and_then(|numbers| numbers.try_into().ok()).ok_or_else(wrong)?;
+    Ok((view.to_owned(), numbers))
+}
+
+/// A part of a whole, 0 to 1.
+pub fn share(text: &str) -> Result<f32, String> {
+    let value = text.parse().ok().filter(|value| (0.0..=1.0).contains(value));
+    value.ok_or_else(|| format!("`{text}` is no share; expected 0 to 1"))
+}
+
+/// A distance, world units, 0 or more.
+pub fn distance(text: &str) -> Result<f64, String> {
+    let value = text.parse().ok().filter(|value: &f64| value.is_finite() && *value >= 0.0);
+    value.ok_or_else(|| format!("`{text}` is no distance; expected 0 or more, in world units"))
+}
+
+/// A near plane, world units, more than 0.
+pub fn near(text: &str) -> Result<f32, String> {
+    let value = text.parse().ok().filter(|value: &f32| value.is_finite() && *value > 0.0);
+    value.ok_or_else(|| format!("`{text}` is no near plane; expected more than 0, in world units"))
 }
 
 /// A size such as `320x240`.

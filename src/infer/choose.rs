@@ -1,5 +1,6 @@
 //! From a mask in one view to labels.
 
+use super::catalogue::Catalogue;
 use crate::scene::{LabelMap, UNLABELLED};
 use crate::{Error, Result};
 
@@ -42,8 +43,8 @@ pub fn choose_labels(map: &LabelMap, mask: &[bool]) -> Vec<u32> {
     labels
 }
 
-/// [`choose_labels`], or an error that names `argument` and lists the labels that came closest.
-pub fn require_labels(argument: &str, map: &LabelMap, mask: &[bool]) -> Result<Vec<u32>> {
+/// [`choose_labels`], or an error that names `argument` and lists the labels that came closest, with their names.
+pub fn require_labels(argument: &str, map: &LabelMap, mask: &[bool], known: &Catalogue) -> Result<Vec<u32>> {
     if mask.len() != map.ids.len() {
         let problem = format!("has {} pixels, the view has {} x {}", mask.len(), map.width, map.height);
         return Err(Error::usage(argument, problem));
@@ -55,10 +56,10 @@ pub fn require_labels(argument: &str, map: &LabelMap, mask: &[bool]) -> Result<V
     let near: Vec<String> = candidates(map, mask)
         .iter()
         .take(8)
-        .map(|c| format!("{} ({} of its {} pixels are inside)", c.label, c.inside, c.pixels))
+        .map(|c| format!("{} ({} of its {} pixels are inside)", known.title(c.label), c.inside, c.pixels))
         .collect();
     let problem = if near.is_empty() {
-        "covers no pixel of any label in this view; draw it over an object".to_owned()
+        format!("covers no pixel of any label in this view; draw it over an object; {}", known.there_is())
     } else {
         format!(
             "selects nothing, because no label has more than half of its pixels inside; it touches {}; \

@@ -1,5 +1,6 @@
-//! The labels of a model: what there is, and a model of some of them.
+//! The labels of a model: what there is, and models of some of them.
 
+use super::catalogue::Catalogue;
 use crate::scene::{Gaussians, UNLABELLED};
 use crate::{Error, Result};
 use glam::DVec3;
@@ -73,42 +74,13 @@ pub fn remove(model: &Gaussians, labels: &[u32]) -> Result<Gaussians> {
 }
 
 /// The labels as a set, if each of them occurs in the model.
-pub fn check_labels(model: &Gaussians, labels: &[u32]) -> Result<BTreeSet<u32>> {
-    let known: BTreeSet<u32> = (0..model.len()).map(|row| label_of(model, row)).collect();
-    let wanted: BTreeSet<u32> = labels.iter().copied().collect();
-    let unknown: Vec<String> = wanted.difference(&known).map(u32::to_string).collect();
-    if wanted.is_empty() {
-        return Err(Error::usage("--labels", format!("names no label; {}", there_is(&known))));
-    }
-    if !unknown.is_empty() {
-        let problem = format!("no Gaussian has label {}; {}", unknown.join(", "), there_is(&known));
-        return Err(Error::usage("--labels", problem));
-    }
+fn check_labels(model: &Gaussians, labels: &[u32]) -> Result<BTreeSet<u32>> {
+    let wanted = labels.iter().copied().collect();
+    Catalogue::new(model, None).check("--labels", &wanted)?;
     Ok(wanted)
 }
 
 /// Label of a row; 0 in a model without labels.
 fn label_of(model: &Gaussians, row: usize) -> u32 {
     model.labels.as_ref().map_or(UNLABELLED, |labels| labels[row])
-}
-
-/// "the model has 1-4, 7", for messages.
-fn there_is(known: &BTreeSet<u32>) -> String {
-    let objects: Vec<u32> = known.iter().copied().filter(|&label| label != UNLABELLED).collect();
-    if objects.is_empty() {
-        return "the model has no labelled Gaussian; train it with masks".to_owned();
-    }
-    let mut ranges: Vec<(u32, u32)> = Vec::new();
-    for label in objects {
-        match ranges.last_mut() {
-            Some((_, last)) if *last + 1 == label => *last = label,
-            _ => ranges.push((label, label)),
-        }
-    }
-    let texts: Vec<String> = ranges
-        .iter()
-        .map(|&(first, last)| if first == last { first.to_string() } else { format!("{first}-{last}") })
-        .collect();
-    let zero = if known.contains(&UNLABELLED) { ", and 0 for the unlabelled" } else { "" };
-    format!("the model has {}{zero}", texts.join(", "))
 }

@@ -87,6 +87,11 @@ pub fn write_png_rgb8(path: impl AsRef<Path>, width: u32, height: u32, pixels: &
     write_png(path.as_ref(), (width, height), png::ColorType::Rgb, png::BitDepth::Eight, bytemuck::cast_slice(pixels))
 }
 
+/// Writes an 8-bit RGBA PNG, colours not multiplied by alpha, `pixels` row-major.
+pub fn write_png_rgba8(path: impl AsRef<Path>, width: u32, height: u32, pixels: &[[u8; 4]]) -> Result<()> {
+    write_png(path.as_ref(), (width, height), png::ColorType::Rgba, png::BitDepth::Eight, bytemuck::cast_slice(pixels))
+}
+
 /// Writes an 8-bit grey PNG, `pixels` row-major.
 pub fn write_png_grey8(path: impl AsRef<Path>, width: u32, height: u32, pixels: &[u8]) -> Result<()> {
     write_png(path.as_ref(), (width, height), png::ColorType::Grayscale, png::BitDepth::Eight, pixels)

@@ -2,7 +2,7 @@
 //!
 //! It stands in a folder of masks, in the folder of a run, and beside a PLY of its own as `NAME.labels.json`.
 
-use super::atomic;
+use super::{atomic, run_folder};
 use crate::error::{Error, Result};
 use crate::scene::labels::{LABEL_MAX, label_colour};
 use serde::{Deserialize, Serialize};
@@ -105,12 +105,19 @@ impl LabelTable {
     }
 
     /// Where the table of a model is, if there is one: `NAME.labels.json` beside the PLY, else `labels.json` in the
-    /// folder of the run (for `RUN/point_cloud/iteration_N/point_cloud.ply` and for `RUN` itself).
+    /// folder of the run.
     pub fn find_for_model(model: &Path) -> Option<PathBuf> {
-        let beside = Self::beside(model);
-        let run = if model.is_dir() { Some(model) } else { model.ancestors().nth(3) };
-        let of_run = run.map(|run| run.join(FILE));
-        [Some(beside), of_run].into_iter().flatten().find(|path| path.is_file())
+        let of_run = run_folder::of_model(model).map(|run| run.join(FILE));
+        [Some(Self::beside(model)), of_run].into_iter().flatten().find(|path| path.is_file())
+    }
+
+    /// Puts the table at `path`; without one, no old table stays there to name labels of something else.
+    pub fn put(table: Option<&Self>, path: &Path) -> Result<()> {
+        match table {
+            Some(table) => table.write(path),
+            None if path.is_file() => std::fs::remove_file(path).map_err(Error::write(path)),
+            None => Ok(()),
+        }
     }
 
     /// The place for the table of a PLY that is not in the folder of a run.

@@ -21,6 +21,7 @@ pub mod masks;
 pub mod occlusion_table;
 pub mod ply;
 mod resample;
+pub mod run_folder;
 mod transforms;
 pub mod truth;
 

@@ -61,8 +61,6 @@ pub enum TexelFormat {
     R32Uint,
     /// One f32.
     R32Sfloat,
-    /// Four bytes, read as [0, 1].
-    Rgba8Unorm,
 }
 
 impl TexelFormat {
@@ -70,7 +68,7 @@ impl TexelFormat {
     pub fn bytes(self) -> u32 {
         match self {
             Self::Rgba32Sfloat => 16,
-            Self::R32Uint | Self::R32Sfloat | Self::Rgba8Unorm => 4,
+            Self::R32Uint | Self::R32Sfloat => 4,
         }
     }
 }

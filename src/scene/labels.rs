@@ -26,6 +26,11 @@ impl LabelMap {
         self.ids[(y * self.width + x) as usize]
     }
 
+    /// The id at column `x` and row `y`, if that is inside.
+    pub fn get(&self, x: u32, y: u32) -> Option<u16> {
+        (x < self.width && y < self.height).then(|| self.at(x, y))
+    }
+
     /// The ids that occur, sorted, without 0.
     pub fn objects(&self) -> Vec<u16> {
         let mut seen = vec![false; 65_536];

@@ -153,7 +153,6 @@ fn vulkan_format(format: TexelFormat) -> vk::Format {
         TexelFormat::Rgba32Sfloat => vk::Format::R32G32B32A32_SFLOAT,
         TexelFormat::R32Uint => vk::Format::R32_UINT,
         TexelFormat::R32Sfloat => vk::Format::R32_SFLOAT,
-        TexelFormat::Rgba8Unorm => vk::Format::R8G8B8A8_UNORM,
     }
 }
 

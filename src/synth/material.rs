@@ -17,6 +17,10 @@ pub enum Pattern {
     Noise(f64),
     /// Balls on a grid of this pitch.
     Spots(f64),
+    /// Only the first colour.
+    Plain,
+    /// As the ground below, for an object that is not turned and whose offset is its position.
+    Ground,
 }
 
 /// Colour of an object.
@@ -39,6 +43,8 @@ impl Material {
     pub fn albedo(&self, place: DVec3) -> DVec3 {
         let p = place + self.offset;
         let share = match self.pattern {
+            Pattern::Ground => return ground_albedo(p, self.seed),
+            Pattern::Plain => 0.0,
             Pattern::Checks(edge) => (p / edge).floor().element_sum().rem_euclid(2.0),
             Pattern::Stripes(width, axis) => (p[axis] / width).floor().rem_euclid(2.0),
             Pattern::Wedges(count) => {
@@ -59,6 +65,14 @@ impl Material {
         let shade = 0.88 + 0.24 * noise(p / 0.45, self.seed + 2);
         self.first.lerp(self.second, share) * shade
     }
+}
+
+/// Albedo of the ground at a place of the world; the seed is the world's.
+pub fn ground_albedo(place: DVec3, seed: u64) -> DVec3 {
+    let tile = (place / 0.55 + 0.21).floor();
+    let odd = (tile.x + tile.y).rem_euclid(2.0);
+    let base = DVec3::new(0.62, 0.58, 0.5).lerp(DVec3::new(0.46, 0.47, 0.45), odd);
+    base * (0.75 + 0.5 * noise(place / 0.35, seed + 77))
 }
 
 /// Value noise in 0 to 1, one random value per unit cube's corner, smooth in between.

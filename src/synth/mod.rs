@@ -1,8 +1,10 @@
-//! A posed test scene, ray-traced from analytic shapes: photos, masks of visible and of whole objects, depth, points.
+//! A posed test scene, ray-traced from analytic shapes: photos, masks of visible and of whole objects, objects alone,
+//! depth, points.
 //!
 //! Nothing in it is made of Gaussians, so a score on it is not a score of the engine against itself.
 
 mod cameras;
+mod hard;
 mod material;
 mod points;
 mod presets;
@@ -13,9 +15,9 @@ mod world;
 mod write;
 
 pub use cameras::ring_of_cameras;
-pub use trace::{Picture, picture};
+pub use trace::{Picture, alone, picture};
 pub use world::{Object, World};
-pub use write::{Label, Summary, write};
+pub use write::{Summary, write};
 
 use crate::scene::{Dataset, LabelMap, Photo, View};
 use serde::{Deserialize, Serialize};
@@ -29,6 +31,8 @@ pub enum Preset {
     Default,
     /// Three objects; for quick tests.
     Simple,
+    /// What labels find hard: thin parts, the ground's colours, black, inside another, cut by the border, touching.
+    Hard,
 }
 
 /// What to make.

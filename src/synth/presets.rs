@@ -3,17 +3,18 @@
 use super::material::{Material, Pattern, hsv};
 use super::shape::Shape;
 use super::world::Object;
-use super::{Preset, hash01};
+use super::{Preset, hard, hash01};
 use glam::{DQuat, DVec3};
 
 /// One row of an arrangement: name, shape, position, turn about z in degrees, pattern.
-type Row = (&'static str, Shape, [f64; 3], f64, Pattern);
+pub type Row = (&'static str, Shape, [f64; 3], f64, Pattern);
 
 /// The objects of a preset, ids 1, 2, .. in order.
 pub fn objects(preset: Preset, seed: u64) -> Vec<Object> {
     let rows = match preset {
         Preset::Default => default_rows(),
         Preset::Simple => simple_rows(),
+        Preset::Hard => hard::rows(),
     };
     rows.into_iter().enumerate().map(|(index, row)| object(index, row, seed)).collect()
 }
@@ -64,13 +65,18 @@ fn object(index: usize, (name, shape, position, turn, pattern): Row, seed: u64) 
     let id = index as u64 + 1;
     let random = |what: u64| hash01(seed, 1, id, what);
     let hue = (index as f64 * 0.381_966 + 0.55 + 0.15 * random(0)).fract();
-    let material = Material {
+    let mut material = Material {
         pattern,
         first: hsv(hue, 0.5, 0.88),
         second: hsv(hue + 0.09, 0.62, 0.48),
         offset: DVec3::new(random(1), random(2), random(3)) * 0.05 + 0.013,
         seed: seed.wrapping_mul(1009).wrapping_add(id * 16),
     };
+    match pattern {
+        Pattern::Plain => material.first = DVec3::splat(hard::BLACK),
+        Pattern::Ground => material = Material { offset: DVec3::from_array(position), seed, ..material },
+        _ => {}
+    }
     Object {
         id: id as u8,
         name,

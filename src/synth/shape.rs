@@ -15,6 +15,10 @@ pub enum Shape {
     Cylinder(f64, f64),
     /// Lying torus: radius of the ring, radius of its tube.
     Ring(f64, f64),
+    /// Upright bars along x with two rails across: number of bars, their pitch, half height, radius of all of it.
+    Fence(u32, f64, f64, f64),
+    /// Box of these outer half sizes without a lid: thickness of floor and walls.
+    Bin(DVec3, f64),
 }
 
 /// Where a ray enters a shape.
@@ -35,6 +39,8 @@ impl Shape {
             Self::RoundBlock(half, radius) => half.length() + radius,
             Self::Cylinder(radius, half) => radius.hypot(half),
             Self::Ring(ring, tube) => ring + tube,
+            Self::Fence(bars, pitch, half, radius) => (f64::from(bars) * pitch / 2.0).hypot(half) + radius,
+            Self::Bin(half, _) => half.length(),
         }
     }
 
@@ -59,8 +65,37 @@ impl Shape {
                 let distance_to = |p: DVec3| (p.truncate().length() - ring).hypot(p.z) - tube;
                 march(distance_to, origin, direction, near.max(0.0), far)
             }
+            Self::Fence(bars, pitch, half, radius) => {
+                enter_parts(&fence_parts(bars, pitch, half, radius), origin, direction)
+            }
+            Self::Bin(half, wall) => enter_parts(&bin_parts(half, wall), origin, direction),
         }
     }
+}
+
+/// A simple shape and where its centre is in the frame of the whole.
+type Part = (Shape, DVec3);
+
+fn fence_parts(bars: u32, pitch: f64, half: f64, radius: f64) -> Vec<Part> {
+    let first = -0.5 * pitch * (f64::from(bars) - 1.0);
+    let bar = |index: u32| (Shape::Cylinder(radius, half), DVec3::X * (first + pitch * f64::from(index)));
+    let rail = |height: f64| (Shape::RoundBlock(DVec3::X * -first, radius), DVec3::Z * height);
+    (0..bars).map(bar).chain([rail(0.5 * half), rail(-0.5 * half)]).collect()
+}
+
+/// A floor and four walls that meet without overlap.
+fn bin_parts(half: DVec3, wall: f64) -> [Part; 5] {
+    let thin = wall / 2.0;
+    let inner = half.y - wall;
+    let side = |x: f64| (Shape::Block(DVec3::new(thin, half.y, half.z)), DVec3::X * x);
+    let end = |y: f64| (Shape::Block(DVec3::new(half.x - wall, thin, half.z)), DVec3::Y * y);
+    let floor = (Shape::Block(DVec3::new(half.x - wall, inner, thin)), DVec3::Z * (thin - half.z));
+    [floor, side(half.x - thin), side(thin - half.x), end(half.y - thin), end(thin - half.y)]
+}
+
+fn enter_parts(parts: &[Part], origin: DVec3, direction: DVec3) -> Option<Entry> {
+    let entries = parts.iter().filter_map(|(shape, at)| shape.enter(origin - at, direction));
+    entries.min_by(|a, b| a.distance.total_cmp(&b.distance))
 }
 
 /// Distances at which a ray enters and leaves a sphere around the origin.

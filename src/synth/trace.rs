@@ -1,4 +1,4 @@
-//! One picture: colour over the pixel, ids, depth and whole objects at its centre.
+//! One picture: colour over the pixel, ids, depth and whole objects at its centre; and an object alone.
 
 use super::hash01;
 use super::world::World;
@@ -47,10 +47,7 @@ pub fn picture(world: &World, camera: &Camera, view: u32) -> Picture {
         .map(|object| {
             (0..width * height)
                 .into_par_iter()
-                .map(|index| {
-                    let ray = ray(camera, f64::from(index % width) + 0.5, f64::from(index / width) + 0.5);
-                    object.distance(origin, ray).is_some()
-                })
+                .map(|index| object.distance(origin, middle(camera, index % width, index / width)).is_some())
                 .collect()
         })
         .collect();
@@ -70,24 +67,59 @@ pub fn ray(camera: &Camera, x: f64, y: f64) -> DVec3 {
     (camera.rotation.transpose() * own).normalize()
 }
 
-fn pixel(world: &World, camera: &Camera, view: u32, x: u32, y: u32) -> Pixel {
+/// The object of this index as the camera of a view sees it with nothing before it, RGBA, row-major: alpha is 255 where
+/// the object covers the pixel's centre, else all is 0. Light and shadows are those of the photo: taking the others
+/// away would not leave the colours that photos can teach. The colour is the mean over the part of the pixel that the
+/// object covers, so that where it fills the pixel and nothing hides it, it is the photo's.
+pub fn alone(world: &World, camera: &Camera, view: u32, index: usize) -> Vec<[u8; 4]> {
     let origin = camera.centre();
-    let mut sum = DVec3::ZERO;
-    for sample in 0..SIDE * SIDE {
+    let pixel = |at: u32| {
+        let (x, y) = (at % camera.width, at / camera.width);
+        let Some(centre) = world.hit_object(index, origin, middle(camera, x, y)) else { return [0; 4] };
+        let hits = samples(camera, view, x, y)
+            .filter_map(|(direction, spot)| Some((world.hit_object(index, origin, direction)?, spot)));
+        let (mut sum, mut count) = (DVec3::ZERO, 0);
+        for (hit, spot) in hits {
+            sum += world.colour(&hit, spot);
+            count += 1;
+        }
+        let [r, g, b] = bytes(if count > 0 { sum / f64::from(count) } else { world.colour(&centre, [0.0; 2]) });
+        [r, g, b, 255]
+    };
+    (0..camera.width * camera.height).into_par_iter().map(pixel).collect()
+}
+
+/// Directions of the samples of a pixel, each with its place on the light.
+fn samples(camera: &Camera, view: u32, x: u32, y: u32) -> impl Iterator<Item = (DVec3, [f64; 2])> {
+    (0..SIDE * SIDE).map(move |sample| {
         let random = |what: u64| hash01(u64::from(view), u64::from(y) << 32 | u64::from(x), u64::from(sample), what);
         let (column, row) = (sample % SIDE, sample / SIDE);
         let within = |cell: u32, what: u64| (f64::from(cell) + random(what)) / f64::from(SIDE);
         let direction = ray(camera, f64::from(x) + within(column, 0), f64::from(y) + within(row, 1));
-        let hit = world.hit(origin, direction);
         // The spots on the light are the same in every pixel: shadows have no noise that differs between views.
         let spot = |cell: u32| (f64::from(cell) + 0.5) / f64::from(SIDE) * 2.0 - 1.0;
-        sum += world.colour(&hit, [spot(column), spot(row)]);
+        (direction, [spot(column), spot(row)])
+    })
+}
+
+/// Direction of the ray through a pixel's centre.
+fn middle(camera: &Camera, x: u32, y: u32) -> DVec3 {
+    ray(camera, f64::from(x) + 0.5, f64::from(y) + 0.5)
+}
+
+fn bytes(colour: DVec3) -> [u8; 3] {
+    colour.to_array().map(|value| (value * 255.0).round() as u8)
+}
+
+fn pixel(world: &World, camera: &Camera, view: u32, x: u32, y: u32) -> Pixel {
+    let origin = camera.centre();
+    let mut sum = DVec3::ZERO;
+    for (direction, spot) in samples(camera, view, x, y) {
+        sum += world.colour(&world.hit(origin, direction), spot);
     }
-    let mean = sum / f64::from(SIDE * SIDE);
-    let direction = ray(camera, f64::from(x) + 0.5, f64::from(y) + 0.5);
-    let centre = world.hit(origin, direction);
+    let centre = world.hit(origin, middle(camera, x, y));
     Pixel {
-        rgb: mean.to_array().map(|value| (value * 255.0).round() as u8),
+        rgb: bytes(sum / f64::from(SIDE * SIDE)),
         id: world.id(&centre),
         depth: camera.to_camera(centre.place).z as f32,
     }

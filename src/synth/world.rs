@@ -1,6 +1,6 @@
 //! Objects on a textured ground under a sky: what a ray sees.
 
-use super::material::{Material, noise};
+use super::material::{Material, ground_albedo};
 use super::shape::Shape;
 use super::{Preset, hash01, presets};
 use glam::{DQuat, DVec3};
@@ -97,18 +97,24 @@ impl World {
     /// Follows a ray to the first surface. `origin` is above the ground and inside the sky.
     pub fn hit(&self, origin: DVec3, direction: DVec3) -> Hit {
         let mut best = ground_or_sky(origin, direction);
-        for (index, object) in self.objects.iter().enumerate() {
-            let (own_origin, own_direction) = object.to_own(origin, direction);
-            if let Some(entry) = object.shape.enter(own_origin, own_direction)
-                && entry.distance < best.distance
+        best.place = origin + direction * best.distance;
+        for index in 0..self.objects.len() {
+            if let Some(hit) = self.hit_object(index, origin, direction)
+                && hit.distance < best.distance
             {
-                best.distance = entry.distance;
-                best.normal = object.rotation * entry.normal;
-                best.surface = Surface::Object(index);
+                best = hit;
             }
         }
-        best.place = origin + direction * best.distance;
         best
+    }
+
+    /// Where a ray meets the object of this index, whatever else is in the way.
+    pub fn hit_object(&self, index: usize, origin: DVec3, direction: DVec3) -> Option<Hit> {
+        let object = &self.objects[index];
+        let (own_origin, own_direction) = object.to_own(origin, direction);
+        let entry = object.shape.enter(own_origin, own_direction)?;
+        let (distance, normal) = (entry.distance, object.rotation * entry.normal);
+        Some(Hit { distance, place: origin + direction * distance, normal, surface: Surface::Object(index) })
     }
 
     /// Colour that leaves a surface in every direction alike, 0 to 1. `spot` in -1 to 1 picks the place on the light, so
@@ -116,7 +122,7 @@ impl World {
     pub fn colour(&self, hit: &Hit, spot: [f64; 2]) -> DVec3 {
         let albedo = match hit.surface {
             Surface::Sky => return sky_colour(hit.place),
-            Surface::Ground => self.ground_albedo(hit.place),
+            Surface::Ground => ground_albedo(hit.place, self.seed),
             Surface::Object(index) => {
                 let object = &self.objects[index];
                 object.material.albedo(object.to_own(hit.place, hit.normal).0)
@@ -134,13 +140,6 @@ impl World {
             _ => 0.0,
         };
         shaded.lerp(sky_colour(DVec3::X), haze).clamp(DVec3::ZERO, DVec3::ONE)
-    }
-
-    fn ground_albedo(&self, place: DVec3) -> DVec3 {
-        let tile = (place / 0.55 + 0.21).floor();
-        let odd = (tile.x + tile.y).rem_euclid(2.0);
-        let base = DVec3::new(0.62, 0.58, 0.5).lerp(DVec3::new(0.46, 0.47, 0.45), odd);
-        base * (0.75 + 0.5 * noise(place / 0.35, self.seed + 77))
     }
 }
 

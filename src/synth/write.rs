@@ -1,12 +1,12 @@
-//! The files of a made scene: COLMAP model, pictures, masks, depth, names.
+//! The files of a made scene: COLMAP model, pictures, masks with names, objects alone, depth.
 
 use super::points::Seen;
 use super::trace::Picture;
-use super::world::World;
-use super::{SynthOptions, picture, points, ring_of_cameras, view_name};
+use super::world::{Object, World};
+use super::{SynthOptions, alone, picture, points, ring_of_cameras, view_name};
+use crate::io::label_table::{self, LabelEntry, LabelTable};
 use crate::io::{atomic, image};
 use crate::scene::Camera;
-use crate::scene::labels::label_colour;
 use crate::{Error, Result};
 use glam::DQuat;
 use serde::Serialize;
@@ -22,24 +22,8 @@ pub struct Summary {
     pub views: u32,
     /// Number of points.
     pub points: usize,
-    /// The objects.
-    pub objects: Vec<Label>,
-}
-
-/// Id, name and display colour of an object; `labels.json` is a list of these.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Label {
-    /// Id in the masks.
-    pub id: u8,
-    /// Name.
-    pub name: String,
-    /// Colour in previews.
-    pub colour: [u8; 3],
-}
-
-fn labels(world: &World) -> Vec<Label> {
-    let label = |id: u8, name: &str| Label { id, name: name.to_owned(), colour: label_colour(u32::from(id)) };
-    world.objects.iter().map(|object| label(object.id, object.name)).collect()
+    /// The objects, with the pixels and views that show them.
+    pub objects: Vec<LabelEntry>,
 }
 
 /// Makes a scene and writes it into `folder`, which must be empty or new. `after_view` is told how many views are
@@ -54,40 +38,54 @@ pub fn write(options: &SynthOptions, folder: &Path, after_view: &dyn Fn(u32) -> 
     let world = World::new(options.preset, options.seed);
     let cameras = ring_of_cameras(options);
     create_folders(folder, &world)?;
-    let objects = labels(&world);
-    let text = serde_json::to_string_pretty(&objects).map_err(|error| Error::Bug(error.to_string()))?;
-    save(&folder.join("labels.json"), format!("{text}\n").as_bytes())?;
+    let entry = |object: &Object| LabelEntry { name: Some(object.name.into()), ..LabelEntry::new(object.id.into()) };
+    let mut table = LabelTable::new(world.objects.iter().map(entry).collect());
     let seen = points::sample(&world, &cameras, options);
     write_colmap(folder, &cameras, &seen)?;
     for (index, camera) in cameras.iter().enumerate() {
-        write_view(folder, index, &world, &picture(&world, camera, index as u32))?;
+        let made = picture(&world, camera, index as u32);
+        write_view(folder, index, &world, camera, &made)?;
+        count(&mut table, &made.ids);
         after_view(index as u32 + 1)?;
     }
-    Ok(Summary { scene: folder.to_owned(), views: options.views, points: seen.len(), objects })
+    table.write(&folder.join("masks").join(label_table::FILE))?;
+    Ok(Summary { scene: folder.to_owned(), views: options.views, points: seen.len(), objects: table.labels })
+}
+
+/// Adds a mask to the counts.
+fn count(table: &mut LabelTable, ids: &[u8]) {
+    for entry in &mut table.labels {
+        let pixels = ids.iter().filter(|&&id| u32::from(id) == entry.id).count() as u64;
+        entry.pixels += pixels;
+        entry.views += u32::from(pixels > 0);
+    }
 }
 
 fn create_folders(folder: &Path, world: &World) -> Result<()> {
     if fs::read_dir(folder).is_ok_and(|mut entries| entries.next().is_some()) {
         return Err(Error::usage("DIR", format!("{} is not empty; name a new folder", folder.display())));
     }
-    let amodal = world.objects.iter().map(|object| format!("amodal/{}", object.id));
+    let of_objects =
+        ["amodal", "objects"].map(|kind| world.objects.iter().map(move |object| format!("{kind}/{}", object.id)));
     let names = ["images", "sparse/0", "masks", "depth"].map(str::to_owned);
-    for name in names.into_iter().chain(amodal) {
+    for name in names.into_iter().chain(of_objects.into_iter().flatten()) {
         let path = folder.join(name);
         fs::create_dir_all(&path).map_err(Error::write(&path))?;
     }
     Ok(())
 }
 
-fn write_view(folder: &Path, index: usize, world: &World, made: &Picture) -> Result<()> {
+fn write_view(folder: &Path, index: usize, world: &World, camera: &Camera, made: &Picture) -> Result<()> {
     let name = view_name(index);
     let (width, height) = (made.width, made.height);
     image::write_png_rgb8(folder.join("images").join(&name), width, height, &made.rgb)?;
     image::write_png_grey8(folder.join("masks").join(&name), width, height, &made.ids)?;
-    for (object, whole) in world.objects.iter().zip(&made.whole) {
+    for (place, (object, whole)) in world.objects.iter().zip(&made.whole).enumerate() {
         let path = folder.join("amodal").join(object.id.to_string()).join(&name);
         let bytes: Vec<u8> = whole.iter().map(|&covered| if covered { 255 } else { 0 }).collect();
         image::write_png_grey8(&path, width, height, &bytes)?;
+        let path = folder.join("objects").join(object.id.to_string()).join(&name);
+        image::write_png_rgba8(&path, width, height, &alone(world, camera, index as u32, place))?;
     }
     image::write_exr_y(folder.join("depth").join(format!("{index:03}.exr")), width, height, &made.depth)
 }

@@ -19,7 +19,7 @@ mod table {
         PLANES "planes": 16, Domain::Gaussians, Class::Model, Some(TexelFormat::Rgba32Sfloat), "Kept vectors.";
         TOTALS "totals": 4, Domain::Fixed(16), Class::Kept, None, "Kept, zeroed when allocated.";
         UNIFORMS "uniforms": 4, Domain::Fixed(4), Class::Slot, None, "From the host.";
-        PHOTO "photo": 4, Domain::Pixels, Class::Slot, Some(TexelFormat::Rgba8Unorm), "From the host, as bytes.";
+        FLOATS "floats": 4, Domain::Pixels, Class::Slot, Some(TexelFormat::R32Sfloat), "From the host, as floats.";
         REPORT "report": 4, Domain::Pixels, Class::Report, None, "To the host.";
         A "a": 4, Domain::Pixels, Class::Step, Some(TexelFormat::R32Uint), "Scratch.";
         B "b": 4, Domain::Pixels, Class::Step, Some(TexelFormat::R32Uint), "Scratch.";

@@ -8,18 +8,18 @@ toy_shader!(
     fetch,
     0,
     [],
-    [("words", R, T, 0), ("planes", R, T, 0), ("photo", R, T, 0), ("to", W, S, 4)],
+    [("words", R, T, 0), ("planes", R, T, 0), ("floats", R, T, 0), ("to", W, S, 4)],
     "#extension GL_EXT_samplerless_texture_functions : require
     layout(local_size_x = 64) in;
     layout(set=0, binding=0) uniform utextureBuffer words;
     layout(set=0, binding=1) uniform textureBuffer planes;
-    layout(set=0, binding=2) uniform textureBuffer photo;
+    layout(set=0, binding=2) uniform textureBuffer floats;
     layout(scalar, set=0, binding=3) writeonly buffer to_block { uint to[]; };
     void main() {
         int i = int(gl_GlobalInvocationID.x);
         vec4 plane = texelFetch(planes, i);
-        vec4 color = texelFetch(photo, i) * 255.0;
-        to[i] = texelFetch(words, i).x + uint(plane.x + 10.0 * plane.w) + 1000u * uint(color.g + 0.5);
+        float number = texelFetch(floats, i).x;
+        to[i] = texelFetch(words, i).x + uint(plane.x + 10.0 * plane.w) + 1000u * uint(number + 0.5);
     }"
 );
 
@@ -64,14 +64,14 @@ fn buffers_can_be_read_as_texels() {
     let mut list = PassList::new("texels");
     // A scratch buffer that does not lie at the start of its page.
     list.fill(A, 1).copy(MODEL, B, 0);
-    list.pass(PassDecl::new(fetch(), vec![B, PLANES, PHOTO, C], Grid::Groups(2, 1, 1)));
+    list.pass(PassDecl::new(fetch(), vec![B, PLANES, FLOATS, C], Grid::Groups(2, 1, 1)));
     list.pass(PassDecl::new(twice(), vec![C, C], Grid::Groups(2, 1, 1)));
     list.copy(C, REPORT, 0).copy(A, MODEL, 4);
     let id = scheduler.prepare(&list).unwrap();
     assert!(scheduler.plan(id).unwrap().placement(B).unwrap().offset > 0);
     scheduler.upload(MODEL, 0, 0, &(0..128).collect::<Vec<u32>>()).unwrap();
     scheduler.upload(PLANES, 0, 0, &(0..128).map(|i| [i as f32, 0.0, 0.0, 7.0]).collect::<Vec<_>>()).unwrap();
-    scheduler.upload(PHOTO, 1, 0, &(0..128_u8).map(|i| [9, i, 9, 9]).collect::<Vec<_>>()).unwrap();
+    scheduler.upload(FLOATS, 1, 0, &(0..128).map(|i| i as f32).collect::<Vec<_>>()).unwrap();
     scheduler.run(id, 1).unwrap();
     let expected = (0..128).map(|i| 3 * (i + (i + 70) + 1000 * i)).collect::<Vec<u32>>();
     assert_eq!(scheduler.download_all::<u32>(REPORT, 1).unwrap(), expected);

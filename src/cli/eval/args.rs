@@ -1,7 +1,7 @@
 //! What `labelgs eval` can be told.
 
 use crate::cli::args::SceneArgs;
-use crate::cli::values::colour;
+use crate::cli::values::{colour, near};
 use crate::infer::protocol::{By, Protocol};
 use clap::Args;
 use std::path::PathBuf;
@@ -27,6 +27,9 @@ pub struct EvalArgs {
     /// Colour behind the scene: black, white, or R,G,B from 0 to 1.
     #[arg(long, value_name = "COLOUR", value_parser = colour, default_value = "black")]
     pub background: [f32; 3],
+    /// Gaussians nearer to the camera are not drawn, world units; otherwise as in the run of the model, otherwise 0.2.
+    #[arg(long, value_name = "Z", value_parser = near)]
+    pub near: Option<f32>,
     /// Score by a published benchmark instead: its masks, its way of choosing objects, its averages.
     #[arg(
         long, value_name = "NAME", value_enum, requires = "truth", help_heading = "Benchmarks",

@@ -3,7 +3,7 @@
 use super::table::bench_table;
 use super::watch::Watcher;
 use super::{EvalArgs, put_out};
-use crate::cli::scene::{NEAR, open_gpu, open_scene, render_engine};
+use crate::cli::scene::{near_plane, open_gpu, open_scene, render_engine};
 use crate::cli::{Context, open_model};
 use crate::infer::lpips::Weights;
 use crate::infer::protocol::paint::EnginePainter;
@@ -53,7 +53,7 @@ pub(super) fn run(protocol: Protocol, args: &EvalArgs, context: &Context) -> Res
     let mut watcher = Watcher::new(picture_count(&layout), args.page.as_deref(), context)?;
     let sizes = views.iter().map(|view| (view.camera.width, view.camera.height));
     let mut engine = render_engine(open_gpu(context)?, &model, sizes)?;
-    let mut painter = EnginePainter::new(&mut engine, &model, NEAR);
+    let mut painter = EnginePainter::new(&mut engine, &model, near_plane(&args.model, args.near)?);
     let report = run_bench(&layout, &bench, &mut painter, &mut watcher)?;
     let table = bench_table(&report);
     watcher.finish(&table)?;

@@ -3,7 +3,7 @@
 use super::table::own_table;
 use super::watch::Watcher;
 use super::{EvalArgs, put_out};
-use crate::cli::scene::{NEAR, open_gpu, open_scene, pick_views, render_engine};
+use crate::cli::scene::{near_plane, open_gpu, open_scene, pick_views, render_engine};
 use crate::cli::{Context, open_model};
 use crate::infer::evaluate::{Rendering, Wholes, evaluate, picture_count};
 use crate::io::image::read_rgba;
@@ -22,7 +22,7 @@ pub(super) fn run(args: &EvalArgs, context: &Context) -> Result<()> {
     let gpu = open_gpu(context)?;
     let sizes = views.iter().map(|view| (view.camera.width, view.camera.height));
     let mut engine = render_engine(gpu, &model, sizes)?;
-    let how = Rendering { near: NEAR, background: args.background };
+    let how = Rendering { near: near_plane(&args.model, args.near)?, background: args.background };
     let scores = evaluate(&mut engine, &model, &views, how, &wholes, &mut watcher)?;
     let table = own_table(&scores);
     watcher.finish(&table)?;

@@ -3,7 +3,8 @@
 use super::write_mask;
 use crate::cli::args::{JsonFlag, SceneArgs};
 use crate::cli::log::Progress;
-use crate::cli::scene::{NEAR, open_gpu, open_scene};
+use crate::cli::scene::{near_plane, open_gpu, open_scene};
+use crate::cli::values::near;
 use crate::cli::{Context, open_model, stdout};
 use crate::engine::{Engine, LabelRoom, Room};
 use crate::infer::associate::{Owners, Segment, associate};
@@ -44,9 +45,9 @@ pub struct RepairArgs {
     /// Make masks for photos that have none.
     #[arg(long)]
     pub make_missing: bool,
-    /// Gaussians nearer to the camera are not seen, world units.
-    #[arg(long, value_name = "Z", default_value_t = NEAR)]
-    pub near: f32,
+    /// Gaussians nearer to the camera are not seen, world units; otherwise as in the run of the model, otherwise 0.2.
+    #[arg(long, value_name = "Z", value_parser = near)]
+    pub near: Option<f32>,
     /// How the scene is read; masks of test views are left out.
     #[command(flatten)]
     pub reading: SceneArgs,
@@ -76,7 +77,8 @@ pub fn run(args: &RepairArgs, context: &Context) -> Result<()> {
         done += 1;
         progress.set(done, String::new);
     };
-    let (masks, repairs) = repair(&mut engine, &model, &views, args, &mut tick)?;
+    let near = near_plane(&args.model, args.near)?;
+    let (masks, repairs) = repair(&mut engine, &model, &views, (near, args), &mut tick)?;
     drop(progress);
     write(&args.output, &args.masks, &views, &masks)?;
     report(&views, &masks, &repairs, args, context)
@@ -87,10 +89,10 @@ fn repair(
     engine: &mut Engine,
     model: &Gaussians,
     views: &[&View],
-    args: &RepairArgs,
+    (near, args): (f32, &RepairArgs),
     tick: &mut dyn FnMut(),
 ) -> Result<(Vec<Option<LabelMap>>, Repairs)> {
-    let how = Sweep { near: args.near, border: 0 };
+    let how = Sweep { near, border: 0 };
     let mut owners = Vec::with_capacity(views.len());
     for view in views {
         let voter = view.mask.as_ref().map(|mask| voter(view, mask));
@@ -117,7 +119,7 @@ fn repair(
     let decision = decide(&sweep(engine, &voters, how)?, &model.means, true)?;
     let mut masks = Vec::with_capacity(views.len());
     for (index, (view, mask)) in views.iter().zip(&renamed).enumerate() {
-        let shown = render(engine, &view.camera, args.near, [0.0; 3], 0)?.label_map(&decision.labels);
+        let shown = render(engine, &view.camera, near, [0.0; 3], 0)?.label_map(&decision.labels);
         masks.push(match mask {
             Some(mask) => Some(mend(index, mask, &shown, &mut repairs)),
             None if args.make_missing => {

@@ -6,7 +6,7 @@ pub use source::{for_training, from_depths};
 
 use super::args::JsonFlag;
 use super::log::Progress;
-use super::scene::{NEAR, open_gpu, open_with, render_engine};
+use super::scene::{near_plane, open_gpu, open_with, render_engine};
 use super::{Context, open_model, stdout};
 use crate::infer::occlusion::{Rule, by_contour, picture};
 use crate::infer::render::render;
@@ -86,14 +86,14 @@ pub fn run(args: &OcclusionArgs, context: &Context) -> Result<()> {
 }
 
 fn from_model(path: &Path, views: &[&View], context: &Context) -> Result<BTreeMap<String, Occluders>> {
-    let model = open_model(path)?;
+    let (model, near) = (open_model(path)?, near_plane(path, None)?);
     let gpu = open_gpu(context)?;
     let mut engine = render_engine(gpu, &model, views.iter().map(|view| (view.camera.width, view.camera.height)))?;
     engine.upload_model(&model)?;
     let mut progress = Progress::new(views.len() as u64, "views", &context.global);
     let mut found = BTreeMap::new();
     for view in views {
-        let rendered = render(&mut engine, &view.camera, NEAR, [0.0; 3], model.sh_degree)?;
+        let rendered = render(&mut engine, &view.camera, near, [0.0; 3], model.sh_degree)?;
         found.insert(view.name.clone(), by_contour(mask(view)?, &rendered.mean_depth(), Rule::default()));
         progress.set(found.len() as u64, String::new);
     }

@@ -57,30 +57,35 @@ impl<'a> Words<'a> {
     }
 }
 
-/// Reads `cameras.txt`.
-pub(super) fn cameras(path: &Path) -> Result<Vec<CameraRecord>> {
+/// Reads a file with one record a line.
+fn records<T>(path: &Path, read: impl Fn(Words) -> Result<T>) -> Result<Vec<T>> {
     let mut all = Vec::new();
     for line in lines(path)? {
         let (number, line) = line?;
-        if !is_record(&line) {
-            continue;
+        if is_record(&line) {
+            all.push(read(Words { path, number, rest: line.trim() })?);
         }
-        let mut words = Words { path, number, rest: line.trim() };
+    }
+    Ok(all)
+}
+
+/// Reads `cameras.txt`.
+pub(super) fn cameras(path: &Path) -> Result<Vec<CameraRecord>> {
+    records(path, |mut words| {
         let (id, name) = (words.number("camera id")?, words.word("a camera model")?);
         let Some(model) = MODELS.iter().position(|model| model.0 == name) else {
             return Err(
                 words.error(format!("camera {id} has the unknown model {name}; run `colmap image_undistorter`"))
             );
         };
-        check_supported(path, &format!("line {number}, camera {id}"), model)?;
+        check_supported(path, &format!("line {}, camera {id}", words.number), model)?;
         let (width, height) = (words.number("width")?, words.number("height")?);
         let mut parameters = Vec::new();
         while !words.rest.trim().is_empty() {
             parameters.push(words.number("camera parameter")?);
         }
-        all.push(CameraRecord { id, model, width, height, parameters });
-    }
-    Ok(all)
+        Ok(CameraRecord { id, model, width, height, parameters })
+    })
 }
 
 /// Reads `images.txt`: two lines an image, the second with its observations, which may be empty.
@@ -111,20 +116,13 @@ pub(super) fn images(path: &Path) -> Result<Vec<ImageRecord>> {
 
 /// Reads `points3D.txt`, without the tracks.
 pub(super) fn points(path: &Path) -> Result<Vec<Point>> {
-    let mut all = Vec::new();
-    for line in lines(path)? {
-        let (number, line) = line?;
-        if !is_record(&line) {
-            continue;
-        }
-        let mut words = Words { path, number, rest: line.trim() };
+    records(path, |mut words| {
         words.word("a point id")?;
         let position = DVec3::from_array(words.numbers("coordinate")?);
         let mut colour = [0u8; 3];
         for value in &mut colour {
             *value = words.number("colour from 0 to 255")?;
         }
-        all.push(Point { position, colour });
-    }
-    Ok(all)
+        Ok(Point { position, colour })
+    })
 }

@@ -1,0 +1,183 @@
+//! Which labels: by id, by name, by a mask, a point or a box in a view. Several ways add up.
+
+use super::Context;
+use super::args::SceneArgs;
+use super::labelled::TableArg;
+use super::scene::{find_view, near_plane, open_gpu, open_scene, render_engine};
+use super::values::{At, BoxAt, Picks, at, box_at, near, picks};
+use crate::infer::catalogue::{Catalogue, Pick};
+use crate::infer::prompt::{Place, Prompt, choose};
+use crate::infer::render::render;
+use crate::scene::{Camera, Gaussians, LabelMap};
+use crate::{Error, Result};
+use clap::Args;
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+
+/// Labels by name and by place. Pixels count from 0 at the top left of the view in the size of its photo, or in the
+/// size that --max-resolution makes of it.
+#[derive(Args, Clone, Debug, Default)]
+#[command(next_help_heading = "Choice of labels")]
+pub struct PromptArgs {
+    /// Label of this name, whatever the case; may be given several times.
+    #[arg(long = "name", value_name = "NAME")]
+    pub names: Vec<String>,
+    /// Label that pixel x,y of a view shows, from 0 at the top left; may be given several times, also in several views.
+    /// Pixels are those of the photo, or of what --max-resolution makes of it.
+    #[arg(long, value_name = "VIEW:x,y", value_parser = at, requires = "scene")]
+    pub at: Vec<At>,
+    /// Label at this pixel is not meant; may be given several times.
+    #[arg(long, value_name = "VIEW:x,y", value_parser = at, requires = "scene")]
+    pub not_at: Vec<At>,
+    /// Labels with more than half of their pixels in a box: x0 <= x < x1 and y0 <= y < y1; may be given several times.
+    #[arg(long = "box", value_name = "VIEW:x0,y0,x1,y1", value_parser = box_at, requires = "scene")]
+    pub boxes: Vec<BoxAt>,
+    /// A mask in one view: labels with more than half of their pixels under it are chosen. Any pixel that is not 0 is
+    /// in; the view is rendered in the size of the mask.
+    #[arg(long, value_name = "FILE", requires = "view", requires = "scene")]
+    pub mask: Option<PathBuf>,
+    /// Name of the view that the mask belongs to.
+    #[arg(long, value_name = "NAME", requires = "mask")]
+    pub view: Option<String>,
+    /// Names.
+    #[command(flatten)]
+    pub table: TableArg,
+    /// Gaussians nearer to the camera are not drawn, world units; otherwise as in the run of the model, otherwise 0.2.
+    #[arg(long, value_name = "Z", value_parser = near)]
+    pub near: Option<f32>,
+}
+
+/// A choice, which must not be empty.
+#[derive(Args, Clone, Debug)]
+#[command(next_help_heading = "Choice of labels")]
+#[command(group(clap::ArgGroup::new("choice").required(true).multiple(true)
+    .args(["labels", "names", "at", "boxes", "mask"])))]
+pub struct ChooseArgs {
+    /// The labels by id or by name, such as 1,4-6,cup; 0 is what has no label.
+    #[arg(long, value_name = "LABELS", value_parser = picks)]
+    pub labels: Option<Picks>,
+    /// The other ways.
+    #[command(flatten)]
+    pub prompts: PromptArgs,
+    /// Scene of the views.
+    #[arg(long, value_name = "SCENE")]
+    pub scene: Option<PathBuf>,
+    /// Longest side of a view, px; otherwise that of its photo.
+    #[arg(long, value_name = "PX", value_parser = clap::value_parser!(u32).range(1..))]
+    pub max_resolution: Option<u32>,
+}
+
+/// The model that is asked, and where its views are.
+pub struct Asked<'a> {
+    /// Path of the model.
+    pub path: &'a Path,
+    /// The model.
+    pub model: &'a Gaussians,
+    /// Its labels.
+    pub known: &'a Catalogue,
+    /// Scene of the views.
+    pub scene: Option<&'a Path>,
+    /// Longest side of a view, px.
+    pub max_resolution: Option<u32>,
+}
+
+impl ChooseArgs {
+    /// The labels that are meant.
+    pub fn labels(&self, path: &Path, model: &Gaussians, known: &Catalogue, to: &Context) -> Result<BTreeSet<u32>> {
+        let asked = Asked { path, model, known, scene: self.scene.as_deref(), max_resolution: self.max_resolution };
+        self.prompts.labels("--labels", self.labels.as_ref(), &asked, to)
+    }
+}
+
+impl PromptArgs {
+    /// True if nothing was typed.
+    pub fn is_empty(&self) -> bool {
+        self.names.is_empty() && self.mask.is_none() && !self.has_points()
+    }
+
+    fn has_points(&self) -> bool {
+        !self.at.is_empty() || !self.not_at.is_empty() || !self.boxes.is_empty()
+    }
+
+    /// The labels that are meant, with those of `listed`, which came with the flag `argument`.
+    pub fn labels(
+        &self,
+        argument: &str,
+        listed: Option<&Picks>,
+        asked: &Asked,
+        context: &Context,
+    ) -> Result<BTreeSet<u32>> {
+        let names: Vec<Pick> = self.names.iter().map(|name| Pick::Name(name.clone())).collect();
+        let lists = [(argument, listed.map_or(&[][..], |picks| &picks.0)), ("--name", &names)];
+        let mut chosen = BTreeSet::new();
+        for (argument, picks) in lists.into_iter().filter(|(_, picks)| !picks.is_empty()) {
+            chosen.extend(asked.known.resolve(argument, picks)?);
+        }
+        let prompts = self.prompts()?;
+        if prompts.is_empty() {
+            return if chosen.is_empty() { asked.known.check(argument, &chosen).map(|()| chosen) } else { Ok(chosen) };
+        }
+        let maps = self.label_maps(&prompts, asked, context)?;
+        let map_of = |prompt: &Prompt| maps.get(&key(prompt)).cloned().ok_or_else(|| Error::Bug("no map".into()));
+        choose(chosen, &prompts, asked.known, &mut { map_of })
+    }
+
+    fn prompts(&self) -> Result<Vec<Prompt>> {
+        let point = |argument, away| {
+            move |at: &At| {
+                let [x, y] = at.pixel;
+                Prompt { argument, view: at.view.clone(), size: None, place: Place::Point(x, y), away }
+            }
+        };
+        let area = |boxed: &BoxAt| Prompt {
+            argument: "--box",
+            view: boxed.view.clone(),
+            size: None,
+            place: Place::Box(boxed.corners),
+            away: false,
+        };
+        let points = self.at.iter().map(point("--at", false)).chain(self.not_at.iter().map(point("--not-at", true)));
+        let mut prompts: Vec<Prompt> = points.chain(self.boxes.iter().map(area)).collect();
+        if let (Some(mask), Some(view)) = (&self.mask, &self.view) {
+            let map = crate::io::mask::read_mask(mask)?;
+            let place = Place::Mask(map.ids.iter().map(|&id| id != 0).collect());
+            let size = Some((map.width, map.height));
+            prompts.push(Prompt { argument: "--mask", view: view.clone(), size, place, away: false });
+        }
+        Ok(prompts)
+    }
+
+    /// The label maps that the prompts need, each rendered once.
+    fn label_maps(&self, prompts: &[Prompt], asked: &Asked, context: &Context) -> Result<BTreeMap<Key, LabelMap>> {
+        let Some(scene) = asked.scene else {
+            return Err(Error::usage(prompts[0].argument, "needs --scene, which has the view"));
+        };
+        let Some(labels) = &asked.model.labels else {
+            return Err(Error::data(asked.path, "", "the model has no labels; train it with --masks"));
+        };
+        let reading = SceneArgs { test_every: 8, max_resolution: asked.max_resolution };
+        let dataset = open_scene(scene, &reading, None, [0.0; 3], false)?;
+        let mut cameras: BTreeMap<Key, Camera> = BTreeMap::new();
+        for prompt in prompts {
+            let camera = &find_view(&dataset, &prompt.view)?.camera;
+            let (width, height) = prompt.size.unwrap_or((camera.width, camera.height));
+            cameras.insert(key(prompt), camera.resized(width, height));
+        }
+        let near = near_plane(asked.path, self.near)?;
+        let sizes = cameras.values().map(|camera| (camera.width, camera.height));
+        let mut engine = render_engine(open_gpu(context)?, asked.model, sizes)?;
+        engine.upload_model(asked.model)?;
+        let mut map = |(key, camera): (Key, Camera)| {
+            let rendered = render(&mut engine, &camera, near, [0.0; 3], asked.model.sh_degree)?;
+            Ok((key, rendered.label_map(labels)))
+        };
+        cameras.into_iter().map(&mut map).collect()
+    }
+}
+
+/// A view in a size.
+type Key = (String, Option<(u32, u32)>);
+
+fn key(prompt: &Prompt) -> Key {
+    (prompt.view.clone(), prompt.size)
+}

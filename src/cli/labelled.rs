@@ -1,0 +1,79 @@
+//! A model with the names of its labels: opened, and written after an edit.
+
+use super::{Context, open_model, stdout};
+use crate::Result;
+use crate::infer::catalogue::Catalogue;
+use crate::io::label_table::LabelTable;
+use crate::io::ply::write_gaussians;
+use crate::scene::Gaussians;
+use clap::Args;
+use serde_json::json;
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+
+/// Where names come from.
+#[derive(Args, Clone, Debug, Default)]
+pub struct TableArg {
+    /// Table with the names of labels; otherwise MODEL.labels.json beside the PLY, or labels.json of its run.
+    #[arg(long, value_name = "FILE")]
+    pub label_table: Option<PathBuf>,
+}
+
+impl TableArg {
+    /// The table of a model, if there is one.
+    pub fn open(&self, model: &Path) -> Result<Option<LabelTable>> {
+        let path = self.label_table.clone().or_else(|| LabelTable::find_for_model(model));
+        path.map(|path| LabelTable::read(&path)).transpose()
+    }
+}
+
+/// Opens a model and counts its labels.
+pub fn open(model: &Path, table: &TableArg) -> Result<(Gaussians, Catalogue)> {
+    let gaussians = open_model(model)?;
+    let known = Catalogue::new(&gaussians, table.open(model)?);
+    Ok((gaussians, known))
+}
+
+/// What an edit made.
+pub struct Edited<'a> {
+    /// File to write.
+    pub output: &'a Path,
+    /// The model.
+    pub model: &'a Gaussians,
+    /// The names of its labels, where the source has names.
+    pub table: Option<LabelTable>,
+    /// Gaussians of the source.
+    pub of: usize,
+    /// Labels that were chosen, or that the edit made.
+    pub labels: &'a BTreeSet<u32>,
+}
+
+impl Edited<'_> {
+    /// Writes model and table and prints what was written; `more` are further fields of the JSON.
+    pub fn finish(&self, print_json: bool, more: serde_json::Value) -> Result<()> {
+        let left_out = write_gaussians(self.output, self.model)?;
+        let beside = LabelTable::beside(self.output);
+        LabelTable::put(self.table.as_ref(), &beside)?;
+        let written = self.model.len() as u64 - left_out;
+        if print_json {
+            let mut result = json!({
+                "schema_version": 1,
+                "output": self.output.display().to_string(),
+                "label_table": self.table.as_ref().map(|_| beside.display().to_string()),
+                "labels": self.labels,
+                "gaussians": written,
+                "of": self.of,
+            });
+            if let (Some(result), serde_json::Value::Object(more)) = (result.as_object_mut(), more) {
+                result.extend(more);
+            }
+            return stdout::print_json(&result);
+        }
+        stdout::print(&format!("{}: {written} of {} Gaussians\n", self.output.display(), self.of))
+    }
+}
+
+/// True if JSON was asked for before or behind the verb.
+pub fn wants_json(context: &Context, here: &super::args::JsonFlag) -> bool {
+    context.json || here.json
+}

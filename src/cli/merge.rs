@@ -1,0 +1,65 @@
+//! `labelgs merge`.
+
+use super::Context;
+use super::args::JsonFlag;
+use super::labelled::{Edited, TableArg, open, wants_json};
+use super::values::{Picks, label, picks};
+use crate::infer::edit::relabel;
+use crate::infer::rename::{give_name, renumber};
+use crate::scene::UNLABELLED;
+use crate::{Error, Result};
+use clap::Args;
+use serde_json::json;
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::PathBuf;
+
+/// `labelgs merge`.
+#[derive(Args, Clone, Debug)]
+pub struct MergeArgs {
+    /// The model: a PLY, or the folder that `labelgs train` made.
+    #[arg(value_name = "MODEL")]
+    pub model: PathBuf,
+    /// The labels that become one, by id or by name, such as 3,5 or cup,saucer.
+    #[arg(long, value_name = "LABELS", value_parser = picks)]
+    pub labels: Picks,
+    /// Id of the result: one of them or a free one; otherwise the smallest of them.
+    #[arg(long, value_name = "ID", value_parser = label)]
+    pub into: Option<u32>,
+    /// Name of the result; otherwise that of the label whose id it has, or the first of the others.
+    #[arg(long, value_name = "NAME")]
+    pub name: Option<String>,
+    /// File to write; names of its labels go to OUT.labels.json beside it.
+    #[arg(short, long, value_name = "OUT.ply")]
+    pub output: PathBuf,
+    /// Names.
+    #[command(flatten)]
+    pub table: TableArg,
+    /// JSON.
+    #[command(flatten)]
+    pub json: JsonFlag,
+}
+
+/// Writes the model with one label in place of several.
+pub fn run(args: &MergeArgs, context: &Context) -> Result<()> {
+    let (model, known) = open(&args.model, &args.table)?;
+    let labels = known.resolve("--labels", &args.labels.0)?;
+    let smallest = labels.iter().copied().find(|&label| label != UNLABELLED);
+    let into = match args.into.or(smallest) {
+        Some(UNLABELLED) | None => return Err(Error::usage("--into", "0 is no label; relabel makes labels 0")),
+        Some(into) => into,
+    };
+    if known.gaussians.contains_key(&into) && !labels.contains(&into) {
+        let problem = format!("label {} is another one; list it in --labels too, or take a free id", known.title(into));
+        return Err(Error::usage("--into", problem));
+    }
+    let map: BTreeMap<u32, u32> = labels.iter().map(|&label| (label, into)).collect();
+    let merged = relabel(&model, &map);
+    let mut table = known.table.as_ref().map(|table| renumber(table, &map));
+    if let Some(name) = &args.name {
+        let ids = crate::infer::catalogue::Catalogue::new(&merged, None);
+        table = Some(give_name(&ids, table, into, name)?);
+    }
+    let labels = BTreeSet::from([into]);
+    let edited = Edited { output: &args.output, model: &merged, table, of: model.len(), labels: &labels };
+    edited.finish(wants_json(context, &args.json), json!({ "merged": map.keys().collect::<Vec<_>>() }))
+}

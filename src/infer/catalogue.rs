@@ -1,0 +1,99 @@
+//! The labels of a model by id and by name: what people type, and what they are told.
+
+use crate::io::label_table::LabelTable;
+use crate::scene::{Gaussians, UNLABELLED};
+use crate::{Error, Result};
+use std::collections::{BTreeMap, BTreeSet};
+
+/// Most labels that a message lists.
+const LISTED_MAX: usize = 24;
+
+/// Labels as one types them.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Pick {
+    /// All ids from the first to the last.
+    Ids(u32, u32),
+    /// The label of this name, whatever the case.
+    Name(String),
+}
+
+/// What is known about the labels of a model.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Catalogue {
+    /// Gaussians of each label that occurs, 0 included.
+    pub gaussians: BTreeMap<u32, u64>,
+    /// Names and pixels, where a table tells them.
+    pub table: Option<LabelTable>,
+}
+
+impl Catalogue {
+    /// Counts the labels of a model; one without labels is all 0.
+    pub fn new(model: &Gaussians, table: Option<LabelTable>) -> Self {
+        let mut gaussians = BTreeMap::new();
+        match &model.labels {
+            Some(labels) => labels.iter().for_each(|&label| *gaussians.entry(label).or_insert(0) += 1),
+            None if model.is_empty() => {}
+            None => drop(gaussians.insert(UNLABELLED, model.len() as u64)),
+        }
+        Self { gaussians, table }
+    }
+
+    /// The ids that `picks` mean, each of which occurs in the model; an error names `argument` and lists what there is.
+    pub fn resolve(&self, argument: &str, picks: &[Pick]) -> Result<BTreeSet<u32>> {
+        let mut ids = BTreeSet::new();
+        for pick in picks {
+            match pick {
+                Pick::Ids(first, last) => ids.extend(*first..=*last),
+                Pick::Name(name) => {
+                    let found = self.table.as_ref().and_then(|table| table.by_name(name));
+                    let unknown = || Error::usage(argument, format!("no label is named {name}; {}", self.there_is()));
+                    ids.insert(found.ok_or_else(unknown)?);
+                }
+            }
+        }
+        self.check(argument, &ids)?;
+        Ok(ids)
+    }
+
+    /// Refuses an empty choice and labels without a Gaussian.
+    pub fn check(&self, argument: &str, ids: &BTreeSet<u32>) -> Result<()> {
+        let unknown: Vec<String> =
+            ids.iter().filter(|id| !self.gaussians.contains_key(id)).map(|&id| self.title(id)).collect();
+        if ids.is_empty() {
+            return Err(Error::usage(argument, format!("names no label; {}", self.there_is())));
+        }
+        if !unknown.is_empty() {
+            let some = unknown.iter().take(LISTED_MAX).map(String::as_str).collect::<Vec<_>>().join(", ");
+            return Err(Error::usage(argument, format!("no Gaussian has label {some}; {}", self.there_is())));
+        }
+        Ok(())
+    }
+
+    /// Name of a label, if it has one.
+    pub fn name(&self, id: u32) -> Option<&str> {
+        self.table.as_ref()?.entry(id)?.name.as_deref()
+    }
+
+    /// Id and, where there is one, name: `3 cup`.
+    pub fn title(&self, id: u32) -> String {
+        self.name(id).map_or_else(|| id.to_string(), |name| format!("{id} {name}"))
+    }
+
+    /// "the model has 1 cup (80 Gaussians, 2400 px in the masks), 3 (5 Gaussians)", for messages.
+    pub fn there_is(&self) -> String {
+        let text = |(&id, &count): (&u32, &u64)| {
+            let pixels = self.table.as_ref().and_then(|table| table.entry(id)).map_or(0, |entry| entry.pixels);
+            let pixels = if pixels > 0 { format!(", {pixels} px in the masks") } else { String::new() };
+            format!("{} ({count} Gaussians{pixels})", self.title(id))
+        };
+        let objects = self.gaussians.iter().filter(|row| *row.0 != UNLABELLED);
+        let texts: Vec<String> = objects.clone().take(LISTED_MAX).map(text).collect();
+        if texts.is_empty() {
+            return "the model has no labelled Gaussian; train it with masks".to_owned();
+        }
+        let more = objects.count() - texts.len();
+        let more = if more > 0 { format!(" and {more} more, see labelgs list") } else { String::new() };
+        let zero = if self.gaussians.contains_key(&UNLABELLED) { ", and 0 for the unlabelled" } else { "" };
+        format!("the model has {}{more}{zero}", texts.join(", "))
+    }
+}

@@ -1,0 +1,124 @@
+//! Connected parts of a set of Gaussians.
+//!
+//! Two Gaussians are connected when their ellipsoids of [`REACH`] standard deviations, grown by half of a gap, meet.
+//! Whether two ellipsoids meet is asked with the contact function of Perram and Wertheim (1985).
+
+use crate::scene::Gaussians;
+use crate::{Error, Result};
+use glam::{DMat3, DQuat, DVec3};
+use kiddo::{ImmutableKdTree, SquaredEuclidean};
+use petgraph::unionfind::UnionFind;
+use std::collections::BTreeMap;
+
+/// Standard deviations from the centre to the border of an ellipsoid: an eighth of the opacity is left there.
+pub const REACH: f64 = 2.0;
+
+/// What counts as connected, and what as a speck.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Grouping {
+    /// Two ellipsoids that are at most this far apart are connected, world units; 0: they must touch.
+    pub gap: f64,
+    /// A part with a smaller share of the Gaussians is a speck, 0 to 1. The largest part never is.
+    pub min_share: f64,
+}
+
+impl Default for Grouping {
+    fn default() -> Self {
+        Self { gap: 0.0, min_share: 0.05 }
+    }
+}
+
+/// The parts of a set of rows; each sorted.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Parts {
+    /// Parts that are large enough, the largest first; parts of one size by their first row.
+    pub parts: Vec<Vec<usize>>,
+    /// The rows of all others.
+    pub specks: Vec<usize>,
+}
+
+/// Divides `rows` of a model into connected parts.
+pub fn components(model: &Gaussians, rows: &[usize], how: Grouping) -> Result<Parts> {
+    let bodies: Vec<Body> = rows.iter().map(|&row| Body::new(model, row, how.gap)).collect();
+    let mut groups: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
+    let joined = join(&bodies)?;
+    joined.into_iter().zip(rows).for_each(|(group, &row)| groups.entry(group).or_default().push(row));
+    let mut parts: Vec<Vec<usize>> = groups.into_values().collect();
+    parts.iter_mut().for_each(|part| part.sort_unstable());
+    parts.sort_by_key(|part| (std::cmp::Reverse(part.len()), part[0]));
+    let least = how.min_share * rows.len() as f64;
+    let large = parts.iter().enumerate().take_while(|(index, part)| *index == 0 || part.len() as f64 >= least).count();
+    let mut specks: Vec<usize> = parts.split_off(large).concat();
+    specks.sort_unstable();
+    Ok(Parts { parts, specks })
+}
+
+/// A representative of the group of each body.
+fn join(bodies: &[Body]) -> Result<Vec<usize>> {
+    let mut groups = UnionFind::new(bodies.len());
+    let centres: Vec<[f64; 3]> = bodies.iter().map(|body| body.centre.to_array()).collect();
+    if !centres.is_empty() {
+        let tree: ImmutableKdTree<f64, 3> = ImmutableKdTree::new_from_slice(&centres)
+            .map_err(|error| Error::Bug(format!("the k-d tree of the Gaussians failed: {error:?}")))?;
+        for (index, body) in bodies.iter().enumerate() {
+            // A pair is looked at from its larger body, so that a small one has few to look at.
+            let reach = (2.0 * body.radius).powi(2);
+            for found in tree.query(&centres[index]).within::<SquaredEuclidean<f64>>(reach).unsorted().execute() {
+                let other = found.item as usize;
+                let is_larger = (body.radius, index) > (bodies[other].radius, other);
+                if is_larger && !groups.equiv(index, other) && body.meets(&bodies[other]) {
+                    groups.union(index, other);
+                }
+            }
+        }
+    }
+    Ok(groups.into_labeling())
+}
+
+/// The ellipsoid of a Gaussian.
+struct Body {
+    centre: DVec3,
+    /// Longest half axis.
+    radius: f64,
+    /// Rotation times squared half axes times its inverse.
+    shape: DMat3,
+}
+
+impl Body {
+    fn new(model: &Gaussians, row: usize, gap: f64) -> Self {
+        // Never flat, so that sums of shapes can be inverted.
+        let axes = DVec3::from_array(model.scales[row].map(f64::from)).map(|scale| REACH * scale.exp() + gap / 2.0);
+        let axes = axes.clamp(DVec3::splat(axes.max_element() * 1e-6), DVec3::splat(1e100)).max(DVec3::splat(1e-100));
+        let [w, x, y, z] = model.quats[row].map(f64::from);
+        let turn = DMat3::from_quat(DQuat::from_xyzw(x, y, z, w).normalize());
+        Self {
+            centre: DVec3::from_array(model.means[row].map(f64::from)),
+            radius: axes.max_element(),
+            shape: turn * DMat3::from_diagonal(axes * axes) * turn.transpose(),
+        }
+    }
+
+    /// True if the two ellipsoids share a point: the largest of s (1 - s) d' ((1 - s) A + s B)^-1 d over s in 0 to 1 is
+    /// at most 1. The function is concave, so a search by thirds finds it.
+    fn meets(&self, other: &Self) -> bool {
+        let between = other.centre - self.centre;
+        if between.length() > self.radius + other.radius {
+            return false;
+        }
+        let contact = |s: f64| {
+            let mixed = self.shape * (1.0 - s) + other.shape * s;
+            s * (1.0 - s) * between.dot(mixed.inverse() * between)
+        };
+        let (mut low, mut high) = (0.0, 1.0);
+        // (2/3)^40 of the way is less than the error of an f32.
+        for _ in 0..40 {
+            let (a, b) = (low + (high - low) / 3.0, high - (high - low) / 3.0);
+            let (at_a, at_b) = (contact(a), contact(b));
+            if at_a.max(at_b) > 1.0 {
+                return false;
+            }
+            if at_a < at_b { low = a } else { high = b }
+        }
+        true
+    }
+}

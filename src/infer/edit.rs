@@ -1,0 +1,108 @@
+//! Models with other colours or other labels.
+
+use super::components::{Grouping, components};
+use crate::scene::gaussians::SH_C0;
+use crate::scene::labels::LABEL_MAX;
+use crate::scene::{Gaussians, UNLABELLED};
+use crate::{Error, Result};
+use std::collections::{BTreeMap, BTreeSet};
+
+/// What becomes of parts that are too small.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
+pub enum Specks {
+    /// They keep their label.
+    #[default]
+    Keep,
+    /// They lose their label.
+    Unlabel,
+    /// They are left out of the model.
+    Drop,
+}
+
+/// Label of each row; all 0 in a model without labels.
+fn labels_of(model: &Gaussians) -> Vec<u32> {
+    model.labels.clone().unwrap_or_else(|| vec![UNLABELLED; model.len()])
+}
+
+/// Mixes the colour (0 to 1) into the Gaussians of some labels: `mix` 1 replaces their colour in every direction, 0
+/// leaves it.
+pub fn recolour(model: &Gaussians, labels: &BTreeSet<u32>, colour: [f32; 3], mix: f32) -> Gaussians {
+    let mut out = model.clone();
+    let rest = model.rest_per_gaussian();
+    let target = colour.map(|value| ((f64::from(value) - 0.5) / SH_C0) as f32);
+    for (row, label) in labels_of(model).into_iter().enumerate() {
+        if labels.contains(&label) {
+            let old = model.sh0[row];
+            out.sh0[row] = [0, 1, 2].map(|c| old[c] * (1.0 - mix) + target[c] * mix);
+            out.sh_rest[row * rest..(row + 1) * rest].iter_mut().flatten().for_each(|value| *value *= 1.0 - mix);
+        }
+    }
+    out
+}
+
+/// Gives labels new ids, all at once; labels that the map does not name stay.
+pub fn relabel(model: &Gaussians, map: &BTreeMap<u32, u32>) -> Gaussians {
+    let labels = labels_of(model).iter().map(|label| *map.get(label).unwrap_or(label)).collect();
+    Gaussians { labels: Some(labels), ..model.clone() }
+}
+
+/// A model with its labels split into connected parts.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Split {
+    /// The model.
+    pub model: Gaussians,
+    /// For each label that was split, in order: the ids of its parts, the largest first, which keeps the old id.
+    pub ids: BTreeMap<u32, Vec<u32>>,
+    /// Gaussians in parts that were too small.
+    pub specks: u64,
+}
+
+/// Splits each of `labels` into connected parts. The largest part keeps the id, the others get the next ids that
+/// neither the model nor `taken` has.
+pub fn split_components(
+    model: &Gaussians,
+    labels: &BTreeSet<u32>,
+    taken: &BTreeSet<u32>,
+    how: Grouping,
+    specks: Specks,
+) -> Result<Split> {
+    let mut new = labels_of(model);
+    let old = new.clone();
+    let used: BTreeSet<u32> = taken.iter().copied().chain(old.iter().copied()).collect();
+    let last = used.last().copied().unwrap_or(UNLABELLED);
+    // Ids behind the last one, then gaps.
+    let mut free = (last + 1..=LABEL_MAX).chain((1..last).filter(|id| !used.contains(id)));
+    let (mut ids, mut small) = (BTreeMap::new(), BTreeSet::new());
+    for &label in labels {
+        let found = components(model, &rows_of(&old, label), how)?;
+        let mut own = vec![label];
+        for part in found.parts.iter().skip(1) {
+            let none = || Error::usage("--labels", format!("{} parts, and no id is free", found.parts.len()));
+            let id = free.next().ok_or_else(none)?;
+            part.iter().for_each(|&row| new[row] = id);
+            own.push(id);
+        }
+        ids.insert(label, own);
+        small.extend(found.specks);
+    }
+    if specks == Specks::Unlabel {
+        small.iter().for_each(|&row| new[row] = UNLABELLED);
+    }
+    let labelled = Gaussians { labels: Some(new), ..model.clone() };
+    let model = if specks == Specks::Drop { labelled.filtered(|row| !small.contains(&row)) } else { labelled };
+    Ok(Split { model, ids, specks: small.len() as u64 })
+}
+
+/// The model without the specks of its labels, each label for itself.
+pub fn without_specks(model: &Gaussians, how: Grouping) -> Result<Gaussians> {
+    let labels = labels_of(model);
+    let mut specks = BTreeSet::new();
+    for &label in &labels.iter().copied().collect::<BTreeSet<u32>>() {
+        specks.extend(components(model, &rows_of(&labels, label), how)?.specks);
+    }
+    Ok(model.filtered(|row| !specks.contains(&row)))
+}
+
+fn rows_of(labels: &[u32], label: u32) -> Vec<usize> {
+    (0..labels.len()).filter(|&row| labels[row] == label).collect()
+}

@@ -1,0 +1,66 @@
+//! Tables of labels that follow an edited model.
+
+use super::catalogue::Catalogue;
+use crate::io::label_table::{LabelEntry, LabelTable};
+use crate::scene::UNLABELLED;
+use crate::{Error, Result};
+use std::collections::{BTreeMap, BTreeSet};
+
+/// The entries whose id is wanted.
+pub fn keep(table: &LabelTable, wanted: impl Fn(u32) -> bool) -> LabelTable {
+    LabelTable::new(table.labels.iter().filter(|entry| wanted(entry.id)).cloned().collect())
+}
+
+/// The table after labels got new ids. Where several become one, the entry that had the id all along gives name and
+/// colour, else the first; pixels add up, and so that no mask counts twice, views are those of the label with most.
+pub fn renumber(table: &LabelTable, map: &BTreeMap<u32, u32>) -> LabelTable {
+    let mut groups: BTreeMap<u32, Vec<&LabelEntry>> = BTreeMap::new();
+    for entry in &table.labels {
+        groups.entry(*map.get(&entry.id).unwrap_or(&entry.id)).or_default().push(entry);
+    }
+    groups.remove(&UNLABELLED);
+    let merged = |(id, mut group): (u32, Vec<&LabelEntry>)| {
+        group.sort_by_key(|entry| (entry.id != id, entry.id));
+        LabelEntry {
+            id,
+            name: group.iter().find_map(|entry| entry.name.clone()),
+            colour: group[0].colour,
+            source: group.iter().find_map(|entry| entry.source.clone()),
+            pixels: group.iter().map(|entry| entry.pixels).sum(),
+            views: group.iter().map(|entry| entry.views).max().unwrap_or_default(),
+        }
+    };
+    LabelTable::new(groups.into_iter().map(merged).collect())
+}
+
+/// The table after a split: `NAME 2`, `NAME 3` and so on for the parts of a label that has a name.
+pub fn split(table: &LabelTable, ids: &BTreeMap<u32, Vec<u32>>) -> LabelTable {
+    let mut names: BTreeSet<String> = table.labels.iter().filter_map(|entry| entry.name.clone()).collect();
+    let mut labels = table.labels.clone();
+    for (&label, parts) in ids {
+        let name = table.entry(label).and_then(|entry| entry.name.clone());
+        let mut free = (2_u32..).filter_map(|number| {
+            let name = format!("{} {number}", name.as_deref()?);
+            names.insert(name.clone()).then_some(name)
+        });
+        for &id in &parts[1..] {
+            let name = if name.is_some() { free.next() } else { None };
+            labels.push(LabelEntry { name, ..LabelEntry::new(id) });
+        }
+    }
+    LabelTable::new(labels)
+}
+
+/// The table with a name for a label; a table is made where there is none. A name of another label is an error.
+pub fn give_name(known: &Catalogue, table: Option<LabelTable>, id: u32, name: &str) -> Result<LabelTable> {
+    let made = || known.gaussians.keys().filter(|&&id| id != UNLABELLED).map(|&id| LabelEntry::new(id)).collect();
+    let mut labels = table.map_or_else(made, |table| table.labels);
+    if let Some(other) = labels.iter().find(|entry| entry.id != id && entry.name.as_deref() == Some(name)) {
+        return Err(Error::usage("--name", format!("{name} is the name of label {}; names are unique", other.id)));
+    }
+    match labels.iter_mut().find(|entry| entry.id == id) {
+        Some(entry) => entry.name = Some(name.to_owned()),
+        None => labels.push(LabelEntry { name: Some(name.to_owned()), ..LabelEntry::new(id) }),
+    }
+    Ok(LabelTable::new(labels))
+}
