@@ -96,6 +96,9 @@ pub enum Command {
     /// Render a smooth video through the photos of a scene, for a tracker of objects.
     #[command(after_help = "Example: labelgs densify out --scene garden -o video")]
     Densify(DensifyArgs),
+    /// Train a scene in several ways and compare the scores in one table.
+    #[command(after_help = "Example: labelgs ablate garden --masks garden/masks -o ablation -- --iterations 3000")]
+    Ablate(Box<super::ablate::AblateArgs>),
     /// Make a posed test scene with masks, whole outlines and depth.
     #[command(after_help = "Example: labelgs synth scene && labelgs train scene --masks scene/masks -o out")]
     Synth(SynthArgs),

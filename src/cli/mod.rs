@@ -1,5 +1,6 @@
 //! The command line: what is typed, what is decided, and a verb per file.
 
+pub mod ablate;
 pub mod args;
 pub mod choose;
 pub mod config;
@@ -102,6 +103,7 @@ fn run(args: Vec<OsString>) -> Result<(), Exit> {
     interrupt::install()?;
     let context = Context { global: cli.global, json: cli.json };
     match cli.command {
+        Command::Ablate(args) => ablate::run(&args, &context),
         Command::Train(args) => train::run(&args, &context),
         Command::Render(args) => render::run(&args, &context),
         Command::Label(args) => label::run(&args, &context),

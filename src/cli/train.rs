@@ -20,8 +20,14 @@ use serde_json::json;
 use std::path::Path;
 use std::time::Instant;
 
-/// Trains a model.
+/// Trains a model and prints what came of it.
 pub fn run(args: &TrainArgs, context: &Context) -> Result<()> {
+    let (summary, sentence) = train(args, context)?;
+    if context.json || args.json.json { stdout::print_json(&summary) } else { stdout::print(&sentence) }
+}
+
+/// Trains a model; returns its metrics.json, and the same in a sentence.
+pub(super) fn train(args: &TrainArgs, context: &Context) -> Result<(serde_json::Value, String)> {
     let config = config::decide(args)?;
     let out = args.output.as_path();
     prepare_output(out)?;
@@ -90,10 +96,8 @@ pub fn run(args: &TrainArgs, context: &Context) -> Result<()> {
     if let Some(status) = stopped {
         return Err(Error::Interrupted(status));
     }
-    if context.json || args.json.json {
-        return stdout::print_json(&summary);
-    }
-    stdout::print(&sentence((trainer.steps_done(), gaussians, seconds), scores.as_ref(), &path))
+    let sentence = sentence((trainer.steps_done(), gaussians, seconds), scores.as_ref(), &path);
+    Ok((summary, sentence))
 }
 
 fn sentence((steps, gaussians, seconds): (u32, u32, f64), scores: Option<&Scores>, path: &Path) -> String {

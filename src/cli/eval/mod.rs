@@ -8,6 +8,7 @@ mod watch;
 
 pub use args::EvalArgs;
 pub use own::read_outline;
+pub(super) use own::score;
 
 use super::{Context, stdout};
 use crate::io::atomic;

@@ -6,14 +6,22 @@ use super::{EvalArgs, put_out};
 use crate::cli::scene::{near_plane, open_gpu, open_scene, pick_views, render_engine};
 use crate::cli::{Context, open_model};
 use crate::infer::evaluate::{Rendering, Wholes, evaluate, picture_count};
+use crate::infer::scores::Scores;
 use crate::io::image::read_rgba;
 use crate::io::mask::read_mask;
 use crate::scene::View;
 use crate::{Error, Result};
 use std::path::{Path, PathBuf};
 
-/// Scores a model.
+/// Scores a model and prints the scores.
 pub(super) fn run(args: &EvalArgs, context: &Context) -> Result<()> {
+    let scores = score(args, context)?;
+    put_out(&scores, &own_table(&scores), args, context)?;
+    scores.check(args.min_psnr, args.min_iou)
+}
+
+/// Scores a model.
+pub(in crate::cli) fn score(args: &EvalArgs, context: &Context) -> Result<Scores> {
     let model = open_model(&args.model)?;
     let dataset = open_scene(&args.scene, &args.reading, args.masks.clone(), args.background, true)?;
     let views = pick_views(&dataset, &args.views)?;
@@ -24,10 +32,8 @@ pub(super) fn run(args: &EvalArgs, context: &Context) -> Result<()> {
     let mut engine = render_engine(gpu, &model, sizes)?;
     let how = Rendering { near: near_plane(&args.model, args.near)?, background: args.background };
     let scores = evaluate(&mut engine, &model, &views, how, &wholes, &mut watcher)?;
-    let table = own_table(&scores);
-    watcher.finish(&table)?;
-    put_out(&scores, &table, args, context)?;
-    scores.check(args.min_psnr, args.min_iou)
+    watcher.finish(&own_table(&scores))?;
+    Ok(scores)
 }
 
 /// Folders with what is known about whole objects, `ID/NAME.png` in each.
