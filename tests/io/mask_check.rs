@@ -102,13 +102,19 @@ fn nearly_empty_masks_and_objects_are_found() {
     let empty: Vec<Finding> = found.into_iter().filter(|finding| finding.problem == Problem::NearlyEmpty).collect();
     assert_eq!(short(&empty), [(Problem::NearlyEmpty, Some("010.png"), None)]);
 
-    // Five masks of 400 px: an id with half of them, and in one a single pixel, of 0.5 % of 200.
-    let look =
-        |pixels: usize| Look::new(&map(20, 20, |index| if index < pixels { 4 } else { 5 }), &camera(20, 20), &[]);
-    let (usual, speck) = (look(201), look(1));
+    // Masks of 600 px with 400 of an id, but for one with a single pixel of it.
+    let id = |pixels: usize| {
+        move |index: usize| match index {
+            400.. => 5,
+            _ if index < pixels => 4,
+            _ => 0,
+        }
+    };
+    let look = |pixels: usize| Look::new(&map(30, 20, id(pixels)), &camera(30, 20), &[]);
+    let (usual, speck) = (look(400), look(1));
     let masks = [("a", &usual), ("b", &usual), ("c", &speck), ("d", &usual), ("e", &usual)];
     assert_eq!(short(&findings(&masks)), [(Problem::NearlyEmpty, Some("c"), Some(4))]);
-    let few = look(2);
+    let few = look(3);
     let masks = [("a", &usual), ("b", &usual), ("c", &few), ("d", &usual), ("e", &usual)];
     assert_eq!(findings(&masks), []);
 }
@@ -161,7 +167,8 @@ fn points_excuse_an_absence() {
     let blink = [(Problem::Blink, Some("b"), Some(3))];
     assert_eq!(short(&looks(&left(0, 5), &here, &points)), blink);
     assert_eq!(short(&looks(&left(0, 5), &here, &[])), blink, "without points there is no excuse");
-    assert_eq!(looks(&left(5, 5), &here, &points), [], "behind another object");
+    let covered = map(20, 20, |index| if (2..8).contains(&(index % 20)) || index % 20 >= 10 { 5 } else { 0 });
+    assert_eq!(looks(&covered, &here, &points), [], "behind another object");
     let away = Camera { translation: glam::DVec3::new(5.0, 0.0, 0.0), ..here.clone() };
     assert_eq!(looks(&left(0, 5), &away, &points), [], "out of the picture");
     let behind = Camera { translation: glam::DVec3::new(0.0, 0.0, -3.0), ..here.clone() };

@@ -3,7 +3,7 @@
 use super::open_photos;
 use crate::cli::args::JsonFlag;
 use crate::cli::{Context, stdout};
-use crate::io::masks::check::Finding;
+use crate::io::masks::check::{Finding, Problem};
 use crate::io::masks::{Report, inspect};
 use crate::{Error, Result};
 use clap::Args;
@@ -29,8 +29,8 @@ pub struct CheckArgs {
 pub fn run(args: &CheckArgs, context: &Context) -> Result<()> {
     let dataset = open_photos(&args.scene)?;
     let report = inspect(&dataset, &args.masks)?;
-    let mut counts: BTreeMap<&str, usize> = BTreeMap::new();
-    report.findings.iter().for_each(|finding| *counts.entry(finding.problem.text()).or_default() += 1);
+    let mut counts: BTreeMap<Problem, usize> = BTreeMap::new();
+    report.findings.iter().for_each(|finding| *counts.entry(finding.problem).or_default() += 1);
     if context.json || args.json.json {
         stdout::print_json(&json!({
             "schema_version": 1,
@@ -45,7 +45,7 @@ pub fn run(args: &CheckArgs, context: &Context) -> Result<()> {
     if report.findings.is_empty() {
         return Ok(());
     }
-    let counts: Vec<String> = counts.iter().map(|(problem, count)| format!("{count} {problem}")).collect();
+    let counts: Vec<String> = counts.iter().map(|(problem, count)| format!("{count} {}", problem.text())).collect();
     Err(Error::Check(format!("{}: {}", args.masks.display(), counts.join(", "))))
 }
 
