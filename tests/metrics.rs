@@ -6,7 +6,7 @@ use labelgs::infer::scores::{ObjectRender, Scores, ViewScores};
 use labelgs::infer::select::{extract, remove, summarise};
 use labelgs::infer::ssim::{ssim, ssim_map, window};
 use labelgs::scene::{Gaussians, LabelMap, Photo};
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 /// A repeatable number in 0 to 1.
 fn random(index: usize) -> f64 {
