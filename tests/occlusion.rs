@@ -131,16 +131,29 @@ fn a_vote_needs_the_margin_and_the_majority() {
     assert_eq!(found(&[1.0, 1.01]), nobody, "1 % is within the margin of 2 %");
     let (labels, mut depth) = strips(&[1.0, 1.01]);
     assert_eq!(by_contour(&labels, &depth, Rule { margin: 0.005, ..rule })[&2], [1]);
-    // One row of four is far in front: by the mean 1 hides 2, by the vote the other three rows say no.
-    depth[1] = 0.1;
+    // Of what takes sides, half is no majority.
+    let (labels, mut depth) = strips(&[1.0, 2.0]);
+    (2..4).for_each(|row| depth[row * 4..row * 4 + 4].copy_from_slice(&[2.0, 2.0, 1.0, 1.0]));
     assert_eq!(by_contour(&labels, &depth, rule), nobody);
-    let wide: Vec<f64> = depth.iter().map(|&z| f64::from(z)).collect();
-    assert_eq!(by_mean(&labels, &wide)[&2], [1]);
-    // Half is no majority.
+    // What touches takes no sides: two rows of four decide, against one at a higher majority they do not.
     let (labels, mut depth) = strips(&[1.0, 1.0]);
-    (0..2).for_each(|row| [depth[row * 4], depth[row * 4 + 1]] = [0.5; 2]);
-    let halves = by_contour(&labels, &depth, Rule { majority: 0.6, ..rule });
-    assert_eq!(halves, nobody, "the row beside the step sees both depths, so a little more than half agree");
+    (0..2).for_each(|row| depth[row * 4..row * 4 + 2].fill(0.5));
+    assert_eq!(by_contour(&labels, &depth, rule), lists(&[(1, &[]), (2, &[1])]));
+    depth[3 * 4 + 2..].fill(0.5);
+    assert_eq!(by_contour(&labels, &depth, rule), lists(&[(1, &[]), (2, &[1])]));
+    assert_eq!(by_contour(&labels, &depth, Rule { majority: 0.7, ..rule }), nobody);
+}
+
+#[test]
+fn a_few_pixels_decide_nothing() {
+    let rows = 40;
+    let labels = map(4, &[1, 1, 2, 2].repeat(rows));
+    let mut depth = vec![2.0; 4 * rows];
+    depth[1] = 0.1;
+    let wide: Vec<f64> = depth.iter().map(|&z| f64::from(z)).collect();
+    assert_eq!(by_mean(&labels, &wide)[&2], [1], "the mean has no choice");
+    assert!(by_contour(&labels, &depth, Rule::default()).values().all(Vec::is_empty));
+    assert_eq!(by_contour(&labels, &depth, Rule { least: 0.0, ..Rule::default() })[&2], [1]);
 }
 
 #[test]
@@ -157,22 +170,28 @@ fn holes_have_no_vote() {
     assert!(by_contour(&labels, &depth, Rule::default()).values().all(Vec::is_empty));
 }
 
+/// Wall 3 around table 2 around cup 1, the table's depth that at its outer and at its inner contour.
+fn nested(wall: f32, table: (f32, f32), cup: f32) -> Occluders {
+    let ring = |i: usize| (i % 9).min(8 - i % 9).min((i / 9).min(8 - i / 9));
+    let labels: Vec<u16> = (0..81).map(|i| [3, 2, 2, 1, 1][ring(i)]).collect();
+    let depth: Vec<f32> = (0..81).map(|i| [wall, table.0, table.1, cup, cup][ring(i)]).collect();
+    by_contour(&map(9, &labels), &depth, Rule::default())
+}
+
 #[test]
 fn occluders_come_in_chains() {
-    let found = |depths: &[f32]| {
-        let (labels, depth) = strips(depths);
-        by_contour(&labels, &depth, Rule::default())
-    };
-    // 4 goes on behind 3, which goes on behind 2, and so on.
-    assert_eq!(found(&[1.0, 2.0, 3.0, 4.0]), lists(&[(1, &[]), (2, &[1]), (3, &[1, 2]), (4, &[1, 2, 3])]));
+    // The wall goes on behind the table, which goes on behind the cup.
+    assert_eq!(nested(3.0, (2.0, 2.0), 1.0), lists(&[(1, &[]), (2, &[1]), (3, &[1, 2])]));
+    // The table goes back to 5, and the cup on it stands behind the wall: it cannot hide it.
+    assert_eq!(nested(3.0, (2.0, 5.0), 4.0), lists(&[(1, &[]), (2, &[1]), (3, &[2])]));
+    // A chain must not leave the object: of strips, each is hidden by its neighbour alone.
+    let (labels, depth) = strips(&[1.0, 2.0, 3.0, 4.0]);
+    let found = by_contour(&labels, &depth, Rule::default());
+    assert_eq!(found, lists(&[(1, &[]), (2, &[1]), (3, &[2]), (4, &[3])]));
     // 2 is in front of both neighbours; they do not hide each other.
-    assert_eq!(found(&[3.0, 1.0, 4.0]), lists(&[(1, &[2]), (2, &[]), (3, &[2])]));
-    // A chain ends at what is not nearer than the object where it goes under: 2 rises from 1.0 at 3 to 9.0 at 1, and 1
-    // hides it there, but at 8.0 it is behind 3.
-    let labels = map(6, &[1, 1, 2, 2, 3, 3].repeat(4));
-    let depth: Vec<f32> = [8.0, 8.0, 9.0, 1.0, 5.0, 5.0].repeat(4);
-    assert_eq!(by_contour(&labels, &depth, Rule::default()), lists(&[(1, &[]), (2, &[1]), (3, &[2])]));
-    // A ring in which each hides the next: no object hides itself, and none that it hides.
+    let (labels, depth) = strips(&[3.0, 1.0, 4.0]);
+    assert_eq!(by_contour(&labels, &depth, Rule::default()), lists(&[(1, &[2]), (2, &[]), (3, &[2])]));
+    // 1 and 2 hide each other's neighbour in a ring; nothing may come to hide itself.
     let labels = map(4, &[1, 1, 2, 2, 1, 1, 2, 2, 1, 3, 3, 2, 3, 3, 3, 3]);
     let depth = [5.0, 5.0, 1.0, 1.0, 5.0, 5.0, 1.0, 1.0, 3.0, 4.0, 0.5, 3.0, 4.0, 4.0, 4.0, 4.0];
     for (label, by) in by_contour(&labels, &depth, Rule::default()) {
@@ -196,8 +215,7 @@ fn the_vote_finds_what_hides_in_a_known_scene() {
             }
         }
         let shown = labels.objects();
-        // A few pixels at a silhouette are a matter of rounding.
-        hidden.retain(|&(label, other), &mut pixels| label != other && pixels >= 12 && shown.contains(&label));
+        hidden.retain(|&(label, other), _| label != other && shown.contains(&label));
         let pairs = |found: &Occluders| -> BTreeSet<(u16, u16)> {
             found.iter().flat_map(|(&label, by)| by.iter().map(move |&other| (label, other))).collect()
         };
@@ -211,10 +229,11 @@ fn the_vote_finds_what_hides_in_a_known_scene() {
         mean_pairs += mean.len();
         true_pairs += truth.len();
     }
-    eprintln!("true {true_pairs}; vote {found_pairs}, right {both}; mean {mean_pairs}, right {mean_both}");
-    let precision = |right: usize, found: usize| right as f64 / found as f64;
-    assert!(both as f64 >= 0.8 * true_pairs as f64, "{both} of {true_pairs} are found");
-    assert!(precision(both, found_pairs) > precision(mean_both, mean_pairs), "{both}/{found_pairs}");
+    // 94 of 100, against 94 of 101 by the mean, of 107. Those that are missed hide without touching or by a pixel or two.
+    let all =
+        format!("{both} of {found_pairs} are right, by the mean {mean_both} of {mean_pairs}; {true_pairs} are true");
+    assert!(both as f64 >= 0.85 * true_pairs as f64 && both as f64 >= 0.92 * found_pairs as f64, "{all}");
+    assert!(both * mean_pairs >= mean_both * found_pairs, "{all}");
 }
 
 #[test]

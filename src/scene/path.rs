@@ -29,7 +29,9 @@ impl Places {
         let centres: Vec<DVec3> = cameras.iter().map(|camera| camera.centre()).collect();
         let mean = centres.iter().sum::<DVec3>() / centres.len().max(1) as f64;
         let radius = centres.iter().map(|centre| centre.distance(mean)).fold(0.0, f64::max);
-        let unit = if radius > 0.0 { radius } else { 1.0 };
+        // Centres come from poses by arithmetic: cameras that only turn are a rounding apart, which is no radius.
+        let far = centres.iter().map(|centre| centre.length()).fold(0.0, f64::max);
+        let unit = if radius > 1e-9 * far { radius } else { far.max(1.0) };
         let rotations = cameras.iter().map(|camera| DQuat::from_mat3(&camera.rotation).normalize()).collect();
         Self { centres: centres.iter().map(|centre| *centre / unit).collect(), rotations }
     }

@@ -1,5 +1,6 @@
 //! Occluders from depth that means the same everywhere: a vote of the contour's pixels, and chains of occluders.
 
+use super::hull::Outline;
 use super::walk;
 use crate::scene::{LabelMap, Occluders};
 use std::collections::BTreeMap;
@@ -10,14 +11,16 @@ pub struct Rule {
     /// Relative difference of depth at which a pixel takes sides. 0.02: a floor seen at 15 degrees in a picture of 320 px
     /// changes by 1 % from one pixel to the next, and is not in front of what stands on it.
     pub margin: f64,
-    /// Share of the pixels that must agree, at least 0.5. 0.5: something that stands on another thing touches it along
-    /// one side and is in front of it along the others.
+    /// Share of the pixels that take sides which must agree, at least 0.5. 0.5: something that stands on another thing is
+    /// in front of it along most of its contour, and along the rest, where the two touch, no pixel takes sides.
     pub majority: f64,
+    /// Share of all pixels of the contour that must agree. 0.1: less is noise of a few pixels.
+    pub least: f64,
 }
 
 impl Default for Rule {
     fn default() -> Self {
-        Self { margin: 0.02, majority: 0.5 }
+        Self { margin: 0.02, majority: 0.5, least: 0.1 }
     }
 }
 
@@ -40,31 +43,38 @@ impl Side {
     }
 }
 
+type Sides = BTreeMap<(u16, u16), Side>;
+
 /// Occluders of each object. `depth` is z per pixel, smaller is nearer; what is not finite or not positive is none.
 ///
-/// k' hides k directly if they touch and more than `majority` of the pixels on both sides of their contour find k'
-/// nearer by `margin`; each compares its own depth with the mean of its neighbours across.
+/// k' hides k directly if they touch and the pixels on both sides of their contour vote for it by `rule`; each compares
+/// its own depth with the mean of its neighbours across.
 ///
 /// k' hides k through a chain k, a, .., k' in which each hides the one before directly: k goes on behind a, and where k'
-/// covers a nothing says that k ends there, so that its pixels cannot say that k is absent. A link counts only if its
-/// object is nearer, by the margin and along its contour towards the link before, than k is where it goes under a; and
-/// only if k does not hide the object. So a chain cannot come round behind k.
+/// covers a nothing says that k ends there, so that its pixels cannot say that k is absent. Each further link must
+/// * lie within k: the mean of its pixels is in the convex hull of those of k, because what is interrupted goes on
+///   between its visible parts, and without this nearly everything in a crowd would hide everything;
+/// * be nearer by the margin, along its contour towards the link before, than k is where it goes under a;
+/// * not be hidden by k directly.
 pub fn by_contour(labels: &LabelMap, depth: &[f32], rule: Rule) -> Occluders {
     let sides = sides(labels, depth, rule.margin);
     let mut direct: Occluders = labels.objects().into_iter().map(|label| (label, Vec::new())).collect();
     for (&(label, other), own) in &sides {
         let Some(theirs) = sides.get(&(other, label)) else { continue };
-        let (agree, votes) = (own.other_nearer + theirs.self_nearer, own.votes + theirs.votes);
-        if agree as f64 > rule.majority * votes as f64 {
+        let (agree, against) = (own.other_nearer + theirs.self_nearer, own.self_nearer + theirs.other_nearer);
+        let enough = agree as f64 >= rule.least * (own.votes + theirs.votes) as f64;
+        if enough && agree as f64 > rule.majority * (agree + against) as f64 {
             direct.entry(label).or_default().push(other);
         }
     }
-    direct.keys().map(|&label| (label, with_chains(label, &direct, &sides, rule.margin))).collect()
+    let outlines = Outline::of_all(labels);
+    let chains = Chains { direct: &direct, sides: &sides, outlines: &outlines, margin: rule.margin };
+    direct.keys().map(|&label| (label, chains.occluders(label))).collect()
 }
 
-fn sides(labels: &LabelMap, depth: &[f32], margin: f64) -> BTreeMap<(u16, u16), Side> {
+fn sides(labels: &LabelMap, depth: &[f32], margin: f64) -> Sides {
     let known = |pixel: usize| Some(f64::from(depth[pixel])).filter(|z| z.is_finite() && *z > 0.0);
-    let mut sides: BTreeMap<(u16, u16), Side> = BTreeMap::new();
+    let mut sides = Sides::new();
     walk(labels, |own, other, pixel, neighbours| {
         let (sum, count) =
             neighbours.iter().filter_map(|&at| known(at)).fold((0.0, 0_u32), |(sum, count), z| (sum + z, count + 1));
@@ -79,24 +89,48 @@ fn sides(labels: &LabelMap, depth: &[f32], margin: f64) -> BTreeMap<(u16, u16), 
     sides
 }
 
-/// The direct occluders of `label` and those at the end of a chain, sorted.
-fn with_chains(label: u16, direct: &Occluders, sides: &BTreeMap<(u16, u16), Side>, margin: f64) -> Vec<u16> {
-    let mean = |own: u16, other: u16| sides.get(&(own, other)).map(Side::mean_depth);
-    let hidden_by = |label: u16| direct.get(&label).map(Vec::as_slice).unwrap_or_default();
-    // For each occluder the largest depth at which `label` goes under the first link of a chain to it.
-    let mut reached: BTreeMap<u16, f64> = BTreeMap::new();
-    let first = hidden_by(label).iter().filter_map(|&other| Some((other, mean(label, other)?)));
-    let mut open: Vec<(u16, f64)> = first.collect();
-    while let Some((link, goes_under)) = open.pop() {
-        if reached.get(&link).is_some_and(|&before| before >= goes_under) {
-            continue;
-        }
-        reached.insert(link, goes_under);
-        let next = hidden_by(link).iter().copied().filter(|&next| {
-            let nearer = mean(next, link).is_some_and(|z| z < goes_under * (1.0 - margin));
-            next != label && nearer && !hidden_by(next).contains(&label)
-        });
-        open.extend(next.map(|next| (next, goes_under)));
+/// What chains are followed with.
+struct Chains<'a> {
+    direct: &'a Occluders,
+    sides: &'a Sides,
+    outlines: &'a BTreeMap<u16, Outline>,
+    margin: f64,
+}
+
+impl Chains<'_> {
+    fn hidden_by(&self, label: u16) -> &[u16] {
+        self.direct.get(&label).map(Vec::as_slice).unwrap_or_default()
     }
-    reached.into_keys().collect()
+
+    fn mean_depth(&self, own: u16, other: u16) -> Option<f64> {
+        self.sides.get(&(own, other)).map(Side::mean_depth)
+    }
+
+    fn within(&self, inner: u16, outer: u16) -> bool {
+        match (self.outlines.get(&inner), self.outlines.get(&outer)) {
+            (Some(inner), Some(outer)) => outer.contains(inner.mean()),
+            _ => false,
+        }
+    }
+
+    /// The direct occluders of `label` and those at the end of a chain, sorted.
+    fn occluders(&self, label: u16) -> Vec<u16> {
+        // For each occluder the largest depth at which `label` goes under the first link of a chain to it.
+        let mut reached: BTreeMap<u16, f64> = BTreeMap::new();
+        let first = self.hidden_by(label).iter();
+        let mut open: Vec<(u16, f64)> =
+            first.filter_map(|&other| Some((other, self.mean_depth(label, other)?))).collect();
+        while let Some((link, goes_under)) = open.pop() {
+            if reached.get(&link).is_some_and(|&before| before >= goes_under) {
+                continue;
+            }
+            reached.insert(link, goes_under);
+            let next = self.hidden_by(link).iter().copied().filter(|&next| {
+                let nearer = self.mean_depth(next, link).is_some_and(|z| z < goes_under * (1.0 - self.margin));
+                next != label && nearer && !self.hidden_by(next).contains(&label) && self.within(next, label)
+            });
+            open.extend(next.map(|next| (next, goes_under)));
+        }
+        reached.into_keys().collect()
+    }
 }

@@ -6,6 +6,7 @@
 
 mod contour;
 mod draw;
+mod hull;
 mod mean;
 
 pub use contour::{Rule, by_contour};
