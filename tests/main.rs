@@ -10,6 +10,7 @@ mod associate;
 mod cli;
 mod cli_edit;
 mod cli_engine;
+mod cli_labels;
 mod cli_masks;
 mod compare_self;
 mod config;

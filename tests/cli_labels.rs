@@ -1,0 +1,103 @@
+//! The verbs around labels, from a trained model to repaired masks, on a small scene.
+
+use crate::support;
+use assert_cmd::Command;
+use labelgs::io::mask::read_mask;
+use labelgs::io::ply::read_gaussians;
+use serde_json::Value;
+use std::path::Path;
+
+#[track_caller]
+fn labelgs(args: &[&str], status: i32) -> String {
+    let mut command = Command::cargo_bin("labelgs").expect("the tool is built");
+    let output = command.env("LABELGS_VALIDATION", "off").args(args).output().expect("it runs");
+    let (out, err) = (String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
+    assert_eq!(output.status.code(), Some(status), "{args:?}: {err}");
+    if status == 0 { out.into_owned() } else { err.into_owned() }
+}
+
+#[track_caller]
+fn json(text: &str) -> Value {
+    serde_json::from_str(text).unwrap_or_else(|error| panic!("{error}: {text}"))
+}
+
+/// Pixels of each id in a mask.
+fn areas(mask: &Path) -> std::collections::BTreeMap<u16, usize> {
+    let mut areas = std::collections::BTreeMap::new();
+    read_mask(mask).expect("mask").ids.iter().for_each(|&id| *areas.entry(id).or_default() += 1);
+    areas
+}
+
+#[test]
+fn a_model_without_labels_gets_them_and_mends_masks() {
+    let Some(_turn) = support::device() else { return };
+    let folder = tempfile::tempdir().expect("folder");
+    let path = |name: &str| folder.path().join(name).to_string_lossy().into_owned();
+    let (scene, masks, plain, model) = (path("scene"), path("scene/masks"), path("plain"), path("labelled.ply"));
+    labelgs(&["synth", &scene, "--preset", "simple", "--size", "96x72", "--views", "12", "--points", "1500", "-q"], 0);
+    labelgs(&["train", &scene, "--iterations", "250", "--preview-every", "0", "-o", &plain, "-q"], 0);
+
+    let found = json(&labelgs(&["label", &plain, "--scene", &scene, "--masks", &masks, "-o", &model, "--json", "-q"], 0));
+    assert_eq!(found["schema_version"], 1);
+    let read = read_gaussians(&model).expect("model").gaussians;
+    let confidence = read.label_confidence.expect("votes tell how sure they are");
+    assert!(confidence.iter().all(|share| (0.0..=1.0).contains(share)));
+    let labels: std::collections::BTreeSet<u32> = read.labels.expect("labels").into_iter().collect();
+    assert_eq!(labels, [0, 1, 2, 3].into());
+    let scores = json(&labelgs(&["eval", &model, "--scene", &scene, "--masks", &masks, "--json", "-q"], 0));
+    let iou = scores["mean"]["iou_map"].as_f64().expect("a score");
+    assert!(iou > 0.8, "{iou} after a short training");
+    // The paper's rule on the same model labels less.
+    let main = path("main.ply");
+    let rule = ["label", &plain, "--scene", &scene, "--masks", &masks, "--rule", "main", "-o", &main, "-q"];
+    labelgs(&rule, 0);
+    let of_rule = read_gaussians(&main).expect("model").gaussians.labels.expect("labels");
+    let count = |labels: &[u32]| labels.iter().filter(|&&label| label != 0).count();
+    let votes = read_gaussians(&model).expect("model").gaussians.labels.expect("labels");
+    assert!(count(&of_rule) < count(&votes) && count(&of_rule) > 0);
+
+    // Ids of their own in every view, then made to agree again.
+    let (spoilt, mended) = (path("spoilt"), path("mended"));
+    labelgs(&["masks", "spoil", &masks, "--fault", "per-view", "-o", &spoilt, "-q"], 0);
+    let repair = ["masks", "repair", &spoilt, "--per-view", "--model", &plain, "--scene", &scene, "-o", &mended, "--json"];
+    let report = json(&labelgs(&repair, 0));
+    assert_eq!(report["objects"], serde_json::json!([1, 2, 3]), "{report}");
+    let mut wrong = 0;
+    for view in (0..12).filter(|view| view % 8 != 0) {
+        let name = format!("{view:03}.png");
+        let (truth, ours) = (areas(&Path::new(&masks).join(&name)), areas(&Path::new(&mended).join(&name)));
+        // Objects are numbered by size, so areas are compared.
+        let sorted = |areas: &std::collections::BTreeMap<u16, usize>| {
+            let mut sizes: Vec<usize> = areas.iter().filter(|(id, _)| **id != 0).map(|(_, &size)| size).collect();
+            sizes.sort_unstable();
+            sizes
+        };
+        wrong += usize::from(sorted(&truth) != sorted(&ours));
+    }
+    assert!(wrong <= 2, "{wrong} masks changed their outlines");
+    let again = labelgs(&repair, 2);
+    assert!(again.contains("is not empty"), "{again}");
+}
+
+#[test]
+fn an_ablation_compares_variants() {
+    let Some(_turn) = support::device() else { return };
+    let folder = tempfile::tempdir().expect("folder");
+    let path = |name: &str| folder.path().join(name).to_string_lossy().into_owned();
+    let (scene, masks, out) = (path("scene"), path("scene/masks"), path("out"));
+    labelgs(&["synth", &scene, "--preset", "simple", "--size", "64x48", "--views", "9", "--points", "500", "-q"], 0);
+    let common = ["--", "--iterations", "40", "--label-from", "10", "--preview-every", "0"];
+    let mut args = vec!["ablate", &scene, "--masks", &masks, "-o", &out, "--rows", "no-labels,ours", "-q"];
+    args.extend(["--row", "half=--label-weight 0.5"]);
+    args.extend(common);
+    let table = labelgs(&args, 0);
+    for part in ["no-labels", "ours", "half", "iou_hidden", "quoted from the paper", "0.925 / 34.26"] {
+        assert!(table.contains(part), "{part} is not in\n{table}");
+    }
+    let record = json(&std::fs::read_to_string(Path::new(&out).join("ablation.json")).expect("record"));
+    let rows = record["rows"].as_array().expect("rows");
+    assert_eq!(rows.len(), 3);
+    assert!(rows.iter().all(|row| row["runs"][0]["scores"]["psnr"].as_f64() > Some(5.0)), "{record}");
+    let wrong = labelgs(&["ablate", &scene, "--masks", &masks, "-o", &out, "--row", "x=--no-such-flag 1"], 2);
+    assert!(wrong.contains("x: ") && wrong.contains("--no-such-flag"), "{wrong}");
+}
