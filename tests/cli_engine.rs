@@ -188,6 +188,8 @@ fn from_a_scene_to_objects_and_pictures() {
     let labels: Vec<u64> =
         listed["labels"].as_array().expect("rows").iter().filter_map(|row| row["label"].as_u64()).collect();
     assert!(labels.contains(&2) && listed["gaussians"] == trained["gaussians"], "{listed}");
+    let named = listed["labels"].as_array().expect("rows").iter().find(|row| row["label"] == 2);
+    assert_eq!(named.expect("label 2")["name"], "ball", "the run has the names of its masks");
 
     let scores = json(&succeeds(&["eval", &out, "--scene", &scene, "--masks", &masks, "--json"]));
     assert!(scores["mean"]["psnr"].as_f64() > Some(12.0), "{scores}");
