@@ -129,7 +129,7 @@ fn a_vote_needs_the_margin_and_the_majority() {
     assert_eq!(found(&[1.0, 1.1]), lists(&[(1, &[]), (2, &[1])]));
     assert_eq!(found(&[1.1, 1.0]), lists(&[(1, &[2]), (2, &[])]));
     assert_eq!(found(&[1.0, 1.01]), nobody, "1 % is within the margin of 2 %");
-    let (labels, mut depth) = strips(&[1.0, 1.01]);
+    let (labels, depth) = strips(&[1.0, 1.01]);
     assert_eq!(by_contour(&labels, &depth, Rule { margin: 0.005, ..rule })[&2], [1]);
     // Of what takes sides, half is no majority.
     let (labels, mut depth) = strips(&[1.0, 2.0]);
