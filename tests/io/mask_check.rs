@@ -9,19 +9,27 @@ use labelgs::scene::{Camera, Dataset, LabelMap, Point};
 use labelgs::synth::{self, SynthOptions};
 use std::fs;
 use std::path::Path;
+use std::sync::LazyLock;
 use tempfile::TempDir;
 
 const WIDTH: u32 = 96;
 const HEIGHT: u32 = 72;
 
 /// A made scene of 24 views with masks by a ray tracer.
-fn made() -> (TempDir, Dataset) {
-    let folder = tempfile::tempdir().expect("folder");
+static MADE: LazyLock<Dataset> = LazyLock::new(|| {
     let options = SynthOptions { width: WIDTH, height: HEIGHT, views: 24, points: 800, ..SynthOptions::default() };
-    synth::write(&options, folder.path(), &|_| Ok(())).expect("written");
-    let load = LoadOptions { photos: false, test_every: None, ..LoadOptions::default() };
-    let dataset = io::open(folder.path(), &load).expect("a scene");
-    (folder, dataset)
+    synth::dataset(&options, 0)
+});
+
+/// The scene, and a folder with its masks in `masks`.
+fn made() -> (TempDir, &'static Dataset) {
+    let folder = tempfile::tempdir().expect("folder");
+    for view in MADE.all() {
+        let map = view.mask.as_ref().expect("a mask");
+        let ids: Vec<u8> = map.ids.iter().map(|&id| id as u8).collect();
+        write_png_grey8(folder.path().join("masks").join(&view.name), map.width, map.height, &ids).expect("written");
+    }
+    (folder, &MADE)
 }
 
 fn report(folder: &TempDir, dataset: &Dataset) -> Report {
@@ -43,7 +51,7 @@ fn short(findings: &[Finding]) -> Vec<(Problem, Option<&str>, Option<u32>)> {
 #[test]
 fn clean_masks_give_nothing() {
     let (folder, dataset) = made();
-    let report = report(&folder, &dataset);
+    let report = report(&folder, dataset);
     assert_eq!(report.findings, []);
     assert_eq!((report.photos, report.masks, report.ids), (24, 24, (1..=8).collect::<Vec<u32>>()));
 }
@@ -61,7 +69,7 @@ fn files_that_do_not_fit_their_photos_are_found() {
     png(&masks.join("008.png"), (WIDTH, HEIGHT), png::ColorType::Rgb, png::BitDepth::Eight, &vec![1; 3 * 96 * 72]);
     fs::write(masks.join("009.jpg"), "text").expect("written");
     fs::write(masks.join("labels.json"), "belongs here").expect("written");
-    let report = report(&folder, &dataset);
+    let report = report(&folder, dataset);
     let files = report.findings.iter().filter(|finding| finding.problem <= Problem::Unreadable);
     let files: Vec<Finding> = files.cloned().collect();
     let expected = [
@@ -82,14 +90,14 @@ fn files_that_do_not_fit_their_photos_are_found() {
 fn a_mask_with_object_and_surroundings_swapped_is_found() {
     let (folder, dataset) = made();
     edit(&folder, "004.png", |_, id| if id == 2 { 0 } else { 2 });
-    let found = report(&folder, &dataset).findings;
+    let found = report(&folder, dataset).findings;
     let inverted: Vec<Finding> = found.into_iter().filter(|finding| finding.problem == Problem::Inverted).collect();
     assert_eq!(short(&inverted), [(Problem::Inverted, Some("004.png"), Some(2))]);
     // A single object, swapped everywhere.
     for view in dataset.all() {
         edit(&folder, &view.name, |_, id| u16::from(id != 1));
     }
-    let found = report(&folder, &dataset).findings;
+    let found = report(&folder, dataset).findings;
     assert_eq!(found.len(), 24, "{found:?}");
     assert!(found.iter().all(|finding| finding.problem == Problem::Inverted && finding.id == Some(1)), "{found:?}");
 }
@@ -98,7 +106,7 @@ fn a_mask_with_object_and_surroundings_swapped_is_found() {
 fn nearly_empty_masks_and_objects_are_found() {
     let (folder, dataset) = made();
     edit(&folder, "010.png", |_, _| 0);
-    let found = report(&folder, &dataset).findings;
+    let found = report(&folder, dataset).findings;
     let empty: Vec<Finding> = found.into_iter().filter(|finding| finding.problem == Problem::NearlyEmpty).collect();
     assert_eq!(short(&empty), [(Problem::NearlyEmpty, Some("010.png"), None)]);
 
@@ -123,7 +131,7 @@ fn nearly_empty_masks_and_objects_are_found() {
 fn an_id_in_one_view_is_found() {
     let (folder, dataset) = made();
     edit(&folder, "012.png", |index, id| if index < 300 { 200 } else { id });
-    assert_eq!(short(&report(&folder, &dataset).findings), [(Problem::SingleView, Some("012.png"), Some(200))]);
+    assert_eq!(short(&report(&folder, dataset).findings), [(Problem::SingleView, Some("012.png"), Some(200))]);
 }
 
 #[test]
@@ -137,7 +145,7 @@ fn an_id_that_is_lost_for_one_view_is_found() {
     };
     let id = (1..=8).find(|&id| shown(id)).expect("an object in all three views");
     edit(&folder, "014.png", |_, found| if found == id { 0 } else { found });
-    let found = report(&folder, &dataset).findings;
+    let found = report(&folder, dataset).findings;
     assert_eq!(short(&found), [(Problem::Blink, Some("014.png"), Some(u32::from(id)))]);
     assert!(found[0].text.contains("013.png and 015.png"), "{found:?}");
 }
