@@ -111,7 +111,7 @@ fn every_flag_of_train_changes_its_field() {
         ("--gpf", "off"),
         ("--label-samples", "4"),
         ("--label-weight", "0.5"),
-        ("--label-balance", "off"),
+        ("--label-balance", "on"),
         ("--label-alpha", "0.2"),
         ("--occlusion", "none"),
         ("--occlusion-every", "10"),

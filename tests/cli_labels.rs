@@ -37,7 +37,8 @@ fn a_model_without_labels_gets_them_and_mends_masks() {
     labelgs(&["synth", &scene, "--preset", "simple", "--size", "96x72", "--views", "12", "--points", "1500", "-q"], 0);
     labelgs(&["train", &scene, "--iterations", "250", "--preview-every", "0", "-o", &plain, "-q"], 0);
 
-    let found = json(&labelgs(&["label", &plain, "--scene", &scene, "--masks", &masks, "-o", &model, "--json", "-q"], 0));
+    let found =
+        json(&labelgs(&["label", &plain, "--scene", &scene, "--masks", &masks, "-o", &model, "--json", "-q"], 0));
     assert_eq!(found["schema_version"], 1);
     let read = read_gaussians(&model).expect("model").gaussians;
     let confidence = read.label_confidence.expect("votes tell how sure they are");
@@ -59,7 +60,8 @@ fn a_model_without_labels_gets_them_and_mends_masks() {
     // Ids of their own in every view, then made to agree again.
     let (spoilt, mended) = (path("spoilt"), path("mended"));
     labelgs(&["masks", "spoil", &masks, "--fault", "per-view", "-o", &spoilt, "-q"], 0);
-    let repair = ["masks", "repair", &spoilt, "--per-view", "--model", &plain, "--scene", &scene, "-o", &mended, "--json"];
+    let repair =
+        ["masks", "repair", &spoilt, "--per-view", "--model", &plain, "--scene", &scene, "-o", &mended, "--json"];
     let report = json(&labelgs(&repair, 0));
     assert_eq!(report["objects"], serde_json::json!([1, 2, 3]), "{report}");
     let mut wrong = 0;

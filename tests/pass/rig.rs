@@ -121,6 +121,10 @@ impl Rig {
             background: scene.target.background.map(|v| v as f32),
             sh_degree: scene.gaussians.sh_degree,
             label_rule: LabelRule::Main,
+            // What the mirrors' rules have.
+            label_weight: 1.0,
+            label_alpha: 0.1,
+            label_balance: true,
             ..TrainConfig::default()
         };
         let layers =
