@@ -29,7 +29,7 @@ pub struct TrainView {
     pub mask: Option<LabelMap>,
     /// Objects of the mask, sorted.
     pub objects: Vec<u16>,
-    /// The mask as the device reads it.
+    /// The mask as the device reads it; empty without a mask.
     pub view_labels: Vec<u32>,
     /// What each object shows of itself.
     pub shown: BTreeMap<u16, Shown>,
@@ -162,7 +162,11 @@ pub fn upload(
     sched.upload(Buf::STEP, slot, 0, &[uniforms])?;
     sched.upload(Buf::TARGET, slot, 0, &view.photo.rgba)?;
     let Some(room) = room.filter(|_| job.labels) else { return Ok(()) };
-    sched.upload(Buf::VIEW_LABELS, slot, 0, &view.view_labels)?;
+    if view.view_labels.is_empty() {
+        sched.upload(Buf::VIEW_LABELS, slot, 0, &vec![0_u32; view.photo.rgba.len()])?;
+    } else {
+        sched.upload(Buf::VIEW_LABELS, slot, 0, &view.view_labels)?;
+    }
     let words = uniforms.occluder_words as usize;
     let mut layer_from_label = vec![0_u32; room.max_label as usize + 1];
     let mut label_from_layer = vec![0_u32; room.layers as usize + 1];

@@ -287,7 +287,7 @@ fn train_view(view: &mut crate::scene::View, border: u32) -> Result<TrainView> {
     let mask = view.mask.take();
     let objects = mask.as_ref().map(crate::scene::LabelMap::objects).unwrap_or_default();
     let (name, camera) = (view.name.clone(), view.camera.clone());
-    let view_labels = mask.as_ref().map_or_else(|| vec![0; photo.rgba.len()], |mask| job::view_labels(mask, border));
+    let view_labels = mask.as_ref().map(|mask| job::view_labels(mask, border)).unwrap_or_default();
     let shown = job::shown_objects(&photo, &view_labels);
     let occluders = Default::default();
     Ok(TrainView { name, camera, photo, valid_pixels, mask, objects, view_labels, shown, occluders })
