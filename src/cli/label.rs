@@ -3,19 +3,18 @@
 use super::args::JsonFlag;
 use super::args::SceneArgs;
 use super::log::Progress;
-use super::scene::{near_plane, open_gpu, open_scene};
+use super::scene::{near_plane, open_gpu, open_scene, vote_engine};
 use super::values::{near, switch};
 use super::{Context, open_model, stdout};
-use crate::engine::{Engine, LabelRoom, Room};
-use crate::infer::ballot::{Sweep, Voter, columns_for, sweep};
-use crate::infer::decide::{apply, decide, drop_unsure, trust};
+use crate::engine::Engine;
+use crate::infer::ballot::{Sweep, Voter, columns_for};
+use crate::infer::decide::{apply, count, drop_unsure};
 use crate::infer::lift::{Lift, lift};
 use crate::infer::render::render;
 use crate::infer::select::summarise;
-use crate::io::label_table::{FILE, LabelTable};
+use crate::io::label_table::LabelTable;
 use crate::io::ply::write_gaussians;
 use crate::scene::{Gaussians, UNLABELLED, View};
-use crate::sched::SchedulerOptions;
 use crate::train::LabelRule;
 use crate::{Error, Result};
 use clap::Args;
@@ -23,7 +22,7 @@ use rand::SeedableRng;
 use rand::seq::SliceRandom;
 use rand_pcg::Pcg64Mcg;
 use serde_json::json;
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::path::PathBuf;
 use std::time::Instant;
 
@@ -87,17 +86,9 @@ pub fn run(args: &LabelArgs, context: &Context) -> Result<()> {
         return Err(Error::data(&args.masks, "", "no training view has a mask here; see --test-every"));
     }
     let objects: BTreeSet<u16> = views.iter().filter_map(|view| view.mask.as_ref()).flat_map(|m| m.objects()).collect();
-    let size = views.iter().map(|view| (view.camera.width, view.camera.height));
-    let size = size.reduce(|a, b| (a.0.max(b.0), a.1.max(b.1))).unwrap_or((1, 1));
-    let labels = LabelRoom {
-        max_label: objects.iter().max().map_or(0, |&id| u32::from(id)),
-        layers: 0,
-        vote_columns: columns_for(objects.len()),
-    };
-    let room = Room { gaussians: (model.len() as u64).max(1), size, trained: false, labels: Some(labels) };
     let gpu = open_gpu(context)?;
     let start = Instant::now();
-    let mut engine = Engine::new(gpu, room, SchedulerOptions::default())?;
+    let mut engine = vote_engine(gpu, &model, &views, columns_for(objects.len()))?;
     engine.upload_model(&model)?;
     let mut progress = Progress::new(u64::from(args.rounds), "rounds", &context.global);
     if args.rule == LabelRule::Main {
@@ -112,8 +103,7 @@ pub fn run(args: &LabelArgs, context: &Context) -> Result<()> {
     drop_unsure(&mut model, args.min_confidence);
     let seconds = start.elapsed().as_secs_f64();
     write_gaussians(&args.output, &model)?;
-    let table = Some(args.masks.join(FILE)).filter(|path| path.is_file()).map(|path| LabelTable::read(&path));
-    LabelTable::put(table.transpose()?.as_ref(), &LabelTable::beside(&args.output))?;
+    LabelTable::put(LabelTable::of_folder(&args.masks)?.as_ref(), &LabelTable::beside(&args.output))?;
     let rows = summarise(&model);
     if context.json || args.json.json {
         return stdout::print_json(&json!({
@@ -159,20 +149,13 @@ fn vote(
     (near, judge): (f32, bool),
     args: &LabelArgs,
 ) -> Result<()> {
-    let mut trusts: Vec<Option<BTreeMap<u16, f32>>> = vec![None; views.len()];
-    if let Some(labels) = model.labels.as_ref().filter(|_| judge) {
-        for (view, to) in views.iter().zip(&mut trusts) {
-            let shown = render(engine, &view.camera, near, [0.0; 3], 0)?.label_map(labels);
-            *to = view.mask.as_ref().map(|mask| trust(mask, &shown));
-        }
-    }
-    let voters = views.iter().zip(&trusts).filter_map(|(view, trust)| {
-        let (photo, trust) = (view.photo.as_ref(), trust.as_ref());
-        Some(Voter { camera: &view.camera, mask: view.mask.as_ref()?, photo, trust })
+    let voters = views.iter().filter_map(|view| {
+        Some(Voter { camera: &view.camera, mask: view.mask.as_ref()?, photo: view.photo.as_ref(), trust: None })
     });
     let voters: Vec<Voter> = voters.collect();
-    let ballot = sweep(engine, &voters, Sweep { near, border: args.mask_border })?;
-    let decision = decide(&ballot, &model.means, !args.no_complete)?;
+    let judges = model.labels.as_deref().filter(|_| judge);
+    let how = Sweep { near, border: args.mask_border };
+    let decision = count(engine, &voters, judges, &model.means, how, !args.no_complete)?;
     apply(model, decision);
     Ok(())
 }

@@ -1,5 +1,6 @@
 //! A model with the names of its labels: opened, and written after an edit.
 
+use super::args::JsonFlag;
 use super::{Context, open_model, stdout};
 use crate::Result;
 use crate::infer::catalogue::Catalogue;
@@ -25,6 +26,23 @@ impl TableArg {
         let path = self.label_table.clone().or_else(|| LabelTable::find_for_model(model));
         path.map(|path| LabelTable::read(&path)).transpose()
     }
+}
+
+/// What every edit of labels is told.
+#[derive(Args, Clone, Debug)]
+pub struct EditArgs {
+    /// The model: a PLY, or the folder that `labelgs train` made.
+    #[arg(value_name = "MODEL")]
+    pub model: PathBuf,
+    /// File to write; names of its labels go to OUT.labels.json beside it.
+    #[arg(short, long, value_name = "OUT.ply")]
+    pub output: PathBuf,
+    /// Names.
+    #[command(flatten)]
+    pub table: TableArg,
+    /// JSON.
+    #[command(flatten)]
+    pub json: JsonFlag,
 }
 
 /// Opens a model and counts its labels.
@@ -74,6 +92,6 @@ impl Edited<'_> {
 }
 
 /// True if JSON was asked for before or behind the verb.
-pub fn wants_json(context: &Context, here: &super::args::JsonFlag) -> bool {
+pub fn wants_json(context: &Context, here: &JsonFlag) -> bool {
     context.json || here.json
 }

@@ -1,8 +1,7 @@
 //! `labelgs merge`.
 
 use super::Context;
-use super::args::JsonFlag;
-use super::labelled::{Edited, TableArg, open, wants_json};
+use super::labelled::{EditArgs, Edited, open, wants_json};
 use super::values::{Picks, label, picks};
 use crate::infer::edit::relabel;
 use crate::infer::rename::{give_name, renumber};
@@ -11,14 +10,13 @@ use crate::{Error, Result};
 use clap::Args;
 use serde_json::json;
 use std::collections::{BTreeMap, BTreeSet};
-use std::path::PathBuf;
 
 /// `labelgs merge`.
 #[derive(Args, Clone, Debug)]
 pub struct MergeArgs {
-    /// The model: a PLY, or the folder that `labelgs train` made.
-    #[arg(value_name = "MODEL")]
-    pub model: PathBuf,
+    /// Model and output.
+    #[command(flatten)]
+    pub edit: EditArgs,
     /// The labels that become one, by id or by name, such as 3,5 or cup,saucer.
     #[arg(long, value_name = "LABELS", value_parser = picks)]
     pub labels: Picks,
@@ -28,20 +26,11 @@ pub struct MergeArgs {
     /// Name of the result; otherwise that of the label whose id it has, or the first of the others.
     #[arg(long, value_name = "NAME")]
     pub name: Option<String>,
-    /// File to write; names of its labels go to OUT.labels.json beside it.
-    #[arg(short, long, value_name = "OUT.ply")]
-    pub output: PathBuf,
-    /// Names.
-    #[command(flatten)]
-    pub table: TableArg,
-    /// JSON.
-    #[command(flatten)]
-    pub json: JsonFlag,
 }
 
 /// Writes the model with one label in place of several.
 pub fn run(args: &MergeArgs, context: &Context) -> Result<()> {
-    let (model, known) = open(&args.model, &args.table)?;
+    let (model, known) = open(&args.edit.model, &args.edit.table)?;
     let labels = known.resolve("--labels", &args.labels.0)?;
     let smallest = labels.iter().copied().find(|&label| label != UNLABELLED);
     let into = match args.into.or(smallest) {
@@ -60,6 +49,6 @@ pub fn run(args: &MergeArgs, context: &Context) -> Result<()> {
         table = Some(give_name(&ids, table, into, name)?);
     }
     let labels = BTreeSet::from([into]);
-    let edited = Edited { output: &args.output, model: &merged, table, of: model.len(), labels: &labels };
-    edited.finish(wants_json(context, &args.json), json!({ "merged": map.keys().collect::<Vec<_>>() }))
+    let edited = Edited { output: &args.edit.output, model: &merged, table, of: model.len(), labels: &labels };
+    edited.finish(wants_json(context, &args.edit.json), json!({ "merged": map.keys().collect::<Vec<_>>() }))
 }

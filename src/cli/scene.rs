@@ -2,7 +2,7 @@
 
 use super::args::SceneArgs;
 use super::{Context, config};
-use crate::engine::{Engine, Room};
+use crate::engine::{Engine, LabelRoom, Room};
 use crate::error::{Error, Result};
 use crate::gpu::{Gpu, GpuOptions};
 use crate::io::{self, LoadOptions, run_folder};
@@ -99,7 +99,23 @@ fn without_extension(name: &str) -> String {
 
 /// An engine that renders `model` at up to `size`, the model not yet on it.
 pub fn render_engine(gpu: Arc<Gpu>, model: &Gaussians, sizes: impl Iterator<Item = (u32, u32)>) -> Result<Engine> {
+    engine_for(gpu, model, sizes, None)
+}
+
+/// As [`render_engine`] for the sizes of `views`, with room for votes for so many labels at once.
+pub fn vote_engine(gpu: Arc<Gpu>, model: &Gaussians, views: &[&View], columns: u32) -> Result<Engine> {
+    let sizes = views.iter().map(|view| (view.camera.width, view.camera.height));
+    // No layer is ever sampled, so no id needs a place among them.
+    engine_for(gpu, model, sizes, Some(LabelRoom { max_label: 0, layers: 0, vote_columns: columns }))
+}
+
+fn engine_for(
+    gpu: Arc<Gpu>,
+    model: &Gaussians,
+    sizes: impl Iterator<Item = (u32, u32)>,
+    labels: Option<LabelRoom>,
+) -> Result<Engine> {
     let size = sizes.reduce(|a, b| (a.0.max(b.0), a.1.max(b.1))).unwrap_or((1, 1));
-    let room = Room { gaussians: (model.len() as u64).max(1), size, trained: false, labels: None };
+    let room = Room { gaussians: (model.len() as u64).max(1), size, trained: false, labels };
     Engine::new(gpu, room, SchedulerOptions::default())
 }

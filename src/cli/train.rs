@@ -31,7 +31,7 @@ pub(super) fn train(args: &TrainArgs, context: &Context) -> Result<(serde_json::
     let config = config::decide(args)?;
     let out = args.output.as_path();
     prepare_output(out)?;
-    let names = names(args)?;
+    let names = args.masks.as_deref().map(LabelTable::of_folder).transpose()?.flatten();
     let mut dataset = open_with(&args.scene, &config::load_options(&config, args.masks.clone()))?;
     if dataset.train.is_empty() {
         return Err(Error::data(
@@ -184,12 +184,6 @@ fn prepare_output(out: &Path) -> Result<()> {
     std::fs::create_dir_all(out).map_err(Error::write(out))?;
     atomic::remove_stale(out);
     Ok(())
-}
-
-/// The table of the masks, if they have one: the model keeps the names.
-fn names(args: &TrainArgs) -> Result<Option<LabelTable>> {
-    let path = args.masks.as_ref().map(|masks| masks.join(label_table::FILE)).filter(|path| path.is_file());
-    path.map(|path| LabelTable::read(&path)).transpose()
 }
 
 /// No more initial points than `--max-gaussians`: every n-th is kept.

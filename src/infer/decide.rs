@@ -1,6 +1,8 @@
 //! From votes to a label and a confidence for every Gaussian.
 
-use super::ballot::{Ballot, weight};
+use super::ballot::{Ballot, Sweep, Voter, sweep, weight};
+use super::render::render;
+use crate::engine::Engine;
 use crate::error::{Error, Result};
 use crate::scene::{Gaussians, LabelMap, UNLABELLED};
 use kiddo::{ImmutableKdTree, SquaredEuclidean};
@@ -99,4 +101,24 @@ pub fn drop_unsure(model: &mut Gaussians, least: f32) {
     for (label, _) in labels.iter_mut().zip(confidence).filter(|(_, confidence)| **confidence < least) {
         *label = UNLABELLED;
     }
+}
+
+/// Counts the votes of `voters` for the engine's model and decides. With the labels that the model has, `judges`, masks
+/// that disagree with them count less ([`trust`]). Nothing may be in flight.
+pub fn count(
+    engine: &mut Engine,
+    voters: &[Voter],
+    judges: Option<&[u32]>,
+    means: &[[f32; 3]],
+    how: Sweep,
+    complete: bool,
+) -> Result<Decision> {
+    let mut trusts = Vec::new();
+    for voter in voters.iter().filter(|_| judges.is_some()) {
+        let shown = render(engine, voter.camera, how.near, [0.0; 3], 0)?;
+        trusts.extend(judges.map(|labels| trust(voter.mask, &shown.label_map(labels))));
+    }
+    let voters: Vec<Voter> =
+        voters.iter().enumerate().map(|(index, voter)| Voter { trust: trusts.get(index), ..*voter }).collect();
+    decide(&sweep(engine, &voters, how)?, means, complete)
 }

@@ -31,10 +31,7 @@ impl Page {
     /// A page in `folder`, which is made. It must not hold another page's pictures, which would stay there.
     pub fn new(folder: &Path) -> Result<Self> {
         std::fs::create_dir_all(folder).map_err(Error::write(folder))?;
-        if folder.read_dir().map_err(Error::read(folder))?.next().is_some() {
-            let problem = format!("{} is not empty; name a new folder", folder.display());
-            return Err(Error::usage("--page", problem));
-        }
+        atomic::require_empty("--page", folder)?;
         Ok(Self { folder: folder.to_owned(), rows: String::new(), count: 0 })
     }
 

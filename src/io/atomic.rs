@@ -16,6 +16,19 @@ pub fn write(path: impl AsRef<Path>, body: impl FnOnce(&mut dyn Write) -> io::Re
     write_inner(path, body).map_err(Error::write(path))
 }
 
+/// Refuses a folder that holds something: old files among new ones would be read as one set. `argument` named it. A
+/// folder that is not there yet is fine.
+pub fn require_empty(argument: &str, folder: &Path) -> Result<()> {
+    match fs::read_dir(folder) {
+        Ok(mut entries) => match entries.next() {
+            Some(_) => Err(Error::usage(argument, format!("{} is not empty; name a new folder", folder.display()))),
+            None => Ok(()),
+        },
+        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(()),
+        Err(error) => Err(Error::write(folder)(error)),
+    }
+}
+
 fn write_inner(path: &Path, body: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> io::Result<()> {
     let target = follow(path)?;
     match fs::metadata(&target) {

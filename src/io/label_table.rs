@@ -87,6 +87,12 @@ impl LabelTable {
         Ok(Self::new(table.labels))
     }
 
+    /// Reads the table of a folder of masks, if it has one.
+    pub fn of_folder(folder: &Path) -> Result<Option<Self>> {
+        let path = folder.join(FILE);
+        path.is_file().then(|| Self::read(&path)).transpose()
+    }
+
     /// Writes the table, whole or not at all.
     pub fn write(&self, path: &Path) -> Result<()> {
         let text = serde_json::to_string_pretty(self).map_err(|error| Error::Bug(format!("JSON: {error}")))?;

@@ -62,9 +62,7 @@ fn count(table: &mut LabelTable, ids: &[u8]) {
 }
 
 fn create_folders(folder: &Path, world: &World) -> Result<()> {
-    if fs::read_dir(folder).is_ok_and(|mut entries| entries.next().is_some()) {
-        return Err(Error::usage("DIR", format!("{} is not empty; name a new folder", folder.display())));
-    }
+    atomic::require_empty("DIR", folder)?;
     let of_objects =
         ["amodal", "objects"].map(|kind| world.objects.iter().map(move |object| format!("{kind}/{}", object.id)));
     let names = ["images", "sparse/0", "masks", "depth"].map(str::to_owned);

@@ -2,12 +2,10 @@
 
 use super::{LabelRule, Trainer};
 use crate::error::Result;
-use crate::infer::ballot::{Sweep, Voter, sweep};
-use crate::infer::decide::{Decision, decide, trust};
-use crate::infer::render::render;
+use crate::infer::ballot::{Sweep, Voter};
+use crate::infer::decide::{self, Decision};
 use crate::plan::Buf;
-use crate::scene::{Gaussians, LabelMap};
-use std::collections::BTreeMap;
+use crate::scene::Gaussians;
 
 impl Trainer {
     fn votes(&self) -> bool {
@@ -30,35 +28,19 @@ impl Trainer {
         let count = self.engine.gaussian_count() as usize;
         let rows = self.engine.sched_mut().download::<[f32; 4]>(Buf::MEANS, 0, 0, count)?;
         let means: Vec<[f32; 3]> = rows.iter().map(|&[x, y, z, _]| [x, y, z]).collect();
-        let trusts: Vec<Option<BTreeMap<u16, f32>>> =
-            if self.config.vote_trust && self.labelled_once { self.trusts()? } else { vec![None; self.views.len()] };
-        let voters = self.views.iter().zip(&trusts).filter_map(|(view, trust)| {
-            let (mask, trust) = (view.mask.as_ref()?, trust.as_ref());
-            Some(Voter { camera: &view.camera, mask, photo: Some(&view.photo), trust })
+        let voters = self.views.iter().filter_map(|view| {
+            Some(Voter { camera: &view.camera, mask: view.mask.as_ref()?, photo: Some(&view.photo), trust: None })
         });
         let voters: Vec<Voter> = voters.collect();
-        let ballot = sweep(&mut self.engine, &voters, how)?;
-        let decision = decide(&ballot, &means, true)?;
+        let judges = if self.config.vote_trust && self.labelled_once {
+            Some(self.engine.sched_mut().download::<u32>(Buf::LABELS, 0, 0, count)?)
+        } else {
+            None
+        };
+        let decision = decide::count(&mut self.engine, &voters, judges.as_deref(), &means, how, true)?;
         self.engine.sched_mut().upload(Buf::LABELS, 0, 0, &decision.labels)?;
         self.labelled_once = true;
         Ok(decision)
-    }
-
-    /// How far each view's mask agrees with the labels that the Gaussians have now.
-    fn trusts(&mut self) -> Result<Vec<Option<BTreeMap<u16, f32>>>> {
-        let count = self.engine.gaussian_count() as usize;
-        let labels = self.engine.sched_mut().download::<u32>(Buf::LABELS, 0, 0, count)?;
-        let (near, background) = (self.config.near, self.config.background);
-        let mut all = Vec::with_capacity(self.views.len());
-        for view in &self.views {
-            let Some(mask) = &view.mask else {
-                all.push(None);
-                continue;
-            };
-            let shown: LabelMap = render(&mut self.engine, &view.camera, near, background, 0)?.label_map(&labels);
-            all.push(Some(trust(mask, &shown)));
-        }
-        Ok(all)
     }
 
     /// The model with its final labels: where votes decide they are counted again, and confidence is known.

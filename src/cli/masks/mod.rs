@@ -7,11 +7,11 @@ pub mod repair;
 pub mod spoil;
 
 use super::Context;
+use crate::Result;
 use crate::cli::scene::open_with;
 use crate::io::LoadOptions;
 use crate::io::image::{write_png_grey8, write_png_grey16};
 use crate::scene::{Dataset, LabelMap};
-use crate::{Error, Result};
 use clap::{Args, Subcommand};
 use std::path::Path;
 
@@ -58,15 +58,6 @@ pub fn run(args: &MasksArgs, context: &Context) -> Result<()> {
 /// Reads the scene that masks belong to: names, sizes and cameras of its photos, and its points.
 fn open_photos(scene: &Path) -> Result<Dataset> {
     open_with(scene, &LoadOptions { photos: false, test_every: None, ..LoadOptions::default() })
-}
-
-/// Refuses a folder that holds something: old masks among new ones would be read as one set.
-fn refuse_used(folder: &Path) -> Result<()> {
-    let used = std::fs::read_dir(folder).is_ok_and(|mut entries| entries.next().is_some());
-    if used {
-        return Err(Error::usage("--output", format!("{} is not empty; name a new folder", folder.display())));
-    }
-    Ok(())
 }
 
 /// Writes ids as grey, with 8 bits where they suffice.

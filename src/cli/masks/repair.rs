@@ -3,18 +3,18 @@
 use super::write_mask;
 use crate::cli::args::{JsonFlag, SceneArgs};
 use crate::cli::log::Progress;
-use crate::cli::scene::{near_plane, open_gpu, open_scene};
+use crate::cli::scene::{near_plane, open_gpu, open_scene, vote_engine};
 use crate::cli::values::near;
 use crate::cli::{Context, open_model, stdout};
-use crate::engine::{Engine, LabelRoom, Room};
+use crate::engine::Engine;
 use crate::infer::associate::{Owners, Segment, associate};
 use crate::infer::ballot::{COLUMNS_MAX, Sweep, Voter, sweep};
-use crate::infer::decide::decide;
+use crate::infer::decide::count;
 use crate::infer::render::render;
 use crate::infer::repair::{Naming, Repairs, mend, name_groups, rename};
+use crate::io::atomic;
 use crate::io::label_table::{FILE, LabelEntry, LabelTable};
 use crate::scene::{Gaussians, LabelMap, View};
-use crate::sched::SchedulerOptions;
 use crate::{Error, Result};
 use clap::Args;
 use serde_json::json;
@@ -58,18 +58,14 @@ pub struct RepairArgs {
 
 /// Makes masks of all views agree with each other.
 pub fn run(args: &RepairArgs, context: &Context) -> Result<()> {
-    super::refuse_used(&args.output)?;
+    atomic::require_empty("--output", &args.output)?;
     let model = open_model(&args.model)?;
     let dataset = open_scene(&args.scene, &args.reading, Some(args.masks.clone()), [0.0; 3], true)?;
     let views: Vec<&View> = dataset.train.iter().collect();
     if views.iter().all(|view| view.mask.is_none()) {
         return Err(Error::data(&args.masks, "", "no training view has a mask here; see --test-every"));
     }
-    let size = views.iter().map(|view| (view.camera.width, view.camera.height));
-    let size = size.reduce(|a, b| (a.0.max(b.0), a.1.max(b.1))).unwrap_or((1, 1));
-    let labels = LabelRoom { max_label: 0, layers: 0, vote_columns: COLUMNS_MAX };
-    let room = Room { gaussians: (model.len() as u64).max(1), size, trained: false, labels: Some(labels) };
-    let mut engine = Engine::new(open_gpu(context)?, room, SchedulerOptions::default())?;
+    let mut engine = vote_engine(open_gpu(context)?, &model, &views, COLUMNS_MAX)?;
     engine.upload_model(&model)?;
     let mut progress = Progress::new(2 * views.len() as u64, "views", &context.global);
     let mut done = 0;
@@ -116,7 +112,7 @@ fn repair(
     // What all renamed masks together make of the model tells what each of them should show.
     let voters = views.iter().zip(&renamed).filter_map(|(view, mask)| Some(voter(view, mask.as_ref()?)));
     let voters: Vec<Voter> = voters.collect();
-    let decision = decide(&sweep(engine, &voters, how)?, &model.means, true)?;
+    let decision = count(engine, &voters, None, &model.means, how, true)?;
     let mut masks = Vec::with_capacity(views.len());
     for (index, (view, mask)) in views.iter().zip(&renamed).enumerate() {
         let shown = render(engine, &view.camera, near, [0.0; 3], 0)?.label_map(&decision.labels);
@@ -148,8 +144,7 @@ fn areas(views: &[&View]) -> BTreeMap<Segment, u64> {
 
 fn write(folder: &Path, source: &Path, views: &[&View], masks: &[Option<LabelMap>]) -> Result<()> {
     let mut entries: BTreeMap<u16, LabelEntry> = BTreeMap::new();
-    let known =
-        Some(source.join(FILE)).filter(|path| path.is_file()).map(|path| LabelTable::read(&path)).transpose()?;
+    let known = LabelTable::of_folder(source)?;
     for (view, mask) in views.iter().zip(masks) {
         let Some(mask) = mask else { continue };
         write_mask(&folder.join(Path::new(&view.name).with_extension("png")), mask)?;

@@ -3,6 +3,7 @@
 use super::write_mask;
 use crate::cli::args::JsonFlag;
 use crate::cli::{Context, stdout};
+use crate::io::atomic;
 use crate::io::mask::read_mask;
 use crate::scene::LabelMap;
 use crate::synth::spoil::{Fault, spoil};
@@ -39,7 +40,7 @@ pub fn run(args: &SpoilArgs, context: &Context) -> Result<()> {
     if !(0.0..=1.0).contains(&args.share) {
         return Err(Error::usage("--share", format!("is {}, needs 0 to 1", args.share)));
     }
-    super::refuse_used(&args.output)?;
+    atomic::require_empty("--output", &args.output)?;
     let names = pngs(&args.masks)?;
     let masks: Vec<LabelMap> = names.iter().map(|name| read_mask(args.masks.join(name))).collect::<Result<_>>()?;
     let spoilt = spoil(&masks, args.fault, args.share, args.seed);

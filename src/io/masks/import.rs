@@ -9,7 +9,7 @@ use crate::error::{Error, Result};
 use crate::io::label_table::{FILE, LabelEntry, LabelTable};
 use crate::io::load::all_or_one_error;
 use crate::io::mask::with_png;
-use crate::io::{image, resample::same_aspect};
+use crate::io::{atomic, image, resample::same_aspect};
 use crate::scene::labels::LABEL_MAX;
 use crate::scene::{Dataset, View};
 use rayon::prelude::*;
@@ -78,9 +78,7 @@ struct Survey {
 
 /// Imports the masks of the photos of `dataset` into the folder `output`, which must be new or empty.
 pub fn import(dataset: &Dataset, options: &ImportOptions, output: &Path) -> Result<Imported> {
-    if output.exists() && std::fs::read_dir(output).map_err(Error::write(output))?.next().is_some() {
-        return Err(Error::usage("--output", format!("{} is not empty; name a new folder", output.display())));
-    }
+    atomic::require_empty("--output", output)?;
     let views = dataset.all();
     let names: Vec<&str> = views.iter().map(|view| view.name.as_str()).collect();
     let reading = detect(&names, options)?;
