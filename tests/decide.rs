@@ -1,7 +1,7 @@
 //! From votes to labels.
 
 use labelgs::infer::ballot::Ballot;
-use labelgs::infer::decide::{decide, trust};
+use labelgs::infer::decide::{Agreement, agreement, decide, trust};
 use labelgs::scene::LabelMap;
 
 /// A ballot of rows in whole pixels.
@@ -47,10 +47,21 @@ fn nobody_to_ask_is_no_failure() {
 }
 
 #[test]
-fn a_mask_is_trusted_as_far_as_it_agrees() {
+fn a_mask_is_trusted_as_far_as_the_others() {
     let map = |ids: &[u16]| LabelMap { width: ids.len() as u32, height: 1, ids: ids.to_vec() };
-    let found = trust(&map(&[0, 0, 1, 1, 2, 2, 2, 2]), &map(&[0, 0, 1, 1, 1, 1, 1, 2]));
-    assert_eq!(found, [(0, 1.0), (1, 1.0), (2, 0.0625)].into());
+    let found = agreement(&map(&[0, 0, 1, 1, 2, 2, 2, 2]), &map(&[0, 0, 1, 1, 1, 1, 1, 2]));
+    assert_eq!(found, [(0, (2, 2)), (1, (2, 2)), (2, (1, 4))].into());
+    // Label 1 is shown half as well in the last view as in all together; label 2 is shown nowhere, and label 3, a thin
+    // object, badly everywhere.
+    let views: [Agreement; 3] = [
+        [(1, (40, 40)), (2, (0, 9)), (3, (1, 10))].into(),
+        [(1, (30, 30)), (2, (0, 5)), (3, (1, 10))].into(),
+        [(1, (10, 30)), (3, (1, 10))].into(),
+    ];
+    let trusts = trust(&views);
+    assert_eq!(trusts[..2], [[(1, 1.0), (2, 1.0), (3, 1.0)].into(), [(1, 1.0), (2, 1.0), (3, 1.0)].into()]);
+    assert_eq!((trusts[2][&1], trusts[2][&3]), (((1.0 / 3.0) / 0.8_f64).powi(2) as f32, 1.0));
+    assert_eq!(trust(&[]), []);
 }
 
 #[test]

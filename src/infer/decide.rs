@@ -77,16 +77,40 @@ fn tree_of(means: &[[f32; 3]], totals: &[f64]) -> Result<Option<(ImmutableKdTree
     Ok(Some((tree, rows)))
 }
 
-/// How far a view's mask can be trusted, by label: the square of the share of the label's pixels where the model, which
-/// all views made, shows the same. A mask whose ids were swapped or merged speaks with little weight in the next count.
-pub fn trust(mask: &LabelMap, rendered: &LabelMap) -> BTreeMap<u16, f32> {
-    let mut counts: BTreeMap<u16, (u64, u64)> = BTreeMap::new();
+/// Pixels of a mask by label: where the model shows the same label, and all.
+pub type Agreement = BTreeMap<u16, (u64, u64)>;
+
+/// Where a view's mask agrees with the labels that the model shows there.
+pub fn agreement(mask: &LabelMap, rendered: &LabelMap) -> Agreement {
+    let mut counts = Agreement::new();
     for (&id, &shown) in mask.ids.iter().zip(&rendered.ids) {
         let (same, all) = counts.entry(id).or_default();
         *same += u64::from(id == shown);
         *all += 1;
     }
-    counts.into_iter().map(|(id, (same, all))| (id, (same as f32 / all as f32).powi(2))).collect()
+    counts
+}
+
+/// How far each view's mask can be trusted, by label: the square of its agreement with the model, which all views made,
+/// over the agreement of all views together; 1 at most. A mask whose ids were swapped or merged speaks with little
+/// weight in the next count. A label that the model shows badly everywhere is nobody's mistake: were its votes to count
+/// less for that, thin objects would lose to what surrounds them, and what is gone from the model could never return.
+pub fn trust(views: &[Agreement]) -> Vec<BTreeMap<u16, f32>> {
+    let mut together = Agreement::new();
+    for (&id, &(same, all)) in views.iter().flatten() {
+        let (sum, of) = together.entry(id).or_default();
+        *sum += same;
+        *of += all;
+    }
+    let share = |(same, all): (u64, u64)| same as f64 / all as f64;
+    let of_view = |view: &Agreement| {
+        let trust = |(&id, &counts): (&u16, &(u64, u64))| match together[&id] {
+            (0, _) => (id, 1.0),
+            usual => (id, (share(counts) / share(usual)).min(1.0).powi(2) as f32),
+        };
+        view.iter().map(trust).collect()
+    };
+    views.iter().map(of_view).collect()
 }
 
 /// Puts a decision into a model.
@@ -113,11 +137,14 @@ pub fn count(
     how: Sweep,
     complete: bool,
 ) -> Result<Decision> {
-    let mut trusts = Vec::new();
-    for voter in voters.iter().filter(|_| judges.is_some()) {
-        let shown = render(engine, voter.camera, how.near, [0.0; 3], 0)?;
-        trusts.extend(judges.map(|labels| trust(voter.mask, &shown.label_map(labels))));
+    let mut agreements = Vec::new();
+    if let Some(labels) = judges {
+        for voter in voters {
+            let shown = render(engine, voter.camera, how.near, [0.0; 3], 0)?;
+            agreements.push(agreement(voter.mask, &shown.label_map(labels)));
+        }
     }
+    let trusts = trust(&agreements);
     let voters: Vec<Voter> =
         voters.iter().enumerate().map(|(index, voter)| Voter { trust: trusts.get(index), ..*voter }).collect();
     decide(&sweep(engine, &voters, how)?, means, complete)
