@@ -3,6 +3,7 @@
 use super::training::train;
 use crate::support::device;
 use labelgs::sched::SchedulerOptions;
+use labelgs::train::LabelRule;
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::process::Command;
 
@@ -16,9 +17,11 @@ fn hash_of_a_training() {
         return;
     }
     let Some(turn) = device() else { return };
-    let outcome = train(&turn, SchedulerOptions::default(), |_| ());
     let mut hasher = DefaultHasher::new();
-    (outcome.ply, outcome.losses).hash(&mut hasher);
+    for rule in [LabelRule::Votes, LabelRule::Main] {
+        let outcome = train(&turn, rule, SchedulerOptions::default(), |_| ());
+        (outcome.ply, outcome.losses).hash(&mut hasher);
+    }
     println!("subgroup {} hash {:016x}", turn.subgroup_size(), hasher.finish());
 }
 

@@ -9,10 +9,11 @@ use labelgs::plan::{Capacity, PlanOptions};
 use labelgs::scene::Dataset;
 use labelgs::sched::SchedulerOptions;
 use labelgs::synth::{Preset, SynthOptions, dataset};
-use labelgs::train::{TrainConfig, Trainer};
+use labelgs::train::{LabelRule, TrainConfig, Trainer};
 
-/// 45 steps in which everything happens: higher degrees, labels, occluders, densification, an opacity reset.
-pub fn config() -> TrainConfig {
+/// 45 steps in which everything happens: higher degrees, labels by either rule, occluders, densification, an opacity
+/// reset.
+pub fn config(label_rule: LabelRule) -> TrainConfig {
     TrainConfig {
         iterations: 45,
         label_from: 4,
@@ -27,6 +28,8 @@ pub fn config() -> TrainConfig {
         opacity_lr: 0.3,
         label_threshold: 0.4,
         label_samples: 2,
+        label_rule,
+        vote_every: 12,
         ..TrainConfig::default()
     }
 }
@@ -50,9 +53,9 @@ pub struct Outcome {
 }
 
 /// Trains; `change` may change the trainer before its first step.
-pub fn train(turn: &Turn, options: SchedulerOptions, change: impl FnOnce(&mut Trainer)) -> Outcome {
+pub fn train(turn: &Turn, rule: LabelRule, options: SchedulerOptions, change: impl FnOnce(&mut Trainer)) -> Outcome {
     let mut dataset = small();
-    let config = config();
+    let config = config(rule);
     let start = initial_gaussians(&dataset, config.seed, 100).expect("points");
     let mut trainer = Trainer::new(turn.gpu(), config.clone(), &mut dataset, &start, options).expect("a trainer");
     change(&mut trainer);
@@ -61,7 +64,7 @@ pub fn train(turn: &Turn, options: SchedulerOptions, change: impl FnOnce(&mut Tr
         losses.extend(trainer.step().expect("a step").iter().map(|report| (report.loss + report.label_loss).to_bits()));
     }
     losses.extend(trainer.drain().expect("the last steps").iter().map(|r| (r.loss + r.label_loss).to_bits()));
-    let model = trainer.model().expect("a model");
+    let model = trainer.labelled_model().expect("a model");
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("model.ply");
     write_gaussians(&path, &model).expect("a PLY");
@@ -89,25 +92,34 @@ fn large(trainer: &mut Trainer) {
     trainer.engine_mut().make_room_for_gaussians(20_000).expect("it fits");
 }
 
-/// The reference run twice; overflows on the way; one barrier before each pass; no shared scratch, and poison in it.
 #[test]
-fn a_training_is_the_same_to_the_last_bit() {
+fn a_training_with_votes_is_the_same_to_the_last_bit() {
+    stays_the_same(LabelRule::Votes);
+}
+
+#[test]
+fn a_training_by_the_papers_rule_is_the_same_to_the_last_bit() {
+    stays_the_same(LabelRule::Main);
+}
+
+/// The reference run twice; overflows on the way; one barrier before each pass; no shared scratch, and poison in it.
+fn stays_the_same(rule: LabelRule) {
     let Some(turn) = device() else { return };
     let plan = PlanOptions::default();
     let with = |plan: PlanOptions| SchedulerOptions { plan, ..SchedulerOptions::default() };
-    let first = train(&turn, with(plan), |_| ());
+    let first = train(&turn, rule, with(plan), |_| ());
     assert!(first.counts.1 > first.counts.0 + 50, "densification shows: {:?}", first.counts);
     let labelled = labels_of(&first.ply);
     assert!(labelled > 10, "only {labelled} Gaussians have labels");
-    same("again", &train(&turn, with(plan), |_| ()), &first);
-    let grown = train(&turn, with(plan), tiny);
+    same("again", &train(&turn, rule, with(plan), |_| ()), &first);
+    let grown = train(&turn, rule, with(plan), tiny);
     assert!(grown.instances > 1000, "{} pairs were enough", grown.instances);
     same("tiny buffers that grow", &grown, &first);
-    same("large buffers", &train(&turn, with(plan), large), &first);
-    same("barriers", &train(&turn, with(PlanOptions { barrier_everywhere: true, ..plan }), |_| ()), &first);
+    same("large buffers", &train(&turn, rule, with(plan), large), &first);
+    same("barriers", &train(&turn, rule, with(PlanOptions { barrier_everywhere: true, ..plan }), |_| ()), &first);
     let alone = PlanOptions { alias: false, guards: true, ..plan };
     let poisoned = SchedulerOptions { poison_step: true, ..with(alone) };
-    same("poison", &train(&turn, poisoned, large), &first);
+    same("poison", &train(&turn, rule, poisoned, large), &first);
 }
 
 /// Gaussians with a label in the bytes of a PLY.
