@@ -217,6 +217,9 @@ fn from_a_scene_to_objects_and_pictures() {
     assert!(table.contains("no weights") && table.contains("mean of objects"), "{table}");
 
     succeeds(&["extract", &out, "--labels", "2", "-o", &object]);
+    let sure = read_gaussians(&object).expect("PLY").gaussians.label_confidence.expect("votes tell how sure they are");
+    assert!(sure.iter().all(|&share| share >= 0.6));
+    succeeds(&["extract", &out, "--labels", "2", "--min-confidence", "0", "-o", &object]);
     succeeds(&["remove", &out, "--labels", "2", "-o", &rest]);
     let (object_model, rest_model) =
         (read_gaussians(&object).expect("PLY").gaussians, read_gaussians(&rest).expect("PLY").gaussians);

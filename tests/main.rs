@@ -35,3 +35,4 @@ mod sched;
 mod segments;
 mod shadergen;
 mod synth;
+mod track;

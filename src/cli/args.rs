@@ -3,7 +3,7 @@
 use super::choose::PromptArgs;
 use super::densify::DensifyArgs;
 use super::eval::EvalArgs;
-use super::labelled::TableArg;
+use super::labelled::{SureArg, TableArg};
 use super::masks::MasksArgs;
 use super::merge::MergeArgs;
 use super::occlusion::OcclusionArgs;
@@ -159,6 +159,9 @@ pub struct RenderArgs {
     /// Render all but these labels, or all but those that --name, --at, --box and --mask choose.
     #[arg(long, value_name = "LABELS", value_parser = picks, num_args = 0..=1)]
     pub without: Option<Option<Picks>>,
+    /// Which Gaussians of the labels of --only.
+    #[command(flatten)]
+    pub sure: SureArg,
     /// Labels by name and by place.
     #[command(flatten)]
     pub prompts: PromptArgs,

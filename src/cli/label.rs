@@ -7,11 +7,11 @@ use super::scene::{near_plane, open_gpu, open_scene, vote_engine};
 use super::values::{near, switch};
 use super::{Context, open_model, stdout};
 use crate::engine::Engine;
-use crate::infer::ballot::{Sweep, Voter, columns_for};
-use crate::infer::decide::{apply, count, drop_unsure};
-use crate::infer::lift::{Lift, lift};
+use crate::infer::edit::select::summarise;
 use crate::infer::render::render;
-use crate::infer::select::summarise;
+use crate::infer::vote::ballot::{Sweep, Voter, columns_for};
+use crate::infer::vote::decide::{Decision, apply, count};
+use crate::infer::vote::lift::{Lift, lift};
 use crate::io::label_table::LabelTable;
 use crate::io::ply::write_gaussians;
 use crate::scene::{Gaussians, UNLABELLED, View};
@@ -95,12 +95,15 @@ pub fn run(args: &LabelArgs, context: &Context) -> Result<()> {
         lift_all(&mut engine, &mut model, &views, near, args)?;
     } else {
         for round in 0..args.rounds {
-            vote(&mut engine, &mut model, &views, (near, round > 0), args)?;
+            let mut decision = vote(&mut engine, &model, &views, (near, round > 0), args)?;
+            if round + 1 == args.rounds {
+                decision.drop_unsure(args.min_confidence);
+            }
+            apply(&mut model, decision);
             progress.set(u64::from(round) + 1, String::new);
         }
     }
     drop(progress);
-    drop_unsure(&mut model, args.min_confidence);
     let seconds = start.elapsed().as_secs_f64();
     write_gaussians(&args.output, &model)?;
     LabelTable::put(LabelTable::of_folder(&args.masks)?.as_ref(), &LabelTable::beside(&args.output))?;
@@ -144,18 +147,16 @@ fn lift_all(engine: &mut Engine, model: &mut Gaussians, views: &[&View], near: f
 /// One round: judges the masks by the labels of the last one if asked to, counts, decides.
 fn vote(
     engine: &mut Engine,
-    model: &mut Gaussians,
+    model: &Gaussians,
     views: &[&View],
     (near, judge): (f32, bool),
     args: &LabelArgs,
-) -> Result<()> {
+) -> Result<Decision> {
     let voters = views.iter().filter_map(|view| {
         Some(Voter { camera: &view.camera, mask: view.mask.as_ref()?, photo: view.photo.as_ref(), trust: None })
     });
     let voters: Vec<Voter> = voters.collect();
     let judges = model.labels.as_deref().filter(|_| judge);
     let how = Sweep { near, border: args.mask_border };
-    let decision = count(engine, &voters, judges, &model.means, how, !args.no_complete)?;
-    apply(model, decision);
-    Ok(())
+    count(engine, &voters, judges, &model.means, how, !args.no_complete)
 }

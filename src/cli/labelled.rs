@@ -1,12 +1,14 @@
 //! A model with the names of its labels: opened, and written after an edit.
 
 use super::args::JsonFlag;
+use super::values::share;
 use super::{Context, open_model, stdout};
-use crate::Result;
-use crate::infer::catalogue::Catalogue;
+use crate::infer::edit::catalogue::Catalogue;
+use crate::infer::edit::select::{SURE, extract};
 use crate::io::label_table::LabelTable;
 use crate::io::ply::write_gaussians;
 use crate::scene::Gaussians;
+use crate::{Error, Result};
 use clap::Args;
 use serde_json::json;
 use std::collections::BTreeSet;
@@ -43,6 +45,27 @@ pub struct EditArgs {
     /// JSON.
     #[command(flatten)]
     pub json: JsonFlag,
+}
+
+/// Which Gaussians an object consists of.
+#[derive(Args, Clone, Copy, Debug)]
+pub struct SureArg {
+    /// An object on its own is made of Gaussians with at least this label_confidence, if the model has any.
+    #[arg(long, value_name = "SHARE", value_parser = share, default_value_t = SURE)]
+    pub min_confidence: f32,
+}
+
+impl SureArg {
+    /// The Gaussians of some labels that are sure enough; an error if there is none.
+    pub fn extract(&self, model: &Gaussians, labels: &[u32]) -> Result<Gaussians> {
+        let part = extract(model, labels, self.min_confidence)?;
+        if part.is_empty() {
+            let problem =
+                format!("no Gaussian of the labels has a confidence of {}; ask for less", self.min_confidence);
+            return Err(Error::usage("--min-confidence", problem));
+        }
+        Ok(part)
+    }
 }
 
 /// Opens a model and counts its labels.

@@ -4,7 +4,7 @@ use super::args::ListArgs;
 use super::labelled::open;
 use super::{Context, stdout};
 use crate::Result;
-use crate::infer::select::{LabelSummary, summarise};
+use crate::infer::edit::select::{LabelSummary, summarise};
 use serde::Serialize;
 use serde_json::json;
 

@@ -5,7 +5,7 @@ use super::devices::{shape_json, shape_of, shape_text};
 use super::{Context, stdout};
 use crate::engine::{Engine, LabelRoom, Room, capacity};
 use crate::gpu::{self, GpuOptions};
-use crate::infer::ballot::COLUMNS_MAX;
+use crate::infer::vote::ballot::COLUMNS_MAX;
 use crate::pass::{KernelShape, Variant, training_step};
 use crate::plan::{Capacity, Grid, Limits, MemoryReport, Page, PassList, Plan, PlanOptions, TABLE, Touch, Work};
 use crate::sched::plan_limits;

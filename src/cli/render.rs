@@ -5,9 +5,9 @@ use super::args::RenderArgs;
 use super::choose::Asked;
 use super::scene::{near_plane, open_gpu, open_scene, pick_views, render_engine};
 use super::{labelled, open_model, stdout};
+use crate::infer::edit::select::remove;
 use crate::infer::output::{Format, Pictures, What, write_pictures};
 use crate::infer::render::render;
-use crate::infer::select::{extract, remove};
 use crate::io::camera_json::read_camera;
 use crate::scene::{Camera, Gaussians};
 use crate::{Error, Result};
@@ -39,9 +39,9 @@ pub fn run(args: &RenderArgs, context: &Context) -> Result<()> {
 
 /// The part of the model that is to be seen.
 fn shown(args: &RenderArgs, context: &Context) -> Result<Gaussians> {
-    let (flag, picks, part): (_, _, fn(&Gaussians, &[u32]) -> Result<Gaussians>) = match (&args.only, &args.without) {
-        (Some(picks), _) => ("--only", picks, extract),
-        (None, Some(picks)) => ("--without", picks, remove),
+    let (flag, picks) = match (&args.only, &args.without) {
+        (Some(picks), _) => ("--only", picks),
+        (None, Some(picks)) => ("--without", picks),
         (None, None) if args.prompts.is_empty() => return open_model(&args.model),
         (None, None) => {
             let problem = "or --without is needed to say what becomes of the labels that --name, --at, --box or --mask \
@@ -58,7 +58,8 @@ fn shown(args: &RenderArgs, context: &Context) -> Result<Gaussians> {
         max_resolution: args.reading.max_resolution,
     };
     let labels = args.prompts.labels(flag, picks.as_ref(), &asked, context)?;
-    part(&model, &labels.into_iter().collect::<Vec<_>>())
+    let labels: Vec<u32> = labels.into_iter().collect();
+    if args.only.is_some() { args.sure.extract(&model, &labels) } else { remove(&model, &labels) }
 }
 
 fn cameras(args: &RenderArgs) -> Result<Vec<(String, Camera)>> {

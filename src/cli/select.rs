@@ -3,13 +3,13 @@
 use super::Context;
 use super::args::JsonFlag;
 use super::choose::ChooseArgs;
-use super::labelled::{Edited, open, wants_json};
+use super::labelled::{Edited, SureArg, open, wants_json};
 use super::values::{distance, share};
 use crate::Result;
-use crate::infer::components::Grouping;
-use crate::infer::edit::without_specks;
-use crate::infer::rename::keep;
-use crate::infer::select::{extract, remove};
+use crate::infer::edit::change::without_specks;
+use crate::infer::edit::components::Grouping;
+use crate::infer::edit::rename::keep;
+use crate::infer::edit::select::remove;
 use clap::Args;
 use serde_json::json;
 use std::collections::BTreeSet;
@@ -38,6 +38,9 @@ pub struct ExtractArgs {
     /// Model, choice and output.
     #[command(flatten)]
     pub select: SelectArgs,
+    /// Which Gaussians of the labels.
+    #[command(flatten)]
+    pub sure: SureArg,
     /// Leave out detached specks: connected parts of a label that are smaller than --min-share.
     #[arg(long)]
     pub drop_specks: bool,
@@ -70,7 +73,7 @@ pub fn run_extract(args: &ExtractArgs, context: &Context) -> Result<()> {
     let select = &args.select;
     let (model, known) = open(&select.model, &select.choice.prompts.table)?;
     let labels = select.choice.labels(&select.model, &model, &known, context)?;
-    let whole = extract(&model, &listed(&labels))?;
+    let whole = args.sure.extract(&model, &listed(&labels))?;
     let part = if args.drop_specks { without_specks(&whole, args.grouping.grouping())? } else { whole.clone() };
     let edited = Edited {
         output: &select.output,

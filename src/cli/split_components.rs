@@ -5,8 +5,8 @@ use super::labelled::{EditArgs, Edited, open, wants_json};
 use super::select::GroupingArgs;
 use super::values::{Picks, picks};
 use crate::Result;
-use crate::infer::edit::{Specks, split_components};
-use crate::infer::rename::split;
+use crate::infer::edit::change::{Specks, split_components};
+use crate::infer::edit::rename::split;
 use clap::Args;
 use serde_json::json;
 

@@ -6,9 +6,10 @@ use super::train_args::TrainArgs;
 use super::{Context, config, interrupt, occlusion, stdout};
 use crate::engine::Engine;
 use crate::gpu::Gpu;
-use crate::infer::evaluate::{Rendering, evaluate};
+use crate::infer::edit::select::SURE;
 use crate::infer::render::render;
-use crate::infer::scores::Scores;
+use crate::infer::score::evaluate::{Rendering, evaluate};
+use crate::infer::score::scores::Scores;
 use crate::io::label_table::{self, LabelTable};
 use crate::io::occlusion_table::{self, OcclusionTable};
 use crate::io::{atomic, init, run_folder};
@@ -244,6 +245,6 @@ fn score(trainer: &mut Trainer, dataset: &Dataset, config: &TrainConfig) -> Resu
     let mut model = trainer.model()?;
     // Bands that were never let in are 0; without them the render is cheaper.
     model.sh_degree = model.sh_degree.max(trainer.sh_degree());
-    let how = Rendering { near: config.near, background: config.background };
+    let how = Rendering { near: config.near, background: config.background, min_confidence: SURE };
     evaluate(trainer.engine_mut(), &model, &views, how, &(), &mut ()).map(Some)
 }

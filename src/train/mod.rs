@@ -16,7 +16,7 @@ pub use timing::StepTimes;
 use crate::engine::{Engine, LabelRoom, ListKey, Report, Room};
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
-use crate::infer::ballot::columns_for;
+use crate::infer::vote::ballot::columns_for;
 use crate::pass::{KernelShape, Variant};
 use crate::scene::{Dataset, Gaussians};
 use crate::sched::{SchedulerOptions, Ticket};
@@ -171,7 +171,7 @@ impl Trainer {
         let mut done = Vec::new();
         if self.counts_votes(step) {
             done.extend(self.drain()?);
-            self.count_votes()?;
+            self.refresh_labels()?;
         }
         if self.refreshes_occluders(step) {
             done.extend(self.drain()?);

@@ -2,8 +2,8 @@
 
 use super::{LabelRule, Trainer};
 use crate::error::Result;
-use crate::infer::ballot::{Sweep, Voter};
-use crate::infer::decide::{self, Decision};
+use crate::infer::vote::ballot::{Sweep, Voter};
+use crate::infer::vote::decide::{self, Decision};
 use crate::plan::Buf;
 use crate::scene::Gaussians;
 
@@ -23,7 +23,14 @@ impl Trainer {
     }
 
     /// Counts the votes of all views and gives the labels to the device; nothing may be in flight.
-    pub(super) fn count_votes(&mut self) -> Result<Decision> {
+    pub(super) fn refresh_labels(&mut self) -> Result<()> {
+        let decision = self.count_votes()?;
+        self.engine.sched_mut().upload(Buf::LABELS, 0, 0, &decision.labels)?;
+        self.labelled_once = true;
+        Ok(())
+    }
+
+    fn count_votes(&mut self) -> Result<Decision> {
         let how = Sweep { near: self.config.near, border: self.config.mask_border };
         let count = self.engine.gaussian_count() as usize;
         let rows = self.engine.sched_mut().download::<[f32; 4]>(Buf::MEANS, 0, 0, count)?;
@@ -37,10 +44,7 @@ impl Trainer {
         } else {
             None
         };
-        let decision = decide::count(&mut self.engine, &voters, judges.as_deref(), &means, how, true)?;
-        self.engine.sched_mut().upload(Buf::LABELS, 0, 0, &decision.labels)?;
-        self.labelled_once = true;
-        Ok(decision)
+        decide::count(&mut self.engine, &voters, judges.as_deref(), &means, how, true)
     }
 
     /// The model with its final labels: where votes decide they are counted again, and confidence is known.
@@ -48,7 +52,9 @@ impl Trainer {
         self.drain()?;
         let decision = if self.votes() { Some(self.count_votes()?) } else { None };
         let mut model = self.model()?;
-        model.label_confidence = decision.map(|decision| decision.confidence);
+        if let Some(decision) = decision {
+            decide::apply(&mut model, decision);
+        }
         Ok(model)
     }
 }

@@ -1,8 +1,8 @@
 //! LPIPS with made weights whose answer can be worked out.
 
-use labelgs::infer::lpips::convolution::{Layer, Planes, convolve, halve};
-use labelgs::infer::lpips::{CHANNELS, STAGES, Weights};
-use labelgs::infer::protocol::score::Distance;
+use labelgs::infer::score::lpips::convolution::{Layer, Planes, convolve, halve};
+use labelgs::infer::score::lpips::{CHANNELS, STAGES, Weights};
+use labelgs::infer::score::protocol::score::Distance;
 use std::io::Write;
 use std::path::Path;
 use tempfile::tempdir;

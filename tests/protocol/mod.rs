@@ -5,11 +5,11 @@ mod lpips;
 mod refusals;
 mod rules;
 
-use labelgs::infer::protocol::paint::Painter;
-use labelgs::infer::protocol::report::Report;
-use labelgs::infer::protocol::run::{Bench, run};
-use labelgs::infer::protocol::score::Drawn;
-use labelgs::infer::protocol::{Ask, By, Layout, Protocol};
+use labelgs::infer::score::protocol::paint::Painter;
+use labelgs::infer::score::protocol::report::Report;
+use labelgs::infer::score::protocol::run::{Bench, run};
+use labelgs::infer::score::protocol::score::Drawn;
+use labelgs::infer::score::protocol::{Ask, By, Layout, Protocol};
 use labelgs::io::image::write_png_grey8;
 use labelgs::io::label_table::{LabelEntry, LabelTable};
 use labelgs::io::truth::{files_below, read_truth};

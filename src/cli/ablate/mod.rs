@@ -6,7 +6,7 @@ mod table;
 
 use super::args::{Cli, Command, JsonFlag};
 use super::{Context, eval, interrupt, stdout, train};
-use crate::infer::scores::MeanScores;
+use crate::infer::score::scores::MeanScores;
 use crate::{Error, Result};
 use clap::{Args, Parser};
 use rows::{Masks, Row, rows};

@@ -1,8 +1,9 @@
 //! What `labelgs eval` can be told.
 
 use crate::cli::args::SceneArgs;
+use crate::cli::labelled::SureArg;
 use crate::cli::values::{colour, near};
-use crate::infer::protocol::{By, Protocol};
+use crate::infer::score::protocol::{By, Protocol};
 use clap::Args;
 use std::path::PathBuf;
 
@@ -30,6 +31,9 @@ pub struct EvalArgs {
     /// Gaussians nearer to the camera are not drawn, world units; otherwise as in the run of the model, otherwise 0.2.
     #[arg(long, value_name = "Z", value_parser = near)]
     pub near: Option<f32>,
+    /// Which Gaussians an object rendered alone is made of.
+    #[command(flatten)]
+    pub sure: SureArg,
     /// Score by a published benchmark instead: its masks, its way of choosing objects, its averages.
     #[arg(
         long, value_name = "NAME", value_enum, requires = "truth", help_heading = "Benchmarks",

@@ -5,11 +5,11 @@ use super::watch::Watcher;
 use super::{EvalArgs, put_out};
 use crate::cli::scene::{near_plane, open_gpu, open_scene, render_engine};
 use crate::cli::{Context, open_model};
-use crate::infer::lpips::Weights;
-use crate::infer::protocol::paint::EnginePainter;
-use crate::infer::protocol::run::{Bench, picture_count, run as run_bench};
-use crate::infer::protocol::score::Distance;
-use crate::infer::protocol::{Ask, By, Layout, Prompt, Protocol};
+use crate::infer::score::lpips::Weights;
+use crate::infer::score::protocol::paint::EnginePainter;
+use crate::infer::score::protocol::run::{Bench, picture_count, run as run_bench};
+use crate::infer::score::protocol::score::Distance;
+use crate::infer::score::protocol::{Ask, By, Layout, Prompt, Protocol};
 use crate::io::label_table::LabelTable;
 use crate::io::truth::{files_below, read_truth};
 use crate::scene::{Dataset, UNLABELLED, View};
@@ -53,7 +53,8 @@ pub(super) fn run(protocol: Protocol, args: &EvalArgs, context: &Context) -> Res
     let mut watcher = Watcher::new(picture_count(&layout), args.page.as_deref(), context)?;
     let sizes = views.iter().map(|view| (view.camera.width, view.camera.height));
     let mut engine = render_engine(open_gpu(context)?, &model, sizes)?;
-    let mut painter = EnginePainter::new(&mut engine, &model, near_plane(&args.model, args.near)?);
+    let mut painter =
+        EnginePainter::new(&mut engine, &model, near_plane(&args.model, args.near)?, args.sure.min_confidence);
     let report = run_bench(&layout, &bench, &mut painter, &mut watcher)?;
     let table = bench_table(&report);
     watcher.finish(&table)?;

@@ -5,8 +5,8 @@ use super::watch::Watcher;
 use super::{EvalArgs, put_out};
 use crate::cli::scene::{near_plane, open_gpu, open_scene, pick_views, render_engine};
 use crate::cli::{Context, open_model};
-use crate::infer::evaluate::{Rendering, Wholes, evaluate, picture_count};
-use crate::infer::scores::Scores;
+use crate::infer::score::evaluate::{Rendering, Wholes, evaluate, picture_count};
+use crate::infer::score::scores::Scores;
 use crate::io::image::read_rgba;
 use crate::io::mask::read_mask;
 use crate::scene::View;
@@ -30,7 +30,11 @@ pub(in crate::cli) fn score(args: &EvalArgs, context: &Context) -> Result<Scores
     let gpu = open_gpu(context)?;
     let sizes = views.iter().map(|view| (view.camera.width, view.camera.height));
     let mut engine = render_engine(gpu, &model, sizes)?;
-    let how = Rendering { near: near_plane(&args.model, args.near)?, background: args.background };
+    let how = Rendering {
+        near: near_plane(&args.model, args.near)?,
+        background: args.background,
+        min_confidence: args.sure.min_confidence,
+    };
     let scores = evaluate(&mut engine, &model, &views, how, &wholes, &mut watcher)?;
     watcher.finish(&own_table(&scores))?;
     Ok(scores)

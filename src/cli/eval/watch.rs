@@ -3,8 +3,8 @@
 use crate::Result;
 use crate::cli::Context;
 use crate::cli::log::Progress;
-use crate::infer::compared::{Compared, Watch};
-use crate::infer::page::Page;
+use crate::infer::score::compared::{Compared, Watch};
+use crate::infer::score::page::Page;
 use std::path::Path;
 
 /// Counts pictures and shows them.

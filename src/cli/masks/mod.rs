@@ -5,13 +5,14 @@ pub mod collect;
 pub mod import;
 pub mod repair;
 pub mod spoil;
+pub mod track;
 
 use super::Context;
-use crate::Result;
 use crate::cli::scene::open_with;
 use crate::io::LoadOptions;
 use crate::io::image::{write_png_grey8, write_png_grey16};
 use crate::scene::{Dataset, LabelMap};
+use crate::{Error, Result};
 use clap::{Args, Subcommand};
 use std::path::Path;
 
@@ -37,6 +38,9 @@ pub enum MasksVerb {
     /// Take the masks of the photos out of a tracker's output on the video of `labelgs densify`.
     #[command(after_help = "Example: labelgs masks collect tracked --frames video/frames.json -o masks")]
     Collect(collect::CollectArgs),
+    /// Give ids that go from frame to frame by overlap to the masks of a segmenter of single pictures.
+    #[command(after_help = "Example: labelgs masks track segmented -o tracked, between densify and collect")]
+    Track(track::TrackArgs),
     /// Make masks of all views agree, by the Gaussians of a trained model that they own.
     #[command(after_help = "Example: labelgs masks repair sam_masks --per-view --model out --scene garden -o masks")]
     Repair(repair::RepairArgs),
@@ -50,6 +54,7 @@ pub fn run(args: &MasksArgs, context: &Context) -> Result<()> {
         MasksVerb::Import(args) => import::run(args, context),
         MasksVerb::Check(args) => check::run(args, context),
         MasksVerb::Collect(args) => collect::run(args, context),
+        MasksVerb::Track(args) => track::run(args, context),
         MasksVerb::Repair(args) => repair::run(args, context),
         MasksVerb::Spoil(args) => spoil::run(args, context),
     }
@@ -67,4 +72,16 @@ fn write_mask(path: &Path, mask: &LabelMap) -> Result<()> {
         return write_png_grey8(path, mask.width, mask.height, &bytes);
     }
     write_png_grey16(path, mask.width, mask.height, &mask.ids)
+}
+
+/// Names of the PNGs of a folder, sorted.
+fn pngs(folder: &Path) -> Result<Vec<String>> {
+    let entries = std::fs::read_dir(folder).map_err(Error::read(folder))?;
+    let names = entries.flatten().filter_map(|entry| entry.file_name().into_string().ok());
+    let mut names: Vec<String> = names.filter(|name| name.ends_with(".png")).collect();
+    names.sort();
+    if names.is_empty() {
+        return Err(Error::data(folder, "", "holds no PNG; expected a folder of id masks"));
+    }
+    Ok(names)
 }

@@ -1,6 +1,6 @@
 //! `labelgs masks spoil`.
 
-use super::write_mask;
+use super::{pngs, write_mask};
 use crate::cli::args::JsonFlag;
 use crate::cli::{Context, stdout};
 use crate::io::atomic;
@@ -10,7 +10,7 @@ use crate::synth::spoil::{Fault, spoil};
 use crate::{Error, Result};
 use clap::Args;
 use serde_json::json;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// `labelgs masks spoil`.
 #[derive(Args, Clone, Debug)]
@@ -55,16 +55,4 @@ pub fn run(args: &SpoilArgs, context: &Context) -> Result<()> {
         return stdout::print_json(&json!({ "schema_version": 1, "masks": names.len(), "changed": changed }));
     }
     stdout::print(&format!("{}: {changed} of {} masks changed\n", args.output.display(), names.len()))
-}
-
-/// Names of the PNGs of a folder, sorted.
-fn pngs(folder: &Path) -> Result<Vec<String>> {
-    let entries = std::fs::read_dir(folder).map_err(Error::read(folder))?;
-    let names = entries.flatten().filter_map(|entry| entry.file_name().into_string().ok());
-    let mut names: Vec<String> = names.filter(|name| name.ends_with(".png")).collect();
-    names.sort();
-    if names.is_empty() {
-        return Err(Error::data(folder, "", "holds no PNG; expected a folder of id masks"));
-    }
-    Ok(names)
 }

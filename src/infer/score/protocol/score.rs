@@ -1,9 +1,9 @@
 //! Scores of one object in one frame.
 
-use crate::infer::boundary::boundary_iou;
-use crate::infer::metrics::{COVERED, Overlap, PAPER_COVERED, mean, paper_score, psnr};
-use crate::infer::ssim::ssim;
-use crate::infer::ssim8::{ssim8, to_bytes};
+use crate::infer::score::boundary::boundary_iou;
+use crate::infer::score::metrics::{COVERED, Overlap, PAPER_COVERED, mean, paper_score, psnr};
+use crate::infer::score::ssim::ssim;
+use crate::infer::score::ssim8::{ssim8, to_bytes};
 use crate::io::truth::TruthMask;
 use crate::scene::Photo;
 use serde::Serialize;

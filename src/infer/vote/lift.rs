@@ -1,6 +1,6 @@
 //! The paper's lift, on a model that is not being trained: for comparison with votes.
 
-use super::render::Rendered;
+use crate::infer::render::Rendered;
 use crate::scene::{Camera, LabelMap, UNLABELLED};
 use glam::DVec3;
 

@@ -132,8 +132,9 @@ fn vote(engine: &mut Engine, voter: &Voter, chunk: &[u16], how: Sweep) -> Result
 
 /// Column of each pixel's label, or [`VOTE_NONE`].
 fn columns_of(voter: &Voter, chunk: &[u16], border: u32) -> Vec<u32> {
-    let column: BTreeMap<u16, u32> = chunk.iter().copied().zip(0..).collect();
-    let mut columns: Vec<u32> = voter.mask.ids.iter().map(|id| column.get(id).copied().unwrap_or(VOTE_NONE)).collect();
+    let mut column = vec![VOTE_NONE; 1 << 16];
+    chunk.iter().zip(0..).for_each(|(&id, at)| column[usize::from(id)] = at);
+    let mut columns: Vec<u32> = voter.mask.ids.iter().map(|&id| column[usize::from(id)]).collect();
     if let Some(photo) = voter.photo {
         columns.iter_mut().zip(&photo.rgba).filter(|(_, pixel)| pixel[3] < 128).for_each(|(to, _)| *to = VOTE_NONE);
     }
@@ -148,14 +149,15 @@ fn columns_of(voter: &Voter, chunk: &[u16], border: u32) -> Vec<u32> {
 fn most_labels(columns: &[u32], width: u32, tile_width: u32, tile_height: u32) -> usize {
     let tiles_x = width.div_ceil(tile_width) as usize;
     let height = columns.len() / width.max(1) as usize;
-    let mut seen = vec![BTreeSet::new(); tiles_x * height.div_ceil(tile_height as usize)];
+    // A bit per column, of which there are at most COLUMNS_MAX.
+    let mut seen = vec![0_u32; tiles_x * height.div_ceil(tile_height as usize)];
     for (y, row) in columns.chunks_exact(width as usize).enumerate() {
         for (x, &column) in row.iter().enumerate().filter(|(_, column)| **column != VOTE_NONE) {
             let tile = y / tile_height as usize * tiles_x + x / tile_width as usize;
-            seen[tile].insert(column);
+            seen[tile] |= 1 << column;
         }
     }
-    seen.iter().map(BTreeSet::len).max().unwrap_or(0)
+    seen.iter().map(|bits| bits.count_ones() as usize).max().unwrap_or(0)
 }
 
 /// Blending weight in pixels of a number of votes.

@@ -8,7 +8,7 @@ pub mod convolution;
 mod weights;
 
 use crate::error::{Error, Result};
-use crate::infer::protocol::score::Distance;
+use crate::infer::score::protocol::score::Distance;
 use convolution::{Planes, convolve, halve};
 pub use weights::Weights;
 

@@ -4,7 +4,7 @@
 //! knows better: two masks show one object if the Gaussians that make their pixels are the same (Gaga's idea of a memory
 //! of Gaussians, here with an exact count instead of the front-most layer).
 
-use super::ballot::{Ballot, weight};
+use crate::infer::vote::ballot::{Ballot, weight};
 use std::cmp::Ordering;
 use std::collections::{BTreeMap, BTreeSet, BinaryHeap};
 

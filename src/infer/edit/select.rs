@@ -7,6 +7,10 @@ use glam::DVec3;
 use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
 
+/// Least confidence of the Gaussians that an object is made of when it stands alone. What straddles an object and its
+/// surroundings, or shows in few pixels, sticks out of the object once nothing is around it.
+pub const SURE: f32 = 0.6;
+
 /// What a model knows about one label.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct LabelSummary {
@@ -57,10 +61,12 @@ pub fn summarise(model: &Gaussians) -> Vec<LabelSummary> {
     sums.into_iter().map(row).collect()
 }
 
-/// The Gaussians of these labels, in order. An error, which lists what there is, if one of the labels does not occur.
-pub fn extract(model: &Gaussians, labels: &[u32]) -> Result<Gaussians> {
+/// The Gaussians of these labels, in order, but for those whose confidence is known and less than `least` ([`SURE`]);
+/// there may be none left. An error, which lists what there is, if one of the labels does not occur.
+pub fn extract(model: &Gaussians, labels: &[u32], least: f32) -> Result<Gaussians> {
     let wanted = check_labels(model, labels)?;
-    Ok(model.filtered(|row| wanted.contains(&label_of(model, row))))
+    let sure = |row: usize| model.label_confidence.as_ref().is_none_or(|shares| shares[row] >= least);
+    Ok(model.filtered(|row| wanted.contains(&label_of(model, row)) && sure(row)))
 }
 
 /// All but the Gaussians of these labels, in order. The same errors as [`extract`], and one if nothing is left.

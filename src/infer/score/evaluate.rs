@@ -2,12 +2,12 @@
 
 use super::compared::{Compared, Watch};
 use super::metrics::COVERED;
-use super::occlusion::{Rule, by_contour};
-use super::render::{Rendered, render};
 use super::scores::{ObjectRender, ObjectTruth, Scores, ViewScores};
-use super::select::extract;
 use crate::engine::Engine;
 use crate::error::{Error, Result};
+use crate::infer::edit::select::extract;
+use crate::infer::occlusion::{Rule, by_contour};
+use crate::infer::render::{Rendered, render};
 use crate::scene::{Gaussians, LabelMap, View};
 use std::collections::BTreeMap;
 
@@ -18,6 +18,8 @@ pub struct Rendering {
     pub near: f32,
     /// Colour behind the scene; objects are rendered on black.
     pub background: [f32; 3],
+    /// Least confidence of an object's Gaussians where it is rendered alone.
+    pub min_confidence: f32,
 }
 
 /// What a scene knows about objects beyond what is visible of them.
@@ -60,7 +62,8 @@ pub fn evaluate(
         hidden.push(hidden_by(view.mask.as_ref(), &rendered));
     }
     for id in objects(views) {
-        let part = labels.filter(|labels| labels.contains(&id)).map(|_| extract(model, &[id])).transpose()?;
+        let there = labels.filter(|labels| labels.contains(&id));
+        let part = there.map(|_| extract(model, &[id], how.min_confidence)).transpose()?.filter(|p| !p.is_empty());
         if let Some(part) = &part {
             engine.upload_model(part)?;
         }

@@ -1,9 +1,9 @@
 //! From votes to a label and a confidence for every Gaussian.
 
 use super::ballot::{Ballot, Sweep, Voter, sweep, weight};
-use super::render::render;
 use crate::engine::Engine;
 use crate::error::{Error, Result};
+use crate::infer::render::render;
 use crate::scene::{Gaussians, LabelMap, UNLABELLED};
 use kiddo::{ImmutableKdTree, SquaredEuclidean};
 use rayon::prelude::*;
@@ -23,6 +23,15 @@ pub struct Decision {
     pub labels: Vec<u32>,
     /// Share of the winner in all votes [N], 0 to 1; 0 where nobody voted.
     pub confidence: Vec<f32>,
+}
+
+impl Decision {
+    /// Labels of less confidence become 0.
+    pub fn drop_unsure(&mut self, least: f32) {
+        for (label, _) in self.labels.iter_mut().zip(&self.confidence).filter(|(_, share)| **share < least) {
+            *label = UNLABELLED;
+        }
+    }
 }
 
 /// The label with most votes, the smaller of equals. A Gaussian with little weight of its own asks its nearest
@@ -117,14 +126,6 @@ pub fn trust(views: &[Agreement]) -> Vec<BTreeMap<u16, f32>> {
 pub fn apply(model: &mut Gaussians, decision: Decision) {
     model.labels = Some(decision.labels);
     model.label_confidence = Some(decision.confidence);
-}
-
-/// Labels of little confidence become 0.
-pub fn drop_unsure(model: &mut Gaussians, least: f32) {
-    let (Some(labels), Some(confidence)) = (&mut model.labels, &model.label_confidence) else { return };
-    for (label, _) in labels.iter_mut().zip(confidence).filter(|(_, confidence)| **confidence < least) {
-        *label = UNLABELLED;
-    }
 }
 
 /// Counts the votes of `voters` for the engine's model and decides. With the labels that the model has, `judges`, masks

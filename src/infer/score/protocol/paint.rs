@@ -3,8 +3,8 @@
 use super::score::Drawn;
 use crate::engine::Engine;
 use crate::error::Result;
+use crate::infer::edit::select::extract;
 use crate::infer::render::render;
-use crate::infer::select::extract;
 use crate::scene::{Camera, Gaussians, LabelMap};
 
 /// Renders a model with labels.
@@ -20,21 +20,23 @@ pub struct EnginePainter<'a> {
     engine: &'a mut Engine,
     model: &'a Gaussians,
     near: f32,
+    min_confidence: f32,
     /// The labels on the device; the whole model is `Some(None)`.
     there: Option<Option<Vec<u32>>>,
 }
 
 impl<'a> EnginePainter<'a> {
-    /// `near` is the near plane, world units.
-    pub fn new(engine: &'a mut Engine, model: &'a Gaussians, near: f32) -> Self {
-        Self { engine, model, near, there: None }
+    /// `near` is the near plane, world units; an object's Gaussians of less confidence are left out where it is drawn
+    /// alone.
+    pub fn new(engine: &'a mut Engine, model: &'a Gaussians, near: f32, min_confidence: f32) -> Self {
+        Self { engine, model, near, min_confidence, there: None }
     }
 
     fn upload(&mut self, labels: Option<&[u32]>) -> Result<()> {
         let wanted = labels.map(<[u32]>::to_vec);
         if self.there.as_ref() != Some(&wanted) {
             match labels {
-                Some(labels) => self.engine.upload_model(&extract(self.model, labels)?)?,
+                Some(labels) => self.engine.upload_model(&extract(self.model, labels, self.min_confidence)?)?,
                 None => self.engine.upload_model(self.model)?,
             }
             self.there = Some(wanted);

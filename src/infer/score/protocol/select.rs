@@ -4,7 +4,7 @@ use super::paint::Painter;
 use super::run::Bench;
 use super::{Prompt, Task};
 use crate::error::Result;
-use crate::infer::choose::{candidates, choose_labels};
+use crate::infer::edit::choose::{candidates, choose_labels};
 use crate::io::truth::TruthMask;
 use crate::scene::{LabelMap, View};
 use std::path::Path;

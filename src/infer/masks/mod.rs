@@ -1,0 +1,5 @@
+//! Masks made to agree between views: by overlap from frame to frame, or by the Gaussians that they own.
+
+pub mod associate;
+pub mod repair;
+pub mod track;
