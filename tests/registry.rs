@@ -44,9 +44,14 @@ fn lists() -> Vec<(Capacity, PassList)> {
             capacity.segment_pixels = if segments > 1 { 100_000 } else { 0 };
             let size = ROOM.size;
             let mut add = |list| all.push((capacity, list));
-            for (labels, sh_degree, update) in [(true, 3, true), (true, 0, false), (false, 3, true), (false, 1, false)]
-            {
-                add(pass::training_step(&shape, &capacity, Variant { labels, sh_degree, size, update }));
+            for (labels, lift, sh_degree, update) in [
+                (true, true, 3, true),
+                (true, false, 3, true),
+                (true, true, 0, false),
+                (false, false, 3, true),
+                (false, false, 1, false),
+            ] {
+                add(pass::training_step(&shape, &capacity, Variant { labels, lift, sh_degree, size, update }));
             }
             add(pass::render_view(&shape, &capacity, 3));
             add(pass::vote_view(&shape, &capacity, 2));

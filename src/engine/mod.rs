@@ -154,7 +154,13 @@ impl Engine {
     pub fn lists_of(shape: &KernelShape, capacity: &Capacity, room: &Room) -> Vec<PassList> {
         let mut lists = vec![pass::render_view(shape, capacity, 3)];
         if room.trained {
-            let variant = Variant { labels: room.labels.is_some(), sh_degree: 3, size: room.size, update: true };
+            let variant = Variant {
+                labels: room.labels.is_some(),
+                lift: room.labels.is_some(),
+                sh_degree: 3,
+                size: room.size,
+                update: true,
+            };
             lists.insert(0, pass::training_step(shape, capacity, variant));
             lists.push(pass::densify_apply(shape, capacity, room.labels.is_some()));
         }

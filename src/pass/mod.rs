@@ -27,8 +27,10 @@ use crate::plan::{Buf, Capacity, PassList};
 /// What a recorded list depends on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Variant {
-    /// Object layers and lift are in the list.
+    /// Object layers are in the list.
     pub labels: bool,
+    /// So is the paper's lift of labels from the view; only with `labels`.
+    pub lift: bool,
     /// Active degree of the spherical harmonics.
     pub sh_degree: u32,
     /// Largest image, px; bounds the grids of the loss.
@@ -63,7 +65,7 @@ pub fn training_step(shape: &KernelShape, capacity: &Capacity, variant: Variant)
     if variant.update {
         optimize::adam(&mut b);
     }
-    if variant.labels {
+    if variant.lift {
         lift::resolve(&mut b);
     }
     end(b)

@@ -112,6 +112,13 @@ pub struct Job {
     pub stamp: u32,
 }
 
+impl Job {
+    /// True if the paper's lift is in the step.
+    pub fn lifts(&self, config: &TrainConfig) -> bool {
+        self.labels && config.label_rule == LabelRule::Main
+    }
+}
+
 /// What is the same for all steps.
 #[derive(Clone, Copy, Debug)]
 pub struct Fixed {
@@ -133,7 +140,7 @@ pub fn uniforms(job: &Job, view: &TrainView, config: &TrainConfig, fixed: Fixed,
         label_weight: config.label_weight,
         label_alpha: alpha_weight(config),
         label_threshold: config.label_threshold,
-        lift: u32::from(job.labels && config.label_rule == LabelRule::Main),
+        lift: u32::from(job.lifts(config)),
         gpf: u32::from(config.gpf),
         occluder_words: labels.div_ceil(32),
         stamp: job.stamp,

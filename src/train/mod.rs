@@ -243,6 +243,7 @@ impl Trainer {
     fn key(&self, job: &Job) -> ListKey {
         ListKey::Train(Variant {
             labels: job.labels,
+            lift: job.lifts(&self.config),
             sh_degree: self.config.sh_degree_at(job.step),
             size: self.engine.room().size,
             update: job.update,

@@ -146,7 +146,8 @@ impl Rig {
     pub fn key(&self) -> ListKey {
         let (labels, update) = (self.job.labels, self.job.update);
         let size = (self.scene.camera.width, self.scene.camera.height);
-        ListKey::Train(Variant { labels, sh_degree: self.config.sh_degree, size, update })
+        let lift = self.job.lifts(&self.config);
+        ListKey::Train(Variant { labels, lift, sh_degree: self.config.sh_degree, size, update })
     }
 
     /// Runs a training step; no pass may write outside of its buffers.

@@ -114,10 +114,10 @@ pub fn engine_lists(shape: KernelShape) -> (Capacity, Vec<PassList>) {
         sort_lanes: 64,
         segments: 2,
     };
-    let variant = Variant { labels: true, sh_degree: 3, size: (256, 256), update: true };
+    let variant = Variant { labels: true, lift: true, sh_degree: 3, size: (256, 256), update: true };
     let lists = vec![
         pass::training_step(&shape, &capacity, variant),
-        pass::training_step(&shape, &capacity, Variant { labels: false, sh_degree: 0, ..variant }),
+        pass::training_step(&shape, &capacity, Variant { labels: false, lift: false, sh_degree: 0, ..variant }),
         pass::render_view(&shape, &capacity, 3),
         pass::densify_count(&shape, &capacity),
         pass::densify_apply(&shape, &capacity, true),
