@@ -272,6 +272,9 @@ pub struct ProfileArgs {
     /// Train so many steps first, so that a trained scene is measured.
     #[arg(long, value_name = "S", default_value_t = 0)]
     pub from_step: u32,
+    /// Start from this model, a PLY or the folder that `labelgs train` made, instead of the scene's points.
+    #[arg(long, value_name = "MODEL")]
+    pub model: Option<PathBuf>,
     /// Settings of training in TOML, as config.toml of an earlier run. Labels start at --from-step at the latest.
     #[arg(long, value_name = "FILE.toml")]
     pub config: Option<PathBuf>,

@@ -4,7 +4,7 @@ use super::args::ProfileArgs;
 use super::log::Progress;
 use super::profile_report::{Clocks, Profile, Workers};
 use super::scene::{open_gpu, open_scene};
-use super::{Context, config, stdout};
+use super::{Context, config, open_model, stdout};
 use crate::gpu::Gpu;
 use crate::io::init;
 use crate::plan::PlanOptions;
@@ -27,7 +27,10 @@ pub fn run(args: &ProfileArgs, context: &Context) -> Result<()> {
     }
     let mut profile = Profile::new(&gpu, workers(&gpu)?, args);
     profile.views = dataset.train.len();
-    let model = init::initial_gaussians(&dataset, config.seed, init::RANDOM_COUNT)?;
+    let model = match &args.model {
+        Some(path) => open_model(path)?,
+        None => init::initial_gaussians(&dataset, config.seed, init::RANDOM_COUNT)?,
+    };
     let plan = PlanOptions { barrier_everywhere: !args.overlap, ..PlanOptions::default() };
     let options = SchedulerOptions { plan, timestamps: true, ..SchedulerOptions::default() };
     let mut trainer = Trainer::new(Arc::clone(&gpu), config, &mut dataset, &model, options)?;
