@@ -180,7 +180,7 @@ fn orders_and_sums() {
     assert_eq!(exclusive_scan(&[3, 0, 2, 7]), (vec![0, 3, 3, 5], 12));
     assert_eq!(compact(&[0, 4, 0, 1]), [1, 3]);
     let ranges = tile_ranges(&[0, 0, 3], 4);
-    assert_eq!(ranges, [[0, 2], [0, 0], [0, 0], [2, 3]]);
+    assert_eq!(ranges, [[0, 2], [2, 2], [2, 2], [2, 3]]);
     assert_eq!(tile_lengths(&ranges), (2, vec![true, false, false, true]));
 }
 

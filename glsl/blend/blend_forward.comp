@@ -6,7 +6,7 @@
 #include "blend_tile.glsl"
 // blend_forward — alpha-blend one tile of one layer front to back.
 // Work:    one subgroup (= workgroup) a tile: the scene's tiles, then (variant labels) the occupied layer tiles.
-// Reads:   step, counters; tile_starts, tile_ends [layers * T]; sorted_splats [I]; splats [V,3]
+// Reads:   step, counters; tile_starts, tile_ends [layers * T]; slots [I]; splat_from_instance [I]; splats [V,3]
 //          variant labels: layer_tiles; target [P] RGBA8; view_labels [P]; layer_occluders; label_from_layer;
 //          layer_weights; gaussian_from_splat [V]
 // Writes:  image [P] linear RGB over the background, w = final transmittance; last [P] = 1 + index of the last splat
@@ -26,8 +26,9 @@ READ1(0, StepUniforms, step);
 INOUT1(1, Counters, counters);
 FETCHU(2, tile_starts);
 FETCHU(3, tile_ends);
-FETCHU(4, sorted_splats);
+FETCHU(4, slots);
 FETCH4(5, splats);
+FETCHU(19, splat_from_instance);
 WRITE(6, vec4, image);
 WRITE(7, uint, last);
 #ifdef MAIN
@@ -149,7 +150,7 @@ void main() {
         }
         uint count = min(SUBGROUP_SIZE, end - base);
         walked += count;
-        uint index = fetchu(sorted_splats, min(base + lane, end - 1u));
+        uint index = fetchu(splat_from_instance, fetchu(slots, min(base + lane, end - 1u)));
         vec4 r0 = fetch4(splats, 3u * index), r1 = fetch4(splats, 3u * index + 1u), r2 = fetch4(splats, 3u * index + 2u);
         TileSplat mine = TileSplat(r0.x - corner.x, r0.y - corner.y, r0.z, r0.w, r1.x, r1.y, vec3(r1.zw, r2.x), r2.y);
         for (uint j = 0u; j < count; j++) {

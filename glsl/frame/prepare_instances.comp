@@ -2,11 +2,10 @@
 #include "layout.glsl"
 #include "constants.glsl"
 #include "step.glsl"
-#include "dispatch.glsl"
-// prepare_instances — size the dispatches over (splat, tile) pairs; flag an overflow of their buffers.
+// prepare_instances — flag an overflow of the buffers of (splat, tile) pairs, and make none.
 // Work:    one invocation.
 // Reads:   counters.instance_count (what is needed, even beyond capacity)
-// Writes:  dispatch_args (instances); failure (sticky bit); on overflow dispatch_args (splats) become 0
+// Writes:  on overflow failure (sticky bit), and dispatch_args (splats) become 0
 // Mirror:  none (bookkeeping; tests/overflow.rs)
 
 layout(local_size_x = 1) in;
@@ -17,14 +16,8 @@ INOUT1(2, uint, failure);
 
 void main() {
     uint needed = counters.instance_count;
-    bool fits = needed <= INSTANCE_CAPACITY;
-    if (!fits) {
+    if (needed > INSTANCE_CAPACITY) {
         failure |= FAILED_INSTANCES;
-    }
-    uvec3 groups = folded_groups(fits ? (needed + 63u) / 64u : 0u);
-    dispatch_args[ARGS_INSTANCES] = groups.x;
-    dispatch_args[ARGS_INSTANCES + 1u] = groups.y;
-    if (!fits) {
         dispatch_args[ARGS_SPLATS] = 0u;
     }
 }

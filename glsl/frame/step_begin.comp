@@ -28,6 +28,5 @@ void main() {
     put(ARGS_SH2, folded_groups((n * 4u + 63u) / 64u));
     put(ARGS_SH3, folded_groups((n * 6u + 63u) / 64u));
     put(ARGS_SPLATS, uvec3(0u, 1u, 1u));
-    put(ARGS_INSTANCES, uvec3(0u, 1u, 1u));
     put(ARGS_BLEND, uvec3(0u, 1u, 1u));
 }

@@ -23,8 +23,7 @@ const uint KEY_INVISIBLE = 0xffffffffu;
 // Entries of dispatch_args, 3 words each (VkDispatchIndirectCommand).
 const uint ARGS_GAUSSIANS = 0u;
 const uint ARGS_SPLATS = 3u;
-const uint ARGS_INSTANCES = 6u;
-const uint ARGS_BLEND = 9u;
-const uint ARGS_SH1 = 12u;
-const uint ARGS_SH2 = 15u;
-const uint ARGS_SH3 = 18u;
+const uint ARGS_BLEND = 6u;
+const uint ARGS_SH1 = 9u;
+const uint ARGS_SH2 = 12u;
+const uint ARGS_SH3 = 15u;

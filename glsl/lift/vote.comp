@@ -7,7 +7,7 @@
 // vote — add up, for each Gaussian and each label, the weight with which it shows in the pixels of that label.
 // Work:    one subgroup (= workgroup) a tile of the scene, jobs as in blend_forward. A walk counts four labels of the
 //          tile; tiles with more are walked again (specialisation ROUND).
-// Reads:   step; tile_starts, tile_ends [T]; sorted_splats [I]; splats [V,3]; gaussian_from_splat [V];
+// Reads:   step; tile_starts, tile_ends [T]; slots, splat_from_instance [I]; splats [V,3]; gaussian_from_splat [V];
 //          view_labels [P] column of each pixel's label, VOTE_NONE: the pixel has no say; vote_weights [columns]
 // Writes:  votes_low, votes_high [N, columns]: 64 bits with VOTE_ONE to a pixel of weight 1, times the column's weight
 // Math:    A[j, k] = sum over pixels v with label k of alpha_j T_j (FlashSplat's sums, every contributor counts)
@@ -18,13 +18,14 @@ layout(constant_id = 15) const uint ROUND = 0;
 READ1(0, StepUniforms, step);
 FETCHU(1, tile_starts);
 FETCHU(2, tile_ends);
-FETCHU(3, sorted_splats);
+FETCHU(3, slots);
 FETCH4(4, splats);
 FETCHU(5, gaussian_from_splat);
 FETCHU(6, view_labels);
 READ(7, float, vote_weights);
 INOUT(8, uint, votes_low);
 INOUT(9, uint, votes_high);
+FETCHU(10, splat_from_instance);
 #ifdef SEGMENTED
 INOUT(30, vec4, segment_colours); // [jobs, pixels of a tile], w: transmittance with the sign of `T`
 #endif
@@ -95,7 +96,7 @@ void main() {
             break;
         }
         uint count = min(SUBGROUP_SIZE, end - base);
-        uint index = fetchu(sorted_splats, min(base + lane, end - 1u));
+        uint index = fetchu(splat_from_instance, fetchu(slots, min(base + lane, end - 1u)));
         vec4 r0 = fetch4(splats, 3u * index), r1 = fetch4(splats, 3u * index + 1u);
         float sum[LABELS_PER_WALK];
         [[unroll]] for (uint q = 0u; q < LABELS_PER_WALK; q++) {

@@ -2,37 +2,52 @@
 #include "layout.glsl"
 #include "constants.glsl"
 #include "step.glsl"
-#include "dispatch.glsl"
-// tile_ranges — find where each tile's splats begin and end in the sorted list, and resolve slots to splats.
-// Work:    64 instances a workgroup. tile_starts and tile_ends are zero before.
-// Reads:   counters, failure; tile_keys [I] sorted; slots [I] (pre-sort position); splat_from_instance [I]
-// Writes:  tile_starts, tile_ends [layers * T]; sorted_splats [I]
-// Mirror:  tests/reference/tile.rs::tile_ranges
+// tile_ranges — where each tile's list begins and ends among the sorted pairs, the longest list, and (variant labels)
+// which tiles of object layers hold anything.
+// Work:    one tile of one layer an invocation; the grid covers all layers that the plan allows. Tiles are few beside
+//          pairs, so that a binary search by each tile is cheaper than a look at each pair.
+// Reads:   step, counters, failure; tile_keys [I] sorted
+// Writes:  tile_starts, tile_ends [layers * T], equal where a list is empty; counters.longest_list (integer maximum, any
+//          order); variant labels: layer_occupied [layers * T] 0 or 1
+// Mirror:  tests/reference/tile.rs::tile_ranges, tile.rs::tile_lengths
 
 layout(local_size_x = 64) in;
-READ1(0, Counters, counters);
+READ1(0, StepUniforms, step);
 READ1(1, uint, failure);
-FETCHU(2, tile_keys);
-FETCHU(3, slots);
-FETCHU(4, splat_from_instance);
-WRITE(5, uint, tile_starts);
-WRITE(6, uint, tile_ends);
-WRITE(7, uint, sorted_splats);
+INOUT1(2, Counters, counters);
+FETCHU(3, tile_keys);
+WRITE(4, uint, tile_starts);
+WRITE(5, uint, tile_ends);
+#ifdef LABELS
+WRITE(6, uint, layer_occupied);
+#endif
+
+// The first pair whose key is not less.
+uint first_not_less(uint key, uint count) {
+    uint low = 0u, high = count;
+    while (low < high) {
+        uint middle = (low + high) / 2u;
+        bool less = fetchu(tile_keys, middle) < key;
+        low = less ? middle + 1u : low;
+        high = less ? high : middle;
+    }
+    return low;
+}
 
 void main() {
-    uint i = linear_group_id() * 64u + gl_LocalInvocationID.x;
-    uint n = counters.instance_count;
-    if (i >= n || failure != 0u) {
-        return;
+    uint t = gl_GlobalInvocationID.x;
+    bool some = t < step.tile_count * (step.layer_count + 1u);
+    uint count = some && failure == 0u ? counters.instance_count : 0u;
+    uint start = first_not_less(t, count), end = first_not_less(t + 1u, count);
+    uint longest = subgroupMax(end - start);
+    if (subgroupElect() && longest > 0u) {
+        atomicMax(counters.longest_list, longest);
     }
-    uint key = fetchu(tile_keys, i);
-    uint before = i > 0u ? fetchu(tile_keys, i - 1u) : ~key;
-    uint after = i + 1u < n ? fetchu(tile_keys, i + 1u) : ~key;
-    if (before != key) {
-        tile_starts[key] = i;
+    if (some) {
+        tile_starts[t] = start;
+        tile_ends[t] = end;
+#ifdef LABELS
+        layer_occupied[t] = t >= step.tile_count && end > start ? 1u : 0u;
+#endif
     }
-    if (after != key) {
-        tile_ends[key] = i + 1u;
-    }
-    sorted_splats[i] = fetchu(splat_from_instance, fetchu(slots, i));
 }

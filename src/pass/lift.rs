@@ -14,14 +14,14 @@ pub fn resolve(b: &mut Builder) {
 }
 
 /// Adds the weights of all contributors to the votes for the labels of their pixels.
-pub fn vote(b: &mut Builder, rounds: u32) {
+pub fn vote(b: &mut Builder, slots: Buf, rounds: u32) {
     let (subgroup, tile_width, tile_height) = (b.shape.subgroup, b.shape.tile_width, b.shape.tile_height);
     let (segments, length) = (b.capacity.segments as u32, b.shape.segment_length);
     for round in 0..rounds {
         if segments == 1 {
             pass!(b, texel vote {
                 step: Buf::STEP, tile_starts: Buf::TILE_STARTS, tile_ends: Buf::TILE_ENDS,
-                sorted_splats: Buf::SORTED_SPLATS, splats: Buf::SPLATS, gaussian_from_splat: GAUSSIAN_FROM_SPLAT,
+                slots: slots, splat_from_instance: Buf::SPLAT_FROM_INSTANCE, splats: Buf::SPLATS, gaussian_from_splat: GAUSSIAN_FROM_SPLAT,
                 view_labels: Buf::VIEW_LABELS, vote_weights: Buf::VOTE_WEIGHTS, votes_low: Buf::VOTES_LOW,
                 votes_high: Buf::VOTES_HIGH,
             } [subgroup_size: subgroup, tile_width: tile_width, tile_height: tile_height, round: round],
@@ -31,7 +31,7 @@ pub fn vote(b: &mut Builder, rounds: u32) {
         for segment in 0..segments {
             pass!(b, texel vote_segmented {
                 step: Buf::STEP, tile_starts: Buf::TILE_STARTS, tile_ends: Buf::TILE_ENDS,
-                sorted_splats: Buf::SORTED_SPLATS, splats: Buf::SPLATS, gaussian_from_splat: GAUSSIAN_FROM_SPLAT,
+                slots: slots, splat_from_instance: Buf::SPLAT_FROM_INSTANCE, splats: Buf::SPLATS, gaussian_from_splat: GAUSSIAN_FROM_SPLAT,
                 view_labels: Buf::VIEW_LABELS, vote_weights: Buf::VOTE_WEIGHTS, votes_low: Buf::VOTES_LOW,
                 votes_high: Buf::VOTES_HIGH, segment_colours: Buf::SEGMENT_COLOURS,
             } [subgroup_size: subgroup, tile_width: tile_width, tile_height: tile_height, round: round,

@@ -57,7 +57,7 @@ pub fn training_step(shape: &KernelShape, capacity: &Capacity, variant: Variant)
     let mut b = begin("training step", shape, capacity, variant.labels, variant.sh_degree);
     project::visible_splats(&mut b);
     let slots = tile::bin_splats(&mut b);
-    blend::blend_forward(&mut b);
+    blend::blend_forward(&mut b, slots);
     loss::photo_loss(&mut b, variant.size.0, variant.size.1);
     blend::blend_backward(&mut b, slots);
     gather::gather(&mut b);
@@ -75,8 +75,8 @@ pub fn training_step(shape: &KernelShape, capacity: &Capacity, variant: Variant)
 pub fn render_view(shape: &KernelShape, capacity: &Capacity, sh_degree: u32) -> PassList {
     let mut b = begin("render", shape, capacity, false, sh_degree);
     project::visible_splats(&mut b);
-    tile::bin_splats(&mut b);
-    blend::blend_forward_main(&mut b);
+    let slots = tile::bin_splats(&mut b);
+    blend::blend_forward_main(&mut b, slots);
     end(b)
 }
 
@@ -84,8 +84,8 @@ pub fn render_view(shape: &KernelShape, capacity: &Capacity, sh_degree: u32) -> 
 pub fn vote_view(shape: &KernelShape, capacity: &Capacity, rounds: u32) -> PassList {
     let mut b = begin("votes", shape, capacity, false, 0);
     project::visible_splats(&mut b);
-    tile::bin_splats(&mut b);
-    lift::vote(&mut b, rounds);
+    let slots = tile::bin_splats(&mut b);
+    lift::vote(&mut b, slots, rounds);
     end(b)
 }
 

@@ -1,12 +1,11 @@
 //! Which splats each tile holds, front to back, for the scene and for each object layer.
 
-use super::build::{Builder, Count, ONE, args, over_splats};
+use super::build::{Builder, Count, ONE, over_splats};
 use super::project::GAUSSIAN_FROM_SPLAT;
 use super::scan::{self, Total};
 use super::sort::{self, SortBuffers};
 use crate::pass;
 use crate::plan::{Buf, Grid};
-use crate::shaders::constants;
 
 /// Lists the (splat, tile) pairs, sorts them by layer and tile, and finds each tile's range. Returns the buffer that
 /// holds the slots (places before the sort) of the sorted pairs.
@@ -20,14 +19,7 @@ pub fn bin_splats(b: &mut Builder) -> Buf {
         SortBuffers { keys: [Buf::TILE_KEYS_A, Buf::TILE_KEYS_B], values: [Buf::TILE_VALUES_A, Buf::TILE_VALUES_B] };
     let bits = 64 - b.capacity.virtual_tiles.saturating_sub(1).leading_zeros();
     let (keys, slots) = sort::sort(b, buffers, bits, Count::Instances, true);
-    b.list.fill(Buf::TILE_STARTS, 0);
-    b.list.fill(Buf::TILE_ENDS, 0);
-    pass!(b, texel tile_ranges {
-        counters: Buf::COUNTERS, failure: Buf::FAILURE, tile_keys: keys, slots: slots,
-        splat_from_instance: Buf::SPLAT_FROM_INSTANCE, tile_starts: Buf::TILE_STARTS, tile_ends: Buf::TILE_ENDS,
-        sorted_splats: Buf::SORTED_SPLATS,
-    } [], args(constants::ARGS_INSTANCES));
-    tile_lengths(b);
+    tile_ranges(b, keys);
     let layer_tiles = b.capacity.layer_tiles as u32;
     let longest = b.shape.segment_length * b.capacity.segments as u32;
     pass!(b, prepare_blend {
@@ -54,18 +46,18 @@ fn emit_instances(b: &mut Builder) {
     }
 }
 
-fn tile_lengths(b: &mut Builder) {
+fn tile_ranges(b: &mut Builder, keys: Buf) {
     let groups = Grid::Groups((b.capacity.virtual_tiles as u32).div_ceil(64), 1, 1);
     if !b.labels {
-        pass!(b, texel tile_lengths {
-            step: Buf::STEP, failure: Buf::FAILURE, tile_starts: Buf::TILE_STARTS, tile_ends: Buf::TILE_ENDS,
-            counters: Buf::COUNTERS,
+        pass!(b, texel tile_ranges {
+            step: Buf::STEP, failure: Buf::FAILURE, counters: Buf::COUNTERS, tile_keys: keys,
+            tile_starts: Buf::TILE_STARTS, tile_ends: Buf::TILE_ENDS,
         } [], groups);
         return;
     }
-    pass!(b, texel tile_lengths_labels {
-        step: Buf::STEP, failure: Buf::FAILURE, tile_starts: Buf::TILE_STARTS, tile_ends: Buf::TILE_ENDS,
-        counters: Buf::COUNTERS, layer_occupied: Buf::LAYER_OCCUPIED,
+    pass!(b, texel tile_ranges_labels {
+        step: Buf::STEP, failure: Buf::FAILURE, counters: Buf::COUNTERS, tile_keys: keys,
+        tile_starts: Buf::TILE_STARTS, tile_ends: Buf::TILE_ENDS, layer_occupied: Buf::LAYER_OCCUPIED,
     } [], groups);
     scan::scan(b, Buf::LAYER_OCCUPIED, Buf::LAYER_OFFSETS, Count::VirtualTiles, Total::LayerTiles);
     let layer_tiles = b.capacity.layer_tiles as u32;

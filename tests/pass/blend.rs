@@ -35,7 +35,7 @@ fn last_splats(rig: &mut Rig) -> Vec<usize> {
     let (shape, (width, _), pixels) = (*rig.engine.shape(), rig.size(), rig.pixels());
     let counters = rig.engine.report(0).expect("a report").counters;
     let last = rig.get::<u32>(Buf::LAST, pixels);
-    let sorted = rig.get::<u32>(Buf::SORTED_SPLATS, counters.instance_count as usize);
+    let sorted = rig.sorted_splats(counters.instance_count as usize);
     let uniforms = rig.uniforms();
     let starts = rig.get::<u32>(Buf::TILE_STARTS, uniforms.tile_count as usize);
     let tile_of = |pixel: usize| {

@@ -150,6 +150,25 @@ impl Rig {
         ListKey::Train(Variant { labels, lift, sh_degree: self.config.sh_degree, size, update })
     }
 
+    /// The device's sorted pairs: keys and slots.
+    pub fn sorted_pairs(&mut self, count: usize) -> (Vec<u32>, Vec<u32>) {
+        let virtual_tiles = self.engine.sched().capacity().virtual_tiles;
+        let bits = 64 - (virtual_tiles - 1).leading_zeros();
+        let passes = bits.div_ceil(self.engine.shape().digit_bits);
+        let (keys, values) = if passes.is_multiple_of(2) {
+            (Buf::TILE_KEYS_A, Buf::TILE_VALUES_A)
+        } else {
+            (Buf::TILE_KEYS_B, Buf::TILE_VALUES_B)
+        };
+        (self.get(keys, count), self.get(values, count))
+    }
+
+    /// The splats of the sorted (splat, tile) pairs.
+    pub fn sorted_splats(&mut self, count: usize) -> Vec<u32> {
+        let splat_from_instance = self.get::<u32>(Buf::SPLAT_FROM_INSTANCE, count);
+        self.sorted_pairs(count).1.into_iter().map(|slot| splat_from_instance[slot as usize]).collect()
+    }
+
     /// Runs a training step; no pass may write outside of its buffers.
     pub fn train(&mut self) -> Report {
         let key = self.key();

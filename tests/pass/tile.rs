@@ -12,19 +12,6 @@ use labelgs::plan::Buf;
 /// Log2 units that the device's test may err on the side of one tile too many: 0.01, and 2e-6 of the exponent's terms.
 const SLACK: f64 = 0.02;
 
-/// The device's sorted pairs: keys and slots.
-fn sorted_pairs(rig: &mut Rig, count: usize) -> (Vec<u32>, Vec<u32>) {
-    let virtual_tiles = rig.engine.sched().capacity().virtual_tiles;
-    let bits = 64 - (virtual_tiles - 1).leading_zeros();
-    let passes = bits.div_ceil(rig.engine.shape().digit_bits);
-    let (keys, values) = if passes.is_multiple_of(2) {
-        (Buf::TILE_KEYS_A, Buf::TILE_VALUES_A)
-    } else {
-        (Buf::TILE_KEYS_B, Buf::TILE_VALUES_B)
-    };
-    (rig.get(keys, count), rig.get(values, count))
-}
-
 #[test]
 fn tiles_of_splats_and_lists_of_tiles() {
     let Some(turn) = device() else { return };
@@ -38,7 +25,7 @@ fn tiles_of_splats_and_lists_of_tiles() {
     check("instance_offsets", exact(&rig.get::<u32>(Buf::INSTANCE_OFFSETS, splats.len()), &offsets));
     assert_eq!(counters.instance_count, total);
 
-    let (sorted_keys, slots) = sorted_pairs(&mut rig, pairs);
+    let (sorted_keys, slots) = rig.sorted_pairs(pairs);
     let mut keys = vec![u32::MAX; pairs];
     slots.iter().zip(&sorted_keys).for_each(|(&slot, &key)| keys[slot as usize] = key);
     check("order of pairs", exact(&slots, &radix_sort(&keys).iter().map(|&slot| slot as u32).collect::<Vec<_>>()));
@@ -80,7 +67,6 @@ fn lists(rig: &mut Rig, sorted_keys: &[u32], slots: &[u32], splat_from_instance:
     check("tile_starts", exact(&rig.get::<u32>(Buf::TILE_STARTS, virtual_tiles), &starts));
     check("tile_ends", exact(&rig.get::<u32>(Buf::TILE_ENDS, virtual_tiles), &ends));
     let sorted: Vec<u32> = slots.iter().map(|&slot| splat_from_instance[slot as usize]).collect();
-    check("sorted_splats", exact(&rig.get::<u32>(Buf::SORTED_SPLATS, slots.len()), &sorted));
     assert!(ranges.iter().all(|&[a, b]| sorted[a as usize..b as usize].is_sorted()), "lists run front to back");
 
     let (longest, occupied) = tile_lengths(&ranges);

@@ -158,15 +158,8 @@ pub fn tile_lengths(ranges: &[[u32; 2]]) -> (u32, Vec<bool>) {
     (lengths.clone().max().unwrap_or(0), lengths.map(|length| length > 0).collect())
 }
 
-/// [start, end) of each key in a sorted list of keys; (0, 0) for keys that do not occur.
+/// [start, end) of each key in a sorted list of keys; keys that do not occur begin and end where they would be.
 pub fn tile_ranges(sorted_keys: &[u32], keys: usize) -> Vec<[u32; 2]> {
-    let mut ranges = vec![[0, 0]; keys];
-    for (place, &key) in sorted_keys.iter().enumerate() {
-        let range = &mut ranges[key as usize];
-        if range[1] == 0 {
-            range[0] = place as u32;
-        }
-        range[1] = place as u32 + 1;
-    }
-    ranges
+    let before = |key: usize| sorted_keys.iter().filter(|&&found| (found as usize) < key).count() as u32;
+    (0..keys).map(|key| [before(key), before(key + 1)]).collect()
 }
