@@ -45,8 +45,9 @@ pub(super) fn train(args: &TrainArgs, context: &Context) -> Result<(serde_json::
     let gpu = open_gpu(context)?;
     let mut model = init::initial_gaussians(&dataset, config.seed, init::RANDOM_COUNT)?;
     bound_start(&mut model, &config);
-    let room = train::room(&dataset, &config, model.len() as u64 * 2)?;
-    let memory = Engine::predict(&gpu, &room)?;
+    let options = SchedulerOptions { memory_limit: args.memory_limit, ..SchedulerOptions::default() };
+    let room = train::start_room(&gpu, &dataset, &config, model.len(), options)?;
+    let memory = Engine::predict(&gpu, &room, options)?;
     tracing::info!(
         "memory to start with: {:.1} MiB on the device, for {} Gaussians and {} x {} px; it grows with the model",
         memory.total as f64 / f64::from(1 << 20),
@@ -59,7 +60,7 @@ pub(super) fn train(args: &TrainArgs, context: &Context) -> Result<(serde_json::
     let cameras: Vec<_> = dataset.all().into_iter().map(|view| (view.name.as_str(), &view.camera)).collect();
     record::save_cameras(out, &cameras)?;
     let preview = preview_view(&dataset);
-    let mut trainer = Trainer::new(gpu, config.clone(), &mut dataset, &model, SchedulerOptions::default())?;
+    let mut trainer = Trainer::new(gpu, config.clone(), &mut dataset, &model, options)?;
     if let Some(table) = &occluders {
         let without = trainer.set_occluders(&table.views);
         if let Some(first) = without.first() {

@@ -2,7 +2,7 @@
 //! `TrainConfig::default()`.
 
 use super::args::JsonFlag;
-use super::values::{colour, count, samples, switch};
+use super::values::{bytes, colour, count, samples, switch};
 use crate::scene::DepthKind;
 use crate::train::TrainConfig;
 use crate::train::config::{LabelRule, Occlusion};
@@ -37,6 +37,9 @@ pub struct TrainArgs {
     #[command(flatten)]
     pub json: JsonFlag,
 
+    /// Most memory of the device to use, such as 1500M or 2G: the number of Gaussians stays below what that holds.
+    #[arg(long, value_name = "SIZE", value_parser = bytes)]
+    pub memory_limit: Option<u64>,
     /// The run.
     #[command(flatten)]
     pub run: RunFlags,

@@ -120,6 +120,21 @@ pub fn size(text: &str) -> Result<Size, String> {
     Ok(Size(side(width)?, side(height)?))
 }
 
+/// Bytes, such as `1500M` or `2G`, in powers of 1024.
+pub fn bytes(text: &str) -> Result<u64, String> {
+    let wrong =
+        || format!("`{text}` is no amount of memory; expected a number with K, M or G behind it, such as 1500M");
+    let (number, unit) = text.trim().split_at(text.trim().len().saturating_sub(1));
+    let shift = match unit.to_ascii_uppercase().as_str() {
+        "K" => 10,
+        "M" => 20,
+        "G" => 30,
+        _ => return Err(wrong()),
+    };
+    let value = number.parse().ok().filter(|value: &f64| value.is_finite() && *value > 0.0).ok_or_else(wrong)?;
+    Ok((value * f64::from(1_u32 << shift)) as u64)
+}
+
 /// A colour: a name, or three numbers from 0 to 1.
 pub fn colour(text: &str) -> Result<[f32; 3], String> {
     match text {

@@ -34,6 +34,16 @@ pub struct SchedulerOptions {
     pub poison_step: bool,
     /// Each item leaves a mark that the host sees, to name the last one when the device is lost.
     pub crash_markers: bool,
+    /// Use no more than so many bytes of the device's memory.
+    pub memory_limit: Option<u64>,
+}
+
+impl SchedulerOptions {
+    /// The limits that plans respect on a device.
+    pub fn limits(&self, gpu: &Gpu) -> Limits {
+        let limits = limits_of(gpu);
+        Limits { max_memory: self.memory_limit.unwrap_or(u64::MAX).min(limits.max_memory), ..limits }
+    }
 }
 
 /// A prepared pass list.
@@ -106,7 +116,7 @@ impl Scheduler {
         capacity: Capacity,
         options: SchedulerOptions,
     ) -> Result<Self> {
-        let limits = limits_of(&gpu);
+        let limits = options.limits(&gpu);
         MemoryReport::predict(table, &capacity, &[], &limits, options.plan)?;
         let mut scheduler = Self {
             lists: Vec::new(),
@@ -136,6 +146,11 @@ impl Scheduler {
         limits: &Limits,
     ) -> Result<MemoryReport> {
         MemoryReport::predict(table, capacity, lists, limits, PlanOptions::default())
+    }
+
+    /// The memory that some lists would need with other capacities, under the limits and options of this scheduler.
+    pub fn predict_here(&self, capacity: &Capacity, lists: &[PassList]) -> Result<MemoryReport> {
+        MemoryReport::predict(self.table, capacity, lists, &self.limits, self.options.plan)
     }
 
     /// Plans and records a list.

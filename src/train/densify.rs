@@ -23,7 +23,8 @@ impl Trainer {
     pub(super) fn densify(&mut self, job: &Job) -> Result<Densified> {
         let uniforms = self.densify_uniforms(job);
         let counted = self.count_densified(uniforms)?;
-        let uniforms = self.bounded(uniforms, counted.densified_count)?;
+        let bound = self.bound(counted.densified_count)?;
+        let uniforms = self.bounded(uniforms, counted.densified_count, bound)?;
         let counted = self.count_densified(uniforms)?;
         self.engine.make_room_for_gaussians(u64::from(counted.densified_count))?;
         let list = self.engine.list(ListKey::DensifyApply)?;
@@ -61,9 +62,19 @@ impl Trainer {
         Ok(self.engine.report(0)?.counters)
     }
 
+    /// The most Gaussians that there may be, of `count` that are wanted: what was asked for, and what memory holds.
+    fn bound(&mut self, count: u32) -> Result<u64> {
+        let wanted = u64::from(count).min(self.max_gaussians);
+        let fits = self.engine.most_gaussians(wanted)?;
+        if fits < wanted && !self.memory_bounds {
+            self.memory_bounds = true;
+            tracing::warn!("memory holds {fits} Gaussians, {wanted} are wanted; from here on only the best may grow");
+        }
+        Ok(fits.min(self.max_gaussians))
+    }
+
     /// Raises the gradient threshold until the result fits the bound: those that need it most grow first.
-    fn bounded(&mut self, uniforms: StepUniforms, count: u32) -> Result<StepUniforms> {
-        let bound = self.max_gaussians;
+    fn bounded(&mut self, uniforms: StepUniforms, count: u32, bound: u64) -> Result<StepUniforms> {
         if u64::from(count) <= bound {
             return Ok(uniforms);
         }

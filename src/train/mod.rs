@@ -52,6 +52,8 @@ pub struct Trainer {
     updates: u32,
     stamp: u32,
     max_gaussians: u64,
+    /// Memory has bounded the number of Gaussians, which was said.
+    memory_bounds: bool,
     /// Votes were counted before, so that masks can be compared with their outcome.
     labelled_once: bool,
     timing: Option<timing::Timing>,
@@ -74,6 +76,23 @@ pub fn room(dataset: &Dataset, config: &TrainConfig, gaussians: u64) -> Result<R
         },
     });
     Ok(Room { gaussians, size, trained: true, labels })
+}
+
+/// Room to start with: for twice as many Gaussians as there are, or for those where memory is short.
+pub fn start_room(
+    gpu: &Gpu,
+    dataset: &Dataset,
+    config: &TrainConfig,
+    gaussians: usize,
+    options: SchedulerOptions,
+) -> Result<Room> {
+    let gaussians = gaussians as u64;
+    let most = if config.max_gaussians > 0 { config.max_gaussians } else { u64::MAX };
+    let roomy = room(dataset, config, (gaussians * 2).min(most).max(gaussians))?;
+    match Engine::predict(gpu, &roomy, options) {
+        Err(Error::OutOfMemory { .. }) => Ok(Room { gaussians, ..roomy }),
+        other => other.map(|_| roomy),
+    }
 }
 
 impl Trainer {
@@ -101,7 +120,7 @@ impl Trainer {
         config.check()?;
         let fixed = Fixed { extent: dataset.extent() };
         let max_gaussians = if config.max_gaussians > 0 { config.max_gaussians } else { u64::from(u32::MAX) };
-        let room = room(dataset, &config, (model.len() as u64 * 2).min(max_gaussians).max(model.len() as u64))?;
+        let room = start_room(&gpu, dataset, &config, model.len(), options)?;
         let views =
             dataset.train.iter_mut().map(|view| train_view(view, config.mask_border)).collect::<Result<Vec<_>>>()?;
         let mut engine = Engine::with_shape(gpu, shape, room, options)?;
@@ -118,6 +137,7 @@ impl Trainer {
             updates: 0,
             stamp: 0,
             max_gaussians,
+            memory_bounds: false,
             labelled_once: false,
             timing: None,
         })

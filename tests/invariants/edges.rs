@@ -10,6 +10,7 @@ use labelgs::engine::{Engine, LabelRoom, Room};
 use labelgs::infer::render::render;
 use labelgs::plan::{Buf, Work};
 use labelgs::scene::Gaussians;
+use labelgs::sched::SchedulerOptions;
 
 fn shape(gaussians: usize, width: u32, height: u32) -> Shape {
     Shape { gaussians, width, height, opacities: (0.0, 4.0), ..Shape::default() }
@@ -149,7 +150,9 @@ fn no_labels_no_cost() {
     // Nor does a render pay for training.
     let labels = Some(LabelRoom { max_label: 3, layers: 2, vote_columns: 0 });
     let room = |trained, labels| Room { gaussians: 1000, size: (64, 48), trained, labels };
-    let total = |room: &Room| Engine::predict(rig.engine.sched().gpu(), room).expect("it fits").total;
+    let total = |room: &Room| {
+        Engine::predict(rig.engine.sched().gpu(), room, SchedulerOptions::default()).expect("it fits").total
+    };
     assert!(
         total(&room(false, None)) < total(&room(true, None)) && total(&room(true, None)) < total(&room(true, labels))
     );

@@ -3,6 +3,7 @@
 use crate::support::compare::{check, exact};
 use crate::support::device;
 use crate::support::device::Turn;
+use labelgs::engine::Engine;
 use labelgs::io::init::initial_gaussians;
 use labelgs::io::ply::write_gaussians;
 use labelgs::plan::{Capacity, PlanOptions};
@@ -50,6 +51,8 @@ pub struct Outcome {
     pub counts: (usize, usize),
     /// Pairs that there was room for in the end.
     pub instances: u64,
+    /// Bytes of the device's memory in the end, before the model was read.
+    pub memory: u64,
 }
 
 /// Trains; `change` may change the trainer before its first step.
@@ -64,12 +67,19 @@ pub fn train(turn: &Turn, rule: LabelRule, options: SchedulerOptions, change: im
         losses.extend(trainer.step().expect("a step").iter().map(|report| (report.loss + report.label_loss).to_bits()));
     }
     losses.extend(trainer.drain().expect("the last steps").iter().map(|r| (r.loss + r.label_loss).to_bits()));
+    let memory = trainer.engine_mut().sched().memory_total();
     let model = trainer.labelled_model().expect("a model");
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("model.ply");
     write_gaussians(&path, &model).expect("a PLY");
     let instances = trainer.engine_mut().sched().capacity().instances;
-    Outcome { instances, ply: std::fs::read(path).expect("the PLY"), losses, counts: (start.len(), model.len()) }
+    Outcome {
+        instances,
+        memory,
+        ply: std::fs::read(path).expect("the PLY"),
+        losses,
+        counts: (start.len(), model.len()),
+    }
 }
 
 #[track_caller]
@@ -120,6 +130,28 @@ fn stays_the_same(rule: LabelRule) {
     let alone = PlanOptions { alias: false, guards: true, ..plan };
     let poisoned = SchedulerOptions { poison_step: true, ..with(alone) };
     same("poison", &train(&turn, rule, poisoned, large), &first);
+}
+
+#[test]
+fn a_memory_limit_bounds_the_gaussians() {
+    let Some(turn) = device() else { return };
+    let free = train(&turn, LabelRule::Votes, SchedulerOptions::default(), |_| ());
+    let (start, end) = free.counts;
+    // Room for half of the growth.
+    let room = labelgs::train::room(&small(), &config(LabelRule::Votes), (start + end) as u64 / 2).expect("views");
+    let limit = Engine::predict(&turn.gpu(), &room, SchedulerOptions::default()).expect("it fits").total;
+    assert!(limit < free.memory, "{limit} bytes bound nothing: {} were used", free.memory);
+    let options = SchedulerOptions { memory_limit: Some(limit), ..SchedulerOptions::default() };
+    let held = train(&turn, LabelRule::Votes, options, |_| ());
+    assert!(held.memory <= limit, "{} bytes of {limit}", held.memory);
+    assert!(held.counts.1 > start + 20 && held.counts.1 < end - 20, "{:?} and without a limit {end}", held.counts);
+    assert!(held.losses.last() != free.losses.last());
+    // Less than the start needs is refused, with the number that would fit.
+    let options = SchedulerOptions { memory_limit: Some(8 << 20), ..SchedulerOptions::default() };
+    let first = initial_gaussians(&small(), 0, 100).expect("points");
+    let refused = Trainer::new(turn.gpu(), config(LabelRule::Votes), &mut small(), &first, options);
+    let error = refused.err().expect("what staging takes leaves nothing for a model");
+    assert_eq!(error.exit_status(), 5, "{error}");
 }
 
 /// Gaussians with a label in the bytes of a PLY.

@@ -1,0 +1,176 @@
+//! How much memory an engine takes: capacities for what is known at first, which follow what a scene turns out to need.
+
+use super::{Engine, Report, Room};
+use crate::error::{Error, Result};
+use crate::gpu::Gpu;
+use crate::pass::{self, KernelShape, Variant, loss};
+use crate::plan::{Buf, Capacity, MemoryReport, PassList, TABLE};
+use crate::sched::{Scheduler, SchedulerOptions};
+use crate::shaders::structs::Counters;
+
+/// Capacities for some room, before any measurement.
+pub fn capacity(shape: &KernelShape, room: &Room) -> Capacity {
+    let (width, height) = room.size;
+    let (tiles_x, tiles_y) = shape.tiles(width, height);
+    let tiles = u64::from(tiles_x) * u64::from(tiles_y);
+    let layers = room.labels.map_or(0, |labels| u64::from(labels.layers));
+    let labels = room.labels.map_or(0, |labels| u64::from(labels.max_label) + 1);
+    let label_words = if labels > 0 { labels.div_ceil(32) * (layers + 1) } else { 0 };
+    // Lists bind the model even if it is empty.
+    let gaussians = room.gaussians.max(1);
+    let instances = (gaussians * 6).max(tiles * 16);
+    let mut capacity = Capacity {
+        gaussians,
+        trained: if room.trained { gaussians } else { 0 },
+        labelled: if labels > 0 { gaussians } else { 0 },
+        virtual_tiles: tiles * (layers + 1),
+        layer_tiles: if layers > 0 { tiles } else { 0 },
+        pixels: u64::from(width) * u64::from(height),
+        labelled_pixels: if labels > 0 { u64::from(width) * u64::from(height) } else { 0 },
+        labels,
+        vote_columns: room.labels.map_or(0, |labels| u64::from(labels.vote_columns)),
+        vote_cells: room.labels.map_or(0, |labels| u64::from(labels.vote_columns)) * gaussians,
+        layers: if labels > 0 { layers + 1 } else { 0 },
+        occluder_words: label_words,
+        loss_partials: u64::from(loss::partials(shape.subgroup, width, height)),
+        segments: 1,
+        ..Capacity::default()
+    };
+    derive(shape, &mut capacity, instances, room.trained);
+    capacity
+}
+
+/// Fills in what follows from the number of instances and of layer tiles.
+fn derive(shape: &KernelShape, capacity: &mut Capacity, instances: u64, trained: bool) {
+    capacity.instances = instances;
+    capacity.trained_instances = if trained { instances } else { 0 };
+    capacity.layer_pixels = capacity.layer_tiles * u64::from(shape.tile_pixels());
+    let jobs = (capacity.pixels.div_ceil(u64::from(shape.tile_pixels())) * 2) + capacity.layer_tiles;
+    capacity.segment_pixels = if capacity.segments > 1 { jobs * u64::from(shape.tile_pixels()) } else { 0 };
+    capacity.sort_lanes = u64::from(shape.lanes(instances.max(capacity.gaussians)));
+    capacity.sort_cells = capacity.sort_lanes << shape.digit_bits;
+    capacity.scan_lanes = 2 * u64::from(shape.lanes(capacity.gaussians.max(capacity.virtual_tiles)));
+}
+
+impl Engine {
+    /// The memory that an engine for `room` would take, before anything is allocated.
+    pub fn predict(gpu: &Gpu, room: &Room, options: SchedulerOptions) -> Result<MemoryReport> {
+        let shape = KernelShape::new(gpu.subgroup_size(), gpu.is_cpu());
+        let capacity = capacity(&shape, room);
+        let lists = Self::lists_of(&shape, &capacity, room);
+        Scheduler::predict(TABLE, &capacity, &lists, &options.limits(gpu))
+    }
+
+    /// The lists that decide how much scratch memory is needed.
+    pub fn lists_of(shape: &KernelShape, capacity: &Capacity, room: &Room) -> Vec<PassList> {
+        let mut lists = vec![pass::render_view(shape, capacity, 3)];
+        if room.trained {
+            let variant = Variant {
+                labels: room.labels.is_some(),
+                lift: room.labels.is_some(),
+                sh_degree: 3,
+                size: room.size,
+                update: true,
+            };
+            lists.insert(0, pass::training_step(shape, capacity, variant));
+            lists.push(pass::densify_apply(shape, capacity, room.labels.is_some()));
+        }
+        lists
+    }
+
+    /// Grows the model's buffers if `count` Gaussians do not fit. All lists are recorded again.
+    pub fn make_room_for_gaussians(&mut self, count: u64) -> Result<()> {
+        if count <= self.room.gaussians {
+            return Ok(());
+        }
+        let roomy = Capacity::grown(self.room.gaussians, count);
+        let gaussians = if self.fits(&self.capacity_for(roomy))? { roomy } else { count };
+        let new = self.capacity_for(gaussians);
+        self.set_capacity(new)?;
+        self.room.gaussians = gaussians;
+        Ok(())
+    }
+
+    /// The most Gaussians, up to `wanted`, that there is memory for. What there is room for already is never less.
+    pub fn most_gaussians(&self, wanted: u64) -> Result<u64> {
+        let (mut fits, mut too_many) = (self.room.gaussians, wanted + 1);
+        if wanted <= fits || self.fits(&self.capacity_for(wanted))? {
+            return Ok(wanted);
+        }
+        while fits + 1 < too_many {
+            let middle = fits.midpoint(too_many);
+            if self.fits(&self.capacity_for(middle))? {
+                fits = middle;
+            } else {
+                too_many = middle;
+            }
+        }
+        Ok(fits)
+    }
+
+    /// Capacities for more Gaussians, with what the scene has needed so far: as many pairs and tiles for each.
+    fn capacity_for(&self, gaussians: u64) -> Capacity {
+        let old = self.sched.capacity();
+        let mut new = capacity(&self.shape, &Room { gaussians, ..self.room });
+        new.layer_tiles = new.layer_tiles.max(old.layer_tiles);
+        new.segments = old.segments;
+        let instances = new.instances.max(old.instances);
+        derive(&self.shape, &mut new, instances, self.room.trained);
+        new
+    }
+
+    /// True if the memory suffices for these capacities and all lists.
+    fn fits(&self, capacity: &Capacity) -> Result<bool> {
+        let lists = Self::lists_of(&self.shape, capacity, &self.room);
+        match self.sched.predict_here(capacity, &lists) {
+            Ok(_) => Ok(true),
+            Err(Error::OutOfMemory { .. }) => Ok(false),
+            Err(other) => Err(other),
+        }
+    }
+
+    /// Grows what a failed list needed, and clears the failure. True if something grew.
+    pub fn recover(&mut self, report: &Report) -> Result<bool> {
+        if report.failure == 0 {
+            return Ok(false);
+        }
+        self.sched.wait_all()?;
+        let needed = &report.counters;
+        let grown = self.capacity_of(needed, Capacity::grown);
+        // Where there is no room for more than what is needed, that must do.
+        let new = if self.fits(&grown)? { grown } else { self.capacity_of(needed, |_, needed| needed) };
+        if new == *self.sched.capacity() {
+            return Err(Error::Bug(format!("failure {} without a need: {needed:?}", report.failure)));
+        }
+        tracing::debug!(
+            "buffers grow: {} instances, {} layer tiles, {} segments",
+            new.instances,
+            new.layer_tiles,
+            new.segments
+        );
+        self.set_capacity(new)?;
+        self.sched.fill(Buf::FAILURE, 0)?;
+        Ok(true)
+    }
+
+    /// The capacities in force, grown where they were too small.
+    fn capacity_of(&self, needed: &Counters, grown: impl Fn(u64, u64) -> u64) -> Capacity {
+        let mut new = *self.sched.capacity();
+        let follow = |have: &mut u64, needed: u32| {
+            if u64::from(needed) > *have {
+                *have = grown(*have, u64::from(needed));
+            }
+        };
+        follow(&mut new.instances, needed.instance_count);
+        follow(&mut new.layer_tiles, needed.layer_tile_count);
+        new.segments = new.segments.max(u64::from(needed.longest_list.div_ceil(self.shape.segment_length)));
+        let instances = new.instances;
+        derive(&self.shape, &mut new, instances, self.room.trained);
+        new
+    }
+
+    fn set_capacity(&mut self, capacity: Capacity) -> Result<()> {
+        self.lists.clear();
+        self.sched.set_capacity(capacity)
+    }
+}
