@@ -11,5 +11,6 @@ mod mask_import;
 mod masks;
 mod output;
 mod photos;
+mod pipeline_file;
 mod ply;
 mod transforms;

@@ -4,7 +4,8 @@ use super::args::SceneArgs;
 use super::{Context, config};
 use crate::engine::{Engine, LabelRoom, Room};
 use crate::error::{Error, Result};
-use crate::gpu::{Gpu, GpuOptions};
+use crate::gpu::{Gpu, GpuOptions, PipelineStore};
+use crate::io::pipeline_file::PipelineFolder;
 use crate::io::{self, LoadOptions, run_folder};
 use crate::scene::{Dataset, Gaussians, View};
 use crate::sched::SchedulerOptions;
@@ -29,6 +30,7 @@ pub fn open_gpu(context: &Context) -> Result<Arc<Gpu>> {
     if let Some(device) = &context.global.device {
         options.device = Some(device.clone());
     }
+    options.pipelines = PipelineFolder::of_user().map(|folder| Arc::new(folder) as Arc<dyn PipelineStore>);
     let gpu = Gpu::new(&options)?;
     let found = gpu.capabilities();
     let cpu = if gpu.is_cpu() { ", a processor: expect it to be slower than a graphics card" } else { "" };

@@ -5,6 +5,7 @@
 // Vulkan is a foreign interface: every call is unsafe. This module and the recorder are the only places for it.
 #![allow(unsafe_code)]
 
+mod cache;
 mod call;
 mod capabilities;
 mod command;
@@ -20,6 +21,7 @@ mod query;
 mod select;
 mod timeline;
 
+pub use cache::PipelineStore;
 pub use capabilities::{Capabilities, DeviceKind, Need, Subgroup};
 pub use devices::devices;
 pub use instance::{Message, MessageLog, Validation};
@@ -52,6 +54,8 @@ pub struct GpuOptions {
     pub robust_buffer_access: bool,
     /// Subgroup size to pin; the device's default if none.
     pub subgroup_size: Option<u32>,
+    /// Where compiled pipelines are kept between runs; nowhere if none.
+    pub pipelines: Option<Arc<dyn PipelineStore>>,
 }
 
 impl GpuOptions {
@@ -72,6 +76,7 @@ pub struct Gpu {
     allocator: Mutex<Option<Allocator>>,
     queue: Mutex<vk::Queue>,
     names: Option<ash::ext::debug_utils::Device>,
+    cache: Mutex<cache::PipelineCache>,
     device: ash::Device,
     capabilities: Capabilities,
     // Declared last: fields are dropped in this order, and `Drop` destroys the device before them.
@@ -101,8 +106,10 @@ impl Gpu {
             Error::NoDevice(format!("the memory allocator does not start: {error}"))
         })?;
         let names = instance.has_debug_utils().then(|| ash::ext::debug_utils::Device::new(instance.raw(), &device));
+        let cache = cache::PipelineCache::new(&device, &capabilities, options.pipelines.as_ref());
         Ok(Arc::new(Self {
             pipelines: Mutex::new(HashMap::new()),
+            cache: Mutex::new(cache),
             allocator: Mutex::new(Some(allocator)),
             queue: Mutex::new(queue),
             names,
@@ -165,6 +172,11 @@ impl Gpu {
         vk_call("vkQueueSubmit", || unsafe { self.device.queue_submit(*queue, &[info], vk::Fence::null()) })
     }
 
+    /// The cache that pipelines are made through.
+    fn pipeline_cache(&self) -> vk::PipelineCache {
+        lock(&self.cache).raw()
+    }
+
     /// The device's functions, for the modules that may be unsafe.
     pub(crate) fn raw(&self) -> &ash::Device {
         &self.device
@@ -184,6 +196,7 @@ impl Drop for Gpu {
         // A lost device reports an error here; it is destroyed all the same.
         let _ = self.wait_idle();
         lock(&self.pipelines).clear();
+        lock(&self.cache).close(&self.device);
         // The allocator frees its blocks with the device's functions, so it goes first.
         drop(lock(&self.allocator).take());
         // SAFETY: every object made from the device holds an `Arc` of this, so none is left; pipelines and memory were

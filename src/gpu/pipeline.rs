@@ -84,7 +84,7 @@ impl Pipeline {
         let module = vk_call("vkCreateShaderModule", || unsafe { gpu.raw().create_shader_module(&info, None) })?;
         let full = gpu.capabilities.features.full_subgroups
             && subgroup_size.zip(width).is_some_and(|(size, width)| width % size == 0);
-        let made = pipeline.make(module, spec, subgroup_size, full);
+        let made = pipeline.make(gpu.pipeline_cache(), module, spec, subgroup_size, full);
         // SAFETY: pipelines do not need their modules once they are made.
         unsafe { gpu.raw().destroy_shader_module(module, None) };
         made?;
@@ -123,7 +123,14 @@ impl Pipeline {
         Ok(())
     }
 
-    fn make(&mut self, module: vk::ShaderModule, spec: &[u32], size: Option<u32>, full: bool) -> Result<()> {
+    fn make(
+        &mut self,
+        cache: vk::PipelineCache,
+        module: vk::ShaderModule,
+        spec: &[u32],
+        size: Option<u32>,
+        full: bool,
+    ) -> Result<()> {
         let entries = self.shader.spec.iter().enumerate().map(|(index, constant)| vk::SpecializationMapEntry {
             constant_id: constant.id,
             offset: index as u32 * 4,
@@ -145,10 +152,9 @@ impl Pipeline {
             stage = stage.flags(vk::PipelineShaderStageCreateFlags::REQUIRE_FULL_SUBGROUPS);
         }
         let infos = [vk::ComputePipelineCreateInfo::default().stage(stage).layout(self.layout)];
-        // SAFETY: module and layout are alive and made for the same shader.
+        // SAFETY: module and layout are alive and made for the same shader; caches synchronise themselves.
         let made = vk_call("vkCreateComputePipelines", || {
-            unsafe { self.device.create_compute_pipelines(vk::PipelineCache::null(), &infos, None) }
-                .map_err(|(_, result)| result)
+            unsafe { self.device.create_compute_pipelines(cache, &infos, None) }.map_err(|(_, result)| result)
         })?;
         self.handle = made.first().copied().unwrap_or_default();
         Ok(())

@@ -19,6 +19,7 @@ mod load;
 pub mod mask;
 pub mod masks;
 pub mod occlusion_table;
+pub mod pipeline_file;
 pub mod ply;
 mod resample;
 pub mod run_folder;

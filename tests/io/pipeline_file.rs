@@ -1,0 +1,65 @@
+//! Compiled pipelines between runs.
+
+use crate::support::device;
+use crate::support::device::options;
+use labelgs::gpu::{Gpu, GpuOptions, PipelineStore};
+use labelgs::io::pipeline_file::PipelineFolder;
+use labelgs::pass::KernelShape;
+use std::sync::Arc;
+
+#[test]
+fn what_is_damaged_is_not_given_to_a_driver() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let store = PipelineFolder::new(folder.path().join("new"));
+    assert!(store.load("gpu").is_empty(), "nothing was saved");
+    let data: Vec<u8> = (0..=255).collect();
+    store.save("gpu", &data);
+    assert_eq!(store.load("gpu"), data);
+    assert!(store.load("another").is_empty(), "each device has its own");
+    let path = folder.path().join("new/pipelines-gpu.bin");
+    let whole = std::fs::read(&path).expect("a file");
+    for damaged in [&whole[..whole.len() - 1], &whole[..10], &[], &[whole.as_slice(), b"x"].concat()[..]] {
+        std::fs::write(&path, damaged).expect("written");
+        assert!(store.load("gpu").is_empty(), "{} of {} bytes", damaged.len(), whole.len());
+    }
+    for at in 0..whole.len() {
+        let mut flipped = whole.clone();
+        flipped[at] ^= 0x10;
+        std::fs::write(&path, &flipped).expect("written");
+        assert!(store.load("gpu").is_empty(), "byte {at}");
+    }
+    // A file in the folder's place: a warning, no failure.
+    std::fs::write(folder.path().join("file"), b"").expect("written");
+    PipelineFolder::new(folder.path().join("file")).save("gpu", &data);
+}
+
+#[test]
+fn a_device_saves_what_it_compiled_and_takes_it_back() {
+    let Some(_turn) = device() else { return };
+    let folder = tempfile::tempdir().expect("a folder");
+    let store: Arc<dyn PipelineStore> = Arc::new(PipelineFolder::new(folder.path()));
+    let with = || GpuOptions { pipelines: Some(Arc::clone(&store)), ..options() };
+    let use_it = || {
+        let gpu = Gpu::new(&with()).expect("a device");
+        let shape = KernelShape::new(gpu.subgroup_size(), gpu.is_cpu());
+        let device = gpu.capabilities().uuid_text();
+        let messages = gpu.message_log();
+        let room = labelgs::engine::Room { gaussians: 10, size: (16, 16), trained: false, labels: None };
+        let mut engine = labelgs::engine::Engine::with_shape(gpu, shape, room, Default::default()).expect("an engine");
+        engine.list(labelgs::engine::ListKey::Render(0)).expect("pipelines");
+        drop(engine);
+        assert!(messages.messages().is_empty(), "{:?}", messages.messages());
+        device
+    };
+    let device = use_it();
+    let first = store.load(&device);
+    // A header at least: drivers that keep nothing hand out just that.
+    assert!(first.len() >= 16, "{} bytes", first.len());
+    use_it();
+    assert!(store.load(&device).len() >= 16);
+    // What another driver wrote is refused by the header, not by a crash.
+    let mut foreign = first.clone();
+    foreign[8..12].copy_from_slice(&[0xff; 4]);
+    store.save(&device, &foreign);
+    use_it();
+}
