@@ -88,11 +88,11 @@ fn plan_adds_up() {
     assert_eq!(plan["memory"]["total"], sum("bytes") + pages + staging);
     let names: Vec<&str> =
         plan["passes"].as_array().expect("passes").iter().filter_map(|pass| pass["name"].as_str()).collect();
-    assert!(names[0] == "step_begin" && names.iter().any(|name| name.starts_with("lift_resolve")), "{names:?}");
+    assert!(names[0] == "step_begin" && names.iter().any(|name| name.starts_with("layer_list")), "{names:?}");
     let without =
         json(&succeeds(&["plan", "--gaussians", "2k", "--size", "160x120", "--label-samples", "0", "--json"]));
     assert!(without["memory"]["total"].as_u64() < plan["memory"]["total"].as_u64());
-    assert!(!without.to_string().contains("lift_resolve"));
+    assert!(!without.to_string().contains("layer_list"));
 }
 
 #[test]
@@ -157,7 +157,6 @@ fn profile_times_every_stage() {
             "gather",
             "project backward",
             "optimise",
-            "labels",
             "report"
         ]
     );
@@ -168,6 +167,21 @@ fn profile_times_every_stage() {
     assert!(number("/host_ms/mean") >= 0.5 * number("/passes_ms/median"), "the host waits for the passes");
     assert_eq!(found["steps"].as_array().map(Vec::len), Some(6));
     assert_eq!(found.pointer("/steps/0/step"), Some(&8.into()));
+    let file = file.to_str().expect("UTF-8");
+    let same = succeeds(&["profile", "--compare", file, file]);
+    assert!(same.contains("blend backward") && same.contains("pairs_walked") && !same.contains("slower"), "{same}");
+    let slow = folder.path().join("slow.json");
+    let mut slower = found.clone();
+    for step in slower["steps"].as_array_mut().expect("steps") {
+        step["stages_ms"]["gather"] = 1e6.into();
+    }
+    std::fs::write(&slow, slower.to_string()).expect("written");
+    let slow = slow.to_str().expect("UTF-8");
+    let refused = labelgs(&["profile", "--compare", file, slow]);
+    assert_eq!(refused.status.code(), Some(1));
+    assert!(text(&refused.stderr).contains("slower beyond noise: all, gather"), "{}", text(&refused.stderr));
+    succeeds(&["profile", "--compare", slow, file]);
+    assert_eq!(labelgs(&["profile", "--compare", file, &masks]).status.code(), Some(3));
     let overlap = json(&succeeds(&["profile", &scene, "--steps", "3", "--warm-up", "2", "--overlap", "--json"]));
     assert!(overlap["labels"] == false && overlap["barrier_before_each_pass"] == false);
 }

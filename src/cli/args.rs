@@ -12,7 +12,7 @@ use super::relabel::RelabelArgs;
 use super::select::{ExtractArgs, SelectArgs};
 use super::split_components::SplitArgs;
 use super::train_args::TrainArgs;
-use super::values::{Picks, Size, colour, count, picks, size};
+use super::values::{Picks, Size, colour, count, picks, share, size};
 use crate::infer::output::{Format, What};
 use crate::synth::Preset;
 use clap::{Args, Parser, Subcommand};
@@ -249,7 +249,7 @@ pub struct PlanArgs {
 
 /// `labelgs profile`.
 #[derive(Args, Clone, Debug)]
-#[command(group(clap::ArgGroup::new("input").required(true).args(["scene", "synthetic"])))]
+#[command(group(clap::ArgGroup::new("input").required(true).args(["scene", "synthetic", "compare"])))]
 pub struct ProfileArgs {
     /// Scene to time.
     #[arg(value_name = "SCENE")]
@@ -284,6 +284,12 @@ pub struct ProfileArgs {
     /// How the scene is read.
     #[command(flatten)]
     pub reading: SceneArgs,
+    /// Instead compare two files that --json wrote; fail with status 1 if a stage became slower beyond noise.
+    #[arg(long, value_names = ["OLD.json", "NEW.json"], num_args = 2, conflicts_with_all = ["scene", "synthetic", "model"])]
+    pub compare: Option<Vec<PathBuf>>,
+    /// With --compare: by how much a median may grow.
+    #[arg(long, value_name = "SHARE", value_parser = share, default_value_t = 0.05, requires = "compare")]
+    pub tolerance: f32,
     /// Write the numbers as JSON to FILE; without FILE print them.
     #[arg(id = "json_file", long = "json", value_name = "FILE", num_args = 0..=1)]
     pub json: Option<Option<PathBuf>>,

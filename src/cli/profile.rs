@@ -4,7 +4,7 @@ use super::args::ProfileArgs;
 use super::log::Progress;
 use super::profile_report::{Clocks, Profile, Workers};
 use super::scene::{open_gpu, open_scene};
-use super::{Context, config, open_model, stdout};
+use super::{Context, config, open_model, profile_compare, stdout};
 use crate::gpu::Gpu;
 use crate::io::init;
 use crate::plan::PlanOptions;
@@ -19,6 +19,9 @@ use std::time::{Duration, Instant};
 
 /// Times steps inside of real training.
 pub fn run(args: &ProfileArgs, context: &Context) -> Result<()> {
+    if let Some([old, new]) = args.compare.as_deref() {
+        return profile_compare::run([old, new], args.tolerance.into(), context.json || args.json.is_some());
+    }
     let config = decide(args)?;
     let mut dataset = open(args, &config)?;
     let gpu = open_gpu(context)?;
