@@ -2,8 +2,8 @@
 
 use assert_cmd::Command;
 use clap::Parser;
-use labelgs::cli::args::{Cli, Command as Verb};
-use labelgs::cli::{command, config};
+use labelgs::cli::command::{Cli, Command as Verb, command};
+use labelgs::cli::config;
 use labelgs::io::ply::{read_gaussians, write_gaussians};
 use labelgs::scene::Gaussians;
 use labelgs::train::TrainConfig;

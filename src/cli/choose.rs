@@ -1,7 +1,7 @@
 //! Which labels: by id, by name, by a mask, a point or a box in a view. Several ways add up.
 
-use super::Context;
 use super::args::SceneArgs;
+use super::context::Context;
 use super::labelled::TableArg;
 use super::scene::{find_view, near_plane, open_gpu, open_scene, render_engine};
 use super::values::{At, BoxAt, Picks, at, box_at, near, picks};

@@ -1,10 +1,11 @@
 //! `labelgs densify`: a video between the photos, on which a tracker of objects loses fewer of them.
 
 use super::args::{JsonFlag, SceneArgs};
+use super::context::{Context, open_model};
 use super::log::Progress;
 use super::scene::{near_plane, open_gpu, open_scene, render_engine};
+use super::stdout;
 use super::values::{colour, near};
-use super::{Context, open_model, stdout};
 use crate::infer::output::{Format, write_rgb};
 use crate::infer::render::render;
 use crate::io::frames::{self, Frame, Frames};

@@ -1,11 +1,21 @@
 //! `labelgs devices`.
 
-use super::args::DevicesArgs;
-use super::{Context, stdout};
+use super::args::JsonFlag;
+use super::context::Context;
+use super::stdout;
 use crate::gpu::{self, Capabilities, GpuOptions, Need};
 use crate::pass::KernelShape;
 use crate::{Error, Result};
+use clap::Args;
 use serde_json::{Value, json};
+
+/// `labelgs devices`.
+#[derive(Args, Clone, Debug)]
+pub struct DevicesArgs {
+    /// JSON.
+    #[command(flatten)]
+    pub json: JsonFlag,
+}
 
 /// Prints the devices. Fails if none of them can be used.
 pub fn run(args: &DevicesArgs, context: &Context) -> Result<()> {

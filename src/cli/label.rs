@@ -2,10 +2,11 @@
 
 use super::args::JsonFlag;
 use super::args::SceneArgs;
+use super::context::{Context, open_model};
 use super::log::Progress;
 use super::scene::{near_plane, open_gpu, open_scene, vote_engine};
+use super::stdout;
 use super::values::{near, switch};
-use super::{Context, open_model, stdout};
 use crate::engine::Engine;
 use crate::infer::edit::select::summarise;
 use crate::infer::render::render;

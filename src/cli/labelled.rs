@@ -1,8 +1,9 @@
 //! A model with the names of its labels: opened, and written after an edit.
 
 use super::args::JsonFlag;
+use super::context::{Context, open_model};
+use super::stdout;
 use super::values::share;
-use super::{Context, open_model, stdout};
 use crate::infer::edit::catalogue::Catalogue;
 use crate::infer::edit::select::{SURE, extract};
 use crate::io::label_table::LabelTable;

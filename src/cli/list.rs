@@ -1,12 +1,30 @@
 //! `labelgs list`.
 
-use super::args::ListArgs;
+use super::args::JsonFlag;
+use super::context::Context;
+use super::labelled::TableArg;
 use super::labelled::open;
-use super::{Context, stdout};
+use super::stdout;
 use crate::Result;
 use crate::infer::edit::select::{LabelSummary, summarise};
+use clap::Args;
 use serde::Serialize;
 use serde_json::json;
+use std::path::PathBuf;
+
+/// `labelgs list`.
+#[derive(Args, Clone, Debug)]
+pub struct ListArgs {
+    /// The model: a PLY, or the folder that `labelgs train` made.
+    #[arg(value_name = "MODEL")]
+    pub model: PathBuf,
+    /// Names.
+    #[command(flatten)]
+    pub table: TableArg,
+    /// JSON.
+    #[command(flatten)]
+    pub json: JsonFlag,
+}
 
 /// A label with its name.
 #[derive(Serialize)]

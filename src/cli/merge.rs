@@ -1,6 +1,6 @@
 //! `labelgs merge`.
 
-use super::Context;
+use super::context::Context;
 use super::labelled::{EditArgs, Edited, open, wants_json};
 use super::values::{Picks, label, picks};
 use crate::infer::edit::change::relabel;

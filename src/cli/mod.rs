@@ -3,7 +3,9 @@
 pub mod ablate;
 pub mod args;
 pub mod choose;
+pub mod command;
 pub mod config;
+pub mod context;
 pub mod densify;
 pub mod devices;
 pub mod eval;
@@ -31,22 +33,12 @@ pub mod train;
 pub mod train_args;
 pub mod values;
 
-use crate::scene::Gaussians;
-use crate::{Error, Result};
-use args::{Cli, Command, GlobalArgs};
-use clap::{CommandFactory, FromArgMatches};
+use crate::Error;
+use clap::FromArgMatches;
+use command::{Cli, Command, command};
+use context::Context;
 use std::ffi::OsString;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::path::Path;
-
-/// What every verb gets besides its own arguments.
-#[derive(Clone, Debug, Default)]
-pub struct Context {
-    /// `-q`, `-v` and `--device`.
-    pub global: GlobalArgs,
-    /// `--json` before the verb.
-    pub json: bool,
-}
 
 /// The process: parses `args`, runs the verb, reports an error, returns the exit status.
 pub fn main(args: impl IntoIterator<Item = OsString>) -> u8 {
@@ -125,27 +117,4 @@ fn run(args: Vec<OsString>) -> Result<(), Exit> {
         Command::Profile(args) => profile::run(&args, &context),
     }?;
     Ok(())
-}
-
-/// The command with the defaults of training in its help.
-pub fn command() -> clap::Command {
-    let defaults = config::default_texts();
-    Cli::command().mut_subcommand("train", |train| {
-        train.mut_args(|arg| {
-            let Some(default) = arg.get_long().and_then(|long| defaults.get(long)) else { return arg };
-            let help = arg.get_help().map(ToString::to_string).unwrap_or_default();
-            arg.help(format!("{help} [default: {default}]"))
-        })
-    })
-}
-
-/// Reads a model, or the last one in the folder of a run, and logs what a person should know about the file.
-pub fn open_model(path: &Path) -> Result<Gaussians> {
-    let path = &if path.is_dir() { crate::train::record::latest_model(path)? } else { path.to_owned() };
-    let read = crate::io::ply::read_gaussians(path)?;
-    read.notes.iter().for_each(|note| tracing::info!("{}: {note}", path.display()));
-    if read.dropped > 0 {
-        tracing::warn!("{}: left out {} Gaussians that cannot be rendered", path.display(), read.dropped);
-    }
-    Ok(read.gaussians)
 }

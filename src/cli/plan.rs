@@ -1,8 +1,10 @@
 //! `labelgs plan`.
 
-use super::args::PlanArgs;
+use super::args::JsonFlag;
+use super::context::Context;
 use super::devices::{shape_json, shape_of, shape_text};
-use super::{Context, stdout};
+use super::stdout;
+use super::values::{Size, count, size};
 use crate::engine::{Engine, LabelRoom, Room, capacity};
 use crate::gpu::{self, GpuOptions};
 use crate::infer::vote::ballot::COLUMNS_MAX;
@@ -10,7 +12,28 @@ use crate::pass::{KernelShape, Variant, training_step};
 use crate::plan::{Capacity, Grid, Limits, MemoryReport, Page, PassList, Plan, PlanOptions, TABLE, Touch, Work};
 use crate::sched::plan_limits;
 use crate::{Error, Result};
+use clap::Args;
 use serde_json::{Value, json};
+
+/// `labelgs plan`.
+#[derive(Args, Clone, Debug)]
+pub struct PlanArgs {
+    /// Number of Gaussians to plan for, such as 500k or 2M.
+    #[arg(long, value_name = "N", value_parser = count, default_value = "1M")]
+    pub gaussians: u64,
+    /// Size of a picture, px.
+    #[arg(long, value_name = "WxH", value_parser = size, default_value = "1600x1064")]
+    pub size: Size,
+    /// Objects per step; 0 plans without labels.
+    #[arg(long, value_name = "N", default_value_t = 10)]
+    pub label_samples: u32,
+    /// Degree of the spherical harmonics.
+    #[arg(long, value_name = "DEGREE", value_parser = clap::value_parser!(u32).range(0..=3), default_value_t = 3)]
+    pub sh_degree: u32,
+    /// JSON.
+    #[command(flatten)]
+    pub json: JsonFlag,
+}
 
 /// Largest label id that is planned for; ids beyond it cost a few bytes each.
 const MAX_LABEL: u32 = 255;

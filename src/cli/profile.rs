@@ -1,10 +1,12 @@
 //! `labelgs profile`.
 
-use super::args::ProfileArgs;
+use super::args::SceneArgs;
+use super::context::{Context, open_model};
 use super::log::Progress;
-use super::profile_report::{Clocks, Profile, Workers};
+use super::profile_report::{Clocks, Profile, Window, Workers};
 use super::scene::{open_gpu, open_scene};
-use super::{Context, config, open_model, profile_compare, stdout};
+use super::values::share;
+use super::{config, profile_compare, stdout};
 use crate::gpu::Gpu;
 use crate::io::init;
 use crate::plan::PlanOptions;
@@ -13,9 +15,59 @@ use crate::sched::SchedulerOptions;
 use crate::synth::{self, SynthOptions};
 use crate::train::{StepReport, TrainConfig, Trainer};
 use crate::{Error, Result};
+use clap::Args;
 use std::path::Path;
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
+
+/// `labelgs profile`.
+#[derive(Args, Clone, Debug)]
+#[command(group(clap::ArgGroup::new("input").required(true).args(["scene", "synthetic", "compare"])))]
+pub struct ProfileArgs {
+    /// Scene to time.
+    #[arg(value_name = "SCENE")]
+    pub scene: Option<PathBuf>,
+    /// Time the scene of `labelgs synth` instead, with its masks.
+    #[arg(long)]
+    pub synthetic: bool,
+    /// Folder of id masks.
+    #[arg(long, value_name = "DIR", conflicts_with = "synthetic")]
+    pub masks: Option<PathBuf>,
+    /// Leave out the masks of --synthetic.
+    #[arg(long, requires = "synthetic")]
+    pub no_masks: bool,
+    /// Steps to time.
+    #[arg(long, value_name = "N", default_value_t = 100, value_parser = clap::value_parser!(u32).range(1..))]
+    pub steps: u32,
+    /// Steps before the clock starts.
+    #[arg(long, value_name = "N", default_value_t = 20)]
+    pub warm_up: u32,
+    /// Train so many steps first, so that a trained scene is measured.
+    #[arg(long, value_name = "S", default_value_t = 0)]
+    pub from_step: u32,
+    /// Start from this model, a PLY or the folder that `labelgs train` made, instead of the scene's points.
+    #[arg(long, value_name = "MODEL")]
+    pub model: Option<PathBuf>,
+    /// Settings of training in TOML, as config.toml of an earlier run. Labels start at --from-step at the latest.
+    #[arg(long, value_name = "FILE.toml")]
+    pub config: Option<PathBuf>,
+    /// Let passes overlap as in training: the wall clock is then the true one, times of passes are what each added.
+    #[arg(long)]
+    pub overlap: bool,
+    /// How the scene is read.
+    #[command(flatten)]
+    pub reading: SceneArgs,
+    /// Instead compare two files that --json wrote; fail with status 1 if a stage became slower beyond noise.
+    #[arg(long, value_names = ["OLD.json", "NEW.json"], num_args = 2, conflicts_with_all = ["scene", "synthetic", "model"])]
+    pub compare: Option<Vec<PathBuf>>,
+    /// With --compare: by how much a median may grow.
+    #[arg(long, value_name = "SHARE", value_parser = share, default_value_t = 0.05, requires = "compare")]
+    pub tolerance: f32,
+    /// Write the numbers as JSON to FILE; without FILE print them.
+    #[arg(id = "json_file", long = "json", value_name = "FILE", num_args = 0..=1)]
+    pub json: Option<Option<PathBuf>>,
+}
 
 /// Times steps inside of real training.
 pub fn run(args: &ProfileArgs, context: &Context) -> Result<()> {
@@ -28,7 +80,8 @@ pub fn run(args: &ProfileArgs, context: &Context) -> Result<()> {
     if gpu.limits().timestamp_bits == 0 {
         return Err(Error::NoDevice("this device has no timestamps on its compute queue".into()));
     }
-    let mut profile = Profile::new(&gpu, workers(&gpu)?, args);
+    let window = Window { overlap: args.overlap, from_step: args.from_step, warm_up: args.warm_up };
+    let mut profile = Profile::new(&gpu, workers(&gpu)?, window);
     profile.views = dataset.train.len();
     let model = match &args.model {
         Some(path) => open_model(path)?,

@@ -1,6 +1,5 @@
 //! What `labelgs profile` found, as a table and as JSON.
 
-use super::args::ProfileArgs;
 use super::devices::{shape_json, shape_of, shape_text};
 use crate::engine::Room;
 use crate::gpu::Gpu;
@@ -18,6 +17,17 @@ pub struct Workers {
     pub count: usize,
     /// Where the number comes from.
     pub source: &'static str,
+}
+
+/// Which steps are timed, and how.
+#[derive(Clone, Copy, Debug)]
+pub struct Window {
+    /// Passes overlap as in training.
+    pub overlap: bool,
+    /// Steps of training before.
+    pub from_step: u32,
+    /// Steps after those whose times do not count.
+    pub warm_up: u32,
 }
 
 /// What the host's clocks say.
@@ -68,16 +78,16 @@ pub struct Profile {
 
 impl Profile {
     /// An empty one.
-    pub fn new(gpu: &Gpu, workers: Option<Workers>, args: &ProfileArgs) -> Self {
+    pub fn new(gpu: &Gpu, workers: Option<Workers>, window: Window) -> Self {
         let found = gpu.capabilities();
         Self {
             device: found.name.clone(),
             driver: format!("{} {}", found.driver_name, found.driver_info),
             shape: shape_of(found),
             workers,
-            overlap: args.overlap,
-            from_step: args.from_step,
-            warm_up: args.warm_up,
+            overlap: window.overlap,
+            from_step: window.from_step,
+            warm_up: window.warm_up,
             views: 0,
             gaussians: 0,
             room: Room { gaussians: 0, size: (0, 0), trained: true, labels: None },

@@ -1,6 +1,6 @@
 //! `labelgs recolour`.
 
-use super::Context;
+use super::context::Context;
 use super::labelled::{Edited, open, wants_json};
 use super::select::SelectArgs;
 use super::values::{colour, share};

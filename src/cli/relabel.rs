@@ -1,6 +1,6 @@
 //! `labelgs relabel`.
 
-use super::Context;
+use super::context::Context;
 use super::labelled::{EditArgs, Edited, open, wants_json};
 use super::values::{Renumbering, renumbering};
 use crate::Result;

@@ -1,17 +1,71 @@
 //! `labelgs render`.
 
-use super::Context;
-use super::args::RenderArgs;
+use super::args::{JsonFlag, SceneArgs};
 use super::choose::Asked;
+use super::choose::PromptArgs;
+use super::context::Context;
+use super::context::open_model;
+use super::labelled::SureArg;
 use super::scene::{near_plane, open_gpu, open_scene, pick_views, render_engine};
-use super::{labelled, open_model, stdout};
+use super::values::{Picks, colour, picks};
+use super::{labelled, stdout};
 use crate::infer::edit::select::remove;
 use crate::infer::output::{Format, Pictures, What, write_pictures};
 use crate::infer::render::render;
 use crate::io::camera_json::read_camera;
 use crate::scene::{Camera, Gaussians};
 use crate::{Error, Result};
+use clap::Args;
 use serde_json::json;
+use std::path::PathBuf;
+
+/// `labelgs render`.
+#[derive(Args, Clone, Debug)]
+#[command(group(clap::ArgGroup::new("from").required(true).args(["scene", "camera"])))]
+pub struct RenderArgs {
+    /// The model: a PLY, or the folder that `labelgs train` made.
+    #[arg(value_name = "MODEL")]
+    pub model: PathBuf,
+    /// Scene whose cameras to use.
+    #[arg(long, value_name = "SCENE")]
+    pub scene: Option<PathBuf>,
+    /// Which views: test, train, all, or names with commas between.
+    #[arg(long, value_name = "VIEWS", default_value = "test", conflicts_with = "camera")]
+    pub views: String,
+    /// A camera of its own: JSON with w2c (4 x 4), fx, fy, cx, cy, W, H.
+    #[arg(long, value_name = "CAM.json")]
+    pub camera: Option<PathBuf>,
+    /// Folder for the pictures, NAME.WHAT.png or .exr.
+    #[arg(short, long, value_name = "DIR")]
+    pub output: PathBuf,
+    /// What to write of each view, with commas between.
+    #[arg(long, value_name = "WHAT", value_enum, value_delimiter = ',', default_value = "rgb")]
+    pub what: Vec<What>,
+    /// Render only these labels, such as 1,4-6,cup, or those that --name, --at, --box and --mask choose.
+    #[arg(long, value_name = "LABELS", value_parser = picks, num_args = 0..=1, conflicts_with = "without")]
+    pub only: Option<Option<Picks>>,
+    /// Render all but these labels, or all but those that --name, --at, --box and --mask choose.
+    #[arg(long, value_name = "LABELS", value_parser = picks, num_args = 0..=1)]
+    pub without: Option<Option<Picks>>,
+    /// Which Gaussians of the labels of --only.
+    #[command(flatten)]
+    pub sure: SureArg,
+    /// Labels by name and by place.
+    #[command(flatten)]
+    pub prompts: PromptArgs,
+    /// Kind of file.
+    #[arg(long, value_name = "FORMAT", value_enum, default_value = "png")]
+    pub format: Format,
+    /// Colour behind the scene: black, white, or R,G,B from 0 to 1.
+    #[arg(long, value_name = "COLOUR", value_parser = colour, default_value = "black")]
+    pub background: [f32; 3],
+    /// How the scene is read.
+    #[command(flatten)]
+    pub reading: SceneArgs,
+    /// JSON.
+    #[command(flatten)]
+    pub json: JsonFlag,
+}
 
 /// Renders views.
 pub fn run(args: &RenderArgs, context: &Context) -> Result<()> {

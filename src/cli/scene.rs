@@ -1,7 +1,8 @@
 //! What the verbs that render share: the device, the scene, its views.
 
 use super::args::SceneArgs;
-use super::{Context, config};
+use super::config;
+use super::context::Context;
 use crate::engine::{Engine, LabelRoom, Room};
 use crate::error::{Error, Result};
 use crate::gpu::{Gpu, GpuOptions, PipelineStore};

@@ -1,8 +1,8 @@
 //! `labelgs extract` and `labelgs remove`.
 
-use super::Context;
 use super::args::JsonFlag;
 use super::choose::ChooseArgs;
+use super::context::Context;
 use super::labelled::{Edited, SureArg, open, wants_json};
 use super::values::{distance, share};
 use crate::Result;

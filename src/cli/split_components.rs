@@ -1,6 +1,6 @@
 //! `labelgs split-components`.
 
-use super::Context;
+use super::context::Context;
 use super::labelled::{EditArgs, Edited, open, wants_json};
 use super::select::GroupingArgs;
 use super::values::{Picks, picks};

@@ -1,11 +1,42 @@
 //! `labelgs synth`.
 
-use super::args::SynthArgs;
+use super::args::JsonFlag;
+use super::context::Context;
 use super::log::Progress;
-use super::{Context, interrupt, stdout};
+use super::values::{Size, size};
+use super::{interrupt, stdout};
 use crate::Result;
+use crate::synth::Preset;
 use crate::synth::{SynthOptions, write};
+use clap::Args;
 use std::cell::RefCell;
+use std::path::PathBuf;
+
+/// `labelgs synth`.
+#[derive(Args, Clone, Debug)]
+pub struct SynthArgs {
+    /// Folder to make; must be new or empty.
+    #[arg(value_name = "DIR")]
+    pub folder: PathBuf,
+    /// Which objects.
+    #[arg(long, value_name = "PRESET", value_enum, default_value = "default")]
+    pub preset: Preset,
+    /// Size of a picture, px.
+    #[arg(long, value_name = "WxH", value_parser = size, default_value = "320x240")]
+    pub size: Size,
+    /// Number of views.
+    #[arg(long, value_name = "N", default_value_t = 40)]
+    pub views: u32,
+    /// Number of 3-D points.
+    #[arg(long, value_name = "N", default_value_t = 4000)]
+    pub points: u32,
+    /// Seed of colours, camera jitter and points.
+    #[arg(long, value_name = "SEED", default_value_t = 0)]
+    pub seed: u64,
+    /// JSON.
+    #[command(flatten)]
+    pub json: JsonFlag,
+}
 
 /// Makes the scene.
 pub fn run(args: &SynthArgs, context: &Context) -> Result<()> {

@@ -1,9 +1,10 @@
 //! `labelgs train`.
 
+use super::context::Context;
 use super::log::Progress;
 use super::scene::{open_gpu, open_with};
 use super::train_args::TrainArgs;
-use super::{Context, config, interrupt, occlusion, stdout};
+use super::{config, interrupt, occlusion, stdout};
 use crate::engine::Engine;
 use crate::gpu::Gpu;
 use crate::infer::edit::select::SURE;

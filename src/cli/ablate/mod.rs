@@ -4,11 +4,14 @@ mod quoted;
 mod rows;
 mod table;
 
-use super::args::{Cli, Command, JsonFlag};
-use super::{Context, eval, interrupt, stdout, train};
+use super::args::JsonFlag;
+use super::context::Context;
+use super::eval::EvalArgs;
+use super::train_args::TrainArgs;
+use super::{eval, interrupt, stdout, train};
 use crate::infer::score::scores::MeanScores;
 use crate::{Error, Result};
-use clap::{Args, Parser};
+use clap::{Args, FromArgMatches};
 use rows::{Masks, Row, rows};
 use serde::Serialize;
 use serde_json::json;
@@ -68,7 +71,7 @@ pub fn run(args: &AblateArgs, context: &Context) -> Result<()> {
     let rows = rows(&args.rows, &args.own_rows, args.masks_without_dov.is_some())?;
     // A typing error in the last variant is found before the first is trained.
     for row in &rows {
-        command(row, 0, args)?;
+        train_args(row, 0, args)?;
     }
     let mut outcomes: Vec<(Row, Vec<Outcome>)> = Vec::new();
     for row in rows {
@@ -99,9 +102,9 @@ fn folder(row: &Row, seed: u64, args: &AblateArgs) -> PathBuf {
 }
 
 /// The `train` that a variant is, as if it had been typed.
-fn command(row: &Row, seed: u64, args: &AblateArgs) -> Result<Command> {
+fn train_args(row: &Row, seed: u64, args: &AblateArgs) -> Result<TrainArgs> {
     let text = |path: &Path| path.display().to_string();
-    let mut typed = vec!["labelgs".to_owned(), "train".to_owned(), text(&args.scene)];
+    let mut typed = vec!["train".to_owned(), text(&args.scene)];
     typed.extend(["-o".to_owned(), text(&folder(row, seed, args)), "--seed".to_owned(), seed.to_string()]);
     let masks = match row.masks {
         Masks::None => None,
@@ -112,23 +115,25 @@ fn command(row: &Row, seed: u64, args: &AblateArgs) -> Result<Command> {
         typed.extend(["--masks".to_owned(), text(masks)]);
     }
     typed.extend(row.flags.iter().chain(&args.common).cloned());
-    let parsed = Cli::try_parse_from(typed).map_err(|error| {
+    parse(typed).map_err(|error| {
         let text = error.to_string();
         Error::usage("--row", format!("{}: {}", row.name, text.lines().next().unwrap_or_default()))
-    })?;
-    Ok(parsed.command)
+    })
+}
+
+/// Arguments of a verb as if they had been typed; the first is its name.
+fn parse<A: Args + FromArgMatches>(typed: Vec<String>) -> std::result::Result<A, clap::Error> {
+    A::from_arg_matches(&A::augment_args(clap::Command::new("labelgs")).try_get_matches_from(typed)?)
 }
 
 fn one(row: &Row, seed: u64, args: &AblateArgs, context: &Context) -> Result<Outcome> {
-    let Command::Train(train_args) = command(row, seed, args)? else {
-        return Err(Error::Bug("a variant is no training".to_owned()));
-    };
+    let train_args = train_args(row, seed, args)?;
     let config = super::config::decide(&train_args)?;
     let (summary, _) = train::train(&train_args, context)?;
     let text = |path: &Path| path.display().to_string();
     let out = folder(row, seed, args);
     let masks = args.truth.as_ref().unwrap_or(&args.masks);
-    let mut typed = vec!["labelgs".to_owned(), "eval".to_owned(), text(&out)];
+    let mut typed = vec!["eval".to_owned(), text(&out)];
     typed.extend(["--scene".to_owned(), text(&args.scene), "--masks".to_owned(), text(masks)]);
     typed.extend(["--test-every".to_owned(), config.test_every.to_string()]);
     if config.max_resolution > 0 {
@@ -136,10 +141,7 @@ fn one(row: &Row, seed: u64, args: &AblateArgs, context: &Context) -> Result<Out
     }
     let colour: Vec<String> = config.background.iter().map(f32::to_string).collect();
     typed.extend(["--background".to_owned(), colour.join(",")]);
-    let parsed = Cli::try_parse_from(typed).map_err(|error| Error::Bug(format!("eval: {error}")))?;
-    let Command::Eval(eval_args) = parsed.command else {
-        return Err(Error::Bug("a scoring is no eval".to_owned()));
-    };
+    let eval_args: EvalArgs = parse(typed).map_err(|error| Error::Bug(format!("eval: {error}")))?;
     let scores = eval::score(&eval_args, context)?;
     eval::write_json(&out.join("scores.json"), &scores)?;
     Ok(Outcome {

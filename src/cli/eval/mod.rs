@@ -10,7 +10,8 @@ pub use args::EvalArgs;
 pub use own::read_outline;
 pub(super) use own::score;
 
-use super::{Context, stdout};
+use super::context::Context;
+use super::stdout;
 use crate::io::atomic;
 use crate::{Error, Result};
 use std::path::Path;

@@ -3,8 +3,8 @@
 use super::table::own_table;
 use super::watch::Watcher;
 use super::{EvalArgs, put_out};
+use crate::cli::context::{Context, open_model};
 use crate::cli::scene::{near_plane, open_gpu, open_scene, pick_views, render_engine};
-use crate::cli::{Context, open_model};
 use crate::infer::score::evaluate::{Rendering, Wholes, evaluate, picture_count};
 use crate::infer::score::scores::Scores;
 use crate::io::image::read_rgba;

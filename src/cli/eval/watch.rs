@@ -1,7 +1,7 @@
 //! Progress, and the page where one was asked for.
 
 use crate::Result;
-use crate::cli::Context;
+use crate::cli::context::Context;
 use crate::cli::log::Progress;
 use crate::infer::score::compared::{Compared, Watch};
 use crate::infer::score::page::Page;

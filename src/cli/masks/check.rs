@@ -2,7 +2,8 @@
 
 use super::open_photos;
 use crate::cli::args::JsonFlag;
-use crate::cli::{Context, stdout};
+use crate::cli::context::Context;
+use crate::cli::stdout;
 use crate::io::masks::check::{Finding, Problem};
 use crate::io::masks::{Report, inspect};
 use crate::{Error, Result};

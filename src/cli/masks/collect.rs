@@ -1,7 +1,8 @@
 //! `labelgs masks collect`: the paper's E, from the masks of all frames to those of the photos.
 
 use crate::cli::args::JsonFlag;
-use crate::cli::{Context, stdout};
+use crate::cli::context::Context;
+use crate::cli::stdout;
 use crate::io::frames::{Frame, Frames};
 use crate::io::image::write_png_grey16;
 use crate::io::mask::{mask_size_fits, read_mask};

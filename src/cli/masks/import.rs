@@ -3,7 +3,8 @@
 use super::open_photos;
 use crate::Result;
 use crate::cli::args::JsonFlag;
-use crate::cli::{Context, stdout};
+use crate::cli::context::Context;
+use crate::cli::stdout;
 use crate::io::label_table::LabelEntry;
 use crate::io::masks::{Format, ImportOptions, Imported, Overlap, import};
 use clap::Args;

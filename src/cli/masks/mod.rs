@@ -7,7 +7,7 @@ pub mod repair;
 pub mod spoil;
 pub mod track;
 
-use super::Context;
+use super::context::Context;
 use crate::cli::scene::open_with;
 use crate::io::LoadOptions;
 use crate::io::image::{write_png_grey8, write_png_grey16};

@@ -2,10 +2,11 @@
 
 use super::write_mask;
 use crate::cli::args::{JsonFlag, SceneArgs};
+use crate::cli::context::{Context, open_model};
 use crate::cli::log::Progress;
 use crate::cli::scene::{near_plane, open_gpu, open_scene, vote_engine};
+use crate::cli::stdout;
 use crate::cli::values::near;
-use crate::cli::{Context, open_model, stdout};
 use crate::engine::Engine;
 use crate::infer::masks::associate::{Owners, Segment, associate};
 use crate::infer::masks::repair::{Naming, Repairs, mend, name_groups, rename};

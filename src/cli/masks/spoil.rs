@@ -2,7 +2,8 @@
 
 use super::{pngs, write_mask};
 use crate::cli::args::JsonFlag;
-use crate::cli::{Context, stdout};
+use crate::cli::context::Context;
+use crate::cli::stdout;
 use crate::io::atomic;
 use crate::io::mask::read_mask;
 use crate::scene::LabelMap;

@@ -2,8 +2,9 @@
 
 use super::{pngs, write_mask};
 use crate::cli::args::JsonFlag;
+use crate::cli::context::Context;
+use crate::cli::stdout;
 use crate::cli::values::share;
-use crate::cli::{Context, stdout};
 use crate::infer::masks::track::{Overlap, track};
 use crate::io::atomic;
 use crate::io::mask::read_mask;

@@ -5,9 +5,10 @@ mod source;
 pub use source::{for_training, from_depths};
 
 use super::args::JsonFlag;
+use super::context::{Context, open_model};
 use super::log::Progress;
 use super::scene::{near_plane, open_gpu, open_with, render_engine};
-use super::{Context, open_model, stdout};
+use super::stdout;
 use crate::infer::occlusion::{Rule, by_contour, picture};
 use crate::infer::render::render;
 use crate::io::LoadOptions;
