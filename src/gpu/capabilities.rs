@@ -1,6 +1,5 @@
 //! What a device is and can do, against what the engine needs.
 
-use super::call::vk_call;
 use super::limits::Limits;
 use crate::error::{Error, Result};
 use ash::vk;
@@ -113,62 +112,6 @@ pub struct Capabilities {
 }
 
 impl Capabilities {
-    /// Asks a device.
-    pub(super) fn probe(instance: &ash::Instance, index: usize, physical: vk::PhysicalDevice) -> Result<Self> {
-        // SAFETY: the handle comes from this instance; here and below the structs match the device's version.
-        let core = unsafe { instance.get_physical_device_properties(physical) };
-        let version = core.api_version;
-        let api_version =
-            (vk::api_version_major(version), vk::api_version_minor(version), vk::api_version_patch(version));
-        let extensions = vk_call("vkEnumerateDeviceExtensionProperties", || unsafe {
-            instance.enumerate_device_extension_properties(physical)
-        })?;
-        let has = |name| extensions.iter().any(|extension| extension.extension_name_as_c_str() == Ok(name));
-        let is_1_3 = version >= vk::API_VERSION_1_3;
-        let has_size_control = is_1_3 || has(ash::ext::subgroup_size_control::NAME);
-        let features = super::devices::features(instance, physical, has_size_control);
-        let mut eleven = vk::PhysicalDeviceVulkan11Properties::default();
-        let mut twelve = vk::PhysicalDeviceVulkan12Properties::default();
-        let mut control = vk::PhysicalDeviceSubgroupSizeControlProperties::default();
-        let mut buffers = vk::PhysicalDeviceMaintenance4Properties::default();
-        let mut all = vk::PhysicalDeviceProperties2::default();
-        if version >= vk::API_VERSION_1_2 {
-            all = all.push_next(&mut eleven).push_next(&mut twelve);
-        }
-        if has_size_control {
-            all = all.push_next(&mut control);
-        }
-        if is_1_3 {
-            all = all.push_next(&mut buffers);
-        }
-        unsafe { instance.get_physical_device_properties2(physical, &mut all) };
-        let max_buffer = if is_1_3 { buffers.max_buffer_size } else { u64::MAX };
-        let families = unsafe { instance.get_physical_device_queue_family_properties(physical) };
-        let family = super::devices::compute_family(&families);
-        let memory = super::devices::memory(instance, physical, has(ash::ext::memory_budget::NAME));
-        let timestamp_bits = family.map_or(0, |(_, properties)| properties.timestamp_valid_bits);
-        let mut limits = super::devices::limits(&core.limits, &eleven, max_buffer, memory, timestamp_bits);
-        limits.lower_by_env()?;
-        let subgroup = super::devices::subgroup(&eleven, &control, &features);
-        let mut found = Self {
-            index,
-            name: text(core.device_name_as_c_str()),
-            kind: kind(core.device_type),
-            api_version,
-            driver_name: text(twelve.driver_name_as_c_str()),
-            driver_info: text(twelve.driver_info_as_c_str()),
-            uuid: eleven.device_uuid,
-            limits,
-            subgroup,
-            needs: Vec::new(),
-            features,
-            queue_family: family.map_or(0, |(index, _)| index),
-            size_control_is_extension: has_size_control && !is_1_3,
-        };
-        found.needs = super::devices::needs(&found, family.is_some());
-        Ok(found)
-    }
-
     /// True if the "device" is the host's processor.
     pub fn is_cpu(&self) -> bool {
         self.kind == DeviceKind::Cpu
@@ -182,19 +125,5 @@ impl Capabilities {
     /// The UUID as text.
     pub fn uuid_text(&self) -> String {
         self.uuid.iter().map(|byte| format!("{byte:02x}")).collect()
-    }
-}
-
-fn text<E>(name: std::result::Result<&std::ffi::CStr, E>) -> String {
-    name.map_or_else(|_| String::new(), |name| name.to_string_lossy().into_owned())
-}
-
-fn kind(kind: vk::PhysicalDeviceType) -> DeviceKind {
-    match kind {
-        vk::PhysicalDeviceType::DISCRETE_GPU => DeviceKind::Discrete,
-        vk::PhysicalDeviceType::INTEGRATED_GPU => DeviceKind::Integrated,
-        vk::PhysicalDeviceType::VIRTUAL_GPU => DeviceKind::Virtual,
-        vk::PhysicalDeviceType::CPU => DeviceKind::Cpu,
-        _ => DeviceKind::Other,
     }
 }

@@ -17,6 +17,7 @@ mod limits;
 mod local_size;
 mod memory;
 mod pipeline;
+mod probe;
 mod query;
 mod select;
 mod timeline;

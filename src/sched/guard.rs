@@ -2,27 +2,15 @@
 
 use super::Scheduler;
 use super::recorder::Recorder;
-use super::storage::Storage;
 use crate::error::{Error, Result};
 use crate::gpu::Buffer;
-use crate::plan::{Buf, Class, GUARD_BYTES, Plan, SLOTS};
+use crate::plan::{Buf, Class, GUARD_BYTES, SLOTS};
 
 const PATTERN: u32 = 0x5AFE_C0DE;
 
 /// Writes the guard that begins at a byte offset.
 pub(super) fn write(recorder: &Recorder<'_>, buffer: &Buffer, offset: u64) -> Result<()> {
     recorder.fill(buffer, offset, GUARD_BYTES, PATTERN)
-}
-
-/// Writes the guards of the scratch buffers of a plan.
-pub(super) fn write_scratch(recorder: &Recorder<'_>, plan: &Plan, storage: &Storage) -> Result<()> {
-    for (index, decl) in plan.table.iter().enumerate() {
-        if let (Class::Step, Some(place)) = (decl.class, plan.placements[index]) {
-            let (buffer, offset) = storage.place(plan, Buf(index as u16), 0)?;
-            write(recorder, buffer, offset + place.bytes)?;
-        }
-    }
-    Ok(())
 }
 
 impl Scheduler {

@@ -65,7 +65,7 @@ impl Writer<'_> {
     /// Fresh guards and timestamps.
     fn prologue(&self, queries: Option<&QueryPool>) -> Result<()> {
         if self.plan.options.guards {
-            guard::write_scratch(&self.recorder, self.plan, self.storage)?;
+            write_scratch_guards(&self.recorder, self.plan, self.storage)?;
             self.recorder.barrier(Uses::ALL, Uses::ALL);
         }
         if let Some(queries) = queries {
@@ -156,7 +156,13 @@ fn vulkan_format(format: TexelFormat) -> vk::Format {
     }
 }
 
-/// Buffers of a class have one copy per slot, or one in all.
-pub(super) fn copy_of(class: Class, slot: usize) -> usize {
-    if class.copies() > 1 { slot } else { 0 }
+/// Writes the guards of the scratch buffers of a plan.
+fn write_scratch_guards(recorder: &Recorder<'_>, plan: &Plan, storage: &Storage) -> Result<()> {
+    for (index, decl) in plan.table.iter().enumerate() {
+        if let (Class::Step, Some(place)) = (decl.class, plan.placements[index]) {
+            let (buffer, offset) = storage.place(plan, Buf(index as u16), 0)?;
+            guard::write(recorder, buffer, offset + place.bytes)?;
+        }
+    }
+    Ok(())
 }

@@ -1,6 +1,5 @@
 //! The memory behind the plan: a VkBuffer for each buffer that is not scratch, and the pages of the Step arena.
 
-use super::recording::copy_of;
 use super::{Scheduler, guard};
 use crate::error::{Error, Result};
 use crate::gpu::{Buffer, Gpu, MemoryKind};
@@ -215,4 +214,9 @@ impl Scheduler {
             Ok(())
         })
     }
+}
+
+/// Buffers of a class have one copy per slot, or one in all.
+pub(super) fn copy_of(class: Class, slot: usize) -> usize {
+    if class.copies() > 1 { slot } else { 0 }
 }

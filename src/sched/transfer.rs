@@ -1,8 +1,8 @@
 //! Transfers between host and buffers, outside of lists.
 
 use super::recorder::Recorder;
-use super::recording::copy_of;
 use super::storage::Storage;
+use super::storage::copy_of;
 use super::{Scheduler, Ticket};
 use crate::error::{Error, Result};
 use crate::gpu::{Buffer, Gpu, MemoryKind};

@@ -1,7 +1,7 @@
 //! Objects that labels find hard. Each stands for one difficulty; `tests/synth.rs` measures that it is there.
 
 use super::material::Pattern;
-use super::presets::Row;
+use super::object::Row;
 use super::shape::Shape;
 use glam::DVec3;
 

@@ -6,6 +6,7 @@
 mod cameras;
 mod hard;
 mod material;
+mod object;
 mod points;
 mod presets;
 mod shape;
@@ -15,8 +16,9 @@ mod world;
 mod write;
 
 pub use cameras::ring_of_cameras;
+pub use object::Object;
 pub use trace::{Picture, alone, picture};
-pub use world::{Object, World};
+pub use world::World;
 pub use write::{Summary, write};
 
 use crate::scene::{Dataset, LabelMap, Photo, View};

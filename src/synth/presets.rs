@@ -1,13 +1,10 @@
 //! The arrangements of objects.
 
 use super::material::{Material, Pattern, hsv};
+use super::object::{Object, Row};
 use super::shape::Shape;
-use super::world::Object;
 use super::{Preset, hard, hash01};
 use glam::{DQuat, DVec3};
-
-/// One row of an arrangement: name, shape, position, turn about z in degrees, pattern.
-pub type Row = (&'static str, Shape, [f64; 3], f64, Pattern);
 
 /// The objects of a preset, ids 1, 2, .. in order.
 pub fn objects(preset: Preset, seed: u64) -> Vec<Object> {

@@ -1,45 +1,14 @@
 //! Objects on a textured ground under a sky: what a ray sees.
 
-use super::material::{Material, ground_albedo};
-use super::shape::Shape;
+use super::material::ground_albedo;
+use super::object::Object;
 use super::{Preset, hash01, presets};
-use glam::{DQuat, DVec3};
+use glam::DVec3;
 
 /// Radius of the sky, a real surface around the scene: what is far must be learnable too.
 const SKY_RADIUS: f64 = 9.0;
 /// Radii between which the ground takes the colour of the horizon.
 const HAZE: (f64, f64) = (2.2, 6.5);
-
-/// A labelled object.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Object {
-    /// Id in the masks, from 1.
-    pub id: u8,
-    /// Name.
-    pub name: &'static str,
-    /// Shape in its own frame.
-    pub shape: Shape,
-    /// Centre, world.
-    pub position: DVec3,
-    /// World from own frame.
-    pub rotation: DQuat,
-    /// Colour.
-    pub material: Material,
-}
-
-impl Object {
-    /// Place and direction in the object's own frame.
-    fn to_own(&self, origin: DVec3, direction: DVec3) -> (DVec3, DVec3) {
-        let back = self.rotation.conjugate();
-        (back * (origin - self.position), back * direction)
-    }
-
-    /// Distance at which a ray meets the object alone.
-    pub fn distance(&self, origin: DVec3, direction: DVec3) -> Option<f64> {
-        let (origin, direction) = self.to_own(origin, direction);
-        self.shape.enter(origin, direction).map(|entry| entry.distance)
-    }
-}
 
 /// What a ray meets first.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,8 +1,9 @@
 //! The files of a made scene: COLMAP model, pictures, masks with names, objects alone, depth.
 
+use super::object::Object;
 use super::points::Seen;
 use super::trace::Picture;
-use super::world::{Object, World};
+use super::world::World;
 use super::{SynthOptions, alone, picture, points, ring_of_cameras, view_name};
 use crate::io::label_table::{self, LabelEntry, LabelTable};
 use crate::io::{atomic, image};

@@ -5,9 +5,10 @@ mod lpips;
 mod refusals;
 mod rules;
 
+use labelgs::infer::score::protocol::bench::Bench;
 use labelgs::infer::score::protocol::paint::Painter;
 use labelgs::infer::score::protocol::report::Report;
-use labelgs::infer::score::protocol::run::{Bench, run};
+use labelgs::infer::score::protocol::run::run;
 use labelgs::infer::score::protocol::score::Drawn;
 use labelgs::infer::score::protocol::{Ask, By, Layout, Protocol};
 use labelgs::io::image::write_png_grey8;

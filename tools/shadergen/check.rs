@@ -1,6 +1,7 @@
 //! The rules that every shader keeps. Each breach is a [`Finding`] that stops the build.
 
 use super::interface::{Interface, Kind};
+use super::source::{line_of, without_comments};
 use super::{Finding, Shader, Variant, constants, is_snake_case};
 use std::collections::BTreeMap;
 
@@ -74,12 +75,6 @@ pub fn text(path: &str, source: &str) -> Vec<Finding> {
         }
     }
     findings
-}
-
-/// Line (from 1) of the first place where `name` stands as a word; 1 if it stands nowhere.
-pub fn line_of(source: &str, name: &str) -> usize {
-    let is_word = |line: &str| line.split(|c: char| !(c.is_alphanumeric() || c == '_')).any(|word| word == name);
-    without_comments(source).lines().position(is_word).map_or(1, |index| index + 1)
 }
 
 /// Structs of one name must be one struct, whatever shader they stand in.
@@ -170,24 +165,6 @@ fn agreement(shader: &Shader, base: &Variant, other: &Variant) -> Option<Finding
     };
     let rule = format!("{} and {} have different {what}; variants share one interface", base.name, other.name);
     Some(Finding::new(format!("{}:1", shader.path), rule))
-}
-
-/// The text with comments blanked out; line breaks stay.
-fn without_comments(source: &str) -> String {
-    let mut code = String::with_capacity(source.len());
-    let mut rest = source;
-    while let Some(start) = rest.find("//").into_iter().chain(rest.find("/*")).min() {
-        code.push_str(&rest[..start]);
-        let end = if rest[start..].starts_with("//") {
-            rest[start..].find('\n').map_or(rest.len(), |end| start + end)
-        } else {
-            rest[start + 2..].find("*/").map_or(rest.len(), |end| start + end + 4)
-        };
-        code.extend(rest[start..end].chars().filter(|c| *c == '\n'));
-        rest = &rest[end..];
-    }
-    code.push_str(rest);
-    code
 }
 
 /// Which of 1/255, 0.99 and 1e-4 stand in a line of code.

@@ -43,7 +43,7 @@ pub fn read(compiler: &GlslCompiler, text: &str) -> Result<Vec<Constant>, Vec<Fi
         match stored.get(index).copied().flatten() {
             Some(bits) => constant.bits = bits,
             None => findings.push(Finding::new(
-                format!("{place}:{}", super::check::line_of(text, &constant.name)),
+                format!("{place}:{}", super::source::line_of(text, &constant.name)),
                 format!(
                     "the value of `{}` is not known to the GLSL compiler; use literals and constants",
                     constant.name

@@ -7,6 +7,7 @@ pub mod constants;
 pub mod emit;
 pub mod interface;
 pub mod reflect;
+pub mod source;
 pub mod variants;
 
 use compile::{Define, GlslCompiler, Purpose};

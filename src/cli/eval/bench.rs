@@ -3,11 +3,12 @@
 use super::table::bench_table;
 use super::watch::Watcher;
 use super::{EvalArgs, put_out};
+use crate::cli::context::{Context, open_model};
 use crate::cli::scene::{near_plane, open_gpu, open_scene, render_engine};
-use crate::cli::{Context, open_model};
 use crate::infer::score::lpips::Weights;
+use crate::infer::score::protocol::bench::Bench;
 use crate::infer::score::protocol::paint::EnginePainter;
-use crate::infer::score::protocol::run::{Bench, picture_count, run as run_bench};
+use crate::infer::score::protocol::run::{picture_count, run as run_bench};
 use crate::infer::score::protocol::score::Distance;
 use crate::infer::score::protocol::{Ask, By, Layout, Prompt, Protocol};
 use crate::io::label_table::LabelTable;

@@ -3,6 +3,7 @@
 mod random;
 mod region;
 mod sweep;
+mod texel;
 
 use crate::error::{Error, Result};
 use crate::scene::gaussians::SH_C0;

@@ -10,8 +10,9 @@
 
 use super::region::{self, Region};
 use super::sweep::Sweep;
+use super::texel::texel;
 use crate::error::{Error, Result};
-use crate::scene::{Camera, Dataset, Photo, Point, View};
+use crate::scene::{Camera, Dataset, Point, View};
 use glam::{DVec2, DVec3};
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
@@ -121,11 +122,6 @@ impl Test<'_> {
             if coloured > 0 { sum.map(|value| ((value + coloured / 2) / coloured) as u8) } else { point.colour };
         Some(Point { colour, ..point })
     }
-}
-
-pub(super) fn texel(photo: &Photo, pixel: DVec2) -> Option<[u8; 3]> {
-    let [r, g, b, valid] = photo.rgba[pixel.y as usize * photo.width as usize + pixel.x as usize];
-    (valid == 255).then_some([r, g, b])
 }
 
 fn near(a: [u8; 3], b: [u8; 3]) -> bool {

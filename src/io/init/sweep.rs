@@ -3,8 +3,8 @@
 //! A plain plane sweep without windows or smoothing. Most of its points lie near a surface, which is all that the
 //! first Gaussians need; training moves the others or removes them.
 
-use super::random::texel;
 use super::region::{sees, unproject};
+use super::texel::texel;
 use crate::io::resample::{bounded_size, shrink_photo};
 use crate::scene::{Camera, Photo, Point, View};
 use glam::DVec2;

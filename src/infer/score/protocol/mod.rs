@@ -4,6 +4,7 @@
 //! how each is chosen. [`run`] chooses and scores, [`report`] averages. Nothing is left out in silence: an object that
 //! cannot be chosen and a frame that cannot be rendered count as 0 and are listed.
 
+pub mod bench;
 mod binary;
 mod labelgs;
 mod lerf_mask;

@@ -1,7 +1,7 @@
 //! Which labels an object of a benchmark has in the model.
 
+use super::bench::Bench;
 use super::paint::Painter;
-use super::run::Bench;
 use super::{Prompt, Task};
 use crate::error::Result;
 use crate::infer::edit::choose::{candidates, choose_labels};

@@ -1,0 +1,250 @@
+//! The questions behind [`Capabilities`].
+
+use super::call::vk_call;
+use super::capabilities::{Capabilities, DeviceKind, Features, Need, Subgroup};
+use super::limits::Limits;
+use crate::error::Result;
+use crate::shaders::{self, BindingKind, ShaderDesc};
+use ash::vk;
+
+/// Subgroup operations that the kernels are written with.
+const SUBGROUP_OPERATIONS: vk::SubgroupFeatureFlags = vk::SubgroupFeatureFlags::from_raw(
+    vk::SubgroupFeatureFlags::BASIC.as_raw()
+        | vk::SubgroupFeatureFlags::ARITHMETIC.as_raw()
+        | vk::SubgroupFeatureFlags::SHUFFLE.as_raw(),
+);
+
+impl Capabilities {
+    /// Asks a device.
+    pub(super) fn probe(instance: &ash::Instance, index: usize, physical: vk::PhysicalDevice) -> Result<Self> {
+        // SAFETY: the handle comes from this instance; here and below the structs match the device's version.
+        let core = unsafe { instance.get_physical_device_properties(physical) };
+        let version = core.api_version;
+        let api_version =
+            (vk::api_version_major(version), vk::api_version_minor(version), vk::api_version_patch(version));
+        let extensions = vk_call("vkEnumerateDeviceExtensionProperties", || unsafe {
+            instance.enumerate_device_extension_properties(physical)
+        })?;
+        let has = |name| extensions.iter().any(|extension| extension.extension_name_as_c_str() == Ok(name));
+        let is_1_3 = version >= vk::API_VERSION_1_3;
+        let has_size_control = is_1_3 || has(ash::ext::subgroup_size_control::NAME);
+        let features = features(instance, physical, has_size_control);
+        let mut eleven = vk::PhysicalDeviceVulkan11Properties::default();
+        let mut twelve = vk::PhysicalDeviceVulkan12Properties::default();
+        let mut control = vk::PhysicalDeviceSubgroupSizeControlProperties::default();
+        let mut buffers = vk::PhysicalDeviceMaintenance4Properties::default();
+        let mut all = vk::PhysicalDeviceProperties2::default();
+        if version >= vk::API_VERSION_1_2 {
+            all = all.push_next(&mut eleven).push_next(&mut twelve);
+        }
+        if has_size_control {
+            all = all.push_next(&mut control);
+        }
+        if is_1_3 {
+            all = all.push_next(&mut buffers);
+        }
+        unsafe { instance.get_physical_device_properties2(physical, &mut all) };
+        let max_buffer = if is_1_3 { buffers.max_buffer_size } else { u64::MAX };
+        let families = unsafe { instance.get_physical_device_queue_family_properties(physical) };
+        let family = compute_family(&families);
+        let memory = memory(instance, physical, has(ash::ext::memory_budget::NAME));
+        let timestamp_bits = family.map_or(0, |(_, properties)| properties.timestamp_valid_bits);
+        let mut limits = limits(&core.limits, &eleven, max_buffer, memory, timestamp_bits);
+        limits.lower_by_env()?;
+        let subgroup = subgroup(&eleven, &control, &features);
+        let mut found = Self {
+            index,
+            name: text(core.device_name_as_c_str()),
+            kind: kind(core.device_type),
+            api_version,
+            driver_name: text(twelve.driver_name_as_c_str()),
+            driver_info: text(twelve.driver_info_as_c_str()),
+            uuid: eleven.device_uuid,
+            limits,
+            subgroup,
+            needs: Vec::new(),
+            features,
+            queue_family: family.map_or(0, |(index, _)| index),
+            size_control_is_extension: has_size_control && !is_1_3,
+        };
+        found.needs = needs(&found, family.is_some());
+        Ok(found)
+    }
+}
+
+/// Features of the device that we know of.
+fn features(instance: &ash::Instance, physical: vk::PhysicalDevice, size_control: bool) -> Features {
+    let mut twelve = vk::PhysicalDeviceVulkan12Features::default();
+    let mut control = vk::PhysicalDeviceSubgroupSizeControlFeatures::default();
+    // SAFETY: the handle comes from this instance.
+    let version = unsafe { instance.get_physical_device_properties(physical) }.api_version;
+    let mut all = vk::PhysicalDeviceFeatures2::default();
+    if version >= vk::API_VERSION_1_2 {
+        all = all.push_next(&mut twelve);
+    }
+    if size_control {
+        all = all.push_next(&mut control);
+    }
+    // SAFETY: the chained structs are known to the device's version and extensions.
+    unsafe { instance.get_physical_device_features2(physical, &mut all) };
+    let core = all.features;
+    let on = |flag: vk::Bool32| flag == vk::TRUE;
+    Features {
+        memory_model: on(twelve.vulkan_memory_model) && on(twelve.vulkan_memory_model_device_scope),
+        scalar: on(twelve.scalar_block_layout),
+        timeline: on(twelve.timeline_semaphore),
+        robust: on(core.robust_buffer_access),
+        size_control: on(control.subgroup_size_control),
+        full_subgroups: on(control.compute_full_subgroups),
+    }
+}
+
+/// The queue family to use: one that computes without drawing, as it is the least busy, else any that computes.
+fn compute_family(families: &[vk::QueueFamilyProperties]) -> Option<(u32, vk::QueueFamilyProperties)> {
+    let computes = |family: &&(u32, vk::QueueFamilyProperties)| family.1.queue_flags.contains(vk::QueueFlags::COMPUTE);
+    let numbered = families.iter().enumerate().map(|(index, family)| (index as u32, *family)).collect::<Vec<_>>();
+    let draws = |family: &&(u32, vk::QueueFamilyProperties)| family.1.queue_flags.contains(vk::QueueFlags::GRAPHICS);
+    // A family without timestamps is only taken if there is no other.
+    let rank =
+        |family: &&(u32, vk::QueueFamilyProperties)| (family.1.timestamp_valid_bits == 0, draws(family), family.0);
+    numbered.iter().filter(computes).min_by_key(rank).copied()
+}
+
+/// Size of the largest heap of the device, and how much of it we may use.
+fn memory(instance: &ash::Instance, physical: vk::PhysicalDevice, has_budget: bool) -> (u64, u64) {
+    let mut budget = vk::PhysicalDeviceMemoryBudgetPropertiesEXT::default();
+    let mut all = vk::PhysicalDeviceMemoryProperties2::default();
+    if has_budget {
+        all = all.push_next(&mut budget);
+    }
+    // SAFETY: the handle comes from this instance, and the chained struct is known to the device.
+    unsafe { instance.get_physical_device_memory_properties2(physical, &mut all) };
+    let heaps = all.memory_properties;
+    let local = |heap: &vk::MemoryHeap| heap.flags.contains(vk::MemoryHeapFlags::DEVICE_LOCAL);
+    let heaps = heaps.memory_heaps.iter().take(heaps.memory_heap_count as usize).enumerate();
+    let Some((index, heap)) = heaps.filter(|(_, heap)| local(heap)).max_by_key(|(_, heap)| heap.size) else {
+        return (0, 0);
+    };
+    // Beyond its budget a driver may swap, slow down or lose the device, so a part stays free.
+    let free = if has_budget { budget.heap_budget[index].min(heap.size) } else { heap.size };
+    (heap.size, free / 100 * 90)
+}
+
+/// Limits in our words.
+fn limits(
+    core: &vk::PhysicalDeviceLimits,
+    eleven: &vk::PhysicalDeviceVulkan11Properties<'_>,
+    max_buffer: u64,
+    (heap, max_memory): (u64, u64),
+    timestamp_bits: u32,
+) -> Limits {
+    Limits {
+        max_storage_range: u64::from(core.max_storage_buffer_range),
+        max_texel_elements: u64::from(core.max_texel_buffer_elements),
+        storage_alignment: core.min_storage_buffer_offset_alignment,
+        texel_alignment: core.min_texel_buffer_offset_alignment,
+        max_groups: core.max_compute_work_group_count,
+        max_group_size: core.max_compute_work_group_size,
+        max_invocations: core.max_compute_work_group_invocations,
+        max_shared: core.max_compute_shared_memory_size,
+        max_allocation: eleven.max_memory_allocation_size.min(max_buffer),
+        max_push: core.max_push_constants_size,
+        max_storage_buffers: core
+            .max_per_stage_descriptor_storage_buffers
+            .min(core.max_descriptor_set_storage_buffers)
+            .min(core.max_per_stage_resources),
+        max_texel_buffers: core
+            .max_per_stage_descriptor_sampled_images
+            .min(core.max_descriptor_set_sampled_images)
+            .min(core.max_per_stage_resources),
+        heap,
+        max_memory,
+        timestamp_period: if timestamp_bits == 0 { 0.0 } else { core.timestamp_period },
+        timestamp_bits,
+    }
+}
+
+/// Subgroups in our words.
+fn subgroup(
+    eleven: &vk::PhysicalDeviceVulkan11Properties<'_>,
+    control: &vk::PhysicalDeviceSubgroupSizeControlProperties<'_>,
+    features: &Features,
+) -> Subgroup {
+    let compute = vk::ShaderStageFlags::COMPUTE;
+    let is_pinned = features.size_control && control.required_subgroup_size_stages.contains(compute);
+    let in_compute = eleven.subgroup_supported_stages.contains(compute);
+    let none = vk::SubgroupFeatureFlags::empty();
+    let size = eleven.subgroup_size;
+    let (min, max) = if is_pinned { (control.min_subgroup_size, control.max_subgroup_size) } else { (size, size) };
+    Subgroup {
+        size: size.clamp(min, max),
+        min,
+        max,
+        max_per_group: if is_pinned { control.max_compute_workgroup_subgroups } else { u32::MAX },
+        is_pinned,
+        operations: if in_compute { eleven.subgroup_supported_operations } else { none },
+    }
+}
+
+/// Requirements and options against what was found.
+fn needs(found: &Capabilities, has_queue: bool) -> Vec<Need> {
+    let (limits, features, subgroup) = (&found.limits, &found.features, &found.subgroup);
+    let (major, minor, patch) = found.api_version;
+    let flag = |what, is_met, reason| need(what, is_met, "yes", if is_met { "yes" } else { "no" }.to_owned(), reason);
+    let least = |what, needed: u32, found: u32, reason| {
+        need(what, found >= needed, &needed.to_string(), found.to_string(), reason)
+    };
+    let bindings = shaders::ALL.iter().map(|shader| storage_bindings(shader)).max().unwrap_or(0);
+    let push = shaders::ALL.iter().map(|shader| shader.push_bytes).max().unwrap_or(0);
+    let shuffles = subgroup.operations.contains(SUBGROUP_OPERATIONS);
+    let mut needs = vec![
+        need("Vulkan", (major, minor) >= (1, 2), "1.2", format!("{major}.{minor}.{patch}"), "everything"),
+        flag("compute queue", has_queue, "everything"),
+        flag("scalarBlockLayout", features.scalar, "one layout for shaders and host"),
+        flag("timelineSemaphore", features.timeline, "two steps in flight"),
+        flag("subgroup shuffle, arithmetic", shuffles, "blending without shared memory"),
+        least("subgroup size", 8, subgroup.size, "one tile per subgroup"),
+        least("workgroup size", 256, limits.max_invocations, "scan and sort"),
+        least("push constants, bytes", push, limits.max_push, "parameters of passes"),
+        least("storage buffers per shader", bindings, limits.max_storage_buffers, "bindings of the largest pass"),
+    ];
+    needs.extend(wishes(limits, subgroup));
+    needs
+}
+
+/// What the engine runs without, at a price.
+fn wishes(limits: &Limits, subgroup: &Subgroup) -> [Need; 3] {
+    let wish = |what, is_met, found: String, reason| Need {
+        is_required: false,
+        ..need(what, is_met, "wished", found, reason)
+    };
+    let pins = format!("{} of {}..{}", subgroup.size, subgroup.min, subgroup.max);
+    let (range, bits, period) = (limits.max_storage_range, limits.timestamp_bits, limits.timestamp_period);
+    [
+        wish("pinned subgroup size", subgroup.is_pinned, pins, "else the driver's default is hoped for"),
+        wish("storage binding of 1 GiB", range >= 1 << 30, format!("{range} B"), "bounds the number of Gaussians"),
+        wish("timestamps", bits > 0, format!("{bits} bits, {period} ns"), "time of each pass"),
+    ]
+}
+
+fn need(what: &'static str, is_met: bool, needed: &str, found: String, reason: &'static str) -> Need {
+    Need { what, is_required: true, needed: needed.to_owned(), found, is_met, reason }
+}
+
+fn storage_bindings(shader: &ShaderDesc) -> u32 {
+    shader.bindings.iter().filter(|binding| binding.kind == BindingKind::Storage).count() as u32
+}
+
+fn text<E>(name: std::result::Result<&std::ffi::CStr, E>) -> String {
+    name.map_or_else(|_| String::new(), |name| name.to_string_lossy().into_owned())
+}
+
+fn kind(kind: vk::PhysicalDeviceType) -> DeviceKind {
+    match kind {
+        vk::PhysicalDeviceType::DISCRETE_GPU => DeviceKind::Discrete,
+        vk::PhysicalDeviceType::INTEGRATED_GPU => DeviceKind::Integrated,
+        vk::PhysicalDeviceType::VIRTUAL_GPU => DeviceKind::Virtual,
+        vk::PhysicalDeviceType::CPU => DeviceKind::Cpu,
+        _ => DeviceKind::Other,
+    }
+}

@@ -1,0 +1,10 @@
+//! What a photo shows at a point.
+
+use crate::scene::Photo;
+use glam::DVec2;
+
+/// Colour of the pixel that a point (px) lies in, if the photo has one there.
+pub(super) fn texel(photo: &Photo, pixel: DVec2) -> Option<[u8; 3]> {
+    let [r, g, b, valid] = photo.rgba[pixel.y as usize * photo.width as usize + pixel.x as usize];
+    (valid == 255).then_some([r, g, b])
+}
