@@ -55,8 +55,13 @@ INOUT(30, vec4, segment_colours); // [jobs, pixels of a tile] (colour, transmitt
 INOUT(31, uvec4, segment_rest);   // (last, main splat, its weight, depth)
 #endif
 #ifdef LABELS
+// 1: the paper's lift is on, for which each pixel remembers its main splat.
+layout(constant_id = 16) const uint LIFT = 0;
 #include "label_state.glsl"
 #include "label_rules.glsl"
+const bool REMEMBERS_MAIN = LIFT != 0u;
+#else
+const bool REMEMBERS_MAIN = true; // where there is a main splat at all
 #endif
 
 void main() {
@@ -179,9 +184,11 @@ void main() {
                 depth[k] += s.z * w;
 #endif
 #if defined(MAIN) || defined(LABELS)
-                bool main_now = w > best[k];
-                best[k] = main_now ? w : best[k];
-                main_[k] = main_now ? id : main_[k];
+                if (REMEMBERS_MAIN) {
+                    bool main_now = w > best[k];
+                    best[k] = main_now ? w : best[k];
+                    main_[k] = main_now ? id : main_[k];
+                }
 #endif
             }
         }
@@ -240,7 +247,7 @@ void main() {
             main_weight_depth[p] = vec2(best[k], depth[k]);
 #endif
 #ifdef LABELS
-            if (u.lift != 0u && best[k] >= u.label_threshold) {
+            if (REMEMBERS_MAIN && best[k] >= u.label_threshold) {
                 lift(p, main_[k], best[k], u);
             }
 #endif

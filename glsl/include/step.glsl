@@ -18,7 +18,6 @@ struct StepUniforms {
     float label_weight;     // lambda_2
     float label_alpha;      // weight of the alpha term within the label loss
     float label_threshold;  // lift where the main weight is at least this
-    uint lift;              // 1: labels are lifted in this step
     uint gpf;               // 1: projection filter on
     uint occluder_words;    // words of occluder bits per layer
     uint stamp;             // differs from step to step, never 0

@@ -57,7 +57,7 @@ pub fn training_step(shape: &KernelShape, capacity: &Capacity, variant: Variant)
     let mut b = begin("training step", shape, capacity, variant.labels, variant.sh_degree);
     project::visible_splats(&mut b);
     let slots = tile::bin_splats(&mut b);
-    blend::blend_forward(&mut b, slots);
+    blend::blend_forward(&mut b, slots, variant.lift);
     loss::photo_loss(&mut b, variant.size.0, variant.size.1);
     blend::blend_backward(&mut b, slots);
     gather::gather(&mut b);
