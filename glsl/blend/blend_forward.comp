@@ -55,11 +55,8 @@ INOUT(30, vec4, segment_colours); // [jobs, pixels of a tile] (colour, transmitt
 INOUT(31, uvec4, segment_rest);   // (last, main splat, its weight, depth)
 #endif
 #ifdef LABELS
-// 1: the paper's lift is on, for which each pixel remembers its main splat.
-layout(constant_id = 16) const uint LIFT = 0;
 #include "label_state.glsl"
 #include "label_rules.glsl"
-const bool REMEMBERS_MAIN = LIFT != 0u;
 #else
 const bool REMEMBERS_MAIN = true; // where there is a main splat at all
 #endif
@@ -113,9 +110,7 @@ void main() {
         }
 #endif
         T[k] = inside ? 1.0 : -1.0; // the sign says whether the pixel still takes splats
-        cr[k] = 0.0;
-        cg[k] = 0.0;
-        cb[k] = 0.0;
+        cr[k] = cg[k] = cb[k] = 0.0;
         final_[k] = 0u;
 #if defined(MAIN) || defined(LABELS)
         best[k] = 0.0;
@@ -184,11 +179,9 @@ void main() {
                 depth[k] += s.z * w;
 #endif
 #if defined(MAIN) || defined(LABELS)
-                if (REMEMBERS_MAIN) {
-                    bool main_now = w > best[k];
-                    best[k] = main_now ? w : best[k];
-                    main_[k] = main_now ? id : main_[k];
-                }
+                bool main_now = REMEMBERS_MAIN && w > best[k];
+                best[k] = main_now ? w : best[k];
+                main_[k] = main_now ? id : main_[k];
 #endif
             }
         }

@@ -1,5 +1,9 @@
 // Rules of the labels: which pixels are hidden from an object, and the lift.
 
+// 1: the paper's lift is on, for which each pixel remembers its main splat.
+layout(constant_id = 16) const uint LIFT = 0;
+const bool REMEMBERS_MAIN = LIFT != 0u;
+
 // U_k(v) = 0: the pixel belongs to an object that hides this layer's object, or lies too near to a contour.
 bool left_out(uint layer, uint here, StepUniforms u) {
     if ((here & LABEL_BORDER) != 0u) {
