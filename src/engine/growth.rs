@@ -108,7 +108,7 @@ impl Engine {
         Ok(fits)
     }
 
-    /// Capacities for more Gaussians, with what the scene has needed so far: as many pairs and tiles for each.
+    /// Capacities for more Gaussians, with no fewer pairs, tiles and segments than the scene has needed so far.
     fn capacity_for(&self, gaussians: u64) -> Capacity {
         let old = self.sched.capacity();
         let mut new = capacity(&self.shape, &Room { gaussians, ..self.room });

@@ -48,7 +48,8 @@ impl PipelineCache {
 
     /// Hands new pipelines to the store and frees the cache, whose device is about to go.
     pub(super) fn close(&mut self, device: &ash::Device) {
-        if let Some(store) = &self.store {
+        // There is none where the driver refused one.
+        if let Some(store) = self.store.as_ref().filter(|_| self.handle != vk::PipelineCache::null()) {
             // SAFETY: device and cache are alive. A lost device has nothing to hand out.
             let data = unsafe { device.get_pipeline_cache_data(self.handle) }.unwrap_or_default();
             if !data.is_empty() && data.len() != self.loaded {
