@@ -1,7 +1,6 @@
 //! `labelgs label`.
 
-use super::args::JsonFlag;
-use super::args::SceneArgs;
+use super::args::{JsonFlag, SceneArgs};
 use super::context::{Context, open_model};
 use super::log::Progress;
 use super::scene::{near_plane, open_gpu, open_scene, vote_engine};

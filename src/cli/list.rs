@@ -2,8 +2,7 @@
 
 use super::args::JsonFlag;
 use super::context::Context;
-use super::labelled::TableArg;
-use super::labelled::open;
+use super::labelled::{TableArg, open};
 use super::stdout;
 use crate::Result;
 use crate::infer::edit::select::{LabelSummary, summarise};

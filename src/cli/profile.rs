@@ -16,8 +16,7 @@ use crate::synth::{self, SynthOptions};
 use crate::train::{StepReport, TrainConfig, Trainer};
 use crate::{Error, Result};
 use clap::Args;
-use std::path::Path;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 

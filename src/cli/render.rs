@@ -1,10 +1,8 @@
 //! `labelgs render`.
 
 use super::args::{JsonFlag, SceneArgs};
-use super::choose::Asked;
-use super::choose::PromptArgs;
-use super::context::Context;
-use super::context::open_model;
+use super::choose::{Asked, PromptArgs};
+use super::context::{Context, open_model};
 use super::labelled::SureArg;
 use super::scene::{near_plane, open_gpu, open_scene, pick_views, render_engine};
 use super::values::{Picks, colour, picks};
