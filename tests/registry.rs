@@ -51,7 +51,11 @@ fn lists() -> Vec<(Capacity, PassList)> {
                 (false, false, 3, true),
                 (false, false, 1, false),
             ] {
-                add(pass::training_step(&shape, &capacity, Variant { labels, lift, sh_degree, size, update }));
+                add(pass::training_step(
+                    &shape,
+                    &capacity,
+                    Variant { labels, lift, sh_degree, size, update, counts: false },
+                ));
             }
             add(pass::render_view(&shape, &capacity, 3));
             add(pass::vote_view(&shape, &capacity, 2));

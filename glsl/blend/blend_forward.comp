@@ -4,6 +4,7 @@
 #include "step.glsl"
 #include "dispatch.glsl"
 #include "blend_tile.glsl"
+layout(constant_id = 17) const uint COUNTS = 0; // 1: contributing pairs are counted
 // blend_forward — alpha-blend one tile of one layer front to back.
 // Work:    one subgroup (= workgroup) a tile: the scene's tiles, then (variant labels) the occupied layer tiles.
 // Reads:   step, counters; tile_starts, tile_ends [layers * T]; slots [I]; splat_from_instance [I]; splats [V,3]
@@ -139,7 +140,7 @@ void main() {
 #endif
     }
 
-    uint walked = 0u;
+    uint walked = 0u, contributing = 0u;
     for (uint base = begin; base < end; base += SUBGROUP_SIZE) {
         float live = T[0];
         [[unroll]] for (uint k = 1u; k < ROWS; k++) {
@@ -175,6 +176,7 @@ void main() {
                 cb[k] += s.colour.z * w;
                 T[k] = takes ? next : -abs(T[k]);
                 final_[k] = w > 0.0 ? position : final_[k];
+                contributing += COUNTS != 0u && w > 0.0 ? 1u : 0u;
 #ifdef MAIN
                 depth[k] += s.z * w;
 #endif
@@ -187,7 +189,14 @@ void main() {
         }
     }
     if (lane == 0u && walked > 0u) {
-        atomicAdd(counters.walked_splats, walked);
+        if (in_first_half(group, jobs)) {
+            atomicAdd(counters.walked_first, walked);
+        } else {
+            atomicAdd(counters.walked_second, walked);
+        }
+    }
+    if (COUNTS != 0u) {
+        atomicAdd(counters.contributing_pairs, contributing);
     }
 #ifdef SEGMENTED
     if (SEGMENT + 1u < SEGMENTS) {
@@ -208,24 +217,7 @@ void main() {
 
 #ifdef LABELS
     if (t.layer != 0u) {
-        float loss = 0.0;
-        uint label = label_from_layer[t.layer];
-        [[unroll]] for (uint k = 0u; k < ROWS; k++) {
-            bool inside = t.x < u.width && t.y0 + k < u.height;
-            uint p = inside ? (t.y0 + k) * u.width + t.x : 0u;
-            uint here = fetchu(view_labels, p);
-            vec4 photo = fetchc(target, p);
-            vec4 wanted = here == label ? vec4(photo.xyz, 1.0) : vec4(0.0);
-            bool counts = inside && photo.w > 0.5 && !left_out(t.layer, here, u);
-            vec4 difference = counts ? vec4(cr[k], cg[k], cb[k], 1.0 - abs(T[k])) - wanted : vec4(0.0);
-            vec4 change = counts ? abs(difference) - wanted : vec4(0.0); // wanted >= 0
-            loss += change.x + change.y + change.z + u.label_alpha * change.w;
-            layer_state[layer_pixel(t, k)] = uvec2(floatBitsToUint(abs(T[k])), final_[k] | pack_signs(difference));
-        }
-        loss = subgroup_sum(loss);
-        if (lane == 0u) {
-            layer_loss[slot] = loss * layer_weights[t.layer];
-        }
+        finish_layer(t, slot, T, cr, cg, cb, final_, u);
         return;
     }
 #endif

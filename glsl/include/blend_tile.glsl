@@ -27,11 +27,15 @@ struct TileJob {
     float row0;   // first row of the lane relative to the tile's top edge
 };
 
+// Devices that split a dispatch do so at its middle.
+bool in_first_half(uint i, uint n) {
+    return i < (n + 1u) / 2u;
+}
+
 // Neighbouring tiles cost about the same, so the even ones make the first half of the groups and the odd ones the
 // second: devices that split a dispatch into fixed halves get two halves of equal cost.
 uint interleave(uint i, uint n) {
-    uint half_ = (n + 1u) / 2u;
-    return i < half_ ? 2u * i : 2u * (i - half_) + 1u;
+    return in_first_half(i, n) ? 2u * i : 2u * (i - (n + 1u) / 2u) + 1u;
 }
 
 TileJob locate(uint job, uint virtual_tile, uint slot, StepUniforms u) {

@@ -33,3 +33,26 @@ void lift(uint p, uint splat, float weight, StepUniforms u) {
     uint key = (uint(weight * 65535.0) << 16) | label;
     atomicMax(label_keys[fetchu(gaussian_from_splat, splat)], key);
 }
+
+// What blend_forward keeps of a layer's tile: its loss, and the state from which the backward pass starts.
+void finish_layer(TileJob t, uint slot, float T[ROWS], float cr[ROWS], float cg[ROWS], float cb[ROWS],
+                  uint final_[ROWS], StepUniforms u) {
+    float loss = 0.0;
+    uint label = label_from_layer[t.layer];
+    [[unroll]] for (uint k = 0u; k < ROWS; k++) {
+        bool inside = t.x < u.width && t.y0 + k < u.height;
+        uint p = inside ? (t.y0 + k) * u.width + t.x : 0u;
+        uint here = fetchu(view_labels, p);
+        vec4 photo = fetchc(target, p);
+        vec4 wanted = here == label ? vec4(photo.xyz, 1.0) : vec4(0.0);
+        bool counts = inside && photo.w > 0.5 && !left_out(t.layer, here, u);
+        vec4 difference = counts ? vec4(cr[k], cg[k], cb[k], 1.0 - abs(T[k])) - wanted : vec4(0.0);
+        vec4 change = counts ? abs(difference) - wanted : vec4(0.0); // wanted >= 0
+        loss += change.x + change.y + change.z + u.label_alpha * change.w;
+        layer_state[layer_pixel(t, k)] = uvec2(floatBitsToUint(abs(T[k])), final_[k] | pack_signs(difference));
+    }
+    loss = subgroup_sum(loss);
+    if (gl_LocalInvocationID.x == 0u) {
+        layer_loss[slot] = loss * layer_weights[t.layer];
+    }
+}

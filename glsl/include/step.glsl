@@ -37,7 +37,9 @@ struct Counters {
     uint longest_list;      // splats in the fullest tile
     uint nonfinite_count;   // Gaussians whose gradient was not finite and was dropped
     uint densified_count;   // Gaussians after densification
-    uint walked_splats;     // splats that tiles walked in blend_forward; times the pixels of a tile: pairs
+    uint walked_first, walked_second; // splats that tiles walked in blend_forward, in the first and in the second half
+                            // of its workgroups; times the pixels of a tile: pairs
+    uint contributing_pairs; // (pixel, splat) pairs with a weight; counted on demand only
     uint cloned_count, split_count, pruned_count;
     float loss_l1, loss_ssim, loss_label; // sums, not yet divided; the label loss less that of empty layers
 };

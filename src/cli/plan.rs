@@ -73,7 +73,8 @@ fn subject(args: &PlanArgs, context: &Context) -> Result<Subject> {
     let size = (args.size.0, args.size.1);
     let room = Room { gaussians: args.gaussians.max(1), size, trained: true, labels };
     let capacity = capacity(&shape, &room);
-    let variant = Variant { labels: labels.is_some(), lift: false, sh_degree: args.sh_degree, size, update: true };
+    let variant =
+        Variant { labels: labels.is_some(), lift: false, sh_degree: args.sh_degree, size, update: true, counts: false };
     let list = training_step(&shape, &capacity, variant);
     Ok(Subject { device, shape, limits, room, capacity, list })
 }

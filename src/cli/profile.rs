@@ -68,6 +68,9 @@ pub struct ProfileArgs {
     pub json: Option<Option<PathBuf>>,
 }
 
+/// Steps after the timed ones that count pairs.
+const COUNTED: u32 = 10;
+
 /// Times steps inside of real training.
 pub fn run(args: &ProfileArgs, context: &Context) -> Result<()> {
     if let Some([old, new]) = args.compare.as_deref() {
@@ -106,7 +109,7 @@ fn decide(args: &ProfileArgs) -> Result<TrainConfig> {
         None => TrainConfig::default(),
     };
     decided.label_from = decided.label_from.min(args.from_step.saturating_add(1));
-    let steps = u64::from(args.from_step) + u64::from(args.warm_up) + u64::from(args.steps) + 1;
+    let steps = u64::from(args.from_step) + u64::from(args.warm_up) + u64::from(args.steps.saturating_add(COUNTED)) + 1;
     let steps = u32::try_from(steps).map_err(|_| Error::usage("--steps", "there are too many steps in all"))?;
     decided.iterations = decided.iterations.max(steps);
     decided.check()?;
@@ -157,6 +160,13 @@ fn measure(trainer: &mut Trainer, args: &ProfileArgs, context: &Context, profile
     profile.gaussians = trainer.gaussian_count();
     profile.room = *trainer.engine_mut().room();
     profile.fill(clocks, &reports, times);
+    trainer.count_pairs(true);
+    let mut counted = Vec::new();
+    for _ in 0..COUNTED.min(args.steps) {
+        counted.extend(trainer.step()?);
+    }
+    counted.extend(trainer.drain()?);
+    profile.fill_pairs(&counted);
     Ok(())
 }
 

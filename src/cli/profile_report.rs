@@ -71,6 +71,8 @@ pub struct Profile {
     /// Name in JSON, name in the table, values.
     counters: Vec<(&'static str, &'static str, Spread)>,
     pairs: f64,
+    balance: f64,
+    contributing: f64,
     ns_per_pair: [f64; 2],
     steps: Vec<Value>,
     left_out: usize,
@@ -97,6 +99,8 @@ impl Profile {
             device_ms: Spread::default(),
             counters: Vec::new(),
             pairs: 0.0,
+            balance: f64::NAN,
+            contributing: f64::NAN,
             ns_per_pair: [f64::NAN; 2],
             steps: Vec::new(),
             left_out: 0,
@@ -115,12 +119,12 @@ impl Profile {
         self.stages = rows(&times, |_| "");
         let sums = times.iter().map(|times| times.items.iter().map(|item| item.2 as f64 / 1e6).sum());
         self.device_ms = spread(sums.collect());
-        let walked =
-            |report: &StepReport| f64::from(report.report.counters.walked_splats) * f64::from(self.shape.tile_pixels());
+        let pixels = f64::from(self.shape.tile_pixels());
+        let walked = |step: &StepReport| walked_splats(step) * pixels;
         let counter = |value: &dyn Fn(&StepReport) -> f64| spread(reports.iter().map(value).collect());
         self.counters = vec![
             ("visible", "visible splats", counter(&|step| f64::from(step.report.counters.visible_count))),
-            ("instances", "(splat, tile) pairs", counter(&|step| f64::from(step.report.counters.instance_count))),
+            ("instances", "(splat, tile) pairs", counter(&instances)),
             (
                 "layer_tiles",
                 "tiles of object layers",
@@ -131,8 +135,10 @@ impl Profile {
                 "splats of the fullest tile",
                 counter(&|step| f64::from(step.report.counters.longest_list)),
             ),
+            ("pairs_listed", "(pixel, splat) pairs listed", counter(&|step| instances(step) * pixels)),
             ("pairs_walked", "(pixel, splat) pairs walked", counter(&walked)),
         ];
+        self.balance = spread(reports.iter().map(balance).collect()).mean;
         let counted: HashSet<u32> = times.iter().map(|times| times.step).collect();
         self.pairs = reports.iter().filter(|report| counted.contains(&report.step)).map(walked).sum();
         let threads = self.workers.map_or(1.0, |workers| workers.count as f64);
@@ -140,6 +146,13 @@ impl Profile {
             let items = times.iter().flat_map(|times| &times.items).filter(|item| item.0 == stage);
             items.map(|item| item.2 as f64).sum::<f64>() * threads / self.pairs
         });
+    }
+
+    /// Adds what further steps counted that were not timed: which share of the walked pairs had a weight.
+    pub fn fill_pairs(&mut self, reports: &[StepReport]) {
+        let weighted: f64 = reports.iter().map(|step| f64::from(step.report.counters.contributing_pairs)).sum();
+        let walked: f64 = reports.iter().map(walked_splats).sum();
+        self.contributing = weighted / (walked * f64::from(self.shape.tile_pixels()));
     }
 
     /// Steps that count for the passes.
@@ -164,8 +177,16 @@ impl Profile {
             Some(Workers { count, source }) => format!("times {count} worker threads ({source})"),
             None => "of the whole device".to_owned(),
         };
+        let (width, height) = self.room.size;
+        let walked =
+            self.counters.iter().find(|(name, _, _)| *name == "pairs_walked").map_or(f64::NAN, |(_, _, v)| v.mean);
         format!(
-            "per (pixel, splat) pair walked, ns: blend forward {forward:.3}, blend backward {backward:.3}, {whose}\n"
+            "per (pixel, splat) pair walked, ns: blend forward {forward:.3}, blend backward {backward:.3}, {whose}\n\
+             pairs walked per pixel: {:.1}, of which {:.1} % have a weight; the fuller half of the tiles walks {:.3} of \
+             the mean\n",
+            walked / (f64::from(width) * f64::from(height)),
+            self.contributing * 100.0,
+            self.balance
         )
     }
 
@@ -237,6 +258,8 @@ impl Profile {
             "processor_ms": self.cpu_ms(),
             "counters": counters.collect::<serde_json::Map<_, _>>(),
             "pairs_walked": self.pairs,
+            "contributing_share": self.contributing,
+            "balance_of_halves": self.balance,
             "ns_per_pair": { "blend_forward": self.ns_per_pair[0], "blend_backward": self.ns_per_pair[1] },
             "steps": self.steps,
         })
@@ -256,7 +279,8 @@ impl Profile {
             "instances": counters.instance_count,
             "layer_tiles": counters.layer_tile_count,
             "longest_list": counters.longest_list,
-            "pairs_walked": f64::from(counters.walked_splats) * f64::from(self.shape.tile_pixels()),
+            "pairs_walked": walked_splats(report) * f64::from(self.shape.tile_pixels()),
+            "balance_of_halves": balance(report),
             "first_run": times.map(|times| times.is_first),
             "stages_ms": stages,
         })
@@ -267,6 +291,20 @@ impl Spread {
     fn to_json(self) -> Value {
         json!({ "median": self.median, "p90": self.p90, "mean": self.mean })
     }
+}
+
+fn instances(step: &StepReport) -> f64 {
+    f64::from(step.report.counters.instance_count)
+}
+
+fn walked_splats(step: &StepReport) -> f64 {
+    f64::from(step.report.counters.walked_first) + f64::from(step.report.counters.walked_second)
+}
+
+/// What the fuller half of the workgroups walks, by the mean of both: 1 is even, 2 is all in one half.
+fn balance(step: &StepReport) -> f64 {
+    let counters = &step.report.counters;
+    f64::from(counters.walked_first.max(counters.walked_second)) / (0.5 * walked_splats(step)).max(1.0)
 }
 
 fn ms(ns: u64) -> f64 {

@@ -71,6 +71,7 @@ impl Engine {
                 sh_degree: 3,
                 size: room.size,
                 update: true,
+                counts: false,
             };
             lists.insert(0, pass::training_step(shape, capacity, variant));
             lists.push(pass::densify_apply(shape, capacity, room.labels.is_some()));

@@ -12,7 +12,7 @@ const GRID: fn() -> Grid = || args(constants::ARGS_BLEND);
 pub fn blend_forward(b: &mut Builder, slots: Buf, lift: bool) {
     let (subgroup, tile_width, tile_height) = (b.shape.subgroup, b.shape.tile_width, b.shape.tile_height);
     let (segments, length) = (b.capacity.segments as u32, b.shape.segment_length);
-    let lift = u32::from(lift);
+    let (lift, counts) = (u32::from(lift), u32::from(b.counts));
     if segments > 1 {
         for segment in 0..segments {
             if b.labels {
@@ -24,14 +24,14 @@ pub fn blend_forward(b: &mut Builder, slots: Buf, lift: bool) {
                     gaussian_from_splat: GAUSSIAN_FROM_SPLAT, layer_state: Buf::LAYER_STATE, layer_loss: Buf::LAYER_LOSS,
                     label_keys: Buf::LABEL_KEYS, layer_from_label: Buf::LAYER_FROM_LABEL, layer_weights: Buf::LAYER_WEIGHTS,
                     segment_colours: Buf::SEGMENT_COLOURS, segment_rest: Buf::SEGMENT_REST,
-                } [subgroup_size: subgroup, tile_width: tile_width, tile_height: tile_height, lift: lift,
+                } [subgroup_size: subgroup, tile_width: tile_width, tile_height: tile_height, lift: lift, counts: counts,
                     segment: segment, segments: segments, segment_length: length], GRID());
             } else {
                 pass!(b, texel blend_forward_segmented {
                     step: Buf::STEP, counters: Buf::COUNTERS, tile_starts: Buf::TILE_STARTS, tile_ends: Buf::TILE_ENDS,
                     slots: slots, splat_from_instance: Buf::SPLAT_FROM_INSTANCE, splats: Buf::SPLATS, image: Buf::IMAGE, last: Buf::LAST,
                     segment_colours: Buf::SEGMENT_COLOURS, segment_rest: Buf::SEGMENT_REST,
-                } [subgroup_size: subgroup, tile_width: tile_width, tile_height: tile_height,
+                } [subgroup_size: subgroup, tile_width: tile_width, tile_height: tile_height, counts: counts,
                     segment: segment, segments: segments, segment_length: length], GRID());
             }
         }
@@ -43,12 +43,12 @@ pub fn blend_forward(b: &mut Builder, slots: Buf, lift: bool) {
             layer_occluders: Buf::LAYER_OCCLUDERS, label_from_layer: Buf::LABEL_FROM_LAYER,
             gaussian_from_splat: GAUSSIAN_FROM_SPLAT, layer_state: Buf::LAYER_STATE, layer_loss: Buf::LAYER_LOSS,
             label_keys: Buf::LABEL_KEYS, layer_from_label: Buf::LAYER_FROM_LABEL, layer_weights: Buf::LAYER_WEIGHTS,
-        } [subgroup_size: subgroup, tile_width: tile_width, tile_height: tile_height, lift: lift], GRID());
+        } [subgroup_size: subgroup, tile_width: tile_width, tile_height: tile_height, lift: lift, counts: counts], GRID());
     } else {
         pass!(b, texel blend_forward {
             step: Buf::STEP, counters: Buf::COUNTERS, tile_starts: Buf::TILE_STARTS, tile_ends: Buf::TILE_ENDS,
             slots: slots, splat_from_instance: Buf::SPLAT_FROM_INSTANCE, splats: Buf::SPLATS, image: Buf::IMAGE, last: Buf::LAST,
-        } [subgroup_size: subgroup, tile_width: tile_width, tile_height: tile_height], GRID());
+        } [subgroup_size: subgroup, tile_width: tile_width, tile_height: tile_height, counts: counts], GRID());
     }
 }
 

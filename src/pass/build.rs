@@ -14,6 +14,8 @@ pub struct Builder<'a> {
     pub labels: bool,
     /// Active degree of the spherical harmonics.
     pub sh_degree: u32,
+    /// Blending counts the pairs that have a weight.
+    pub counts: bool,
     /// The list.
     pub list: PassList,
 }

@@ -37,10 +37,12 @@ pub struct Variant {
     pub size: (u32, u32),
     /// Parameters are updated at the end.
     pub update: bool,
+    /// The (pixel, splat) pairs that have a weight are counted, which takes time.
+    pub counts: bool,
 }
 
 fn begin<'a>(name: &str, shape: &'a KernelShape, capacity: &'a Capacity, labels: bool, sh_degree: u32) -> Builder<'a> {
-    let mut b = Builder { shape, capacity, labels, sh_degree, list: PassList::new(name) };
+    let mut b = Builder { shape, capacity, labels, sh_degree, counts: false, list: PassList::new(name) };
     pass!(b, step_begin { step: Buf::STEP, counters: Buf::COUNTERS, dispatch_args: Buf::DISPATCH_ARGS } [],
         build::ONE);
     b
@@ -55,6 +57,7 @@ fn end(mut b: Builder) -> PassList {
 /// One optimiser step on one view.
 pub fn training_step(shape: &KernelShape, capacity: &Capacity, variant: Variant) -> PassList {
     let mut b = begin("training step", shape, capacity, variant.labels, variant.sh_degree);
+    b.counts = variant.counts;
     project::visible_splats(&mut b);
     let slots = tile::bin_splats(&mut b);
     blend::blend_forward(&mut b, slots, variant.lift);

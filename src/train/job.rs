@@ -168,11 +168,7 @@ pub fn upload(
     sched.upload(Buf::STEP, slot, 0, &[uniforms])?;
     sched.upload(Buf::TARGET, slot, 0, &view.photo.rgba)?;
     let Some(room) = room.filter(|_| job.labels) else { return Ok(()) };
-    if view.view_labels.is_empty() {
-        sched.upload(Buf::VIEW_LABELS, slot, 0, &vec![0_u32; view.photo.rgba.len()])?;
-    } else {
-        sched.upload(Buf::VIEW_LABELS, slot, 0, &view.view_labels)?;
-    }
+    sched.upload(Buf::VIEW_LABELS, slot, 0, &view.view_labels)?;
     let words = uniforms.occluder_words as usize;
     let mut layer_from_label = vec![0_u32; room.max_label as usize + 1];
     let mut label_from_layer = vec![0_u32; room.layers as usize + 1];

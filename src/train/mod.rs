@@ -57,6 +57,7 @@ pub struct Trainer {
     /// Votes were counted before, so that masks can be compared with their outcome.
     labelled_once: bool,
     timing: Option<timing::Timing>,
+    counts_pairs: bool,
 }
 
 /// Room for training on a data set.
@@ -140,6 +141,7 @@ impl Trainer {
             memory_bounds: false,
             labelled_once: false,
             timing: None,
+            counts_pairs: false,
         })
     }
 
@@ -237,9 +239,10 @@ impl Trainer {
 
     fn job(&mut self, step: u32) -> Job {
         let view = self.order.draw();
-        let labels = self.engine.room().labels.is_some() && self.config.labels_at(step);
-        let samples = if labels { self.config.label_samples as usize } else { 0 };
+        let samples = if self.config.labels_at(step) { self.config.label_samples as usize } else { 0 };
         let layers = sampler::sample_objects(self.config.seed, step, &self.views[view].objects, samples);
+        // A view whose mask shows nothing, or that has none, costs what a scene without masks costs.
+        let labels = !layers.is_empty();
         // A densification replaces the parameters that the gradients belong to: no update then (3DGS).
         let update = !(self.config.densifies_at(step) && step < self.config.iterations);
         self.updates += u32::from(update);
@@ -267,6 +270,7 @@ impl Trainer {
             sh_degree: self.config.sh_degree_at(job.step),
             size: self.engine.room().size,
             update: job.update,
+            counts: self.counts_pairs,
         })
     }
 

@@ -31,6 +31,11 @@ impl Trainer {
         self.timing.get_or_insert_default();
     }
 
+    /// Whether the steps to come count the (pixel, splat) pairs that have a weight, which slows them.
+    pub fn count_pairs(&mut self, on: bool) {
+        self.counts_pairs = on;
+    }
+
     /// The times of the steps that ended since the last call.
     pub fn take_times(&mut self) -> Vec<StepTimes> {
         self.timing.as_mut().map(|timing| std::mem::take(&mut timing.times)).unwrap_or_default()

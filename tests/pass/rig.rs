@@ -147,7 +147,7 @@ impl Rig {
         let (labels, update) = (self.job.labels, self.job.update);
         let size = (self.scene.camera.width, self.scene.camera.height);
         let lift = self.job.lifts(&self.config);
-        ListKey::Train(Variant { labels, lift, sh_degree: self.config.sh_degree, size, update })
+        ListKey::Train(Variant { labels, lift, sh_degree: self.config.sh_degree, size, update, counts: false })
     }
 
     /// The device's sorted pairs: keys and slots.

@@ -114,7 +114,7 @@ pub fn engine_lists(shape: KernelShape) -> (Capacity, Vec<PassList>) {
         sort_lanes: 64,
         segments: 2,
     };
-    let variant = Variant { labels: true, lift: true, sh_degree: 3, size: (256, 256), update: true };
+    let variant = Variant { labels: true, lift: true, sh_degree: 3, size: (256, 256), update: true, counts: false };
     let lists = vec![
         pass::training_step(&shape, &capacity, variant),
         pass::training_step(&shape, &capacity, Variant { labels: false, lift: false, sh_degree: 0, ..variant }),
