@@ -72,7 +72,9 @@ fn every_flag_is_explained_once() {
 fn every_field_of_the_configuration_has_a_flag_with_its_default() {
     let root = command();
     let verb = root.find_subcommand("train").expect("train");
-    let fields = serde_json::to_value(TrainConfig { feature_rest_lr: Some(0.0), ..Default::default() }).expect("JSON");
+    let fields =
+        serde_json::to_value(TrainConfig { feature_rest_lr: Some(0.0), densify_until: Some(9), ..Default::default() })
+            .expect("JSON");
     for field in fields.as_object().expect("fields").keys() {
         let flag = field.replace('_', "-");
         let arg =

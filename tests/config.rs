@@ -11,10 +11,20 @@ fn schedules_follow_the_reference() {
     assert_eq!([999, 1000, 2000, 3000, 9000].map(|step| config.sh_degree_at(step)), [0, 1, 2, 3, 3]);
     let densifies: Vec<u32> = (1..=800).filter(|&step| config.densifies_at(step)).collect();
     assert_eq!(densifies, [600, 700, 800]);
-    let resets: Vec<u32> = (1..=15_000).filter(|&step| config.resets_opacity_at(step)).collect();
-    assert_eq!(resets, [3000, 6000, 9000, 12_000]);
+    let resets = |config: &TrainConfig| (1..=15_000).filter(|&step| config.resets_opacity_at(step)).collect::<Vec<_>>();
+    assert_eq!(resets(&config), [3000, 6000]);
+    assert_eq!(resets(&TrainConfig::paper()), [3000, 6000, 9000, 12_000]);
     assert!(!config.labels_at(999) && config.labels_at(1000));
     assert!((config.feature_rest_lr() - 1.25e-4).abs() < 1e-15);
+}
+
+#[test]
+fn densification_ends_at_half_of_the_run() {
+    let last = |iterations| {
+        let config = TrainConfig { iterations, ..TrainConfig::default() };
+        (1..=iterations).filter(|&step| config.densifies_at(step)).max()
+    };
+    assert_eq!([400, 1500, 3000, 30_000].map(last), [None, Some(1400), Some(1400), Some(14_900)]);
 }
 
 #[test]

@@ -184,7 +184,7 @@ pub struct DensityFlags {
     /// Step after which it starts.
     #[arg(long, value_name = "STEP")]
     pub densify_from: Option<u32>,
-    /// Step at which it ends.
+    /// Step at which it ends; otherwise half of the run, but 1000 steps after --densify-from at the earliest.
     #[arg(long, value_name = "STEP")]
     pub densify_until: Option<u32>,
     /// Steps between two.
@@ -234,7 +234,8 @@ impl TrainArgs {
         take!(config, self.optimiser, lambda_dssim sh_degree sh_degree_interval position_lr_init position_lr_final
             position_lr_max_steps feature_lr opacity_lr scaling_lr rotation_lr);
         config.feature_rest_lr = self.optimiser.feature_rest_lr.or(config.feature_rest_lr);
-        take!(config, self.density, densify_from densify_until densify_interval densify_grad_threshold percent_dense
+        config.densify_until = self.density.densify_until.or(config.densify_until);
+        take!(config, self.density, densify_from densify_interval densify_grad_threshold percent_dense
             min_opacity max_scale opacity_reset_interval opacity_reset_margin);
     }
 }

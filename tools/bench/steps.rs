@@ -1,11 +1,160 @@
-//! Steps.
+//! What a step with labels costs beside one without: by the area that masks cover, and by the number of objects.
 
-use super::Common;
+use super::pace::{Pace, median, race};
+use super::{Common, device, write_json};
 use labelgs::Result;
+use labelgs::engine::{Engine, Room};
+use labelgs::gpu::Gpu;
+use labelgs::infer::render::render;
+use labelgs::io::init;
+use labelgs::scene::{Dataset, Gaussians};
+use labelgs::sched::SchedulerOptions;
+use labelgs::synth::{self, SynthOptions};
+use labelgs::train::{TrainConfig, Trainer};
+use serde_json::{Value, json};
+use std::sync::Arc;
+
+const TEST_EVERY: u32 = 8;
+
+/// Sizes of a run.
+struct Size {
+    /// Of the pictures that the model is trained on; the second table has twice the width and height.
+    picture: (u32, u32),
+    views: u32,
+    training: u32,
+    timed: usize,
+    objects: [usize; 2],
+}
 
 /// Runs it.
-pub fn run(_common: &Common) -> Result<()> {
-    let gpu = super::device::open()?;
-    println!("{}", gpu.capabilities().name);
-    Ok(())
+pub fn run(common: &Common) -> Result<()> {
+    let size = if common.small {
+        Size { picture: (48, 40), views: 9, training: 20, timed: 2, objects: [3, 12] }
+    } else {
+        Size { picture: (320, 240), views: 40, training: 1500, timed: 60, objects: [10, 100] }
+    };
+    let gpu = device::open()?;
+    let options =
+        SynthOptions { width: size.picture.0, height: size.picture.1, views: size.views, ..Default::default() };
+    let model = trained(&gpu, &options, size.training)?;
+    let first = by_area(&gpu, &options, &model, size.timed)?;
+    let larger = SynthOptions { width: 2 * options.width, height: 2 * options.height, ..options };
+    let second = by_number(&gpu, &larger, &model, &size)?;
+    write_json(common, "steps", &json!({ "schema_version": 1, "by_area": first, "by_number": second }))
+}
+
+/// The built-in scene after so many steps without masks.
+fn trained(gpu: &Arc<Gpu>, options: &SynthOptions, steps: u32) -> Result<Gaussians> {
+    let mut dataset = without_masks(synth::dataset(options, TEST_EVERY));
+    let config = TrainConfig { iterations: steps, ..TrainConfig::default() };
+    let points = init::initial_gaussians(&dataset, config.seed, init::RANDOM_COUNT)?;
+    let mut trainer = Trainer::new(Arc::clone(gpu), config, &mut dataset, &points, SchedulerOptions::default())?;
+    for _ in 0..steps {
+        trainer.step()?;
+    }
+    trainer.model()
+}
+
+fn without_masks(mut dataset: Dataset) -> Dataset {
+    dataset.train.iter_mut().for_each(|view| view.mask = None);
+    dataset
+}
+
+/// Masks as they are made, and masks that leave no pixel out.
+fn by_area(gpu: &Arc<Gpu>, options: &SynthOptions, model: &Gaussians, timed: usize) -> Result<Vec<Value>> {
+    let made = synth::dataset(options, TEST_EVERY);
+    let share = covered(&made);
+    let mut whole = made.clone();
+    let ground =
+        1 + made.train.iter().filter_map(|view| view.mask.as_ref()).flat_map(|m| m.objects()).max().unwrap_or(0);
+    for mask in whole.train.iter_mut().filter_map(|view| view.mask.as_mut()) {
+        mask.ids.iter_mut().filter(|id| **id == 0).for_each(|id| *id = ground);
+    }
+    let paces = vec![
+        Pace::new("no masks", gpu, without_masks(made.clone()), model, 0)?,
+        Pace::new(&format!("masks cover {:.0} %", share * 100.0), gpu, made, model, u32::from(ground))?,
+        Pace::new("masks cover everything", gpu, whole, model, u32::from(ground))?,
+    ];
+    table(paces, timed, (options.width, options.height), model)
+}
+
+/// The same space divided among few and among many objects, all of them in the loss.
+fn by_number(gpu: &Arc<Gpu>, options: &SynthOptions, model: &Gaussians, size: &Size) -> Result<Vec<Value>> {
+    let made = synth::dataset(options, TEST_EVERY);
+    let mut paces = vec![Pace::new("no masks", gpu, without_masks(made.clone()), model, 0)?];
+    for objects in size.objects {
+        let divided = divided(gpu, &made, model, objects)?;
+        paces.push(Pace::new(&format!("{objects} objects"), gpu, divided, model, objects as u32)?);
+    }
+    table(paces, size.timed, (options.width, options.height), model)
+}
+
+/// Share of the pixels that belong to an object.
+fn covered(dataset: &Dataset) -> f64 {
+    let ids = || dataset.train.iter().filter_map(|view| view.mask.as_ref()).flat_map(|mask| &mask.ids);
+    ids().filter(|&&id| id != 0).count() as f64 / ids().count().max(1) as f64
+}
+
+/// Masks of `objects` regions of space, which together cover what the model covers.
+fn divided(gpu: &Arc<Gpu>, dataset: &Dataset, model: &Gaussians, objects: usize) -> Result<Dataset> {
+    let mut labels = vec![0; model.len()];
+    let mut all: Vec<usize> = (0..model.len()).collect();
+    divide(&mut all, &model.means, objects, &mut 1, &mut labels);
+    let size = dataset.train.first().map_or((1, 1), |view| (view.camera.width, view.camera.height));
+    let room = Room { gaussians: model.len() as u64, size, trained: false, labels: None };
+    let mut engine = Engine::new(Arc::clone(gpu), room, SchedulerOptions::default())?;
+    engine.upload_model(model)?;
+    let mut dataset = dataset.clone();
+    for view in &mut dataset.train {
+        let seen = render(&mut engine, &view.camera, TrainConfig::default().near, [0.0; 3], 0)?;
+        view.mask = Some(seen.label_map(&labels));
+    }
+    Ok(dataset)
+}
+
+/// Cuts a set of Gaussians across its longest side until there are so many parts of about equal counts.
+fn divide(rows: &mut [usize], means: &[[f32; 3]], parts: usize, next: &mut u32, labels: &mut [u32]) {
+    if parts <= 1 || rows.len() < 2 {
+        rows.iter().for_each(|&row| labels[row] = *next);
+        *next += 1;
+        return;
+    }
+    let side = |axis: usize| {
+        let values = rows.iter().map(|&row| means[row][axis]);
+        values.clone().fold(f32::MIN, f32::max) - values.fold(f32::MAX, f32::min)
+    };
+    let axis = (0..3).max_by(|&a, &b| side(a).total_cmp(&side(b))).unwrap_or(0);
+    let (left, at) = (parts / 2, rows.len() * (parts / 2) / parts);
+    rows.select_nth_unstable_by(at, |&a, &b| means[a][axis].total_cmp(&means[b][axis]));
+    let (low, high) = rows.split_at_mut(at);
+    divide(low, means, left, next, labels);
+    divide(high, means, parts - left, next, labels);
+}
+
+fn table(mut paces: Vec<Pace>, timed: usize, (width, height): (u32, u32), model: &Gaussians) -> Result<Vec<Value>> {
+    race(&mut paces, timed)?;
+    let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
+    let (plain, scene_pairs) = (median(&paces[0].passes), mean(&paces[0].pairs));
+    println!("{} Gaussians, {width} x {height} px, {timed} steps of each in turn", model.len());
+    println!(
+        "{:<24} {:>9} {:>9} {:>9} {:>7} {:>9} {:>12}",
+        "", "passes ms", "ratio", "cpu ms", "items", "pairs/px", "object/scene"
+    );
+    let mut rows = Vec::new();
+    for pace in &paces {
+        let (passes, processor, pairs) = (median(&pace.passes), median(&pace.processor), mean(&pace.pairs));
+        let (ratio, objects) = (passes / plain, pairs / scene_pairs - 1.0);
+        let per_pixel = pairs / (f64::from(width) * f64::from(height));
+        println!(
+            "{:<24} {passes:>9.2} {ratio:>9.2} {processor:>9.1} {:>7} {per_pixel:>9.1} {objects:>12.2}",
+            pace.name, pace.items
+        );
+        rows.push(json!({
+            "name": pace.name, "size": [width, height], "gaussians": model.len(), "passes_ms": passes, "ratio": ratio,
+            "processor_ms": processor, "wall_ms": median(&pace.wall), "items": pace.items, "pairs": pairs,
+            "object_pairs_by_scene_pairs": objects,
+        }));
+    }
+    println!();
+    Ok(rows)
 }

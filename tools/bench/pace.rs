@@ -1,0 +1,99 @@
+//! Steps of several trainings, timed in turn, so that a busy machine is equally busy for all of them.
+
+use labelgs::gpu::Gpu;
+use labelgs::scene::{Dataset, Gaussians};
+use labelgs::sched::SchedulerOptions;
+use labelgs::train::{TrainConfig, Trainer};
+use labelgs::{Error, Result};
+use rustix::time::{ClockId, clock_gettime};
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+/// Processor time of this process, all threads.
+pub fn processor_time() -> Duration {
+    let time = clock_gettime(ClockId::ProcessCPUTime);
+    Duration::new(time.tv_sec.unsigned_abs(), time.tv_nsec as u32)
+}
+
+/// The value in the middle, NaN of nothing.
+pub fn median(values: &[f64]) -> f64 {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    sorted.get(sorted.len() / 2).copied().unwrap_or(f64::NAN)
+}
+
+/// A training whose steps are timed one by one.
+pub struct Pace {
+    /// What it is called in tables.
+    pub name: String,
+    trainer: Trainer,
+    /// Sum of the passes, ms, by step.
+    pub passes: Vec<f64>,
+    /// Host's clock from submit to end, ms, by step.
+    pub wall: Vec<f64>,
+    /// Processor time of all threads, ms, by step.
+    pub processor: Vec<f64>,
+    /// (pixel, splat) pairs walked, by step.
+    pub pairs: Vec<f64>,
+    /// Items of the step's list.
+    pub items: usize,
+}
+
+impl Pace {
+    /// A training that starts from `model`; nothing grows, and labels are on from the first step if there are masks.
+    pub fn new(
+        name: &str,
+        gpu: &Arc<Gpu>,
+        mut dataset: Dataset,
+        model: &Gaussians,
+        label_samples: u32,
+    ) -> Result<Self> {
+        let config = TrainConfig {
+            iterations: 1_000_000,
+            label_from: 1,
+            vote_every: 1_000_000,
+            occlusion_every: 1_000_000,
+            densify_from: u32::MAX,
+            label_samples: label_samples.max(1),
+            ..TrainConfig::default()
+        };
+        let options = SchedulerOptions { timestamps: true, ..SchedulerOptions::default() };
+        let mut trainer = Trainer::new(Arc::clone(gpu), config, &mut dataset, model, options)?;
+        trainer.keep_times();
+        let (passes, wall, processor, pairs) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+        Ok(Self { name: name.to_owned(), trainer, passes, wall, processor, pairs, items: 0 })
+    }
+
+    /// One step, waited for. Steps in which the driver compiles are run, and count for nothing.
+    pub fn step(&mut self) -> Result<()> {
+        let (start, processor) = (Instant::now(), processor_time());
+        let mut reports = self.trainer.step()?;
+        reports.extend(self.trainer.drain()?);
+        let (wall, processor) = (start.elapsed(), processor_time().saturating_sub(processor));
+        let (times, last) = (self.trainer.take_times(), reports.last());
+        let (Some(times), Some(last)) = (times.last(), last) else {
+            return Err(Error::Bug("a step that was waited for has no report".to_owned()));
+        };
+        if times.is_first {
+            return Ok(());
+        }
+        self.items = times.items.len();
+        self.passes.push(times.items.iter().map(|(_, _, ns)| *ns as f64 / 1e6).sum());
+        self.wall.push(wall.as_secs_f64() * 1e3);
+        self.processor.push(processor.as_secs_f64() * 1e3);
+        let counters = &last.report.counters;
+        let pixels = f64::from(self.trainer.engine_mut().shape().tile_pixels());
+        self.pairs.push((f64::from(counters.walked_first) + f64::from(counters.walked_second)) * pixels);
+        Ok(())
+    }
+}
+
+/// Runs the trainings in turn until each has so many timed steps.
+pub fn race(paces: &mut [Pace], steps: usize) -> Result<()> {
+    while paces.iter().any(|pace| pace.wall.len() < steps) {
+        for pace in paces.iter_mut() {
+            pace.step()?;
+        }
+    }
+    Ok(())
+}
