@@ -50,6 +50,19 @@ fn without_a_driver_devices_fails_and_plan_does_not() {
     assert_eq!(run(&["plan", "--device", "0"]).status.code(), Some(4));
 }
 
+/// Vectors of 128 bits make subgroups of 4, which no kernel serves.
+#[test]
+fn a_subgroup_size_without_kernels_is_refused_by_name() {
+    if !turn().is_some_and(|gpu| gpu.is_cpu()) {
+        return;
+    }
+    let mut command = Command::cargo_bin("labelgs").expect("the tool is built");
+    command.env("LP_NATIVE_VECTOR_WIDTH", "128").env("LABELGS_VALIDATION", "off");
+    let output = command.args(["profile", "--synthetic", "--steps", "1"]).output().expect("it runs");
+    assert_eq!(output.status.code(), Some(4), "{}", text(&output.stderr));
+    assert!(text(&output.stderr).contains("lacks subgroup size (needed 8, found 4)"), "{}", text(&output.stderr));
+}
+
 #[test]
 fn devices_tells_what_is_needed_and_found() {
     let Some(gpu) = turn() else { return };
@@ -93,6 +106,16 @@ fn plan_adds_up() {
         json(&succeeds(&["plan", "--gaussians", "2k", "--size", "160x120", "--label-samples", "0", "--json"]));
     assert!(without["memory"]["total"].as_u64() < plan["memory"]["total"].as_u64());
     assert!(!without.to_string().contains("layer_list"));
+}
+
+#[test]
+fn a_plan_for_a_card_needs_no_card() {
+    let args = |memory| ["plan", "--gaussians", "10M", "--size", "1600x1064", "--card", memory, "--json"];
+    let plan = json(&succeeds(&args("80G")));
+    assert_eq!(plan["kernels"]["subgroup_size"], 32, "{}", plan["kernels"]);
+    let total = plan["memory"]["total"].as_u64().expect("bytes");
+    assert!((8 << 30..80 << 30).contains(&total), "{total} bytes");
+    assert_eq!(labelgs(&args("8G")).status.code(), Some(5));
 }
 
 #[test]

@@ -4,7 +4,7 @@ use super::args::JsonFlag;
 use super::context::Context;
 use super::devices::{shape_json, shape_of, shape_text};
 use super::stdout;
-use super::values::{Size, count, size};
+use super::values::{Size, bytes, count, size};
 use crate::engine::{Engine, LabelRoom, Room, capacity};
 use crate::gpu::{self, GpuOptions};
 use crate::infer::vote::ballot::COLUMNS_MAX;
@@ -30,6 +30,9 @@ pub struct PlanArgs {
     /// Degree of the spherical harmonics.
     #[arg(long, value_name = "DEGREE", value_parser = clap::value_parser!(u32).range(0..=3), default_value_t = 3)]
     pub sh_degree: u32,
+    /// Plan for a graphics card with so much memory, such as 24G, in place of the device of this machine.
+    #[arg(long, value_name = "SIZE", value_parser = bytes)]
+    pub card: Option<u64>,
     /// JSON.
     #[command(flatten)]
     pub json: JsonFlag,
@@ -64,7 +67,10 @@ pub fn run(args: &PlanArgs, context: &Context) -> Result<()> {
 }
 
 fn subject(args: &PlanArgs, context: &Context) -> Result<Subject> {
-    let (device, shape, limits) = device(context)?;
+    let (device, shape, limits) = match args.card {
+        Some(memory) => card(memory),
+        None => device(context)?,
+    };
     let labels = (args.label_samples > 0).then(|| LabelRoom {
         max_label: MAX_LABEL.max(args.label_samples),
         layers: args.label_samples,
@@ -77,6 +83,14 @@ fn subject(args: &PlanArgs, context: &Context) -> Result<Subject> {
         Variant { labels: labels.is_some(), lift: false, sh_degree: args.sh_degree, size, update: true, counts: false };
     let list = training_step(&shape, &capacity, variant);
     Ok(Subject { device, shape, limits, room, capacity, list })
+}
+
+/// A card as the large makers' drivers describe theirs: subgroups of 32, bindings and allocations of 4 GiB.
+fn card(memory: u64) -> (Option<String>, KernelShape, Limits) {
+    const RANGE: u64 = u32::MAX as u64 & !0xffff;
+    let limits = Limits { max_storage_range: RANGE, max_allocation: RANGE, max_memory: memory, ..Limits::default() };
+    let name = format!("a graphics card with {:.1} GiB", memory as f64 / f64::from(1 << 30));
+    (Some(name), KernelShape::new(32, false), limits)
 }
 
 /// The device's name, kernels and limits; without a device those of a software device.
