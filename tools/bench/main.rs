@@ -4,7 +4,20 @@
 //! charts into `--output`. With `--small` it does the same in seconds on tiny scenes, as the tests run it.
 
 mod device;
+mod kernels;
+#[allow(dead_code, reason = "the mirrors of the tests; benchmarks need some")]
+#[path = "../../tests/reference/mod.rs"]
+mod reference;
+#[allow(dead_code, reason = "runs the engine's passes, for the tests")]
+#[path = "../../tests/pass/rig.rs"]
+mod rig;
+#[allow(dead_code, reason = "the compiler of the build; benchmarks reflect nothing")]
+#[path = "../shadergen/compile.rs"]
+mod shader_compiler;
 mod steps;
+#[allow(dead_code, unused_imports, reason = "helpers of the tests; benchmarks need some")]
+#[path = "../../tests/support/mod.rs"]
+mod support;
 
 use clap::{Parser, Subcommand};
 use labelgs::Result;
@@ -34,6 +47,8 @@ pub struct Common {
 
 #[derive(Subcommand)]
 enum Command {
+    /// Time against error of every mode of the kernels, and each pass alone.
+    Kernels(kernels::KernelArgs),
     /// What a step with labels costs beside one without, by covered area and number of objects.
     Steps(Common),
 }
@@ -49,6 +64,7 @@ fn main() -> std::process::ExitCode {
 
 fn run() -> Result<()> {
     match Arguments::parse().command {
+        Command::Kernels(args) => kernels::run(&args),
         Command::Steps(common) => steps::run(&common),
     }
 }
