@@ -34,7 +34,7 @@ const NOISE: f64 = 0.02;
 /// Numbers of the modes that no other beats in time (beyond noise) without a larger error, fastest first.
 pub fn front(scene: &SceneResult, measure: Measure) -> Vec<usize> {
     let points: Vec<(f64, f64)> =
-        scene.modes.iter().map(|mode| (mode.relative_time, (measure.of)(mode).unwrap_or(f64::INFINITY))).collect();
+        scene.modes.iter().map(|mode| (mode.relative_least, (measure.of)(mode).unwrap_or(f64::INFINITY))).collect();
     let beaten = |i: usize| {
         points.iter().enumerate().any(|(j, other)| {
             let (time, error) = points[i];
@@ -52,7 +52,7 @@ pub fn knee(scene: &SceneResult, measure: Measure) -> Option<usize> {
     let front = front(scene, measure);
     let point = |&i: &usize| {
         let mode = &scene.modes[i];
-        (mode.relative_time, (measure.of)(mode).unwrap_or(f64::INFINITY).max(1e-9).ln())
+        (mode.relative_least, (measure.of)(mode).unwrap_or(f64::INFINITY).max(1e-9).ln())
     };
     let (first, last) = (point(front.first()?), point(front.last()?));
     let below = |i: &usize| {

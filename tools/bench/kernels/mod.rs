@@ -125,8 +125,7 @@ fn compile(gpu: &Gpu, args: &KernelArgs) -> Result<Vec<(Mode, Replacements)>> {
 
 /// What must not be: a number that is none, or a default mode that is off.
 fn faults(scene: &SceneResult, kind: scenes::Kind) -> Vec<String> {
-    let mut faults: Vec<String> =
-        measure::check_default(scene, kind).err().map(|error| error.to_string()).into_iter().collect();
+    let mut faults: Vec<String> = measure::fault_of_default(scene, kind).into_iter().collect();
     for mode in &scene.modes {
         let errors = [&mode.against_rules, &mode.against_no_cut_offs];
         if errors.into_iter().flatten().any(|errors| !errors.are_finite()) {

@@ -35,7 +35,7 @@ pub fn scene(scene: &SceneResult) -> String {
 
 fn modes(out: &mut String, scene: &SceneResult) {
     let stages = ["project", "sort", "tile", "blend forward", "blend backward", "gather", "project backward"];
-    let _ = write!(out, "{:>2} {:<22}{:>7}{:>7}{:>9}{:>9}", "", "", "time", "least", "ms", "CPU ms");
+    let _ = write!(out, "{:>2} {:<22}{:>7}{:>7}{:>7}{:>9}{:>9}", "", "", "median", "least", "CPU", "ms", "CPU ms");
     for stage in stages {
         let _ = write!(
             out,
@@ -45,13 +45,14 @@ fn modes(out: &mut String, scene: &SceneResult) {
     }
     let _ = writeln!(out, "{:>11} |{:^46}|{:^46}", "instances", "against the rules", "against no cut-offs");
     let heads = format!("{:^22}  {:^22}", "colours max 99.9% rms", "gradients max 99.9% rms");
-    let _ = writeln!(out, "{:>130} |{heads:^46}|{heads:^46}", "");
+    let _ = writeln!(out, "{:>134} |{heads:^46}|{heads:^46}", "");
     for (number, mode) in scene.modes.iter().enumerate() {
         let cpu = mode.cpu.map_or("-".to_owned(), |cpu| format!("{:.1}", cpu.median));
+        let relative = mode.relative_cpu.map_or("-".to_owned(), |cpu| format!("{cpu:.3}"));
         let _ = write!(
             out,
-            "{number:>2} {:<22}{:>7.3}{:>7.3}{:>9.2}{cpu:>9}",
-            mode.name, mode.relative_time, mode.relative_least, mode.touched.median
+            "{number:>2} {:<22}{:>7.3}{:>7.3}{relative:>7}{:>9.2}{cpu:>9}",
+            mode.name, mode.relative_median, mode.relative_least, mode.touched.median
         );
         for stage in stages {
             let _ = write!(out, "{:>9.2}", mode.stages.get(stage).map_or(0.0, |time| time.median));
@@ -70,8 +71,8 @@ fn numbers(errors: Option<&Errors>) -> String {
 /// What the numbers before the modes and the charts' points mean.
 pub fn legend(modes: &[Mode]) -> String {
     let mut out = String::from(
-        "time: project, sort, tile, blend and gather by that of the default in the same round (median); least: by the \
-         least times\nerrors: absolute for colours; worst group of parameters for gradients: largest by the largest \
+        "median: time of project, sort, tile, blend and gather by that of the default in the same round; least: by the \
+         least times of their passes; CPU: processor time of the whole step\nerrors: absolute for colours; worst group of parameters for gradients: largest by the largest \
          magnitude, relative, norm by norm\n",
     );
     for (number, mode) in modes.iter().enumerate() {
