@@ -65,7 +65,7 @@ fn panel(
     modes: &[Mode],
 ) -> std::result::Result<(), Box<dyn std::error::Error>> {
     let points: Vec<(usize, f64, f64)> = (scene.modes.iter().enumerate())
-        .filter_map(|(i, mode)| Some((i, mode.relative_least, (measure.of)(mode)?.max(1e-9))))
+        .filter_map(|(i, mode)| Some((i, mode.relative_time, (measure.of)(mode)?.max(1e-9))))
         .filter(|(_, time, error)| time.is_finite() && error.is_finite())
         .collect();
     let ends = |values: &mut dyn Iterator<Item = f64>| {

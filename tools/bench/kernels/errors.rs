@@ -4,6 +4,7 @@ use super::mirror::Mirror;
 use crate::reference::Row;
 use crate::reference::model::{Group, flatten};
 use serde::Serialize;
+use std::collections::BTreeMap;
 
 /// Elements below this part of the largest have no relative error of their own.
 const FLOOR: f64 = 1e-6;
@@ -34,7 +35,7 @@ pub struct GroupError {
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct GradientError {
     /// Name and error of each group.
-    pub groups: Vec<(String, GroupError)>,
+    pub groups: BTreeMap<String, GroupError>,
     /// The largest of each measure over the groups.
     pub worst: GroupError,
 }
@@ -101,7 +102,7 @@ fn gradients(actual: &[Row], expected: &[Row]) -> GradientError {
         out.worst.max = larger(error.max, out.worst.max);
         out.worst.p999 = larger(error.p999, out.worst.p999);
         out.worst.rms = larger(error.rms, out.worst.rms);
-        out.groups.push((format!("{group:?}").to_lowercase(), error));
+        out.groups.insert(format!("{group:?}").to_lowercase(), error);
     }
     out
 }

@@ -16,16 +16,21 @@ fn colour(errors: Option<&Errors>) -> Option<f64> {
     errors.map(|errors| errors.colours.p999)
 }
 
-fn gradient(errors: Option<&Errors>) -> Option<f64> {
+/// Where a cut-off changes which pairs count, small elements have any relative error, and only the norm says something.
+fn norm(errors: Option<&Errors>) -> Option<f64> {
     errors.map(|errors| errors.gradients.worst.rms)
+}
+
+fn relative(errors: Option<&Errors>) -> Option<f64> {
+    errors.map(|errors| errors.gradients.worst.p999)
 }
 
 /// The four measures, in the order of the chart's panels.
 pub const MEASURES: [Measure; 4] = [
     Measure { name: "colours, 99.9 %, no cut-offs", of: |mode| colour(mode.against_no_cut_offs.as_ref()) },
-    Measure { name: "gradients, norm, no cut-offs", of: |mode| gradient(mode.against_no_cut_offs.as_ref()) },
+    Measure { name: "gradients, norm, no cut-offs", of: |mode| norm(mode.against_no_cut_offs.as_ref()) },
     Measure { name: "colours, 99.9 %, same rules", of: |mode| colour(mode.against_rules.as_ref()) },
-    Measure { name: "gradients, norm, same rules", of: |mode| gradient(mode.against_rules.as_ref()) },
+    Measure { name: "gradients, 99.9 % relative, same rules", of: |mode| relative(mode.against_rules.as_ref()) },
 ];
 
 /// A difference of time that is noise.
@@ -34,7 +39,7 @@ const NOISE: f64 = 0.02;
 /// Numbers of the modes that no other beats in time (beyond noise) without a larger error, fastest first.
 pub fn front(scene: &SceneResult, measure: Measure) -> Vec<usize> {
     let points: Vec<(f64, f64)> =
-        scene.modes.iter().map(|mode| (mode.relative_least, (measure.of)(mode).unwrap_or(f64::INFINITY))).collect();
+        scene.modes.iter().map(|mode| (mode.relative_time, (measure.of)(mode).unwrap_or(f64::INFINITY))).collect();
     let beaten = |i: usize| {
         points.iter().enumerate().any(|(j, other)| {
             let (time, error) = points[i];
@@ -52,7 +57,7 @@ pub fn knee(scene: &SceneResult, measure: Measure) -> Option<usize> {
     let front = front(scene, measure);
     let point = |&i: &usize| {
         let mode = &scene.modes[i];
-        (mode.relative_least, (measure.of)(mode).unwrap_or(f64::INFINITY).max(1e-9).ln())
+        (mode.relative_time, (measure.of)(mode).unwrap_or(f64::INFINITY).max(1e-9).ln())
     };
     let (first, last) = (point(front.first()?), point(front.last()?));
     let below = |i: &usize| {

@@ -47,9 +47,12 @@ pub fn spread(mut values: Vec<f64>) -> Spread {
 pub struct ModeResult {
     /// Name of the mode.
     pub name: &'static str,
+    /// What charts show as time: on a processor its time, `relative_cpu`, which other programs disturb least; on a
+    /// graphics card `relative_median`.
+    pub relative_time: f64,
     /// Time of the stages that modes touch by that of the default in the same round, median over the rounds.
     pub relative_median: f64,
-    /// The same by the least times: what others on the machine disturb least, hence what charts show.
+    /// The same by the least times.
     pub relative_least: f64,
     /// Processor time of the step by that of the default in the same round, median over the rounds.
     pub relative_cpu: Option<f64>,
@@ -141,11 +144,14 @@ pub fn scene(gpu: &Arc<Gpu>, plan: &Plan, modes: &[(Mode, Replacements)]) -> Res
     let results = results.map(|(((mode, _), samples), errors)| {
         let (against_rules, against_no_cut_offs) = errors.unzip();
         let times = Times::of(samples);
+        let relative_median = ratio(&times.touched, &default.touched);
+        let relative_cpu = times.cpu.as_ref().zip(default.cpu.as_ref()).map(|(own, of_default)| ratio(own, of_default));
         Ok(ModeResult {
             name: mode.name,
-            relative_median: ratio(&times.touched, &default.touched),
+            relative_time: relative_cpu.filter(|_| gpu.is_cpu()).unwrap_or(relative_median),
+            relative_median,
             relative_least: times.least / default.least,
-            relative_cpu: times.cpu.as_ref().zip(default.cpu.as_ref()).map(|(own, of_default)| ratio(own, of_default)),
+            relative_cpu,
             touched: Spread { min: times.least, ..spread(times.touched) },
             stages: stage_times(samples),
             cpu: times.cpu.map(spread),

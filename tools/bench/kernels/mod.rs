@@ -102,7 +102,7 @@ pub fn run(args: &KernelArgs) -> Result<()> {
         load_before,
         scenes: &scenes,
     };
-    let json = serde_json::to_string_pretty(&file).map_err(|error| Error::Bug(format!("JSON: {error}")))?;
+    let json = serde_json::to_string(&file).map_err(|error| Error::Bug(format!("JSON: {error}")))?;
     let svg = chart::svg(&scenes, &plain)?;
     for (name, text) in [("kernels.json", json), ("kernels.svg", svg)] {
         let path = args.common.output.join(name);

@@ -153,10 +153,10 @@ fn draw(random: &mut Pcg32, kind: Kind, index: usize, count: usize) -> Drawn {
     }
 }
 
-/// Median width 2 px with a tail to some 20 px, flattened along one axis; opacities with a long tail, half of them
-/// below 0.3; on one of four sheets, each of which waves.
+/// Median width 2.5 px with a tail to some 25 px, flattened along one axis; opacities from faint to opaque with a median
+/// of 0.6, so that most pixels are opaque, and what is behind is hidden; on one of four sheets, each of which waves.
 fn trained(random: &mut Pcg32, at: [f64; 2]) -> Drawn {
-    let width = 2.0 * (0.7 * normal(random)).exp();
+    let width = 2.5 * (0.7 * normal(random)).exp();
     let flat = uniform(random, 0.05, 0.6);
     let second = uniform(random, 0.4, 1.0);
     let sheet = [0.45, 0.25, 0.2, 0.1].iter().scan(uniform(random, 0.0, 1.0), |left, share| {
@@ -166,7 +166,7 @@ fn trained(random: &mut Pcg32, at: [f64; 2]) -> Drawn {
     let sheet = sheet.take_while(|left| *left > 0.0).count().min(3) as f64;
     let wave = (7.0 * at[0] + 1.3 * sheet).sin() * (5.0 * at[1] - 0.7 * sheet).cos();
     let depth = (2.0 + 2.5 * sheet + 0.6 * wave) * (1.0 + 0.01 * normal(random));
-    let logit = (2.2 * normal(random) - 0.9).clamp(-5.3, 7.0);
+    let logit = (2.2 * normal(random) + 0.4).clamp(-5.3, 7.0);
     Drawn { at, depth, deviations: [width, width * second, width * flat], opacity: 1.0 / (1.0 + (-logit).exp()) }
 }
 
