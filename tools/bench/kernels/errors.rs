@@ -43,6 +43,10 @@ pub struct GradientError {
 /// Errors against one reference.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Errors {
+    /// Pixels that were compared.
+    pub pixels: usize,
+    /// Gaussians whose gradients were compared.
+    pub rows: usize,
     /// Of the picture.
     pub colours: ColourError,
     /// Of the gradients.
@@ -68,11 +72,16 @@ pub struct Outcome {
 /// Compares all of it, or the pixels and rows whose decisions are farther than `sure` from going the other way.
 pub fn compare(outcome: &Outcome, mirror: &Mirror, sure: f64) -> Errors {
     let pixels = (0..mirror.colours.len()).filter(|&i| mirror.pixel_margins[i] >= sure);
-    let differences =
+    let differences: Vec<f64> =
         pixels.flat_map(|i| [0, 1, 2].map(|c| (outcome.colours[i][c] - mirror.colours[i][c]).abs())).collect();
     let rows: Vec<usize> = (0..mirror.rows.len()).filter(|&i| mirror.row_margins[i] >= sure).collect();
     let pick = |from: &[Row]| -> Vec<Row> { rows.iter().map(|&i| from[i]).collect() };
-    Errors { colours: colours(differences), gradients: gradients(&pick(&outcome.rows), &pick(&mirror.rows)) }
+    Errors {
+        pixels: differences.len() / 3,
+        rows: rows.len(),
+        colours: colours(differences),
+        gradients: gradients(&pick(&outcome.rows), &pick(&mirror.rows)),
+    }
 }
 
 /// A NaN is worse than any number.

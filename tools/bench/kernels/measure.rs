@@ -224,16 +224,16 @@ fn stage_times(samples: &[Sample]) -> BTreeMap<&'static str, Spread> {
     Stage::ALL.into_iter().filter(|stage| has(*stage)).map(|stage| (stage.name(), of(stage))).collect()
 }
 
-/// What is wrong with the default mode, if anything. Where no decision is near, all that is left is rounding; the bounds
-/// are three times what lavapipe shows.
+/// What is wrong with the default mode, if anything. Where no decision is near, all that is left is rounding, and in
+/// large scenes a few pairs whose depths are the same f32; the bounds are three times what lavapipe shows.
 pub fn fault_of_default(scene: &SceneResult, kind: Kind) -> Option<String> {
     let errors = scene.rounding.as_ref()?;
     let (colour, gradient) = match kind {
-        Kind::Trained => (1e-4, 1e-4),
-        Kind::Needles => (2e-4, 1e-1),
-        _ => (1e-3, 1e-3),
+        // The conic of a needle in f32 loses what its length is made of.
+        Kind::Needles => (1.2e-4, 2.5e-1),
+        _ => (5e-6, 3e-5),
     };
-    let found = (errors.colours.max, errors.gradients.worst.rms);
+    let found = (errors.colours.p999, errors.gradients.worst.rms);
     let good = found.0 <= colour && found.1 <= gradient;
     (!good).then(|| {
         format!(

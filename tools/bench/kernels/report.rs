@@ -23,9 +23,18 @@ pub fn scene(scene: &SceneResult) -> String {
         scene.rounds,
         scene.load.map_or("unknown".to_owned(), |load| format!("{load:.2}")),
     );
-    modes(&mut out, scene);
+    times(&mut out, scene);
+    if scene.rounding.is_some() {
+        errors(&mut out, scene);
+    }
     if let Some(rounding) = &scene.rounding {
-        let _ = writeln!(out, "default where no decision is near (rounding alone): {}", numbers(Some(rounding)));
+        let _ = writeln!(
+            out,
+            "default, {} pixels and {} Gaussians with no decision near (rounding alone):{}",
+            rounding.pixels,
+            rounding.rows,
+            numbers(Some(rounding))
+        );
     }
     for (name, knee) in knee::all(scene) {
         let _ = writeln!(out, "{name}: {knee}");
@@ -33,19 +42,23 @@ pub fn scene(scene: &SceneResult) -> String {
     out
 }
 
-fn modes(out: &mut String, scene: &SceneResult) {
-    let stages = ["project", "sort", "tile", "blend forward", "blend backward", "gather", "project backward"];
-    let _ = write!(out, "{:>2} {:<22}{:>7}{:>7}{:>7}{:>9}{:>9}", "", "", "median", "least", "CPU", "ms", "CPU ms");
-    for stage in stages {
-        let _ = write!(
-            out,
-            "{:>9}",
-            stage.replace("project backward", "proj bwd").replace("blend ", "").replace("ward", ".")
-        );
+/// Columns of the times.
+const STAGES: [(&str, &str); 7] = [
+    ("project", "project"),
+    ("sort", "sort"),
+    ("tile", "tile"),
+    ("blend forward", "forward"),
+    ("blend backward", "backward"),
+    ("gather", "gather"),
+    ("project backward", "proj bwd"),
+];
+
+fn times(out: &mut String, scene: &SceneResult) {
+    let _ = write!(out, "{:25}{:>7}{:>7}{:>7}{:>9}{:>9}", "", "median", "least", "CPU", "ms", "CPU ms");
+    for (_, head) in STAGES {
+        let _ = write!(out, "{head:>10}");
     }
-    let _ = writeln!(out, "{:>11} |{:^46}|{:^46}", "instances", "against the rules", "against no cut-offs");
-    let heads = format!("{:^22}  {:^22}", "colours max 99.9% rms", "gradients max 99.9% rms");
-    let _ = writeln!(out, "{:>134} |{heads:^46}|{heads:^46}", "");
+    let _ = writeln!(out, "{:>11}", "instances");
     for (number, mode) in scene.modes.iter().enumerate() {
         let cpu = mode.cpu.map_or("-".to_owned(), |cpu| format!("{:.1}", cpu.median));
         let relative = mode.relative_cpu.map_or("-".to_owned(), |cpu| format!("{cpu:.3}"));
@@ -54,26 +67,39 @@ fn modes(out: &mut String, scene: &SceneResult) {
             "{number:>2} {:<22}{:>7.3}{:>7.3}{relative:>7}{:>9.2}{cpu:>9}",
             mode.name, mode.relative_median, mode.relative_least, mode.touched.median
         );
-        for stage in stages {
-            let _ = write!(out, "{:>9.2}", mode.stages.get(stage).map_or(0.0, |time| time.median));
+        for (stage, _) in STAGES {
+            let _ = write!(out, "{:>10.2}", mode.stages.get(stage).map_or(0.0, |time| time.median));
         }
+        let _ = writeln!(out, "{:>11}", mode.instances);
+    }
+}
+
+fn errors(out: &mut String, scene: &SceneResult) {
+    let _ = writeln!(out, "{:25}{:^54}|{:^54}", "", "against the same rules", "against no cut-offs");
+    let _ = write!(out, "{:25}", "");
+    for end in ["|", ""] {
+        let _ = write!(out, "{:^27}{:^27}{end}", "colours: max 99.9% rms", "gradients: max 99.9% norm");
+    }
+    let _ = writeln!(out);
+    for (number, mode) in scene.modes.iter().enumerate() {
         let (rules, open) = (numbers(mode.against_rules.as_ref()), numbers(mode.against_no_cut_offs.as_ref()));
-        let _ = writeln!(out, "{:>11} | {rules} | {open}", mode.instances);
+        let _ = writeln!(out, "{number:>2} {:<22}{rules}|{open}", mode.name);
     }
 }
 
 fn numbers(errors: Option<&Errors>) -> String {
-    let Some(errors) = errors else { return "-".to_owned() };
+    let Some(errors) = errors else { return String::new() };
     let (c, g) = (errors.colours, errors.gradients.worst);
-    format!("{:.1e} {:.1e} {:.1e}  {:.1e} {:.1e} {:.1e}", c.max, c.p999, c.rms, g.max, g.p999, g.rms)
+    [c.max, c.p999, c.rms, g.max, g.p999, g.rms].map(|value| format!("{value:>9.1e}")).concat()
 }
 
-/// What the numbers before the modes and the charts' points mean.
+/// What the columns mean, and the modes behind the numbers of the charts.
 pub fn legend(modes: &[Mode]) -> String {
     let mut out = String::from(
-        "median: time of project, sort, tile, blend and gather by that of the default in the same round; least: by the \
-         least times of their passes; CPU: processor time of the whole step\nerrors: absolute for colours; worst group of parameters for gradients: largest by the largest \
-         magnitude, relative, norm by norm\n",
+        "times by those of the default: `median` of the rounds' ratios of all stages but loss and report, `least` by the \
+         sums of\nthe least times of the passes, `CPU` processor time of the whole step\n\
+         errors: absolute for colours; for gradients those of the worst group of parameters: largest by the largest \
+         magnitude,\n99.9 % of the relative errors, norm by norm\n",
     );
     for (number, mode) in modes.iter().enumerate() {
         let _ = writeln!(out, "{number:>2} {:<22}{}", mode.name, mode.about);
@@ -83,19 +109,20 @@ pub fn legend(modes: &[Mode]) -> String {
 
 /// Each pass alone, all scenes side by side.
 pub fn passes(scenes: &[SceneResult]) -> String {
-    let mut out = String::from("\neach pass alone, default mode (median ms of all its runs in a step; ns an item)\n");
+    let mut out =
+        String::from("\neach pass alone, default mode: ms of all its runs in a step, and ns an item (median)\n");
     let sized: Vec<&SceneResult> = scenes.iter().filter(|scene| scene.name.starts_with('S')).collect();
     let Some(first) = sized.first() else { return out };
-    let _ = write!(out, "{:<18}{:<26}{:>5} {:<9}", "stage", "pass", "runs", "item");
+    let _ = write!(out, "{:<18}{:<24}{:<9}", "stage", "pass", "item");
     for scene in &sized {
-        let _ = write!(out, "{:>10} ms{:>10} ns", scene.name, "");
+        let _ = write!(out, "{:>7} median{:>8}{:>12}", scene.name, "least", "ns/item");
     }
     let _ = writeln!(out);
-    for (index, row) in first.passes.iter().enumerate() {
-        let _ = write!(out, "{:<18}{:<26}{:>5} {:<9}", row.stage, row.name, row.runs, row.unit);
+    for row in &first.passes {
+        let _ = write!(out, "{:<18}{:<24}{:<9}", row.stage, row.name, row.unit);
         for scene in &sized {
-            if let Some(row) = scene.passes.get(index) {
-                let _ = write!(out, "{:>13.3}{:>13.2}", row.time.median, row.ns_per_item);
+            if let Some(row) = scene.passes.iter().find(|other| (other.stage, &other.name) == (row.stage, &row.name)) {
+                let _ = write!(out, "{:>14.3}{:>8.3}{:>12.2}", row.time.median, row.time.min, row.ns_per_item);
             }
         }
         let _ = writeln!(out);
