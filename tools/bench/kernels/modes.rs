@@ -215,7 +215,6 @@ pub const MODES: &[Mode] = &[
             replace: "keys_out[to] = min(key - floatBitsToUint(step.near), 0x07ffffffu) << 5;",
         }],
         unsorted_bits: 16,
-        ..PLAIN
     },
     Mode {
         name: "determinant a c - b b",
