@@ -85,7 +85,7 @@ fn panel(
         .build_cartesian_2d(left - margin..right + margin, (low * 0.5..high * 2.0).log_scale())?;
     chart
         .configure_mesh()
-        .x_desc("time relative to the default")
+        .x_desc("time of a step relative to the default (processor time on a processor)")
         .y_label_formatter(&|value| format!("{value:.0e}"))
         .light_line_style(WHITE)
         .draw()?;

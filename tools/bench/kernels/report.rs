@@ -36,8 +36,11 @@ pub fn scene(scene: &SceneResult) -> String {
             numbers(Some(rounding))
         );
     }
-    for (name, knee) in knee::all(scene) {
-        let _ = writeln!(out, "{name}: {knee}");
+    // The other scenes ask what breaks, not what pays.
+    if scene.name.starts_with('S') {
+        for (name, knee) in knee::all(scene) {
+            let _ = writeln!(out, "{name}: {knee}");
+        }
     }
     out
 }
@@ -115,14 +118,14 @@ pub fn passes(scenes: &[SceneResult]) -> String {
     let Some(first) = sized.first() else { return out };
     let _ = write!(out, "{:<18}{:<24}{:<9}", "stage", "pass", "item");
     for scene in &sized {
-        let _ = write!(out, "{:>7} median{:>8}{:>12}", scene.name, "least", "ns/item");
+        let _ = write!(out, "{:>7} median{:>10}{:>12}", scene.name, "least", "ns/item");
     }
     let _ = writeln!(out);
     for row in &first.passes {
         let _ = write!(out, "{:<18}{:<24}{:<9}", row.stage, row.name, row.unit);
         for scene in &sized {
             if let Some(row) = scene.passes.iter().find(|other| (other.stage, &other.name) == (row.stage, &row.name)) {
-                let _ = write!(out, "{:>14.3}{:>8.3}{:>12.2}", row.time.median, row.time.min, row.ns_per_item);
+                let _ = write!(out, "{:>14.3}{:>10.3}{:>12.2}", row.time.median, row.time.min, row.ns_per_item);
             }
         }
         let _ = writeln!(out);
