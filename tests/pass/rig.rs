@@ -105,6 +105,11 @@ impl Rig {
 
     /// As `new`, with kernels of a given shape.
     pub fn with_shape(turn: Turn, scene: Scene, labels: bool, shape: KernelShape) -> Self {
+        Self::with_options(turn, scene, labels, shape, readable())
+    }
+
+    /// As `with_shape`, with options of the scheduler; without `readable` only some buffers can be read back.
+    pub fn with_options(turn: Turn, scene: Scene, labels: bool, shape: KernelShape, options: SchedulerOptions) -> Self {
         let room = Room {
             gaussians: scene.gaussians.len().max(1) as u64,
             size: (scene.camera.width, scene.camera.height),
@@ -115,7 +120,7 @@ impl Rig {
                 vote_columns: VOTE_COLUMNS,
             }),
         };
-        let mut engine = Engine::with_shape(turn.gpu(), shape, room, readable()).expect("the engine starts");
+        let mut engine = Engine::with_shape(turn.gpu(), shape, room, options).expect("the engine starts");
         engine.upload_model(&scene.gaussians).expect("the model fits");
         let config = TrainConfig {
             background: scene.target.background.map(|v| v as f32),

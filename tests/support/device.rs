@@ -30,6 +30,14 @@ impl Turn {
         Arc::clone(&self.gpu)
     }
 
+    /// A turn with a device that the caller opened himself.
+    #[allow(dead_code)]
+    pub fn with(gpu: Arc<Gpu>) -> Self {
+        let turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
+        let messages_before = gpu.messages().len();
+        Self { gpu, messages_before, _turn: turn }
+    }
+
     /// Takes note of messages that were expected.
     #[allow(dead_code)]
     pub fn forgive(&mut self) {

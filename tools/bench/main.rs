@@ -4,15 +4,31 @@
 //! charts into `--output`. With `--small` it does the same in seconds on tiny scenes, as the tests run it.
 
 mod device;
+mod features;
+mod kernels;
+mod measure;
 mod memory;
 mod pace;
+mod paper;
+#[allow(dead_code, reason = "the mirrors of the tests; benchmarks need some")]
+#[path = "../../tests/reference/mod.rs"]
+mod reference;
+#[allow(dead_code, reason = "runs the engine's passes, for the tests")]
+#[path = "../../tests/pass/rig.rs"]
+mod rig;
+#[allow(dead_code, reason = "the compiler of the build; benchmarks reflect nothing")]
+#[path = "../shadergen/compile.rs"]
+mod shader_compiler;
 mod start;
 mod steps;
+#[allow(dead_code, unused_imports, reason = "helpers of the tests; benchmarks need some")]
+#[path = "../../tests/support/mod.rs"]
+mod support;
+mod trained;
+mod training;
 
 use clap::{Parser, Subcommand};
 use labelgs::Result;
-use labelgs::io::atomic;
-use serde_json::Value;
 use std::path::PathBuf;
 
 /// Benchmarks of labelgs.
@@ -39,8 +55,16 @@ pub struct Common {
 
 #[derive(Subcommand)]
 enum Command {
+    /// Time against error of every mode of the kernels, and each pass alone.
+    Kernels(kernels::KernelArgs),
     /// What a step with labels costs beside one without, by covered area and number of objects.
     Steps(Common),
+    /// One traversal for all objects against a pass for each, as in the paper's reference code.
+    Paper(paper::Options),
+    /// Quality against seconds of training, with and without labels, and the time to the first step.
+    Training(training::Options),
+    /// What rendering a learned feature per Gaussian would cost, as methods do that have no labels.
+    Features(features::Options),
     /// Predicted against measured memory of training.
     Memory(Common),
     /// From the start of the program to its first picture, with empty and with filled caches.
@@ -48,6 +72,9 @@ enum Command {
     /// One measurement of `memory`, in a process of its own.
     #[command(hide = true)]
     MemoryOf { gaussians: u32, width: u32, height: u32 },
+    /// Time to the first step of a training, in a process of its own.
+    #[command(hide = true)]
+    FirstStep(Common),
 }
 
 fn main() -> std::process::ExitCode {
@@ -61,17 +88,14 @@ fn main() -> std::process::ExitCode {
 
 fn run() -> Result<()> {
     match Arguments::parse().command {
+        Command::Kernels(args) => kernels::run(&args),
         Command::Steps(common) => steps::run(&common),
+        Command::Paper(options) => paper::run(&options),
+        Command::Training(options) => training::run(&options),
+        Command::Features(options) => features::run(&options),
+        Command::FirstStep(common) => training::first_step(&common),
         Command::Memory(common) => memory::run(&common),
         Command::Start(common) => start::run(&common),
         Command::MemoryOf { gaussians, width, height } => memory::measure(gaussians, width, height),
     }
-}
-
-/// Writes a benchmark's numbers into the output folder.
-pub fn write_json(common: &Common, name: &str, numbers: &Value) -> Result<()> {
-    let path = common.output.join(format!("{name}.json"));
-    atomic::write(&path, |to| writeln!(to, "{numbers:#}"))?;
-    println!("{}", path.display());
-    Ok(())
 }

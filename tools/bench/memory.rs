@@ -1,6 +1,7 @@
 //! Predicted against measured memory of training, on a device whose memory is the host's.
 
-use super::{Common, device, write_json};
+use super::measure::write_json;
+use super::{Common, device};
 use glam::{DMat3, DVec3};
 use labelgs::engine::Engine;
 use labelgs::scene::{Camera, Dataset, Gaussians, LabelMap, Photo, View};
@@ -46,7 +47,7 @@ pub fn run(common: &Common) -> Result<()> {
         );
         rows.push(row);
     }
-    write_json(common, "memory", &json!({ "schema_version": 1, "rows": rows }))?;
+    write_json(&common.output.join("memory.json"), &json!({ "schema_version": 1, "rows": rows }))?;
     let ratio =
         |row: &Value| row["measured"].as_f64().unwrap_or(f64::NAN) / row["predicted"].as_f64().unwrap_or(f64::NAN);
     match rows.iter().map(ratio).find(|ratio| !((1.0 - ratio).abs() <= TOLERANCE)) {

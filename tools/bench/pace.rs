@@ -1,26 +1,12 @@
 //! Steps of several trainings, timed in turn, so that a busy machine is equally busy for all of them.
 
+use super::measure::timed;
 use labelgs::gpu::Gpu;
 use labelgs::scene::{Dataset, Gaussians};
 use labelgs::sched::SchedulerOptions;
 use labelgs::train::{TrainConfig, Trainer};
 use labelgs::{Error, Result};
-use rustix::time::{ClockId, clock_gettime};
 use std::sync::Arc;
-use std::time::{Duration, Instant};
-
-/// Processor time of this process, all threads.
-pub fn processor_time() -> Duration {
-    let time = clock_gettime(ClockId::ProcessCPUTime);
-    Duration::new(time.tv_sec.unsigned_abs(), time.tv_nsec as u32)
-}
-
-/// The value in the middle, NaN of nothing.
-pub fn median(values: &[f64]) -> f64 {
-    let mut sorted = values.to_vec();
-    sorted.sort_by(f64::total_cmp);
-    sorted.get(sorted.len() / 2).copied().unwrap_or(f64::NAN)
-}
 
 /// A training whose steps are timed one by one.
 pub struct Pace {
@@ -66,10 +52,11 @@ impl Pace {
 
     /// One step, waited for. Steps in which the driver compiles are run, and count for nothing.
     pub fn step(&mut self) -> Result<()> {
-        let (start, processor) = (Instant::now(), processor_time());
-        let mut reports = self.trainer.step()?;
-        reports.extend(self.trainer.drain()?);
-        let (wall, processor) = (start.elapsed(), processor_time().saturating_sub(processor));
+        let (reports, cost) = timed(|| {
+            let mut reports = self.trainer.step()?;
+            reports.extend(self.trainer.drain()?);
+            Ok(reports)
+        })?;
         let (times, last) = (self.trainer.take_times(), reports.last());
         let (Some(times), Some(last)) = (times.last(), last) else {
             return Err(Error::Bug("a step that was waited for has no report".to_owned()));
@@ -79,8 +66,8 @@ impl Pace {
         }
         self.items = times.items.len();
         self.passes.push(times.items.iter().map(|(_, _, ns)| *ns as f64 / 1e6).sum());
-        self.wall.push(wall.as_secs_f64() * 1e3);
-        self.processor.push(processor.as_secs_f64() * 1e3);
+        self.wall.push(cost.wall);
+        self.processor.push(cost.cpu);
         let counters = &last.report.counters;
         let pixels = f64::from(self.trainer.engine_mut().shape().tile_pixels());
         self.pairs.push((f64::from(counters.walked_first) + f64::from(counters.walked_second)) * pixels);

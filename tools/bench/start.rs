@@ -1,7 +1,8 @@
 //! From the start of the program to the first picture, with empty and with filled caches.
 
-use super::pace::median;
-use super::{Common, memory, write_json};
+use super::measure::median;
+use super::measure::write_json;
+use super::{Common, memory};
 use labelgs::io::atomic;
 use labelgs::io::camera_json::CameraFile;
 use labelgs::io::ply::write_gaussians;
@@ -25,13 +26,10 @@ pub fn run(common: &Common) -> Result<()> {
     atomic::write(&camera, |to| to.write_all(first.as_bytes()))?;
     let cold = picture(folder.path(), &ply, &camera)?;
     let times = (0..warm).map(|_| picture(folder.path(), &ply, &camera)).collect::<Result<Vec<_>>>()?;
-    let found = median(&times);
+    let found = median(times.iter().copied());
     println!("labelgs render: a picture of {width} x {height} px of {count} Gaussians, from the start of the program");
     println!("empty caches {cold:.2} s; filled caches {found:.2} s (median of {warm})");
-    write_json(
-        common,
-        "start",
-        &json!({ "schema_version": 1, "gaussians": count, "size": [width, height], "cold_s": cold, "warm_s": times }),
+    write_json(&common.output.join("start.json"), &json!({ "schema_version": 1, "gaussians": count, "size": [width, height], "cold_s": cold, "warm_s": times }),
     )
 }
 

@@ -1,7 +1,9 @@
 //! What a step with labels costs beside one without: by the area that masks cover, and by the number of objects.
 
-use super::pace::{Pace, median, race};
-use super::{Common, device, write_json};
+use super::pace::{Pace, race};
+use super::measure::median;
+use super::measure::write_json;
+use super::{Common, device};
 use labelgs::Result;
 use labelgs::engine::{Engine, Room};
 use labelgs::gpu::Gpu;
@@ -40,7 +42,7 @@ pub fn run(common: &Common) -> Result<()> {
     let first = by_area(&gpu, &options, &model, size.timed)?;
     let larger = SynthOptions { width: 2 * options.width, height: 2 * options.height, ..options };
     let second = by_number(&gpu, &larger, &model, &size)?;
-    write_json(common, "steps", &json!({ "schema_version": 1, "by_area": first, "by_number": second }))
+    write_json(&common.output.join("steps.json"), &json!({ "schema_version": 1, "by_area": first, "by_number": second }))
 }
 
 /// The built-in scene after so many steps without masks.
@@ -134,7 +136,7 @@ fn divide(rows: &mut [usize], means: &[[f32; 3]], parts: usize, next: &mut u32, 
 fn table(mut paces: Vec<Pace>, timed: usize, (width, height): (u32, u32), model: &Gaussians) -> Result<Vec<Value>> {
     race(&mut paces, timed)?;
     let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
-    let (plain, scene_pairs) = (median(&paces[0].passes), mean(&paces[0].pairs));
+    let (plain, scene_pairs) = (median(paces[0].passes.iter().copied()), mean(&paces[0].pairs));
     println!("{} Gaussians, {width} x {height} px, {timed} steps of each in turn", model.len());
     println!(
         "{:<24} {:>9} {:>9} {:>9} {:>7} {:>9} {:>12}",
@@ -142,7 +144,7 @@ fn table(mut paces: Vec<Pace>, timed: usize, (width, height): (u32, u32), model:
     );
     let mut rows = Vec::new();
     for pace in &paces {
-        let (passes, processor, pairs) = (median(&pace.passes), median(&pace.processor), mean(&pace.pairs));
+        let (passes, processor, pairs) = (median(pace.passes.iter().copied()), median(pace.processor.iter().copied()), mean(&pace.pairs));
         let (ratio, objects) = (passes / plain, pairs / scene_pairs - 1.0);
         let per_pixel = pairs / (f64::from(width) * f64::from(height));
         println!(
@@ -151,7 +153,7 @@ fn table(mut paces: Vec<Pace>, timed: usize, (width, height): (u32, u32), model:
         );
         rows.push(json!({
             "name": pace.name, "size": [width, height], "gaussians": model.len(), "passes_ms": passes, "ratio": ratio,
-            "processor_ms": processor, "wall_ms": median(&pace.wall), "items": pace.items, "pairs": pairs,
+            "processor_ms": processor, "wall_ms": median(pace.wall.iter().copied()), "items": pace.items, "pairs": pairs,
             "object_pairs_by_scene_pairs": objects,
         }));
     }

@@ -1,0 +1,132 @@
+//! How far a picture and its gradients are from those in float64.
+
+use super::mirror::Mirror;
+use crate::reference::Row;
+use crate::reference::model::{Group, flatten};
+use serde::Serialize;
+use std::collections::BTreeMap;
+
+/// Elements below this part of the largest have no relative error of their own.
+const FLOOR: f64 = 1e-6;
+
+/// Absolute errors of the colours, all channels.
+#[derive(Clone, Copy, Debug, Default, Serialize)]
+pub struct ColourError {
+    /// Largest.
+    pub max: f64,
+    /// 99.9 % are at most this.
+    pub p999: f64,
+    /// Root of the mean square.
+    pub rms: f64,
+}
+
+/// Errors of the gradient by one group of parameters.
+#[derive(Clone, Copy, Debug, Default, Serialize)]
+pub struct GroupError {
+    /// Largest error by the largest magnitude.
+    pub max: f64,
+    /// 99.9 % of the relative errors are at most this; of elements of at least 1e-6 of the largest magnitude.
+    pub p999: f64,
+    /// Norm of the error by the norm of the gradient.
+    pub rms: f64,
+}
+
+/// Errors of the gradients by all groups.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct GradientError {
+    /// Name and error of each group.
+    pub groups: BTreeMap<String, GroupError>,
+    /// The largest of each measure over the groups.
+    pub worst: GroupError,
+}
+
+/// Errors against one reference.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct Errors {
+    /// Pixels that were compared.
+    pub pixels: usize,
+    /// Gaussians whose gradients were compared.
+    pub rows: usize,
+    /// Of the picture.
+    pub colours: ColourError,
+    /// Of the gradients.
+    pub gradients: GradientError,
+}
+
+impl Errors {
+    /// True if there is no NaN and no infinity.
+    pub fn are_finite(&self) -> bool {
+        let (colours, worst) = (&self.colours, &self.gradients.worst);
+        [colours.max, colours.p999, colours.rms, worst.max, worst.p999, worst.rms].iter().all(|v| v.is_finite())
+    }
+}
+
+/// What a device made of a step.
+pub struct Outcome {
+    /// Picture, [height, width].
+    pub colours: Vec<[f64; 3]>,
+    /// Gradients by Gaussian.
+    pub rows: Vec<Row>,
+}
+
+/// Compares all of it, or the pixels and rows whose decisions are farther than `sure` from going the other way.
+pub fn compare(outcome: &Outcome, mirror: &Mirror, sure: f64) -> Errors {
+    let pixels = (0..mirror.colours.len()).filter(|&i| mirror.pixel_margins[i] >= sure);
+    let differences: Vec<f64> =
+        pixels.flat_map(|i| [0, 1, 2].map(|c| (outcome.colours[i][c] - mirror.colours[i][c]).abs())).collect();
+    let rows: Vec<usize> = (0..mirror.rows.len()).filter(|&i| mirror.row_margins[i] >= sure).collect();
+    let pick = |from: &[Row]| -> Vec<Row> { rows.iter().map(|&i| from[i]).collect() };
+    Errors {
+        pixels: differences.len() / 3,
+        rows: rows.len(),
+        colours: colours(differences),
+        gradients: gradients(&pick(&outcome.rows), &pick(&mirror.rows)),
+    }
+}
+
+/// A NaN is worse than any number.
+fn larger(a: f64, b: f64) -> f64 {
+    if a.is_nan() || a > b { a } else { b }
+}
+
+fn quantile(values: &mut [f64], share: f64) -> f64 {
+    if values.is_empty() {
+        return 0.0;
+    }
+    let place = ((values.len() - 1) as f64 * share).ceil() as usize;
+    *values.select_nth_unstable_by(place, f64::total_cmp).1
+}
+
+fn colours(mut differences: Vec<f64>) -> ColourError {
+    let square = differences.iter().map(|d| d * d).sum::<f64>() / differences.len().max(1) as f64;
+    let max = differences.iter().copied().fold(0.0, larger);
+    ColourError { max, p999: quantile(&mut differences, 0.999), rms: square.sqrt() }
+}
+
+fn gradients(actual: &[Row], expected: &[Row]) -> GradientError {
+    let mut out = GradientError::default();
+    for group in Group::ALL {
+        let (actual, expected) = (flatten(actual, group), flatten(expected, group));
+        let error = group_error(&actual, &expected);
+        out.worst.max = larger(error.max, out.worst.max);
+        out.worst.p999 = larger(error.p999, out.worst.p999);
+        out.worst.rms = larger(error.rms, out.worst.rms);
+        out.groups.insert(format!("{group:?}").to_lowercase(), error);
+    }
+    out
+}
+
+fn group_error(actual: &[f64], expected: &[f64]) -> GroupError {
+    let largest = expected.iter().fold(0.0_f64, |most, e| most.max(e.abs()));
+    if largest == 0.0 {
+        let max = actual.iter().map(|a| a.abs()).fold(0.0, larger);
+        return GroupError { max, p999: max, rms: max };
+    }
+    let pairs = || actual.iter().zip(expected);
+    let max = pairs().map(|(a, e)| (a - e).abs()).fold(0.0, larger) / largest;
+    let norm = |squares: f64| squares.sqrt();
+    let rms = norm(pairs().map(|(a, e)| (a - e) * (a - e)).sum()) / norm(expected.iter().map(|e| e * e).sum());
+    let mut relative: Vec<f64> =
+        pairs().filter(|(_, e)| e.abs() >= FLOOR * largest).map(|(a, e)| ((a - e) / e).abs()).collect();
+    GroupError { max, p999: quantile(&mut relative, 0.999), rms }
+}

@@ -1,0 +1,136 @@
+//! Kernels: time against error of every mode, and each pass alone.
+//!
+//! A mode is a training step whose shaders or passes differ in one respect from the engine's (`modes`). It runs in the
+//! engine's own scheduler on seeded scenes, is timed by the device's timestamps round robin with all others, and its
+//! picture and gradients are compared with the float64 mirrors of the tests: once with the engine's rules, and once
+//! without any cut-off, which is what those rules stand for.
+
+mod backward;
+mod bed;
+mod chart;
+mod errors;
+mod knee;
+mod measure;
+mod mirror;
+mod modes;
+mod passes;
+mod patch;
+mod report;
+mod scenes;
+
+use super::Common;
+use labelgs::engine::{Room, capacity};
+use labelgs::gpu::Gpu;
+use labelgs::io::atomic;
+use labelgs::pass::{self, KernelShape, Variant};
+use labelgs::{Error, Result};
+use measure::SceneResult;
+use modes::{MODES, Mode};
+use patch::Replacements;
+use serde::Serialize;
+
+/// Of the JSON file.
+const SCHEMA_VERSION: u32 = 1;
+
+/// What this benchmark knows beside the others.
+#[derive(clap::Args, Clone, Debug)]
+pub struct KernelArgs {
+    #[command(flatten)]
+    common: Common,
+    /// Time the largest scene too: 1,000,000 Gaussians, 1440 x 1080 px.
+    #[arg(long)]
+    large: bool,
+    /// These scenes alone.
+    #[arg(long, value_name = "NAME,..", value_delimiter = ',')]
+    scenes: Vec<String>,
+    /// These modes alone, by number; the default is always among them.
+    #[arg(long, value_name = "N,..", value_delimiter = ',')]
+    modes: Vec<usize>,
+    /// Timed rounds of every scene.
+    #[arg(long, value_name = "N")]
+    rounds: Option<usize>,
+}
+
+/// The file.
+#[derive(Serialize)]
+struct File<'a> {
+    schema_version: u32,
+    benchmark: &'static str,
+    small: bool,
+    device: String,
+    driver: String,
+    threads: usize,
+    load_before: Option<f64>,
+    scenes: &'a [SceneResult],
+}
+
+/// Processes that waited for a processor on the average of the last minute, where the system tells.
+fn load() -> Option<f64> {
+    std::fs::read_to_string("/proc/loadavg").ok()?.split_whitespace().next()?.parse().ok()
+}
+
+/// Runs it.
+pub fn run(args: &KernelArgs) -> Result<()> {
+    let load_before = load();
+    let gpu = super::device::open()?;
+    let modes = compile(&gpu, args)?;
+    let plain: Vec<Mode> = modes.iter().map(|(mode, _)| *mode).collect();
+    let capabilities = gpu.capabilities();
+    let driver = format!("{} {}", capabilities.driver_name, capabilities.driver_info);
+    println!("{}, {driver}", capabilities.name);
+    print!("{}", report::legend(&plain));
+    let mut scenes = Vec::new();
+    let mut failures = Vec::new();
+    for mut plan in scenes::plans(args.common.small, args.large) {
+        if !args.scenes.is_empty() && !args.scenes.iter().any(|name| name.eq_ignore_ascii_case(plan.name)) {
+            continue;
+        }
+        plan.rounds = args.rounds.unwrap_or(plan.rounds).max(1);
+        let scene = measure::scene(&gpu, &plan, &modes)?;
+        print!("{}", report::scene(&scene));
+        failures.extend(faults(&scene, plan.kind));
+        scenes.push(scene);
+    }
+    print!("{}", report::passes(&scenes));
+    let file = File {
+        schema_version: SCHEMA_VERSION,
+        benchmark: "kernels",
+        small: args.common.small,
+        device: capabilities.name.clone(),
+        driver,
+        threads: std::thread::available_parallelism().map_or(1, usize::from),
+        load_before,
+        scenes: &scenes,
+    };
+    let json = serde_json::to_string(&file).map_err(|error| Error::Bug(format!("JSON: {error}")))?;
+    let svg = chart::svg(&scenes, &plain)?;
+    for (name, text) in [("kernels.json", json), ("kernels.svg", svg)] {
+        let path = args.common.output.join(name);
+        atomic::write(&path, |out| out.write_all(text.as_bytes()))?;
+        println!("{}", path.display());
+    }
+    if failures.is_empty() { Ok(()) } else { Err(Error::Check(failures.join("; "))) }
+}
+
+/// The modes with their shaders for the device.
+fn compile(gpu: &Gpu, args: &KernelArgs) -> Result<Vec<(Mode, Replacements)>> {
+    let shape = KernelShape::new(gpu.subgroup_size(), gpu.is_cpu());
+    let room = Room { gaussians: 1, size: (64, 64), trained: true, labels: None };
+    let variant = Variant { labels: false, lift: false, sh_degree: 3, size: room.size, update: false };
+    let list = pass::training_step(&shape, &capacity(&shape, &room), variant);
+    let wanted = |number: usize| number == 0 || args.modes.is_empty() || args.modes.contains(&number);
+    let modes = MODES.iter().enumerate().filter(|(number, _)| wanted(*number));
+    modes.map(|(_, mode)| Ok((*mode, mode.compile(&list)?))).collect()
+}
+
+/// What must not be: a number that is none, or a default mode that is off.
+fn faults(scene: &SceneResult, kind: scenes::Kind) -> Vec<String> {
+    let mut faults: Vec<String> = measure::fault_of_default(scene, kind).into_iter().collect();
+    for mode in &scene.modes {
+        let errors = [&mode.against_rules, &mode.against_no_cut_offs];
+        if errors.into_iter().flatten().any(|errors| !errors.are_finite()) {
+            faults.push(format!("{}: mode `{}` gives numbers that are not finite", scene.name, mode.name));
+        }
+    }
+    faults
+}
