@@ -4,7 +4,15 @@
 //! charts into `--output`. With `--small` it does the same in seconds on tiny scenes, as the tests run it.
 
 mod device;
+mod features;
+mod measure;
+mod paper;
+#[allow(dead_code)]
+#[path = "../../tests/reference/mod.rs"]
+mod reference;
 mod steps;
+mod trained;
+mod training;
 
 use clap::{Parser, Subcommand};
 use labelgs::Result;
@@ -36,6 +44,15 @@ pub struct Common {
 enum Command {
     /// What a step with labels costs beside one without, by covered area and number of objects.
     Steps(Common),
+    /// One traversal for all objects against a pass for each, as in the paper's reference code.
+    Paper(paper::Options),
+    /// Quality against seconds of training, with and without labels, and the time to the first step.
+    Training(training::Options),
+    /// What rendering a learned feature per Gaussian would cost, as methods do that have no labels.
+    Features(features::Options),
+    /// Time to the first step of a training, in a process of its own.
+    #[command(hide = true)]
+    FirstStep(Common),
 }
 
 fn main() -> std::process::ExitCode {
@@ -50,5 +67,9 @@ fn main() -> std::process::ExitCode {
 fn run() -> Result<()> {
     match Arguments::parse().command {
         Command::Steps(common) => steps::run(&common),
+        Command::Paper(options) => paper::run(&options),
+        Command::Training(options) => training::run(&options),
+        Command::Features(options) => features::run(&options),
+        Command::FirstStep(common) => training::first_step(&common),
     }
 }
