@@ -4,7 +4,7 @@
 #include "step.glsl"
 #include "dispatch.glsl"
 #include "blend_tile.glsl"
-// feature_backward — gradient of CHANNELS channels by the features, one record per (splat, tile) pair.
+// feature_backward — gradient of 4 VECS channels by the features, one record per (splat, tile) pair.
 // Work:    one subgroup (= workgroup) a tile of the scene. Front to back: weights do not depend on what is behind.
 // Reads:   step; tile_starts [T]; slots, splat_from_instance [I]; splats [V,3]; last [P]; v_features_image [P,VECS]
 // Writes:  v_feature_instances [I,VECS] at the pair's slot; a record counts where blend_backward left the step's stamp

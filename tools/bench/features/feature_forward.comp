@@ -4,7 +4,7 @@
 #include "step.glsl"
 #include "dispatch.glsl"
 #include "blend_tile.glsl"
-// feature_forward — blend CHANNELS channels of a feature per Gaussian over one tile, and the gradient of a simple loss.
+// feature_forward — blend 4 VECS channels of a feature per Gaussian over one tile, and the gradient of a simple loss.
 // Work:    one subgroup (= workgroup) a tile of the scene, as blend_forward.
 // Reads:   step; tile_starts [T]; slots, splat_from_instance [I]; splats [V,3]; last [P]; gaussian_from_splat [V];
 //          features [N,stride]
