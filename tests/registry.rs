@@ -57,6 +57,12 @@ fn lists() -> Vec<(Capacity, PassList)> {
                     Variant { labels, lift, sh_degree, size, update, counts: false },
                 ));
             }
+            add(pass::separate_step(
+                &shape,
+                &capacity,
+                Variant { labels: true, lift: true, sh_degree: 3, size, update: true },
+                2,
+            ));
             add(pass::render_view(&shape, &capacity, 3));
             add(pass::vote_view(&shape, &capacity, 2));
             add(pass::densify_count(&shape, &capacity));

@@ -6,9 +6,9 @@
 // gather — add up the gradient records of each splat, in slot order; note the densification statistic.
 // Work:    64 splats a workgroup.
 // Reads:   step, counters, failure; tiles_touched, instance_offsets [V]; v_instances_a, _b, _c [I];
-//          gaussian_from_splat [V]; variant labels: labels [N], layer_from_label
+//          gaussian_from_splat [V], not in variant object; variant labels: labels [N], layer_from_label
 // Writes:  v_splats [V,3]: v_mean2d (px), v_conic xy..; v_conic z, v_log_opacity, v_colour rg; v_colour b
-//          densify_stats [N] += (|scene v_mean2d| in NDC units, 1)
+//          densify_stats [N] += (|scene v_mean2d| in NDC units, 1), not in variant object
 // Math:    the statistic sees the scene layer only, never the label loss.
 // Order:   fixed, bitwise reproducible; no atomics.
 // Mirror:  tests/reference/blend.rs::blend_backward, densify.rs::accumulate
@@ -22,9 +22,11 @@ FETCHU(4, instance_offsets);
 FETCH4(5, v_instances_a);
 FETCH4(6, v_instances_b);
 FETCH4(7, v_instances_c);
-FETCHU(8, gaussian_from_splat);
 WRITE(9, vec4, v_splats);
+#ifndef OBJECT
+FETCHU(8, gaussian_from_splat);
 INOUT(10, vec2, densify_stats);
+#endif
 #ifdef LABELS
 FETCHU(11, labels);
 FETCHU(12, layer_from_label);
@@ -36,8 +38,11 @@ void main() {
         return;
     }
     uint stamp = step.stamp;
-    uint total = fetchu(tiles_touched, s), first = fetchu(instance_offsets, s), gaussian = fetchu(gaussian_from_splat, s);
+    uint total = fetchu(tiles_touched, s), first = fetchu(instance_offsets, s);
     uint scene = total;
+#ifndef OBJECT
+    uint gaussian = fetchu(gaussian_from_splat, s);
+#endif
 #ifdef LABELS
     scene = fetchu(layer_from_label, fetchu(labels, gaussian)) != 0u ? total / 2u : total;
 #endif
@@ -56,8 +61,10 @@ void main() {
     v_splats[3u * s] = a;
     v_splats[3u * s + 1u] = b;
     v_splats[3u * s + 2u] = vec4(c, 0.0, 0.0, 0.0);
+#ifndef OBJECT
     if (total > 0u) {
         float size = length(scene_mean * vec2(0.5 * float(step.width), 0.5 * float(step.height)));
         densify_stats[gaussian] += vec2(size, 1.0);
     }
+#endif
 }

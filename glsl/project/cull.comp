@@ -6,10 +6,10 @@
 #include "gaussian.glsl"
 // cull — drop Gaussians that cannot count at any pixel: behind the near plane, too transparent, or surely off the image.
 // Work:    64 Gaussians a workgroup.
-// Reads:   step; means [N] (xyz world, w opacity logit); scales [N] (ln)
+// Reads:   step; means [N] (xyz world, w opacity logit); scales [N] (ln); variant object: labels [N], label_from_layer
 // Writes:  depth_keys [N]: bits of z, or KEY_INVISIBLE; splat_from_gaussian [N] = NO_SPLAT
 // Math:    |cov2d| <= |J|^2 max(s)^2 + blur; radius where alpha falls to ALPHA_MIN. Conservative, never drops a splat
-//          that project_forward would give a tile.
+//          that project_forward would give a tile. Variant object: of layer 1's object alone.
 // Mirror:  tests/reference/project.rs::cull
 
 layout(local_size_x = 64) in;
@@ -18,6 +18,10 @@ FETCH4(1, means);
 FETCH4(2, scales);
 WRITE(3, uint, depth_keys);
 WRITE(4, uint, splat_from_gaussian);
+#ifdef OBJECT
+FETCHU(5, labels);
+READ(6, uint, label_from_layer);
+#endif
 
 void main() {
     StepUniforms u = step;
@@ -41,6 +45,9 @@ void main() {
     bool inside = all(greaterThanEqual(centre + radius, vec2(0.0)))
         && all(lessThanEqual(centre - radius, vec2(float(u.width), float(u.height))));
     bool visible = view.z > u.near && reach > 0.0 && inside && finite(view.z);
+#ifdef OBJECT
+    visible = visible && fetchu(labels, i) == label_from_layer[1];
+#endif
     depth_keys[i] = visible ? floatBitsToUint(view.z) : KEY_INVISIBLE;
     splat_from_gaussian[i] = NO_SPLAT;
 }

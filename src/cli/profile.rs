@@ -54,6 +54,9 @@ pub struct ProfileArgs {
     /// Let passes overlap as in training: the wall clock is then the true one, times of passes are what each added.
     #[arg(long)]
     pub overlap: bool,
+    /// Give each sampled object passes of its own, as the paper's reference code does, to see what one traversal saves.
+    #[arg(long, conflicts_with = "compare")]
+    pub separate_objects: bool,
     /// How the scene is read.
     #[command(flatten)]
     pub reading: SceneArgs,
@@ -92,6 +95,7 @@ pub fn run(args: &ProfileArgs, context: &Context) -> Result<()> {
     let plan = PlanOptions { barrier_everywhere: !args.overlap, ..PlanOptions::default() };
     let options = SchedulerOptions { plan, timestamps: true, ..SchedulerOptions::default() };
     let mut trainer = Trainer::new(Arc::clone(&gpu), config, &mut dataset, &model, options)?;
+    trainer.separate_objects(args.separate_objects);
     measure(&mut trainer, args, context, &mut profile)?;
     match &args.json {
         Some(Some(file)) => super::eval::write_json(file, &profile.to_json())?,

@@ -298,7 +298,7 @@ fn instances(step: &StepReport) -> f64 {
 }
 
 fn walked_splats(step: &StepReport) -> f64 {
-    f64::from(step.report.counters.walked_first) + f64::from(step.report.counters.walked_second)
+    step.report.counters.walked_splats() as f64
 }
 
 /// What the fuller half of the workgroups walks, by the mean of both: 1 is even, 2 is all in one half.

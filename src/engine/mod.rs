@@ -45,6 +45,8 @@ pub struct Room {
 pub enum ListKey {
     /// One optimiser step.
     Train(Variant),
+    /// One optimiser step with so many sampled objects that have passes of their own, see [`pass::separate_step`].
+    Separate(Variant, u32),
     /// One picture, with this degree of the spherical harmonics.
     Render(u32),
     /// Votes of one view; tiles are walked so many times, four labels each.
@@ -153,6 +155,7 @@ impl Engine {
         let (shape, capacity) = (&self.shape, self.sched.capacity());
         let list = match key {
             ListKey::Train(variant) => pass::training_step(shape, capacity, variant),
+            ListKey::Separate(variant, objects) => pass::separate_step(shape, capacity, variant, objects),
             ListKey::Render(sh_degree) => pass::render_view(shape, capacity, sh_degree),
             ListKey::Vote(rounds) => pass::vote_view(shape, capacity, rounds),
             ListKey::DensifyCount => pass::densify_count(shape, capacity),

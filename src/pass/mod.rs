@@ -11,6 +11,7 @@ pub mod loss;
 mod optimize;
 mod project;
 pub mod scan;
+mod separate;
 pub mod shape;
 pub mod sort;
 pub mod stage;
@@ -18,6 +19,7 @@ mod tile;
 
 pub use build::Builder;
 pub use optimize::ATTRIBUTES;
+pub use separate::separate_step;
 pub use shape::KernelShape;
 pub use stage::Stage;
 

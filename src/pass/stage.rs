@@ -72,7 +72,7 @@ pub fn stages(list: &PassList) -> Vec<(Stage, String)> {
         let name = match work {
             Work::Pass(pass) => {
                 let stem = pass.shader.stem;
-                projected |= stem.starts_with("project_forward");
+                projected = !stem.starts_with("cull") && (projected || stem.starts_with("project_forward"));
                 now = stage_of(stem, now);
                 match (now, projected) {
                     (Stage::Sort, false) => format!("{stem} by depth"),
@@ -96,8 +96,9 @@ pub fn stages(list: &PassList) -> Vec<(Stage, String)> {
 
 /// The stage of a shader; scans belong to the stage around them.
 fn stage_of(stem: &str, now: Stage) -> Stage {
-    const BY_PREFIX: [(&str, Stage); 19] = [
+    const BY_PREFIX: [(&str, Stage); 20] = [
         ("step_begin", Stage::Project),
+        ("next_object", Stage::Project),
         ("cull", Stage::Project),
         ("prepare_splats", Stage::Project),
         ("compact", Stage::Project),

@@ -10,11 +10,26 @@ use crate::plan::{Buf, Grid};
 /// Lists the (splat, tile) pairs, sorts them by layer and tile, and finds each tile's range. Returns the buffer that
 /// holds the slots (places before the sort) of the sorted pairs.
 pub fn bin_splats(b: &mut Builder) -> Buf {
+    let emit = if b.labels { emit_all_layers } else { emit_scene };
+    bin(b, emit)
+}
+
+/// The scene's splats alone, in the first of the layers that the list has.
+pub fn bin_scene(b: &mut Builder) -> Buf {
+    bin(b, emit_scene)
+}
+
+/// An object's splats, in layer 1 alone.
+pub fn bin_object(b: &mut Builder) -> Buf {
+    bin(b, emit_object)
+}
+
+fn bin(b: &mut Builder, emit: impl Fn(&mut Builder)) -> Buf {
     let instances = b.capacity.instances as u32;
     pass!(b, prepare_instances {
         counters: Buf::COUNTERS, dispatch_args: Buf::DISPATCH_ARGS, failure: Buf::FAILURE,
     } [instance_capacity: instances], ONE);
-    emit_instances(b);
+    emit(b);
     let buffers =
         SortBuffers { keys: [Buf::TILE_KEYS_A, Buf::TILE_KEYS_B], values: [Buf::TILE_VALUES_A, Buf::TILE_VALUES_B] };
     let bits = 64 - b.capacity.virtual_tiles.saturating_sub(1).leading_zeros();
@@ -28,22 +43,32 @@ pub fn bin_splats(b: &mut Builder) -> Buf {
     slots
 }
 
-fn emit_instances(b: &mut Builder) {
+fn emit_all_layers(b: &mut Builder) {
     let (tile_width, tile_height) = (b.shape.tile_width, b.shape.tile_height);
-    if b.labels {
-        pass!(b, texel emit_instances_labels {
-            step: Buf::STEP, counters: Buf::COUNTERS, failure: Buf::FAILURE, splats: Buf::SPLATS,
-            tiles_touched: Buf::TILES_TOUCHED, instance_offsets: Buf::INSTANCE_OFFSETS, tile_keys: Buf::TILE_KEYS_A,
-            splat_from_instance: Buf::SPLAT_FROM_INSTANCE, gaussian_from_splat: GAUSSIAN_FROM_SPLAT,
-            labels: Buf::LABELS, layer_from_label: Buf::LAYER_FROM_LABEL,
-        } [tile_width: tile_width, tile_height: tile_height], over_splats());
-    } else {
-        pass!(b, texel emit_instances {
-            step: Buf::STEP, counters: Buf::COUNTERS, failure: Buf::FAILURE, splats: Buf::SPLATS,
-            tiles_touched: Buf::TILES_TOUCHED, instance_offsets: Buf::INSTANCE_OFFSETS, tile_keys: Buf::TILE_KEYS_A,
-            splat_from_instance: Buf::SPLAT_FROM_INSTANCE,
-        } [tile_width: tile_width, tile_height: tile_height], over_splats());
-    }
+    pass!(b, texel emit_instances_labels {
+        step: Buf::STEP, counters: Buf::COUNTERS, failure: Buf::FAILURE, splats: Buf::SPLATS,
+        tiles_touched: Buf::TILES_TOUCHED, instance_offsets: Buf::INSTANCE_OFFSETS, tile_keys: Buf::TILE_KEYS_A,
+        splat_from_instance: Buf::SPLAT_FROM_INSTANCE, gaussian_from_splat: GAUSSIAN_FROM_SPLAT,
+        labels: Buf::LABELS, layer_from_label: Buf::LAYER_FROM_LABEL,
+    } [tile_width: tile_width, tile_height: tile_height], over_splats());
+}
+
+fn emit_scene(b: &mut Builder) {
+    let (tile_width, tile_height) = (b.shape.tile_width, b.shape.tile_height);
+    pass!(b, texel emit_instances {
+        step: Buf::STEP, counters: Buf::COUNTERS, failure: Buf::FAILURE, splats: Buf::SPLATS,
+        tiles_touched: Buf::TILES_TOUCHED, instance_offsets: Buf::INSTANCE_OFFSETS, tile_keys: Buf::TILE_KEYS_A,
+        splat_from_instance: Buf::SPLAT_FROM_INSTANCE,
+    } [tile_width: tile_width, tile_height: tile_height], over_splats());
+}
+
+fn emit_object(b: &mut Builder) {
+    let (tile_width, tile_height) = (b.shape.tile_width, b.shape.tile_height);
+    pass!(b, texel emit_instances_object {
+        step: Buf::STEP, counters: Buf::COUNTERS, failure: Buf::FAILURE, splats: Buf::SPLATS,
+        tiles_touched: Buf::TILES_TOUCHED, instance_offsets: Buf::INSTANCE_OFFSETS, tile_keys: Buf::TILE_KEYS_A,
+        splat_from_instance: Buf::SPLAT_FROM_INSTANCE,
+    } [tile_width: tile_width, tile_height: tile_height], over_splats());
 }
 
 fn tile_ranges(b: &mut Builder, keys: Buf) {

@@ -56,6 +56,7 @@ pub struct Trainer {
     memory_bounds: bool,
     /// Votes were counted before, so that masks can be compared with their outcome.
     labelled_once: bool,
+    separate: bool,
     timing: Option<timing::Timing>,
     counts_pairs: bool,
 }
@@ -140,6 +141,7 @@ impl Trainer {
             max_gaussians,
             memory_bounds: false,
             labelled_once: false,
+            separate: false,
             timing: None,
             counts_pairs: false,
         })
@@ -148,6 +150,12 @@ impl Trainer {
     /// The engine, for renders between steps.
     pub fn engine_mut(&mut self) -> &mut Engine {
         &mut self.engine
+    }
+
+    /// From the next step on each sampled object has passes of its own, as in the reference code: slower, and up to
+    /// rounding the same. For measurements; nothing may be in flight ([`Trainer::drain`]).
+    pub fn separate_objects(&mut self, separate: bool) {
+        self.separate = separate;
     }
 
     /// The configuration.
@@ -264,14 +272,18 @@ impl Trainer {
     }
 
     fn key(&self, job: &Job) -> ListKey {
-        ListKey::Train(Variant {
+        let variant = Variant {
             labels: job.labels,
             lift: job.lifts(&self.config),
             sh_degree: self.config.sh_degree_at(job.step),
             size: self.engine.room().size,
             update: job.update,
             counts: self.counts_pairs,
-        })
+        };
+        if self.separate && job.labels {
+            return ListKey::Separate(variant, job.layers.len() as u32);
+        }
+        ListKey::Train(variant)
     }
 
     /// Waits for the oldest step in flight. If a buffer was too small, the step changed nothing, nor did those after it:

@@ -11,6 +11,7 @@ mod optimize;
 mod orders;
 mod project;
 pub mod rig;
+mod separate;
 mod step;
 mod tile;
 mod votes;

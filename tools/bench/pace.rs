@@ -68,9 +68,8 @@ impl Pace {
         self.passes.push(times.items.iter().map(|(_, _, ns)| *ns as f64 / 1e6).sum());
         self.wall.push(cost.wall);
         self.processor.push(cost.cpu);
-        let counters = &last.report.counters;
         let pixels = f64::from(self.trainer.engine_mut().shape().tile_pixels());
-        self.pairs.push((f64::from(counters.walked_first) + f64::from(counters.walked_second)) * pixels);
+        self.pairs.push(last.report.counters.walked_splats() as f64 * pixels);
         Ok(())
     }
 }

@@ -29,7 +29,9 @@ pub fn run(common: &Common) -> Result<()> {
     let found = median(times.iter().copied());
     println!("labelgs render: a picture of {width} x {height} px of {count} Gaussians, from the start of the program");
     println!("empty caches {cold:.2} s; filled caches {found:.2} s (median of {warm})");
-    write_json(&common.output.join("start.json"), &json!({ "schema_version": 1, "gaussians": count, "size": [width, height], "cold_s": cold, "warm_s": times }),
+    write_json(
+        &common.output.join("start.json"),
+        &json!({ "schema_version": 1, "gaussians": count, "size": [width, height], "cold_s": cold, "warm_s": times }),
     )
 }
 

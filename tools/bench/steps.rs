@@ -1,8 +1,8 @@
 //! What a step with labels costs beside one without: by the area that masks cover, and by the number of objects.
 
-use super::pace::{Pace, race};
 use super::measure::median;
 use super::measure::write_json;
+use super::pace::{Pace, race};
 use super::{Common, device};
 use labelgs::Result;
 use labelgs::engine::{Engine, Room};
@@ -42,7 +42,10 @@ pub fn run(common: &Common) -> Result<()> {
     let first = by_area(&gpu, &options, &model, size.timed)?;
     let larger = SynthOptions { width: 2 * options.width, height: 2 * options.height, ..options };
     let second = by_number(&gpu, &larger, &model, &size)?;
-    write_json(&common.output.join("steps.json"), &json!({ "schema_version": 1, "by_area": first, "by_number": second }))
+    write_json(
+        &common.output.join("steps.json"),
+        &json!({ "schema_version": 1, "by_area": first, "by_number": second }),
+    )
 }
 
 /// The built-in scene after so many steps without masks.
@@ -144,7 +147,8 @@ fn table(mut paces: Vec<Pace>, timed: usize, (width, height): (u32, u32), model:
     );
     let mut rows = Vec::new();
     for pace in &paces {
-        let (passes, processor, pairs) = (median(pace.passes.iter().copied()), median(pace.processor.iter().copied()), mean(&pace.pairs));
+        let (passes, processor, pairs) =
+            (median(pace.passes.iter().copied()), median(pace.processor.iter().copied()), mean(&pace.pairs));
         let (ratio, objects) = (passes / plain, pairs / scene_pairs - 1.0);
         let per_pixel = pairs / (f64::from(width) * f64::from(height));
         println!(

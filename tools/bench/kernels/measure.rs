@@ -170,7 +170,7 @@ pub fn scene(gpu: &Arc<Gpu>, plan: &Plan, modes: &[(Mode, Replacements)]) -> Res
         rounds: plan.rounds,
         splats: counters.visible_count,
         instances: counters.instance_count,
-        pairs: u64::from(counters.walked_splats) * u64::from(tile),
+        pairs: counters.walked_splats() * u64::from(tile),
         load: super::load(),
         modes,
         passes,

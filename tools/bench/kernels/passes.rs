@@ -58,7 +58,7 @@ fn items_of(stage: Stage, name: &str, plan: &Plan, counters: &Counters, tile_pix
     let gaussians = ("Gaussian", plan.gaussians as u64);
     let splats = ("splat", u64::from(counters.visible_count));
     let instances = ("instance", u64::from(counters.instance_count));
-    let pairs = ("pair", u64::from(counters.walked_splats) * u64::from(tile_pixels));
+    let pairs = ("pair", counters.walked_splats() * u64::from(tile_pixels));
     let pixels = u64::from(plan.size.0) * u64::from(plan.size.1);
     match (stage, name) {
         (_, "step_begin" | "prepare_splats" | "prepare_instances" | "prepare_blend" | "scan_spine" | "loss_reduce") => {

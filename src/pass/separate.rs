@@ -1,0 +1,91 @@
+//! A training step in which every sampled object has passes of its own, as in the reference code of LabelGS: its Gaussians
+//! are culled, sorted, projected, listed, blended and differentiated again, and its gradients are added to the scene's.
+//!
+//! It gives what [`training_step`](super::training_step) gives, up to the order of sums, and exists to measure what one
+//! traversal of all layers saves: the kernels and the culling are the same, only the structure differs. Each object is
+//! layer 1 of passes that have no other layer, so that one recording serves every object.
+
+use super::build::{Builder, ONE};
+use super::{Variant, begin, blend, end, gather, lift, loss, optimize, project, tile};
+use crate::pass;
+use crate::pass::KernelShape;
+use crate::plan::{Buf, Capacity, PassList, Work};
+
+/// What the passes of an object read and write in place of the step's buffers.
+const OF_OBJECT: [(Buf, Buf); 5] = [
+    (Buf::STEP, Buf::OBJECT_STEP),
+    (Buf::LABEL_FROM_LAYER, Buf::OBJECT_LABEL),
+    (Buf::LAYER_WEIGHTS, Buf::OBJECT_WEIGHT),
+    (Buf::LAYER_OCCLUDERS, Buf::OBJECT_OCCLUDERS),
+    (Buf::SPLAT_FROM_GAUSSIAN, Buf::OBJECT_SPLATS),
+];
+
+/// One optimiser step on one view with `objects` sampled objects, one after the other.
+pub fn separate_step(shape: &KernelShape, capacity: &Capacity, variant: Variant, objects: u32) -> PassList {
+    let mut b = begin("training step, objects one by one", shape, capacity, false, variant.sh_degree);
+    project::visible_splats(&mut b);
+    // The lift is in the labelled kernel, which then finds its layers empty.
+    b.labels = variant.lift;
+    let slots = tile::bin_scene(&mut b);
+    blend::blend_forward(&mut b, slots, variant.lift);
+    b.labels = false;
+    loss::photo_loss(&mut b, variant.size.0, variant.size.1);
+    blend::blend_backward(&mut b, slots);
+    gather::gather(&mut b);
+    project::project_backward(&mut b);
+    if objects > 0 {
+        b.list.fill(Buf::OBJECT, 0);
+        let object = object_passes(shape, capacity, variant.sh_degree);
+        for _ in 0..objects {
+            next_object(&mut b);
+            b.list.work.extend(object.iter().cloned());
+        }
+        next_object(&mut b);
+    }
+    if variant.update {
+        optimize::adam(&mut b);
+    }
+    if variant.lift {
+        lift::resolve(&mut b);
+    }
+    end(b)
+}
+
+fn next_object(b: &mut Builder) {
+    pass!(b, next_object {
+        step: Buf::STEP, label_from_layer: Buf::LABEL_FROM_LAYER, layer_weights: Buf::LAYER_WEIGHTS,
+        layer_occluders: Buf::LAYER_OCCLUDERS, object: Buf::OBJECT, object_counters: Buf::OBJECT_COUNTERS,
+        counters: Buf::COUNTERS, object_step: Buf::OBJECT_STEP, object_label: Buf::OBJECT_LABEL,
+        object_weight: Buf::OBJECT_WEIGHT, object_occluders: Buf::OBJECT_OCCLUDERS,
+    } [], ONE);
+}
+
+/// The passes of one object.
+fn object_passes(shape: &KernelShape, capacity: &Capacity, sh_degree: u32) -> Vec<Work> {
+    let tiles = capacity.virtual_tiles / capacity.layers.max(1);
+    let capacity = Capacity { virtual_tiles: 2 * tiles, ..*capacity };
+    let list = PassList::new("object");
+    let mut b = Builder { shape, capacity: &capacity, labels: false, sh_degree, counts: false, list };
+    project::visible_splats_of_object(&mut b);
+    b.labels = true;
+    let slots = tile::bin_object(&mut b);
+    blend::blend_forward(&mut b, slots, false);
+    loss::label_loss(&mut b);
+    blend::blend_backward(&mut b, slots);
+    gather::gather_object(&mut b);
+    let mut work = b.list.work;
+    for item in &mut work {
+        if let Work::Pass(pass) = item {
+            pass.buffers.iter_mut().for_each(|buf| *buf = of_object(*buf));
+        }
+    }
+    // The gradients stay by the scene's splats.
+    let list = PassList { name: String::new(), work };
+    let mut b = Builder { shape, capacity: &capacity, labels: true, sh_degree, counts: false, list };
+    project::project_backward_of_object(&mut b, Buf::SPLAT_FROM_GAUSSIAN);
+    b.list.work
+}
+
+fn of_object(buf: Buf) -> Buf {
+    OF_OBJECT.iter().find(|(step, _)| *step == buf).map_or(buf, |(_, object)| *object)
+}

@@ -1,0 +1,96 @@
+//! Clocks, medians, tables, files.
+
+use labelgs::gpu::Gpu;
+use labelgs::io::atomic;
+use labelgs::{Error, Result};
+use serde::Serialize;
+use std::fmt::Write as _;
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+/// What a piece of work took.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Cost {
+    /// Wall clock, ms.
+    pub wall: f64,
+    /// Processor time of all threads of this process, ms; 0 where the system does not tell.
+    pub cpu: f64,
+}
+
+/// Runs `work` and says what it took.
+pub fn timed<T>(work: impl FnOnce() -> Result<T>) -> Result<(T, Cost)> {
+    let (wall, cpu) = (Instant::now(), cpu_time());
+    let done = work()?;
+    let ms = |duration: Duration| duration.as_secs_f64() * 1e3;
+    Ok((done, Cost { wall: ms(wall.elapsed()), cpu: ms(cpu_time().saturating_sub(cpu)) }))
+}
+
+#[cfg(unix)]
+fn cpu_time() -> Duration {
+    let time = rustix::time::clock_gettime(rustix::time::ClockId::ProcessCPUTime);
+    Duration::new(time.tv_sec.try_into().unwrap_or(0), time.tv_nsec.try_into().unwrap_or(0))
+}
+
+#[cfg(not(unix))]
+fn cpu_time() -> Duration {
+    Duration::ZERO
+}
+
+/// The middle value, the mean of the two middle ones of an even number; NaN of nothing.
+pub fn median(values: impl IntoIterator<Item = f64>) -> f64 {
+    let mut sorted: Vec<f64> = values.into_iter().collect();
+    sorted.sort_by(f64::total_cmp);
+    match sorted.len() {
+        0 => f64::NAN,
+        n if n % 2 == 1 => sorted[n / 2],
+        n => f64::midpoint(sorted[n / 2 - 1], sorted[n / 2]),
+    }
+}
+
+/// Medians of wall clock and processor time.
+pub fn median_cost(costs: &[Cost]) -> Cost {
+    Cost { wall: median(costs.iter().map(|cost| cost.wall)), cpu: median(costs.iter().map(|cost| cost.cpu)) }
+}
+
+/// Average number of processes that wanted a processor in the last minute, if the system tells.
+pub fn load() -> Option<f64> {
+    std::fs::read_to_string("/proc/loadavg").ok()?.split(' ').next()?.parse().ok()
+}
+
+/// Columns aligned to the right, the first to the left; the first row is the head.
+pub fn table(rows: &[Vec<String>]) -> String {
+    let columns = rows.iter().map(Vec::len).max().unwrap_or(0);
+    let width = |column: usize| rows.iter().filter_map(|row| row.get(column)).map(|cell| cell.chars().count()).max();
+    let widths: Vec<usize> = (0..columns).map(|column| width(column).unwrap_or(0)).collect();
+    let mut text = String::new();
+    for row in rows {
+        let mut line = String::new();
+        for (column, cell) in row.iter().enumerate() {
+            let width = widths[column];
+            // Writing to a string cannot fail.
+            let _ = if column == 0 { write!(line, "{cell:width$}") } else { write!(line, "  {cell:>width$}") };
+        }
+        text.push_str(line.trim_end());
+        text.push('\n');
+    }
+    text
+}
+
+/// Writes a value as JSON.
+pub fn write_json(path: &Path, value: &impl Serialize) -> Result<()> {
+    let text = serde_json::to_string_pretty(value).map_err(|error| Error::Bug(format!("JSON: {error}")))?;
+    atomic::write(path, |file| writeln!(file, "{text}"))?;
+    println!("wrote {}", path.display());
+    Ok(())
+}
+
+/// Fails with a message where something does not hold.
+pub fn require(holds: bool, otherwise: impl FnOnce() -> String) -> Result<()> {
+    if holds { Ok(()) } else { Err(Error::Check(otherwise())) }
+}
+
+/// The validation layer, if it looked on, had nothing to say.
+pub fn require_silence(gpu: &Gpu) -> Result<()> {
+    let messages = gpu.messages();
+    require(messages.is_empty(), || format!("the validation layer has {} messages: {messages:#?}", messages.len()))
+}

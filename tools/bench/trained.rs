@@ -1,0 +1,78 @@
+//! Trainings that benchmarks start from and time.
+
+use labelgs::Result;
+use labelgs::engine::{Engine, Room};
+use labelgs::gpu::Gpu;
+use labelgs::infer::edit::select::SURE;
+use labelgs::infer::score::evaluate::{Rendering, evaluate};
+use labelgs::infer::score::scores::MeanScores;
+use labelgs::io::initial_gaussians;
+use labelgs::scene::{Dataset, Gaussians, View};
+use labelgs::sched::SchedulerOptions;
+use labelgs::train::{TrainConfig, Trainer};
+use std::sync::Arc;
+
+/// The model that a training of the scene starts from.
+pub fn start(dataset: &Dataset, config: &TrainConfig) -> Result<Gaussians> {
+    initial_gaussians(dataset, config.seed, 1000)
+}
+
+/// A trainer on a copy of the scene.
+pub fn trainer(gpu: &Arc<Gpu>, dataset: &Dataset, model: &Gaussians, config: TrainConfig) -> Result<Trainer> {
+    Trainer::new(Arc::clone(gpu), config, &mut dataset.clone(), model, SchedulerOptions::default())
+}
+
+/// A labelled model after so many steps.
+pub fn labelled_model(gpu: &Arc<Gpu>, dataset: &Dataset, steps: u32) -> Result<Gaussians> {
+    let steps = steps.max(1);
+    let config = TrainConfig { iterations: steps + 1, label_from: steps.div_ceil(2), ..TrainConfig::default() };
+    let mut trainer = trainer(gpu, dataset, &start(dataset, &config)?, config)?;
+    for _ in 0..steps {
+        trainer.step()?;
+    }
+    trainer.labelled_model()
+}
+
+/// Settings for timing: all bands of colour and labels from the first step, and nothing between the steps after it.
+pub fn timing_config() -> TrainConfig {
+    TrainConfig {
+        iterations: u32::MAX,
+        label_from: 1,
+        vote_every: u32::MAX,
+        occlusion_every: u32::MAX,
+        sh_degree_interval: 1,
+        densify_from: u32::MAX,
+        densify_until: Some(u32::MAX),
+        opacity_reset_interval: 0,
+        ..TrainConfig::default()
+    }
+}
+
+/// The scene without masks.
+pub fn without_masks(dataset: &Dataset) -> Dataset {
+    let mut plain = dataset.clone();
+    plain.train.iter_mut().for_each(|view| view.mask = None);
+    plain
+}
+
+/// Renders held-out views of models and scores them, on memory of its own.
+pub struct Judge {
+    engine: Engine,
+}
+
+impl Judge {
+    /// For the views of a scene.
+    pub fn new(gpu: &Arc<Gpu>, dataset: &Dataset) -> Result<Self> {
+        let sizes = dataset.test.iter().map(|view| (view.camera.width, view.camera.height));
+        let size = sizes.reduce(|a, b| (a.0.max(b.0), a.1.max(b.1))).unwrap_or((1, 1));
+        let room = Room { gaussians: 1, size, trained: false, labels: None };
+        Ok(Self { engine: Engine::new(Arc::clone(gpu), room, SchedulerOptions::default())? })
+    }
+
+    /// Scores on the held-out views, as `labelgs eval` gives them.
+    pub fn scores(&mut self, dataset: &Dataset, model: &Gaussians, config: &TrainConfig) -> Result<MeanScores> {
+        let views: Vec<&View> = dataset.test.iter().collect();
+        let how = Rendering { near: config.near, background: config.background, min_confidence: SURE };
+        Ok(evaluate(&mut self.engine, model, &views, how, &(), &mut ())?.mean)
+    }
+}
