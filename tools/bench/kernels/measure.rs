@@ -131,9 +131,11 @@ pub fn scene(gpu: &Arc<Gpu>, plan: &Plan, modes: &[(Mode, Replacements)]) -> Res
     drop(mirrors);
     let mut samples: Vec<Vec<Sample>> = vec![Vec::new(); bed.full_step() + 1];
     for round in 0..plan.rounds {
-        // Every other round backwards, so that no mode always follows the same one.
-        for place in 0..samples.len() {
-            let list = if round % 2 == 0 { place } else { samples.len() - 1 - place };
+        // Every round begins elsewhere and every other one goes backwards, so that no mode always follows the same one.
+        let count = samples.len();
+        for place in 0..count {
+            let forward = if round % 2 == 0 { place } else { count - 1 - place };
+            let list = (forward + 7 * round) % count;
             samples[list].push(bed.run(list)?);
         }
     }

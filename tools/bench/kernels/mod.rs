@@ -43,7 +43,7 @@ pub struct KernelArgs {
     /// These scenes alone.
     #[arg(long, value_name = "NAME,..", value_delimiter = ',')]
     scenes: Vec<String>,
-    /// These modes alone, by number; the default is always among them.
+    /// These modes alone, by their number in a full run; the default is always among them.
     #[arg(long, value_name = "N,..", value_delimiter = ',')]
     modes: Vec<usize>,
     /// Timed rounds of every scene.
