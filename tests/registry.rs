@@ -60,7 +60,7 @@ fn lists() -> Vec<(Capacity, PassList)> {
             add(pass::separate_step(
                 &shape,
                 &capacity,
-                Variant { labels: true, lift: true, sh_degree: 3, size, update: true },
+                Variant { labels: true, lift: true, sh_degree: 3, size, update: true, counts: false },
                 2,
             ));
             add(pass::render_view(&shape, &capacity, 3));

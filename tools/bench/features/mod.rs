@@ -194,7 +194,7 @@ impl Bed {
         let mut sched = Scheduler::new(Arc::clone(gpu), buffers.table, *capacity, options)?;
         model::upload(&mut sched, model, false)?;
         sched.upload(buffers.features, 0, 0, &features(model.len(), channels))?;
-        let variant = Variant { labels: false, lift: false, sh_degree: 3, size: *size, update: true };
+        let variant = Variant { labels: false, lift: false, sh_degree: 3, size: *size, update: true, counts: false };
         let full = step_with_features((&shape, capacity), variant, kernels, &buffers, channels)?;
         let full = sched.prepare(&full)?;
         let plain = sched.prepare(&training_step(&shape, capacity, variant))?;

@@ -69,7 +69,7 @@ impl<'a> Bed<'a> {
 
     fn variant(&self, update: bool) -> Variant {
         let size = (self.rig.scene.camera.width, self.rig.scene.camera.height);
-        Variant { labels: false, lift: false, sh_degree: self.rig.config.sh_degree, size, update }
+        Variant { labels: false, lift: false, sh_degree: self.rig.config.sh_degree, size, update, counts: false }
     }
 
     fn default_list(&self, update: bool) -> PassList {

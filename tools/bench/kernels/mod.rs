@@ -116,7 +116,7 @@ pub fn run(args: &KernelArgs) -> Result<()> {
 fn compile(gpu: &Gpu, args: &KernelArgs) -> Result<Vec<(Mode, Replacements)>> {
     let shape = KernelShape::new(gpu.subgroup_size(), gpu.is_cpu());
     let room = Room { gaussians: 1, size: (64, 64), trained: true, labels: None };
-    let variant = Variant { labels: false, lift: false, sh_degree: 3, size: room.size, update: false };
+    let variant = Variant { labels: false, lift: false, sh_degree: 3, size: room.size, update: false, counts: false };
     let list = pass::training_step(&shape, &capacity(&shape, &room), variant);
     let wanted = |number: usize| number == 0 || args.modes.is_empty() || args.modes.contains(&number);
     let modes = MODES.iter().enumerate().filter(|(number, _)| wanted(*number));
