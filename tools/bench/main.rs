@@ -6,6 +6,7 @@
 mod device;
 mod features;
 mod kernels;
+mod limits;
 mod measure;
 mod memory;
 mod pace;
@@ -65,6 +66,8 @@ enum Command {
     Training(training::Options),
     /// What rendering a learned feature per Gaussian would cost, as methods do that have no labels.
     Features(features::Options),
+    /// How near each stage of a step comes to what the device could do, measured in the same run.
+    Limits(Common),
     /// Predicted against measured memory of training.
     Memory(Common),
     /// From the start of the program to its first picture, with empty and with filled caches.
@@ -94,6 +97,7 @@ fn run() -> Result<()> {
         Command::Training(options) => training::run(&options),
         Command::Features(options) => features::run(&options),
         Command::FirstStep(common) => training::first_step(&common),
+        Command::Limits(common) => limits::run(&common),
         Command::Memory(common) => memory::run(&common),
         Command::Start(common) => start::run(&common),
         Command::MemoryOf { gaussians, width, height } => memory::measure(gaussians, width, height),

@@ -2,10 +2,12 @@
 
 use super::measure::timed;
 use labelgs::gpu::Gpu;
+use labelgs::pass::Stage;
 use labelgs::scene::{Dataset, Gaussians};
 use labelgs::sched::SchedulerOptions;
 use labelgs::train::{TrainConfig, Trainer};
 use labelgs::{Error, Result};
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 /// A training whose steps are timed one by one.
@@ -15,12 +17,18 @@ pub struct Pace {
     trainer: Trainer,
     /// Sum of the passes, ms, by step.
     pub passes: Vec<f64>,
+    /// The same by stage.
+    pub stages: BTreeMap<Stage, Vec<f64>>,
     /// Host's clock from submit to end, ms, by step.
     pub wall: Vec<f64>,
     /// Processor time of all threads, ms, by step.
     pub processor: Vec<f64>,
     /// (pixel, splat) pairs walked, by step.
     pub pairs: Vec<f64>,
+    /// Visible splats, by step.
+    pub splats: Vec<f64>,
+    /// (splat, tile) pairs, by step.
+    pub instances: Vec<f64>,
     /// Items of the step's list.
     pub items: usize,
 }
@@ -46,8 +54,18 @@ impl Pace {
         let options = SchedulerOptions { timestamps: true, ..SchedulerOptions::default() };
         let mut trainer = Trainer::new(Arc::clone(gpu), config, &mut dataset, model, options)?;
         trainer.keep_times();
-        let (passes, wall, processor, pairs) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
-        Ok(Self { name: name.to_owned(), trainer, passes, wall, processor, pairs, items: 0 })
+        Ok(Self {
+            name: name.to_owned(),
+            trainer,
+            passes: Vec::new(),
+            stages: BTreeMap::new(),
+            wall: Vec::new(),
+            processor: Vec::new(),
+            pairs: Vec::new(),
+            splats: Vec::new(),
+            instances: Vec::new(),
+            items: 0,
+        })
     }
 
     /// One step, waited for. Steps in which the driver compiles are run, and count for nothing.
@@ -66,9 +84,16 @@ impl Pace {
         }
         self.items = times.items.len();
         self.passes.push(times.items.iter().map(|(_, _, ns)| *ns as f64 / 1e6).sum());
+        let mut sums: BTreeMap<Stage, f64> = BTreeMap::new();
+        for (stage, _, ns) in &times.items {
+            *sums.entry(*stage).or_default() += *ns as f64 / 1e6;
+        }
+        sums.into_iter().for_each(|(stage, ms)| self.stages.entry(stage).or_default().push(ms));
         self.wall.push(cost.wall);
         self.processor.push(cost.cpu);
         let pixels = f64::from(self.trainer.engine_mut().shape().tile_pixels());
+        self.splats.push(f64::from(last.report.counters.visible_count));
+        self.instances.push(f64::from(last.report.counters.instance_count));
         self.pairs.push(last.report.counters.walked_splats() as f64 * pixels);
         Ok(())
     }

@@ -3,6 +3,7 @@
 use super::measure::median;
 use super::measure::write_json;
 use super::pace::{Pace, race};
+use super::trained::without_masks;
 use super::{Common, device};
 use labelgs::Result;
 use labelgs::engine::{Engine, Room};
@@ -16,7 +17,8 @@ use labelgs::train::{TrainConfig, Trainer};
 use serde_json::{Value, json};
 use std::sync::Arc;
 
-const TEST_EVERY: u32 = 8;
+/// Held-out views of the made scenes.
+pub const TEST_EVERY: u32 = 8;
 
 /// Sizes of a run.
 struct Size {
@@ -49,8 +51,8 @@ pub fn run(common: &Common) -> Result<()> {
 }
 
 /// The built-in scene after so many steps without masks.
-fn trained(gpu: &Arc<Gpu>, options: &SynthOptions, steps: u32) -> Result<Gaussians> {
-    let mut dataset = without_masks(synth::dataset(options, TEST_EVERY));
+pub fn trained(gpu: &Arc<Gpu>, options: &SynthOptions, steps: u32) -> Result<Gaussians> {
+    let mut dataset = without_masks(&synth::dataset(options, TEST_EVERY));
     let config = TrainConfig { iterations: steps, ..TrainConfig::default() };
     let points = init::initial_gaussians(&dataset, config.seed, init::RANDOM_COUNT)?;
     let mut trainer = Trainer::new(Arc::clone(gpu), config, &mut dataset, &points, SchedulerOptions::default())?;
@@ -58,11 +60,6 @@ fn trained(gpu: &Arc<Gpu>, options: &SynthOptions, steps: u32) -> Result<Gaussia
         trainer.step()?;
     }
     trainer.model()
-}
-
-fn without_masks(mut dataset: Dataset) -> Dataset {
-    dataset.train.iter_mut().for_each(|view| view.mask = None);
-    dataset
 }
 
 /// Masks as they are made, and masks that leave no pixel out.
@@ -76,7 +73,7 @@ fn by_area(gpu: &Arc<Gpu>, options: &SynthOptions, model: &Gaussians, timed: usi
         mask.ids.iter_mut().filter(|id| **id == 0).for_each(|id| *id = ground);
     }
     let paces = vec![
-        Pace::new("no masks", gpu, without_masks(made.clone()), model, 0)?,
+        Pace::new("no masks", gpu, without_masks(&made), model, 0)?,
         Pace::new(&format!("masks cover {:.0} %", share * 100.0), gpu, made, model, u32::from(ground))?,
         Pace::new("masks cover everything", gpu, whole, model, u32::from(ground))?,
     ];
@@ -86,7 +83,7 @@ fn by_area(gpu: &Arc<Gpu>, options: &SynthOptions, model: &Gaussians, timed: usi
 /// The same space divided among few and among many objects, all of them in the loss.
 fn by_number(gpu: &Arc<Gpu>, options: &SynthOptions, model: &Gaussians, size: &Size) -> Result<Vec<Value>> {
     let made = synth::dataset(options, TEST_EVERY);
-    let mut paces = vec![Pace::new("no masks", gpu, without_masks(made.clone()), model, 0)?];
+    let mut paces = vec![Pace::new("no masks", gpu, without_masks(&made), model, 0)?];
     for objects in size.objects {
         let divided = divided(gpu, &made, model, objects)?;
         paces.push(Pace::new(&format!("{objects} objects"), gpu, divided, model, objects as u32)?);

@@ -13,7 +13,7 @@ use super::trained::{labelled_model, timing_config, trainer, without_masks};
 use super::{Common, device};
 use kernels::{Buffers, Channels, Kernels, step_with_features};
 use labelgs::Result;
-use labelgs::engine::{model, uniforms::view_uniforms};
+use labelgs::engine::{Room, capacity, model, uniforms::view_uniforms};
 use labelgs::gpu::Gpu;
 use labelgs::pass::{KernelShape, Variant, training_step};
 use labelgs::plan::{Buf, Capacity, PlanOptions};
@@ -120,7 +120,11 @@ fn labelled_row(
             }
         }
     }
-    let capacity = *plain.engine_mut().sched().capacity();
+    // As many rows as there are Gaussians, or 512 channels would not fit where they do.
+    let grown = *plain.engine_mut().sched().capacity();
+    let room = Room { gaussians: model.len() as u64, ..*plain.engine_mut().room() };
+    let exact = capacity(plain.engine_mut().shape(), &room);
+    let capacity = Capacity { instances: grown.instances, trained_instances: grown.trained_instances, ..exact };
     Ok((row("labels (LabelGS, this engine)", &costs[1], &costs[0]), capacity))
 }
 

@@ -1,0 +1,139 @@
+//! What the device does at best, measured with kernels that do one thing.
+
+use labelgs::gpu::Gpu;
+use labelgs::plan::{Buf, BufferDecl, Capacity, Class, Domain, Grid, PassDecl, PassList, TexelFormat};
+use labelgs::sched::{Scheduler, SchedulerOptions};
+use labelgs::shaders::{Access, BindingDesc, BindingKind, ShaderDesc, SpecDesc};
+use labelgs::{Error, Result};
+use serde::Serialize;
+use shaderc::{CompileOptions, Compiler, EnvVersion, OptimizationLevel, ShaderKind, TargetEnv};
+use std::sync::Arc;
+
+/// vec4 of the buffer that is copied, nearly 64 MiB: as many workgroups as a dispatch has at most.
+const VECS: u32 = 65_535 * 64;
+/// Workgroups of 64 and rounds of eight operations each.
+const GROUPS: u32 = 1024;
+const ROUNDS: u32 = 2048;
+/// Dispatches of the list that costs nothing but dispatches.
+const EMPTY: u32 = 64;
+const REPETITIONS: usize = 8;
+
+/// Rates of a device.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct Ceilings {
+    /// Multiplications and additions a second, as the driver compiles `v * a + b`.
+    pub operations: f64,
+    /// `exp2` a second.
+    pub exp2: f64,
+    /// Divisions a second.
+    pub divisions: f64,
+    /// Bytes read and written a second.
+    pub bytes: f64,
+    /// Seconds that a dispatch takes by itself, with the barrier before it.
+    pub dispatch: f64,
+}
+
+/// What the arithmetic kernel repeats.
+#[derive(Clone, Copy)]
+enum Operation {
+    MultiplyAdd = 0,
+    Exp2 = 1,
+    Divide = 2,
+}
+
+/// Measures them; `texel` says how the engine's kernels read on this device.
+pub fn measure(gpu: &Arc<Gpu>, texel: bool, small: bool) -> Result<Ceilings> {
+    let (groups, vecs) = if small { (2, 1 << 12) } else { (GROUPS, VECS) };
+    let row = |name, elements| BufferDecl {
+        name,
+        element_bytes: 16,
+        domain: Domain::Fixed(elements),
+        class: Class::Kept,
+        texel: Some(TexelFormat::Rgba32Sfloat),
+        doc: "A benchmark's.",
+    };
+    let table = Box::leak(Box::new([row("from", vecs), row("to", vecs)]));
+    let (from, to) = (Buf(0), Buf(1));
+    let options = SchedulerOptions { timestamps: true, ..SchedulerOptions::default() };
+    let mut sched = Scheduler::new(Arc::clone(gpu), table, Capacity::default(), options)?;
+    let arithmetic = arithmetic()?;
+    let mut seconds = |operation: Operation, rounds: u32| {
+        let mut list = PassList::new("arithmetic");
+        list.pass(PassDecl::new(arithmetic, vec![to], Grid::Groups(groups, 1, 1)).spec(vec![operation as u32, rounds]));
+        least(&mut sched, &list)
+    };
+    let count = f64::from(groups) * 64.0 * 8.0;
+    // What does not grow with the rounds is not counted.
+    let mut rate = |operation, rounds: u32| -> Result<f64> {
+        let net = seconds(operation, rounds)? - seconds(operation, 1)?;
+        Ok(count * f64::from(rounds - 1) / net.max(1e-9))
+    };
+    let operations = 2.0 * rate(Operation::MultiplyAdd, ROUNDS)?;
+    let (exp2, divisions) = (rate(Operation::Exp2, ROUNDS / 4)?, rate(Operation::Divide, ROUNDS / 4)?);
+    let mut list = PassList::new("copy");
+    list.pass(PassDecl::new(copy(texel)?, vec![from, to], Grid::Groups(vecs / 64, 1, 1)));
+    let bytes = 32.0 * f64::from(vecs) / least(&mut sched, &list)?;
+    let mut list = PassList::new("dispatches");
+    for _ in 0..EMPTY {
+        list.pass(PassDecl::new(arithmetic, vec![to], Grid::Groups(1, 1, 1)).spec(vec![0, 1]));
+    }
+    let dispatch = least(&mut sched, &list)? / f64::from(EMPTY);
+    Ok(Ceilings { operations, exp2, divisions, bytes, dispatch })
+}
+
+/// The shortest of several runs of a list, seconds; the first is left out, in which drivers compile.
+fn least(sched: &mut Scheduler, list: &PassList) -> Result<f64> {
+    let id = sched.prepare(list)?;
+    let mut shortest = f64::INFINITY;
+    for repetition in 0..=REPETITIONS {
+        sched.run(id, 0)?;
+        let seconds: f64 = sched.timings(id, 0)?.iter().map(|(_, ns)| *ns as f64 * 1e-9).sum();
+        if repetition > 0 {
+            shortest = shortest.min(seconds);
+        }
+    }
+    Ok(shortest)
+}
+
+fn arithmetic() -> Result<&'static ShaderDesc> {
+    let to =
+        BindingDesc { name: "to", binding: 0, kind: BindingKind::Storage, access: Access::Write, element_bytes: 4 };
+    let spec = [SpecDesc { name: "OPERATION", id: 0, default: 0 }, SpecDesc { name: "ROUNDS", id: 1, default: 1 }];
+    compile("arithmetic", include_str!("arithmetic.comp"), vec![to], spec.to_vec(), false)
+}
+
+fn copy(texel: bool) -> Result<&'static ShaderDesc> {
+    let (kind, element_bytes) = if texel { (BindingKind::Texel, 0) } else { (BindingKind::Storage, 16) };
+    let from = BindingDesc { name: "from", binding: 0, kind, access: Access::Read, element_bytes };
+    let to =
+        BindingDesc { name: "to", binding: 1, kind: BindingKind::Storage, access: Access::Write, element_bytes: 16 };
+    compile("copy", include_str!("copy.comp"), vec![from, to], Vec::new(), texel)
+}
+
+/// Compiles a kernel; its description lives as long as the program, as those of the engine's shaders do.
+fn compile(
+    name: &'static str,
+    source: &str,
+    bindings: Vec<BindingDesc>,
+    spec: Vec<SpecDesc>,
+    texel: bool,
+) -> Result<&'static ShaderDesc> {
+    let failed = |error: shaderc::Error| Error::Bug(format!("{name}: {error}"));
+    let compiler = Compiler::new().map_err(failed)?;
+    let mut options = CompileOptions::new().map_err(failed)?;
+    options.set_target_env(TargetEnv::Vulkan, EnvVersion::Vulkan1_2 as u32);
+    options.set_optimization_level(OptimizationLevel::Performance);
+    if texel {
+        options.add_macro_definition("TEXEL", None);
+    }
+    let words = compiler.compile_into_spirv(source, ShaderKind::Compute, name, "main", Some(&options));
+    Ok(Box::leak(Box::new(ShaderDesc {
+        stem: name,
+        name,
+        spirv: Box::leak(words.map_err(failed)?.as_binary_u8().to_vec().into_boxed_slice()),
+        bindings: Box::leak(bindings.into_boxed_slice()),
+        push_bytes: 0,
+        spec: Box::leak(spec.into_boxed_slice()),
+        uses_subgroups: false,
+    })))
+}

@@ -1,0 +1,172 @@
+//! How near each stage of a step comes to what the device could do.
+//!
+//! The limit of a stage is the larger of its arithmetic by the rate of arithmetic and of its bytes by the rate of a copy,
+//! both measured in the same run, plus what its dispatches take by themselves. The counts are floors: what the method
+//! needs, not what the kernels happen to do.
+
+mod ceilings;
+
+use super::measure::{self, median, table};
+use super::pace::{Pace, race};
+use super::steps::{TEST_EVERY, trained};
+use super::trained::without_masks;
+use super::{Common, device};
+use ceilings::Ceilings;
+use labelgs::Result;
+use labelgs::pass::{KernelShape, Stage};
+use labelgs::synth::{self, SynthOptions};
+use serde_json::{Value, json};
+
+/// What a stage needs.
+#[derive(Clone, Copy, Default)]
+struct Need {
+    /// Multiplications and additions.
+    operations: f64,
+    exp2: f64,
+    divisions: f64,
+    /// Read and written.
+    bytes: f64,
+}
+
+impl Need {
+    /// Seconds at least.
+    fn seconds(self, c: &Ceilings) -> f64 {
+        let arithmetic = self.operations / c.operations + self.exp2 / c.exp2 + self.divisions / c.divisions;
+        arithmetic.max(self.bytes / c.bytes)
+    }
+}
+
+/// Counts of a step.
+struct Step {
+    gaussians: f64,
+    splats: f64,
+    instances: f64,
+    pairs: f64,
+    pixels: f64,
+    tiles: u32,
+}
+
+/// What each stage of a step without labels needs at degree 0 of the colours.
+fn need(stage: Stage, s: &Step, digit_bits: u32) -> Need {
+    let passes = |bits: u32| f64::from(bits.div_ceil(digit_bits));
+    let tile_bits = u32::BITS - s.tiles.saturating_sub(1).leading_zeros();
+    let vec4 = 16.0;
+    match stage {
+        // Means and scales of all; four planes in, three records out of the visible.
+        Stage::Project => Need {
+            operations: 40.0 * s.gaussians + 150.0 * s.splats,
+            bytes: (2.0 * vec4 + 8.0) * s.gaussians + (7.0 * vec4 + 8.0) * s.splats,
+            ..Need::default()
+        },
+        // A pass reads the keys twice and keys and values once, and writes both.
+        Stage::Sort => {
+            Need { bytes: 20.0 * (passes(32) * s.splats + passes(tile_bits) * s.instances), ..Need::default() }
+        }
+        Stage::Tile => Need {
+            operations: 35.0 * s.instances,
+            bytes: (3.0 * vec4 + 8.0) * s.splats + 8.0 * s.instances,
+            ..Need::default()
+        },
+        // Exponent 6, weight and transmittance 3, colour 6 (method of 3DGS in base 2).
+        Stage::BlendForward => Need {
+            operations: 15.0 * s.pairs,
+            exp2: s.pairs,
+            bytes: (3.0 * vec4 + 8.0) * s.instances + 20.0 * s.pixels,
+            ..Need::default()
+        },
+        // Exponent 6, transmittance 1, light 6, gradient of alpha 4, three moments 5, colour 6.
+        Stage::BlendBackward => Need {
+            operations: 28.0 * s.pairs,
+            exp2: s.pairs,
+            divisions: s.pairs,
+            bytes: (6.0 * vec4 + 8.0) * s.instances + 52.0 * s.pixels,
+        },
+        // Two windows of 11 taps along both axes: over four moments and over three derivatives, three channels.
+        Stage::Loss => Need {
+            operations: s.pixels * 3.0 * (2.0 * 2.0 * 11.0 * (4.0 + 3.0) + 30.0),
+            bytes: 2.0 * (vec4 + 4.0) * s.pixels + 3.0 * 3.0 * 2.0 * vec4 * s.pixels + vec4 * s.pixels,
+            ..Need::default()
+        },
+        Stage::Gather => Need { bytes: 3.0 * vec4 * (s.instances + s.splats), ..Need::default() },
+        Stage::ProjectBackward => {
+            Need { operations: 400.0 * s.splats, bytes: 11.0 * vec4 * s.splats, ..Need::default() }
+        }
+        // Four planes of parameters with two moments, read and written, and the gradients of the visible.
+        Stage::Optimise => Need {
+            operations: 16.0 * 12.0 * s.gaussians,
+            bytes: 4.0 * 6.0 * vec4 * s.gaussians + 4.0 * vec4 * s.splats,
+            ..Need::default()
+        },
+        _ => Need::default(),
+    }
+}
+
+/// Runs it.
+pub fn run(common: &Common) -> Result<()> {
+    let (options, training, timed) = if common.small {
+        (SynthOptions { width: 48, height: 40, views: 9, ..Default::default() }, 20, 2)
+    } else {
+        (SynthOptions::default(), 1500, 60)
+    };
+    let gpu = device::open()?;
+    let shape = KernelShape::new(gpu.subgroup_size(), gpu.is_cpu());
+    let c = ceilings::measure(&gpu, shape.texel, common.small)?;
+    println!(
+        "{}: {:.1} G multiplications and additions, {:.2} G exp2, {:.2} G divisions, {:.1} GB read and written a second; \
+         {:.1} us a dispatch",
+        gpu.capabilities().name,
+        c.operations / 1e9,
+        c.exp2 / 1e9,
+        c.divisions / 1e9,
+        c.bytes / 1e9,
+        c.dispatch * 1e6
+    );
+    let model = trained(&gpu, &options, training)?;
+    let dataset = without_masks(&synth::dataset(&options, TEST_EVERY));
+    let mut paces = [Pace::new("plain step", &gpu, dataset, &model, 0)?];
+    race(&mut paces, timed)?;
+    let [pace] = &paces;
+    let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
+    let (tiles_x, tiles_y) = shape.tiles(options.width, options.height);
+    let step = Step {
+        gaussians: model.len() as f64,
+        splats: mean(&pace.splats),
+        instances: mean(&pace.instances),
+        pairs: mean(&pace.pairs),
+        pixels: f64::from(options.width) * f64::from(options.height),
+        tiles: tiles_x * tiles_y,
+    };
+    println!(
+        "{} Gaussians, {} x {} px: {:.1} M pairs, {:.0} a pixel; load {:.1}\n",
+        model.len(),
+        options.width,
+        options.height,
+        step.pairs / 1e6,
+        step.pairs / step.pixels,
+        measure::load().unwrap_or(f64::NAN)
+    );
+    let mut rows = vec![["stage", "ms", "limit ms", "fraction"].map(str::to_owned).to_vec()];
+    let mut found: Vec<Value> = Vec::new();
+    let (mut all, mut limits) = (0.0, 0.0);
+    for (stage, times) in &pace.stages {
+        let (ms, limit) = (median(times.iter().copied()), need(*stage, &step, shape.digit_bits).seconds(&c) * 1e3);
+        (all, limits) = (all + ms, limits + limit);
+        found.push(json!({ "stage": stage.name(), "ms": ms, "limit_ms": limit }));
+        rows.push(vec![
+            stage.name().to_owned(),
+            format!("{ms:.2}"),
+            format!("{limit:.2}"),
+            format!("{:.2}", limit / ms),
+        ]);
+    }
+    let dispatches = pace.items as f64 * c.dispatch * 1e3;
+    rows.push(vec![format!("{} dispatches", pace.items), String::new(), format!("{dispatches:.2}"), String::new()]);
+    let limits = limits + dispatches;
+    rows.push(vec!["step".to_owned(), format!("{all:.2}"), format!("{limits:.2}"), format!("{:.2}", limits / all)]);
+    println!("{}", table(&rows));
+    measure::write_json(
+        &common.output.join("limits.json"),
+        &json!({ "schema_version": 1, "ceilings": c, "gaussians": model.len(), "pairs": step.pairs, "stages": found,
+            "dispatches": pace.items, "step_ms": all, "limit_ms": limits }),
+    )
+}
