@@ -190,7 +190,7 @@ pub struct DensityFlags {
     /// Step after which it starts.
     #[arg(long, value_name = "STEP")]
     pub densify_from: Option<u32>,
-    /// Step at which it ends; otherwise half of the run, but 1000 steps after --densify-from at the earliest.
+    /// Step at which it ends, at the earliest 1000 steps after --densify-from if not given [default: half of the run].
     #[arg(long, value_name = "STEP")]
     pub densify_until: Option<u32>,
     /// Steps between two.

@@ -2,6 +2,9 @@
 //!
 //! Both use the same kernels and the same culling ([`labelgs::pass::separate_step`]), so that their ratio is what the
 //! structure saves. Steps of both and of a plain training run in turn, from the same model, on the same views.
+//!
+//! What favours a pass for each: it culls to the object's Gaussians first, adds gradients for visible splats only, and
+//! has its loss in the blend kernel. What does not: as in the reference, each pass visits all tiles of the image.
 
 use super::measure::{self, Cost, median, median_cost, require, table, timed};
 use super::trained::{Judge, labelled_model, start, timing_config, trainer, without_masks};
