@@ -298,3 +298,38 @@ fn without_space_the_run_ends_and_the_last_checkpoint_stays() {
     assert_eq!(output.status.code(), Some(7), "{}", stderr(&output));
     assert!(stderr(&output).contains("checkpoints"), "{}", stderr(&output));
 }
+
+#[test]
+fn an_output_that_was_deleted_meanwhile_is_made_anew() {
+    let Some(_turn) = device() else { return };
+    let place = Place::new();
+    let flags = ["--iterations", "30", "--checkpoint-every", "3", "--preview-every", "0"];
+    let args = place.train("out", &flags);
+    let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_labelgs"));
+    command.env("LABELGS_VALIDATION", "off").env("LABELGS_CACHE", place.path("cache")).args(args);
+    let mut child = command.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().expect("it runs");
+    wait_until(&mut child, || !place.checkpoints("out").is_empty());
+    // A checkpoint may be written at the same time.
+    while std::fs::remove_dir_all(place.path("out")).is_err() {}
+    let text = succeeded(&child.wait_with_output().expect("a child"));
+    assert!(text.contains("was deleted meanwhile"), "{text}");
+    assert!(!place.model("out", 30).is_empty() && place.path("out/config.toml").exists());
+    assert_eq!(place.checkpoints("out").iter().map(|found| found.step).collect::<Vec<_>>(), [30]);
+    all_whole(&place.path("out"));
+}
+
+/// A run that starts anew where another one was has its own checkpoints in the end.
+#[test]
+fn checkpoints_of_an_earlier_run_stay_until_there_are_new_ones() {
+    let Some(_turn) = device() else { return };
+    let place = Place::new();
+    succeeded(&place.trained("out", &["--iterations", "9", "--checkpoint-every", "9"]));
+    let old = place.checkpoints("out");
+    let text = succeeded(&place.trained("out", &["--iterations", "3", "--checkpoint-every", "0"]));
+    assert!(text.contains("of an earlier run") && text.contains("--resume goes on"), "{text}");
+    assert_eq!(place.checkpoints("out"), old);
+    succeeded(&place.trained("out", &["--iterations", "5", "--checkpoint-every", "2"]));
+    let steps: Vec<u32> = place.checkpoints("out").iter().map(|found| found.step).collect();
+    assert_eq!(steps, [5], "the run of 9 steps is nobody's business any more");
+    assert!(succeeded(&place.trained("out", &["--resume"])).contains("goes on after step 5"));
+}

@@ -64,15 +64,22 @@ pub(super) fn train(args: &TrainArgs, context: &Context) -> Result<(serde_json::
         Some(state) => Trainer::resume(gpu, &mut dataset, state, options)?,
         None => start(gpu, &config, &mut dataset, occluders.as_ref(), options)?,
     };
-    let text = config::dump(&config, &facts)?;
-    atomic::write(out.join(run_folder::CONFIG), |file| file.write_all(text.as_bytes()))?;
-    LabelTable::put(names.as_ref(), &out.join(label_table::FILE))?;
-    let cameras: Vec<_> = dataset.all().into_iter().map(|view| (view.name.as_str(), &view.camera)).collect();
-    record::save_cameras(out, &cameras)?;
+    let records = || {
+        let text = config::dump(&config, &facts)?;
+        atomic::write(out.join(run_folder::CONFIG), |file| file.write_all(text.as_bytes()))?;
+        LabelTable::put(names.as_ref(), &out.join(label_table::FILE))?;
+        let cameras: Vec<_> = dataset.all().into_iter().map(|view| (view.name.as_str(), &view.camera)).collect();
+        record::save_cameras(out, &cameras)
+    };
+    records()?;
     interrupt::note_only();
     let start = Instant::now();
     let last = steps(&mut trainer, out, preview.as_ref(), &mut checkpoints, context)
         .map_err(|error| keep_model(&mut trainer, out, error))?;
+    if !out.join(run_folder::CONFIG).exists() {
+        tracing::warn!("{} was deleted meanwhile; what is known is written again", out.display());
+        records()?;
+    }
     // What was learnt is saved either way.
     let kept = if interrupt::status().is_some() { checkpoints.save(&mut trainer) } else { Ok(()) };
     let model = trainer.labelled_model()?;
