@@ -139,6 +139,7 @@ fn every_flag_of_train_changes_its_field() {
         ("--opacity-reset-margin", "9"),
         ("--save-at", "2000,5000"),
         ("--preview-every", "6"),
+        ("--checkpoint-every", "12"),
     ];
     let all: Vec<&str> = typed.iter().flat_map(|&(flag, value)| [flag, value]).collect();
     let json = |config: &TrainConfig| serde_json::to_value(config).expect("JSON");

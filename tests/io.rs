@@ -1,5 +1,6 @@
 //! Files to scenes and back, on fixtures that the tests write themselves.
 
+mod checkpoint;
 mod colmap;
 mod depths;
 mod fixtures;

@@ -12,6 +12,7 @@ mod cli_edit;
 mod cli_engine;
 mod cli_labels;
 mod cli_masks;
+mod cli_resume;
 mod compare_self;
 mod config;
 mod decide;

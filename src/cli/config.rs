@@ -84,23 +84,25 @@ pub fn load_options(config: &TrainConfig, masks: Option<PathBuf>) -> LoadOptions
 
 /// Defaults of the flags of `train` as one types them, by flag without dashes.
 pub fn default_texts() -> BTreeMap<String, String> {
-    // TOML prints a f32 as one would type it.
-    let fields = toml::to_string(&TrainConfig::default()).unwrap_or_default();
-    let mut texts: BTreeMap<String, String> = fields
-        .lines()
-        .filter_map(|line| line.split_once(" = "))
-        .map(|(name, value)| (name.replace('_', "-"), typed(name, value)))
-        .collect();
-    texts.insert("feature-rest-lr".into(), "--feature-lr / 20".into());
+    let mut texts = fields(&TrainConfig::default());
+    for (flag, text) in [("background", "black"), ("save-at", "none"), ("feature-rest-lr", "--feature-lr / 20")] {
+        texts.insert(flag.into(), text.into());
+    }
     texts
 }
 
-fn typed(name: &str, value: &str) -> String {
-    match (name, value) {
-        ("background", _) => "black".into(),
-        ("save_at", _) => "none".into(),
-        (_, "true") => "on".into(),
-        (_, "false") => "off".into(),
+/// Values of a configuration as one types them, by flag without dashes; what is not set has none.
+pub fn fields(config: &TrainConfig) -> BTreeMap<String, String> {
+    // TOML prints a f32 as one would type it.
+    let fields = toml::to_string(config).unwrap_or_default();
+    let fields = fields.lines().filter_map(|line| line.split_once(" = "));
+    fields.map(|(name, value)| (name.replace('_', "-"), typed(value))).collect()
+}
+
+fn typed(value: &str) -> String {
+    match value {
+        "true" => "on".into(),
+        "false" => "off".into(),
         _ => value.trim_matches('"').to_owned(),
     }
 }

@@ -24,6 +24,7 @@ mod profile_report;
 pub mod recolour;
 pub mod relabel;
 pub mod render;
+pub mod resume;
 pub mod scene;
 pub mod select;
 pub mod split_components;

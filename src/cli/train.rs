@@ -2,6 +2,7 @@
 
 use super::context::Context;
 use super::log::Progress;
+use super::resume::{self, Checkpoints};
 use super::scene::{open_gpu, open_with};
 use super::train_args::TrainArgs;
 use super::{config, interrupt, occlusion, stdout};
@@ -13,13 +14,14 @@ use crate::infer::score::evaluate::{Rendering, evaluate};
 use crate::infer::score::scores::Scores;
 use crate::io::label_table::{self, LabelTable};
 use crate::io::occlusion_table::{self, OcclusionTable};
-use crate::io::{atomic, init, run_folder};
+use crate::io::{atomic, checkpoint_folder, init, run_folder};
 use crate::scene::{Dataset, Photo, View};
 use crate::sched::SchedulerOptions;
 use crate::train::{self, StepReport, TrainConfig, Trainer, record};
 use crate::{Error, Result};
 use serde_json::json;
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::time::Instant;
 
 /// Trains a model and prints what came of it.
@@ -30,11 +32,17 @@ pub fn run(args: &TrainArgs, context: &Context) -> Result<()> {
 
 /// Trains a model; returns its metrics.json, and the same in a sentence.
 pub(super) fn train(args: &TrainArgs, context: &Context) -> Result<(serde_json::Value, String)> {
-    let config = config::decide(args)?;
+    let resumed = resume::find(args)?;
+    let config = match &resumed {
+        Some(state) => state.config.clone(),
+        None => config::decide(args)?,
+    };
     let out = args.output.as_path();
-    prepare_output(out)?;
-    let names = args.masks.as_deref().map(LabelTable::of_folder).transpose()?.flatten();
-    let mut dataset = open_with(&args.scene, &config::load_options(&config, args.masks.clone()))?;
+    prepare_output(out, &config)?;
+    let mut run = resume::facts(args, resumed.as_ref());
+    let masks = args.masks.clone().or(run.masks.as_ref().map(PathBuf::from));
+    let names = masks.as_deref().map(LabelTable::of_folder).transpose()?.flatten();
+    let mut dataset = open_with(&args.scene, &config::load_options(&config, masks.clone()))?;
     if dataset.train.is_empty() {
         return Err(Error::data(
             &args.scene,
@@ -42,41 +50,42 @@ pub(super) fn train(args: &TrainArgs, context: &Context) -> Result<(serde_json::
             "no view is left to train on; use --no-test or a larger --test-every",
         ));
     }
-    let occluders = occlusion::for_training(args, &dataset)?;
-    let gpu = open_gpu(context)?;
-    let mut model = init::initial_gaussians(&dataset, config.seed, init::RANDOM_COUNT)?;
-    bound_start(&mut model, &config);
-    let options = SchedulerOptions { memory_limit: args.memory_limit, ..SchedulerOptions::default() };
-    let room = train::start_room(&gpu, &dataset, &config, model.len(), options)?;
-    let memory = Engine::predict(&gpu, &room, options)?;
-    tracing::info!(
-        "memory to start with: {:.1} MiB on the device, for {} Gaussians and {} x {} px; it grows with the model",
-        memory.total as f64 / f64::from(1 << 20),
-        room.gaussians,
-        room.size.0,
-        room.size.1
-    );
-    write_run(out, &config, &gpu, args)?;
-    LabelTable::put(names.as_ref(), &out.join(label_table::FILE))?;
-    let cameras: Vec<_> = dataset.all().into_iter().map(|view| (view.name.as_str(), &view.camera)).collect();
-    record::save_cameras(out, &cameras)?;
-    let preview = preview_view(&dataset);
-    let mut trainer = Trainer::new(gpu, config.clone(), &mut dataset, &model, options)?;
+    let occluders = if resumed.is_none() { occlusion::for_training(args, &dataset)? } else { None };
     if let Some(table) = &occluders {
-        let without = trainer.set_occluders(&table.views);
-        if let Some(first) = without.first() {
-            let count = without.len();
-            tracing::warn!("{count} training views have no list of occluders, such as {first}; nothing hides there");
-        }
+        run.occlusion = Some(table.kind.clone());
     }
+    let gpu = open_gpu(context)?;
+    let preview = preview_view(&dataset);
+    let options = SchedulerOptions { memory_limit: run.memory_limit, ..SchedulerOptions::default() };
+    let mut facts = facts(args, masks.as_deref(), &gpu);
+    facts.extend(resumed.as_ref().map(|state| ("goes on after step", state.step.to_string())));
+    let mut checkpoints = Checkpoints::new(out, run.clone(), resumed.as_ref())?;
+    let mut trainer = match resumed {
+        Some(state) => Trainer::resume(gpu, &mut dataset, state, options)?,
+        None => start(gpu, &config, &mut dataset, occluders.as_ref(), options)?,
+    };
+    let records = || {
+        let text = config::dump(&config, &facts)?;
+        atomic::write(out.join(run_folder::CONFIG), |file| file.write_all(text.as_bytes()))?;
+        LabelTable::put(names.as_ref(), &out.join(label_table::FILE))?;
+        let cameras: Vec<_> = dataset.all().into_iter().map(|view| (view.name.as_str(), &view.camera)).collect();
+        record::save_cameras(out, &cameras)
+    };
+    records()?;
     interrupt::note_only();
     let start = Instant::now();
-    let last =
-        steps(&mut trainer, out, preview.as_ref(), context).map_err(|error| keep_model(&mut trainer, out, error))?;
+    let last = steps(&mut trainer, out, preview.as_ref(), &mut checkpoints, context)
+        .map_err(|error| keep_model(&mut trainer, out, error))?;
+    if !out.join(run_folder::CONFIG).exists() {
+        tracing::warn!("{} was deleted meanwhile; what is known is written again", out.display());
+        records()?;
+    }
+    // What was learnt is saved either way.
+    let kept = if interrupt::status().is_some() { checkpoints.save(&mut trainer) } else { Ok(()) };
     let model = trainer.labelled_model()?;
     let seconds = start.elapsed().as_secs_f64();
     let path = record::save_model(out, trainer.steps_done(), &model)?;
-    save_occluders(out, &trainer, occluders.as_ref())?;
+    save_occluders(out, &trainer, run.occlusion.as_deref())?;
     // Scoring puts single objects in the model's place.
     let gaussians = trainer.gaussian_count();
     if let Some(view) = &preview {
@@ -96,9 +105,12 @@ pub(super) fn train(args: &TrainArgs, context: &Context) -> Result<(serde_json::
         "views": scores.as_ref().map(|scores| &scores.views),
     });
     super::eval::write_json(&out.join("metrics.json"), &summary)?;
+    kept?;
     if let Some(status) = stopped {
+        tracing::info!("stopped after step {} of {}; --resume goes on", trainer.steps_done(), config.iterations);
         return Err(Error::Interrupted(status));
     }
+    checkpoints.finish()?;
     let sentence = sentence((trainer.steps_done(), gaussians, seconds), scores.as_ref(), &path);
     Ok((summary, sentence))
 }
@@ -119,11 +131,17 @@ fn sentence((steps, gaussians, seconds): (u32, u32, f64), scores: Option<&Scores
 }
 
 /// The loop. A noted signal ends it after the step.
-fn steps(trainer: &mut Trainer, out: &Path, preview: Option<&View>, context: &Context) -> Result<Option<StepReport>> {
+fn steps(
+    trainer: &mut Trainer,
+    out: &Path,
+    preview: Option<&View>,
+    checkpoints: &mut Checkpoints,
+    context: &Context,
+) -> Result<Option<StepReport>> {
     let config = trainer.config().clone();
     let mut progress = Progress::new(u64::from(config.iterations), "steps", &context.global);
     let mut last = None;
-    for step in 1..=config.iterations {
+    for step in trainer.steps_done() + 1..=config.iterations {
         let done = trainer.step()?;
         last = done.last().copied().or(last);
         progress.set(u64::from(step), || {
@@ -143,6 +161,10 @@ fn steps(trainer: &mut Trainer, out: &Path, preview: Option<&View>, context: &Co
                 preview_now(trainer, out, view)?;
             }
         }
+        if checkpoints.due(trainer) {
+            last = trainer.drain()?.last().copied().or(last);
+            checkpoints.save_due(trainer)?;
+        }
         if interrupt::status().is_some() {
             break;
         }
@@ -152,13 +174,13 @@ fn steps(trainer: &mut Trainer, out: &Path, preview: Option<&View>, context: &Co
 }
 
 /// Writes the occluders that the last step used.
-fn save_occluders(out: &Path, trainer: &Trainer, given: Option<&OcclusionTable>) -> Result<()> {
+fn save_occluders(out: &Path, trainer: &Trainer, given: Option<&str>) -> Result<()> {
     let views = trainer.occluders();
     if views.is_empty() {
         return Ok(());
     }
     let kind = match (given, trainer.config().occlusion) {
-        (Some(table), _) => &table.kind,
+        (Some(kind), _) => kind,
         (None, train::Occlusion::None) => "none",
         (None, _) => "rendered",
     };
@@ -182,11 +204,46 @@ fn keep_model(trainer: &mut Trainer, out: &Path, error: Error) -> Error {
     error
 }
 
-/// Refuses an output folder that cannot be used before any work is done.
-fn prepare_output(out: &Path) -> Result<()> {
-    std::fs::create_dir_all(out).map_err(Error::write(out))?;
-    atomic::remove_stale(out);
+/// Refuses an output folder that cannot be used before any work is done, and clears it of what killed runs left.
+fn prepare_output(out: &Path, config: &TrainConfig) -> Result<()> {
+    let checkpoints = out.join(checkpoint_folder::FOLDER);
+    let folder = if config.checkpoint_every > 0 { checkpoints.as_path() } else { out };
+    std::fs::create_dir_all(folder).map_err(Error::write(folder))?;
+    let models = std::fs::read_dir(out.join("point_cloud")).into_iter().flatten().flatten().map(|entry| entry.path());
+    for folder in [out.to_owned(), checkpoints, out.join("preview")].into_iter().chain(models) {
+        atomic::remove_stale(folder);
+    }
     Ok(())
+}
+
+/// A trainer with the initial model of the scene.
+fn start(
+    gpu: Arc<Gpu>,
+    config: &TrainConfig,
+    dataset: &mut Dataset,
+    occluders: Option<&OcclusionTable>,
+    options: SchedulerOptions,
+) -> Result<Trainer> {
+    let mut model = init::initial_gaussians(dataset, config.seed, init::RANDOM_COUNT)?;
+    bound_start(&mut model, config);
+    let room = train::start_room(&gpu, dataset, config, model.len(), options)?;
+    let memory = Engine::predict(&gpu, &room, options)?;
+    tracing::info!(
+        "memory to start with: {:.1} MiB on the device, for {} Gaussians and {} x {} px; it grows with the model",
+        memory.total as f64 / f64::from(1 << 20),
+        room.gaussians,
+        room.size.0,
+        room.size.1
+    );
+    let mut trainer = Trainer::new(gpu, config.clone(), dataset, &model, options)?;
+    if let Some(table) = occluders {
+        let without = trainer.set_occluders(&table.views);
+        if let Some(first) = without.first() {
+            let count = without.len();
+            tracing::warn!("{count} training views have no list of occluders, such as {first}; nothing hides there");
+        }
+    }
+    Ok(trainer)
 }
 
 /// No more initial points than `--max-gaussians`: every n-th is kept.
@@ -202,14 +259,15 @@ fn bound_start(model: &mut crate::scene::Gaussians, config: &TrainConfig) {
     }
 }
 
-fn write_run(out: &Path, config: &TrainConfig, gpu: &Gpu, args: &TrainArgs) -> Result<()> {
+/// What `config.toml` says besides the settings.
+fn facts(args: &TrainArgs, masks: Option<&Path>, gpu: &Gpu) -> Vec<(&'static str, String)> {
     let found = gpu.capabilities();
     let mut facts = vec![
         ("scene", args.scene.display().to_string()),
         ("device", format!("{} ({} {})", found.name, found.driver_name, found.driver_info)),
         ("subgroup size", gpu.subgroup_size().to_string()),
     ];
-    if let Some(masks) = &args.masks {
+    if let Some(masks) = masks {
         facts.push(("masks", masks.display().to_string()));
     }
     if let (Some(depths), Some(kind)) = (&args.depths, args.depth_kind) {
@@ -218,8 +276,7 @@ fn write_run(out: &Path, config: &TrainConfig, gpu: &Gpu, args: &TrainArgs) -> R
     if let Some(file) = &args.occlusion_file {
         facts.push(("occlusion file", file.display().to_string()));
     }
-    let text = config::dump(config, &facts)?;
-    atomic::write(out.join(run_folder::CONFIG), |file| file.write_all(text.as_bytes()))
+    facts
 }
 
 /// The view of the preview pictures: the first held-out one, else the first of all.

@@ -33,6 +33,9 @@ pub struct TrainArgs {
     /// Settings in TOML, as config.toml of an earlier run; flags win over it.
     #[arg(long, value_name = "FILE.toml")]
     pub config: Option<PathBuf>,
+    /// Go on from the newest checkpoint in OUT, with its settings and masks; without one, start at step 1.
+    #[arg(long)]
+    pub resume: bool,
     /// JSON.
     #[command(flatten)]
     pub json: JsonFlag,
@@ -91,6 +94,9 @@ pub struct RunFlags {
     /// Steps between two preview pictures; 0 makes none.
     #[arg(long, value_name = "N")]
     pub preview_every: Option<u32>,
+    /// Steps between two checkpoints; 0 writes one when interrupted only.
+    #[arg(long, value_name = "N")]
+    pub checkpoint_every: Option<u32>,
 }
 
 /// Object labels; they need masks.
@@ -221,7 +227,7 @@ impl TrainArgs {
     /// Puts what was typed over `config`.
     pub fn apply(&self, config: &mut TrainConfig) {
         take!(config, self.run, iterations max_resolution test_every seed max_gaussians background near save_at
-            preview_every);
+            preview_every checkpoint_every);
         if self.run.no_test {
             config.test_every = 0;
         }

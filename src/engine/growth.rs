@@ -7,6 +7,20 @@ use crate::pass::{self, KernelShape, Variant, loss};
 use crate::plan::{Buf, Capacity, MemoryReport, PassList, TABLE};
 use crate::sched::{Scheduler, SchedulerOptions};
 use crate::shaders::structs::Counters;
+use serde::{Deserialize, Serialize};
+
+/// How far the memory of an engine has grown: what bounded memory leaves room for depends on it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Sizes {
+    /// Gaussians that there is room for.
+    pub gaussians: u32,
+    /// (splat, tile) pairs.
+    pub instances: u32,
+    /// Occupied tiles of object layers.
+    pub layer_tiles: u32,
+    /// Segments of the longest list of a tile.
+    pub segments: u32,
+}
 
 /// Capacities for some room, before any measurement.
 pub fn capacity(shape: &KernelShape, room: &Room) -> Capacity {
@@ -168,6 +182,33 @@ impl Engine {
         let instances = new.instances;
         derive(&self.shape, &mut new, instances, self.room.trained);
         new
+    }
+
+    /// How far the memory has grown.
+    pub fn sizes(&self) -> Sizes {
+        let capacity = self.sched.capacity();
+        let word = |size: u64| u32::try_from(size).unwrap_or(u32::MAX);
+        Sizes {
+            gaussians: word(self.room.gaussians),
+            instances: word(capacity.instances),
+            layer_tiles: word(capacity.layer_tiles),
+            segments: word(capacity.segments),
+        }
+    }
+
+    /// Makes the memory of a new engine as large as another one's had become.
+    pub fn grow_to(&mut self, sizes: Sizes) -> Result<()> {
+        let gaussians = self.room.gaussians.max(u64::from(sizes.gaussians));
+        let mut new = capacity(&self.shape, &Room { gaussians, ..self.room });
+        if new.layer_tiles > 0 {
+            new.layer_tiles = new.layer_tiles.max(u64::from(sizes.layer_tiles));
+        }
+        new.segments = new.segments.max(u64::from(sizes.segments));
+        let instances = new.instances.max(u64::from(sizes.instances));
+        derive(&self.shape, &mut new, instances, self.room.trained);
+        self.set_capacity(new)?;
+        self.room.gaussians = gaussians;
+        Ok(())
     }
 
     fn set_capacity(&mut self, capacity: Capacity) -> Result<()> {

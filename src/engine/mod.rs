@@ -2,9 +2,10 @@
 
 mod growth;
 pub mod model;
+pub mod state;
 pub mod uniforms;
 
-pub use growth::capacity;
+pub use growth::{Sizes, capacity};
 
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;

@@ -6,6 +6,8 @@
 
 pub mod atomic;
 pub mod camera_json;
+pub mod checkpoint;
+pub mod checkpoint_folder;
 mod colmap;
 pub mod depth;
 mod depth_file;

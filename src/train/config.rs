@@ -144,6 +144,8 @@ pub struct TrainConfig {
     pub save_at: Vec<u32>,
     /// Steps between two preview pictures of a held-out view; 0 makes none. 1000.
     pub preview_every: u32,
+    /// Steps between two checkpoints, from which `--resume` goes on; 0 writes one at an interrupt only. 1000.
+    pub checkpoint_every: u32,
 }
 
 impl Default for TrainConfig {
@@ -191,6 +193,7 @@ impl Default for TrainConfig {
             opacity_reset_margin: 1500,
             save_at: Vec::new(),
             preview_every: 1000,
+            checkpoint_every: 1000,
         }
     }
 }

@@ -6,11 +6,13 @@ pub mod job;
 mod occlusion;
 pub mod record;
 mod sampler;
+mod state;
 mod timing;
 mod votes;
 
 pub use config::{LabelRule, Occlusion, TrainConfig};
 pub use densify::Densified;
+pub use state::{RunFacts, TrainState, ViewPrint};
 pub use timing::StepTimes;
 
 use crate::engine::{Engine, LabelRoom, ListKey, Report, Room};
@@ -59,6 +61,8 @@ pub struct Trainer {
     separate: bool,
     timing: Option<timing::Timing>,
     counts_pairs: bool,
+    /// What the views are told apart by; empty until somebody asks.
+    prints: Vec<ViewPrint>,
 }
 
 /// Room for training on a data set.
@@ -120,13 +124,25 @@ impl Trainer {
         options: SchedulerOptions,
     ) -> Result<Self> {
         config.check()?;
+        let room = start_room(&gpu, dataset, &config, model.len(), options)?;
+        let mut trainer = Self::without_model(gpu, shape, config, dataset, room, options)?;
+        trainer.engine.upload_model(model)?;
+        Ok(trainer)
+    }
+
+    fn without_model(
+        gpu: Arc<Gpu>,
+        shape: KernelShape,
+        config: TrainConfig,
+        dataset: &mut Dataset,
+        room: Room,
+        options: SchedulerOptions,
+    ) -> Result<Self> {
         let fixed = Fixed { extent: dataset.extent() };
         let max_gaussians = if config.max_gaussians > 0 { config.max_gaussians } else { u64::from(u32::MAX) };
-        let room = start_room(&gpu, dataset, &config, model.len(), options)?;
         let views =
             dataset.train.iter_mut().map(|view| train_view(view, config.mask_border)).collect::<Result<Vec<_>>>()?;
-        let mut engine = Engine::with_shape(gpu, shape, room, options)?;
-        engine.upload_model(model)?;
+        let engine = Engine::with_shape(gpu, shape, room, options)?;
         let order = ViewOrder::new(config.seed, views.len());
         Ok(Self {
             engine,
@@ -144,6 +160,7 @@ impl Trainer {
             separate: false,
             timing: None,
             counts_pairs: false,
+            prints: Vec::new(),
         })
     }
 

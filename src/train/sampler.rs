@@ -29,6 +29,15 @@ impl ViewOrder {
         Self { random: stream(seed, VIEW_STREAM), views, stack: Vec::new() }
     }
 
+    /// The order after so many draws.
+    pub fn after(seed: u64, views: usize, draws: u32) -> Self {
+        let mut order = Self::new(seed, views);
+        (0..draws).for_each(|_| {
+            order.draw();
+        });
+        order
+    }
+
     /// The next view.
     pub fn draw(&mut self) -> usize {
         if self.stack.is_empty() {

@@ -2,5 +2,6 @@
 
 mod edges;
 mod processes;
+mod resume;
 mod shapes;
 mod training;

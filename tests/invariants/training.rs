@@ -35,7 +35,8 @@ pub fn config(label_rule: LabelRule) -> TrainConfig {
     }
 }
 
-fn small() -> Dataset {
+/// Five views with masks.
+pub fn small() -> Dataset {
     let options = SynthOptions { preset: Preset::Simple, width: 72, height: 52, views: 5, points: 400, seed: 3 };
     dataset(&options, 0)
 }
@@ -155,7 +156,7 @@ fn a_memory_limit_bounds_the_gaussians() {
 }
 
 /// Gaussians with a label in the bytes of a PLY.
-fn labels_of(ply: &[u8]) -> usize {
+pub fn labels_of(ply: &[u8]) -> usize {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("model.ply");
     std::fs::write(&path, ply).expect("a file");

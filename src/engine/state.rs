@@ -1,0 +1,71 @@
+//! What of the device's memory a training needs to go on: the Model buffers, as they are. All others start as zeros, here
+//! as in a training that goes on.
+
+use super::Engine;
+use crate::error::Result;
+use crate::io::checkpoint::Plane;
+use crate::plan::{Buf, TABLE};
+use std::collections::BTreeMap;
+
+/// An attribute of the model, its first and its second moments, and the degree from which on it is in use.
+const ATTRIBUTES: [([Buf; 3], u32); 7] = [
+    ([Buf::MEANS, Buf::M_MEANS, Buf::U_MEANS], 0),
+    ([Buf::SCALES, Buf::M_SCALES, Buf::U_SCALES], 0),
+    ([Buf::QUATS, Buf::M_QUATS, Buf::U_QUATS], 0),
+    ([Buf::SH0, Buf::M_SH0, Buf::U_SH0], 0),
+    ([Buf::SH1, Buf::M_SH1, Buf::U_SH1], 1),
+    ([Buf::SH2, Buf::M_SH2, Buf::U_SH2], 2),
+    ([Buf::SH3, Buf::M_SH3, Buf::U_SH3], 3),
+];
+
+/// The buffers of the state of a training with this degree of the spherical harmonics.
+fn buffers(sh_degree: u32, labels: bool) -> Vec<Buf> {
+    let attributes = ATTRIBUTES.iter().filter(|(_, degree)| *degree <= sh_degree).flat_map(|(bufs, _)| *bufs);
+    let labels = labels.then_some(Buf::LABELS);
+    attributes.chain([Buf::DENSIFY_STATS]).chain(labels).collect()
+}
+
+fn words(buf: Buf) -> u32 {
+    TABLE[buf.index()].element_bytes / 4
+}
+
+/// Says what is wrong with planes that are to be the state of `count` Gaussians. `labels` is true with masks.
+pub fn check(planes: &[Plane], count: u32, sh_degree: u32, labels: bool) -> Result<(), String> {
+    let mut given: BTreeMap<&str, &Plane> = planes.iter().map(|plane| (plane.name.as_str(), plane)).collect();
+    for buf in buffers(sh_degree, labels) {
+        let (name, words) = (TABLE[buf.index()].name, words(buf));
+        let plane = given.remove(name).ok_or_else(|| format!("the plane {name} is missing"))?;
+        let rows = plane.data.len() as u64 / u64::from(plane.words.max(1));
+        if (plane.words, rows) != (words, u64::from(count)) {
+            return Err(format!(
+                "the plane {name} has {rows} rows of {} words, {count} of {words} are expected",
+                plane.words
+            ));
+        }
+    }
+    given.keys().next().map_or(Ok(()), |name| Err(format!("there is a plane {name}, which nothing needs")))
+}
+
+impl Engine {
+    /// Reads the state; nothing may be in flight.
+    pub fn download_state(&mut self, sh_degree: u32) -> Result<Vec<Plane>> {
+        let count = self.gaussian_count as usize;
+        let planes = buffers(sh_degree, self.room.labels.is_some()).into_iter().map(|buf| {
+            let data = self.sched.download(buf, 0, 0, count * words(buf) as usize)?;
+            Ok(Plane { name: TABLE[buf.index()].name.to_owned(), words: words(buf), data })
+        });
+        planes.collect()
+    }
+
+    /// Puts a state that [`check`] has nothing against into the memory of a new engine.
+    pub fn upload_state(&mut self, count: u32, planes: &[Plane]) -> Result<()> {
+        self.make_room_for_gaussians(u64::from(count))?;
+        for plane in planes {
+            if let Some(index) = TABLE.iter().position(|decl| decl.name == plane.name) {
+                self.sched.upload(Buf(index as u16), 0, 0, &plane.data)?;
+            }
+        }
+        self.gaussian_count = count;
+        Ok(())
+    }
+}

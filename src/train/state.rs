@@ -1,0 +1,246 @@
+//! Everything that a training needs to go on as if it had never stopped, and its file.
+//!
+//! What is not here follows from what is: learning rates and degrees from the step, the order of the views and sampled
+//! objects from the seed and the step, gradients and votes from the next step's own passes.
+
+use super::sampler::ViewOrder;
+use super::{TrainConfig, Trainer, room};
+use crate::engine::{Sizes, state};
+use crate::error::{Error, Result};
+use crate::gpu::Gpu;
+use crate::io::checkpoint::{Checkpoint, Plane};
+use crate::pass::KernelShape;
+use crate::scene::{Camera, Dataset, LabelMap, Occluders, Photo};
+use crate::sched::SchedulerOptions;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// A training between two steps.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TrainState {
+    /// The labelgs that wrote it.
+    pub labelgs: String,
+    /// Device, driver and subgroup size; other ones round differently.
+    pub device: String,
+    /// Steps done.
+    pub step: u32,
+    /// Steps that updated the parameters, which the moments are corrected by.
+    pub updates: u32,
+    /// Gaussians.
+    pub gaussians: u32,
+    /// Votes were counted before.
+    pub labelled_once: bool,
+    /// Memory has bounded the number of Gaussians.
+    pub memory_bounds: bool,
+    /// How far memory had grown.
+    pub sizes: Sizes,
+    /// The configuration, as TOML in the file: there every float is read back as it was.
+    #[serde(with = "as_toml")]
+    pub config: TrainConfig,
+    /// The training views, in their order.
+    pub views: Vec<ViewPrint>,
+    /// By name of the view: the occluders of its objects.
+    pub occluders: BTreeMap<String, Occluders>,
+    /// How the run was started.
+    pub run: RunFacts,
+    /// Parameters, moments, statistics and labels.
+    #[serde(skip)]
+    pub planes: Vec<Plane>,
+    /// The file that it was read from, for messages.
+    #[serde(skip)]
+    pub path: PathBuf,
+}
+
+/// What a run was given besides its configuration.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RunFacts {
+    /// Folder of the masks.
+    pub masks: Option<String>,
+    /// Most bytes of the device's memory.
+    pub memory_limit: Option<u64>,
+    /// What the occluders that it started with were made from.
+    pub occlusion: Option<String>,
+}
+
+/// What a view is told apart by.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ViewPrint {
+    /// Name.
+    pub name: String,
+    /// Width and height, px.
+    pub size: [u32; 2],
+    /// CRC-32 of pose and intrinsics.
+    pub camera: u32,
+    /// CRC-32 of the photo's pixels.
+    pub photo: u32,
+    /// CRC-32 of the mask's ids.
+    pub mask: Option<u32>,
+}
+
+impl ViewPrint {
+    fn new(name: &str, camera: &Camera, photo: Option<&Photo>, mask: Option<&LabelMap>) -> Self {
+        let intrinsics = [camera.fx, camera.fy, camera.cx, camera.cy];
+        let pose = camera.rotation.to_cols_array().into_iter().chain(camera.translation.to_array());
+        let numbers: Vec<u8> = pose.chain(intrinsics).flat_map(f64::to_le_bytes).collect();
+        Self {
+            name: name.to_owned(),
+            size: [camera.width, camera.height],
+            camera: crc32fast::hash(&numbers),
+            photo: photo.map_or(0, |photo| crc32fast::hash(photo.rgba.as_flattened())),
+            mask: mask.map(|mask| crc32fast::hash(bytemuck::cast_slice(&mask.ids))),
+        }
+    }
+}
+
+/// The configuration as text: JSON is read back to the last digit only almost always.
+mod as_toml {
+    use super::TrainConfig;
+    use serde::{Deserialize, Deserializer, Serializer, de, ser};
+
+    pub fn serialize<S: Serializer>(config: &TrainConfig, to: S) -> Result<S::Ok, S::Error> {
+        let text = toml::to_string(config).map_err(ser::Error::custom)?;
+        if toml::from_str::<TrainConfig>(&text).as_ref() != Ok(config) {
+            return Err(ser::Error::custom("the configuration is not read back as it was written"));
+        }
+        to.serialize_str(&text)
+    }
+
+    pub fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<TrainConfig, D::Error> {
+        toml::from_str(&String::deserialize(from)?).map_err(de::Error::custom)
+    }
+}
+
+impl TrainState {
+    /// Writes the checkpoint, whole or not at all.
+    pub fn write(self, path: &Path) -> Result<()> {
+        let meta = serde_json::to_value(&self).map_err(|error| Error::Bug(format!("checkpoint: {error}")))?;
+        Checkpoint { meta, planes: self.planes }.write(path)
+    }
+
+    /// Reads a checkpoint. One that is damaged, of another version or not to be made sense of is an error that says why.
+    pub fn read(path: &Path) -> Result<Self> {
+        let file = Checkpoint::read(path)?;
+        let odd = |problem: String| Error::data(path, "contents", problem);
+        let state: Self = serde_json::from_value(file.meta).map_err(|error| odd(error.to_string()))?;
+        let state = Self { planes: file.planes, path: path.to_owned(), ..state };
+        state.config.check().map_err(|error| odd(error.to_string()))?;
+        if state.updates > state.step {
+            return Err(odd(format!("{} updates in {} steps", state.updates, state.step)));
+        }
+        let labels = state.masks_given();
+        state::check(&state.planes, state.gaussians, state.config.sh_degree, labels).map_err(odd)?;
+        Ok(state)
+    }
+
+    /// True if views had masks.
+    pub fn masks_given(&self) -> bool {
+        self.views.iter().any(|view| view.mask.is_some())
+    }
+
+    /// Refuses a scene that is not the one of the checkpoint, with the first thing that differs.
+    fn check_scene(&self, scene: &Path, views: &[ViewPrint]) -> Result<()> {
+        let masks = |views: &[ViewPrint]| views.iter().any(|view| view.mask.is_some());
+        let (then, now) = (masks(&self.views), masks(views));
+        if then != now {
+            let had = |masks| if masks { "masks" } else { "no masks" };
+            let problem = format!("{} was made with {}, now there are {}", self.path.display(), had(then), had(now));
+            return Err(Error::usage("--masks", problem));
+        }
+        let refuse = |view: &str, what: &str| {
+            let cure = "resume with the scene as it was, or train without --resume";
+            Err(Error::data(scene, view, format!("{what} {}; {cure}", self.path.display())))
+        };
+        if self.views.len() != views.len() {
+            return refuse("", &format!("has {} training views, {} are in", views.len(), self.views.len()));
+        }
+        for (then, now) in self.views.iter().zip(views) {
+            let what = match () {
+                () if then.name != now.name => &format!("is in the place of {} in", then.name),
+                () if then.size != now.size || then.camera != now.camera => "has another camera than in",
+                () if then.photo != now.photo => "has another photo than in",
+                () if then.mask != now.mask => "has another mask than in",
+                () => continue,
+            };
+            return refuse(&now.name, what);
+        }
+        Ok(())
+    }
+}
+
+impl Trainer {
+    /// The training as it is now, once the steps in flight are done.
+    pub fn state(&mut self) -> Result<TrainState> {
+        self.drain()?;
+        let print =
+            |view: &super::TrainView| ViewPrint::new(&view.name, &view.camera, Some(&view.photo), view.mask.as_ref());
+        if self.prints.is_empty() {
+            self.prints = self.views.iter().map(print).collect();
+        }
+        Ok(TrainState {
+            labelgs: env!("CARGO_PKG_VERSION").to_owned(),
+            device: device(self.engine.sched().gpu()),
+            step: self.step,
+            updates: self.updates,
+            gaussians: self.gaussian_count(),
+            labelled_once: self.labelled_once,
+            memory_bounds: self.memory_bounds,
+            sizes: self.engine.sizes(),
+            config: self.config.clone(),
+            views: self.prints.clone(),
+            occluders: self.occluders(),
+            run: RunFacts::default(),
+            planes: self.engine.download_state(self.config.sh_degree)?,
+            path: PathBuf::new(),
+        })
+    }
+
+    /// Goes on where `state` stopped, to the same bits on the same device as if it had not. `dataset.train` gives its
+    /// photos and masks away; it must be what the state was made with.
+    pub fn resume(gpu: Arc<Gpu>, dataset: &mut Dataset, state: TrainState, options: SchedulerOptions) -> Result<Self> {
+        state.config.check()?;
+        let views = dataset.train.iter();
+        let prints: Vec<ViewPrint> =
+            views.map(|v| ViewPrint::new(&v.name, &v.camera, v.photo.as_ref(), v.mask.as_ref())).collect();
+        state.check_scene(&dataset.root, &prints)?;
+        let (now, version) = (device(&gpu), env!("CARGO_PKG_VERSION"));
+        for (then, now) in [(&state.device, now.as_str()), (&state.labelgs, version)] {
+            if then != now {
+                tracing::warn!("{} was made with {then}, this is {now}: bits may differ", state.path.display());
+            }
+        }
+        let shape = KernelShape::new(gpu.subgroup_size(), gpu.is_cpu());
+        let room = room(dataset, &state.config, u64::from(state.gaussians))?;
+        if let Some(labels) = room.labels
+            && let Some(plane) = state.planes.iter().find(|plane| plane.name == "labels")
+            && let Some(label) = plane.data.iter().find(|&&label| label > labels.max_label)
+        {
+            let problem = format!("is {label}, the masks have ids up to {}", labels.max_label);
+            return Err(Error::data(&state.path, "a label", problem));
+        }
+        let mut trainer = Self::without_model(gpu, shape, state.config, dataset, room, options)?;
+        match trainer.engine.grow_to(state.sizes) {
+            // On a smaller device there is less room to grow.
+            Err(Error::OutOfMemory { .. }) => {}
+            other => other?,
+        }
+        trainer.engine.upload_state(state.gaussians, &state.planes)?;
+        trainer.set_occluders(&state.occluders);
+        trainer.order = ViewOrder::after(trainer.config.seed, trainer.views.len(), state.step);
+        (trainer.step, trainer.updates) = (state.step, state.updates);
+        (trainer.labelled_once, trainer.memory_bounds) = (state.labelled_once, state.memory_bounds);
+        trainer.prints = prints;
+        Ok(trainer)
+    }
+}
+
+/// What equal bits are promised for.
+fn device(gpu: &Gpu) -> String {
+    let found = gpu.capabilities();
+    let driver = format!("{} {}", found.driver_name, found.driver_info);
+    format!("{} ({driver}, subgroups of {})", found.name, gpu.subgroup_size())
+}

@@ -1,0 +1,335 @@
+//! `labelgs train` that is stopped, killed or out of space, and goes on with `--resume`.
+
+use crate::support::device;
+use assert_cmd::Command;
+use labelgs::io::checkpoint_folder::{self, Found};
+use labelgs::io::ply::read_gaussians;
+use labelgs::train::TrainState;
+use rand::{Rng, SeedableRng};
+use rand_pcg::Pcg32;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Output, Stdio};
+use std::time::{Duration, Instant};
+
+/// Kills of the test; `LABELGS_TEST_KILLS` asks for more.
+const KILLS: u32 = 6;
+/// Steps of a run.
+const STEPS: u32 = 40;
+
+const SETTINGS: &str = "
+iterations = 40
+checkpoint_every = 4
+preview_every = 7
+label_from = 4
+vote_every = 12
+occlusion_every = 15
+sh_degree_interval = 6
+densify_from = 5
+densify_interval = 8
+densify_grad_threshold = 1e-4
+opacity_reset_interval = 20
+opacity_reset_margin = 10
+";
+
+/// A scene, and a folder for compiled pipelines, which make starts quick.
+struct Place {
+    folder: tempfile::TempDir,
+}
+
+impl Place {
+    fn new() -> Self {
+        let place = Self { folder: tempfile::tempdir().expect("a folder") };
+        let scene = place.text("scene");
+        let made = ["synth", &scene, "--preset", "simple", "--size", "64x48", "--views", "6", "--points", "200"];
+        assert!(place.labelgs(&made).status.success());
+        std::fs::write(place.path("settings.toml"), SETTINGS).expect("settings");
+        place
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+
+    fn text(&self, name: &str) -> String {
+        self.path(name).to_str().expect("UTF-8").to_owned()
+    }
+
+    fn labelgs(&self, args: &[&str]) -> Output {
+        let mut command = Command::cargo_bin("labelgs").expect("the tool is built");
+        command.env("LABELGS_VALIDATION", "off").env("LABELGS_CACHE", self.path("cache"));
+        command.args(args).output().expect("it runs")
+    }
+
+    /// A run in the folder `out` with further flags.
+    fn train(&self, out: &str, flags: &[&str]) -> Vec<String> {
+        let typed = ["train", &self.text("scene"), "-o", &self.text(out), "--masks", &self.text("scene/masks")];
+        typed.iter().chain(flags).map(|&part| part.to_owned()).collect()
+    }
+
+    fn trained(&self, out: &str, flags: &[&str]) -> Output {
+        let args = self.train(out, flags);
+        self.labelgs(&args.iter().map(String::as_str).collect::<Vec<_>>())
+    }
+
+    fn spawned(&self, args: &[String]) -> Child {
+        let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_labelgs"));
+        command.env("LABELGS_VALIDATION", "off").env("LABELGS_CACHE", self.path("cache")).args(args);
+        command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().expect("it runs")
+    }
+
+    fn settings(&self) -> String {
+        self.text("settings.toml")
+    }
+
+    fn checkpoints(&self, out: &str) -> Vec<Found> {
+        checkpoint_folder::list(&self.path(out)).expect("a list")
+    }
+
+    fn model(&self, out: &str, step: u32) -> Vec<u8> {
+        let path = self.path(out).join(format!("point_cloud/iteration_{step}/point_cloud.ply"));
+        std::fs::read(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
+    }
+}
+
+fn stderr(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+#[track_caller]
+fn succeeded(output: &Output) -> String {
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(output));
+    stderr(output)
+}
+
+/// All files below a folder.
+fn files(folder: &Path) -> Vec<PathBuf> {
+    let entries = std::fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path());
+    entries.flat_map(|path| if path.is_dir() { files(&path) } else { vec![path] }).collect()
+}
+
+/// Every file that a killed run left can be read by its name, but for temporary ones, which have another.
+fn all_whole(out: &Path) {
+    for path in files(out) {
+        let name = path.file_name().expect("a name").to_string_lossy().into_owned();
+        if name.starts_with(".labelgs-") && name.ends_with(".tmp") {
+            continue;
+        }
+        let read = || std::fs::read_to_string(&path).expect("text");
+        let whole = match path.extension().and_then(|extension| extension.to_str()) {
+            Some("ckpt") => TrainState::read(&path).map(drop).map_err(|error| error.to_string()),
+            Some("ply") => read_gaussians(&path).map(drop).map_err(|error| error.to_string()),
+            Some("json") => serde_json::from_str::<serde_json::Value>(&read()).map(drop).map_err(|e| e.to_string()),
+            Some("toml") => toml::from_str::<toml::Table>(&read()).map(drop).map_err(|error| error.to_string()),
+            Some("png") => image::open(&path).map(drop).map_err(|error| error.to_string()),
+            _ => Err("what is this?".to_owned()),
+        };
+        whole.unwrap_or_else(|error| panic!("{}: {error}", path.display()));
+    }
+}
+
+fn wait_until(child: &mut Child, what: impl Fn() -> bool) {
+    let start = Instant::now();
+    while !what() && child.try_wait().expect("a child").is_none() {
+        assert!(start.elapsed() < Duration::from_secs(60), "nothing happens");
+        std::thread::sleep(Duration::from_millis(2));
+    }
+}
+
+#[test]
+fn kills_at_any_moment_cost_no_bit() {
+    let Some(_turn) = device() else { return };
+    let place = Place::new();
+    let start = Instant::now();
+    succeeded(&place.trained("straight", &["--config", &place.settings()]));
+    let run = start.elapsed();
+    let kills = std::env::var("LABELGS_TEST_KILLS").ok().and_then(|kills| kills.parse().ok()).unwrap_or(KILLS);
+    let mut random = Pcg32::seed_from_u64(u64::from(kills));
+    let mut steps = Vec::new();
+    for kill in 0..kills {
+        let newest = || place.checkpoints("out").first().map_or(0, |found| found.number);
+        let before = newest();
+        let args = place.train("out", &["--config", &place.settings(), "--resume"]);
+        let mut child = place.spawned(&args);
+        // Every second one dies anywhere, the others in or after writing.
+        if kill % 2 == 0 {
+            wait_until(&mut child, || newest() > before);
+            std::thread::sleep(Duration::from_micros(random.random_range(0..40_000)));
+        } else {
+            std::thread::sleep(run.mul_f64(random.random_range(0.0..1.0)));
+        }
+        child.kill().expect("killed or done");
+        child.wait().expect("a child");
+        all_whole(&place.path("out"));
+        steps.push(place.checkpoints("out").first().map_or(0, |found| found.step));
+    }
+    assert!(steps.is_sorted() && steps.iter().any(|&step| step > 0), "{steps:?}");
+    let text = succeeded(&place.trained("out", &["--resume"]));
+    assert!(text.contains("goes on after step"), "{text}");
+    assert!(place.model("out", STEPS) == place.model("straight", STEPS), "killed after {steps:?}: the models differ");
+    assert!(files(&place.path("out")).iter().all(|path| path.extension().is_some_and(|name| name != "tmp")));
+    assert_eq!(place.checkpoints("out").iter().map(|found| found.step).collect::<Vec<_>>(), [STEPS]);
+    assert_eq!(place.checkpoints("straight").len(), 1, "a run that has ended leaves its last one");
+}
+
+#[cfg(unix)]
+#[test]
+fn a_signal_leaves_a_checkpoint_and_two_end_at_once() {
+    let Some(_turn) = device() else { return };
+    let place = Place::new();
+    let long = ["--iterations", "5000", "--checkpoint-every", "0", "--save-at", "3", "--preview-every", "0"];
+    let send = |child: &Child, signal: &str| {
+        let sent = std::process::Command::new("kill").args([signal, &child.id().to_string()]).status();
+        assert!(sent.expect("kill").success());
+    };
+    for (signal, status, out) in [("-INT", 130, "int"), ("-TERM", 143, "term")] {
+        let mut child = place.spawned(&place.train(out, &long));
+        wait_until(&mut child, || place.path(out).join("point_cloud/iteration_3/point_cloud.ply").exists());
+        assert!(place.checkpoints(out).is_empty());
+        send(&child, signal);
+        assert_eq!(child.wait().expect("a child").code(), Some(status));
+        let found = place.checkpoints(out);
+        let state = TrainState::read(&found[0].path).expect("a whole one");
+        assert!(found.len() == 1 && state.step == found[0].step && state.step >= 3);
+        assert!(!place.model(out, state.step).is_empty());
+    }
+    let mut child = place.spawned(&place.train("twice", &long));
+    wait_until(&mut child, || place.path("twice/point_cloud/iteration_3/point_cloud.ply").exists());
+    send(&child, "-INT");
+    std::thread::sleep(Duration::from_millis(1));
+    send(&child, "-INT");
+    assert_eq!(child.wait().expect("a child").code(), Some(130));
+    all_whole(&place.path("twice"));
+}
+
+#[test]
+fn a_resumed_run_says_what_changed_and_what_cannot() {
+    let Some(_turn) = device() else { return };
+    let place = Place::new();
+    let nothing = place.trained("out", &["--resume", "--iterations", "6", "--checkpoint-every", "2"]);
+    assert!(succeeded(&nothing).contains("no checkpoint: training starts at step 1"), "{}", stderr(&nothing));
+    let first = place.model("out", 6);
+    let refused = |flags: &[&str], status: i32, parts: &[&str]| {
+        let output = place.trained("out", &[&["--resume"], flags].concat());
+        assert_eq!(output.status.code(), Some(status), "{flags:?}: {}", stderr(&output));
+        let text = stderr(&output);
+        assert!(parts.iter().all(|part| text.contains(part)), "{flags:?}: {text}");
+    };
+    refused(&["--seed", "4"], 2, &["--seed: 0 in the checkpoint, now 4"]);
+    refused(&["--sh-degree", "1"], 2, &["--sh-degree: 3 in the checkpoint, now 1"]);
+    refused(&["--label-rule", "main"], 2, &["--label-rule"]);
+    refused(&["--no-test"], 2, &["--test-every: 8 in the checkpoint, now 0"]);
+    refused(&["--iterations", "5"], 2, &["--iterations", "6 steps"]);
+    assert_eq!(place.model("out", 6), first);
+
+    // The masks are found by what the checkpoint says.
+    let args = ["train", &place.text("scene"), "-o", &place.text("out"), "--resume", "--iterations", "9"];
+    let text = succeeded(&place.labelgs(&[&args[..], &["--feature-lr", "0.003", "--memory-limit", "2G"]].concat()));
+    for part in ["--iterations: 6 in the checkpoint, now 9", "--feature-lr: 0.0025 in", "--memory-limit: not set in"] {
+        assert!(text.contains(part), "{part} is not in {text}");
+    }
+    assert!(!place.model("out", 9).is_empty());
+    let text = succeeded(&place.trained("out", &["--resume", "-q"]));
+    assert!(!text.contains("now"), "what was changed is in the new checkpoint: {text}");
+
+    // Masks that are not those of the checkpoint.
+    std::fs::rename(place.path("scene/masks"), place.path("masks")).expect("moved");
+    refused(&[], 3, &["masks"]);
+    let mask = place.path("masks/001.png");
+    std::fs::copy(place.path("masks/002.png"), &mask).expect("another mask");
+    let moved = ["train", &place.text("scene"), "-o", &place.text("out"), "--resume", "--masks", &place.text("masks")];
+    let output = place.labelgs(&moved);
+    assert_eq!(output.status.code(), Some(3), "{}", stderr(&output));
+    assert!(stderr(&output).contains("001.png: has another mask than in"), "{}", stderr(&output));
+}
+
+#[test]
+fn a_damaged_checkpoint_gives_way_to_the_one_before() {
+    let Some(_turn) = device() else { return };
+    let place = Place::new();
+    let flags = ["--iterations", "9", "--checkpoint-every", "3", "--save-at", "8"];
+    succeeded(&place.trained("straight", &flags));
+    let mut child = place.spawned(&place.train("out", &flags));
+    wait_until(&mut child, || place.checkpoints("out").first().is_some_and(|found| found.step >= 6));
+    child.kill().expect("killed");
+    child.wait().expect("a child");
+    let found = place.checkpoints("out");
+    assert!(found.len() >= 2, "{found:?}");
+    let whole = std::fs::read(&found[0].path).expect("bytes");
+    std::fs::write(&found[0].path, &whole[..whole.len() / 2]).expect("cut");
+    let text = succeeded(&place.trained("out", &["--resume"]));
+    let name = found[0].path.file_name().expect("a name").to_string_lossy().into_owned();
+    assert!(text.contains(&name) && text.contains("cut short") && text.contains("before it is tried"), "{text}");
+    assert!(place.model("out", 9) == place.model("straight", 9));
+    // Nothing whole: nothing is trained over what may be saved by hand.
+    for found in place.checkpoints("out") {
+        std::fs::write(&found.path, b"labelgs").expect("damaged");
+    }
+    let output = place.trained("out", &["--resume"]);
+    assert_eq!(output.status.code(), Some(3), "{}", stderr(&output));
+}
+
+/// A bound on the size of files stands for a full disk: the model fits, a checkpoint does not.
+#[cfg(target_os = "linux")]
+#[test]
+fn without_space_the_run_ends_and_the_last_checkpoint_stays() {
+    let Some(_turn) = device() else { return };
+    let place = Place::new();
+    let flags = ["--iterations", "4", "--checkpoint-every", "2", "--preview-every", "0"];
+    succeeded(&place.trained("out", &flags));
+    let old = place.checkpoints("out");
+    let mut args = place.train("out", &["--resume", "--iterations", "8"]);
+    // Blocks of 512 bytes; what is written beyond fails with an error, as the signal is ignored.
+    let size = std::fs::metadata(&old[0].path).expect("a file").len() / 512 - 1;
+    let script = format!("trap '' XFSZ; ulimit -f {size}; exec \"$@\"");
+    args.insert(0, env!("CARGO_BIN_EXE_labelgs").to_owned());
+    let mut shell = std::process::Command::new("sh");
+    shell.env("LABELGS_VALIDATION", "off").env("LABELGS_CACHE", "off").args(["-c", &script, "sh"]).args(args);
+    let output = shell.output().expect("a shell");
+    let text = succeeded(&output);
+    assert!(text.contains("cannot be written") && text.contains("training goes on"), "{text}");
+    assert_eq!(place.checkpoints("out"), old, "the last one is there");
+    TrainState::read(&old[0].path).expect("and whole");
+    assert!(!place.model("out", 8).is_empty());
+    assert!(files(&place.path("out")).iter().all(|path| path.extension().is_some_and(|name| name != "tmp")));
+    // What stands in the folder's place is found before any work.
+    std::fs::create_dir_all(place.path("blocked")).expect("a folder");
+    std::fs::write(place.path("blocked/checkpoints"), b"").expect("a file");
+    let output = place.trained("blocked", &flags);
+    assert_eq!(output.status.code(), Some(7), "{}", stderr(&output));
+    assert!(stderr(&output).contains("checkpoints"), "{}", stderr(&output));
+}
+
+#[test]
+fn an_output_that_was_deleted_meanwhile_is_made_anew() {
+    let Some(_turn) = device() else { return };
+    let place = Place::new();
+    let flags = ["--iterations", "30", "--checkpoint-every", "3", "--preview-every", "0"];
+    let args = place.train("out", &flags);
+    let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_labelgs"));
+    command.env("LABELGS_VALIDATION", "off").env("LABELGS_CACHE", place.path("cache")).args(args);
+    let mut child = command.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().expect("it runs");
+    wait_until(&mut child, || !place.checkpoints("out").is_empty());
+    // A checkpoint may be written at the same time.
+    while std::fs::remove_dir_all(place.path("out")).is_err() {}
+    let text = succeeded(&child.wait_with_output().expect("a child"));
+    assert!(text.contains("was deleted meanwhile"), "{text}");
+    assert!(!place.model("out", 30).is_empty() && place.path("out/config.toml").exists());
+    assert_eq!(place.checkpoints("out").iter().map(|found| found.step).collect::<Vec<_>>(), [30]);
+    all_whole(&place.path("out"));
+}
+
+/// A run that starts anew where another one was has its own checkpoints in the end.
+#[test]
+fn checkpoints_of_an_earlier_run_stay_until_there_are_new_ones() {
+    let Some(_turn) = device() else { return };
+    let place = Place::new();
+    succeeded(&place.trained("out", &["--iterations", "9", "--checkpoint-every", "9"]));
+    let old = place.checkpoints("out");
+    let text = succeeded(&place.trained("out", &["--iterations", "3", "--checkpoint-every", "0"]));
+    assert!(text.contains("of an earlier run") && text.contains("--resume goes on"), "{text}");
+    assert_eq!(place.checkpoints("out"), old);
+    succeeded(&place.trained("out", &["--iterations", "5", "--checkpoint-every", "2"]));
+    let steps: Vec<u32> = place.checkpoints("out").iter().map(|found| found.step).collect();
+    assert_eq!(steps, [5], "the run of 9 steps is nobody's business any more");
+    assert!(succeeded(&place.trained("out", &["--resume"])).contains("goes on after step 5"));
+}
