@@ -3,6 +3,7 @@
 //! `tools/bench/run COMMAND` builds with optimisation and runs one of them. Each prints its tables and writes JSON and
 //! charts into `--output`. With `--small` it does the same in seconds on tiny scenes, as the tests run it.
 
+mod compiler;
 mod device;
 mod features;
 mod kernels;

@@ -25,14 +25,16 @@ pub fn timed<T>(work: impl FnOnce() -> Result<T>) -> Result<(T, Cost)> {
     Ok((done, Cost { wall: ms(wall.elapsed()), cpu: ms(cpu_time().saturating_sub(cpu)) }))
 }
 
+/// Processor time of this process, all threads; 0 where the system does not tell.
 #[cfg(unix)]
-fn cpu_time() -> Duration {
+pub fn cpu_time() -> Duration {
     let time = rustix::time::clock_gettime(rustix::time::ClockId::ProcessCPUTime);
     Duration::new(time.tv_sec.try_into().unwrap_or(0), time.tv_nsec.try_into().unwrap_or(0))
 }
 
+/// The system does not tell.
 #[cfg(not(unix))]
-fn cpu_time() -> Duration {
+pub fn cpu_time() -> Duration {
     Duration::ZERO
 }
 

@@ -6,12 +6,12 @@ use crate::measure::require;
 use crate::reference::Rules;
 use crate::reference::blend::{Trace, smallest_over_pixels, trace};
 use crate::reference::project::Splat;
+use crate::rig::splat_of;
 use crate::trained::{labelled_model, timing_config, trainer, without_masks};
 use labelgs::Result;
 use labelgs::gpu::Gpu;
 use labelgs::plan::Buf;
 use labelgs::synth::{self, Preset, SynthOptions};
-use std::f64::consts::LN_2;
 use std::sync::Arc;
 
 /// Pixels with a decision nearer than this to its threshold are left out.
@@ -53,7 +53,7 @@ fn compare(bed: &mut Bed, visible: usize, (width, height): (u32, u32)) -> Result
     let first = floats - lanes;
     let order = bed.sched.download::<u32>(Buf::DEPTH_VALUES_A, 0, 0, visible)?;
     let records = bed.sched.download::<[f32; 12]>(Buf::SPLATS, 0, 0, visible)?;
-    let splats: Vec<Splat> = order.iter().zip(&records).map(|(&gaussian, record)| splat(gaussian, record)).collect();
+    let splats: Vec<Splat> = order.iter().zip(&records).map(|(&gaussian, record)| splat_of(gaussian, record)).collect();
     let v_image = bed.sched.download::<f32>(bed.buffers.v_image, 0, 0, width * height * lanes)?;
     let v_features = bed.sched.download::<f32>(bed.buffers.v_features, 0, 0, visible * floats)?;
     let value =
@@ -103,17 +103,4 @@ fn compare(bed: &mut Bed, visible: usize, (width, height): (u32, u32)) -> Result
 /// `wanted` of feature_forward.comp.
 fn wanted(x: usize, y: usize, channel: usize) -> f32 {
     (0.37 * channel as f32 + 0.013 * x as f32 + 0.007 * y as f32).fract()
-}
-
-/// A splat from its record (glsl/include/record.glsl).
-fn splat(gaussian: u32, record: &[f32; 12]) -> Splat {
-    let [x, y, a, b, c, log2_o, red, green, blue, depth, _, _] = record.map(f64::from);
-    Splat {
-        gaussian: gaussian as usize,
-        depth,
-        mean2d: [x, y],
-        conic: [-2.0 * LN_2 * a, -LN_2 * b, -2.0 * LN_2 * c],
-        opacity: log2_o.exp2(),
-        colour: [red, green, blue],
-    }
 }

@@ -1,20 +1,10 @@
 //! The feature kernels, compiled when the benchmark runs, and the buffers and passes that they add to a plain step.
 
+use crate::compiler::spirv;
 use labelgs::pass::{KernelShape, Variant, training_step};
 use labelgs::plan::{Buf, BufferDecl, Capacity, Class, Domain, Grid, PassDecl, PassList, TABLE, TexelFormat, Work};
 use labelgs::shaders::{Access, BindingDesc, BindingKind, ShaderDesc, SpecDesc, constants};
 use labelgs::{Error, Result};
-use shaderc::{CompileOptions, Compiler, EnvVersion, OptimizationLevel, ResolvedInclude, ShaderKind, TargetEnv};
-
-/// Includes of the engine that the kernels share.
-const INCLUDES: [(&str, &str); 6] = [
-    ("layout.glsl", include_str!("../../../glsl/include/layout.glsl")),
-    ("constants.glsl", include_str!("../../../glsl/include/constants.glsl")),
-    ("step.glsl", include_str!("../../../glsl/include/step.glsl")),
-    ("dispatch.glsl", include_str!("../../../glsl/include/dispatch.glsl")),
-    ("blend_tile.glsl", include_str!("../../../glsl/include/blend_tile.glsl")),
-    ("subgroup.glsl", include_str!("../../../glsl/include/subgroup.glsl")),
-];
 
 /// Bytes of the push constants: first vec4 of the channels, vec4 a Gaussian.
 const PUSH_BYTES: u32 = 8;
@@ -83,21 +73,7 @@ fn compile(
     uses_subgroups: bool,
     texel: bool,
 ) -> Result<&'static ShaderDesc> {
-    let failed = |error: shaderc::Error| Error::Bug(format!("{name}: {error}"));
-    let compiler = Compiler::new().map_err(failed)?;
-    let mut options = CompileOptions::new().map_err(failed)?;
-    options.set_target_env(TargetEnv::Vulkan, EnvVersion::Vulkan1_2 as u32);
-    options.set_optimization_level(OptimizationLevel::Performance);
-    if texel {
-        options.add_macro_definition("TEXEL", None);
-    }
-    options.set_include_callback(|file, _kind, _from, _depth| {
-        let found = INCLUDES.iter().find(|(name, _)| *name == file);
-        let (name, content) = found.ok_or_else(|| format!("there is no {file}"))?;
-        Ok(ResolvedInclude { resolved_name: (*name).to_owned(), content: (*content).to_owned() })
-    });
-    let words = compiler.compile_into_spirv(source, ShaderKind::Compute, name, "main", Some(&options));
-    let words = words.map_err(failed)?;
+    let spirv = spirv(name, source, texel)?;
     let describe = |(binding, &(name, seen)): (usize, &(&'static str, Seen))| {
         let (kind, access, element_bytes) = match seen {
             Seen::Read(bytes) => (BindingKind::Storage, Access::Read, bytes),
@@ -115,7 +91,7 @@ fn compile(
     Ok(Box::leak(Box::new(ShaderDesc {
         stem: name,
         name,
-        spirv: Box::leak(words.as_binary_u8().to_vec().into_boxed_slice()),
+        spirv,
         bindings: Box::leak(bindings.into_boxed_slice()),
         push_bytes,
         spec: Box::leak(specs.into_boxed_slice()),

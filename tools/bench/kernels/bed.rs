@@ -3,6 +3,7 @@
 use super::errors::Outcome;
 use super::modes::Mode;
 use super::patch::Replacements;
+use crate::measure::cpu_time;
 use crate::rig::Rig;
 use crate::support::device::Turn;
 use crate::support::scenes::Scene;
@@ -99,7 +100,7 @@ impl<'a> Bed<'a> {
             job::upload(&mut rig.engine, 0, uniforms, &rig.view, &rig.job, &rig.config)?;
             let before = cpu_time();
             rig.engine.sched_mut().run(self.lists[list], 0)?;
-            let cpu = cpu_time().zip(before).map(|(after, before)| after.saturating_sub(before));
+            let cpu = cpu_time().saturating_sub(before);
             let report = rig.engine.report(0)?;
             if rig.engine.recover(&report)? {
                 self.lists.clear();
@@ -111,7 +112,7 @@ impl<'a> Bed<'a> {
             }
             let named = self.stages[list].iter().cloned().zip(times);
             let items = named.map(|((stage, name), (_, ns))| (stage, name, ns)).collect();
-            return Ok(Sample { items, cpu, counters: report.counters });
+            return Ok(Sample { items, cpu: (!cpu.is_zero()).then_some(cpu), counters: report.counters });
         }
     }
 
@@ -138,16 +139,4 @@ impl<'a> Bed<'a> {
         }
         Err(Error::Check("the default mode is not the step of the engine".to_owned()))
     }
-}
-
-/// Processor time of this process, user and system, all threads.
-#[cfg(unix)]
-fn cpu_time() -> Option<Duration> {
-    let time = rustix::time::clock_gettime(rustix::time::ClockId::ProcessCPUTime);
-    Some(Duration::new(time.tv_sec.try_into().ok()?, time.tv_nsec.try_into().ok()?))
-}
-
-#[cfg(not(unix))]
-fn cpu_time() -> Option<Duration> {
-    None
 }

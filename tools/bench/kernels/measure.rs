@@ -173,7 +173,7 @@ pub fn scene(gpu: &Arc<Gpu>, plan: &Plan, modes: &[(Mode, Replacements)]) -> Res
         splats: counters.visible_count,
         instances: counters.instance_count,
         pairs: counters.walked_splats() * u64::from(tile),
-        load: super::load(),
+        load: crate::measure::load(),
         modes,
         passes,
         rounding,

@@ -64,14 +64,9 @@ struct File<'a> {
     scenes: &'a [SceneResult],
 }
 
-/// Processes that waited for a processor on the average of the last minute, where the system tells.
-fn load() -> Option<f64> {
-    std::fs::read_to_string("/proc/loadavg").ok()?.split_whitespace().next()?.parse().ok()
-}
-
 /// Runs it.
 pub fn run(args: &KernelArgs) -> Result<()> {
-    let load_before = load();
+    let load_before = super::measure::load();
     let gpu = super::device::open()?;
     let modes = compile(&gpu, args)?;
     let plain: Vec<Mode> = modes.iter().map(|(mode, _)| *mode).collect();

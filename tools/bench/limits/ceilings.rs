@@ -1,12 +1,12 @@
 //! What the device does at best, measured with kernels that do one thing.
 
+use crate::compiler::spirv;
+use labelgs::Result;
 use labelgs::gpu::Gpu;
 use labelgs::plan::{Buf, BufferDecl, Capacity, Class, Domain, Grid, PassDecl, PassList, TexelFormat};
 use labelgs::sched::{Scheduler, SchedulerOptions};
 use labelgs::shaders::{Access, BindingDesc, BindingKind, ShaderDesc, SpecDesc};
-use labelgs::{Error, Result};
 use serde::Serialize;
-use shaderc::{CompileOptions, Compiler, EnvVersion, OptimizationLevel, ShaderKind, TargetEnv};
 use std::sync::Arc;
 
 /// vec4 of the buffer that is copied, nearly 64 MiB: as many workgroups as a dispatch has at most.
@@ -118,19 +118,10 @@ fn compile(
     spec: Vec<SpecDesc>,
     texel: bool,
 ) -> Result<&'static ShaderDesc> {
-    let failed = |error: shaderc::Error| Error::Bug(format!("{name}: {error}"));
-    let compiler = Compiler::new().map_err(failed)?;
-    let mut options = CompileOptions::new().map_err(failed)?;
-    options.set_target_env(TargetEnv::Vulkan, EnvVersion::Vulkan1_2 as u32);
-    options.set_optimization_level(OptimizationLevel::Performance);
-    if texel {
-        options.add_macro_definition("TEXEL", None);
-    }
-    let words = compiler.compile_into_spirv(source, ShaderKind::Compute, name, "main", Some(&options));
     Ok(Box::leak(Box::new(ShaderDesc {
         stem: name,
         name,
-        spirv: Box::leak(words.map_err(failed)?.as_binary_u8().to_vec().into_boxed_slice()),
+        spirv: spirv(name, source, texel)?,
         bindings: Box::leak(bindings.into_boxed_slice()),
         push_bytes: 0,
         spec: Box::leak(spec.into_boxed_slice()),
