@@ -49,6 +49,24 @@ pub fn median(values: impl IntoIterator<Item = f64>) -> f64 {
     }
 }
 
+/// Median and least of some numbers.
+#[derive(Clone, Copy, Debug, Default, Serialize)]
+pub struct Spread {
+    /// Median.
+    pub median: f64,
+    /// Least.
+    pub min: f64,
+}
+
+/// Of the numbers; 0 without any.
+pub fn spread(values: Vec<f64>) -> Spread {
+    if values.is_empty() {
+        return Spread::default();
+    }
+    let min = values.iter().copied().fold(f64::INFINITY, f64::min);
+    Spread { median: median(values), min }
+}
+
 /// Medians of wall clock and processor time.
 pub fn median_cost(costs: &[Cost]) -> Cost {
     Cost { wall: median(costs.iter().map(|cost| cost.wall)), cpu: median(costs.iter().map(|cost| cost.cpu)) }

@@ -7,6 +7,7 @@ use super::modes::Mode;
 use super::passes::{PassRow, rows_of};
 use super::patch::Replacements;
 use super::scenes::{self, Kind, Plan};
+use crate::measure::{Spread, spread};
 use crate::reference::Rules;
 use labelgs::gpu::Gpu;
 use labelgs::pass::Stage;
@@ -20,27 +21,6 @@ use std::sync::Arc;
 const UNTOUCHED: [Stage; 4] = [Stage::Loss, Stage::Optimise, Stage::Labels, Stage::Report];
 /// Decisions nearer than this to their threshold may go the other way in f32 (tests/pass/step.rs).
 const SURE: f64 = 2e-5;
-
-/// Median and least of some numbers.
-#[derive(Clone, Copy, Debug, Default, Serialize)]
-pub struct Spread {
-    /// Median.
-    pub median: f64,
-    /// Least.
-    pub min: f64,
-}
-
-/// Of the numbers; 0 without any.
-pub fn spread(mut values: Vec<f64>) -> Spread {
-    values.sort_by(f64::total_cmp);
-    let middle = values.len() / 2;
-    let median = match values.len() {
-        0 => 0.0,
-        n if n % 2 == 1 => values[middle],
-        _ => 0.5 * (values[middle - 1] + values[middle]),
-    };
-    Spread { median, min: values.first().copied().unwrap_or(0.0) }
-}
 
 /// A mode on a scene.
 #[derive(Clone, Debug, Serialize)]

@@ -1,8 +1,8 @@
 //! Each pass alone: what the passes of a step take, and per item.
 
 use super::bed::Sample;
-use super::measure::{Spread, spread};
 use super::scenes::Plan;
+use crate::measure::{Spread, spread};
 use labelgs::pass::Stage;
 use labelgs::shaders::structs::Counters;
 use serde::Serialize;
