@@ -10,6 +10,7 @@ struct Projection {
     vec3 m0, m1;    // rows of M = J W R S; cov2d = M M^T + blur
     vec3 cov;       // xx, xy, yy with blur
     vec3 conic;     // A, B, C
+    vec3 q_m0, q_m1; // rows of Q M, Q being the matrix of the conic
 };
 
 mat3 rotation_from_quat(vec4 q) { // unit (w, x, y, z)
@@ -44,6 +45,9 @@ Projection project_gaussian(StepUniforms step, vec3 mean, vec3 log_scale, vec4 q
     float det = dot(crossed, crossed) + COV2D_BLUR * (a + c) + COV2D_BLUR * COV2D_BLUR;
     p.cov = vec3(a + COV2D_BLUR, b, c + COV2D_BLUR);
     p.conic = vec3(p.cov.z, -b, p.cov.x) / det;
+    // The adjugate of M M^T times M is (m1 x n, n x m0): along a needle, where conic and M cancel, no digit is lost.
+    p.q_m0 = (COV2D_BLUR * p.m0 + cross(p.m1, crossed)) / det;
+    p.q_m1 = (COV2D_BLUR * p.m1 + cross(crossed, p.m0)) / det;
     return p;
 }
 

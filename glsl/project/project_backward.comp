@@ -77,11 +77,9 @@ void main() {
     // conic -> covariance -> M
     vec3 q = p.conic;
     vec3 v = vec3(a.z, 0.5 * a.w, b.x); // symmetric matrix of the conic's gradient
-    vec2 q0 = q.xy, q1 = q.yz;
-    vec2 r0 = vec2(dot(q0, v.xy), dot(q0, v.yz)), r1 = vec2(dot(q1, v.xy), dot(q1, v.yz)); // Q V
-    vec3 g = -vec3(dot(r0, q0), dot(r0, q1), dot(r1, q1));                               // -Q V Q
-    vec3 v_m0 = 2.0 * (g.x * p.m0 + g.y * p.m1), v_m1 = 2.0 * (g.y * p.m0 + g.z * p.m1);
-    vec3 v_log_scale = v_m0 * p.m0 + v_m1 * p.m1;
+    vec3 e0 = -2.0 * (v.x * p.q_m0 + v.y * p.q_m1), e1 = -2.0 * (v.y * p.q_m0 + v.z * p.q_m1); // -2 V Q M
+    vec3 v_m0 = q.x * e0 + q.y * e1, v_m1 = q.y * e0 + q.z * e1;                             // -2 Q V Q M
+    vec3 v_log_scale = p.q_m0 * e0 + p.q_m1 * e1; // diagonal of M^T v_M
     vec3 w0 = v_m0 * p.sigma, w1 = v_m1 * p.sigma;
     vec3 v_t0 = p.rotation * w0, v_t1 = p.rotation * w1;
     mat3 v_r = mat3(w0.x * p.t0 + w1.x * p.t1, w0.y * p.t0 + w1.y * p.t1, w0.z * p.t0 + w1.z * p.t1);
