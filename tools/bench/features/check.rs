@@ -14,8 +14,9 @@ use labelgs::plan::Buf;
 use labelgs::synth::{self, Preset, SynthOptions};
 use std::sync::Arc;
 
-/// Pixels with a decision nearer than this to its threshold are left out.
-const SURE: f64 = 1e-4;
+/// Pixels with a decision nearer than this to its threshold are left out, and gradients of splats in them: both sides
+/// decide from the same f32 records, so only the rounding of exponents and transmittances stands between them.
+const SURE: f64 = 1e-5;
 /// Largest error of a feature: sums of some hundred f32 terms of at most 1; exponents are f32 too.
 const FORWARD: f64 = 1e-4;
 /// The same of a gradient, in units of the sum of its terms' sizes.
