@@ -7,12 +7,13 @@
 #include "ellipse.glsl"
 // emit_instances — write one (tile key, splat) pair for every tile that a splat touches.
 // Work:    64 splats a workgroup. A splat's instances are contiguous ("slots"): first those of the scene layer, then
-//          those of its object layer; keys are layer * tile_count + tile. Variant object: all are of layer 1.
+//          those of its object layer; keys are layer * tile_count + tile.
 // Reads:   step, counters, failure; splats [V,3]; tiles_touched [V]; instance_offsets [V];
 //          variant labels: gaussian_from_splat [V], labels [N], layer_from_label
 // Writes:  tile_keys [I]; splat_from_instance [I]
 // Mirror:  tests/reference/tile.rs::emit_instances
 
+layout(constant_id = 18) const uint LAYER = 0; // of what is not in a layer of its object
 layout(local_size_x = 64) in;
 READ1(0, StepUniforms, step);
 READ1(1, Counters, counters);
@@ -50,10 +51,7 @@ void main() {
     uint written = 0u, tx = rect.x_min, ty = rect.y_min;
     for (uint k = 0u; k < rect.count; k++) {
         if (written < count && tile_touched(u, tx, ty, r0.xy, q, r1.y)) {
-            uint tile = ty * u.tiles_x + tx;
-#ifdef OBJECT
-            tile += u.tile_count;
-#endif
+            uint tile = LAYER * u.tile_count + ty * u.tiles_x + tx;
             tile_keys[first + written] = tile;
             splat_from_instance[first + written] = s;
 #ifdef LABELS

@@ -1,31 +1,13 @@
 //! The model between its host form and the device's planes of vec4.
 
 use crate::error::Result;
+use crate::pass::ATTRIBUTES;
 use crate::plan::Buf;
 use crate::scene::Gaussians;
 use crate::sched::Scheduler;
 
 /// Bands above degree 0: plane, vec4 per Gaussian, first coefficient among the rest, coefficients.
 const BANDS: [(Buf, usize, usize, usize); 3] = [(Buf::SH1, 3, 0, 3), (Buf::SH2, 4, 3, 5), (Buf::SH3, 6, 8, 7)];
-
-/// Planes that hold state of the optimiser.
-const STATE: [Buf; 15] = [
-    Buf::M_MEANS,
-    Buf::M_SCALES,
-    Buf::M_QUATS,
-    Buf::M_SH0,
-    Buf::M_SH1,
-    Buf::M_SH2,
-    Buf::M_SH3,
-    Buf::U_MEANS,
-    Buf::U_SCALES,
-    Buf::U_QUATS,
-    Buf::U_SH0,
-    Buf::U_SH1,
-    Buf::U_SH2,
-    Buf::U_SH3,
-    Buf::DENSIFY_STATS,
-];
 
 /// Writes the planes; optimiser state becomes 0.
 pub fn upload(sched: &mut Scheduler, model: &Gaussians, labels: bool) -> Result<()> {
@@ -47,7 +29,7 @@ pub fn upload(sched: &mut Scheduler, model: &Gaussians, labels: bool) -> Result<
         }
         sched.upload(plane, 0, 0, &words)?;
     }
-    for plane in STATE {
+    for plane in ATTRIBUTES.iter().flat_map(|a| [a.planes[1], a.planes[2]]).chain([Buf::DENSIFY_STATS]) {
         sched.fill(plane, 0)?;
     }
     if labels {

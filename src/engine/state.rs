@@ -4,23 +4,13 @@
 use super::Engine;
 use crate::error::Result;
 use crate::io::checkpoint::Plane;
+use crate::pass::ATTRIBUTES;
 use crate::plan::{Buf, TABLE};
 use std::collections::BTreeMap;
 
-/// An attribute of the model, its first and its second moments, and the degree from which on it is in use.
-const ATTRIBUTES: [([Buf; 3], u32); 7] = [
-    ([Buf::MEANS, Buf::M_MEANS, Buf::U_MEANS], 0),
-    ([Buf::SCALES, Buf::M_SCALES, Buf::U_SCALES], 0),
-    ([Buf::QUATS, Buf::M_QUATS, Buf::U_QUATS], 0),
-    ([Buf::SH0, Buf::M_SH0, Buf::U_SH0], 0),
-    ([Buf::SH1, Buf::M_SH1, Buf::U_SH1], 1),
-    ([Buf::SH2, Buf::M_SH2, Buf::U_SH2], 2),
-    ([Buf::SH3, Buf::M_SH3, Buf::U_SH3], 3),
-];
-
 /// The buffers of the state of a training with this degree of the spherical harmonics.
 fn buffers(sh_degree: u32, labels: bool) -> Vec<Buf> {
-    let attributes = ATTRIBUTES.iter().filter(|(_, degree)| *degree <= sh_degree).flat_map(|(bufs, _)| *bufs);
+    let attributes = ATTRIBUTES.iter().filter(|a| a.from_degree <= sh_degree).flat_map(|a| a.planes);
     let labels = labels.then_some(Buf::LABELS);
     attributes.chain([Buf::DENSIFY_STATS]).chain(labels).collect()
 }

@@ -10,18 +10,17 @@ use crate::plan::{Buf, Grid};
 /// Lists the (splat, tile) pairs, sorts them by layer and tile, and finds each tile's range. Returns the buffer that
 /// holds the slots (places before the sort) of the sorted pairs.
 pub fn bin_splats(b: &mut Builder) -> Buf {
-    let emit = if b.labels { emit_all_layers } else { emit_scene };
-    bin(b, emit)
+    if b.labels { bin(b, emit_all_layers) } else { bin_scene(b) }
 }
 
 /// The scene's splats alone, in the first of the layers that the list has.
 pub fn bin_scene(b: &mut Builder) -> Buf {
-    bin(b, emit_scene)
+    bin(b, |b| emit_layer(b, 0))
 }
 
 /// An object's splats, in layer 1 alone.
 pub fn bin_object(b: &mut Builder) -> Buf {
-    bin(b, emit_object)
+    bin(b, |b| emit_layer(b, 1))
 }
 
 fn bin(b: &mut Builder, emit: impl Fn(&mut Builder)) -> Buf {
@@ -53,22 +52,14 @@ fn emit_all_layers(b: &mut Builder) {
     } [tile_width: tile_width, tile_height: tile_height], over_splats());
 }
 
-fn emit_scene(b: &mut Builder) {
+/// All splats, in one layer.
+fn emit_layer(b: &mut Builder, layer: u32) {
     let (tile_width, tile_height) = (b.shape.tile_width, b.shape.tile_height);
     pass!(b, texel emit_instances {
         step: Buf::STEP, counters: Buf::COUNTERS, failure: Buf::FAILURE, splats: Buf::SPLATS,
         tiles_touched: Buf::TILES_TOUCHED, instance_offsets: Buf::INSTANCE_OFFSETS, tile_keys: Buf::TILE_KEYS_A,
         splat_from_instance: Buf::SPLAT_FROM_INSTANCE,
-    } [tile_width: tile_width, tile_height: tile_height], over_splats());
-}
-
-fn emit_object(b: &mut Builder) {
-    let (tile_width, tile_height) = (b.shape.tile_width, b.shape.tile_height);
-    pass!(b, texel emit_instances_object {
-        step: Buf::STEP, counters: Buf::COUNTERS, failure: Buf::FAILURE, splats: Buf::SPLATS,
-        tiles_touched: Buf::TILES_TOUCHED, instance_offsets: Buf::INSTANCE_OFFSETS, tile_keys: Buf::TILE_KEYS_A,
-        splat_from_instance: Buf::SPLAT_FROM_INSTANCE,
-    } [tile_width: tile_width, tile_height: tile_height], over_splats());
+    } [tile_width: tile_width, tile_height: tile_height, layer: layer], over_splats());
 }
 
 fn tile_ranges(b: &mut Builder, keys: Buf) {

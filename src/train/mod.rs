@@ -58,8 +58,10 @@ pub struct Trainer {
     memory_bounds: bool,
     /// Votes were counted before, so that masks can be compared with their outcome.
     labelled_once: bool,
+    /// Objects have passes of their own.
     separate: bool,
     timing: Option<timing::Timing>,
+    /// Blending counts the pairs that have a weight.
     counts_pairs: bool,
     /// What the views are told apart by; empty until somebody asks.
     prints: Vec<ViewPrint>,

@@ -4,4 +4,4 @@ mod edges;
 mod processes;
 mod resume;
 mod shapes;
-mod training;
+pub mod training;

@@ -91,7 +91,7 @@ fn same(what: &str, other: &Outcome, first: &Outcome) {
 }
 
 /// Far too small for the first step already.
-fn tiny(trainer: &mut Trainer) {
+pub fn tiny(trainer: &mut Trainer) {
     let engine = trainer.engine_mut();
     let old = *engine.sched().capacity();
     let layer_pixels = u64::from(engine.shape().tile_pixels());

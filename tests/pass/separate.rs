@@ -2,13 +2,14 @@
 
 use super::project::compare_rows;
 use super::rig::{GRADIENTS, MOMENTS_1, Rig};
+use crate::invariants::training::tiny;
 use crate::reference::Row;
 use crate::support::compare::{GradientBounds, Tolerance, check, close, exact};
 use crate::support::device;
 use crate::support::scenes::{Shape, scene};
 use labelgs::engine::{ListKey, Report};
 use labelgs::io::init::initial_gaussians;
-use labelgs::plan::{Buf, Capacity};
+use labelgs::plan::Buf;
 use labelgs::sched::SchedulerOptions;
 use labelgs::shaders::constants::NO_SPLAT;
 use labelgs::synth::{Preset, SynthOptions, dataset};
@@ -101,15 +102,6 @@ fn a_hidden_object_gets_no_gradient_of_others() {
     let key = separate(&rig);
     let apart = run(&mut rig, key);
     assert!(gradient_rows(&mut rig, &apart) == expected, "without label loss objects add nothing");
-}
-
-/// Too small for the first step, in every way.
-fn tiny(trainer: &mut Trainer) {
-    let engine = trainer.engine_mut();
-    let old = *engine.sched().capacity();
-    let layer_pixels = u64::from(engine.shape().tile_pixels());
-    let tiny = Capacity { instances: 100, trained_instances: 100, layer_tiles: 1, layer_pixels, ..old };
-    engine.sched_mut().set_capacity(tiny).expect("less fits too");
 }
 
 #[test]

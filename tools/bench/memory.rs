@@ -1,6 +1,7 @@
 //! Predicted against measured memory of training, on a device whose memory is the host's.
 
 use super::measure::write_json;
+use super::trained::timed_step;
 use super::{Common, device};
 use glam::{DMat3, DVec3};
 use labelgs::engine::Engine;
@@ -94,10 +95,7 @@ pub fn measure(count: u32, width: u32, height: u32) -> Result<()> {
 fn steps(trainer: &mut Trainer) -> Result<f64> {
     let mut seconds = 0.0;
     for _ in 0..STEPS {
-        let start = std::time::Instant::now();
-        trainer.step()?;
-        trainer.drain()?;
-        seconds = start.elapsed().as_secs_f64();
+        seconds = timed_step(trainer)?.1.wall / 1e3;
     }
     Ok(seconds)
 }

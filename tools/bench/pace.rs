@@ -1,6 +1,6 @@
 //! Steps of several trainings, timed in turn, so that a busy machine is equally busy for all of them.
 
-use super::measure::timed;
+use super::trained::{timed_step, timing_config};
 use labelgs::gpu::Gpu;
 use labelgs::pass::Stage;
 use labelgs::scene::{Dataset, Gaussians};
@@ -42,15 +42,9 @@ impl Pace {
         model: &Gaussians,
         label_samples: u32,
     ) -> Result<Self> {
-        let config = TrainConfig {
-            iterations: 1_000_000,
-            label_from: 1,
-            vote_every: 1_000_000,
-            occlusion_every: 1_000_000,
-            densify_from: u32::MAX,
-            label_samples: label_samples.max(1),
-            ..TrainConfig::default()
-        };
+        // Bands of colour come in as in any training.
+        let sh_degree_interval = TrainConfig::default().sh_degree_interval;
+        let config = TrainConfig { label_samples: label_samples.max(1), sh_degree_interval, ..timing_config() };
         let options = SchedulerOptions { timestamps: true, ..SchedulerOptions::default() };
         let mut trainer = Trainer::new(Arc::clone(gpu), config, &mut dataset, model, options)?;
         trainer.keep_times();
@@ -70,11 +64,7 @@ impl Pace {
 
     /// One step, waited for. Steps in which the driver compiles are run, and count for nothing.
     pub fn step(&mut self) -> Result<()> {
-        let (reports, cost) = timed(|| {
-            let mut reports = self.trainer.step()?;
-            reports.extend(self.trainer.drain()?);
-            Ok(reports)
-        })?;
+        let (reports, cost) = timed_step(&mut self.trainer)?;
         let (times, last) = (self.trainer.take_times(), reports.last());
         let (Some(times), Some(last)) = (times.last(), last) else {
             return Err(Error::Bug("a step that was waited for has no report".to_owned()));

@@ -7,7 +7,7 @@
 //! has its loss in the blend kernel. What does not: as in the reference, each pass visits all tiles of the image.
 
 use super::measure::{self, Cost, median, median_cost, require, table, timed};
-use super::trained::{Judge, labelled_model, start, timing_config, trainer, without_masks};
+use super::trained::{Judge, labelled_model, start, timed_step, timing_config, trainer, without_masks};
 use super::{Common, device};
 use labelgs::Result;
 use labelgs::gpu::Gpu;
@@ -147,11 +147,7 @@ fn time(gpu: &Arc<Gpu>, dataset: &Dataset, model: &Gaussians, plan: &Plan) -> Re
     let mut reports: [Vec<StepReport>; 3] = Default::default();
     for step in 0..plan.warm_up + plan.steps {
         for (index, trainer) in trainers.iter_mut().enumerate() {
-            let (done, cost) = timed(|| {
-                let mut done = trainer.step()?;
-                done.extend(trainer.drain()?);
-                Ok(done)
-            })?;
+            let (done, cost) = timed_step(trainer)?;
             if step >= plan.warm_up {
                 costs[index].push(cost);
                 reports[index].extend(done);

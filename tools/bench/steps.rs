@@ -1,24 +1,19 @@
 //! What a step with labels costs beside one without: by the area that masks cover, and by the number of objects.
 
-use super::measure::median;
-use super::measure::write_json;
+use super::measure::{median, write_json};
 use super::pace::{Pace, race};
-use super::trained::without_masks;
+use super::trained::{TEST_EVERY, plain_model, without_masks};
 use super::{Common, device};
 use labelgs::Result;
 use labelgs::engine::{Engine, Room};
 use labelgs::gpu::Gpu;
 use labelgs::infer::render::render;
-use labelgs::io::init;
 use labelgs::scene::{Dataset, Gaussians};
 use labelgs::sched::SchedulerOptions;
 use labelgs::synth::{self, SynthOptions};
-use labelgs::train::{TrainConfig, Trainer};
+use labelgs::train::TrainConfig;
 use serde_json::{Value, json};
 use std::sync::Arc;
-
-/// Held-out views of the made scenes.
-pub const TEST_EVERY: u32 = 8;
 
 /// Sizes of a run.
 struct Size {
@@ -40,7 +35,7 @@ pub fn run(common: &Common) -> Result<()> {
     let gpu = device::open()?;
     let options =
         SynthOptions { width: size.picture.0, height: size.picture.1, views: size.views, ..Default::default() };
-    let model = trained(&gpu, &options, size.training)?;
+    let model = plain_model(&gpu, &options, size.training)?;
     let first = by_area(&gpu, &options, &model, size.timed)?;
     let larger = SynthOptions { width: 2 * options.width, height: 2 * options.height, ..options };
     let second = by_number(&gpu, &larger, &model, &size)?;
@@ -48,18 +43,6 @@ pub fn run(common: &Common) -> Result<()> {
         &common.output.join("steps.json"),
         &json!({ "schema_version": 1, "by_area": first, "by_number": second }),
     )
-}
-
-/// The built-in scene after so many steps without masks.
-pub fn trained(gpu: &Arc<Gpu>, options: &SynthOptions, steps: u32) -> Result<Gaussians> {
-    let mut dataset = without_masks(&synth::dataset(options, TEST_EVERY));
-    let config = TrainConfig { iterations: steps, ..TrainConfig::default() };
-    let points = init::initial_gaussians(&dataset, config.seed, init::RANDOM_COUNT)?;
-    let mut trainer = Trainer::new(Arc::clone(gpu), config, &mut dataset, &points, SchedulerOptions::default())?;
-    for _ in 0..steps {
-        trainer.step()?;
-    }
-    trainer.model()
 }
 
 /// Masks as they are made, and masks that leave no pixel out.

@@ -1,25 +1,50 @@
 //! Trainings that benchmarks start from and time.
 
+use super::measure::{Cost, timed};
 use labelgs::Result;
 use labelgs::engine::{Engine, Room};
 use labelgs::gpu::Gpu;
 use labelgs::infer::edit::select::SURE;
 use labelgs::infer::score::evaluate::{Rendering, evaluate};
 use labelgs::infer::score::scores::MeanScores;
-use labelgs::io::initial_gaussians;
+use labelgs::io::init::{RANDOM_COUNT, initial_gaussians};
 use labelgs::scene::{Dataset, Gaussians, View};
 use labelgs::sched::SchedulerOptions;
-use labelgs::train::{TrainConfig, Trainer};
+use labelgs::synth::{self, SynthOptions};
+use labelgs::train::{StepReport, TrainConfig, Trainer};
 use std::sync::Arc;
+
+/// Every so many-th view of a made scene is held out.
+pub const TEST_EVERY: u32 = 8;
 
 /// The model that a training of the scene starts from.
 pub fn start(dataset: &Dataset, config: &TrainConfig) -> Result<Gaussians> {
-    initial_gaussians(dataset, config.seed, 1000)
+    initial_gaussians(dataset, config.seed, RANDOM_COUNT)
 }
 
 /// A trainer on a copy of the scene.
 pub fn trainer(gpu: &Arc<Gpu>, dataset: &Dataset, model: &Gaussians, config: TrainConfig) -> Result<Trainer> {
     Trainer::new(Arc::clone(gpu), config, &mut dataset.clone(), model, SchedulerOptions::default())
+}
+
+/// One step, waited for: what it reports and what it took.
+pub fn timed_step(trainer: &mut Trainer) -> Result<(Vec<StepReport>, Cost)> {
+    timed(|| {
+        let mut reports = trainer.step()?;
+        reports.extend(trainer.drain()?);
+        Ok(reports)
+    })
+}
+
+/// A made scene after so many steps without masks.
+pub fn plain_model(gpu: &Arc<Gpu>, options: &SynthOptions, steps: u32) -> Result<Gaussians> {
+    let dataset = without_masks(&synth::dataset(options, TEST_EVERY));
+    let config = TrainConfig { iterations: steps, ..TrainConfig::default() };
+    let mut trainer = trainer(gpu, &dataset, &start(&dataset, &config)?, config)?;
+    for _ in 0..steps {
+        trainer.step()?;
+    }
+    trainer.model()
 }
 
 /// A labelled model after so many steps.

@@ -9,7 +9,7 @@ mod check;
 mod kernels;
 
 use super::measure::{self, Cost, median, median_cost, require, table, timed};
-use super::trained::{labelled_model, timing_config, trainer, without_masks};
+use super::trained::{labelled_model, timed_step, timing_config, trainer, without_masks};
 use super::{Common, device};
 use kernels::{Buffers, Channels, Kernels, step_with_features};
 use labelgs::Result;
@@ -114,7 +114,7 @@ fn labelled_row(
     let mut costs = [Vec::new(), Vec::new()];
     for step in 0..warm_up + steps {
         for (trainer, costs) in [&mut plain, &mut labelled].into_iter().zip(&mut costs) {
-            let (_, cost) = timed(|| Ok((trainer.step()?, trainer.drain()?)))?;
+            let (_, cost) = timed_step(trainer)?;
             if step >= warm_up {
                 costs.push(cost);
             }

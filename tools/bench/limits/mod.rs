@@ -8,8 +8,7 @@ mod ceilings;
 
 use super::measure::{self, median, table};
 use super::pace::{Pace, race};
-use super::steps::{TEST_EVERY, trained};
-use super::trained::without_masks;
+use super::trained::{TEST_EVERY, plain_model, without_masks};
 use super::{Common, device};
 use ceilings::Ceilings;
 use labelgs::Result;
@@ -121,7 +120,7 @@ pub fn run(common: &Common) -> Result<()> {
         c.bytes / 1e9,
         c.dispatch * 1e6
     );
-    let model = trained(&gpu, &options, training)?;
+    let model = plain_model(&gpu, &options, training)?;
     let dataset = without_masks(&synth::dataset(&options, TEST_EVERY));
     let mut paces = [Pace::new("plain step", &gpu, dataset, &model, 0)?];
     race(&mut paces, timed)?;
