@@ -6,12 +6,14 @@
 //!
 //! ```text
 //! cli                    verbs: what is typed, what is decided
+//! selftest               the device against the reference, for tests and users
 //! train                  the loop over steps, and what happens between them
 //! infer    synth         pictures, scores, selections; a scene with every truth
 //! engine                 a device with a model in its memory
 //! sched                  executes plans: recordings, two slots in flight, transfers
 //! pass                   what the engine does, as lists of GPU passes; no Vulkan
 //! plan     io            sizes, places, barriers (pure); files
+//! reference              the method in f64, for comparisons
 //! shaders  gpu   scene   generated interfaces; a thin layer over Vulkan; plain host data
 //! error
 //! ```
@@ -48,8 +50,10 @@ pub mod infer;
 pub mod io;
 pub mod pass;
 pub mod plan;
+pub mod reference;
 pub mod scene;
 pub mod sched;
+pub mod selftest;
 pub mod shaders;
 pub mod synth;
 pub mod train;

@@ -285,3 +285,17 @@ fn from_a_scene_to_objects_and_pictures() {
         "no model in there"
     );
 }
+
+#[test]
+fn selftest_prints_a_row_for_each_check() {
+    let Some(_gpu) = turn() else { return };
+    let table = succeeds(&["selftest"]);
+    assert!(
+        table.contains("blend backward") && table.contains("training twice") && !table.contains("FAILED"),
+        "{table}"
+    );
+    let found = json(&succeeds(&["selftest", "--json"]));
+    assert_eq!(found["passed"], true);
+    let checks = found["checks"].as_array().expect("a list");
+    assert!(checks.len() > 20 && checks.iter().all(|check| check["error"].as_f64() <= Some(1.0)), "{found}");
+}

@@ -1,7 +1,7 @@
 //! Integration tests, one binary.
 
-#[allow(dead_code, reason = "mirrors are complete; not every test needs every part")]
-mod reference;
+use labelgs::reference;
+
 #[allow(dead_code, reason = "helpers are shared by tests that come and go")]
 mod support;
 
@@ -34,6 +34,7 @@ mod protocol;
 mod registry;
 mod sched;
 mod segments;
+mod selftest;
 mod shadergen;
 mod synth;
 mod track;

@@ -10,7 +10,7 @@
 // Writes:  depth_keys [N]: bits of z, or KEY_INVISIBLE; splat_from_gaussian [N] = NO_SPLAT
 // Math:    |cov2d| <= |J|^2 max(s)^2 + blur; radius where alpha falls to ALPHA_MIN. Conservative, never drops a splat
 //          that project_forward would give a tile. Variant object: of layer 1's object alone.
-// Mirror:  tests/reference/project.rs::cull
+// Mirror:  src/reference/project.rs::cull
 
 layout(local_size_x = 64) in;
 READ1(0, StepUniforms, step);

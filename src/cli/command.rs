@@ -17,6 +17,7 @@ use super::recolour::RecolourArgs;
 use super::relabel::RelabelArgs;
 use super::render::RenderArgs;
 use super::select::{ExtractArgs, SelectArgs};
+use super::selftest::SelftestArgs;
 use super::split_components::SplitArgs;
 use super::synth::SynthArgs;
 use super::train_args::TrainArgs;
@@ -93,6 +94,9 @@ pub enum Command {
     Synth(SynthArgs),
     /// Compare the Vulkan devices with what is required.
     Devices(DevicesArgs),
+    /// Check a device: every pass against float64, gradients, determinism.
+    #[command(after_help = "Example: labelgs selftest --device 0 && labelgs train scene -o out")]
+    Selftest(SelftestArgs),
     /// Print buffers, passes and barriers of a training step without running it.
     #[command(after_help = "Example: labelgs plan --gaussians 500k --size 960x540 --label-samples 10")]
     Plan(PlanArgs),

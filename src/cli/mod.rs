@@ -27,6 +27,7 @@ pub mod render;
 pub mod resume;
 pub mod scene;
 pub mod select;
+pub mod selftest;
 pub mod split_components;
 pub mod stdout;
 pub mod synth;
@@ -113,6 +114,7 @@ fn run(args: Vec<OsString>) -> Result<(), Exit> {
         Command::Occlusion(args) => occlusion::run(&args, &context),
         Command::Synth(args) => synth::run(&args, &context),
         Command::Devices(args) => devices::run(&args, &context),
+        Command::Selftest(args) => selftest::run(&args, &context),
         Command::Masks(args) => masks::run(&args, &context),
         Command::Plan(args) => plan::run(&args, &context),
         Command::Profile(args) => profile::run(&args, &context),

@@ -1,14 +1,15 @@
 //! Blending forward and backward, of the scene and of the object layers.
 
-use super::rig::{Rig, image_margins, prove};
-use crate::reference::blend::{self, Blended, Upstream, blend_backward, blend_forward, blend_layers_forward};
+use super::rig::{Rig, prove};
+use crate::reference::blend::{self, Upstream, blend_backward, blend_forward, blend_layers_forward};
 use crate::reference::loss::label_loss;
-use crate::reference::project::{Splat, SplatGradient};
+use crate::reference::project::Splat;
 use crate::reference::{Rules, tile};
-use crate::support::compare::{Band, GradientBounds, Tolerance, Verdict, close, close_with_band, exact, gradients};
+use crate::support::compare::{Band, GradientBounds, Tolerance, close, exact};
 use crate::support::device;
 use crate::support::scenes::{Scene, Shape, scene};
 use labelgs::plan::Buf;
+use labelgs::selftest::judge;
 
 /// Faint to opaque, so that pixels stop and alphas are clamped.
 pub fn opaque_scene(seed: u64) -> Scene {
@@ -19,16 +20,6 @@ pub fn opaque_scene(seed: u64) -> Scene {
 const CUT: Band = Band { width: 2e-5, flip: 0.01, ratio: 0.001 };
 /// Sums of some 50 f32 products; 4.1e-7 seen.
 const COLOUR: Tolerance = Tolerance { absolute: 6.5e-7, relative: 0.0 };
-
-/// Colours and transmittance of each pixel.
-fn picture(image: &Blended) -> Vec<f64> {
-    image.pixels.iter().flat_map(|p| [p.colour[0], p.colour[1], p.colour[2], p.transmittance]).collect()
-}
-
-fn compare_picture(actual: &[[f32; 4]], expected: &Blended) -> Verdict {
-    let actual: Vec<f64> = actual.as_flattened().iter().map(|&v| f64::from(v)).collect();
-    close_with_band(&actual, &picture(expected), &image_margins(expected, 4), (COLOUR, CUT), |_, _| true)
-}
 
 /// The splat at `last` of each pixel's tile list, +1; 0 for none.
 fn last_splats(rig: &mut Rig) -> Vec<usize> {
@@ -65,7 +56,7 @@ fn blend_forward_of_the_scene() {
         let sure: Vec<usize> = (0..image.len()).filter(|&i| expected.pixels[i].margins.image() > CUT.width).collect();
         let (a, e): (Vec<usize>, Vec<usize>) = sure.iter().map(|&i| (last[i], expected.pixels[i].last)).unzip();
         exact(&a, &e)?;
-        compare_picture(&image, &expected)
+        judge::picture(&image, &expected, (COLOUR, CUT))
     });
     // The list of a render blends the same picture.
     rig.render();
@@ -88,7 +79,7 @@ fn blend_forward_main_of_a_render() {
     let weight_depth = rig.get::<[f32; 2]>(Buf::MAIN_WEIGHT_DEPTH, pixels);
     prove("blend_forward_main", &["alpha_min", "alpha_max", "transmittance_min"], |rules| {
         let expected = blend_forward(rules, &splats, size, background);
-        compare_picture(&image, &expected)?;
+        judge::picture(&image, &expected, (COLOUR, CUT))?;
         let sure = |i: &usize| expected.pixels[*i].margins.image().min(expected.pixels[*i].margins.main) > CUT.width;
         let sure: Vec<usize> = (0..pixels).filter(sure).collect();
         assert!(sure.len() * 100 > pixels * 99, "{} of {pixels} pixels are sure", sure.len());
@@ -113,29 +104,6 @@ const BOUNDS: GradientBounds = GradientBounds {
     bias: 4e-7,
 };
 
-/// Each kind of float of the splats' gradients on its own.
-pub fn compare_splat_gradients(
-    actual: &[SplatGradient],
-    expected: &[SplatGradient],
-    margins: &[f64],
-    bounds: GradientBounds,
-) -> Verdict {
-    let sure: Vec<usize> = (0..actual.len()).filter(|&i| margins[i] > SURE).collect();
-    assert!(sure.len() * 10 > actual.len() * 7, "{} of {} splats are sure", sure.len(), actual.len());
-    let pick = |of: &[SplatGradient], kind: usize| -> Vec<f64> {
-        let floats = |v: &SplatGradient| match kind {
-            0 => v.mean2d.to_vec(),
-            1 => v.conic.to_vec(),
-            2 => vec![v.opacity],
-            _ => v.colour.to_vec(),
-        };
-        sure.iter().flat_map(|&i| floats(&of[i])).collect()
-    };
-    super::project::all(["mean2d", "conic", "opacity", "colour"].into_iter().enumerate().map(|(kind, name)| {
-        gradients(&pick(actual, kind), &pick(expected, kind), bounds).map_err(|text| format!("{name}: {text}"))
-    }))
-}
-
 #[test]
 fn blend_backward_and_gather_of_the_scene() {
     let Some(turn) = device() else { return };
@@ -146,7 +114,7 @@ fn blend_backward_and_gather_of_the_scene() {
     let actual = rig.splat_gradients(&splats);
     prove("blend_backward", &["alpha_min", "alpha_max", "transmittance_min"], |rules| {
         let expected = blend_backward(rules, &splats, size, background, &v_image);
-        compare_splat_gradients(&actual, &expected.values, &expected.margins, BOUNDS)
+        judge::splat_gradients(&actual, &expected.values, (&expected.margins, SURE), BOUNDS)
     });
 }
 
@@ -198,7 +166,7 @@ fn object_layers_equal_filtered_renders() {
             }
         }
         let margins: Vec<f64> = expected.margins.iter().zip(&kinks).map(|(a, b)| a.min(*b)).collect();
-        compare_splat_gradients(&actual, &expected.values, &margins, BOUNDS)
+        judge::splat_gradients(&actual, &expected.values, (&margins, SURE), BOUNDS)
     });
 }
 

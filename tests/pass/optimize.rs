@@ -1,37 +1,19 @@
 //! The optimiser, densification and the opacity reset.
 
 use super::rig::{MOMENTS_1, MOMENTS_2, PARAMETERS, Rig, prove};
+use crate::reference::Row;
 use crate::reference::adam::{Optimised, Rates, adam};
 use crate::reference::densify::{Origin, Population, densify, mark, opacity_reset};
 use crate::reference::model::ROW_FLOATS;
-use crate::reference::{Group, Row};
-use crate::support::compare::{Tolerance, Verdict, check, close, exact};
+use crate::support::compare::{Tolerance, check, close, exact};
 use crate::support::device;
 use crate::support::scenes::{Shape, population, scene};
 use labelgs::engine::ListKey;
 use labelgs::plan::Buf;
 use labelgs::scene::Gaussians;
+use labelgs::selftest::judge;
 use labelgs::shaders::structs::StepUniforms;
 use labelgs::train::job::Fixed;
-
-/// Rounding of an f32 parameter, and of its update: a few roundings, and the host's bias correction, which takes 0.999 as
-/// the nearest f32 (1.3e-5 of 1 - 0.999).
-fn compare_updates(actual: &[Optimised], expected: &[Optimised], rates: &Rates) -> Verdict {
-    let mut pairs = (Vec::new(), Vec::new());
-    for (a, e) in actual.iter().zip(expected) {
-        let (a, e) = ([a.row, a.m, a.u].map(|r| r.floats()), [e.row, e.m, e.u].map(|r| r.floats()));
-        for (group, rate) in Group::ALL.into_iter().zip(rates.0) {
-            for i in group.range() {
-                // In units of the largest error that is expected.
-                let of_m = 1e-6 * e[1][i].abs() + 3e-6 * e[2][i].sqrt(); // two terms that may cancel
-                let units = [1e-7 * e[0][i].abs() + 1e-5 * rate, of_m + 1e-30, 1e-6 * e[2][i] + 1e-36];
-                (0..3).for_each(|k| pairs.0.push((a[k][i] - e[k][i]) / units[k]));
-                pairs.1.extend([0.0; 3]);
-            }
-        }
-    }
-    close(&pairs.0, &pairs.1, Tolerance { absolute: 1.0, relative: 0.0 })
-}
 
 fn states(rig: &mut Rig) -> Vec<Optimised> {
     let count = rig.scene.gaussians.len();
@@ -54,14 +36,14 @@ fn adam_of_every_attribute() {
         steps.push((step, rig.uniforms(), before, rig.gradient_rows(), states(&mut rig)));
     }
     prove("adam", &["adam_beta1", "adam_beta2", "adam_eps"], |rules| {
-        super::project::all(steps.iter().map(|(step, u, before, gradients, after)| {
+        judge::all(steps.iter().map(|(step, u, before, gradients, after)| {
             let [means, opacity] = [u.rate_means[0], u.rate_means[3]];
             let rest = u.rate_sh_rest;
             let rates =
                 Rates([means, u.rate_quats, u.rate_scales, opacity, u.rate_sh0, rest, rest, rest].map(f64::from));
             let mirror = |(state, gradient)| adam(rules, &rates, *step, state, gradient);
             let expected: Vec<Optimised> = before.iter().zip(gradients).map(mirror).collect();
-            compare_updates(after, &expected, &rates)
+            judge::updates(after, &expected, &rates)
         }))
     });
 }
@@ -140,7 +122,7 @@ fn densify_case(step: u32, bearing: &[&str]) {
     let mut rig = Rig::new(turn, s, true);
     rig.engine.make_room_for_gaussians(1001).expect("room for all children");
     let uniforms = densifying(&mut rig, &before, step);
-    let upload = |rig: &mut Rig| rig.engine.sched_mut().upload(Buf::STEP, 0, 0, &[uniforms]).expect("upload");
+    let upload = |rig: &mut labelgs::selftest::rig::Rig| rig.engine.sched_mut().upload(Buf::STEP, 0, 0, &[uniforms]);
     let counted = rig.run(ListKey::DensifyCount, upload).counters;
     let marks = rig.get::<u32>(Buf::CHILDREN_COUNTS, before.model.rows.len());
     let applied = rig.run(ListKey::DensifyApply, upload).counters;
@@ -189,7 +171,7 @@ fn opacity_reset_of_a_population() {
     s.gaussians = gaussians(&before);
     let mut rig = Rig::new(turn, s, true);
     let uniforms = densifying(&mut rig, &before, 3000);
-    rig.run(ListKey::OpacityReset, |rig| rig.engine.sched_mut().upload(Buf::STEP, 0, 0, &[uniforms]).expect("upload"));
+    rig.run(ListKey::OpacityReset, |rig| rig.engine.sched_mut().upload(Buf::STEP, 0, 0, &[uniforms]));
     let after = states(&mut rig);
     prove("opacity reset", &["reset_opacity"], |rules| {
         let mut pairs = (Vec::new(), Vec::new());

@@ -1,15 +1,16 @@
 //! Culling, compaction, order, projection, and the projection's gradient.
 
 use super::rig::{GRADIENTS, Rig, prove};
-use crate::reference::model::{ROW_FLOATS, flatten};
+use crate::reference::model::ROW_FLOATS;
 use crate::reference::project::{Splat, SplatGradient, near_margin, project_backward, project_forward, sigmoid};
 use crate::reference::scan::compact;
 use crate::reference::sort::radix_sort;
-use crate::reference::{Group, Row, Rules, tile};
-use crate::support::compare::{GradientBounds, Summary, Tolerance, Verdict, check, close, exact, gradients};
+use crate::reference::{Rules, tile};
+use crate::support::compare::{GradientBounds, Tolerance, check, close, exact};
 use crate::support::device;
 use crate::support::scenes::{Scene, Shape, scene};
 use labelgs::plan::Buf;
+use labelgs::selftest::judge;
 use labelgs::shaders::constants::KEY_INVISIBLE;
 
 /// Half of the Gaussians far outside, so that slopes are clamped and many are culled; some behind the near plane.
@@ -22,18 +23,6 @@ pub fn wide_scene(seed: u64, sh_degree: u32) -> Scene {
     }
     s.gaussians.opacities.iter_mut().step_by(7).for_each(|v| *v -= 4.0);
     s
-}
-
-/// (a, e) pairs into one verdict.
-pub fn all(verdicts: impl IntoIterator<Item = Verdict>) -> Verdict {
-    let mut worst = Summary::default();
-    for verdict in verdicts {
-        let summary = verdict?;
-        let (flips, whole) = (worst.flips + summary.flips, worst.whole.max(summary.whole));
-        worst = if summary.worst > worst.worst { summary } else { worst };
-        (worst.flips, worst.whole) = (flips, whole);
-    }
-    Ok(worst)
 }
 
 /// The device drops nothing that counts, and keeps nothing at or behind the near plane or too faint.
@@ -80,18 +69,6 @@ fn visible_gaussians_in_depth_order() {
     check("splat_from_gaussian", exact(&rig.get::<u32>(Buf::SPLAT_FROM_GAUSSIAN, count), &splat_of));
 }
 
-/// Centre, shape relative to its size, log2 of the opacity, colour, depth.
-fn splat_floats(splat: &Splat, scale: &Splat) -> [f64; 10] {
-    let (size_a, size_c) = (scale.conic[0].sqrt(), scale.conic[2].sqrt());
-    let [x, y] = splat.mean2d;
-    // Far outside of the image a px is not worth what it is inside.
-    let [fx, fy] = scale.mean2d.map(|v| 1.0 + (v / 50.0).abs());
-    let [a, b, c] = splat.conic;
-    let [red, green, blue] = splat.colour;
-    let shape = [a / (size_a * size_a), b / (size_a * size_c), c / (size_c * size_c)];
-    [x / fx, y / fy, shape[0], shape[1], shape[2], splat.opacity.log2(), red, green, blue, splat.depth]
-}
-
 #[test]
 fn project_forward_of_each_degree() {
     for sh_degree in 0..=3 {
@@ -105,10 +82,8 @@ fn project_forward_of_each_degree() {
             let expected: Vec<Splat> = (splats.iter())
                 .map(|s| project_forward(rules, &camera, &model, s.gaussian).map_or(Splat::default(), |p| p.splat))
                 .collect();
-            let floats =
-                |of: &[Splat]| of.iter().zip(&expected).flat_map(|(s, e)| splat_floats(s, e)).collect::<Vec<_>>();
             // Centres are some 50 px times the roundings of a quotient; 8.9e-6 seen.
-            close(&floats(&splats), &floats(&expected), Tolerance { absolute: 1.4e-5, relative: 0.0 })
+            judge::splats(&splats, &expected, Tolerance { absolute: 1.4e-5, relative: 0.0 })
         });
     }
 }
@@ -121,15 +96,6 @@ const BOUNDS: GradientBounds = GradientBounds {
     angle: 1.1e-12,
     bias: 1.1e-6,
 };
-
-/// Each group of floats on its own: their magnitudes have nothing to do with each other.
-pub fn compare_rows(actual: &[Row], expected: &[Row], degree: u32, bounds: GradientBounds) -> Verdict {
-    let active = Group::ALL.into_iter().take(5 + degree as usize);
-    all(active.map(|group| {
-        gradients(&flatten(actual, group), &flatten(expected, group), bounds)
-            .map_err(|text| format!("{group:?}: {text}"))
-    }))
-}
 
 #[test]
 fn project_backward_of_each_degree() {
@@ -152,7 +118,7 @@ fn project_backward_of_each_degree() {
                     expected.push(project_backward(rules, &camera, &model, splat.gaussian, &v_splats[place]));
                 }
             }
-            compare_rows(&found, &expected, sh_degree, BOUNDS)
+            judge::rows(&found, &expected, sh_degree, BOUNDS)
         });
     }
 }

@@ -1,6 +1,5 @@
 //! Objects in passes of their own against all layers in one traversal: the same step, up to the order of sums.
 
-use super::project::compare_rows;
 use super::rig::{GRADIENTS, MOMENTS_1, Rig};
 use crate::invariants::training::tiny;
 use crate::reference::Row;
@@ -11,6 +10,7 @@ use labelgs::engine::{ListKey, Report};
 use labelgs::io::init::initial_gaussians;
 use labelgs::plan::Buf;
 use labelgs::sched::SchedulerOptions;
+use labelgs::selftest::judge;
 use labelgs::shaders::constants::NO_SPLAT;
 use labelgs::synth::{Preset, SynthOptions, dataset};
 use labelgs::train::{LabelRule, StepReport, TrainConfig, Trainer};
@@ -38,7 +38,7 @@ fn run(rig: &mut Rig, key: ListKey) -> Report {
     rig.engine.upload_model(&gaussians).expect("the model fits");
     rig.run(key, |rig| {
         let uniforms = rig.uniforms();
-        labelgs::train::job::upload(&mut rig.engine, 0, uniforms, &rig.view, &rig.job, &rig.config).expect("upload");
+        labelgs::train::job::upload(&mut rig.engine, 0, uniforms, &rig.view, &rig.job, &rig.config)
     })
 }
 
@@ -79,13 +79,13 @@ fn gradients_are_those_of_one_traversal() {
 
         let degree = rig.config.sh_degree;
         let actual = gradient_rows(&mut rig, &apart);
-        let summary = check("gradients", compare_rows(&actual, &expected, degree, BOUNDS));
+        let summary = check("gradients", judge::rows(&actual, &expected, degree, BOUNDS));
         println!("{objects} objects: {:.3}, as a whole {:.3} of the tolerance", summary.worst, summary.whole);
         check("labels", exact(&rig.get::<u32>(Buf::LABELS, count), &labels));
         // The statistic is the scene's: it is summed up alike.
         check("statistics", exact(&rig.get::<u32>(Buf::DENSIFY_STATS, 2 * count), &statistics));
         // One update of Adam: its first moments are linear in the gradient, where parameters take its sign.
-        check("moments", compare_rows(&rig.rows(MOMENTS_1, count), &moments, degree, BOUNDS));
+        check("moments", judge::rows(&rig.rows(MOMENTS_1, count), &moments, degree, BOUNDS));
     }
 }
 

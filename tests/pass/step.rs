@@ -1,6 +1,5 @@
 //! A whole step: losses and the gradient of every parameter against the mirror, from the model to the gradient.
 
-use super::project::compare_rows;
 use super::rig::{Rig, prove};
 use crate::reference::rules::{Family, mutants};
 use crate::reference::step::step;
@@ -8,6 +7,7 @@ use crate::reference::{Row, Rules};
 use crate::support::compare::{GradientBounds, Tolerance, Verdict, close};
 use crate::support::device;
 use crate::support::scenes::{Shape, scene};
+use labelgs::selftest::judge;
 
 /// Errors of all passes add up; 0.89 of (1e-6, 5e-5) seen by element, 0.15 of (1e-5, 1e-10) as a whole.
 const BOUNDS: GradientBounds = GradientBounds {
@@ -39,7 +39,7 @@ fn case(name: &str, seed: u64, shape: &Shape, labels: bool, bearing: &[&str]) {
         let sure: Vec<usize> = (0..actual.len()).filter(|&i| expected.margins[i] > SURE).collect();
         assert!(sure.len() * 10 > actual.len() * 6, "{} of {} Gaussians are sure", sure.len(), actual.len());
         let pick = |rows: &[Row]| sure.iter().map(|&i| rows[i]).collect::<Vec<_>>();
-        compare_rows(&pick(&actual), &pick(&expected.rows), model.sh_degree, BOUNDS)
+        judge::rows(&pick(&actual), &pick(&expected.rows), model.sh_degree, BOUNDS)
     });
 }
 

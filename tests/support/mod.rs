@@ -2,7 +2,7 @@
 
 pub mod compare;
 pub mod device;
-pub mod scenes;
 pub mod toy;
 
 pub use device::device;
+pub use labelgs::selftest::scenes;

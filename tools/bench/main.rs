@@ -12,20 +12,11 @@ mod measure;
 mod memory;
 mod pace;
 mod paper;
-#[allow(dead_code, reason = "the mirrors of the tests; benchmarks need some")]
-#[path = "../../tests/reference/mod.rs"]
-mod reference;
-#[allow(dead_code, reason = "runs the engine's passes, for the tests")]
-#[path = "../../tests/pass/rig.rs"]
-mod rig;
 #[allow(dead_code, reason = "the compiler of the build; benchmarks reflect nothing")]
 #[path = "../shadergen/compile.rs"]
 mod shader_compiler;
 mod start;
 mod steps;
-#[allow(dead_code, unused_imports, reason = "helpers of the tests; benchmarks need some")]
-#[path = "../../tests/support/mod.rs"]
-mod support;
 mod trained;
 mod training;
 
@@ -82,7 +73,7 @@ enum Command {
 }
 
 fn main() -> std::process::ExitCode {
-    let outcome = run();
+    let outcome = run().and_then(|()| device::require_silence());
     if let Err(error) = outcome {
         eprintln!("bench: {error}");
         return std::process::ExitCode::FAILURE;

@@ -3,14 +3,14 @@
 use super::kernels::{Channels, Kernels};
 use super::{Bed, Ground, feature};
 use crate::measure::require;
-use crate::reference::Rules;
-use crate::reference::blend::{Trace, smallest_over_pixels, trace};
-use crate::reference::project::Splat;
-use crate::rig::splat_of;
 use crate::trained::{labelled_model, timing_config, trainer, without_masks};
 use labelgs::Result;
 use labelgs::gpu::Gpu;
 use labelgs::plan::Buf;
+use labelgs::reference::Rules;
+use labelgs::reference::blend::{Trace, smallest_over_pixels, trace};
+use labelgs::reference::project::Splat;
+use labelgs::selftest::rig::splat_of;
 use labelgs::synth::{self, Preset, SynthOptions};
 use std::sync::Arc;
 

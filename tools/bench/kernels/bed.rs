@@ -4,14 +4,13 @@ use super::errors::Outcome;
 use super::modes::Mode;
 use super::patch::Replacements;
 use crate::measure::cpu_time;
-use crate::rig::Rig;
-use crate::support::device::Turn;
-use crate::support::scenes::Scene;
 use labelgs::engine::ListKey;
 use labelgs::gpu::Gpu;
 use labelgs::pass::{self, KernelShape, Stage, Variant};
 use labelgs::plan::{Buf, PassList, PlanOptions};
 use labelgs::sched::{ListId, SchedulerOptions};
+use labelgs::selftest::rig::Rig;
+use labelgs::selftest::scenes::Scene;
 use labelgs::shaders::structs::Counters;
 use labelgs::train::job;
 use labelgs::{Error, Result};
@@ -51,7 +50,7 @@ impl<'a> Bed<'a> {
         // With a barrier before each item, times belong to their items; without aliasing, all can be read back.
         let plan = PlanOptions { alias: false, guards: false, barrier_everywhere: true };
         let options = SchedulerOptions { plan, timestamps: true, ..SchedulerOptions::default() };
-        let mut rig = Rig::with_options(Turn::with(Arc::clone(gpu)), scene, false, shape, options);
+        let mut rig = Rig::new(Arc::clone(gpu), scene, false, shape, options)?;
         let config = &mut rig.config;
         (config.position_lr_init, config.position_lr_final) = (f64::MIN_POSITIVE, f64::MIN_POSITIVE);
         (config.feature_lr, config.opacity_lr, config.scaling_lr, config.rotation_lr) = (0.0, 0.0, 0.0, 0.0);
@@ -119,9 +118,9 @@ impl<'a> Bed<'a> {
     /// Picture and gradients of the last run.
     pub fn outcome(&mut self) -> Result<Outcome> {
         let pixels = self.rig.pixels();
-        let image = self.rig.get::<[f32; 4]>(Buf::IMAGE, pixels);
+        let image = self.rig.get::<[f32; 4]>(Buf::IMAGE, pixels)?;
         let colours = image.iter().map(|&[r, g, b, _]| [r, g, b].map(f64::from)).collect();
-        Ok(Outcome { colours, rows: self.rig.gradient_rows() })
+        Ok(Outcome { colours, rows: self.rig.gradient_rows()? })
     }
 
     /// The engine's own list gives the picture of the default mode, to the bit.

@@ -4,8 +4,8 @@ use crate::reference::densify::Population;
 use crate::reference::loss::{ObjectSlot, Photo};
 use crate::reference::step::Target;
 use crate::reference::{Model, Row};
+use crate::scene::{Camera, Gaussians};
 use glam::{DMat3, DVec3};
-use labelgs::scene::{Camera, Gaussians};
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
 
@@ -98,7 +98,8 @@ pub fn camera(random: &mut Pcg32, width: u32, height: u32) -> Camera {
 
 /// Gaussians in a ball of radius about 1.5 around the origin.
 pub fn gaussians(random: &mut Pcg32, shape: &Shape) -> Gaussians {
-    let mut out = Gaussians { sh_degree: shape.sh_degree, labels: Some(Vec::new()), ..Gaussians::default() };
+    let mut out = Gaussians { sh_degree: shape.sh_degree, ..Gaussians::default() };
+    let mut labels = Vec::new();
     let (small, large) = (shape.scales.0.ln(), shape.scales.1.ln());
     for _ in 0..shape.gaussians {
         let mut draw = |low: f64, high: f64| random.random_range(low..high) as f32;
@@ -109,9 +110,9 @@ pub fn gaussians(random: &mut Pcg32, shape: &Shape) -> Gaussians {
         out.opacities.push(draw(shape.opacities.0, shape.opacities.1));
         out.sh0.push([0; 3].map(|_| draw(-0.8, 1.6)));
         (0..out.rest_per_gaussian()).for_each(|_| out.sh_rest.push([0; 3].map(|_| draw(-0.25, 0.25))));
-        let label = random.random_range(0..=shape.objects);
-        out.labels.as_mut().expect("labels were made above").push(label);
+        labels.push(random.random_range(0..=shape.objects));
     }
+    out.labels = Some(labels);
     out
 }
 

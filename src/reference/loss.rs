@@ -21,7 +21,7 @@ impl Photo {
     }
 
     /// From an RGBA8 photo.
-    pub fn from_scene(photo: &labelgs::scene::Photo) -> Self {
+    pub fn from_scene(photo: &crate::scene::Photo) -> Self {
         let colour = |p: &[u8; 4]| [p[0], p[1], p[2]].map(|v| f64::from(v) / 255.0);
         Self {
             size: (photo.width as usize, photo.height as usize),

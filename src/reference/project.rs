@@ -1,8 +1,8 @@
 //! From a Gaussian in the world to a splat in a view, and the gradient back.
 
 use super::{Model, Row, Rules, sh, sort, tile};
+use crate::scene::Camera;
 use glam::{DMat3, DVec2, DVec3};
-use labelgs::scene::Camera;
 
 /// A Gaussian as one view sees it.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

@@ -1,6 +1,6 @@
 //! Rows of parameters, and the same rows as gradients or moments.
 
-use labelgs::scene::Gaussians;
+use crate::scene::Gaussians;
 use std::ops::Range;
 
 /// Floats per Gaussian.

@@ -4,7 +4,7 @@ use super::blend::{self, Blended, Upstream};
 use super::loss::{self, Loss, ObjectSlot, Photo};
 use super::project::{self, Projection, Splat, SplatGradient};
 use super::{Model, Row, Rules};
-use labelgs::scene::Camera;
+use crate::scene::Camera;
 
 /// What a view trains towards.
 #[derive(Clone, Debug, PartialEq)]

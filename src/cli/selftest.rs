@@ -1,0 +1,86 @@
+//! `labelgs selftest`.
+
+use super::args::JsonFlag;
+use super::context::Context;
+use super::devices::{shape_json, shape_text};
+use super::scene::open_gpu;
+use super::stdout;
+use crate::pass::KernelShape;
+use crate::selftest::{self, Check};
+use crate::{Error, Result};
+use clap::Args;
+use serde_json::json;
+
+/// `labelgs selftest`.
+#[derive(Args, Clone, Debug)]
+pub struct SelftestArgs {
+    /// JSON.
+    #[command(flatten)]
+    pub json: JsonFlag,
+}
+
+/// Runs the checks and prints a row for each. Fails if one does.
+pub fn run(args: &SelftestArgs, context: &Context) -> Result<()> {
+    let gpu = open_gpu(context)?;
+    let (found, kernels) = (gpu.capabilities(), KernelShape::new(gpu.subgroup_size(), gpu.is_cpu()));
+    let as_json = context.json || args.json.json;
+    if !as_json {
+        stdout::print(&format!(
+            "{} ({} {})\n{}\n\n{:<48} {:>8} {:>8}  {}\n",
+            found.name,
+            found.driver_name,
+            found.driver_info,
+            shape_text(&kernels),
+            "check against float64",
+            "error",
+            "seconds",
+            "(1 is the largest error allowed)"
+        ))?;
+    }
+    let mut checks = Vec::new();
+    let mut printed = Ok(());
+    selftest::run(&gpu, |check| {
+        if !as_json && printed.is_ok() {
+            printed = stdout::print(&row(&check));
+        }
+        checks.push(check);
+    })?;
+    printed?;
+    let failed: Vec<&str> = checks.iter().filter(|c| c.verdict.is_err()).map(|c| c.name.as_str()).collect();
+    if as_json {
+        stdout::print_json(&json!({
+            "schema_version": 1,
+            "device": found.name,
+            "driver": { "name": found.driver_name, "version": found.driver_info },
+            "kernels": shape_json(&kernels),
+            "passed": failed.is_empty(),
+            "checks": checks.iter().map(to_json).collect::<Vec<_>>(),
+        }))?;
+    }
+    if failed.is_empty() {
+        return Ok(());
+    }
+    Err(Error::Check(format!(
+        "{} of {} checks of this device failed ({}); try another driver version or another --device, and report it",
+        failed.len(),
+        checks.len(),
+        failed.join("; ")
+    )))
+}
+
+fn row(check: &Check) -> String {
+    match (&check.verdict, check.worst()) {
+        (Err(text), _) => format!("{:<48} {:>8} {:>8.1}  {text}\n", check.name, "FAILED", check.seconds),
+        (Ok(_), worst) => format!("{:<48} {:>8.3} {:>8.1}\n", check.name, worst.unwrap_or(0.0), check.seconds),
+    }
+}
+
+fn to_json(check: &Check) -> serde_json::Value {
+    json!({
+        "name": check.name,
+        "passed": check.verdict.is_ok(),
+        "error": check.worst(),
+        "problem": check.verdict.as_ref().err(),
+        "seconds": check.seconds,
+    })
+}

@@ -1,0 +1,80 @@
+//! The device against the reference: what `labelgs selftest` runs for a user, and what the tests build on.
+
+mod checks;
+pub mod compare;
+pub mod judge;
+pub mod rig;
+pub mod scenes;
+mod training;
+
+use crate::error::Result;
+use crate::gpu::Gpu;
+use crate::pass::KernelShape;
+use crate::reference::Rules;
+use checks::Ran;
+use compare::Verdict;
+use std::sync::Arc;
+use std::time::Instant;
+
+/// One check of the self-test.
+#[derive(Clone, Debug)]
+pub struct Check {
+    /// What was checked.
+    pub name: String,
+    /// What was measured, or what is wrong.
+    pub verdict: Verdict,
+    /// Seconds that it took, compilation by the driver included.
+    pub seconds: f64,
+}
+
+impl Check {
+    /// Largest error in units of what is allowed; none where it failed.
+    pub fn worst(&self) -> Option<f64> {
+        self.verdict.as_ref().ok().map(|summary| summary.worst.max(summary.whole))
+    }
+}
+
+/// Runs every check on a device and hands each to `done` as it ends. An error is a failure of the device itself, such
+/// as a lack of memory.
+pub fn run(gpu: &Arc<Gpu>, done: impl FnMut(Check)) -> Result<()> {
+    run_against(&Rules::default(), gpu, done)
+}
+
+/// The same against other rules than the engine's, to see that the checks can fail.
+pub fn run_against(rules: &Rules, gpu: &Arc<Gpu>, mut done: impl FnMut(Check)) -> Result<()> {
+    let kernels = KernelShape::new(gpu.subgroup_size(), gpu.is_cpu());
+    let other = KernelShape { texel: !kernels.texel, ..kernels };
+    for (kernels, reads) in [(kernels, ""), (other, if other.texel { ", texel reads" } else { ", storage reads" })] {
+        let start = Instant::now();
+        let mut ran = Ran::new(rules, gpu, kernels)?;
+        let prepared = start.elapsed().as_secs_f64();
+        type Pass = fn(&mut Ran) -> Result<Verdict>;
+        let passes: [(&str, Pass); 10] = [
+            ("depth order", Ran::order),
+            ("projection", Ran::projection),
+            ("tile lists", Ran::tiles),
+            ("blend forward", Ran::blend),
+            ("photo loss and its gradient", Ran::loss),
+            ("votes", Ran::votes),
+            ("blend backward", Ran::blend_backward),
+            ("gradient of a step with labels", Ran::gradient),
+            ("the same step twice, bit by bit", Ran::repeated),
+            ("Adam", Ran::adam),
+        ];
+        for (index, (name, pass)) in passes.into_iter().enumerate() {
+            let start = Instant::now();
+            let verdict = pass(&mut ran)?;
+            let before = if index == 0 { prepared } else { 0.0 };
+            done(Check { name: format!("{name}{reads}"), verdict, seconds: start.elapsed().as_secs_f64() + before });
+        }
+    }
+    type Whole = fn(&Arc<Gpu>, KernelShape) -> Result<Verdict>;
+    let wholes: [(&str, Whole); 2] =
+        [("70,000 splats in a tile", checks::long_list), ("training twice, bit by bit", training::twice)];
+    for (name, whole) in wholes {
+        let start = Instant::now();
+        let verdict = whole(gpu, kernels)?;
+        done(Check { name: name.to_owned(), verdict, seconds: start.elapsed().as_secs_f64() });
+    }
+    Ok(())
+}

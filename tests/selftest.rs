@@ -1,0 +1,45 @@
+//! The self-test: passes here, and sees every kind of fault.
+
+use crate::reference::Rules;
+use crate::reference::rules::mutants;
+use crate::support::device;
+use labelgs::selftest;
+use std::sync::Arc;
+
+fn failures(rules: &Rules, gpu: &Arc<labelgs::gpu::Gpu>) -> Vec<String> {
+    let mut failed = Vec::new();
+    selftest::run_against(rules, gpu, |check| {
+        if check.verdict.is_err() {
+            failed.push(check.name);
+        }
+    })
+    .expect("the device works");
+    failed
+}
+
+#[test]
+fn passes_on_this_device() {
+    let Some(turn) = device() else { return };
+    assert_eq!(failures(&Rules::default(), &turn.gpu()), Vec::<String>::new());
+}
+
+/// An engine that differs from the reference in one constant fails in the checks of the passes that use it.
+#[test]
+fn sees_each_pass_go_wrong() {
+    let Some(turn) = device() else { return };
+    for (mutant, check) in [
+        ("dilation", "projection"),
+        ("sh_c2", "projection"),
+        ("alpha_min", "blend forward"),
+        ("ssim_c2", "photo loss and its gradient"),
+        ("alpha_max", "blend backward"),
+        ("label_weight", "gradient of a step with labels"),
+        ("adam_beta2", "Adam"),
+    ] {
+        let all = mutants();
+        let found = all.iter().find(|found| found.name == mutant).unwrap_or_else(|| panic!("no mutant {mutant}"));
+        let failed = failures(&found.rules, &turn.gpu());
+        assert!(failed.iter().any(|name| name == check), "{mutant}: only {failed:?} fail");
+        assert!(failed.iter().any(|name| name.starts_with(check) && name.ends_with("reads")), "{mutant}: {failed:?}");
+    }
+}
