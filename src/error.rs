@@ -75,7 +75,10 @@ pub enum Error {
         cure: String,
     },
     /// A loss or a parameter became infinite or not a number.
-    #[error("numerical failure at step {step}, view {view}: {quantity}")]
+    #[error(
+        "numerical failure at step {step}, view {view}: {quantity}; what was saved before is whole: see `labelgs \
+         selftest`, and go on with `train --resume`, or with smaller learning rates"
+    )]
     Numeric {
         /// The quantity that is not finite.
         quantity: String,

@@ -15,7 +15,7 @@
 //! plan     io            sizes, places, barriers (pure); files
 //! reference              the method in f64, for comparisons
 //! shaders  gpu   scene   generated interfaces; a thin layer over Vulkan; plain host data
-//! error
+//! error    fault
 //! ```
 //!
 //! # Words
@@ -45,6 +45,7 @@
 pub mod cli;
 pub mod engine;
 pub mod error;
+pub mod fault;
 pub mod gpu;
 pub mod infer;
 pub mod io;

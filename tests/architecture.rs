@@ -7,7 +7,7 @@ const ROOT: &str = env!("CARGO_MANIFEST_DIR");
 
 /// A module may use modules of lower floors only; modules of one floor do not know each other.
 const FLOORS: [&[&str]; 9] = [
-    &["error", "lib"],
+    &["error", "fault", "lib"],
     &["shaders", "gpu", "scene"],
     &["plan", "io", "reference"],
     &["pass"],

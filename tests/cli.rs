@@ -26,6 +26,7 @@ fn text(bytes: &[u8]) -> String {
 fn model(folder: &Path) -> PathBuf {
     let path = folder.join("model.ply");
     let gaussians = Gaussians {
+        origin: glam::DVec3::ZERO,
         means: (0..6).map(|i| [i as f32, 0.0, 1.0]).collect(),
         quats: vec![[1.0, 0.0, 0.0, 0.0]; 6],
         scales: vec![[-3.0; 3]; 6],

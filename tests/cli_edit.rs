@@ -36,6 +36,7 @@ fn refused(args: &[&str]) -> String {
 fn balls(path: &Path, places: &[[f32; 3]], labels: &[u32]) {
     let count = places.len();
     let gaussians = Gaussians {
+        origin: glam::DVec3::ZERO,
         means: places.to_vec(),
         quats: vec![[1.0, 0.0, 0.0, 0.0]; count],
         scales: vec![[0.15_f32.ln(); 3]; count],

@@ -1,131 +1,17 @@
 //! `labelgs train` that is stopped, killed or out of space, and goes on with `--resume`.
 
 use crate::support::device;
-use assert_cmd::Command;
-use labelgs::io::checkpoint_folder::{self, Found};
-use labelgs::io::ply::read_gaussians;
+use crate::support::runs::{Place, all_whole, files, stderr, succeeded};
 use labelgs::train::TrainState;
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
-use std::path::{Path, PathBuf};
-use std::process::{Child, Output, Stdio};
+use std::process::{Child, Stdio};
 use std::time::{Duration, Instant};
 
 /// Kills of the test; `LABELGS_TEST_KILLS` asks for more.
 const KILLS: u32 = 6;
 /// Steps of a run.
 const STEPS: u32 = 40;
-
-const SETTINGS: &str = "
-iterations = 40
-checkpoint_every = 4
-preview_every = 7
-label_from = 4
-vote_every = 12
-occlusion_every = 15
-sh_degree_interval = 6
-densify_from = 5
-densify_interval = 8
-densify_grad_threshold = 1e-4
-opacity_reset_interval = 20
-opacity_reset_margin = 10
-";
-
-/// A scene, and a folder for compiled pipelines, which make starts quick.
-struct Place {
-    folder: tempfile::TempDir,
-}
-
-impl Place {
-    fn new() -> Self {
-        let place = Self { folder: tempfile::tempdir().expect("a folder") };
-        let scene = place.text("scene");
-        let made = ["synth", &scene, "--preset", "simple", "--size", "64x48", "--views", "6", "--points", "200"];
-        assert!(place.labelgs(&made).status.success());
-        std::fs::write(place.path("settings.toml"), SETTINGS).expect("settings");
-        place
-    }
-
-    fn path(&self, name: &str) -> PathBuf {
-        self.folder.path().join(name)
-    }
-
-    fn text(&self, name: &str) -> String {
-        self.path(name).to_str().expect("UTF-8").to_owned()
-    }
-
-    fn labelgs(&self, args: &[&str]) -> Output {
-        let mut command = Command::cargo_bin("labelgs").expect("the tool is built");
-        command.env("LABELGS_VALIDATION", "off").env("LABELGS_CACHE", self.path("cache"));
-        command.args(args).output().expect("it runs")
-    }
-
-    /// A run in the folder `out` with further flags.
-    fn train(&self, out: &str, flags: &[&str]) -> Vec<String> {
-        let typed = ["train", &self.text("scene"), "-o", &self.text(out), "--masks", &self.text("scene/masks")];
-        typed.iter().chain(flags).map(|&part| part.to_owned()).collect()
-    }
-
-    fn trained(&self, out: &str, flags: &[&str]) -> Output {
-        let args = self.train(out, flags);
-        self.labelgs(&args.iter().map(String::as_str).collect::<Vec<_>>())
-    }
-
-    fn spawned(&self, args: &[String]) -> Child {
-        let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_labelgs"));
-        command.env("LABELGS_VALIDATION", "off").env("LABELGS_CACHE", self.path("cache")).args(args);
-        command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().expect("it runs")
-    }
-
-    fn settings(&self) -> String {
-        self.text("settings.toml")
-    }
-
-    fn checkpoints(&self, out: &str) -> Vec<Found> {
-        checkpoint_folder::list(&self.path(out)).expect("a list")
-    }
-
-    fn model(&self, out: &str, step: u32) -> Vec<u8> {
-        let path = self.path(out).join(format!("point_cloud/iteration_{step}/point_cloud.ply"));
-        std::fs::read(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
-    }
-}
-
-fn stderr(output: &Output) -> String {
-    String::from_utf8_lossy(&output.stderr).into_owned()
-}
-
-#[track_caller]
-fn succeeded(output: &Output) -> String {
-    assert_eq!(output.status.code(), Some(0), "{}", stderr(output));
-    stderr(output)
-}
-
-/// All files below a folder.
-fn files(folder: &Path) -> Vec<PathBuf> {
-    let entries = std::fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path());
-    entries.flat_map(|path| if path.is_dir() { files(&path) } else { vec![path] }).collect()
-}
-
-/// Every file that a killed run left can be read by its name, but for temporary ones, which have another.
-fn all_whole(out: &Path) {
-    for path in files(out) {
-        let name = path.file_name().expect("a name").to_string_lossy().into_owned();
-        if name.starts_with(".labelgs-") && name.ends_with(".tmp") {
-            continue;
-        }
-        let read = || std::fs::read_to_string(&path).expect("text");
-        let whole = match path.extension().and_then(|extension| extension.to_str()) {
-            Some("ckpt") => TrainState::read(&path).map(drop).map_err(|error| error.to_string()),
-            Some("ply") => read_gaussians(&path).map(drop).map_err(|error| error.to_string()),
-            Some("json") => serde_json::from_str::<serde_json::Value>(&read()).map(drop).map_err(|e| e.to_string()),
-            Some("toml") => toml::from_str::<toml::Table>(&read()).map(drop).map_err(|error| error.to_string()),
-            Some("png") => image::open(&path).map(drop).map_err(|error| error.to_string()),
-            _ => Err("what is this?".to_owned()),
-        };
-        whole.unwrap_or_else(|error| panic!("{}: {error}", path.display()));
-    }
-}
 
 fn wait_until(child: &mut Child, what: impl Fn() -> bool) {
     let start = Instant::now();
@@ -166,7 +52,7 @@ fn kills_at_any_moment_cost_no_bit() {
     let text = succeeded(&place.trained("out", &["--resume"]));
     assert!(text.contains("goes on after step"), "{text}");
     assert!(place.model("out", STEPS) == place.model("straight", STEPS), "killed after {steps:?}: the models differ");
-    assert!(files(&place.path("out")).iter().all(|path| path.extension().is_some_and(|name| name != "tmp")));
+    assert!(files(&place.path("out")).iter().all(|path| path.extension().is_none_or(|name| name != "tmp")));
     assert_eq!(place.checkpoints("out").iter().map(|found| found.step).collect::<Vec<_>>(), [STEPS]);
     assert_eq!(place.checkpoints("straight").len(), 1, "a run that has ended leaves its last one");
 }
@@ -290,7 +176,7 @@ fn without_space_the_run_ends_and_the_last_checkpoint_stays() {
     assert_eq!(place.checkpoints("out"), old, "the last one is there");
     TrainState::read(&old[0].path).expect("and whole");
     assert!(!place.model("out", 8).is_empty());
-    assert!(files(&place.path("out")).iter().all(|path| path.extension().is_some_and(|name| name != "tmp")));
+    assert!(files(&place.path("out")).iter().all(|path| path.extension().is_none_or(|name| name != "tmp")));
     // What stands in the folder's place is found before any work.
     std::fs::create_dir_all(place.path("blocked")).expect("a folder");
     std::fs::write(place.path("blocked/checkpoints"), b"").expect("a file");

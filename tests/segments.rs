@@ -23,6 +23,7 @@ fn crowd(count: usize) -> (Gaussians, Camera) {
     };
     let part = |i: usize, a: usize| (i * a % 9973) as f32 / 9973.0;
     let gaussians = Gaussians {
+        origin: glam::DVec3::ZERO,
         means: (0..count)
             .map(|i| {
                 let z = 2.0 + i as f32 * 1e-4;

@@ -13,6 +13,7 @@ const float ADAM_EPSILON = 1e-15;
 const float OPACITY_RESET_LOGIT = -4.5951198501345898; // logit(0.01)
 const float SPLIT_SHRINK = 0.47000362924573558;        // ln 1.6
 const float LN2 = 0.69314718055994531;
+const float GRADIENT_MAX = 1e18;            // larger gradients are dropped: their squares would overflow in Adam
 const uint NO_SPLAT = 0xffffffffu;
 const uint LABEL_MASK = 0xffffu;             // id of a pixel of view_labels; above it:
 const uint LABEL_BORDER = 0x10000u;          // so near to a contour of the mask that it says nothing

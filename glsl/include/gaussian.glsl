@@ -13,6 +13,18 @@ struct Projection {
     vec3 q_m0, q_m1; // rows of Q M, Q being the matrix of the conic
 };
 
+// Unit quaternion, and one over the length. Lengths whose square leaves f32 are halved in the exponent first; 0 has no
+// direction and becomes NaN.
+vec4 unit_quat(vec4 q, out float inv_norm) {
+    float squared = dot(q, q);
+    bool usual = squared > 1e-24 && squared < 1e24;
+    float scale = usual ? 1.0 : 1.0 / max(max(abs(q.x), abs(q.y)), max(abs(q.z), abs(q.w)));
+    vec4 scaled = q * scale;
+    float inv_scaled = inversesqrt(usual ? squared : dot(scaled, scaled));
+    inv_norm = scale * inv_scaled;
+    return scaled * inv_scaled;
+}
+
 mat3 rotation_from_quat(vec4 q) { // unit (w, x, y, z)
     float w = q.x, x = q.y, y = q.z, z = q.w;
     return mat3(
@@ -35,7 +47,8 @@ Projection project_gaussian(StepUniforms step, vec3 mean, vec3 log_scale, vec4 q
     p.slope = clamp(p.slope_raw, vec2(step.clamp_x_min, step.clamp_y_min), vec2(step.clamp_x_max, step.clamp_y_max));
     p.t0 = step.fx * inv_z * (step.view_row0 - p.slope.x * step.view_row2);
     p.t1 = step.fy * inv_z * (step.view_row1 - p.slope.y * step.view_row2);
-    p.rotation = rotation_from_quat(quat * inversesqrt(max(dot(quat, quat), 1e-24)));
+    float inv_norm;
+    p.rotation = rotation_from_quat(unit_quat(quat, inv_norm));
     p.sigma = exp(log_scale);
     p.m0 = (p.t0 * p.rotation) * p.sigma;
     p.m1 = (p.t1 * p.rotation) * p.sigma;

@@ -7,7 +7,8 @@
 // cull — drop Gaussians that cannot count at any pixel: behind the near plane, too transparent, or surely off the image.
 // Work:    64 Gaussians a workgroup.
 // Reads:   step; means [N] (xyz world, w opacity logit); scales [N] (ln); variant object: labels [N], label_from_layer
-// Writes:  depth_keys [N]: bits of z, or KEY_INVISIBLE; splat_from_gaussian [N] = NO_SPLAT
+// Writes:  depth_keys [N]: bits of z, or KEY_INVISIBLE; splat_from_gaussian [N] = NO_SPLAT; counters.broken_* (integer
+//          atomics): positions, scales and opacities that are not finite
 // Math:    |cov2d| <= |J|^2 max(s)^2 + blur; radius where alpha falls to ALPHA_MIN. Conservative, never drops a splat
 //          that project_forward would give a tile. Variant object: of layer 1's object alone.
 // Mirror:  src/reference/project.rs::cull
@@ -18,9 +19,10 @@ FETCH4(1, means);
 FETCH4(2, scales);
 WRITE(3, uint, depth_keys);
 WRITE(4, uint, splat_from_gaussian);
+INOUT1(5, Counters, counters);
 #ifdef OBJECT
-FETCHU(5, labels);
-READ(6, uint, label_from_layer);
+FETCHU(6, labels);
+READ(7, uint, label_from_layer);
 #endif
 
 void main() {
@@ -48,6 +50,10 @@ void main() {
 #ifdef OBJECT
     visible = visible && fetchu(labels, i) == label_from_layer[1];
 #endif
+    if (!finite(mean.x + mean.y + mean.z + mean.w + s.x + s.y + s.z)) {
+        atomicAdd(counters.broken_count, 1u);
+        atomicMin(counters.broken_first, i);
+    }
     depth_keys[i] = visible ? floatBitsToUint(view.z) : KEY_INVISIBLE;
     splat_from_gaussian[i] = NO_SPLAT;
 }

@@ -9,7 +9,7 @@
 // Work:    64 splats a workgroup.
 // Reads:   step, failure; gaussian_from_splat [V]; means, scales, quats, sh0..sh3 [N]; v_splats [V,3]
 // Writes:  v_means [V] (xyz world, w opacity logit), v_scales [V] (ln), v_quats [V], v_sh0 [V], v_sh1 [V,3], v_sh2 [V,4],
-//          v_sh3 [V,6]; counters.nonfinite_count (integer add): such a Gaussian gets gradient 0
+//          v_sh3 [V,6]; counters.nonfinite_* (integer atomics): such a Gaussian gets gradient 0
 //          variant object: adds to the gradients of the scene's splats (splat_from_gaussian)
 // Math:    dSigma = -Q dQ Q through the inverse; dM = 2 G M; Jacobian, view direction and mean2d paths reach the mean;
 //          a clamped x/z or y/z passes nothing on; the clamp of the colour at 0 passes nothing on.
@@ -85,8 +85,8 @@ void main() {
     mat3 v_r = mat3(w0.x * p.t0 + w1.x * p.t1, w0.y * p.t0 + w1.y * p.t1, w0.z * p.t0 + w1.z * p.t1);
 
     // rotation -> quaternion, then through the normalisation
-    float inv_norm = inversesqrt(max(dot(quat, quat), 1e-24));
-    vec4 n = quat * inv_norm;
+    float inv_norm;
+    vec4 n = unit_quat(quat, inv_norm);
     vec4 v_n = 2.0 * vec4(
         n.y * (v_r[1].z - v_r[2].y) + n.z * (v_r[2].x - v_r[0].z) + n.w * (v_r[0].y - v_r[1].x),
         -2.0 * n.y * (v_r[1].y + v_r[2].z) + n.z * (v_r[0].y + v_r[1].x) + n.w * (v_r[0].z + v_r[2].x) + n.x * (v_r[1].z - v_r[2].y),
@@ -107,9 +107,11 @@ void main() {
 
     float opacity = exp2(log2_opacity(mean.w));
     float v_logit = b.y * (1.0 - opacity);
-    sane = sane && finite(dot(abs(v_mean) + abs(v_log_scale), vec3(1.0)) + dot(abs(v_quat), vec4(1.0)));
+    float size = dot(abs(v_mean) + abs(v_log_scale) + abs(v_colour), vec3(1.0)) + dot(abs(v_quat), vec4(1.0)) + abs(v_logit);
+    sane = sane && finite(size) && size < GRADIENT_MAX;
     if (!sane) {
         atomicAdd(counters.nonfinite_count, 1u);
+        atomicMin(counters.nonfinite_first, i);
     }
     uint to = s;
 #ifdef OBJECT

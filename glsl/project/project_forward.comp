@@ -11,14 +11,15 @@
 // Work:    64 splats a workgroup, splats in depth order.
 // Reads:   step, counters; gaussian_from_splat [V]; means, scales, quats, sh0 [N]; sh1 [N,3], sh2 [N,4], sh3 [N,6];
 //          variant labels: labels [N], layer_from_label
-// Writes:  splats [V,3] (record.glsl); tiles_touched [V] over all layers; splat_from_gaussian [N]
+// Writes:  splats [V,3] (record.glsl); tiles_touched [V] over all layers; splat_from_gaussian [N]; counters.broken_*
+//          (integer atomics): splats that are not finite, which touch no tile
 // Math:    EWA splatting with Cauchy-Binet determinant; SH colour, clamped at 0; ellipse.glsl for the tiles.
 // Mirror:  src/reference/project.rs::project_forward
 
 layout(constant_id = 11) const uint SH_DEGREE = 3;
 layout(local_size_x = 64) in;
 READ1(0, StepUniforms, step);
-READ1(1, Counters, counters);
+INOUT1(1, Counters, counters);
 FETCHU(2, gaussian_from_splat);
 FETCH4(3, means);
 FETCH4(4, scales);
@@ -59,6 +60,10 @@ void main() {
     TileRect rect = tile_rect(u, centre, extent);
     uint touched = 0u, tx = rect.x_min, ty = rect.y_min;
     bool sane = finite(centre.x + centre.y + q.x + q.y + q.z + log2_o + colour.x + colour.y + colour.z);
+    if (!sane) {
+        atomicAdd(counters.broken_count, 1u);
+        atomicMin(counters.broken_first, i);
+    }
     uint candidates = sane ? rect.count : 0u;
     for (uint k = 0u; k < candidates; k++) {
         touched += tile_touched(u, tx, ty, centre, q, log2_o) ? 1u : 0u;

@@ -3,6 +3,7 @@
 use super::train_args::TrainArgs;
 use crate::io::LoadOptions;
 use crate::train::config::{Occlusion, TrainConfig};
+use crate::train::near::NEAR;
 use crate::{Error, Result};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -44,7 +45,7 @@ pub fn near_of(path: &Path) -> Result<f32> {
     struct Fields {
         near: Option<f32>,
     }
-    let near = parse::<Fields>(path)?.near.unwrap_or(TrainConfig::default().near);
+    let near = parse::<Fields>(path)?.near.unwrap_or(NEAR);
     if !near.is_finite() || near <= 0.0 {
         return Err(Error::data(path, "near", format!("is {near}, needs more than 0; or say --near")));
     }
@@ -85,7 +86,12 @@ pub fn load_options(config: &TrainConfig, masks: Option<PathBuf>) -> LoadOptions
 /// Defaults of the flags of `train` as one types them, by flag without dashes.
 pub fn default_texts() -> BTreeMap<String, String> {
     let mut texts = fields(&TrainConfig::default());
-    for (flag, text) in [("background", "black"), ("save-at", "none"), ("feature-rest-lr", "--feature-lr / 20")] {
+    for (flag, text) in [
+        ("background", "black"),
+        ("save-at", "none"),
+        ("near", "0.2, less in a small scene"),
+        ("feature-rest-lr", "--feature-lr / 20"),
+    ] {
         texts.insert(flag.into(), text.into());
     }
     texts

@@ -137,7 +137,7 @@ fn lift_all(engine: &mut Engine, model: &mut Gaussians, views: &[&View], near: f
     for view in order.into_iter().map(|index| views[index]) {
         let Some(mask) = &view.mask else { continue };
         let rendered = render(engine, &view.camera, near, [0.0; 3], 0)?;
-        lift(&mut labels, &model.means, &view.camera, &rendered, mask, how);
+        lift(&mut labels, &model.means, &view.camera.relative_to(model.origin), &rendered, mask, how);
     }
     model.labels = Some(labels);
     model.label_confidence = None;

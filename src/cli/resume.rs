@@ -135,6 +135,16 @@ impl Checkpoints {
         every > 0 && (step.is_multiple_of(every) || step == config.iterations)
     }
 
+    /// Puts a training back to its last checkpoint, because of what has gone wrong since. False if there is none.
+    pub fn restore(&mut self, trainer: &mut Trainer, reason: &Error) -> Result<bool> {
+        let Some(path) = self.kept.last() else { return Ok(false) };
+        let state = TrainState::read(path)?;
+        tracing::warn!("{reason}; training goes back to {} once", path.display());
+        trainer.restore(&state)?;
+        self.step = state.step;
+        Ok(true)
+    }
+
     /// Writes one that is due. That it cannot be written ends no training: there may be room again the next time.
     pub fn save_due(&mut self, trainer: &mut Trainer) -> Result<()> {
         match self.save(trainer) {

@@ -10,7 +10,7 @@ use crate::io::pipeline_file::PipelineFolder;
 use crate::io::{self, LoadOptions, run_folder};
 use crate::scene::{Dataset, Gaussians, View};
 use crate::sched::SchedulerOptions;
-use crate::train::TrainConfig;
+use crate::train::near::NEAR;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -21,7 +21,7 @@ pub fn near_plane(model: &Path, typed: Option<f32>) -> Result<f32> {
     match (typed, of_run()) {
         (Some(near), _) => Ok(near),
         (None, Some(file)) => config::near_of(&file),
-        (None, None) => Ok(TrainConfig::default().near),
+        (None, None) => Ok(NEAR),
     }
 }
 

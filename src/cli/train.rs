@@ -20,6 +20,7 @@ use crate::sched::SchedulerOptions;
 use crate::train::{self, StepReport, TrainConfig, Trainer, record};
 use crate::{Error, Result};
 use serde_json::json;
+use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
@@ -38,7 +39,7 @@ pub(super) fn train(args: &TrainArgs, context: &Context) -> Result<(serde_json::
         None => config::decide(args)?,
     };
     let out = args.output.as_path();
-    prepare_output(out, &config)?;
+    let _lock = prepare_output(out, &config)?;
     let mut run = resume::facts(args, resumed.as_ref());
     let masks = args.masks.clone().or(run.masks.as_ref().map(PathBuf::from));
     let names = masks.as_deref().map(LabelTable::of_folder).transpose()?.flatten();
@@ -64,6 +65,8 @@ pub(super) fn train(args: &TrainArgs, context: &Context) -> Result<(serde_json::
         Some(state) => Trainer::resume(gpu, &mut dataset, state, options)?,
         None => start(gpu, &config, &mut dataset, occluders.as_ref(), options)?,
     };
+    // The near plane is known now.
+    let config = trainer.config().clone();
     let records = || {
         let text = config::dump(&config, &facts)?;
         atomic::write(out.join(run_folder::CONFIG), |file| file.write_all(text.as_bytes()))?;
@@ -74,8 +77,17 @@ pub(super) fn train(args: &TrainArgs, context: &Context) -> Result<(serde_json::
     records()?;
     interrupt::note_only();
     let start = Instant::now();
-    let last = steps(&mut trainer, out, preview.as_ref(), &mut checkpoints, context)
-        .map_err(|error| keep_model(&mut trainer, out, error))?;
+    let go_on = |trainer: &mut Trainer, checkpoints: &mut Checkpoints| {
+        steps(trainer, out, preview.as_ref(), checkpoints, context)
+    };
+    let last = match go_on(&mut trainer, &mut checkpoints) {
+        // Once: what fails again has its reason in the scene or the settings.
+        Err(error @ Error::Numeric { .. }) if checkpoints.restore(&mut trainer, &error)? => {
+            go_on(&mut trainer, &mut checkpoints)
+        }
+        other => other,
+    };
+    let last = last.map_err(|error| keep_model(&mut trainer, out, error))?;
     if !out.join(run_folder::CONFIG).exists() {
         tracing::warn!("{} was deleted meanwhile; what is known is written again", out.display());
         records()?;
@@ -204,16 +216,18 @@ fn keep_model(trainer: &mut Trainer, out: &Path, error: Error) -> Error {
     error
 }
 
-/// Refuses an output folder that cannot be used before any work is done, and clears it of what killed runs left.
-fn prepare_output(out: &Path, config: &TrainConfig) -> Result<()> {
+/// Refuses an output folder that cannot be used before any work is done, and clears it of what killed runs left. It is
+/// this run's as long as the result lives.
+fn prepare_output(out: &Path, config: &TrainConfig) -> Result<File> {
     let checkpoints = out.join(checkpoint_folder::FOLDER);
     let folder = if config.checkpoint_every > 0 { checkpoints.as_path() } else { out };
     std::fs::create_dir_all(folder).map_err(Error::write(folder))?;
+    let lock = run_folder::lock(out)?;
     let models = std::fs::read_dir(out.join("point_cloud")).into_iter().flatten().flatten().map(|entry| entry.path());
     for folder in [out.to_owned(), checkpoints, out.join("preview")].into_iter().chain(models) {
         atomic::remove_stale(folder);
     }
-    Ok(())
+    Ok(lock)
 }
 
 /// A trainer with the initial model of the scene.

@@ -14,6 +14,7 @@ use crate::plan::{Buf, TABLE};
 use crate::scene::Gaussians;
 use crate::sched::{ListId, Scheduler, SchedulerOptions, Ticket};
 use crate::shaders::structs::Counters;
+use glam::DVec3;
 use std::collections::HashMap;
 use std::sync::Arc;
 
@@ -76,6 +77,8 @@ pub struct Engine {
     room: Room,
     lists: HashMap<ListKey, ListId>,
     gaussian_count: u32,
+    /// What the positions of the model are relative to.
+    origin: DVec3,
 }
 
 impl Engine {
@@ -101,7 +104,7 @@ impl Engine {
             ));
         }
         let sched = Scheduler::new(gpu, TABLE, capacity(&shape, &room), options)?;
-        Ok(Self { sched, shape, room, lists: HashMap::new(), gaussian_count: 0 })
+        Ok(Self { sched, shape, room, lists: HashMap::new(), gaussian_count: 0, origin: DVec3::ZERO })
     }
 
     /// The scheduler underneath.
@@ -129,6 +132,11 @@ impl Engine {
         self.gaussian_count
     }
 
+    /// The world position that the positions on the device are relative to.
+    pub fn origin(&self) -> DVec3 {
+        self.origin
+    }
+
     /// Says that the device now holds so many Gaussians (after a densification).
     pub fn set_gaussian_count(&mut self, count: u32) {
         self.gaussian_count = count;
@@ -139,13 +147,16 @@ impl Engine {
         self.make_room_for_gaussians(gaussians.len() as u64)?;
         model::upload(&mut self.sched, gaussians, self.room.labels.is_some())?;
         self.gaussian_count = gaussians.len() as u32;
+        self.origin = gaussians.origin;
         Ok(())
     }
 
     /// Reads the model back.
     pub fn download_model(&mut self, sh_degree: u32) -> Result<Gaussians> {
         self.sched.wait_all()?;
-        model::download(&mut self.sched, self.gaussian_count as usize, sh_degree, self.room.labels.is_some())
+        let labels = self.room.labels.is_some();
+        let model = model::download(&mut self.sched, self.gaussian_count as usize, sh_degree, labels)?;
+        Ok(Gaussians { origin: self.origin, ..model })
     }
 
     /// The recorded list for a key; recorded on first use.

@@ -6,6 +6,7 @@ use crate::error::Result;
 use crate::io::checkpoint::Plane;
 use crate::pass::ATTRIBUTES;
 use crate::plan::{Buf, TABLE};
+use glam::DVec3;
 use std::collections::BTreeMap;
 
 /// The buffers of the state of a training with this degree of the spherical harmonics.
@@ -48,14 +49,14 @@ impl Engine {
     }
 
     /// Puts a state that [`check`] has nothing against into the memory of a new engine.
-    pub fn upload_state(&mut self, count: u32, planes: &[Plane]) -> Result<()> {
+    pub fn upload_state(&mut self, count: u32, origin: DVec3, planes: &[Plane]) -> Result<()> {
         self.make_room_for_gaussians(u64::from(count))?;
         for plane in planes {
             if let Some(index) = TABLE.iter().position(|decl| decl.name == plane.name) {
                 self.sched.upload(Buf(index as u16), 0, 0, &plane.data)?;
             }
         }
-        self.gaussian_count = count;
+        (self.gaussian_count, self.origin) = (count, origin);
         Ok(())
     }
 }

@@ -4,13 +4,15 @@ use crate::pass::KernelShape;
 use crate::scene::Camera;
 use crate::shaders::structs::StepUniforms;
 use bytemuck::Zeroable;
+use glam::DVec3;
 
 /// Share of half the image by which the Jacobian's slopes may leave the image (3DGS clamps at 1.3 tan(fov / 2)).
 const SLOPE_MARGIN: f64 = 0.3;
 
-/// The camera's part of the uniforms; everything else is 0.
+/// The camera's part of the uniforms; everything else is 0. Positions on the device are relative to `origin`.
 pub fn view_uniforms(
     camera: &Camera,
+    origin: DVec3,
     shape: &KernelShape,
     near: f32,
     background: [f32; 3],
@@ -24,7 +26,7 @@ pub fn view_uniforms(
         view_row0: row(0),
         view_row1: row(1),
         view_row2: row(2),
-        camera_centre: camera.centre().as_vec3().to_array(),
+        camera_centre: camera.relative_to(origin).centre().as_vec3().to_array(),
         fx: camera.fx as f32,
         fy: camera.fy as f32,
         cx: camera.cx as f32,

@@ -52,7 +52,8 @@ pub fn render(
 ) -> Result<Rendered> {
     loop {
         engine.sched().wait_all()?;
-        let uniforms = view_uniforms(camera, engine.shape(), near, background, engine.gaussian_count());
+        let uniforms =
+            view_uniforms(camera, engine.origin(), engine.shape(), near, background, engine.gaussian_count());
         let list = engine.list(ListKey::Render(sh_degree))?;
         let sched = engine.sched_mut();
         sched.upload(Buf::STEP, 0, 0, &[uniforms])?;

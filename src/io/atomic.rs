@@ -1,6 +1,7 @@
 //! Files that are either the old one or the complete new one, whatever happens in between.
 
 use crate::error::{Error, Result};
+use crate::fault;
 use std::fs::{self, File};
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
@@ -40,11 +41,16 @@ fn write_inner(path: &Path, body: impl FnOnce(&mut dyn Write) -> io::Result<()>)
         Some(parent) if !parent.as_os_str().is_empty() => parent,
         _ => Path::new("."),
     };
+    fault::writing()?;
     fs::create_dir_all(folder)?;
+    fault::writing()?;
     let temporary = temporary_in(folder)?;
     fill(temporary.as_file(), body)?;
+    fault::writing()?;
     temporary.as_file().sync_all()?;
+    fault::writing()?;
     temporary.persist(&target).map_err(|failed| failed.error)?;
+    fault::writing()?;
     sync_folder(folder)
 }
 
@@ -70,10 +76,28 @@ fn temporary_in(folder: &Path) -> io::Result<tempfile::NamedTempFile> {
 }
 
 fn fill(file: &File, body: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> io::Result<()> {
-    let mut buffered = BufWriter::with_capacity(1 << 18, file);
+    let mut buffered = BufWriter::with_capacity(1 << 18, Fallible(file));
     body(&mut buffered)?;
     // Dropping a BufWriter loses the error of its last write, so the flush is spelled out.
     buffered.flush()
+}
+
+/// A file whose writes can be made to fail.
+struct Fallible<'a>(&'a File);
+
+impl Write for Fallible<'_> {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        if let Err(error) = fault::writing() {
+            // As a disk that fills up: a part is there.
+            let _ = self.0.write(&bytes[..bytes.len() / 2]);
+            return Err(error);
+        }
+        self.0.write(bytes)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.0.flush()
+    }
 }
 
 #[cfg(unix)]

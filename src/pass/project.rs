@@ -13,7 +13,7 @@ pub const GAUSSIAN_FROM_SPLAT: Buf = Buf::DEPTH_VALUES_A;
 pub fn visible_splats(b: &mut Builder) {
     pass!(b, texel cull {
         step: Buf::STEP, means: Buf::MEANS, scales: Buf::SCALES, depth_keys: Buf::DEPTH_KEYS,
-        splat_from_gaussian: Buf::SPLAT_FROM_GAUSSIAN,
+        splat_from_gaussian: Buf::SPLAT_FROM_GAUSSIAN, counters: Buf::COUNTERS,
     } [], over_gaussians());
     order_and_project(b);
 }
@@ -22,7 +22,8 @@ pub fn visible_splats(b: &mut Builder) {
 pub fn visible_splats_of_object(b: &mut Builder) {
     pass!(b, texel cull_object {
         step: Buf::STEP, means: Buf::MEANS, scales: Buf::SCALES, depth_keys: Buf::DEPTH_KEYS,
-        splat_from_gaussian: Buf::SPLAT_FROM_GAUSSIAN, labels: Buf::LABELS, label_from_layer: Buf::LABEL_FROM_LAYER,
+        splat_from_gaussian: Buf::SPLAT_FROM_GAUSSIAN, counters: Buf::COUNTERS, labels: Buf::LABELS,
+        label_from_layer: Buf::LABEL_FROM_LAYER,
     } [], over_gaussians());
     order_and_project(b);
 }

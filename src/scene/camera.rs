@@ -32,6 +32,11 @@ impl Camera {
         -(self.rotation.transpose() * self.translation)
     }
 
+    /// The same camera in a world whose origin is moved to `origin`.
+    pub fn relative_to(&self, origin: DVec3) -> Self {
+        Self { translation: self.to_camera(origin), ..self.clone() }
+    }
+
     /// Camera-space position of a world point.
     pub fn to_camera(&self, world: DVec3) -> DVec3 {
         self.rotation * world + self.translation

@@ -1,12 +1,17 @@
 //! Host copy of the model: a structure of arrays, one row per Gaussian.
 
+use glam::DVec3;
+
 /// Zeroth spherical-harmonics basis constant, 1 / (2 sqrt(pi)).
 pub const SH_C0: f64 = 0.28209479177387814;
 
 /// The Gaussians of a scene, parameters stored before activation as in the standard 3DGS PLY.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Gaussians {
-    /// World positions, [N, 3].
+    /// The world position that `means` are relative to: 0 but for scenes far from the origin, see
+    /// [`far_origin`](super::origin::far_origin).
+    pub origin: DVec3,
+    /// Positions, [N, 3], world units.
     pub means: Vec<[f32; 3]>,
     /// Rotations (w, x, y, z), not necessarily of unit length, [N, 4].
     pub quats: Vec<[f32; 4]>,
@@ -32,6 +37,11 @@ impl Gaussians {
         self.means.len()
     }
 
+    /// World position of a Gaussian.
+    pub fn world(&self, row: usize) -> DVec3 {
+        self.origin + DVec3::from_array(self.means[row].map(f64::from))
+    }
+
     /// True without any Gaussian.
     pub fn is_empty(&self) -> bool {
         self.means.is_empty()
@@ -47,6 +57,7 @@ impl Gaussians {
         let rows: Vec<usize> = (0..self.len()).filter(|&row| keep(row)).collect();
         let rest = self.rest_per_gaussian();
         Self {
+            origin: self.origin,
             means: rows.iter().map(|&r| self.means[r]).collect(),
             quats: rows.iter().map(|&r| self.quats[r]).collect(),
             scales: rows.iter().map(|&r| self.scales[r]).collect(),

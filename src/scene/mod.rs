@@ -4,6 +4,7 @@ pub mod camera;
 pub mod depth;
 pub mod gaussians;
 pub mod labels;
+pub mod origin;
 pub mod path;
 pub mod view;
 

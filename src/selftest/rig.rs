@@ -14,6 +14,7 @@ use crate::scene::{LabelMap, Photo};
 use crate::sched::SchedulerOptions;
 use crate::shaders::structs::StepUniforms;
 use crate::train::job::{self, Fixed, Job, TrainView};
+use crate::train::near::NEAR;
 use crate::train::{LabelRule, TrainConfig};
 use bytemuck::Pod;
 use std::f64::consts::LN_2;
@@ -123,6 +124,7 @@ impl Rig {
             label_weight: 1.0,
             label_alpha: 0.1,
             label_balance: true,
+            near: NEAR,
             ..TrainConfig::default()
         };
         let layers =

@@ -55,7 +55,8 @@ pub struct TrainConfig {
     pub max_gaussians: u64,
     /// Colour behind the scene, r, g, b in 0 to 1. Black (LabelGS, 3DGS). The label loss is always on black.
     pub background: [f32; 3],
-    /// Gaussians nearer to the camera plane are not drawn, world units. 0.2 (3DGS).
+    /// Gaussians nearer to the camera plane are not drawn, world units. 0 lets the scene decide: 0.2 (3DGS), or a
+    /// twentieth of the median depth of its first Gaussians where that is less.
     pub near: f32,
 
     /// First step that lifts labels and adds the label loss. 1000 (LabelGS): before, the geometry is too rough.
@@ -157,7 +158,7 @@ impl Default for TrainConfig {
             seed: 0,
             max_gaussians: 0,
             background: [0.0; 3],
-            near: 0.2,
+            near: 0.0,
             label_from: 1000,
             label_rule: LabelRule::Votes,
             vote_every: 500,
@@ -297,7 +298,7 @@ impl TrainConfig {
             ("--densify-grad-threshold", f64::from(self.densify_grad_threshold), 0.0, f64::MAX),
             ("--percent-dense", f64::from(self.percent_dense), 0.0, f64::MAX),
             ("--max-scale", f64::from(self.max_scale), 0.0, f64::MAX),
-            ("--near", f64::from(self.near), f64::MIN_POSITIVE, f64::MAX),
+            ("--near", f64::from(self.near), 0.0, f64::MAX),
             ("--position-lr-init", self.position_lr_init, f64::MIN_POSITIVE, f64::MAX),
             ("--position-lr-final", self.position_lr_final, f64::MIN_POSITIVE, f64::MAX),
             ("--feature-lr", self.feature_lr, 0.0, f64::MAX),

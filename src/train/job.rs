@@ -129,7 +129,7 @@ pub struct Fixed {
 /// The uniforms of a step.
 pub fn uniforms(job: &Job, view: &TrainView, config: &TrainConfig, fixed: Fixed, engine: &Engine) -> StepUniforms {
     let count = engine.gaussian_count();
-    let base = view_uniforms(&view.camera, engine.shape(), config.near, config.background, count);
+    let base = view_uniforms(&view.camera, engine.origin(), engine.shape(), config.near, config.background, count);
     let rate = (config.position_lr(job.step) * fixed.extent) as f32;
     let correction = |beta: f32| (1.0 / (1.0 - f64::from(beta).powi(job.updates.max(1) as i32))) as f32;
     let labels = engine.room().labels.map_or(0, |room| room.max_label + 1);

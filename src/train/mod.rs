@@ -3,9 +3,11 @@
 pub mod config;
 mod densify;
 pub mod job;
+pub mod near;
 mod occlusion;
 pub mod record;
 mod sampler;
+mod sentinel;
 mod state;
 mod timing;
 mod votes;
@@ -17,9 +19,11 @@ pub use timing::StepTimes;
 
 use crate::engine::{Engine, LabelRoom, ListKey, Report, Room};
 use crate::error::{Error, Result};
+use crate::fault;
 use crate::gpu::Gpu;
 use crate::infer::vote::ballot::columns_for;
 use crate::pass::{KernelShape, Variant};
+use crate::plan::Buf;
 use crate::scene::{Dataset, Gaussians};
 use crate::sched::{SchedulerOptions, Ticket};
 use job::{Fixed, Job, TrainView};
@@ -63,6 +67,7 @@ pub struct Trainer {
     timing: Option<timing::Timing>,
     /// Blending counts the pairs that have a weight.
     counts_pairs: bool,
+    seen: sentinel::Seen,
     /// What the views are told apart by; empty until somebody asks.
     prints: Vec<ViewPrint>,
 }
@@ -127,6 +132,11 @@ impl Trainer {
     ) -> Result<Self> {
         config.check()?;
         let room = start_room(&gpu, dataset, &config, model.len(), options)?;
+        let near = match config.near {
+            0.0 => near::near_plane(dataset.train.iter().map(|view| &view.camera), model),
+            near => near,
+        };
+        let config = TrainConfig { near, ..config };
         let mut trainer = Self::without_model(gpu, shape, config, dataset, room, options)?;
         trainer.engine.upload_model(model)?;
         Ok(trainer)
@@ -162,6 +172,7 @@ impl Trainer {
             separate: false,
             timing: None,
             counts_pairs: false,
+            seen: sentinel::Seen::default(),
             prints: Vec::new(),
         })
     }
@@ -227,6 +238,9 @@ impl Trainer {
             self.refresh_occluders()?;
         }
         let job = self.job(step);
+        if fault::at("nan").is_some() {
+            self.engine.sched_mut().upload(Buf::MEANS, 0, 0, &[f32::NAN])?;
+        }
         if self.flying.len() == crate::plan::SLOTS {
             done.extend(self.absorb()?);
         }
@@ -326,13 +340,7 @@ impl Trainer {
         let l1 = f64::from(counters.loss_l1) * scale;
         let loss = (1.0 - lambda) * l1 + lambda * (1.0 - f64::from(counters.loss_ssim) * scale);
         let label_loss = job::label_loss(&job, view, &self.config, counters.loss_label);
-        if !(loss + label_loss).is_finite() {
-            return Err(Error::Numeric {
-                quantity: format!("the loss is {loss}, the label loss {label_loss}"),
-                step: u64::from(job.step),
-                view: view.name.clone(),
-            });
-        }
+        self.watch(&job, &report, [loss, label_loss])?;
         Ok(Some(StepReport { step: job.step, loss, label_loss, report }))
     }
 }

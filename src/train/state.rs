@@ -12,6 +12,7 @@ use crate::io::checkpoint::{Checkpoint, Plane};
 use crate::pass::KernelShape;
 use crate::scene::{Camera, Dataset, LabelMap, Occluders, Photo};
 use crate::sched::SchedulerOptions;
+use glam::DVec3;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -31,6 +32,9 @@ pub struct TrainState {
     pub updates: u32,
     /// Gaussians.
     pub gaussians: u32,
+    /// The world position that the positions are relative to.
+    #[serde(default)]
+    pub origin: [f64; 3],
     /// Votes were counted before.
     pub labelled_once: bool,
     /// Memory has bounded the number of Gaussians.
@@ -187,6 +191,7 @@ impl Trainer {
             step: self.step,
             updates: self.updates,
             gaussians: self.gaussian_count(),
+            origin: self.engine.origin().to_array(),
             labelled_once: self.labelled_once,
             memory_bounds: self.memory_bounds,
             sizes: self.engine.sizes(),
@@ -222,19 +227,33 @@ impl Trainer {
             let problem = format!("is {label}, the masks have ids up to {}", labels.max_label);
             return Err(Error::data(&state.path, "a label", problem));
         }
-        let mut trainer = Self::without_model(gpu, shape, state.config, dataset, room, options)?;
-        match trainer.engine.grow_to(state.sizes) {
+        let mut trainer = Self::without_model(gpu, shape, state.config.clone(), dataset, room, options)?;
+        trainer.prints = prints;
+        trainer.put(&state)?;
+        Ok(trainer)
+    }
+
+    /// Goes back to a state of this very training, whatever has become of it since.
+    pub fn restore(&mut self, state: &TrainState) -> Result<()> {
+        // What flies has nothing to say any more.
+        self.engine.sched().wait_all()?;
+        self.flying.clear();
+        self.put(state)
+    }
+
+    fn put(&mut self, state: &TrainState) -> Result<()> {
+        match self.engine.grow_to(state.sizes) {
             // On a smaller device there is less room to grow.
             Err(Error::OutOfMemory { .. }) => {}
             other => other?,
         }
-        trainer.engine.upload_state(state.gaussians, &state.planes)?;
-        trainer.set_occluders(&state.occluders);
-        trainer.order = ViewOrder::after(trainer.config.seed, trainer.views.len(), state.step);
-        (trainer.step, trainer.updates) = (state.step, state.updates);
-        (trainer.labelled_once, trainer.memory_bounds) = (state.labelled_once, state.memory_bounds);
-        trainer.prints = prints;
-        Ok(trainer)
+        self.engine.upload_state(state.gaussians, DVec3::from_array(state.origin), &state.planes)?;
+        self.set_occluders(&state.occluders);
+        self.order = ViewOrder::after(self.config.seed, self.views.len(), state.step);
+        (self.step, self.updates) = (state.step, state.updates);
+        (self.labelled_once, self.memory_bounds) = (state.labelled_once, state.memory_bounds);
+        self.seen = Default::default();
+        Ok(())
     }
 }
 

@@ -81,6 +81,7 @@ fn gaussians(population: &Population) -> Gaussians {
     let narrow = |v: f64| v as f32;
     let rows = &population.model.rows;
     Gaussians {
+        origin: glam::DVec3::ZERO,
         means: rows.iter().map(|r| r.mean.map(narrow)).collect(),
         quats: rows.iter().map(|r| r.quat.map(narrow)).collect(),
         scales: rows.iter().map(|r| r.scale.map(narrow)).collect(),

@@ -2,6 +2,7 @@
 
 pub mod compare;
 pub mod device;
+pub mod runs;
 pub mod toy;
 
 pub use device::device;

@@ -11,7 +11,7 @@ use labelgs::infer::render::render;
 use labelgs::scene::{Dataset, Gaussians};
 use labelgs::sched::SchedulerOptions;
 use labelgs::synth::{self, SynthOptions};
-use labelgs::train::TrainConfig;
+use labelgs::train::near::NEAR;
 use serde_json::{Value, json};
 use std::sync::Arc;
 
@@ -91,7 +91,7 @@ fn divided(gpu: &Arc<Gpu>, dataset: &Dataset, model: &Gaussians, objects: usize)
     engine.upload_model(model)?;
     let mut dataset = dataset.clone();
     for view in &mut dataset.train {
-        let seen = render(&mut engine, &view.camera, TrainConfig::default().near, [0.0; 3], 0)?;
+        let seen = render(&mut engine, &view.camera, NEAR, [0.0; 3], 0)?;
         view.mask = Some(seen.label_map(&labels));
     }
     Ok(dataset)

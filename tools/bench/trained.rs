@@ -11,6 +11,7 @@ use labelgs::io::init::{RANDOM_COUNT, initial_gaussians};
 use labelgs::scene::{Dataset, Gaussians, View};
 use labelgs::sched::SchedulerOptions;
 use labelgs::synth::{self, SynthOptions};
+use labelgs::train::near::NEAR;
 use labelgs::train::{StepReport, TrainConfig, Trainer};
 use std::sync::Arc;
 
@@ -97,7 +98,11 @@ impl Judge {
     /// Scores on the held-out views, as `labelgs eval` gives them.
     pub fn scores(&mut self, dataset: &Dataset, model: &Gaussians, config: &TrainConfig) -> Result<MeanScores> {
         let views: Vec<&View> = dataset.test.iter().collect();
-        let how = Rendering { near: config.near, background: config.background, min_confidence: SURE };
+        let how = Rendering {
+            near: if config.near > 0.0 { config.near } else { NEAR },
+            background: config.background,
+            min_confidence: SURE,
+        };
         Ok(evaluate(&mut self.engine, model, &views, how, &(), &mut ())?.mean)
     }
 }

@@ -41,7 +41,7 @@ pub fn summarise(model: &Gaussians) -> Vec<LabelSummary> {
     for row in 0..model.len() {
         let start = Sum { count: 0, mass: 0.0, min: DVec3::INFINITY, max: DVec3::NEG_INFINITY, weighted: DVec3::ZERO };
         let sum = sums.entry(label_of(model, row)).or_insert(start);
-        let mean = DVec3::from_array(model.means[row].map(f64::from));
+        let mean = model.world(row);
         // Never 0, so that invisible Gaussians have a centre too.
         let opacity = (1.0 / (1.0 + (-f64::from(model.opacities[row])).exp())).max(1e-200);
         sum.count += 1;

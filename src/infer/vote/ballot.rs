@@ -114,7 +114,8 @@ fn vote(engine: &mut Engine, voter: &Voter, chunk: &[u16], how: Sweep) -> Result
     let weights: Vec<f32> = chunk.iter().map(trust).collect();
     loop {
         engine.sched().wait_all()?;
-        let base = view_uniforms(voter.camera, engine.shape(), how.near, [0.0; 3], engine.gaussian_count());
+        let base =
+            view_uniforms(voter.camera, engine.origin(), engine.shape(), how.near, [0.0; 3], engine.gaussian_count());
         let uniforms = StepUniforms { vote_columns: chunk.len() as u32, ..base };
         let list = engine.list(ListKey::Vote(rounds))?;
         let sched = engine.sched_mut();

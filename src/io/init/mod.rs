@@ -7,6 +7,7 @@ mod texel;
 
 use crate::error::{Error, Result};
 use crate::scene::gaussians::SH_C0;
+use crate::scene::origin::far_origin;
 use crate::scene::{Dataset, Gaussians, Point};
 use kiddo::{ImmutableKdTree, SquaredEuclidean};
 use rayon::prelude::*;
@@ -14,7 +15,8 @@ use std::num::NonZero;
 
 /// Opacity of a new Gaussian.
 const OPACITY: f64 = 0.1;
-/// Smallest mean squared distance to the neighbours, world units squared.
+/// Smallest mean squared distance to the neighbours (3DGS): world units squared, or squared extents of the scene where
+/// that is smaller than 1.
 const DISTANCE2_MIN: f64 = 1e-7;
 /// Neighbours that decide the size of a Gaussian.
 const NEIGHBOURS: usize = 3;
@@ -35,7 +37,8 @@ pub const RANDOM_COUNT: usize = 50_000;
 /// than a fiftieth of a picture.
 pub fn initial_gaussians(dataset: &Dataset, seed: u64, count_if_no_points: usize) -> Result<Gaussians> {
     if dataset.points.len() >= POINTS_MIN {
-        return Ok(from_points(&dataset.points, &neighbour_distances2(&dataset.points, dataset.extent())?));
+        let distances2 = neighbour_distances2(&dataset.points, dataset.extent())?;
+        return Ok(from_points(&dataset.points, &distances2, dataset.extent()));
     }
     let mut points = random::points(dataset, seed, count_if_no_points)?;
     points.extend_from_slice(&dataset.points);
@@ -43,17 +46,20 @@ pub fn initial_gaussians(dataset: &Dataset, seed: u64, count_if_no_points: usize
     distances2.par_iter_mut().zip(&points).for_each(|(distance2, point)| {
         *distance2 = distance2.min((SIZE_MAX * region::image_side(&dataset.train, point.position)).powi(2));
     });
-    Ok(from_points(&points, &distances2))
+    Ok(from_points(&points, &distances2, dataset.extent()))
 }
 
 /// One Gaussian per point, in their order; `distances2` are their squared sizes.
-fn from_points(points: &[Point], distances2: &[f64]) -> Gaussians {
+fn from_points(points: &[Point], distances2: &[f64], extent: f64) -> Gaussians {
+    let least = DISTANCE2_MIN * extent.min(1.0).powi(2);
     let logit = (OPACITY / (1.0 - OPACITY)).ln() as f32;
     let count = points.len();
-    let scale = |&distance2: &f64| [(0.5 * distance2.max(DISTANCE2_MIN).ln()) as f32; 3];
+    let scale = |&distance2: &f64| [(0.5 * distance2.max(least).ln()) as f32; 3];
     let constant = |value: u8| ((f64::from(value) / 255.0 - 0.5) / SH_C0) as f32;
+    let origin = far_origin(&points.iter().map(|point| point.position).collect::<Vec<_>>());
     let mut gaussians = Gaussians {
-        means: points.iter().map(|point| point.position.as_vec3().to_array()).collect(),
+        origin,
+        means: points.iter().map(|point| (point.position - origin).as_vec3().to_array()).collect(),
         quats: vec![[1.0, 0.0, 0.0, 0.0]; count],
         scales: distances2.iter().map(scale).collect(),
         opacities: vec![logit; count],

@@ -6,6 +6,8 @@ use crate::error::{Error, Result};
 use crate::io::atomic;
 use crate::scene::Gaussians;
 use crate::scene::labels::LABEL_MAX;
+use crate::scene::origin::far_origin;
+use glam::DVec3;
 use ply_rs_bw::ply::{Addable, DefaultElement, ElementDef, Encoding, Header, PropertyDef, PropertyType, ScalarType};
 use ply_rs_bw::writer::Writer;
 use std::io::{self, Write};
@@ -60,15 +62,21 @@ pub fn read_gaussians(path: impl AsRef<Path>) -> Result<ReadPly> {
         read.gaussians.label_confidence = Some(Vec::new());
     }
     let mut dropped = Dropped::default();
+    let mut positions = Vec::new();
     let mut total = 0;
     let odd = table.for_each(&columns, |index, row| {
         total = index + 1;
         let (row, labelling) = row.split_at(14 + rest * 3);
         let label = labelling.first().map(|&label| label_of(path, index, label)).transpose()?;
         let confidence = labelling.get(1).map(|&share| confidence_of(path, index, share)).transpose()?;
-        push_row(&mut read.gaussians, &mut dropped, row, label, confidence);
+        if let Some(position) = push_row(&mut read.gaussians, &mut dropped, row, label, confidence) {
+            positions.push(position);
+        }
         Ok(())
     })?;
+    let origin = far_origin(&positions);
+    read.gaussians.origin = origin;
+    read.gaussians.means = positions.iter().map(|&position| (position - origin).as_vec3().to_array()).collect();
     read.dropped = dropped.total();
     if read.dropped > 0 {
         read.notes.push(format!("left out {} of {total} Gaussians: {}", read.dropped, dropped.reasons()));
@@ -135,23 +143,29 @@ impl Dropped {
     }
 }
 
-/// Appends a row in the order of [`REQUIRED`] and `f_rest_*`, or counts why it is left out.
-fn push_row(to: &mut Gaussians, dropped: &mut Dropped, row: &[f64], label: Option<u32>, confidence: Option<f32>) {
+/// Appends a row in the order of [`REQUIRED`] and `f_rest_*`, but for its position, which it returns; or counts why it
+/// is left out.
+fn push_row(
+    to: &mut Gaussians,
+    dropped: &mut Dropped,
+    row: &[f64],
+    label: Option<u32>,
+    confidence: Option<f32>,
+) -> Option<DVec3> {
     let value = |index: usize| row[index] as f32;
     if (0..row.len()).any(|index| !value(index).is_finite()) {
         dropped.not_finite += 1;
-        return;
+        return None;
     }
     let scales = [value(7), value(8), value(9)];
     if scales.iter().any(|&scale| scale > LOG_SCALE_MAX) {
         dropped.too_large += 1;
-        return;
+        return None;
     }
     let Some(quat) = rotation([row[10], row[11], row[12], row[13]]) else {
         dropped.no_rotation += 1;
-        return;
+        return None;
     };
-    to.means.push([value(0), value(1), value(2)]);
     to.sh0.push([value(3), value(4), value(5)]);
     to.opacities.push(value(6));
     to.scales.push(scales);
@@ -164,6 +178,7 @@ fn push_row(to: &mut Gaussians, dropped: &mut Dropped, row: &[f64], label: Optio
     if let (Some(shares), Some(share)) = (to.label_confidence.as_mut(), confidence) {
         shares.push(share);
     }
+    Some(DVec3::new(row[0], row[1], row[2]))
 }
 
 /// The rotation as stored; normalised only if its squared length would leave f32. `None` for zero.
@@ -177,8 +192,9 @@ fn rotation(quat: [f64; 4]) -> Option<[f32; 4]> {
 }
 
 /// Writes the standard 3DGS PLY (little-endian, no comments, normals zero), with `label` as last column only if
-/// the scene has labels, and `label_confidence` before it only if that is known. Rows that are not finite are left out; returns how many. The file appears complete or
-/// not at all.
+/// the scene has labels, and `label_confidence` before it only if that is known. Positions are world positions, as
+/// doubles where floats would round them, which is only far from the origin. Rows that are not finite are left out;
+/// returns how many. The file appears complete or not at all.
 pub fn write_gaussians(path: impl AsRef<Path>, gaussians: &Gaussians) -> Result<u64> {
     let (count, rest) = (gaussians.len(), gaussians.rest_per_gaussian());
     let lengths = [gaussians.quats.len(), gaussians.scales.len(), gaussians.opacities.len(), gaussians.sh0.len()];
@@ -188,14 +204,15 @@ pub fn write_gaussians(path: impl AsRef<Path>, gaussians: &Gaussians) -> Result<
         return Err(Error::Bug(format!("the columns of {count} Gaussians differ in length")));
     }
     let finite: Vec<usize> = (0..count).filter(|&row| is_finite(gaussians, row)).collect();
-    let header = header(finite.len(), rest * 3, gaussians);
+    let wide = finite.iter().any(|&row| gaussians.world(row) != gaussians.world(row).as_vec3().as_dvec3());
+    let header = header(finite.len(), rest * 3, gaussians, wide);
     atomic::write(path, |out| {
         // The header goes through a buffer because the crate wants a sized writer.
         let mut text = Vec::new();
         Writer::<DefaultElement>::new().write_header(&mut text, &header)?;
         out.write_all(&text)?;
         let mut bytes = Vec::with_capacity((18 + rest * 3) * 4);
-        finite.iter().try_for_each(|&row| write_row(out, &mut bytes, gaussians, row))
+        finite.iter().try_for_each(|&row| write_row(out, &mut bytes, gaussians, row, wide))
     })?;
     Ok((count - finite.len()) as u64)
 }
@@ -208,7 +225,7 @@ fn is_finite(g: &Gaussians, row: usize) -> bool {
         && g.opacities[row].is_finite()
 }
 
-fn header(count: usize, rest: usize, gaussians: &Gaussians) -> Header {
+fn header(count: usize, rest: usize, gaussians: &Gaussians, wide: bool) -> Header {
     let mut names: Vec<String> = ["x", "y", "z", "nx", "ny", "nz"].map(String::from).to_vec();
     names.extend((0..3).map(|k| format!("f_dc_{k}")));
     names.extend((0..rest).map(|k| format!("f_rest_{k}")));
@@ -217,7 +234,10 @@ fn header(count: usize, rest: usize, gaussians: &Gaussians) -> Header {
     names.extend((0..4).map(|k| format!("rot_{k}")));
     let mut vertex = ElementDef::new("vertex".into());
     vertex.count = count;
-    names.into_iter().for_each(|n| vertex.properties.add(PropertyDef::new(n, PropertyType::Scalar(ScalarType::Float))));
+    for (index, name) in names.into_iter().enumerate() {
+        let scalar = if wide && index < 3 { ScalarType::Double } else { ScalarType::Float };
+        vertex.properties.add(PropertyDef::new(name, PropertyType::Scalar(scalar)));
+    }
     if gaussians.labels.is_some() {
         if gaussians.label_confidence.is_some() {
             let share = PropertyDef::new("label_confidence".into(), PropertyType::Scalar(ScalarType::Float));
@@ -231,11 +251,17 @@ fn header(count: usize, rest: usize, gaussians: &Gaussians) -> Header {
     header
 }
 
-fn write_row(out: &mut dyn Write, bytes: &mut Vec<u8>, g: &Gaussians, row: usize) -> io::Result<()> {
+fn write_row(out: &mut dyn Write, bytes: &mut Vec<u8>, g: &Gaussians, row: usize, wide: bool) -> io::Result<()> {
     bytes.clear();
     let rest = g.rest_per_gaussian();
     let triples = &g.sh_rest[row * rest..(row + 1) * rest];
-    let head = g.means[row].into_iter().chain([0.0; 3]).chain(g.sh0[row]);
+    let place = g.world(row).to_array();
+    if wide {
+        place.iter().for_each(|value| bytes.extend_from_slice(&value.to_le_bytes()));
+    } else {
+        place.iter().for_each(|&value| bytes.extend_from_slice(&(value as f32).to_le_bytes()));
+    }
+    let head = [0.0; 3].into_iter().chain(g.sh0[row]);
     let channels = (0..3).flat_map(|channel| triples.iter().map(move |triple| triple[channel]));
     let tail = [g.opacities[row]].into_iter().chain(g.scales[row]).chain(g.quats[row]);
     head.chain(channels).chain(tail).for_each(|value| bytes.extend_from_slice(&value.to_le_bytes()));

@@ -11,6 +11,7 @@ mod kernels;
 use super::measure::{self, Cost, median, median_cost, require, table, timed};
 use super::trained::{labelled_model, timed_step, timing_config, trainer, without_masks};
 use super::{Common, device};
+use glam::DVec3;
 use kernels::{Buffers, Channels, Kernels, step_with_features};
 use labelgs::Result;
 use labelgs::engine::{Room, capacity, model, uniforms::view_uniforms};
@@ -215,7 +216,7 @@ impl Bed {
             stamp: self.stamp,
             adam_correction1: 1.0,
             adam_correction2: 1.0,
-            ..view_uniforms(&view.camera, &self.shape, 0.2, [0.0; 3], self.gaussians)
+            ..view_uniforms(&view.camera, DVec3::ZERO, &self.shape, 0.2, [0.0; 3], self.gaussians)
         };
         self.sched.upload(Buf::STEP, 0, 0, &[uniforms])?;
         self.sched.upload(Buf::TARGET, 0, 0, &photo.rgba)?;

@@ -1,0 +1,67 @@
+//! Scenes far from the origin, such as in UTM coordinates: f32 holds positions relative to a point in their middle.
+
+use glam::DVec3;
+
+/// A scene is far away if its middle is more than so many times its size from the origin. There f32 rounds positions to
+/// 1.5e-5 of the scene, a hundredth of a pixel; beyond it, soon to pixels.
+const FAR: f64 = 256.0;
+
+/// The point that positions are best kept relative to: the origin unless the scene is far from it. Its coordinates are
+/// multiples of a power of two above the size of the scene, so that little is lost in the subtraction.
+pub fn far_origin(positions: &[DVec3]) -> DVec3 {
+    if positions.is_empty() {
+        return DVec3::ZERO;
+    }
+    // Medians, because a stray point may be anywhere.
+    let middle = by_axis(|axis| median(positions.iter().map(|p| p[axis]).collect()));
+    let size = by_axis(|axis| median(positions.iter().map(|p| (p[axis] - middle[axis]).abs()).collect())).length();
+    if !(middle.length() > FAR * size) || !middle.is_finite() {
+        return DVec3::ZERO;
+    }
+    // A scene of one point has no size; then the grid is as fine as f32 is there.
+    let grid = (4.0 * size).max(middle.length() * f64::from(f32::EPSILON)).log2().ceil().exp2();
+    (middle / grid).round() * grid
+}
+
+fn by_axis(value: impl Fn(usize) -> f64) -> DVec3 {
+    DVec3::new(value(0), value(1), value(2))
+}
+
+fn median(mut values: Vec<f64>) -> f64 {
+    let middle = values.len() / 2;
+    *values.select_nth_unstable_by(middle, f64::total_cmp).1
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn cloud(centre: DVec3, size: f64) -> Vec<DVec3> {
+        (0..200)
+            .map(|i| centre + size * DVec3::new((i % 7) as f64 - 3.0, (i % 11) as f64 - 5.0, (i % 5) as f64))
+            .collect()
+    }
+
+    #[test]
+    fn near_scenes_stay_where_they_are() {
+        assert_eq!(far_origin(&[]), DVec3::ZERO);
+        assert_eq!(far_origin(&[DVec3::ZERO]), DVec3::ZERO);
+        for (centre, size) in [(1.0, 1.0), (100.0, 1.0), (1e6, 1e5), (0.0, 1e-3)] {
+            assert_eq!(far_origin(&cloud(DVec3::splat(centre), size)), DVec3::ZERO, "{centre}, {size}");
+        }
+    }
+
+    #[test]
+    fn far_scenes_lose_nothing() {
+        for size in [1e-3, 1.0, 300.0] {
+            let mut cloud = cloud(DVec3::new(4.5e5, 5.4e6, 120.0), size);
+            cloud.push(DVec3::ZERO);
+            let origin = far_origin(&cloud);
+            assert!(origin.distance(DVec3::new(4.5e5, 5.4e6, 120.0)) < 40.0 * size.max(1.0), "{origin}");
+            for p in &cloud[..200] {
+                let back = (*p - origin).as_vec3().as_dvec3() + origin;
+                assert!(back.distance(*p) < 1e-5 * size + 2e-9, "{p}: {}", back.distance(*p));
+            }
+        }
+    }
+}

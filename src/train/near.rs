@@ -1,0 +1,64 @@
+//! The near plane of a scene.
+
+use crate::scene::{Camera, Gaussians};
+use glam::DVec3;
+
+/// The near plane of 3DGS, world units: what a model is rendered with of which nothing is known.
+pub const NEAR: f32 = 0.2;
+/// The near plane of a small scene, in median depths of its Gaussians.
+const SHARE: f64 = 0.05;
+/// Cameras and Gaussians that are looked at, evenly chosen.
+const CAMERAS: usize = 64;
+const GAUSSIANS: usize = 4096;
+
+/// [`NEAR`], or [`SHARE`] of the median depth at which training cameras see the first Gaussians where that is less.
+pub fn near_plane<'a>(cameras: impl ExactSizeIterator<Item = &'a Camera>, model: &Gaussians) -> f32 {
+    let rows: Vec<DVec3> =
+        (0..model.len()).step_by(model.len().div_ceil(GAUSSIANS).max(1)).map(|row| model.world(row)).collect();
+    let every = cameras.len().div_ceil(CAMERAS).max(1);
+    let mut depths = Vec::new();
+    for camera in cameras.step_by(every) {
+        for place in rows.iter().map(|&world| camera.to_camera(world)).filter(|place| place.z > 0.0) {
+            let at = camera.project(place);
+            if at.x >= 0.0 && at.y >= 0.0 && at.x <= f64::from(camera.width) && at.y <= f64::from(camera.height) {
+                depths.push(place.z);
+            }
+        }
+    }
+    if depths.is_empty() {
+        return NEAR;
+    }
+    let middle = depths.len() / 2;
+    let median = *depths.select_nth_unstable_by(middle, f64::total_cmp).1;
+    // A plane at 0 would divide by it.
+    NEAR.min((SHARE * median) as f32).max(f32::MIN_POSITIVE)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::DMat3;
+
+    #[test]
+    fn small_scenes_come_nearer() {
+        let camera = Camera {
+            rotation: DMat3::IDENTITY,
+            translation: DVec3::ZERO,
+            fx: 100.0,
+            fy: 100.0,
+            cx: 32.0,
+            cy: 32.0,
+            width: 64,
+            height: 64,
+        };
+        let at = |depth: f32| Gaussians { means: vec![[0.0, 0.0, depth]; 9], ..Gaussians::default() };
+        let near = |model: &Gaussians| near_plane(std::iter::once(&camera), model);
+        assert_eq!(near(&at(10.0)), NEAR);
+        assert!((near(&at(1e-3)) - 5e-5).abs() < 1e-9);
+        assert_eq!(near(&at(-1.0)), NEAR, "nothing is before the camera");
+        let far = DVec3::new(0.0, 0.0, 5e6);
+        let moved = Gaussians { origin: far, ..at(1e-3) };
+        let away = camera.relative_to(-far);
+        assert!((near_plane(std::iter::once(&away), &moved) - 5e-5).abs() < 1e-6, "far from the origin too");
+    }
+}

@@ -1,0 +1,231 @@
+//! Adversarial models on the device against float64, from the model to the picture and the gradient.
+//!
+//! Bounds are some five times what lavapipe shows: f32 rounds by 6e-8, exponents of about 5 add their roundings, and a
+//! pixel sums tens of such terms. Where a scene loses more, it says why.
+
+use crate::pass::rig::Rig;
+use crate::reference::model::flatten;
+use crate::reference::step::step;
+use crate::reference::{Group, Rules};
+use crate::support::device;
+use crate::support::scenes::{Scene, Shape, plain_camera, scene};
+use labelgs::scene::Gaussians;
+
+/// Bounds of one adversary.
+struct Bound {
+    /// Largest error of a colour where no decision (cut, stop, order) is near, and its reason.
+    colour: f64,
+    /// Largest relative error in norm of the gradient of a kind of parameter, over the Gaussians of which all decisions
+    /// are sure, or over all where hardly any are.
+    gradient: f64,
+}
+
+/// Decisions nearer than this may fall either way.
+const SURE: f64 = 1e-4;
+
+/// Runs a step and compares; prints what was seen.
+fn holds(name: &str, scene: Scene, labels: bool, bound: Bound) {
+    let Some(turn) = device() else { return };
+    let mut rig = Rig::new(turn, scene, labels);
+    rig.train();
+    let pixels = rig.pixels();
+    let image = rig.get::<[f32; 4]>(labelgs::plan::Buf::IMAGE, pixels);
+    let actual = rig.gradient_rows();
+    let (model, camera, mut target) = (rig.model(), rig.scene.camera.clone(), rig.scene.target.clone());
+    if !labels {
+        target.slots.clear();
+    }
+    let expected = step(&Rules::default(), &camera, &model, &target);
+    let mut colour = 0.0_f64;
+    let mut compared = 0;
+    for (found, wanted) in image.iter().zip(&expected.layers[0].pixels) {
+        assert!(found.iter().all(|v| v.is_finite()), "{name}: a pixel is {found:?}");
+        if wanted.margins.image() > SURE {
+            compared += 1;
+            (0..3).for_each(|c| colour = colour.max((f64::from(found[c]) - wanted.colour[c]).abs()));
+        }
+    }
+    let mut sure: Vec<usize> = (0..actual.len()).filter(|&i| expected.margins[i] > SURE).collect();
+    if sure.len() * 4 < actual.len() {
+        // Every splat is at its cut somewhere; then a flip there is part of the bound.
+        sure = (0..actual.len()).collect();
+    }
+    let pick = |rows: &[crate::reference::Row]| sure.iter().map(|&i| rows[i]).collect::<Vec<_>>();
+    let (found, wanted) = (pick(&actual), pick(&expected.rows));
+    let mut gradient = 0.0_f64;
+    for group in Group::ALL.into_iter().take(5 + model.sh_degree as usize) {
+        let (found, wanted) = (flatten(&found, group), flatten(&wanted, group));
+        assert!(found.iter().all(|v| v.is_finite()), "{name}: a gradient of {group:?} is not finite");
+        let norm = |values: &mut dyn Iterator<Item = f64>| values.map(|v| v * v).sum::<f64>().sqrt();
+        let size = norm(&mut wanted.iter().copied());
+        let error = norm(&mut found.iter().zip(&wanted).map(|(a, b)| a - b));
+        let error = if size > 0.0 { error / size } else { error };
+        if error > bound.gradient {
+            println!("{name}: {group:?} {error:.1e} of {size:.1e}");
+        }
+        gradient = gradient.max(error);
+    }
+    println!(
+        "{name}: colours {colour:.1e} of {:.1e} ({compared} of {pixels} pixels), gradients {gradient:.1e} of {:.1e} \
+         ({} of {} Gaussians)",
+        bound.colour,
+        bound.gradient,
+        sure.len(),
+        actual.len()
+    );
+    assert!(compared * 3 > pixels, "{name}: only {compared} of {pixels} pixels are sure");
+    assert!(colour <= bound.colour, "{name}: a colour is off by {colour:.1e}");
+    assert!(gradient <= bound.gradient, "{name}: gradients are off by {gradient:.1e} in norm");
+}
+
+/// A random scene, changed.
+fn changed(seed: u64, shape: Shape, change: impl Fn(usize, &mut Gaussians)) -> Scene {
+    let mut made = scene(seed, &shape);
+    (0..made.gaussians.len()).for_each(|row| change(row, &mut made.gaussians));
+    made
+}
+
+const SMALL: Shape = Shape {
+    gaussians: 80,
+    width: 48,
+    height: 40,
+    objects: 3,
+    sh_degree: 3,
+    scales: (0.05, 0.5),
+    opacities: (-3.0, 5.0),
+};
+
+/// 1e6 : 1 in every rotation. The conic's small eigenvalue is 1e-6 of the large one, so that the exponent is a small
+/// difference of terms ten times as large.
+#[test]
+fn needles() {
+    let made = changed(201, SMALL, |row, g| g.scales[row] = [0.0, (1e-6_f32).ln(), (1e-6_f32).ln()]);
+    holds("needles", made, true, Bound { colour: 5e-5, gradient: 1.1e-4 });
+}
+
+/// Flat discs of which one axis is smaller than any float of a position.
+#[test]
+fn discs() {
+    let made = changed(202, SMALL, |row, g| g.scales[row] = [-1.0, -1.5, -30.0]);
+    holds("discs", made, true, Bound { colour: 5e-6, gradient: 1.1e-5 });
+}
+
+/// Far below a pixel: the blur alone makes the splat.
+#[test]
+fn points() {
+    let made = changed(203, SMALL, |row, g| g.scales[row] = [-15.0, -14.0, -13.0]);
+    holds("points", made, true, Bound { colour: 1.1e-5, gradient: 2e-5 });
+}
+
+/// Larger than the scene: every pixel sees the middle of every splat.
+#[test]
+fn giants() {
+    let made = changed(204, SMALL, |row, g| {
+        g.scales[row] = [6.0, 7.0, 5.0];
+        g.opacities[row] = -3.0;
+    });
+    holds("giants", made, false, Bound { colour: 5e-6, gradient: 1.1e-5 });
+}
+
+/// Rotations of any length that f32 squares.
+#[test]
+fn rotations_of_any_length() {
+    let made = changed(205, SMALL, |row, g| {
+        let length = [1e-15_f32, 1e-6, 1.0, 1e6, 1e15][row % 5];
+        g.quats[row] = g.quats[row].map(|v| v * length);
+    });
+    holds("rotations of any length", made, true, Bound { colour: 5e-6, gradient: 1.1e-5 });
+}
+
+/// Opacities from nothing to all: logits of 15 are 3e-7 from 1, those of 100 are 1.
+#[test]
+fn opacities_at_their_ends() {
+    let made = changed(206, SMALL, |row, g| g.opacities[row] = [-100.0, -15.0, -5.5, 0.0, 15.0, 100.0][row % 6]);
+    holds("opacities at their ends", made, true, Bound { colour: 5e-6, gradient: 1.1e-5 });
+}
+
+fn stack(count: usize, opacity: f64, depth: impl Fn(usize) -> f32) -> Scene {
+    let mut made = scene(207, &Shape { gaussians: 1, width: 24, height: 20, ..SMALL });
+    made.camera = plain_camera(24, 20);
+    let logit = (opacity / (1.0 - opacity)).ln() as f32;
+    let colour = |i: usize| [(i % 7) as f32 * 0.2 - 0.6, (i % 5) as f32 * 0.3 - 0.6, (i % 3) as f32 * 0.5 - 0.5];
+    made.gaussians = Gaussians {
+        means: (0..count).map(|i| [(i % 9) as f32 * 1e-3, (i % 4) as f32 * 1e-3, depth(i)]).collect(),
+        quats: vec![[1.0, 0.0, 0.0, 0.0]; count],
+        scales: vec![[1.0, 1.0, -4.0]; count],
+        opacities: vec![logit; count],
+        sh0: (0..count).map(colour).collect(),
+        labels: Some((0..count).map(|i| (i % 4) as u32).collect()),
+        ..Gaussians::default()
+    };
+    made
+}
+
+/// 2,000 layers of alpha 0.01: transmittance is a product of as many factors, and is divided again going back.
+#[test]
+fn two_thousand_faint_layers() {
+    let made = stack(2000, 0.01, |i| 4.0 + i as f32 * 1e-3);
+    holds("2,000 faint layers", made, true, Bound { colour: 5e-6, gradient: 1.1e-5 });
+}
+
+/// Every alpha at its clamp: two layers leave T at 1e-4 but for rounding, which is just where a pixel stops. It may stop a
+/// layer later, which has a ten-thousandth of the weight.
+#[test]
+fn layers_at_the_clamp() {
+    let made = stack(60, 0.9999, |i| 4.0 + i as f32 * 1e-2);
+    holds("layers at the clamp", made, true, Bound { colour: 5e-6, gradient: 1e-3 });
+}
+
+/// Equal depths: the order is that of the rows, there as here.
+#[test]
+fn ties_of_depth() {
+    let made = stack(400, 0.05, |_| 5.0);
+    holds("ties of depth", made, true, Bound { colour: 5e-6, gradient: 1.1e-5 });
+}
+
+/// Centres on the near plane, one float before and behind it, and large splats across it.
+#[test]
+fn across_the_near_plane() {
+    let near = 0.2_f32;
+    let depths = [near, f32::from_bits(near.to_bits() + 1), f32::from_bits(near.to_bits() - 1), -1.0, 0.21, 0.5];
+    let mut made = stack(120, 0.3, |i| if i % 2 == 0 { depths[i / 2 % 6] } else { 4.0 + i as f32 * 0.01 });
+    made.gaussians.scales.iter_mut().for_each(|scale| *scale = [-3.0, -3.0, 0.0]);
+    holds("across the near plane", made, true, Bound { colour: 5e-6, gradient: 2e-5 });
+}
+
+/// Fields of view of 170 and of 1 degree.
+#[test]
+fn wide_and_narrow_cameras() {
+    for (name, degrees) in [("170 degrees", 170.0_f64), ("1 degree", 1.0)] {
+        let mut made = scene(209, &SMALL);
+        let focal = 24.0 / (degrees.to_radians() / 2.0).tan();
+        (made.camera.fx, made.camera.fy) = (f64::from(focal as f32), f64::from(focal as f32));
+        holds(name, made, true, Bound { colour: 5e-6, gradient: 2e-5 });
+    }
+}
+
+/// Harmonics of 1e6: colours far beyond any photo, negative ones clamped to 0.
+#[test]
+fn harmonics_that_overflow_a_photo() {
+    let made = changed(210, SMALL, |row, g| {
+        let rest = g.rest_per_gaussian();
+        g.sh0[row] = [1e6, -1e6, 1.0];
+        g.sh_rest[row * rest..(row + 1) * rest].iter_mut().for_each(|v| *v = [1e5, -1e5, 0.1]);
+    });
+    holds("harmonics of 1e6", made, true, Bound { colour: 2.0, gradient: 1.1e-5 });
+}
+
+/// Masks of everything and of nothing, and the smallest and the largest label.
+#[test]
+fn masks_and_labels_at_their_ends() {
+    for (name, id) in [("a mask of everything", 1_u32), ("the largest label", 65_535)] {
+        let mut made = scene(211, &Shape { objects: 1, ..SMALL });
+        made.target.label_map.fill(id);
+        made.target.slots.iter_mut().for_each(|slot| slot.label = id);
+        made.gaussians.labels.iter_mut().flatten().for_each(|label| *label *= id);
+        holds(name, made, true, Bound { colour: 5e-6, gradient: 2e-5 });
+    }
+    let mut made = scene(212, &Shape { objects: 1, ..SMALL });
+    made.target.label_map.fill(0);
+    holds("a mask of nothing", made, true, Bound { colour: 5e-6, gradient: 1.1e-5 });
+}

@@ -1,0 +1,142 @@
+//! Runs of the tool on a small scene, and what they leave.
+
+use assert_cmd::Command;
+use labelgs::io::checkpoint_folder::{self, Found};
+use labelgs::io::ply::read_gaussians;
+use labelgs::train::TrainState;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Output, Stdio};
+
+const SETTINGS: &str = "
+iterations = 40
+checkpoint_every = 4
+preview_every = 7
+label_from = 4
+vote_every = 12
+occlusion_every = 15
+sh_degree_interval = 6
+densify_from = 5
+densify_interval = 8
+densify_grad_threshold = 1e-4
+opacity_reset_interval = 20
+opacity_reset_margin = 10
+";
+
+/// A scene, and a folder for compiled pipelines, which make starts quick.
+pub struct Place {
+    folder: tempfile::TempDir,
+}
+
+impl Place {
+    /// Makes the scene.
+    pub fn new() -> Self {
+        let place = Self { folder: tempfile::tempdir().expect("a folder") };
+        let scene = place.text("scene");
+        let made = ["synth", &scene, "--preset", "simple", "--size", "64x48", "--views", "6", "--points", "200"];
+        assert!(place.labelgs(&made).status.success());
+        std::fs::write(place.path("settings.toml"), SETTINGS).expect("settings");
+        place
+    }
+
+    /// A path in the folder.
+    pub fn path(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+
+    /// The same as text.
+    pub fn text(&self, name: &str) -> String {
+        self.path(name).to_str().expect("UTF-8").to_owned()
+    }
+
+    /// Runs the tool.
+    pub fn labelgs(&self, args: &[&str]) -> Output {
+        self.faulty(args, None)
+    }
+
+    /// Runs the tool with a fault (src/fault.rs).
+    pub fn faulty(&self, args: &[&str], fault: Option<&str>) -> Output {
+        let mut command = Command::cargo_bin("labelgs").expect("the tool is built");
+        command.env("LABELGS_VALIDATION", "off").env("LABELGS_CACHE", self.path("cache"));
+        if let Some(fault) = fault {
+            command.env("LABELGS_FAULT", fault);
+        }
+        command.args(args).output().expect("it runs")
+    }
+
+    /// A run in the folder `out` with further flags.
+    pub fn train(&self, out: &str, flags: &[&str]) -> Vec<String> {
+        let typed = ["train", &self.text("scene"), "-o", &self.text(out), "--masks", &self.text("scene/masks")];
+        typed.iter().chain(flags).map(|&part| part.to_owned()).collect()
+    }
+
+    /// Runs it.
+    pub fn trained(&self, out: &str, flags: &[&str]) -> Output {
+        self.trained_with(None, out, flags)
+    }
+
+    /// Runs it with a fault.
+    pub fn trained_with(&self, fault: Option<&str>, out: &str, flags: &[&str]) -> Output {
+        let args = self.train(out, flags);
+        self.faulty(&args.iter().map(String::as_str).collect::<Vec<_>>(), fault)
+    }
+
+    /// Starts the tool.
+    pub fn spawned(&self, args: &[String]) -> Child {
+        let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_labelgs"));
+        command.env("LABELGS_VALIDATION", "off").env("LABELGS_CACHE", self.path("cache")).args(args);
+        command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().expect("it runs")
+    }
+
+    /// The file of settings.
+    pub fn settings(&self) -> String {
+        self.text("settings.toml")
+    }
+
+    /// Checkpoints, the newest first.
+    pub fn checkpoints(&self, out: &str) -> Vec<Found> {
+        checkpoint_folder::list(&self.path(out)).expect("a list")
+    }
+
+    /// Bytes of the model of a step.
+    pub fn model(&self, out: &str, step: u32) -> Vec<u8> {
+        let path = self.path(out).join(format!("point_cloud/iteration_{step}/point_cloud.ply"));
+        std::fs::read(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
+    }
+}
+
+/// What was said.
+pub fn stderr(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+#[track_caller]
+pub fn succeeded(output: &Output) -> String {
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(output));
+    stderr(output)
+}
+
+/// All files below a folder.
+pub fn files(folder: &Path) -> Vec<PathBuf> {
+    let entries = std::fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path());
+    entries.flat_map(|path| if path.is_dir() { files(&path) } else { vec![path] }).collect()
+}
+
+/// Every file that a killed run left can be read by its name, but for temporary ones, which have another.
+pub fn all_whole(out: &Path) {
+    for path in files(out) {
+        let name = path.file_name().expect("a name").to_string_lossy().into_owned();
+        if name.starts_with(".labelgs-") {
+            continue;
+        }
+        let read = || std::fs::read_to_string(&path).expect("text");
+        let whole = match path.extension().and_then(|extension| extension.to_str()) {
+            Some("ckpt") => TrainState::read(&path).map(drop).map_err(|error| error.to_string()),
+            Some("ply") => read_gaussians(&path).map(drop).map_err(|error| error.to_string()),
+            Some("json") => serde_json::from_str::<serde_json::Value>(&read()).map(drop).map_err(|e| e.to_string()),
+            Some("toml") => toml::from_str::<toml::Table>(&read()).map(drop).map_err(|error| error.to_string()),
+            Some("png") => image::open(&path).map(drop).map_err(|error| error.to_string()),
+            _ => Err("what is this?".to_owned()),
+        };
+        whole.unwrap_or_else(|error| panic!("{}: {error}", path.display()));
+    }
+}
