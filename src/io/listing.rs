@@ -9,6 +9,9 @@ use std::path::{Path, PathBuf};
 /// Largest side of a camera, px.
 const SIDE_MAX: u32 = 1 << 17;
 
+/// Farthest from the origin that a camera or a point may be, world units: there the squares of f32 are still numbers.
+pub(crate) const FAR: f64 = 1e12;
+
 /// One photo as listed.
 #[derive(Clone, Debug)]
 pub(crate) struct Listed {
@@ -55,6 +58,12 @@ pub(crate) fn check_camera(path: &Path, place: &str, camera: &Camera, lens: &Len
             "focal lengths {fx} and {fy} px make a field of view of 180 degrees; a pinhole ends before"
         ));
     }
+    let narrowest = (f64::from(width) / fx).min(f64::from(height) / fy);
+    if narrowest < 1e-6 {
+        return refuse(format!(
+            "focal lengths {fx} and {fy} px are a million times the image of {width} x {height} px; they are in px"
+        ));
+    }
     if !(0.0..=f64::from(width)).contains(&cx) || !(0.0..=f64::from(height)).contains(&cy) {
         return refuse(format!("principal point ({cx}, {cy}) lies outside the image of {width} x {height} px"));
     }
@@ -63,6 +72,9 @@ pub(crate) fn check_camera(path: &Path, place: &str, camera: &Camera, lens: &Len
     }
     if !camera.translation.is_finite() || !camera.rotation.is_finite() {
         return refuse("the pose is not finite".into());
+    }
+    if camera.translation.length() > FAR {
+        return refuse(format!("the camera is farther than {FAR:e} from the origin; move the scene to it"));
     }
     Ok(())
 }

@@ -5,7 +5,7 @@
 
 use super::lens::Lens;
 use super::listed_path::Place;
-use super::listing::{Listed, Listing, check_camera, find_file, invert_pose, rotation_of};
+use super::listing::{FAR, Listed, Listing, check_camera, find_file, invert_pose, rotation_of};
 use super::{image, ply};
 use crate::error::{Error, Result};
 use crate::scene::{Camera, Point};
@@ -272,6 +272,10 @@ fn in_the_frame_of(
     };
     let moved = points.iter().map(|p| Point { position: matrix.transform_point3(p.position), ..*p });
     let moved: Vec<Point> = moved.collect();
+    if !moved.iter().all(|point| point.position.abs().max_element() <= FAR) {
+        let problem = format!("moves points beyond {FAR:e}; expected a rotation and a scale of the usual size");
+        return Err(Error::data(path, "applied_transform", problem));
+    }
     if seen(views, &moved) as f64 > 1.2 * seen(views, &points) as f64 {
         notes.push("applied_transform was applied to the points, which fit the cameras only so".into());
         return Ok(moved);

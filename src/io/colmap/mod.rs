@@ -8,7 +8,7 @@ mod model;
 mod text;
 
 use super::listed_path::Place;
-use super::listing::{Listed, Listing, check_camera, find_file};
+use super::listing::{FAR, Listed, Listing, check_camera, find_file};
 use crate::error::{Error, Result};
 use crate::scene::{Camera, Point};
 use glam::{DMat3, DQuat, DVec3};
@@ -60,9 +60,12 @@ pub(crate) fn list(scene: &Place) -> Result<Option<Listing>> {
 
 fn finite(mut points: Vec<Point>, notes: &mut Vec<String>) -> Vec<Point> {
     let before = points.len();
-    points.retain(|point| point.position.is_finite());
+    points.retain(|point| point.position.is_finite() && point.position.abs().max_element() <= FAR);
     if points.len() < before {
-        notes.push(format!("left out {} of {before} points whose position is not finite", before - points.len()));
+        notes.push(format!(
+            "left out {} of {before} points whose position is not finite or beyond {FAR:e}",
+            before - points.len()
+        ));
     }
     points
 }
