@@ -41,7 +41,7 @@ impl<'a> Place<'a> {
             return refuse("is no path of a file; list photos by paths relative to the scene folder");
         }
         let inside = path.components().all(|part| matches!(part, Component::Normal(_) | Component::CurDir));
-        if !(inside && !has_drive(&text)) && !self.allow_outside {
+        if !self.allow_outside && (!inside || has_drive(&text)) {
             return refuse(
                 "lies outside the scene folder; list photos by paths relative to it, without `..`, or say \
                  --allow-outside if the scene may read them there",

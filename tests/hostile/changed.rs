@@ -8,7 +8,7 @@ use crate::support::memory::peak_of;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 /// Most places of a seed that are changed; longer seeds are changed at evenly spaced places.
-const PLACES: usize = 400;
+const PLACES: usize = 250;
 
 /// Numbers that a field may be given, as text.
 const WORDS: [&str; 11] = [

@@ -113,7 +113,6 @@ pub const TARGETS: [Target; 28] = [
         read: mask_rgb,
         seeds: seeds::mask_rgb,
         dress: png_sums,
-        ..PLAIN
     },
     Target {
         name: "mask_binary",
@@ -122,7 +121,6 @@ pub const TARGETS: [Target; 28] = [
         read: |folder, _| imported(folder, Format::BinaryFolders),
         seeds: seeds::mask_binary,
         dress: png_sums,
-        ..PLAIN
     },
     Target {
         name: "mask_auto",
@@ -131,7 +129,6 @@ pub const TARGETS: [Target; 28] = [
         read: |folder, _| imported(folder, Format::Auto),
         seeds: seeds::mask,
         dress: png_sums,
-        ..PLAIN
     },
     Target {
         name: "pred_json",
@@ -148,7 +145,6 @@ pub const TARGETS: [Target; 28] = [
         read: depth,
         seeds: seeds::depth_png,
         dress: png_sums,
-        ..PLAIN
     },
     Target {
         name: "depth_exr",
