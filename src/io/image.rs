@@ -39,6 +39,19 @@ pub(crate) fn check_length(path: &Path, (width, height): (u32, u32), channels: u
     if samples <= (file_length(path)? + 64) * SAMPLES_MAX { Ok(()) } else { Err(too_short(path, (width, height))) }
 }
 
+/// Refuses a palette that is no whole number of colours, which the decoder would read beyond the end of.
+fn check_palette(path: &Path) -> Result<()> {
+    let file = std::io::BufReader::new(std::fs::File::open(path).map_err(Error::read(path))?);
+    let reader = png::Decoder::new(file).read_info();
+    let reader = reader.map_err(|error| Error::data(path, "", format!("cannot be decoded: {error}")))?;
+    let bytes = reader.info().palette.as_ref().map_or(0, |palette| palette.len());
+    if bytes.is_multiple_of(3) {
+        return Ok(());
+    }
+    let problem = format!("has {bytes} bytes, no whole number of colours; write the picture anew");
+    Err(Error::data(path, "palette", problem))
+}
+
 fn file_length(path: &Path) -> Result<u64> {
     Ok(std::fs::metadata(path).map_err(Error::read(path))?.len())
 }
@@ -99,9 +112,10 @@ fn decode(path: &Path) -> Result<image::DynamicImage> {
     // What comes out with 8 bits may have been packed grey or a palette of two colours.
     let packed = if decoder.color_type().bytes_per_pixel() == decoder.color_type().channel_count() { 1 } else { bits };
     if png {
-        check_png_length(path, size, packed)?
+        check_png_length(path, size, packed)?;
+        check_palette(path)?;
     } else {
-        check_length(path, size, 1)?
+        check_length(path, size, 1)?;
     }
     image::DynamicImage::from_decoder(decoder).map_err(undecodable)
 }
