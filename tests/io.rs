@@ -3,7 +3,7 @@
 mod checkpoint;
 mod colmap;
 mod depths;
-mod fixtures;
+pub mod fixtures;
 mod init;
 mod label_table;
 mod mask_check;

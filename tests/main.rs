@@ -5,6 +5,9 @@ use labelgs::reference;
 #[allow(dead_code, reason = "helpers are shared by tests that come and go")]
 mod support;
 
+#[global_allocator]
+static MEMORY: support::memory::Counting = support::memory::Counting;
+
 mod architecture;
 mod associate;
 mod cli;
@@ -20,6 +23,7 @@ mod decide;
 mod densify;
 mod edits;
 mod gradient;
+mod hostile;
 mod invariants;
 mod io;
 mod labels;

@@ -1,5 +1,7 @@
 //! Arguments that several verbs share. Only what was typed is in here; decisions are made in `config` and in the verbs.
 
+use super::values::share;
+use crate::io::{LoadOptions, MAX_BAD_PHOTOS};
 use clap::Args;
 
 /// What applies to every verb.
@@ -25,6 +27,31 @@ pub struct JsonFlag {
     pub json: bool,
 }
 
+/// What is let through of a scene that is not as it should be.
+#[derive(Args, Clone, Copy, Debug)]
+#[command(next_help_heading = "Scene")]
+pub struct ReadArgs {
+    /// Largest share of the photos, from 0 to 1, that may be undecodable: they are skipped with a warning.
+    #[arg(long, value_name = "SHARE", value_parser = share, default_value_t = MAX_BAD_PHOTOS)]
+    pub max_bad_photos: f32,
+    /// Read photos and points also where the scene lists them outside of its folder.
+    #[arg(long)]
+    pub allow_outside: bool,
+}
+
+impl Default for ReadArgs {
+    fn default() -> Self {
+        Self { max_bad_photos: MAX_BAD_PHOTOS, allow_outside: false }
+    }
+}
+
+impl ReadArgs {
+    /// Puts what was typed into `options`.
+    pub fn into_options(self, options: LoadOptions) -> LoadOptions {
+        LoadOptions { max_bad_photos: self.max_bad_photos, allow_outside: self.allow_outside, ..options }
+    }
+}
+
 /// How a scene is read by a verb that does not train.
 #[derive(Args, Clone, Debug)]
 pub struct SceneArgs {
@@ -34,4 +61,7 @@ pub struct SceneArgs {
     /// Longest side of a picture, px; otherwise its own size.
     #[arg(long, value_name = "PX", value_parser = clap::value_parser!(u32).range(1..), help_heading = "Scene")]
     pub max_resolution: Option<u32>,
+    /// What is let through.
+    #[command(flatten)]
+    pub read: ReadArgs,
 }

@@ -1,6 +1,6 @@
 //! Which labels: by id, by name, by a mask, a point or a box in a view. Several ways add up.
 
-use super::args::SceneArgs;
+use super::args::{ReadArgs, SceneArgs};
 use super::context::Context;
 use super::labelled::TableArg;
 use super::scene::{find_view, near_plane, open_gpu, open_scene, render_engine};
@@ -65,6 +65,9 @@ pub struct ChooseArgs {
     /// Longest side of a view, px; otherwise that of its photo.
     #[arg(long, value_name = "PX", value_parser = clap::value_parser!(u32).range(1..))]
     pub max_resolution: Option<u32>,
+    /// What is let through of the scene.
+    #[command(flatten)]
+    pub read: ReadArgs,
 }
 
 /// The model that is asked, and where its views are.
@@ -79,12 +82,15 @@ pub struct Asked<'a> {
     pub scene: Option<&'a Path>,
     /// Longest side of a view, px.
     pub max_resolution: Option<u32>,
+    /// What is let through of the scene.
+    pub read: ReadArgs,
 }
 
 impl ChooseArgs {
     /// The labels that are meant.
     pub fn labels(&self, path: &Path, model: &Gaussians, known: &Catalogue, to: &Context) -> Result<BTreeSet<u32>> {
-        let asked = Asked { path, model, known, scene: self.scene.as_deref(), max_resolution: self.max_resolution };
+        let (scene, max_resolution) = (self.scene.as_deref(), self.max_resolution);
+        let asked = Asked { path, model, known, scene, max_resolution, read: self.read };
         self.prompts.labels("--labels", self.labels.as_ref(), &asked, to)
     }
 }
@@ -155,7 +161,7 @@ impl PromptArgs {
         let Some(labels) = &asked.model.labels else {
             return Err(Error::data(asked.path, "", "the model has no labels; train it with --masks"));
         };
-        let reading = SceneArgs { test_every: 8, max_resolution: asked.max_resolution };
+        let reading = SceneArgs { test_every: 8, max_resolution: asked.max_resolution, read: asked.read };
         let dataset = open_scene(scene, &reading, None, [0.0; 3], false)?;
         let mut cameras: BTreeMap<Key, Camera> = BTreeMap::new();
         for prompt in prompts {

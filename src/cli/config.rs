@@ -80,6 +80,7 @@ pub fn load_options(config: &TrainConfig, masks: Option<PathBuf>) -> LoadOptions
         test_every: some(config.test_every),
         background: config.background,
         photos: true,
+        ..LoadOptions::default()
     }
 }
 

@@ -18,9 +18,6 @@ pub struct Context {
 pub fn open_model(path: &Path) -> Result<Gaussians> {
     let path = &if path.is_dir() { crate::train::record::latest_model(path)? } else { path.to_owned() };
     let read = crate::io::ply::read_gaussians(path)?;
-    read.notes.iter().for_each(|note| tracing::info!("{}: {note}", path.display()));
-    if read.dropped > 0 {
-        tracing::warn!("{}: left out {} Gaussians that cannot be rendered", path.display(), read.dropped);
-    }
+    read.notes.iter().for_each(|note| tracing::warn!("{}: {note}", path.display()));
     Ok(read.gaussians)
 }

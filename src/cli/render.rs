@@ -108,6 +108,7 @@ fn shown(args: &RenderArgs, context: &Context) -> Result<Gaussians> {
         known: &known,
         scene: args.scene.as_deref(),
         max_resolution: args.reading.max_resolution,
+        read: args.reading.read,
     };
     let labels = args.prompts.labels(flag, picks.as_ref(), &asked, context)?;
     let labels: Vec<u32> = labels.into_iter().collect();

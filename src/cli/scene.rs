@@ -48,8 +48,9 @@ pub fn open_scene(
     photos: bool,
 ) -> Result<Dataset> {
     let test_every = (reading.test_every > 0).then_some(reading.test_every);
-    let options = LoadOptions { masks, max_resolution: reading.max_resolution, test_every, background, photos };
-    open_with(path, &options)
+    let (max_resolution, base) = (reading.max_resolution, LoadOptions::default());
+    let options = LoadOptions { masks, max_resolution, test_every, background, photos, ..base };
+    open_with(path, &reading.read.into_options(options))
 }
 
 /// Reads a scene with given options and logs its notes.

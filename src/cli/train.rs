@@ -43,7 +43,7 @@ pub(super) fn train(args: &TrainArgs, context: &Context) -> Result<(serde_json::
     let mut run = resume::facts(args, resumed.as_ref());
     let masks = args.masks.clone().or(run.masks.as_ref().map(PathBuf::from));
     let names = masks.as_deref().map(LabelTable::of_folder).transpose()?.flatten();
-    let mut dataset = open_with(&args.scene, &config::load_options(&config, masks.clone()))?;
+    let mut dataset = open_with(&args.scene, &args.read.into_options(config::load_options(&config, masks.clone())))?;
     if dataset.train.is_empty() {
         return Err(Error::data(
             &args.scene,

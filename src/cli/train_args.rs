@@ -1,7 +1,7 @@
 //! Flags of `labelgs train`: one per field of [`TrainConfig`], each absent unless typed. Defaults in the help come from
 //! `TrainConfig::default()`.
 
-use super::args::JsonFlag;
+use super::args::{JsonFlag, ReadArgs};
 use super::values::{bytes, colour, count, samples, switch};
 use crate::scene::DepthKind;
 use crate::train::TrainConfig;
@@ -43,6 +43,9 @@ pub struct TrainArgs {
     /// Most memory of the device to use, such as 1500M or 2G: the number of Gaussians stays below what that holds.
     #[arg(long, value_name = "SIZE", value_parser = bytes)]
     pub memory_limit: Option<u64>,
+    /// What is let through of the scene; the same has to be typed again with --resume.
+    #[command(flatten)]
+    pub read: ReadArgs,
     /// The run.
     #[command(flatten)]
     pub run: RunFlags,

@@ -24,13 +24,13 @@ fn stem(name: &str) -> PathBuf {
 }
 
 impl DepthFolder {
-    /// The maps in `folder` for the photos of `scene`.
+    /// The maps in `folder` for the photos of `scene`, which was opened before.
     pub fn open(folder: &Path, scene: &Path) -> Result<Self> {
         if !folder.is_dir() {
             return Err(Error::data(folder, "", "there is no such folder of depth maps"));
         }
         let listed: BTreeMap<String, Listed> =
-            super::list(scene)?.views.into_iter().map(|view| (view.name.clone(), view)).collect();
+            super::list(scene, true)?.views.into_iter().map(|view| (view.name.clone(), view)).collect();
         let mut stems = HashMap::new();
         listed.keys().for_each(|name| *stems.entry(stem(name)).or_insert(0) += 1);
         Ok(Self { folder: folder.to_owned(), listed, stems })

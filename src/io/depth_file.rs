@@ -1,6 +1,6 @@
 //! One depth map in a file: 16-bit PNG, EXR, NPY or PFM. Values are handed on as they are written.
 
-use super::image::check_size;
+use super::image::{PIXELS_MAX, check_length, check_png_length, check_size};
 use crate::error::{Error, Result};
 use crate::scene::DepthMap;
 use exr::prelude::{MetaData, read_first_flat_layer_from_file};
@@ -43,6 +43,7 @@ fn read_png(path: &Path) -> Result<DepthMap> {
         );
         return Err(Error::data(path, "", problem));
     }
+    check_png_length(path, (width, height), 16)?;
     let mut bytes = vec![0; reader.output_buffer_size().ok_or_else(|| refuse(&"too large"))?];
     reader.next_frame(&mut bytes).map_err(|error| refuse(&error))?;
     let values = bytes.chunks_exact(2).map(|pair| f32::from(u16::from_be_bytes([pair[0], pair[1]]))).collect();
@@ -56,10 +57,20 @@ fn read_exr(path: &Path) -> Result<DepthMap> {
         return Err(Error::data(path, "", "there is no such file"));
     }
     let header = MetaData::read_from_file(path, false).map_err(|error| refuse(&error))?;
-    let size = header.headers.first().map_or((0, 0), |header| (header.layer_size.x(), header.layer_size.y()));
     let side = |side: usize| u32::try_from(side).unwrap_or(u32::MAX);
-    let (width, height) = (side(size.0), side(size.1));
-    check_size(path, (width, height))?;
+    let (mut samples, mut first) = (0, None);
+    for header in &header.headers {
+        // Which layer is read is the crate's choice, and all channels of it take memory.
+        let (size, channels) = ((side(header.layer_size.x()), side(header.layer_size.y())), header.channels.list.len());
+        check_size(path, size)?;
+        check_length(path, size, channels as u64)?;
+        samples += u64::from(size.0) * u64::from(size.1) * channels as u64;
+        first = first.or(Some(size));
+    }
+    if samples > PIXELS_MAX {
+        return Err(refuse(&format!("{samples} samples in all channels; up to {PIXELS_MAX} are supported")));
+    }
+    let Some((width, height)) = first else { return Err(refuse(&"it has no picture")) };
     let image = read_first_flat_layer_from_file(path).map_err(|error| refuse(&error))?;
     let channels = &image.layer_data.channel_data.list;
     let named = |name: &str| channels.iter().find(|channel| channel.name.eq(name));
@@ -155,7 +166,11 @@ fn read_pfm(path: &Path) -> Result<DepthMap> {
     let mut number = |what: &str| {
         word().and_then(|word| word.parse::<f64>().ok()).ok_or_else(|| refuse(&format!("its header has no {what}")))
     };
-    let (width, height, scale) = (number("width")? as u32, number("height")? as u32, number("scale")?);
+    let (width, height, scale) = (number("width")?, number("height")?, number("scale")?);
+    if [width, height].iter().any(|side| side.fract() != 0.0) || !scale.is_finite() || scale == 0.0 {
+        return Err(refuse(&format!("{width} x {height} px with the scale {scale}; sides are whole, scales not 0")));
+    }
+    let (width, height) = (width as u32, height as u32);
     check_size(path, (width, height))?;
     let (row, expected) = (width as usize * 4, width as usize * height as usize * 4);
     let numbers = &bytes[at.min(bytes.len())..];

@@ -21,6 +21,47 @@ pub(crate) fn check_size(path: &Path, (width, height): (u32, u32)) -> Result<()>
     Ok(())
 }
 
+/// Most bytes that deflate makes of one; few bytes of header around them are forgiven.
+const DEFLATE_MAX: u64 = 1032;
+/// Most samples that one byte stands for in the other formats: a JPEG has at least a bit for each block of 64 and each of
+/// the parts that it may be interleaved of.
+const SAMPLES_MAX: u64 = 8192;
+
+/// Refuses a PNG of `bits` a pixel whose file is too short for its pixels, before memory is taken for them.
+pub(crate) fn check_png_length(path: &Path, (width, height): (u32, u32), bits: u32) -> Result<()> {
+    let bytes = (u64::from(width) * u64::from(bits)).div_ceil(8) * u64::from(height);
+    if bytes <= (file_length(path)? + 64) * DEFLATE_MAX { Ok(()) } else { Err(too_short(path, (width, height))) }
+}
+
+/// Refuses a file that is too short for `channels` of so many pixels, whatever packed them.
+pub(crate) fn check_length(path: &Path, (width, height): (u32, u32), channels: u64) -> Result<()> {
+    let samples = u64::from(width) * u64::from(height) * channels;
+    if samples <= (file_length(path)? + 64) * SAMPLES_MAX { Ok(()) } else { Err(too_short(path, (width, height))) }
+}
+
+/// Refuses a palette that is no whole number of colours, which the decoder would read beyond the end of.
+fn check_palette(path: &Path) -> Result<()> {
+    let file = std::io::BufReader::new(std::fs::File::open(path).map_err(Error::read(path))?);
+    let reader = png::Decoder::new(file).read_info();
+    let reader = reader.map_err(|error| Error::data(path, "", format!("cannot be decoded: {error}")))?;
+    let bytes = reader.info().palette.as_ref().map_or(0, |palette| palette.len());
+    if bytes.is_multiple_of(3) {
+        return Ok(());
+    }
+    let problem = format!("has {bytes} bytes, no whole number of colours; write the picture anew");
+    Err(Error::data(path, "palette", problem))
+}
+
+fn file_length(path: &Path) -> Result<u64> {
+    Ok(std::fs::metadata(path).map_err(Error::read(path))?.len())
+}
+
+fn too_short(path: &Path, (width, height): (u32, u32)) -> Error {
+    let problem =
+        format!("{width} x {height} px cannot be in so few bytes; the file was cut short or its header is wrong");
+    Error::data(path, "", problem)
+}
+
 fn reader(path: &Path) -> Result<ImageReader<std::io::BufReader<std::fs::File>>> {
     // The kind is guessed from the first bytes, so a PNG called .jpg is read all the same.
     let mut reader = ImageReader::open(path).and_then(ImageReader::with_guessed_format).map_err(Error::read(path))?;
@@ -63,8 +104,19 @@ pub fn read_grey(path: impl AsRef<Path>) -> Result<(u32, u32, Vec<u8>)> {
 
 fn decode(path: &Path) -> Result<image::DynamicImage> {
     let undecodable = |error: image::ImageError| Error::data(path, "", format!("cannot be decoded: {error}"));
-    let decoder = reader(path)?.into_decoder().map_err(undecodable)?;
-    check_size(path, decoder.dimensions())?;
+    let reader = reader(path)?;
+    let png = reader.format() == Some(image::ImageFormat::Png);
+    let decoder = reader.into_decoder().map_err(undecodable)?;
+    let (size, bits) = (decoder.dimensions(), u32::from(decoder.color_type().bits_per_pixel()));
+    check_size(path, size)?;
+    // What comes out with 8 bits may have been packed grey or a palette of two colours.
+    let packed = if decoder.color_type().bytes_per_pixel() == decoder.color_type().channel_count() { 1 } else { bits };
+    if png {
+        check_png_length(path, size, packed)?;
+        check_palette(path)?;
+    } else {
+        check_length(path, size, 1)?;
+    }
     image::DynamicImage::from_decoder(decoder).map_err(undecodable)
 }
 

@@ -4,10 +4,13 @@ use super::lens::Lens;
 use crate::error::{Error, Result};
 use crate::scene::{Camera, Point};
 use glam::{DMat3, DQuat, DVec3};
-use std::path::{Component, Path, PathBuf};
+use std::path::{Path, PathBuf};
 
 /// Largest side of a camera, px.
 const SIDE_MAX: u32 = 1 << 17;
+
+/// Farthest from the origin that a camera or a point may be, world units: there the squares of f32 are still numbers.
+pub(crate) const FAR: f64 = 1e12;
 
 /// One photo as listed.
 #[derive(Clone, Debug)]
@@ -25,13 +28,15 @@ pub(crate) struct Listed {
 }
 
 /// A scene before any pixel is read.
-#[derive(Clone, Debug, Default)]
+#[derive(Debug, Default)]
 pub(crate) struct Listing {
     /// The file that lists the photos, for messages.
     pub(crate) source: PathBuf,
     pub(crate) views: Vec<Listed>,
     /// Names of photos without a file that could not even be made a camera of.
     pub(crate) missing: Vec<String>,
+    /// Why photos that are there could not be made a camera of.
+    pub(crate) bad: Vec<Error>,
     pub(crate) points: Vec<Point>,
     pub(crate) notes: Vec<String>,
 }
@@ -53,6 +58,12 @@ pub(crate) fn check_camera(path: &Path, place: &str, camera: &Camera, lens: &Len
             "focal lengths {fx} and {fy} px make a field of view of 180 degrees; a pinhole ends before"
         ));
     }
+    let narrowest = (f64::from(width) / fx).min(f64::from(height) / fy);
+    if narrowest < 1e-6 {
+        return refuse(format!(
+            "focal lengths {fx} and {fy} px are a million times the image of {width} x {height} px; they are in px"
+        ));
+    }
     if !(0.0..=f64::from(width)).contains(&cx) || !(0.0..=f64::from(height)).contains(&cy) {
         return refuse(format!("principal point ({cx}, {cy}) lies outside the image of {width} x {height} px"));
     }
@@ -61,6 +72,9 @@ pub(crate) fn check_camera(path: &Path, place: &str, camera: &Camera, lens: &Len
     }
     if !camera.translation.is_finite() || !camera.rotation.is_finite() {
         return refuse("the pose is not finite".into());
+    }
+    if camera.translation.length() > FAR {
+        return refuse(format!("the camera is farther than {FAR:e} from the origin; move the scene to it"));
     }
     Ok(())
 }
@@ -83,20 +97,6 @@ pub(crate) fn rotation_of(matrix: DMat3) -> Option<DMat3> {
 pub(crate) fn invert_pose(rotation: DMat3, centre: DVec3) -> (DMat3, DVec3) {
     let inverse = rotation.transpose();
     (inverse, -(inverse * centre))
-}
-
-/// `name` as a path below the scene. Paths that leave the scene are refused.
-pub(crate) fn relative_path(source: &Path, root: &Path, name: &str) -> Result<PathBuf> {
-    let mut path = PathBuf::from(name);
-    if let Ok(inside) = path.strip_prefix(root) {
-        path = inside.to_owned();
-    }
-    let leaves = path.components().any(|part| !matches!(part, Component::Normal(_) | Component::CurDir));
-    if leaves || path.as_os_str().is_empty() || name.contains('\0') {
-        let problem = "lies outside the scene folder; list photos by paths relative to it, without `..`";
-        return Err(Error::data(source, format!("photo `{name}`"), problem));
-    }
-    Ok(path.components().filter(|part| *part != Component::CurDir).collect())
 }
 
 /// The first of `folders` (below `root`) that holds `relative`, with one of `extensions` added.

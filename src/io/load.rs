@@ -1,10 +1,10 @@
 //! From a listing to a data set: split, decode, undistort, resize, masks.
 
-use super::LoadOptions;
 use super::image::{check_size, photo_size, read_photo};
 use super::listing::{Listed, Listing};
 use super::mask::{MaskFolder, read_checked};
 use super::resample::{bounded_size, resample_ids, same_aspect, shrink_photo, undistort_photo};
+use super::{LoadOptions, bad_photos};
 use crate::error::{Error, Result};
 use crate::scene::{Camera, Dataset, LabelMap, Photo, View};
 use rayon::prelude::*;
@@ -12,7 +12,7 @@ use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 
 /// Most problems that one message lists.
-const LISTED_MAX: usize = 20;
+pub(crate) const LISTED_MAX: usize = 20;
 
 /// Loads what `listing` lists.
 pub(crate) fn load(root: &Path, mut listing: Listing, options: &LoadOptions) -> Result<Dataset> {
@@ -23,9 +23,19 @@ pub(crate) fn load(root: &Path, mut listing: Listing, options: &LoadOptions) -> 
     let masks = options.masks.as_deref().map(|folder| MaskFolder::new(folder, views.iter().map(|v| v.name.as_str())));
     let masks = masks.transpose()?;
     let resampled = AtomicUsize::new(0);
-    let loaded: Vec<Result<View>> =
-        views.par_iter().map(|view| load_view(view, options, masks.as_ref(), &resampled)).collect();
-    let loaded = all_or_one_error(root, loaded)?;
+    let read = |view| Ok(load_view(view, decode(view, options)?, options, masks.as_ref(), &resampled));
+    let read: Vec<Result<Result<View>>> = views.par_iter().map(read).collect();
+    let mut undecodable = std::mem::take(&mut listing.bad);
+    let total = views.len() + undecodable.len();
+    let mut loaded = Vec::with_capacity(views.len());
+    for (view, test) in read.into_iter().zip(test) {
+        match view {
+            Ok(view) => loaded.push(view.map(|view| (view, test))),
+            Err(error) => undecodable.push(error),
+        }
+    }
+    bad_photos::skip(root, undecodable, total, options, &mut notes)?;
+    let (loaded, test): (Vec<View>, Vec<bool>) = all_or_one_error(root, loaded)?.into_iter().unzip();
     if let Some(masks) = &masks {
         let without: Vec<&str> = loaded.iter().filter(|v| v.mask.is_none()).map(|view| view.name.as_str()).collect();
         if without.len() == loaded.len() {
@@ -57,7 +67,7 @@ pub(crate) fn shortened(names: &[&str]) -> String {
 /// The views whose photo exists. Without photos asked for and without any there, all views that state their size.
 fn existing(listing: &Listing, options: &LoadOptions, notes: &mut Vec<String>) -> Result<Vec<Listed>> {
     let total = listing.views.len() + listing.missing.len();
-    if total == 0 {
+    if total + listing.bad.len() == 0 {
         return Err(Error::data(&listing.source, "", "lists no photo"));
     }
     let found = listing.views.iter().filter(|view| view.photo.is_some()).count();
@@ -122,18 +132,32 @@ pub(crate) fn all_or_one_error<T>(root: &Path, loaded: Vec<Result<T>>) -> Result
     }
 }
 
+/// What the file of a photo says, before anything is asked of it: its size, and its pixels if they are wanted.
+type Decoded = (Option<(u32, u32)>, Option<Photo>);
+
+/// Decodes the photo of a view, if it has one.
+fn decode(listed: &Listed, options: &LoadOptions) -> Result<Decoded> {
+    let Some(path) = &listed.photo else { return Ok((None, None)) };
+    if !options.photos {
+        return Ok((Some(stored_size(path)?), None));
+    }
+    // A photo of another shape is refused later, and before it takes memory.
+    let size = stored_size(path)?;
+    let fits = same_aspect(size, (listed.camera.width, listed.camera.height));
+    let photo = if fits { Some(read_photo(path, options.background)?) } else { None };
+    Ok((Some(size), photo))
+}
+
 fn load_view(
     listed: &Listed,
+    (stored, photo): Decoded,
     options: &LoadOptions,
     masks: Option<&MaskFolder>,
     resampled: &AtomicUsize,
 ) -> Result<View> {
-    let original = at_photo_size(listed)?;
+    let original = at_size(listed, stored)?;
     let size = bounded_size((original.width, original.height), options.max_resolution);
-    let photo = match &listed.photo {
-        Some(path) if options.photos => Some(load_photo(path, listed, &original, size, options.background)?),
-        _ => None,
-    };
+    let photo = photo.map(|photo| fitted(photo, listed, &original, size));
     let mask = match masks.and_then(|masks| masks.find(&listed.name)) {
         Some(path) => Some(load_mask(&path, listed, &original, size, resampled)?),
         None => None,
@@ -143,9 +167,17 @@ fn load_view(
 
 /// The camera at the size of the photo's file, which may be a scaled version of what the data set states.
 pub(crate) fn at_photo_size(listed: &Listed) -> Result<Camera> {
-    let Some(path) = &listed.photo else { return Ok(listed.camera.clone()) };
+    at_size(listed, listed.photo.as_deref().map(stored_size).transpose()?)
+}
+
+fn stored_size(path: &Path) -> Result<(u32, u32)> {
     let size = photo_size(path)?;
     check_size(path, size)?;
+    Ok(size)
+}
+
+fn at_size(listed: &Listed, stored: Option<(u32, u32)>) -> Result<Camera> {
+    let (Some(path), Some(size)) = (&listed.photo, stored) else { return Ok(listed.camera.clone()) };
     let camera = &listed.camera;
     if !same_aspect(size, (camera.width, camera.height)) {
         let problem = format!(
@@ -158,21 +190,15 @@ pub(crate) fn at_photo_size(listed: &Listed) -> Result<Camera> {
     Ok(camera.resized(size.0, size.1))
 }
 
-fn load_photo(
-    path: &Path,
-    listed: &Listed,
-    original: &Camera,
-    (width, height): (u32, u32),
-    background: [f32; 3],
-) -> Result<Photo> {
-    let mut photo = read_photo(path, background)?;
+/// The photo without its lens and in its final size.
+fn fitted(mut photo: Photo, listed: &Listed, original: &Camera, (width, height): (u32, u32)) -> Photo {
     if !listed.lens.is_pinhole() {
         photo = undistort_photo(&photo, original, &listed.lens);
     }
     if (width, height) != (photo.width, photo.height) {
         photo = shrink_photo(&photo, width, height);
     }
-    Ok(photo)
+    photo
 }
 
 fn load_mask(

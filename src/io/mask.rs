@@ -3,7 +3,7 @@
 //! The pixel value is the id and 0 is unlabelled: grey PNG of any depth, or palette PNG, whose *index* is the id.
 //! Colours are never turned into ids: two palette entries may share a colour, and a colour code needs its legend.
 
-use super::image::check_size;
+use super::image::{check_png_length, check_size};
 use super::resample::same_aspect;
 use crate::error::{Error, Result};
 use crate::scene::LabelMap;
@@ -56,6 +56,7 @@ fn open(path: &Path) -> Result<(png::Reader<BufReader<File>>, Header)> {
     let info = reader.info();
     let header = Header { size: (info.width, info.height), colour: info.color_type, depth: info.bit_depth };
     check_size(path, header.size)?;
+    check_png_length(path, header.size, header.colour.samples() as u32 * header.depth as u32)?;
     Ok((reader, header))
 }
 

@@ -5,6 +5,7 @@
 //! [`init`] makes the first Gaussians of a scene. All output goes through [`atomic`].
 
 pub mod atomic;
+mod bad_photos;
 pub mod camera_json;
 pub mod checkpoint;
 pub mod checkpoint_folder;
@@ -16,6 +17,7 @@ pub mod image;
 pub mod init;
 pub mod label_table;
 pub mod lens;
+mod listed_path;
 mod listing;
 mod load;
 pub mod mask;
@@ -31,6 +33,7 @@ pub mod truth;
 use crate::error::{Error, Result};
 use crate::scene::Dataset;
 use lens::Lens;
+use listed_path::Place;
 use listing::Listing;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -51,11 +54,26 @@ pub struct LoadOptions {
     pub background: [f32; 3],
     /// Whether photos are decoded. Their sizes are read in any case.
     pub photos: bool,
+    /// Largest share of the photos, from 0 to 1, that may be undecodable; they are skipped with a note.
+    pub max_bad_photos: f32,
+    /// Whether a scene may list files outside of its folder, by absolute paths or by `..`.
+    pub allow_outside: bool,
 }
+
+/// Largest share of undecodable photos unless another is asked for.
+pub const MAX_BAD_PHOTOS: f32 = 0.1;
 
 impl Default for LoadOptions {
     fn default() -> Self {
-        Self { masks: None, max_resolution: None, test_every: Some(8), background: [0.0; 3], photos: true }
+        Self {
+            masks: None,
+            max_resolution: None,
+            test_every: Some(8),
+            background: [0.0; 3],
+            photos: true,
+            max_bad_photos: MAX_BAD_PHOTOS,
+            allow_outside: false,
+        }
     }
 }
 
@@ -65,12 +83,16 @@ impl Default for LoadOptions {
 ///
 /// Views come undistorted and resized, each with a pinhole camera of its own size; see [`LoadOptions`] and the notes
 /// of the result. Undistortion keeps focal lengths and principal point: pixels for which the photo has no source get
-/// alpha 0 and the id 0. Listed photos without a file are skipped before the split.
+/// alpha 0 and the id 0. Listed photos without a file are skipped before the split, undecodable ones after it.
 pub fn open(scene: &Path, options: &LoadOptions) -> Result<Dataset> {
     if options.max_resolution == Some(0) {
         return Err(Error::usage("--max-resolution", "0 px leaves no image; expected 1 or more"));
     }
-    load::load(folder_of(scene), list(scene)?, options)
+    if !(0.0..=1.0).contains(&options.max_bad_photos) {
+        let problem = format!("{} is no share; expected a number from 0 to 1", options.max_bad_photos);
+        return Err(Error::usage("--max-bad-photos", problem));
+    }
+    load::load(folder_of(scene), list(scene, options.allow_outside)?, options)
 }
 
 /// The folder of a scene that is named by its folder or by one file in it.
@@ -81,17 +103,18 @@ fn folder_of(scene: &Path) -> &Path {
     scene.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
-/// What a scene lists.
-fn list(scene: &Path) -> Result<Listing> {
+/// What a scene lists, with files outside of its folder only where those are allowed.
+fn list(scene: &Path, allow_outside: bool) -> Result<Listing> {
     if scene.is_file() {
-        return transforms::list_file(folder_of(scene), scene);
+        return transforms::list_file(&Place::new(folder_of(scene), allow_outside), scene);
     }
     if !scene.is_dir() {
         return Err(Error::data(scene, "", "there is no such folder; expected the folder of a scene"));
     }
-    let listing = match colmap::list(scene)? {
+    let place = Place::new(scene, allow_outside);
+    let listing = match colmap::list(&place)? {
         Some(listing) => Some(listing),
-        None => transforms::list(scene)?,
+        None => transforms::list(&place)?,
     };
     let problem = "holds no scene: expected a COLMAP model (cameras and images, .bin or .txt, in sparse/0, sparse \
                    or colmap/sparse/0) or transforms.json or transforms_train.json";
@@ -99,9 +122,9 @@ fn list(scene: &Path) -> Result<Listing> {
 }
 
 /// The lenses of the photos that `scene` (as in [`open`]) lists, by the name of the view; those of a pinhole are left
-/// out.
+/// out. Where the photos lie is not judged: that was done when the scene was opened.
 pub fn lenses(scene: &Path) -> Result<BTreeMap<String, Lens>> {
-    Ok(list(scene)?
+    Ok(list(scene, true)?
         .views
         .into_iter()
         .filter(|view| !view.lens.is_pinhole())

@@ -4,13 +4,14 @@
 //! axes. The world stays that of `transform_matrix`: nerfstudio's `applied_transform` is already part of it.
 
 use super::lens::Lens;
-use super::listing::{Listed, Listing, check_camera, find_file, invert_pose, relative_path, rotation_of};
+use super::listed_path::Place;
+use super::listing::{FAR, Listed, Listing, check_camera, find_file, invert_pose, rotation_of};
 use super::{image, ply};
 use crate::error::{Error, Result};
 use crate::scene::{Camera, Point};
 use glam::{DAffine3, DMat3, DVec3};
 use serde::Deserialize;
-use std::collections::HashSet;
+use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
 /// Endings tried for a photo that is listed without one.
@@ -65,10 +66,10 @@ struct Transforms {
     intrinsics: Intrinsics,
 }
 
-/// Reads the scene at `root`, if it has transforms: `transforms_train.json` and `transforms_test.json` with their
+/// Reads the scene, if it has transforms: `transforms_train.json` and `transforms_test.json` with their
 /// split, or else `transforms.json`, or else `transforms_train.json` alone.
-pub(crate) fn list(root: &Path) -> Result<Option<Listing>> {
-    let file = |name: &str| Some(root.join(name)).filter(|path| path.is_file());
+pub(crate) fn list(scene: &Place) -> Result<Option<Listing>> {
+    let file = |name: &str| Some(scene.root.join(name)).filter(|path| path.is_file());
     let (train, test) = (file("transforms_train.json"), file("transforms_test.json"));
     let files = match (train, test, file("transforms.json")) {
         (Some(train), Some(test), _) => vec![(train, Some(false)), (test, Some(true))],
@@ -78,33 +79,50 @@ pub(crate) fn list(root: &Path) -> Result<Option<Listing>> {
     };
     let mut listing = Listing { source: files[0].0.clone(), ..Listing::default() };
     for (path, test) in files {
-        read(root, &path, test, &mut listing)?;
+        read(scene, &path, test, &mut listing)?;
     }
     strip_folder(&mut listing);
     Ok(Some(listing))
 }
 
 /// Reads one given file.
-pub(crate) fn list_file(root: &Path, path: &Path) -> Result<Listing> {
+pub(crate) fn list_file(scene: &Place, path: &Path) -> Result<Listing> {
     let mut listing = Listing { source: path.to_owned(), ..Listing::default() };
-    read(root, path, None, &mut listing)?;
+    read(scene, path, None, &mut listing)?;
     strip_folder(&mut listing);
     Ok(listing)
 }
 
-fn read(root: &Path, path: &Path, test: Option<bool>, listing: &mut Listing) -> Result<()> {
+fn read(scene: &Place, path: &Path, test: Option<bool>, listing: &mut Listing) -> Result<()> {
     let text = std::fs::read_to_string(path).map_err(Error::read(path))?;
     let transforms: Transforms = serde_json::from_str(&text)
         .map_err(|error| Error::data(path, format!("line {}", error.line()), error.to_string()))?;
-    let mut seen = HashSet::new();
+    let mut seen: HashMap<String, Option<PathBuf>> = HashMap::new();
     let mut repeated = 0;
     let first = listing.views.len();
     for (index, frame) in transforms.frames.iter().enumerate() {
         let place = format!("frame {index} (`{}`)", frame.file_path);
-        match listed(root, path, &place, frame, &transforms.intrinsics)? {
-            Some(view) if seen.insert(view.name.clone()) => listing.views.push(Listed { test, ..view }),
-            Some(_) => repeated += 1,
-            None => listing.missing.push(frame.file_path.clone()),
+        let view = match listed(scene, path, &place, frame, &transforms.intrinsics)? {
+            Found::View(view) => *view,
+            Found::Nothing => {
+                listing.missing.push(frame.file_path.clone());
+                continue;
+            }
+            Found::Bad(error) => {
+                listing.bad.push(error);
+                continue;
+            }
+        };
+        match seen.get(&view.name) {
+            None => {
+                seen.insert(view.name.clone(), view.photo.clone());
+                listing.views.push(Listed { test, ..view });
+            }
+            Some(photo) if *photo == view.photo => repeated += 1,
+            Some(_) => {
+                let problem = format!("another photo is called `{}` too; rename one of them", view.name);
+                return Err(Error::data(path, place, problem));
+            }
         }
     }
     if repeated > 0 {
@@ -116,8 +134,7 @@ fn read(root: &Path, path: &Path, test: Option<bool>, listing: &mut Listing) -> 
         listing.notes.push("`mask_path` of the frames is not used; id images are given by a folder of masks".into());
     }
     if let Some(name) = &transforms.ply_file_path {
-        let points = relative_path(path, root, &name.replace('\\', "/"))?;
-        let points = root.join(points);
+        let points = scene.root.join(scene.resolve(path, name)?.path);
         if points.is_file() {
             let read = ply::read_points(&points)?;
             let applied = transforms.applied_transform.as_deref();
@@ -130,28 +147,39 @@ fn read(root: &Path, path: &Path, test: Option<bool>, listing: &mut Listing) -> 
     Ok(())
 }
 
-/// The view of a frame; `None` if its photo does not exist and nothing tells its size.
-fn listed(root: &Path, path: &Path, place: &str, frame: &Frame, file: &Intrinsics) -> Result<Option<Listed>> {
-    let name = frame.file_path.replace('\\', "/");
-    let relative = relative_path(path, root, &name)?;
-    let photo = find_file(root, &[".", "images"], &relative, &EXTENSIONS);
+/// What there is of a frame.
+enum Found {
+    View(Box<Listed>),
+    /// Its photo does not exist, and nothing tells its size.
+    Nothing,
+    /// Its photo exists and does not tell its size either.
+    Bad(Error),
+}
+
+/// The view of a frame.
+fn listed(scene: &Place, path: &Path, place: &str, frame: &Frame, file: &Intrinsics) -> Result<Found> {
+    let resolved = scene.resolve(path, &frame.file_path)?;
+    let photo = find_file(scene.root, &[".", "images"], &resolved.path, &EXTENSIONS);
     let intrinsics = frame.intrinsics.or(file);
     let lens = lens(path, place, &intrinsics)?;
     let size = match (intrinsics.w, intrinsics.h, &photo) {
         (Some(w), Some(h), _) => (side(path, place, w)?, side(path, place, h)?),
-        (_, _, Some(photo)) => image::photo_size(photo)?,
-        _ => return Ok(None),
+        (_, _, Some(photo)) => match image::photo_size(photo) {
+            Ok(size) => size,
+            Err(error) => return Ok(Found::Bad(error)),
+        },
+        _ => return Ok(Found::Nothing),
     };
     let (rotation, translation) = pose(path, place, &frame.transform_matrix)?;
     let mut camera = camera(path, place, &intrinsics, size)?;
     (camera.rotation, camera.translation) = (rotation, translation);
     check_camera(path, place, &camera, &lens)?;
-    let mut name = relative.to_string_lossy().into_owned();
+    let mut name = resolved.name;
     // A photo listed without ending gets that of its file, or `frame.0001` would lose its number later on.
     if let Some(found) = photo.as_ref().and_then(|photo| photo.to_str()) {
         name.push_str(EXTENSIONS.iter().rev().find(|ext| found.ends_with(&format!("{name}{ext}"))).unwrap_or(&""));
     }
-    Ok(Some(Listed { name, photo, camera, lens, test: None }))
+    Ok(Found::View(Box::new(Listed { name, photo, camera, lens, test: None })))
 }
 
 fn side(path: &Path, place: &str, value: f64) -> Result<u32> {
@@ -186,6 +214,14 @@ fn lens(path: &Path, place: &str, i: &Intrinsics) -> Result<Lens> {
 /// other where one is missing; the principal point is the middle if none is given.
 fn camera(path: &Path, place: &str, i: &Intrinsics, (width, height): (u32, u32)) -> Result<Camera> {
     let (w, h) = (f64::from(width), f64::from(height));
+    // Beyond half a turn the tangent comes back: degrees, say, would pass as some angle in radians.
+    for (name, angle) in [("camera_angle_x", i.camera_angle_x), ("camera_angle_y", i.camera_angle_y)] {
+        if let Some(angle) = angle.filter(|angle| !(*angle > 0.0 && *angle < std::f64::consts::PI)) {
+            let problem =
+                format!("{name} is {angle}, the focal length of no pinhole; expected radians between 0 and pi");
+            return Err(Error::data(path, place, problem));
+        }
+    }
     let from_angle = |side: f64, angle: f64| side / 2.0 / (angle / 2.0).tan();
     let fx = i.fl_x.or(i.camera_angle_x.map(|angle| from_angle(w, angle)));
     // With fl_x alone fy is the same; an angle is used only where no length is given for its side.
@@ -236,6 +272,10 @@ fn in_the_frame_of(
     };
     let moved = points.iter().map(|p| Point { position: matrix.transform_point3(p.position), ..*p });
     let moved: Vec<Point> = moved.collect();
+    if !moved.iter().all(|point| point.position.abs().max_element() <= FAR) {
+        let problem = format!("moves points beyond {FAR:e}; expected a rotation and a scale of the usual size");
+        return Err(Error::data(path, "applied_transform", problem));
+    }
     if seen(views, &moved) as f64 > 1.2 * seen(views, &points) as f64 {
         notes.push("applied_transform was applied to the points, which fit the cameras only so".into());
         return Ok(moved);
@@ -259,8 +299,8 @@ fn seen(views: &[Listed], points: &[Point]) -> usize {
 
 /// Takes a leading `images/` off the names if all have it, so that names mean the same as in a COLMAP scene.
 fn strip_folder(listing: &mut Listing) {
-    let path: PathBuf = "images".into();
-    if listing.views.iter().all(|view| Path::new(&view.name).strip_prefix(&path).is_ok()) {
-        listing.views.iter_mut().for_each(|view| view.name = view.name["images/".len()..].to_owned());
+    let stripped = listing.views.iter().map(|view| view.name.strip_prefix("images/").map(str::to_owned));
+    if let Some(names) = stripped.collect::<Option<Vec<String>>>() {
+        listing.views.iter_mut().zip(names).for_each(|(view, name)| view.name = name);
     }
 }

@@ -69,7 +69,8 @@ impl Dataset {
         views
     }
 
-    /// Radius of the training cameras around their mean, times 1.1 (method of 3DGS); 1 where that is 0.
+    /// Radius of the training cameras around their mean, times 1.1 (method of 3DGS); 1 where that is nothing but
+    /// rounding.
     pub fn extent(&self) -> f64 {
         let centres: Vec<DVec3> = self.train.iter().map(|view| view.camera.centre()).collect();
         if centres.is_empty() {
@@ -77,6 +78,7 @@ impl Dataset {
         }
         let mean = centres.iter().sum::<DVec3>() / centres.len() as f64;
         let radius = centres.iter().map(|c| c.distance(mean)).fold(0.0, f64::max);
-        if radius > 0.0 { radius * 1.1 } else { 1.0 }
+        let far = centres.iter().map(|centre| centre.length()).fold(1.0, f64::max);
+        if radius > 1e-9 * far { radius * 1.1 } else { 1.0 }
     }
 }

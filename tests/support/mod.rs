@@ -1,7 +1,8 @@
-//! What the tests share: a device, comparison predicates, small scenes, toy shaders.
+//! What the tests share: a device, memory counted, comparison predicates, small scenes, toy shaders.
 
 pub mod compare;
 pub mod device;
+pub mod memory;
 pub mod runs;
 pub mod toy;
 

@@ -1,7 +1,7 @@
 //! `labelgs masks check`.
 
 use super::open_photos;
-use crate::cli::args::JsonFlag;
+use crate::cli::args::{JsonFlag, ReadArgs};
 use crate::cli::context::Context;
 use crate::cli::stdout;
 use crate::io::masks::check::{Finding, Problem};
@@ -21,6 +21,9 @@ pub struct CheckArgs {
     /// Scene whose photos the masks belong to.
     #[arg(long, value_name = "SCENE")]
     pub scene: PathBuf,
+    /// What is let through of the scene.
+    #[command(flatten)]
+    pub read: ReadArgs,
     /// JSON.
     #[command(flatten)]
     pub json: JsonFlag,
@@ -28,7 +31,7 @@ pub struct CheckArgs {
 
 /// Reports on the masks; fails if anything is wrong with them.
 pub fn run(args: &CheckArgs, context: &Context) -> Result<()> {
-    let dataset = open_photos(&args.scene)?;
+    let dataset = open_photos(&args.scene, args.read)?;
     let report = inspect(&dataset, &args.masks)?;
     let mut counts: BTreeMap<Problem, usize> = BTreeMap::new();
     report.findings.iter().for_each(|finding| *counts.entry(finding.problem).or_default() += 1);

@@ -2,7 +2,7 @@
 
 use super::open_photos;
 use crate::Result;
-use crate::cli::args::JsonFlag;
+use crate::cli::args::{JsonFlag, ReadArgs};
 use crate::cli::context::Context;
 use crate::cli::stdout;
 use crate::io::label_table::LabelEntry;
@@ -32,6 +32,9 @@ pub struct ImportArgs {
     /// Whose pixels are that two black and white masks share.
     #[arg(long, value_name = "RULE", value_enum, default_value = "error")]
     pub overlap: Overlap,
+    /// What is let through of the scene.
+    #[command(flatten)]
+    pub read: ReadArgs,
     /// JSON.
     #[command(flatten)]
     pub json: JsonFlag,
@@ -39,7 +42,7 @@ pub struct ImportArgs {
 
 /// Imports the masks.
 pub fn run(args: &ImportArgs, context: &Context) -> Result<()> {
-    let dataset = open_photos(&args.scene)?;
+    let dataset = open_photos(&args.scene, args.read)?;
     let options = ImportOptions {
         folder: args.folder.clone(),
         format: args.format,

@@ -4,7 +4,7 @@ mod source;
 
 pub use source::{for_training, from_depths};
 
-use super::args::JsonFlag;
+use super::args::{JsonFlag, ReadArgs};
 use super::context::{Context, open_model};
 use super::log::Progress;
 use super::scene::{near_plane, open_gpu, open_with, render_engine};
@@ -49,6 +49,9 @@ pub struct OcclusionArgs {
     /// Longest side of a picture, px; otherwise its own size.
     #[arg(long, value_name = "PX", value_parser = clap::value_parser!(u32).range(1..))]
     pub max_resolution: Option<u32>,
+    /// What is let through of the scene.
+    #[command(flatten)]
+    pub read: ReadArgs,
     /// JSON.
     #[command(flatten)]
     pub json: JsonFlag,
@@ -62,7 +65,7 @@ pub fn run(args: &OcclusionArgs, context: &Context) -> Result<()> {
         photos: false,
         ..LoadOptions::default()
     };
-    let dataset = open_with(&args.scene, &options)?;
+    let dataset = open_with(&args.scene, &args.read.into_options(options))?;
     let views: Vec<&View> = dataset.all().into_iter().filter(|view| view.mask.is_some()).collect();
     let table = match (&args.depths, args.depth_kind, &args.model) {
         (Some(depths), Some(kind), _) => OcclusionTable::new("depth", from_depths(&args.scene, depths, kind, &views)?),

@@ -7,7 +7,8 @@ mod binary;
 mod model;
 mod text;
 
-use super::listing::{Listed, Listing, check_camera, find_file, relative_path};
+use super::listed_path::Place;
+use super::listing::{FAR, Listed, Listing, check_camera, find_file};
 use crate::error::{Error, Result};
 use crate::scene::{Camera, Point};
 use glam::{DMat3, DQuat, DVec3};
@@ -35,9 +36,9 @@ fn find(root: &Path) -> Option<Files> {
     })
 }
 
-/// Reads the model of the scene at `root`, if it has one.
-pub(crate) fn list(root: &Path) -> Result<Option<Listing>> {
-    let Some(files) = find(root) else { return Ok(None) };
+/// Reads the model of the scene, if it has one.
+pub(crate) fn list(scene: &Place) -> Result<Option<Listing>> {
+    let Some(files) = find(scene.root) else { return Ok(None) };
     let path = |stem: &str| files.folder.join(stem).with_extension(files.extension);
     let binary = files.extension == "bin";
     let (cameras_path, images_path, points_path) = (path("cameras"), path("images"), path("points3D"));
@@ -53,22 +54,25 @@ pub(crate) fn list(root: &Path) -> Result<Option<Listing>> {
     if files.folder.ends_with("sparse/0") && files.folder.with_file_name("1").is_dir() {
         notes.push(format!("only the model {} is used; its neighbours are ignored", files.folder.display()));
     }
-    let views = join(root, &cameras_path, &cameras, &images_path, &images)?;
-    Ok(Some(Listing { source: images_path, views, points, notes, missing: Vec::new() }))
+    let views = join(scene, &cameras_path, &cameras, &images_path, &images)?;
+    Ok(Some(Listing { source: images_path, views, points, notes, ..Listing::default() }))
 }
 
 fn finite(mut points: Vec<Point>, notes: &mut Vec<String>) -> Vec<Point> {
     let before = points.len();
-    points.retain(|point| point.position.is_finite());
+    points.retain(|point| point.position.is_finite() && point.position.abs().max_element() <= FAR);
     if points.len() < before {
-        notes.push(format!("left out {} of {before} points whose position is not finite", before - points.len()));
+        notes.push(format!(
+            "left out {} of {before} points whose position is not finite or beyond {FAR:e}",
+            before - points.len()
+        ));
     }
     points
 }
 
 /// Gives each image its camera.
 fn join(
-    root: &Path,
+    scene: &Place,
     cameras_path: &Path,
     cameras: &[CameraRecord],
     images_path: &Path,
@@ -84,20 +88,25 @@ fn join(
     let mut views = Vec::with_capacity(images.len());
     for image in images {
         let place = format!("image {} (`{}`)", image.id, image.name);
-        if !ids.insert(image.id) || !names.insert(image.name.as_str()) {
-            return Err(Error::data(images_path, place, "has an id or a name that was listed before"));
+        let twice = || Error::data(images_path, place.as_str(), "has an id or a name that was listed before");
+        if !ids.insert(image.id) {
+            return Err(twice());
         }
         let Some(camera) = by_id.get(&image.camera) else {
             let problem = format!("uses camera {}, which {} does not list", image.camera, cameras_path.display());
-            return Err(Error::data(images_path, place, problem));
+            return Err(Error::data(images_path, place.as_str(), problem));
         };
-        views.push(listed(root, images_path, &place, image, cameras_path, camera)?);
+        let view = listed(scene, images_path, &place, image, cameras_path, camera)?;
+        if !names.insert(view.name.clone()) {
+            return Err(twice());
+        }
+        views.push(view);
     }
     Ok(views)
 }
 
 fn listed(
-    root: &Path,
+    scene: &Place,
     images_path: &Path,
     place: &str,
     image: &ImageRecord,
@@ -120,9 +129,7 @@ fn listed(
         &lens,
     )?;
     check_camera(images_path, place, &camera, &lens)?;
-    // Models made on Windows may separate folders by backslashes.
-    let name = image.name.replace('\\', "/");
-    let relative = relative_path(images_path, root, &name)?;
-    let photo = find_file(root, &["images", "."], &relative, &[""]);
-    Ok(Listed { name, photo, camera, lens, test: None })
+    let file = scene.resolve(images_path, &image.name)?;
+    let photo = find_file(scene.root, &["images", "."], &file.path, &[""]);
+    Ok(Listed { name: file.name, photo, camera, lens, test: None })
 }

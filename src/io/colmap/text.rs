@@ -13,7 +13,14 @@ use std::str::FromStr;
 fn lines(path: &Path) -> Result<impl Iterator<Item = Result<(usize, String)>>> {
     let file = BufReader::new(File::open(path).map_err(Error::read(path))?);
     let path = path.to_owned();
-    Ok(file.lines().enumerate().map(move |(index, line)| Ok((index + 1, line.map_err(Error::read(&path))?))))
+    let line = move |(index, line): (usize, std::io::Result<Vec<u8>>)| {
+        let place = || format!("line {}", index + 1);
+        let text = String::from_utf8(line.map_err(Error::read(&path))?);
+        let text =
+            text.map_err(|_| Error::data(&path, place(), "is not UTF-8 text; export the model as text again"))?;
+        Ok((index + 1, text))
+    };
+    Ok(file.split(b'\n').enumerate().map(line))
 }
 
 fn is_record(line: &str) -> bool {

@@ -37,6 +37,7 @@ pub const RANDOM_COUNT: usize = 50_000;
 /// than a fiftieth of a picture.
 pub fn initial_gaussians(dataset: &Dataset, seed: u64, count_if_no_points: usize) -> Result<Gaussians> {
     if dataset.points.len() >= POINTS_MIN {
+        check_seen(dataset)?;
         let distances2 = neighbour_distances2(&dataset.points, dataset.extent())?;
         return Ok(from_points(&dataset.points, &distances2, dataset.extent()));
     }
@@ -47,6 +48,22 @@ pub fn initial_gaussians(dataset: &Dataset, seed: u64, count_if_no_points: usize
         *distance2 = distance2.min((SIZE_MAX * region::image_side(&dataset.train, point.position)).powi(2));
     });
     Ok(from_points(&points, &distances2, dataset.extent()))
+}
+
+/// Refuses points of which no camera sees any: nothing would ever be drawn, and nothing learnt.
+fn check_seen(dataset: &Dataset) -> Result<()> {
+    let seen = |point: &Point| dataset.train.iter().any(|view| region::sees(&view.camera, point.position).is_some());
+    if dataset.train.is_empty() || dataset.points.par_iter().any(seen) {
+        return Ok(());
+    }
+    let problem = format!(
+        "none of the {} points is in the picture of any of {} training cameras: poses are of another kind than the \
+         format says (world-to-camera for camera-to-world, or other axes), or the points belong to another scene; \
+         without points training would start anywhere before the cameras",
+        dataset.points.len(),
+        dataset.train.len()
+    );
+    Err(Error::data(&dataset.root, "points", problem))
 }
 
 /// One Gaussian per point, in their order; `distances2` are their squared sizes.

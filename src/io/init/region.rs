@@ -85,7 +85,8 @@ pub(super) fn find(views: &[View], extent: f64) -> Region {
         let inward = cameras.iter().filter(|camera| sees(camera, centre).is_some()).count();
         let radius = median(cameras.iter().map(|c| c.centre().distance(centre) * narrow_sine(c)).collect());
         let distance = median(cameras.iter().map(|c| c.centre().distance(centre)).collect());
-        if inward * 4 >= cameras.len() * 3 && radius > 0.0 {
+        // Cameras at one place that turn are a rounding apart, which is no distance.
+        if inward * 4 >= cameras.len() * 3 && radius > 1e-6 * extent {
             return Region::Ball { centre, radius, distance };
         }
     }

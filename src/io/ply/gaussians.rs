@@ -19,8 +19,10 @@ const REQUIRED: [&str; 14] = [
     "rot_3",
 ];
 
-/// Largest log-scale whose exponential is finite in f32.
-const LOG_SCALE_MAX: f32 = 88.0;
+/// Largest log-scale whose square is finite in f32 after the exponential, as covariances need it.
+const LOG_SCALE_MAX: f32 = 44.0;
+/// Gaussians from which on chance does not make all values look activated.
+const ACTIVATED_MIN: usize = 16;
 
 /// A scene read from a PLY.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -81,10 +83,22 @@ pub fn read_gaussians(path: impl AsRef<Path>) -> Result<ReadPly> {
     if read.dropped > 0 {
         read.notes.push(format!("left out {} of {total} Gaussians: {}", read.dropped, dropped.reasons()));
     }
+    if looks_activated(&read.gaussians) {
+        let note = "every opacity is from 0 to 1 and every scale positive: they seem to be written after their sigmoid \
+                    and exponential, where a 3DGS PLY has them before; such a model looks like fog";
+        read.notes.push(note.to_owned());
+    }
     if odd.extra_bytes > 0 {
         read.notes.push(format!("{} bytes after the last Gaussian were ignored", odd.extra_bytes));
     }
     Ok(read)
+}
+
+/// True for what a writer leaves that activates values once more than the format says.
+fn looks_activated(gaussians: &Gaussians) -> bool {
+    gaussians.len() >= ACTIVATED_MIN
+        && gaussians.opacities.iter().all(|opacity| (0.0..=1.0).contains(opacity))
+        && gaussians.scales.iter().flatten().all(|&scale| scale > 0.0)
 }
 
 /// Degree from the number of `f_rest_*` columns.

@@ -2,13 +2,14 @@
 
 use super::table::Table;
 use crate::error::{Error, Result};
+use crate::io::listing::FAR;
 use crate::scene::Point;
 use glam::DVec3;
 use std::path::Path;
 
 /// Reads points from a PLY with `x y z` and, if it has them, `red green blue`: integers from 0 to 255, or floats,
 /// which count as 0 to 1 unless one of them is larger. Points without colour are mid-grey. Points that are not
-/// finite are left out.
+/// finite, or so far away that f32 cannot hold the squares, are left out.
 pub fn read_points(path: impl AsRef<Path>) -> Result<Vec<Point>> {
     let path = path.as_ref();
     let table = Table::open(path)?;
@@ -28,7 +29,7 @@ pub fn read_points(path: impl AsRef<Path>) -> Result<Vec<Point>> {
         if colour.iter().any(|value| !value.is_finite()) {
             return Err(Error::data(path, format!("vertex {index}"), "a colour that is not a number"));
         }
-        if row[..3].iter().all(|value| value.is_finite()) {
+        if row[..3].iter().all(|value| value.abs() <= FAR) {
             rows.push(([row[0], row[1], row[2]], colour));
         }
         Ok(())

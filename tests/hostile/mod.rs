@@ -1,0 +1,14 @@
+//! What comes from outside: hostile files, and scenes that lie.
+
+#[path = "../../tools/fuzz/seeds.rs"]
+mod seeds;
+#[path = "../../tools/fuzz/targets.rs"]
+mod targets;
+
+mod bombs;
+mod changed;
+mod paths;
+mod replay;
+mod reports;
+mod scenes;
+mod trainings;

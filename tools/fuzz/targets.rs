@@ -1,0 +1,467 @@
+//! What is fuzzed: every reader of files that people hand in, as a table of names and functions. The fuzzer and the
+//! tests of the suite share it.
+//!
+//! Each target is a folder in which one file changes. Bytes are written to that file and read as the program reads
+//! them. They must be accepted, with a result that makes sense, or refused with an error that is not a bug's and names
+//! a file.
+
+use super::seeds;
+use labelgs::gpu::PipelineStore;
+use labelgs::io::checkpoint::{Checkpoint, VERSION};
+use labelgs::io::depth::DepthFolder;
+use labelgs::io::frames::Frames;
+use labelgs::io::label_table::LabelTable;
+use labelgs::io::masks::{Format, ImportOptions, import};
+use labelgs::io::occlusion_table::OcclusionTable;
+use labelgs::io::pipeline_file::PipelineFolder;
+use labelgs::io::{self, LoadOptions, camera_json, image, mask, ply};
+use labelgs::scene::{Camera, Dataset, Gaussians, Photo};
+use labelgs::{Error, Result};
+use std::path::{Path, PathBuf};
+use tempfile::TempDir;
+
+/// A reader.
+pub struct Target {
+    /// What it is called.
+    pub name: &'static str,
+    /// The file that the bytes go to, below the folder.
+    file: &'static str,
+    /// Writes what else is in the folder.
+    prepare: fn(&Path),
+    /// Reads, with the folder and the file, and looks at what came out.
+    read: fn(&Path, &Path) -> Result<()>,
+    /// Small valid files.
+    pub seeds: fn() -> Vec<Vec<u8>>,
+    /// Makes a file of the bytes, where a checksum would keep all changes out.
+    dress: fn(&[u8]) -> Vec<u8>,
+}
+
+const PLAIN: Target =
+    Target { name: "", file: "", prepare: |_| (), read: |_, _| Ok(()), seeds: Vec::new, dress: <[u8]>::to_vec };
+
+/// Bytes of memory that a reader may take for a file of `length` bytes: the least that decoders need, and for each byte
+/// the 8192 samples that it may stand for, as floats and once more while they are decoded. All else takes far less.
+pub fn memory_bound(length: usize) -> usize {
+    (64 << 20) + 8192 * 4 * 2 * length
+}
+
+/// All readers.
+pub const TARGETS: [Target; 28] = [
+    Target {
+        name: "colmap_cameras_bin",
+        file: "sparse/0/cameras.bin",
+        prepare: colmap_bin,
+        read: scene,
+        seeds: seeds::colmap_cameras_bin,
+        ..PLAIN
+    },
+    Target {
+        name: "colmap_images_bin",
+        file: "sparse/0/images.bin",
+        prepare: colmap_bin,
+        read: scene,
+        seeds: || vec![seeds::colmap_images_bin()],
+        ..PLAIN
+    },
+    Target {
+        name: "colmap_points_bin",
+        file: "sparse/0/points3D.bin",
+        prepare: colmap_bin,
+        read: scene,
+        seeds: || vec![seeds::colmap_points_bin()],
+        ..PLAIN
+    },
+    Target {
+        name: "colmap_cameras_txt",
+        file: "sparse/0/cameras.txt",
+        prepare: colmap_txt,
+        read: scene,
+        seeds: seeds::colmap_cameras_txt,
+        ..PLAIN
+    },
+    Target {
+        name: "colmap_images_txt",
+        file: "sparse/0/images.txt",
+        prepare: colmap_txt,
+        read: scene,
+        seeds: || vec![seeds::colmap_images_txt()],
+        ..PLAIN
+    },
+    Target {
+        name: "colmap_points_txt",
+        file: "sparse/0/points3D.txt",
+        prepare: colmap_txt,
+        read: scene,
+        seeds: || vec![seeds::colmap_points_txt()],
+        ..PLAIN
+    },
+    Target {
+        name: "transforms_json",
+        file: "transforms.json",
+        prepare: transforms,
+        read: scene,
+        seeds: seeds::transforms_json,
+        ..PLAIN
+    },
+    Target { name: "ply_model", file: "model.ply", read: ply_model, seeds: seeds::ply_model, ..PLAIN },
+    Target { name: "ply_cloud", file: "cloud.ply", read: ply_cloud, seeds: seeds::ply_cloud, ..PLAIN },
+    Target { name: "mask", file: "mask.png", read: id_mask, seeds: seeds::mask, dress: png_sums, ..PLAIN },
+    Target {
+        name: "mask_rgb",
+        file: "in/00.png",
+        prepare: masks,
+        read: mask_rgb,
+        seeds: seeds::mask_rgb,
+        dress: png_sums,
+    },
+    Target {
+        name: "mask_binary",
+        file: "in/cup/00.png",
+        prepare: colmap_bin,
+        read: |folder, _| imported(folder, Format::BinaryFolders),
+        seeds: seeds::mask_binary,
+        dress: png_sums,
+    },
+    Target {
+        name: "mask_auto",
+        file: "in/00.png",
+        prepare: colmap_bin,
+        read: |folder, _| imported(folder, Format::Auto),
+        seeds: seeds::mask,
+        dress: png_sums,
+    },
+    Target {
+        name: "pred_json",
+        file: "in/pred.json",
+        prepare: pred_masks,
+        read: mask_rgb,
+        seeds: || vec![seeds::pred_json()],
+        ..PLAIN
+    },
+    Target {
+        name: "depth_png",
+        file: "depths/00.png",
+        prepare: colmap_bin,
+        read: depth,
+        seeds: seeds::depth_png,
+        dress: png_sums,
+    },
+    Target {
+        name: "depth_exr",
+        file: "depths/00.exr",
+        prepare: colmap_bin,
+        read: depth,
+        seeds: seeds::depth_exr,
+        ..PLAIN
+    },
+    Target {
+        name: "depth_npy",
+        file: "depths/00.npy",
+        prepare: colmap_bin,
+        read: depth,
+        seeds: seeds::depth_npy,
+        ..PLAIN
+    },
+    Target {
+        name: "depth_pfm",
+        file: "depths/00.pfm",
+        prepare: colmap_bin,
+        read: depth,
+        seeds: seeds::depth_pfm,
+        ..PLAIN
+    },
+    Target { name: "photo_png", file: "photo.png", read: photo, seeds: seeds::photo_png, dress: png_sums, ..PLAIN },
+    Target { name: "photo_jpeg", file: "photo.jpg", read: photo, seeds: seeds::photo_jpeg, ..PLAIN },
+    Target {
+        name: "checkpoint",
+        file: "a.ckpt",
+        read: checkpoint,
+        seeds: || vec![dressed(&seeds::checkpoint())],
+        ..PLAIN
+    },
+    Target {
+        name: "checkpoint_body",
+        file: "a.ckpt",
+        read: checkpoint,
+        seeds: || vec![seeds::checkpoint()],
+        dress: dressed,
+        ..PLAIN
+    },
+    Target { name: "config_toml", file: "config.toml", read: config, seeds: seeds::config_toml, ..PLAIN },
+    Target { name: "camera_json", file: "camera.json", read: camera, seeds: || vec![seeds::camera_json()], ..PLAIN },
+    Target { name: "labels_json", file: "labels.json", read: labels, seeds: || vec![seeds::labels_json()], ..PLAIN },
+    Target {
+        name: "occlusion_json",
+        file: "occlusion.json",
+        read: occlusion,
+        seeds: || vec![seeds::occlusion_json()],
+        ..PLAIN
+    },
+    Target { name: "frames_json", file: "frames.json", read: frames, seeds: || vec![seeds::frames_json()], ..PLAIN },
+    Target {
+        name: "pipelines",
+        file: "pipelines-x.bin",
+        read: |folder, _| {
+            PipelineFolder::new(folder).load("x");
+            Ok(())
+        },
+        seeds: || vec![seeds::pipelines()],
+        ..PLAIN
+    },
+];
+
+/// The reader of a name.
+pub fn find(name: &str) -> Option<&'static Target> {
+    const ALL: &[Target] = &TARGETS;
+    ALL.iter().find(|target| target.name == name)
+}
+
+/// All names, for messages.
+#[allow(dead_code, reason = "the tests walk the table instead")]
+pub fn names() -> String {
+    TARGETS.map(|target| target.name).join(" ")
+}
+
+/// A target with its folder.
+pub struct Place {
+    target: &'static Target,
+    folder: TempDir,
+    file: PathBuf,
+}
+
+impl Place {
+    /// Makes the folder, in memory where there is such a place.
+    pub fn new(target: &'static Target) -> Self {
+        let memory = Path::new("/dev/shm");
+        let folder = if memory.is_dir() { tempfile::tempdir_in(memory) } else { tempfile::tempdir() };
+        let folder = folder.expect("a temporary folder");
+        (target.prepare)(folder.path());
+        let file = folder.path().join(target.file);
+        std::fs::create_dir_all(file.parent().expect("a folder")).expect("a folder");
+        Self { target, folder, file }
+    }
+
+    /// Puts the bytes into their file.
+    pub fn put(&self, bytes: &[u8]) {
+        std::fs::write(&self.file, (self.target.dress)(bytes)).expect("a file");
+    }
+
+    /// Reads what was put.
+    pub fn read(&self) -> Result<()> {
+        (self.target.read)(self.folder.path(), &self.file)
+    }
+
+    /// Puts the bytes, reads them, and panics if the answer is none that a user should get; true if they were accepted.
+    pub fn check(&self, bytes: &[u8]) -> bool {
+        self.put(bytes);
+        self.judge(self.read())
+    }
+
+    /// What [`Place::check`] thinks of an answer.
+    pub fn judge(&self, answer: Result<()>) -> bool {
+        let Err(error) = answer else { return true };
+        let text = error.to_string();
+        let named = match &error {
+            Error::Data { path, problem, .. } => path.starts_with(self.folder.path()) && problem.len() > 5,
+            Error::Read { path, .. } => path.starts_with(self.folder.path()),
+            Error::Usage { argument, problem } => argument.starts_with("--") && problem.len() > 5,
+            _ => false,
+        };
+        assert!(named, "{}: the answer is `{text}` ({error:?})", self.target.name);
+        false
+    }
+}
+
+/// A file of a checkpoint with this body, its checksum right.
+fn dressed(body: &[u8]) -> Vec<u8> {
+    let mut bytes = b"labelgsC".to_vec();
+    bytes.extend(VERSION.to_le_bytes());
+    bytes.extend(crc32fast::hash(body).to_le_bytes());
+    bytes.extend((body.len() as u64).to_le_bytes());
+    bytes.extend(body);
+    bytes
+}
+
+/// A PNG with the checksums of its chunks right again; anything else as it is.
+fn png_sums(bytes: &[u8]) -> Vec<u8> {
+    let mut bytes = bytes.to_vec();
+    if !bytes.starts_with(b"\x89PNG\r\n\x1a\n") {
+        return bytes;
+    }
+    let mut at = 8;
+    while let Some(head) = bytes.get(at..at + 8) {
+        let length = u32::from_be_bytes([head[0], head[1], head[2], head[3]]) as usize;
+        let end = at.saturating_add(8).saturating_add(length);
+        if end.saturating_add(4) > bytes.len() {
+            break;
+        }
+        let sum = crc32fast::hash(&bytes[at + 4..end]);
+        bytes[end..end + 4].copy_from_slice(&sum.to_be_bytes());
+        at = end + 4;
+    }
+    bytes
+}
+
+fn put(folder: &Path, name: &str, bytes: impl AsRef<[u8]>) {
+    let path = folder.join(name);
+    std::fs::create_dir_all(path.parent().expect("a folder")).expect("a folder");
+    std::fs::write(path, bytes).expect("a file");
+}
+
+fn colmap_bin(folder: &Path) {
+    put(folder, "sparse/0/cameras.bin", &seeds::colmap_cameras_bin()[0]);
+    put(folder, "sparse/0/images.bin", seeds::colmap_images_bin());
+    put(folder, "sparse/0/points3D.bin", seeds::colmap_points_bin());
+}
+
+fn colmap_txt(folder: &Path) {
+    put(folder, "sparse/0/cameras.txt", &seeds::colmap_cameras_txt()[0]);
+    put(folder, "sparse/0/images.txt", seeds::colmap_images_txt());
+    put(folder, "sparse/0/points3D.txt", seeds::colmap_points_txt());
+}
+
+fn transforms(folder: &Path) {
+    put(folder, "images/00.png", &seeds::photo_png()[0]);
+    put(folder, "points.ply", &seeds::ply_cloud()[0]);
+}
+
+fn masks(folder: &Path) {
+    colmap_bin(folder);
+    put(folder, "in/pred.json", seeds::pred_json());
+}
+
+fn pred_masks(folder: &Path) {
+    colmap_bin(folder);
+    put(folder, "in/00.png", &seeds::mask_rgb()[0]);
+}
+
+fn open(folder: &Path) -> Result<Dataset> {
+    io::open(folder, &LoadOptions { photos: false, test_every: None, ..LoadOptions::default() })
+}
+
+/// A scene, and what training would start from.
+fn scene(folder: &Path, _: &Path) -> Result<()> {
+    let dataset = open(folder)?;
+    dataset.train.iter().for_each(|view| sound_camera(&view.camera));
+    assert!(dataset.points.iter().all(|point| point.position.as_vec3().is_finite()), "a point that is no f32");
+    assert!(dataset.extent() > 0.0 && (dataset.extent() as f32).is_finite(), "the extent is {}", dataset.extent());
+    if dataset.train.len() <= 8 {
+        sound_model(&io::initial_gaussians(&dataset, 1, 8)?);
+    }
+    Ok(())
+}
+
+/// Numbers that a device can be given.
+fn sound_camera(camera: &Camera) {
+    let Camera { fx, fy, cx, cy, width, height, .. } = *camera;
+    assert!(width > 0 && height > 0, "{camera:?}");
+    assert!([fx, fy].iter().all(|&f| (f as f32).is_finite() && f as f32 > 0.0), "{camera:?}");
+    assert!([cx, cy].iter().all(|&c| (c as f32).is_finite()), "{camera:?}");
+    assert!(camera.translation.as_vec3().is_finite() && camera.centre().as_vec3().is_finite(), "{camera:?}");
+    let rows = camera.rotation.transpose();
+    let lengths = [rows.x_axis, rows.y_axis, rows.z_axis].map(|row| row.length());
+    assert!(lengths.iter().all(|length| (length - 1.0).abs() < 1e-6), "{camera:?}");
+    assert!((camera.rotation.determinant() - 1.0).abs() < 1e-6, "{camera:?}");
+}
+
+fn sound_model(model: &Gaussians) {
+    let (count, rest) = (model.len(), model.rest_per_gaussian());
+    let lengths = [model.quats.len(), model.scales.len(), model.opacities.len(), model.sh0.len()];
+    assert!(lengths.iter().all(|&length| length == count), "{lengths:?} of {count}");
+    assert_eq!(model.sh_rest.len(), count * rest);
+    assert!(model.labels.as_ref().is_none_or(|labels| labels.len() == count), "labels");
+    assert!(model.label_confidence.as_ref().is_none_or(|shares| shares.len() == count), "shares");
+    let triples = model.means.iter().chain(&model.scales).chain(&model.sh0).chain(&model.sh_rest).flatten();
+    let all = triples.chain(model.quats.iter().flatten()).chain(&model.opacities);
+    assert!(all.into_iter().all(|value| value.is_finite()), "a value that is not finite");
+}
+
+/// A model; what was read comes back when it is written and read again.
+fn ply_model(folder: &Path, file: &Path) -> Result<()> {
+    let read = ply::read_gaussians(file)?;
+    sound_model(&read.gaussians);
+    let again = folder.join("again.ply");
+    assert_eq!(ply::write_gaussians(&again, &read.gaussians).expect("written"), 0);
+    assert_eq!(ply::read_gaussians(&again).expect("what was written").gaussians, read.gaussians);
+    Ok(())
+}
+
+fn ply_cloud(_: &Path, file: &Path) -> Result<()> {
+    let points = ply::read_points(file)?;
+    assert!(points.iter().all(|point| point.position.as_vec3().is_finite()), "a point that is no f32");
+    Ok(())
+}
+
+fn id_mask(_: &Path, file: &Path) -> Result<()> {
+    let map = mask::read_mask(file)?;
+    assert_eq!(map.ids.len(), map.width as usize * map.height as usize);
+    Ok(())
+}
+
+fn mask_rgb(folder: &Path, _: &Path) -> Result<()> {
+    imported(folder, Format::DevaLong)
+}
+
+/// Masks of a scene with one changed picture.
+fn imported(folder: &Path, format: Format) -> Result<()> {
+    let dataset = open(folder)?;
+    let out = folder.join("out");
+    let options = ImportOptions { folder: folder.join("in"), format, ..ImportOptions::default() };
+    let answer = import(&dataset, &options, &out).map(|_| ());
+    if out.exists() {
+        std::fs::remove_dir_all(&out).expect("removed");
+    }
+    answer
+}
+
+fn depth(folder: &Path, _: &Path) -> Result<()> {
+    let dataset = open(folder)?;
+    let map = DepthFolder::open(&folder.join("depths"), folder)?.read(&dataset.train[0])?;
+    assert_eq!(map.values.len(), map.width as usize * map.height as usize);
+    Ok(())
+}
+
+fn photo(_: &Path, file: &Path) -> Result<()> {
+    let sound = |photo: &Photo| assert_eq!(photo.rgba.len(), photo.width as usize * photo.height as usize);
+    let size = image::photo_size(file)?;
+    let read = image::read_photo(file, [0.5; 3])?;
+    sound(&read);
+    assert_eq!((read.width, read.height), size);
+    assert!(read.rgba.iter().all(|texel| texel[3] == 255), "transparency is blended");
+    sound(&image::read_rgba(file)?);
+    let (width, height, values) = image::read_grey(file)?;
+    assert_eq!(values.len(), width as usize * height as usize);
+    Ok(())
+}
+
+fn checkpoint(_: &Path, file: &Path) -> Result<()> {
+    Checkpoint::read(file)?;
+    labelgs::train::TrainState::read(file).map(|_| ())
+}
+
+fn config(_: &Path, file: &Path) -> Result<()> {
+    labelgs::cli::config::near_of(file)?;
+    let config = labelgs::cli::config::read(file)?;
+    config.check()
+}
+
+fn camera(_: &Path, file: &Path) -> Result<()> {
+    sound_camera(&camera_json::read_camera(file)?);
+    Ok(())
+}
+
+fn labels(folder: &Path, file: &Path) -> Result<()> {
+    let table = LabelTable::read(file)?;
+    let again = folder.join("again.json");
+    table.write(&again).expect("written");
+    assert_eq!(LabelTable::read(&again).expect("what was written"), table);
+    Ok(())
+}
+
+fn occlusion(_: &Path, file: &Path) -> Result<()> {
+    OcclusionTable::read(file).map(|_| ())
+}
+
+fn frames(_: &Path, file: &Path) -> Result<()> {
+    Frames::read(file).map(|_| ())
+}
