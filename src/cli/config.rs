@@ -45,8 +45,9 @@ pub fn near_of(path: &Path) -> Result<f32> {
     struct Fields {
         near: Option<f32>,
     }
-    let near = parse::<Fields>(path)?.near.unwrap_or(NEAR);
-    if !near.is_finite() || near <= 0.0 {
+    // 0 leaves it to a scene, which is not known here.
+    let near = parse::<Fields>(path)?.near.filter(|&near| near != 0.0).unwrap_or(NEAR);
+    if !near.is_finite() || near < 0.0 {
         return Err(Error::data(path, "near", format!("is {near}, needs more than 0; or say --near")));
     }
     Ok(near)

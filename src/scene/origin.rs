@@ -5,6 +5,8 @@ use glam::DVec3;
 /// A scene is far away if its middle is more than so many times its size from the origin. There f32 rounds positions to
 /// 1.5e-5 of the scene, a hundredth of a pixel; beyond it, soon to pixels.
 const FAR: f64 = 256.0;
+/// World units.
+const SIZE_OF_A_POINT: f64 = 10.0;
 
 /// The point that positions are best kept relative to: the origin unless the scene is far from it. Its coordinates are
 /// multiples of a power of two above the size of the scene, so that little is lost in the subtraction.
@@ -15,11 +17,12 @@ pub fn far_origin(positions: &[DVec3]) -> DVec3 {
     // Medians, because a stray point may be anywhere.
     let middle = by_axis(|axis| median(positions.iter().map(|p| p[axis]).collect()));
     let size = by_axis(|axis| median(positions.iter().map(|p| (p[axis] - middle[axis]).abs()).collect())).length();
+    // One point, or many at one place, have no size to compare with.
+    let size = if size > 0.0 { size } else { SIZE_OF_A_POINT };
     if !(middle.length() > FAR * size) || !middle.is_finite() {
         return DVec3::ZERO;
     }
-    // A scene of one point has no size; then the grid is as fine as f32 is there.
-    let grid = (4.0 * size).max(middle.length() * f64::from(f32::EPSILON)).log2().ceil().exp2();
+    let grid = (4.0 * size).log2().ceil().exp2();
     (middle / grid).round() * grid
 }
 
@@ -46,6 +49,8 @@ mod tests {
     fn near_scenes_stay_where_they_are() {
         assert_eq!(far_origin(&[]), DVec3::ZERO);
         assert_eq!(far_origin(&[DVec3::ZERO]), DVec3::ZERO);
+        assert_eq!(far_origin(&[DVec3::splat(300.1)]), DVec3::ZERO);
+        assert_ne!(far_origin(&[DVec3::splat(5e6)]), DVec3::ZERO);
         for (centre, size) in [(1.0, 1.0), (100.0, 1.0), (1e6, 1e5), (0.0, 1e-3)] {
             assert_eq!(far_origin(&cloud(DVec3::splat(centre), size)), DVec3::ZERO, "{centre}, {size}");
         }
