@@ -63,6 +63,30 @@ fn a_subgroup_size_without_kernels_is_refused_by_name() {
     assert!(text(&output.stderr).contains("lacks subgroup size (needed 8, found 4)"), "{}", text(&output.stderr));
 }
 
+/// What the kernels cannot do without is named, with the status of a device that does not fit.
+#[test]
+fn required_features_are_missed_by_name() {
+    let Some(_gpu) = turn() else { return };
+    for (hidden, named) in
+        [("scalar", "scalarBlockLayout"), ("timeline", "timelineSemaphore"), ("shuffle", "subgroup shuffle")]
+    {
+        let mut command = Command::cargo_bin("labelgs").expect("the tool is built");
+        command.env("LABELGS_HIDE", hidden).env("LABELGS_VALIDATION", "off");
+        let output = command.args(["profile", "--synthetic", "--steps", "1"]).output().expect("it runs");
+        assert_eq!(output.status.code(), Some(4), "{hidden}: {}", text(&output.stderr));
+        assert!(text(&output.stderr).contains(&format!("lacks {named}")), "{hidden}: {}", text(&output.stderr));
+    }
+    let mut command = Command::cargo_bin("labelgs").expect("the tool is built");
+    let output = command.env("LABELGS_HIDE", "colour").args(["devices"]).output().expect("it runs");
+    assert_eq!(output.status.code(), Some(2), "{}", text(&output.stderr));
+    // Where there are no timestamps, `profile` has nothing to say.
+    let mut command = Command::cargo_bin("labelgs").expect("the tool is built");
+    command.env("LABELGS_HIDE", "timestamps").env("LABELGS_VALIDATION", "off");
+    let output = command.args(["profile", "--synthetic", "--steps", "1"]).output().expect("it runs");
+    assert_eq!(output.status.code(), Some(4), "{}", text(&output.stderr));
+    assert!(text(&output.stderr).contains("no timestamps"), "{}", text(&output.stderr));
+}
+
 #[test]
 fn devices_tells_what_is_needed_and_found() {
     let Some(gpu) = turn() else { return };

@@ -91,7 +91,7 @@ fn segments_change_nothing() {
     let start = labelgs::io::init::initial_gaussians(&dataset, 0, 400).expect("points");
     let config = TrainConfig { iterations: 20, label_from: 5, ..TrainConfig::default() };
     let run = |segment_length: u32| {
-        let shape = KernelShape { segment_length, ..KernelShape::new(gpu.subgroup_size(), gpu.is_cpu()) };
+        let shape = KernelShape { segment_length, ..KernelShape::of(gpu.capabilities()) };
         let mut dataset = dataset.clone();
         let mut trainer =
             Trainer::with_shape(gpu.clone(), shape, config.clone(), &mut dataset, &start, SchedulerOptions::default())

@@ -44,7 +44,7 @@ pub fn run(args: &DevicesArgs, context: &Context) -> Result<()> {
 
 /// The kernels that a device gets.
 pub fn shape_of(device: &Capabilities) -> KernelShape {
-    KernelShape::new(device.subgroup.size, device.is_cpu())
+    KernelShape::of(device)
 }
 
 /// The kernels in words.

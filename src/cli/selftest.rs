@@ -22,7 +22,7 @@ pub struct SelftestArgs {
 /// Runs the checks and prints a row for each. Fails if one does.
 pub fn run(args: &SelftestArgs, context: &Context) -> Result<()> {
     let gpu = open_gpu(context)?;
-    let (found, kernels) = (gpu.capabilities(), KernelShape::new(gpu.subgroup_size(), gpu.is_cpu()));
+    let (found, kernels) = (gpu.capabilities(), KernelShape::of(gpu.capabilities()));
     let as_json = context.json || args.json.json;
     if !as_json {
         stdout::print(&format!(

@@ -69,7 +69,7 @@ fn derive(shape: &KernelShape, capacity: &mut Capacity, instances: u64, trained:
 impl Engine {
     /// The memory that an engine for `room` would take, before anything is allocated.
     pub fn predict(gpu: &Gpu, room: &Room, options: SchedulerOptions) -> Result<MemoryReport> {
-        let shape = KernelShape::new(gpu.subgroup_size(), gpu.is_cpu());
+        let shape = KernelShape::of(gpu.capabilities());
         let capacity = capacity(&shape, room);
         let lists = Self::lists_of(&shape, &capacity, room);
         Scheduler::predict(TABLE, &capacity, &lists, &options.limits(gpu))

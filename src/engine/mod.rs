@@ -84,7 +84,7 @@ pub struct Engine {
 impl Engine {
     /// Allocates for `room`.
     pub fn new(gpu: Arc<Gpu>, room: Room, options: SchedulerOptions) -> Result<Self> {
-        let shape = KernelShape::new(gpu.subgroup_size(), gpu.is_cpu());
+        let shape = KernelShape::of(gpu.capabilities());
         Self::with_shape(gpu, shape, room, options)
     }
 

@@ -12,6 +12,7 @@ mod command;
 mod crash;
 mod descriptor;
 mod devices;
+mod hidden;
 mod instance;
 mod limits;
 mod local_size;

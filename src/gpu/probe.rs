@@ -2,6 +2,7 @@
 
 use super::call::vk_call;
 use super::capabilities::{Capabilities, DeviceKind, Features, Need, Subgroup};
+use super::hidden::Hidden;
 use super::limits::Limits;
 use crate::error::Result;
 use crate::shaders::{self, BindingKind, ShaderDesc};
@@ -28,7 +29,9 @@ impl Capabilities {
         let has = |name| extensions.iter().any(|extension| extension.extension_name_as_c_str() == Ok(name));
         let is_1_3 = version >= vk::API_VERSION_1_3;
         let has_size_control = is_1_3 || has(ash::ext::subgroup_size_control::NAME);
-        let features = features(instance, physical, has_size_control);
+        let hidden = Hidden::by_env()?;
+        let mut features = features(instance, physical, has_size_control);
+        hidden.features(&mut features);
         let mut eleven = vk::PhysicalDeviceVulkan11Properties::default();
         let mut twelve = vk::PhysicalDeviceVulkan12Properties::default();
         let mut control = vk::PhysicalDeviceSubgroupSizeControlProperties::default();
@@ -51,7 +54,9 @@ impl Capabilities {
         let timestamp_bits = family.map_or(0, |(_, properties)| properties.timestamp_valid_bits);
         let mut limits = limits(&core.limits, &eleven, max_buffer, memory, timestamp_bits);
         limits.lower_by_env()?;
-        let subgroup = subgroup(&eleven, &control, &features);
+        hidden.limits(&mut limits);
+        let mut subgroup = subgroup(&eleven, &control, &features);
+        hidden.subgroup(&mut subgroup);
         let mut found = Self {
             index,
             name: text(core.device_name_as_c_str()),

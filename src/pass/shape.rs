@@ -1,6 +1,7 @@
 //! Which variant of the kernels a device gets: subgroup size, tile, texel or storage reads, digits of the sort.
 
 use crate::error::{Error, Result};
+use crate::gpu::Capabilities;
 use crate::shaders::ShaderDesc;
 
 /// Shape of the kernels, fixed for a device.
@@ -26,7 +27,17 @@ pub struct KernelShape {
 /// rounds and one more for each subgroup's load.
 const SEGMENT_LENGTH: u32 = 40_960;
 
+/// Elements that a device's texel buffers must hold for reads through them: vec4 of a GiB. Smaller ones would bound
+/// the model before memory does.
+const TEXELS_MIN: u64 = 1 << 26;
+
 impl KernelShape {
+    /// The shape for a device.
+    pub fn of(device: &Capabilities) -> Self {
+        let shape = Self::new(device.subgroup.size, device.is_cpu());
+        Self { texel: shape.texel && device.limits.max_texel_elements >= TEXELS_MIN, ..shape }
+    }
+
     /// The shape for a subgroup size; `cpu` says that the device is a processor.
     pub fn new(subgroup: u32, cpu: bool) -> Self {
         let (tile_width, tile_height) = match subgroup {

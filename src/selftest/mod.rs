@@ -42,7 +42,7 @@ pub fn run(gpu: &Arc<Gpu>, done: impl FnMut(Check)) -> Result<()> {
 
 /// The same against other rules than the engine's, to see that the checks can fail.
 pub fn run_against(rules: &Rules, gpu: &Arc<Gpu>, mut done: impl FnMut(Check)) -> Result<()> {
-    let kernels = KernelShape::new(gpu.subgroup_size(), gpu.is_cpu());
+    let kernels = KernelShape::of(gpu.capabilities());
     let other = KernelShape { texel: !kernels.texel, ..kernels };
     for (kernels, reads) in [(kernels, ""), (other, if other.texel { ", texel reads" } else { ", storage reads" })] {
         let start = Instant::now();

@@ -117,7 +117,7 @@ impl Trainer {
         model: &Gaussians,
         options: SchedulerOptions,
     ) -> Result<Self> {
-        let shape = KernelShape::new(gpu.subgroup_size(), gpu.is_cpu());
+        let shape = KernelShape::of(gpu.capabilities());
         Self::with_shape(gpu, shape, config, dataset, model, options)
     }
 

@@ -218,7 +218,7 @@ impl Trainer {
                 tracing::warn!("{} was made with {then}, this is {now}: bits may differ", state.path.display());
             }
         }
-        let shape = KernelShape::new(gpu.subgroup_size(), gpu.is_cpu());
+        let shape = KernelShape::of(gpu.capabilities());
         let room = room(dataset, &state.config, u64::from(state.gaussians))?;
         if let Some(labels) = room.labels
             && let Some(plane) = state.planes.iter().find(|plane| plane.name == "labels")

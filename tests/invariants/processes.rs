@@ -58,6 +58,25 @@ fn a_training_is_the_same_on_any_number_of_threads() {
     }
 }
 
+/// Without each feature that a device may lack the engine does the same with something else. Bits may differ only where
+/// kernels differ: nowhere, as reads of texels and of storage are the same numbers.
+#[test]
+fn without_optional_features_a_training_is_the_same() {
+    if std::env::var_os(CHILD).is_some() || !is_lavapipe() {
+        return;
+    }
+    let run = |hidden: &str| {
+        let tests = ["invariants::processes::hash_of_a_training", "pass::step", "pass::blend"];
+        let text = child(&tests, &[("LABELGS_HIDE", hidden)]);
+        let hash = text.split("hash ").nth(1).and_then(|rest| rest.split_whitespace().next()).map(str::to_owned);
+        hash.unwrap_or_else(|| panic!("no hash in {text}"))
+    };
+    let all = run("");
+    for hidden in ["size_control,full_subgroups", "timestamps,memory_model,robust", "texels"] {
+        assert_eq!(run(hidden), all, "without {hidden}");
+    }
+}
+
 /// Subgroups of 16 where the processor has vectors for them (elsewhere the same size again).
 #[test]
 fn passes_agree_with_their_mirrors_on_wide_vectors() {

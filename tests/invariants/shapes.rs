@@ -14,7 +14,7 @@ fn crowd() -> Scene {
 /// Runs a step and a render with a changed kernel shape.
 fn with_shape<T>(change: impl Fn(&mut KernelShape), read: impl Fn(&mut Rig) -> T) -> Option<T> {
     let turn = device()?;
-    let mut shape = KernelShape::new(turn.subgroup_size(), turn.is_cpu());
+    let mut shape = KernelShape::of(turn.capabilities());
     change(&mut shape);
     let mut rig = Rig::with_shape(turn, crowd(), true, shape);
     Some(read(&mut rig))

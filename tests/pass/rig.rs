@@ -41,7 +41,7 @@ impl DerefMut for Rig {
 impl Rig {
     /// The scene on the shared device, with or without labels, with the device's kernel shape.
     pub fn new(turn: Turn, scene: Scene, labels: bool) -> Self {
-        let shape = KernelShape::new(turn.subgroup_size(), turn.is_cpu());
+        let shape = KernelShape::of(turn.capabilities());
         Self::with_shape(turn, scene, labels, shape)
     }
 

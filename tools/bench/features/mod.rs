@@ -81,7 +81,7 @@ pub fn run(options: &Options) -> Result<()> {
     let gpu = device::open()?;
     let dataset = synth::dataset(&scene, 5);
     let model = labelled_model(&gpu, &dataset, from_step)?;
-    let kernels = Kernels::compile(&KernelShape::new(gpu.subgroup_size(), gpu.is_cpu()))?;
+    let kernels = Kernels::compile(&KernelShape::of(gpu.capabilities()))?;
     check::run(&gpu, &kernels)?;
     let (labelled, capacity) = labelled_row(&gpu, &dataset, &model, warm_up, steps)?;
     let ground = Ground { gpu: &gpu, kernels: &kernels, model: &model, capacity, size: (scene.width, scene.height) };
@@ -192,7 +192,7 @@ impl Bed {
     fn new(ground: &Ground, channels: Channels, alias: bool) -> Result<Self> {
         let Ground { gpu, kernels, model, capacity, size } = ground;
         require(capacity.segments == 1, || "a tile holds too many splats".to_owned())?;
-        let shape = KernelShape::new(gpu.subgroup_size(), gpu.is_cpu());
+        let shape = KernelShape::of(gpu.capabilities());
         let buffers = Buffers::new(channels, capacity)?;
         let plan = PlanOptions { alias, ..PlanOptions::default() };
         let options = SchedulerOptions { plan, ..SchedulerOptions::default() };

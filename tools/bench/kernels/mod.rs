@@ -109,7 +109,7 @@ pub fn run(args: &KernelArgs) -> Result<()> {
 
 /// The modes with their shaders for the device.
 fn compile(gpu: &Gpu, args: &KernelArgs) -> Result<Vec<(Mode, Replacements)>> {
-    let shape = KernelShape::new(gpu.subgroup_size(), gpu.is_cpu());
+    let shape = KernelShape::of(gpu.capabilities());
     let room = Room { gaussians: 1, size: (64, 64), trained: true, labels: None };
     let variant = Variant { labels: false, lift: false, sh_degree: 3, size: room.size, update: false, counts: false };
     let list = pass::training_step(&shape, &capacity(&shape, &room), variant);

@@ -108,7 +108,7 @@ pub fn run(common: &Common) -> Result<()> {
         (SynthOptions::default(), 1500, 60)
     };
     let gpu = device::open()?;
-    let shape = KernelShape::new(gpu.subgroup_size(), gpu.is_cpu());
+    let shape = KernelShape::of(gpu.capabilities());
     let c = ceilings::measure(&gpu, shape.texel, common.small)?;
     println!(
         "{}: {:.1} G multiplications and additions, {:.2} G exp2, {:.2} G divisions, {:.1} GB read and written a second; \

@@ -1,0 +1,63 @@
+//! Features that a device has and that are not to be seen, so that a poorer device can be tried out on a richer one.
+
+use super::capabilities::{Features, Subgroup};
+use super::limits::Limits;
+use crate::error::{Error, Result};
+use ash::vk;
+
+/// What can be hidden.
+const NAMES: [&str; 9] = [
+    "memory_model",
+    "scalar",
+    "timeline",
+    "robust",
+    "size_control",
+    "full_subgroups",
+    "shuffle",
+    "timestamps",
+    "texels",
+];
+
+/// What `LABELGS_HIDE` names, separated by commas.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Hidden(Vec<String>);
+
+impl Hidden {
+    pub(super) fn by_env() -> Result<Self> {
+        let Ok(text) = std::env::var("LABELGS_HIDE") else { return Ok(Self::default()) };
+        let names: Vec<String> = text.split(',').filter(|name| !name.is_empty()).map(str::to_owned).collect();
+        match names.iter().find(|name| !NAMES.contains(&name.as_str())) {
+            Some(name) => Err(Error::usage("LABELGS_HIDE", format!("{name} is none of {}", NAMES.join(", ")))),
+            None => Ok(Self(names)),
+        }
+    }
+
+    fn has(&self, name: &str) -> bool {
+        self.0.iter().any(|hidden| hidden == name)
+    }
+
+    pub(super) fn features(&self, features: &mut Features) {
+        features.memory_model &= !self.has("memory_model");
+        features.scalar &= !self.has("scalar");
+        features.timeline &= !self.has("timeline");
+        features.robust &= !self.has("robust");
+        features.size_control &= !self.has("size_control");
+        features.full_subgroups &= !self.has("full_subgroups");
+    }
+
+    pub(super) fn subgroup(&self, subgroup: &mut Subgroup) {
+        if self.has("shuffle") {
+            subgroup.operations &= !vk::SubgroupFeatureFlags::SHUFFLE;
+        }
+    }
+
+    pub(super) fn limits(&self, limits: &mut Limits) {
+        if self.has("timestamps") {
+            (limits.timestamp_bits, limits.timestamp_period) = (0, 0.0);
+        }
+        if self.has("texels") {
+            // What Vulkan promises.
+            limits.max_texel_elements = limits.max_texel_elements.min(65_536);
+        }
+    }
+}
