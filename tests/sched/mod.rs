@@ -1,5 +1,6 @@
 //! The scheduler on a real device, with toy passes.
 
+mod controls;
 mod faults;
 mod memory;
 mod random;

@@ -1,0 +1,66 @@
+//! Negative controls: what each mode of the validation layer is there for, it must find.
+
+use super::*;
+use labelgs::gpu::{Gpu, GpuOptions, Message, Validation};
+
+/// Messages of a device of its own in a mode; none where the layer is not installed.
+fn messages(validation: Validation, list: &PassList) -> Option<Vec<Message>> {
+    let gpu = Gpu::new(&GpuOptions { validation, ..GpuOptions::from_env().unwrap() }).unwrap();
+    if !gpu.is_validated() {
+        eprintln!("skipped: the validation layer is not installed");
+        return None;
+    }
+    let log = gpu.message_log();
+    let mut scheduler = Scheduler::new(gpu, TABLE, pixels(256), SchedulerOptions::default()).unwrap();
+    let id = scheduler.prepare(list).unwrap();
+    scheduler.run(id, 0).unwrap();
+    drop(scheduler);
+    Some(log.messages())
+}
+
+// Says that it reads, and writes: nobody plans a barrier for that.
+toy_shader!(
+    liar,
+    0,
+    [],
+    [("to", R, S, 4)],
+    "layout(local_size_x = 64) in;
+    layout(scalar, set=0, binding=0) buffer to_block { uint to[]; };
+    void main() { to[gl_GlobalInvocationID.x] = gl_GlobalInvocationID.x; }"
+);
+
+toy_shader!(
+    beyond,
+    0,
+    [],
+    [("to", W, S, 4)],
+    "layout(local_size_x = 64) in;
+    layout(scalar, set=0, binding=0) writeonly buffer to_block { uint to[]; };
+    void main() { to[gl_GlobalInvocationID.x + 256u] = 7u; }"
+);
+
+#[test]
+fn a_missing_barrier_is_heard() {
+    let Some(turn) = device() else { return };
+    let mut list = PassList::new("race");
+    list.fill(A, 5);
+    list.pass(PassDecl::new(liar(), vec![A], Grid::Groups(4, 1, 1)));
+    list.pass(scaled(A, B, 3, 1, 256)).copy(B, REPORT, 0);
+    let Some(found) = messages(Validation::Sync, &list) else { return };
+    assert!(found.iter().any(|message| message.is_error && message.id.contains("SYNC-HAZARD")), "{found:?}");
+    // The core alone is deaf to it: that is why there are modes.
+    let Some(found) = messages(Validation::On, &list) else { return };
+    assert!(!found.iter().any(|message| message.id.contains("SYNC-HAZARD")), "{found:?}");
+    drop(turn);
+}
+
+#[test]
+fn a_write_beyond_a_buffer_is_heard() {
+    let Some(turn) = device() else { return };
+    let mut list = PassList::new("beyond");
+    list.pass(PassDecl::new(beyond(), vec![A], Grid::Groups(1, 1, 1)));
+    list.copy(A, REPORT, 0);
+    let Some(found) = messages(Validation::GpuAssisted, &list) else { return };
+    assert!(found.iter().any(|message| message.is_error && message.text.contains("out of bounds")), "{found:?}");
+    drop(turn);
+}
