@@ -26,7 +26,8 @@ void main() {
     }
     float l1 = subgroup_sum(sum.x), ssim = subgroup_sum(sum.y), label = 0.0;
 #ifdef LABELS
-    for (uint i = lane; i < counters.layer_tile_count; i += SUBGROUP_SIZE) {
+    uint count = counters.layer_tile_count;
+    for (uint i = lane; i < count; i += SUBGROUP_SIZE) {
         label += layer_loss[i];
     }
     label = subgroup_sum(label);

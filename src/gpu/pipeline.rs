@@ -60,6 +60,18 @@ impl Gpu {
     }
 }
 
+/// A kernel that the driver does not take, unless it is memory that is short or the device that is gone.
+fn refused(gpu: &Gpu, shader: &ShaderDesc, error: Error) -> Error {
+    if matches!(error.exit_status(), 5 | 6) {
+        return error;
+    }
+    let device = gpu.capabilities();
+    Error::NoDevice(format!(
+        "{} ({} {}) does not compile the shader {}: {error}; try another version of the driver or another --device",
+        device.name, device.driver_name, device.driver_info, shader.name
+    ))
+}
+
 impl Pipeline {
     fn new(gpu: &Gpu, shader: &'static ShaderDesc, spec: &[u32], subgroup_size: Option<u32>) -> Result<Self> {
         let width = gpu.check_workgroup(shader, spec, subgroup_size)?;
@@ -87,7 +99,7 @@ impl Pipeline {
         let made = pipeline.make(gpu.pipeline_cache(), module, spec, subgroup_size, full);
         // SAFETY: pipelines do not need their modules once they are made.
         unsafe { gpu.raw().destroy_shader_module(module, None) };
-        made?;
+        made.map_err(|error| refused(gpu, shader, error))?;
         gpu.name_object(pipeline.handle, shader.name);
         Ok(pipeline)
     }
