@@ -37,7 +37,9 @@ pub fn open_gpu(context: &Context) -> Result<Arc<Gpu>> {
     let cpu = if gpu.is_cpu() { ", a processor: expect it to be slower than a graphics card" } else { "" };
     tracing::info!("device: {} ({}){cpu}", found.name, found.driver_info);
     if !found.subgroup.is_pinned {
-        tracing::warn!("this device does not let subgroup sizes be chosen; `labelgs selftest` tells whether its own do");
+        tracing::warn!(
+            "this device does not let subgroup sizes be chosen; `labelgs selftest` tells whether its own do"
+        );
     }
     Ok(gpu)
 }
