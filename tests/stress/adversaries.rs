@@ -85,42 +85,36 @@ fn changed(seed: u64, shape: Shape, change: impl Fn(usize, &mut Gaussians)) -> S
     made
 }
 
-const SMALL: Shape = Shape {
-    gaussians: 80,
-    width: 48,
-    height: 40,
-    objects: 3,
-    sh_degree: 3,
-    scales: (0.05, 0.5),
-    opacities: (-3.0, 5.0),
-};
+fn small() -> Shape {
+    Shape { gaussians: 80, ..Shape::default() }
+}
 
 /// 1e6 : 1 in every rotation. The conic's small eigenvalue is 1e-6 of the large one, so that the exponent is a small
 /// difference of terms ten times as large.
 #[test]
 fn needles() {
-    let made = changed(201, SMALL, |row, g| g.scales[row] = [0.0, (1e-6_f32).ln(), (1e-6_f32).ln()]);
+    let made = changed(201, small(), |row, g| g.scales[row] = [0.0, (1e-6_f32).ln(), (1e-6_f32).ln()]);
     holds("needles", made, true, Bound { colour: 5e-5, gradient: 1.1e-4 });
 }
 
 /// Flat discs of which one axis is smaller than any float of a position.
 #[test]
 fn discs() {
-    let made = changed(202, SMALL, |row, g| g.scales[row] = [-1.0, -1.5, -30.0]);
+    let made = changed(202, small(), |row, g| g.scales[row] = [-1.0, -1.5, -30.0]);
     holds("discs", made, true, Bound { colour: 5e-6, gradient: 1.1e-5 });
 }
 
 /// Far below a pixel: the blur alone makes the splat.
 #[test]
 fn points() {
-    let made = changed(203, SMALL, |row, g| g.scales[row] = [-15.0, -14.0, -13.0]);
+    let made = changed(203, small(), |row, g| g.scales[row] = [-15.0, -14.0, -13.0]);
     holds("points", made, true, Bound { colour: 1.1e-5, gradient: 2e-5 });
 }
 
 /// Larger than the scene: every pixel sees the middle of every splat.
 #[test]
 fn giants() {
-    let made = changed(204, SMALL, |row, g| {
+    let made = changed(204, small(), |row, g| {
         g.scales[row] = [6.0, 7.0, 5.0];
         g.opacities[row] = -3.0;
     });
@@ -130,7 +124,7 @@ fn giants() {
 /// Rotations of any length that f32 squares.
 #[test]
 fn rotations_of_any_length() {
-    let made = changed(205, SMALL, |row, g| {
+    let made = changed(205, small(), |row, g| {
         let length = [1e-15_f32, 1e-6, 1.0, 1e6, 1e15][row % 5];
         g.quats[row] = g.quats[row].map(|v| v * length);
     });
@@ -140,12 +134,12 @@ fn rotations_of_any_length() {
 /// Opacities from nothing to all: logits of 15 are 3e-7 from 1, those of 100 are 1.
 #[test]
 fn opacities_at_their_ends() {
-    let made = changed(206, SMALL, |row, g| g.opacities[row] = [-100.0, -15.0, -5.5, 0.0, 15.0, 100.0][row % 6]);
+    let made = changed(206, small(), |row, g| g.opacities[row] = [-100.0, -15.0, -5.5, 0.0, 15.0, 100.0][row % 6]);
     holds("opacities at their ends", made, true, Bound { colour: 5e-6, gradient: 1.1e-5 });
 }
 
 fn stack(count: usize, opacity: f64, depth: impl Fn(usize) -> f32) -> Scene {
-    let mut made = scene(207, &Shape { gaussians: 1, width: 24, height: 20, ..SMALL });
+    let mut made = scene(207, &Shape { gaussians: 1, width: 24, height: 20, ..small() });
     made.camera = plain_camera(24, 20);
     let logit = (opacity / (1.0 - opacity)).ln() as f32;
     let colour = |i: usize| [(i % 7) as f32 * 0.2 - 0.6, (i % 5) as f32 * 0.3 - 0.6, (i % 3) as f32 * 0.5 - 0.5];
@@ -197,7 +191,7 @@ fn across_the_near_plane() {
 #[test]
 fn wide_and_narrow_cameras() {
     for (name, degrees) in [("170 degrees", 170.0_f64), ("1 degree", 1.0)] {
-        let mut made = scene(209, &SMALL);
+        let mut made = scene(209, &small());
         let focal = 24.0 / (degrees.to_radians() / 2.0).tan();
         (made.camera.fx, made.camera.fy) = (f64::from(focal as f32), f64::from(focal as f32));
         holds(name, made, true, Bound { colour: 5e-6, gradient: 2e-5 });
@@ -207,7 +201,7 @@ fn wide_and_narrow_cameras() {
 /// Harmonics of 1e6: colours far beyond any photo, negative ones clamped to 0.
 #[test]
 fn harmonics_that_overflow_a_photo() {
-    let made = changed(210, SMALL, |row, g| {
+    let made = changed(210, small(), |row, g| {
         let rest = g.rest_per_gaussian();
         g.sh0[row] = [1e6, -1e6, 1.0];
         g.sh_rest[row * rest..(row + 1) * rest].iter_mut().for_each(|v| *v = [1e5, -1e5, 0.1]);
@@ -219,13 +213,13 @@ fn harmonics_that_overflow_a_photo() {
 #[test]
 fn masks_and_labels_at_their_ends() {
     for (name, id) in [("a mask of everything", 1_u32), ("the largest label", 65_535)] {
-        let mut made = scene(211, &Shape { objects: 1, ..SMALL });
+        let mut made = scene(211, &Shape { objects: 1, ..small() });
         made.target.label_map.fill(id);
         made.target.slots.iter_mut().for_each(|slot| slot.label = id);
         made.gaussians.labels.iter_mut().flatten().for_each(|label| *label *= id);
         holds(name, made, true, Bound { colour: 5e-6, gradient: 2e-5 });
     }
-    let mut made = scene(212, &Shape { objects: 1, ..SMALL });
+    let mut made = scene(212, &Shape { objects: 1, ..small() });
     made.target.label_map.fill(0);
     holds("a mask of nothing", made, true, Bound { colour: 5e-6, gradient: 1.1e-5 });
 }
