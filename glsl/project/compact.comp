@@ -5,7 +5,7 @@
 #include "dispatch.glsl"
 // compact — list the visible Gaussians, in the order of the model.
 // Work:    64 Gaussians a workgroup.
-// Reads:   step; depth_keys [N]; visible_offsets [N]
+// Reads:   step, failure; depth_keys [N]; visible_offsets [N]
 // Writes:  keys_out [V] depth bits; values_out [V] Gaussian index
 // Mirror:  src/reference/scan.rs::compact
 
@@ -15,10 +15,12 @@ FETCHU(1, depth_keys);
 FETCHU(2, visible_offsets);
 WRITE(3, uint, keys_out);
 WRITE(4, uint, values_out);
+READ1(5, uint, failure);
 
 void main() {
     uint i = linear_group_id() * 64u + gl_LocalInvocationID.x;
-    if (i >= step.gaussian_count) {
+    // After a failure the scan counts nothing, and the offsets are those of another step.
+    if (i >= step.gaussian_count || failure != 0u) {
         return;
     }
     uint key = fetchu(depth_keys, i);

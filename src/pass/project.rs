@@ -33,7 +33,7 @@ fn order_and_project(b: &mut Builder) {
     pass!(b, prepare_splats { counters: Buf::COUNTERS, dispatch_args: Buf::DISPATCH_ARGS } [], ONE);
     pass!(b, texel compact {
         step: Buf::STEP, depth_keys: Buf::DEPTH_KEYS, visible_offsets: Buf::VISIBLE_OFFSETS,
-        keys_out: Buf::DEPTH_KEYS_A, values_out: Buf::DEPTH_VALUES_A,
+        keys_out: Buf::DEPTH_KEYS_A, values_out: Buf::DEPTH_VALUES_A, failure: Buf::FAILURE,
     } [], over_gaussians());
     let buffers = SortBuffers {
         keys: [Buf::DEPTH_KEYS_A, Buf::DEPTH_KEYS_B],
