@@ -117,6 +117,12 @@ fn a_resumed_run_says_what_changed_and_what_cannot() {
     let text = succeeded(&place.trained("out", &["--resume", "-q"]));
     assert!(!text.contains("now"), "what was changed is in the new checkpoint: {text}");
 
+    // A file that leaves the near plane to the scene does not change what was decided for it.
+    let near = || TrainState::read(&place.checkpoints("out")[0].path).expect("a whole one").config.near;
+    let decided = near();
+    let text = succeeded(&place.trained("out", &["--resume", "--config", &place.settings(), "--iterations", "10"]));
+    assert!(decided > 0.0 && near() == decided && !text.contains("--near"), "{decided}, {}: {text}", near());
+
     // Masks that are not those of the checkpoint.
     std::fs::rename(place.path("scene/masks"), place.path("masks")).expect("moved");
     refused(&[], 3, &["masks"]);

@@ -53,6 +53,10 @@ fn decide(args: &TrainArgs, mut state: TrainState) -> Result<TrainState> {
     };
     args.apply(&mut wanted);
     wanted.check()?;
+    if wanted.near == 0.0 {
+        // Left to the scene, and that was decided when the run began.
+        wanted.near = state.config.near;
+    }
     let (then, now) = (config::fields(&state.config), config::fields(&wanted));
     for flag in then.keys().chain(now.keys()).collect::<BTreeSet<_>>() {
         let (then, now) = (then.get(flag), now.get(flag));
