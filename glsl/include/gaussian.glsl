@@ -13,8 +13,8 @@ struct Projection {
     vec3 q_m0, q_m1; // rows of Q M, Q being the matrix of the conic
 };
 
-// Unit quaternion, and one over the length. Lengths whose square leaves f32 are halved in the exponent first; 0 has no
-// direction and becomes NaN.
+// Unit quaternion, and one over the length. Where the square of the length leaves f32, the largest component becomes 1
+// first; 0 has no direction and becomes NaN.
 vec4 unit_quat(vec4 q, out float inv_norm) {
     float squared = dot(q, q);
     bool usual = squared > 1e-24 && squared < 1e24;

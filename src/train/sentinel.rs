@@ -32,7 +32,7 @@ impl Trainer {
     /// Looks at what a step counted.
     pub(super) fn watch(&mut self, job: &Job, report: &Report, losses: [f64; 2]) -> Result<()> {
         let counters = &report.counters;
-        let view = self.views[job.view].name.clone();
+        let view = &self.views[job.view].name;
         let failure = |quantity: String| Error::Numeric { quantity, step: u64::from(job.step), view: view.clone() };
         if counters.broken_count > 0 {
             return Err(failure(format!(

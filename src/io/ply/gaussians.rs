@@ -218,7 +218,8 @@ pub fn write_gaussians(path: impl AsRef<Path>, gaussians: &Gaussians) -> Result<
         return Err(Error::Bug(format!("the columns of {count} Gaussians differ in length")));
     }
     let finite: Vec<usize> = (0..count).filter(|&row| is_finite(gaussians, row)).collect();
-    let wide = finite.iter().any(|&row| gaussians.world(row) != gaussians.world(row).as_vec3().as_dvec3());
+    let wide = gaussians.origin != DVec3::ZERO
+        && finite.iter().any(|&row| gaussians.world(row) != gaussians.world(row).as_vec3().as_dvec3());
     let header = header(finite.len(), rest * 3, gaussians, wide);
     atomic::write(path, |out| {
         // The header goes through a buffer because the crate wants a sized writer.
