@@ -1,14 +1,19 @@
 //! Faults on purpose, so that every failure can be tested: the environment variable `LABELGS_FAULT=SITE:N:KIND` makes the
-//! N-th event of a site fail, once.
+//! N-th event of a site fail; with `:COUNT` behind it, so many from there on.
 //!
 //! | site | events | kinds |
 //! | --- | --- | --- |
 //! | a Vulkan call, such as `vkQueueSubmit` | its calls | `DEVICE_LOST`, `HOST_MEMORY`, `DEVICE_MEMORY`, `INITIALIZATION` |
 //! | `vulkan` | all Vulkan calls that can fail | the same |
-//! | `write` | what is done to write files: making, writing, syncing, renaming | `NO_SPACE`, `IO` |
+//! | `write` | what is done to write files: making, writing, syncing, renaming | `NO_SPACE`, `IO`, `SHORT`, `INTERRUPTED` |
+//! | `read` | what is done to read files: opening, reading, listing a folder | `IO`, `SHORT`, `INTERRUPTED` |
 //! | `nan` | steps of a training | `NUMBER`: a Gaussian gets a position that is none |
+//!
+//! `SHORT` and `INTERRUPTED` are what every system may do at any time: a part is read or written, or nothing, and the call
+//! has to be made again. They may change nothing.
 
 use std::io;
+use std::ops::Range;
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -27,36 +32,65 @@ pub enum Kind {
     NoSpace,
     /// The disk fails.
     Io,
+    /// One byte is read or written, whatever was asked for.
+    Short,
+    /// A signal came first.
+    Interrupted,
     /// A number is none.
     Number,
 }
 
 struct Fault {
     site: String,
-    after: AtomicU64,
+    /// Events that are to fail.
+    events: Range<u64>,
+    /// Events so far.
+    seen: AtomicU64,
     kind: Kind,
 }
 
 /// The fault that this event of a site meets, if one was asked for.
 pub fn at(site: &str) -> Option<Kind> {
     static FAULT: OnceLock<Option<Fault>> = OnceLock::new();
-    let fault = FAULT.get_or_init(|| parse(&std::env::var("LABELGS_FAULT").ok()?)).as_ref()?;
-    let hit = fault.site == site && fault.after.fetch_sub(1, Ordering::Relaxed) == 1;
+    let fault = FAULT.get_or_init(|| {
+        let text = std::env::var("LABELGS_FAULT").ok().filter(|text| !text.is_empty())?;
+        let fault = parse(&text);
+        if fault.is_none() {
+            tracing::warn!("LABELGS_FAULT: {text} is not SITE:N:KIND or SITE:N:KIND:COUNT, nothing will fail");
+        }
+        fault
+    });
+    let fault = fault.as_ref()?;
+    let hit = fault.site == site && fault.events.contains(&(fault.seen.fetch_add(1, Ordering::Relaxed) + 1));
+    if hit {
+        tracing::warn!("a fault on purpose: {:?} at {site}", fault.kind);
+    }
     hit.then_some(fault.kind)
 }
 
-/// The fault of a step of writing a file.
-pub fn writing() -> io::Result<()> {
-    match at("write") {
+/// The fault of a transfer of bytes from or to a file. True if only a part may be transferred.
+pub fn of_transfer(site: &str) -> io::Result<bool> {
+    match at(site) {
         Some(Kind::NoSpace) => Err(io::ErrorKind::StorageFull.into()),
+        Some(Kind::Interrupted) => Err(io::ErrorKind::Interrupted.into()),
+        Some(Kind::Short) => Ok(true),
         Some(_) => Err(io::Error::other("a fault on purpose")),
-        None => Ok(()),
+        None => Ok(false),
+    }
+}
+
+/// The fault of any other step with a file, which is done whole or fails.
+pub fn of_file(site: &str) -> io::Result<()> {
+    match of_transfer(site) {
+        Err(error) if error.kind() == io::ErrorKind::Interrupted => Ok(()),
+        other => other.map(|_| ()),
     }
 }
 
 fn parse(text: &str) -> Option<Fault> {
     let mut parts = text.split(':');
-    let (site, after, kind) = (parts.next()?, parts.next()?.parse().ok()?, parts.next()?);
+    let (site, first, kind) = (parts.next()?, parts.next()?.parse::<u64>().ok()?, parts.next()?);
+    let count = parts.next().map_or(Some(1), |count| count.parse().ok())?;
     let kind = match kind {
         "DEVICE_LOST" => Kind::DeviceLost,
         "HOST_MEMORY" => Kind::HostMemory,
@@ -64,8 +98,11 @@ fn parse(text: &str) -> Option<Fault> {
         "INITIALIZATION" => Kind::Initialization,
         "NO_SPACE" => Kind::NoSpace,
         "IO" => Kind::Io,
+        "SHORT" => Kind::Short,
+        "INTERRUPTED" => Kind::Interrupted,
         "NUMBER" => Kind::Number,
         _ => return None,
     };
-    Some(Fault { site: site.to_owned(), after: AtomicU64::new(after), kind })
+    let events = first..first.saturating_add(count);
+    Some(Fault { site: site.to_owned(), events, seen: AtomicU64::new(0), kind })
 }

@@ -1,7 +1,7 @@
 //! From what was typed to what is done: flag before file before default.
 
 use super::train_args::TrainArgs;
-use crate::io::LoadOptions;
+use crate::io::{self, LoadOptions};
 use crate::train::config::{Occlusion, TrainConfig};
 use crate::train::near::NEAR;
 use crate::{Error, Result};
@@ -54,7 +54,7 @@ pub fn near_of(path: &Path) -> Result<f32> {
 }
 
 fn parse<T: serde::de::DeserializeOwned>(path: &Path) -> Result<T> {
-    let text = std::fs::read_to_string(path).map_err(Error::read(path))?;
+    let text = io::read::text(path)?;
     toml::from_str(&text).map_err(|error| {
         let line = error.span().map(|span| text[..span.start].matches('\n').count() + 1);
         let place = line.map_or(String::new(), |line| format!("line {line}"));

@@ -1,6 +1,7 @@
 //! `labelgs profile --compare`: two profiles side by side.
 
 use super::stdout;
+use crate::io::read;
 use crate::{Error, Result};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
@@ -21,7 +22,7 @@ pub struct Row {
 /// `tolerance` (a share), and three quarters of its steps slower than three quarters of the old one's.
 pub fn run(files: [&Path; 2], tolerance: f64, as_json: bool) -> Result<()> {
     let read = |path: &Path| -> Result<Value> {
-        let text = std::fs::read_to_string(path).map_err(Error::read(path))?;
+        let text = read::text(path)?;
         serde_json::from_str(&text).map_err(|error| {
             Error::data(path, format!("line {}", error.line()), format!("is no JSON of labelgs profile: {error}"))
         })

@@ -41,16 +41,16 @@ fn write_inner(path: &Path, body: impl FnOnce(&mut dyn Write) -> io::Result<()>)
         Some(parent) if !parent.as_os_str().is_empty() => parent,
         _ => Path::new("."),
     };
-    fault::writing()?;
+    fault::of_file("write")?;
     fs::create_dir_all(folder)?;
-    fault::writing()?;
+    fault::of_file("write")?;
     let temporary = temporary_in(folder)?;
     fill(temporary.as_file(), body)?;
-    fault::writing()?;
+    fault::of_file("write")?;
     temporary.as_file().sync_all()?;
-    fault::writing()?;
+    fault::of_file("write")?;
     temporary.persist(&target).map_err(|failed| failed.error)?;
-    fault::writing()?;
+    fault::of_file("write")?;
     sync_folder(folder)
 }
 
@@ -87,12 +87,17 @@ struct Fallible<'a>(&'a File);
 
 impl Write for Fallible<'_> {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        if let Err(error) = fault::writing() {
-            // As a disk that fills up: a part is there.
-            let _ = self.0.write(&bytes[..bytes.len() / 2]);
-            return Err(error);
+        match fault::of_transfer("write") {
+            Ok(false) => self.0.write(bytes),
+            Ok(true) => self.0.write(&bytes[..bytes.len().min(1)]),
+            Err(error) => {
+                if error.kind() == io::ErrorKind::StorageFull {
+                    // A disk that fills up takes what it has room for.
+                    let _ = self.0.write(&bytes[..bytes.len() / 2]);
+                }
+                Err(error)
+            }
         }
-        self.0.write(bytes)
     }
 
     fn flush(&mut self) -> io::Result<()> {

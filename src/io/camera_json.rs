@@ -5,6 +5,7 @@ use super::lens::Lens;
 use super::listing::{check_camera, rotation_of};
 use super::transforms::affine;
 use crate::error::{Error, Result};
+use crate::io::read;
 use crate::scene::Camera;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -44,7 +45,7 @@ impl From<&Camera> for CameraFile {
 /// Reads `{"w2c": 4x4 row-major with OpenCV axes, "fx", "fy", "cx", "cy", "W", "H"}`.
 pub fn read_camera(path: impl AsRef<Path>) -> Result<Camera> {
     let path = path.as_ref();
-    let text = std::fs::read_to_string(path).map_err(Error::read(path))?;
+    let text = read::text(path)?;
     let file: CameraFile = serde_json::from_str(&text).map_err(|error| {
         let expected = "expected {\"w2c\": 4x4 rows, \"fx\", \"fy\", \"cx\", \"cy\", \"W\", \"H\"}";
         Error::data(path, format!("line {}", error.line()), format!("{error}; {expected}"))

@@ -10,11 +10,11 @@
 
 use super::atomic;
 use crate::error::{Error, Result};
+use crate::io::read;
 use crc32fast::Hasher;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
-use std::fs::File;
-use std::io::{self, BufRead, BufReader, Read, Seek, SeekFrom, Write};
+use std::io::{self, BufRead, Read, Seek, SeekFrom, Write};
 use std::path::Path;
 
 /// Version of the format that is written and read.
@@ -99,9 +99,8 @@ impl Checkpoint {
     /// Reads a file. What is cut short, longer than it was, changed in any bit, or of another version is an error that
     /// says so. Takes about as much memory as the file has bytes, whatever they are.
     pub fn read(path: &Path) -> Result<Self> {
-        let file = File::open(path).map_err(Error::read(path))?;
-        let length = file.metadata().map_err(Error::read(path))?.len();
-        let mut file = BufReader::with_capacity(1 << 18, file);
+        let mut file = read::open(path)?;
+        let length = file.get_ref().length().map_err(Error::read(path))?;
         check(&mut file, path, length)?;
         file.seek(SeekFrom::Start(HEADER as u64)).map_err(Error::read(path))?;
         // From here on the bytes are those that were written; what does not fit together was written so.

@@ -2,6 +2,7 @@
 //! newest is found without a clock, also where a run was started anew at step 1.
 
 use crate::error::{Error, Result};
+use crate::io::read;
 use std::path::{Path, PathBuf};
 
 /// Name of the folder in that of a run.
@@ -22,15 +23,11 @@ pub struct Found {
 /// The checkpoints in the folder of a run, the newest first; none if there is no such folder.
 pub fn list(out: &Path) -> Result<Vec<Found>> {
     let folder = out.join(FOLDER);
-    let entries = match std::fs::read_dir(&folder) {
-        Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(Vec::new()),
-        other => other.map_err(Error::read(&folder))?,
+    let entries = match read::folder(&folder) {
+        Err(Error::Read { source, .. }) if source.kind() == std::io::ErrorKind::NotFound => return Ok(Vec::new()),
+        other => other?,
     };
-    let mut found = Vec::new();
-    for entry in entries {
-        let path = entry.map_err(Error::read(&folder))?.path();
-        found.extend(parse(path));
-    }
+    let mut found: Vec<Found> = entries.into_iter().filter_map(parse).collect();
     found.sort_unstable_by(|a, b| b.cmp(a));
     Ok(found)
 }

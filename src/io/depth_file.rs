@@ -2,10 +2,9 @@
 
 use super::image::{PIXELS_MAX, check_length, check_png_length, check_size};
 use crate::error::{Error, Result};
+use crate::io::read;
 use crate::scene::DepthMap;
-use exr::prelude::{MetaData, read_first_flat_layer_from_file};
-use std::fs::File;
-use std::io::BufReader;
+use exr::prelude::{MetaData, ReadChannels, ReadLayers};
 use std::path::Path;
 
 /// Extensions of depth files, the preferred first: a PNG beside another file is often only a picture of it.
@@ -30,8 +29,7 @@ fn refuse(path: &Path, kind: &str) -> impl Fn(&dyn std::fmt::Display) -> Error {
 
 fn read_png(path: &Path) -> Result<DepthMap> {
     let refuse = refuse(path, "PNG");
-    let file = File::open(path).map_err(Error::read(path))?;
-    let mut reader = png::Decoder::new(BufReader::new(file)).read_info().map_err(|error| refuse(&error))?;
+    let mut reader = png::Decoder::new(read::open(path)?).read_info().map_err(|error| refuse(&error))?;
     let (width, height) = (reader.info().width, reader.info().height);
     check_size(path, (width, height))?;
     let (colour, bits) = (reader.info().color_type, reader.info().bit_depth);
@@ -53,10 +51,7 @@ fn read_png(path: &Path) -> Result<DepthMap> {
 /// The only channel of the first layer, or that of the name Y, Z or R.
 fn read_exr(path: &Path) -> Result<DepthMap> {
     let refuse = refuse(path, "EXR");
-    if !path.is_file() {
-        return Err(Error::data(path, "", "there is no such file"));
-    }
-    let header = MetaData::read_from_file(path, false).map_err(|error| refuse(&error))?;
+    let header = MetaData::read_from_buffered(read::open(path)?, false).map_err(|error| refuse(&error))?;
     let side = |side: usize| u32::try_from(side).unwrap_or(u32::MAX);
     let (mut samples, mut first) = (0, None);
     for header in &header.headers {
@@ -71,7 +66,8 @@ fn read_exr(path: &Path) -> Result<DepthMap> {
         return Err(refuse(&format!("{samples} samples in all channels; up to {PIXELS_MAX} are supported")));
     }
     let Some((width, height)) = first else { return Err(refuse(&"it has no picture")) };
-    let image = read_first_flat_layer_from_file(path).map_err(|error| refuse(&error))?;
+    let layer = exr::prelude::read().no_deep_data().largest_resolution_level().all_channels().first_valid_layer();
+    let image = layer.all_attributes().from_buffered(read::open(path)?).map_err(|error| refuse(&error))?;
     let channels = &image.layer_data.channel_data.list;
     let named = |name: &str| channels.iter().find(|channel| channel.name.eq(name));
     let channel = match channels.as_slice() {
@@ -92,7 +88,7 @@ fn read_exr(path: &Path) -> Result<DepthMap> {
 /// version, length of the header, a Python dictionary of three known keys, then the numbers.
 fn read_npy(path: &Path) -> Result<DepthMap> {
     let refuse = refuse(path, "NPY");
-    let bytes = std::fs::read(path).map_err(Error::read(path))?;
+    let bytes = read::bytes(path)?;
     let parts = || {
         let rest = bytes.strip_prefix(b"\x93NUMPY")?;
         let (start, length) = match *rest.first()? {
@@ -149,7 +145,7 @@ fn read_npy(path: &Path) -> Result<DepthMap> {
 /// `Pf`, width and height, scale (below 0 for little-endian), then rows from the bottom up.
 fn read_pfm(path: &Path) -> Result<DepthMap> {
     let refuse = refuse(path, "PFM");
-    let bytes = std::fs::read(path).map_err(Error::read(path))?;
+    let bytes = read::bytes(path)?;
     let mut at = 0;
     let mut word = || {
         let start = at + bytes[at..].iter().position(|byte| !byte.is_ascii_whitespace())?;

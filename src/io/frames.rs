@@ -3,6 +3,7 @@
 use super::atomic;
 use super::camera_json::CameraFile;
 use crate::error::{Error, Result};
+use crate::io::read;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -39,7 +40,7 @@ impl Frames {
 
     /// Reads a video. Another version, a photo with two frames and a video without photos are errors.
     pub fn read(path: &Path) -> Result<Self> {
-        let text = std::fs::read_to_string(path).map_err(Error::read(path))?;
+        let text = read::text(path)?;
         let video: Self = serde_json::from_str(&text).map_err(|error| {
             let expected = r#"expected {"schema_version": 1, "frames": [{"file", "photo", "camera"}]}"#;
             Error::data(path, format!("line {}", error.line()), format!("{error}; {expected}"))

@@ -2,10 +2,11 @@
 
 use super::atomic;
 use crate::error::{Error, Result};
+use crate::io::read::{self, Source};
 use crate::scene::Photo;
 use exr::prelude::{AnyChannel, AnyChannels, Encoding, FlatSamples, Image, Layer, LayerAttributes, WritableImage};
 use image::{ImageDecoder, ImageReader};
-use std::io::Cursor;
+use std::io::{BufReader, Cursor};
 use std::path::Path;
 
 /// Most pixels that an image may have; larger ones are refused before they are decoded.
@@ -41,8 +42,7 @@ pub(crate) fn check_length(path: &Path, (width, height): (u32, u32), channels: u
 
 /// Refuses a palette that is no whole number of colours, which the decoder would read beyond the end of.
 fn check_palette(path: &Path) -> Result<()> {
-    let file = std::io::BufReader::new(std::fs::File::open(path).map_err(Error::read(path))?);
-    let reader = png::Decoder::new(file).read_info();
+    let reader = png::Decoder::new(read::open(path)?).read_info();
     let reader = reader.map_err(|error| Error::data(path, "", format!("cannot be decoded: {error}")))?;
     let bytes = reader.info().palette.as_ref().map_or(0, |palette| palette.len());
     if bytes.is_multiple_of(3) {
@@ -62,9 +62,9 @@ fn too_short(path: &Path, (width, height): (u32, u32)) -> Error {
     Error::data(path, "", problem)
 }
 
-fn reader(path: &Path) -> Result<ImageReader<std::io::BufReader<std::fs::File>>> {
+fn reader(path: &Path) -> Result<ImageReader<BufReader<Source>>> {
     // The kind is guessed from the first bytes, so a PNG called .jpg is read all the same.
-    let mut reader = ImageReader::open(path).and_then(ImageReader::with_guessed_format).map_err(Error::read(path))?;
+    let mut reader = ImageReader::new(read::open(path)?).with_guessed_format().map_err(Error::read(path))?;
     let mut limits = image::Limits::default();
     limits.max_alloc = Some(PIXELS_MAX * 16);
     reader.limits(limits);

@@ -4,6 +4,7 @@
 
 use super::{atomic, run_folder};
 use crate::error::{Error, Result};
+use crate::io::read;
 use crate::scene::labels::{LABEL_MAX, label_colour};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
@@ -61,7 +62,7 @@ impl LabelTable {
     /// Reads a table. Another version, an id that no label can have, one that occurs twice and a name that stands
     /// for two ids are errors.
     pub fn read(path: &Path) -> Result<Self> {
-        let text = std::fs::read_to_string(path).map_err(Error::read(path))?;
+        let text = read::text(path)?;
         let table: Self = serde_json::from_str(&text).map_err(|error| {
             let expected =
                 r#"expected {"schema_version": 1, "labels": [{"id": 1, "name": "cup", "colour": [r, g, b]}]}"#;

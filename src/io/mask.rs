@@ -6,13 +6,13 @@
 use super::image::{check_png_length, check_size};
 use super::resample::same_aspect;
 use crate::error::{Error, Result};
+use crate::io::read::{self, Source};
 use crate::scene::LabelMap;
 use std::collections::HashMap;
-use std::fs::File;
 use std::io::BufReader;
 use std::path::{Path, PathBuf};
 
-type Decoder = png::Decoder<BufReader<File>>;
+type Decoder = png::Decoder<BufReader<Source>>;
 
 fn problem(path: &Path, error: impl std::fmt::Display) -> Error {
     Error::data(path, "", format!("is no readable PNG mask: {error}"))
@@ -47,9 +47,8 @@ impl Raw {
     }
 }
 
-fn open(path: &Path) -> Result<(png::Reader<BufReader<File>>, Header)> {
-    let file = File::open(path).map_err(Error::read(path))?;
-    let mut decoder = Decoder::new(BufReader::new(file));
+fn open(path: &Path) -> Result<(png::Reader<BufReader<Source>>, Header)> {
+    let mut decoder = Decoder::new(read::open(path)?);
     // Any other choice expands a palette to colours or drops the low half of 16-bit ids.
     decoder.set_transformations(png::Transformations::IDENTITY);
     let reader = decoder.read_info().map_err(|error| problem(path, error))?;

@@ -25,6 +25,7 @@ pub mod masks;
 pub mod occlusion_table;
 pub mod pipeline_file;
 pub mod ply;
+pub mod read;
 mod resample;
 pub mod run_folder;
 mod transforms;

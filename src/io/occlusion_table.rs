@@ -2,6 +2,7 @@
 
 use super::atomic;
 use crate::error::{Error, Result};
+use crate::io::read;
 use crate::scene::labels::Occluders;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -30,7 +31,7 @@ impl OcclusionTable {
 
     /// Reads a table. Another version, the id 0 and an object that hides itself are errors; lists come back sorted.
     pub fn read(path: &Path) -> Result<Self> {
-        let text = std::fs::read_to_string(path).map_err(Error::read(path))?;
+        let text = read::text(path)?;
         let mut table: Self = serde_json::from_str(&text).map_err(|error| {
             let expected =
                 r#"expected {"schema_version": 1, "kind": "depth", "views": {"00.png": {"1": [], "2": [1]}}}"#;

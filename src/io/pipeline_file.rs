@@ -2,6 +2,7 @@
 
 use super::atomic;
 use crate::gpu::PipelineStore;
+use crate::io::read;
 use std::path::PathBuf;
 
 const MAGIC: [u8; 8] = *b"labelgsP";
@@ -41,7 +42,7 @@ impl PipelineFolder {
 impl PipelineStore for PipelineFolder {
     fn load(&self, device: &str) -> Vec<u8> {
         let path = self.path(device);
-        let Ok(bytes) = std::fs::read(&path) else { return Vec::new() };
+        let Ok(bytes) = read::bytes(&path) else { return Vec::new() };
         unpack(&bytes).map(<[u8]>::to_vec).unwrap_or_else(|| {
             tracing::warn!("{} is damaged; pipelines are compiled again and it is written anew", path.display());
             Vec::new()

@@ -8,6 +8,7 @@ use super::listed_path::Place;
 use super::listing::{FAR, Listed, Listing, check_camera, find_file, invert_pose, rotation_of};
 use super::{image, ply};
 use crate::error::{Error, Result};
+use crate::io::read;
 use crate::scene::{Camera, Point};
 use glam::{DAffine3, DMat3, DVec3};
 use serde::Deserialize;
@@ -94,7 +95,7 @@ pub(crate) fn list_file(scene: &Place, path: &Path) -> Result<Listing> {
 }
 
 fn read(scene: &Place, path: &Path, test: Option<bool>, listing: &mut Listing) -> Result<()> {
-    let text = std::fs::read_to_string(path).map_err(Error::read(path))?;
+    let text = read::text(path)?;
     let transforms: Transforms = serde_json::from_str(&text)
         .map_err(|error| Error::data(path, format!("line {}", error.line()), error.to_string()))?;
     let mut seen: HashMap<String, Option<PathBuf>> = HashMap::new();

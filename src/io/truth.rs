@@ -4,9 +4,9 @@ use super::image::read_grey;
 use super::lens::Lens;
 use super::resample::{resample_ids, same_aspect, shrink_photo};
 use crate::error::{Error, Result};
+use crate::io::read;
 use crate::scene::{LabelMap, Photo, View};
 use std::collections::BTreeMap;
-use std::fs;
 use std::path::{Path, PathBuf};
 
 /// A mask at the size at which it is compared, row-major.
@@ -38,9 +38,9 @@ pub fn files_below(folder: &Path) -> Result<Vec<PathBuf>> {
 
 fn collect(root: &Path, inside: &Path, depth: u32, found: &mut Vec<PathBuf>) -> Result<()> {
     let folder = root.join(inside);
-    for entry in fs::read_dir(&folder).map_err(Error::read(&folder))? {
-        let name = entry.map_err(Error::read(&folder))?.file_name();
-        let path = inside.join(&name);
+    for entry in read::folder(&folder)? {
+        let name = entry.file_name().unwrap_or_default();
+        let path = inside.join(name);
         if name.to_string_lossy().starts_with('.') {
             continue;
         }

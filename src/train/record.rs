@@ -2,6 +2,7 @@
 
 use crate::error::{Error, Result};
 use crate::infer::render::Rendered;
+use crate::io::read;
 use crate::io::{camera_json, image, ply};
 use crate::scene::labels::label_colour;
 use crate::scene::{Camera, Gaussians, Photo};
@@ -15,8 +16,8 @@ pub fn model_path(out: &Path, step: u32) -> PathBuf {
 /// The model of the latest step in the folder of a run.
 pub fn latest_model(out: &Path) -> Result<PathBuf> {
     let folder = out.join("point_cloud");
-    let steps = std::fs::read_dir(&folder).into_iter().flatten().flatten();
-    let steps = steps.filter_map(|entry| entry.file_name().to_str()?.strip_prefix("iteration_")?.parse::<u32>().ok());
+    let steps = if folder.is_dir() { read::folder(&folder)? } else { Vec::new() };
+    let steps = steps.iter().filter_map(|path| path.file_name()?.to_str()?.strip_prefix("iteration_")?.parse().ok());
     let latest = steps.filter(|&step| model_path(out, step).is_file()).max();
     latest.map(|step| model_path(out, step)).ok_or_else(|| {
         Error::data(

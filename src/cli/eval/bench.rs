@@ -12,6 +12,7 @@ use crate::infer::score::protocol::run::{picture_count, run as run_bench};
 use crate::infer::score::protocol::score::Distance;
 use crate::infer::score::protocol::{Ask, By, Layout, Prompt, Protocol};
 use crate::io::label_table::LabelTable;
+use crate::io::read;
 use crate::io::truth::{files_below, read_truth};
 use crate::scene::{Dataset, UNLABELLED, View};
 use crate::{Error, Result};
@@ -66,7 +67,7 @@ pub(super) fn run(protocol: Protocol, args: &EvalArgs, context: &Context) -> Res
 fn read_layout(protocol: Protocol, root: &Path, by: By, args: &EvalArgs) -> Result<Layout> {
     let files = files_below(root)?;
     let list = root.join("classes.txt");
-    let classes = if list.is_file() { Some(std::fs::read_to_string(&list).map_err(Error::read(&list))?) } else { None };
+    let classes = if list.is_file() { Some(read::text(&list)?) } else { None };
     // `--scene .` has a name too.
     let scene = std::fs::canonicalize(&args.scene).unwrap_or_else(|_| args.scene.clone());
     let scene = scene.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();

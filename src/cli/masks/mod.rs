@@ -12,6 +12,7 @@ use crate::cli::args::ReadArgs;
 use crate::cli::scene::open_with;
 use crate::io::LoadOptions;
 use crate::io::image::{write_png_grey8, write_png_grey16};
+use crate::io::read;
 use crate::scene::{Dataset, LabelMap};
 use crate::{Error, Result};
 use clap::{Args, Subcommand};
@@ -78,8 +79,8 @@ fn write_mask(path: &Path, mask: &LabelMap) -> Result<()> {
 
 /// Names of the PNGs of a folder, sorted.
 fn pngs(folder: &Path) -> Result<Vec<String>> {
-    let entries = std::fs::read_dir(folder).map_err(Error::read(folder))?;
-    let names = entries.flatten().filter_map(|entry| entry.file_name().into_string().ok());
+    let entries = read::folder(folder)?;
+    let names = entries.iter().filter_map(|path| path.file_name()?.to_str().map(str::to_owned));
     let mut names: Vec<String> = names.filter(|name| name.ends_with(".png")).collect();
     names.sort();
     if names.is_empty() {

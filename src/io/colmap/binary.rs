@@ -2,9 +2,9 @@
 
 use super::model::{CameraRecord, ImageRecord, MODELS, check_supported};
 use crate::error::{Error, Result};
+use crate::io::read;
 use crate::scene::Point;
 use glam::DVec3;
-use std::fs::File;
 use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
 
@@ -14,7 +14,7 @@ const NAME_MAX: u64 = 4096;
 /// A file read front to back, which knows where it is.
 struct Source {
     path: PathBuf,
-    file: BufReader<File>,
+    file: BufReader<read::Source>,
     length: u64,
     at: u64,
     /// Kind, number from 1 and announced count of the record being read.
@@ -23,9 +23,8 @@ struct Source {
 
 impl Source {
     fn open(path: &Path) -> Result<Self> {
-        let file = File::open(path).map_err(Error::read(path))?;
-        let length = file.metadata().map_err(Error::read(path))?.len();
-        let file = BufReader::with_capacity(1 << 18, file);
+        let file = read::open(path)?;
+        let length = file.get_ref().length().map_err(Error::read(path))?;
         Ok(Self { path: path.to_owned(), file, length, at: 0, record: ("record", 0, 0) })
     }
 

@@ -2,16 +2,16 @@
 
 use super::model::{CameraRecord, ImageRecord, MODELS, check_supported};
 use crate::error::{Error, Result};
+use crate::io::read;
 use crate::scene::Point;
 use glam::DVec3;
-use std::fs::File;
-use std::io::{BufRead, BufReader};
+use std::io::BufRead;
 use std::path::Path;
 use std::str::FromStr;
 
 /// Lines with their numbers from 1.
 fn lines(path: &Path) -> Result<impl Iterator<Item = Result<(usize, String)>>> {
-    let file = BufReader::new(File::open(path).map_err(Error::read(path))?);
+    let file = read::open(path)?;
     let path = path.to_owned();
     let line = move |(index, line): (usize, std::io::Result<Vec<u8>>)| {
         let place = || format!("line {}", index + 1);

@@ -6,6 +6,7 @@ use super::pred::Pred;
 use super::{Format, ImportOptions, shortened};
 use crate::error::{Error, Result};
 use crate::io::mask::read_header;
+use crate::io::read;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -181,7 +182,7 @@ fn classes_without_mask(root: &Path, claims: &Claims) -> Result<Vec<String>> {
     if !path.is_file() {
         return Ok(vec![format!("{} is not there", path.display())]);
     }
-    let text = std::fs::read_to_string(&path).map_err(Error::read(&path))?;
+    let text = read::text(&path)?;
     let objects = claims.objects();
     let lines = text.lines().map(str::trim).filter(|line| !line.is_empty());
     let without: Vec<&str> = lines.filter(|class| !objects.iter().any(|object| object == class)).collect();

@@ -3,6 +3,7 @@
 use super::Format;
 use crate::error::{Error, Result};
 use crate::io::mask::PhotoNames;
+use crate::io::read;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
@@ -26,8 +27,7 @@ pub(super) fn files(root: &Path) -> Result<Vec<String>> {
 }
 
 fn walk(folder: &Path, prefix: &str, depth: usize, found: &mut Vec<String>) -> Result<()> {
-    for entry in std::fs::read_dir(folder).map_err(Error::read(folder))? {
-        let path = entry.map_err(Error::read(folder))?.path();
+    for path in read::folder(folder)? {
         let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
         if name.starts_with('.') {
             continue;
@@ -57,8 +57,9 @@ pub(super) fn root(folder: &Path, format: Format) -> Result<PathBuf> {
         let fitting = inside.into_iter().find(|(_, formats)| formats.contains(&format));
         return Ok(fitting.map_or(folder.to_owned(), |(name, _)| folder.join(name)));
     }
-    let entries = std::fs::read_dir(folder).map_err(Error::read(folder))?;
-    if entries.flatten().any(|entry| png_key(&entry.file_name().to_string_lossy()).is_some()) {
+    let names = read::folder(folder)?;
+    let names = names.iter().filter_map(|path| path.file_name());
+    if names.into_iter().any(|name| png_key(&name.to_string_lossy()).is_some()) {
         return Ok(folder.to_owned());
     }
     match *inside.map(|(name, formats)| (*name, formats[0])).collect::<Vec<_>>() {

@@ -2,6 +2,7 @@
 
 use super::shortened;
 use crate::error::{Error, Result};
+use crate::io::read;
 use serde::Deserialize;
 use serde_json::Value;
 use std::collections::{BTreeMap, BTreeSet};
@@ -43,7 +44,7 @@ pub(super) struct Pred {
 impl Pred {
     /// Reads the file. A category is called as `categories` calls it, otherwise `category N`.
     pub(super) fn read(path: &Path) -> Result<Self> {
-        let text = std::fs::read_to_string(path).map_err(Error::read(path))?;
+        let text = read::text(path)?;
         let file: File = serde_json::from_str(&text).map_err(|error| {
             let expected = r#"expected {"annotations": [{"segments_info": [{"id": 1, "category_id": null}]}]}"#;
             Error::data(path, format!("line {}", error.line()), format!("{error}; {expected}"))

@@ -1,9 +1,9 @@
 //! The `vertex` element of a PLY file as rows of selected columns.
 
 use crate::error::{Error, Result};
+use crate::io::read::{self, Source};
 use ply_rs_bw::parser::{Parser, Reader};
 use ply_rs_bw::ply::{DefaultElement, ElementDef, Encoding, Header, PropertyType, ScalarType};
-use std::fs::File;
 use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
 
@@ -15,7 +15,7 @@ const LINE_MAX: u64 = 64 * 1024;
 /// An open PLY file, its header understood and its `vertex` rows not yet read.
 pub(super) struct Table {
     path: PathBuf,
-    file: BufReader<File>,
+    file: BufReader<Source>,
     encoding: Encoding,
     vertex: ElementDef,
     /// Elements before `vertex`, whose rows are skipped.
@@ -66,9 +66,8 @@ fn decode(scalar: &ScalarType, bytes: &[u8], big_endian: bool) -> f64 {
 impl Table {
     /// Opens `path` and reads its header.
     pub(super) fn open(path: &Path) -> Result<Self> {
-        let file = File::open(path).map_err(Error::read(path))?;
-        let file_bytes = file.metadata().map_err(Error::read(path))?.len();
-        let mut file = BufReader::with_capacity(1 << 18, file);
+        let mut file = read::open(path)?;
+        let file_bytes = file.get_ref().length().map_err(Error::read(path))?;
         let text = header_bytes(path, &mut file)?;
         let header = parse_header(path, &text)?;
         let mut elements: Vec<ElementDef> = header.elements.into_iter().map(|(_, element)| element).collect();

@@ -8,6 +8,7 @@
 use super::convolution::Layer;
 use super::{CHANNELS, STAGES};
 use crate::error::{Error, Result};
+use crate::io::read;
 use safetensors::{Dtype, SafeTensors};
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -22,7 +23,7 @@ pub struct Weights {
 impl Weights {
     /// Reads the file; every tensor must be there with its shape.
     pub fn read(path: &Path) -> Result<Self> {
-        let bytes = std::fs::read(path).map_err(Error::read(path))?;
+        let bytes = read::bytes(path)?;
         let file = SafeTensors::deserialize(&bytes)
             .map_err(|error| Error::data(path, "", format!("is no readable safetensors file: {error}")))?;
         let tensor = |name: String, shape: &[usize]| floats(path, &file, &name, shape);

@@ -1,0 +1,79 @@
+//! How files are read. Every open and every read of every reader goes through here, so that
+//! [faults](crate::fault) reach all of them.
+
+use crate::error::{Error, Result};
+use crate::fault;
+use std::fs::{self, File};
+use std::io::{self, BufReader, Read, Seek, SeekFrom};
+use std::path::{Path, PathBuf};
+
+/// A file that is read.
+#[derive(Debug)]
+pub struct Source(File);
+
+impl Source {
+    /// Bytes of the file.
+    pub fn length(&self) -> io::Result<u64> {
+        Ok(self.0.metadata()?.len())
+    }
+}
+
+impl Read for Source {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        let mut once = || {
+            let is_short = fault::of_transfer("read")?;
+            let most = if is_short { buffer.len().min(1) } else { buffer.len() };
+            self.0.read(&mut buffer[..most])
+        };
+        loop {
+            // Not every decoder tries again what a signal interrupted.
+            match once() {
+                Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+                other => return other,
+            }
+        }
+    }
+}
+
+impl Seek for Source {
+    fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
+        self.0.seek(to)
+    }
+}
+
+fn source(path: &Path) -> io::Result<Source> {
+    fault::of_file("read")?;
+    Ok(Source(File::open(path)?))
+}
+
+/// Opens a file.
+pub fn open(path: &Path) -> Result<BufReader<Source>> {
+    let file = source(path).map_err(Error::read(path))?;
+    Ok(BufReader::with_capacity(1 << 16, file))
+}
+
+/// All bytes of a file.
+pub fn bytes(path: &Path) -> Result<Vec<u8>> {
+    let all = || {
+        let mut file = source(path)?;
+        let mut bytes = Vec::new();
+        file.read_to_end(&mut bytes)?;
+        Ok(bytes)
+    };
+    all().map_err(Error::read(path))
+}
+
+/// A file of UTF-8 text.
+pub fn text(path: &Path) -> Result<String> {
+    String::from_utf8(bytes(path)?)
+        .map_err(|error| Error::data(path, format!("byte {}", error.utf8_error().valid_up_to()), "is not UTF-8 text"))
+}
+
+/// Paths of what is in a folder, in no order.
+pub fn folder(path: &Path) -> Result<Vec<PathBuf>> {
+    let all = || {
+        fault::of_file("read")?;
+        fs::read_dir(path)?.map(|entry| Ok(entry?.path())).collect::<io::Result<_>>()
+    };
+    all().map_err(Error::read(path))
+}
