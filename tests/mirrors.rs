@@ -178,6 +178,7 @@ fn orders_and_sums() {
     assert_eq!(depth_sort(&[3.0, 1.0, 2.0, 1.0]), [1, 3, 2, 0]);
     assert_eq!(radix_sort(&[5, 1, 5, 0, 1]), [3, 1, 4, 0, 2]);
     assert_eq!(exclusive_scan(&[3, 0, 2, 7]), (vec![0, 3, 3, 5], 12));
+    assert_eq!(exclusive_scan(&[u32::MAX - 1, 1, 1, 7]), (vec![0, u32::MAX - 1, u32::MAX, u32::MAX], u32::MAX));
     assert_eq!(compact(&[0, 4, 0, 1]), [1, 3]);
     let ranges = tile_ranges(&[0, 0, 3], 4);
     assert_eq!(ranges, [[0, 2], [2, 2], [2, 2], [2, 3]]);

@@ -3,6 +3,7 @@
 #include "constants.glsl"
 #include "step.glsl"
 #include "count.glsl"
+#include "saturate.glsl"
 // scan_apply — third of three: each lane writes the exclusive prefix of its share.
 // Work:    as scan_reduce.
 // Reads:   step, counters, failure; values [n]; partials [LANES] (exclusive)
@@ -32,6 +33,6 @@ void main() {
         v = v != KEY_INVISIBLE ? 1u : 0u;
 #endif
         offsets[i] = running;
-        running += v;
+        running = saturating_add(running, v);
     }
 }

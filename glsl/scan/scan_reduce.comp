@@ -3,6 +3,7 @@
 #include "constants.glsl"
 #include "step.glsl"
 #include "count.glsl"
+#include "saturate.glsl"
 // scan_reduce — first of three: each lane adds up its contiguous share of the values.
 // Work:    LANES lanes over all workgroups; lane i owns values [i c, (i+1) c), c = ceil(n / LANES).
 // Reads:   step, counters, failure; values [n] (variant flag: counts values that are not KEY_INVISIBLE)
@@ -30,7 +31,7 @@ void main() {
 #ifdef FLAG
         v = v != KEY_INVISIBLE ? 1u : 0u;
 #endif
-        sum += v;
+        sum = saturating_add(sum, v);
     }
     partials[lane] = sum;
 }

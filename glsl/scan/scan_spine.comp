@@ -2,6 +2,7 @@
 #include "layout.glsl"
 #include "constants.glsl"
 #include "step.glsl"
+#include "saturate.glsl"
 // scan_spine — second of three: exclusive scan of the lanes' sums, and the total into a counter.
 // Work:    one workgroup of one subgroup.
 // Reads:   partials [LANES]
@@ -22,11 +23,14 @@ void main() {
     uint begin = min(lane * share, LANES), end = min(begin + share, LANES);
     uint sum = 0u;
     for (uint i = begin; i < end; i++) {
-        sum += partials[i];
+        sum = saturating_add(sum, partials[i]);
     }
-    uint running = subgroupExclusiveAdd(sum);
+    // In two halves, neither of which can overflow.
+    uint low = subgroupExclusiveAdd(sum & 0xffffu);
+    uint high = subgroupExclusiveAdd(sum >> 16u) + (low >> 16u);
+    uint running = high > 0xffffu ? 0xffffffffu : (high << 16u) | (low & 0xffffu);
     if (lane == SUBGROUP_SIZE - 1u) {
-        uint total = running + sum;
+        uint total = saturating_add(running, sum);
         if (TOTAL == 0u) {
             counters.visible_count = total;
         } else if (TOTAL == 1u) {
@@ -40,6 +44,6 @@ void main() {
     for (uint i = begin; i < end; i++) {
         uint v = partials[i];
         partials[i] = running;
-        running += v;
+        running = saturating_add(running, v);
     }
 }

@@ -1,11 +1,11 @@
 //! Prefix sums and compaction: exact answers.
 
-/// Sums of all earlier values, and the total.
+/// Sums of all earlier values, and the total; they stop at the largest number.
 pub fn exclusive_scan(values: &[u32]) -> (Vec<u32>, u32) {
     let mut total = 0_u32;
     let sums = values.iter().map(|&value| {
         let before = total;
-        total = total.wrapping_add(value);
+        total = total.saturating_add(value);
         before
     });
     (sums.collect(), total)

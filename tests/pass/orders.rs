@@ -63,7 +63,9 @@ fn scan_of_numbers() {
     });
     let mut random = generator(71);
     for count in COUNTS {
-        let values: Vec<u32> = (0..count).map(|_| random.random_range(0..900)).collect();
+        // More than 2^32 in all, with the longest list.
+        let most = if count == ITEMS { u32::MAX / 1000 } else { 900 };
+        let values: Vec<u32> = (0..count).map(|_| random.random_range(0..most)).collect();
         announce(&mut engine, count);
         engine.sched_mut().upload(Buf::TILES_TOUCHED, 0, 0, &values).expect("upload");
         engine.sched_mut().run(id, 0).expect("run");
@@ -71,6 +73,7 @@ fn scan_of_numbers() {
         let (offsets, total) = exclusive_scan(&values);
         check("offsets", exact(&get(&mut engine, Buf::INSTANCE_OFFSETS, count), &offsets));
         assert_eq!(counters(&mut engine).instance_count, total);
+        assert_eq!(total == u32::MAX, count == ITEMS);
     }
 }
 
