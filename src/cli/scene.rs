@@ -10,6 +10,7 @@ use crate::io::pipeline_file::PipelineFolder;
 use crate::io::{self, LoadOptions, run_folder};
 use crate::scene::{Dataset, Gaussians, View};
 use crate::sched::SchedulerOptions;
+use crate::selftest;
 use crate::train::near::NEAR;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -37,9 +38,8 @@ pub fn open_gpu(context: &Context) -> Result<Arc<Gpu>> {
     let cpu = if gpu.is_cpu() { ", a processor: expect it to be slower than a graphics card" } else { "" };
     tracing::info!("device: {} ({}){cpu}", found.name, found.driver_info);
     if !found.subgroup.is_pinned {
-        tracing::warn!(
-            "this device does not let subgroup sizes be chosen; `labelgs selftest` tells whether its own do"
-        );
+        tracing::info!("this device does not let subgroup sizes be chosen: a step is tried first");
+        selftest::canary(&gpu)?;
     }
     Ok(gpu)
 }

@@ -6,17 +6,8 @@ use crate::error::{Error, Result};
 use ash::vk;
 
 /// What can be hidden.
-const NAMES: [&str; 9] = [
-    "memory_model",
-    "scalar",
-    "timeline",
-    "robust",
-    "size_control",
-    "full_subgroups",
-    "shuffle",
-    "timestamps",
-    "texels",
-];
+const NAMES: [&str; 8] =
+    ["memory_model", "scalar", "timeline", "robust", "size_control", "full_subgroups", "shuffle", "timestamps"];
 
 /// What `LABELGS_HIDE` names, separated by commas.
 #[derive(Clone, Debug, Default)]
@@ -54,10 +45,6 @@ impl Hidden {
     pub(super) fn limits(&self, limits: &mut Limits) {
         if self.has("timestamps") {
             (limits.timestamp_bits, limits.timestamp_period) = (0, 0.0);
-        }
-        if self.has("texels") {
-            // What Vulkan promises.
-            limits.max_texel_elements = limits.max_texel_elements.min(65_536);
         }
     }
 }

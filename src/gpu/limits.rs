@@ -49,7 +49,7 @@ impl Limits {
             ("LABELGS_LIMIT_ALLOCATION", &mut self.max_allocation),
             ("LABELGS_LIMIT_MEMORY", &mut self.max_memory),
         ] {
-            if let Ok(text) = std::env::var(name) {
+            if let Some(text) = std::env::var(name).ok().filter(|text| !text.is_empty()) {
                 let problem = || Error::usage(name, format!("{text} is no size; a number with K, M or G is expected"));
                 *limit = (*limit).min(parse_size(&text).ok_or_else(problem)?);
             }

@@ -7,7 +7,7 @@ pub mod rig;
 pub mod scenes;
 mod training;
 
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::pass::KernelShape;
 use crate::reference::Rules;
@@ -32,6 +32,29 @@ impl Check {
     pub fn worst(&self) -> Option<f64> {
         self.verdict.as_ref().ok().map(|summary| summary.worst.max(summary.whole))
     }
+}
+
+/// One step against the reference, where a driver does not let subgroup sizes be chosen: kernels for other subgroups than
+/// those that run compute nonsense and write where they may not.
+pub fn canary(gpu: &Arc<Gpu>) -> Result<()> {
+    let found = gpu.capabilities();
+    let step = || -> Result<Verdict> {
+        let mut ran = Ran::new(&Rules::default(), gpu, KernelShape::of(found))?;
+        Ok(judge::all([ran.tiles()?, ran.blend()?, ran.loss()?, ran.gradient()?]))
+    };
+    let problem = match step() {
+        Ok(Ok(_)) => return Ok(()),
+        Ok(Err(problem)) | Err(Error::Bug(problem)) => problem,
+        Err(other) => return Err(other),
+    };
+    Err(Error::NoDevice(format!(
+        "{} ({} {}) tells of subgroups of {} and does not let their size be chosen; a step with such subgroups goes wrong \
+         ({problem}): try another version of the driver or another --device",
+        found.name,
+        found.driver_name,
+        found.driver_info,
+        gpu.subgroup_size()
+    )))
 }
 
 /// Runs every check on a device and hands each to `done` as it ends. An error is a failure of the device itself, such
