@@ -87,6 +87,15 @@ pub enum Error {
         /// The view.
         view: String,
     },
+    /// Densification has left nothing to train.
+    #[error(
+        "every Gaussian was pruned after step {step}: the poses or the photos do not fit together, or --min-opacity or \
+         --max-scale take too much"
+    )]
+    Pruned {
+        /// The step.
+        step: u32,
+    },
     /// The run finished, and a check that was asked for failed.
     #[error("check failed: {0}")]
     Check(String),
@@ -126,7 +135,7 @@ impl Error {
         match self {
             Self::Check(_) => 1,
             Self::Usage { .. } => 2,
-            Self::Data { .. } | Self::Read { .. } => 3,
+            Self::Data { .. } | Self::Read { .. } | Self::Pruned { .. } => 3,
             Self::NoDevice(_) => 4,
             Self::OutOfMemory { .. } => 5,
             Self::DeviceLost { .. } => 6,

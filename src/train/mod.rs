@@ -255,11 +255,7 @@ impl Trainer {
                 let what = self.densify(&job)?;
                 tracing::debug!("step {step}: {what:?}, {} Gaussians", self.gaussian_count());
                 if self.gaussian_count() == 0 {
-                    return Err(Error::Numeric {
-                        quantity: "every Gaussian was pruned; the poses or the photos do not fit together".to_owned(),
-                        step: u64::from(step),
-                        view: self.views[job.view].name.clone(),
-                    });
+                    return Err(Error::Pruned { step });
                 }
             }
             if resets {
