@@ -27,8 +27,31 @@ use std::time::Instant;
 
 /// Trains a model and prints what came of it.
 pub fn run(args: &TrainArgs, context: &Context) -> Result<()> {
-    let (summary, sentence) = train(args, context)?;
+    let (summary, sentence) = restarted(args, context)?;
     if context.json || args.json.json { stdout::print_json(&summary) } else { stdout::print(&sentence) }
+}
+
+/// Trains a model; if `--restart` was typed, also over losses of the device. A device that is lost twice without a
+/// checkpoint in between would be lost again.
+fn restarted(args: &TrainArgs, context: &Context) -> Result<(serde_json::Value, String)> {
+    if !args.restart {
+        return train(args, context);
+    }
+    let newest = || Ok(checkpoint_folder::list(&args.output)?.first().map_or(0, |found| found.number));
+    let mut args = args.clone();
+    let mut before = newest()?;
+    loop {
+        let error = match train(&args, context) {
+            Err(error @ Error::DeviceLost { .. }) => error,
+            other => return other,
+        };
+        let number = newest()?;
+        if number <= before {
+            return Err(error);
+        }
+        tracing::warn!("{error}; it is opened again, and training goes on from the newest checkpoint");
+        (before, args.resume) = (number, true);
+    }
 }
 
 /// Trains a model; returns its metrics.json, and the same in a sentence.
@@ -57,7 +80,8 @@ pub(super) fn train(args: &TrainArgs, context: &Context) -> Result<(serde_json::
     }
     let gpu = open_gpu(context)?;
     let preview = preview_view(&dataset);
-    let options = SchedulerOptions { memory_limit: run.memory_limit, ..SchedulerOptions::default() };
+    let options =
+        SchedulerOptions { memory_limit: run.memory_limit, crash_markers: args.restart, ..SchedulerOptions::default() };
     let mut facts = facts(args, masks.as_deref(), &gpu);
     facts.extend(resumed.as_ref().map(|state| ("goes on after step", state.step.to_string())));
     let mut checkpoints = Checkpoints::new(out, run.clone(), resumed.as_ref())?;

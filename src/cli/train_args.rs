@@ -36,6 +36,10 @@ pub struct TrainArgs {
     /// Go on from the newest checkpoint in OUT, with its settings and masks; without one, start at step 1.
     #[arg(long)]
     pub resume: bool,
+    /// Open the device again if it is lost, and go on from the newest checkpoint, as long as there is a new one each
+    /// time. The pass that lost it is named, at some cost in time.
+    #[arg(long)]
+    pub restart: bool,
     /// JSON.
     #[command(flatten)]
     pub json: JsonFlag,

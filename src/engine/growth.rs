@@ -100,8 +100,14 @@ impl Engine {
         }
         let roomy = Capacity::grown(self.room.gaussians, count);
         let gaussians = if self.fits(&self.capacity_for(roomy))? { roomy } else { count };
-        let new = self.capacity_for(gaussians);
-        self.set_capacity(new)?;
+        let gaussians = match self.set_capacity(self.capacity_for(gaussians)) {
+            // Drivers may hold less than they tell.
+            Err(Error::OutOfMemory { .. }) if gaussians > count => {
+                self.set_capacity(self.capacity_for(count))?;
+                count
+            }
+            other => other.map(|()| gaussians)?,
+        };
         self.room.gaussians = gaussians;
         Ok(())
     }
@@ -153,7 +159,8 @@ impl Engine {
         let needed = &report.counters;
         let grown = self.capacity_of(needed, Capacity::grown);
         // Where there is no room for more than what is needed, that must do.
-        let new = if self.fits(&grown)? { grown } else { self.capacity_of(needed, |_, needed| needed) };
+        let least = self.capacity_of(needed, |_, needed| needed);
+        let new = if self.fits(&grown)? { grown } else { least };
         if new == *self.sched.capacity() {
             return Err(Error::Bug(format!("failure {} without a need: {needed:?}", report.failure)));
         }
@@ -163,7 +170,10 @@ impl Engine {
             new.layer_tiles,
             new.segments
         );
-        self.set_capacity(new)?;
+        match self.set_capacity(new) {
+            Err(Error::OutOfMemory { .. }) if new != least => self.set_capacity(least)?,
+            other => other?,
+        }
         self.sched.fill(Buf::FAILURE, 0)?;
         Ok(true)
     }

@@ -3,7 +3,7 @@
 use super::Trainer;
 use super::job::Job;
 use crate::engine::ListKey;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::plan::Buf;
 use crate::shaders::structs::{Counters, StepUniforms};
 
@@ -21,12 +21,22 @@ pub struct Densified {
 impl Trainer {
     /// Clones, splits and prunes after `job`, whose statistics are in; all earlier submits are done.
     pub(super) fn densify(&mut self, job: &Job) -> Result<Densified> {
-        let uniforms = self.densify_uniforms(job);
-        let counted = self.count_densified(uniforms)?;
-        let bound = self.bound(counted.densified_count)?;
-        let uniforms = self.bounded(uniforms, counted.densified_count, bound)?;
-        let counted = self.count_densified(uniforms)?;
-        self.engine.make_room_for_gaussians(u64::from(counted.densified_count))?;
+        let wished = self.densify_uniforms(job);
+        let wanted = self.count_densified(wished)?.densified_count;
+        let mut bound = self.bound(wanted)?;
+        let (uniforms, counted) = loop {
+            let uniforms = self.bounded(wished, wanted, bound)?;
+            let counted = self.count_densified(uniforms)?;
+            let room = self.engine.room().gaussians;
+            match self.engine.make_room_for_gaussians(u64::from(counted.densified_count)) {
+                Err(error @ Error::OutOfMemory { .. }) if bound > room => {
+                    tracing::warn!("{error}; from here on there are no more than {room} Gaussians");
+                    (self.max_gaussians, self.memory_bounds) = (room, true);
+                    bound = room;
+                }
+                other => break other.map(|()| (uniforms, counted))?,
+            }
+        };
         let list = self.engine.list(ListKey::DensifyApply)?;
         self.engine.sched_mut().upload(Buf::STEP, 0, 0, &[uniforms])?;
         self.engine.sched_mut().run(list, 0)?;
