@@ -172,3 +172,27 @@ fn a_scene_without_masks_pays_nothing_for_labels() {
     assert!(without.0 < 2048 && without.0 < with.0, "{without:?} {with:?}");
     assert!(without.1 < with.1, "{without:?} {with:?}");
 }
+
+/// The file of a module of the tests, such as `cli_long` or `sched::faults`.
+fn module_file(path: &[&str]) -> Option<PathBuf> {
+    let place = path.iter().fold(Path::new(ROOT).join("tests"), |folder, part| folder.join(part));
+    [place.with_extension("rs"), place.join("mod.rs")].into_iter().find(|file| file.is_file())
+}
+
+/// `tests/README.md` names tests and modules of tests; a test that is renamed must not leave a hole there.
+#[test]
+fn every_test_that_the_list_of_faults_names_is_there() {
+    let text = fs::read_to_string(Path::new(ROOT).join("tests/README.md")).expect("the list");
+    let cells = text.lines().filter_map(|line| line.strip_suffix(" |")?.rsplit_once(" | ")).map(|(_, tests)| tests);
+    let names: Vec<&str> = cells.flat_map(|cell| cell.split('`').skip(1).step_by(2)).collect();
+    assert!(names.len() > 80, "{}", names.len());
+    for name in names.into_iter().filter(|name| !name.starts_with("tools/")) {
+        let parts: Vec<&str> = name.split("::").collect();
+        let (test, module) = parts.split_last().expect("a name");
+        let is_test = || {
+            let text = fs::read_to_string(module_file(module)?).ok()?;
+            text.contains(&format!("#[test]\nfn {test}()")).then_some(())
+        };
+        assert!(module_file(&parts).is_some() || is_test().is_some(), "there is no test {name}");
+    }
+}

@@ -1,0 +1,66 @@
+//! A long training is the same to the last bit: run again, interrupted in the middle, on other numbers of threads.
+
+use crate::support::device;
+use crate::support::runs::{Place, succeeded};
+use std::process::Command;
+use std::time::{Duration, Instant};
+
+const STEPS: u32 = 1000;
+const MIDDLE: u32 = 500;
+
+const SETTINGS: &str = "
+iterations = 1000
+checkpoint_every = 500
+preview_every = 0
+label_from = 100
+vote_every = 150
+occlusion_every = 200
+sh_degree_interval = 200
+densify_from = 50
+densify_until = 900
+densify_interval = 50
+densify_grad_threshold = 5e-4
+opacity_reset_interval = 300
+opacity_reset_margin = 100
+";
+
+#[test]
+fn a_thousand_steps_are_the_same_to_the_last_bit() {
+    let Some(turn) = device() else { return };
+    let place = Place::new();
+    std::fs::write(place.path("long.toml"), SETTINGS).expect("settings");
+    let settings = place.text("long.toml");
+    let flags = ["--config", &settings];
+    succeeded(&place.trained("straight", &flags));
+    let expected = place.model("straight", STEPS);
+    let gaussians =
+        labelgs::io::ply::read_gaussians(&place.path("straight/point_cloud/iteration_1000/point_cloud.ply"));
+    let gaussians = gaussians.expect("a model").gaussians;
+    let labelled = gaussians.labels.as_ref().map_or(0, |labels| labels.iter().filter(|&&id| id > 0).count());
+    assert!(gaussians.len() > 300 && labelled > 100, "{} Gaussians, {labelled} of them labelled", gaussians.len());
+
+    // Killed after the checkpoint in the middle.
+    let mut child = place.spawned(&place.train("killed", &flags));
+    let start = Instant::now();
+    while place.checkpoints("killed").is_empty() && child.try_wait().expect("a child").is_none() {
+        assert!(start.elapsed() < Duration::from_secs(300), "no checkpoint");
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    child.kill().expect("killed or done");
+    child.wait().expect("a child");
+    assert_eq!(place.checkpoints("killed").first().map(|found| found.step), Some(MIDDLE));
+    succeeded(&place.trained("killed", &["--resume"]));
+    assert!(place.model("killed", STEPS) == expected, "killed and resumed: another model");
+
+    if !turn.is_cpu() {
+        return;
+    }
+    // The number of threads is lavapipe's.
+    for threads in ["1", "5"] {
+        let out = format!("threads-{threads}");
+        let mut command = Command::new(env!("CARGO_BIN_EXE_labelgs"));
+        command.env("LP_NUM_THREADS", threads).env("LABELGS_VALIDATION", "off").args(place.train(&out, &flags));
+        succeeded(&command.output().expect("it runs"));
+        assert!(place.model(&out, STEPS) == expected, "{threads} threads: another model");
+    }
+}

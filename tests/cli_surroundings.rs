@@ -1,0 +1,175 @@
+//! The tool where things are arranged otherwise than at home: names of folders, languages, closed streams, links, folders
+//! that nobody may write to.
+#![cfg(unix)]
+
+use crate::support::device;
+use crate::support::runs::{Place, files, stderr, succeeded};
+use std::collections::BTreeMap;
+use std::ffi::{OsStr, OsString};
+use std::os::unix::ffi::OsStrExt;
+use std::os::unix::fs::symlink;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output, Stdio};
+
+fn labelgs() -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_labelgs"));
+    command.env("LABELGS_VALIDATION", "off");
+    command
+}
+
+fn train(scene: &Path, out: &Path, flags: &[&str]) -> Output {
+    let mut command = labelgs();
+    command.arg("train").arg(scene).arg("--masks").arg(scene.join("masks")).arg("-o").arg(out);
+    command.args(["--checkpoint-every", "2"]).args(flags).output().expect("it runs")
+}
+
+/// A copy of the scene in another folder.
+fn moved(place: &Place, to: &Path) {
+    let from = place.path("scene");
+    for path in files(&from) {
+        let copy = to.join(path.strip_prefix(&from).expect("inside"));
+        std::fs::create_dir_all(copy.parent().expect("a folder")).expect("a folder");
+        std::fs::copy(path, copy).expect("a copy");
+    }
+}
+
+#[test]
+fn folders_may_have_any_name() {
+    let Some(_turn) = device() else { return };
+    let place = Place::new();
+    let names: [&[u8]; 4] =
+        ["a b".as_bytes(), "\u{fc}\u{4e2d}\u{1f436}".as_bytes(), b"line\nbreak --flag", b"no\xffutf8"];
+    for name in names {
+        let name = OsStr::from_bytes(name);
+        let (scene, out) = (place.path("scenes").join(name), place.path("models").join(name));
+        moved(&place, &scene);
+        succeeded(&train(&scene, &out, &["--iterations", "4"]));
+        // A name that is no text cannot be kept in a checkpoint: the masks are typed again, here as everywhere.
+        let said = succeeded(&train(&scene, &out, &["--resume", "--iterations", "6"]));
+        assert!(said.contains("goes on after step 4"), "{name:?}: {said}");
+        let pictures = place.path("pictures").join(name);
+        let mut render = labelgs();
+        render.arg("render").arg(&out).arg("--scene").arg(&scene).arg("-o").arg(&pictures);
+        succeeded(&render.output().expect("it runs"));
+        assert!(!files(&pictures).is_empty(), "{name:?}");
+        succeeded(&labelgs().arg("list").arg(&out).output().expect("it runs"));
+    }
+    // Longer than a system takes.
+    let long: PathBuf = std::iter::repeat_n("folder", 700).collect();
+    let output = train(&place.path("scene"), &place.path("models").join(&long), &["--iterations", "4"]);
+    assert_eq!(output.status.code(), Some(7), "{}", stderr(&output));
+    assert!(stderr(&output).contains("cannot be written"), "{}", stderr(&output));
+    let output = train(&place.path("scenes").join(long), &place.path("models/long"), &["--iterations", "4"]);
+    assert_eq!(output.status.code(), Some(3), "{}", stderr(&output));
+}
+
+/// Numbers are written and read alike under every language, and no zone or date changes a result.
+#[test]
+fn languages_and_zones_change_nothing() {
+    let Some(_turn) = device() else { return };
+    let place = Place::new();
+    succeeded(&place.trained("out", &["--iterations", "4"]));
+    let model = place.model("out", 4);
+    for (language, zone) in
+        [("C", "UTC"), ("de_DE.UTF-8", "Asia/Kathmandu"), ("tr_TR", "nowhere/at all"), ("", "\u{fffd}")]
+    {
+        let out = place.path(&format!("out-{language}"));
+        let mut command = labelgs();
+        command.env("LANG", language).env("LC_ALL", language).env("TZ", zone);
+        command.args(place.train(out.to_str().expect("text"), &["--iterations", "4"]).iter().map(OsString::from));
+        succeeded(&command.output().expect("it runs"));
+        assert!(place.model(&format!("out-{language}"), 4) == model, "{language:?} in {zone:?}");
+    }
+}
+
+/// Streams that are closed, or whose reader is gone, end nothing: results are in files.
+#[test]
+fn nobody_has_to_listen() {
+    let Some(_turn) = device() else { return };
+    let place = Place::new();
+    succeeded(&place.trained("right", &["--iterations", "4"]));
+    let model = place.model("right", 4);
+    let shell = |redirection: &str, out: &str| {
+        let mut command = Command::new("sh");
+        command.args(["-c", &format!("\"$0\" \"$@\" {redirection}"), env!("CARGO_BIN_EXE_labelgs")]);
+        command.env("LABELGS_VALIDATION", "off").args(place.train(&place.text(out), &["--iterations", "4", "-vv"]));
+        command.status().expect("it runs").code()
+    };
+    for (index, redirection) in
+        ["<&-", ">&-", "2>&-", "<&- >&- 2>&-", "2>/dev/full", ">/dev/null 2>&1"].iter().enumerate()
+    {
+        let out = format!("closed-{index}");
+        assert_eq!(shell(redirection, &out), Some(0), "{redirection}");
+        assert!(place.model(&out, 4) == model, "{redirection}");
+    }
+    // A result that cannot be printed is an output that cannot be written.
+    assert_eq!(shell(">/dev/full", "full"), Some(7));
+    assert!(place.model("full", 4) == model);
+    // `labelgs train ... 2>&1 | head -n 1`
+    for to_stdout in [true, false] {
+        let (reader, writer) = std::io::pipe().expect("a pipe");
+        drop(reader);
+        let out = format!("piped-{to_stdout}");
+        let mut command = labelgs();
+        command.args(place.train(&place.text(&out), &["--iterations", "4", "-vv"]));
+        let command = if to_stdout { command.stdout(writer) } else { command.stderr(writer).stdout(Stdio::null()) };
+        assert_eq!(command.status().expect("it runs").code(), Some(0), "to standard output: {to_stdout}");
+        assert!(place.model(&out, 4) == model);
+    }
+}
+
+/// Bytes and times of every file below a folder.
+fn state(folder: &Path) -> BTreeMap<PathBuf, (Vec<u8>, std::time::SystemTime)> {
+    let time = |path: &Path| std::fs::metadata(path).and_then(|found| found.modified()).expect("a time");
+    let mut found: BTreeMap<_, _> = (files(folder).into_iter())
+        .map(|path| (path.clone(), (std::fs::read(&path).expect("a file"), time(&path))))
+        .collect();
+    // A file that was made and deleted again leaves its mark here.
+    found.insert(folder.to_owned(), (Vec::new(), time(folder)));
+    found
+}
+
+#[test]
+fn a_scene_is_never_written_to() {
+    let Some(_turn) = device() else { return };
+    let place = Place::new();
+    let before = state(&place.path("scene"));
+    let (scene, out) = (place.text("scene"), place.text("out"));
+    succeeded(&place.trained("out", &["--iterations", "4"]));
+    succeeded(&place.labelgs(&["render", &out, "--scene", &scene, "-o", &place.text("pictures")]));
+    let (relabelled, masks) = (place.text("relabelled.ply"), place.text("scene/masks"));
+    let checked = place.labelgs(&["masks", "check", "--scene", &scene, &masks]);
+    assert!(matches!(checked.status.code(), Some(0 | 1)), "{}", stderr(&checked));
+    succeeded(&place.labelgs(&["label", &out, "--scene", &scene, "--masks", &masks, "-o", &relabelled]));
+    succeeded(&place.labelgs(&["eval", &out, "--scene", &scene, "--masks", &masks]));
+    let after = state(&place.path("scene"));
+    assert!(before == after, "files before: {:?}, after: {:?}", before.keys(), after.keys());
+}
+
+/// Links: photos and masks may be links, and so may the folder of the results.
+#[test]
+fn links_are_followed() {
+    let Some(_turn) = device() else { return };
+    let place = Place::new();
+    succeeded(&place.trained("right", &["--iterations", "4"]));
+    let linked = place.path("linked");
+    std::fs::create_dir_all(linked.join("images")).expect("a folder");
+    for entry in std::fs::read_dir(place.path("scene")).expect("a scene") {
+        let path = entry.expect("an entry").path();
+        if !path.ends_with("images") {
+            symlink(&path, linked.join(path.file_name().expect("a name"))).expect("a link");
+        }
+    }
+    for photo in files(&place.path("scene/images")) {
+        symlink(&photo, linked.join("images").join(photo.file_name().expect("a name"))).expect("a link");
+    }
+    std::fs::create_dir_all(place.path("real")).expect("a folder");
+    symlink(place.path("real"), place.path("out")).expect("a link");
+    succeeded(&train(&linked, &place.path("out"), &["--iterations", "4"]));
+    assert!(place.path("out").is_symlink());
+    assert!(place.model("real", 4) == place.model("right", 4));
+    // A link that leads nowhere.
+    symlink(place.path("gone"), place.path("nowhere")).expect("a link");
+    let output = train(&linked, &place.path("nowhere"), &["--iterations", "4"]);
+    assert_eq!(output.status.code(), Some(7), "{}", stderr(&output));
+}
