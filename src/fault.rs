@@ -7,6 +7,7 @@
 //! | `vulkan` | all Vulkan calls that can fail | the same |
 //! | `write` | what is done to write files: making, writing, syncing, renaming | `NO_SPACE`, `IO`, `SHORT`, `INTERRUPTED` |
 //! | `read` | what is done to read files: opening, reading, listing a folder | `IO`, `SHORT`, `INTERRUPTED` |
+//! | `loader` | loading Vulkan | any |
 //! | `nan` | steps of a training | `NUMBER`: a Gaussian gets a position that is none |
 //!
 //! `SHORT` and `INTERRUPTED` are what every system may do at any time: a part is read or written, or nothing, and the call

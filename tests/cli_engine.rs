@@ -35,19 +35,31 @@ fn json(text: &str) -> Value {
 
 #[test]
 fn without_a_driver_devices_fails_and_plan_does_not() {
-    let run = |args: &[&str]| {
-        let mut command = Command::cargo_bin("labelgs").expect("the tool is built");
-        let nowhere = "/nonexistent/driver.json";
-        command.env("VK_DRIVER_FILES", nowhere).env("VK_ICD_FILENAMES", nowhere).env_remove("LABELGS_DEVICE");
-        command.args(args).output().expect("it runs")
-    };
-    let output = run(&["devices"]);
-    assert_eq!(output.status.code(), Some(4), "{}", text(&output.stderr));
-    assert!(text(&output.stderr).starts_with("error: no usable Vulkan device: "), "{}", text(&output.stderr));
-    let output = run(&["plan", "--gaussians", "1k", "--size", "64x48", "--json"]);
-    assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
-    assert_eq!(json(&text(&output.stdout))["device"], Value::Null);
-    assert_eq!(run(&["plan", "--device", "0"]).status.code(), Some(4));
+    let folder = tempfile::tempdir().expect("a folder");
+    let broken = folder.path().join("driver.json");
+    let text_of_driver =
+        r#"{"file_format_version": "1.0.0", "ICD": {"library_path": "/dev/null", "api_version": "1.3.0"}}"#;
+    std::fs::write(&broken, text_of_driver).expect("a file");
+    // No driver, a driver whose library is none, no loader.
+    for (driver, fault) in
+        [("/nonexistent/driver.json", ""), (broken.to_str().expect("text"), ""), ("", "loader:1:INITIALIZATION")]
+    {
+        let run = |args: &[&str]| {
+            let mut command = Command::cargo_bin("labelgs").expect("the tool is built");
+            command.env("LABELGS_FAULT", fault).env_remove("LABELGS_DEVICE").env_remove("LABELGS_VALIDATION");
+            if !driver.is_empty() {
+                command.env("VK_DRIVER_FILES", driver).env("VK_ICD_FILENAMES", driver);
+            }
+            command.args(args).output().expect("it runs")
+        };
+        let output = run(&["devices"]);
+        assert_eq!(output.status.code(), Some(4), "{}", text(&output.stderr));
+        assert!(text(&output.stderr).contains("error: no usable Vulkan device: "), "{}", text(&output.stderr));
+        let output = run(&["plan", "--gaussians", "1k", "--size", "64x48", "--json"]);
+        assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+        assert_eq!(json(&text(&output.stdout))["device"], Value::Null);
+        assert_eq!(run(&["plan", "--device", "0"]).status.code(), Some(4));
+    }
 }
 
 /// Vectors of 128 bits make subgroups of 4, which no kernel serves.

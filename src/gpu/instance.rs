@@ -3,6 +3,7 @@
 use super::call::vk_call;
 use super::lock;
 use crate::error::{Error, Result};
+use crate::fault;
 use ash::vk;
 use std::ffi::{CStr, c_char, c_void};
 use std::sync::{Arc, Mutex};
@@ -82,12 +83,16 @@ pub(super) struct Instance {
 
 impl Instance {
     pub(super) fn new(validation: Validation) -> Result<Self> {
-        // SAFETY: loading the system's Vulkan loader runs its initialisers, as every Vulkan program does.
-        let entry = unsafe { ash::Entry::load() }.map_err(|error| {
+        let missing = |cause: &dyn std::fmt::Display| {
             Error::NoDevice(format!(
-                "the Vulkan loader (libvulkan.so.1) cannot be loaded: {error}; install a Vulkan driver"
+                "the Vulkan loader (libvulkan.so.1) cannot be loaded: {cause}; install a Vulkan driver"
             ))
-        })?;
+        };
+        if fault::at("loader").is_some() {
+            return Err(missing(&"a fault on purpose"));
+        }
+        // SAFETY: loading the system's Vulkan loader runs its initialisers, as every Vulkan program does.
+        let entry = unsafe { ash::Entry::load() }.map_err(|error| missing(&error))?;
         // SAFETY: no preconditions.
         let version = vk_call("vkEnumerateInstanceVersion", || unsafe { entry.try_enumerate_instance_version() })?;
         let version = version.unwrap_or(vk::API_VERSION_1_0);
