@@ -19,6 +19,7 @@ mod cli_long;
 mod cli_masks;
 mod cli_resume;
 mod cli_surroundings;
+mod coarse;
 mod compare_self;
 mod config;
 mod decide;

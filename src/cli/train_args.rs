@@ -77,6 +77,9 @@ pub struct RunFlags {
     /// Longest side of a photo, px; 0 keeps its size.
     #[arg(long, value_name = "PX")]
     pub max_resolution: Option<u32>,
+    /// Last step that looks at photos of half the size, without labels; 0 for none.
+    #[arg(long, value_name = "STEP")]
+    pub coarse_until: Option<u32>,
     /// Every N-th view by name is held out.
     #[arg(long, value_name = "N", conflicts_with = "no_test")]
     pub test_every: Option<u32>,
@@ -233,7 +236,7 @@ macro_rules! take {
 impl TrainArgs {
     /// Puts what was typed over `config`.
     pub fn apply(&self, config: &mut TrainConfig) {
-        take!(config, self.run, iterations max_resolution test_every seed max_gaussians background near save_at
+        take!(config, self.run, iterations max_resolution coarse_until test_every seed max_gaussians background near save_at
             preview_every checkpoint_every);
         if self.run.no_test {
             config.test_every = 0;

@@ -26,7 +26,7 @@ pub mod occlusion_table;
 pub mod pipeline_file;
 pub mod ply;
 pub mod read;
-mod resample;
+pub(crate) mod resample;
 pub mod run_folder;
 mod transforms;
 pub mod truth;

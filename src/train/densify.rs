@@ -3,7 +3,7 @@
 use super::Trainer;
 use super::job::Job;
 use crate::engine::ListKey;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::plan::Buf;
 use crate::shaders::structs::{Counters, StepUniforms};
 
@@ -29,8 +29,8 @@ impl Trainer {
             let counted = self.count_densified(uniforms)?;
             let room = self.engine.room().gaussians;
             match self.engine.make_room_for_gaussians(u64::from(counted.densified_count)) {
-                Err(error @ Error::OutOfMemory { .. }) if bound > room => {
-                    tracing::warn!("{error}; from here on there are no more than {room} Gaussians");
+                Err(error) if error.is_out_of_memory() && bound > room => {
+                    tracing::warn!("{error}; from here on there are no more than {room} Gaussians (until --resume)");
                     (self.max_gaussians, self.memory_bounds) = (room, true);
                     bound = room;
                 }
@@ -61,7 +61,7 @@ impl Trainer {
             prune_opacity: config.min_opacity,
             prune_big: u32::from(config.prunes_large_at(job.step)),
             seed: (config.seed as u32) ^ job.step.wrapping_mul(0x9e37_79b9),
-            ..super::job::uniforms(job, &self.views[job.view], config, self.fixed, &self.engine)
+            ..super::job::uniforms(job, self.views.of(job), config, self.fixed, &self.engine)
         }
     }
 

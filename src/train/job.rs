@@ -5,6 +5,7 @@ use super::config::LabelRule;
 use crate::engine::Engine;
 use crate::engine::uniforms::view_uniforms;
 use crate::error::Result;
+use crate::io::resample::shrink_photo;
 use crate::plan::Buf;
 use crate::scene::{Camera, LabelMap, Occluders, Photo};
 use crate::shaders::constants::{ADAM_BETA1, ADAM_BETA2, LABEL_BORDER};
@@ -35,6 +36,30 @@ pub struct TrainView {
     pub shown: BTreeMap<u16, Shown>,
     /// For each object, the objects that hide it in this view.
     pub occluders: Occluders,
+}
+
+impl TrainView {
+    /// The same view at half the size, without its masks.
+    pub fn halved(&self) -> Self {
+        let (width, height) = (self.camera.width.div_ceil(2), self.camera.height.div_ceil(2));
+        let photo = shrink_photo(&self.photo, width, height);
+        Self {
+            name: self.name.clone(),
+            camera: self.camera.resized(width, height),
+            valid_pixels: valid_pixels(&photo),
+            photo,
+            mask: None,
+            objects: Vec::new(),
+            view_labels: Vec::new(),
+            shown: BTreeMap::new(),
+            occluders: Occluders::new(),
+        }
+    }
+}
+
+/// Pixels of a photo that count.
+pub fn valid_pixels(photo: &Photo) -> u64 {
+    photo.rgba.iter().filter(|pixel| pixel[3] > 127).count() as u64
 }
 
 /// What an object shows in a view.

@@ -10,6 +10,7 @@ mod sampler;
 mod sentinel;
 mod state;
 mod timing;
+mod views;
 mod votes;
 
 pub use config::{LabelRule, Occlusion, TrainConfig};
@@ -30,6 +31,7 @@ use job::{Fixed, Job, TrainView};
 use sampler::ViewOrder;
 use std::collections::{BTreeSet, VecDeque};
 use std::sync::Arc;
+use views::Views;
 
 /// What is known about a finished step.
 #[derive(Clone, Copy, Debug)]
@@ -48,7 +50,7 @@ pub struct StepReport {
 pub struct Trainer {
     engine: Engine,
     config: TrainConfig,
-    views: Vec<TrainView>,
+    views: Views,
     fixed: Fixed,
     order: ViewOrder,
     /// Steps submitted, not yet absorbed; at most one per slot.
@@ -154,6 +156,7 @@ impl Trainer {
         let max_gaussians = if config.max_gaussians > 0 { config.max_gaussians } else { u64::from(u32::MAX) };
         let views =
             dataset.train.iter_mut().map(|view| train_view(view, config.mask_border)).collect::<Result<Vec<_>>>()?;
+        let views = Views::new(views, config.coarse_until);
         let engine = Engine::with_shape(gpu, shape, room, options)?;
         let order = ViewOrder::new(config.seed, views.len());
         Ok(Self {
@@ -216,7 +219,7 @@ impl Trainer {
     /// Reads the model back. Steps that failed for want of memory changed nothing in it.
     pub fn model(&mut self) -> Result<Gaussians> {
         if let Err(error) = self.drain() {
-            if !matches!(error, Error::OutOfMemory { .. }) {
+            if !error.is_out_of_memory() {
                 return Err(error);
             }
             self.flying.clear();
@@ -292,7 +295,7 @@ impl Trainer {
         let slot = job.step as usize % crate::plan::SLOTS;
         let key = self.key(&job);
         self.engine.list(key)?;
-        let view = &self.views[job.view];
+        let view = self.views.of(&job);
         let uniforms = job::uniforms(&job, view, &self.config, self.fixed, &self.engine);
         job::upload(&mut self.engine, slot, uniforms, view, &job, &self.config)?;
         let ticket = self.engine.submit(key, slot)?;
@@ -321,7 +324,13 @@ impl Trainer {
         let Some((job, ticket)) = self.flying.front().cloned() else { return Ok(None) };
         self.engine.sched().wait(ticket)?;
         let report = self.engine.report(job.step as usize % crate::plan::SLOTS)?;
-        if self.engine.recover(&report)? {
+        let recovered = self.engine.recover(&report);
+        if recovered.is_err() {
+            // Nothing came of these steps, nor will it.
+            self.flying.clear();
+            self.step = job.step - 1;
+        }
+        if recovered? {
             let again: Vec<Job> = self.flying.drain(..).map(|(job, _)| job).collect();
             for job in again {
                 self.submit(job)?;
@@ -330,7 +339,7 @@ impl Trainer {
         }
         self.flying.pop_front();
         self.note_times(&job)?;
-        let view = &self.views[job.view];
+        let view = self.views.of(&job);
         let scale = 1.0 / (3.0 * view.valid_pixels.max(1) as f64);
         let (counters, lambda) = (&report.counters, f64::from(self.config.lambda_dssim));
         let l1 = f64::from(counters.loss_l1) * scale;
@@ -343,7 +352,7 @@ impl Trainer {
 
 fn train_view(view: &mut crate::scene::View, border: u32) -> Result<TrainView> {
     let photo = view.photo.take().ok_or_else(|| Error::Bug(format!("{} came without its photo", view.name)))?;
-    let valid_pixels = photo.rgba.iter().filter(|pixel| pixel[3] > 127).count() as u64;
+    let valid_pixels = job::valid_pixels(&photo);
     let mask = view.mask.take();
     let objects = mask.as_ref().map(crate::scene::LabelMap::objects).unwrap_or_default();
     let (name, camera) = (view.name.clone(), view.camera.clone());

@@ -42,8 +42,8 @@ impl Trainer {
         let config = &self.config;
         self.engine.room().labels.is_some()
             && config.occlusion == Occlusion::Rendered
-            && step >= config.label_from
-            && (step - config.label_from).is_multiple_of(config.occlusion_every)
+            && config.labels_at(step)
+            && (step - config.labels_from()).is_multiple_of(config.occlusion_every)
             // Right after an opacity reset there is no depth to speak of.
             && !(step > 1 && config.resets_opacity_at(step - 1))
     }

@@ -16,8 +16,8 @@ impl Trainer {
     pub(super) fn counts_votes(&self, step: u32) -> bool {
         let config = &self.config;
         self.votes()
-            && step >= config.label_from
-            && (step - config.label_from).is_multiple_of(config.vote_every)
+            && config.labels_at(step)
+            && (step - config.labels_from()).is_multiple_of(config.vote_every)
             // Right after an opacity reset nothing tells what is in front.
             && !(step > 1 && config.resets_opacity_at(step - 1))
     }

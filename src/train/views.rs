@@ -1,0 +1,40 @@
+//! The views of a training, at the sizes that steps look at them.
+
+use super::job::{Job, TrainView};
+use std::ops::{Deref, DerefMut};
+
+/// The training views; as a slice, those at their full size.
+#[derive(Debug)]
+pub struct Views {
+    whole: Vec<TrainView>,
+    /// The same at half the size, if some steps look at them.
+    halved: Vec<TrainView>,
+    coarse_until: u32,
+}
+
+impl Views {
+    /// Views of which steps up to `coarse_until` look at halves.
+    pub fn new(whole: Vec<TrainView>, coarse_until: u32) -> Self {
+        let halved = if coarse_until > 0 { whole.iter().map(TrainView::halved).collect() } else { Vec::new() };
+        Self { whole, halved, coarse_until }
+    }
+
+    /// The view of a step, as the step looks at it.
+    pub fn of(&self, job: &Job) -> &TrainView {
+        if job.step <= self.coarse_until { &self.halved[job.view] } else { &self.whole[job.view] }
+    }
+}
+
+impl Deref for Views {
+    type Target = [TrainView];
+
+    fn deref(&self) -> &[TrainView] {
+        &self.whole
+    }
+}
+
+impl DerefMut for Views {
+    fn deref_mut(&mut self) -> &mut [TrainView] {
+        &mut self.whole
+    }
+}
