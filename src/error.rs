@@ -108,6 +108,11 @@ pub enum Error {
 }
 
 impl Error {
+    /// True if memory of the device or of the host ran out.
+    pub fn is_out_of_memory(&self) -> bool {
+        self.exit_status() == 5
+    }
+
     /// A [`Error::Data`] without much ado.
     pub fn data(path: impl AsRef<Path>, place: impl Into<String>, problem: impl Into<String>) -> Self {
         Self::Data { path: path.as_ref().to_owned(), place: place.into(), problem: problem.into() }

@@ -17,6 +17,14 @@ fn events() -> impl Iterator<Item = u32> {
     std::iter::successors(Some(1_u32), |&n| Some(if all() || n < 3 { n + 1 } else { n + n / 2 }))
 }
 
+/// Kinds of faults with the events that they are tried at: all of them at each, or in turn.
+fn cases(kinds: &'static [&str]) -> impl Iterator<Item = (&'static str, u32)> {
+    let each = if all() { kinds.len() } else { 1 };
+    events()
+        .enumerate()
+        .flat_map(move |(turn, nth)| (0..each).map(move |kind| (kinds[(turn + kind) % kinds.len()], nth)))
+}
+
 /// True if the command came to the event that was to fail.
 fn met(output: &Output) -> bool {
     stderr(output).contains("a fault on purpose")
@@ -59,7 +67,10 @@ fn any_vulkan_call_may_fail() {
             harmless += u32::from(status == 0);
         }
         println!("{kind}: {tried} of the Vulkan calls of a render, {harmless} of them harmless");
-        assert!(tried > 8 && harmless < 8, "{kind}: {tried} calls were made to fail, {harmless} did not matter");
+        assert!(
+            tried > 8 && harmless * 2 < tried,
+            "{kind}: {tried} calls were made to fail, {harmless} did not matter"
+        );
     }
 }
 
@@ -72,8 +83,8 @@ fn any_write_may_fail() {
     succeeded(&place.trained("right", &flags));
     let expected = place.model("right", 10);
     let (mut tried, mut failed) = (0, 0);
-    for (kind, nth) in ["NO_SPACE", "IO", "SHORT", "INTERRUPTED"].iter().cycle().zip(events()) {
-        let (fault, out) = (format!("write:{nth}:{kind}"), format!("out-{nth}"));
+    for (kind, nth) in cases(&["NO_SPACE", "IO", "SHORT", "INTERRUPTED"]) {
+        let (fault, out) = (format!("write:{nth}:{kind}"), format!("out-{nth}-{kind}"));
         let output = place.trained_with(Some(&fault), &out, &flags);
         let status = status(&output, &[0, 7], &fault);
         all_whole(&place.path(&out));
@@ -87,7 +98,7 @@ fn any_write_may_fail() {
         tried += 1;
         if status == 7 {
             failed += 1;
-            assert!(["NO_SPACE", "IO"].contains(kind), "{fault}: {}", stderr(&output));
+            assert!(["NO_SPACE", "IO"].contains(&kind), "{fault}: {}", stderr(&output));
             assert!(stderr(&output).contains("cannot be written"), "{fault}: {}", stderr(&output));
             let mut again = flags.to_vec();
             again.push("--resume");
@@ -124,8 +135,8 @@ fn any_read_may_fail() {
         succeeded(&run(verb, verb, None));
         let expected = results(&place.path(verb));
         let (mut tried, mut failed) = (0, 0);
-        for (kind, nth) in ["IO", "SHORT", "INTERRUPTED"].iter().cycle().zip(events()) {
-            let (fault, out) = (format!("read:{nth}:{kind}"), format!("{verb}-{nth}"));
+        for (kind, nth) in cases(&["IO", "SHORT", "INTERRUPTED"]) {
+            let (fault, out) = (format!("read:{nth}:{kind}"), format!("{verb}-{nth}-{kind}"));
             let output = run(verb, &out, Some(&fault));
             let status = status(&output, &[0, 3], &fault);
             all_whole(&place.path(&out));
@@ -141,8 +152,12 @@ fn any_read_may_fail() {
                 );
             } else {
                 failed += 1;
-                assert_eq!(*kind, "IO", "{verb}, {fault}: {}", stderr(&output));
-                assert!(stderr(&output).contains(": cannot be "), "{verb}, {fault}: {}", stderr(&output));
+                assert_eq!(kind, "IO", "{verb}, {fault}: {}", stderr(&output));
+                assert!(
+                    stderr(&output).contains(": cannot be read: a fault on purpose"),
+                    "{verb}, {fault}: {}",
+                    stderr(&output)
+                );
             }
         }
         println!("{tried} reads of {verb} were made to fail, {failed} of them ended it");

@@ -1,6 +1,6 @@
 //! The tool where things are arranged otherwise than at home: names of folders, languages, closed streams, links, folders
 //! that nobody may write to.
-#![cfg(unix)]
+#![cfg(target_os = "linux")]
 
 use crate::support::device;
 use crate::support::runs::{Place, files, stderr, succeeded};
@@ -11,14 +11,14 @@ use std::os::unix::fs::symlink;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 
-fn labelgs() -> Command {
+fn labelgs(place: &Place) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_labelgs"));
-    command.env("LABELGS_VALIDATION", "off");
+    command.env("LABELGS_VALIDATION", "off").env("LABELGS_CACHE", place.path("cache"));
     command
 }
 
-fn train(scene: &Path, out: &Path, flags: &[&str]) -> Output {
-    let mut command = labelgs();
+fn train(place: &Place, scene: &Path, out: &Path, flags: &[&str]) -> Output {
+    let mut command = labelgs(place);
     command.arg("train").arg(scene).arg("--masks").arg(scene.join("masks")).arg("-o").arg(out);
     command.args(["--checkpoint-every", "2"]).args(flags).output().expect("it runs")
 }
@@ -43,23 +43,23 @@ fn folders_may_have_any_name() {
         let name = OsStr::from_bytes(name);
         let (scene, out) = (place.path("scenes").join(name), place.path("models").join(name));
         moved(&place, &scene);
-        succeeded(&train(&scene, &out, &["--iterations", "4"]));
+        succeeded(&train(&place, &scene, &out, &["--iterations", "4"]));
         // A name that is no text cannot be kept in a checkpoint: the masks are typed again, here as everywhere.
-        let said = succeeded(&train(&scene, &out, &["--resume", "--iterations", "6"]));
+        let said = succeeded(&train(&place, &scene, &out, &["--resume", "--iterations", "6"]));
         assert!(said.contains("goes on after step 4"), "{name:?}: {said}");
         let pictures = place.path("pictures").join(name);
-        let mut render = labelgs();
+        let mut render = labelgs(&place);
         render.arg("render").arg(&out).arg("--scene").arg(&scene).arg("-o").arg(&pictures);
         succeeded(&render.output().expect("it runs"));
         assert!(!files(&pictures).is_empty(), "{name:?}");
-        succeeded(&labelgs().arg("list").arg(&out).output().expect("it runs"));
+        succeeded(&labelgs(&place).arg("list").arg(&out).output().expect("it runs"));
     }
     // Longer than a system takes.
     let long: PathBuf = std::iter::repeat_n("folder", 700).collect();
-    let output = train(&place.path("scene"), &place.path("models").join(&long), &["--iterations", "4"]);
+    let output = train(&place, &place.path("scene"), &place.path("models").join(&long), &["--iterations", "4"]);
     assert_eq!(output.status.code(), Some(7), "{}", stderr(&output));
     assert!(stderr(&output).contains("cannot be written"), "{}", stderr(&output));
-    let output = train(&place.path("scenes").join(long), &place.path("models/long"), &["--iterations", "4"]);
+    let output = train(&place, &place.path("scenes").join(long), &place.path("models/long"), &["--iterations", "4"]);
     assert_eq!(output.status.code(), Some(3), "{}", stderr(&output));
 }
 
@@ -74,7 +74,7 @@ fn languages_and_zones_change_nothing() {
         [("C", "UTC"), ("de_DE.UTF-8", "Asia/Kathmandu"), ("tr_TR", "nowhere/at all"), ("", "\u{fffd}")]
     {
         let out = place.path(&format!("out-{language}"));
-        let mut command = labelgs();
+        let mut command = labelgs(&place);
         command.env("LANG", language).env("LC_ALL", language).env("TZ", zone);
         command.args(place.train(out.to_str().expect("text"), &["--iterations", "4"]).iter().map(OsString::from));
         succeeded(&command.output().expect("it runs"));
@@ -92,7 +92,8 @@ fn nobody_has_to_listen() {
     let shell = |redirection: &str, out: &str| {
         let mut command = Command::new("sh");
         command.args(["-c", &format!("\"$0\" \"$@\" {redirection}"), env!("CARGO_BIN_EXE_labelgs")]);
-        command.env("LABELGS_VALIDATION", "off").args(place.train(&place.text(out), &["--iterations", "4", "-vv"]));
+        command.env("LABELGS_VALIDATION", "off").env("LABELGS_CACHE", place.path("cache"));
+        command.args(place.train(&place.text(out), &["--iterations", "4", "-vv"]));
         command.status().expect("it runs").code()
     };
     for (index, redirection) in
@@ -110,7 +111,7 @@ fn nobody_has_to_listen() {
         let (reader, writer) = std::io::pipe().expect("a pipe");
         drop(reader);
         let out = format!("piped-{to_stdout}");
-        let mut command = labelgs();
+        let mut command = labelgs(&place);
         command.args(place.train(&place.text(&out), &["--iterations", "4", "-vv"]));
         let command = if to_stdout { command.stdout(writer) } else { command.stderr(writer).stdout(Stdio::null()) };
         assert_eq!(command.status().expect("it runs").code(), Some(0), "to standard output: {to_stdout}");
@@ -124,8 +125,12 @@ fn state(folder: &Path) -> BTreeMap<PathBuf, (Vec<u8>, std::time::SystemTime)> {
     let mut found: BTreeMap<_, _> = (files(folder).into_iter())
         .map(|path| (path.clone(), (std::fs::read(&path).expect("a file"), time(&path))))
         .collect();
-    // A file that was made and deleted again leaves its mark here.
-    found.insert(folder.to_owned(), (Vec::new(), time(folder)));
+    // A file that was made and deleted again leaves its mark on its folder.
+    let folders: Vec<PathBuf> = found.keys().filter_map(|path| path.parent()).map(Path::to_owned).collect();
+    for folder in folders {
+        let time = time(&folder);
+        found.insert(folder, (Vec::new(), time));
+    }
     found
 }
 
@@ -165,11 +170,11 @@ fn links_are_followed() {
     }
     std::fs::create_dir_all(place.path("real")).expect("a folder");
     symlink(place.path("real"), place.path("out")).expect("a link");
-    succeeded(&train(&linked, &place.path("out"), &["--iterations", "4"]));
+    succeeded(&train(&place, &linked, &place.path("out"), &["--iterations", "4"]));
     assert!(place.path("out").is_symlink());
     assert!(place.model("real", 4) == place.model("right", 4));
     // A link that leads nowhere.
     symlink(place.path("gone"), place.path("nowhere")).expect("a link");
-    let output = train(&linked, &place.path("nowhere"), &["--iterations", "4"]);
+    let output = train(&place, &linked, &place.path("nowhere"), &["--iterations", "4"]);
     assert_eq!(output.status.code(), Some(7), "{}", stderr(&output));
 }

@@ -26,8 +26,19 @@ pub fn near_plane(model: &Path, typed: Option<f32>) -> Result<f32> {
     }
 }
 
-/// Opens the device that was asked for and says which it is.
+/// Opens the device that was asked for and says which it is. One whose subgroups may not be what it tells has to prove
+/// itself first.
 pub fn open_gpu(context: &Context) -> Result<Arc<Gpu>> {
+    let gpu = open_untried(context)?;
+    if !gpu.capabilities().subgroup.is_pinned {
+        tracing::info!("this device does not let subgroup sizes be chosen: a step is tried first");
+        selftest::canary(&gpu)?;
+    }
+    Ok(gpu)
+}
+
+/// The same without proof.
+pub fn open_untried(context: &Context) -> Result<Arc<Gpu>> {
     let mut options = GpuOptions::from_env()?;
     if let Some(device) = &context.global.device {
         options.device = Some(device.clone());
@@ -37,10 +48,6 @@ pub fn open_gpu(context: &Context) -> Result<Arc<Gpu>> {
     let found = gpu.capabilities();
     let cpu = if gpu.is_cpu() { ", a processor: expect it to be slower than a graphics card" } else { "" };
     tracing::info!("device: {} ({}){cpu}", found.name, found.driver_info);
-    if !found.subgroup.is_pinned {
-        tracing::info!("this device does not let subgroup sizes be chosen: a step is tried first");
-        selftest::canary(&gpu)?;
-    }
     Ok(gpu)
 }
 

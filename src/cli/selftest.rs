@@ -3,7 +3,7 @@
 use super::args::JsonFlag;
 use super::context::Context;
 use super::devices::{shape_json, shape_text};
-use super::scene::open_gpu;
+use super::scene::open_untried;
 use super::stdout;
 use crate::pass::KernelShape;
 use crate::selftest::{self, Check};
@@ -21,7 +21,7 @@ pub struct SelftestArgs {
 
 /// Runs the checks and prints a row for each. Fails if one does.
 pub fn run(args: &SelftestArgs, context: &Context) -> Result<()> {
-    let gpu = open_gpu(context)?;
+    let gpu = open_untried(context)?;
     let (found, kernels) = (gpu.capabilities(), KernelShape::of(gpu.capabilities()));
     let as_json = context.json || args.json.json;
     if !as_json {

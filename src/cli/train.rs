@@ -23,44 +23,55 @@ use serde_json::json;
 use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 /// Trains a model and prints what came of it.
 pub fn run(args: &TrainArgs, context: &Context) -> Result<()> {
-    let (summary, sentence) = restarted(args, context)?;
+    let (summary, sentence) = train(args, context)?;
     if context.json || args.json.json { stdout::print_json(&summary) } else { stdout::print(&sentence) }
 }
 
-/// Trains a model; if `--restart` was typed, also over losses of the device. A device that is lost twice without a
-/// checkpoint in between would be lost again.
-fn restarted(args: &TrainArgs, context: &Context) -> Result<(serde_json::Value, String)> {
+/// Trains a model; returns its metrics.json, and the same in a sentence. If `--restart` was typed, also over losses of
+/// the device: one that is lost twice without a checkpoint in between would be lost again.
+pub(super) fn train(args: &TrainArgs, context: &Context) -> Result<(serde_json::Value, String)> {
     if !args.restart {
-        return train(args, context);
+        return train_once(args, context);
     }
     let newest = || Ok(checkpoint_folder::list(&args.output)?.first().map_or(0, |found| found.number));
     let mut args = args.clone();
-    let mut before = newest()?;
+    let (mut before, mut was_lost) = (newest()?, false);
+    let mut waits = [1, 4, 16].into_iter();
     loop {
-        let error = match train(&args, context) {
+        let error = match train_once(&args, context) {
             Err(error @ Error::DeviceLost { .. }) => error,
+            // A driver may take a while until it has a device again.
+            Err(error @ Error::NoDevice(_)) if was_lost => {
+                let Some(seconds) = waits.next() else { return Err(error) };
+                tracing::warn!("{error}; tried again in {seconds} s");
+                std::thread::sleep(Duration::from_secs(seconds));
+                continue;
+            }
             other => return other,
         };
+        interrupt::check()?;
         let number = newest()?;
         if number <= before {
             return Err(error);
         }
         tracing::warn!("{error}; it is opened again, and training goes on from the newest checkpoint");
-        (before, args.resume) = (number, true);
+        (before, was_lost, args.resume, args.config) = (number, true, true, None);
     }
 }
 
-/// Trains a model; returns its metrics.json, and the same in a sentence.
-pub(super) fn train(args: &TrainArgs, context: &Context) -> Result<(serde_json::Value, String)> {
+fn train_once(args: &TrainArgs, context: &Context) -> Result<(serde_json::Value, String)> {
     let resumed = resume::find(args)?;
     let config = match &resumed {
         Some(state) => state.config.clone(),
         None => config::decide(args)?,
     };
+    if args.restart && config.checkpoint_every == 0 {
+        return Err(Error::usage("--restart", "goes on from checkpoints, and --checkpoint-every is 0"));
+    }
     let out = args.output.as_path();
     let _lock = prepare_output(out, &config)?;
     let mut run = resume::facts(args, resumed.as_ref());
@@ -225,7 +236,7 @@ fn save_occluders(out: &Path, trainer: &Trainer, given: Option<&str>) -> Result<
 
 /// A run that memory ended keeps what it has learnt: steps that did not fit changed nothing.
 fn keep_model(trainer: &mut Trainer, out: &Path, error: Error) -> Error {
-    if !matches!(error, Error::OutOfMemory { .. }) {
+    if !error.is_out_of_memory() {
         return error;
     }
     let step = trainer.steps_done();

@@ -102,7 +102,7 @@ impl Engine {
         let gaussians = if self.fits(&self.capacity_for(roomy))? { roomy } else { count };
         let gaussians = match self.set_capacity(self.capacity_for(gaussians)) {
             // Drivers may hold less than they tell.
-            Err(Error::OutOfMemory { .. }) if gaussians > count => {
+            Err(error) if error.is_out_of_memory() && gaussians > count => {
                 self.set_capacity(self.capacity_for(count))?;
                 count
             }
@@ -171,7 +171,7 @@ impl Engine {
             new.segments
         );
         match self.set_capacity(new) {
-            Err(Error::OutOfMemory { .. }) if new != least => self.set_capacity(least)?,
+            Err(error) if error.is_out_of_memory() && new != least => self.set_capacity(least)?,
             other => other?,
         }
         self.sched.fill(Buf::FAILURE, 0)?;

@@ -47,7 +47,7 @@ pub struct Subgroup {
     pub max: u32,
     /// Most subgroups of a workgroup whose size is pinned.
     pub max_per_group: u32,
-    /// True if the size is pinned; else the driver's default is hoped for.
+    /// True if the size is pinned; else it is the driver's default, which may be another than it tells.
     pub is_pinned: bool,
     /// Operations in compute shaders.
     pub operations: vk::SubgroupFeatureFlags,

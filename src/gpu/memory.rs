@@ -51,11 +51,14 @@ impl Buffer {
         let scheme = AllocationScheme::GpuAllocatorManaged;
         let wanted = AllocationCreateDesc { name, requirements, location, linear: true, allocation_scheme: scheme };
         let allocated = match (fault("vkAllocateMemory"), lock(&gpu.allocator).as_mut()) {
-            (Some(_), _) => Err(AllocationError::OutOfMemory),
+            (Some(vk::Result::ERROR_OUT_OF_DEVICE_MEMORY), _) => Err(AllocationError::OutOfMemory),
+            (Some(other), _) => {
+                Err(AllocationError::Internal(format!("Unexpected error in vkAllocateMemory: {other:?}")))
+            }
             (None, Some(allocator)) => allocator.allocate(&wanted),
             (None, None) => Err(AllocationError::Internal("the device is being destroyed".to_owned())),
         };
-        let allocation = allocated.map_err(|error| buffer.out_of_memory(error))?;
+        let allocation = allocated.map_err(|error| buffer.refused(error))?;
         let allocation = buffer.allocation.insert(allocation);
         // SAFETY: fresh memory of the right type and size; nothing else is bound to it or to the buffer.
         vk_call("vkBindBufferMemory", || unsafe {
@@ -65,7 +68,7 @@ impl Buffer {
         Ok(buffer)
     }
 
-    fn out_of_memory(&self, error: AllocationError) -> Error {
+    fn refused(&self, error: AllocationError) -> Error {
         match error {
             AllocationError::OutOfMemory | AllocationError::NoCompatibleMemoryTypeFound => Error::OutOfMemory {
                 what: self.name.clone(),
@@ -74,6 +77,13 @@ impl Buffer {
                 limit: self.gpu.limits().heap,
                 cure: "lower --max-gaussians, use smaller images or free memory of the device".to_owned(),
             },
+            // The crate tells of some failures by their names alone.
+            AllocationError::Internal(text) if text.contains("DEVICE_LOST") => {
+                Error::DeviceLost { pass: "unknown".to_owned() }
+            }
+            AllocationError::Internal(text) if text.contains("OUT_OF_HOST_MEMORY") => {
+                Error::Vulkan { call: "vkAllocateMemory", result: vk::Result::ERROR_OUT_OF_HOST_MEMORY }
+            }
             other => Error::Bug(format!("memory of {}: {other}", self.name)),
         }
     }

@@ -226,7 +226,7 @@ fn wishes(limits: &Limits, subgroup: &Subgroup) -> [Need; 3] {
     let pins = format!("{} of {}..{}", subgroup.size, subgroup.min, subgroup.max);
     let (range, bits, period) = (limits.max_storage_range, limits.timestamp_bits, limits.timestamp_period);
     [
-        wish("pinned subgroup size", subgroup.is_pinned, pins, "else the driver's default is hoped for"),
+        wish("pinned subgroup size", subgroup.is_pinned, pins, "else a step is tried before the work"),
         wish("storage binding of 1 GiB", range >= 1 << 30, format!("{range} B"), "bounds the number of Gaussians"),
         wish("timestamps", bits > 0, format!("{bits} bits, {period} ns"), "time of each pass"),
     ]

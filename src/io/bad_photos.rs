@@ -17,6 +17,10 @@ pub(crate) fn skip(
     if bad.is_empty() {
         return Ok(());
     }
+    // Whatever a disk that fails holds, it is not the photo that is bad.
+    if let Some(unread) = bad.iter().position(|error| matches!(error, Error::Read { .. })) {
+        return Err(bad.swap_remove(unread));
+    }
     let count = bad.len();
     let listed = || bad.iter().take(LISTED_MAX).map(|error| format!("\n  {error}")).collect::<String>();
     let more = if count > LISTED_MAX { format!("\n  and {} more", count - LISTED_MAX) } else { String::new() };

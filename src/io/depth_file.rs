@@ -5,6 +5,7 @@ use crate::error::{Error, Result};
 use crate::io::read;
 use crate::scene::DepthMap;
 use exr::prelude::{MetaData, ReadChannels, ReadLayers};
+use std::io::Cursor;
 use std::path::Path;
 
 /// Extensions of depth files, the preferred first: a PNG beside another file is often only a picture of it.
@@ -29,7 +30,7 @@ fn refuse(path: &Path, kind: &str) -> impl Fn(&dyn std::fmt::Display) -> Error {
 
 fn read_png(path: &Path) -> Result<DepthMap> {
     let refuse = refuse(path, "PNG");
-    let mut reader = png::Decoder::new(read::open(path)?).read_info().map_err(|error| refuse(&error))?;
+    let mut reader = png::Decoder::new(Cursor::new(read::bytes(path)?)).read_info().map_err(|error| refuse(&error))?;
     let (width, height) = (reader.info().width, reader.info().height);
     check_size(path, (width, height))?;
     let (colour, bits) = (reader.info().color_type, reader.info().bit_depth);
@@ -51,7 +52,8 @@ fn read_png(path: &Path) -> Result<DepthMap> {
 /// The only channel of the first layer, or that of the name Y, Z or R.
 fn read_exr(path: &Path) -> Result<DepthMap> {
     let refuse = refuse(path, "EXR");
-    let header = MetaData::read_from_buffered(read::open(path)?, false).map_err(|error| refuse(&error))?;
+    let bytes = read::bytes(path)?;
+    let header = MetaData::read_from_buffered(Cursor::new(&bytes), false).map_err(|error| refuse(&error))?;
     let side = |side: usize| u32::try_from(side).unwrap_or(u32::MAX);
     let (mut samples, mut first) = (0, None);
     for header in &header.headers {
@@ -67,7 +69,7 @@ fn read_exr(path: &Path) -> Result<DepthMap> {
     }
     let Some((width, height)) = first else { return Err(refuse(&"it has no picture")) };
     let layer = exr::prelude::read().no_deep_data().largest_resolution_level().all_channels().first_valid_layer();
-    let image = layer.all_attributes().from_buffered(read::open(path)?).map_err(|error| refuse(&error))?;
+    let image = layer.all_attributes().from_buffered(Cursor::new(&bytes)).map_err(|error| refuse(&error))?;
     let channels = &image.layer_data.channel_data.list;
     let named = |name: &str| channels.iter().find(|channel| channel.name.eq(name));
     let channel = match channels.as_slice() {

@@ -2,11 +2,11 @@
 
 use super::atomic;
 use crate::error::{Error, Result};
-use crate::io::read::{self, Source};
+use crate::io::read;
 use crate::scene::Photo;
 use exr::prelude::{AnyChannel, AnyChannels, Encoding, FlatSamples, Image, Layer, LayerAttributes, WritableImage};
 use image::{ImageDecoder, ImageReader};
-use std::io::{BufReader, Cursor};
+use std::io::{BufRead, Cursor, ErrorKind, Seek};
 use std::path::Path;
 
 /// Most pixels that an image may have; larger ones are refused before they are decoded.
@@ -41,8 +41,8 @@ pub(crate) fn check_length(path: &Path, (width, height): (u32, u32), channels: u
 }
 
 /// Refuses a palette that is no whole number of colours, which the decoder would read beyond the end of.
-fn check_palette(path: &Path) -> Result<()> {
-    let reader = png::Decoder::new(read::open(path)?).read_info();
+fn check_palette(path: &Path, bytes: &[u8]) -> Result<()> {
+    let reader = png::Decoder::new(Cursor::new(bytes)).read_info();
     let reader = reader.map_err(|error| Error::data(path, "", format!("cannot be decoded: {error}")))?;
     let bytes = reader.info().palette.as_ref().map_or(0, |palette| palette.len());
     if bytes.is_multiple_of(3) {
@@ -62,9 +62,9 @@ fn too_short(path: &Path, (width, height): (u32, u32)) -> Error {
     Error::data(path, "", problem)
 }
 
-fn reader(path: &Path) -> Result<ImageReader<BufReader<Source>>> {
+fn reader<R: BufRead + Seek>(path: &Path, file: R) -> Result<ImageReader<R>> {
     // The kind is guessed from the first bytes, so a PNG called .jpg is read all the same.
-    let mut reader = ImageReader::new(read::open(path)?).with_guessed_format().map_err(Error::read(path))?;
+    let mut reader = ImageReader::new(file).with_guessed_format().map_err(Error::read(path))?;
     let mut limits = image::Limits::default();
     limits.max_alloc = Some(PIXELS_MAX * 16);
     reader.limits(limits);
@@ -74,7 +74,11 @@ fn reader(path: &Path) -> Result<ImageReader<BufReader<Source>>> {
 /// Width and height from the header alone, px.
 pub fn photo_size(path: impl AsRef<Path>) -> Result<(u32, u32)> {
     let path = path.as_ref();
-    reader(path)?.into_dimensions().map_err(|error| Error::data(path, "", format!("cannot be decoded: {error}")))
+    reader(path, read::open(path)?)?.into_dimensions().map_err(|error| match error {
+        // A file that was cut short ends too early, as no failing disk does.
+        image::ImageError::IoError(cause) if cause.kind() != ErrorKind::UnexpectedEof => Error::read(path)(cause),
+        other => Error::data(path, "", format!("cannot be decoded: {other}")),
+    })
 }
 
 /// Reads a PNG or JPEG as 8-bit RGB. Transparency is blended over `background` (components from 0 to 1), so all
@@ -104,7 +108,8 @@ pub fn read_grey(path: impl AsRef<Path>) -> Result<(u32, u32, Vec<u8>)> {
 
 fn decode(path: &Path) -> Result<image::DynamicImage> {
     let undecodable = |error: image::ImageError| Error::data(path, "", format!("cannot be decoded: {error}"));
-    let reader = reader(path)?;
+    let bytes = read::bytes(path)?;
+    let reader = reader(path, Cursor::new(&bytes))?;
     let png = reader.format() == Some(image::ImageFormat::Png);
     let decoder = reader.into_decoder().map_err(undecodable)?;
     let (size, bits) = (decoder.dimensions(), u32::from(decoder.color_type().bits_per_pixel()));
@@ -113,7 +118,7 @@ fn decode(path: &Path) -> Result<image::DynamicImage> {
     let packed = if decoder.color_type().bytes_per_pixel() == decoder.color_type().channel_count() { 1 } else { bits };
     if png {
         check_png_length(path, size, packed)?;
-        check_palette(path)?;
+        check_palette(path, &bytes)?;
     } else {
         check_length(path, size, 1)?;
     }

@@ -6,13 +6,13 @@
 use super::image::{check_png_length, check_size};
 use super::resample::same_aspect;
 use crate::error::{Error, Result};
-use crate::io::read::{self, Source};
+use crate::io::read;
 use crate::scene::LabelMap;
 use std::collections::HashMap;
-use std::io::BufReader;
+use std::io::Cursor;
 use std::path::{Path, PathBuf};
 
-type Decoder = png::Decoder<BufReader<Source>>;
+type Decoder = png::Decoder<Cursor<Vec<u8>>>;
 
 fn problem(path: &Path, error: impl std::fmt::Display) -> Error {
     Error::data(path, "", format!("is no readable PNG mask: {error}"))
@@ -47,8 +47,8 @@ impl Raw {
     }
 }
 
-fn open(path: &Path) -> Result<(png::Reader<BufReader<Source>>, Header)> {
-    let mut decoder = Decoder::new(read::open(path)?);
+fn open(path: &Path) -> Result<(png::Reader<Cursor<Vec<u8>>>, Header)> {
+    let mut decoder = Decoder::new(Cursor::new(read::bytes(path)?));
     // Any other choice expands a palette to colours or drops the low half of 16-bit ids.
     decoder.set_transformations(png::Transformations::IDENTITY);
     let reader = decoder.read_info().map_err(|error| problem(path, error))?;

@@ -161,6 +161,7 @@ impl Scheduler {
 
     /// Plans and records several lists; cheaper than one by one if scratch memory has to grow.
     pub fn prepare_all(&mut self, lists: &[&PassList]) -> Result<Vec<ListId>> {
+        self.replace_lost()?;
         let mut plans = Vec::new();
         for list in lists {
             plans.push(Plan::new(self.table, &self.capacity, list, &self.limits, self.options.plan)?);

@@ -90,6 +90,12 @@ impl Scheduler {
         let resized = self.resize_those(&capacity, true).and_then(|()| self.resize_those(&capacity, false));
         if resized.is_ok() {
             self.capacity = capacity;
+        } else {
+            // What grew in vain takes memory that others need now; what cannot shrink stays large.
+            let old = self.capacity;
+            if let Err(error) = self.resize_those(&old, false) {
+                tracing::debug!("not all memory is given back: {error}");
+            }
         }
         for index in 0..self.table.len() {
             if matches!(self.table[index].class, Class::Kept | Class::Slot | Class::Report) {
@@ -98,6 +104,17 @@ impl Scheduler {
         }
         self.write_own_guards()?;
         resized
+    }
+
+    /// Allocates what a failed [`Self::resize_own`] has lost: buffers without content, whose old memory was given up for
+    /// the new and could not be had back.
+    pub(super) fn replace_lost(&mut self) -> Result<()> {
+        for index in 0..self.table.len() {
+            if self.grows(index, &self.capacity)? == Some(true) {
+                return self.resize_own(self.capacity);
+            }
+        }
+        Ok(())
     }
 
     fn resize_those(&mut self, capacity: &Capacity, grow: bool) -> Result<()> {
@@ -135,7 +152,8 @@ impl Scheduler {
                     Ok(())
                 }
                 Err(error) => {
-                    // The old size fitted a moment ago; should it not now, the first error is still the one to tell.
+                    // The old size fitted a moment ago; should it not now, the first error is still the one to tell, and
+                    // the next list asks again.
                     self.storage.own[index] = allocate(&self.gpu, decl, old_bytes).unwrap_or_default();
                     Err(error)
                 }

@@ -44,12 +44,14 @@ pub fn canary(gpu: &Arc<Gpu>) -> Result<()> {
     };
     let problem = match step() {
         Ok(Ok(_)) => return Ok(()),
-        Ok(Err(problem)) | Err(Error::Bug(problem)) => problem,
-        Err(other) => return Err(other),
+        Ok(Err(problem)) => problem,
+        Err(lost @ Error::DeviceLost { .. }) => return Err(lost),
+        // Sums that are nonsense ask for all memory there is.
+        Err(other) => other.to_string(),
     };
     Err(Error::NoDevice(format!(
         "{} ({} {}) tells of subgroups of {} and does not let their size be chosen; a step with such subgroups goes wrong \
-         ({problem}): try another version of the driver or another --device",
+         ({problem}): see `labelgs selftest`; try another version of the driver or another --device",
         found.name,
         found.driver_name,
         found.driver_info,
