@@ -142,9 +142,8 @@ fn unsafe_code_has_two_places() {
 fn files_are_opened_in_two_places() {
     const CALLS: [&str; 7] =
         ["File::open", "File::create", "fs::read", "fs::write", "fs::copy", "_from_file(", "ImageReader::open"];
-    // Listings of its own output, where what cannot be read is left alone; and the lock.
-    const ALLOWED: [&str; 5] =
-        ["io/read.rs", "io/atomic.rs", "io/run_folder.rs", "cli/train.rs", "io/pipeline_file.rs"];
+    // The last lists its own output, and leaves alone what cannot be read.
+    const ALLOWED: [&str; 3] = ["io/read.rs", "io/atomic.rs", "cli/train.rs"];
     for (path, text) in files("src", &["rs"]) {
         let code = text.split("#[cfg(test)]").next().unwrap_or_default();
         let code = code.lines().filter(|line| !line.trim_start().starts_with("//"));

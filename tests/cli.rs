@@ -100,6 +100,7 @@ fn every_flag_of_train_changes_its_field() {
     let typed = [
         ("--iterations", "7"),
         ("--max-resolution", "99"),
+        ("--coarse-until", "4"),
         ("--test-every", "5"),
         ("--seed", "11"),
         ("--max-gaussians", "2.5M"),
