@@ -68,7 +68,8 @@ pub struct TrainArgs {
 #[derive(Args, Clone, Debug)]
 #[command(next_help_heading = "Run")]
 pub struct RunFlags {
-    /// Start from the settings of the LabelGS paper, where ours differ: --label-rule main --label-weight 1.
+    /// Start from the settings of the LabelGS paper, where ours differ: --label-rule main --label-weight 1
+    /// --densify-until 40000 --opacity-reset-interval 3000.
     #[arg(long, conflicts_with = "config")]
     pub paper: bool,
     /// Number of steps, one view each.

@@ -137,9 +137,10 @@ pub struct TrainConfig {
     /// Gaussians of lower opacity are pruned. 0.005 (3DGS).
     pub min_opacity: f32,
     /// Gaussians of a larger standard deviation, in units of the scene extent, are pruned once the first opacity reset is
-    /// past. 0.1 (3DGS).
+    /// past; never where there is none. 0.1 (3DGS).
     pub max_scale: f32,
-    /// Steps between two opacity resets. 3000 (3DGS); 0 switches them off.
+    /// Steps between two opacity resets; 0 makes none. 0: after resets (3DGS: 3000) Gaussians next to the cameras take the
+    /// place of a sky or of what else is far, and views between those cameras turn to fog.
     pub opacity_reset_interval: u32,
     /// No opacity reset within this many steps of the end. 1500 (LabelGS).
     pub opacity_reset_margin: u32,
@@ -194,7 +195,7 @@ impl Default for TrainConfig {
             percent_dense: 0.01,
             min_opacity: 0.005,
             max_scale: 0.1,
-            opacity_reset_interval: 3000,
+            opacity_reset_interval: 0,
             opacity_reset_margin: 1500,
             save_at: Vec::new(),
             preview_every: 1000,
@@ -206,7 +207,13 @@ impl Default for TrainConfig {
 impl TrainConfig {
     /// The paper's settings where they differ from the default.
     pub fn paper() -> Self {
-        Self { label_rule: LabelRule::Main, label_weight: 1.0, densify_until: Some(40_000), ..Self::default() }
+        Self {
+            label_rule: LabelRule::Main,
+            label_weight: 1.0,
+            densify_until: Some(40_000),
+            opacity_reset_interval: 3000,
+            ..Self::default()
+        }
     }
 
     /// Learning rate of positions at `step`, before the scene extent.
