@@ -1,9 +1,11 @@
 //! Photos that are there and cannot be decoded: a few may be missing from a training, many are a damaged data set.
 
 use super::LoadOptions;
-use super::load::LISTED_MAX;
 use crate::error::{Error, Result};
 use std::path::Path;
+
+/// Most problems that one message lists.
+pub(crate) const LISTED_MAX: usize = 20;
 
 /// Notes the photos that are skipped, or refuses the scene, with a list, if they are more than the options allow.
 /// `bad` is why each of them, of `total` photos that there are files of, cannot be decoded.

@@ -1,18 +1,16 @@
 //! From a listing to a data set: split, decode, undistort, resize, masks.
 
+use super::LoadOptions;
+use super::bad_photos::{self, LISTED_MAX};
 use super::image::{check_size, photo_size, read_photo};
 use super::listing::{Listed, Listing};
 use super::mask::{MaskFolder, read_checked};
 use super::resample::{bounded_size, resample_ids, same_aspect, shrink_photo, undistort_photo};
-use super::{LoadOptions, bad_photos};
 use crate::error::{Error, Result};
 use crate::scene::{Camera, Dataset, LabelMap, Photo, View};
 use rayon::prelude::*;
 use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
-
-/// Most problems that one message lists.
-pub(crate) const LISTED_MAX: usize = 20;
 
 /// Loads what `listing` lists.
 pub(crate) fn load(root: &Path, mut listing: Listing, options: &LoadOptions) -> Result<Dataset> {
