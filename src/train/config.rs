@@ -48,8 +48,7 @@ pub struct TrainConfig {
     /// 1080). Smaller is faster and loses fine texture.
     pub max_resolution: u32,
     /// Steps at the start that look at photos of half the size, without labels: a quarter of the pixels while the model is
-    /// rough anyway. 0 (3DGS). A third of a run takes about a tenth less time, for the same
-    /// PSNR.
+    /// rough anyway. 0 (3DGS). With a third of the steps a run takes a tenth less time, for the same PSNR.
     pub coarse_until: u32,
     /// Every n-th view, by name, is held out for scoring; 0 trains on all. 8 (LabelGS, 3DGS).
     pub test_every: u32,
