@@ -13,6 +13,7 @@ use labelgs::plan::Buf;
 use labelgs::scene::Gaussians;
 use labelgs::selftest::judge;
 use labelgs::shaders::structs::StepUniforms;
+use labelgs::train::TrainConfig;
 use labelgs::train::job::Fixed;
 
 fn states(rig: &mut Rig) -> Vec<Optimised> {
@@ -103,13 +104,13 @@ fn densifying(rig: &mut Rig, before: &Population, step: u32) -> StepUniforms {
     let stats: Vec<[f32; 2]> =
         before.gradient_sum.iter().zip(&before.gradient_count).map(|(&s, &n)| [s as f32, n as f32]).collect();
     rig.engine.sched_mut().upload(Buf::DENSIFY_STATS, 0, 0, &stats).expect("upload");
-    let config = &rig.config;
+    let (config, with_resets) = (&rig.config, TrainConfig::paper());
     StepUniforms {
         densify_threshold: config.densify_grad_threshold,
         densify_scale: config.percent_dense,
         prune_scale: config.max_scale,
         prune_opacity: config.min_opacity,
-        prune_big: u32::from(config.prunes_large_at(step)),
+        prune_big: u32::from(with_resets.prunes_large_at(step)),
         seed: SEED,
         ..rig.uniforms()
     }
