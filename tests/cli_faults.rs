@@ -3,7 +3,7 @@
 //! N rises until a command ends without having met its fault. `LABELGS_TEST_FAULTS=all` tries every N in place of some.
 
 use crate::support::device;
-use crate::support::runs::{Place, all_whole, files, stderr, succeeded};
+use crate::support::runs::{Place, all_whole, copy, files, stderr, succeeded};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::Output;
@@ -172,14 +172,6 @@ fn results(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
     let found: BTreeMap<_, _> = files(folder).into_iter().filter(wanted).map(named).collect();
     assert!(!found.is_empty(), "{} has no result", folder.display());
     found
-}
-
-fn copy(from: &Path, to: &Path) {
-    for path in files(from) {
-        let copy = to.join(path.strip_prefix(from).expect("inside"));
-        std::fs::create_dir_all(copy.parent().expect("a folder")).expect("a folder");
-        std::fs::write(copy, read(&path)).expect("written");
-    }
 }
 
 fn read(path: &Path) -> Vec<u8> {

@@ -3,7 +3,7 @@
 #![cfg(target_os = "linux")]
 
 use crate::support::device;
-use crate::support::runs::{Place, files, stderr, succeeded};
+use crate::support::runs::{Place, copy, files, stderr, succeeded};
 use std::collections::BTreeMap;
 use std::ffi::{OsStr, OsString};
 use std::os::unix::ffi::OsStrExt;
@@ -23,16 +23,6 @@ fn train(place: &Place, scene: &Path, out: &Path, flags: &[&str]) -> Output {
     command.args(["--checkpoint-every", "2"]).args(flags).output().expect("it runs")
 }
 
-/// A copy of the scene in another folder.
-fn moved(place: &Place, to: &Path) {
-    let from = place.path("scene");
-    for path in files(&from) {
-        let copy = to.join(path.strip_prefix(&from).expect("inside"));
-        std::fs::create_dir_all(copy.parent().expect("a folder")).expect("a folder");
-        std::fs::copy(path, copy).expect("a copy");
-    }
-}
-
 #[test]
 fn folders_may_have_any_name() {
     let Some(_turn) = device() else { return };
@@ -42,7 +32,7 @@ fn folders_may_have_any_name() {
     for name in names {
         let name = OsStr::from_bytes(name);
         let (scene, out) = (place.path("scenes").join(name), place.path("models").join(name));
-        moved(&place, &scene);
+        copy(&place.path("scene"), &scene);
         succeeded(&train(&place, &scene, &out, &["--iterations", "4"]));
         // A name that is no text cannot be kept in a checkpoint: the masks are typed again, here as everywhere.
         let said = succeeded(&train(&place, &scene, &out, &["--resume", "--iterations", "6"]));

@@ -121,6 +121,15 @@ pub fn files(folder: &Path) -> Vec<PathBuf> {
     entries.flat_map(|path| if path.is_dir() { files(&path) } else { vec![path] }).collect()
 }
 
+/// Copies all files below a folder to another one.
+pub fn copy(from: &Path, to: &Path) {
+    for path in files(from) {
+        let copy = to.join(path.strip_prefix(from).expect("inside"));
+        std::fs::create_dir_all(copy.parent().expect("a folder")).expect("a folder");
+        std::fs::copy(path, copy).expect("a copy");
+    }
+}
+
 /// Every file that a killed run left can be read by its name, but for temporary ones, which have another.
 pub fn all_whole(out: &Path) {
     for path in files(out) {
