@@ -2,9 +2,11 @@
 
 use crate::support::device;
 use crate::support::runs::{Place, all_whole, files, stderr, succeeded};
+use labelgs::io::run_folder::Lock;
 use labelgs::train::TrainState;
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
+use std::path::PathBuf;
 use std::process::{Child, Stdio};
 use std::time::{Duration, Instant};
 
@@ -208,6 +210,36 @@ fn an_output_that_was_deleted_meanwhile_is_made_anew() {
     assert!(!place.model("out", 30).is_empty() && place.path("out/config.toml").exists());
     assert_eq!(place.checkpoints("out").iter().map(|found| found.step).collect::<Vec<_>>(), [30]);
     all_whole(&place.path("out"));
+}
+
+/// A run whose folder was deleted, and where another one has begun meanwhile, ends; there may be the checkpoint that it was
+/// writing at that moment, and nothing else.
+#[test]
+fn a_deleted_folder_may_be_the_folder_of_another_run() {
+    let Some(_turn) = device() else { return };
+    let place = Place::new();
+    let args = place.train("out", &["--iterations", "100000", "--checkpoint-every", "5", "--preview-every", "0"]);
+    let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_labelgs"));
+    command.env("LABELGS_VALIDATION", "off").env("LABELGS_CACHE", place.path("cache")).args(args);
+    let mut child = command.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().expect("it runs");
+    wait_until(&mut child, || !place.checkpoints("out").is_empty());
+    let out = place.path("out");
+    let lock = loop {
+        // The run takes the folder again at its next checkpoint, unless the other one is faster.
+        if std::fs::remove_dir_all(&out).is_ok()
+            && std::fs::create_dir(&out).is_ok()
+            && let Ok(lock) = Lock::take(&out)
+        {
+            break lock;
+        }
+    };
+    let output = child.wait_with_output().expect("a child");
+    assert_eq!(output.status.code(), Some(7), "{}", stderr(&output));
+    assert!(stderr(&output).contains("another labelgs trains into this folder"), "{}", stderr(&output));
+    let foreign = files(&out).into_iter().filter(|path| !path.ends_with(".labelgs-lock"));
+    let foreign: Vec<PathBuf> = foreign.collect();
+    assert!(foreign.len() <= 1 && place.checkpoints("out").len() == foreign.len(), "{foreign:?}");
+    drop(lock);
 }
 
 /// A run that starts anew where another one was has its own checkpoints in the end.

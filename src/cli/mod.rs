@@ -19,7 +19,7 @@ pub mod merge;
 pub mod occlusion;
 pub mod plan;
 pub mod profile;
-mod profile_compare;
+pub mod profile_compare;
 mod profile_report;
 pub mod recolour;
 pub mod relabel;

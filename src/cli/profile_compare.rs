@@ -7,6 +7,25 @@ use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::path::Path;
 
+/// What `labelgs profile --json` wrote.
+#[derive(Clone, Debug)]
+pub struct Profile {
+    json: Value,
+    /// Times of each stage in every step that counts, ms, and under `all` their sum.
+    pub samples: BTreeMap<String, Vec<f64>>,
+}
+
+impl Profile {
+    /// Reads it from a file.
+    pub fn read(path: &Path) -> Result<Self> {
+        let json = serde_json::from_str(&read::text(path)?).map_err(|error| {
+            Error::data(path, format!("line {}", error.line()), format!("is no JSON of labelgs profile: {error}"))
+        })?;
+        let samples = samples(&json, path)?;
+        Ok(Self { json, samples })
+    }
+}
+
 /// A stage in both profiles.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Row {
@@ -21,21 +40,15 @@ pub struct Row {
 /// Prints stages and counters of both; fails if a stage of the new one is slower beyond noise: its median by more than
 /// `tolerance` (a share), and three quarters of its steps slower than three quarters of the old one's.
 pub fn run(files: [&Path; 2], tolerance: f64, as_json: bool) -> Result<()> {
-    let read = |path: &Path| -> Result<Value> {
-        let text = read::text(path)?;
-        serde_json::from_str(&text).map_err(|error| {
-            Error::data(path, format!("line {}", error.line()), format!("is no JSON of labelgs profile: {error}"))
-        })
-    };
-    let [old, new] = [read(files[0])?, read(files[1])?];
-    let samples = [samples(&old, files[0])?, samples(&new, files[1])?];
+    let [old, new] = [Profile::read(files[0])?, Profile::read(files[1])?];
     for what in ["device", "kernels", "labels", "size", "views", "worker_threads", "barrier_before_each_pass"] {
-        if old[what] != new[what] {
-            tracing::warn!("the profiles differ in {what}: {} and {}", old[what], new[what]);
+        let [old, new] = [&old.json[what], &new.json[what]];
+        if old != new {
+            tracing::warn!("the profiles differ in {what}: {old} and {new}");
         }
     }
-    let rows = compare(&samples[0], &samples[1], tolerance);
-    let counters = counters(&old, &new);
+    let rows = compare(&old.samples, &new.samples, tolerance);
+    let counters = counters(&old.json, &new.json);
     if as_json {
         let row = |row: &Row| json!({ "stage": row.stage, "before_ms": row.median[0], "after_ms": row.median[1], "regressed": row.regressed });
         stdout::print_json(&json!({
@@ -51,7 +64,6 @@ pub fn run(files: [&Path; 2], tolerance: f64, as_json: bool) -> Result<()> {
     if slower.is_empty() { Ok(()) } else { Err(Error::Check(format!("slower beyond noise: {}", slower.join(", ")))) }
 }
 
-/// Times of each stage in every step that counts, ms, and their sum.
 fn samples(profile: &Value, path: &Path) -> Result<BTreeMap<String, Vec<f64>>> {
     let wrong = || Error::data(path, "steps", "expected the steps with stages_ms that labelgs profile --json writes");
     let mut samples: BTreeMap<String, Vec<f64>> = BTreeMap::new();

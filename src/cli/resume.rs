@@ -4,6 +4,7 @@
 use super::config;
 use super::train_args::TrainArgs;
 use crate::io::checkpoint_folder;
+use crate::io::run_folder::Lock;
 use crate::train::{RunFacts, TrainConfig, TrainState, Trainer};
 use crate::{Error, Result};
 use std::collections::BTreeSet;
@@ -110,6 +111,7 @@ fn named(folder: &Path) -> Option<String> {
 /// The checkpoints of a run.
 pub struct Checkpoints {
     out: PathBuf,
+    lock: Lock,
     run: RunFacts,
     /// Those of this run, the newest last.
     kept: Vec<PathBuf>,
@@ -118,8 +120,8 @@ pub struct Checkpoints {
 }
 
 impl Checkpoints {
-    /// For a run in the folder `out` that goes on from `resumed`.
-    pub fn new(out: &Path, run: RunFacts, resumed: Option<&TrainState>) -> Result<Self> {
+    /// For a run in the folder `out`, which it has locked, that goes on from `resumed`.
+    pub fn new(out: &Path, lock: Lock, run: RunFacts, resumed: Option<&TrainState>) -> Result<Self> {
         if resumed.is_none()
             && let Some(old) = checkpoint_folder::list(out)?.first()
         {
@@ -129,7 +131,13 @@ impl Checkpoints {
             );
         }
         let (kept, step) = resumed.map_or((Vec::new(), 0), |state| (vec![state.path.clone()], state.step));
-        Ok(Self { out: out.to_owned(), run, kept, step })
+        Ok(Self { out: out.to_owned(), lock, run, kept, step })
+    }
+
+    /// Makes sure that the folder is still this run's, before anything is written: it may have been deleted, and another
+    /// run begun in its place.
+    pub fn hold_folder(&mut self) -> Result<()> {
+        self.lock.hold()
     }
 
     /// True where the schedule asks for one.
@@ -151,6 +159,7 @@ impl Checkpoints {
 
     /// Writes one that is due. That it cannot be written ends no training: there may be room again the next time.
     pub fn save_due(&mut self, trainer: &mut Trainer) -> Result<()> {
+        self.hold_folder()?;
         match self.save(trainer) {
             Err(error @ Error::Write { .. }) => {
                 let last = self.kept.last().map_or("there is none yet".to_owned(), |path| path.display().to_string());

@@ -14,13 +14,13 @@ use crate::infer::score::evaluate::{Rendering, evaluate};
 use crate::infer::score::scores::Scores;
 use crate::io::label_table::{self, LabelTable};
 use crate::io::occlusion_table::{self, OcclusionTable};
-use crate::io::{atomic, checkpoint_folder, init, run_folder};
+use crate::io::run_folder::{self, Lock};
+use crate::io::{atomic, checkpoint_folder, init};
 use crate::scene::{Dataset, Photo, View};
 use crate::sched::SchedulerOptions;
 use crate::train::{self, StepReport, TrainConfig, Trainer, record};
 use crate::{Error, Result};
 use serde_json::json;
-use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -73,7 +73,7 @@ fn train_once(args: &TrainArgs, context: &Context) -> Result<(serde_json::Value,
         return Err(Error::usage("--restart", "goes on from checkpoints, and --checkpoint-every is 0"));
     }
     let out = args.output.as_path();
-    let _lock = prepare_output(out, &config)?;
+    let lock = prepare_output(out, &config)?;
     let mut run = resume::facts(args, resumed.as_ref());
     let masks = args.masks.clone().or(run.masks.as_ref().map(PathBuf::from));
     let names = masks.as_deref().map(LabelTable::of_folder).transpose()?.flatten();
@@ -95,7 +95,7 @@ fn train_once(args: &TrainArgs, context: &Context) -> Result<(serde_json::Value,
         SchedulerOptions { memory_limit: run.memory_limit, crash_markers: args.restart, ..SchedulerOptions::default() };
     let mut facts = facts(args, masks.as_deref(), &gpu);
     facts.extend(resumed.as_ref().map(|state| ("goes on after step", state.step.to_string())));
-    let mut checkpoints = Checkpoints::new(out, run.clone(), resumed.as_ref())?;
+    let mut checkpoints = Checkpoints::new(out, lock, run.clone(), resumed.as_ref())?;
     let mut trainer = match resumed {
         Some(state) => Trainer::resume(gpu, &mut dataset, state, options)?,
         None => start(gpu, &config, &mut dataset, occluders.as_ref(), options)?,
@@ -123,6 +123,7 @@ fn train_once(args: &TrainArgs, context: &Context) -> Result<(serde_json::Value,
         other => other,
     };
     let last = last.map_err(|error| keep_model(&mut trainer, out, error))?;
+    checkpoints.hold_folder()?;
     if !out.join(run_folder::CONFIG).exists() {
         tracing::warn!("{} was deleted meanwhile; what is known is written again", out.display());
         records()?;
@@ -198,6 +199,7 @@ fn steps(
         });
         if step < config.iterations {
             if config.save_at.contains(&step) {
+                checkpoints.hold_folder()?;
                 let model = trainer.labelled_model()?;
                 record::save_model(out, step, &model)?;
             }
@@ -205,6 +207,7 @@ fn steps(
                 && step % config.preview_every == 0
                 && let Some(view) = preview
             {
+                checkpoints.hold_folder()?;
                 preview_now(trainer, out, view)?;
             }
         }
@@ -253,11 +256,11 @@ fn keep_model(trainer: &mut Trainer, out: &Path, error: Error) -> Error {
 
 /// Refuses an output folder that cannot be used before any work is done, and clears it of what killed runs left. It is
 /// this run's as long as the result lives.
-fn prepare_output(out: &Path, config: &TrainConfig) -> Result<File> {
+fn prepare_output(out: &Path, config: &TrainConfig) -> Result<Lock> {
     let checkpoints = out.join(checkpoint_folder::FOLDER);
     let folder = if config.checkpoint_every > 0 { checkpoints.as_path() } else { out };
     std::fs::create_dir_all(folder).map_err(Error::write(folder))?;
-    let lock = run_folder::lock(out)?;
+    let lock = Lock::take(out)?;
     let models = std::fs::read_dir(out.join("point_cloud")).into_iter().flatten().flatten().map(|entry| entry.path());
     for folder in [out.to_owned(), checkpoints, out.join("preview")].into_iter().chain(models) {
         atomic::remove_stale(folder);

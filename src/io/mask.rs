@@ -8,14 +8,23 @@ use super::resample::same_aspect;
 use crate::error::{Error, Result};
 use crate::io::read;
 use crate::scene::LabelMap;
+use png::DecodingError;
 use std::collections::HashMap;
-use std::io::Cursor;
+use std::io::{BufReader, ErrorKind};
 use std::path::{Path, PathBuf};
 
-type Decoder = png::Decoder<Cursor<Vec<u8>>>;
+type Reader = png::Reader<BufReader<read::Source>>;
 
-fn problem(path: &Path, error: impl std::fmt::Display) -> Error {
-    Error::data(path, "", format!("is no readable PNG mask: {error}"))
+fn unreadable(path: &Path, error: DecodingError) -> Error {
+    match error {
+        // A file that was cut short ends too early, as no failing disk does.
+        DecodingError::IoError(cause) if cause.kind() != ErrorKind::UnexpectedEof => Error::read(path)(cause),
+        other => problem(path, other),
+    }
+}
+
+fn problem(path: &Path, problem: impl std::fmt::Display) -> Error {
+    Error::data(path, "", format!("is no readable PNG mask: {problem}"))
 }
 
 /// What a PNG says about itself before its pixels.
@@ -47,11 +56,11 @@ impl Raw {
     }
 }
 
-fn open(path: &Path) -> Result<(png::Reader<Cursor<Vec<u8>>>, Header)> {
-    let mut decoder = Decoder::new(Cursor::new(read::bytes(path)?));
+fn open(path: &Path) -> Result<(Reader, Header)> {
+    let mut decoder = png::Decoder::new(read::open(path)?);
     // Any other choice expands a palette to colours or drops the low half of 16-bit ids.
     decoder.set_transformations(png::Transformations::IDENTITY);
-    let reader = decoder.read_info().map_err(|error| problem(path, error))?;
+    let reader = decoder.read_info().map_err(|error| unreadable(path, error))?;
     let info = reader.info();
     let header = Header { size: (info.width, info.height), colour: info.color_type, depth: info.bit_depth };
     check_size(path, header.size)?;
@@ -59,7 +68,7 @@ fn open(path: &Path) -> Result<(png::Reader<Cursor<Vec<u8>>>, Header)> {
     Ok((reader, header))
 }
 
-/// Reads the header of a PNG.
+/// Reads the header of a PNG, and of the file no more than it takes.
 pub(crate) fn read_header(path: &Path) -> Result<Header> {
     open(path).map(|(_, header)| header)
 }
@@ -70,7 +79,7 @@ pub(crate) fn read_raw(path: &Path, accept: impl FnOnce(&Header) -> Result<()>) 
     accept(&header)?;
     let length = reader.output_buffer_size().ok_or_else(|| problem(path, "too large"))?;
     let mut bytes = vec![0; length];
-    let frame = reader.next_frame(&mut bytes).map_err(|error| problem(path, error))?;
+    let frame = reader.next_frame(&mut bytes).map_err(|error| unreadable(path, error))?;
     Ok(Raw { header, bytes, line_size: frame.line_size })
 }
 

@@ -135,7 +135,7 @@ fn changed_colmap_models_are_read_or_refused() {
 
 #[test]
 fn changed_text_files_are_read_or_refused() {
-    run_all(&["transforms_", "config_", "camera_", "labels_", "occlusion_", "frames_", "pred_"]);
+    run_all(&["transforms_", "config_", "camera_", "labels_", "occlusion_", "frames_", "pred_", "profile_"]);
 }
 
 #[test]
@@ -156,6 +156,11 @@ fn changed_depth_maps_are_read_or_refused() {
 #[test]
 fn changed_photos_are_read_or_refused() {
     run_all(&["photo_"]);
+}
+
+#[test]
+fn changed_weights_are_read_or_refused() {
+    run_all(&["lpips_"]);
 }
 
 #[test]

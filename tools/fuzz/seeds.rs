@@ -374,6 +374,24 @@ pub fn frames_json() -> Vec<u8> {
     .into_bytes()
 }
 
+/// Two steps of a profile, of which the first does not count.
+pub fn profile_json() -> Vec<u8> {
+    br#"{"schema_version": 1, "device": "x", "size": [12, 8], "counters": {"visible": {"median": 7, "p90": 8}},
+"steps": [{"step": 1, "first_run": true, "stages_ms": {"sort": 1.5}},
+{"step": 2, "first_run": false, "stages_ms": {"sort": 0.5, "blend forward": 2}}]}"#
+        .to_vec()
+}
+
+/// Two tensors with the names of weights of LPIPS.
+pub fn lpips_weights() -> Vec<u8> {
+    let header = r#"{"__metadata__":{"format":"pt"},"features.0.bias":{"dtype":"F32","shape":[4],"data_offsets":[0,16]},
+"lin0.model.1.weight":{"dtype":"F32","shape":[1,2,1,1],"data_offsets":[16,24]}}"#;
+    let mut bytes = (header.len() as u64).to_le_bytes().to_vec();
+    bytes.extend(header.as_bytes());
+    bytes.extend([0.5f32, 1.0, -2.0, 3.5, 0.25, 8.0].iter().flat_map(|value| value.to_le_bytes()));
+    bytes
+}
+
 /// Compiled pipelines.
 pub fn pipelines() -> Vec<u8> {
     let folder = tempfile::tempdir().expect("a folder");

@@ -6,7 +6,9 @@
 //! a file.
 
 use super::seeds;
+use labelgs::cli::profile_compare::{Profile, compare};
 use labelgs::gpu::PipelineStore;
+use labelgs::infer::score::lpips::weights::read_tensors;
 use labelgs::io::checkpoint::{Checkpoint, VERSION};
 use labelgs::io::depth::DepthFolder;
 use labelgs::io::frames::Frames;
@@ -46,7 +48,7 @@ pub fn memory_bound(length: usize) -> usize {
 }
 
 /// All readers.
-pub const TARGETS: [Target; 28] = [
+pub const TARGETS: [Target; 30] = [
     Target {
         name: "colmap_cameras_bin",
         file: "sparse/0/cameras.bin",
@@ -198,6 +200,20 @@ pub const TARGETS: [Target; 28] = [
         ..PLAIN
     },
     Target { name: "frames_json", file: "frames.json", read: frames, seeds: || vec![seeds::frames_json()], ..PLAIN },
+    Target {
+        name: "profile_json",
+        file: "profile.json",
+        read: profile,
+        seeds: || vec![seeds::profile_json()],
+        ..PLAIN
+    },
+    Target {
+        name: "lpips_weights",
+        file: "lpips.safetensors",
+        read: weights,
+        seeds: || vec![seeds::lpips_weights()],
+        ..PLAIN
+    },
     Target {
         name: "pipelines",
         file: "pipelines-x.bin",
@@ -460,6 +476,23 @@ fn labels(folder: &Path, file: &Path) -> Result<()> {
 
 fn occlusion(_: &Path, file: &Path) -> Result<()> {
     OcclusionTable::read(file).map(|_| ())
+}
+
+fn profile(_: &Path, file: &Path) -> Result<()> {
+    let profile = Profile::read(file)?;
+    assert!(!profile.samples.is_empty(), "a profile without a step");
+    // As with its own figures, so with those of another one.
+    compare(&profile.samples, &profile.samples, 0.05).iter().for_each(|row| assert!(!row.regressed, "{row:?}"));
+    Ok(())
+}
+
+/// Two small tensors: those of VGG16 fit no small file.
+fn weights(_: &Path, file: &Path) -> Result<()> {
+    let wanted = [("features.0.bias".into(), vec![4]), ("lin0.model.1.weight".into(), vec![1, 2, 1, 1])];
+    let read = read_tensors(file, &wanted)?;
+    assert_eq!(read.iter().map(Vec::len).collect::<Vec<_>>(), [4, 2]);
+    assert!(read.iter().flatten().all(|value| value.is_finite()), "a value that is not finite");
+    Ok(())
 }
 
 fn frames(_: &Path, file: &Path) -> Result<()> {

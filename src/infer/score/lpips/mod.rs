@@ -5,7 +5,7 @@
 //! over pixels, and summed over stages.
 
 pub mod convolution;
-mod weights;
+pub mod weights;
 
 use crate::error::{Error, Result};
 use crate::infer::score::protocol::score::Distance;

@@ -23,23 +23,22 @@ pub struct Weights {
 impl Weights {
     /// Reads the file; every tensor must be there with its shape.
     pub fn read(path: &Path) -> Result<Self> {
-        let bytes = read::bytes(path)?;
-        let file = SafeTensors::deserialize(&bytes)
-            .map_err(|error| Error::data(path, "", format!("is no readable safetensors file: {error}")))?;
-        let tensor = |name: String, shape: &[usize]| floats(path, &file, &name, shape);
-        let mut layers = BTreeMap::new();
+        let numbers: Vec<(usize, usize)> =
+            STAGES.iter().zip(CHANNELS).flat_map(|(stage, outputs)| stage.iter().map(move |&n| (n, outputs))).collect();
+        let mut wanted = Vec::new();
         let mut inputs = 3;
-        for (stage, &outputs) in STAGES.iter().zip(&CHANNELS) {
-            for &number in *stage {
-                let weight = tensor(format!("features.{number}.weight"), &[outputs, inputs, 3, 3])?;
-                let bias = tensor(format!("features.{number}.bias"), &[outputs])?;
-                layers.insert(number, Layer { weight, bias });
-                inputs = outputs;
-            }
+        for &(number, outputs) in &numbers {
+            wanted.push((format!("features.{number}.weight"), vec![outputs, inputs, 3, 3]));
+            wanted.push((format!("features.{number}.bias"), vec![outputs]));
+            inputs = outputs;
         }
         let linear = CHANNELS.iter().enumerate();
-        let linear = linear.map(|(index, &count)| tensor(format!("lin{index}.model.1.weight"), &[1, count, 1, 1]));
-        Ok(Self { layers, linear: linear.collect::<Result<_>>()? })
+        wanted.extend(linear.map(|(index, &count)| (format!("lin{index}.model.1.weight"), vec![1, count, 1, 1])));
+
+        let mut read = read_tensors(path, &wanted)?.into_iter();
+        let mut next = || read.next().unwrap_or_default();
+        let layers = numbers.iter().map(|&(number, _)| (number, Layer { weight: next(), bias: next() })).collect();
+        Ok(Self { layers, linear: read.collect() })
     }
 
     pub(super) fn layer(&self, number: usize) -> Result<&Layer> {
@@ -49,6 +48,14 @@ impl Weights {
     pub(super) fn linear(&self, stage: usize) -> &[f32] {
         &self.linear[stage]
     }
+}
+
+/// Tensors of a safetensors file by name and shape, all of finite 32-bit floats.
+pub fn read_tensors(path: &Path, wanted: &[(String, Vec<usize>)]) -> Result<Vec<Vec<f32>>> {
+    let bytes = read::bytes(path)?;
+    let file = SafeTensors::deserialize(&bytes)
+        .map_err(|error| Error::data(path, "", format!("is no readable safetensors file: {error}")))?;
+    wanted.iter().map(|(name, shape)| floats(path, &file, name, shape)).collect()
 }
 
 fn floats(path: &Path, file: &SafeTensors, name: &str, shape: &[usize]) -> Result<Vec<f32>> {
