@@ -15,6 +15,7 @@ mod paper;
 #[allow(dead_code, reason = "the compiler of the build; benchmarks reflect nothing")]
 #[path = "../shadergen/compile.rs"]
 mod shader_compiler;
+mod skips;
 mod start;
 mod steps;
 mod trained;
@@ -60,6 +61,8 @@ enum Command {
     Features(features::Options),
     /// How near each stage of a step comes to what the device could do, measured in the same run.
     Limits(Common),
+    /// The most that skips would save which are not built.
+    Skips(Common),
     /// Predicted against measured memory of training.
     Memory(Common),
     /// From the start of the program to its first picture, with empty and with filled caches.
@@ -90,6 +93,7 @@ fn run() -> Result<()> {
         Command::Features(options) => features::run(&options),
         Command::FirstStep(common) => training::first_step(&common),
         Command::Limits(common) => limits::run(&common),
+        Command::Skips(common) => skips::run(&common),
         Command::Memory(common) => memory::run(&common),
         Command::Start(common) => start::run(&common),
         Command::MemoryOf { gaussians, width, height } => memory::measure(gaussians, width, height),
