@@ -14,6 +14,7 @@ mod cli;
 mod cli_edit;
 mod cli_engine;
 mod cli_faults;
+mod cli_kills;
 mod cli_labels;
 mod cli_long;
 mod cli_masks;

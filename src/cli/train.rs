@@ -263,7 +263,7 @@ fn prepare_output(out: &Path, config: &TrainConfig) -> Result<Lock> {
     let lock = Lock::take(out)?;
     let models = std::fs::read_dir(out.join("point_cloud")).into_iter().flatten().flatten().map(|entry| entry.path());
     for folder in [out.to_owned(), checkpoints, out.join("preview")].into_iter().chain(models) {
-        atomic::remove_stale(folder);
+        atomic::remove_stale(folder, Duration::ZERO);
     }
     Ok(lock)
 }

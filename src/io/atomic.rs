@@ -2,9 +2,12 @@
 
 use crate::error::{Error, Result};
 use crate::fault;
+use std::collections::BTreeSet;
 use std::fs::{self, File};
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
+use std::sync::Mutex;
+use std::time::Duration;
 
 const PREFIX: &str = ".labelgs-";
 const SUFFIX: &str = ".tmp";
@@ -43,6 +46,7 @@ fn write_inner(path: &Path, body: impl FnOnce(&mut dyn Write) -> io::Result<()>)
     };
     fault::of_file("write")?;
     fs::create_dir_all(folder)?;
+    clean_once(folder);
     fault::of_file("write")?;
     let temporary = temporary_in(folder)?;
     fill(temporary.as_file(), body)?;
@@ -115,9 +119,22 @@ fn sync_folder(_folder: &Path) -> io::Result<()> {
     Ok(())
 }
 
-/// Removes the temporary files that killed runs of this program left in `folder`; returns how many. Files of
-/// processes that still live are kept, and where liveness cannot be told (no `/proc`) nothing is removed.
-pub fn remove_stale(folder: impl AsRef<Path>) -> usize {
+/// How old a temporary file must be before a command that does not own the folder removes it. On a disk that several
+/// computers share, its process may live where this one cannot see it.
+const STALE: Duration = Duration::from_secs(3600);
+
+/// Removes what killed commands left in a folder, at this process's first write there.
+fn clean_once(folder: &Path) {
+    static CLEANED: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
+    let is_new = CLEANED.lock().is_ok_and(|mut cleaned| cleaned.insert(folder.to_owned()));
+    if is_new {
+        remove_stale(folder, STALE);
+    }
+}
+
+/// Removes the temporary files, not changed for so long, that killed runs of this program left in `folder`; returns how
+/// many. Files of processes that still live are kept, and where liveness cannot be told (no `/proc`) nothing is removed.
+pub fn remove_stale(folder: impl AsRef<Path>, unchanged: Duration) -> usize {
     let processes = Path::new("/proc");
     if !processes.join("self").exists() {
         return 0;
@@ -129,7 +146,9 @@ pub fn remove_stale(folder: impl AsRef<Path>) -> usize {
             .to_str()
             .and_then(|name| name.strip_prefix(PREFIX)?.strip_suffix(SUFFIX)?.split_once('-'))
             .and_then(|(process, _)| process.parse::<u32>().ok());
-        process.is_some_and(|process| !processes.join(process.to_string()).exists())
+        let is_dead = process.is_some_and(|process| !processes.join(process.to_string()).exists());
+        let age = || entry.metadata().ok()?.modified().ok()?.elapsed().ok();
+        is_dead && (unchanged.is_zero() || age().is_some_and(|age| age >= unchanged))
     });
     stale.filter(|entry| fs::remove_file(entry.path()).is_ok()).count()
 }

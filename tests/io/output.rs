@@ -6,6 +6,7 @@ use labelgs::io::{atomic, camera_json, image as images};
 use labelgs::scene::Camera;
 use std::fs;
 use std::io::Error;
+use std::time::Duration;
 
 fn entries(scene: &Scene) -> Vec<String> {
     let mut names: Vec<String> = fs::read_dir(scene.path())
@@ -55,9 +56,22 @@ fn links_and_devices_are_written_through() {
         scene.write(".labelgs-4194305-abc.tmp", b"");
         scene.write(&format!(".labelgs-{}-abc.tmp", std::process::id()), b"");
         scene.write(".labelgs-notes.tmp", b"");
-        assert_eq!(atomic::remove_stale(scene.path()), 1);
+        assert_eq!(atomic::remove_stale(scene.path(), Duration::from_secs(60)), 0, "it is too young");
+        assert_eq!(atomic::remove_stale(scene.path(), Duration::ZERO), 1);
         assert_eq!(entries(&scene).len(), 4);
     }
+}
+
+/// A command that writes into a folder removes what one that was killed left there long ago.
+#[cfg(target_os = "linux")]
+#[test]
+fn old_litter_goes_with_the_next_write() {
+    let scene = Scene::new();
+    let old = fs::File::create(scene.write(".labelgs-4194305-old.tmp", b"")).expect("a file");
+    old.set_modified(std::time::SystemTime::now() - Duration::from_secs(7200)).expect("a time");
+    scene.write(".labelgs-4194305-new.tmp", b"");
+    atomic::write(scene.at("a.txt"), |out| out.write_all(b"text")).expect("written");
+    assert_eq!(entries(&scene), [".labelgs-4194305-new.tmp", "a.txt"]);
 }
 
 #[test]

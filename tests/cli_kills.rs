@@ -1,0 +1,73 @@
+//! Commands other than `train` that are killed while they write: what they leave is whole, and a second run ends as one
+//! that nobody killed.
+
+use crate::support::device;
+use crate::support::runs::{Place, all_whole, files, succeeded};
+use rand::{Rng, SeedableRng};
+use rand_pcg::Pcg32;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+/// Kills of each command; `LABELGS_TEST_KILLS` asks for more.
+const KILLS: u32 = 3;
+
+/// Bytes of all files below a folder, but for temporary ones.
+fn contents(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
+    let of = |path: PathBuf| {
+        let bytes = std::fs::read(&path).expect("a file");
+        (path.strip_prefix(folder).expect("inside").to_owned(), bytes)
+    };
+    let is_temporary = |path: &PathBuf| path.extension().is_some_and(|extension| extension == "tmp");
+    files(folder).into_iter().filter(|path| !is_temporary(path)).map(of).collect()
+}
+
+#[test]
+fn exports_may_be_killed_at_any_moment() {
+    let Some(_turn) = device() else { return };
+    let place = Place::new();
+    succeeded(&place.trained("run", &["--iterations", "12", "--label-from", "2"]));
+    let (run, scene, masks) = (place.text("run"), place.text("scene"), place.text("scene/masks"));
+    let model = place.text("run/point_cloud/iteration_12/point_cloud.ply");
+    let out = place.text("out");
+    let file = |name: &str| format!("{out}/{name}");
+    let commands: [(&str, Vec<&str>, String); 5] = [
+        ("label", vec!["label", &model, "--scene", &scene, "--masks", &masks, "-o"], file("all.ply")),
+        ("extract", vec!["extract", &model, "--labels", "1", "-o"], file("part.ply")),
+        ("remove", vec!["remove", &model, "--labels", "1", "-o"], file("rest.ply")),
+        (
+            "render",
+            vec!["render", &run, "--scene", &scene, "--views", "all", "--what", "rgb,labels", "-o"],
+            out.clone(),
+        ),
+        ("eval", vec!["eval", &run, "--scene", &scene, "--masks", &masks, "--json"], file("scores.json")),
+    ];
+    let kills = std::env::var("LABELGS_TEST_KILLS").ok().and_then(|kills| kills.parse().ok()).unwrap_or(KILLS);
+    let mut random = Pcg32::seed_from_u64(u64::from(kills));
+    for (name, args, to) in commands {
+        let args: Vec<String> = args.iter().map(|part| (*part).to_owned()).chain([to]).collect();
+        let words: Vec<&str> = args.iter().map(String::as_str).collect();
+        std::fs::create_dir_all(&out).expect("a folder");
+        let start = Instant::now();
+        succeeded(&place.labelgs(&words));
+        let took = start.elapsed();
+        let right = contents(&place.path("out"));
+        assert!(!right.is_empty(), "{name} writes nothing");
+        // Half of them over files that are there.
+        for kill in 0..kills {
+            if kill % 2 == 0 {
+                std::fs::remove_dir_all(&out).and_then(|()| std::fs::create_dir(&out)).expect("an empty folder");
+            }
+            let mut child = place.spawned(&args);
+            std::thread::sleep(took.mul_f64(random.random_range(0.3..1.0)));
+            child.kill().expect("killed or done");
+            child.wait().expect("a child");
+            all_whole(&place.path("out"));
+            assert!(contents(&place.path("out")).iter().all(|(path, bytes)| right.get(path) == Some(bytes)), "{name}");
+        }
+        succeeded(&place.labelgs(&words));
+        assert!(contents(&place.path("out")) == right, "{name}: other files than without kills");
+        std::fs::remove_dir_all(&out).expect("removed");
+    }
+    println!("{kills} kills of each export");
+}
