@@ -1,5 +1,7 @@
 //! What comes from outside: hostile files, and scenes that lie.
 
+#[path = "../../tools/fuzz/readers.rs"]
+mod readers;
 #[path = "../../tools/fuzz/seeds.rs"]
 mod seeds;
 #[path = "../../tools/fuzz/targets.rs"]

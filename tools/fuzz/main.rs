@@ -3,6 +3,7 @@
 
 #[path = "../../tests/support/memory.rs"]
 mod memory;
+mod readers;
 mod seeds;
 mod targets;
 
