@@ -18,13 +18,13 @@ pub struct SortBuffers {
 pub fn sort(b: &mut Builder, buffers: SortBuffers, bits: u32, count: Count, identity: bool) -> (Buf, Buf) {
     let (subgroup, lanes) = (b.shape.subgroup, b.capacity.sort_lanes as u32);
     let groups = Grid::Groups(lanes / subgroup, 1, 1);
-    let passes = bits.div_ceil(b.shape.digit_bits).max(1);
-    // Digits of one length: their tables, and the scan of these by one subgroup, are then as small as can be.
-    let digit_bits = bits.div_ceil(passes).max(1);
+    let digit_bits = b.shape.digit_bits;
+    let passes = bits.div_ceil(digit_bits).max(1);
     for pass in 0..passes {
         let (from, to) = ((pass % 2) as usize, 1 - (pass % 2) as usize);
         let shift = pass * digit_bits;
-        let digit_bits = digit_bits.min(u32::BITS - shift);
+        // The last digit has the bits that are left: its tables, and their scan by one subgroup, are smaller.
+        let digit_bits = digit_bits.min(bits.max(1) - shift);
         // The first pass of an identity sort reads no values; the keys stand in for the buffer that nothing wrote yet.
         let identity_now = identity && pass == 0;
         let values_in = if identity_now { buffers.keys[from] } else { buffers.values[from] };
