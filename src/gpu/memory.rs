@@ -84,6 +84,10 @@ impl Buffer {
             AllocationError::Internal(text) if text.contains("OUT_OF_HOST_MEMORY") => {
                 Error::Vulkan { call: "vkAllocateMemory", result: vk::Result::ERROR_OUT_OF_HOST_MEMORY }
             }
+            // No driver should give this answer here, and one that does is not this program's fault.
+            AllocationError::Internal(text) if text.contains("INITIALIZATION_FAILED") => {
+                Error::Vulkan { call: "vkAllocateMemory", result: vk::Result::ERROR_INITIALIZATION_FAILED }
+            }
             other => Error::Bug(format!("memory of {}: {other}", self.name)),
         }
     }
