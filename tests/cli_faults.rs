@@ -3,7 +3,7 @@
 //! N rises until a command ends without having met its fault. `LABELGS_TEST_FAULTS=all` tries every N in place of some.
 
 use crate::support::device;
-use crate::support::runs::{Place, all_whole, copy, files, stderr, succeeded};
+use crate::support::runs::{Place, all_whole, contents, copy, files, stderr, succeeded};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::Output;
@@ -167,15 +167,9 @@ fn any_read_may_fail() {
 
 /// Models and pictures of a folder, by their path in it.
 fn results(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
-    let wanted = |path: &PathBuf| path.extension().is_some_and(|kind| kind == "ply" || kind == "png");
-    let named = |path: PathBuf| (path.strip_prefix(folder).expect("inside").to_owned(), read(&path));
-    let found: BTreeMap<_, _> = files(folder).into_iter().filter(wanted).map(named).collect();
+    let found = contents(folder, |path| path.extension().is_some_and(|kind| kind == "ply" || kind == "png"));
     assert!(!found.is_empty(), "{} has no result", folder.display());
     found
-}
-
-fn read(path: &Path) -> Vec<u8> {
-    std::fs::read(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
 }
 
 /// A device that is lost is opened again, and the pass that lost it is named. Without a new checkpoint it stays lost.

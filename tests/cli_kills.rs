@@ -2,24 +2,19 @@
 //! that nobody killed.
 
 use crate::support::device;
-use crate::support::runs::{Place, all_whole, files, succeeded};
+use crate::support::runs::{Place, all_whole, contents, kills, succeeded};
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-/// Kills of each command; `LABELGS_TEST_KILLS` asks for more.
+/// Kills of each command.
 const KILLS: u32 = 3;
 
 /// Bytes of all files below a folder, but for temporary ones.
-fn contents(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
-    let of = |path: PathBuf| {
-        let bytes = std::fs::read(&path).expect("a file");
-        (path.strip_prefix(folder).expect("inside").to_owned(), bytes)
-    };
-    let is_temporary = |path: &PathBuf| path.extension().is_some_and(|extension| extension == "tmp");
-    files(folder).into_iter().filter(|path| !is_temporary(path)).map(of).collect()
+fn results(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
+    contents(folder, |path| path.extension().is_none_or(|extension| extension != "tmp"))
 }
 
 #[test]
@@ -31,27 +26,24 @@ fn exports_may_be_killed_at_any_moment() {
     let model = place.text("run/point_cloud/iteration_12/point_cloud.ply");
     let out = place.text("out");
     let file = |name: &str| format!("{out}/{name}");
-    let commands: [(&str, Vec<&str>, String); 5] = [
-        ("label", vec!["label", &model, "--scene", &scene, "--masks", &masks, "-o"], file("all.ply")),
-        ("extract", vec!["extract", &model, "--labels", "1", "-o"], file("part.ply")),
-        ("remove", vec!["remove", &model, "--labels", "1", "-o"], file("rest.ply")),
-        (
-            "render",
-            vec!["render", &run, "--scene", &scene, "--views", "all", "--what", "rgb,labels", "-o"],
-            out.clone(),
-        ),
-        ("eval", vec!["eval", &run, "--scene", &scene, "--masks", &masks, "--json"], file("scores.json")),
+    let commands: [(Vec<&str>, String); 5] = [
+        (vec!["label", &model, "--scene", &scene, "--masks", &masks, "-o"], file("all.ply")),
+        (vec!["extract", &model, "--labels", "1", "-o"], file("part.ply")),
+        (vec!["remove", &model, "--labels", "1", "-o"], file("rest.ply")),
+        (vec!["render", &run, "--scene", &scene, "--views", "all", "--what", "rgb,labels", "-o"], out.clone()),
+        (vec!["eval", &run, "--scene", &scene, "--masks", &masks, "--json"], file("scores.json")),
     ];
-    let kills = std::env::var("LABELGS_TEST_KILLS").ok().and_then(|kills| kills.parse().ok()).unwrap_or(KILLS);
+    let kills = kills(KILLS);
     let mut random = Pcg32::seed_from_u64(u64::from(kills));
-    for (name, args, to) in commands {
+    for (args, to) in commands {
+        let name = args[0];
         let args: Vec<String> = args.iter().map(|part| (*part).to_owned()).chain([to]).collect();
         let words: Vec<&str> = args.iter().map(String::as_str).collect();
         std::fs::create_dir_all(&out).expect("a folder");
         let start = Instant::now();
         succeeded(&place.labelgs(&words));
         let took = start.elapsed();
-        let right = contents(&place.path("out"));
+        let right = results(&place.path("out"));
         assert!(!right.is_empty(), "{name} writes nothing");
         // Half of them over files that are there.
         for kill in 0..kills {
@@ -63,10 +55,10 @@ fn exports_may_be_killed_at_any_moment() {
             child.kill().expect("killed or done");
             child.wait().expect("a child");
             all_whole(&place.path("out"));
-            assert!(contents(&place.path("out")).iter().all(|(path, bytes)| right.get(path) == Some(bytes)), "{name}");
+            assert!(results(&place.path("out")).iter().all(|(path, bytes)| right.get(path) == Some(bytes)), "{name}");
         }
         succeeded(&place.labelgs(&words));
-        assert!(contents(&place.path("out")) == right, "{name}: other files than without kills");
+        assert!(results(&place.path("out")) == right, "{name}: other files than without kills");
         std::fs::remove_dir_all(&out).expect("removed");
     }
     println!("{kills} kills of each export");

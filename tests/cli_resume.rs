@@ -1,7 +1,7 @@
 //! `labelgs train` that is stopped, killed or out of space, and goes on with `--resume`.
 
 use crate::support::device;
-use crate::support::runs::{Place, all_whole, files, stderr, succeeded};
+use crate::support::runs::{Place, all_whole, files, kills, stderr, succeeded};
 use labelgs::io::run_folder::Lock;
 use labelgs::train::TrainState;
 use rand::{Rng, SeedableRng};
@@ -10,7 +10,7 @@ use std::path::PathBuf;
 use std::process::{Child, Stdio};
 use std::time::{Duration, Instant};
 
-/// Kills of the test; `LABELGS_TEST_KILLS` asks for more.
+/// Kills of the test.
 const KILLS: u32 = 6;
 /// Steps of a run.
 const STEPS: u32 = 40;
@@ -30,7 +30,7 @@ fn kills_at_any_moment_cost_no_bit() {
     let start = Instant::now();
     succeeded(&place.trained("straight", &["--config", &place.settings()]));
     let run = start.elapsed();
-    let kills = std::env::var("LABELGS_TEST_KILLS").ok().and_then(|kills| kills.parse().ok()).unwrap_or(KILLS);
+    let kills = kills(KILLS);
     let mut random = Pcg32::seed_from_u64(u64::from(kills));
     let mut steps = Vec::new();
     for kill in 0..kills {

@@ -81,12 +81,13 @@ impl Buffer {
             AllocationError::Internal(text) if text.contains("DEVICE_LOST") => {
                 Error::DeviceLost { pass: "unknown".to_owned() }
             }
-            AllocationError::Internal(text) if text.contains("OUT_OF_HOST_MEMORY") => {
-                Error::Vulkan { call: "vkAllocateMemory", result: vk::Result::ERROR_OUT_OF_HOST_MEMORY }
-            }
-            // No driver should give this answer here, and one that does is not this program's fault.
-            AllocationError::Internal(text) if text.contains("INITIALIZATION_FAILED") => {
-                Error::Vulkan { call: "vkAllocateMemory", result: vk::Result::ERROR_INITIALIZATION_FAILED }
+            AllocationError::Internal(text) => {
+                // The last is no answer that a driver should give here, and one that does is not this program's fault.
+                let known = [vk::Result::ERROR_OUT_OF_HOST_MEMORY, vk::Result::ERROR_INITIALIZATION_FAILED];
+                match known.into_iter().find(|result| text.contains(&format!("{result:?}"))) {
+                    Some(result) => Error::Vulkan { call: "vkAllocateMemory", result },
+                    None => Error::Bug(format!("memory of {}: {text}", self.name)),
+                }
             }
             other => Error::Bug(format!("memory of {}: {other}", self.name)),
         }

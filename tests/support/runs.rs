@@ -4,6 +4,7 @@ use assert_cmd::Command;
 use labelgs::io::checkpoint_folder::{self, Found};
 use labelgs::io::ply::read_gaussians;
 use labelgs::train::TrainState;
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Output, Stdio};
 
@@ -121,6 +122,13 @@ pub fn files(folder: &Path) -> Vec<PathBuf> {
     entries.flat_map(|path| if path.is_dir() { files(&path) } else { vec![path] }).collect()
 }
 
+/// Bytes of the files below a folder that are wanted, by their path in it.
+pub fn contents(folder: &Path, wanted: impl Fn(&PathBuf) -> bool) -> BTreeMap<PathBuf, Vec<u8>> {
+    let bytes = |path: &Path| std::fs::read(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
+    let named = |path: PathBuf| (path.strip_prefix(folder).expect("inside").to_owned(), bytes(&path));
+    files(folder).into_iter().filter(wanted).map(named).collect()
+}
+
 /// Copies all files below a folder to another one.
 pub fn copy(from: &Path, to: &Path) {
     for path in files(from) {
@@ -128,6 +136,11 @@ pub fn copy(from: &Path, to: &Path) {
         std::fs::create_dir_all(copy.parent().expect("a folder")).expect("a folder");
         std::fs::copy(path, copy).expect("a copy");
     }
+}
+
+/// How often a test kills; `LABELGS_TEST_KILLS` asks for more.
+pub fn kills(usual: u32) -> u32 {
+    std::env::var("LABELGS_TEST_KILLS").ok().and_then(|kills| kills.parse().ok()).unwrap_or(usual)
 }
 
 /// Every file that a killed run left can be read by its name, but for temporary ones, which have another.
