@@ -3,6 +3,7 @@
 #include "constants.glsl"
 #include "step.glsl"
 #include "dispatch.glsl"
+#include "gaussian.glsl"
 // gather — add up the gradient records of each splat, in slot order; note the densification statistic.
 // Work:    64 splats a workgroup.
 // Reads:   step, counters, failure; tiles_touched, instance_offsets [V]; v_instances_a, _b, _c [I];
@@ -64,7 +65,10 @@ void main() {
 #ifndef OBJECT
     if (total > 0u) {
         float size = length(scene_mean * vec2(0.5 * float(step.width), 0.5 * float(step.height)));
-        densify_stats[gaussian] += vec2(size, 1.0);
+        // As project_backward, which drops the gradients of such a splat: one infinity would stay in the sum.
+        if (finite(size) && size < GRADIENT_MAX) {
+            densify_stats[gaussian] += vec2(size, 1.0);
+        }
     }
 #endif
 }

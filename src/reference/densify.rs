@@ -1,7 +1,9 @@
 //! Cloning, splitting and removing Gaussians.
 
 use super::project::{normalised, rotation, sigmoid};
+use super::rules::wide;
 use super::{Model, Row, Rules};
+use crate::shaders::constants;
 use glam::DVec3;
 
 /// What densification knows.
@@ -109,9 +111,11 @@ pub fn mark(rules: &Rules, before: &Population, extent: f64, step: u32) -> Vec<u
     counts
 }
 
-/// Adds a view to the statistic: the gradient's norm and one view where the Gaussian is visible.
+/// Adds a view to the statistic: the gradient's norm and one view where the Gaussian is visible. A norm that Adam would not
+/// be given either is left out.
 pub fn accumulate(population: &mut Population, gradient2d: &[f64], visible: &[bool]) {
-    for index in (0..visible.len()).filter(|&index| visible[index]) {
+    let counts = |index: &usize| visible[*index] && gradient2d[*index] < wide(constants::GRADIENT_MAX);
+    for index in (0..visible.len()).filter(counts) {
         population.gradient_sum[index] += gradient2d[index];
         population.gradient_count[index] += 1.0;
     }
