@@ -36,7 +36,8 @@ struct Counters {
     uint layer_tile_count;  // tiles of object layers that hold a splat
     uint longest_list;      // splats in the fullest tile
     uint nonfinite_count, nonfinite_first; // Gaussians whose gradient was not finite and was dropped; the lowest index
-    uint broken_count, broken_first; // Gaussians with parameters that are not finite or not projected so; the same
+    uint broken_count, broken_first; // Gaussians whose position, opacity or scale is not finite (cull); the same
+    uint unprojected_count, unprojected_first; // Gaussians whose splat is not finite (project_forward); the same
     uint densified_count;   // Gaussians after densification
     uint walked_first, walked_second; // splats that tiles walked in blend_forward, in the first and in the second half
                             // of its workgroups; times the pixels of a tile: pairs

@@ -11,7 +11,7 @@
 // Work:    64 splats a workgroup, splats in depth order.
 // Reads:   step, counters; gaussian_from_splat [V]; means, scales, quats, sh0 [N]; sh1 [N,3], sh2 [N,4], sh3 [N,6];
 //          variant labels: labels [N], layer_from_label
-// Writes:  splats [V,3] (record.glsl); tiles_touched [V] over all layers; splat_from_gaussian [N]; counters.broken_*
+// Writes:  splats [V,3] (record.glsl); tiles_touched [V] over all layers; splat_from_gaussian [N]; counters.unprojected_*
 //          (integer atomics): splats that are not finite, which touch no tile
 // Math:    EWA splatting with Cauchy-Binet determinant; SH colour, clamped at 0; ellipse.glsl for the tiles.
 // Mirror:  src/reference/project.rs::project_forward
@@ -61,8 +61,8 @@ void main() {
     uint touched = 0u, tx = rect.x_min, ty = rect.y_min;
     bool sane = finite(centre.x + centre.y + q.x + q.y + q.z + log2_o + colour.x + colour.y + colour.z);
     if (!sane) {
-        atomicAdd(counters.broken_count, 1u);
-        atomicMin(counters.broken_first, i);
+        atomicAdd(counters.unprojected_count, 1u);
+        atomicMin(counters.unprojected_first, i);
     }
     uint candidates = sane ? rect.count : 0u;
     for (uint k = 0u; k < candidates; k++) {

@@ -34,11 +34,15 @@ impl Trainer {
         let counters = &report.counters;
         let view = &self.views[job.view].name;
         let failure = |quantity: String| Error::Numeric { quantity, step: u64::from(job.step), view: view.clone() };
-        if counters.broken_count > 0 {
-            return Err(failure(format!(
-                "cull or project_forward found {} Gaussians with parameters that are not finite, the first is {}",
-                counters.broken_count, counters.broken_first
-            )));
+        for (pass, what, count, first) in [
+            ("cull", "positions, opacities or scales", counters.broken_count, counters.broken_first),
+            ("project_forward", "projections or colours", counters.unprojected_count, counters.unprojected_first),
+        ] {
+            if count > 0 {
+                return Err(failure(format!(
+                    "{pass} found {count} Gaussians with {what} that are not finite, the first is {first}"
+                )));
+            }
         }
         if !losses.iter().all(|loss| loss.is_finite()) {
             return Err(failure(format!("loss_reduce: the loss is {}, the label loss {}", losses[0], losses[1])));
