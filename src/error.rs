@@ -148,13 +148,18 @@ impl Error {
             Self::Numeric { .. } => 8,
             Self::Interrupted(status) => *status,
             Self::Vulkan { result, .. } => match *result {
-                ash::vk::Result::ERROR_OUT_OF_DEVICE_MEMORY | ash::vk::Result::ERROR_OUT_OF_HOST_MEMORY => 5,
+                ash::vk::Result::ERROR_OUT_OF_DEVICE_MEMORY
+                | ash::vk::Result::ERROR_OUT_OF_HOST_MEMORY
+                | ash::vk::Result::ERROR_OUT_OF_POOL_MEMORY
+                | ash::vk::Result::ERROR_FRAGMENTED_POOL
+                | ash::vk::Result::ERROR_TOO_MANY_OBJECTS => 5,
                 ash::vk::Result::ERROR_DEVICE_LOST => 6,
                 ash::vk::Result::ERROR_INITIALIZATION_FAILED
                 | ash::vk::Result::ERROR_INCOMPATIBLE_DRIVER
                 | ash::vk::Result::ERROR_LAYER_NOT_PRESENT
                 | ash::vk::Result::ERROR_EXTENSION_NOT_PRESENT
-                | ash::vk::Result::ERROR_FEATURE_NOT_PRESENT => 4,
+                | ash::vk::Result::ERROR_FEATURE_NOT_PRESENT
+                | ash::vk::Result::ERROR_UNKNOWN => 4,
                 _ => 70,
             },
             Self::Bug(_) => 70,
