@@ -1,7 +1,7 @@
 //! Arguments that several verbs share. Only what was typed is in here; decisions are made in `config` and in the verbs.
 
 use super::values::share;
-use crate::io::{LoadOptions, MAX_BAD_PHOTOS};
+use crate::io::LoadOptions;
 use clap::Args;
 
 /// What applies to every verb.
@@ -28,27 +28,23 @@ pub struct JsonFlag {
 }
 
 /// What is let through of a scene that is not as it should be.
-#[derive(Args, Clone, Copy, Debug)]
+#[derive(Args, Clone, Copy, Debug, Default)]
 #[command(next_help_heading = "Scene")]
 pub struct ReadArgs {
     /// Largest share of the photos, from 0 to 1, that may be undecodable: they are skipped with a warning.
-    #[arg(long, value_name = "SHARE", value_parser = share, default_value_t = MAX_BAD_PHOTOS)]
-    pub max_bad_photos: f32,
+    /// 0.1 unless given.
+    #[arg(long, value_name = "SHARE", value_parser = share)]
+    pub max_bad_photos: Option<f32>,
     /// Read photos and points also where the scene lists them outside of its folder.
     #[arg(long)]
     pub allow_outside: bool,
 }
 
-impl Default for ReadArgs {
-    fn default() -> Self {
-        Self { max_bad_photos: MAX_BAD_PHOTOS, allow_outside: false }
-    }
-}
-
 impl ReadArgs {
     /// Puts what was typed into `options`.
     pub fn into_options(self, options: LoadOptions) -> LoadOptions {
-        LoadOptions { max_bad_photos: self.max_bad_photos, allow_outside: self.allow_outside, ..options }
+        let max_bad_photos = self.max_bad_photos.unwrap_or(options.max_bad_photos);
+        LoadOptions { max_bad_photos, allow_outside: self.allow_outside || options.allow_outside, ..options }
     }
 }
 

@@ -87,6 +87,8 @@ fn decide(args: &TrainArgs, mut state: TrainState) -> Result<TrainState> {
     if let Some(masks) = &args.masks {
         state.run.masks = named(masks);
     }
+    state.run.max_bad_photos = args.read.max_bad_photos.or(state.run.max_bad_photos);
+    state.run.allow_outside |= args.read.allow_outside;
     if args.depths.is_some() || args.occlusion_file.is_some() {
         tracing::info!("occluders come from the checkpoint; their files are not read again");
     }
@@ -97,9 +99,13 @@ fn decide(args: &TrainArgs, mut state: TrainState) -> Result<TrainState> {
 pub fn facts(args: &TrainArgs, resumed: Option<&TrainState>) -> RunFacts {
     match resumed {
         Some(state) => state.run.clone(),
-        None => {
-            RunFacts { masks: args.masks.as_deref().and_then(named), memory_limit: args.memory_limit, occlusion: None }
-        }
+        None => RunFacts {
+            masks: args.masks.as_deref().and_then(named),
+            memory_limit: args.memory_limit,
+            occlusion: None,
+            max_bad_photos: args.read.max_bad_photos,
+            allow_outside: args.read.allow_outside,
+        },
     }
 }
 
@@ -147,14 +153,21 @@ impl Checkpoints {
         every > 0 && (step.is_multiple_of(every) || step == config.iterations)
     }
 
-    /// Puts a training back to its last checkpoint, because of what has gone wrong since. False if there is none.
+    /// Puts a training back to its last whole checkpoint, because of what has gone wrong since. False if there is none.
     pub fn restore(&mut self, trainer: &mut Trainer, reason: &Error) -> Result<bool> {
-        let Some(path) = self.kept.last() else { return Ok(false) };
-        let state = TrainState::read(path)?;
-        tracing::warn!("{reason}; training goes back to {} once", path.display());
-        trainer.restore(&state)?;
-        self.step = state.step;
-        Ok(true)
+        while let Some(path) = self.kept.last() {
+            match TrainState::read(path) {
+                Ok(state) => {
+                    tracing::warn!("{reason}; training goes back to {}", path.display());
+                    trainer.restore(&state)?;
+                    self.step = state.step;
+                    return Ok(true);
+                }
+                Err(error) => tracing::warn!("{error}; the checkpoint before it is tried"),
+            }
+            self.kept.pop();
+        }
+        Ok(false)
     }
 
     /// Writes one that is due. That it cannot be written ends no training: there may be room again the next time.

@@ -1,5 +1,6 @@
 //! `labelgs train`.
 
+use super::args::ReadArgs;
 use super::context::Context;
 use super::log::Progress;
 use super::resume::{self, Checkpoints};
@@ -77,7 +78,8 @@ fn train_once(args: &TrainArgs, context: &Context) -> Result<(serde_json::Value,
     let mut run = resume::facts(args, resumed.as_ref());
     let masks = args.masks.clone().or(run.masks.as_ref().map(PathBuf::from));
     let names = masks.as_deref().map(LabelTable::of_folder).transpose()?.flatten();
-    let mut dataset = open_with(&args.scene, &args.read.into_options(config::load_options(&config, masks.clone())))?;
+    let reading = ReadArgs { max_bad_photos: run.max_bad_photos, allow_outside: run.allow_outside };
+    let mut dataset = open_with(&args.scene, &reading.into_options(config::load_options(&config, masks.clone())))?;
     if dataset.train.is_empty() {
         return Err(Error::data(
             &args.scene,
@@ -115,13 +117,21 @@ fn train_once(args: &TrainArgs, context: &Context) -> Result<(serde_json::Value,
     let go_on = |trainer: &mut Trainer, checkpoints: &mut Checkpoints| {
         steps(trainer, out, preview.as_ref(), checkpoints, context)
     };
-    let last = match go_on(&mut trainer, &mut checkpoints) {
-        // Once: what fails again has its reason in the scene or the settings.
-        Err(error @ Error::Numeric { .. }) if checkpoints.restore(&mut trainer, &error)? => {
-            go_on(&mut trainer, &mut checkpoints)
-        }
-        other => other,
-    };
+    // First a device that erred once is made up for, bit for bit. What fails again has its reason in the scene or in the
+    // settings, and slower steps may get past it.
+    let mut last = go_on(&mut trainer, &mut checkpoints);
+    for is_slower in [false, true] {
+        last = match last {
+            Err(error @ Error::Numeric { .. }) if checkpoints.restore(&mut trainer, &error)? => {
+                if is_slower {
+                    trainer.halve_rates();
+                    tracing::warn!("it went wrong again: from here on all learning rates are half of what they were");
+                }
+                go_on(&mut trainer, &mut checkpoints)
+            }
+            other => other,
+        };
+    }
     let last = last.map_err(|error| keep_model(&mut trainer, out, error))?;
     checkpoints.hold_folder()?;
     if !out.join(run_folder::CONFIG).exists() {
@@ -201,14 +211,14 @@ fn steps(
             if config.save_at.contains(&step) {
                 checkpoints.hold_folder()?;
                 let model = trainer.labelled_model()?;
-                record::save_model(out, step, &model)?;
+                tolerate(record::save_model(out, step, &model).map(drop))?;
             }
             if config.preview_every > 0
                 && step % config.preview_every == 0
                 && let Some(view) = preview
             {
                 checkpoints.hold_folder()?;
-                preview_now(trainer, out, view)?;
+                tolerate(preview_now(trainer, out, view))?;
             }
         }
         if checkpoints.due(trainer) {
@@ -221,6 +231,17 @@ fn steps(
     }
     let done = trainer.drain()?;
     Ok(done.last().copied().or(last))
+}
+
+/// That something cannot be written on the way ends no training: there may be room again at its end.
+fn tolerate(written: Result<()>) -> Result<()> {
+    match written {
+        Err(error @ Error::Write { .. }) => {
+            tracing::warn!("{error}; training goes on without it");
+            Ok(())
+        }
+        other => other,
+    }
 }
 
 /// Writes the occluders that the last step used.

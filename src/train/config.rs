@@ -227,6 +227,23 @@ impl TrainConfig {
         self.feature_rest_lr.unwrap_or(self.feature_lr / 20.0)
     }
 
+    /// Makes all learning rates half of what they are.
+    pub(super) fn halve_rates(&mut self) {
+        for rate in [
+            &mut self.position_lr_init,
+            &mut self.position_lr_final,
+            &mut self.feature_lr,
+            &mut self.opacity_lr,
+            &mut self.scaling_lr,
+            &mut self.rotation_lr,
+        ]
+        .into_iter()
+        .chain(&mut self.feature_rest_lr)
+        {
+            *rate *= 0.5;
+        }
+    }
+
     /// Degree of the spherical harmonics that `step` uses.
     pub fn sh_degree_at(&self, step: u32) -> u32 {
         (step / self.sh_degree_interval).min(self.sh_degree)

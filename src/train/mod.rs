@@ -196,6 +196,11 @@ impl Trainer {
         &self.config
     }
 
+    /// Makes all learning rates half of what they are, for the rest of the run.
+    pub fn halve_rates(&mut self) {
+        self.config.halve_rates();
+    }
+
     /// The training views.
     pub fn views(&self) -> &[TrainView] {
         &self.views

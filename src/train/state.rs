@@ -59,7 +59,7 @@ pub struct TrainState {
 }
 
 /// What a run was given besides its configuration.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RunFacts {
     /// Folder of the masks.
@@ -68,6 +68,12 @@ pub struct RunFacts {
     pub memory_limit: Option<u64>,
     /// What the occluders that it started with were made from.
     pub occlusion: Option<String>,
+    /// Largest share of the photos that may be undecodable, if it was given.
+    #[serde(default)]
+    pub max_bad_photos: Option<f32>,
+    /// Photos and points may lie outside of the scene's folder.
+    #[serde(default)]
+    pub allow_outside: bool,
 }
 
 /// What a view is told apart by.
