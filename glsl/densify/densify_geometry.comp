@@ -8,8 +8,8 @@
 #include "random.glsl"
 // densify_geometry — write positions, scales and rotations of the densified model.
 // Work:    64 old Gaussians a workgroup; children stand next to each other at their parent's place in the order.
-// Reads:   step; old_means, old_scales, old_quats [N]; densify_stats [N]; child_offsets [N]
-// Writes:  means, scales, quats [new N]; densify_actions [N]
+// Reads:   step; old_means, old_scales, old_quats [N]; densify_actions [N]; child_offsets [N]
+// Writes:  means, scales, quats [new N]
 // Math:    clone: exact copy; split: mean + R (s * normal), ln s - ln 1.6 (3DGS).
 // Mirror:  src/reference/densify.rs::densify
 
@@ -18,12 +18,11 @@ READ1(0, StepUniforms, step);
 FETCH4(1, old_means);
 FETCH4(2, old_scales);
 FETCH4(3, old_quats);
-READ(4, vec2, densify_stats);
+FETCHU(4, densify_actions);
 FETCHU(5, child_offsets);
 WRITE(6, vec4, means);
 WRITE(7, vec4, scales);
 WRITE(8, vec4, quats);
-WRITE(9, uint, densify_actions);
 
 void main() {
     StepUniforms u = step;
@@ -32,10 +31,10 @@ void main() {
         return;
     }
     vec4 mean = fetch4(old_means, i), scale = fetch4(old_scales, i), quat = fetch4(old_quats, i);
-    uint action = densify_action(u, mean.w, scale.xyz, densify_stats[i]);
-    densify_actions[i] = action;
+    uint action = fetchu(densify_actions, i);
     uint to = fetchu(child_offsets, i);
-    mat3 rotation = rotation_from_quat(quat * inversesqrt(max(dot(quat, quat), 1e-24)));
+    float inv_norm;
+    mat3 rotation = rotation_from_quat(unit_quat(quat, inv_norm));
     for (uint child = 0u; child < children(action); child++) {
         vec4 m = mean, s = scale;
         if (action == ACTION_SPLIT) {

@@ -7,7 +7,7 @@
 // densify_mark — how many Gaussians each one becomes: 0 pruned, 1 kept, 2 cloned or split.
 // Work:    64 Gaussians a workgroup.
 // Reads:   step; means.w, scales [N]; densify_stats [N] (sum, count)
-// Writes:  children_counts [N]; counters.cloned_count, split_count, pruned_count (integer add)
+// Writes:  densify_actions [N]; children_counts [N]; counters.cloned_count, split_count, pruned_count (integer add)
 // Math:    method of 3DGS; children are tested for size after the split.
 // Mirror:  src/reference/densify.rs::mark
 
@@ -18,6 +18,7 @@ FETCH4(2, scales);
 READ(3, vec2, densify_stats);
 WRITE(4, uint, children_counts);
 INOUT1(5, Counters, counters);
+WRITE(6, uint, densify_actions);
 
 void main() {
     StepUniforms u = step;
@@ -26,6 +27,7 @@ void main() {
         return;
     }
     uint action = densify_action(u, fetch4(means, i).w, fetch4(scales, i).xyz, densify_stats[i]);
+    densify_actions[i] = action;
     children_counts[i] = children(action);
     if (action == ACTION_CLONE) {
         atomicAdd(counters.cloned_count, 1u);

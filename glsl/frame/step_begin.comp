@@ -3,7 +3,7 @@
 #include "constants.glsl"
 #include "step.glsl"
 #include "dispatch.glsl"
-// step_begin — clear the counters and size the dispatches that depend on the number of Gaussians.
+// step_begin — clear the counters and size the dispatches that depend on the number of Gaussians or of layers.
 // Work:    one invocation.
 // Reads:   step
 // Writes:  counters; dispatch_args (all entries; those of later stages 0)
@@ -27,6 +27,7 @@ void main() {
     put(ARGS_SH1, folded_groups((n * 3u + 63u) / 64u));
     put(ARGS_SH2, folded_groups((n * 4u + 63u) / 64u));
     put(ARGS_SH3, folded_groups((n * 6u + 63u) / 64u));
+    put(ARGS_TILES, folded_groups((step.tile_count * (step.layer_count + 1u) + 63u) / 64u));
     put(ARGS_SPLATS, uvec3(0u, 1u, 1u));
     put(ARGS_BLEND, uvec3(0u, 1u, 1u));
 }

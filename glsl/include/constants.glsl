@@ -28,3 +28,4 @@ const uint ARGS_BLEND = 6u;
 const uint ARGS_SH1 = 9u;
 const uint ARGS_SH2 = 12u;
 const uint ARGS_SH3 = 15u;
+const uint ARGS_TILES = 18u;

@@ -1,4 +1,5 @@
-// Which tiles hold a pixel where a splat counts (alpha >= ALPHA_MIN). One function for counting and for emitting.
+// Which tiles hold a pixel where a splat counts (alpha >= ALPHA_MIN). One function for counting and for emitting, which
+// must agree to the last bit though they are two pipelines: hence `precise`.
 
 layout(constant_id = 1) const uint TILE_WIDTH = 8;
 layout(constant_id = 2) const uint TILE_HEIGHT = 8;
@@ -9,8 +10,8 @@ struct TileRect { // inclusive; empty where count is 0
 
 // Tiles that the bounding box of the ellipse overlaps; half extents in px.
 TileRect tile_rect(StepUniforms step, vec2 mean, vec2 extent) {
-    vec2 lo = max(ceil(mean - extent - 0.5), vec2(0.0));
-    vec2 hi = min(floor(mean + extent - 0.5), vec2(float(step.width) - 1.0, float(step.height) - 1.0));
+    precise vec2 lo = max(ceil(mean - extent - 0.5), vec2(0.0));
+    precise vec2 hi = min(floor(mean + extent - 0.5), vec2(float(step.width) - 1.0, float(step.height) - 1.0));
     TileRect r;
     bool some = lo.x <= hi.x && lo.y <= hi.y; // false for NaN too
     uvec2 a = uvec2(some ? lo : vec2(0.0)), b = uvec2(some ? hi : vec2(0.0));
@@ -24,7 +25,8 @@ TileRect tile_rect(StepUniforms step, vec2 mean, vec2 extent) {
 
 // Exponent of the splat at offset d = mean - pixel, base 2.
 float splat_exponent(vec3 q, float log2_o, vec2 d) {
-    return log2_o + q.x * d.x * d.x + d.y * (q.y * d.x + q.z * d.y);
+    precise float exponent = log2_o + q.x * d.x * d.x + d.y * (q.y * d.x + q.z * d.y);
+    return exponent;
 }
 
 // True if the concave exponent reaches the cut somewhere in the rectangle of the tile's pixel centres. The rounding
@@ -32,14 +34,14 @@ float splat_exponent(vec3 q, float log2_o, vec2 d) {
 bool tile_touched(StepUniforms step, uint tx, uint ty, vec2 mean, vec3 q, float log2_o) {
     vec2 lo = vec2(float(tx * TILE_WIDTH), float(ty * TILE_HEIGHT)) + 0.5;
     vec2 hi = min(lo + vec2(float(TILE_WIDTH), float(TILE_HEIGHT)) - 1.0, vec2(float(step.width), float(step.height)) - 0.5);
-    vec2 d_min = mean - hi, d_max = mean - lo; // range of mean - pixel
+    precise vec2 d_min = mean - hi, d_max = mean - lo; // range of mean - pixel
     vec2 e = clamp(vec2(0.0), d_min, d_max);   // the offset nearest to the mean, per axis
     // maximum along the facing vertical edge, and along the facing horizontal edge
-    float y = clamp(-0.5 * q.y * e.x / q.z, d_min.y, d_max.y);
-    float x = clamp(-0.5 * q.y * e.y / q.x, d_min.x, d_max.x);
+    precise float y = clamp(-0.5 * q.y * e.x / q.z, d_min.y, d_max.y);
+    precise float x = clamp(-0.5 * q.y * e.y / q.x, d_min.x, d_max.x);
     vec2 p = vec2(e.x, y), r = vec2(x, e.y);
     float best = max(splat_exponent(q, log2_o, p), splat_exponent(q, log2_o, r));
     vec2 m = max(abs(p), abs(r));
-    float margin = 0.01 + 2e-6 * (abs(q.x) * m.x * m.x + abs(q.y) * m.x * m.y + abs(q.z) * m.y * m.y);
+    precise float margin = 0.01 + 2e-6 * (abs(q.x) * m.x * m.x + abs(q.y) * m.x * m.y + abs(q.z) * m.y * m.y);
     return best >= LOG2_ALPHA_MIN - margin;
 }

@@ -10,6 +10,7 @@
 // Mirror:  src/reference/loss.rs::photo_loss
 
 #include "subgroup.glsl"
+layout(constant_id = 3) const uint LAYER_TILE_CAPACITY = 0;
 layout(constant_id = 6) const uint PARTIALS = 1;
 layout(local_size_x_id = 0) in;
 READ(0, vec2, loss_partials);
@@ -26,7 +27,8 @@ void main() {
     }
     float l1 = subgroup_sum(sum.x), ssim = subgroup_sum(sum.y), label = 0.0;
 #ifdef LABELS
-    uint count = counters.layer_tile_count;
+    // Where there are more than there is room for, the step has failed and its loss is nobody's.
+    uint count = min(counters.layer_tile_count, LAYER_TILE_CAPACITY);
     for (uint i = lane; i < count; i += SUBGROUP_SIZE) {
         label += layer_loss[i];
     }

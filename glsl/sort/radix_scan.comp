@@ -1,7 +1,8 @@
 #version 460
 #include "layout.glsl"
 // radix_scan — exclusive scan of the whole histogram, digit-major, in place.
-// Work:    one workgroup of one subgroup; lane i owns a contiguous share.
+// Work:    one workgroup of one subgroup; lane i owns a contiguous share, a multiple of four cells, and takes four a round:
+//          lavapipe ends both loops together after 65,535 rounds.
 // Reads:   histogram [CELLS]
 // Writes:  histogram [CELLS]
 // Order:   exact integers, same in every run.
@@ -14,16 +15,19 @@ INOUT(0, uint, histogram);
 
 void main() {
     uint lane = gl_LocalInvocationID.x;
-    uint share = (CELLS + SUBGROUP_SIZE - 1u) / SUBGROUP_SIZE;
-    uint begin = min(lane * share, CELLS), end = min(begin + share, CELLS);
+    uint share = CELLS / SUBGROUP_SIZE;
+    uint begin = lane * share, end = begin + share;
     uint sum = 0u;
-    for (uint i = begin; i < end; i++) {
-        sum += histogram[i];
+    for (uint i = begin; i < end; i += 4u) {
+        sum += histogram[i] + histogram[i + 1u] + histogram[i + 2u] + histogram[i + 3u];
     }
     uint running = subgroupExclusiveAdd(sum);
-    for (uint i = begin; i < end; i++) {
-        uint v = histogram[i];
+    for (uint i = begin; i < end; i += 4u) {
+        uvec4 v = uvec4(histogram[i], histogram[i + 1u], histogram[i + 2u], histogram[i + 3u]);
         histogram[i] = running;
-        running += v;
+        histogram[i + 1u] = running + v.x;
+        histogram[i + 2u] = running + v.x + v.y;
+        histogram[i + 3u] = running + v.x + v.y + v.z;
+        running += v.x + v.y + v.z + v.w;
     }
 }

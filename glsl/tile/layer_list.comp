@@ -2,6 +2,7 @@
 #include "layout.glsl"
 #include "constants.glsl"
 #include "step.glsl"
+#include "dispatch.glsl"
 // layer_list — list the occupied tiles of the object layers.
 // Work:    one tile of one layer an invocation.
 // Reads:   step, failure; layer_occupied, layer_offsets [layers * T]
@@ -17,7 +18,7 @@ FETCHU(3, layer_offsets);
 WRITE(4, uint, layer_tiles);
 
 void main() {
-    uint t = gl_GlobalInvocationID.x;
+    uint t = linear_group_id() * 64u + gl_LocalInvocationID.x;
     if (t < step.tile_count * (step.layer_count + 1u) && failure == 0u && fetchu(layer_occupied, t) != 0u) {
         uint to = fetchu(layer_offsets, t);
         if (to < LAYER_TILE_CAPACITY) {

@@ -2,9 +2,10 @@
 #include "layout.glsl"
 #include "constants.glsl"
 #include "step.glsl"
+#include "dispatch.glsl"
 // tile_ranges — where each tile's list begins and ends among the sorted pairs, the longest list, and (variant labels)
 // which tiles of object layers hold anything.
-// Work:    one tile of one layer an invocation; the grid covers all layers that the plan allows. Tiles are few beside
+// Work:    one tile of one layer an invocation; the grid covers the step's layers. Tiles are few beside
 //          pairs, so that a binary search by each tile is cheaper than a look at each pair.
 // Reads:   step, counters, failure; tile_keys [I] sorted
 // Writes:  tile_starts, tile_ends [layers * T], equal where a list is empty; counters.longest_list (integer maximum, any
@@ -35,7 +36,7 @@ uint first_not_less(uint key, uint count) {
 }
 
 void main() {
-    uint t = gl_GlobalInvocationID.x;
+    uint t = linear_group_id() * 64u + gl_LocalInvocationID.x;
     bool some = t < step.tile_count * (step.layer_count + 1u);
     uint count = some && failure == 0u ? counters.instance_count : 0u;
     uint start = first_not_less(t, count), end = first_not_less(t + 1u, count);

@@ -59,7 +59,7 @@ fn derive(shape: &KernelShape, capacity: &mut Capacity, instances: u64, trained:
     capacity.instances = instances;
     capacity.trained_instances = if trained { instances } else { 0 };
     capacity.layer_pixels = capacity.layer_tiles * u64::from(shape.tile_pixels());
-    let jobs = (capacity.pixels.div_ceil(u64::from(shape.tile_pixels())) * 2) + capacity.layer_tiles;
+    let jobs = capacity.virtual_tiles / capacity.layers.max(1) + capacity.layer_tiles;
     capacity.segment_pixels = if capacity.segments > 1 { jobs * u64::from(shape.tile_pixels()) } else { 0 };
     capacity.sort_lanes = u64::from(shape.lanes(instances.max(capacity.gaussians)));
     capacity.sort_cells = capacity.sort_lanes << shape.digit_bits;

@@ -24,7 +24,7 @@ mod select;
 mod timeline;
 
 pub use cache::PipelineStore;
-pub use capabilities::{Capabilities, DeviceKind, Need, Subgroup};
+pub use capabilities::{Capabilities, DeviceKind, Need, SUBGROUP_MAX, SUBGROUP_MIN, Subgroup};
 pub use devices::devices;
 pub use instance::{Message, MessageLog, Validation};
 pub use limits::Limits;

@@ -1,7 +1,7 @@
 //! The questions behind [`Capabilities`].
 
 use super::call::vk_call;
-use super::capabilities::{Capabilities, DeviceKind, Features, Need, Subgroup};
+use super::capabilities::{Capabilities, DeviceKind, Features, Need, SUBGROUP_MAX, SUBGROUP_MIN, Subgroup};
 use super::hidden::Hidden;
 use super::limits::Limits;
 use crate::error::Result;
@@ -180,7 +180,10 @@ fn subgroup(
     let in_compute = eleven.subgroup_supported_stages.contains(compute);
     let none = vk::SubgroupFeatureFlags::empty();
     let size = eleven.subgroup_size;
-    let (min, max) = if is_pinned { (control.min_subgroup_size, control.max_subgroup_size) } else { (size, size) };
+    let (min, max) = match is_pinned {
+        true => (control.min_subgroup_size, control.max_subgroup_size.min(SUBGROUP_MAX).max(control.min_subgroup_size)),
+        false => (size, size),
+    };
     Subgroup {
         size: size.clamp(min, max),
         min,
@@ -208,7 +211,13 @@ fn needs(found: &Capabilities, has_queue: bool) -> Vec<Need> {
         flag("scalarBlockLayout", features.scalar, "one layout for shaders and host"),
         flag("timelineSemaphore", features.timeline, "two steps in flight"),
         flag("subgroup shuffle, arithmetic", shuffles, "blending without shared memory"),
-        least("subgroup size", 8, subgroup.size, "one tile per subgroup"),
+        need(
+            "subgroup size",
+            (SUBGROUP_MIN..=SUBGROUP_MAX).contains(&subgroup.size),
+            &format!("{SUBGROUP_MIN} to {SUBGROUP_MAX}"),
+            subgroup.size.to_string(),
+            "one tile per subgroup",
+        ),
         least("workgroup size", 256, limits.max_invocations, "scan and sort"),
         least("push constants, bytes", push, limits.max_push, "parameters of passes"),
         least("storage buffers per shader", bindings, limits.max_storage_buffers, "bindings of the largest pass"),

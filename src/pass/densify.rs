@@ -10,7 +10,7 @@ use crate::plan::Buf;
 pub fn mark(b: &mut Builder) {
     pass!(b, texel densify_mark {
         step: Buf::STEP, means: Buf::MEANS, scales: Buf::SCALES, densify_stats: Buf::DENSIFY_STATS,
-        children_counts: Buf::CHILDREN_COUNTS, counters: Buf::COUNTERS,
+        children_counts: Buf::CHILDREN_COUNTS, counters: Buf::COUNTERS, densify_actions: Buf::DENSIFY_ACTIONS,
     } [], over_gaussians());
     scan::scan(b, Buf::CHILDREN_COUNTS, Buf::CHILD_OFFSETS, Count::Gaussians, Total::Densified);
 }
@@ -22,8 +22,8 @@ pub fn apply(b: &mut Builder) {
     b.list.copy(Buf::QUATS, Buf::OLD_QUATS, 0);
     pass!(b, texel densify_geometry {
         step: Buf::STEP, old_means: Buf::OLD_MEANS, old_scales: Buf::OLD_SCALES, old_quats: Buf::OLD_QUATS,
-        densify_stats: Buf::DENSIFY_STATS, child_offsets: Buf::CHILD_OFFSETS, means: Buf::MEANS, scales: Buf::SCALES,
-        quats: Buf::QUATS, densify_actions: Buf::DENSIFY_ACTIONS,
+        densify_actions: Buf::DENSIFY_ACTIONS, child_offsets: Buf::CHILD_OFFSETS, means: Buf::MEANS, scales: Buf::SCALES,
+        quats: Buf::QUATS,
     } [], over_gaussians());
     for a in &ATTRIBUTES {
         let geometry = [Buf::MEANS, Buf::SCALES, Buf::QUATS].contains(&a.planes[0]);

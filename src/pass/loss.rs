@@ -21,10 +21,11 @@ pub fn photo_loss(b: &mut Builder, width: u32, height: u32) {
         loss_partials: Buf::LOSS_PARTIALS,
     } [], columns(1));
     let (subgroup, partials) = (b.shape.subgroup, partials(b.shape.subgroup, width, height));
+    let layer_tiles = b.capacity.layer_tiles as u32;
     if b.labels {
         pass!(b, loss_reduce_labels {
             loss_partials: Buf::LOSS_PARTIALS, counters: Buf::COUNTERS, layer_loss: Buf::LAYER_LOSS,
-        } [subgroup_size: subgroup, partials: partials], ONE);
+        } [subgroup_size: subgroup, layer_tile_capacity: layer_tiles, partials: partials], ONE);
     } else {
         pass!(b, loss_reduce { loss_partials: Buf::LOSS_PARTIALS, counters: Buf::COUNTERS }
             [subgroup_size: subgroup, partials: partials], ONE);
@@ -33,10 +34,10 @@ pub fn photo_loss(b: &mut Builder, width: u32, height: u32) {
 
 /// Sums up the label loss of the layers alone.
 pub fn label_loss(b: &mut Builder) {
-    let subgroup = b.shape.subgroup;
+    let (subgroup, layer_tiles) = (b.shape.subgroup, b.capacity.layer_tiles as u32);
     pass!(b, loss_reduce_labels {
         loss_partials: Buf::LOSS_PARTIALS, counters: Buf::COUNTERS, layer_loss: Buf::LAYER_LOSS,
-    } [subgroup_size: subgroup, partials: 0], ONE);
+    } [subgroup_size: subgroup, layer_tile_capacity: layer_tiles, partials: 0], ONE);
 }
 
 /// Partial loss sums of an image: one for each subgroup of each strip.

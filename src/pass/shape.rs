@@ -1,7 +1,7 @@
 //! Which variant of the kernels a device gets: subgroup size, tile, texel or storage reads, digits of the sort.
 
 use crate::error::{Error, Result};
-use crate::gpu::Capabilities;
+use crate::gpu::{Capabilities, SUBGROUP_MAX, SUBGROUP_MIN};
 use crate::shaders::ShaderDesc;
 
 /// Shape of the kernels, fixed for a device.
@@ -59,7 +59,11 @@ impl KernelShape {
     /// Refuses shapes that the blend kernels cannot take: a lane owns whole pixels of one column of a tile.
     pub fn check(&self) -> Result<()> {
         let (width, pixels) = (self.tile_width, self.tile_pixels());
-        if pixels > 0 && self.subgroup.is_multiple_of(width) && pixels.is_multiple_of(self.subgroup) {
+        if (SUBGROUP_MIN..=SUBGROUP_MAX).contains(&self.subgroup)
+            && pixels > 0
+            && self.subgroup.is_multiple_of(width)
+            && pixels.is_multiple_of(self.subgroup)
+        {
             return Ok(());
         }
         Err(Error::Bug(format!(

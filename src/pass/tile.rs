@@ -1,11 +1,12 @@
 //! Which splats each tile holds, front to back, for the scene and for each object layer.
 
-use super::build::{Builder, Count, ONE, over_splats};
+use super::build::{Builder, Count, ONE, args, over_splats};
 use super::project::GAUSSIAN_FROM_SPLAT;
 use super::scan::{self, Total};
 use super::sort::{self, SortBuffers};
 use crate::pass;
-use crate::plan::{Buf, Grid};
+use crate::plan::Buf;
+use crate::shaders::constants;
 
 /// Lists the (splat, tile) pairs, sorts them by layer and tile, and finds each tile's range. Returns the buffer that
 /// holds the slots (places before the sort) of the sorted pairs.
@@ -63,7 +64,7 @@ fn emit_layer(b: &mut Builder, layer: u32) {
 }
 
 fn tile_ranges(b: &mut Builder, keys: Buf) {
-    let groups = Grid::Groups((b.capacity.virtual_tiles as u32).div_ceil(64), 1, 1);
+    let groups = args(constants::ARGS_TILES);
     if !b.labels {
         pass!(b, texel tile_ranges {
             step: Buf::STEP, failure: Buf::FAILURE, counters: Buf::COUNTERS, tile_keys: keys,

@@ -51,7 +51,7 @@ crate::buffers! {
     V_INSTANCES_C "v_instances_c": 16, Domain::TrainedInstances, Class::Kept, VEC4, "The same: v_colour b, and the stamp; the record is valid where that is the step's.";
 
     COUNTERS "counters": size_of::<Counters>() as u32, Domain::One, Class::Kept, None, "Counts of this step (glsl/include/step.glsl).";
-    DISPATCH_ARGS "dispatch_args": 4, Domain::Fixed(18), Class::Step, None, "Indirect dispatch arguments (ARGS_ words of constants.glsl).";
+    DISPATCH_ARGS "dispatch_args": 4, Domain::Fixed(21), Class::Step, None, "Indirect dispatch arguments (ARGS_ words of constants.glsl).";
     DEPTH_KEYS "depth_keys": 4, Domain::Gaussians, Class::Step, WORD, "Bits of z, or KEY_INVISIBLE [N].";
     VISIBLE_OFFSETS "visible_offsets": 4, Domain::Gaussians, Class::Step, WORD, "Place among the visible [N].";
     SPLAT_FROM_GAUSSIAN "splat_from_gaussian": 4, Domain::Gaussians, Class::Step, WORD, "Splat of each Gaussian, or NO_SPLAT [N].";

@@ -328,7 +328,7 @@ impl TrainConfig {
             ("--background", f64::from(self.background[2]), 0.0, 1.0),
             ("--label-alpha", f64::from(self.label_alpha), 0.0, f64::MAX),
             ("--label-weight", f64::from(self.label_weight), 0.0, f64::MAX),
-            ("--densify-grad-threshold", f64::from(self.densify_grad_threshold), 0.0, f64::MAX),
+            ("--densify-grad-threshold", f64::from(self.densify_grad_threshold), f64::MIN_POSITIVE, f64::MAX),
             ("--percent-dense", f64::from(self.percent_dense), 0.0, f64::MAX),
             ("--max-scale", f64::from(self.max_scale), 0.0, f64::MAX),
             ("--near", f64::from(self.near), 0.0, f64::MAX),

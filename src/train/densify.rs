@@ -90,12 +90,9 @@ impl Trainer {
         }
         let (mut low, mut high) = (uniforms.densify_threshold, uniforms.densify_threshold * 2.0);
         let with = |threshold| StepUniforms { densify_threshold: threshold, ..uniforms };
-        // Gradients are finite, so some threshold lets nothing grow; 60 doublings span every f32.
-        for _ in 0..60 {
-            if u64::from(self.count_densified(with(high))?.densified_count) <= bound {
-                break;
-            }
-            (low, high) = (high, high * 2.0);
+        // The statistic has no infinite gradients, so some threshold lets nothing grow.
+        while high < f32::MAX && u64::from(self.count_densified(with(high))?.densified_count) > bound {
+            (low, high) = (high, (high * 2.0).min(f32::MAX));
         }
         for _ in 0..12 {
             let middle = 0.5 * (low + high);
