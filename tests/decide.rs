@@ -6,7 +6,11 @@ use labelgs::scene::LabelMap;
 
 /// A ballot of rows in whole pixels.
 fn ballot(labels: &[u16], rows: &[&[u64]]) -> Ballot {
-    Ballot { labels: labels.to_vec(), votes: rows.iter().flat_map(|row| row.iter().map(|v| v << 16)).collect() }
+    let cells = |(row, votes): (u32, &&[u64])| {
+        let cells = votes.iter().zip(0..).filter(|(votes, _)| **votes > 0);
+        cells.map(|(votes, column)| (row, column, votes << 16)).collect::<Vec<_>>()
+    };
+    Ballot::new(labels.to_vec(), rows.len(), (0..).zip(rows).flat_map(cells).collect())
 }
 
 /// Places in a row, one unit apart.
@@ -38,11 +42,21 @@ fn who_is_never_seen_asks_the_neighbours() {
     assert_eq!(alone.labels[..10], complete.labels[..10], "who has votes decides alone");
 }
 
+/// Every label of every Gaussian would be 12 GB of votes; what was voted is some kilobytes.
+#[test]
+fn thousands_of_labels_take_memory_for_what_was_voted_only() {
+    let (labels, count) = ((0..30_000).collect::<Vec<u16>>(), 50_000_u32);
+    let votes = (0..count).flat_map(|row| [(row, (row % 29_999) as u16 + 1, 5 << 16), (row, 0, 2 << 16)]);
+    let ballot = Ballot::new(labels, count as usize, votes.collect());
+    let decision = decide(&ballot, &places(count as usize), true).expect("decided");
+    assert!((0..count).all(|row| decision.labels[row as usize] == row % 29_999 + 1));
+}
+
 #[test]
 fn nobody_to_ask_is_no_failure() {
     let rows: [&[u64]; 2] = [&[0, 0], &[0, 0]];
     assert_eq!(decide(&ballot(&[0, 4], &rows), &places(2), true).expect("decided").labels, [0, 0]);
-    assert_eq!(decide(&Ballot { labels: vec![0], votes: vec![] }, &[], true).expect("decided").labels, [0_u32; 0]);
+    assert_eq!(decide(&ballot(&[0], &[]), &[], true).expect("decided").labels, [0_u32; 0]);
     assert!(decide(&ballot(&[0, 4], &rows), &places(3), true).is_err(), "rows must fit");
 }
 

@@ -7,7 +7,7 @@ use super::scenes::{Scene, Shape, dot, plain_camera, scene};
 use crate::engine::Report;
 use crate::error::Result;
 use crate::gpu::Gpu;
-use crate::infer::vote::ballot::{Sweep, Voter, sweep, weight};
+use crate::infer::vote::ballot::{Sweep, Voter, sweep};
 use crate::pass::KernelShape;
 use crate::plan::Buf;
 use crate::reference::adam::{Optimised, Rates, adam};
@@ -24,7 +24,7 @@ use std::sync::Arc;
 
 /// Vulkan lets `exp2`, division, square roots and their like be off by several units in the last place, lavapipe is off
 /// by about one: bounds are this many times what the tests hold lavapipe to.
-const LEEWAY: f64 = 8.0;
+pub(super) const LEEWAY: f64 = 8.0;
 /// Decisions (alpha 1/255, the stop) nearer to their threshold than this may fall either way.
 const SURE: f64 = 1e-4;
 const COLOUR: Tolerance = Tolerance { absolute: 6.5e-7 * LEEWAY, relative: 0.0 };
@@ -201,7 +201,7 @@ impl Ran {
         let voter = Voter { camera: &camera, mask: &mask, photo: None, trust: None };
         let how = Sweep { near: self.rig.config.near, border: 0 };
         let ballot = sweep(&mut self.rig.engine, &[voter], how)?;
-        let actual: Vec<f64> = ballot.votes.iter().map(|&votes| weight(votes)).collect();
+        let actual = ballot.weights();
         let column = |id: &u16| ballot.labels.iter().position(|label| label == id);
         let columns: Vec<Option<usize>> = mask.ids.iter().map(column).collect();
         let expected = vote(&self.rules, &self.splats, size, count, &columns, &vec![1.0; ballot.labels.len()]);

@@ -6,7 +6,7 @@ use crate::reference::lift::vote;
 use crate::support::compare::{Tolerance, check, close};
 use crate::support::device;
 use crate::support::scenes::{Scene, Shape, scene};
-use labelgs::infer::vote::ballot::{Sweep, Voter, sweep, weight};
+use labelgs::infer::vote::ballot::{Sweep, Voter, sweep};
 use labelgs::scene::{LabelMap, Photo};
 use std::collections::BTreeMap;
 
@@ -43,7 +43,7 @@ fn sums_of_weights_by_label() {
     let ballot = sweep(&mut rig.engine, &[voter, voter, voter], how).expect("votes");
     assert_eq!(ballot.labels, [0, 2, 3, 5, 7, 8, 11]);
     assert!(ballot.labels.len() > 2 * VOTE_COLUMNS as usize, "the sweep takes several rounds");
-    let actual: Vec<f64> = ballot.votes.iter().map(|&votes| weight(votes)).collect();
+    let actual = ballot.weights();
     let columns: Vec<Option<usize>> = (mask.ids.iter().zip(&photo.rgba))
         .map(|(id, pixel)| ballot.labels.iter().position(|label| label == id).filter(|_| pixel[3] > 127))
         .collect();
@@ -71,7 +71,7 @@ fn pixels_near_a_contour_have_no_say() {
     let voter = Voter { camera: &camera, mask: &mask, photo: None, trust: None };
     let how = Sweep { near: rig.config.near, border: 2 };
     let ballot = sweep(&mut rig.engine, &[voter], how).expect("votes");
-    let actual: Vec<f64> = ballot.votes.iter().map(|&votes| weight(votes)).collect();
+    let actual = ballot.weights();
     let column = |index: usize| match index % width {
         0..18 => Some(1),
         18..22 => None,

@@ -30,9 +30,9 @@ impl Owners {
     pub fn new(ballot: &Ballot) -> Self {
         let owner = |row: usize| {
             let votes = ballot.row(row);
-            let total: f64 = votes.iter().map(|&votes| weight(votes)).sum();
-            let (place, best) = votes.iter().enumerate().max_by_key(|&(place, votes)| (*votes, usize::MAX - place))?;
-            (total >= SEEN && weight(*best) >= OWNED * total).then_some((place as u16, total as f32))
+            let total: f64 = votes.iter().map(|&(_, votes)| weight(votes)).sum();
+            let &(place, best) = votes.iter().max_by_key(|&&(place, votes)| (votes, u16::MAX - place))?;
+            (total >= SEEN && weight(best) >= OWNED * total).then_some((place, total as f32))
         };
         Self { ids: ballot.labels.clone(), rows: (0..ballot.len()).map(owner).collect() }
     }

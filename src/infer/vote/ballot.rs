@@ -11,6 +11,7 @@ use crate::plan::Buf;
 use crate::scene::{Camera, LabelMap, Photo, UNLABELLED};
 use crate::shaders::constants::{VOTE_NONE, VOTE_ONE};
 use crate::shaders::structs::StepUniforms;
+use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Labels that one walk over a tile counts (glsl/lift/vote.comp).
@@ -40,30 +41,52 @@ pub struct Sweep {
     pub border: u32,
 }
 
+/// Votes for one Gaussian: columns in order, with sums of blending weights, [`VOTE_ONE`] to a pixel of weight 1. Columns
+/// without votes are left out: of thousands of objects a Gaussian meets a few.
+pub type Row = [(u16, u64)];
+
 /// What all views together say.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Ballot {
     /// Label of each column, sorted; the first is 0, no object.
     pub labels: Vec<u16>,
-    /// Sums of blending weights [N, columns], [`VOTE_ONE`] to a pixel of weight 1.
-    pub votes: Vec<u64>,
+    /// Where each row begins among the cells [N + 1].
+    starts: Vec<usize>,
+    cells: Vec<(u16, u64)>,
 }
 
 impl Ballot {
+    /// From (row, column, votes) of `count` rows, in any order, each place once at most.
+    pub fn new(labels: Vec<u16>, count: usize, mut votes: Vec<(u32, u16, u64)>) -> Self {
+        votes.par_sort_unstable();
+        let mut starts = vec![0; count + 1];
+        votes.iter().for_each(|(row, ..)| starts[*row as usize + 1] += 1);
+        (0..count).for_each(|row| starts[row + 1] += starts[row]);
+        Self { labels, starts, cells: votes.into_iter().map(|(_, column, votes)| (column, votes)).collect() }
+    }
+
     /// Number of Gaussians.
     pub fn len(&self) -> usize {
-        self.votes.len() / self.labels.len().max(1)
+        self.starts.len() - 1
     }
 
     /// True without Gaussians.
     pub fn is_empty(&self) -> bool {
-        self.votes.is_empty()
+        self.len() == 0
     }
 
-    /// Votes for Gaussian `row`, one per column.
-    pub fn row(&self, row: usize) -> &[u64] {
-        let columns = self.labels.len();
-        &self.votes[row * columns..][..columns]
+    /// Votes for Gaussian `row`.
+    pub fn row(&self, row: usize) -> &Row {
+        &self.cells[self.starts[row]..self.starts[row + 1]]
+    }
+
+    /// Blending weights, px, of all columns [N, columns], as the mirrors have them.
+    pub fn weights(&self) -> Vec<f64> {
+        let mut dense = vec![0.0; self.len() * self.labels.len()];
+        for (row, cells) in dense.chunks_mut(self.labels.len()).enumerate() {
+            self.row(row).iter().for_each(|&(column, votes)| cells[usize::from(column)] = weight(votes));
+        }
+        dense
     }
 }
 
@@ -82,10 +105,10 @@ pub fn sweep(engine: &mut Engine, voters: &[Voter], how: Sweep) -> Result<Ballot
     let objects: BTreeSet<u16> = voters.iter().flat_map(|voter| voter.mask.objects()).collect();
     let labels: Vec<u16> = std::iter::once(UNLABELLED as u16).chain(objects).collect();
     let count = engine.gaussian_count() as usize;
-    let mut ballot = Ballot { votes: vec![0; count * labels.len()], labels };
-    for first in (0..ballot.labels.len()).step_by(room) {
-        let columns = room.min(ballot.labels.len() - first);
-        let chunk = ballot.labels[first..][..columns].to_vec();
+    let mut votes = Vec::new();
+    for first in (0..labels.len()).step_by(room) {
+        let columns = room.min(labels.len() - first);
+        let chunk = labels[first..][..columns].to_vec();
         engine.sched_mut().fill(Buf::VOTES_LOW, 0)?;
         engine.sched_mut().fill(Buf::VOTES_HIGH, 0)?;
         for voter in voters {
@@ -93,13 +116,11 @@ pub fn sweep(engine: &mut Engine, voters: &[Voter], how: Sweep) -> Result<Ballot
         }
         let low = engine.sched_mut().download::<u32>(Buf::VOTES_LOW, 0, 0, count * columns)?;
         let high = engine.sched_mut().download::<u32>(Buf::VOTES_HIGH, 0, 0, count * columns)?;
-        let width = ballot.labels.len();
-        for (cell, (low, high)) in low.into_iter().zip(high).enumerate() {
-            let to = cell / columns * width + first + cell % columns;
-            ballot.votes[to] = u64::from(high) << 32 | u64::from(low);
-        }
+        let sums = low.into_iter().zip(high).map(|(low, high)| u64::from(high) << 32 | u64::from(low));
+        let cells = sums.enumerate().filter(|(_, sum)| *sum > 0);
+        votes.extend(cells.map(|(cell, sum)| ((cell / columns) as u32, (first + cell % columns) as u16, sum)));
     }
-    Ok(ballot)
+    Ok(Ballot::new(labels, count, votes))
 }
 
 /// Adds the votes of one view for the labels of `chunk`.

@@ -41,36 +41,36 @@ pub fn decide(ballot: &Ballot, means: &[[f32; 3]], complete: bool) -> Result<Dec
     if ballot.len() != means.len() {
         return Err(Error::Bug(format!("{} rows of votes for {} Gaussians", ballot.len(), means.len())));
     }
-    let own: Vec<Vec<f64>> = (0..means.len()).into_par_iter().map(|row| shares(ballot, row)).collect();
-    let totals: Vec<f64> = own.iter().map(|votes| votes.iter().sum()).collect();
-    let winners: Vec<usize> = own.par_iter().map(|votes| winner(votes)).collect();
+    let own = |row: usize| ballot.row(row).iter().map(|&(column, votes)| (column, weight(votes)));
+    let (totals, winners): (Vec<f64>, Vec<u16>) = (0..means.len())
+        .into_par_iter()
+        .map(|row| (own(row).map(|(_, share)| share).sum::<f64>(), winner(own(row))))
+        .unzip();
     let tree = if complete { tree_of(means, &totals)? } else { None };
     let decide_row = |row: usize| {
-        let mut votes = own[row].clone();
+        let mut votes: BTreeMap<u16, f64> = own(row).collect();
         if let Some((tree, rows)) = tree.as_ref().filter(|_| totals[row] < EVIDENCE)
             && let Some(asked) = NonZero::new(NEIGHBOURS.min(rows.len()))
         {
             let at = means[row].map(f64::from);
             let near = tree.query(&at).nearest_n::<SquaredEuclidean<f64>>(asked).execute();
             for item in &near {
-                votes[winners[rows[item.item as usize]]] += (EVIDENCE - totals[row]) / asked.get() as f64;
+                let winner = winners[rows[item.item as usize]];
+                *votes.entry(winner).or_default() += (EVIDENCE - totals[row]) / asked.get() as f64;
             }
         }
-        let (column, total) = (winner(&votes), votes.iter().sum::<f64>());
-        let confidence = if total > 0.0 { votes[column] / total } else { 0.0 };
-        (u32::from(ballot.labels[column]), confidence as f32)
+        let column = winner(votes.iter().map(|(&column, &share)| (column, share)));
+        let total: f64 = votes.values().sum();
+        let confidence = if total > 0.0 { votes.get(&column).copied().unwrap_or(0.0) / total } else { 0.0 };
+        (u32::from(ballot.labels[usize::from(column)]), confidence as f32)
     };
     let (labels, confidence) = (0..means.len()).into_par_iter().map(decide_row).unzip();
     Ok(Decision { labels, confidence })
 }
 
-fn shares(ballot: &Ballot, row: usize) -> Vec<f64> {
-    ballot.row(row).iter().map(|&votes| weight(votes)).collect()
-}
-
-fn winner(votes: &[f64]) -> usize {
-    let best = |best: usize, at: usize| if votes[at] > votes[best] { at } else { best };
-    (0..votes.len()).fold(0, best)
+/// The column with the largest share, the first of equals; 0 if there is none.
+fn winner(shares: impl Iterator<Item = (u16, f64)>) -> u16 {
+    shares.fold((0, 0.0), |best, at| if at.1 > best.1 { at } else { best }).0
 }
 
 /// The Gaussians with enough weight of their own, as a tree with their rows.
