@@ -11,7 +11,7 @@ use crate::infer::edit::select::remove;
 use crate::infer::output::{Format, Pictures, What, write_pictures};
 use crate::infer::render::render;
 use crate::io::camera_json::read_camera;
-use crate::scene::{Camera, Gaussians};
+use crate::scene::{Camera, Gaussians, stems};
 use crate::{Error, Result};
 use clap::Args;
 use serde_json::json;
@@ -123,7 +123,7 @@ fn cameras(args: &RenderArgs) -> Result<Vec<(String, Camera)>> {
     let Some(scene) = &args.scene else { return Err(Error::usage("--scene", "--scene or --camera is needed")) };
     let dataset = open_scene(scene, &args.reading, None, args.background, false)?;
     let views = pick_views(&dataset, &args.views)?;
-    Ok(views.iter().map(|view| (view.stem(), view.camera.clone())).collect())
+    Ok(stems(&views).into_iter().zip(&views).map(|(stem, view)| (stem, view.camera.clone())).collect())
 }
 
 fn write(

@@ -58,12 +58,21 @@ fn write_inner(path: &Path, body: impl FnOnce(&mut dyn Write) -> io::Result<()>)
     sync_folder(folder)
 }
 
-/// The file that a chain of symbolic links ends at, so that a rename replaces it and not the link.
+/// The file that a chain of symbolic links ends at, so that a rename replaces it and not the link. It need not be there
+/// yet. Links of the system to pipes (`/dev/stdout`) lead nowhere by name and stay as they are.
 fn follow(path: &Path) -> io::Result<PathBuf> {
-    match fs::symlink_metadata(path) {
-        Ok(found) if found.file_type().is_symlink() => fs::canonicalize(path),
-        _ => Ok(path.to_owned()),
+    let mut at = path.to_owned();
+    // As many as Linux follows.
+    for _ in 0..40 {
+        match (fs::symlink_metadata(&at), fs::metadata(&at)) {
+            (Ok(found), target) if found.is_symlink() && target.as_ref().map_or(true, fs::Metadata::is_file) => {
+                let link = fs::read_link(&at)?;
+                at = at.parent().unwrap_or(Path::new("")).join(link);
+            }
+            _ => return Ok(at),
+        }
     }
+    Err(io::Error::other("it is a symbolic link that leads in a circle"))
 }
 
 fn temporary_in(folder: &Path) -> io::Result<tempfile::NamedTempFile> {
@@ -109,9 +118,21 @@ impl Write for Fallible<'_> {
     }
 }
 
+/// Some file systems of networks and of users know no syncing of folders, and some folders may be written but not read:
+/// then the system decides when the new name is on the disk.
 #[cfg(unix)]
 fn sync_folder(folder: &Path) -> io::Result<()> {
-    File::open(folder)?.sync_all()
+    match File::open(folder).and_then(|folder| folder.sync_all()) {
+        Err(error)
+            if matches!(
+                error.kind(),
+                io::ErrorKind::InvalidInput | io::ErrorKind::Unsupported | io::ErrorKind::PermissionDenied
+            ) =>
+        {
+            Ok(())
+        }
+        other => other,
+    }
 }
 
 #[cfg(not(unix))]

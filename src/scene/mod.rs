@@ -12,4 +12,4 @@ pub use camera::Camera;
 pub use depth::{DepthKind, DepthMap};
 pub use gaussians::Gaussians;
 pub use labels::{LabelMap, Occluders, UNLABELLED};
-pub use view::{Dataset, Photo, Point, View};
+pub use view::{Dataset, Photo, Point, View, stems};

@@ -2,6 +2,7 @@
 
 use super::{Camera, LabelMap};
 use glam::DVec3;
+use std::collections::BTreeSet;
 use std::path::PathBuf;
 
 /// A decoded photo, row-major RGBA8. Alpha is 255 where the photo holds a colour and 0 where it has no source
@@ -35,6 +36,20 @@ impl View {
         let path = std::path::Path::new(&self.name).with_extension("");
         path.to_string_lossy().replace(['/', '\\'], "_")
     }
+}
+
+/// Names for output files of several views, none twice: [`View::stem`], with a number behind it where another view before
+/// it has the same (`a/1.jpg` and `a_1.png`).
+pub fn stems(views: &[&View]) -> Vec<String> {
+    let mut taken = BTreeSet::new();
+    let mut name = |view: &&View| {
+        let stem = view.stem();
+        let free = (1..).map(|n| if n == 1 { stem.clone() } else { format!("{stem}_{n}") });
+        let name = free.into_iter().find(|name| !taken.contains(name)).unwrap_or_default();
+        taken.insert(name.clone());
+        name
+    };
+    views.iter().map(&mut name).collect()
 }
 
 /// A coloured 3-D point.

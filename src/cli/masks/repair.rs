@@ -66,6 +66,13 @@ pub fn run(args: &RepairArgs, context: &Context) -> Result<()> {
     if views.iter().all(|view| view.mask.is_none()) {
         return Err(Error::data(&args.masks, "", "no training view has a mask here; see --test-every"));
     }
+    let mut files = BTreeMap::new();
+    for view in &views {
+        if let Some(other) = files.insert(file_of(view), &view.name) {
+            let problem = format!("{other} would have the same mask file; rename one of the photos");
+            return Err(Error::data(&args.scene, &view.name, problem));
+        }
+    }
     let mut engine = vote_engine(open_gpu(context)?, &model, &views, COLUMNS_MAX)?;
     engine.upload_model(&model)?;
     let mut progress = Progress::new(2 * views.len() as u64, "views", &context.global);
@@ -143,12 +150,17 @@ fn areas(views: &[&View]) -> BTreeMap<Segment, u64> {
     areas
 }
 
+/// The file of a view's mask in the folder of all.
+fn file_of(view: &View) -> PathBuf {
+    Path::new(&view.name).with_extension("png")
+}
+
 fn write(folder: &Path, source: &Path, views: &[&View], masks: &[Option<LabelMap>]) -> Result<()> {
     let mut entries: BTreeMap<u16, LabelEntry> = BTreeMap::new();
     let known = LabelTable::of_folder(source)?;
     for (view, mask) in views.iter().zip(masks) {
         let Some(mask) = mask else { continue };
-        write_mask(&folder.join(Path::new(&view.name).with_extension("png")), mask)?;
+        write_mask(&folder.join(file_of(view)), mask)?;
         for id in mask.objects() {
             let old = known.as_ref().and_then(|table| table.entry(u32::from(id)).cloned());
             let blank = || LabelEntry { pixels: 0, views: 0, ..old.unwrap_or_else(|| LabelEntry::new(u32::from(id))) };

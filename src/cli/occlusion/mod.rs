@@ -14,7 +14,7 @@ use crate::infer::render::render;
 use crate::io::LoadOptions;
 use crate::io::image::write_png_rgb8;
 use crate::io::occlusion_table::OcclusionTable;
-use crate::scene::{DepthKind, LabelMap, Occluders, View};
+use crate::scene::{DepthKind, LabelMap, Occluders, View, stems};
 use crate::{Error, Result};
 use clap::Args;
 use serde_json::json;
@@ -73,7 +73,7 @@ pub fn run(args: &OcclusionArgs, context: &Context) -> Result<()> {
         _ => return Err(Error::usage("--depths", "--depths with --depth-kind, or --model is needed")),
     };
     if let Some(folder) = &args.pictures {
-        views.iter().try_for_each(|view| draw(folder, view, &table))?;
+        views.iter().zip(stems(&views)).try_for_each(|(view, stem)| draw(folder, (view, &stem), &table))?;
     }
     table.write(&args.output)?;
     let (pairs, output) = (table.pair_count(), args.output.display());
@@ -104,10 +104,10 @@ fn from_model(path: &Path, views: &[&View], context: &Context) -> Result<BTreeMa
     Ok(found)
 }
 
-fn draw(folder: &Path, view: &View, table: &OcclusionTable) -> Result<()> {
+fn draw(folder: &Path, (view, stem): (&View, &str), table: &OcclusionTable) -> Result<()> {
     let (mask, none) = (mask(view)?, Occluders::new());
     let pixels = picture(mask, table.views.get(&view.name).unwrap_or(&none));
-    write_png_rgb8(folder.join(format!("{}.png", view.stem())), mask.width, mask.height, &pixels)
+    write_png_rgb8(folder.join(format!("{stem}.png")), mask.width, mask.height, &pixels)
 }
 
 fn mask(view: &View) -> Result<&LabelMap> {
