@@ -113,6 +113,11 @@ impl Error {
         self.exit_status() == 5
     }
 
+    /// True if there is no device to work with, or its driver does not start.
+    pub fn is_without_device(&self) -> bool {
+        self.exit_status() == 4
+    }
+
     /// A [`Error::Data`] without much ado.
     pub fn data(path: impl AsRef<Path>, place: impl Into<String>, problem: impl Into<String>) -> Self {
         Self::Data { path: path.as_ref().to_owned(), place: place.into(), problem: problem.into() }

@@ -1,5 +1,5 @@
 //! Faults on purpose, so that every failure can be tested: the environment variable `LABELGS_FAULT=SITE:N:KIND` makes the
-//! N-th event of a site fail; with `:COUNT` behind it, so many from there on.
+//! N-th event of a site fail; with `:COUNT` behind it, so many from there on. Several stand with commas between.
 //!
 //! | site | events | kinds |
 //! | --- | --- | --- |
@@ -9,6 +9,7 @@
 //! | `read` | what is done to read files: opening, reading, listing a folder | `IO`, `SHORT`, `INTERRUPTED` |
 //! | `loader` | loading Vulkan | any |
 //! | `nan` | steps of a training | `NUMBER`: a Gaussian gets a position that is none |
+//! | any | | `SLOW`: the event takes a minute |
 //!
 //! `SHORT` and `INTERRUPTED` are what every system may do at any time: a part is read or written, or nothing, and the call
 //! has to be made again. They may change nothing.
@@ -17,6 +18,7 @@ use std::io;
 use std::ops::Range;
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::Duration;
 
 /// What a fault does.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -39,6 +41,8 @@ pub enum Kind {
     Interrupted,
     /// A number is none.
     Number,
+    /// Nothing fails, but takes a minute.
+    Slow,
 }
 
 struct Fault {
@@ -52,21 +56,28 @@ struct Fault {
 
 /// The fault that this event of a site meets, if one was asked for.
 pub fn at(site: &str) -> Option<Kind> {
-    static FAULT: OnceLock<Option<Fault>> = OnceLock::new();
-    let fault = FAULT.get_or_init(|| {
-        let text = std::env::var("LABELGS_FAULT").ok().filter(|text| !text.is_empty())?;
-        let fault = parse(&text);
-        if fault.is_none() {
-            tracing::warn!("LABELGS_FAULT: {text} is not SITE:N:KIND or SITE:N:KIND:COUNT, nothing will fail");
-        }
-        fault
+    static FAULTS: OnceLock<Vec<Fault>> = OnceLock::new();
+    let faults = FAULTS.get_or_init(|| {
+        let text = std::env::var("LABELGS_FAULT").unwrap_or_default();
+        let read = |text: &str| {
+            let fault = parse(text);
+            if fault.is_none() {
+                tracing::warn!("LABELGS_FAULT: {text} is not SITE:N:KIND or SITE:N:KIND:COUNT, nothing will fail");
+            }
+            fault
+        };
+        text.split(',').filter(|text| !text.is_empty()).filter_map(read).collect()
     });
-    let fault = fault.as_ref()?;
-    let hit = fault.site == site && fault.events.contains(&(fault.seen.fetch_add(1, Ordering::Relaxed) + 1));
-    if hit {
-        tracing::warn!("a fault on purpose: {:?} at {site}", fault.kind);
+    // All of them count this event, also those behind one that it meets.
+    let met =
+        |fault: &&Fault| fault.site == site && fault.events.contains(&(fault.seen.fetch_add(1, Ordering::Relaxed) + 1));
+    let kind = faults.iter().filter(met).last()?.kind;
+    tracing::warn!("a fault on purpose: {kind:?} at {site}");
+    if kind == Kind::Slow {
+        std::thread::sleep(Duration::from_secs(60));
+        return None;
     }
-    hit.then_some(fault.kind)
+    Some(kind)
 }
 
 /// The fault of a transfer of bytes from or to a file. True if only a part may be transferred.
@@ -102,6 +113,7 @@ fn parse(text: &str) -> Option<Fault> {
         "SHORT" => Kind::Short,
         "INTERRUPTED" => Kind::Interrupted,
         "NUMBER" => Kind::Number,
+        "SLOW" => Kind::Slow,
         _ => return None,
     };
     let events = first..first.saturating_add(count);

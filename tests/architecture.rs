@@ -129,10 +129,10 @@ fn with_word(word: &str) -> Vec<String> {
 }
 
 #[test]
-fn unsafe_code_has_two_places() {
+fn unsafe_code_has_three_places() {
     let elsewhere = with_word("unsafe ")
         .into_iter()
-        .filter(|file| !file.starts_with("src/gpu/") && file != "src/sched/recorder.rs");
+        .filter(|file| !file.starts_with("src/gpu/") && file != "src/sched/recorder.rs" && file != "src/main.rs");
     assert_eq!(elsewhere.collect::<Vec<_>>(), Vec::<String>::new());
     assert!(with_word("unsafe ").contains(&"src/sched/recorder.rs".to_owned()), "the search finds what is there");
 }
@@ -143,7 +143,7 @@ fn files_are_opened_in_two_places() {
     const CALLS: [&str; 7] =
         ["File::open", "File::create", "fs::read", "fs::write", "fs::copy", "_from_file(", "ImageReader::open"];
     // The last lists its own output, and leaves alone what cannot be read.
-    const ALLOWED: [&str; 3] = ["io/read.rs", "io/atomic.rs", "cli/train.rs"];
+    const ALLOWED: [&str; 3] = ["io/read.rs", "io/atomic.rs", "cli/train_run.rs"];
     for (path, text) in files("src", &["rs"]) {
         let code = text.split("#[cfg(test)]").next().unwrap_or_default();
         let code = code.lines().filter(|line| !line.trim_start().starts_with("//"));

@@ -33,6 +33,7 @@ pub mod stdout;
 pub mod synth;
 pub mod train;
 pub mod train_args;
+mod train_run;
 pub mod values;
 
 use crate::Error;
@@ -96,7 +97,7 @@ fn run(args: Vec<OsString>) -> Result<(), Exit> {
     let cli = Cli::from_arg_matches(&command().try_get_matches_from(args)?)?;
     log::start(&cli.global);
     interrupt::install()?;
-    let context = Context { global: cli.global, json: cli.json };
+    let context = Context::new(cli.global, cli.json);
     match cli.command {
         Command::Ablate(args) => ablate::run(&args, &context),
         Command::Train(args) => train::run(&args, &context),
@@ -119,5 +120,5 @@ fn run(args: Vec<OsString>) -> Result<(), Exit> {
         Command::Plan(args) => plan::run(&args, &context),
         Command::Profile(args) => profile::run(&args, &context),
     }?;
-    Ok(())
+    Ok(context.check_rules()?)
 }

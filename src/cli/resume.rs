@@ -170,11 +170,12 @@ impl Checkpoints {
         Ok(false)
     }
 
-    /// Writes one that is due. That it cannot be written ends no training: there may be room again the next time.
+    /// Writes one that is due. That it cannot be written, or its folder be listed, ends no training: there may be room again
+    /// the next time.
     pub fn save_due(&mut self, trainer: &mut Trainer) -> Result<()> {
         self.hold_folder()?;
         match self.save(trainer) {
-            Err(error @ Error::Write { .. }) => {
+            Err(error @ (Error::Write { .. } | Error::Read { .. })) => {
                 let last = self.kept.last().map_or("there is none yet".to_owned(), |path| path.display().to_string());
                 tracing::warn!("{error}; training goes on, the last checkpoint is: {last}");
                 Ok(())

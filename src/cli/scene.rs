@@ -45,6 +45,7 @@ pub fn open_untried(context: &Context) -> Result<Arc<Gpu>> {
     }
     options.pipelines = PipelineFolder::of_user().map(|folder| Arc::new(folder) as Arc<dyn PipelineStore>);
     let gpu = Gpu::new(&options)?;
+    context.listen(&gpu);
     let found = gpu.capabilities();
     let cpu = if gpu.is_cpu() { ", a processor: expect it to be slower than a graphics card" } else { "" };
     tracing::info!("device: {} ({}){cpu}", found.name, found.driver_info);

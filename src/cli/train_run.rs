@@ -1,4 +1,4 @@
-//! `labelgs train`.
+//! One run of a training: what is read, the loop, what is written.
 
 use super::args::ReadArgs;
 use super::context::Context;
@@ -6,7 +6,7 @@ use super::log::Progress;
 use super::resume::{self, Checkpoints};
 use super::scene::{open_gpu, open_with};
 use super::train_args::TrainArgs;
-use super::{config, interrupt, occlusion, stdout};
+use super::{config, interrupt, occlusion};
 use crate::engine::Engine;
 use crate::gpu::Gpu;
 use crate::infer::edit::select::SURE;
@@ -19,62 +19,32 @@ use crate::io::run_folder::{self, Lock};
 use crate::io::{atomic, checkpoint_folder, init};
 use crate::scene::{Dataset, Photo, View};
 use crate::sched::SchedulerOptions;
-use crate::train::{self, StepReport, TrainConfig, Trainer, record};
+use crate::train::record::{self, Models};
+use crate::train::{self, StepReport, TrainConfig, Trainer};
 use crate::{Error, Result};
 use serde_json::json;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-/// Trains a model and prints what came of it.
-pub fn run(args: &TrainArgs, context: &Context) -> Result<()> {
-    let (summary, sentence) = train(args, context)?;
-    if context.json || args.json.json { stdout::print_json(&summary) } else { stdout::print(&sentence) }
-}
-
-/// Trains a model; returns its metrics.json, and the same in a sentence. If `--restart` was typed, also over losses of
-/// the device: one that is lost twice without a checkpoint in between would be lost again.
-pub(super) fn train(args: &TrainArgs, context: &Context) -> Result<(serde_json::Value, String)> {
-    if !args.restart {
-        return train_once(args, context);
-    }
-    let newest = || Ok(checkpoint_folder::list(&args.output)?.first().map_or(0, |found| found.number));
-    let mut args = args.clone();
-    let (mut before, mut was_lost) = (newest()?, false);
-    let mut waits = [1, 4, 16].into_iter();
-    loop {
-        let error = match train_once(&args, context) {
-            Err(error @ Error::DeviceLost { .. }) => error,
-            // A driver may take a while until it has a device again.
-            Err(error @ Error::NoDevice(_)) if was_lost => {
-                let Some(seconds) = waits.next() else { return Err(error) };
-                tracing::warn!("{error}; tried again in {seconds} s");
-                std::thread::sleep(Duration::from_secs(seconds));
-                continue;
-            }
-            other => return other,
-        };
-        interrupt::check()?;
-        let number = newest()?;
-        if number <= before {
-            return Err(error);
-        }
-        tracing::warn!("{error}; it is opened again, and training goes on from the newest checkpoint");
-        (before, was_lost, args.resume, args.config) = (number, true, true, None);
-    }
-}
-
-fn train_once(args: &TrainArgs, context: &Context) -> Result<(serde_json::Value, String)> {
+/// Trains a model; returns its metrics.json, and the same in a sentence.
+pub(super) fn train_once(args: &TrainArgs, context: &Context) -> Result<(serde_json::Value, String)> {
+    // Bad settings leave no folder behind. Checkpoints are looked for when the folder is this run's: the one that it goes on
+    // from may be writing its last.
+    let settings = if args.resume { None } else { Some(config::decide(args)?) };
+    let out = args.output.as_path();
+    let lock = lock_output(out)?;
     let resumed = resume::find(args)?;
-    let config = match &resumed {
-        Some(state) => state.config.clone(),
-        None => config::decide(args)?,
+    let config = match (&resumed, settings) {
+        (Some(state), _) => state.config.clone(),
+        (None, Some(settings)) => settings,
+        (None, None) => config::decide(args)?,
     };
     if args.restart && config.checkpoint_every == 0 {
         return Err(Error::usage("--restart", "goes on from checkpoints, and --checkpoint-every is 0"));
     }
-    let out = args.output.as_path();
-    let lock = prepare_output(out, &config)?;
+    prepare_output(out, &config)?;
+    let mut models = Models::new(out, resumed.as_ref().map_or(0, |state| state.step))?;
     let mut run = resume::facts(args, resumed.as_ref());
     let masks = args.masks.clone().or(run.masks.as_ref().map(PathBuf::from));
     let names = masks.as_deref().map(LabelTable::of_folder).transpose()?.flatten();
@@ -114,8 +84,8 @@ fn train_once(args: &TrainArgs, context: &Context) -> Result<(serde_json::Value,
     records()?;
     interrupt::note_only();
     let start = Instant::now();
-    let go_on = |trainer: &mut Trainer, checkpoints: &mut Checkpoints| {
-        steps(trainer, out, preview.as_ref(), checkpoints, context)
+    let mut go_on = |trainer: &mut Trainer, checkpoints: &mut Checkpoints| {
+        steps(trainer, out, preview.as_ref(), (checkpoints, &mut models), context)
     };
     // First a device that erred once is made up for, bit for bit. What fails again has its reason in the scene or in the
     // settings, and slower steps may get past it.
@@ -132,17 +102,21 @@ fn train_once(args: &TrainArgs, context: &Context) -> Result<(serde_json::Value,
             other => other,
         };
     }
-    let last = last.map_err(|error| keep_model(&mut trainer, out, error))?;
+    let last = last.map_err(|error| keep_model(&mut trainer, &mut models, error))?;
     checkpoints.hold_folder()?;
     if !out.join(run_folder::CONFIG).exists() {
         tracing::warn!("{} was deleted meanwhile; what is known is written again", out.display());
         records()?;
     }
     // What was learnt is saved either way.
-    let kept = if interrupt::status().is_some() { checkpoints.save(&mut trainer) } else { Ok(()) };
-    let model = trainer.labelled_model()?;
+    let kept = match interrupt::status() {
+        Some(_) => checkpoints.save(&mut trainer).map(|()| true),
+        None => Ok(false),
+    };
+    let model = trainer.labelled_model();
+    let model = model.map_err(|error| keep_model(&mut trainer, &mut models, error))?;
     let seconds = start.elapsed().as_secs_f64();
-    let path = record::save_model(out, trainer.steps_done(), &model)?;
+    let path = models.save(trainer.steps_done(), &model)?;
     save_occluders(out, &trainer, run.occlusion.as_deref())?;
     // Scoring puts single objects in the model's place.
     let gaussians = trainer.gaussian_count();
@@ -163,9 +137,10 @@ fn train_once(args: &TrainArgs, context: &Context) -> Result<(serde_json::Value,
         "views": scores.as_ref().map(|scores| &scores.views),
     });
     super::eval::write_json(&out.join("metrics.json"), &summary)?;
-    kept?;
+    let is_kept = kept?;
     if let Some(status) = stopped {
-        tracing::info!("stopped after step {} of {}; --resume goes on", trainer.steps_done(), config.iterations);
+        let further = if is_kept { "--resume goes on" } else { "only the scores are missing" };
+        tracing::info!("stopped after step {} of {}; {further}", trainer.steps_done(), config.iterations);
         return Err(Error::Interrupted(status));
     }
     checkpoints.finish()?;
@@ -193,7 +168,7 @@ fn steps(
     trainer: &mut Trainer,
     out: &Path,
     preview: Option<&View>,
-    checkpoints: &mut Checkpoints,
+    (checkpoints, models): (&mut Checkpoints, &mut Models),
     context: &Context,
 ) -> Result<Option<StepReport>> {
     let config = trainer.config().clone();
@@ -211,7 +186,7 @@ fn steps(
             if config.save_at.contains(&step) {
                 checkpoints.hold_folder()?;
                 let model = trainer.labelled_model()?;
-                tolerate(record::save_model(out, step, &model).map(drop))?;
+                tolerate(models.save(step, &model).map(drop))?;
             }
             if config.preview_every > 0
                 && step % config.preview_every == 0
@@ -259,12 +234,12 @@ fn save_occluders(out: &Path, trainer: &Trainer, given: Option<&str>) -> Result<
 }
 
 /// A run that memory ended keeps what it has learnt: steps that did not fit changed nothing.
-fn keep_model(trainer: &mut Trainer, out: &Path, error: Error) -> Error {
+fn keep_model(trainer: &mut Trainer, models: &mut Models, error: Error) -> Error {
     if !error.is_out_of_memory() {
         return error;
     }
     let step = trainer.steps_done();
-    match trainer.model().and_then(|model| record::save_model(out, step, &model)) {
+    match trainer.model().and_then(|model| models.save(step, &model)) {
         Ok(path) => tracing::warn!(
             "stopped at step {step} of {}; the model so far is {}",
             trainer.config().iterations,
@@ -275,18 +250,23 @@ fn keep_model(trainer: &mut Trainer, out: &Path, error: Error) -> Error {
     error
 }
 
-/// Refuses an output folder that cannot be used before any work is done, and clears it of what killed runs left. It is
-/// this run's as long as the result lives.
-fn prepare_output(out: &Path, config: &TrainConfig) -> Result<Lock> {
+/// The output folder, which is this run's as long as the result lives.
+fn lock_output(out: &Path) -> Result<Lock> {
+    std::fs::create_dir_all(out).map_err(Error::write(out))?;
+    Lock::take(out)
+}
+
+/// Refuses an output folder that cannot be used before any work is done, and clears it of what killed runs left.
+fn prepare_output(out: &Path, config: &TrainConfig) -> Result<()> {
     let checkpoints = out.join(checkpoint_folder::FOLDER);
-    let folder = if config.checkpoint_every > 0 { checkpoints.as_path() } else { out };
-    std::fs::create_dir_all(folder).map_err(Error::write(folder))?;
-    let lock = Lock::take(out)?;
+    if config.checkpoint_every > 0 {
+        std::fs::create_dir_all(&checkpoints).map_err(Error::write(&checkpoints))?;
+    }
     let models = std::fs::read_dir(out.join("point_cloud")).into_iter().flatten().flatten().map(|entry| entry.path());
     for folder in [out.to_owned(), checkpoints, out.join("preview")].into_iter().chain(models) {
         atomic::remove_stale(folder, Duration::ZERO);
     }
-    Ok(lock)
+    Ok(())
 }
 
 /// A trainer with the initial model of the scene.

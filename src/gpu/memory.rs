@@ -70,7 +70,9 @@ impl Buffer {
 
     fn refused(&self, error: AllocationError) -> Error {
         match error {
-            AllocationError::OutOfMemory | AllocationError::NoCompatibleMemoryTypeFound => Error::OutOfMemory {
+            AllocationError::OutOfMemory
+            | AllocationError::NoCompatibleMemoryTypeFound
+            | AllocationError::FailedToMap(_) => Error::OutOfMemory {
                 what: self.name.clone(),
                 needed: self.bytes,
                 limit_name: "the largest heap of this device (of which that much is no longer free)".to_owned(),
@@ -82,8 +84,13 @@ impl Buffer {
                 Error::DeviceLost { pass: "unknown".to_owned() }
             }
             AllocationError::Internal(text) => {
-                // The last is no answer that a driver should give here, and one that does is not this program's fault.
-                let known = [vk::Result::ERROR_OUT_OF_HOST_MEMORY, vk::Result::ERROR_INITIALIZATION_FAILED];
+                // The last two are no answers that a driver should give here, and one that does is not this program's fault.
+                let known = [
+                    vk::Result::ERROR_OUT_OF_HOST_MEMORY,
+                    vk::Result::ERROR_TOO_MANY_OBJECTS,
+                    vk::Result::ERROR_INITIALIZATION_FAILED,
+                    vk::Result::ERROR_UNKNOWN,
+                ];
                 match known.into_iter().find(|result| text.contains(&format!("{result:?}"))) {
                     Some(result) => Error::Vulkan { call: "vkAllocateMemory", result },
                     None => Error::Bug(format!("memory of {}: {text}", self.name)),

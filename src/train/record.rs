@@ -13,13 +13,17 @@ pub fn model_path(out: &Path, step: u32) -> PathBuf {
     out.join("point_cloud").join(format!("iteration_{step}")).join("point_cloud.ply")
 }
 
+/// The steps of the models in the folder of a run.
+fn steps(out: &Path) -> Result<Vec<u32>> {
+    let folder = out.join("point_cloud");
+    let entries = if folder.is_dir() { read::folder(&folder)? } else { Vec::new() };
+    let steps = entries.iter().filter_map(|path| path.file_name()?.to_str()?.strip_prefix("iteration_")?.parse().ok());
+    Ok(steps.filter(|&step| model_path(out, step).is_file()).collect())
+}
+
 /// The model of the latest step in the folder of a run.
 pub fn latest_model(out: &Path) -> Result<PathBuf> {
-    let folder = out.join("point_cloud");
-    let steps = if folder.is_dir() { read::folder(&folder)? } else { Vec::new() };
-    let steps = steps.iter().filter_map(|path| path.file_name()?.to_str()?.strip_prefix("iteration_")?.parse().ok());
-    let latest = steps.filter(|&step| model_path(out, step).is_file()).max();
-    latest.map(|step| model_path(out, step)).ok_or_else(|| {
+    steps(out)?.into_iter().max().map(|step| model_path(out, step)).ok_or_else(|| {
         Error::data(
             out,
             "",
@@ -28,14 +32,41 @@ pub fn latest_model(out: &Path) -> Result<PathBuf> {
     })
 }
 
-/// Writes the model of a step.
-pub fn save_model(out: &Path, step: u32, model: &Gaussians) -> Result<PathBuf> {
-    let path = model_path(out, step);
-    let left_out = ply::write_gaussians(&path, model)?;
-    if left_out > 0 {
-        tracing::warn!("{}: {left_out} Gaussians are not finite and were left out", path.display());
+/// The models that a run writes. Where an earlier run left some of later steps, they go when this one has its first:
+/// the model of the latest step is the one that other commands take.
+pub struct Models {
+    out: PathBuf,
+    earlier: Vec<u32>,
+}
+
+impl Models {
+    /// For a run in the folder `out` that goes on after step `from`, or starts at 0.
+    pub fn new(out: &Path, from: u32) -> Result<Self> {
+        let earlier: Vec<u32> = steps(out)?.into_iter().filter(|&step| step > from).collect();
+        if let Some(step) = earlier.iter().max() {
+            let path = model_path(out, *step);
+            tracing::warn!("{} is of an earlier run and goes when this one has a model", path.display());
+        }
+        Ok(Self { out: out.to_owned(), earlier })
     }
-    Ok(path)
+
+    /// Writes the model of a step.
+    pub fn save(&mut self, step: u32, model: &Gaussians) -> Result<PathBuf> {
+        let path = model_path(&self.out, step);
+        let left_out = ply::write_gaussians(&path, model)?;
+        if left_out > 0 {
+            tracing::warn!("{}: {left_out} Gaussians are not finite and were left out", path.display());
+        }
+        for old in self.earlier.drain(..).filter(|&old| old != step) {
+            let old = model_path(&self.out, old);
+            if let Err(error) = std::fs::remove_file(&old) {
+                tracing::warn!("{}: not removed: {error}", old.display());
+            }
+            // Unless somebody keeps something else in there.
+            let _ = old.parent().map(std::fs::remove_dir);
+        }
+        Ok(path)
+    }
 }
 
 /// Writes `cameras.json`.

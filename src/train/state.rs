@@ -10,6 +10,7 @@ use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::io::checkpoint::{Checkpoint, Plane};
 use crate::pass::KernelShape;
+use crate::plan::{Buf, TABLE};
 use crate::scene::{Camera, Dataset, LabelMap, Occluders, Photo};
 use crate::sched::SchedulerOptions;
 use glam::DVec3;
@@ -142,7 +143,8 @@ impl TrainState {
         if state.updates > state.step {
             return Err(odd(format!("{} updates in {} steps", state.updates, state.step)));
         }
-        let labels = state.masks_given();
+        // Masks may be there and show no object.
+        let labels = state.planes.iter().any(|plane| plane.name == TABLE[Buf::LABELS.index()].name);
         state::check(&state.planes, state.gaussians, state.config.sh_degree, labels).map_err(odd)?;
         Ok(state)
     }
@@ -205,9 +207,27 @@ impl Trainer {
             views: self.prints.clone(),
             occluders: self.occluders(),
             run: RunFacts::default(),
-            planes: self.engine.download_state(self.config.sh_degree)?,
+            planes: self.finite_planes()?,
             path: PathBuf::new(),
         })
+    }
+
+    /// The planes of the state, unless one holds a number that is none: to go on from that would help nobody, and what
+    /// the last step has spoilt no pass has looked at yet.
+    fn finite_planes(&mut self) -> Result<Vec<Plane>> {
+        let planes = self.engine.download_state(self.config.sh_degree)?;
+        let is_finite = |word: &u32| f32::from_bits(*word).is_finite();
+        for plane in planes.iter().filter(|plane| plane.name != TABLE[Buf::LABELS.index()].name) {
+            if let Some(at) = plane.data.iter().position(|word| !is_finite(word)) {
+                let row = at / plane.words.max(1) as usize;
+                return Err(Error::Numeric {
+                    quantity: format!("{} of Gaussian {row} is not finite, so there is no checkpoint", plane.name),
+                    step: u64::from(self.step),
+                    view: "of this step or one before".to_owned(),
+                });
+            }
+        }
+        Ok(planes)
     }
 
     /// Goes on where `state` stopped, to the same bits on the same device as if it had not. `dataset.train` gives its
