@@ -81,10 +81,7 @@ fn to_text(device: &Capabilities, picked: Option<usize>) -> String {
     text += &format!("   driver  {} {}\n   uuid    {}\n", device.driver_name, device.driver_info, device.uuid_text());
     let (heap, usable) = (device.limits.heap >> 20, device.limits.max_memory >> 20);
     text += &format!("   memory  {heap} MiB, {usable} MiB may be used\n");
-    for need in &device.needs {
-        let (what, needed, found) = (need.what, &need.needed, &need.found);
-        text += &format!("   {:<7} {what:<29} needed {needed:<7} found {found:<18} {}\n", state(need), need.reason);
-    }
+    text += &needs_text(device);
     if device.missing().is_empty() {
         text += &format!("   kernels {}\n", shape_text(&shape_of(device)));
     } else {
@@ -93,15 +90,29 @@ fn to_text(device: &Capabilities, picked: Option<usize>) -> String {
     text
 }
 
-fn to_json(device: &Capabilities, picked: Option<usize>) -> Value {
-    let (major, minor, patch) = device.api_version;
-    let usable = device.missing().is_empty();
-    let needs = device.needs.iter().map(|need| {
+/// What the engine needs and wishes of a device, a row each.
+pub fn needs_text(device: &Capabilities) -> String {
+    let row = |need: &Need| {
+        let (what, needed, found) = (need.what, &need.needed, &need.found);
+        format!("   {:<7} {what:<29} needed {needed:<7} found {found:<18} {}\n", state(need), need.reason)
+    };
+    device.needs.iter().map(row).collect()
+}
+
+/// The same as JSON.
+pub fn needs_json(device: &Capabilities) -> Vec<Value> {
+    let row = |need: &Need| {
         json!({
             "what": need.what, "required": need.is_required, "needed": need.needed, "found": need.found,
             "met": need.is_met, "reason": need.reason,
         })
-    });
+    };
+    device.needs.iter().map(row).collect()
+}
+
+fn to_json(device: &Capabilities, picked: Option<usize>) -> Value {
+    let (major, minor, patch) = device.api_version;
+    let usable = device.missing().is_empty();
     json!({
         "index": device.index,
         "name": device.name,
@@ -111,7 +122,7 @@ fn to_json(device: &Capabilities, picked: Option<usize>) -> Value {
         "uuid": device.uuid_text(),
         "memory_bytes": device.limits.heap,
         "usable_memory_bytes": device.limits.max_memory,
-        "needs": needs.collect::<Vec<_>>(),
+        "needs": needs_json(device),
         "usable": usable,
         "picked": picked == Some(device.index),
         "kernels": usable.then(|| shape_json(&shape_of(device))),

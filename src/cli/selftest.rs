@@ -2,7 +2,7 @@
 
 use super::args::JsonFlag;
 use super::context::Context;
-use super::devices::{shape_json, shape_text};
+use super::devices::{needs_json, needs_text, shape_json, shape_text};
 use super::scene::open_untried;
 use super::stdout;
 use crate::pass::KernelShape;
@@ -26,10 +26,11 @@ pub fn run(args: &SelftestArgs, context: &Context) -> Result<()> {
     let as_json = context.json || args.json.json;
     if !as_json {
         stdout::print(&format!(
-            "{} ({} {})\n{}\n\n{:<48} {:>8} {:>8}  {}\n",
+            "{} ({} {})\n{}{}\n\n{:<48} {:>8} {:>8}  {}\n",
             found.name,
             found.driver_name,
             found.driver_info,
+            needs_text(found),
             shape_text(&kernels),
             "check against float64",
             "error",
@@ -52,6 +53,7 @@ pub fn run(args: &SelftestArgs, context: &Context) -> Result<()> {
             "schema_version": 1,
             "device": found.name,
             "driver": { "name": found.driver_name, "version": found.driver_info },
+            "needs": needs_json(found),
             "kernels": shape_json(&kernels),
             "passed": failed.is_empty(),
             "checks": checks.iter().map(to_json).collect::<Vec<_>>(),

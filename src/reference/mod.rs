@@ -11,6 +11,7 @@ pub mod lift;
 pub mod loss;
 pub mod model;
 pub mod project;
+pub mod random;
 pub mod rules;
 pub mod scan;
 pub mod sh;

@@ -3,6 +3,7 @@
 mod checks;
 pub mod compare;
 pub mod judge;
+pub mod model;
 pub mod rig;
 pub mod scenes;
 mod training;
@@ -92,6 +93,17 @@ pub fn run_against(rules: &Rules, gpu: &Arc<Gpu>, mut done: impl FnMut(Check)) -
             let before = if index == 0 { prepared } else { 0.0 };
             done(Check { name: format!("{name}{reads}"), verdict, seconds: start.elapsed().as_secs_f64() + before });
         }
+    }
+    type Change = fn(&Rules, &Arc<Gpu>, KernelShape, f64) -> Result<Verdict>;
+    let changes: [(&str, Change); 3] = [
+        ("densification", model::densification),
+        ("reset of opacities", model::reset),
+        ("lift of labels by the paper's rule", model::lift_of_a_step),
+    ];
+    for (name, change) in changes {
+        let start = Instant::now();
+        let verdict = change(rules, gpu, kernels, checks::LEEWAY)?;
+        done(Check { name: name.to_owned(), verdict, seconds: start.elapsed().as_secs_f64() });
     }
     type Whole = fn(&Arc<Gpu>, KernelShape) -> Result<Verdict>;
     let wholes: [(&str, Whole); 2] =

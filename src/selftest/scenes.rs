@@ -130,8 +130,11 @@ pub fn target(random: &mut Pcg32, shape: &Shape) -> Target {
     }
     let mut label_map = vec![0_u32; width * height];
     for label in 1..=shape.objects {
-        let (x0, y0) = (random.random_range(0..width / 2), random.random_range(0..height / 2));
-        let (w, h) = (random.random_range(width / 4..width / 2), random.random_range(height / 4..height / 2));
+        // From a quarter of the picture to half of it, and a pixel at least.
+        let mut start = |size: usize| random.random_range(0..(size / 2).max(1));
+        let (x0, y0) = (start(width), start(height));
+        let mut length = |size: usize| random.random_range(size / 4..(size / 2).max(size / 4 + 1)).max(1);
+        let (w, h) = (length(width), length(height));
         (y0..y0 + h).for_each(|y| label_map[y * width + x0..y * width + x0 + w].fill(label));
     }
     let valid = (0..width * height).map(|index| index % width >= width / 12 || index / width >= height / 3).collect();

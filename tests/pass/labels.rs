@@ -1,27 +1,17 @@
 //! Lift, label loss, and what labels must not change.
 
 use super::rig::{Rig, prove};
-use crate::reference::blend::{blend_forward, blend_layers_forward};
-use crate::reference::lift::{Masks, centres_of, lift, lift_resolve};
+use crate::reference::blend::blend_layers_forward;
 use crate::reference::loss::{ObjectSlot, Photo, label_loss};
 use crate::reference::step::Target;
 use crate::reference::{Row, Rules};
 use crate::support::compare::{Tolerance, Verdict, check, close, exact};
 use crate::support::device;
-use crate::support::scenes::{Scene, Shape, dot, plain_camera, scene};
+use crate::support::scenes::{Scene, dot, plain_camera};
 use labelgs::plan::Buf;
 use labelgs::scene::Gaussians;
+use labelgs::selftest::model::{dominant, lifted};
 use labelgs::train::job;
-
-/// Gaussians large and opaque enough to dominate pixels; masks are three columns, with nothing at the upper border.
-fn dominant(seed: u64) -> Scene {
-    let shape = Shape { scales: (0.1, 0.5), opacities: (1.0, 8.0), ..Shape::default() };
-    let mut s = scene(seed, &Shape { gaussians: 50, width: 61, height: 45, ..shape });
-    for (index, label) in s.target.label_map.iter_mut().enumerate() {
-        *label = if index / 61 < 6 { 0 } else { (index % 61 * 3 / 61 + 1) as u32 };
-    }
-    s
-}
 
 #[test]
 fn lift_with_and_without_the_filter() {
@@ -32,23 +22,12 @@ fn lift_with_and_without_the_filter() {
         // One object of the masks is not sampled.
         rig.job.layers.pop();
         rig.train();
-        let (splats, size, background) = (rig.splats(), rig.size(), rig.scene.target.background);
         let before = rig.model().labels;
-        let actual = rig.get::<u32>(Buf::LABELS, before.len());
-        let (sampled, label_map) = (rig.slots(), rig.scene.target.label_map.clone());
+        let rig = std::cell::RefCell::new(rig);
         prove(&format!("lift, filter {gpf}"), &["lift_threshold"], |rules| -> Verdict {
-            let image = blend_forward(rules, &splats, size, background);
-            let masks = Masks { label_map: &label_map, sampled: &sampled, gpf };
-            let votes = lift(rules, &image, &centres_of(&splats, before.len()), &masks);
-            let mut expected = before.clone();
-            lift_resolve(&votes, &mut expected);
-            let changed = expected.iter().zip(&before).filter(|(a, b)| a != b).count();
-            assert!(changed > 2, "only {changed} labels change");
-            let sure: Vec<usize> = (0..before.len()).filter(|&i| votes.margins[i] > 1e-5).collect();
-            assert!(sure.len() * 10 > before.len() * 9);
-            let pick = |of: &[u32]| sure.iter().map(|&i| of[i]).collect::<Vec<_>>();
-            exact(&pick(&actual), &pick(&expected))
+            lifted(&mut rig.borrow_mut(), rules, &before).expect("labels can be read")
         });
+        let mut rig = rig.into_inner();
         assert!(rig.get::<u32>(Buf::LABEL_KEYS, before.len()).iter().all(|&key| key == 0), "votes start over");
     }
 }

@@ -101,11 +101,6 @@ impl Rig {
         self.inner.rows(planes, count).expect("the planes can be read")
     }
 
-    /// Writes a set of planes; rows must hold f32 values.
-    pub fn put_rows(&mut self, planes: [Buf; 7], rows: &[Row]) {
-        self.inner.put_rows(planes, rows).expect("the planes fit");
-    }
-
     /// The gradients of the last step by Gaussian; 0 where it has no splat.
     pub fn gradient_rows(&mut self) -> Vec<Row> {
         self.inner.gradient_rows().expect("the gradients can be read")
