@@ -3,7 +3,7 @@
 //! Each seed is cut at every length, changed in every byte in four ways, and given hostile numbers at every place:
 //! as bytes of every width, and where it is text in place of every number.
 
-use super::targets::{Place, TARGETS, Target, memory_bound};
+use super::targets::{Place, TARGETS, Target};
 use crate::support::memory::peak_of;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
@@ -104,7 +104,7 @@ fn run(target: &'static Target) -> (usize, usize, usize) {
                 Ok(fine) => accepted += usize::from(fine),
                 Err(_) => panic!("{}: panics on a changed seed {index}, kept as {}", target.name, keep()),
             }
-            let bound = memory_bound(bytes.len());
+            let bound = place.memory_bound(bytes.len());
             assert!(peak <= bound, "{}: {peak} bytes for {} of {}", target.name, bytes.len(), keep());
             most = most.max(peak);
             cases += 1;

@@ -34,6 +34,6 @@ fn place() -> &'static Place {
 
 fuzz_target!(init: { place(); }, |data: &[u8]| {
     let (_, peak) = memory::peak_of(|| place().check(data));
-    let most = targets::memory_bound(data.len());
+    let most = place().memory_bound(data.len());
     assert!(peak <= most, "{peak} bytes of memory for a file of {}, {most} are allowed", data.len());
 });

@@ -29,16 +29,22 @@ pub struct Target {
     pub seeds: fn() -> Vec<Vec<u8>>,
     /// Makes a file of the bytes, where a checksum would keep all changes out.
     dress: fn(&[u8]) -> Vec<u8>,
+    /// Bytes of memory that each byte of the file may take.
+    per_byte: usize,
 }
 
-const PLAIN: Target =
-    Target { name: "", file: "", prepare: |_| (), read: |_, _| Ok(()), seeds: Vec::new, dress: <[u8]>::to_vec };
+const PLAIN: Target = Target {
+    name: "",
+    file: "",
+    prepare: |_| (),
+    read: |_, _| Ok(()),
+    seeds: Vec::new,
+    dress: <[u8]>::to_vec,
+    per_byte: 64,
+};
 
-/// Bytes of memory that a reader may take for a file of `length` bytes: the least that decoders need, and for each byte
-/// the 8192 samples that it may stand for, as floats and once more while they are decoded. All else takes far less.
-pub fn memory_bound(length: usize) -> usize {
-    (64 << 20) + 8192 * 4 * 2 * length
-}
+/// Files of compressed pixels: a byte may stand for 8192 samples, as floats and once more while they are decoded.
+const PIXELS: Target = Target { per_byte: 8192 * 4 * 2, ..PLAIN };
 
 /// All readers.
 pub const TARGETS: [Target; 30] = [
@@ -100,7 +106,7 @@ pub const TARGETS: [Target; 30] = [
     },
     Target { name: "ply_model", file: "model.ply", read: ply_model, seeds: seeds::ply_model, ..PLAIN },
     Target { name: "ply_cloud", file: "cloud.ply", read: ply_cloud, seeds: seeds::ply_cloud, ..PLAIN },
-    Target { name: "mask", file: "mask.png", read: id_mask, seeds: seeds::mask, dress: png_sums, ..PLAIN },
+    Target { name: "mask", file: "mask.png", read: id_mask, seeds: seeds::mask, dress: png_sums, ..PIXELS },
     Target {
         name: "mask_rgb",
         file: "in/00.png",
@@ -108,6 +114,7 @@ pub const TARGETS: [Target; 30] = [
         read: mask_rgb,
         seeds: seeds::mask_rgb,
         dress: png_sums,
+        ..PIXELS
     },
     Target {
         name: "mask_binary",
@@ -116,6 +123,7 @@ pub const TARGETS: [Target; 30] = [
         read: |folder, _| imported(folder, Format::BinaryFolders),
         seeds: seeds::mask_binary,
         dress: png_sums,
+        ..PIXELS
     },
     Target {
         name: "mask_auto",
@@ -124,6 +132,7 @@ pub const TARGETS: [Target; 30] = [
         read: |folder, _| imported(folder, Format::Auto),
         seeds: seeds::mask,
         dress: png_sums,
+        ..PIXELS
     },
     Target {
         name: "pred_json",
@@ -131,7 +140,7 @@ pub const TARGETS: [Target; 30] = [
         prepare: pred_masks,
         read: mask_rgb,
         seeds: || vec![seeds::pred_json()],
-        ..PLAIN
+        ..PIXELS
     },
     Target {
         name: "depth_png",
@@ -140,6 +149,7 @@ pub const TARGETS: [Target; 30] = [
         read: depth,
         seeds: seeds::depth_png,
         dress: png_sums,
+        ..PIXELS
     },
     Target {
         name: "depth_exr",
@@ -147,7 +157,7 @@ pub const TARGETS: [Target; 30] = [
         prepare: colmap_bin,
         read: depth,
         seeds: seeds::depth_exr,
-        ..PLAIN
+        ..PIXELS
     },
     Target {
         name: "depth_npy",
@@ -165,8 +175,8 @@ pub const TARGETS: [Target; 30] = [
         seeds: seeds::depth_pfm,
         ..PLAIN
     },
-    Target { name: "photo_png", file: "photo.png", read: photo, seeds: seeds::photo_png, dress: png_sums, ..PLAIN },
-    Target { name: "photo_jpeg", file: "photo.jpg", read: photo, seeds: seeds::photo_jpeg, ..PLAIN },
+    Target { name: "photo_png", file: "photo.png", read: photo, seeds: seeds::photo_png, dress: png_sums, ..PIXELS },
+    Target { name: "photo_jpeg", file: "photo.jpg", read: photo, seeds: seeds::photo_jpeg, ..PIXELS },
     Target {
         name: "checkpoint",
         file: "a.ckpt",
@@ -248,6 +258,12 @@ impl Place {
         let file = folder.path().join(target.file);
         std::fs::create_dir_all(file.parent().expect("a folder")).expect("a folder");
         Self { target, folder, file }
+    }
+
+    /// Bytes of memory that the reader may take for a file of `length` bytes; the constant part is what decoders and the
+    /// rest of a scene need.
+    pub fn memory_bound(&self, length: usize) -> usize {
+        (64 << 20) + self.target.per_byte * length
     }
 
     /// Puts the bytes into their file.
