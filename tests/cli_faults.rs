@@ -74,6 +74,61 @@ fn any_vulkan_call_may_fail() {
     }
 }
 
+/// Whatever Vulkan call of a training fails: its status, whole files, and a run that goes on afterwards to the same bits.
+#[test]
+fn any_vulkan_call_of_a_training_may_fail() {
+    let Some(_turn) = device() else { return };
+    let place = Place::new();
+    // Votes, densification, a checkpoint and a preview in six steps.
+    std::fs::write(place.path("short.toml"), SHORT).expect("settings");
+    let short = place.text("short.toml");
+    let flags = ["--config", &short];
+    succeeded(&place.trained("right", &flags));
+    let expected = place.model("right", 6);
+    let (mut tried, mut failed) = (0, 0);
+    for (kind, nth) in cases(&["DEVICE_LOST", "HOST_MEMORY", "DEVICE_MEMORY", "INITIALIZATION"]) {
+        let (fault, out) = (format!("vulkan:{nth}:{kind}"), format!("out-{nth}-{kind}"));
+        let output = place.trained_with(Some(&fault), &out, &flags);
+        let allowed = match kind {
+            "DEVICE_LOST" => &[0, 4, 6][..],
+            "INITIALIZATION" => &[0, 4],
+            _ => &[0, 4, 5],
+        };
+        let status = status(&output, allowed, &fault);
+        all_whole(&place.path(&out));
+        if !met(&output) {
+            assert_eq!(status, 0, "{fault}");
+            break;
+        }
+        (tried, failed) = (tried + 1, failed + u32::from(status != 0));
+        let said = stderr(&output);
+        if status == 6 {
+            assert!(said.contains("the device was lost; the last pass known to have started is"), "{fault}: {said}");
+        }
+        if status != 0 {
+            succeeded(&place.trained(&out, &[&flags[..], &["--resume"]].concat()));
+        }
+        let is_bounded = said.contains("from here on there are no more than");
+        assert!(
+            is_bounded || place.model(&out, 6) == expected,
+            "{fault}: another model than without the fault; {said}"
+        );
+    }
+    println!("{tried} Vulkan calls of a training were made to fail, {failed} of them ended it");
+    assert!(tried > 8 && failed * 2 > tried, "{failed} of {tried}");
+}
+
+const SHORT: &str = "
+iterations = 6
+checkpoint_every = 3
+preview_every = 4
+label_from = 2
+vote_every = 2
+densify_from = 1
+densify_interval = 2
+densify_grad_threshold = 1e-4
+";
+
 /// A full or broken disk at any moment of a training: its status, whole files, and a run that goes on afterwards.
 #[test]
 fn any_write_may_fail() {
@@ -206,6 +261,10 @@ fn a_lost_device_is_opened_again() {
     );
     // The others were lost while memory was set up, when there is no pass.
     assert!(healed > 2 && lost > 2 && named > 0, "{healed} healed, {named} named, {lost} lost");
+    // A driver may need a while until it has a device again.
+    let fault = "vkQueueSubmit:300:DEVICE_LOST,vkEnumeratePhysicalDevices:2:INITIALIZATION";
+    let said = succeeded(&place.trained_with(Some(fault), "slow", &flags));
+    assert!(said.contains("tried again in 1 s") && place.model("slow", 40) == expected, "{said}");
     // Checkpoints of an earlier run are nothing to go on from.
     let output =
         place.trained_with(Some("vkQueueSubmit:30:DEVICE_LOST"), "right", &["--restart", "--iterations", "40"]);
@@ -264,13 +323,22 @@ fn a_number_that_is_none_is_found_and_undone() {
     succeeded(&place.trained("right", &flags));
     let said = succeeded(&place.trained_with(Some("nan:27:NUMBER"), "healed", &flags));
     assert!(
-        said.contains("1 Gaussians with parameters that are not finite, the first is 0")
+        said.contains("1 Gaussians with positions, opacities or scales that are not finite, the first is 0")
             && said.contains("cull")
             && said.contains("view ")
             && said.contains("goes back to"),
         "{said}"
     );
     assert!(place.model("healed", 40) == place.model("right", 40), "healed, the model is the same");
+    // What comes again is met with smaller steps, once.
+    let said = succeeded(&place.trained_with(Some("nan:27:NUMBER:2"), "slower", &flags));
+    assert!(said.contains("all learning rates are half of what they were"), "{said}");
+    assert!(place.model("slower", 40) != place.model("right", 40));
+    let rates = labelgs::train::TrainState::read(&place.checkpoints("slower")[0].path).expect("a checkpoint").config;
+    assert_eq!(rates.feature_lr, 0.00125, "a resumed run goes on with them");
+    let output = place.trained_with(Some("nan:27:NUMBER:1000"), "broken", &flags);
+    assert_eq!(output.status.code(), Some(8), "{}", stderr(&output));
+    all_whole(&place.path("broken"));
     // Before there is a checkpoint there is nothing to go back to.
     let output = place.trained_with(Some("nan:2:NUMBER"), "lost", &flags);
     assert_eq!(output.status.code(), Some(8), "{}", stderr(&output));

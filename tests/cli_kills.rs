@@ -6,6 +6,7 @@ use crate::support::runs::{Place, all_whole, contents, kills, succeeded};
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
 use std::collections::BTreeMap;
+use std::os::unix::process::ExitStatusExt;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -40,20 +41,24 @@ fn exports_may_be_killed_at_any_moment() {
         let args: Vec<String> = args.iter().map(|part| (*part).to_owned()).chain([to]).collect();
         let words: Vec<&str> = args.iter().map(String::as_str).collect();
         std::fs::create_dir_all(&out).expect("a folder");
+        succeeded(&place.labelgs(&words));
         let start = Instant::now();
         succeeded(&place.labelgs(&words));
         let took = start.elapsed();
         let right = results(&place.path("out"));
         assert!(!right.is_empty(), "{name} writes nothing");
-        // Half of them over files that are there.
-        for kill in 0..kills {
-            if kill % 2 == 0 {
+        let (mut killed, mut started) = (0, 0);
+        while killed < kills {
+            // Half of them over files that are there.
+            if started % 2 == 0 {
                 std::fs::remove_dir_all(&out).and_then(|()| std::fs::create_dir(&out)).expect("an empty folder");
             }
             let mut child = place.spawned(&args);
             std::thread::sleep(took.mul_f64(random.random_range(0.3..1.0)));
             child.kill().expect("killed or done");
-            child.wait().expect("a child");
+            killed += u32::from(child.wait().expect("a child").signal().is_some());
+            started += 1;
+            assert!(started < 20 * kills, "{name} is done before it can be killed");
             all_whole(&place.path("out"));
             assert!(results(&place.path("out")).iter().all(|(path, bytes)| right.get(path) == Some(bytes)), "{name}");
         }

@@ -6,6 +6,8 @@ use labelgs::io::run_folder::Lock;
 use labelgs::train::TrainState;
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
+use std::io::{BufRead, BufReader};
+use std::os::unix::process::ExitStatusExt;
 use std::path::PathBuf;
 use std::process::{Child, Stdio};
 use std::time::{Duration, Instant};
@@ -27,36 +29,50 @@ fn wait_until(child: &mut Child, what: impl Fn() -> bool) {
 fn kills_at_any_moment_cost_no_bit() {
     let Some(_turn) = device() else { return };
     let place = Place::new();
+    succeeded(&place.trained("first", &["--config", &place.settings()]));
     let start = Instant::now();
     succeeded(&place.trained("straight", &["--config", &place.settings()]));
     let run = start.elapsed();
+    assert_eq!(place.checkpoints("straight").len(), 1, "a run that has ended leaves its last one");
     let kills = kills(KILLS);
     let mut random = Pcg32::seed_from_u64(u64::from(kills));
-    let mut steps = Vec::new();
-    for kill in 0..kills {
-        let newest = || place.checkpoints("out").first().map_or(0, |found| found.number);
-        let before = newest();
-        let args = place.train("out", &["--config", &place.settings(), "--resume"]);
-        let mut child = place.spawned(&args);
-        // Every second one dies anywhere, the others in or after writing.
-        if kill % 2 == 0 {
-            wait_until(&mut child, || newest() > before);
-            std::thread::sleep(Duration::from_micros(random.random_range(0..40_000)));
-        } else {
-            std::thread::sleep(run.mul_f64(random.random_range(0.0..1.0)));
+    let newest = || place.checkpoints("out").first().map_or((0, 0), |found| (found.number, found.step));
+    // Steps of the checkpoints that the kills of a run left.
+    let (mut killed, mut steps, mut ended, mut began) = (0, Vec::new(), 0, 0);
+    while killed < kills || !steps.is_empty() {
+        let (before, step) = newest();
+        let mut child = place.spawned(&place.train("out", &["--config", &place.settings(), "--resume"]));
+        if killed < kills {
+            // Every second one dies anywhere, the others in or after writing.
+            if killed % 2 == 0 {
+                wait_until(&mut child, || newest().0 > before);
+                std::thread::sleep(Duration::from_micros(random.random_range(0..40_000)));
+            } else {
+                std::thread::sleep(run.mul_f64(random.random_range(0.0..1.0)));
+            }
+            child.kill().expect("killed or done");
         }
-        child.kill().expect("killed or done");
-        child.wait().expect("a child");
+        let status = child.wait().expect("a child");
         all_whole(&place.path("out"));
-        steps.push(place.checkpoints("out").first().map_or(0, |found| found.step));
+        assert!(newest().1 >= step, "a checkpoint is gone: {step} and {:?}", newest());
+        if status.signal().is_some() {
+            (killed, began) = (killed + 1, began + u32::from(newest().1 > 0));
+            steps.push(newest().1);
+            continue;
+        }
+        // It has got to its end between the kills.
+        assert!(status.success(), "{status}");
+        assert!(
+            place.model("out", STEPS) == place.model("straight", STEPS),
+            "killed after {steps:?}: the models differ"
+        );
+        assert!(files(&place.path("out")).iter().all(|path| path.extension().is_none_or(|name| name != "tmp")));
+        assert_eq!(place.checkpoints("out").iter().map(|found| found.step).collect::<Vec<_>>(), [STEPS]);
+        std::fs::remove_dir_all(place.path("out")).expect("removed");
+        (ended, steps) = (ended + 1, Vec::new());
     }
-    assert!(steps.is_sorted() && steps.iter().any(|&step| step > 0), "{steps:?}");
-    let text = succeeded(&place.trained("out", &["--resume"]));
-    assert!(text.contains("goes on after step"), "{text}");
-    assert!(place.model("out", STEPS) == place.model("straight", STEPS), "killed after {steps:?}: the models differ");
-    assert!(files(&place.path("out")).iter().all(|path| path.extension().is_none_or(|name| name != "tmp")));
-    assert_eq!(place.checkpoints("out").iter().map(|found| found.step).collect::<Vec<_>>(), [STEPS]);
-    assert_eq!(place.checkpoints("straight").len(), 1, "a run that has ended leaves its last one");
+    println!("{killed} kills, {began} of them after a checkpoint; {ended} trainings came to their end between them");
+    assert!(killed == kills && began > 0 && ended > 0);
 }
 
 #[cfg(unix)]
@@ -80,13 +96,33 @@ fn a_signal_leaves_a_checkpoint_and_two_end_at_once() {
         assert!(found.len() == 1 && state.step == found[0].step && state.step >= 3);
         assert!(!place.model(out, state.step).is_empty());
     }
-    let mut child = place.spawned(&place.train("twice", &long));
-    wait_until(&mut child, || place.path("twice/point_cloud/iteration_3/point_cloud.ply").exists());
+    // At any moment: at once before the first step, with a checkpoint after it.
+    let mut random = Pcg32::seed_from_u64(5);
+    for turn in 0..kills(4) {
+        let out = format!("any-{turn}");
+        let mut child = place.spawned(&place.train(&out, &long));
+        std::thread::sleep(Duration::from_micros(random.random_range(0..1_500_000)));
+        send(&child, "-INT");
+        assert_eq!(child.wait().expect("a child").code(), Some(130), "{out}");
+        all_whole(&place.path(&out));
+        let left = place.checkpoints(&out).len();
+        assert!(left <= 1 && (left == 1) == place.path(&out).join("metrics.json").exists(), "{out}: {left}");
+    }
+    // A step that takes a minute: the first signal waits for it, the second does not.
+    let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_labelgs"));
+    command.env("LABELGS_VALIDATION", "off").env("LABELGS_CACHE", place.path("cache"));
+    command.env("LABELGS_FAULT", "vkQueueSubmit:300:SLOW").args(place.train("twice", &long));
+    let mut child = command.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().expect("it runs");
+    let mut said = BufReader::new(child.stderr.take().expect("a pipe")).lines();
+    let is_slow = |line: Result<String, std::io::Error>| line.is_ok_and(|line| line.contains("Slow at vkQueueSubmit"));
+    assert!(said.any(is_slow), "the slow step comes");
     send(&child, "-INT");
-    std::thread::sleep(Duration::from_millis(1));
+    std::thread::sleep(Duration::from_millis(500));
+    assert!(child.try_wait().expect("a child").is_none(), "the first signal lets the step come to its end");
     send(&child, "-INT");
     assert_eq!(child.wait().expect("a child").code(), Some(130));
     all_whole(&place.path("twice"));
+    assert!(place.checkpoints("twice").is_empty(), "the second one waits for no checkpoint");
 }
 
 #[test]
@@ -160,6 +196,56 @@ fn a_damaged_checkpoint_gives_way_to_the_one_before() {
     }
     let output = place.trained("out", &["--resume"]);
     assert_eq!(output.status.code(), Some(3), "{}", stderr(&output));
+}
+
+/// Masks in which no object is to be seen: there are labels to ask for, and none to learn.
+#[test]
+fn masks_without_objects_are_resumed_like_others() {
+    let Some(_turn) = device() else { return };
+    let place = Place::new();
+    for mask in files(&place.path("scene/masks")).iter().filter(|path| path.extension().is_some_and(|e| e == "png")) {
+        image::GrayImage::new(64, 48).save(mask).expect("a mask");
+    }
+    let flags = ["--checkpoint-every", "2", "--label-from", "2"];
+    succeeded(&place.trained("straight", &[&flags[..], &["--iterations", "8"]].concat()));
+    succeeded(&place.trained("out", &[&flags[..], &["--iterations", "4"]].concat()));
+    let text = succeeded(&place.trained("out", &["--resume", "--iterations", "8"]));
+    assert!(text.contains("goes on after step 4"), "{text}");
+    assert!(place.model("out", 8) == place.model("straight", 8));
+}
+
+/// What the scene was read with is in the checkpoint.
+#[test]
+fn a_resumed_run_reads_the_scene_as_the_first_did() {
+    let Some(_turn) = device() else { return };
+    let place = Place::new();
+    std::fs::write(place.path("scene/images/003.png"), b"no photo").expect("written");
+    let flags = ["--iterations", "4", "--checkpoint-every", "2"];
+    assert_eq!(place.trained("out", &flags).status.code(), Some(3), "a sixth is more than a tenth");
+    succeeded(&place.trained("out", &[&flags[..], &["--max-bad-photos", "0.3"]].concat()));
+    succeeded(&place.trained("out", &["--resume", "--iterations", "6"]));
+    assert!(!place.model("out", 6).is_empty());
+}
+
+/// Folders that nobody may write to, and previews that cannot be written on the way.
+#[cfg(target_os = "linux")]
+#[test]
+fn what_cannot_be_written_is_said_early_or_borne() {
+    let Some(_turn) = device() else { return };
+    let place = Place::new();
+    let masks = place.text("scene/masks");
+    let output = place.labelgs(&["train", &place.text("scene"), "-o", "/sys/labelgs", "--masks", &masks]);
+    assert_eq!(output.status.code(), Some(7), "{}", stderr(&output));
+    assert!(stderr(&output).contains("/sys/labelgs: cannot be written"), "{}", stderr(&output));
+    assert!(!stderr(&output).contains("memory to start with"), "nothing was trained: {}", stderr(&output));
+    // A file in the place of the folder of previews.
+    std::fs::create_dir_all(place.path("out")).expect("a folder");
+    std::fs::write(place.path("out/preview"), b"").expect("a file");
+    let output = place.trained("out", &["--iterations", "6", "--preview-every", "2", "--checkpoint-every", "2"]);
+    let said = stderr(&output);
+    assert!(said.matches("training goes on without it").count() == 2, "{said}");
+    assert_eq!(output.status.code(), Some(7), "that of the end is missing: {said}");
+    assert!(!place.model("out", 6).is_empty() && place.checkpoints("out")[0].step == 6);
 }
 
 /// A bound on the size of files stands for a full disk: the model fits, a checkpoint does not.
@@ -252,7 +338,16 @@ fn checkpoints_of_an_earlier_run_stay_until_there_are_new_ones() {
     let text = succeeded(&place.trained("out", &["--iterations", "3", "--checkpoint-every", "0"]));
     assert!(text.contains("of an earlier run") && text.contains("--resume goes on"), "{text}");
     assert_eq!(place.checkpoints("out"), old);
-    succeeded(&place.trained("out", &["--iterations", "5", "--checkpoint-every", "2"]));
+    let models = || {
+        let found = files(&place.path("out/point_cloud")).into_iter();
+        found
+            .map(|path| path.parent().and_then(|step| step.file_name()?.to_str().map(str::to_owned)))
+            .collect::<Vec<_>>()
+    };
+    assert!(text.contains("iteration_9/point_cloud.ply is of an earlier run"), "{text}");
+    assert_eq!(models(), [Some("iteration_3".to_owned())], "what other commands take is of the last run");
+    succeeded(&place.trained("out", &["--iterations", "5", "--checkpoint-every", "2", "--save-at", "2"]));
+    assert_eq!(models().len(), 2, "{:?}", models());
     let steps: Vec<u32> = place.checkpoints("out").iter().map(|found| found.step).collect();
     assert_eq!(steps, [5], "the run of 9 steps is nobody's business any more");
     assert!(succeeded(&place.trained("out", &["--resume"])).contains("goes on after step 5"));

@@ -3,7 +3,9 @@
 #![cfg(target_os = "linux")]
 
 use crate::support::device;
-use crate::support::runs::{Place, copy, files, stderr, succeeded};
+use crate::support::runs::{Place, all_whole, copy, files, stderr, succeeded};
+use labelgs::io::ply::write_gaussians;
+use labelgs::scene::Gaussians;
 use std::collections::BTreeMap;
 use std::ffi::{OsStr, OsString};
 use std::os::unix::ffi::OsStrExt;
@@ -109,6 +111,71 @@ fn nobody_has_to_listen() {
     }
 }
 
+/// Runs the tool with so much address space, MiB.
+fn within(place: &Place, megabytes: u32, args: &[String]) -> Output {
+    let mut command = Command::new("sh");
+    command.args(["-c", r#"ulimit -c 0; ulimit -v "$1"; shift; exec "$@""#, "sh", &(megabytes * 1024).to_string()]);
+    command.env("LABELGS_VALIDATION", "off").env("LABELGS_CACHE", place.path("cache"));
+    command.arg(env!("CARGO_BIN_EXE_labelgs")).args(args).output().expect("a shell")
+}
+
+/// A computer without memory: the status for that, with the number, and no half of a file.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_computer_may_be_out_of_memory() {
+    let Some(_turn) = device() else { return };
+    let place = Place::new();
+    let [model, part, right] = ["model.ply", "part.ply", "right.ply"].map(|name| place.text(name));
+    let rows = 300_000;
+    let gaussians = Gaussians {
+        means: (0..rows).map(|row| [row as f32, 0.0, 0.0]).collect(),
+        quats: vec![[1.0, 0.0, 0.0, 0.0]; rows],
+        scales: vec![[0.0; 3]; rows],
+        opacities: vec![0.0; rows],
+        sh0: vec![[0.0; 3]; rows],
+        ..Gaussians::default()
+    };
+    write_gaussians(&model, &gaussians).expect("written");
+    let extract = |to: &str| ["extract", &model, "--labels", "0", "-o", to].map(str::to_owned);
+    succeeded(&place.labelgs(&extract(&right).each_ref().map(String::as_str)));
+    let (mut done, mut refused) = (0, 0);
+    for megabytes in (30..400).step_by(10) {
+        let output = within(&place, megabytes, &extract(&part));
+        let written = std::fs::read(&part).ok();
+        match output.status.code() {
+            Some(0) => {
+                done += 1;
+                assert!(written == std::fs::read(&right).ok(), "{megabytes} MiB: another file than with memory");
+                std::fs::remove_file(&part).expect("removed");
+            }
+            Some(5) => {
+                refused += 1;
+                let said = stderr(&output);
+                assert!(said.contains("the memory of this computer ran out when "), "{megabytes} MiB: {said}");
+                assert!(written.is_none(), "{megabytes} MiB: half of a file");
+            }
+            _ => panic!("{megabytes} MiB: {}; {}", output.status, stderr(&output)),
+        }
+    }
+    println!("{refused} of {} runs had too little memory", done + refused);
+    assert!(done > 3 && refused > 3, "{done}, {refused}");
+    // In a training the driver may be the one that finds no memory. It may end the process by a signal, then; what is
+    // written stays whole, and the training goes on where there is memory.
+    succeeded(&place.trained("right", &["--iterations", "8", "--checkpoint-every", "4"]));
+    for megabytes in (200..1200).step_by(200) {
+        let out = format!("out-{megabytes}");
+        let flags = ["--iterations", "8", "--checkpoint-every", "4", "--resume"];
+        let output = within(&place, megabytes, &place.train(&place.text(&out), &flags));
+        assert!(matches!(output.status.code(), None | Some(0 | 4 | 5)), "{}: {}", output.status, stderr(&output));
+        assert!(!stderr(&output).contains("bug in labelgs"), "{megabytes} MiB: {}", stderr(&output));
+        if place.path(&out).exists() {
+            all_whole(&place.path(&out));
+        }
+        succeeded(&place.trained(&out, &flags));
+        assert!(place.model(&out, 8) == place.model("right", 8), "{megabytes} MiB");
+    }
+}
+
 /// Bytes and times of every file below a folder.
 fn state(folder: &Path) -> BTreeMap<PathBuf, (Vec<u8>, std::time::SystemTime)> {
     let time = |path: &Path| std::fs::metadata(path).and_then(|found| found.modified()).expect("a time");
@@ -166,5 +233,19 @@ fn links_are_followed() {
     // A link that leads nowhere.
     symlink(place.path("gone"), place.path("nowhere")).expect("a link");
     let output = train(&place, &linked, &place.path("nowhere"), &["--iterations", "4"]);
+    assert_eq!(output.status.code(), Some(7), "{}", stderr(&output));
+    // A file that is not there yet may be named by a link, and a link may be the system's name of a pipe.
+    let model = place.text("right/point_cloud/iteration_4/point_cloud.ply");
+    symlink("later.ply", place.path("link.ply")).expect("a link");
+    let extract = ["extract", &model, "--labels", "0", "-o"];
+    succeeded(&place.labelgs(&[&extract[..], &[&place.text("link.ply")]].concat()));
+    let bytes = std::fs::read(place.path("later.ply")).expect("what the link names");
+    assert!(place.path("link.ply").is_symlink());
+    let output = place.labelgs(&[&extract[..], &["/dev/stdout", "-q"]].concat());
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    assert!(output.stdout.starts_with(&bytes), "the file comes out of the pipe");
+    symlink("circle-b", place.path("circle-a")).expect("a link");
+    symlink("circle-a", place.path("circle-b")).expect("a link");
+    let output = place.labelgs(&[&extract[..], &[&place.text("circle-a")]].concat());
     assert_eq!(output.status.code(), Some(7), "{}", stderr(&output));
 }

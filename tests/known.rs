@@ -7,7 +7,8 @@ use labelgs::shaders;
 use rspirv::dr::Operand;
 use rspirv::spirv::{Capability, Op};
 
-/// Atomics on floats are missing on some devices and add in no fixed order: no kernel has any.
+/// Atomics on floats are missing on some devices and add in no fixed order: no kernel has any. Integers and floats of 64
+/// bits are missing on others.
 #[test]
 fn no_kernel_has_atomics_on_floats() {
     for shader in shaders::ALL {
@@ -21,13 +22,111 @@ fn no_kernel_has_atomics_on_floats() {
             );
             if let [Operand::Capability(needed)] = instruction.operands.as_slice() {
                 assert!(
-                    !matches!(needed, Capability::AtomicFloat32AddEXT | Capability::Int64Atomics | Capability::Float64),
+                    !matches!(
+                        needed,
+                        Capability::AtomicFloat32AddEXT
+                            | Capability::Int64Atomics
+                            | Capability::Int64
+                            | Capability::Float64
+                    ),
                     "{} needs {needed:?}",
                     shader.name
                 );
             }
         }
     }
+}
+
+/// The tool under the validation layer, in the mode that the tests run in: a broken rule is a bug of ours, with its status.
+#[test]
+fn commands_break_no_rule_of_vulkan() {
+    let Some(turn) = device() else { return };
+    if !turn.is_validated() {
+        return;
+    }
+    let place = Place::new();
+    let [scene, masks, out] = ["scene", "scene/masks", "out"].map(|name| place.text(name));
+    let mode = std::env::var("LABELGS_VALIDATION").unwrap_or("on".to_owned());
+    let (settings, lifted) = (place.settings(), place.text("lifted.ply"));
+    let commands: [&[&str]; 6] = [
+        &["train", &scene, "-o", &out, "--masks", &masks, "--config", &settings],
+        &["train", &scene, "-o", &out, "--masks", &masks, "--resume", "--iterations", "44"],
+        &["render", &out, "--scene", &scene, "--what", "rgb,labels,depth", "-o", &place.text("pictures")],
+        &["label", &out, "--scene", &scene, "--masks", &masks, "-o", &lifted],
+        &["eval", &out, "--scene", &scene, "--masks", &masks],
+        &["occlusion", &scene, "--masks", &masks, "--model", &out, "-o", &place.text("occlusion.json")],
+    ];
+    for args in commands {
+        let mut command = assert_cmd::Command::cargo_bin("labelgs").expect("the tool is built");
+        let output = command.env("LABELGS_VALIDATION", &mode).env("LABELGS_CACHE", "off").args(args).output();
+        succeeded(&output.expect("it runs"));
+    }
+}
+
+/// Labels beyond those of the masks, up to the last that there is: tables made for the masks' ids do not hold them.
+#[test]
+fn labels_beyond_those_of_the_masks_are_no_surprise() {
+    let Some(_turn) = device() else { return };
+    let place = Place::new();
+    let [scene, masks, model] = ["scene", "scene/masks", "model.ply"].map(|name| place.text(name));
+    succeeded(&place.trained("out", &["--config", &place.settings()]));
+    let found = place.path("out/point_cloud/iteration_40/point_cloud.ply");
+    let mut gaussians = labelgs::io::ply::read_gaussians(&found).expect("a model").gaussians;
+    let labels = gaussians.labels.as_mut().expect("labels");
+    labels.iter_mut().step_by(3).for_each(|label| *label = 65_535);
+    labelgs::io::ply::write_gaussians(&model, &gaussians).expect("written");
+    let commands: [&[&str]; 6] = [
+        &["list", &model],
+        &["render", &model, "--scene", &scene, "--what", "rgb,labels", "-o", &place.text("pictures")],
+        &["render", &model, "--scene", &scene, "--only", "65535", "-o", &place.text("one")],
+        &["eval", &model, "--scene", &scene, "--masks", &masks],
+        &["label", &model, "--scene", &scene, "--masks", &masks, "-o", &place.text("again.ply")],
+        &["remove", &model, "--labels", "65535", "-o", &place.text("rest.ply")],
+    ];
+    for args in commands {
+        succeeded(&place.labelgs(args));
+    }
+}
+
+/// Buffers that a device bounds below what a training grows to: it goes on with as many Gaussians as fit, or ends with the
+/// numbers; it never asks for more than the limit.
+#[test]
+fn a_training_meets_the_limits_of_a_device() {
+    let Some(_turn) = device() else { return };
+    let place = Place::new();
+    let flags = ["--config", &place.settings(), "--densify-grad-threshold", "1e-9"];
+    let free = succeeded(&place.trained("free", &flags));
+    let bound = "from here on only the best may grow";
+    assert!(!free.contains(bound), "{free}");
+    let mut outcomes = std::collections::BTreeMap::new();
+    for (name, limit) in [
+        ("SSBO", "96K"),
+        ("SSBO", "160K"),
+        ("SSBO", "256K"),
+        ("TEXELS", "16K"),
+        ("ALLOCATION", "256K"),
+        ("MEMORY", "8M"),
+        ("MEMORY", "10M"),
+    ] {
+        let out = format!("{name}-{limit}");
+        let mut command = assert_cmd::Command::cargo_bin("labelgs").expect("the tool is built");
+        command.env("LABELGS_VALIDATION", "off").env("LABELGS_CACHE", place.path("cache"));
+        command.env(format!("LABELGS_LIMIT_{name}"), limit).args(place.train(&place.text(&out), &flags));
+        let output = command.output().expect("it runs");
+        let said = stderr(&output);
+        let outcome = match output.status.code() {
+            Some(0) if said.contains(bound) => "with a bound",
+            Some(0) => "as without",
+            Some(5) if said.contains(" bytes, ") && said.contains("lower ") => "refused with numbers",
+            other => panic!("{out}: {other:?}; {said}"),
+        };
+        *outcomes.entry(outcome).or_insert(0) += 1;
+        if output.status.success() {
+            assert!(!place.model(&out, 40).is_empty());
+        }
+    }
+    println!("{outcomes:?}");
+    assert!(outcomes.contains_key("with a bound") && outcomes.contains_key("refused with numbers"), "{outcomes:?}");
 }
 
 /// A model is no checkpoint, whatever it is called: the moments of Adam would be missing.

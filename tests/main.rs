@@ -45,6 +45,7 @@ mod registry;
 mod sched;
 mod segments;
 mod selftest;
+mod sentinel;
 mod shadergen;
 mod stress;
 mod synth;

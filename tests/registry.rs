@@ -143,6 +143,17 @@ fn every_buffer_is_used_by_some_list() {
     assert_eq!(unused.map(|(_, decl)| decl.name).collect::<Vec<_>>(), Vec::<&str>::new());
 }
 
+/// Strips of the loss and butterflies end at 64 lanes; no kernel needs fewer than 8.
+#[test]
+fn subgroups_without_kernels_have_no_shape() {
+    for subgroup in [8, 16, 32, 64] {
+        KernelShape::new(subgroup, false).check().expect("kernels");
+    }
+    for subgroup in [1, 4, 128] {
+        assert!(KernelShape::new(subgroup, false).check().is_err(), "subgroups of {subgroup}");
+    }
+}
+
 #[test]
 fn every_list_can_be_planned_and_printed() {
     for (capacity, list) in lists() {
@@ -152,6 +163,21 @@ fn every_list_can_be_planned_and_printed() {
         assert_eq!(plan.items.len(), list.work.len());
         assert!(plan.items.iter().all(|item| text.contains(&item.label)), "{text}");
         assert!(list.work.len() < 2 || plan.barrier_count() > 0, "{}", list.name);
+    }
+}
+
+/// More tiles of layers than workgroups of an axis: `--label-samples all` in a view full of objects.
+#[test]
+fn two_hundred_layers_can_be_planned() {
+    let labels = Some(LabelRoom { max_label: 200, layers: 200, vote_columns: 16 });
+    let room = Room { gaussians: 100_000, size: (1920, 1080), trained: true, labels };
+    let shape = KernelShape::new(8, true);
+    let capacity = capacity(&shape, &room);
+    assert!(capacity.virtual_tiles.div_ceil(64) > 65_535, "an axis would do");
+    let limits = Limits { max_storage_range: 1 << 32, max_allocation: 1 << 34, ..Limits::default() };
+    for list in Engine::lists_of(&shape, &capacity, &room) {
+        let plan = Plan::new(TABLE, &capacity, &list, &limits, PlanOptions::default());
+        plan.unwrap_or_else(|error| panic!("{}: {error}", list.name));
     }
 }
 

@@ -1,7 +1,9 @@
 //! Lists of splats that are longer than one dispatch may walk.
 
+use crate::pass::rig::{Rig, readable};
 use crate::reference::{blend, model::Model, project, rules::Rules};
 use crate::support::device;
+use crate::support::scenes::{Shape, scene};
 use labelgs::engine::{Engine, Room};
 use labelgs::infer::render::render;
 use labelgs::pass::KernelShape;
@@ -105,4 +107,19 @@ fn segments_change_nothing() {
     let ((whole, one), (parts, many)) = (run(40_960), run(16));
     assert!(one == 1 && many > 2, "{one} and {many} segments");
     assert_eq!(whole, parts);
+}
+
+/// Pictures narrower than a tile have more tiles than pixels by a tile's pixels; all have their segments.
+#[test]
+fn segments_of_narrow_pictures_have_their_room() {
+    for (width, height) in [(3, 200), (1, 150), (200, 3)] {
+        let Some(turn) = device() else { return };
+        let shape = KernelShape { segment_length: 16, ..KernelShape::of(turn.capabilities()) };
+        let made = scene(61, &Shape { gaussians: 400, width, height, scales: (0.3, 1.5), ..Shape::default() });
+        // Guards behind the buffers are looked at after each run.
+        let mut rig = Rig::with_options(turn, made, true, shape, readable());
+        rig.train();
+        let segments = rig.engine.sched().capacity().segments;
+        assert!(segments > 1, "{width} x {height}: one segment shows nothing");
+    }
 }

@@ -55,11 +55,11 @@ void main() {
     vec3 direction = normalize(mean.xyz - u.camera_centre);
     float basis[15];
     sh_basis(direction, SH_DEGREE, basis);
-    vec3 colour = max(sh_colour(i, basis), 0.0);
+    vec3 raw = sh_colour(i, basis), colour = max(raw, 0.0); // drivers take 0 for the larger of it and NaN
 
     TileRect rect = tile_rect(u, centre, extent);
     uint touched = 0u, tx = rect.x_min, ty = rect.y_min;
-    bool sane = finite(centre.x + centre.y + q.x + q.y + q.z + log2_o + colour.x + colour.y + colour.z);
+    bool sane = finite(centre.x + centre.y + q.x + q.y + q.z + log2_o + raw.x + raw.y + raw.z);
     if (!sane) {
         atomicAdd(counters.unprojected_count, 1u);
         atomicMin(counters.unprojected_first, i);

@@ -61,6 +61,7 @@ pub fn train(turn: &Turn, rule: LabelRule, options: SchedulerOptions, change: im
     let mut dataset = small();
     let config = config(rule);
     let start = initial_gaussians(&dataset, config.seed, 100).expect("points");
+    let has_guards = options.plan.guards;
     let mut trainer = Trainer::new(turn.gpu(), config.clone(), &mut dataset, &start, options).expect("a trainer");
     change(&mut trainer);
     let mut losses = Vec::new();
@@ -68,6 +69,9 @@ pub fn train(turn: &Turn, rule: LabelRule, options: SchedulerOptions, change: im
         losses.extend(trainer.step().expect("a step").iter().map(|report| (report.loss + report.label_loss).to_bits()));
     }
     losses.extend(trainer.drain().expect("the last steps").iter().map(|r| (r.loss + r.label_loss).to_bits()));
+    if has_guards {
+        trainer.engine_mut().sched_mut().check_guards().expect("no pass writes outside of its buffers");
+    }
     let memory = trainer.engine_mut().sched().memory_total();
     let model = trainer.labelled_model().expect("a model");
     let folder = tempfile::tempdir().expect("a folder");

@@ -100,28 +100,45 @@ fn scan_of_visible_keys() {
 #[test]
 fn sort_of_keys_and_values() {
     let Some(turn) = device() else { return };
-    let mut engine = engine(turn.gpu());
+    let cases = [(ITEMS, u32::MAX), (ITEMS, 3), (ITEMS, 1), (1000, 300), (9, 4), (1, 9), (0, 1)];
+    sort_exactly(&mut engine(turn.gpu()), &cases);
+}
+
+/// Sorts so many keys of so many different ones.
+fn sort_exactly(engine: &mut Engine, cases: &[(usize, u32)]) {
     let buffers = SortBuffers {
         keys: [Buf::DEPTH_KEYS_A, Buf::DEPTH_KEYS_B],
         values: [Buf::DEPTH_VALUES_A, Buf::DEPTH_VALUES_B],
     };
     let mut found = None;
-    let id = list(&mut engine, |b| found = Some(sort::sort(b, buffers, 32, Count::Splats, false)));
+    let id = list(engine, |b| found = Some(sort::sort(b, buffers, 32, Count::Splats, false)));
     let (keys_out, values_out) = found.expect("the sort was declared");
     let mut random = generator(73);
-    for (count, different) in [(ITEMS, u32::MAX), (ITEMS, 3), (ITEMS, 1), (1000, 300), (9, 4), (1, 9), (0, 1)] {
+    for &(count, different) in cases {
         let keys: Vec<u32> = (0..count).map(|_| random.random_range(0..different)).collect();
         let values: Vec<u32> = (0..count as u32).map(|i| i.wrapping_mul(0x9e37_79b9)).collect();
-        announce(&mut engine, count);
+        announce(engine, count);
         engine.sched_mut().upload(buffers.keys[0], 0, 0, &keys).expect("upload");
         engine.sched_mut().upload(buffers.values[0], 0, 0, &values).expect("upload");
         engine.sched_mut().run(id, 0).expect("run");
         engine.sched_mut().check_guards().expect("no pass writes outside of its buffers");
         let order = radix_sort(&keys);
         let by_order = |of: &[u32]| order.iter().map(|&place| of[place]).collect::<Vec<_>>();
-        check("keys", exact(&get(&mut engine, keys_out, count), &by_order(&keys)));
-        check("values", exact(&get(&mut engine, values_out, count), &by_order(&values)));
+        check("keys", exact(&get(engine, keys_out, count), &by_order(&keys)));
+        check("values", exact(&get(engine, values_out, count), &by_order(&values)));
     }
+}
+
+/// As many lanes as 33 million pairs have: the scan of their histogram stays below lavapipe's 65,535 rounds.
+#[test]
+fn sort_with_the_lanes_of_a_large_scene() {
+    let Some(turn) = device() else { return };
+    let mut engine = engine(turn.gpu());
+    let (subgroup, digit_bits) = (u64::from(engine.shape().subgroup), engine.shape().digit_bits);
+    let lanes = 140 * subgroup;
+    let large = Capacity { sort_lanes: lanes, sort_cells: lanes << digit_bits, ..*engine.sched().capacity() };
+    engine.sched_mut().set_capacity(large).expect("room");
+    sort_exactly(&mut engine, &[(ITEMS, u32::MAX), (ITEMS, 3)]);
 }
 
 /// From one pass of the sort to all that 32 bits take; the values are the places before the sort.

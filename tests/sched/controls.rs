@@ -1,12 +1,14 @@
 //! Negative controls: what each mode of the validation layer is there for, it must find.
 
 use super::*;
+use crate::support::device::{NO_LAYER, layer_is_required};
 use labelgs::gpu::{Gpu, GpuOptions, Message, Validation};
 
 /// Messages of a device of its own in a mode; none where the layer is not installed.
 fn messages(validation: Validation, list: &PassList) -> Option<Vec<Message>> {
     let gpu = Gpu::new(&GpuOptions { validation, ..GpuOptions::from_env().unwrap() }).unwrap();
     if !gpu.is_validated() {
+        assert!(!layer_is_required(), "{NO_LAYER}");
         eprintln!("skipped: the validation layer is not installed");
         return None;
     }

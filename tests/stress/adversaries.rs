@@ -131,6 +131,55 @@ fn rotations_of_any_length() {
     holds("rotations of any length", made, true, Bound { colour: 5e-6, gradient: 1.1e-5 });
 }
 
+/// Rotations of which f32 squares nothing, or no float, are still rotations. The gradient of one of length 1e-20 is 1e20
+/// times as large as of one of length 1, and what is beyond 1e18 is dropped: all of it is missing, nothing is wrong.
+#[test]
+fn rotations_that_cannot_be_squared() {
+    let of_length = |length: f32| changed(213, small(), |row, g| g.quats[row] = g.quats[row].map(|v| v * length));
+    holds("rotations of 1e20", of_length(1e20), true, Bound { colour: 5e-6, gradient: 1.1e-5 });
+    holds("rotations of 1e-20", of_length(1e-20), true, Bound { colour: 5e-6, gradient: 1.0 });
+}
+
+/// A rotation of length 0 is none: the projection is not a number, the Gaussian has no splat, and is counted.
+#[test]
+fn rotations_of_length_zero() {
+    let Some(turn) = device() else { return };
+    let made = changed(214, small(), |row, g| {
+        if row % 8 == 0 {
+            g.quats[row] = [0.0; 4];
+        }
+    });
+    let mut rig = Rig::new(turn, made, true);
+    let counters = rig.train().counters;
+    assert_eq!(counters.unprojected_first, 0);
+    assert!((1..=10).contains(&counters.unprojected_count), "{counters:?}");
+    assert!(rig.gradient_rows().iter().all(|row| row.floats().iter().all(|value| value.is_finite())));
+    let pixels = rig.pixels();
+    let image = rig.get::<[f32; 4]>(labelgs::plan::Buf::IMAGE, pixels);
+    assert!(image.iter().flatten().all(|value| value.is_finite()));
+}
+
+/// As small as a logarithm makes them, and so large that squares of squares are just floats. Nothing clamps scales; those
+/// beyond are counted and not drawn (`sentinel`).
+#[test]
+fn scales_at_both_ends_of_floats() {
+    let made = changed(215, small(), |row, g| {
+        g.scales[row] = if row % 2 == 0 { [-44.0; 3] } else { [18.0, 17.0, 19.0] };
+        g.opacities[row] = -3.0;
+    });
+    holds("scales at both ends", made, true, Bound { colour: 5e-6, gradient: 1.1e-5 });
+}
+
+/// One pixel wide, one high, and one in all: its gradient by scales is 4e-4 in norm, off by 2e-8, which is what f32 rounds
+/// the terms by that it is the small difference of.
+#[test]
+fn pictures_of_one_pixel() {
+    for (width, height, gradient) in [(1, 17, 1.1e-5), (17, 1, 1.1e-5), (1, 1, 2.2e-4)] {
+        let made = scene(216, &Shape { width, height, ..small() });
+        holds(&format!("{width} x {height} px"), made, true, Bound { colour: 5e-6, gradient });
+    }
+}
+
 /// Opacities from nothing to all: logits of 15 are 3e-7 from 1, those of 100 are 1.
 #[test]
 fn opacities_at_their_ends() {
@@ -207,6 +256,29 @@ fn harmonics_that_overflow_a_photo() {
         g.sh_rest[row * rest..(row + 1) * rest].iter_mut().for_each(|v| *v = [1e5, -1e5, 0.1]);
     });
     holds("harmonics of 1e6", made, true, Bound { colour: 2.0, gradient: 1.1e-5 });
+}
+
+/// Harmonics of 3e38: sums that are floats are colours, whose gradients are beyond all bounds and dropped; sums that are
+/// none have no splat. Both are counted, and no number of the step is lost.
+#[test]
+fn harmonics_that_overflow_floats() {
+    let Some(turn) = device() else { return };
+    let made = changed(217, small(), |row, g| {
+        let rest = g.rest_per_gaussian();
+        if row % 8 == 0 {
+            g.sh0[row] = [3e38, -3e38, 1.0];
+            g.sh_rest[row * rest..(row + 1) * rest].iter_mut().for_each(|v| *v = [3e38, -3e38, 0.1]);
+        }
+    });
+    let mut rig = Rig::new(turn, made, true);
+    let counters = rig.train().counters;
+    assert!(counters.unprojected_count > 0 && counters.nonfinite_count > 0, "{counters:?}");
+    assert!(counters.unprojected_first.is_multiple_of(8), "{counters:?}");
+    let pixels = rig.pixels();
+    let image = rig.get::<[f32; 4]>(labelgs::plan::Buf::IMAGE, pixels);
+    assert!(image.iter().flatten().all(|value| value.is_finite()), "a pixel is not finite");
+    assert!(image.iter().flatten().any(|value| *value > 1e30), "what is a float is drawn");
+    assert!(rig.gradient_rows().iter().flat_map(|row| row.floats()).all(f64::is_finite));
 }
 
 /// Masks of everything and of nothing, and the smallest and the largest label.

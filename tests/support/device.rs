@@ -6,7 +6,7 @@
 //!
 //! Without a device, tests that call `device()` return early with a message on stderr; with `LABELGS_REQUIRE_VULKAN=1`
 //! they fail instead. `LABELGS_DEVICE` chooses a device, `LABELGS_VALIDATION` (`off`, `on`, `sync`, `gpu`) what the layer
-//! checks, if it is installed; `sync` unless given.
+//! checks, if it is installed (with `LABELGS_REQUIRE_VALIDATION=1` it has to be); `sync` unless given.
 
 use labelgs::gpu::{Gpu, GpuOptions, Validation};
 use std::ops::Deref;
@@ -88,9 +88,21 @@ pub fn options() -> GpuOptions {
     options
 }
 
+/// What to say where the layer is missing and must not be.
+pub const NO_LAYER: &str = "LABELGS_REQUIRE_VALIDATION=1 and the validation layer is not there";
+
+/// True if tests that need the validation layer may not be skipped.
+pub fn layer_is_required() -> bool {
+    std::env::var("LABELGS_REQUIRE_VALIDATION").is_ok_and(|value| value == "1")
+}
+
 fn open() -> Option<Arc<Gpu>> {
     match Gpu::new(&options()) {
-        Ok(gpu) => Some(gpu),
+        Ok(gpu) => {
+            let is_asked = options().validation != Validation::Off;
+            assert!(gpu.is_validated() || !is_asked || !layer_is_required(), "{NO_LAYER}");
+            Some(gpu)
+        }
         Err(error) if std::env::var("LABELGS_REQUIRE_VULKAN").is_ok_and(|value| value == "1") => {
             panic!("LABELGS_REQUIRE_VULKAN=1 and {error}")
         }

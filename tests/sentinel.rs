@@ -1,0 +1,132 @@
+//! What watches the numbers of a training: what it counts, names, drops and ends.
+
+use crate::pass::rig::{PARAMETERS, Rig};
+use crate::reference::Rules;
+use crate::reference::step::step;
+use crate::support::device;
+use crate::support::scenes::{Scene, Shape, scene};
+use labelgs::Error;
+use labelgs::io::init::initial_gaussians;
+use labelgs::plan::Buf;
+use labelgs::scene::Gaussians;
+use labelgs::sched::SchedulerOptions;
+use labelgs::synth::{Preset, SynthOptions, dataset};
+use labelgs::train::{TrainConfig, Trainer};
+
+/// A scene of which one Gaussian, in full view, is changed.
+fn with(change: impl Fn(&mut Gaussians, usize)) -> (Scene, usize) {
+    let mut made = scene(221, &Shape { gaussians: 60, ..Shape::default() });
+    let row = 17;
+    made.gaussians.means[row] = [0.0, 0.0, 4.0];
+    made.gaussians.opacities[row] = 1.0;
+    made.gaussians.scales[row] = [-2.0, -1.0, -1.5];
+    change(&mut made.gaussians, row);
+    (made, row)
+}
+
+/// A quaternion of length 1e-25 is a rotation like any other, but its gradient is 1e25 times as large and no square of it
+/// is a float: the Gaussian stays as it is in that step, and nothing else notices.
+#[test]
+fn a_gradient_beyond_floats_is_dropped_and_nothing_else() {
+    let Some(turn) = device() else { return };
+    let (made, row) = with(|g, row| g.quats[row] = [3e-26, 8e-26, -5e-26, 2e-26]);
+    let mut rig = Rig::new(turn, made, false);
+    rig.job.update = true;
+    let count = rig.scene.gaussians.len();
+    let (model, camera) = (rig.model(), rig.scene.camera.clone());
+    let mut target = rig.scene.target.clone();
+    target.slots.clear();
+    let before = rig.rows(PARAMETERS, count);
+    let counters = rig.train().counters;
+    assert_eq!((counters.nonfinite_count, counters.nonfinite_first), (1, row as u32));
+    assert_eq!((counters.broken_count, counters.unprojected_count), (0, 0));
+    let (after, gradients) = (rig.rows(PARAMETERS, count), rig.gradient_rows());
+    assert_eq!(before[row], after[row], "without moments, a gradient of 0 moves nothing");
+    assert!(gradients[row].floats().iter().all(|value| *value == 0.0));
+    let expected = step(&Rules::default(), &camera, &model, &target);
+    assert!(expected.rows[row].quat.iter().any(|value| value.abs() > 1e18), "the gradient is as large as that");
+    let (mut error, mut size, mut moved) = (0.0, 0.0, 0);
+    for other in (0..count).filter(|&other| other != row && expected.margins[other] > 1e-4) {
+        for (found, wanted) in gradients[other].floats().iter().zip(expected.rows[other].floats()) {
+            error += (found - wanted).powi(2);
+            size += wanted.powi(2);
+        }
+        moved += usize::from(before[other] != after[other]);
+    }
+    // As the adversaries' bound.
+    assert!(
+        size > 0.0 && (error / size).sqrt() < 2e-5,
+        "the others' gradients are off by {:.1e}",
+        (error / size).sqrt()
+    );
+    assert!(moved > 20, "only {moved} others moved");
+}
+
+#[test]
+fn the_pass_that_finds_a_broken_parameter_is_counted_by_itself() {
+    type Change = fn(&mut Gaussians, usize);
+    let cases: [(&str, Change, [u32; 2]); 7] = [
+        ("a position", |g, row| g.means[row][1] = f32::NAN, [1, 0]),
+        ("an infinite scale", |g, row| g.scales[row][0] = f32::INFINITY, [1, 1]),
+        ("an opacity", |g, row| g.opacities[row] = f32::NAN, [1, 0]),
+        ("a quaternion", |g, row| g.quats[row][2] = f32::NAN, [0, 1]),
+        ("a colour", |g, row| g.sh0[row][0] = f32::NAN, [0, 1]),
+        ("a colour less than any", |g, row| g.sh0[row][1] = f32::NEG_INFINITY, [0, 1]),
+        ("nothing", |_, _| (), [0, 0]),
+    ];
+    for (name, change, expected) in cases {
+        let Some(turn) = device() else { return };
+        let (made, row) = with(change);
+        let counters = Rig::new(turn, made, true).train().counters;
+        let found = [counters.broken_count, counters.unprojected_count];
+        assert_eq!(found, expected, "{name}");
+        let first = [counters.broken_first, counters.unprojected_first];
+        (0..2).filter(|&pass| found[pass] > 0).for_each(|pass| assert_eq!(first[pass], row as u32, "{name}"));
+    }
+}
+
+/// What a step has spoilt no pass has looked at when the checkpoint is written: it is not.
+#[test]
+fn a_state_with_a_number_that_is_none_is_no_checkpoint() {
+    let Some(turn) = device() else { return };
+    let options = SynthOptions { preset: Preset::Simple, width: 48, height: 36, views: 4, points: 300, seed: 3 };
+    let mut dataset = dataset(&options, 0);
+    let model = initial_gaussians(&dataset, 0, 300).expect("points");
+    let config = TrainConfig { iterations: 20, ..TrainConfig::default() };
+    let mut trainer =
+        Trainer::new(turn.gpu(), config, &mut dataset, &model, SchedulerOptions::default()).expect("it starts");
+    trainer.step().expect("a step");
+    let sound = trainer.state().expect("a state");
+    for buf in [Buf::QUATS, Buf::M_SH0, Buf::U_MEANS, Buf::DENSIFY_STATS] {
+        trainer.engine_mut().sched_mut().upload(buf, 0, 9, &[f32::NAN]).expect("upload");
+        let error = trainer.state().expect_err("no state");
+        assert!(matches!(error, Error::Numeric { step: 1, .. }), "{error}");
+        assert!(error.to_string().contains("is not finite, so there is no checkpoint"), "{error}");
+        trainer.restore(&sound).expect("restored");
+    }
+    assert_eq!(trainer.state().expect("a state").planes, sound.planes);
+}
+
+/// More than ten dropped gradients in each of three steps are no accident.
+#[test]
+fn a_training_that_drops_gradients_all_the_time_ends() {
+    let Some(turn) = device() else { return };
+    let run = |broken: usize| -> Result<u32, Error> {
+        let options = SynthOptions { preset: Preset::Simple, width: 48, height: 36, views: 4, points: 300, seed: 3 };
+        let mut dataset = dataset(&options, 0);
+        let mut model = initial_gaussians(&dataset, 0, 300).expect("points");
+        // Spheres have no gradient of rotations.
+        model.scales.iter_mut().for_each(|scale| scale[0] += 0.5);
+        (0..broken).for_each(|row| model.quats[row] = [1e-25, 2e-25, 0.0, 1e-25]);
+        let config = TrainConfig { iterations: 20, ..TrainConfig::default() };
+        let mut trainer = Trainer::new(turn.gpu(), config, &mut dataset, &model, SchedulerOptions::default())?;
+        (0..20).try_for_each(|_| trainer.step().map(drop))?;
+        trainer.drain()?;
+        Ok(trainer.steps_done())
+    };
+    assert_eq!(run(5).expect("few are borne"), 20);
+    let error = run(200).expect_err("many are not");
+    assert!(matches!(error, Error::Numeric { step: 3, .. }), "{error}");
+    assert!(error.to_string().contains("project_backward dropped the gradients of"), "{error}");
+    assert_eq!(error.exit_status(), 8);
+}
