@@ -96,6 +96,19 @@ fn points_mostly_behind_the_cameras_train() {
     trains("points elsewhere", scene);
 }
 
+/// Half of the points within arm's reach of the cameras, some at their very centres.
+#[test]
+fn cameras_inside_the_cloud_train() {
+    let mut scene = scene();
+    let centres: Vec<_> = scene.train.iter().map(|view| view.camera.centre()).collect();
+    for (index, point) in scene.points.iter_mut().enumerate().filter(|(index, _)| index % 2 == 0) {
+        let part = |step: usize| (index * step % 17) as f64 / 17.0 - 0.5;
+        let reach = if index % 10 == 0 { 0.0 } else { 0.6 };
+        point.position = centres[index / 2 % centres.len()] + reach * glam::DVec3::new(part(3), part(5), part(7));
+    }
+    trains("cameras inside the cloud", scene);
+}
+
 #[test]
 fn masks_of_every_kind_train() {
     let with = |change: &dyn Fn(usize, &mut LabelMap)| {
