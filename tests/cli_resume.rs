@@ -346,6 +346,7 @@ fn checkpoints_of_an_earlier_run_stay_until_there_are_new_ones() {
     };
     assert!(text.contains("iteration_9/point_cloud.ply is of an earlier run"), "{text}");
     assert_eq!(models(), [Some("iteration_3".to_owned())], "what other commands take is of the last run");
+    assert!(place.path("out/earlier/point_cloud/iteration_9/point_cloud.ply").exists(), "and nothing is lost");
     succeeded(&place.trained("out", &["--iterations", "5", "--checkpoint-every", "2", "--save-at", "2"]));
     assert_eq!(models().len(), 2, "{:?}", models());
     let steps: Vec<u32> = place.checkpoints("out").iter().map(|found| found.step).collect();

@@ -8,6 +8,9 @@ use crate::scene::labels::label_colour;
 use crate::scene::{Camera, Gaussians, Photo};
 use std::path::{Path, PathBuf};
 
+/// Where models of earlier runs go.
+const EARLIER: &str = "earlier";
+
 /// Where the model of a step is kept, as the viewers of 3DGS expect it.
 pub fn model_path(out: &Path, step: u32) -> PathBuf {
     out.join("point_cloud").join(format!("iteration_{step}")).join("point_cloud.ply")
@@ -32,8 +35,8 @@ pub fn latest_model(out: &Path) -> Result<PathBuf> {
     })
 }
 
-/// The models that a run writes. Where an earlier run left some of later steps, they go when this one has its first:
-/// the model of the latest step is the one that other commands take.
+/// The models that a run writes. Where an earlier run left some of later steps, they are moved to the folder `earlier` when
+/// this one has its first: the model of the latest step is the one that other commands take.
 pub struct Models {
     out: PathBuf,
     earlier: Vec<u32>,
@@ -45,7 +48,7 @@ impl Models {
         let earlier: Vec<u32> = steps(out)?.into_iter().filter(|&step| step > from).collect();
         if let Some(step) = earlier.iter().max() {
             let path = model_path(out, *step);
-            tracing::warn!("{} is of an earlier run and goes when this one has a model", path.display());
+            tracing::warn!("{} is of an earlier run and goes to {EARLIER} when this one has a model", path.display());
         }
         Ok(Self { out: out.to_owned(), earlier })
     }
@@ -58,12 +61,13 @@ impl Models {
             tracing::warn!("{}: {left_out} Gaussians are not finite and were left out", path.display());
         }
         for old in self.earlier.drain(..).filter(|&old| old != step) {
-            let old = model_path(&self.out, old);
-            if let Err(error) = std::fs::remove_file(&old) {
-                tracing::warn!("{}: not removed: {error}", old.display());
+            let (from, to) = (model_path(&self.out, old), model_path(&self.out.join(EARLIER), old));
+            let moved = to.parent().map_or(Ok(()), std::fs::create_dir_all).and_then(|()| std::fs::rename(&from, &to));
+            if let Err(error) = moved {
+                tracing::warn!("{}: not moved: {error}", from.display());
             }
             // Unless somebody keeps something else in there.
-            let _ = old.parent().map(std::fs::remove_dir);
+            let _ = from.parent().map(std::fs::remove_dir);
         }
         Ok(path)
     }
