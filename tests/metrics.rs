@@ -286,6 +286,19 @@ fn extract_and_remove_share_the_model_out() {
 }
 
 #[test]
+fn a_view_that_is_much_worse_than_the_others_is_found() {
+    let of = |values: &[f64]| {
+        let view = |&psnr: &f64| ViewScores { psnr, ..ViewScores::default() };
+        Scores::new((0..).zip(values).map(|(index, psnr)| (format!("{index}.png"), view(psnr))).collect())
+    };
+    assert_eq!(of(&[36.0, 35.0, 22.5, 37.0, 34.0]).odd_view(), Some(("2.png", 22.5, 35.0)));
+    assert_eq!(of(&[36.0, 35.0, 31.0, 37.0, 34.0]).odd_view(), None, "views differ");
+    assert_eq!(of(&[22.0, 35.0]).odd_view(), Some(("0.png", 22.0, 35.0)));
+    assert_eq!((of(&[22.0]).odd_view(), of(&[]).odd_view()), (None, None));
+    assert_eq!(of(&[f64::INFINITY, f64::INFINITY]).odd_view(), None);
+}
+
+#[test]
 fn scores_are_averaged_over_pairs() {
     let photo = photo(12, 2);
     let render = colours(&photo);

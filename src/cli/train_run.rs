@@ -358,5 +358,7 @@ fn score(trainer: &mut Trainer, dataset: &Dataset, config: &TrainConfig) -> Resu
     // Bands that were never let in are 0; without them the render is cheaper.
     model.sh_degree = model.sh_degree.max(trainer.sh_degree());
     let how = Rendering { near: config.near, background: config.background, min_confidence: SURE };
-    evaluate(trainer.engine_mut(), &model, &views, how, &(), &mut ()).map(Some)
+    let scores = evaluate(trainer.engine_mut(), &model, &views, how, &(), &mut ())?;
+    super::eval::warn_of_odd_view(&scores, config.near);
+    Ok(Some(scores))
 }

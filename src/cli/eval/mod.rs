@@ -12,6 +12,7 @@ pub(super) use own::score;
 
 use super::context::Context;
 use super::stdout;
+use crate::infer::score::scores::Scores;
 use crate::io::atomic;
 use crate::{Error, Result};
 use std::path::Path;
@@ -21,6 +22,17 @@ pub fn run(args: &EvalArgs, context: &Context) -> Result<()> {
     match args.protocol {
         Some(protocol) => bench::run(protocol, args, context),
         None => own::run(args, context),
+    }
+}
+
+/// Points to a view that is seen much worse than the others, and to what helps most often: Gaussians hang in the air before
+/// its camera, where no photo of the training shows them.
+pub fn warn_of_odd_view(scores: &Scores, near: f32) {
+    if let Some((name, found, median)) = scores.odd_view() {
+        tracing::warn!(
+            "view {name} has {found:.1} dB, the one in the middle {median:.1}: if it is foggy, try --near of a tenth of the \
+             distance to what is seen (it is {near})"
+        );
     }
 }
 

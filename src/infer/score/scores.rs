@@ -11,6 +11,9 @@ use crate::{Error, Result};
 use serde::Serialize;
 use std::collections::BTreeMap;
 
+/// How far below the median a view is odd, dB. The views of a scene that was learnt lie within some 3 dB.
+const ODD: f64 = 6.0;
+
 /// Scores of one object, in one view or on average over views. `None` where there was nothing to compare.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct ObjectScores {
@@ -217,6 +220,15 @@ impl Scores {
             objects: by_object.iter().map(|(&id, scores)| (id, average(scores))).collect(),
             views,
         }
+    }
+
+    /// The view that is seen worst, with its PSNR and the median of all, dB, if it is so far below that something must
+    /// stand before its camera, or be wrong with its pose or photo.
+    pub fn odd_view(&self) -> Option<(&str, f64, f64)> {
+        let mut sorted: Vec<(&str, f64)> = self.views.iter().map(|(name, view)| (name.as_str(), view.psnr)).collect();
+        sorted.sort_by(|a, b| a.1.total_cmp(&b.1));
+        let (&(name, worst), median) = (sorted.first()?, sorted[sorted.len() / 2].1);
+        (worst < median - ODD).then_some((name, worst, median))
     }
 
     /// The checks of `--min-psnr` and `--min-iou`: mean PSNR, and mean IoU of the label map.
