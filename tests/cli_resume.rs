@@ -103,7 +103,11 @@ fn a_signal_leaves_a_checkpoint_and_two_end_at_once() {
         let mut child = place.spawned(&place.train(&out, &long));
         std::thread::sleep(Duration::from_micros(random.random_range(0..1_500_000)));
         send(&child, "-INT");
-        assert_eq!(child.wait().expect("a child").code(), Some(130), "{out}");
+        let status = child.wait().expect("a child");
+        if status.signal().is_some() && !place.path(&out).exists() {
+            continue; // before the program had begun
+        }
+        assert_eq!(status.code(), Some(130), "{out}: {status}");
         all_whole(&place.path(&out));
         let left = place.checkpoints(&out).len();
         assert!(left <= 1 && (left == 1) == place.path(&out).join("metrics.json").exists(), "{out}: {left}");
