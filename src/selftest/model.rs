@@ -11,7 +11,9 @@ use crate::plan::Buf;
 use crate::reference::blend::blend_forward;
 use crate::reference::densify::{Origin, Population, densify, mark, opacity_reset};
 use crate::reference::lift::{Masks, centres_of, lift, lift_resolve};
+use crate::reference::project::Splat;
 use crate::reference::random::normal_draw;
+use crate::reference::step::Target;
 use crate::reference::{Row, Rules};
 use crate::scene::Gaussians;
 use crate::shaders::structs::{Counters, StepUniforms};
@@ -146,24 +148,44 @@ impl Reset {
     }
 }
 
-/// The paper's lift of a step that has run, with labels of Gaussians `before`: those that it must change are changed, and
-/// no others. Where several Gaussians have nearly the same weight, either may win.
-pub fn lifted(rig: &mut Rig, rules: &Rules, before: &[u32]) -> Result<Verdict> {
-    let actual = rig.get::<u32>(Buf::LABELS, before.len())?;
-    let (splats, sampled) = (rig.splats()?, rig.slots());
-    let target = &rig.scene.target;
-    let image = blend_forward(rules, &splats, rig.size(), target.background);
-    let masks = Masks { label_map: &target.label_map, sampled: &sampled, gpf: rig.config.gpf };
-    let votes = lift(rules, &image, &centres_of(&splats, before.len()), &masks);
-    let mut expected = before.to_vec();
-    lift_resolve(&votes, &mut expected);
-    let changed = expected.iter().zip(before).filter(|(a, b)| a != b).count();
-    let sure: Vec<usize> = (0..before.len()).filter(|&i| votes.margins[i] > 1e-5).collect();
-    if changed < 3 || sure.len() * 10 <= before.len() * 9 {
-        return Ok(Err(format!("{changed} labels change, {} of {} are sure", sure.len(), before.len())));
+/// The paper's lift of labels in a step that has run.
+pub struct Lifted {
+    before: Vec<u32>,
+    after: Vec<u32>,
+    splats: Vec<Splat>,
+    sampled: Vec<u32>,
+    target: Target,
+    size: (usize, usize),
+    gpf: bool,
+}
+
+impl Lifted {
+    /// Runs a training step; the scene has the labels before it.
+    pub fn new(rig: &mut Rig) -> Result<Self> {
+        let before = rig.model().labels;
+        rig.train()?;
+        let (after, splats) = (rig.get(Buf::LABELS, before.len())?, rig.splats()?);
+        let (sampled, target) = (rig.slots(), rig.scene.target.clone());
+        Ok(Self { before, after, splats, sampled, target, size: rig.size(), gpf: rig.config.gpf })
     }
-    let pick = |of: &[u32]| sure.iter().map(|&i| of[i]).collect::<Vec<_>>();
-    Ok(exact(&pick(&actual), &pick(&expected)))
+
+    /// The same by the reference under `rules`: those that it must change are changed, and no others. Where several
+    /// Gaussians have nearly the same weight, either may win.
+    pub fn verdict(&self, rules: &Rules) -> Verdict {
+        let (before, target) = (&self.before, &self.target);
+        let image = blend_forward(rules, &self.splats, self.size, target.background);
+        let masks = Masks { label_map: &target.label_map, sampled: &self.sampled, gpf: self.gpf };
+        let votes = lift(rules, &image, &centres_of(&self.splats, before.len()), &masks);
+        let mut expected = before.clone();
+        lift_resolve(&votes, &mut expected);
+        let changed = expected.iter().zip(before).filter(|(a, b)| a != b).count();
+        let sure: Vec<usize> = (0..before.len()).filter(|&i| votes.margins[i] > 1e-5).collect();
+        if changed < 3 || sure.len() * 10 <= before.len() * 9 {
+            return Err(format!("{changed} labels change, {} of {} are sure", sure.len(), before.len()));
+        }
+        let pick = |of: &[u32]| sure.iter().map(|&i| of[i]).collect::<Vec<_>>();
+        exact(&pick(&self.after), &pick(&expected))
+    }
 }
 
 /// Gaussians large and opaque enough to dominate pixels; masks are three columns, with nothing at the upper border.
@@ -197,8 +219,5 @@ pub(super) fn reset(rules: &Rules, gpu: &Arc<Gpu>, kernels: KernelShape, leeway:
 
 /// The paper's lift of labels in one step.
 pub(super) fn lift_of_a_step(rules: &Rules, gpu: &Arc<Gpu>, kernels: KernelShape, _: f64) -> Result<Verdict> {
-    let mut rig = rig_of(gpu, kernels, dominant(131))?;
-    let before = rig.model().labels;
-    rig.train()?;
-    lifted(&mut rig, rules, &before)
+    Ok(Lifted::new(&mut rig_of(gpu, kernels, dominant(131))?)?.verdict(rules))
 }

@@ -5,12 +5,12 @@ use crate::reference::blend::blend_layers_forward;
 use crate::reference::loss::{ObjectSlot, Photo, label_loss};
 use crate::reference::step::Target;
 use crate::reference::{Row, Rules};
-use crate::support::compare::{Tolerance, Verdict, check, close, exact};
+use crate::support::compare::{Tolerance, check, close, exact};
 use crate::support::device;
 use crate::support::scenes::{Scene, dot, plain_camera};
 use labelgs::plan::Buf;
 use labelgs::scene::Gaussians;
-use labelgs::selftest::model::{dominant, lifted};
+use labelgs::selftest::model::{Lifted, dominant};
 use labelgs::train::job;
 
 #[test]
@@ -21,14 +21,10 @@ fn lift_with_and_without_the_filter() {
         rig.config.gpf = gpf;
         // One object of the masks is not sampled.
         rig.job.layers.pop();
-        rig.train();
-        let before = rig.model().labels;
-        let rig = std::cell::RefCell::new(rig);
-        prove(&format!("lift, filter {gpf}"), &["lift_threshold"], |rules| -> Verdict {
-            lifted(&mut rig.borrow_mut(), rules, &before).expect("labels can be read")
-        });
-        let mut rig = rig.into_inner();
-        assert!(rig.get::<u32>(Buf::LABEL_KEYS, before.len()).iter().all(|&key| key == 0), "votes start over");
+        let count = rig.scene.gaussians.len();
+        let ran = Lifted::new(&mut rig).expect("it runs");
+        prove(&format!("lift, filter {gpf}"), &["lift_threshold"], |rules| ran.verdict(rules));
+        assert!(rig.get::<u32>(Buf::LABEL_KEYS, count).iter().all(|&key| key == 0), "votes start over");
     }
 }
 
