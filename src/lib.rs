@@ -6,14 +6,14 @@
 //!
 //! ```text
 //! cli                    verbs: what is typed, what is decided
-//! selftest               the device against the reference, for tests and users
+//! verify                 the method in f64, and the device compared with it, for tests and users
 //! train                  the loop over steps, and what happens between them
-//! infer    synth         pictures, scores, selections; a scene with every truth
+//! eval     synth         scores of a model; a scene with every truth
+//! label                  labels from masks, occluders, repair of masks
+//! render   edit          pictures of a model; its labels chosen and changed, without a device
 //! engine                 a device with a model in its memory
-//! sched                  executes plans: recordings, two slots in flight, transfers
 //! pass                   what the engine does, as lists of GPU passes; no Vulkan
-//! plan     io            sizes, places, barriers (pure); files
-//! reference              the method in f64, for comparisons
+//! scheduler  io          plans lists (sizes, places, barriers) and executes them; files
 //! shaders  gpu   scene   generated interfaces; a thin layer over Vulkan; plain host data
 //! error    fault
 //! ```
@@ -25,7 +25,7 @@
 //! *Mask*: the visible ids of a photo. *Step*: one update of the parameters. *View*: a posed photo. A gradient is named
 //! `v_` and the value's name, first and second moments `m_` and `u_`.
 //!
-//! The paper's names: B_j is `labels[j]`, M_k a mask, U_k what [`infer::occlusion`] finds, H(G, k) an object layer, GPF the
+//! The paper's names: B_j is `labels[j]`, M_k a mask, U_k what [`label::occlusion`] finds, H(G, k) an object layer, GPF the
 //! test of the projected centre in `glsl/include/label_rules.glsl`.
 //!
 //! # Conventions
@@ -35,28 +35,29 @@
 //!
 //! # Life of a step
 //!
-//! [`train::Trainer::step`] draws a view, writes its photo, masks and uniforms into one of two slots and submits the list
+//! [`train::Trainer::step`] draws a view, writes its photo, masks and uniforms into one of two frames in flight and submits the list
 //! that [`pass::training_step`] declared: cull, sort by depth, project, list (splat, tile) pairs, sort them by layer and
 //! tile, blend forward, loss, blend backward, gather, project backward, Adam. Nothing is read back inside a step; its
-//! report is read when the slot comes round again. A buffer that was too small sets a sticky bit, every later pass leaves
+//! report is read when the frame comes round again. A buffer that was too small sets a sticky bit, every later pass leaves
 //! the model alone, the buffer grows, and the steps run again.
 #![deny(unsafe_code)]
 
 pub mod cli;
+pub mod edit;
 pub mod engine;
 pub mod error;
+pub mod eval;
 pub mod fault;
 pub mod gpu;
-pub mod infer;
 pub mod io;
+pub mod label;
 pub mod pass;
-pub mod plan;
-pub mod reference;
+pub mod render;
 pub mod scene;
-pub mod sched;
-pub mod selftest;
+pub mod scheduler;
 pub mod shaders;
 pub mod synth;
 pub mod train;
+pub mod verify;
 
 pub use error::{Error, Result};

@@ -3,7 +3,7 @@
 use crate::support::device;
 use labelgs::io::init;
 use labelgs::scene::{Dataset, Photo};
-use labelgs::sched::SchedulerOptions;
+use labelgs::scheduler::SchedulerOptions;
 use labelgs::synth::{Preset, SynthOptions, dataset};
 use labelgs::train::{StepReport, TrainConfig, Trainer};
 use std::sync::Arc;

@@ -1,10 +1,10 @@
 //! Choosing and editing labels, on Gaussians and label maps made by hand.
 
-use labelgs::infer::edit::catalogue::{Catalogue, Pick};
-use labelgs::infer::edit::change::{Specks, recolour, relabel, split_components, without_specks};
-use labelgs::infer::edit::components::{Grouping, components};
-use labelgs::infer::edit::prompt::{Place, Prompt, choose};
-use labelgs::infer::edit::rename::{give_name, keep, renumber, split};
+use labelgs::edit::catalogue::{Catalogue, Pick};
+use labelgs::edit::change::{Specks, recolour, relabel, split_components, without_specks};
+use labelgs::edit::components::{Grouping, components};
+use labelgs::edit::prompt::{Place, Prompt, choose};
+use labelgs::edit::rename::{give_name, keep, renumber, split};
 use labelgs::io::label_table::{LabelEntry, LabelTable};
 use labelgs::scene::gaussians::SH_C0;
 use labelgs::scene::{Gaussians, LabelMap};

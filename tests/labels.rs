@@ -3,7 +3,7 @@
 use crate::reference::blend::{Blended, Contribution, Trace, blend_backward, blend_forward, shade};
 use crate::reference::densify::{Origin, Population, accumulate, densify, mark};
 use crate::reference::lift::{Masks, lift, lift_resolve, pixel_of, vote_key};
-use crate::reference::loss::{BORDER, ObjectSlot, Photo, label_loss};
+use crate::reference::loss::{BORDER, ObjectPixel, Photo, label_loss};
 use crate::reference::model::flatten;
 use crate::reference::project::{Splat, project_all, project_backward};
 use crate::reference::step::{Target, splats_of, step};
@@ -219,7 +219,7 @@ fn label_loss_of_a_right_object_is_0() {
 fn pixels_near_a_contour_say_nothing_and_weights_scale() {
     let photo = Photo { size: (4, 1), colours: vec![[0.5; 3]; 4], valid: vec![true; 4] };
     let loss = |map: &[u32], weight: f64| {
-        let slot = ObjectSlot { label: 1, occluders: Vec::new(), weight };
+        let slot = ObjectPixel { label: 1, occluders: Vec::new(), weight };
         label_loss(&Rules::default(), (&[[0.8; 3]; 4], &[0.8; 4]), &photo, map, &slot)
     };
     let (all, without) = (loss(&[1, 0, 1, 0], 1.0), loss(&[1, BORDER, 1 | BORDER, 0], 1.0));
@@ -249,7 +249,7 @@ fn label_loss_of_an_empty_object_is_its_masked_photo_without_gradient() {
 #[test]
 fn occluded_and_invalid_pixels_say_nothing_about_an_object() {
     let photo = Photo { size: (4, 1), colours: vec![[0.5; 3]; 4], valid: vec![true, true, true, false] };
-    let slot = ObjectSlot { label: 1, occluders: vec![2], weight: 1.0 };
+    let slot = ObjectPixel { label: 1, occluders: vec![2], weight: 1.0 };
     let rules = Rules { label_alpha: 0.5, ..Rules::default() };
     let loss = label_loss(&rules, (&[[0.8; 3]; 4], &[0.8; 4]), &photo, &[1, 2, 0, 1], &slot);
     // Mask: 0.3 off; occluder: left out; elsewhere 0.8 off; invalid: left out of the count, too. Opacity: 0.2 and 0.8 off.

@@ -1,6 +1,6 @@
 //! Integration tests, one binary.
 
-use labelgs::reference;
+use labelgs::verify::reference;
 
 #[allow(dead_code, reason = "helpers are shared by tests that come and go")]
 mod support;
@@ -39,10 +39,9 @@ mod occlusion;
 mod output;
 mod overflow;
 mod pass;
-mod plan;
 mod protocol;
 mod registry;
-mod sched;
+mod scheduler;
 mod segments;
 mod selftest;
 mod sentinel;

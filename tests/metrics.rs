@@ -1,14 +1,14 @@
 //! Scores, label choice and selections against slow or hand-made answers.
 
-use labelgs::infer::edit::catalogue::Catalogue;
-use labelgs::infer::edit::choose::{candidates, choose_labels, require_labels};
-use labelgs::infer::edit::select::{SURE, extract, remove, summarise};
-use labelgs::infer::score::boundary::{boundary_iou, rim, rim_width};
-use labelgs::infer::score::crop::Crop;
-use labelgs::infer::score::metrics::{Overlap, paper_score, psnr};
-use labelgs::infer::score::scores::{ObjectRender, ObjectTruth, Scores, ViewScores};
-use labelgs::infer::score::ssim::{ssim, ssim_map, window};
-use labelgs::infer::score::ssim8::{ssim8, to_bytes};
+use labelgs::edit::catalogue::Catalogue;
+use labelgs::edit::choose::{candidates, choose_labels, require_labels};
+use labelgs::edit::select::{MIN_LABEL_CONFIDENCE, extract, remove, summarise};
+use labelgs::eval::boundary::{boundary_iou, rim, rim_width};
+use labelgs::eval::crop::Crop;
+use labelgs::eval::metrics::{Overlap, paper_score, psnr};
+use labelgs::eval::scores::{ObjectRender, ObjectTruth, Scores, ViewScores};
+use labelgs::eval::ssim::{ssim, ssim_map, window};
+use labelgs::eval::ssim8::{ssim8, to_bytes};
 use labelgs::scene::{Gaussians, LabelMap, Photo};
 use std::collections::BTreeMap;
 
@@ -267,9 +267,10 @@ fn labels_are_summarised() {
 
 #[test]
 fn extract_and_remove_share_the_model_out() {
-    let (object, rest) = (extract(&model(), &[2], SURE).expect("2"), remove(&model(), &[2]).expect("2"));
+    let (object, rest) =
+        (extract(&model(), &[2], MIN_LABEL_CONFIDENCE).expect("2"), remove(&model(), &[2]).expect("2"));
     assert_eq!((object.labels, rest.labels), (Some(vec![2, 2]), Some(vec![5, 0])));
-    let message = extract(&model(), &[2, 7, 9], SURE).expect_err("no 7").to_string();
+    let message = extract(&model(), &[2, 7, 9], MIN_LABEL_CONFIDENCE).expect_err("no 7").to_string();
     assert!(
         message.contains("label 7, 9;") && message.contains("2 (2 Gaussians), 5 (1 Gaussians), and 0 for the"),
         "{message}"
@@ -277,11 +278,11 @@ fn extract_and_remove_share_the_model_out() {
     let doubtful = Gaussians { label_confidence: Some(vec![0.59, 0.6, 0.5, 0.4]), ..model() };
     let of = |least| extract(&doubtful, &[2], least).expect("2").means;
     assert!(of(0.0) == object.means && of(2.0).is_empty());
-    assert_eq!(of(SURE), [model().means[1]], "who has less than 0.6 is left out");
-    assert!(extract(&model(), &[], SURE).is_err());
+    assert_eq!(of(MIN_LABEL_CONFIDENCE), [model().means[1]], "who has less than 0.6 is left out");
+    assert!(extract(&model(), &[], MIN_LABEL_CONFIDENCE).is_err());
     assert!(remove(&model(), &[0, 2, 5]).is_err());
     let unlabelled = Gaussians { labels: None, ..model() };
-    let message = extract(&unlabelled, &[1], SURE).expect_err("no labels").to_string();
+    let message = extract(&unlabelled, &[1], MIN_LABEL_CONFIDENCE).expect_err("no labels").to_string();
     assert!(message.contains("no labelled"), "{message}");
 }
 

@@ -1,7 +1,7 @@
 //! Who hides whom: both rules against hand-made and slow answers, and against a scene that knows the truth.
 
-use labelgs::infer::occlusion::{Rule, by_contour, by_mean, distances, picture};
 use labelgs::io::occlusion_table::OcclusionTable;
+use labelgs::label::occlusion::{Rule, by_contour, by_mean, distances, picture};
 use labelgs::scene::{DepthKind, DepthMap, LabelMap, Occluders};
 use labelgs::synth::{Preset, SynthOptions, World, ring_of_cameras};
 use std::collections::{BTreeMap, BTreeSet};

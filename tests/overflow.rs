@@ -3,7 +3,7 @@
 use crate::support::device;
 use labelgs::io::init;
 use labelgs::scene::Gaussians;
-use labelgs::sched::SchedulerOptions;
+use labelgs::scheduler::SchedulerOptions;
 use labelgs::synth::{Preset, SynthOptions, dataset};
 use labelgs::train::{TrainConfig, Trainer};
 

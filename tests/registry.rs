@@ -1,19 +1,19 @@
 //! One stem, four places: every shader has its header, its mirror and its pass; every buffer has its pass.
 
-use labelgs::engine::{Engine, LabelRoom, Room, capacity};
+use labelgs::engine::{Engine, EngineSize, LabelSize, capacity};
 use labelgs::pass::{self, KernelShape, Variant};
-use labelgs::plan::{Capacity, Grid, Limits, PassList, Plan, PlanOptions, TABLE, Work};
+use labelgs::scheduler::plan::{Capacity, Grid, Limits, PassList, Plan, PlanOptions, TABLE, Work};
 use labelgs::shaders;
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 
 const ROOT: &str = env!("CARGO_MANIFEST_DIR");
-const ROOM: Room = Room {
+const ROOM: EngineSize = EngineSize {
     gaussians: 10_000,
     size: (320, 240),
     trained: true,
-    labels: Some(LabelRoom { max_label: 40, layers: 8, vote_columns: 9 }),
+    labels: Some(LabelSize { max_label: 40, layers: 8, vote_columns: 9 }),
 };
 
 /// Stem and text of every compute shader.
@@ -99,7 +99,8 @@ fn every_mirror_is_there() {
         }
         for part in mirror.split(", ") {
             let (file, function) = part.split_once("::").unwrap_or_else(|| panic!("{stem}: {part} names no function"));
-            let file = Path::new(ROOT).join("src/reference").join(file.trim_start_matches("src/reference/"));
+            let file =
+                Path::new(ROOT).join("src/verify/reference").join(file.trim_start_matches("src/verify/reference/"));
             let reference =
                 fs::read_to_string(&file).unwrap_or_else(|error| panic!("{stem}: {}: {error}", file.display()));
             assert!(
@@ -169,8 +170,8 @@ fn every_list_can_be_planned_and_printed() {
 /// More tiles of layers than workgroups of an axis: `--label-samples all` in a view full of objects.
 #[test]
 fn two_hundred_layers_can_be_planned() {
-    let labels = Some(LabelRoom { max_label: 200, layers: 200, vote_columns: 16 });
-    let room = Room { gaussians: 100_000, size: (1920, 1080), trained: true, labels };
+    let labels = Some(LabelSize { max_label: 200, layers: 200, vote_columns: 16 });
+    let room = EngineSize { gaussians: 100_000, size: (1920, 1080), trained: true, labels };
     let shape = KernelShape::new(8, true);
     let capacity = capacity(&shape, &room);
     assert!(capacity.virtual_tiles.div_ceil(64) > 65_535, "an axis would do");
@@ -184,17 +185,22 @@ fn two_hundred_layers_can_be_planned() {
 #[test]
 fn a_scene_without_masks_pays_nothing_for_labels() {
     let shape = KernelShape::new(8, true);
-    let bytes = |room: &Room| {
+    let bytes = |room: &EngineSize| {
         let capacity = capacity(&shape, room);
         let lists = Engine::lists_of(&shape, &capacity, room);
-        let report =
-            labelgs::plan::MemoryReport::predict(TABLE, &capacity, &lists, &Limits::default(), PlanOptions::default());
+        let report = labelgs::scheduler::plan::MemoryReport::predict(
+            TABLE,
+            &capacity,
+            &lists,
+            &Limits::default(),
+            PlanOptions::default(),
+        );
         let report = report.expect("fits");
         let labels = ["labels", "label_keys", "view_labels", "layer_state"];
         let named = report.rows.iter().filter(|row| labels.contains(&row.name)).map(|row| row.bytes).sum::<u64>();
         (named, report.total)
     };
-    let (with, without) = (bytes(&ROOM), bytes(&Room { labels: None, ..ROOM }));
+    let (with, without) = (bytes(&ROOM), bytes(&EngineSize { labels: None, ..ROOM }));
     assert!(without.0 < 2048 && without.0 < with.0, "{without:?} {with:?}");
     assert!(without.1 < with.1, "{without:?} {with:?}");
 }

@@ -1,14 +1,14 @@
 //! Lists of splats that are longer than one dispatch may walk.
 
-use crate::pass::rig::{Rig, readable};
+use crate::pass::fixture::{Fixture, readable};
 use crate::reference::{blend, model::Model, project, rules::Rules};
 use crate::support::device;
 use crate::support::scenes::{Shape, scene};
-use labelgs::engine::{Engine, Room};
-use labelgs::infer::render::render;
+use labelgs::engine::{Engine, EngineSize};
 use labelgs::pass::KernelShape;
+use labelgs::render::render;
 use labelgs::scene::{Camera, Gaussians};
-use labelgs::sched::SchedulerOptions;
+use labelgs::scheduler::SchedulerOptions;
 use labelgs::train::{TrainConfig, Trainer};
 
 /// Tiny, faint Gaussians in front of one 8 x 8 tile.
@@ -50,7 +50,7 @@ fn sixty_thousand_gaussians_in_one_tile() {
     let Some(turn) = device() else { return };
     let gpu = turn.gpu();
     let (model, camera) = crowd(60_000);
-    let room = Room { gaussians: 60_000, size: (8, 8), trained: false, labels: None };
+    let room = EngineSize { gaussians: 60_000, size: (8, 8), trained: false, labels: None };
     let mut engine = Engine::new(gpu, room, SchedulerOptions::default()).expect("room");
     engine.upload_model(&model).expect("model");
     let rendered = render(&mut engine, &camera, 0.2, [0.0; 3], 0).expect("render");
@@ -117,9 +117,9 @@ fn segments_of_narrow_pictures_have_their_room() {
         let shape = KernelShape { segment_length: 16, ..KernelShape::of(turn.capabilities()) };
         let made = scene(61, &Shape { gaussians: 400, width, height, scales: (0.3, 1.5), ..Shape::default() });
         // Guards behind the buffers are looked at after each run.
-        let mut rig = Rig::with_options(turn, made, true, shape, readable());
-        rig.train();
-        let segments = rig.engine.sched().capacity().segments;
+        let mut fixture = Fixture::with_options(turn, made, true, shape, readable());
+        fixture.train();
+        let segments = fixture.engine.sched().capacity().segments;
         assert!(segments > 1, "{width} x {height}: one segment shows nothing");
     }
 }

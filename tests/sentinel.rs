@@ -1,15 +1,15 @@
 //! What watches the numbers of a training: what it counts, names, drops and ends.
 
-use crate::pass::rig::{PARAMETERS, Rig};
+use crate::pass::fixture::{Fixture, PARAMETERS};
 use crate::reference::Rules;
 use crate::reference::step::step;
 use crate::support::device;
 use crate::support::scenes::{Scene, Shape, scene};
 use labelgs::Error;
 use labelgs::io::init::initial_gaussians;
-use labelgs::plan::Buf;
 use labelgs::scene::Gaussians;
-use labelgs::sched::SchedulerOptions;
+use labelgs::scheduler::SchedulerOptions;
+use labelgs::scheduler::plan::Buf;
 use labelgs::synth::{Preset, SynthOptions, dataset};
 use labelgs::train::{TrainConfig, Trainer};
 
@@ -30,17 +30,17 @@ fn with(change: impl Fn(&mut Gaussians, usize)) -> (Scene, usize) {
 fn a_gradient_beyond_floats_is_dropped_and_nothing_else() {
     let Some(turn) = device() else { return };
     let (made, row) = with(|g, row| g.quats[row] = [3e-26, 8e-26, -5e-26, 2e-26]);
-    let mut rig = Rig::new(turn, made, false);
-    rig.job.update = true;
-    let count = rig.scene.gaussians.len();
-    let (model, camera) = (rig.model(), rig.scene.camera.clone());
-    let mut target = rig.scene.target.clone();
+    let mut fixture = Fixture::new(turn, made, false);
+    fixture.input.update = true;
+    let count = fixture.scene.gaussians.len();
+    let (model, camera) = (fixture.model(), fixture.scene.camera.clone());
+    let mut target = fixture.scene.target.clone();
     target.slots.clear();
-    let before = rig.rows(PARAMETERS, count);
-    let counters = rig.train().counters;
+    let before = fixture.rows(PARAMETERS, count);
+    let counters = fixture.train().counters;
     assert_eq!((counters.nonfinite_count, counters.nonfinite_first), (1, row as u32));
     assert_eq!((counters.broken_count, counters.unprojected_count), (0, 0));
-    let (after, gradients) = (rig.rows(PARAMETERS, count), rig.gradient_rows());
+    let (after, gradients) = (fixture.rows(PARAMETERS, count), fixture.gradient_rows());
     assert_eq!(before[row], after[row], "without moments, a gradient of 0 moves nothing");
     assert!(gradients[row].floats().iter().all(|value| *value == 0.0));
     let expected = step(&Rules::default(), &camera, &model, &target);
@@ -77,7 +77,7 @@ fn the_pass_that_finds_a_broken_parameter_is_counted_by_itself() {
     for (name, change, expected) in cases {
         let Some(turn) = device() else { return };
         let (made, row) = with(change);
-        let counters = Rig::new(turn, made, true).train().counters;
+        let counters = Fixture::new(turn, made, true).train().counters;
         let found = [counters.broken_count, counters.unprojected_count];
         assert_eq!(found, expected, "{name}");
         let first = [counters.broken_first, counters.unprojected_first];

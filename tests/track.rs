@@ -1,8 +1,8 @@
 //! Ids from frame to frame by overlap, alone and on the video between sparse photos.
 
-use labelgs::infer::masks::track::{Overlap, track};
 use labelgs::io::image::write_png_grey16;
 use labelgs::io::mask::read_mask;
+use labelgs::label::masks::track::{Overlap, track};
 use labelgs::scene::path::{Between, short_order, video};
 use labelgs::scene::{Camera, LabelMap};
 use labelgs::synth::spoil::{Fault, spoil};

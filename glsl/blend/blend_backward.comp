@@ -15,7 +15,7 @@
 // Math:    p = dL/d ln alpha = w (u - s) with u = colour . g and s the colour behind, times g; geometry and opacity
 //          gradients are linear in six moments of p about the tile's centre. T by division. Clamped alpha: p = 0.
 // Order:   fixed, bitwise reproducible.
-// Mirror:  src/reference/blend.rs::blend_backward
+// Mirror:  src/verify/reference/blend.rs::blend_backward
 
 READ1(0, StepUniforms, step);
 FETCHU(1, tile_starts);

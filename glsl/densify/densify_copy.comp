@@ -8,7 +8,7 @@
 // Work:    one vec4 of one old Gaussian an invocation; STRIDE vec4 a Gaussian.
 // Reads:   step; old_values [N,STRIDE]; densify_actions [N]; child_offsets [N]
 // Writes:  values [new N,STRIDE]. MOMENTS: new Gaussians start at 0; the parent of a clone keeps its own.
-// Mirror:  src/reference/densify.rs::densify
+// Mirror:  src/verify/reference/densify.rs::densify
 
 layout(constant_id = 14) const uint STRIDE = 1;
 layout(constant_id = 16) const uint MOMENTS = 0;

@@ -11,7 +11,7 @@
 // Reads:   step; old_means, old_scales, old_quats [N]; densify_actions [N]; child_offsets [N]
 // Writes:  means, scales, quats [new N]
 // Math:    clone: exact copy; split: mean + R (s * normal), ln s - ln 1.6 (3DGS).
-// Mirror:  src/reference/densify.rs::densify
+// Mirror:  src/verify/reference/densify.rs::densify
 
 layout(local_size_x = 64) in;
 READ1(0, StepUniforms, step);

@@ -9,7 +9,7 @@
 // Reads:   step; means.w, scales [N]; densify_stats [N] (sum, count)
 // Writes:  densify_actions [N]; children_counts [N]; counters.cloned_count, split_count, pruned_count (integer add)
 // Math:    method of 3DGS; children are tested for size after the split.
-// Mirror:  src/reference/densify.rs::mark
+// Mirror:  src/verify/reference/densify.rs::mark
 
 layout(local_size_x = 64) in;
 READ1(0, StepUniforms, step);

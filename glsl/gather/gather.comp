@@ -12,7 +12,7 @@
 //          densify_stats [N] += (|scene v_mean2d| in NDC units, 1), not in variant object
 // Math:    the statistic sees the scene layer only, never the label loss.
 // Order:   fixed, bitwise reproducible; no atomics.
-// Mirror:  src/reference/blend.rs::blend_backward, densify.rs::accumulate
+// Mirror:  src/verify/reference/blend.rs::blend_backward, densify.rs::accumulate
 
 layout(local_size_x = 64) in;
 READ1(0, StepUniforms, step);

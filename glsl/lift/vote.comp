@@ -12,7 +12,7 @@
 // Writes:  votes_low, votes_high [N, columns]: 64 bits with VOTE_ONE to a pixel of weight 1, times the column's weight
 // Math:    A[j, k] = sum over pixels v with label k of alpha_j T_j (FlashSplat's sums, every contributor counts)
 // Order:   a tile's sum has a fixed order and is rounded once; integers add up in any order.
-// Mirror:  src/reference/lift.rs::vote
+// Mirror:  src/verify/reference/lift.rs::vote
 
 layout(constant_id = 15) const uint ROUND = 0;
 READ1(0, StepUniforms, step);

@@ -7,7 +7,7 @@
 // Reads:   loss_partials [PARTIALS]; variant labels: layer_loss [counters.layer_tile_count]
 // Writes:  counters.loss_l1, loss_ssim, loss_label
 // Order:   fixed, bitwise reproducible.
-// Mirror:  src/reference/loss.rs::photo_loss
+// Mirror:  src/verify/reference/loss.rs::photo_loss
 
 #include "subgroup.glsl"
 layout(constant_id = 3) const uint LAYER_TILE_CAPACITY = 0;

@@ -7,7 +7,7 @@
 // Reads:   step; moments [3, P]; target [P] (alpha 0: the value does not count)
 // Writes:  v_moments [3, P] vec4: d ssim / d mean x, / d mean (x^2 + y^2), / d mean x y, and the value; 0 where left out
 // Math:    ((2 mx my + C1)(2 sxy + C2)) / ((mx^2 + my^2 + C1)(sxx + syy + C2))
-// Mirror:  src/reference/loss.rs::ssim
+// Mirror:  src/verify/reference/loss.rs::ssim
 
 layout(local_size_x = 64) in;
 READ1(0, StepUniforms, step);

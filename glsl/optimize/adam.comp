@@ -9,7 +9,7 @@
 //          second_moments_in [N,STRIDE]
 // Writes:  parameters, first_moments, second_moments [N,STRIDE], the same buffers
 // Math:    Kingma and Ba; beta 0.9 / 0.999, epsilon 1e-15, no weight decay; rates by RATE.
-// Mirror:  src/reference/adam.rs::adam
+// Mirror:  src/verify/reference/adam.rs::adam
 
 layout(constant_id = 14) const uint STRIDE = 1;
 layout(constant_id = 15) const uint RATE = 0; // 0 means, 1 scales, 2 quats, 3 sh0, 4 higher bands

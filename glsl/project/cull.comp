@@ -11,7 +11,7 @@
 //          atomics): positions, scales and opacities that are not finite
 // Math:    |cov2d| <= |J|^2 max(s)^2 + blur; radius where alpha falls to ALPHA_MIN. Conservative, never drops a splat
 //          that project_forward would give a tile. Variant object: of layer 1's object alone.
-// Mirror:  src/reference/project.rs::cull
+// Mirror:  src/verify/reference/project.rs::cull
 
 layout(local_size_x = 64) in;
 READ1(0, StepUniforms, step);

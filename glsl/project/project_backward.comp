@@ -13,7 +13,7 @@
 //          variant object: adds to the gradients of the scene's splats (splat_from_gaussian)
 // Math:    dSigma = -Q dQ Q through the inverse; dM = 2 G M; Jacobian, view direction and mean2d paths reach the mean;
 //          a clamped x/z or y/z passes nothing on; the clamp of the colour at 0 passes nothing on.
-// Mirror:  src/reference/project.rs::project_backward
+// Mirror:  src/verify/reference/project.rs::project_backward
 
 layout(constant_id = 11) const uint SH_DEGREE = 3;
 layout(local_size_x = 64) in;

@@ -8,7 +8,7 @@
 // Reads:   partials [LANES]
 // Writes:  partials [LANES] (exclusive); counters (the field that TOTAL names)
 // Order:   exact integers, same in every run.
-// Mirror:  src/reference/scan.rs::exclusive_scan
+// Mirror:  src/verify/reference/scan.rs::exclusive_scan
 
 layout(constant_id = 0) const uint SUBGROUP_SIZE = 8;
 layout(constant_id = 6) const uint LANES = 64;

@@ -9,7 +9,7 @@
 // Reads:   step, counters, failure; keys_in [n]
 // Writes:  histogram [2^DIGIT_BITS, LANES]
 // Order:   exact integers, same in every run.
-// Mirror:  src/reference/sort.rs::radix_sort
+// Mirror:  src/verify/reference/sort.rs::radix_sort
 
 layout(constant_id = 0) const uint SUBGROUP_SIZE = 8;
 layout(constant_id = 6) const uint LANES = 32;

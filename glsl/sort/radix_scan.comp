@@ -6,7 +6,7 @@
 // Reads:   histogram [CELLS]
 // Writes:  histogram [CELLS]
 // Order:   exact integers, same in every run.
-// Mirror:  src/reference/sort.rs::radix_sort
+// Mirror:  src/verify/reference/sort.rs::radix_sort
 
 layout(constant_id = 0) const uint SUBGROUP_SIZE = 8;
 layout(constant_id = 6) const uint CELLS = 8192;

@@ -4,8 +4,8 @@ use super::args::JsonFlag;
 use super::context::{Context, open_model};
 use super::stdout;
 use super::values::share;
-use crate::infer::edit::catalogue::Catalogue;
-use crate::infer::edit::select::{SURE, extract};
+use crate::edit::catalogue::Catalogue;
+use crate::edit::select::{MIN_LABEL_CONFIDENCE, extract};
 use crate::io::label_table::LabelTable;
 use crate::io::ply::write_gaussians;
 use crate::scene::Gaussians;
@@ -50,13 +50,13 @@ pub struct EditArgs {
 
 /// Which Gaussians an object consists of.
 #[derive(Args, Clone, Copy, Debug)]
-pub struct SureArg {
+pub struct MinConfidenceArg {
     /// An object on its own is made of Gaussians with at least this label_confidence, if the model has any.
-    #[arg(long, value_name = "SHARE", value_parser = share, default_value_t = SURE)]
+    #[arg(long, value_name = "SHARE", value_parser = share, default_value_t = MIN_LABEL_CONFIDENCE)]
     pub min_confidence: f32,
 }
 
-impl SureArg {
+impl MinConfidenceArg {
     /// The Gaussians of some labels that are sure enough; an error if there is none.
     pub fn extract(&self, model: &Gaussians, labels: &[u32]) -> Result<Gaussians> {
         let part = extract(model, labels, self.min_confidence)?;

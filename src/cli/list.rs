@@ -5,7 +5,7 @@ use super::context::Context;
 use super::labelled::{TableArg, open};
 use super::stdout;
 use crate::Result;
-use crate::infer::edit::select::{LabelSummary, summarise};
+use crate::edit::select::{LabelSummary, summarise};
 use clap::Args;
 use serde::Serialize;
 use serde_json::json;

@@ -3,8 +3,8 @@
 use super::context::Context;
 use super::labelled::{EditArgs, Edited, open, wants_json};
 use super::values::{Picks, label, picks};
-use crate::infer::edit::change::relabel;
-use crate::infer::edit::rename::{give_name, renumber};
+use crate::edit::change::relabel;
+use crate::edit::rename::{give_name, renumber};
 use crate::scene::UNLABELLED;
 use crate::{Error, Result};
 use clap::Args;
@@ -45,7 +45,7 @@ pub fn run(args: &MergeArgs, context: &Context) -> Result<()> {
     let merged = relabel(&model, &map);
     let mut table = known.table.as_ref().map(|table| renumber(table, &map));
     if let Some(name) = &args.name {
-        let ids = crate::infer::edit::catalogue::Catalogue::new(&merged, None);
+        let ids = crate::edit::catalogue::Catalogue::new(&merged, None);
         table = Some(give_name(&ids, table, into, name)?);
     }
     let labels = BTreeSet::from([into]);

@@ -5,12 +5,14 @@ use super::context::Context;
 use super::devices::{shape_json, shape_of, shape_text};
 use super::stdout;
 use super::values::{Size, bytes, count, size};
-use crate::engine::{Engine, LabelRoom, Room, capacity};
+use crate::engine::{Engine, EngineSize, LabelSize, capacity};
 use crate::gpu::{self, GpuOptions};
-use crate::infer::vote::ballot::COLUMNS_MAX;
+use crate::label::vote::ballot::COLUMNS_MAX;
 use crate::pass::{KernelShape, Variant, training_step};
-use crate::plan::{Capacity, Grid, Limits, MemoryReport, Page, PassList, Plan, PlanOptions, TABLE, Touch, Work};
-use crate::sched::plan_limits;
+use crate::scheduler::plan::{
+    Capacity, Grid, Limits, MemoryReport, Page, PassList, Plan, PlanOptions, TABLE, Touch, Work,
+};
+use crate::scheduler::plan_limits;
 use crate::{Error, Result};
 use clap::Args;
 use serde_json::{Value, json};
@@ -46,7 +48,7 @@ struct Subject {
     device: Option<String>,
     shape: KernelShape,
     limits: Limits,
-    room: Room,
+    room: EngineSize,
     capacity: Capacity,
     list: PassList,
 }
@@ -71,13 +73,13 @@ fn subject(args: &PlanArgs, context: &Context) -> Result<Subject> {
         Some(memory) => card(memory),
         None => device(context)?,
     };
-    let labels = (args.label_samples > 0).then(|| LabelRoom {
+    let labels = (args.label_samples > 0).then(|| LabelSize {
         max_label: MAX_LABEL.max(args.label_samples),
         layers: args.label_samples,
         vote_columns: COLUMNS_MAX,
     });
     let size = (args.size.0, args.size.1);
-    let room = Room { gaussians: args.gaussians.max(1), size, trained: true, labels };
+    let room = EngineSize { gaussians: args.gaussians.max(1), size, trained: true, labels };
     let capacity = capacity(&shape, &room);
     let variant =
         Variant { labels: labels.is_some(), lift: false, sh_degree: args.sh_degree, size, update: true, counts: false };

@@ -1,10 +1,10 @@
 //! What `labelgs profile` found, as a table and as JSON.
 
 use super::devices::{shape_json, shape_of, shape_text};
-use crate::engine::Room;
+use crate::engine::EngineSize;
 use crate::gpu::Gpu;
 use crate::pass::{KernelShape, Stage};
-use crate::sched::{PassTime, Profiler};
+use crate::scheduler::{PassTime, Profiler};
 use crate::train::{StepReport, StepTimes};
 use serde_json::{Value, json};
 use std::collections::{HashMap, HashSet};
@@ -63,7 +63,7 @@ pub struct Profile {
     /// Gaussians at the end.
     pub gaussians: u32,
     /// What the memory was sized for.
-    pub room: Room,
+    pub room: EngineSize,
     clocks: Clocks,
     passes: Vec<(Stage, PassTime)>,
     stages: Vec<(Stage, PassTime)>,
@@ -92,7 +92,7 @@ impl Profile {
             warm_up: window.warm_up,
             views: 0,
             gaussians: 0,
-            room: Room { gaussians: 0, size: (0, 0), trained: true, labels: None },
+            room: EngineSize { gaussians: 0, size: (0, 0), trained: true, labels: None },
             clocks: Clocks::default(),
             passes: Vec::new(),
             stages: Vec::new(),

@@ -5,7 +5,7 @@ use super::labelled::{Edited, open, wants_json};
 use super::select::SelectArgs;
 use super::values::{colour, share};
 use crate::Result;
-use crate::infer::edit::change::recolour;
+use crate::edit::change::recolour;
 use clap::Args;
 use serde_json::json;
 

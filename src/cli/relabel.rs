@@ -4,8 +4,8 @@ use super::context::Context;
 use super::labelled::{EditArgs, Edited, open, wants_json};
 use super::values::{Renumbering, renumbering};
 use crate::Result;
-use crate::infer::edit::change::relabel;
-use crate::infer::edit::rename::renumber;
+use crate::edit::change::relabel;
+use crate::edit::rename::renumber;
 use clap::Args;
 use serde_json::json;
 

@@ -3,14 +3,14 @@
 use super::args::{JsonFlag, SceneArgs};
 use super::choose::{Asked, PromptArgs};
 use super::context::{Context, open_model};
-use super::labelled::SureArg;
+use super::labelled::MinConfidenceArg;
 use super::scene::{near_plane, open_gpu, open_scene, pick_views, render_engine};
 use super::values::{Picks, colour, picks};
 use super::{labelled, stdout};
-use crate::infer::edit::select::remove;
-use crate::infer::output::{Format, Pictures, What, write_pictures};
-use crate::infer::render::render;
+use crate::edit::select::remove;
 use crate::io::camera_json::read_camera;
+use crate::render::pictures::{Format, Pictures, What, write_pictures};
+use crate::render::render;
 use crate::scene::{Camera, Gaussians, stems};
 use crate::{Error, Result};
 use clap::Args;
@@ -47,7 +47,7 @@ pub struct RenderArgs {
     pub without: Option<Option<Picks>>,
     /// Which Gaussians of the labels of --only.
     #[command(flatten)]
-    pub sure: SureArg,
+    pub sure: MinConfidenceArg,
     /// Labels by name and by place.
     #[command(flatten)]
     pub prompts: PromptArgs,
@@ -129,7 +129,7 @@ fn cameras(args: &RenderArgs) -> Result<Vec<(String, Camera)>> {
 fn write(
     args: &RenderArgs,
     stem: &str,
-    rendered: &crate::infer::render::Rendered,
+    rendered: &crate::render::Rendered,
     model: &Gaussians,
 ) -> Result<Vec<std::path::PathBuf>> {
     let asked = |what| args.what.contains(&what);

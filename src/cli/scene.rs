@@ -3,15 +3,15 @@
 use super::args::SceneArgs;
 use super::config;
 use super::context::Context;
-use crate::engine::{Engine, LabelRoom, Room};
+use crate::engine::{Engine, EngineSize, LabelSize};
 use crate::error::{Error, Result};
 use crate::gpu::{Gpu, GpuOptions, PipelineStore};
 use crate::io::pipeline_file::PipelineFolder;
 use crate::io::{self, LoadOptions, run_folder};
 use crate::scene::{Dataset, Gaussians, View};
-use crate::sched::SchedulerOptions;
-use crate::selftest;
+use crate::scheduler::SchedulerOptions;
 use crate::train::near::NEAR;
+use crate::verify::selftest;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -123,16 +123,16 @@ pub fn render_engine(gpu: Arc<Gpu>, model: &Gaussians, sizes: impl Iterator<Item
 pub fn vote_engine(gpu: Arc<Gpu>, model: &Gaussians, views: &[&View], columns: u32) -> Result<Engine> {
     let sizes = views.iter().map(|view| (view.camera.width, view.camera.height));
     // No layer is ever sampled, so no id needs a place among them.
-    engine_for(gpu, model, sizes, Some(LabelRoom { max_label: 0, layers: 0, vote_columns: columns }))
+    engine_for(gpu, model, sizes, Some(LabelSize { max_label: 0, layers: 0, vote_columns: columns }))
 }
 
 fn engine_for(
     gpu: Arc<Gpu>,
     model: &Gaussians,
     sizes: impl Iterator<Item = (u32, u32)>,
-    labels: Option<LabelRoom>,
+    labels: Option<LabelSize>,
 ) -> Result<Engine> {
     let size = sizes.reduce(|a, b| (a.0.max(b.0), a.1.max(b.1))).unwrap_or((1, 1));
-    let room = Room { gaussians: (model.len() as u64).max(1), size, trained: false, labels };
+    let room = EngineSize { gaussians: (model.len() as u64).max(1), size, trained: false, labels };
     Engine::new(gpu, room, SchedulerOptions::default())
 }

@@ -3,13 +3,13 @@
 use super::args::JsonFlag;
 use super::choose::ChooseArgs;
 use super::context::Context;
-use super::labelled::{Edited, SureArg, open, wants_json};
+use super::labelled::{Edited, MinConfidenceArg, open, wants_json};
 use super::values::{distance, share};
 use crate::Result;
-use crate::infer::edit::change::without_specks;
-use crate::infer::edit::components::Grouping;
-use crate::infer::edit::rename::keep;
-use crate::infer::edit::select::remove;
+use crate::edit::change::without_specks;
+use crate::edit::components::Grouping;
+use crate::edit::rename::keep;
+use crate::edit::select::remove;
 use clap::Args;
 use serde_json::json;
 use std::collections::BTreeSet;
@@ -40,7 +40,7 @@ pub struct ExtractArgs {
     pub select: SelectArgs,
     /// Which Gaussians of the labels.
     #[command(flatten)]
-    pub sure: SureArg,
+    pub sure: MinConfidenceArg,
     /// Leave out detached specks: connected parts of a label that are smaller than --min-share.
     #[arg(long)]
     pub drop_specks: bool,

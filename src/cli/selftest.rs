@@ -6,7 +6,7 @@ use super::devices::{needs_json, needs_text, shape_json, shape_text};
 use super::scene::open_untried;
 use super::stdout;
 use crate::pass::KernelShape;
-use crate::selftest::{self, Check};
+use crate::verify::selftest::{self, Check};
 use crate::{Error, Result};
 use clap::Args;
 use serde_json::json;

@@ -5,8 +5,8 @@ use super::labelled::{EditArgs, Edited, open, wants_json};
 use super::select::GroupingArgs;
 use super::values::{Picks, picks};
 use crate::Result;
-use crate::infer::edit::change::{Specks, split_components};
-use crate::infer::edit::rename::split;
+use crate::edit::change::{Specks, split_components};
+use crate::edit::rename::split;
 use clap::Args;
 use serde_json::json;
 

@@ -7,18 +7,18 @@ use super::resume::{self, Checkpoints};
 use super::scene::{open_gpu, open_with};
 use super::train_args::TrainArgs;
 use super::{config, interrupt, occlusion};
+use crate::edit::select::MIN_LABEL_CONFIDENCE;
 use crate::engine::Engine;
+use crate::eval::evaluate::{Rendering, evaluate};
+use crate::eval::scores::Scores;
 use crate::gpu::Gpu;
-use crate::infer::edit::select::SURE;
-use crate::infer::render::render;
-use crate::infer::score::evaluate::{Rendering, evaluate};
-use crate::infer::score::scores::Scores;
 use crate::io::label_table::{self, LabelTable};
 use crate::io::occlusion_table::{self, OcclusionTable};
 use crate::io::run_folder::{self, Lock};
 use crate::io::{atomic, checkpoint_folder, init};
+use crate::render::render;
 use crate::scene::{Dataset, Photo, View};
-use crate::sched::SchedulerOptions;
+use crate::scheduler::SchedulerOptions;
 use crate::train::record::{self, Models};
 use crate::train::{self, StepReport, TrainConfig, Trainer};
 use crate::{Error, Result};
@@ -357,7 +357,7 @@ fn score(trainer: &mut Trainer, dataset: &Dataset, config: &TrainConfig) -> Resu
     let mut model = trainer.model()?;
     // Bands that were never let in are 0; without them the render is cheaper.
     model.sh_degree = model.sh_degree.max(trainer.sh_degree());
-    let how = Rendering { near: config.near, background: config.background, min_confidence: SURE };
+    let how = Rendering { near: config.near, background: config.background, min_confidence: MIN_LABEL_CONFIDENCE };
     let scores = evaluate(trainer.engine_mut(), &model, &views, how, &(), &mut ())?;
     super::eval::warn_of_odd_view(&scores, config.near);
     Ok(Some(scores))

@@ -1,6 +1,6 @@
 //! Parsers of single values.
 
-use crate::infer::edit::catalogue::Pick;
+use crate::edit::catalogue::Pick;
 use crate::scene::labels::LABEL_MAX;
 use std::collections::BTreeMap;
 

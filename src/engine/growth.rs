@@ -1,17 +1,17 @@
 //! How much memory an engine takes: capacities for what is known at first, which follow what a scene turns out to need.
 
-use super::{Engine, Report, Room};
+use super::{Engine, EngineSize, Report};
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::pass::{self, KernelShape, Variant, loss};
-use crate::plan::{Buf, Capacity, MemoryReport, PassList, TABLE};
-use crate::sched::{Scheduler, SchedulerOptions};
+use crate::scheduler::plan::{Buf, Capacity, MemoryReport, PassList, TABLE};
+use crate::scheduler::{Scheduler, SchedulerOptions};
 use crate::shaders::structs::Counters;
 use serde::{Deserialize, Serialize};
 
 /// How far the memory of an engine has grown: what bounded memory leaves room for depends on it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Sizes {
+pub struct GrownSizes {
     /// Gaussians that there is room for.
     pub gaussians: u32,
     /// (splat, tile) pairs.
@@ -23,7 +23,7 @@ pub struct Sizes {
 }
 
 /// Capacities for some room, before any measurement.
-pub fn capacity(shape: &KernelShape, room: &Room) -> Capacity {
+pub fn capacity(shape: &KernelShape, room: &EngineSize) -> Capacity {
     let (width, height) = room.size;
     let (tiles_x, tiles_y) = shape.tiles(width, height);
     let tiles = u64::from(tiles_x) * u64::from(tiles_y);
@@ -68,7 +68,7 @@ fn derive(shape: &KernelShape, capacity: &mut Capacity, instances: u64, trained:
 
 impl Engine {
     /// The memory that an engine for `room` would take, before anything is allocated.
-    pub fn predict(gpu: &Gpu, room: &Room, options: SchedulerOptions) -> Result<MemoryReport> {
+    pub fn predict(gpu: &Gpu, room: &EngineSize, options: SchedulerOptions) -> Result<MemoryReport> {
         let shape = KernelShape::of(gpu.capabilities());
         let capacity = capacity(&shape, room);
         let lists = Self::lists_of(&shape, &capacity, room);
@@ -76,7 +76,7 @@ impl Engine {
     }
 
     /// The lists that decide how much scratch memory is needed.
-    pub fn lists_of(shape: &KernelShape, capacity: &Capacity, room: &Room) -> Vec<PassList> {
+    pub fn lists_of(shape: &KernelShape, capacity: &Capacity, room: &EngineSize) -> Vec<PassList> {
         let mut lists = vec![pass::render_view(shape, capacity, 3)];
         if room.trained {
             let variant = Variant {
@@ -132,7 +132,7 @@ impl Engine {
     /// Capacities for more Gaussians, with no fewer pairs, tiles and segments than the scene has needed so far.
     fn capacity_for(&self, gaussians: u64) -> Capacity {
         let old = self.sched.capacity();
-        let mut new = capacity(&self.shape, &Room { gaussians, ..self.room });
+        let mut new = capacity(&self.shape, &EngineSize { gaussians, ..self.room });
         new.layer_tiles = new.layer_tiles.max(old.layer_tiles);
         new.segments = old.segments;
         let instances = new.instances.max(old.instances);
@@ -195,10 +195,10 @@ impl Engine {
     }
 
     /// How far the memory has grown.
-    pub fn sizes(&self) -> Sizes {
+    pub fn sizes(&self) -> GrownSizes {
         let capacity = self.sched.capacity();
         let word = |size: u64| u32::try_from(size).unwrap_or(u32::MAX);
-        Sizes {
+        GrownSizes {
             gaussians: word(self.room.gaussians),
             instances: word(capacity.instances),
             layer_tiles: word(capacity.layer_tiles),
@@ -207,9 +207,9 @@ impl Engine {
     }
 
     /// Makes the memory of a new engine as large as another one's had become.
-    pub fn grow_to(&mut self, sizes: Sizes) -> Result<()> {
+    pub fn grow_to(&mut self, sizes: GrownSizes) -> Result<()> {
         let gaussians = self.room.gaussians.max(u64::from(sizes.gaussians));
-        let mut new = capacity(&self.shape, &Room { gaussians, ..self.room });
+        let mut new = capacity(&self.shape, &EngineSize { gaussians, ..self.room });
         if new.layer_tiles > 0 {
             new.layer_tiles = new.layer_tiles.max(u64::from(sizes.layer_tiles));
         }

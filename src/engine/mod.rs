@@ -5,14 +5,14 @@ pub mod model;
 pub mod state;
 pub mod uniforms;
 
-pub use growth::{Sizes, capacity};
+pub use growth::{GrownSizes, capacity};
 
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::pass::{self, KernelShape, Variant};
-use crate::plan::{Buf, TABLE};
 use crate::scene::Gaussians;
-use crate::sched::{ListId, Scheduler, SchedulerOptions, Ticket};
+use crate::scheduler::plan::{Buf, TABLE};
+use crate::scheduler::{ListId, Scheduler, SchedulerOptions, Ticket};
 use crate::shaders::structs::Counters;
 use glam::DVec3;
 use std::collections::HashMap;
@@ -20,7 +20,7 @@ use std::sync::Arc;
 
 /// Room for labels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct LabelRoom {
+pub struct LabelSize {
     /// Largest id.
     pub max_label: u32,
     /// Objects sampled in one step, at most.
@@ -31,7 +31,7 @@ pub struct LabelRoom {
 
 /// What the memory of an engine is sized for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Room {
+pub struct EngineSize {
     /// Gaussians.
     pub gaussians: u64,
     /// Largest image, px.
@@ -39,7 +39,7 @@ pub struct Room {
     /// Optimiser state and gradients.
     pub trained: bool,
     /// Labels; none for a scene without masks, which then pays nothing for them.
-    pub labels: Option<LabelRoom>,
+    pub labels: Option<LabelSize>,
 }
 
 /// Which list.
@@ -74,7 +74,7 @@ pub struct Report {
 pub struct Engine {
     sched: Scheduler,
     shape: KernelShape,
-    room: Room,
+    room: EngineSize,
     lists: HashMap<ListKey, ListId>,
     gaussian_count: u32,
     /// What the positions of the model are relative to.
@@ -83,13 +83,13 @@ pub struct Engine {
 
 impl Engine {
     /// Allocates for `room`.
-    pub fn new(gpu: Arc<Gpu>, room: Room, options: SchedulerOptions) -> Result<Self> {
+    pub fn new(gpu: Arc<Gpu>, room: EngineSize, options: SchedulerOptions) -> Result<Self> {
         let shape = KernelShape::of(gpu.capabilities());
         Self::with_shape(gpu, shape, room, options)
     }
 
     /// As [`Engine::new`], with kernels of a given shape.
-    pub fn with_shape(gpu: Arc<Gpu>, shape: KernelShape, room: Room, options: SchedulerOptions) -> Result<Self> {
+    pub fn with_shape(gpu: Arc<Gpu>, shape: KernelShape, room: EngineSize, options: SchedulerOptions) -> Result<Self> {
         shape.check()?;
         let (tiles_x, tiles_y) = shape.tiles(room.size.0, room.size.1);
         // A splat may touch every tile, once more in its object's layer, and one loop walks them (65,535 rounds).
@@ -123,7 +123,7 @@ impl Engine {
     }
 
     /// What the memory is sized for.
-    pub fn room(&self) -> &Room {
+    pub fn room(&self) -> &EngineSize {
         &self.room
     }
 
@@ -179,17 +179,17 @@ impl Engine {
         Ok(id)
     }
 
-    /// Submits a list with the host's data of a slot.
-    pub fn submit(&mut self, key: ListKey, slot: usize) -> Result<Ticket> {
+    /// Submits a list with the host's data of a frame.
+    pub fn submit(&mut self, key: ListKey, frame: usize) -> Result<Ticket> {
         let id = self.list(key)?;
-        self.sched.submit(id, slot)
+        self.sched.submit(id, frame)
     }
 
-    /// What the last list of a slot reports; waits for it.
-    pub fn report(&mut self, slot: usize) -> Result<Report> {
-        self.sched.wait_slot(slot)?;
-        let counters = self.sched.download::<Counters>(Buf::REPORT, slot, 0, 1)?[0];
-        let failure = self.sched.download::<u32>(Buf::REPORT_FAILURE, slot, 0, 1)?[0];
+    /// What the last list of a frame reports; waits for it.
+    pub fn report(&mut self, frame: usize) -> Result<Report> {
+        self.sched.wait_frame(frame)?;
+        let counters = self.sched.download::<Counters>(Buf::REPORT, frame, 0, 1)?[0];
+        let failure = self.sched.download::<u32>(Buf::REPORT_FAILURE, frame, 0, 1)?[0];
         Ok(Report { counters, failure })
     }
 }

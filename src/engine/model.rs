@@ -2,9 +2,9 @@
 
 use crate::error::Result;
 use crate::pass::ATTRIBUTES;
-use crate::plan::Buf;
 use crate::scene::Gaussians;
-use crate::sched::Scheduler;
+use crate::scheduler::Scheduler;
+use crate::scheduler::plan::Buf;
 
 /// Bands above degree 0: plane, vec4 per Gaussian, first coefficient among the rest, coefficients.
 const BANDS: [(Buf, usize, usize, usize); 3] = [(Buf::SH1, 3, 0, 3), (Buf::SH2, 4, 3, 5), (Buf::SH3, 6, 8, 7)];

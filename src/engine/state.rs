@@ -5,7 +5,7 @@ use super::Engine;
 use crate::error::Result;
 use crate::io::checkpoint::Plane;
 use crate::pass::ATTRIBUTES;
-use crate::plan::{Buf, TABLE};
+use crate::scheduler::plan::{Buf, TABLE};
 use glam::DVec3;
 use std::collections::BTreeMap;
 

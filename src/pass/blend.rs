@@ -3,7 +3,7 @@
 use super::build::{Builder, args};
 use super::project::GAUSSIAN_FROM_SPLAT;
 use crate::pass;
-use crate::plan::{Buf, Grid};
+use crate::scheduler::plan::{Buf, Grid};
 use crate::shaders::constants;
 
 const GRID: fn() -> Grid = || args(constants::ARGS_BLEND);

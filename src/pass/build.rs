@@ -1,7 +1,7 @@
 //! What the pass families share while a list is put together.
 
 use super::KernelShape;
-use crate::plan::{Buf, Capacity, Grid, PassDecl, PassList};
+use crate::scheduler::plan::{Buf, Capacity, Grid, PassDecl, PassList};
 use crate::shaders::constants;
 
 /// A list in the making.
@@ -63,13 +63,13 @@ pub const ONE: Grid = Grid::Groups(1, 1, 1);
 macro_rules! pass {
     ($b:expr, texel $stem:ident { $($name:ident: $buf:expr),* $(,)? } [$($spec:ident: $value:expr),* $(,)?], $grid:expr) => {{
         use $crate::shaders::$stem as shader;
-        let declared = $crate::plan::PassDecl::new($b.shape.pick(&shader::BASE, &shader::TEXEL),
+        let declared = $crate::scheduler::plan::PassDecl::new($b.shape.pick(&shader::BASE, &shader::TEXEL),
             shader::Bindings { $($name: $buf),* }.list(), $grid);
         $crate::pass!(@spec $b, declared, shader, [$($spec: $value),*])
     }};
     ($b:expr, $stem:ident { $($name:ident: $buf:expr),* $(,)? } [$($spec:ident: $value:expr),* $(,)?], $grid:expr) => {{
         use $crate::shaders::$stem as shader;
-        let declared = $crate::plan::PassDecl::new(&shader::BASE, shader::Bindings { $($name: $buf),* }.list(), $grid);
+        let declared = $crate::scheduler::plan::PassDecl::new(&shader::BASE, shader::Bindings { $($name: $buf),* }.list(), $grid);
         $crate::pass!(@spec $b, declared, shader, [$($spec: $value),*])
     }};
     (@spec $b:expr, $declared:expr, $shader:ident, []) => { $b.pass($declared) };

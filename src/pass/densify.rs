@@ -4,7 +4,7 @@ use super::build::{Builder, Count, args, over_gaussians};
 use super::optimize::ATTRIBUTES;
 use super::scan::{self, Total};
 use crate::pass;
-use crate::plan::Buf;
+use crate::scheduler::plan::Buf;
 
 /// Decides for each Gaussian and counts the result.
 pub fn mark(b: &mut Builder) {

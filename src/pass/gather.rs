@@ -3,7 +3,7 @@
 use super::build::{Builder, over_splats};
 use super::project::GAUSSIAN_FROM_SPLAT;
 use crate::pass;
-use crate::plan::Buf;
+use crate::scheduler::plan::Buf;
 
 /// Adds up the records and notes the densification statistic.
 pub fn gather(b: &mut Builder) {

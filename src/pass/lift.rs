@@ -3,7 +3,7 @@
 use super::build::{Builder, args, over_gaussians};
 use super::project::GAUSSIAN_FROM_SPLAT;
 use crate::pass;
-use crate::plan::Buf;
+use crate::scheduler::plan::Buf;
 use crate::shaders::constants;
 
 /// The highest vote of this step becomes the label of its Gaussian.

@@ -2,7 +2,7 @@
 
 use super::build::{Builder, ONE};
 use crate::pass;
-use crate::plan::{Buf, Grid};
+use crate::scheduler::plan::{Buf, Grid};
 
 /// Rows or columns that one lane filters in registers (glsl/include/window.glsl).
 const STRIP: u32 = 8;

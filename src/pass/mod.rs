@@ -24,7 +24,7 @@ pub use shape::KernelShape;
 pub use stage::Stage;
 
 use crate::pass;
-use crate::plan::{Buf, Capacity, PassList};
+use crate::scheduler::plan::{Buf, Capacity, PassList};
 
 /// What a recorded list depends on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

@@ -2,7 +2,7 @@
 
 use super::build::{Builder, args, over_gaussians};
 use crate::pass;
-use crate::plan::Buf;
+use crate::scheduler::plan::Buf;
 use crate::shaders::constants;
 
 /// An attribute of the Gaussians as the optimiser sees it.

@@ -4,7 +4,7 @@ use super::build::{Builder, Count, ONE, over_gaussians, over_splats};
 use super::scan::{self, Total};
 use super::sort::{self, SortBuffers};
 use crate::pass;
-use crate::plan::Buf;
+use crate::scheduler::plan::Buf;
 
 /// Sorted Gaussian indices of the visible splats; the depth sort has an even number of passes.
 pub const GAUSSIAN_FROM_SPLAT: Buf = Buf::DEPTH_VALUES_A;

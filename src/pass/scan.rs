@@ -2,7 +2,7 @@
 
 use super::build::{Builder, Count, ONE};
 use crate::pass;
-use crate::plan::{Buf, Grid};
+use crate::scheduler::plan::{Buf, Grid};
 
 /// Which counter the total goes to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

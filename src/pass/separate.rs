@@ -9,7 +9,7 @@ use super::build::{Builder, ONE};
 use super::{Variant, begin, blend, end, gather, lift, loss, optimize, project, tile};
 use crate::pass;
 use crate::pass::KernelShape;
-use crate::plan::{Buf, Capacity, PassList, Work};
+use crate::scheduler::plan::{Buf, Capacity, PassList, Work};
 
 /// What the passes of an object read and write in place of the step's buffers.
 const OF_OBJECT: [(Buf, Buf); 5] = [

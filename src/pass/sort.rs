@@ -2,7 +2,7 @@
 
 use super::build::{Builder, Count, ONE};
 use crate::pass;
-use crate::plan::{Buf, Grid};
+use crate::scheduler::plan::{Buf, Grid};
 
 /// Two pairs of buffers that the passes of a sort go back and forth between.
 #[derive(Clone, Copy, Debug)]

@@ -1,6 +1,6 @@
 //! Which stage of a step a pass belongs to, for reports.
 
-use crate::plan::{Buf, PassList, TABLE, Work};
+use crate::scheduler::plan::{Buf, PassList, TABLE, Work};
 
 /// A stage of a training step, in the order of the step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -125,7 +125,7 @@ fn stage_of(stem: &str, now: Stage) -> Stage {
 mod tests {
     use super::{Stage, stages};
     use crate::pass::{KernelShape, Variant, training_step};
-    use crate::plan::Capacity;
+    use crate::scheduler::plan::Capacity;
 
     #[test]
     fn every_item_of_a_step_has_its_stage() {

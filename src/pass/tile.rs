@@ -5,7 +5,7 @@ use super::project::GAUSSIAN_FROM_SPLAT;
 use super::scan::{self, Total};
 use super::sort::{self, SortBuffers};
 use crate::pass;
-use crate::plan::Buf;
+use crate::scheduler::plan::Buf;
 use crate::shaders::constants;
 
 /// Lists the (splat, tile) pairs, sorts them by layer and tile, and finds each tile's range. Returns the buffer that

@@ -1,10 +1,10 @@
 //! Densification and opacity reset between steps, with a bound on the number of Gaussians.
 
 use super::Trainer;
-use super::job::Job;
+use super::step_input::StepInput;
 use crate::engine::ListKey;
 use crate::error::Result;
-use crate::plan::Buf;
+use crate::scheduler::plan::Buf;
 use crate::shaders::structs::{Counters, StepUniforms};
 
 /// What a densification did.
@@ -19,9 +19,9 @@ pub struct Densified {
 }
 
 impl Trainer {
-    /// Clones, splits and prunes after `job`, whose statistics are in; all earlier submits are done.
-    pub(super) fn densify(&mut self, job: &Job) -> Result<Densified> {
-        let wished = self.densify_uniforms(job);
+    /// Clones, splits and prunes after `input`, whose statistics are in; all earlier submits are done.
+    pub(super) fn densify(&mut self, input: &StepInput) -> Result<Densified> {
+        let wished = self.densify_uniforms(input);
         let wanted = self.count_densified(wished)?.densified_count;
         let mut bound = self.bound(wanted)?;
         let (uniforms, counted) = loop {
@@ -45,23 +45,23 @@ impl Trainer {
     }
 
     /// Brings all opacities down to at most 0.01.
-    pub(super) fn reset_opacity(&mut self, job: &Job) -> Result<()> {
-        let uniforms = self.densify_uniforms(job);
+    pub(super) fn reset_opacity(&mut self, input: &StepInput) -> Result<()> {
+        let uniforms = self.densify_uniforms(input);
         let list = self.engine.list(ListKey::OpacityReset)?;
         self.engine.sched_mut().upload(Buf::STEP, 0, 0, &[uniforms])?;
         self.engine.sched_mut().run(list, 0)
     }
 
-    fn densify_uniforms(&self, job: &Job) -> StepUniforms {
+    fn densify_uniforms(&self, input: &StepInput) -> StepUniforms {
         let config = &self.config;
         StepUniforms {
             densify_threshold: config.densify_grad_threshold,
             densify_scale: (f64::from(config.percent_dense) * self.fixed.extent) as f32,
             prune_scale: (f64::from(config.max_scale) * self.fixed.extent) as f32,
             prune_opacity: config.min_opacity,
-            prune_big: u32::from(config.prunes_large_at(job.step)),
-            seed: (config.seed as u32) ^ job.step.wrapping_mul(0x9e37_79b9),
-            ..super::job::uniforms(job, self.views.of(job), config, self.fixed, &self.engine)
+            prune_big: u32::from(config.prunes_large_at(input.step)),
+            seed: (config.seed as u32) ^ input.step.wrapping_mul(0x9e37_79b9),
+            ..super::step_input::uniforms(input, self.views.of(input), config, self.fixed, &self.engine)
         }
     }
 

@@ -2,35 +2,35 @@
 
 pub mod config;
 mod densify;
-pub mod job;
 pub mod near;
 mod occlusion;
 pub mod record;
 mod sampler;
 mod sentinel;
 mod state;
+pub mod step_input;
 mod timing;
 mod views;
 mod votes;
 
 pub use config::{LabelRule, Occlusion, TrainConfig};
 pub use densify::Densified;
-pub use state::{RunFacts, TrainState, ViewPrint};
+pub use state::{RunFacts, TrainState, ViewFingerprint};
 pub use timing::StepTimes;
 
-use crate::engine::{Engine, LabelRoom, ListKey, Report, Room};
+use crate::engine::{Engine, EngineSize, LabelSize, ListKey, Report};
 use crate::error::{Error, Result};
 use crate::fault;
 use crate::gpu::Gpu;
-use crate::infer::vote::ballot::columns_for;
+use crate::label::vote::ballot::columns_for;
 use crate::pass::{KernelShape, Variant};
-use crate::plan::Buf;
 use crate::scene::{Dataset, Gaussians};
-use crate::sched::{SchedulerOptions, Ticket};
-use job::{Fixed, Job, TrainView};
+use crate::scheduler::plan::Buf;
+use crate::scheduler::{SchedulerOptions, Ticket};
 use sampler::ViewOrder;
 use std::collections::{BTreeSet, VecDeque};
 use std::sync::Arc;
+use step_input::{SceneScale, StepInput, TrainView};
 use views::Views;
 
 /// What is known about a finished step.
@@ -51,10 +51,10 @@ pub struct Trainer {
     engine: Engine,
     config: TrainConfig,
     views: Views,
-    fixed: Fixed,
+    fixed: SceneScale,
     order: ViewOrder,
-    /// Steps submitted, not yet absorbed; at most one per slot.
-    flying: VecDeque<(Job, Ticket)>,
+    /// Steps submitted, not yet absorbed; at most one per frame.
+    in_flight: VecDeque<(StepInput, Ticket)>,
     /// Steps submitted so far.
     step: u32,
     updates: u32,
@@ -71,18 +71,18 @@ pub struct Trainer {
     counts_pairs: bool,
     seen: sentinel::Seen,
     /// What the views are told apart by; empty until somebody asks.
-    prints: Vec<ViewPrint>,
+    fingerprints: Vec<ViewFingerprint>,
 }
 
 /// Room for training on a data set.
-pub fn room(dataset: &Dataset, config: &TrainConfig, gaussians: u64) -> Result<Room> {
+pub fn room(dataset: &Dataset, config: &TrainConfig, gaussians: u64) -> Result<EngineSize> {
     let sizes = dataset.train.iter().chain(&dataset.test).map(|view| (view.camera.width, view.camera.height));
     let size = sizes.reduce(|a, b| (a.0.max(b.0), a.1.max(b.1)));
     let size = size.ok_or_else(|| Error::data(&dataset.root, "", "the scene has no view to train on"))?;
     let objects: Vec<u16> =
         dataset.train.iter().filter_map(|view| view.mask.as_ref()).flat_map(|m| m.objects()).collect();
     let most = dataset.train.iter().filter_map(|view| view.mask.as_ref().map(|mask| mask.objects().len())).max();
-    let labels = objects.iter().max().map(|&max_label| LabelRoom {
+    let labels = objects.iter().max().map(|&max_label| LabelSize {
         max_label: u32::from(max_label),
         layers: config.label_samples.min(most.unwrap_or(0) as u32),
         vote_columns: match config.label_rule {
@@ -90,7 +90,7 @@ pub fn room(dataset: &Dataset, config: &TrainConfig, gaussians: u64) -> Result<R
             LabelRule::Main => 0,
         },
     });
-    Ok(Room { gaussians, size, trained: true, labels })
+    Ok(EngineSize { gaussians, size, trained: true, labels })
 }
 
 /// Room to start with: for twice as many Gaussians as there are, or for those where memory is short.
@@ -100,12 +100,12 @@ pub fn start_room(
     config: &TrainConfig,
     gaussians: usize,
     options: SchedulerOptions,
-) -> Result<Room> {
+) -> Result<EngineSize> {
     let gaussians = gaussians as u64;
     let most = if config.max_gaussians > 0 { config.max_gaussians } else { u64::MAX };
     let roomy = room(dataset, config, (gaussians * 2).min(most).max(gaussians))?;
     match Engine::predict(gpu, &roomy, options) {
-        Err(Error::OutOfMemory { .. }) => Ok(Room { gaussians, ..roomy }),
+        Err(Error::OutOfMemory { .. }) => Ok(EngineSize { gaussians, ..roomy }),
         other => other.map(|_| roomy),
     }
 }
@@ -149,10 +149,10 @@ impl Trainer {
         shape: KernelShape,
         config: TrainConfig,
         dataset: &mut Dataset,
-        room: Room,
+        room: EngineSize,
         options: SchedulerOptions,
     ) -> Result<Self> {
-        let fixed = Fixed { extent: dataset.extent() };
+        let fixed = SceneScale { extent: dataset.extent() };
         let max_gaussians = if config.max_gaussians > 0 { config.max_gaussians } else { u64::from(u32::MAX) };
         let views =
             dataset.train.iter_mut().map(|view| train_view(view, config.mask_border)).collect::<Result<Vec<_>>>()?;
@@ -165,7 +165,7 @@ impl Trainer {
             views,
             fixed,
             order,
-            flying: VecDeque::new(),
+            in_flight: VecDeque::new(),
             step: 0,
             updates: 0,
             stamp: 0,
@@ -176,7 +176,7 @@ impl Trainer {
             timing: None,
             counts_pairs: false,
             seen: sentinel::Seen::default(),
-            prints: Vec::new(),
+            fingerprints: Vec::new(),
         })
     }
 
@@ -227,7 +227,7 @@ impl Trainer {
             if !error.is_out_of_memory() {
                 return Err(error);
             }
-            self.flying.clear();
+            self.in_flight.clear();
         }
         self.engine.download_model(self.config.sh_degree)
     }
@@ -245,14 +245,14 @@ impl Trainer {
             done.extend(self.drain()?);
             self.refresh_occluders()?;
         }
-        let job = self.job(step);
+        let input = self.input(step);
         if fault::at("nan").is_some() {
             self.engine.sched_mut().upload(Buf::MEANS, 0, 0, &[f32::NAN])?;
         }
-        if self.flying.len() == crate::plan::SLOTS {
-            done.extend(self.absorb()?);
+        if self.in_flight.len() == crate::scheduler::plan::FRAMES_IN_FLIGHT {
+            done.extend(self.retire()?);
         }
-        self.submit(job.clone())?;
+        self.submit(input.clone())?;
         self.step = step;
         let last = step >= self.config.iterations;
         let (densifies, resets) =
@@ -260,14 +260,14 @@ impl Trainer {
         if densifies || resets {
             done.extend(self.drain()?);
             if densifies {
-                let what = self.densify(&job)?;
+                let what = self.densify(&input)?;
                 tracing::debug!("step {step}: {what:?}, {} Gaussians", self.gaussian_count());
                 if self.gaussian_count() == 0 {
                     return Err(Error::Pruned { step });
                 }
             }
             if resets {
-                self.reset_opacity(&job)?;
+                self.reset_opacity(&input)?;
             }
         }
         Ok(done)
@@ -276,13 +276,13 @@ impl Trainer {
     /// Waits for all steps in flight.
     pub fn drain(&mut self) -> Result<Vec<StepReport>> {
         let mut done = Vec::new();
-        while !self.flying.is_empty() {
-            done.extend(self.absorb()?);
+        while !self.in_flight.is_empty() {
+            done.extend(self.retire()?);
         }
         Ok(done)
     }
 
-    fn job(&mut self, step: u32) -> Job {
+    fn input(&mut self, step: u32) -> StepInput {
         let view = self.order.draw();
         let samples = if self.config.labels_at(step) { self.config.label_samples as usize } else { 0 };
         let layers = sampler::sample_objects(self.config.seed, step, &self.views[view].objects, samples);
@@ -291,78 +291,78 @@ impl Trainer {
         // A densification replaces the parameters that the gradients belong to: no update then (3DGS).
         let update = !(self.config.densifies_at(step) && step < self.config.iterations);
         self.updates += u32::from(update);
-        Job { step, view, layers, labels, update, updates: self.updates, stamp: 0 }
+        StepInput { step, view, layers, labels, update, updates: self.updates, stamp: 0 }
     }
 
-    fn submit(&mut self, mut job: Job) -> Result<()> {
+    fn submit(&mut self, mut input: StepInput) -> Result<()> {
         self.stamp = self.stamp.wrapping_add(1).max(1);
-        job.stamp = self.stamp;
-        let slot = job.step as usize % crate::plan::SLOTS;
-        let key = self.key(&job);
+        input.stamp = self.stamp;
+        let frame = input.step as usize % crate::scheduler::plan::FRAMES_IN_FLIGHT;
+        let key = self.key(&input);
         self.engine.list(key)?;
-        let view = self.views.of(&job);
-        let uniforms = job::uniforms(&job, view, &self.config, self.fixed, &self.engine);
-        job::upload(&mut self.engine, slot, uniforms, view, &job, &self.config)?;
-        let ticket = self.engine.submit(key, slot)?;
-        self.flying.push_back((job, ticket));
+        let view = self.views.of(&input);
+        let uniforms = step_input::uniforms(&input, view, &self.config, self.fixed, &self.engine);
+        step_input::upload(&mut self.engine, frame, uniforms, view, &input, &self.config)?;
+        let ticket = self.engine.submit(key, frame)?;
+        self.in_flight.push_back((input, ticket));
         Ok(())
     }
 
-    fn key(&self, job: &Job) -> ListKey {
+    fn key(&self, input: &StepInput) -> ListKey {
         let variant = Variant {
-            labels: job.labels,
-            lift: job.lifts(&self.config),
-            sh_degree: self.config.sh_degree_at(job.step),
+            labels: input.labels,
+            lift: input.lifts(&self.config),
+            sh_degree: self.config.sh_degree_at(input.step),
             size: self.engine.room().size,
-            update: job.update,
+            update: input.update,
             counts: self.counts_pairs,
         };
-        if self.separate && job.labels {
-            return ListKey::Separate(variant, job.layers.len() as u32);
+        if self.separate && input.labels {
+            return ListKey::Separate(variant, input.layers.len() as u32);
         }
         ListKey::Train(variant)
     }
 
     /// Waits for the oldest step in flight. If a buffer was too small, the step changed nothing, nor did those after it:
     /// the buffer grows and they run again.
-    fn absorb(&mut self) -> Result<Option<StepReport>> {
-        let Some((job, ticket)) = self.flying.front().cloned() else { return Ok(None) };
+    fn retire(&mut self) -> Result<Option<StepReport>> {
+        let Some((input, ticket)) = self.in_flight.front().cloned() else { return Ok(None) };
         self.engine.sched().wait(ticket)?;
-        let report = self.engine.report(job.step as usize % crate::plan::SLOTS)?;
+        let report = self.engine.report(input.step as usize % crate::scheduler::plan::FRAMES_IN_FLIGHT)?;
         let recovered = self.engine.recover(&report);
         if recovered.is_err() {
             // Nothing came of these steps, nor will it.
-            self.flying.clear();
-            self.step = job.step - 1;
+            self.in_flight.clear();
+            self.step = input.step - 1;
         }
         if recovered? {
-            let again: Vec<Job> = self.flying.drain(..).map(|(job, _)| job).collect();
-            for job in again {
-                self.submit(job)?;
+            let again: Vec<StepInput> = self.in_flight.drain(..).map(|(input, _)| input).collect();
+            for input in again {
+                self.submit(input)?;
             }
-            return self.absorb();
+            return self.retire();
         }
-        self.flying.pop_front();
-        self.note_times(&job)?;
-        let view = self.views.of(&job);
+        self.in_flight.pop_front();
+        self.note_times(&input)?;
+        let view = self.views.of(&input);
         let scale = 1.0 / (3.0 * view.valid_pixels.max(1) as f64);
         let (counters, lambda) = (&report.counters, f64::from(self.config.lambda_dssim));
         let l1 = f64::from(counters.loss_l1) * scale;
         let loss = (1.0 - lambda) * l1 + lambda * (1.0 - f64::from(counters.loss_ssim) * scale);
-        let label_loss = job::label_loss(&job, view, &self.config, counters.loss_label);
-        self.watch(&job, &report, [loss, label_loss])?;
-        Ok(Some(StepReport { step: job.step, loss, label_loss, report }))
+        let label_loss = step_input::label_loss(&input, view, &self.config, counters.loss_label);
+        self.watch(&input, &report, [loss, label_loss])?;
+        Ok(Some(StepReport { step: input.step, loss, label_loss, report }))
     }
 }
 
 fn train_view(view: &mut crate::scene::View, border: u32) -> Result<TrainView> {
     let photo = view.photo.take().ok_or_else(|| Error::Bug(format!("{} came without its photo", view.name)))?;
-    let valid_pixels = job::valid_pixels(&photo);
+    let valid_pixels = step_input::valid_pixels(&photo);
     let mask = view.mask.take();
     let objects = mask.as_ref().map(crate::scene::LabelMap::objects).unwrap_or_default();
     let (name, camera) = (view.name.clone(), view.camera.clone());
-    let view_labels = mask.as_ref().map(|mask| job::view_labels(mask, border)).unwrap_or_default();
-    let shown = job::shown_objects(&photo, &view_labels);
+    let view_labels = mask.as_ref().map(|mask| step_input::view_labels(mask, border)).unwrap_or_default();
+    let shown = step_input::shown_objects(&photo, &view_labels);
     let occluders = Default::default();
     Ok(TrainView { name, camera, photo, valid_pixels, mask, objects, view_labels, shown, occluders })
 }

@@ -3,8 +3,8 @@
 
 use super::{Occlusion, Trainer};
 use crate::error::Result;
-use crate::infer::occlusion::{Rule, by_contour};
-use crate::infer::render::render;
+use crate::label::occlusion::{Rule, by_contour};
+use crate::render::render;
 use crate::scene::Occluders;
 use std::collections::BTreeMap;
 

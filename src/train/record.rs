@@ -1,9 +1,9 @@
 //! Files of a run: the model, the cameras, the previews. Each is written whole or not at all.
 
 use crate::error::{Error, Result};
-use crate::infer::render::Rendered;
 use crate::io::read;
 use crate::io::{camera_json, image, ply};
+use crate::render::Rendered;
 use crate::scene::labels::label_colour;
 use crate::scene::{Camera, Gaussians, Photo};
 use std::path::{Path, PathBuf};

@@ -8,7 +8,7 @@
 //!   loss that is no number. Whoever runs it restores what was saved before ([`Trainer::restore`](super::Trainer::restore)).
 
 use super::Trainer;
-use super::job::Job;
+use super::step_input::StepInput;
 use crate::engine::Report;
 use crate::error::{Error, Result};
 
@@ -30,10 +30,10 @@ pub(super) struct Seen {
 
 impl Trainer {
     /// Looks at what a step counted.
-    pub(super) fn watch(&mut self, job: &Job, report: &Report, losses: [f64; 2]) -> Result<()> {
+    pub(super) fn watch(&mut self, input: &StepInput, report: &Report, losses: [f64; 2]) -> Result<()> {
         let counters = &report.counters;
-        let view = &self.views[job.view].name;
-        let failure = |quantity: String| Error::Numeric { quantity, step: u64::from(job.step), view: view.clone() };
+        let view = &self.views[input.view].name;
+        let failure = |quantity: String| Error::Numeric { quantity, step: u64::from(input.step), view: view.clone() };
         for (pass, what, count, first) in [
             ("cull", "positions, opacities or scales", counters.broken_count, counters.broken_first),
             ("project_forward", "projections or colours", counters.unprojected_count, counters.unprojected_first),
@@ -57,7 +57,7 @@ impl Trainer {
                 tracing::warn!(
                     "step {}, view {view}: project_backward dropped the gradients of {count} Gaussians that are not \
                      finite, the first of Gaussian {}; {} so far",
-                    job.step,
+                    input.step,
                     counters.nonfinite_first,
                     seen.dropped
                 );

@@ -5,14 +5,14 @@
 
 use super::sampler::ViewOrder;
 use super::{TrainConfig, Trainer, room};
-use crate::engine::{Sizes, state};
+use crate::engine::{GrownSizes, state};
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::io::checkpoint::{Checkpoint, Plane};
 use crate::pass::KernelShape;
-use crate::plan::{Buf, TABLE};
 use crate::scene::{Camera, Dataset, LabelMap, Occluders, Photo};
-use crate::sched::SchedulerOptions;
+use crate::scheduler::SchedulerOptions;
+use crate::scheduler::plan::{Buf, TABLE};
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -41,12 +41,12 @@ pub struct TrainState {
     /// Memory has bounded the number of Gaussians.
     pub memory_bounds: bool,
     /// How far memory had grown.
-    pub sizes: Sizes,
+    pub sizes: GrownSizes,
     /// The configuration, as TOML in the file: there every float is read back as it was.
     #[serde(with = "as_toml")]
     pub config: TrainConfig,
     /// The training views, in their order.
-    pub views: Vec<ViewPrint>,
+    pub views: Vec<ViewFingerprint>,
     /// By name of the view: the occluders of its objects.
     pub occluders: BTreeMap<String, Occluders>,
     /// How the run was started.
@@ -80,7 +80,7 @@ pub struct RunFacts {
 /// What a view is told apart by.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct ViewPrint {
+pub struct ViewFingerprint {
     /// Name.
     pub name: String,
     /// Width and height, px.
@@ -93,7 +93,7 @@ pub struct ViewPrint {
     pub mask: Option<u32>,
 }
 
-impl ViewPrint {
+impl ViewFingerprint {
     fn new(name: &str, camera: &Camera, photo: Option<&Photo>, mask: Option<&LabelMap>) -> Self {
         let intrinsics = [camera.fx, camera.fy, camera.cx, camera.cy];
         let pose = camera.rotation.to_cols_array().into_iter().chain(camera.translation.to_array());
@@ -155,8 +155,8 @@ impl TrainState {
     }
 
     /// Refuses a scene that is not the one of the checkpoint, with the first thing that differs.
-    fn check_scene(&self, scene: &Path, views: &[ViewPrint]) -> Result<()> {
-        let masks = |views: &[ViewPrint]| views.iter().any(|view| view.mask.is_some());
+    fn check_scene(&self, scene: &Path, views: &[ViewFingerprint]) -> Result<()> {
+        let masks = |views: &[ViewFingerprint]| views.iter().any(|view| view.mask.is_some());
         let (then, now) = (masks(&self.views), masks(views));
         if then != now {
             let had = |masks| if masks { "masks" } else { "no masks" };
@@ -188,10 +188,11 @@ impl Trainer {
     /// The training as it is now, once the steps in flight are done.
     pub fn state(&mut self) -> Result<TrainState> {
         self.drain()?;
-        let print =
-            |view: &super::TrainView| ViewPrint::new(&view.name, &view.camera, Some(&view.photo), view.mask.as_ref());
-        if self.prints.is_empty() {
-            self.prints = self.views.iter().map(print).collect();
+        let print = |view: &super::TrainView| {
+            ViewFingerprint::new(&view.name, &view.camera, Some(&view.photo), view.mask.as_ref())
+        };
+        if self.fingerprints.is_empty() {
+            self.fingerprints = self.views.iter().map(print).collect();
         }
         Ok(TrainState {
             labelgs: env!("CARGO_PKG_VERSION").to_owned(),
@@ -204,7 +205,7 @@ impl Trainer {
             memory_bounds: self.memory_bounds,
             sizes: self.engine.sizes(),
             config: self.config.clone(),
-            views: self.prints.clone(),
+            views: self.fingerprints.clone(),
             occluders: self.occluders(),
             run: RunFacts::default(),
             planes: self.finite_planes()?,
@@ -235,9 +236,9 @@ impl Trainer {
     pub fn resume(gpu: Arc<Gpu>, dataset: &mut Dataset, state: TrainState, options: SchedulerOptions) -> Result<Self> {
         state.config.check()?;
         let views = dataset.train.iter();
-        let prints: Vec<ViewPrint> =
-            views.map(|v| ViewPrint::new(&v.name, &v.camera, v.photo.as_ref(), v.mask.as_ref())).collect();
-        state.check_scene(&dataset.root, &prints)?;
+        let fingerprints: Vec<ViewFingerprint> =
+            views.map(|v| ViewFingerprint::new(&v.name, &v.camera, v.photo.as_ref(), v.mask.as_ref())).collect();
+        state.check_scene(&dataset.root, &fingerprints)?;
         let (now, version) = (device(&gpu), env!("CARGO_PKG_VERSION"));
         for (then, now) in [(&state.device, now.as_str()), (&state.labelgs, version)] {
             if then != now {
@@ -254,7 +255,7 @@ impl Trainer {
             return Err(Error::data(&state.path, "a label", problem));
         }
         let mut trainer = Self::without_model(gpu, shape, state.config.clone(), dataset, room, options)?;
-        trainer.prints = prints;
+        trainer.fingerprints = fingerprints;
         trainer.put(&state)?;
         Ok(trainer)
     }
@@ -263,7 +264,7 @@ impl Trainer {
     pub fn restore(&mut self, state: &TrainState) -> Result<()> {
         // What flies has nothing to say any more.
         self.engine.sched().wait_all()?;
-        self.flying.clear();
+        self.in_flight.clear();
         self.put(state)
     }
 

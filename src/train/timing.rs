@@ -1,10 +1,10 @@
 //! Times of the passes of each step, for `labelgs profile`.
 
 use super::Trainer;
-use super::job::Job;
+use super::step_input::StepInput;
 use crate::error::Result;
 use crate::pass::Stage;
-use crate::sched::ListId;
+use crate::scheduler::ListId;
 use std::collections::HashSet;
 
 /// Times of the passes of a step.
@@ -41,19 +41,19 @@ impl Trainer {
         self.timing.as_mut().map(|timing| std::mem::take(&mut timing.times)).unwrap_or_default()
     }
 
-    /// Reads the times of a step that has ended and whose slot was not used again.
-    pub(super) fn note_times(&mut self, job: &Job) -> Result<()> {
+    /// Reads the times of a step that has ended and whose frame was not used again.
+    pub(super) fn note_times(&mut self, input: &StepInput) -> Result<()> {
         if self.timing.is_none() {
             return Ok(());
         }
-        let (key, slot) = (self.key(job), job.step as usize % crate::plan::SLOTS);
+        let (key, frame) = (self.key(input), input.step as usize % crate::scheduler::plan::FRAMES_IN_FLIGHT);
         let id = self.engine.list(key)?;
-        let times = self.engine.sched().timings(id, slot)?;
+        let times = self.engine.sched().timings(id, frame)?;
         let stages = crate::pass::stage::stages(&self.engine.sched().plan(id)?.list);
         if let Some(timing) = &mut self.timing {
             let items = stages.into_iter().zip(times).map(|((stage, name), (_, ns))| (stage, name, ns)).collect();
-            let is_first = timing.seen.insert((id, slot));
-            timing.times.push(StepTimes { step: job.step, is_first, items });
+            let is_first = timing.seen.insert((id, frame));
+            timing.times.push(StepTimes { step: input.step, is_first, items });
         }
         Ok(())
     }

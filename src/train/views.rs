@@ -1,6 +1,6 @@
 //! The views of a training, at the sizes that steps look at them.
 
-use super::job::{Job, TrainView};
+use super::step_input::{StepInput, TrainView};
 use std::ops::{Deref, DerefMut};
 
 /// The training views; as a slice, those at their full size.
@@ -20,8 +20,8 @@ impl Views {
     }
 
     /// The view of a step, as the step looks at it.
-    pub fn of(&self, job: &Job) -> &TrainView {
-        if job.step <= self.coarse_until { &self.halved[job.view] } else { &self.whole[job.view] }
+    pub fn of(&self, input: &StepInput) -> &TrainView {
+        if input.step <= self.coarse_until { &self.halved[input.view] } else { &self.whole[input.view] }
     }
 }
 

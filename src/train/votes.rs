@@ -2,10 +2,10 @@
 
 use super::{LabelRule, Trainer};
 use crate::error::Result;
-use crate::infer::vote::ballot::{Sweep, Voter};
-use crate::infer::vote::decide::{self, Decision};
-use crate::plan::Buf;
+use crate::label::vote::ballot::{Sweep, Voter};
+use crate::label::vote::decide::{self, Decision};
 use crate::scene::Gaussians;
+use crate::scheduler::plan::Buf;
 
 impl Trainer {
     fn votes(&self) -> bool {

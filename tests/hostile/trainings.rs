@@ -4,7 +4,7 @@ use crate::support::device;
 use assert_cmd::Command;
 use labelgs::io::init::initial_gaussians;
 use labelgs::scene::{Camera, Dataset, LabelMap, Photo, View};
-use labelgs::sched::SchedulerOptions;
+use labelgs::scheduler::SchedulerOptions;
 use labelgs::synth::{Preset, SynthOptions, dataset};
 use labelgs::train::{TrainConfig, Trainer};
 use std::path::Path;

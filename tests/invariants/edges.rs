@@ -1,16 +1,16 @@
 //! Scenes at the edge: nothing to see, one Gaussian, one pixel, no labels.
 
-use crate::pass::rig::{Rig, readable};
+use crate::pass::fixture::{Fixture, readable};
 use crate::reference::Rules;
 use crate::reference::blend::blend_forward;
 use crate::support::compare::{Tolerance, check, close};
 use crate::support::device;
 use crate::support::scenes::{Shape, scene};
-use labelgs::engine::{Engine, LabelRoom, Room};
-use labelgs::infer::render::render;
-use labelgs::plan::{Buf, Work};
+use labelgs::engine::{Engine, EngineSize, LabelSize};
+use labelgs::render::render;
 use labelgs::scene::Gaussians;
-use labelgs::sched::SchedulerOptions;
+use labelgs::scheduler::SchedulerOptions;
+use labelgs::scheduler::plan::{Buf, Work};
 
 fn shape(gaussians: usize, width: u32, height: u32) -> Shape {
     Shape { gaussians, width, height, opacities: (0.0, 4.0), ..Shape::default() }
@@ -21,17 +21,17 @@ fn shape(gaussians: usize, width: u32, height: u32) -> Shape {
 fn pictures_of_any_size() {
     for (width, height) in [(13, 12), (33, 12), (12, 67)] {
         let Some(turn) = device() else { return };
-        let mut rig = Rig::new(turn, scene(211, &shape(30, width, height)), true);
-        rig.render();
-        let (splats, size, background) = (rig.splats(), rig.size(), rig.scene.target.background);
-        let image = rig.get::<[f32; 4]>(Buf::IMAGE, size.0 * size.1);
+        let mut fixture = Fixture::new(turn, scene(211, &shape(30, width, height)), true);
+        fixture.render();
+        let (splats, size, background) = (fixture.splats(), fixture.size(), fixture.scene.target.background);
+        let image = fixture.get::<[f32; 4]>(Buf::IMAGE, size.0 * size.1);
         let expected = blend_forward(&Rules::default(), &splats, size, background);
         let actual: Vec<f64> = image.iter().flat_map(|p| [p[0], p[1], p[2]].map(f64::from)).collect();
         check(
             "picture",
             close(&actual, expected.colours().as_flattened(), Tolerance { absolute: 1e-6, relative: 0.0 }),
         );
-        rig.train();
+        fixture.train();
     }
 }
 
@@ -45,8 +45,8 @@ fn one_pixel() {
     s.target.photo.valid = vec![true];
     s.target.label_map = vec![1];
     s.target.slots.truncate(1);
-    let mut rig = Rig::new(turn, s, true);
-    let report = rig.train();
+    let mut fixture = Fixture::new(turn, s, true);
+    let report = fixture.train();
     assert!(report.counters.loss_l1.is_finite() && report.counters.nonfinite_count == 0);
 }
 
@@ -55,11 +55,11 @@ fn one_gaussian() {
     let Some(turn) = device() else { return };
     let mut s = scene(213, &shape(1, 30, 20));
     s.gaussians.means = vec![[0.0; 3]];
-    let mut rig = Rig::new(turn, s, true);
-    rig.job.update = true;
-    let report = rig.train();
+    let mut fixture = Fixture::new(turn, s, true);
+    fixture.input.update = true;
+    let report = fixture.train();
     assert_eq!(report.counters.visible_count, 1);
-    assert!(rig.gradient_rows()[0].mean.iter().any(|v| *v != 0.0));
+    assert!(fixture.gradient_rows()[0].mean.iter().any(|v| *v != 0.0));
 }
 
 /// No gradient, no update, and the picture is the background.
@@ -69,14 +69,14 @@ fn nothing_visible() {
     let mut s = scene(214, &shape(20, 30, 20));
     s.gaussians.means.iter_mut().for_each(|mean| mean[2] = -50.0);
     let background = s.target.background.map(|v| v as f32);
-    let mut rig = Rig::new(turn, s, true);
-    rig.job.update = true;
-    let before = rig.get::<u32>(Buf::MEANS, 80);
-    let report = rig.train();
+    let mut fixture = Fixture::new(turn, s, true);
+    fixture.input.update = true;
+    let before = fixture.get::<u32>(Buf::MEANS, 80);
+    let report = fixture.train();
     assert_eq!((report.counters.visible_count, report.counters.instance_count), (0, 0));
     let [r, g, b] = background;
-    assert!(rig.get::<[f32; 4]>(Buf::IMAGE, 600).iter().all(|pixel| *pixel == [r, g, b, 1.0]));
-    assert_eq!(rig.get::<u32>(Buf::MEANS, 80), before);
+    assert!(fixture.get::<[f32; 4]>(Buf::IMAGE, 600).iter().all(|pixel| *pixel == [r, g, b, 1.0]));
+    assert_eq!(fixture.get::<u32>(Buf::MEANS, 80), before);
 }
 
 /// Numbers that are none, and that overflow on their way to the screen, spoil nothing beside them.
@@ -91,12 +91,12 @@ fn gaussians_that_are_not_numbers() {
     s.gaussians.sh0[8] = [f32::NAN; 3];
     s.gaussians.quats[9] = [0.0; 4];
     s.gaussians.means[10] = [1e30, 0.0, 1e30];
-    let mut rig = Rig::new(turn, s, true);
-    rig.job.update = true;
-    let report = rig.train();
-    assert!(rig.get::<f32>(Buf::IMAGE, 2400).iter().all(|v| v.is_finite()));
+    let mut fixture = Fixture::new(turn, s, true);
+    fixture.input.update = true;
+    let report = fixture.train();
+    assert!(fixture.get::<f32>(Buf::IMAGE, 2400).iter().all(|v| v.is_finite()));
     assert!(report.counters.loss_l1.is_finite() && report.counters.loss_label.is_finite());
-    for (index, row) in rig.gradient_rows().iter().enumerate() {
+    for (index, row) in fixture.gradient_rows().iter().enumerate() {
         assert!(row.floats().iter().all(|v| v.is_finite()), "gradient of Gaussian {index}");
     }
 }
@@ -105,7 +105,7 @@ fn gaussians_that_are_not_numbers() {
 fn a_model_without_gaussians() {
     let Some(turn) = device() else { return };
     let camera = scene(216, &shape(1, 30, 20)).camera;
-    let room = Room { gaussians: 0, size: (30, 20), trained: false, labels: None };
+    let room = EngineSize { gaussians: 0, size: (30, 20), trained: false, labels: None };
     let mut engine = Engine::new(turn.gpu(), room, readable()).expect("the engine starts");
     engine.upload_model(&Gaussians::default()).expect("nothing to upload");
     let rendered = render(&mut engine, &camera, 0.2, [0.5, 0.25, 0.0], 0).expect("a picture");
@@ -130,15 +130,15 @@ const LABEL_BUFFERS: [&str; 8] = [
 fn no_labels_no_cost() {
     let Some(turn) = device() else { return };
     let s = scene(217, &shape(40, 30, 20));
-    let mut rig = Rig::new(turn, s, false);
-    rig.job.update = true;
-    rig.train();
-    let key = rig.key();
-    let id = rig.engine.list(key).expect("the list of the step");
-    let memory = rig.engine.sched().memory();
+    let mut fixture = Fixture::new(turn, s, false);
+    fixture.input.update = true;
+    fixture.train();
+    let key = fixture.key();
+    let id = fixture.engine.list(key).expect("the list of the step");
+    let memory = fixture.engine.sched().memory();
     let of_labels: u64 = memory.iter().filter(|(name, _)| LABEL_BUFFERS.contains(&name.as_str())).map(|(_, n)| n).sum();
     assert_eq!(of_labels, 0, "{memory:?}");
-    let plan = rig.engine.sched().plan(id).expect("a plan");
+    let plan = fixture.engine.sched().plan(id).expect("a plan");
     for work in &plan.list.work {
         let Work::Pass(pass) = work else { continue };
         let named = ["labels", "lift", "layer"].iter().any(|word| pass.shader.name.contains(word));
@@ -148,10 +148,10 @@ fn no_labels_no_cost() {
         }
     }
     // Nor does a render pay for training.
-    let labels = Some(LabelRoom { max_label: 3, layers: 2, vote_columns: 0 });
-    let room = |trained, labels| Room { gaussians: 1000, size: (64, 48), trained, labels };
-    let total = |room: &Room| {
-        Engine::predict(rig.engine.sched().gpu(), room, SchedulerOptions::default()).expect("it fits").total
+    let labels = Some(LabelSize { max_label: 3, layers: 2, vote_columns: 0 });
+    let room = |trained, labels| EngineSize { gaussians: 1000, size: (64, 48), trained, labels };
+    let total = |room: &EngineSize| {
+        Engine::predict(fixture.engine.sched().gpu(), room, SchedulerOptions::default()).expect("it fits").total
     };
     assert!(
         total(&room(false, None)) < total(&room(true, None)) && total(&room(true, None)) < total(&room(true, labels))

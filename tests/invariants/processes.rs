@@ -2,7 +2,7 @@
 
 use super::training::train;
 use crate::support::device;
-use labelgs::sched::SchedulerOptions;
+use labelgs::scheduler::SchedulerOptions;
 use labelgs::train::LabelRule;
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::process::Command;

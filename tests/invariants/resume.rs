@@ -9,7 +9,7 @@ use labelgs::io::checkpoint::Plane;
 use labelgs::io::init::initial_gaussians;
 use labelgs::io::ply::write_gaussians;
 use labelgs::scene::Dataset;
-use labelgs::sched::SchedulerOptions;
+use labelgs::scheduler::SchedulerOptions;
 use labelgs::train::{LabelRule, StepReport, TrainConfig, TrainState, Trainer};
 use std::path::Path;
 

@@ -1,33 +1,33 @@
 //! Kernel shapes: tiles and ways to read change nothing, or only the last bits.
 
-use crate::pass::rig::{GRADIENTS, Rig};
+use crate::pass::fixture::{Fixture, GRADIENTS};
 use crate::support::compare::{Band, Tolerance, check, close_with_band, exact};
 use crate::support::device;
 use crate::support::scenes::{Scene, Shape, scene};
 use labelgs::pass::KernelShape;
-use labelgs::plan::Buf;
+use labelgs::scheduler::plan::Buf;
 
 fn crowd() -> Scene {
     scene(201, &Shape { gaussians: 300, width: 61, height: 45, opacities: (-4.0, 8.0), ..Shape::default() })
 }
 
 /// Runs a step and a render with a changed kernel shape.
-fn with_shape<T>(change: impl Fn(&mut KernelShape), read: impl Fn(&mut Rig) -> T) -> Option<T> {
+fn with_shape<T>(change: impl Fn(&mut KernelShape), read: impl Fn(&mut Fixture) -> T) -> Option<T> {
     let turn = device()?;
     let mut shape = KernelShape::of(turn.capabilities());
     change(&mut shape);
-    let mut rig = Rig::with_shape(turn, crowd(), true, shape);
-    Some(read(&mut rig))
+    let mut fixture = Fixture::with_shape(turn, crowd(), true, shape);
+    Some(read(&mut fixture))
 }
 
 /// Picture, main Gaussians, labels of one shape.
-fn picture(rig: &mut Rig) -> (Vec<f64>, Vec<i32>, Vec<u32>) {
-    let (pixels, count) = (rig.pixels(), rig.scene.gaussians.len());
-    rig.render();
-    let main = rig.get::<i32>(Buf::MAIN_GAUSSIAN, pixels);
-    rig.train();
-    let image = rig.get::<f32>(Buf::IMAGE, 4 * pixels);
-    (image.iter().map(|&v| f64::from(v)).collect(), main, rig.get(Buf::LABELS, count))
+fn picture(fixture: &mut Fixture) -> (Vec<f64>, Vec<i32>, Vec<u32>) {
+    let (pixels, count) = (fixture.pixels(), fixture.scene.gaussians.len());
+    fixture.render();
+    let main = fixture.get::<i32>(Buf::MAIN_GAUSSIAN, pixels);
+    fixture.train();
+    let image = fixture.get::<f32>(Buf::IMAGE, 4 * pixels);
+    (image.iter().map(|&v| f64::from(v)).collect(), main, fixture.get(Buf::LABELS, count))
 }
 
 #[test]
@@ -56,17 +56,17 @@ fn the_picture_does_not_depend_on_the_tile_size() {
 }
 
 /// Everything that a step leaves, as bits.
-fn everything(rig: &mut Rig) -> Vec<u32> {
-    rig.job.update = true;
-    rig.train();
-    let (pixels, splats, count) = (rig.pixels(), rig.splats().len(), rig.scene.gaussians.len());
-    let mut bits = rig.get::<u32>(Buf::IMAGE, 4 * pixels);
-    bits.extend(rig.get::<u32>(Buf::V_IMAGE, 4 * pixels));
-    bits.extend(rig.get::<u32>(Buf::V_SPLATS, 12 * splats));
-    GRADIENTS[..4].iter().for_each(|&plane| bits.extend(rig.get::<u32>(plane, 4 * splats)));
-    bits.extend(rig.get::<u32>(Buf::MEANS, 4 * count));
-    bits.extend(rig.get::<u32>(Buf::SH3, 24 * count));
-    bits.extend(rig.get::<u32>(Buf::LABELS, count));
+fn everything(fixture: &mut Fixture) -> Vec<u32> {
+    fixture.input.update = true;
+    fixture.train();
+    let (pixels, splats, count) = (fixture.pixels(), fixture.splats().len(), fixture.scene.gaussians.len());
+    let mut bits = fixture.get::<u32>(Buf::IMAGE, 4 * pixels);
+    bits.extend(fixture.get::<u32>(Buf::V_IMAGE, 4 * pixels));
+    bits.extend(fixture.get::<u32>(Buf::V_SPLATS, 12 * splats));
+    GRADIENTS[..4].iter().for_each(|&plane| bits.extend(fixture.get::<u32>(plane, 4 * splats)));
+    bits.extend(fixture.get::<u32>(Buf::MEANS, 4 * count));
+    bits.extend(fixture.get::<u32>(Buf::SH3, 24 * count));
+    bits.extend(fixture.get::<u32>(Buf::LABELS, count));
     bits
 }
 

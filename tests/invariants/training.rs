@@ -6,9 +6,9 @@ use crate::support::device::Turn;
 use labelgs::engine::Engine;
 use labelgs::io::init::initial_gaussians;
 use labelgs::io::ply::write_gaussians;
-use labelgs::plan::{Capacity, PlanOptions};
 use labelgs::scene::Dataset;
-use labelgs::sched::SchedulerOptions;
+use labelgs::scheduler::SchedulerOptions;
+use labelgs::scheduler::plan::{Capacity, PlanOptions};
 use labelgs::synth::{Preset, SynthOptions, dataset};
 use labelgs::train::{LabelRule, TrainConfig, Trainer};
 

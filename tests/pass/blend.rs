@@ -1,6 +1,6 @@
 //! Blending forward and backward, of the scene and of the object layers.
 
-use super::rig::{Rig, prove};
+use super::fixture::{Fixture, prove};
 use crate::reference::blend::{self, Upstream, blend_backward, blend_forward, blend_layers_forward};
 use crate::reference::loss::label_loss;
 use crate::reference::project::Splat;
@@ -8,8 +8,8 @@ use crate::reference::{Rules, tile};
 use crate::support::compare::{Band, GradientBounds, Tolerance, close, exact};
 use crate::support::device;
 use crate::support::scenes::{Scene, Shape, scene};
-use labelgs::plan::Buf;
-use labelgs::selftest::judge;
+use labelgs::scheduler::plan::Buf;
+use labelgs::verify::selftest::judge;
 
 /// Faint to opaque, so that pixels stop and alphas are clamped.
 pub fn opaque_scene(seed: u64) -> Scene {
@@ -22,13 +22,13 @@ const CUT: Band = Band { width: 2e-5, flip: 0.01, ratio: 0.001 };
 const COLOUR: Tolerance = Tolerance { absolute: 6.5e-7, relative: 0.0 };
 
 /// The splat at `last` of each pixel's tile list, +1; 0 for none.
-fn last_splats(rig: &mut Rig) -> Vec<usize> {
-    let (shape, (width, _), pixels) = (*rig.engine.shape(), rig.size(), rig.pixels());
-    let counters = rig.engine.report(0).expect("a report").counters;
-    let last = rig.get::<u32>(Buf::LAST, pixels);
-    let sorted = rig.sorted_splats(counters.instance_count as usize);
-    let uniforms = rig.uniforms();
-    let starts = rig.get::<u32>(Buf::TILE_STARTS, uniforms.tile_count as usize);
+fn last_splats(fixture: &mut Fixture) -> Vec<usize> {
+    let (shape, (width, _), pixels) = (*fixture.engine.shape(), fixture.size(), fixture.pixels());
+    let counters = fixture.engine.report(0).expect("a report").counters;
+    let last = fixture.get::<u32>(Buf::LAST, pixels);
+    let sorted = fixture.sorted_splats(counters.instance_count as usize);
+    let uniforms = fixture.uniforms();
+    let starts = fixture.get::<u32>(Buf::TILE_STARTS, uniforms.tile_count as usize);
     let tile_of = |pixel: usize| {
         let (x, y) = ((pixel % width) as u32, (pixel / width) as u32);
         (y / shape.tile_height * uniforms.tiles_x + x / shape.tile_width) as usize
@@ -44,11 +44,11 @@ fn last_splats(rig: &mut Rig) -> Vec<usize> {
 #[test]
 fn blend_forward_of_the_scene() {
     let Some(turn) = device() else { return };
-    let mut rig = Rig::new(turn, opaque_scene(51), false);
-    rig.train();
-    let (splats, size, background) = (rig.splats(), rig.size(), rig.scene.target.background);
-    let image = rig.get::<[f32; 4]>(Buf::IMAGE, size.0 * size.1);
-    let last = last_splats(&mut rig);
+    let mut fixture = Fixture::new(turn, opaque_scene(51), false);
+    fixture.train();
+    let (splats, size, background) = (fixture.splats(), fixture.size(), fixture.scene.target.background);
+    let image = fixture.get::<[f32; 4]>(Buf::IMAGE, size.0 * size.1);
+    let last = last_splats(&mut fixture);
     let stopped = image.iter().filter(|pixel| pixel[3] < 1e-3).count();
     assert!(stopped > 100, "only {stopped} pixels are opaque");
     prove("blend_forward", &["alpha_min", "alpha_max", "transmittance_min"], |rules| {
@@ -59,8 +59,8 @@ fn blend_forward_of_the_scene() {
         judge::picture(&image, &expected, (COLOUR, CUT))
     });
     // The list of a render blends the same picture.
-    rig.render();
-    let rendered = rig.get::<[f32; 4]>(Buf::IMAGE, size.0 * size.1);
+    fixture.render();
+    let rendered = fixture.get::<[f32; 4]>(Buf::IMAGE, size.0 * size.1);
     assert!(
         bytemuck::cast_slice::<_, u32>(&rendered) == bytemuck::cast_slice::<_, u32>(&image),
         "render and training agree"
@@ -70,13 +70,13 @@ fn blend_forward_of_the_scene() {
 #[test]
 fn blend_forward_main_of_a_render() {
     let Some(turn) = device() else { return };
-    let mut rig = Rig::new(turn, opaque_scene(52), false);
-    rig.render();
-    let (splats, size, background) = (rig.splats(), rig.size(), rig.scene.target.background);
+    let mut fixture = Fixture::new(turn, opaque_scene(52), false);
+    fixture.render();
+    let (splats, size, background) = (fixture.splats(), fixture.size(), fixture.scene.target.background);
     let pixels = size.0 * size.1;
-    let image = rig.get::<[f32; 4]>(Buf::IMAGE, pixels);
-    let main = rig.get::<i32>(Buf::MAIN_GAUSSIAN, pixels);
-    let weight_depth = rig.get::<[f32; 2]>(Buf::MAIN_WEIGHT_DEPTH, pixels);
+    let image = fixture.get::<[f32; 4]>(Buf::IMAGE, pixels);
+    let main = fixture.get::<i32>(Buf::MAIN_GAUSSIAN, pixels);
+    let weight_depth = fixture.get::<[f32; 2]>(Buf::MAIN_WEIGHT_DEPTH, pixels);
     prove("blend_forward_main", &["alpha_min", "alpha_max", "transmittance_min"], |rules| {
         let expected = blend_forward(rules, &splats, size, background);
         judge::picture(&image, &expected, (COLOUR, CUT))?;
@@ -93,7 +93,7 @@ fn blend_forward_main_of_a_render() {
 }
 
 /// Splats whose decisions are all farther than this from their thresholds are compared.
-const SURE: f64 = 1e-5;
+const MARGIN: f64 = 1e-5;
 
 /// Sums over pixels in f32, transmittance by division; 0.27 of (1e-6, 1e-5) seen by element, 0.25 of 1e-6 as a whole.
 const BOUNDS: GradientBounds = GradientBounds {
@@ -107,29 +107,29 @@ const BOUNDS: GradientBounds = GradientBounds {
 #[test]
 fn blend_backward_and_gather_of_the_scene() {
     let Some(turn) = device() else { return };
-    let mut rig = Rig::new(turn, opaque_scene(53), false);
-    rig.train();
-    let (splats, size, background) = (rig.splats(), rig.size(), rig.scene.target.background);
-    let v_image = v_image(&mut rig);
-    let actual = rig.splat_gradients(&splats);
+    let mut fixture = Fixture::new(turn, opaque_scene(53), false);
+    fixture.train();
+    let (splats, size, background) = (fixture.splats(), fixture.size(), fixture.scene.target.background);
+    let v_image = v_image(&mut fixture);
+    let actual = fixture.splat_gradients(&splats);
     prove("blend_backward", &["alpha_min", "alpha_max", "transmittance_min"], |rules| {
         let expected = blend_backward(rules, &splats, size, background, &v_image);
-        judge::splat_gradients(&actual, &expected.values, (&expected.margins, SURE), BOUNDS)
+        judge::splat_gradients(&actual, &expected.values, (&expected.margins, MARGIN), BOUNDS)
     });
 }
 
 /// Gradient of the photo loss by the image, as the device's loss passes left it.
-fn v_image(rig: &mut Rig) -> Upstream {
-    let pixels = rig.pixels();
-    let rows = rig.get::<[f32; 4]>(Buf::V_IMAGE, pixels);
+fn v_image(fixture: &mut Fixture) -> Upstream {
+    let pixels = fixture.pixels();
+    let rows = fixture.get::<[f32; 4]>(Buf::V_IMAGE, pixels);
     Upstream::of_colours(&rows.iter().map(|&[r, g, b, _]| [r, g, b].map(f64::from)).collect::<Vec<_>>())
 }
 
 /// Gradient of every layer: the scene's from the device, the objects' from their mirror (a sign of each difference), and
 /// the distance of each splat to a kink of a label loss.
-fn v_layers(rules: &Rules, rig: &Rig, splats: &[Splat], v_scene: &Upstream) -> (Vec<Upstream>, Vec<f64>) {
-    let (target, labels, size) = (&rig.scene.target, rig.model().labels, rig.size());
-    let layers = blend_layers_forward(rules, splats, &labels, &rig.slots(), size, target.background);
+fn v_layers(rules: &Rules, fixture: &Fixture, splats: &[Splat], v_scene: &Upstream) -> (Vec<Upstream>, Vec<f64>) {
+    let (target, labels, size) = (&fixture.scene.target, fixture.model().labels, fixture.size());
+    let layers = blend_layers_forward(rules, splats, &labels, &fixture.slots(), size, target.background);
     let mut v_layers = vec![v_scene.clone()];
     let mut kinks = vec![f64::INFINITY; size.0 * size.1];
     for (slot, layer) in target.slots.iter().zip(&layers[1..]) {
@@ -145,15 +145,16 @@ fn v_layers(rules: &Rules, rig: &Rig, splats: &[Splat], v_scene: &Upstream) -> (
 #[test]
 fn object_layers_equal_filtered_renders() {
     let Some(turn) = device() else { return };
-    let mut rig = Rig::new(turn, opaque_scene(54), true);
-    let report = rig.train();
+    let mut fixture = Fixture::new(turn, opaque_scene(54), true);
+    let report = fixture.train();
     assert!(report.counters.layer_tile_count > 10);
-    let splats = rig.splats();
-    let v_scene = v_image(&mut rig);
-    let actual = rig.splat_gradients(&splats);
-    let (labels, slots, size, target) = (rig.model().labels, rig.slots(), rig.size(), rig.scene.target.clone());
+    let splats = fixture.splats();
+    let v_scene = v_image(&mut fixture);
+    let actual = fixture.splat_gradients(&splats);
+    let (labels, slots, size, target) =
+        (fixture.model().labels, fixture.slots(), fixture.size(), fixture.scene.target.clone());
     prove("object layers", &["alpha_min", "alpha_max", "label_weight", "label_alpha"], |rules| {
-        let (v_layers, kinks) = v_layers(rules, &rig, &splats, &v_scene);
+        let (v_layers, kinks) = v_layers(rules, &fixture, &splats, &v_scene);
         // Separate renders: each object's splats alone, over black.
         let mut expected = blend_backward(rules, &splats, size, target.background, &v_scene);
         for (slot, v_image) in slots.iter().zip(&v_layers[1..]) {
@@ -166,7 +167,7 @@ fn object_layers_equal_filtered_renders() {
             }
         }
         let margins: Vec<f64> = expected.margins.iter().zip(&kinks).map(|(a, b)| a.min(*b)).collect();
-        judge::splat_gradients(&actual, &expected.values, (&margins, SURE), BOUNDS)
+        judge::splat_gradients(&actual, &expected.values, (&margins, MARGIN), BOUNDS)
     });
 }
 
@@ -174,10 +175,10 @@ fn object_layers_equal_filtered_renders() {
 #[test]
 fn no_tile_misses_a_splat_that_counts() {
     let Some(turn) = device() else { return };
-    let mut rig = Rig::new(turn, opaque_scene(55), false);
-    rig.train();
-    let (splats, (width, height), shape) = (rig.splats(), rig.size(), *rig.engine.shape());
-    let touched = rig.get::<u32>(Buf::TILES_TOUCHED, splats.len());
+    let mut fixture = Fixture::new(turn, opaque_scene(55), false);
+    fixture.train();
+    let (splats, (width, height), shape) = (fixture.splats(), fixture.size(), *fixture.engine.shape());
+    let touched = fixture.get::<u32>(Buf::TILES_TOUCHED, splats.len());
     let grid = tile::TileGrid { size: (width, height), tile: (shape.tile_width as usize, shape.tile_height as usize) };
     let rules = Rules::default();
     for (splat, &touched) in splats.iter().zip(&touched) {

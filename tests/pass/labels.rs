@@ -1,42 +1,42 @@
 //! Lift, label loss, and what labels must not change.
 
-use super::rig::{Rig, prove};
+use super::fixture::{Fixture, prove};
 use crate::reference::blend::blend_layers_forward;
-use crate::reference::loss::{ObjectSlot, Photo, label_loss};
+use crate::reference::loss::{ObjectPixel, Photo, label_loss};
 use crate::reference::step::Target;
 use crate::reference::{Row, Rules};
 use crate::support::compare::{Tolerance, check, close, exact};
 use crate::support::device;
 use crate::support::scenes::{Scene, dot, plain_camera};
-use labelgs::plan::Buf;
 use labelgs::scene::Gaussians;
-use labelgs::selftest::model::{Lifted, dominant};
-use labelgs::train::job;
+use labelgs::scheduler::plan::Buf;
+use labelgs::train::step_input;
+use labelgs::verify::selftest::model::{Lifted, dominant};
 
 #[test]
 fn lift_with_and_without_the_filter() {
     for gpf in [true, false] {
         let Some(turn) = device() else { return };
-        let mut rig = Rig::new(turn, dominant(131), true);
-        rig.config.gpf = gpf;
+        let mut fixture = Fixture::new(turn, dominant(131), true);
+        fixture.config.gpf = gpf;
         // One object of the masks is not sampled.
-        rig.job.layers.pop();
-        let count = rig.scene.gaussians.len();
-        let ran = Lifted::new(&mut rig).expect("it runs");
+        fixture.input.layers.pop();
+        let count = fixture.scene.gaussians.len();
+        let ran = Lifted::new(&mut fixture).expect("it runs");
         prove(&format!("lift, filter {gpf}"), &["lift_threshold"], |rules| ran.verdict(rules));
-        assert!(rig.get::<u32>(Buf::LABEL_KEYS, count).iter().all(|&key| key == 0), "votes start over");
+        assert!(fixture.get::<u32>(Buf::LABEL_KEYS, count).iter().all(|&key| key == 0), "votes start over");
     }
 }
 
 #[test]
 fn label_loss_of_a_step() {
     let Some(turn) = device() else { return };
-    let mut rig = Rig::new(turn, dominant(132), true);
-    let counters = rig.train().counters;
-    let (splats, size, labels, slots) = (rig.splats(), rig.size(), rig.model().labels, rig.slots());
-    let target = rig.scene.target.clone();
+    let mut fixture = Fixture::new(turn, dominant(132), true);
+    let counters = fixture.train().counters;
+    let (splats, size, labels, slots) = (fixture.splats(), fixture.size(), fixture.model().labels, fixture.slots());
+    let target = fixture.scene.target.clone();
     assert!(target.slots.iter().any(|slot| !slot.occluders.is_empty()));
-    let actual = job::label_loss(&rig.job, &rig.view, &rig.config, counters.loss_label);
+    let actual = step_input::label_loss(&fixture.input, &fixture.view, &fixture.config, counters.loss_label);
     assert!(target.slots.iter().any(|slot| slot.weight != 1.0), "objects of different sizes weigh differently");
     prove("label loss", &["label_weight", "label_alpha"], |rules| {
         let layers = blend_layers_forward(rules, &splats, &labels, &slots, size, target.background);
@@ -52,12 +52,12 @@ fn label_loss_of_a_step() {
 #[test]
 fn densification_does_not_see_the_label_loss() {
     let run = |label_weight: f32| -> Option<(Vec<u32>, Vec<u32>)> {
-        let mut rig = Rig::new(device()?, dominant(133), true);
-        rig.config.label_weight = label_weight;
-        rig.train();
-        let count = rig.scene.gaussians.len();
-        let splats = rig.splats().len();
-        Some((rig.get(Buf::DENSIFY_STATS, 2 * count), rig.get(Buf::V_MEANS, 4 * splats)))
+        let mut fixture = Fixture::new(device()?, dominant(133), true);
+        fixture.config.label_weight = label_weight;
+        fixture.train();
+        let count = fixture.scene.gaussians.len();
+        let splats = fixture.splats().len();
+        Some((fixture.get(Buf::DENSIFY_STATS, 2 * count), fixture.get(Buf::V_MEANS, 4 * splats)))
     };
     let (Some(without), Some(with)) = (run(0.0), run(1e6)) else { return };
     assert!(without.0.iter().any(|&v| v != 0));
@@ -92,7 +92,7 @@ fn drawn(rows: &[Row], labels: Vec<u32>, width: u32, height: u32, label_map: Vec
                 valid: vec![true; pixels],
             },
             label_map,
-            slots: objects.iter().map(|&label| ObjectSlot { label, occluders: Vec::new(), weight: 1.0 }).collect(),
+            slots: objects.iter().map(|&label| ObjectPixel { label, occluders: Vec::new(), weight: 1.0 }).collect(),
             background: [0.0; 3],
         },
     }
@@ -115,13 +115,13 @@ fn on_a_ray(opacities: &[f64]) -> Scene {
 fn two_gaussians_on_a_ray() {
     for (opacities, weight, labels) in [([0.7, 0.9], 0.7, [7, 0]), ([0.5, 0.999], 0.5, [0, 0])] {
         let Some(turn) = device() else { return };
-        let mut rig = Rig::new(turn, on_a_ray(&opacities), true);
-        rig.render();
-        assert_eq!(rig.get::<u32>(Buf::MAIN_GAUSSIAN, MIDDLE + 1)[MIDDLE], 0, "the near one");
-        let found = f64::from(rig.get::<[f32; 2]>(Buf::MAIN_WEIGHT_DEPTH, MIDDLE + 1)[MIDDLE][0]);
+        let mut fixture = Fixture::new(turn, on_a_ray(&opacities), true);
+        fixture.render();
+        assert_eq!(fixture.get::<u32>(Buf::MAIN_GAUSSIAN, MIDDLE + 1)[MIDDLE], 0, "the near one");
+        let found = f64::from(fixture.get::<[f32; 2]>(Buf::MAIN_WEIGHT_DEPTH, MIDDLE + 1)[MIDDLE][0]);
         check("weight", close(&[found], &[weight], Tolerance { absolute: 1e-6, relative: 0.0 }));
-        rig.train();
-        assert_eq!(rig.get::<u32>(Buf::LABELS, 2), labels);
+        fixture.train();
+        assert_eq!(fixture.get::<u32>(Buf::LABELS, 2), labels);
     }
 }
 
@@ -129,10 +129,10 @@ fn two_gaussians_on_a_ray() {
 #[test]
 fn two_saturated_splats_stop() {
     let Some(turn) = device() else { return };
-    let mut rig = Rig::new(turn, on_a_ray(&[0.9999, 0.9999, 0.5]), false);
-    rig.train();
-    assert_eq!(rig.get::<u32>(Buf::LAST, MIDDLE + 1)[MIDDLE], 1);
-    assert_eq!(rig.get::<[f32; 4]>(Buf::IMAGE, MIDDLE + 1)[MIDDLE][3], 1.0 - 0.99_f32);
+    let mut fixture = Fixture::new(turn, on_a_ray(&[0.9999, 0.9999, 0.5]), false);
+    fixture.train();
+    assert_eq!(fixture.get::<u32>(Buf::LAST, MIDDLE + 1)[MIDDLE], 1);
+    assert_eq!(fixture.get::<[f32; 4]>(Buf::IMAGE, MIDDLE + 1)[MIDDLE][3], 1.0 - 0.99_f32);
 }
 
 /// method.md check 3.
@@ -142,12 +142,12 @@ fn a_pixel_without_a_splat_has_no_main_gaussian() {
     let camera = plain_camera(SIDE, SIDE);
     let mut s = drawn(&[dot(&camera, [2.5, 2.5], 5.0, 0.5, 0.9)], vec![0], SIDE, SIDE, vec![7; 289]);
     s.target.background = [0.25, 0.5, 0.75];
-    let mut rig = Rig::new(turn, s, false);
-    rig.render();
-    assert_eq!(rig.get::<i32>(Buf::MAIN_GAUSSIAN, 289)[MIDDLE], -1);
-    assert_eq!(rig.get::<[f32; 2]>(Buf::MAIN_WEIGHT_DEPTH, 289)[MIDDLE], [0.0, 0.0]);
-    assert_eq!(rig.get::<[f32; 4]>(Buf::IMAGE, 289)[MIDDLE], [0.25, 0.5, 0.75, 1.0]);
-    assert_eq!(rig.get::<i32>(Buf::MAIN_GAUSSIAN, 289)[2 * 17 + 2], 0);
+    let mut fixture = Fixture::new(turn, s, false);
+    fixture.render();
+    assert_eq!(fixture.get::<i32>(Buf::MAIN_GAUSSIAN, 289)[MIDDLE], -1);
+    assert_eq!(fixture.get::<[f32; 2]>(Buf::MAIN_WEIGHT_DEPTH, 289)[MIDDLE], [0.0, 0.0]);
+    assert_eq!(fixture.get::<[f32; 4]>(Buf::IMAGE, 289)[MIDDLE], [0.25, 0.5, 0.75, 1.0]);
+    assert_eq!(fixture.get::<i32>(Buf::MAIN_GAUSSIAN, 289)[2 * 17 + 2], 0);
 }
 
 /// method.md check 4: centre in mask 1, main pixels in mask 2 only.
@@ -167,10 +167,10 @@ fn a_gaussian_across_two_masks() {
             }
         };
         let s = drawn(&rows, vec![0, 0], 48, 8, (0..48 * 8).map(|i| mask(i % 48)).collect());
-        let mut rig = Rig::new(turn, s, true);
-        rig.config.gpf = gpf;
-        rig.train();
-        assert_eq!(rig.get::<u32>(Buf::LABELS, 2), [1, expected], "filter {gpf}");
+        let mut fixture = Fixture::new(turn, s, true);
+        fixture.config.gpf = gpf;
+        fixture.train();
+        assert_eq!(fixture.get::<u32>(Buf::LABELS, 2), [1, expected], "filter {gpf}");
     }
 }
 
@@ -182,10 +182,10 @@ fn a_centre_beside_the_image_lifts_nothing() {
             let Some(turn) = device() else { return };
             let camera = plain_camera(SIDE, SIDE);
             let s = drawn(&[dot(&camera, [x, 8.5], 5.0, 3.0, 0.95)], vec![0], SIDE, SIDE, vec![7; 289]);
-            let mut rig = Rig::new(turn, s, true);
-            rig.config.gpf = gpf;
-            rig.train();
-            assert_eq!(rig.get::<u32>(Buf::LABELS, 1), [expected], "centre at {x}, filter {gpf}");
+            let mut fixture = Fixture::new(turn, s, true);
+            fixture.config.gpf = gpf;
+            fixture.train();
+            assert_eq!(fixture.get::<u32>(Buf::LABELS, 1), [expected], "centre at {x}, filter {gpf}");
         }
     }
 }
@@ -197,16 +197,16 @@ fn label_loss_of_an_empty_object() {
     let camera = plain_camera(SIDE, SIDE);
     let s = drawn(&[dot(&camera, [8.5, 8.5], 5.0, 3.0, 0.4)], vec![0], SIDE, SIDE, vec![7; 289]);
     let expected = s.target.photo.colours[0][0];
-    let mut rig = Rig::new(turn, s, true);
-    rig.config.label_alpha = 0.0;
-    let counters = rig.train().counters;
+    let mut fixture = Fixture::new(turn, s, true);
+    fixture.config.label_alpha = 0.0;
+    let counters = fixture.train().counters;
     assert_eq!((counters.loss_label, counters.layer_tile_count), (0.0, 0));
-    let loss = job::label_loss(&rig.job, &rig.view, &rig.config, counters.loss_label);
+    let loss = step_input::label_loss(&fixture.input, &fixture.view, &fixture.config, counters.loss_label);
     check("loss", close(&[loss], &[expected], Tolerance { absolute: 1e-7, relative: 0.0 }));
-    let with: Vec<u32> = rig.get(Buf::V_SPLATS, 12);
-    rig.config.label_weight = 1e6;
-    rig.train();
-    check("gradient", exact(&rig.get::<u32>(Buf::V_SPLATS, 12), &with));
+    let with: Vec<u32> = fixture.get(Buf::V_SPLATS, 12);
+    fixture.config.label_weight = 1e6;
+    fixture.train();
+    check("gradient", exact(&fixture.get::<u32>(Buf::V_SPLATS, 12), &with));
 }
 
 /// method.md check 8: the picture of an object is its photo. A flat layer of opacity 0.5 over black shows half its colour.
@@ -217,10 +217,10 @@ fn label_loss_of_a_right_object() {
     let mut row = dot(&camera, [8.5, 8.5], 5.0, 1e4, 0.5);
     // Degree 0 of the colour: 0.5 + C0 k = 2 * 128 / 255, so that half of it is the photo's 128 / 255.
     row.sh[0] = [(256.0 / 255.0 - 0.5) / Rules::default().sh_c0; 3];
-    let mut rig = Rig::new(turn, drawn(&[row], vec![7], SIDE, SIDE, vec![7; 289]), true);
-    rig.config.label_alpha = 0.0; // it is half transparent
-    let counters = rig.train().counters;
-    let loss = job::label_loss(&rig.job, &rig.view, &rig.config, counters.loss_label);
+    let mut fixture = Fixture::new(turn, drawn(&[row], vec![7], SIDE, SIDE, vec![7; 289]), true);
+    fixture.config.label_alpha = 0.0; // it is half transparent
+    let counters = fixture.train().counters;
+    let loss = step_input::label_loss(&fixture.input, &fixture.view, &fixture.config, counters.loss_label);
     check("loss", close(&[loss], &[0.0], Tolerance { absolute: 1e-5, relative: 0.0 }));
 }
 
@@ -232,16 +232,16 @@ fn pixels_of_occluders_are_left_out() {
     let label_map: Vec<u32> = (0..289).map(|i| if i % 17 < 9 { 1 } else { 2 }).collect();
     let mut s = drawn(&[dot(&camera, [12.5, 8.5], 5.0, 0.4, 0.9)], vec![1], SIDE, SIDE, label_map);
     s.target.slots[0].occluders = vec![2];
-    let mut rig = Rig::new(turn, s, true);
-    rig.config.label_threshold = 0.99; // the label stays
-    let counters = rig.train().counters;
+    let mut fixture = Fixture::new(turn, s, true);
+    fixture.config.label_threshold = 0.99; // the label stays
+    let counters = fixture.train().counters;
     assert!(counters.layer_tile_count > 0 && counters.loss_label == 0.0);
-    let with: Vec<u32> = rig.get(Buf::V_SPLATS, 12);
-    rig.config.label_weight = 0.0;
-    rig.train();
-    check("gradient", exact(&rig.get::<u32>(Buf::V_SPLATS, 12), &with));
+    let with: Vec<u32> = fixture.get(Buf::V_SPLATS, 12);
+    fixture.config.label_weight = 0.0;
+    fixture.train();
+    check("gradient", exact(&fixture.get::<u32>(Buf::V_SPLATS, 12), &with));
     // Without the occluder the same pixels count.
-    rig.view.occluders.clear();
-    rig.config.label_weight = 1.0;
-    assert!(rig.train().counters.loss_label > 0.0);
+    fixture.view.occluders.clear();
+    fixture.config.label_weight = 1.0;
+    assert!(fixture.train().counters.loss_label > 0.0);
 }

@@ -1,11 +1,11 @@
 //! Photo loss: its value, and its gradient by the image.
 
-use super::rig::{Rig, prove};
+use super::fixture::{Fixture, prove};
 use crate::reference::loss::photo_loss;
 use crate::support::compare::{GradientBounds, Tolerance, Verdict, close, gradients};
 use crate::support::device;
 use crate::support::scenes::{Shape, scene};
-use labelgs::plan::Buf;
+use labelgs::scheduler::plan::Buf;
 
 /// Sums of 121 f32 products of the window, twice; SSIM divides by variances that are small differences. Seen: 0.75 of
 /// (1e-5, 1e-5) by element, 0.31 of 1e-5 as a whole.
@@ -26,13 +26,13 @@ fn loss_of_the_photo() {
     for (seed, width, height) in [(91, 61, 45), (92, 70, 133)] {
         let Some(turn) = device() else { return };
         let shape = Shape { gaussians: 150, width, height, ..Shape::default() };
-        let mut rig = Rig::new(turn, scene(seed, &shape), false);
-        let counters = rig.train().counters;
-        let pixels = rig.pixels();
+        let mut fixture = Fixture::new(turn, scene(seed, &shape), false);
+        let counters = fixture.train().counters;
+        let pixels = fixture.pixels();
         let image: Vec<[f64; 3]> =
-            rig.get::<[f32; 4]>(Buf::IMAGE, pixels).iter().map(|&[r, g, b, _]| [r, g, b].map(f64::from)).collect();
-        let v_image = rig.get::<[f32; 4]>(Buf::V_IMAGE, pixels);
-        let photo = &rig.scene.target.photo;
+            fixture.get::<[f32; 4]>(Buf::IMAGE, pixels).iter().map(|&[r, g, b, _]| [r, g, b].map(f64::from)).collect();
+        let v_image = fixture.get::<[f32; 4]>(Buf::V_IMAGE, pixels);
+        let photo = &fixture.scene.target.photo;
         let sums = [counters.loss_l1, counters.loss_ssim].map(|v| f64::from(v) / photo.elements());
         let bearing = ["l1_weight", "dssim_weight", "ssim_sigma", "ssim_reach", "ssim_c1", "ssim_c2"];
         prove(&format!("photo loss {width}x{height}"), &bearing, |rules| -> Verdict {

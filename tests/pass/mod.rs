@@ -5,12 +5,12 @@
 //! `step` compares the whole chain. Tolerances are 1.5 times the worst value seen on lavapipe, written beside them.
 
 mod blend;
+pub mod fixture;
 mod labels;
 mod loss;
 mod optimize;
 mod orders;
 mod project;
-pub mod rig;
 mod separate;
 mod step;
 mod tile;

@@ -1,18 +1,19 @@
 //! The optimiser, densification and the opacity reset.
 
-use super::rig::{MOMENTS_1, MOMENTS_2, PARAMETERS, Rig, prove};
+use super::fixture::{Fixture, MOMENTS_1, MOMENTS_2, PARAMETERS, prove};
 use crate::reference::adam::{Optimised, Rates, adam};
 use crate::reference::random::normal_draw;
 use crate::support::compare::Tolerance;
 use crate::support::device;
 use crate::support::scenes::{Shape, population, scene};
-use labelgs::selftest::judge;
-use labelgs::selftest::model::{Densified, Reset, scene_of};
-use labelgs::train::job::Fixed;
+use labelgs::train::step_input::SceneScale;
+use labelgs::verify::selftest::judge;
+use labelgs::verify::selftest::model::{Densified, Reset, scene_of};
 
-fn states(rig: &mut Rig) -> Vec<Optimised> {
-    let count = rig.scene.gaussians.len();
-    let (rows, m, u) = (rig.rows(PARAMETERS, count), rig.rows(MOMENTS_1, count), rig.rows(MOMENTS_2, count));
+fn states(fixture: &mut Fixture) -> Vec<Optimised> {
+    let count = fixture.scene.gaussians.len();
+    let (rows, m, u) =
+        (fixture.rows(PARAMETERS, count), fixture.rows(MOMENTS_1, count), fixture.rows(MOMENTS_2, count));
     (0..count).map(|i| Optimised { row: rows[i], m: m[i], u: u[i] }).collect()
 }
 
@@ -20,15 +21,15 @@ fn states(rig: &mut Rig) -> Vec<Optimised> {
 #[test]
 fn adam_of_every_attribute() {
     let Some(turn) = device() else { return };
-    let mut rig = Rig::new(turn, scene(101, &Shape { gaussians: 60, ..Shape::default() }), true);
-    rig.fixed = Fixed { extent: 4.0 };
-    rig.job.update = true;
+    let mut fixture = Fixture::new(turn, scene(101, &Shape { gaussians: 60, ..Shape::default() }), true);
+    fixture.fixed = SceneScale { extent: 4.0 };
+    fixture.input.update = true;
     let mut steps = Vec::new();
     for step in 1..=5 {
-        (rig.job.step, rig.job.updates, rig.job.stamp) = (step, step, step);
-        let before = states(&mut rig);
-        rig.train();
-        steps.push((step, rig.uniforms(), before, rig.gradient_rows(), states(&mut rig)));
+        (fixture.input.step, fixture.input.updates, fixture.input.stamp) = (step, step, step);
+        let before = states(&mut fixture);
+        fixture.train();
+        steps.push((step, fixture.uniforms(), before, fixture.gradient_rows(), states(&mut fixture)));
     }
     prove("adam", &["adam_beta1", "adam_beta2", "adam_eps"], |rules| {
         judge::all(steps.iter().map(|(step, u, before, gradients, after)| {
@@ -61,8 +62,8 @@ fn densify_case(step: u32, bearing: &[&str]) {
     for (row, length) in before.model.rows.iter_mut().zip([1.0, 1e-15, 1e15, 1e-19, 1e19].into_iter().cycle()) {
         row.quat = row.quat.map(|value| f64::from((value * length) as f32));
     }
-    let mut rig = Rig::new(turn, scene_of(&before), true);
-    let ran = Densified::new(&mut rig, before, step).expect("it runs");
+    let mut fixture = Fixture::new(turn, scene_of(&before), true);
+    let ran = Densified::new(&mut fixture, before, step).expect("it runs");
     prove(&format!("densify at {step}"), bearing, |rules| {
         // 0.23 of (1e-6, 1e-7) seen.
         ran.verdict(rules, Tolerance { absolute: 3.5e-7, relative: 3.5e-8 })
@@ -84,8 +85,8 @@ fn densify_late_removes_the_huge() {
 fn opacity_reset_of_a_population() {
     let Some(turn) = device() else { return };
     let before = population(120, 300);
-    let mut rig = Rig::new(turn, scene_of(&before), true);
-    let ran = Reset::new(&mut rig, before).expect("it runs");
+    let mut fixture = Fixture::new(turn, scene_of(&before), true);
+    let ran = Reset::new(&mut fixture, before).expect("it runs");
     prove("opacity reset", &["reset_opacity"], |rules| {
         // The constant is the logit of 0.01, not of the nearest f32; 8e-8 seen.
         ran.verdict(rules, Tolerance { absolute: 1.2e-7, relative: 0.0 })

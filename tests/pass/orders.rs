@@ -1,19 +1,19 @@
 //! Scan and sort on numbers of every kind: exact answers.
 
-use super::rig::readable;
+use super::fixture::readable;
 use crate::reference::scan::exclusive_scan;
 use crate::reference::sort::radix_sort;
 use crate::support::compare::{check, exact};
 use crate::support::device;
 use crate::support::scenes::generator;
 use bytemuck::Zeroable;
-use labelgs::engine::{Engine, Room};
+use labelgs::engine::{Engine, EngineSize};
 use labelgs::pass::build::Count;
 use labelgs::pass::scan::{self, Total};
 use labelgs::pass::sort::{self, SortBuffers};
 use labelgs::pass::{Builder, KernelShape};
-use labelgs::plan::{Buf, Capacity, PassList};
-use labelgs::sched::ListId;
+use labelgs::scheduler::ListId;
+use labelgs::scheduler::plan::{Buf, Capacity, PassList};
 use labelgs::shaders::constants::KEY_INVISIBLE;
 use labelgs::shaders::structs::{Counters, StepUniforms};
 use rand::Rng;
@@ -21,7 +21,7 @@ use rand::Rng;
 const ITEMS: usize = 5000;
 
 fn engine(gpu: std::sync::Arc<labelgs::gpu::Gpu>) -> Engine {
-    let room = Room { gaussians: ITEMS as u64, size: (64, 64), trained: false, labels: None };
+    let room = EngineSize { gaussians: ITEMS as u64, size: (64, 64), trained: false, labels: None };
     Engine::new(gpu, room, readable()).expect("the engine starts")
 }
 

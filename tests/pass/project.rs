@@ -1,6 +1,6 @@
 //! Culling, compaction, order, projection, and the projection's gradient.
 
-use super::rig::{GRADIENTS, Rig, prove};
+use super::fixture::{Fixture, GRADIENTS, prove};
 use crate::reference::model::ROW_FLOATS;
 use crate::reference::project::{Splat, SplatGradient, near_margin, project_backward, project_forward, sigmoid};
 use crate::reference::scan::compact;
@@ -9,9 +9,9 @@ use crate::reference::{Rules, tile};
 use crate::support::compare::{GradientBounds, Tolerance, check, close, exact};
 use crate::support::device;
 use crate::support::scenes::{Scene, Shape, scene};
-use labelgs::plan::Buf;
-use labelgs::selftest::judge;
+use labelgs::scheduler::plan::Buf;
 use labelgs::shaders::constants::KEY_INVISIBLE;
+use labelgs::verify::selftest::judge;
 
 /// Half of the Gaussians far outside, so that slopes are clamped and many are culled; some behind the near plane.
 pub fn wide_scene(seed: u64, sh_degree: u32) -> Scene {
@@ -29,11 +29,11 @@ pub fn wide_scene(seed: u64, sh_degree: u32) -> Scene {
 #[test]
 fn visible_gaussians_in_depth_order() {
     let Some(turn) = device() else { return };
-    let mut rig = Rig::new(turn, wide_scene(11, 3), false);
-    let report = rig.train();
-    let count = rig.scene.gaussians.len();
-    let keys = rig.get::<u32>(Buf::DEPTH_KEYS, count);
-    let (model, camera, size) = (rig.model(), rig.scene.camera.clone(), rig.size());
+    let mut fixture = Fixture::new(turn, wide_scene(11, 3), false);
+    let report = fixture.train();
+    let count = fixture.scene.gaussians.len();
+    let keys = fixture.get::<u32>(Buf::DEPTH_KEYS, count);
+    let (model, camera, size) = (fixture.model(), fixture.scene.camera.clone(), fixture.size());
     prove("cull", &["near"], |rules| {
         let mut depths = (Vec::new(), Vec::new());
         for (index, &key) in keys.iter().enumerate() {
@@ -63,19 +63,19 @@ fn visible_gaussians_in_depth_order() {
     assert!(listed.len() == visible && visible > 100 && visible < 280, "{visible} of {count} are visible");
     let order = radix_sort(&listed.iter().map(|&i| keys[i as usize]).collect::<Vec<_>>());
     let expected: Vec<u32> = order.iter().map(|&place| listed[place]).collect();
-    check("depth order", exact(&rig.get::<u32>(Buf::DEPTH_VALUES_A, visible), &expected));
+    check("depth order", exact(&fixture.get::<u32>(Buf::DEPTH_VALUES_A, visible), &expected));
     let mut splat_of = vec![u32::MAX; count];
     expected.iter().enumerate().for_each(|(splat, &gaussian)| splat_of[gaussian as usize] = splat as u32);
-    check("splat_from_gaussian", exact(&rig.get::<u32>(Buf::SPLAT_FROM_GAUSSIAN, count), &splat_of));
+    check("splat_from_gaussian", exact(&fixture.get::<u32>(Buf::SPLAT_FROM_GAUSSIAN, count), &splat_of));
 }
 
 #[test]
 fn project_forward_of_each_degree() {
     for sh_degree in 0..=3 {
         let Some(turn) = device() else { return };
-        let mut rig = Rig::new(turn, wide_scene(20 + u64::from(sh_degree), sh_degree), false);
-        rig.render();
-        let (splats, model, camera) = (rig.splats(), rig.model(), rig.scene.camera.clone());
+        let mut fixture = Fixture::new(turn, wide_scene(20 + u64::from(sh_degree), sh_degree), false);
+        fixture.render();
+        let (splats, model, camera) = (fixture.splats(), fixture.model(), fixture.scene.camera.clone());
         let mut bearing = vec!["dilation", "jacobian_margin", "colour_bias", "sh_c0"];
         bearing.extend(&["sh_c1", "sh_c2", "sh_c3"][..sh_degree as usize]);
         prove(&format!("project_forward, degree {sh_degree}"), &bearing, |rules| {
@@ -101,11 +101,11 @@ const BOUNDS: GradientBounds = GradientBounds {
 fn project_backward_of_each_degree() {
     for sh_degree in [3, 1] {
         let Some(turn) = device() else { return };
-        let mut rig = Rig::new(turn, wide_scene(30 + u64::from(sh_degree), sh_degree), false);
-        rig.train();
-        let (splats, model, camera) = (rig.splats(), rig.model(), rig.scene.camera.clone());
-        let v_splats: Vec<SplatGradient> = rig.splat_gradients(&splats);
-        let actual = rig.rows(GRADIENTS, splats.len());
+        let mut fixture = Fixture::new(turn, wide_scene(30 + u64::from(sh_degree), sh_degree), false);
+        fixture.train();
+        let (splats, model, camera) = (fixture.splats(), fixture.model(), fixture.scene.camera.clone());
+        let v_splats: Vec<SplatGradient> = fixture.splat_gradients(&splats);
+        let actual = fixture.rows(GRADIENTS, splats.len());
         assert!(actual.iter().filter(|row| row.floats() != [0.0; ROW_FLOATS]).count() > 60);
         let mut bearing = vec!["dilation", "jacobian_margin", "sh_c0", "sh_c1"];
         bearing.extend(&["sh_c2", "sh_c3"][..sh_degree as usize - 1]);

@@ -1,6 +1,6 @@
 //! Objects in passes of their own against all layers in one traversal: the same step, up to the order of sums.
 
-use super::rig::{GRADIENTS, MOMENTS_1, Rig};
+use super::fixture::{Fixture, GRADIENTS, MOMENTS_1};
 use crate::invariants::training::tiny;
 use crate::reference::Row;
 use crate::support::compare::{GradientBounds, Tolerance, check, close, exact};
@@ -8,12 +8,12 @@ use crate::support::device;
 use crate::support::scenes::{Shape, scene};
 use labelgs::engine::{ListKey, Report};
 use labelgs::io::init::initial_gaussians;
-use labelgs::plan::Buf;
-use labelgs::sched::SchedulerOptions;
-use labelgs::selftest::judge;
+use labelgs::scheduler::SchedulerOptions;
+use labelgs::scheduler::plan::Buf;
 use labelgs::shaders::constants::NO_SPLAT;
 use labelgs::synth::{Preset, SynthOptions, dataset};
 use labelgs::train::{LabelRule, StepReport, TrainConfig, Trainer};
+use labelgs::verify::selftest::judge;
 
 /// Both are f32 sums of the same terms, scene and object apart or together: what is left is rounding, which large terms
 /// of opposite sign make more of. 0.67 of the bounds seen, by element and as a whole.
@@ -26,26 +26,33 @@ const BOUNDS: GradientBounds = GradientBounds {
 };
 
 /// The step with objects one by one.
-fn separate(rig: &Rig) -> ListKey {
-    let ListKey::Train(variant) = rig.key() else { unreachable!("the rig trains") };
-    ListKey::Separate(variant, rig.job.layers.len() as u32)
+fn separate(fixture: &Fixture) -> ListKey {
+    let ListKey::Train(variant) = fixture.key() else { unreachable!("the fixture trains") };
+    ListKey::Separate(variant, fixture.input.layers.len() as u32)
 }
 
 /// Runs a list on the model as it was first. No record of the runs before may count.
-fn run(rig: &mut Rig, key: ListKey) -> Report {
-    rig.job.stamp += 1;
-    let gaussians = rig.scene.gaussians.clone();
-    rig.engine.upload_model(&gaussians).expect("the model fits");
-    rig.run(key, |rig| {
-        let uniforms = rig.uniforms();
-        labelgs::train::job::upload(&mut rig.engine, 0, uniforms, &rig.view, &rig.job, &rig.config)
+fn run(fixture: &mut Fixture, key: ListKey) -> Report {
+    fixture.input.stamp += 1;
+    let gaussians = fixture.scene.gaussians.clone();
+    fixture.engine.upload_model(&gaussians).expect("the model fits");
+    fixture.run(key, |fixture| {
+        let uniforms = fixture.uniforms();
+        labelgs::train::step_input::upload(
+            &mut fixture.engine,
+            0,
+            uniforms,
+            &fixture.view,
+            &fixture.input,
+            &fixture.config,
+        )
     })
 }
 
 /// The gradients by Gaussian, through the order that the optimiser uses.
-fn gradient_rows(rig: &mut Rig, report: &Report) -> Vec<Row> {
-    let by_splat = rig.rows(GRADIENTS, report.counters.visible_count as usize);
-    let splats = rig.get::<u32>(Buf::SPLAT_FROM_GAUSSIAN, rig.scene.gaussians.len());
+fn gradient_rows(fixture: &mut Fixture, report: &Report) -> Vec<Row> {
+    let by_splat = fixture.rows(GRADIENTS, report.counters.visible_count as usize);
+    let splats = fixture.get::<u32>(Buf::SPLAT_FROM_GAUSSIAN, fixture.scene.gaussians.len());
     let row = |splat: u32| if splat == NO_SPLAT { Row::default() } else { by_splat[splat as usize] };
     splats.into_iter().map(row).collect()
 }
@@ -55,19 +62,19 @@ fn gradients_are_those_of_one_traversal() {
     for (seed, objects, lift) in [(62, 3, LabelRule::Main), (64, 5, LabelRule::Votes), (65, 1, LabelRule::Main)] {
         let Some(turn) = device() else { return };
         let shape = Shape { gaussians: 120, objects, width: 61, height: 45, ..Shape::default() };
-        let mut rig = Rig::new(turn, scene(seed, &shape), true);
-        rig.config.label_rule = lift;
-        rig.job.update = true;
-        let key = rig.key();
-        let together = run(&mut rig, key);
-        let count = rig.scene.gaussians.len();
-        let expected = gradient_rows(&mut rig, &together);
-        let labels = rig.get::<u32>(Buf::LABELS, count);
-        let statistics = rig.get::<u32>(Buf::DENSIFY_STATS, 2 * count);
-        let moments = rig.rows(MOMENTS_1, count);
+        let mut fixture = Fixture::new(turn, scene(seed, &shape), true);
+        fixture.config.label_rule = lift;
+        fixture.input.update = true;
+        let key = fixture.key();
+        let together = run(&mut fixture, key);
+        let count = fixture.scene.gaussians.len();
+        let expected = gradient_rows(&mut fixture, &together);
+        let labels = fixture.get::<u32>(Buf::LABELS, count);
+        let statistics = fixture.get::<u32>(Buf::DENSIFY_STATS, 2 * count);
+        let moments = fixture.rows(MOMENTS_1, count);
 
-        let key = separate(&rig);
-        let apart = run(&mut rig, key);
+        let key = separate(&fixture);
+        let apart = run(&mut fixture, key);
         let (a, b) = (&apart.counters, &together.counters);
         assert!(apart.failure == 0 && b.layer_tile_count > 0);
         assert_eq!((a.visible_count, a.nonfinite_count, a.longest_list), (b.visible_count, 0, b.longest_list));
@@ -77,15 +84,15 @@ fn gradients_are_those_of_one_traversal() {
         let sums = [a, b].map(|counters| f64::from(counters.loss_label));
         check("label loss", close(&sums[..1], &sums[1..], Tolerance { absolute: 1e-5, relative: 1e-6 }));
 
-        let degree = rig.config.sh_degree;
-        let actual = gradient_rows(&mut rig, &apart);
+        let degree = fixture.config.sh_degree;
+        let actual = gradient_rows(&mut fixture, &apart);
         let summary = check("gradients", judge::rows(&actual, &expected, degree, BOUNDS));
         println!("{objects} objects: {:.3}, as a whole {:.3} of the tolerance", summary.worst, summary.whole);
-        check("labels", exact(&rig.get::<u32>(Buf::LABELS, count), &labels));
+        check("labels", exact(&fixture.get::<u32>(Buf::LABELS, count), &labels));
         // The statistic is the scene's: it is summed up alike.
-        check("statistics", exact(&rig.get::<u32>(Buf::DENSIFY_STATS, 2 * count), &statistics));
+        check("statistics", exact(&fixture.get::<u32>(Buf::DENSIFY_STATS, 2 * count), &statistics));
         // One update of Adam: its first moments are linear in the gradient, where parameters take its sign.
-        check("moments", judge::rows(&rig.rows(MOMENTS_1, count), &moments, degree, BOUNDS));
+        check("moments", judge::rows(&fixture.rows(MOMENTS_1, count), &moments, degree, BOUNDS));
     }
 }
 
@@ -94,14 +101,14 @@ fn gradients_are_those_of_one_traversal() {
 fn a_hidden_object_gets_no_gradient_of_others() {
     let Some(turn) = device() else { return };
     let shape = Shape { gaussians: 200, opacities: (2.0, 8.0), ..Shape::default() };
-    let mut rig = Rig::new(turn, scene(66, &shape), true);
-    rig.config.label_weight = 0.0;
-    let key = rig.key();
-    let together = run(&mut rig, key);
-    let expected = gradient_rows(&mut rig, &together);
-    let key = separate(&rig);
-    let apart = run(&mut rig, key);
-    assert!(gradient_rows(&mut rig, &apart) == expected, "without label loss objects add nothing");
+    let mut fixture = Fixture::new(turn, scene(66, &shape), true);
+    fixture.config.label_weight = 0.0;
+    let key = fixture.key();
+    let together = run(&mut fixture, key);
+    let expected = gradient_rows(&mut fixture, &together);
+    let key = separate(&fixture);
+    let apart = run(&mut fixture, key);
+    assert!(gradient_rows(&mut fixture, &apart) == expected, "without label loss objects add nothing");
 }
 
 #[test]

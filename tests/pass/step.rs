@@ -1,13 +1,13 @@
 //! A whole step: losses and the gradient of every parameter against the mirror, from the model to the gradient.
 
-use super::rig::{Rig, prove};
+use super::fixture::{Fixture, prove};
 use crate::reference::rules::{Family, mutants};
 use crate::reference::step::step;
 use crate::reference::{Row, Rules};
 use crate::support::compare::{GradientBounds, Tolerance, Verdict, close};
 use crate::support::device;
 use crate::support::scenes::{Shape, scene};
-use labelgs::selftest::judge;
+use labelgs::verify::selftest::judge;
 
 /// Errors of all passes add up; 0.89 of (1e-6, 5e-5) seen by element, 0.15 of (1e-5, 1e-10) as a whole.
 const BOUNDS: GradientBounds = GradientBounds {
@@ -19,14 +19,14 @@ const BOUNDS: GradientBounds = GradientBounds {
 };
 
 /// Gaussians with a decision nearer than this to its threshold are left out.
-const SURE: f64 = 2e-5;
+const MARGIN: f64 = 2e-5;
 
 fn case(name: &str, seed: u64, shape: &Shape, labels: bool, bearing: &[&str]) {
     let Some(turn) = device() else { return };
-    let mut rig = Rig::new(turn, scene(seed, shape), labels);
-    let report = rig.train();
-    let actual = rig.gradient_rows();
-    let (model, camera, mut target) = (rig.model(), rig.scene.camera.clone(), rig.scene.target.clone());
+    let mut fixture = Fixture::new(turn, scene(seed, shape), labels);
+    let report = fixture.train();
+    let actual = fixture.gradient_rows();
+    let (model, camera, mut target) = (fixture.model(), fixture.scene.camera.clone(), fixture.scene.target.clone());
     if !labels {
         target.slots.clear();
     }
@@ -36,7 +36,7 @@ fn case(name: &str, seed: u64, shape: &Shape, labels: bool, bearing: &[&str]) {
         let expected = step(rules, &camera, &model, &target);
         let loss = |l1: f64, ssim: f64| rules.l1_weight * l1 + rules.dssim_weight * (1.0 - ssim);
         close(&[loss(sums[0], sums[1])], &[expected.photo.value], Tolerance { absolute: 1e-5, relative: 0.0 })?;
-        let sure: Vec<usize> = (0..actual.len()).filter(|&i| expected.margins[i] > SURE).collect();
+        let sure: Vec<usize> = (0..actual.len()).filter(|&i| expected.margins[i] > MARGIN).collect();
         assert!(sure.len() * 10 > actual.len() * 6, "{} of {} Gaussians are sure", sure.len(), actual.len());
         let pick = |rows: &[Row]| sure.iter().map(|&i| rows[i]).collect::<Vec<_>>();
         judge::rows(&pick(&actual), &pick(&expected.rows), model.sh_degree, BOUNDS)

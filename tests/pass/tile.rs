@@ -1,13 +1,13 @@
 //! Which tiles each splat touches, the sorted lists of tiles and layers, and the occupied tiles of the layers.
 
 use super::blend::opaque_scene;
-use super::rig::{Rig, prove};
+use super::fixture::{Fixture, prove};
 use crate::reference::scan::{compact, exclusive_scan};
 use crate::reference::sort::radix_sort;
 use crate::reference::tile::{TileGrid, tile_lengths, tile_ranges, tiles_within, touched_tiles};
 use crate::support::compare::{Summary, check, exact};
 use crate::support::device;
-use labelgs::plan::Buf;
+use labelgs::scheduler::plan::Buf;
 
 /// Log2 units that the device's test may err on the side of one tile too many: 0.01, and 2e-6 of the exponent's terms.
 const SLACK: f64 = 0.02;
@@ -15,25 +15,25 @@ const SLACK: f64 = 0.02;
 #[test]
 fn tiles_of_splats_and_lists_of_tiles() {
     let Some(turn) = device() else { return };
-    let mut rig = Rig::new(turn, opaque_scene(81), true);
-    let counters = rig.train().counters;
-    let (splats, pairs) = (rig.splats(), counters.instance_count as usize);
-    let (uniforms, shape, labels) = (rig.uniforms(), *rig.engine.shape(), rig.model().labels);
-    let grid = TileGrid { size: rig.size(), tile: (shape.tile_width as usize, shape.tile_height as usize) };
-    let touched = rig.get::<u32>(Buf::TILES_TOUCHED, splats.len());
+    let mut fixture = Fixture::new(turn, opaque_scene(81), true);
+    let counters = fixture.train().counters;
+    let (splats, pairs) = (fixture.splats(), counters.instance_count as usize);
+    let (uniforms, shape, labels) = (fixture.uniforms(), *fixture.engine.shape(), fixture.model().labels);
+    let grid = TileGrid { size: fixture.size(), tile: (shape.tile_width as usize, shape.tile_height as usize) };
+    let touched = fixture.get::<u32>(Buf::TILES_TOUCHED, splats.len());
     let (offsets, total) = exclusive_scan(&touched);
-    check("instance_offsets", exact(&rig.get::<u32>(Buf::INSTANCE_OFFSETS, splats.len()), &offsets));
+    check("instance_offsets", exact(&fixture.get::<u32>(Buf::INSTANCE_OFFSETS, splats.len()), &offsets));
     assert_eq!(counters.instance_count, total);
 
-    let (sorted_keys, slots) = rig.sorted_pairs(pairs);
+    let (sorted_keys, slots) = fixture.sorted_pairs(pairs);
     let mut keys = vec![u32::MAX; pairs];
     slots.iter().zip(&sorted_keys).for_each(|(&slot, &key)| keys[slot as usize] = key);
     check("order of pairs", exact(&slots, &radix_sort(&keys).iter().map(|&slot| slot as u32).collect::<Vec<_>>()));
-    let splat_from_instance = rig.get::<u32>(Buf::SPLAT_FROM_INSTANCE, pairs);
+    let splat_from_instance = fixture.get::<u32>(Buf::SPLAT_FROM_INSTANCE, pairs);
     let owners = touched.iter().enumerate().flat_map(|(splat, &n)| std::iter::repeat_n(splat as u32, n as usize));
     check("splat_from_instance", exact(&splat_from_instance, &owners.collect::<Vec<_>>()));
 
-    let layers = rig.job.layers.clone();
+    let layers = fixture.input.layers.clone();
     let layer_of = |gaussian: usize| layers.iter().position(|&label| u32::from(label) == labels[gaussian]);
     assert!(splats.iter().any(|s| layer_of(s.gaussian).is_some()) && splats.iter().any(|s| labels[s.gaussian] == 0));
     prove("tiles of splats", &["alpha_min"], |rules| {
@@ -55,17 +55,17 @@ fn tiles_of_splats_and_lists_of_tiles() {
         }
         Ok(Summary::default())
     });
-    lists(&mut rig, &sorted_keys, &slots, &splat_from_instance);
+    lists(&mut fixture, &sorted_keys, &slots, &splat_from_instance);
 }
 
-fn lists(rig: &mut Rig, sorted_keys: &[u32], slots: &[u32], splat_from_instance: &[u32]) {
-    let (uniforms, counters) = (rig.uniforms(), rig.engine.report(0).expect("a report").counters);
+fn lists(fixture: &mut Fixture, sorted_keys: &[u32], slots: &[u32], splat_from_instance: &[u32]) {
+    let (uniforms, counters) = (fixture.uniforms(), fixture.engine.report(0).expect("a report").counters);
     let virtual_tiles = (uniforms.tile_count * (uniforms.layer_count + 1)) as usize;
     let ranges = tile_ranges(sorted_keys, virtual_tiles);
     let starts: Vec<u32> = ranges.iter().map(|range| range[0]).collect();
     let ends: Vec<u32> = ranges.iter().map(|range| range[1]).collect();
-    check("tile_starts", exact(&rig.get::<u32>(Buf::TILE_STARTS, virtual_tiles), &starts));
-    check("tile_ends", exact(&rig.get::<u32>(Buf::TILE_ENDS, virtual_tiles), &ends));
+    check("tile_starts", exact(&fixture.get::<u32>(Buf::TILE_STARTS, virtual_tiles), &starts));
+    check("tile_ends", exact(&fixture.get::<u32>(Buf::TILE_ENDS, virtual_tiles), &ends));
     let sorted: Vec<u32> = slots.iter().map(|&slot| splat_from_instance[slot as usize]).collect();
     assert!(ranges.iter().all(|&[a, b]| sorted[a as usize..b as usize].is_sorted()), "lists run front to back");
 
@@ -73,8 +73,8 @@ fn lists(rig: &mut Rig, sorted_keys: &[u32], slots: &[u32], splat_from_instance:
     assert_eq!(counters.longest_list, longest);
     let first = uniforms.tile_count as usize;
     let flags: Vec<u32> = (0..virtual_tiles).map(|tile| u32::from(tile >= first && occupied[tile])).collect();
-    check("layer_occupied", exact(&rig.get::<u32>(Buf::LAYER_OCCUPIED, virtual_tiles), &flags));
+    check("layer_occupied", exact(&fixture.get::<u32>(Buf::LAYER_OCCUPIED, virtual_tiles), &flags));
     let listed = compact(&flags);
     assert_eq!(counters.layer_tile_count as usize, listed.len());
-    check("layer_tiles", exact(&rig.get::<u32>(Buf::LAYER_TILES, listed.len()), &listed));
+    check("layer_tiles", exact(&fixture.get::<u32>(Buf::LAYER_TILES, listed.len()), &listed));
 }

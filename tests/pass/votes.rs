@@ -1,12 +1,12 @@
 //! Votes for labels: the sums of a sweep against the mirror, whatever the number of columns and walks.
 
-use super::rig::{Rig, VOTE_COLUMNS, prove};
+use super::fixture::{Fixture, VOTE_COLUMNS, prove};
 use crate::reference::Rules;
 use crate::reference::lift::vote;
 use crate::support::compare::{Tolerance, check, close};
 use crate::support::device;
 use crate::support::scenes::{Scene, Shape, scene};
-use labelgs::infer::vote::ballot::{Sweep, Voter, sweep};
+use labelgs::label::vote::ballot::{Sweep, Voter, sweep};
 use labelgs::scene::{LabelMap, Photo};
 use std::collections::BTreeMap;
 
@@ -30,17 +30,17 @@ fn mask_of(s: &Scene) -> LabelMap {
 #[test]
 fn sums_of_weights_by_label() {
     let Some(turn) = device() else { return };
-    let mut rig = Rig::new(turn, patches(141), true);
-    rig.render();
-    let (splats, size, count) = (rig.splats(), rig.size(), rig.scene.gaussians.len());
-    let mask = mask_of(&rig.scene);
-    let photo: Photo = rig.view.photo.clone();
-    let camera = rig.scene.camera.clone();
+    let mut fixture = Fixture::new(turn, patches(141), true);
+    fixture.render();
+    let (splats, size, count) = (fixture.splats(), fixture.size(), fixture.scene.gaussians.len());
+    let mask = mask_of(&fixture.scene);
+    let photo: Photo = fixture.view.photo.clone();
+    let camera = fixture.scene.camera.clone();
     let trust = BTreeMap::from([(3_u16, 0.25_f32), (8, 0.0)]);
     let voter = Voter { camera: &camera, mask: &mask, photo: Some(&photo), trust: Some(&trust) };
     // Three views that are the same: thrice the votes.
-    let how = Sweep { near: rig.config.near, border: 0 };
-    let ballot = sweep(&mut rig.engine, &[voter, voter, voter], how).expect("votes");
+    let how = Sweep { near: fixture.config.near, border: 0 };
+    let ballot = sweep(&mut fixture.engine, &[voter, voter, voter], how).expect("votes");
     assert_eq!(ballot.labels, [0, 2, 3, 5, 7, 8, 11]);
     assert!(ballot.labels.len() > 2 * VOTE_COLUMNS as usize, "the sweep takes several rounds");
     let actual = ballot.weights();
@@ -60,17 +60,17 @@ fn sums_of_weights_by_label() {
 #[test]
 fn pixels_near_a_contour_have_no_say() {
     let Some(turn) = device() else { return };
-    let mut rig = Rig::new(turn, patches(142), true);
-    rig.render();
-    let (splats, size, count) = (rig.splats(), rig.size(), rig.scene.gaussians.len());
-    let mut mask = mask_of(&rig.scene);
+    let mut fixture = Fixture::new(turn, patches(142), true);
+    fixture.render();
+    let (splats, size, count) = (fixture.splats(), fixture.size(), fixture.scene.gaussians.len());
+    let mut mask = mask_of(&fixture.scene);
     // Two halves, so that something is left beside the contour.
     let width = mask.width as usize;
     mask.ids.iter_mut().enumerate().for_each(|(index, id)| *id = if index % width < 20 { 2 } else { 0 });
-    let camera = rig.scene.camera.clone();
+    let camera = fixture.scene.camera.clone();
     let voter = Voter { camera: &camera, mask: &mask, photo: None, trust: None };
-    let how = Sweep { near: rig.config.near, border: 2 };
-    let ballot = sweep(&mut rig.engine, &[voter], how).expect("votes");
+    let how = Sweep { near: fixture.config.near, border: 2 };
+    let ballot = sweep(&mut fixture.engine, &[voter], how).expect("votes");
     let actual = ballot.weights();
     let column = |index: usize| match index % width {
         0..18 => Some(1),

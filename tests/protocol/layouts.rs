@@ -1,7 +1,7 @@
 //! Each benchmark's files, written here, scored with a known result.
 
 use super::{Columns, columns_file, layout, run_on};
-use labelgs::infer::score::protocol::{By, Prompt, Protocol};
+use labelgs::eval::protocol::{By, Prompt, Protocol};
 use tempfile::tempdir;
 
 #[test]

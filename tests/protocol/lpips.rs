@@ -1,8 +1,8 @@
 //! LPIPS with made weights whose answer can be worked out.
 
-use labelgs::infer::score::lpips::convolution::{Layer, Planes, convolve, halve};
-use labelgs::infer::score::lpips::{CHANNELS, STAGES, Weights};
-use labelgs::infer::score::protocol::score::Distance;
+use labelgs::eval::lpips::convolution::{Layer, Planes, convolve, halve};
+use labelgs::eval::lpips::{CHANNELS, STAGES, Weights};
+use labelgs::eval::protocol::score::Distance;
 use std::io::Write;
 use std::path::Path;
 use tempfile::tempdir;

@@ -5,12 +5,12 @@ mod lpips;
 mod refusals;
 mod rules;
 
-use labelgs::infer::score::protocol::bench::Bench;
-use labelgs::infer::score::protocol::paint::Painter;
-use labelgs::infer::score::protocol::report::Report;
-use labelgs::infer::score::protocol::run::run;
-use labelgs::infer::score::protocol::score::Drawn;
-use labelgs::infer::score::protocol::{Ask, By, Layout, Protocol};
+use labelgs::eval::protocol::bench::Bench;
+use labelgs::eval::protocol::paint::Painter;
+use labelgs::eval::protocol::report::Report;
+use labelgs::eval::protocol::run::run;
+use labelgs::eval::protocol::score::Drawn;
+use labelgs::eval::protocol::{Ask, By, Layout, Protocol};
 use labelgs::io::image::write_png_grey8;
 use labelgs::io::label_table::{LabelEntry, LabelTable};
 use labelgs::io::truth::{files_below, read_truth};

@@ -2,7 +2,7 @@
 
 use super::{Columns, columns_file, layout, message, run_on};
 use assert_cmd::Command;
-use labelgs::infer::score::protocol::{By, Protocol};
+use labelgs::eval::protocol::{By, Protocol};
 use labelgs::io::label_table::{LabelEntry, LabelTable};
 use labelgs::io::ply::write_gaussians;
 use labelgs::scene::Gaussians;

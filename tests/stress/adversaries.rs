@@ -3,7 +3,7 @@
 //! Bounds are some five times what lavapipe shows: f32 rounds by 6e-8, exponents of about 5 add their roundings, and a
 //! pixel sums tens of such terms. Where a scene loses more, it says why.
 
-use crate::pass::rig::Rig;
+use crate::pass::fixture::Fixture;
 use crate::reference::model::flatten;
 use crate::reference::step::step;
 use crate::reference::{Group, Rules};
@@ -21,17 +21,17 @@ struct Bound {
 }
 
 /// Decisions nearer than this may fall either way.
-const SURE: f64 = 1e-4;
+const MARGIN: f64 = 1e-4;
 
 /// Runs a step and compares; prints what was seen.
 fn holds(name: &str, scene: Scene, labels: bool, bound: Bound) {
     let Some(turn) = device() else { return };
-    let mut rig = Rig::new(turn, scene, labels);
-    rig.train();
-    let pixels = rig.pixels();
-    let image = rig.get::<[f32; 4]>(labelgs::plan::Buf::IMAGE, pixels);
-    let actual = rig.gradient_rows();
-    let (model, camera, mut target) = (rig.model(), rig.scene.camera.clone(), rig.scene.target.clone());
+    let mut fixture = Fixture::new(turn, scene, labels);
+    fixture.train();
+    let pixels = fixture.pixels();
+    let image = fixture.get::<[f32; 4]>(labelgs::scheduler::plan::Buf::IMAGE, pixels);
+    let actual = fixture.gradient_rows();
+    let (model, camera, mut target) = (fixture.model(), fixture.scene.camera.clone(), fixture.scene.target.clone());
     if !labels {
         target.slots.clear();
     }
@@ -40,12 +40,12 @@ fn holds(name: &str, scene: Scene, labels: bool, bound: Bound) {
     let mut compared = 0;
     for (found, wanted) in image.iter().zip(&expected.layers[0].pixels) {
         assert!(found.iter().all(|v| v.is_finite()), "{name}: a pixel is {found:?}");
-        if wanted.margins.image() > SURE {
+        if wanted.margins.image() > MARGIN {
             compared += 1;
             (0..3).for_each(|c| colour = colour.max((f64::from(found[c]) - wanted.colour[c]).abs()));
         }
     }
-    let mut sure: Vec<usize> = (0..actual.len()).filter(|&i| expected.margins[i] > SURE).collect();
+    let mut sure: Vec<usize> = (0..actual.len()).filter(|&i| expected.margins[i] > MARGIN).collect();
     if sure.len() * 4 < actual.len() {
         // Every splat is at its cut somewhere; then a flip there is part of the bound.
         sure = (0..actual.len()).collect();
@@ -149,13 +149,13 @@ fn rotations_of_length_zero() {
             g.quats[row] = [0.0; 4];
         }
     });
-    let mut rig = Rig::new(turn, made, true);
-    let counters = rig.train().counters;
+    let mut fixture = Fixture::new(turn, made, true);
+    let counters = fixture.train().counters;
     assert_eq!(counters.unprojected_first, 0);
     assert!((1..=10).contains(&counters.unprojected_count), "{counters:?}");
-    assert!(rig.gradient_rows().iter().all(|row| row.floats().iter().all(|value| value.is_finite())));
-    let pixels = rig.pixels();
-    let image = rig.get::<[f32; 4]>(labelgs::plan::Buf::IMAGE, pixels);
+    assert!(fixture.gradient_rows().iter().all(|row| row.floats().iter().all(|value| value.is_finite())));
+    let pixels = fixture.pixels();
+    let image = fixture.get::<[f32; 4]>(labelgs::scheduler::plan::Buf::IMAGE, pixels);
     assert!(image.iter().flatten().all(|value| value.is_finite()));
 }
 
@@ -270,15 +270,15 @@ fn harmonics_that_overflow_floats() {
             g.sh_rest[row * rest..(row + 1) * rest].iter_mut().for_each(|v| *v = [3e38, -3e38, 0.1]);
         }
     });
-    let mut rig = Rig::new(turn, made, true);
-    let counters = rig.train().counters;
+    let mut fixture = Fixture::new(turn, made, true);
+    let counters = fixture.train().counters;
     assert!(counters.unprojected_count > 0 && counters.nonfinite_count > 0, "{counters:?}");
     assert!(counters.unprojected_first.is_multiple_of(8), "{counters:?}");
-    let pixels = rig.pixels();
-    let image = rig.get::<[f32; 4]>(labelgs::plan::Buf::IMAGE, pixels);
+    let pixels = fixture.pixels();
+    let image = fixture.get::<[f32; 4]>(labelgs::scheduler::plan::Buf::IMAGE, pixels);
     assert!(image.iter().flatten().all(|value| value.is_finite()), "a pixel is not finite");
     assert!(image.iter().flatten().any(|value| *value > 1e30), "what is a float is drawn");
-    assert!(rig.gradient_rows().iter().flat_map(|row| row.floats()).all(f64::is_finite));
+    assert!(fixture.gradient_rows().iter().flat_map(|row| row.floats()).all(f64::is_finite));
 }
 
 /// Masks of everything and of nothing, and the smallest and the largest label.

@@ -2,12 +2,12 @@
 
 use crate::support::device;
 use glam::DVec3;
-use labelgs::engine::{Engine, Room};
-use labelgs::infer::render::render;
+use labelgs::engine::{Engine, EngineSize};
 use labelgs::io::init::initial_gaussians;
 use labelgs::io::ply::{read_gaussians, write_gaussians};
+use labelgs::render::render;
 use labelgs::scene::{Dataset, Gaussians, View};
-use labelgs::sched::SchedulerOptions;
+use labelgs::scheduler::SchedulerOptions;
 use labelgs::synth::{Preset, SynthOptions, dataset};
 use labelgs::train::{TrainConfig, Trainer};
 use std::sync::Arc;
@@ -81,7 +81,7 @@ fn pictures_are_the_same_at_any_size_and_place() {
     let picture = |scale: f64, offset: DVec3| -> Vec<[f32; 3]> {
         let dataset = scene(scale, offset);
         let model = initial_gaussians(&dataset, 0, 500).expect("points");
-        let room = Room { gaussians: model.len() as u64, size: (72, 52), trained: false, labels: None };
+        let room = EngineSize { gaussians: model.len() as u64, size: (72, 52), trained: false, labels: None };
         let mut engine = Engine::new(turn.gpu(), room, SchedulerOptions::default()).expect("an engine");
         engine.upload_model(&model).expect("the model");
         let near = (0.2 * scale) as f32;
@@ -123,7 +123,7 @@ fn far_models_are_saved_without_loss() {
         let moved = read.world(row).distance(model.world(row));
         assert!(moved < 1e-6, "Gaussian {row} moved by {moved}");
     }
-    let room = Room { gaussians: read.len() as u64, size: (72, 52), trained: false, labels: None };
+    let room = EngineSize { gaussians: read.len() as u64, size: (72, 52), trained: false, labels: None };
     let mut engine = Engine::new(turn.gpu(), room, SchedulerOptions::default()).expect("an engine");
     engine.upload_model(&read).expect("the model");
     let after = psnr(&mut engine, near, &scene(1.0, UTM).train[0]);

@@ -6,7 +6,7 @@ use super::{Common, device};
 use glam::{DMat3, DVec3};
 use labelgs::engine::Engine;
 use labelgs::scene::{Camera, Dataset, Gaussians, LabelMap, Photo, View};
-use labelgs::sched::SchedulerOptions;
+use labelgs::scheduler::SchedulerOptions;
 use labelgs::train::{TrainConfig, Trainer};
 use labelgs::{Error, Result};
 use rand::rngs::SmallRng;

@@ -4,7 +4,7 @@ use super::trained::{timed_step, timing_config};
 use labelgs::gpu::Gpu;
 use labelgs::pass::Stage;
 use labelgs::scene::{Dataset, Gaussians};
-use labelgs::sched::SchedulerOptions;
+use labelgs::scheduler::SchedulerOptions;
 use labelgs::train::{TrainConfig, Trainer};
 use labelgs::{Error, Result};
 use std::collections::BTreeMap;

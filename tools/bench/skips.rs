@@ -8,13 +8,13 @@ use super::pace::{Pace, race};
 use super::trained::{TEST_EVERY, labelled_model, without_masks};
 use super::{Common, device};
 use labelgs::Result;
-use labelgs::engine::{Engine, Room};
+use labelgs::edit::select::{extract, summarise};
+use labelgs::engine::{Engine, EngineSize};
 use labelgs::gpu::Gpu;
-use labelgs::infer::edit::select::{extract, summarise};
-use labelgs::infer::render::{Rendered, render};
 use labelgs::pass::Stage;
+use labelgs::render::{Rendered, render};
 use labelgs::scene::{Camera, Dataset, Gaussians};
-use labelgs::sched::SchedulerOptions;
+use labelgs::scheduler::SchedulerOptions;
 use labelgs::synth::{self, SynthOptions};
 use labelgs::train::near::NEAR;
 use serde::Serialize;
@@ -118,7 +118,7 @@ fn served_tiles(gpu: &Arc<Gpu>, dataset: &Dataset, model: &Gaussians, views: usi
     let cameras: Vec<&Camera> =
         dataset.test.iter().chain(&dataset.train).map(|view| &view.camera).take(views).collect();
     let size = cameras.first().map_or((1, 1), |camera| (camera.width, camera.height));
-    let room = Room { gaussians: model.len() as u64, size, trained: false, labels: None };
+    let room = EngineSize { gaussians: model.len() as u64, size, trained: false, labels: None };
     let mut engine = Engine::new(Arc::clone(gpu), room, SchedulerOptions::default())?;
     let tile = (engine.shape().tile_width as usize, engine.shape().tile_height as usize);
     let mut pictures = |model: &Gaussians| -> Result<Vec<Rendered>> {

@@ -2,14 +2,14 @@
 
 use super::measure::{Cost, timed};
 use labelgs::Result;
-use labelgs::engine::{Engine, Room};
+use labelgs::edit::select::MIN_LABEL_CONFIDENCE;
+use labelgs::engine::{Engine, EngineSize};
+use labelgs::eval::evaluate::{Rendering, evaluate};
+use labelgs::eval::scores::MeanScores;
 use labelgs::gpu::Gpu;
-use labelgs::infer::edit::select::SURE;
-use labelgs::infer::score::evaluate::{Rendering, evaluate};
-use labelgs::infer::score::scores::MeanScores;
 use labelgs::io::init::{RANDOM_COUNT, initial_gaussians};
 use labelgs::scene::{Dataset, Gaussians, View};
-use labelgs::sched::SchedulerOptions;
+use labelgs::scheduler::SchedulerOptions;
 use labelgs::synth::{self, SynthOptions};
 use labelgs::train::near::NEAR;
 use labelgs::train::{StepReport, TrainConfig, Trainer};
@@ -91,7 +91,7 @@ impl Judge {
     pub fn new(gpu: &Arc<Gpu>, dataset: &Dataset) -> Result<Self> {
         let sizes = dataset.test.iter().map(|view| (view.camera.width, view.camera.height));
         let size = sizes.reduce(|a, b| (a.0.max(b.0), a.1.max(b.1))).unwrap_or((1, 1));
-        let room = Room { gaussians: 1, size, trained: false, labels: None };
+        let room = EngineSize { gaussians: 1, size, trained: false, labels: None };
         Ok(Self { engine: Engine::new(Arc::clone(gpu), room, SchedulerOptions::default())? })
     }
 
@@ -101,7 +101,7 @@ impl Judge {
         let how = Rendering {
             near: if config.near > 0.0 { config.near } else { NEAR },
             background: config.background,
-            min_confidence: SURE,
+            min_confidence: MIN_LABEL_CONFIDENCE,
         };
         Ok(evaluate(&mut self.engine, model, &views, how, &(), &mut ())?.mean)
     }

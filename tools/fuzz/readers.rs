@@ -3,7 +3,7 @@
 use super::seeds;
 use labelgs::Result;
 use labelgs::cli::profile_compare::{Profile, compare};
-use labelgs::infer::score::lpips::weights::read_tensors;
+use labelgs::eval::lpips::weights::read_tensors;
 use labelgs::io::checkpoint::Checkpoint;
 use labelgs::io::depth::DepthFolder;
 use labelgs::io::frames::Frames;

@@ -9,7 +9,7 @@ use super::context::Context;
 use super::eval::EvalArgs;
 use super::train_args::TrainArgs;
 use super::{eval, interrupt, stdout, train};
-use crate::infer::score::scores::MeanScores;
+use crate::eval::scores::MeanScores;
 use crate::{Error, Result};
 use clap::{Args, FromArgMatches};
 use rows::{Masks, Row, rows};

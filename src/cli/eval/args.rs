@@ -1,9 +1,9 @@
 //! What `labelgs eval` can be told.
 
 use crate::cli::args::SceneArgs;
-use crate::cli::labelled::SureArg;
+use crate::cli::labelled::MinConfidenceArg;
 use crate::cli::values::{colour, near};
-use crate::infer::score::protocol::{By, Protocol};
+use crate::eval::protocol::{By, Protocol};
 use clap::Args;
 use std::path::PathBuf;
 
@@ -33,7 +33,7 @@ pub struct EvalArgs {
     pub near: Option<f32>,
     /// Which Gaussians an object rendered alone is made of.
     #[command(flatten)]
-    pub sure: SureArg,
+    pub sure: MinConfidenceArg,
     /// Score by a published benchmark instead: its masks, its way of choosing objects, its averages.
     #[arg(
         long, value_name = "NAME", value_enum, requires = "truth", help_heading = "Benchmarks",

@@ -12,7 +12,7 @@ pub(super) use own::score;
 
 use super::context::Context;
 use super::stdout;
-use crate::infer::score::scores::Scores;
+use crate::eval::scores::Scores;
 use crate::io::atomic;
 use crate::{Error, Result};
 use std::path::Path;

@@ -5,8 +5,8 @@ use super::watch::Watcher;
 use super::{EvalArgs, put_out, warn_of_odd_view};
 use crate::cli::context::{Context, open_model};
 use crate::cli::scene::{near_plane, open_gpu, open_scene, pick_views, render_engine};
-use crate::infer::score::evaluate::{Rendering, Wholes, evaluate, picture_count};
-use crate::infer::score::scores::Scores;
+use crate::eval::evaluate::{AmodalTruth, Rendering, evaluate, picture_count};
+use crate::eval::scores::Scores;
 use crate::io::image::read_rgba;
 use crate::io::mask::read_mask;
 use crate::scene::View;
@@ -59,7 +59,7 @@ impl Folders {
     }
 }
 
-impl Wholes for Folders {
+impl AmodalTruth for Folders {
     fn outline(&self, id: u32, view: &View) -> Result<Option<Vec<bool>>> {
         self.amodal.as_deref().map_or(Ok(None), |folder| read_outline(folder, id, view))
     }

@@ -1,8 +1,8 @@
 //! Scores as text.
 
-use crate::infer::score::protocol::report::{Absent, Report};
-use crate::infer::score::protocol::score::PairScores;
-use crate::infer::score::scores::Scores;
+use crate::eval::protocol::report::{Absent, Report};
+use crate::eval::protocol::score::PairScores;
+use crate::eval::scores::Scores;
 
 fn number(value: Option<f64>, digits: usize) -> String {
     value.map_or("-".to_owned(), |value| format!("{value:.digits$}"))

@@ -3,8 +3,8 @@
 use crate::Result;
 use crate::cli::context::Context;
 use crate::cli::log::Progress;
-use crate::infer::score::compared::{Compared, Watch};
-use crate::infer::score::page::Page;
+use crate::eval::compared::{Compared, Watch};
+use crate::eval::page::Page;
 use std::path::Path;
 
 /// Counts pictures and shows them.

@@ -2,9 +2,9 @@
 
 use super::mask;
 use crate::cli::train_args::TrainArgs;
-use crate::infer::occlusion::{by_mean, distances};
 use crate::io::depth::DepthFolder;
 use crate::io::occlusion_table::OcclusionTable;
+use crate::label::occlusion::{by_mean, distances};
 use crate::scene::{Dataset, DepthKind, Occluders, View};
 use crate::{Error, Result};
 use rayon::prelude::*;

@@ -6,17 +6,17 @@ use crate::measure::require;
 use crate::trained::{labelled_model, timing_config, trainer, without_masks};
 use labelgs::Result;
 use labelgs::gpu::Gpu;
-use labelgs::plan::Buf;
-use labelgs::reference::Rules;
-use labelgs::reference::blend::{Trace, smallest_over_pixels, trace};
-use labelgs::reference::project::Splat;
-use labelgs::selftest::rig::splat_of;
+use labelgs::scheduler::plan::Buf;
 use labelgs::synth::{self, Preset, SynthOptions};
+use labelgs::verify::reference::Rules;
+use labelgs::verify::reference::blend::{Trace, smallest_over_pixels, trace};
+use labelgs::verify::reference::project::Splat;
+use labelgs::verify::selftest::fixture::splat_of;
 use std::sync::Arc;
 
 /// Pixels with a decision nearer than this to its threshold are left out, and gradients of splats in them: both sides
 /// decide from the same f32 records, so only the rounding of exponents and transmittances stands between them.
-const SURE: f64 = 1e-5;
+const MARGIN: f64 = 1e-5;
 /// Largest error of a feature: sums of some hundred f32 terms of at most 1; exponents are f32 too.
 const FORWARD: f64 = 1e-4;
 /// The same of a gradient, in units of the sum of its terms' sizes.
@@ -75,7 +75,7 @@ fn compare(bed: &mut Bed, visible: usize, (width, height): (u32, u32)) -> Result
             // The target is a fraction: f32 may round it across a whole number.
             let error = (rendered - blended).abs();
             let error = error.min((error - 1.0).abs());
-            worst = worst.max(if margins[p] > SURE { error } else { 0.0 });
+            worst = worst.max(if margins[p] > MARGIN { error } else { 0.0 });
             by_picture += gradient * blended;
             for c in &ray.contributions {
                 let sum = &mut expected[c.splat * lanes + lane];
@@ -85,13 +85,13 @@ fn compare(bed: &mut Bed, visible: usize, (width, height): (u32, u32)) -> Result
     }
     require(worst < FORWARD, || format!("a feature is off by {worst:.2e}"))?;
     let sure = smallest_over_pixels(&rules, &splats, (width, height), &margins);
-    require(sure.iter().filter(|&&margin| margin > SURE).count() * 2 > visible, || "few splats are sure".to_owned())?;
+    require(sure.iter().filter(|&&margin| margin > MARGIN).count() * 2 > visible, || "few splats are sure".to_owned())?;
     for splat in 0..visible {
         for lane in 0..lanes {
             let found = f64::from(v_features[splat * floats + first + lane]);
             let (sum, size) = expected[splat * lanes + lane];
             by_features += found * value(splat, lane);
-            require(sure[splat] <= SURE || (found - sum).abs() <= BACKWARD * size + 1e-6, || {
+            require(sure[splat] <= MARGIN || (found - sum).abs() <= BACKWARD * size + 1e-6, || {
                 format!("the gradient of splat {splat}, channel {}, is {found}, not {sum}", first + lane)
             })?;
         }

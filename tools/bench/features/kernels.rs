@@ -2,7 +2,9 @@
 
 use crate::compiler::spirv;
 use labelgs::pass::{KernelShape, Variant, training_step};
-use labelgs::plan::{Buf, BufferDecl, Capacity, Class, Domain, Grid, PassDecl, PassList, TABLE, TexelFormat, Work};
+use labelgs::scheduler::plan::{
+    Buf, BufferDecl, Capacity, Class, Domain, Grid, PassDecl, PassList, TABLE, TexelFormat, Work,
+};
 use labelgs::shaders::{Access, BindingDesc, BindingKind, ShaderDesc, SpecDesc, constants};
 use labelgs::{Error, Result};
 
@@ -147,8 +149,8 @@ impl Buffers {
         let (stride, vecs) = (u64::from(channels.stride()), u64::from(channels.vecs));
         let features = row("features", capacity.gaussians * stride, Class::Model)?;
         let v_image = row("v_features_image", capacity.pixels * vecs, Class::Step)?;
-        let v_instances = row("v_feature_instances", capacity.instances * vecs, Class::Kept)?;
-        let v_features = row("v_features", capacity.gaussians * stride, Class::Kept)?;
+        let v_instances = row("v_feature_instances", capacity.instances * vecs, Class::Persistent)?;
+        let v_features = row("v_features", capacity.gaussians * stride, Class::Persistent)?;
         Ok(Self { table: Box::leak(table.into_boxed_slice()), features, v_image, v_instances, v_features })
     }
 }

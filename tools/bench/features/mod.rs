@@ -14,12 +14,12 @@ use super::{Common, device};
 use glam::DVec3;
 use kernels::{Buffers, Channels, Kernels, step_with_features};
 use labelgs::Result;
-use labelgs::engine::{Room, capacity, model, uniforms::view_uniforms};
+use labelgs::engine::{EngineSize, capacity, model, uniforms::view_uniforms};
 use labelgs::gpu::Gpu;
 use labelgs::pass::{KernelShape, Variant, training_step};
-use labelgs::plan::{Buf, Capacity, PlanOptions};
 use labelgs::scene::{Dataset, Gaussians, View};
-use labelgs::sched::{ListId, Scheduler, SchedulerOptions};
+use labelgs::scheduler::plan::{Buf, Capacity, PlanOptions};
+use labelgs::scheduler::{ListId, Scheduler, SchedulerOptions};
 use labelgs::shaders::structs::{Counters, StepUniforms};
 use labelgs::synth::{self, Preset, SynthOptions};
 use serde::Serialize;
@@ -123,7 +123,7 @@ fn labelled_row(
     }
     // As many rows as there are Gaussians, or 512 channels would not fit where they do.
     let grown = *plain.engine_mut().sched().capacity();
-    let room = Room { gaussians: model.len() as u64, ..*plain.engine_mut().room() };
+    let room = EngineSize { gaussians: model.len() as u64, ..*plain.engine_mut().room() };
     let exact = capacity(plain.engine_mut().shape(), &room);
     let capacity = Capacity { instances: grown.instances, trained_instances: grown.trained_instances, ..exact };
     Ok((row("labels (LabelGS, this engine)", &costs[1], &costs[0]), capacity))

@@ -7,12 +7,12 @@ use crate::measure::cpu_time;
 use labelgs::engine::ListKey;
 use labelgs::gpu::Gpu;
 use labelgs::pass::{self, KernelShape, Stage, Variant};
-use labelgs::plan::{Buf, PassList, PlanOptions};
-use labelgs::sched::{ListId, SchedulerOptions};
-use labelgs::selftest::rig::Rig;
-use labelgs::selftest::scenes::Scene;
+use labelgs::scheduler::plan::{Buf, PassList, PlanOptions};
+use labelgs::scheduler::{ListId, SchedulerOptions};
 use labelgs::shaders::structs::Counters;
-use labelgs::train::job;
+use labelgs::train::step_input;
+use labelgs::verify::selftest::fixture::Fixture;
+use labelgs::verify::selftest::scenes::Scene;
 use labelgs::{Error, Result};
 use std::sync::Arc;
 use std::time::Duration;
@@ -37,7 +37,7 @@ impl Sample {
 
 /// A scene, an engine, and a list for each mode; after them the default with the optimiser, which trains nothing.
 pub struct Bed<'a> {
-    rig: Rig,
+    fixture: Fixture,
     modes: &'a [(Mode, Replacements)],
     lists: Vec<ListId>,
     stages: Vec<Vec<(Stage, String)>>,
@@ -50,11 +50,11 @@ impl<'a> Bed<'a> {
         // With a barrier before each item, times belong to their items; without aliasing, all can be read back.
         let plan = PlanOptions { alias: false, guards: false, barrier_everywhere: true };
         let options = SchedulerOptions { plan, timestamps: true, ..SchedulerOptions::default() };
-        let mut rig = Rig::new(Arc::clone(gpu), scene, false, shape, options)?;
-        let config = &mut rig.config;
+        let mut fixture = Fixture::new(Arc::clone(gpu), scene, false, shape, options)?;
+        let config = &mut fixture.config;
         (config.position_lr_init, config.position_lr_final) = (f64::MIN_POSITIVE, f64::MIN_POSITIVE);
         (config.feature_lr, config.opacity_lr, config.scaling_lr, config.rotation_lr) = (0.0, 0.0, 0.0, 0.0);
-        Ok(Self { rig, modes, lists: Vec::new(), stages: Vec::new() })
+        Ok(Self { fixture, modes, lists: Vec::new(), stages: Vec::new() })
     }
 
     /// Number of the list with the optimiser; those before it are the modes.
@@ -64,25 +64,25 @@ impl<'a> Bed<'a> {
 
     /// Pixels of a tile.
     pub fn tile_pixels(&self) -> u32 {
-        self.rig.engine.shape().tile_pixels()
+        self.fixture.engine.shape().tile_pixels()
     }
 
     fn variant(&self, update: bool) -> Variant {
-        let size = (self.rig.scene.camera.width, self.rig.scene.camera.height);
-        Variant { labels: false, lift: false, sh_degree: self.rig.config.sh_degree, size, update, counts: false }
+        let size = (self.fixture.scene.camera.width, self.fixture.scene.camera.height);
+        Variant { labels: false, lift: false, sh_degree: self.fixture.config.sh_degree, size, update, counts: false }
     }
 
     fn default_list(&self, update: bool) -> PassList {
-        pass::training_step(self.rig.engine.shape(), self.rig.engine.sched().capacity(), self.variant(update))
+        pass::training_step(self.fixture.engine.shape(), self.fixture.engine.sched().capacity(), self.variant(update))
     }
 
     fn prepare(&mut self) -> Result<()> {
-        let (default, digit_bits) = (self.default_list(false), self.rig.engine.shape().digit_bits);
+        let (default, digit_bits) = (self.default_list(false), self.fixture.engine.shape().digit_bits);
         let lists = self.modes.iter().map(|(mode, shaders)| mode.list(&default, shaders, digit_bits));
         let mut lists = lists.collect::<Result<Vec<_>>>()?;
         lists.push(self.default_list(true));
         self.stages = lists.iter().map(pass::stage::stages).collect();
-        self.lists = self.rig.engine.sched_mut().prepare_all(&lists.iter().collect::<Vec<_>>())?;
+        self.lists = self.fixture.engine.sched_mut().prepare_all(&lists.iter().collect::<Vec<_>>())?;
         Ok(())
     }
 
@@ -92,20 +92,20 @@ impl<'a> Bed<'a> {
             if self.lists.is_empty() {
                 self.prepare()?;
             }
-            let rig = &mut self.rig;
+            let fixture = &mut self.fixture;
             // Gradient records of other modes must not count as those of this run.
-            rig.job.stamp += 1;
-            let uniforms = rig.uniforms();
-            job::upload(&mut rig.engine, 0, uniforms, &rig.view, &rig.job, &rig.config)?;
+            fixture.input.stamp += 1;
+            let uniforms = fixture.uniforms();
+            step_input::upload(&mut fixture.engine, 0, uniforms, &fixture.view, &fixture.input, &fixture.config)?;
             let before = cpu_time();
-            rig.engine.sched_mut().run(self.lists[list], 0)?;
+            fixture.engine.sched_mut().run(self.lists[list], 0)?;
             let cpu = cpu_time().saturating_sub(before);
-            let report = rig.engine.report(0)?;
-            if rig.engine.recover(&report)? {
+            let report = fixture.engine.report(0)?;
+            if fixture.engine.recover(&report)? {
                 self.lists.clear();
                 continue;
             }
-            let times = rig.engine.sched().timings(self.lists[list], 0)?;
+            let times = fixture.engine.sched().timings(self.lists[list], 0)?;
             if times.is_empty() {
                 return Err(Error::NoDevice("this device has no timestamps on its compute queue".to_owned()));
             }
@@ -117,21 +117,21 @@ impl<'a> Bed<'a> {
 
     /// Picture and gradients of the last run.
     pub fn outcome(&mut self) -> Result<Outcome> {
-        let pixels = self.rig.pixels();
-        let image = self.rig.get::<[f32; 4]>(Buf::IMAGE, pixels)?;
+        let pixels = self.fixture.pixels();
+        let image = self.fixture.get::<[f32; 4]>(Buf::IMAGE, pixels)?;
         let colours = image.iter().map(|&[r, g, b, _]| [r, g, b].map(f64::from)).collect();
-        Ok(Outcome { colours, rows: self.rig.gradient_rows()? })
+        Ok(Outcome { colours, rows: self.fixture.gradient_rows()? })
     }
 
     /// The engine's own list gives the picture of the default mode, to the bit.
     pub fn check_default(&mut self, outcome: &Outcome) -> Result<()> {
         let key = ListKey::Train(self.variant(false));
-        self.rig.job.stamp += 1;
-        let rig = &mut self.rig;
-        let list = rig.engine.list(key)?;
-        let uniforms = rig.uniforms();
-        job::upload(&mut rig.engine, 0, uniforms, &rig.view, &rig.job, &rig.config)?;
-        rig.engine.sched_mut().run(list, 0)?;
+        self.fixture.input.stamp += 1;
+        let fixture = &mut self.fixture;
+        let list = fixture.engine.list(key)?;
+        let uniforms = fixture.uniforms();
+        step_input::upload(&mut fixture.engine, 0, uniforms, &fixture.view, &fixture.input, &fixture.config)?;
+        fixture.engine.sched_mut().run(list, 0)?;
         let own = self.outcome()?;
         if own.colours == outcome.colours && own.rows == outcome.rows {
             return Ok(());

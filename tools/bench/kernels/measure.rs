@@ -10,8 +10,8 @@ use super::scenes::{self, Kind, Plan};
 use crate::measure::{Spread, spread};
 use labelgs::gpu::Gpu;
 use labelgs::pass::Stage;
-use labelgs::reference::Rules;
 use labelgs::shaders::structs::Counters;
+use labelgs::verify::reference::Rules;
 use labelgs::{Error, Result};
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -20,7 +20,7 @@ use std::sync::Arc;
 /// Stages that no mode touches.
 const UNTOUCHED: [Stage; 4] = [Stage::Loss, Stage::Optimise, Stage::Labels, Stage::Report];
 /// Decisions nearer than this to their threshold may go the other way in f32 (tests/pass/step.rs).
-const SURE: f64 = 2e-5;
+const MARGIN: f64 = 2e-5;
 
 /// A mode on a scene.
 #[derive(Clone, Debug, Serialize)]
@@ -103,7 +103,7 @@ pub fn scene(gpu: &Arc<Gpu>, plan: &Plan, modes: &[(Mode, Replacements)]) -> Res
             let outcome = bed.outcome()?;
             *errors = Some((compare(&outcome, by_rules, 0.0), compare(&outcome, by_open, 0.0)));
             if list == 0 {
-                rounding = Some(compare(&outcome, by_rules, SURE));
+                rounding = Some(compare(&outcome, by_rules, MARGIN));
                 bed.check_default(&outcome)?;
             }
         }

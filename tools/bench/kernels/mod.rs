@@ -19,7 +19,7 @@ mod report;
 mod scenes;
 
 use super::Common;
-use labelgs::engine::{Room, capacity};
+use labelgs::engine::{EngineSize, capacity};
 use labelgs::gpu::Gpu;
 use labelgs::io::atomic;
 use labelgs::pass::{self, KernelShape, Variant};
@@ -110,7 +110,7 @@ pub fn run(args: &KernelArgs) -> Result<()> {
 /// The modes with their shaders for the device.
 fn compile(gpu: &Gpu, args: &KernelArgs) -> Result<Vec<(Mode, Replacements)>> {
     let shape = KernelShape::of(gpu.capabilities());
-    let room = Room { gaussians: 1, size: (64, 64), trained: true, labels: None };
+    let room = EngineSize { gaussians: 1, size: (64, 64), trained: true, labels: None };
     let variant = Variant { labels: false, lift: false, sh_degree: 3, size: room.size, update: false, counts: false };
     let list = pass::training_step(&shape, &capacity(&shape, &room), variant);
     let wanted = |number: usize| number == 0 || args.modes.is_empty() || args.modes.contains(&number);

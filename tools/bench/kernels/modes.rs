@@ -2,7 +2,7 @@
 
 use super::backward::{FROM_THE_FRONT, REPLAYED, RESTARTED};
 use super::patch::{self, Patch, Replacements};
-use labelgs::plan::{Buf, PassList, Work};
+use labelgs::scheduler::plan::{Buf, PassList, Work};
 use labelgs::{Error, Result};
 
 /// What a mode trades.

@@ -2,7 +2,7 @@
 //! passes of a list get the new module in place of the old one.
 
 use crate::shader_compiler::{Define, GlslCompiler, Purpose};
-use labelgs::plan::{PassList, Work};
+use labelgs::scheduler::plan::{PassList, Work};
 use labelgs::shaders::ShaderDesc;
 use labelgs::{Error, Result};
 use std::collections::HashMap;

@@ -3,8 +3,8 @@
 use crate::compiler::spirv;
 use labelgs::Result;
 use labelgs::gpu::Gpu;
-use labelgs::plan::{Buf, BufferDecl, Capacity, Class, Domain, Grid, PassDecl, PassList, TexelFormat};
-use labelgs::sched::{Scheduler, SchedulerOptions};
+use labelgs::scheduler::plan::{Buf, BufferDecl, Capacity, Class, Domain, Grid, PassDecl, PassList, TexelFormat};
+use labelgs::scheduler::{Scheduler, SchedulerOptions};
 use labelgs::shaders::{Access, BindingDesc, BindingKind, ShaderDesc, SpecDesc};
 use serde::Serialize;
 use std::sync::Arc;
@@ -48,7 +48,7 @@ pub fn measure(gpu: &Arc<Gpu>, texel: bool, small: bool) -> Result<Ceilings> {
         name,
         element_bytes: 16,
         domain: Domain::Fixed(elements),
-        class: Class::Kept,
+        class: Class::Persistent,
         texel: Some(TexelFormat::Rgba32Sfloat),
         doc: "A benchmark's.",
     };

@@ -1,0 +1,139 @@
+//! Scores of a model on posed photos: renders every view, then every object alone.
+
+use super::compared::{Compared, Watch};
+use super::metrics::COVERED;
+use super::scores::{ObjectRender, ObjectTruth, Scores, ViewScores};
+use crate::edit::select::extract;
+use crate::engine::Engine;
+use crate::error::{Error, Result};
+use crate::label::occlusion::{Rule, by_contour};
+use crate::render::{Rendered, render};
+use crate::scene::{Gaussians, LabelMap, View};
+use std::collections::BTreeMap;
+
+/// How views are rendered for scoring.
+#[derive(Clone, Copy, Debug)]
+pub struct Rendering {
+    /// Near plane, world units.
+    pub near: f32,
+    /// Colour behind the scene; objects are rendered on black.
+    pub background: [f32; 3],
+    /// Least confidence of an object's Gaussians where it is rendered alone.
+    pub min_confidence: f32,
+}
+
+/// What a scene knows about objects beyond what is visible of them.
+pub trait AmodalTruth {
+    /// Whole outline of an object in a view, at the view's size.
+    fn outline(&self, _id: u32, _view: &View) -> Result<Option<Vec<bool>>> {
+        Ok(None)
+    }
+
+    /// Colour and opacity of an object in a view without anything before it, at the view's size.
+    fn alone(&self, _id: u32, _view: &View) -> Result<Option<Vec<[u8; 4]>>> {
+        Ok(None)
+    }
+}
+
+/// Nothing is known.
+impl AmodalTruth for () {}
+
+/// Scores `model` on `views`, which come with photos; objects where the views have masks. The engine's model is
+/// replaced; `watch` sees each picture.
+pub fn evaluate(
+    engine: &mut Engine,
+    model: &Gaussians,
+    views: &[&View],
+    how: Rendering,
+    wholes: &dyn AmodalTruth,
+    watch: &mut dyn Watch,
+) -> Result<Scores> {
+    engine.upload_model(model)?;
+    let labels = model.labels.as_deref();
+    let mut scores = Vec::new();
+    let mut hidden = Vec::new();
+    for view in views {
+        let rendered = render(engine, &view.camera, how.near, how.background, model.sh_degree)?;
+        let map = labels.map(|labels| rendered.label_map(labels));
+        let score = ViewScores::new(&rendered.rgb, photo(view)?, map.as_ref(), view.mask.as_ref())?;
+        let numbers = vec![("PSNR", Some(score.psnr)), ("SSIM", Some(score.ssim))];
+        watch.see(&Compared { numbers, ..Compared::new(&view.name, photo(view)?, &rendered.rgb) })?;
+        scores.push(score);
+        hidden.push(hidden_by(view.mask.as_ref(), &rendered));
+    }
+    for id in objects(views) {
+        let there = labels.filter(|labels| labels.contains(&id));
+        let part = there.map(|_| extract(model, &[id], how.min_confidence)).transpose()?.filter(|p| !p.is_empty());
+        if let Some(part) = &part {
+            engine.upload_model(part)?;
+        }
+        for (index, view) in views.iter().enumerate() {
+            let rendered = match &part {
+                Some(_) => Some(render(engine, &view.camera, how.near, [0.0; 3], model.sh_degree)?),
+                None => None,
+            };
+            let alone = rendered.as_ref().map(|r| ObjectRender { colour: &r.rgb, alpha: &r.alpha });
+            let (whole, picture) = (wholes.outline(id, view)?, wholes.alone(id, view)?);
+            let unknown = pixels_of(view.mask.as_ref(), hidden[index].get(&(id as u16)));
+            let truth = ObjectTruth {
+                photo: photo(view)?,
+                mask: view.mask.as_ref(),
+                whole: whole.as_deref(),
+                hidden: unknown.as_deref(),
+                alone: picture.as_deref(),
+            };
+            scores[index].add_object(id, alone, truth)?;
+            show(watch, id, view, alone, truth, &scores[index])?;
+        }
+    }
+    Ok(Scores::new(views.iter().map(|view| view.name.clone()).zip(scores).collect()))
+}
+
+/// Shows an object of a view to `watch`, if it has a truth there.
+fn show(
+    watch: &mut dyn Watch,
+    id: u32,
+    view: &View,
+    render: Option<ObjectRender>,
+    truth: ObjectTruth,
+    scores: &ViewScores,
+) -> Result<()> {
+    let (Some(outline), Some(row)) = (truth.outline(id), scores.objects.get(&id)) else { return watch.skip() };
+    let pixels = outline.len();
+    let black = vec![[0.0; 3]; pixels];
+    let (rgb, found) = match render {
+        Some(render) => (render.colour, render.alpha.iter().map(|&alpha| alpha > COVERED).collect()),
+        None => (&black[..], vec![false; pixels]),
+    };
+    watch.see(&Compared {
+        object: Some(id.to_string()),
+        masks: Some((&found, &outline)),
+        numbers: vec![("IoU", row.iou_object), ("boundary IoU", row.boundary_iou), ("PSNR", row.object_psnr)],
+        ..Compared::new(&view.name, truth.photo, rgb)
+    })
+}
+
+/// Pictures that [`evaluate`] renders.
+pub fn picture_count(views: &[&View]) -> u64 {
+    (views.len() * (1 + objects(views).len())) as u64
+}
+
+/// Objects of the views' masks, sorted.
+fn objects(views: &[&View]) -> Vec<u32> {
+    let ids = views.iter().filter_map(|view| view.mask.as_ref()).flat_map(LabelMap::objects).map(u32::from);
+    ids.collect::<std::collections::BTreeSet<u32>>().into_iter().collect()
+}
+
+fn photo(view: &View) -> Result<&crate::scene::Photo> {
+    view.photo.as_ref().ok_or_else(|| Error::Bug(format!("{} came without its photo", view.name)))
+}
+
+fn hidden_by(mask: Option<&LabelMap>, rendered: &Rendered) -> BTreeMap<u16, Vec<u16>> {
+    mask.map(|mask| by_contour(mask, &rendered.mean_depth(), Rule::default())).unwrap_or_default()
+}
+
+/// True where the mask shows one of `ids`.
+fn pixels_of(mask: Option<&LabelMap>, ids: Option<&Vec<u16>>) -> Option<Vec<bool>> {
+    let (mask, ids) = (mask?, ids?);
+    Some(mask.ids.iter().map(|id| ids.contains(id)).collect())
+}

@@ -1,0 +1,68 @@
+//! LPIPS v0.1 with VGG16 (Zhang et al. 2018) on the processor.
+//!
+//! Both pictures go through the 13 convolutions of VGG16. After the last one of each of its five stages the features of
+//! a pixel are scaled to length 1; the squared difference of each channel is weighted, summed over channels, averaged
+//! over pixels, and summed over stages.
+
+pub mod convolution;
+pub mod weights;
+
+use crate::error::{Error, Result};
+use crate::eval::protocol::score::Distance;
+use convolution::{Planes, convolve, halve};
+pub use weights::Weights;
+
+/// Convolutions of each stage: their numbers in torchvision's `features`. A stage after the first starts with a pooling.
+pub const STAGES: [&[usize]; 5] = [&[0, 2], &[5, 7], &[10, 12, 14], &[17, 19, 21], &[24, 26, 28]];
+/// Output channels of each stage.
+pub const CHANNELS: [usize; 5] = [64, 128, 256, 512, 512];
+/// Smallest side that four poolings leave a pixel of, px.
+const SIDE_MIN: usize = 16;
+/// Mean and deviation of each input channel, for values from -1 to 1.
+const SHIFT: [f32; 3] = [-0.030, -0.088, -0.188];
+const SCALE: [f32; 3] = [0.458, 0.448, 0.450];
+/// Added to the length of a feature vector.
+const EPSILON: f32 = 1e-10;
+
+impl Distance for Weights {
+    fn distance(&self, a: &[[f32; 3]], b: &[[f32; 3]], width: usize, height: usize) -> Result<f64> {
+        if width < SIDE_MIN || height < SIDE_MIN {
+            let problem = format!("needs pictures of {SIDE_MIN} x {SIDE_MIN} px or more, one has {width} x {height}");
+            return Err(Error::usage("--lpips", problem));
+        }
+        let (mut a, mut b) = (input(a, width, height), input(b, width, height));
+        let mut total = 0.0;
+        for stage in 0..STAGES.len() {
+            if stage > 0 {
+                (a, b) = (halve(&a), halve(&b));
+            }
+            for &number in STAGES[stage] {
+                let layer = self.layer(number)?;
+                (a, b) = (convolve(&a, layer), convolve(&b, layer));
+            }
+            total += difference(&a, &b, self.linear(stage));
+        }
+        Ok(total)
+    }
+}
+
+/// Colours from 0 to 1 as VGG16 takes them.
+fn input(colours: &[[f32; 3]], width: usize, height: usize) -> Planes {
+    let channel = |c: usize| colours.iter().map(move |colour| (2.0 * colour[c] - 1.0 - SHIFT[c]) / SCALE[c]);
+    Planes { channels: 3, width, height, values: (0..3).flat_map(channel).collect() }
+}
+
+/// Mean over pixels of the weighted squared difference of the features, each pixel's scaled to length 1.
+fn difference(a: &Planes, b: &Planes, weights: &[f32]) -> f64 {
+    let area = a.width * a.height;
+    let at = |planes: &Planes, channel: usize, pixel: usize| planes.values[channel * area + pixel];
+    let length = |planes: &Planes, pixel: usize| {
+        (0..planes.channels).map(|channel| at(planes, channel, pixel).powi(2)).sum::<f32>().sqrt() + EPSILON
+    };
+    let one = |pixel: usize| {
+        let (long_a, long_b) = (length(a, pixel), length(b, pixel));
+        let square = |channel: usize| (at(a, channel, pixel) / long_a - at(b, channel, pixel) / long_b).powi(2);
+        (0..a.channels).map(|channel| f64::from(weights[channel] * square(channel))).sum::<f64>()
+    };
+    (0..area).map(one).sum::<f64>() / area as f64
+}

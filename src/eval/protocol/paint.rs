@@ -1,0 +1,68 @@
+//! Who renders for a benchmark.
+
+use super::score::Drawn;
+use crate::edit::select::extract;
+use crate::engine::Engine;
+use crate::error::Result;
+use crate::render::render;
+use crate::scene::{Camera, Gaussians, LabelMap};
+
+/// Renders a model with labels.
+pub trait Painter {
+    /// The label of each pixel of the whole scene.
+    fn label_map(&mut self, camera: &Camera) -> Result<LabelMap>;
+    /// Some labels, or with `None` the whole scene, on black.
+    fn draw(&mut self, labels: Option<&[u32]>, camera: &Camera) -> Result<Drawn>;
+}
+
+/// A [`Painter`] on a device.
+pub struct EnginePainter<'a> {
+    engine: &'a mut Engine,
+    model: &'a Gaussians,
+    near: f32,
+    min_confidence: f32,
+    /// The labels on the device; the whole model is `Some(None)`.
+    there: Option<Option<Vec<u32>>>,
+}
+
+impl<'a> EnginePainter<'a> {
+    /// `near` is the near plane, world units; an object's Gaussians of less confidence are left out where it is drawn
+    /// alone.
+    pub fn new(engine: &'a mut Engine, model: &'a Gaussians, near: f32, min_confidence: f32) -> Self {
+        Self { engine, model, near, min_confidence, there: None }
+    }
+
+    fn upload(&mut self, labels: Option<&[u32]>) -> Result<()> {
+        let wanted = labels.map(<[u32]>::to_vec);
+        if self.there.as_ref() != Some(&wanted) {
+            match labels {
+                Some(labels) => self.engine.upload_model(&extract(self.model, labels, self.min_confidence)?)?,
+                None => self.engine.upload_model(self.model)?,
+            }
+            self.there = Some(wanted);
+        }
+        Ok(())
+    }
+}
+
+impl Painter for EnginePainter<'_> {
+    fn label_map(&mut self, camera: &Camera) -> Result<LabelMap> {
+        self.upload(None)?;
+        let rendered = render(self.engine, camera, self.near, [0.0; 3], self.model.sh_degree)?;
+        let unlabelled;
+        let labels = match &self.model.labels {
+            Some(labels) => labels,
+            None => {
+                unlabelled = vec![0; self.model.len()];
+                &unlabelled
+            }
+        };
+        Ok(rendered.label_map(labels))
+    }
+
+    fn draw(&mut self, labels: Option<&[u32]>, camera: &Camera) -> Result<Drawn> {
+        self.upload(labels)?;
+        let rendered = render(self.engine, camera, self.near, [0.0; 3], self.model.sh_degree)?;
+        Ok(Drawn { rgb: rendered.rgb, alpha: rendered.alpha })
+    }
+}

@@ -1,0 +1,92 @@
+//! Which labels an object of a benchmark has in the model.
+
+use super::bench::Bench;
+use super::paint::Painter;
+use super::{Prompt, Task};
+use crate::edit::choose::{candidates, choose_labels};
+use crate::error::Result;
+use crate::io::truth::TruthMask;
+use crate::scene::{LabelMap, View};
+use std::path::Path;
+
+/// What the prompt of an object came to.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) enum Choice {
+    /// These labels, at least one.
+    Labels(Vec<u32>),
+    /// The prompt was followed and selects nothing; why.
+    Empty(String),
+    /// The prompt cannot be followed; why.
+    Missing(String),
+}
+
+/// Share of the strokes on an object that a label needs, so that a stroke that slips does not choose a neighbour.
+const STROKES: f64 = 0.05;
+
+pub(super) fn choose(task: &Task, bench: &Bench, painter: &mut dyn Painter) -> Result<Choice> {
+    match &task.prompt {
+        Prompt::Name => Ok(by_name(&task.object, bench)),
+        Prompt::Mask(prompt) => {
+            let Some(view) = bench.view(&prompt.frame) else { return Ok(no_view(&prompt.frame)) };
+            let mask = (bench.truth)(&prompt.file, view)?;
+            let map = painter.label_map(&view.camera.resized(mask.width, mask.height))?;
+            let labels = choose_labels(&map, &mask.inside);
+            Ok(if labels.is_empty() { Choice::Empty(why_empty(&map, &mask)) } else { Choice::Labels(labels) })
+        }
+        Prompt::Scribbles { frame, on, off } => {
+            let Some(view) = bench.view(frame) else { return Ok(no_view(frame)) };
+            let strokes = |files: &[std::path::PathBuf]| -> Result<Vec<TruthMask>> {
+                files.iter().map(|file| (bench.truth)(Path::new(file), view)).collect()
+            };
+            under_strokes(&strokes(on)?, &strokes(off)?, view, painter)
+        }
+    }
+}
+
+fn no_view(frame: &str) -> Choice {
+    Choice::Missing(format!("the scene has no view {frame}, which holds the prompt"))
+}
+
+/// A name in the table, or an id.
+fn by_name(object: &str, bench: &Bench) -> Choice {
+    let named = bench.names.and_then(|names| names.by_name(object));
+    let Some(id) = named.or_else(|| object.parse().ok()) else {
+        return Choice::Missing(format!("labels.json has no label called {object}"));
+    };
+    if bench.labels.contains(&id) {
+        Choice::Labels(vec![id])
+    } else {
+        Choice::Empty(format!("label {id} has no Gaussian"))
+    }
+}
+
+fn why_empty(map: &LabelMap, mask: &TruthMask) -> String {
+    let near = candidates(map, &mask.inside);
+    match near.first() {
+        None => "the prompt's mask covers no label".into(),
+        Some(best) => format!(
+            "no label has more than half of its pixels in the prompt's mask; label {} has {} of {}",
+            best.label, best.inside, best.pixels
+        ),
+    }
+}
+
+/// Labels with more pixels under the strokes on the object than under the others, and a share of the former.
+fn under_strokes(on: &[TruthMask], off: &[TruthMask], view: &View, painter: &mut dyn Painter) -> Result<Choice> {
+    let mut counts = std::collections::BTreeMap::<u32, (u64, u64)>::new();
+    for (stroke, wanted) in on.iter().map(|mask| (mask, true)).chain(off.iter().map(|mask| (mask, false))) {
+        let map = painter.label_map(&view.camera.resized(stroke.width, stroke.height))?;
+        for candidate in candidates(&map, &stroke.inside) {
+            let (yes, no) = counts.entry(candidate.label).or_default();
+            *(if wanted { yes } else { no }) += candidate.inside;
+        }
+    }
+    let all: u64 = counts.values().map(|&(yes, _)| yes).sum();
+    let enough = |&(yes, no): &(u64, u64)| yes > no && yes as f64 >= STROKES * all as f64;
+    let labels: Vec<u32> = counts.iter().filter(|(_, count)| enough(count)).map(|(&label, _)| label).collect();
+    Ok(if labels.is_empty() {
+        Choice::Empty("no label has more pixels under the strokes on the object than under the others".into())
+    } else {
+        Choice::Labels(labels)
+    })
+}

@@ -1,0 +1,165 @@
+//! Which masks of different views show the same object, by the Gaussians that they own.
+//!
+//! Per-image segmentation numbers its masks anew in every photo, and trackers lose and swap numbers. A trained scene
+//! knows better: two masks show one object if the Gaussians that make their pixels are the same (Gaga's idea of a memory
+//! of Gaussians, here with an exact count instead of the front-most layer).
+
+use crate::label::vote::ballot::{Ballot, weight};
+use std::cmp::Ordering;
+use std::collections::{BTreeMap, BTreeSet, BinaryHeap};
+
+/// Weight in a view above which a Gaussian counts as seen there, px.
+const SEEN: f64 = 0.25;
+/// Share of it that must lie in one mask for the mask to own it.
+const OWNED: f64 = 0.5;
+/// Overlap of two groups of masks above which they are one object.
+pub const SAME_OBJECT: f64 = 0.25;
+
+/// Which mask of a view owns each Gaussian.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Owners {
+    /// Ids of the view's masks, sorted; 0 among them stands for what has none.
+    pub ids: Vec<u16>,
+    /// For each Gaussian the place of its owner in `ids`, and its weight in the view, px; none where it is not seen or
+    /// belongs to no mask in particular.
+    pub rows: Vec<Option<(u16, f32)>>,
+}
+
+impl Owners {
+    /// From the votes of this view alone.
+    pub fn new(ballot: &Ballot) -> Self {
+        let owner = |row: usize| {
+            let votes = ballot.row(row);
+            let total: f64 = votes.iter().map(|&(_, votes)| weight(votes)).sum();
+            let &(place, best) = votes.iter().max_by_key(|&&(place, votes)| (votes, u16::MAX - place))?;
+            (total >= SEEN && weight(best) >= OWNED * total).then_some((place, total as f32))
+        };
+        Self { ids: ballot.labels.clone(), rows: (0..ballot.len()).map(owner).collect() }
+    }
+}
+
+/// A mask: index of its view, id in that view.
+pub type Segment = (usize, u16);
+
+/// Overlap of two groups: what both own, and what either owns of what both views see.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Overlap {
+    both: f64,
+    either: f64,
+}
+
+impl Overlap {
+    fn plus(self, other: Self) -> Self {
+        Self { both: self.both + other.both, either: self.either + other.either }
+    }
+
+    fn ratio(self) -> f64 {
+        if self.either > 0.0 { self.both / self.either } else { 0.0 }
+    }
+}
+
+/// A pair of groups that may be joined, best first, then by number so that the order is the same everywhere.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Candidate {
+    ratio: f64,
+    pair: (usize, usize),
+}
+
+impl Eq for Candidate {}
+
+impl PartialOrd for Candidate {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl Ord for Candidate {
+    fn cmp(&self, other: &Self) -> Ordering {
+        self.ratio.total_cmp(&other.ratio).then(other.pair.cmp(&self.pair))
+    }
+}
+
+/// Groups the masks of all views (0 left out) into objects: the two groups with the largest overlap are joined, until
+/// none overlap by [`SAME_OBJECT`]. Masks of one view are never one object. Returns the groups, each sorted, in the
+/// order of their first masks.
+pub fn associate(views: &[Owners]) -> Vec<Vec<Segment>> {
+    let segments: Vec<Segment> = (views.iter().enumerate())
+        .flat_map(|(view, owners)| owners.ids.iter().filter(|&&id| id != 0).map(move |&id| (view, id)))
+        .collect();
+    let number: BTreeMap<Segment, usize> = segments.iter().copied().zip(0..).collect();
+    let mut links: Vec<BTreeMap<usize, Overlap>> = vec![BTreeMap::new(); segments.len()];
+    for first in 0..views.len() {
+        for second in first + 1..views.len() {
+            for ((a, b), overlap) in overlaps(&views[first], &views[second]) {
+                let (a, b) = (number[&(first, a)], number[&(second, b)]);
+                links[a].insert(b, overlap);
+                links[b].insert(a, overlap);
+            }
+        }
+    }
+    join(&segments, links)
+}
+
+/// Overlaps of the masks of two views, by ids, over the Gaussians that both views see.
+fn overlaps(first: &Owners, second: &Owners) -> Vec<((u16, u16), Overlap)> {
+    let (columns, mut table) = (second.ids.len(), vec![0.0; first.ids.len() * second.ids.len()]);
+    for (a, b) in first.rows.iter().zip(&second.rows) {
+        if let (Some((a, weight_a)), Some((b, weight_b))) = (a, b) {
+            table[usize::from(*a) * columns + usize::from(*b)] += f64::from(weight_a.min(*weight_b));
+        }
+    }
+    let row = |a: usize| table[a * columns..][..columns].iter().sum::<f64>();
+    let column = |b: usize| (0..first.ids.len()).map(|a| table[a * columns + b]).sum::<f64>();
+    let (rows, sums): (Vec<f64>, Vec<f64>) =
+        ((0..first.ids.len()).map(row).collect(), (0..columns).map(column).collect());
+    let mut found = Vec::new();
+    for (a, &id_a) in first.ids.iter().enumerate().filter(|(_, id)| **id != 0) {
+        for (b, &id_b) in second.ids.iter().enumerate().filter(|(_, id)| **id != 0) {
+            let both = table[a * columns + b];
+            let either = rows[a] + sums[b] - both;
+            if either > 0.0 {
+                found.push(((id_a, id_b), Overlap { both, either }));
+            }
+        }
+    }
+    found
+}
+
+/// Agglomeration with average linkage.
+fn join(segments: &[Segment], mut links: Vec<BTreeMap<usize, Overlap>>) -> Vec<Vec<Segment>> {
+    let mut groups: Vec<Vec<Segment>> = segments.iter().map(|&segment| vec![segment]).collect();
+    let mut seen_in: Vec<BTreeSet<usize>> = segments.iter().map(|&(view, _)| [view].into()).collect();
+    let candidate = |a: usize, b: usize, overlap: Overlap| {
+        let ratio = overlap.ratio();
+        (ratio >= SAME_OBJECT).then_some(Candidate { ratio, pair: (a.min(b), a.max(b)) })
+    };
+    let pairs = links.iter().enumerate().flat_map(|(a, row)| row.iter().map(move |(&b, &overlap)| (a, b, overlap)));
+    let mut heap: BinaryHeap<Candidate> =
+        pairs.filter(|(a, b, _)| a < b).filter_map(|(a, b, overlap)| candidate(a, b, overlap)).collect();
+    while let Some(Candidate { ratio, pair: (a, b) }) = heap.pop() {
+        // An entry is stale once one of its groups has grown or gone.
+        let current = links[a].get(&b).is_some_and(|overlap| overlap.ratio() == ratio);
+        if !current || groups[a].is_empty() || groups[b].is_empty() || !seen_in[a].is_disjoint(&seen_in[b]) {
+            continue;
+        }
+        let (gone, views) = (std::mem::take(&mut groups[b]), std::mem::take(&mut seen_in[b]));
+        groups[a].extend(gone);
+        seen_in[a].extend(views);
+        links[a].remove(&b);
+        for (other, overlap) in std::mem::take(&mut links[b]) {
+            if other == a {
+                continue;
+            }
+            let sum = links[a].get(&other).copied().unwrap_or_default().plus(overlap);
+            links[a].insert(other, sum);
+            links[other].remove(&b);
+            links[other].insert(a, sum);
+        }
+        let renewed = links[a].iter().filter_map(|(&other, &overlap)| candidate(a, other, overlap));
+        heap.extend(renewed);
+    }
+    let mut groups: Vec<Vec<Segment>> = groups.into_iter().filter(|group| !group.is_empty()).collect();
+    groups.iter_mut().for_each(|group| group.sort_unstable());
+    groups.sort_unstable_by_key(|group| group[0]);
+    groups
+}

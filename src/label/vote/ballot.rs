@@ -1,0 +1,188 @@
+//! Votes for labels: every contributor of every pixel of every masked view counts (FlashSplat's sums), background too.
+//!
+//! The paper writes a label where one Gaussian makes most of a pixel, and the last view to write wins. Sums over all
+//! views do not depend on their order, reach Gaussians that never dominate a pixel, can be revoked by the background,
+//! and say how sure they are.
+
+use crate::engine::uniforms::view_uniforms;
+use crate::engine::{Engine, ListKey};
+use crate::error::{Error, Result};
+use crate::scene::{Camera, LabelMap, Photo, UNLABELLED};
+use crate::scheduler::plan::Buf;
+use crate::shaders::constants::{VOTE_NONE, VOTE_ONE};
+use crate::shaders::structs::StepUniforms;
+use rayon::prelude::*;
+use std::collections::{BTreeMap, BTreeSet};
+
+/// Labels that one walk over a tile counts (glsl/lift/vote.comp).
+const LABELS_PER_WALK: usize = 4;
+/// Most labels that a sweep counts at once; more take more sweeps. Bounds memory at 128 bytes a Gaussian.
+pub const COLUMNS_MAX: u32 = 16;
+
+/// A view that votes.
+#[derive(Clone, Copy, Debug)]
+pub struct Voter<'a> {
+    /// Camera.
+    pub camera: &'a Camera,
+    /// Visible objects.
+    pub mask: &'a LabelMap,
+    /// The photo, for the pixels that have no source and no say.
+    pub photo: Option<&'a Photo>,
+    /// Weight of this view's votes by label, 0 to 1; 1 where nothing is said.
+    pub trust: Option<&'a BTreeMap<u16, f32>>,
+}
+
+/// How a sweep is made.
+#[derive(Clone, Copy, Debug)]
+pub struct Sweep {
+    /// Near plane, world units.
+    pub near: f32,
+    /// Pixels within this distance of a contour of their mask have no say, px.
+    pub border: u32,
+}
+
+/// Votes for one Gaussian: columns in order, with sums of blending weights, [`VOTE_ONE`] to a pixel of weight 1. Columns
+/// without votes are left out: of thousands of objects a Gaussian meets a few.
+pub type Row = [(u16, u64)];
+
+/// What all views together say.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Ballot {
+    /// Label of each column, sorted; the first is 0, no object.
+    pub labels: Vec<u16>,
+    /// Where each row begins among the cells [N + 1].
+    starts: Vec<usize>,
+    cells: Vec<(u16, u64)>,
+}
+
+impl Ballot {
+    /// From (row, column, votes) of `count` rows, in any order, each place once at most.
+    pub fn new(labels: Vec<u16>, count: usize, mut votes: Vec<(u32, u16, u64)>) -> Self {
+        votes.par_sort_unstable();
+        let mut starts = vec![0; count + 1];
+        votes.iter().for_each(|(row, ..)| starts[*row as usize + 1] += 1);
+        (0..count).for_each(|row| starts[row + 1] += starts[row]);
+        Self { labels, starts, cells: votes.into_iter().map(|(_, column, votes)| (column, votes)).collect() }
+    }
+
+    /// Number of Gaussians.
+    pub fn len(&self) -> usize {
+        self.starts.len() - 1
+    }
+
+    /// True without Gaussians.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Votes for Gaussian `row`.
+    pub fn row(&self, row: usize) -> &Row {
+        &self.cells[self.starts[row]..self.starts[row + 1]]
+    }
+
+    /// Blending weights, px, of all columns [N, columns], as the mirrors have them.
+    pub fn weights(&self) -> Vec<f64> {
+        let mut dense = vec![0.0; self.len() * self.labels.len()];
+        for (row, cells) in dense.chunks_mut(self.labels.len()).enumerate() {
+            self.row(row).iter().for_each(|&(column, votes)| cells[usize::from(column)] = weight(votes));
+        }
+        dense
+    }
+}
+
+/// Columns to make room for in an engine that is to count votes for `objects` objects.
+pub fn columns_for(objects: usize) -> u32 {
+    (objects as u32 + 1).min(COLUMNS_MAX)
+}
+
+/// Counts the votes of all views for the engine's model. The engine needs room for votes
+/// ([`LabelSize::vote_columns`](crate::engine::LabelSize)), and nothing may be in flight.
+pub fn sweep(engine: &mut Engine, voters: &[Voter], how: Sweep) -> Result<Ballot> {
+    let room = engine.room().labels.map_or(0, |room| room.vote_columns) as usize;
+    if room == 0 {
+        return Err(Error::Bug("the engine has no room for votes".to_owned()));
+    }
+    let objects: BTreeSet<u16> = voters.iter().flat_map(|voter| voter.mask.objects()).collect();
+    let labels: Vec<u16> = std::iter::once(UNLABELLED as u16).chain(objects).collect();
+    let count = engine.gaussian_count() as usize;
+    let mut votes = Vec::new();
+    for first in (0..labels.len()).step_by(room) {
+        let columns = room.min(labels.len() - first);
+        let chunk = labels[first..][..columns].to_vec();
+        engine.sched_mut().fill(Buf::VOTES_LOW, 0)?;
+        engine.sched_mut().fill(Buf::VOTES_HIGH, 0)?;
+        for voter in voters {
+            vote(engine, voter, &chunk, how)?;
+        }
+        let low = engine.sched_mut().download::<u32>(Buf::VOTES_LOW, 0, 0, count * columns)?;
+        let high = engine.sched_mut().download::<u32>(Buf::VOTES_HIGH, 0, 0, count * columns)?;
+        let sums = low.into_iter().zip(high).map(|(low, high)| u64::from(high) << 32 | u64::from(low));
+        let cells = sums.enumerate().filter(|(_, sum)| *sum > 0);
+        votes.extend(cells.map(|(cell, sum)| ((cell / columns) as u32, (first + cell % columns) as u16, sum)));
+    }
+    Ok(Ballot::new(labels, count, votes))
+}
+
+/// Adds the votes of one view for the labels of `chunk`.
+fn vote(engine: &mut Engine, voter: &Voter, chunk: &[u16], how: Sweep) -> Result<()> {
+    let columns = columns_of(voter, chunk, how.border);
+    let rounds = most_labels(&columns, voter.mask.width, engine.shape().tile_width, engine.shape().tile_height)
+        .div_ceil(LABELS_PER_WALK) as u32;
+    if rounds == 0 {
+        return Ok(());
+    }
+    let trust = |label: &u16| voter.trust.and_then(|trust| trust.get(label)).copied().unwrap_or(1.0);
+    let weights: Vec<f32> = chunk.iter().map(trust).collect();
+    loop {
+        engine.sched().wait_all()?;
+        let base =
+            view_uniforms(voter.camera, engine.origin(), engine.shape(), how.near, [0.0; 3], engine.gaussian_count());
+        let uniforms = StepUniforms { vote_columns: chunk.len() as u32, ..base };
+        let list = engine.list(ListKey::Vote(rounds))?;
+        let sched = engine.sched_mut();
+        sched.upload(Buf::STEP, 0, 0, &[uniforms])?;
+        sched.upload(Buf::VIEW_LABELS, 0, 0, &columns)?;
+        sched.upload(Buf::VOTE_WEIGHTS, 0, 0, &weights)?;
+        sched.run(list, 0)?;
+        // What did not fit was not counted.
+        let report = engine.report(0)?;
+        if !engine.recover(&report)? {
+            return Ok(());
+        }
+    }
+}
+
+/// Column of each pixel's label, or [`VOTE_NONE`].
+fn columns_of(voter: &Voter, chunk: &[u16], border: u32) -> Vec<u32> {
+    let mut column = vec![VOTE_NONE; 1 << 16];
+    chunk.iter().zip(0..).for_each(|(&id, at)| column[usize::from(id)] = at);
+    let mut columns: Vec<u32> = voter.mask.ids.iter().map(|&id| column[usize::from(id)]).collect();
+    if let Some(photo) = voter.photo {
+        columns.iter_mut().zip(&photo.rgba).filter(|(_, pixel)| pixel[3] < 128).for_each(|(to, _)| *to = VOTE_NONE);
+    }
+    if border > 0 {
+        let near = voter.mask.near_contour(border);
+        columns.iter_mut().zip(near).filter(|(_, near)| *near).for_each(|(to, _)| *to = VOTE_NONE);
+    }
+    columns
+}
+
+/// The most different columns in a tile.
+fn most_labels(columns: &[u32], width: u32, tile_width: u32, tile_height: u32) -> usize {
+    let tiles_x = width.div_ceil(tile_width) as usize;
+    let height = columns.len() / width.max(1) as usize;
+    // A bit per column, of which there are at most COLUMNS_MAX.
+    let mut seen = vec![0_u32; tiles_x * height.div_ceil(tile_height as usize)];
+    for (y, row) in columns.chunks_exact(width as usize).enumerate() {
+        for (x, &column) in row.iter().enumerate().filter(|(_, column)| **column != VOTE_NONE) {
+            let tile = y / tile_height as usize * tiles_x + x / tile_width as usize;
+            seen[tile] |= 1 << column;
+        }
+    }
+    seen.iter().map(|bits| bits.count_ones() as usize).max().unwrap_or(0)
+}
+
+/// Blending weight in pixels of a number of votes.
+pub fn weight(votes: u64) -> f64 {
+    votes as f64 / f64::from(VOTE_ONE)
+}

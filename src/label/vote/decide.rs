@@ -1,0 +1,152 @@
+//! From votes to a label and a confidence for every Gaussian.
+
+use super::ballot::{Ballot, Sweep, Voter, sweep, weight};
+use crate::engine::Engine;
+use crate::error::{Error, Result};
+use crate::render::render;
+use crate::scene::{Gaussians, LabelMap, UNLABELLED};
+use kiddo::{ImmutableKdTree, SquaredEuclidean};
+use rayon::prelude::*;
+use std::collections::BTreeMap;
+use std::num::NonZero;
+
+/// Weight over all views below which a Gaussian's own votes count for less than its neighbours', px. What shows less
+/// than a pixel in all views together is inside an object or behind it, and no pixel speaks for it.
+const EVIDENCE: f64 = 1.0;
+/// Neighbours that speak for it instead.
+const NEIGHBOURS: usize = 8;
+
+/// A label per Gaussian.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Decision {
+    /// Labels [N], 0: no object.
+    pub labels: Vec<u32>,
+    /// Share of the winner in all votes [N], 0 to 1; 0 where nobody voted.
+    pub confidence: Vec<f32>,
+}
+
+impl Decision {
+    /// Labels of less confidence become 0.
+    pub fn drop_unsure(&mut self, least: f32) {
+        for (label, _) in self.labels.iter_mut().zip(&self.confidence).filter(|(_, share)| **share < least) {
+            *label = UNLABELLED;
+        }
+    }
+}
+
+/// The label with most votes, the smaller of equals. A Gaussian with little weight of its own asks its nearest
+/// neighbours that have more: the object's inside gets the object's label, so that nothing of it stays behind when it is
+/// taken out (with `complete`; without, it decides by what little it has).
+pub fn decide(ballot: &Ballot, means: &[[f32; 3]], complete: bool) -> Result<Decision> {
+    if ballot.len() != means.len() {
+        return Err(Error::Bug(format!("{} rows of votes for {} Gaussians", ballot.len(), means.len())));
+    }
+    let own = |row: usize| ballot.row(row).iter().map(|&(column, votes)| (column, weight(votes)));
+    let (totals, winners): (Vec<f64>, Vec<u16>) = (0..means.len())
+        .into_par_iter()
+        .map(|row| (own(row).map(|(_, share)| share).sum::<f64>(), winner(own(row))))
+        .unzip();
+    let tree = if complete { tree_of(means, &totals)? } else { None };
+    let decide_row = |row: usize| {
+        let mut votes: BTreeMap<u16, f64> = own(row).collect();
+        if let Some((tree, rows)) = tree.as_ref().filter(|_| totals[row] < EVIDENCE)
+            && let Some(asked) = NonZero::new(NEIGHBOURS.min(rows.len()))
+        {
+            let at = means[row].map(f64::from);
+            let near = tree.query(&at).nearest_n::<SquaredEuclidean<f64>>(asked).execute();
+            for item in &near {
+                let winner = winners[rows[item.item as usize]];
+                *votes.entry(winner).or_default() += (EVIDENCE - totals[row]) / asked.get() as f64;
+            }
+        }
+        let column = winner(votes.iter().map(|(&column, &share)| (column, share)));
+        let total: f64 = votes.values().sum();
+        let confidence = if total > 0.0 { votes.get(&column).copied().unwrap_or(0.0) / total } else { 0.0 };
+        (u32::from(ballot.labels[usize::from(column)]), confidence as f32)
+    };
+    let (labels, confidence) = (0..means.len()).into_par_iter().map(decide_row).unzip();
+    Ok(Decision { labels, confidence })
+}
+
+/// The column with the largest share, the first of equals; 0 if there is none.
+fn winner(shares: impl Iterator<Item = (u16, f64)>) -> u16 {
+    shares.fold((0, 0.0), |best, at| if at.1 > best.1 { at } else { best }).0
+}
+
+/// The Gaussians with enough weight of their own, as a tree with their rows.
+fn tree_of(means: &[[f32; 3]], totals: &[f64]) -> Result<Option<(ImmutableKdTree<f64, 3>, Vec<usize>)>> {
+    let sure = |&row: &usize| totals[row] >= EVIDENCE && means[row].iter().all(|value| value.is_finite());
+    let rows: Vec<usize> = (0..means.len()).filter(sure).collect();
+    if rows.is_empty() {
+        return Ok(None);
+    }
+    let places: Vec<[f64; 3]> = rows.iter().map(|&row| means[row].map(f64::from)).collect();
+    let tree = ImmutableKdTree::new_from_slice(&places)
+        .map_err(|error| Error::Bug(format!("the k-d tree of the Gaussians failed: {error:?}")))?;
+    Ok(Some((tree, rows)))
+}
+
+/// Pixels of a mask by label: where the model shows the same label, and all.
+pub type Agreement = BTreeMap<u16, (u64, u64)>;
+
+/// Where a view's mask agrees with the labels that the model shows there.
+pub fn agreement(mask: &LabelMap, rendered: &LabelMap) -> Agreement {
+    let mut counts = Agreement::new();
+    for (&id, &shown) in mask.ids.iter().zip(&rendered.ids) {
+        let (same, all) = counts.entry(id).or_default();
+        *same += u64::from(id == shown);
+        *all += 1;
+    }
+    counts
+}
+
+/// How far each view's mask can be trusted, by label: the square of its agreement with the model, which all views made,
+/// over the agreement of all views together; 1 at most. A mask whose ids were swapped or merged speaks with little
+/// weight in the next count. A label that the model shows badly everywhere is nobody's mistake: were its votes to count
+/// less for that, thin objects would lose to what surrounds them, and what is gone from the model could never return.
+pub fn trust(views: &[Agreement]) -> Vec<BTreeMap<u16, f32>> {
+    let mut together = Agreement::new();
+    for (&id, &(same, all)) in views.iter().flatten() {
+        let (sum, of) = together.entry(id).or_default();
+        *sum += same;
+        *of += all;
+    }
+    let share = |(same, all): (u64, u64)| same as f64 / all as f64;
+    let of_view = |view: &Agreement| {
+        let trust = |(&id, &counts): (&u16, &(u64, u64))| match together[&id] {
+            (0, _) => (id, 1.0),
+            usual => (id, (share(counts) / share(usual)).min(1.0).powi(2) as f32),
+        };
+        view.iter().map(trust).collect()
+    };
+    views.iter().map(of_view).collect()
+}
+
+/// Puts a decision into a model.
+pub fn apply(model: &mut Gaussians, decision: Decision) {
+    model.labels = Some(decision.labels);
+    model.label_confidence = Some(decision.confidence);
+}
+
+/// Counts the votes of `voters` for the engine's model and decides. With the labels that the model has, `judges`, masks
+/// that disagree with them count less ([`trust`]). Nothing may be in flight.
+pub fn count(
+    engine: &mut Engine,
+    voters: &[Voter],
+    judges: Option<&[u32]>,
+    means: &[[f32; 3]],
+    how: Sweep,
+    complete: bool,
+) -> Result<Decision> {
+    let mut agreements = Vec::new();
+    if let Some(labels) = judges {
+        for voter in voters {
+            let shown = render(engine, voter.camera, how.near, [0.0; 3], 0)?;
+            agreements.push(agreement(voter.mask, &shown.label_map(labels)));
+        }
+    }
+    let trusts = trust(&agreements);
+    let voters: Vec<Voter> =
+        voters.iter().enumerate().map(|(index, voter)| Voter { trust: trusts.get(index), ..*voter }).collect();
+    decide(&sweep(engine, &voters, how)?, means, complete)
+}

@@ -1,0 +1,38 @@
+//! The paper's lift, on a model that is not being trained: for comparison with votes.
+
+use crate::render::Rendered;
+use crate::scene::{Camera, LabelMap, UNLABELLED};
+use glam::DVec3;
+
+/// Settings of the lift (LabelGS, equations 6 and 7).
+#[derive(Clone, Copy, Debug)]
+pub struct Lift {
+    /// Least blending weight of a pixel's main Gaussian.
+    pub threshold: f32,
+    /// Gaussian projection filter: its centre must project into the same mask.
+    pub gpf: bool,
+}
+
+/// Writes the labels of one view's mask into the main Gaussians of its pixels; whatever was there before is lost. Within
+/// the view the heavier weight wins, then the larger label. `camera` is [relative](Camera::relative_to) to the origin of
+/// `means`.
+pub fn lift(labels: &mut [u32], means: &[[f32; 3]], camera: &Camera, rendered: &Rendered, mask: &LabelMap, how: Lift) {
+    let mut best = vec![(0.0_f32, UNLABELLED); labels.len()];
+    for ((&top, &weight), &id) in rendered.top_id.iter().zip(&rendered.top_weight).zip(&mask.ids) {
+        let Ok(row) = usize::try_from(top) else { continue };
+        let vote = (weight, u32::from(id));
+        if id == 0 || weight < how.threshold || vote <= best[row] {
+            continue;
+        }
+        let at = camera.project(camera.to_camera(DVec3::from_array(means[row].map(f64::from)))).floor();
+        let inside = at.x >= 0.0 && at.y >= 0.0 && at.x < f64::from(camera.width) && at.y < f64::from(camera.height);
+        if inside && (!how.gpf || mask.at(at.x as u32, at.y as u32) == id) {
+            best[row] = vote;
+        }
+    }
+    for (label, (weight, voted)) in labels.iter_mut().zip(best) {
+        if weight > 0.0 {
+            *label = voted;
+        }
+    }
+}

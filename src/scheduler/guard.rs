@@ -1,0 +1,49 @@
+//! Guards: a pattern behind each buffer that no pass may touch. For tests.
+
+use super::Scheduler;
+use super::recorder::Recorder;
+use crate::error::{Error, Result};
+use crate::gpu::Buffer;
+use crate::scheduler::plan::{Buf, Class, FRAMES_IN_FLIGHT, GUARD_BYTES};
+
+const PATTERN: u32 = 0x5AFE_C0DE;
+
+/// Writes the guard that begins at a byte offset.
+pub(super) fn write(recorder: &Recorder<'_>, buffer: &Buffer, offset: u64) -> Result<()> {
+    recorder.fill(buffer, offset, GUARD_BYTES, PATTERN)
+}
+
+impl Scheduler {
+    /// Fails if some pass wrote behind the end of a buffer; names the buffer and the first wrong word.
+    ///
+    /// Sees the buffers that are not scratch, and the scratch of the list that was prepared or submitted last.
+    pub fn check_guards(&mut self) -> Result<()> {
+        if !self.options.plan.guards {
+            return Err(Error::Bug("the scheduler was made without guards".to_owned()));
+        }
+        self.wait_all()?;
+        for index in 0..self.table.len() {
+            let (decl, buf) = (&self.table[index], Buf(index as u16));
+            if decl.class != Class::Step && self.is_empty(buf)? {
+                continue;
+            }
+            let submitted = self.current.is_some_and(|list| self.was_submitted(list));
+            if decl.class == Class::Step && !(submitted && self.is_placed(buf)) {
+                continue;
+            }
+            let copies = if decl.class.copies() > 1 { FRAMES_IN_FLIGHT } else { 1 };
+            for frame in 0..copies {
+                let end = self.bytes(buf)?;
+                let words = self.read_words(buf, frame, end, GUARD_BYTES)?;
+                if let Some(position) = words.iter().position(|&word| word != PATTERN) {
+                    let (name, value) = (decl.name, words[position]);
+                    return Err(Error::Bug(format!(
+                        "something wrote {value:#010x} at byte {} behind the end of buffer {name} ({end} bytes)",
+                        position * 4
+                    )));
+                }
+            }
+        }
+        Ok(())
+    }
+}

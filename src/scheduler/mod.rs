@@ -1,0 +1,384 @@
+//! The scheduler: plans pass lists ([`plan`], pure), owns the memory of all buffers, and replays what was recorded.
+//!
+//! Two steps are in flight, one per frame, on one queue with one timeline. Every recording opens with a full barrier, so
+//! lists run in the order of their submits; what is inside of a list is ordered by the plan's barriers.
+
+mod guard;
+pub mod plan;
+pub mod profiler;
+mod recorder;
+mod recording;
+mod storage;
+mod transfer;
+
+pub use profiler::{PassTime, Profiler};
+
+use crate::error::{Error, Result};
+use crate::gpu::{CommandBuffer, Gpu, Timeline};
+use crate::scheduler::plan::{
+    Barrier, Buf, BufferDecl, Capacity, FRAMES_IN_FLIGHT, Limits, MemoryReport, PassList, Plan, PlanOptions, memory,
+};
+use recorder::Recorder;
+use recording::Recording;
+use std::sync::Arc;
+use storage::Storage;
+use transfer::Staging;
+
+/// Choices of a scheduler.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct SchedulerOptions {
+    /// Choices of the plans. With `barrier_everywhere`, times belong to their passes.
+    pub plan: PlanOptions,
+    /// A timestamp after each item, see [`Scheduler::timings`].
+    pub timestamps: bool,
+    /// Scratch memory is filled with 0xFFFFFFFF (NaN) whenever a list is prepared.
+    pub poison_step: bool,
+    /// Each item leaves a mark that the host sees, to name the last one when the device is lost.
+    pub crash_markers: bool,
+    /// Use no more than so many bytes of the device's memory.
+    pub memory_limit: Option<u64>,
+}
+
+impl SchedulerOptions {
+    /// The limits that plans respect on a device.
+    pub fn limits(&self, gpu: &Gpu) -> Limits {
+        let limits = limits_of(gpu);
+        Limits { max_memory: self.memory_limit.unwrap_or(u64::MAX).min(limits.max_memory), ..limits }
+    }
+}
+
+/// A prepared pass list.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct ListId {
+    index: usize,
+    /// Lists are forgotten when capacities change; an id of an earlier generation is refused.
+    generation: u64,
+}
+
+/// A submit that can be waited for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Ticket(u64);
+
+struct List {
+    plan: Plan,
+    /// One per frame.
+    recordings: Vec<Recording>,
+}
+
+/// Executes pass lists.
+pub struct Scheduler {
+    lists: Vec<List>,
+    storage: Storage,
+    staging: Staging,
+    /// For transfers outside of lists.
+    immediate: CommandBuffer,
+    timeline: Timeline,
+    /// Value of the last submit.
+    submitted: u64,
+    /// Value of the last submit of each frame.
+    slot_busy: [u64; FRAMES_IN_FLIGHT],
+    /// The list whose scratch buffers `upload` and `download` mean: the last one prepared or submitted.
+    current: Option<usize>,
+    generation: u64,
+    capacity: Capacity,
+    options: SchedulerOptions,
+    limits: Limits,
+    table: &'static [BufferDecl],
+    // Last, so that the device outlives what was made from it.
+    gpu: Arc<Gpu>,
+}
+
+/// The limits of a device in the planner's terms.
+pub fn limits_of(gpu: &Gpu) -> Limits {
+    plan_limits(gpu.limits())
+}
+
+/// The same before the device is opened.
+pub fn plan_limits(limits: &crate::gpu::Limits) -> Limits {
+    Limits {
+        max_storage_range: limits.max_storage_range,
+        max_texel_elements: limits.max_texel_elements,
+        storage_alignment: limits.storage_alignment,
+        texel_alignment: limits.texel_alignment,
+        max_groups: limits.max_groups,
+        max_allocation: limits.max_allocation,
+        max_push: limits.max_push,
+        max_storage_buffers: limits.max_storage_buffers,
+        max_texel_buffers: limits.max_texel_buffers,
+        max_memory: limits.max_memory,
+    }
+}
+
+impl Scheduler {
+    /// Allocates everything but scratch memory; Model and Kept buffers start as zeros.
+    pub fn new(
+        gpu: Arc<Gpu>,
+        table: &'static [BufferDecl],
+        capacity: Capacity,
+        options: SchedulerOptions,
+    ) -> Result<Self> {
+        let limits = options.limits(&gpu);
+        MemoryReport::predict(table, &capacity, &[], &limits, options.plan)?;
+        let mut scheduler = Self {
+            lists: Vec::new(),
+            storage: Storage::new(table.len()),
+            staging: Staging::new(&gpu)?,
+            immediate: CommandBuffer::new(&gpu)?,
+            timeline: Timeline::new(&gpu)?,
+            submitted: 0,
+            slot_busy: [0; FRAMES_IN_FLIGHT],
+            current: None,
+            generation: 0,
+            capacity,
+            options,
+            limits,
+            table,
+            gpu,
+        };
+        scheduler.allocate_own()?;
+        Ok(scheduler)
+    }
+
+    /// The memory that some lists would need, before anything is allocated.
+    pub fn predict(
+        table: &'static [BufferDecl],
+        capacity: &Capacity,
+        lists: &[PassList],
+        limits: &Limits,
+    ) -> Result<MemoryReport> {
+        MemoryReport::predict(table, capacity, lists, limits, PlanOptions::default())
+    }
+
+    /// The memory that some lists would need with other capacities, under the limits and options of this scheduler.
+    pub fn predict_here(&self, capacity: &Capacity, lists: &[PassList]) -> Result<MemoryReport> {
+        MemoryReport::predict(self.table, capacity, lists, &self.limits, self.options.plan)
+    }
+
+    /// Plans and records a list.
+    pub fn prepare(&mut self, list: &PassList) -> Result<ListId> {
+        let ids = self.prepare_all(&[list])?;
+        ids.first().copied().ok_or_else(|| Error::Bug("no list was prepared".to_owned()))
+    }
+
+    /// Plans and records several lists; cheaper than one by one if scratch memory has to grow.
+    pub fn prepare_all(&mut self, lists: &[&PassList]) -> Result<Vec<ListId>> {
+        self.replace_lost()?;
+        let mut plans = Vec::new();
+        for list in lists {
+            plans.push(Plan::new(self.table, &self.capacity, list, &self.limits, self.options.plan)?);
+        }
+        let all = self.lists.iter().map(|list| &list.plan).chain(&plans).collect::<Vec<_>>();
+        MemoryReport::of_plans(self.table, &self.capacity, &all, &self.limits, self.options.plan)?;
+        let pages = memory::merge_pages(all.iter().map(|plan| plan.step_pages.as_slice()));
+        self.grow_arena(&pages)?;
+        if self.options.poison_step {
+            self.poison()?;
+        }
+        let mut ids = Vec::new();
+        for plan in plans {
+            let recordings = self.record(&plan)?;
+            self.lists.push(List { plan, recordings });
+            self.current = Some(self.lists.len() - 1);
+            ids.push(ListId { index: self.lists.len() - 1, generation: self.generation });
+        }
+        Ok(ids)
+    }
+
+    /// Changes the options of lists that are prepared from now on. Guards cannot be switched on or off.
+    pub fn set_options(&mut self, options: SchedulerOptions) -> Result<()> {
+        if options.plan.guards != self.options.plan.guards {
+            return Err(Error::Bug("guards are decided when the scheduler is made".to_owned()));
+        }
+        self.options = options;
+        Ok(())
+    }
+
+    /// Submits a prepared list with the host-visible buffers of a frame.
+    ///
+    /// Nothing is allocated. Blocks only if the same list is still running in the same frame.
+    pub fn submit(&mut self, id: ListId, frame: usize) -> Result<Ticket> {
+        let index = self.index(id)?;
+        self.check_slot(frame)?;
+        self.wait(Ticket(self.lists[index].recordings[frame].busy))?;
+        let recording = &self.lists[index].recordings[frame];
+        if let Some(markers) = &recording.markers {
+            markers.reset()?;
+        }
+        let value = self.submitted + 1;
+        let submitted = self.gpu.submit(&recording.command, &self.timeline, value);
+        submitted.map_err(|error| self.name_pass(error))?;
+        self.submitted = value;
+        self.slot_busy[frame] = value;
+        self.lists[index].recordings[frame].busy = value;
+        self.current = Some(index);
+        Ok(Ticket(value))
+    }
+
+    /// Submits a list and waits for it.
+    pub fn run(&mut self, id: ListId, frame: usize) -> Result<()> {
+        let ticket = self.submit(id, frame)?;
+        self.wait(ticket)
+    }
+
+    /// Blocks until a submit is done.
+    pub fn wait(&self, ticket: Ticket) -> Result<()> {
+        if ticket.0 == 0 {
+            return Ok(());
+        }
+        self.timeline.wait(ticket.0).map_err(|error| {
+            // Whoever gets the error may free what the device was to be done with. A lost device returns at once.
+            let _ = self.gpu.wait_idle();
+            self.name_pass(error)
+        })
+    }
+
+    /// True if a submit is done.
+    pub fn is_done(&self, ticket: Ticket) -> Result<bool> {
+        Ok(self.timeline.value().map_err(|error| self.name_pass(error))? >= ticket.0)
+    }
+
+    /// Blocks until all submits are done.
+    pub fn wait_all(&self) -> Result<()> {
+        self.wait(Ticket(self.submitted))
+    }
+
+    /// Blocks until the host may touch the host-visible buffers of a frame.
+    pub fn wait_frame(&self, frame: usize) -> Result<()> {
+        self.check_slot(frame)?;
+        self.wait(Ticket(self.slot_busy[frame]))
+    }
+
+    /// Changes capacities: Model buffers keep their contents (the common prefix; new elements are 0), all others start
+    /// afresh, and all lists are forgotten. If memory does not suffice, the old capacities stay in force.
+    pub fn set_capacity(&mut self, capacity: Capacity) -> Result<()> {
+        self.wait_all()?;
+        MemoryReport::predict(self.table, &capacity, &[], &self.limits, self.options.plan)?;
+        self.lists.clear();
+        self.current = None;
+        self.generation += 1;
+        self.storage.drop_arena();
+        self.resize_own(capacity)
+    }
+
+    /// The capacities in force.
+    pub fn capacity(&self) -> &Capacity {
+        &self.capacity
+    }
+
+    /// The table of buffers.
+    pub fn table(&self) -> &'static [BufferDecl] {
+        self.table
+    }
+
+    /// The limits that plans respect.
+    pub fn limits(&self) -> &Limits {
+        &self.limits
+    }
+
+    /// The device.
+    pub fn gpu(&self) -> &Arc<Gpu> {
+        &self.gpu
+    }
+
+    /// Allocated bytes by buffer, scratch page and staging.
+    pub fn memory(&self) -> Vec<(String, u64)> {
+        let mut rows = self.storage.memory(self.table);
+        rows.push(("staging".to_owned(), self.staging.bytes()));
+        rows
+    }
+
+    /// All allocated bytes.
+    pub fn memory_total(&self) -> u64 {
+        self.memory().iter().map(|(_, bytes)| bytes).sum()
+    }
+
+    /// The plan of a list, for reports.
+    pub fn plan(&self, id: ListId) -> Result<&Plan> {
+        Ok(&self.lists[self.index(id)?].plan)
+    }
+
+    /// The barriers of a list, one entry per item.
+    pub fn barriers(&self, id: ListId) -> Result<Vec<Option<Barrier>>> {
+        Ok(self.plan(id)?.items.iter().map(|item| item.barrier.clone()).collect())
+    }
+
+    /// Nanoseconds of each item of a list in its last submit with a frame; waits for it.
+    ///
+    /// Without `barrier_everywhere` items overlap, and an entry is the time that the item added. Empty if timestamps
+    /// were off when the list was prepared, if the device has none, or before the first submit.
+    pub fn timings(&self, id: ListId, frame: usize) -> Result<Vec<(String, u64)>> {
+        let list = &self.lists[self.index(id)?];
+        self.check_slot(frame)?;
+        let recording = &list.recordings[frame];
+        let Some(queries) = recording.queries.as_ref().filter(|_| recording.busy > 0) else { return Ok(Vec::new()) };
+        self.wait(Ticket(recording.busy))?;
+        let times = queries.intervals()?;
+        Ok(list.plan.items.iter().map(|item| item.label.clone()).zip(times).collect())
+    }
+
+    fn index(&self, id: ListId) -> Result<usize> {
+        if id.generation == self.generation && id.index < self.lists.len() {
+            return Ok(id.index);
+        }
+        Err(Error::Bug("a pass list was used after capacities changed; prepare it again".to_owned()))
+    }
+
+    fn check_slot(&self, frame: usize) -> Result<()> {
+        if frame < FRAMES_IN_FLIGHT { Ok(()) } else { Err(Error::Bug(format!("frame {frame} of {FRAMES_IN_FLIGHT}"))) }
+    }
+
+    fn decl(&self, buf: Buf) -> Result<&'static BufferDecl> {
+        self.table.get(buf.index()).ok_or_else(|| Error::Bug(format!("there is no buffer {} in the table", buf.0)))
+    }
+
+    /// Records a list for each frame.
+    fn record(&self, plan: &Plan) -> Result<Vec<Recording>> {
+        (0..FRAMES_IN_FLIGHT).map(|frame| Recording::new(&self.gpu, plan, &self.storage, frame, self.options)).collect()
+    }
+
+    /// Records, submits and waits for a few commands outside of any list.
+    fn immediately(
+        &mut self,
+        commands: impl FnOnce(&mut Recorder<'_>, &Storage, &Staging) -> Result<()>,
+    ) -> Result<()> {
+        let mut recorder = Recorder::begin(&self.gpu, &self.immediate)?;
+        commands(&mut recorder, &self.storage, &self.staging)?;
+        recorder.end()?;
+        let value = self.submitted + 1;
+        self.gpu.submit(&self.immediate, &self.timeline, value).map_err(|error| self.name_pass(error))?;
+        self.submitted = value;
+        self.wait(Ticket(value))
+    }
+
+    /// Puts the name of the last pass that is known to have begun into the error of a lost device.
+    fn name_pass(&self, error: Error) -> Error {
+        if !matches!(error, Error::DeviceLost { .. }) {
+            return error;
+        }
+        let marked = self.lists.iter().flat_map(|list| list.recordings.iter().map(move |one| (one, &list.plan)));
+        let marked = marked.filter_map(|(recording, plan)| {
+            let item = recording.markers.as_ref()?.last_begun()?;
+            Some((recording.busy, format!("{} of list {}", plan.items.get(item)?.label, plan.list.name)))
+        });
+        let pass = match marked.max_by_key(|(busy, _)| *busy) {
+            Some((busy, pass)) if busy == self.submitted => pass,
+            Some((_, pass)) => format!("{pass}, or what came after it"),
+            None if self.options.crash_markers => "none; memory was being set up".to_owned(),
+            None => "unknown: crash markers are off (`train --restart` has them on)".to_owned(),
+        };
+        Error::DeviceLost { pass }
+    }
+}
+
+impl Drop for Scheduler {
+    fn drop(&mut self) {
+        // Nothing may be in use when it is freed. A lost device has nothing in use.
+        let _ = self.wait_all();
+    }
+}
+
+impl std::fmt::Debug for Scheduler {
+    fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(formatter, "Scheduler({} lists, {} bytes)", self.lists.len(), self.memory_total())
+    }
+}

@@ -1,0 +1,119 @@
+//! What a table of buffers is made of; the table itself is `plan/table.rs`.
+//!
+//! A buffer is a plane of equal elements. What it is bound as (read, written, texel) stands in the shaders; where it
+//! lies in memory is decided by the planner from its class.
+
+use super::capacity::Domain;
+
+/// A buffer: the index of its row in the table. Made by [`buffers!`](crate::buffers).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Buf(pub u16);
+
+impl Buf {
+    /// Row of the table.
+    pub fn index(self) -> usize {
+        usize::from(self.0)
+    }
+}
+
+/// How long the contents of a buffer live, and who may see them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Class {
+    /// The trained model and what belongs to it; kept when capacities change; never aliased.
+    Model,
+    /// Kept from step to step and never aliased, but zeroed whenever it is (re)allocated.
+    Persistent,
+    /// Scratch of one pass list; buffers whose lives do not overlap share bytes.
+    Step,
+    /// Written by the host for each step; one copy per frame, in host-visible memory.
+    PerFrame,
+    /// Written by the device, read by the host; one copy per frame, in host-cached memory.
+    Report,
+}
+
+impl Class {
+    /// Number of copies: two for what the host shares with the steps in flight.
+    pub fn copies(self) -> u64 {
+        match self {
+            Self::PerFrame | Self::Report => super::FRAMES_IN_FLIGHT as u64,
+            Self::Model | Self::Persistent | Self::Step => 1,
+        }
+    }
+
+    /// Name for tables.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Model => "model",
+            Self::Persistent => "kept",
+            Self::Step => "step",
+            Self::PerFrame => "slot",
+            Self::Report => "report",
+        }
+    }
+}
+
+/// Format of the texel view of a buffer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum TexelFormat {
+    /// Four f32.
+    Rgba32Sfloat,
+    /// One u32.
+    R32Uint,
+    /// One f32.
+    R32Sfloat,
+}
+
+impl TexelFormat {
+    /// Bytes of one texel.
+    pub fn bytes(self) -> u32 {
+        match self {
+            Self::Rgba32Sfloat => 16,
+            Self::R32Uint | Self::R32Sfloat => 4,
+        }
+    }
+}
+
+/// One row of the table of buffers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct BufferDecl {
+    /// Plural noun, the same in GLSL, plan and reference.
+    pub name: &'static str,
+    /// Bytes of one element; a multiple of 4.
+    pub element_bytes: u32,
+    /// What is counted: the number of elements is the capacity of this domain.
+    pub domain: Domain,
+    /// How long it lives.
+    pub class: Class,
+    /// Format of the texel view, if shaders fetch from it as a texel buffer.
+    pub texel: Option<TexelFormat>,
+    /// Shape, unit and meaning.
+    pub doc: &'static str,
+}
+
+/// Declares a table of buffers.
+///
+/// Each row is `NAME "name": element_bytes, domain, class, texel, "doc";`. The plain form yields the constants
+/// `Buf::NAME` and `pub static TABLE: &[BufferDecl]` (only this crate can use it, as `Buf` is its type); the form
+/// that starts with `consts;` yields free constants `NAME` instead, for tables of tests.
+#[macro_export]
+macro_rules! buffers {
+    (consts; $($ident:ident $name:literal : $bytes:expr, $domain:expr, $class:expr, $texel:expr, $doc:literal;)*) => {
+        $crate::buffers!(@table $($ident $name : $bytes, $domain, $class, $texel, $doc;)*);
+        $(#[doc = $doc] #[allow(dead_code)]
+        pub const $ident: $crate::scheduler::plan::Buf = $crate::scheduler::plan::Buf(BufferIndex::$ident as u16);)*
+    };
+    (@table $($ident:ident $name:literal : $bytes:expr, $domain:expr, $class:expr, $texel:expr, $doc:literal;)*) => {
+        #[allow(non_camel_case_types, clippy::upper_case_acronyms, dead_code)]
+        enum BufferIndex { $($ident),* }
+        /// The rows of the table of buffers, in the order of their declaration.
+        pub static TABLE: &[$crate::scheduler::plan::BufferDecl] = &[$($crate::scheduler::plan::BufferDecl {
+            name: $name, element_bytes: $bytes, domain: $domain, class: $class, texel: $texel, doc: $doc,
+        }),*];
+    };
+    ($($ident:ident $name:literal : $bytes:expr, $domain:expr, $class:expr, $texel:expr, $doc:literal;)*) => {
+        $crate::buffers!(@table $($ident $name : $bytes, $domain, $class, $texel, $doc;)*);
+        impl $crate::scheduler::plan::Buf {
+            $(#[doc = $doc] pub const $ident: $crate::scheduler::plan::Buf = $crate::scheduler::plan::Buf(BufferIndex::$ident as u16);)*
+        }
+    };
+}

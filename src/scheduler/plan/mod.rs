@@ -1,0 +1,215 @@
+//! The planner: from capacities, a pass list and the limits of a device to sizes, places in memory and barriers.
+//!
+//! Pure functions without Vulkan: what a plan holds is decided before anything is allocated, can be printed
+//! ([`Plan::report`]) and is tested without a GPU. The same input gives the same plan, byte for byte.
+
+mod arena;
+pub mod barrier;
+pub mod buffers;
+pub mod capacity;
+mod check;
+mod lifetime;
+mod limits;
+pub mod memory;
+pub mod pass;
+mod report;
+mod table;
+
+pub use barrier::{Barrier, Touch, Use, Uses};
+pub use buffers::{Buf, BufferDecl, Class, TexelFormat};
+pub use capacity::{Capacity, Domain};
+pub use lifetime::Life;
+pub use limits::Limits;
+pub use memory::{MemoryReport, MemoryRow};
+pub use pass::{Grid, PassDecl, PassList, Work};
+pub use table::TABLE;
+
+use crate::error::{Error, Result};
+use crate::shaders::BindingKind;
+
+/// Steps in flight, and so copies of what the host shares with them.
+pub const FRAMES_IN_FLIGHT: usize = 2;
+
+/// Bytes of the guard after each buffer in test mode.
+pub const GUARD_BYTES: u64 = 256;
+
+/// Choices of a plan.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct PlanOptions {
+    /// Step buffers whose lives do not overlap share bytes.
+    pub alias: bool,
+    /// A guard after each buffer; switches aliasing off, so that guards outlive their buffer's neighbours.
+    pub guards: bool,
+    /// A full barrier before each item: times become attributable, and results must not change.
+    pub barrier_everywhere: bool,
+}
+
+impl Default for PlanOptions {
+    fn default() -> Self {
+        Self { alias: true, guards: false, barrier_everywhere: false }
+    }
+}
+
+impl PlanOptions {
+    /// True if Step buffers may share bytes.
+    pub fn aliases(&self) -> bool {
+        self.alias && !self.guards
+    }
+}
+
+/// The memory that a buffer lies in.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Page {
+    /// A VkBuffer of its own (one per frame in flight for the classes with copies).
+    Own(Buf),
+    /// A page of the Step arena.
+    Step(u32),
+}
+
+/// Where a buffer lies.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Placement {
+    /// The memory.
+    pub page: Page,
+    /// Byte offset in the page.
+    pub offset: u64,
+    /// Bytes of the elements; room for at least one.
+    pub bytes: u64,
+    /// Bytes bound to shaders: the elements, and in test mode the guard, so that writes past the end are seen there.
+    pub bound: u64,
+}
+
+/// Number of descriptors of one frame.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct DescriptorCounts {
+    /// Sets: one per pass.
+    pub sets: u32,
+    /// Storage buffers.
+    pub storage: u32,
+    /// Texel buffers.
+    pub texel: u32,
+}
+
+/// One planned item of a pass list.
+#[derive(Clone, Debug)]
+pub struct PlanItem {
+    /// Name in reports.
+    pub label: String,
+    /// What it does with memory.
+    pub touches: Vec<Touch>,
+    /// The barrier before it.
+    pub barrier: Option<Barrier>,
+}
+
+/// A planned pass list.
+#[derive(Clone, Debug)]
+pub struct Plan {
+    /// The table of buffers.
+    pub table: &'static [BufferDecl],
+    /// The list.
+    pub list: PassList,
+    /// The capacities.
+    pub capacity: Capacity,
+    /// The choices.
+    pub options: PlanOptions,
+    /// Place of each buffer by row of the table; none for Step buffers that the list does not touch.
+    pub placements: Vec<Option<Placement>>,
+    /// First and last item that touches each buffer.
+    pub lives: Vec<Option<Life>>,
+    /// Bytes of each page of the Step arena.
+    pub step_pages: Vec<u64>,
+    /// The items, as many as the list's.
+    pub items: Vec<PlanItem>,
+    /// Descriptors of one frame.
+    pub descriptors: DescriptorCounts,
+}
+
+impl Plan {
+    /// Plans a pass list.
+    pub fn new(
+        table: &'static [BufferDecl],
+        capacity: &Capacity,
+        list: &PassList,
+        limits: &Limits,
+        options: PlanOptions,
+    ) -> Result<Self> {
+        let sizes = memory::sizes(table, capacity)?;
+        check::list(table, &sizes, list, limits)?;
+        let labels = list.work.iter().map(|work| label(table, work)).collect::<Vec<_>>();
+        let uses = list.work.iter().map(|work| barrier::uses(work, &sizes)).collect::<Vec<_>>();
+        let lives = lifetime::lives(table.len(), &uses);
+        if options.aliases() {
+            lifetime::check_written_first(table, &labels, &uses)?;
+        }
+        let (placements, step_pages) = arena::place(table, &sizes, &lives, limits, options)?;
+        let touches = uses.iter().map(|uses| barrier::touches(uses, &placements)).collect::<Result<Vec<_>>>()?;
+        let barriers = barrier::derive(table, &labels, &touches, options.barrier_everywhere);
+        let items = labels.into_iter().zip(touches).zip(barriers);
+        let items = items.map(|((label, touches), barrier)| PlanItem { label, touches, barrier }).collect();
+        let descriptors = count_descriptors(list);
+        let (list, capacity) = (list.clone(), *capacity);
+        Ok(Self { table, list, capacity, options, placements, lives, step_pages, items, descriptors })
+    }
+
+    /// Place of a buffer that the list touches, or that is not scratch.
+    pub fn placement(&self, buf: Buf) -> Result<Placement> {
+        self.placements.get(buf.index()).copied().flatten().ok_or_else(|| {
+            Error::Bug(format!("pass list {} does not touch buffer {}", self.list.name, name(self.table, buf)))
+        })
+    }
+
+    /// Bytes of the Step arena.
+    pub fn step_bytes(&self) -> u64 {
+        self.step_pages.iter().sum()
+    }
+
+    /// The item that destroys the contents of a Step buffer after its last use, if bytes were reused.
+    pub fn overwritten_by(&self, buf: Buf) -> Option<Buf> {
+        let place = self.placements.get(buf.index()).copied().flatten()?;
+        let life = self.lives.get(buf.index()).copied().flatten()?;
+        (0..self.table.len()).map(|index| Buf(index as u16)).find(|&other| {
+            let (Some(place2), Some(life2)) = (self.placements[other.index()], self.lives[other.index()]) else {
+                return false;
+            };
+            other != buf
+                && place2.page == place.page
+                && place2.offset < place.offset + place.bound
+                && place.offset < place2.offset + place2.bound
+                && life2.last > life.last
+        })
+    }
+
+    /// Number of barriers.
+    pub fn barrier_count(&self) -> usize {
+        self.items.iter().filter(|item| item.barrier.is_some()).count()
+    }
+}
+
+/// Name of a buffer, for messages; safe for rows that do not exist.
+pub(crate) fn name(table: &'static [BufferDecl], buf: Buf) -> &'static str {
+    table.get(buf.index()).map_or("(no such buffer)", |decl| decl.name)
+}
+
+fn label(table: &'static [BufferDecl], work: &Work) -> String {
+    match work {
+        Work::Pass(pass) => pass.label.clone(),
+        Work::Fill { buf, .. } => format!("fill {}", name(table, *buf)),
+        Work::Copy { from, to, .. } => format!("copy {} to {}", name(table, *from), name(table, *to)),
+    }
+}
+
+fn count_descriptors(list: &PassList) -> DescriptorCounts {
+    let mut counts = DescriptorCounts::default();
+    for work in &list.work {
+        if let Work::Pass(pass) = work {
+            counts.sets += 1;
+            for binding in pass.shader.bindings {
+                match binding.kind {
+                    BindingKind::Storage => counts.storage += 1,
+                    BindingKind::Texel => counts.texel += 1,
+                }
+            }
+        }
+    }
+    counts
+}

@@ -1,0 +1,168 @@
+//! One command buffer: a planned list with the host-visible buffers of one frame.
+
+use super::SchedulerOptions;
+use super::guard;
+use super::recorder::{Groups, Recorder};
+use super::storage::Storage;
+use crate::error::{Error, Result};
+use crate::gpu::{Binding, BufferView, CommandBuffer, DescriptorPool, Gpu, Markers, QueryPool};
+use crate::scheduler::plan::{Buf, Class, Grid, PassDecl, Plan, TexelFormat, Uses, Work};
+use crate::shaders::BindingKind;
+use ash::vk;
+use std::collections::HashMap;
+use std::sync::Arc;
+
+/// A recorded list, ready to be submitted again and again.
+pub(super) struct Recording {
+    pub(super) command: CommandBuffer,
+    pub(super) queries: Option<QueryPool>,
+    pub(super) markers: Option<Markers>,
+    /// Timeline value of the last submit.
+    pub(super) busy: u64,
+    _descriptors: DescriptorPool,
+    _views: HashMap<Buf, BufferView>,
+}
+
+/// What the recording of one list needs at hand.
+struct Writer<'a> {
+    gpu: &'a Arc<Gpu>,
+    plan: &'a Plan,
+    storage: &'a Storage,
+    frame: usize,
+    recorder: Recorder<'a>,
+    descriptors: &'a DescriptorPool,
+    views: &'a HashMap<Buf, BufferView>,
+}
+
+impl Recording {
+    pub(super) fn new(
+        gpu: &Arc<Gpu>,
+        plan: &Plan,
+        storage: &Storage,
+        frame: usize,
+        options: SchedulerOptions,
+    ) -> Result<Self> {
+        let items = plan.items.len();
+        let counts = plan.descriptors;
+        let command = CommandBuffer::new(gpu)?;
+        let descriptors = DescriptorPool::new(gpu, counts.sets, counts.storage, counts.texel)?;
+        let timed = options.timestamps && gpu.limits().timestamp_bits > 0;
+        let queries = timed.then(|| QueryPool::new(gpu, items as u32 + 1)).transpose()?;
+        let markers = options.crash_markers.then(|| Markers::new(gpu, items)).transpose()?;
+        let views = views(gpu, plan, storage, frame)?;
+        let recorder = Recorder::begin(gpu, &command)?;
+        let writer = Writer { gpu, plan, storage, frame, recorder, descriptors: &descriptors, views: &views };
+        writer.prologue(queries.as_ref())?;
+        for item in 0..items {
+            writer.item(item, queries.as_ref(), markers.as_ref())?;
+        }
+        writer.recorder.end()?;
+        Ok(Self { command, queries, markers, busy: 0, _descriptors: descriptors, _views: views })
+    }
+}
+
+impl Writer<'_> {
+    /// Fresh guards and timestamps.
+    fn prologue(&self, queries: Option<&QueryPool>) -> Result<()> {
+        if self.plan.options.guards {
+            write_scratch_guards(&self.recorder, self.plan, self.storage)?;
+            self.recorder.barrier(Uses::ALL, Uses::ALL);
+        }
+        if let Some(queries) = queries {
+            self.recorder.reset_timestamps(queries);
+            self.recorder.timestamp(queries, 0)?;
+        }
+        Ok(())
+    }
+
+    fn item(&self, index: usize, queries: Option<&QueryPool>, markers: Option<&Markers>) -> Result<()> {
+        if let Some(barrier) = &self.plan.items[index].barrier {
+            self.recorder.barrier(barrier.src, barrier.dst);
+        }
+        if let Some(markers) = markers {
+            self.recorder.fill(markers.buffer(), index as u64 * 4, 4, 1)?;
+        }
+        match &self.plan.list.work[index] {
+            Work::Pass(pass) => self.pass(pass)?,
+            Work::Fill { buf, word } => {
+                let (buffer, offset) = self.storage.place(self.plan, *buf, self.frame)?;
+                self.recorder.fill(buffer, offset, self.plan.placement(*buf)?.bytes, *word)?;
+            }
+            Work::Copy { from, to, bytes } => {
+                let most = self.plan.placement(*from)?.bytes.min(self.plan.placement(*to)?.bytes);
+                let bytes = if *bytes == 0 { most } else { *bytes };
+                let from = self.storage.place(self.plan, *from, self.frame)?;
+                let to = self.storage.place(self.plan, *to, self.frame)?;
+                self.recorder.copy(from, to, bytes)?;
+            }
+        }
+        if let Some(queries) = queries {
+            self.recorder.timestamp(queries, index as u32 + 1)?;
+        }
+        Ok(())
+    }
+
+    fn pass(&self, pass: &PassDecl) -> Result<()> {
+        let pipeline = self.gpu.pipeline(pass.shader, &pass.spec)?;
+        let mut bindings = Vec::new();
+        for (binding, &buf) in pass.shader.bindings.iter().zip(&pass.buffers) {
+            bindings.push(match binding.kind {
+                BindingKind::Storage => {
+                    let (buffer, offset) = self.storage.place(self.plan, buf, self.frame)?;
+                    Binding::Storage { buffer, offset, bytes: self.plan.placement(buf)?.bound }
+                }
+                BindingKind::Texel => {
+                    let view = self.views.get(&buf);
+                    Binding::Texel(view.ok_or_else(|| Error::Bug(format!("no texel view of buffer {}", buf.0)))?)
+                }
+            });
+        }
+        let set = self.descriptors.set(&pipeline, &bindings)?;
+        let groups = match pass.grid {
+            Grid::Groups(x, y, z) => Groups::Count([x, y, z]),
+            Grid::Indirect(buf, inner) => {
+                let (buffer, offset) = self.storage.place(self.plan, buf, self.frame)?;
+                Groups::Indirect(buffer, offset + u64::from(inner))
+            }
+        };
+        self.recorder.dispatch(&pipeline, set, &pass.push, &groups)
+    }
+}
+
+/// A view of each buffer that some pass reads as texels.
+fn views(gpu: &Arc<Gpu>, plan: &Plan, storage: &Storage, frame: usize) -> Result<HashMap<Buf, BufferView>> {
+    let mut views = HashMap::new();
+    for work in &plan.list.work {
+        let Work::Pass(pass) = work else { continue };
+        for (binding, &buf) in pass.shader.bindings.iter().zip(&pass.buffers) {
+            if binding.kind != BindingKind::Texel || views.contains_key(&buf) {
+                continue;
+            }
+            let decl = &plan.table[buf.index()];
+            let format = decl.texel.ok_or_else(|| Error::Bug(format!("{} has no texel format", decl.name)))?;
+            let (buffer, offset) = storage.place(plan, buf, frame)?;
+            let bytes = plan.placement(buf)?.bytes;
+            views.insert(buf, BufferView::new(gpu, buffer, vulkan_format(format), offset, bytes)?);
+        }
+    }
+    Ok(views)
+}
+
+fn vulkan_format(format: TexelFormat) -> vk::Format {
+    match format {
+        TexelFormat::Rgba32Sfloat => vk::Format::R32G32B32A32_SFLOAT,
+        TexelFormat::R32Uint => vk::Format::R32_UINT,
+        TexelFormat::R32Sfloat => vk::Format::R32_SFLOAT,
+    }
+}
+
+/// Writes the guards of the scratch buffers of a plan.
+fn write_scratch_guards(recorder: &Recorder<'_>, plan: &Plan, storage: &Storage) -> Result<()> {
+    for (index, decl) in plan.table.iter().enumerate() {
+        if let (Class::Step, Some(place)) = (decl.class, plan.placements[index]) {
+            let (buffer, offset) = storage.place(plan, Buf(index as u16), 0)?;
+            guard::write(recorder, buffer, offset + place.bytes)?;
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,240 @@
+//! The memory behind the plan: a VkBuffer for each buffer that is not scratch, and the pages of the Step arena.
+
+use super::{Scheduler, guard};
+use crate::error::{Error, Result};
+use crate::gpu::{Buffer, Gpu, MemoryKind};
+use crate::scheduler::plan::{Buf, BufferDecl, Capacity, Class, Page, Plan, memory};
+use std::sync::Arc;
+
+/// All buffers of a scheduler.
+pub(super) struct Storage {
+    /// By row of the table, one per copy; empty for scratch.
+    own: Vec<Vec<Buffer>>,
+    /// Pages of the Step arena.
+    step: Vec<Buffer>,
+}
+
+impl Storage {
+    pub(super) fn new(rows: usize) -> Self {
+        Self { own: (0..rows).map(|_| Vec::new()).collect(), step: Vec::new() }
+    }
+
+    /// Where a buffer of a plan lies for a frame.
+    pub(super) fn place(&self, plan: &Plan, buf: Buf, frame: usize) -> Result<(&Buffer, u64)> {
+        let place = plan.placement(buf)?;
+        let buffer = match place.page {
+            Page::Step(page) => self.step.get(page as usize),
+            Page::Own(buf) => return Ok((self.own(buf, copy_of(plan.table[buf.index()].class, frame))?, place.offset)),
+        };
+        Ok((buffer.ok_or_else(|| Error::Bug(format!("no memory for buffer {}", buf.0)))?, place.offset))
+    }
+
+    /// One copy of a buffer that is not scratch.
+    pub(super) fn own(&self, buf: Buf, copy: usize) -> Result<&Buffer> {
+        let buffer = self.own.get(buf.index()).and_then(|copies| copies.get(copy));
+        buffer.ok_or_else(|| Error::Bug(format!("no memory for copy {copy} of buffer {}", buf.0)))
+    }
+
+    /// A page of the Step arena.
+    pub(super) fn step_pages(&self) -> &[Buffer] {
+        &self.step
+    }
+
+    pub(super) fn drop_arena(&mut self) {
+        self.step.clear();
+    }
+
+    /// Allocated bytes.
+    pub(super) fn memory(&self, table: &'static [BufferDecl]) -> Vec<(String, u64)> {
+        let own = table.iter().zip(&self.own).filter(|(_, copies)| !copies.is_empty());
+        let own = own.map(|(decl, copies)| (decl.name.to_owned(), copies.iter().map(Buffer::bytes).sum()));
+        let step = self.step.iter().enumerate().map(|(page, buffer)| (format!("scratch page {page}"), buffer.bytes()));
+        own.chain(step).collect()
+    }
+}
+
+/// Allocates all copies of a buffer; none of a buffer without bytes.
+fn allocate(gpu: &Arc<Gpu>, decl: &BufferDecl, bytes: u64) -> Result<Vec<Buffer>> {
+    let kind = match decl.class {
+        Class::Model | Class::Persistent | Class::Step => MemoryKind::Device,
+        Class::PerFrame => MemoryKind::Upload,
+        Class::Report => MemoryKind::Download,
+    };
+    let copies = if bytes == 0 { 0 } else { decl.class.copies() };
+    (0..copies).map(|_| Buffer::new(gpu, decl.name, bytes, kind)).collect()
+}
+
+impl Scheduler {
+    /// Bytes of one copy of a buffer in its VkBuffer.
+    fn own_bytes(&self, decl: &BufferDecl, capacity: &Capacity) -> Result<u64> {
+        memory::own_bytes(decl, capacity, self.options.plan, self.limits.alignment())
+    }
+
+    /// Allocates every buffer that is not scratch.
+    pub(super) fn allocate_own(&mut self) -> Result<()> {
+        for index in 0..self.table.len() {
+            let decl = &self.table[index];
+            if decl.class != Class::Step {
+                self.storage.own[index] = allocate(&self.gpu, decl, self.own_bytes(decl, &self.capacity)?)?;
+                self.clear(Buf(index as u16))?;
+            }
+        }
+        self.write_own_guards()
+    }
+
+    /// Reallocates what changes its size; Model buffers keep the common prefix, all others start afresh.
+    ///
+    /// Growing buffers go first: should one not fit, those that grew already are merely larger than the old capacities
+    /// ask for, and nothing is lost.
+    pub(super) fn resize_own(&mut self, capacity: Capacity) -> Result<()> {
+        let resized = self.resize_those(&capacity, true).and_then(|()| self.resize_those(&capacity, false));
+        if resized.is_ok() {
+            self.capacity = capacity;
+        } else {
+            // What grew in vain takes memory that others need now; what cannot shrink stays large.
+            let old = self.capacity;
+            if let Err(error) = self.resize_those(&old, false) {
+                tracing::debug!("not all memory is given back: {error}");
+            }
+        }
+        for index in 0..self.table.len() {
+            if matches!(self.table[index].class, Class::Persistent | Class::PerFrame | Class::Report) {
+                self.clear(Buf(index as u16))?;
+            }
+        }
+        self.write_own_guards()?;
+        resized
+    }
+
+    /// Allocates what a failed [`Self::resize_own`] has lost: buffers without content, whose old memory was given up for
+    /// the new and could not be had back.
+    pub(super) fn replace_lost(&mut self) -> Result<()> {
+        for index in 0..self.table.len() {
+            if self.grows(index, &self.capacity)? == Some(true) {
+                return self.resize_own(self.capacity);
+            }
+        }
+        Ok(())
+    }
+
+    fn resize_those(&mut self, capacity: &Capacity, grow: bool) -> Result<()> {
+        for index in 0..self.table.len() {
+            if self.grows(index, capacity)? == Some(grow) {
+                self.resize(index, capacity)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// True if a buffer must grow, false if it may shrink, none if it stays.
+    fn grows(&self, index: usize, capacity: &Capacity) -> Result<Option<bool>> {
+        let decl = &self.table[index];
+        if decl.class == Class::Step {
+            return Ok(None);
+        }
+        let now = self.storage.own[index].first().map_or(0, Buffer::bytes);
+        let wanted = self.own_bytes(decl, capacity)?;
+        Ok((wanted != now).then_some(wanted > now))
+    }
+
+    fn resize(&mut self, index: usize, capacity: &Capacity) -> Result<()> {
+        let (decl, buf) = (&self.table[index], Buf(index as u16));
+        let keep = memory::bytes_of(decl, capacity)?.min(memory::bytes_of(decl, &self.capacity)?);
+        let bytes = self.own_bytes(decl, capacity)?;
+        if decl.class != Class::Model {
+            // Nothing to keep: the old memory is free for the new.
+            let old = std::mem::take(&mut self.storage.own[index]);
+            let old_bytes = old.first().map_or(0, Buffer::bytes);
+            drop(old);
+            return match allocate(&self.gpu, decl, bytes) {
+                Ok(copies) => {
+                    self.storage.own[index] = copies;
+                    Ok(())
+                }
+                Err(error) => {
+                    // The old size fitted a moment ago; should it not now, the first error is still the one to tell, and
+                    // the next list asks again.
+                    self.storage.own[index] = allocate(&self.gpu, decl, old_bytes).unwrap_or_default();
+                    Err(error)
+                }
+            };
+        }
+        let fresh = allocate(&self.gpu, decl, bytes)?;
+        let old = std::mem::replace(&mut self.storage.own[index], fresh);
+        if bytes == 0 {
+            return Ok(());
+        }
+        self.immediately(|recorder, storage, _| {
+            let fresh = storage.own(buf, 0)?;
+            let Some(old) = old.first() else { return recorder.fill(fresh, 0, bytes, 0) };
+            if bytes > keep {
+                recorder.fill(fresh, keep, bytes - keep, 0)?;
+            }
+            recorder.copy((old, 0), (fresh, 0), keep)
+        })
+    }
+
+    /// Zeros in all copies of a buffer that is not scratch.
+    fn clear(&mut self, buf: Buf) -> Result<()> {
+        self.immediately(|recorder, storage, _| {
+            for buffer in &storage.own[buf.index()] {
+                recorder.fill(buffer, 0, buffer.bytes(), 0)?;
+            }
+            Ok(())
+        })
+    }
+
+    /// Makes the Step arena at least this large; if it has to grow, lists that exist are recorded anew.
+    pub(super) fn grow_arena(&mut self, pages: &[u64]) -> Result<()> {
+        let now = self.storage.step.iter().map(Buffer::bytes).collect::<Vec<_>>();
+        let merged = memory::merge_pages([now.as_slice(), pages].into_iter());
+        if merged == now {
+            return Ok(());
+        }
+        self.wait_all()?;
+        let current = self.current.take();
+        let plans = std::mem::take(&mut self.lists).into_iter().map(|list| list.plan).collect::<Vec<_>>();
+        // Scratch has nothing to keep, so the old memory is free for the new. Should the new not fit, no list is left
+        // that could use what is not there, and ids of lists are refused.
+        self.storage.step.clear();
+        let generation = self.generation;
+        self.generation += 1;
+        for (page, bytes) in merged.iter().enumerate() {
+            let name = format!("scratch page {page}");
+            self.storage.step.push(Buffer::new(&self.gpu, &name, *bytes, MemoryKind::Device)?);
+        }
+        for plan in plans {
+            let recordings = self.record(&plan)?;
+            self.lists.push(super::List { plan, recordings });
+        }
+        (self.generation, self.current) = (generation, current);
+        Ok(())
+    }
+
+    /// Fills the Step arena with NaN.
+    pub(super) fn poison(&mut self) -> Result<()> {
+        self.immediately(|recorder, storage, _| {
+            storage.step.iter().try_for_each(|page| recorder.fill(page, 0, page.bytes(), u32::MAX))
+        })
+    }
+
+    /// Writes the guards behind the buffers that are not scratch.
+    fn write_own_guards(&mut self) -> Result<()> {
+        if !self.options.plan.guards {
+            return Ok(());
+        }
+        let (table, capacity) = (self.table, self.capacity);
+        self.immediately(|recorder, storage, _| {
+            for (decl, copies) in table.iter().zip(&storage.own) {
+                let bytes = memory::bytes_of(decl, &capacity)?;
+                copies.iter().try_for_each(|buffer| guard::write(recorder, buffer, bytes))?;
+            }
+            Ok(())
+        })
+    }
+}
+
+/// Buffers of a class have one copy per frame, or one in all.
+pub(super) fn copy_of(class: Class, frame: usize) -> usize {
+    if class.copies() > 1 { frame } else { 0 }
+}

@@ -1,0 +1,280 @@
+//! Each pass of a training step against the reference, on a small scene with labels.
+
+use super::compare::{Band, GradientBounds, Summary, Tolerance, Verdict, close, exact, gradients};
+use super::fixture::{Fixture, GRADIENTS, MOMENTS_1, MOMENTS_2, PARAMETERS, readable};
+use super::judge;
+use super::scenes::{Scene, Shape, dot, plain_camera, scene};
+use crate::engine::Report;
+use crate::error::Result;
+use crate::gpu::Gpu;
+use crate::label::vote::ballot::{Sweep, Voter, sweep};
+use crate::pass::KernelShape;
+use crate::scene::{Gaussians, LabelMap};
+use crate::scheduler::plan::Buf;
+use crate::train::LabelRule;
+use crate::verify::reference::adam::{Optimised, Rates, adam};
+use crate::verify::reference::blend::{Upstream, blend_backward, blend_forward};
+use crate::verify::reference::lift::vote;
+use crate::verify::reference::loss::photo_loss;
+use crate::verify::reference::project::{Splat, project_forward};
+use crate::verify::reference::step::step;
+use crate::verify::reference::tile::{TileGrid, counted_tiles, tiles_within};
+use crate::verify::reference::{Row, Rules};
+use std::sync::Arc;
+
+/// Vulkan lets `exp2`, division, square roots and their like be off by several units in the last place, lavapipe is off
+/// by about one: bounds are this many times what the tests hold lavapipe to.
+pub(super) const LEEWAY: f64 = 8.0;
+/// Decisions (alpha 1/255, the stop) nearer to their threshold than this may fall either way.
+const MARGIN: f64 = 1e-4;
+const COLOUR: Tolerance = Tolerance { absolute: 6.5e-7 * LEEWAY, relative: 0.0 };
+const CUT: Band = Band { width: MARGIN, flip: 0.01, ratio: 0.005 };
+
+const fn bounds(element: f64, whole: f64) -> GradientBounds {
+    GradientBounds {
+        element: Tolerance { absolute: element * LEEWAY, relative: 10.0 * element * LEEWAY },
+        outliers: 0.0,
+        norm: whole * LEEWAY,
+        angle: whole * LEEWAY,
+        bias: whole * LEEWAY,
+    }
+}
+
+/// A step that has run, with every buffer still there.
+pub struct Ran {
+    fixture: Fixture,
+    report: Report,
+    splats: Vec<Splat>,
+    rules: Rules,
+}
+
+impl Ran {
+    /// Runs a step with labels, without an update, to be compared with the reference under `rules`.
+    pub fn new(rules: &Rules, gpu: &Arc<Gpu>, kernels: KernelShape) -> Result<Self> {
+        let shape = Shape { gaussians: 150, width: 61, height: 45, opacities: (-4.0, 7.0), ..Shape::default() };
+        let mut fixture = Fixture::new(Arc::clone(gpu), scene(62, &shape), true, kernels, readable())?;
+        // The paper's rule would change labels from step to step.
+        fixture.config.label_rule = LabelRule::Votes;
+        let report = fixture.train()?;
+        let splats = fixture.splats()?;
+        Ok(Self { fixture, report, splats, rules: rules.clone() })
+    }
+
+    fn pixels(&mut self) -> Result<Vec<[f32; 4]>> {
+        let pixels = self.fixture.pixels();
+        self.fixture.get(Buf::IMAGE, pixels)
+    }
+
+    /// Visible Gaussians come front to back, equals in the order of their rows.
+    pub fn order(&mut self) -> Result<Verdict> {
+        let visible = self.splats.len();
+        let count = self.fixture.scene.gaussians.len();
+        let keys = self.fixture.get::<u32>(Buf::DEPTH_KEYS, count)?;
+        let order = self.fixture.get::<u32>(Buf::DEPTH_VALUES_A, visible)?;
+        let mut expected = order.clone();
+        expected.sort_by_key(|&gaussian| (keys.get(gaussian as usize).copied(), gaussian));
+        let distinct = expected.windows(2).all(|pair| pair[0] != pair[1]);
+        Ok(if visible * 2 > keys.len() && distinct {
+            exact(&order, &expected)
+        } else {
+            Err(format!("{visible} of {} Gaussians are visible, or some are twice", keys.len()))
+        })
+    }
+
+    /// Centres, conics, opacities and colours of splats.
+    pub fn projection(&mut self) -> Result<Verdict> {
+        let (model, camera) = (self.fixture.model(), self.fixture.scene.camera.clone());
+        let projected = |s: &Splat| project_forward(&self.rules, &camera, &model, s.gaussian);
+        let expected: Vec<Splat> = self.splats.iter().map(|s| projected(s).map_or(*s, |p| p.splat)).collect();
+        let kept = self.splats.iter().filter(|s| projected(s).is_some()).count();
+        if kept < self.splats.len() {
+            return Ok(Err(format!("{} splats cannot be seen at all", self.splats.len() - kept)));
+        }
+        // Centres are some 50 px times the roundings of a quotient.
+        Ok(judge::splats(&self.splats, &expected, Tolerance { absolute: 1.4e-5 * LEEWAY, relative: 0.0 }))
+    }
+
+    /// Every tile in which a splat counts is in its list, and the lists are sorted.
+    pub fn tiles(&mut self) -> Result<Verdict> {
+        let pairs = self.report.counters.instance_count as usize;
+        let (keys, _) = self.fixture.sorted_pairs(pairs)?;
+        let owners = self.fixture.sorted_splats(pairs)?;
+        let shape = *self.fixture.engine.shape();
+        let grid =
+            TileGrid { size: self.fixture.size(), tile: (shape.tile_width as usize, shape.tile_height as usize) };
+        let tiles = self.fixture.uniforms().tile_count;
+        let mut found = vec![Vec::new(); self.splats.len()];
+        for (&key, &owner) in keys.iter().zip(&owners) {
+            if let Some(list) = found.get_mut(owner as usize).filter(|_| key < tiles) {
+                list.push(key);
+            }
+        }
+        if !keys.is_sorted() {
+            return Ok(Err("the tile keys are not sorted".to_owned()));
+        }
+        for (index, (splat, found)) in self.splats.iter().zip(&found).enumerate() {
+            let least = counted_tiles(&self.rules, splat, &grid);
+            // The device may list a tile too many within 0.02 in log2 of alpha.
+            let most = tiles_within(&self.rules, splat, &grid, 0.02);
+            if !least.iter().all(|t| found.contains(t)) || !found.iter().all(|t| most.contains(t)) {
+                return Ok(Err(format!("splat {index} is listed in {found:?}; it counts in {least:?} of {most:?}")));
+            }
+        }
+        Ok(Ok(Summary::default()))
+    }
+
+    /// Colours and transmittance.
+    pub fn blend(&mut self) -> Result<Verdict> {
+        let image = self.pixels()?;
+        let expected =
+            blend_forward(&self.rules, &self.splats, self.fixture.size(), self.fixture.scene.target.background);
+        Ok(judge::picture(&image, &expected, (COLOUR, CUT)))
+    }
+
+    /// L1, SSIM, and their gradient by the picture.
+    pub fn loss(&mut self) -> Result<Verdict> {
+        let image: Vec<[f64; 3]> = self.pixels()?.iter().map(|&[r, g, b, _]| [r, g, b].map(f64::from)).collect();
+        let v_image = self.fixture.get::<[f32; 4]>(Buf::V_IMAGE, image.len())?;
+        let photo = &self.fixture.scene.target.photo;
+        let expected = photo_loss(&self.rules, &image, photo);
+        let counters = &self.report.counters;
+        let sums = [counters.loss_l1, counters.loss_ssim].map(|sum| f64::from(sum) / photo.elements());
+        let values = close(&sums, &[expected.l1, expected.ssim], Tolerance { absolute: 1e-6 * LEEWAY, relative: 0.0 });
+        // Near its kink the sign of L1 is anyone's.
+        let sure: Vec<usize> = (0..image.len()).filter(|&i| expected.margins[i] > 1e-5).collect();
+        let actual: Vec<f64> = sure.iter().flat_map(|&i| [0, 1, 2].map(|c| f64::from(v_image[i][c]))).collect();
+        let wanted: Vec<f64> = sure.iter().flat_map(|&i| expected.v_image[i]).collect();
+        Ok(judge::all([values, gradients(&actual, &wanted, bounds(1.1e-6, 4.6e-6))]))
+    }
+
+    /// Gradients of the splats by a step without object layers, from the device's own picture gradient.
+    pub fn blend_backward(&mut self) -> Result<Verdict> {
+        let layers = std::mem::take(&mut self.fixture.input.layers);
+        self.fixture.input.labels = false;
+        self.fixture.train()?;
+        let pixels = self.fixture.pixels();
+        let rows = self.fixture.get::<[f32; 4]>(Buf::V_IMAGE, pixels)?;
+        let v_image =
+            Upstream::of_colours(&rows.iter().map(|&[r, g, b, _]| [r, g, b].map(f64::from)).collect::<Vec<_>>());
+        let splats = self.fixture.splats()?;
+        let actual = self.fixture.splat_gradients(&splats)?;
+        (self.fixture.input.labels, self.fixture.input.layers) = (true, layers);
+        let (size, background) = (self.fixture.size(), self.fixture.scene.target.background);
+        let expected = blend_backward(&self.rules, &splats, size, background, &v_image);
+        let margins = (&expected.margins[..], 1e-5);
+        Ok(judge::splat_gradients(&actual, &expected.values, margins, bounds(4e-7, 4e-7)))
+    }
+
+    /// The gradient of every parameter by photo loss and label losses.
+    pub fn gradient(&mut self) -> Result<Verdict> {
+        self.fixture.train()?;
+        let (model, camera, target) =
+            (self.fixture.model(), self.fixture.scene.camera.clone(), self.fixture.scene.target.clone());
+        let actual = self.fixture.gradient_rows()?;
+        let expected = step(&self.rules, &camera, &model, &target);
+        let sure: Vec<usize> = (0..actual.len()).filter(|&i| expected.margins[i] > 2e-5).collect();
+        if sure.len() * 10 < actual.len() * 4 {
+            return Ok(Err(format!("only {} of {} Gaussians are sure", sure.len(), actual.len())));
+        }
+        let pick = |rows: &[Row]| sure.iter().map(|&i| rows[i]).collect::<Vec<_>>();
+        Ok(judge::rows(&pick(&actual), &pick(&expected.rows), model.sh_degree, bounds(6.7e-6, 2.3e-6)))
+    }
+
+    /// The same step twice: the same bits.
+    pub fn repeated(&mut self) -> Result<Verdict> {
+        let mut bits = || -> Result<Vec<u32>> {
+            self.fixture.train()?;
+            let (pixels, visible) = (self.fixture.pixels(), self.splats.len());
+            let mut all: Vec<u32> = self.fixture.get::<u32>(Buf::IMAGE, pixels * 4)?;
+            for plane in [GRADIENTS[0], GRADIENTS[1], GRADIENTS[2], GRADIENTS[3]] {
+                all.extend(self.fixture.get::<u32>(plane, visible * 4)?);
+            }
+            Ok(all)
+        };
+        let (first, second) = (bits()?, bits()?);
+        Ok(exact(&second, &first))
+    }
+
+    /// Sums of blending weights by label of the mask.
+    pub fn votes(&mut self) -> Result<Verdict> {
+        let (size, count) = (self.fixture.size(), self.fixture.scene.gaussians.len());
+        let (camera, target) = (self.fixture.scene.camera.clone(), &self.fixture.scene.target);
+        let ids = target.label_map.iter().map(|&id| id as u16).collect();
+        let mask = LabelMap { width: camera.width, height: camera.height, ids };
+        let voter = Voter { camera: &camera, mask: &mask, photo: None, trust: None };
+        let how = Sweep { near: self.fixture.config.near, border: 0 };
+        let ballot = sweep(&mut self.fixture.engine, &[voter], how)?;
+        let actual = ballot.weights();
+        let column = |id: &u16| ballot.labels.iter().position(|label| label == id);
+        let columns: Vec<Option<usize>> = mask.ids.iter().map(column).collect();
+        let expected = vote(&self.rules, &self.splats, size, count, &columns, &vec![1.0; ballot.labels.len()]);
+        // Each tile's sum is rounded to 2^-16, and there are at most 48 tiles; what is at the cut may fall either way.
+        Ok(close(&actual, &expected, Tolerance { absolute: 48.0 * 0.5 / 65_536.0 + 0.02, relative: 1e-4 }))
+    }
+
+    /// Adam on all attributes, each of three steps from the state that the device had before it.
+    pub fn adam(&mut self) -> Result<Verdict> {
+        let count = self.fixture.scene.gaussians.len();
+        let mut verdicts = Vec::new();
+        self.fixture.input.update = true;
+        for step in 1..=3 {
+            (self.fixture.input.step, self.fixture.input.updates) = (step, step);
+            let before = states(&mut self.fixture, count)?;
+            self.fixture.train()?;
+            let (u, gradients) = (self.fixture.uniforms(), self.fixture.gradient_rows()?);
+            let after = states(&mut self.fixture, count)?;
+            let ([means, opacity], rest) = ([u.rate_means[0], u.rate_means[3]], u.rate_sh_rest);
+            let rates =
+                Rates([means, u.rate_quats, u.rate_scales, opacity, u.rate_sh0, rest, rest, rest].map(f64::from));
+            let mirror = |(state, gradient)| adam(&self.rules, &rates, step, state, gradient);
+            let expected: Vec<Optimised> = before.iter().zip(&gradients).map(mirror).collect();
+            verdicts.push(judge::updates(&after, &expected, &rates));
+        }
+        self.fixture.input.update = false;
+        Ok(judge::all(verdicts))
+    }
+}
+
+fn states(fixture: &mut Fixture, count: usize) -> Result<Vec<Optimised>> {
+    let (rows, m, u) =
+        (fixture.rows(PARAMETERS, count)?, fixture.rows(MOMENTS_1, count)?, fixture.rows(MOMENTS_2, count)?);
+    Ok((0..count).map(|i| Optimised { row: rows[i], m: m[i], u: u[i] }).collect())
+}
+
+/// More splats in one tile than some drivers run rounds of a loop (65,535). Nearly all are over one corner; those behind
+/// them all are over the opposite one, where they show only if the walk goes to its end.
+pub fn long_list(gpu: &Arc<Gpu>, kernels: KernelShape) -> Result<Verdict> {
+    const SPLATS: usize = 70_000;
+    let camera = plain_camera(8, 8);
+    let row = |i: usize| {
+        let at = if i + 5 < SPLATS { [0.5, 0.5] } else { [7.5, 7.5] };
+        dot(&camera, at, 1.0 + i as f64 * 1e-4, 0.3, 0.3)
+    };
+    let rows: Vec<Row> = (0..SPLATS).map(row).collect();
+    let template = scene(1, &Shape { gaussians: 1, width: 8, height: 8, objects: 1, ..Shape::default() });
+    let scene = Scene { camera, gaussians: grey(&rows), ..template };
+    let mut fixture = Fixture::new(Arc::clone(gpu), scene, false, kernels, readable())?;
+    let report = fixture.render()?;
+    let listed = report.counters.longest_list;
+    if (listed as usize) < SPLATS - 5 {
+        return Ok(Err(format!("the longest list has {listed} splats, {SPLATS} are in the tile")));
+    }
+    let splats = fixture.splats()?;
+    let expected = blend_forward(&Rules::default(), &splats, fixture.size(), fixture.scene.target.background);
+    let pixels = fixture.pixels();
+    let image = fixture.get::<[f32; 4]>(Buf::IMAGE, pixels)?;
+    Ok(judge::picture(&image, &expected, (COLOUR, CUT)))
+}
+
+/// Gaussians of degree 0 with these parameters.
+fn grey(rows: &[Row]) -> Gaussians {
+    let three = |of: fn(&Row) -> [f64; 3]| rows.iter().map(|row| of(row).map(|v| v as f32)).collect::<Vec<_>>();
+    Gaussians {
+        means: three(|row| row.mean),
+        quats: rows.iter().map(|row| row.quat.map(|v| v as f32)).collect(),
+        scales: three(|row| row.scale),
+        opacities: rows.iter().map(|row| row.opacity as f32).collect(),
+        sh0: three(|row| row.sh[0]),
+        ..Gaussians::default()
+    }
+}

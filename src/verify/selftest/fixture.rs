@@ -1,0 +1,312 @@
+//! A scene on the device: runs the engine's own pass lists and reads every buffer back.
+
+use super::scenes::Scene;
+use crate::engine::{Engine, EngineSize, LabelSize, ListKey, Report};
+use crate::error::Result;
+use crate::gpu::Gpu;
+use crate::pass::{KernelShape, Variant};
+use crate::scene::{LabelMap, Photo};
+use crate::scheduler::SchedulerOptions;
+use crate::scheduler::plan::{Buf, PlanOptions};
+use crate::shaders::structs::StepUniforms;
+use crate::train::near::NEAR;
+use crate::train::step_input::{self, SceneScale, StepInput, TrainView};
+use crate::train::{LabelRule, TrainConfig};
+use crate::verify::reference::loss::ObjectPixel;
+use crate::verify::reference::model::ROW_FLOATS;
+use crate::verify::reference::project::{Splat, SplatGradient};
+use crate::verify::reference::{Model, Row};
+use bytemuck::Pod;
+use std::f64::consts::LN_2;
+use std::sync::Arc;
+
+/// Planes of the parameters in the order of `plane_rows`.
+pub const PARAMETERS: [Buf; 7] = [Buf::MEANS, Buf::SCALES, Buf::QUATS, Buf::SH0, Buf::SH1, Buf::SH2, Buf::SH3];
+/// First moments.
+pub const MOMENTS_1: [Buf; 7] =
+    [Buf::M_MEANS, Buf::M_SCALES, Buf::M_QUATS, Buf::M_SH0, Buf::M_SH1, Buf::M_SH2, Buf::M_SH3];
+/// Second moments.
+pub const MOMENTS_2: [Buf; 7] =
+    [Buf::U_MEANS, Buf::U_SCALES, Buf::U_QUATS, Buf::U_SH0, Buf::U_SH1, Buf::U_SH2, Buf::U_SH3];
+/// Gradients, by splat.
+pub const GRADIENTS: [Buf; 7] =
+    [Buf::V_MEANS, Buf::V_SCALES, Buf::V_QUATS, Buf::V_SH0, Buf::V_SH1, Buf::V_SH2, Buf::V_SH3];
+
+/// Floats of each plane, and where they go in `Row::floats`: (floats, runs of (from, to, length)).
+const LAYOUT: [(usize, &[(usize, usize, usize)]); 7] = [
+    (4, &[(0, 0, 3), (3, 10, 1)]),
+    (4, &[(0, 7, 3)]),
+    (4, &[(0, 3, 4)]),
+    (4, &[(0, 11, 3)]),
+    (12, &[(0, 14, 9)]),
+    (16, &[(0, 23, 15)]),
+    (24, &[(0, 38, 21)]),
+];
+
+/// Labels that the engine counts votes for at once: few, so that sweeps need several rounds.
+pub const VOTE_COLUMNS: u32 = 3;
+
+/// A scene, an engine with its model, and the step that is run.
+pub struct Fixture {
+    /// The engine.
+    pub engine: Engine,
+    /// The scene.
+    pub scene: Scene,
+    /// What the host knows of the view.
+    pub view: TrainView,
+    /// The step.
+    pub input: StepInput,
+    /// The settings.
+    pub config: TrainConfig,
+    /// Extent of the scene.
+    pub fixed: SceneScale,
+}
+
+/// Scheduler options in which every buffer can be read back.
+pub fn readable() -> SchedulerOptions {
+    let plan = PlanOptions { alias: false, guards: true, barrier_everywhere: false };
+    SchedulerOptions { plan, poison_step: true, ..SchedulerOptions::default() }
+}
+
+/// What the trainer keeps of a scene's only view.
+pub fn train_view(scene: &Scene) -> TrainView {
+    let (target, camera) = (&scene.target, scene.camera.clone());
+    let rgba = (target.photo.colours.iter().zip(&target.photo.valid))
+        .map(|(c, &valid)| {
+            let [r, g, b] = c.map(|v| (v * 255.0).round() as u8);
+            [r, g, b, if valid { 255 } else { 0 }]
+        })
+        .collect();
+    let (width, height) = (camera.width, camera.height);
+    let mask = LabelMap { width, height, ids: target.label_map.iter().map(|&id| id as u16).collect() };
+    let occluders = |slot: &ObjectPixel| (slot.label as u16, slot.occluders.iter().map(|&id| id as u16).collect());
+    let photo = Photo { width, height, rgba };
+    TrainView {
+        name: "the view".to_owned(),
+        shown: step_input::shown_objects(&photo, &target.label_map),
+        view_labels: target.label_map.clone(),
+        photo,
+        valid_pixels: target.photo.valid.iter().filter(|&&valid| valid).count() as u64,
+        objects: mask.objects(),
+        mask: Some(mask),
+        occluders: target.slots.iter().map(occluders).collect(),
+        camera,
+    }
+}
+
+impl Fixture {
+    /// The scene on a device, with or without labels, with kernels of a given shape. Without [`readable`] only some
+    /// buffers can be read back.
+    pub fn new(
+        gpu: Arc<Gpu>,
+        scene: Scene,
+        labels: bool,
+        shape: KernelShape,
+        options: SchedulerOptions,
+    ) -> Result<Self> {
+        let room = EngineSize {
+            gaussians: scene.gaussians.len().max(1) as u64,
+            size: (scene.camera.width, scene.camera.height),
+            trained: true,
+            labels: labels.then(|| LabelSize {
+                max_label: scene.target.label_map.iter().copied().max().unwrap_or(0).max(1),
+                layers: scene.target.slots.len() as u32,
+                vote_columns: VOTE_COLUMNS,
+            }),
+        };
+        let mut engine = Engine::with_shape(gpu, shape, room, options)?;
+        engine.upload_model(&scene.gaussians)?;
+        let config = TrainConfig {
+            background: scene.target.background.map(|v| v as f32),
+            sh_degree: scene.gaussians.sh_degree,
+            label_rule: LabelRule::Main,
+            // What the mirrors' rules have.
+            label_weight: 1.0,
+            label_alpha: 0.1,
+            label_balance: true,
+            near: NEAR,
+            ..TrainConfig::default()
+        };
+        let layers =
+            if labels { scene.target.slots.iter().map(|slot| slot.label as u16).collect() } else { Vec::new() };
+        let input = StepInput { step: 1, view: 0, layers, labels, update: false, updates: 1, stamp: 7 };
+        let view = train_view(&scene);
+        let mut fixture = Self { view, engine, scene, input, config, fixed: SceneScale { extent: 1.0 } };
+        let weights = step_input::layer_weights(&fixture.input, &fixture.view, &fixture.config);
+        fixture.scene.target.slots.iter_mut().zip(weights).for_each(|(slot, weight)| slot.weight = f64::from(weight));
+        Ok(fixture)
+    }
+
+    /// The uniforms of the step.
+    pub fn uniforms(&self) -> StepUniforms {
+        step_input::uniforms(&self.input, &self.view, &self.config, self.fixed, &self.engine)
+    }
+
+    /// The list of a training step.
+    pub fn key(&self) -> ListKey {
+        let (labels, update) = (self.input.labels, self.input.update);
+        let size = (self.scene.camera.width, self.scene.camera.height);
+        let lift = self.input.lifts(&self.config);
+        ListKey::Train(Variant { labels, lift, sh_degree: self.config.sh_degree, size, update, counts: false })
+    }
+
+    /// The device's sorted pairs: keys and slots.
+    pub fn sorted_pairs(&mut self, count: usize) -> Result<(Vec<u32>, Vec<u32>)> {
+        let virtual_tiles = self.engine.sched().capacity().virtual_tiles;
+        let bits = 64 - (virtual_tiles - 1).leading_zeros();
+        let passes = bits.div_ceil(self.engine.shape().digit_bits);
+        let (keys, values) = if passes.is_multiple_of(2) {
+            (Buf::TILE_KEYS_A, Buf::TILE_VALUES_A)
+        } else {
+            (Buf::TILE_KEYS_B, Buf::TILE_VALUES_B)
+        };
+        Ok((self.get(keys, count)?, self.get(values, count)?))
+    }
+
+    /// The splats of the sorted (splat, tile) pairs.
+    pub fn sorted_splats(&mut self, count: usize) -> Result<Vec<u32>> {
+        let splat_from_instance = self.get::<u32>(Buf::SPLAT_FROM_INSTANCE, count)?;
+        let slots = self.sorted_pairs(count)?.1;
+        Ok(slots.into_iter().map(|slot| splat_from_instance.get(slot as usize).copied().unwrap_or(u32::MAX)).collect())
+    }
+
+    /// Runs a training step; no pass may write outside of its buffers.
+    pub fn train(&mut self) -> Result<Report> {
+        let key = self.key();
+        self.run(key, Self::upload)
+    }
+
+    /// Writes what the host gives to a step.
+    fn upload(&mut self) -> Result<()> {
+        let uniforms = self.uniforms();
+        step_input::upload(&mut self.engine, 0, uniforms, &self.view, &self.input, &self.config)
+    }
+
+    /// Runs a list, again with more memory if that was too small. `upload` writes what the host gives.
+    pub fn run(&mut self, key: ListKey, upload: impl Fn(&mut Self) -> Result<()>) -> Result<Report> {
+        loop {
+            // Records of pairs are valid by the mark of their submit.
+            self.input.stamp = self.input.stamp % u32::MAX + 1;
+            upload(self)?;
+            let list = self.engine.list(key)?;
+            self.engine.sched_mut().run(list, 0)?;
+            let report = self.engine.report(0)?;
+            self.engine.sched_mut().check_guards()?;
+            if !self.engine.recover(&report)? {
+                return Ok(report);
+            }
+        }
+    }
+
+    /// Runs the list of a render.
+    pub fn render(&mut self) -> Result<Report> {
+        self.run(ListKey::Render(self.config.sh_degree), Self::upload)
+    }
+
+    /// The first `count` values of a buffer.
+    pub fn get<T: Pod>(&mut self, buf: Buf, count: usize) -> Result<Vec<T>> {
+        self.engine.sched_mut().download(buf, 0, 0, count)
+    }
+
+    /// Width and height, px.
+    pub fn size(&self) -> (usize, usize) {
+        (self.scene.camera.width as usize, self.scene.camera.height as usize)
+    }
+
+    /// Number of pixels.
+    pub fn pixels(&self) -> usize {
+        self.size().0 * self.size().1
+    }
+
+    /// Splats that the device projected, in its order.
+    pub fn splats(&mut self) -> Result<Vec<Splat>> {
+        let visible = self.engine.report(0)?.counters.visible_count as usize;
+        let order = self.get::<u32>(Buf::DEPTH_VALUES_A, visible)?;
+        let records = self.get::<[f32; 12]>(Buf::SPLATS, visible)?;
+        Ok(order.iter().zip(&records).map(|(&gaussian, record)| splat_of(gaussian, record)).collect())
+    }
+
+    /// Gradients of the splats.
+    pub fn splat_gradients(&mut self, splats: &[Splat]) -> Result<Vec<SplatGradient>> {
+        let records = self.get::<[f32; 12]>(Buf::V_SPLATS, splats.len())?;
+        let wide = |record: &[f32; 12]| record.map(f64::from);
+        let gradients = (records.iter().map(wide).zip(splats))
+            .map(|(v, splat)| SplatGradient {
+                mean2d: [v[0], v[1]],
+                conic: [v[2], v[3], v[4]],
+                // The record holds the derivative by ln o.
+                opacity: v[5] / splat.opacity,
+                colour: [v[6], v[7], v[8]],
+            })
+            .collect();
+        Ok(gradients)
+    }
+
+    /// `count` rows of a set of planes (parameters, moments or gradients).
+    pub fn rows(&mut self, planes: [Buf; 7], count: usize) -> Result<Vec<Row>> {
+        let mut floats = vec![[0.0; ROW_FLOATS]; count];
+        let bands = [true, true, true, true].into_iter().chain((1..=3).map(|band| band <= self.config.sh_degree));
+        for ((plane, (stride, runs)), _) in
+            planes.into_iter().zip(LAYOUT).zip(bands.collect::<Vec<_>>()).filter(|p| p.1)
+        {
+            let values = self.get::<f32>(plane, count * stride)?;
+            for (row, values) in floats.iter_mut().zip(values.chunks_exact(stride)) {
+                for &(from, to, length) in runs {
+                    (0..length).for_each(|i| row[to + i] = f64::from(values[from + i]));
+                }
+            }
+        }
+        Ok(floats.iter().map(Row::from_floats).collect())
+    }
+
+    /// Writes a set of planes; rows must hold f32 values.
+    pub fn put_rows(&mut self, planes: [Buf; 7], rows: &[Row]) -> Result<()> {
+        for (plane, (stride, runs)) in planes.into_iter().zip(LAYOUT) {
+            let mut values = vec![0.0_f32; rows.len() * stride];
+            for (row, values) in rows.iter().zip(values.chunks_exact_mut(stride)) {
+                let floats = row.floats();
+                for &(from, to, length) in runs {
+                    (0..length).for_each(|i| values[from + i] = floats[to + i] as f32);
+                }
+            }
+            self.engine.sched_mut().upload(plane, 0, 0, &values)?;
+        }
+        Ok(())
+    }
+
+    /// The gradients of the last step by Gaussian; 0 where it has no splat.
+    pub fn gradient_rows(&mut self) -> Result<Vec<Row>> {
+        let splats = self.splats()?;
+        let by_splat = self.rows(GRADIENTS, splats.len())?;
+        let mut rows = vec![Row::default(); self.scene.gaussians.len()];
+        for (splat, row) in splats.iter().zip(by_splat) {
+            if let Some(to) = rows.get_mut(splat.gaussian) {
+                *to = row;
+            }
+        }
+        Ok(rows)
+    }
+
+    /// The model for the mirrors.
+    pub fn model(&self) -> Model {
+        self.scene.model()
+    }
+
+    /// Labels of the sampled objects.
+    pub fn slots(&self) -> Vec<u32> {
+        self.input.layers.iter().map(|&label| u32::from(label)).collect()
+    }
+}
+
+/// A splat from its record (glsl/include/record.glsl).
+pub fn splat_of(gaussian: u32, record: &[f32; 12]) -> Splat {
+    let [x, y, a, b, c, log2_o, red, green, blue, depth, _, _] = record.map(f64::from);
+    Splat {
+        gaussian: gaussian as usize,
+        depth,
+        mean2d: [x, y],
+        conic: [-2.0 * LN_2 * a, -LN_2 * b, -2.0 * LN_2 * c],
+        opacity: log2_o.exp2(),
+        colour: [red, green, blue],
+    }
+}

@@ -1,0 +1,117 @@
+//! The device against the reference: what `labelgs selftest` runs for a user, and what the tests build on.
+
+mod checks;
+pub mod compare;
+pub mod fixture;
+pub mod judge;
+pub mod model;
+pub mod scenes;
+mod training;
+
+use crate::error::{Error, Result};
+use crate::gpu::Gpu;
+use crate::pass::KernelShape;
+use crate::verify::reference::Rules;
+use checks::Ran;
+use compare::Verdict;
+use std::sync::Arc;
+use std::time::Instant;
+
+/// One check of the self-test.
+#[derive(Clone, Debug)]
+pub struct Check {
+    /// What was checked.
+    pub name: String,
+    /// What was measured, or what is wrong.
+    pub verdict: Verdict,
+    /// Seconds that it took, compilation by the driver included.
+    pub seconds: f64,
+}
+
+impl Check {
+    /// Largest error in units of what is allowed; none where it failed.
+    pub fn worst(&self) -> Option<f64> {
+        self.verdict.as_ref().ok().map(|summary| summary.worst.max(summary.whole))
+    }
+}
+
+/// One step against the reference, where a driver does not let subgroup sizes be chosen: kernels for other subgroups than
+/// those that run compute nonsense and write where they may not.
+pub fn canary(gpu: &Arc<Gpu>) -> Result<()> {
+    let found = gpu.capabilities();
+    let step = || -> Result<Verdict> {
+        let mut ran = Ran::new(&Rules::default(), gpu, KernelShape::of(found))?;
+        Ok(judge::all([ran.tiles()?, ran.blend()?, ran.loss()?, ran.gradient()?]))
+    };
+    let problem = match step() {
+        Ok(Ok(_)) => return Ok(()),
+        Ok(Err(problem)) => problem,
+        Err(lost @ Error::DeviceLost { .. }) => return Err(lost),
+        // Sums that are nonsense ask for all memory there is.
+        Err(other) => other.to_string(),
+    };
+    Err(Error::NoDevice(format!(
+        "{} ({} {}) tells of subgroups of {} and does not let their size be chosen; a step with such subgroups goes wrong \
+         ({problem}): see `labelgs selftest`; try another version of the driver or another --device",
+        found.name,
+        found.driver_name,
+        found.driver_info,
+        gpu.subgroup_size()
+    )))
+}
+
+/// Runs every check on a device and hands each to `done` as it ends. An error is a failure of the device itself, such
+/// as a lack of memory.
+pub fn run(gpu: &Arc<Gpu>, done: impl FnMut(Check)) -> Result<()> {
+    run_against(&Rules::default(), gpu, done)
+}
+
+/// The same against other rules than the engine's, to see that the checks can fail.
+pub fn run_against(rules: &Rules, gpu: &Arc<Gpu>, mut done: impl FnMut(Check)) -> Result<()> {
+    let kernels = KernelShape::of(gpu.capabilities());
+    let other = KernelShape { texel: !kernels.texel, ..kernels };
+    for (kernels, reads) in [(kernels, ""), (other, if other.texel { ", texel reads" } else { ", storage reads" })] {
+        let start = Instant::now();
+        let mut ran = Ran::new(rules, gpu, kernels)?;
+        let prepared = start.elapsed().as_secs_f64();
+        type Pass = fn(&mut Ran) -> Result<Verdict>;
+        let passes: [(&str, Pass); 10] = [
+            ("depth order", Ran::order),
+            ("projection", Ran::projection),
+            ("tile lists", Ran::tiles),
+            ("blend forward", Ran::blend),
+            ("photo loss and its gradient", Ran::loss),
+            ("votes", Ran::votes),
+            ("blend backward", Ran::blend_backward),
+            ("gradient of a step with labels", Ran::gradient),
+            ("the same step twice, bit by bit", Ran::repeated),
+            ("Adam", Ran::adam),
+        ];
+        for (index, (name, pass)) in passes.into_iter().enumerate() {
+            let start = Instant::now();
+            let verdict = pass(&mut ran)?;
+            let before = if index == 0 { prepared } else { 0.0 };
+            done(Check { name: format!("{name}{reads}"), verdict, seconds: start.elapsed().as_secs_f64() + before });
+        }
+    }
+    type Change = fn(&Rules, &Arc<Gpu>, KernelShape, f64) -> Result<Verdict>;
+    let changes: [(&str, Change); 3] = [
+        ("densification", model::densification),
+        ("reset of opacities", model::reset),
+        ("lift of labels by the paper's rule", model::lift_of_a_step),
+    ];
+    for (name, change) in changes {
+        let start = Instant::now();
+        let verdict = change(rules, gpu, kernels, checks::LEEWAY)?;
+        done(Check { name: name.to_owned(), verdict, seconds: start.elapsed().as_secs_f64() });
+    }
+    type Whole = fn(&Arc<Gpu>, KernelShape) -> Result<Verdict>;
+    let wholes: [(&str, Whole); 2] =
+        [("70,000 splats in a tile", checks::long_list), ("training twice, bit by bit", training::twice)];
+    for (name, whole) in wholes {
+        let start = Instant::now();
+        let verdict = whole(gpu, kernels)?;
+        done(Check { name: name.to_owned(), verdict, seconds: start.elapsed().as_secs_f64() });
+    }
+    Ok(())
+}

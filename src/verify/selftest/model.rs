@@ -1,0 +1,226 @@
+//! What changes the model besides Adam, against the reference: densification, the reset of opacities, the lift of labels.
+
+use super::compare::{Tolerance, Verdict, close, exact};
+use super::fixture::{Fixture, MOMENTS_1, MOMENTS_2, PARAMETERS, readable};
+use super::scenes::{Scene, Shape, population, scene};
+use crate::engine::ListKey;
+use crate::error::Result;
+use crate::gpu::Gpu;
+use crate::pass::KernelShape;
+use crate::scene::Gaussians;
+use crate::scheduler::plan::Buf;
+use crate::shaders::structs::{Counters, StepUniforms};
+use crate::train::TrainConfig;
+use crate::verify::reference::blend::blend_forward;
+use crate::verify::reference::densify::{Origin, Population, densify, mark, opacity_reset};
+use crate::verify::reference::lift::{Masks, centres_of, lift, lift_resolve};
+use crate::verify::reference::project::Splat;
+use crate::verify::reference::random::normal_draw;
+use crate::verify::reference::step::Target;
+use crate::verify::reference::{Row, Rules};
+use std::sync::Arc;
+
+const SEED: u32 = 0x1234_5678;
+
+/// A fixture whose model is a population, with moments and statistics, and the uniforms that change it at `step` in a scene of
+/// extent 1.
+fn holding(fixture: &mut Fixture, before: &Population, step: u32) -> Result<StepUniforms> {
+    fixture.put_rows(MOMENTS_1, &before.m)?;
+    fixture.put_rows(MOMENTS_2, &before.u)?;
+    let stats: Vec<[f32; 2]> =
+        before.gradient_sum.iter().zip(&before.gradient_count).map(|(&s, &n)| [s as f32, n as f32]).collect();
+    fixture.engine.sched_mut().upload(Buf::DENSIFY_STATS, 0, 0, &stats)?;
+    let (config, with_resets) = (&fixture.config, TrainConfig::paper());
+    Ok(StepUniforms {
+        densify_threshold: config.densify_grad_threshold,
+        densify_scale: config.percent_dense,
+        prune_scale: config.max_scale,
+        prune_opacity: config.min_opacity,
+        prune_big: u32::from(with_resets.prunes_large_at(step)),
+        seed: SEED,
+        ..fixture.uniforms()
+    })
+}
+
+/// A scene for a population: its picture does not matter.
+pub fn scene_of(population: &Population) -> Scene {
+    let template = scene(1, &Shape { gaussians: 1, ..Shape::default() });
+    Scene { gaussians: gaussians(population), ..template }
+}
+
+fn gaussians(population: &Population) -> Gaussians {
+    let narrow = |v: f64| v as f32;
+    let rows = &population.model.rows;
+    Gaussians {
+        means: rows.iter().map(|r| r.mean.map(narrow)).collect(),
+        quats: rows.iter().map(|r| r.quat.map(narrow)).collect(),
+        scales: rows.iter().map(|r| r.scale.map(narrow)).collect(),
+        opacities: rows.iter().map(|r| narrow(r.opacity)).collect(),
+        sh0: rows.iter().map(|r| r.sh[0].map(narrow)).collect(),
+        sh_rest: rows.iter().flat_map(|r| r.sh[1..].iter().map(|c| c.map(narrow))).collect(),
+        sh_degree: 3,
+        labels: Some(population.model.labels.clone()),
+        ..Gaussians::default()
+    }
+}
+
+/// A densification that has run.
+pub struct Densified {
+    step: u32,
+    before: Population,
+    counted: Counters,
+    applied: Counters,
+    marks: Vec<u32>,
+    after: [Vec<Row>; 3],
+    labels: Vec<u32>,
+    stats: Vec<f32>,
+}
+
+impl Densified {
+    /// Counts and applies a densification at `step`; the fixture has the population as its model.
+    pub fn new(fixture: &mut Fixture, before: Population, step: u32) -> Result<Self> {
+        let rows = before.model.rows.len();
+        fixture.engine.make_room_for_gaussians(2 * rows as u64 + 1)?;
+        let uniforms = holding(fixture, &before, step)?;
+        let upload = |fixture: &mut Fixture| fixture.engine.sched_mut().upload(Buf::STEP, 0, 0, &[uniforms]);
+        let counted = fixture.run(ListKey::DensifyCount, upload)?.counters;
+        let marks = fixture.get::<u32>(Buf::CHILDREN_COUNTS, rows)?;
+        let applied = fixture.run(ListKey::DensifyApply, upload)?.counters;
+        let count = counted.densified_count as usize;
+        let after =
+            [fixture.rows(PARAMETERS, count)?, fixture.rows(MOMENTS_1, count)?, fixture.rows(MOMENTS_2, count)?];
+        let (labels, stats) = (fixture.get(Buf::LABELS, count)?, fixture.get(Buf::DENSIFY_STATS, 2 * count)?);
+        Ok(Self { step, before, counted, applied, marks, after, labels, stats })
+    }
+
+    /// The same by the reference under `rules`. Everything is copied but the places and scales of children, which may be
+    /// off by `tolerance`.
+    pub fn verdict(&self, rules: &Rules, tolerance: Tolerance) -> Verdict {
+        let normal = |row: usize, child: u32, axis: usize| normal_draw(SEED, row as u32, 3 * child + axis as u32);
+        let expected = densify(rules, &self.before, 1.0, self.step, normal);
+        let nearest = expected.margins.iter().copied().fold(f64::INFINITY, f64::min);
+        if nearest <= 1e-6 {
+            return Err(format!("a decision of this seed is too near to a threshold: {nearest}"));
+        }
+        if self.counted != self.applied {
+            return Err(format!("counted {:?}, applied {:?}", self.counted, self.applied));
+        }
+        exact(&self.marks, &mark(rules, &self.before, 1.0, self.step))?;
+        exact(&self.labels, &expected.model.labels)?;
+        exact(&self.stats, &vec![0.0; self.stats.len()])?;
+        let of = |origin: Origin| expected.origins.iter().filter(|(_, o)| *o == origin).count() as u32;
+        let counts = [self.counted.cloned_count, self.counted.split_count];
+        exact(&counts, &[of(Origin::Clone), of(Origin::Child(1))])?;
+        let floats = |rows: &[Row]| -> Vec<f64> { rows.iter().flat_map(Row::floats).collect() };
+        exact(&floats(&self.after[1]), &floats(&expected.m))?;
+        exact(&floats(&self.after[2]), &floats(&expected.u))?;
+        close(&floats(&self.after[0]), &floats(&expected.model.rows), tolerance)
+    }
+}
+
+/// A reset of opacities that has run.
+pub struct Reset {
+    before: Population,
+    after: Vec<f64>,
+    labels: Vec<u32>,
+}
+
+impl Reset {
+    /// Resets; the fixture has the population as its model.
+    pub fn new(fixture: &mut Fixture, before: Population) -> Result<Self> {
+        let uniforms = holding(fixture, &before, 3000)?;
+        fixture
+            .run(ListKey::OpacityReset, |fixture| fixture.engine.sched_mut().upload(Buf::STEP, 0, 0, &[uniforms]))?;
+        let count = before.model.rows.len();
+        let planes =
+            [fixture.rows(PARAMETERS, count)?, fixture.rows(MOMENTS_1, count)?, fixture.rows(MOMENTS_2, count)?];
+        let after = planes.iter().flatten().flat_map(Row::floats).collect();
+        Ok(Self { before, after, labels: fixture.get(Buf::LABELS, count)? })
+    }
+
+    /// The same by the reference under `rules`.
+    pub fn verdict(&self, rules: &Rules, tolerance: Tolerance) -> Verdict {
+        let mut planes = [self.before.model.rows.clone(), self.before.m.clone(), self.before.u.clone()];
+        let [rows, m, u] = &mut planes;
+        for ((row, m), u) in rows.iter_mut().zip(m).zip(u) {
+            opacity_reset(rules, row, m, u);
+        }
+        exact(&self.labels, &self.before.model.labels)?;
+        let expected: Vec<f64> = planes.iter().flatten().flat_map(Row::floats).collect();
+        close(&self.after, &expected, tolerance)
+    }
+}
+
+/// The paper's lift of labels in a step that has run.
+pub struct Lifted {
+    before: Vec<u32>,
+    after: Vec<u32>,
+    splats: Vec<Splat>,
+    sampled: Vec<u32>,
+    target: Target,
+    size: (usize, usize),
+    gpf: bool,
+}
+
+impl Lifted {
+    /// Runs a training step; the scene has the labels before it.
+    pub fn new(fixture: &mut Fixture) -> Result<Self> {
+        let before = fixture.model().labels;
+        fixture.train()?;
+        let (after, splats) = (fixture.get(Buf::LABELS, before.len())?, fixture.splats()?);
+        let (sampled, target) = (fixture.slots(), fixture.scene.target.clone());
+        Ok(Self { before, after, splats, sampled, target, size: fixture.size(), gpf: fixture.config.gpf })
+    }
+
+    /// The same by the reference under `rules`: those that it must change are changed, and no others. Where several
+    /// Gaussians have nearly the same weight, either may win.
+    pub fn verdict(&self, rules: &Rules) -> Verdict {
+        let (before, target) = (&self.before, &self.target);
+        let image = blend_forward(rules, &self.splats, self.size, target.background);
+        let masks = Masks { label_map: &target.label_map, sampled: &self.sampled, gpf: self.gpf };
+        let votes = lift(rules, &image, &centres_of(&self.splats, before.len()), &masks);
+        let mut expected = before.clone();
+        lift_resolve(&votes, &mut expected);
+        let changed = expected.iter().zip(before).filter(|(a, b)| a != b).count();
+        let sure: Vec<usize> = (0..before.len()).filter(|&i| votes.margins[i] > 1e-5).collect();
+        if changed < 3 || sure.len() * 10 <= before.len() * 9 {
+            return Err(format!("{changed} labels change, {} of {} are sure", sure.len(), before.len()));
+        }
+        let pick = |of: &[u32]| sure.iter().map(|&i| of[i]).collect::<Vec<_>>();
+        exact(&pick(&self.after), &pick(&expected))
+    }
+}
+
+/// Gaussians large and opaque enough to dominate pixels; masks are three columns, with nothing at the upper border.
+pub fn dominant(seed: u64) -> Scene {
+    let shape = Shape { scales: (0.1, 0.5), opacities: (1.0, 8.0), ..Shape::default() };
+    let mut s = scene(seed, &Shape { gaussians: 50, width: 61, height: 45, ..shape });
+    for (index, label) in s.target.label_map.iter_mut().enumerate() {
+        *label = if index / 61 < 6 { 0 } else { (index % 61 * 3 / 61 + 1) as u32 };
+    }
+    s
+}
+
+fn rig_of(gpu: &Arc<Gpu>, kernels: KernelShape, scene: Scene) -> Result<Fixture> {
+    Fixture::new(Arc::clone(gpu), scene, true, kernels, readable())
+}
+
+/// Densification of 500 Gaussians, some below and some above each threshold.
+pub(super) fn densification(rules: &Rules, gpu: &Arc<Gpu>, kernels: KernelShape, leeway: f64) -> Result<Verdict> {
+    let before = population(710, 500);
+    let mut fixture = rig_of(gpu, kernels, scene_of(&before))?;
+    let tolerance = Tolerance { absolute: 3.5e-7 * leeway, relative: 3.5e-8 * leeway };
+    Ok(Densified::new(&mut fixture, before, 600)?.verdict(rules, tolerance))
+}
+
+/// A reset of the opacities of 300 Gaussians.
+pub(super) fn reset(rules: &Rules, gpu: &Arc<Gpu>, kernels: KernelShape, leeway: f64) -> Result<Verdict> {
+    let before = population(120, 300);
+    let mut fixture = rig_of(gpu, kernels, scene_of(&before))?;
+    Ok(Reset::new(&mut fixture, before)?.verdict(rules, Tolerance { absolute: 1.2e-7 * leeway, relative: 0.0 }))
+}
+
+/// The paper's lift of labels in one step.
+pub(super) fn lift_of_a_step(rules: &Rules, gpu: &Arc<Gpu>, kernels: KernelShape, _: f64) -> Result<Verdict> {
+    Ok(Lifted::new(&mut rig_of(gpu, kernels, dominant(131))?)?.verdict(rules))
+}

@@ -1,0 +1,63 @@
+//! A short training, twice.
+
+use super::compare::{Verdict, exact};
+use crate::error::Result;
+use crate::gpu::Gpu;
+use crate::io::initial_gaussians;
+use crate::pass::KernelShape;
+use crate::scene::Gaussians;
+use crate::scheduler::SchedulerOptions;
+use crate::synth::{self, Preset, SynthOptions};
+use crate::train::{TrainConfig, Trainer};
+use std::sync::Arc;
+
+const STEPS: u32 = 60;
+
+/// Sixty steps with labels, votes and two densifications give the same model twice, bit by bit, and a smaller loss.
+pub fn twice(gpu: &Arc<Gpu>, kernels: KernelShape) -> Result<Verdict> {
+    let (first, loss) = train(gpu, kernels)?;
+    let (second, _) = train(gpu, kernels)?;
+    let [before, after] = loss;
+    if !(after < 0.7 * before) {
+        return Ok(Err(format!("the loss goes from {before:.4} to {after:.4} in {STEPS} steps")));
+    }
+    let bits = |model: &Gaussians| -> Vec<u32> {
+        let floats = |rows: &[[f32; 3]]| rows.as_flattened().iter().map(|v| v.to_bits()).collect::<Vec<_>>();
+        let mut all =
+            [floats(&model.means), floats(&model.scales), floats(&model.sh0), floats(&model.sh_rest)].concat();
+        all.extend(model.quats.as_flattened().iter().chain(&model.opacities).map(|v| v.to_bits()));
+        all.extend(model.labels.iter().flatten());
+        all
+    };
+    Ok(exact(&bits(&second), &bits(&first)))
+}
+
+/// The model, and the mean loss of the first and of the last ten steps.
+fn train(gpu: &Arc<Gpu>, kernels: KernelShape) -> Result<(Gaussians, [f64; 2])> {
+    let options = SynthOptions { preset: Preset::Simple, width: 72, height: 52, views: 6, points: 400, seed: 3 };
+    let mut dataset = synth::dataset(&options, 0);
+    let config = TrainConfig {
+        iterations: STEPS,
+        label_from: 10,
+        vote_every: 20,
+        densify_from: 15,
+        densify_until: Some(STEPS),
+        densify_interval: 20,
+        densify_grad_threshold: 5e-5,
+        ..TrainConfig::default()
+    };
+    let model = initial_gaussians(&dataset, config.seed, 100)?;
+    let mut trainer =
+        Trainer::with_shape(Arc::clone(gpu), kernels, config, &mut dataset, &model, SchedulerOptions::default())?;
+    let mut reports = Vec::new();
+    for _ in 0..STEPS {
+        reports.extend(trainer.step()?);
+    }
+    reports.extend(trainer.drain()?);
+    let mean = |steps: &[crate::train::StepReport]| {
+        steps.iter().map(|report| report.loss).sum::<f64>() / steps.len().max(1) as f64
+    };
+    let ten = reports.len().min(10);
+    let losses = [mean(&reports[..ten]), mean(&reports[reports.len() - ten..])];
+    Ok((trainer.labelled_model()?, losses))
+}

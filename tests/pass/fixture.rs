@@ -1,0 +1,120 @@
+//! The fixture of the self-test on the tests' device; what goes wrong ends the test.
+
+use crate::reference::project::{Splat, SplatGradient};
+use crate::reference::rules::mutants;
+use crate::reference::{Row, Rules};
+use crate::support::compare::{Verdict, check};
+use crate::support::device::Turn;
+use crate::support::scenes::Scene;
+use bytemuck::Pod;
+use labelgs::Result;
+use labelgs::engine::{ListKey, Report};
+use labelgs::pass::KernelShape;
+use labelgs::scheduler::SchedulerOptions;
+use labelgs::scheduler::plan::Buf;
+use labelgs::verify::selftest::fixture;
+use std::ops::{Deref, DerefMut};
+
+pub use fixture::{GRADIENTS, MOMENTS_1, MOMENTS_2, PARAMETERS, VOTE_COLUMNS, readable};
+
+/// A scene, an engine with its model, and the step that is run.
+pub struct Fixture {
+    inner: fixture::Fixture,
+    // Last: it looks for messages of the validation layer when everything else is gone.
+    _turn: Turn,
+}
+
+impl Deref for Fixture {
+    type Target = fixture::Fixture;
+
+    fn deref(&self) -> &fixture::Fixture {
+        &self.inner
+    }
+}
+
+impl DerefMut for Fixture {
+    fn deref_mut(&mut self) -> &mut fixture::Fixture {
+        &mut self.inner
+    }
+}
+
+impl Fixture {
+    /// The scene on the shared device, with or without labels, with the device's kernel shape.
+    pub fn new(turn: Turn, scene: Scene, labels: bool) -> Self {
+        let shape = KernelShape::of(turn.capabilities());
+        Self::with_shape(turn, scene, labels, shape)
+    }
+
+    /// As `new`, with kernels of a given shape.
+    pub fn with_shape(turn: Turn, scene: Scene, labels: bool, shape: KernelShape) -> Self {
+        Self::with_options(turn, scene, labels, shape, readable())
+    }
+
+    /// As `with_shape`, with options of the scheduler; without `readable` only some buffers can be read back.
+    pub fn with_options(turn: Turn, scene: Scene, labels: bool, shape: KernelShape, options: SchedulerOptions) -> Self {
+        let inner = fixture::Fixture::new(turn.gpu(), scene, labels, shape, options).expect("the engine starts");
+        Self { inner, _turn: turn }
+    }
+
+    /// The device's sorted pairs: keys and slots.
+    pub fn sorted_pairs(&mut self, count: usize) -> (Vec<u32>, Vec<u32>) {
+        self.inner.sorted_pairs(count).expect("the pairs can be read")
+    }
+
+    /// The splats of the sorted (splat, tile) pairs.
+    pub fn sorted_splats(&mut self, count: usize) -> Vec<u32> {
+        self.inner.sorted_splats(count).expect("the pairs can be read")
+    }
+
+    /// Runs a training step; no pass may write outside of its buffers.
+    pub fn train(&mut self) -> Report {
+        self.inner.train().expect("the step runs and its buffers can grow")
+    }
+
+    /// Runs a list, again with more memory if that was too small. `upload` writes what the host gives.
+    pub fn run(&mut self, key: ListKey, upload: impl Fn(&mut fixture::Fixture) -> Result<()>) -> Report {
+        self.inner.run(key, upload).expect("the list runs and its buffers can grow")
+    }
+
+    /// Runs the list of a render.
+    pub fn render(&mut self) -> Report {
+        self.inner.render().expect("the list runs and its buffers can grow")
+    }
+
+    /// The first `count` values of a buffer.
+    pub fn get<T: Pod>(&mut self, buf: Buf, count: usize) -> Vec<T> {
+        self.inner.get(buf, count).expect("the buffer can be read")
+    }
+
+    /// Splats that the device projected, in its order.
+    pub fn splats(&mut self) -> Vec<Splat> {
+        self.inner.splats().expect("the splats can be read")
+    }
+
+    /// Gradients of the splats.
+    pub fn splat_gradients(&mut self, splats: &[Splat]) -> Vec<SplatGradient> {
+        self.inner.splat_gradients(splats).expect("the gradients can be read")
+    }
+
+    /// `count` rows of a set of planes (parameters, moments or gradients).
+    pub fn rows(&mut self, planes: [Buf; 7], count: usize) -> Vec<Row> {
+        self.inner.rows(planes, count).expect("the planes can be read")
+    }
+
+    /// The gradients of the last step by Gaussian; 0 where it has no splat.
+    pub fn gradient_rows(&mut self) -> Vec<Row> {
+        self.inner.gradient_rows().expect("the gradients can be read")
+    }
+}
+
+/// Checks with the rules, then with each named constant changed: that must fail. Prints the worst error.
+#[track_caller]
+pub fn prove(name: &str, bearing: &[&str], compare: impl Fn(&Rules) -> Verdict) {
+    let summary = check(name, compare(&Rules::default()));
+    println!("{name}: {:.3}, as a whole {:.3} of the tolerance, {} flips", summary.worst, summary.whole, summary.flips);
+    let all = mutants();
+    for wanted in bearing {
+        let mutant = all.iter().find(|mutant| mutant.name == *wanted).unwrap_or_else(|| panic!("no mutant {wanted}"));
+        assert!(compare(&mutant.rules).is_err(), "{name} does not see a change of {wanted}");
+    }
+}
