@@ -7,6 +7,7 @@
 //! ```text
 //! cli                    verbs: what is typed, what is decided
 //! verify                 the method in f64, and the device compared with it, for tests and users
+//! run                    a training from a folder of photos to a folder with a model; its observer
 //! train                  the loop over steps, and what happens between them
 //! eval     synth         scores of a model; a scene with every truth
 //! label                  labels from masks, occluders, repair of masks
@@ -15,6 +16,7 @@
 //! pass                   what the engine does, as lists of GPU passes; no Vulkan
 //! scheduler  io          plans lists (sizes, places, barriers) and executes them; files
 //! shaders  gpu   scene   generated interfaces; a thin layer over Vulkan; plain host data
+//! options                options that are written once: flag, key, help, default, range
 //! error    fault
 //! ```
 //!
@@ -42,6 +44,7 @@
 //! the model alone, the buffer grows, and the steps run again.
 #![deny(unsafe_code)]
 
+#[cfg(feature = "cli")]
 pub mod cli;
 pub mod edit;
 pub mod engine;
@@ -51,8 +54,10 @@ pub mod fault;
 pub mod gpu;
 pub mod io;
 pub mod label;
+pub mod options;
 pub mod pass;
 pub mod render;
+pub mod run;
 pub mod scene;
 pub mod scheduler;
 pub mod shaders;

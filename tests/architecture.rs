@@ -6,8 +6,9 @@ use std::path::{Path, PathBuf};
 const ROOT: &str = env!("CARGO_MANIFEST_DIR");
 
 /// A module may use modules of lower floors only; modules of one floor do not know each other.
-const FLOORS: [&[&str]; 11] = [
+const FLOORS: [&[&str]; 13] = [
     &["error", "fault", "lib"],
+    &["options"],
     &["shaders", "gpu", "scene"],
     &["scheduler", "io"],
     &["pass"],
@@ -16,6 +17,7 @@ const FLOORS: [&[&str]; 11] = [
     &["label"],
     &["eval", "synth"],
     &["train"],
+    &["run"],
     &["verify"],
     &["cli"],
 ];
@@ -144,8 +146,7 @@ fn unsafe_code_has_three_places() {
 fn files_are_opened_in_two_places() {
     const CALLS: [&str; 7] =
         ["File::open", "File::create", "fs::read", "fs::write", "fs::copy", "_from_file(", "ImageReader::open"];
-    // The last lists its own output, and leaves alone what cannot be read.
-    const ALLOWED: [&str; 3] = ["io/read.rs", "io/atomic.rs", "cli/train_run.rs"];
+    const ALLOWED: [&str; 2] = ["io/read.rs", "io/atomic.rs"];
     for (path, text) in files("src", &["rs"]) {
         let code = text.split("#[cfg(test)]").next().unwrap_or_default();
         let code = code.lines().filter(|line| !line.trim_start().starts_with("//"));

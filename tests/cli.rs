@@ -3,10 +3,9 @@
 use assert_cmd::Command;
 use clap::Parser;
 use labelgs::cli::command::{Cli, Command as Verb, command};
-use labelgs::cli::config;
 use labelgs::io::ply::{read_gaussians, write_gaussians};
+use labelgs::run::Settings;
 use labelgs::scene::Gaussians;
-use labelgs::train::TrainConfig;
 use labelgs::train::config::Occlusion;
 use serde_json::Value;
 use std::collections::BTreeSet;
@@ -45,10 +44,10 @@ fn folder() -> TempDir {
     tempfile::tempdir().expect("folder")
 }
 
-fn train(flags: &[&str]) -> labelgs::Result<TrainConfig> {
+fn train(flags: &[&str]) -> labelgs::Result<Settings> {
     let line = ["labelgs", "train", "scene", "-o", "out"].iter().chain(flags).copied();
     match Cli::try_parse_from(line).expect("flags").command {
-        Verb::Train(args) => config::decide(&args),
+        Verb::Train(args) => args.how.settings(None),
         other => panic!("{other:?}"),
     }
 }
@@ -70,18 +69,21 @@ fn every_flag_is_explained_once() {
 }
 
 #[test]
-fn every_field_of_the_configuration_has_a_flag_with_its_default() {
+fn every_setting_has_a_flag_with_its_default() {
     let root = command();
     let verb = root.find_subcommand("train").expect("train");
-    let fields =
-        serde_json::to_value(TrainConfig { feature_rest_lr: Some(0.0), densify_until: Some(9), ..Default::default() })
-            .expect("JSON");
-    for field in fields.as_object().expect("fields").keys() {
-        let flag = field.replace('_', "-");
+    for key in Settings::keys() {
         let arg =
-            verb.get_arguments().find(|arg| arg.get_long() == Some(&flag)).unwrap_or_else(|| panic!("no --{flag}"));
-        let help = arg.get_help().map(ToString::to_string).unwrap_or_default();
-        assert!(help.contains("[default: "), "--{flag}: {help}");
+            verb.get_arguments().find(|arg| arg.get_id() == key.name).unwrap_or_else(|| panic!("no {}", key.name));
+        assert_eq!(arg.get_long().map(|long| format!("--{long}")), Some(key.flag()));
+        for help in [arg.get_help(), arg.get_long_help()].into_iter().flatten().map(ToString::to_string) {
+            assert!(help.contains("[default: "), "{}: {help}", key.flag());
+        }
+    }
+    // A link of the crate's documentation means nothing to whoever reads the help.
+    for verb in root.get_subcommands() {
+        let help = verb.clone().render_long_help().to_string();
+        assert!(!help.contains("[`") && !help.contains("`]"), "{help}");
     }
     let help = text(&labelgs(&["train", "--help"]).stdout);
     // Lines are wrapped anywhere.
@@ -95,65 +97,90 @@ fn every_field_of_the_configuration_has_a_flag_with_its_default() {
     }
 }
 
+/// A value of every setting that is not its default.
+const TYPED: [(&str, &str); 44] = [
+    ("--iterations", "7"),
+    ("--max-resolution", "99"),
+    ("--coarse-until", "4"),
+    ("--test-every", "5"),
+    ("--seed", "11"),
+    ("--max-gaussians", "2.5M"),
+    ("--background", "0.1,0.2,1"),
+    ("--near", "0.1"),
+    ("--label-from", "3"),
+    ("--label-rule", "main"),
+    ("--vote-every", "70"),
+    ("--vote-trust", "off"),
+    ("--mask-border", "3"),
+    ("--label-threshold", "0.7"),
+    ("--gpf", "off"),
+    ("--label-samples", "4"),
+    ("--label-weight", "0.5"),
+    ("--label-balance", "on"),
+    ("--label-alpha", "0.2"),
+    ("--occlusion", "none"),
+    ("--occlusion-every", "10"),
+    ("--lambda-dssim", "0.3"),
+    ("--sh-degree", "1"),
+    ("--sh-degree-interval", "20"),
+    ("--position-lr-init", "1e-3"),
+    ("--position-lr-final", "1e-5"),
+    ("--position-lr-max-steps", "40"),
+    ("--feature-lr", "0.1"),
+    ("--feature-rest-lr", "0.2"),
+    ("--opacity-lr", "0.3"),
+    ("--scaling-lr", "0.4"),
+    ("--rotation-lr", "0.5"),
+    ("--densify-from", "1"),
+    ("--densify-until", "2"),
+    ("--densify-interval", "3"),
+    ("--densify-grad-threshold", "0.1"),
+    ("--percent-dense", "0.2"),
+    ("--min-opacity", "0.01"),
+    ("--max-scale", "0.3"),
+    ("--opacity-reset-interval", "8"),
+    ("--opacity-reset-margin", "9"),
+    ("--save-at", "2000,5000"),
+    ("--preview-every", "6"),
+    ("--checkpoint-every", "12"),
+];
+
 #[test]
-fn every_flag_of_train_changes_its_field() {
-    let typed = [
-        ("--iterations", "7"),
-        ("--max-resolution", "99"),
-        ("--coarse-until", "4"),
-        ("--test-every", "5"),
-        ("--seed", "11"),
-        ("--max-gaussians", "2.5M"),
-        ("--background", "0.1,0.2,1"),
-        ("--near", "0.1"),
-        ("--label-from", "3"),
-        ("--label-rule", "main"),
-        ("--vote-every", "70"),
-        ("--vote-trust", "off"),
-        ("--mask-border", "3"),
-        ("--label-threshold", "0.7"),
-        ("--gpf", "off"),
-        ("--label-samples", "4"),
-        ("--label-weight", "0.5"),
-        ("--label-balance", "on"),
-        ("--label-alpha", "0.2"),
-        ("--occlusion", "none"),
-        ("--occlusion-every", "10"),
-        ("--lambda-dssim", "0.3"),
-        ("--sh-degree", "1"),
-        ("--sh-degree-interval", "20"),
-        ("--position-lr-init", "1e-3"),
-        ("--position-lr-final", "1e-5"),
-        ("--position-lr-max-steps", "40"),
-        ("--feature-lr", "0.1"),
-        ("--feature-rest-lr", "0.2"),
-        ("--opacity-lr", "0.3"),
-        ("--scaling-lr", "0.4"),
-        ("--rotation-lr", "0.5"),
-        ("--densify-from", "1"),
-        ("--densify-until", "2"),
-        ("--densify-interval", "3"),
-        ("--densify-grad-threshold", "0.1"),
-        ("--percent-dense", "0.2"),
-        ("--min-opacity", "0.01"),
-        ("--max-scale", "0.3"),
-        ("--opacity-reset-interval", "8"),
-        ("--opacity-reset-margin", "9"),
-        ("--save-at", "2000,5000"),
-        ("--preview-every", "6"),
-        ("--checkpoint-every", "12"),
-    ];
-    let all: Vec<&str> = typed.iter().flat_map(|&(flag, value)| [flag, value]).collect();
-    let json = |config: &TrainConfig| serde_json::to_value(config).expect("JSON");
-    let (changed, default) = (json(&train(&all).expect("decided")), json(&TrainConfig::default()));
-    for (field, value) in changed.as_object().expect("fields") {
-        assert_ne!(Some(value), default.get(field), "{field} is out of reach");
+fn every_setting_follows_its_flag() {
+    let all: Vec<&str> = TYPED.iter().flat_map(|&(flag, value)| [flag, value]).collect();
+    let changed = train(&all).expect("decided");
+    let (texts, defaults) = (changed.texts(), Settings::default().texts());
+    for key in Settings::keys() {
+        assert!(TYPED.iter().any(|(flag, _)| *flag == key.flag()), "{} is not tried", key.name);
+        assert_ne!(texts.get(key.name), defaults.get(key.name), "{} is out of reach", key.name);
     }
-    assert_eq!(changed["max_gaussians"], 2_500_000);
-    assert_eq!(changed["save_at"], serde_json::json!([2000, 5000]));
-    assert_eq!(train(&["--no-test"]).expect("decided").test_every, 0);
-    assert_eq!(train(&["--background", "white"]).expect("decided").background, [1.0; 3]);
-    assert_eq!(train(&[]).expect("decided"), TrainConfig::default());
+    assert_eq!(changed.train.max_gaussians, 2_500_000);
+    assert_eq!(changed.run.save_at, [2000, 5000]);
+    assert_eq!(train(&["--no-test"]).expect("decided").read.test_every, 0);
+    assert_eq!(train(&["--background", "white"]).expect("decided").train.background, [1.0; 3]);
+    assert_eq!(train(&[]).expect("decided"), Settings::default());
+}
+
+#[test]
+fn every_setting_of_a_file_survives_flags_that_nobody_typed() {
+    let folder = folder();
+    let path = folder.path().join("all.toml");
+    let file = path.to_str().expect("UTF-8");
+    let all: Vec<&str> = TYPED.iter().flat_map(|&(flag, value)| [flag, value]).collect();
+    let written = train(&all).expect("decided");
+    std::fs::write(&path, written.dump(&[]).expect("TOML")).expect("file");
+    assert_eq!(train(&["--config", file]).expect("decided"), written);
+    // A flag changes its own setting and no other.
+    let defaults = Settings::default().texts();
+    for key in Settings::keys().filter(|key| key.name != "save_at") {
+        let Some(default) = defaults.get(key.name) else { continue };
+        let value = default.replace(['[', ']', ' '], "");
+        let flag = key.flag();
+        let texts = train(&["--config", file, &flag, &value]).expect("decided").texts();
+        let mut expected = written.texts();
+        expected.insert(key.name.to_owned(), default.clone());
+        assert_eq!(texts, expected, "{flag} {value}");
+    }
 }
 
 #[test]
@@ -163,16 +190,17 @@ fn flag_before_file_before_default() {
     std::fs::write(&path, "iterations = 300\nocclusion = \"none\"\nbackground = [1, 0.5, 0]\n").expect("file");
     let file = path.to_str().expect("UTF-8");
     let decided = train(&["--config", file, "--iterations", "400"]).expect("decided");
-    assert_eq!((decided.iterations, decided.occlusion, decided.seed), (400, Occlusion::None, 0));
-    assert_eq!(decided.background, [1.0, 0.5, 0.0]);
+    let config = &decided.train;
+    assert_eq!((config.iterations, config.occlusion, config.seed), (400, Occlusion::None, 0));
+    assert_eq!(config.background, [1.0, 0.5, 0.0]);
 
-    let dumped = config::dump(&decided, &[("device", "a\nb".into())]).expect("TOML");
+    let dumped = decided.dump(&[("device", "a\nb".into())]).expect("TOML");
     assert!(dumped.contains("# device: a b\n") && dumped.contains("label_threshold = 0.6\n"), "{dumped}");
     std::fs::write(&path, dumped).expect("file");
-    assert_eq!(config::read(&path).expect("read back"), decided);
+    assert_eq!(Settings::read(&path).expect("read back"), decided);
 
     std::fs::write(&path, "iterations = 300\nlambda = 0.2\n").expect("file");
-    let message = config::read(&path).expect_err("unknown field").to_string();
+    let message = Settings::read(&path).expect_err("unknown field").to_string();
     assert!(message.contains("line 2") && message.contains("lambda"), "{message}");
     std::fs::write(&path, "label_threshold = 3\n").expect("file");
     let error = train(&["--config", file]).expect_err("out of range");

@@ -1,5 +1,6 @@
 //! Schedules and checks of the training configuration.
 
+use labelgs::io::ReadOptions;
 use labelgs::train::TrainConfig;
 
 #[test]
@@ -35,7 +36,6 @@ fn nonsense_is_refused_by_flag() {
         (TrainConfig { label_threshold: f32::NAN, ..Default::default() }, "--label-threshold"),
         (TrainConfig { label_threshold: 1.5, ..Default::default() }, "--label-threshold"),
         (TrainConfig { sh_degree: 4, ..Default::default() }, "--sh-degree"),
-        (TrainConfig { test_every: 1, ..Default::default() }, "--test-every"),
         (TrainConfig { opacity_lr: -1.0, ..Default::default() }, "--opacity-lr"),
         (TrainConfig { background: [0.0, 0.0, 2.0], ..Default::default() }, "--background"),
     ];
@@ -44,4 +44,6 @@ fn nonsense_is_refused_by_flag() {
         assert!(message.starts_with(flag), "{message}");
     }
     TrainConfig::default().check().expect("the defaults are sound");
+    let message = ReadOptions { test_every: 1, ..Default::default() }.check().expect_err("nothing is left").to_string();
+    assert!(message.starts_with("--test-every"), "{message}");
 }

@@ -2,7 +2,6 @@
 
 use super::ablate::AblateArgs;
 use super::args::GlobalArgs;
-use super::config;
 use super::densify::DensifyArgs;
 use super::devices::DevicesArgs;
 use super::eval::EvalArgs;
@@ -21,6 +20,7 @@ use super::selftest::SelftestArgs;
 use super::split_components::SplitArgs;
 use super::synth::SynthArgs;
 use super::train_args::TrainArgs;
+use crate::run::Settings;
 use clap::{CommandFactory, Parser, Subcommand};
 
 const EXIT_STATUSES: &str = "\
@@ -107,12 +107,23 @@ pub enum Command {
 
 /// The command with the defaults of training in its help.
 pub fn command() -> clap::Command {
-    let defaults = config::default_texts();
+    let mut defaults = Settings::default().texts();
+    // What the values alone do not tell.
+    for (key, text) in [
+        ("background", "black"),
+        ("save_at", "none"),
+        ("near", "0.2, less in a small scene"),
+        ("feature_rest_lr", "--feature-lr / 20"),
+    ] {
+        defaults.insert(key.into(), text.into());
+    }
     Cli::command().mut_subcommand("train", |train| {
         train.mut_args(|arg| {
-            let Some(default) = arg.get_long().and_then(|long| defaults.get(long)) else { return arg };
-            let help = arg.get_help().map(ToString::to_string).unwrap_or_default();
-            arg.help(format!("{help} [default: {default}]"))
+            let Some(default) = defaults.get(arg.get_id().as_str()) else { return arg };
+            let with = |help: String| format!("{help} [default: {default}]");
+            let (short, long) = (arg.get_help().map(ToString::to_string), arg.get_long_help().map(ToString::to_string));
+            let arg = if let Some(help) = short { arg.help(with(help)) } else { arg };
+            if let Some(help) = long { arg.long_help(with(help)) } else { arg }
         })
     })
 }

@@ -6,9 +6,10 @@ use super::log::Progress;
 use super::profile_report::{Clocks, Profile, Window, Workers};
 use super::scene::{open_gpu, open_scene};
 use super::values::share;
-use super::{config, profile_compare, stdout};
+use super::{profile_compare, stdout};
 use crate::gpu::Gpu;
 use crate::io::init;
+use crate::run::Settings;
 use crate::scene::Dataset;
 use crate::scheduler::SchedulerOptions;
 use crate::scheduler::plan::PlanOptions;
@@ -98,7 +99,7 @@ pub fn run(args: &ProfileArgs, context: &Context) -> Result<()> {
     trainer.separate_objects(args.separate_objects);
     measure(&mut trainer, args, context, &mut profile)?;
     match &args.json {
-        Some(Some(file)) => super::eval::write_json(file, &profile.to_json())?,
+        Some(Some(file)) => crate::io::atomic::write_json(file, &profile.to_json())?,
         Some(None) => stdout::print_json(&profile.to_json())?,
         None if context.json => stdout::print_json(&profile.to_json())?,
         None => {}
@@ -109,7 +110,7 @@ pub fn run(args: &ProfileArgs, context: &Context) -> Result<()> {
 /// The configuration: labels are on in every timed step, and no timed step is the last one.
 fn decide(args: &ProfileArgs) -> Result<TrainConfig> {
     let mut decided = match &args.config {
-        Some(path) => config::read(path)?,
+        Some(path) => Settings::read(path)?.train,
         None => TrainConfig::default(),
     };
     decided.label_from = decided.label_from.min(args.from_step.saturating_add(1));

@@ -1,13 +1,13 @@
 //! What the verbs that render share: the device, the scene, its views.
 
 use super::args::SceneArgs;
-use super::config;
 use super::context::Context;
 use crate::engine::{Engine, EngineSize, LabelSize};
 use crate::error::{Error, Result};
 use crate::gpu::{Gpu, GpuOptions, PipelineStore};
 use crate::io::pipeline_file::PipelineFolder;
-use crate::io::{self, LoadOptions, run_folder};
+use crate::io::{self, LoadOptions};
+use crate::run::Settings;
 use crate::scene::{Dataset, Gaussians, View};
 use crate::scheduler::SchedulerOptions;
 use crate::train::near::NEAR;
@@ -18,11 +18,9 @@ use std::sync::Arc;
 /// The near plane to render a model with, world units: what was typed, else what the run of the model was trained with
 /// (its config.toml), else 0.2 (3DGS).
 pub fn near_plane(model: &Path, typed: Option<f32>) -> Result<f32> {
-    let of_run = || run_folder::of_model(model).map(|run| run.join(run_folder::CONFIG)).filter(|file| file.is_file());
-    match (typed, of_run()) {
-        (Some(near), _) => Ok(near),
-        (None, Some(file)) => config::near_of(&file),
-        (None, None) => Ok(NEAR),
+    match typed {
+        Some(near) => Ok(near),
+        None => Ok(Settings::of_model(model)?.map_or(NEAR, |settings| settings.train.near)),
     }
 }
 
@@ -63,20 +61,7 @@ pub fn open_scene(
     let test_every = (reading.test_every > 0).then_some(reading.test_every);
     let (max_resolution, base) = (reading.max_resolution, LoadOptions::default());
     let options = LoadOptions { masks, max_resolution, test_every, background, photos, ..base };
-    open_with(path, &reading.read.into_options(options))
-}
-
-/// Reads a scene with given options and logs its notes.
-pub fn open_with(path: &Path, options: &LoadOptions) -> Result<Dataset> {
-    let dataset = io::open(path, options)?;
-    dataset.notes.iter().for_each(|note| tracing::warn!("{note}"));
-    tracing::info!(
-        "scene: {} training views, {} test views, {} points",
-        dataset.train.len(),
-        dataset.test.len(),
-        dataset.points.len()
-    );
-    Ok(dataset)
+    io::open_logged(path, &reading.read.into_options(options))
 }
 
 /// The views that `test`, `train`, `all` or a list of names means.

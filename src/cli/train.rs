@@ -1,52 +1,78 @@
-//! `labelgs train`, also over losses of the device.
+//! `labelgs train`.
 
 use super::context::Context;
+use super::log::Progress;
+use super::scene::open_gpu;
 use super::train_args::TrainArgs;
-use super::train_run::train_once;
 use super::{interrupt, stdout};
-use crate::io::checkpoint_folder;
-use crate::{Error, Result};
-use std::time::Duration;
+use crate::Result;
+use crate::run::{self, Event, Flow, Live, Observer, Request, Settings, Summary};
 
 /// Trains a model and prints what came of it.
 pub fn run(args: &TrainArgs, context: &Context) -> Result<()> {
-    let (summary, sentence) = train(args, context)?;
-    if context.json || args.json.json { stdout::print_json(&summary) } else { stdout::print(&sentence) }
+    let settings = |checkpoint: Option<&Settings>| args.how.settings(checkpoint);
+    let request = args.how.request((&args.scene, &args.output), args.masks.clone(), &settings)?;
+    let summary = train(&request, context)?;
+    if context.json || args.json.json {
+        return stdout::print_json(&summary.to_json());
+    }
+    stdout::print(&sentence(&summary))
 }
 
-/// Seconds between looks for a device after one was lost.
-const WAITS: [u64; 3] = [1, 4, 16];
-
-/// Trains a model; returns its metrics.json, and the same in a sentence. If `--restart` was typed, also over losses of
-/// the device: one that is lost twice without a checkpoint in between would be lost again.
-pub(super) fn train(args: &TrainArgs, context: &Context) -> Result<(serde_json::Value, String)> {
-    if !args.restart {
-        return train_once(args, context);
-    }
-    let newest = || Ok(checkpoint_folder::list(&args.output)?.first().map_or(0, |found| found.number));
-    let mut args = args.clone();
-    let (mut before, mut was_lost) = (newest()?, false);
-    let mut waits = WAITS.iter();
-    loop {
-        let error = match train_once(&args, context) {
-            Err(error @ Error::DeviceLost { .. }) => error,
-            // A driver may take a while until it has a device again.
-            Err(error) if was_lost && error.is_without_device() => {
-                interrupt::check()?;
-                let Some(&seconds) = waits.next() else { return Err(error) };
-                tracing::warn!("{error}; tried again in {seconds} s");
-                std::thread::sleep(Duration::from_secs(seconds));
-                continue;
-            }
-            other => return other,
-        };
+/// Trains before the eyes of whoever sits at the terminal; a signal ends it, with everything saved.
+pub(super) fn train(request: &Request, context: &Context) -> Result<Summary> {
+    let open = || {
         interrupt::check()?;
-        waits = WAITS.iter();
-        let number = newest()?;
-        if number <= before {
-            return Err(error);
+        open_gpu(context)
+    };
+    let summary = run::train(request, &open, &mut Terminal { context, progress: None })?;
+    if summary.stopped { interrupt::check().map(|()| summary) } else { Ok(summary) }
+}
+
+/// Shows the progress, and turns a signal into the end of the run.
+struct Terminal<'a> {
+    context: &'a Context,
+    progress: Option<Progress>,
+}
+
+impl Observer for Terminal<'_> {
+    fn on(&mut self, event: &Event<'_>, live: &mut Live<'_>) -> Result<Flow> {
+        match *event {
+            Event::Started { steps, .. } => {
+                // From here on there is something to save.
+                interrupt::note_only();
+                self.progress = Some(Progress::new(u64::from(steps), "steps", &self.context.global));
+            }
+            Event::Step { step, report, is_last } => {
+                if let Some(progress) = &mut self.progress {
+                    progress.set(u64::from(step), || {
+                        let (loss, label) = report.map_or((f64::NAN, 0.0), |report| (report.loss, report.label_loss));
+                        let label = if label > 0.0 { format!(" label loss {label:.4}") } else { String::new() };
+                        format!("loss {loss:.4}{label} {} Gaussians", live.gaussian_count())
+                    });
+                }
+                if is_last {
+                    self.progress = None;
+                }
+            }
+            _ => {}
         }
-        tracing::warn!("{error}; it is opened again, and training goes on from the newest checkpoint");
-        (before, was_lost, args.resume, args.config) = (number, true, true, None);
+        Ok(if interrupt::status().is_some() { Flow::Stop } else { Flow::Continue })
     }
+}
+
+fn sentence(summary: &Summary) -> String {
+    let Summary { model, gaussians, steps, seconds, .. } = summary;
+    let mut text = format!("{}: {gaussians} Gaussians after {steps} steps in {seconds:.1} s", model.display());
+    if let Some(mean) = summary.scores.as_ref().map(|scores| &scores.mean) {
+        text += &format!(
+            "; test views: PSNR {:.2} dB, SSIM {:.4}",
+            mean.psnr.unwrap_or(f64::NAN),
+            mean.ssim.unwrap_or(f64::NAN)
+        );
+        if let Some(iou) = mean.objects.iou_map {
+            text += &format!(", IoU of the label map {iou:.3}");
+        }
+    }
+    text + "\n"
 }

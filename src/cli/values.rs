@@ -4,6 +4,8 @@ use crate::edit::catalogue::Pick;
 use crate::scene::labels::LABEL_MAX;
 use std::collections::BTreeMap;
 
+pub use crate::options::parse::{colour, count, switch};
+
 /// Labels by id and by name.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Picks(pub Vec<Pick>);
@@ -133,47 +135,4 @@ pub fn bytes(text: &str) -> Result<u64, String> {
     };
     let value = number.parse().ok().filter(|value: &f64| value.is_finite() && *value > 0.0).ok_or_else(wrong)?;
     Ok((value * f64::from(1_u32 << shift)) as u64)
-}
-
-/// A colour: a name, or three numbers from 0 to 1.
-pub fn colour(text: &str) -> Result<[f32; 3], String> {
-    match text {
-        "black" => return Ok([0.0; 3]),
-        "white" => return Ok([1.0; 3]),
-        _ => {}
-    }
-    let wrong = || format!("`{text}` is no colour; expected black, white, or R,G,B from 0 to 1 each");
-    let parts = text.split(',').map(|part| part.trim().parse::<f32>().ok().filter(|value| (0.0..=1.0).contains(value)));
-    let parts: Vec<f32> = parts.collect::<Option<_>>().ok_or_else(wrong)?;
-    parts.try_into().map_err(|_| wrong())
-}
-
-/// A number of things such as `1500`, `500k` or `2M`.
-pub fn count(text: &str) -> Result<u64, String> {
-    let wrong = || format!("`{text}` is no number of things; expected such as 1500, 500k or 2.5M");
-    let (digits, unit) = match text.char_indices().last() {
-        Some((at, 'k' | 'K')) => (&text[..at], 1e3),
-        Some((at, 'm' | 'M')) => (&text[..at], 1e6),
-        _ => return text.parse().map_err(|_| wrong()),
-    };
-    let value = digits.parse::<f64>().map_err(|_| wrong())? * unit;
-    // Below 2^53, where every whole number is a f64.
-    if !(0.0..9e15).contains(&value) { Err(wrong()) } else { Ok(value.round() as u64) }
-}
-
-/// `on` or `off`.
-pub fn switch(text: &str) -> Result<bool, String> {
-    match text {
-        "on" | "true" | "yes" => Ok(true),
-        "off" | "false" | "no" => Ok(false),
-        _ => Err(format!("`{text}` is neither on nor off")),
-    }
-}
-
-/// A number of objects, or `all`.
-pub fn samples(text: &str) -> Result<u32, String> {
-    match text {
-        "all" => Ok(u32::MAX),
-        _ => text.parse().map_err(|_| format!("`{text}` is neither a number of objects nor all")),
-    }
 }

@@ -8,7 +8,8 @@ use crate::{Error, Result};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// What becomes of parts that are too small.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 pub enum Specks {
     /// They keep their label.
     #[default]

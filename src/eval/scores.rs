@@ -222,6 +222,17 @@ impl Scores {
         }
     }
 
+    /// Points to a view that is seen much worse than the others, and to what helps most often: Gaussians hang in the air before
+    /// its camera, where no photo of the training shows them.
+    pub fn warn_of_odd_view(&self, near: f32) {
+        if let Some((name, found, median)) = self.odd_view() {
+            tracing::warn!(
+                "view {name} has {found:.1} dB, the one in the middle {median:.1}: if it is foggy, try --near of a tenth of the \
+                 distance to what is seen (it is {near})"
+            );
+        }
+    }
+
     /// The view that is seen worst, with its PSNR and the median of all, dB, if it is so far below that something must
     /// stand before its camera, or be wrong with its pose or photo.
     pub fn odd_view(&self) -> Option<(&str, f64, f64)> {

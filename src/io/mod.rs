@@ -26,6 +26,7 @@ pub mod occlusion_table;
 pub mod pipeline_file;
 pub mod ply;
 pub mod read;
+mod read_options;
 pub(crate) mod resample;
 pub mod run_folder;
 mod transforms;
@@ -40,6 +41,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 pub use init::initial_gaussians;
+pub use read_options::ReadOptions;
 
 /// What to read of a scene, and how.
 #[derive(Clone, Debug, PartialEq)]
@@ -94,6 +96,15 @@ pub fn open(scene: &Path, options: &LoadOptions) -> Result<Dataset> {
         return Err(Error::usage("--max-bad-photos", problem));
     }
     load::load(folder_of(scene), list(scene, options.allow_outside)?, options)
+}
+
+/// As [`open`]; what a person should know of the scene goes into the log.
+pub fn open_logged(scene: &Path, options: &LoadOptions) -> Result<Dataset> {
+    let dataset = open(scene, options)?;
+    dataset.notes.iter().for_each(|note| tracing::warn!("{note}"));
+    let (train, test, points) = (dataset.train.len(), dataset.test.len(), dataset.points.len());
+    tracing::info!("scene: {train} training views, {test} test views, {points} points");
+    Ok(dataset)
 }
 
 /// The folder of a scene that is named by its folder or by one file in it.

@@ -7,7 +7,8 @@ use crate::{Error, Result};
 use std::path::{Path, PathBuf};
 
 /// A kind of picture.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 pub enum What {
     /// Colour.
     Rgb,
@@ -24,7 +25,8 @@ pub enum What {
 }
 
 /// A kind of file.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 pub enum Format {
     /// 8 or 16 bits, clamped to 0..1.
     #[default]

@@ -1,7 +1,8 @@
 //! A depth per pixel.
 
 /// How numbers of a depth map are to be read.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 pub enum DepthKind {
     /// Larger is nearer, up to an unknown scale and offset, as networks for single photos predict it.
     Inverse,

@@ -25,7 +25,8 @@ use crate::scene::{Dataset, LabelMap, Photo, View};
 use serde::{Deserialize, Serialize};
 
 /// Which objects stand in the scene.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 #[serde(rename_all = "lowercase")]
 pub enum Preset {
     /// Eight objects that touch and hide each other.

@@ -8,7 +8,8 @@ use std::collections::{BTreeMap, BTreeSet};
 const SHRINK: f64 = 2.25;
 
 /// A fault.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 pub enum Fault {
     /// Two objects have each other's ids in a share of the views.
     Swap,

@@ -4,7 +4,6 @@ pub mod config;
 mod densify;
 pub mod near;
 mod occlusion;
-pub mod record;
 mod sampler;
 mod sentinel;
 mod state;
@@ -15,7 +14,7 @@ mod votes;
 
 pub use config::{LabelRule, Occlusion, TrainConfig};
 pub use densify::Densified;
-pub use state::{RunFacts, TrainState, ViewFingerprint};
+pub use state::{TrainState, ViewFingerprint};
 pub use timing::StepTimes;
 
 use crate::engine::{Engine, EngineSize, LabelSize, ListKey, Report};
@@ -72,6 +71,10 @@ pub struct Trainer {
     seen: sentinel::Seen,
     /// What the views are told apart by; empty until somebody asks.
     fingerprints: Vec<ViewFingerprint>,
+    /// The last step whose numbers are known.
+    newest: Option<StepReport>,
+    /// The last densification, until somebody asks.
+    densified: Option<Densified>,
 }
 
 /// Room for training on a data set.
@@ -177,6 +180,8 @@ impl Trainer {
             counts_pairs: false,
             seen: sentinel::Seen::default(),
             fingerprints: Vec::new(),
+            newest: None,
+            densified: None,
         })
     }
 
@@ -209,6 +214,16 @@ impl Trainer {
     /// Steps submitted so far.
     pub fn steps_done(&self) -> u32 {
         self.step
+    }
+
+    /// The last step whose numbers are known.
+    pub fn newest_report(&self) -> Option<StepReport> {
+        self.newest
+    }
+
+    /// What the last densification did; none if that was asked for already.
+    pub fn take_densified(&mut self) -> Option<Densified> {
+        self.densified.take()
     }
 
     /// Gaussians of the model.
@@ -261,6 +276,7 @@ impl Trainer {
             done.extend(self.drain()?);
             if densifies {
                 let what = self.densify(&input)?;
+                self.densified = Some(what);
                 tracing::debug!("step {step}: {what:?}, {} Gaussians", self.gaussian_count());
                 if self.gaussian_count() == 0 {
                     return Err(Error::Pruned { step });
@@ -351,7 +367,8 @@ impl Trainer {
         let loss = (1.0 - lambda) * l1 + lambda * (1.0 - f64::from(counters.loss_ssim) * scale);
         let label_loss = step_input::label_loss(&input, view, &self.config, counters.loss_label);
         self.watch(&input, &report, [loss, label_loss])?;
-        Ok(Some(StepReport { step: input.step, loss, label_loss, report }))
+        self.newest = Some(StepReport { step: input.step, loss, label_loss, report });
+        Ok(self.newest)
     }
 }
 

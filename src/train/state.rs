@@ -42,39 +42,20 @@ pub struct TrainState {
     pub memory_bounds: bool,
     /// How far memory had grown.
     pub sizes: GrownSizes,
-    /// The configuration, as TOML in the file: there every float is read back as it was.
-    #[serde(with = "as_toml")]
+    /// The configuration.
     pub config: TrainConfig,
     /// The training views, in their order.
     pub views: Vec<ViewFingerprint>,
     /// By name of the view: the occluders of its objects.
     pub occluders: BTreeMap<String, Occluders>,
-    /// How the run was started.
-    pub run: RunFacts,
+    /// What whoever runs the training keeps in the file, null for nothing.
+    pub run: serde_json::Value,
     /// Parameters, moments, statistics and labels.
     #[serde(skip)]
     pub planes: Vec<Plane>,
     /// The file that it was read from, for messages.
     #[serde(skip)]
     pub path: PathBuf,
-}
-
-/// What a run was given besides its configuration.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct RunFacts {
-    /// Folder of the masks.
-    pub masks: Option<String>,
-    /// Most bytes of the device's memory.
-    pub memory_limit: Option<u64>,
-    /// What the occluders that it started with were made from.
-    pub occlusion: Option<String>,
-    /// Largest share of the photos that may be undecodable, if it was given.
-    #[serde(default)]
-    pub max_bad_photos: Option<f32>,
-    /// Photos and points may lie outside of the scene's folder.
-    #[serde(default)]
-    pub allow_outside: bool,
 }
 
 /// What a view is told apart by.
@@ -108,24 +89,6 @@ impl ViewFingerprint {
     }
 }
 
-/// The configuration as text: JSON is read back to the last digit only almost always.
-mod as_toml {
-    use super::TrainConfig;
-    use serde::{Deserialize, Deserializer, Serializer, de, ser};
-
-    pub fn serialize<S: Serializer>(config: &TrainConfig, to: S) -> Result<S::Ok, S::Error> {
-        let text = toml::to_string(config).map_err(ser::Error::custom)?;
-        if toml::from_str::<TrainConfig>(&text).as_ref() != Ok(config) {
-            return Err(ser::Error::custom("the configuration is not read back as it was written"));
-        }
-        to.serialize_str(&text)
-    }
-
-    pub fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<TrainConfig, D::Error> {
-        toml::from_str(&String::deserialize(from)?).map_err(de::Error::custom)
-    }
-}
-
 impl TrainState {
     /// Writes the checkpoint, whole or not at all.
     pub fn write(self, path: &Path) -> Result<()> {
@@ -147,11 +110,6 @@ impl TrainState {
         let labels = state.planes.iter().any(|plane| plane.name == TABLE[Buf::LABELS.index()].name);
         state::check(&state.planes, state.gaussians, state.config.sh_degree, labels).map_err(odd)?;
         Ok(state)
-    }
-
-    /// True if views had masks.
-    pub fn masks_given(&self) -> bool {
-        self.views.iter().any(|view| view.mask.is_some())
     }
 
     /// Refuses a scene that is not the one of the checkpoint, with the first thing that differs.
@@ -207,7 +165,7 @@ impl Trainer {
             config: self.config.clone(),
             views: self.fingerprints.clone(),
             occluders: self.occluders(),
-            run: RunFacts::default(),
+            run: serde_json::Value::Null,
             planes: self.finite_planes()?,
             path: PathBuf::new(),
         })

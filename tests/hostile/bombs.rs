@@ -186,7 +186,7 @@ fn json_nested_deeply_is_refused() {
         assert!(text.contains("transforms.json") && text.contains("line 1"), "{text}");
     }
     let toml = scene.write("config.toml", format!("near = {}", "[".repeat(100_000)));
-    refused(|| labelgs::cli::config::read(&toml));
+    refused(|| labelgs::run::Settings::read(&toml));
     let keys = scene.write("keys.toml", format!("{}near = 1", "a.".repeat(50_000)));
-    refused(|| labelgs::cli::config::read(&keys));
+    refused(|| labelgs::run::Settings::read(&keys));
 }

@@ -152,9 +152,7 @@ pub fn checkpoint(_: &Path, file: &Path) -> Result<()> {
 }
 
 pub fn config(_: &Path, file: &Path) -> Result<()> {
-    labelgs::cli::config::near_of(file)?;
-    let config = labelgs::cli::config::read(file)?;
-    config.check()
+    labelgs::run::Settings::read(file)?.check()
 }
 
 pub fn camera(_: &Path, file: &Path) -> Result<()> {

@@ -1,12 +1,11 @@
 //! Small valid files of every kind, made by the program's own writers where it has one.
 
-use labelgs::cli::config;
 use labelgs::gpu::PipelineStore;
 use labelgs::io::label_table::{LabelEntry, LabelTable};
 use labelgs::io::pipeline_file::PipelineFolder;
 use labelgs::io::{image as pixels, ply};
+use labelgs::run::Settings;
 use labelgs::scene::Gaussians;
-use labelgs::train::TrainConfig;
 use std::io::Cursor;
 use std::path::Path;
 
@@ -341,9 +340,9 @@ pub fn checkpoint() -> Vec<u8> {
 
 /// The defaults, the paper's, and a few lines by hand.
 pub fn config_toml() -> Vec<Vec<u8>> {
-    let dump = |settings: &TrainConfig| config::dump(settings, &[("device", "x".into())]).expect("text").into_bytes();
+    let dump = |settings: &Settings| settings.dump(&[("device", "x".into())]).expect("text").into_bytes();
     let own = b"iterations = 500\nbackground = [0.0, 0.5, 1.0]\nsave_at = [10, 20]\nnear = 0.1\n".to_vec();
-    vec![dump(&TrainConfig::default()), dump(&TrainConfig::paper()), own]
+    vec![dump(&Settings::default()), dump(&Settings::paper()), own]
 }
 
 /// A camera of `render --camera`.

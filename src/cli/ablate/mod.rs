@@ -7,9 +7,11 @@ mod table;
 use super::args::JsonFlag;
 use super::context::Context;
 use super::eval::EvalArgs;
-use super::train_args::TrainArgs;
+use super::train_args::TrainFlags;
 use super::{eval, interrupt, stdout, train};
-use crate::eval::scores::MeanScores;
+use crate::eval::scores::{MeanScores, Scores};
+use crate::io::atomic;
+use crate::run::Settings;
 use crate::{Error, Result};
 use clap::{Args, FromArgMatches};
 use rows::{Masks, Row, rows};
@@ -61,7 +63,7 @@ struct Outcome {
     /// Scores of the test views.
     scores: MeanScores,
     /// Gaussians at the end.
-    gaussians: u64,
+    gaussians: u32,
     /// Time of the training without scoring, s.
     seconds: f64,
 }
@@ -71,7 +73,7 @@ pub fn run(args: &AblateArgs, context: &Context) -> Result<()> {
     let rows = rows(&args.rows, &args.own_rows, args.masks_without_dov.is_some())?;
     // A typing error in the last variant is found before the first is trained.
     for row in &rows {
-        train_args(row, 0, args)?;
+        flags(row, args)?;
     }
     let mut outcomes: Vec<(Row, Vec<Outcome>)> = Vec::new();
     for row in rows {
@@ -88,7 +90,7 @@ pub fn run(args: &AblateArgs, context: &Context) -> Result<()> {
     let table: Vec<_> =
         outcomes.iter().map(|(row, runs)| json!({ "name": row.name, "flags": row.flags, "runs": runs })).collect();
     let record = json!({ "schema_version": 1, "scene": args.scene.display().to_string(), "rows": table });
-    eval::write_json(&args.output.join("ablation.json"), &record)?;
+    atomic::write_json(&args.output.join("ablation.json"), &record)?;
     if context.json || args.json.json {
         return stdout::print_json(&record);
     }
@@ -97,57 +99,46 @@ pub fn run(args: &AblateArgs, context: &Context) -> Result<()> {
     stdout::print(&(table::table(&rows) + &quoted::table()))
 }
 
-fn folder(row: &Row, seed: u64, args: &AblateArgs) -> PathBuf {
-    args.output.join(format!("{}-{seed}", row.name))
-}
-
-/// The `train` that a variant is, as if it had been typed.
-fn train_args(row: &Row, seed: u64, args: &AblateArgs) -> Result<TrainArgs> {
-    let text = |path: &Path| path.display().to_string();
-    let mut typed = vec!["train".to_owned(), text(&args.scene)];
-    typed.extend(["-o".to_owned(), text(&folder(row, seed, args)), "--seed".to_owned(), seed.to_string()]);
-    let masks = match row.masks {
-        Masks::None => None,
-        Masks::Given => Some(&args.masks),
-        Masks::WithoutDov => args.masks_without_dov.as_ref(),
-    };
-    if let Some(masks) = masks {
-        typed.extend(["--masks".to_owned(), text(masks)]);
+/// The flags of a variant.
+fn flags(row: &Row, args: &AblateArgs) -> Result<TrainFlags> {
+    let typed = std::iter::once("train").chain(row.flags.iter().chain(&args.common).map(String::as_str));
+    let command = TrainFlags::augment_args(clap::Command::new("labelgs"));
+    let flags = command.try_get_matches_from(typed).and_then(|matches| TrainFlags::from_arg_matches(&matches));
+    let wrong = |problem: &str| Error::usage("--row", format!("{}: {problem}", row.name));
+    let flags = flags.map_err(|error| wrong(error.to_string().lines().next().unwrap_or_default()))?;
+    if flags.train.is_typed("seed") {
+        return Err(wrong("--seed is what differs between the runs of a variant; say --seeds N"));
     }
-    typed.extend(row.flags.iter().chain(&args.common).cloned());
-    parse(typed).map_err(|error| {
-        let text = error.to_string();
-        Error::usage("--row", format!("{}: {}", row.name, text.lines().next().unwrap_or_default()))
-    })
-}
-
-/// Arguments of a verb as if they had been typed; the first is its name.
-fn parse<A: Args + FromArgMatches>(typed: Vec<String>) -> std::result::Result<A, clap::Error> {
-    A::from_arg_matches(&A::augment_args(clap::Command::new("labelgs")).try_get_matches_from(typed)?)
+    flags.settings(None).map_err(|error| wrong(&error.to_string()))?;
+    Ok(flags)
 }
 
 fn one(row: &Row, seed: u64, args: &AblateArgs, context: &Context) -> Result<Outcome> {
-    let train_args = train_args(row, seed, args)?;
-    let config = super::config::decide(&train_args)?;
-    let (summary, _) = train::train(&train_args, context)?;
-    let text = |path: &Path| path.display().to_string();
-    let out = folder(row, seed, args);
-    let masks = args.truth.as_ref().unwrap_or(&args.masks);
-    let mut typed = vec!["eval".to_owned(), text(&out)];
-    typed.extend(["--scene".to_owned(), text(&args.scene), "--masks".to_owned(), text(masks)]);
-    typed.extend(["--test-every".to_owned(), config.test_every.to_string()]);
-    if config.max_resolution > 0 {
-        typed.extend(["--max-resolution".to_owned(), config.max_resolution.to_string()]);
-    }
-    let colour: Vec<String> = config.background.iter().map(f32::to_string).collect();
-    typed.extend(["--background".to_owned(), colour.join(",")]);
-    let eval_args: EvalArgs = parse(typed).map_err(|error| Error::Bug(format!("eval: {error}")))?;
-    let scores = eval::score(&eval_args, context)?;
-    eval::write_json(&out.join("scores.json"), &scores)?;
-    Ok(Outcome {
-        seed,
-        scores: scores.mean,
-        gaussians: summary["gaussians"].as_u64().unwrap_or(0),
-        seconds: summary["seconds"].as_f64().unwrap_or(0.0),
-    })
+    let flags = flags(row, args)?;
+    let masks = match row.masks {
+        Masks::None => None,
+        Masks::Given => Some(args.masks.clone()),
+        Masks::WithoutDov => args.masks_without_dov.clone(),
+    };
+    let out = args.output.join(format!("{}-{seed}", row.name));
+    let settings = |checkpoint: Option<&Settings>| {
+        let mut settings = flags.settings(checkpoint)?;
+        settings.train.seed = seed;
+        Ok(settings)
+    };
+    let request = flags.request((&args.scene, &out), masks, &settings)?;
+    let summary = train::train(&request, context)?;
+    let scores = score(&out, &settings(None)?, args, context)?;
+    atomic::write_json(&out.join("scores.json"), &scores)?;
+    Ok(Outcome { seed, scores: scores.mean, gaussians: summary.gaussians, seconds: summary.seconds })
+}
+
+/// Scores what a variant has made, on the views that it did not train on.
+fn score(out: &Path, settings: &Settings, args: &AblateArgs, context: &Context) -> Result<Scores> {
+    let mut eval = EvalArgs::new(out, &args.scene);
+    eval.masks = Some(args.truth.as_ref().unwrap_or(&args.masks).clone());
+    eval.background = settings.train.background;
+    eval.reading.test_every = settings.read.test_every;
+    eval.reading.max_resolution = (settings.read.max_resolution > 0).then_some(settings.read.max_resolution);
+    eval::score(&eval, context)
 }

@@ -14,7 +14,7 @@ const COLUMNS: [Column; 10] = [
     ("psnr_hidden", 2, |run| run.scores.objects.psnr_hidden),
     ("paper mIoU", 4, |run| run.scores.objects.paper_iou),
     ("object PSNR", 2, |run| run.scores.objects.object_psnr),
-    ("Gaussians", 0, |run| Some(run.gaussians as f64)),
+    ("Gaussians", 0, |run| Some(f64::from(run.gaussians))),
     ("seconds", 1, |run| Some(run.seconds)),
 ];
 

@@ -1,11 +1,12 @@
 //! What `labelgs eval` can be told.
 
-use crate::cli::args::SceneArgs;
+use crate::cli::args::{ReadArgs, SceneArgs};
 use crate::cli::labelled::MinConfidenceArg;
 use crate::cli::values::{colour, near};
+use crate::edit::select::MIN_LABEL_CONFIDENCE;
 use crate::eval::protocol::{By, Protocol};
 use clap::Args;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// `labelgs eval`.
 #[derive(Args, Clone, Debug)]
@@ -73,4 +74,32 @@ pub struct EvalArgs {
     /// Write all scores as JSON to FILE; without FILE print them.
     #[arg(id = "json_file", long = "json", value_name = "FILE", num_args = 0..=1)]
     pub json: Option<Option<PathBuf>>,
+}
+
+impl EvalArgs {
+    /// What is asked for where nobody types more than a model and a scene.
+    pub fn new(model: &Path, scene: &Path) -> Self {
+        Self {
+            model: model.to_owned(),
+            scene: scene.to_owned(),
+            views: "test".to_owned(),
+            masks: None,
+            amodal: None,
+            background: [0.0; 3],
+            near: None,
+            sure: MinConfidenceArg { min_confidence: MIN_LABEL_CONFIDENCE },
+            protocol: None,
+            truth: None,
+            by: None,
+            names: None,
+            objects: Vec::new(),
+            compat: false,
+            lpips: None,
+            page: None,
+            min_psnr: None,
+            min_iou: None,
+            reading: SceneArgs { test_every: 8, max_resolution: None, read: ReadArgs::default() },
+            json: None,
+        }
+    }
 }

@@ -2,7 +2,7 @@
 
 use super::table::own_table;
 use super::watch::Watcher;
-use super::{EvalArgs, put_out, warn_of_odd_view};
+use super::{EvalArgs, put_out};
 use crate::cli::context::{Context, open_model};
 use crate::cli::scene::{near_plane, open_gpu, open_scene, pick_views, render_engine};
 use crate::eval::evaluate::{AmodalTruth, Rendering, evaluate, picture_count};
@@ -37,7 +37,7 @@ pub(in crate::cli) fn score(args: &EvalArgs, context: &Context) -> Result<Scores
     };
     let scores = evaluate(&mut engine, &model, &views, how, &wholes, &mut watcher)?;
     watcher.finish(&own_table(&scores))?;
-    warn_of_odd_view(&scores, how.near);
+    scores.warn_of_odd_view(how.near);
     Ok(scores)
 }
 

@@ -9,10 +9,10 @@ pub mod track;
 
 use super::context::Context;
 use crate::cli::args::ReadArgs;
-use crate::cli::scene::open_with;
-use crate::io::LoadOptions;
+
 use crate::io::image::{write_png_grey8, write_png_grey16};
 use crate::io::read;
+use crate::io::{self, LoadOptions};
 use crate::scene::{Dataset, LabelMap};
 use crate::{Error, Result};
 use clap::{Args, Subcommand};
@@ -65,7 +65,7 @@ pub fn run(args: &MasksArgs, context: &Context) -> Result<()> {
 /// Reads the scene that masks belong to: names, sizes and cameras of its photos, and its points.
 fn open_photos(scene: &Path, read: ReadArgs) -> Result<Dataset> {
     let options = LoadOptions { photos: false, test_every: None, ..LoadOptions::default() };
-    open_with(scene, &read.into_options(options))
+    io::open_logged(scene, &read.into_options(options))
 }
 
 /// Writes ids as grey, with 8 bits where they suffice.

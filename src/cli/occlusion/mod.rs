@@ -1,18 +1,14 @@
-//! `labelgs occlusion`, and what training needs of it.
-
-mod source;
-
-pub use source::{for_training, from_depths};
+//! `labelgs occlusion`.
 
 use super::args::{JsonFlag, ReadArgs};
 use super::context::{Context, open_model};
 use super::log::Progress;
-use super::scene::{near_plane, open_gpu, open_with, render_engine};
+use super::scene::{near_plane, open_gpu, render_engine};
 use super::stdout;
-use crate::io::LoadOptions;
 use crate::io::image::write_png_rgb8;
 use crate::io::occlusion_table::OcclusionTable;
-use crate::label::occlusion::{Rule, by_contour, picture};
+use crate::io::{self, LoadOptions};
+use crate::label::occlusion::{Rule, by_contour, from_depths, picture};
 use crate::render::render;
 use crate::scene::{DepthKind, LabelMap, Occluders, View, stems};
 use crate::{Error, Result};
@@ -65,7 +61,7 @@ pub fn run(args: &OcclusionArgs, context: &Context) -> Result<()> {
         photos: false,
         ..LoadOptions::default()
     };
-    let dataset = open_with(&args.scene, &args.read.into_options(options))?;
+    let dataset = io::open_logged(&args.scene, &args.read.into_options(options))?;
     let views: Vec<&View> = dataset.all().into_iter().filter(|view| view.mask.is_some()).collect();
     let table = match (&args.depths, args.depth_kind, &args.model) {
         (Some(depths), Some(kind), _) => OcclusionTable::new("depth", from_depths(&args.scene, depths, kind, &views)?),

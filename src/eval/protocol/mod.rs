@@ -21,14 +21,15 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// A benchmark.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 pub enum Protocol {
     /// The LabelGS paper: TRUTH/FRAME/OBJECT.png; the first frame is the prompt.
     Labelgs,
     /// LERF-Mask of Gaussian Grouping: TRUTH/FRAME/PROMPT.png; objects by name.
     LerfMask,
     /// 3D-OVS: TRUTH/FRAME/CLASS.png and TRUTH/classes.txt; objects by name.
-    #[value(name = "3d-ovs")]
+    #[cfg_attr(feature = "cli", value(name = "3d-ovs"))]
     ThreeDOvs,
     /// NVOS: masks, reference_image and scribbles, each with a folder per scene.
     Nvos,
@@ -37,7 +38,8 @@ pub enum Protocol {
 }
 
 /// How labels are chosen for an object.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 pub enum By {
     /// By a mask in one view: labels with more than half of their pixels under it.
     Prompt,

@@ -18,7 +18,8 @@ use serde::Serialize;
 use std::path::PathBuf;
 
 /// How a folder of masks is to be read.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 #[serde(rename_all = "kebab-case")]
 pub enum Format {
     /// What fits, if only one reading does.
@@ -42,7 +43,7 @@ pub enum Format {
     LerfMask,
     /// `segmentations` of 3D-OVS: NAME/OBJECT.png and classes.txt.
     #[serde(rename = "3d-ovs")]
-    #[value(name = "3d-ovs")]
+    #[cfg_attr(feature = "cli", value(name = "3d-ovs"))]
     ThreeDOvs,
 }
 
@@ -65,7 +66,8 @@ impl Format {
 }
 
 /// Whose a pixel is that two black and white masks of a photo claim.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 #[serde(rename_all = "kebab-case")]
 pub enum Overlap {
     /// Nobody's: the import fails and tells how many there are.

@@ -5,11 +5,13 @@
 //! contour of k towards k' if its label is k and one of its 8 neighbours is k'. 0 never hides and is never hidden.
 
 mod contour;
+mod depths;
 mod draw;
 mod hull;
 mod mean;
 
 pub use contour::{Rule, by_contour};
+pub use depths::from_depths;
 pub use draw::picture;
 pub use mean::{by_mean, distances};
 

@@ -1,0 +1,27 @@
+//! Occluders from depth maps in files, by the paper's rule.
+
+use super::{by_mean, distances};
+use crate::error::{Error, Result};
+use crate::io::depth::DepthFolder;
+use crate::scene::{DepthKind, Occluders, View};
+use rayon::prelude::*;
+use std::collections::BTreeMap;
+use std::path::Path;
+
+/// Occluders of `views` of a scene, which have masks, by name of the view. One depth map is in memory per thread.
+pub fn from_depths(
+    scene: &Path,
+    depths: &Path,
+    kind: DepthKind,
+    views: &[&View],
+) -> Result<BTreeMap<String, Occluders>> {
+    let folder = DepthFolder::open(depths, scene)?;
+    folder.check_complete(views)?;
+    let of_view = |view: &&View| {
+        let map = folder.read(view)?;
+        let mask = view.mask.as_ref().ok_or_else(|| Error::Bug(format!("{} came without its mask", view.name)))?;
+        Ok((view.name.clone(), by_mean(mask, &distances(&map, kind))))
+    };
+    let found: Vec<Result<(String, Occluders)>> = views.par_iter().map(of_view).collect();
+    found.into_iter().collect()
+}

@@ -1,0 +1,191 @@
+//! Options that are written once: name, type, default, range, whether they may change within a run, and help stand at
+//! one field. [`options!`](crate::options!) makes of them a struct, its `Default`, its check, its keys in `config.toml`
+//! and, with the feature `cli`, its flags.
+//!
+//! A flag has no default of its own: what nobody typed stays as it was, so that a flag wins over a file and a file over
+//! the default.
+
+pub mod parse;
+#[cfg(feature = "cli")]
+pub mod typed;
+
+use crate::error::{Error, Result};
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+use std::collections::BTreeMap;
+
+/// Values that make sense.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Range {
+    Any,
+    AtLeast(u32),
+    NotNegative,
+    Positive,
+    UpTo(f64),
+    PositiveUpTo(f64),
+}
+
+/// What is known about an option besides its value.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Key {
+    /// Its name in `config.toml`; the flag has dashes for the underscores.
+    pub name: &'static str,
+    /// It cannot change within a run: the scene was read with it, or what is in memory has its shape.
+    pub is_fixed: bool,
+    range: Range,
+}
+
+impl Key {
+    /// An option that takes any value.
+    pub const fn new(name: &'static str) -> Self {
+        Self { name, is_fixed: false, range: Range::Any }
+    }
+
+    /// Cannot change within a run.
+    pub const fn fixed(self) -> Self {
+        Self { is_fixed: true, ..self }
+    }
+
+    /// Whole numbers from `least`.
+    pub const fn at_least(self, least: u32) -> Self {
+        Self { range: Range::AtLeast(least), ..self }
+    }
+
+    /// 0 or more.
+    pub const fn not_negative(self) -> Self {
+        Self { range: Range::NotNegative, ..self }
+    }
+
+    /// More than 0.
+    pub const fn positive(self) -> Self {
+        Self { range: Range::Positive, ..self }
+    }
+
+    /// 0 to `most`.
+    pub const fn up_to(self, most: f64) -> Self {
+        Self { range: Range::UpTo(most), ..self }
+    }
+
+    /// More than 0, at most `most`.
+    pub const fn positive_up_to(self, most: f64) -> Self {
+        Self { range: Range::PositiveUpTo(most), ..self }
+    }
+
+    /// The flag, with its dashes.
+    pub fn flag(&self) -> String {
+        format!("--{}", self.name.replace('_', "-"))
+    }
+
+    /// Refuses a value outside of the range.
+    pub fn check(&self, value: &impl Numbers) -> Result<()> {
+        let is_wrong = |&number: &f64| match self.range {
+            Range::Any => false,
+            Range::AtLeast(least) => number < f64::from(least),
+            // A NaN is in no range.
+            Range::NotNegative => !(0.0..=f64::MAX).contains(&number),
+            Range::Positive => !(f64::MIN_POSITIVE..=f64::MAX).contains(&number),
+            Range::UpTo(most) => !(0.0..=most).contains(&number),
+            Range::PositiveUpTo(most) => !(f64::MIN_POSITIVE..=most).contains(&number),
+        };
+        let Some(wrong) = value.numbers().into_iter().find(is_wrong) else { return Ok(()) };
+        let needed = match self.range {
+            Range::Any => "a number".to_owned(),
+            Range::AtLeast(least) => format!("at least {least}"),
+            Range::NotNegative => "0 or more".to_owned(),
+            Range::Positive => "more than 0".to_owned(),
+            Range::UpTo(most) => format!("0 to {most}"),
+            Range::PositiveUpTo(most) => format!("more than 0, at most {most}"),
+        };
+        Err(Error::usage(self.flag(), format!("is {wrong}, needs {needed}")))
+    }
+}
+
+/// The numbers of a value that its range bounds.
+pub trait Numbers {
+    /// All of them; none where the type has no range.
+    fn numbers(&self) -> Vec<f64>;
+}
+
+macro_rules! numbers {
+    ($($kind:ty => |$value:ident| $numbers:expr;)*) => {
+        $(impl Numbers for $kind {
+            fn numbers(&self) -> Vec<f64> {
+                let $value = self;
+                $numbers
+            }
+        })*
+    };
+}
+
+numbers! {
+    u32 => |value| vec![f64::from(*value)];
+    u64 => |value| vec![*value as f64];
+    f32 => |value| vec![f64::from(*value)];
+    f64 => |value| vec![*value];
+    [f32; 3] => |value| value.map(f64::from).to_vec();
+    Option<u32> => |value| value.iter().map(|&number| f64::from(number)).collect();
+    Option<f64> => |value| value.iter().copied().collect();
+}
+
+/// A struct that [`options!`](crate::options!) made.
+pub trait Options: Serialize + DeserializeOwned + Default {
+    /// Its options, in order.
+    const KEYS: &'static [Key];
+
+    /// Refuses values outside of their ranges; the message names the flag.
+    fn check_ranges(&self) -> Result<()>;
+
+    /// The values as one types them, by key; an option that is not set has none.
+    fn texts(&self) -> BTreeMap<String, String> {
+        // TOML prints a f32 as one would type it.
+        let text = toml::to_string(self).unwrap_or_default();
+        let fields = text.lines().filter_map(|line| line.split_once(" = "));
+        fields.map(|(key, value)| (key.to_owned(), parse::as_typed(value))).collect()
+    }
+}
+
+/// Declares a struct of options. A field is `NAME <"VALUE NAME">: TYPE = DEFAULT, RULES;` with rules of [`Key`] such as
+/// `at_least(1)` and `fixed`; fields stand under the heading of their flags. The first paragraph of a field's doc is the
+/// help, what follows is shown by `--help` only.
+#[macro_export]
+macro_rules! options {
+    ($(#[$outer:meta])* pub struct $name:ident {
+        $($heading:literal { $(
+            $(#[$meta:meta])* $key:ident <$value:literal>: $kind:ty = $default:expr $(, $rule:ident $(($bound:expr))?)*;
+        )* })*
+    }) => {
+        $(#[$outer])*
+        #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+        #[cfg_attr(feature = "cli", derive(clap::Args))]
+        #[serde(default)]
+        pub struct $name { $($(
+            $(#[$meta])*
+            #[cfg_attr(feature = "cli", arg(long, value_name = $value, help_heading = $heading))]
+            pub $key: $kind,
+        )*)* }
+
+        impl Default for $name {
+            fn default() -> Self {
+                Self { $($($key: $default,)*)* }
+            }
+        }
+
+        impl $crate::options::Options for $name {
+            const KEYS: &'static [$crate::options::Key] =
+                &[$($($crate::options::Key::new(stringify!($key))$(.$rule($($bound)?))*,)*)*];
+
+            fn check_ranges(&self) -> $crate::Result<()> {
+                let mut keys = Self::KEYS.iter();
+                $($( $crate::options!(@check keys, self.$key $(, $rule)*); )*)*
+                let _ = keys;
+                Ok(())
+            }
+        }
+    };
+    // An option without rules has a type without numbers, or takes any.
+    (@check $keys:ident, $value:expr) => { let _ = $keys.next(); };
+    (@check $keys:ident, $value:expr, fixed) => { let _ = $keys.next(); };
+    (@check $keys:ident, $value:expr, $($rule:ident),+) => {
+        if let Some(key) = $keys.next() { key.check(&$value)?; }
+    };
+}

@@ -1,0 +1,115 @@
+//! What a run leaves in its folder, and the scores at its end.
+
+use super::{Event, Run, Summary, models, preview};
+use crate::edit::select::MIN_LABEL_CONFIDENCE;
+use crate::error::Result;
+use crate::eval::evaluate::{Rendering, evaluate};
+use crate::eval::scores::Scores;
+use crate::io::label_table::{self, LabelTable};
+use crate::io::occlusion_table::{self, OcclusionTable};
+use crate::io::{atomic, run_folder};
+use crate::scene::View;
+use crate::train::Occlusion;
+use std::path::PathBuf;
+use std::time::Duration;
+
+impl Run<'_> {
+    /// Settings, names of labels and cameras.
+    pub(super) fn write_records(&self) -> Result<()> {
+        let out = &self.request.output;
+        let text = self.settings.dump(&self.facts)?;
+        atomic::write(out.join(run_folder::CONFIG), |file| file.write_all(text.as_bytes()))?;
+        LabelTable::put(self.names.as_ref(), &out.join(label_table::FILE))?;
+        let cameras: Vec<_> = self.dataset.all().into_iter().map(|view| (view.name.as_str(), &view.camera)).collect();
+        models::save_cameras(out, &cameras)
+    }
+
+    /// Makes sure that the folder is still this run's, and that its records are in it.
+    pub(super) fn hold_records(&mut self) -> Result<()> {
+        self.hold_folder()?;
+        let out = &self.request.output;
+        if !out.join(run_folder::CONFIG).exists() {
+            tracing::warn!("{} was deleted meanwhile; what is known is written again", out.display());
+            self.write_records()?;
+        }
+        Ok(())
+    }
+
+    /// Writes the model with its final labels.
+    pub(super) fn save_labelled(&mut self) -> Result<PathBuf> {
+        let model = self.trainer.labelled_model().map_err(|error| self.keep_model(error))?;
+        self.models.save(self.trainer.steps_done(), &model)
+    }
+
+    /// What has come of the training, before it is scored.
+    pub(super) fn summary(&self, model: PathBuf, spent: Duration) -> Summary {
+        let last = self.trainer.newest_report();
+        Summary {
+            steps: self.trainer.steps_done(),
+            seconds: spent.as_secs_f64(),
+            gaussians: self.trainer.gaussian_count(),
+            loss: last.map(|report| report.loss),
+            label_loss: last.map(|report| report.label_loss),
+            model,
+            scores: None,
+            stopped: false,
+        }
+    }
+
+    /// Writes the last preview, scores the held-out views unless the run was stopped, and writes what is known. `kept` is
+    /// what became of the checkpoint of a run that was stopped.
+    pub(super) fn finish(&mut self, summary: &mut Summary, kept: Result<bool>) -> Result<()> {
+        let step = summary.steps;
+        self.save_occluders()?;
+        if let Some(path) = preview::write(self)? {
+            self.tell(Event::Preview { step, path: &path })?;
+        }
+        self.tell(Event::Model { step, path: &summary.model })?;
+        if !self.stopped {
+            summary.scores = self.score()?;
+        }
+        summary.stopped = self.stopped;
+        summary.write(&self.request.output)?;
+        let is_kept = kept?;
+        if self.stopped {
+            let further = if is_kept { "--resume goes on" } else { "only the scores are missing" };
+            tracing::info!("stopped after step {step} of {}; {further}", self.settings.train.iterations);
+        } else {
+            self.checkpoints.finish()?;
+        }
+        if let Some(scores) = &summary.scores {
+            self.tell(Event::Evaluated(scores))?;
+        }
+        self.tell(Event::Done(summary))
+    }
+
+    /// Writes the occluders that the last step used.
+    fn save_occluders(&self) -> Result<()> {
+        let views = self.trainer.occluders();
+        if views.is_empty() {
+            return Ok(());
+        }
+        let kind = match (self.occlusion.as_deref(), self.settings.train.occlusion) {
+            (Some(kind), _) => kind,
+            (None, Occlusion::None) => "none",
+            (None, _) => "rendered",
+        };
+        OcclusionTable::new(kind, views).write(&self.request.output.join(occlusion_table::FILE))
+    }
+
+    /// Scores the held-out views, objects too where they have masks.
+    fn score(&mut self) -> Result<Option<Scores>> {
+        let views: Vec<&View> = self.dataset.test.iter().collect();
+        if views.is_empty() {
+            return Ok(None);
+        }
+        let mut model = self.trainer.model()?;
+        // Bands that were never let in are 0; without them the render is cheaper.
+        model.sh_degree = model.sh_degree.max(self.trainer.sh_degree());
+        let config = &self.settings.train;
+        let how = Rendering { near: config.near, background: config.background, min_confidence: MIN_LABEL_CONFIDENCE };
+        let scores = evaluate(self.trainer.engine_mut(), &model, &views, how, &(), &mut ())?;
+        scores.warn_of_odd_view(how.near);
+        Ok(Some(scores))
+    }
+}

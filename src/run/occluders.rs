@@ -1,0 +1,56 @@
+//! Occluders that are known before the first step.
+
+use super::Request;
+use crate::error::{Error, Result};
+use crate::io::occlusion_table::OcclusionTable;
+use crate::label::occlusion::from_depths;
+use crate::scene::{Dataset, DepthKind, View};
+use crate::train::Occlusion;
+use std::path::PathBuf;
+
+/// Files that occluders come from.
+#[derive(Clone, Debug, PartialEq)]
+pub enum OccluderFiles {
+    /// Depth maps, one per photo by name, for the paper's rule.
+    Depths {
+        /// Their folder.
+        folder: PathBuf,
+        /// What their numbers mean.
+        kind: DepthKind,
+    },
+    /// Lists, as an earlier run wrote them.
+    Lists(PathBuf),
+}
+
+/// Refuses a source of occluders without the files that it needs, and files that the source does not read.
+pub(super) fn check(source: Occlusion, files: Option<&OccluderFiles>) -> Result<()> {
+    match (source, files) {
+        (Occlusion::Depth, Some(OccluderFiles::Depths { .. })) => Ok(()),
+        (Occlusion::Depth, _) => Err(Error::usage("--occlusion", "depth needs the folder: --depths DIR")),
+        (_, Some(OccluderFiles::Depths { .. })) => Err(Error::usage("--depths", "is only read with --occlusion depth")),
+        (Occlusion::File, None) => {
+            Err(Error::usage("--config", "takes the occluders from a file; name it: --occlusion-file FILE"))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// The table that a run starts with, if it does not look for occluders itself.
+pub(super) fn table(request: &Request, dataset: &Dataset) -> Result<Option<OcclusionTable>> {
+    let views: Vec<&View> = dataset.train.iter().filter(|view| view.mask.is_some()).collect();
+    let path = match &request.occluders {
+        None => return Ok(None),
+        Some(OccluderFiles::Depths { folder, kind }) => {
+            let found = from_depths(&request.scene, folder, *kind, &views)?;
+            return Ok(Some(OcclusionTable::new("depth", found)));
+        }
+        Some(OccluderFiles::Lists(path)) => path,
+    };
+    let table = OcclusionTable::read(path)?;
+    if !views.is_empty() && !views.iter().any(|view| table.views.contains_key(&view.name)) {
+        let some = table.views.keys().next().map_or("no view", String::as_str);
+        let problem = format!("has none of the scene's views, such as {}; it has {some}", views[0].name);
+        return Err(Error::data(path, "views", problem));
+    }
+    Ok(Some(table))
+}

@@ -1,0 +1,216 @@
+//! What happens before the first step: the folder, the settings, the scene, the first model.
+
+use super::checkpoints::Checkpoints;
+use super::models::Models;
+use super::resume::{self, Record, Resumed, absolute};
+use super::{Inputs, Observer, OccluderFiles, Request, Run, Settings, Start, occluders};
+use crate::engine::Engine;
+use crate::error::{Error, Result};
+use crate::gpu::Gpu;
+use crate::io::label_table::LabelTable;
+use crate::io::occlusion_table::OcclusionTable;
+use crate::io::run_folder::Lock;
+use crate::io::{self, atomic, checkpoint_folder, init};
+use crate::scene::{Dataset, Gaussians};
+use crate::scheduler::SchedulerOptions;
+use crate::train::{self, TrainConfig, Trainer};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::Duration;
+
+/// Everything that a run knows before a device is open.
+pub(super) struct Prepared {
+    lock: Lock,
+    settings: Settings,
+    resumed: Option<Resumed>,
+    inputs: Inputs,
+    models: Models,
+    names: Option<LabelTable>,
+    dataset: Dataset,
+    table: Option<OcclusionTable>,
+}
+
+/// Takes the folder, decides the settings and reads the scene. `is_again` goes on from the newest checkpoint.
+pub(super) fn prepare(request: &Request, is_again: bool) -> Result<Prepared> {
+    // Bad settings leave no folder behind. Checkpoints are looked for when the folder is this run's: the one that it goes
+    // on from may be writing its last.
+    if let Start::New(settings) = &request.start {
+        check_new(settings, request)?;
+    }
+    let out = request.output.as_path();
+    std::fs::create_dir_all(out).map_err(Error::write(out))?;
+    let lock = Lock::take(out)?;
+    let resumed = match &request.start {
+        Start::Newest(changed) => resume::find(request, *changed)?,
+        Start::New(settings) if is_again => resume::find(request, &|found| Ok(found.unwrap_or(settings).clone()))?,
+        Start::New(_) => None,
+    };
+    let settings = match (&resumed, &request.start) {
+        (Some(resumed), _) => resumed.settings.clone(),
+        (None, Start::New(settings)) => settings.clone(),
+        (None, Start::Newest(changed)) => {
+            let settings = changed(None)?;
+            check_new(&settings, request)?;
+            settings
+        }
+    };
+    if request.restart && settings.run.checkpoint_every == 0 {
+        return Err(Error::usage("--restart", "goes on from checkpoints, and --checkpoint-every is 0"));
+    }
+    clear(out, &settings)?;
+    let models = Models::new(out, resumed.as_ref().map_or(0, |resumed| resumed.state.step))?;
+    let mut inputs = resumed.as_ref().map_or(request.inputs.clone(), |resumed| resumed.record.inputs.clone());
+    inputs.masks = request.inputs.masks.clone().or(inputs.masks);
+    let names = inputs.masks.as_deref().map(LabelTable::of_folder).transpose()?.flatten();
+    let dataset = read_scene(request, &settings, &inputs)?;
+    let table = if resumed.is_none() { occluders::table(request, &dataset)? } else { None };
+    Ok(Prepared { lock, settings, resumed, inputs, models, names, dataset, table })
+}
+
+fn check_new(settings: &Settings, request: &Request) -> Result<()> {
+    settings.check()?;
+    occluders::check(settings.train.occlusion, request.occluders.as_ref())
+}
+
+/// Clears the folder of what killed runs left, and refuses one that cannot be used before any work is done.
+fn clear(out: &Path, settings: &Settings) -> Result<()> {
+    let checkpoints = out.join(checkpoint_folder::FOLDER);
+    if settings.run.checkpoint_every > 0 {
+        std::fs::create_dir_all(&checkpoints).map_err(Error::write(&checkpoints))?;
+    }
+    // A folder that is not there, or that nobody may list, holds nothing to clear.
+    let models = io::read::folder(&out.join("point_cloud")).unwrap_or_default();
+    for folder in [out.to_owned(), checkpoints, out.join("preview")].into_iter().chain(models) {
+        atomic::remove_stale(folder, Duration::ZERO);
+    }
+    Ok(())
+}
+
+fn read_scene(request: &Request, settings: &Settings, inputs: &Inputs) -> Result<Dataset> {
+    let mut options = settings.load_options(inputs.masks.clone());
+    options.max_bad_photos = inputs.max_bad_photos.unwrap_or(options.max_bad_photos);
+    options.allow_outside = inputs.allow_outside;
+    let dataset = io::open_logged(&request.scene, &options)?;
+    if dataset.train.is_empty() {
+        let problem = "no view is left to train on; use --no-test or a larger --test-every";
+        return Err(Error::data(&request.scene, "", problem));
+    }
+    Ok(dataset)
+}
+
+/// Puts the model on the device: the checkpoint's, or the initial one.
+pub(super) fn begin<'a>(
+    prepared: Prepared,
+    request: &'a Request,
+    gpu: Arc<Gpu>,
+    observer: &'a mut dyn Observer,
+) -> Result<Run<'a>> {
+    let Prepared { lock, settings, resumed, inputs, models, names, mut dataset, table } = prepared;
+    let out = request.output.as_path();
+    let preview = dataset.test.first().or(dataset.train.first()).cloned();
+    let options = SchedulerOptions {
+        memory_limit: inputs.memory_limit,
+        crash_markers: request.restart,
+        ..SchedulerOptions::default()
+    };
+    let mut facts = facts(request, inputs.masks.as_deref(), &gpu);
+    facts.extend(resumed.as_ref().map(|resumed| ("goes on after step", resumed.state.step.to_string())));
+    let before = resumed.as_ref().and_then(|resumed| resumed.record.occlusion.clone());
+    let occlusion = before.or(table.as_ref().map(|table| table.kind.clone()));
+    let record = Record {
+        inputs: Inputs { masks: recorded(inputs.masks.as_deref()), ..inputs.clone() },
+        occlusion: occlusion.clone(),
+        read: settings.read.clone(),
+        run: settings.run.clone(),
+    };
+    let checkpoints = Checkpoints::new(out, lock, record, resumed.as_ref().map(|resumed| &resumed.state))?;
+    let trainer = match resumed {
+        Some(resumed) => Trainer::resume(gpu, &mut dataset, resumed.state, options)?,
+        None => start(gpu, &settings.train, &mut dataset, table.as_ref(), options)?,
+    };
+    // The near plane is known now.
+    let settings = Settings { train: trainer.config().clone(), ..settings };
+    Ok(Run {
+        request,
+        settings,
+        occlusion,
+        facts,
+        names,
+        dataset,
+        preview,
+        trainer,
+        checkpoints,
+        models,
+        observer,
+        stopped: false,
+    })
+}
+
+/// The folder of the masks for a checkpoint. One that cannot be written as text must be named again.
+fn recorded(masks: Option<&Path>) -> Option<PathBuf> {
+    masks.filter(|masks| masks.to_str().is_some()).map(absolute)
+}
+
+/// A trainer with the initial model of the scene.
+fn start(
+    gpu: Arc<Gpu>,
+    config: &TrainConfig,
+    dataset: &mut Dataset,
+    occluders: Option<&OcclusionTable>,
+    options: SchedulerOptions,
+) -> Result<Trainer> {
+    let mut model = init::initial_gaussians(dataset, config.seed, init::RANDOM_COUNT)?;
+    bound_start(&mut model, config);
+    let room = train::start_room(&gpu, dataset, config, model.len(), options)?;
+    let memory = Engine::predict(&gpu, &room, options)?;
+    tracing::info!(
+        "memory to start with: {:.1} MiB on the device, for {} Gaussians and {} x {} px; it grows with the model",
+        memory.total as f64 / f64::from(1 << 20),
+        room.gaussians,
+        room.size.0,
+        room.size.1
+    );
+    let mut trainer = Trainer::new(gpu, config.clone(), dataset, &model, options)?;
+    if let Some(table) = occluders {
+        let without = trainer.set_occluders(&table.views);
+        if let Some(first) = without.first() {
+            let count = without.len();
+            tracing::warn!("{count} training views have no list of occluders, such as {first}; nothing hides there");
+        }
+    }
+    Ok(trainer)
+}
+
+/// No more initial points than `max_gaussians`: every n-th is kept.
+fn bound_start(model: &mut Gaussians, config: &TrainConfig) {
+    let (count, bound) = (model.len() as u64, config.max_gaussians);
+    if bound > 0 && count > bound {
+        tracing::warn!(
+            "{count} initial points, --max-gaussians {bound}: every {:.1}-th is used",
+            count as f64 / bound as f64
+        );
+        // Row i is kept where i * bound / count steps up: an even choice.
+        *model = model.filtered(|row| row as u64 * bound / count != (row as u64 + 1) * bound / count);
+    }
+}
+
+/// What `config.toml` says besides the settings.
+fn facts(request: &Request, masks: Option<&Path>, gpu: &Gpu) -> Vec<(&'static str, String)> {
+    let found = gpu.capabilities();
+    let mut facts = vec![
+        ("scene", request.scene.display().to_string()),
+        ("device", format!("{} ({} {})", found.name, found.driver_name, found.driver_info)),
+        ("subgroup size", gpu.subgroup_size().to_string()),
+    ];
+    if let Some(masks) = masks {
+        facts.push(("masks", masks.display().to_string()));
+    }
+    match &request.occluders {
+        Some(OccluderFiles::Depths { folder, kind }) => {
+            facts.push(("depths", format!("{} ({kind:?})", folder.display())));
+        }
+        Some(OccluderFiles::Lists(file)) => facts.push(("occlusion file", file.display().to_string())),
+        None => {}
+    }
+    facts
+}

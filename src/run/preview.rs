@@ -1,0 +1,18 @@
+//! Preview pictures: photo, render and label map side by side.
+
+use super::{Live, Run, models};
+use crate::error::Result;
+use std::path::PathBuf;
+
+/// Writes the picture of the preview view as the scene is now; none without a photo.
+pub(super) fn write(run: &mut Run) -> Result<Option<PathBuf>> {
+    let Some(view) = &run.preview else { return Ok(None) };
+    let Some(photo) = &view.photo else { return Ok(None) };
+    let mut live = Live::new(&mut run.trainer);
+    let rendered = live.render(&view.camera)?;
+    let labels = live.model()?.labels;
+    let name = format!("{:06}_{}.png", run.trainer.steps_done(), view.stem());
+    let path = run.request.output.join("preview").join(name);
+    models::save_preview(&path, photo, &rendered, labels.as_deref())?;
+    Ok(Some(path))
+}

@@ -1,0 +1,124 @@
+//! From which checkpoint and with what settings a run goes on.
+
+use super::{Changed, Inputs, Request, Settings};
+use crate::error::{Error, Result};
+use crate::io::{ReadOptions, checkpoint_folder};
+use crate::run::RunOptions;
+use crate::train::TrainState;
+use serde::{Deserialize, Serialize};
+use std::path::{Path, PathBuf};
+
+/// What a checkpoint holds of the run, besides the state of the training.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+pub(super) struct Record {
+    pub inputs: Inputs,
+    /// What the occluders that it started with were made from.
+    pub occlusion: Option<String>,
+    pub read: ReadOptions,
+    pub run: RunOptions,
+}
+
+/// A checkpoint to go on from.
+pub(super) struct Resumed {
+    pub state: TrainState,
+    pub settings: Settings,
+    pub record: Record,
+}
+
+/// The newest whole checkpoint of the folder, with the settings that the run is to go on with. None if there is nothing
+/// to go on from; an error if there are checkpoints, and all are damaged.
+pub(super) fn find(request: &Request, changed: &Changed) -> Result<Option<Resumed>> {
+    let mut first = None;
+    for found in checkpoint_folder::list(&request.output)? {
+        match read(&found.path) {
+            Ok(resumed) => {
+                tracing::info!("{}: goes on after step {}", found.path.display(), resumed.state.step);
+                return decide(request, changed, resumed).map(Some);
+            }
+            Err(error) => {
+                tracing::warn!("{error}; the checkpoint before it is tried");
+                first.get_or_insert(error);
+            }
+        }
+    }
+    match first {
+        Some(error) => Err(error),
+        None => {
+            tracing::warn!("{} holds no checkpoint: training starts at step 1", request.output.display());
+            Ok(None)
+        }
+    }
+}
+
+fn read(path: &Path) -> Result<Resumed> {
+    let state = TrainState::read(path)?;
+    let record: Record = serde_json::from_value(state.run.clone())
+        .map_err(|error| Error::data(path, "contents", format!("of the run: {error}")))?;
+    let settings = Settings { read: record.read.clone(), train: state.config.clone(), run: record.run.clone() };
+    settings.check().map_err(|error| Error::data(path, "contents", error.to_string()))?;
+    Ok(Resumed { state, settings, record })
+}
+
+/// Puts what was asked for over the settings of the checkpoint, and says what that changes.
+fn decide(request: &Request, changed: &Changed, mut resumed: Resumed) -> Result<Resumed> {
+    let then = &resumed.settings;
+    let mut wanted = changed(Some(then))?;
+    wanted.check()?;
+    if wanted.train.near == 0.0 {
+        // Left to the scene, and that was decided when the run began.
+        wanted.train.near = then.train.near;
+    }
+    compare(then, &wanted)?;
+    if wanted.train.iterations < resumed.state.step {
+        let (path, steps) = (resumed.state.path.display(), resumed.state.step);
+        let problem = format!("is {}, and {path} has {steps} steps", wanted.train.iterations);
+        return Err(Error::usage("--iterations", problem));
+    }
+    resumed.state.config = wanted.train.clone();
+    resumed.settings = wanted;
+    merge(&mut resumed.record.inputs, &request.inputs);
+    if request.occluders.is_some() {
+        tracing::info!("occluders come from the checkpoint; their files are not read again");
+    }
+    Ok(resumed)
+}
+
+/// Says what has changed, and refuses what cannot change within a run.
+fn compare(then: &Settings, now: &Settings) -> Result<()> {
+    let (then, now) = (then.texts(), now.texts());
+    for key in Settings::keys() {
+        let (then, now) = (then.get(key.name), now.get(key.name));
+        if then == now {
+            continue;
+        }
+        let text = |value: Option<&String>| value.map_or("not set", String::as_str).to_owned();
+        let change = format!("{} in the checkpoint, now {}", text(then), text(now));
+        if key.is_fixed {
+            let problem = format!("{change}; it cannot change within a run: leave it out, or train without --resume");
+            return Err(Error::usage(key.flag(), problem));
+        }
+        tracing::warn!("{}: {change}", key.flag());
+    }
+    Ok(())
+}
+
+/// Puts what is given now over what the checkpoint was given.
+fn merge(then: &mut Inputs, now: &Inputs) {
+    if let Some(bytes) = now.memory_limit
+        && then.memory_limit != Some(bytes)
+    {
+        let text = then.memory_limit.map_or("not set".to_owned(), |bytes| bytes.to_string());
+        tracing::warn!("--memory-limit: {text} in the checkpoint, now {bytes}");
+        then.memory_limit = Some(bytes);
+    }
+    if let Some(masks) = &now.masks {
+        then.masks = Some(absolute(masks));
+    }
+    then.max_bad_photos = now.max_bad_photos.or(then.max_bad_photos);
+    then.allow_outside |= now.allow_outside;
+}
+
+/// A folder as another working directory finds it.
+pub(super) fn absolute(folder: &Path) -> PathBuf {
+    std::path::absolute(folder).unwrap_or_else(|_| folder.to_owned())
+}
