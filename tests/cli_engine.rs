@@ -362,3 +362,27 @@ fn selftest_prints_a_row_for_each_check() {
     let checks = found["checks"].as_array().expect("a list");
     assert!(checks.len() > 20 && checks.iter().all(|check| check["error"].as_f64() <= Some(1.0)), "{found}");
 }
+
+#[test]
+fn render_and_eval_take_the_resolution_of_the_run() {
+    let Some(_turn) = turn() else { return };
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = |name: &str| folder.path().join(name).to_str().expect("UTF-8").to_owned();
+    let (scene, out) = (path("scene"), path("out"));
+    succeeds(&["synth", &scene, "--preset", "simple", "--size", "64x48", "--views", "6", "--points", "100"]);
+    succeeds(&["train", &scene, "-o", &out, "--iterations", "5", "--max-resolution", "32", "--test-every", "3"]);
+    let size = |flags: &[&str]| {
+        let pictures = path(&format!("pictures{}", flags.len()));
+        let base = ["render", &out, "--scene", &scene, "-o", &pictures, "--json"];
+        let printed = json(&succeeds(&base.iter().chain(flags).copied().collect::<Vec<_>>()));
+        let files = printed["files"].as_array().expect("files").clone();
+        let first = image::image_dimensions(files[0].as_str().expect("a file")).expect("a picture");
+        (files.len(), first)
+    };
+    assert_eq!(size(&[]), (2, (32, 24)), "what the run was trained at, and its own test views");
+    assert_eq!(size(&["--max-resolution", "64", "--test-every", "2"]), (3, (64, 48)), "what is typed wins");
+    let printed = json(&succeeds(&["eval", &out, "--scene", &scene, "--json"]));
+    assert_eq!(printed["views"].as_object().expect("views").len(), 2);
+    let stored = json(&std::fs::read_to_string(path("out/metrics.json")).expect("metrics"));
+    assert_eq!(printed["mean"]["psnr"], stored["test"]["psnr"], "scores of the run and of `eval` are of one size");
+}

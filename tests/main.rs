@@ -35,6 +35,7 @@ mod labels;
 mod metrics;
 mod mirror_mutants;
 mod mirrors;
+mod observer;
 mod occlusion;
 mod output;
 mod overflow;

@@ -1,8 +1,11 @@
 //! Arguments that several verbs share. Only what was typed is in here; decisions are made in `config` and in the verbs.
 
 use super::values::share;
-use crate::io::LoadOptions;
+use crate::Result;
+use crate::io::{LoadOptions, ReadOptions};
+use crate::run::Settings;
 use clap::Args;
+use std::path::Path;
 
 /// What applies to every verb.
 #[derive(Args, Clone, Debug, Default)]
@@ -49,15 +52,36 @@ impl ReadArgs {
 }
 
 /// How a scene is read by a verb that does not train.
-#[derive(Args, Clone, Debug)]
+#[derive(Args, Clone, Debug, Default)]
 pub struct SceneArgs {
-    /// Every N-th view by name is a test view; the value that the model was trained with.
-    #[arg(long, value_name = "N", default_value_t = 8, help_heading = "Scene")]
-    pub test_every: u32,
-    /// Longest side of a picture, px; otherwise its own size.
+    /// Every N-th view by name is a test view, 0 for none; otherwise 8, and as in the run of the model for `eval` and
+    /// `render`.
+    #[arg(long, value_name = "N", help_heading = "Scene")]
+    pub test_every: Option<u32>,
+    /// Longest side of a picture, px; otherwise its own size, and as in the run of the model for `eval` and `render`.
     #[arg(long, value_name = "PX", value_parser = clap::value_parser!(u32).range(1..), help_heading = "Scene")]
     pub max_resolution: Option<u32>,
     /// What is let through.
     #[command(flatten)]
     pub read: ReadArgs,
+}
+
+impl SceneArgs {
+    /// The same, with the values of the run that a model is in where nothing was typed.
+    pub fn of_run(&self, model: &Path) -> Result<Self> {
+        let Some(ReadOptions { max_resolution, test_every }) = Settings::of_model(model)?.map(|run| run.read) else {
+            return Ok(self.clone());
+        };
+        let longest = (max_resolution > 0).then_some(max_resolution);
+        Ok(Self {
+            test_every: self.test_every.or(Some(test_every)),
+            max_resolution: self.max_resolution.or(longest),
+            ..self.clone()
+        })
+    }
+
+    /// Every how many-th view is a test view, 0 for none.
+    pub fn test_every(&self) -> u32 {
+        self.test_every.unwrap_or(ReadOptions::default().test_every)
+    }
 }

@@ -161,7 +161,7 @@ impl PromptArgs {
         let Some(labels) = &asked.model.labels else {
             return Err(Error::data(asked.path, "", "the model has no labels; train it with --masks"));
         };
-        let reading = SceneArgs { test_every: 8, max_resolution: asked.max_resolution, read: asked.read };
+        let reading = SceneArgs { max_resolution: asked.max_resolution, read: asked.read, ..SceneArgs::default() };
         let dataset = open_scene(scene, &reading, None, [0.0; 3], false)?;
         let mut cameras: BTreeMap<Key, Camera> = BTreeMap::new();
         for prompt in prompts {

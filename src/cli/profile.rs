@@ -124,7 +124,7 @@ fn decide(args: &ProfileArgs) -> Result<TrainConfig> {
 fn open(args: &ProfileArgs, config: &TrainConfig) -> Result<Dataset> {
     let mut dataset = match &args.scene {
         Some(scene) => open_scene(scene, &args.reading, args.masks.clone(), config.background, true)?,
-        None => synth::dataset(&SynthOptions::default(), args.reading.test_every),
+        None => synth::dataset(&SynthOptions::default(), args.reading.test_every()),
     };
     if args.no_masks {
         dataset.train.iter_mut().for_each(|view| view.mask = None);

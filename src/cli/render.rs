@@ -121,7 +121,7 @@ fn cameras(args: &RenderArgs) -> Result<Vec<(String, Camera)>> {
         return Ok(vec![(stem, read_camera(path)?)]);
     }
     let Some(scene) = &args.scene else { return Err(Error::usage("--scene", "--scene or --camera is needed")) };
-    let dataset = open_scene(scene, &args.reading, None, args.background, false)?;
+    let dataset = open_scene(scene, &args.reading.of_run(&args.model)?, None, args.background, false)?;
     let views = pick_views(&dataset, &args.views)?;
     Ok(stems(&views).into_iter().zip(&views).map(|(stem, view)| (stem, view.camera.clone())).collect())
 }

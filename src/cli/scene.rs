@@ -58,7 +58,7 @@ pub fn open_scene(
     background: [f32; 3],
     photos: bool,
 ) -> Result<Dataset> {
-    let test_every = (reading.test_every > 0).then_some(reading.test_every);
+    let test_every = Some(reading.test_every()).filter(|&every| every > 0);
     let (max_resolution, base) = (reading.max_resolution, LoadOptions::default());
     let options = LoadOptions { masks, max_resolution, test_every, background, photos, ..base };
     io::open_logged(path, &reading.read.into_options(options))

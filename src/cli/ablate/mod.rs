@@ -138,7 +138,5 @@ fn score(out: &Path, settings: &Settings, args: &AblateArgs, context: &Context) 
     let mut eval = EvalArgs::new(out, &args.scene);
     eval.masks = Some(args.truth.as_ref().unwrap_or(&args.masks).clone());
     eval.background = settings.train.background;
-    eval.reading.test_every = settings.read.test_every;
-    eval.reading.max_resolution = (settings.read.max_resolution > 0).then_some(settings.read.max_resolution);
     eval::score(&eval, context)
 }

@@ -1,6 +1,6 @@
 //! What `labelgs eval` can be told.
 
-use crate::cli::args::{ReadArgs, SceneArgs};
+use crate::cli::args::SceneArgs;
 use crate::cli::labelled::MinConfidenceArg;
 use crate::cli::values::{colour, near};
 use crate::edit::select::MIN_LABEL_CONFIDENCE;
@@ -98,7 +98,7 @@ impl EvalArgs {
             page: None,
             min_psnr: None,
             min_iou: None,
-            reading: SceneArgs { test_every: 8, max_resolution: None, read: ReadArgs::default() },
+            reading: SceneArgs::default(),
             json: None,
         }
     }

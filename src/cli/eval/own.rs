@@ -23,7 +23,8 @@ pub(super) fn run(args: &EvalArgs, context: &Context) -> Result<()> {
 /// Scores a model.
 pub(in crate::cli) fn score(args: &EvalArgs, context: &Context) -> Result<Scores> {
     let model = open_model(&args.model)?;
-    let dataset = open_scene(&args.scene, &args.reading, args.masks.clone(), args.background, true)?;
+    let reading = args.reading.of_run(&args.model)?;
+    let dataset = open_scene(&args.scene, &reading, args.masks.clone(), args.background, true)?;
     let views = pick_views(&dataset, &args.views)?;
     let wholes = Folders::find(args)?;
     let mut watcher = Watcher::new(picture_count(&views), args.page.as_deref(), context)?;
