@@ -1,8 +1,7 @@
 //! A scene on the device with the lists of all modes.
 
 use super::errors::Outcome;
-use super::modes::Mode;
-use super::patch::Replacements;
+use super::modes::{Mode, Replacements};
 use crate::measure::cpu_time;
 use labelgs::engine::ListKey;
 use labelgs::gpu::Gpu;
@@ -77,8 +76,8 @@ impl<'a> Bed<'a> {
     }
 
     fn prepare(&mut self) -> Result<()> {
-        let (default, digit_bits) = (self.default_list(false), self.fixture.engine.shape().digit_bits);
-        let lists = self.modes.iter().map(|(mode, shaders)| mode.list(&default, shaders, digit_bits));
+        let default = self.default_list(false);
+        let lists = self.modes.iter().map(|(mode, kernels)| mode.list(&default, kernels));
         let mut lists = lists.collect::<Result<Vec<_>>>()?;
         lists.push(self.default_list(true));
         self.stages = lists.iter().map(pass::stage::stages).collect();

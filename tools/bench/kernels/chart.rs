@@ -14,10 +14,6 @@ fn colour(family: Family) -> RGBColor {
         Family::Default => BLACK,
         Family::Stop => RGBColor(213, 94, 0),
         Family::Cut => RGBColor(0, 114, 178),
-        Family::TileTest => RGBColor(0, 158, 115),
-        Family::Backward => RGBColor(204, 121, 167),
-        Family::Packed => RGBColor(230, 159, 0),
-        Family::Keys => RGBColor(86, 180, 233),
         Family::Arithmetic => RGBColor(130, 130, 130),
     }
 }

@@ -3,9 +3,8 @@
 use super::bed::{Bed, Sample};
 use super::errors::{Errors, compare};
 use super::mirror::{View, without_cut_offs};
-use super::modes::Mode;
+use super::modes::{Mode, Replacements};
 use super::passes::{PassRow, rows_of};
-use super::patch::Replacements;
 use super::scenes::{self, Kind, Plan};
 use crate::measure::{Spread, spread};
 use labelgs::gpu::Gpu;

@@ -1,11 +1,10 @@
 //! Kernels: time against error of every mode, and each pass alone.
 //!
-//! A mode is a training step whose shaders or passes differ in one respect from the engine's (`modes`). It runs in the
+//! A mode is a training step whose kernels are compiled with a macro (`modes`). It runs in the
 //! engine's own scheduler on seeded scenes, is timed by the device's timestamps round robin with all others, and its
 //! picture and gradients are compared with the float64 mirrors of the tests: once with the engine's rules, and once
 //! without any cut-off, which is what those rules stand for.
 
-mod backward;
 mod bed;
 mod chart;
 mod errors;
@@ -14,7 +13,6 @@ mod measure;
 mod mirror;
 mod modes;
 mod passes;
-mod patch;
 mod report;
 mod scenes;
 
@@ -25,8 +23,7 @@ use labelgs::io::atomic;
 use labelgs::pass::{self, KernelShape, Variant};
 use labelgs::{Error, Result};
 use measure::SceneResult;
-use modes::{MODES, Mode};
-use patch::Replacements;
+use modes::{MODES, Mode, Replacements};
 use serde::Serialize;
 
 /// Of the JSON file.
