@@ -48,7 +48,8 @@ pub fn shader(name: &'static str, source: &str, texel: bool) -> Result<&'static 
         },
         element_bytes: binding.element_bytes,
     });
-    let spec = found.spec.into_iter().map(|spec| SpecDesc { name: spec.name.leak(), id: spec.id, default: spec.default });
+    let spec =
+        found.spec.into_iter().map(|spec| SpecDesc { name: spec.name.leak(), id: spec.id, default: spec.default });
     Ok(Box::leak(Box::new(ShaderDesc {
         stem: name,
         name,

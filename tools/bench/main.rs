@@ -49,7 +49,7 @@ pub struct Common {
 
 #[derive(Subcommand)]
 enum Command {
-    /// Time against error of every mode of the kernels, and each pass alone.
+    /// Time against error of every mode of the kernels.
     Kernels(kernels::KernelArgs),
     /// What a step with labels costs beside one without, by covered area and number of objects.
     Steps(Common),

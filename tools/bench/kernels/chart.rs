@@ -20,8 +20,7 @@ fn colour(family: Family) -> RGBColor {
 
 /// The chart as the text of an SVG file.
 pub fn svg(scenes: &[SceneResult], modes: &[Mode]) -> Result<String> {
-    let shown: Vec<&SceneResult> =
-        scenes.iter().filter(|scene| scene.name.starts_with('S') && scene.rounding.is_some()).collect();
+    let shown: Vec<&SceneResult> = scenes.iter().filter(|scene| scene.name.starts_with('S')).collect();
     let size = (PANEL.0 * MEASURES.len() as u32 + LEGEND, PANEL.1 * shown.len().max(1) as u32);
     let mut text = String::new();
     draw(&mut text, size, &shown, modes).map_err(|error| Error::Bug(format!("chart: {error}")))?;
@@ -61,7 +60,7 @@ fn panel(
     modes: &[Mode],
 ) -> std::result::Result<(), Box<dyn std::error::Error>> {
     let points: Vec<(usize, f64, f64)> = (scene.modes.iter().enumerate())
-        .filter_map(|(i, mode)| Some((i, mode.relative_time, (measure.of)(mode)?.max(1e-9))))
+        .map(|(i, mode)| (i, mode.relative_time, (measure.of)(mode).max(1e-9)))
         .filter(|(_, time, error)| time.is_finite() && error.is_finite())
         .collect();
     let ends = |values: &mut dyn Iterator<Item = f64>| {

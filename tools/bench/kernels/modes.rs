@@ -129,4 +129,3 @@ fn source_of(stem: &str) -> Result<Option<PathBuf>> {
     let files = folders.flatten().map(|folder| folder.path().join(format!("{stem}.comp")));
     Ok(files.into_iter().find(|file| file.is_file()))
 }
-

@@ -19,7 +19,6 @@ use labelgs::synth::{self, Preset, SynthOptions};
 use labelgs::train::TrainConfig;
 use labelgs::{Error, Result};
 use serde::Serialize;
-use std::path::Path;
 use std::process::Command;
 use std::sync::Arc;
 use std::time::Instant;
@@ -112,7 +111,6 @@ pub fn run(options: &Options) -> Result<()> {
         curves,
     };
     print(&outcome);
-    measure::require_silence(&gpu)?;
     measure::write_json(&options.common.output.join("training.json"), &outcome)?;
     chart::write(&options.common.output.join("training.svg"), &outcome.curves)?;
     check(&outcome)
@@ -273,11 +271,4 @@ fn check(outcome: &Outcome) -> Result<()> {
 /// Used by the chart: colours and names in the order of the table.
 fn names() -> impl Iterator<Item = &'static str> {
     KINDS.iter().map(|kind| kind.name)
-}
-
-/// Makes the folder of a chart and writes its text.
-fn write_text(path: &Path, text: &str) -> Result<()> {
-    labelgs::io::atomic::write(path, |file| file.write_all(text.as_bytes()))?;
-    println!("wrote {}", path.display());
-    Ok(())
 }
