@@ -9,13 +9,13 @@ mod chart;
 mod curve;
 
 use super::measure::{self, median, require, table};
-use super::trained::{Judge, start, trainer, without_masks};
+use super::trained::{Judge, small_scene, start, trainer, without_masks};
 use super::{Common, device};
 use curve::{Curve, Sample, reached};
 use labelgs::gpu::{Gpu, GpuOptions, PipelineStore};
 use labelgs::io::pipeline_file::PipelineFolder;
 use labelgs::scene::Dataset;
-use labelgs::synth::{self, Preset, SynthOptions};
+use labelgs::synth::{self, SynthOptions};
 use labelgs::train::TrainConfig;
 use labelgs::{Error, Result};
 use serde::Serialize;
@@ -117,11 +117,7 @@ pub fn run(options: &Options) -> Result<()> {
 }
 
 fn scene(small: bool) -> SynthOptions {
-    if small {
-        SynthOptions { preset: Preset::Simple, width: 72, height: 52, views: 6, points: 300, seed: 3 }
-    } else {
-        SynthOptions::default()
-    }
+    if small { SynthOptions { views: 6, ..small_scene() } } else { SynthOptions::default() }
 }
 
 fn config(kind: Kind, iterations: u32, seed: u64) -> TrainConfig {
