@@ -1,9 +1,14 @@
 // Every constant of the algorithm, once. Exported to Rust by the build; the f64 mirrors widen these f32 values.
+// Only the benchmark of kernels (tools/bench/kernels/modes.rs) defines a macro in place of a constant.
 
+#ifndef ALPHA_MIN
 const float ALPHA_MIN = 1.0 / 255.0;         // a pair with less opacity at a pixel does not count (3DGS)
+#endif
 const float LOG2_ALPHA_MIN = log2(ALPHA_MIN);
 const float ALPHA_MAX = 0.99;                // clamp of a pair's opacity (3DGS)
+#ifndef TRANSMITTANCE_MIN
 const float TRANSMITTANCE_MIN = 1e-4;        // a pixel stops before the splat that would go below (3DGS)
+#endif
 const float COV2D_BLUR = 0.3;                // px^2 on the diagonal of the projected covariance (3DGS)
 const float SSIM_C1 = 0.01 * 0.01;
 const float SSIM_C2 = 0.03 * 0.03;

@@ -1,33 +1,62 @@
-//! Kernels of benchmarks, compiled when they run.
+//! Kernels that are compiled when a benchmark runs, by the compiler of the build.
 
+use crate::shadergen::compile::{Define, GlslCompiler, Purpose};
+use crate::shadergen::{interface, reflect};
+use labelgs::shaders::{Access, BindingDesc, BindingKind, ShaderDesc, SpecDesc};
 use labelgs::{Error, Result};
-use shaderc::{CompileOptions, Compiler, EnvVersion, OptimizationLevel, ResolvedInclude, ShaderKind, TargetEnv};
+use std::path::Path;
 
-/// Includes of the engine that the kernels share.
-const INCLUDES: [(&str, &str); 6] = [
-    ("layout.glsl", include_str!("../../glsl/include/layout.glsl")),
-    ("constants.glsl", include_str!("../../glsl/include/constants.glsl")),
-    ("step.glsl", include_str!("../../glsl/include/step.glsl")),
-    ("dispatch.glsl", include_str!("../../glsl/include/dispatch.glsl")),
-    ("blend_tile.glsl", include_str!("../../glsl/include/blend_tile.glsl")),
-    ("subgroup.glsl", include_str!("../../glsl/include/subgroup.glsl")),
-];
+/// The engine's kernels.
+pub const GLSL: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/glsl");
 
-/// SPIR-V of a kernel, with the engine's includes; it lives as long as the program, as that of the engine's shaders does.
-pub fn spirv(name: &str, source: &str, texel: bool) -> Result<&'static [u8]> {
-    let failed = |error: shaderc::Error| Error::Bug(format!("{name}: {error}"));
-    let compiler = Compiler::new().map_err(failed)?;
-    let mut options = CompileOptions::new().map_err(failed)?;
-    options.set_target_env(TargetEnv::Vulkan, EnvVersion::Vulkan1_2 as u32);
-    options.set_optimization_level(OptimizationLevel::Performance);
-    if texel {
-        options.add_macro_definition("TEXEL", None);
+fn compiler() -> Result<GlslCompiler> {
+    GlslCompiler::new(&Path::new(GLSL).join("include")).map_err(Error::Bug)
+}
+
+/// The macros of a device that reads through texel buffers, or none.
+pub fn texel_define(texel: bool) -> Vec<Define> {
+    if texel { vec![("TEXEL".to_owned(), None)] } else { Vec::new() }
+}
+
+/// SPIR-V of a kernel with the engine's includes. It lives as long as the program, since pipelines are told apart by the
+/// address of their module.
+pub fn spirv(name: &str, source: &str, defines: &[Define]) -> Result<&'static [u8]> {
+    let words = compiler()?.compile(name, source, defines, Purpose::Ship).map_err(Error::Check)?;
+    Ok(words.iter().flat_map(|word| word.to_le_bytes()).collect::<Vec<u8>>().leak())
+}
+
+/// A kernel of a benchmark with the interface that it declares.
+pub fn shader(name: &'static str, source: &str, texel: bool) -> Result<&'static ShaderDesc> {
+    let defines = texel_define(texel);
+    let declared = compiler()?.compile(name, source, &defines, Purpose::Reflect).map_err(Error::Check)?;
+    let declared = rspirv::dr::load_words(&declared).map_err(|error| Error::Bug(format!("{name}: {error}")))?;
+    let found = reflect::interface(&declared);
+    if let Some(problem) = found.problems.first() {
+        return Err(Error::Check(format!("{name}: {}: {}", problem.name, problem.rule)));
     }
-    options.set_include_callback(|file, _kind, _from, _depth| {
-        let found = INCLUDES.iter().find(|(name, _)| *name == file);
-        let (name, content) = found.ok_or_else(|| format!("there is no {file}"))?;
-        Ok(ResolvedInclude { resolved_name: (*name).to_owned(), content: (*content).to_owned() })
+    let bindings = found.bindings.into_iter().map(|binding| BindingDesc {
+        name: binding.name.leak(),
+        binding: binding.binding,
+        kind: match binding.kind {
+            interface::Kind::Storage => BindingKind::Storage,
+            interface::Kind::Texel => BindingKind::Texel,
+        },
+        access: match binding.access {
+            interface::Access::Read => Access::Read,
+            interface::Access::Write => Access::Write,
+            interface::Access::ReadWrite => Access::ReadWrite,
+        },
+        element_bytes: binding.element_bytes,
     });
-    let words = compiler.compile_into_spirv(source, ShaderKind::Compute, name, "main", Some(&options));
-    Ok(Box::leak(words.map_err(failed)?.as_binary_u8().to_vec().into_boxed_slice()))
+    let spec =
+        found.spec.into_iter().map(|spec| SpecDesc { name: spec.name.leak(), id: spec.id, default: spec.default });
+    Ok(Box::leak(Box::new(ShaderDesc {
+        stem: name,
+        name,
+        spirv: spirv(name, source, &defines)?,
+        bindings: bindings.collect::<Vec<_>>().leak(),
+        push_bytes: found.push.map_or(0, |push| push.bytes),
+        spec: spec.collect::<Vec<_>>().leak(),
+        uses_subgroups: found.uses_subgroups,
+    })))
 }

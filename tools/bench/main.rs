@@ -12,9 +12,9 @@ mod measure;
 mod memory;
 mod pace;
 mod paper;
-#[allow(dead_code, reason = "the compiler of the build; benchmarks reflect nothing")]
-#[path = "../shadergen/compile.rs"]
-mod shader_compiler;
+#[allow(dead_code, reason = "what the build does with shaders; benchmarks generate nothing")]
+#[path = "../shadergen/mod.rs"]
+mod shadergen;
 mod skips;
 mod start;
 mod steps;
@@ -49,7 +49,7 @@ pub struct Common {
 
 #[derive(Subcommand)]
 enum Command {
-    /// Time against error of every mode of the kernels, and each pass alone.
+    /// Time against error of every mode of the kernels.
     Kernels(kernels::KernelArgs),
     /// What a step with labels costs beside one without, by covered area and number of objects.
     Steps(Common),

@@ -1,6 +1,5 @@
 //! Clocks, medians, tables, files.
 
-use labelgs::gpu::Gpu;
 use labelgs::io::atomic;
 use labelgs::{Error, Result};
 use serde::Serialize;
@@ -27,14 +26,14 @@ pub fn timed<T>(work: impl FnOnce() -> Result<T>) -> Result<(T, Cost)> {
 
 /// Processor time of this process, all threads; 0 where the system does not tell.
 #[cfg(unix)]
-pub fn cpu_time() -> Duration {
+fn cpu_time() -> Duration {
     let time = rustix::time::clock_gettime(rustix::time::ClockId::ProcessCPUTime);
     Duration::new(time.tv_sec.try_into().unwrap_or(0), time.tv_nsec.try_into().unwrap_or(0))
 }
 
 /// The system does not tell.
 #[cfg(not(unix))]
-pub fn cpu_time() -> Duration {
+fn cpu_time() -> Duration {
     Duration::ZERO
 }
 
@@ -47,24 +46,6 @@ pub fn median(values: impl IntoIterator<Item = f64>) -> f64 {
         n if n % 2 == 1 => sorted[n / 2],
         n => f64::midpoint(sorted[n / 2 - 1], sorted[n / 2]),
     }
-}
-
-/// Median and least of some numbers.
-#[derive(Clone, Copy, Debug, Default, Serialize)]
-pub struct Spread {
-    /// Median.
-    pub median: f64,
-    /// Least.
-    pub min: f64,
-}
-
-/// Of the numbers; 0 without any.
-pub fn spread(values: Vec<f64>) -> Spread {
-    if values.is_empty() {
-        return Spread::default();
-    }
-    let min = values.iter().copied().fold(f64::INFINITY, f64::min);
-    Spread { median: median(values), min }
 }
 
 /// Medians of wall clock and processor time.
@@ -99,7 +80,12 @@ pub fn table(rows: &[Vec<String>]) -> String {
 /// Writes a value as JSON.
 pub fn write_json(path: &Path, value: &impl Serialize) -> Result<()> {
     let text = serde_json::to_string_pretty(value).map_err(|error| Error::Bug(format!("JSON: {error}")))?;
-    atomic::write(path, |file| writeln!(file, "{text}"))?;
+    write_text(path, &format!("{text}\n"))
+}
+
+/// Writes a text, and makes the folder that it goes into.
+pub fn write_text(path: &Path, text: &str) -> Result<()> {
+    atomic::write(path, |file| file.write_all(text.as_bytes()))?;
     println!("wrote {}", path.display());
     Ok(())
 }
@@ -107,10 +93,4 @@ pub fn write_json(path: &Path, value: &impl Serialize) -> Result<()> {
 /// Fails with a message where something does not hold.
 pub fn require(holds: bool, otherwise: impl FnOnce() -> String) -> Result<()> {
     if holds { Ok(()) } else { Err(Error::Check(otherwise())) }
-}
-
-/// The validation layer, if it looked on, had nothing to say.
-pub fn require_silence(gpu: &Gpu) -> Result<()> {
-    let messages = gpu.messages();
-    require(messages.is_empty(), || format!("the validation layer has {} messages: {messages:#?}", messages.len()))
 }

@@ -120,7 +120,6 @@ pub fn run(options: &Options) -> Result<()> {
         }
         print_trainings(&outcome.trainings, plan.iterations);
     }
-    measure::require_silence(&gpu)?;
     measure::write_json(&options.common.output.join("paper.json"), &outcome)?;
     check(&outcome, options.common.small)
 }

@@ -10,13 +10,18 @@ use labelgs::gpu::Gpu;
 use labelgs::io::init::{RANDOM_COUNT, initial_gaussians};
 use labelgs::scene::{Dataset, Gaussians, View};
 use labelgs::scheduler::SchedulerOptions;
-use labelgs::synth::{self, SynthOptions};
+use labelgs::synth::{self, Preset, SynthOptions};
 use labelgs::train::near::NEAR;
 use labelgs::train::{StepReport, TrainConfig, Trainer};
 use std::sync::Arc;
 
 /// Every so many-th view of a made scene is held out.
 pub const TEST_EVERY: u32 = 8;
+
+/// A scene of which steps take milliseconds.
+pub fn small_scene() -> SynthOptions {
+    SynthOptions { preset: Preset::Simple, width: 72, height: 52, views: 5, points: 300, seed: 3 }
+}
 
 /// The model that a training of the scene starts from.
 pub fn start(dataset: &Dataset, config: &TrainConfig) -> Result<Gaussians> {

@@ -3,11 +3,11 @@
 use super::kernels::{Channels, Kernels};
 use super::{Bed, Ground, feature};
 use crate::measure::require;
-use crate::trained::{labelled_model, timing_config, trainer, without_masks};
+use crate::trained::{labelled_model, small_scene, timing_config, trainer, without_masks};
 use labelgs::Result;
 use labelgs::gpu::Gpu;
 use labelgs::scheduler::plan::Buf;
-use labelgs::synth::{self, Preset, SynthOptions};
+use labelgs::synth;
 use labelgs::verify::reference::Rules;
 use labelgs::verify::reference::blend::{Trace, smallest_over_pixels, trace};
 use labelgs::verify::reference::project::Splat;
@@ -26,7 +26,7 @@ const ADJOINT: f64 = 1e-4;
 
 /// Checks one number of channels of each kind.
 pub fn run(gpu: &Arc<Gpu>, kernels: &Kernels) -> Result<()> {
-    let scene = SynthOptions { preset: Preset::Simple, width: 72, height: 52, views: 5, points: 300, seed: 3 };
+    let scene = small_scene();
     let dataset = synth::dataset(&scene, 0);
     let model = labelled_model(gpu, &dataset, 12)?;
     let mut steps = trainer(gpu, &without_masks(&dataset), &model, timing_config())?;

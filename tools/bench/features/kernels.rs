@@ -1,26 +1,12 @@
 //! The feature kernels, compiled when the benchmark runs, and the buffers and passes that they add to a plain step.
 
-use crate::compiler::spirv;
+use crate::compiler::shader;
 use labelgs::pass::{KernelShape, Variant, training_step};
 use labelgs::scheduler::plan::{
     Buf, BufferDecl, Capacity, Class, Domain, Grid, PassDecl, PassList, TABLE, TexelFormat, Work,
 };
-use labelgs::shaders::{Access, BindingDesc, BindingKind, ShaderDesc, SpecDesc, constants};
+use labelgs::shaders::{ShaderDesc, constants};
 use labelgs::{Error, Result};
-
-/// Bytes of the push constants: first vec4 of the channels, vec4 a Gaussian.
-const PUSH_BYTES: u32 = 8;
-
-/// How a kernel sees a buffer.
-#[derive(Clone, Copy)]
-enum Seen {
-    /// Storage that is read; bytes of an element.
-    Read(u32),
-    /// Fetched: a texel buffer where that is fast; bytes of an element as storage.
-    Fetch(u32),
-    /// Storage that is written.
-    Write(u32),
-}
 
 /// The three kernels for a shape.
 pub struct Kernels {
@@ -30,75 +16,14 @@ pub struct Kernels {
 }
 
 impl Kernels {
-    /// Compiles them; descriptions live as long as the program, as those of the engine's shaders do.
+    /// Compiles them.
     pub fn compile(shape: &KernelShape) -> Result<Self> {
-        use Seen::{Fetch, Read, Write};
-        let step = ("step", Read(size_of::<labelgs::shaders::structs::StepUniforms>() as u32));
-        let counters = ("counters", Read(size_of::<labelgs::shaders::structs::Counters>() as u32));
-        let tile = [step, ("tile_starts", Fetch(4)), ("slots", Fetch(4)), ("splat_from_instance", Fetch(4))];
-        let seen = [("splats", Fetch(16)), ("last", Fetch(4))];
-        let tile = [&tile[..], &seen].concat();
-        let forward =
-            [&tile[..], &[("gaussian_from_splat", Fetch(4)), ("features", Fetch(16)), ("v_features_image", Write(16))]]
-                .concat();
-        let backward = [&tile[..], &[("v_features_image", Fetch(16)), ("v_feature_instances", Write(16))]].concat();
-        let gather = [
-            step,
-            counters,
-            ("tiles_touched", Fetch(4)),
-            ("instance_offsets", Fetch(4)),
-            ("v_instances_c", Fetch(16)),
-            ("v_feature_instances", Fetch(16)),
-            ("v_features", Write(16)),
-        ];
-        let source = |name| match name {
-            "feature_forward" => include_str!("feature_forward.comp"),
-            "feature_backward" => include_str!("feature_backward.comp"),
-            _ => include_str!("feature_gather.comp"),
-        };
-        let shader = |name, bindings: &[(&'static str, Seen)], push, uses_subgroups| {
-            compile(name, source(name), bindings, push, uses_subgroups, shape.texel)
-        };
         Ok(Self {
-            forward: shader("feature_forward", &forward, PUSH_BYTES, true)?,
-            backward: shader("feature_backward", &backward, 0, true)?,
-            gather: shader("feature_gather", &gather, PUSH_BYTES, false)?,
+            forward: shader("feature_forward", include_str!("feature_forward.comp"), shape.texel)?,
+            backward: shader("feature_backward", include_str!("feature_backward.comp"), shape.texel)?,
+            gather: shader("feature_gather", include_str!("feature_gather.comp"), shape.texel)?,
         })
     }
-}
-
-fn compile(
-    name: &'static str,
-    source: &str,
-    bindings: &[(&'static str, Seen)],
-    push_bytes: u32,
-    uses_subgroups: bool,
-    texel: bool,
-) -> Result<&'static ShaderDesc> {
-    let spirv = spirv(name, source, texel)?;
-    let describe = |(binding, &(name, seen)): (usize, &(&'static str, Seen))| {
-        let (kind, access, element_bytes) = match seen {
-            Seen::Read(bytes) => (BindingKind::Storage, Access::Read, bytes),
-            Seen::Fetch(_) if texel => (BindingKind::Texel, Access::Read, 0),
-            Seen::Fetch(bytes) => (BindingKind::Storage, Access::Read, bytes),
-            Seen::Write(bytes) => (BindingKind::Storage, Access::Write, bytes),
-        };
-        BindingDesc { name, binding: binding as u32, kind, access, element_bytes }
-    };
-    let bindings: Vec<BindingDesc> = bindings.iter().enumerate().map(describe).collect();
-    let spec = |name, id, default| SpecDesc { name, id, default };
-    let vecs = spec("VECS", 10, 1);
-    let tile = vec![spec("SUBGROUP_SIZE", 0, 8), spec("TILE_WIDTH", 1, 8), spec("TILE_HEIGHT", 2, 8), vecs];
-    let specs = if uses_subgroups { tile } else { vec![vecs] };
-    Ok(Box::leak(Box::new(ShaderDesc {
-        stem: name,
-        name,
-        spirv,
-        bindings: Box::leak(bindings.into_boxed_slice()),
-        push_bytes,
-        spec: Box::leak(specs.into_boxed_slice()),
-        uses_subgroups,
-    })))
 }
 
 /// How many channels there are, and how many are walked at once.

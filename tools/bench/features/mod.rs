@@ -9,7 +9,7 @@ mod check;
 mod kernels;
 
 use super::measure::{self, Cost, median, median_cost, require, table, timed};
-use super::trained::{labelled_model, timed_step, timing_config, trainer, without_masks};
+use super::trained::{labelled_model, small_scene, timed_step, timing_config, trainer, without_masks};
 use super::{Common, device};
 use glam::DVec3;
 use kernels::{Buffers, Channels, Kernels, step_with_features};
@@ -21,7 +21,7 @@ use labelgs::scene::{Dataset, Gaussians, View};
 use labelgs::scheduler::plan::{Buf, Capacity, PlanOptions};
 use labelgs::scheduler::{ListId, Scheduler, SchedulerOptions};
 use labelgs::shaders::structs::{Counters, StepUniforms};
-use labelgs::synth::{self, Preset, SynthOptions};
+use labelgs::synth::{self, SynthOptions};
 use serde::Serialize;
 use std::sync::Arc;
 
@@ -72,12 +72,8 @@ struct Outcome {
 /// Runs it.
 pub fn run(options: &Options) -> Result<()> {
     let small = options.common.small;
-    let (scene, warm_up, steps, from_step) = if small {
-        let scene = SynthOptions { preset: Preset::Simple, width: 72, height: 52, views: 5, points: 300, seed: 3 };
-        (scene, 1, 2, 12)
-    } else {
-        (SynthOptions::default(), 4, options.steps, options.from_step)
-    };
+    let (scene, warm_up, steps, from_step) =
+        if small { (small_scene(), 1, 2, 12) } else { (SynthOptions::default(), 4, options.steps, options.from_step) };
     let gpu = device::open()?;
     let dataset = synth::dataset(&scene, 5);
     let model = labelled_model(&gpu, &dataset, from_step)?;
@@ -94,7 +90,6 @@ pub fn run(options: &Options) -> Result<()> {
     let size = (scene.width, scene.height);
     let outcome = Outcome { device: gpu.capabilities().name.clone(), load, size, gaussians: model.len(), rows };
     print(&outcome);
-    measure::require_silence(&gpu)?;
     measure::write_json(&options.common.output.join("features.json"), &outcome)?;
     let sane = |row: &Row| row.ratio.is_finite() && (small || row.ratio > 1.0);
     require(outcome.rows.iter().all(sane), || "a step with more work takes less time".to_owned())

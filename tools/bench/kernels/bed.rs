@@ -1,46 +1,39 @@
 //! A scene on the device with the lists of all modes.
 
 use super::errors::Outcome;
-use super::modes::Mode;
-use super::patch::Replacements;
-use crate::measure::cpu_time;
+use super::modes::{Mode, Replacements};
+use crate::measure::timed;
 use labelgs::engine::ListKey;
 use labelgs::gpu::Gpu;
 use labelgs::pass::{self, KernelShape, Stage, Variant};
-use labelgs::scheduler::plan::{Buf, PassList, PlanOptions};
+use labelgs::scheduler::plan::{Buf, PlanOptions};
 use labelgs::scheduler::{ListId, SchedulerOptions};
 use labelgs::shaders::structs::Counters;
 use labelgs::train::step_input;
 use labelgs::verify::selftest::fixture::Fixture;
 use labelgs::verify::selftest::scenes::Scene;
 use labelgs::{Error, Result};
+use std::collections::BTreeMap;
 use std::sync::Arc;
-use std::time::Duration;
 
 /// One submit.
 #[derive(Clone, Debug)]
 pub struct Sample {
-    /// Stage, name and nanoseconds of each item of the list.
-    pub items: Vec<(Stage, String, u64)>,
-    /// Processor time of the process.
-    pub cpu: Option<Duration>,
+    /// Milliseconds of each stage.
+    pub stages: BTreeMap<Stage, f64>,
+    /// Processor time of the process, ms; none where the system does not tell.
+    pub cpu: Option<f64>,
     /// What the device counted.
     pub counters: Counters,
 }
 
-impl Sample {
-    /// Milliseconds of the items of some stages.
-    pub fn ms(&self, of: impl Fn(Stage) -> bool) -> f64 {
-        self.items.iter().filter(|(stage, ..)| of(*stage)).map(|(.., ns)| *ns as f64 * 1e-6).sum()
-    }
-}
-
-/// A scene, an engine, and a list for each mode; after them the default with the optimiser, which trains nothing.
+/// A scene, an engine, and a list for each mode.
 pub struct Bed<'a> {
     fixture: Fixture,
     modes: &'a [(Mode, Replacements)],
     lists: Vec<ListId>,
-    stages: Vec<Vec<(Stage, String)>>,
+    /// Of the items of every list.
+    stages: Vec<Stage>,
 }
 
 impl<'a> Bed<'a> {
@@ -50,16 +43,8 @@ impl<'a> Bed<'a> {
         // With a barrier before each item, times belong to their items; without aliasing, all can be read back.
         let plan = PlanOptions { alias: false, guards: false, barrier_everywhere: true };
         let options = SchedulerOptions { plan, timestamps: true, ..SchedulerOptions::default() };
-        let mut fixture = Fixture::new(Arc::clone(gpu), scene, false, shape, options)?;
-        let config = &mut fixture.config;
-        (config.position_lr_init, config.position_lr_final) = (f64::MIN_POSITIVE, f64::MIN_POSITIVE);
-        (config.feature_lr, config.opacity_lr, config.scaling_lr, config.rotation_lr) = (0.0, 0.0, 0.0, 0.0);
+        let fixture = Fixture::new(Arc::clone(gpu), scene, false, shape, options)?;
         Ok(Self { fixture, modes, lists: Vec::new(), stages: Vec::new() })
-    }
-
-    /// Number of the list with the optimiser; those before it are the modes.
-    pub fn full_step(&self) -> usize {
-        self.modes.len()
     }
 
     /// Pixels of a tile.
@@ -67,21 +52,19 @@ impl<'a> Bed<'a> {
         self.fixture.engine.shape().tile_pixels()
     }
 
-    fn variant(&self, update: bool) -> Variant {
+    /// Without the optimiser, which no mode touches, and which would change the model.
+    fn variant(&self) -> Variant {
         let size = (self.fixture.scene.camera.width, self.fixture.scene.camera.height);
-        Variant { labels: false, lift: false, sh_degree: self.fixture.config.sh_degree, size, update, counts: false }
-    }
-
-    fn default_list(&self, update: bool) -> PassList {
-        pass::training_step(self.fixture.engine.shape(), self.fixture.engine.sched().capacity(), self.variant(update))
+        let sh_degree = self.fixture.config.sh_degree;
+        Variant { labels: false, lift: false, sh_degree, size, update: false, counts: false }
     }
 
     fn prepare(&mut self) -> Result<()> {
-        let (default, digit_bits) = (self.default_list(false), self.fixture.engine.shape().digit_bits);
-        let lists = self.modes.iter().map(|(mode, shaders)| mode.list(&default, shaders, digit_bits));
-        let mut lists = lists.collect::<Result<Vec<_>>>()?;
-        lists.push(self.default_list(true));
-        self.stages = lists.iter().map(pass::stage::stages).collect();
+        let engine = &self.fixture.engine;
+        let default = pass::training_step(engine.shape(), engine.sched().capacity(), self.variant());
+        let lists = self.modes.iter().map(|(mode, kernels)| mode.list(&default, kernels));
+        let lists = lists.collect::<Result<Vec<_>>>()?;
+        self.stages = pass::stage::stages(&default).into_iter().map(|(stage, _)| stage).collect();
         self.lists = self.fixture.engine.sched_mut().prepare_all(&lists.iter().collect::<Vec<_>>())?;
         Ok(())
     }
@@ -93,13 +76,8 @@ impl<'a> Bed<'a> {
                 self.prepare()?;
             }
             let fixture = &mut self.fixture;
-            // Gradient records of other modes must not count as those of this run.
-            fixture.input.stamp += 1;
-            let uniforms = fixture.uniforms();
-            step_input::upload(&mut fixture.engine, 0, uniforms, &fixture.view, &fixture.input, &fixture.config)?;
-            let before = cpu_time();
-            fixture.engine.sched_mut().run(self.lists[list], 0)?;
-            let cpu = cpu_time().saturating_sub(before);
+            upload(fixture)?;
+            let ((), cost) = timed(|| fixture.engine.sched_mut().run(self.lists[list], 0))?;
             let report = fixture.engine.report(0)?;
             if fixture.engine.recover(&report)? {
                 self.lists.clear();
@@ -109,9 +87,12 @@ impl<'a> Bed<'a> {
             if times.is_empty() {
                 return Err(Error::NoDevice("this device has no timestamps on its compute queue".to_owned()));
             }
-            let named = self.stages[list].iter().cloned().zip(times);
-            let items = named.map(|((stage, name), (_, ns))| (stage, name, ns)).collect();
-            return Ok(Sample { items, cpu: (!cpu.is_zero()).then_some(cpu), counters: report.counters });
+            let mut stages = BTreeMap::new();
+            for (stage, (_, ns)) in self.stages.iter().zip(times) {
+                *stages.entry(*stage).or_default() += ns as f64 * 1e-6;
+            }
+            let cpu = (cost.cpu > 0.0).then_some(cost.cpu);
+            return Ok(Sample { stages, cpu, counters: report.counters });
         }
     }
 
@@ -125,12 +106,10 @@ impl<'a> Bed<'a> {
 
     /// The engine's own list gives the picture of the default mode, to the bit.
     pub fn check_default(&mut self, outcome: &Outcome) -> Result<()> {
-        let key = ListKey::Train(self.variant(false));
-        self.fixture.input.stamp += 1;
+        let key = ListKey::Train(self.variant());
         let fixture = &mut self.fixture;
         let list = fixture.engine.list(key)?;
-        let uniforms = fixture.uniforms();
-        step_input::upload(&mut fixture.engine, 0, uniforms, &fixture.view, &fixture.input, &fixture.config)?;
+        upload(fixture)?;
         fixture.engine.sched_mut().run(list, 0)?;
         let own = self.outcome()?;
         if own.colours == outcome.colours && own.rows == outcome.rows {
@@ -138,4 +117,11 @@ impl<'a> Bed<'a> {
         }
         Err(Error::Check("the default mode is not the step of the engine".to_owned()))
     }
+}
+
+/// What a step needs, with a new stamp: gradient records of other modes must not count as those of this run.
+fn upload(fixture: &mut Fixture) -> Result<()> {
+    fixture.input.stamp += 1;
+    let uniforms = fixture.uniforms();
+    step_input::upload(&mut fixture.engine, 0, uniforms, &fixture.view, &fixture.input, &fixture.config)
 }

@@ -14,18 +14,13 @@ fn colour(family: Family) -> RGBColor {
         Family::Default => BLACK,
         Family::Stop => RGBColor(213, 94, 0),
         Family::Cut => RGBColor(0, 114, 178),
-        Family::TileTest => RGBColor(0, 158, 115),
-        Family::Backward => RGBColor(204, 121, 167),
-        Family::Packed => RGBColor(230, 159, 0),
-        Family::Keys => RGBColor(86, 180, 233),
         Family::Arithmetic => RGBColor(130, 130, 130),
     }
 }
 
 /// The chart as the text of an SVG file.
 pub fn svg(scenes: &[SceneResult], modes: &[Mode]) -> Result<String> {
-    let shown: Vec<&SceneResult> =
-        scenes.iter().filter(|scene| scene.name.starts_with('S') && scene.rounding.is_some()).collect();
+    let shown: Vec<&SceneResult> = scenes.iter().filter(|scene| scene.name.starts_with('S')).collect();
     let size = (PANEL.0 * MEASURES.len() as u32 + LEGEND, PANEL.1 * shown.len().max(1) as u32);
     let mut text = String::new();
     draw(&mut text, size, &shown, modes).map_err(|error| Error::Bug(format!("chart: {error}")))?;
@@ -65,7 +60,7 @@ fn panel(
     modes: &[Mode],
 ) -> std::result::Result<(), Box<dyn std::error::Error>> {
     let points: Vec<(usize, f64, f64)> = (scene.modes.iter().enumerate())
-        .filter_map(|(i, mode)| Some((i, mode.relative_time, (measure.of)(mode)?.max(1e-9))))
+        .map(|(i, mode)| (i, mode.relative_time, (measure.of)(mode).max(1e-9)))
         .filter(|(_, time, error)| time.is_finite() && error.is_finite())
         .collect();
     let ends = |values: &mut dyn Iterator<Item = f64>| {
@@ -89,35 +84,13 @@ fn panel(
         .y_label_formatter(&|value| format!("{value:.0e}"))
         .light_line_style(WHITE)
         .draw()?;
-    let mut labels = Labels::default();
     for (number, time, error) in points {
         let family = modes.get(number).map_or(Family::Default, |mode| mode.family);
         let (radius, style) = if number == 0 { (6, 18) } else { (3, 12) };
         chart.draw_series([Circle::new((time, error), radius, colour(family).filled())])?;
         let text = if number == 0 { "default".to_owned() } else { number.to_string() };
         let style = ("sans-serif", style).into_font().color(&colour(family));
-        let offset = labels.place(chart.backend_coord(&(time, error)), text.len());
-        chart.draw_series([EmptyElement::at((time, error)) + Text::new(text, offset, style)])?;
+        chart.draw_series([EmptyElement::at((time, error)) + Text::new(text, (6, -6), style)])?;
     }
     Ok(())
-}
-
-/// Labels that stand already: left, top and width, px.
-#[derive(Default)]
-struct Labels(Vec<(i32, i32, i32)>);
-
-impl Labels {
-    /// Where a label goes from its point: beside it, or as far above or below as it must to stand alone.
-    fn place(&mut self, (x, y): (i32, i32), letters: usize) -> (i32, i32) {
-        const HEIGHT: i32 = 11;
-        let (left, width) = (x + 6, 8 * letters as i32);
-        let free = |&dy: &i32| {
-            self.0.iter().all(|&(other, top, wide)| {
-                left >= other + wide || other >= left + width || (y + dy - top).abs() >= HEIGHT
-            })
-        };
-        let dy = [-6, 6, -18, 18, -30, 30, -42, 42, -54, 54].into_iter().find(free).unwrap_or(-66);
-        self.0.push((left, y + dy, width));
-        (6, dy)
-    }
 }

@@ -1,6 +1,5 @@
 //! Which modes nothing else beats, and which of them is the knee. Differences within noise count for nothing.
 
-use super::errors::Errors;
 use super::measure::{ModeResult, SceneResult};
 
 /// A measure of error that a chart shows.
@@ -9,28 +8,16 @@ pub struct Measure {
     /// Name.
     pub name: &'static str,
     /// Its value for a mode.
-    pub of: fn(&ModeResult) -> Option<f64>,
+    pub of: fn(&ModeResult) -> f64,
 }
 
-fn colour(errors: Option<&Errors>) -> Option<f64> {
-    errors.map(|errors| errors.colours.p999)
-}
-
-/// Where a cut-off changes which pairs count, small elements have any relative error, and only the norm says something.
-fn norm(errors: Option<&Errors>) -> Option<f64> {
-    errors.map(|errors| errors.gradients.worst.rms)
-}
-
-fn relative(errors: Option<&Errors>) -> Option<f64> {
-    errors.map(|errors| errors.gradients.worst.p999)
-}
-
-/// The four measures, in the order of the chart's panels.
+/// The four measures, in the order of the chart's panels. Where a cut-off changes which pairs count, small elements of
+/// gradients have any relative error, and only the norm says something.
 pub const MEASURES: [Measure; 4] = [
-    Measure { name: "colours, 99.9 %, no cut-offs", of: |mode| colour(mode.against_no_cut_offs.as_ref()) },
-    Measure { name: "gradients, norm, no cut-offs", of: |mode| norm(mode.against_no_cut_offs.as_ref()) },
-    Measure { name: "colours, 99.9 %, same rules", of: |mode| colour(mode.against_rules.as_ref()) },
-    Measure { name: "gradients, 99.9 % relative, same rules", of: |mode| relative(mode.against_rules.as_ref()) },
+    Measure { name: "colours, 99.9 %, no cut-offs", of: |mode| mode.against_no_cut_offs.colours.p999 },
+    Measure { name: "gradients, norm, no cut-offs", of: |mode| mode.against_no_cut_offs.gradients.worst.rms },
+    Measure { name: "colours, 99.9 %, same rules", of: |mode| mode.against_rules.colours.p999 },
+    Measure { name: "gradients, 99.9 % relative, same rules", of: |mode| mode.against_rules.gradients.worst.p999 },
 ];
 
 /// A difference of relative time that is noise.
@@ -43,7 +30,8 @@ struct Points(Vec<(f64, f64)>);
 
 impl Points {
     fn of(scene: &SceneResult, measure: Measure) -> Self {
-        let error = |mode| (measure.of)(mode).filter(|error| error.is_finite()).unwrap_or(f64::INFINITY).max(1e-9);
+        let error =
+            |mode| Some((measure.of)(mode)).filter(|error| error.is_finite()).unwrap_or(f64::INFINITY).max(1e-9);
         Self(scene.modes.iter().map(|mode| (mode.relative_time, error(mode))).collect())
     }
 
@@ -96,5 +84,5 @@ pub fn all(scene: &SceneResult) -> Vec<(&'static str, String)> {
             format!("unbeaten {}; knee {}; like the default {}", names(&front), names(&[knee]), names(&ties)),
         ))
     };
-    if scene.rounding.is_none() { Vec::new() } else { MEASURES.into_iter().filter_map(one).collect() }
+    MEASURES.into_iter().filter_map(one).collect()
 }

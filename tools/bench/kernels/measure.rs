@@ -3,16 +3,13 @@
 use super::bed::{Bed, Sample};
 use super::errors::{Errors, compare};
 use super::mirror::{View, without_cut_offs};
-use super::modes::Mode;
-use super::passes::{PassRow, rows_of};
-use super::patch::Replacements;
+use super::modes::{Mode, Replacements};
 use super::scenes::{self, Kind, Plan};
-use crate::measure::{Spread, spread};
+use crate::measure::median;
+use labelgs::Result;
 use labelgs::gpu::Gpu;
 use labelgs::pass::Stage;
-use labelgs::shaders::structs::Counters;
 use labelgs::verify::reference::Rules;
-use labelgs::{Error, Result};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -32,23 +29,16 @@ pub struct ModeResult {
     pub relative_time: f64,
     /// Time of the stages that modes touch by that of the default in the same round, median over the rounds.
     pub relative_median: f64,
-    /// The same by the least times.
-    pub relative_least: f64,
     /// Processor time of the step by that of the default in the same round, median over the rounds.
     pub relative_cpu: Option<f64>,
-    /// ms of the stages that modes touch, all but loss, optimiser and report: median, and the sum of the least times of
-    /// the passes.
-    pub touched: Spread,
-    /// ms of each stage.
-    pub stages: BTreeMap<&'static str, Spread>,
-    /// Processor time of a step without optimiser, ms.
-    pub cpu: Option<Spread>,
+    /// ms of each stage, median.
+    pub stages: BTreeMap<&'static str, f64>,
     /// (splat, tile) pairs that were sorted.
     pub instances: u32,
     /// Against the float64 step with the engine's rules.
-    pub against_rules: Option<Errors>,
+    pub against_rules: Errors,
     /// Against the float64 step without stop and cut.
-    pub against_no_cut_offs: Option<Errors>,
+    pub against_no_cut_offs: Errors,
 }
 
 /// A scene.
@@ -66,84 +56,43 @@ pub struct SceneResult {
     pub rounds: usize,
     /// Splats of the view.
     pub splats: u32,
-    /// (splat, tile) pairs.
-    pub instances: u32,
     /// (splat, pixel) pairs that the forward pass walked.
     pub pairs: u64,
     /// Processes that waited for a processor, on the average of a minute, after the scene.
     pub load: Option<f64>,
     /// The modes, the default first.
     pub modes: Vec<ModeResult>,
-    /// The passes of the default step, the optimiser among them.
-    pub passes: Vec<PassRow>,
     /// The default against the float64 step, where no decision is near: rounding alone.
-    pub rounding: Option<Errors>,
+    pub rounding: Errors,
 }
 
 /// Measures a scene.
 pub fn scene(gpu: &Arc<Gpu>, plan: &Plan, modes: &[(Mode, Replacements)]) -> Result<SceneResult> {
     let mut scene = scenes::build(plan);
     let (rules, open) = (Rules::default(), without_cut_offs());
-    let mut mirrors = None;
-    if plan.compared {
-        let picture = View::new(&rules, &scene).picture().0;
-        scenes::set_photo(&mut scene, &picture);
-        mirrors = Some((View::new(&rules, &scene).step(), View::new(&open, &scene).step()));
-    }
+    let picture = View::new(&rules, &scene).picture().0;
+    scenes::set_photo(&mut scene, &picture);
+    let (by_rules, by_open) = (View::new(&rules, &scene).step(), View::new(&open, &scene).step());
     let mut bed = Bed::new(gpu, scene, modes)?;
-    let mut errors: Vec<Option<(Errors, Errors)>> = vec![None; modes.len()];
-    let mut rounding = None;
     // All lists once: buffers grow, drivers compile.
-    for list in 0..=bed.full_step() {
+    for list in 0..modes.len() {
         bed.run(list)?;
     }
-    if let Some((by_rules, by_open)) = &mirrors {
-        for (list, errors) in errors.iter_mut().enumerate() {
-            bed.run(list)?;
-            let outcome = bed.outcome()?;
-            *errors = Some((compare(&outcome, by_rules, 0.0), compare(&outcome, by_open, 0.0)));
-            if list == 0 {
-                rounding = Some(compare(&outcome, by_rules, MARGIN));
-                bed.check_default(&outcome)?;
-            }
+    let mut errors = Vec::new();
+    let mut rounding = Errors::default();
+    for list in 0..modes.len() {
+        bed.run(list)?;
+        let outcome = bed.outcome()?;
+        errors.push((compare(&outcome, &by_rules, 0.0), compare(&outcome, &by_open, 0.0)));
+        if list == 0 {
+            rounding = compare(&outcome, &by_rules, MARGIN);
+            bed.check_default(&outcome)?;
         }
     }
-    drop(mirrors);
-    let mut samples: Vec<Vec<Sample>> = vec![Vec::new(); bed.full_step() + 1];
-    for round in 0..plan.rounds {
-        // Every round begins elsewhere and every other one goes backwards, so that no mode always follows the same one.
-        let count = samples.len();
-        for place in 0..count {
-            let forward = if round % 2 == 0 { place } else { count - 1 - place };
-            let list = (forward + 7 * round) % count;
-            samples[list].push(bed.run(list)?);
-        }
-    }
-    let counters = counters(&samples[0])?;
-    let tile = bed.tile_pixels();
-    let default = Times::of(&samples[0]);
+    let samples = time(&mut bed, modes.len(), plan.rounds)?;
     let results = modes.iter().zip(&samples).zip(errors);
-    let results = results.map(|(((mode, _), samples), errors)| {
-        let (against_rules, against_no_cut_offs) = errors.unzip();
-        let times = Times::of(samples);
-        let relative_median = ratio(&times.touched, &default.touched);
-        let relative_cpu = times.cpu.as_ref().zip(default.cpu.as_ref()).map(|(own, of_default)| ratio(own, of_default));
-        Ok(ModeResult {
-            name: mode.name,
-            relative_time: relative_cpu.filter(|_| gpu.is_cpu()).unwrap_or(relative_median),
-            relative_median,
-            relative_least: times.least / default.least,
-            relative_cpu,
-            touched: Spread { min: times.least, ..spread(times.touched) },
-            stages: stage_times(samples),
-            cpu: times.cpu.map(spread),
-            instances: self::counters(samples)?.instance_count,
-            against_rules,
-            against_no_cut_offs,
-        })
-    });
-    let modes = results.collect::<Result<Vec<_>>>()?;
-    let passes = rows_of(&samples[bed.full_step()], plan, &counters, tile);
+    let results = results.map(|(((mode, _), own), errors)| result(mode, own, &samples[0], errors, gpu.is_cpu()));
+    let counters = samples[0][0].counters;
     Ok(SceneResult {
         name: plan.name,
         about: plan.about,
@@ -151,65 +100,63 @@ pub fn scene(gpu: &Arc<Gpu>, plan: &Plan, modes: &[(Mode, Replacements)]) -> Res
         size: plan.size,
         rounds: plan.rounds,
         splats: counters.visible_count,
-        instances: counters.instance_count,
-        pairs: counters.walked_splats() * u64::from(tile),
+        pairs: counters.walked_splats() * u64::from(bed.tile_pixels()),
         load: crate::measure::load(),
-        modes,
-        passes,
+        modes: results.collect(),
         rounding,
     })
 }
 
-/// Times of a mode by round, ms.
-struct Times {
-    /// Of the stages that modes touch.
-    touched: Vec<f64>,
-    /// Sum over their passes of the least time that each took in any round.
-    least: f64,
-    /// Processor time of the step.
-    cpu: Option<Vec<f64>>,
-}
-
-impl Times {
-    fn of(samples: &[Sample]) -> Self {
-        let is_touched = |stage: Stage| !UNTOUCHED.contains(&stage);
-        let mut least: Vec<u64> = Vec::new();
-        for sample in samples {
-            let times = sample.items.iter().filter(|(stage, ..)| is_touched(*stage)).map(|(.., ns)| *ns);
-            for (place, ns) in times.enumerate() {
-                match least.get_mut(place) {
-                    Some(so_far) => *so_far = (*so_far).min(ns),
-                    None => least.push(ns),
-                }
-            }
-        }
-        Self {
-            touched: samples.iter().map(|sample| sample.ms(is_touched)).collect(),
-            least: least.iter().sum::<u64>() as f64 * 1e-6,
-            cpu: samples.iter().map(|sample| sample.cpu.map(|cpu| cpu.as_secs_f64() * 1e3)).collect(),
-        }
+fn result(
+    mode: &Mode,
+    own: &[Sample],
+    of_default: &[Sample],
+    (against_rules, against_no_cut_offs): (Errors, Errors),
+    is_cpu: bool,
+) -> ModeResult {
+    let touched = |sample: &Sample| {
+        let touched = sample.stages.iter().filter(|(stage, _)| !UNTOUCHED.contains(stage));
+        Some(touched.map(|(_, ms)| ms).sum())
+    };
+    let relative_median = ratio(own, of_default, touched).unwrap_or(f64::NAN);
+    let relative_cpu = ratio(own, of_default, |sample| sample.cpu);
+    let ms = |stage: &Stage| median(own.iter().map(|sample| sample.stages[stage]));
+    ModeResult {
+        name: mode.name,
+        relative_time: relative_cpu.filter(|_| is_cpu).unwrap_or(relative_median),
+        relative_median,
+        relative_cpu,
+        stages: own[0].stages.keys().map(|stage| (stage.name(), ms(stage))).collect(),
+        instances: own[0].counters.instance_count,
+        against_rules,
+        against_no_cut_offs,
     }
 }
 
+/// Samples of every list by round. Every round begins elsewhere and every other one goes backwards, so that no mode
+/// always follows the same one.
+fn time(bed: &mut Bed<'_>, count: usize, rounds: usize) -> Result<Vec<Vec<Sample>>> {
+    let mut samples: Vec<Vec<Sample>> = vec![Vec::new(); count];
+    for round in 0..rounds {
+        for place in 0..count {
+            let forward = if round % 2 == 0 { place } else { count - 1 - place };
+            let list = (forward + 7 * round) % count;
+            samples[list].push(bed.run(list)?);
+        }
+    }
+    Ok(samples)
+}
+
 /// Median of the ratios of each round.
-fn ratio(own: &[f64], of_default: &[f64]) -> f64 {
-    spread(own.iter().zip(of_default).map(|(a, b)| a / b).collect()).median
-}
-
-fn counters(samples: &[Sample]) -> Result<Counters> {
-    samples.last().map(|sample| sample.counters).ok_or_else(|| Error::usage("--rounds", "at least 1 is needed"))
-}
-
-fn stage_times(samples: &[Sample]) -> BTreeMap<&'static str, Spread> {
-    let has = |stage: Stage| samples.iter().any(|sample| sample.items.iter().any(|(found, ..)| *found == stage));
-    let of = |stage: Stage| spread(samples.iter().map(|sample| sample.ms(|found| found == stage)).collect());
-    Stage::ALL.into_iter().filter(|stage| has(*stage)).map(|stage| (stage.name(), of(stage))).collect()
+fn ratio(own: &[Sample], of_default: &[Sample], ms: impl Fn(&Sample) -> Option<f64>) -> Option<f64> {
+    let ratios = own.iter().zip(of_default).map(|(a, b)| Some(ms(a)? / ms(b)?));
+    ratios.collect::<Option<Vec<f64>>>().map(median)
 }
 
 /// What is wrong with the default mode, if anything. Where no decision is near, all that is left is rounding, and in
 /// large scenes a few pairs whose depths are the same f32; the bounds are three times what lavapipe shows.
 pub fn fault_of_default(scene: &SceneResult, kind: Kind) -> Option<String> {
-    let errors = scene.rounding.as_ref()?;
+    let errors = &scene.rounding;
     let (colour, gradient) = match kind {
         // Exponents of needles are small differences of large products.
         Kind::Needles => (1.2e-4, 2.6e-4),
@@ -218,7 +165,7 @@ pub fn fault_of_default(scene: &SceneResult, kind: Kind) -> Option<String> {
         _ => (5e-6, 3e-5),
     };
     // Where nearly every Gaussian is near some decision, all of them are looked at.
-    let all = scene.modes.first()?.against_rules.as_ref()?;
+    let all = &scene.modes.first()?.against_rules;
     let gradients = if errors.rows * 10 < scene.gaussians { &all.gradients } else { &errors.gradients };
     let found = (errors.colours.p999, gradients.worst.rms);
     let good = found.0 <= colour && found.1 <= gradient;

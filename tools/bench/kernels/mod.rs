@@ -1,11 +1,10 @@
-//! Kernels: time against error of every mode, and each pass alone.
+//! Kernels: time against error of every mode.
 //!
-//! A mode is a training step whose shaders or passes differ in one respect from the engine's (`modes`). It runs in the
+//! A mode is a training step whose kernels are compiled with a macro (`modes`). It runs in the
 //! engine's own scheduler on seeded scenes, is timed by the device's timestamps round robin with all others, and its
 //! picture and gradients are compared with the float64 mirrors of the tests: once with the engine's rules, and once
 //! without any cut-off, which is what those rules stand for.
 
-mod backward;
 mod bed;
 mod chart;
 mod errors;
@@ -13,33 +12,24 @@ mod knee;
 mod measure;
 mod mirror;
 mod modes;
-mod passes;
-mod patch;
 mod report;
 mod scenes;
 
 use super::Common;
+use super::measure::{write_json, write_text};
 use labelgs::engine::{EngineSize, capacity};
 use labelgs::gpu::Gpu;
-use labelgs::io::atomic;
 use labelgs::pass::{self, KernelShape, Variant};
 use labelgs::{Error, Result};
 use measure::SceneResult;
-use modes::{MODES, Mode};
-use patch::Replacements;
-use serde::Serialize;
-
-/// Of the JSON file.
-const SCHEMA_VERSION: u32 = 1;
+use modes::{MODES, Mode, Replacements};
+use serde_json::json;
 
 /// What this benchmark knows beside the others.
 #[derive(clap::Args, Clone, Debug)]
 pub struct KernelArgs {
     #[command(flatten)]
     common: Common,
-    /// Time the largest scene too: 1,000,000 Gaussians, 1440 x 1080 px.
-    #[arg(long)]
-    large: bool,
     /// These scenes alone.
     #[arg(long, value_name = "NAME,..", value_delimiter = ',')]
     scenes: Vec<String>,
@@ -51,19 +41,6 @@ pub struct KernelArgs {
     rounds: Option<usize>,
 }
 
-/// The file.
-#[derive(Serialize)]
-struct File<'a> {
-    schema_version: u32,
-    benchmark: &'static str,
-    small: bool,
-    device: String,
-    driver: String,
-    threads: usize,
-    load_before: Option<f64>,
-    scenes: &'a [SceneResult],
-}
-
 /// Runs it.
 pub fn run(args: &KernelArgs) -> Result<()> {
     let load_before = super::measure::load();
@@ -73,37 +50,26 @@ pub fn run(args: &KernelArgs) -> Result<()> {
     let capabilities = gpu.capabilities();
     let driver = format!("{} {}", capabilities.driver_name, capabilities.driver_info);
     println!("{}, {driver}", capabilities.name);
-    print!("{}", report::legend(&plain));
+    report::legend(&plain);
     let mut scenes = Vec::new();
     let mut failures = Vec::new();
-    for mut plan in scenes::plans(args.common.small, args.large) {
+    for mut plan in scenes::plans(args.common.small) {
         if !args.scenes.is_empty() && !args.scenes.iter().any(|name| name.eq_ignore_ascii_case(plan.name)) {
             continue;
         }
         plan.rounds = args.rounds.unwrap_or(plan.rounds).max(1);
         let scene = measure::scene(&gpu, &plan, &modes)?;
-        print!("{}", report::scene(&scene));
+        report::scene(&scene);
         failures.extend(faults(&scene, plan.kind));
         scenes.push(scene);
     }
-    print!("{}", report::passes(&scenes));
-    let file = File {
-        schema_version: SCHEMA_VERSION,
-        benchmark: "kernels",
-        small: args.common.small,
-        device: capabilities.name.clone(),
-        driver,
-        threads: std::thread::available_parallelism().map_or(1, usize::from),
-        load_before,
-        scenes: &scenes,
-    };
-    let json = serde_json::to_string(&file).map_err(|error| Error::Bug(format!("JSON: {error}")))?;
-    let svg = chart::svg(&scenes, &plain)?;
-    for (name, text) in [("kernels.json", json), ("kernels.svg", svg)] {
-        let path = args.common.output.join(name);
-        atomic::write(&path, |out| out.write_all(text.as_bytes()))?;
-        println!("{}", path.display());
-    }
+    let threads = std::thread::available_parallelism().map_or(1, usize::from);
+    write_json(
+        &args.common.output.join("kernels.json"),
+        &json!({ "schema_version": 2, "small": args.common.small, "device": capabilities.name, "driver": driver,
+            "threads": threads, "load_before": load_before, "scenes": scenes }),
+    )?;
+    write_text(&args.common.output.join("kernels.svg"), &chart::svg(&scenes, &plain)?)?;
     if failures.is_empty() { Ok(()) } else { Err(Error::Check(failures.join("; "))) }
 }
 
@@ -123,7 +89,7 @@ fn faults(scene: &SceneResult, kind: scenes::Kind) -> Vec<String> {
     let mut faults: Vec<String> = measure::fault_of_default(scene, kind).into_iter().collect();
     for mode in &scene.modes {
         let errors = [&mode.against_rules, &mode.against_no_cut_offs];
-        if errors.into_iter().flatten().any(|errors| !errors.are_finite()) {
+        if errors.into_iter().any(|errors| !errors.are_finite()) {
             faults.push(format!("{}: mode `{}` gives numbers that are not finite", scene.name, mode.name));
         }
     }

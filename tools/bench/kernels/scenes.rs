@@ -1,4 +1,4 @@
-//! The scenes: three sizes with the statistics of a trained scene, and five that are hard on the arithmetic.
+//! The scenes: two sizes with the statistics of a trained scene, and five that are hard on the arithmetic.
 
 use glam::{DMat3, DVec3};
 use labelgs::scene::{Camera, Gaussians};
@@ -11,7 +11,7 @@ use rand_pcg::Pcg32;
 /// How large, and how often.
 #[derive(Clone, Copy, Debug)]
 pub struct Plan {
-    /// Name in tables: S1 to S3, A1 to A5.
+    /// Name in tables: S1, S2, A1 to A5.
     pub name: &'static str,
     /// What it is.
     pub about: &'static str,
@@ -21,8 +21,6 @@ pub struct Plan {
     pub size: (u32, u32),
     /// Timed rounds over all modes.
     pub rounds: usize,
-    /// Compared with float64 too, not timed alone.
-    pub compared: bool,
     /// What it holds.
     pub kind: Kind,
 }
@@ -45,21 +43,17 @@ pub enum Kind {
 }
 
 /// The scenes of a run.
-pub fn plans(small: bool, large: bool) -> Vec<Plan> {
+pub fn plans(small: bool) -> Vec<Plan> {
     let plan = |name, about, gaussians, size, rounds, kind| {
         let size = if small { (64, 48) } else { size };
         let rounds = if small { 2 } else { rounds };
-        Plan { name, about, gaussians, size, rounds, compared: true, kind }
+        Plan { name, about, gaussians, size, rounds, kind }
     };
     let count = |full: usize, small_count: usize| if small { small_count } else { full };
     let small_picture = (128, 96);
     let mut plans = vec![plan("S1", "as trained, small", count(20_000, 300), (256, 192), 30, Kind::Trained)];
     if !small {
         plans.push(plan("S2", "as trained, medium", 200_000, (640, 480), 10, Kind::Trained));
-    }
-    if large && !small {
-        let plan = plan("S3", "as trained, large", 1_000_000, (1440, 1080), 3, Kind::Trained);
-        plans.push(Plan { compared: false, ..plan });
     }
     plans.extend([
         plan("A1", "needles, axes 1e4 : 1", count(1_000, 100), small_picture, 5, Kind::Needles),

@@ -1,11 +1,10 @@
 //! What the device does at best, measured with kernels that do one thing.
 
-use crate::compiler::spirv;
+use crate::compiler::shader;
 use labelgs::Result;
 use labelgs::gpu::Gpu;
 use labelgs::scheduler::plan::{Buf, BufferDecl, Capacity, Class, Domain, Grid, PassDecl, PassList, TexelFormat};
 use labelgs::scheduler::{Scheduler, SchedulerOptions};
-use labelgs::shaders::{Access, BindingDesc, BindingKind, ShaderDesc, SpecDesc};
 use serde::Serialize;
 use std::sync::Arc;
 
@@ -56,7 +55,7 @@ pub fn measure(gpu: &Arc<Gpu>, texel: bool, small: bool) -> Result<Ceilings> {
     let (from, to) = (Buf(0), Buf(1));
     let options = SchedulerOptions { timestamps: true, ..SchedulerOptions::default() };
     let mut sched = Scheduler::new(Arc::clone(gpu), table, Capacity::default(), options)?;
-    let arithmetic = arithmetic()?;
+    let arithmetic = shader("arithmetic", include_str!("arithmetic.comp"), texel)?;
     let mut seconds = |operation: Operation, rounds: u32| {
         let mut list = PassList::new("arithmetic");
         list.pass(PassDecl::new(arithmetic, vec![to], Grid::Groups(groups, 1, 1)).spec(vec![operation as u32, rounds]));
@@ -70,8 +69,9 @@ pub fn measure(gpu: &Arc<Gpu>, texel: bool, small: bool) -> Result<Ceilings> {
     };
     let operations = 2.0 * rate(Operation::MultiplyAdd, ROUNDS)?;
     let (exp2, divisions) = (rate(Operation::Exp2, ROUNDS / 4)?, rate(Operation::Divide, ROUNDS / 4)?);
+    let copy = shader("copy", include_str!("copy.comp"), texel)?;
     let mut list = PassList::new("copy");
-    list.pass(PassDecl::new(copy(texel)?, vec![from, to], Grid::Groups(vecs / 64, 1, 1)));
+    list.pass(PassDecl::new(copy, vec![from, to], Grid::Groups(vecs / 64, 1, 1)));
     let bytes = 32.0 * f64::from(vecs) / least(&mut sched, &list)?;
     let mut list = PassList::new("dispatches");
     for _ in 0..EMPTY {
@@ -93,38 +93,4 @@ fn least(sched: &mut Scheduler, list: &PassList) -> Result<f64> {
         }
     }
     Ok(shortest)
-}
-
-fn arithmetic() -> Result<&'static ShaderDesc> {
-    let to =
-        BindingDesc { name: "to", binding: 0, kind: BindingKind::Storage, access: Access::Write, element_bytes: 4 };
-    let spec = [SpecDesc { name: "OPERATION", id: 0, default: 0 }, SpecDesc { name: "ROUNDS", id: 1, default: 1 }];
-    compile("arithmetic", include_str!("arithmetic.comp"), vec![to], spec.to_vec(), false)
-}
-
-fn copy(texel: bool) -> Result<&'static ShaderDesc> {
-    let (kind, element_bytes) = if texel { (BindingKind::Texel, 0) } else { (BindingKind::Storage, 16) };
-    let from = BindingDesc { name: "from", binding: 0, kind, access: Access::Read, element_bytes };
-    let to =
-        BindingDesc { name: "to", binding: 1, kind: BindingKind::Storage, access: Access::Write, element_bytes: 16 };
-    compile("copy", include_str!("copy.comp"), vec![from, to], Vec::new(), texel)
-}
-
-/// Compiles a kernel; its description lives as long as the program, as those of the engine's shaders do.
-fn compile(
-    name: &'static str,
-    source: &str,
-    bindings: Vec<BindingDesc>,
-    spec: Vec<SpecDesc>,
-    texel: bool,
-) -> Result<&'static ShaderDesc> {
-    Ok(Box::leak(Box::new(ShaderDesc {
-        stem: name,
-        name,
-        spirv: spirv(name, source, texel)?,
-        bindings: Box::leak(bindings.into_boxed_slice()),
-        push_bytes: 0,
-        spec: Box::leak(spec.into_boxed_slice()),
-        uses_subgroups: false,
-    })))
 }

@@ -1,8 +1,8 @@
 //! Curves of all kinds of training: median over seeds, with the range as a band.
 
 use super::curve::{Curve, Sample};
-use super::{names, write_text};
-use crate::measure::median;
+use super::names;
+use crate::measure::{median, write_text};
 use labelgs::{Error, Result};
 use plotters::prelude::*;
 use std::path::Path;

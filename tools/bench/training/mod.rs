@@ -9,17 +9,16 @@ mod chart;
 mod curve;
 
 use super::measure::{self, median, require, table};
-use super::trained::{Judge, start, trainer, without_masks};
+use super::trained::{Judge, small_scene, start, trainer, without_masks};
 use super::{Common, device};
 use curve::{Curve, Sample, reached};
 use labelgs::gpu::{Gpu, GpuOptions, PipelineStore};
 use labelgs::io::pipeline_file::PipelineFolder;
 use labelgs::scene::Dataset;
-use labelgs::synth::{self, Preset, SynthOptions};
+use labelgs::synth::{self, SynthOptions};
 use labelgs::train::TrainConfig;
 use labelgs::{Error, Result};
 use serde::Serialize;
-use std::path::Path;
 use std::process::Command;
 use std::sync::Arc;
 use std::time::Instant;
@@ -112,18 +111,13 @@ pub fn run(options: &Options) -> Result<()> {
         curves,
     };
     print(&outcome);
-    measure::require_silence(&gpu)?;
     measure::write_json(&options.common.output.join("training.json"), &outcome)?;
     chart::write(&options.common.output.join("training.svg"), &outcome.curves)?;
     check(&outcome)
 }
 
 fn scene(small: bool) -> SynthOptions {
-    if small {
-        SynthOptions { preset: Preset::Simple, width: 72, height: 52, views: 6, points: 300, seed: 3 }
-    } else {
-        SynthOptions::default()
-    }
+    if small { SynthOptions { views: 6, ..small_scene() } } else { SynthOptions::default() }
 }
 
 fn config(kind: Kind, iterations: u32, seed: u64) -> TrainConfig {
@@ -273,11 +267,4 @@ fn check(outcome: &Outcome) -> Result<()> {
 /// Used by the chart: colours and names in the order of the table.
 fn names() -> impl Iterator<Item = &'static str> {
     KINDS.iter().map(|kind| kind.name)
-}
-
-/// Makes the folder of a chart and writes its text.
-fn write_text(path: &Path, text: &str) -> Result<()> {
-    labelgs::io::atomic::write(path, |file| file.write_all(text.as_bytes()))?;
-    println!("wrote {}", path.display());
-    Ok(())
 }
