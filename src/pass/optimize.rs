@@ -41,7 +41,7 @@ const fn attribute(planes: [Buf; 3], gradient: Buf, stride: u32, rate: u32, from
 pub fn adam(b: &mut Builder) {
     let degree = b.sh_degree;
     for a in ATTRIBUTES.iter().filter(|a| a.from_degree <= degree) {
-        pass!(b, texel adam {
+        pass!(b, adam {
             step: Buf::STEP, failure: Buf::FAILURE, splat_from_gaussian: Buf::SPLAT_FROM_GAUSSIAN,
             gradients: a.gradient, parameters_in: a.planes[0], first_moments_in: a.planes[1],
             second_moments_in: a.planes[2], parameters: a.planes[0], first_moments: a.planes[1], second_moments: a.planes[2],
