@@ -3,7 +3,7 @@
 use super::build::{Builder, args};
 use super::project::GAUSSIAN_FROM_SPLAT;
 use crate::pass;
-use crate::scheduler::plan::Buf;
+use crate::scheduler::plan::{Buf, Stage};
 use crate::shaders::constants;
 
 /// Blends all tiles front to back; with labels also the object layers and their loss, and the lift if it is asked for.
@@ -18,6 +18,7 @@ pub fn blend_forward_main(b: &mut Builder, slots: Buf) {
 
 fn forward(b: &mut Builder, slots: Buf, main: bool, lift: bool) {
     let (segments, counts) = (b.capacity.segments as u32, b.counts);
+    b.list.stage = Stage::BlendForward;
     for segment in 0..segments {
         pass!(b, blend_forward(labels: b.labels, main: main, segmented: segments > 1) {
             step: Buf::STEP, counters: Buf::COUNTERS, tile_starts: Buf::TILE_STARTS, tile_ends: Buf::TILE_ENDS,
@@ -35,6 +36,7 @@ fn forward(b: &mut Builder, slots: Buf, main: bool, lift: bool) {
 /// Walks all tiles back to front and writes a gradient record per (splat, tile) pair.
 pub fn blend_backward(b: &mut Builder, slots: Buf) {
     let segments = b.capacity.segments as u32;
+    b.list.stage = Stage::BlendBackward;
     for segment in (0..segments).rev() {
         pass!(b, blend_backward(labels: b.labels, segmented: segments > 1) {
             step: Buf::STEP, tile_starts: Buf::TILE_STARTS, slots: slots, splat_from_instance: Buf::SPLAT_FROM_INSTANCE,

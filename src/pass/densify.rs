@@ -4,10 +4,11 @@ use super::build::{Builder, Count, args, over_gaussians};
 use super::optimize::ATTRIBUTES;
 use super::scan::{self, Total};
 use crate::pass;
-use crate::scheduler::plan::Buf;
+use crate::scheduler::plan::{Buf, Stage};
 
 /// Decides for each Gaussian and counts the result.
 pub fn mark(b: &mut Builder) {
+    b.list.stage = Stage::Optimise;
     pass!(b, densify_mark {
         step: Buf::STEP, means: Buf::MEANS, scales: Buf::SCALES, densify_stats: Buf::DENSIFY_STATS,
         children_counts: Buf::CHILDREN_COUNTS, counters: Buf::COUNTERS, densify_actions: Buf::DENSIFY_ACTIONS,

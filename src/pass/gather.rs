@@ -3,7 +3,7 @@
 use super::build::{Builder, over_splats};
 use super::project::GAUSSIAN_FROM_SPLAT;
 use crate::pass;
-use crate::scheduler::plan::Buf;
+use crate::scheduler::plan::{Buf, Stage};
 
 /// Adds up the records and notes the densification statistic.
 pub fn gather(b: &mut Builder) {
@@ -16,6 +16,7 @@ pub fn gather_object(b: &mut Builder) {
 }
 
 fn records(b: &mut Builder, labels: bool, object: bool) {
+    b.list.stage = Stage::Gather;
     pass!(b, gather(labels: labels, object: object) {
         step: Buf::STEP, counters: Buf::COUNTERS, failure: Buf::FAILURE, tiles_touched: Buf::TILES_TOUCHED,
         instance_offsets: Buf::INSTANCE_OFFSETS, v_instances_a: Buf::V_INSTANCES_A, v_instances_b: Buf::V_INSTANCES_B,

@@ -3,11 +3,12 @@
 use super::build::{Builder, args, over_gaussians};
 use super::project::GAUSSIAN_FROM_SPLAT;
 use crate::pass;
-use crate::scheduler::plan::Buf;
+use crate::scheduler::plan::{Buf, Stage};
 use crate::shaders::constants;
 
 /// The highest vote of this step becomes the label of its Gaussian.
 pub fn resolve(b: &mut Builder) {
+    b.list.stage = Stage::Labels;
     pass!(b, lift_resolve {
         step: Buf::STEP, failure: Buf::FAILURE, label_keys: Buf::LABEL_KEYS, labels: Buf::LABELS,
     } [], over_gaussians());
@@ -16,6 +17,7 @@ pub fn resolve(b: &mut Builder) {
 /// Adds the weights of all contributors to the votes for the labels of their pixels.
 pub fn vote(b: &mut Builder, slots: Buf, rounds: u32) {
     let segments = b.capacity.segments as u32;
+    b.list.stage = Stage::Labels;
     for (round, segment) in (0..rounds).flat_map(|round| (0..segments).map(move |segment| (round, segment))) {
         pass!(b, vote(segmented: segments > 1) {
             step: Buf::STEP, tile_starts: Buf::TILE_STARTS, tile_ends: Buf::TILE_ENDS, slots: slots,

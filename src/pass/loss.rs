@@ -2,13 +2,14 @@
 
 use super::build::{Builder, ONE};
 use crate::pass;
-use crate::scheduler::plan::{Buf, Grid};
+use crate::scheduler::plan::{Buf, Grid, Stage};
 
 /// Rows or columns that one lane filters in registers (glsl/include/window.glsl).
 const STRIP: u32 = 8;
 
 /// Writes `v_image` and the loss sums, for an image of at most `width` x `height` px.
 pub fn photo_loss(b: &mut Builder, width: u32, height: u32) {
+    b.list.stage = Stage::Loss;
     let columns = |channels| Grid::Groups(width.div_ceil(64), height.div_ceil(STRIP), channels);
     let rows = Grid::Groups(height.div_ceil(64), width.div_ceil(STRIP), 3);
     pass!(b, ssim_columns { step: Buf::STEP, image: Buf::IMAGE, target: Buf::TARGET, moments: Buf::SSIM_A } [],
@@ -25,6 +26,7 @@ pub fn photo_loss(b: &mut Builder, width: u32, height: u32) {
 
 /// Sums up the label loss of the layers alone.
 pub fn label_loss(b: &mut Builder) {
+    b.list.stage = Stage::Loss;
     reduce(b, 0);
 }
 

@@ -4,19 +4,21 @@ use super::build::{Builder, Count, ONE, over_gaussians, over_splats};
 use super::scan::{self, Total};
 use super::sort::{self, SortBuffers};
 use crate::pass;
-use crate::scheduler::plan::Buf;
+use crate::scheduler::plan::{Buf, Stage};
 
 /// Sorted Gaussian indices of the visible splats; the depth sort has an even number of passes.
 pub const GAUSSIAN_FROM_SPLAT: Buf = Buf::DEPTH_VALUES_A;
 
 /// Lists the visible Gaussians in depth order and projects them.
 pub fn visible_splats(b: &mut Builder) {
+    b.list.stage = Stage::Project;
     cull(b, false);
     order_and_project(b);
 }
 
 /// As [`visible_splats`], for the object of layer 1 alone.
 pub fn visible_splats_of_object(b: &mut Builder) {
+    b.list.stage = Stage::Project;
     cull(b, true);
     order_and_project(b);
 }
@@ -40,7 +42,7 @@ fn order_and_project(b: &mut Builder) {
         keys: [Buf::DEPTH_KEYS_A, Buf::DEPTH_KEYS_B],
         values: [Buf::DEPTH_VALUES_A, Buf::DEPTH_VALUES_B],
     };
-    let (_, sorted) = sort::sort(b, buffers, 32, Count::Splats, false);
+    let (_, sorted) = sort::sort(b, buffers, 32, Count::Splats, "by depth", false);
     debug_assert_eq!(sorted, GAUSSIAN_FROM_SPLAT);
     project_forward(b);
     scan::scan(b, Buf::TILES_TOUCHED, Buf::INSTANCE_OFFSETS, Count::Splats, Total::Instances);
@@ -68,6 +70,7 @@ pub fn project_backward_of_object(b: &mut Builder, scene_splats: Buf) {
 
 fn backward(b: &mut Builder, object: bool, scene_splats: Buf) {
     let sh_degree = b.sh_degree;
+    b.list.stage = Stage::ProjectBackward;
     pass!(b, project_backward(object: object) {
         step: Buf::STEP, failure: Buf::FAILURE, gaussian_from_splat: GAUSSIAN_FROM_SPLAT, means: Buf::MEANS,
         scales: Buf::SCALES, quats: Buf::QUATS, sh0: Buf::SH0, sh1: Buf::SH1, sh2: Buf::SH2, sh3: Buf::SH3,

@@ -2,7 +2,7 @@
 
 use super::build::{Builder, Count, ONE};
 use crate::pass;
-use crate::scheduler::plan::{Buf, Grid};
+use crate::scheduler::plan::{Buf, Grid, Stage, Work};
 
 /// Two pairs of buffers that the passes of a sort go back and forth between.
 #[derive(Clone, Copy, Debug)]
@@ -13,9 +13,10 @@ pub struct SortBuffers {
     pub values: [Buf; 2],
 }
 
-/// Sorts by the low `bits` bits; with `identity` the values are the places of the keys before the sort. Returns the
-/// buffers that hold the sorted keys and values.
-pub fn sort(b: &mut Builder, buffers: SortBuffers, bits: u32, count: Count, identity: bool) -> (Buf, Buf) {
+/// Sorts by the low `bits` bits; with `identity` the values are the places of the keys before the sort. Tables of times
+/// say what is sorted `by`. Returns the buffers that hold the sorted keys and values.
+pub fn sort(b: &mut Builder, buffers: SortBuffers, bits: u32, count: Count, by: &str, identity: bool) -> (Buf, Buf) {
+    let (first, around) = (b.list.work.len(), std::mem::replace(&mut b.list.stage, Stage::Sort));
     let lanes = b.capacity.sort_lanes as u32;
     let groups = Grid::Groups(lanes / b.shape.subgroup, 1, 1);
     let digit_bits = b.shape.digit_bits;
@@ -40,6 +41,12 @@ pub fn sort(b: &mut Builder, buffers: SortBuffers, bits: u32, count: Count, iden
             values_out: buffers.values[to],
         } [count_source: count as u32, lanes: lanes, shift: shift, digit_bits: digit_bits,
             identity: u32::from(identity_now)], groups);
+    }
+    b.list.stage = around;
+    for work in &mut b.list.work[first..] {
+        if let Work::Pass(pass) = work {
+            pass.title = format!("{} {by}", pass.title);
+        }
     }
     let last = (passes % 2) as usize;
     (buffers.keys[last], buffers.values[last])

@@ -5,7 +5,7 @@ use super::project::GAUSSIAN_FROM_SPLAT;
 use super::scan::{self, Total};
 use super::sort::{self, SortBuffers};
 use crate::pass;
-use crate::scheduler::plan::Buf;
+use crate::scheduler::plan::{Buf, Stage};
 use crate::shaders::constants;
 
 /// Lists the (splat, tile) pairs, sorts them by layer and tile, and finds each tile's range. Returns the buffer that
@@ -27,6 +27,7 @@ pub fn bin_object(b: &mut Builder) -> Buf {
 /// With `layers` each splat also in the layer of its object, else all in `layer` alone.
 fn bin(b: &mut Builder, layers: bool, layer: u32) -> Buf {
     let instances = b.capacity.instances as u32;
+    b.list.stage = Stage::Tile;
     pass!(b, prepare_instances {
         counters: Buf::COUNTERS, dispatch_args: Buf::DISPATCH_ARGS, failure: Buf::FAILURE,
     } [instance_capacity: instances], ONE);
@@ -39,7 +40,7 @@ fn bin(b: &mut Builder, layers: bool, layer: u32) -> Buf {
     let buffers =
         SortBuffers { keys: [Buf::TILE_KEYS_A, Buf::TILE_KEYS_B], values: [Buf::TILE_VALUES_A, Buf::TILE_VALUES_B] };
     let bits = 64 - b.capacity.virtual_tiles.saturating_sub(1).leading_zeros();
-    let (keys, slots) = sort::sort(b, buffers, bits, Count::Instances, true);
+    let (keys, slots) = sort::sort(b, buffers, bits, Count::Instances, "by tile", true);
     tile_ranges(b, keys);
     let layer_tiles = b.capacity.layer_tiles as u32;
     let longest = b.shape.segment_length * b.capacity.segments as u32;
