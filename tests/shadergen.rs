@@ -126,9 +126,12 @@ fn a_good_shader_is_reflected_in_full() {
     let expected =
         [(0, "[f32; 3]"), (12, "u32"), (16, "[super::structs::Inner; 2]"), (40, "[[f32; 3]; 3]"), (76, "i32")];
     assert_eq!(offsets, expected);
-    for text in
-        ["pub static TEXEL", "pub mod good", "`glsl/test/good.comp`: do a little of everything.", "&good::BASE,"]
-    {
+    for text in [
+        "macros: &[\"TEXEL\"]",
+        "pub mod good",
+        "`glsl/test/good.comp`: do a little of everything.",
+        "&good::VARIANTS[1]",
+    ] {
         assert!(generated.rust.contains(text), "`{text}` is not generated");
     }
 }
@@ -271,6 +274,13 @@ fn variants_with_different_interfaces_are_found() {
 }
 
 #[test]
+fn a_constant_that_differs_between_siblings_is_found() {
+    let text = small("#ifdef OTHER\nSPEC(0, uint, A, 1);\n#else\nSPEC(0, uint, A, 2);\n#endif", "words[1] = A;");
+    let files = [("test/probe.comp", text.as_str()), ("variants.txt", "wide = probe: OTHER\n")];
+    one_finding(&files, &["glsl/test/probe.comp:9", "`A` differs between probe and wide"]);
+}
+
+#[test]
 fn a_struct_with_two_layouts_is_found() {
     let one = small("struct Pair { uint a; uint b; };\nREAD(1, Pair, pairs);", "words[1] = pairs[0].b;");
     let two = one.replace("probe —", "second —").replace("uint a;", "float a;");
@@ -338,6 +348,11 @@ fn siblings_have_an_interface_of_their_own_and_a_star_reaches_all_that_fetch() {
         ("wide", vec!["wide", "wide_texel"], 3),
     ];
     assert_eq!(shaders, expected);
+    // One module for both: the macro that chooses, and every binding once.
+    for (text, times) in [("pub mod probe {", 1), ("pub mod wide", 0), ("pub more: bool,", 1), ("pub keys: B,", 1)] {
+        assert_eq!(generated.rust.matches(text).count(), times, "{text}");
+    }
+    assert!(generated.rust.contains("/// Binding 2, read where there is MORE."), "{}", generated.rust);
     one_finding(
         &[("test/probe.comp", &plain.replace("plain", "probe")), ("variants.txt", "probe = probe: A")],
         &["already"],

@@ -2,7 +2,7 @@
 
 use super::KernelShape;
 use crate::scheduler::plan::{Buf, Capacity, Grid, PassDecl, PassList};
-use crate::shaders::constants;
+use crate::shaders::{Compiled, ShaderDesc, constants};
 
 /// A list in the making.
 pub struct Builder<'a> {
@@ -34,10 +34,41 @@ pub enum Count {
 }
 
 impl Builder<'_> {
-    /// Appends a pass.
-    pub fn pass(&mut self, pass: PassDecl) {
-        self.list.pass(pass);
+    /// Appends a pass: what [`pass!`](crate::pass) expands to. Of the named buffers and constants the variant takes those
+    /// that it has.
+    ///
+    /// # Panics
+    ///
+    /// If the kernel is not compiled with these macros.
+    pub fn pass(
+        &mut self,
+        kernel: &'static [Compiled],
+        macros: &[(&'static str, u32)],
+        buffers: &[(&str, Buf)],
+        constants: &[(&str, u32)],
+        grid: Grid,
+    ) {
+        let macros = macros.iter().filter(|(_, on)| *on != 0).map(|(name, _)| *name).collect();
+        let shader = variant(kernel, macros, self.shape.texel);
+        let buffers = shader.bindings.iter().filter_map(|binding| value(buffers, binding.name)).collect();
+        let words = shader.spec.iter().filter_map(|constant| value(constants, constant.name)).collect();
+        self.list.pass(PassDecl::new(shader, buffers, grid).spec(words));
     }
+}
+
+/// The variant with these macros, and with `TEXEL` if that is wished and the kernel fetches.
+fn variant(kernel: &'static [Compiled], mut macros: Vec<&str>, texel: bool) -> &'static ShaderDesc {
+    let find = |macros: &[&str]| kernel.iter().find(|compiled| compiled.macros == macros);
+    macros.sort_unstable();
+    let plain = find(&macros);
+    macros.extend(texel.then_some("TEXEL"));
+    macros.sort_unstable();
+    let found = find(&macros).or(plain);
+    &found.unwrap_or_else(|| panic!("{} is not compiled with {macros:?}", kernel[0].shader.name)).shader
+}
+
+fn value<T: Copy>(named: &[(&str, T)], wanted: &str) -> Option<T> {
+    named.iter().find(|(name, _)| *name == wanted).map(|(_, value)| *value)
 }
 
 /// An indirect grid at one of the `ARGS_` words of `dispatch_args`.
@@ -58,22 +89,43 @@ pub fn over_splats() -> Grid {
 /// Grid of one workgroup.
 pub const ONE: Grid = Grid::Groups(1, 1, 1);
 
-/// `pass!(builder, stem { binding: BUF, .. } [Spec fields], grid)`: declares a pass of the variant for the device.
+/// `pass!(builder, file(macro: bool, ..) { binding: BUF, .. } [constant: value, ..], grid)`: declares a pass of a kernel.
+///
+/// Every binding that some sibling of the file has is named. Constants that are not named come from the shape, or are the
+/// defaults of the GLSL; macros that are not named are off.
 #[macro_export]
 macro_rules! pass {
-    ($b:expr, texel $stem:ident { $($name:ident: $buf:expr),* $(,)? } [$($spec:ident: $value:expr),* $(,)?], $grid:expr) => {{
-        use $crate::shaders::$stem as shader;
-        let declared = $crate::scheduler::plan::PassDecl::new($b.shape.pick(&shader::BASE, &shader::TEXEL),
-            shader::Bindings { $($name: $buf),* }.list(), $grid);
-        $crate::pass!(@spec $b, declared, shader, [$($spec: $value),*])
+    ($b:expr, $file:ident $(($($macro:ident: $on:expr),*))? { $($name:ident: $buf:expr),* $(,)? }
+        [$($constant:ident: $value:expr),* $(,)?], $grid:expr) => {{
+        use $crate::shaders::$file as kernel;
+        let shape = $b.shape;
+        #[allow(clippy::needless_update)]
+        let macros = kernel::Macros { $($($macro: $on,)*)? ..Default::default() };
+        #[allow(clippy::needless_update)]
+        let spec = kernel::Spec { $($constant: $value,)* ..kernel::Spec::with(|name| shape.constant(name)) };
+        let buffers = kernel::Bindings { $($name: $buf),* };
+        $b.pass(&kernel::VARIANTS, &macros.named(), &buffers.named(), &spec.named(), $grid)
     }};
-    ($b:expr, $stem:ident { $($name:ident: $buf:expr),* $(,)? } [$($spec:ident: $value:expr),* $(,)?], $grid:expr) => {{
-        use $crate::shaders::$stem as shader;
-        let declared = $crate::scheduler::plan::PassDecl::new(&shader::BASE, shader::Bindings { $($name: $buf),* }.list(), $grid);
-        $crate::pass!(@spec $b, declared, shader, [$($spec: $value),*])
-    }};
-    (@spec $b:expr, $declared:expr, $shader:ident, []) => { $b.pass($declared) };
-    (@spec $b:expr, $declared:expr, $shader:ident, [$($spec:ident: $value:expr),+]) => {
-        $b.pass($declared.spec(#[allow(clippy::needless_update)] $shader::Spec { $($spec: $value,)+ ..Default::default() }.words()))
-    };
+}
+
+#[cfg(test)]
+mod tests {
+    use super::variant;
+    use crate::shaders::blend_forward::VARIANTS;
+
+    #[test]
+    fn the_variant_has_the_macros_that_are_on() {
+        let name = |macros: &[&'static str], texel| variant(&VARIANTS, macros.to_vec(), texel).name;
+        assert_eq!(name(&[], false), "blend_forward");
+        assert_eq!(name(&["SEGMENTED", "LABELS"], false), "blend_forward_labels_segmented");
+        assert_eq!(name(&["MAIN"], true), "blend_forward_main_texel");
+        // A kernel that fetches nothing has no variant of its own for texels.
+        assert_eq!(variant(&crate::shaders::radix_scan::VARIANTS, Vec::new(), true).name, "radix_scan");
+    }
+
+    #[test]
+    #[should_panic(expected = "blend_forward is not compiled with [\"LABELS\", \"MAIN\"]")]
+    fn macros_that_no_variant_has_end_the_program() {
+        variant(&VARIANTS, vec!["MAIN", "LABELS"], false);
+    }
 }

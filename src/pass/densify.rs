@@ -4,11 +4,12 @@ use super::build::{Builder, Count, args, over_gaussians};
 use super::optimize::ATTRIBUTES;
 use super::scan::{self, Total};
 use crate::pass;
-use crate::scheduler::plan::Buf;
+use crate::scheduler::plan::{Buf, Stage};
 
 /// Decides for each Gaussian and counts the result.
 pub fn mark(b: &mut Builder) {
-    pass!(b, texel densify_mark {
+    b.list.stage = Stage::Optimise;
+    pass!(b, densify_mark {
         step: Buf::STEP, means: Buf::MEANS, scales: Buf::SCALES, densify_stats: Buf::DENSIFY_STATS,
         children_counts: Buf::CHILDREN_COUNTS, counters: Buf::COUNTERS, densify_actions: Buf::DENSIFY_ACTIONS,
     } [], over_gaussians());
@@ -20,7 +21,7 @@ pub fn apply(b: &mut Builder) {
     b.list.copy(Buf::MEANS, Buf::OLD_MEANS, 0);
     b.list.copy(Buf::SCALES, Buf::OLD_SCALES, 0);
     b.list.copy(Buf::QUATS, Buf::OLD_QUATS, 0);
-    pass!(b, texel densify_geometry {
+    pass!(b, densify_geometry {
         step: Buf::STEP, old_means: Buf::OLD_MEANS, old_scales: Buf::OLD_SCALES, old_quats: Buf::OLD_QUATS,
         densify_actions: Buf::DENSIFY_ACTIONS, child_offsets: Buf::CHILD_OFFSETS, means: Buf::MEANS, scales: Buf::SCALES,
         quats: Buf::QUATS,
@@ -29,7 +30,7 @@ pub fn apply(b: &mut Builder) {
         let geometry = [Buf::MEANS, Buf::SCALES, Buf::QUATS].contains(&a.planes[0]);
         for (index, &plane) in a.planes.iter().enumerate().skip(usize::from(geometry)) {
             b.list.copy(plane, Buf::OLD_VALUES, 0);
-            pass!(b, texel densify_copy {
+            pass!(b, densify_copy {
                 step: Buf::STEP, old_values: Buf::OLD_VALUES, densify_actions: Buf::DENSIFY_ACTIONS,
                 child_offsets: Buf::CHILD_OFFSETS, values: plane,
             } [stride: a.stride, moments: u32::from(index > 0)], args(a.args));
@@ -37,7 +38,7 @@ pub fn apply(b: &mut Builder) {
     }
     if b.labels {
         b.list.copy(Buf::LABELS, Buf::OLD_LABELS, 0);
-        pass!(b, texel densify_labels {
+        pass!(b, densify_labels {
             step: Buf::STEP, old_labels: Buf::OLD_LABELS, densify_actions: Buf::DENSIFY_ACTIONS,
             child_offsets: Buf::CHILD_OFFSETS, labels: Buf::LABELS,
         } [], over_gaussians());

@@ -3,31 +3,24 @@
 use super::build::{Builder, over_splats};
 use super::project::GAUSSIAN_FROM_SPLAT;
 use crate::pass;
-use crate::scheduler::plan::Buf;
+use crate::scheduler::plan::{Buf, Stage};
 
 /// Adds up the records and notes the densification statistic.
 pub fn gather(b: &mut Builder) {
-    if b.labels {
-        pass!(b, texel gather_labels {
-            step: Buf::STEP, counters: Buf::COUNTERS, failure: Buf::FAILURE, tiles_touched: Buf::TILES_TOUCHED,
-            instance_offsets: Buf::INSTANCE_OFFSETS, v_instances_a: Buf::V_INSTANCES_A, v_instances_b: Buf::V_INSTANCES_B, v_instances_c: Buf::V_INSTANCES_C,
-            gaussian_from_splat: GAUSSIAN_FROM_SPLAT, v_splats: Buf::V_SPLATS, densify_stats: Buf::DENSIFY_STATS,
-            labels: Buf::LABELS, layer_from_label: Buf::LAYER_FROM_LABEL,
-        } [], over_splats());
-    } else {
-        pass!(b, texel gather {
-            step: Buf::STEP, counters: Buf::COUNTERS, failure: Buf::FAILURE, tiles_touched: Buf::TILES_TOUCHED,
-            instance_offsets: Buf::INSTANCE_OFFSETS, v_instances_a: Buf::V_INSTANCES_A, v_instances_b: Buf::V_INSTANCES_B, v_instances_c: Buf::V_INSTANCES_C,
-            gaussian_from_splat: GAUSSIAN_FROM_SPLAT, v_splats: Buf::V_SPLATS, densify_stats: Buf::DENSIFY_STATS,
-        } [], over_splats());
-    }
+    records(b, b.labels, false);
 }
 
 /// Adds up the records of an object's splats, which densification does not see.
 pub fn gather_object(b: &mut Builder) {
-    pass!(b, texel gather_object {
+    records(b, false, true);
+}
+
+fn records(b: &mut Builder, labels: bool, object: bool) {
+    b.list.stage = Stage::Gather;
+    pass!(b, gather(labels: labels, object: object) {
         step: Buf::STEP, counters: Buf::COUNTERS, failure: Buf::FAILURE, tiles_touched: Buf::TILES_TOUCHED,
-        instance_offsets: Buf::INSTANCE_OFFSETS, v_instances_a: Buf::V_INSTANCES_A, v_instances_b: Buf::V_INSTANCES_B, v_instances_c: Buf::V_INSTANCES_C,
-        v_splats: Buf::V_SPLATS,
+        instance_offsets: Buf::INSTANCE_OFFSETS, v_instances_a: Buf::V_INSTANCES_A, v_instances_b: Buf::V_INSTANCES_B,
+        v_instances_c: Buf::V_INSTANCES_C, gaussian_from_splat: GAUSSIAN_FROM_SPLAT, v_splats: Buf::V_SPLATS,
+        densify_stats: Buf::DENSIFY_STATS, labels: Buf::LABELS, layer_from_label: Buf::LAYER_FROM_LABEL,
     } [], over_splats());
 }

@@ -2,42 +2,39 @@
 
 use super::build::{Builder, ONE};
 use crate::pass;
-use crate::scheduler::plan::{Buf, Grid};
+use crate::scheduler::plan::{Buf, Grid, Stage};
 
 /// Rows or columns that one lane filters in registers (glsl/include/window.glsl).
 const STRIP: u32 = 8;
 
 /// Writes `v_image` and the loss sums, for an image of at most `width` x `height` px.
 pub fn photo_loss(b: &mut Builder, width: u32, height: u32) {
+    b.list.stage = Stage::Loss;
     let columns = |channels| Grid::Groups(width.div_ceil(64), height.div_ceil(STRIP), channels);
     let rows = Grid::Groups(height.div_ceil(64), width.div_ceil(STRIP), 3);
-    pass!(b, texel ssim_columns { step: Buf::STEP, image: Buf::IMAGE, target: Buf::TARGET, moments: Buf::SSIM_A } [],
+    pass!(b, ssim_columns { step: Buf::STEP, image: Buf::IMAGE, target: Buf::TARGET, moments: Buf::SSIM_A } [],
         columns(3));
-    pass!(b, texel ssim_rows { step: Buf::STEP, moments: Buf::SSIM_A, target: Buf::TARGET, v_moments: Buf::SSIM_B } [],
+    pass!(b, ssim_rows { step: Buf::STEP, moments: Buf::SSIM_A, target: Buf::TARGET, v_moments: Buf::SSIM_B } [],
         rows);
-    pass!(b, texel ssim_rows_backward { step: Buf::STEP, v_moments: Buf::SSIM_B, v_rows: Buf::SSIM_A } [], rows);
-    pass!(b, texel loss_columns_backward {
+    pass!(b, ssim_rows_backward { step: Buf::STEP, v_moments: Buf::SSIM_B, v_rows: Buf::SSIM_A } [], rows);
+    pass!(b, loss_columns_backward {
         step: Buf::STEP, v_rows: Buf::SSIM_A, image: Buf::IMAGE, target: Buf::TARGET, v_image: Buf::V_IMAGE,
         loss_partials: Buf::LOSS_PARTIALS,
     } [], columns(1));
-    let (subgroup, partials) = (b.shape.subgroup, partials(b.shape.subgroup, width, height));
-    let layer_tiles = b.capacity.layer_tiles as u32;
-    if b.labels {
-        pass!(b, loss_reduce_labels {
-            loss_partials: Buf::LOSS_PARTIALS, counters: Buf::COUNTERS, layer_loss: Buf::LAYER_LOSS,
-        } [subgroup_size: subgroup, layer_tile_capacity: layer_tiles, partials: partials], ONE);
-    } else {
-        pass!(b, loss_reduce { loss_partials: Buf::LOSS_PARTIALS, counters: Buf::COUNTERS }
-            [subgroup_size: subgroup, partials: partials], ONE);
-    }
+    reduce(b, partials(b.shape.subgroup, width, height));
 }
 
 /// Sums up the label loss of the layers alone.
 pub fn label_loss(b: &mut Builder) {
-    let (subgroup, layer_tiles) = (b.shape.subgroup, b.capacity.layer_tiles as u32);
-    pass!(b, loss_reduce_labels {
+    b.list.stage = Stage::Loss;
+    reduce(b, 0);
+}
+
+fn reduce(b: &mut Builder, partials: u32) {
+    let layer_tiles = b.capacity.layer_tiles as u32;
+    pass!(b, loss_reduce(labels: b.labels) {
         loss_partials: Buf::LOSS_PARTIALS, counters: Buf::COUNTERS, layer_loss: Buf::LAYER_LOSS,
-    } [subgroup_size: subgroup, layer_tile_capacity: layer_tiles, partials: 0], ONE);
+    } [layer_tile_capacity: layer_tiles, partials: partials], ONE);
 }
 
 /// Partial loss sums of an image: one for each subgroup of each strip.

@@ -21,10 +21,11 @@ pub use build::Builder;
 pub use optimize::ATTRIBUTES;
 pub use separate::separate_step;
 pub use shape::KernelShape;
-pub use stage::Stage;
 
 use crate::pass;
 use crate::scheduler::plan::{Buf, Capacity, PassList};
+
+pub use crate::scheduler::plan::Stage;
 
 /// What a recorded list depends on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -51,6 +52,7 @@ fn begin<'a>(name: &str, shape: &'a KernelShape, capacity: &'a Capacity, labels:
 }
 
 fn end(mut b: Builder) -> PassList {
+    b.list.stage = Stage::Report;
     b.list.copy(Buf::COUNTERS, Buf::REPORT, 0);
     b.list.copy(Buf::FAILURE, Buf::REPORT_FAILURE, 0);
     b.list

@@ -2,7 +2,7 @@
 
 use super::build::{Builder, args, over_gaussians};
 use crate::pass;
-use crate::scheduler::plan::Buf;
+use crate::scheduler::plan::{Buf, Stage};
 use crate::shaders::constants;
 
 /// An attribute of the Gaussians as the optimiser sees it.
@@ -40,8 +40,9 @@ const fn attribute(planes: [Buf; 3], gradient: Buf, stride: u32, rate: u32, from
 /// One Adam update of the attributes that are active.
 pub fn adam(b: &mut Builder) {
     let degree = b.sh_degree;
+    b.list.stage = Stage::Optimise;
     for a in ATTRIBUTES.iter().filter(|a| a.from_degree <= degree) {
-        pass!(b, texel adam {
+        pass!(b, adam {
             step: Buf::STEP, failure: Buf::FAILURE, splat_from_gaussian: Buf::SPLAT_FROM_GAUSSIAN,
             gradients: a.gradient, parameters_in: a.planes[0], first_moments_in: a.planes[1],
             second_moments_in: a.planes[2], parameters: a.planes[0], first_moments: a.planes[1], second_moments: a.planes[2],
@@ -51,6 +52,7 @@ pub fn adam(b: &mut Builder) {
 
 /// No opacity above 0.01; its moments start over.
 pub fn opacity_reset(b: &mut Builder) {
+    b.list.stage = Stage::Optimise;
     pass!(b, opacity_reset { step: Buf::STEP, means: Buf::MEANS, m_means: Buf::M_MEANS, u_means: Buf::U_MEANS } [],
         over_gaussians());
 }

@@ -4,34 +4,37 @@ use super::build::{Builder, Count, ONE, over_gaussians, over_splats};
 use super::scan::{self, Total};
 use super::sort::{self, SortBuffers};
 use crate::pass;
-use crate::scheduler::plan::Buf;
+use crate::scheduler::plan::{Buf, Stage};
 
 /// Sorted Gaussian indices of the visible splats; the depth sort has an even number of passes.
 pub const GAUSSIAN_FROM_SPLAT: Buf = Buf::DEPTH_VALUES_A;
 
 /// Lists the visible Gaussians in depth order and projects them.
 pub fn visible_splats(b: &mut Builder) {
-    pass!(b, texel cull {
-        step: Buf::STEP, means: Buf::MEANS, scales: Buf::SCALES, depth_keys: Buf::DEPTH_KEYS,
-        splat_from_gaussian: Buf::SPLAT_FROM_GAUSSIAN, counters: Buf::COUNTERS,
-    } [], over_gaussians());
+    b.list.stage = Stage::Project;
+    cull(b, false);
     order_and_project(b);
 }
 
 /// As [`visible_splats`], for the object of layer 1 alone.
 pub fn visible_splats_of_object(b: &mut Builder) {
-    pass!(b, texel cull_object {
+    b.list.stage = Stage::Project;
+    cull(b, true);
+    order_and_project(b);
+}
+
+fn cull(b: &mut Builder, object: bool) {
+    pass!(b, cull(object: object) {
         step: Buf::STEP, means: Buf::MEANS, scales: Buf::SCALES, depth_keys: Buf::DEPTH_KEYS,
         splat_from_gaussian: Buf::SPLAT_FROM_GAUSSIAN, counters: Buf::COUNTERS, labels: Buf::LABELS,
         label_from_layer: Buf::LABEL_FROM_LAYER,
     } [], over_gaussians());
-    order_and_project(b);
 }
 
 fn order_and_project(b: &mut Builder) {
     scan::scan_visible(b, Buf::DEPTH_KEYS, Buf::VISIBLE_OFFSETS);
     pass!(b, prepare_splats { counters: Buf::COUNTERS, dispatch_args: Buf::DISPATCH_ARGS } [], ONE);
-    pass!(b, texel compact {
+    pass!(b, compact {
         step: Buf::STEP, depth_keys: Buf::DEPTH_KEYS, visible_offsets: Buf::VISIBLE_OFFSETS,
         keys_out: Buf::DEPTH_KEYS_A, values_out: Buf::DEPTH_VALUES_A, failure: Buf::FAILURE,
     } [], over_gaussians());
@@ -39,45 +42,36 @@ fn order_and_project(b: &mut Builder) {
         keys: [Buf::DEPTH_KEYS_A, Buf::DEPTH_KEYS_B],
         values: [Buf::DEPTH_VALUES_A, Buf::DEPTH_VALUES_B],
     };
-    let (_, sorted) = sort::sort(b, buffers, 32, Count::Splats, false);
+    let (_, sorted) = sort::sort(b, buffers, 32, Count::Splats, "by depth", false);
     debug_assert_eq!(sorted, GAUSSIAN_FROM_SPLAT);
     project_forward(b);
     scan::scan(b, Buf::TILES_TOUCHED, Buf::INSTANCE_OFFSETS, Count::Splats, Total::Instances);
 }
 
 fn project_forward(b: &mut Builder) {
-    let (tile_width, tile_height, sh_degree) = (b.shape.tile_width, b.shape.tile_height, b.sh_degree);
-    if b.labels {
-        pass!(b, texel project_forward_labels {
-            step: Buf::STEP, counters: Buf::COUNTERS, gaussian_from_splat: GAUSSIAN_FROM_SPLAT, means: Buf::MEANS,
-            scales: Buf::SCALES, quats: Buf::QUATS, sh0: Buf::SH0, sh1: Buf::SH1, sh2: Buf::SH2, sh3: Buf::SH3,
-            splats: Buf::SPLATS, tiles_touched: Buf::TILES_TOUCHED, splat_from_gaussian: Buf::SPLAT_FROM_GAUSSIAN,
-            labels: Buf::LABELS, layer_from_label: Buf::LAYER_FROM_LABEL,
-        } [tile_width: tile_width, tile_height: tile_height, sh_degree: sh_degree], over_splats());
-    } else {
-        pass!(b, texel project_forward {
-            step: Buf::STEP, counters: Buf::COUNTERS, gaussian_from_splat: GAUSSIAN_FROM_SPLAT, means: Buf::MEANS,
-            scales: Buf::SCALES, quats: Buf::QUATS, sh0: Buf::SH0, sh1: Buf::SH1, sh2: Buf::SH2, sh3: Buf::SH3,
-            splats: Buf::SPLATS, tiles_touched: Buf::TILES_TOUCHED, splat_from_gaussian: Buf::SPLAT_FROM_GAUSSIAN,
-        } [tile_width: tile_width, tile_height: tile_height, sh_degree: sh_degree], over_splats());
-    }
+    let sh_degree = b.sh_degree;
+    pass!(b, project_forward(labels: b.labels) {
+        step: Buf::STEP, counters: Buf::COUNTERS, gaussian_from_splat: GAUSSIAN_FROM_SPLAT, means: Buf::MEANS,
+        scales: Buf::SCALES, quats: Buf::QUATS, sh0: Buf::SH0, sh1: Buf::SH1, sh2: Buf::SH2, sh3: Buf::SH3,
+        splats: Buf::SPLATS, tiles_touched: Buf::TILES_TOUCHED, splat_from_gaussian: Buf::SPLAT_FROM_GAUSSIAN,
+        labels: Buf::LABELS, layer_from_label: Buf::LAYER_FROM_LABEL,
+    } [sh_degree: sh_degree], over_splats());
 }
 
 /// Gradients of the splats back to the parameters of their Gaussians.
 pub fn project_backward(b: &mut Builder) {
-    let sh_degree = b.sh_degree;
-    pass!(b, texel project_backward {
-        step: Buf::STEP, failure: Buf::FAILURE, gaussian_from_splat: GAUSSIAN_FROM_SPLAT, means: Buf::MEANS,
-        scales: Buf::SCALES, quats: Buf::QUATS, sh0: Buf::SH0, sh1: Buf::SH1, sh2: Buf::SH2, sh3: Buf::SH3,
-        v_splats: Buf::V_SPLATS, v_means: Buf::V_MEANS, v_scales: Buf::V_SCALES, v_quats: Buf::V_QUATS,
-        v_sh0: Buf::V_SH0, v_sh1: Buf::V_SH1, v_sh2: Buf::V_SH2, v_sh3: Buf::V_SH3, counters: Buf::COUNTERS,
-    } [sh_degree: sh_degree], over_splats());
+    backward(b, false, Buf::SPLAT_FROM_GAUSSIAN);
 }
 
 /// As [`project_backward`] for the splats of an object; added to the gradients of `scene_splats`.
 pub fn project_backward_of_object(b: &mut Builder, scene_splats: Buf) {
+    backward(b, true, scene_splats);
+}
+
+fn backward(b: &mut Builder, object: bool, scene_splats: Buf) {
     let sh_degree = b.sh_degree;
-    pass!(b, texel project_backward_object {
+    b.list.stage = Stage::ProjectBackward;
+    pass!(b, project_backward(object: object) {
         step: Buf::STEP, failure: Buf::FAILURE, gaussian_from_splat: GAUSSIAN_FROM_SPLAT, means: Buf::MEANS,
         scales: Buf::SCALES, quats: Buf::QUATS, sh0: Buf::SH0, sh1: Buf::SH1, sh2: Buf::SH2, sh3: Buf::SH3,
         v_splats: Buf::V_SPLATS, v_means: Buf::V_MEANS, v_scales: Buf::V_SCALES, v_quats: Buf::V_QUATS,

@@ -9,7 +9,7 @@ use super::build::{Builder, ONE};
 use super::{Variant, begin, blend, end, gather, lift, loss, optimize, project, tile};
 use crate::pass;
 use crate::pass::KernelShape;
-use crate::scheduler::plan::{Buf, Capacity, PassList, Work};
+use crate::scheduler::plan::{Buf, Capacity, PassList, Stage, Work};
 
 /// What the passes of an object read and write in place of the step's buffers.
 const OF_OBJECT: [(Buf, Buf); 5] = [
@@ -52,6 +52,7 @@ pub fn separate_step(shape: &KernelShape, capacity: &Capacity, variant: Variant,
 }
 
 fn next_object(b: &mut Builder) {
+    b.list.stage = Stage::Project;
     pass!(b, next_object {
         step: Buf::STEP, label_from_layer: Buf::LABEL_FROM_LAYER, layer_weights: Buf::LAYER_WEIGHTS,
         layer_occluders: Buf::LAYER_OCCLUDERS, object: Buf::OBJECT, object_counters: Buf::OBJECT_COUNTERS,
@@ -80,7 +81,7 @@ fn object_passes(shape: &KernelShape, capacity: &Capacity, sh_degree: u32) -> Ve
         }
     }
     // The gradients stay by the scene's splats.
-    let list = PassList { name: String::new(), work };
+    let list = PassList { work, ..PassList::default() };
     let mut b = Builder { shape, capacity: &capacity, labels: true, sh_degree, counts: false, list };
     project::project_backward_of_object(&mut b, Buf::SPLAT_FROM_GAUSSIAN);
     b.list.work

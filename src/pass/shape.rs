@@ -2,7 +2,6 @@
 
 use crate::error::{Error, Result};
 use crate::gpu::{Capabilities, SUBGROUP_MAX, SUBGROUP_MIN};
-use crate::shaders::ShaderDesc;
 
 /// Shape of the kernels, fixed for a device.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -88,8 +87,14 @@ impl KernelShape {
         groups.next_multiple_of(2).max(self.lane_groups) * self.subgroup
     }
 
-    /// The variant for this device.
-    pub fn pick(&self, base: &'static ShaderDesc, texel: &'static ShaderDesc) -> &'static ShaderDesc {
-        if self.texel { texel } else { base }
+    /// The specialisation constants that follow from the shape alone, by their GLSL names.
+    pub fn constant(&self, name: &str) -> Option<u32> {
+        match name {
+            "SUBGROUP_SIZE" => Some(self.subgroup),
+            "TILE_WIDTH" => Some(self.tile_width),
+            "TILE_HEIGHT" => Some(self.tile_height),
+            "SEGMENT_LENGTH" => Some(self.segment_length),
+            _ => None,
+        }
     }
 }

@@ -2,7 +2,7 @@
 
 use super::build::{Builder, Count, ONE};
 use crate::pass;
-use crate::scheduler::plan::{Buf, Grid};
+use crate::scheduler::plan::{Buf, Grid, Stage, Work};
 
 /// Two pairs of buffers that the passes of a sort go back and forth between.
 #[derive(Clone, Copy, Debug)]
@@ -13,11 +13,12 @@ pub struct SortBuffers {
     pub values: [Buf; 2],
 }
 
-/// Sorts by the low `bits` bits; with `identity` the values are the places of the keys before the sort. Returns the
-/// buffers that hold the sorted keys and values.
-pub fn sort(b: &mut Builder, buffers: SortBuffers, bits: u32, count: Count, identity: bool) -> (Buf, Buf) {
-    let (subgroup, lanes) = (b.shape.subgroup, b.capacity.sort_lanes as u32);
-    let groups = Grid::Groups(lanes / subgroup, 1, 1);
+/// Sorts by the low `bits` bits; with `identity` the values are the places of the keys before the sort. Tables of times
+/// say what is sorted `by`. Returns the buffers that hold the sorted keys and values.
+pub fn sort(b: &mut Builder, buffers: SortBuffers, bits: u32, count: Count, by: &str, identity: bool) -> (Buf, Buf) {
+    let (first, around) = (b.list.work.len(), std::mem::replace(&mut b.list.stage, Stage::Sort));
+    let lanes = b.capacity.sort_lanes as u32;
+    let groups = Grid::Groups(lanes / b.shape.subgroup, 1, 1);
     let digit_bits = b.shape.digit_bits;
     let passes = bits.div_ceil(digit_bits).max(1);
     for pass in 0..passes {
@@ -28,18 +29,24 @@ pub fn sort(b: &mut Builder, buffers: SortBuffers, bits: u32, count: Count, iden
         // The first pass of an identity sort reads no values; the keys stand in for the buffer that nothing wrote yet.
         let identity_now = identity && pass == 0;
         let values_in = if identity_now { buffers.keys[from] } else { buffers.values[from] };
-        pass!(b, texel radix_count {
+        pass!(b, radix_count {
             step: Buf::STEP, counters: Buf::COUNTERS, failure: Buf::FAILURE, keys_in: buffers.keys[from],
             histogram: Buf::SORT_HISTOGRAM,
-        } [subgroup_size: subgroup, count_source: count as u32, lanes: lanes, shift: shift, digit_bits: digit_bits], groups);
+        } [count_source: count as u32, lanes: lanes, shift: shift, digit_bits: digit_bits], groups);
         pass!(b, radix_scan { histogram: Buf::SORT_HISTOGRAM }
-            [subgroup_size: subgroup, cells: lanes << digit_bits], ONE);
-        pass!(b, texel radix_scatter {
+            [cells: lanes << digit_bits], ONE);
+        pass!(b, radix_scatter {
             step: Buf::STEP, counters: Buf::COUNTERS, failure: Buf::FAILURE, keys_in: buffers.keys[from],
             values_in: values_in, histogram: Buf::SORT_HISTOGRAM, keys_out: buffers.keys[to],
             values_out: buffers.values[to],
-        } [subgroup_size: subgroup, count_source: count as u32, lanes: lanes, shift: shift, digit_bits: digit_bits,
+        } [count_source: count as u32, lanes: lanes, shift: shift, digit_bits: digit_bits,
             identity: u32::from(identity_now)], groups);
+    }
+    b.list.stage = around;
+    for work in &mut b.list.work[first..] {
+        if let Work::Pass(pass) = work {
+            pass.title = format!("{} {by}", pass.title);
+        }
     }
     let last = (passes % 2) as usize;
     (buffers.keys[last], buffers.values[last])

@@ -5,35 +5,42 @@ use super::project::GAUSSIAN_FROM_SPLAT;
 use super::scan::{self, Total};
 use super::sort::{self, SortBuffers};
 use crate::pass;
-use crate::scheduler::plan::Buf;
+use crate::scheduler::plan::{Buf, Stage};
 use crate::shaders::constants;
 
 /// Lists the (splat, tile) pairs, sorts them by layer and tile, and finds each tile's range. Returns the buffer that
 /// holds the slots (places before the sort) of the sorted pairs.
 pub fn bin_splats(b: &mut Builder) -> Buf {
-    if b.labels { bin(b, emit_all_layers) } else { bin_scene(b) }
+    bin(b, b.labels, 0)
 }
 
 /// The scene's splats alone, in the first of the layers that the list has.
 pub fn bin_scene(b: &mut Builder) -> Buf {
-    bin(b, |b| emit_layer(b, 0))
+    bin(b, false, 0)
 }
 
 /// An object's splats, in layer 1 alone.
 pub fn bin_object(b: &mut Builder) -> Buf {
-    bin(b, |b| emit_layer(b, 1))
+    bin(b, false, 1)
 }
 
-fn bin(b: &mut Builder, emit: impl Fn(&mut Builder)) -> Buf {
+/// With `layers` each splat also in the layer of its object, else all in `layer` alone.
+fn bin(b: &mut Builder, layers: bool, layer: u32) -> Buf {
     let instances = b.capacity.instances as u32;
+    b.list.stage = Stage::Tile;
     pass!(b, prepare_instances {
         counters: Buf::COUNTERS, dispatch_args: Buf::DISPATCH_ARGS, failure: Buf::FAILURE,
     } [instance_capacity: instances], ONE);
-    emit(b);
+    pass!(b, emit_instances(labels: layers) {
+        step: Buf::STEP, counters: Buf::COUNTERS, failure: Buf::FAILURE, splats: Buf::SPLATS,
+        tiles_touched: Buf::TILES_TOUCHED, instance_offsets: Buf::INSTANCE_OFFSETS, tile_keys: Buf::TILE_KEYS_A,
+        splat_from_instance: Buf::SPLAT_FROM_INSTANCE, gaussian_from_splat: GAUSSIAN_FROM_SPLAT,
+        labels: Buf::LABELS, layer_from_label: Buf::LAYER_FROM_LABEL,
+    } [layer: layer], over_splats());
     let buffers =
         SortBuffers { keys: [Buf::TILE_KEYS_A, Buf::TILE_KEYS_B], values: [Buf::TILE_VALUES_A, Buf::TILE_VALUES_B] };
     let bits = 64 - b.capacity.virtual_tiles.saturating_sub(1).leading_zeros();
-    let (keys, slots) = sort::sort(b, buffers, bits, Count::Instances, true);
+    let (keys, slots) = sort::sort(b, buffers, bits, Count::Instances, "by tile", true);
     tile_ranges(b, keys);
     let layer_tiles = b.capacity.layer_tiles as u32;
     let longest = b.shape.segment_length * b.capacity.segments as u32;
@@ -43,42 +50,18 @@ fn bin(b: &mut Builder, emit: impl Fn(&mut Builder)) -> Buf {
     slots
 }
 
-fn emit_all_layers(b: &mut Builder) {
-    let (tile_width, tile_height) = (b.shape.tile_width, b.shape.tile_height);
-    pass!(b, texel emit_instances_labels {
-        step: Buf::STEP, counters: Buf::COUNTERS, failure: Buf::FAILURE, splats: Buf::SPLATS,
-        tiles_touched: Buf::TILES_TOUCHED, instance_offsets: Buf::INSTANCE_OFFSETS, tile_keys: Buf::TILE_KEYS_A,
-        splat_from_instance: Buf::SPLAT_FROM_INSTANCE, gaussian_from_splat: GAUSSIAN_FROM_SPLAT,
-        labels: Buf::LABELS, layer_from_label: Buf::LAYER_FROM_LABEL,
-    } [tile_width: tile_width, tile_height: tile_height], over_splats());
-}
-
-/// All splats, in one layer.
-fn emit_layer(b: &mut Builder, layer: u32) {
-    let (tile_width, tile_height) = (b.shape.tile_width, b.shape.tile_height);
-    pass!(b, texel emit_instances {
-        step: Buf::STEP, counters: Buf::COUNTERS, failure: Buf::FAILURE, splats: Buf::SPLATS,
-        tiles_touched: Buf::TILES_TOUCHED, instance_offsets: Buf::INSTANCE_OFFSETS, tile_keys: Buf::TILE_KEYS_A,
-        splat_from_instance: Buf::SPLAT_FROM_INSTANCE,
-    } [tile_width: tile_width, tile_height: tile_height, layer: layer], over_splats());
-}
-
 fn tile_ranges(b: &mut Builder, keys: Buf) {
     let groups = args(constants::ARGS_TILES);
-    if !b.labels {
-        pass!(b, texel tile_ranges {
-            step: Buf::STEP, failure: Buf::FAILURE, counters: Buf::COUNTERS, tile_keys: keys,
-            tile_starts: Buf::TILE_STARTS, tile_ends: Buf::TILE_ENDS,
-        } [], groups);
-        return;
-    }
-    pass!(b, texel tile_ranges_labels {
+    pass!(b, tile_ranges(labels: b.labels) {
         step: Buf::STEP, failure: Buf::FAILURE, counters: Buf::COUNTERS, tile_keys: keys,
         tile_starts: Buf::TILE_STARTS, tile_ends: Buf::TILE_ENDS, layer_occupied: Buf::LAYER_OCCUPIED,
     } [], groups);
+    if !b.labels {
+        return;
+    }
     scan::scan(b, Buf::LAYER_OCCUPIED, Buf::LAYER_OFFSETS, Count::VirtualTiles, Total::LayerTiles);
     let layer_tiles = b.capacity.layer_tiles as u32;
-    pass!(b, texel layer_list {
+    pass!(b, layer_list {
         step: Buf::STEP, failure: Buf::FAILURE, layer_occupied: Buf::LAYER_OCCUPIED,
         layer_offsets: Buf::LAYER_OFFSETS, layer_tiles: Buf::LAYER_TILES,
     } [layer_tile_capacity: layer_tiles], groups);

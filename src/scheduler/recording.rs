@@ -84,11 +84,11 @@ impl Writer<'_> {
         }
         match &self.plan.list.work[index] {
             Work::Pass(pass) => self.pass(pass)?,
-            Work::Fill { buf, word } => {
+            Work::Fill { buf, word, .. } => {
                 let (buffer, offset) = self.storage.place(self.plan, *buf, self.frame)?;
                 self.recorder.fill(buffer, offset, self.plan.placement(*buf)?.bytes, *word)?;
             }
-            Work::Copy { from, to, bytes } => {
+            Work::Copy { from, to, bytes, .. } => {
                 let most = self.plan.placement(*from)?.bytes.min(self.plan.placement(*to)?.bytes);
                 let bytes = if *bytes == 0 { most } else { *bytes };
                 let from = self.storage.place(self.plan, *from, self.frame)?;

@@ -111,7 +111,7 @@ fn sort_exactly(engine: &mut Engine, cases: &[(usize, u32)]) {
         values: [Buf::DEPTH_VALUES_A, Buf::DEPTH_VALUES_B],
     };
     let mut found = None;
-    let id = list(engine, |b| found = Some(sort::sort(b, buffers, 32, Count::Splats, false)));
+    let id = list(engine, |b| found = Some(sort::sort(b, buffers, 32, Count::Splats, "by depth", false)));
     let (keys_out, values_out) = found.expect("the sort was declared");
     let mut random = generator(73);
     for &(count, different) in cases {
@@ -153,7 +153,7 @@ fn sort_of_places_by_some_bits() {
             values: [Buf::DEPTH_VALUES_A, Buf::DEPTH_VALUES_B],
         };
         let mut found = None;
-        let id = list(&mut engine, |b| found = Some(sort::sort(b, buffers, bits, Count::Splats, true)));
+        let id = list(&mut engine, |b| found = Some(sort::sort(b, buffers, bits, Count::Splats, "by tile", true)));
         let (keys_out, values_out) = found.expect("the sort was declared");
         let keys: Vec<u32> = (0..ITEMS).map(|_| random.random_range(0..1 << bits)).collect();
         announce(&mut engine, ITEMS);

@@ -95,6 +95,22 @@ pub fn shared_structs(shaders: &[Shader]) -> Vec<Finding> {
     findings
 }
 
+/// Siblings share the Rust side of their specialisation constants, so one name must be one constant.
+pub fn siblings(shaders: &[Shader]) -> Vec<Finding> {
+    let mut known = BTreeMap::new();
+    let mut findings = Vec::new();
+    for shader in shaders {
+        for constant in &shader.variants[0].interface.spec {
+            let (first, other) = known.entry((&shader.file_stem, &constant.name)).or_insert((&shader.stem, constant));
+            if *other != constant {
+                let (name, stem) = (&constant.name, &shader.stem);
+                findings.push(Finding::new(at(shader, name), format!("`{name}` differs between {first} and {stem}")));
+            }
+        }
+    }
+    findings
+}
+
 fn at(shader: &Shader, name: &str) -> String {
     format!("{}:{}", shader.path, line_of(&shader.source, name))
 }

@@ -69,6 +69,11 @@ impl Shader {
             .map(str::trim)
             .filter(|sentence| !sentence.is_empty())
     }
+
+    /// The macros that make it a sibling.
+    pub fn macros(&self) -> Vec<String> {
+        self.variants.first().map(Variant::macros).unwrap_or_default()
+    }
 }
 
 /// One way to compile a shader.
@@ -76,8 +81,6 @@ impl Shader {
 pub struct Variant {
     /// `stem` or `stem_suffix`.
     pub name: String,
-    /// Empty for the base.
-    pub suffix: String,
     /// Its macros.
     pub defines: Vec<Define>,
     /// The module that ships.
@@ -89,13 +92,13 @@ pub struct Variant {
 }
 
 impl Variant {
-    /// The macros in one line.
-    pub fn macros(&self) -> String {
+    /// The macros as texts, in the order of their names.
+    pub fn macros(&self) -> Vec<String> {
         let texts = self.defines.iter().map(|(name, value)| match value {
             Some(value) => format!("{name}={value}"),
             None => name.clone(),
         });
-        format!("Compiled with {}.", texts.collect::<Vec<_>>().join(", "))
+        texts.collect::<BTreeSet<_>>().into_iter().collect()
     }
 }
 
@@ -130,6 +133,7 @@ pub fn generate(glsl: &Path) -> Result<Generated, Vec<Finding>> {
     compile_all(&include, &mut shaders)?;
     let mut findings: Vec<Finding> = shaders.iter().flat_map(check::shader).collect();
     findings.extend(check::shared_structs(&shaders));
+    findings.extend(check::siblings(&shaders));
     for path in files(&include, "glsl")? {
         findings.extend(check::text(&message_path(glsl, &path), &read(&path)?));
     }
@@ -221,7 +225,7 @@ fn declare_variants(glsl: &Path, shaders: &mut Vec<Shader>) -> Result<(), Vec<Fi
             shaders.iter_mut().filter(|shader| line.applies_to(shader)).for_each(|shader| {
                 let defines = [shader.variants[0].defines.clone(), line.defines.clone()].concat();
                 let name = format!("{}_{}", shader.stem, line.suffix);
-                shader.variants.push(Variant { name, suffix: line.suffix.clone(), defines, ..Variant::default() });
+                shader.variants.push(Variant { name, defines, ..Variant::default() });
             });
         }
     }

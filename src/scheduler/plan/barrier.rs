@@ -107,7 +107,7 @@ pub(super) fn uses(work: &Work, sizes: &[Size]) -> Vec<BufferUse> {
     let whole = |buf, kind| BufferUse { buf, kind, range: None };
     match work {
         Work::Fill { buf, .. } => vec![whole(*buf, Use::TransferWrite)],
-        Work::Copy { from, to, bytes } => {
+        Work::Copy { from, to, bytes, .. } => {
             let most = sizes[from.index()].bytes.min(sizes[to.index()].bytes);
             let range = Some((0, if *bytes == 0 { most } else { *bytes }));
             vec![

@@ -16,7 +16,7 @@ pub(super) fn list(table: &'static [BufferDecl], sizes: &[Size], list: &PassList
             Work::Pass(pass) => check_pass(table, sizes, pass, limits)
                 .map_err(|error| if let Error::Bug(what) = error { in_pass(list, pass, &what) } else { error })?,
             Work::Fill { buf, .. } => row(table, *buf).map(|_| ())?,
-            Work::Copy { from, to, bytes } => check_copy(table, sizes, *from, *to, *bytes)?,
+            Work::Copy { from, to, bytes, .. } => check_copy(table, sizes, *from, *to, *bytes)?,
         }
     }
     Ok(())

@@ -13,6 +13,7 @@ mod limits;
 pub mod memory;
 pub mod pass;
 mod report;
+mod stage;
 mod table;
 
 pub use barrier::{Barrier, Touch, Use, Uses};
@@ -22,6 +23,7 @@ pub use lifetime::Life;
 pub use limits::Limits;
 pub use memory::{MemoryReport, MemoryRow};
 pub use pass::{Grid, PassDecl, PassList, Work};
+pub use stage::Stage;
 pub use table::TABLE;
 
 use crate::error::{Error, Result};

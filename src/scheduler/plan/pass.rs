@@ -1,5 +1,6 @@
 //! Passes as declarations: which shader, which buffers, how many workgroups.
 
+use super::Stage;
 use super::buffers::Buf;
 use crate::shaders::ShaderDesc;
 
@@ -17,6 +18,10 @@ pub enum Grid {
 pub struct PassDecl {
     /// Name in reports, timings and crash messages; the shader's name unless given.
     pub label: String,
+    /// Name in tables of times, which variants share; the shader's stem unless given.
+    pub title: String,
+    /// Stage of the step; set when the pass enters a list.
+    pub stage: Stage,
     /// The shader variant.
     pub shader: &'static ShaderDesc,
     /// Buffers in the order of the shader's bindings.
@@ -32,7 +37,8 @@ pub struct PassDecl {
 impl PassDecl {
     /// A pass with default specialisation constants and no push constants.
     pub fn new(shader: &'static ShaderDesc, buffers: Vec<Buf>, grid: Grid) -> Self {
-        Self { label: shader.name.to_owned(), shader, buffers, spec: Vec::new(), push: Vec::new(), grid }
+        let (label, title) = (shader.name.to_owned(), shader.stem.to_owned());
+        Self { label, title, stage: Stage::default(), shader, buffers, spec: Vec::new(), push: Vec::new(), grid }
     }
 
     /// Sets the specialisation constants.
@@ -74,6 +80,8 @@ pub enum Work {
         buf: Buf,
         /// The word.
         word: u32,
+        /// Stage of the step.
+        stage: Stage,
     },
     /// The first bytes of a buffer are copied to the start of another.
     Copy {
@@ -83,6 +91,8 @@ pub enum Work {
         to: Buf,
         /// Number of bytes, a multiple of 4; 0 copies as much as both hold.
         bytes: u64,
+        /// Stage of the step.
+        stage: Stage,
     },
 }
 
@@ -99,29 +109,31 @@ pub struct PassList {
     pub name: String,
     /// The work, in order.
     pub work: Vec<Work>,
+    /// Stage of the items that are appended from now on.
+    pub stage: Stage,
 }
 
 impl PassList {
     /// An empty list.
     pub fn new(name: impl Into<String>) -> Self {
-        Self { name: name.into(), work: Vec::new() }
+        Self { name: name.into(), ..Self::default() }
     }
 
     /// Appends a dispatch.
     pub fn pass(&mut self, pass: PassDecl) -> &mut Self {
-        self.work.push(Work::Pass(pass));
+        self.work.push(Work::Pass(PassDecl { stage: self.stage, ..pass }));
         self
     }
 
     /// Appends a fill.
     pub fn fill(&mut self, buf: Buf, word: u32) -> &mut Self {
-        self.work.push(Work::Fill { buf, word });
+        self.work.push(Work::Fill { buf, word, stage: self.stage });
         self
     }
 
     /// Appends a copy of `bytes` bytes, or of as much as both buffers hold if 0.
     pub fn copy(&mut self, from: Buf, to: Buf, bytes: u64) -> &mut Self {
-        self.work.push(Work::Copy { from, to, bytes });
+        self.work.push(Work::Copy { from, to, bytes, stage: self.stage });
         self
     }
 }

@@ -69,7 +69,7 @@ fn accesses(plan: &Plan, item: usize) -> Vec<(Page, u64, u64, Use)> {
     };
     match &plan.list.work[item] {
         Work::Fill { buf, .. } => add(*buf, Use::TransferWrite, None),
-        Work::Copy { from, to, bytes } => {
+        Work::Copy { from, to, bytes, .. } => {
             let all = [from, to].map(|buf| plan.placements[buf.0 as usize].unwrap().bytes);
             let bytes = if *bytes == 0 { all[0].min(all[1]) } else { *bytes };
             add(*from, Use::TransferRead, Some((0, bytes)));
