@@ -4,7 +4,7 @@ use assert_cmd::Command;
 use clap::Parser;
 use labelgs::cli::command::{Cli, Command as Verb, command};
 use labelgs::cli::config;
-use labelgs::io::ply::{read_gaussians, write_gaussians};
+use labelgs::io::model::{read_model, write_model};
 use labelgs::scene::Gaussians;
 use labelgs::train::TrainConfig;
 use labelgs::train::config::Occlusion;
@@ -37,7 +37,7 @@ fn model(folder: &Path) -> PathBuf {
         labels: Some(vec![0, 1, 1, 3, 3, 3]),
         label_confidence: None,
     };
-    write_gaussians(&path, &gaussians).expect("written");
+    write_model(&path, &gaussians).expect("written");
     path
 }
 
@@ -239,7 +239,7 @@ fn extract_and_remove_write_the_two_parts() {
         assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
         let json: Value = serde_json::from_slice(&output.stdout).expect("JSON");
         assert_eq!((&json["gaussians"], &json["of"]), (&expected.len().into(), &6.into()));
-        assert_eq!(read_gaussians(&part).expect("PLY").gaussians.labels, Some(expected));
+        assert_eq!(read_model(&part).expect("PLY").gaussians.labels, Some(expected));
     }
     let before = std::fs::read(&part).expect("file");
     let output = labelgs(&["extract", model, "--labels", "2,3", "-o", out]);

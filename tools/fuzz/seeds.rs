@@ -2,9 +2,10 @@
 
 use labelgs::cli::config;
 use labelgs::gpu::PipelineStore;
+use labelgs::io::image as pixels;
 use labelgs::io::label_table::{LabelEntry, LabelTable};
+use labelgs::io::model::write_model;
 use labelgs::io::pipeline_file::PipelineFolder;
-use labelgs::io::{image as pixels, ply};
 use labelgs::scene::Gaussians;
 use labelgs::train::TrainConfig;
 use std::io::Cursor;
@@ -159,7 +160,7 @@ fn gaussians(count: usize, degree: u32, labelled: bool) -> Gaussians {
 pub fn ply_model() -> Vec<Vec<u8>> {
     let model = |degree, labelled| {
         written("a.ply", |path| {
-            ply::write_gaussians(path, &gaussians(3, degree, labelled)).expect("written");
+            write_model(path, &gaussians(3, degree, labelled)).expect("written");
         })
     };
     let mut all: Vec<Vec<u8>> = (0..=3).map(|degree| model(degree, degree % 2 == 1)).collect();
