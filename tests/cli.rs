@@ -3,7 +3,7 @@
 use assert_cmd::Command;
 use clap::Parser;
 use labelgs::cli::command::{Cli, Command as Verb, command};
-use labelgs::io::ply::{read_gaussians, write_gaussians};
+use labelgs::io::model::{read_model, write_model};
 use labelgs::run::Settings;
 use labelgs::scene::Gaussians;
 use labelgs::train::config::Occlusion;
@@ -36,7 +36,7 @@ fn model(folder: &Path) -> PathBuf {
         labels: Some(vec![0, 1, 1, 3, 3, 3]),
         label_confidence: None,
     };
-    write_gaussians(&path, &gaussians).expect("written");
+    write_model(&path, &gaussians).expect("written");
     path
 }
 
@@ -267,7 +267,7 @@ fn extract_and_remove_write_the_two_parts() {
         assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
         let json: Value = serde_json::from_slice(&output.stdout).expect("JSON");
         assert_eq!((&json["gaussians"], &json["of"]), (&expected.len().into(), &6.into()));
-        assert_eq!(read_gaussians(&part).expect("PLY").gaussians.labels, Some(expected));
+        assert_eq!(read_model(&part).expect("PLY").gaussians.labels, Some(expected));
     }
     let before = std::fs::read(&part).expect("file");
     let output = labelgs(&["extract", model, "--labels", "2,3", "-o", out]);

@@ -5,7 +5,7 @@ use glam::DVec3;
 use labelgs::cli::scene::near_plane;
 use labelgs::io::label_table::{LabelEntry, LabelTable};
 use labelgs::io::mask::read_mask;
-use labelgs::io::ply::{read_gaussians, write_gaussians};
+use labelgs::io::model::{read_model, write_model};
 use labelgs::io::run_folder;
 use labelgs::scene::Gaussians;
 use labelgs::synth::{SynthOptions, ring_of_cameras};
@@ -47,11 +47,11 @@ fn balls(path: &Path, places: &[[f32; 3]], labels: &[u32]) {
         labels: Some(labels.to_vec()),
         label_confidence: None,
     };
-    write_gaussians(path, &gaussians).expect("written");
+    write_model(path, &gaussians).expect("written");
 }
 
 fn labels_of(path: &Path) -> Vec<u32> {
-    read_gaussians(path).expect("PLY").gaussians.labels.expect("labels")
+    read_model(path).expect("PLY").gaussians.labels.expect("labels")
 }
 
 /// A model with the labels 0, 1 cup, 1, 3 spoon, 3, 3, and its table.
@@ -100,7 +100,7 @@ fn names_choose_labels_and_go_with_them() {
     let args = ["recolour", text(&model), "--labels", "ladle", "--label-table", text(&other)];
     let result = succeeds(&[&args[..], &["--colour", "1,0,0", "-o", text(&out)]].concat());
     assert_eq!(result["recoloured"], 3);
-    let painted = read_gaussians(&out).expect("PLY").gaussians;
+    let painted = read_model(&out).expect("PLY").gaussians;
     assert!(painted.sh0[0] == [0.5; 3] && (painted.sh0[4][0] - 1.772_454).abs() < 1e-5, "{:?}", painted.sh0);
     assert_eq!(names(&beside), [(3, "ladle".to_owned())]);
 

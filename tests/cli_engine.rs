@@ -1,7 +1,7 @@
 //! The command line with a device: what it can do, what it plans, what it times, and a scene from synth to pictures.
 
 use assert_cmd::Command;
-use labelgs::io::ply::read_gaussians;
+use labelgs::io::model::read_model;
 use serde_json::Value;
 use std::path::Path;
 use std::process::Output;
@@ -317,12 +317,12 @@ fn from_a_scene_to_objects_and_pictures() {
     assert!(table.contains("no weights") && table.contains("mean of objects"), "{table}");
 
     succeeds(&["extract", &out, "--labels", "2", "-o", &object]);
-    let sure = read_gaussians(&object).expect("PLY").gaussians.label_confidence.expect("votes tell how sure they are");
+    let sure = read_model(&object).expect("PLY").gaussians.label_confidence.expect("votes tell how sure they are");
     assert!(sure.iter().all(|&share| share >= 0.6));
     succeeds(&["extract", &out, "--labels", "2", "--min-confidence", "0", "-o", &object]);
     succeeds(&["remove", &out, "--labels", "2", "-o", &rest]);
     let (object_model, rest_model) =
-        (read_gaussians(&object).expect("PLY").gaussians, read_gaussians(&rest).expect("PLY").gaussians);
+        (read_model(&object).expect("PLY").gaussians, read_model(&rest).expect("PLY").gaussians);
     assert_eq!(object_model.len() + rest_model.len(), trained["gaussians"].as_u64().expect("a number") as usize);
     assert!(object_model.labels.is_some_and(|labels| labels.iter().all(|&label| label == 2)));
     let unknown = labelgs(&["extract", &out, "--labels", "77", "-o", &object]);

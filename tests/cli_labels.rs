@@ -3,7 +3,7 @@
 use crate::support;
 use assert_cmd::Command;
 use labelgs::io::mask::read_mask;
-use labelgs::io::ply::read_gaussians;
+use labelgs::io::model::read_model;
 use serde_json::Value;
 use std::path::Path;
 
@@ -40,7 +40,7 @@ fn a_model_without_labels_gets_them_and_mends_masks() {
     let found =
         json(&labelgs(&["label", &plain, "--scene", &scene, "--masks", &masks, "-o", &model, "--json", "-q"], 0));
     assert_eq!(found["schema_version"], 1);
-    let read = read_gaussians(&model).expect("model").gaussians;
+    let read = read_model(&model).expect("model").gaussians;
     let confidence = read.label_confidence.expect("votes tell how sure they are");
     assert!(confidence.iter().all(|share| (0.0..=1.0).contains(share)));
     let labels: std::collections::BTreeSet<u32> = read.labels.expect("labels").into_iter().collect();
@@ -52,9 +52,9 @@ fn a_model_without_labels_gets_them_and_mends_masks() {
     let main = path("main.ply");
     let rule = ["label", &plain, "--scene", &scene, "--masks", &masks, "--rule", "main", "-o", &main, "-q"];
     labelgs(&rule, 0);
-    let of_rule = read_gaussians(&main).expect("model").gaussians.labels.expect("labels");
+    let of_rule = read_model(&main).expect("model").gaussians.labels.expect("labels");
     let count = |labels: &[u32]| labels.iter().filter(|&&label| label != 0).count();
-    let votes = read_gaussians(&model).expect("model").gaussians.labels.expect("labels");
+    let votes = read_model(&model).expect("model").gaussians.labels.expect("labels");
     assert!(count(&of_rule) < count(&votes) && count(&of_rule) > 0);
 
     // Ids of their own in every view, then made to agree again.

@@ -4,7 +4,7 @@
 
 use crate::support::device;
 use crate::support::runs::{Place, all_whole, copy, files, stderr, succeeded};
-use labelgs::io::ply::write_gaussians;
+use labelgs::io::model::write_model;
 use labelgs::scene::Gaussians;
 use std::collections::BTreeMap;
 use std::ffi::{OsStr, OsString};
@@ -135,7 +135,7 @@ fn a_computer_may_be_out_of_memory() {
         sh0: vec![[0.0; 3]; rows],
         ..Gaussians::default()
     };
-    write_gaussians(&model, &gaussians).expect("written");
+    write_model(&model, &gaussians).expect("written");
     let extract = |to: &str| ["extract", &model, "--labels", "0", "-o", to].map(str::to_owned);
     succeeded(&place.labelgs(&extract(&right).each_ref().map(String::as_str)));
     let (mut done, mut refused) = (0, 0);

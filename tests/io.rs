@@ -10,6 +10,7 @@ mod mask_check;
 mod mask_forms;
 mod mask_import;
 mod masks;
+mod model;
 mod output;
 mod photos;
 mod pipeline_file;

@@ -46,7 +46,7 @@ impl Context {
 /// Reads a model, or the last one in the folder of a run, and logs what a person should know about the file.
 pub fn open_model(path: &Path) -> Result<Gaussians> {
     let path = &if path.is_dir() { crate::run::models::latest_model(path)? } else { path.to_owned() };
-    let read = crate::io::ply::read_gaussians(path)?;
+    let read = crate::io::model::read_model(path)?;
     read.notes.iter().for_each(|note| tracing::warn!("{}: {note}", path.display()));
     Ok(read.gaussians)
 }

@@ -9,7 +9,7 @@ use super::values::{near, switch};
 use crate::edit::select::summarise;
 use crate::engine::Engine;
 use crate::io::label_table::LabelTable;
-use crate::io::ply::write_gaussians;
+use crate::io::model::write_model;
 use crate::label::vote::ballot::{Sweep, Voter, columns_for};
 use crate::label::vote::decide::{Decision, apply, count};
 use crate::label::vote::lift::{Lift, lift};
@@ -105,7 +105,7 @@ pub fn run(args: &LabelArgs, context: &Context) -> Result<()> {
     }
     drop(progress);
     let seconds = start.elapsed().as_secs_f64();
-    write_gaussians(&args.output, &model)?;
+    write_model(&args.output, &model)?;
     LabelTable::put(LabelTable::of_folder(&args.masks)?.as_ref(), &LabelTable::beside(&args.output))?;
     let rows = summarise(&model);
     if context.json || args.json.json {

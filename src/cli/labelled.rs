@@ -7,7 +7,7 @@ use super::values::share;
 use crate::edit::catalogue::Catalogue;
 use crate::edit::select::{MIN_LABEL_CONFIDENCE, extract};
 use crate::io::label_table::LabelTable;
-use crate::io::ply::write_gaussians;
+use crate::io::model::write_model;
 use crate::scene::Gaussians;
 use crate::{Error, Result};
 use clap::Args;
@@ -93,7 +93,7 @@ pub struct Edited<'a> {
 impl Edited<'_> {
     /// Writes model and table and prints what was written; `more` are further fields of the JSON.
     pub fn finish(&self, print_json: bool, more: serde_json::Value) -> Result<()> {
-        let left_out = write_gaussians(self.output, self.model)?;
+        let left_out = write_model(self.output, self.model)?;
         let beside = LabelTable::beside(self.output);
         LabelTable::put(self.table.as_ref(), &beside)?;
         let written = self.model.len() as u64 - left_out;

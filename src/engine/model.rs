@@ -11,6 +11,7 @@ const BANDS: [(Buf, usize, usize, usize); 3] = [(Buf::SH1, 3, 0, 3), (Buf::SH2, 
 
 /// Writes the planes; optimiser state becomes 0.
 pub fn upload(sched: &mut Scheduler, model: &Gaussians, labels: bool) -> Result<()> {
+    model.check()?;
     let with = |rows: &[[f32; 3]], last: &dyn Fn(usize) -> f32| -> Vec<[f32; 4]> {
         rows.iter().enumerate().map(|(i, &[x, y, z])| [x, y, z, last(i)]).collect()
     };

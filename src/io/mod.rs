@@ -1,6 +1,6 @@
 //! Files to scenes and back.
 //!
-//! [`open`] reads a captured scene, [`ply`] the model, [`image`] and [`mask`] pixels, [`camera_json`] single cameras;
+//! [`open`] reads a captured scene, [`model`] a model, [`image`] and [`mask`] pixels, [`camera_json`] single cameras;
 //! [`masks`] imports and checks whole folders of masks;
 //! [`init`] makes the first Gaussians of a scene. All output goes through [`atomic`].
 
@@ -22,6 +22,7 @@ mod listing;
 mod load;
 pub mod mask;
 pub mod masks;
+pub mod model;
 pub mod occlusion_table;
 pub mod pipeline_file;
 pub mod ply;

@@ -1,8 +1,9 @@
 //! Files of a run: the model, the cameras, the previews. Each is written whole or not at all.
 
 use crate::error::{Error, Result};
+use crate::io::model::write_model;
 use crate::io::read;
-use crate::io::{camera_json, image, ply};
+use crate::io::{camera_json, image};
 use crate::render::Rendered;
 use crate::scene::labels::label_colour;
 use crate::scene::{Camera, Gaussians, Photo};
@@ -56,7 +57,7 @@ impl Models {
     /// Writes the model of a step.
     pub fn save(&mut self, step: u32, model: &Gaussians) -> Result<PathBuf> {
         let path = model_path(&self.out, step);
-        let left_out = ply::write_gaussians(&path, model)?;
+        let left_out = write_model(&path, model)?;
         if left_out > 0 {
             tracing::warn!("{}: {left_out} Gaussians are not finite and were left out", path.display());
         }

@@ -1,5 +1,6 @@
 //! Host copy of the model: a structure of arrays, one row per Gaussian.
 
+use crate::error::{Error, Result};
 use glam::DVec3;
 
 /// Zeroth spherical-harmonics basis constant, 1 / (2 sqrt(pi)).
@@ -50,6 +51,34 @@ impl Gaussians {
     /// Coefficients per Gaussian and channel above degree 0: 0, 3, 8 or 15.
     pub fn rest_per_gaussian(&self) -> usize {
         ((self.sh_degree + 1) * (self.sh_degree + 1) - 1) as usize
+    }
+
+    /// An error unless all columns have a row for each Gaussian, as what reads them expects.
+    pub fn check(&self) -> Result<()> {
+        let (count, rest) = (self.len(), self.len() * self.rest_per_gaussian());
+        let columns = [
+            ("quats", self.quats.len(), count),
+            ("scales", self.scales.len(), count),
+            ("opacities", self.opacities.len(), count),
+            ("sh0", self.sh0.len(), count),
+            ("sh_rest", self.sh_rest.len(), rest),
+            ("labels", self.labels.as_ref().map_or(count, Vec::len), count),
+            ("label_confidence", self.label_confidence.as_ref().map_or(count, Vec::len), count),
+        ];
+        let Some((name, has, needs)) = columns.into_iter().find(|&(_, has, needs)| has != needs) else {
+            return Ok(());
+        };
+        let problem = format!("{has} rows of {count} Gaussians of SH degree {}; expected {needs}", self.sh_degree);
+        Err(Error::usage(format!("Gaussians::{name}"), problem))
+    }
+
+    /// True if no value of a row is infinite or NaN.
+    pub fn is_finite(&self, row: usize) -> bool {
+        let rest = self.rest_per_gaussian();
+        let triples = [self.means[row], self.scales[row], self.sh0[row]];
+        triples.iter().chain(&self.sh_rest[row * rest..(row + 1) * rest]).all(|t| t.iter().all(|v| v.is_finite()))
+            && self.quats[row].iter().all(|v| v.is_finite())
+            && self.opacities[row].is_finite()
     }
 
     /// Keeps the rows for which `keep` holds, in order.

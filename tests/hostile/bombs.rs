@@ -10,7 +10,8 @@ use labelgs::Result;
 use labelgs::io::depth::DepthFolder;
 use labelgs::io::image::{photo_size, read_photo};
 use labelgs::io::mask::read_mask;
-use labelgs::io::ply::{read_gaussians, read_points};
+use labelgs::io::model::read_model;
+use labelgs::io::ply::read_points;
 use labelgs::io::{self, LoadOptions};
 use labelgs::scene::DepthMap;
 use std::path::Path;
@@ -150,11 +151,11 @@ fn a_ply_header_ends_within_64_kib() {
     let scene = Scene::new();
     let endless = format!("ply\nformat ascii 1.0\n{}", "comment x\n".repeat(1 << 20));
     let path = scene.write("endless.ply", &endless);
-    for text in [refused(|| read_gaussians(&path)), refused(|| read_points(&path).map(|_| ()))] {
+    for text in [refused(|| read_model(&path)), refused(|| read_points(&path).map(|_| ()))] {
         assert!(text.contains("no `end_header` line within the first 65536 bytes"), "{text}");
     }
     let one_line = scene.write("line.ply", format!("ply\ncomment {}", "x".repeat(100 << 20)));
-    refused(|| read_gaussians(&one_line));
+    refused(|| read_model(&one_line));
 }
 
 #[test]
@@ -164,11 +165,11 @@ fn a_ply_promises_more_than_there_is() {
     let at = whole.windows(8).position(|part| part == b"vertex 3").expect("the element");
     for count in ["1152921504606846976", "18446744073709551615", "4294967295", "-1", "3.5", "NaN", "1e9", "4"] {
         let bytes = [&whole[..at + 7], count.as_bytes(), &whole[at + 8..]].concat();
-        let text = refused(|| read_gaussians(scene.write("a.ply", &bytes)));
+        let text = refused(|| read_model(scene.write("a.ply", &bytes)));
         assert!(text.contains("a.ply: header"), "{text}");
     }
     let none = [&whole[..at + 7], b"0", &whole[at + 8..]].concat();
-    let read = read_gaussians(scene.write("none.ply", none)).expect("no Gaussians and bytes behind them");
+    let read = read_model(scene.write("none.ply", none)).expect("no Gaussians and bytes behind them");
     assert!(read.gaussians.is_empty() && read.notes[0].contains("bytes after the last"), "{:?}", read.notes);
 }
 

@@ -3,7 +3,7 @@
 use crate::io::fixtures::{ColmapCamera, Scene, images_bin, pinhole, refusal, simple};
 use labelgs::io::image::{photo_size, read_photo, write_png_grey16};
 use labelgs::io::mask::read_mask;
-use labelgs::io::ply::{read_gaussians, write_gaussians};
+use labelgs::io::model::{read_model, write_model};
 use labelgs::io::{self, LoadOptions};
 use labelgs::scene::{Dataset, Gaussians};
 
@@ -175,8 +175,8 @@ fn a_bad_row_takes_all_of_its_attributes_along() {
                 let mut bytes = clean.clone();
                 poison(&mut bytes, rest, bad);
                 let path = scene.at("a.ply");
-                assert_eq!(write_gaussians(&path, &bytes).expect("written"), 1, "{what}");
-                let read = read_gaussians(&path).expect("read");
+                assert_eq!(write_model(&path, &bytes).expect("written"), 1, "{what}");
+                let read = read_model(&path).expect("read");
                 assert_eq!(read.gaussians, clean.filtered(|row| row != 4), "{what} {bad}, degree {degree}");
             }
         }
@@ -189,13 +189,13 @@ fn values_that_were_activated_twice_are_pointed_out() {
     let scene = Scene::new();
     let path = scene.at("a.ply");
     let raw = model(20, 0);
-    write_gaussians(&path, &raw).expect("written");
-    assert_eq!(read_gaussians(&path).expect("read").notes, Vec::<String>::new());
+    write_model(&path, &raw).expect("written");
+    assert_eq!(read_model(&path).expect("read").notes, Vec::<String>::new());
     let mut activated = raw.clone();
     activated.opacities.iter_mut().for_each(|value| *value = 1.0 / (1.0 + (-*value).exp()));
     activated.scales.iter_mut().flatten().for_each(|value| *value = value.exp());
-    write_gaussians(&path, &activated).expect("written");
-    let read = read_gaussians(&path).expect("read");
+    write_model(&path, &activated).expect("written");
+    let read = read_model(&path).expect("read");
     assert!(read.notes.len() == 1 && read.notes[0].contains("after their sigmoid and exponential"), "{:?}", read.notes);
     // Sizes whose squares no f32 holds are left out, whatever made them.
     let mut huge = raw.clone();
@@ -203,8 +203,8 @@ fn values_that_were_activated_twice_are_pointed_out() {
     huge.scales[5] = [0.0, 1e30, 0.0];
     huge.opacities[6] = 1e30;
     huge.opacities[7] = -1e30;
-    write_gaussians(&path, &huge).expect("written");
-    let read = read_gaussians(&path).expect("read");
+    write_model(&path, &huge).expect("written");
+    let read = read_model(&path).expect("read");
     assert_eq!((read.dropped, read.gaussians.len()), (2, 18));
     assert!(read.notes[0].contains("2 with an infinite size"), "{:?}", read.notes);
 }

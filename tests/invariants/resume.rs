@@ -7,7 +7,7 @@ use labelgs::Result;
 use labelgs::engine::Engine;
 use labelgs::io::checkpoint::Plane;
 use labelgs::io::init::initial_gaussians;
-use labelgs::io::ply::write_gaussians;
+use labelgs::io::model::write_model;
 use labelgs::scene::Dataset;
 use labelgs::scheduler::SchedulerOptions;
 use labelgs::train::{LabelRule, StepReport, TrainConfig, TrainState, Trainer};
@@ -41,7 +41,7 @@ fn go_on(trainer: &mut Trainer, stops: &[u32], folder: &Path) -> (Vec<u8>, Vec<u
     }
     losses.extend(bits(trainer.drain().expect("the last steps")));
     let path = folder.join("model.ply");
-    write_gaussians(&path, &trainer.labelled_model().expect("a model")).expect("a PLY");
+    write_model(&path, &trainer.labelled_model().expect("a model")).expect("a PLY");
     (std::fs::read(path).expect("the PLY"), losses)
 }
 

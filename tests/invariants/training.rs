@@ -5,7 +5,7 @@ use crate::support::device;
 use crate::support::device::Turn;
 use labelgs::engine::Engine;
 use labelgs::io::init::initial_gaussians;
-use labelgs::io::ply::write_gaussians;
+use labelgs::io::model::write_model;
 use labelgs::scene::Dataset;
 use labelgs::scheduler::SchedulerOptions;
 use labelgs::scheduler::plan::{Capacity, PlanOptions};
@@ -76,7 +76,7 @@ pub fn train(turn: &Turn, rule: LabelRule, options: SchedulerOptions, change: im
     let model = trainer.labelled_model().expect("a model");
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("model.ply");
-    write_gaussians(&path, &model).expect("a PLY");
+    write_model(&path, &model).expect("a PLY");
     let instances = trainer.engine_mut().sched().capacity().instances;
     Outcome {
         instances,
@@ -164,6 +164,6 @@ pub fn labels_of(ply: &[u8]) -> usize {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("model.ply");
     std::fs::write(&path, ply).expect("a file");
-    let read = labelgs::io::ply::read_gaussians(&path).expect("a PLY");
+    let read = labelgs::io::model::read_model(&path).expect("a PLY");
     read.gaussians.labels.map_or(0, |labels| labels.iter().filter(|&&label| label != 0).count())
 }

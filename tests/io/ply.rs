@@ -1,7 +1,8 @@
 //! Gaussians and points as PLY: round trips, foreign layouts, hostile files.
 
 use super::fixtures::*;
-use labelgs::io::ply::{read_gaussians, read_points, write_gaussians};
+use labelgs::io::model::{read_model, write_model};
+use labelgs::io::ply::read_points;
 use labelgs::scene::Gaussians;
 use std::fs;
 
@@ -33,8 +34,8 @@ fn what_is_written_is_read() {
         for labelled in [false, true] {
             for count in [0, 1, 13] {
                 let written = gaussians(count, degree, labelled);
-                assert_eq!(write_gaussians(scene.at("a.ply"), &written).expect("written"), 0);
-                let read = read_gaussians(scene.at("a.ply")).expect("read");
+                assert_eq!(write_model(scene.at("a.ply"), &written).expect("written"), 0);
+                let read = read_model(scene.at("a.ply")).expect("read");
                 assert_eq!((read.gaussians, read.dropped, read.notes.len()), (written, 0, 0));
             }
         }
@@ -45,7 +46,7 @@ fn what_is_written_is_read() {
 fn the_layout_is_the_standard_one() {
     let scene = Scene::new();
     let g = gaussians(1, 1, true);
-    write_gaussians(scene.at("a.ply"), &g).expect("written");
+    write_model(scene.at("a.ply"), &g).expect("written");
     let bytes = fs::read(scene.at("a.ply")).expect("bytes");
     let names = "x y z nx ny nz f_dc_0 f_dc_1 f_dc_2 f_rest_0 f_rest_1 f_rest_2 f_rest_3 f_rest_4 f_rest_5 f_rest_6 \
                  f_rest_7 f_rest_8 opacity scale_0 scale_1 scale_2 rot_0 rot_1 rot_2 rot_3";
@@ -126,7 +127,7 @@ fn columns_are_found_by_name_in_any_type_and_byte_order() {
         ("binary_big_endian", "\n"),
         ("binary_little_endian", "\r\n"),
     ] {
-        let read = read_gaussians(scene.write("a.ply", foreign(format, line_end))).expect("read");
+        let read = read_model(scene.write("a.ply", foreign(format, line_end))).expect("read");
         let expected = Gaussians {
             means: vec![[-7.0, 300.0, 2.5]],
             quats: vec![[0.1, 0.2, 0.3, 0.4]],
@@ -150,8 +151,8 @@ fn unusable_rows_are_dropped_and_counted() {
         poisoned.quats[3] = [0.0; 4];
         poisoned.scales[4][1] = 90.0;
         // The writer leaves out what is not finite, the reader the rest.
-        assert_eq!(write_gaussians(scene.at("a.ply"), &poisoned).expect("written"), 1);
-        let read = read_gaussians(scene.at("a.ply")).expect("read");
+        assert_eq!(write_model(scene.at("a.ply"), &poisoned).expect("written"), 1);
+        let read = read_model(scene.at("a.ply")).expect("read");
         assert_eq!(read.gaussians, clean.filtered(|row| ![1, 3, 4].contains(&row)));
         assert_eq!(read.dropped, 2);
         assert!(
@@ -162,11 +163,11 @@ fn unusable_rows_are_dropped_and_counted() {
     }
     let text = String::from_utf8(foreign("ascii", "\n")).expect("text");
     for bad in ["NaN", "inf", "-inf", "1e300"] {
-        let read = read_gaussians(scene.write("b.ply", text.replace(" 2.5 ", &format!(" {bad} ")))).expect("read");
+        let read = read_model(scene.write("b.ply", text.replace(" 2.5 ", &format!(" {bad} ")))).expect("read");
         assert_eq!((read.gaussians.len(), read.dropped), (0, 1));
     }
     let tiny = text.replace("0.4 0.3 0.2 0.1", "0 0 1e-30 1e-30");
-    let quat = read_gaussians(scene.write("c.ply", tiny)).expect("read").gaussians.quats[0];
+    let quat = read_model(scene.write("c.ply", tiny)).expect("read").gaussians.quats[0];
     assert!((quat[0] - 0.5f32.sqrt()).abs() < 1e-6 && quat[0] == quat[1]);
 }
 
@@ -176,12 +177,12 @@ fn labels_of_any_type_are_whole_numbers_up_to_65535() {
     let text = String::from_utf8(foreign("ascii", "\n")).expect("text");
     for kind in ["uchar", "int", "uint", "float", "double"] {
         let typed = text.replace("property ushort label", &format!("property {kind} label"));
-        let read = read_gaussians(scene.write("a.ply", typed.replace("65535", "7"))).expect("read");
+        let read = read_model(scene.write("a.ply", typed.replace("65535", "7"))).expect("read");
         assert_eq!(read.gaussians.labels, Some(vec![7]));
     }
     let typed = text.replace("property ushort label", "property double label");
     for bad in ["65536", "-1", "1.5", "nan", "1e99"] {
-        let error = refusal(read_gaussians(scene.write("a.ply", typed.replace("65535", bad))));
+        let error = refusal(read_model(scene.write("a.ply", typed.replace("65535", bad))));
         assert!(error.contains("vertex 0") && error.contains("65535"), "{error}");
     }
 }
@@ -190,7 +191,7 @@ fn labels_of_any_type_are_whole_numbers_up_to_65535() {
 fn hostile_headers_are_refused_quickly() {
     let scene = Scene::new();
     let good = String::from_utf8(foreign("ascii", "\n")).expect("text");
-    let refuse = |text: String| refusal(read_gaussians(scene.write("a.ply", text)));
+    let refuse = |text: String| refusal(read_model(scene.write("a.ply", text)));
     for count in ["-1", "18446744073709551616", "x"] {
         refuse(good.replace("vertex 1\n", &format!("vertex {count}\n")));
     }
@@ -199,7 +200,7 @@ fn hostile_headers_are_refused_quickly() {
         let mut binary = foreign("binary_little_endian", "\n");
         let at = binary.windows(9).position(|w| w == b"vertex 1\n").expect("the element");
         binary.splice(at..at + 9, format!("vertex {count}\n").into_bytes());
-        assert!(refusal(read_gaussians(scene.write("b.ply", &binary))).contains(&count.to_string()));
+        assert!(refusal(read_model(scene.write("b.ply", &binary))).contains(&count.to_string()));
     }
     refuse(good.replace("camera 2\n", "camera 18446744073709551615\n"));
     assert!(refuse(format!("ply\ncomment {}\n", "x".repeat(1 << 20))).contains("65536"));
@@ -215,7 +216,7 @@ fn hostile_headers_are_refused_quickly() {
     assert!(refuse("solid stl".into()).contains("ply"));
     assert!(refuse(String::new()).contains("ply"));
     assert!(refuse("ply\nend_header\n".into()).contains("header"));
-    refusal(read_gaussians(scene.path().join("absent.ply")));
+    refusal(read_model(scene.path().join("absent.ply")));
 }
 
 #[test]
@@ -226,12 +227,12 @@ fn a_file_cut_anywhere_is_refused() {
         // An ascii file may lose its last line end; losing a digit more cannot be told from another number.
         let last = if format == "ascii" { whole.len() - 3 } else { whole.len() };
         (0..last).for_each(|length| {
-            refusal(read_gaussians(scene.write("a.ply", &whole[..length])));
+            refusal(read_model(scene.write("a.ply", &whole[..length])));
         });
     }
     let mut longer = foreign("binary_little_endian", "\n");
     longer.extend([0; 5]);
-    assert!(read_gaussians(scene.write("a.ply", longer)).expect("read").notes[0].contains("5 bytes"));
+    assert!(read_model(scene.write("a.ply", longer)).expect("read").notes[0].contains("5 bytes"));
 }
 
 #[test]
@@ -256,6 +257,6 @@ fn points_have_colours_of_either_kind_or_none() {
     assert_eq!(read("float", "0 0 0 0.5 0 200\n").expect("points")[0].colour, [1, 0, 200]);
     assert_eq!(read("", "0 0 0\n").expect("points")[0].colour, [128; 3]);
     refusal(read("float", "0 0 0 nan 0 200\n"));
-    let points_as_gaussians = refusal(read_gaussians(scene.path().join("p.ply")));
+    let points_as_gaussians = refusal(read_model(scene.path().join("p.ply")));
     assert!(points_as_gaussians.contains("points"), "{points_as_gaussians}");
 }

@@ -4,7 +4,7 @@ use super::{Columns, columns_file, layout, message, run_on};
 use assert_cmd::Command;
 use labelgs::eval::protocol::{By, Protocol};
 use labelgs::io::label_table::{LabelEntry, LabelTable};
-use labelgs::io::ply::write_gaussians;
+use labelgs::io::model::write_model;
 use labelgs::scene::Gaussians;
 use std::path::Path;
 use tempfile::tempdir;
@@ -66,7 +66,7 @@ fn the_command_line_refuses_before_a_device_is_needed() {
         labels: Some(vec![3]),
         label_confidence: None,
     };
-    write_gaussians(Path::new(&model), &gaussians).expect("written");
+    write_model(Path::new(&model), &gaussians).expect("written");
     let with = |more: &[&str]| eval(&[&[&model[..], "--scene", &scene, "--truth", &truth], more].concat());
     let says = |more: &[&str], status: i32, expected: &str| {
         let (found, text) = with(more);

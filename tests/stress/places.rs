@@ -4,7 +4,7 @@ use crate::support::device;
 use glam::DVec3;
 use labelgs::engine::{Engine, EngineSize};
 use labelgs::io::init::initial_gaussians;
-use labelgs::io::ply::{read_gaussians, write_gaussians};
+use labelgs::io::model::{read_model, write_model};
 use labelgs::render::render;
 use labelgs::scene::{Dataset, Gaussians, View};
 use labelgs::scheduler::SchedulerOptions;
@@ -114,10 +114,10 @@ fn far_models_are_saved_without_loss() {
     let (before, near, model) = train(&turn.gpu(), scene(1.0, UTM));
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("far.ply");
-    write_gaussians(&path, &model).expect("written");
+    write_model(&path, &model).expect("written");
     let header = String::from_utf8_lossy(&std::fs::read(&path).expect("read")[..400]).into_owned();
     assert!(header.contains("property double x") && header.contains("property float nx"), "{header}");
-    let read = read_gaussians(&path).expect("read").gaussians;
+    let read = read_model(&path).expect("read").gaussians;
     assert!(read.origin.distance(UTM) < 100.0, "{}", read.origin);
     for row in 0..model.len() {
         let moved = read.world(row).distance(model.world(row));
@@ -145,12 +145,12 @@ fn near_models_have_floats() {
         .iter_mut()
         .for_each(|mean| *mean = (model.origin + DVec3::from_array(mean.map(f64::from))).as_vec3().to_array());
     model.origin = DVec3::ZERO;
-    write_gaussians(&path, &model).expect("written");
-    let read = read_gaussians(&path).expect("read").gaussians;
+    write_model(&path, &model).expect("written");
+    let read = read_model(&path).expect("read").gaussians;
     assert_ne!(read.origin, DVec3::ZERO, "it is far from the origin for its size");
-    write_gaussians(&path, &read).expect("written");
+    write_model(&path, &read).expect("written");
     let bytes = std::fs::read(&path).expect("read");
     assert!(String::from_utf8_lossy(&bytes[..200]).contains("property float x"));
-    let again = read_gaussians(&path).expect("read").gaussians;
+    let again = read_model(&path).expect("read").gaussians;
     (0..model.len()).for_each(|row| assert_eq!(again.world(row), model.world(row)));
 }

@@ -2,7 +2,7 @@
 
 use assert_cmd::Command;
 use labelgs::io::checkpoint_folder::{self, Found};
-use labelgs::io::ply::read_gaussians;
+use labelgs::io::model::read_model;
 use labelgs::train::TrainState;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -153,7 +153,7 @@ pub fn all_whole(out: &Path) {
         let read = || std::fs::read_to_string(&path).expect("text");
         let whole = match path.extension().and_then(|extension| extension.to_str()) {
             Some("ckpt") => TrainState::read(&path).map(drop).map_err(|error| error.to_string()),
-            Some("ply") => read_gaussians(&path).map(drop).map_err(|error| error.to_string()),
+            Some("ply") => read_model(&path).map(drop).map_err(|error| error.to_string()),
             Some("json") => serde_json::from_str::<serde_json::Value>(&read()).map(drop).map_err(|e| e.to_string()),
             Some("toml") => toml::from_str::<toml::Table>(&read()).map(drop).map_err(|error| error.to_string()),
             Some("png") => image::open(&path).map(drop).map_err(|error| error.to_string()),

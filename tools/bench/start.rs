@@ -5,7 +5,7 @@ use super::measure::write_json;
 use super::{Common, memory};
 use labelgs::io::atomic;
 use labelgs::io::camera_json::CameraFile;
-use labelgs::io::ply::write_gaussians;
+use labelgs::io::model::write_model;
 use labelgs::{Error, Result};
 use serde_json::json;
 use std::path::Path;
@@ -18,7 +18,7 @@ pub fn run(common: &Common) -> Result<()> {
     let folder = tempfile::tempdir().map_err(|error| Error::Bug(format!("no temporary folder: {error}")))?;
     let (dataset, model) = memory::scene(count, width, height);
     let ply = folder.path().join("model.ply");
-    write_gaussians(&ply, &model)?;
+    write_model(&ply, &model)?;
     let camera = folder.path().join("camera.json");
     let first = dataset.train.first().map(|view| &view.camera);
     let first = first.ok_or_else(|| Error::Bug("the scene has no view".to_owned()))?;

@@ -10,7 +10,7 @@ use labelgs::io::frames::Frames;
 use labelgs::io::label_table::LabelTable;
 use labelgs::io::masks::{Format, ImportOptions, import};
 use labelgs::io::occlusion_table::OcclusionTable;
-use labelgs::io::{self, LoadOptions, camera_json, image, mask, ply};
+use labelgs::io::{self, LoadOptions, camera_json, image, mask, model, ply};
 use labelgs::scene::{Camera, Dataset, Gaussians, Photo};
 use std::path::Path;
 
@@ -90,11 +90,11 @@ pub fn sound_model(model: &Gaussians) {
 
 /// A model; what was read comes back when it is written and read again.
 pub fn ply_model(folder: &Path, file: &Path) -> Result<()> {
-    let read = ply::read_gaussians(file)?;
+    let read = model::read_model(file)?;
     sound_model(&read.gaussians);
     let again = folder.join("again.ply");
-    assert_eq!(ply::write_gaussians(&again, &read.gaussians).expect("written"), 0);
-    assert_eq!(ply::read_gaussians(&again).expect("what was written").gaussians, read.gaussians);
+    assert_eq!(model::write_model(&again, &read.gaussians).expect("written"), 0);
+    assert_eq!(model::read_model(&again).expect("what was written").gaussians, read.gaussians);
     Ok(())
 }
 

@@ -1,9 +1,10 @@
 //! Small valid files of every kind, made by the program's own writers where it has one.
 
 use labelgs::gpu::PipelineStore;
+use labelgs::io::image as pixels;
 use labelgs::io::label_table::{LabelEntry, LabelTable};
+use labelgs::io::model::write_model;
 use labelgs::io::pipeline_file::PipelineFolder;
-use labelgs::io::{image as pixels, ply};
 use labelgs::run::Settings;
 use labelgs::scene::Gaussians;
 use std::io::Cursor;
@@ -158,7 +159,7 @@ fn gaussians(count: usize, degree: u32, labelled: bool) -> Gaussians {
 pub fn ply_model() -> Vec<Vec<u8>> {
     let model = |degree, labelled| {
         written("a.ply", |path| {
-            ply::write_gaussians(path, &gaussians(3, degree, labelled)).expect("written");
+            write_model(path, &gaussians(3, degree, labelled)).expect("written");
         })
     };
     let mut all: Vec<Vec<u8>> = (0..=3).map(|degree| model(degree, degree % 2 == 1)).collect();

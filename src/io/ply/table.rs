@@ -13,7 +13,7 @@ const HEADER_MAX: u64 = 64 * 1024;
 const LINE_MAX: u64 = 64 * 1024;
 
 /// An open PLY file, its header understood and its `vertex` rows not yet read.
-pub(super) struct Table {
+pub(in crate::io) struct Table {
     path: PathBuf,
     file: BufReader<Source>,
     encoding: Encoding,
@@ -65,7 +65,7 @@ fn decode(scalar: &ScalarType, bytes: &[u8], big_endian: bool) -> f64 {
 
 impl Table {
     /// Opens `path` and reads its header.
-    pub(super) fn open(path: &Path) -> Result<Self> {
+    pub(in crate::io) fn open(path: &Path) -> Result<Self> {
         let mut file = read::open(path)?;
         let file_bytes = file.get_ref().length().map_err(Error::read(path))?;
         let text = header_bytes(path, &mut file)?;
@@ -99,12 +99,12 @@ impl Table {
     }
 
     /// Names of the vertex properties in the order of the file.
-    pub(super) fn names(&self) -> impl Iterator<Item = &str> {
+    pub(in crate::io) fn names(&self) -> impl Iterator<Item = &str> {
         self.vertex.properties.iter().map(|(_, property)| property.name.as_str())
     }
 
     /// True if the property exists and is `float` or `double`.
-    pub(super) fn is_float(&self, name: &str) -> bool {
+    pub(in crate::io) fn is_float(&self, name: &str) -> bool {
         self.vertex
             .properties
             .get(name)
@@ -112,7 +112,7 @@ impl Table {
     }
 
     /// Calls `row` with the values of `columns` for each vertex, as f64, in order.
-    pub(super) fn for_each(
+    pub(in crate::io) fn for_each(
         mut self,
         columns: &[&str],
         mut row: impl FnMut(u64, &[f64]) -> Result<()>,
@@ -219,9 +219,9 @@ impl Table {
 }
 
 /// What was odd about the rows.
-pub(super) struct Notes {
+pub(in crate::io) struct Notes {
     /// Bytes after the last declared element.
-    pub(super) extra_bytes: u64,
+    pub(in crate::io) extra_bytes: u64,
 }
 
 /// Reads up to and with the `end_header` line, at most [`HEADER_MAX`] bytes.

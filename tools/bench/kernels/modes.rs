@@ -108,7 +108,7 @@ impl Mode {
 
     /// The list of the mode, from that of the default. Every kernel of the mode must be in it.
     pub fn list(&self, default: &PassList, kernels: &Replacements) -> Result<PassList> {
-        let mut list = PassList { name: self.name.to_owned(), work: default.work.clone() };
+        let mut list = PassList { name: self.name.to_owned(), ..default.clone() };
         let mut put = 0;
         for work in &mut list.work {
             if let Work::Pass(pass) = work

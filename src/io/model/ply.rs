@@ -1,9 +1,9 @@
 //! The standard 3DGS PLY, with `property uint label` as its last column where the scene has labels, and before it
 //! `property float label_confidence` where votes were counted.
 
-use super::table::Table;
+use super::format::{ModelFormat, ReadModel};
 use crate::error::{Error, Result};
-use crate::io::atomic;
+use crate::io::ply::Table;
 use crate::scene::Gaussians;
 use crate::scene::labels::LABEL_MAX;
 use crate::scene::origin::far_origin;
@@ -24,30 +24,21 @@ const LOG_SCALE_MAX: f32 = 44.0;
 /// Gaussians from which on chance does not make all values look activated.
 const ACTIVATED_MIN: usize = 16;
 
-/// A scene read from a PLY.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct ReadPly {
-    /// The usable rows.
-    pub gaussians: Gaussians,
-    /// Rows left out because a value was not finite, a rotation zero or a size beyond f32.
-    pub dropped: u64,
-    /// What a person should know about the file, a line each.
-    pub notes: Vec<String>,
-}
+/// What the viewers of 3DGS read.
+pub(super) const FORMAT: ModelFormat = ModelFormat { name: "PLY", endings: &[".ply"], read, write };
 
 /// Reads a 3DGS PLY: little-endian, big-endian or ascii, columns by name in any order and of any scalar type, SH
 /// degree by the number of `f_rest_*` (0, 9, 24 or 45, channel-major), `label` if there is one. Other columns are
 /// ignored. Rows with values that cannot be rendered are dropped and counted; a label that is no whole number from
 /// 0 to 65535 is an error.
-pub fn read_gaussians(path: impl AsRef<Path>) -> Result<ReadPly> {
-    let path = path.as_ref();
+fn read(path: &Path) -> Result<ReadModel> {
     let table = Table::open(path)?;
     let sh_degree = sh_degree(path, &table)?;
     if table.names().any(|name| name == "red") && !table.names().any(|name| name == "f_dc_0") {
         let problem = "holds coloured points, not Gaussians: it has `red` and no `f_dc_0`; train on them first";
         return Err(Error::data(path, "header", problem));
     }
-    let mut read = ReadPly::default();
+    let mut read = ReadModel::default();
     read.gaussians.sh_degree = sh_degree;
     let rest = read.gaussians.rest_per_gaussian();
     let rest_names: Vec<String> = (0..rest * 3).map(|index| format!("f_rest_{index}")).collect();
@@ -207,37 +198,17 @@ fn rotation(quat: [f64; 4]) -> Option<[f32; 4]> {
 
 /// Writes the standard 3DGS PLY (little-endian, no comments, normals zero), with `label` as last column only if
 /// the scene has labels, and `label_confidence` before it only if that is known. Positions are world positions, as
-/// doubles where floats would round them, which is only far from the origin. Rows that are not finite are left out;
-/// returns how many. The file appears complete or not at all.
-pub fn write_gaussians(path: impl AsRef<Path>, gaussians: &Gaussians) -> Result<u64> {
-    let (count, rest) = (gaussians.len(), gaussians.rest_per_gaussian());
-    let lengths = [gaussians.quats.len(), gaussians.scales.len(), gaussians.opacities.len(), gaussians.sh0.len()];
-    let labels_fit = gaussians.labels.as_ref().is_none_or(|labels| labels.len() == count)
-        && gaussians.label_confidence.as_ref().is_none_or(|shares| shares.len() == count);
-    if lengths.iter().any(|&n| n != count) || gaussians.sh_rest.len() != count * rest || !labels_fit {
-        return Err(Error::Bug(format!("the columns of {count} Gaussians differ in length")));
-    }
-    let finite: Vec<usize> = (0..count).filter(|&row| is_finite(gaussians, row)).collect();
+/// doubles where floats would round them, which is only far from the origin.
+fn write(out: &mut dyn Write, gaussians: &Gaussians, rows: &[usize]) -> io::Result<()> {
+    let rest = gaussians.rest_per_gaussian();
     let wide = gaussians.origin != DVec3::ZERO
-        && finite.iter().any(|&row| gaussians.world(row) != gaussians.world(row).as_vec3().as_dvec3());
-    let header = header(finite.len(), rest * 3, gaussians, wide);
-    atomic::write(path, |out| {
-        // The header goes through a buffer because the crate wants a sized writer.
-        let mut text = Vec::new();
-        Writer::<DefaultElement>::new().write_header(&mut text, &header)?;
-        out.write_all(&text)?;
-        let mut bytes = Vec::with_capacity((18 + rest * 3) * 4);
-        finite.iter().try_for_each(|&row| write_row(out, &mut bytes, gaussians, row, wide))
-    })?;
-    Ok((count - finite.len()) as u64)
-}
-
-fn is_finite(g: &Gaussians, row: usize) -> bool {
-    let rest = g.rest_per_gaussian();
-    let triples = [g.means[row], g.scales[row], g.sh0[row]];
-    triples.iter().chain(&g.sh_rest[row * rest..(row + 1) * rest]).all(|t| t.iter().all(|v| v.is_finite()))
-        && g.quats[row].iter().all(|v| v.is_finite())
-        && g.opacities[row].is_finite()
+        && rows.iter().any(|&row| gaussians.world(row) != gaussians.world(row).as_vec3().as_dvec3());
+    // The header goes through a buffer because the crate wants a sized writer.
+    let mut text = Vec::new();
+    Writer::<DefaultElement>::new().write_header(&mut text, &header(rows.len(), rest * 3, gaussians, wide))?;
+    out.write_all(&text)?;
+    let mut bytes = Vec::with_capacity((18 + rest * 3) * 4);
+    rows.iter().try_for_each(|&row| write_row(out, &mut bytes, gaussians, row, wide))
 }
 
 fn header(count: usize, rest: usize, gaussians: &Gaussians, wide: bool) -> Header {

@@ -1,0 +1,111 @@
+//! Models by the ending of their files, and a format that a program adds.
+
+use super::fixtures::*;
+use labelgs::cli::context::open_model;
+use labelgs::io::model::{ModelFormat, ReadModel, read_model, register, write_model};
+use labelgs::scene::Gaussians;
+use labelgs::{Error, Result};
+use std::io::{self, Write};
+use std::path::Path;
+
+/// A Gaussian of SH degree 0 a line: place, size, colour, opacity; all are round.
+const BALLS: ModelFormat = ModelFormat { name: "balls", endings: &[".balls", ".balls.txt"], read: read_balls, write };
+
+fn read_balls(path: &Path) -> Result<ReadModel> {
+    let mut read = ReadModel::default();
+    for (line, text) in labelgs::io::read::text(path)?.lines().enumerate() {
+        let row: Vec<f32> = text.split(' ').map_while(|word| word.parse().ok()).collect();
+        let &[x, y, z, size, r, g, b, opacity] = row.as_slice() else {
+            return Err(Error::data(path, format!("line {}", line + 1), "is no row of 8 numbers"));
+        };
+        let to = &mut read.gaussians;
+        to.means.push([x, y, z]);
+        to.scales.push([size; 3]);
+        to.sh0.push([r, g, b]);
+        to.opacities.push(opacity);
+        to.quats.push([1.0, 0.0, 0.0, 0.0]);
+    }
+    Ok(read)
+}
+
+fn write(out: &mut dyn Write, model: &Gaussians, rows: &[usize]) -> io::Result<()> {
+    rows.iter().try_for_each(|&row| {
+        let ([x, y, z], size, [r, g, b]) = (model.means[row], model.scales[row][0], model.sh0[row]);
+        writeln!(out, "{x} {y} {z} {size} {r} {g} {b} {}", model.opacities[row])
+    })
+}
+
+fn balls() -> Gaussians {
+    Gaussians {
+        means: vec![[1.0, 2.0, 3.0], [-4.0, 5.5, 6.0]],
+        quats: vec![[1.0, 0.0, 0.0, 0.0]; 2],
+        scales: vec![[-2.0; 3], [-3.0; 3]],
+        opacities: vec![0.5, 2.0],
+        sh0: vec![[0.25, 0.5, 0.75], [0.125, 1.0, -1.0]],
+        ..Gaussians::default()
+    }
+}
+
+#[test]
+fn a_format_that_is_added_is_read_and_written_by_its_endings() {
+    static FORMAT: ModelFormat = BALLS;
+    register(&FORMAT);
+    let scene = Scene::new();
+    let mut model = balls();
+    for name in ["a.balls", "b.BALLS", "c.balls.txt"] {
+        assert_eq!(write_model(scene.at(name), &model).expect("written"), 0);
+        assert_eq!(std::fs::read(scene.at(name)).expect("bytes")[..9], *b"1 2 3 -2 ", "{name}");
+        assert_eq!(read_model(scene.at(name)).expect("read").gaussians, model);
+        assert_eq!(open_model(&scene.at(name)).expect("read"), model, "as commands read it");
+    }
+    model.opacities[0] = f32::NAN;
+    assert_eq!(write_model(scene.at("a.balls"), &model).expect("written"), 1);
+    assert_eq!(read_model(scene.at("a.balls")).expect("read").gaussians.means, model.means[1..]);
+    let refused = refusal(read_model(scene.write("a.balls", "1 2 3\n")));
+    assert!(refused.ends_with("a.balls: line 1: is no row of 8 numbers"), "{refused}");
+    // Nothing changes for the others, but that one more ending is known.
+    write_model(scene.at("a.ply"), &balls()).expect("written");
+    assert!(std::fs::read(scene.at("a.ply")).expect("bytes").starts_with(b"ply\n"));
+    let refused = refusal(read_model(scene.write("a.splat", "1 2 3\n")));
+    assert!(refused.contains(".splat was read as PLY, known endings of models are .balls, .balls.txt, .ply"));
+}
+
+#[test]
+fn any_other_ending_may_be_a_ply() {
+    let scene = Scene::new();
+    for name in ["a.PLY", "a.points", "a", "a.ply.bak"] {
+        write_model(scene.at(name), &balls()).expect("written");
+        assert!(std::fs::read(scene.at(name)).expect("bytes").starts_with(b"ply\n"), "{name}");
+        assert_eq!(read_model(scene.at(name)).expect("read").gaussians, balls(), "{name}");
+    }
+    let problem = |name: &str| {
+        let path = scene.write(name, "no header\n");
+        refusal(read_model(&path)).replace(&path.display().to_string(), "")
+    };
+    let (ply, none, other) = (problem("b.ply"), problem("b"), problem("b.spz"));
+    assert_eq!(ply, none);
+    assert!(other.starts_with(&format!("{ply}; .spz was read as PLY, known endings of models are ")), "{other}");
+    assert!(other.contains(".ply"), "{other}");
+}
+
+#[test]
+fn columns_that_differ_in_length_are_refused() {
+    let scene = Scene::new();
+    let cut: [(&str, fn(&mut Gaussians)); 7] = [
+        ("quats", |model| model.quats.truncate(1)),
+        ("scales", |model| model.scales.push([0.0; 3])),
+        ("opacities", |model| model.opacities.clear()),
+        ("sh0", |model| model.sh0.truncate(1)),
+        ("sh_rest", |model| model.sh_degree = 1),
+        ("labels", |model| model.labels = Some(vec![1])),
+        ("label_confidence", |model| model.label_confidence = Some(vec![1.0; 3])),
+    ];
+    assert!(balls().check().is_ok());
+    for (name, cut) in cut {
+        let mut model = balls();
+        cut(&mut model);
+        let error = write_model(scene.at("a.ply"), &model).expect_err("columns that differ").to_string();
+        assert!(error.contains(name) && error.contains("of 2 Gaussians"), "{error}");
+        assert!(!scene.path().join("a.ply").exists());
+    }
+}
