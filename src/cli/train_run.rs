@@ -285,8 +285,8 @@ fn start(
         "memory to start with: {:.1} MiB on the device, for {} Gaussians and {} x {} px; it grows with the model",
         memory.total as f64 / f64::from(1 << 20),
         room.gaussians,
-        room.size.0,
-        room.size.1
+        room.image.0,
+        room.image.1
     );
     let mut trainer = Trainer::new(gpu, config.clone(), dataset, &model, options)?;
     if let Some(table) = occluders {
@@ -339,10 +339,10 @@ fn preview_view(dataset: &Dataset) -> Option<View> {
 
 fn preview_now(trainer: &mut Trainer, out: &Path, view: &View) -> Result<()> {
     trainer.drain()?;
-    let (degree, config) = (trainer.sh_degree(), trainer.config().clone());
+    let options = trainer.render_options();
     let Some(photo) = &view.photo else { return Ok(()) };
     let photo: &Photo = photo;
-    let rendered = render(trainer.engine_mut(), &view.camera, config.near, config.background, degree)?;
+    let rendered = render(trainer.engine_mut(), &view.camera, &options)?;
     let labels = trainer.model()?.labels;
     let path = out.join("preview").join(format!("{:06}_{}.png", trainer.steps_done(), view.stem()));
     record::save_preview(&path, photo, &rendered, labels.as_deref())
@@ -357,7 +357,7 @@ fn score(trainer: &mut Trainer, dataset: &Dataset, config: &TrainConfig) -> Resu
     let mut model = trainer.model()?;
     // Bands that were never let in are 0; without them the render is cheaper.
     model.sh_degree = model.sh_degree.max(trainer.sh_degree());
-    let how = Rendering { near: config.near, background: config.background, min_confidence: MIN_LABEL_CONFIDENCE };
+    let how = Rendering { options: trainer.render_options(), min_confidence: MIN_LABEL_CONFIDENCE };
     let scores = evaluate(trainer.engine_mut(), &model, &views, how, &(), &mut ())?;
     super::eval::warn_of_odd_view(&scores, config.near);
     Ok(Some(scores))

@@ -39,9 +39,9 @@ pub fn check(planes: &[Plane], count: u32, sh_degree: u32, labels: bool) -> Resu
 
 impl Engine {
     /// Reads the state; nothing may be in flight.
-    pub fn download_state(&mut self, sh_degree: u32) -> Result<Vec<Plane>> {
+    pub fn download_state(&mut self) -> Result<Vec<Plane>> {
         let count = self.gaussian_count as usize;
-        let planes = buffers(sh_degree, self.room.labels.is_some()).into_iter().map(|buf| {
+        let planes = buffers(self.sh_degree, self.room.labels.is_some()).into_iter().map(|buf| {
             let data = self.sched.download(buf, 0, 0, count * words(buf) as usize)?;
             Ok(Plane { name: TABLE[buf.index()].name.to_owned(), words: words(buf), data })
         });

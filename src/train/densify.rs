@@ -4,7 +4,6 @@ use super::Trainer;
 use super::step_input::StepInput;
 use crate::engine::ListKey;
 use crate::error::Result;
-use crate::scheduler::plan::Buf;
 use crate::shaders::structs::{Counters, StepUniforms};
 
 /// What a densification did.
@@ -37,9 +36,7 @@ impl Trainer {
                 other => break other.map(|()| (uniforms, counted))?,
             }
         };
-        let list = self.engine.list(ListKey::DensifyApply)?;
-        self.engine.sched_mut().upload(Buf::STEP, 0, 0, &[uniforms])?;
-        self.engine.sched_mut().run(list, 0)?;
+        self.engine.run(ListKey::DensifyApply, &uniforms)?;
         self.engine.set_gaussian_count(counted.densified_count);
         Ok(Densified { cloned: counted.cloned_count, split: counted.split_count, pruned: counted.pruned_count })
     }
@@ -47,9 +44,8 @@ impl Trainer {
     /// Brings all opacities down to at most 0.01.
     pub(super) fn reset_opacity(&mut self, input: &StepInput) -> Result<()> {
         let uniforms = self.densify_uniforms(input);
-        let list = self.engine.list(ListKey::OpacityReset)?;
-        self.engine.sched_mut().upload(Buf::STEP, 0, 0, &[uniforms])?;
-        self.engine.sched_mut().run(list, 0)
+        self.engine.run(ListKey::OpacityReset, &uniforms)?;
+        Ok(())
     }
 
     fn densify_uniforms(&self, input: &StepInput) -> StepUniforms {
@@ -66,10 +62,7 @@ impl Trainer {
     }
 
     fn count_densified(&mut self, uniforms: StepUniforms) -> Result<Counters> {
-        let list = self.engine.list(ListKey::DensifyCount)?;
-        self.engine.sched_mut().upload(Buf::STEP, 0, 0, &[uniforms])?;
-        self.engine.sched_mut().run(list, 0)?;
-        Ok(self.engine.report(0)?.counters)
+        Ok(self.engine.run(ListKey::DensifyCount, &uniforms)?.counters)
     }
 
     /// The most Gaussians that there may be, of `count` that are wanted: what was asked for, and what memory holds.

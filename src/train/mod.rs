@@ -18,15 +18,16 @@ pub use densify::Densified;
 pub use state::{RunFacts, TrainState, ViewFingerprint};
 pub use timing::StepTimes;
 
-use crate::engine::{Engine, EngineSize, LabelSize, ListKey, Report};
+use crate::engine::{Engine, EngineSize, InFlight, LabelSize, ListKey, Report};
 use crate::error::{Error, Result};
 use crate::fault;
 use crate::gpu::Gpu;
 use crate::label::vote::ballot::columns_for;
 use crate::pass::{KernelShape, Variant};
+use crate::render::RenderOptions;
 use crate::scene::{Dataset, Gaussians};
-use crate::scheduler::plan::Buf;
-use crate::scheduler::{SchedulerOptions, Ticket};
+use crate::scheduler::SchedulerOptions;
+use crate::scheduler::plan::FRAMES_IN_FLIGHT;
 use sampler::ViewOrder;
 use std::collections::{BTreeSet, VecDeque};
 use std::sync::Arc;
@@ -53,12 +54,13 @@ pub struct Trainer {
     views: Views,
     fixed: SceneScale,
     order: ViewOrder,
-    /// Steps submitted, not yet absorbed; at most one per frame.
-    in_flight: VecDeque<(StepInput, Ticket)>,
+    /// Largest photo, px. The engine's image may have grown beyond it since.
+    image: (u32, u32),
+    /// Steps submitted and not retired yet; at most one per frame.
+    in_flight: VecDeque<(StepInput, InFlight)>,
     /// Steps submitted so far.
     step: u32,
     updates: u32,
-    stamp: u32,
     max_gaussians: u64,
     /// Memory has bounded the number of Gaussians, which was said.
     memory_bounds: bool,
@@ -77,8 +79,8 @@ pub struct Trainer {
 /// Room for training on a data set.
 pub fn room(dataset: &Dataset, config: &TrainConfig, gaussians: u64) -> Result<EngineSize> {
     let sizes = dataset.train.iter().chain(&dataset.test).map(|view| (view.camera.width, view.camera.height));
-    let size = sizes.reduce(|a, b| (a.0.max(b.0), a.1.max(b.1)));
-    let size = size.ok_or_else(|| Error::data(&dataset.root, "", "the scene has no view to train on"))?;
+    let image = sizes.reduce(|a, b| (a.0.max(b.0), a.1.max(b.1)));
+    let image = image.ok_or_else(|| Error::data(&dataset.root, "", "the scene has no view to train on"))?;
     let objects: Vec<u16> =
         dataset.train.iter().filter_map(|view| view.mask.as_ref()).flat_map(|m| m.objects()).collect();
     let most = dataset.train.iter().filter_map(|view| view.mask.as_ref().map(|mask| mask.objects().len())).max();
@@ -90,7 +92,7 @@ pub fn room(dataset: &Dataset, config: &TrainConfig, gaussians: u64) -> Result<E
             LabelRule::Main => 0,
         },
     });
-    Ok(EngineSize { gaussians, size, trained: true, labels })
+    Ok(EngineSize::new(gaussians, image).for_training().with_labels(labels))
 }
 
 /// Room to start with: for twice as many Gaussians as there are, or for those where memory is short.
@@ -141,6 +143,8 @@ impl Trainer {
         let config = TrainConfig { near, ..config };
         let mut trainer = Self::without_model(gpu, shape, config, dataset, room, options)?;
         trainer.engine.upload_model(model)?;
+        // Bands that the model does not have start as 0.
+        trainer.engine.set_sh_degree(trainer.config.sh_degree);
         Ok(trainer)
     }
 
@@ -157,7 +161,8 @@ impl Trainer {
         let views =
             dataset.train.iter_mut().map(|view| train_view(view, config.mask_border)).collect::<Result<Vec<_>>>()?;
         let views = Views::new(views, config.coarse_until);
-        let engine = Engine::with_shape(gpu, shape, room, options)?;
+        let mut engine = Engine::with_shape(gpu, shape, room, options)?;
+        engine.set_sh_degree(config.sh_degree);
         let order = ViewOrder::new(config.seed, views.len());
         Ok(Self {
             engine,
@@ -165,10 +170,10 @@ impl Trainer {
             views,
             fixed,
             order,
+            image: room.image,
             in_flight: VecDeque::new(),
             step: 0,
             updates: 0,
-            stamp: 0,
             max_gaussians,
             memory_bounds: false,
             labelled_once: false,
@@ -180,7 +185,7 @@ impl Trainer {
         })
     }
 
-    /// The engine, for renders between steps.
+    /// The engine, for renders between steps; nothing may be in flight ([`Trainer::drain`]).
     pub fn engine_mut(&mut self) -> &mut Engine {
         &mut self.engine
     }
@@ -221,6 +226,12 @@ impl Trainer {
         self.config.sh_degree_at(self.step)
     }
 
+    /// How previews are rendered: as the steps do.
+    pub fn render_options(&self) -> RenderOptions {
+        let (near, background) = (self.config.near, self.config.background);
+        RenderOptions { near, background, sh_degree: Some(self.sh_degree()), ..RenderOptions::default() }
+    }
+
     /// Reads the model back. Steps that failed for want of memory changed nothing in it.
     pub fn model(&mut self) -> Result<Gaussians> {
         if let Err(error) = self.drain() {
@@ -228,8 +239,9 @@ impl Trainer {
                 return Err(error);
             }
             self.in_flight.clear();
+            self.engine.abandon()?;
         }
-        self.engine.download_model(self.config.sh_degree)
+        self.engine.download_model()
     }
 
     /// One step: submits it and, where the schedule says so, densifies. Returns the reports of steps that are done;
@@ -247,9 +259,9 @@ impl Trainer {
         }
         let input = self.input(step);
         if fault::at("nan").is_some() {
-            self.engine.sched_mut().upload(Buf::MEANS, 0, 0, &[f32::NAN])?;
+            self.engine.spoil()?;
         }
-        if self.in_flight.len() == crate::scheduler::plan::FRAMES_IN_FLIGHT {
+        if self.in_flight.len() == FRAMES_IN_FLIGHT {
             done.extend(self.retire()?);
         }
         self.submit(input.clone())?;
@@ -291,20 +303,16 @@ impl Trainer {
         // A densification replaces the parameters that the gradients belong to: no update then (3DGS).
         let update = !(self.config.densifies_at(step) && step < self.config.iterations);
         self.updates += u32::from(update);
-        StepInput { step, view, layers, labels, update, updates: self.updates, stamp: 0 }
+        StepInput { step, view, layers, labels, update, updates: self.updates }
     }
 
-    fn submit(&mut self, mut input: StepInput) -> Result<()> {
-        self.stamp = self.stamp.wrapping_add(1).max(1);
-        input.stamp = self.stamp;
-        let frame = input.step as usize % crate::scheduler::plan::FRAMES_IN_FLIGHT;
+    fn submit(&mut self, input: StepInput) -> Result<()> {
         let key = self.key(&input);
-        self.engine.list(key)?;
         let view = self.views.of(&input);
         let uniforms = step_input::uniforms(&input, view, &self.config, self.fixed, &self.engine);
-        step_input::upload(&mut self.engine, frame, uniforms, view, &input, &self.config)?;
-        let ticket = self.engine.submit(key, frame)?;
-        self.in_flight.push_back((input, ticket));
+        let data = step_input::train_input(&input, view, &self.config, uniforms, &self.engine);
+        let flight = self.engine.submit(key, &data)?;
+        self.in_flight.push_back((input, flight));
         Ok(())
     }
 
@@ -313,7 +321,7 @@ impl Trainer {
             labels: input.labels,
             lift: input.lifts(&self.config),
             sh_degree: self.config.sh_degree_at(input.step),
-            size: self.engine.room().size,
+            size: self.image,
             update: input.update,
             counts: self.counts_pairs,
         };
@@ -326,9 +334,8 @@ impl Trainer {
     /// Waits for the oldest step in flight. If a buffer was too small, the step changed nothing, nor did those after it:
     /// the buffer grows and they run again.
     fn retire(&mut self) -> Result<Option<StepReport>> {
-        let Some((input, ticket)) = self.in_flight.front().cloned() else { return Ok(None) };
-        self.engine.sched().wait(ticket)?;
-        let report = self.engine.report(input.step as usize % crate::scheduler::plan::FRAMES_IN_FLIGHT)?;
+        let Some((input, flight)) = self.in_flight.front().cloned() else { return Ok(None) };
+        let report = self.engine.retire(&flight)?;
         let recovered = self.engine.recover(&report);
         if recovered.is_err() {
             // Nothing came of these steps, nor will it.
@@ -343,7 +350,7 @@ impl Trainer {
             return self.retire();
         }
         self.in_flight.pop_front();
-        self.note_times(&input)?;
+        self.note_times(input.step, flight.recording)?;
         let view = self.views.of(&input);
         let scale = 1.0 / (3.0 * view.valid_pixels.max(1) as f64);
         let (counters, lambda) = (&report.counters, f64::from(self.config.lambda_dssim));

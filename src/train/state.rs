@@ -196,7 +196,7 @@ impl Trainer {
         }
         Ok(TrainState {
             labelgs: env!("CARGO_PKG_VERSION").to_owned(),
-            device: device(self.engine.sched().gpu()),
+            device: device(self.engine.gpu()),
             step: self.step,
             updates: self.updates,
             gaussians: self.gaussian_count(),
@@ -216,7 +216,7 @@ impl Trainer {
     /// The planes of the state, unless one holds a number that is none: to go on from that would help nobody, and what
     /// the last step has spoilt no pass has looked at yet.
     fn finite_planes(&mut self) -> Result<Vec<Plane>> {
-        let planes = self.engine.download_state(self.config.sh_degree)?;
+        let planes = self.engine.download_state()?;
         let is_finite = |word: &u32| f32::from_bits(*word).is_finite();
         for plane in planes.iter().filter(|plane| plane.name != TABLE[Buf::LABELS.index()].name) {
             if let Some(at) = plane.data.iter().position(|word| !is_finite(word)) {
@@ -262,8 +262,7 @@ impl Trainer {
 
     /// Goes back to a state of this very training, whatever has become of it since.
     pub fn restore(&mut self, state: &TrainState) -> Result<()> {
-        // What flies has nothing to say any more.
-        self.engine.sched().wait_all()?;
+        self.engine.abandon()?;
         self.in_flight.clear();
         self.put(state)
     }

@@ -10,7 +10,6 @@ use labelgs::pass::{self, KernelShape, Stage, Variant};
 use labelgs::scheduler::plan::{Buf, PassList, PlanOptions};
 use labelgs::scheduler::{ListId, SchedulerOptions};
 use labelgs::shaders::structs::Counters;
-use labelgs::train::step_input;
 use labelgs::verify::selftest::fixture::Fixture;
 use labelgs::verify::selftest::scenes::Scene;
 use labelgs::{Error, Result};
@@ -73,7 +72,7 @@ impl<'a> Bed<'a> {
     }
 
     fn default_list(&self, update: bool) -> PassList {
-        pass::training_step(self.fixture.engine.shape(), self.fixture.engine.sched().capacity(), self.variant(update))
+        pass::training_step(self.fixture.engine.shape(), self.fixture.engine.raw().capacity(), self.variant(update))
     }
 
     fn prepare(&mut self) -> Result<()> {
@@ -82,7 +81,7 @@ impl<'a> Bed<'a> {
         let mut lists = lists.collect::<Result<Vec<_>>>()?;
         lists.push(self.default_list(true));
         self.stages = lists.iter().map(pass::stage::stages).collect();
-        self.lists = self.fixture.engine.sched_mut().prepare_all(&lists.iter().collect::<Vec<_>>())?;
+        self.lists = self.fixture.engine.raw_mut().prepare_all(&lists.iter().collect::<Vec<_>>())?;
         Ok(())
     }
 
@@ -93,19 +92,16 @@ impl<'a> Bed<'a> {
                 self.prepare()?;
             }
             let fixture = &mut self.fixture;
-            // Gradient records of other modes must not count as those of this run.
-            fixture.input.stamp += 1;
-            let uniforms = fixture.uniforms();
-            step_input::upload(&mut fixture.engine, 0, uniforms, &fixture.view, &fixture.input, &fixture.config)?;
+            fixture.write()?;
             let before = cpu_time();
-            fixture.engine.sched_mut().run(self.lists[list], 0)?;
+            fixture.engine.raw_mut().run(self.lists[list], 0)?;
             let cpu = cpu_time().saturating_sub(before);
             let report = fixture.engine.report(0)?;
             if fixture.engine.recover(&report)? {
                 self.lists.clear();
                 continue;
             }
-            let times = fixture.engine.sched().timings(self.lists[list], 0)?;
+            let times = fixture.engine.raw().timings(self.lists[list], 0)?;
             if times.is_empty() {
                 return Err(Error::NoDevice("this device has no timestamps on its compute queue".to_owned()));
             }
@@ -126,12 +122,7 @@ impl<'a> Bed<'a> {
     /// The engine's own list gives the picture of the default mode, to the bit.
     pub fn check_default(&mut self, outcome: &Outcome) -> Result<()> {
         let key = ListKey::Train(self.variant(false));
-        self.fixture.input.stamp += 1;
-        let fixture = &mut self.fixture;
-        let list = fixture.engine.list(key)?;
-        let uniforms = fixture.uniforms();
-        step_input::upload(&mut fixture.engine, 0, uniforms, &fixture.view, &fixture.input, &fixture.config)?;
-        fixture.engine.sched_mut().run(list, 0)?;
+        self.fixture.train_as(key)?;
         let own = self.outcome()?;
         if own.colours == outcome.colours && own.rows == outcome.rows {
             return Ok(());
