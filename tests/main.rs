@@ -46,6 +46,7 @@ mod segments;
 mod selftest;
 mod sentinel;
 mod shadergen;
+mod strategy;
 mod stress;
 mod synth;
 mod track;

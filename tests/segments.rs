@@ -9,7 +9,7 @@ use labelgs::pass::KernelShape;
 use labelgs::render::{RenderOptions, render};
 use labelgs::scene::{Camera, Gaussians};
 use labelgs::scheduler::SchedulerOptions;
-use labelgs::train::{TrainConfig, Trainer};
+use labelgs::train::{TrainConfig, Trainer, TrainerOptions};
 
 /// Tiny, faint Gaussians in front of one 8 x 8 tile.
 fn crowd(count: usize) -> (Gaussians, Camera) {
@@ -95,9 +95,8 @@ fn segments_change_nothing() {
     let run = |segment_length: u32| {
         let shape = KernelShape { segment_length, ..KernelShape::of(gpu.capabilities()) };
         let mut dataset = dataset.clone();
-        let mut trainer =
-            Trainer::with_shape(gpu.clone(), shape, config.clone(), &mut dataset, &start, SchedulerOptions::default())
-                .expect("trainer");
+        let options = TrainerOptions { shape: Some(shape), ..TrainerOptions::default() };
+        let mut trainer = Trainer::new(gpu.clone(), config.clone(), &mut dataset, &start, options).expect("trainer");
         for _ in 0..config.iterations {
             trainer.step().expect("step");
         }

@@ -19,7 +19,7 @@ pub use size::{EngineSize, LabelSize};
 
 use crate::error::Result;
 use crate::gpu::Gpu;
-use crate::pass::KernelShape;
+use crate::pass::{Extension, KernelShape};
 use crate::scene::{Camera, Gaussians};
 use crate::scheduler::plan::{FRAMES_IN_FLIGHT, TABLE};
 use crate::scheduler::{ListId, Scheduler, SchedulerOptions};
@@ -38,6 +38,8 @@ pub struct Engine {
     sh_degree: u32,
     /// What the positions of the model are relative to.
     origin: DVec3,
+    /// What extended steps have more than others.
+    extension: Arc<dyn Extension>,
     /// Mark of the last submit, never 0.
     stamp: u32,
     last_frame: usize,
@@ -66,6 +68,7 @@ impl Engine {
             gaussian_count: 0,
             sh_degree: 0,
             origin: DVec3::ZERO,
+            extension: Arc::new(()),
             stamp: 0,
             last_frame: 0,
             in_flight: [false; FRAMES_IN_FLIGHT],
@@ -111,6 +114,11 @@ impl Engine {
     /// Gives the model another degree; bands that were not uploaded are 0.
     pub fn set_sh_degree(&mut self, sh_degree: u32) {
         self.sh_degree = sh_degree;
+    }
+
+    /// What [`ListKey::Extended`] adds to a step; before the first of them.
+    pub fn set_extension(&mut self, extension: Arc<dyn Extension>) {
+        self.extension = extension;
     }
 
     /// Puts a model into the device's memory; moments and statistics start at 0.

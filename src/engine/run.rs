@@ -12,6 +12,8 @@ use crate::shaders::structs::Counters;
 pub enum ListKey {
     /// One optimiser step.
     Train(Variant),
+    /// The same with passes of the [`pass::Extension`] under some number.
+    Extended(Variant, u32),
     /// One optimiser step with so many sampled objects that have passes of their own, see [`pass::separate_step`].
     Separate(Variant, u32),
     /// One picture, with this degree of the spherical harmonics.
@@ -60,6 +62,9 @@ impl Engine {
         let (shape, capacity) = (&self.shape, self.sched.capacity());
         let list = match key {
             ListKey::Train(variant) => pass::training_step(shape, capacity, variant),
+            ListKey::Extended(variant, passes) => {
+                pass::extended_step(shape, capacity, variant, (&*self.extension, passes))
+            }
             ListKey::Separate(variant, objects) => pass::separate_step(shape, capacity, variant, objects),
             ListKey::Render(sh_degree) => pass::render_view(shape, capacity, sh_degree),
             ListKey::Vote(rounds) => pass::vote_view(shape, capacity, rounds),

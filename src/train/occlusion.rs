@@ -44,8 +44,7 @@ impl Trainer {
             && config.occlusion == Occlusion::Rendered
             && config.labels_at(step)
             && (step - config.labels_from()).is_multiple_of(config.occlusion_every)
-            // Right after an opacity reset there is no depth to speak of.
-            && !(step > 1 && config.resets_opacity_at(step - 1))
+            && !self.blurs_depth_before(step)
     }
 
     /// Renders the depth of every view with masks; nothing may be in flight.

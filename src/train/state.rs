@@ -4,14 +4,13 @@
 //! objects from the seed and the step, gradients and votes from the next step's own passes.
 
 use super::sampler::ViewOrder;
-use super::{TrainConfig, Trainer, room};
+use super::strategy::Kept;
+use super::{TrainConfig, Trainer, TrainerOptions, room};
 use crate::engine::{GrownSizes, state};
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::io::checkpoint::{Checkpoint, Plane};
-use crate::pass::KernelShape;
 use crate::scene::{Camera, Dataset, LabelMap, Occluders, Photo};
-use crate::scheduler::SchedulerOptions;
 use crate::scheduler::plan::{Buf, TABLE};
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
@@ -51,6 +50,9 @@ pub struct TrainState {
     pub occluders: BTreeMap<String, Occluders>,
     /// How the run was started.
     pub run: RunFacts,
+    /// What the strategy keeps; the default one is not mentioned.
+    #[serde(default, skip_serializing_if = "Kept::is_default")]
+    pub strategy: Kept,
     /// Parameters, moments, statistics and labels.
     #[serde(skip)]
     pub planes: Vec<Plane>,
@@ -145,7 +147,8 @@ impl TrainState {
         }
         // Masks may be there and show no object.
         let labels = state.planes.iter().any(|plane| plane.name == TABLE[Buf::LABELS.index()].name);
-        state::check(&state.planes, state.gaussians, state.config.sh_degree, labels).map_err(odd)?;
+        state::check(&state.planes, state.gaussians, state.config.sh_degree, labels, &state.strategy.planes)
+            .map_err(odd)?;
         Ok(state)
     }
 
@@ -202,12 +205,13 @@ impl Trainer {
             gaussians: self.gaussian_count(),
             origin: self.engine.origin().to_array(),
             labelled_once: self.labelled_once,
-            memory_bounds: self.memory_bounds,
+            memory_bounds: self.bound.by_memory,
             sizes: self.engine.sizes(),
             config: self.config.clone(),
             views: self.fingerprints.clone(),
             occluders: self.occluders(),
             run: RunFacts::default(),
+            strategy: Kept::of(&*self.strategy),
             planes: self.finite_planes()?,
             path: PathBuf::new(),
         })
@@ -216,7 +220,7 @@ impl Trainer {
     /// The planes of the state, unless one holds a number that is none: to go on from that would help nobody, and what
     /// the last step has spoilt no pass has looked at yet.
     fn finite_planes(&mut self) -> Result<Vec<Plane>> {
-        let planes = self.engine.download_state()?;
+        let planes = self.engine.download_state(self.strategy.planes())?;
         let is_finite = |word: &u32| f32::from_bits(*word).is_finite();
         for plane in planes.iter().filter(|plane| plane.name != TABLE[Buf::LABELS.index()].name) {
             if let Some(at) = plane.data.iter().position(|word| !is_finite(word)) {
@@ -233,7 +237,12 @@ impl Trainer {
 
     /// Goes on where `state` stopped, to the same bits on the same device as if it had not. `dataset.train` gives its
     /// photos and masks away; it must be what the state was made with.
-    pub fn resume(gpu: Arc<Gpu>, dataset: &mut Dataset, state: TrainState, options: SchedulerOptions) -> Result<Self> {
+    pub fn resume(
+        gpu: Arc<Gpu>,
+        dataset: &mut Dataset,
+        state: TrainState,
+        options: impl Into<TrainerOptions>,
+    ) -> Result<Self> {
         state.config.check()?;
         let views = dataset.train.iter();
         let fingerprints: Vec<ViewFingerprint> =
@@ -245,7 +254,6 @@ impl Trainer {
                 tracing::warn!("{} was made with {then}, this is {now}: bits may differ", state.path.display());
             }
         }
-        let shape = KernelShape::of(gpu.capabilities());
         let room = room(dataset, &state.config, u64::from(state.gaussians))?;
         if let Some(labels) = room.labels
             && let Some(plane) = state.planes.iter().find(|plane| plane.name == "labels")
@@ -254,7 +262,7 @@ impl Trainer {
             let problem = format!("is {label}, the masks have ids up to {}", labels.max_label);
             return Err(Error::data(&state.path, "a label", problem));
         }
-        let mut trainer = Self::without_model(gpu, shape, state.config.clone(), dataset, room, options)?;
+        let mut trainer = Self::without_model(gpu, state.config.clone(), dataset, room, options.into())?;
         trainer.fingerprints = fingerprints;
         trainer.put(&state)?;
         Ok(trainer)
@@ -268,6 +276,8 @@ impl Trainer {
     }
 
     fn put(&mut self, state: &TrainState) -> Result<()> {
+        let odd = |problem| Error::data(&state.path, "strategy", problem);
+        state.strategy.restore(&mut *self.strategy).map_err(odd)?;
         match self.engine.grow_to(state.sizes) {
             // On a smaller device there is less room to grow.
             Err(Error::OutOfMemory { .. }) => {}
@@ -277,7 +287,7 @@ impl Trainer {
         self.set_occluders(&state.occluders);
         self.order = ViewOrder::after(self.config.seed, self.views.len(), state.step);
         (self.step, self.updates) = (state.step, state.updates);
-        (self.labelled_once, self.memory_bounds) = (state.labelled_once, state.memory_bounds);
+        (self.labelled_once, self.bound.by_memory) = (state.labelled_once, state.memory_bounds);
         self.seen = Default::default();
         Ok(())
     }

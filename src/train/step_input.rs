@@ -167,6 +167,7 @@ pub fn uniforms(
         label_threshold: config.label_threshold,
         gpf: u32::from(config.gpf),
         occluder_words: labels.div_ceil(32),
+        seed: (config.seed as u32) ^ input.step.wrapping_mul(0x9e37_79b9),
         adam_correction1: correction(ADAM_BETA1),
         adam_correction2: correction(ADAM_BETA2),
         rate_means: [rate, rate, rate, config.opacity_lr as f32],

@@ -17,8 +17,7 @@ impl Trainer {
         self.votes()
             && config.labels_at(step)
             && (step - config.labels_from()).is_multiple_of(config.vote_every)
-            // Right after an opacity reset nothing tells what is in front.
-            && !(step > 1 && config.resets_opacity_at(step - 1))
+            && !self.blurs_depth_before(step)
     }
 
     /// Counts the votes of all views and gives the labels to the device; nothing may be in flight.

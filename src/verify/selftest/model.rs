@@ -11,6 +11,7 @@ use crate::scene::Gaussians;
 use crate::scheduler::plan::Buf;
 use crate::shaders::structs::{Counters, StepUniforms};
 use crate::train::TrainConfig;
+use crate::train::strategy::default::prunes_large_at;
 use crate::verify::reference::blend::blend_forward;
 use crate::verify::reference::densify::{Origin, Population, densify, mark, opacity_reset};
 use crate::verify::reference::lift::{Masks, centres_of, lift, lift_resolve};
@@ -36,7 +37,7 @@ fn holding(fixture: &mut Fixture, before: &Population, step: u32) -> Result<Step
         densify_scale: config.percent_dense,
         prune_scale: config.max_scale,
         prune_opacity: config.min_opacity,
-        prune_big: u32::from(with_resets.prunes_large_at(step)),
+        prune_big: u32::from(prunes_large_at(&with_resets, step)),
         seed: SEED,
         ..fixture.uniforms()
     })
