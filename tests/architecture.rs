@@ -169,3 +169,13 @@ fn the_library_prints_nothing() {
         assert_eq!(with_word(word), Vec::<String>::new(), "{word}");
     }
 }
+
+/// Above the engine only what checks it touches its scheduler.
+#[test]
+fn the_scheduler_is_the_engines_own() {
+    let above = |path: &Path| floor(&module(path)) > floor("engine") && module(path) != "verify";
+    let touches =
+        |text: &str| [".raw()", ".raw_mut()", "Scheduler::", "ListId", "Ticket"].iter().any(|w| text.contains(w));
+    let found = files("src", &["rs"]).into_iter().filter(|(path, text)| above(path) && touches(text));
+    assert_eq!(found.map(|(path, _)| path).collect::<Vec<_>>(), Vec::<PathBuf>::new());
+}

@@ -2,6 +2,7 @@
 
 use labelgs::io::ReadOptions;
 use labelgs::train::TrainConfig;
+use labelgs::train::strategy::default::{densifies_at, resets_opacity_at};
 
 #[test]
 fn schedules_follow_the_reference() {
@@ -10,9 +11,10 @@ fn schedules_follow_the_reference() {
     assert!((config.position_lr(15_000) - 1.6e-5).abs() < 1e-12);
     assert!((config.position_lr(90_000) - 1.6e-6).abs() < 1e-12);
     assert_eq!([999, 1000, 2000, 3000, 9000].map(|step| config.sh_degree_at(step)), [0, 1, 2, 3, 3]);
-    let densifies: Vec<u32> = (1..=800).filter(|&step| config.densifies_at(step)).collect();
+    let densifies: Vec<u32> = (1..=800).filter(|&step| densifies_at(&config, step)).collect();
     assert_eq!(densifies, [600, 700, 800]);
-    let resets = |config: &TrainConfig| (1..=15_000).filter(|&step| config.resets_opacity_at(step)).collect::<Vec<_>>();
+    let resets =
+        |config: &TrainConfig| (1..=15_000).filter(|&step| resets_opacity_at(config, step)).collect::<Vec<_>>();
     assert!(resets(&config).is_empty());
     assert_eq!(resets(&TrainConfig { opacity_reset_interval: 3000, ..config.clone() }), [3000, 6000]);
     assert_eq!(resets(&TrainConfig::paper()), [3000, 6000, 9000, 12_000]);
@@ -24,7 +26,7 @@ fn schedules_follow_the_reference() {
 fn densification_ends_at_half_of_the_run() {
     let last = |iterations| {
         let config = TrainConfig { iterations, ..TrainConfig::default() };
-        (1..=iterations).filter(|&step| config.densifies_at(step)).max()
+        (1..=iterations).filter(|&step| densifies_at(&config, step)).max()
     };
     assert_eq!([400, 1500, 3000, 30_000].map(last), [None, Some(1400), Some(1400), Some(14_900)]);
 }

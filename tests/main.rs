@@ -47,6 +47,7 @@ mod segments;
 mod selftest;
 mod sentinel;
 mod shadergen;
+mod strategy;
 mod stress;
 mod synth;
 mod track;

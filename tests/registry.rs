@@ -9,12 +9,11 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 const ROOT: &str = env!("CARGO_MANIFEST_DIR");
-const ROOM: EngineSize = EngineSize {
-    gaussians: 10_000,
-    size: (320, 240),
-    trained: true,
-    labels: Some(LabelSize { max_label: 40, layers: 8, vote_columns: 9 }),
-};
+const ROOM: EngineSize = EngineSize::new(10_000, (320, 240)).for_training().with_labels(Some(LabelSize {
+    max_label: 40,
+    layers: 8,
+    vote_columns: 9,
+}));
 
 /// Stem and text of every compute shader.
 fn sources() -> Vec<(String, String)> {
@@ -42,7 +41,7 @@ fn lists() -> Vec<(Capacity, PassList)> {
             let mut capacity = capacity(&shape, &ROOM);
             capacity.segments = segments;
             capacity.segment_pixels = if segments > 1 { 100_000 } else { 0 };
-            let size = ROOM.size;
+            let size = ROOM.image;
             let mut add = |list| all.push((capacity, list));
             for (labels, lift, sh_degree, update) in [
                 (true, true, 3, true),
@@ -171,7 +170,7 @@ fn every_list_can_be_planned_and_printed() {
 #[test]
 fn two_hundred_layers_can_be_planned() {
     let labels = Some(LabelSize { max_label: 200, layers: 200, vote_columns: 16 });
-    let room = EngineSize { gaussians: 100_000, size: (1920, 1080), trained: true, labels };
+    let room = EngineSize::new(100_000, (1920, 1080)).for_training().with_labels(labels);
     let shape = KernelShape::new(8, true);
     let capacity = capacity(&shape, &room);
     assert!(capacity.virtual_tiles.div_ceil(64) > 65_535, "an axis would do");

@@ -6,10 +6,10 @@ use crate::support::device;
 use crate::support::scenes::{Shape, scene};
 use labelgs::engine::{Engine, EngineSize};
 use labelgs::pass::KernelShape;
-use labelgs::render::render;
+use labelgs::render::{RenderOptions, render};
 use labelgs::scene::{Camera, Gaussians};
 use labelgs::scheduler::SchedulerOptions;
-use labelgs::train::{TrainConfig, Trainer};
+use labelgs::train::{TrainConfig, Trainer, TrainerOptions};
 
 /// Tiny, faint Gaussians in front of one 8 x 8 tile.
 fn crowd(count: usize) -> (Gaussians, Camera) {
@@ -50,11 +50,11 @@ fn sixty_thousand_gaussians_in_one_tile() {
     let Some(turn) = device() else { return };
     let gpu = turn.gpu();
     let (model, camera) = crowd(60_000);
-    let room = EngineSize { gaussians: 60_000, size: (8, 8), trained: false, labels: None };
+    let room = EngineSize::new(60_000, (8, 8));
     let mut engine = Engine::new(gpu, room, SchedulerOptions::default()).expect("room");
     engine.upload_model(&model).expect("model");
-    let rendered = render(&mut engine, &camera, 0.2, [0.0; 3], 0).expect("render");
-    assert!(engine.sched().capacity().segments > 1, "the list fits one segment; the test shows nothing");
+    let rendered = render(&mut engine, &camera, &RenderOptions::default()).expect("render");
+    assert!(engine.raw().capacity().segments > 1, "the list fits one segment; the test shows nothing");
     let rules = Rules::default();
     let splats: Vec<_> = project::project_all(&rules, &camera, &Model::from_gaussians(&model))
         .into_iter()
@@ -95,14 +95,13 @@ fn segments_change_nothing() {
     let run = |segment_length: u32| {
         let shape = KernelShape { segment_length, ..KernelShape::of(gpu.capabilities()) };
         let mut dataset = dataset.clone();
-        let mut trainer =
-            Trainer::with_shape(gpu.clone(), shape, config.clone(), &mut dataset, &start, SchedulerOptions::default())
-                .expect("trainer");
+        let options = TrainerOptions { shape: Some(shape), ..TrainerOptions::default() };
+        let mut trainer = Trainer::new(gpu.clone(), config.clone(), &mut dataset, &start, options).expect("trainer");
         for _ in 0..config.iterations {
             trainer.step().expect("step");
         }
         let model = trainer.model().expect("model");
-        (model, trainer.engine_mut().sched().capacity().segments)
+        (model, trainer.engine_mut().raw().capacity().segments)
     };
     let ((whole, one), (parts, many)) = (run(40_960), run(16));
     assert!(one == 1 && many > 2, "{one} and {many} segments");
@@ -119,7 +118,7 @@ fn segments_of_narrow_pictures_have_their_room() {
         // Guards behind the buffers are looked at after each run.
         let mut fixture = Fixture::with_options(turn, made, true, shape, readable());
         fixture.train();
-        let segments = fixture.engine.sched().capacity().segments;
+        let segments = fixture.engine.raw().capacity().segments;
         assert!(segments > 1, "{width} x {height}: one segment shows nothing");
     }
 }

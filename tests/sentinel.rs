@@ -98,7 +98,7 @@ fn a_state_with_a_number_that_is_none_is_no_checkpoint() {
     trainer.step().expect("a step");
     let sound = trainer.state().expect("a state");
     for buf in [Buf::QUATS, Buf::M_SH0, Buf::U_MEANS, Buf::DENSIFY_STATS] {
-        trainer.engine_mut().sched_mut().upload(buf, 0, 9, &[f32::NAN]).expect("upload");
+        trainer.engine_mut().raw_mut().upload(buf, 0, 9, &[f32::NAN]).expect("upload");
         let error = trainer.state().expect_err("no state");
         assert!(matches!(error, Error::Numeric { step: 1, .. }), "{error}");
         assert!(error.to_string().contains("is not finite, so there is no checkpoint"), "{error}");

@@ -3,7 +3,8 @@
 #include "constants.glsl"
 #include "step.glsl"
 #include "dispatch.glsl"
-// adam — one Adam update of one attribute of all Gaussians; a Gaussian that is not visible has gradient 0.
+// adam — one Adam update of one attribute of all Gaussians; a Gaussian that is not visible has gradient 0, or with
+//        SEEN_ONLY stays as it is.
 // Work:    one vec4 of one Gaussian an invocation; STRIDE vec4 a Gaussian.
 // Reads:   step, failure; splat_from_gaussian [N]; gradients [V,STRIDE]; parameters_in, first_moments_in,
 //          second_moments_in [N,STRIDE]
@@ -13,6 +14,7 @@
 
 layout(constant_id = 14) const uint STRIDE = 1;
 layout(constant_id = 15) const uint RATE = 0; // 0 means, 1 scales, 2 quats, 3 sh0, 4 higher bands
+layout(constant_id = 16) const uint SEEN_ONLY = 0;
 layout(local_size_x = 64) in;
 READ1(0, StepUniforms, step);
 READ1(1, uint, failure);
@@ -35,6 +37,9 @@ void main() {
         return;
     }
     uint s = fetchu(splat_from_gaussian, i);
+    if (SEEN_ONLY != 0u && s == NO_SPLAT) {
+        return;
+    }
     vec4 g = fetch4(gradients, s == NO_SPLAT ? 0u : s * STRIDE + (e - i * STRIDE));
     g = s == NO_SPLAT ? vec4(0.0) : g;
     vec4 rate = RATE == 0u ? u.rate_means

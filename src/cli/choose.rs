@@ -7,7 +7,7 @@ use super::scene::{find_view, near_plane, open_gpu, open_scene, render_engine};
 use super::values::{At, BoxAt, Picks, at, box_at, near, picks};
 use crate::edit::catalogue::{Catalogue, Pick};
 use crate::edit::prompt::{Place, Prompt, choose};
-use crate::render::render;
+use crate::render::{Parts, RenderOptions, render};
 use crate::scene::{Camera, Gaussians, LabelMap};
 use crate::{Error, Result};
 use clap::Args;
@@ -174,7 +174,7 @@ impl PromptArgs {
         let mut engine = render_engine(open_gpu(context)?, asked.model, sizes)?;
         engine.upload_model(asked.model)?;
         let mut map = |(key, camera): (Key, Camera)| {
-            let rendered = render(&mut engine, &camera, near, [0.0; 3], asked.model.sh_degree)?;
+            let rendered = render(&mut engine, &camera, &RenderOptions::new(near, Parts::MAIN))?;
             Ok((key, rendered.label_map(labels)))
         };
         cameras.into_iter().map(&mut map).collect()

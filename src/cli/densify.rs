@@ -8,7 +8,7 @@ use super::stdout;
 use super::values::{colour, near};
 use crate::io::frames::{self, Frame, Frames};
 use crate::render::pictures::{Format, write_rgb};
-use crate::render::render;
+use crate::render::{Parts, RenderOptions, render};
 use crate::scene::path::{Between, short_order, video};
 use crate::scene::{Camera, Dataset, View};
 use crate::{Error, Result};
@@ -76,10 +76,11 @@ pub fn run(args: &DensifyArgs, context: &Context) -> Result<()> {
     let size = (cameras[0].width, cameras[0].height);
     let mut engine = render_engine(gpu, &model, std::iter::once(size))?;
     engine.upload_model(&model)?;
+    let options = RenderOptions { background: args.background, ..RenderOptions::new(near, Parts::COLOUR) };
     let mut progress = Progress::new(stops.len() as u64, "frames", &context.global);
     let mut written = Vec::new();
     for (index, stop) in stops.iter().enumerate() {
-        let rendered = render(&mut engine, &stop.camera, near, args.background, model.sh_degree)?;
+        let rendered = render(&mut engine, &stop.camera, &options)?;
         let file = format!("frames/{index:05}.png");
         write_rgb(&args.output.join(&file), size, &rendered.rgb, Format::Png)?;
         let photo = stop.camera_index.map(|view| views[view].name.clone());

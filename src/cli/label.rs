@@ -13,7 +13,7 @@ use crate::io::model::write_model;
 use crate::label::vote::ballot::{Sweep, Voter, columns_for};
 use crate::label::vote::decide::{Decision, apply, count};
 use crate::label::vote::lift::{Lift, lift};
-use crate::render::render;
+use crate::render::{RenderOptions, render};
 use crate::scene::{Gaussians, UNLABELLED, View};
 use crate::train::LabelRule;
 use crate::{Error, Result};
@@ -136,7 +136,7 @@ fn lift_all(engine: &mut Engine, model: &mut Gaussians, views: &[&View], near: f
     let how = Lift { threshold: args.label_threshold, gpf: args.gpf };
     for view in order.into_iter().map(|index| views[index]) {
         let Some(mask) = &view.mask else { continue };
-        let rendered = render(engine, &view.camera, near, [0.0; 3], 0)?;
+        let rendered = render(engine, &view.camera, &RenderOptions::of_labels(near))?;
         lift(&mut labels, &model.means, &view.camera.relative_to(model.origin), &rendered, mask, how);
     }
     model.labels = Some(labels);

@@ -79,7 +79,7 @@ fn subject(args: &PlanArgs, context: &Context) -> Result<Subject> {
         vote_columns: COLUMNS_MAX,
     });
     let size = (args.size.0, args.size.1);
-    let room = EngineSize { gaussians: args.gaussians.max(1), size, trained: true, labels };
+    let room = EngineSize::new(args.gaussians.max(1), size).for_training().with_labels(labels);
     let capacity = capacity(&shape, &room);
     let variant =
         Variant { labels: labels.is_some(), lift: false, sh_degree: args.sh_degree, size, update: true, counts: false };
@@ -139,8 +139,8 @@ fn to_text(subject: &Subject, (memory, plan): &(MemoryReport, Plan)) -> String {
          SCRATCH ARENA of the step; buffers whose items do not overlap share bytes\n{}\n\
          PASSES\n{}",
         room.gaussians,
-        room.size.0,
-        room.size.1,
+        room.image.0,
+        room.image.1,
         subject.device.as_deref().unwrap_or("none found, limits assumed"),
         shape_text(&subject.shape),
         capacity.instances,
@@ -165,7 +165,7 @@ fn to_json(subject: &Subject, (memory, plan): &(MemoryReport, Plan), problem: Op
         "device": subject.device,
         "kernels": shape_json(&subject.shape),
         "gaussians": room.gaussians,
-        "size": [room.size.0, room.size.1],
+        "size": [room.image.0, room.image.1],
         "label_samples": room.labels.map_or(0, |labels| labels.layers),
         "instances": subject.capacity.instances,
         "layer_tiles": subject.capacity.layer_tiles,

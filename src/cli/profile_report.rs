@@ -92,7 +92,7 @@ impl Profile {
             warm_up: window.warm_up,
             views: 0,
             gaussians: 0,
-            room: EngineSize { gaussians: 0, size: (0, 0), trained: true, labels: None },
+            room: EngineSize::default().for_training(),
             clocks: Clocks::default(),
             passes: Vec::new(),
             stages: Vec::new(),
@@ -177,7 +177,7 @@ impl Profile {
             Some(Workers { count, source }) => format!("times {count} worker threads ({source})"),
             None => "of the whole device".to_owned(),
         };
-        let (width, height) = self.room.size;
+        let (width, height) = self.room.image;
         let walked =
             self.counters.iter().find(|(name, _, _)| *name == "pairs_walked").map_or(f64::NAN, |(_, _, v)| v.mean);
         format!(
@@ -196,7 +196,7 @@ impl Profile {
             (self.from_step + self.warm_up + 1, self.from_step + self.warm_up + self.steps.len() as u32);
         let labels = if self.room.labels.is_some() { "with labels" } else { "without labels" };
         let mode = if self.overlap { "passes overlap" } else { "a barrier before each pass" };
-        let (width, height) = self.room.size;
+        let (width, height) = self.room.image;
         let mut text = format!(
             "device:  {} ({})\nkernels: {}\nsteps {first} to {last} of training {labels}, {} views of up to {width} x \
              {height} px, {} Gaussians at the end\n{} steps count for the passes, {} first runs of a recording do not; \
@@ -248,7 +248,7 @@ impl Profile {
             "warm_up": self.warm_up,
             "labels": self.room.labels.is_some(),
             "views": self.views,
-            "size": [self.room.size.0, self.room.size.1],
+            "size": [self.room.image.0, self.room.image.1],
             "gaussians": self.gaussians,
             "steps_counted": self.counted(),
             "stages": self.stages.iter().map(row).collect::<Vec<_>>(),

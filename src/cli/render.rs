@@ -10,7 +10,7 @@ use super::{labelled, stdout};
 use crate::edit::select::remove;
 use crate::io::camera_json::read_camera;
 use crate::render::pictures::{Format, Pictures, What, write_pictures};
-use crate::render::render;
+use crate::render::{Parts, RenderOptions, render};
 use crate::scene::{Camera, Gaussians, stems};
 use crate::{Error, Result};
 use clap::Args;
@@ -77,9 +77,12 @@ pub fn run(args: &RenderArgs, context: &Context) -> Result<()> {
     let gpu = open_gpu(context)?;
     let mut engine = render_engine(gpu, &shown, cameras.iter().map(|(_, camera)| (camera.width, camera.height)))?;
     engine.upload_model(&shown)?;
+    let asked = |of: &[What]| args.what.iter().any(|what| of.contains(what));
+    let parts = Parts { depth: asked(&[What::Depth]), main: asked(&[What::Labels, What::TopId, What::TopWeight]) };
+    let options = RenderOptions { background: args.background, ..RenderOptions::new(near, parts) };
     let mut files = Vec::new();
     for (stem, camera) in &cameras {
-        let rendered = render(&mut engine, camera, near, args.background, shown.sh_degree)?;
+        let rendered = render(&mut engine, camera, &options)?;
         files.extend(write(args, stem, &rendered, &shown)?);
     }
     let files: Vec<String> = files.iter().map(|file| file.display().to_string()).collect();

@@ -117,7 +117,7 @@ fn engine_for(
     sizes: impl Iterator<Item = (u32, u32)>,
     labels: Option<LabelSize>,
 ) -> Result<Engine> {
-    let size = sizes.reduce(|a, b| (a.0.max(b.0), a.1.max(b.1))).unwrap_or((1, 1));
-    let room = EngineSize { gaussians: (model.len() as u64).max(1), size, trained: false, labels };
+    let image = sizes.reduce(|a, b| (a.0.max(b.0), a.1.max(b.1))).unwrap_or((1, 1));
+    let room = EngineSize::new((model.len() as u64).max(1), image).with_labels(labels);
     Engine::new(gpu, room, SchedulerOptions::default())
 }

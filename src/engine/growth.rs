@@ -24,7 +24,7 @@ pub struct GrownSizes {
 
 /// Capacities for some room, before any measurement.
 pub fn capacity(shape: &KernelShape, room: &EngineSize) -> Capacity {
-    let (width, height) = room.size;
+    let (width, height) = room.image;
     let (tiles_x, tiles_y) = shape.tiles(width, height);
     let tiles = u64::from(tiles_x) * u64::from(tiles_y);
     let layers = room.labels.map_or(0, |labels| u64::from(labels.layers));
@@ -83,7 +83,7 @@ impl Engine {
                 labels: room.labels.is_some(),
                 lift: room.labels.is_some(),
                 sh_degree: 3,
-                size: room.size,
+                size: room.image,
                 update: true,
                 counts: false,
             };
@@ -98,12 +98,13 @@ impl Engine {
         if count <= self.room.gaussians {
             return Ok(());
         }
+        self.check_idle()?;
         let roomy = Capacity::grown(self.room.gaussians, count);
-        let gaussians = if self.fits(&self.capacity_for(roomy))? { roomy } else { count };
-        let gaussians = match self.set_capacity(self.capacity_for(gaussians)) {
+        let gaussians = if self.fits(&self.with_gaussians(roomy))? { roomy } else { count };
+        let gaussians = match self.set_capacity(self.with_gaussians(gaussians)) {
             // Drivers may hold less than they tell.
             Err(error) if error.is_out_of_memory() && gaussians > count => {
-                self.set_capacity(self.capacity_for(count))?;
+                self.set_capacity(self.with_gaussians(count))?;
                 count
             }
             other => other.map(|()| gaussians)?,
@@ -112,15 +113,30 @@ impl Engine {
         Ok(())
     }
 
+    /// Makes the largest image at least `width` x `height` px; the model stays. Nothing may be in flight. All lists are
+    /// recorded again.
+    pub fn grow_image(&mut self, width: u32, height: u32) -> Result<()> {
+        let image = (self.room.image.0.max(width), self.room.image.1.max(height));
+        if image == self.room.image {
+            return Ok(());
+        }
+        self.check_idle()?;
+        let room = EngineSize { image, ..self.room };
+        room.check(&self.shape)?;
+        self.set_capacity(self.capacity_for(&room))?;
+        self.room = room;
+        Ok(())
+    }
+
     /// The most Gaussians, up to `wanted`, that there is memory for. What there is room for already is never less.
     pub fn most_gaussians(&self, wanted: u64) -> Result<u64> {
         let (mut fits, mut too_many) = (self.room.gaussians, wanted + 1);
-        if wanted <= fits || self.fits(&self.capacity_for(wanted))? {
+        if wanted <= fits || self.fits(&self.with_gaussians(wanted))? {
             return Ok(wanted);
         }
         while fits + 1 < too_many {
             let middle = fits.midpoint(too_many);
-            if self.fits(&self.capacity_for(middle))? {
+            if self.fits(&self.with_gaussians(middle))? {
                 fits = middle;
             } else {
                 too_many = middle;
@@ -129,10 +145,14 @@ impl Engine {
         Ok(fits)
     }
 
-    /// Capacities for more Gaussians, with no fewer pairs, tiles and segments than the scene has needed so far.
-    fn capacity_for(&self, gaussians: u64) -> Capacity {
+    fn with_gaussians(&self, gaussians: u64) -> Capacity {
+        self.capacity_for(&EngineSize { gaussians, ..self.room })
+    }
+
+    /// Capacities for a larger room, with no fewer pairs, tiles and segments than the scene has needed so far.
+    fn capacity_for(&self, room: &EngineSize) -> Capacity {
         let old = self.sched.capacity();
-        let mut new = capacity(&self.shape, &EngineSize { gaussians, ..self.room });
+        let mut new = capacity(&self.shape, room);
         new.layer_tiles = new.layer_tiles.max(old.layer_tiles);
         new.segments = old.segments;
         let instances = new.instances.max(old.instances);
@@ -150,12 +170,13 @@ impl Engine {
         }
     }
 
-    /// Grows what a failed list needed, and clears the failure. True if something grew.
+    /// Grows what a failed list needed, and clears the failure. True if something grew; lists that were in flight have
+    /// changed nothing then.
     pub fn recover(&mut self, report: &Report) -> Result<bool> {
         if report.failure == 0 {
             return Ok(false);
         }
-        self.sched.wait_all()?;
+        self.abandon()?;
         let needed = &report.counters;
         let grown = self.capacity_of(needed, Capacity::grown);
         // Where there is no room for more than what is needed, that must do.

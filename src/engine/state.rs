@@ -9,21 +9,28 @@ use crate::scheduler::plan::{Buf, TABLE};
 use glam::DVec3;
 use std::collections::BTreeMap;
 
-/// The buffers of the state of a training with this degree of the spherical harmonics.
-fn buffers(sh_degree: u32, labels: bool) -> Vec<Buf> {
+/// The buffers of the state of a training with this degree of the spherical harmonics, with those that its strategy keeps.
+fn buffers(sh_degree: u32, labels: bool, kept: &[Buf]) -> Vec<Buf> {
     let attributes = ATTRIBUTES.iter().filter(|a| a.from_degree <= sh_degree).flat_map(|a| a.planes);
     let labels = labels.then_some(Buf::LABELS);
-    attributes.chain([Buf::DENSIFY_STATS]).chain(labels).collect()
+    attributes.chain(kept.iter().copied()).chain(labels).collect()
+}
+
+fn named(name: &str) -> Option<Buf> {
+    TABLE.iter().position(|decl| decl.name == name).map(|index| Buf(index as u16))
 }
 
 fn words(buf: Buf) -> u32 {
     TABLE[buf.index()].element_bytes / 4
 }
 
-/// Says what is wrong with planes that are to be the state of `count` Gaussians. `labels` is true with masks.
-pub fn check(planes: &[Plane], count: u32, sh_degree: u32, labels: bool) -> Result<(), String> {
+/// Says what is wrong with planes that are to be the state of `count` Gaussians. `labels` is true with masks; `kept` are
+/// the names of what the strategy keeps.
+pub fn check(planes: &[Plane], count: u32, sh_degree: u32, labels: bool, kept: &[String]) -> Result<(), String> {
+    let kept = kept.iter().map(|name| named(name).ok_or_else(|| format!("there is no plane {name}")));
+    let kept = kept.collect::<Result<Vec<_>, _>>()?;
     let mut given: BTreeMap<&str, &Plane> = planes.iter().map(|plane| (plane.name.as_str(), plane)).collect();
-    for buf in buffers(sh_degree, labels) {
+    for buf in buffers(sh_degree, labels, &kept) {
         let (name, words) = (TABLE[buf.index()].name, words(buf));
         let plane = given.remove(name).ok_or_else(|| format!("the plane {name} is missing"))?;
         let rows = plane.data.len() as u64 / u64::from(plane.words.max(1));
@@ -38,10 +45,10 @@ pub fn check(planes: &[Plane], count: u32, sh_degree: u32, labels: bool) -> Resu
 }
 
 impl Engine {
-    /// Reads the state; nothing may be in flight.
-    pub fn download_state(&mut self, sh_degree: u32) -> Result<Vec<Plane>> {
+    /// Reads the state with what the strategy keeps; nothing may be in flight.
+    pub fn download_state(&mut self, kept: &[Buf]) -> Result<Vec<Plane>> {
         let count = self.gaussian_count as usize;
-        let planes = buffers(sh_degree, self.room.labels.is_some()).into_iter().map(|buf| {
+        let planes = buffers(self.sh_degree, self.room.labels.is_some(), kept).into_iter().map(|buf| {
             let data = self.sched.download(buf, 0, 0, count * words(buf) as usize)?;
             Ok(Plane { name: TABLE[buf.index()].name.to_owned(), words: words(buf), data })
         });
@@ -52,8 +59,8 @@ impl Engine {
     pub fn upload_state(&mut self, count: u32, origin: DVec3, planes: &[Plane]) -> Result<()> {
         self.make_room_for_gaussians(u64::from(count))?;
         for plane in planes {
-            if let Some(index) = TABLE.iter().position(|decl| decl.name == plane.name) {
-                self.sched.upload(Buf(index as u16), 0, 0, &plane.data)?;
+            if let Some(buf) = named(&plane.name) {
+                self.sched.upload(buf, 0, 0, &plane.data)?;
             }
         }
         (self.gaussian_count, self.origin) = (count, origin);

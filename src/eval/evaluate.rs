@@ -7,17 +7,15 @@ use crate::edit::select::extract;
 use crate::engine::Engine;
 use crate::error::{Error, Result};
 use crate::label::occlusion::{Rule, by_contour};
-use crate::render::{Rendered, render};
+use crate::render::{Parts, RenderOptions, Rendered, render};
 use crate::scene::{Gaussians, LabelMap, View};
 use std::collections::BTreeMap;
 
 /// How views are rendered for scoring.
 #[derive(Clone, Copy, Debug)]
 pub struct Rendering {
-    /// Near plane, world units.
-    pub near: f32,
-    /// Colour behind the scene; objects are rendered on black.
-    pub background: [f32; 3],
+    /// Of whole scenes; objects are rendered on black.
+    pub options: RenderOptions,
     /// Least confidence of an object's Gaussians where it is rendered alone.
     pub min_confidence: f32,
 }
@@ -49,11 +47,13 @@ pub fn evaluate(
     watch: &mut dyn Watch,
 ) -> Result<Scores> {
     engine.upload_model(model)?;
+    let of_scene = RenderOptions { parts: Parts::ALL, ..how.options };
+    let of_object = RenderOptions { background: [0.0; 3], parts: Parts::COLOUR, ..how.options };
     let labels = model.labels.as_deref();
     let mut scores = Vec::new();
     let mut hidden = Vec::new();
     for view in views {
-        let rendered = render(engine, &view.camera, how.near, how.background, model.sh_degree)?;
+        let rendered = render(engine, &view.camera, &of_scene)?;
         let map = labels.map(|labels| rendered.label_map(labels));
         let score = ViewScores::new(&rendered.rgb, photo(view)?, map.as_ref(), view.mask.as_ref())?;
         let numbers = vec![("PSNR", Some(score.psnr)), ("SSIM", Some(score.ssim))];
@@ -69,7 +69,7 @@ pub fn evaluate(
         }
         for (index, view) in views.iter().enumerate() {
             let rendered = match &part {
-                Some(_) => Some(render(engine, &view.camera, how.near, [0.0; 3], model.sh_degree)?),
+                Some(_) => Some(render(engine, &view.camera, &of_object)?),
                 None => None,
             };
             let alone = rendered.as_ref().map(|r| ObjectRender { colour: &r.rgb, alpha: &r.alpha });

@@ -44,6 +44,30 @@ pub struct Variant {
     pub counts: bool,
 }
 
+/// Where a training step can be extended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Hook {
+    /// Behind project_backward: the gradients of the visible Gaussians are known.
+    Gradients,
+    /// Behind Adam, in steps that update the parameters.
+    Updated,
+}
+
+/// What a strategy changes in training steps. `passes` is a number of its own, from 1: each has its recording.
+pub trait Extension: std::fmt::Debug + Send + Sync {
+    /// Adds passes.
+    fn extend(&self, _passes: u32, _hook: Hook, _b: &mut Builder) {}
+
+    /// True if Adam moves Gaussians that the step does not show, whose gradient is 0, as 3DGS does. Otherwise they and
+    /// their moments stay as they are.
+    fn updates_unseen(&self, _passes: u32) -> bool {
+        true
+    }
+}
+
+/// Changes nothing.
+impl Extension for () {}
+
 fn begin<'a>(name: &str, shape: &'a KernelShape, capacity: &'a Capacity, labels: bool, sh_degree: u32) -> Builder<'a> {
     let mut b = Builder { shape, capacity, labels, sh_degree, counts: false, list: PassList::new(name) };
     pass!(b, step_begin { step: Buf::STEP, counters: Buf::COUNTERS, dispatch_args: Buf::DISPATCH_ARGS } [],
@@ -60,6 +84,16 @@ fn end(mut b: Builder) -> PassList {
 
 /// One optimiser step on one view.
 pub fn training_step(shape: &KernelShape, capacity: &Capacity, variant: Variant) -> PassList {
+    extended_step(shape, capacity, variant, (&(), 0))
+}
+
+/// The same with what an extension adds under some number.
+pub fn extended_step(
+    shape: &KernelShape,
+    capacity: &Capacity,
+    variant: Variant,
+    (extension, passes): (&dyn Extension, u32),
+) -> PassList {
     let mut b = begin("training step", shape, capacity, variant.labels, variant.sh_degree);
     b.counts = variant.counts;
     project::visible_splats(&mut b);
@@ -69,8 +103,10 @@ pub fn training_step(shape: &KernelShape, capacity: &Capacity, variant: Variant)
     blend::blend_backward(&mut b, slots);
     gather::gather(&mut b);
     project::project_backward(&mut b);
+    extension.extend(passes, Hook::Gradients, &mut b);
     if variant.update {
-        optimize::adam(&mut b);
+        optimize::adam(&mut b, extension.updates_unseen(passes));
+        extension.extend(passes, Hook::Updated, &mut b);
     }
     if variant.lift {
         lift::resolve(&mut b);

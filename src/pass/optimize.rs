@@ -37,16 +37,16 @@ const fn attribute(planes: [Buf; 3], gradient: Buf, stride: u32, rate: u32, from
     Attribute { planes, gradient, stride, rate, from_degree, args }
 }
 
-/// One Adam update of the attributes that are active.
-pub fn adam(b: &mut Builder) {
-    let degree = b.sh_degree;
+/// One Adam update of the attributes that are active; of all Gaussians, or of those alone that the step shows.
+pub fn adam(b: &mut Builder, unseen: bool) {
+    let (degree, seen_only) = (b.sh_degree, u32::from(!unseen));
     b.list.stage = Stage::Optimise;
     for a in ATTRIBUTES.iter().filter(|a| a.from_degree <= degree) {
         pass!(b, adam {
             step: Buf::STEP, failure: Buf::FAILURE, splat_from_gaussian: Buf::SPLAT_FROM_GAUSSIAN,
             gradients: a.gradient, parameters_in: a.planes[0], first_moments_in: a.planes[1],
             second_moments_in: a.planes[2], parameters: a.planes[0], first_moments: a.planes[1], second_moments: a.planes[2],
-        } [stride: a.stride, rate: a.rate], args(a.args));
+        } [stride: a.stride, rate: a.rate, seen_only: seen_only], args(a.args));
     }
 }
 

@@ -43,7 +43,7 @@ pub fn separate_step(shape: &KernelShape, capacity: &Capacity, variant: Variant,
         next_object(&mut b);
     }
     if variant.update {
-        optimize::adam(&mut b);
+        optimize::adam(&mut b, true);
     }
     if variant.lift {
         lift::resolve(&mut b);

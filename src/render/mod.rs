@@ -2,13 +2,65 @@
 
 pub mod pictures;
 
-use crate::engine::uniforms::view_uniforms;
 use crate::engine::{Engine, ListKey};
 use crate::error::Result;
 use crate::scene::{Camera, LabelMap};
-use crate::scheduler::plan::Buf;
 
-/// One rendered view, row-major.
+/// The near plane of 3DGS, world units: what a model is rendered with of which nothing is known.
+pub const NEAR: f32 = 0.2;
+
+/// What is read back of a picture besides colour and alpha.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Parts {
+    /// Depth.
+    pub depth: bool,
+    /// The main Gaussians and their weights.
+    pub main: bool,
+}
+
+impl Parts {
+    /// Colour and alpha only.
+    pub const COLOUR: Self = Self { depth: false, main: false };
+    /// The same with depth.
+    pub const DEPTH: Self = Self { depth: true, main: false };
+    /// The same with the main Gaussians.
+    pub const MAIN: Self = Self { depth: false, main: true };
+    /// Everything.
+    pub const ALL: Self = Self { depth: true, main: true };
+}
+
+/// How a picture is made.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RenderOptions {
+    /// Gaussians nearer to the camera plane are not drawn, world units.
+    pub near: f32,
+    /// Colour behind the scene.
+    pub background: [f32; 3],
+    /// Degree of the spherical harmonics; none: the model's.
+    pub sh_degree: Option<u32>,
+    /// What is read back.
+    pub parts: Parts,
+}
+
+impl Default for RenderOptions {
+    fn default() -> Self {
+        Self { near: NEAR, background: [0.0; 3], sh_degree: None, parts: Parts::ALL }
+    }
+}
+
+impl RenderOptions {
+    /// Some parts, on black.
+    pub fn new(near: f32, parts: Parts) -> Self {
+        Self { near, parts, ..Self::default() }
+    }
+
+    /// For main Gaussians only, whose colour does not matter.
+    pub fn of_labels(near: f32) -> Self {
+        Self { sh_degree: Some(0), ..Self::new(near, Parts::MAIN) }
+    }
+}
+
+/// One rendered view, row-major. What was not asked for is empty.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Rendered {
     /// Width, px.
@@ -28,14 +80,16 @@ pub struct Rendered {
 }
 
 impl Rendered {
-    /// Label of the main Gaussian of each pixel (LabelGS, inference), 0 where none contributes.
+    /// Label of the main Gaussian of each pixel (LabelGS, inference), 0 where none contributes. Needs [`Parts::main`].
     pub fn label_map(&self, labels: &[u32]) -> LabelMap {
+        debug_assert_eq!(self.top_id.len(), self.rgb.len(), "main Gaussians were not asked for");
         let id = |&top: &i32| usize::try_from(top).map_or(0, |index| labels[index] as u16);
         LabelMap { width: self.width, height: self.height, ids: self.top_id.iter().map(id).collect() }
     }
 
-    /// Depth divided by alpha; 0 where alpha is below one half.
+    /// Depth divided by alpha; 0 where alpha is below one half. Needs [`Parts::depth`].
     pub fn mean_depth(&self) -> Vec<f32> {
+        debug_assert_eq!(self.depth.len(), self.rgb.len(), "depth was not asked for");
         self.depth
             .iter()
             .zip(&self.alpha)
@@ -44,39 +98,23 @@ impl Rendered {
     }
 }
 
-/// Renders the engine's model; grows buffers as needed.
-pub fn render(
-    engine: &mut Engine,
-    camera: &Camera,
-    near: f32,
-    background: [f32; 3],
-    sh_degree: u32,
-) -> Result<Rendered> {
-    loop {
-        engine.sched().wait_all()?;
-        let uniforms =
-            view_uniforms(camera, engine.origin(), engine.shape(), near, background, engine.gaussian_count());
-        let list = engine.list(ListKey::Render(sh_degree))?;
-        let sched = engine.sched_mut();
-        sched.upload(Buf::STEP, 0, 0, &[uniforms])?;
-        sched.run(list, 0)?;
-        let report = engine.report(0)?;
-        if !engine.recover(&report)? {
-            break;
-        }
-    }
-    let pixels = (camera.width * camera.height) as usize;
-    let sched = engine.sched_mut();
-    let image = sched.download::<[f32; 4]>(Buf::IMAGE, 0, 0, pixels)?;
-    let main = sched.download::<i32>(Buf::MAIN_GAUSSIAN, 0, 0, pixels)?;
-    let weight_depth = sched.download::<[f32; 2]>(Buf::MAIN_WEIGHT_DEPTH, 0, 0, pixels)?;
+/// Renders the engine's model; grows buffers as needed. The camera's image must fit the engine's
+/// ([`Engine::grow_image`]), and nothing may be in flight.
+pub fn render(engine: &mut Engine, camera: &Camera, options: &RenderOptions) -> Result<Rendered> {
+    let uniforms = engine.view_uniforms(camera, options.near, options.background);
+    engine.run(ListKey::Render(options.sh_degree.unwrap_or(engine.sh_degree())), &uniforms)?;
+    let pixels = camera.width as usize * camera.height as usize;
+    let Parts { depth, main } = options.parts;
+    let image = engine.picture(pixels)?;
+    let weight_depth = if depth || main { engine.weights_and_depths(pixels)? } else { Vec::new() };
+    let pick = |asked: bool, part: usize| weight_depth.iter().filter(|_| asked).map(|pair| pair[part]).collect();
     Ok(Rendered {
         width: camera.width,
         height: camera.height,
         rgb: image.iter().map(|&[r, g, b, _]| [r, g, b]).collect(),
         alpha: image.iter().map(|pixel| 1.0 - pixel[3]).collect(),
-        depth: weight_depth.iter().map(|pair| pair[1]).collect(),
-        top_id: main,
-        top_weight: weight_depth.iter().map(|pair| pair[0]).collect(),
+        depth: pick(depth, 1),
+        top_id: if main { engine.main_gaussians(pixels)? } else { Vec::new() },
+        top_weight: pick(main, 0),
     })
 }

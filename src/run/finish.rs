@@ -103,13 +103,10 @@ impl Run<'_> {
         if views.is_empty() {
             return Ok(None);
         }
-        let mut model = self.trainer.model()?;
-        // Bands that were never let in are 0; without them the render is cheaper.
-        model.sh_degree = model.sh_degree.max(self.trainer.sh_degree());
-        let config = &self.settings.train;
-        let how = Rendering { near: config.near, background: config.background, min_confidence: MIN_LABEL_CONFIDENCE };
+        let model = self.trainer.model()?;
+        let how = Rendering { options: self.trainer.render_options(), min_confidence: MIN_LABEL_CONFIDENCE };
         let scores = evaluate(self.trainer.engine_mut(), &model, &views, how, &(), &mut ())?;
-        scores.warn_of_odd_view(how.near);
+        scores.warn_of_odd_view(self.settings.train.near);
         Ok(Some(scores))
     }
 }

@@ -2,7 +2,6 @@
 //! and may pause, save and stop.
 
 use super::Summary;
-use crate::engine::Engine;
 use crate::error::Result;
 use crate::eval::scores::Scores;
 use crate::render::{Rendered, render};
@@ -123,9 +122,10 @@ impl<'a> Live<'a> {
     /// A picture of the scene as it is now, from any camera and of any size.
     pub fn render(&mut self, camera: &Camera) -> Result<Rendered> {
         self.trainer.drain()?;
-        let (degree, config) = (self.trainer.sh_degree(), self.trainer.config().clone());
-        let engine: &mut Engine = self.trainer.engine_mut();
-        render(engine, camera, config.near, config.background, degree)
+        let options = self.trainer.render_options();
+        let engine = self.trainer.engine_mut();
+        engine.grow_image(camera.width, camera.height)?;
+        render(engine, camera, &options)
     }
 
     /// The model as it is now, with the labels of the last count of votes.

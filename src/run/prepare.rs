@@ -167,8 +167,8 @@ fn start(
         "memory to start with: {:.1} MiB on the device, for {} Gaussians and {} x {} px; it grows with the model",
         memory.total as f64 / f64::from(1 << 20),
         room.gaussians,
-        room.size.0,
-        room.size.1
+        room.image.0,
+        room.image.1
     );
     let mut trainer = Trainer::new(gpu, config.clone(), dataset, &model, options)?;
     if let Some(table) = occluders {

@@ -310,31 +310,6 @@ impl TrainConfig {
         (step / self.sh_degree_interval).min(self.sh_degree)
     }
 
-    /// Step at which densification ends.
-    pub fn densify_until(&self) -> u32 {
-        /// Steps of densification that a short run needs.
-        const LEAST: u32 = 1000;
-        self.densify_until.unwrap_or((self.iterations / 2).max(self.densify_from.saturating_add(LEAST)))
-    }
-
-    /// True for steps that end with a densification.
-    pub fn densifies_at(&self, step: u32) -> bool {
-        step < self.densify_until() && step > self.densify_from && step.is_multiple_of(self.densify_interval)
-    }
-
-    /// True where a densification at `step` also prunes by size.
-    pub fn prunes_large_at(&self, step: u32) -> bool {
-        self.opacity_reset_interval > 0 && step > self.opacity_reset_interval
-    }
-
-    /// True for steps that end with an opacity reset.
-    pub fn resets_opacity_at(&self, step: u32) -> bool {
-        self.opacity_reset_interval > 0
-            && step < self.densify_until()
-            && step.is_multiple_of(self.opacity_reset_interval)
-            && self.iterations.saturating_sub(step) > self.opacity_reset_margin
-    }
-
     /// True for steps that lift labels and add the label loss, given masks.
     pub fn labels_at(&self, step: u32) -> bool {
         step >= self.labels_from()

@@ -1,35 +1,38 @@
 //! Training: the loop over steps, and what happens between them.
 
 pub mod config;
-mod densify;
 pub mod near;
 mod occlusion;
 mod sampler;
 mod sentinel;
+mod setup;
 mod state;
 pub mod step_input;
+pub mod strategy;
 mod timing;
 mod views;
 mod votes;
 
 pub use config::{LabelRule, Occlusion, TrainConfig};
-pub use densify::Densified;
+pub use setup::{TrainerOptions, room, start_room};
 pub use state::{TrainState, ViewFingerprint};
+pub use strategy::Densified;
 pub use timing::StepTimes;
 
-use crate::engine::{Engine, EngineSize, LabelSize, ListKey, Report};
-use crate::error::{Error, Result};
+use crate::engine::{Engine, EngineSize, InFlight, ListKey, Report};
+use crate::error::Result;
 use crate::fault;
 use crate::gpu::Gpu;
-use crate::label::vote::ballot::columns_for;
 use crate::pass::{KernelShape, Variant};
+use crate::render::RenderOptions;
 use crate::scene::{Dataset, Gaussians};
-use crate::scheduler::plan::Buf;
-use crate::scheduler::{SchedulerOptions, Ticket};
+use crate::scheduler::plan::FRAMES_IN_FLIGHT;
+use crate::shaders::structs::StepUniforms;
 use sampler::ViewOrder;
-use std::collections::{BTreeSet, VecDeque};
+use std::collections::VecDeque;
 use std::sync::Arc;
 use step_input::{SceneScale, StepInput, TrainView};
+use strategy::{At, Bound, Population, Strategy};
 use views::Views;
 
 /// What is known about a finished step.
@@ -52,15 +55,15 @@ pub struct Trainer {
     views: Views,
     fixed: SceneScale,
     order: ViewOrder,
-    /// Steps submitted, not yet absorbed; at most one per frame.
-    in_flight: VecDeque<(StepInput, Ticket)>,
+    /// Largest photo, px. The engine's image may have grown beyond it since.
+    image: (u32, u32),
+    /// Steps submitted and not retired yet; at most one per frame.
+    in_flight: VecDeque<(StepInput, InFlight)>,
     /// Steps submitted so far.
     step: u32,
     updates: u32,
-    stamp: u32,
-    max_gaussians: u64,
-    /// Memory has bounded the number of Gaussians, which was said.
-    memory_bounds: bool,
+    bound: Bound,
+    strategy: Box<dyn Strategy>,
     /// Votes were counted before, so that masks can be compared with their outcome.
     labelled_once: bool,
     /// Objects have passes of their own.
@@ -77,42 +80,6 @@ pub struct Trainer {
     densified: Option<Densified>,
 }
 
-/// Room for training on a data set.
-pub fn room(dataset: &Dataset, config: &TrainConfig, gaussians: u64) -> Result<EngineSize> {
-    let sizes = dataset.train.iter().chain(&dataset.test).map(|view| (view.camera.width, view.camera.height));
-    let size = sizes.reduce(|a, b| (a.0.max(b.0), a.1.max(b.1)));
-    let size = size.ok_or_else(|| Error::data(&dataset.root, "", "the scene has no view to train on"))?;
-    let objects: Vec<u16> =
-        dataset.train.iter().filter_map(|view| view.mask.as_ref()).flat_map(|m| m.objects()).collect();
-    let most = dataset.train.iter().filter_map(|view| view.mask.as_ref().map(|mask| mask.objects().len())).max();
-    let labels = objects.iter().max().map(|&max_label| LabelSize {
-        max_label: u32::from(max_label),
-        layers: config.label_samples.min(most.unwrap_or(0) as u32),
-        vote_columns: match config.label_rule {
-            LabelRule::Votes => columns_for(objects.iter().collect::<BTreeSet<_>>().len()),
-            LabelRule::Main => 0,
-        },
-    });
-    Ok(EngineSize { gaussians, size, trained: true, labels })
-}
-
-/// Room to start with: for twice as many Gaussians as there are, or for those where memory is short.
-pub fn start_room(
-    gpu: &Gpu,
-    dataset: &Dataset,
-    config: &TrainConfig,
-    gaussians: usize,
-    options: SchedulerOptions,
-) -> Result<EngineSize> {
-    let gaussians = gaussians as u64;
-    let most = if config.max_gaussians > 0 { config.max_gaussians } else { u64::MAX };
-    let roomy = room(dataset, config, (gaussians * 2).min(most).max(gaussians))?;
-    match Engine::predict(gpu, &roomy, options) {
-        Err(Error::OutOfMemory { .. }) => Ok(EngineSize { gaussians, ..roomy }),
-        other => other.map(|_| roomy),
-    }
-}
-
 impl Trainer {
     /// Puts the initial model on the device. `dataset.train` gives its photos and masks away.
     pub fn new(
@@ -120,47 +87,42 @@ impl Trainer {
         config: TrainConfig,
         dataset: &mut Dataset,
         model: &Gaussians,
-        options: SchedulerOptions,
-    ) -> Result<Self> {
-        let shape = KernelShape::of(gpu.capabilities());
-        Self::with_shape(gpu, shape, config, dataset, model, options)
-    }
-
-    /// As [`Trainer::new`], with kernels of a given shape.
-    pub fn with_shape(
-        gpu: Arc<Gpu>,
-        shape: KernelShape,
-        config: TrainConfig,
-        dataset: &mut Dataset,
-        model: &Gaussians,
-        options: SchedulerOptions,
+        options: impl Into<TrainerOptions>,
     ) -> Result<Self> {
         config.check()?;
-        let room = start_room(&gpu, dataset, &config, model.len(), options)?;
+        let options = options.into();
+        let room = start_room(&gpu, dataset, &config, model.len(), options.scheduler)?;
         let near = match config.near {
             0.0 => near::near_plane(dataset.train.iter().map(|view| &view.camera), model),
             near => near,
         };
         let config = TrainConfig { near, ..config };
-        let mut trainer = Self::without_model(gpu, shape, config, dataset, room, options)?;
+        let mut trainer = Self::without_model(gpu, config, dataset, room, options)?;
         trainer.engine.upload_model(model)?;
+        // Bands that the model does not have start as 0.
+        trainer.engine.set_sh_degree(trainer.config.sh_degree);
         Ok(trainer)
     }
 
     fn without_model(
         gpu: Arc<Gpu>,
-        shape: KernelShape,
         config: TrainConfig,
         dataset: &mut Dataset,
         room: EngineSize,
-        options: SchedulerOptions,
+        TrainerOptions { shape, scheduler, strategy }: TrainerOptions,
     ) -> Result<Self> {
         let fixed = SceneScale { extent: dataset.extent() };
-        let max_gaussians = if config.max_gaussians > 0 { config.max_gaussians } else { u64::from(u32::MAX) };
-        let views =
-            dataset.train.iter_mut().map(|view| train_view(view, config.mask_border)).collect::<Result<Vec<_>>>()?;
+        let most = if config.max_gaussians > 0 { config.max_gaussians } else { u64::from(u32::MAX) };
+        let views = dataset
+            .train
+            .iter_mut()
+            .map(|view| setup::train_view(view, config.mask_border))
+            .collect::<Result<Vec<_>>>()?;
         let views = Views::new(views, config.coarse_until);
-        let engine = Engine::with_shape(gpu, shape, room, options)?;
+        let shape = shape.unwrap_or_else(|| KernelShape::of(gpu.capabilities()));
+        let mut engine = Engine::with_shape(gpu, shape, room, scheduler)?;
+        engine.set_sh_degree(config.sh_degree);
+        engine.set_extension(strategy.extension());
         let order = ViewOrder::new(config.seed, views.len());
         Ok(Self {
             engine,
@@ -168,12 +130,12 @@ impl Trainer {
             views,
             fixed,
             order,
+            image: room.image,
             in_flight: VecDeque::new(),
             step: 0,
             updates: 0,
-            stamp: 0,
-            max_gaussians,
-            memory_bounds: false,
+            bound: Bound { most, by_memory: false },
+            strategy,
             labelled_once: false,
             separate: false,
             timing: None,
@@ -185,7 +147,7 @@ impl Trainer {
         })
     }
 
-    /// The engine, for renders between steps.
+    /// The engine, for renders between steps; nothing may be in flight ([`Trainer::drain`]).
     pub fn engine_mut(&mut self) -> &mut Engine {
         &mut self.engine
     }
@@ -236,6 +198,12 @@ impl Trainer {
         self.config.sh_degree_at(self.step)
     }
 
+    /// How previews are rendered: as the steps do.
+    pub fn render_options(&self) -> RenderOptions {
+        let (near, background) = (self.config.near, self.config.background);
+        RenderOptions { near, background, sh_degree: Some(self.sh_degree()), ..RenderOptions::default() }
+    }
+
     /// Reads the model back. Steps that failed for want of memory changed nothing in it.
     pub fn model(&mut self) -> Result<Gaussians> {
         if let Err(error) = self.drain() {
@@ -243,8 +211,9 @@ impl Trainer {
                 return Err(error);
             }
             self.in_flight.clear();
+            self.engine.abandon()?;
         }
-        self.engine.download_model(self.config.sh_degree)
+        self.engine.download_model()
     }
 
     /// One step: submits it and, where the schedule says so, densifies. Returns the reports of steps that are done;
@@ -262,29 +231,20 @@ impl Trainer {
         }
         let input = self.input(step);
         if fault::at("nan").is_some() {
-            self.engine.sched_mut().upload(Buf::MEANS, 0, 0, &[f32::NAN])?;
+            self.engine.spoil()?;
         }
-        if self.in_flight.len() == crate::scheduler::plan::FRAMES_IN_FLIGHT {
+        if self.in_flight.len() == FRAMES_IN_FLIGHT {
             done.extend(self.retire()?);
         }
         self.submit(input.clone())?;
         self.step = step;
-        let last = step >= self.config.iterations;
-        let (densifies, resets) =
-            (self.config.densifies_at(step) && !last, self.config.resets_opacity_at(step) && !last);
-        if densifies || resets {
+        if self.strategy.acts_after(self.at(step)) {
             done.extend(self.drain()?);
-            if densifies {
-                let what = self.densify(&input)?;
-                self.densified = Some(what);
-                tracing::debug!("step {step}: {what:?}, {} Gaussians", self.gaussian_count());
-                if self.gaussian_count() == 0 {
-                    return Err(Error::Pruned { step });
-                }
-            }
-            if resets {
-                self.reset_opacity(&input)?;
-            }
+            let uniforms = self.uniforms(&input);
+            let mut population = Population::new(&mut self.engine, &mut self.bound, uniforms, step);
+            let at = At { step, config: &self.config, extent: self.fixed.extent };
+            self.strategy.act(at, &mut population)?;
+            self.densified = population.densified().or(self.densified);
         }
         Ok(done)
     }
@@ -304,23 +264,32 @@ impl Trainer {
         let layers = sampler::sample_objects(self.config.seed, step, &self.views[view].objects, samples);
         // A view whose mask shows nothing, or that has none, costs what a scene without masks costs.
         let labels = !layers.is_empty();
-        // A densification replaces the parameters that the gradients belong to: no update then (3DGS).
-        let update = !(self.config.densifies_at(step) && step < self.config.iterations);
+        let update = self.strategy.updates(self.at(step));
         self.updates += u32::from(update);
-        StepInput { step, view, layers, labels, update, updates: self.updates, stamp: 0 }
+        StepInput { step, view, layers, labels, update, updates: self.updates }
     }
 
-    fn submit(&mut self, mut input: StepInput) -> Result<()> {
-        self.stamp = self.stamp.wrapping_add(1).max(1);
-        input.stamp = self.stamp;
-        let frame = input.step as usize % crate::scheduler::plan::FRAMES_IN_FLIGHT;
-        let key = self.key(&input);
-        self.engine.list(key)?;
-        let view = self.views.of(&input);
-        let uniforms = step_input::uniforms(&input, view, &self.config, self.fixed, &self.engine);
-        step_input::upload(&mut self.engine, frame, uniforms, view, &input, &self.config)?;
-        let ticket = self.engine.submit(key, frame)?;
-        self.in_flight.push_back((input, ticket));
+    fn at(&self, step: u32) -> At<'_> {
+        At { step, config: &self.config, extent: self.fixed.extent }
+    }
+
+    /// True if the model does not show what is in front before a step.
+    fn blurs_depth_before(&self, step: u32) -> bool {
+        step > 1 && self.strategy.blurs_depth_after(self.at(step - 1))
+    }
+
+    fn uniforms(&self, input: &StepInput) -> StepUniforms {
+        let view = self.views.of(input);
+        let mut uniforms = step_input::uniforms(input, view, &self.config, self.fixed, &self.engine);
+        self.strategy.uniforms(self.at(input.step), &mut uniforms);
+        uniforms
+    }
+
+    fn submit(&mut self, input: StepInput) -> Result<()> {
+        let (key, view, uniforms) = (self.key(&input), self.views.of(&input), self.uniforms(&input));
+        let data = step_input::train_input(&input, view, &self.config, uniforms, &self.engine);
+        let flight = self.engine.submit(key, &data)?;
+        self.in_flight.push_back((input, flight));
         Ok(())
     }
 
@@ -329,22 +298,24 @@ impl Trainer {
             labels: input.labels,
             lift: input.lifts(&self.config),
             sh_degree: self.config.sh_degree_at(input.step),
-            size: self.engine.room().size,
+            size: self.image,
             update: input.update,
             counts: self.counts_pairs,
         };
         if self.separate && input.labels {
             return ListKey::Separate(variant, input.layers.len() as u32);
         }
-        ListKey::Train(variant)
+        match self.strategy.passes(self.at(input.step)) {
+            0 => ListKey::Train(variant),
+            passes => ListKey::Extended(variant, passes),
+        }
     }
 
     /// Waits for the oldest step in flight. If a buffer was too small, the step changed nothing, nor did those after it:
     /// the buffer grows and they run again.
     fn retire(&mut self) -> Result<Option<StepReport>> {
-        let Some((input, ticket)) = self.in_flight.front().cloned() else { return Ok(None) };
-        self.engine.sched().wait(ticket)?;
-        let report = self.engine.report(input.step as usize % crate::scheduler::plan::FRAMES_IN_FLIGHT)?;
+        let Some((input, flight)) = self.in_flight.front().cloned() else { return Ok(None) };
+        let report = self.engine.retire(&flight)?;
         let recovered = self.engine.recover(&report);
         if recovered.is_err() {
             // Nothing came of these steps, nor will it.
@@ -359,7 +330,7 @@ impl Trainer {
             return self.retire();
         }
         self.in_flight.pop_front();
-        self.note_times(&input)?;
+        self.note_times(input.step, flight.recording)?;
         let view = self.views.of(&input);
         let scale = 1.0 / (3.0 * view.valid_pixels.max(1) as f64);
         let (counters, lambda) = (&report.counters, f64::from(self.config.lambda_dssim));
@@ -370,16 +341,4 @@ impl Trainer {
         self.newest = Some(StepReport { step: input.step, loss, label_loss, report });
         Ok(self.newest)
     }
-}
-
-fn train_view(view: &mut crate::scene::View, border: u32) -> Result<TrainView> {
-    let photo = view.photo.take().ok_or_else(|| Error::Bug(format!("{} came without its photo", view.name)))?;
-    let valid_pixels = step_input::valid_pixels(&photo);
-    let mask = view.mask.take();
-    let objects = mask.as_ref().map(crate::scene::LabelMap::objects).unwrap_or_default();
-    let (name, camera) = (view.name.clone(), view.camera.clone());
-    let view_labels = mask.as_ref().map(|mask| step_input::view_labels(mask, border)).unwrap_or_default();
-    let shown = step_input::shown_objects(&photo, &view_labels);
-    let occluders = Default::default();
-    Ok(TrainView { name, camera, photo, valid_pixels, mask, objects, view_labels, shown, occluders })
 }

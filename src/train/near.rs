@@ -3,8 +3,8 @@
 use crate::scene::{Camera, Gaussians};
 use glam::DVec3;
 
-/// The near plane of 3DGS, world units: what a model is rendered with of which nothing is known.
-pub const NEAR: f32 = 0.2;
+pub use crate::render::NEAR;
+
 /// The near plane of a small scene, in median depths of its Gaussians.
 const SHARE: f64 = 0.05;
 /// Cameras and Gaussians that are looked at, evenly chosen.

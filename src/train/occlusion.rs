@@ -4,7 +4,7 @@
 use super::{Occlusion, Trainer};
 use crate::error::Result;
 use crate::label::occlusion::{Rule, by_contour};
-use crate::render::render;
+use crate::render::{Parts, RenderOptions, render};
 use crate::scene::Occluders;
 use std::collections::BTreeMap;
 
@@ -44,17 +44,16 @@ impl Trainer {
             && config.occlusion == Occlusion::Rendered
             && config.labels_at(step)
             && (step - config.labels_from()).is_multiple_of(config.occlusion_every)
-            // Right after an opacity reset there is no depth to speak of.
-            && !(step > 1 && config.resets_opacity_at(step - 1))
+            && !self.blurs_depth_before(step)
     }
 
     /// Renders the depth of every view with masks; nothing may be in flight.
     pub(super) fn refresh_occluders(&mut self) -> Result<()> {
-        let degree = self.sh_degree();
+        let options = RenderOptions { parts: Parts::DEPTH, ..self.render_options() };
         for index in 0..self.views.len() {
             let view = &self.views[index];
             let Some(mask) = &view.mask else { continue };
-            let rendered = render(&mut self.engine, &view.camera, self.config.near, self.config.background, degree)?;
+            let rendered = render(&mut self.engine, &view.camera, &options)?;
             let found = by_contour(mask, &rendered.mean_depth(), Rule::default());
             self.views[index].occluders = found;
         }

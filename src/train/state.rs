@@ -4,14 +4,13 @@
 //! objects from the seed and the step, gradients and votes from the next step's own passes.
 
 use super::sampler::ViewOrder;
-use super::{TrainConfig, Trainer, room};
+use super::strategy::Kept;
+use super::{TrainConfig, Trainer, TrainerOptions, room};
 use crate::engine::{GrownSizes, state};
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::io::checkpoint::{Checkpoint, Plane};
-use crate::pass::KernelShape;
 use crate::scene::{Camera, Dataset, LabelMap, Occluders, Photo};
-use crate::scheduler::SchedulerOptions;
 use crate::scheduler::plan::{Buf, TABLE};
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
@@ -50,6 +49,9 @@ pub struct TrainState {
     pub occluders: BTreeMap<String, Occluders>,
     /// What whoever runs the training keeps in the file, null for nothing.
     pub run: serde_json::Value,
+    /// What the strategy keeps; the default one is not mentioned.
+    #[serde(default, skip_serializing_if = "Kept::is_default")]
+    pub strategy: Kept,
     /// Parameters, moments, statistics and labels.
     #[serde(skip)]
     pub planes: Vec<Plane>,
@@ -108,7 +110,8 @@ impl TrainState {
         }
         // Masks may be there and show no object.
         let labels = state.planes.iter().any(|plane| plane.name == TABLE[Buf::LABELS.index()].name);
-        state::check(&state.planes, state.gaussians, state.config.sh_degree, labels).map_err(odd)?;
+        state::check(&state.planes, state.gaussians, state.config.sh_degree, labels, &state.strategy.planes)
+            .map_err(odd)?;
         Ok(state)
     }
 
@@ -154,18 +157,19 @@ impl Trainer {
         }
         Ok(TrainState {
             labelgs: env!("CARGO_PKG_VERSION").to_owned(),
-            device: device(self.engine.sched().gpu()),
+            device: device(self.engine.gpu()),
             step: self.step,
             updates: self.updates,
             gaussians: self.gaussian_count(),
             origin: self.engine.origin().to_array(),
             labelled_once: self.labelled_once,
-            memory_bounds: self.memory_bounds,
+            memory_bounds: self.bound.by_memory,
             sizes: self.engine.sizes(),
             config: self.config.clone(),
             views: self.fingerprints.clone(),
             occluders: self.occluders(),
             run: serde_json::Value::Null,
+            strategy: Kept::of(&*self.strategy),
             planes: self.finite_planes()?,
             path: PathBuf::new(),
         })
@@ -174,7 +178,7 @@ impl Trainer {
     /// The planes of the state, unless one holds a number that is none: to go on from that would help nobody, and what
     /// the last step has spoilt no pass has looked at yet.
     fn finite_planes(&mut self) -> Result<Vec<Plane>> {
-        let planes = self.engine.download_state(self.config.sh_degree)?;
+        let planes = self.engine.download_state(self.strategy.planes())?;
         let is_finite = |word: &u32| f32::from_bits(*word).is_finite();
         for plane in planes.iter().filter(|plane| plane.name != TABLE[Buf::LABELS.index()].name) {
             if let Some(at) = plane.data.iter().position(|word| !is_finite(word)) {
@@ -191,7 +195,12 @@ impl Trainer {
 
     /// Goes on where `state` stopped, to the same bits on the same device as if it had not. `dataset.train` gives its
     /// photos and masks away; it must be what the state was made with.
-    pub fn resume(gpu: Arc<Gpu>, dataset: &mut Dataset, state: TrainState, options: SchedulerOptions) -> Result<Self> {
+    pub fn resume(
+        gpu: Arc<Gpu>,
+        dataset: &mut Dataset,
+        state: TrainState,
+        options: impl Into<TrainerOptions>,
+    ) -> Result<Self> {
         state.config.check()?;
         let views = dataset.train.iter();
         let fingerprints: Vec<ViewFingerprint> =
@@ -203,7 +212,6 @@ impl Trainer {
                 tracing::warn!("{} was made with {then}, this is {now}: bits may differ", state.path.display());
             }
         }
-        let shape = KernelShape::of(gpu.capabilities());
         let room = room(dataset, &state.config, u64::from(state.gaussians))?;
         if let Some(labels) = room.labels
             && let Some(plane) = state.planes.iter().find(|plane| plane.name == "labels")
@@ -212,7 +220,7 @@ impl Trainer {
             let problem = format!("is {label}, the masks have ids up to {}", labels.max_label);
             return Err(Error::data(&state.path, "a label", problem));
         }
-        let mut trainer = Self::without_model(gpu, shape, state.config.clone(), dataset, room, options)?;
+        let mut trainer = Self::without_model(gpu, state.config.clone(), dataset, room, options.into())?;
         trainer.fingerprints = fingerprints;
         trainer.put(&state)?;
         Ok(trainer)
@@ -220,13 +228,14 @@ impl Trainer {
 
     /// Goes back to a state of this very training, whatever has become of it since.
     pub fn restore(&mut self, state: &TrainState) -> Result<()> {
-        // What flies has nothing to say any more.
-        self.engine.sched().wait_all()?;
+        self.engine.abandon()?;
         self.in_flight.clear();
         self.put(state)
     }
 
     fn put(&mut self, state: &TrainState) -> Result<()> {
+        let odd = |problem| Error::data(&state.path, "strategy", problem);
+        state.strategy.restore(&mut *self.strategy).map_err(odd)?;
         match self.engine.grow_to(state.sizes) {
             // On a smaller device there is less room to grow.
             Err(Error::OutOfMemory { .. }) => {}
@@ -236,7 +245,7 @@ impl Trainer {
         self.set_occluders(&state.occluders);
         self.order = ViewOrder::after(self.config.seed, self.views.len(), state.step);
         (self.step, self.updates) = (state.step, state.updates);
-        (self.labelled_once, self.memory_bounds) = (state.labelled_once, state.memory_bounds);
+        (self.labelled_once, self.bound.by_memory) = (state.labelled_once, state.memory_bounds);
         self.seen = Default::default();
         Ok(())
     }

@@ -2,12 +2,9 @@
 
 use super::TrainConfig;
 use super::config::LabelRule;
-use crate::engine::Engine;
-use crate::engine::uniforms::view_uniforms;
-use crate::error::Result;
+use crate::engine::{Engine, LayerInput, TrainInput};
 use crate::io::resample::shrink_photo;
 use crate::scene::{Camera, LabelMap, Occluders, Photo};
-use crate::scheduler::plan::Buf;
 use crate::shaders::constants::{ADAM_BETA1, ADAM_BETA2, LABEL_BORDER};
 use crate::shaders::structs::StepUniforms;
 use std::collections::BTreeMap;
@@ -133,8 +130,6 @@ pub struct StepInput {
     pub update: bool,
     /// Updates so far, this one included.
     pub updates: u32,
-    /// Unique mark of the submit, never 0.
-    pub stamp: u32,
 }
 
 impl StepInput {
@@ -159,8 +154,7 @@ pub fn uniforms(
     fixed: SceneScale,
     engine: &Engine,
 ) -> StepUniforms {
-    let count = engine.gaussian_count();
-    let base = view_uniforms(&view.camera, engine.origin(), engine.shape(), config.near, config.background, count);
+    let base = engine.view_uniforms(&view.camera, config.near, config.background);
     let rate = (config.position_lr(input.step) * fixed.extent) as f32;
     let correction = |beta: f32| (1.0 / (1.0 - f64::from(beta).powi(input.updates.max(1) as i32))) as f32;
     let labels = engine.room().labels.map_or(0, |room| room.max_label + 1);
@@ -173,7 +167,7 @@ pub fn uniforms(
         label_threshold: config.label_threshold,
         gpf: u32::from(config.gpf),
         occluder_words: labels.div_ceil(32),
-        stamp: input.stamp,
+        seed: (config.seed as u32) ^ input.step.wrapping_mul(0x9e37_79b9),
         adam_correction1: correction(ADAM_BETA1),
         adam_correction2: correction(ADAM_BETA2),
         rate_means: [rate, rate, rate, config.opacity_lr as f32],
@@ -185,37 +179,31 @@ pub fn uniforms(
     }
 }
 
-/// Writes everything of a step into a frame.
-pub fn upload(
-    engine: &mut Engine,
-    frame: usize,
-    uniforms: StepUniforms,
-    view: &TrainView,
+/// What the device reads of a step.
+pub fn train_input<'a>(
     input: &StepInput,
+    view: &'a TrainView,
     config: &TrainConfig,
-) -> Result<()> {
-    let room = engine.room().labels;
-    let sched = engine.sched_mut();
-    sched.upload(Buf::STEP, frame, 0, &[uniforms])?;
-    sched.upload(Buf::TARGET, frame, 0, &view.photo.rgba)?;
-    let Some(room) = room.filter(|_| input.labels) else { return Ok(()) };
-    sched.upload(Buf::VIEW_LABELS, frame, 0, &view.view_labels)?;
-    let words = uniforms.occluder_words as usize;
-    let mut layer_from_label = vec![0_u32; room.max_label as usize + 1];
-    let mut label_from_layer = vec![0_u32; room.layers as usize + 1];
-    let mut weights = vec![1.0_f32; room.layers as usize + 1];
-    weights.iter_mut().skip(1).zip(layer_weights(input, view, config)).for_each(|(to, weight)| *to = weight);
-    let mut hidden = vec![0_u32; words * (room.layers as usize + 1)];
-    for (index, &label) in input.layers.iter().enumerate() {
-        let layer = index + 1;
-        layer_from_label[usize::from(label)] = layer as u32;
-        label_from_layer[layer] = u32::from(label);
-        for &occluder in view.occluders.get(&label).into_iter().flatten() {
-            hidden[layer * words + usize::from(occluder / 32)] |= 1 << (occluder % 32);
+    uniforms: StepUniforms,
+    engine: &Engine,
+) -> TrainInput<'a> {
+    let room = engine.room().labels.filter(|_| input.labels);
+    let layers = room.map(|room| {
+        let words = uniforms.occluder_words as usize;
+        let mut layer_from_label = vec![0_u32; room.max_label as usize + 1];
+        let mut label_from_layer = vec![0_u32; room.layers as usize + 1];
+        let mut weights = vec![1.0_f32; room.layers as usize + 1];
+        weights.iter_mut().skip(1).zip(layer_weights(input, view, config)).for_each(|(to, weight)| *to = weight);
+        let mut occluders = vec![0_u32; words * (room.layers as usize + 1)];
+        for (index, &label) in input.layers.iter().enumerate() {
+            let layer = index + 1;
+            layer_from_label[usize::from(label)] = layer as u32;
+            label_from_layer[layer] = u32::from(label);
+            for &occluder in view.occluders.get(&label).into_iter().flatten() {
+                occluders[layer * words + usize::from(occluder / 32)] |= 1 << (occluder % 32);
+            }
         }
-    }
-    sched.upload(Buf::LAYER_FROM_LABEL, frame, 0, &layer_from_label)?;
-    sched.upload(Buf::LABEL_FROM_LAYER, frame, 0, &label_from_layer)?;
-    sched.upload(Buf::LAYER_WEIGHTS, frame, 0, &weights)?;
-    sched.upload(Buf::LAYER_OCCLUDERS, frame, 0, &hidden)
+        LayerInput { view_labels: &view.view_labels, layer_from_label, label_from_layer, weights, occluders }
+    });
+    TrainInput { uniforms, photo: &view.photo.rgba, layers }
 }

@@ -1,10 +1,9 @@
 //! Times of the passes of each step, for `labelgs profile`.
 
 use super::Trainer;
-use super::step_input::StepInput;
+use crate::engine::Recording;
 use crate::error::Result;
 use crate::pass::Stage;
-use crate::scheduler::ListId;
 use std::collections::HashSet;
 
 /// Times of the passes of a step.
@@ -21,7 +20,7 @@ pub struct StepTimes {
 /// What was collected.
 #[derive(Debug, Default)]
 pub(super) struct Timing {
-    seen: HashSet<(ListId, usize)>,
+    seen: HashSet<Recording>,
     times: Vec<StepTimes>,
 }
 
@@ -42,18 +41,10 @@ impl Trainer {
     }
 
     /// Reads the times of a step that has ended and whose frame was not used again.
-    pub(super) fn note_times(&mut self, input: &StepInput) -> Result<()> {
-        if self.timing.is_none() {
-            return Ok(());
-        }
-        let (key, frame) = (self.key(input), input.step as usize % crate::scheduler::plan::FRAMES_IN_FLIGHT);
-        let id = self.engine.list(key)?;
-        let times = self.engine.sched().timings(id, frame)?;
-        let stages = crate::pass::stage::stages(&self.engine.sched().plan(id)?.list);
+    pub(super) fn note_times(&mut self, step: u32, recording: Recording) -> Result<()> {
         if let Some(timing) = &mut self.timing {
-            let items = stages.into_iter().zip(times).map(|((stage, name), (_, ns))| (stage, name, ns)).collect();
-            let is_first = timing.seen.insert((id, frame));
-            timing.times.push(StepTimes { step: input.step, is_first, items });
+            let items = self.engine.times(recording)?;
+            timing.times.push(StepTimes { step, is_first: timing.seen.insert(recording), items });
         }
         Ok(())
     }

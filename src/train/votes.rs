@@ -5,7 +5,6 @@ use crate::error::Result;
 use crate::label::vote::ballot::{Sweep, Voter};
 use crate::label::vote::decide::{self, Decision};
 use crate::scene::Gaussians;
-use crate::scheduler::plan::Buf;
 
 impl Trainer {
     fn votes(&self) -> bool {
@@ -18,32 +17,26 @@ impl Trainer {
         self.votes()
             && config.labels_at(step)
             && (step - config.labels_from()).is_multiple_of(config.vote_every)
-            // Right after an opacity reset nothing tells what is in front.
-            && !(step > 1 && config.resets_opacity_at(step - 1))
+            && !self.blurs_depth_before(step)
     }
 
     /// Counts the votes of all views and gives the labels to the device; nothing may be in flight.
     pub(super) fn refresh_labels(&mut self) -> Result<()> {
         let decision = self.count_votes()?;
-        self.engine.sched_mut().upload(Buf::LABELS, 0, 0, &decision.labels)?;
+        self.engine.set_labels(&decision.labels)?;
         self.labelled_once = true;
         Ok(())
     }
 
     fn count_votes(&mut self) -> Result<Decision> {
         let how = Sweep { near: self.config.near, border: self.config.mask_border };
-        let count = self.engine.gaussian_count() as usize;
-        let rows = self.engine.sched_mut().download::<[f32; 4]>(Buf::MEANS, 0, 0, count)?;
-        let means: Vec<[f32; 3]> = rows.iter().map(|&[x, y, z, _]| [x, y, z]).collect();
+        let means = self.engine.means()?;
         let voters = self.views.iter().filter_map(|view| {
             Some(Voter { camera: &view.camera, mask: view.mask.as_ref()?, photo: Some(&view.photo), trust: None })
         });
         let voters: Vec<Voter> = voters.collect();
-        let judges = if self.config.vote_trust && self.labelled_once {
-            Some(self.engine.sched_mut().download::<u32>(Buf::LABELS, 0, 0, count)?)
-        } else {
-            None
-        };
+        let is_judged = self.config.vote_trust && self.labelled_once;
+        let judges = if is_judged { Some(self.engine.labels()?) } else { None };
         decide::count(&mut self.engine, &voters, judges.as_deref(), &means, how, true)
     }
 

@@ -7,7 +7,7 @@ use crate::support::compare::{Tolerance, check, close};
 use crate::support::device;
 use crate::support::scenes::{Shape, scene};
 use labelgs::engine::{Engine, EngineSize, LabelSize};
-use labelgs::render::render;
+use labelgs::render::{RenderOptions, render};
 use labelgs::scene::Gaussians;
 use labelgs::scheduler::SchedulerOptions;
 use labelgs::scheduler::plan::{Buf, Work};
@@ -105,13 +105,14 @@ fn gaussians_that_are_not_numbers() {
 fn a_model_without_gaussians() {
     let Some(turn) = device() else { return };
     let camera = scene(216, &shape(1, 30, 20)).camera;
-    let room = EngineSize { gaussians: 0, size: (30, 20), trained: false, labels: None };
+    let room = EngineSize::new(0, (30, 20));
     let mut engine = Engine::new(turn.gpu(), room, readable()).expect("the engine starts");
     engine.upload_model(&Gaussians::default()).expect("nothing to upload");
-    let rendered = render(&mut engine, &camera, 0.2, [0.5, 0.25, 0.0], 0).expect("a picture");
+    let options = RenderOptions { background: [0.5, 0.25, 0.0], ..RenderOptions::default() };
+    let rendered = render(&mut engine, &camera, &options).expect("a picture");
     assert!(rendered.rgb.iter().all(|pixel| *pixel == [0.5, 0.25, 0.0]));
     assert!(rendered.top_id.iter().all(|&id| id == -1) && rendered.alpha.iter().all(|&alpha| alpha == 0.0));
-    assert!(engine.download_model(0).expect("a model").is_empty());
+    assert!(engine.download_model().expect("a model").is_empty());
 }
 
 const LABEL_BUFFERS: [&str; 8] = [
@@ -135,10 +136,10 @@ fn no_labels_no_cost() {
     fixture.train();
     let key = fixture.key();
     let id = fixture.engine.list(key).expect("the list of the step");
-    let memory = fixture.engine.sched().memory();
+    let memory = fixture.engine.raw().memory();
     let of_labels: u64 = memory.iter().filter(|(name, _)| LABEL_BUFFERS.contains(&name.as_str())).map(|(_, n)| n).sum();
     assert_eq!(of_labels, 0, "{memory:?}");
-    let plan = fixture.engine.sched().plan(id).expect("a plan");
+    let plan = fixture.engine.raw().plan(id).expect("a plan");
     for work in &plan.list.work {
         let Work::Pass(pass) = work else { continue };
         let named = ["labels", "lift", "layer"].iter().any(|word| pass.shader.name.contains(word));
@@ -149,9 +150,9 @@ fn no_labels_no_cost() {
     }
     // Nor does a render pay for training.
     let labels = Some(LabelSize { max_label: 3, layers: 2, vote_columns: 0 });
-    let room = |trained, labels| EngineSize { gaussians: 1000, size: (64, 48), trained, labels };
+    let room = |trained, labels| EngineSize { trained, labels, ..EngineSize::new(1000, (64, 48)) };
     let total = |room: &EngineSize| {
-        Engine::predict(fixture.engine.sched().gpu(), room, SchedulerOptions::default()).expect("it fits").total
+        Engine::predict(fixture.engine.gpu(), room, SchedulerOptions::default()).expect("it fits").total
     };
     assert!(
         total(&room(false, None)) < total(&room(true, None)) && total(&room(true, None)) < total(&room(true, labels))

@@ -10,7 +10,7 @@ use labelgs::scene::Dataset;
 use labelgs::scheduler::SchedulerOptions;
 use labelgs::scheduler::plan::{Capacity, PlanOptions};
 use labelgs::synth::{Preset, SynthOptions, dataset};
-use labelgs::train::{LabelRule, TrainConfig, Trainer};
+use labelgs::train::{LabelRule, StepReport, TrainConfig, Trainer};
 
 /// 45 steps in which everything happens: higher degrees, labels by either rule, occluders, densification, an opacity
 /// reset.
@@ -58,26 +58,41 @@ pub struct Outcome {
 
 /// Trains; `change` may change the trainer before its first step.
 pub fn train(turn: &Turn, rule: LabelRule, options: SchedulerOptions, change: impl FnOnce(&mut Trainer)) -> Outcome {
+    let mut change = Some(change);
+    train_with(turn, rule, options, |trainer| {
+        change.take().into_iter().for_each(|change| change(trainer));
+        Vec::new()
+    })
+}
+
+/// Trains; `between` is called before each step, and returns what it has drained.
+pub fn train_with(
+    turn: &Turn,
+    rule: LabelRule,
+    options: SchedulerOptions,
+    mut between: impl FnMut(&mut Trainer) -> Vec<StepReport>,
+) -> Outcome {
     let mut dataset = small();
     let config = config(rule);
     let start = initial_gaussians(&dataset, config.seed, 100).expect("points");
     let has_guards = options.plan.guards;
     let mut trainer = Trainer::new(turn.gpu(), config.clone(), &mut dataset, &start, options).expect("a trainer");
-    change(&mut trainer);
+    let bits = |reports: Vec<StepReport>| reports.into_iter().map(|r| (r.loss + r.label_loss).to_bits());
     let mut losses = Vec::new();
     for _ in 0..config.iterations {
-        losses.extend(trainer.step().expect("a step").iter().map(|report| (report.loss + report.label_loss).to_bits()));
+        losses.extend(bits(between(&mut trainer)));
+        losses.extend(bits(trainer.step().expect("a step")));
     }
-    losses.extend(trainer.drain().expect("the last steps").iter().map(|r| (r.loss + r.label_loss).to_bits()));
+    losses.extend(bits(trainer.drain().expect("the last steps")));
     if has_guards {
-        trainer.engine_mut().sched_mut().check_guards().expect("no pass writes outside of its buffers");
+        trainer.engine_mut().raw_mut().check_guards().expect("no pass writes outside of its buffers");
     }
-    let memory = trainer.engine_mut().sched().memory_total();
+    let memory = trainer.engine_mut().raw().memory_total();
     let model = trainer.labelled_model().expect("a model");
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("model.ply");
     write_model(&path, &model).expect("a PLY");
-    let instances = trainer.engine_mut().sched().capacity().instances;
+    let instances = trainer.engine_mut().raw().capacity().instances;
     Outcome {
         instances,
         memory,
@@ -97,10 +112,10 @@ fn same(what: &str, other: &Outcome, first: &Outcome) {
 /// Far too small for the first step already.
 pub fn tiny(trainer: &mut Trainer) {
     let engine = trainer.engine_mut();
-    let old = *engine.sched().capacity();
+    let old = *engine.raw().capacity();
     let layer_pixels = u64::from(engine.shape().tile_pixels());
     let tiny = Capacity { instances: 100, trained_instances: 100, layer_tiles: 1, layer_pixels, ..old };
-    engine.sched_mut().set_capacity(tiny).expect("less fits too");
+    engine.raw_mut().set_capacity(tiny).expect("less fits too");
 }
 
 fn large(trainer: &mut Trainer) {

@@ -44,7 +44,7 @@ fn a_device_saves_what_it_compiled_and_takes_it_back() {
         let shape = KernelShape::of(gpu.capabilities());
         let device = gpu.capabilities().uuid_text();
         let messages = gpu.message_log();
-        let room = labelgs::engine::EngineSize { gaussians: 10, size: (16, 16), trained: false, labels: None };
+        let room = labelgs::engine::EngineSize::new(10, (16, 16));
         let mut engine = labelgs::engine::Engine::with_shape(gpu, shape, room, Default::default()).expect("an engine");
         engine.list(labelgs::engine::ListKey::Render(0)).expect("pipelines");
         drop(engine);

@@ -7,7 +7,6 @@ use crate::support::compare::{Verdict, check};
 use crate::support::device::Turn;
 use crate::support::scenes::Scene;
 use bytemuck::Pod;
-use labelgs::Result;
 use labelgs::engine::{ListKey, Report};
 use labelgs::pass::KernelShape;
 use labelgs::scheduler::SchedulerOptions;
@@ -71,9 +70,9 @@ impl Fixture {
         self.inner.train().expect("the step runs and its buffers can grow")
     }
 
-    /// Runs a list, again with more memory if that was too small. `upload` writes what the host gives.
-    pub fn run(&mut self, key: ListKey, upload: impl Fn(&mut fixture::Fixture) -> Result<()>) -> Report {
-        self.inner.run(key, upload).expect("the list runs and its buffers can grow")
+    /// Runs a training step as another list.
+    pub fn train_as(&mut self, key: ListKey) -> Report {
+        self.inner.train_as(key).expect("the step runs and its buffers can grow")
     }
 
     /// Runs the list of a render.

@@ -26,7 +26,7 @@ fn adam_of_every_attribute() {
     fixture.input.update = true;
     let mut steps = Vec::new();
     for step in 1..=5 {
-        (fixture.input.step, fixture.input.updates, fixture.input.stamp) = (step, step, step);
+        (fixture.input.step, fixture.input.updates) = (step, step);
         let before = states(&mut fixture);
         fixture.train();
         steps.push((step, fixture.uniforms(), before, fixture.gradient_rows(), states(&mut fixture)));

@@ -21,18 +21,18 @@ use rand::Rng;
 const ITEMS: usize = 5000;
 
 fn engine(gpu: std::sync::Arc<labelgs::gpu::Gpu>) -> Engine {
-    let room = EngineSize { gaussians: ITEMS as u64, size: (64, 64), trained: false, labels: None };
+    let room = EngineSize::new(ITEMS as u64, (64, 64));
     Engine::new(gpu, room, readable()).expect("the engine starts")
 }
 
 /// Records what `declare` says.
 fn list(engine: &mut Engine, declare: impl FnOnce(&mut Builder)) -> ListId {
-    let (shape, capacity): (KernelShape, Capacity) = (*engine.shape(), *engine.sched().capacity());
+    let (shape, capacity): (KernelShape, Capacity) = (*engine.shape(), *engine.raw().capacity());
     let list = PassList::new("test");
     let mut builder = Builder { shape: &shape, capacity: &capacity, labels: false, sh_degree: 0, counts: false, list };
     declare(&mut builder);
     let list = builder.list;
-    engine.sched_mut().prepare(&list).expect("the list is planned")
+    engine.raw_mut().prepare(&list).expect("the list is planned")
 }
 
 /// Says that there are so many Gaussians, splats and pairs.
@@ -40,16 +40,16 @@ fn announce(engine: &mut Engine, count: usize) {
     let count = count as u32;
     let uniforms = StepUniforms { gaussian_count: count, ..StepUniforms::zeroed() };
     let counters = Counters { visible_count: count, instance_count: count, ..Counters::zeroed() };
-    engine.sched_mut().upload(Buf::STEP, 0, 0, &[uniforms]).expect("upload");
-    engine.sched_mut().upload(Buf::COUNTERS, 0, 0, &[counters]).expect("upload");
+    engine.raw_mut().upload(Buf::STEP, 0, 0, &[uniforms]).expect("upload");
+    engine.raw_mut().upload(Buf::COUNTERS, 0, 0, &[counters]).expect("upload");
 }
 
 fn get(engine: &mut Engine, buf: Buf, count: usize) -> Vec<u32> {
-    engine.sched_mut().download(buf, 0, 0, count).expect("download")
+    engine.raw_mut().download(buf, 0, 0, count).expect("download")
 }
 
 fn counters(engine: &mut Engine) -> Counters {
-    engine.sched_mut().download::<Counters>(Buf::COUNTERS, 0, 0, 1).expect("download")[0]
+    engine.raw_mut().download::<Counters>(Buf::COUNTERS, 0, 0, 1).expect("download")[0]
 }
 
 const COUNTS: [usize; 7] = [0, 1, 7, 63, 64, 1000, ITEMS];
@@ -67,9 +67,9 @@ fn scan_of_numbers() {
         let most = if count == ITEMS { u32::MAX / 1000 } else { 900 };
         let values: Vec<u32> = (0..count).map(|_| random.random_range(0..most)).collect();
         announce(&mut engine, count);
-        engine.sched_mut().upload(Buf::TILES_TOUCHED, 0, 0, &values).expect("upload");
-        engine.sched_mut().run(id, 0).expect("run");
-        engine.sched_mut().check_guards().expect("no pass writes outside of its buffers");
+        engine.raw_mut().upload(Buf::TILES_TOUCHED, 0, 0, &values).expect("upload");
+        engine.raw_mut().run(id, 0).expect("run");
+        engine.raw_mut().check_guards().expect("no pass writes outside of its buffers");
         let (offsets, total) = exclusive_scan(&values);
         check("offsets", exact(&get(&mut engine, Buf::INSTANCE_OFFSETS, count), &offsets));
         assert_eq!(counters(&mut engine).instance_count, total);
@@ -87,8 +87,8 @@ fn scan_of_visible_keys() {
         let key = |random: &mut rand_pcg::Pcg32| if random.random_bool(0.4) { KEY_INVISIBLE } else { random.random() };
         let keys: Vec<u32> = (0..count).map(|_| key(&mut random)).collect();
         announce(&mut engine, count);
-        engine.sched_mut().upload(Buf::DEPTH_KEYS, 0, 0, &keys).expect("upload");
-        engine.sched_mut().run(id, 0).expect("run");
+        engine.raw_mut().upload(Buf::DEPTH_KEYS, 0, 0, &keys).expect("upload");
+        engine.raw_mut().run(id, 0).expect("run");
         let flags: Vec<u32> = keys.iter().map(|&key| u32::from(key != KEY_INVISIBLE)).collect();
         let (offsets, total) = exclusive_scan(&flags);
         check("offsets", exact(&get(&mut engine, Buf::VISIBLE_OFFSETS, count), &offsets));
@@ -118,10 +118,10 @@ fn sort_exactly(engine: &mut Engine, cases: &[(usize, u32)]) {
         let keys: Vec<u32> = (0..count).map(|_| random.random_range(0..different)).collect();
         let values: Vec<u32> = (0..count as u32).map(|i| i.wrapping_mul(0x9e37_79b9)).collect();
         announce(engine, count);
-        engine.sched_mut().upload(buffers.keys[0], 0, 0, &keys).expect("upload");
-        engine.sched_mut().upload(buffers.values[0], 0, 0, &values).expect("upload");
-        engine.sched_mut().run(id, 0).expect("run");
-        engine.sched_mut().check_guards().expect("no pass writes outside of its buffers");
+        engine.raw_mut().upload(buffers.keys[0], 0, 0, &keys).expect("upload");
+        engine.raw_mut().upload(buffers.values[0], 0, 0, &values).expect("upload");
+        engine.raw_mut().run(id, 0).expect("run");
+        engine.raw_mut().check_guards().expect("no pass writes outside of its buffers");
         let order = radix_sort(&keys);
         let by_order = |of: &[u32]| order.iter().map(|&place| of[place]).collect::<Vec<_>>();
         check("keys", exact(&get(engine, keys_out, count), &by_order(&keys)));
@@ -136,8 +136,8 @@ fn sort_with_the_lanes_of_a_large_scene() {
     let mut engine = engine(turn.gpu());
     let (subgroup, digit_bits) = (u64::from(engine.shape().subgroup), engine.shape().digit_bits);
     let lanes = 140 * subgroup;
-    let large = Capacity { sort_lanes: lanes, sort_cells: lanes << digit_bits, ..*engine.sched().capacity() };
-    engine.sched_mut().set_capacity(large).expect("room");
+    let large = Capacity { sort_lanes: lanes, sort_cells: lanes << digit_bits, ..*engine.raw().capacity() };
+    engine.raw_mut().set_capacity(large).expect("room");
     sort_exactly(&mut engine, &[(ITEMS, u32::MAX), (ITEMS, 3)]);
 }
 
@@ -157,8 +157,8 @@ fn sort_of_places_by_some_bits() {
         let (keys_out, values_out) = found.expect("the sort was declared");
         let keys: Vec<u32> = (0..ITEMS).map(|_| random.random_range(0..1 << bits)).collect();
         announce(&mut engine, ITEMS);
-        engine.sched_mut().upload(buffers.keys[0], 0, 0, &keys).expect("upload");
-        engine.sched_mut().run(id, 0).expect("run");
+        engine.raw_mut().upload(buffers.keys[0], 0, 0, &keys).expect("upload");
+        engine.raw_mut().run(id, 0).expect("run");
         let order = radix_sort(&keys);
         let sorted: Vec<u32> = order.iter().map(|&place| keys[place]).collect();
         let places: Vec<u32> = order.iter().map(|&place| place as u32).collect();

@@ -31,22 +31,11 @@ fn separate(fixture: &Fixture) -> ListKey {
     ListKey::Separate(variant, fixture.input.layers.len() as u32)
 }
 
-/// Runs a list on the model as it was first. No record of the runs before may count.
+/// Runs a list on the model as it was first.
 fn run(fixture: &mut Fixture, key: ListKey) -> Report {
-    fixture.input.stamp += 1;
     let gaussians = fixture.scene.gaussians.clone();
     fixture.engine.upload_model(&gaussians).expect("the model fits");
-    fixture.run(key, |fixture| {
-        let uniforms = fixture.uniforms();
-        labelgs::train::step_input::upload(
-            &mut fixture.engine,
-            0,
-            uniforms,
-            &fixture.view,
-            &fixture.input,
-            &fixture.config,
-        )
-    })
+    fixture.train_as(key)
 }
 
 /// The gradients by Gaussian, through the order that the optimiser uses.

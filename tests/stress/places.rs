@@ -5,7 +5,7 @@ use glam::DVec3;
 use labelgs::engine::{Engine, EngineSize};
 use labelgs::io::init::initial_gaussians;
 use labelgs::io::model::{read_model, write_model};
-use labelgs::render::render;
+use labelgs::render::{Parts, RenderOptions, render};
 use labelgs::scene::{Dataset, Gaussians, View};
 use labelgs::scheduler::SchedulerOptions;
 use labelgs::synth::{Preset, SynthOptions, dataset};
@@ -28,7 +28,7 @@ fn scene(scale: f64, offset: DVec3) -> Dataset {
 }
 
 fn psnr(engine: &mut Engine, near: f32, view: &View) -> f64 {
-    let rendered = render(engine, &view.camera, near, [0.0; 3], 3).expect("a picture");
+    let rendered = render(engine, &view.camera, &RenderOptions::new(near, Parts::COLOUR)).expect("a picture");
     let photo = view.photo.as_ref().expect("a photo");
     let squares = rendered.rgb.iter().zip(&photo.rgba).flat_map(|(found, photo)| {
         (0..3).map(|c| (f64::from(found[c]).clamp(0.0, 1.0) - f64::from(photo[c]) / 255.0).powi(2)).collect::<Vec<_>>()
@@ -81,14 +81,12 @@ fn pictures_are_the_same_at_any_size_and_place() {
     let picture = |scale: f64, offset: DVec3| -> Vec<[f32; 3]> {
         let dataset = scene(scale, offset);
         let model = initial_gaussians(&dataset, 0, 500).expect("points");
-        let room = EngineSize { gaussians: model.len() as u64, size: (72, 52), trained: false, labels: None };
+        let room = EngineSize::new(model.len() as u64, (72, 52));
         let mut engine = Engine::new(turn.gpu(), room, SchedulerOptions::default()).expect("an engine");
         engine.upload_model(&model).expect("the model");
-        let near = (0.2 * scale) as f32;
-        let views = dataset
-            .train
-            .iter()
-            .flat_map(|view| render(&mut engine, &view.camera, near, [0.0; 3], 3).expect("a picture").rgb);
+        let options = RenderOptions { sh_degree: Some(3), ..RenderOptions::new((0.2 * scale) as f32, Parts::COLOUR) };
+        let views =
+            dataset.train.iter().flat_map(|view| render(&mut engine, &view.camera, &options).expect("a picture").rgb);
         views.collect()
     };
     let expected = picture(1.0, DVec3::ZERO);
@@ -123,7 +121,7 @@ fn far_models_are_saved_without_loss() {
         let moved = read.world(row).distance(model.world(row));
         assert!(moved < 1e-6, "Gaussian {row} moved by {moved}");
     }
-    let room = EngineSize { gaussians: read.len() as u64, size: (72, 52), trained: false, labels: None };
+    let room = EngineSize::new(read.len() as u64, (72, 52));
     let mut engine = Engine::new(turn.gpu(), room, SchedulerOptions::default()).expect("an engine");
     engine.upload_model(&read).expect("the model");
     let after = psnr(&mut engine, near, &scene(1.0, UTM).train[0]);

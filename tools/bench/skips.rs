@@ -12,11 +12,10 @@ use labelgs::edit::select::{extract, summarise};
 use labelgs::engine::{Engine, EngineSize};
 use labelgs::gpu::Gpu;
 use labelgs::pass::Stage;
-use labelgs::render::{Rendered, render};
+use labelgs::render::{Parts, RenderOptions, Rendered, render};
 use labelgs::scene::{Camera, Dataset, Gaussians};
 use labelgs::scheduler::SchedulerOptions;
 use labelgs::synth::{self, SynthOptions};
-use labelgs::train::near::NEAR;
 use serde::Serialize;
 use std::sync::Arc;
 
@@ -118,12 +117,13 @@ fn served_tiles(gpu: &Arc<Gpu>, dataset: &Dataset, model: &Gaussians, views: usi
     let cameras: Vec<&Camera> =
         dataset.test.iter().chain(&dataset.train).map(|view| &view.camera).take(views).collect();
     let size = cameras.first().map_or((1, 1), |camera| (camera.width, camera.height));
-    let room = EngineSize { gaussians: model.len() as u64, size, trained: false, labels: None };
+    let room = EngineSize::new(model.len() as u64, size);
     let mut engine = Engine::new(Arc::clone(gpu), room, SchedulerOptions::default())?;
     let tile = (engine.shape().tile_width as usize, engine.shape().tile_height as usize);
+    let options = RenderOptions { parts: Parts::COLOUR, ..RenderOptions::default() };
     let mut pictures = |model: &Gaussians| -> Result<Vec<Rendered>> {
         engine.upload_model(model)?;
-        cameras.iter().map(|camera| render(&mut engine, camera, NEAR, [0.0; 3], model.sh_degree)).collect()
+        cameras.iter().map(|camera| render(&mut engine, camera, &options)).collect()
     };
     let scene = pictures(model)?;
     let mut served = Served::default();

@@ -7,11 +7,10 @@ use super::{Common, device};
 use labelgs::Result;
 use labelgs::engine::{Engine, EngineSize};
 use labelgs::gpu::Gpu;
-use labelgs::render::render;
+use labelgs::render::{NEAR, RenderOptions, render};
 use labelgs::scene::{Dataset, Gaussians};
 use labelgs::scheduler::SchedulerOptions;
 use labelgs::synth::{self, SynthOptions};
-use labelgs::train::near::NEAR;
 use serde_json::{Value, json};
 use std::sync::Arc;
 
@@ -86,12 +85,12 @@ fn divided(gpu: &Arc<Gpu>, dataset: &Dataset, model: &Gaussians, objects: usize)
     let mut all: Vec<usize> = (0..model.len()).collect();
     divide(&mut all, &model.means, objects, &mut 1, &mut labels);
     let size = dataset.train.first().map_or((1, 1), |view| (view.camera.width, view.camera.height));
-    let room = EngineSize { gaussians: model.len() as u64, size, trained: false, labels: None };
+    let room = EngineSize::new(model.len() as u64, size);
     let mut engine = Engine::new(Arc::clone(gpu), room, SchedulerOptions::default())?;
     engine.upload_model(model)?;
     let mut dataset = dataset.clone();
     for view in &mut dataset.train {
-        let seen = render(&mut engine, &view.camera, NEAR, [0.0; 3], 0)?;
+        let seen = render(&mut engine, &view.camera, &RenderOptions::of_labels(NEAR))?;
         view.mask = Some(seen.label_map(&labels));
     }
     Ok(dataset)

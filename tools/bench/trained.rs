@@ -8,10 +8,10 @@ use labelgs::eval::evaluate::{Rendering, evaluate};
 use labelgs::eval::scores::MeanScores;
 use labelgs::gpu::Gpu;
 use labelgs::io::init::{RANDOM_COUNT, initial_gaussians};
+use labelgs::render::{NEAR, RenderOptions};
 use labelgs::scene::{Dataset, Gaussians, View};
 use labelgs::scheduler::SchedulerOptions;
 use labelgs::synth::{self, Preset, SynthOptions};
-use labelgs::train::near::NEAR;
 use labelgs::train::{StepReport, TrainConfig, Trainer};
 use std::sync::Arc;
 
@@ -96,18 +96,16 @@ impl Judge {
     pub fn new(gpu: &Arc<Gpu>, dataset: &Dataset) -> Result<Self> {
         let sizes = dataset.test.iter().map(|view| (view.camera.width, view.camera.height));
         let size = sizes.reduce(|a, b| (a.0.max(b.0), a.1.max(b.1))).unwrap_or((1, 1));
-        let room = EngineSize { gaussians: 1, size, trained: false, labels: None };
+        let room = EngineSize::new(1, size);
         Ok(Self { engine: Engine::new(Arc::clone(gpu), room, SchedulerOptions::default())? })
     }
 
     /// Scores on the held-out views, as `labelgs eval` gives them.
     pub fn scores(&mut self, dataset: &Dataset, model: &Gaussians, config: &TrainConfig) -> Result<MeanScores> {
         let views: Vec<&View> = dataset.test.iter().collect();
-        let how = Rendering {
-            near: if config.near > 0.0 { config.near } else { NEAR },
-            background: config.background,
-            min_confidence: MIN_LABEL_CONFIDENCE,
-        };
+        let near = if config.near > 0.0 { config.near } else { NEAR };
+        let options = RenderOptions { near, background: config.background, ..RenderOptions::default() };
+        let how = Rendering { options, min_confidence: MIN_LABEL_CONFIDENCE };
         Ok(evaluate(&mut self.engine, model, &views, how, &(), &mut ())?.mean)
     }
 }

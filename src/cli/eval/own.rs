@@ -9,6 +9,7 @@ use crate::eval::evaluate::{AmodalTruth, Rendering, evaluate, picture_count};
 use crate::eval::scores::Scores;
 use crate::io::image::read_rgba;
 use crate::io::mask::read_mask;
+use crate::render::RenderOptions;
 use crate::scene::View;
 use crate::{Error, Result};
 use std::path::{Path, PathBuf};
@@ -31,14 +32,14 @@ pub(in crate::cli) fn score(args: &EvalArgs, context: &Context) -> Result<Scores
     let gpu = open_gpu(context)?;
     let sizes = views.iter().map(|view| (view.camera.width, view.camera.height));
     let mut engine = render_engine(gpu, &model, sizes)?;
+    let near = near_plane(&args.model, args.near)?;
     let how = Rendering {
-        near: near_plane(&args.model, args.near)?,
-        background: args.background,
+        options: RenderOptions { near, background: args.background, ..RenderOptions::default() },
         min_confidence: args.sure.min_confidence,
     };
     let scores = evaluate(&mut engine, &model, &views, how, &wholes, &mut watcher)?;
     watcher.finish(&own_table(&scores))?;
-    scores.warn_of_odd_view(how.near);
+    scores.warn_of_odd_view(near);
     Ok(scores)
 }
 

@@ -14,7 +14,7 @@ use crate::label::masks::associate::{Owners, Segment, associate};
 use crate::label::masks::repair::{Naming, Repairs, mend, name_groups, rename};
 use crate::label::vote::ballot::{COLUMNS_MAX, Sweep, Voter, sweep};
 use crate::label::vote::decide::count;
-use crate::render::render;
+use crate::render::{RenderOptions, render};
 use crate::scene::{Gaussians, LabelMap, View};
 use crate::{Error, Result};
 use clap::Args;
@@ -123,7 +123,7 @@ fn repair(
     let decision = count(engine, &voters, None, &model.means, how, true)?;
     let mut masks = Vec::with_capacity(views.len());
     for (index, (view, mask)) in views.iter().zip(&renamed).enumerate() {
-        let shown = render(engine, &view.camera, near, [0.0; 3], 0)?.label_map(&decision.labels);
+        let shown = render(engine, &view.camera, &RenderOptions::of_labels(near))?.label_map(&decision.labels);
         masks.push(match mask {
             Some(mask) => Some(mend(index, mask, &shown, &mut repairs)),
             None if args.make_missing => {

@@ -9,7 +9,7 @@ use crate::io::image::write_png_rgb8;
 use crate::io::occlusion_table::OcclusionTable;
 use crate::io::{self, LoadOptions};
 use crate::label::occlusion::{Rule, by_contour, from_depths, picture};
-use crate::render::render;
+use crate::render::{Parts, RenderOptions, render};
 use crate::scene::{DepthKind, LabelMap, Occluders, View, stems};
 use crate::{Error, Result};
 use clap::Args;
@@ -93,7 +93,7 @@ fn from_model(path: &Path, views: &[&View], context: &Context) -> Result<BTreeMa
     let mut progress = Progress::new(views.len() as u64, "views", &context.global);
     let mut found = BTreeMap::new();
     for view in views {
-        let rendered = render(&mut engine, &view.camera, near, [0.0; 3], model.sh_degree)?;
+        let rendered = render(&mut engine, &view.camera, &RenderOptions::new(near, Parts::DEPTH))?;
         found.insert(view.name.clone(), by_contour(mask(view)?, &rendered.mean_depth(), Rule::default()));
         progress.set(found.len() as u64, String::new);
     }

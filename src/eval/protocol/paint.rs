@@ -4,7 +4,7 @@ use super::score::Drawn;
 use crate::edit::select::extract;
 use crate::engine::Engine;
 use crate::error::Result;
-use crate::render::render;
+use crate::render::{Parts, RenderOptions, render};
 use crate::scene::{Camera, Gaussians, LabelMap};
 
 /// Renders a model with labels.
@@ -48,7 +48,7 @@ impl<'a> EnginePainter<'a> {
 impl Painter for EnginePainter<'_> {
     fn label_map(&mut self, camera: &Camera) -> Result<LabelMap> {
         self.upload(None)?;
-        let rendered = render(self.engine, camera, self.near, [0.0; 3], self.model.sh_degree)?;
+        let rendered = render(self.engine, camera, &RenderOptions::new(self.near, Parts::MAIN))?;
         let unlabelled;
         let labels = match &self.model.labels {
             Some(labels) => labels,
@@ -62,7 +62,7 @@ impl Painter for EnginePainter<'_> {
 
     fn draw(&mut self, labels: Option<&[u32]>, camera: &Camera) -> Result<Drawn> {
         self.upload(labels)?;
-        let rendered = render(self.engine, camera, self.near, [0.0; 3], self.model.sh_degree)?;
+        let rendered = render(self.engine, camera, &RenderOptions::new(self.near, Parts::COLOUR))?;
         Ok(Drawn { rgb: rendered.rgb, alpha: rendered.alpha })
     }
 }

@@ -4,11 +4,9 @@
 //! views do not depend on their order, reach Gaussians that never dominate a pixel, can be revoked by the background,
 //! and say how sure they are.
 
-use crate::engine::uniforms::view_uniforms;
-use crate::engine::{Engine, ListKey};
+use crate::engine::{Engine, ListKey, VoteInput};
 use crate::error::{Error, Result};
 use crate::scene::{Camera, LabelMap, Photo, UNLABELLED};
-use crate::scheduler::plan::Buf;
 use crate::shaders::constants::{VOTE_NONE, VOTE_ONE};
 use crate::shaders::structs::StepUniforms;
 use rayon::prelude::*;
@@ -109,15 +107,11 @@ pub fn sweep(engine: &mut Engine, voters: &[Voter], how: Sweep) -> Result<Ballot
     for first in (0..labels.len()).step_by(room) {
         let columns = room.min(labels.len() - first);
         let chunk = labels[first..][..columns].to_vec();
-        engine.sched_mut().fill(Buf::VOTES_LOW, 0)?;
-        engine.sched_mut().fill(Buf::VOTES_HIGH, 0)?;
+        engine.clear_votes()?;
         for voter in voters {
             vote(engine, voter, &chunk, how)?;
         }
-        let low = engine.sched_mut().download::<u32>(Buf::VOTES_LOW, 0, 0, count * columns)?;
-        let high = engine.sched_mut().download::<u32>(Buf::VOTES_HIGH, 0, 0, count * columns)?;
-        let sums = low.into_iter().zip(high).map(|(low, high)| u64::from(high) << 32 | u64::from(low));
-        let cells = sums.enumerate().filter(|(_, sum)| *sum > 0);
+        let cells = engine.votes(columns)?.into_iter().enumerate().filter(|(_, sum)| *sum > 0);
         votes.extend(cells.map(|(cell, sum)| ((cell / columns) as u32, (first + cell % columns) as u16, sum)));
     }
     Ok(Ballot::new(labels, count, votes))
@@ -133,23 +127,11 @@ fn vote(engine: &mut Engine, voter: &Voter, chunk: &[u16], how: Sweep) -> Result
     }
     let trust = |label: &u16| voter.trust.and_then(|trust| trust.get(label)).copied().unwrap_or(1.0);
     let weights: Vec<f32> = chunk.iter().map(trust).collect();
-    loop {
-        engine.sched().wait_all()?;
-        let base =
-            view_uniforms(voter.camera, engine.origin(), engine.shape(), how.near, [0.0; 3], engine.gaussian_count());
-        let uniforms = StepUniforms { vote_columns: chunk.len() as u32, ..base };
-        let list = engine.list(ListKey::Vote(rounds))?;
-        let sched = engine.sched_mut();
-        sched.upload(Buf::STEP, 0, 0, &[uniforms])?;
-        sched.upload(Buf::VIEW_LABELS, 0, 0, &columns)?;
-        sched.upload(Buf::VOTE_WEIGHTS, 0, 0, &weights)?;
-        sched.run(list, 0)?;
-        // What did not fit was not counted.
-        let report = engine.report(0)?;
-        if !engine.recover(&report)? {
-            return Ok(());
-        }
-    }
+    let base = engine.view_uniforms(voter.camera, how.near, [0.0; 3]);
+    let uniforms = StepUniforms { vote_columns: chunk.len() as u32, ..base };
+    // What does not fit is not counted, and counted when the list runs again.
+    engine.run(ListKey::Vote(rounds), &VoteInput { uniforms, columns: &columns, weights: &weights })?;
+    Ok(())
 }
 
 /// Column of each pixel's label, or [`VOTE_NONE`].

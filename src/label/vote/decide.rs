@@ -3,7 +3,7 @@
 use super::ballot::{Ballot, Sweep, Voter, sweep, weight};
 use crate::engine::Engine;
 use crate::error::{Error, Result};
-use crate::render::render;
+use crate::render::{RenderOptions, render};
 use crate::scene::{Gaussians, LabelMap, UNLABELLED};
 use kiddo::{ImmutableKdTree, SquaredEuclidean};
 use rayon::prelude::*;
@@ -141,7 +141,7 @@ pub fn count(
     let mut agreements = Vec::new();
     if let Some(labels) = judges {
         for voter in voters {
-            let shown = render(engine, voter.camera, how.near, [0.0; 3], 0)?;
+            let shown = render(engine, voter.camera, &RenderOptions::of_labels(how.near))?;
             agreements.push(agreement(voter.mask, &shown.label_map(labels)));
         }
     }

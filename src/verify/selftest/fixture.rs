@@ -1,7 +1,7 @@
 //! A scene on the device: runs the engine's own pass lists and reads every buffer back.
 
 use super::scenes::Scene;
-use crate::engine::{Engine, EngineSize, LabelSize, ListKey, Report};
+use crate::engine::{Engine, EngineSize, Input, LabelSize, ListKey, Report};
 use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::pass::{KernelShape, Variant};
@@ -104,16 +104,13 @@ impl Fixture {
         shape: KernelShape,
         options: SchedulerOptions,
     ) -> Result<Self> {
-        let room = EngineSize {
-            gaussians: scene.gaussians.len().max(1) as u64,
-            size: (scene.camera.width, scene.camera.height),
-            trained: true,
-            labels: labels.then(|| LabelSize {
-                max_label: scene.target.label_map.iter().copied().max().unwrap_or(0).max(1),
-                layers: scene.target.slots.len() as u32,
-                vote_columns: VOTE_COLUMNS,
-            }),
-        };
+        let labels_size = labels.then(|| LabelSize {
+            max_label: scene.target.label_map.iter().copied().max().unwrap_or(0).max(1),
+            layers: scene.target.slots.len() as u32,
+            vote_columns: VOTE_COLUMNS,
+        });
+        let room = EngineSize::new(scene.gaussians.len().max(1) as u64, (scene.camera.width, scene.camera.height));
+        let room = room.for_training().with_labels(labels_size);
         let mut engine = Engine::with_shape(gpu, shape, room, options)?;
         engine.upload_model(&scene.gaussians)?;
         let config = TrainConfig {
@@ -129,7 +126,7 @@ impl Fixture {
         };
         let layers =
             if labels { scene.target.slots.iter().map(|slot| slot.label as u16).collect() } else { Vec::new() };
-        let input = StepInput { step: 1, view: 0, layers, labels, update: false, updates: 1, stamp: 7 };
+        let input = StepInput { step: 1, view: 0, layers, labels, update: false, updates: 1 };
         let view = train_view(&scene);
         let mut fixture = Self { view, engine, scene, input, config, fixed: SceneScale { extent: 1.0 } };
         let weights = step_input::layer_weights(&fixture.input, &fixture.view, &fixture.config);
@@ -152,7 +149,7 @@ impl Fixture {
 
     /// The device's sorted pairs: keys and slots.
     pub fn sorted_pairs(&mut self, count: usize) -> Result<(Vec<u32>, Vec<u32>)> {
-        let virtual_tiles = self.engine.sched().capacity().virtual_tiles;
+        let virtual_tiles = self.engine.raw().capacity().virtual_tiles;
         let bits = 64 - (virtual_tiles - 1).leading_zeros();
         let passes = bits.div_ceil(self.engine.shape().digit_bits);
         let (keys, values) = if passes.is_multiple_of(2) {
@@ -172,40 +169,31 @@ impl Fixture {
 
     /// Runs a training step; no pass may write outside of its buffers.
     pub fn train(&mut self) -> Result<Report> {
-        let key = self.key();
-        self.run(key, Self::upload)
+        self.train_as(self.key())
     }
 
-    /// Writes what the host gives to a step.
-    fn upload(&mut self) -> Result<()> {
+    /// The same as another list.
+    pub fn train_as(&mut self, key: ListKey) -> Result<Report> {
         let uniforms = self.uniforms();
-        step_input::upload(&mut self.engine, 0, uniforms, &self.view, &self.input, &self.config)
+        let data = step_input::train_input(&self.input, &self.view, &self.config, uniforms, &self.engine);
+        self.engine.run(key, &data)
     }
 
-    /// Runs a list, again with more memory if that was too small. `upload` writes what the host gives.
-    pub fn run(&mut self, key: ListKey, upload: impl Fn(&mut Self) -> Result<()>) -> Result<Report> {
-        loop {
-            // Records of pairs are valid by the mark of their submit.
-            self.input.stamp = self.input.stamp % u32::MAX + 1;
-            upload(self)?;
-            let list = self.engine.list(key)?;
-            self.engine.sched_mut().run(list, 0)?;
-            let report = self.engine.report(0)?;
-            self.engine.sched_mut().check_guards()?;
-            if !self.engine.recover(&report)? {
-                return Ok(report);
-            }
-        }
+    /// Writes what the host gives to a step, for lists of the caller.
+    pub fn write(&mut self) -> Result<()> {
+        let uniforms = self.uniforms();
+        let data = step_input::train_input(&self.input, &self.view, &self.config, uniforms, &self.engine);
+        self.engine.write(0, Input::Train(&data))
     }
 
     /// Runs the list of a render.
     pub fn render(&mut self) -> Result<Report> {
-        self.run(ListKey::Render(self.config.sh_degree), Self::upload)
+        self.engine.run(ListKey::Render(self.config.sh_degree), &self.uniforms())
     }
 
     /// The first `count` values of a buffer.
     pub fn get<T: Pod>(&mut self, buf: Buf, count: usize) -> Result<Vec<T>> {
-        self.engine.sched_mut().download(buf, 0, 0, count)
+        self.engine.raw_mut().download(buf, 0, 0, count)
     }
 
     /// Width and height, px.
@@ -269,7 +257,7 @@ impl Fixture {
                     (0..length).for_each(|i| values[from + i] = floats[to + i] as f32);
                 }
             }
-            self.engine.sched_mut().upload(plane, 0, 0, &values)?;
+            self.engine.raw_mut().upload(plane, 0, 0, &values)?;
         }
         Ok(())
     }

@@ -11,6 +11,7 @@ use crate::scene::Gaussians;
 use crate::scheduler::plan::Buf;
 use crate::shaders::structs::{Counters, StepUniforms};
 use crate::train::TrainConfig;
+use crate::train::strategy::default::prunes_large_at;
 use crate::verify::reference::blend::blend_forward;
 use crate::verify::reference::densify::{Origin, Population, densify, mark, opacity_reset};
 use crate::verify::reference::lift::{Masks, centres_of, lift, lift_resolve};
@@ -29,14 +30,14 @@ fn holding(fixture: &mut Fixture, before: &Population, step: u32) -> Result<Step
     fixture.put_rows(MOMENTS_2, &before.u)?;
     let stats: Vec<[f32; 2]> =
         before.gradient_sum.iter().zip(&before.gradient_count).map(|(&s, &n)| [s as f32, n as f32]).collect();
-    fixture.engine.sched_mut().upload(Buf::DENSIFY_STATS, 0, 0, &stats)?;
+    fixture.engine.raw_mut().upload(Buf::DENSIFY_STATS, 0, 0, &stats)?;
     let (config, with_resets) = (&fixture.config, TrainConfig::paper());
     Ok(StepUniforms {
         densify_threshold: config.densify_grad_threshold,
         densify_scale: config.percent_dense,
         prune_scale: config.max_scale,
         prune_opacity: config.min_opacity,
-        prune_big: u32::from(with_resets.prunes_large_at(step)),
+        prune_big: u32::from(prunes_large_at(&with_resets, step)),
         seed: SEED,
         ..fixture.uniforms()
     })
@@ -82,10 +83,9 @@ impl Densified {
         let rows = before.model.rows.len();
         fixture.engine.make_room_for_gaussians(2 * rows as u64 + 1)?;
         let uniforms = holding(fixture, &before, step)?;
-        let upload = |fixture: &mut Fixture| fixture.engine.sched_mut().upload(Buf::STEP, 0, 0, &[uniforms]);
-        let counted = fixture.run(ListKey::DensifyCount, upload)?.counters;
+        let counted = fixture.engine.run(ListKey::DensifyCount, &uniforms)?.counters;
         let marks = fixture.get::<u32>(Buf::CHILDREN_COUNTS, rows)?;
-        let applied = fixture.run(ListKey::DensifyApply, upload)?.counters;
+        let applied = fixture.engine.run(ListKey::DensifyApply, &uniforms)?.counters;
         let count = counted.densified_count as usize;
         let after =
             [fixture.rows(PARAMETERS, count)?, fixture.rows(MOMENTS_1, count)?, fixture.rows(MOMENTS_2, count)?];
@@ -129,8 +129,7 @@ impl Reset {
     /// Resets; the fixture has the population as its model.
     pub fn new(fixture: &mut Fixture, before: Population) -> Result<Self> {
         let uniforms = holding(fixture, &before, 3000)?;
-        fixture
-            .run(ListKey::OpacityReset, |fixture| fixture.engine.sched_mut().upload(Buf::STEP, 0, 0, &[uniforms]))?;
+        fixture.engine.run(ListKey::OpacityReset, &uniforms)?;
         let count = before.model.rows.len();
         let planes =
             [fixture.rows(PARAMETERS, count)?, fixture.rows(MOMENTS_1, count)?, fixture.rows(MOMENTS_2, count)?];

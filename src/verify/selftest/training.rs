@@ -6,9 +6,8 @@ use crate::gpu::Gpu;
 use crate::io::initial_gaussians;
 use crate::pass::KernelShape;
 use crate::scene::Gaussians;
-use crate::scheduler::SchedulerOptions;
 use crate::synth::{self, Preset, SynthOptions};
-use crate::train::{TrainConfig, Trainer};
+use crate::train::{TrainConfig, Trainer, TrainerOptions};
 use std::sync::Arc;
 
 const STEPS: u32 = 60;
@@ -47,8 +46,8 @@ fn train(gpu: &Arc<Gpu>, kernels: KernelShape) -> Result<(Gaussians, [f64; 2])> 
         ..TrainConfig::default()
     };
     let model = initial_gaussians(&dataset, config.seed, 100)?;
-    let mut trainer =
-        Trainer::with_shape(Arc::clone(gpu), kernels, config, &mut dataset, &model, SchedulerOptions::default())?;
+    let options = TrainerOptions { shape: Some(kernels), ..TrainerOptions::default() };
+    let mut trainer = Trainer::new(Arc::clone(gpu), config, &mut dataset, &model, options)?;
     let mut reports = Vec::new();
     for _ in 0..STEPS {
         reports.extend(trainer.step()?);

@@ -34,7 +34,7 @@ pub fn run(gpu: &Arc<Gpu>, kernels: &Kernels) -> Result<()> {
         steps.step()?;
     }
     steps.drain()?;
-    let capacity = *steps.engine_mut().sched().capacity();
+    let capacity = *steps.engine_mut().raw().capacity();
     let size = (scene.width, scene.height);
     let ground = Ground { gpu, kernels, model: &model, capacity, size };
     for (count, vecs) in [(3, 1), (16, 2), (40, 4)] {

@@ -117,7 +117,7 @@ fn labelled_row(
         }
     }
     // As many rows as there are Gaussians, or 512 channels would not fit where they do.
-    let grown = *plain.engine_mut().sched().capacity();
+    let grown = *plain.engine_mut().raw().capacity();
     let room = EngineSize { gaussians: model.len() as u64, ..*plain.engine_mut().room() };
     let exact = capacity(plain.engine_mut().shape(), &room);
     let capacity = Capacity { instances: grown.instances, trained_instances: grown.trained_instances, ..exact };

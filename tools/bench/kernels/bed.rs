@@ -9,7 +9,6 @@ use labelgs::pass::{self, KernelShape, Stage, Variant};
 use labelgs::scheduler::plan::{Buf, PlanOptions};
 use labelgs::scheduler::{ListId, SchedulerOptions};
 use labelgs::shaders::structs::Counters;
-use labelgs::train::step_input;
 use labelgs::verify::selftest::fixture::Fixture;
 use labelgs::verify::selftest::scenes::Scene;
 use labelgs::{Error, Result};
@@ -61,11 +60,11 @@ impl<'a> Bed<'a> {
 
     fn prepare(&mut self) -> Result<()> {
         let engine = &self.fixture.engine;
-        let default = pass::training_step(engine.shape(), engine.sched().capacity(), self.variant());
+        let default = pass::training_step(engine.shape(), engine.raw().capacity(), self.variant());
         let lists = self.modes.iter().map(|(mode, kernels)| mode.list(&default, kernels));
         let lists = lists.collect::<Result<Vec<_>>>()?;
         self.stages = pass::stage::stages(&default).into_iter().map(|(stage, _)| stage).collect();
-        self.lists = self.fixture.engine.sched_mut().prepare_all(&lists.iter().collect::<Vec<_>>())?;
+        self.lists = self.fixture.engine.raw_mut().prepare_all(&lists.iter().collect::<Vec<_>>())?;
         Ok(())
     }
 
@@ -76,14 +75,14 @@ impl<'a> Bed<'a> {
                 self.prepare()?;
             }
             let fixture = &mut self.fixture;
-            upload(fixture)?;
-            let ((), cost) = timed(|| fixture.engine.sched_mut().run(self.lists[list], 0))?;
+            fixture.write()?;
+            let ((), cost) = timed(|| fixture.engine.raw_mut().run(self.lists[list], 0))?;
             let report = fixture.engine.report(0)?;
             if fixture.engine.recover(&report)? {
                 self.lists.clear();
                 continue;
             }
-            let times = fixture.engine.sched().timings(self.lists[list], 0)?;
+            let times = fixture.engine.raw().timings(self.lists[list], 0)?;
             if times.is_empty() {
                 return Err(Error::NoDevice("this device has no timestamps on its compute queue".to_owned()));
             }
@@ -107,21 +106,11 @@ impl<'a> Bed<'a> {
     /// The engine's own list gives the picture of the default mode, to the bit.
     pub fn check_default(&mut self, outcome: &Outcome) -> Result<()> {
         let key = ListKey::Train(self.variant());
-        let fixture = &mut self.fixture;
-        let list = fixture.engine.list(key)?;
-        upload(fixture)?;
-        fixture.engine.sched_mut().run(list, 0)?;
+        self.fixture.train_as(key)?;
         let own = self.outcome()?;
         if own.colours == outcome.colours && own.rows == outcome.rows {
             return Ok(());
         }
         Err(Error::Check("the default mode is not the step of the engine".to_owned()))
     }
-}
-
-/// What a step needs, with a new stamp: gradient records of other modes must not count as those of this run.
-fn upload(fixture: &mut Fixture) -> Result<()> {
-    fixture.input.stamp += 1;
-    let uniforms = fixture.uniforms();
-    step_input::upload(&mut fixture.engine, 0, uniforms, &fixture.view, &fixture.input, &fixture.config)
 }

@@ -76,8 +76,8 @@ pub fn run(args: &KernelArgs) -> Result<()> {
 /// The modes with their shaders for the device.
 fn compile(gpu: &Gpu, args: &KernelArgs) -> Result<Vec<(Mode, Replacements)>> {
     let shape = KernelShape::of(gpu.capabilities());
-    let room = EngineSize { gaussians: 1, size: (64, 64), trained: true, labels: None };
-    let variant = Variant { labels: false, lift: false, sh_degree: 3, size: room.size, update: false, counts: false };
+    let room = EngineSize::new(1, (64, 64)).for_training();
+    let variant = Variant { labels: false, lift: false, sh_degree: 3, size: room.image, update: false, counts: false };
     let list = pass::training_step(&shape, &capacity(&shape, &room), variant);
     let wanted = |number: usize| number == 0 || args.modes.is_empty() || args.modes.contains(&number);
     let modes = MODES.iter().enumerate().filter(|(number, _)| wanted(*number));

@@ -1,0 +1,71 @@
+//! What is on the device, typed. Nothing may be in flight.
+
+use super::Engine;
+use crate::error::Result;
+use crate::scheduler::Scheduler;
+use crate::scheduler::plan::Buf;
+
+impl Engine {
+    /// Positions of the Gaussians, relative to [`Engine::origin`].
+    pub fn means(&mut self) -> Result<Vec<[f32; 3]>> {
+        let rows = self.sched.download::<[f32; 4]>(Buf::MEANS, 0, 0, self.gaussian_count as usize)?;
+        Ok(rows.iter().map(|&[x, y, z, _]| [x, y, z]).collect())
+    }
+
+    /// Labels of the Gaussians; the engine must have been made with labels.
+    pub fn labels(&mut self) -> Result<Vec<u32>> {
+        self.sched.download(Buf::LABELS, 0, 0, self.gaussian_count as usize)
+    }
+
+    /// Replaces the labels.
+    pub fn set_labels(&mut self, labels: &[u32]) -> Result<()> {
+        self.sched.upload(Buf::LABELS, 0, 0, labels)
+    }
+
+    /// Sets all votes to 0.
+    pub fn clear_votes(&mut self) -> Result<()> {
+        self.sched.fill(Buf::VOTES_LOW, 0)?;
+        self.sched.fill(Buf::VOTES_HIGH, 0)
+    }
+
+    /// The votes for each Gaussian and column [N, columns].
+    pub fn votes(&mut self, columns: usize) -> Result<Vec<u64>> {
+        let cells = self.gaussian_count as usize * columns;
+        let low = self.sched.download::<u32>(Buf::VOTES_LOW, 0, 0, cells)?;
+        let high = self.sched.download::<u32>(Buf::VOTES_HIGH, 0, 0, cells)?;
+        Ok(low.into_iter().zip(high).map(|(low, high)| u64::from(high) << 32 | u64::from(low)).collect())
+    }
+
+    /// The picture of the last list: r, g, b over the background, and the final transmittance.
+    pub fn picture(&mut self, pixels: usize) -> Result<Vec<[f32; 4]>> {
+        self.sched.download(Buf::IMAGE, 0, 0, pixels)
+    }
+
+    /// Main Gaussian of each pixel of the last render, -1 where none contributes.
+    pub fn main_gaussians(&mut self, pixels: usize) -> Result<Vec<i32>> {
+        self.sched.download(Buf::MAIN_GAUSSIAN, 0, 0, pixels)
+    }
+
+    /// Weight of that Gaussian, and the weighted sum of z over all Gaussians.
+    pub fn weights_and_depths(&mut self, pixels: usize) -> Result<Vec<[f32; 2]>> {
+        self.sched.download(Buf::MAIN_WEIGHT_DEPTH, 0, 0, pixels)
+    }
+
+    /// Makes a position NaN, as a broken device would.
+    #[doc(hidden)]
+    pub fn spoil(&mut self) -> Result<()> {
+        self.sched.upload(Buf::MEANS, 0, 0, &[f32::NAN])
+    }
+
+    /// The scheduler underneath, for tests, the self-test and benchmarks that read buffers of their own choice.
+    #[doc(hidden)]
+    pub fn raw(&self) -> &Scheduler {
+        &self.sched
+    }
+
+    /// As [`Engine::raw`], for uploads, downloads and lists of their own.
+    #[doc(hidden)]
+    pub fn raw_mut(&mut self) -> &mut Scheduler {
+        &mut self.sched
+    }
+}

@@ -1,0 +1,106 @@
+//! What the host gives to a list, by its kind.
+
+use super::Engine;
+use crate::error::Result;
+use crate::scheduler::plan::Buf;
+use crate::shaders::structs::StepUniforms;
+
+/// What a list reads besides the model.
+#[derive(Clone, Copy, Debug)]
+pub enum Input<'a> {
+    /// Of a render, a densification or an opacity reset.
+    Uniforms(&'a StepUniforms),
+    /// Of a training step.
+    Train(&'a TrainInput<'a>),
+    /// Of the votes of a view.
+    Vote(&'a VoteInput<'a>),
+}
+
+/// What a training step reads.
+#[derive(Clone, Debug)]
+pub struct TrainInput<'a> {
+    /// Uniforms.
+    pub uniforms: StepUniforms,
+    /// The photo [P], RGBA8; alpha 0: left out.
+    pub photo: &'a [[u8; 4]],
+    /// Of a step with labels.
+    pub layers: Option<LayerInput<'a>>,
+}
+
+/// What a training step with labels reads.
+#[derive(Clone, Debug)]
+pub struct LayerInput<'a> {
+    /// Visible object of each pixel [P].
+    pub view_labels: &'a [u32],
+    /// Layer of each label id, 0: not sampled in this step.
+    pub layer_from_label: Vec<u32>,
+    /// Label id of each layer.
+    pub label_from_layer: Vec<u32>,
+    /// Weight of each layer's label loss.
+    pub weights: Vec<f32>,
+    /// For each layer a bit per label id: set where that object hides the layer's.
+    pub occluders: Vec<u32>,
+}
+
+/// What the votes of a view read.
+#[derive(Clone, Copy, Debug)]
+pub struct VoteInput<'a> {
+    /// Uniforms.
+    pub uniforms: StepUniforms,
+    /// Column of each pixel [P].
+    pub columns: &'a [u32],
+    /// Weight of the votes of each column.
+    pub weights: &'a [f32],
+}
+
+impl<'a> From<&'a StepUniforms> for Input<'a> {
+    fn from(uniforms: &'a StepUniforms) -> Self {
+        Self::Uniforms(uniforms)
+    }
+}
+
+impl<'a> From<&'a TrainInput<'a>> for Input<'a> {
+    fn from(input: &'a TrainInput<'a>) -> Self {
+        Self::Train(input)
+    }
+}
+
+impl<'a> From<&'a VoteInput<'a>> for Input<'a> {
+    fn from(input: &'a VoteInput<'a>) -> Self {
+        Self::Vote(input)
+    }
+}
+
+impl Engine {
+    /// Writes the input of a list into a frame. The only place where a camera reaches the device, so its size is checked
+    /// here. Public for tests and benchmarks that run lists of their own.
+    #[doc(hidden)]
+    pub fn write(&mut self, frame: usize, input: Input) -> Result<()> {
+        let uniforms = match input {
+            Input::Uniforms(uniforms) => uniforms,
+            Input::Train(train) => &train.uniforms,
+            Input::Vote(vote) => &vote.uniforms,
+        };
+        self.room.check_image(uniforms.width, uniforms.height)?;
+        // Records of (splat, tile) pairs are valid by the mark of their submit.
+        self.stamp = self.stamp.wrapping_add(1).max(1);
+        let sched = &mut self.sched;
+        sched.upload(Buf::STEP, frame, 0, &[StepUniforms { stamp: self.stamp, ..*uniforms }])?;
+        match input {
+            Input::Uniforms(_) => Ok(()),
+            Input::Train(train) => {
+                sched.upload(Buf::TARGET, frame, 0, train.photo)?;
+                let Some(layers) = &train.layers else { return Ok(()) };
+                sched.upload(Buf::VIEW_LABELS, frame, 0, layers.view_labels)?;
+                sched.upload(Buf::LAYER_FROM_LABEL, frame, 0, &layers.layer_from_label)?;
+                sched.upload(Buf::LABEL_FROM_LAYER, frame, 0, &layers.label_from_layer)?;
+                sched.upload(Buf::LAYER_WEIGHTS, frame, 0, &layers.weights)?;
+                sched.upload(Buf::LAYER_OCCLUDERS, frame, 0, &layers.occluders)
+            }
+            Input::Vote(vote) => {
+                sched.upload(Buf::VIEW_LABELS, frame, 0, vote.columns)?;
+                sched.upload(Buf::VOTE_WEIGHTS, frame, 0, vote.weights)
+            }
+        }
+    }
+}

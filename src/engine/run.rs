@@ -1,0 +1,150 @@
+//! Lists: recorded on first use, run and waited for, or submitted while others are in flight.
+
+use super::{Engine, Input};
+use crate::error::{Error, Result};
+use crate::pass::{self, Stage, Variant};
+use crate::scheduler::plan::{Buf, FRAMES_IN_FLIGHT};
+use crate::scheduler::{ListId, Ticket};
+use crate::shaders::structs::Counters;
+
+/// Which list.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum ListKey {
+    /// One optimiser step.
+    Train(Variant),
+    /// The same with passes of the [`pass::Extension`] under some number.
+    Extended(Variant, u32),
+    /// One optimiser step with so many sampled objects that have passes of their own, see [`pass::separate_step`].
+    Separate(Variant, u32),
+    /// One picture, with this degree of the spherical harmonics.
+    Render(u32),
+    /// Votes of one view; tiles are walked so many times, four labels each.
+    Vote(u32),
+    /// Count of a densification.
+    DensifyCount,
+    /// Densification.
+    DensifyApply,
+    /// Opacity reset.
+    OpacityReset,
+}
+
+/// What a list reports.
+#[derive(Clone, Copy, Debug)]
+pub struct Report {
+    /// Counters.
+    pub counters: Counters,
+    /// Sticky failure bits (glsl/include/step.glsl).
+    pub failure: u32,
+}
+
+/// A list in flight; [`Engine::retire`] waits for it.
+#[derive(Clone, Copy, Debug)]
+pub struct InFlight {
+    /// What tells its recording from others.
+    pub recording: Recording,
+    ticket: Ticket,
+}
+
+/// A list as it was recorded for a frame. After buffers have grown it is another one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Recording {
+    list: ListId,
+    frame: usize,
+}
+
+impl Engine {
+    /// The recorded list for a key; recorded on first use. Public for tests and benchmarks, with [`Engine::raw`].
+    #[doc(hidden)]
+    pub fn list(&mut self, key: ListKey) -> Result<ListId> {
+        if let Some(&id) = self.lists.get(&key) {
+            return Ok(id);
+        }
+        let (shape, capacity) = (&self.shape, self.sched.capacity());
+        let list = match key {
+            ListKey::Train(variant) => pass::training_step(shape, capacity, variant),
+            ListKey::Extended(variant, passes) => {
+                pass::extended_step(shape, capacity, variant, (&*self.extension, passes))
+            }
+            ListKey::Separate(variant, objects) => pass::separate_step(shape, capacity, variant, objects),
+            ListKey::Render(sh_degree) => pass::render_view(shape, capacity, sh_degree),
+            ListKey::Vote(rounds) => pass::vote_view(shape, capacity, rounds),
+            ListKey::DensifyCount => pass::densify_count(shape, capacity),
+            ListKey::DensifyApply => pass::densify_apply(shape, capacity, self.room.labels.is_some()),
+            ListKey::OpacityReset => pass::opacity_reset(shape, capacity),
+        };
+        let id = self.sched.prepare(&list)?;
+        self.lists.insert(key, id);
+        Ok(id)
+    }
+
+    /// Runs a list and waits for it; again with more memory where a buffer was too small. Nothing may be in flight.
+    pub fn run<'a>(&mut self, key: ListKey, input: impl Into<Input<'a>>) -> Result<Report> {
+        let input = input.into();
+        self.check_idle()?;
+        loop {
+            let list = self.list(key)?;
+            self.write(0, input)?;
+            self.sched.run(list, 0)?;
+            let report = self.report(0)?;
+            if self.has_guards {
+                self.sched.check_guards()?;
+            }
+            if !self.recover(&report)? {
+                return Ok(report);
+            }
+        }
+    }
+
+    /// Submits a list and does not wait for it. At most one per frame may be in flight.
+    pub fn submit<'a>(&mut self, key: ListKey, input: impl Into<Input<'a>>) -> Result<InFlight> {
+        let frame = (self.last_frame + 1) % FRAMES_IN_FLIGHT;
+        if self.in_flight[frame] {
+            return Err(Error::Bug(format!("{FRAMES_IN_FLIGHT} lists are in flight; retire the oldest first")));
+        }
+        let list = self.list(key)?;
+        self.write(frame, input.into())?;
+        let ticket = self.sched.submit(list, frame)?;
+        (self.last_frame, self.in_flight[frame]) = (frame, true);
+        Ok(InFlight { recording: Recording { list, frame }, ticket })
+    }
+
+    /// Waits for a list in flight. If the report has a failure, [`Engine::recover`] must follow, and the list and those
+    /// submitted after it must be submitted again.
+    pub fn retire(&mut self, flight: &InFlight) -> Result<Report> {
+        self.sched.wait(flight.ticket)?;
+        self.in_flight[flight.recording.frame] = false;
+        self.report(flight.recording.frame)
+    }
+
+    /// Waits for all lists in flight; nobody will ask for their reports.
+    pub fn abandon(&mut self) -> Result<()> {
+        self.sched.wait_all()?;
+        self.in_flight = [false; FRAMES_IN_FLIGHT];
+        Ok(())
+    }
+
+    /// Refuses what would lose the reports of lists in flight, and with them that a list has to run again.
+    pub(super) fn check_idle(&self) -> Result<()> {
+        match self.in_flight.contains(&true) {
+            true => Err(Error::Bug("steps are in flight; wait for them first (Trainer::drain)".to_owned())),
+            false => Ok(()),
+        }
+    }
+
+    /// What the last list of a frame reports; waits for it.
+    #[doc(hidden)]
+    pub fn report(&mut self, frame: usize) -> Result<Report> {
+        self.sched.wait_frame(frame)?;
+        let counters = self.sched.download::<Counters>(Buf::REPORT, frame, 0, 1)?[0];
+        let failure = self.sched.download::<u32>(Buf::REPORT_FAILURE, frame, 0, 1)?[0];
+        Ok(Report { counters, failure })
+    }
+
+    /// Stage, name and nanoseconds of each item of a list that was retired and whose frame was not used again. Empty
+    /// without [timestamps](crate::scheduler::SchedulerOptions::timestamps).
+    pub fn times(&self, recording: Recording) -> Result<Vec<(Stage, String, u64)>> {
+        let times = self.sched.timings(recording.list, recording.frame)?;
+        let stages = pass::stage::stages(&self.sched.plan(recording.list)?.list);
+        Ok(stages.into_iter().zip(times).map(|((stage, name), (_, ns))| (stage, name, ns)).collect())
+    }
+}

@@ -1,0 +1,72 @@
+//! What the memory of an engine is sized for.
+
+use crate::error::{Error, Result};
+use crate::pass::KernelShape;
+
+/// Sizes that labels need.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct LabelSize {
+    /// Largest id.
+    pub max_label: u32,
+    /// Objects sampled in one step, at most.
+    pub layers: u32,
+    /// Labels that one sweep of votes counts, 0 without votes.
+    pub vote_columns: u32,
+}
+
+/// What the memory of an engine is sized for.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct EngineSize {
+    /// Gaussians.
+    pub gaussians: u64,
+    /// Largest image, px.
+    pub image: (u32, u32),
+    /// Optimiser state and gradients.
+    pub trained: bool,
+    /// Labels; none for a scene without masks, which then pays nothing for them.
+    pub labels: Option<LabelSize>,
+}
+
+impl EngineSize {
+    /// For rendering so many Gaussians in images of up to `image` px.
+    pub const fn new(gaussians: u64, image: (u32, u32)) -> Self {
+        Self { gaussians, image, trained: false, labels: None }
+    }
+
+    /// The same with optimiser state and gradients.
+    pub const fn for_training(self) -> Self {
+        Self { trained: true, ..self }
+    }
+
+    /// The same with labels, if any are given.
+    pub const fn with_labels(self, labels: Option<LabelSize>) -> Self {
+        Self { labels, ..self }
+    }
+
+    /// Refuses images of more tiles than the kernels can walk.
+    pub fn check(&self, shape: &KernelShape) -> Result<()> {
+        let (width, height) = self.image;
+        let (tiles_x, tiles_y) = shape.tiles(width, height);
+        // A splat may touch every tile, once more in its object's layer, and one loop walks them (65,535 rounds).
+        let most = if self.labels.is_some() { 32_500 } else { 65_000 };
+        if u64::from(tiles_x) * u64::from(tiles_y) <= most {
+            return Ok(());
+        }
+        let problem = format!(
+            "{width} x {height} px make {tiles_x} x {tiles_y} tiles, at most {most} are supported; choose a smaller size"
+        );
+        Err(Error::usage("--max-resolution", problem))
+    }
+
+    /// Refuses an image that the buffers have no place for.
+    pub fn check_image(&self, width: u32, height: u32) -> Result<()> {
+        if width <= self.image.0 && height <= self.image.1 {
+            return Ok(());
+        }
+        let problem = format!(
+            "its image has {width} x {height} px, the engine has memory for {} x {} px; call Engine::grow_image first",
+            self.image.0, self.image.1
+        );
+        Err(Error::usage("camera", problem))
+    }
+}

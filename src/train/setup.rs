@@ -1,0 +1,85 @@
+//! What a training is made from: options, sizes, views.
+
+use super::step_input::{self, TrainView};
+use super::strategy::{DefaultStrategy, Strategy};
+use super::{LabelRule, TrainConfig};
+use crate::engine::{Engine, EngineSize, LabelSize};
+use crate::error::{Error, Result};
+use crate::gpu::Gpu;
+use crate::label::vote::ballot::columns_for;
+use crate::pass::KernelShape;
+use crate::scene::{Dataset, LabelMap, View};
+use crate::scheduler::SchedulerOptions;
+use std::collections::BTreeSet;
+
+/// What a trainer is made with besides its configuration.
+#[derive(Debug)]
+pub struct TrainerOptions {
+    /// Shape of the kernels; none: the device's.
+    pub shape: Option<KernelShape>,
+    /// Of the engine.
+    pub scheduler: SchedulerOptions,
+    /// What happens to the Gaussians besides the optimiser.
+    pub strategy: Box<dyn Strategy>,
+}
+
+impl Default for TrainerOptions {
+    fn default() -> Self {
+        SchedulerOptions::default().into()
+    }
+}
+
+impl From<SchedulerOptions> for TrainerOptions {
+    fn from(scheduler: SchedulerOptions) -> Self {
+        Self { shape: None, scheduler, strategy: Box::new(DefaultStrategy) }
+    }
+}
+
+/// Room for training on a data set.
+pub fn room(dataset: &Dataset, config: &TrainConfig, gaussians: u64) -> Result<EngineSize> {
+    let sizes = dataset.train.iter().chain(&dataset.test).map(|view| (view.camera.width, view.camera.height));
+    let image = sizes.reduce(|a, b| (a.0.max(b.0), a.1.max(b.1)));
+    let image = image.ok_or_else(|| Error::data(&dataset.root, "", "the scene has no view to train on"))?;
+    let objects: Vec<u16> =
+        dataset.train.iter().filter_map(|view| view.mask.as_ref()).flat_map(|m| m.objects()).collect();
+    let most = dataset.train.iter().filter_map(|view| view.mask.as_ref().map(|mask| mask.objects().len())).max();
+    let labels = objects.iter().max().map(|&max_label| LabelSize {
+        max_label: u32::from(max_label),
+        layers: config.label_samples.min(most.unwrap_or(0) as u32),
+        vote_columns: match config.label_rule {
+            LabelRule::Votes => columns_for(objects.iter().collect::<BTreeSet<_>>().len()),
+            LabelRule::Main => 0,
+        },
+    });
+    Ok(EngineSize::new(gaussians, image).for_training().with_labels(labels))
+}
+
+/// Room to start with: for twice as many Gaussians as there are, or for those where memory is short.
+pub fn start_room(
+    gpu: &Gpu,
+    dataset: &Dataset,
+    config: &TrainConfig,
+    gaussians: usize,
+    options: SchedulerOptions,
+) -> Result<EngineSize> {
+    let gaussians = gaussians as u64;
+    let most = if config.max_gaussians > 0 { config.max_gaussians } else { u64::MAX };
+    let roomy = room(dataset, config, (gaussians * 2).min(most).max(gaussians))?;
+    match Engine::predict(gpu, &roomy, options) {
+        Err(Error::OutOfMemory { .. }) => Ok(EngineSize { gaussians, ..roomy }),
+        other => other.map(|_| roomy),
+    }
+}
+
+/// A view as training keeps it; takes photo and mask away.
+pub(super) fn train_view(view: &mut View, border: u32) -> Result<TrainView> {
+    let photo = view.photo.take().ok_or_else(|| Error::Bug(format!("{} came without its photo", view.name)))?;
+    let valid_pixels = step_input::valid_pixels(&photo);
+    let mask = view.mask.take();
+    let objects = mask.as_ref().map(LabelMap::objects).unwrap_or_default();
+    let (name, camera) = (view.name.clone(), view.camera.clone());
+    let view_labels = mask.as_ref().map(|mask| step_input::view_labels(mask, border)).unwrap_or_default();
+    let shown = step_input::shown_objects(&photo, &view_labels);
+    let occluders = Default::default();
+    Ok(TrainView { name, camera, photo, valid_pixels, mask, objects, view_labels, shown, occluders })
+}

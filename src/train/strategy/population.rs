@@ -1,0 +1,134 @@
+//! The Gaussians between two steps, as strategies change them, with a bound on their number.
+
+use crate::engine::{Engine, ListKey};
+use crate::error::{Error, Result};
+use crate::shaders::structs::{Counters, StepUniforms};
+
+/// What a densification did.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Densified {
+    /// Gaussians cloned.
+    pub cloned: u32,
+    /// Gaussians split.
+    pub split: u32,
+    /// Gaussians removed.
+    pub pruned: u32,
+}
+
+/// The most Gaussians that there may be.
+#[derive(Clone, Copy, Debug)]
+pub struct Bound {
+    /// As the user or the device has it.
+    pub most: u64,
+    /// Memory has bounded the number of Gaussians, which was said.
+    pub by_memory: bool,
+}
+
+/// The Gaussians on the device, with nothing in flight.
+pub struct Population<'a> {
+    engine: &'a mut Engine,
+    bound: &'a mut Bound,
+    uniforms: StepUniforms,
+    step: u32,
+    densified: Option<Densified>,
+}
+
+impl<'a> Population<'a> {
+    /// After a step with these uniforms.
+    pub(in crate::train) fn new(
+        engine: &'a mut Engine,
+        bound: &'a mut Bound,
+        uniforms: StepUniforms,
+        step: u32,
+    ) -> Self {
+        Self { engine, bound, uniforms, step, densified: None }
+    }
+
+    /// Gaussians.
+    pub fn count(&self) -> u32 {
+        self.engine.gaussian_count()
+    }
+
+    /// What was densified since the step.
+    pub fn densified(&self) -> Option<Densified> {
+        self.densified
+    }
+
+    /// The uniforms of the step, with a seed of its own.
+    pub fn uniforms(&self) -> StepUniforms {
+        self.uniforms
+    }
+
+    /// The engine.
+    pub fn engine(&mut self) -> &mut Engine {
+        self.engine
+    }
+
+    /// Clones, splits and prunes by the thresholds in `uniforms`, no more than there may be. Statistics start over.
+    pub fn densify(&mut self, uniforms: StepUniforms) -> Result<Densified> {
+        let wanted = self.count_densified(uniforms)?.densified_count;
+        let mut most = self.most(wanted)?;
+        let (uniforms, counted) = loop {
+            let bounded = self.bounded(uniforms, wanted, most)?;
+            let counted = self.count_densified(bounded)?;
+            let room = self.engine.room().gaussians;
+            match self.engine.make_room_for_gaussians(u64::from(counted.densified_count)) {
+                Err(error) if error.is_out_of_memory() && most > room => {
+                    tracing::warn!("{error}; from here on there are no more than {room} Gaussians (until --resume)");
+                    *self.bound = Bound { most: room, by_memory: true };
+                    most = room;
+                }
+                other => break other.map(|()| (bounded, counted))?,
+            }
+        };
+        self.engine.run(ListKey::DensifyApply, &uniforms)?;
+        self.engine.set_gaussian_count(counted.densified_count);
+        if counted.densified_count == 0 {
+            return Err(Error::Pruned { step: self.step });
+        }
+        let done = Densified { cloned: counted.cloned_count, split: counted.split_count, pruned: counted.pruned_count };
+        self.densified = Some(done);
+        Ok(done)
+    }
+
+    /// Brings all opacities down to at most 0.01.
+    pub fn reset_opacity(&mut self) -> Result<()> {
+        let uniforms = StepUniforms { gaussian_count: self.count(), ..self.uniforms };
+        self.engine.run(ListKey::OpacityReset, &uniforms).map(drop)
+    }
+
+    fn count_densified(&mut self, uniforms: StepUniforms) -> Result<Counters> {
+        Ok(self.engine.run(ListKey::DensifyCount, &uniforms)?.counters)
+    }
+
+    /// The most Gaussians that there may be, of `count` that are wanted: what was asked for, and what memory holds.
+    fn most(&mut self, count: u32) -> Result<u64> {
+        let wanted = u64::from(count).min(self.bound.most);
+        let fits = self.engine.most_gaussians(wanted)?;
+        if fits < wanted && !self.bound.by_memory {
+            self.bound.by_memory = true;
+            tracing::warn!("memory holds {fits} Gaussians, {wanted} are wanted; from here on only the best may grow");
+        }
+        Ok(fits.min(self.bound.most))
+    }
+
+    /// Raises the gradient threshold until the result fits the bound: those that need it most grow first.
+    fn bounded(&mut self, uniforms: StepUniforms, count: u32, most: u64) -> Result<StepUniforms> {
+        // Where nothing grows there is nothing to bound.
+        if u64::from(count) <= most || uniforms.densify_threshold <= 0.0 {
+            return Ok(uniforms);
+        }
+        let (mut low, mut high) = (uniforms.densify_threshold, uniforms.densify_threshold * 2.0);
+        let with = |threshold| StepUniforms { densify_threshold: threshold, ..uniforms };
+        // The statistic has no infinite gradients, so some threshold lets nothing grow.
+        while high < f32::MAX && u64::from(self.count_densified(with(high))?.densified_count) > most {
+            (low, high) = (high, (high * 2.0).min(f32::MAX));
+        }
+        for _ in 0..12 {
+            let middle = 0.5 * (low + high);
+            let fits = u64::from(self.count_densified(with(middle))?.densified_count) <= most;
+            (low, high) = if fits { (low, middle) } else { (middle, high) };
+        }
+        Ok(with(high))
+    }
+}

@@ -1,0 +1,173 @@
+//! Strategies of other makes than the default: what they may change, and that a checkpoint knows them.
+
+use crate::invariants::training::{config, small};
+use crate::support::device;
+use crate::support::device::Turn;
+use labelgs::Result;
+use labelgs::io::init::initial_gaussians;
+use labelgs::pass::{Builder, Extension, Hook};
+use labelgs::scene::Gaussians;
+use labelgs::scheduler::SchedulerOptions;
+use labelgs::scheduler::plan::Buf;
+use labelgs::shaders::structs::StepUniforms;
+use labelgs::train::strategy::{At, Population, Strategy};
+use labelgs::train::{LabelRule, TrainConfig, TrainState, Trainer, TrainerOptions};
+use serde_json::{Value, json};
+use std::sync::Arc;
+
+/// Never grows; drops what is faint every seven steps; leaves colours alone; in every second step it forgets the momentum
+/// of positions and leaves alone what the step does not show.
+#[derive(Debug, Default)]
+struct Thinning {
+    rounds: u32,
+}
+
+#[derive(Debug)]
+struct Forgetful;
+
+impl Extension for Forgetful {
+    fn extend(&self, passes: u32, hook: Hook, b: &mut Builder) {
+        if passes == 1 && hook == Hook::Updated {
+            b.list.fill(Buf::M_MEANS, 0);
+        }
+    }
+
+    fn updates_unseen(&self, _passes: u32) -> bool {
+        false
+    }
+}
+
+impl Strategy for Thinning {
+    fn name(&self) -> &'static str {
+        "thinning"
+    }
+
+    fn acts_after(&self, at: At) -> bool {
+        at.step.is_multiple_of(7)
+    }
+
+    fn act(&mut self, _at: At, population: &mut Population) -> Result<()> {
+        self.rounds += 1;
+        let prune_opacity = 0.02 * self.rounds as f32 + 0.05;
+        let uniforms = StepUniforms { densify_threshold: 0.0, prune_opacity, ..population.uniforms() };
+        let what = population.densify(uniforms)?;
+        assert_eq!((what.cloned, what.split), (0, 0));
+        Ok(())
+    }
+
+    fn uniforms(&self, _at: At, to: &mut StepUniforms) {
+        to.rate_sh0 = 0.0;
+    }
+
+    fn extension(&self) -> Arc<dyn Extension> {
+        Arc::new(Forgetful)
+    }
+
+    fn passes(&self, at: At) -> u32 {
+        u32::from(at.step.is_multiple_of(2))
+    }
+
+    fn keep(&self) -> Value {
+        json!(self.rounds)
+    }
+
+    fn restore(&mut self, kept: &Value) -> Result<(), String> {
+        self.rounds = kept.as_u64().ok_or("no number of rounds")? as u32;
+        Ok(())
+    }
+}
+
+fn options() -> TrainerOptions {
+    TrainerOptions { strategy: Box::new(Thinning::default()), ..TrainerOptions::default() }
+}
+
+fn settings() -> TrainConfig {
+    TrainConfig { iterations: 30, ..config(LabelRule::Votes) }
+}
+
+/// Each third Gaussian is fainter than those before.
+fn start() -> Gaussians {
+    let mut model = initial_gaussians(&small(), 0, 100).expect("points");
+    model.opacities.iter_mut().enumerate().for_each(|(row, logit)| *logit = if row % 3 == 0 { -3.5 } else { -0.5 });
+    model
+}
+
+fn fresh(turn: &Turn, options: impl Into<TrainerOptions>) -> Trainer {
+    Trainer::new(turn.gpu(), settings(), &mut small(), &start(), options).expect("a trainer")
+}
+
+fn go_on(trainer: &mut Trainer, until: u32) -> TrainState {
+    while trainer.steps_done() < until {
+        trainer.step().expect("a step");
+    }
+    trainer.state().expect("a state")
+}
+
+fn plane<'a>(state: &'a TrainState, name: &str) -> Option<&'a [u32]> {
+    state.planes.iter().find(|plane| plane.name == name).map(|plane| &plane.data[..])
+}
+
+#[test]
+fn a_strategy_decides_what_becomes_of_the_gaussians() {
+    let Some(turn) = device() else { return };
+    let mut trainer = fresh(&turn, options());
+    let first = go_on(&mut trainer, 5);
+    assert!(plane(&first, "m_means").expect("moments").iter().any(|&word| word != 0), "an odd step keeps momentum");
+    assert!(plane(&first, "densify_stats").is_none(), "it keeps no statistics");
+    let colours: Vec<[f32; 3]> = trainer.model().expect("a model").sh0;
+    assert_eq!(colours, start().sh0);
+    let second = go_on(&mut trainer, 6);
+    assert!(plane(&second, "m_means").expect("moments").iter().all(|&word| word == 0), "an even one forgets it");
+    let counts: Vec<u32> = [7, 14, 21, 30].map(|until| go_on(&mut trainer, until).gaussians).to_vec();
+    assert!(counts[0] < second.gaussians && counts.is_sorted_by(|a, b| a >= b), "{} {counts:?}", second.gaussians);
+    let grown = go_on(&mut fresh(&turn, SchedulerOptions::default()), 30).gaussians;
+    assert!(grown > second.gaussians, "by default the same settings grow: {grown}");
+}
+
+#[test]
+fn a_strategy_goes_on_from_a_checkpoint_of_its_own() {
+    let Some(turn) = device() else { return };
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("state");
+    let mut trainer = fresh(&turn, options());
+    go_on(&mut trainer, 16).write(&file).expect("a file");
+    let expected = go_on(&mut trainer, 30);
+    let read = || TrainState::read(&file).expect("a state");
+    let mut resumed = Trainer::resume(turn.gpu(), &mut small(), read(), options()).expect("it goes on");
+    let found = go_on(&mut resumed, 30);
+    assert_eq!((found.gaussians, &found.strategy), (expected.gaussians, &expected.strategy));
+    assert_eq!(found.strategy.value, json!(4), "rounds after 30 steps");
+    assert_eq!(found.planes, expected.planes);
+    let refused = Trainer::resume(turn.gpu(), &mut small(), read(), SchedulerOptions::default());
+    let error = refused.err().expect("another strategy").to_string();
+    assert!(error.contains("thinning") && error.contains("default"), "{error}");
+}
+
+/// The default costs nothing in files either.
+#[test]
+fn checkpoints_do_not_mention_the_default_strategy() {
+    let Some(turn) = device() else { return };
+    let state = go_on(&mut fresh(&turn, SchedulerOptions::default()), 3);
+    let json = serde_json::to_value(&state).expect("JSON");
+    assert!(json.get("strategy").is_none() && json.get("step").is_some());
+    assert!(plane(&state, "densify_stats").is_some());
+}
+
+/// A Gaussian that no view shows has gradient 0: its momentum moves it on, unless the strategy says otherwise.
+#[test]
+fn unseen_gaussians_move_or_rest() {
+    let Some(turn) = device() else { return };
+    for (options, rests) in [(options(), true), (TrainerOptions::default(), false)] {
+        let mut model = start();
+        model.opacities[7] = -20.0;
+        let mut trainer = Trainer::new(turn.gpu(), settings(), &mut small(), &model, options).expect("a trainer");
+        trainer.step().expect("a step");
+        trainer.drain().expect("its report");
+        let before = trainer.model().expect("a model").means[7];
+        trainer.engine_mut().raw_mut().upload(Buf::M_MEANS, 0, 7, &[[1.0_f32, 0.0, 0.0, 0.0]]).expect("upload");
+        trainer.engine_mut().raw_mut().upload(Buf::U_MEANS, 0, 7, &[[1.0_f32; 4]]).expect("upload");
+        trainer.step().expect("a step");
+        let after = trainer.model().expect("a model").means[7];
+        assert_eq!(before == after, rests, "{before:?} {after:?}");
+    }
+}
