@@ -123,13 +123,7 @@ impl Pipeline {
             self.device.create_descriptor_set_layout(&info, None)
         })?;
         let layouts = [self.set_layout];
-        let ranges = [vk::PushConstantRange {
-            stage_flags: vk::ShaderStageFlags::COMPUTE,
-            offset: 0,
-            size: self.shader.push_bytes,
-        }];
-        let ranges = if self.shader.push_bytes == 0 { &[][..] } else { &ranges[..] };
-        let info = vk::PipelineLayoutCreateInfo::default().set_layouts(&layouts).push_constant_ranges(ranges);
+        let info = vk::PipelineLayoutCreateInfo::default().set_layouts(&layouts);
         // SAFETY: as above.
         self.layout = vk_call("vkCreatePipelineLayout", || unsafe { self.device.create_pipeline_layout(&info, None) })?;
         Ok(())

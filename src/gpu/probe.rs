@@ -153,7 +153,6 @@ fn limits(
         max_invocations: core.max_compute_work_group_invocations,
         max_shared: core.max_compute_shared_memory_size,
         max_allocation: eleven.max_memory_allocation_size.min(max_buffer),
-        max_push: core.max_push_constants_size,
         max_storage_buffers: core
             .max_per_stage_descriptor_storage_buffers
             .min(core.max_descriptor_set_storage_buffers)

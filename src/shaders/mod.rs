@@ -61,8 +61,6 @@ pub struct ShaderDesc {
     pub spirv: &'static [u8],
     /// Bindings in the order of the fields of `Bindings<B>`, which is the order of binding numbers.
     pub bindings: &'static [BindingDesc],
-    /// Bytes of push constants.
-    pub push_bytes: u32,
     /// Specialisation constants in the order of the fields of `Spec`.
     pub spec: &'static [SpecDesc],
     /// True if the shader uses subgroup operations, so that the subgroup size must be pinned.

@@ -25,15 +25,13 @@ pub fn shader(name: &'static str, glsl: &str, bindings: &[(&'static str, Access,
         name,
         spirv: Box::leak(compiled.as_binary_u8().to_vec().into_boxed_slice()),
         bindings: Box::leak(bindings.collect::<Vec<_>>().into_boxed_slice()),
-        push_bytes: 0,
         spec: &[],
         uses_subgroups: glsl.contains("gl_Subgroup"),
     }
 }
 
-/// Adds push constants and specialisation constants (name, id, default), and leaks the description.
-pub fn finish(mut shader: ShaderDesc, push_bytes: u32, spec: &[(&'static str, u32, u32)]) -> &'static ShaderDesc {
-    shader.push_bytes = push_bytes;
+/// Adds specialisation constants (name, id, default), and leaks the description.
+pub fn finish(mut shader: ShaderDesc, spec: &[(&'static str, u32, u32)]) -> &'static ShaderDesc {
     let spec = spec.iter().map(|&(name, id, default)| SpecDesc { name, id, default });
     shader.spec = Box::leak(spec.collect::<Vec<_>>().into_boxed_slice());
     Box::leak(Box::new(shader))

@@ -1,4 +1,4 @@
-//! What a shader declares: bindings, push constants, specialisation constants and the structs in them.
+//! What a shader declares: bindings, specialisation constants and the structs in them.
 
 use std::collections::BTreeMap;
 
@@ -99,8 +99,6 @@ pub struct Problem {
 pub struct Interface {
     /// In the order of binding numbers.
     pub bindings: Vec<Binding>,
-    /// Push constants.
-    pub push: Option<Struct>,
     /// In the order of ids.
     pub spec: Vec<SpecConstant>,
     /// Struct types used in blocks, by name.

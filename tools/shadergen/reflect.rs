@@ -106,10 +106,10 @@ impl<'a> Reflector<'a> {
             match class {
                 StorageClass::StorageBuffer => self.storage(id, pointee),
                 StorageClass::UniformConstant => self.texel(id, pointee),
-                StorageClass::PushConstant => self.interface.push = self.block(pointee, "Push"),
-                StorageClass::Uniform => {
+                StorageClass::Uniform | StorageClass::PushConstant => {
                     let name = self.name(pointee);
-                    self.problem(&name, "uniform blocks are not supported; use a readonly buffer (READ1)");
+                    let rule = "uniform blocks and push constants are not supported; use a readonly buffer (READ1)";
+                    self.problem(&name, rule);
                 }
                 _ => {}
             }

@@ -50,7 +50,6 @@ fn shader(name: &'static str, accesses: &[Access]) -> &'static ShaderDesc {
         name,
         spirv: &[],
         bindings: Box::leak(bindings.collect::<Vec<_>>().into_boxed_slice()),
-        push_bytes: 0,
         spec: &[],
         uses_subgroups: false,
     }))

@@ -8,9 +8,6 @@ use labelgs::scheduler::plan::{
 use labelgs::shaders::{Access, BindingDesc, BindingKind, ShaderDesc, SpecDesc, constants};
 use labelgs::{Error, Result};
 
-/// Bytes of the push constants: first vec4 of the channels, vec4 a Gaussian.
-const PUSH_BYTES: u32 = 8;
-
 /// How a kernel sees a buffer.
 #[derive(Clone, Copy)]
 enum Seen {
@@ -56,13 +53,13 @@ impl Kernels {
             "feature_backward" => include_str!("feature_backward.comp"),
             _ => include_str!("feature_gather.comp"),
         };
-        let shader = |name, bindings: &[(&'static str, Seen)], push, uses_subgroups| {
-            compile(name, source(name), bindings, push, uses_subgroups, shape.texel)
+        let shader = |name, bindings: &[(&'static str, Seen)], uses_subgroups| {
+            compile(name, source(name), bindings, uses_subgroups, shape.texel)
         };
         Ok(Self {
-            forward: shader("feature_forward", &forward, PUSH_BYTES, true)?,
-            backward: shader("feature_backward", &backward, 0, true)?,
-            gather: shader("feature_gather", &gather, PUSH_BYTES, false)?,
+            forward: shader("feature_forward", &forward, true)?,
+            backward: shader("feature_backward", &backward, true)?,
+            gather: shader("feature_gather", &gather, false)?,
         })
     }
 }
@@ -71,7 +68,6 @@ fn compile(
     name: &'static str,
     source: &str,
     bindings: &[(&'static str, Seen)],
-    push_bytes: u32,
     uses_subgroups: bool,
     texel: bool,
 ) -> Result<&'static ShaderDesc> {
@@ -87,15 +83,14 @@ fn compile(
     };
     let bindings: Vec<BindingDesc> = bindings.iter().enumerate().map(describe).collect();
     let spec = |name, id, default| SpecDesc { name, id, default };
-    let vecs = spec("VECS", 10, 1);
-    let tile = vec![spec("SUBGROUP_SIZE", 0, 8), spec("TILE_WIDTH", 1, 8), spec("TILE_HEIGHT", 2, 8), vecs];
-    let specs = if uses_subgroups { tile } else { vec![vecs] };
+    let channels = [spec("VECS", 10, 1), spec("CHUNK", 20, 0), spec("STRIDE", 21, 1)];
+    let tile = [spec("SUBGROUP_SIZE", 0, 8), spec("TILE_WIDTH", 1, 8), spec("TILE_HEIGHT", 2, 8)];
+    let specs = if uses_subgroups { [&tile[..], &channels].concat() } else { channels.to_vec() };
     Ok(Box::leak(Box::new(ShaderDesc {
         stem: name,
         name,
         spirv,
         bindings: Box::leak(bindings.into_boxed_slice()),
-        push_bytes,
         spec: Box::leak(specs.into_boxed_slice()),
         uses_subgroups,
     })))
@@ -170,11 +165,11 @@ pub fn step_with_features(
     let Work::Pass(backward) = &list.work[at] else { return Err(missing()) };
     let bound = backward.shader.bindings.iter().position(|binding| binding.name == "slots").ok_or_else(missing)?;
     let slots = backward.buffers[bound];
-    let tile = vec![shape.subgroup, shape.tile_width, shape.tile_height, channels.vecs];
     let grid = |word: u32| Grid::Indirect(Buf::DISPATCH_ARGS, word * 4);
     let mut walks = Vec::new();
     for chunk in channels.chunks() {
-        let push = [chunk, channels.stride()];
+        let walk = vec![channels.vecs, chunk, channels.stride()];
+        let tile = [&[shape.subgroup, shape.tile_width, shape.tile_height], &walk[..]].concat();
         let lists = [Buf::STEP, Buf::TILE_STARTS, slots, Buf::SPLAT_FROM_INSTANCE, Buf::SPLATS, Buf::LAST];
         let forward = [&lists[..], &[Buf::DEPTH_VALUES_A, buffers.features, buffers.v_image]].concat();
         let backward = [&lists[..], &[buffers.v_image, buffers.v_instances]].concat();
@@ -188,10 +183,10 @@ pub fn step_with_features(
             buffers.v_features,
         ];
         let blend = grid(constants::ARGS_BLEND);
-        walks.push(PassDecl::new(kernels.forward, forward, blend).spec(tile.clone()).push_pod(&push).into());
-        walks.push(PassDecl::new(kernels.backward, backward, blend).spec(tile.clone()).into());
+        walks.push(PassDecl::new(kernels.forward, forward, blend).spec(tile.clone()).into());
+        walks.push(PassDecl::new(kernels.backward, backward, blend).spec(tile).into());
         let gather = PassDecl::new(kernels.gather, gather, grid(constants::ARGS_SPLATS));
-        walks.push(gather.spec(vec![channels.vecs]).push_pod(&push).into());
+        walks.push(gather.spec(walk).into());
     }
     list.work.splice(at + 1..at + 1, walks);
     Ok(list)

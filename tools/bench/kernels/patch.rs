@@ -124,7 +124,6 @@ fn stand_in(shader: &ShaderDesc, words: &[u32]) -> &'static ShaderDesc {
         name: shader.name,
         spirv: Box::leak(bytes.into_boxed_slice()),
         bindings: shader.bindings,
-        push_bytes: shader.push_bytes,
         spec: shader.spec,
         uses_subgroups: shader.uses_subgroups,
     }))

@@ -123,7 +123,6 @@ fn compile(
         name,
         spirv: spirv(name, source, texel)?,
         bindings: Box::leak(bindings.into_boxed_slice()),
-        push_bytes: 0,
         spec: Box::leak(spec.into_boxed_slice()),
         uses_subgroups: false,
     })))
