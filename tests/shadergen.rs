@@ -1,11 +1,11 @@
 //! The shader generator: what it reads from a shader, and that each of its findings is found.
 
 #[path = "../tools/shadergen/mod.rs"]
-mod tool;
+pub mod tool;
 
 use std::fs;
 use tempfile::TempDir;
-use tool::interface::{Access, Kind};
+use tool::interface::{Access, Kind, LocalSize};
 use tool::{Finding, Generated};
 
 const CONSTANTS: &str = include_str!("../glsl/include/constants.glsl");
@@ -118,6 +118,8 @@ fn a_good_shader_is_reflected_in_full() {
     ];
     assert_eq!(spec, expected);
     assert!(base.interface.uses_subgroups);
+    let expected = [LocalSize::Constant(0), LocalSize::Constant(6), LocalSize::Fixed(1)];
+    assert_eq!(base.interface.local_size, expected);
     let counters = &base.interface.structs["Counters"];
     let offsets: Vec<_> = counters.fields.iter().map(|field| (field.offset, field.ty.rust.as_str())).collect();
     let expected =
@@ -136,7 +138,9 @@ fn a_good_shader_is_reflected_in_full() {
 #[test]
 fn a_shader_without_subgroup_operations_says_so() {
     let generated = generate(&[("test/probe.comp", &small("", ""))]).expect("no finding");
-    assert!(!generated.shaders[0].variants[0].interface.uses_subgroups);
+    let interface = &generated.shaders[0].variants[0].interface;
+    assert!(!interface.uses_subgroups);
+    assert_eq!(interface.local_size, [LocalSize::Fixed(1); 3]);
 }
 
 #[test]

@@ -213,7 +213,10 @@ fn emit_variant(out: &mut String, shader: &Shader, variant: &Variant) {
     for SpecConstant { name, id, default, .. } in &interface.spec {
         put!(out, "            super::SpecDesc {{ name: {name:?}, id: {id}, default: {default} }},");
     }
-    put!(out, "        ],\n        uses_subgroups: {},\n        }} }},", interface.uses_subgroups);
+    put!(out, "        ],");
+    let local_size = interface.local_size.map_join(|size| format!("super::LocalSize::{size:?}"));
+    put!(out, "        local_size: [{local_size}],");
+    put!(out, "        uses_subgroups: {},\n        }} }},", interface.uses_subgroups);
 }
 
 /// A Rust literal of the value with these bits.

@@ -85,6 +85,21 @@ pub struct SpecConstant {
     pub default: u32,
 }
 
+/// Invocations on one axis of a workgroup.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LocalSize {
+    /// A number.
+    Fixed(u32),
+    /// The specialisation constant of this id.
+    Constant(u32),
+}
+
+impl Default for LocalSize {
+    fn default() -> Self {
+        Self::Fixed(1)
+    }
+}
+
 /// Something that reflection cannot represent or that breaks a rule: a name to look for in the source, and the rule.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Problem {
@@ -103,6 +118,8 @@ pub struct Interface {
     pub spec: Vec<SpecConstant>,
     /// Struct types used in blocks, by name.
     pub structs: BTreeMap<String, Struct>,
+    /// Invocations on each axis of a workgroup.
+    pub local_size: [LocalSize; 3],
     /// Whether subgroup operations are used.
     pub uses_subgroups: bool,
     /// What is wrong with it.

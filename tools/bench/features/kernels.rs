@@ -5,7 +5,7 @@ use labelgs::pass::{KernelShape, Variant, training_step};
 use labelgs::scheduler::plan::{
     Buf, BufferDecl, Capacity, Class, Domain, Grid, PassDecl, PassList, TABLE, TexelFormat, Work,
 };
-use labelgs::shaders::{Access, BindingDesc, BindingKind, ShaderDesc, SpecDesc, constants};
+use labelgs::shaders::{Access, BindingDesc, BindingKind, LocalSize, ShaderDesc, SpecDesc, constants};
 use labelgs::{Error, Result};
 
 /// How a kernel sees a buffer.
@@ -86,12 +86,14 @@ fn compile(
     let channels = [spec("VECS", 10, 1), spec("CHUNK", 20, 0), spec("STRIDE", 21, 1)];
     let tile = [spec("SUBGROUP_SIZE", 0, 8), spec("TILE_WIDTH", 1, 8), spec("TILE_HEIGHT", 2, 8)];
     let specs = if uses_subgroups { [&tile[..], &channels].concat() } else { channels.to_vec() };
+    let width = if uses_subgroups { LocalSize::Constant(0) } else { LocalSize::Fixed(64) };
     Ok(Box::leak(Box::new(ShaderDesc {
         stem: name,
         name,
         spirv,
         bindings: Box::leak(bindings.into_boxed_slice()),
         spec: Box::leak(specs.into_boxed_slice()),
+        local_size: [width, LocalSize::Fixed(1), LocalSize::Fixed(1)],
         uses_subgroups,
     })))
 }

@@ -125,6 +125,7 @@ fn stand_in(shader: &ShaderDesc, words: &[u32]) -> &'static ShaderDesc {
         spirv: Box::leak(bytes.into_boxed_slice()),
         bindings: shader.bindings,
         spec: shader.spec,
+        local_size: shader.local_size,
         uses_subgroups: shader.uses_subgroups,
     }))
 }

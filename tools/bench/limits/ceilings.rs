@@ -5,7 +5,7 @@ use labelgs::Result;
 use labelgs::gpu::Gpu;
 use labelgs::scheduler::plan::{Buf, BufferDecl, Capacity, Class, Domain, Grid, PassDecl, PassList, TexelFormat};
 use labelgs::scheduler::{Scheduler, SchedulerOptions};
-use labelgs::shaders::{Access, BindingDesc, BindingKind, ShaderDesc, SpecDesc};
+use labelgs::shaders::{Access, BindingDesc, BindingKind, LocalSize, ShaderDesc, SpecDesc};
 use serde::Serialize;
 use std::sync::Arc;
 
@@ -124,6 +124,7 @@ fn compile(
         spirv: spirv(name, source, texel)?,
         bindings: Box::leak(bindings.into_boxed_slice()),
         spec: Box::leak(spec.into_boxed_slice()),
+        local_size: [LocalSize::Fixed(64), LocalSize::Fixed(1), LocalSize::Fixed(1)],
         uses_subgroups: false,
     })))
 }
