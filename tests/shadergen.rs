@@ -1,11 +1,11 @@
 //! The shader generator: what it reads from a shader, and that each of its findings is found.
 
 #[path = "../tools/shadergen/mod.rs"]
-mod tool;
+pub mod tool;
 
 use std::fs;
 use tempfile::TempDir;
-use tool::interface::{Access, Kind};
+use tool::interface::{Access, Kind, LocalSize};
 use tool::{Finding, Generated};
 
 const CONSTANTS: &str = include_str!("../glsl/include/constants.glsl");
@@ -27,7 +27,6 @@ FETCH4(1, means);
 FETCHU(2, labels);
 INOUT(3, vec3, colors);
 WRITE(7, uvec2, keys);
-PUSH { vec3 offset; Inner inner; } push;
 SPEC(0, uint, WIDTH, 8);
 SPEC(1, float, SCALE, 0.25);
 SPEC(2, bool, CLAMP, true);
@@ -37,7 +36,7 @@ layout(local_size_x_id = 0, local_size_y_id = 6) in;
 void main() {
     uint i = gl_GlobalInvocationID.x;
     float sum = subgroupAdd(fetch4(means, i).x) * (CLAMP ? ALPHA_MIN : SCALE) + float(SHIFT);
-    colors[i] += sum * counters.m * push.offset * push.inner.b;
+    colors[i] += sum * counters.m * counters.x * counters.inner[1].b;
     keys[i] = uvec2(fetchu(labels, i), WIDTH + counters.n);
 }
 "#;
@@ -119,8 +118,8 @@ fn a_good_shader_is_reflected_in_full() {
     ];
     assert_eq!(spec, expected);
     assert!(base.interface.uses_subgroups);
-    let push = base.interface.push.as_ref().expect("push constants");
-    assert_eq!((push.bytes, push.fields[1].offset, push.fields[1].ty.rust.as_str()), (24, 12, "super::structs::Inner"));
+    let expected = [LocalSize::Constant(0), LocalSize::Constant(6), LocalSize::Fixed(1)];
+    assert_eq!(base.interface.local_size, expected);
     let counters = &base.interface.structs["Counters"];
     let offsets: Vec<_> = counters.fields.iter().map(|field| (field.offset, field.ty.rust.as_str())).collect();
     let expected =
@@ -139,7 +138,9 @@ fn a_good_shader_is_reflected_in_full() {
 #[test]
 fn a_shader_without_subgroup_operations_says_so() {
     let generated = generate(&[("test/probe.comp", &small("", ""))]).expect("no finding");
-    assert!(!generated.shaders[0].variants[0].interface.uses_subgroups);
+    let interface = &generated.shaders[0].variants[0].interface;
+    assert!(!interface.uses_subgroups);
+    assert_eq!(interface.local_size, [LocalSize::Fixed(1); 3]);
 }
 
 #[test]
@@ -216,18 +217,15 @@ fn other_resources_than_buffers_are_found() {
     let image = "layout(set = 0, binding = 1, rgba8) uniform image2D canvas;";
     probe(image, "imageStore(canvas, ivec2(0), vec4(1));", &["`canvas` is neither a storage block nor"]);
     let uniform = "layout(scalar, set = 0, binding = 1) uniform rates_block { float rate; };";
-    probe(uniform, "words[0] = uint(rate);", &["uniform blocks are not supported"]);
+    probe(uniform, "words[0] = uint(rate);", &["uniform blocks and push constants are not supported"]);
+    let push = "layout(push_constant, scalar) uniform push_block { uint many[4]; } push;";
+    probe(push, "words[0] = push.many[3];", &["glsl/test/probe.comp:8", "uniform blocks and push constants are not"]);
 }
 
 #[test]
 fn a_block_both_readonly_and_writeonly_is_found() {
     let body = "layout(scalar, set = 0, binding = 1) readonly writeonly buffer odd_block { uint odd[]; };";
     probe(body, "words[0] = odd.length();", &["`odd` is readonly and writeonly"]);
-}
-
-#[test]
-fn push_constants_beyond_128_bytes_are_found() {
-    probe("PUSH { uint many[33]; } push;", "words[0] = push.many[32];", &["132 bytes of push constants", "128"]);
 }
 
 #[test]
@@ -264,7 +262,6 @@ fn variants_with_different_interfaces_are_found() {
         (with("READ(1, uint, a);", "INOUT(1, uint, a);", "words[1] = a[0];"), "bindings"),
         (with("READ(1, uint, a);", "READ(2, uint, a);", "words[1] = a[0];"), "bindings"),
         (with("READ(1, uint, a);", "READ(1, uvec2, a);", "words[1] = uvec2(a[0]).x;"), "bindings"),
-        (with("PUSH { uint a; } push;", "PUSH { int a; } push;", "words[1] = uint(push.a);"), "push constants"),
         (with("SPEC(0, uint, A, 1);", "SPEC(0, uint, A, 2);", "words[1] = A;"), "specialisation constants"),
     ];
     for (text, what) in &cases {

@@ -23,8 +23,6 @@ pub struct Limits {
     pub max_shared: u32,
     /// Largest allocation and buffer, in bytes.
     pub max_allocation: u64,
-    /// Bytes of push constants.
-    pub max_push: u32,
     /// Storage buffers of one shader.
     pub max_storage_buffers: u32,
     /// Texel buffers of one shader.

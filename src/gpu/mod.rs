@@ -15,7 +15,6 @@ mod devices;
 mod hidden;
 mod instance;
 mod limits;
-mod local_size;
 mod memory;
 mod pipeline;
 mod probe;

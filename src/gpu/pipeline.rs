@@ -1,7 +1,6 @@
 //! Compute pipelines.
 
 use super::call::vk_call;
-use super::local_size::local_size;
 use super::{Gpu, lock};
 use crate::error::{Error, Result};
 use crate::shaders::{BindingDesc, BindingKind, ShaderDesc};
@@ -44,16 +43,15 @@ impl Gpu {
         Ok(Arc::clone(lock(&self.pipelines).entry(key).or_insert(pipeline)))
     }
 
-    /// Fails if the workgroup of a shader is too large, which drivers answer in their own ways.
-    fn check_workgroup(&self, shader: &ShaderDesc, spec: &[u32], subgroup_size: Option<u32>) -> Result<Option<u32>> {
-        let Some(size) = local_size(shader, spec) else { return Ok(None) };
-        let limits = self.limits();
+    /// Width of the workgroup of a shader; fails if it is too large, which drivers answer in their own ways.
+    fn check_workgroup(&self, shader: &ShaderDesc, spec: &[u32], subgroup_size: Option<u32>) -> Result<u32> {
+        let (size, limits) = (shader.workgroup(spec), self.limits());
         let invocations = size.iter().map(|&count| u64::from(count)).product::<u64>();
         let subgroups = u64::from(subgroup_size.unwrap_or(1)) * u64::from(self.capabilities.subgroup.max_per_group);
         let most = u64::from(limits.max_invocations).min(if subgroup_size.is_some() { subgroups } else { u64::MAX });
         let fits = size.iter().zip(&limits.max_group_size).all(|(count, limit)| (1..=*limit).contains(count));
         if fits && invocations <= most {
-            return Ok(Some(size[0]));
+            return Ok(size[0]);
         }
         let name = shader.name;
         Err(Error::NoDevice(format!("shader {name} has workgroups of {size:?}, the device takes {most} invocations")))
@@ -94,8 +92,8 @@ impl Pipeline {
         let info = vk::ShaderModuleCreateInfo::default().code(&words);
         // SAFETY: the SPIR-V comes from the shader compiler of the build.
         let module = vk_call("vkCreateShaderModule", || unsafe { gpu.raw().create_shader_module(&info, None) })?;
-        let full = gpu.capabilities.features.full_subgroups
-            && subgroup_size.zip(width).is_some_and(|(size, width)| width % size == 0);
+        let full =
+            gpu.capabilities.features.full_subgroups && subgroup_size.is_some_and(|size| width.is_multiple_of(size));
         let made = pipeline.make(gpu.pipeline_cache(), module, spec, subgroup_size, full);
         // SAFETY: pipelines do not need their modules once they are made.
         unsafe { gpu.raw().destroy_shader_module(module, None) };
@@ -123,13 +121,7 @@ impl Pipeline {
             self.device.create_descriptor_set_layout(&info, None)
         })?;
         let layouts = [self.set_layout];
-        let ranges = [vk::PushConstantRange {
-            stage_flags: vk::ShaderStageFlags::COMPUTE,
-            offset: 0,
-            size: self.shader.push_bytes,
-        }];
-        let ranges = if self.shader.push_bytes == 0 { &[][..] } else { &ranges[..] };
-        let info = vk::PipelineLayoutCreateInfo::default().set_layouts(&layouts).push_constant_ranges(ranges);
+        let info = vk::PipelineLayoutCreateInfo::default().set_layouts(&layouts);
         // SAFETY: as above.
         self.layout = vk_call("vkCreatePipelineLayout", || unsafe { self.device.create_pipeline_layout(&info, None) })?;
         Ok(())

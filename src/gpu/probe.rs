@@ -153,7 +153,6 @@ fn limits(
         max_invocations: core.max_compute_work_group_invocations,
         max_shared: core.max_compute_shared_memory_size,
         max_allocation: eleven.max_memory_allocation_size.min(max_buffer),
-        max_push: core.max_push_constants_size,
         max_storage_buffers: core
             .max_per_stage_descriptor_storage_buffers
             .min(core.max_descriptor_set_storage_buffers)
@@ -203,7 +202,6 @@ fn needs(found: &Capabilities, has_queue: bool) -> Vec<Need> {
         need(what, found >= needed, &needed.to_string(), found.to_string(), reason)
     };
     let bindings = shaders::ALL.iter().map(|shader| storage_bindings(shader)).max().unwrap_or(0);
-    let push = shaders::ALL.iter().map(|shader| shader.push_bytes).max().unwrap_or(0);
     let shuffles = subgroup.operations.contains(SUBGROUP_OPERATIONS);
     let mut needs = vec![
         need("Vulkan", (major, minor) >= (1, 2), "1.2", format!("{major}.{minor}.{patch}"), "everything"),
@@ -219,7 +217,6 @@ fn needs(found: &Capabilities, has_queue: bool) -> Vec<Need> {
             "one tile per subgroup",
         ),
         least("workgroup size", 256, limits.max_invocations, "scan and sort"),
-        least("push constants, bytes", push, limits.max_push, "parameters of passes"),
         least("storage buffers per shader", bindings, limits.max_storage_buffers, "bindings of the largest pass"),
     ];
     needs.extend(wishes(limits, subgroup));

@@ -102,7 +102,6 @@ pub fn plan_limits(limits: &crate::gpu::Limits) -> Limits {
         texel_alignment: limits.texel_alignment,
         max_groups: limits.max_groups,
         max_allocation: limits.max_allocation,
-        max_push: limits.max_push,
         max_storage_buffers: limits.max_storage_buffers,
         max_texel_buffers: limits.max_texel_buffers,
         max_memory: limits.max_memory,

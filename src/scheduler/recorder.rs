@@ -102,17 +102,8 @@ impl<'a> Recorder<'a> {
     }
 
     /// Runs a shader.
-    pub(super) fn dispatch(
-        &self,
-        pipeline: &Pipeline,
-        set: vk::DescriptorSet,
-        push: &[u8],
-        groups: &Groups<'_>,
-    ) -> Result<()> {
+    pub(super) fn dispatch(&self, pipeline: &Pipeline, set: vk::DescriptorSet, groups: &Groups<'_>) -> Result<()> {
         let (raw, command, limits) = (self.gpu.raw(), self.command, self.gpu.limits());
-        if push.len() > limits.max_push as usize || !push.len().is_multiple_of(4) {
-            return Err(Error::Bug(format!("{} bytes of push constants", push.len())));
-        }
         match groups {
             Groups::Count(count) if count.iter().zip(&limits.max_groups).any(|(count, limit)| count > limit) => {
                 return Err(Error::Bug(format!("{count:?} workgroups, the device takes {:?}", limits.max_groups)));
@@ -125,9 +116,6 @@ impl<'a> Recorder<'a> {
         unsafe {
             raw.cmd_bind_pipeline(command, vk::PipelineBindPoint::COMPUTE, pipeline.raw());
             raw.cmd_bind_descriptor_sets(command, vk::PipelineBindPoint::COMPUTE, pipeline.layout(), 0, &[set], &[]);
-            if !push.is_empty() {
-                raw.cmd_push_constants(command, pipeline.layout(), vk::ShaderStageFlags::COMPUTE, 0, push);
-            }
             match groups {
                 Groups::Count([x, y, z]) => raw.cmd_dispatch(command, *x, *y, *z),
                 Groups::Indirect(buffer, offset) => raw.cmd_dispatch_indirect(command, buffer.raw(), *offset),

@@ -125,7 +125,7 @@ impl Writer<'_> {
                 Groups::Indirect(buffer, offset + u64::from(inner))
             }
         };
-        self.recorder.dispatch(&pipeline, set, &pass.push, &groups)
+        self.recorder.dispatch(&pipeline, set, &groups)
     }
 }
 

@@ -50,6 +50,15 @@ pub struct SpecDesc {
     pub default: u32,
 }
 
+/// Invocations on one axis of a workgroup.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LocalSize {
+    /// A number.
+    Fixed(u32),
+    /// The specialisation constant of this id.
+    Constant(u32),
+}
+
 /// One compiled variant of a shader.
 #[derive(Debug)]
 pub struct ShaderDesc {
@@ -61,12 +70,25 @@ pub struct ShaderDesc {
     pub spirv: &'static [u8],
     /// Bindings in the order of the fields of `Bindings<B>`, which is the order of binding numbers.
     pub bindings: &'static [BindingDesc],
-    /// Bytes of push constants.
-    pub push_bytes: u32,
     /// Specialisation constants in the order of the fields of `Spec`.
     pub spec: &'static [SpecDesc],
+    /// Invocations on each axis of a workgroup.
+    pub local_size: [LocalSize; 3],
     /// True if the shader uses subgroup operations, so that the subgroup size must be pinned.
     pub uses_subgroups: bool,
+}
+
+impl ShaderDesc {
+    /// Invocations on each axis of a workgroup with these words of the specialisation constants.
+    pub fn workgroup(&self, words: &[u32]) -> [u32; 3] {
+        self.local_size.map(|size| match size {
+            LocalSize::Fixed(size) => size,
+            LocalSize::Constant(id) => {
+                let place = self.spec.iter().position(|constant| constant.id == id);
+                place.and_then(|place| words.get(place).copied()).unwrap_or(0)
+            }
+        })
+    }
 }
 
 /// One way in which a GLSL file is compiled.

@@ -23,7 +23,6 @@ fn messages(validation: Validation, list: &PassList) -> Option<Vec<Message>> {
 // Says that it reads, and writes: nobody plans a barrier for that.
 toy_shader!(
     liar,
-    0,
     [],
     [("to", R, S, 4)],
     "layout(local_size_x = 64) in;
@@ -33,7 +32,6 @@ toy_shader!(
 
 toy_shader!(
     beyond,
-    0,
     [],
     [("to", W, S, 4)],
     "layout(local_size_x = 64) in;

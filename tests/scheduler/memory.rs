@@ -5,13 +5,12 @@ use labelgs::Error;
 
 toy_shader!(
     overrun,
-    4,
-    [],
+    [("INDEX", 0, 0)],
     [("to", W, S, 4)],
     "layout(local_size_x = 1) in;
-    layout(push_constant, scalar) uniform Push { uint index; };
+    layout(constant_id = 0) const uint INDEX = 0;
     layout(scalar, set=0, binding=0) writeonly buffer to_block { uint to[]; };
-    void main() { to[index] = 7; }"
+    void main() { to[INDEX] = 7; }"
 );
 
 fn ramp(count: u32) -> Vec<u32> {
@@ -101,7 +100,7 @@ fn guards_see_a_write_behind_the_end() {
         let write = |index: u32| {
             let mut list = PassList::new("write");
             list.fill(A, 1).fill(C, 2);
-            list.pass(PassDecl::new(overrun(), vec![buf], Grid::Groups(1, 1, 1)).push_pod(&index));
+            list.pass(PassDecl::new(overrun(), vec![buf], Grid::Groups(1, 1, 1)).spec(vec![index]));
             list
         };
         let inside = scheduler.prepare(&write(count - 1)).unwrap();

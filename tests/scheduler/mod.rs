@@ -40,12 +40,12 @@ const RW: Access = Access::ReadWrite;
 const S: BindingKind = BindingKind::Storage;
 const T: BindingKind = BindingKind::Texel;
 
-/// Declares a function that compiles a shader once: bytes of push constants, specialisation constants, bindings, GLSL.
+/// Declares a function that compiles a shader once: specialisation constants, bindings, GLSL.
 macro_rules! toy_shader {
-    ($name:ident, $push:expr, $spec:expr, $bindings:expr, $glsl:expr) => {
+    ($name:ident, $spec:expr, $bindings:expr, $glsl:expr) => {
         pub(crate) fn $name() -> &'static ShaderDesc {
             static SHADER: std::sync::OnceLock<&'static ShaderDesc> = std::sync::OnceLock::new();
-            SHADER.get_or_init(|| toy::finish(toy::shader(stringify!($name), $glsl, &$bindings), $push, &$spec))
+            SHADER.get_or_init(|| toy::finish(toy::shader(stringify!($name), $glsl, &$bindings), &$spec))
         }
     };
 }
@@ -53,15 +53,15 @@ pub(crate) use toy_shader;
 
 toy_shader!(
     scale,
-    8,
-    [("WIDTH", 0, 64), ("FACTOR", 1, 1)],
+    [("WIDTH", 0, 64), ("FACTOR", 1, 1), ("TERM", 2, 0), ("COUNT", 3, 0)],
     [("from", R, S, 4), ("to", W, S, 4)],
     "layout(local_size_x_id = 0) in;
     layout(constant_id = 1) const uint FACTOR = 1;
-    layout(push_constant, scalar) uniform Push { uint term; uint count; };
+    layout(constant_id = 2) const uint TERM = 0;
+    layout(constant_id = 3) const uint COUNT = 0;
     layout(scalar, set=0, binding=0) readonly buffer from_block { uint from[]; };
     layout(scalar, set=0, binding=1) writeonly buffer to_block { uint to[]; };
-    void main() { uint i = gl_GlobalInvocationID.x; if (i < count) to[i] = from[i] * FACTOR + term; }"
+    void main() { uint i = gl_GlobalInvocationID.x; if (i < COUNT) to[i] = from[i] * FACTOR + TERM; }"
 );
 
 fn pixels(count: u64) -> Capacity {
@@ -70,9 +70,7 @@ fn pixels(count: u64) -> Capacity {
 
 /// `to[i] = from[i] * factor + term`.
 fn scaled(from: Buf, to: Buf, factor: u32, term: u32, count: u32) -> PassDecl {
-    PassDecl::new(scale(), vec![from, to], Grid::Groups(count.div_ceil(64), 1, 1))
-        .spec(vec![64, factor])
-        .push_pod(&[term, count])
+    PassDecl::new(scale(), vec![from, to], Grid::Groups(count.div_ceil(64), 1, 1)).spec(vec![64, factor, term, count])
 }
 
 fn options(plan: PlanOptions) -> SchedulerOptions {

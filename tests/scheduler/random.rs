@@ -7,17 +7,17 @@ use rand::{Rng, SeedableRng};
 // Each element needs a far one, so that a pass that starts too early, or scratch that is reused too early, shows.
 toy_shader!(
     shift,
-    8,
-    [],
+    [("BY", 0, 0), ("COUNT", 1, 0)],
     [("from", R, S, 4), ("other", R, S, 4), ("to", W, S, 4)],
     "layout(local_size_x = 64) in;
-    layout(push_constant, scalar) uniform Push { uint by; uint count; };
+    layout(constant_id = 0) const uint BY = 0;
+    layout(constant_id = 1) const uint COUNT = 0;
     layout(scalar, set=0, binding=0) readonly buffer from_block { uint from[]; };
     layout(scalar, set=0, binding=1) readonly buffer other_block { uint other[]; };
     layout(scalar, set=0, binding=2) writeonly buffer to_block { uint to[]; };
     void main() {
         uint i = gl_GlobalInvocationID.x;
-        if (i < count) to[i] = from[(i + by) % count] * 5 + other[(i + 2 * by) % count] + 1;
+        if (i < COUNT) to[i] = from[(i + BY) % COUNT] * 5 + other[(i + 2 * BY) % COUNT] + 1;
     }"
 );
 
@@ -53,7 +53,7 @@ fn random_list(seed: u64) -> (PassList, Vec<u32>) {
             (0..COUNT).map(|i| at(first, i + by).wrapping_mul(5).wrapping_add(at(second, i + 2 * by)).wrapping_add(1));
         values[to] = Some(result.collect());
         let buffers = vec![SCRATCH[from], SCRATCH[other], SCRATCH[to]];
-        list.pass(PassDecl::new(shift(), buffers, Grid::Groups(COUNT.div_ceil(64), 1, 1)).push_pod(&[by, COUNT]));
+        list.pass(PassDecl::new(shift(), buffers, Grid::Groups(COUNT.div_ceil(64), 1, 1)).spec(vec![by, COUNT]));
     }
     let last = (0..6).rev().find(|&index| values[index].is_some()).unwrap();
     list.copy(SCRATCH[last], REPORT, 0);

@@ -4,7 +4,6 @@ use super::*;
 
 toy_shader!(
     accumulate,
-    0,
     [],
     [("uniforms", R, S, 4), ("totals", RW, S, 4), ("report", W, S, 4)],
     "layout(local_size_x = 16) in;
@@ -20,7 +19,6 @@ toy_shader!(
 
 toy_shader!(
     arguments,
-    0,
     [],
     [("uniforms", R, S, 4), ("arguments", W, S, 4)],
     "layout(local_size_x = 1) in;
@@ -31,7 +29,6 @@ toy_shader!(
 
 toy_shader!(
     mark,
-    0,
     [],
     [("marks", W, S, 4)],
     "layout(local_size_x = 32) in;

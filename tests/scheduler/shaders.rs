@@ -6,7 +6,6 @@ use labelgs::gpu::{Gpu, GpuOptions};
 
 toy_shader!(
     fetch,
-    0,
     [],
     [("words", R, T, 0), ("planes", R, T, 0), ("floats", R, T, 0), ("to", W, S, 4)],
     "#extension GL_EXT_samplerless_texture_functions : require
@@ -25,7 +24,6 @@ toy_shader!(
 
 toy_shader!(
     twice,
-    0,
     [],
     [("texels", R, T, 0), ("words", W, S, 4)],
     "#extension GL_EXT_samplerless_texture_functions : require
@@ -37,7 +35,6 @@ toy_shader!(
 
 toy_shader!(
     subgroups,
-    0,
     [("WIDTH", 7, 32)],
     [("to", W, S, 4)],
     "layout(local_size_x_id = 7) in;
@@ -47,7 +44,6 @@ toy_shader!(
 
 toy_shader!(
     undeclared_push,
-    0,
     [],
     [("to", W, S, 4)],
     "layout(local_size_x = 1) in;

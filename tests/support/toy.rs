@@ -1,6 +1,7 @@
 //! Shaders compiled by the test that uses them.
 
-use labelgs::shaders::{Access, BindingDesc, BindingKind, ShaderDesc, SpecDesc};
+use crate::shadergen::tool::{interface, reflect};
+use labelgs::shaders::{Access, BindingDesc, BindingKind, LocalSize, ShaderDesc, SpecDesc};
 
 /// Compiles GLSL (without the version line) and describes its bindings: (name, access, kind, bytes of an element).
 pub fn shader(name: &'static str, glsl: &str, bindings: &[(&'static str, Access, BindingKind, u32)]) -> ShaderDesc {
@@ -20,20 +21,24 @@ pub fn shader(name: &'static str, glsl: &str, bindings: &[(&'static str, Access,
         access,
         element_bytes,
     });
+    let module = rspirv::dr::load_words(compiled.as_binary()).expect("a module");
+    let local_size = reflect::interface(&module).local_size.map(|size| match size {
+        interface::LocalSize::Fixed(size) => LocalSize::Fixed(size),
+        interface::LocalSize::Constant(id) => LocalSize::Constant(id),
+    });
     ShaderDesc {
         stem: name,
         name,
         spirv: Box::leak(compiled.as_binary_u8().to_vec().into_boxed_slice()),
         bindings: Box::leak(bindings.collect::<Vec<_>>().into_boxed_slice()),
-        push_bytes: 0,
         spec: &[],
+        local_size,
         uses_subgroups: glsl.contains("gl_Subgroup"),
     }
 }
 
-/// Adds push constants and specialisation constants (name, id, default), and leaks the description.
-pub fn finish(mut shader: ShaderDesc, push_bytes: u32, spec: &[(&'static str, u32, u32)]) -> &'static ShaderDesc {
-    shader.push_bytes = push_bytes;
+/// Adds specialisation constants (name, id, default), and leaks the description.
+pub fn finish(mut shader: ShaderDesc, spec: &[(&'static str, u32, u32)]) -> &'static ShaderDesc {
     let spec = spec.iter().map(|&(name, id, default)| SpecDesc { name, id, default });
     shader.spec = Box::leak(spec.collect::<Vec<_>>().into_boxed_slice());
     Box::leak(Box::new(shader))

@@ -2,7 +2,7 @@
 
 use crate::shadergen::compile::{Define, GlslCompiler, Purpose};
 use crate::shadergen::{interface, reflect};
-use labelgs::shaders::{Access, BindingDesc, BindingKind, ShaderDesc, SpecDesc};
+use labelgs::shaders::{Access, BindingDesc, BindingKind, LocalSize, ShaderDesc, SpecDesc};
 use labelgs::{Error, Result};
 use std::path::Path;
 
@@ -55,8 +55,11 @@ pub fn shader(name: &'static str, source: &str, texel: bool) -> Result<&'static 
         name,
         spirv: spirv(name, source, &defines)?,
         bindings: bindings.collect::<Vec<_>>().leak(),
-        push_bytes: found.push.map_or(0, |push| push.bytes),
         spec: spec.collect::<Vec<_>>().leak(),
+        local_size: found.local_size.map(|size| match size {
+            interface::LocalSize::Fixed(size) => LocalSize::Fixed(size),
+            interface::LocalSize::Constant(id) => LocalSize::Constant(id),
+        }),
         uses_subgroups: found.uses_subgroups,
     })))
 }

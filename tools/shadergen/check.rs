@@ -5,9 +5,6 @@ use super::source::{line_of, without_comments};
 use super::{Finding, Shader, Variant, constants, is_snake_case};
 use std::collections::BTreeMap;
 
-/// Vulkan promises no more bytes of push constants than this.
-const MAX_PUSH_BYTES: u32 = 128;
-
 /// Names that Rust keeps for itself, or that stand for something else in the generated modules.
 const RESERVED: &[&str] = &[
     "as",
@@ -126,7 +123,7 @@ fn header(shader: &Shader) -> Option<Finding> {
 }
 
 fn interface(shader: &Shader, variant: &Variant) -> Vec<Finding> {
-    let Interface { bindings, push, spec, problems, .. } = &variant.interface;
+    let Interface { bindings, spec, problems, .. } = &variant.interface;
     let mut findings: Vec<Finding> =
         problems.iter().map(|problem| Finding::new(at(shader, &problem.name), problem.rule.clone())).collect();
     let mut breach = |name: &str, rule: String| findings.push(Finding::new(at(shader, name), rule));
@@ -145,12 +142,7 @@ fn interface(shader: &Shader, variant: &Variant) -> Vec<Finding> {
             breach(name, format!("binding {} is declared twice", binding.binding));
         }
     }
-    if let Some(push) = push.as_ref().filter(|push| push.bytes > MAX_PUSH_BYTES) {
-        let rule = format!("{} bytes of push constants; Vulkan promises {MAX_PUSH_BYTES}", push.bytes);
-        breach("push_constant", rule);
-    }
-    let fields = push.iter().flat_map(|push| &push.fields).map(|field| field.name.clone());
-    let names = bindings.iter().map(|binding| binding.name.clone()).chain(fields);
+    let names = bindings.iter().map(|binding| binding.name.clone());
     for name in names.chain(spec.iter().map(|spec| spec.name.to_lowercase())) {
         if RESERVED.contains(&name.as_str()) || !is_snake_case(&name) {
             breach(&name, format!("`{name}` cannot be the name of a Rust field; use another name in snake_case"));
@@ -172,8 +164,6 @@ fn agreement(shader: &Shader, base: &Variant, other: &Variant) -> Option<Finding
         .any(|(a, b)| a.kind == Kind::Storage && b.kind == Kind::Storage && a.element_bytes != b.element_bytes);
     let what = if shape(a) != shape(b) || sizes_differ {
         "bindings"
-    } else if a.push != b.push {
-        "push constants"
     } else if a.spec != b.spec {
         "specialisation constants"
     } else {

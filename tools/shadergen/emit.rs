@@ -58,7 +58,7 @@ fn emit_structs(out: &mut String, shaders: &[Shader]) {
     for variant in shaders.iter().flat_map(|shader| &shader.variants) {
         structs.extend(variant.interface.structs.iter().map(|(name, body)| (name.as_str(), body)));
     }
-    put!(out, "\n/// Structs that stand in storage blocks and push constants, laid out as the shaders see them.");
+    put!(out, "\n/// Structs that stand in storage blocks, laid out as the shaders see them.");
     put!(out, "#[allow(clippy::all)]\npub mod structs {{");
     for body in structs.values() {
         emit_struct(out, body, "A struct of the shaders.");
@@ -209,12 +209,14 @@ fn emit_variant(out: &mut String, shader: &Shader, variant: &Variant) {
              access: super::Access::{access:?}, element_bytes: {element_bytes} }},"
         );
     }
-    put!(out, "        ],\n        push_bytes: {},", interface.push.as_ref().map_or(0, |push| push.bytes));
-    put!(out, "        spec: &[");
+    put!(out, "        ],\n        spec: &[");
     for SpecConstant { name, id, default, .. } in &interface.spec {
         put!(out, "            super::SpecDesc {{ name: {name:?}, id: {id}, default: {default} }},");
     }
-    put!(out, "        ],\n        uses_subgroups: {},\n        }} }},", interface.uses_subgroups);
+    put!(out, "        ],");
+    let local_size = interface.local_size.map_join(|size| format!("super::LocalSize::{size:?}"));
+    put!(out, "        local_size: [{local_size}],");
+    put!(out, "        uses_subgroups: {},\n        }} }},", interface.uses_subgroups);
 }
 
 /// A Rust literal of the value with these bits.

@@ -1,4 +1,4 @@
-//! What a shader declares: bindings, push constants, specialisation constants and the structs in them.
+//! What a shader declares: bindings, specialisation constants and the structs in them.
 
 use std::collections::BTreeMap;
 
@@ -85,6 +85,21 @@ pub struct SpecConstant {
     pub default: u32,
 }
 
+/// Invocations on one axis of a workgroup.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LocalSize {
+    /// A number.
+    Fixed(u32),
+    /// The specialisation constant of this id.
+    Constant(u32),
+}
+
+impl Default for LocalSize {
+    fn default() -> Self {
+        Self::Fixed(1)
+    }
+}
+
 /// Something that reflection cannot represent or that breaks a rule: a name to look for in the source, and the rule.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Problem {
@@ -99,12 +114,12 @@ pub struct Problem {
 pub struct Interface {
     /// In the order of binding numbers.
     pub bindings: Vec<Binding>,
-    /// Push constants.
-    pub push: Option<Struct>,
     /// In the order of ids.
     pub spec: Vec<SpecConstant>,
     /// Struct types used in blocks, by name.
     pub structs: BTreeMap<String, Struct>,
+    /// Invocations on each axis of a workgroup.
+    pub local_size: [LocalSize; 3],
     /// Whether subgroup operations are used.
     pub uses_subgroups: bool,
     /// What is wrong with it.

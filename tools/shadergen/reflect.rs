@@ -1,8 +1,8 @@
 //! Reads the interface of a shader from its SPIR-V module.
 
-use super::interface::{Access, Binding, Field, Interface, Kind, Problem, SpecConstant, Struct, Type};
+use super::interface::{Access, Binding, Field, Interface, Kind, LocalSize, Problem, SpecConstant, Struct, Type};
 use rspirv::dr::{Instruction, Module, Operand};
-use rspirv::spirv::{BuiltIn, Decoration, Dim, Op, StorageClass, Word};
+use rspirv::spirv::{BuiltIn, Decoration, Dim, ExecutionMode, Op, StorageClass, Word};
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 /// A module with what is needed to find one's way in it.
@@ -19,6 +19,7 @@ pub fn interface(module: &Module) -> Interface {
     let mut reflector = Reflector::new(module);
     reflector.bindings();
     reflector.spec_constants();
+    reflector.interface.local_size = reflector.local_size();
     reflector.interface.uses_subgroups = module.capabilities.iter().any(|instruction| {
         matches!(instruction.operands.first(), Some(Operand::Capability(capability))
             if format!("{capability:?}").starts_with("GroupNonUniform"))
@@ -106,10 +107,10 @@ impl<'a> Reflector<'a> {
             match class {
                 StorageClass::StorageBuffer => self.storage(id, pointee),
                 StorageClass::UniformConstant => self.texel(id, pointee),
-                StorageClass::PushConstant => self.interface.push = self.block(pointee, "Push"),
-                StorageClass::Uniform => {
+                StorageClass::Uniform | StorageClass::PushConstant => {
                     let name = self.name(pointee);
-                    self.problem(&name, "uniform blocks are not supported; use a readonly buffer (READ1)");
+                    let rule = "uniform blocks and push constants are not supported; use a readonly buffer (READ1)";
+                    self.problem(&name, rule);
                 }
                 _ => {}
             }
@@ -268,13 +269,34 @@ impl<'a> Reflector<'a> {
         }
     }
 
-    fn local_size_name(&self, id: Word) -> String {
+    /// The constant that holds the size of a workgroup, if it is not written out in the execution mode.
+    fn workgroup_size(&self) -> Option<&'a Instruction> {
         let is_size = |value: &&Instruction| {
             value.result_id.and_then(|id| self.decoration(id, Decoration::BuiltIn))
                 == Some(BuiltIn::WorkgroupSize as u32)
         };
-        let size = self.module.types_global_values.iter().find(is_size);
-        let axis = size.and_then(|size| (0..3).find(|axis| word(size, *axis) == id)).unwrap_or(0);
+        self.module.types_global_values.iter().find(is_size)
+    }
+
+    /// Invocations on each axis. The built-in wins over the execution mode, says the SPIR-V specification.
+    fn local_size(&self) -> [LocalSize; 3] {
+        if let Some(size) = self.workgroup_size() {
+            let constant = |id| LocalSize::Fixed(self.values.get(&id).map_or(0, |value| word(value, 0)));
+            return [0, 1, 2].map(|axis| {
+                let id = word(size, axis);
+                self.decoration(id, Decoration::SpecId).map_or_else(|| constant(id), LocalSize::Constant)
+            });
+        }
+        let sizes = self.module.execution_modes.iter().find_map(|mode| match mode.operands.as_slice() {
+            [_, Operand::ExecutionMode(ExecutionMode::LocalSize), sizes @ ..] => Some(sizes),
+            _ => None,
+        });
+        let size = |axis| sizes.and_then(|sizes| sizes.get(axis)).map_or(0, |size| literal(std::slice::from_ref(size)));
+        [0, 1, 2].map(|axis| LocalSize::Fixed(size(axis)))
+    }
+
+    fn local_size_name(&self, id: Word) -> String {
+        let axis = self.workgroup_size().and_then(|size| (0..3).find(|axis| word(size, *axis) == id)).unwrap_or(0);
         format!("LOCAL_SIZE_{}", ["X", "Y", "Z"][axis])
     }
 }

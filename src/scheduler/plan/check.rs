@@ -50,13 +50,8 @@ fn check_pass(table: &'static [BufferDecl], sizes: &[Size], pass: &PassDecl, lim
         if found == expected { Ok(()) } else { Err(problem()) }
     };
     expect("buffers", pass.buffers.len(), shader.bindings.len())?;
-    expect("bytes of push constants", pass.push.len(), shader.push_bytes as usize)?;
     if !pass.spec.is_empty() {
         expect("specialisation constants", pass.spec.len(), shader.spec.len())?;
-    }
-    if shader.push_bytes > limits.max_push {
-        let (found, limit) = (shader.push_bytes, limits.max_push);
-        return Err(Error::Bug(format!("{found} bytes of push constants, the device takes {limit}")));
     }
     check_counts(pass, limits)?;
     check_grid(table, sizes, pass, limits)?;

@@ -15,8 +15,6 @@ pub struct Limits {
     pub max_groups: [u32; 3],
     /// Largest memory allocation (and buffer), in bytes.
     pub max_allocation: u64,
-    /// Bytes of push constants.
-    pub max_push: u32,
     /// Storage buffers of one shader.
     pub max_storage_buffers: u32,
     /// Texel buffers of one shader.
@@ -35,7 +33,6 @@ impl Default for Limits {
             texel_alignment: 256,
             max_groups: [65_535; 3],
             max_allocation: 1 << 30,
-            max_push: 128,
             max_storage_buffers: 32,
             max_texel_buffers: 32,
             max_memory: u64::MAX,

@@ -28,17 +28,15 @@ pub struct PassDecl {
     pub buffers: Vec<Buf>,
     /// Words of the specialisation constants in the order of `ShaderDesc::spec`; empty for the defaults.
     pub spec: Vec<u32>,
-    /// Push constants, recorded once.
-    pub push: Vec<u8>,
     /// Number of workgroups.
     pub grid: Grid,
 }
 
 impl PassDecl {
-    /// A pass with default specialisation constants and no push constants.
+    /// A pass with default specialisation constants.
     pub fn new(shader: &'static ShaderDesc, buffers: Vec<Buf>, grid: Grid) -> Self {
         let (label, title) = (shader.name.to_owned(), shader.stem.to_owned());
-        Self { label, title, stage: Stage::default(), shader, buffers, spec: Vec::new(), push: Vec::new(), grid }
+        Self { label, title, stage: Stage::default(), shader, buffers, spec: Vec::new(), grid }
     }
 
     /// Sets the specialisation constants.
@@ -46,19 +44,6 @@ impl PassDecl {
     pub fn spec(mut self, words: Vec<u32>) -> Self {
         self.spec = words;
         self
-    }
-
-    /// Sets the push constants.
-    #[must_use]
-    pub fn push(mut self, bytes: impl Into<Vec<u8>>) -> Self {
-        self.push = bytes.into();
-        self
-    }
-
-    /// Sets the push constants from a plain struct.
-    #[must_use]
-    pub fn push_pod<T: bytemuck::NoUninit>(self, push: &T) -> Self {
-        self.push(bytemuck::bytes_of(push))
     }
 
     /// Sets the name in reports.

@@ -74,7 +74,6 @@ fn declarations_that_do_not_match_their_shader_are_bugs() {
     odd.copy(MODEL, LABELS, 4001);
     for (list, expected) in [
         (one(few), "1 buffers given, the shader has 2"),
-        (one(two().push(vec![0; 8])), "8 bytes of push constants given, the shader has 0"),
         (one(two().spec(vec![1])), "1 specialisation constants given, the shader has 0"),
         (one(pass("wide", &[(A, Access::Write)], wide)), "70000 x 1 x 1 workgroups"),
         (one(pass("far", &[(A, Access::Write)], Grid::Indirect(TOTALS, 0))), "indirect arguments at byte 0 of totals"),

@@ -8,7 +8,7 @@ use labelgs::pass::{self, KernelShape, Variant};
 use labelgs::scheduler::plan::{
     Buf, Capacity, Grid, Limits, MemoryReport, Page, PassDecl, PassList, Plan, PlanOptions, TABLE, Work,
 };
-use labelgs::shaders::{Access, BindingDesc, BindingKind, ShaderDesc};
+use labelgs::shaders::{Access, BindingDesc, BindingKind, LocalSize, ShaderDesc};
 
 /// Buffers of the random lists: all classes, and sizes that do not divide each other.
 mod table {
@@ -50,8 +50,8 @@ fn shader(name: &'static str, accesses: &[Access]) -> &'static ShaderDesc {
         name,
         spirv: &[],
         bindings: Box::leak(bindings.collect::<Vec<_>>().into_boxed_slice()),
-        push_bytes: 0,
         spec: &[],
+        local_size: [LocalSize::Fixed(1); 3],
         uses_subgroups: false,
     }))
 }

@@ -13,6 +13,8 @@
 // Mirror:  tools/bench/features/check.rs
 
 layout(constant_id = 10) const uint VECS = 1; // vec4 of channels
+layout(constant_id = 20) const uint CHUNK = 0; // first vec4 of the channels
+layout(constant_id = 21) const uint STRIDE = 1; // vec4 a Gaussian
 READ1(0, StepUniforms, step);
 FETCHU(1, tile_starts);
 FETCHU(2, slots);
@@ -22,7 +24,6 @@ FETCHU(5, last);
 FETCHU(6, gaussian_from_splat);
 FETCH4(7, features);
 WRITE(8, vec4, v_features_image);
-PUSH { uint chunk; uint stride; } push; // first vec4 of the channels, vec4 a Gaussian
 
 // What the feature should be: smooth over the image, different for each channel.
 vec4 wanted(uint x, uint y, uint channel) {
@@ -62,7 +63,7 @@ void main() {
         vec4 r0 = fetch4(splats, 3u * index), r1 = fetch4(splats, 3u * index + 1u);
         vec4 mine[VECS];
         [[unroll]] for (uint v = 0u; v < VECS; v++) {
-            mine[v] = fetch4(features, gaussian * push.stride + push.chunk + v);
+            mine[v] = fetch4(features, gaussian * STRIDE + CHUNK + v);
         }
         for (uint j = 0u; j < count; j++) {
             float x = subgroupShuffle(r0.x, j) - corner.x, y = subgroupShuffle(r0.y, j) - corner.y;
@@ -94,7 +95,7 @@ void main() {
         uint y = t.y0 + k;
         if (t.x < u.width && y < u.height) {
             [[unroll]] for (uint v = 0u; v < VECS; v++) {
-                vec4 target = wanted(t.x, y, 4u * (push.chunk + v));
+                vec4 target = wanted(t.x, y, 4u * (CHUNK + v));
                 v_features_image[(y * u.width + t.x) * VECS + v] = F[k * VECS + v] - target;
             }
         }

@@ -12,6 +12,8 @@
 // Mirror:  tools/bench/features/check.rs
 
 layout(constant_id = 10) const uint VECS = 1;
+layout(constant_id = 20) const uint CHUNK = 0; // first vec4 of the channels
+layout(constant_id = 21) const uint STRIDE = 1; // vec4 a Gaussian
 layout(local_size_x = 64) in;
 READ1(0, StepUniforms, step);
 READ1(1, Counters, counters);
@@ -20,7 +22,6 @@ FETCHU(3, instance_offsets);
 FETCH4(4, v_instances_c);
 FETCH4(5, v_feature_instances);
 WRITE(6, vec4, v_features);
-PUSH { uint chunk; uint stride; } push;
 
 void main() {
     uint s = linear_group_id() * 64u + gl_LocalInvocationID.x;
@@ -40,6 +41,6 @@ void main() {
         }
     }
     [[unroll]] for (uint v = 0u; v < VECS; v++) {
-        v_features[s * push.stride + push.chunk + v] = sum[v];
+        v_features[s * STRIDE + CHUNK + v] = sum[v];
     }
 }

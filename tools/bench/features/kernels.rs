@@ -95,11 +95,11 @@ pub fn step_with_features(
     let Work::Pass(backward) = &list.work[at] else { return Err(missing()) };
     let bound = backward.shader.bindings.iter().position(|binding| binding.name == "slots").ok_or_else(missing)?;
     let slots = backward.buffers[bound];
-    let tile = vec![shape.subgroup, shape.tile_width, shape.tile_height, channels.vecs];
     let grid = |word: u32| Grid::Indirect(Buf::DISPATCH_ARGS, word * 4);
     let mut walks = Vec::new();
     for chunk in channels.chunks() {
-        let push = [chunk, channels.stride()];
+        let walk = vec![channels.vecs, chunk, channels.stride()];
+        let tile = [&[shape.subgroup, shape.tile_width, shape.tile_height], &walk[..]].concat();
         let lists = [Buf::STEP, Buf::TILE_STARTS, slots, Buf::SPLAT_FROM_INSTANCE, Buf::SPLATS, Buf::LAST];
         let forward = [&lists[..], &[Buf::DEPTH_VALUES_A, buffers.features, buffers.v_image]].concat();
         let backward = [&lists[..], &[buffers.v_image, buffers.v_instances]].concat();
@@ -113,10 +113,10 @@ pub fn step_with_features(
             buffers.v_features,
         ];
         let blend = grid(constants::ARGS_BLEND);
-        walks.push(PassDecl::new(kernels.forward, forward, blend).spec(tile.clone()).push_pod(&push).into());
-        walks.push(PassDecl::new(kernels.backward, backward, blend).spec(tile.clone()).into());
+        walks.push(PassDecl::new(kernels.forward, forward, blend).spec(tile.clone()).into());
+        walks.push(PassDecl::new(kernels.backward, backward, blend).spec(tile).into());
         let gather = PassDecl::new(kernels.gather, gather, grid(constants::ARGS_SPLATS));
-        walks.push(gather.spec(vec![channels.vecs]).push_pod(&push).into());
+        walks.push(gather.spec(walk).into());
     }
     list.work.splice(at + 1..at + 1, walks);
     Ok(list)
