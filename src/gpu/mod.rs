@@ -1,6 +1,6 @@
 //! Thin layer over Vulkan: one instance, one device, one compute queue, and owners of the objects made from them.
 //!
-//! Everything that Vulkan asks the caller to guarantee is guaranteed here or in `sched/recorder.rs`, so that the rest
+//! Everything that Vulkan asks the caller to guarantee is guaranteed here or in `scheduler/recorder.rs`, so that the rest
 //! of the crate is safe code. Objects hold an `Arc<Gpu>`: no handle outlives its device.
 // Vulkan is a foreign interface: every call is unsafe. This module and the recorder are the only places for it.
 #![allow(unsafe_code)]
