@@ -15,7 +15,7 @@
 //! pass                   what the engine does, as lists of GPU passes; no Vulkan
 //! scheduler  io          plans lists (sizes, places, barriers) and executes them; files
 //! shaders  gpu   scene   generated interfaces; a thin layer over Vulkan; plain host data
-//! error    fault
+//! error    lab
 //! ```
 //!
 //! # Words
@@ -47,9 +47,9 @@ pub mod edit;
 pub mod engine;
 pub mod error;
 pub mod eval;
-pub mod fault;
 pub mod gpu;
 pub mod io;
+pub mod lab;
 pub mod label;
 pub mod pass;
 pub mod render;

@@ -39,6 +39,7 @@ pub(crate) use query::QueryPool;
 pub(crate) use timeline::Timeline;
 
 use crate::error::{Error, Result};
+use crate::lab;
 use ash::vk;
 use gpu_allocator::vulkan::{Allocator, AllocatorCreateDesc};
 use instance::Instance;
@@ -61,11 +62,12 @@ pub struct GpuOptions {
 }
 
 impl GpuOptions {
-    /// Options from `LABELGS_DEVICE`, `LABELGS_VALIDATION` (`off`, `on`, `sync`, `gpu`) and `LABELGS_SUBGROUP_SIZE`.
+    /// Options from `LABELGS_DEVICE` and `LABELGS_VALIDATION` (`off`, `on`, `sync`, `gpu`); for tests also from
+    /// `LABELGS_SUBGROUP_SIZE`.
     pub fn from_env() -> Result<Self> {
         let set = |name| std::env::var(name).ok().filter(|value| !value.is_empty());
         let validation = set("LABELGS_VALIDATION").map(|value| value.parse()).transpose()?.unwrap_or_default();
-        let subgroup_size = set("LABELGS_SUBGROUP_SIZE")
+        let subgroup_size = lab::var("LABELGS_SUBGROUP_SIZE")
             .map(|value| value.parse().map_err(|_| Error::usage("LABELGS_SUBGROUP_SIZE", "a whole number is expected")))
             .transpose()?;
         Ok(Self { device: set("LABELGS_DEVICE"), validation, subgroup_size, ..Self::default() })

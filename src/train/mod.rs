@@ -20,8 +20,8 @@ pub use timing::StepTimes;
 
 use crate::engine::{Engine, EngineSize, LabelSize, ListKey, Report};
 use crate::error::{Error, Result};
-use crate::fault;
 use crate::gpu::Gpu;
+use crate::lab::fault;
 use crate::label::vote::ballot::columns_for;
 use crate::pass::{KernelShape, Variant};
 use crate::scene::{Dataset, Gaussians};
