@@ -57,6 +57,7 @@ fn lists() -> Vec<(Capacity, PassList)> {
                     Variant { labels, lift, sh_degree, size, update, counts: false },
                 ));
             }
+            #[cfg(feature = "lab")]
             add(pass::separate_step(
                 &shape,
                 &capacity,

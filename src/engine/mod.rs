@@ -48,6 +48,7 @@ pub enum ListKey {
     /// One optimiser step.
     Train(Variant),
     /// One optimiser step with so many sampled objects that have passes of their own, see [`pass::separate_step`].
+    #[cfg(feature = "lab")]
     Separate(Variant, u32),
     /// One picture, with this degree of the spherical harmonics.
     Render(u32),
@@ -167,6 +168,7 @@ impl Engine {
         let (shape, capacity) = (&self.shape, self.sched.capacity());
         let list = match key {
             ListKey::Train(variant) => pass::training_step(shape, capacity, variant),
+            #[cfg(feature = "lab")]
             ListKey::Separate(variant, objects) => pass::separate_step(shape, capacity, variant, objects),
             ListKey::Render(sh_degree) => pass::render_view(shape, capacity, sh_degree),
             ListKey::Vote(rounds) => pass::vote_view(shape, capacity, rounds),

@@ -22,12 +22,3 @@ pub fn gather(b: &mut Builder) {
         } [], over_splats());
     }
 }
-
-/// Adds up the records of an object's splats, which densification does not see.
-pub fn gather_object(b: &mut Builder) {
-    pass!(b, texel gather_object {
-        step: Buf::STEP, counters: Buf::COUNTERS, failure: Buf::FAILURE, tiles_touched: Buf::TILES_TOUCHED,
-        instance_offsets: Buf::INSTANCE_OFFSETS, v_instances_a: Buf::V_INSTANCES_A, v_instances_b: Buf::V_INSTANCES_B, v_instances_c: Buf::V_INSTANCES_C,
-        v_splats: Buf::V_SPLATS,
-    } [], over_splats());
-}

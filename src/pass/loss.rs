@@ -32,14 +32,6 @@ pub fn photo_loss(b: &mut Builder, width: u32, height: u32) {
     }
 }
 
-/// Sums up the label loss of the layers alone.
-pub fn label_loss(b: &mut Builder) {
-    let (subgroup, layer_tiles) = (b.shape.subgroup, b.capacity.layer_tiles as u32);
-    pass!(b, loss_reduce_labels {
-        loss_partials: Buf::LOSS_PARTIALS, counters: Buf::COUNTERS, layer_loss: Buf::LAYER_LOSS,
-    } [subgroup_size: subgroup, layer_tile_capacity: layer_tiles, partials: 0], ONE);
-}
-
 /// Partial loss sums of an image: one for each subgroup of each strip.
 pub fn partials(subgroup: u32, width: u32, height: u32) -> u32 {
     width.div_ceil(64) * (64 / subgroup) * height.div_ceil(STRIP)

@@ -18,17 +18,8 @@ pub fn visible_splats(b: &mut Builder) {
     order_and_project(b);
 }
 
-/// As [`visible_splats`], for the object of layer 1 alone.
-pub fn visible_splats_of_object(b: &mut Builder) {
-    pass!(b, texel cull_object {
-        step: Buf::STEP, means: Buf::MEANS, scales: Buf::SCALES, depth_keys: Buf::DEPTH_KEYS,
-        splat_from_gaussian: Buf::SPLAT_FROM_GAUSSIAN, counters: Buf::COUNTERS, labels: Buf::LABELS,
-        label_from_layer: Buf::LABEL_FROM_LAYER,
-    } [], over_gaussians());
-    order_and_project(b);
-}
-
-fn order_and_project(b: &mut Builder) {
+/// From depth keys to splats in depth order.
+pub fn order_and_project(b: &mut Builder) {
     scan::scan_visible(b, Buf::DEPTH_KEYS, Buf::VISIBLE_OFFSETS);
     pass!(b, prepare_splats { counters: Buf::COUNTERS, dispatch_args: Buf::DISPATCH_ARGS } [], ONE);
     pass!(b, texel compact {
@@ -71,17 +62,5 @@ pub fn project_backward(b: &mut Builder) {
         scales: Buf::SCALES, quats: Buf::QUATS, sh0: Buf::SH0, sh1: Buf::SH1, sh2: Buf::SH2, sh3: Buf::SH3,
         v_splats: Buf::V_SPLATS, v_means: Buf::V_MEANS, v_scales: Buf::V_SCALES, v_quats: Buf::V_QUATS,
         v_sh0: Buf::V_SH0, v_sh1: Buf::V_SH1, v_sh2: Buf::V_SH2, v_sh3: Buf::V_SH3, counters: Buf::COUNTERS,
-    } [sh_degree: sh_degree], over_splats());
-}
-
-/// As [`project_backward`] for the splats of an object; added to the gradients of `scene_splats`.
-pub fn project_backward_of_object(b: &mut Builder, scene_splats: Buf) {
-    let sh_degree = b.sh_degree;
-    pass!(b, texel project_backward_object {
-        step: Buf::STEP, failure: Buf::FAILURE, gaussian_from_splat: GAUSSIAN_FROM_SPLAT, means: Buf::MEANS,
-        scales: Buf::SCALES, quats: Buf::QUATS, sh0: Buf::SH0, sh1: Buf::SH1, sh2: Buf::SH2, sh3: Buf::SH3,
-        v_splats: Buf::V_SPLATS, v_means: Buf::V_MEANS, v_scales: Buf::V_SCALES, v_quats: Buf::V_QUATS,
-        v_sh0: Buf::V_SH0, v_sh1: Buf::V_SH1, v_sh2: Buf::V_SH2, v_sh3: Buf::V_SH3, counters: Buf::COUNTERS,
-        splat_from_gaussian: scene_splats,
     } [sh_degree: sh_degree], over_splats());
 }

@@ -5,7 +5,8 @@
 //! traversal of all layers saves: the kernels and the culling are the same, only the structure differs. Each object is
 //! layer 1 of passes that have no other layer, so that one recording serves every object.
 
-use super::build::{Builder, ONE};
+use super::build::{Builder, ONE, over_gaussians, over_splats};
+use super::project::GAUSSIAN_FROM_SPLAT;
 use super::{Variant, begin, blend, end, gather, lift, loss, optimize, project, tile};
 use crate::pass;
 use crate::pass::KernelShape;
@@ -26,7 +27,7 @@ pub fn separate_step(shape: &KernelShape, capacity: &Capacity, variant: Variant,
     project::visible_splats(&mut b);
     // The lift is in the labelled kernel, which then finds its layers empty.
     b.labels = variant.lift;
-    let slots = tile::bin_scene(&mut b);
+    let slots = tile::bin_layer(&mut b, 0);
     blend::blend_forward(&mut b, slots, variant.lift);
     b.labels = false;
     loss::photo_loss(&mut b, variant.size.0, variant.size.1);
@@ -66,13 +67,13 @@ fn object_passes(shape: &KernelShape, capacity: &Capacity, sh_degree: u32) -> Ve
     let capacity = Capacity { virtual_tiles: 2 * tiles, ..*capacity };
     let list = PassList::new("object");
     let mut b = Builder { shape, capacity: &capacity, labels: false, sh_degree, counts: false, list };
-    project::visible_splats_of_object(&mut b);
+    visible_splats_of_object(&mut b);
     b.labels = true;
-    let slots = tile::bin_object(&mut b);
+    let slots = tile::bin_layer(&mut b, 1);
     blend::blend_forward(&mut b, slots, false);
-    loss::label_loss(&mut b);
+    label_loss(&mut b);
     blend::blend_backward(&mut b, slots);
-    gather::gather_object(&mut b);
+    gather_object(&mut b);
     let mut work = b.list.work;
     for item in &mut work {
         if let Work::Pass(pass) = item {
@@ -82,10 +83,49 @@ fn object_passes(shape: &KernelShape, capacity: &Capacity, sh_degree: u32) -> Ve
     // The gradients stay by the scene's splats.
     let list = PassList { name: String::new(), work };
     let mut b = Builder { shape, capacity: &capacity, labels: true, sh_degree, counts: false, list };
-    project::project_backward_of_object(&mut b, Buf::SPLAT_FROM_GAUSSIAN);
+    project_backward_of_object(&mut b, Buf::SPLAT_FROM_GAUSSIAN);
     b.list.work
 }
 
 fn of_object(buf: Buf) -> Buf {
     OF_OBJECT.iter().find(|(step, _)| *step == buf).map_or(buf, |(_, object)| *object)
+}
+
+/// Lists the visible Gaussians of layer 1's object in depth order and projects them.
+fn visible_splats_of_object(b: &mut Builder) {
+    pass!(b, texel cull_object {
+        step: Buf::STEP, means: Buf::MEANS, scales: Buf::SCALES, depth_keys: Buf::DEPTH_KEYS,
+        splat_from_gaussian: Buf::SPLAT_FROM_GAUSSIAN, counters: Buf::COUNTERS, labels: Buf::LABELS,
+        label_from_layer: Buf::LABEL_FROM_LAYER,
+    } [], over_gaussians());
+    project::order_and_project(b);
+}
+
+/// Sums up the label loss of the layers alone.
+fn label_loss(b: &mut Builder) {
+    let (subgroup, layer_tiles) = (b.shape.subgroup, b.capacity.layer_tiles as u32);
+    pass!(b, loss_reduce_labels {
+        loss_partials: Buf::LOSS_PARTIALS, counters: Buf::COUNTERS, layer_loss: Buf::LAYER_LOSS,
+    } [subgroup_size: subgroup, layer_tile_capacity: layer_tiles, partials: 0], ONE);
+}
+
+/// Adds up the records of an object's splats, which densification does not see.
+fn gather_object(b: &mut Builder) {
+    pass!(b, texel gather_object {
+        step: Buf::STEP, counters: Buf::COUNTERS, failure: Buf::FAILURE, tiles_touched: Buf::TILES_TOUCHED,
+        instance_offsets: Buf::INSTANCE_OFFSETS, v_instances_a: Buf::V_INSTANCES_A, v_instances_b: Buf::V_INSTANCES_B, v_instances_c: Buf::V_INSTANCES_C,
+        v_splats: Buf::V_SPLATS,
+    } [], over_splats());
+}
+
+/// Gradients of an object's splats back to the parameters of their Gaussians, added to those of `scene_splats`.
+fn project_backward_of_object(b: &mut Builder, scene_splats: Buf) {
+    let sh_degree = b.sh_degree;
+    pass!(b, texel project_backward_object {
+        step: Buf::STEP, failure: Buf::FAILURE, gaussian_from_splat: GAUSSIAN_FROM_SPLAT, means: Buf::MEANS,
+        scales: Buf::SCALES, quats: Buf::QUATS, sh0: Buf::SH0, sh1: Buf::SH1, sh2: Buf::SH2, sh3: Buf::SH3,
+        v_splats: Buf::V_SPLATS, v_means: Buf::V_MEANS, v_scales: Buf::V_SCALES, v_quats: Buf::V_QUATS,
+        v_sh0: Buf::V_SH0, v_sh1: Buf::V_SH1, v_sh2: Buf::V_SH2, v_sh3: Buf::V_SH3, counters: Buf::COUNTERS,
+        splat_from_gaussian: scene_splats,
+    } [sh_degree: sh_degree], over_splats());
 }

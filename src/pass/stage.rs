@@ -96,8 +96,9 @@ pub fn stages(list: &PassList) -> Vec<(Stage, String)> {
 
 /// The stage of a shader; scans belong to the stage around them.
 fn stage_of(stem: &str, now: Stage) -> Stage {
-    const BY_PREFIX: [(&str, Stage); 20] = [
+    const BY_PREFIX: &[(&str, Stage)] = &[
         ("step_begin", Stage::Project),
+        #[cfg(feature = "lab")]
         ("next_object", Stage::Project),
         ("cull", Stage::Project),
         ("prepare_splats", Stage::Project),

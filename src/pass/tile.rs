@@ -11,17 +11,12 @@ use crate::shaders::constants;
 /// Lists the (splat, tile) pairs, sorts them by layer and tile, and finds each tile's range. Returns the buffer that
 /// holds the slots (places before the sort) of the sorted pairs.
 pub fn bin_splats(b: &mut Builder) -> Buf {
-    if b.labels { bin(b, emit_all_layers) } else { bin_scene(b) }
+    if b.labels { bin(b, emit_all_layers) } else { bin_layer(b, 0) }
 }
 
-/// The scene's splats alone, in the first of the layers that the list has.
-pub fn bin_scene(b: &mut Builder) -> Buf {
-    bin(b, |b| emit_layer(b, 0))
-}
-
-/// An object's splats, in layer 1 alone.
-pub fn bin_object(b: &mut Builder) -> Buf {
-    bin(b, |b| emit_layer(b, 1))
+/// The same for all splats in one of the layers that the list has.
+pub fn bin_layer(b: &mut Builder, layer: u32) -> Buf {
+    bin(b, |b| emit_layer(b, layer))
 }
 
 fn bin(b: &mut Builder, emit: impl Fn(&mut Builder)) -> Buf {

@@ -7,6 +7,7 @@ mod occlusion;
 pub mod record;
 mod sampler;
 mod sentinel;
+mod separate;
 mod state;
 pub mod step_input;
 mod timing;
@@ -64,8 +65,7 @@ pub struct Trainer {
     memory_bounds: bool,
     /// Votes were counted before, so that masks can be compared with their outcome.
     labelled_once: bool,
-    /// Objects have passes of their own.
-    separate: bool,
+    separate: separate::Separate,
     timing: Option<timing::Timing>,
     /// Blending counts the pairs that have a weight.
     counts_pairs: bool,
@@ -172,7 +172,7 @@ impl Trainer {
             max_gaussians,
             memory_bounds: false,
             labelled_once: false,
-            separate: false,
+            separate: separate::Separate::default(),
             timing: None,
             counts_pairs: false,
             seen: sentinel::Seen::default(),
@@ -183,12 +183,6 @@ impl Trainer {
     /// The engine, for renders between steps.
     pub fn engine_mut(&mut self) -> &mut Engine {
         &mut self.engine
-    }
-
-    /// From the next step on each sampled object has passes of its own, as in the reference code: slower, and up to
-    /// rounding the same. For measurements; nothing may be in flight ([`Trainer::drain`]).
-    pub fn separate_objects(&mut self, separate: bool) {
-        self.separate = separate;
     }
 
     /// The configuration.
@@ -317,10 +311,7 @@ impl Trainer {
             update: input.update,
             counts: self.counts_pairs,
         };
-        if self.separate && input.labels {
-            return ListKey::Separate(variant, input.layers.len() as u32);
-        }
-        ListKey::Train(variant)
+        self.separate.key(variant, input)
     }
 
     /// Waits for the oldest step in flight. If a buffer was too small, the step changed nothing, nor did those after it:
