@@ -11,7 +11,8 @@ fn main() {
     }
     let folder = |variable| std::env::var_os(variable).map(PathBuf::from).expect("cargo sets it");
     let (root, out) = (folder("CARGO_MANIFEST_DIR"), folder("OUT_DIR"));
-    if let Err(findings) = shadergen::run(&root.join("glsl"), &out) {
+    let lab = std::env::var_os("CARGO_FEATURE_LAB").is_some();
+    if let Err(findings) = shadergen::run(&root.join("glsl"), &out, lab) {
         for finding in findings {
             for line in finding.to_string().lines() {
                 println!("cargo::error={line}");

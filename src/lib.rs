@@ -17,7 +17,7 @@
 //! scheduler  io          plans lists (sizes, places, barriers) and executes them; files
 //! shaders  gpu   scene   generated interfaces; a thin layer over Vulkan; plain host data
 //! options                options that are written once: flag, key, help, default, range
-//! error    fault
+//! error    lab
 //! ```
 //!
 //! # Words
@@ -50,9 +50,9 @@ pub mod edit;
 pub mod engine;
 pub mod error;
 pub mod eval;
-pub mod fault;
 pub mod gpu;
 pub mod io;
+pub mod lab;
 pub mod label;
 pub mod options;
 pub mod pass;

@@ -7,7 +7,7 @@ const ROOT: &str = env!("CARGO_MANIFEST_DIR");
 
 /// A module may use modules of lower floors only; modules of one floor do not know each other.
 const FLOORS: [&[&str]; 13] = [
-    &["error", "fault", "lib"],
+    &["error", "lab", "lib"],
     &["options"],
     &["shaders", "gpu", "scene"],
     &["scheduler", "io"],

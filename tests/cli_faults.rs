@@ -5,8 +5,10 @@
 use crate::support::device;
 use crate::support::runs::{Place, all_whole, contents, copy, files, stderr, succeeded};
 use std::collections::BTreeMap;
+use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
-use std::process::Output;
+use std::process::{Child, Command, Output, Stdio};
+use std::time::Duration;
 
 fn all() -> bool {
     std::env::var("LABELGS_TEST_FAULTS").is_ok_and(|value| value == "all")
@@ -358,4 +360,31 @@ fn a_folder_has_one_run_at_a_time() {
     assert!(stderr(&output).contains("another labelgs trains into this folder"), "{}", stderr(&output));
     drop(lock);
     succeeded(&place.trained("out", &["--iterations", "1"]));
+}
+
+/// A step that takes a minute: the first signal waits for it, the second does not.
+#[cfg(unix)]
+#[test]
+fn two_signals_end_a_slow_step_at_once() {
+    let Some(_turn) = device() else { return };
+    let place = Place::new();
+    let send = |child: &Child| {
+        let sent = Command::new("kill").args(["-INT", &child.id().to_string()]).status();
+        assert!(sent.expect("kill").success());
+    };
+    let long = ["--iterations", "5000", "--checkpoint-every", "0", "--save-at", "3", "--preview-every", "0"];
+    let mut command = Command::new(env!("CARGO_BIN_EXE_labelgs"));
+    command.env("LABELGS_VALIDATION", "off").env("LABELGS_CACHE", place.path("cache"));
+    command.env("LABELGS_FAULT", "vkQueueSubmit:300:SLOW").args(place.train("twice", &long));
+    let mut child = command.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().expect("it runs");
+    let mut said = BufReader::new(child.stderr.take().expect("a pipe")).lines();
+    let is_slow = |line: Result<String, std::io::Error>| line.is_ok_and(|line| line.contains("Slow at vkQueueSubmit"));
+    assert!(said.any(is_slow), "the slow step comes");
+    send(&child);
+    std::thread::sleep(Duration::from_millis(500));
+    assert!(child.try_wait().expect("a child").is_none(), "the first signal lets the step come to its end");
+    send(&child);
+    assert_eq!(child.wait().expect("a child").code(), Some(130));
+    all_whole(&place.path("twice"));
+    assert!(place.checkpoints("twice").is_empty(), "the second one waits for no checkpoint");
 }

@@ -1,4 +1,4 @@
-//! Integration tests, one binary.
+//! Integration tests, one binary; those of the program as it ships are in `shipped.rs`.
 
 use labelgs::verify::reference;
 
@@ -11,14 +11,12 @@ static MEMORY: support::memory::Counting = support::memory::Counting;
 mod architecture;
 mod associate;
 mod cli;
+mod cli_devices;
 mod cli_edit;
-mod cli_engine;
 mod cli_faults;
-mod cli_kills;
 mod cli_labels;
 mod cli_long;
 mod cli_masks;
-mod cli_resume;
 mod cli_surroundings;
 mod coarse;
 mod compare_self;

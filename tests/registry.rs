@@ -56,6 +56,7 @@ fn lists() -> Vec<(Capacity, PassList)> {
                     Variant { labels, lift, sh_degree, size, update, counts: false },
                 ));
             }
+            #[cfg(feature = "lab")]
             add(pass::separate_step(
                 &shape,
                 &capacity,
@@ -204,7 +205,7 @@ fn a_scene_without_masks_pays_nothing_for_labels() {
     assert!(without.1 < with.1, "{without:?} {with:?}");
 }
 
-/// The file of a module of the tests, such as `cli_long` or `sched::faults`.
+/// The file of a module of the tests, such as `cli_long` or `scheduler::faults`.
 fn module_file(path: &[&str]) -> Option<PathBuf> {
     let place = path.iter().fold(Path::new(ROOT).join("tests"), |folder, part| folder.join(part));
     [place.with_extension("rs"), place.join("mod.rs")].into_iter().find(|file| file.is_file())

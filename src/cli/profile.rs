@@ -56,6 +56,7 @@ pub struct ProfileArgs {
     #[arg(long)]
     pub overlap: bool,
     /// Give each sampled object passes of its own, as the paper's reference code does, to see what one traversal saves.
+    #[cfg(feature = "lab")]
     #[arg(long, conflicts_with = "compare")]
     pub separate_objects: bool,
     /// How the scene is read.
@@ -96,6 +97,7 @@ pub fn run(args: &ProfileArgs, context: &Context) -> Result<()> {
     let plan = PlanOptions { barrier_everywhere: !args.overlap, ..PlanOptions::default() };
     let options = SchedulerOptions { plan, timestamps: true, ..SchedulerOptions::default() };
     let mut trainer = Trainer::new(Arc::clone(&gpu), config, &mut dataset, &model, options)?;
+    #[cfg(feature = "lab")]
     trainer.separate_objects(args.separate_objects);
     measure(&mut trainer, args, context, &mut profile)?;
     match &args.json {

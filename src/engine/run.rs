@@ -15,6 +15,7 @@ pub enum ListKey {
     /// The same with passes of the [`pass::Extension`] under some number.
     Extended(Variant, u32),
     /// One optimiser step with so many sampled objects that have passes of their own, see [`pass::separate_step`].
+    #[cfg(feature = "lab")]
     Separate(Variant, u32),
     /// One picture, with this degree of the spherical harmonics.
     Render(u32),
@@ -65,6 +66,7 @@ impl Engine {
             ListKey::Extended(variant, passes) => {
                 pass::extended_step(shape, capacity, variant, (&*self.extension, passes))
             }
+            #[cfg(feature = "lab")]
             ListKey::Separate(variant, objects) => pass::separate_step(shape, capacity, variant, objects),
             ListKey::Render(sh_degree) => pass::render_view(shape, capacity, sh_degree),
             ListKey::Vote(rounds) => pass::vote_view(shape, capacity, rounds),

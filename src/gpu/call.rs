@@ -1,12 +1,12 @@
 //! The one way to call a Vulkan function that may fail.
 
 use crate::error::{Error, Result};
-use crate::fault::{self, Kind};
+use crate::lab::fault::{self, Kind};
 use ash::vk;
 
 /// Calls Vulkan and names the call in the error.
 ///
-/// A [fault](crate::fault) on purpose fails the call without making it.
+/// A [fault](fault) on purpose fails the call without making it.
 pub(crate) fn vk_call<T>(call: &'static str, function: impl FnOnce() -> ash::prelude::VkResult<T>) -> Result<T> {
     let outcome = match fault(call) {
         Some(result) => Err(result),

@@ -1,8 +1,9 @@
-//! Features that a device has and that are not to be seen, so that a poorer device can be tried out on a richer one.
+//! Features that a device has and that are not to be seen, so that tests try out a poorer device on a richer one.
 
 use super::capabilities::{Features, Subgroup};
 use super::limits::Limits;
 use crate::error::{Error, Result};
+use crate::lab;
 use ash::vk;
 
 /// What can be hidden.
@@ -15,7 +16,7 @@ pub(super) struct Hidden(Vec<String>);
 
 impl Hidden {
     pub(super) fn by_env() -> Result<Self> {
-        let Ok(text) = std::env::var("LABELGS_HIDE") else { return Ok(Self::default()) };
+        let Some(text) = lab::var("LABELGS_HIDE") else { return Ok(Self::default()) };
         let names: Vec<String> = text.split(',').filter(|name| !name.is_empty()).map(str::to_owned).collect();
         match names.iter().find(|name| !NAMES.contains(&name.as_str())) {
             Some(name) => Err(Error::usage("LABELGS_HIDE", format!("{name} is none of {}", NAMES.join(", ")))),

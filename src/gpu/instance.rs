@@ -3,7 +3,7 @@
 use super::call::vk_call;
 use super::lock;
 use crate::error::{Error, Result};
-use crate::fault;
+use crate::lab::fault;
 use ash::vk;
 use std::ffi::{CStr, c_char, c_void};
 use std::sync::{Arc, Mutex};

@@ -1,6 +1,7 @@
 //! Limits of a device that decide sizes.
 
 use crate::error::{Error, Result};
+use crate::lab;
 
 /// What a device can hold and run at most.
 #[derive(Clone, Debug, PartialEq)]
@@ -39,7 +40,7 @@ pub struct Limits {
 
 impl Limits {
     /// Lowers limits to what `LABELGS_LIMIT_SSBO`, `_TEXELS`, `_ALLOCATION` and `_MEMORY` say (numbers with K, M or G),
-    /// so that a small device can be tried out on a large one.
+    /// so that tests try out a small device on a large one.
     pub(super) fn lower_by_env(&mut self) -> Result<()> {
         for (name, limit) in [
             ("LABELGS_LIMIT_SSBO", &mut self.max_storage_range),
@@ -47,7 +48,7 @@ impl Limits {
             ("LABELGS_LIMIT_ALLOCATION", &mut self.max_allocation),
             ("LABELGS_LIMIT_MEMORY", &mut self.max_memory),
         ] {
-            if let Some(text) = std::env::var(name).ok().filter(|text| !text.is_empty()) {
+            if let Some(text) = lab::var(name) {
                 let problem = || Error::usage(name, format!("{text} is no size; a number with K, M or G is expected"));
                 *limit = (*limit).min(parse_size(&text).ok_or_else(problem)?);
             }

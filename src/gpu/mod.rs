@@ -1,6 +1,6 @@
 //! Thin layer over Vulkan: one instance, one device, one compute queue, and owners of the objects made from them.
 //!
-//! Everything that Vulkan asks the caller to guarantee is guaranteed here or in `sched/recorder.rs`, so that the rest
+//! Everything that Vulkan asks the caller to guarantee is guaranteed here or in `scheduler/recorder.rs`, so that the rest
 //! of the crate is safe code. Objects hold an `Arc<Gpu>`: no handle outlives its device.
 // Vulkan is a foreign interface: every call is unsafe. This module and the recorder are the only places for it.
 #![allow(unsafe_code)]
@@ -38,6 +38,7 @@ pub(crate) use query::QueryPool;
 pub(crate) use timeline::Timeline;
 
 use crate::error::{Error, Result};
+use crate::lab;
 use ash::vk;
 use gpu_allocator::vulkan::{Allocator, AllocatorCreateDesc};
 use instance::Instance;
@@ -60,11 +61,12 @@ pub struct GpuOptions {
 }
 
 impl GpuOptions {
-    /// Options from `LABELGS_DEVICE`, `LABELGS_VALIDATION` (`off`, `on`, `sync`, `gpu`) and `LABELGS_SUBGROUP_SIZE`.
+    /// Options from `LABELGS_DEVICE` and `LABELGS_VALIDATION` (`off`, `on`, `sync`, `gpu`); for tests also from
+    /// `LABELGS_SUBGROUP_SIZE`.
     pub fn from_env() -> Result<Self> {
         let set = |name| std::env::var(name).ok().filter(|value| !value.is_empty());
         let validation = set("LABELGS_VALIDATION").map(|value| value.parse()).transpose()?.unwrap_or_default();
-        let subgroup_size = set("LABELGS_SUBGROUP_SIZE")
+        let subgroup_size = lab::var("LABELGS_SUBGROUP_SIZE")
             .map(|value| value.parse().map_err(|_| Error::usage("LABELGS_SUBGROUP_SIZE", "a whole number is expected")))
             .transpose()?;
         Ok(Self { device: set("LABELGS_DEVICE"), validation, subgroup_size, ..Self::default() })

@@ -1,7 +1,7 @@
 //! Files that are either the old one or the complete new one, whatever happens in between.
 
 use crate::error::{Error, Result};
-use crate::fault;
+use crate::lab::fault;
 use std::collections::BTreeSet;
 use std::fs::{self, File};
 use std::io::{self, BufWriter, Write};

@@ -1,8 +1,8 @@
 //! How files are read. Every open and every read of every reader goes through here, so that
-//! [faults](crate::fault) reach all of them.
+//! [faults](crate::lab::fault) reach all of them.
 
 use crate::error::{Error, Result};
-use crate::fault;
+use crate::lab::fault;
 use std::fs::{self, File};
 use std::io::{self, BufReader, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};

@@ -11,6 +11,7 @@ pub fn gather(b: &mut Builder) {
 }
 
 /// Adds up the records of an object's splats, which densification does not see.
+#[cfg(feature = "lab")]
 pub fn gather_object(b: &mut Builder) {
     records(b, false, true);
 }

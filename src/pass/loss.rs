@@ -25,6 +25,7 @@ pub fn photo_loss(b: &mut Builder, width: u32, height: u32) {
 }
 
 /// Sums up the label loss of the layers alone.
+#[cfg(feature = "lab")]
 pub fn label_loss(b: &mut Builder) {
     b.list.stage = Stage::Loss;
     reduce(b, 0);

@@ -11,6 +11,7 @@ pub mod loss;
 mod optimize;
 mod project;
 pub mod scan;
+#[cfg(feature = "lab")]
 mod separate;
 pub mod shape;
 pub mod sort;
@@ -19,6 +20,7 @@ mod tile;
 
 pub use build::Builder;
 pub use optimize::ATTRIBUTES;
+#[cfg(feature = "lab")]
 pub use separate::separate_step;
 pub use shape::KernelShape;
 

@@ -17,6 +17,7 @@ pub fn visible_splats(b: &mut Builder) {
 }
 
 /// As [`visible_splats`], for the object of layer 1 alone.
+#[cfg(feature = "lab")]
 pub fn visible_splats_of_object(b: &mut Builder) {
     b.list.stage = Stage::Project;
     cull(b, true);
@@ -64,6 +65,7 @@ pub fn project_backward(b: &mut Builder) {
 }
 
 /// As [`project_backward`] for the splats of an object; added to the gradients of `scene_splats`.
+#[cfg(feature = "lab")]
 pub fn project_backward_of_object(b: &mut Builder, scene_splats: Buf) {
     backward(b, true, scene_splats);
 }

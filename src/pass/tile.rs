@@ -15,11 +15,13 @@ pub fn bin_splats(b: &mut Builder) -> Buf {
 }
 
 /// The scene's splats alone, in the first of the layers that the list has.
+#[cfg(feature = "lab")]
 pub fn bin_scene(b: &mut Builder) -> Buf {
     bin(b, false, 0)
 }
 
 /// An object's splats, in layer 1 alone.
+#[cfg(feature = "lab")]
 pub fn bin_object(b: &mut Builder) -> Buf {
     bin(b, false, 1)
 }

@@ -5,6 +5,7 @@ pub mod near;
 mod occlusion;
 mod sampler;
 mod sentinel;
+mod separate;
 mod setup;
 mod state;
 pub mod step_input;
@@ -21,8 +22,8 @@ pub use timing::StepTimes;
 
 use crate::engine::{Engine, EngineSize, InFlight, ListKey, Report};
 use crate::error::Result;
-use crate::fault;
 use crate::gpu::Gpu;
+use crate::lab::fault;
 use crate::pass::{KernelShape, Variant};
 use crate::render::RenderOptions;
 use crate::scene::{Dataset, Gaussians};
@@ -66,8 +67,7 @@ pub struct Trainer {
     strategy: Box<dyn Strategy>,
     /// Votes were counted before, so that masks can be compared with their outcome.
     labelled_once: bool,
-    /// Objects have passes of their own.
-    separate: bool,
+    separate: separate::Separate,
     timing: Option<timing::Timing>,
     /// Blending counts the pairs that have a weight.
     counts_pairs: bool,
@@ -137,7 +137,7 @@ impl Trainer {
             bound: Bound { most, by_memory: false },
             strategy,
             labelled_once: false,
-            separate: false,
+            separate: separate::Separate::default(),
             timing: None,
             counts_pairs: false,
             seen: sentinel::Seen::default(),
@@ -150,12 +150,6 @@ impl Trainer {
     /// The engine, for renders between steps; nothing may be in flight ([`Trainer::drain`]).
     pub fn engine_mut(&mut self) -> &mut Engine {
         &mut self.engine
-    }
-
-    /// From the next step on each sampled object has passes of its own, as in the reference code: slower, and up to
-    /// rounding the same. For measurements; nothing may be in flight ([`Trainer::drain`]).
-    pub fn separate_objects(&mut self, separate: bool) {
-        self.separate = separate;
     }
 
     /// The configuration.
@@ -302,8 +296,8 @@ impl Trainer {
             update: input.update,
             counts: self.counts_pairs,
         };
-        if self.separate && input.labels {
-            return ListKey::Separate(variant, input.layers.len() as u32);
+        if let Some(key) = self.separate.key(variant, input) {
+            return key;
         }
         match self.strategy.passes(self.at(input.step)) {
             0 => ListKey::Train(variant),

@@ -51,7 +51,7 @@ fn work() -> labelgs::Result<()> {
 fn outcome(fault: &str) -> String {
     let program = std::env::current_exe().unwrap();
     let mut command = Command::new(program);
-    command.args(["--exact", "sched::faults::child", "--nocapture", "--test-threads=1"]);
+    command.args(["--exact", "scheduler::faults::child", "--nocapture", "--test-threads=1"]);
     command.env(CHILD, "1").env("LABELGS_FAULT", fault).env("LABELGS_VALIDATION", "off");
     let output = command.output().unwrap();
     let text = String::from_utf8_lossy(&output.stdout).into_owned();

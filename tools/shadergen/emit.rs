@@ -18,8 +18,8 @@ pub fn rust(shaders: &[Shader], constants: &[Constant]) -> String {
     emit_structs(&mut out, shaders);
     let mut all = String::new();
     for (file, siblings) in by_file(shaders) {
-        emit_file(&mut out, file, &siblings);
-        for index in 0..siblings.iter().map(|sibling| sibling.variants.len()).sum() {
+        let variants = emit_file(&mut out, file, &siblings);
+        for index in 0..variants {
             put!(all, "    &{file}::VARIANTS[{index}].shader,");
         }
     }
@@ -85,21 +85,24 @@ fn emit_struct(out: &mut String, body: &Struct, doc: &str) {
     put!(out, "    const _: () = assert!(size_of::<{name}>() == {});", body.bytes);
 }
 
-/// One module for a file: what all its siblings need, each name once.
-fn emit_file(out: &mut String, file: &str, siblings: &[&Shader]) {
-    let Some(base) = siblings.first() else { return };
+/// One module for a file: what all its siblings need, each name once. Returns the number of variants in this build; a file
+/// without any has no module.
+fn emit_file(out: &mut String, file: &str, siblings: &[&Shader]) -> usize {
+    let here = siblings.iter().filter(|shader| shader.is_in);
+    let variants: Vec<_> =
+        here.flat_map(|shader| shader.variants.iter().map(move |variant| (shader, variant))).collect();
+    let (false, Some(base)) = (variants.is_empty(), siblings.first()) else { return 0 };
     put!(out, "\n/// `{}`: {}", base.path, base.summary().unwrap_or_default());
     put!(out, "#[allow(clippy::all)]\npub mod {file} {{");
     emit_macros(out, siblings);
     emit_bindings(out, siblings);
     emit_spec(out, siblings);
-    let variants: Vec<_> =
-        siblings.iter().flat_map(|shader| shader.variants.iter().map(move |variant| (shader, variant))).collect();
     put!(out, "    /// All variants.\n    pub static VARIANTS: [super::Compiled; {}] = [", variants.len());
-    for (shader, variant) in variants {
+    for (shader, variant) in &variants {
         emit_variant(out, shader, variant);
     }
     put!(out, "    ];\n}}");
+    variants.len()
 }
 
 /// A struct with a field for each name, and the values of the fields with their GLSL names.

@@ -56,6 +56,8 @@ pub struct Shader {
     pub source: String,
     /// Base first.
     pub variants: Vec<Variant>,
+    /// It is in this build. Of a sibling that is not, the file still has the names of its bindings.
+    pub is_in: bool,
 }
 
 impl Shader {
@@ -112,24 +114,24 @@ pub struct Generated {
 }
 
 /// Generates from the folder `glsl` and writes `shaders.rs` and the `.spv` files into `out`.
-pub fn run(glsl: &Path, out: &Path) -> Result<(), Vec<Finding>> {
-    let generated = generate(glsl)?;
+pub fn run(glsl: &Path, out: &Path, lab: bool) -> Result<(), Vec<Finding>> {
+    let generated = generate(glsl, lab)?;
     let save = |file: PathBuf, bytes: &[u8]| {
         fs::write(&file, bytes).map_err(|error| vec![Finding::new(file.display().to_string(), error.to_string())])
     };
-    for variant in generated.shaders.iter().flat_map(|shader| &shader.variants) {
+    for variant in generated.shaders.iter().filter(|shader| shader.is_in).flat_map(|shader| &shader.variants) {
         let bytes: Vec<u8> = variant.words.iter().flat_map(|word| word.to_le_bytes()).collect();
         save(out.join(format!("{}.spv", variant.name)), &bytes)?;
     }
     save(out.join("shaders.rs"), generated.rust.as_bytes())
 }
 
-/// Everything but the writing. All findings of a stage come together.
-pub fn generate(glsl: &Path) -> Result<Generated, Vec<Finding>> {
+/// Everything but the writing; with `lab` also the shaders of that feature. All findings of a stage come together.
+pub fn generate(glsl: &Path, lab: bool) -> Result<Generated, Vec<Finding>> {
     let include = glsl.join("include");
     let compiler = GlslCompiler::new(&include).map_err(|error| vec![Finding::new("", error)])?;
     let mut shaders = find(glsl)?;
-    declare_variants(glsl, &mut shaders)?;
+    declare_variants(glsl, &mut shaders, lab)?;
     compile_all(&include, &mut shaders)?;
     let mut findings: Vec<Finding> = shaders.iter().flat_map(check::shader).collect();
     findings.extend(check::shared_structs(&shaders));
@@ -195,21 +197,21 @@ fn find(glsl: &Path) -> Result<Vec<Shader>, Vec<Finding>> {
             findings.push(Finding::new(path.clone(), format!("{} has the same stem", twin.path)));
         }
         let variants = vec![Variant { name: stem.clone(), ..Variant::default() }];
-        shaders.push(Shader { file_stem: stem.clone(), stem, path, source: read(&file)?, variants });
+        shaders.push(Shader { file_stem: stem.clone(), stem, path, source: read(&file)?, variants, is_in: true });
     }
     shaders.sort_by(|a, b| a.stem.cmp(&b.stem));
     if findings.is_empty() { Ok(shaders) } else { Err(findings) }
 }
 
-fn declare_variants(glsl: &Path, shaders: &mut Vec<Shader>) -> Result<(), Vec<Finding>> {
+fn declare_variants(glsl: &Path, shaders: &mut Vec<Shader>, lab: bool) -> Result<(), Vec<Finding>> {
     let file = glsl.join("variants.txt");
     if !file.exists() {
         return Ok(());
     }
     let name = message_path(glsl, &file);
     let mut findings = Vec::new();
-    let lines = variants::parse(&name, &read(&file)?)?;
-    for line in &lines {
+    let text = read(&file)?;
+    for line in &variants::parse(&name, &text)? {
         let place = format!("{name}:{}", line.line);
         let full = if line.sibling { line.suffix.clone() } else { format!("{}_{}", line.stem, line.suffix) };
         if shaders.iter().any(|shader| shader.stem == full) {
@@ -227,6 +229,12 @@ fn declare_variants(glsl: &Path, shaders: &mut Vec<Shader>) -> Result<(), Vec<Fi
                 let name = format!("{}_{}", shader.stem, line.suffix);
                 shader.variants.push(Variant { name, defines, ..Variant::default() });
             });
+        }
+    }
+    for (place, stem) in variants::of_lab(&name, &text) {
+        match shaders.iter().position(|shader| shader.stem == stem) {
+            None => findings.push(Finding::new(place, format!("there is no shader `{stem}`"))),
+            Some(index) => shaders[index].is_in = lab,
         }
     }
     shaders.sort_by(|a, b| a.stem.cmp(&b.stem));

@@ -95,13 +95,6 @@ crate::buffers! {
     V_SH1 "v_sh1": 48, Domain::Gaussians, Class::Step, VEC4, "Gradients of sh1 [V].";
     V_SH2 "v_sh2": 64, Domain::Gaussians, Class::Step, VEC4, "Gradients of sh2 [V].";
     V_SH3 "v_sh3": 96, Domain::Gaussians, Class::Step, VEC4, "Gradients of sh3 [V].";
-    OBJECT "object": 4, Domain::One, Class::Step, None, "Layer of the object whose passes run, where objects have passes of their own.";
-    OBJECT_COUNTERS "object_counters": size_of::<Counters>() as u32, Domain::One, Class::Step, None, "Counts of the passes before those of that object.";
-    OBJECT_STEP "object_step": size_of::<StepUniforms>() as u32, Domain::One, Class::Step, None, "The step's uniforms with that object as the only layer.";
-    OBJECT_LABEL "object_label": 4, Domain::Fixed(2), Class::Step, None, "label_from_layer of that layer.";
-    OBJECT_WEIGHT "object_weight": 4, Domain::Fixed(2), Class::Step, None, "layer_weights of that layer.";
-    OBJECT_OCCLUDERS "object_occluders": 4, Domain::OccluderWords, Class::Step, None, "layer_occluders of that layer.";
-    OBJECT_SPLATS "object_splats": 4, Domain::Gaussians, Class::Step, None, "splat_from_gaussian among that object's splats [N].";
     CHILDREN_COUNTS "children_counts": 4, Domain::Gaussians, Class::Step, WORD, "What each Gaussian becomes: 0, 1 or 2 [N].";
     CHILD_OFFSETS "child_offsets": 4, Domain::Gaussians, Class::Step, WORD, "Place of the first child [N].";
     DENSIFY_ACTIONS "densify_actions": 4, Domain::Gaussians, Class::Step, WORD, "Decision for each Gaussian [N].";
@@ -110,4 +103,18 @@ crate::buffers! {
     OLD_QUATS "old_quats": 16, Domain::Gaussians, Class::Step, VEC4, "Quats before densification.";
     OLD_VALUES "old_values": 96, Domain::Gaussians, Class::Step, VEC4, "One attribute before densification.";
     OLD_LABELS "old_labels": 4, Domain::Labelled, Class::Step, WORD, "Labels before densification.";
+    #[cfg(feature = "lab")]
+    OBJECT "object": 4, Domain::One, Class::Step, None, "Layer of the object whose passes run, where objects have passes of their own.";
+    #[cfg(feature = "lab")]
+    OBJECT_COUNTERS "object_counters": size_of::<Counters>() as u32, Domain::One, Class::Step, None, "Counts of the passes before those of that object.";
+    #[cfg(feature = "lab")]
+    OBJECT_STEP "object_step": size_of::<StepUniforms>() as u32, Domain::One, Class::Step, None, "The step's uniforms with that object as the only layer.";
+    #[cfg(feature = "lab")]
+    OBJECT_LABEL "object_label": 4, Domain::Fixed(2), Class::Step, None, "label_from_layer of that layer.";
+    #[cfg(feature = "lab")]
+    OBJECT_WEIGHT "object_weight": 4, Domain::Fixed(2), Class::Step, None, "layer_weights of that layer.";
+    #[cfg(feature = "lab")]
+    OBJECT_OCCLUDERS "object_occluders": 4, Domain::OccluderWords, Class::Step, None, "layer_occluders of that layer.";
+    #[cfg(feature = "lab")]
+    OBJECT_SPLATS "object_splats": 4, Domain::Gaussians, Class::Step, None, "splat_from_gaussian among that object's splats [N].";
 }

@@ -1,0 +1,111 @@
+//! The command line with devices that are poorer than the one that is there, or with none.
+
+use crate::support::device;
+use assert_cmd::Command;
+use serde_json::Value;
+
+fn text(bytes: &[u8]) -> String {
+    String::from_utf8_lossy(bytes).into_owned()
+}
+
+#[track_caller]
+fn json(text: &str) -> Value {
+    serde_json::from_str(text).unwrap_or_else(|error| panic!("{error}: {text}"))
+}
+
+#[test]
+fn without_a_driver_devices_fails_and_plan_does_not() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let broken = folder.path().join("driver.json");
+    let text_of_driver =
+        r#"{"file_format_version": "1.0.0", "ICD": {"library_path": "/dev/null", "api_version": "1.3.0"}}"#;
+    std::fs::write(&broken, text_of_driver).expect("a file");
+    // No driver, a driver whose library is none, no loader.
+    for (driver, fault) in
+        [("/nonexistent/driver.json", ""), (broken.to_str().expect("text"), ""), ("", "loader:1:INITIALIZATION")]
+    {
+        let run = |args: &[&str]| {
+            let mut command = Command::cargo_bin("labelgs").expect("the tool is built");
+            command.env("LABELGS_FAULT", fault).env_remove("LABELGS_DEVICE").env_remove("LABELGS_VALIDATION");
+            if !driver.is_empty() {
+                command.env("VK_DRIVER_FILES", driver).env("VK_ICD_FILENAMES", driver);
+            }
+            command.args(args).output().expect("it runs")
+        };
+        let output = run(&["devices"]);
+        assert_eq!(output.status.code(), Some(4), "{}", text(&output.stderr));
+        assert!(text(&output.stderr).contains("error: no usable Vulkan device: "), "{}", text(&output.stderr));
+        let output = run(&["plan", "--gaussians", "1k", "--size", "64x48", "--json"]);
+        assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+        assert_eq!(json(&text(&output.stdout))["device"], Value::Null);
+        assert_eq!(run(&["plan", "--device", "0"]).status.code(), Some(4));
+    }
+}
+
+/// What the kernels cannot do without is named, with the status of a device that does not fit.
+#[test]
+fn required_features_are_missed_by_name() {
+    let Some(_gpu) = device() else { return };
+    for (hidden, named) in
+        [("scalar", "scalarBlockLayout"), ("timeline", "timelineSemaphore"), ("shuffle", "subgroup shuffle")]
+    {
+        let mut command = Command::cargo_bin("labelgs").expect("the tool is built");
+        command.env("LABELGS_HIDE", hidden).env("LABELGS_VALIDATION", "off");
+        let output = command.args(["profile", "--synthetic", "--steps", "1"]).output().expect("it runs");
+        assert_eq!(output.status.code(), Some(4), "{hidden}: {}", text(&output.stderr));
+        assert!(text(&output.stderr).contains(&format!("lacks {named}")), "{hidden}: {}", text(&output.stderr));
+    }
+    let mut command = Command::cargo_bin("labelgs").expect("the tool is built");
+    let output = command.env("LABELGS_HIDE", "colour").args(["devices"]).output().expect("it runs");
+    assert_eq!(output.status.code(), Some(2), "{}", text(&output.stderr));
+    // Where there are no timestamps, `profile` has nothing to say.
+    let mut command = Command::cargo_bin("labelgs").expect("the tool is built");
+    command.env("LABELGS_HIDE", "timestamps").env("LABELGS_VALIDATION", "off");
+    let output = command.args(["profile", "--synthetic", "--steps", "1"]).output().expect("it runs");
+    assert_eq!(output.status.code(), Some(4), "{}", text(&output.stderr));
+    assert!(text(&output.stderr).contains("no timestamps"), "{}", text(&output.stderr));
+}
+
+/// A driver whose subgroups cannot be pinned and are of another size than it tells is found out before it does harm.
+/// Debian 12's lavapipe is one with vectors of 512 bits, and is none with those of 256.
+#[test]
+fn subgroups_that_are_not_as_told_are_refused() {
+    if !device().is_some_and(|gpu| gpu.is_cpu()) {
+        return;
+    }
+    for width in ["256", "512"] {
+        let run = |args: &[&str]| {
+            let mut command = Command::cargo_bin("labelgs").expect("the tool is built");
+            command.env("LP_NATIVE_VECTOR_WIDTH", width).env("LABELGS_HIDE", "size_control,full_subgroups");
+            command.env("LABELGS_VALIDATION", "off").args(args).output().expect("it runs")
+        };
+        let devices = json(&text(&run(&["devices", "--json"]).stdout));
+        let found = &devices["devices"][0];
+        let size = found["kernels"]["subgroup_size"].as_u64().expect("a size");
+        let is_debians = found["driver"].to_string().contains("Mesa 22.3");
+        let output = run(&["profile", "--synthetic", "--steps", "1"]);
+        let said = text(&output.stderr);
+        match output.status.code() {
+            Some(4) if size == 16 => assert!(said.contains("tells of subgroups of 16 and does not let"), "{said}"),
+            Some(0) => assert!(!(is_debians && size == 16), "not found out: {said}"),
+            status => panic!("status {status:?} with subgroups of {size}: {said}"),
+        }
+    }
+}
+
+#[test]
+fn a_plan_that_does_not_fit_is_printed_and_fails() {
+    let mut command = Command::cargo_bin("labelgs").expect("the tool is built");
+    let args = ["plan", "--gaussians", "2k", "--size", "160x120", "--json"];
+    let output = command.env("LABELGS_LIMIT_SSBO", "64K").args(args).output().expect("it runs");
+    if device().is_none() {
+        return;
+    }
+    assert_eq!(output.status.code(), Some(5), "{}", text(&output.stderr));
+    let plan = json(&text(&output.stdout));
+    assert!(
+        plan["fits"] == false && plan["problem"].as_str().is_some_and(|text| text.contains("65536")),
+        "{}",
+        plan["problem"]
+    );
+}
