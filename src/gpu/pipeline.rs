@@ -92,8 +92,8 @@ impl Pipeline {
         let info = vk::ShaderModuleCreateInfo::default().code(&words);
         // SAFETY: the SPIR-V comes from the shader compiler of the build.
         let module = vk_call("vkCreateShaderModule", || unsafe { gpu.raw().create_shader_module(&info, None) })?;
-        let full = gpu.capabilities.features.full_subgroups
-            && subgroup_size.is_some_and(|size| width.is_multiple_of(size));
+        let full =
+            gpu.capabilities.features.full_subgroups && subgroup_size.is_some_and(|size| width.is_multiple_of(size));
         let made = pipeline.make(gpu.pipeline_cache(), module, spec, subgroup_size, full);
         // SAFETY: pipelines do not need their modules once they are made.
         unsafe { gpu.raw().destroy_shader_module(module, None) };

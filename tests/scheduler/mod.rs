@@ -70,8 +70,7 @@ fn pixels(count: u64) -> Capacity {
 
 /// `to[i] = from[i] * factor + term`.
 fn scaled(from: Buf, to: Buf, factor: u32, term: u32, count: u32) -> PassDecl {
-    PassDecl::new(scale(), vec![from, to], Grid::Groups(count.div_ceil(64), 1, 1))
-        .spec(vec![64, factor, term, count])
+    PassDecl::new(scale(), vec![from, to], Grid::Groups(count.div_ceil(64), 1, 1)).spec(vec![64, factor, term, count])
 }
 
 fn options(plan: PlanOptions) -> SchedulerOptions {
