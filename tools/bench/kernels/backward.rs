@@ -16,7 +16,7 @@ const uint KEPT = 8192u / (TILE_WIDTH * TILE_HEIGHT);
 shared float kept_T[KEPT * TILE_WIDTH * TILE_HEIGHT];
 
 TileSplat load(uint list_start, uint at, vec2 corner) {
-    uint index = fetchu(splat_from_instance, fetchu(slots, list_start + at));
+    uint index = fetchu(splat_from_instance, fetchu(instance_from_sorted, list_start + at));
     vec4 r0 = fetch4(splats, 3u * index), r1 = fetch4(splats, 3u * index + 1u);
     return TileSplat(r0.x - corner.x, r0.y - corner.y, r0.z, r0.w, r1.x, r1.y, vec3(0.0), 0.0);
 }
