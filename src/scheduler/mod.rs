@@ -42,7 +42,7 @@ pub struct SchedulerOptions {
 impl SchedulerOptions {
     /// The limits that plans respect on a device.
     pub fn limits(&self, gpu: &Gpu) -> Limits {
-        let limits = limits_of(gpu);
+        let limits = gpu.limits().plan;
         Limits { max_memory: self.memory_limit.unwrap_or(u64::MAX).min(limits.max_memory), ..limits }
     }
 }
@@ -86,26 +86,6 @@ pub struct Scheduler {
     table: &'static [BufferDecl],
     // Last, so that the device outlives what was made from it.
     gpu: Arc<Gpu>,
-}
-
-/// The limits of a device in the planner's terms.
-pub fn limits_of(gpu: &Gpu) -> Limits {
-    plan_limits(gpu.limits())
-}
-
-/// The same before the device is opened.
-pub fn plan_limits(limits: &crate::gpu::Limits) -> Limits {
-    Limits {
-        max_storage_range: limits.max_storage_range,
-        max_texel_elements: limits.max_texel_elements,
-        storage_alignment: limits.storage_alignment,
-        texel_alignment: limits.texel_alignment,
-        max_groups: limits.max_groups,
-        max_allocation: limits.max_allocation,
-        max_storage_buffers: limits.max_storage_buffers,
-        max_texel_buffers: limits.max_texel_buffers,
-        max_memory: limits.max_memory,
-    }
 }
 
 impl Scheduler {

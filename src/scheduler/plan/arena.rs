@@ -2,7 +2,7 @@
 
 use super::buffers::{Buf, BufferDecl, Class};
 use super::lifetime::Life;
-use super::limits::Limits;
+use super::Limits;
 use super::memory::Size;
 use super::{GUARD_BYTES, Page, Placement, PlanOptions};
 use crate::error::{Error, Result};

@@ -2,7 +2,7 @@
 
 use super::buffers::{Buf, BufferDecl};
 use super::capacity::Domain;
-use super::limits::Limits;
+use super::Limits;
 use super::memory::Size;
 use super::name;
 use super::pass::{Grid, PassDecl, PassList, Work};

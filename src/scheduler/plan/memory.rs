@@ -2,7 +2,7 @@
 
 use super::buffers::{BufferDecl, Class};
 use super::capacity::Capacity;
-use super::limits::Limits;
+use super::Limits;
 use super::pass::PassList;
 use super::{GUARD_BYTES, Plan, PlanOptions};
 use crate::error::{Error, Result};
