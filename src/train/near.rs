@@ -1,10 +1,11 @@
 //! The near plane of a scene.
 
 use crate::scene::{Camera, Gaussians};
+use crate::shaders::constants;
 use glam::DVec3;
 
 /// The near plane of 3DGS, world units: what a model is rendered with of which nothing is known.
-pub const NEAR: f32 = 0.2;
+pub const NEAR: f32 = constants::NEAR;
 /// The near plane of a small scene, in median depths of its Gaussians.
 const SHARE: f64 = 0.05;
 /// Cameras and Gaussians that are looked at, evenly chosen.

@@ -15,10 +15,10 @@ mod report;
 mod stage;
 mod table;
 
+pub use crate::gpu::PlanLimits as Limits;
 pub use barrier::{Barrier, Touch, Use, Uses};
 pub use buffers::{Buf, BufferDecl, Class, TexelFormat};
 pub use capacity::{Capacity, Domain};
-pub use crate::gpu::PlanLimits as Limits;
 pub use lifetime::Life;
 pub use memory::{MemoryReport, MemoryRow};
 pub use pass::{Grid, PassDecl, PassList, Work};
