@@ -22,8 +22,8 @@
 //!
 //! # Words
 //!
-//! *Gaussian*: a row of the model. *Splat*: its projection in a view. *Instance*: a (splat, tile) pair; its place before
-//! the sort is its *slot*. *Layer*: the scene (0) or one sampled object of the view. *Label*: an object's id, 0 for none.
+//! *Gaussian*: a row of the model. *Splat*: its projection in a view. *Instance*: a (splat, tile) pair, numbered
+//! as before the sort. *Layer*: the scene (0) or one sampled object of the view. *Label*: an object's id, 0 for none.
 //! *Mask*: the visible ids of a photo. *Step*: one update of the parameters. *View*: a posed photo. A gradient is named
 //! `v_` and the value's name, first and second moments `m_` and `u_`.
 //!

@@ -6,8 +6,8 @@ use labelgs::edit::components::{Grouping, components};
 use labelgs::edit::prompt::{Place, Prompt, choose};
 use labelgs::edit::rename::{give_name, keep, renumber, split};
 use labelgs::io::label_table::{LabelEntry, LabelTable};
-use labelgs::scene::gaussians::SH_C0;
 use labelgs::scene::{Gaussians, LabelMap};
+use labelgs::shaders::constants::exact::SH_C0;
 use std::collections::{BTreeMap, BTreeSet};
 
 const UPRIGHT: [f32; 4] = [1.0, 0.0, 0.0, 0.0];

@@ -27,10 +27,10 @@ FETCH4(1, means);
 FETCHU(2, labels);
 INOUT(3, vec3, colors);
 WRITE(7, uvec2, keys);
-SPEC(0, uint, WIDTH, 8);
-SPEC(1, float, SCALE, 0.25);
-SPEC(2, bool, CLAMP, true);
-SPEC(5, int, SHIFT, -3);
+layout(constant_id = 0) const uint WIDTH = 8;
+layout(constant_id = 1) const float SCALE = 0.25;
+layout(constant_id = 2) const bool CLAMP = true;
+layout(constant_id = 5) const int SHIFT = -3;
 layout(local_size_x_id = 0, local_size_y_id = 6) in;
 
 void main() {
@@ -262,7 +262,14 @@ fn variants_with_different_interfaces_are_found() {
         (with("READ(1, uint, a);", "INOUT(1, uint, a);", "words[1] = a[0];"), "bindings"),
         (with("READ(1, uint, a);", "READ(2, uint, a);", "words[1] = a[0];"), "bindings"),
         (with("READ(1, uint, a);", "READ(1, uvec2, a);", "words[1] = uvec2(a[0]).x;"), "bindings"),
-        (with("SPEC(0, uint, A, 1);", "SPEC(0, uint, A, 2);", "words[1] = A;"), "specialisation constants"),
+        (
+            with(
+                "layout(constant_id = 0) const uint A = 1;",
+                "layout(constant_id = 0) const uint A = 2;",
+                "words[1] = A;",
+            ),
+            "specialisation constants",
+        ),
     ];
     for (text, what) in &cases {
         let rule = format!("probe and probe_other have different {what}");
@@ -272,7 +279,10 @@ fn variants_with_different_interfaces_are_found() {
 
 #[test]
 fn a_constant_that_differs_between_siblings_is_found() {
-    let text = small("#ifdef OTHER\nSPEC(0, uint, A, 1);\n#else\nSPEC(0, uint, A, 2);\n#endif", "words[1] = A;");
+    let text = small(
+        "#ifdef OTHER\nlayout(constant_id = 0) const uint A = 1;\n#else\nlayout(constant_id = 0) const uint A = 2;\n#endif",
+        "words[1] = A;",
+    );
     let files = [("test/probe.comp", text.as_str()), ("variants.txt", "wide = probe: OTHER\n")];
     one_finding(&files, &["glsl/test/probe.comp:9", "`A` differs between probe and wide"]);
 }

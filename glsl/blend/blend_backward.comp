@@ -7,9 +7,9 @@
 #include "blend_tile.glsl"
 // blend_backward — walk one tile of one layer back to front and write one gradient record per (splat, tile) pair.
 // Work:    one subgroup (= workgroup) a tile, jobs as in blend_forward.
-// Reads:   step; tile_starts [layers * T]; slots, splat_from_instance [I]; splats [V,3]; image [P] (w = transmittance),
+// Reads:   step; tile_starts [layers * T]; instance_from_sorted, splat_from_instance [I]; splats [V,3]; image [P] (w = transmittance),
 //          last [P]; v_image [P]; variant labels: counters, layer_tiles, layer_state, layer_weights
-// Writes:  v_instances_a, _b, _c [I] at the pair's slot: v_mean2d (px), v_conic xy; v_conic z, v_log_opacity, v_colour rg;
+// Writes:  v_instances_a, _b, _c [I] by instance: v_mean2d (px), v_conic xy; v_conic z, v_log_opacity, v_colour rg;
 //          v_colour b, stamp of the step
 //          (records without the current stamp were not walked and count as 0)
 // Math:    p = dL/d ln alpha = w (u - s) with u = colour . g and s the colour behind, times g; geometry and opacity
@@ -20,7 +20,7 @@
 READ1(0, StepUniforms, step);
 FETCHU(1, tile_starts);
 FETCHU(2, splat_from_instance);
-FETCHU(3, slots);
+FETCHU(3, instance_from_sorted);
 FETCH4(4, splats);
 FETCH4(5, image);
 FETCHU(6, last);
@@ -50,14 +50,14 @@ void main() {
         return;
     }
     uint job = interleave(group, jobs);
-    uint virtual_tile = job, layer_slot = 0u;
+    uint virtual_tile = job, layer_tile = 0u;
 #ifdef LABELS
     if (job >= u.tile_count) {
-        layer_slot = job - u.tile_count;
-        virtual_tile = fetchu(layer_tiles, layer_slot);
+        layer_tile = job - u.tile_count;
+        virtual_tile = fetchu(layer_tiles, layer_tile);
     }
 #endif
-    TileJob t = locate(job, virtual_tile, layer_slot, u);
+    TileJob t = locate(virtual_tile, layer_tile, u);
     uint lane = gl_LocalInvocationID.x;
     uint list_start = fetchu(tile_starts, virtual_tile);
     vec2 corner = vec2(float(t.x - (lane % TILE_WIDTH)), float((t.tile / u.tiles_x) * TILE_HEIGHT));
@@ -118,7 +118,7 @@ void main() {
         uint base = (batch - 1u) * SUBGROUP_SIZE; // within the list
         uint count = min(SUBGROUP_SIZE, deepest - base);
         uint at = list_start + min(base + lane, deepest - 1u);
-        uint slot = fetchu(slots, at), index = fetchu(splat_from_instance, slot);
+        uint instance = fetchu(instance_from_sorted, at), index = fetchu(splat_from_instance, instance);
         vec4 r0 = fetch4(splats, 3u * index), r1 = fetch4(splats, 3u * index + 1u), r2 = fetch4(splats, 3u * index + 2u);
         TileSplat mine = TileSplat(r0.x - corner.x, r0.y - corner.y, r0.z, r0.w, r1.x, r1.y, vec3(r1.zw, r2.x), 0.0);
         float o0 = 0.0, ox = 0.0, oy = 0.0, oxx = 0.0, oxy = 0.0, oyy = 0.0, or_ = 0.0, og = 0.0, ob = 0.0;
@@ -173,9 +173,9 @@ void main() {
         float Sxy = d.x * (d.y * o0 - oy) - d.y * ox + oxy;
         float Syy = d.y * (d.y * o0 - 2.0 * oy) + oyy;
         if (lane < count) {
-            v_instances_a[slot] = vec4(-(conic.x * Sx + conic.y * Sy), -(conic.y * Sx + conic.z * Sy), -0.5 * Sxx, -Sxy);
-            v_instances_b[slot] = vec4(-0.5 * Syy, o0, or_, og);
-            v_instances_c[slot] = vec4(ob, uintBitsToFloat(u.stamp), 0.0, 0.0);
+            v_instances_a[instance] = vec4(-(conic.x * Sx + conic.y * Sy), -(conic.y * Sx + conic.z * Sy), -0.5 * Sxx, -Sxy);
+            v_instances_b[instance] = vec4(-0.5 * Syy, o0, or_, og);
+            v_instances_c[instance] = vec4(ob, uintBitsToFloat(u.stamp), 0.0, 0.0);
         }
     }
 #ifdef SEGMENTED

@@ -7,14 +7,14 @@
 layout(constant_id = 17) const uint COUNTS = 0; // 1: contributing pairs are counted
 // blend_forward — alpha-blend one tile of one layer front to back.
 // Work:    one subgroup (= workgroup) a tile: the scene's tiles, then (variant labels) the occupied layer tiles.
-// Reads:   step, counters; tile_starts, tile_ends [layers * T]; slots [I]; splat_from_instance [I]; splats [V,3]
+// Reads:   step, counters; tile_starts, tile_ends [layers * T]; instance_from_sorted [I]; splat_from_instance [I]; splats [V,3]
 //          variant labels: layer_tiles; target [P] RGBA8; view_labels [P]; layer_occluders; label_from_layer;
 //          layer_weights; gaussian_from_splat [V]
 // Writes:  image [P] linear RGB over the background, w = final transmittance; last [P] = 1 + index of the last splat
 //          that contributed, within the tile's list (0: none); variant main: main_gaussian [P] (NO_SPLAT: none) and
 //          main_weight_depth [P] (weight, weighted sum of z);
-//          variant labels: layer_state [slots, pixels of a tile] (transmittance, last and signs of the loss gradient),
-//          layer_loss [slots] (label loss less that of an empty picture, which the host knows: tiles that hold no splat
+//          variant labels: layer_state [layer tiles, pixels of a tile] (transmittance, last and signs of the loss gradient),
+//          layer_loss [layer tiles] (label loss less that of an empty picture, which the host knows: tiles that hold no splat
 //          are not walked), label_keys [N] (integer maximum, any order)
 // Math:    LabelGS eq. 5; alpha <= ALPHA_MAX; a pair counts where alpha >= ALPHA_MIN, tested on the exponent; a pixel
 //          stops before the splat that would take its transmittance below TRANSMITTANCE_MIN (3DGS).
@@ -27,7 +27,7 @@ READ1(0, StepUniforms, step);
 INOUT1(1, Counters, counters);
 FETCHU(2, tile_starts);
 FETCHU(3, tile_ends);
-FETCHU(4, slots);
+FETCHU(4, instance_from_sorted);
 FETCH4(5, splats);
 FETCHU(19, splat_from_instance);
 WRITE(6, vec4, image);
@@ -74,14 +74,14 @@ void main() {
         return;
     }
     uint job = interleave(group, jobs);
-    uint virtual_tile = job, slot = 0u;
+    uint virtual_tile = job, layer_tile = 0u;
 #ifdef LABELS
     if (job >= u.tile_count) {
-        slot = job - u.tile_count;
-        virtual_tile = fetchu(layer_tiles, slot);
+        layer_tile = job - u.tile_count;
+        virtual_tile = fetchu(layer_tiles, layer_tile);
     }
 #endif
-    TileJob t = locate(job, virtual_tile, slot, u);
+    TileJob t = locate(virtual_tile, layer_tile, u);
     uint lane = gl_LocalInvocationID.x;
     uint list_start = fetchu(tile_starts, virtual_tile), list_end = fetchu(tile_ends, virtual_tile);
 #ifdef SEGMENTED
@@ -151,7 +151,7 @@ void main() {
         }
         uint count = min(SUBGROUP_SIZE, end - base);
         walked += count;
-        uint index = fetchu(splat_from_instance, fetchu(slots, min(base + lane, end - 1u)));
+        uint index = fetchu(splat_from_instance, fetchu(instance_from_sorted, min(base + lane, end - 1u)));
         vec4 r0 = fetch4(splats, 3u * index), r1 = fetch4(splats, 3u * index + 1u), r2 = fetch4(splats, 3u * index + 2u);
         TileSplat mine = TileSplat(r0.x - corner.x, r0.y - corner.y, r0.z, r0.w, r1.x, r1.y, vec3(r1.zw, r2.x), r2.y);
         for (uint j = 0u; j < count; j++) {
@@ -217,7 +217,7 @@ void main() {
 
 #ifdef LABELS
     if (t.layer != 0u) {
-        finish_layer(t, slot, T, cr, cg, cb, final_, u);
+        finish_layer(t, T, cr, cg, cb, final_, u);
         return;
     }
 #endif

@@ -4,7 +4,7 @@
 #include "step.glsl"
 #include "dispatch.glsl"
 #include "gaussian.glsl"
-// gather — add up the gradient records of each splat, in slot order; note the densification statistic.
+// gather — add up the gradient records of each splat, in the order of instances; note the densification statistic.
 // Work:    64 splats a workgroup.
 // Reads:   step, counters, failure; tiles_touched, instance_offsets [V]; v_instances_a, _b, _c [I];
 //          gaussian_from_splat [V], not in variant object; variant labels: labels [N], layer_from_label

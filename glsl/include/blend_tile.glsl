@@ -17,14 +17,12 @@ layout(constant_id = 14) const uint SEGMENT_LENGTH = 40960;
 const uint ROWS = TILE_WIDTH * TILE_HEIGHT / SUBGROUP_SIZE;
 
 struct TileJob {
-    bool some;
-    uint layer;   // 0: the scene
-    uint tile;    // within the layer
-    uint virtual_tile;
-    uint slot;    // index among the occupied layer tiles
-    uint x, y0;   // the lane's column and first row, px
-    float px;     // centre of the lane's column relative to the tile's left edge
-    float row0;   // first row of the lane relative to the tile's top edge
+    uint layer;      // 0: the scene
+    uint tile;       // within the layer
+    uint layer_tile; // index among the occupied layer tiles
+    uint x, y0;      // the lane's column and first row, px
+    float px;        // centre of the lane's column relative to the tile's left edge
+    float row0;      // first row of the lane relative to the tile's top edge
 };
 
 // Devices that split a dispatch do so at its middle.
@@ -38,11 +36,9 @@ uint interleave(uint i, uint n) {
     return in_first_half(i, n) ? 2u * i : 2u * (i - (n + 1u) / 2u) + 1u;
 }
 
-TileJob locate(uint job, uint virtual_tile, uint slot, StepUniforms u) {
+TileJob locate(uint virtual_tile, uint layer_tile, StepUniforms u) {
     TileJob t;
-    t.some = true;
-    t.virtual_tile = virtual_tile;
-    t.slot = slot;
+    t.layer_tile = layer_tile;
     t.layer = virtual_tile / u.tile_count;
     t.tile = virtual_tile % u.tile_count;
     uint lane = gl_LocalInvocationID.x;

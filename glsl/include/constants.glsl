@@ -1,4 +1,5 @@
-// Every constant of the algorithm, once. Exported to Rust by the build; the f64 mirrors widen these f32 values.
+// Every constant of the algorithm, once. Exported to Rust by the build. The f64 reference types its own, so that a slip
+// here shows; a test compares them (src/verify/reference/rules.rs).
 // Only the benchmark of kernels (tools/bench/kernels/modes.rs) defines a macro in place of a constant.
 
 #ifndef ALPHA_MIN
@@ -19,12 +20,27 @@ const float OPACITY_RESET_LOGIT = -4.5951198501345898; // logit(0.01)
 const float SPLIT_SHRINK = 0.47000362924573558;        // ln 1.6
 const float LN2 = 0.69314718055994531;
 const float GRADIENT_MAX = 1e18;            // larger gradients are dropped: their squares would overflow in Adam
+const float COLOUR_BIAS = 0.5;               // colour of a Gaussian without spherical harmonics (3DGS)
+const float NEAR = 0.2;                      // near plane, world units, unless the scene is small (3DGS); host only
+const float JACOBIAN_MARGIN = 0.3;           // how far slopes may leave the image, in half images (3DGS); host only
 const uint NO_SPLAT = 0xffffffffu;
 const uint LABEL_MASK = 0xffffu;             // id of a pixel of view_labels; above it:
 const uint LABEL_BORDER = 0x10000u;          // so near to a contour of the mask that it says nothing
 const uint VOTE_NONE = 0xffffffffu;         // column of a pixel that has no say
 const float VOTE_ONE = 65536.0;              // fixed point of the votes for labels
 const uint KEY_INVISIBLE = 0xffffffffu;
+
+// Factors of the real spherical harmonics (sh.glsl).
+const float SH_C0 = 0.28209479177387814;
+const float SH_C1 = 0.48860251190291992;
+const float SH_C2_0 = 1.0925484305920792;
+const float SH_C2_2 = 0.31539156525252005;
+const float SH_C2_4 = 0.54627421529603959;
+const float SH_C3_0 = 0.59004358992664352;
+const float SH_C3_1 = 2.8906114426405538;
+const float SH_C3_2 = 0.45704579946446577;
+const float SH_C3_3 = 0.37317633259011546;
+const float SH_C3_5 = 1.4453057213202769;
 
 // Entries of dispatch_args, 3 words each (VkDispatchIndirectCommand).
 const uint ARGS_GAUSSIANS = 0u;

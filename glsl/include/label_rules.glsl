@@ -35,8 +35,8 @@ void lift(uint p, uint splat, float weight, StepUniforms u) {
 }
 
 // What blend_forward keeps of a layer's tile: its loss, and the state from which the backward pass starts.
-void finish_layer(TileJob t, uint slot, float T[ROWS], float cr[ROWS], float cg[ROWS], float cb[ROWS],
-                  uint final_[ROWS], StepUniforms u) {
+void finish_layer(TileJob t, float T[ROWS], float cr[ROWS], float cg[ROWS], float cb[ROWS], uint final_[ROWS],
+                  StepUniforms u) {
     float loss = 0.0;
     uint label = label_from_layer[t.layer];
     [[unroll]] for (uint k = 0u; k < ROWS; k++) {
@@ -53,6 +53,6 @@ void finish_layer(TileJob t, uint slot, float T[ROWS], float cr[ROWS], float cg[
     }
     loss = subgroup_sum(loss);
     if (gl_LocalInvocationID.x == 0u) {
-        layer_loss[slot] = loss * layer_weights[t.layer];
+        layer_loss[t.layer_tile] = loss * layer_weights[t.layer];
     }
 }

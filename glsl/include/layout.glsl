@@ -6,7 +6,6 @@
 //   FETCH4(2, quats)           array of vec4 that is only read by fetch4(quats, i); a texel buffer if TEXEL is defined
 //   FETCHU(3, labels)          array of uint, likewise with fetchu(labels, i)
 //   FETCHC(3, target)          array of RGBA8 colours, read by fetchc(target, i) as vec4 in 0 to 1
-//   SPEC(0, uint, WIDTH, 8)    specialisation constant
 #ifndef LAYOUT_GLSL
 #define LAYOUT_GLSL
 
@@ -43,7 +42,5 @@
 // Unpacked by the shader, not by the texel unit: the same bits on every device.
 #define FETCHC(number, name) FETCHU(number, name)
 #define fetchc(name, i) unpackUnorm4x8(fetchu(name, i))
-
-#define SPEC(number, T, name, value) layout(constant_id = number) const T name = value
 
 #endif

@@ -1,16 +1,5 @@
 // Real spherical harmonics up to degree 3 in the order and with the signs of 3DGS, and their derivatives by direction.
 
-const float SH_C0 = 0.28209479177387814;
-const float SH_C1 = 0.48860251190291992;
-const float SH_C2_0 = 1.0925484305920792;
-const float SH_C2_2 = 0.31539156525252005;
-const float SH_C2_4 = 0.54627421529603959;
-const float SH_C3_0 = 0.59004358992664352;
-const float SH_C3_1 = 2.8906114426405538;
-const float SH_C3_2 = 0.45704579946446577;
-const float SH_C3_3 = 0.37317633259011546;
-const float SH_C3_5 = 1.4453057213202769;
-
 // Basis values of degree 1 (3), 2 (5) and 3 (7) for a unit direction.
 void sh_basis(vec3 d, uint degree, out float basis[15]) {
     float x = d.x, y = d.y, z = d.z;

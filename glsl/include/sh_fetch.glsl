@@ -6,7 +6,7 @@ vec3 band1(uint i, uint k) {
 }
 
 vec3 sh_colour(uint i, float basis[15]) {
-    vec3 c = 0.5 + SH_C0 * fetch4(sh0, i).xyz;
+    vec3 c = COLOUR_BIAS + SH_C0 * fetch4(sh0, i).xyz;
     if (SH_DEGREE >= 1u) {
         c += basis[0] * band1(i, 0u) + basis[1] * band1(i, 1u) + basis[2] * band1(i, 2u);
     }

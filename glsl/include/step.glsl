@@ -1,4 +1,4 @@
-// What changes every step, written by the host into the step's slot; and what the device reports back.
+// What changes every step, written by the host for the step's frame; and what the device reports back.
 
 struct StepUniforms {
     vec3 view_row0;         // rows of the rotation of camera_from_world

@@ -7,7 +7,7 @@
 // vote — add up, for each Gaussian and each label, the weight with which it shows in the pixels of that label.
 // Work:    one subgroup (= workgroup) a tile of the scene, jobs as in blend_forward. A walk counts four labels of the
 //          tile; tiles with more are walked again (specialisation ROUND).
-// Reads:   step; tile_starts, tile_ends [T]; slots, splat_from_instance [I]; splats [V,3]; gaussian_from_splat [V];
+// Reads:   step; tile_starts, tile_ends [T]; instance_from_sorted, splat_from_instance [I]; splats [V,3]; gaussian_from_splat [V];
 //          view_labels [P] column of each pixel's label, VOTE_NONE: the pixel has no say; vote_weights [columns]
 // Writes:  votes_low, votes_high [N, columns]: 64 bits with VOTE_ONE to a pixel of weight 1, times the column's weight
 // Math:    A[j, k] = sum over pixels v with label k of alpha_j T_j (FlashSplat's sums, every contributor counts)
@@ -18,7 +18,7 @@ layout(constant_id = 15) const uint ROUND = 0;
 READ1(0, StepUniforms, step);
 FETCHU(1, tile_starts);
 FETCHU(2, tile_ends);
-FETCHU(3, slots);
+FETCHU(3, instance_from_sorted);
 FETCH4(4, splats);
 FETCHU(5, gaussian_from_splat);
 FETCHU(6, view_labels);
@@ -48,7 +48,7 @@ void main() {
         return;
     }
     uint tile = interleave(group, u.tile_count);
-    TileJob t = locate(tile, tile, 0u, u);
+    TileJob t = locate(tile, 0u, u);
     uint lane = gl_LocalInvocationID.x;
 
     float T[ROWS];
@@ -96,7 +96,7 @@ void main() {
             break;
         }
         uint count = min(SUBGROUP_SIZE, end - base);
-        uint index = fetchu(splat_from_instance, fetchu(slots, min(base + lane, end - 1u)));
+        uint index = fetchu(splat_from_instance, fetchu(instance_from_sorted, min(base + lane, end - 1u)));
         vec4 r0 = fetch4(splats, 3u * index), r1 = fetch4(splats, 3u * index + 1u);
         float sum[LABELS_PER_WALK];
         [[unroll]] for (uint q = 0u; q < LABELS_PER_WALK; q++) {

@@ -6,7 +6,7 @@
 #include "record.glsl"
 #include "ellipse.glsl"
 // emit_instances — write one (tile key, splat) pair for every tile that a splat touches.
-// Work:    64 splats a workgroup. A splat's instances are contiguous ("slots"): first those of the scene layer, then
+// Work:    64 splats a workgroup. A splat's instances are contiguous: first those of the scene layer, then
 //          those of its object layer; keys are layer * tile_count + tile.
 // Reads:   step, counters, failure; splats [V,3]; tiles_touched [V]; instance_offsets [V];
 //          variant labels: gaussian_from_splat [V], labels [N], layer_from_label

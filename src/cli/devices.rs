@@ -79,7 +79,7 @@ fn to_text(device: &Capabilities, picked: Option<usize>) -> String {
     let mut text =
         format!("{}: {} ({}, Vulkan {major}.{minor}.{patch}{mark})\n", device.index, device.name, kind(device));
     text += &format!("   driver  {} {}\n   uuid    {}\n", device.driver_name, device.driver_info, device.uuid_text());
-    let (heap, usable) = (device.limits.heap >> 20, device.limits.max_memory >> 20);
+    let (heap, usable) = (device.limits.heap >> 20, device.limits.plan.max_memory >> 20);
     text += &format!("   memory  {heap} MiB, {usable} MiB may be used\n");
     text += &needs_text(device);
     if device.missing().is_empty() {
@@ -121,7 +121,7 @@ fn to_json(device: &Capabilities, picked: Option<usize>) -> Value {
         "driver": { "name": device.driver_name, "version": device.driver_info },
         "uuid": device.uuid_text(),
         "memory_bytes": device.limits.heap,
-        "usable_memory_bytes": device.limits.max_memory,
+        "usable_memory_bytes": device.limits.plan.max_memory,
         "needs": needs_json(device),
         "usable": usable,
         "picked": picked == Some(device.index),

@@ -12,7 +12,6 @@ use crate::pass::{KernelShape, Variant, training_step};
 use crate::scheduler::plan::{
     Capacity, Grid, Limits, MemoryReport, Page, PassList, Plan, PlanOptions, TABLE, Touch, Work,
 };
-use crate::scheduler::plan_limits;
 use crate::{Error, Result};
 use clap::Args;
 use serde_json::{Value, json};
@@ -102,7 +101,7 @@ fn device(context: &Context) -> Result<(Option<String>, KernelShape, Limits)> {
     match gpu::devices(&options) {
         Ok((devices, Some(picked))) => {
             let device = &devices[picked];
-            Ok((Some(device.name.clone()), shape_of(device), plan_limits(&device.limits)))
+            Ok((Some(device.name.clone()), shape_of(device), device.limits.plan))
         }
         Ok((_, None)) if options.device.is_some() => {
             Err(Error::NoDevice("the device that was asked for cannot be used; see labelgs devices".into()))

@@ -1,9 +1,9 @@
 //! Models with other colours or other labels.
 
 use super::components::{Grouping, components};
-use crate::scene::gaussians::SH_C0;
 use crate::scene::labels::LABEL_MAX;
 use crate::scene::{Gaussians, UNLABELLED};
+use crate::shaders::constants::exact::SH_C0;
 use crate::{Error, Result};
 use std::collections::{BTreeMap, BTreeSet};
 

@@ -2,12 +2,10 @@
 
 use crate::pass::KernelShape;
 use crate::scene::Camera;
+use crate::shaders::constants::exact::JACOBIAN_MARGIN;
 use crate::shaders::structs::StepUniforms;
 use bytemuck::Zeroable;
 use glam::DVec3;
-
-/// Share of half the image by which the Jacobian's slopes may leave the image (3DGS clamps at 1.3 tan(fov / 2)).
-const SLOPE_MARGIN: f64 = 0.3;
 
 /// The camera's part of the uniforms; everything else is 0. Positions on the device are relative to `origin`.
 pub fn view_uniforms(
@@ -19,7 +17,7 @@ pub fn view_uniforms(
     count: u32,
 ) -> StepUniforms {
     let (width, height) = (f64::from(camera.width), f64::from(camera.height));
-    let (margin_x, margin_y) = (SLOPE_MARGIN * 0.5 * width / camera.fx, SLOPE_MARGIN * 0.5 * height / camera.fy);
+    let (margin_x, margin_y) = (JACOBIAN_MARGIN * 0.5 * width / camera.fx, JACOBIAN_MARGIN * 0.5 * height / camera.fy);
     let (tiles_x, tiles_y) = shape.tiles(camera.width, camera.height);
     let row = |index| camera.rotation.row(index).as_vec3().to_array();
     StepUniforms {

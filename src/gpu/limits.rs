@@ -3,9 +3,9 @@
 use crate::error::{Error, Result};
 use crate::lab;
 
-/// What a device can hold and run at most.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Limits {
+/// Limits of a device that a plan must respect.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct PlanLimits {
     /// Largest storage buffer binding, in bytes.
     pub max_storage_range: u64,
     /// Largest texel buffer view, in texels.
@@ -16,22 +16,53 @@ pub struct Limits {
     pub texel_alignment: u64,
     /// Workgroups per axis of a dispatch.
     pub max_groups: [u32; 3],
+    /// Largest memory allocation (and buffer), in bytes.
+    pub max_allocation: u64,
+    /// Storage buffers of one shader.
+    pub max_storage_buffers: u32,
+    /// Texel buffers of one shader.
+    pub max_texel_buffers: u32,
+    /// Memory that the engine may use in all, in bytes: part of what the driver says is free, or of the heap.
+    pub max_memory: u64,
+}
+
+impl Default for PlanLimits {
+    /// Modest limits that any device the engine runs on is likely to reach, without a bound on all memory.
+    fn default() -> Self {
+        Self {
+            max_storage_range: 128 << 20,
+            max_texel_elements: 128 << 20,
+            storage_alignment: 256,
+            texel_alignment: 256,
+            max_groups: [65_535; 3],
+            max_allocation: 1 << 30,
+            max_storage_buffers: 32,
+            max_texel_buffers: 32,
+            max_memory: u64::MAX,
+        }
+    }
+}
+
+impl PlanLimits {
+    /// Alignment of every buffer in a page: fit for storage bindings, texel views and cache lines.
+    pub fn alignment(&self) -> u64 {
+        self.storage_alignment.max(self.texel_alignment).max(64)
+    }
+}
+
+/// What a device can hold and run at most.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Limits {
+    /// What plans respect.
+    pub plan: PlanLimits,
     /// Invocations per axis of a workgroup.
     pub max_group_size: [u32; 3],
     /// Invocations of a workgroup.
     pub max_invocations: u32,
     /// Bytes of shared memory of a workgroup.
     pub max_shared: u32,
-    /// Largest allocation and buffer, in bytes.
-    pub max_allocation: u64,
-    /// Storage buffers of one shader.
-    pub max_storage_buffers: u32,
-    /// Texel buffers of one shader.
-    pub max_texel_buffers: u32,
     /// Size of the device's largest own heap, in bytes.
     pub heap: u64,
-    /// Memory that the engine may use, in bytes: part of what the driver says is free, or of the heap.
-    pub max_memory: u64,
     /// Nanoseconds of one timestamp tick; 0 if compute queues have no timestamps.
     pub timestamp_period: f32,
     /// Bits of a timestamp that count.
@@ -43,10 +74,10 @@ impl Limits {
     /// so that tests try out a small device on a large one.
     pub(super) fn lower_by_env(&mut self) -> Result<()> {
         for (name, limit) in [
-            ("LABELGS_LIMIT_SSBO", &mut self.max_storage_range),
-            ("LABELGS_LIMIT_TEXELS", &mut self.max_texel_elements),
-            ("LABELGS_LIMIT_ALLOCATION", &mut self.max_allocation),
-            ("LABELGS_LIMIT_MEMORY", &mut self.max_memory),
+            ("LABELGS_LIMIT_SSBO", &mut self.plan.max_storage_range),
+            ("LABELGS_LIMIT_TEXELS", &mut self.plan.max_texel_elements),
+            ("LABELGS_LIMIT_ALLOCATION", &mut self.plan.max_allocation),
+            ("LABELGS_LIMIT_MEMORY", &mut self.plan.max_memory),
         ] {
             if let Some(text) = lab::var(name) {
                 let problem = || Error::usage(name, format!("{text} is no size; a number with K, M or G is expected"));

@@ -26,7 +26,7 @@ pub use cache::PipelineStore;
 pub use capabilities::{Capabilities, DeviceKind, Need, SUBGROUP_MAX, SUBGROUP_MIN, Subgroup};
 pub use devices::devices;
 pub use instance::{Message, MessageLog, Validation};
-pub use limits::Limits;
+pub use limits::{Limits, PlanLimits};
 pub use memory::{Buffer, MemoryKind};
 
 pub(crate) use call::vk_call;

@@ -3,7 +3,7 @@
 use super::call::vk_call;
 use super::capabilities::{Capabilities, DeviceKind, Features, Need, SUBGROUP_MAX, SUBGROUP_MIN, Subgroup};
 use super::hidden::Hidden;
-use super::limits::Limits;
+use super::limits::{Limits, PlanLimits};
 use crate::error::Result;
 use crate::shaders::{self, BindingKind, ShaderDesc};
 use ash::vk;
@@ -143,15 +143,12 @@ fn limits(
     (heap, max_memory): (u64, u64),
     timestamp_bits: u32,
 ) -> Limits {
-    Limits {
+    let plan = PlanLimits {
         max_storage_range: u64::from(core.max_storage_buffer_range),
         max_texel_elements: u64::from(core.max_texel_buffer_elements),
         storage_alignment: core.min_storage_buffer_offset_alignment,
         texel_alignment: core.min_texel_buffer_offset_alignment,
         max_groups: core.max_compute_work_group_count,
-        max_group_size: core.max_compute_work_group_size,
-        max_invocations: core.max_compute_work_group_invocations,
-        max_shared: core.max_compute_shared_memory_size,
         max_allocation: eleven.max_memory_allocation_size.min(max_buffer),
         max_storage_buffers: core
             .max_per_stage_descriptor_storage_buffers
@@ -161,8 +158,14 @@ fn limits(
             .max_per_stage_descriptor_sampled_images
             .min(core.max_descriptor_set_sampled_images)
             .min(core.max_per_stage_resources),
-        heap,
         max_memory,
+    };
+    Limits {
+        plan,
+        max_group_size: core.max_compute_work_group_size,
+        max_invocations: core.max_compute_work_group_invocations,
+        max_shared: core.max_compute_shared_memory_size,
+        heap,
         timestamp_period: if timestamp_bits == 0 { 0.0 } else { core.timestamp_period },
         timestamp_bits,
     }
@@ -217,7 +220,7 @@ fn needs(found: &Capabilities, has_queue: bool) -> Vec<Need> {
             "one tile per subgroup",
         ),
         least("workgroup size", 256, limits.max_invocations, "scan and sort"),
-        least("storage buffers per shader", bindings, limits.max_storage_buffers, "bindings of the largest pass"),
+        least("storage buffers per shader", bindings, limits.plan.max_storage_buffers, "bindings of the largest pass"),
     ];
     needs.extend(wishes(limits, subgroup));
     needs
@@ -230,7 +233,7 @@ fn wishes(limits: &Limits, subgroup: &Subgroup) -> [Need; 3] {
         ..need(what, is_met, "wished", found, reason)
     };
     let pins = format!("{} of {}..{}", subgroup.size, subgroup.min, subgroup.max);
-    let (range, bits, period) = (limits.max_storage_range, limits.timestamp_bits, limits.timestamp_period);
+    let (range, bits, period) = (limits.plan.max_storage_range, limits.timestamp_bits, limits.timestamp_period);
     [
         wish("pinned subgroup size", subgroup.is_pinned, pins, "else a step is tried before the work"),
         wish("storage binding of 1 GiB", range >= 1 << 30, format!("{range} B"), "bounds the number of Gaussians"),

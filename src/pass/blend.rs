@@ -7,23 +7,23 @@ use crate::scheduler::plan::{Buf, Stage};
 use crate::shaders::constants;
 
 /// Blends all tiles front to back; with labels also the object layers and their loss, and the lift if it is asked for.
-pub fn blend_forward(b: &mut Builder, slots: Buf, lift: bool) {
-    forward(b, slots, false, lift);
+pub fn blend_forward(b: &mut Builder, pairs: Buf, lift: bool) {
+    forward(b, pairs, false, lift);
 }
 
 /// Blends all tiles of the scene and keeps the main Gaussian of each pixel, its weight, and depth.
-pub fn blend_forward_main(b: &mut Builder, slots: Buf) {
-    forward(b, slots, true, false);
+pub fn blend_forward_main(b: &mut Builder, pairs: Buf) {
+    forward(b, pairs, true, false);
 }
 
-fn forward(b: &mut Builder, slots: Buf, main: bool, lift: bool) {
+fn forward(b: &mut Builder, pairs: Buf, main: bool, lift: bool) {
     let (segments, counts) = (b.capacity.segments as u32, b.counts);
     b.list.stage = Stage::BlendForward;
     for segment in 0..segments {
         pass!(b, blend_forward(labels: b.labels, main: main, segmented: segments > 1) {
             step: Buf::STEP, counters: Buf::COUNTERS, tile_starts: Buf::TILE_STARTS, tile_ends: Buf::TILE_ENDS,
-            slots: slots, splat_from_instance: Buf::SPLAT_FROM_INSTANCE, splats: Buf::SPLATS, image: Buf::IMAGE,
-            last: Buf::LAST, gaussian_from_splat: GAUSSIAN_FROM_SPLAT, main_gaussian: Buf::MAIN_GAUSSIAN,
+            instance_from_sorted: pairs, splat_from_instance: Buf::SPLAT_FROM_INSTANCE, splats: Buf::SPLATS,
+            image: Buf::IMAGE, last: Buf::LAST, gaussian_from_splat: GAUSSIAN_FROM_SPLAT, main_gaussian: Buf::MAIN_GAUSSIAN,
             main_weight_depth: Buf::MAIN_WEIGHT_DEPTH, layer_tiles: Buf::LAYER_TILES, target: Buf::TARGET,
             view_labels: Buf::VIEW_LABELS, layer_occluders: Buf::LAYER_OCCLUDERS,
             label_from_layer: Buf::LABEL_FROM_LAYER, layer_state: Buf::LAYER_STATE, layer_loss: Buf::LAYER_LOSS,
@@ -34,13 +34,13 @@ fn forward(b: &mut Builder, slots: Buf, main: bool, lift: bool) {
 }
 
 /// Walks all tiles back to front and writes a gradient record per (splat, tile) pair.
-pub fn blend_backward(b: &mut Builder, slots: Buf) {
+pub fn blend_backward(b: &mut Builder, pairs: Buf) {
     let segments = b.capacity.segments as u32;
     b.list.stage = Stage::BlendBackward;
     for segment in (0..segments).rev() {
         pass!(b, blend_backward(labels: b.labels, segmented: segments > 1) {
-            step: Buf::STEP, tile_starts: Buf::TILE_STARTS, slots: slots, splat_from_instance: Buf::SPLAT_FROM_INSTANCE,
-            splats: Buf::SPLATS, image: Buf::IMAGE, last: Buf::LAST, v_image: Buf::V_IMAGE,
+            step: Buf::STEP, tile_starts: Buf::TILE_STARTS, instance_from_sorted: pairs,
+            splat_from_instance: Buf::SPLAT_FROM_INSTANCE, splats: Buf::SPLATS, image: Buf::IMAGE, last: Buf::LAST, v_image: Buf::V_IMAGE,
             v_instances_a: Buf::V_INSTANCES_A, v_instances_b: Buf::V_INSTANCES_B, v_instances_c: Buf::V_INSTANCES_C,
             counters: Buf::COUNTERS, layer_tiles: Buf::LAYER_TILES, layer_state: Buf::LAYER_STATE,
             layer_weights: Buf::LAYER_WEIGHTS, segment_back: Buf::SEGMENT_BACK,

@@ -15,13 +15,13 @@ pub fn resolve(b: &mut Builder) {
 }
 
 /// Adds the weights of all contributors to the votes for the labels of their pixels.
-pub fn vote(b: &mut Builder, slots: Buf, rounds: u32) {
+pub fn vote(b: &mut Builder, pairs: Buf, rounds: u32) {
     let segments = b.capacity.segments as u32;
     b.list.stage = Stage::Labels;
     for (round, segment) in (0..rounds).flat_map(|round| (0..segments).map(move |segment| (round, segment))) {
         pass!(b, vote(segmented: segments > 1) {
-            step: Buf::STEP, tile_starts: Buf::TILE_STARTS, tile_ends: Buf::TILE_ENDS, slots: slots,
-            splat_from_instance: Buf::SPLAT_FROM_INSTANCE, splats: Buf::SPLATS,
+            step: Buf::STEP, tile_starts: Buf::TILE_STARTS, tile_ends: Buf::TILE_ENDS,
+            instance_from_sorted: pairs, splat_from_instance: Buf::SPLAT_FROM_INSTANCE, splats: Buf::SPLATS,
             gaussian_from_splat: GAUSSIAN_FROM_SPLAT, view_labels: Buf::VIEW_LABELS, vote_weights: Buf::VOTE_WEIGHTS,
             votes_low: Buf::VOTES_LOW, votes_high: Buf::VOTES_HIGH, segment_colours: Buf::SEGMENT_COLOURS,
         } [round: round, segment: segment, segments: segments], args(constants::ARGS_BLEND));

@@ -99,10 +99,10 @@ pub fn extended_step(
     let mut b = begin("training step", shape, capacity, variant.labels, variant.sh_degree);
     b.counts = variant.counts;
     project::visible_splats(&mut b);
-    let slots = tile::bin_splats(&mut b);
-    blend::blend_forward(&mut b, slots, variant.lift);
+    let pairs = tile::bin_splats(&mut b);
+    blend::blend_forward(&mut b, pairs, variant.lift);
     loss::photo_loss(&mut b, variant.size.0, variant.size.1);
-    blend::blend_backward(&mut b, slots);
+    blend::blend_backward(&mut b, pairs);
     gather::gather(&mut b);
     project::project_backward(&mut b);
     extension.extend(passes, Hook::Gradients, &mut b);
@@ -120,8 +120,8 @@ pub fn extended_step(
 pub fn render_view(shape: &KernelShape, capacity: &Capacity, sh_degree: u32) -> PassList {
     let mut b = begin("render", shape, capacity, false, sh_degree);
     project::visible_splats(&mut b);
-    let slots = tile::bin_splats(&mut b);
-    blend::blend_forward_main(&mut b, slots);
+    let pairs = tile::bin_splats(&mut b);
+    blend::blend_forward_main(&mut b, pairs);
     end(b)
 }
 
@@ -129,8 +129,8 @@ pub fn render_view(shape: &KernelShape, capacity: &Capacity, sh_degree: u32) -> 
 pub fn vote_view(shape: &KernelShape, capacity: &Capacity, rounds: u32) -> PassList {
     let mut b = begin("votes", shape, capacity, false, 0);
     project::visible_splats(&mut b);
-    let slots = tile::bin_splats(&mut b);
-    lift::vote(&mut b, slots, rounds);
+    let pairs = tile::bin_splats(&mut b);
+    lift::vote(&mut b, pairs, rounds);
     end(b)
 }
 

@@ -6,8 +6,11 @@ use super::sort::{self, SortBuffers};
 use crate::pass;
 use crate::scheduler::plan::{Buf, Stage};
 
-/// Sorted Gaussian indices of the visible splats; the depth sort has an even number of passes.
+/// Gaussian of each splat; the depth sort ends there.
 pub const GAUSSIAN_FROM_SPLAT: Buf = Buf::DEPTH_VALUES_A;
+
+/// Bits of a depth key.
+const DEPTH_BITS: u32 = 32;
 
 /// Lists the visible Gaussians in depth order and projects them.
 pub fn visible_splats(b: &mut Builder) {
@@ -33,18 +36,18 @@ fn cull(b: &mut Builder, object: bool) {
 }
 
 fn order_and_project(b: &mut Builder) {
+    let buffers = SortBuffers {
+        keys: [Buf::DEPTH_KEYS_A, Buf::DEPTH_KEYS_B],
+        values: [GAUSSIAN_FROM_SPLAT, Buf::DEPTH_VALUES_B],
+    };
+    let buffers = buffers.ending_in_first(b.shape, DEPTH_BITS);
     scan::scan_visible(b, Buf::DEPTH_KEYS, Buf::VISIBLE_OFFSETS);
     pass!(b, prepare_splats { counters: Buf::COUNTERS, dispatch_args: Buf::DISPATCH_ARGS } [], ONE);
     pass!(b, compact {
         step: Buf::STEP, depth_keys: Buf::DEPTH_KEYS, visible_offsets: Buf::VISIBLE_OFFSETS,
-        keys_out: Buf::DEPTH_KEYS_A, values_out: Buf::DEPTH_VALUES_A, failure: Buf::FAILURE,
+        keys_out: buffers.keys[0], values_out: buffers.values[0], failure: Buf::FAILURE,
     } [], over_gaussians());
-    let buffers = SortBuffers {
-        keys: [Buf::DEPTH_KEYS_A, Buf::DEPTH_KEYS_B],
-        values: [Buf::DEPTH_VALUES_A, Buf::DEPTH_VALUES_B],
-    };
-    let (_, sorted) = sort::sort(b, buffers, 32, Count::Splats, "by depth", false);
-    debug_assert_eq!(sorted, GAUSSIAN_FROM_SPLAT);
+    sort::sort(b, buffers, DEPTH_BITS, Count::Splats, "by depth", false);
     project_forward(b);
     scan::scan(b, Buf::TILES_TOUCHED, Buf::INSTANCE_OFFSETS, Count::Splats, Total::Instances);
 }
@@ -80,4 +83,30 @@ fn backward(b: &mut Builder, object: bool, scene_splats: Buf) {
         v_sh0: Buf::V_SH0, v_sh1: Buf::V_SH1, v_sh2: Buf::V_SH2, v_sh3: Buf::V_SH3, counters: Buf::COUNTERS,
         splat_from_gaussian: scene_splats,
     } [sh_degree: sh_degree], over_splats());
+}
+
+#[cfg(test)]
+mod tests {
+    use super::GAUSSIAN_FROM_SPLAT;
+    use crate::pass::{KernelShape, render_view};
+    use crate::scheduler::plan::{Buf, Capacity, Work};
+
+    #[test]
+    fn the_depth_sort_ends_in_one_buffer_whatever_its_passes() {
+        for (digit_bits, passes) in [(4, 8), (7, 5), (8, 4), (11, 3), (16, 2)] {
+            let shape = KernelShape { digit_bits, ..KernelShape::new(8, true) };
+            let list = render_view(&shape, &Capacity { segments: 1, ..Capacity::default() }, 0);
+            let bound = |title: &str, name: &str| -> Vec<Buf> {
+                let passes = list.work.iter().filter_map(|work| match work {
+                    Work::Pass(pass) if pass.title == title => Some(pass),
+                    _ => None,
+                });
+                let at = |binding: &crate::shaders::BindingDesc| binding.name == name;
+                passes.map(|pass| pass.buffers[pass.shader.bindings.iter().position(at).expect(name)]).collect()
+            };
+            let sorted = bound("radix_scatter by depth", "values_out");
+            assert_eq!((sorted.len(), sorted.last()), (passes, Some(&GAUSSIAN_FROM_SPLAT)), "{digit_bits} bits");
+            assert_eq!(bound("compact", "values_out"), bound("radix_scatter by depth", "values_in")[..1]);
+        }
+    }
 }

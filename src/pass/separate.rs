@@ -26,11 +26,11 @@ pub fn separate_step(shape: &KernelShape, capacity: &Capacity, variant: Variant,
     project::visible_splats(&mut b);
     // The lift is in the labelled kernel, which then finds its layers empty.
     b.labels = variant.lift;
-    let slots = tile::bin_scene(&mut b);
-    blend::blend_forward(&mut b, slots, variant.lift);
+    let pairs = tile::bin_scene(&mut b);
+    blend::blend_forward(&mut b, pairs, variant.lift);
     b.labels = false;
     loss::photo_loss(&mut b, variant.size.0, variant.size.1);
-    blend::blend_backward(&mut b, slots);
+    blend::blend_backward(&mut b, pairs);
     gather::gather(&mut b);
     project::project_backward(&mut b);
     if objects > 0 {
@@ -69,10 +69,10 @@ fn object_passes(shape: &KernelShape, capacity: &Capacity, sh_degree: u32) -> Ve
     let mut b = Builder { shape, capacity: &capacity, labels: false, sh_degree, counts: false, list };
     project::visible_splats_of_object(&mut b);
     b.labels = true;
-    let slots = tile::bin_object(&mut b);
-    blend::blend_forward(&mut b, slots, false);
+    let pairs = tile::bin_object(&mut b);
+    blend::blend_forward(&mut b, pairs, false);
     loss::label_loss(&mut b);
-    blend::blend_backward(&mut b, slots);
+    blend::blend_backward(&mut b, pairs);
     gather::gather_object(&mut b);
     let mut work = b.list.work;
     for item in &mut work {

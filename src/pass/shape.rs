@@ -34,7 +34,7 @@ impl KernelShape {
     /// The shape for a device.
     pub fn of(device: &Capabilities) -> Self {
         let shape = Self::new(device.subgroup.size, device.is_cpu());
-        Self { texel: shape.texel && device.limits.max_texel_elements >= TEXELS_MIN, ..shape }
+        Self { texel: shape.texel && device.limits.plan.max_texel_elements >= TEXELS_MIN, ..shape }
     }
 
     /// The shape for a subgroup size; `cpu` says that the device is a processor.

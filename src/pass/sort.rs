@@ -1,5 +1,6 @@
 //! Stable radix sort of (key, value) pairs by the low bits of the key.
 
+use super::KernelShape;
 use super::build::{Builder, Count, ONE};
 use crate::pass;
 use crate::scheduler::plan::{Buf, Grid, Stage, Work};
@@ -13,6 +14,19 @@ pub struct SortBuffers {
     pub values: [Buf; 2],
 }
 
+impl SortBuffers {
+    /// In the order in which a sort by `bits` bits ends in the first pair: its input then belongs into the new first one.
+    pub fn ending_in_first(self, shape: &KernelShape, bits: u32) -> Self {
+        let Self { keys: [a, b], values: [c, d] } = self;
+        if passes(shape, bits).is_multiple_of(2) { self } else { Self { keys: [b, a], values: [d, c] } }
+    }
+}
+
+/// Passes of a sort by `bits` bits.
+fn passes(shape: &KernelShape, bits: u32) -> u32 {
+    bits.div_ceil(shape.digit_bits).max(1)
+}
+
 /// Sorts by the low `bits` bits; with `identity` the values are the places of the keys before the sort. Tables of times
 /// say what is sorted `by`. Returns the buffers that hold the sorted keys and values.
 pub fn sort(b: &mut Builder, buffers: SortBuffers, bits: u32, count: Count, by: &str, identity: bool) -> (Buf, Buf) {
@@ -20,7 +34,7 @@ pub fn sort(b: &mut Builder, buffers: SortBuffers, bits: u32, count: Count, by: 
     let lanes = b.capacity.sort_lanes as u32;
     let groups = Grid::Groups(lanes / b.shape.subgroup, 1, 1);
     let digit_bits = b.shape.digit_bits;
-    let passes = bits.div_ceil(digit_bits).max(1);
+    let passes = passes(b.shape, bits);
     for pass in 0..passes {
         let (from, to) = ((pass % 2) as usize, 1 - (pass % 2) as usize);
         let shift = pass * digit_bits;

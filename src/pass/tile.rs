@@ -9,7 +9,7 @@ use crate::scheduler::plan::{Buf, Stage};
 use crate::shaders::constants;
 
 /// Lists the (splat, tile) pairs, sorts them by layer and tile, and finds each tile's range. Returns the buffer that
-/// holds the slots (places before the sort) of the sorted pairs.
+/// holds the place before the sort of each sorted pair.
 pub fn bin_splats(b: &mut Builder) -> Buf {
     bin(b, b.labels, 0)
 }
@@ -42,14 +42,14 @@ fn bin(b: &mut Builder, layers: bool, layer: u32) -> Buf {
     let buffers =
         SortBuffers { keys: [Buf::TILE_KEYS_A, Buf::TILE_KEYS_B], values: [Buf::TILE_VALUES_A, Buf::TILE_VALUES_B] };
     let bits = 64 - b.capacity.virtual_tiles.saturating_sub(1).leading_zeros();
-    let (keys, slots) = sort::sort(b, buffers, bits, Count::Instances, "by tile", true);
+    let (keys, pairs) = sort::sort(b, buffers, bits, Count::Instances, "by tile", true);
     tile_ranges(b, keys);
     let layer_tiles = b.capacity.layer_tiles as u32;
     let longest = b.shape.segment_length * b.capacity.segments as u32;
     pass!(b, prepare_blend {
         step: Buf::STEP, counters: Buf::COUNTERS, dispatch_args: Buf::DISPATCH_ARGS, failure: Buf::FAILURE,
     } [layer_tile_capacity: layer_tiles, longest_list: longest], ONE);
-    slots
+    pairs
 }
 
 fn tile_ranges(b: &mut Builder, keys: Buf) {

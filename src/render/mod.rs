@@ -7,7 +7,7 @@ use crate::error::Result;
 use crate::scene::{Camera, LabelMap};
 
 /// The near plane of 3DGS, world units: what a model is rendered with of which nothing is known.
-pub const NEAR: f32 = 0.2;
+pub const NEAR: f32 = crate::shaders::constants::NEAR;
 
 /// What is read back of a picture besides colour and alpha.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

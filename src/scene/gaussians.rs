@@ -3,9 +3,6 @@
 use crate::error::{Error, Result};
 use glam::DVec3;
 
-/// Zeroth spherical-harmonics basis constant, 1 / (2 sqrt(pi)).
-pub const SH_C0: f64 = 0.28209479177387814;
-
 /// The Gaussians of a scene, parameters stored before activation as in the standard 3DGS PLY.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Gaussians {

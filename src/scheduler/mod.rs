@@ -42,7 +42,7 @@ pub struct SchedulerOptions {
 impl SchedulerOptions {
     /// The limits that plans respect on a device.
     pub fn limits(&self, gpu: &Gpu) -> Limits {
-        let limits = limits_of(gpu);
+        let limits = gpu.limits().plan;
         Limits { max_memory: self.memory_limit.unwrap_or(u64::MAX).min(limits.max_memory), ..limits }
     }
 }
@@ -76,7 +76,7 @@ pub struct Scheduler {
     /// Value of the last submit.
     submitted: u64,
     /// Value of the last submit of each frame.
-    slot_busy: [u64; FRAMES_IN_FLIGHT],
+    frame_busy: [u64; FRAMES_IN_FLIGHT],
     /// The list whose scratch buffers `upload` and `download` mean: the last one prepared or submitted.
     current: Option<usize>,
     generation: u64,
@@ -86,26 +86,6 @@ pub struct Scheduler {
     table: &'static [BufferDecl],
     // Last, so that the device outlives what was made from it.
     gpu: Arc<Gpu>,
-}
-
-/// The limits of a device in the planner's terms.
-pub fn limits_of(gpu: &Gpu) -> Limits {
-    plan_limits(gpu.limits())
-}
-
-/// The same before the device is opened.
-pub fn plan_limits(limits: &crate::gpu::Limits) -> Limits {
-    Limits {
-        max_storage_range: limits.max_storage_range,
-        max_texel_elements: limits.max_texel_elements,
-        storage_alignment: limits.storage_alignment,
-        texel_alignment: limits.texel_alignment,
-        max_groups: limits.max_groups,
-        max_allocation: limits.max_allocation,
-        max_storage_buffers: limits.max_storage_buffers,
-        max_texel_buffers: limits.max_texel_buffers,
-        max_memory: limits.max_memory,
-    }
 }
 
 impl Scheduler {
@@ -125,7 +105,7 @@ impl Scheduler {
             immediate: CommandBuffer::new(&gpu)?,
             timeline: Timeline::new(&gpu)?,
             submitted: 0,
-            slot_busy: [0; FRAMES_IN_FLIGHT],
+            frame_busy: [0; FRAMES_IN_FLIGHT],
             current: None,
             generation: 0,
             capacity,
@@ -183,21 +163,12 @@ impl Scheduler {
         Ok(ids)
     }
 
-    /// Changes the options of lists that are prepared from now on. Guards cannot be switched on or off.
-    pub fn set_options(&mut self, options: SchedulerOptions) -> Result<()> {
-        if options.plan.guards != self.options.plan.guards {
-            return Err(Error::Bug("guards are decided when the scheduler is made".to_owned()));
-        }
-        self.options = options;
-        Ok(())
-    }
-
     /// Submits a prepared list with the host-visible buffers of a frame.
     ///
     /// Nothing is allocated. Blocks only if the same list is still running in the same frame.
     pub fn submit(&mut self, id: ListId, frame: usize) -> Result<Ticket> {
         let index = self.index(id)?;
-        self.check_slot(frame)?;
+        self.check_frame(frame)?;
         self.wait(Ticket(self.lists[index].recordings[frame].busy))?;
         let recording = &self.lists[index].recordings[frame];
         if let Some(markers) = &recording.markers {
@@ -207,7 +178,7 @@ impl Scheduler {
         let submitted = self.gpu.submit(&recording.command, &self.timeline, value);
         submitted.map_err(|error| self.name_pass(error))?;
         self.submitted = value;
-        self.slot_busy[frame] = value;
+        self.frame_busy[frame] = value;
         self.lists[index].recordings[frame].busy = value;
         self.current = Some(index);
         Ok(Ticket(value))
@@ -243,8 +214,8 @@ impl Scheduler {
 
     /// Blocks until the host may touch the host-visible buffers of a frame.
     pub fn wait_frame(&self, frame: usize) -> Result<()> {
-        self.check_slot(frame)?;
-        self.wait(Ticket(self.slot_busy[frame]))
+        self.check_frame(frame)?;
+        self.wait(Ticket(self.frame_busy[frame]))
     }
 
     /// Changes capacities: Model buffers keep their contents (the common prefix; new elements are 0), all others start
@@ -307,7 +278,7 @@ impl Scheduler {
     /// were off when the list was prepared, if the device has none, or before the first submit.
     pub fn timings(&self, id: ListId, frame: usize) -> Result<Vec<(String, u64)>> {
         let list = &self.lists[self.index(id)?];
-        self.check_slot(frame)?;
+        self.check_frame(frame)?;
         let recording = &list.recordings[frame];
         let Some(queries) = recording.queries.as_ref().filter(|_| recording.busy > 0) else { return Ok(Vec::new()) };
         self.wait(Ticket(recording.busy))?;
@@ -322,7 +293,7 @@ impl Scheduler {
         Err(Error::Bug("a pass list was used after capacities changed; prepare it again".to_owned()))
     }
 
-    fn check_slot(&self, frame: usize) -> Result<()> {
+    fn check_frame(&self, frame: usize) -> Result<()> {
         if frame < FRAMES_IN_FLIGHT { Ok(()) } else { Err(Error::Bug(format!("frame {frame} of {FRAMES_IN_FLIGHT}"))) }
     }
 

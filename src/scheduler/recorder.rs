@@ -103,7 +103,7 @@ impl<'a> Recorder<'a> {
 
     /// Runs a shader.
     pub(super) fn dispatch(&self, pipeline: &Pipeline, set: vk::DescriptorSet, groups: &Groups<'_>) -> Result<()> {
-        let (raw, command, limits) = (self.gpu.raw(), self.command, self.gpu.limits());
+        let (raw, command, limits) = (self.gpu.raw(), self.command, self.gpu.limits().plan);
         match groups {
             Groups::Count(count) if count.iter().zip(&limits.max_groups).any(|(count, limit)| count > limit) => {
                 return Err(Error::Bug(format!("{count:?} workgroups, the device takes {:?}", limits.max_groups)));

@@ -1,9 +1,9 @@
 //! Transfers between host and buffers, outside of lists.
 
+use super::Scheduler;
 use super::recorder::Recorder;
 use super::storage::Storage;
 use super::storage::copy_of;
-use super::{Scheduler, Ticket};
 use crate::error::{Error, Result};
 use crate::gpu::{Buffer, Gpu, MemoryKind};
 use crate::scheduler::plan::{Buf, Class, memory};
@@ -31,7 +31,7 @@ impl Staging {
 impl Scheduler {
     /// Writes elements to a buffer, from its element `first` on; `T` may be any plain type.
     ///
-    /// Waits for what still uses the buffer. The frame counts for Slot and Report buffers only. For a scratch buffer, the
+    /// Waits for what still uses the buffer. The frame counts for PerFrame and Report buffers only. For a scratch buffer, the
     /// list that was prepared or submitted last is meant, and it must have been planned without aliasing.
     pub fn upload<T: Pod>(&mut self, buf: Buf, frame: usize, first: u64, data: &[T]) -> Result<()> {
         let data: &[u8] = bytemuck::cast_slice(data);
@@ -65,7 +65,7 @@ impl Scheduler {
 
     /// Reads `count` values from a buffer, from its element `first` on; `T` may be any plain type.
     ///
-    /// Waits for what still writes the buffer. The frame counts for Slot and Report buffers only. For a scratch buffer,
+    /// Waits for what still writes the buffer. The frame counts for PerFrame and Report buffers only. For a scratch buffer,
     /// the list that was prepared or submitted last is meant; fails if later passes of the list reused its bytes.
     pub fn download<T: Pod>(&mut self, buf: Buf, frame: usize, first: u64, count: usize) -> Result<Vec<T>> {
         let mut values = vec![T::zeroed(); count];
@@ -149,7 +149,7 @@ impl Scheduler {
 
     /// Byte offset of an element, if the range lies in the buffer.
     fn range(&self, buf: Buf, frame: usize, first: u64, bytes: u64) -> Result<u64> {
-        self.check_slot(frame)?;
+        self.check_frame(frame)?;
         let (decl, all) = (self.decl(buf)?, self.bytes(buf)?);
         let start = first
             .checked_mul(u64::from(decl.element_bytes))
@@ -188,11 +188,6 @@ impl Scheduler {
                 )))
             }
         }
-    }
-
-    /// The ticket of the last submit.
-    pub fn last_ticket(&self) -> Ticket {
-        Ticket(self.submitted)
     }
 }
 

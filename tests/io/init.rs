@@ -2,8 +2,8 @@
 
 use glam::{DMat3, DVec3};
 use labelgs::io::initial_gaussians;
-use labelgs::scene::gaussians::SH_C0;
 use labelgs::scene::{Camera, Dataset, Photo, Point, View};
+use labelgs::shaders::constants::exact::SH_C0;
 
 fn point(x: f64, y: f64, z: f64) -> Point {
     Point { position: DVec3::new(x, y, z), colour: [255, 0, 51] }

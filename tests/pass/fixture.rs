@@ -55,7 +55,7 @@ impl Fixture {
         Self { inner, _turn: turn }
     }
 
-    /// The device's sorted pairs: keys and slots.
+    /// The device's sorted pairs: keys, and places before the sort.
     pub fn sorted_pairs(&mut self, count: usize) -> (Vec<u32>, Vec<u32>) {
         self.inner.sorted_pairs(count).expect("the pairs can be read")
     }

@@ -22,7 +22,7 @@ fn memory_is_what_was_predicted() {
     let Some(gpu) = device() else { return };
     let mut list = PassList::new("toy");
     list.fill(A, 5).pass(scaled(A, B, 3, 1, 5000)).copy(B, REPORT, 0);
-    let (limits, capacity) = (labelgs::scheduler::limits_of(&gpu), pixels(5000));
+    let (limits, capacity) = (gpu.limits().plan, pixels(5000));
     let predicted = Scheduler::predict(TABLE, &capacity, std::slice::from_ref(&list), &limits).unwrap();
     let mut scheduler = Scheduler::new(gpu.gpu(), TABLE, capacity, SchedulerOptions::default()).unwrap();
     scheduler.prepare(&list).unwrap();

@@ -50,7 +50,14 @@ fn emit_constants(out: &mut String, constants: &[Constant]) {
         put!(out, "    /// {doc}\n    ///\n    /// GLSL: `{}`.", constant.expression);
         put!(out, "    pub const {}: {rust} = {value};", constant.name);
     }
-    put!(out, "}}");
+    put!(out, "\n    /// Those that are written as a decimal number, with all its digits.\n    pub mod exact {{");
+    for constant in constants.iter().filter(|constant| constant.glsl_type == "float") {
+        if let Ok(value) = constant.expression.parse::<f64>() {
+            put!(out, "        /// GLSL: `{}`.", constant.expression);
+            put!(out, "        pub const {}: f64 = {value:?};", constant.name);
+        }
+    }
+    put!(out, "    }}\n}}");
 }
 
 fn emit_structs(out: &mut String, shaders: &[Shader]) {

@@ -6,9 +6,9 @@ mod sweep;
 mod texel;
 
 use crate::error::{Error, Result};
-use crate::scene::gaussians::SH_C0;
 use crate::scene::origin::far_origin;
 use crate::scene::{Dataset, Gaussians, Point};
+use crate::shaders::constants::exact::SH_C0;
 use kiddo::{ImmutableKdTree, SquaredEuclidean};
 use rayon::prelude::*;
 use std::num::NonZero;

@@ -1,8 +1,8 @@
 //! Places of buffers: Step buffers share pages by first fit, all others have memory of their own.
 
+use super::Limits;
 use super::buffers::{Buf, BufferDecl, Class};
 use super::lifetime::Life;
-use super::limits::Limits;
 use super::memory::Size;
 use super::{GUARD_BYTES, Page, Placement, PlanOptions};
 use crate::error::{Error, Result};

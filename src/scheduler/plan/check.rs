@@ -1,8 +1,8 @@
 //! Checks of a pass list against the shaders' interfaces and the device's limits, before anything is planned.
 
+use super::Limits;
 use super::buffers::{Buf, BufferDecl};
 use super::capacity::Domain;
-use super::limits::Limits;
 use super::memory::Size;
 use super::name;
 use super::pass::{Grid, PassDecl, PassList, Work};

@@ -1,8 +1,8 @@
 //! Sizes of buffers, and the memory that pass lists need, predicted before anything is allocated.
 
+use super::Limits;
 use super::buffers::{BufferDecl, Class};
 use super::capacity::Capacity;
-use super::limits::Limits;
 use super::pass::PassList;
 use super::{GUARD_BYTES, Plan, PlanOptions};
 use crate::error::{Error, Result};

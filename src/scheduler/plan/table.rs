@@ -63,12 +63,12 @@ crate::buffers! {
     SORT_HISTOGRAM "sort_histogram": 4, Domain::SortCells, Class::Step, WORD, "Counts by digit and lane.";
     SPLATS "splats": 48, Domain::Gaussians, Class::Step, VEC4, "Projected Gaussians in depth order [V,3 vec4] (glsl/include/record.glsl).";
     TILES_TOUCHED "tiles_touched": 4, Domain::Gaussians, Class::Step, WORD, "Tiles of each splat over all layers [V].";
-    INSTANCE_OFFSETS "instance_offsets": 4, Domain::Gaussians, Class::Step, WORD, "First slot of each splat [V].";
+    INSTANCE_OFFSETS "instance_offsets": 4, Domain::Gaussians, Class::Step, WORD, "First instance of each splat [V].";
     TILE_KEYS_A "tile_keys_a": 4, Domain::Instances, Class::Step, WORD, "Layer and tile of each pair [I].";
     TILE_KEYS_B "tile_keys_b": 4, Domain::Instances, Class::Step, WORD, "The same between two passes of the sort [I].";
-    TILE_VALUES_A "tile_values_a": 4, Domain::Instances, Class::Step, WORD, "Slot of each pair during the sort [I].";
-    TILE_VALUES_B "tile_values_b": 4, Domain::Instances, Class::Step, WORD, "Slot of each pair during the sort [I].";
-    SPLAT_FROM_INSTANCE "splat_from_instance": 4, Domain::Instances, Class::Step, WORD, "Splat of each slot [I].";
+    TILE_VALUES_A "tile_values_a": 4, Domain::Instances, Class::Step, WORD, "Instance of each pair during the sort [I].";
+    TILE_VALUES_B "tile_values_b": 4, Domain::Instances, Class::Step, WORD, "Instance of each pair during the sort [I].";
+    SPLAT_FROM_INSTANCE "splat_from_instance": 4, Domain::Instances, Class::Step, WORD, "Splat of each pair [I], numbered as before the sort.";
     TILE_STARTS "tile_starts": 4, Domain::VirtualTiles, Class::Step, WORD, "First sorted pair of each tile of each layer.";
     TILE_ENDS "tile_ends": 4, Domain::VirtualTiles, Class::Step, WORD, "One past the last.";
     LAYER_OCCUPIED "layer_occupied": 4, Domain::VirtualTiles, Class::Step, WORD, "1 where an object layer's tile holds a splat.";

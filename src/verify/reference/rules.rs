@@ -1,4 +1,7 @@
 //! Every constant of the method, as the f32 value that the engine uses, widened to f64.
+//!
+//! They are typed here once more, so that a slip in the shaders' constants is no slip of the mirrors too; the test below
+//! compares the two.
 
 /// Constants of all passes.
 #[derive(Clone, Debug, PartialEq)]
@@ -190,4 +193,41 @@ pub fn mutants() -> Vec<Mutant> {
         Mutant { name, family, rules }
     };
     changes.into_iter().chain([lift]).map(changed).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Rules;
+    use crate::shaders::constants as glsl;
+
+    #[test]
+    fn the_rules_are_the_constants_of_the_shaders() {
+        let r = Rules::default();
+        let [c20, c22, c24] = [glsl::SH_C2_0, glsl::SH_C2_2, glsl::SH_C2_4];
+        let [c30, c31, c32, c33, c35] = [glsl::SH_C3_0, glsl::SH_C3_1, glsl::SH_C3_2, glsl::SH_C3_3, glsl::SH_C3_5];
+        let single = [
+            (r.near, glsl::NEAR),
+            (r.dilation, glsl::COV2D_BLUR),
+            (r.jacobian_margin, glsl::JACOBIAN_MARGIN),
+            (r.alpha_min, glsl::ALPHA_MIN),
+            (r.alpha_max, glsl::ALPHA_MAX),
+            (r.transmittance_min, glsl::TRANSMITTANCE_MIN),
+            (r.exponent_min(), glsl::LOG2_ALPHA_MIN),
+            (r.colour_bias, glsl::COLOUR_BIAS),
+            (r.sh_c0, glsl::SH_C0),
+            (r.sh_c1, glsl::SH_C1),
+            (r.ssim_c1, glsl::SSIM_C1),
+            (r.ssim_c2, glsl::SSIM_C2),
+            (r.adam_beta1, glsl::ADAM_BETA1),
+            (r.adam_beta2, glsl::ADAM_BETA2),
+            (r.adam_eps, glsl::ADAM_EPSILON),
+            (r.split_shrink.ln(), glsl::SPLIT_SHRINK),
+            ((r.reset_opacity / (1.0 - r.reset_opacity)).ln(), glsl::OPACITY_RESET_LOGIT),
+        ];
+        let degree_2 = r.sh_c2.into_iter().zip([c20, -c20, c22, -c20, c24]);
+        let degree_3 = r.sh_c3.into_iter().zip([-c30, c31, -c32, c33, -c32, c35, -c30]);
+        for (rule, constant) in single.into_iter().chain(degree_2).chain(degree_3) {
+            assert!((rule / f64::from(constant) - 1.0).abs() < 2e-7, "{rule} for {constant}");
+        }
+    }
 }

@@ -147,7 +147,7 @@ impl Fixture {
         ListKey::Train(Variant { labels, lift, sh_degree: self.config.sh_degree, size, update, counts: false })
     }
 
-    /// The device's sorted pairs: keys and slots.
+    /// The device's sorted pairs: keys, and places before the sort.
     pub fn sorted_pairs(&mut self, count: usize) -> Result<(Vec<u32>, Vec<u32>)> {
         let virtual_tiles = self.engine.raw().capacity().virtual_tiles;
         let bits = 64 - (virtual_tiles - 1).leading_zeros();
@@ -163,8 +163,11 @@ impl Fixture {
     /// The splats of the sorted (splat, tile) pairs.
     pub fn sorted_splats(&mut self, count: usize) -> Result<Vec<u32>> {
         let splat_from_instance = self.get::<u32>(Buf::SPLAT_FROM_INSTANCE, count)?;
-        let slots = self.sorted_pairs(count)?.1;
-        Ok(slots.into_iter().map(|slot| splat_from_instance.get(slot as usize).copied().unwrap_or(u32::MAX)).collect())
+        let places = self.sorted_pairs(count)?.1;
+        Ok(places
+            .into_iter()
+            .map(|place| splat_from_instance.get(place as usize).copied().unwrap_or(u32::MAX))
+            .collect())
     }
 
     /// Runs a training step; no pass may write outside of its buffers.

@@ -6,8 +6,8 @@
 #include "blend_tile.glsl"
 // feature_backward — gradient of 4 VECS channels by the features, one record per (splat, tile) pair.
 // Work:    one subgroup (= workgroup) a tile of the scene. Front to back: weights do not depend on what is behind.
-// Reads:   step; tile_starts [T]; slots, splat_from_instance [I]; splats [V,3]; last [P]; v_features_image [P,VECS]
-// Writes:  v_feature_instances [I,VECS] at the pair's slot; a record counts where blend_backward left the step's stamp
+// Reads:   step; tile_starts [T]; instance_from_sorted, splat_from_instance [I]; splats [V,3]; last [P]; v_features_image [P,VECS]
+// Writes:  v_feature_instances [I,VECS] by instance; a record counts where blend_backward left the step's stamp
 // Math:    v_f = sum over pixels of w (F - target). The way to alpha and so to the geometry is left out.
 // Order:   fixed, bitwise reproducible.
 // Mirror:  tools/bench/features/check.rs
@@ -15,7 +15,7 @@
 layout(constant_id = 10) const uint VECS = 1;
 READ1(0, StepUniforms, step);
 FETCHU(1, tile_starts);
-FETCHU(2, slots);
+FETCHU(2, instance_from_sorted);
 FETCHU(3, splat_from_instance);
 FETCH4(4, splats);
 FETCHU(5, last);
@@ -29,7 +29,7 @@ void main() {
         return;
     }
     uint tile = interleave(group, u.tile_count);
-    TileJob t = locate(tile, tile, 0u, u);
+    TileJob t = locate(tile, 0u, u);
     uint lane = gl_LocalInvocationID.x;
     uint list_start = fetchu(tile_starts, tile);
     vec2 corner = vec2(float(t.x - (lane % TILE_WIDTH)), float((t.tile / u.tiles_x) * TILE_HEIGHT));
@@ -50,8 +50,8 @@ void main() {
     deepest = subgroup_max(deepest);
     for (uint base = 0u; base < deepest; base += SUBGROUP_SIZE) {
         uint count = min(SUBGROUP_SIZE, deepest - base);
-        uint slot = fetchu(slots, list_start + min(base + lane, deepest - 1u));
-        uint index = fetchu(splat_from_instance, slot);
+        uint instance = fetchu(instance_from_sorted, list_start + min(base + lane, deepest - 1u));
+        uint index = fetchu(splat_from_instance, instance);
         vec4 r0 = fetch4(splats, 3u * index), r1 = fetch4(splats, 3u * index + 1u);
         vec4 own[VECS];
         [[unroll]] for (uint v = 0u; v < VECS; v++) {
@@ -88,7 +88,7 @@ void main() {
         }
         if (lane < count) {
             [[unroll]] for (uint v = 0u; v < VECS; v++) {
-                v_feature_instances[slot * VECS + v] = own[v];
+                v_feature_instances[instance * VECS + v] = own[v];
             }
         }
     }

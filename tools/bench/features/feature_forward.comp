@@ -6,7 +6,7 @@
 #include "blend_tile.glsl"
 // feature_forward — blend 4 VECS channels of a feature per Gaussian over one tile, and the gradient of a simple loss.
 // Work:    one subgroup (= workgroup) a tile of the scene, as blend_forward.
-// Reads:   step; tile_starts [T]; slots, splat_from_instance [I]; splats [V,3]; last [P]; gaussian_from_splat [V];
+// Reads:   step; tile_starts [T]; instance_from_sorted, splat_from_instance [I]; splats [V,3]; last [P]; gaussian_from_splat [V];
 //          features [N,stride]
 // Writes:  v_features_image [P,VECS]: F - target
 // Math:    F = sum w f over the splats that blend_forward found to count; loss (F - target)^2 / 2, target by `wanted`.
@@ -17,7 +17,7 @@ layout(constant_id = 20) const uint CHUNK = 0; // first vec4 of the channels
 layout(constant_id = 21) const uint STRIDE = 1; // vec4 a Gaussian
 READ1(0, StepUniforms, step);
 FETCHU(1, tile_starts);
-FETCHU(2, slots);
+FETCHU(2, instance_from_sorted);
 FETCHU(3, splat_from_instance);
 FETCH4(4, splats);
 FETCHU(5, last);
@@ -38,7 +38,7 @@ void main() {
         return;
     }
     uint tile = interleave(group, u.tile_count);
-    TileJob t = locate(tile, tile, 0u, u);
+    TileJob t = locate(tile, 0u, u);
     uint lane = gl_LocalInvocationID.x;
     uint list_start = fetchu(tile_starts, tile);
     vec2 corner = vec2(float(t.x - (lane % TILE_WIDTH)), float((t.tile / u.tiles_x) * TILE_HEIGHT));
@@ -58,7 +58,7 @@ void main() {
     deepest = subgroup_max(deepest);
     for (uint base = 0u; base < deepest; base += SUBGROUP_SIZE) {
         uint count = min(SUBGROUP_SIZE, deepest - base);
-        uint index = fetchu(splat_from_instance, fetchu(slots, list_start + min(base + lane, deepest - 1u)));
+        uint index = fetchu(splat_from_instance, fetchu(instance_from_sorted, list_start + min(base + lane, deepest - 1u)));
         uint gaussian = fetchu(gaussian_from_splat, index);
         vec4 r0 = fetch4(splats, 3u * index), r1 = fetch4(splats, 3u * index + 1u);
         vec4 mine[VECS];

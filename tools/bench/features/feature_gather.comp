@@ -3,7 +3,7 @@
 #include "constants.glsl"
 #include "step.glsl"
 #include "dispatch.glsl"
-// feature_gather — add up the feature records of each splat, in slot order, as gather does.
+// feature_gather — add up the feature records of each splat, in instance order, as gather does.
 // Work:    64 splats a workgroup.
 // Reads:   step, counters; tiles_touched, instance_offsets [V]; v_instances_c [I] (stamps);
 //          v_feature_instances [I,VECS]

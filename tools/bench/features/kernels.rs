@@ -93,14 +93,20 @@ pub fn step_with_features(
     let is = |work: &Work, wanted: &str| matches!(work, Work::Pass(pass) if pass.shader.stem.starts_with(wanted));
     let at = list.work.iter().rposition(|work| is(work, "blend_backward")).ok_or_else(missing)?;
     let Work::Pass(backward) = &list.work[at] else { return Err(missing()) };
-    let bound = backward.shader.bindings.iter().position(|binding| binding.name == "slots").ok_or_else(missing)?;
-    let slots = backward.buffers[bound];
+    let bound = backward
+        .shader
+        .bindings
+        .iter()
+        .position(|binding| binding.name == "instance_from_sorted")
+        .ok_or_else(missing)?;
+    let instance_from_sorted = backward.buffers[bound];
     let grid = |word: u32| Grid::Indirect(Buf::DISPATCH_ARGS, word * 4);
     let mut walks = Vec::new();
     for chunk in channels.chunks() {
         let walk = vec![channels.vecs, chunk, channels.stride()];
         let tile = [&[shape.subgroup, shape.tile_width, shape.tile_height], &walk[..]].concat();
-        let lists = [Buf::STEP, Buf::TILE_STARTS, slots, Buf::SPLAT_FROM_INSTANCE, Buf::SPLATS, Buf::LAST];
+        let lists =
+            [Buf::STEP, Buf::TILE_STARTS, instance_from_sorted, Buf::SPLAT_FROM_INSTANCE, Buf::SPLATS, Buf::LAST];
         let forward = [&lists[..], &[Buf::DEPTH_VALUES_A, buffers.features, buffers.v_image]].concat();
         let backward = [&lists[..], &[buffers.v_image, buffers.v_instances]].concat();
         let gather = vec![
