@@ -6,7 +6,8 @@
 use crate::reference::blend::{Upstream, blend_backward, blend_forward, centre, trace};
 use crate::reference::loss::{label_loss, photo_loss};
 use crate::reference::model::ROW_FLOATS;
-use crate::reference::project::{Splat, SplatGradient, project_backward, project_forward};
+use crate::reference::project::{project_backward, project_forward};
+use crate::reference::splat::{Splat, SplatGradient};
 use crate::reference::step::{splats_of, step};
 use crate::reference::{Model, Row, Rules, project, sh};
 use crate::support::compare::{Tolerance, check, close};

@@ -3,9 +3,10 @@
 use crate::reference::adam::{Optimised, Rates, adam, falling_rate};
 use crate::reference::blend::{blend_forward, centre, shade, trace};
 use crate::reference::loss::{Photo, blur, photo_loss, ssim, ssim_backward, window};
-use crate::reference::project::{Splat, normalised, project_all, project_forward, rotation};
+use crate::reference::project::{normalised, project_all, project_forward, rotation};
 use crate::reference::scan::{compact, exclusive_scan};
 use crate::reference::sort::{depth_sort, radix_sort};
+use crate::reference::splat::Splat;
 use crate::reference::step::splats_of;
 use crate::reference::tile::{
     TileGrid, counted_tiles, cull, emit_instances, exponent, tile_lengths, tile_ranges, tiles_within, touched_tiles,

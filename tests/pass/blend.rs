@@ -3,7 +3,7 @@
 use super::fixture::{Fixture, prove};
 use crate::reference::blend::{self, Upstream, blend_backward, blend_forward, blend_layers_forward};
 use crate::reference::loss::label_loss;
-use crate::reference::project::Splat;
+use crate::reference::splat::Splat;
 use crate::reference::{Rules, tile};
 use crate::support::compare::{Band, GradientBounds, Tolerance, close, exact};
 use crate::support::device;

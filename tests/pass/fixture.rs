@@ -1,7 +1,7 @@
 //! The fixture of the self-test on the tests' device; what goes wrong ends the test.
 
-use crate::reference::project::{Splat, SplatGradient};
 use crate::reference::rules::mutants;
+use crate::reference::splat::{Splat, SplatGradient};
 use crate::reference::{Row, Rules};
 use crate::support::compare::{Verdict, check};
 use crate::support::device::Turn;

@@ -2,9 +2,10 @@
 
 use super::fixture::{Fixture, GRADIENTS, prove};
 use crate::reference::model::ROW_FLOATS;
-use crate::reference::project::{Splat, SplatGradient, near_margin, project_backward, project_forward, sigmoid};
+use crate::reference::project::{near_margin, project_backward, project_forward, sigmoid};
 use crate::reference::scan::compact;
 use crate::reference::sort::radix_sort;
+use crate::reference::splat::{Splat, SplatGradient};
 use crate::reference::{Rules, tile};
 use crate::support::compare::{GradientBounds, Tolerance, check, close, exact};
 use crate::support::device;

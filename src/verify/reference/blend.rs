@@ -1,7 +1,7 @@
 //! Front-to-back blending of splats at pixels, its gradient, and the object layers.
 
 use super::Rules;
-use super::project::{Splat, SplatGradient};
+use super::splat::{Splat, SplatGradient};
 use super::tile::exponent;
 
 /// Distances to the nearest decision that would have gone the other way.

@@ -2,7 +2,7 @@
 
 use super::Rules;
 use super::blend::{Blended, centre, trace};
-use super::project::Splat;
+use super::splat::Splat;
 
 /// What one view votes.
 #[derive(Clone, Debug, Default, PartialEq)]

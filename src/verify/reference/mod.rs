@@ -16,6 +16,7 @@ pub mod rules;
 pub mod scan;
 pub mod sh;
 pub mod sort;
+pub mod splat;
 pub mod step;
 pub mod tile;
 

@@ -2,7 +2,8 @@
 
 use super::blend::{self, Blended, Upstream};
 use super::loss::{self, Loss, ObjectPixel, Photo};
-use super::project::{self, Projection, Splat, SplatGradient};
+use super::project::{self, Projection};
+use super::splat::{Splat, SplatGradient};
 use super::{Model, Row, Rules};
 use crate::scene::Camera;
 

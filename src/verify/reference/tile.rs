@@ -1,7 +1,7 @@
 //! Which tiles a splat counts in: by every pixel, and by the continuous test over the rectangle of pixel centres.
 
 use super::Rules;
-use super::project::Splat;
+use super::splat::Splat;
 
 /// log2 of alpha before the clamp at a position, px.
 pub fn exponent(splat: &Splat, at: [f64; 2]) -> f64 {

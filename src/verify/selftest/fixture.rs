@@ -14,7 +14,7 @@ use crate::train::step_input::{self, SceneScale, StepInput, TrainView};
 use crate::train::{LabelRule, TrainConfig};
 use crate::verify::reference::loss::ObjectPixel;
 use crate::verify::reference::model::ROW_FLOATS;
-use crate::verify::reference::project::{Splat, SplatGradient};
+use crate::verify::reference::splat::{Splat, SplatGradient};
 use crate::verify::reference::{Model, Row};
 use bytemuck::Pod;
 use std::f64::consts::LN_2;

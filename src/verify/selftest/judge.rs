@@ -6,7 +6,7 @@ use super::compare::{
 use crate::verify::reference::adam::{Optimised, Rates};
 use crate::verify::reference::blend::Blended;
 use crate::verify::reference::model::flatten;
-use crate::verify::reference::project::{Splat, SplatGradient};
+use crate::verify::reference::splat::{Splat, SplatGradient};
 use crate::verify::reference::{Group, Row};
 
 /// Several verdicts into one.

@@ -10,7 +10,7 @@ use labelgs::scheduler::plan::Buf;
 use labelgs::synth;
 use labelgs::verify::reference::Rules;
 use labelgs::verify::reference::blend::{Trace, smallest_over_pixels, trace};
-use labelgs::verify::reference::project::Splat;
+use labelgs::verify::reference::splat::Splat;
 use labelgs::verify::selftest::fixture::splat_of;
 use std::sync::Arc;
 

@@ -3,7 +3,8 @@
 
 use labelgs::verify::reference::blend::{self, Margins, Upstream};
 use labelgs::verify::reference::loss::photo_loss;
-use labelgs::verify::reference::project::{self, Splat, SplatGradient};
+use labelgs::verify::reference::project::{self};
+use labelgs::verify::reference::splat::{Splat, SplatGradient};
 use labelgs::verify::reference::{Model, Row, Rules, sort};
 use labelgs::verify::selftest::scenes::Scene;
 use rayon::prelude::*;
