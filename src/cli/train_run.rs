@@ -49,7 +49,7 @@ pub(super) fn train_once(args: &TrainArgs, context: &Context) -> Result<(serde_j
     let masks = args.masks.clone().or(run.masks.as_ref().map(PathBuf::from));
     let names = masks.as_deref().map(LabelTable::of_folder).transpose()?.flatten();
     let reading = ReadArgs { max_bad_photos: run.max_bad_photos, allow_outside: run.allow_outside };
-    let mut dataset = open_with(&args.scene, &reading.into_options(config::load_options(&config, masks.clone())))?;
+    let dataset = open_with(&args.scene, &reading.into_options(config::load_options(&config, masks.clone())))?;
     if dataset.train.is_empty() {
         return Err(Error::data(
             &args.scene,
@@ -69,8 +69,8 @@ pub(super) fn train_once(args: &TrainArgs, context: &Context) -> Result<(serde_j
     facts.extend(resumed.as_ref().map(|state| ("goes on after step", state.step.to_string())));
     let mut checkpoints = Checkpoints::new(out, lock, run.clone(), resumed.as_ref())?;
     let mut trainer = match resumed {
-        Some(state) => Trainer::resume(gpu, &mut dataset, state, options)?,
-        None => start(gpu, &config, &mut dataset, occluders.as_ref(), options)?,
+        Some(state) => Trainer::resume(gpu, &dataset, state, options)?,
+        None => start(gpu, &config, &dataset, occluders.as_ref(), options)?,
     };
     // The near plane is known now.
     let config = trainer.config().clone();
@@ -273,7 +273,7 @@ fn prepare_output(out: &Path, config: &TrainConfig) -> Result<()> {
 fn start(
     gpu: Arc<Gpu>,
     config: &TrainConfig,
-    dataset: &mut Dataset,
+    dataset: &Dataset,
     occluders: Option<&OcclusionTable>,
     options: SchedulerOptions,
 ) -> Result<Trainer> {
