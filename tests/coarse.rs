@@ -12,11 +12,11 @@ const SCENE: SynthOptions =
     SynthOptions { preset: Preset::Simple, width: 96, height: 72, views: 6, points: 200, seed: 1 };
 const COARSE: u32 = 6;
 
-fn steps(gpu: &Arc<labelgs::gpu::Gpu>, mut data: Dataset, coarse_until: u32) -> Vec<StepReport> {
+fn steps(gpu: &Arc<labelgs::gpu::Gpu>, data: Dataset, coarse_until: u32) -> Vec<StepReport> {
     let config = TrainConfig { iterations: 100, label_from: 3, coarse_until, ..TrainConfig::default() };
     let model = init::initial_gaussians(&dataset(&SCENE, 0), 0, 100).expect("a model");
     let mut trainer =
-        Trainer::new(Arc::clone(gpu), config, &mut data, &model, SchedulerOptions::default()).expect("a trainer");
+        Trainer::new(Arc::clone(gpu), config, &data, &model, SchedulerOptions::default()).expect("a trainer");
     let mut reports = Vec::new();
     for _ in 0..COARSE + 4 {
         reports.extend(trainer.step().expect("a step"));
@@ -45,7 +45,7 @@ fn coarse_steps_are_those_of_a_smaller_scene() {
     let mut small = dataset(&SCENE, 0);
     for view in &mut small.train {
         view.camera = view.camera.resized(48, 36);
-        view.photo = view.photo.as_ref().map(half);
+        view.photo = view.photo.as_deref().map(|photo| half(photo).into());
         view.mask = None;
     }
     let (coarse, small) = (steps(&gpu.gpu(), dataset(&SCENE, 0), COARSE), steps(&gpu.gpu(), small, 0));

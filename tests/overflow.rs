@@ -13,14 +13,14 @@ const SCENE: SynthOptions =
 /// The model after a few steps with labels, in memory that has room for `room` Gaussians from the start; and whether
 /// the pairs of splat and tile had to grow.
 fn trained(gpu: &std::sync::Arc<labelgs::gpu::Gpu>, room: u64) -> (Gaussians, bool) {
-    let mut data = dataset(&SCENE, 0);
+    let data = dataset(&SCENE, 0);
     let config = TrainConfig { iterations: 100, label_from: 3, ..TrainConfig::default() };
     let mut model = init::initial_gaussians(&data, 0, 100).expect("a model");
     // Large and opaque: many tiles each, and labels at once.
     model.scales.iter_mut().flatten().for_each(|scale| *scale = -1.2);
     model.opacities.iter_mut().for_each(|logit| *logit = 2.0);
-    let mut trainer = Trainer::new(std::sync::Arc::clone(gpu), config, &mut data, &model, SchedulerOptions::default())
-        .expect("trainer");
+    let mut trainer =
+        Trainer::new(std::sync::Arc::clone(gpu), config, &data, &model, SchedulerOptions::default()).expect("trainer");
     trainer.engine_mut().make_room_for_gaussians(room).expect("room");
     let before = trainer.engine_mut().raw().capacity().instances;
     for _ in 0..6 {

@@ -94,9 +94,8 @@ fn segments_change_nothing() {
     let config = TrainConfig { iterations: 20, label_from: 5, ..TrainConfig::default() };
     let run = |segment_length: u32| {
         let shape = KernelShape { segment_length, ..KernelShape::of(gpu.capabilities()) };
-        let mut dataset = dataset.clone();
         let options = TrainerOptions { shape: Some(shape), ..TrainerOptions::default() };
-        let mut trainer = Trainer::new(gpu.clone(), config.clone(), &mut dataset, &start, options).expect("trainer");
+        let mut trainer = Trainer::new(gpu.clone(), config.clone(), &dataset, &start, options).expect("trainer");
         for _ in 0..config.iterations {
             trainer.step().expect("step");
         }

@@ -90,11 +90,11 @@ fn the_pass_that_finds_a_broken_parameter_is_counted_by_itself() {
 fn a_state_with_a_number_that_is_none_is_no_checkpoint() {
     let Some(turn) = device() else { return };
     let options = SynthOptions { preset: Preset::Simple, width: 48, height: 36, views: 4, points: 300, seed: 3 };
-    let mut dataset = dataset(&options, 0);
+    let dataset = dataset(&options, 0);
     let model = initial_gaussians(&dataset, 0, 300).expect("points");
     let config = TrainConfig { iterations: 20, ..TrainConfig::default() };
     let mut trainer =
-        Trainer::new(turn.gpu(), config, &mut dataset, &model, SchedulerOptions::default()).expect("it starts");
+        Trainer::new(turn.gpu(), config, &dataset, &model, SchedulerOptions::default()).expect("it starts");
     trainer.step().expect("a step");
     let sound = trainer.state().expect("a state");
     for buf in [Buf::QUATS, Buf::M_SH0, Buf::U_MEANS, Buf::DENSIFY_STATS] {
@@ -113,13 +113,13 @@ fn a_training_that_drops_gradients_all_the_time_ends() {
     let Some(turn) = device() else { return };
     let run = |broken: usize| -> Result<u32, Error> {
         let options = SynthOptions { preset: Preset::Simple, width: 48, height: 36, views: 4, points: 300, seed: 3 };
-        let mut dataset = dataset(&options, 0);
+        let dataset = dataset(&options, 0);
         let mut model = initial_gaussians(&dataset, 0, 300).expect("points");
         // Spheres have no gradient of rotations.
         model.scales.iter_mut().for_each(|scale| scale[0] += 0.5);
         (0..broken).for_each(|row| model.quats[row] = [1e-25, 2e-25, 0.0, 1e-25]);
         let config = TrainConfig { iterations: 20, ..TrainConfig::default() };
-        let mut trainer = Trainer::new(turn.gpu(), config, &mut dataset, &model, SchedulerOptions::default())?;
+        let mut trainer = Trainer::new(turn.gpu(), config, &dataset, &model, SchedulerOptions::default())?;
         (0..20).try_for_each(|_| trainer.step().map(drop))?;
         trainer.drain()?;
         Ok(trainer.steps_done())

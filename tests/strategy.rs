@@ -93,7 +93,7 @@ fn start() -> Gaussians {
 }
 
 fn fresh(turn: &Turn, options: impl Into<TrainerOptions>) -> Trainer {
-    Trainer::new(turn.gpu(), settings(), &mut small(), &start(), options).expect("a trainer")
+    Trainer::new(turn.gpu(), settings(), &small(), &start(), options).expect("a trainer")
 }
 
 fn go_on(trainer: &mut Trainer, until: u32) -> TrainState {
@@ -133,12 +133,12 @@ fn a_strategy_goes_on_from_a_checkpoint_of_its_own() {
     go_on(&mut trainer, 16).write(&file).expect("a file");
     let expected = go_on(&mut trainer, 30);
     let read = || TrainState::read(&file).expect("a state");
-    let mut resumed = Trainer::resume(turn.gpu(), &mut small(), read(), options()).expect("it goes on");
+    let mut resumed = Trainer::resume(turn.gpu(), &small(), read(), options()).expect("it goes on");
     let found = go_on(&mut resumed, 30);
     assert_eq!((found.gaussians, &found.strategy), (expected.gaussians, &expected.strategy));
     assert_eq!(found.strategy.value, json!(4), "rounds after 30 steps");
     assert_eq!(found.planes, expected.planes);
-    let refused = Trainer::resume(turn.gpu(), &mut small(), read(), SchedulerOptions::default());
+    let refused = Trainer::resume(turn.gpu(), &small(), read(), SchedulerOptions::default());
     let error = refused.err().expect("another strategy").to_string();
     assert!(error.contains("thinning") && error.contains("default"), "{error}");
 }
@@ -160,7 +160,7 @@ fn unseen_gaussians_move_or_rest() {
     for (options, rests) in [(options(), true), (TrainerOptions::default(), false)] {
         let mut model = start();
         model.opacities[7] = -20.0;
-        let mut trainer = Trainer::new(turn.gpu(), settings(), &mut small(), &model, options).expect("a trainer");
+        let mut trainer = Trainer::new(turn.gpu(), settings(), &small(), &model, options).expect("a trainer");
         trainer.step().expect("a step");
         trainer.drain().expect("its report");
         let before = trainer.model().expect("a model").means[7];

@@ -153,7 +153,7 @@ fn vote(
     args: &LabelArgs,
 ) -> Result<Decision> {
     let voters = views.iter().filter_map(|view| {
-        Some(Voter { camera: &view.camera, mask: view.mask.as_ref()?, photo: view.photo.as_ref(), trust: None })
+        Some(Voter { camera: &view.camera, mask: view.mask.as_ref()?, photo: view.photo.as_deref(), trust: None })
     });
     let voters: Vec<Voter> = voters.collect();
     let judges = model.labels.as_deref().filter(|_| judge);

@@ -82,7 +82,7 @@ pub fn run(args: &ProfileArgs, context: &Context) -> Result<()> {
         return profile_compare::run([old, new], args.tolerance.into(), context.json || args.json.is_some());
     }
     let config = decide(args)?;
-    let mut dataset = open(args, &config)?;
+    let dataset = open(args, &config)?;
     let gpu = open_gpu(context)?;
     if gpu.limits().timestamp_bits == 0 {
         return Err(Error::NoDevice("this device has no timestamps on its compute queue".into()));
@@ -96,7 +96,7 @@ pub fn run(args: &ProfileArgs, context: &Context) -> Result<()> {
     };
     let plan = PlanOptions { barrier_everywhere: !args.overlap, ..PlanOptions::default() };
     let options = SchedulerOptions { plan, timestamps: true, ..SchedulerOptions::default() };
-    let mut trainer = Trainer::new(Arc::clone(&gpu), config, &mut dataset, &model, options)?;
+    let mut trainer = Trainer::new(Arc::clone(&gpu), config, &dataset, &model, options)?;
     #[cfg(feature = "lab")]
     trainer.separate_objects(args.separate_objects);
     measure(&mut trainer, args, context, &mut profile)?;

@@ -55,11 +55,11 @@ pub fn evaluate(
     for view in views {
         let rendered = render(engine, &view.camera, &of_scene)?;
         let map = labels.map(|labels| rendered.label_map(labels));
-        let score = ViewScores::new(&rendered.rgb, photo(view)?, map.as_ref(), view.mask.as_ref())?;
+        let score = ViewScores::new(&rendered.rgb, photo(view)?, map.as_ref(), view.mask.as_deref())?;
         let numbers = vec![("PSNR", Some(score.psnr)), ("SSIM", Some(score.ssim))];
         watch.see(&Compared { numbers, ..Compared::new(&view.name, photo(view)?, &rendered.rgb) })?;
         scores.push(score);
-        hidden.push(hidden_by(view.mask.as_ref(), &rendered));
+        hidden.push(hidden_by(view.mask.as_deref(), &rendered));
     }
     for id in objects(views) {
         let there = labels.filter(|labels| labels.contains(&id));
@@ -74,10 +74,10 @@ pub fn evaluate(
             };
             let alone = rendered.as_ref().map(|r| ObjectRender { colour: &r.rgb, alpha: &r.alpha });
             let (whole, picture) = (wholes.outline(id, view)?, wholes.alone(id, view)?);
-            let unknown = pixels_of(view.mask.as_ref(), hidden[index].get(&(id as u16)));
+            let unknown = pixels_of(view.mask.as_deref(), hidden[index].get(&(id as u16)));
             let truth = ObjectTruth {
                 photo: photo(view)?,
-                mask: view.mask.as_ref(),
+                mask: view.mask.as_deref(),
                 whole: whole.as_deref(),
                 hidden: unknown.as_deref(),
                 alone: picture.as_deref(),
@@ -120,12 +120,12 @@ pub fn picture_count(views: &[&View]) -> u64 {
 
 /// Objects of the views' masks, sorted.
 fn objects(views: &[&View]) -> Vec<u32> {
-    let ids = views.iter().filter_map(|view| view.mask.as_ref()).flat_map(LabelMap::objects).map(u32::from);
+    let ids = views.iter().filter_map(|view| view.mask.as_deref()).flat_map(LabelMap::objects).map(u32::from);
     ids.collect::<std::collections::BTreeSet<u32>>().into_iter().collect()
 }
 
 fn photo(view: &View) -> Result<&crate::scene::Photo> {
-    view.photo.as_ref().ok_or_else(|| Error::Bug(format!("{} came without its photo", view.name)))
+    view.photo.as_deref().ok_or_else(|| Error::Bug(format!("{} came without its photo", view.name)))
 }
 
 fn hidden_by(mask: Option<&LabelMap>, rendered: &Rendered) -> BTreeMap<u16, Vec<u16>> {

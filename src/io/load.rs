@@ -10,6 +10,7 @@ use crate::error::{Error, Result};
 use crate::scene::{Camera, Dataset, LabelMap, Photo, View};
 use rayon::prelude::*;
 use std::path::Path;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 
 /// Loads what `listing` lists.
@@ -160,7 +161,12 @@ fn load_view(
         Some(path) => Some(load_mask(&path, listed, &original, size, resampled)?),
         None => None,
     };
-    Ok(View { name: listed.name.clone(), camera: original.resized(size.0, size.1), photo, mask })
+    Ok(View {
+        name: listed.name.clone(),
+        camera: original.resized(size.0, size.1),
+        photo: photo.map(Arc::new),
+        mask: mask.map(Arc::new),
+    })
 }
 
 /// The camera at the size of the photo's file, which may be a scaled version of what the data set states.

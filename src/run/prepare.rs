@@ -105,7 +105,7 @@ pub(super) fn begin<'a>(
     gpu: Arc<Gpu>,
     observer: &'a mut dyn Observer,
 ) -> Result<Run<'a>> {
-    let Prepared { lock, settings, resumed, inputs, models, names, mut dataset, table } = prepared;
+    let Prepared { lock, settings, resumed, inputs, models, names, dataset, table } = prepared;
     let out = request.output.as_path();
     let preview = dataset.test.first().or(dataset.train.first()).cloned();
     let options = SchedulerOptions {
@@ -125,8 +125,8 @@ pub(super) fn begin<'a>(
     };
     let checkpoints = Checkpoints::new(out, lock, record, resumed.as_ref().map(|resumed| &resumed.state))?;
     let trainer = match resumed {
-        Some(resumed) => Trainer::resume(gpu, &mut dataset, resumed.state, options)?,
-        None => start(gpu, &settings.train, &mut dataset, table.as_ref(), options)?,
+        Some(resumed) => Trainer::resume(gpu, &dataset, resumed.state, options)?,
+        None => start(gpu, &settings.train, &dataset, table.as_ref(), options)?,
     };
     // The near plane is known now.
     let settings = Settings { train: trainer.config().clone(), ..settings };
@@ -155,7 +155,7 @@ fn recorded(masks: Option<&Path>) -> Option<PathBuf> {
 fn start(
     gpu: Arc<Gpu>,
     config: &TrainConfig,
-    dataset: &mut Dataset,
+    dataset: &Dataset,
     occluders: Option<&OcclusionTable>,
     options: SchedulerOptions,
 ) -> Result<Trainer> {

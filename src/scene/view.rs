@@ -4,6 +4,7 @@ use super::{Camera, LabelMap};
 use glam::DVec3;
 use std::collections::BTreeSet;
 use std::path::PathBuf;
+use std::sync::Arc;
 
 /// A decoded photo, row-major RGBA8. Alpha is 255 where the photo holds a colour and 0 where it has no source
 /// (outside the original image after undistortion); pixels with alpha 0 stay out of every loss and score.
@@ -17,7 +18,7 @@ pub struct Photo {
     pub rgba: Vec<[u8; 4]>,
 }
 
-/// One posed photo.
+/// One posed photo. Photo and mask are shared by all its copies.
 #[derive(Clone, Debug)]
 pub struct View {
     /// Name as the data set lists it, such as `00.jpg` or `left/00.jpg`.
@@ -25,9 +26,9 @@ pub struct View {
     /// Camera of the photo as it is in memory (undistorted, resized).
     pub camera: Camera,
     /// The photo; `None` if photos were not asked for.
-    pub photo: Option<Photo>,
+    pub photo: Option<Arc<Photo>>,
     /// Visible objects; `None` if no masks were asked for or this view has none.
-    pub mask: Option<LabelMap>,
+    pub mask: Option<Arc<LabelMap>>,
 }
 
 impl View {

@@ -23,6 +23,7 @@ pub use write::{Summary, write};
 
 use crate::scene::{Dataset, LabelMap, Photo, View};
 use serde::{Deserialize, Serialize};
+use std::sync::Arc;
 
 /// Which objects stand in the scene.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -77,8 +78,8 @@ pub fn dataset(options: &SynthOptions, test_every: u32) -> Dataset {
         let view = View {
             name: view_name(index),
             camera: camera.clone(),
-            photo: Some(Photo { width, height, rgba }),
-            mask: Some(LabelMap { width, height, ids }),
+            photo: Some(Arc::new(Photo { width, height, rgba })),
+            mask: Some(Arc::new(LabelMap { width, height, ids })),
         };
         let held_out = test_every > 0 && (index as u32).is_multiple_of(test_every);
         if held_out { dataset.test.push(view) } else { dataset.train.push(view) }

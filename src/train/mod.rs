@@ -81,11 +81,11 @@ pub struct Trainer {
 }
 
 impl Trainer {
-    /// Puts the initial model on the device. `dataset.train` gives its photos and masks away.
+    /// Puts the initial model on the device.
     pub fn new(
         gpu: Arc<Gpu>,
         config: TrainConfig,
-        dataset: &mut Dataset,
+        dataset: &Dataset,
         model: &Gaussians,
         options: impl Into<TrainerOptions>,
     ) -> Result<Self> {
@@ -107,17 +107,14 @@ impl Trainer {
     fn without_model(
         gpu: Arc<Gpu>,
         config: TrainConfig,
-        dataset: &mut Dataset,
+        dataset: &Dataset,
         room: EngineSize,
         TrainerOptions { shape, scheduler, strategy }: TrainerOptions,
     ) -> Result<Self> {
         let fixed = SceneScale { extent: dataset.extent() };
         let most = if config.max_gaussians > 0 { config.max_gaussians } else { u64::from(u32::MAX) };
-        let views = dataset
-            .train
-            .iter_mut()
-            .map(|view| setup::train_view(view, config.mask_border))
-            .collect::<Result<Vec<_>>>()?;
+        let views =
+            dataset.train.iter().map(|view| setup::train_view(view, config.mask_border)).collect::<Result<Vec<_>>>()?;
         let views = Views::new(views, config.coarse_until);
         let shape = shape.unwrap_or_else(|| KernelShape::of(gpu.capabilities()));
         let mut engine = Engine::with_shape(gpu, shape, room, scheduler)?;

@@ -71,12 +71,12 @@ pub fn start_room(
     }
 }
 
-/// A view as training keeps it; takes photo and mask away.
-pub(super) fn train_view(view: &mut View, border: u32) -> Result<TrainView> {
-    let photo = view.photo.take().ok_or_else(|| Error::Bug(format!("{} came without its photo", view.name)))?;
+/// A view as training keeps it.
+pub(super) fn train_view(view: &View, border: u32) -> Result<TrainView> {
+    let photo = view.photo.clone().ok_or_else(|| Error::Bug(format!("{} came without its photo", view.name)))?;
     let valid_pixels = step_input::valid_pixels(&photo);
-    let mask = view.mask.take();
-    let objects = mask.as_ref().map(LabelMap::objects).unwrap_or_default();
+    let mask = view.mask.clone();
+    let objects = mask.as_deref().map(LabelMap::objects).unwrap_or_default();
     let (name, camera) = (view.name.clone(), view.camera.clone());
     let view_labels = mask.as_ref().map(|mask| step_input::view_labels(mask, border)).unwrap_or_default();
     let shown = step_input::shown_objects(&photo, &view_labels);

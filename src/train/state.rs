@@ -150,7 +150,7 @@ impl Trainer {
     pub fn state(&mut self) -> Result<TrainState> {
         self.drain()?;
         let print = |view: &super::TrainView| {
-            ViewFingerprint::new(&view.name, &view.camera, Some(&view.photo), view.mask.as_ref())
+            ViewFingerprint::new(&view.name, &view.camera, Some(&view.photo), view.mask.as_deref())
         };
         if self.fingerprints.is_empty() {
             self.fingerprints = self.views.iter().map(print).collect();
@@ -193,18 +193,18 @@ impl Trainer {
         Ok(planes)
     }
 
-    /// Goes on where `state` stopped, to the same bits on the same device as if it had not. `dataset.train` gives its
-    /// photos and masks away; it must be what the state was made with.
+    /// Goes on where `state` stopped, to the same bits on the same device as if it had not. `dataset` must be what
+    /// the state was made with.
     pub fn resume(
         gpu: Arc<Gpu>,
-        dataset: &mut Dataset,
+        dataset: &Dataset,
         state: TrainState,
         options: impl Into<TrainerOptions>,
     ) -> Result<Self> {
         state.config.check()?;
         let views = dataset.train.iter();
         let fingerprints: Vec<ViewFingerprint> =
-            views.map(|v| ViewFingerprint::new(&v.name, &v.camera, v.photo.as_ref(), v.mask.as_ref())).collect();
+            views.map(|v| ViewFingerprint::new(&v.name, &v.camera, v.photo.as_deref(), v.mask.as_deref())).collect();
         state.check_scene(&dataset.root, &fingerprints)?;
         let (now, version) = (device(&gpu), env!("CARGO_PKG_VERSION"));
         for (then, now) in [(&state.device, now.as_str()), (&state.labelgs, version)] {

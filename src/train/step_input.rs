@@ -8,6 +8,7 @@ use crate::scene::{Camera, LabelMap, Occluders, Photo};
 use crate::shaders::constants::{ADAM_BETA1, ADAM_BETA2, LABEL_BORDER};
 use crate::shaders::structs::StepUniforms;
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 /// Largest weight of a small object beside large ones.
 const WEIGHT_MAX: f64 = 10.0;
@@ -20,11 +21,11 @@ pub struct TrainView {
     /// Camera.
     pub camera: Camera,
     /// Photo.
-    pub photo: Photo,
+    pub photo: Arc<Photo>,
     /// Pixels of the photo that count.
     pub valid_pixels: u64,
     /// Masks, if the view has any.
-    pub mask: Option<LabelMap>,
+    pub mask: Option<Arc<LabelMap>>,
     /// Objects of the mask, sorted.
     pub objects: Vec<u16>,
     /// The mask as the device reads it; empty without a mask.
@@ -44,7 +45,7 @@ impl TrainView {
             name: self.name.clone(),
             camera: self.camera.resized(width, height),
             valid_pixels: valid_pixels(&photo),
-            photo,
+            photo: Arc::new(photo),
             mask: None,
             objects: Vec::new(),
             view_labels: Vec::new(),

@@ -8,6 +8,7 @@ use labelgs::scheduler::SchedulerOptions;
 use labelgs::synth::{Preset, SynthOptions, dataset};
 use labelgs::train::{TrainConfig, Trainer};
 use std::path::Path;
+use std::sync::Arc;
 
 /// Four views of 40 x 30 px with masks.
 fn scene() -> Dataset {
@@ -16,7 +17,7 @@ fn scene() -> Dataset {
 
 /// Trains a dozen steps with labels, densification and votes; losses and model are numbers.
 #[track_caller]
-fn trains(name: &str, mut scene: Dataset) {
+fn trains(name: &str, scene: Dataset) {
     let Some(turn) = device() else { return };
     let config = TrainConfig {
         iterations: 12,
@@ -30,7 +31,7 @@ fn trains(name: &str, mut scene: Dataset) {
     };
     let start = initial_gaussians(&scene, 1, 150).unwrap_or_else(|error| panic!("{name}: {error}"));
     let options = SchedulerOptions::default();
-    let mut trainer = Trainer::new(turn.gpu(), config.clone(), &mut scene, &start, options).expect(name);
+    let mut trainer = Trainer::new(turn.gpu(), config.clone(), &scene, &start, options).expect(name);
     let mut reports = Vec::new();
     for _ in 0..config.iterations {
         reports.extend(trainer.step().unwrap_or_else(|error| panic!("{name}: {error}")));
@@ -114,7 +115,7 @@ fn masks_of_every_kind_train() {
     let with = |change: &dyn Fn(usize, &mut LabelMap)| {
         let mut scene = scene();
         let masks = scene.train.iter_mut().enumerate();
-        masks.for_each(|(index, view)| change(index, view.mask.as_mut().expect("a mask")));
+        masks.for_each(|(index, view)| change(index, Arc::make_mut(view.mask.as_mut().expect("a mask"))));
         scene
     };
     trains(
@@ -141,7 +142,7 @@ fn tiny(width: u32, height: u32) -> Dataset {
         let photo = Photo { width, height, rgba: vec![[90, 120, 30, 255]; pixels] };
         let mask = LabelMap { width, height, ids: (0..pixels).map(|pixel| (pixel % 3) as u16).collect() };
         assert!(camera.cx > 0.0 && old.width > width);
-        *view = View { name: view.name.clone(), camera, photo: Some(photo), mask: Some(mask) };
+        *view = View { name: view.name.clone(), camera, photo: Some(Arc::new(photo)), mask: Some(Arc::new(mask)) };
     }
     scene
 }

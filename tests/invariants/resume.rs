@@ -12,6 +12,7 @@ use labelgs::scene::Dataset;
 use labelgs::scheduler::SchedulerOptions;
 use labelgs::train::{LabelRule, StepReport, TrainConfig, TrainState, Trainer};
 use std::path::Path;
+use std::sync::Arc;
 
 /// Densification, opacity resets, votes and looks at the occluders before and after step 30, and nothing twice alike.
 fn long(rule: LabelRule) -> TrainConfig {
@@ -45,23 +46,23 @@ fn go_on(trainer: &mut Trainer, stops: &[u32], folder: &Path) -> (Vec<u8>, Vec<u
     (std::fs::read(path).expect("the PLY"), losses)
 }
 
-fn fresh(turn: &Turn, config: TrainConfig, dataset: &mut Dataset, options: SchedulerOptions) -> Trainer {
+fn fresh(turn: &Turn, config: TrainConfig, dataset: &Dataset, options: SchedulerOptions) -> Trainer {
     let start = initial_gaussians(dataset, config.seed, 100).expect("points");
     Trainer::new(turn.gpu(), config, dataset, &start, options).expect("a trainer")
 }
 
-fn resume(turn: &Turn, file: &Path, dataset: &mut Dataset, options: SchedulerOptions) -> Result<Trainer> {
+fn resume(turn: &Turn, file: &Path, dataset: &Dataset, options: SchedulerOptions) -> Result<Trainer> {
     Trainer::resume(turn.gpu(), dataset, TrainState::read(file)?, options)
 }
 
 fn same_when_resumed(turn: &Turn, config: TrainConfig, data: fn() -> Dataset, options: SchedulerOptions) -> Vec<u8> {
     let folder = tempfile::tempdir().expect("a folder");
-    let first = go_on(&mut fresh(turn, config.clone(), &mut data(), options), &[], folder.path());
-    let stopped = go_on(&mut fresh(turn, config, &mut data(), options), &STOPS, folder.path());
+    let first = go_on(&mut fresh(turn, config.clone(), &data(), options), &[], folder.path());
+    let stopped = go_on(&mut fresh(turn, config, &data(), options), &STOPS, folder.path());
     assert!(stopped == first, "to look at the state changes nothing");
     for stop in STOPS {
         let file = folder.path().join(stop.to_string());
-        let mut trainer = resume(turn, &file, &mut data(), options).expect("it goes on");
+        let mut trainer = resume(turn, &file, &data(), options).expect("it goes on");
         let again = folder.path().join("again");
         trainer.state().expect("a state").write(&again).expect("a file");
         assert!(
@@ -105,7 +106,7 @@ fn a_training_that_memory_bounds_goes_on_to_the_same_bits() {
     let limit = Engine::predict(&turn.gpu(), &room, SchedulerOptions::default()).expect("it fits").total;
     let options = SchedulerOptions { memory_limit: Some(limit), ..SchedulerOptions::default() };
     let free = go_on(
-        &mut fresh(&turn, long(LabelRule::Votes), &mut small(), SchedulerOptions::default()),
+        &mut fresh(&turn, long(LabelRule::Votes), &small(), SchedulerOptions::default()),
         &[],
         tempfile::tempdir().expect("a folder").path(),
     );
@@ -119,12 +120,12 @@ fn another_scene_is_refused_with_what_differs() {
     let folder = tempfile::tempdir().expect("a folder");
     let options = SchedulerOptions::default();
     let config = TrainConfig { iterations: 6, ..config(LabelRule::Votes) };
-    go_on(&mut fresh(&turn, config, &mut small(), options), &[6], folder.path());
+    go_on(&mut fresh(&turn, config, &small(), options), &[6], folder.path());
     let file = folder.path().join("6");
     let refusal = |change: &dyn Fn(&mut Dataset), status: i32, parts: &[&str]| {
         let mut dataset = small();
         change(&mut dataset);
-        let error = resume(&turn, &file, &mut dataset, options).err().expect("another scene");
+        let error = resume(&turn, &file, &dataset, options).err().expect("another scene");
         let text = error.to_string();
         assert_eq!(error.exit_status(), status, "{text}");
         assert!(parts.iter().all(|part| text.contains(part)), "{text}");
@@ -133,10 +134,18 @@ fn another_scene_is_refused_with_what_differs() {
     refusal(&|dataset| drop(dataset.train.pop()), 3, &["4 training views, 5"]);
     refusal(&|dataset| dataset.train[1].name = "other.png".into(), 3, &["other.png", "in the place of"]);
     refusal(&|dataset| dataset.train[2].camera.fx += 1e-9, 3, &["another camera"]);
-    refusal(&|dataset| dataset.train[3].photo.as_mut().expect("a photo").rgba[5][1] ^= 1, 3, &["another photo"]);
-    refusal(&|dataset| dataset.train[4].mask.as_mut().expect("a mask").ids[9] ^= 1, 3, &["another mask"]);
+    refusal(
+        &|dataset| Arc::make_mut(dataset.train[3].photo.as_mut().expect("a photo")).rgba[5][1] ^= 1,
+        3,
+        &["another photo"],
+    );
+    refusal(
+        &|dataset| Arc::make_mut(dataset.train[4].mask.as_mut().expect("a mask")).ids[9] ^= 1,
+        3,
+        &["another mask"],
+    );
     refusal(&|dataset| dataset.train[4].mask = None, 3, &["another mask"]);
-    resume(&turn, &file, &mut small(), options).expect("the same scene");
+    resume(&turn, &file, &small(), options).expect("the same scene");
 }
 
 #[test]
@@ -145,14 +154,14 @@ fn a_state_that_does_not_fit_together_is_refused() {
     let folder = tempfile::tempdir().expect("a folder");
     let options = SchedulerOptions::default();
     let config = TrainConfig { iterations: 6, ..config(LabelRule::Votes) };
-    go_on(&mut fresh(&turn, config, &mut small(), options), &[6], folder.path());
+    go_on(&mut fresh(&turn, config, &small(), options), &[6], folder.path());
     let state = TrainState::read(&folder.path().join("6")).expect("it is whole");
     let path = folder.path().join("changed");
     let refusal = |change: &dyn Fn(&mut TrainState), part: &str| {
         let mut changed = state.clone();
         change(&mut changed);
         changed.write(&path).expect("a file");
-        let error = resume(&turn, &path, &mut small(), options).err().unwrap_or_else(|| panic!("{part}: accepted"));
+        let error = resume(&turn, &path, &small(), options).err().unwrap_or_else(|| panic!("{part}: accepted"));
         let text = error.to_string();
         assert_eq!(error.exit_status(), 3, "{text}");
         assert!(text.contains(part) && text.contains("changed"), "{part}: {text}");

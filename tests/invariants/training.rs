@@ -72,11 +72,11 @@ pub fn train_with(
     options: SchedulerOptions,
     mut between: impl FnMut(&mut Trainer) -> Vec<StepReport>,
 ) -> Outcome {
-    let mut dataset = small();
+    let dataset = small();
     let config = config(rule);
     let start = initial_gaussians(&dataset, config.seed, 100).expect("points");
     let has_guards = options.plan.guards;
-    let mut trainer = Trainer::new(turn.gpu(), config.clone(), &mut dataset, &start, options).expect("a trainer");
+    let mut trainer = Trainer::new(turn.gpu(), config.clone(), &dataset, &start, options).expect("a trainer");
     let bits = |reports: Vec<StepReport>| reports.into_iter().map(|r| (r.loss + r.label_loss).to_bits());
     let mut losses = Vec::new();
     for _ in 0..config.iterations {
@@ -169,7 +169,7 @@ fn a_memory_limit_bounds_the_gaussians() {
     // Less than the start needs is refused, with the number that would fit.
     let options = SchedulerOptions { memory_limit: Some(8 << 20), ..SchedulerOptions::default() };
     let first = initial_gaussians(&small(), 0, 100).expect("points");
-    let refused = Trainer::new(turn.gpu(), config(LabelRule::Votes), &mut small(), &first, options);
+    let refused = Trainer::new(turn.gpu(), config(LabelRule::Votes), &small(), &first, options);
     let error = refused.err().expect("what staging takes leaves nothing for a model");
     assert_eq!(error.exit_status(), 5, "{error}");
 }

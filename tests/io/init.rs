@@ -40,7 +40,7 @@ fn dataset(cameras: impl IntoIterator<Item = Camera>, shade: impl Fn(&Camera, DV
         let rgba =
             (0..camera.height).flat_map(|y| (0..camera.width).map(move |x| (x, y))).map(|(x, y)| texel(x, y)).collect();
         let photo = Some(Photo { width: camera.width, height: camera.height, rgba });
-        View { name: format!("{index:02}"), camera, photo, mask: None }
+        View { name: format!("{index:02}"), camera, photo: photo.map(Into::into), mask: None }
     };
     Dataset { train: cameras.into_iter().enumerate().map(view).collect(), ..Dataset::default() }
 }

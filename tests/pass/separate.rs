@@ -105,12 +105,12 @@ fn a_short_training_stays_close() {
     let Some(turn) = device() else { return };
     let options = SynthOptions { preset: Preset::Simple, width: 72, height: 52, views: 5, points: 400, seed: 3 };
     let run = |separate: bool, small: bool| -> Vec<StepReport> {
-        let mut dataset = dataset(&options, 0);
+        let dataset = dataset(&options, 0);
         let config =
             TrainConfig { iterations: 30, label_from: 5, label_rule: LabelRule::Main, ..TrainConfig::default() };
         let start = initial_gaussians(&dataset, 0, 100).expect("points");
         let mut trainer =
-            Trainer::new(turn.gpu(), config, &mut dataset, &start, SchedulerOptions::default()).expect("a trainer");
+            Trainer::new(turn.gpu(), config, &dataset, &start, SchedulerOptions::default()).expect("a trainer");
         trainer.separate_objects(separate);
         if small {
             tiny(&mut trainer);

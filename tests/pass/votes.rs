@@ -34,7 +34,7 @@ fn sums_of_weights_by_label() {
     fixture.render();
     let (splats, size, count) = (fixture.splats(), fixture.size(), fixture.scene.gaussians.len());
     let mask = mask_of(&fixture.scene);
-    let photo: Photo = fixture.view.photo.clone();
+    let photo: Photo = (*fixture.view.photo).clone();
     let camera = fixture.scene.camera.clone();
     let trust = BTreeMap::from([(3_u16, 0.25_f32), (8, 0.0)]);
     let voter = Voter { camera: &camera, mask: &mask, photo: Some(&photo), trust: Some(&trust) };

@@ -70,7 +70,7 @@ pub fn view(name: &str) -> View {
         height: side,
     };
     let photo = Photo { width: side, height: side, rgba: vec![[GREY, GREY, GREY, 255]; SIDE * SIDE] };
-    View { name: name.to_owned(), camera, photo: Some(photo), mask: None }
+    View { name: name.to_owned(), camera, photo: Some(photo.into()), mask: None }
 }
 
 /// Writes a mask that is white in some columns.

@@ -38,12 +38,12 @@ fn psnr(engine: &mut Engine, near: f32, view: &View) -> f64 {
 }
 
 /// PSNR of the first view after 150 steps, the near plane, and the model.
-fn train(gpu: &Arc<labelgs::gpu::Gpu>, mut dataset: Dataset) -> (f64, f32, Gaussians) {
+fn train(gpu: &Arc<labelgs::gpu::Gpu>, dataset: Dataset) -> (f64, f32, Gaussians) {
     let seen = dataset.train[0].clone();
     let config = TrainConfig { iterations: 150, densify_from: 40, densify_interval: 40, ..TrainConfig::default() };
     let model = initial_gaussians(&dataset, 0, 500).expect("points");
     let options = SchedulerOptions::default();
-    let mut trainer = Trainer::new(Arc::clone(gpu), config, &mut dataset, &model, options).expect("it starts");
+    let mut trainer = Trainer::new(Arc::clone(gpu), config, &dataset, &model, options).expect("it starts");
     for _ in 0..150 {
         trainer.step().expect("a step");
     }

@@ -74,11 +74,11 @@ pub fn measure(count: u32, width: u32, height: u32) -> Result<()> {
     let config = TrainConfig { iterations: 10, label_from: 1, densify_from: u32::MAX, ..TrainConfig::default() };
     let options = SchedulerOptions { poison_step: true, ..SchedulerOptions::default() };
     // A training on one Gaussian compiles what there is to compile, which is not the engine's memory.
-    let mut small = scene(1, width, height);
-    steps(&mut Trainer::new(Arc::clone(&gpu), config.clone(), &mut small.0, &small.1, options)?)?;
-    let (mut dataset, model) = scene(count, width, height);
+    let small = scene(1, width, height);
+    steps(&mut Trainer::new(Arc::clone(&gpu), config.clone(), &small.0, &small.1, options)?)?;
+    let (dataset, model) = scene(count, width, height);
     let before = resident("VmRSS:")?;
-    let mut trainer = Trainer::new(Arc::clone(&gpu), config, &mut dataset, &model, options)?;
+    let mut trainer = Trainer::new(Arc::clone(&gpu), config, &dataset, &model, options)?;
     let seconds = steps(&mut trainer)?;
     let predicted = Engine::predict(&gpu, trainer.engine_mut().room(), options)?.total;
     let measured = resident("VmRSS:")?.saturating_sub(before);
@@ -126,8 +126,12 @@ pub fn scene(count: u32, width: u32, height: u32) -> (Dataset, Gaussians) {
     let pixels = (width * height) as usize;
     let photo = Photo { width, height, rgba: vec![[90, 120, 150, 255]; pixels] };
     let ids = (0..pixels).map(|index| 1 + (index % 2) as u16).collect();
-    let view =
-        View { name: "view".to_owned(), camera, photo: Some(photo), mask: Some(LabelMap { width, height, ids }) };
+    let view = View {
+        name: "view".to_owned(),
+        camera,
+        photo: Some(photo.into()),
+        mask: Some(LabelMap { width, height, ids }.into()),
+    };
     (Dataset { train: vec![view], ..Dataset::default() }, model)
 }
 

@@ -37,18 +37,12 @@ pub struct Pace {
 
 impl Pace {
     /// A training that starts from `model`; nothing grows, and labels are on from the first step if there are masks.
-    pub fn new(
-        name: &str,
-        gpu: &Arc<Gpu>,
-        mut dataset: Dataset,
-        model: &Gaussians,
-        label_samples: u32,
-    ) -> Result<Self> {
+    pub fn new(name: &str, gpu: &Arc<Gpu>, dataset: Dataset, model: &Gaussians, label_samples: u32) -> Result<Self> {
         // Bands of colour come in as in any training.
         let sh_degree_interval = TrainConfig::default().sh_degree_interval;
         let config = TrainConfig { label_samples: label_samples.max(1), sh_degree_interval, ..timing_config() };
         let options = SchedulerOptions { timestamps: true, ..SchedulerOptions::default() };
-        let mut trainer = Trainer::new(Arc::clone(gpu), config, &mut dataset, model, options)?;
+        let mut trainer = Trainer::new(Arc::clone(gpu), config, &dataset, model, options)?;
         trainer.keep_times();
         Ok(Self {
             name: name.to_owned(),

@@ -52,6 +52,7 @@ fn by_area(gpu: &Arc<Gpu>, options: &SynthOptions, model: &Gaussians, timed: usi
     let ground =
         1 + made.train.iter().filter_map(|view| view.mask.as_ref()).flat_map(|m| m.objects()).max().unwrap_or(0);
     for mask in whole.train.iter_mut().filter_map(|view| view.mask.as_mut()) {
+        let mask = Arc::make_mut(mask);
         mask.ids.iter_mut().filter(|id| **id == 0).for_each(|id| *id = ground);
     }
     let paces = vec![
@@ -91,7 +92,7 @@ fn divided(gpu: &Arc<Gpu>, dataset: &Dataset, model: &Gaussians, objects: usize)
     let mut dataset = dataset.clone();
     for view in &mut dataset.train {
         let seen = render(&mut engine, &view.camera, &RenderOptions::of_labels(NEAR))?;
-        view.mask = Some(seen.label_map(&labels));
+        view.mask = Some(Arc::new(seen.label_map(&labels)));
     }
     Ok(dataset)
 }

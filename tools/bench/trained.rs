@@ -30,7 +30,7 @@ pub fn start(dataset: &Dataset, config: &TrainConfig) -> Result<Gaussians> {
 
 /// A trainer on a copy of the scene.
 pub fn trainer(gpu: &Arc<Gpu>, dataset: &Dataset, model: &Gaussians, config: TrainConfig) -> Result<Trainer> {
-    Trainer::new(Arc::clone(gpu), config, &mut dataset.clone(), model, SchedulerOptions::default())
+    Trainer::new(Arc::clone(gpu), config, dataset, model, SchedulerOptions::default())
 }
 
 /// One step, waited for: what it reports and what it took.

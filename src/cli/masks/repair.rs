@@ -138,7 +138,7 @@ fn repair(
 }
 
 fn voter<'a>(view: &'a View, mask: &'a LabelMap) -> Voter<'a> {
-    Voter { camera: &view.camera, mask, photo: view.photo.as_ref(), trust: None }
+    Voter { camera: &view.camera, mask, photo: view.photo.as_deref(), trust: None }
 }
 
 fn areas(views: &[&View]) -> BTreeMap<Segment, u64> {

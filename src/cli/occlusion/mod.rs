@@ -107,5 +107,5 @@ fn draw(folder: &Path, (view, stem): (&View, &str), table: &OcclusionTable) -> R
 }
 
 fn mask(view: &View) -> Result<&LabelMap> {
-    view.mask.as_ref().ok_or_else(|| Error::Bug(format!("{} came without its mask", view.name)))
+    view.mask.as_deref().ok_or_else(|| Error::Bug(format!("{} came without its mask", view.name)))
 }

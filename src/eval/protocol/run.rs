@@ -83,7 +83,7 @@ fn score_one(
     watch: &mut dyn Watch,
 ) -> Result<PairScores> {
     let mask = (bench.truth)(&truth.file, view)?;
-    let photo = view.photo.as_ref().ok_or_else(|| Error::Bug(format!("{} came without its photo", view.name)))?;
+    let photo = view.photo.as_deref().ok_or_else(|| Error::Bug(format!("{} came without its photo", view.name)))?;
     let photo = photo_at(photo, mask.width, mask.height);
     let drawn = painter.draw(labels, &view.camera.resized(mask.width, mask.height))?;
     let scores = score(&drawn, &mask, &photo, bench.compat, bench.lpips)?;

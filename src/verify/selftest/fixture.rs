@@ -85,10 +85,10 @@ pub fn train_view(scene: &Scene) -> TrainView {
         name: "the view".to_owned(),
         shown: step_input::shown_objects(&photo, &target.label_map),
         view_labels: target.label_map.clone(),
-        photo,
+        photo: Arc::new(photo),
         valid_pixels: target.photo.valid.iter().filter(|&&valid| valid).count() as u64,
         objects: mask.objects(),
-        mask: Some(mask),
+        mask: Some(Arc::new(mask)),
         occluders: target.slots.iter().map(occluders).collect(),
         camera,
     }

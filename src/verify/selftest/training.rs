@@ -34,7 +34,7 @@ pub fn twice(gpu: &Arc<Gpu>, kernels: KernelShape) -> Result<Verdict> {
 /// The model, and the mean loss of the first and of the last ten steps.
 fn train(gpu: &Arc<Gpu>, kernels: KernelShape) -> Result<(Gaussians, [f64; 2])> {
     let options = SynthOptions { preset: Preset::Simple, width: 72, height: 52, views: 6, points: 400, seed: 3 };
-    let mut dataset = synth::dataset(&options, 0);
+    let dataset = synth::dataset(&options, 0);
     let config = TrainConfig {
         iterations: STEPS,
         label_from: 10,
@@ -47,7 +47,7 @@ fn train(gpu: &Arc<Gpu>, kernels: KernelShape) -> Result<(Gaussians, [f64; 2])> 
     };
     let model = initial_gaussians(&dataset, config.seed, 100)?;
     let options = TrainerOptions { shape: Some(kernels), ..TrainerOptions::default() };
-    let mut trainer = Trainer::new(Arc::clone(gpu), config, &mut dataset, &model, options)?;
+    let mut trainer = Trainer::new(Arc::clone(gpu), config, &dataset, &model, options)?;
     let mut reports = Vec::new();
     for _ in 0..STEPS {
         reports.extend(trainer.step()?);
