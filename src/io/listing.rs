@@ -67,7 +67,7 @@ pub(crate) fn check_camera(path: &Path, place: &str, camera: &Camera, lens: &Len
     if !(0.0..=f64::from(width)).contains(&cx) || !(0.0..=f64::from(height)).contains(&cy) {
         return refuse(format!("principal point ({cx}, {cy}) lies outside the image of {width} x {height} px"));
     }
-    if !lens.is_finite() {
+    if lens.distortion().is_some_and(|lens| !lens.is_finite()) {
         return refuse("a distortion coefficient is not a number".into());
     }
     if !camera.translation.is_finite() || !camera.rotation.is_finite() {

@@ -3,7 +3,7 @@
 //! Photos are undistorted with bilinear interpolation at their own size and then shrunk by an exact area average.
 //! Ids are never mixed: each target pixel takes the id at its centre, through size and lens in one step.
 
-use super::lens::Lens;
+use super::lens::{Distortion, Lens};
 use crate::scene::{Camera, LabelMap, Photo};
 use glam::DVec2;
 use rayon::prelude::*;
@@ -31,29 +31,27 @@ pub fn same_aspect(a: (u32, u32), b: (u32, u32)) -> bool {
 /// Maps pixels of the pinhole image of `camera` to the photo taken through `lens` with the same intrinsics.
 pub struct Undistortion<'a> {
     camera: &'a Camera,
-    lens: &'a Lens,
-    valid_radius: f64,
+    /// With the distance from the axis up to which it is one to one.
+    lens: Option<(&'a dyn Distortion, f64)>,
 }
 
 impl<'a> Undistortion<'a> {
     /// `camera` has the size of the photo.
-    pub fn new(camera: &'a Camera, lens: &'a Lens) -> Self {
+    pub fn new(camera: &'a Camera, lens: Option<&'a dyn Distortion>) -> Self {
         let far = |f: f64, c: f64, side: u32| (c.max(f64::from(side) - c) / f).abs();
         let corner = DVec2::new(far(camera.fx, camera.cx, camera.width), far(camera.fy, camera.cy, camera.height));
-        Self { camera, lens, valid_radius: lens.valid_radius(corner.length().max(1e-9)) }
+        Self { camera, lens: lens.map(|lens| (lens, lens.valid_radius(corner.length().max(1e-9)))) }
     }
 
     /// Photo position of the pinhole position `pixel`, both in px with centres at halves; `None` outside the photo.
     pub fn source(&self, pixel: DVec2) -> Option<DVec2> {
         let camera = self.camera;
-        if self.lens.is_pinhole() {
-            return Some(pixel);
-        }
+        let Some((lens, valid_radius)) = self.lens else { return Some(pixel) };
         let ideal = DVec2::new((pixel.x - camera.cx) / camera.fx, (pixel.y - camera.cy) / camera.fy);
-        if ideal.length() > self.valid_radius {
+        if ideal.length() > valid_radius {
             return None;
         }
-        let bent = self.lens.distort(ideal);
+        let bent = lens.distort(ideal);
         let at = DVec2::new(bent.x * camera.fx + camera.cx, bent.y * camera.fy + camera.cy);
         let inside = (0.0..f64::from(camera.width)).contains(&at.x) && (0.0..f64::from(camera.height)).contains(&at.y);
         inside.then_some(at)
@@ -63,7 +61,7 @@ impl<'a> Undistortion<'a> {
 /// The pinhole photo with the intrinsics of `camera`, which has the photo's size. Pixels without a source are
 /// black with alpha 0.
 pub fn undistort_photo(photo: &Photo, camera: &Camera, lens: &Lens) -> Photo {
-    let map = Undistortion::new(camera, lens);
+    let map = Undistortion::new(camera, lens.distortion());
     let row = |y: u32| {
         let map = &map;
         (0..photo.width).map(move |x| {
@@ -157,7 +155,7 @@ pub fn resample_nearest<T: Copy + Send + Sync>(
     if lens.is_pinhole() && from == (width, height) {
         return values.to_vec();
     }
-    let map = Undistortion::new(camera, lens);
+    let map = Undistortion::new(camera, lens.distortion());
     let to_photo = DVec2::new(f64::from(camera.width) / f64::from(width), f64::from(camera.height) / f64::from(height));
     let to_values =
         DVec2::new(f64::from(from.0) / f64::from(camera.width), f64::from(from.1) / f64::from(camera.height));
@@ -172,4 +170,44 @@ pub fn resample_nearest<T: Copy + Send + Sync>(
         })
     };
     (0..height).into_par_iter().flat_map_iter(row).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::{DMat3, DVec3};
+
+    /// Keeps angles: a ray of angle a from the axis ends at a.
+    #[derive(Debug)]
+    struct Equidistant;
+
+    impl Distortion for Equidistant {
+        fn is_finite(&self) -> bool {
+            true
+        }
+
+        fn distort(&self, ideal: DVec2) -> DVec2 {
+            ideal.normalize_or_zero() * self.bent_radius(ideal.length())
+        }
+
+        fn bent_radius(&self, radius: f64) -> f64 {
+            radius.atan()
+        }
+    }
+
+    #[test]
+    fn any_lens_is_undone() {
+        let (rotation, translation) = (DMat3::IDENTITY, DVec3::ZERO);
+        let camera = Camera { rotation, translation, fx: 10.0, fy: 20.0, cx: 50.0, cy: 40.0, width: 100, height: 80 };
+        let map = Undistortion::new(&camera, Some(&Equidistant));
+        // 45 degrees to the right, then down.
+        let quarter = std::f64::consts::FRAC_PI_4;
+        for (pixel, expected) in [
+            (DVec2::new(60.0, 40.0), DVec2::new(50.0 + 10.0 * quarter, 40.0)),
+            (DVec2::new(50.0, 60.0), DVec2::new(50.0, 40.0 + 20.0 * quarter)),
+            (DVec2::new(50.0, 40.0), DVec2::new(50.0, 40.0)),
+        ] {
+            assert!(map.source(pixel).expect("inside").distance(expected) < 1e-12, "{pixel}");
+        }
+    }
 }

@@ -3,7 +3,7 @@
 //! Poses are camera-to-world with OpenGL axes (y up, looking along -z) and become camera-from-world with OpenCV
 //! axes. The world stays that of `transform_matrix`: nerfstudio's `applied_transform` is already part of it.
 
-use super::lens::Lens;
+use super::lens::{self, Lens};
 use super::listed_path::Place;
 use super::listing::{FAR, Listed, Listing, check_camera, find_file, invert_pose, rotation_of};
 use super::{image, ply};
@@ -191,24 +191,21 @@ fn side(path: &Path, place: &str, value: f64) -> Result<u32> {
 }
 
 fn lens(path: &Path, place: &str, i: &Intrinsics) -> Result<Lens> {
-    let k = |value: Option<f64>| value.unwrap_or(0.0);
-    let model = i.camera_model.as_deref().unwrap_or("OPENCV");
+    let named = i.camera_model.as_deref().unwrap_or("OPENCV");
     let fisheye = i.is_fisheye == Some(true);
-    match model {
-        "PINHOLE" | "SIMPLE_PINHOLE" | "PERSPECTIVE" if !fisheye => Ok(Lens::default()),
-        "OPENCV" | "SIMPLE_RADIAL" | "RADIAL" if !fisheye => {
-            let numerator = [k(i.k1), k(i.k2), k(i.k3), k(i.k4)];
-            Ok(Lens { numerator, denominator: [0.0; 3], tangential: [k(i.p1), k(i.p2)] })
-        }
-        _ => {
-            let name = if fisheye { "is_fisheye" } else { model };
-            let problem = format!(
-                "camera model {name} is not supported (supported: PINHOLE, SIMPLE_PINHOLE, SIMPLE_RADIAL, RADIAL, \
-                 OPENCV); undistort the photos first, for example with `colmap image_undistorter`"
-            );
-            Err(Error::data(path, place, problem))
-        }
-    }
+    let model = lens::model(if named == "PERSPECTIVE" { "PINHOLE" } else { named }).filter(|_| !fisheye);
+    let Some(of_names) = model.and_then(|model| model.of_names) else {
+        let name = if fisheye { "is_fisheye" } else { named };
+        let known = lens::MODELS.iter().filter(|model| model.of_names.is_some()).map(|model| model.name);
+        let problem = format!(
+            "camera model {name} is not supported (supported: {}); undistort the photos first, for example with `colmap \
+             image_undistorter`",
+            known.collect::<Vec<_>>().join(", ")
+        );
+        return Err(Error::data(path, place, problem));
+    };
+    let all = [("k1", i.k1), ("k2", i.k2), ("k3", i.k3), ("k4", i.k4), ("p1", i.p1), ("p2", i.p2)];
+    Ok(of_names(&|name| all.iter().find(|known| known.0 == name).and_then(|known| known.1).unwrap_or(0.0)))
 }
 
 /// Intrinsics at an identity pose. The focal lengths come from `fl_x`, `fl_y` or the field of view, each for the

@@ -33,9 +33,13 @@ impl LabelMap {
 
     /// The ids that occur, sorted, without 0.
     pub fn objects(&self) -> Vec<u16> {
-        let mut seen = vec![false; 65_536];
-        self.ids.iter().for_each(|&id| seen[usize::from(id)] = true);
-        (1..=u16::MAX).filter(|&id| seen[usize::from(id)]).collect()
+        // A bit per id.
+        let mut seen = [0_u64; 1024];
+        self.ids.iter().for_each(|&id| seen[usize::from(id / 64)] |= 1 << (id % 64));
+        seen[0] &= !1;
+        let of_word =
+            |(at, &word): (u16, &u64)| (0..64).filter(move |bit| word >> bit & 1 == 1).map(move |bit| at * 64 + bit);
+        (0..).zip(&seen).filter(|(_, word)| **word != 0).flat_map(of_word).collect()
     }
 
     /// True for the pixels that have another id within `distance` px, in a square around them.

@@ -3,7 +3,7 @@
 use super::fixtures::*;
 use glam::DVec2;
 use labelgs::io::image::{photo_size, read_photo};
-use labelgs::io::lens::Lens;
+use labelgs::io::lens::{Distortion, Lens, Polynomial};
 use labelgs::io::{self, LoadOptions};
 use labelgs::scene::{Dataset, Photo};
 use std::fs;
@@ -112,7 +112,7 @@ fn shrinking_averages_the_exact_box() {
 fn the_lens_is_opencvs() {
     let at = DVec2::new(0.3, -0.2);
     let lens =
-        Lens { numerator: [0.1, -0.05, 0.02, 0.0], denominator: [0.01, 0.02, 0.03], tangential: [0.004, -0.003] };
+        Polynomial { numerator: [0.1, -0.05, 0.02, 0.0], denominator: [0.01, 0.02, 0.03], tangential: [0.004, -0.003] };
     let (x, y, r2) = (at.x, at.y, at.x * at.x + at.y * at.y);
     let radial = (1.0 + 0.1 * r2 - 0.05 * r2.powi(2) + 0.02 * r2.powi(3))
         / (1.0 + 0.01 * r2 + 0.02 * r2.powi(2) + 0.03 * r2.powi(3));
@@ -121,11 +121,12 @@ fn the_lens_is_opencvs() {
         y * radial + 0.004 * (r2 + 2.0 * y * y) - 2.0 * 0.003 * x * y,
     );
     assert!(lens.distort(at).distance(expected) < 1e-15);
-    assert_eq!(Lens::default().distort(at), at);
+    assert_eq!(Polynomial::default().distort(at), at);
+    assert!(Lens::from(Polynomial::default()).is_pinhole() && !Lens::from(lens).is_pinhole());
     // r (1 - r^2) turns round at r = 1 / sqrt 3.
-    let folded = Lens { numerator: [-1.0, 0.0, 0.0, 0.0], ..Lens::default() };
+    let folded = Polynomial { numerator: [-1.0, 0.0, 0.0, 0.0], ..Polynomial::default() };
     assert!((folded.valid_radius(2.0) - 3f64.powf(-0.5)).abs() < 2e-3);
-    assert_eq!(Lens::default().valid_radius(2.0), 2.0);
+    assert_eq!(Polynomial::default().valid_radius(2.0), 2.0);
 }
 
 /// A scene photographed through an OPENCV lens: the photo holds its own pixel coordinates as colours.
@@ -154,7 +155,7 @@ fn undistortion_samples_where_the_model_says() {
         let view = &dataset.train[0];
         let (camera, photo) = (&view.camera, view.photo.as_ref().expect("a photo"));
         let mask = view.mask.as_ref().expect("a mask");
-        let lens = Lens { numerator: [k[0], k[1], 0.0, 0.0], denominator: [0.0; 3], tangential: [k[2], k[3]] };
+        let lens = Polynomial { numerator: [k[0], k[1], 0.0, 0.0], denominator: [0.0; 3], tangential: [k[2], k[3]] };
         let (mut inside, mut outside) = (0, 0);
         for y in 0..size.1 {
             for x in 0..size.0 {

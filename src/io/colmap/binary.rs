@@ -1,6 +1,6 @@
 //! The binary files: little-endian, fixed widths, a count in front. Counts are never trusted for memory.
 
-use super::model::{CameraRecord, ImageRecord, MODELS, check_supported};
+use super::model::{CameraRecord, ImageRecord, NAMES, model_of};
 use crate::error::{Error, Result};
 use crate::io::read;
 use crate::scene::Point;
@@ -102,16 +102,16 @@ impl Source {
 /// Reads `cameras.bin`.
 pub(super) fn cameras(path: &Path) -> Result<Vec<CameraRecord>> {
     Source::open(path)?.records("camera", |source| {
-        let (id, model) = (source.u32()?, source.u32()?);
+        let (id, number) = (source.u32()?, source.u32()?);
         let (width, height) = (source.u64()?, source.u64()?);
-        let Some(&(_, count, _)) = MODELS.get(model as usize) else {
+        let Some(name) = NAMES.get(number as usize) else {
             return Err(
-                source.error(format!("camera {id} has the unknown model {model}; run `colmap image_undistorter`"))
+                source.error(format!("camera {id} has the unknown model {number}; run `colmap image_undistorter`"))
             );
         };
-        check_supported(path, &format!("camera {id}"), model as usize)?;
-        let parameters = (0..count).map(|_| source.f64()).collect::<Result<_>>()?;
-        Ok(CameraRecord { id, model: model as usize, width, height, parameters })
+        let model = model_of(path, &format!("camera {id}"), name)?;
+        let parameters = (0..model.focals + 2 + model.coefficients).map(|_| source.f64()).collect::<Result<_>>()?;
+        Ok(CameraRecord { id, model, width, height, parameters })
     })
 }
 

@@ -1,32 +1,31 @@
 //! Records of a COLMAP model and what its camera models mean.
 
 use crate::error::{Error, Result};
-use crate::io::lens::Lens;
+use crate::io::lens::{self, CameraModel, Lens};
 use crate::scene::Camera;
 use glam::{DMat3, DVec3};
 use std::path::Path;
 
-/// Camera models by COLMAP's number: name, number of parameters, supported.
-pub(super) const MODELS: [(&str, usize, bool); 12] = [
-    ("SIMPLE_PINHOLE", 3, true),
-    ("PINHOLE", 4, true),
-    ("SIMPLE_RADIAL", 4, true),
-    ("RADIAL", 5, true),
-    ("OPENCV", 8, true),
-    ("OPENCV_FISHEYE", 8, false),
-    ("FULL_OPENCV", 12, true),
-    ("FOV", 5, false),
-    ("SIMPLE_RADIAL_FISHEYE", 4, false),
-    ("RADIAL_FISHEYE", 5, false),
-    ("THIN_PRISM_FISHEYE", 12, false),
-    ("RAD_TAN_THIN_PRISM_FISHEYE", 16, false),
+/// Names of the camera models by COLMAP's number.
+pub(super) const NAMES: [&str; 12] = [
+    "SIMPLE_PINHOLE",
+    "PINHOLE",
+    "SIMPLE_RADIAL",
+    "RADIAL",
+    "OPENCV",
+    "OPENCV_FISHEYE",
+    "FULL_OPENCV",
+    "FOV",
+    "SIMPLE_RADIAL_FISHEYE",
+    "RADIAL_FISHEYE",
+    "THIN_PRISM_FISHEYE",
+    "RAD_TAN_THIN_PRISM_FISHEYE",
 ];
 
 /// A line of `cameras`.
 pub(super) struct CameraRecord {
     pub(super) id: u32,
-    /// Index into [`MODELS`].
-    pub(super) model: usize,
+    pub(super) model: &'static CameraModel,
     pub(super) width: u64,
     pub(super) height: u64,
     pub(super) parameters: Vec<f64>,
@@ -42,26 +41,24 @@ pub(super) struct ImageRecord {
     pub(super) name: String,
 }
 
-/// Refuses models that cannot be undone to a pinhole here.
-pub(super) fn check_supported(path: &Path, place: &str, model: usize) -> Result<()> {
-    let (name, _, supported) = MODELS[model];
-    if supported {
-        return Ok(());
-    }
-    let known: Vec<&str> = MODELS.iter().filter(|model| model.2).map(|model| model.0).collect();
-    let problem = format!(
-        "camera model {name} is not supported (supported: {}); run `colmap image_undistorter` and use its output",
-        known.join(", ")
-    );
-    Err(Error::data(path, place, problem))
+/// The camera model of one of [`NAMES`]; an error for those that cannot be undone to a pinhole here.
+pub(super) fn model_of(path: &Path, place: &str, name: &str) -> Result<&'static CameraModel> {
+    lens::model(name).ok_or_else(|| {
+        let known: Vec<&str> = NAMES.into_iter().filter(|name| lens::model(name).is_some()).collect();
+        let problem = format!(
+            "camera model {name} is not supported (supported: {}); run `colmap image_undistorter` and use its output",
+            known.join(", ")
+        );
+        Error::data(path, place, problem)
+    })
 }
 
 impl CameraRecord {
     /// Intrinsics with an identity pose, and the lens.
     pub(super) fn intrinsics(&self, path: &Path) -> Result<(Camera, Lens)> {
         let place = format!("camera {}", self.id);
-        let (name, count, _) = MODELS[self.model];
-        let p = &self.parameters;
+        let CameraModel { name, focals, coefficients, of_list, .. } = *self.model;
+        let (p, count) = (&self.parameters, focals + 2 + coefficients);
         if p.len() != count {
             return Err(Error::data(path, place, format!("{name} has {count} parameters, {} are listed", p.len())));
         }
@@ -70,23 +67,8 @@ impl CameraRecord {
             u32::try_from(side).map_err(|_| problem())
         };
         let (width, height) = (side(self.width)?, side(self.height)?);
-        let two_focals = !matches!(name, "SIMPLE_PINHOLE" | "SIMPLE_RADIAL" | "RADIAL");
-        let (fx, fy, cx, cy, k) =
-            if two_focals { (p[0], p[1], p[2], p[3], &p[4..]) } else { (p[0], p[0], p[1], p[2], &p[3..]) };
-        let mut lens = Lens::default();
-        match *k {
-            [k1] => lens.numerator[0] = k1,
-            [k1, k2] => lens.numerator[..2].copy_from_slice(&[k1, k2]),
-            [k1, k2, p1, p2] => {
-                lens.numerator[..2].copy_from_slice(&[k1, k2]);
-                lens.tangential = [p1, p2];
-            }
-            [k1, k2, p1, p2, k3, k4, k5, k6] => {
-                lens = Lens { numerator: [k1, k2, k3, 0.0], denominator: [k4, k5, k6], tangential: [p1, p2] };
-            }
-            _ => {}
-        }
+        let (fx, fy, cx, cy) = (p[0], p[focals - 1], p[focals], p[focals + 1]);
         let camera = Camera { rotation: DMat3::IDENTITY, translation: DVec3::ZERO, fx, fy, cx, cy, width, height };
-        Ok((camera, lens))
+        Ok((camera, of_list(&p[focals + 2..])))
     }
 }

@@ -1,6 +1,6 @@
 //! The text files: a record a line, `#` starts a comment.
 
-use super::model::{CameraRecord, ImageRecord, MODELS, check_supported};
+use super::model::{CameraRecord, ImageRecord, NAMES, model_of};
 use crate::error::{Error, Result};
 use crate::io::read;
 use crate::scene::Point;
@@ -80,12 +80,12 @@ fn records<T>(path: &Path, read: impl Fn(Words) -> Result<T>) -> Result<Vec<T>> 
 pub(super) fn cameras(path: &Path) -> Result<Vec<CameraRecord>> {
     records(path, |mut words| {
         let (id, name) = (words.number("camera id")?, words.word("a camera model")?);
-        let Some(model) = MODELS.iter().position(|model| model.0 == name) else {
+        if !NAMES.contains(&name) {
             return Err(
                 words.error(format!("camera {id} has the unknown model {name}; run `colmap image_undistorter`"))
             );
-        };
-        check_supported(path, &format!("line {}, camera {id}", words.number), model)?;
+        }
+        let model = model_of(path, &format!("line {}, camera {id}", words.number), name)?;
         let (width, height) = (words.number("width")?, words.number("height")?);
         let mut parameters = Vec::new();
         while !words.rest.trim().is_empty() {
