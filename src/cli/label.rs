@@ -3,26 +3,19 @@
 use super::args::{JsonFlag, SceneArgs};
 use super::context::{Context, open_model};
 use super::log::Progress;
-use super::scene::{near_plane, open_gpu, open_scene, vote_engine};
+use super::scene::{near_plane, open_gpu, open_scene};
 use super::stdout;
 use super::values::{near, switch};
 use crate::edit::select::summarise;
-use crate::engine::Engine;
 use crate::io::label_table::LabelTable;
 use crate::io::model::write_model;
-use crate::label::vote::ballot::{Sweep, Voter, columns_for};
-use crate::label::vote::decide::{Decision, apply, count};
-use crate::label::vote::lift::{Lift, lift};
-use crate::render::{RenderOptions, render};
-use crate::scene::{Gaussians, UNLABELLED, View};
+use crate::label::vote::lift::Lift;
+use crate::label::vote::model::{Counting, columns_of, label_by_lift, label_by_votes, vote_engine};
+use crate::scene::View;
 use crate::train::LabelRule;
 use crate::{Error, Result};
 use clap::Args;
-use rand::SeedableRng;
-use rand::seq::SliceRandom;
-use rand_pcg::Pcg64Mcg;
 use serde_json::json;
-use std::collections::BTreeSet;
 use std::path::PathBuf;
 use std::time::Instant;
 
@@ -85,23 +78,24 @@ pub fn run(args: &LabelArgs, context: &Context) -> Result<()> {
     if views.is_empty() {
         return Err(Error::data(&args.masks, "", "no training view has a mask here; see --test-every"));
     }
-    let objects: BTreeSet<u16> = views.iter().filter_map(|view| view.mask.as_ref()).flat_map(|m| m.objects()).collect();
     let gpu = open_gpu(context)?;
     let start = Instant::now();
-    let mut engine = vote_engine(gpu, &model, &views, columns_for(objects.len()))?;
-    engine.upload_model(&model)?;
+    let mut engine = vote_engine(gpu, &model, &views, columns_of(&views))?;
     let mut progress = Progress::new(u64::from(args.rounds), "rounds", &context.global);
     if args.rule == LabelRule::Main {
-        lift_all(&mut engine, &mut model, &views, near, args)?;
+        let how = Lift { threshold: args.label_threshold, gpf: args.gpf };
+        label_by_lift(&mut engine, &mut model, &views, (near, how, args.seed))?;
     } else {
-        for round in 0..args.rounds {
-            let mut decision = vote(&mut engine, &model, &views, (near, round > 0), args)?;
-            if round + 1 == args.rounds {
-                decision.drop_unsure(args.min_confidence);
-            }
-            apply(&mut model, decision);
-            progress.set(u64::from(round) + 1, String::new);
-        }
+        let how = Counting {
+            near,
+            mask_border: args.mask_border,
+            rounds: args.rounds,
+            complete: !args.no_complete,
+            min_confidence: args.min_confidence,
+        };
+        label_by_votes(&mut engine, &mut model, &views, &how, &mut |round| {
+            progress.set(u64::from(round), String::new)
+        })?;
     }
     drop(progress);
     let seconds = start.elapsed().as_secs_f64();
@@ -126,37 +120,4 @@ pub fn run(args: &LabelArgs, context: &Context) -> Result<()> {
         rows.iter().filter(|row| row.label != 0).count(),
         views.len()
     ))
-}
-
-/// Every view writes its labels, one after the other.
-fn lift_all(engine: &mut Engine, model: &mut Gaussians, views: &[&View], near: f32, args: &LabelArgs) -> Result<()> {
-    let mut order: Vec<usize> = (0..views.len()).collect();
-    order.shuffle(&mut Pcg64Mcg::seed_from_u64(args.seed));
-    let mut labels = vec![UNLABELLED; model.len()];
-    let how = Lift { threshold: args.label_threshold, gpf: args.gpf };
-    for view in order.into_iter().map(|index| views[index]) {
-        let Some(mask) = &view.mask else { continue };
-        let rendered = render(engine, &view.camera, &RenderOptions::of_labels(near))?;
-        lift(&mut labels, &model.means, &view.camera.relative_to(model.origin), &rendered, mask, how);
-    }
-    model.labels = Some(labels);
-    model.label_confidence = None;
-    Ok(())
-}
-
-/// One round: judges the masks by the labels of the last one if asked to, counts, decides.
-fn vote(
-    engine: &mut Engine,
-    model: &Gaussians,
-    views: &[&View],
-    (near, judge): (f32, bool),
-    args: &LabelArgs,
-) -> Result<Decision> {
-    let voters = views.iter().filter_map(|view| {
-        Some(Voter { camera: &view.camera, mask: view.mask.as_ref()?, photo: view.photo.as_deref(), trust: None })
-    });
-    let voters: Vec<Voter> = voters.collect();
-    let judges = model.labels.as_deref().filter(|_| judge);
-    let how = Sweep { near, border: args.mask_border };
-    count(engine, &voters, judges, &model.means, how, !args.no_complete)
 }

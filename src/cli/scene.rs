@@ -2,7 +2,7 @@
 
 use super::args::SceneArgs;
 use super::context::Context;
-use crate::engine::{Engine, EngineSize, LabelSize};
+use crate::engine::{Engine, EngineSize};
 use crate::error::{Error, Result};
 use crate::gpu::{Gpu, GpuOptions, PipelineStore};
 use crate::io::pipeline_file::PipelineFolder;
@@ -99,25 +99,7 @@ fn without_extension(name: &str) -> String {
     Path::new(name).with_extension("").to_string_lossy().into_owned()
 }
 
-/// An engine that renders `model` at up to `size`, the model not yet on it.
+/// An engine that renders `model`, which is not yet on it, at up to the largest of `sizes`.
 pub fn render_engine(gpu: Arc<Gpu>, model: &Gaussians, sizes: impl Iterator<Item = (u32, u32)>) -> Result<Engine> {
-    engine_for(gpu, model, sizes, None)
-}
-
-/// As [`render_engine`] for the sizes of `views`, with room for votes for so many labels at once.
-pub fn vote_engine(gpu: Arc<Gpu>, model: &Gaussians, views: &[&View], columns: u32) -> Result<Engine> {
-    let sizes = views.iter().map(|view| (view.camera.width, view.camera.height));
-    // No layer is ever sampled, so no id needs a place among them.
-    engine_for(gpu, model, sizes, Some(LabelSize { max_label: 0, layers: 0, vote_columns: columns }))
-}
-
-fn engine_for(
-    gpu: Arc<Gpu>,
-    model: &Gaussians,
-    sizes: impl Iterator<Item = (u32, u32)>,
-    labels: Option<LabelSize>,
-) -> Result<Engine> {
-    let image = sizes.reduce(|a, b| (a.0.max(b.0), a.1.max(b.1))).unwrap_or((1, 1));
-    let room = EngineSize::new((model.len() as u64).max(1), image).with_labels(labels);
-    Engine::new(gpu, room, SchedulerOptions::default())
+    Engine::new(gpu, EngineSize::of_model(model, sizes), SchedulerOptions::default())
 }

@@ -2,6 +2,7 @@
 
 use crate::error::{Error, Result};
 use crate::pass::KernelShape;
+use crate::scene::Gaussians;
 
 /// Sizes that labels need.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -31,6 +32,12 @@ impl EngineSize {
     /// For rendering so many Gaussians in images of up to `image` px.
     pub const fn new(gaussians: u64, image: (u32, u32)) -> Self {
         Self { gaussians, image, trained: false, labels: None }
+    }
+
+    /// For rendering a model in images of up to the largest of `sizes`, px.
+    pub fn of_model(model: &Gaussians, sizes: impl Iterator<Item = (u32, u32)>) -> Self {
+        let image = sizes.reduce(|a, b| (a.0.max(b.0), a.1.max(b.1))).unwrap_or((1, 1));
+        Self::new((model.len() as u64).max(1), image)
     }
 
     /// The same with optimiser state and gradients.

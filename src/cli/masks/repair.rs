@@ -4,18 +4,16 @@ use super::write_mask;
 use crate::cli::args::{JsonFlag, SceneArgs};
 use crate::cli::context::{Context, open_model};
 use crate::cli::log::Progress;
-use crate::cli::scene::{near_plane, open_gpu, open_scene, vote_engine};
+use crate::cli::scene::{near_plane, open_gpu, open_scene};
 use crate::cli::stdout;
 use crate::cli::values::near;
-use crate::engine::Engine;
 use crate::io::atomic;
 use crate::io::label_table::{FILE, LabelEntry, LabelTable};
-use crate::label::masks::associate::{Owners, Segment, associate};
-use crate::label::masks::repair::{Naming, Repairs, mend, name_groups, rename};
-use crate::label::vote::ballot::{COLUMNS_MAX, Sweep, Voter, sweep};
-use crate::label::vote::decide::count;
-use crate::render::{RenderOptions, render};
-use crate::scene::{Gaussians, LabelMap, View};
+use crate::label::masks::agree::{Agreement, agree};
+use crate::label::masks::repair::Repairs;
+use crate::label::vote::ballot::COLUMNS_MAX;
+use crate::label::vote::model::vote_engine;
+use crate::scene::{LabelMap, View};
 use crate::{Error, Result};
 use clap::Args;
 use serde_json::json;
@@ -74,80 +72,22 @@ pub fn run(args: &RepairArgs, context: &Context) -> Result<()> {
         }
     }
     let mut engine = vote_engine(open_gpu(context)?, &model, &views, COLUMNS_MAX)?;
-    engine.upload_model(&model)?;
     let mut progress = Progress::new(2 * views.len() as u64, "views", &context.global);
     let mut done = 0;
     let mut tick = || {
         done += 1;
         progress.set(done, String::new);
     };
-    let near = near_plane(&args.model, args.near)?;
-    let (masks, repairs) = repair(&mut engine, &model, &views, (near, args), &mut tick)?;
+    let how = Agreement {
+        near: near_plane(&args.model, args.near)?,
+        per_view: args.per_view,
+        min_views: args.min_views,
+        make_missing: args.make_missing,
+    };
+    let (masks, repairs) = agree(&mut engine, &model, &views, how, &mut tick)?;
     drop(progress);
     write(&args.output, &args.masks, &views, &masks)?;
     report(&views, &masks, &repairs, args, context)
-}
-
-/// Masks of the views, where there are any, and what was done to them.
-fn repair(
-    engine: &mut Engine,
-    model: &Gaussians,
-    views: &[&View],
-    (near, args): (f32, &RepairArgs),
-    tick: &mut dyn FnMut(),
-) -> Result<(Vec<Option<LabelMap>>, Repairs)> {
-    let how = Sweep { near, border: 0 };
-    let mut owners = Vec::with_capacity(views.len());
-    for view in views {
-        let voter = view.mask.as_ref().map(|mask| voter(view, mask));
-        owners.push(match voter {
-            Some(voter) => Owners::new(&sweep(engine, &[voter], how)?),
-            None => Owners::default(),
-        });
-        tick();
-    }
-    let mut groups = associate(&owners);
-    groups.retain(|group| group.len() >= args.min_views);
-    let pixels = areas(views);
-    let naming = if args.per_view { Naming::Fresh } else { Naming::Majority };
-    let names = name_groups(&groups, &pixels, naming);
-    let mut repairs = Repairs::default();
-    let changed = names.iter().filter(|((_, old), new)| !args.per_view && old != *new);
-    repairs.renamed.extend(changed.map(|(&segment, &new)| (segment, new)));
-    let renamed: Vec<Option<LabelMap>> = (views.iter().enumerate())
-        .map(|(index, view)| view.mask.as_ref().map(|mask| rename(index, mask, &names)))
-        .collect();
-    // What all renamed masks together make of the model tells what each of them should show.
-    let voters = views.iter().zip(&renamed).filter_map(|(view, mask)| Some(voter(view, mask.as_ref()?)));
-    let voters: Vec<Voter> = voters.collect();
-    let decision = count(engine, &voters, None, &model.means, how, true)?;
-    let mut masks = Vec::with_capacity(views.len());
-    for (index, (view, mask)) in views.iter().zip(&renamed).enumerate() {
-        let shown = render(engine, &view.camera, &RenderOptions::of_labels(near))?.label_map(&decision.labels);
-        masks.push(match mask {
-            Some(mask) => Some(mend(index, mask, &shown, &mut repairs)),
-            None if args.make_missing => {
-                repairs.made.push(index);
-                Some(shown)
-            }
-            None => None,
-        });
-        tick();
-    }
-    Ok((masks, repairs))
-}
-
-fn voter<'a>(view: &'a View, mask: &'a LabelMap) -> Voter<'a> {
-    Voter { camera: &view.camera, mask, photo: view.photo.as_deref(), trust: None }
-}
-
-fn areas(views: &[&View]) -> BTreeMap<Segment, u64> {
-    let mut areas = BTreeMap::new();
-    for (index, view) in views.iter().enumerate() {
-        let ids = view.mask.iter().flat_map(|mask| &mask.ids).filter(|id| **id != 0);
-        ids.for_each(|&id| *areas.entry((index, id)).or_default() += 1);
-    }
-    areas
 }
 
 /// The file of a view's mask in the folder of all.

@@ -6,7 +6,7 @@
 
 use crate::engine::{Engine, ListKey, VoteInput};
 use crate::error::{Error, Result};
-use crate::scene::{Camera, LabelMap, Photo, UNLABELLED};
+use crate::scene::{Camera, LabelMap, Photo, UNLABELLED, View};
 use crate::shaders::constants::{VOTE_NONE, VOTE_ONE};
 use crate::shaders::structs::StepUniforms;
 use rayon::prelude::*;
@@ -28,6 +28,13 @@ pub struct Voter<'a> {
     pub photo: Option<&'a Photo>,
     /// Weight of this view's votes by label, 0 to 1; 1 where nothing is said.
     pub trust: Option<&'a BTreeMap<u16, f32>>,
+}
+
+impl<'a> Voter<'a> {
+    /// A view with a mask, which need not be its own.
+    pub fn of(view: &'a View, mask: &'a LabelMap) -> Self {
+        Self { camera: &view.camera, mask, photo: view.photo.as_deref(), trust: None }
+    }
 }
 
 /// How a sweep is made.

@@ -3,3 +3,4 @@
 pub mod ballot;
 pub mod decide;
 pub mod lift;
+pub mod model;

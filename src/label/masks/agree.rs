@@ -1,0 +1,81 @@
+//! Masks of all views made to agree with each other, by the Gaussians of a model that all of them show.
+
+use super::associate::{Owners, Segment, associate};
+use super::repair::{Naming, Repairs, mend, name_groups, rename};
+use crate::engine::Engine;
+use crate::error::Result;
+use crate::label::vote::ballot::{Sweep, Voter, sweep};
+use crate::label::vote::decide::count;
+use crate::render::{RenderOptions, render};
+use crate::scene::{Gaussians, LabelMap, View};
+use std::collections::BTreeMap;
+
+/// How masks are made to agree.
+#[derive(Clone, Copy, Debug)]
+pub struct Agreement {
+    /// Near plane, world units.
+    pub near: f32,
+    /// The ids of different views mean nothing to each other.
+    pub per_view: bool,
+    /// Objects that fewer views show are left out.
+    pub min_views: usize,
+    /// Views without a mask get one.
+    pub make_missing: bool,
+}
+
+/// Masks of the views, where there are any, and what was done to them. `engine` holds the model and has memory for votes;
+/// `tick` is called twice for each view.
+pub fn agree(
+    engine: &mut Engine,
+    model: &Gaussians,
+    views: &[&View],
+    how: Agreement,
+    tick: &mut dyn FnMut(),
+) -> Result<(Vec<Option<LabelMap>>, Repairs)> {
+    let counting = Sweep { near: how.near, border: 0 };
+    let mut owners = Vec::with_capacity(views.len());
+    for view in views {
+        owners.push(match &view.mask {
+            Some(mask) => Owners::new(&sweep(engine, &[Voter::of(view, mask)], counting)?),
+            None => Owners::default(),
+        });
+        tick();
+    }
+    let mut groups = associate(&owners);
+    groups.retain(|group| group.len() >= how.min_views);
+    let naming = if how.per_view { Naming::Fresh } else { Naming::Majority };
+    let names = name_groups(&groups, &areas(views), naming);
+    let mut repairs = Repairs::default();
+    let changed = names.iter().filter(|((_, old), new)| !how.per_view && old != *new);
+    repairs.renamed.extend(changed.map(|(&segment, &new)| (segment, new)));
+    let renamed: Vec<Option<LabelMap>> = (views.iter().enumerate())
+        .map(|(index, view)| view.mask.as_ref().map(|mask| rename(index, mask, &names)))
+        .collect();
+    // What all renamed masks together make of the model tells what each of them should show.
+    let voters = views.iter().zip(&renamed).filter_map(|(view, mask)| Some(Voter::of(view, mask.as_ref()?)));
+    let decision = count(engine, &voters.collect::<Vec<_>>(), None, &model.means, counting, true)?;
+    let mut masks = Vec::with_capacity(views.len());
+    for (index, (view, mask)) in views.iter().zip(&renamed).enumerate() {
+        let options = RenderOptions::of_labels(how.near);
+        let shown = render(engine, &view.camera, &options)?.label_map(&decision.labels);
+        masks.push(match mask {
+            Some(mask) => Some(mend(index, mask, &shown, &mut repairs)),
+            None if how.make_missing => {
+                repairs.made.push(index);
+                Some(shown)
+            }
+            None => None,
+        });
+        tick();
+    }
+    Ok((masks, repairs))
+}
+
+fn areas(views: &[&View]) -> BTreeMap<Segment, u64> {
+    let mut areas = BTreeMap::new();
+    for (index, view) in views.iter().enumerate() {
+        let ids = view.mask.iter().flat_map(|mask| &mask.ids).filter(|id| **id != 0);
+        ids.for_each(|&id| *areas.entry((index, id)).or_default() += 1);
+    }
+    areas
+}
