@@ -37,8 +37,8 @@
 //!
 //! # Life of a step
 //!
-//! [`train::Trainer::step`] draws a view, writes its photo, masks and uniforms into one of two frames in flight and submits the list
-//! that [`pass::training_step`] declared: cull, sort by depth, project, list (splat, tile) pairs, sort them by layer and
+//! [`train::Trainer::step`] draws a view, writes its photo, masks and uniforms into one of two frames in flight and
+//! submits the list that [`pass::training_step`] declared: cull, sort by depth, project, list (splat, tile) pairs, sort them by layer and
 //! tile, blend forward, loss, blend backward, gather, project backward, Adam. Nothing is read back inside a step; its
 //! report is read when the frame comes round again. A buffer that was too small sets a sticky bit, every later pass leaves
 //! the model alone, the buffer grows, and the steps run again.

@@ -2,27 +2,29 @@
 
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::sync::LazyLock;
 
 const ROOT: &str = env!("CARGO_MANIFEST_DIR");
 
-/// A module may use modules of lower floors only; modules of one floor do not know each other.
-const FLOORS: [&[&str]; 13] = [
-    &["error", "lab", "lib"],
-    &["options"],
-    &["shaders", "gpu", "scene"],
-    &["scheduler", "io"],
-    &["pass"],
-    &["engine"],
-    &["render", "edit"],
-    &["label"],
-    &["eval", "synth"],
-    &["train"],
-    &["run"],
-    &["verify"],
-    &["cli"],
-];
-/// Above all floors.
-const TOP: [&str; 1] = ["main"];
+/// Columns of the names in the table of floors.
+const NAMES: usize = 23;
+
+/// Modules by floor, the lowest first, as the head of `src/lib.rs` lists them: a module may use those of lower floors only,
+/// and modules of one floor do not know each other.
+fn floors() -> &'static [Vec<String>] {
+    static FLOORS: LazyLock<Vec<Vec<String>>> = LazyLock::new(|| {
+        let text = fs::read_to_string(Path::new(ROOT).join("src/lib.rs")).expect("lib.rs");
+        let table = text.split("```text\n").nth(1).and_then(|rest| rest.split("//! ```").next()).expect("a table");
+        let names = |line: &str| line.trim_start_matches("//! ").chars().take(NAMES).collect::<String>();
+        let words = |line| names(line).split_whitespace().map(str::to_owned).collect::<Vec<_>>();
+        let mut floors: Vec<Vec<String>> = table.lines().rev().map(words).collect();
+        floors[0].push("lib".to_owned());
+        floors.push(vec!["main".to_owned()]);
+        floors
+    });
+    &FLOORS
+}
+
 /// What lies on a lower floor and does not follow the rule, with the reason.
 const EXCEPTIONS: [(&str, &str); 1] = [
     // Tables of needs come from the shaders' own interfaces.
@@ -51,10 +53,8 @@ fn module(path: &Path) -> String {
 }
 
 fn floor(module: &str) -> usize {
-    if TOP.contains(&module) {
-        return FLOORS.len();
-    }
-    FLOORS.iter().position(|modules| modules.contains(&module)).unwrap_or_else(|| panic!("{module} is on no floor"))
+    let found = floors().iter().position(|modules| modules.iter().any(|name| name == module));
+    found.unwrap_or_else(|| panic!("{module} is on no floor of src/lib.rs"))
 }
 
 /// Modules of this crate that a text names, but for its tests: `crate::name` and `crate::{name, ..}`.
