@@ -184,15 +184,6 @@ impl Scheduler {
         Ok(ids)
     }
 
-    /// Changes the options of lists that are prepared from now on. Guards cannot be switched on or off.
-    pub fn set_options(&mut self, options: SchedulerOptions) -> Result<()> {
-        if options.plan.guards != self.options.plan.guards {
-            return Err(Error::Bug("guards are decided when the scheduler is made".to_owned()));
-        }
-        self.options = options;
-        Ok(())
-    }
-
     /// Submits a prepared list with the host-visible buffers of a frame.
     ///
     /// Nothing is allocated. Blocks only if the same list is still running in the same frame.
@@ -230,11 +221,6 @@ impl Scheduler {
             let _ = self.gpu.wait_idle();
             self.name_pass(error)
         })
-    }
-
-    /// True if a submit is done.
-    pub fn is_done(&self, ticket: Ticket) -> Result<bool> {
-        Ok(self.timeline.value().map_err(|error| self.name_pass(error))? >= ticket.0)
     }
 
     /// Blocks until all submits are done.

@@ -1,9 +1,9 @@
 //! Transfers between host and buffers, outside of lists.
 
+use super::Scheduler;
 use super::recorder::Recorder;
 use super::storage::Storage;
 use super::storage::copy_of;
-use super::{Scheduler, Ticket};
 use crate::error::{Error, Result};
 use crate::gpu::{Buffer, Gpu, MemoryKind};
 use crate::scheduler::plan::{Buf, Class, memory};
@@ -74,13 +74,6 @@ impl Scheduler {
         self.check_survives(buf)?;
         self.read_bytes(buf, frame, start, bytes)?;
         Ok(values)
-    }
-
-    /// Reads all of a buffer.
-    pub fn download_all<T: Pod>(&mut self, buf: Buf, frame: usize) -> Result<Vec<T>> {
-        let empty = self.decl(buf)?.class != Class::Step && self.is_empty(buf)?;
-        let count = if empty { 0 } else { self.bytes(buf)? as usize / size_of::<T>().max(1) };
-        self.download(buf, frame, 0, count)
     }
 
     /// Sets every word of a buffer, in all its copies; waits for what still uses it.
@@ -188,11 +181,6 @@ impl Scheduler {
                 )))
             }
         }
-    }
-
-    /// The ticket of the last submit.
-    pub fn last_ticket(&self) -> Ticket {
-        Ticket(self.submitted)
     }
 }
 

@@ -149,11 +149,6 @@ impl TrainState {
         Ok(state)
     }
 
-    /// True if views had masks.
-    pub fn masks_given(&self) -> bool {
-        self.views.iter().any(|view| view.mask.is_some())
-    }
-
     /// Refuses a scene that is not the one of the checkpoint, with the first thing that differs.
     fn check_scene(&self, scene: &Path, views: &[ViewFingerprint]) -> Result<()> {
         let masks = |views: &[ViewFingerprint]| views.iter().any(|view| view.mask.is_some());

@@ -19,16 +19,6 @@ impl Photo {
     pub fn elements(&self) -> f64 {
         3.0 * self.valid.iter().filter(|&&valid| valid).count() as f64
     }
-
-    /// From an RGBA8 photo.
-    pub fn from_scene(photo: &crate::scene::Photo) -> Self {
-        let colour = |p: &[u8; 4]| [p[0], p[1], p[2]].map(|v| f64::from(v) / 255.0);
-        Self {
-            size: (photo.width as usize, photo.height as usize),
-            colours: photo.rgba.iter().map(colour).collect(),
-            valid: photo.rgba.iter().map(|p| p[3] != 0).collect(),
-        }
-    }
 }
 
 /// A loss with its gradient by the image.
