@@ -32,12 +32,6 @@ impl Timeline {
         // SAFETY: the handle is alive.
         vk_call("vkWaitSemaphores", || unsafe { self.gpu.raw().wait_semaphores(&info, u64::MAX) })
     }
-
-    /// The value reached so far.
-    pub(crate) fn value(&self) -> Result<u64> {
-        // SAFETY: the handle is alive.
-        vk_call("vkGetSemaphoreCounterValue", || unsafe { self.gpu.raw().get_semaphore_counter_value(self.handle) })
-    }
 }
 
 impl Drop for Timeline {

@@ -202,11 +202,6 @@ impl Scheduler {
         })
     }
 
-    /// True if a submit is done.
-    pub fn is_done(&self, ticket: Ticket) -> Result<bool> {
-        Ok(self.timeline.value().map_err(|error| self.name_pass(error))? >= ticket.0)
-    }
-
     /// Blocks until all submits are done.
     pub fn wait_all(&self) -> Result<()> {
         self.wait(Ticket(self.submitted))

@@ -76,13 +76,6 @@ impl Scheduler {
         Ok(values)
     }
 
-    /// Reads all of a buffer.
-    pub fn download_all<T: Pod>(&mut self, buf: Buf, frame: usize) -> Result<Vec<T>> {
-        let empty = self.decl(buf)?.class != Class::Step && self.is_empty(buf)?;
-        let count = if empty { 0 } else { self.bytes(buf)? as usize / size_of::<T>().max(1) };
-        self.download(buf, frame, 0, count)
-    }
-
     /// Sets every word of a buffer, in all its copies; waits for what still uses it.
     pub fn fill(&mut self, buf: Buf, word: u32) -> Result<()> {
         self.wait_all()?;
