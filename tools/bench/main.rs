@@ -5,7 +5,6 @@
 
 mod compiler;
 mod device;
-mod features;
 mod kernels;
 mod limits;
 mod measure;
@@ -15,7 +14,6 @@ mod paper;
 #[allow(dead_code, reason = "what the build does with shaders; benchmarks generate nothing")]
 #[path = "../shadergen/mod.rs"]
 mod shadergen;
-mod skips;
 mod start;
 mod steps;
 mod trained;
@@ -57,12 +55,8 @@ enum Command {
     Paper(paper::Options),
     /// Quality against seconds of training, with and without labels, and the time to the first step.
     Training(training::Options),
-    /// What rendering a learned feature per Gaussian would cost, as methods do that have no labels.
-    Features(features::Options),
     /// How near each stage of a step comes to what the device could do, measured in the same run.
     Limits(Common),
-    /// The most that skips would save which are not built.
-    Skips(Common),
     /// Predicted against measured memory of training.
     Memory(Common),
     /// From the start of the program to its first picture, with empty and with filled caches.
@@ -90,10 +84,8 @@ fn run() -> Result<()> {
         Command::Steps(common) => steps::run(&common),
         Command::Paper(options) => paper::run(&options),
         Command::Training(options) => training::run(&options),
-        Command::Features(options) => features::run(&options),
         Command::FirstStep(common) => training::first_step(&common),
         Command::Limits(common) => limits::run(&common),
-        Command::Skips(common) => skips::run(&common),
         Command::Memory(common) => memory::run(&common),
         Command::Start(common) => start::run(&common),
         Command::MemoryOf { gaussians, width, height } => memory::measure(gaussians, width, height),
