@@ -3,6 +3,7 @@
 use crate::support::runs::Place;
 use crate::support::{device, device::Turn};
 use labelgs::Result;
+use labelgs::render::Parts;
 use labelgs::run::{self, Event, Flow, Live, Observer, Request, Settings, Start, Summary};
 use labelgs::scene::Camera;
 use std::collections::BTreeMap;
@@ -60,7 +61,7 @@ impl Observer for Watcher {
         *self.heard.entry(name).or_default() += 1;
         let Event::Step { step, .. } = *event else { return Ok(Flow::Continue) };
         if let Some(camera) = self.camera.as_ref().filter(|_| step.is_multiple_of(self.looks_every)) {
-            self.pictures.push((step, live.render(camera)?.rgb.len()));
+            self.pictures.push((step, live.render(camera, Parts::COLOUR)?.rgb.len()));
         }
         Ok(self.answers.get(&step).copied().unwrap_or_default())
     }

@@ -4,7 +4,7 @@
 use super::Summary;
 use crate::error::Result;
 use crate::eval::scores::Scores;
-use crate::render::{Rendered, render};
+use crate::render::{Parts, RenderOptions, Rendered, render};
 use crate::scene::{Camera, Gaussians};
 use crate::train::{Densified, StepReport, Trainer};
 use std::path::Path;
@@ -119,10 +119,10 @@ impl<'a> Live<'a> {
         self.trainer.gaussian_count()
     }
 
-    /// A picture of the scene as it is now, from any camera and of any size.
-    pub fn render(&mut self, camera: &Camera) -> Result<Rendered> {
+    /// A picture of the scene as it is now, from any camera and of any size, with the parts that are asked for.
+    pub fn render(&mut self, camera: &Camera, parts: Parts) -> Result<Rendered> {
         self.trainer.drain()?;
-        let options = self.trainer.render_options();
+        let options = RenderOptions { parts, ..self.trainer.render_options() };
         let engine = self.trainer.engine_mut();
         engine.grow_image(camera.width, camera.height)?;
         render(engine, camera, &options)

@@ -2,6 +2,7 @@
 
 use super::{Live, Run, models};
 use crate::error::Result;
+use crate::render::Parts;
 use std::path::PathBuf;
 
 /// Writes the picture of the preview view as the scene is now; none without a photo.
@@ -9,7 +10,7 @@ pub(super) fn write(run: &mut Run) -> Result<Option<PathBuf>> {
     let Some(view) = &run.preview else { return Ok(None) };
     let Some(photo) = &view.photo else { return Ok(None) };
     let mut live = Live::new(&mut run.trainer);
-    let rendered = live.render(&view.camera)?;
+    let rendered = live.render(&view.camera, Parts::MAIN)?;
     let labels = live.model()?.labels;
     let name = format!("{:06}_{}.png", run.trainer.steps_done(), view.stem());
     let path = run.request.output.join("preview").join(name);
