@@ -17,7 +17,7 @@ pub fn blend_forward_main(b: &mut Builder, pairs: Buf) {
 }
 
 fn forward(b: &mut Builder, pairs: Buf, main: bool, lift: bool) {
-    let (segments, counts) = (b.capacity.segments as u32, b.counts);
+    let (segments, counts) = (b.segments(), b.counts);
     b.list.stage = Stage::BlendForward;
     for segment in 0..segments {
         pass!(b, blend_forward(labels: b.labels, main: main, segmented: segments > 1) {
@@ -35,7 +35,7 @@ fn forward(b: &mut Builder, pairs: Buf, main: bool, lift: bool) {
 
 /// Walks all tiles back to front and writes a gradient record per (splat, tile) pair.
 pub fn blend_backward(b: &mut Builder, pairs: Buf) {
-    let segments = b.capacity.segments as u32;
+    let segments = b.segments();
     b.list.stage = Stage::BlendBackward;
     for segment in (0..segments).rev() {
         pass!(b, blend_backward(labels: b.labels, segmented: segments > 1) {

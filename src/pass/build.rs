@@ -34,6 +34,11 @@ pub enum Count {
 }
 
 impl Builder<'_> {
+    /// Dispatches that walk the longest list of a tile, at least one.
+    pub fn segments(&self) -> u32 {
+        self.capacity.segments.max(1) as u32
+    }
+
     /// Appends a pass: what [`pass!`](crate::pass) expands to. Of the named buffers and constants the variant takes those
     /// that it has.
     ///

@@ -16,7 +16,7 @@ pub fn resolve(b: &mut Builder) {
 
 /// Adds the weights of all contributors to the votes for the labels of their pixels.
 pub fn vote(b: &mut Builder, pairs: Buf, rounds: u32) {
-    let segments = b.capacity.segments as u32;
+    let segments = b.segments();
     b.list.stage = Stage::Labels;
     for (round, segment) in (0..rounds).flat_map(|round| (0..segments).map(move |segment| (round, segment))) {
         pass!(b, vote(segmented: segments > 1) {

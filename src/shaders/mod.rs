@@ -68,9 +68,9 @@ pub struct ShaderDesc {
     pub name: &'static str,
     /// SPIR-V bytes, length a multiple of 4.
     pub spirv: &'static [u8],
-    /// Bindings in the order of the fields of `Bindings<B>`, which is the order of binding numbers.
+    /// Bindings in the order of their numbers.
     pub bindings: &'static [BindingDesc],
-    /// Specialisation constants in the order of the fields of `Spec`.
+    /// Specialisation constants in the order of their ids.
     pub spec: &'static [SpecDesc],
     /// Invocations on each axis of a workgroup.
     pub local_size: [LocalSize; 3],
