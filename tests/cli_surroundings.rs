@@ -111,6 +111,26 @@ fn nobody_has_to_listen() {
     }
 }
 
+/// Compiled pipelines go where the user's caches are, unless `LABELGS_CACHE` says otherwise.
+#[test]
+fn caches_are_kept_where_the_system_has_them() {
+    let Some(_turn) = device() else { return };
+    let place = Place::new();
+    let named = [("HOME", "home"), ("XDG_CACHE_HOME", "xdg"), ("LABELGS_CACHE", "own")];
+    for (count, expected) in [(1, "home/.cache/labelgs"), (2, "xdg/labelgs"), (3, "own")] {
+        let mut command = labelgs(&place);
+        command.env_remove("XDG_CACHE_HOME").env_remove("LABELGS_CACHE");
+        named[..count].iter().for_each(|&(name, folder)| drop(command.env(name, place.path(folder))));
+        let output = command.args(place.train(&place.text(&format!("out-{count}")), &["--iterations", "1"])).output();
+        succeeded(&output.expect("it runs"));
+        let kept = std::fs::read_dir(place.path(expected)).expect(expected);
+        assert!(
+            kept.flatten().any(|entry| entry.file_name().to_string_lossy().starts_with("pipelines-")),
+            "{expected}"
+        );
+    }
+}
+
 /// Runs the tool with so much address space, MiB.
 fn within(place: &Place, megabytes: u32, args: &[String]) -> Output {
     let mut command = Command::new("sh");

@@ -3,6 +3,7 @@
 use super::atomic;
 use crate::gpu::PipelineStore;
 use crate::io::read;
+use etcetera::base_strategy::{BaseStrategy, choose_native_strategy};
 use std::path::PathBuf;
 
 const MAGIC: [u8; 8] = *b"labelgsP";
@@ -22,14 +23,12 @@ impl PipelineFolder {
 
     /// `LABELGS_CACHE` if it names a folder, otherwise the user's cache folder; none with `off`, or where there is none.
     pub fn of_user() -> Option<Self> {
-        let set = |name: &str| std::env::var_os(name).filter(|value| !value.is_empty()).map(PathBuf::from);
-        match set("LABELGS_CACHE") {
-            Some(value) if value.as_os_str() == "off" => None,
+        match std::env::var_os("LABELGS_CACHE").filter(|value| !value.is_empty()) {
+            Some(value) if value == "off" => None,
             Some(folder) => Some(Self::new(folder)),
             None => {
-                let home = || set("HOME").map(|home| home.join(".cache"));
-                let base = set("XDG_CACHE_HOME").or_else(|| set("LOCALAPPDATA")).or_else(home)?;
-                Some(Self::new(base.join("labelgs")))
+                let base = choose_native_strategy().ok()?.cache_dir();
+                base.is_absolute().then(|| Self::new(base.join("labelgs")))
             }
         }
     }
