@@ -120,7 +120,7 @@ fn caches_are_kept_where_the_system_has_them() {
     for (count, expected) in [(1, "home/.cache/labelgs"), (2, "xdg/labelgs"), (3, "own")] {
         let mut command = labelgs(&place);
         command.env_remove("XDG_CACHE_HOME").env_remove("LABELGS_CACHE");
-        named[..count].iter().for_each(|&(name, folder)| drop(command.env(name, place.path(folder))));
+        command.envs(named[..count].iter().map(|&(name, folder)| (name, place.path(folder))));
         let output = command.args(place.train(&place.text(&format!("out-{count}")), &["--iterations", "1"])).output();
         succeeded(&output.expect("it runs"));
         let kept = std::fs::read_dir(place.path(expected)).expect(expected);

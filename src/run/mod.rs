@@ -35,6 +35,7 @@ use std::time::Instant;
 pub type Changed<'a> = dyn Fn(Option<&Settings>) -> Result<Settings> + 'a;
 
 /// Where a run starts.
+#[allow(clippy::large_enum_variant, reason = "there is one in a run")]
 pub enum Start<'a> {
     /// At step 1. Checkpoints of an earlier run in the folder go when this run has one.
     New(Settings),

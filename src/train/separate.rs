@@ -19,7 +19,7 @@ impl Separate {
 
     #[cfg(feature = "lab")]
     pub(super) fn key(&self, variant: Variant, input: &StepInput) -> Option<ListKey> {
-        (self.on && input.labels).then(|| ListKey::Separate(variant, input.layers.len() as u32))
+        (self.on && input.labels).then_some(ListKey::Separate(variant, input.layers.len() as u32))
     }
 }
 
