@@ -44,6 +44,7 @@ mod scheduler;
 mod segments;
 mod selftest;
 mod sentinel;
+mod shared;
 mod shadergen;
 mod strategy;
 mod stress;

@@ -9,11 +9,10 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 const ROOT: &str = env!("CARGO_MANIFEST_DIR");
-const ROOM: EngineSize = EngineSize::new(10_000, (320, 240)).for_training().with_labels(Some(LabelSize {
-    max_label: 40,
-    layers: 8,
-    vote_columns: 9,
-}));
+const ROOM: EngineSize = EngineSize::new(10_000, (320, 240))
+    .for_training()
+    .with_labels(Some(LabelSize { max_label: 40, layers: 8, vote_columns: 9 }))
+    .with_shared_rows(5);
 
 /// Stem and text of every compute shader.
 fn sources() -> Vec<(String, String)> {

@@ -24,6 +24,7 @@ const float COLOUR_BIAS = 0.5;               // colour of a Gaussian without sph
 const float NEAR = 0.2;                      // near plane, world units, unless the scene is small (3DGS); host only
 const float JACOBIAN_MARGIN = 0.3;           // how far slopes may leave the image, in half images (3DGS); host only
 const uint NO_SPLAT = 0xffffffffu;
+const uint NO_ROW = 0xffffffffu;
 const uint LABEL_MASK = 0xffffu;             // id of a pixel of view_labels; above it:
 const uint LABEL_BORDER = 0x10000u;          // so near to a contour of the mask that it says nothing
 const uint VOTE_NONE = 0xffffffffu;         // column of a pixel that has no say

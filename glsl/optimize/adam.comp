@@ -4,21 +4,30 @@
 #include "step.glsl"
 #include "dispatch.glsl"
 // adam — one Adam update of one attribute of all Gaussians; a Gaussian that is not visible has gradient 0, or with
-//        SEEN_ONLY stays as it is.
-// Work:    one vec4 of one Gaussian an invocation; STRIDE vec4 a Gaussian.
+//        SEEN_ONLY stays as it is. With SHARED of the shared rows that the step names and has rates for; others stay as
+//        they are, and each row's moments are corrected by its own number of updates.
+// Work:    one vec4 of one Gaussian an invocation; STRIDE vec4 a Gaussian. SHARED: one row of the step.
 // Reads:   step, failure; splat_from_gaussian [N]; gradients [V,STRIDE]; parameters_in, first_moments_in,
-//          second_moments_in [N,STRIDE]
-// Writes:  parameters, first_moments, second_moments [N,STRIDE], the same buffers
-// Math:    Kingma and Ba; beta 0.9 / 0.999, epsilon 1e-15, no weight decay; rates by RATE.
-// Mirror:  src/verify/reference/adam.rs::adam
+//          second_moments_in [N,STRIDE]. SHARED: failure; step_rows, step_rates, gradients, weights and the rest [S]
+// Writes:  parameters, first_moments, second_moments [N,STRIDE], the same buffers. SHARED: these and weights [S]
+// Math:    Kingma and Ba; beta 0.9 / 0.999, epsilon 1e-15, no weight decay; rates by RATE. SHARED: 1 - beta^t is the
+//          moment of gradients that are all 1: no power, and no count beside it.
+// Mirror:  src/verify/reference/adam.rs::adam, adam.rs::adam_value
 
+layout(local_size_x = 64) in;
+#ifdef SHARED
+layout(constant_id = 14) const uint ROWS = 0; // elements of step_rows
+READ(0, uint, step_rows);
+READ(2, vec4, step_rates);
+INOUT(10, vec2, weights);
+#else
 layout(constant_id = 14) const uint STRIDE = 1;
 layout(constant_id = 15) const uint RATE = 0; // 0 means, 1 scales, 2 quats, 3 sh0, 4 higher bands
 layout(constant_id = 16) const uint SEEN_ONLY = 0;
-layout(local_size_x = 64) in;
 READ1(0, StepUniforms, step);
-READ1(1, uint, failure);
 FETCHU(2, splat_from_gaussian);
+#endif
+READ1(1, uint, failure);
 FETCH4(3, gradients);
 // One buffer, two bindings: read as texels where that is fast, written as storage. An invocation reads its own elements
 // only, before it writes them.
@@ -30,6 +39,22 @@ WRITE(8, vec4, first_moments);
 WRITE(9, vec4, second_moments);
 
 void main() {
+#ifdef SHARED
+    uint i = linear_group_id() * 64u + gl_LocalInvocationID.x;
+    uint e = i < ROWS ? step_rows[i] : NO_ROW;
+    if (e == NO_ROW || failure != 0u) {
+        return;
+    }
+    vec4 rate = step_rates[i];
+    if (rate == vec4(0.0)) {
+        return;
+    }
+    vec4 g = fetch4(gradients, e);
+    vec2 beta = vec2(ADAM_BETA1, ADAM_BETA2);
+    vec2 weight = beta * weights[e] + (1.0 - beta);
+    weights[e] = weight;
+    float correction1 = 1.0 / weight.x, correction2 = 1.0 / weight.y;
+#else
     StepUniforms u = step;
     uint e = linear_group_id() * 64u + gl_LocalInvocationID.x;
     uint i = e / STRIDE;
@@ -44,9 +69,11 @@ void main() {
     g = s == NO_SPLAT ? vec4(0.0) : g;
     vec4 rate = RATE == 0u ? u.rate_means
         : vec4(RATE == 1u ? u.rate_scales : RATE == 2u ? u.rate_quats : RATE == 3u ? u.rate_sh0 : u.rate_sh_rest);
+    float correction1 = u.adam_correction1, correction2 = u.adam_correction2;
+#endif
     vec4 m = ADAM_BETA1 * fetch4(first_moments_in, e) + (1.0 - ADAM_BETA1) * g;
     vec4 v = ADAM_BETA2 * fetch4(second_moments_in, e) + (1.0 - ADAM_BETA2) * g * g;
-    vec4 update = rate * (m * u.adam_correction1) / (sqrt(v * u.adam_correction2) + ADAM_EPSILON);
+    vec4 update = rate * (m * correction1) / (sqrt(v * correction2) + ADAM_EPSILON);
     parameters[e] = fetch4(parameters_in, e) - update;
     first_moments[e] = m;
     second_moments[e] = v;

@@ -2,6 +2,7 @@
 
 use super::Engine;
 use crate::error::Result;
+use crate::pass::SHARED_PLANES;
 use crate::scheduler::Scheduler;
 use crate::scheduler::plan::Buf;
 
@@ -20,6 +21,19 @@ impl Engine {
     /// Replaces the labels.
     pub fn set_labels(&mut self, labels: &[u32]) -> Result<()> {
         self.sched.upload(Buf::LABELS, 0, 0, labels)
+    }
+
+    /// The shared parameters; none if the engine was made without rows of them.
+    pub fn shared(&mut self) -> Result<Vec<[f32; 4]>> {
+        self.sched.download_all(Buf::SHARED, 0)
+    }
+
+    /// Replaces the first shared parameters; the moments of all start over.
+    pub fn set_shared(&mut self, rows: &[[f32; 4]]) -> Result<()> {
+        for plane in &SHARED_PLANES[1..] {
+            self.sched.fill(*plane, 0)?;
+        }
+        self.sched.upload(Buf::SHARED, 0, 0, rows)
     }
 
     /// Sets all votes to 0.

@@ -48,6 +48,7 @@ pub fn capacity(shape: &KernelShape, room: &EngineSize) -> Capacity {
         occluder_words: label_words,
         loss_partials: u64::from(loss::partials(shape.subgroup, width, height)),
         segments: 1,
+        shared_rows: u64::from(room.shared_rows),
         ..Capacity::default()
     };
     derive(shape, &mut capacity, instances, room.trained);

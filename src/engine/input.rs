@@ -1,8 +1,9 @@
 //! What the host gives to a list, by its kind.
 
 use super::Engine;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::scheduler::plan::Buf;
+use crate::shaders::constants::NO_ROW;
 use crate::shaders::structs::StepUniforms;
 
 /// What a list reads besides the model.
@@ -25,6 +26,17 @@ pub struct TrainInput<'a> {
     pub photo: &'a [[u8; 4]],
     /// Of a step with labels.
     pub layers: Option<LayerInput<'a>>,
+    /// Rows of shared parameters that belong to the step, in the order that its passes know them by.
+    pub shared: Vec<SharedRow>,
+}
+
+/// A row of shared parameters in a step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SharedRow {
+    /// Which one.
+    pub row: u32,
+    /// Learning rates; if all are 0 the row rests, with its moments.
+    pub rates: [f32; 4],
 }
 
 /// What a training step with labels reads.
@@ -84,6 +96,9 @@ impl Engine {
         self.room.check_image(uniforms.width, uniforms.height)?;
         // Records of (splat, tile) pairs are valid by the mark of their submit.
         self.stamp = self.stamp.wrapping_add(1).max(1);
+        if let Input::Train(train) = input {
+            self.write_shared(frame, &train.shared)?;
+        }
         let sched = &mut self.sched;
         sched.upload(Buf::STEP, frame, 0, &[StepUniforms { stamp: self.stamp, ..*uniforms }])?;
         match input {
@@ -102,5 +117,24 @@ impl Engine {
                 sched.upload(Buf::VOTE_WEIGHTS, frame, 0, vote.weights)
             }
         }
+    }
+
+    /// Writes the rows of a step, each once, and the end behind them.
+    fn write_shared(&mut self, frame: usize, shared: &[SharedRow]) -> Result<()> {
+        let mut rows: Vec<u32> = shared.iter().map(|step| step.row).collect();
+        let mut sorted = rows.clone();
+        sorted.sort_unstable();
+        sorted.dedup();
+        let all = self.room.shared_rows;
+        if sorted.len() < rows.len() || sorted.last().is_some_and(|&row| row >= all) {
+            return Err(Error::Bug(format!("the shared rows {rows:?} of a step are not different ones of {all}")));
+        }
+        if all == 0 {
+            return Ok(());
+        }
+        rows.resize(all as usize, NO_ROW);
+        let rates: Vec<[f32; 4]> = shared.iter().map(|step| step.rates).collect();
+        self.sched.upload(Buf::STEP_ROWS, frame, 0, &rows)?;
+        self.sched.upload(Buf::STEP_RATES, frame, 0, &rates)
     }
 }

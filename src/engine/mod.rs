@@ -13,7 +13,7 @@ pub mod state;
 pub mod uniforms;
 
 pub use growth::{GrownSizes, capacity};
-pub use input::{Input, LayerInput, TrainInput, VoteInput};
+pub use input::{Input, LayerInput, SharedRow, TrainInput, VoteInput};
 pub use run::{InFlight, ListKey, Recording, Report};
 pub use size::{EngineSize, LabelSize};
 

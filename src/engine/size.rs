@@ -26,12 +26,14 @@ pub struct EngineSize {
     pub trained: bool,
     /// Labels; none for a scene without masks, which then pays nothing for them.
     pub labels: Option<LabelSize>,
+    /// Rows of four parameters that are no Gaussian's.
+    pub shared_rows: u32,
 }
 
 impl EngineSize {
     /// For rendering so many Gaussians in images of up to `image` px.
     pub const fn new(gaussians: u64, image: (u32, u32)) -> Self {
-        Self { gaussians, image, trained: false, labels: None }
+        Self { gaussians, image, trained: false, labels: None, shared_rows: 0 }
     }
 
     /// For rendering a model in images of up to the largest of `sizes`, px.
@@ -48,6 +50,11 @@ impl EngineSize {
     /// The same with labels, if any are given.
     pub const fn with_labels(self, labels: Option<LabelSize>) -> Self {
         Self { labels, ..self }
+    }
+
+    /// The same with so many rows of four parameters that are no Gaussian's.
+    pub const fn with_shared_rows(self, shared_rows: u32) -> Self {
+        Self { shared_rows, ..self }
     }
 
     /// Refuses images of more tiles than the kernels can walk.

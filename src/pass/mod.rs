@@ -19,7 +19,7 @@ pub mod stage;
 mod tile;
 
 pub use build::Builder;
-pub use optimize::ATTRIBUTES;
+pub use optimize::{ATTRIBUTES, SHARED_PLANES};
 #[cfg(feature = "lab")]
 pub use separate::separate_step;
 pub use shape::KernelShape;
@@ -49,13 +49,17 @@ pub struct Variant {
 /// Where a training step can be extended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Hook {
+    /// Behind blend_forward: the picture is known. What is changed in it must be undone at [`Hook::Loss`].
+    Picture,
+    /// Behind the photo loss: its gradient by the picture is known, and may be changed.
+    Loss,
     /// Behind project_backward: the gradients of the visible Gaussians are known.
     Gradients,
     /// Behind Adam, in steps that update the parameters.
     Updated,
 }
 
-/// What a strategy changes in training steps. `passes` is a number of its own, from 1: each has its recording.
+/// What a strategy, or whoever has [shared parameters](SHARED_PLANES), changes in training steps. `passes` is a number of its own, from 1: each has its recording.
 pub trait Extension: std::fmt::Debug + Send + Sync {
     /// Adds passes.
     fn extend(&self, _passes: u32, _hook: Hook, _b: &mut Builder) {}
@@ -101,13 +105,17 @@ pub fn extended_step(
     project::visible_splats(&mut b);
     let pairs = tile::bin_splats(&mut b);
     blend::blend_forward(&mut b, pairs, variant.lift);
+    optimize::clear_shared(&mut b);
+    extension.extend(passes, Hook::Picture, &mut b);
     loss::photo_loss(&mut b, variant.size.0, variant.size.1);
+    extension.extend(passes, Hook::Loss, &mut b);
     blend::blend_backward(&mut b, pairs);
     gather::gather(&mut b);
     project::project_backward(&mut b);
     extension.extend(passes, Hook::Gradients, &mut b);
     if variant.update {
         optimize::adam(&mut b, extension.updates_unseen(passes));
+        optimize::adam_shared(&mut b);
         extension.extend(passes, Hook::Updated, &mut b);
     }
     if variant.lift {

@@ -1,8 +1,8 @@
-//! Adam on every attribute, and the reset of opacities.
+//! Adam on every attribute of the Gaussians and on shared parameters, and the reset of opacities.
 
 use super::build::{Builder, args, over_gaussians};
 use crate::pass;
-use crate::scheduler::plan::{Buf, Stage};
+use crate::scheduler::plan::{Buf, Grid, Stage};
 use crate::shaders::constants;
 
 /// An attribute of the Gaussians as the optimiser sees it.
@@ -37,17 +37,50 @@ const fn attribute(planes: [Buf; 3], gradient: Buf, stride: u32, rate: u32, from
     Attribute { planes, gradient, stride, rate, from_degree, args }
 }
 
+/// Parameters that are no Gaussian's, their moments, and the weights that correct these. A capacity without rows of them
+/// has neither these buffers nor passes on them.
+pub const SHARED_PLANES: [Buf; 4] = [Buf::SHARED, Buf::M_SHARED, Buf::U_SHARED, Buf::W_SHARED];
+
 /// One Adam update of the attributes that are active; of all Gaussians, or of those alone that the step shows.
 pub fn adam(b: &mut Builder, unseen: bool) {
     let (degree, seen_only) = (b.sh_degree, u32::from(!unseen));
     b.list.stage = Stage::Optimise;
     for a in ATTRIBUTES.iter().filter(|a| a.from_degree <= degree) {
-        pass!(b, adam {
-            step: Buf::STEP, failure: Buf::FAILURE, splat_from_gaussian: Buf::SPLAT_FROM_GAUSSIAN,
-            gradients: a.gradient, parameters_in: a.planes[0], first_moments_in: a.planes[1],
-            second_moments_in: a.planes[2], parameters: a.planes[0], first_moments: a.planes[1], second_moments: a.planes[2],
-        } [stride: a.stride, rate: a.rate, seen_only: seen_only], args(a.args));
+        update(b, false, (a.planes, a.gradient), [a.stride, a.rate, seen_only], args(a.args));
     }
+}
+
+/// Shared parameters have gradient 0 until a pass of an extension writes another.
+pub fn clear_shared(b: &mut Builder) {
+    if b.capacity.shared_rows > 0 {
+        b.list.fill(Buf::V_SHARED, 0);
+    }
+}
+
+/// One Adam update of the shared parameters that belong to the step.
+pub fn adam_shared(b: &mut Builder) {
+    if b.capacity.shared_rows > 0 {
+        let [parameters, first, second, _] = SHARED_PLANES;
+        let grid = Grid::Groups(b.capacity.shared_rows.div_ceil(64) as u32, 1, 1);
+        update(b, true, ([parameters, first, second], Buf::V_SHARED), [1, 0, 0], grid);
+    }
+}
+
+fn update(
+    b: &mut Builder,
+    shared: bool,
+    (planes, gradients): ([Buf; 3], Buf),
+    [stride, rate, seen_only]: [u32; 3],
+    grid: Grid,
+) {
+    let rows = b.capacity.shared_rows as u32;
+    let [parameters, first, second] = planes;
+    pass!(b, adam(shared: shared) {
+        step: Buf::STEP, failure: Buf::FAILURE, splat_from_gaussian: Buf::SPLAT_FROM_GAUSSIAN, gradients: gradients,
+        parameters_in: parameters, first_moments_in: first, second_moments_in: second, parameters: parameters,
+        first_moments: first, second_moments: second, step_rows: Buf::STEP_ROWS, step_rates: Buf::STEP_RATES,
+        weights: Buf::W_SHARED,
+    } [stride: stride, rate: rate, seen_only: seen_only, rows: rows], grid);
 }
 
 /// No opacity above 0.01; its moments start over.

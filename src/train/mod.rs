@@ -7,6 +7,7 @@ mod sampler;
 mod sentinel;
 mod separate;
 mod setup;
+pub mod shared;
 mod state;
 pub mod step_input;
 pub mod strategy;
@@ -20,7 +21,7 @@ pub use state::{TrainState, ViewFingerprint};
 pub use strategy::Densified;
 pub use timing::StepTimes;
 
-use crate::engine::{Engine, EngineSize, InFlight, ListKey, Report};
+use crate::engine::{Engine, EngineSize, InFlight, ListKey, Report, TrainInput};
 use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::lab::fault;
@@ -30,6 +31,7 @@ use crate::scene::{Dataset, Gaussians};
 use crate::scheduler::plan::FRAMES_IN_FLIGHT;
 use crate::shaders::structs::StepUniforms;
 use sampler::ViewOrder;
+use shared::Shared;
 use std::collections::VecDeque;
 use std::sync::Arc;
 use step_input::{SceneScale, StepInput, TrainView};
@@ -65,6 +67,7 @@ pub struct Trainer {
     updates: u32,
     bound: Bound,
     strategy: Box<dyn Strategy>,
+    shared: Shared,
     /// Votes were counted before, so that masks can be compared with their outcome.
     labelled_once: bool,
     separate: separate::Separate,
@@ -99,6 +102,7 @@ impl Trainer {
         let config = TrainConfig { near, ..config };
         let mut trainer = Self::without_model(gpu, config, dataset, room, options)?;
         trainer.engine.upload_model(model)?;
+        trainer.engine.set_shared(&trainer.shared.start(trainer.views.len())?)?;
         // Bands that the model does not have start as 0.
         trainer.engine.set_sh_degree(trainer.config.sh_degree);
         Ok(trainer)
@@ -109,7 +113,7 @@ impl Trainer {
         config: TrainConfig,
         dataset: &Dataset,
         room: EngineSize,
-        TrainerOptions { shape, scheduler, strategy }: TrainerOptions,
+        TrainerOptions { shape, scheduler, strategy, shared }: TrainerOptions,
     ) -> Result<Self> {
         let fixed = SceneScale { extent: dataset.extent() };
         let most = if config.max_gaussians > 0 { config.max_gaussians } else { u64::from(u32::MAX) };
@@ -117,9 +121,10 @@ impl Trainer {
             dataset.train.iter().map(|view| setup::train_view(view, config.mask_border)).collect::<Result<Vec<_>>>()?;
         let views = Views::new(views, config.coarse_until);
         let shape = shape.unwrap_or_else(|| KernelShape::of(gpu.capabilities()));
+        let room = room.with_shared_rows(shared.rows(views.len()));
         let mut engine = Engine::with_shape(gpu, shape, room, scheduler)?;
         engine.set_sh_degree(config.sh_degree);
-        engine.set_extension(strategy.extension());
+        engine.set_extension(shared.extended(strategy.extension()));
         let order = ViewOrder::new(config.seed, views.len());
         Ok(Self {
             engine,
@@ -133,6 +138,7 @@ impl Trainer {
             updates: 0,
             bound: Bound { most, by_memory: false },
             strategy,
+            shared,
             labelled_once: false,
             separate: separate::Separate::default(),
             timing: None,
@@ -278,7 +284,9 @@ impl Trainer {
 
     fn submit(&mut self, input: StepInput) -> Result<()> {
         let (key, view, uniforms) = (self.key(&input), self.views.of(&input), self.uniforms(&input));
+        let shared = self.shared.of_step(self.at(input.step), input.view)?;
         let data = step_input::train_input(&input, view, &self.config, uniforms, &self.engine);
+        let data = TrainInput { shared, ..data };
         let flight = self.engine.submit(key, &data)?;
         self.in_flight.push_back((input, flight));
         Ok(())
@@ -296,7 +304,7 @@ impl Trainer {
         if let Some(key) = self.separate.key(variant, input) {
             return key;
         }
-        match self.strategy.passes(self.at(input.step)) {
+        match self.shared.passes(self.strategy.passes(self.at(input.step))) {
             0 => ListKey::Train(variant),
             passes => ListKey::Extended(variant, passes),
         }

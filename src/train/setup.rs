@@ -1,5 +1,6 @@
 //! What a training is made from: options, sizes, views.
 
+use super::shared::Shared;
 use super::step_input::{self, TrainView};
 use super::strategy::{DefaultStrategy, Strategy};
 use super::{LabelRule, TrainConfig};
@@ -21,6 +22,8 @@ pub struct TrainerOptions {
     pub scheduler: SchedulerOptions,
     /// What happens to the Gaussians besides the optimiser.
     pub strategy: Box<dyn Strategy>,
+    /// Parameters that are no Gaussian's.
+    pub shared: Shared,
 }
 
 impl Default for TrainerOptions {
@@ -31,7 +34,7 @@ impl Default for TrainerOptions {
 
 impl From<SchedulerOptions> for TrainerOptions {
     fn from(scheduler: SchedulerOptions) -> Self {
-        Self { shape: None, scheduler, strategy: Box::new(DefaultStrategy) }
+        Self { shape: None, scheduler, strategy: Box::new(DefaultStrategy), shared: Shared::default() }
     }
 }
 

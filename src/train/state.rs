@@ -4,12 +4,14 @@
 //! objects from the seed and the step, gradients and votes from the next step's own passes.
 
 use super::sampler::ViewOrder;
+use super::shared::KeptShared;
 use super::strategy::Kept;
 use super::{TrainConfig, Trainer, TrainerOptions, room};
 use crate::engine::{GrownSizes, state};
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::io::checkpoint::{Checkpoint, Plane};
+use crate::pass::SHARED_PLANES;
 use crate::scene::{Camera, Dataset, LabelMap, Occluders, Photo};
 use crate::scheduler::plan::{Buf, TABLE};
 use glam::DVec3;
@@ -52,6 +54,9 @@ pub struct TrainState {
     /// What the strategy keeps; the default one is not mentioned.
     #[serde(default, skip_serializing_if = "Kept::is_default")]
     pub strategy: Kept,
+    /// Whose the shared parameters are, if there are any.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub shared: Option<KeptShared>,
     /// Parameters, moments, statistics and labels.
     #[serde(skip)]
     pub planes: Vec<Plane>,
@@ -110,8 +115,8 @@ impl TrainState {
         }
         // Masks may be there and show no object.
         let labels = state.planes.iter().any(|plane| plane.name == TABLE[Buf::LABELS.index()].name);
-        state::check(&state.planes, state.gaussians, state.config.sh_degree, labels, &state.strategy.planes)
-            .map_err(odd)?;
+        let counts = [state.gaussians, state.shared.as_ref().map_or(0, |kept| kept.layout.count(state.views.len()))];
+        state::check(&state.planes, counts, state.config.sh_degree, labels, &state.strategy.planes).map_err(odd)?;
         Ok(state)
     }
 
@@ -170,6 +175,7 @@ impl Trainer {
             occluders: self.occluders(),
             run: serde_json::Value::Null,
             strategy: Kept::of(&*self.strategy),
+            shared: self.shared.kept(),
             planes: self.finite_planes()?,
             path: PathBuf::new(),
         })
@@ -183,8 +189,10 @@ impl Trainer {
         for plane in planes.iter().filter(|plane| plane.name != TABLE[Buf::LABELS.index()].name) {
             if let Some(at) = plane.data.iter().position(|word| !is_finite(word)) {
                 let row = at / plane.words.max(1) as usize;
+                let is_shared = SHARED_PLANES.iter().any(|buf| TABLE[buf.index()].name == plane.name);
+                let of = if is_shared { "row" } else { "Gaussian" };
                 return Err(Error::Numeric {
-                    quantity: format!("{} of Gaussian {row} is not finite, so there is no checkpoint", plane.name),
+                    quantity: format!("{} of {of} {row} is not finite, so there is no checkpoint", plane.name),
                     step: u64::from(self.step),
                     view: "of this step or one before".to_owned(),
                 });
@@ -236,6 +244,9 @@ impl Trainer {
     fn put(&mut self, state: &TrainState) -> Result<()> {
         let odd = |problem| Error::data(&state.path, "strategy", problem);
         state.strategy.restore(&mut *self.strategy).map_err(odd)?;
+        self.shared
+            .check(state.shared.as_ref())
+            .map_err(|problem| Error::data(&state.path, "shared parameters", problem))?;
         match self.engine.grow_to(state.sizes) {
             // On a smaller device there is less room to grow.
             Err(Error::OutOfMemory { .. }) => {}

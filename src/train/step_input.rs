@@ -206,5 +206,5 @@ pub fn train_input<'a>(
         }
         LayerInput { view_labels: &view.view_labels, layer_from_label, label_from_layer, weights, occluders }
     });
-    TrainInput { uniforms, photo: &view.photo.rgba, layers }
+    TrainInput { uniforms, photo: &view.photo.rgba, layers, shared: Vec::new() }
 }

@@ -34,10 +34,10 @@ mod table {
 }
 use table::*;
 
-const R: Access = Access::Read;
-const W: Access = Access::Write;
-const RW: Access = Access::ReadWrite;
-const S: BindingKind = BindingKind::Storage;
+pub(crate) const R: Access = Access::Read;
+pub(crate) const W: Access = Access::Write;
+pub(crate) const RW: Access = Access::ReadWrite;
+pub(crate) const S: BindingKind = BindingKind::Storage;
 const T: BindingKind = BindingKind::Texel;
 
 /// Declares a function that compiles a shader once: specialisation constants, bindings, GLSL.

@@ -107,6 +107,8 @@ domains! { Domain, Capacity;
         "Partial sums of the loss.";
     SegmentPixels segment_pixels: "segment pixels", cures::IMAGE,
         "Pixels of all jobs of the blend passes, or 0 while no tile's list is too long for one dispatch.";
+    SharedRows shared_rows: "shared rows", cures::NONE,
+        "Rows of four parameters that are no Gaussian's, or 0 in a training without any.";
     .. sort_lanes: "Lanes of the sort.";
     segments: "Dispatches that one walk of a tile's list may take.";
 }

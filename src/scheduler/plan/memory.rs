@@ -2,7 +2,7 @@
 
 use super::Limits;
 use super::buffers::{BufferDecl, Class};
-use super::capacity::Capacity;
+use super::capacity::{Capacity, Domain};
 use super::pass::PassList;
 use super::{GUARD_BYTES, Plan, PlanOptions};
 use crate::error::{Error, Result};
@@ -113,11 +113,13 @@ impl MemoryReport {
                 own_bytes(decl, capacity, options, limits.alignment())?
             };
             let bytes = one * decl.class.copies();
+            // Of what only users of the library add there is nothing to say where nobody did.
+            let added = decl.domain != Domain::SharedRows || capacity.shared_rows > 0;
             let used = decl.class != Class::Step || plans.iter().any(|plan| plan.placements[index].is_some());
             if decl.class != Class::Step {
                 total = total.saturating_add(bytes);
             }
-            if used {
+            if used && added {
                 let (name, class, element_bytes) = (decl.name, decl.class, decl.element_bytes);
                 rows.push(MemoryRow { name, class, count: capacity.count(decl.domain), element_bytes, bytes });
             }

@@ -16,6 +16,8 @@ crate::buffers! {
     LAYER_WEIGHTS "layer_weights": 4, Domain::Layers, Class::PerFrame, None, "Weight of each layer's label loss.";
     LAYER_OCCLUDERS "layer_occluders": 4, Domain::OccluderWords, Class::PerFrame, WORD, "For each layer a bit per label id: set where that object hides the layer's.";
     VOTE_WEIGHTS "vote_weights": 4, Domain::VoteColumns, Class::PerFrame, None, "Weight of the votes for each label in this view.";
+    STEP_ROWS "step_rows": 4, Domain::SharedRows, Class::PerFrame, WORD, "Shared rows of the step: the scene's, then the photo's; NO_ROW behind them.";
+    STEP_RATES "step_rates": 16, Domain::SharedRows, Class::PerFrame, None, "Learning rates of these rows; a row without any rests.";
     REPORT "report": size_of::<Counters>() as u32, Domain::One, Class::Report, None, "Counters of a step, for the host.";
     REPORT_FAILURE "report_failure": 4, Domain::One, Class::Report, None, "The failure word after a step, for the host.";
 
@@ -41,6 +43,10 @@ crate::buffers! {
     U_SH2 "u_sh2": 64, Domain::Trained, Class::Model, VEC4, "Second moments of sh2.";
     U_SH3 "u_sh3": 96, Domain::Trained, Class::Model, VEC4, "Second moments of sh3.";
     LABELS "labels": 4, Domain::Labelled, Class::Model, WORD, "Object of each Gaussian [N], 0: unlabelled.";
+    SHARED "shared_parameters": 16, Domain::SharedRows, Class::Model, VEC4, "Parameters of the scene and of each photo [S].";
+    M_SHARED "m_shared": 16, Domain::SharedRows, Class::Model, VEC4, "First moments of shared_parameters.";
+    U_SHARED "u_shared": 16, Domain::SharedRows, Class::Model, VEC4, "Second moments of shared_parameters.";
+    W_SHARED "w_shared": 8, Domain::SharedRows, Class::Model, None, "Weight of all gradients in either moment of a row [S]: 1 - beta^t after its t-th update.";
     DENSIFY_STATS "densify_stats": 8, Domain::Trained, Class::Model, None, "Sum of screen gradients and number of views since the last densification [N].";
     LABEL_KEYS "label_keys": 4, Domain::Labelled, Class::Persistent, None, "Votes of a step [N]: weight in the high half, label in the low; 0: none.";
     VOTES_LOW "votes_low": 4, Domain::VoteCells, Class::Model, None, "Votes of a sweep by Gaussian and label [N, columns], the lower words.";
@@ -95,6 +101,7 @@ crate::buffers! {
     V_SH1 "v_sh1": 48, Domain::Gaussians, Class::Step, VEC4, "Gradients of sh1 [V].";
     V_SH2 "v_sh2": 64, Domain::Gaussians, Class::Step, VEC4, "Gradients of sh2 [V].";
     V_SH3 "v_sh3": 96, Domain::Gaussians, Class::Step, VEC4, "Gradients of sh3 [V].";
+    V_SHARED "v_shared": 16, Domain::SharedRows, Class::Step, VEC4, "Gradients of shared_parameters [S].";
     CHILDREN_COUNTS "children_counts": 4, Domain::Gaussians, Class::Step, WORD, "What each Gaussian becomes: 0, 1 or 2 [N].";
     CHILD_OFFSETS "child_offsets": 4, Domain::Gaussians, Class::Step, WORD, "Place of the first child [N].";
     DENSIFY_ACTIONS "densify_actions": 4, Domain::Gaussians, Class::Step, WORD, "Decision for each Gaussian [N].";

@@ -21,17 +21,21 @@ pub struct Optimised {
 pub fn adam(rules: &Rules, rates: &Rates, step: u32, state: &Optimised, gradient: &Row) -> Optimised {
     let (mut row, mut m, mut u) = (state.row.floats(), state.m.floats(), state.u.floats());
     let g = gradient.floats();
-    let (beta1, beta2) = (rules.adam_beta1, rules.adam_beta2);
-    let exponent = f64::from(step);
-    let (correct1, correct2) = (1.0 - beta1.powf(exponent), 1.0 - beta2.powf(exponent));
     for (group, rate) in Group::ALL.into_iter().zip(rates.0) {
         for i in group.range() {
-            m[i] = beta1 * m[i] + (1.0 - beta1) * g[i];
-            u[i] = beta2 * u[i] + (1.0 - beta2) * g[i] * g[i];
-            row[i] -= rate * (m[i] / correct1) / ((u[i] / correct2).sqrt() + rules.adam_eps);
+            [row[i], m[i], u[i]] = adam_value(rules, rate, step, [row[i], m[i], u[i]], g[i]);
         }
     }
     Optimised { row: Row::from_floats(&row), m: Row::from_floats(&m), u: Row::from_floats(&u) }
+}
+
+/// One update of one parameter with its moments: its `step`-th.
+pub fn adam_value(rules: &Rules, rate: f64, step: u32, [value, m, u]: [f64; 3], g: f64) -> [f64; 3] {
+    let (beta1, beta2, exponent) = (rules.adam_beta1, rules.adam_beta2, f64::from(step));
+    let m = beta1 * m + (1.0 - beta1) * g;
+    let u = beta2 * u + (1.0 - beta2) * g * g;
+    let (m_hat, u_hat) = (m / (1.0 - beta1.powf(exponent)), u / (1.0 - beta2.powf(exponent)));
+    [value - rate * m_hat / (u_hat.sqrt() + rules.adam_eps), m, u]
 }
 
 /// Rate that falls from `first` to `last` along an exponential over `steps`.

@@ -112,6 +112,7 @@ pub fn engine_lists(shape: KernelShape) -> (Capacity, Vec<PassList>) {
         sort_cells: 64 * 256,
         loss_partials: 1024,
         sort_lanes: 64,
+        shared_rows: 70,
         segments: 2,
     };
     let variant = Variant { labels: true, lift: true, sh_degree: 3, size: (256, 256), update: true, counts: false };
