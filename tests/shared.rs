@@ -174,9 +174,9 @@ fn with(parameters: impl SharedParameters + 'static) -> TrainerOptions {
     TrainerOptions { shared: parameters.into(), ..TrainerOptions::default() }
 }
 
-fn trainer(turn: &Turn, mut scene: Dataset, config: TrainConfig, options: impl Into<TrainerOptions>) -> Trainer {
+fn trainer(turn: &Turn, scene: Dataset, config: TrainConfig, options: impl Into<TrainerOptions>) -> Trainer {
     let start = initial_gaussians(&scene, 0, 100).expect("points");
-    Trainer::new(turn.gpu(), config, &mut scene, &start, options).expect("a trainer")
+    Trainer::new(turn.gpu(), config, &scene, &start, options).expect("a trainer")
 }
 
 fn settings() -> TrainConfig {
@@ -195,7 +195,7 @@ fn rows(trainer: &mut Trainer) -> Vec<[[f32; 4]; 3]> {
     trainer.drain().expect("reports");
     let values = trainer.engine_mut().shared().expect("rows");
     let raw = trainer.engine_mut().raw_mut();
-    let mut read = |buf| raw.download_all::<[f32; 4]>(buf, 0).expect("moments");
+    let mut read = |buf| raw.download::<[f32; 4]>(buf, 0, 0, values.len()).expect("moments");
     let (m, u) = (read(Buf::M_SHARED), read(Buf::U_SHARED));
     values.into_iter().zip(m.into_iter().zip(u)).map(|(value, (m, u))| [value, m, u]).collect()
 }
@@ -251,14 +251,14 @@ fn shared_rows_go_on_from_a_checkpoint() {
     go_on(&mut straight, 17).write(&file).expect("a file");
     let expected = go_on(&mut straight, 30);
     let read = || TrainState::read(&file).expect("a state");
-    let mut resumed = Trainer::resume(turn.gpu(), &mut small(), read(), with(Pulled)).expect("it goes on");
+    let mut resumed = Trainer::resume(turn.gpu(), &small(), read(), with(Pulled)).expect("it goes on");
     let found = go_on(&mut resumed, 30);
     assert!(found.planes.iter().any(|plane| plane.name == "w_shared" && plane.data.len() == 2 * ROWS));
     assert_eq!((found.shared, found.planes), (expected.shared, expected.planes));
     straight.restore(&read()).expect("it goes back");
     assert_eq!(straight.state().expect("a state").planes, read().planes);
     for (options, now) in [(TrainerOptions::default(), "none"), (with(Brightness), "brightness")] {
-        let refused = Trainer::resume(turn.gpu(), &mut small(), read(), options);
+        let refused = Trainer::resume(turn.gpu(), &small(), read(), options);
         let error = refused.err().expect("other parameters").to_string();
         assert!(error.contains("were pulled (1 rows") && error.contains(&format!("there are {now}")), "{error}");
     }
@@ -275,7 +275,7 @@ fn a_brightness_of_each_photo_is_found() {
     let Some(turn) = device() else { return };
     let mut scene = small();
     for view in scene.train.iter_mut().skip(1).step_by(2) {
-        let photo = view.photo.as_mut().expect("a photo");
+        let photo = Arc::make_mut(view.photo.as_mut().expect("a photo"));
         photo.rgba.iter_mut().for_each(|[r, g, b, _]| [r, g, b].into_iter().for_each(|v| *v = v.saturating_sub(50)));
     }
     let config = TrainConfig { iterations: 60, densify_from: 1000, ..TrainConfig::default() };

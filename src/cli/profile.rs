@@ -165,7 +165,7 @@ fn measure(trainer: &mut Trainer, args: &ProfileArgs, context: &Context, profile
     let reports: Vec<StepReport> = reports.into_iter().filter(|report| timed(report.step)).collect();
     let times = trainer.take_times().into_iter().filter(|times| timed(times.step)).collect();
     profile.gaussians = trainer.gaussian_count();
-    profile.room = *trainer.engine_mut().room();
+    profile.size = *trainer.engine_mut().size();
     profile.fill(clocks, &reports, times);
     trainer.count_pairs(true);
     let mut counted = Vec::new();

@@ -63,7 +63,7 @@ pub struct Profile {
     /// Gaussians at the end.
     pub gaussians: u32,
     /// What the memory was sized for.
-    pub room: EngineSize,
+    pub size: EngineSize,
     clocks: Clocks,
     passes: Vec<(Stage, PassTime)>,
     stages: Vec<(Stage, PassTime)>,
@@ -92,7 +92,7 @@ impl Profile {
             warm_up: window.warm_up,
             views: 0,
             gaussians: 0,
-            room: EngineSize::default().for_training(),
+            size: EngineSize::default().for_training(),
             clocks: Clocks::default(),
             passes: Vec::new(),
             stages: Vec::new(),
@@ -177,7 +177,7 @@ impl Profile {
             Some(Workers { count, source }) => format!("times {count} worker threads ({source})"),
             None => "of the whole device".to_owned(),
         };
-        let (width, height) = self.room.image;
+        let (width, height) = self.size.image;
         let walked =
             self.counters.iter().find(|(name, _, _)| *name == "pairs_walked").map_or(f64::NAN, |(_, _, v)| v.mean);
         format!(
@@ -194,9 +194,9 @@ impl Profile {
     pub fn to_text(&self) -> String {
         let (first, last) =
             (self.from_step + self.warm_up + 1, self.from_step + self.warm_up + self.steps.len() as u32);
-        let labels = if self.room.labels.is_some() { "with labels" } else { "without labels" };
+        let labels = if self.size.labels.is_some() { "with labels" } else { "without labels" };
         let mode = if self.overlap { "passes overlap" } else { "a barrier before each pass" };
-        let (width, height) = self.room.image;
+        let (width, height) = self.size.image;
         let mut text = format!(
             "device:  {} ({})\nkernels: {}\nsteps {first} to {last} of training {labels}, {} views of up to {width} x \
              {height} px, {} Gaussians at the end\n{} steps count for the passes, {} first runs of a recording do not; \
@@ -246,9 +246,9 @@ impl Profile {
             "barrier_before_each_pass": !self.overlap,
             "from_step": self.from_step,
             "warm_up": self.warm_up,
-            "labels": self.room.labels.is_some(),
+            "labels": self.size.labels.is_some(),
             "views": self.views,
-            "size": [self.room.image.0, self.room.image.1],
+            "size": [self.size.image.0, self.size.image.1],
             "gaussians": self.gaussians,
             "steps_counted": self.counted(),
             "stages": self.stages.iter().map(row).collect::<Vec<_>>(),

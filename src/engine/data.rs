@@ -25,7 +25,7 @@ impl Engine {
 
     /// The shared parameters; none if the engine was made without rows of them.
     pub fn shared(&mut self) -> Result<Vec<[f32; 4]>> {
-        self.sched.download_all(Buf::SHARED, 0)
+        self.sched.download(Buf::SHARED, 0, 0, self.size.shared_rows as usize)
     }
 
     /// Replaces the first shared parameters; the moments of all start over.

@@ -23,35 +23,35 @@ pub struct GrownSizes {
 }
 
 /// Capacities for some room, before any measurement.
-pub fn capacity(shape: &KernelShape, room: &EngineSize) -> Capacity {
-    let (width, height) = room.image;
+pub fn capacity(shape: &KernelShape, size: &EngineSize) -> Capacity {
+    let (width, height) = size.image;
     let (tiles_x, tiles_y) = shape.tiles(width, height);
     let tiles = u64::from(tiles_x) * u64::from(tiles_y);
-    let layers = room.labels.map_or(0, |labels| u64::from(labels.layers));
-    let labels = room.labels.map_or(0, |labels| u64::from(labels.max_label) + 1);
+    let layers = size.labels.map_or(0, |labels| u64::from(labels.layers));
+    let labels = size.labels.map_or(0, |labels| u64::from(labels.max_label) + 1);
     let label_words = if labels > 0 { labels.div_ceil(32) * (layers + 1) } else { 0 };
     // Lists bind the model even if it is empty.
-    let gaussians = room.gaussians.max(1);
+    let gaussians = size.gaussians.max(1);
     let instances = (gaussians * 6).max(tiles * 16);
     let mut capacity = Capacity {
         gaussians,
-        trained: if room.trained { gaussians } else { 0 },
+        trained: if size.trained { gaussians } else { 0 },
         labelled: if labels > 0 { gaussians } else { 0 },
         virtual_tiles: tiles * (layers + 1),
         layer_tiles: if layers > 0 { tiles } else { 0 },
         pixels: u64::from(width) * u64::from(height),
         labelled_pixels: if labels > 0 { u64::from(width) * u64::from(height) } else { 0 },
         labels,
-        vote_columns: room.labels.map_or(0, |labels| u64::from(labels.vote_columns)),
-        vote_cells: room.labels.map_or(0, |labels| u64::from(labels.vote_columns)) * gaussians,
+        vote_columns: size.labels.map_or(0, |labels| u64::from(labels.vote_columns)),
+        vote_cells: size.labels.map_or(0, |labels| u64::from(labels.vote_columns)) * gaussians,
         layers: if labels > 0 { layers + 1 } else { 0 },
         occluder_words: label_words,
         loss_partials: u64::from(loss::partials(shape.subgroup, width, height)),
         segments: 1,
-        shared_rows: u64::from(room.shared_rows),
+        shared_rows: u64::from(size.shared_rows),
         ..Capacity::default()
     };
-    derive(shape, &mut capacity, instances, room.trained);
+    derive(shape, &mut capacity, instances, size.trained);
     capacity
 }
 
@@ -69,38 +69,38 @@ fn derive(shape: &KernelShape, capacity: &mut Capacity, instances: u64, trained:
 
 impl Engine {
     /// The memory that an engine for `room` would take, before anything is allocated.
-    pub fn predict(gpu: &Gpu, room: &EngineSize, options: SchedulerOptions) -> Result<MemoryReport> {
+    pub fn predict(gpu: &Gpu, size: &EngineSize, options: SchedulerOptions) -> Result<MemoryReport> {
         let shape = KernelShape::of(gpu.capabilities());
-        let capacity = capacity(&shape, room);
-        let lists = Self::lists_of(&shape, &capacity, room);
+        let capacity = capacity(&shape, size);
+        let lists = Self::lists_of(&shape, &capacity, size);
         Scheduler::predict(TABLE, &capacity, &lists, &options.limits(gpu))
     }
 
     /// The lists that decide how much scratch memory is needed.
-    pub fn lists_of(shape: &KernelShape, capacity: &Capacity, room: &EngineSize) -> Vec<PassList> {
+    pub fn lists_of(shape: &KernelShape, capacity: &Capacity, size: &EngineSize) -> Vec<PassList> {
         let mut lists = vec![pass::render_view(shape, capacity, 3)];
-        if room.trained {
+        if size.trained {
             let variant = Variant {
-                labels: room.labels.is_some(),
-                lift: room.labels.is_some(),
+                labels: size.labels.is_some(),
+                lift: size.labels.is_some(),
                 sh_degree: 3,
-                size: room.image,
+                size: size.image,
                 update: true,
                 counts: false,
             };
             lists.insert(0, pass::training_step(shape, capacity, variant));
-            lists.push(pass::densify_apply(shape, capacity, room.labels.is_some()));
+            lists.push(pass::densify_apply(shape, capacity, size.labels.is_some()));
         }
         lists
     }
 
     /// Grows the model's buffers if `count` Gaussians do not fit. All lists are recorded again.
     pub fn make_room_for_gaussians(&mut self, count: u64) -> Result<()> {
-        if count <= self.room.gaussians {
+        if count <= self.size.gaussians {
             return Ok(());
         }
         self.check_idle()?;
-        let roomy = Capacity::grown(self.room.gaussians, count);
+        let roomy = Capacity::grown(self.size.gaussians, count);
         let gaussians = if self.fits(&self.with_gaussians(roomy))? { roomy } else { count };
         let gaussians = match self.set_capacity(self.with_gaussians(gaussians)) {
             // Drivers may hold less than they tell.
@@ -110,28 +110,28 @@ impl Engine {
             }
             other => other.map(|()| gaussians)?,
         };
-        self.room.gaussians = gaussians;
+        self.size.gaussians = gaussians;
         Ok(())
     }
 
     /// Makes the largest image at least `width` x `height` px; the model stays. Nothing may be in flight. All lists are
     /// recorded again.
     pub fn grow_image(&mut self, width: u32, height: u32) -> Result<()> {
-        let image = (self.room.image.0.max(width), self.room.image.1.max(height));
-        if image == self.room.image {
+        let image = (self.size.image.0.max(width), self.size.image.1.max(height));
+        if image == self.size.image {
             return Ok(());
         }
         self.check_idle()?;
-        let room = EngineSize { image, ..self.room };
-        room.check(&self.shape)?;
-        self.set_capacity(self.capacity_for(&room))?;
-        self.room = room;
+        let size = EngineSize { image, ..self.size };
+        size.check(&self.shape)?;
+        self.set_capacity(self.capacity_for(&size))?;
+        self.size = size;
         Ok(())
     }
 
     /// The most Gaussians, up to `wanted`, that there is memory for. What there is room for already is never less.
     pub fn most_gaussians(&self, wanted: u64) -> Result<u64> {
-        let (mut fits, mut too_many) = (self.room.gaussians, wanted + 1);
+        let (mut fits, mut too_many) = (self.size.gaussians, wanted + 1);
         if wanted <= fits || self.fits(&self.with_gaussians(wanted))? {
             return Ok(wanted);
         }
@@ -147,23 +147,23 @@ impl Engine {
     }
 
     fn with_gaussians(&self, gaussians: u64) -> Capacity {
-        self.capacity_for(&EngineSize { gaussians, ..self.room })
+        self.capacity_for(&EngineSize { gaussians, ..self.size })
     }
 
     /// Capacities for a larger room, with no fewer pairs, tiles and segments than the scene has needed so far.
-    fn capacity_for(&self, room: &EngineSize) -> Capacity {
+    fn capacity_for(&self, size: &EngineSize) -> Capacity {
         let old = self.sched.capacity();
-        let mut new = capacity(&self.shape, room);
+        let mut new = capacity(&self.shape, size);
         new.layer_tiles = new.layer_tiles.max(old.layer_tiles);
         new.segments = old.segments;
         let instances = new.instances.max(old.instances);
-        derive(&self.shape, &mut new, instances, self.room.trained);
+        derive(&self.shape, &mut new, instances, self.size.trained);
         new
     }
 
     /// True if the memory suffices for these capacities and all lists.
     fn fits(&self, capacity: &Capacity) -> Result<bool> {
-        let lists = Self::lists_of(&self.shape, capacity, &self.room);
+        let lists = Self::lists_of(&self.shape, capacity, &self.size);
         match self.sched.predict_here(capacity, &lists) {
             Ok(_) => Ok(true),
             Err(Error::OutOfMemory { .. }) => Ok(false),
@@ -212,7 +212,7 @@ impl Engine {
         follow(&mut new.layer_tiles, needed.layer_tile_count);
         new.segments = new.segments.max(u64::from(needed.longest_list.div_ceil(self.shape.segment_length)));
         let instances = new.instances;
-        derive(&self.shape, &mut new, instances, self.room.trained);
+        derive(&self.shape, &mut new, instances, self.size.trained);
         new
     }
 
@@ -221,7 +221,7 @@ impl Engine {
         let capacity = self.sched.capacity();
         let word = |size: u64| u32::try_from(size).unwrap_or(u32::MAX);
         GrownSizes {
-            gaussians: word(self.room.gaussians),
+            gaussians: word(self.size.gaussians),
             instances: word(capacity.instances),
             layer_tiles: word(capacity.layer_tiles),
             segments: word(capacity.segments),
@@ -230,16 +230,16 @@ impl Engine {
 
     /// Makes the memory of a new engine as large as another one's had become.
     pub fn grow_to(&mut self, sizes: GrownSizes) -> Result<()> {
-        let gaussians = self.room.gaussians.max(u64::from(sizes.gaussians));
-        let mut new = capacity(&self.shape, &EngineSize { gaussians, ..self.room });
+        let gaussians = self.size.gaussians.max(u64::from(sizes.gaussians));
+        let mut new = capacity(&self.shape, &EngineSize { gaussians, ..self.size });
         if new.layer_tiles > 0 {
             new.layer_tiles = new.layer_tiles.max(u64::from(sizes.layer_tiles));
         }
         new.segments = new.segments.max(u64::from(sizes.segments));
         let instances = new.instances.max(u64::from(sizes.instances));
-        derive(&self.shape, &mut new, instances, self.room.trained);
+        derive(&self.shape, &mut new, instances, self.size.trained);
         self.set_capacity(new)?;
-        self.room.gaussians = gaussians;
+        self.size.gaussians = gaussians;
         Ok(())
     }
 

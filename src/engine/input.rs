@@ -93,7 +93,7 @@ impl Engine {
             Input::Train(train) => &train.uniforms,
             Input::Vote(vote) => &vote.uniforms,
         };
-        self.room.check_image(uniforms.width, uniforms.height)?;
+        self.size.check_image(uniforms.width, uniforms.height)?;
         // Records of (splat, tile) pairs are valid by the mark of their submit.
         self.stamp = self.stamp.wrapping_add(1).max(1);
         if let Input::Train(train) = input {
@@ -125,7 +125,7 @@ impl Engine {
         let mut sorted = rows.clone();
         sorted.sort_unstable();
         sorted.dedup();
-        let all = self.room.shared_rows;
+        let all = self.size.shared_rows;
         if sorted.len() < rows.len() || sorted.last().is_some_and(|&row| row >= all) {
             return Err(Error::Bug(format!("the shared rows {rows:?} of a step are not different ones of {all}")));
         }

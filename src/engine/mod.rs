@@ -32,7 +32,7 @@ use std::sync::Arc;
 pub struct Engine {
     sched: Scheduler,
     shape: KernelShape,
-    room: EngineSize,
+    size: EngineSize,
     lists: HashMap<ListKey, ListId>,
     gaussian_count: u32,
     sh_degree: u32,
@@ -50,20 +50,20 @@ pub struct Engine {
 }
 
 impl Engine {
-    /// Allocates for `room`.
-    pub fn new(gpu: Arc<Gpu>, room: EngineSize, options: SchedulerOptions) -> Result<Self> {
+    /// Allocates for `size`.
+    pub fn new(gpu: Arc<Gpu>, size: EngineSize, options: SchedulerOptions) -> Result<Self> {
         let shape = KernelShape::of(gpu.capabilities());
-        Self::with_shape(gpu, shape, room, options)
+        Self::with_shape(gpu, shape, size, options)
     }
 
     /// As [`Engine::new`], with kernels of a given shape.
-    pub fn with_shape(gpu: Arc<Gpu>, shape: KernelShape, room: EngineSize, options: SchedulerOptions) -> Result<Self> {
+    pub fn with_shape(gpu: Arc<Gpu>, shape: KernelShape, size: EngineSize, options: SchedulerOptions) -> Result<Self> {
         shape.check()?;
-        room.check(&shape)?;
+        size.check(&shape)?;
         Ok(Self {
-            sched: Scheduler::new(gpu, TABLE, capacity(&shape, &room), options)?,
+            sched: Scheduler::new(gpu, TABLE, capacity(&shape, &size), options)?,
             shape,
-            room,
+            size,
             lists: HashMap::new(),
             gaussian_count: 0,
             sh_degree: 0,
@@ -87,8 +87,8 @@ impl Engine {
     }
 
     /// What the memory is sized for.
-    pub fn room(&self) -> &EngineSize {
-        &self.room
+    pub fn size(&self) -> &EngineSize {
+        &self.size
     }
 
     /// Gaussians of the model.
@@ -124,7 +124,7 @@ impl Engine {
     /// Puts a model into the device's memory; moments and statistics start at 0.
     pub fn upload_model(&mut self, gaussians: &Gaussians) -> Result<()> {
         self.make_room_for_gaussians(gaussians.len() as u64)?;
-        model::upload(&mut self.sched, gaussians, self.room.labels.is_some())?;
+        model::upload(&mut self.sched, gaussians, self.size.labels.is_some())?;
         self.gaussian_count = gaussians.len() as u32;
         (self.sh_degree, self.origin) = (gaussians.sh_degree, gaussians.origin);
         Ok(())
@@ -133,7 +133,7 @@ impl Engine {
     /// Reads the model back.
     pub fn download_model(&mut self) -> Result<Gaussians> {
         self.sched.wait_all()?;
-        let labels = self.room.labels.is_some();
+        let labels = self.size.labels.is_some();
         let model = model::download(&mut self.sched, self.gaussian_count as usize, self.sh_degree, labels)?;
         Ok(Gaussians { origin: self.origin, ..model })
     }

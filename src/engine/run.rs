@@ -71,7 +71,7 @@ impl Engine {
             ListKey::Render(sh_degree) => pass::render_view(shape, capacity, sh_degree),
             ListKey::Vote(rounds) => pass::vote_view(shape, capacity, rounds),
             ListKey::DensifyCount => pass::densify_count(shape, capacity),
-            ListKey::DensifyApply => pass::densify_apply(shape, capacity, self.room.labels.is_some()),
+            ListKey::DensifyApply => pass::densify_apply(shape, capacity, self.size.labels.is_some()),
             ListKey::OpacityReset => pass::opacity_reset(shape, capacity),
         };
         let id = self.sched.prepare(&list)?;

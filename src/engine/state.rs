@@ -50,9 +50,9 @@ pub fn check(planes: &[Plane], counts: [u32; 2], sh_degree: u32, labels: bool, k
 impl Engine {
     /// Reads the state with what the strategy keeps; nothing may be in flight.
     pub fn download_state(&mut self, kept: &[Buf]) -> Result<Vec<Plane>> {
-        let counts = [self.gaussian_count, self.room.shared_rows];
+        let counts = [self.gaussian_count, self.size.shared_rows];
         let planes =
-            buffers(self.sh_degree, self.room.labels.is_some(), kept, counts).into_iter().map(|(buf, count)| {
+            buffers(self.sh_degree, self.size.labels.is_some(), kept, counts).into_iter().map(|(buf, count)| {
                 let data = self.sched.download(buf, 0, 0, count as usize * words(buf) as usize)?;
                 Ok(Plane { name: TABLE[buf.index()].name.to_owned(), words: words(buf), data })
             });

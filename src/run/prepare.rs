@@ -161,14 +161,14 @@ fn start(
 ) -> Result<Trainer> {
     let mut model = init::initial_gaussians(dataset, config.seed, init::RANDOM_COUNT)?;
     bound_start(&mut model, config);
-    let room = train::start_room(&gpu, dataset, config, model.len(), options)?;
-    let memory = Engine::predict(&gpu, &room, options)?;
+    let size = train::start_size(&gpu, dataset, config, model.len(), options)?;
+    let memory = Engine::predict(&gpu, &size, options)?;
     tracing::info!(
         "memory to start with: {:.1} MiB on the device, for {} Gaussians and {} x {} px; it grows with the model",
         memory.total as f64 / f64::from(1 << 20),
-        room.gaussians,
-        room.image.0,
-        room.image.1
+        size.gaussians,
+        size.image.0,
+        size.image.1
     );
     let mut trainer = Trainer::new(gpu, config.clone(), dataset, &model, options)?;
     if let Some(table) = occluders {

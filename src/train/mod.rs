@@ -16,7 +16,7 @@ mod views;
 mod votes;
 
 pub use config::{LabelRule, Occlusion, TrainConfig};
-pub use setup::{TrainerOptions, room, start_room};
+pub use setup::{TrainerOptions, engine_size, start_size};
 pub use state::{TrainState, ViewFingerprint};
 pub use strategy::Densified;
 pub use timing::StepTimes;
@@ -94,13 +94,13 @@ impl Trainer {
     ) -> Result<Self> {
         config.check()?;
         let options = options.into();
-        let room = start_room(&gpu, dataset, &config, model.len(), options.scheduler)?;
+        let size = start_size(&gpu, dataset, &config, model.len(), options.scheduler)?;
         let near = match config.near {
             0.0 => near::near_plane(dataset.train.iter().map(|view| &view.camera), model),
             near => near,
         };
         let config = TrainConfig { near, ..config };
-        let mut trainer = Self::without_model(gpu, config, dataset, room, options)?;
+        let mut trainer = Self::without_model(gpu, config, dataset, size, options)?;
         trainer.engine.upload_model(model)?;
         trainer.engine.set_shared(&trainer.shared.start(trainer.views.len())?)?;
         // Bands that the model does not have start as 0.
@@ -112,7 +112,7 @@ impl Trainer {
         gpu: Arc<Gpu>,
         config: TrainConfig,
         dataset: &Dataset,
-        room: EngineSize,
+        size: EngineSize,
         TrainerOptions { shape, scheduler, strategy, shared }: TrainerOptions,
     ) -> Result<Self> {
         let fixed = SceneScale { extent: dataset.extent() };
@@ -121,8 +121,8 @@ impl Trainer {
             dataset.train.iter().map(|view| setup::train_view(view, config.mask_border)).collect::<Result<Vec<_>>>()?;
         let views = Views::new(views, config.coarse_until);
         let shape = shape.unwrap_or_else(|| KernelShape::of(gpu.capabilities()));
-        let room = room.with_shared_rows(shared.rows(views.len()));
-        let mut engine = Engine::with_shape(gpu, shape, room, scheduler)?;
+        let size = size.with_shared_rows(shared.rows(views.len()));
+        let mut engine = Engine::with_shape(gpu, shape, size, scheduler)?;
         engine.set_sh_degree(config.sh_degree);
         engine.set_extension(shared.extended(strategy.extension()));
         let order = ViewOrder::new(config.seed, views.len());
@@ -132,7 +132,7 @@ impl Trainer {
             views,
             fixed,
             order,
-            image: room.image,
+            image: size.image,
             in_flight: VecDeque::new(),
             step: 0,
             updates: 0,

@@ -40,7 +40,7 @@ impl Trainer {
     /// True before the steps at which the occluders are looked at.
     pub(super) fn refreshes_occluders(&self, step: u32) -> bool {
         let config = &self.config;
-        self.engine.room().labels.is_some()
+        self.engine.size().labels.is_some()
             && config.occlusion == Occlusion::Rendered
             && config.labels_at(step)
             && (step - config.labels_from()).is_multiple_of(config.occlusion_every)

@@ -39,7 +39,7 @@ impl From<SchedulerOptions> for TrainerOptions {
 }
 
 /// Room for training on a data set.
-pub fn room(dataset: &Dataset, config: &TrainConfig, gaussians: u64) -> Result<EngineSize> {
+pub fn engine_size(dataset: &Dataset, config: &TrainConfig, gaussians: u64) -> Result<EngineSize> {
     let sizes = dataset.train.iter().chain(&dataset.test).map(|view| (view.camera.width, view.camera.height));
     let image = sizes.reduce(|a, b| (a.0.max(b.0), a.1.max(b.1)));
     let image = image.ok_or_else(|| Error::data(&dataset.root, "", "the scene has no view to train on"))?;
@@ -58,7 +58,7 @@ pub fn room(dataset: &Dataset, config: &TrainConfig, gaussians: u64) -> Result<E
 }
 
 /// Room to start with: for twice as many Gaussians as there are, or for those where memory is short.
-pub fn start_room(
+pub fn start_size(
     gpu: &Gpu,
     dataset: &Dataset,
     config: &TrainConfig,
@@ -67,7 +67,7 @@ pub fn start_room(
 ) -> Result<EngineSize> {
     let gaussians = gaussians as u64;
     let most = if config.max_gaussians > 0 { config.max_gaussians } else { u64::MAX };
-    let roomy = room(dataset, config, (gaussians * 2).min(most).max(gaussians))?;
+    let roomy = engine_size(dataset, config, (gaussians * 2).min(most).max(gaussians))?;
     match Engine::predict(gpu, &roomy, options) {
         Err(Error::OutOfMemory { .. }) => Ok(EngineSize { gaussians, ..roomy }),
         other => other.map(|_| roomy),

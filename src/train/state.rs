@@ -6,7 +6,7 @@
 use super::sampler::ViewOrder;
 use super::shared::KeptShared;
 use super::strategy::Kept;
-use super::{TrainConfig, Trainer, TrainerOptions, room};
+use super::{TrainConfig, Trainer, TrainerOptions, engine_size};
 use crate::engine::{GrownSizes, state};
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
@@ -220,15 +220,15 @@ impl Trainer {
                 tracing::warn!("{} was made with {then}, this is {now}: bits may differ", state.path.display());
             }
         }
-        let room = room(dataset, &state.config, u64::from(state.gaussians))?;
-        if let Some(labels) = room.labels
+        let size = engine_size(dataset, &state.config, u64::from(state.gaussians))?;
+        if let Some(labels) = size.labels
             && let Some(plane) = state.planes.iter().find(|plane| plane.name == "labels")
             && let Some(label) = plane.data.iter().find(|&&label| label > labels.max_label)
         {
             let problem = format!("is {label}, the masks have ids up to {}", labels.max_label);
             return Err(Error::data(&state.path, "a label", problem));
         }
-        let mut trainer = Self::without_model(gpu, state.config.clone(), dataset, room, options.into())?;
+        let mut trainer = Self::without_model(gpu, state.config.clone(), dataset, size, options.into())?;
         trainer.fingerprints = fingerprints;
         trainer.put(&state)?;
         Ok(trainer)

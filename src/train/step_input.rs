@@ -158,7 +158,7 @@ pub fn uniforms(
     let base = engine.view_uniforms(&view.camera, config.near, config.background);
     let rate = (config.position_lr(input.step) * fixed.extent) as f32;
     let correction = |beta: f32| (1.0 / (1.0 - f64::from(beta).powi(input.updates.max(1) as i32))) as f32;
-    let labels = engine.room().labels.map_or(0, |room| room.max_label + 1);
+    let labels = engine.size().labels.map_or(0, |room| room.max_label + 1);
     StepUniforms {
         layer_count: input.layers.len() as u32,
         lambda_dssim: config.lambda_dssim,
@@ -188,7 +188,7 @@ pub fn train_input<'a>(
     uniforms: StepUniforms,
     engine: &Engine,
 ) -> TrainInput<'a> {
-    let room = engine.room().labels.filter(|_| input.labels);
+    let room = engine.size().labels.filter(|_| input.labels);
     let layers = room.map(|room| {
         let words = uniforms.occluder_words as usize;
         let mut layer_from_label = vec![0_u32; room.max_label as usize + 1];

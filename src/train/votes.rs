@@ -8,7 +8,7 @@ use crate::scene::Gaussians;
 
 impl Trainer {
     fn votes(&self) -> bool {
-        self.engine.room().labels.is_some() && self.config.label_rule == LabelRule::Votes
+        self.engine.size().labels.is_some() && self.config.label_rule == LabelRule::Votes
     }
 
     /// True before the steps at which votes are counted.

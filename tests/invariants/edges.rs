@@ -150,11 +150,11 @@ fn no_labels_no_cost() {
     }
     // Nor does a render pay for training.
     let labels = Some(LabelSize { max_label: 3, layers: 2, vote_columns: 0 });
-    let room = |trained, labels| EngineSize { trained, labels, ..EngineSize::new(1000, (64, 48)) };
-    let total = |room: &EngineSize| {
-        Engine::predict(fixture.engine.gpu(), room, SchedulerOptions::default()).expect("it fits").total
+    let size = |trained, labels| EngineSize { trained, labels, ..EngineSize::new(1000, (64, 48)) };
+    let total = |size: &EngineSize| {
+        Engine::predict(fixture.engine.gpu(), size, SchedulerOptions::default()).expect("it fits").total
     };
     assert!(
-        total(&room(false, None)) < total(&room(true, None)) && total(&room(true, None)) < total(&room(true, labels))
+        total(&size(false, None)) < total(&size(true, None)) && total(&size(true, None)) < total(&size(true, labels))
     );
 }

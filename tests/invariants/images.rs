@@ -60,11 +60,11 @@ fn an_engine_that_has_grown_renders_as_one_made_so_large() {
     grown.upload_model(&model).expect("the model");
     let before = render(&mut grown, &camera, &RenderOptions::default()).expect("a picture");
     grown.grow_image(200, 150).expect("it fits");
-    assert_eq!(grown.room().image, (200, 150));
+    assert_eq!(grown.size().image, (200, 150));
     assert_eq!(render(&mut grown, &large, &RenderOptions::default()).expect("a picture"), expected);
     assert_eq!(render(&mut grown, &camera, &RenderOptions::default()).expect("a picture"), before);
     grown.grow_image(10, 180).expect("it fits");
-    assert_eq!(grown.room().image, (200, 180), "neither side shrinks");
+    assert_eq!(grown.size().image, (200, 180), "neither side shrinks");
     let error = grown.grow_image(1 << 15, 1 << 15).expect_err("more tiles than a loop walks");
     assert!(error.to_string().contains("tiles"), "{error}");
     assert_eq!(render(&mut grown, &large, &RenderOptions::default()).expect("a picture"), expected);

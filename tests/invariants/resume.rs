@@ -102,7 +102,7 @@ fn a_training_without_masks_goes_on_to_the_same_bits() {
 #[test]
 fn a_training_that_memory_bounds_goes_on_to_the_same_bits() {
     let Some(turn) = device() else { return };
-    let room = labelgs::train::room(&small(), &long(LabelRule::Votes), 600).expect("views");
+    let room = labelgs::train::engine_size(&small(), &long(LabelRule::Votes), 600).expect("views");
     let limit = Engine::predict(&turn.gpu(), &room, SchedulerOptions::default()).expect("it fits").total;
     let options = SchedulerOptions { memory_limit: Some(limit), ..SchedulerOptions::default() };
     let free = go_on(

@@ -158,7 +158,8 @@ fn a_memory_limit_bounds_the_gaussians() {
     let free = train(&turn, LabelRule::Votes, SchedulerOptions::default(), |_| ());
     let (start, end) = free.counts;
     // Room for half of the growth.
-    let room = labelgs::train::room(&small(), &config(LabelRule::Votes), (start + end) as u64 / 2).expect("views");
+    let room =
+        labelgs::train::engine_size(&small(), &config(LabelRule::Votes), (start + end) as u64 / 2).expect("views");
     let limit = Engine::predict(&turn.gpu(), &room, SchedulerOptions::default()).expect("it fits").total;
     assert!(limit < free.memory, "{limit} bytes bound nothing: {} were used", free.memory);
     let options = SchedulerOptions { memory_limit: Some(limit), ..SchedulerOptions::default() };

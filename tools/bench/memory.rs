@@ -80,7 +80,7 @@ pub fn measure(count: u32, width: u32, height: u32) -> Result<()> {
     let before = resident("VmRSS:")?;
     let mut trainer = Trainer::new(Arc::clone(&gpu), config, &dataset, &model, options)?;
     let seconds = steps(&mut trainer)?;
-    let predicted = Engine::predict(&gpu, trainer.engine_mut().room(), options)?.total;
+    let predicted = Engine::predict(&gpu, trainer.engine_mut().size(), options)?.total;
     let measured = resident("VmRSS:")?.saturating_sub(before);
     let peak = resident("VmHWM:")?.saturating_sub(before);
     let row = json!({

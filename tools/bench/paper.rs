@@ -207,7 +207,7 @@ fn median_pairs(reports: &[StepReport]) -> f64 {
 /// Items of the three lists.
 fn lists(trainer: &mut Trainer, objects: u32) -> [usize; 3] {
     let engine = trainer.engine_mut();
-    let (shape, capacity, size) = (engine.shape(), engine.raw().capacity(), engine.room().image);
+    let (shape, capacity, size) = (engine.shape(), engine.raw().capacity(), engine.size().image);
     let variant = Variant { labels: true, lift: false, sh_degree: 3, size, update: true, counts: false };
     let plain = pass::training_step(shape, capacity, Variant { labels: false, ..variant });
     let together = pass::training_step(shape, capacity, variant);

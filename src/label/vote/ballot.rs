@@ -103,7 +103,7 @@ pub fn columns_for(objects: usize) -> u32 {
 /// Counts the votes of all views for the engine's model. The engine needs room for votes
 /// ([`LabelSize::vote_columns`](crate::engine::LabelSize)), and nothing may be in flight.
 pub fn sweep(engine: &mut Engine, voters: &[Voter], how: Sweep) -> Result<Ballot> {
-    let room = engine.room().labels.map_or(0, |room| room.vote_columns) as usize;
+    let room = engine.size().labels.map_or(0, |room| room.vote_columns) as usize;
     if room == 0 {
         return Err(Error::Bug("the engine has no room for votes".to_owned()));
     }

@@ -71,7 +71,7 @@ impl<'a> Population<'a> {
         let (uniforms, counted) = loop {
             let bounded = self.bounded(uniforms, wanted, most)?;
             let counted = self.count_densified(bounded)?;
-            let room = self.engine.room().gaussians;
+            let room = self.engine.size().gaussians;
             match self.engine.make_room_for_gaussians(u64::from(counted.densified_count)) {
                 Err(error) if error.is_out_of_memory() && most > room => {
                     tracing::warn!("{error}; from here on there are no more than {room} Gaussians (until --resume)");
