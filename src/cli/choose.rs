@@ -175,7 +175,7 @@ impl PromptArgs {
         engine.upload_model(asked.model)?;
         let mut map = |(key, camera): (Key, Camera)| {
             let rendered = render(&mut engine, &camera, &RenderOptions::new(near, Parts::MAIN))?;
-            Ok((key, rendered.label_map(labels)))
+            Ok((key, rendered.label_map(labels)?))
         };
         cameras.into_iter().map(&mut map).collect()
     }

@@ -145,7 +145,7 @@ fn write(
                 &unlabelled
             }
         };
-        Some(rendered.label_map(labels))
+        Some(rendered.label_map(labels)?)
     } else {
         None
     };

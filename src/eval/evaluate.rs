@@ -54,12 +54,12 @@ pub fn evaluate(
     let mut hidden = Vec::new();
     for view in views {
         let rendered = render(engine, &view.camera, &of_scene)?;
-        let map = labels.map(|labels| rendered.label_map(labels));
+        let map = labels.map(|labels| rendered.label_map(labels)).transpose()?;
         let score = ViewScores::new(&rendered.rgb, photo(view)?, map.as_ref(), view.mask.as_deref())?;
         let numbers = vec![("PSNR", Some(score.psnr)), ("SSIM", Some(score.ssim))];
         watch.see(&Compared { numbers, ..Compared::new(&view.name, photo(view)?, &rendered.rgb) })?;
         scores.push(score);
-        hidden.push(hidden_by(view.mask.as_deref(), &rendered));
+        hidden.push(hidden_by(view.mask.as_deref(), &rendered)?);
     }
     for id in objects(views) {
         let there = labels.filter(|labels| labels.contains(&id));
@@ -128,8 +128,9 @@ fn photo(view: &View) -> Result<&crate::scene::Photo> {
     view.photo.as_deref().ok_or_else(|| Error::Bug(format!("{} came without its photo", view.name)))
 }
 
-fn hidden_by(mask: Option<&LabelMap>, rendered: &Rendered) -> BTreeMap<u16, Vec<u16>> {
-    mask.map(|mask| by_contour(mask, &rendered.mean_depth(), Rule::default())).unwrap_or_default()
+fn hidden_by(mask: Option<&LabelMap>, rendered: &Rendered) -> Result<BTreeMap<u16, Vec<u16>>> {
+    let Some(mask) = mask else { return Ok(BTreeMap::new()) };
+    Ok(by_contour(mask, &rendered.mean_depth()?, Rule::default()))
 }
 
 /// True where the mask shows one of `ids`.

@@ -3,7 +3,7 @@
 pub mod pictures;
 
 use crate::engine::{Engine, ListKey};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::scene::{Camera, LabelMap};
 
 /// The near plane of 3DGS, world units: what a model is rendered with of which nothing is known.
@@ -80,21 +80,24 @@ pub struct Rendered {
 }
 
 impl Rendered {
-    /// Label of the main Gaussian of each pixel (LabelGS, inference), 0 where none contributes. Needs [`Parts::main`].
-    pub fn label_map(&self, labels: &[u32]) -> LabelMap {
-        debug_assert_eq!(self.top_id.len(), self.rgb.len(), "main Gaussians were not asked for");
+    /// Label of the main Gaussian of each pixel (LabelGS, inference), 0 where none contributes. An error without
+    /// [`Parts::main`].
+    pub fn label_map(&self, labels: &[u32]) -> Result<LabelMap> {
+        self.check_part(self.top_id.len(), "main Gaussians")?;
         let id = |&top: &i32| usize::try_from(top).map_or(0, |index| labels[index] as u16);
-        LabelMap { width: self.width, height: self.height, ids: self.top_id.iter().map(id).collect() }
+        Ok(LabelMap { width: self.width, height: self.height, ids: self.top_id.iter().map(id).collect() })
     }
 
-    /// Depth divided by alpha; 0 where alpha is below one half. Needs [`Parts::depth`].
-    pub fn mean_depth(&self) -> Vec<f32> {
-        debug_assert_eq!(self.depth.len(), self.rgb.len(), "depth was not asked for");
-        self.depth
-            .iter()
-            .zip(&self.alpha)
-            .map(|(&depth, &alpha)| if alpha >= 0.5 { depth / alpha } else { 0.0 })
-            .collect()
+    /// Depth divided by alpha; 0 where alpha is below one half. An error without [`Parts::depth`].
+    pub fn mean_depth(&self) -> Result<Vec<f32>> {
+        self.check_part(self.depth.len(), "depth")?;
+        let mean = |(&depth, &alpha): (&f32, &f32)| if alpha >= 0.5 { depth / alpha } else { 0.0 };
+        Ok(self.depth.iter().zip(&self.alpha).map(mean).collect())
+    }
+
+    fn check_part(&self, there: usize, part: &str) -> Result<()> {
+        let is_there = there == self.rgb.len();
+        is_there.then_some(()).ok_or_else(|| Error::Bug(format!("the picture was rendered without its {part}")))
     }
 }
 

@@ -83,7 +83,7 @@ pub fn save_cameras(out: &Path, cameras: &[(&str, &Camera)]) -> Result<()> {
 pub fn save_preview(path: &Path, photo: &Photo, rendered: &Rendered, labels: Option<&[u32]>) -> Result<()> {
     let (width, height) = (rendered.width as usize, rendered.height as usize);
     let byte = |value: f32| (value.clamp(0.0, 1.0) * 255.0).round() as u8;
-    let map = labels.map(|labels| rendered.label_map(labels));
+    let map = labels.map(|labels| rendered.label_map(labels)).transpose()?;
     let panels = if map.is_some() { 3 } else { 2 };
     let mut pixels = vec![[0_u8; 3]; width * panels * height];
     for y in 0..height {

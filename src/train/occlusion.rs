@@ -54,7 +54,7 @@ impl Trainer {
             let view = &self.views[index];
             let Some(mask) = &view.mask else { continue };
             let rendered = render(&mut self.engine, &view.camera, &options)?;
-            let found = by_contour(mask, &rendered.mean_depth(), Rule::default());
+            let found = by_contour(mask, &rendered.mean_depth()?, Rule::default());
             self.views[index].occluders = found;
         }
         Ok(())

@@ -6,7 +6,7 @@ use crate::support::scenes::{Shape, scene};
 use labelgs::Error;
 use labelgs::engine::{Engine, EngineSize, LabelSize};
 use labelgs::label::vote::ballot::{Sweep, Voter, sweep};
-use labelgs::render::{RenderOptions, render};
+use labelgs::render::{Parts, RenderOptions, render};
 use labelgs::scene::{Camera, Gaussians, LabelMap};
 use labelgs::scheduler::SchedulerOptions;
 use labelgs::scheduler::plan::PlanOptions;
@@ -45,6 +45,21 @@ fn a_camera_that_is_too_large_is_refused() {
     let voter = Voter { camera: &tall, mask: &mask, photo: None, trust: None };
     refused(sweep(&mut engine, &[voter], Sweep { near: 0.2, border: 0 }));
     render(&mut engine, &camera, &RenderOptions::default()).expect("what fits is rendered as ever");
+}
+
+#[test]
+fn a_picture_without_a_part_says_so() {
+    let Some(turn) = device() else { return };
+    let (model, camera) = model_and_camera();
+    let mut engine = Engine::new(turn.gpu(), EngineSize::new(60, (64, 48)), guarded()).expect("an engine");
+    engine.upload_model(&model).expect("the model");
+    let all = render(&mut engine, &camera, &RenderOptions::default()).expect("a picture");
+    let colour = render(&mut engine, &camera, &RenderOptions::new(0.2, Parts::COLOUR)).expect("a picture");
+    assert_eq!((&all.rgb, &all.alpha), (&colour.rgb, &colour.alpha));
+    let labels = vec![1; model.len()];
+    assert!(all.label_map(&labels).is_ok() && all.mean_depth().is_ok());
+    let missing = [colour.label_map(&labels).err(), colour.mean_depth().err()].map(|error| error.expect("refused"));
+    assert!(missing[0].to_string().contains("main Gaussians") && missing[1].to_string().contains("depth"));
 }
 
 #[test]

@@ -92,7 +92,7 @@ fn divided(gpu: &Arc<Gpu>, dataset: &Dataset, model: &Gaussians, objects: usize)
     let mut dataset = dataset.clone();
     for view in &mut dataset.train {
         let seen = render(&mut engine, &view.camera, &RenderOptions::of_labels(NEAR))?;
-        view.mask = Some(Arc::new(seen.label_map(&labels)));
+        view.mask = Some(Arc::new(seen.label_map(&labels)?));
     }
     Ok(dataset)
 }

@@ -94,7 +94,7 @@ fn from_model(path: &Path, views: &[&View], context: &Context) -> Result<BTreeMa
     let mut found = BTreeMap::new();
     for view in views {
         let rendered = render(&mut engine, &view.camera, &RenderOptions::new(near, Parts::DEPTH))?;
-        found.insert(view.name.clone(), by_contour(mask(view)?, &rendered.mean_depth(), Rule::default()));
+        found.insert(view.name.clone(), by_contour(mask(view)?, &rendered.mean_depth()?, Rule::default()));
         progress.set(found.len() as u64, String::new);
     }
     Ok(found)

@@ -57,7 +57,7 @@ impl Painter for EnginePainter<'_> {
                 &unlabelled
             }
         };
-        Ok(rendered.label_map(labels))
+        rendered.label_map(labels)
     }
 
     fn draw(&mut self, labels: Option<&[u32]>, camera: &Camera) -> Result<Drawn> {

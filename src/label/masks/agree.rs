@@ -57,7 +57,7 @@ pub fn agree(
     let mut masks = Vec::with_capacity(views.len());
     for (index, (view, mask)) in views.iter().zip(&renamed).enumerate() {
         let options = RenderOptions::of_labels(how.near);
-        let shown = render(engine, &view.camera, &options)?.label_map(&decision.labels);
+        let shown = render(engine, &view.camera, &options)?.label_map(&decision.labels)?;
         masks.push(match mask {
             Some(mask) => Some(mend(index, mask, &shown, &mut repairs)),
             None if how.make_missing => {

@@ -142,7 +142,7 @@ pub fn count(
     if let Some(labels) = judges {
         for voter in voters {
             let shown = render(engine, voter.camera, &RenderOptions::of_labels(how.near))?;
-            agreements.push(agreement(voter.mask, &shown.label_map(labels)));
+            agreements.push(agreement(voter.mask, &shown.label_map(labels)?));
         }
     }
     let trusts = trust(&agreements);
