@@ -209,19 +209,22 @@ fn shared_rows_are_updated_as_the_mirror_says_and_others_rest() {
     assert_eq!(before.len(), ROWS);
     assert_eq!(before[3], [[2.0, 0.0, 2.0, 3.1], [0.0; 4], [0.0; 4]]);
     let (mut updates, mut steps) = ([0; ROWS], Vec::new());
-    for step in 1..=12 {
+    for step in 1..=17 {
         trainer.step().expect("a step");
         let after = rows(&mut trainer);
         let changed: Vec<usize> = (0..ROWS).filter(|&row| after[row] != before[row]).collect();
+        // Steps that densify update nothing; the scene's row rests in every fourth.
+        let of_photos = usize::from(step % 8 != 0);
         let of_scene = usize::from(step % 4 != 0);
-        assert_eq!((changed.len(), changed.contains(&0)), (1 + of_scene, of_scene == 1), "step {step}: {changed:?}");
+        assert_eq!(changed.len(), of_photos + of_scene, "step {step}: {changed:?}");
+        assert_eq!(changed.contains(&0), of_scene == 1, "step {step}: {changed:?}");
         for row in changed {
             updates[row] += 1;
             steps.push((row, updates[row], before[row], after[row]));
         }
         before = after;
     }
-    assert!(updates[0] == 9 && updates[1..].iter().all(|&count| count >= 2), "{updates:?}");
+    assert!(updates[0] == 13 && updates[1..].iter().all(|&count| count >= 2), "{updates:?}");
     prove("adam of shared rows", &["adam_beta1", "adam_beta2", "adam_eps"], |rules| {
         let (mut errors, zeros) = (Vec::new(), vec![0.0; steps.len() * 12]);
         for (row, step, before, after) in &steps {
