@@ -92,6 +92,10 @@ fn every_setting_has_a_flag_with_its_default() {
     {
         assert!(help.contains(default), "{default} is not in\n{help}");
     }
+    assert!(
+        help.contains("where ours differ: --label-rule main --label-weight 1.0 --densify-until 40000 --opacity-reset-interval 3000"),
+        "{help}"
+    );
     for heading in ["Run:", "Labels:", "Optimiser:", "Densification:", "Global:"] {
         assert!(help.contains(heading), "{heading} is not in\n{help}");
     }

@@ -22,6 +22,7 @@ use super::synth::SynthArgs;
 use super::train_args::TrainArgs;
 use crate::run::Settings;
 use clap::{CommandFactory, Parser, Subcommand};
+use std::collections::BTreeMap;
 
 const EXIT_STATUSES: &str = "\
 Exit status: 0 done, 1 finished but a requested check failed, 2 usage, 3 bad input, 4 no usable device, 5 out of memory, \
@@ -108,6 +109,7 @@ pub enum Command {
 /// The command with the defaults of training in its help.
 pub fn command() -> clap::Command {
     let mut defaults = Settings::default().texts();
+    let paper = paper_flags(&defaults);
     // What the values alone do not tell.
     for (key, text) in [
         ("background", "black"),
@@ -119,6 +121,10 @@ pub fn command() -> clap::Command {
     }
     Cli::command().mut_subcommand("train", |train| {
         train.mut_args(|arg| {
+            if arg.get_id() == "paper" {
+                let help = arg.get_help().map(ToString::to_string).unwrap_or_default();
+                return arg.help(format!("{help} {paper}"));
+            }
             let Some(default) = defaults.get(arg.get_id().as_str()) else { return arg };
             let with = |help: String| format!("{help} [default: {default}]");
             let (short, long) = (arg.get_help().map(ToString::to_string), arg.get_long_help().map(ToString::to_string));
@@ -126,4 +132,14 @@ pub fn command() -> clap::Command {
             if let Some(help) = long { arg.long_help(with(help)) } else { arg }
         })
     })
+}
+
+/// The settings of the paper that are no defaults, as flags.
+fn paper_flags(defaults: &BTreeMap<String, String>) -> String {
+    let paper = Settings::paper().texts();
+    let changed = Settings::keys().filter_map(|key| {
+        let value = paper.get(key.name).filter(|value| defaults.get(key.name) != Some(value))?;
+        Some(format!("{} {value}", key.flag()))
+    });
+    changed.collect::<Vec<_>>().join(" ")
 }

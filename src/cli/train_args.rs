@@ -59,8 +59,7 @@ pub struct TrainFlags {
     /// What is let through of the scene; the same has to be typed again with --resume.
     #[command(flatten)]
     pub trust: ReadArgs,
-    /// Start from the settings of the LabelGS paper, where ours differ: --label-rule main --label-weight 1
-    /// --densify-until 40000 --opacity-reset-interval 3000.
+    /// Start from the settings of the LabelGS paper, where ours differ:
     #[arg(long, conflicts_with = "config", help_heading = "Run")]
     pub paper: bool,
     /// Hold out nothing.
