@@ -1,5 +1,5 @@
 //! Options that are written once: name, type, default, range, whether they may change within a run, and help stand at
-//! one field. [`options!`](crate::options!) makes of them a struct, its `Default`, its check, its keys in `config.toml`
+//! one field. [`options!`](macro@crate::options) makes of them a struct, its `Default`, its check, its keys in `config.toml`
 //! and, with the feature `cli`, its flags.
 //!
 //! A flag has no default of its own: what nobody typed stays as it was, so that a flag wins over a file and a file over
@@ -127,7 +127,7 @@ numbers! {
     Option<f64> => |value| value.iter().copied().collect();
 }
 
-/// A struct that [`options!`](crate::options!) made.
+/// A struct that [`options!`](macro@crate::options) made.
 pub trait Options: Serialize + DeserializeOwned + Default {
     /// Its options, in order.
     const KEYS: &'static [Key];
