@@ -1,4 +1,4 @@
-//! What `labelgs train` can be told. Every setting is a field of the run's own structs; see [`crate::options`].
+//! What `labelgs train` can be told. Every setting is a field of the run's own structs; see [`crate::options`](mod@crate::options).
 
 use super::args::{JsonFlag, ReadArgs};
 use super::values::bytes;
