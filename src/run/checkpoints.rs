@@ -1,7 +1,6 @@
 //! The checkpoints that a run leaves.
 
 use super::resume::Record;
-use super::settings::RunOptions;
 use crate::error::{Error, Result};
 use crate::io::checkpoint_folder;
 use crate::io::run_folder::Lock;
@@ -44,8 +43,8 @@ impl Checkpoints {
     }
 
     /// True where the schedule asks for one.
-    pub fn due(&self, options: &RunOptions, step: u32, last: u32) -> bool {
-        let every = options.checkpoint_every;
+    pub fn due(&self, step: u32, last: u32) -> bool {
+        let every = self.record.run.checkpoint_every;
         every > 0 && (step.is_multiple_of(every) || step == last)
     }
 

@@ -9,9 +9,8 @@ use std::path::PathBuf;
 pub(super) fn write(run: &mut Run) -> Result<Option<PathBuf>> {
     let Some(view) = &run.preview else { return Ok(None) };
     let Some(photo) = &view.photo else { return Ok(None) };
-    let mut live = Live::new(&mut run.trainer);
-    let rendered = live.render(&view.camera, Parts::MAIN)?;
-    let labels = live.model()?.labels;
+    let rendered = Live::new(&mut run.trainer).render(&view.camera, Parts::MAIN)?;
+    let labels = run.trainer.labels()?;
     let name = format!("{:06}_{}.png", run.trainer.steps_done(), view.stem());
     let path = run.request.output.join("preview").join(name);
     models::save_preview(&path, photo, &rendered, labels.as_deref())?;

@@ -73,7 +73,12 @@ impl Settings {
             let problem = format!("there is no setting {}; `labelgs train --help` lists all", key.get_ref());
             return Err(Error::data(path, line(&text, key.span().start), problem));
         }
-        Ok(Self { read: parse(path, &text)?, train: parse(path, &text)?, run: parse(path, &text)? })
+        Self::parse(path, &text)
+    }
+
+    /// Each part takes its own keys and leaves the others alone.
+    fn parse(path: &Path, text: &str) -> Result<Self> {
+        Ok(Self { read: parse(path, text)?, train: parse(path, text)?, run: parse(path, text)? })
     }
 
     /// The settings of the run that a model is in, if it is in one; its folder is that of
@@ -83,7 +88,7 @@ impl Settings {
         let Some(file) = file else { return Ok(None) };
         // Rows that other versions of the program know are no reason to refuse a model.
         let text = io::read::text(&file)?;
-        let mut settings = Self { read: parse(&file, &text)?, train: parse(&file, &text)?, run: parse(&file, &text)? };
+        let mut settings = Self::parse(&file, &text)?;
         let near = &mut settings.train.near;
         // 0 leaves it to a scene, which is not known here.
         if *near == 0.0 {

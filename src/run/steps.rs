@@ -17,7 +17,7 @@ pub(super) fn steps(run: &mut Run) -> Result<()> {
         if step < last {
             write_between(run, step)?;
         }
-        if run.checkpoints.due(&run.settings.run, step, last) {
+        if run.checkpoints.due(step, last) {
             run.trainer.drain()?;
             if let Some(path) = run.checkpoints.save_due(&mut run.trainer)? {
                 run.tell(Event::Checkpoint { step, path: &path })?;

@@ -28,6 +28,12 @@ impl Trainer {
         Ok(())
     }
 
+    /// The labels on the device, once the steps in flight are done; none without masks.
+    pub fn labels(&mut self) -> Result<Option<Vec<u32>>> {
+        self.drain()?;
+        self.engine.size().labels.is_some().then(|| self.engine.labels()).transpose()
+    }
+
     fn count_votes(&mut self) -> Result<Decision> {
         let how = Sweep { near: self.config.near, border: self.config.mask_border };
         let means = self.engine.means()?;
