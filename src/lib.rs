@@ -5,6 +5,7 @@
 //! A module uses lower ones only (`tests/architecture.rs` reads the `use` lines):
 //!
 //! ```text
+//! internals              what the program, tests and benchmarks reach into
 //! cli                    verbs: what is typed, what is decided
 //! verify                 the method in f64, and the device compared with it, for tests and users
 //! run                    a training from a folder of photos to a folder with a model; its observer
@@ -43,26 +44,33 @@
 //! report is read when the frame comes round again. A buffer that was too small sets a sticky bit, every later pass leaves
 //! the model alone, the buffer grows, and the steps run again.
 #![deny(unsafe_code)]
+#![warn(unreachable_pub)]
+#![cfg_attr(
+    not(feature = "cli"),
+    allow(dead_code, unused_imports, reason = "what only the commands use is left out by the linker")
+)]
 
 #[cfg(feature = "cli")]
-pub mod cli;
+mod cli;
 pub mod edit;
 pub mod engine;
-pub mod error;
+mod error;
 pub mod eval;
 pub mod gpu;
+#[doc(hidden)]
+pub mod internals;
 pub mod io;
-pub mod lab;
+mod lab;
 pub mod label;
-pub mod options;
-pub mod pass;
+mod options;
+mod pass;
 pub mod render;
 pub mod run;
 pub mod scene;
-pub mod scheduler;
-pub mod shaders;
+mod scheduler;
+mod shaders;
 pub mod synth;
-pub mod train;
-pub mod verify;
+mod train;
+mod verify;
 
 pub use error::{Error, Result};

@@ -50,5 +50,5 @@ fn given(memory: *mut u8, bytes: usize) -> *mut u8 {
 }
 
 fn main() -> std::process::ExitCode {
-    labelgs::cli::main(std::env::args_os()).into()
+    labelgs::internals::cli::main(std::env::args_os()).into()
 }

@@ -97,7 +97,8 @@ fn modules_use_lower_floors_only() {
     for (path, text) in files("src", &["rs"]) {
         let own = module(&path);
         for other in used(&text) {
-            let is_macro = other == "buffers" && own == "scheduler";
+            // `buffers!` is expanded in tests too, and names what it needs by the way in for tests.
+            let is_macro = own == "scheduler" && ["buffers", "internals"].contains(&other.as_str());
             let allowed = is_macro
                 || other == own
                 || floor(&own) > floor(&other)
@@ -173,7 +174,9 @@ fn the_library_prints_nothing() {
 /// Above the engine only what checks it touches its scheduler.
 #[test]
 fn the_scheduler_is_the_engines_own() {
-    let above = |path: &Path| floor(&module(path)) > floor("engine") && module(path) != "verify";
+    let above = |path: &Path| {
+        floor(&module(path)) > floor("engine") && !["verify", "internals"].contains(&module(path).as_str())
+    };
     let touches =
         |text: &str| [".raw()", ".raw_mut()", "Scheduler::", "ListId", "Ticket"].iter().any(|w| text.contains(w));
     let found = files("src", &["rs"]).into_iter().filter(|(path, text)| above(path) && touches(text));

@@ -2,11 +2,11 @@
 
 use assert_cmd::Command;
 use clap::Parser;
-use labelgs::cli::command::{Cli, Command as Verb, command};
-use labelgs::io::model::{read_model, write_model};
+use labelgs::internals::cli::command::{Cli, Command as Verb, command};
+use labelgs::io::{read_model, write_model};
+use labelgs::run::Occlusion;
 use labelgs::run::Settings;
 use labelgs::scene::Gaussians;
-use labelgs::train::config::Occlusion;
 use serde_json::Value;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};

@@ -2,13 +2,14 @@
 
 use assert_cmd::Command;
 use glam::DVec3;
-use labelgs::cli::scene::near_plane;
-use labelgs::io::label_table::{LabelEntry, LabelTable};
-use labelgs::io::mask::read_mask;
-use labelgs::io::model::{read_model, write_model};
-use labelgs::io::run_folder;
+use labelgs::internals::cli::scene::near_plane;
+use labelgs::internals::io::run_folder;
+use labelgs::internals::synth::ring_of_cameras;
+use labelgs::io::read_mask;
+use labelgs::io::{LabelEntry, LabelTable};
+use labelgs::io::{read_model, write_model};
 use labelgs::scene::Gaussians;
-use labelgs::synth::{SynthOptions, ring_of_cameras};
+use labelgs::synth::SynthOptions;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 use std::process::Output;

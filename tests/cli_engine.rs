@@ -1,7 +1,7 @@
 //! The command line with a device: what it can do, what it plans, what it times, and a scene from synth to pictures.
 
 use assert_cmd::Command;
-use labelgs::io::model::read_model;
+use labelgs::io::read_model;
 use serde_json::Value;
 use std::path::Path;
 use std::process::Output;
@@ -205,10 +205,10 @@ fn from_a_scene_to_objects_and_pictures() {
 
     let (truth, page) = (path("truth"), path("page"));
     for (view, object) in [("000", 1), ("000", 2), ("008", 1), ("008", 2)] {
-        let mask = labelgs::io::mask::read_mask(format!("{masks}/{view}.png")).expect("a mask");
+        let mask = labelgs::io::read_mask(format!("{masks}/{view}.png")).expect("a mask");
         let bytes: Vec<u8> = mask.ids.iter().map(|&id| if id == object { 255 } else { 0 }).collect();
         let file = format!("{truth}/{view}/{object}.png");
-        labelgs::io::image::write_png_grey8(file, mask.width, mask.height, &bytes).expect("written");
+        labelgs::internals::io::image::write_png_grey8(file, mask.width, mask.height, &bytes).expect("written");
     }
     let by_name = ["eval", &out, "--scene", &scene, "--protocol", "lerf-mask", "--truth", &truth, "--page", &page];
     let found = json(&succeeds(&[&by_name[..], &["--json"]].concat()));

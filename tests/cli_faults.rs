@@ -336,7 +336,8 @@ fn a_number_that_is_none_is_found_and_undone() {
     let said = succeeded(&place.trained_with(Some("nan:27:NUMBER:2"), "slower", &flags));
     assert!(said.contains("all learning rates are half of what they were"), "{said}");
     assert!(place.model("slower", 40) != place.model("right", 40));
-    let rates = labelgs::train::TrainState::read(&place.checkpoints("slower")[0].path).expect("a checkpoint").config;
+    let rates =
+        labelgs::internals::train::TrainState::read(&place.checkpoints("slower")[0].path).expect("a checkpoint").config;
     assert_eq!(rates.feature_lr, 0.00125, "a resumed run goes on with them");
     let output = place.trained_with(Some("nan:27:NUMBER:1000"), "broken", &flags);
     assert_eq!(output.status.code(), Some(8), "{}", stderr(&output));
@@ -354,7 +355,7 @@ fn a_folder_has_one_run_at_a_time() {
     let Some(_turn) = device() else { return };
     let place = Place::new();
     std::fs::create_dir_all(place.path("out")).expect("a folder");
-    let lock = labelgs::io::run_folder::Lock::take(&place.path("out")).expect("the first run");
+    let lock = labelgs::internals::io::run_folder::Lock::take(&place.path("out")).expect("the first run");
     let output = place.trained("out", &["--iterations", "1"]);
     assert_eq!(output.status.code(), Some(7), "{}", stderr(&output));
     assert!(stderr(&output).contains("another labelgs trains into this folder"), "{}", stderr(&output));

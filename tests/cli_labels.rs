@@ -2,8 +2,8 @@
 
 use crate::support;
 use assert_cmd::Command;
-use labelgs::io::mask::read_mask;
-use labelgs::io::model::read_model;
+use labelgs::io::read_mask;
+use labelgs::io::read_model;
 use serde_json::Value;
 use std::path::Path;
 

@@ -2,8 +2,8 @@
 
 use crate::support::device;
 use crate::support::runs::{Place, all_whole, files, kills, stderr, succeeded};
-use labelgs::io::run_folder::Lock;
-use labelgs::train::TrainState;
+use labelgs::internals::io::run_folder::Lock;
+use labelgs::internals::train::TrainState;
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
 use std::os::unix::process::ExitStatusExt;

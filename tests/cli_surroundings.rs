@@ -4,7 +4,7 @@
 
 use crate::support::device;
 use crate::support::runs::{Place, all_whole, copy, files, stderr, succeeded};
-use labelgs::io::model::write_model;
+use labelgs::io::write_model;
 use labelgs::scene::Gaussians;
 use std::collections::BTreeMap;
 use std::ffi::{OsStr, OsString};

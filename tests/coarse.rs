@@ -1,11 +1,12 @@
 //! Steps on photos of half the size.
 
 use crate::support::device;
-use labelgs::io::init;
+use labelgs::internals::io::init;
+use labelgs::internals::scheduler::SchedulerOptions;
+use labelgs::internals::train::{StepReport, Trainer};
+use labelgs::run::TrainConfig;
 use labelgs::scene::{Dataset, Photo};
-use labelgs::scheduler::SchedulerOptions;
 use labelgs::synth::{Preset, SynthOptions, dataset};
-use labelgs::train::{StepReport, TrainConfig, Trainer};
 use std::sync::Arc;
 
 const SCENE: SynthOptions =

@@ -1,8 +1,8 @@
 //! Schedules and checks of the training configuration.
 
+use labelgs::internals::train::strategy::default::{densifies_at, resets_opacity_at};
 use labelgs::io::ReadOptions;
-use labelgs::train::TrainConfig;
-use labelgs::train::strategy::default::{densifies_at, resets_opacity_at};
+use labelgs::run::TrainConfig;
 
 #[test]
 fn schedules_follow_the_reference() {

@@ -2,11 +2,12 @@
 
 use assert_cmd::Command;
 use glam::{DMat3, DQuat, DVec3};
-use labelgs::io::frames::{Frame, Frames};
-use labelgs::io::mask::read_mask;
+use labelgs::internals::synth::ring_of_cameras;
+use labelgs::io::read_mask;
+use labelgs::io::{Frame, Frames};
 use labelgs::scene::Camera;
 use labelgs::scene::path::{Between, between, short_order, video};
-use labelgs::synth::{SynthOptions, ring_of_cameras};
+use labelgs::synth::SynthOptions;
 use serde_json::Value;
 use std::path::Path;
 use std::process::Output;
@@ -141,7 +142,7 @@ fn tracked(folder: &Path) -> (String, String, String) {
     for index in 0..5_u16 {
         let ids: Vec<u16> = (0..64 * 48).map(|i| if i % 64 < 30 { 300 * index + 1 } else { 0 }).collect();
         let file = folder.join(format!("tracked/{index:05}.png"));
-        labelgs::io::image::write_png_grey16(&file, 64, 48, &ids).expect("written");
+        labelgs::internals::io::image::write_png_grey16(&file, 64, 48, &ids).expect("written");
     }
     (path("tracked"), path("video/frames.json"), path("masks"))
 }
@@ -158,9 +159,9 @@ fn masks_go_back_to_their_photos() {
         assert_eq!(read_mask(Path::new(&masks).join(photo)).expect("collected"), there, "{photo}");
     }
     let file = |name: &str| folder.path().join("tracked").join(name);
-    labelgs::io::image::write_png_grey16(file("00002.png"), 48, 48, &[1; 48 * 48]).expect("written");
+    labelgs::internals::io::image::write_png_grey16(file("00002.png"), 48, 48, &[1; 48 * 48]).expect("written");
     fails(3, "48 x 48 px and its frame 64 x 48", &args);
-    labelgs::io::image::write_png_rgb8(file("00002.png"), 64, 48, &[[1, 2, 3]; 64 * 48]).expect("written");
+    labelgs::internals::io::image::write_png_rgb8(file("00002.png"), 64, 48, &[[1, 2, 3]; 64 * 48]).expect("written");
     fails(3, "one id per pixel", &args);
     std::fs::remove_file(file("00002.png")).expect("removed");
     fails(3, "1 of 3 photos have no tracked mask", &args);
@@ -205,7 +206,7 @@ fn there_and_back_again_with_a_device() {
         std::fs::create_dir_all(tracked.parent().expect("a folder")).expect("made");
         // Perfect tracking: the truth where there is one, and something else between.
         let Some(photo) = &frame.photo else {
-            labelgs::io::image::write_png_grey16(tracked, 96, 72, &[9; 96 * 72]).expect("written");
+            labelgs::internals::io::image::write_png_grey16(tracked, 96, 72, &[9; 96 * 72]).expect("written");
             continue;
         };
         assert_eq!(index % 3, 0);

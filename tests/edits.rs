@@ -1,13 +1,14 @@
 //! Choosing and editing labels, on Gaussians and label maps made by hand.
 
-use labelgs::edit::catalogue::{Catalogue, Pick};
-use labelgs::edit::change::{Specks, recolour, relabel, split_components, without_specks};
-use labelgs::edit::components::{Grouping, components};
-use labelgs::edit::prompt::{Place, Prompt, choose};
-use labelgs::edit::rename::{give_name, keep, renumber, split};
-use labelgs::io::label_table::{LabelEntry, LabelTable};
+use labelgs::edit::Grouping;
+use labelgs::edit::{Catalogue, Pick};
+use labelgs::edit::{Place, Prompt, choose};
+use labelgs::edit::{Specks, recolour, relabel, split_components, without_specks};
+use labelgs::internals::edit::components::components;
+use labelgs::internals::edit::rename::{give_name, keep, renumber, split};
+use labelgs::internals::shaders::constants::exact::SH_C0;
+use labelgs::io::{LabelEntry, LabelTable};
 use labelgs::scene::{Gaussians, LabelMap};
-use labelgs::shaders::constants::exact::SH_C0;
 use std::collections::{BTreeMap, BTreeSet};
 
 const UPRIGHT: [f32; 4] = [1.0, 0.0, 0.0, 0.0];

@@ -3,7 +3,7 @@
 
 use crate::support::device;
 use crate::support::runs::{Place, stderr, succeeded};
-use labelgs::shaders;
+use labelgs::internals::shaders;
 use rspirv::dr::Operand;
 use rspirv::spirv::{Capability, Op};
 
@@ -71,10 +71,10 @@ fn labels_beyond_those_of_the_masks_are_no_surprise() {
     let [scene, masks, model] = ["scene", "scene/masks", "model.ply"].map(|name| place.text(name));
     succeeded(&place.trained("out", &["--config", &place.settings()]));
     let found = place.path("out/point_cloud/iteration_40/point_cloud.ply");
-    let mut gaussians = labelgs::io::model::read_model(&found).expect("a model").gaussians;
+    let mut gaussians = labelgs::io::read_model(&found).expect("a model").gaussians;
     let labels = gaussians.labels.as_mut().expect("labels");
     labels.iter_mut().step_by(3).for_each(|label| *label = 65_535);
-    labelgs::io::model::write_model(&model, &gaussians).expect("written");
+    labelgs::io::write_model(&model, &gaussians).expect("written");
     let commands: [&[&str]; 6] = [
         &["list", &model],
         &["render", &model, "--scene", &scene, "--what", "rgb,labels", "-o", &place.text("pictures")],

@@ -1,6 +1,6 @@
 //! Integration tests, one binary; those of the program as it ships are in `shipped.rs`.
 
-use labelgs::verify::reference;
+use labelgs::internals::verify::reference;
 
 #[allow(dead_code, reason = "helpers are shared by tests that come and go")]
 mod support;

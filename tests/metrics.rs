@@ -1,14 +1,17 @@
 //! Scores, label choice and selections against slow or hand-made answers.
 
-use labelgs::edit::catalogue::Catalogue;
-use labelgs::edit::choose::{candidates, choose_labels, require_labels};
-use labelgs::edit::select::{MIN_LABEL_CONFIDENCE, extract, remove, summarise};
-use labelgs::eval::boundary::{boundary_iou, rim, rim_width};
-use labelgs::eval::crop::Crop;
-use labelgs::eval::metrics::{Overlap, paper_score, psnr};
-use labelgs::eval::scores::{ObjectRender, ObjectTruth, Scores, ViewScores};
-use labelgs::eval::ssim::{ssim, ssim_map, window};
-use labelgs::eval::ssim8::{ssim8, to_bytes};
+use labelgs::edit::Catalogue;
+use labelgs::edit::{MIN_LABEL_CONFIDENCE, extract, remove, summarise};
+use labelgs::eval::psnr;
+use labelgs::eval::ssim;
+use labelgs::eval::{Scores, ViewScores};
+use labelgs::internals::edit::choose::{candidates, choose_labels, require_labels};
+use labelgs::internals::eval::boundary::{boundary_iou, rim, rim_width};
+use labelgs::internals::eval::crop::Crop;
+use labelgs::internals::eval::metrics::{Overlap, paper_score};
+use labelgs::internals::eval::scores::{ObjectRender, ObjectTruth};
+use labelgs::internals::eval::ssim::{ssim_map, window};
+use labelgs::internals::eval::ssim8::{ssim8, to_bytes};
 use labelgs::scene::{Gaussians, LabelMap, Photo};
 use std::collections::BTreeMap;
 

@@ -3,8 +3,9 @@
 use crate::support::runs::Place;
 use crate::support::{device, device::Turn};
 use labelgs::Result;
+use labelgs::internals::run;
 use labelgs::render::Parts;
-use labelgs::run::{self, Event, Flow, Live, Observer, Request, Settings, Start, Summary};
+use labelgs::run::{Event, Flow, Live, Observer, Request, Settings, Start, Summary};
 use labelgs::scene::Camera;
 use std::collections::BTreeMap;
 

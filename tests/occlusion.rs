@@ -1,9 +1,11 @@
 //! Who hides whom: both rules against hand-made and slow answers, and against a scene that knows the truth.
 
-use labelgs::io::occlusion_table::OcclusionTable;
-use labelgs::label::occlusion::{Rule, by_contour, by_mean, distances, picture};
+use labelgs::internals::label::occlusion::{distances, picture};
+use labelgs::internals::synth::{World, ring_of_cameras};
+use labelgs::io::OcclusionTable;
+use labelgs::label::occlusion::{Rule, by_contour, by_mean};
 use labelgs::scene::{DepthKind, DepthMap, LabelMap, Occluders};
-use labelgs::synth::{Preset, SynthOptions, World, ring_of_cameras};
+use labelgs::synth::{Preset, SynthOptions};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// A repeatable number in 0 to 1.
@@ -206,7 +208,7 @@ fn the_vote_finds_what_hides_in_a_known_scene() {
     let world = World::new(options.preset, options.seed);
     let (mut both, mut found_pairs, mut true_pairs, mut mean_pairs, mut mean_both) = (0, 0, 0, 0, 0);
     for (view, camera) in ring_of_cameras(&options).iter().enumerate() {
-        let made = labelgs::synth::picture(&world, camera, view as u32);
+        let made = labelgs::internals::synth::picture(&world, camera, view as u32);
         let labels = map(options.width, &made.ids.iter().map(|&id| u16::from(id)).collect::<Vec<_>>());
         let mut hidden: BTreeMap<(u16, u16), usize> = BTreeMap::new();
         for (object, whole) in world.objects.iter().zip(&made.whole) {

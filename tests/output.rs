@@ -1,7 +1,7 @@
 //! Pictures of a view as files.
 
 use exr::prelude::read_first_flat_layer_from_file;
-use labelgs::render::pictures::{Format, Pictures, write_pictures};
+use labelgs::render::{Format, Pictures, write_pictures};
 use labelgs::scene::LabelMap;
 use std::path::Path;
 

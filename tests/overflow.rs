@@ -1,11 +1,12 @@
 //! A buffer that is too small costs a lost step, never a wrong update.
 
 use crate::support::device;
-use labelgs::io::init;
+use labelgs::internals::io::init;
+use labelgs::internals::scheduler::SchedulerOptions;
+use labelgs::internals::train::Trainer;
+use labelgs::run::TrainConfig;
 use labelgs::scene::Gaussians;
-use labelgs::scheduler::SchedulerOptions;
 use labelgs::synth::{Preset, SynthOptions, dataset};
-use labelgs::train::{TrainConfig, Trainer};
 
 const SCENE: SynthOptions =
     SynthOptions { preset: Preset::Simple, width: 96, height: 72, views: 6, points: 200, seed: 1 };

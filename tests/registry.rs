@@ -1,9 +1,11 @@
 //! One stem, four places: every shader has its header, its mirror and its pass; every buffer has its pass.
 
-use labelgs::engine::{Engine, EngineSize, LabelSize, capacity};
-use labelgs::pass::{self, KernelShape, Variant};
-use labelgs::scheduler::plan::{Capacity, Grid, Limits, PassList, Plan, PlanOptions, TABLE, Work};
-use labelgs::shaders;
+use labelgs::engine::{Engine, EngineSize, LabelSize};
+use labelgs::internals::engine::capacity;
+use labelgs::internals::pass;
+use labelgs::internals::pass::{KernelShape, Variant};
+use labelgs::internals::scheduler::plan::{Capacity, Grid, Limits, PassList, Plan, PlanOptions, TABLE, Work};
+use labelgs::internals::shaders;
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -187,7 +189,7 @@ fn a_scene_without_masks_pays_nothing_for_labels() {
     let bytes = |room: &EngineSize| {
         let capacity = capacity(&shape, room);
         let lists = Engine::lists_of(&shape, &capacity, room);
-        let report = labelgs::scheduler::plan::MemoryReport::predict(
+        let report = labelgs::internals::scheduler::plan::MemoryReport::predict(
             TABLE,
             &capacity,
             &lists,

@@ -5,11 +5,12 @@ use crate::reference::{blend, model::Model, project, rules::Rules};
 use crate::support::device;
 use crate::support::scenes::{Shape, scene};
 use labelgs::engine::{Engine, EngineSize};
-use labelgs::pass::KernelShape;
+use labelgs::internals::pass::KernelShape;
+use labelgs::internals::scheduler::SchedulerOptions;
+use labelgs::internals::train::{Trainer, TrainerOptions};
 use labelgs::render::{RenderOptions, render};
+use labelgs::run::TrainConfig;
 use labelgs::scene::{Camera, Gaussians};
-use labelgs::scheduler::SchedulerOptions;
-use labelgs::train::{TrainConfig, Trainer, TrainerOptions};
 
 /// Tiny, faint Gaussians in front of one 8 x 8 tile.
 fn crowd(count: usize) -> (Gaussians, Camera) {
@@ -90,7 +91,7 @@ fn segments_change_nothing() {
         ..Default::default()
     };
     let dataset = labelgs::synth::dataset(&options, 0);
-    let start = labelgs::io::init::initial_gaussians(&dataset, 0, 400).expect("points");
+    let start = labelgs::io::initial_gaussians(&dataset, 0, 400).expect("points");
     let config = TrainConfig { iterations: 20, label_from: 5, ..TrainConfig::default() };
     let run = |segment_length: u32| {
         let shape = KernelShape { segment_length, ..KernelShape::of(gpu.capabilities()) };

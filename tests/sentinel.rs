@@ -6,12 +6,13 @@ use crate::reference::step::step;
 use crate::support::device;
 use crate::support::scenes::{Scene, Shape, scene};
 use labelgs::Error;
-use labelgs::io::init::initial_gaussians;
+use labelgs::internals::scheduler::SchedulerOptions;
+use labelgs::internals::scheduler::plan::Buf;
+use labelgs::internals::train::Trainer;
+use labelgs::io::initial_gaussians;
+use labelgs::run::TrainConfig;
 use labelgs::scene::Gaussians;
-use labelgs::scheduler::SchedulerOptions;
-use labelgs::scheduler::plan::Buf;
 use labelgs::synth::{Preset, SynthOptions, dataset};
-use labelgs::train::{TrainConfig, Trainer};
 
 /// A scene of which one Gaussian, in full view, is changed.
 fn with(change: impl Fn(&mut Gaussians, usize)) -> (Scene, usize) {

@@ -7,16 +7,20 @@ use crate::scheduler::{R, RW, S, W, toy_shader};
 use crate::support::compare::{Tolerance, close};
 use crate::support::device::Turn;
 use crate::support::{device, toy};
-use labelgs::engine::{Engine, EngineSize, capacity};
-use labelgs::io::init::initial_gaussians;
-use labelgs::pass::{Builder, Extension, Hook, KernelShape, Variant, training_step};
+use labelgs::engine::{Engine, EngineSize};
+use labelgs::internals::engine::capacity;
+use labelgs::internals::pass::{Builder, Extension, Hook, KernelShape, Variant, training_step};
+use labelgs::internals::scheduler::SchedulerOptions;
+use labelgs::internals::scheduler::plan::{
+    Buf, Domain, Grid, Limits, MemoryReport, PassDecl, PlanOptions, TABLE, Work,
+};
+use labelgs::internals::shaders::ShaderDesc;
+use labelgs::internals::train::shared::{SharedLayout, SharedParameters};
+use labelgs::internals::train::strategy::At;
+use labelgs::internals::train::{TrainState, Trainer, TrainerOptions};
+use labelgs::io::initial_gaussians;
+use labelgs::run::{LabelRule, TrainConfig};
 use labelgs::scene::Dataset;
-use labelgs::scheduler::SchedulerOptions;
-use labelgs::scheduler::plan::{Buf, Domain, Grid, Limits, MemoryReport, PassDecl, PlanOptions, TABLE, Work};
-use labelgs::shaders::ShaderDesc;
-use labelgs::train::shared::{SharedLayout, SharedParameters};
-use labelgs::train::strategy::At;
-use labelgs::train::{LabelRule, TrainConfig, TrainState, Trainer, TrainerOptions};
 use std::sync::Arc;
 
 /// Views of the scene.

@@ -1,10 +1,12 @@
 //! The made scene: its pictures, masks, depth and points must agree with each other.
 
+use labelgs::internals::synth;
+use labelgs::internals::synth::{Picture, World, alone, picture, ring_of_cameras};
+use labelgs::io::LabelTable;
 use labelgs::io::LoadOptions;
-use labelgs::io::label_table::LabelTable;
-use labelgs::io::mask::read_mask;
+use labelgs::io::read_mask;
 use labelgs::scene::Camera;
-use labelgs::synth::{self, Picture, Preset, SynthOptions, World, alone, picture, ring_of_cameras};
+use labelgs::synth::{Preset, SynthOptions};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 

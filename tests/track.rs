@@ -1,12 +1,13 @@
 //! Ids from frame to frame by overlap, alone and on the video between sparse photos.
 
-use labelgs::io::image::write_png_grey16;
-use labelgs::io::mask::read_mask;
-use labelgs::label::masks::track::{Overlap, track};
+use labelgs::internals::io::image::write_png_grey16;
+use labelgs::internals::synth::{World, picture, ring_of_cameras};
+use labelgs::io::read_mask;
+use labelgs::label::masks::{Overlap, track};
 use labelgs::scene::path::{Between, short_order, video};
 use labelgs::scene::{Camera, LabelMap};
-use labelgs::synth::spoil::{Fault, spoil};
-use labelgs::synth::{Preset, SynthOptions, World, picture, ring_of_cameras};
+use labelgs::synth::{Fault, spoil};
+use labelgs::synth::{Preset, SynthOptions};
 
 const HOW: Overlap = Overlap { least: 0.1, memory: 5 };
 

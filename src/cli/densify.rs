@@ -65,7 +65,7 @@ pub struct DensifyArgs {
 }
 
 /// Renders the video.
-pub fn run(args: &DensifyArgs, context: &Context) -> Result<()> {
+pub(crate) fn run(args: &DensifyArgs, context: &Context) -> Result<()> {
     let (model, near) = (open_model(&args.model)?, near_plane(&args.model, args.near)?);
     let dataset = open_scene(&args.scene, &args.reading, None, args.background, false)?;
     let views = ordered_views(args, &dataset)?;

@@ -18,7 +18,7 @@ pub struct DevicesArgs {
 }
 
 /// Prints the devices. Fails if none of them can be used.
-pub fn run(args: &DevicesArgs, context: &Context) -> Result<()> {
+pub(crate) fn run(args: &DevicesArgs, context: &Context) -> Result<()> {
     let mut options = GpuOptions::from_env()?;
     options.device = context.global.device.clone().or(options.device);
     let (devices, picked) = gpu::devices(&options)?;
@@ -43,12 +43,12 @@ pub fn run(args: &DevicesArgs, context: &Context) -> Result<()> {
 }
 
 /// The kernels that a device gets.
-pub fn shape_of(device: &Capabilities) -> KernelShape {
+pub(crate) fn shape_of(device: &Capabilities) -> KernelShape {
     KernelShape::of(device)
 }
 
 /// The kernels in words.
-pub fn shape_text(shape: &KernelShape) -> String {
+pub(crate) fn shape_text(shape: &KernelShape) -> String {
     format!(
         "subgroups of {}, tiles of {} x {} px, {} reads, sort digits of {} bits",
         shape.subgroup,
@@ -60,7 +60,7 @@ pub fn shape_text(shape: &KernelShape) -> String {
 }
 
 /// The kernels as JSON.
-pub fn shape_json(shape: &KernelShape) -> Value {
+pub(crate) fn shape_json(shape: &KernelShape) -> Value {
     json!({
         "subgroup_size": shape.subgroup,
         "tile": [shape.tile_width, shape.tile_height],
@@ -91,7 +91,7 @@ fn to_text(device: &Capabilities, picked: Option<usize>) -> String {
 }
 
 /// What the engine needs and wishes of a device, a row each.
-pub fn needs_text(device: &Capabilities) -> String {
+pub(crate) fn needs_text(device: &Capabilities) -> String {
     let row = |need: &Need| {
         let (what, needed, found) = (need.what, &need.needed, &need.found);
         format!("   {:<7} {what:<29} needed {needed:<7} found {found:<18} {}\n", state(need), need.reason)
@@ -100,7 +100,7 @@ pub fn needs_text(device: &Capabilities) -> String {
 }
 
 /// The same as JSON.
-pub fn needs_json(device: &Capabilities) -> Vec<Value> {
+pub(crate) fn needs_json(device: &Capabilities) -> Vec<Value> {
     let row = |need: &Need| {
         json!({
             "what": need.what, "required": need.is_required, "needed": need.needed, "found": need.found,

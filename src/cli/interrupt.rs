@@ -12,7 +12,7 @@ static AT_ONCE: LazyLock<Arc<AtomicBool>> = LazyLock::new(|| Arc::new(AtomicBool
 static STATUS: LazyLock<Arc<AtomicUsize>> = LazyLock::new(|| Arc::new(AtomicUsize::new(0)));
 
 /// Sets the signal handlers. The order matters: the first signal is noted and arms the exit, the second one exits.
-pub fn install() -> Result<()> {
+pub(crate) fn install() -> Result<()> {
     for (signal, status) in [(SIGINT, 130), (SIGTERM, 143)] {
         flag::register_conditional_shutdown(signal, status, Arc::clone(&AT_ONCE))
             .and_then(|_| flag::register_usize(signal, Arc::clone(&STATUS), status as usize))
@@ -23,12 +23,12 @@ pub fn install() -> Result<()> {
 }
 
 /// From now on the first signal is only noted; the caller looks at [`check`] often. A second one ends the process.
-pub fn note_only() {
+pub(crate) fn note_only() {
     AT_ONCE.store(false, Ordering::SeqCst);
 }
 
 /// The exit status of a signal that came.
-pub fn status() -> Option<i32> {
+pub(crate) fn status() -> Option<i32> {
     match STATUS.load(Ordering::SeqCst) {
         0 => None,
         status => i32::try_from(status).ok(),
@@ -36,6 +36,6 @@ pub fn status() -> Option<i32> {
 }
 
 /// An error if a signal came.
-pub fn check() -> Result<()> {
+pub(crate) fn check() -> Result<()> {
     status().map_or(Ok(()), |status| Err(Error::Interrupted(status)))
 }

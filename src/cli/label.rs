@@ -71,7 +71,7 @@ pub struct LabelArgs {
 }
 
 /// Gives the Gaussians of a trained model their labels.
-pub fn run(args: &LabelArgs, context: &Context) -> Result<()> {
+pub(crate) fn run(args: &LabelArgs, context: &Context) -> Result<()> {
     let (mut model, near) = (open_model(&args.model)?, near_plane(&args.model, args.near)?);
     let dataset = open_scene(&args.scene, &args.reading, Some(args.masks.clone()), [0.0; 3], true)?;
     let views: Vec<&View> = dataset.train.iter().filter(|view| view.mask.is_some()).collect();

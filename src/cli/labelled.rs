@@ -70,14 +70,14 @@ impl MinConfidenceArg {
 }
 
 /// Opens a model and counts its labels.
-pub fn open(model: &Path, table: &TableArg) -> Result<(Gaussians, Catalogue)> {
+pub(crate) fn open(model: &Path, table: &TableArg) -> Result<(Gaussians, Catalogue)> {
     let gaussians = open_model(model)?;
     let known = Catalogue::new(&gaussians, table.open(model)?);
     Ok((gaussians, known))
 }
 
 /// What an edit made.
-pub struct Edited<'a> {
+pub(crate) struct Edited<'a> {
     /// File to write.
     pub output: &'a Path,
     /// The model.
@@ -92,7 +92,7 @@ pub struct Edited<'a> {
 
 impl Edited<'_> {
     /// Writes model and table and prints what was written; `more` are further fields of the JSON.
-    pub fn finish(&self, print_json: bool, more: serde_json::Value) -> Result<()> {
+    pub(crate) fn finish(&self, print_json: bool, more: serde_json::Value) -> Result<()> {
         let left_out = write_model(self.output, self.model)?;
         let beside = LabelTable::beside(self.output);
         LabelTable::put(self.table.as_ref(), &beside)?;
@@ -116,6 +116,6 @@ impl Edited<'_> {
 }
 
 /// True if JSON was asked for before or behind the verb.
-pub fn wants_json(context: &Context, here: &JsonFlag) -> bool {
+pub(crate) fn wants_json(context: &Context, here: &JsonFlag) -> bool {
     context.json || here.json
 }

@@ -34,7 +34,7 @@ struct Row<'a> {
 }
 
 /// Prints a row per label.
-pub fn run(args: &ListArgs, context: &Context) -> Result<()> {
+pub(crate) fn run(args: &ListArgs, context: &Context) -> Result<()> {
     let (model, known) = open(&args.model, &args.table)?;
     let rows: Vec<Row> =
         summarise(&model).into_iter().map(|summary| Row { name: known.name(summary.label), summary }).collect();

@@ -30,7 +30,7 @@ impl Write for AboveBars {
 }
 
 /// Starts logging; `RUST_LOG` wins over the flags. Later calls do nothing.
-pub fn start(args: &GlobalArgs) {
+pub(crate) fn start(args: &GlobalArgs) {
     let level = match (args.quiet, args.verbose) {
         (true, _) => "error",
         (_, 0) => "warn,labelgs=info",
@@ -51,7 +51,7 @@ pub fn start(args: &GlobalArgs) {
 }
 
 /// Prints the error that ends the process; printed even when quiet.
-pub fn final_error(error: &dyn std::fmt::Display) {
+pub(crate) fn final_error(error: &dyn std::fmt::Display) {
     BARS.suspend(|| {
         // There is nowhere to report a closed standard error.
         let _ = writeln!(std::io::stderr(), "error: {error}");
@@ -59,7 +59,7 @@ pub fn final_error(error: &dyn std::fmt::Display) {
 }
 
 /// Progress of long work: a bar on a terminal, otherwise a log line now and then.
-pub struct Progress {
+pub(crate) struct Progress {
     bar: Option<ProgressBar>,
     what: &'static str,
     total: u64,
@@ -69,7 +69,7 @@ pub struct Progress {
 
 impl Progress {
     /// Progress over `total` things called `what`, such as `steps`.
-    pub fn new(total: u64, what: &'static str, args: &GlobalArgs) -> Self {
+    pub(crate) fn new(total: u64, what: &'static str, args: &GlobalArgs) -> Self {
         let bar = (!args.quiet && std::io::stderr().is_terminal()).then(|| {
             let template = "{bar:30} {pos}/{len} {msg} {per_sec} {eta} left";
             let style = ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar());
@@ -80,7 +80,7 @@ impl Progress {
     }
 
     /// `done` things are done; `message` tells more, such as the loss, and is only asked when it is shown.
-    pub fn set(&mut self, done: u64, message: impl FnOnce() -> String) {
+    pub(crate) fn set(&mut self, done: u64, message: impl FnOnce() -> String) {
         if let Some(bar) = &self.bar {
             bar.set_position(done);
             if self.last.elapsed() > Duration::from_millis(100) {

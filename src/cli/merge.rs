@@ -29,7 +29,7 @@ pub struct MergeArgs {
 }
 
 /// Writes the model with one label in place of several.
-pub fn run(args: &MergeArgs, context: &Context) -> Result<()> {
+pub(crate) fn run(args: &MergeArgs, context: &Context) -> Result<()> {
     let (model, known) = open(&args.edit.model, &args.edit.table)?;
     let labels = known.resolve("--labels", &args.labels.0)?;
     let smallest = labels.iter().copied().find(|&label| label != UNLABELLED);

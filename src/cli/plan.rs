@@ -53,7 +53,7 @@ struct Subject {
 }
 
 /// Prints the plan of a step. A plan that is too large for the device is printed, and then fails.
-pub fn run(args: &PlanArgs, context: &Context) -> Result<()> {
+pub(crate) fn run(args: &PlanArgs, context: &Context) -> Result<()> {
     let subject = subject(args, context)?;
     let (planned, problem) = match planned(&subject, &subject.limits) {
         Err(error @ Error::OutOfMemory { .. }) => (planned(&subject, &without_sizes(&subject.limits))?, Some(error)),

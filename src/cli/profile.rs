@@ -77,7 +77,7 @@ pub struct ProfileArgs {
 const COUNTED: u32 = 10;
 
 /// Times steps inside of real training.
-pub fn run(args: &ProfileArgs, context: &Context) -> Result<()> {
+pub(crate) fn run(args: &ProfileArgs, context: &Context) -> Result<()> {
     if let Some([old, new]) = args.compare.as_deref() {
         return profile_compare::run([old, new], args.tolerance.into(), context.json || args.json.is_some());
     }

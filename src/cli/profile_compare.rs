@@ -39,7 +39,7 @@ pub struct Row {
 
 /// Prints stages and counters of both; fails if a stage of the new one is slower beyond noise: its median by more than
 /// `tolerance` (a share), and three quarters of its steps slower than three quarters of the old one's.
-pub fn run(files: [&Path; 2], tolerance: f64, as_json: bool) -> Result<()> {
+pub(crate) fn run(files: [&Path; 2], tolerance: f64, as_json: bool) -> Result<()> {
     let [old, new] = [Profile::read(files[0])?, Profile::read(files[1])?];
     for what in ["device", "kernels", "labels", "size", "views", "worker_threads", "barrier_before_each_pass"] {
         let [old, new] = [&old.json[what], &new.json[what]];

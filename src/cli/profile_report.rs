@@ -12,7 +12,7 @@ use std::time::Duration;
 
 /// Threads of the host that run the passes.
 #[derive(Clone, Copy, Debug)]
-pub struct Workers {
+pub(super) struct Workers {
     /// How many.
     pub count: usize,
     /// Where the number comes from.
@@ -21,7 +21,7 @@ pub struct Workers {
 
 /// Which steps are timed, and how.
 #[derive(Clone, Copy, Debug)]
-pub struct Window {
+pub(super) struct Window {
     /// Passes overlap as in training.
     pub overlap: bool,
     /// Steps of training before.
@@ -32,7 +32,7 @@ pub struct Window {
 
 /// What the host's clocks say.
 #[derive(Clone, Debug, Default)]
-pub struct Clocks {
+pub(super) struct Clocks {
     /// All timed steps, with what came between them.
     pub wall: Duration,
     /// Each call of the trainer; two steps are in flight, so a call waits for an earlier step.
@@ -50,7 +50,7 @@ struct Spread {
 }
 
 /// A profile.
-pub struct Profile {
+pub(super) struct Profile {
     device: String,
     driver: String,
     shape: KernelShape,
@@ -80,7 +80,7 @@ pub struct Profile {
 
 impl Profile {
     /// An empty one.
-    pub fn new(gpu: &Gpu, workers: Option<Workers>, window: Window) -> Self {
+    pub(super) fn new(gpu: &Gpu, workers: Option<Workers>, window: Window) -> Self {
         let found = gpu.capabilities();
         Self {
             device: found.name.clone(),
@@ -108,7 +108,7 @@ impl Profile {
     }
 
     /// Adds what was measured. The first run of a recording, in which drivers compile, counts for no pass.
-    pub fn fill(&mut self, clocks: Clocks, reports: &[StepReport], mut times: Vec<StepTimes>) {
+    pub(super) fn fill(&mut self, clocks: Clocks, reports: &[StepReport], mut times: Vec<StepTimes>) {
         let all = times.len();
         self.steps =
             reports.iter().map(|report| self.step_json(report, times.iter().find(|t| t.step == report.step))).collect();
@@ -149,7 +149,7 @@ impl Profile {
     }
 
     /// Adds what further steps counted that were not timed: which share of the walked pairs had a weight.
-    pub fn fill_pairs(&mut self, reports: &[StepReport]) {
+    pub(super) fn fill_pairs(&mut self, reports: &[StepReport]) {
         let weighted: f64 = reports.iter().map(|step| f64::from(step.report.counters.contributing_pairs)).sum();
         let walked: f64 = reports.iter().map(walked_splats).sum();
         self.contributing = weighted / (walked * f64::from(self.shape.tile_pixels()));
@@ -191,7 +191,7 @@ impl Profile {
     }
 
     /// The table.
-    pub fn to_text(&self) -> String {
+    pub(super) fn to_text(&self) -> String {
         let (first, last) =
             (self.from_step + self.warm_up + 1, self.from_step + self.warm_up + self.steps.len() as u32);
         let labels = if self.size.labels.is_some() { "with labels" } else { "without labels" };
@@ -228,7 +228,7 @@ impl Profile {
     }
 
     /// Everything.
-    pub fn to_json(&self) -> Value {
+    pub(super) fn to_json(&self) -> Value {
         let row = |(stage, pass): &(Stage, PassTime)| {
             json!({
                 "stage": stage.name(), "name": pass.label, "items": pass.items, "median_ms": ms(pass.median),

@@ -24,7 +24,7 @@ pub struct RecolourArgs {
 }
 
 /// Writes the model with the colour.
-pub fn run(args: &RecolourArgs, context: &Context) -> Result<()> {
+pub(crate) fn run(args: &RecolourArgs, context: &Context) -> Result<()> {
     let select = &args.select;
     let (model, known) = open(&select.model, &select.choice.prompts.table)?;
     let labels = select.choice.labels(&select.model, &model, &known, context)?;

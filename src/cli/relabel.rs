@@ -21,7 +21,7 @@ pub struct RelabelArgs {
 }
 
 /// Writes the model with the new ids.
-pub fn run(args: &RelabelArgs, context: &Context) -> Result<()> {
+pub(crate) fn run(args: &RelabelArgs, context: &Context) -> Result<()> {
     let (model, known) = open(&args.edit.model, &args.edit.table)?;
     let map = &args.map.0;
     known.check("--map", &map.keys().copied().collect())?;

@@ -66,7 +66,7 @@ pub struct RenderArgs {
 }
 
 /// Renders views.
-pub fn run(args: &RenderArgs, context: &Context) -> Result<()> {
+pub(crate) fn run(args: &RenderArgs, context: &Context) -> Result<()> {
     let exr_only = args.what.iter().find(|what| matches!(what, What::TopId | What::TopWeight));
     if args.format == Format::Png && exr_only.is_some() {
         return Err(Error::usage("--what", "top-id and top-weight are 32-bit values; say --format exr"));

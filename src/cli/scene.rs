@@ -26,7 +26,7 @@ pub fn near_plane(model: &Path, typed: Option<f32>) -> Result<f32> {
 
 /// Opens the device that was asked for and says which it is. One whose subgroups may not be what it tells has to prove
 /// itself first.
-pub fn open_gpu(context: &Context) -> Result<Arc<Gpu>> {
+pub(crate) fn open_gpu(context: &Context) -> Result<Arc<Gpu>> {
     let gpu = open_untried(context)?;
     if !gpu.capabilities().subgroup.is_pinned {
         tracing::info!("this device does not let subgroup sizes be chosen: a step is tried first");
@@ -36,7 +36,7 @@ pub fn open_gpu(context: &Context) -> Result<Arc<Gpu>> {
 }
 
 /// The same without proof.
-pub fn open_untried(context: &Context) -> Result<Arc<Gpu>> {
+pub(crate) fn open_untried(context: &Context) -> Result<Arc<Gpu>> {
     let mut options = GpuOptions::from_env()?;
     if let Some(device) = &context.global.device {
         options.device = Some(device.clone());
@@ -51,7 +51,7 @@ pub fn open_untried(context: &Context) -> Result<Arc<Gpu>> {
 }
 
 /// Reads a scene and logs what a person should know about it.
-pub fn open_scene(
+pub(crate) fn open_scene(
     path: &Path,
     reading: &SceneArgs,
     masks: Option<PathBuf>,
@@ -65,7 +65,7 @@ pub fn open_scene(
 }
 
 /// The views that `test`, `train`, `all` or a list of names means.
-pub fn pick_views<'a>(dataset: &'a Dataset, which: &str) -> Result<Vec<&'a View>> {
+pub(crate) fn pick_views<'a>(dataset: &'a Dataset, which: &str) -> Result<Vec<&'a View>> {
     let views: Vec<&View> = match which {
         "test" => dataset.test.iter().collect(),
         "train" => dataset.train.iter().collect(),
@@ -82,7 +82,7 @@ pub fn pick_views<'a>(dataset: &'a Dataset, which: &str) -> Result<Vec<&'a View>
 }
 
 /// The view of a name, with or without its extension.
-pub fn find_view<'a>(dataset: &'a Dataset, name: &str) -> Result<&'a View> {
+pub(crate) fn find_view<'a>(dataset: &'a Dataset, name: &str) -> Result<&'a View> {
     let all = dataset.all();
     let found =
         all.iter().find(|view| view.name == name || view.stem() == name || without_extension(&view.name) == name);
@@ -100,6 +100,10 @@ fn without_extension(name: &str) -> String {
 }
 
 /// An engine that renders `model`, which is not yet on it, at up to the largest of `sizes`.
-pub fn render_engine(gpu: Arc<Gpu>, model: &Gaussians, sizes: impl Iterator<Item = (u32, u32)>) -> Result<Engine> {
+pub(crate) fn render_engine(
+    gpu: Arc<Gpu>,
+    model: &Gaussians,
+    sizes: impl Iterator<Item = (u32, u32)>,
+) -> Result<Engine> {
     Engine::new(gpu, EngineSize::of_model(model, sizes), SchedulerOptions::default())
 }

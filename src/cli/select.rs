@@ -69,7 +69,7 @@ impl GroupingArgs {
 }
 
 /// Writes the chosen labels.
-pub fn run_extract(args: &ExtractArgs, context: &Context) -> Result<()> {
+pub(crate) fn run_extract(args: &ExtractArgs, context: &Context) -> Result<()> {
     let select = &args.select;
     let (model, known) = open(&select.model, &select.choice.prompts.table)?;
     let labels = select.choice.labels(&select.model, &model, &known, context)?;
@@ -86,7 +86,7 @@ pub fn run_extract(args: &ExtractArgs, context: &Context) -> Result<()> {
 }
 
 /// Writes all but the chosen labels.
-pub fn run_remove(args: &SelectArgs, context: &Context) -> Result<()> {
+pub(crate) fn run_remove(args: &SelectArgs, context: &Context) -> Result<()> {
     let (model, known) = open(&args.model, &args.choice.prompts.table)?;
     let labels = args.choice.labels(&args.model, &model, &known, context)?;
     let part = remove(&model, &listed(&labels))?;

@@ -20,7 +20,7 @@ pub struct SelftestArgs {
 }
 
 /// Runs the checks and prints a row for each. Fails if one does.
-pub fn run(args: &SelftestArgs, context: &Context) -> Result<()> {
+pub(crate) fn run(args: &SelftestArgs, context: &Context) -> Result<()> {
     let gpu = open_untried(context)?;
     let (found, kernels) = (gpu.capabilities(), KernelShape::of(gpu.capabilities()));
     let as_json = context.json || args.json.json;

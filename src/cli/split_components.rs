@@ -28,7 +28,7 @@ pub struct SplitArgs {
 }
 
 /// Writes the model with a label for each part.
-pub fn run(args: &SplitArgs, context: &Context) -> Result<()> {
+pub(crate) fn run(args: &SplitArgs, context: &Context) -> Result<()> {
     let (model, known) = open(&args.edit.model, &args.edit.table)?;
     let labels = known.resolve("--labels", &args.labels.0)?;
     let named = known.table.iter().flat_map(|table| &table.labels).map(|entry| entry.id).collect();

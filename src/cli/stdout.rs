@@ -6,19 +6,19 @@ use std::io::{ErrorKind, Write};
 const NAME: &str = "standard output";
 
 /// Prints text as it is.
-pub fn print(text: &str) -> Result<()> {
+pub(crate) fn print(text: &str) -> Result<()> {
     let mut out = std::io::stdout().lock();
     out.write_all(text.as_bytes()).and_then(|()| out.flush()).map_err(Error::write(NAME))
 }
 
 /// Prints a value as one line of JSON.
-pub fn print_json(value: &impl serde::Serialize) -> Result<()> {
+pub(crate) fn print_json(value: &impl serde::Serialize) -> Result<()> {
     let text = serde_json::to_string(value).map_err(|error| Error::Bug(format!("JSON: {error}")))?;
     print(&format!("{text}\n"))
 }
 
 /// True for the error of a reader that has seen enough, such as `head`.
-pub fn is_closed(error: &Error) -> bool {
+pub(crate) fn is_closed(error: &Error) -> bool {
     matches!(error, Error::Write { path, source }
         if path.as_os_str() == NAME && source.kind() == ErrorKind::BrokenPipe)
 }

@@ -38,7 +38,7 @@ pub struct SynthArgs {
 }
 
 /// Makes the scene.
-pub fn run(args: &SynthArgs, context: &Context) -> Result<()> {
+pub(crate) fn run(args: &SynthArgs, context: &Context) -> Result<()> {
     let options = SynthOptions {
         preset: args.preset,
         width: args.size.0,

@@ -9,7 +9,7 @@ use crate::Result;
 use crate::run::{self, Event, Flow, Live, Observer, Request, Settings, Summary};
 
 /// Trains a model and prints what came of it.
-pub fn run(args: &TrainArgs, context: &Context) -> Result<()> {
+pub(crate) fn run(args: &TrainArgs, context: &Context) -> Result<()> {
     let settings = |checkpoint: Option<&Settings>| args.how.settings(checkpoint);
     let request = args.how.request((&args.scene, &args.output), args.masks.clone(), &settings)?;
     let summary = train(&request, context)?;

@@ -4,7 +4,7 @@ use crate::edit::catalogue::Pick;
 use crate::scene::labels::LABEL_MAX;
 use std::collections::BTreeMap;
 
-pub use crate::options::parse::{colour, count, switch};
+pub(crate) use crate::options::parse::{colour, count, switch};
 
 /// Labels by id and by name.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -37,7 +37,7 @@ pub struct Renumbering(pub BTreeMap<u32, u32>);
 pub struct Size(pub u32, pub u32);
 
 /// Labels such as `1,4-6,cup`. What has only digits and dashes is an id or a range of ids.
-pub fn picks(text: &str) -> Result<Picks, String> {
+pub(crate) fn picks(text: &str) -> Result<Picks, String> {
     let pick = |part: &str| {
         if part.is_empty() {
             return Err("an empty name; expected ids or names, such as 1,4-6,cup".to_owned());
@@ -53,13 +53,13 @@ pub fn picks(text: &str) -> Result<Picks, String> {
 }
 
 /// A label, 0 for none.
-pub fn label(text: &str) -> Result<u32, String> {
+pub(crate) fn label(text: &str) -> Result<u32, String> {
     let id = text.trim().parse().ok().filter(|&id| id <= LABEL_MAX);
     id.ok_or_else(|| format!("`{text}` is no label; labels are whole numbers from 0 to {LABEL_MAX}, such as 1,4-6"))
 }
 
 /// Old and new labels such as `3=7,4=0`.
-pub fn renumbering(text: &str) -> Result<Renumbering, String> {
+pub(crate) fn renumbering(text: &str) -> Result<Renumbering, String> {
     let mut map = BTreeMap::new();
     for part in text.split(',') {
         let (old, new) = part.split_once('=').ok_or_else(|| format!("`{part}` is no OLD=NEW, such as 3=7"))?;
@@ -72,13 +72,13 @@ pub fn renumbering(text: &str) -> Result<Renumbering, String> {
 }
 
 /// A pixel of a view such as `004:120,80`.
-pub fn at(text: &str) -> Result<At, String> {
+pub(crate) fn at(text: &str) -> Result<At, String> {
     let (view, pixel) = in_view(text, "VIEW:x,y in whole px, such as 004:120,80")?;
     Ok(At { view, pixel })
 }
 
 /// A box in a view such as `004:100,60,160,120`.
-pub fn box_at(text: &str) -> Result<BoxAt, String> {
+pub(crate) fn box_at(text: &str) -> Result<BoxAt, String> {
     let (view, corners) = in_view(text, "VIEW:x0,y0,x1,y1 in whole px, such as 004:100,60,160,120")?;
     let [x0, y0, x1, y1] = corners;
     if x0 >= x1 || y0 >= y1 {
@@ -97,25 +97,25 @@ fn in_view<const N: usize>(text: &str, expected: &str) -> Result<(String, [u32; 
 }
 
 /// A part of a whole, 0 to 1.
-pub fn share(text: &str) -> Result<f32, String> {
+pub(crate) fn share(text: &str) -> Result<f32, String> {
     let value = text.parse().ok().filter(|value| (0.0..=1.0).contains(value));
     value.ok_or_else(|| format!("`{text}` is no share; expected 0 to 1"))
 }
 
 /// A distance, world units, 0 or more.
-pub fn distance(text: &str) -> Result<f64, String> {
+pub(crate) fn distance(text: &str) -> Result<f64, String> {
     let value = text.parse().ok().filter(|value: &f64| value.is_finite() && *value >= 0.0);
     value.ok_or_else(|| format!("`{text}` is no distance; expected 0 or more, in world units"))
 }
 
 /// A near plane, world units, more than 0.
-pub fn near(text: &str) -> Result<f32, String> {
+pub(crate) fn near(text: &str) -> Result<f32, String> {
     let value = text.parse().ok().filter(|value: &f32| value.is_finite() && *value > 0.0);
     value.ok_or_else(|| format!("`{text}` is no near plane; expected more than 0, in world units"))
 }
 
 /// A size such as `320x240`.
-pub fn size(text: &str) -> Result<Size, String> {
+pub(crate) fn size(text: &str) -> Result<Size, String> {
     let wrong = || format!("`{text}` is no size; expected WIDTHxHEIGHT in px, 1 to 16384 each, such as 320x240");
     let (width, height) = text.split_once(['x', 'X']).ok_or_else(wrong)?;
     let side = |text: &str| text.trim().parse().ok().filter(|side| (1..=16_384).contains(side)).ok_or_else(wrong);
@@ -123,7 +123,7 @@ pub fn size(text: &str) -> Result<Size, String> {
 }
 
 /// Bytes, such as `1500M` or `2G`, in powers of 1024.
-pub fn bytes(text: &str) -> Result<u64, String> {
+pub(crate) fn bytes(text: &str) -> Result<u64, String> {
     let wrong =
         || format!("`{text}` is no amount of memory; expected a number with K, M or G behind it, such as 1500M");
     let (number, unit) = text.trim().split_at(text.trim().len().saturating_sub(1));

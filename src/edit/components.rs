@@ -11,7 +11,7 @@ use petgraph::unionfind::UnionFind;
 use std::collections::BTreeMap;
 
 /// Standard deviations from the centre to the border of an ellipsoid: an eighth of the opacity is left there.
-pub const REACH: f64 = 2.0;
+pub(crate) const REACH: f64 = 2.0;
 
 /// What counts as connected, and what as a speck.
 #[derive(Clone, Copy, Debug, PartialEq)]

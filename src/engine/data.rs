@@ -8,7 +8,7 @@ use crate::scheduler::plan::Buf;
 
 impl Engine {
     /// Positions of the Gaussians, relative to [`Engine::origin`].
-    pub fn means(&mut self) -> Result<Vec<[f32; 3]>> {
+    pub(crate) fn means(&mut self) -> Result<Vec<[f32; 3]>> {
         let rows = self.sched.download::<[f32; 4]>(Buf::MEANS, 0, 0, self.gaussian_count as usize)?;
         Ok(rows.iter().map(|&[x, y, z, _]| [x, y, z]).collect())
     }
@@ -24,12 +24,13 @@ impl Engine {
     }
 
     /// The shared parameters; none if the engine was made without rows of them.
+    #[doc(hidden)]
     pub fn shared(&mut self) -> Result<Vec<[f32; 4]>> {
         self.sched.download(Buf::SHARED, 0, 0, self.size.shared_rows as usize)
     }
 
     /// Replaces the first shared parameters; the moments of all start over.
-    pub fn set_shared(&mut self, rows: &[[f32; 4]]) -> Result<()> {
+    pub(crate) fn set_shared(&mut self, rows: &[[f32; 4]]) -> Result<()> {
         for plane in &SHARED_PLANES[1..] {
             self.sched.fill(*plane, 0)?;
         }
@@ -37,13 +38,13 @@ impl Engine {
     }
 
     /// Sets all votes to 0.
-    pub fn clear_votes(&mut self) -> Result<()> {
+    pub(crate) fn clear_votes(&mut self) -> Result<()> {
         self.sched.fill(Buf::VOTES_LOW, 0)?;
         self.sched.fill(Buf::VOTES_HIGH, 0)
     }
 
     /// The votes for each Gaussian and column [N, columns].
-    pub fn votes(&mut self, columns: usize) -> Result<Vec<u64>> {
+    pub(crate) fn votes(&mut self, columns: usize) -> Result<Vec<u64>> {
         let cells = self.gaussian_count as usize * columns;
         let low = self.sched.download::<u32>(Buf::VOTES_LOW, 0, 0, cells)?;
         let high = self.sched.download::<u32>(Buf::VOTES_HIGH, 0, 0, cells)?;
@@ -51,23 +52,22 @@ impl Engine {
     }
 
     /// The picture of the last list: r, g, b over the background, and the final transmittance.
-    pub fn picture(&mut self, pixels: usize) -> Result<Vec<[f32; 4]>> {
+    pub(crate) fn picture(&mut self, pixels: usize) -> Result<Vec<[f32; 4]>> {
         self.sched.download(Buf::IMAGE, 0, 0, pixels)
     }
 
     /// Main Gaussian of each pixel of the last render, -1 where none contributes.
-    pub fn main_gaussians(&mut self, pixels: usize) -> Result<Vec<i32>> {
+    pub(crate) fn main_gaussians(&mut self, pixels: usize) -> Result<Vec<i32>> {
         self.sched.download(Buf::MAIN_GAUSSIAN, 0, 0, pixels)
     }
 
     /// Weight of that Gaussian, and the weighted sum of z over all Gaussians.
-    pub fn weights_and_depths(&mut self, pixels: usize) -> Result<Vec<[f32; 2]>> {
+    pub(crate) fn weights_and_depths(&mut self, pixels: usize) -> Result<Vec<[f32; 2]>> {
         self.sched.download(Buf::MAIN_WEIGHT_DEPTH, 0, 0, pixels)
     }
 
     /// Makes a position NaN, as a broken device would.
-    #[doc(hidden)]
-    pub fn spoil(&mut self) -> Result<()> {
+    pub(crate) fn spoil(&mut self) -> Result<()> {
         self.sched.upload(Buf::MEANS, 0, 0, &[f32::NAN])
     }
 

@@ -69,6 +69,7 @@ fn derive(shape: &KernelShape, capacity: &mut Capacity, instances: u64, trained:
 
 impl Engine {
     /// The memory that an engine for `room` would take, before anything is allocated.
+    #[doc(hidden)]
     pub fn predict(gpu: &Gpu, size: &EngineSize, options: SchedulerOptions) -> Result<MemoryReport> {
         let shape = KernelShape::of(gpu.capabilities());
         let capacity = capacity(&shape, size);
@@ -77,6 +78,7 @@ impl Engine {
     }
 
     /// The lists that decide how much scratch memory is needed.
+    #[doc(hidden)]
     pub fn lists_of(shape: &KernelShape, capacity: &Capacity, size: &EngineSize) -> Vec<PassList> {
         let mut lists = vec![pass::render_view(shape, capacity, 3)];
         if size.trained {
@@ -95,6 +97,7 @@ impl Engine {
     }
 
     /// Grows the model's buffers if `count` Gaussians do not fit. All lists are recorded again.
+    #[doc(hidden)]
     pub fn make_room_for_gaussians(&mut self, count: u64) -> Result<()> {
         if count <= self.size.gaussians {
             return Ok(());
@@ -130,7 +133,7 @@ impl Engine {
     }
 
     /// The most Gaussians, up to `wanted`, that there is memory for. What there is room for already is never less.
-    pub fn most_gaussians(&self, wanted: u64) -> Result<u64> {
+    pub(crate) fn most_gaussians(&self, wanted: u64) -> Result<u64> {
         let (mut fits, mut too_many) = (self.size.gaussians, wanted + 1);
         if wanted <= fits || self.fits(&self.with_gaussians(wanted))? {
             return Ok(wanted);
@@ -173,6 +176,7 @@ impl Engine {
 
     /// Grows what a failed list needed, and clears the failure. True if something grew; lists that were in flight have
     /// changed nothing then.
+    #[doc(hidden)]
     pub fn recover(&mut self, report: &Report) -> Result<bool> {
         if report.failure == 0 {
             return Ok(false);
@@ -217,7 +221,7 @@ impl Engine {
     }
 
     /// How far the memory has grown.
-    pub fn sizes(&self) -> GrownSizes {
+    pub(crate) fn sizes(&self) -> GrownSizes {
         let capacity = self.sched.capacity();
         let word = |size: u64| u32::try_from(size).unwrap_or(u32::MAX);
         GrownSizes {
@@ -229,7 +233,7 @@ impl Engine {
     }
 
     /// Makes the memory of a new engine as large as another one's had become.
-    pub fn grow_to(&mut self, sizes: GrownSizes) -> Result<()> {
+    pub(crate) fn grow_to(&mut self, sizes: GrownSizes) -> Result<()> {
         let gaussians = self.size.gaussians.max(u64::from(sizes.gaussians));
         let mut new = capacity(&self.shape, &EngineSize { gaussians, ..self.size });
         if new.layer_tiles > 0 {

@@ -8,7 +8,7 @@ use crate::shaders::structs::StepUniforms;
 
 /// What a list reads besides the model.
 #[derive(Clone, Copy, Debug)]
-pub enum Input<'a> {
+pub(crate) enum Input<'a> {
     /// Of a render, a densification or an opacity reset.
     Uniforms(&'a StepUniforms),
     /// Of a training step.
@@ -19,7 +19,7 @@ pub enum Input<'a> {
 
 /// What a training step reads.
 #[derive(Clone, Debug)]
-pub struct TrainInput<'a> {
+pub(crate) struct TrainInput<'a> {
     /// Uniforms.
     pub uniforms: StepUniforms,
     /// The photo [P], RGBA8; alpha 0: left out.
@@ -32,7 +32,7 @@ pub struct TrainInput<'a> {
 
 /// A row of shared parameters in a step.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SharedRow {
+pub(crate) struct SharedRow {
     /// Which one.
     pub row: u32,
     /// Learning rates; if all are 0 the row rests, with its moments.
@@ -41,7 +41,7 @@ pub struct SharedRow {
 
 /// What a training step with labels reads.
 #[derive(Clone, Debug)]
-pub struct LayerInput<'a> {
+pub(crate) struct LayerInput<'a> {
     /// Visible object of each pixel [P].
     pub view_labels: &'a [u32],
     /// Layer of each label id, 0: not sampled in this step.
@@ -56,7 +56,7 @@ pub struct LayerInput<'a> {
 
 /// What the votes of a view read.
 #[derive(Clone, Copy, Debug)]
-pub struct VoteInput<'a> {
+pub(crate) struct VoteInput<'a> {
     /// Uniforms.
     pub uniforms: StepUniforms,
     /// Column of each pixel [P].
@@ -86,8 +86,7 @@ impl<'a> From<&'a VoteInput<'a>> for Input<'a> {
 impl Engine {
     /// Writes the input of a list into a frame. The only place where a camera reaches the device, so its size is checked
     /// here. Public for tests and benchmarks that run lists of their own.
-    #[doc(hidden)]
-    pub fn write(&mut self, frame: usize, input: Input) -> Result<()> {
+    pub(crate) fn write(&mut self, frame: usize, input: Input) -> Result<()> {
         let uniforms = match input {
             Input::Uniforms(uniforms) => uniforms,
             Input::Train(train) => &train.uniforms,

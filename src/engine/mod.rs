@@ -4,17 +4,17 @@
 //! [`Engine::submit`] and [`Engine::retire`] for steps in flight, and typed transfers.
 
 mod data;
-mod growth;
+pub(crate) mod growth;
 mod input;
-pub mod model;
-mod run;
+pub(crate) mod model;
+pub(crate) mod run;
 mod size;
-pub mod state;
-pub mod uniforms;
+pub(crate) mod state;
+pub(crate) mod uniforms;
 
-pub use growth::{GrownSizes, capacity};
-pub use input::{Input, LayerInput, SharedRow, TrainInput, VoteInput};
-pub use run::{InFlight, ListKey, Recording, Report};
+pub(crate) use growth::{GrownSizes, capacity};
+pub(crate) use input::{Input, LayerInput, SharedRow, TrainInput, VoteInput};
+pub(crate) use run::{InFlight, ListKey, Recording, Report};
 pub use size::{EngineSize, LabelSize};
 
 use crate::error::Result;
@@ -57,6 +57,7 @@ impl Engine {
     }
 
     /// As [`Engine::new`], with kernels of a given shape.
+    #[doc(hidden)]
     pub fn with_shape(gpu: Arc<Gpu>, shape: KernelShape, size: EngineSize, options: SchedulerOptions) -> Result<Self> {
         shape.check()?;
         size.check(&shape)?;
@@ -82,6 +83,7 @@ impl Engine {
     }
 
     /// Shape of the kernels.
+    #[doc(hidden)]
     pub fn shape(&self) -> &KernelShape {
         &self.shape
     }
@@ -97,7 +99,7 @@ impl Engine {
     }
 
     /// Says that the device now holds so many Gaussians (after a densification).
-    pub fn set_gaussian_count(&mut self, count: u32) {
+    pub(crate) fn set_gaussian_count(&mut self, count: u32) {
         self.gaussian_count = count;
     }
 
@@ -112,12 +114,12 @@ impl Engine {
     }
 
     /// Gives the model another degree; bands that were not uploaded are 0.
-    pub fn set_sh_degree(&mut self, sh_degree: u32) {
+    pub(crate) fn set_sh_degree(&mut self, sh_degree: u32) {
         self.sh_degree = sh_degree;
     }
 
     /// What [`ListKey::Extended`] adds to a step; before the first of them.
-    pub fn set_extension(&mut self, extension: Arc<dyn Extension>) {
+    pub(crate) fn set_extension(&mut self, extension: Arc<dyn Extension>) {
         self.extension = extension;
     }
 
@@ -139,7 +141,7 @@ impl Engine {
     }
 
     /// A camera's part of the uniforms for the model; everything else is 0.
-    pub fn view_uniforms(&self, camera: &Camera, near: f32, background: [f32; 3]) -> StepUniforms {
+    pub(crate) fn view_uniforms(&self, camera: &Camera, near: f32, background: [f32; 3]) -> StepUniforms {
         uniforms::view_uniforms(camera, self.origin, &self.shape, near, background, self.gaussian_count)
     }
 }

@@ -10,7 +10,7 @@ use crate::scheduler::plan::Buf;
 const BANDS: [(Buf, usize, usize, usize); 3] = [(Buf::SH1, 3, 0, 3), (Buf::SH2, 4, 3, 5), (Buf::SH3, 6, 8, 7)];
 
 /// Writes the planes; optimiser state becomes 0.
-pub fn upload(sched: &mut Scheduler, model: &Gaussians, labels: bool) -> Result<()> {
+pub(crate) fn upload(sched: &mut Scheduler, model: &Gaussians, labels: bool) -> Result<()> {
     model.check()?;
     let with = |rows: &[[f32; 3]], last: &dyn Fn(usize) -> f32| -> Vec<[f32; 4]> {
         rows.iter().enumerate().map(|(i, &[x, y, z])| [x, y, z, last(i)]).collect()
@@ -48,7 +48,7 @@ pub fn upload(sched: &mut Scheduler, model: &Gaussians, labels: bool) -> Result<
 }
 
 /// Reads the planes of `count` Gaussians.
-pub fn download(sched: &mut Scheduler, count: usize, sh_degree: u32, labels: bool) -> Result<Gaussians> {
+pub(crate) fn download(sched: &mut Scheduler, count: usize, sh_degree: u32, labels: bool) -> Result<Gaussians> {
     let xyz = |rows: &[[f32; 4]]| rows.iter().map(|&[x, y, z, _]| [x, y, z]).collect::<Vec<_>>();
     let means = sched.download::<[f32; 4]>(Buf::MEANS, 0, 0, count)?;
     let mut model = Gaussians {

@@ -40,7 +40,7 @@ pub struct Report {
 
 /// A list in flight; [`Engine::retire`] waits for it.
 #[derive(Clone, Copy, Debug)]
-pub struct InFlight {
+pub(crate) struct InFlight {
     /// What tells its recording from others.
     pub recording: Recording,
     ticket: Ticket,
@@ -48,7 +48,7 @@ pub struct InFlight {
 
 /// A list as it was recorded for a frame. After buffers have grown it is another one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub struct Recording {
+pub(crate) struct Recording {
     list: ListId,
     frame: usize,
 }
@@ -80,7 +80,7 @@ impl Engine {
     }
 
     /// Runs a list and waits for it; again with more memory where a buffer was too small. Nothing may be in flight.
-    pub fn run<'a>(&mut self, key: ListKey, input: impl Into<Input<'a>>) -> Result<Report> {
+    pub(crate) fn run<'a>(&mut self, key: ListKey, input: impl Into<Input<'a>>) -> Result<Report> {
         let input = input.into();
         self.check_idle()?;
         loop {
@@ -98,7 +98,7 @@ impl Engine {
     }
 
     /// Submits a list and does not wait for it. At most one per frame may be in flight.
-    pub fn submit<'a>(&mut self, key: ListKey, input: impl Into<Input<'a>>) -> Result<InFlight> {
+    pub(crate) fn submit<'a>(&mut self, key: ListKey, input: impl Into<Input<'a>>) -> Result<InFlight> {
         let frame = (self.last_frame + 1) % FRAMES_IN_FLIGHT;
         if self.in_flight[frame] {
             return Err(Error::Bug(format!("{FRAMES_IN_FLIGHT} lists are in flight; retire the oldest first")));
@@ -112,14 +112,14 @@ impl Engine {
 
     /// Waits for a list in flight. If the report has a failure, [`Engine::recover`] must follow, and the list and those
     /// submitted after it must be submitted again.
-    pub fn retire(&mut self, flight: &InFlight) -> Result<Report> {
+    pub(crate) fn retire(&mut self, flight: &InFlight) -> Result<Report> {
         self.sched.wait(flight.ticket)?;
         self.in_flight[flight.recording.frame] = false;
         self.report(flight.recording.frame)
     }
 
     /// Waits for all lists in flight; nobody will ask for their reports.
-    pub fn abandon(&mut self) -> Result<()> {
+    pub(crate) fn abandon(&mut self) -> Result<()> {
         self.sched.wait_all()?;
         self.in_flight = [false; FRAMES_IN_FLIGHT];
         Ok(())
@@ -144,7 +144,7 @@ impl Engine {
 
     /// Stage, name and nanoseconds of each item of a list that was retired and whose frame was not used again. Empty
     /// without [timestamps](crate::scheduler::SchedulerOptions::timestamps).
-    pub fn times(&self, recording: Recording) -> Result<Vec<(Stage, String, u64)>> {
+    pub(crate) fn times(&self, recording: Recording) -> Result<Vec<(Stage, String, u64)>> {
         let times = self.sched.timings(recording.list, recording.frame)?;
         let stages = pass::stage::stages(&self.sched.plan(recording.list)?.list);
         Ok(stages.into_iter().zip(times).map(|((stage, name), (_, ns))| (stage, name, ns)).collect())

@@ -53,12 +53,13 @@ impl EngineSize {
     }
 
     /// The same with so many rows of four parameters that are no Gaussian's.
+    #[doc(hidden)]
     pub const fn with_shared_rows(self, shared_rows: u32) -> Self {
         Self { shared_rows, ..self }
     }
 
     /// Refuses images of more tiles than the kernels can walk.
-    pub fn check(&self, shape: &KernelShape) -> Result<()> {
+    pub(crate) fn check(&self, shape: &KernelShape) -> Result<()> {
         let (width, height) = self.image;
         let (tiles_x, tiles_y) = shape.tiles(width, height);
         // A splat may touch every tile, once more in its object's layer, and one loop walks them (65,535 rounds).

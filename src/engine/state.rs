@@ -29,7 +29,13 @@ fn words(buf: Buf) -> u32 {
 
 /// Says what is wrong with planes that are to be the state of so many Gaussians and shared rows. `labels` is true with
 /// masks; `kept` are the names of what the strategy keeps.
-pub fn check(planes: &[Plane], counts: [u32; 2], sh_degree: u32, labels: bool, kept: &[String]) -> Result<(), String> {
+pub(crate) fn check(
+    planes: &[Plane],
+    counts: [u32; 2],
+    sh_degree: u32,
+    labels: bool,
+    kept: &[String],
+) -> Result<(), String> {
     let kept = kept.iter().map(|name| named(name).ok_or_else(|| format!("there is no plane {name}")));
     let kept = kept.collect::<Result<Vec<_>, _>>()?;
     let mut given: BTreeMap<&str, &Plane> = planes.iter().map(|plane| (plane.name.as_str(), plane)).collect();
@@ -49,7 +55,7 @@ pub fn check(planes: &[Plane], counts: [u32; 2], sh_degree: u32, labels: bool, k
 
 impl Engine {
     /// Reads the state with what the strategy keeps; nothing may be in flight.
-    pub fn download_state(&mut self, kept: &[Buf]) -> Result<Vec<Plane>> {
+    pub(crate) fn download_state(&mut self, kept: &[Buf]) -> Result<Vec<Plane>> {
         let counts = [self.gaussian_count, self.size.shared_rows];
         let planes =
             buffers(self.sh_degree, self.size.labels.is_some(), kept, counts).into_iter().map(|(buf, count)| {
@@ -60,7 +66,7 @@ impl Engine {
     }
 
     /// Puts a state that [`check`] has nothing against into the memory of a new engine.
-    pub fn upload_state(&mut self, count: u32, origin: DVec3, planes: &[Plane]) -> Result<()> {
+    pub(crate) fn upload_state(&mut self, count: u32, origin: DVec3, planes: &[Plane]) -> Result<()> {
         self.make_room_for_gaussians(u64::from(count))?;
         for plane in planes {
             if let Some(buf) = named(&plane.name) {

@@ -8,7 +8,7 @@ use bytemuck::Zeroable;
 use glam::DVec3;
 
 /// The camera's part of the uniforms; everything else is 0. Positions on the device are relative to `origin`.
-pub fn view_uniforms(
+pub(crate) fn view_uniforms(
     camera: &Camera,
     origin: DVec3,
     shape: &KernelShape,

@@ -3,7 +3,7 @@
 use super::metrics::Overlap;
 
 /// Width of the rim over the diagonal of the image.
-pub const RATIO: f64 = 0.02;
+pub(crate) const RATIO: f64 = 0.02;
 
 /// Width of the rim, px: [`RATIO`] times the diagonal, rounded, at least 1.
 pub fn rim_width(width: usize, height: usize) -> usize {

@@ -114,7 +114,7 @@ fn show(
 }
 
 /// Pictures that [`evaluate`] renders.
-pub fn picture_count(views: &[&View]) -> u64 {
+pub(crate) fn picture_count(views: &[&View]) -> u64 {
     (views.len() * (1 + objects(views).len())) as u64
 }
 

@@ -3,17 +3,17 @@
 use crate::scene::Photo;
 
 /// Opacity above which a pixel counts as covered by an object that is rendered alone.
-pub const COVERED: f32 = 0.5;
+pub(crate) const COVERED: f32 = 0.5;
 /// Channel value above which the paper counts a pixel as covered, on black.
-pub const PAPER_COVERED: f32 = 0.01;
+pub(crate) const PAPER_COVERED: f32 = 0.01;
 
 /// Value of a photo's byte in 0 to 1, in f32 as the device has it, so that an exact render has no error.
-pub fn byte_value(byte: u8) -> f64 {
+pub(crate) fn byte_value(byte: u8) -> f64 {
     f64::from(f32::from(byte) / 255.0)
 }
 
 /// Peak signal-to-noise ratio of a mean squared error, dB; infinite for equal images.
-pub fn psnr_of(mean_squared_error: f64) -> f64 {
+pub(crate) fn psnr_of(mean_squared_error: f64) -> f64 {
     -10.0 * mean_squared_error.log10()
 }
 
@@ -83,7 +83,7 @@ pub fn paper_score(object: &[[f32; 3]], photo: &Photo, inside: &[bool]) -> Paper
 }
 
 /// Mean of the numbers there are; `None` without any.
-pub fn mean(values: impl IntoIterator<Item = f64>) -> Option<f64> {
+pub(crate) fn mean(values: impl IntoIterator<Item = f64>) -> Option<f64> {
     let (sum, count) = values.into_iter().fold((0.0, 0_u64), |(sum, count), value| (sum + value, count + 1));
     (count > 0).then(|| sum / count as f64)
 }

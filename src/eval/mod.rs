@@ -1,13 +1,19 @@
 //! Scores: pictures and outlines against the truth, published benchmarks, and pages to look at.
 
-pub mod boundary;
-pub mod compared;
-pub mod crop;
-pub mod evaluate;
-pub mod lpips;
-pub mod metrics;
-pub mod page;
+pub(crate) mod boundary;
+pub(crate) mod compared;
+pub(crate) mod crop;
+pub(crate) mod evaluate;
+pub(crate) mod lpips;
+pub(crate) mod metrics;
+pub(crate) mod page;
 pub mod protocol;
-pub mod scores;
-pub mod ssim;
-pub mod ssim8;
+pub(crate) mod scores;
+pub(crate) mod ssim;
+pub(crate) mod ssim8;
+
+pub use compared::{Compared, Watch};
+pub use evaluate::{AmodalTruth, Rendering, evaluate};
+pub use metrics::psnr;
+pub use scores::{MeanScores, ObjectScores, Scores, ViewScores};
+pub use ssim::ssim;

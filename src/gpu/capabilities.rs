@@ -37,9 +37,9 @@ pub struct Need {
 }
 
 /// The smallest subgroups that there are kernels for.
-pub const SUBGROUP_MIN: u32 = 8;
+pub(crate) const SUBGROUP_MIN: u32 = 8;
 /// The largest ones: a strip of the loss and the longest butterfly have 64 lanes.
-pub const SUBGROUP_MAX: u32 = 64;
+pub(crate) const SUBGROUP_MAX: u32 = 64;
 
 /// Subgroups of a device.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -10,7 +10,7 @@ use std::sync::Arc;
 
 /// Who uses the memory of a buffer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum MemoryKind {
+pub(crate) enum MemoryKind {
     /// The device only.
     Device,
     /// Written by the host, read by the device.
@@ -20,7 +20,7 @@ pub enum MemoryKind {
 }
 
 /// A buffer with its memory; freed when dropped.
-pub struct Buffer {
+pub(crate) struct Buffer {
     gpu: Arc<Gpu>,
     name: String,
     handle: vk::Buffer,
@@ -30,7 +30,7 @@ pub struct Buffer {
 
 impl Buffer {
     /// Allocates a buffer.
-    pub fn new(gpu: &Arc<Gpu>, name: &str, bytes: u64, kind: MemoryKind) -> Result<Self> {
+    pub(crate) fn new(gpu: &Arc<Gpu>, name: &str, bytes: u64, kind: MemoryKind) -> Result<Self> {
         let usage = vk::BufferUsageFlags::STORAGE_BUFFER
             | vk::BufferUsageFlags::UNIFORM_TEXEL_BUFFER
             | vk::BufferUsageFlags::INDIRECT_BUFFER
@@ -101,7 +101,7 @@ impl Buffer {
     }
 
     /// Size in bytes.
-    pub fn bytes(&self) -> u64 {
+    pub(crate) fn bytes(&self) -> u64 {
         self.bytes
     }
 

@@ -14,7 +14,7 @@ mod descriptor;
 mod devices;
 mod hidden;
 mod instance;
-mod limits;
+pub(crate) mod limits;
 mod memory;
 mod pipeline;
 mod probe;
@@ -23,11 +23,12 @@ mod select;
 mod timeline;
 
 pub use cache::PipelineStore;
-pub use capabilities::{Capabilities, DeviceKind, Need, SUBGROUP_MAX, SUBGROUP_MIN, Subgroup};
+pub use capabilities::{Capabilities, DeviceKind, Need, Subgroup};
+pub(crate) use capabilities::{SUBGROUP_MAX, SUBGROUP_MIN};
 pub use devices::devices;
 pub use instance::{Message, MessageLog, Validation};
-pub use limits::{Limits, PlanLimits};
-pub use memory::{Buffer, MemoryKind};
+pub(crate) use limits::Limits;
+pub(crate) use memory::{Buffer, MemoryKind};
 
 pub(crate) use call::vk_call;
 pub(crate) use command::CommandBuffer;
@@ -128,6 +129,7 @@ impl Gpu {
     }
 
     /// Limits of the device.
+    #[doc(hidden)]
     pub fn limits(&self) -> &Limits {
         &self.capabilities.limits
     }
@@ -158,7 +160,7 @@ impl Gpu {
     }
 
     /// Waits until the device has nothing to do.
-    pub fn wait_idle(&self) -> Result<()> {
+    pub(crate) fn wait_idle(&self) -> Result<()> {
         let _queue = lock(&self.queue);
         // SAFETY: the queue's lock is held, so nothing is submitted meanwhile.
         vk_call("vkDeviceWaitIdle", || unsafe { self.device.device_wait_idle() })

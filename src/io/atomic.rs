@@ -21,14 +21,14 @@ pub fn write(path: impl AsRef<Path>, body: impl FnOnce(&mut dyn Write) -> io::Re
 }
 
 /// Writes JSON.
-pub fn write_json(path: &Path, value: &impl serde::Serialize) -> Result<()> {
+pub(crate) fn write_json(path: &Path, value: &impl serde::Serialize) -> Result<()> {
     let text = serde_json::to_string_pretty(value).map_err(|error| Error::Bug(format!("JSON: {error}")))?;
     write(path, |out| out.write_all(text.as_bytes()))
 }
 
 /// Refuses a folder that holds something: old files among new ones would be read as one set. `argument` named it. A
 /// folder that is not there yet is fine.
-pub fn require_empty(argument: &str, folder: &Path) -> Result<()> {
+pub(crate) fn require_empty(argument: &str, folder: &Path) -> Result<()> {
     match fs::read_dir(folder) {
         Ok(mut entries) => match entries.next() {
             Some(_) => Err(Error::usage(argument, format!("{} is not empty; name a new folder", folder.display()))),

@@ -6,7 +6,7 @@ use crate::io::read;
 use std::path::{Path, PathBuf};
 
 /// Name of the folder in that of a run.
-pub const FOLDER: &str = "checkpoints";
+pub(crate) const FOLDER: &str = "checkpoints";
 const EXTENSION: &str = ".ckpt";
 
 /// A file by its name; what it holds was not looked at.

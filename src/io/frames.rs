@@ -9,7 +9,7 @@ use std::collections::BTreeSet;
 use std::path::Path;
 
 /// Name of the file in the folder of the video.
-pub const FILE: &str = "frames.json";
+pub(crate) const FILE: &str = "frames.json";
 const SCHEMA_VERSION: u32 = 1;
 
 /// One frame.

@@ -10,7 +10,7 @@ use std::io::{BufRead, Cursor, ErrorKind, Seek};
 use std::path::Path;
 
 /// Most pixels that an image may have; larger ones are refused before they are decoded.
-pub const PIXELS_MAX: u64 = 1 << 28;
+pub(crate) const PIXELS_MAX: u64 = 1 << 28;
 
 /// Refuses sizes of zero or beyond [`PIXELS_MAX`].
 pub(crate) fn check_size(path: &Path, (width, height): (u32, u32)) -> Result<()> {
@@ -145,7 +145,7 @@ pub fn write_png_rgb8(path: impl AsRef<Path>, width: u32, height: u32, pixels: &
 }
 
 /// Writes an 8-bit RGBA PNG, colours not multiplied by alpha, `pixels` row-major.
-pub fn write_png_rgba8(path: impl AsRef<Path>, width: u32, height: u32, pixels: &[[u8; 4]]) -> Result<()> {
+pub(crate) fn write_png_rgba8(path: impl AsRef<Path>, width: u32, height: u32, pixels: &[[u8; 4]]) -> Result<()> {
     write_png(path.as_ref(), (width, height), png::ColorType::Rgba, png::BitDepth::Eight, bytemuck::cast_slice(pixels))
 }
 

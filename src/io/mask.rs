@@ -128,7 +128,7 @@ fn unpack(line: &[u8], depth: png::BitDepth, width: usize) -> Vec<u16> {
 }
 
 /// True if a mask of the size `found` can serve a photo of the size `photo`: it is a scaled one.
-pub fn mask_size_fits(found: (u32, u32), photo: (u32, u32)) -> bool {
+pub(crate) fn mask_size_fits(found: (u32, u32), photo: (u32, u32)) -> bool {
     same_aspect(found, photo)
 }
 

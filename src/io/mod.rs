@@ -4,34 +4,34 @@
 //! [`masks`] imports and checks whole folders of masks;
 //! [`init`] makes the first Gaussians of a scene. All output goes through [`atomic`].
 
-pub mod atomic;
+pub(crate) mod atomic;
 mod bad_photos;
-pub mod camera_json;
-pub mod checkpoint;
-pub mod checkpoint_folder;
+pub(crate) mod camera_json;
+pub(crate) mod checkpoint;
+pub(crate) mod checkpoint_folder;
 mod colmap;
-pub mod depth;
+pub(crate) mod depth;
 mod depth_file;
-pub mod frames;
-pub mod image;
-pub mod init;
-pub mod label_table;
-pub mod lens;
+pub(crate) mod frames;
+pub(crate) mod image;
+pub(crate) mod init;
+pub(crate) mod label_table;
+pub(crate) mod lens;
 mod listed_path;
 mod listing;
 mod load;
-pub mod mask;
+pub(crate) mod mask;
 pub mod masks;
-pub mod model;
-pub mod occlusion_table;
-pub mod pipeline_file;
-pub mod ply;
-pub mod read;
+pub(crate) mod model;
+pub(crate) mod occlusion_table;
+pub(crate) mod pipeline_file;
+pub(crate) mod ply;
+pub(crate) mod read;
 mod read_options;
 pub(crate) mod resample;
-pub mod run_folder;
+pub(crate) mod run_folder;
 mod transforms;
-pub mod truth;
+pub(crate) mod truth;
 
 use crate::error::{Error, Result};
 use crate::scene::Dataset;
@@ -41,7 +41,16 @@ use listing::Listing;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+pub use camera_json::{read_camera, write_cameras};
+pub use depth::DepthFolder;
+pub use frames::{Frame, Frames};
+pub use image::read_photo;
 pub use init::initial_gaussians;
+pub use label_table::{LabelEntry, LabelTable};
+pub use mask::read_mask;
+pub use model::{ModelFormat, ReadModel, read_model, register, write_model};
+pub use occlusion_table::OcclusionTable;
+pub use pipeline_file::PipelineFolder;
 pub use read_options::ReadOptions;
 
 /// What to read of a scene, and how.
@@ -100,7 +109,7 @@ pub fn open(scene: &Path, options: &LoadOptions) -> Result<Dataset> {
 }
 
 /// As [`open`]; what a person should know of the scene goes into the log.
-pub fn open_logged(scene: &Path, options: &LoadOptions) -> Result<Dataset> {
+pub(crate) fn open_logged(scene: &Path, options: &LoadOptions) -> Result<Dataset> {
     let dataset = open(scene, options)?;
     dataset.notes.iter().for_each(|note| tracing::warn!("{note}"));
     let (train, test, points) = (dataset.train.len(), dataset.test.len(), dataset.points.len());
@@ -136,7 +145,7 @@ fn list(scene: &Path, allow_outside: bool) -> Result<Listing> {
 
 /// The lenses of the photos that `scene` (as in [`open`]) lists, by the name of the view; those of a pinhole are left
 /// out. Where the photos lie is not judged: that was done when the scene was opened.
-pub fn lenses(scene: &Path) -> Result<BTreeMap<String, Lens>> {
+pub(crate) fn lenses(scene: &Path) -> Result<BTreeMap<String, Lens>> {
     Ok(list(scene, true)?
         .views
         .into_iter()

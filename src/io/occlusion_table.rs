@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 /// Name of the file in the folder of a run.
-pub const FILE: &str = "occlusion.json";
+pub(crate) const FILE: &str = "occlusion.json";
 const SCHEMA_VERSION: u32 = 1;
 
 /// Occluders of the objects of all views.

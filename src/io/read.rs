@@ -9,11 +9,11 @@ use std::path::{Path, PathBuf};
 
 /// A file that is read.
 #[derive(Debug)]
-pub struct Source(File);
+pub(crate) struct Source(File);
 
 impl Source {
     /// Bytes of the file.
-    pub fn length(&self) -> io::Result<u64> {
+    pub(crate) fn length(&self) -> io::Result<u64> {
         Ok(self.0.metadata()?.len())
     }
 }
@@ -47,13 +47,13 @@ fn source(path: &Path) -> io::Result<Source> {
 }
 
 /// Opens a file.
-pub fn open(path: &Path) -> Result<BufReader<Source>> {
+pub(crate) fn open(path: &Path) -> Result<BufReader<Source>> {
     let file = source(path).map_err(Error::read(path))?;
     Ok(BufReader::with_capacity(1 << 16, file))
 }
 
 /// All bytes of a file.
-pub fn bytes(path: &Path) -> Result<Vec<u8>> {
+pub(crate) fn bytes(path: &Path) -> Result<Vec<u8>> {
     let all = || {
         let mut file = source(path)?;
         let mut bytes = Vec::new();
@@ -70,7 +70,7 @@ pub fn text(path: &Path) -> Result<String> {
 }
 
 /// Paths of what is in a folder, in no order.
-pub fn folder(path: &Path) -> Result<Vec<PathBuf>> {
+pub(crate) fn folder(path: &Path) -> Result<Vec<PathBuf>> {
     let all = || {
         fault::of_file("read")?;
         fs::read_dir(path)?.map(|entry| Ok(entry?.path())).collect::<io::Result<_>>()

@@ -3,7 +3,7 @@
 use crate::error::{Error, Result};
 use crate::options::Options;
 
-crate::options! {
+crate::options::options! {
     /// What decides which pixels of a scene a run trains on, and which views are held out.
     pub struct ReadOptions {
         "Run" {

@@ -10,7 +10,7 @@ use rayon::prelude::*;
 
 /// The size with `longest` px at the longest side, if the given one is larger: the one rounding rule for cameras,
 /// photos and masks.
-pub fn bounded_size((width, height): (u32, u32), longest: Option<u32>) -> (u32, u32) {
+pub(crate) fn bounded_size((width, height): (u32, u32), longest: Option<u32>) -> (u32, u32) {
     let Some(longest) = longest.filter(|&longest| longest < width.max(height)) else { return (width, height) };
     let scale = f64::from(longest) / f64::from(width.max(height));
     let side = |side: u32| ((f64::from(side) * scale).round() as u32).max(1);
@@ -18,7 +18,7 @@ pub fn bounded_size((width, height): (u32, u32), longest: Option<u32>) -> (u32, 
 }
 
 /// True if the two sizes differ by a scale only: shrinking the larger to the smaller, the sides agree within 1 px.
-pub fn same_aspect(a: (u32, u32), b: (u32, u32)) -> bool {
+pub(crate) fn same_aspect(a: (u32, u32), b: (u32, u32)) -> bool {
     let along = |from: (u32, u32), to: (u32, u32)| {
         let height = f64::from(from.1) * f64::from(to.0) / f64::from(from.0);
         let width = f64::from(from.0) * f64::from(to.1) / f64::from(from.1);
@@ -29,7 +29,7 @@ pub fn same_aspect(a: (u32, u32), b: (u32, u32)) -> bool {
 }
 
 /// Maps pixels of the pinhole image of `camera` to the photo taken through `lens` with the same intrinsics.
-pub struct Undistortion<'a> {
+pub(crate) struct Undistortion<'a> {
     camera: &'a Camera,
     /// With the distance from the axis up to which it is one to one.
     lens: Option<(&'a dyn Distortion, f64)>,
@@ -37,14 +37,14 @@ pub struct Undistortion<'a> {
 
 impl<'a> Undistortion<'a> {
     /// `camera` has the size of the photo.
-    pub fn new(camera: &'a Camera, lens: Option<&'a dyn Distortion>) -> Self {
+    pub(crate) fn new(camera: &'a Camera, lens: Option<&'a dyn Distortion>) -> Self {
         let far = |f: f64, c: f64, side: u32| (c.max(f64::from(side) - c) / f).abs();
         let corner = DVec2::new(far(camera.fx, camera.cx, camera.width), far(camera.fy, camera.cy, camera.height));
         Self { camera, lens: lens.map(|lens| (lens, lens.valid_radius(corner.length().max(1e-9)))) }
     }
 
     /// Photo position of the pinhole position `pixel`, both in px with centres at halves; `None` outside the photo.
-    pub fn source(&self, pixel: DVec2) -> Option<DVec2> {
+    pub(crate) fn source(&self, pixel: DVec2) -> Option<DVec2> {
         let camera = self.camera;
         let Some((lens, valid_radius)) = self.lens else { return Some(pixel) };
         let ideal = DVec2::new((pixel.x - camera.cx) / camera.fx, (pixel.y - camera.cy) / camera.fy);
@@ -60,7 +60,7 @@ impl<'a> Undistortion<'a> {
 
 /// The pinhole photo with the intrinsics of `camera`, which has the photo's size. Pixels without a source are
 /// black with alpha 0.
-pub fn undistort_photo(photo: &Photo, camera: &Camera, lens: &Lens) -> Photo {
+pub(crate) fn undistort_photo(photo: &Photo, camera: &Camera, lens: &Lens) -> Photo {
     let map = Undistortion::new(camera, lens.distortion());
     let row = |y: u32| {
         let map = &map;
@@ -107,7 +107,7 @@ fn spans(from: u32, to: u32) -> Vec<(usize, Vec<f64>)> {
 
 /// The photo shrunk to `width` x `height` px: each target pixel is the mean over its exact box of source pixels,
 /// fractions included, over those with alpha 255. It has alpha 255 if they cover at least half of the box.
-pub fn shrink_photo(photo: &Photo, width: u32, height: u32) -> Photo {
+pub(crate) fn shrink_photo(photo: &Photo, width: u32, height: u32) -> Photo {
     if (width, height) == (photo.width, photo.height) {
         return photo.clone();
     }
@@ -138,13 +138,13 @@ fn mean(photo: &Photo, (left, across): (usize, &[f64]), (top, down): (usize, &[f
 
 /// The id map that belongs to a photo of size `width` x `height` px, made from a map of the distorted photo at any
 /// scale. `camera` is that of the photo at its own size. Pixels without a source are 0.
-pub fn resample_ids(ids: &LabelMap, camera: &Camera, lens: &Lens, (width, height): (u32, u32)) -> LabelMap {
+pub(crate) fn resample_ids(ids: &LabelMap, camera: &Camera, lens: &Lens, (width, height): (u32, u32)) -> LabelMap {
     let ids = resample_nearest(&ids.ids, (ids.width, ids.height), camera, lens, (width, height), 0);
     LabelMap { width, height, ids }
 }
 
 /// As [`resample_ids`], for values of any kind; pixels without a source are `nothing`.
-pub fn resample_nearest<T: Copy + Send + Sync>(
+pub(crate) fn resample_nearest<T: Copy + Send + Sync>(
     values: &[T],
     from: (u32, u32),
     camera: &Camera,

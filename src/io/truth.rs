@@ -81,6 +81,6 @@ pub fn read_truth(path: &Path, view: &View, lenses: &BTreeMap<String, Lens>) -> 
 }
 
 /// A photo shrunk to the size of a mask, which is not larger.
-pub fn photo_at(photo: &Photo, width: u32, height: u32) -> Photo {
+pub(crate) fn photo_at(photo: &Photo, width: u32, height: u32) -> Photo {
     shrink_photo(photo, width, height)
 }

@@ -23,7 +23,7 @@ use std::time::Duration;
 
 /// What a fault does.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Kind {
+pub(crate) enum Kind {
     /// The device is lost.
     DeviceLost,
     /// The host has no memory.
@@ -57,7 +57,7 @@ struct Fault {
 
 /// The fault that this event of a site meets, if one was asked for.
 #[inline(always)]
-pub fn at(site: &str) -> Option<Kind> {
+pub(crate) fn at(site: &str) -> Option<Kind> {
     if super::ON { asked(site) } else { None }
 }
 
@@ -87,7 +87,7 @@ fn asked(site: &str) -> Option<Kind> {
 }
 
 /// The fault of a transfer of bytes from or to a file. True if only a part may be transferred.
-pub fn of_transfer(site: &str) -> io::Result<bool> {
+pub(crate) fn of_transfer(site: &str) -> io::Result<bool> {
     match at(site) {
         Some(Kind::NoSpace) => Err(io::ErrorKind::StorageFull.into()),
         Some(Kind::Interrupted) => Err(io::ErrorKind::Interrupted.into()),
@@ -98,7 +98,7 @@ pub fn of_transfer(site: &str) -> io::Result<bool> {
 }
 
 /// The fault of any other step with a file, which is done whole or fails.
-pub fn of_file(site: &str) -> io::Result<()> {
+pub(crate) fn of_file(site: &str) -> io::Result<()> {
     match of_transfer(site) {
         Err(error) if error.kind() == io::ErrorKind::Interrupted => Ok(()),
         other => other.map(|_| ()),

@@ -2,4 +2,8 @@
 
 pub mod masks;
 pub mod occlusion;
-pub mod vote;
+pub(crate) mod vote;
+
+pub use vote::decide::Decision;
+pub use vote::lift::Lift;
+pub use vote::model::{Counting, label_by_lift, label_by_votes};

@@ -5,9 +5,9 @@
 //! A flag has no default of its own: what nobody typed stays as it was, so that a flag wins over a file and a file over
 //! the default.
 
-pub mod parse;
+pub(crate) mod parse;
 #[cfg(feature = "cli")]
-pub mod typed;
+pub(crate) mod typed;
 
 use crate::error::{Error, Result};
 use serde::Serialize;
@@ -128,7 +128,7 @@ numbers! {
 }
 
 /// A struct that [`options!`](macro@crate::options) made.
-pub trait Options: Serialize + DeserializeOwned + Default {
+pub(crate) trait Options: Serialize + DeserializeOwned + Default {
     /// Its options, in order.
     const KEYS: &'static [Key];
 
@@ -147,7 +147,6 @@ pub trait Options: Serialize + DeserializeOwned + Default {
 /// Declares a struct of options. A field is `NAME <"VALUE NAME">: TYPE = DEFAULT, RULES;` with rules of [`Key`] such as
 /// `at_least(1)` and `fixed`; fields stand under the heading of their flags. The first paragraph of a field's doc is the
 /// help, what follows is shown by `--help` only.
-#[macro_export]
 macro_rules! options {
     ($(#[$outer:meta])* pub struct $name:ident {
         $($heading:literal { $(
@@ -176,7 +175,7 @@ macro_rules! options {
 
             fn check_ranges(&self) -> $crate::Result<()> {
                 let mut keys = Self::KEYS.iter();
-                $($( $crate::options!(@check keys, self.$key $(, $rule)*); )*)*
+                $($( $crate::options::options!(@check keys, self.$key $(, $rule)*); )*)*
                 let _ = keys;
                 Ok(())
             }
@@ -189,3 +188,4 @@ macro_rules! options {
         if let Some(key) = $keys.next() { key.check(&$value)?; }
     };
 }
+pub(crate) use options;

@@ -1,7 +1,7 @@
 //! Values of options as one types them.
 
 /// A colour: a name, or three numbers from 0 to 1.
-pub fn colour(text: &str) -> Result<[f32; 3], String> {
+pub(crate) fn colour(text: &str) -> Result<[f32; 3], String> {
     match text {
         "black" => return Ok([0.0; 3]),
         "white" => return Ok([1.0; 3]),
@@ -14,7 +14,7 @@ pub fn colour(text: &str) -> Result<[f32; 3], String> {
 }
 
 /// A number of things such as `1500`, `500k` or `2M`.
-pub fn count(text: &str) -> Result<u64, String> {
+pub(crate) fn count(text: &str) -> Result<u64, String> {
     let wrong = || format!("`{text}` is no number of things; expected such as 1500, 500k or 2.5M");
     let (digits, unit) = match text.char_indices().last() {
         Some((at, 'k' | 'K')) => (&text[..at], 1e3),
@@ -27,7 +27,7 @@ pub fn count(text: &str) -> Result<u64, String> {
 }
 
 /// `on` or `off`.
-pub fn switch(text: &str) -> Result<bool, String> {
+pub(crate) fn switch(text: &str) -> Result<bool, String> {
     match text {
         "on" | "true" | "yes" => Ok(true),
         "off" | "false" | "no" => Ok(false),
@@ -36,7 +36,7 @@ pub fn switch(text: &str) -> Result<bool, String> {
 }
 
 /// A number of objects, or `all`.
-pub fn samples(text: &str) -> Result<u32, String> {
+pub(crate) fn samples(text: &str) -> Result<u32, String> {
     match text {
         "all" => Ok(u32::MAX),
         _ => text.parse().map_err(|_| format!("`{text}` is neither a number of objects nor all")),

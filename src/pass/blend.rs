@@ -2,17 +2,17 @@
 
 use super::build::{Builder, args};
 use super::project::GAUSSIAN_FROM_SPLAT;
-use crate::pass;
+use crate::pass::build::pass;
 use crate::scheduler::plan::{Buf, Stage};
 use crate::shaders::constants;
 
 /// Blends all tiles front to back; with labels also the object layers and their loss, and the lift if it is asked for.
-pub fn blend_forward(b: &mut Builder, pairs: Buf, lift: bool) {
+pub(super) fn blend_forward(b: &mut Builder, pairs: Buf, lift: bool) {
     forward(b, pairs, false, lift);
 }
 
 /// Blends all tiles of the scene and keeps the main Gaussian of each pixel, its weight, and depth.
-pub fn blend_forward_main(b: &mut Builder, pairs: Buf) {
+pub(super) fn blend_forward_main(b: &mut Builder, pairs: Buf) {
     forward(b, pairs, true, false);
 }
 
@@ -34,7 +34,7 @@ fn forward(b: &mut Builder, pairs: Buf, main: bool, lift: bool) {
 }
 
 /// Walks all tiles back to front and writes a gradient record per (splat, tile) pair.
-pub fn blend_backward(b: &mut Builder, pairs: Buf) {
+pub(super) fn blend_backward(b: &mut Builder, pairs: Buf) {
     let segments = b.segments();
     b.list.stage = Stage::BlendBackward;
     for segment in (0..segments).rev() {

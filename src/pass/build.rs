@@ -77,28 +77,27 @@ fn value<T: Copy>(named: &[(&str, T)], wanted: &str) -> Option<T> {
 }
 
 /// An indirect grid at one of the `ARGS_` words of `dispatch_args`.
-pub fn args(word: u32) -> Grid {
+pub(crate) fn args(word: u32) -> Grid {
     Grid::Indirect(Buf::DISPATCH_ARGS, word * 4)
 }
 
 /// Grid over the Gaussians, 64 a workgroup.
-pub fn over_gaussians() -> Grid {
+pub(crate) fn over_gaussians() -> Grid {
     args(constants::ARGS_GAUSSIANS)
 }
 
 /// Grid over the visible splats, 64 a workgroup.
-pub fn over_splats() -> Grid {
+pub(crate) fn over_splats() -> Grid {
     args(constants::ARGS_SPLATS)
 }
 
 /// Grid of one workgroup.
-pub const ONE: Grid = Grid::Groups(1, 1, 1);
+pub(crate) const ONE: Grid = Grid::Groups(1, 1, 1);
 
 /// `pass!(builder, file(macro: bool, ..) { binding: BUF, .. } [constant: value, ..], grid)`: declares a pass of a kernel.
 ///
 /// Every binding that some sibling of the file has is named. Constants that are not named come from the shape, or are the
 /// defaults of the GLSL; macros that are not named are off.
-#[macro_export]
 macro_rules! pass {
     ($b:expr, $file:ident $(($($macro:ident: $on:expr),*))? { $($name:ident: $buf:expr),* $(,)? }
         [$($constant:ident: $value:expr),* $(,)?], $grid:expr) => {{
@@ -112,6 +111,7 @@ macro_rules! pass {
         $b.pass(&kernel::VARIANTS, &macros.named(), &buffers.named(), &spec.named(), $grid)
     }};
 }
+pub(crate) use pass;
 
 #[cfg(test)]
 mod tests {

@@ -3,11 +3,11 @@
 use super::build::{Builder, Count, args, over_gaussians};
 use super::optimize::ATTRIBUTES;
 use super::scan::{self, Total};
-use crate::pass;
+use crate::pass::build::pass;
 use crate::scheduler::plan::{Buf, Stage};
 
 /// Decides for each Gaussian and counts the result.
-pub fn mark(b: &mut Builder) {
+pub(super) fn mark(b: &mut Builder) {
     b.list.stage = Stage::Optimise;
     pass!(b, densify_mark {
         step: Buf::STEP, means: Buf::MEANS, scales: Buf::SCALES, densify_stats: Buf::DENSIFY_STATS,
@@ -17,7 +17,7 @@ pub fn mark(b: &mut Builder) {
 }
 
 /// Rewrites the model; needs [`mark`] before it in the same list.
-pub fn apply(b: &mut Builder) {
+pub(super) fn apply(b: &mut Builder) {
     b.list.copy(Buf::MEANS, Buf::OLD_MEANS, 0);
     b.list.copy(Buf::SCALES, Buf::OLD_SCALES, 0);
     b.list.copy(Buf::QUATS, Buf::OLD_QUATS, 0);

@@ -2,17 +2,17 @@
 
 use super::build::{Builder, over_splats};
 use super::project::GAUSSIAN_FROM_SPLAT;
-use crate::pass;
+use crate::pass::build::pass;
 use crate::scheduler::plan::{Buf, Stage};
 
 /// Adds up the records and notes the densification statistic.
-pub fn gather(b: &mut Builder) {
+pub(super) fn gather(b: &mut Builder) {
     records(b, b.labels, false);
 }
 
 /// Adds up the records of an object's splats, which densification does not see.
 #[cfg(feature = "lab")]
-pub fn gather_object(b: &mut Builder) {
+pub(super) fn gather_object(b: &mut Builder) {
     records(b, false, true);
 }
 

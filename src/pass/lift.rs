@@ -2,12 +2,12 @@
 
 use super::build::{Builder, args, over_gaussians};
 use super::project::GAUSSIAN_FROM_SPLAT;
-use crate::pass;
+use crate::pass::build::pass;
 use crate::scheduler::plan::{Buf, Stage};
 use crate::shaders::constants;
 
 /// The highest vote of this step becomes the label of its Gaussian.
-pub fn resolve(b: &mut Builder) {
+pub(super) fn resolve(b: &mut Builder) {
     b.list.stage = Stage::Labels;
     pass!(b, lift_resolve {
         step: Buf::STEP, failure: Buf::FAILURE, label_keys: Buf::LABEL_KEYS, labels: Buf::LABELS,
@@ -15,7 +15,7 @@ pub fn resolve(b: &mut Builder) {
 }
 
 /// Adds the weights of all contributors to the votes for the labels of their pixels.
-pub fn vote(b: &mut Builder, pairs: Buf, rounds: u32) {
+pub(super) fn vote(b: &mut Builder, pairs: Buf, rounds: u32) {
     let segments = b.segments();
     b.list.stage = Stage::Labels;
     for (round, segment) in (0..rounds).flat_map(|round| (0..segments).map(move |segment| (round, segment))) {

@@ -1,14 +1,14 @@
 //! L1 and D-SSIM against the photo: value and gradient by the image, separable and without barriers.
 
 use super::build::{Builder, ONE};
-use crate::pass;
+use crate::pass::build::pass;
 use crate::scheduler::plan::{Buf, Grid, Stage};
 
 /// Rows or columns that one lane filters in registers (glsl/include/window.glsl).
 const STRIP: u32 = 8;
 
 /// Writes `v_image` and the loss sums, for an image of at most `width` x `height` px.
-pub fn photo_loss(b: &mut Builder, width: u32, height: u32) {
+pub(crate) fn photo_loss(b: &mut Builder, width: u32, height: u32) {
     b.list.stage = Stage::Loss;
     let columns = |channels| Grid::Groups(width.div_ceil(64), height.div_ceil(STRIP), channels);
     let rows = Grid::Groups(height.div_ceil(64), width.div_ceil(STRIP), 3);
@@ -26,7 +26,7 @@ pub fn photo_loss(b: &mut Builder, width: u32, height: u32) {
 
 /// Sums up the label loss of the layers alone.
 #[cfg(feature = "lab")]
-pub fn label_loss(b: &mut Builder) {
+pub(crate) fn label_loss(b: &mut Builder) {
     b.list.stage = Stage::Loss;
     reduce(b, 0);
 }
@@ -39,6 +39,6 @@ fn reduce(b: &mut Builder, partials: u32) {
 }
 
 /// Partial loss sums of an image: one for each subgroup of each strip.
-pub fn partials(subgroup: u32, width: u32, height: u32) -> u32 {
+pub(crate) fn partials(subgroup: u32, width: u32, height: u32) -> u32 {
     width.div_ceil(64) * (64 / subgroup) * height.div_ceil(STRIP)
 }

@@ -3,28 +3,28 @@
 //! [`training_step`] is the table of contents of the engine.
 
 mod blend;
-pub mod build;
+pub(crate) mod build;
 mod densify;
 mod gather;
 mod lift;
-pub mod loss;
+pub(crate) mod loss;
 mod optimize;
 mod project;
-pub mod scan;
+pub(crate) mod scan;
 #[cfg(feature = "lab")]
 mod separate;
-pub mod shape;
-pub mod sort;
-pub mod stage;
+pub(crate) mod shape;
+pub(crate) mod sort;
+pub(crate) mod stage;
 mod tile;
 
 pub use build::Builder;
-pub use optimize::{ATTRIBUTES, SHARED_PLANES};
+pub(crate) use optimize::{ATTRIBUTES, SHARED_PLANES};
 #[cfg(feature = "lab")]
 pub use separate::separate_step;
 pub use shape::KernelShape;
 
-use crate::pass;
+use crate::pass::build::pass;
 use crate::scheduler::plan::{Buf, Capacity, PassList};
 
 pub use crate::scheduler::plan::Stage;
@@ -94,7 +94,7 @@ pub fn training_step(shape: &KernelShape, capacity: &Capacity, variant: Variant)
 }
 
 /// The same with what an extension adds under some number.
-pub fn extended_step(
+pub(crate) fn extended_step(
     shape: &KernelShape,
     capacity: &Capacity,
     variant: Variant,

@@ -1,13 +1,13 @@
 //! Adam on every attribute of the Gaussians and on shared parameters, and the reset of opacities.
 
 use super::build::{Builder, args, over_gaussians};
-use crate::pass;
+use crate::pass::build::pass;
 use crate::scheduler::plan::{Buf, Grid, Stage};
 use crate::shaders::constants;
 
 /// An attribute of the Gaussians as the optimiser sees it.
 #[derive(Clone, Copy, Debug)]
-pub struct Attribute {
+pub(crate) struct Attribute {
     /// Parameters, first moments, second moments.
     pub planes: [Buf; 3],
     /// Gradients, by splat.
@@ -23,7 +23,7 @@ pub struct Attribute {
 }
 
 /// All attributes.
-pub const ATTRIBUTES: [Attribute; 7] = [
+pub(crate) const ATTRIBUTES: [Attribute; 7] = [
     attribute([Buf::MEANS, Buf::M_MEANS, Buf::U_MEANS], Buf::V_MEANS, 1, 0, 0, constants::ARGS_GAUSSIANS),
     attribute([Buf::SCALES, Buf::M_SCALES, Buf::U_SCALES], Buf::V_SCALES, 1, 1, 0, constants::ARGS_GAUSSIANS),
     attribute([Buf::QUATS, Buf::M_QUATS, Buf::U_QUATS], Buf::V_QUATS, 1, 2, 0, constants::ARGS_GAUSSIANS),
@@ -39,10 +39,10 @@ const fn attribute(planes: [Buf; 3], gradient: Buf, stride: u32, rate: u32, from
 
 /// Parameters that are no Gaussian's, their moments, and the weights that correct these. A capacity without rows of them
 /// has neither these buffers nor passes on them.
-pub const SHARED_PLANES: [Buf; 4] = [Buf::SHARED, Buf::M_SHARED, Buf::U_SHARED, Buf::W_SHARED];
+pub(crate) const SHARED_PLANES: [Buf; 4] = [Buf::SHARED, Buf::M_SHARED, Buf::U_SHARED, Buf::W_SHARED];
 
 /// One Adam update of the attributes that are active; of all Gaussians, or of those alone that the step shows.
-pub fn adam(b: &mut Builder, unseen: bool) {
+pub(super) fn adam(b: &mut Builder, unseen: bool) {
     let (degree, seen_only) = (b.sh_degree, u32::from(!unseen));
     b.list.stage = Stage::Optimise;
     for a in ATTRIBUTES.iter().filter(|a| a.from_degree <= degree) {
@@ -51,14 +51,14 @@ pub fn adam(b: &mut Builder, unseen: bool) {
 }
 
 /// Shared parameters have gradient 0 until a pass of an extension writes another.
-pub fn clear_shared(b: &mut Builder) {
+pub(super) fn clear_shared(b: &mut Builder) {
     if b.capacity.shared_rows > 0 {
         b.list.fill(Buf::V_SHARED, 0);
     }
 }
 
 /// One Adam update of the shared parameters that belong to the step.
-pub fn adam_shared(b: &mut Builder) {
+pub(super) fn adam_shared(b: &mut Builder) {
     if b.capacity.shared_rows > 0 {
         let [parameters, first, second, _] = SHARED_PLANES;
         let grid = Grid::Groups(b.capacity.shared_rows.div_ceil(64) as u32, 1, 1);
@@ -84,7 +84,7 @@ fn update(
 }
 
 /// No opacity above 0.01; its moments start over.
-pub fn opacity_reset(b: &mut Builder) {
+pub(super) fn opacity_reset(b: &mut Builder) {
     b.list.stage = Stage::Optimise;
     pass!(b, opacity_reset { step: Buf::STEP, means: Buf::MEANS, m_means: Buf::M_MEANS, u_means: Buf::U_MEANS } [],
         over_gaussians());

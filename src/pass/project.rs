@@ -3,17 +3,17 @@
 use super::build::{Builder, Count, ONE, over_gaussians, over_splats};
 use super::scan::{self, Total};
 use super::sort::{self, SortBuffers};
-use crate::pass;
+use crate::pass::build::pass;
 use crate::scheduler::plan::{Buf, Stage};
 
 /// Gaussian of each splat; the depth sort ends there.
-pub const GAUSSIAN_FROM_SPLAT: Buf = Buf::DEPTH_VALUES_A;
+pub(super) const GAUSSIAN_FROM_SPLAT: Buf = Buf::DEPTH_VALUES_A;
 
 /// Bits of a depth key.
 const DEPTH_BITS: u32 = 32;
 
 /// Lists the visible Gaussians in depth order and projects them.
-pub fn visible_splats(b: &mut Builder) {
+pub(super) fn visible_splats(b: &mut Builder) {
     b.list.stage = Stage::Project;
     cull(b, false);
     order_and_project(b);
@@ -21,7 +21,7 @@ pub fn visible_splats(b: &mut Builder) {
 
 /// As [`visible_splats`], for the object of layer 1 alone.
 #[cfg(feature = "lab")]
-pub fn visible_splats_of_object(b: &mut Builder) {
+pub(super) fn visible_splats_of_object(b: &mut Builder) {
     b.list.stage = Stage::Project;
     cull(b, true);
     order_and_project(b);
@@ -63,13 +63,13 @@ fn project_forward(b: &mut Builder) {
 }
 
 /// Gradients of the splats back to the parameters of their Gaussians.
-pub fn project_backward(b: &mut Builder) {
+pub(super) fn project_backward(b: &mut Builder) {
     backward(b, false, Buf::SPLAT_FROM_GAUSSIAN);
 }
 
 /// As [`project_backward`] for the splats of an object; added to the gradients of `scene_splats`.
 #[cfg(feature = "lab")]
-pub fn project_backward_of_object(b: &mut Builder, scene_splats: Buf) {
+pub(super) fn project_backward_of_object(b: &mut Builder, scene_splats: Buf) {
     backward(b, true, scene_splats);
 }
 

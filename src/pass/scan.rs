@@ -1,7 +1,7 @@
 //! Exclusive scan of u32 values, reduce-then-scan: no waiting between workgroups, so it runs on any device.
 
 use super::build::{Builder, Count, ONE};
-use crate::pass;
+use crate::pass::build::pass;
 use crate::scheduler::plan::{Buf, Grid};
 
 /// Which counter the total goes to.

@@ -7,8 +7,8 @@
 
 use super::build::{Builder, ONE};
 use super::{Variant, begin, blend, end, gather, lift, loss, optimize, project, tile};
-use crate::pass;
 use crate::pass::KernelShape;
+use crate::pass::build::pass;
 use crate::scheduler::plan::{Buf, Capacity, PassList, Stage, Work};
 
 /// What the passes of an object read and write in place of the step's buffers.

@@ -2,7 +2,7 @@
 
 use super::KernelShape;
 use super::build::{Builder, Count, ONE};
-use crate::pass;
+use crate::pass::build::pass;
 use crate::scheduler::plan::{Buf, Grid, Stage, Work};
 
 /// Two pairs of buffers that the passes of a sort go back and forth between.

@@ -4,25 +4,25 @@ use super::build::{Builder, Count, ONE, args, over_splats};
 use super::project::GAUSSIAN_FROM_SPLAT;
 use super::scan::{self, Total};
 use super::sort::{self, SortBuffers};
-use crate::pass;
+use crate::pass::build::pass;
 use crate::scheduler::plan::{Buf, Stage};
 use crate::shaders::constants;
 
 /// Lists the (splat, tile) pairs, sorts them by layer and tile, and finds each tile's range. Returns the buffer that
 /// holds the place before the sort of each sorted pair.
-pub fn bin_splats(b: &mut Builder) -> Buf {
+pub(super) fn bin_splats(b: &mut Builder) -> Buf {
     bin(b, b.labels, 0)
 }
 
 /// The scene's splats alone, in the first of the layers that the list has.
 #[cfg(feature = "lab")]
-pub fn bin_scene(b: &mut Builder) -> Buf {
+pub(super) fn bin_scene(b: &mut Builder) -> Buf {
     bin(b, false, 0)
 }
 
 /// An object's splats, in layer 1 alone.
 #[cfg(feature = "lab")]
-pub fn bin_object(b: &mut Builder) -> Buf {
+pub(super) fn bin_object(b: &mut Builder) -> Buf {
     bin(b, false, 1)
 }
 

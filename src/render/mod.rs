@@ -1,6 +1,8 @@
 //! Pictures of a model: colour, alpha, depth, and the main Gaussian of each pixel.
 
-pub mod pictures;
+pub(crate) mod pictures;
+
+pub use pictures::{Format, Pictures, What, write_pictures, write_rgb};
 
 use crate::engine::{Engine, ListKey};
 use crate::error::{Error, Result};

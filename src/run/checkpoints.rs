@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 const KEPT: usize = 2;
 
 /// The checkpoints of a run.
-pub struct Checkpoints {
+pub(super) struct Checkpoints {
     out: PathBuf,
     lock: Lock,
     record: Record,
@@ -23,7 +23,7 @@ pub struct Checkpoints {
 
 impl Checkpoints {
     /// For a run in the folder `out`, which it has locked, that goes on from `resumed`.
-    pub fn new(out: &Path, lock: Lock, record: Record, resumed: Option<&TrainState>) -> Result<Self> {
+    pub(super) fn new(out: &Path, lock: Lock, record: Record, resumed: Option<&TrainState>) -> Result<Self> {
         if resumed.is_none()
             && let Some(old) = checkpoint_folder::list(out)?.first()
         {
@@ -38,18 +38,18 @@ impl Checkpoints {
 
     /// Makes sure that the folder is still this run's, before anything is written: it may have been deleted, and another
     /// run begun in its place.
-    pub fn hold_folder(&mut self) -> Result<()> {
+    pub(super) fn hold_folder(&mut self) -> Result<()> {
         self.lock.hold()
     }
 
     /// True where the schedule asks for one.
-    pub fn due(&self, step: u32, last: u32) -> bool {
+    pub(super) fn due(&self, step: u32, last: u32) -> bool {
         let every = self.record.run.checkpoint_every;
         every > 0 && (step.is_multiple_of(every) || step == last)
     }
 
     /// Puts a training back to its last whole checkpoint, because of what has gone wrong since. False if there is none.
-    pub fn restore(&mut self, trainer: &mut Trainer, reason: &Error) -> Result<bool> {
+    pub(super) fn restore(&mut self, trainer: &mut Trainer, reason: &Error) -> Result<bool> {
         while let Some(path) = self.kept.last() {
             match TrainState::read(path) {
                 Ok(state) => {
@@ -67,7 +67,7 @@ impl Checkpoints {
 
     /// Writes one that is due. That it cannot be written, or its folder be listed, ends no training: there may be room again
     /// the next time.
-    pub fn save_due(&mut self, trainer: &mut Trainer) -> Result<Option<PathBuf>> {
+    pub(super) fn save_due(&mut self, trainer: &mut Trainer) -> Result<Option<PathBuf>> {
         self.hold_folder()?;
         match self.save(trainer) {
             Err(error @ (Error::Write { .. } | Error::Read { .. })) => {
@@ -80,7 +80,7 @@ impl Checkpoints {
     }
 
     /// Writes one now, unless this step has one. Older ones go when it is safe.
-    pub fn save(&mut self, trainer: &mut Trainer) -> Result<Option<PathBuf>> {
+    pub(super) fn save(&mut self, trainer: &mut Trainer) -> Result<Option<PathBuf>> {
         let step = trainer.steps_done();
         if step == self.step {
             return Ok(None);
@@ -96,7 +96,7 @@ impl Checkpoints {
     }
 
     /// Leaves the last one only: the run has ended.
-    pub fn finish(&mut self) -> Result<()> {
+    pub(super) fn finish(&mut self) -> Result<()> {
         if self.kept.is_empty() { Ok(()) } else { self.keep(1) }
     }
 

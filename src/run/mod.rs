@@ -4,14 +4,14 @@
 
 mod checkpoints;
 mod finish;
-pub mod models;
-pub mod observer;
+pub(crate) mod models;
+pub(crate) mod observer;
 mod occluders;
 mod prepare;
 mod preview;
 mod recovery;
 mod resume;
-pub mod settings;
+pub(crate) mod settings;
 mod steps;
 mod summary;
 
@@ -19,6 +19,8 @@ pub use observer::{Event, Flow, Live, Observer};
 pub use occluders::OccluderFiles;
 pub use settings::{RunOptions, Settings};
 pub use summary::Summary;
+
+pub use crate::train::{LabelRule, Occlusion, TrainConfig};
 
 use crate::error::Result;
 use crate::gpu::Gpu;

@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 const EARLIER: &str = "earlier";
 
 /// Where the model of a step is kept, as the viewers of 3DGS expect it.
-pub fn model_path(out: &Path, step: u32) -> PathBuf {
+pub(crate) fn model_path(out: &Path, step: u32) -> PathBuf {
     out.join("point_cloud").join(format!("iteration_{step}")).join("point_cloud.ply")
 }
 
@@ -26,7 +26,7 @@ fn steps(out: &Path) -> Result<Vec<u32>> {
 }
 
 /// The model of the latest step in the folder of a run.
-pub fn latest_model(out: &Path) -> Result<PathBuf> {
+pub(crate) fn latest_model(out: &Path) -> Result<PathBuf> {
     steps(out)?.into_iter().max().map(|step| model_path(out, step)).ok_or_else(|| {
         Error::data(
             out,
@@ -38,14 +38,14 @@ pub fn latest_model(out: &Path) -> Result<PathBuf> {
 
 /// The models that a run writes. Where an earlier run left some of later steps, they are moved to the folder `earlier` when
 /// this one has its first: the model of the latest step is the one that other commands take.
-pub struct Models {
+pub(crate) struct Models {
     out: PathBuf,
     earlier: Vec<u32>,
 }
 
 impl Models {
     /// For a run in the folder `out` that goes on after step `from`, or starts at 0.
-    pub fn new(out: &Path, from: u32) -> Result<Self> {
+    pub(crate) fn new(out: &Path, from: u32) -> Result<Self> {
         let earlier: Vec<u32> = steps(out)?.into_iter().filter(|&step| step > from).collect();
         if let Some(step) = earlier.iter().max() {
             let path = model_path(out, *step);
@@ -55,7 +55,7 @@ impl Models {
     }
 
     /// Writes the model of a step.
-    pub fn save(&mut self, step: u32, model: &Gaussians) -> Result<PathBuf> {
+    pub(crate) fn save(&mut self, step: u32, model: &Gaussians) -> Result<PathBuf> {
         let path = model_path(&self.out, step);
         let left_out = write_model(&path, model)?;
         if left_out > 0 {
@@ -75,12 +75,12 @@ impl Models {
 }
 
 /// Writes `cameras.json`.
-pub fn save_cameras(out: &Path, cameras: &[(&str, &Camera)]) -> Result<()> {
+pub(crate) fn save_cameras(out: &Path, cameras: &[(&str, &Camera)]) -> Result<()> {
     camera_json::write_cameras(out.join("cameras.json"), cameras)
 }
 
 /// Writes photo, render and (with labels) label map side by side.
-pub fn save_preview(path: &Path, photo: &Photo, rendered: &Rendered, labels: Option<&[u32]>) -> Result<()> {
+pub(crate) fn save_preview(path: &Path, photo: &Photo, rendered: &Rendered, labels: Option<&[u32]>) -> Result<()> {
     let (width, height) = (rendered.width as usize, rendered.height as usize);
     let byte = |value: f32| (value.clamp(0.0, 1.0) * 255.0).round() as u8;
     let map = labels.map(|labels| rendered.label_map(labels)).transpose()?;

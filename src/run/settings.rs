@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-crate::options! {
+crate::options::options! {
     /// What a run writes on its way.
     pub struct RunOptions {
         "Run" {

@@ -10,7 +10,7 @@ const SIZE_OF_A_POINT: f64 = 10.0;
 
 /// The point that positions are best kept relative to: the origin unless the scene is far from it. Its coordinates are
 /// multiples of a power of two above the size of the scene, so that little is lost in the subtraction.
-pub fn far_origin(positions: &[DVec3]) -> DVec3 {
+pub(crate) fn far_origin(positions: &[DVec3]) -> DVec3 {
     if positions.is_empty() {
         return DVec3::ZERO;
     }

@@ -41,7 +41,7 @@ impl View {
 
 /// Names for output files of several views, none twice: [`View::stem`], with a number behind it where another view before
 /// it has the same (`a/1.jpg` and `a_1.png`).
-pub fn stems(views: &[&View]) -> Vec<String> {
+pub(crate) fn stems(views: &[&View]) -> Vec<String> {
     let mut taken = BTreeSet::new();
     let mut name = |view: &&View| {
         let stem = view.stem();

@@ -4,14 +4,14 @@
 //! lists run in the order of their submits; what is inside of a list is ordered by the plan's barriers.
 
 mod guard;
-pub mod plan;
-pub mod profiler;
+pub(crate) mod plan;
+pub(crate) mod profiler;
 mod recorder;
 mod recording;
 mod storage;
 mod transfer;
 
-pub use profiler::{PassTime, Profiler};
+pub(crate) use profiler::{PassTime, Profiler};
 
 use crate::error::{Error, Result};
 use crate::gpu::{CommandBuffer, Gpu, Timeline};

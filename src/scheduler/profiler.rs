@@ -7,7 +7,7 @@ const WARM_UP: usize = 2;
 
 /// Times of one pass label.
 #[derive(Clone, Debug, PartialEq)]
-pub struct PassTime {
+pub(crate) struct PassTime {
     /// Label of the pass.
     pub label: String,
     /// Items of the list with this label.
@@ -22,7 +22,7 @@ pub struct PassTime {
 
 /// Collects the timings of one list.
 #[derive(Clone, Debug)]
-pub struct Profiler {
+pub(crate) struct Profiler {
     seen: usize,
     warm_up: usize,
     /// Labels in the order of the list.
@@ -39,17 +39,17 @@ impl Default for Profiler {
 
 impl Profiler {
     /// Nothing collected yet.
-    pub fn new() -> Self {
+    pub(crate) fn new() -> Self {
         Self::with_warm_up(WARM_UP)
     }
 
     /// Leaves out the first `warm_up` steps.
-    pub fn with_warm_up(warm_up: usize) -> Self {
+    pub(crate) fn with_warm_up(warm_up: usize) -> Self {
         Self { seen: 0, warm_up, order: Vec::new(), items: HashMap::new(), samples: HashMap::new() }
     }
 
     /// Adds what [`Scheduler::timings`](super::Scheduler::timings) gave for a step; the first steps are left out.
-    pub fn add(&mut self, timings: &[(String, u64)]) {
+    pub(crate) fn add(&mut self, timings: &[(String, u64)]) {
         self.seen += 1;
         if self.seen <= self.warm_up || timings.is_empty() {
             return;
@@ -69,12 +69,13 @@ impl Profiler {
     }
 
     /// Steps that count.
-    pub fn steps(&self) -> usize {
+    #[cfg(test)]
+    fn steps(&self) -> usize {
         self.seen.saturating_sub(self.warm_up)
     }
 
     /// One row per label, in the order of the list.
-    pub fn rows(&self) -> Vec<PassTime> {
+    pub(crate) fn rows(&self) -> Vec<PassTime> {
         let mut rows = Vec::new();
         for label in &self.order {
             let Some(samples) = self.samples.get(label) else { continue };

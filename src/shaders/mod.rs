@@ -3,6 +3,8 @@
 //! `build.rs` compiles every `glsl/**/*.comp`, reflects the SPIR-V and writes one module per file with `Macros`,
 //! `Bindings<B>` and `Spec` (field names are the GLSL names; all that some sibling of the file has) and the [`Compiled`]
 //! variants. Layouts, bindings and access are written in GLSL and nowhere else.
+// The generated side is public throughout, whatever of it is used.
+#![allow(unreachable_pub)]
 
 /// What a shader does with a binding; from the GLSL qualifiers `readonly` and `writeonly`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -6,12 +6,12 @@ use super::shape::Shape;
 use glam::DVec3;
 
 /// Albedo of the black object: below what an 8-bit photo tells from a hole.
-pub const BLACK: f64 = 0.018;
+pub(super) const BLACK: f64 = 0.018;
 /// Half the thickness of wires and bars: one to three pixels of the usual view.
 const THIN: f64 = 0.013;
 
 /// The objects, ids 1, 2, .. in order.
-pub fn rows() -> Vec<Row> {
+pub(super) fn rows() -> Vec<Row> {
     let block = |x: f64, y: f64, z: f64| Shape::Block(DVec3::new(x, y, z));
     let ball = |radius: f64| Shape::Ball(DVec3::splat(radius));
     vec![

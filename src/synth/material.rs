@@ -68,7 +68,7 @@ impl Material {
 }
 
 /// Albedo of the ground at a place of the world; the seed is the world's.
-pub fn ground_albedo(place: DVec3, seed: u64) -> DVec3 {
+pub(super) fn ground_albedo(place: DVec3, seed: u64) -> DVec3 {
     let tile = (place / 0.55 + 0.21).floor();
     let odd = (tile.x + tile.y).rem_euclid(2.0);
     let base = DVec3::new(0.62, 0.58, 0.5).lerp(DVec3::new(0.46, 0.47, 0.45), odd);
@@ -76,7 +76,7 @@ pub fn ground_albedo(place: DVec3, seed: u64) -> DVec3 {
 }
 
 /// Value noise in 0 to 1, one random value per unit cube's corner, smooth in between.
-pub fn noise(p: DVec3, seed: u64) -> f64 {
+pub(super) fn noise(p: DVec3, seed: u64) -> f64 {
     let cell = p.floor();
     let f = p - cell;
     let s = f * f * (3.0 - 2.0 * f);
@@ -91,7 +91,7 @@ pub fn noise(p: DVec3, seed: u64) -> f64 {
 }
 
 /// A colour from hue (0 to 1, wraps), saturation and value.
-pub fn hsv(hue: f64, saturation: f64, value: f64) -> DVec3 {
+pub(super) fn hsv(hue: f64, saturation: f64, value: f64) -> DVec3 {
     let channel = |offset: f64| {
         let k = (offset + hue.rem_euclid(1.0) * 6.0) % 6.0;
         value - value * saturation * k.min(4.0 - k).clamp(0.0, 1.0)

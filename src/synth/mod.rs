@@ -3,27 +3,27 @@
 //!
 //! Nothing in it is made of Gaussians, so a score on it is not a score of the engine against itself.
 
-mod cameras;
+pub(crate) mod cameras;
 mod hard;
 mod material;
 mod object;
 mod points;
 mod presets;
 mod shape;
-pub mod spoil;
-mod trace;
-mod world;
+pub(crate) mod spoil;
+pub(crate) mod trace;
+pub(crate) mod world;
 mod write;
 
-pub use cameras::ring_of_cameras;
-pub use object::Object;
-pub use trace::{Picture, alone, picture};
-pub use world::World;
+pub use spoil::{Fault, spoil};
+pub(crate) use world::World;
 pub use write::{Summary, write};
 
 use crate::scene::{Dataset, LabelMap, Photo, View};
+use cameras::ring_of_cameras;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
+use trace::picture;
 
 /// Which objects stand in the scene.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]

@@ -5,7 +5,7 @@ use super::shape::Shape;
 use glam::{DQuat, DVec3};
 
 /// One row of an arrangement: name, shape, position, turn about z in degrees, pattern.
-pub type Row = (&'static str, Shape, [f64; 3], f64, Pattern);
+pub(super) type Row = (&'static str, Shape, [f64; 3], f64, Pattern);
 
 /// A labelled object.
 #[derive(Clone, Debug, PartialEq)]

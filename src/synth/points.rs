@@ -13,7 +13,7 @@ const NOISE: f64 = 0.0015;
 
 /// A point and where it is seen.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Seen {
+pub(super) struct Seen {
     /// Place and colour.
     pub point: Point,
     /// View number and place in its image, px.
@@ -21,7 +21,7 @@ pub struct Seen {
 }
 
 /// Points on visible surfaces, as dense as pixels see them; each is seen by two views or more.
-pub fn sample(world: &World, cameras: &[Camera], options: &SynthOptions) -> Vec<Seen> {
+pub(super) fn sample(world: &World, cameras: &[Camera], options: &SynthOptions) -> Vec<Seen> {
     let mut random = Pcg64::seed_from_u64(options.seed);
     let mut found = Vec::new();
     // A scene of few views may have fewer points than asked for; never search for ever.

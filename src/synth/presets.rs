@@ -7,7 +7,7 @@ use super::{Preset, hard, hash01};
 use glam::{DQuat, DVec3};
 
 /// The objects of a preset, ids 1, 2, .. in order.
-pub fn objects(preset: Preset, seed: u64) -> Vec<Object> {
+pub(super) fn objects(preset: Preset, seed: u64) -> Vec<Object> {
     let rows = match preset {
         Preset::Default => default_rows(),
         Preset::Simple => simple_rows(),

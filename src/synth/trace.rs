@@ -62,7 +62,7 @@ pub fn picture(world: &World, camera: &Camera, view: u32) -> Picture {
 }
 
 /// Unit direction, world, of the ray through a place of the image.
-pub fn ray(camera: &Camera, x: f64, y: f64) -> DVec3 {
+pub(super) fn ray(camera: &Camera, x: f64, y: f64) -> DVec3 {
     let own = DVec3::new((x - camera.cx) / camera.fx, (y - camera.cy) / camera.fy, 1.0);
     (camera.rotation.transpose() * own).normalize()
 }

@@ -2,9 +2,11 @@
 
 use super::object::Object;
 use super::points::Seen;
-use super::trace::Picture;
+
+use super::cameras::ring_of_cameras;
+use super::trace::{Picture, alone, picture};
 use super::world::World;
-use super::{SynthOptions, alone, picture, points, ring_of_cameras, view_name};
+use super::{SynthOptions, points, view_name};
 use crate::io::label_table::{self, LabelEntry, LabelTable};
 use crate::io::{atomic, image};
 use crate::scene::Camera;

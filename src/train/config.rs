@@ -39,7 +39,7 @@ pub enum LabelRule {
     Votes,
 }
 
-crate::options! {
+crate::options::options! {
     /// What a training does. `Default` is the paper's setting but for labels, where it is what was measured to be better;
     /// [`TrainConfig::paper`] is the paper's throughout.
     ///

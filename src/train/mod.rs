@@ -1,25 +1,25 @@
 //! Training: the loop over steps, and what happens between them.
 
-pub mod config;
-pub mod near;
+pub(crate) mod config;
+pub(crate) mod near;
 mod occlusion;
 mod sampler;
 mod sentinel;
 mod separate;
-mod setup;
-pub mod shared;
-mod state;
-pub mod step_input;
-pub mod strategy;
+pub(crate) mod setup;
+pub(crate) mod shared;
+pub(crate) mod state;
+pub(crate) mod step_input;
+pub(crate) mod strategy;
 mod timing;
 mod views;
 mod votes;
 
 pub use config::{LabelRule, Occlusion, TrainConfig};
-pub use setup::{TrainerOptions, engine_size, start_size};
-pub use state::{TrainState, ViewFingerprint};
-pub use strategy::Densified;
-pub use timing::StepTimes;
+pub(crate) use setup::{TrainerOptions, engine_size, start_size};
+pub(crate) use state::{TrainState, ViewFingerprint};
+pub(crate) use strategy::Densified;
+pub(crate) use timing::StepTimes;
 
 use crate::engine::{Engine, EngineSize, InFlight, ListKey, Report, TrainInput};
 use crate::error::Result;

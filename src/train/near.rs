@@ -3,7 +3,7 @@
 use crate::scene::{Camera, Gaussians};
 use glam::DVec3;
 
-pub use crate::render::NEAR;
+pub(crate) use crate::render::NEAR;
 
 /// The near plane of a small scene, in median depths of its Gaussians.
 const SHARE: f64 = 0.05;
@@ -12,7 +12,7 @@ const CAMERAS: usize = 64;
 const GAUSSIANS: usize = 4096;
 
 /// [`NEAR`], or [`SHARE`] of the median depth at which training cameras see the first Gaussians where that is less.
-pub fn near_plane<'a>(cameras: impl ExactSizeIterator<Item = &'a Camera>, model: &Gaussians) -> f32 {
+pub(crate) fn near_plane<'a>(cameras: impl ExactSizeIterator<Item = &'a Camera>, model: &Gaussians) -> f32 {
     let rows: Vec<DVec3> =
         (0..model.len()).step_by(model.len().div_ceil(GAUSSIANS).max(1)).map(|row| model.world(row)).collect();
     let every = cameras.len().div_ceil(CAMERAS).max(1);

@@ -17,7 +17,7 @@ fn stream(seed: u64, stream: u64) -> Pcg64Mcg {
 
 /// Draws views without replacement until all were seen, then starts over (3DGS).
 #[derive(Debug)]
-pub struct ViewOrder {
+pub(super) struct ViewOrder {
     random: Pcg64Mcg,
     views: usize,
     stack: Vec<usize>,
@@ -25,12 +25,12 @@ pub struct ViewOrder {
 
 impl ViewOrder {
     /// An order over `views` views.
-    pub fn new(seed: u64, views: usize) -> Self {
+    pub(super) fn new(seed: u64, views: usize) -> Self {
         Self { random: stream(seed, VIEW_STREAM), views, stack: Vec::new() }
     }
 
     /// The order after so many draws.
-    pub fn after(seed: u64, views: usize, draws: u32) -> Self {
+    pub(super) fn after(seed: u64, views: usize, draws: u32) -> Self {
         let mut order = Self::new(seed, views);
         (0..draws).for_each(|_| {
             order.draw();
@@ -39,7 +39,7 @@ impl ViewOrder {
     }
 
     /// The next view.
-    pub fn draw(&mut self) -> usize {
+    pub(super) fn draw(&mut self) -> usize {
         if self.stack.is_empty() {
             self.stack = (0..self.views).collect();
             self.stack.shuffle(&mut self.random);
@@ -49,7 +49,7 @@ impl ViewOrder {
 }
 
 /// At most `count` of the objects of a view, sorted.
-pub fn sample_objects(seed: u64, step: u32, objects: &[u16], count: usize) -> Vec<u16> {
+pub(super) fn sample_objects(seed: u64, step: u32, objects: &[u16], count: usize) -> Vec<u16> {
     let mut chosen = objects.to_vec();
     if chosen.len() > count {
         chosen.shuffle(&mut stream(seed, u64::from(step)));

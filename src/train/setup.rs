@@ -58,7 +58,7 @@ pub fn engine_size(dataset: &Dataset, config: &TrainConfig, gaussians: u64) -> R
 }
 
 /// Room to start with: for twice as many Gaussians as there are, or for those where memory is short.
-pub fn start_size(
+pub(crate) fn start_size(
     gpu: &Gpu,
     dataset: &Dataset,
     config: &TrainConfig,

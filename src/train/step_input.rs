@@ -56,7 +56,7 @@ impl TrainView {
 }
 
 /// Pixels of a photo that count.
-pub fn valid_pixels(photo: &Photo) -> u64 {
+pub(crate) fn valid_pixels(photo: &Photo) -> u64 {
     photo.rgba.iter().filter(|pixel| pixel[3] > 127).count() as u64
 }
 
@@ -70,7 +70,7 @@ pub struct Shown {
 }
 
 /// The mask as the device reads it: ids, with [`LABEL_BORDER`] within `border` px of a contour.
-pub fn view_labels(mask: &LabelMap, border: u32) -> Vec<u32> {
+pub(crate) fn view_labels(mask: &LabelMap, border: u32) -> Vec<u32> {
     let ids = mask.ids.iter().map(|&id| u32::from(id));
     if border == 0 {
         return ids.collect();
@@ -79,7 +79,7 @@ pub fn view_labels(mask: &LabelMap, border: u32) -> Vec<u32> {
 }
 
 /// What each object shows of itself: the label loss of an empty layer.
-pub fn shown_objects(photo: &Photo, view_labels: &[u32]) -> BTreeMap<u16, Shown> {
+pub(crate) fn shown_objects(photo: &Photo, view_labels: &[u32]) -> BTreeMap<u16, Shown> {
     let mut objects: BTreeMap<u16, Shown> = BTreeMap::new();
     for (&id, &[r, g, b, valid]) in view_labels.iter().zip(&photo.rgba) {
         if id != 0 && id & LABEL_BORDER == 0 && valid > 127 {
@@ -93,7 +93,7 @@ pub fn shown_objects(photo: &Photo, view_labels: &[u32]) -> BTreeMap<u16, Shown>
 
 /// Weights of the layers of a step: 1, or as one over the root of the object's area, with a mean of 1 over an area of
 /// the mean size and at most [`WEIGHT_MAX`].
-pub fn layer_weights(input: &StepInput, view: &TrainView, config: &TrainConfig) -> Vec<f32> {
+pub(crate) fn layer_weights(input: &StepInput, view: &TrainView, config: &TrainConfig) -> Vec<f32> {
     let areas: Vec<f64> =
         input.layers.iter().map(|label| view.shown.get(label).map_or(0.0, |shown| shown.pixels as f64)).collect();
     let mean = areas.iter().sum::<f64>() / areas.len().max(1) as f64;
@@ -148,7 +148,7 @@ pub struct SceneScale {
 }
 
 /// The uniforms of a step.
-pub fn uniforms(
+pub(crate) fn uniforms(
     input: &StepInput,
     view: &TrainView,
     config: &TrainConfig,
@@ -181,7 +181,7 @@ pub fn uniforms(
 }
 
 /// What the device reads of a step.
-pub fn train_input<'a>(
+pub(crate) fn train_input<'a>(
     input: &StepInput,
     view: &'a TrainView,
     config: &TrainConfig,

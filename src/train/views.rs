@@ -5,7 +5,7 @@ use std::ops::{Deref, DerefMut};
 
 /// The training views; as a slice, those at their full size.
 #[derive(Debug)]
-pub struct Views {
+pub(super) struct Views {
     whole: Vec<TrainView>,
     /// The same at half the size, if some steps look at them.
     halved: Vec<TrainView>,
@@ -14,13 +14,13 @@ pub struct Views {
 
 impl Views {
     /// Views of which steps up to `coarse_until` look at halves.
-    pub fn new(whole: Vec<TrainView>, coarse_until: u32) -> Self {
+    pub(super) fn new(whole: Vec<TrainView>, coarse_until: u32) -> Self {
         let halved = if coarse_until > 0 { whole.iter().map(TrainView::halved).collect() } else { Vec::new() };
         Self { whole, halved, coarse_until }
     }
 
     /// The view of a step, as the step looks at it.
-    pub fn of(&self, input: &StepInput) -> &TrainView {
+    pub(super) fn of(&self, input: &StepInput) -> &TrainView {
         if input.step <= self.coarse_until { &self.halved[input.view] } else { &self.whole[input.view] }
     }
 }

@@ -7,12 +7,14 @@ use exr::prelude::{
     Vec2, WritableImage,
 };
 use labelgs::Result;
-use labelgs::io::depth::DepthFolder;
-use labelgs::io::image::{photo_size, read_photo};
-use labelgs::io::mask::read_mask;
-use labelgs::io::model::read_model;
-use labelgs::io::ply::read_points;
-use labelgs::io::{self, LoadOptions};
+use labelgs::internals::io;
+use labelgs::internals::io::image::photo_size;
+use labelgs::internals::io::ply::read_points;
+use labelgs::io::DepthFolder;
+use labelgs::io::LoadOptions;
+use labelgs::io::read_mask;
+use labelgs::io::read_model;
+use labelgs::io::read_photo;
 use labelgs::scene::DepthMap;
 use std::path::Path;
 

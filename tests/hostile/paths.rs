@@ -2,7 +2,8 @@
 
 use crate::io::fixtures::{Scene, images_bin, pinhole, refusal};
 use labelgs::Result;
-use labelgs::io::{self, LoadOptions};
+use labelgs::internals::io;
+use labelgs::io::LoadOptions;
 use labelgs::scene::Dataset;
 use std::path::Path;
 

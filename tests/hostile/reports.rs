@@ -1,10 +1,12 @@
 //! Failures of other programs that people reported, each as a test under its own name.
 
 use crate::io::fixtures::{ColmapCamera, Scene, images_bin, pinhole, refusal, simple};
-use labelgs::io::image::{photo_size, read_photo, write_png_grey16};
-use labelgs::io::mask::read_mask;
-use labelgs::io::model::{read_model, write_model};
-use labelgs::io::{self, LoadOptions};
+use labelgs::internals::io;
+use labelgs::internals::io::image::{photo_size, write_png_grey16};
+use labelgs::io::LoadOptions;
+use labelgs::io::read_mask;
+use labelgs::io::read_photo;
+use labelgs::io::{read_model, write_model};
 use labelgs::scene::{Dataset, Gaussians};
 
 fn open(scene: &Scene) -> labelgs::Result<Dataset> {

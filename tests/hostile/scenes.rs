@@ -2,7 +2,8 @@
 
 use crate::io::fixtures::{ColmapCamera, Scene, images_bin, pinhole, refusal, simple};
 use labelgs::Result;
-use labelgs::io::{self, LoadOptions, initial_gaussians};
+use labelgs::internals::io;
+use labelgs::io::{LoadOptions, initial_gaussians};
 use labelgs::scene::Dataset;
 
 fn open(scene: &Scene, max_bad_photos: f32) -> Result<Dataset> {

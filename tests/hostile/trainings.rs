@@ -2,11 +2,12 @@
 
 use crate::support::device;
 use assert_cmd::Command;
-use labelgs::io::init::initial_gaussians;
+use labelgs::internals::scheduler::SchedulerOptions;
+use labelgs::internals::train::Trainer;
+use labelgs::io::initial_gaussians;
+use labelgs::run::TrainConfig;
 use labelgs::scene::{Camera, Dataset, LabelMap, Photo, View};
-use labelgs::scheduler::SchedulerOptions;
 use labelgs::synth::{Preset, SynthOptions, dataset};
-use labelgs::train::{TrainConfig, Trainer};
 use std::path::Path;
 use std::sync::Arc;
 
@@ -181,9 +182,9 @@ fn a_damaged_scene_trains_with_warnings_or_says_what_is_wrong() {
         std::fs::read_dir(Path::new(&scene).join("masks")).expect("masks").map(|entry| entry.expect("a mask").path())
     {
         if mask.extension().is_some_and(|extension| extension == "png") {
-            let whole = labelgs::io::mask::read_mask(&mask).expect("a mask");
+            let whole = labelgs::io::read_mask(&mask).expect("a mask");
             let ids: Vec<u16> = (0..24 * 18).map(|index| whole.at(index % 24 * 2, index / 24 * 2)).collect();
-            labelgs::io::image::write_png_grey16(&mask, 24, 18, &ids).expect("a mask");
+            labelgs::internals::io::image::write_png_grey16(&mask, 24, 18, &ids).expect("a mask");
         }
     }
     let (masks, out) = (at("scene/masks"), at("out"));

@@ -5,12 +5,12 @@ use crate::support::device;
 use crate::support::scenes::{Shape, scene};
 use labelgs::Error;
 use labelgs::engine::{Engine, EngineSize, LabelSize};
-use labelgs::label::vote::ballot::{Sweep, Voter, sweep};
+use labelgs::internals::label::vote::ballot::{Sweep, Voter, sweep};
+use labelgs::internals::scheduler::SchedulerOptions;
+use labelgs::internals::scheduler::plan::PlanOptions;
 use labelgs::render::{Parts, RenderOptions, render};
+use labelgs::run::LabelRule;
 use labelgs::scene::{Camera, Gaussians, LabelMap};
-use labelgs::scheduler::SchedulerOptions;
-use labelgs::scheduler::plan::PlanOptions;
-use labelgs::train::LabelRule;
 
 /// Guards behind the buffers are looked at after each run.
 fn guarded() -> SchedulerOptions {

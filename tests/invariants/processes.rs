@@ -2,8 +2,8 @@
 
 use super::training::train;
 use crate::support::device;
-use labelgs::scheduler::SchedulerOptions;
-use labelgs::train::LabelRule;
+use labelgs::internals::scheduler::SchedulerOptions;
+use labelgs::run::LabelRule;
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::process::Command;
 

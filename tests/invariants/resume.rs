@@ -5,12 +5,13 @@ use crate::support::device;
 use crate::support::device::Turn;
 use labelgs::Result;
 use labelgs::engine::Engine;
-use labelgs::io::checkpoint::Plane;
-use labelgs::io::init::initial_gaussians;
-use labelgs::io::model::write_model;
+use labelgs::internals::io::checkpoint::Plane;
+use labelgs::internals::scheduler::SchedulerOptions;
+use labelgs::internals::train::{StepReport, TrainState, Trainer};
+use labelgs::io::initial_gaussians;
+use labelgs::io::write_model;
+use labelgs::run::{LabelRule, TrainConfig};
 use labelgs::scene::Dataset;
-use labelgs::scheduler::SchedulerOptions;
-use labelgs::train::{LabelRule, StepReport, TrainConfig, TrainState, Trainer};
 use std::path::Path;
 use std::sync::Arc;
 
@@ -102,7 +103,7 @@ fn a_training_without_masks_goes_on_to_the_same_bits() {
 #[test]
 fn a_training_that_memory_bounds_goes_on_to_the_same_bits() {
     let Some(turn) = device() else { return };
-    let room = labelgs::train::engine_size(&small(), &long(LabelRule::Votes), 600).expect("views");
+    let room = labelgs::internals::train::engine_size(&small(), &long(LabelRule::Votes), 600).expect("views");
     let limit = Engine::predict(&turn.gpu(), &room, SchedulerOptions::default()).expect("it fits").total;
     let options = SchedulerOptions { memory_limit: Some(limit), ..SchedulerOptions::default() };
     let free = go_on(

@@ -4,13 +4,14 @@ use crate::support::compare::{check, exact};
 use crate::support::device;
 use crate::support::device::Turn;
 use labelgs::engine::Engine;
-use labelgs::io::init::initial_gaussians;
-use labelgs::io::model::write_model;
+use labelgs::internals::scheduler::SchedulerOptions;
+use labelgs::internals::scheduler::plan::{Capacity, PlanOptions};
+use labelgs::internals::train::{StepReport, Trainer};
+use labelgs::io::initial_gaussians;
+use labelgs::io::write_model;
+use labelgs::run::{LabelRule, TrainConfig};
 use labelgs::scene::Dataset;
-use labelgs::scheduler::SchedulerOptions;
-use labelgs::scheduler::plan::{Capacity, PlanOptions};
 use labelgs::synth::{Preset, SynthOptions, dataset};
-use labelgs::train::{LabelRule, StepReport, TrainConfig, Trainer};
 
 /// 45 steps in which everything happens: higher degrees, labels by either rule, occluders, densification, an opacity
 /// reset.
@@ -158,8 +159,8 @@ fn a_memory_limit_bounds_the_gaussians() {
     let free = train(&turn, LabelRule::Votes, SchedulerOptions::default(), |_| ());
     let (start, end) = free.counts;
     // Room for half of the growth.
-    let room =
-        labelgs::train::engine_size(&small(), &config(LabelRule::Votes), (start + end) as u64 / 2).expect("views");
+    let room = labelgs::internals::train::engine_size(&small(), &config(LabelRule::Votes), (start + end) as u64 / 2)
+        .expect("views");
     let limit = Engine::predict(&turn.gpu(), &room, SchedulerOptions::default()).expect("it fits").total;
     assert!(limit < free.memory, "{limit} bytes bound nothing: {} were used", free.memory);
     let options = SchedulerOptions { memory_limit: Some(limit), ..SchedulerOptions::default() };
@@ -180,6 +181,6 @@ pub fn labels_of(ply: &[u8]) -> usize {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("model.ply");
     std::fs::write(&path, ply).expect("a file");
-    let read = labelgs::io::model::read_model(&path).expect("a PLY");
+    let read = labelgs::io::read_model(&path).expect("a PLY");
     read.gaussians.labels.map_or(0, |labels| labels.iter().filter(|&&label| label != 0).count())
 }

@@ -1,8 +1,8 @@
 //! Files of checkpoints: what comes back, and that nothing damaged does.
 
 use super::fixtures::*;
-use labelgs::io::checkpoint::{Checkpoint, Plane, VERSION};
-use labelgs::io::checkpoint_folder;
+use labelgs::internals::io::checkpoint::{Checkpoint, Plane, VERSION};
+use labelgs::internals::io::checkpoint_folder;
 use serde_json::json;
 use std::fs;
 

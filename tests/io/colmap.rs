@@ -2,7 +2,8 @@
 
 use super::fixtures::*;
 use glam::{DQuat, DVec3};
-use labelgs::io::{self, LoadOptions};
+use labelgs::internals::io;
+use labelgs::io::LoadOptions;
 use labelgs::scene::Dataset;
 use std::fs;
 

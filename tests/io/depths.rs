@@ -1,8 +1,9 @@
 //! Depth maps from every kind of file, brought to their photos.
 
 use super::fixtures::{ColmapCamera, Scene, refusal, simple};
-use labelgs::io::depth::DepthFolder;
-use labelgs::io::{self, LoadOptions};
+use labelgs::internals::io;
+use labelgs::io::DepthFolder;
+use labelgs::io::LoadOptions;
 use labelgs::scene::{Dataset, DepthMap, View};
 use std::path::Path;
 

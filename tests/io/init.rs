@@ -1,9 +1,9 @@
 //! The first Gaussians of a scene.
 
 use glam::{DMat3, DVec3};
+use labelgs::internals::shaders::constants::exact::SH_C0;
 use labelgs::io::initial_gaussians;
 use labelgs::scene::{Camera, Dataset, Photo, Point, View};
-use labelgs::shaders::constants::exact::SH_C0;
 
 fn point(x: f64, y: f64, z: f64) -> Point {
     Point { position: DVec3::new(x, y, z), colour: [255, 0, 51] }

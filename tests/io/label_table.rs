@@ -1,6 +1,7 @@
 //! labels.json: what is written comes back, and what cannot be meant is refused.
 
-use labelgs::io::label_table::{FILE, LabelEntry, LabelTable};
+use labelgs::internals::io::label_table::FILE;
+use labelgs::io::{LabelEntry, LabelTable};
 use std::fs;
 
 fn table() -> LabelTable {

@@ -1,12 +1,16 @@
 //! What `masks check` finds: each kind where it was planted, and nothing in clean masks.
 
 use super::mask_forms::*;
-use labelgs::io::image::write_png_grey8;
-use labelgs::io::masks::check::{Finding, Look, Problem, findings};
-use labelgs::io::masks::{Report, inspect};
-use labelgs::io::{self, LoadOptions};
+use labelgs::internals::io;
+use labelgs::internals::io::image::write_png_grey8;
+use labelgs::internals::io::masks::check::{Look, findings};
+use labelgs::internals::synth;
+use labelgs::io::LoadOptions;
+use labelgs::io::masks::Report;
+use labelgs::io::masks::inspect;
+use labelgs::io::masks::{Finding, Problem};
 use labelgs::scene::{Camera, Dataset, LabelMap, Point};
-use labelgs::synth::{self, SynthOptions};
+use labelgs::synth::SynthOptions;
 use std::fs;
 use std::path::Path;
 use std::sync::LazyLock;
@@ -39,7 +43,7 @@ fn report(folder: &TempDir, dataset: &Dataset) -> Report {
 /// Changes the ids of one mask.
 fn edit(folder: &TempDir, name: &str, change: impl Fn(usize, u16) -> u16) {
     let path = folder.path().join("masks").join(name);
-    let map = labelgs::io::mask::read_mask(&path).expect("a mask");
+    let map = labelgs::io::read_mask(&path).expect("a mask");
     let ids: Vec<u8> = map.ids.iter().enumerate().map(|(index, &id)| change(index, id) as u8).collect();
     write_png_grey8(&path, map.width, map.height, &ids).expect("written");
 }
@@ -137,7 +141,7 @@ fn an_id_in_one_view_is_found() {
 #[test]
 fn an_id_that_is_lost_for_one_view_is_found() {
     let (folder, dataset) = made();
-    let mask = |name: &str| labelgs::io::mask::read_mask(folder.path().join("masks").join(name)).expect("a mask");
+    let mask = |name: &str| labelgs::io::read_mask(folder.path().join("masks").join(name)).expect("a mask");
     let shown = |id: u16| {
         ["013.png", "014.png", "015.png"]
             .iter()

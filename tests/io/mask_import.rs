@@ -2,10 +2,13 @@
 
 use super::fixtures::*;
 use super::mask_forms::*;
-use labelgs::io::label_table::{FILE, LabelTable};
-use labelgs::io::mask::read_mask;
-use labelgs::io::masks::{Format, ImportOptions, Imported, Overlap, import};
-use labelgs::io::{self, LoadOptions};
+use labelgs::internals::io;
+use labelgs::internals::io::label_table::FILE;
+use labelgs::io::LabelTable;
+use labelgs::io::LoadOptions;
+use labelgs::io::masks::import;
+use labelgs::io::masks::{Format, ImportOptions, Imported, Overlap};
+use labelgs::io::read_mask;
 use labelgs::scene::Dataset;
 use png::{BitDepth, ColorType};
 use std::fs;

@@ -1,8 +1,9 @@
 //! Id images: encodings, names, sizes.
 
 use super::fixtures::*;
-use labelgs::io::mask::read_mask;
-use labelgs::io::{self, LoadOptions};
+use labelgs::internals::io;
+use labelgs::io::LoadOptions;
+use labelgs::io::read_mask;
 use labelgs::scene::Dataset;
 use std::fs;
 use std::path::Path;

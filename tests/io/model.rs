@@ -1,8 +1,8 @@
 //! Models by the ending of their files, and a format that a program adds.
 
 use super::fixtures::*;
-use labelgs::cli::context::open_model;
-use labelgs::io::model::{ModelFormat, ReadModel, read_model, register, write_model};
+use labelgs::internals::cli::context::open_model;
+use labelgs::io::{ModelFormat, ReadModel, read_model, register, write_model};
 use labelgs::scene::Gaussians;
 use labelgs::{Error, Result};
 use std::io::{self, Write};
@@ -13,7 +13,7 @@ const BALLS: ModelFormat = ModelFormat { name: "balls", endings: &[".balls", ".b
 
 fn read_balls(path: &Path) -> Result<ReadModel> {
     let mut read = ReadModel::default();
-    for (line, text) in labelgs::io::read::text(path)?.lines().enumerate() {
+    for (line, text) in labelgs::internals::io::read::text(path)?.lines().enumerate() {
         let row: Vec<f32> = text.split(' ').map_while(|word| word.parse().ok()).collect();
         let &[x, y, z, size, r, g, b, opacity] = row.as_slice() else {
             return Err(Error::data(path, format!("line {}", line + 1), "is no row of 8 numbers"));

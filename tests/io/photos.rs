@@ -2,9 +2,11 @@
 
 use super::fixtures::*;
 use glam::DVec2;
-use labelgs::io::image::{photo_size, read_photo};
-use labelgs::io::lens::{Distortion, Lens, Polynomial};
-use labelgs::io::{self, LoadOptions};
+use labelgs::internals::io;
+use labelgs::internals::io::image::photo_size;
+use labelgs::internals::io::lens::{Distortion, Lens, Polynomial};
+use labelgs::io::LoadOptions;
+use labelgs::io::read_photo;
 use labelgs::scene::{Dataset, Photo};
 use std::fs;
 

@@ -1,8 +1,8 @@
 //! Gaussians and points as PLY: round trips, foreign layouts, hostile files.
 
 use super::fixtures::*;
-use labelgs::io::model::{read_model, write_model};
-use labelgs::io::ply::read_points;
+use labelgs::internals::io::ply::read_points;
+use labelgs::io::{read_model, write_model};
 use labelgs::scene::Gaussians;
 use std::fs;
 

@@ -2,7 +2,8 @@
 
 use super::fixtures::*;
 use glam::DVec3;
-use labelgs::io::{self, LoadOptions};
+use labelgs::internals::io;
+use labelgs::io::LoadOptions;
 use labelgs::scene::Dataset;
 
 const IDENTITY: &str = "[[1,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]]";

@@ -6,9 +6,9 @@ use crate::reference::random::normal_draw;
 use crate::support::compare::Tolerance;
 use crate::support::device;
 use crate::support::scenes::{Shape, population, scene};
-use labelgs::train::step_input::SceneScale;
-use labelgs::verify::selftest::judge;
-use labelgs::verify::selftest::model::{Densified, Reset, scene_of};
+use labelgs::internals::train::step_input::SceneScale;
+use labelgs::internals::verify::selftest::judge;
+use labelgs::internals::verify::selftest::model::{Densified, Reset, scene_of};
 
 fn states(fixture: &mut Fixture) -> Vec<Optimised> {
     let count = fixture.scene.gaussians.len();

@@ -6,14 +6,15 @@ use crate::reference::Row;
 use crate::support::compare::{GradientBounds, Tolerance, check, close, exact};
 use crate::support::device;
 use crate::support::scenes::{Shape, scene};
-use labelgs::engine::{ListKey, Report};
-use labelgs::io::init::initial_gaussians;
-use labelgs::scheduler::SchedulerOptions;
-use labelgs::scheduler::plan::Buf;
-use labelgs::shaders::constants::NO_SPLAT;
+use labelgs::internals::engine::{ListKey, Report};
+use labelgs::internals::scheduler::SchedulerOptions;
+use labelgs::internals::scheduler::plan::Buf;
+use labelgs::internals::shaders::constants::NO_SPLAT;
+use labelgs::internals::train::{StepReport, Trainer};
+use labelgs::internals::verify::selftest::judge;
+use labelgs::io::initial_gaussians;
+use labelgs::run::{LabelRule, TrainConfig};
 use labelgs::synth::{Preset, SynthOptions, dataset};
-use labelgs::train::{LabelRule, StepReport, TrainConfig, Trainer};
-use labelgs::verify::selftest::judge;
 
 /// Both are f32 sums of the same terms, scene and object apart or together: what is left is rounding, which large terms
 /// of opposite sign make more of. 0.67 of the bounds seen, by element and as a whole.

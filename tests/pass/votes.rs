@@ -6,7 +6,7 @@ use crate::reference::lift::vote;
 use crate::support::compare::{Tolerance, check, close};
 use crate::support::device;
 use crate::support::scenes::{Scene, Shape, scene};
-use labelgs::label::vote::ballot::{Sweep, Voter, sweep};
+use labelgs::internals::label::vote::ballot::{Sweep, Voter, sweep};
 use labelgs::scene::{LabelMap, Photo};
 use std::collections::BTreeMap;
 

@@ -1,8 +1,8 @@
 //! LPIPS with made weights whose answer can be worked out.
 
-use labelgs::eval::lpips::convolution::{Layer, Planes, convolve, halve};
-use labelgs::eval::lpips::{CHANNELS, STAGES, Weights};
-use labelgs::eval::protocol::score::Distance;
+use labelgs::internals::eval::lpips::convolution::{Layer, Planes, convolve, halve};
+use labelgs::internals::eval::lpips::{CHANNELS, STAGES, Weights};
+use labelgs::internals::eval::protocol::score::Distance;
 use std::io::Write;
 use std::path::Path;
 use tempfile::tempdir;

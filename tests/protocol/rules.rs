@@ -1,11 +1,11 @@
 //! What counts and what does not: absent predictions, empty selections, the published scorers' ways, the page.
 
 use super::{Columns, columns_file, run_on, view};
-use labelgs::eval::compared::{Compared, Watch};
-use labelgs::eval::page::Page;
 use labelgs::eval::protocol::{By, Protocol};
-use labelgs::io::image::{read_grey, write_png_grey8};
-use labelgs::io::truth::read_truth;
+use labelgs::eval::{Compared, Watch};
+use labelgs::internals::eval::page::Page;
+use labelgs::internals::io::image::{read_grey, write_png_grey8};
+use labelgs::internals::io::truth::read_truth;
 use std::collections::BTreeMap;
 use tempfile::tempdir;
 
@@ -76,7 +76,7 @@ fn dark_objects_are_lost_by_the_colour_rule_only() {
     assert_eq!((strict.mean.pairs.iou, strict.mean.pairs.iou_colour), (Some(1.0), Some(0.5)));
     assert_eq!((strict.headline.iou, compat.headline.iou), (Some(1.0), Some(0.5)));
     // Grey pictures: channels agree, and the mean of their PSNR is the PSNR of their mean.
-    let psnr = |found: &labelgs::eval::protocol::report::Report| found.mean.pairs.psnr.expect("a number");
+    let psnr = |found: &labelgs::eval::protocol::Report| found.mean.pairs.psnr.expect("a number");
     assert!((psnr(&strict) - psnr(&compat)).abs() < 1e-9);
     assert_ne!(strict.mean.pairs.ssim, compat.mean.pairs.ssim, "another window");
 }

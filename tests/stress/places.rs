@@ -3,13 +3,14 @@
 use crate::support::device;
 use glam::DVec3;
 use labelgs::engine::{Engine, EngineSize};
-use labelgs::io::init::initial_gaussians;
-use labelgs::io::model::{read_model, write_model};
+use labelgs::internals::scheduler::SchedulerOptions;
+use labelgs::internals::train::Trainer;
+use labelgs::io::initial_gaussians;
+use labelgs::io::{read_model, write_model};
 use labelgs::render::{Parts, RenderOptions, render};
+use labelgs::run::TrainConfig;
 use labelgs::scene::{Dataset, Gaussians, View};
-use labelgs::scheduler::SchedulerOptions;
 use labelgs::synth::{Preset, SynthOptions, dataset};
-use labelgs::train::{TrainConfig, Trainer};
 use std::sync::Arc;
 
 /// Where UTM puts a place in Bavaria, m.

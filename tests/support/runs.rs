@@ -1,9 +1,10 @@
 //! Runs of the tool on a small scene, and what they leave.
 
 use assert_cmd::Command;
-use labelgs::io::checkpoint_folder::{self, Found};
-use labelgs::io::model::read_model;
-use labelgs::train::TrainState;
+use labelgs::internals::io::checkpoint_folder;
+use labelgs::internals::io::checkpoint_folder::Found;
+use labelgs::internals::train::TrainState;
+use labelgs::io::read_model;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Output, Stdio};

@@ -1,6 +1,6 @@
 //! One traversal for the scene and all sampled objects against a pass for each, as the reference code of LabelGS does it.
 //!
-//! Both use the same kernels and the same culling ([`labelgs::pass::separate_step`]), so that their ratio is what the
+//! Both use the same kernels and the same culling ([`labelgs::internals::pass::separate_step`]), so that their ratio is what the
 //! structure saves. Steps of both and of a plain training run in turn, from the same model, on the same views.
 //!
 //! What favours a pass for each: it culls to the object's Gaussians first, adds gradients for visible splats only, and
@@ -10,12 +10,15 @@ use super::measure::{self, Cost, median, median_cost, require, table, timed};
 use super::trained::{Judge, labelled_model, start, timed_step, timing_config, trainer, without_masks};
 use super::{Common, device};
 use labelgs::Result;
-use labelgs::eval::scores::MeanScores;
+use labelgs::eval::MeanScores;
 use labelgs::gpu::Gpu;
-use labelgs::pass::{self, Variant};
+use labelgs::internals::pass;
+use labelgs::internals::pass::Variant;
+use labelgs::internals::synth;
+use labelgs::internals::train::{StepReport, Trainer};
+use labelgs::run::TrainConfig;
 use labelgs::scene::{Dataset, Gaussians, View};
-use labelgs::synth::{self, Preset, SynthOptions};
-use labelgs::train::{StepReport, TrainConfig, Trainer};
+use labelgs::synth::{Preset, SynthOptions};
 use serde::Serialize;
 use std::sync::Arc;
 

@@ -3,9 +3,9 @@
 use super::measure::median;
 use super::measure::write_json;
 use super::{Common, memory};
-use labelgs::io::atomic;
-use labelgs::io::camera_json::CameraFile;
-use labelgs::io::model::write_model;
+use labelgs::internals::io::atomic;
+use labelgs::internals::io::camera_json::CameraFile;
+use labelgs::io::write_model;
 use labelgs::{Error, Result};
 use serde_json::json;
 use std::path::Path;

@@ -2,17 +2,20 @@
 
 use super::measure::{Cost, timed};
 use labelgs::Result;
-use labelgs::edit::select::MIN_LABEL_CONFIDENCE;
+use labelgs::edit::MIN_LABEL_CONFIDENCE;
 use labelgs::engine::{Engine, EngineSize};
-use labelgs::eval::evaluate::{Rendering, evaluate};
-use labelgs::eval::scores::MeanScores;
+use labelgs::eval::MeanScores;
+use labelgs::eval::{Rendering, evaluate};
 use labelgs::gpu::Gpu;
-use labelgs::io::init::{RANDOM_COUNT, initial_gaussians};
+use labelgs::internals::io::init::RANDOM_COUNT;
+use labelgs::internals::scheduler::SchedulerOptions;
+use labelgs::internals::synth;
+use labelgs::internals::train::{StepReport, Trainer};
+use labelgs::io::initial_gaussians;
 use labelgs::render::{NEAR, RenderOptions};
+use labelgs::run::TrainConfig;
 use labelgs::scene::{Dataset, Gaussians, View};
-use labelgs::scheduler::SchedulerOptions;
-use labelgs::synth::{self, Preset, SynthOptions};
-use labelgs::train::{StepReport, TrainConfig, Trainer};
+use labelgs::synth::{Preset, SynthOptions};
 use std::sync::Arc;
 
 /// Every so many-th view of a made scene is held out.

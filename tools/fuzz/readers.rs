@@ -2,15 +2,18 @@
 
 use super::seeds;
 use labelgs::Result;
-use labelgs::cli::profile_compare::{Profile, compare};
-use labelgs::eval::lpips::weights::read_tensors;
-use labelgs::io::checkpoint::Checkpoint;
-use labelgs::io::depth::DepthFolder;
-use labelgs::io::frames::Frames;
-use labelgs::io::label_table::LabelTable;
-use labelgs::io::masks::{Format, ImportOptions, import};
-use labelgs::io::occlusion_table::OcclusionTable;
-use labelgs::io::{self, LoadOptions, camera_json, image, mask, model, ply};
+use labelgs::internals::cli::profile_compare::{Profile, compare};
+use labelgs::internals::eval::lpips::weights::read_tensors;
+use labelgs::internals::io;
+use labelgs::internals::io::checkpoint::Checkpoint;
+use labelgs::internals::io::{camera_json, image, mask, model, ply};
+use labelgs::io::DepthFolder;
+use labelgs::io::Frames;
+use labelgs::io::LabelTable;
+use labelgs::io::LoadOptions;
+use labelgs::io::OcclusionTable;
+use labelgs::io::masks::import;
+use labelgs::io::masks::{Format, ImportOptions};
 use labelgs::scene::{Camera, Dataset, Gaussians, Photo};
 use std::path::Path;
 
@@ -148,7 +151,7 @@ pub fn photo(_: &Path, file: &Path) -> Result<()> {
 
 pub fn checkpoint(_: &Path, file: &Path) -> Result<()> {
     Checkpoint::read(file)?;
-    labelgs::train::TrainState::read(file).map(|_| ())
+    labelgs::internals::train::TrainState::read(file).map(|_| ())
 }
 
 pub fn config(_: &Path, file: &Path) -> Result<()> {

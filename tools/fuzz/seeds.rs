@@ -1,10 +1,10 @@
 //! Small valid files of every kind, made by the program's own writers where it has one.
 
 use labelgs::gpu::PipelineStore;
-use labelgs::io::image as pixels;
-use labelgs::io::label_table::{LabelEntry, LabelTable};
-use labelgs::io::model::write_model;
-use labelgs::io::pipeline_file::PipelineFolder;
+use labelgs::internals::io::image as pixels;
+use labelgs::io::PipelineFolder;
+use labelgs::io::write_model;
+use labelgs::io::{LabelEntry, LabelTable};
 use labelgs::run::Settings;
 use labelgs::scene::Gaussians;
 use std::io::Cursor;

@@ -8,9 +8,9 @@
 use super::readers::*;
 use super::seeds;
 use labelgs::gpu::PipelineStore;
-use labelgs::io::checkpoint::VERSION;
+use labelgs::internals::io::checkpoint::VERSION;
+use labelgs::io::PipelineFolder;
 use labelgs::io::masks::Format;
-use labelgs::io::pipeline_file::PipelineFolder;
 use labelgs::{Error, Result};
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;

@@ -39,7 +39,10 @@ fn by_file(shaders: &[Shader]) -> BTreeMap<&str, Vec<&Shader>> {
 
 fn emit_constants(out: &mut String, constants: &[Constant]) {
     put!(out, "\n/// Constants of `glsl/include/constants.glsl`, bit for bit the values that the shaders use.");
-    put!(out, "#[allow(clippy::all)]\npub mod constants {{");
+    put!(
+        out,
+        "#[allow(clippy::all, dead_code, reason = \"every constant is there as f32 and as f64\")]\npub mod constants {{"
+    );
     for constant in constants {
         let doc = if constant.doc.is_empty() { constant.name.clone() } else { constant.doc.clone() };
         let (rust, value) = match constant.glsl_type.as_str() {

@@ -69,7 +69,7 @@ struct Outcome {
 }
 
 /// Runs all variants and prints the table.
-pub fn run(args: &AblateArgs, context: &Context) -> Result<()> {
+pub(crate) fn run(args: &AblateArgs, context: &Context) -> Result<()> {
     let rows = rows(&args.rows, &args.own_rows, args.masks_without_dov.is_some())?;
     // A typing error in the last variant is found before the first is trained.
     for row in &rows {

@@ -15,7 +15,7 @@ const ROWS: [Row; 4] = [
 ];
 
 /// The table for people.
-pub fn table() -> String {
+pub(super) fn table() -> String {
     let mut text = "\nquoted from the paper, whose scenes are others: mIoU / PSNR of the objects\n".to_owned();
     text += &format!("{:>24}", "");
     SETS.iter().for_each(|set| text += &format!(" {set:>14}"));

@@ -4,7 +4,7 @@ use crate::{Error, Result};
 
 /// Which masks a variant trains with.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Masks {
+pub(super) enum Masks {
     /// None: plain 3D Gaussian Splatting.
     None,
     /// `--masks`.
@@ -15,7 +15,7 @@ pub enum Masks {
 
 /// A variant.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Row {
+pub(super) struct Row {
     /// Name, also of its folder.
     pub name: String,
     /// Masks.
@@ -37,7 +37,7 @@ const KNOWN: [(&str, Masks, &[&str]); 8] = [
 ];
 
 /// The variants of `names` (all that can run without), then `own` ones, each `NAME=FLAGS`.
-pub fn rows(names: &[String], own: &[String], has_without_dov: bool) -> Result<Vec<Row>> {
+pub(super) fn rows(names: &[String], own: &[String], has_without_dov: bool) -> Result<Vec<Row>> {
     let known = |&(name, masks, flags): &(&str, Masks, &[&str])| Row {
         name: name.to_owned(),
         masks,

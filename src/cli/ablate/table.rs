@@ -19,7 +19,7 @@ const COLUMNS: [Column; 10] = [
 ];
 
 /// The table for people.
-pub fn table(rows: &[(&str, &[Outcome])]) -> String {
+pub(super) fn table(rows: &[(&str, &[Outcome])]) -> String {
     let several = rows.iter().any(|(_, runs)| runs.len() > 1);
     let width = if several { 17 } else { 12 };
     let mut text = format!("{:>24}", "variant");

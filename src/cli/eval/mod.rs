@@ -6,8 +6,7 @@ mod own;
 mod table;
 mod watch;
 
-pub use args::EvalArgs;
-pub use own::read_outline;
+pub(crate) use args::EvalArgs;
 pub(super) use own::score;
 
 use super::context::Context;
@@ -16,7 +15,7 @@ use crate::Result;
 use crate::io::atomic::write_json;
 
 /// Scores a model.
-pub fn run(args: &EvalArgs, context: &Context) -> Result<()> {
+pub(crate) fn run(args: &EvalArgs, context: &Context) -> Result<()> {
     match args.protocol {
         Some(protocol) => bench::run(protocol, args, context),
         None => own::run(args, context),

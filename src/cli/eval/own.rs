@@ -74,7 +74,7 @@ impl AmodalTruth for Folders {
 }
 
 /// The whole outline of an object in a view: `ID/NAME.png`, sized like the view by nearest pixels.
-pub fn read_outline(folder: &Path, id: u32, view: &View) -> Result<Option<Vec<bool>>> {
+pub(crate) fn read_outline(folder: &Path, id: u32, view: &View) -> Result<Option<Vec<bool>>> {
     let Some(file) = file_of(folder, id, view) else { return Ok(None) };
     let map = read_mask(&file)?;
     Ok(Some(at_view(view, (map.width, map.height), |index| map.ids[index] != 0)))

@@ -30,7 +30,7 @@ pub struct CheckArgs {
 }
 
 /// Reports on the masks; fails if anything is wrong with them.
-pub fn run(args: &CheckArgs, context: &Context) -> Result<()> {
+pub(crate) fn run(args: &CheckArgs, context: &Context) -> Result<()> {
     let dataset = open_photos(&args.scene, args.read)?;
     let report = inspect(&dataset, &args.masks)?;
     let mut counts: BTreeMap<Problem, usize> = BTreeMap::new();

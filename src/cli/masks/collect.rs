@@ -30,7 +30,7 @@ pub struct CollectArgs {
 }
 
 /// Writes a mask per photo of the video, with the ids of its frame.
-pub fn run(args: &CollectArgs, context: &Context) -> Result<()> {
+pub(crate) fn run(args: &CollectArgs, context: &Context) -> Result<()> {
     let video = Frames::read(&args.frames)?;
     if !args.tracked.is_dir() {
         return Err(Error::data(&args.tracked, "", "there is no such folder of tracked masks"));

@@ -41,7 +41,7 @@ pub struct ImportArgs {
 }
 
 /// Imports the masks.
-pub fn run(args: &ImportArgs, context: &Context) -> Result<()> {
+pub(crate) fn run(args: &ImportArgs, context: &Context) -> Result<()> {
     let dataset = open_photos(&args.scene, args.read)?;
     let options = ImportOptions {
         folder: args.folder.clone(),

@@ -1,11 +1,11 @@
 //! `labelgs masks`: what is done with masks before training.
 
-pub mod check;
-pub mod collect;
-pub mod import;
-pub mod repair;
-pub mod spoil;
-pub mod track;
+pub(crate) mod check;
+pub(crate) mod collect;
+pub(crate) mod import;
+pub(crate) mod repair;
+pub(crate) mod spoil;
+pub(crate) mod track;
 
 use super::context::Context;
 use crate::cli::args::ReadArgs;
@@ -51,7 +51,7 @@ pub enum MasksVerb {
 }
 
 /// Does it.
-pub fn run(args: &MasksArgs, context: &Context) -> Result<()> {
+pub(crate) fn run(args: &MasksArgs, context: &Context) -> Result<()> {
     match &args.verb {
         MasksVerb::Import(args) => import::run(args, context),
         MasksVerb::Check(args) => check::run(args, context),

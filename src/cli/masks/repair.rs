@@ -56,7 +56,7 @@ pub struct RepairArgs {
 }
 
 /// Makes masks of all views agree with each other.
-pub fn run(args: &RepairArgs, context: &Context) -> Result<()> {
+pub(crate) fn run(args: &RepairArgs, context: &Context) -> Result<()> {
     atomic::require_empty("--output", &args.output)?;
     let model = open_model(&args.model)?;
     let dataset = open_scene(&args.scene, &args.reading, Some(args.masks.clone()), [0.0; 3], true)?;

@@ -37,7 +37,7 @@ pub struct SpoilArgs {
 }
 
 /// Writes masks with faults on purpose.
-pub fn run(args: &SpoilArgs, context: &Context) -> Result<()> {
+pub(crate) fn run(args: &SpoilArgs, context: &Context) -> Result<()> {
     if !(0.0..=1.0).contains(&args.share) {
         return Err(Error::usage("--share", format!("is {}, needs 0 to 1", args.share)));
     }

@@ -36,7 +36,7 @@ pub struct TrackArgs {
 }
 
 /// Writes the frames with ids that agree.
-pub fn run(args: &TrackArgs, context: &Context) -> Result<()> {
+pub(crate) fn run(args: &TrackArgs, context: &Context) -> Result<()> {
     atomic::require_empty("--output", &args.output)?;
     let names = pngs(&args.segmented)?;
     let frames: Vec<LabelMap> = names.iter().map(|name| read_mask(args.segmented.join(name))).collect::<Result<_>>()?;

@@ -54,7 +54,7 @@ pub struct OcclusionArgs {
 }
 
 /// Finds the occluders of all views with masks.
-pub fn run(args: &OcclusionArgs, context: &Context) -> Result<()> {
+pub(crate) fn run(args: &OcclusionArgs, context: &Context) -> Result<()> {
     let options = LoadOptions {
         masks: Some(args.masks.clone()),
         max_resolution: args.max_resolution,

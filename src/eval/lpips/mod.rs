@@ -4,8 +4,8 @@
 //! a pixel are scaled to length 1; the squared difference of each channel is weighted, summed over channels, averaged
 //! over pixels, and summed over stages.
 
-pub mod convolution;
-pub mod weights;
+pub(crate) mod convolution;
+pub(crate) mod weights;
 
 use crate::error::{Error, Result};
 use crate::eval::protocol::score::Distance;

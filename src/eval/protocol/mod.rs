@@ -4,16 +4,21 @@
 //! how each is chosen. [`run`] chooses and scores, [`report`] averages. Nothing is left out in silence: an object that
 //! cannot be chosen and a frame that cannot be rendered count as 0 and are listed.
 
-pub mod bench;
+pub(crate) mod bench;
 mod binary;
 mod labelgs;
 mod lerf_mask;
 mod nvos;
-pub mod paint;
-pub mod report;
-pub mod run;
-pub mod score;
+pub(crate) mod paint;
+pub(crate) mod report;
+pub(crate) mod run;
+pub(crate) mod score;
 mod select;
+
+pub use bench::Bench;
+pub use paint::{EnginePainter, Painter};
+pub use report::Report;
+pub use run::run;
 mod three_d_ovs;
 
 use crate::error::{Error, Result};

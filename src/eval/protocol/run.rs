@@ -13,7 +13,7 @@ use crate::io::truth::photo_at;
 use crate::scene::View;
 
 /// Pictures that [`run`] renders at most, but for prompts.
-pub fn picture_count(layout: &Layout) -> u64 {
+pub(crate) fn picture_count(layout: &Layout) -> u64 {
     layout.tasks.iter().map(|task| task.truths.len() as u64).sum()
 }
 

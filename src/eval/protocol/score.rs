@@ -81,7 +81,7 @@ pub struct Drawn {
 /// Scores a picture against a mask and a photo of its size. Pixels without a photo do not count. With `compat` PSNR and
 /// SSIM are those of the paper's scorer: every pixel, PSNR of the unclamped picture as the mean over channels, SSIM of
 /// 8-bit pictures with a uniform window.
-pub fn score(
+pub(crate) fn score(
     drawn: &Drawn,
     truth: &TruthMask,
     photo: &Photo,

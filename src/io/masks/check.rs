@@ -6,21 +6,21 @@ use std::collections::{BTreeMap, BTreeSet};
 
 /// Share of the border of a picture above which an object surrounds the picture. A little less than all, because the
 /// true object may itself touch the border.
-pub const INVERTED_BORDER: f64 = 0.9;
+pub(crate) const INVERTED_BORDER: f64 = 0.9;
 /// Share of a picture above which an object covers most of it. Objects of interest rarely do; their surroundings always.
-pub const INVERTED_SHARE: f64 = 0.5;
+pub(crate) const INVERTED_SHARE: f64 = 0.5;
 /// Border share up to which the same id in the other masks counts as not surrounding them.
-pub const INVERTED_ELSEWHERE: f64 = 0.5;
+pub(crate) const INVERTED_ELSEWHERE: f64 = 0.5;
 /// A mask with less than this part of the usual labelled area is nearly empty: distance and the edge of the picture
 /// change areas by a few times, lost tracks leave nothing or specks.
-pub const EMPTY_MASK: f64 = 0.05;
+pub(crate) const EMPTY_MASK: f64 = 0.05;
 /// The same for one object. Lower, because an object may truly show a sliver from behind another.
-pub const EMPTY_OBJECT: f64 = 0.005;
+pub(crate) const EMPTY_OBJECT: f64 = 0.005;
 /// Masks that must show an object before one of them is compared with their median.
-pub const VIEWS_FOR_MEDIAN: usize = 4;
+pub(crate) const VIEWS_FOR_MEDIAN: usize = 4;
 /// Share of the picture that both neighbours must show of an object for its absence between them to count; less may
 /// truly vanish.
-pub const BLINK_SHARE: f64 = 0.002;
+pub(crate) const BLINK_SHARE: f64 = 0.002;
 
 /// What can be wrong.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]

@@ -3,7 +3,7 @@
 //! Our own form is one grey PNG per photo, named like the photo, whose value is the id, with a `labels.json`
 //! ([`super::label_table`]). [`import`] makes it from what [`Format`] lists; [`inspect`] reports on it.
 
-pub mod check;
+pub(crate) mod check;
 mod content;
 mod detect;
 mod folder;
@@ -11,6 +11,7 @@ mod import;
 mod inspect;
 mod pred;
 
+pub use check::{Finding, Problem};
 pub use import::{Imported, Overlaps, import};
 pub use inspect::{Report, inspect};
 

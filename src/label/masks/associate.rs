@@ -13,7 +13,7 @@ const SEEN: f64 = 0.25;
 /// Share of it that must lie in one mask for the mask to own it.
 const OWNED: f64 = 0.5;
 /// Overlap of two groups of masks above which they are one object.
-pub const SAME_OBJECT: f64 = 0.25;
+pub(crate) const SAME_OBJECT: f64 = 0.25;
 
 /// Which mask of a view owns each Gaussian.
 #[derive(Clone, Debug, Default, PartialEq)]

@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 type Point = (i64, i64);
 
 /// Where an object's pixels are.
-pub struct Outline {
+pub(super) struct Outline {
     /// Corners, counter-clockwise for y up.
     hull: Vec<Point>,
     sum: Point,
@@ -33,7 +33,7 @@ fn half(points: impl Iterator<Item = Point>) -> Vec<Point> {
 
 impl Outline {
     /// The outlines of all objects, by id.
-    pub fn of_all(labels: &LabelMap) -> BTreeMap<u16, Self> {
+    pub(super) fn of_all(labels: &LabelMap) -> BTreeMap<u16, Self> {
         // The leftmost and the rightmost pixel of each row span the hull.
         let mut rows: BTreeMap<u16, BTreeMap<i64, (i64, i64)>> = BTreeMap::new();
         let mut sums: BTreeMap<u16, (Point, i64)> = BTreeMap::new();
@@ -57,13 +57,13 @@ impl Outline {
     }
 
     /// The pixel nearest to the mean of all pixels.
-    pub fn mean(&self) -> (i64, i64) {
+    pub(super) fn mean(&self) -> (i64, i64) {
         let round = |sum: i64| (2 * sum + self.count) / (2 * self.count);
         (round(self.sum.0), round(self.sum.1))
     }
 
     /// True for a pixel in the hull or on its edge. A hull without area holds nothing.
-    pub fn contains(&self, pixel: (i64, i64)) -> bool {
+    pub(super) fn contains(&self, pixel: (i64, i64)) -> bool {
         let corners = self.hull.len();
         corners > 2 && (0..corners).all(|at| area(self.hull[at], self.hull[(at + 1) % corners], pixel) >= 0)
     }

@@ -6,14 +6,15 @@
 
 mod contour;
 mod depths;
-mod draw;
+pub(crate) mod draw;
 mod hull;
-mod mean;
+pub(crate) mod mean;
 
 pub use contour::{Rule, by_contour};
 pub use depths::from_depths;
-pub use draw::picture;
-pub use mean::{by_mean, distances};
+pub(crate) use draw::picture;
+pub use mean::by_mean;
+pub(crate) use mean::distances;
 
 use crate::scene::LabelMap;
 use std::collections::BTreeMap;

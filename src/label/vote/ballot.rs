@@ -15,7 +15,7 @@ use std::collections::{BTreeMap, BTreeSet};
 /// Labels that one walk over a tile counts (glsl/lift/vote.comp).
 const LABELS_PER_WALK: usize = 4;
 /// Most labels that a sweep counts at once; more take more sweeps. Bounds memory at 128 bytes a Gaussian.
-pub const COLUMNS_MAX: u32 = 16;
+pub(crate) const COLUMNS_MAX: u32 = 16;
 
 /// A view that votes.
 #[derive(Clone, Copy, Debug)]
@@ -48,7 +48,7 @@ pub struct Sweep {
 
 /// Votes for one Gaussian: columns in order, with sums of blending weights, [`VOTE_ONE`] to a pixel of weight 1. Columns
 /// without votes are left out: of thousands of objects a Gaussian meets a few.
-pub type Row = [(u16, u64)];
+pub(crate) type Row = [(u16, u64)];
 
 /// What all views together say.
 #[derive(Clone, Debug, PartialEq)]
@@ -96,7 +96,7 @@ impl Ballot {
 }
 
 /// Columns to make room for in an engine that is to count votes for `objects` objects.
-pub fn columns_for(objects: usize) -> u32 {
+pub(crate) fn columns_for(objects: usize) -> u32 {
     (objects as u32 + 1).min(COLUMNS_MAX)
 }
 
@@ -172,6 +172,6 @@ fn most_labels(columns: &[u32], width: u32, tile_width: u32, tile_height: u32) -
 }
 
 /// Blending weight in pixels of a number of votes.
-pub fn weight(votes: u64) -> f64 {
+pub(crate) fn weight(votes: u64) -> f64 {
     votes as f64 / f64::from(VOTE_ONE)
 }

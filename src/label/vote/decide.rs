@@ -123,14 +123,14 @@ pub fn trust(views: &[Agreement]) -> Vec<BTreeMap<u16, f32>> {
 }
 
 /// Puts a decision into a model.
-pub fn apply(model: &mut Gaussians, decision: Decision) {
+pub(crate) fn apply(model: &mut Gaussians, decision: Decision) {
     model.labels = Some(decision.labels);
     model.label_confidence = Some(decision.confidence);
 }
 
 /// Counts the votes of `voters` for the engine's model and decides. With the labels that the model has, `judges`, masks
 /// that disagree with them count less ([`trust`]). Nothing may be in flight.
-pub fn count(
+pub(crate) fn count(
     engine: &mut Engine,
     voters: &[Voter],
     judges: Option<&[u32]>,

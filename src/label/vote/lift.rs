@@ -16,7 +16,14 @@ pub struct Lift {
 /// Writes the labels of one view's mask into the main Gaussians of its pixels; whatever was there before is lost. Within
 /// the view the heavier weight wins, then the larger label. `camera` is [relative](Camera::relative_to) to the origin of
 /// `means`.
-pub fn lift(labels: &mut [u32], means: &[[f32; 3]], camera: &Camera, rendered: &Rendered, mask: &LabelMap, how: Lift) {
+pub(crate) fn lift(
+    labels: &mut [u32],
+    means: &[[f32; 3]],
+    camera: &Camera,
+    rendered: &Rendered,
+    mask: &LabelMap,
+    how: Lift,
+) {
     let mut best = vec![(0.0_f32, UNLABELLED); labels.len()];
     for ((&top, &weight), &id) in rendered.top_id.iter().zip(&rendered.top_weight).zip(&mask.ids) {
         let Ok(row) = usize::try_from(top) else { continue };

@@ -95,25 +95,26 @@ pub struct BufferDecl {
 /// Each row is `NAME "name": element_bytes, domain, class, texel, "doc";`. The plain form yields the constants
 /// `Buf::NAME` and `pub static TABLE: &[BufferDecl]` (only this crate can use it, as `Buf` is its type); the form
 /// that starts with `consts;` yields free constants `NAME` instead, for tables of tests. A row may have a `#[cfg]`.
+#[doc(hidden)]
 #[macro_export]
 macro_rules! buffers {
     (consts; $($(#[$gate:meta])? $ident:ident $name:literal : $bytes:expr, $domain:expr, $class:expr, $texel:expr, $doc:literal;)*) => {
         $crate::buffers!(@table $($(#[$gate])? $ident $name : $bytes, $domain, $class, $texel, $doc;)*);
         $($(#[$gate])? #[doc = $doc] #[allow(dead_code)]
-        pub const $ident: $crate::scheduler::plan::Buf = $crate::scheduler::plan::Buf(BufferIndex::$ident as u16);)*
+        pub const $ident: $crate::internals::scheduler::plan::Buf = $crate::internals::scheduler::plan::Buf(BufferIndex::$ident as u16);)*
     };
     (@table $($(#[$gate:meta])? $ident:ident $name:literal : $bytes:expr, $domain:expr, $class:expr, $texel:expr, $doc:literal;)*) => {
         #[allow(non_camel_case_types, clippy::upper_case_acronyms, dead_code)]
         enum BufferIndex { $($(#[$gate])? $ident),* }
         /// The rows of the table of buffers, in the order of their declaration.
-        pub static TABLE: &[$crate::scheduler::plan::BufferDecl] = &[$($(#[$gate])? $crate::scheduler::plan::BufferDecl {
+        pub static TABLE: &[$crate::internals::scheduler::plan::BufferDecl] = &[$($(#[$gate])? $crate::internals::scheduler::plan::BufferDecl {
             name: $name, element_bytes: $bytes, domain: $domain, class: $class, texel: $texel, doc: $doc,
         }),*];
     };
     ($($(#[$gate:meta])? $ident:ident $name:literal : $bytes:expr, $domain:expr, $class:expr, $texel:expr, $doc:literal;)*) => {
         $crate::buffers!(@table $($(#[$gate])? $ident $name : $bytes, $domain, $class, $texel, $doc;)*);
-        impl $crate::scheduler::plan::Buf {
-            $($(#[$gate])? #[doc = $doc] pub const $ident: $crate::scheduler::plan::Buf = $crate::scheduler::plan::Buf(BufferIndex::$ident as u16);)*
+        impl $crate::internals::scheduler::plan::Buf {
+            $($(#[$gate])? #[doc = $doc] pub const $ident: $crate::internals::scheduler::plan::Buf = $crate::internals::scheduler::plan::Buf(BufferIndex::$ident as u16);)*
         }
     };
 }

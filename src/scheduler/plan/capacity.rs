@@ -2,13 +2,13 @@
 
 /// What the user can do, by what decides a domain: `{fits}` and `{name}` stand for the number that fits, and of what.
 mod cures {
-    pub const MODEL: &str = "lower --max-gaussians to {fits} or use another device";
-    pub const VOTES: &str = "at most {fits} {name} fit; lower --max-gaussians or use another device";
-    pub const PAIRS: &str =
+    pub(super) const MODEL: &str = "lower --max-gaussians to {fits} or use another device";
+    pub(super) const VOTES: &str = "at most {fits} {name} fit; lower --max-gaussians or use another device";
+    pub(super) const PAIRS: &str =
         "at most {fits} {name} fit; lower --max-gaussians or --max-resolution, or use another device";
-    pub const IMAGE: &str = "at most {fits} {name} fit; lower --max-resolution or use another device";
-    pub const LAYERS: &str = "at most {fits} {name} fit; lower --label-samples or use another device";
-    pub const NONE: &str = "use another device";
+    pub(super) const IMAGE: &str = "at most {fits} {name} fit; lower --max-resolution or use another device";
+    pub(super) const LAYERS: &str = "at most {fits} {name} fit; lower --label-samples or use another device";
+    pub(super) const NONE: &str = "use another device";
 }
 
 /// Declares a table of domains and the capacities that count them.
@@ -126,6 +126,7 @@ impl Capacity {
 #[cfg(test)]
 mod tests {
     /// A domain of another table: what a row says is all that there is to say.
+    #[allow(unreachable_pub, reason = "the macro makes a public table")]
     mod shelves {
         use super::super::cures;
 

@@ -8,7 +8,7 @@ use super::{GUARD_BYTES, Plan, PlanOptions};
 use crate::error::{Error, Result};
 
 /// Bytes of the staging memory through which the host reaches device memory: one half up, one half down.
-pub const STAGING_BYTES: u64 = 8 << 20;
+pub(crate) const STAGING_BYTES: u64 = 8 << 20;
 
 /// Elements and bytes of one copy of a buffer.
 #[derive(Clone, Copy, Debug)]
@@ -23,7 +23,7 @@ pub(super) fn sizes(table: &'static [BufferDecl], capacity: &Capacity) -> Result
 }
 
 /// Bytes of one copy of a buffer; room for at least one element, as Vulkan knows no empty buffers.
-pub fn bytes_of(decl: &BufferDecl, capacity: &Capacity) -> Result<u64> {
+pub(crate) fn bytes_of(decl: &BufferDecl, capacity: &Capacity) -> Result<u64> {
     if decl.element_bytes == 0 || !decl.element_bytes.is_multiple_of(4) {
         let (name, bytes) = (decl.name, decl.element_bytes);
         return Err(Error::Bug(format!("elements of buffer {name} have {bytes} bytes, a multiple of 4 expected")));
@@ -41,13 +41,13 @@ pub fn bytes_of(decl: &BufferDecl, capacity: &Capacity) -> Result<u64> {
 }
 
 /// Bytes allocated for one copy of a buffer that has memory of its own.
-pub fn allocated_bytes(bytes: u64, options: PlanOptions, alignment: u64) -> u64 {
+pub(crate) fn allocated_bytes(bytes: u64, options: PlanOptions, alignment: u64) -> u64 {
     (bytes + if options.guards { GUARD_BYTES } else { 0 }).next_multiple_of(alignment)
 }
 
 /// Bytes allocated for one copy of a buffer with memory of its own; nothing where it has no elements, so that what a run
 /// does not need costs nothing. No list may bind such a buffer.
-pub fn own_bytes(decl: &BufferDecl, capacity: &Capacity, options: PlanOptions, alignment: u64) -> Result<u64> {
+pub(crate) fn own_bytes(decl: &BufferDecl, capacity: &Capacity, options: PlanOptions, alignment: u64) -> Result<u64> {
     let bytes = bytes_of(decl, capacity)?;
     Ok(if capacity.count(decl.domain) == 0 { 0 } else { allocated_bytes(bytes, options, alignment) })
 }
@@ -153,7 +153,7 @@ fn unaliased(plan: &Plan) -> u64 {
 }
 
 /// Sizes of pages that hold every one of several arenas.
-pub fn merge_pages<'a>(arenas: impl Iterator<Item = &'a [u64]>) -> Vec<u64> {
+pub(crate) fn merge_pages<'a>(arenas: impl Iterator<Item = &'a [u64]>) -> Vec<u64> {
     let mut merged: Vec<u64> = Vec::new();
     for pages in arenas {
         merged.resize(merged.len().max(pages.len()), 0);

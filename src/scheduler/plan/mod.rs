@@ -4,23 +4,24 @@
 //! ([`Plan::report`]) and is tested without a GPU. The same input gives the same plan, byte for byte.
 
 mod arena;
-pub mod barrier;
-pub mod buffers;
-pub mod capacity;
+pub(crate) mod barrier;
+pub(crate) mod buffers;
+pub(crate) mod capacity;
 mod check;
 mod lifetime;
-pub mod memory;
-pub mod pass;
+pub(crate) mod memory;
+pub(crate) mod pass;
 mod report;
 mod stage;
 mod table;
 
-pub use crate::gpu::PlanLimits as Limits;
-pub use barrier::{Barrier, Touch, Use, Uses};
+pub use crate::gpu::limits::PlanLimits as Limits;
+pub use barrier::Use;
+pub(crate) use barrier::{Barrier, Touch, Uses};
 pub use buffers::{Buf, BufferDecl, Class, TexelFormat};
 pub use capacity::{Capacity, Domain};
-pub use lifetime::Life;
-pub use memory::{MemoryReport, MemoryRow};
+pub(crate) use lifetime::Life;
+pub use memory::MemoryReport;
 pub use pass::{Grid, PassDecl, PassList, Work};
 pub use stage::Stage;
 pub use table::TABLE;
@@ -29,10 +30,10 @@ use crate::error::{Error, Result};
 use crate::shaders::BindingKind;
 
 /// Steps in flight, and so copies of what the host shares with them.
-pub const FRAMES_IN_FLIGHT: usize = 2;
+pub(crate) const FRAMES_IN_FLIGHT: usize = 2;
 
 /// Bytes of the guard after each buffer in test mode.
-pub const GUARD_BYTES: u64 = 256;
+pub(crate) const GUARD_BYTES: u64 = 256;
 
 /// Choices of a plan.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -9,7 +9,7 @@ use crate::train::TrainConfig;
 
 /// The strategy of 3DGS. All of it follows from the step and the configuration.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct DefaultStrategy;
+pub(crate) struct DefaultStrategy;
 
 impl Strategy for DefaultStrategy {
     fn name(&self) -> &'static str {
@@ -59,7 +59,7 @@ fn uniforms(at: At, step: StepUniforms) -> StepUniforms {
 }
 
 /// Step at which densification ends.
-pub fn densify_until(config: &TrainConfig) -> u32 {
+pub(crate) fn densify_until(config: &TrainConfig) -> u32 {
     /// Steps of densification that a short run needs.
     const LEAST: u32 = 1000;
     config.densify_until.unwrap_or((config.iterations / 2).max(config.densify_from.saturating_add(LEAST)))
@@ -71,7 +71,7 @@ pub fn densifies_at(config: &TrainConfig, step: u32) -> bool {
 }
 
 /// True where a densification at `step` also prunes by size.
-pub fn prunes_large_at(config: &TrainConfig, step: u32) -> bool {
+pub(crate) fn prunes_large_at(config: &TrainConfig, step: u32) -> bool {
     config.opacity_reset_interval > 0 && step > config.opacity_reset_interval
 }
 

@@ -1,11 +1,11 @@
 //! What happens to the Gaussians besides the optimiser: when, and what. [`DefaultStrategy`] is that of 3DGS; others
 //! implement [`Strategy`], and go into a [`TrainerOptions`](super::TrainerOptions).
 
-pub mod default;
-mod population;
+pub(crate) mod default;
+pub(crate) mod population;
 
-pub use default::DefaultStrategy;
-pub use population::{Bound, Densified, Population};
+pub(crate) use default::DefaultStrategy;
+pub(crate) use population::{Bound, Densified, Population};
 
 use super::TrainConfig;
 use crate::error::Result;

@@ -17,7 +17,7 @@ pub struct Densified {
 
 /// The most Gaussians that there may be.
 #[derive(Clone, Copy, Debug)]
-pub struct Bound {
+pub(crate) struct Bound {
     /// As the user or the device has it.
     pub most: u64,
     /// Memory has bounded the number of Gaussians, which was said.

@@ -42,7 +42,7 @@ const fn bounds(element: f64, whole: f64) -> GradientBounds {
 }
 
 /// A step that has run, with every buffer still there.
-pub struct Ran {
+pub(super) struct Ran {
     fixture: Fixture,
     report: Report,
     splats: Vec<Splat>,
@@ -51,7 +51,7 @@ pub struct Ran {
 
 impl Ran {
     /// Runs a step with labels, without an update, to be compared with the reference under `rules`.
-    pub fn new(rules: &Rules, gpu: &Arc<Gpu>, kernels: KernelShape) -> Result<Self> {
+    pub(super) fn new(rules: &Rules, gpu: &Arc<Gpu>, kernels: KernelShape) -> Result<Self> {
         let shape = Shape { gaussians: 150, width: 61, height: 45, opacities: (-4.0, 7.0), ..Shape::default() };
         let mut fixture = Fixture::new(Arc::clone(gpu), scene(62, &shape), true, kernels, readable())?;
         // The paper's rule would change labels from step to step.
@@ -67,7 +67,7 @@ impl Ran {
     }
 
     /// Visible Gaussians come front to back, equals in the order of their rows.
-    pub fn order(&mut self) -> Result<Verdict> {
+    pub(super) fn order(&mut self) -> Result<Verdict> {
         let visible = self.splats.len();
         let count = self.fixture.scene.gaussians.len();
         let keys = self.fixture.get::<u32>(Buf::DEPTH_KEYS, count)?;
@@ -83,7 +83,7 @@ impl Ran {
     }
 
     /// Centres, conics, opacities and colours of splats.
-    pub fn projection(&mut self) -> Result<Verdict> {
+    pub(super) fn projection(&mut self) -> Result<Verdict> {
         let (model, camera) = (self.fixture.model(), self.fixture.scene.camera.clone());
         let projected = |s: &Splat| project_forward(&self.rules, &camera, &model, s.gaussian);
         let expected: Vec<Splat> = self.splats.iter().map(|s| projected(s).map_or(*s, |p| p.splat)).collect();
@@ -96,7 +96,7 @@ impl Ran {
     }
 
     /// Every tile in which a splat counts is in its list, and the lists are sorted.
-    pub fn tiles(&mut self) -> Result<Verdict> {
+    pub(super) fn tiles(&mut self) -> Result<Verdict> {
         let pairs = self.report.counters.instance_count as usize;
         let (keys, _) = self.fixture.sorted_pairs(pairs)?;
         let owners = self.fixture.sorted_splats(pairs)?;
@@ -125,7 +125,7 @@ impl Ran {
     }
 
     /// Colours and transmittance.
-    pub fn blend(&mut self) -> Result<Verdict> {
+    pub(super) fn blend(&mut self) -> Result<Verdict> {
         let image = self.pixels()?;
         let expected =
             blend_forward(&self.rules, &self.splats, self.fixture.size(), self.fixture.scene.target.background);
@@ -133,7 +133,7 @@ impl Ran {
     }
 
     /// L1, SSIM, and their gradient by the picture.
-    pub fn loss(&mut self) -> Result<Verdict> {
+    pub(super) fn loss(&mut self) -> Result<Verdict> {
         let image: Vec<[f64; 3]> = self.pixels()?.iter().map(|&[r, g, b, _]| [r, g, b].map(f64::from)).collect();
         let v_image = self.fixture.get::<[f32; 4]>(Buf::V_IMAGE, image.len())?;
         let photo = &self.fixture.scene.target.photo;
@@ -149,7 +149,7 @@ impl Ran {
     }
 
     /// Gradients of the splats by a step without object layers, from the device's own picture gradient.
-    pub fn blend_backward(&mut self) -> Result<Verdict> {
+    pub(super) fn blend_backward(&mut self) -> Result<Verdict> {
         let layers = std::mem::take(&mut self.fixture.input.layers);
         self.fixture.input.labels = false;
         self.fixture.train()?;
@@ -167,7 +167,7 @@ impl Ran {
     }
 
     /// The gradient of every parameter by photo loss and label losses.
-    pub fn gradient(&mut self) -> Result<Verdict> {
+    pub(super) fn gradient(&mut self) -> Result<Verdict> {
         self.fixture.train()?;
         let (model, camera, target) =
             (self.fixture.model(), self.fixture.scene.camera.clone(), self.fixture.scene.target.clone());
@@ -182,7 +182,7 @@ impl Ran {
     }
 
     /// The same step twice: the same bits.
-    pub fn repeated(&mut self) -> Result<Verdict> {
+    pub(super) fn repeated(&mut self) -> Result<Verdict> {
         let mut bits = || -> Result<Vec<u32>> {
             self.fixture.train()?;
             let (pixels, visible) = (self.fixture.pixels(), self.splats.len());
@@ -197,7 +197,7 @@ impl Ran {
     }
 
     /// Sums of blending weights by label of the mask.
-    pub fn votes(&mut self) -> Result<Verdict> {
+    pub(super) fn votes(&mut self) -> Result<Verdict> {
         let (size, count) = (self.fixture.size(), self.fixture.scene.gaussians.len());
         let (camera, target) = (self.fixture.scene.camera.clone(), &self.fixture.scene.target);
         let ids = target.label_map.iter().map(|&id| id as u16).collect();
@@ -214,7 +214,7 @@ impl Ran {
     }
 
     /// Adam on all attributes, each of three steps from the state that the device had before it.
-    pub fn adam(&mut self) -> Result<Verdict> {
+    pub(super) fn adam(&mut self) -> Result<Verdict> {
         let count = self.fixture.scene.gaussians.len();
         let mut verdicts = Vec::new();
         self.fixture.input.update = true;
@@ -244,7 +244,7 @@ fn states(fixture: &mut Fixture, count: usize) -> Result<Vec<Optimised>> {
 
 /// More splats in one tile than some drivers run rounds of a loop (65,535). Nearly all are over one corner; those behind
 /// them all are over the opposite one, where they show only if the walk goes to its end.
-pub fn long_list(gpu: &Arc<Gpu>, kernels: KernelShape) -> Result<Verdict> {
+pub(super) fn long_list(gpu: &Arc<Gpu>, kernels: KernelShape) -> Result<Verdict> {
     const SPLATS: usize = 70_000;
     let camera = plain_camera(8, 8);
     let row = |i: usize| {

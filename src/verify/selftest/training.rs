@@ -13,7 +13,7 @@ use std::sync::Arc;
 const STEPS: u32 = 60;
 
 /// Sixty steps with labels, votes and two densifications give the same model twice, bit by bit, and a smaller loss.
-pub fn twice(gpu: &Arc<Gpu>, kernels: KernelShape) -> Result<Verdict> {
+pub(super) fn twice(gpu: &Arc<Gpu>, kernels: KernelShape) -> Result<Verdict> {
     let (first, loss) = train(gpu, kernels)?;
     let (second, _) = train(gpu, kernels)?;
     let [before, after] = loss;

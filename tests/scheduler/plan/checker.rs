@@ -1,7 +1,7 @@
 //! What a plan must be, checked by brute force and written from the rules of Vulkan, not from the planner.
 
 use super::*;
-use labelgs::scheduler::plan::{Class, Use};
+use labelgs::internals::scheduler::plan::{Class, Use};
 use rand::rngs::SmallRng;
 use rand::{Rng, SeedableRng};
 

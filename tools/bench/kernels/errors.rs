@@ -1,8 +1,8 @@
 //! How far a picture and its gradients are from those in float64.
 
 use super::mirror::Mirror;
-use labelgs::verify::reference::Row;
-use labelgs::verify::reference::model::{Group, flatten};
+use labelgs::internals::verify::reference::Row;
+use labelgs::internals::verify::reference::model::{Group, flatten};
 use serde::Serialize;
 use std::collections::BTreeMap;
 

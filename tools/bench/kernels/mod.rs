@@ -17,9 +17,11 @@ mod scenes;
 
 use super::Common;
 use super::measure::{write_json, write_text};
-use labelgs::engine::{EngineSize, capacity};
+use labelgs::engine::EngineSize;
 use labelgs::gpu::Gpu;
-use labelgs::pass::{self, KernelShape, Variant};
+use labelgs::internals::engine::capacity;
+use labelgs::internals::pass;
+use labelgs::internals::pass::{KernelShape, Variant};
 use labelgs::{Error, Result};
 use measure::SceneResult;
 use modes::{MODES, Mode, Replacements};

@@ -5,7 +5,7 @@ use super::knee;
 use super::measure::SceneResult;
 use super::modes::Mode;
 use crate::measure::table;
-use labelgs::pass::Stage;
+use labelgs::internals::pass::Stage;
 
 /// Stages with a column of their own.
 const STAGES: [Stage; 7] = [

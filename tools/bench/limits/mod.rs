@@ -12,8 +12,9 @@ use super::trained::{TEST_EVERY, plain_model, without_masks};
 use super::{Common, device};
 use ceilings::Ceilings;
 use labelgs::Result;
-use labelgs::pass::{KernelShape, Stage};
-use labelgs::synth::{self, SynthOptions};
+use labelgs::internals::pass::{KernelShape, Stage};
+use labelgs::internals::synth;
+use labelgs::synth::SynthOptions;
 use serde_json::{Value, json};
 
 /// What a stage needs.

@@ -1,0 +1,219 @@
+//! What the program, its tests and its benchmarks reach into, and no user of the library needs. Anything here may change
+//! from one version to the next.
+
+#[cfg(feature = "cli")]
+pub mod cli {
+    pub use crate::cli::main;
+    pub mod command {
+        pub use crate::cli::command::{Cli, Command, command};
+    }
+    pub mod context {
+        pub use crate::cli::context::open_model;
+    }
+    pub mod profile_compare {
+        pub use crate::cli::profile_compare::{Profile, compare};
+    }
+    pub mod scene {
+        pub use crate::cli::scene::near_plane;
+    }
+}
+pub mod edit {
+    pub mod choose {
+        pub use crate::edit::choose::{candidates, choose_labels, require_labels};
+    }
+    pub mod components {
+        pub use crate::edit::components::components;
+    }
+    pub mod rename {
+        pub use crate::edit::rename::{give_name, keep, renumber, split};
+    }
+}
+pub mod engine {
+    pub use crate::engine::growth::capacity;
+    pub use crate::engine::run::{ListKey, Report};
+}
+pub mod eval {
+    pub mod boundary {
+        pub use crate::eval::boundary::{boundary_iou, rim, rim_width};
+    }
+    pub mod crop {
+        pub use crate::eval::crop::Crop;
+    }
+    pub mod lpips {
+        pub use crate::eval::lpips::{CHANNELS, STAGES, Weights};
+        pub mod convolution {
+            pub use crate::eval::lpips::convolution::{Layer, Planes, convolve, halve};
+        }
+        pub mod weights {
+            pub use crate::eval::lpips::weights::read_tensors;
+        }
+    }
+    pub mod metrics {
+        pub use crate::eval::metrics::{Overlap, paper_score};
+    }
+    pub mod page {
+        pub use crate::eval::page::Page;
+    }
+    pub mod protocol {
+        pub mod score {
+            pub use crate::eval::protocol::score::{Distance, Drawn};
+        }
+    }
+    pub mod scores {
+        pub use crate::eval::scores::{ObjectRender, ObjectTruth};
+    }
+    pub mod ssim {
+        pub use crate::eval::ssim::{ssim_map, window};
+    }
+    pub mod ssim8 {
+        pub use crate::eval::ssim8::{ssim8, to_bytes};
+    }
+}
+pub mod io {
+    pub use crate::io::{initial_gaussians, open};
+    pub mod atomic {
+        pub use crate::io::atomic::{remove_stale, write};
+    }
+    pub mod camera_json {
+        pub use crate::io::camera_json::{CameraFile, read_camera, write_cameras};
+    }
+    pub mod checkpoint {
+        pub use crate::io::checkpoint::{Checkpoint, Plane, VERSION};
+    }
+    pub mod checkpoint_folder {
+        pub use crate::io::checkpoint_folder::{Found, keep, list, next};
+    }
+    pub mod image {
+        pub use crate::io::image::{
+            photo_size, read_grey, read_photo, read_rgba, write_exr_rgb, write_exr_y, write_png_grey8,
+            write_png_grey16, write_png_rgb8,
+        };
+    }
+    pub mod init {
+        pub use crate::io::init::{RANDOM_COUNT, initial_gaussians};
+    }
+    pub mod label_table {
+        pub use crate::io::label_table::FILE;
+    }
+    pub mod lens {
+        pub use crate::io::lens::{Distortion, Lens, Polynomial};
+    }
+    pub mod mask {
+        pub use crate::io::mask::read_mask;
+    }
+    pub mod masks {
+        pub mod check {
+            pub use crate::io::masks::check::{Look, findings};
+        }
+    }
+    pub mod model {
+        pub use crate::io::model::{read_model, write_model};
+    }
+    pub mod ply {
+        pub use crate::io::ply::read_points;
+    }
+    pub mod read {
+        pub use crate::io::read::text;
+    }
+    pub mod run_folder {
+        pub use crate::io::run_folder::{CONFIG, Lock, of_model};
+    }
+    pub mod truth {
+        pub use crate::io::truth::{files_below, read_truth};
+    }
+}
+pub mod label {
+    pub mod masks {
+        pub mod associate {
+            pub use crate::label::masks::associate::{Owners, Segment, associate};
+        }
+        pub mod repair {
+            pub use crate::label::masks::repair::{mend, name_groups, rename};
+        }
+    }
+    pub mod occlusion {
+        pub use crate::label::occlusion::draw::picture;
+        pub use crate::label::occlusion::mean::distances;
+    }
+    pub mod vote {
+        pub mod ballot {
+            pub use crate::label::vote::ballot::{Ballot, Sweep, Voter, sweep};
+        }
+        pub mod decide {
+            pub use crate::label::vote::decide::{Agreement, agreement, decide, trust};
+        }
+    }
+}
+pub mod pass {
+    #[cfg(feature = "lab")]
+    pub use crate::pass::separate_step;
+    pub use crate::pass::{
+        Builder, Extension, Hook, KernelShape, Stage, Variant, densify_apply, densify_count, opacity_reset,
+        render_view, training_step, vote_view,
+    };
+    pub mod build {
+        pub use crate::pass::build::Count;
+    }
+    pub mod scan {
+        pub use crate::pass::scan::{Total, scan, scan_visible};
+    }
+    pub mod sort {
+        pub use crate::pass::sort::{SortBuffers, sort};
+    }
+    pub mod stage {
+        pub use crate::pass::stage::stages;
+    }
+}
+pub mod run {
+    pub use crate::run::train;
+}
+pub mod scheduler {
+    pub use crate::scheduler::{ListId, Scheduler, SchedulerOptions};
+    pub mod plan {
+        pub use crate::scheduler::plan::{
+            Buf, BufferDecl, Capacity, Class, Domain, Grid, Limits, MemoryReport, Page, PassDecl, PassList, Plan,
+            PlanOptions, TABLE, TexelFormat, Use, Work,
+        };
+    }
+}
+pub mod shaders {
+    pub use crate::shaders::{ALL, Access, BindingDesc, BindingKind, LocalSize, ShaderDesc, SpecDesc};
+    pub mod constants {
+        pub use crate::shaders::constants::{
+            ALPHA_MAX, ALPHA_MIN, KEY_INVISIBLE, LOG2_ALPHA_MIN, NO_SPLAT, TRANSMITTANCE_MIN,
+        };
+        pub mod exact {
+            pub use crate::shaders::constants::exact::SH_C0;
+        }
+    }
+    pub mod structs {
+        pub use crate::shaders::structs::{Counters, StepUniforms};
+    }
+}
+pub mod synth {
+    pub use crate::synth::cameras::ring_of_cameras;
+    pub use crate::synth::trace::{Picture, alone, picture};
+    pub use crate::synth::world::World;
+    pub use crate::synth::{dataset, write};
+}
+pub mod train {
+    pub use crate::train::setup::{TrainerOptions, engine_size};
+    pub use crate::train::state::TrainState;
+    pub use crate::train::{StepReport, Trainer};
+    pub mod shared {
+        pub use crate::train::shared::{SharedLayout, SharedParameters};
+    }
+    pub mod step_input {
+        pub use crate::train::step_input::{SceneScale, label_loss};
+    }
+    pub mod strategy {
+        pub use crate::train::strategy::population::Population;
+        pub use crate::train::strategy::{At, Strategy};
+        pub mod default {
+            pub use crate::train::strategy::default::{densifies_at, resets_opacity_at};
+        }
+    }
+}
+pub mod verify {
+    pub use crate::verify::{reference, selftest};
+}
