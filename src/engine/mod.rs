@@ -51,9 +51,19 @@ pub struct Engine {
 
 impl Engine {
     /// Allocates for `size`.
+    #[doc(hidden)]
     pub fn new(gpu: Arc<Gpu>, size: EngineSize, options: SchedulerOptions) -> Result<Self> {
         let shape = KernelShape::of(gpu.capabilities());
         Self::with_shape(gpu, shape, size, options)
+    }
+
+    /// Opens an engine with `model` on the device, ready to [`render`](crate::render::render) pictures of up to the
+    /// largest of `images`, (width, height) in px.
+    pub fn of_model(gpu: Arc<Gpu>, model: &Gaussians, images: impl IntoIterator<Item = (u32, u32)>) -> Result<Self> {
+        let size = EngineSize::of_model(model, images.into_iter());
+        let mut engine = Self::new(gpu, size, SchedulerOptions::default())?;
+        engine.upload_model(model)?;
+        Ok(engine)
     }
 
     /// As [`Engine::new`], with kernels of a given shape.

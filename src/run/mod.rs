@@ -15,12 +15,13 @@ pub(crate) mod settings;
 mod steps;
 mod summary;
 
+pub use models::latest_model;
 pub use observer::{Event, Flow, Live, Observer};
 pub use occluders::OccluderFiles;
 pub use settings::{RunOptions, Settings};
 pub use summary::Summary;
 
-pub use crate::train::{LabelRule, Occlusion, TrainConfig};
+pub use crate::train::{Densified, LabelRule, Occlusion, StepReport, TrainConfig};
 
 use crate::error::Result;
 use crate::gpu::Gpu;

@@ -26,7 +26,7 @@ fn steps(out: &Path) -> Result<Vec<u32>> {
 }
 
 /// The model of the latest step in the folder of a run.
-pub(crate) fn latest_model(out: &Path) -> Result<PathBuf> {
+pub fn latest_model(out: &Path) -> Result<PathBuf> {
     steps(out)?.into_iter().max().map(|step| model_path(out, step)).ok_or_else(|| {
         Error::data(
             out,

@@ -18,7 +18,7 @@ mod votes;
 pub use config::{LabelRule, Occlusion, TrainConfig};
 pub(crate) use setup::{TrainerOptions, engine_size, start_size};
 pub(crate) use state::{TrainState, ViewFingerprint};
-pub(crate) use strategy::Densified;
+pub use strategy::Densified;
 pub(crate) use timing::StepTimes;
 
 use crate::engine::{Engine, EngineSize, InFlight, ListKey, Report, TrainInput};

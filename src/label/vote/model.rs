@@ -31,7 +31,7 @@ pub struct Counting {
 }
 
 /// An engine with a model and memory to count votes for so many labels at once ([`columns_for`]).
-pub(crate) fn vote_engine(gpu: Arc<Gpu>, model: &Gaussians, views: &[&View], columns: u32) -> Result<Engine> {
+pub fn vote_engine(gpu: Arc<Gpu>, model: &Gaussians, views: &[&View], columns: u32) -> Result<Engine> {
     let sizes = views.iter().map(|view| (view.camera.width, view.camera.height));
     // No layer is ever sampled, so no id needs a place among them.
     let labels = LabelSize { max_label: 0, layers: 0, vote_columns: columns };
@@ -42,7 +42,7 @@ pub(crate) fn vote_engine(gpu: Arc<Gpu>, model: &Gaussians, views: &[&View], col
 }
 
 /// Columns for the objects of the masks of some views.
-pub(crate) fn columns_of(views: &[&View]) -> u32 {
+pub fn columns_of(views: &[&View]) -> u32 {
     let objects: BTreeSet<u16> = views.iter().filter_map(|view| view.mask.as_ref()).flat_map(|m| m.objects()).collect();
     columns_for(objects.len())
 }

@@ -5,7 +5,8 @@ pub(crate) mod default;
 pub(crate) mod population;
 
 pub(crate) use default::DefaultStrategy;
-pub(crate) use population::{Bound, Densified, Population};
+pub use population::Densified;
+pub(crate) use population::{Bound, Population};
 
 use super::TrainConfig;
 use crate::error::Result;

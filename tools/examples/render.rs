@@ -1,0 +1,33 @@
+//! Renders a view of a scene from a model: its colours, and the label of each pixel in colours.
+//!
+//! ```sh
+//! cargo run --release --example render -- MODEL SCENE VIEW OUT.png LABELS.png
+//! ```
+
+use labelgs::engine::Engine;
+use labelgs::gpu::{Gpu, GpuOptions};
+use labelgs::io::{self, LoadOptions};
+use labelgs::render::{Format, Parts, RenderOptions, render, write_rgb};
+use labelgs::scene::label_colour;
+use std::path::Path;
+
+fn main() -> labelgs::Result<()> {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let [model, scene, view, out, labels_out] = &arguments[..] else {
+        return Err(labelgs::Error::usage("arguments", "expected: MODEL SCENE VIEW OUT.png LABELS.png"));
+    };
+    let model = io::read_model(model)?.gaussians;
+    // Poses only: photos are not decoded.
+    let scene = io::open(Path::new(scene), &LoadOptions { photos: false, ..LoadOptions::default() })?;
+    let missing = || labelgs::Error::usage("VIEW", format!("the scene has no view {view}"));
+    let camera = &scene.all().into_iter().find(|found| found.stem() == *view).ok_or_else(missing)?.camera;
+
+    let size = (camera.width, camera.height);
+    let mut engine = Engine::of_model(Gpu::new(&GpuOptions::default())?, &model, [size])?;
+    let rendered = render(&mut engine, camera, &RenderOptions { parts: Parts::MAIN, ..RenderOptions::default() })?;
+    write_rgb(Path::new(out), size, &rendered.rgb, Format::Png)?;
+
+    let map = rendered.label_map(model.labels.as_deref().unwrap_or(&vec![0; model.len()]))?;
+    let colours = map.ids.iter().map(|&id| label_colour(id.into()).map(|byte| f32::from(byte) / 255.0));
+    write_rgb(Path::new(labels_out), size, &colours.collect::<Vec<_>>(), Format::Png)
+}
