@@ -3,14 +3,19 @@
 #[path = "tools/shadergen/mod.rs"]
 mod shadergen;
 
-use std::path::PathBuf;
+use base64::{Engine, prelude::BASE64_STANDARD};
+use std::fmt::Write;
+use std::path::{Path, PathBuf};
+
+const PICTURES: &str = "src/guide/pictures";
 
 fn main() {
-    for watched in ["build.rs", "glsl", "tools/shadergen"] {
+    for watched in ["build.rs", "glsl", "tools/shadergen", PICTURES] {
         println!("cargo::rerun-if-changed={watched}");
     }
     let folder = |variable| std::env::var_os(variable).map(PathBuf::from).expect("cargo sets it");
     let (root, out) = (folder("CARGO_MANIFEST_DIR"), folder("OUT_DIR"));
+    std::fs::write(out.join("pictures.md"), pictures(&root.join(PICTURES))).expect("cargo's folder is writable");
     let lab = std::env::var_os("CARGO_FEATURE_LAB").is_some();
     if let Err(findings) = shadergen::run(&root.join("glsl"), &out, lab) {
         for finding in findings {
@@ -19,4 +24,18 @@ fn main() {
             }
         }
     }
+}
+
+/// The pictures of the guide as Markdown link definitions with the bytes inside, because rustdoc copies no files:
+/// `[photo]: data:image/png;base64,...`.
+fn pictures(folder: &Path) -> String {
+    let files = std::fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path());
+    let mut files: Vec<PathBuf> = files.filter(|path| path.extension().is_some_and(|ending| ending == "png")).collect();
+    files.sort();
+    files.iter().fold("\n".to_owned(), |mut text, file| {
+        let name = file.file_stem().unwrap_or_default().to_string_lossy();
+        let bytes = std::fs::read(file).expect("a picture of the guide");
+        let _ = writeln!(text, "[{name}]: data:image/png;base64,{}", BASE64_STANDARD.encode(bytes));
+        text
+    })
 }

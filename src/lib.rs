@@ -1,48 +1,61 @@
-//! labelgs: label-aware 3D Gaussian Splatting on Vulkan compute.
+//! Label-aware 3D Gaussian Splatting on Vulkan compute.
 //!
-//! # Floors
+//! From posed photos and object masks, labelgs trains a scene of 3D Gaussians in which every Gaussian carries the id of
+//! its object, so that objects can be listed, taken out, removed, rendered and scored. It follows *LabelGS*
+//! (arXiv 2508.19699) on *3D Gaussian Splatting* (Kerbl et al. 2023), and runs on any Vulkan 1.2 device: a graphics card,
+//! or the processor through Mesa's lavapipe. It needs no CUDA, no Python and no network.
 //!
-//! A module uses lower ones only (`tests/architecture.rs` reads the `use` lines):
+//! A made scene, a training, one object out of it, and a picture of the rest:
 //!
-//! ```text
-//! internals              what the program, tests and benchmarks reach into
-//! cli                    verbs: what is typed, what is decided
-//! verify                 the method in f64, and the device compared with it, for tests and users
-//! run                    a training from a folder of photos to a folder with a model; its observer
-//! train                  the loop over steps, and what happens between them
-//! eval     synth         scores of a model; a scene with every truth
-//! label                  labels from masks, occluders, repair of masks
-//! render   edit          pictures of a model; its labels chosen and changed, without a device
-//! engine                 a device with a model in its memory
-//! pass                   what the engine does, as lists of GPU passes; no Vulkan
-//! scheduler  io          plans lists (sizes, places, barriers) and executes them; files
-//! shaders  gpu   scene   generated interfaces; a thin layer over Vulkan; plain host data
-//! options                options that are written once: flag, key, help, default, range
-//! error    lab
+//! ```no_run
+//! use labelgs::engine::Engine;
+//! use labelgs::gpu::{Gpu, GpuOptions};
+//! use labelgs::{edit, io, render, run, synth};
+//! use std::path::Path;
+//!
+//! fn main() -> labelgs::Result<()> {
+//!     let scene = Path::new("scene");
+//!     synth::write(&synth::SynthOptions::default(), scene, &|_| Ok(()))?;
+//!
+//!     let mut request = run::Request::new(scene, "out");
+//!     request.inputs.masks = Some(scene.join("masks"));
+//!     let summary = run::train(&request, &|| Gpu::new(&GpuOptions::default()), &mut ())?;
+//!
+//!     let model = io::read_model(&summary.model)?.gaussians;
+//!     let barrel = edit::extract(&model, &[3], edit::MIN_LABEL_CONFIDENCE)?;
+//!     let rest = edit::remove(&model, &[3])?;
+//!     io::write_model("barrel.ply", &barrel)?;
+//!
+//!     let camera = io::open(scene, &io::LoadOptions::default())?.test[0].camera.clone();
+//!     let size = (camera.width, camera.height);
+//!     let mut engine = Engine::of_model(Gpu::new(&GpuOptions::default())?, &rest, [size])?;
+//!     let picture = render::render(&mut engine, &camera, &render::RenderOptions::default())?;
+//!     render::write_rgb(Path::new("rest.png"), size, &picture.rgb, render::Format::Png)
+//! }
 //! ```
 //!
-//! # Words
-//!
-//! *Gaussian*: a row of the model. *Splat*: its projection in a view. *Instance*: a (splat, tile) pair, numbered
-//! as before the sort. *Layer*: the scene (0) or one sampled object of the view. *Label*: an object's id, 0 for none.
-//! *Mask*: the visible ids of a photo. *Step*: one update of the parameters. *View*: a posed photo. A gradient is named
-//! `v_` and the value's name, first and second moments `m_` and `u_`.
-//!
-//! The paper's names: B_j is `labels[j]`, M_k a mask, U_k what [`label::occlusion`] finds, H(G, k) an object layer, GPF the
-//! test of the projected centre in `glsl/include/label_rules.glsl`.
+//! | to | start at |
+//! | --- | --- |
+//! | train, watch, pause, resume | [`run::train`], [`run::Observer`] |
+//! | read and write scenes, masks, models | [`io::open`], [`io::masks`], [`io::read_model`] |
+//! | draw pictures, depth, label maps | [`engine::Engine::of_model`], [`render::render`] |
+//! | choose, take out, change objects | [`edit`] |
+//! | label a finished model, repair masks | [`label`] |
+//! | score | [`eval`] |
+//! | read the manual | [`guide`] |
 //!
 //! # Conventions
 //!
 //! World units are the data set's. Camera axes are OpenCV's (x right, y down, z forward); pixel (0, 0) has its centre at
-//! (0.5, 0.5). Quaternions are (w, x, y, z). Opacity and scale are stored before their sigmoid and exponential.
+//! (0.5, 0.5). Quaternions are (w, x, y, z). Opacity and scale are stored before their sigmoid and exponential. Labels
+//! are ids from 1 to 65535; 0 is none. Functions return [`Result`] with one [`Error`] type and print nothing; progress and
+//! warnings go to `tracing`.
 //!
-//! # Life of a step
+//! # Features
 //!
-//! [`train::Trainer::step`] draws a view, writes its photo, masks and uniforms into one of two frames in flight and
-//! submits the list that [`pass::training_step`] declared: cull, sort by depth, project, list (splat, tile) pairs, sort them by layer and
-//! tile, blend forward, loss, blend backward, gather, project backward, Adam. Nothing is read back inside a step; its
-//! report is read when the frame comes round again. A buffer that was too small sets a sticky bit, every later pass leaves
-//! the model alone, the buffer grows, and the steps run again.
+//! `cli` (default): the program, with clap, progress bars and signals; without it the library needs none of them.
+//! `build-shaderc` (default): builds the shader compiler from source instead of linking the system's. `lab`: faults on
+//! purpose, for tests.
 #![deny(unsafe_code)]
 #![warn(unreachable_pub)]
 #![cfg_attr(
@@ -57,6 +70,7 @@ pub mod engine;
 mod error;
 pub mod eval;
 pub mod gpu;
+pub mod guide;
 #[doc(hidden)]
 pub mod internals;
 pub mod io;

@@ -9,13 +9,14 @@ const ROOT: &str = env!("CARGO_MANIFEST_DIR");
 /// Columns of the names in the table of floors.
 const NAMES: usize = 23;
 
-/// Modules by floor, the lowest first, as the head of `src/lib.rs` lists them: a module may use those of lower floors only,
+/// Modules by floor, the lowest first, as `src/guide/inside.md` lists them: a module may use those of lower floors only,
 /// and modules of one floor do not know each other.
 fn floors() -> &'static [Vec<String>] {
     static FLOORS: LazyLock<Vec<Vec<String>>> = LazyLock::new(|| {
-        let text = fs::read_to_string(Path::new(ROOT).join("src/lib.rs")).expect("lib.rs");
-        let table = text.split("```text\n").nth(1).and_then(|rest| rest.split("//! ```").next()).expect("a table");
-        let names = |line: &str| line.trim_start_matches("//! ").chars().take(NAMES).collect::<String>();
+        let text = fs::read_to_string(Path::new(ROOT).join("src/guide/inside.md")).expect("inside.md");
+        let floors = text.split("## Floors").nth(1).expect("a part about floors");
+        let table = floors.split("```text\n").nth(1).and_then(|rest| rest.split("```").next()).expect("a table");
+        let names = |line: &str| line.chars().take(NAMES).collect::<String>();
         let words = |line| names(line).split_whitespace().map(str::to_owned).collect::<Vec<_>>();
         let mut floors: Vec<Vec<String>> = table.lines().rev().map(words).collect();
         floors[0].push("lib".to_owned());
@@ -54,7 +55,7 @@ fn module(path: &Path) -> String {
 
 fn floor(module: &str) -> usize {
     let found = floors().iter().position(|modules| modules.iter().any(|name| name == module));
-    found.unwrap_or_else(|| panic!("{module} is on no floor of src/lib.rs"))
+    found.unwrap_or_else(|| panic!("{module} is on no floor of src/guide/inside.md"))
 }
 
 /// Modules of this crate that a text names, but for its tests: `crate::name` and `crate::{name, ..}`.

@@ -25,6 +25,7 @@ mod decide;
 mod densify;
 mod edits;
 mod gradient;
+mod guide;
 mod hostile;
 mod invariants;
 mod io;

@@ -1,0 +1,110 @@
+//! The commands that README.md and the guide show run as they stand, one after the other, in an empty folder. Only the
+//! long trainings are cut short.
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+const ROOT: &str = env!("CARGO_MANIFEST_DIR");
+
+/// Steps that every long training of the pages loses.
+const STEPS_LESS: u32 = 2980;
+
+/// The line of the guide at which a person runs a tracker of their own.
+const TRACKER: &str = "# your tracker reads video/frames/NNNNN.png and writes id images tracked/NNNNN.png";
+
+/// The lines of the boxes of shell commands in a page.
+fn commands(page: &Path) -> Vec<String> {
+    let text = fs::read_to_string(page).expect("a page");
+    let boxes = text.split("\n```").collect::<Vec<_>>();
+    let shell = boxes.iter().filter_map(|part| part.strip_prefix("sh\n"));
+    let lines = shell.flat_map(str::lines).filter(|line| !line.is_empty() && (!line.starts_with('#') || *line == TRACKER));
+    lines.map(str::to_owned).collect()
+}
+
+/// Pages of the guide, in its order.
+fn pages() -> Vec<PathBuf> {
+    let folder = Path::new(ROOT).join("src/guide");
+    let text = fs::read_to_string(folder.join("mod.rs")).expect("the guide");
+    let names = text.split("include_str!(\"").skip(1).filter_map(|rest| rest.split('"').next());
+    let pages: Vec<PathBuf> = names.map(|name| folder.join(name)).collect();
+    let files = fs::read_dir(&folder).expect("the guide").flatten();
+    let written = files.filter(|file| file.path().extension().is_some_and(|ending| ending == "md")).count();
+    assert_eq!(pages.len(), written, "a page that the guide does not show");
+    pages
+}
+
+/// What a tracker would leave: the masks of the photos among the frames, and the last of them for the frames between.
+fn track(folder: &Path) {
+    let text = fs::read_to_string(folder.join("video/frames.json")).expect("frames.json");
+    let frames: serde_json::Value = serde_json::from_str(&text).expect("JSON");
+    fs::create_dir(folder.join("tracked")).expect("a new folder");
+    let mut mask = None;
+    for frame in frames["frames"].as_array().expect("a list") {
+        let photo = frame["photo"].as_str().map(|photo| folder.join("scene/masks").join(photo));
+        mask = photo.or(mask);
+        let file = Path::new(frame["file"].as_str().expect("a file")).file_name().expect("a name").to_owned();
+        let ids = mask.as_ref().expect("the first frame is a photo");
+        fs::copy(ids, folder.join("tracked").join(file)).expect("a mask per photo");
+    }
+}
+
+/// A training's command with fewer steps.
+fn shortened(words: &mut Vec<String>) {
+    match words.iter().position(|word| word == "--iterations") {
+        Some(at) => {
+            let steps: u32 = words[at + 1].parse().expect("steps");
+            words[at + 1] = if steps > STEPS_LESS { steps - STEPS_LESS } else { steps }.to_string();
+        }
+        None => words.extend(["--iterations".to_owned(), "20".to_owned()]),
+    }
+}
+
+/// Runs each command of the pages once.
+fn run(pages: &[PathBuf]) {
+    if crate::support::device().is_none() {
+        return;
+    }
+    let mut done = BTreeSet::new();
+    let folder = tempfile::tempdir().expect("a folder");
+    for page in pages {
+        for line in commands(page) {
+            if !done.insert(line.clone()) {
+                continue;
+            }
+            if line == TRACKER {
+                track(folder.path());
+                continue;
+            }
+            let typed = line.split(" # ").next().expect("a command").trim();
+            let mut words: Vec<String> = typed.split_whitespace().map(str::to_owned).collect();
+            if words[0] != "labelgs" {
+                let is_known = words[0] == "cargo" || words.iter().any(|word| Path::new(ROOT).join(word).is_file());
+                assert!(is_known, "{}: no command is known for: {line}", page.display());
+                continue;
+            }
+            if words[1] == "train" {
+                shortened(&mut words);
+            }
+            let mut command = Command::new(env!("CARGO_BIN_EXE_labelgs"));
+            command.env("LABELGS_VALIDATION", "off").env("LABELGS_CACHE", folder.path().join("cache"));
+            let output = command.args(&words[1..]).current_dir(folder.path()).output().expect("it runs");
+            let said = String::from_utf8_lossy(&output.stderr);
+            // It ends with status 1 where it finds something, as it does on small objects here.
+            let is_finding = words[1] == "masks" && words[2] == "check" && output.status.code() == Some(1);
+            assert!(output.status.success() || is_finding, "{}: {line}: {}\n{said}", page.display(), output.status);
+        }
+    }
+}
+
+#[test]
+fn every_command_of_readme_and_guide_runs() {
+    run(&[vec![Path::new(ROOT).join("README.md")], pages()].concat());
+}
+
+#[test]
+fn readme_has_at_most_150_lines() {
+    let lines = fs::read_to_string(Path::new(ROOT).join("README.md")).expect("README.md").lines().count();
+    assert!(lines <= 150, "{lines} lines: what is long goes into the guide");
+}
