@@ -3,6 +3,7 @@
 use assert_cmd::Command;
 use clap::Parser;
 use labelgs::internals::cli::command::{Cli, Command as Verb, command};
+use labelgs::internals::cli::wording::flag;
 use labelgs::io::{read_model, write_model};
 use labelgs::run::Occlusion;
 use labelgs::run::Settings;
@@ -75,9 +76,9 @@ fn every_setting_has_a_flag_with_its_default() {
     for key in Settings::keys() {
         let arg =
             verb.get_arguments().find(|arg| arg.get_id() == key.name).unwrap_or_else(|| panic!("no {}", key.name));
-        assert_eq!(arg.get_long().map(|long| format!("--{long}")), Some(key.flag()));
+        assert_eq!(arg.get_long().map(|long| format!("--{long}")), Some(flag(key.name)));
         for help in [arg.get_help(), arg.get_long_help()].into_iter().flatten().map(ToString::to_string) {
-            assert!(help.contains("[default: "), "{}: {help}", key.flag());
+            assert!(help.contains("[default: "), "{}: {help}", key.name);
         }
     }
     // A link of the crate's documentation means nothing to whoever reads the help.
@@ -155,7 +156,7 @@ fn every_setting_follows_its_flag() {
     let changed = train(&all).expect("decided");
     let (texts, defaults) = (changed.texts(), Settings::default().texts());
     for key in Settings::keys() {
-        assert!(TYPED.iter().any(|(flag, _)| *flag == key.flag()), "{} is not tried", key.name);
+        assert!(TYPED.iter().any(|(name, _)| *name == flag(key.name)), "{} is not tried", key.name);
         assert_ne!(texts.get(key.name), defaults.get(key.name), "{} is out of reach", key.name);
     }
     assert_eq!(changed.train.max_gaussians, 2_500_000);
@@ -179,7 +180,7 @@ fn every_setting_of_a_file_survives_flags_that_nobody_typed() {
     for key in Settings::keys().filter(|key| key.name != "save_at") {
         let Some(default) = defaults.get(key.name) else { continue };
         let value = default.replace(['[', ']', ' '], "");
-        let flag = key.flag();
+        let flag = flag(key.name);
         let texts = train(&["--config", file, &flag, &value]).expect("decided").texts();
         let mut expected = written.texts();
         expected.insert(key.name.to_owned(), default.clone());
@@ -208,7 +209,7 @@ fn flag_before_file_before_default() {
     assert!(message.contains("line 2") && message.contains("lambda"), "{message}");
     std::fs::write(&path, "label_threshold = 3\n").expect("file");
     let error = train(&["--config", file]).expect_err("out of range");
-    assert!(error.to_string().starts_with("--label-threshold"), "{error}");
+    assert!(error.to_string().starts_with("label_threshold"), "{error}");
 }
 
 #[test]

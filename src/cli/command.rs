@@ -20,6 +20,7 @@ use super::selftest::SelftestArgs;
 use super::split_components::SplitArgs;
 use super::synth::SynthArgs;
 use super::train_args::TrainArgs;
+use super::wording::flag;
 use crate::run::Settings;
 use clap::{CommandFactory, Parser, Subcommand};
 use std::collections::BTreeMap;
@@ -139,7 +140,7 @@ fn paper_flags(defaults: &BTreeMap<String, String>) -> String {
     let paper = Settings::paper().texts();
     let changed = Settings::keys().filter_map(|key| {
         let value = paper.get(key.name).filter(|value| defaults.get(key.name) != Some(value))?;
-        Some(format!("{} {value}", key.flag()))
+        Some(format!("{} {value}", flag(key.name)))
     });
     changed.collect::<Vec<_>>().join(" ")
 }

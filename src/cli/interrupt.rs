@@ -6,6 +6,9 @@ use signal_hook::flag;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, LazyLock};
 
+/// Exit status after SIGINT.
+const INTERRUPTED: i32 = 130;
+
 /// True while the next signal ends the process at once.
 static AT_ONCE: LazyLock<Arc<AtomicBool>> = LazyLock::new(|| Arc::new(AtomicBool::new(true)));
 /// Exit status of the signal that came, or 0.
@@ -13,7 +16,7 @@ static STATUS: LazyLock<Arc<AtomicUsize>> = LazyLock::new(|| Arc::new(AtomicUsiz
 
 /// Sets the signal handlers. The order matters: the first signal is noted and arms the exit, the second one exits.
 pub(crate) fn install() -> Result<()> {
-    for (signal, status) in [(SIGINT, 130), (SIGTERM, 143)] {
+    for (signal, status) in [(SIGINT, INTERRUPTED), (SIGTERM, 143)] {
         flag::register_conditional_shutdown(signal, status, Arc::clone(&AT_ONCE))
             .and_then(|_| flag::register_usize(signal, Arc::clone(&STATUS), status as usize))
             .and_then(|_| flag::register(signal, Arc::clone(&AT_ONCE)))
@@ -27,15 +30,20 @@ pub(crate) fn note_only() {
     AT_ONCE.store(false, Ordering::SeqCst);
 }
 
-/// The exit status of a signal that came.
-pub(crate) fn status() -> Option<i32> {
+/// Returns true if a signal came.
+pub(crate) fn is_noted() -> bool {
+    STATUS.load(Ordering::SeqCst) != 0
+}
+
+/// Returns the exit status of an interrupted process: that of the signal that came, or that of SIGINT.
+pub(crate) fn status() -> i32 {
     match STATUS.load(Ordering::SeqCst) {
-        0 => None,
-        status => i32::try_from(status).ok(),
+        0 => INTERRUPTED,
+        status => i32::try_from(status).unwrap_or(INTERRUPTED),
     }
 }
 
-/// An error if a signal came.
+/// Fails if a signal came.
 pub(crate) fn check() -> Result<()> {
-    status().map_or(Ok(()), |status| Err(Error::Interrupted(status)))
+    if is_noted() { Err(Error::Interrupted) } else { Ok(()) }
 }

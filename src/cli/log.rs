@@ -1,6 +1,8 @@
 //! Messages on standard error, and a progress bar that they do not tear.
 
 use super::args::GlobalArgs;
+use super::wording;
+use crate::Error;
 use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::{IsTerminal, Write};
 use std::sync::LazyLock;
@@ -20,7 +22,8 @@ struct AboveBars;
 impl Write for AboveBars {
     fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
         // A message that nobody can read ends no work; told of the failure, the logger would panic.
-        let _ = BARS.suspend(|| std::io::stderr().write_all(bytes));
+        let text = wording::message(&String::from_utf8_lossy(bytes));
+        let _ = BARS.suspend(|| std::io::stderr().write_all(text.as_bytes()));
         Ok(bytes.len())
     }
 
@@ -51,7 +54,8 @@ pub(crate) fn start(args: &GlobalArgs) {
 }
 
 /// Prints the error that ends the process; printed even when quiet.
-pub(crate) fn final_error(error: &dyn std::fmt::Display) {
+pub(crate) fn final_error(error: &Error) {
+    let error = wording::error(error);
     BARS.suspend(|| {
         // There is nowhere to report a closed standard error.
         let _ = writeln!(std::io::stderr(), "error: {error}");

@@ -27,11 +27,13 @@ pub(crate) mod scene;
 pub(crate) mod select;
 pub(crate) mod selftest;
 pub(crate) mod split_components;
+pub(crate) mod status;
 pub(crate) mod stdout;
 pub(crate) mod synth;
 pub(crate) mod train;
 pub(crate) mod train_args;
 pub(crate) mod values;
+pub(crate) mod wording;
 
 use crate::Error;
 use clap::FromArgMatches;
@@ -65,11 +67,11 @@ pub fn main(args: impl IntoIterator<Item = OsString>) -> u8 {
         Ok(Err(Exit::Error(error))) if stdout::is_closed(&error) => 0,
         Ok(Err(Exit::Error(error))) => {
             log::final_error(&error);
-            error.exit_status()
+            status::exit_status(&error)
         }
-        Err(_) => 70,
+        Err(_) => status::BUG,
     };
-    u8::try_from(status).unwrap_or(70)
+    u8::try_from(status).unwrap_or(u8::MAX)
 }
 
 /// Why a run ended early.

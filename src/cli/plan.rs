@@ -3,8 +3,8 @@
 use super::args::JsonFlag;
 use super::context::Context;
 use super::devices::{shape_json, shape_of, shape_text};
-use super::stdout;
 use super::values::{Size, bytes, count, size};
+use super::{stdout, wording};
 use crate::engine::{Engine, EngineSize, LabelSize, capacity};
 use crate::gpu::{self, GpuOptions};
 use crate::label::vote::ballot::COLUMNS_MAX;
@@ -104,7 +104,7 @@ fn device(context: &Context) -> Result<(Option<String>, KernelShape, Limits)> {
             Ok((Some(device.name.clone()), shape_of(device), device.limits.plan))
         }
         Ok((_, None)) if options.device.is_some() => {
-            Err(Error::NoDevice("the device that was asked for cannot be used; see labelgs devices".into()))
+            Err(Error::NoDevice("the device that was asked for cannot be used; see `labelgs devices`".into()))
         }
         Err(error) if options.device.is_some() => Err(error),
         Ok((_, None)) | Err(Error::NoDevice(_)) => {
@@ -169,7 +169,7 @@ fn to_json(subject: &Subject, (memory, plan): &(MemoryReport, Plan), problem: Op
         "instances": subject.capacity.instances,
         "layer_tiles": subject.capacity.layer_tiles,
         "fits": problem.is_none(),
-        "problem": problem.map(ToString::to_string),
+        "problem": problem.map(wording::error),
         "memory": {
             "buffers": buffers.collect::<Vec<_>>(),
             "scratch_pages": memory.step_pages,

@@ -89,7 +89,7 @@ pub(crate) fn find_view<'a>(dataset: &'a Dataset, name: &str) -> Result<&'a View
     found.copied().ok_or_else(|| {
         let some: Vec<&str> = all.iter().take(8).map(|view| view.name.as_str()).collect();
         Error::usage(
-            "view",
+            "name of a view",
             format!("there is no view {name}; the scene has {} ... ({} in all)", some.join(", "), all.len()),
         )
     })

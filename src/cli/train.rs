@@ -57,7 +57,7 @@ impl Observer for Terminal<'_> {
             }
             _ => {}
         }
-        Ok(if interrupt::status().is_some() { Flow::Stop } else { Flow::Continue })
+        Ok(if interrupt::is_noted() { Flow::Stop } else { Flow::Continue })
     }
 }
 

@@ -21,11 +21,11 @@ crate::options::options! {
 }
 
 impl ReadOptions {
-    /// Refuses values that make no sense; messages name the flag.
+    /// Refuses values that make no sense; messages name the option.
     pub fn check(&self) -> Result<()> {
         if self.test_every == 1 {
-            let problem = "is 1, which leaves no view to train on; 2 or more, or --no-test";
-            return Err(Error::usage("--test-every", problem));
+            let problem = "is 1, which leaves no view to train on; expected 2 or more, or 0 to hold out none";
+            return Err(Error::usage("test_every", problem));
         }
         self.check_ranges()
     }

@@ -320,7 +320,7 @@ impl TrainConfig {
         if self.coarse_until < self.label_from { self.label_from } else { self.coarse_until.saturating_add(1) }
     }
 
-    /// Refuses values that make no sense; messages name the flag.
+    /// Refuses values that make no sense; messages name the option.
     pub fn check(&self) -> Result<()> {
         self.check_ranges()
     }

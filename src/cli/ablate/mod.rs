@@ -8,7 +8,7 @@ use super::args::JsonFlag;
 use super::context::Context;
 use super::eval::EvalArgs;
 use super::train_args::TrainFlags;
-use super::{eval, interrupt, stdout, train};
+use super::{eval, interrupt, stdout, train, wording};
 use crate::eval::scores::{MeanScores, Scores};
 use crate::io::atomic;
 use crate::run::Settings;
@@ -81,9 +81,7 @@ pub(crate) fn run(args: &AblateArgs, context: &Context) -> Result<()> {
         for seed in 0..args.seeds {
             tracing::info!("variant {}, seed {seed}", row.name);
             runs.push(one(&row, seed, args, context)?);
-            if let Some(status) = interrupt::status() {
-                return Err(Error::Interrupted(status));
-            }
+            interrupt::check()?;
         }
         outcomes.push((row, runs));
     }
@@ -109,7 +107,7 @@ fn flags(row: &Row, args: &AblateArgs) -> Result<TrainFlags> {
     if flags.train.is_typed("seed") {
         return Err(wrong("--seed is what differs between the runs of a variant; say --seeds N"));
     }
-    flags.settings(None).map_err(|error| wrong(&error.to_string()))?;
+    flags.settings(None).map_err(|error| wrong(&wording::error(&error)))?;
     Ok(flags)
 }
 

@@ -59,7 +59,7 @@ pub(crate) fn run(args: &ImportArgs, context: &Context) -> Result<()> {
         }));
     }
     let pred = done.pred.as_ref().map_or(String::new(), |pred| format!(", {}", pred.display()));
-    let mut text = format!("{}{pred}: {} ({})\n", done.source.display(), done.format.flag(), done.why);
+    let mut text = format!("{}{pred}: {} ({})\n", done.source.display(), done.format.name(), done.why);
     text += &format!(
         "{}: {} masks for {} photos, {} labels, {} bits\n",
         args.output.display(),
