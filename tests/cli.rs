@@ -97,8 +97,81 @@ fn every_setting_has_a_flag_with_its_default() {
         help.contains("where ours differ: --label-rule main --label-weight 1.0 --densify-until 40000 --opacity-reset-interval 3000"),
         "{help}"
     );
-    for heading in ["Run:", "Labels:", "Optimiser:", "Densification:", "Global:"] {
+    for heading in [
+        "Options:",
+        "Training:",
+        "Labels:",
+        "Densification:",
+        "Learning rates:",
+        "Rendering:",
+        "Scene:",
+        "Device:",
+        "Output:",
+    ] {
         assert!(help.contains(heading), "{heading} is not in\n{help}");
+    }
+}
+
+/// Commands and their own commands, each with what is typed for it.
+fn commands() -> Vec<(String, clap::Command)> {
+    let mut root = command();
+    root.build();
+    let mut found = Vec::new();
+    for verb in root.get_subcommands().filter(|verb| verb.get_name() != "help") {
+        found.push((format!("labelgs {}", verb.get_name()), verb.clone()));
+        let inner = verb.get_subcommands().filter(|inner| inner.get_name() != "help");
+        found.extend(inner.map(|inner| (format!("labelgs {} {}", verb.get_name(), inner.get_name()), inner.clone())));
+    }
+    found
+}
+
+#[test]
+fn every_help_begins_with_the_result_and_an_example() {
+    for (name, verb) in commands() {
+        let help = verb.clone().term_width(0).render_long_help().to_string();
+        let before = help.split("Usage:").next().unwrap_or_default();
+        let examples: Vec<&str> = before.lines().filter_map(|line| line.strip_prefix("Example: ")).collect();
+        assert!(help.starts_with(char::is_uppercase) && !help.starts_with("Example"), "{name}: {help}");
+        let [example] = examples[..] else { panic!("{name} has not one example:\n{help}") };
+        assert!(example.starts_with(&name), "{name}: {example}");
+        Cli::try_parse_from(example.split_whitespace()).unwrap_or_else(|error| panic!("{example}: {error}"));
+    }
+}
+
+#[test]
+fn the_first_commands_come_first() {
+    let names: Vec<String> = command().get_subcommands().map(|verb| verb.get_name().to_owned()).collect();
+    assert_eq!(names[..7], ["synth", "train", "eval", "list", "extract", "remove", "render"]);
+    let help = text(&labelgs(&["--help"]).stdout);
+    let at = |name: &str| help.find(&format!("\n  {name} ")).unwrap_or_else(|| panic!("{name} is not in\n{help}"));
+    assert!(names.windows(2).all(|pair| at(&pair[0]) < at(&pair[1])), "{help}");
+}
+
+/// A flag that several commands have stands under one heading everywhere.
+#[test]
+fn a_flag_has_one_heading() {
+    const SHARED: [&str; 11] = [
+        "allow-outside",
+        "background",
+        "config",
+        "device",
+        "json",
+        "label-table",
+        "max-bad-photos",
+        "near",
+        "quiet",
+        "test-every",
+        "verbose",
+    ];
+    for flag in SHARED {
+        let headings: BTreeSet<Option<String>> = commands()
+            .iter()
+            .flat_map(|(_, verb)| verb.get_arguments())
+            .filter(|arg| arg.get_long() == Some(flag))
+            .map(|arg| arg.get_help_heading().map(str::to_owned))
+            .collect();
+        assert_eq!(headings.len(), 1, "{flag}: {headings:?}");
+        assert!(headings.iter().all(Option::is_some), "{flag}");
     }
 }
 

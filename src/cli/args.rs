@@ -11,14 +11,14 @@ use std::path::Path;
 #[derive(Args, Clone, Debug, Default)]
 pub struct GlobalArgs {
     /// Say nothing but errors.
-    #[arg(short, long, global = true, help_heading = "Global", conflicts_with = "verbose")]
+    #[arg(short, long, global = true, help_heading = "Output", conflicts_with = "verbose")]
     pub quiet: bool,
     /// Say more; twice for everything. RUST_LOG wins.
-    #[arg(short, long, global = true, help_heading = "Global", action = clap::ArgAction::Count)]
+    #[arg(short, long, global = true, help_heading = "Output", action = clap::ArgAction::Count)]
     pub verbose: u8,
     /// Vulkan device: its number or UUID as `labelgs devices` prints them, or a part of its name; otherwise
     /// LABELGS_DEVICE, otherwise the fastest kind.
-    #[arg(long, value_name = "DEVICE", global = true, help_heading = "Global")]
+    #[arg(long, value_name = "DEVICE", global = true, help_heading = "Device")]
     pub device: Option<String>,
 }
 
@@ -26,7 +26,7 @@ pub struct GlobalArgs {
 #[derive(Args, Clone, Debug, Default)]
 pub struct JsonFlag {
     /// Print the result as JSON.
-    #[arg(id = "json_here", long = "json")]
+    #[arg(id = "json_here", long = "json", help_heading = "Output")]
     pub json: bool,
 }
 

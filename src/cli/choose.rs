@@ -43,7 +43,7 @@ pub struct PromptArgs {
     #[command(flatten)]
     pub table: TableArg,
     /// Gaussians nearer to the camera are not drawn, world units; otherwise as in the run of the model, otherwise 0.2.
-    #[arg(long, value_name = "Z", value_parser = near)]
+    #[arg(long, value_name = "Z", value_parser = near, help_heading = "Rendering")]
     pub near: Option<f32>,
 }
 
@@ -63,7 +63,7 @@ pub struct ChooseArgs {
     #[arg(long, value_name = "SCENE")]
     pub scene: Option<PathBuf>,
     /// Longest side of a view, px; otherwise that of its photo.
-    #[arg(long, value_name = "PX", value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(long, value_name = "PX", value_parser = clap::value_parser!(u32).range(1..), help_heading = "Scene")]
     pub max_resolution: Option<u32>,
     /// What is let through of the scene.
     #[command(flatten)]

@@ -39,7 +39,7 @@ pub struct DensifyArgs {
     #[arg(short, long, value_name = "DIR")]
     pub output: PathBuf,
     /// Gaussians nearer to the camera are not drawn, world units; otherwise as in the run of the model, otherwise 0.2.
-    #[arg(long, value_name = "Z", value_parser = near)]
+    #[arg(long, value_name = "Z", value_parser = near, help_heading = "Rendering")]
     pub near: Option<f32>,
     /// Frames between two photos.
     #[arg(long, value_name = "N", default_value_t = 9, value_parser = clap::value_parser!(u32).range(..=999))]
@@ -54,7 +54,7 @@ pub struct DensifyArgs {
     #[arg(long)]
     pub include_test: bool,
     /// Colour behind the scene: black, white, or R,G,B from 0 to 1.
-    #[arg(long, value_name = "COLOUR", value_parser = colour, default_value = "black")]
+    #[arg(long, value_name = "COLOUR", value_parser = colour, default_value = "black", help_heading = "Rendering")]
     pub background: [f32; 3],
     /// How the scene is read.
     #[command(flatten)]

@@ -36,31 +36,31 @@ pub struct LabelArgs {
     pub output: PathBuf,
     /// How a Gaussian gets its label: by votes, or as the paper's training gives it, from the last of the views (in an
     /// order drawn by --seed) in which it makes most of a pixel.
-    #[arg(long, value_name = "RULE", value_enum, default_value = "votes")]
+    #[arg(long, value_name = "RULE", value_enum, default_value = "votes", help_heading = "Labels")]
     pub rule: LabelRule,
     /// Seed of the order of views of the rule `main`.
-    #[arg(long, value_name = "SEED", default_value_t = 0)]
+    #[arg(long, value_name = "SEED", default_value_t = 0, help_heading = "Labels")]
     pub seed: u64,
     /// Least blending weight of the rule `main`.
-    #[arg(long, value_name = "WEIGHT", default_value_t = 0.6)]
+    #[arg(long, value_name = "WEIGHT", default_value_t = 0.6, help_heading = "Labels")]
     pub label_threshold: f32,
     /// Gaussian projection filter of the rule `main`, on or off.
-    #[arg(long, value_name = "SWITCH", value_parser = switch, default_value = "on")]
+    #[arg(long, value_name = "SWITCH", value_parser = switch, default_value = "on", help_heading = "Labels")]
     pub gpf: bool,
     /// Rounds of counting; from the second on, masks that disagree with all others count less.
-    #[arg(long, value_name = "N", default_value_t = 2, value_parser = clap::value_parser!(u32).range(1..=10))]
+    #[arg(long, value_name = "N", default_value_t = 2, value_parser = clap::value_parser!(u32).range(1..=10), help_heading = "Labels")]
     pub rounds: u32,
     /// Pixels so near to a contour of their mask have no vote, px; 2 suits masks of trackers.
-    #[arg(long, value_name = "PX", default_value_t = 0)]
+    #[arg(long, value_name = "PX", default_value_t = 0, help_heading = "Labels")]
     pub mask_border: u32,
     /// Gaussians whose label has a smaller share of their votes get none.
-    #[arg(long, value_name = "SHARE", default_value_t = 0.0)]
+    #[arg(long, value_name = "SHARE", default_value_t = 0.0, help_heading = "Labels")]
     pub min_confidence: f32,
     /// Leave Gaussians that no pixel speaks for without a label, instead of asking their neighbours.
-    #[arg(long)]
+    #[arg(long, help_heading = "Labels")]
     pub no_complete: bool,
     /// Gaussians nearer to the camera are not seen, world units; otherwise as in the run of the model, otherwise 0.2.
-    #[arg(long, value_name = "Z", value_parser = near)]
+    #[arg(long, value_name = "Z", value_parser = near, help_heading = "Rendering")]
     pub near: Option<f32>,
     /// How the scene is read; test views have no vote.
     #[command(flatten)]

@@ -19,7 +19,7 @@ use std::path::{Path, PathBuf};
 #[derive(Args, Clone, Debug, Default)]
 pub struct TableArg {
     /// Table with the names of labels; otherwise MODEL.labels.json beside the PLY, or labels.json of its run.
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", help_heading = "Labels")]
     pub label_table: Option<PathBuf>,
 }
 
@@ -52,7 +52,7 @@ pub struct EditArgs {
 #[derive(Args, Clone, Copy, Debug)]
 pub struct MinConfidenceArg {
     /// An object on its own is made of Gaussians with at least this label_confidence, if the model has any.
-    #[arg(long, value_name = "SHARE", value_parser = share, default_value_t = MIN_LABEL_CONFIDENCE)]
+    #[arg(long, value_name = "SHARE", value_parser = share, default_value_t = MIN_LABEL_CONFIDENCE, help_heading = "Labels")]
     pub min_confidence: f32,
 }
 

@@ -50,7 +50,7 @@ pub struct ProfileArgs {
     #[arg(long, value_name = "MODEL")]
     pub model: Option<PathBuf>,
     /// Settings of training in TOML, as config.toml of an earlier run. Labels start at --from-step at the latest.
-    #[arg(long, value_name = "FILE.toml")]
+    #[arg(long, value_name = "FILE.toml", help_heading = "Training")]
     pub config: Option<PathBuf>,
     /// Let passes overlap as in training: the wall clock is then the true one, times of passes are what each added.
     #[arg(long)]
@@ -63,13 +63,13 @@ pub struct ProfileArgs {
     #[command(flatten)]
     pub reading: SceneArgs,
     /// Instead compare two files that --json wrote; fail with status 1 if a stage became slower beyond noise.
-    #[arg(long, value_names = ["OLD.json", "NEW.json"], num_args = 2, conflicts_with_all = ["scene", "synthetic", "model"])]
+    #[arg(long, help_heading = "Comparison", value_names = ["OLD.json", "NEW.json"], num_args = 2, conflicts_with_all = ["scene", "synthetic", "model"])]
     pub compare: Option<Vec<PathBuf>>,
     /// With --compare: by how much a median may grow.
-    #[arg(long, value_name = "SHARE", value_parser = share, default_value_t = 0.05, requires = "compare")]
+    #[arg(long, value_name = "SHARE", value_parser = share, default_value_t = 0.05, requires = "compare", help_heading = "Comparison")]
     pub tolerance: f32,
     /// Write the numbers as JSON to FILE; without FILE print them.
-    #[arg(id = "json_file", long = "json", value_name = "FILE", num_args = 0..=1)]
+    #[arg(id = "json_file", long = "json", value_name = "FILE", num_args = 0..=1, help_heading = "Output")]
     pub json: Option<Option<PathBuf>>,
 }
 

@@ -52,10 +52,10 @@ pub struct RenderArgs {
     #[command(flatten)]
     pub prompts: PromptArgs,
     /// Kind of file.
-    #[arg(long, value_name = "FORMAT", value_enum, default_value = "png")]
+    #[arg(long, value_name = "FORMAT", value_enum, default_value = "png", help_heading = "Output")]
     pub format: Format,
     /// Colour behind the scene: black, white, or R,G,B from 0 to 1.
-    #[arg(long, value_name = "COLOUR", value_parser = colour, default_value = "black")]
+    #[arg(long, value_name = "COLOUR", value_parser = colour, default_value = "black", help_heading = "Rendering")]
     pub background: [f32; 3],
     /// How the scene is read.
     #[command(flatten)]

@@ -39,31 +39,31 @@ pub struct TrainFlags {
     pub resume: bool,
     /// Open the device again if it is lost, and go on from the newest checkpoint, as long as there is a new one each
     /// time. The pass that lost it is named, at some cost in time.
-    #[arg(long)]
+    #[arg(long, help_heading = "Device")]
     pub restart: bool,
     /// Folder of depth maps for --occlusion depth, one per photo by name: 16-bit PNG, EXR, NPY or PFM.
-    #[arg(long, value_name = "DIR", requires = "depth_kind")]
+    #[arg(long, value_name = "DIR", requires = "depth_kind", help_heading = "Labels")]
     pub depths: Option<PathBuf>,
     /// What the numbers of --depths mean.
-    #[arg(long, value_name = "KIND", value_enum, requires = "depths")]
+    #[arg(long, value_name = "KIND", value_enum, requires = "depths", help_heading = "Labels")]
     pub depth_kind: Option<DepthKind>,
     /// Occluders to use, as `labelgs occlusion` and an earlier run write them.
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["occlusion", "depths"])]
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["occlusion", "depths"], help_heading = "Labels")]
     pub occlusion_file: Option<PathBuf>,
     /// Settings in TOML, as config.toml of an earlier run; flags win over it.
-    #[arg(long, value_name = "FILE.toml")]
+    #[arg(long, value_name = "FILE.toml", help_heading = "Training")]
     pub config: Option<PathBuf>,
     /// Most memory of the device to use, such as 1500M or 2G: the number of Gaussians stays below what that holds.
-    #[arg(long, value_name = "SIZE", value_parser = bytes)]
+    #[arg(long, value_name = "SIZE", value_parser = bytes, help_heading = "Device")]
     pub memory_limit: Option<u64>,
     /// What is let through of the scene; the same has to be typed again with --resume.
     #[command(flatten)]
     pub trust: ReadArgs,
     /// Start from the settings of the LabelGS paper, where ours differ:
-    #[arg(long, conflicts_with = "config", help_heading = "Run")]
+    #[arg(long, conflicts_with = "config", help_heading = "Training")]
     pub paper: bool,
     /// Hold out nothing.
-    #[arg(long, conflicts_with = "test_every", help_heading = "Run")]
+    #[arg(long, conflicts_with = "test_every", help_heading = "Scene")]
     pub no_test: bool,
     /// How the scene is read.
     #[command(flatten)]

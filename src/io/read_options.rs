@@ -6,7 +6,7 @@ use crate::options::Options;
 crate::options::options! {
     /// What decides which pixels of a scene a run trains on, and which views are held out.
     pub struct ReadOptions {
-        "Run" {
+        "Scene" {
             /// Longest side of a photo, px; 0 keeps its size.
             ///
             /// 0 (the reference shrinks to a height of 1080). Smaller is faster and loses fine texture.

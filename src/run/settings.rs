@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 crate::options::options! {
     /// What a run writes on its way.
     pub struct RunOptions {
-        "Run" {
+        "Output" {
             /// Steps after which to save the model too, with commas between.
             #[cfg_attr(feature = "cli", arg(value_delimiter = ','))]
             save_at <"LIST">: Vec<u32> = Vec::new();

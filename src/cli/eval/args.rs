@@ -24,13 +24,13 @@ pub struct EvalArgs {
     #[arg(long, value_name = "DIR")]
     pub masks: Option<PathBuf>,
     /// Folder of whole outlines, ID/NAME.png; otherwise SCENE/amodal if it is there.
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", help_heading = "Labels")]
     pub amodal: Option<PathBuf>,
     /// Colour behind the scene: black, white, or R,G,B from 0 to 1.
-    #[arg(long, value_name = "COLOUR", value_parser = colour, default_value = "black")]
+    #[arg(long, value_name = "COLOUR", value_parser = colour, default_value = "black", help_heading = "Rendering")]
     pub background: [f32; 3],
     /// Gaussians nearer to the camera are not drawn, world units; otherwise as in the run of the model, otherwise 0.2.
-    #[arg(long, value_name = "Z", value_parser = near)]
+    #[arg(long, value_name = "Z", value_parser = near, help_heading = "Rendering")]
     pub near: Option<f32>,
     /// Which Gaussians an object rendered alone is made of.
     #[command(flatten)]
@@ -60,7 +60,7 @@ pub struct EvalArgs {
     #[arg(long, value_name = "WEIGHTS", requires = "protocol", help_heading = "Benchmarks")]
     pub lpips: Option<PathBuf>,
     /// Write truth, prediction and difference of every picture as a web page into a new folder.
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", help_heading = "Output")]
     pub page: Option<PathBuf>,
     /// Fail with status 1 if the mean PSNR is lower, dB.
     #[arg(long, value_name = "DB", help_heading = "Checks")]
@@ -72,7 +72,7 @@ pub struct EvalArgs {
     #[command(flatten)]
     pub reading: SceneArgs,
     /// Write all scores as JSON to FILE; without FILE print them.
-    #[arg(id = "json_file", long = "json", value_name = "FILE", num_args = 0..=1)]
+    #[arg(id = "json_file", long = "json", value_name = "FILE", num_args = 0..=1, help_heading = "Output")]
     pub json: Option<Option<PathBuf>>,
 }
 

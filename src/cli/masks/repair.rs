@@ -45,7 +45,7 @@ pub struct RepairArgs {
     #[arg(long)]
     pub make_missing: bool,
     /// Gaussians nearer to the camera are not seen, world units; otherwise as in the run of the model, otherwise 0.2.
-    #[arg(long, value_name = "Z", value_parser = near)]
+    #[arg(long, value_name = "Z", value_parser = near, help_heading = "Rendering")]
     pub near: Option<f32>,
     /// How the scene is read; masks of test views are left out.
     #[command(flatten)]

@@ -43,7 +43,7 @@ pub struct OcclusionArgs {
     #[arg(long, value_name = "DIR")]
     pub pictures: Option<PathBuf>,
     /// Longest side of a picture, px; otherwise its own size.
-    #[arg(long, value_name = "PX", value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(long, value_name = "PX", value_parser = clap::value_parser!(u32).range(1..), help_heading = "Scene")]
     pub max_resolution: Option<u32>,
     /// What is let through of the scene.
     #[command(flatten)]
