@@ -1,4 +1,4 @@
-//! Interrupts: at once by default; a verb that has something to save asks to be told instead.
+//! Signals. By default the first one ends the process; a command with unsaved work asks for [`note_only`].
 
 use crate::{Error, Result};
 use signal_hook::consts::{SIGINT, SIGTERM};
@@ -14,7 +14,7 @@ static AT_ONCE: LazyLock<Arc<AtomicBool>> = LazyLock::new(|| Arc::new(AtomicBool
 /// Exit status of the signal that came, or 0.
 static STATUS: LazyLock<Arc<AtomicUsize>> = LazyLock::new(|| Arc::new(AtomicUsize::new(0)));
 
-/// Sets the signal handlers. The order matters: the first signal is noted and arms the exit, the second one exits.
+/// Installs the signal handlers. Their order matters: the first signal is noted and arms the exit, the second exits.
 pub(crate) fn install() -> Result<()> {
     for (signal, status) in [(SIGINT, INTERRUPTED), (SIGTERM, 143)] {
         flag::register_conditional_shutdown(signal, status, Arc::clone(&AT_ONCE))
@@ -25,7 +25,7 @@ pub(crate) fn install() -> Result<()> {
     Ok(())
 }
 
-/// From now on the first signal is only noted; the caller looks at [`check`] often. A second one ends the process.
+/// Makes the first signal only noted; the caller polls [`check`]. A second signal ends the process.
 pub(crate) fn note_only() {
     AT_ONCE.store(false, Ordering::SeqCst);
 }

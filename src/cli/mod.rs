@@ -1,4 +1,4 @@
-//! The command line: what is typed, what is decided, and a verb per file.
+//! The command line: arguments, exit statuses, messages, and a file per command.
 
 pub(crate) mod ablate;
 pub(crate) mod args;
@@ -42,7 +42,7 @@ use context::Context;
 use std::ffi::OsString;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-/// The process: parses `args`, runs the verb, reports an error, returns the exit status.
+/// Parses `args`, runs the command, reports an error and returns the exit status.
 pub fn main(args: impl IntoIterator<Item = OsString>) -> u8 {
     std::panic::set_hook(Box::new(|panic| {
         let place = panic.location().map_or(String::new(), |place| format!(" at {}:{}", place.file(), place.line()));
@@ -60,7 +60,7 @@ pub fn main(args: impl IntoIterator<Item = OsString>) -> u8 {
     let status = match catch_unwind(AssertUnwindSafe(|| run(args))) {
         Ok(Ok(())) => 0,
         Ok(Err(Exit::Clap(error))) => {
-            // A closed pipe while help is printed is no failure.
+            // A closed pipe while help is printed is not an error.
             let _ = error.print();
             error.exit_code()
         }

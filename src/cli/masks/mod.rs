@@ -29,8 +29,8 @@ pub struct MasksArgs {
 /// The commands for masks.
 #[derive(Clone, Debug, Subcommand)]
 pub enum MasksVerb {
-    /// Report missing, misnamed, inverted and nearly empty masks, wrong sizes, and ids that come and go. Exit status 1 if there
-    /// are any.
+    /// Report missing, misnamed, inverted and nearly empty masks, wrong sizes, and ids that come and go. Exit status 1
+    /// if there are any.
     ///
     /// Example: labelgs masks check scene/masks --scene scene
     Check(check::CheckArgs),
@@ -74,7 +74,7 @@ fn open_photos(scene: &Path, read: ReadArgs) -> Result<Dataset> {
     io::open_logged(scene, &read.into_options(options))
 }
 
-/// Writes ids as grey, with 8 bits where they suffice.
+/// Writes ids as a grey PNG of 8 bits, or of 16 bits if an id needs them.
 fn write_mask(path: &Path, mask: &LabelMap) -> Result<()> {
     if mask.ids.iter().all(|&id| id <= u16::from(u8::MAX)) {
         let bytes: Vec<u8> = mask.ids.iter().map(|&id| id as u8).collect();
@@ -83,7 +83,7 @@ fn write_mask(path: &Path, mask: &LabelMap) -> Result<()> {
     write_png_grey16(path, mask.width, mask.height, &mask.ids)
 }
 
-/// Names of the PNGs of a folder, sorted.
+/// Returns the sorted names of the PNGs in a folder.
 fn pngs(folder: &Path) -> Result<Vec<String>> {
     let entries = read::folder(folder)?;
     let names = entries.iter().filter_map(|path| path.file_name()?.to_str().map(str::to_owned));
