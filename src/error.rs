@@ -1,30 +1,30 @@
-//! One error type for the whole engine, and the exit status that each kind of error becomes.
+//! One error type for the whole engine. A message names a setting by its field in backticks, such as `max_gaussians`.
 
 use std::path::{Path, PathBuf};
 
-/// What every fallible function of the crate returns.
+/// The result of every fallible function of the crate.
 pub type Result<T, E = Error> = std::result::Result<T, E>;
 
-/// Everything that can go wrong. A message names the thing, the number and the cure in one line.
+/// An error of the engine. Its message names the thing, the number and the cure in one line.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// The command line or a configuration asks for something that makes no sense.
+    /// An argument, setting or environment variable has an invalid value.
     #[error("{argument}: {problem}")]
     Usage {
-        /// Flag, field or argument.
+        /// Name of the argument, field or variable.
         argument: String,
-        /// What is wrong with it and what was expected.
+        /// What is wrong and what is expected.
         problem: String,
     },
-    /// A file holds something that cannot be used.
+    /// A file has invalid content.
     #[error("{}: {place}{}{problem}", path.display(), if place.is_empty() { "" } else { ": " })]
     Data {
         /// The file.
         path: PathBuf,
-        /// Where in the file: a byte offset, a line, a record, a property. May be empty.
+        /// Place in the file: a byte offset, a line, a record or a property. May be empty.
         place: String,
-        /// What is wrong, what was expected and what to do.
+        /// What is wrong, what is expected and what to do.
         problem: String,
     },
     /// A file could not be read.
@@ -43,7 +43,7 @@ pub enum Error {
         /// The cause.
         source: std::io::Error,
     },
-    /// No Vulkan loader, driver or device that fits.
+    /// No Vulkan loader, driver or device meets the requirements.
     #[error("no usable Vulkan device: {0}")]
     NoDevice(String),
     /// A Vulkan call failed.
@@ -51,57 +51,57 @@ pub enum Error {
     Vulkan {
         /// The call.
         call: &'static str,
-        /// What it returned.
+        /// Its result.
         result: ash::vk::Result,
     },
     /// The device was lost.
     #[error("the device was lost; the last pass known to have started is {pass}")]
     DeviceLost {
-        /// Name of the pass, or `unknown`.
+        /// Name of the last pass that is known to have started, or `unknown`.
         pass: String,
     },
-    /// A buffer does not fit the device, or its memory.
+    /// A buffer exceeds a limit of the device or its memory.
     #[error("{what} needs {needed} bytes, {limit_name} is {limit} bytes; {cure}")]
     OutOfMemory {
         /// The buffer or page.
         what: String,
-        /// Bytes asked for.
+        /// Requested size in bytes.
         needed: u64,
-        /// Name of the limit that was met.
+        /// Name of the exceeded limit.
         limit_name: String,
         /// The limit in bytes.
         limit: u64,
         /// What the user can do.
         cure: String,
     },
-    /// A loss or a parameter became infinite or not a number.
+    /// A loss or a parameter became infinite or NaN.
     #[error(
-        "numerical failure at step {step}, view {view}: {quantity}; what was saved before is whole: see `labelgs \
-         selftest`, and go on with `train --resume`, or with smaller learning rates"
+        "numerical failure at step {step}, view {view}: {quantity}; files saved before this step are intact. Check the \
+         device with the self-test, then go on from the last checkpoint or with smaller learning rates"
     )]
     Numeric {
-        /// The quantity that is not finite.
+        /// The quantity that is infinite or NaN.
         quantity: String,
         /// The step.
         step: u64,
         /// The view.
         view: String,
     },
-    /// Densification has left nothing to train.
+    /// Densification pruned every Gaussian.
     #[error(
-        "every Gaussian was pruned after step {step}: the poses or the photos do not fit together, or --min-opacity or \
-         --max-scale take too much"
+        "every Gaussian was pruned after step {step}: the poses do not fit the photos, or the limits `min_opacity` and \
+         `max_scale` are too strict"
     )]
     Pruned {
         /// The step.
         step: u32,
     },
-    /// The run finished, and a check that was asked for failed.
+    /// The work finished, and a requested check failed.
     #[error("check failed: {0}")]
     Check(String),
-    /// The user interrupted the run; holds the exit status (130 or 143).
+    /// The user interrupted the work.
     #[error("interrupted")]
-    Interrupted(i32),
+    Interrupted,
     /// A broken invariant of the program itself.
     #[error("this is a bug in labelgs, please report it: {0}")]
     Bug(String),
@@ -110,64 +110,63 @@ pub enum Error {
 impl Error {
     /// True if memory of the device or of the host ran out.
     pub fn is_out_of_memory(&self) -> bool {
-        self.exit_status() == 5
+        use ash::vk::Result as Vk;
+        match self {
+            Self::OutOfMemory { .. } => true,
+            Self::Vulkan { result, .. } => matches!(
+                *result,
+                Vk::ERROR_OUT_OF_DEVICE_MEMORY
+                    | Vk::ERROR_OUT_OF_HOST_MEMORY
+                    | Vk::ERROR_OUT_OF_POOL_MEMORY
+                    | Vk::ERROR_FRAGMENTED_POOL
+                    | Vk::ERROR_TOO_MANY_OBJECTS
+            ),
+            _ => false,
+        }
     }
 
-    /// True if there is no device to work with, or its driver does not start.
+    /// True if the device was lost.
+    pub fn is_device_lost(&self) -> bool {
+        matches!(self, Self::DeviceLost { .. } | Self::Vulkan { result: ash::vk::Result::ERROR_DEVICE_LOST, .. })
+    }
+
+    /// True if no device is usable, or its driver fails to start.
     pub fn is_without_device(&self) -> bool {
-        self.exit_status() == 4
+        use ash::vk::Result as Vk;
+        match self {
+            Self::NoDevice(_) => true,
+            Self::Vulkan { result, .. } => matches!(
+                *result,
+                Vk::ERROR_INITIALIZATION_FAILED
+                    | Vk::ERROR_INCOMPATIBLE_DRIVER
+                    | Vk::ERROR_LAYER_NOT_PRESENT
+                    | Vk::ERROR_EXTENSION_NOT_PRESENT
+                    | Vk::ERROR_FEATURE_NOT_PRESENT
+                    | Vk::ERROR_UNKNOWN
+            ),
+            _ => false,
+        }
     }
 
-    /// A [`Error::Data`] without much ado.
+    /// Returns an [`Error::Data`].
     pub fn data(path: impl AsRef<Path>, place: impl Into<String>, problem: impl Into<String>) -> Self {
         Self::Data { path: path.as_ref().to_owned(), place: place.into(), problem: problem.into() }
     }
 
-    /// A [`Error::Usage`] without much ado.
+    /// Returns an [`Error::Usage`].
     pub fn usage(argument: impl Into<String>, problem: impl Into<String>) -> Self {
         Self::Usage { argument: argument.into(), problem: problem.into() }
     }
 
-    /// A [`Error::Read`] as a closure for `map_err`.
+    /// Returns a closure for `map_err` that makes an [`Error::Read`].
     pub fn read(path: impl AsRef<Path>) -> impl FnOnce(std::io::Error) -> Self {
         let path = path.as_ref().to_owned();
         move |source| Self::Read { path, source }
     }
 
-    /// A [`Error::Write`] as a closure for `map_err`.
+    /// Returns a closure for `map_err` that makes an [`Error::Write`].
     pub fn write(path: impl AsRef<Path>) -> impl FnOnce(std::io::Error) -> Self {
         let path = path.as_ref().to_owned();
         move |source| Self::Write { path, source }
-    }
-
-    /// Exit status of the process that ends with this error.
-    pub fn exit_status(&self) -> i32 {
-        match self {
-            Self::Check(_) => 1,
-            Self::Usage { .. } => 2,
-            Self::Data { .. } | Self::Read { .. } | Self::Pruned { .. } => 3,
-            Self::NoDevice(_) => 4,
-            Self::OutOfMemory { .. } => 5,
-            Self::DeviceLost { .. } => 6,
-            Self::Write { .. } => 7,
-            Self::Numeric { .. } => 8,
-            Self::Interrupted(status) => *status,
-            Self::Vulkan { result, .. } => match *result {
-                ash::vk::Result::ERROR_OUT_OF_DEVICE_MEMORY
-                | ash::vk::Result::ERROR_OUT_OF_HOST_MEMORY
-                | ash::vk::Result::ERROR_OUT_OF_POOL_MEMORY
-                | ash::vk::Result::ERROR_FRAGMENTED_POOL
-                | ash::vk::Result::ERROR_TOO_MANY_OBJECTS => 5,
-                ash::vk::Result::ERROR_DEVICE_LOST => 6,
-                ash::vk::Result::ERROR_INITIALIZATION_FAILED
-                | ash::vk::Result::ERROR_INCOMPATIBLE_DRIVER
-                | ash::vk::Result::ERROR_LAYER_NOT_PRESENT
-                | ash::vk::Result::ERROR_EXTENSION_NOT_PRESENT
-                | ash::vk::Result::ERROR_FEATURE_NOT_PRESENT
-                | ash::vk::Result::ERROR_UNKNOWN => 4,
-                _ => 70,
-            },
-            Self::Bug(_) => 70,
-        }
     }
 }

@@ -16,6 +16,12 @@ pub mod cli {
     pub mod scene {
         pub use crate::cli::scene::near_plane;
     }
+    pub mod status {
+        pub use crate::cli::status::exit_status;
+    }
+    pub mod wording {
+        pub use crate::cli::wording::flag;
+    }
 }
 pub mod edit {
     pub mod choose {

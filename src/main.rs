@@ -1,22 +1,22 @@
-//! The command line tool.
+//! The program `labelgs`.
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::io::Write;
 
-/// No host has so many bytes. Who asks for more was told so by a file, and is left to say what is wrong with that.
+/// No computer has this many bytes. A larger request comes from a damaged file; its reader reports the file.
 const NOBODY_HAS: usize = 1 << 46;
 
-/// The system's allocator. Where it has nothing left, the process ends with status 5 and a reason, as for memory of the
-/// device; Rust's own way is to abort.
+/// The system's allocator. If memory runs out, the process ends with status 5 and a message, as for device memory; by
+/// default Rust aborts.
 struct Host;
 
 #[global_allocator]
 static HOST: Host = Host;
 
-// SAFETY: everything is left to the system's allocator.
+// SAFETY: every call goes to the system's allocator.
 unsafe impl GlobalAlloc for Host {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        // SAFETY: the caller keeps the contract, here and below.
+        // SAFETY: the caller upholds the contract of `GlobalAlloc`, here and below.
         given(unsafe { System.alloc(layout) }, layout.size())
     }
 
@@ -38,11 +38,11 @@ unsafe impl GlobalAlloc for Host {
 
 fn given(memory: *mut u8, bytes: usize) -> *mut u8 {
     if memory.is_null() && bytes < NOBODY_HAS {
-        // Standard error has no buffer, so this needs no memory.
+        // Standard error is unbuffered, so this allocates no memory.
         let _ = writeln!(
             std::io::stderr(),
-            "error: the memory of this computer ran out when {bytes} bytes were asked for; use smaller images \
-             (--max-resolution), a lower --max-gaussians, or free memory"
+            "error: this computer has no memory left for {bytes} more bytes; use smaller images (--max-resolution), \
+             lower --max-gaussians, or free memory"
         );
         signal_hook::low_level::exit(5);
     }

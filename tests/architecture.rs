@@ -183,3 +183,32 @@ fn the_scheduler_is_the_engines_own() {
     let found = files("src", &["rs"]).into_iter().filter(|(path, text)| above(path) && touches(text));
     assert_eq!(found.map(|(path, _)| path).collect::<Vec<_>>(), Vec::<PathBuf>::new());
 }
+
+/// The command line alone knows flags and commands; a message of the library names a field in backticks.
+#[test]
+fn the_library_speaks_of_no_flags() {
+    let root = labelgs::internals::cli::command::command();
+    let commands: Vec<String> =
+        root.get_subcommands().map(|command| format!("labelgs {}", command.get_name())).collect();
+    let has_flag = |line: &str| {
+        line.match_indices("--").any(|(at, _)| {
+            let (before, after) = (line[..at].chars().next_back(), line[at + 2..].chars().next());
+            after.is_some_and(|c| c.is_ascii_lowercase()) && before.is_some_and(|c| " \"`({".contains(c))
+        })
+    };
+    assert!(has_flag("say(\"use --near\")") && has_flag("\"--near\"") && !has_flag("a --> b") && !has_flag("x---y"));
+    let has_command = |line: &str, name: &str| {
+        let mut ends = line.match_indices(name).map(|(at, _)| line[at + name.len()..].chars().next());
+        ends.any(|next| !next.is_some_and(|c| c.is_ascii_lowercase()))
+    };
+    let mut found = Vec::new();
+    for (path, text) in files("src", &["rs"]) {
+        if ["cli", "main"].contains(&module(&path).as_str()) {
+            continue;
+        }
+        let lines = text.lines().enumerate().filter(|(_, line)| !line.trim_start().starts_with("//"));
+        let wrong = lines.filter(|(_, line)| has_flag(line) || commands.iter().any(|name| has_command(line, name)));
+        found.extend(wrong.map(|(at, line)| format!("{}:{}: {}", path.display(), at + 1, line.trim())));
+    }
+    assert_eq!(found, Vec::<String>::new());
+}

@@ -3,6 +3,7 @@
 use assert_cmd::Command;
 use clap::Parser;
 use labelgs::internals::cli::command::{Cli, Command as Verb, command};
+use labelgs::internals::cli::wording::flag;
 use labelgs::io::{read_model, write_model};
 use labelgs::run::Occlusion;
 use labelgs::run::Settings;
@@ -75,9 +76,9 @@ fn every_setting_has_a_flag_with_its_default() {
     for key in Settings::keys() {
         let arg =
             verb.get_arguments().find(|arg| arg.get_id() == key.name).unwrap_or_else(|| panic!("no {}", key.name));
-        assert_eq!(arg.get_long().map(|long| format!("--{long}")), Some(key.flag()));
+        assert_eq!(arg.get_long().map(|long| format!("--{long}")), Some(flag(key.name)));
         for help in [arg.get_help(), arg.get_long_help()].into_iter().flatten().map(ToString::to_string) {
-            assert!(help.contains("[default: "), "{}: {help}", key.flag());
+            assert!(help.contains("[default: "), "{}: {help}", key.name);
         }
     }
     // A link of the crate's documentation means nothing to whoever reads the help.
@@ -96,8 +97,81 @@ fn every_setting_has_a_flag_with_its_default() {
         help.contains("where ours differ: --label-rule main --label-weight 1.0 --densify-until 40000 --opacity-reset-interval 3000"),
         "{help}"
     );
-    for heading in ["Run:", "Labels:", "Optimiser:", "Densification:", "Global:"] {
+    for heading in [
+        "Options:",
+        "Training:",
+        "Labels:",
+        "Densification:",
+        "Learning rates:",
+        "Rendering:",
+        "Scene:",
+        "Device:",
+        "Output:",
+    ] {
         assert!(help.contains(heading), "{heading} is not in\n{help}");
+    }
+}
+
+/// Commands and their own commands, each with what is typed for it.
+fn commands() -> Vec<(String, clap::Command)> {
+    let mut root = command();
+    root.build();
+    let mut found = Vec::new();
+    for verb in root.get_subcommands().filter(|verb| verb.get_name() != "help") {
+        found.push((format!("labelgs {}", verb.get_name()), verb.clone()));
+        let inner = verb.get_subcommands().filter(|inner| inner.get_name() != "help");
+        found.extend(inner.map(|inner| (format!("labelgs {} {}", verb.get_name(), inner.get_name()), inner.clone())));
+    }
+    found
+}
+
+#[test]
+fn every_help_begins_with_the_result_and_an_example() {
+    for (name, verb) in commands() {
+        let help = verb.clone().term_width(0).render_long_help().to_string();
+        let before = help.split("Usage:").next().unwrap_or_default();
+        let examples: Vec<&str> = before.lines().filter_map(|line| line.strip_prefix("Example: ")).collect();
+        assert!(help.starts_with(char::is_uppercase) && !help.starts_with("Example"), "{name}: {help}");
+        let [example] = examples[..] else { panic!("{name} has not one example:\n{help}") };
+        assert!(example.starts_with(&name), "{name}: {example}");
+        Cli::try_parse_from(example.split_whitespace()).unwrap_or_else(|error| panic!("{example}: {error}"));
+    }
+}
+
+#[test]
+fn the_first_commands_come_first() {
+    let names: Vec<String> = command().get_subcommands().map(|verb| verb.get_name().to_owned()).collect();
+    assert_eq!(names[..7], ["synth", "train", "eval", "list", "extract", "remove", "render"]);
+    let help = text(&labelgs(&["--help"]).stdout);
+    let at = |name: &str| help.find(&format!("\n  {name} ")).unwrap_or_else(|| panic!("{name} is not in\n{help}"));
+    assert!(names.windows(2).all(|pair| at(&pair[0]) < at(&pair[1])), "{help}");
+}
+
+/// A flag that several commands have stands under one heading everywhere.
+#[test]
+fn a_flag_has_one_heading() {
+    const SHARED: [&str; 11] = [
+        "allow-outside",
+        "background",
+        "config",
+        "device",
+        "json",
+        "label-table",
+        "max-bad-photos",
+        "near",
+        "quiet",
+        "test-every",
+        "verbose",
+    ];
+    for flag in SHARED {
+        let headings: BTreeSet<Option<String>> = commands()
+            .iter()
+            .flat_map(|(_, verb)| verb.get_arguments())
+            .filter(|arg| arg.get_long() == Some(flag))
+            .map(|arg| arg.get_help_heading().map(str::to_owned))
+            .collect();
+        assert_eq!(headings.len(), 1, "{flag}: {headings:?}");
+        assert!(headings.iter().all(Option::is_some), "{flag}");
     }
 }
 
@@ -155,7 +229,7 @@ fn every_setting_follows_its_flag() {
     let changed = train(&all).expect("decided");
     let (texts, defaults) = (changed.texts(), Settings::default().texts());
     for key in Settings::keys() {
-        assert!(TYPED.iter().any(|(flag, _)| *flag == key.flag()), "{} is not tried", key.name);
+        assert!(TYPED.iter().any(|(name, _)| *name == flag(key.name)), "{} is not tried", key.name);
         assert_ne!(texts.get(key.name), defaults.get(key.name), "{} is out of reach", key.name);
     }
     assert_eq!(changed.train.max_gaussians, 2_500_000);
@@ -179,7 +253,7 @@ fn every_setting_of_a_file_survives_flags_that_nobody_typed() {
     for key in Settings::keys().filter(|key| key.name != "save_at") {
         let Some(default) = defaults.get(key.name) else { continue };
         let value = default.replace(['[', ']', ' '], "");
-        let flag = key.flag();
+        let flag = flag(key.name);
         let texts = train(&["--config", file, &flag, &value]).expect("decided").texts();
         let mut expected = written.texts();
         expected.insert(key.name.to_owned(), default.clone());
@@ -208,7 +282,7 @@ fn flag_before_file_before_default() {
     assert!(message.contains("line 2") && message.contains("lambda"), "{message}");
     std::fs::write(&path, "label_threshold = 3\n").expect("file");
     let error = train(&["--config", file]).expect_err("out of range");
-    assert!(error.to_string().starts_with("--label-threshold"), "{error}");
+    assert!(error.to_string().starts_with("label_threshold"), "{error}");
 }
 
 #[test]

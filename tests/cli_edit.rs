@@ -3,6 +3,7 @@
 use assert_cmd::Command;
 use glam::DVec3;
 use labelgs::internals::cli::scene::near_plane;
+use labelgs::internals::cli::status::exit_status;
 use labelgs::internals::io::run_folder;
 use labelgs::internals::synth::ring_of_cameras;
 use labelgs::io::read_mask;
@@ -160,7 +161,7 @@ fn the_near_plane_is_that_of_the_run() {
     assert_eq!(run_folder::of_model(&run.join("a/b/c.ply")), None, "only models of steps are in a run");
     std::fs::write(run.join(run_folder::CONFIG), "near = -1\n").expect("file");
     let error = near_plane(&run, None).expect_err("negative");
-    assert!(error.exit_status() == 3 && error.to_string().contains("near"), "{error}");
+    assert!(exit_status(&error) == 3 && error.to_string().contains("near"), "{error}");
 }
 
 #[test]

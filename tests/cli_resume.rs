@@ -324,7 +324,7 @@ fn checkpoints_of_an_earlier_run_stay_until_there_are_new_ones() {
     succeeded(&place.trained("out", &["--iterations", "9", "--checkpoint-every", "9"]));
     let old = place.checkpoints("out");
     let text = succeeded(&place.trained("out", &["--iterations", "3", "--checkpoint-every", "0"]));
-    assert!(text.contains("of an earlier run") && text.contains("--resume goes on"), "{text}");
+    assert!(text.contains("of an earlier run") && text.contains("Go on with that run"), "{text}");
     assert_eq!(place.checkpoints("out"), old);
     let models = || {
         let found = files(&place.path("out/point_cloud")).into_iter();

@@ -32,20 +32,20 @@ fn densification_ends_at_half_of_the_run() {
 }
 
 #[test]
-fn nonsense_is_refused_by_flag() {
+fn nonsense_is_refused_by_name() {
     let broken = [
-        (TrainConfig { iterations: 0, ..Default::default() }, "--iterations"),
-        (TrainConfig { label_threshold: f32::NAN, ..Default::default() }, "--label-threshold"),
-        (TrainConfig { label_threshold: 1.5, ..Default::default() }, "--label-threshold"),
-        (TrainConfig { sh_degree: 4, ..Default::default() }, "--sh-degree"),
-        (TrainConfig { opacity_lr: -1.0, ..Default::default() }, "--opacity-lr"),
-        (TrainConfig { background: [0.0, 0.0, 2.0], ..Default::default() }, "--background"),
+        (TrainConfig { iterations: 0, ..Default::default() }, "iterations"),
+        (TrainConfig { label_threshold: f32::NAN, ..Default::default() }, "label_threshold"),
+        (TrainConfig { label_threshold: 1.5, ..Default::default() }, "label_threshold"),
+        (TrainConfig { sh_degree: 4, ..Default::default() }, "sh_degree"),
+        (TrainConfig { opacity_lr: -1.0, ..Default::default() }, "opacity_lr"),
+        (TrainConfig { background: [0.0, 0.0, 2.0], ..Default::default() }, "background"),
     ];
-    for (config, flag) in broken {
-        let message = config.check().expect_err(flag).to_string();
-        assert!(message.starts_with(flag), "{message}");
+    for (config, name) in broken {
+        let message = config.check().expect_err(name).to_string();
+        assert!(message.starts_with(name), "{message}");
     }
     TrainConfig::default().check().expect("the defaults are sound");
     let message = ReadOptions { test_every: 1, ..Default::default() }.check().expect_err("nothing is left").to_string();
-    assert!(message.starts_with("--test-every"), "{message}");
+    assert!(message.starts_with("test_every"), "{message}");
 }

@@ -4,6 +4,7 @@ use labelgs::edit::Grouping;
 use labelgs::edit::{Catalogue, Pick};
 use labelgs::edit::{Place, Prompt, choose};
 use labelgs::edit::{Specks, recolour, relabel, split_components, without_specks};
+use labelgs::internals::cli::status::exit_status;
 use labelgs::internals::edit::components::components;
 use labelgs::internals::edit::rename::{give_name, keep, renumber, split};
 use labelgs::internals::shaders::constants::exact::SH_C0;
@@ -205,7 +206,7 @@ fn labels_are_found_by_id_and_name_or_all_are_told() {
         (vec![], "names no label"),
     ] {
         let error = known.resolve("--labels", &picks).expect_err(problem);
-        assert_eq!((error.exit_status(), error.to_string()), (2, format!("--labels: {problem}; {all}")));
+        assert_eq!((exit_status(&error), error.to_string()), (2, format!("--labels: {problem}; {all}")));
     }
 }
 
@@ -248,5 +249,5 @@ fn points_and_boxes_mean_labels() {
     let half = message(&[boxed([0, 0, 1, 2])]);
     assert!(half.contains("1 cup (2 of its 4 pixels are inside)"), "{half}");
     let lost = message(&[point(0, 0), not(1, 1)]);
-    assert!(lost.starts_with("--not-at: leaves no label: it takes 1 cup; the model has 1 cup"), "{lost}");
+    assert!(lost.starts_with("not_at: leaves no label: it takes 1 cup; the model has 1 cup"), "{lost}");
 }

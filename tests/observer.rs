@@ -3,6 +3,7 @@
 use crate::support::runs::Place;
 use crate::support::{device, device::Turn};
 use labelgs::Result;
+use labelgs::internals::cli::status::exit_status;
 use labelgs::internals::run;
 use labelgs::render::Parts;
 use labelgs::run::{Event, Flow, Live, Observer, Request, Settings, Start, Summary};
@@ -134,7 +135,7 @@ fn an_error_of_the_observer_ends_the_run() {
     impl Observer for Angry {
         fn on(&mut self, event: &Event<'_>, _: &mut Live<'_>) -> Result<Flow> {
             match event {
-                Event::Step { step: 3, .. } => Err(labelgs::Error::Interrupted(130)),
+                Event::Step { step: 3, .. } => Err(labelgs::Error::Interrupted),
                 _ => Ok(Flow::Continue),
             }
         }
@@ -142,5 +143,5 @@ fn an_error_of_the_observer_ends_the_run() {
     let Some(turn) = device() else { return };
     let place = Place::new();
     let ended = run::train(&request(&place, "out", Start::New(settings(&place))), &|| Ok(turn.gpu()), &mut Angry);
-    assert_eq!(ended.expect_err("ended").exit_status(), 130);
+    assert_eq!(exit_status(&ended.expect_err("ended")), 130);
 }

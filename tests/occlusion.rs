@@ -1,5 +1,6 @@
 //! Who hides whom: both rules against hand-made and slow answers, and against a scene that knows the truth.
 
+use labelgs::internals::cli::status::exit_status;
 use labelgs::internals::label::occlusion::{distances, picture};
 use labelgs::internals::synth::{World, ring_of_cameras};
 use labelgs::io::OcclusionTable;
@@ -271,7 +272,7 @@ fn the_table_comes_back_and_nonsense_is_refused() {
     ] {
         std::fs::write(&path, &text).expect("written");
         let error = OcclusionTable::read(&path).expect_err(&text);
-        assert!(error.to_string().contains(problem) && error.exit_status() == 3, "{error}");
+        assert!(error.to_string().contains(problem) && exit_status(&error) == 3, "{error}");
     }
     std::fs::write(&path, lists(r#"{"2": [9, 4, 9]}"#)).expect("written");
     assert_eq!(OcclusionTable::read(&path).expect("read").views["0.png"][&2], [4, 9]);

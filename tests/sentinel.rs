@@ -6,6 +6,7 @@ use crate::reference::step::step;
 use crate::support::device;
 use crate::support::scenes::{Scene, Shape, scene};
 use labelgs::Error;
+use labelgs::internals::cli::status::exit_status;
 use labelgs::internals::scheduler::SchedulerOptions;
 use labelgs::internals::scheduler::plan::Buf;
 use labelgs::internals::train::Trainer;
@@ -129,5 +130,5 @@ fn a_training_that_drops_gradients_all_the_time_ends() {
     let error = run(200).expect_err("many are not");
     assert!(matches!(error, Error::Numeric { step: 3, .. }), "{error}");
     assert!(error.to_string().contains("project_backward dropped the gradients of"), "{error}");
-    assert_eq!(error.exit_status(), 8);
+    assert_eq!(exit_status(&error), 8);
 }

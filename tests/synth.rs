@@ -1,5 +1,6 @@
 //! The made scene: its pictures, masks, depth and points must agree with each other.
 
+use labelgs::internals::cli::status::exit_status;
 use labelgs::internals::synth;
 use labelgs::internals::synth::{Picture, World, alone, picture, ring_of_cameras};
 use labelgs::io::LabelTable;
@@ -161,7 +162,7 @@ fn a_filled_folder_is_left_alone() {
     let folder = tempfile::tempdir().expect("folder");
     std::fs::write(folder.path().join("mine.txt"), "mine").expect("file");
     let error = synth::write(&small(), folder.path(), &|_| Ok(())).expect_err("not empty");
-    assert_eq!(error.exit_status(), 2);
+    assert_eq!(exit_status(&error), 2);
     assert!(error.to_string().contains("not empty"), "{error}");
 }
 

@@ -45,7 +45,7 @@ fn too_many_objects_are_an_error() {
     let forgetful = Overlap { memory: 0, ..HOW };
     assert_eq!(track(&many[..2 * 65_535], forgetful).expect("just enough")[2 * 65_534].ids, [65_535]);
     let error = track(&many, forgetful).expect_err("one too many").to_string();
-    assert!(error.contains("65535 objects") && error.contains("--min-overlap"), "{error}");
+    assert!(error.contains("65535 objects") && error.contains("min_overlap"), "{error}");
 }
 
 #[test]

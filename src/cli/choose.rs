@@ -1,4 +1,4 @@
-//! Which labels: by id, by name, by a mask, a point or a box in a view. Several ways add up.
+//! The choice of labels: by id, by name, or by a mask, a point or a box in a view. The choices add up.
 
 use super::args::{ReadArgs, SceneArgs};
 use super::context::Context;
@@ -14,63 +14,64 @@ use clap::Args;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-/// Labels by name and by place. Pixels count from 0 at the top left of the view in the size of its photo, or in the
-/// size that --max-resolution makes of it.
+/// Labels by name and by place. Pixels count from 0 at the top left of the view, in the size of its photo or in the
+/// smaller size of `--max-resolution`.
 #[derive(Args, Clone, Debug, Default)]
 #[command(next_help_heading = "Choice of labels")]
 pub struct PromptArgs {
-    /// Label of this name, whatever the case; may be given several times.
+    /// Choose the label with this name; upper and lower case are the same. May be given several times.
     #[arg(long = "name", value_name = "NAME")]
     pub names: Vec<String>,
-    /// Label that pixel x,y of a view shows, from 0 at the top left; may be given several times, also in several views.
-    /// Pixels are those of the photo, or of what --max-resolution makes of it.
+    /// Choose the label at pixel x,y of a view; 0,0 is the top left pixel of the photo, or of the smaller photo that
+    /// --max-resolution makes. May be given several times, in any views.
     #[arg(long, value_name = "VIEW:x,y", value_parser = at, requires = "scene")]
     pub at: Vec<At>,
-    /// Label at this pixel is not meant; may be given several times.
+    /// Leave out the label at this pixel. May be given several times.
     #[arg(long, value_name = "VIEW:x,y", value_parser = at, requires = "scene")]
     pub not_at: Vec<At>,
-    /// Labels with more than half of their pixels in a box: x0 <= x < x1 and y0 <= y < y1; may be given several times.
+    /// Choose labels with more than half of their pixels in a box: x0 <= x < x1 and y0 <= y < y1. May be given several
+    /// times.
     #[arg(long = "box", value_name = "VIEW:x0,y0,x1,y1", value_parser = box_at, requires = "scene")]
     pub boxes: Vec<BoxAt>,
-    /// A mask in one view: labels with more than half of their pixels under it are chosen. Any pixel that is not 0 is
-    /// in; the view is rendered in the size of the mask.
+    /// Choose labels with more than half of their pixels inside a mask of one view. Pixels above 0 are inside. The view
+    /// is rendered in the size of the mask.
     #[arg(long, value_name = "FILE", requires = "view", requires = "scene")]
     pub mask: Option<PathBuf>,
-    /// Name of the view that the mask belongs to.
+    /// Name of the view of --mask.
     #[arg(long, value_name = "NAME", requires = "mask")]
     pub view: Option<String>,
     /// Names.
     #[command(flatten)]
     pub table: TableArg,
-    /// Gaussians nearer to the camera are not drawn, world units; otherwise as in the run of the model, otherwise 0.2.
-    #[arg(long, value_name = "Z", value_parser = near)]
+    /// Near plane, world units: nearer Gaussians are not drawn. Default: the value of the model's run, else 0.2.
+    #[arg(long, value_name = "Z", value_parser = near, help_heading = "Rendering")]
     pub near: Option<f32>,
 }
 
-/// A choice, which must not be empty.
+/// A choice of at least one label.
 #[derive(Args, Clone, Debug)]
 #[command(next_help_heading = "Choice of labels")]
 #[command(group(clap::ArgGroup::new("choice").required(true).multiple(true)
     .args(["labels", "names", "at", "boxes", "mask"])))]
 pub struct ChooseArgs {
-    /// The labels by id or by name, such as 1,4-6,cup; 0 is what has no label.
+    /// Choose labels by id or by name, such as 1,4-6,cup; 0 stands for Gaussians without a label.
     #[arg(long, value_name = "LABELS", value_parser = picks)]
     pub labels: Option<Picks>,
     /// The other ways.
     #[command(flatten)]
     pub prompts: PromptArgs,
-    /// Scene of the views.
+    /// Scene that has the views.
     #[arg(long, value_name = "SCENE")]
     pub scene: Option<PathBuf>,
-    /// Longest side of a view, px; otherwise that of its photo.
-    #[arg(long, value_name = "PX", value_parser = clap::value_parser!(u32).range(1..))]
+    /// Longest side of a view, px. Default: the size of the photo.
+    #[arg(long, value_name = "PX", value_parser = clap::value_parser!(u32).range(1..), help_heading = "Scene")]
     pub max_resolution: Option<u32>,
-    /// What is let through of the scene.
+    /// Tolerance for the scene.
     #[command(flatten)]
     pub read: ReadArgs,
 }
 
-/// The model that is asked, and where its views are.
+/// A model and the scene of its views.
 pub struct Asked<'a> {
     /// Path of the model.
     pub path: &'a Path,
@@ -82,12 +83,12 @@ pub struct Asked<'a> {
     pub scene: Option<&'a Path>,
     /// Longest side of a view, px.
     pub max_resolution: Option<u32>,
-    /// What is let through of the scene.
+    /// Tolerance for the scene.
     pub read: ReadArgs,
 }
 
 impl ChooseArgs {
-    /// The labels that are meant.
+    /// Returns the chosen labels.
     pub fn labels(&self, path: &Path, model: &Gaussians, known: &Catalogue, to: &Context) -> Result<BTreeSet<u32>> {
         let (scene, max_resolution) = (self.scene.as_deref(), self.max_resolution);
         let asked = Asked { path, model, known, scene, max_resolution, read: self.read };
@@ -96,7 +97,7 @@ impl ChooseArgs {
 }
 
 impl PromptArgs {
-    /// True if nothing was typed.
+    /// Returns true if nothing was typed.
     pub fn is_empty(&self) -> bool {
         self.names.is_empty() && self.mask.is_none() && !self.has_points()
     }
@@ -105,7 +106,7 @@ impl PromptArgs {
         !self.at.is_empty() || !self.not_at.is_empty() || !self.boxes.is_empty()
     }
 
-    /// The labels that are meant, with those of `listed`, which came with the flag `argument`.
+    /// Returns the chosen labels and those of `listed`, the value of the flag `argument`.
     pub fn labels(
         &self,
         argument: &str,
@@ -153,10 +154,10 @@ impl PromptArgs {
         Ok(prompts)
     }
 
-    /// The label maps that the prompts need, each rendered once.
+    /// Renders the label map of each view and size among the prompts, each once.
     fn label_maps(&self, prompts: &[Prompt], asked: &Asked, context: &Context) -> Result<BTreeMap<Key, LabelMap>> {
         let Some(scene) = asked.scene else {
-            return Err(Error::usage(prompts[0].argument, "needs --scene, which has the view"));
+            return Err(Error::usage(prompts[0].argument, "needs the scene of the view: --scene SCENE"));
         };
         let Some(labels) = &asked.model.labels else {
             return Err(Error::data(asked.path, "", "the model has no labels; train it with --masks"));
@@ -181,7 +182,7 @@ impl PromptArgs {
     }
 }
 
-/// A view in a size.
+/// A view and its size; `None` is the size of its camera.
 type Key = (String, Option<(u32, u32)>);
 
 fn key(prompt: &Prompt) -> Key {

@@ -1,4 +1,4 @@
-//! The command line as a whole: its verbs with their examples.
+//! The command line as a whole: its commands, each with an example that runs where `scene` and `out` are.
 
 use super::ablate::AblateArgs;
 use super::args::GlobalArgs;
@@ -20,6 +20,7 @@ use super::selftest::SelftestArgs;
 use super::split_components::SplitArgs;
 use super::synth::SynthArgs;
 use super::train_args::TrainArgs;
+use super::wording::flag;
 use crate::run::Settings;
 use clap::{CommandFactory, Parser, Subcommand};
 use std::collections::BTreeMap;
@@ -29,88 +30,117 @@ Exit status: 0 done, 1 finished but a requested check failed, 2 usage, 3 bad inp
 6 device lost, 7 output, 8 numerical failure, 70 a bug, 130 or 143 interrupted.
 Results go to standard output, everything else to standard error.";
 
-/// Label-aware 3D Gaussian Splatting on Vulkan compute: train, list, extract, remove, render and score objects.
+/// Label-aware 3D Gaussian Splatting on Vulkan compute: train a model of a scene, then list, extract, remove, render and
+/// score its objects.
+///
+/// Example: labelgs synth scene && labelgs train scene --masks scene/masks -o out && labelgs list out
 #[derive(Debug, Parser)]
 #[command(name = "labelgs", version, after_help = EXIT_STATUSES, propagate_version = true)]
 pub struct Cli {
-    /// Print results as JSON.
-    #[arg(long)]
+    /// Print the result as JSON.
+    #[arg(long, help_heading = "Output")]
     pub json: bool,
-    /// What applies to every verb.
+    /// Flags of every command.
     #[command(flatten)]
     pub global: GlobalArgs,
-    /// The verb.
+    /// The command.
     #[command(subcommand)]
     pub command: Command,
 }
 
-/// The verbs.
+/// The commands, in the order of the help: what a newcomer needs comes first.
 #[derive(Debug, Subcommand)]
 pub enum Command {
-    /// Train a model on a posed scene, with object labels if there are masks.
-    #[command(after_help = "Example: labelgs train garden --masks garden/masks -o out")]
+    /// Make a test scene: photos with poses, points, masks, outlines of whole objects and depth.
+    ///
+    /// Example: labelgs synth scene
+    Synth(SynthArgs),
+    /// Train a model of a scene from its photos. With masks, each Gaussian knows its object.
+    ///
+    /// Example: labelgs train scene --masks scene/masks --iterations 3000 -o out
     Train(Box<TrainArgs>),
-    /// Render views of a model, or objects of it.
-    #[command(after_help = "Example: labelgs render out --scene garden --views test --only 3 -o pictures")]
-    Render(RenderArgs),
-    /// Give the Gaussians of a trained model, of any trainer, their labels from masks.
-    #[command(after_help = "Example: labelgs label model.ply --scene garden --masks garden/masks -o labelled.ply")]
-    Label(LabelArgs),
-    /// List the labels of a model.
+    /// Score a model against the photos of a scene: PSNR, SSIM and, with masks, IoU.
+    ///
+    /// Example: labelgs eval out --scene scene --masks scene/masks
+    Eval(Box<EvalArgs>),
+    /// Show the labels of a model: Gaussians, position, size and name of each.
+    ///
+    /// Example: labelgs list out
     List(ListArgs),
-    /// Write the Gaussians of some labels.
-    #[command(after_help = "Example: labelgs extract out --labels 1,4-6 -o object.ply")]
+    /// Write a model of the chosen objects alone.
+    ///
+    /// Example: labelgs extract out --labels 3 -o object.ply
     Extract(ExtractArgs),
-    /// Write all but the Gaussians of some labels.
-    #[command(after_help = "Example: labelgs remove out --labels 2 -o rest.ply")]
+    /// Write a model without the chosen objects.
+    ///
+    /// Example: labelgs remove out --labels 3 -o rest.ply
     Remove(SelectArgs),
-    /// Write a model with another colour on some labels.
-    #[command(after_help = "Example: labelgs recolour out --labels cup --colour 0.9,0.1,0.1 --mix 0.7 -o red.ply")]
+    /// Render pictures, depth or label maps of a model, or of chosen objects.
+    ///
+    /// Example: labelgs render out --scene scene --only 3 -o pictures
+    Render(RenderArgs),
+    /// Write a model with the chosen objects in another colour.
+    ///
+    /// Example: labelgs recolour out --labels barrel --colour 0.9,0.1,0.1 --mix 0.7 -o red.ply
     Recolour(RecolourArgs),
-    /// Write a model with other ids.
-    #[command(after_help = "Example: labelgs relabel out --map 3=7,4=0 -o model.ply")]
+    /// Write a model with other label ids.
+    ///
+    /// Example: labelgs relabel out --map 3=7,4=0 -o relabelled.ply
     Relabel(RelabelArgs),
     /// Write a model in which several labels are one.
-    #[command(after_help = "Example: labelgs merge out --labels 3,5 --name table -o model.ply")]
+    ///
+    /// Example: labelgs merge out --labels 3,5 --name group -o merged.ply
     Merge(MergeArgs),
-    /// Write a model in which each connected part of a label is a label of its own.
-    #[command(after_help = "Example: labelgs split-components out --labels 3 --specks drop -o model.ply")]
+    /// Write a model in which each connected part of a label has a label of its own.
+    ///
+    /// Example: labelgs split-components out --labels 3 --specks drop -o parts.ply
     SplitComponents(SplitArgs),
-    /// Score a model on the views of a scene.
-    #[command(after_help = "Example: labelgs eval out --scene garden --masks garden/masks --json scores.json")]
-    Eval(Box<EvalArgs>),
+    /// Write a model with labels from masks, for a model of any trainer.
+    ///
+    /// Example: labelgs label out --scene scene --masks scene/masks -o labelled.ply
+    Label(LabelArgs),
     /// Import, check and repair masks before training.
+    ///
+    /// Example: labelgs masks check scene/masks --scene scene
     Masks(MasksArgs),
-    /// Find which objects hide which in each view, without training.
-    #[command(after_help = "Example: labelgs occlusion garden --masks garden/masks --model out -o occlusion.json")]
+    /// List which objects hide which in each view, without training.
+    ///
+    /// Example: labelgs occlusion scene --masks scene/masks --model out -o occlusion.json
     Occlusion(OcclusionArgs),
-    /// Render a smooth video through the photos of a scene, for a tracker of objects.
-    #[command(after_help = "Example: labelgs densify out --scene garden -o video")]
+    /// Render a smooth video through the photos of a scene, as input of an object tracker.
+    ///
+    /// Example: labelgs densify out --scene scene -o video
     Densify(DensifyArgs),
     /// Train a scene in several ways and compare the scores in one table.
-    #[command(after_help = "Example: labelgs ablate garden --masks garden/masks -o ablation -- --iterations 3000")]
+    ///
+    /// Example: labelgs ablate scene --masks scene/masks -o ablation -- --iterations 3000
     Ablate(Box<AblateArgs>),
-    /// Make a posed test scene with masks, whole outlines and depth.
-    #[command(after_help = "Example: labelgs synth scene && labelgs train scene --masks scene/masks -o out")]
-    Synth(SynthArgs),
-    /// Compare the Vulkan devices with what is required.
+    /// Show each Vulkan device and whether it meets the requirements.
+    ///
+    /// Example: labelgs devices
     Devices(DevicesArgs),
-    /// Check a device: every pass against float64, gradients, determinism.
-    #[command(after_help = "Example: labelgs selftest --device 0 && labelgs train scene -o out")]
+    /// Check a device: results of every pass against float64, gradients and determinism.
+    ///
+    /// Example: labelgs selftest
     Selftest(SelftestArgs),
-    /// Print buffers, passes and barriers of a training step without running it.
-    #[command(after_help = "Example: labelgs plan --gaussians 500k --size 960x540 --label-samples 10")]
+    /// Show the memory, passes and barriers of a training step, without running it.
+    ///
+    /// Example: labelgs plan --gaussians 500k --size 960x540 --label-samples 10
     Plan(PlanArgs),
-    /// Time training steps pass by pass.
-    #[command(after_help = "Example: labelgs profile --synthetic --from-step 500 --steps 50")]
+    /// Show how long each pass of a training step takes.
+    ///
+    /// Example: labelgs profile scene --masks scene/masks --steps 50
     Profile(ProfileArgs),
 }
 
-/// The command with the defaults of training in its help.
+/// Settings of training that a newcomer needs: the help shows them with the flags that have no heading.
+const FIRST: [&str; 2] = ["iterations", "max_resolution"];
+
+/// Returns the command line with the defaults of training in its help.
 pub fn command() -> clap::Command {
     let mut defaults = Settings::default().texts();
     let paper = paper_flags(&defaults);
-    // What the values alone do not tell.
+    // Defaults whose values need words.
     for (key, text) in [
         ("background", "black"),
         ("save_at", "none"),
@@ -121,6 +151,7 @@ pub fn command() -> clap::Command {
     }
     Cli::command().mut_subcommand("train", |train| {
         train.mut_args(|arg| {
+            let arg = if FIRST.contains(&arg.get_id().as_str()) { arg.help_heading(None) } else { arg };
             if arg.get_id() == "paper" {
                 let help = arg.get_help().map(ToString::to_string).unwrap_or_default();
                 return arg.help(format!("{help} {paper}"));
@@ -134,12 +165,12 @@ pub fn command() -> clap::Command {
     })
 }
 
-/// The settings of the paper that are no defaults, as flags.
+/// Returns the settings in which the paper differs from the defaults, as flags.
 fn paper_flags(defaults: &BTreeMap<String, String>) -> String {
     let paper = Settings::paper().texts();
     let changed = Settings::keys().filter_map(|key| {
         let value = paper.get(key.name).filter(|value| defaults.get(key.name) != Some(value))?;
-        Some(format!("{} {value}", key.flag()))
+        Some(format!("{} {value}", flag(key.name)))
     });
     changed.collect::<Vec<_>>().join(" ")
 }

@@ -1,4 +1,4 @@
-//! What every verb is given, and how it opens a model.
+//! The context of every command, and how a command opens a model.
 
 use super::args::GlobalArgs;
 use crate::gpu::{Gpu, MessageLog};
@@ -7,29 +7,29 @@ use crate::{Error, Result};
 use std::cell::RefCell;
 use std::path::Path;
 
-/// What every verb gets besides its own arguments.
+/// Input of every command besides its own arguments.
 #[derive(Clone, Debug, Default)]
 pub struct Context {
     /// `-q`, `-v` and `--device`.
     pub global: GlobalArgs,
-    /// `--json` before the verb.
+    /// `--json` before the command.
     pub json: bool,
-    /// What the validation layer says of the devices that were opened; they may be gone.
+    /// Messages of the validation layer about every opened device, also after the device is closed.
     messages: RefCell<Vec<MessageLog>>,
 }
 
 impl Context {
-    /// For a command.
+    /// Returns a context without devices.
     pub fn new(global: GlobalArgs, json: bool) -> Self {
         Self { global, json, messages: RefCell::default() }
     }
 
-    /// Listens to what the validation layer, if it was asked for, says of a device.
+    /// Collects the messages of the validation layer about a device.
     pub fn listen(&self, gpu: &Gpu) {
         self.messages.borrow_mut().push(gpu.message_log());
     }
 
-    /// An error if the layer has found a broken rule.
+    /// Fails if the validation layer reported an error.
     pub fn check_rules(&self) -> Result<()> {
         let all: Vec<_> = self.messages.borrow().iter().flat_map(MessageLog::messages).collect();
         let count = all.iter().filter(|message| message.is_error).count();
@@ -43,7 +43,7 @@ impl Context {
     }
 }
 
-/// Reads a model, or the last one in the folder of a run, and logs what a person should know about the file.
+/// Reads a model, or the last model in the folder of a run, and logs the notes of the reader.
 pub fn open_model(path: &Path) -> Result<Gaussians> {
     let path = &if path.is_dir() { crate::run::models::latest_model(path)? } else { path.to_owned() };
     let read = crate::io::model::read_model(path)?;

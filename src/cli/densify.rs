@@ -1,4 +1,4 @@
-//! `labelgs densify`: a video between the photos, on which a tracker of objects loses fewer of them.
+//! `labelgs densify`: a video through the photos. An object tracker loses fewer objects in it than between the photos.
 
 use super::args::{JsonFlag, SceneArgs};
 use super::context::{Context, open_model};
@@ -22,24 +22,24 @@ pub enum Order {
     /// A short path through the poses.
     #[default]
     Path,
-    /// By name, as the paper.
+    /// By name, as in the paper.
     Name,
 }
 
 /// `labelgs densify`.
 #[derive(Args, Clone, Debug)]
 pub struct DensifyArgs {
-    /// The model: a PLY, or the folder that `labelgs train` made.
+    /// The model: a PLY, or the folder of a `labelgs train` run.
     #[arg(value_name = "MODEL")]
     pub model: PathBuf,
-    /// Scene through whose photos the video goes.
+    /// Scene with the photos.
     #[arg(long, value_name = "SCENE")]
     pub scene: PathBuf,
     /// Folder for frames/NNNNN.png and frames.json.
     #[arg(short, long, value_name = "DIR")]
     pub output: PathBuf,
-    /// Gaussians nearer to the camera are not drawn, world units; otherwise as in the run of the model, otherwise 0.2.
-    #[arg(long, value_name = "Z", value_parser = near)]
+    /// Near plane, world units: nearer Gaussians are not drawn. Default: the value of the model's run, else 0.2.
+    #[arg(long, value_name = "Z", value_parser = near, help_heading = "Rendering")]
     pub near: Option<f32>,
     /// Frames between two photos.
     #[arg(long, value_name = "N", default_value_t = 9, value_parser = clap::value_parser!(u32).range(..=999))]
@@ -47,14 +47,15 @@ pub struct DensifyArgs {
     /// Order of the photos.
     #[arg(long, value_name = "ORDER", value_enum, default_value = "path")]
     pub order: Order,
-    /// As the code of LabelGS: by name, world-to-camera translations interpolated, intrinsics of the photo before.
+    /// Follow the code of LabelGS: order by name, interpolated world-to-camera translations, intrinsics of the previous
+    /// photo.
     #[arg(long, conflicts_with = "order")]
     pub compat: bool,
-    /// Let the video go through the test views too; what is tracked then knows them.
+    /// Include the test views in the video. The tracked masks then depend on them.
     #[arg(long)]
     pub include_test: bool,
     /// Colour behind the scene: black, white, or R,G,B from 0 to 1.
-    #[arg(long, value_name = "COLOUR", value_parser = colour, default_value = "black")]
+    #[arg(long, value_name = "COLOUR", value_parser = colour, default_value = "black", help_heading = "Rendering")]
     pub background: [f32; 3],
     /// How the scene is read.
     #[command(flatten)]
@@ -89,7 +90,7 @@ pub(crate) fn run(args: &DensifyArgs, context: &Context) -> Result<()> {
     }
     drop(progress);
     let path = args.output.join(frames::FILE);
-    // Last, so that it stands for a video that is complete.
+    // Written last: its presence means that the video is complete.
     Frames::new(written).write(&path)?;
     if context.json || args.json.json {
         return stdout::print_json(&json!({
@@ -102,7 +103,7 @@ pub(crate) fn run(args: &DensifyArgs, context: &Context) -> Result<()> {
     stdout::print(&format!("{}: {} frames through {} photos\n", path.display(), stops.len(), views.len()))
 }
 
-/// The views in the order of the video; all have one size, because a tracker needs that.
+/// Returns the views in the order of the video. Fails if their sizes differ, because a tracker needs one size.
 fn ordered_views<'a>(args: &DensifyArgs, dataset: &'a Dataset) -> Result<Vec<&'a View>> {
     let views: Vec<&View> = if args.include_test { dataset.all() } else { dataset.train.iter().collect() };
     let Some(first) = views.first() else {
@@ -122,8 +123,8 @@ fn ordered_views<'a>(args: &DensifyArgs, dataset: &'a Dataset) -> Result<Vec<&'a
 
 fn unequal(scene: &Path, a: &View, b: &View) -> Error {
     let problem = format!(
-        "{} has {} x {} px and {} has {} x {} px; the frames of a video have one size, so scale the photos to one or \
-         track the groups as scenes of their own",
+        "{} has {} x {} px and {} has {} x {} px; all frames of a video need one size: scale the photos to one \
+         size, or make a scene of each size",
         a.name, a.camera.width, a.camera.height, b.name, b.camera.width, b.camera.height
     );
     Error::data(scene, "photos", problem)

@@ -17,7 +17,7 @@ pub struct DevicesArgs {
     pub json: JsonFlag,
 }
 
-/// Prints the devices. Fails if none of them can be used.
+/// Prints the devices. Fails if none is usable.
 pub(crate) fn run(args: &DevicesArgs, context: &Context) -> Result<()> {
     let mut options = GpuOptions::from_env()?;
     options.device = context.global.device.clone().or(options.device);
@@ -42,12 +42,12 @@ pub(crate) fn run(args: &DevicesArgs, context: &Context) -> Result<()> {
     }
 }
 
-/// The kernels that a device gets.
+/// Returns the kernel shape for a device.
 pub(crate) fn shape_of(device: &Capabilities) -> KernelShape {
     KernelShape::of(device)
 }
 
-/// The kernels in words.
+/// Returns the kernel shape as text.
 pub(crate) fn shape_text(shape: &KernelShape) -> String {
     format!(
         "subgroups of {}, tiles of {} x {} px, {} reads, sort digits of {} bits",
@@ -59,7 +59,7 @@ pub(crate) fn shape_text(shape: &KernelShape) -> String {
     )
 }
 
-/// The kernels as JSON.
+/// Returns the kernel shape as JSON.
 pub(crate) fn shape_json(shape: &KernelShape) -> Value {
     json!({
         "subgroup_size": shape.subgroup,
@@ -90,7 +90,7 @@ fn to_text(device: &Capabilities, picked: Option<usize>) -> String {
     text
 }
 
-/// What the engine needs and wishes of a device, a row each.
+/// Returns the required and optional features of a device, a row each.
 pub(crate) fn needs_text(device: &Capabilities) -> String {
     let row = |need: &Need| {
         let (what, needed, found) = (need.what, &need.needed, &need.found);
@@ -99,7 +99,7 @@ pub(crate) fn needs_text(device: &Capabilities) -> String {
     device.needs.iter().map(row).collect()
 }
 
-/// The same as JSON.
+/// Returns the same features as JSON.
 pub(crate) fn needs_json(device: &Capabilities) -> Vec<Value> {
     let row = |need: &Need| {
         json!({

@@ -1,4 +1,4 @@
-//! Interrupts: at once by default; a verb that has something to save asks to be told instead.
+//! Signals. By default the first one ends the process; a command with unsaved work asks for [`note_only`].
 
 use crate::{Error, Result};
 use signal_hook::consts::{SIGINT, SIGTERM};
@@ -6,14 +6,17 @@ use signal_hook::flag;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, LazyLock};
 
+/// Exit status after SIGINT.
+const INTERRUPTED: i32 = 130;
+
 /// True while the next signal ends the process at once.
 static AT_ONCE: LazyLock<Arc<AtomicBool>> = LazyLock::new(|| Arc::new(AtomicBool::new(true)));
 /// Exit status of the signal that came, or 0.
 static STATUS: LazyLock<Arc<AtomicUsize>> = LazyLock::new(|| Arc::new(AtomicUsize::new(0)));
 
-/// Sets the signal handlers. The order matters: the first signal is noted and arms the exit, the second one exits.
+/// Installs the signal handlers. Their order matters: the first signal is noted and arms the exit, the second exits.
 pub(crate) fn install() -> Result<()> {
-    for (signal, status) in [(SIGINT, 130), (SIGTERM, 143)] {
+    for (signal, status) in [(SIGINT, INTERRUPTED), (SIGTERM, 143)] {
         flag::register_conditional_shutdown(signal, status, Arc::clone(&AT_ONCE))
             .and_then(|_| flag::register_usize(signal, Arc::clone(&STATUS), status as usize))
             .and_then(|_| flag::register(signal, Arc::clone(&AT_ONCE)))
@@ -22,20 +25,25 @@ pub(crate) fn install() -> Result<()> {
     Ok(())
 }
 
-/// From now on the first signal is only noted; the caller looks at [`check`] often. A second one ends the process.
+/// Makes the first signal only noted; the caller polls [`check`]. A second signal ends the process.
 pub(crate) fn note_only() {
     AT_ONCE.store(false, Ordering::SeqCst);
 }
 
-/// The exit status of a signal that came.
-pub(crate) fn status() -> Option<i32> {
+/// Returns true if a signal came.
+pub(crate) fn is_noted() -> bool {
+    STATUS.load(Ordering::SeqCst) != 0
+}
+
+/// Returns the exit status of an interrupted process: that of the signal that came, or that of SIGINT.
+pub(crate) fn status() -> i32 {
     match STATUS.load(Ordering::SeqCst) {
-        0 => None,
-        status => i32::try_from(status).ok(),
+        0 => INTERRUPTED,
+        status => i32::try_from(status).unwrap_or(INTERRUPTED),
     }
 }
 
-/// An error if a signal came.
+/// Fails if a signal came.
 pub(crate) fn check() -> Result<()> {
-    status().map_or(Ok(()), |status| Err(Error::Interrupted(status)))
+    if is_noted() { Err(Error::Interrupted) } else { Ok(()) }
 }

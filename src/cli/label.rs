@@ -22,7 +22,7 @@ use std::time::Instant;
 /// `labelgs label`.
 #[derive(Args, Clone, Debug)]
 pub struct LabelArgs {
-    /// The model, of any trainer: a PLY, or the folder that `labelgs train` made. Labels that it has are replaced.
+    /// The model, of any trainer: a PLY, or the folder of a `labelgs train` run. Existing labels are replaced.
     #[arg(value_name = "MODEL")]
     pub model: PathBuf,
     /// Scene with the cameras of the masks.
@@ -34,35 +34,38 @@ pub struct LabelArgs {
     /// File to write.
     #[arg(short, long, value_name = "OUT.ply")]
     pub output: PathBuf,
-    /// How a Gaussian gets its label: by votes, or as the paper's training gives it, from the last of the views (in an
-    /// order drawn by --seed) in which it makes most of a pixel.
-    #[arg(long, value_name = "RULE", value_enum, default_value = "votes")]
+    /// How a Gaussian gets its label: by the votes of all views, or as in the paper's training, from the last view in
+    /// which it is the main Gaussian of a pixel. --seed draws the order of the views.
+    #[arg(long, value_name = "RULE", value_enum, default_value = "votes", help_heading = "Labels")]
     pub rule: LabelRule,
-    /// Seed of the order of views of the rule `main`.
-    #[arg(long, value_name = "SEED", default_value_t = 0)]
+    /// Seed of the order of the views. Only for the rule `main`.
+    #[arg(long, value_name = "SEED", default_value_t = 0, help_heading = "Labels")]
     pub seed: u64,
-    /// Least blending weight of the rule `main`.
-    #[arg(long, value_name = "WEIGHT", default_value_t = 0.6)]
+    /// Least blending weight that gives a label. Only for the rule `main`.
+    #[arg(long, value_name = "WEIGHT", default_value_t = 0.6, help_heading = "Labels")]
     pub label_threshold: f32,
-    /// Gaussian projection filter of the rule `main`, on or off.
-    #[arg(long, value_name = "SWITCH", value_parser = switch, default_value = "on")]
+    /// Gaussian projection filter, on or off. Only for the rule `main`.
+    #[arg(long, value_name = "SWITCH", value_parser = switch, default_value = "on", help_heading = "Labels")]
     pub gpf: bool,
-    /// Rounds of counting; from the second on, masks that disagree with all others count less.
-    #[arg(long, value_name = "N", default_value_t = 2, value_parser = clap::value_parser!(u32).range(1..=10))]
+    /// Rounds of counting votes. From the second round on, masks that disagree with all others count less.
+    #[arg(
+        long, value_name = "N", default_value_t = 2, value_parser = clap::value_parser!(u32).range(1..=10),
+        help_heading = "Labels"
+    )]
     pub rounds: u32,
-    /// Pixels so near to a contour of their mask have no vote, px; 2 suits masks of trackers.
-    #[arg(long, value_name = "PX", default_value_t = 0)]
+    /// Ignore the votes of pixels within this distance of a mask's contour, px; 2 suits masks of trackers.
+    #[arg(long, value_name = "PX", default_value_t = 0, help_heading = "Labels")]
     pub mask_border: u32,
-    /// Gaussians whose label has a smaller share of their votes get none.
-    #[arg(long, value_name = "SHARE", default_value_t = 0.0)]
+    /// Least share of a Gaussian's votes that its label needs; below, the Gaussian gets no label.
+    #[arg(long, value_name = "SHARE", default_value_t = 0.0, help_heading = "Labels")]
     pub min_confidence: f32,
-    /// Leave Gaussians that no pixel speaks for without a label, instead of asking their neighbours.
-    #[arg(long)]
+    /// Leave Gaussians without votes unlabelled. Otherwise they take the label of their neighbours.
+    #[arg(long, help_heading = "Labels")]
     pub no_complete: bool,
-    /// Gaussians nearer to the camera are not seen, world units; otherwise as in the run of the model, otherwise 0.2.
-    #[arg(long, value_name = "Z", value_parser = near)]
+    /// Near plane, world units: nearer Gaussians are not seen. Default: the value of the model's run, else 0.2.
+    #[arg(long, value_name = "Z", value_parser = near, help_heading = "Rendering")]
     pub near: Option<f32>,
-    /// How the scene is read; test views have no vote.
+    /// How the scene is read. Test views have no votes.
     #[command(flatten)]
     pub reading: SceneArgs,
     /// JSON.
@@ -76,7 +79,11 @@ pub(crate) fn run(args: &LabelArgs, context: &Context) -> Result<()> {
     let dataset = open_scene(&args.scene, &args.reading, Some(args.masks.clone()), [0.0; 3], true)?;
     let views: Vec<&View> = dataset.train.iter().filter(|view| view.mask.is_some()).collect();
     if views.is_empty() {
-        return Err(Error::data(&args.masks, "", "no training view has a mask here; see --test-every"));
+        return Err(Error::data(
+            &args.masks,
+            "",
+            "no training view has a mask here; check the names of the masks and --test-every",
+        ));
     }
     let gpu = open_gpu(context)?;
     let start = Instant::now();

@@ -1,4 +1,4 @@
-//! A model with the names of its labels: opened, and written after an edit.
+//! Reads a model with the names of its labels, and writes it after an edit.
 
 use super::args::JsonFlag;
 use super::context::{Context, open_model};
@@ -15,29 +15,29 @@ use serde_json::json;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-/// Where names come from.
+/// Source of the names of labels.
 #[derive(Args, Clone, Debug, Default)]
 pub struct TableArg {
-    /// Table with the names of labels; otherwise MODEL.labels.json beside the PLY, or labels.json of its run.
-    #[arg(long, value_name = "FILE")]
+    /// Table with the names of labels. Default: MODEL.labels.json beside the PLY, or labels.json of its run.
+    #[arg(long, value_name = "FILE", help_heading = "Labels")]
     pub label_table: Option<PathBuf>,
 }
 
 impl TableArg {
-    /// The table of a model, if there is one.
+    /// Reads the table of a model, if there is one.
     pub fn open(&self, model: &Path) -> Result<Option<LabelTable>> {
         let path = self.label_table.clone().or_else(|| LabelTable::find_for_model(model));
         path.map(|path| LabelTable::read(&path)).transpose()
     }
 }
 
-/// What every edit of labels is told.
+/// Arguments of every edit of labels.
 #[derive(Args, Clone, Debug)]
 pub struct EditArgs {
-    /// The model: a PLY, or the folder that `labelgs train` made.
+    /// The model: a PLY, or the folder of a `labelgs train` run.
     #[arg(value_name = "MODEL")]
     pub model: PathBuf,
-    /// File to write; names of its labels go to OUT.labels.json beside it.
+    /// File to write. Names of its labels go to OUT.labels.json beside it.
     #[arg(short, long, value_name = "OUT.ply")]
     pub output: PathBuf,
     /// Names.
@@ -51,18 +51,20 @@ pub struct EditArgs {
 /// Which Gaussians an object consists of.
 #[derive(Args, Clone, Copy, Debug)]
 pub struct MinConfidenceArg {
-    /// An object on its own is made of Gaussians with at least this label_confidence, if the model has any.
-    #[arg(long, value_name = "SHARE", value_parser = share, default_value_t = MIN_LABEL_CONFIDENCE)]
+    /// Least label_confidence of a Gaussian of a separate object, for models that have it.
+    #[arg(
+        long, value_name = "SHARE", value_parser = share, default_value_t = MIN_LABEL_CONFIDENCE,
+        help_heading = "Labels"
+    )]
     pub min_confidence: f32,
 }
 
 impl MinConfidenceArg {
-    /// The Gaussians of some labels that are sure enough; an error if there is none.
+    /// Returns the Gaussians of some labels with enough confidence. Fails if there is none.
     pub fn extract(&self, model: &Gaussians, labels: &[u32]) -> Result<Gaussians> {
         let part = extract(model, labels, self.min_confidence)?;
         if part.is_empty() {
-            let problem =
-                format!("no Gaussian of the labels has a confidence of {}; ask for less", self.min_confidence);
+            let problem = format!("no Gaussian of the labels has a confidence of {}; lower it", self.min_confidence);
             return Err(Error::usage("--min-confidence", problem));
         }
         Ok(part)
@@ -76,22 +78,22 @@ pub(crate) fn open(model: &Path, table: &TableArg) -> Result<(Gaussians, Catalog
     Ok((gaussians, known))
 }
 
-/// What an edit made.
+/// The result of an edit.
 pub(crate) struct Edited<'a> {
     /// File to write.
     pub output: &'a Path,
     /// The model.
     pub model: &'a Gaussians,
-    /// The names of its labels, where the source has names.
+    /// The names of its labels, if the source has names.
     pub table: Option<LabelTable>,
-    /// Gaussians of the source.
+    /// Number of Gaussians of the source.
     pub of: usize,
-    /// Labels that were chosen, or that the edit made.
+    /// Labels that were chosen or made.
     pub labels: &'a BTreeSet<u32>,
 }
 
 impl Edited<'_> {
-    /// Writes model and table and prints what was written; `more` are further fields of the JSON.
+    /// Writes model and table and prints a summary. `more` holds further fields of the JSON.
     pub(crate) fn finish(&self, print_json: bool, more: serde_json::Value) -> Result<()> {
         let left_out = write_model(self.output, self.model)?;
         let beside = LabelTable::beside(self.output);
@@ -115,7 +117,7 @@ impl Edited<'_> {
     }
 }
 
-/// True if JSON was asked for before or behind the verb.
+/// Returns true if `--json` was typed before or after the command.
 pub(crate) fn wants_json(context: &Context, here: &JsonFlag) -> bool {
     context.json || here.json
 }

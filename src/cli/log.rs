@@ -1,26 +1,29 @@
-//! Messages on standard error, and a progress bar that they do not tear.
+//! Messages on standard error, printed above the progress bars.
 
 use super::args::GlobalArgs;
+use super::wording;
+use crate::Error;
 use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::{IsTerminal, Write};
 use std::sync::LazyLock;
 use std::time::{Duration, Instant};
 use tracing_subscriber::EnvFilter;
 
-/// All bars of the process; log lines are printed above them.
+/// All progress bars of the process.
 static BARS: LazyLock<MultiProgress> =
     LazyLock::new(|| MultiProgress::with_draw_target(ProgressDrawTarget::stderr_with_hz(10)));
 
 /// Time between two plain progress lines.
 const PLAIN_EVERY: Duration = Duration::from_secs(10);
 
-/// Standard error, written while the bars are out of the way.
+/// Standard error. The bars are hidden during a write. Names of settings become flags.
 struct AboveBars;
 
 impl Write for AboveBars {
     fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
-        // A message that nobody can read ends no work; told of the failure, the logger would panic.
-        let _ = BARS.suspend(|| std::io::stderr().write_all(bytes));
+        // A closed standard error must not end the work, and the logger would panic on an error.
+        let text = wording::message(&String::from_utf8_lossy(bytes));
+        let _ = BARS.suspend(|| std::io::stderr().write_all(text.as_bytes()));
         Ok(bytes.len())
     }
 
@@ -29,7 +32,7 @@ impl Write for AboveBars {
     }
 }
 
-/// Starts logging; `RUST_LOG` wins over the flags. Later calls do nothing.
+/// Starts logging; `RUST_LOG` overrides the flags. Later calls do nothing.
 pub(crate) fn start(args: &GlobalArgs) {
     let level = match (args.quiet, args.verbose) {
         (true, _) => "error",
@@ -46,19 +49,20 @@ pub(crate) fn start(args: &GlobalArgs) {
         .with_target(false)
         .without_time()
         .try_init();
-    // A second start in one process, as tests make, keeps the first.
+    // A second start in one process, as in tests, keeps the first logger.
     drop(started);
 }
 
-/// Prints the error that ends the process; printed even when quiet.
-pub(crate) fn final_error(error: &dyn std::fmt::Display) {
+/// Prints the error that ends the process, even with `--quiet`.
+pub(crate) fn final_error(error: &Error) {
+    let error = wording::error(error);
     BARS.suspend(|| {
-        // There is nowhere to report a closed standard error.
+        // A closed standard error cannot be reported.
         let _ = writeln!(std::io::stderr(), "error: {error}");
     });
 }
 
-/// Progress of long work: a bar on a terminal, otherwise a log line now and then.
+/// Progress of long work: a bar on a terminal, otherwise a log line every [`PLAIN_EVERY`].
 pub(crate) struct Progress {
     bar: Option<ProgressBar>,
     what: &'static str,
@@ -68,7 +72,7 @@ pub(crate) struct Progress {
 }
 
 impl Progress {
-    /// Progress over `total` things called `what`, such as `steps`.
+    /// Starts progress over `total` items called `what`, such as `steps`.
     pub(crate) fn new(total: u64, what: &'static str, args: &GlobalArgs) -> Self {
         let bar = (!args.quiet && std::io::stderr().is_terminal()).then(|| {
             let template = "{bar:30} {pos}/{len} {msg} {per_sec} {eta} left";
@@ -79,7 +83,7 @@ impl Progress {
         Self { bar, what, total, start: now, last: now }
     }
 
-    /// `done` things are done; `message` tells more, such as the loss, and is only asked when it is shown.
+    /// Shows that `done` items are done. `message` adds details, such as the loss; it is only called when shown.
     pub(crate) fn set(&mut self, done: u64, message: impl FnOnce() -> String) {
         if let Some(bar) = &self.bar {
             bar.set_position(done);

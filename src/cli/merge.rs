@@ -17,28 +17,30 @@ pub struct MergeArgs {
     /// Model and output.
     #[command(flatten)]
     pub edit: EditArgs,
-    /// The labels that become one, by id or by name, such as 3,5 or cup,saucer.
+    /// The labels to merge, by id or by name, such as 3,5 or cup,saucer.
     #[arg(long, value_name = "LABELS", value_parser = picks)]
     pub labels: Picks,
-    /// Id of the result: one of them or a free one; otherwise the smallest of them.
+    /// Id of the result: one of --labels or a free id. Default: the smallest of --labels.
     #[arg(long, value_name = "ID", value_parser = label)]
     pub into: Option<u32>,
-    /// Name of the result; otherwise that of the label whose id it has, or the first of the others.
+    /// Name of the result. Default: the name of the label with that id, or the first name among the others.
     #[arg(long, value_name = "NAME")]
     pub name: Option<String>,
 }
 
-/// Writes the model with one label in place of several.
+/// Writes the model with several labels merged into one.
 pub(crate) fn run(args: &MergeArgs, context: &Context) -> Result<()> {
     let (model, known) = open(&args.edit.model, &args.edit.table)?;
     let labels = known.resolve("--labels", &args.labels.0)?;
     let smallest = labels.iter().copied().find(|&label| label != UNLABELLED);
     let into = match args.into.or(smallest) {
-        Some(UNLABELLED) | None => return Err(Error::usage("--into", "0 is no label; relabel makes labels 0")),
+        Some(UNLABELLED) | None => {
+            return Err(Error::usage("--into", "0 means no label; `labelgs relabel` removes labels"));
+        }
         Some(into) => into,
     };
     if known.gaussians.contains_key(&into) && !labels.contains(&into) {
-        let problem = format!("label {} is another one; list it in --labels too, or take a free id", known.title(into));
+        let problem = format!("label {} is another one; add it to --labels, or choose a free id", known.title(into));
         return Err(Error::usage("--into", problem));
     }
     let map: BTreeMap<u32, u32> = labels.iter().map(|&label| (label, into)).collect();

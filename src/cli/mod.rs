@@ -1,4 +1,4 @@
-//! The command line: what is typed, what is decided, and a verb per file.
+//! The command line: arguments, exit statuses, messages, and a file per command.
 
 pub(crate) mod ablate;
 pub(crate) mod args;
@@ -27,11 +27,13 @@ pub(crate) mod scene;
 pub(crate) mod select;
 pub(crate) mod selftest;
 pub(crate) mod split_components;
+pub(crate) mod status;
 pub(crate) mod stdout;
 pub(crate) mod synth;
 pub(crate) mod train;
 pub(crate) mod train_args;
 pub(crate) mod values;
+pub(crate) mod wording;
 
 use crate::Error;
 use clap::FromArgMatches;
@@ -40,7 +42,7 @@ use context::Context;
 use std::ffi::OsString;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-/// The process: parses `args`, runs the verb, reports an error, returns the exit status.
+/// Parses `args`, runs the command, reports an error and returns the exit status.
 pub fn main(args: impl IntoIterator<Item = OsString>) -> u8 {
     std::panic::set_hook(Box::new(|panic| {
         let place = panic.location().map_or(String::new(), |place| format!(" at {}:{}", place.file(), place.line()));
@@ -58,18 +60,18 @@ pub fn main(args: impl IntoIterator<Item = OsString>) -> u8 {
     let status = match catch_unwind(AssertUnwindSafe(|| run(args))) {
         Ok(Ok(())) => 0,
         Ok(Err(Exit::Clap(error))) => {
-            // A closed pipe while help is printed is no failure.
+            // A closed pipe while help is printed is not an error.
             let _ = error.print();
             error.exit_code()
         }
         Ok(Err(Exit::Error(error))) if stdout::is_closed(&error) => 0,
         Ok(Err(Exit::Error(error))) => {
             log::final_error(&error);
-            error.exit_status()
+            status::exit_status(&error)
         }
-        Err(_) => 70,
+        Err(_) => status::BUG,
     };
-    u8::try_from(status).unwrap_or(70)
+    u8::try_from(status).unwrap_or(u8::MAX)
 }
 
 /// Why a run ended early.

@@ -3,8 +3,8 @@
 use super::args::JsonFlag;
 use super::context::Context;
 use super::devices::{shape_json, shape_of, shape_text};
-use super::stdout;
 use super::values::{Size, bytes, count, size};
+use super::{stdout, wording};
 use crate::engine::{Engine, EngineSize, LabelSize, capacity};
 use crate::gpu::{self, GpuOptions};
 use crate::label::vote::ballot::COLUMNS_MAX;
@@ -31,7 +31,7 @@ pub struct PlanArgs {
     /// Degree of the spherical harmonics.
     #[arg(long, value_name = "DEGREE", value_parser = clap::value_parser!(u32).range(0..=3), default_value_t = 3)]
     pub sh_degree: u32,
-    /// Plan for a graphics card with so much memory, such as 24G, in place of the device of this machine.
+    /// Plan for a graphics card with this memory, such as 24G, instead of the device of this machine.
     #[arg(long, value_name = "SIZE", value_parser = bytes)]
     pub card: Option<u64>,
     /// JSON.
@@ -39,10 +39,10 @@ pub struct PlanArgs {
     pub json: JsonFlag,
 }
 
-/// Largest label id that is planned for; ids beyond it cost a few bytes each.
+/// Largest label id of the plan; a larger id costs a few bytes.
 const MAX_LABEL: u32 = 255;
 
-/// What is planned, and for which device.
+/// A step and its device.
 struct Subject {
     device: Option<String>,
     shape: KernelShape,
@@ -52,7 +52,7 @@ struct Subject {
     list: PassList,
 }
 
-/// Prints the plan of a step. A plan that is too large for the device is printed, and then fails.
+/// Prints the plan of a step. Fails afterwards if the plan exceeds the device.
 pub(crate) fn run(args: &PlanArgs, context: &Context) -> Result<()> {
     let subject = subject(args, context)?;
     let (planned, problem) = match planned(&subject, &subject.limits) {
@@ -86,7 +86,7 @@ fn subject(args: &PlanArgs, context: &Context) -> Result<Subject> {
     Ok(Subject { device, shape, limits, room, capacity, list })
 }
 
-/// A card as the large makers' drivers describe theirs: subgroups of 32, bindings and allocations of 4 GiB.
+/// Returns a typical graphics card: subgroups of 32, bindings and allocations of 4 GiB.
 fn card(memory: u64) -> (Option<String>, KernelShape, Limits) {
     const RANGE: u64 = u32::MAX as u64 & !0xffff;
     let limits = Limits { max_storage_range: RANGE, max_allocation: RANGE, max_memory: memory, ..Limits::default() };
@@ -94,7 +94,7 @@ fn card(memory: u64) -> (Option<String>, KernelShape, Limits) {
     (Some(name), KernelShape::new(32, false), limits)
 }
 
-/// The device's name, kernels and limits; without a device those of a software device.
+/// Returns the name, kernels and limits of the device, or those of a software device if there is none.
 fn device(context: &Context) -> Result<(Option<String>, KernelShape, Limits)> {
     let mut options = GpuOptions::from_env()?;
     options.device = context.global.device.clone().or(options.device);
@@ -104,7 +104,7 @@ fn device(context: &Context) -> Result<(Option<String>, KernelShape, Limits)> {
             Ok((Some(device.name.clone()), shape_of(device), device.limits.plan))
         }
         Ok((_, None)) if options.device.is_some() => {
-            Err(Error::NoDevice("the device that was asked for cannot be used; see labelgs devices".into()))
+            Err(Error::NoDevice("the chosen device is not usable; `labelgs devices` says why".into()))
         }
         Err(error) if options.device.is_some() => Err(error),
         Ok((_, None)) | Err(Error::NoDevice(_)) => {
@@ -122,7 +122,7 @@ fn planned(subject: &Subject, limits: &Limits) -> Result<(MemoryReport, Plan)> {
     Ok((memory, Plan::new(TABLE, &subject.capacity, &subject.list, limits, options)?))
 }
 
-/// The same limits with room for everything, to show what would be needed.
+/// Returns the limits with unlimited memory, for a report of the needed memory.
 fn without_sizes(limits: &Limits) -> Limits {
     const MUCH: u64 = 1 << 60;
     Limits { max_storage_range: MUCH, max_texel_elements: MUCH, max_allocation: MUCH, max_memory: MUCH, ..*limits }
@@ -169,7 +169,7 @@ fn to_json(subject: &Subject, (memory, plan): &(MemoryReport, Plan), problem: Op
         "instances": subject.capacity.instances,
         "layer_tiles": subject.capacity.layer_tiles,
         "fits": problem.is_none(),
-        "problem": problem.map(ToString::to_string),
+        "problem": problem.map(wording::error),
         "memory": {
             "buffers": buffers.collect::<Vec<_>>(),
             "scratch_pages": memory.step_pages,
@@ -222,7 +222,7 @@ fn passes(plan: &Plan) -> Vec<Value> {
     rows.collect()
 }
 
-/// Workgroups by axis, `"indirect"` where the device decides, null for copies and fills.
+/// Returns the workgroups by axis, `"indirect"` if the device decides, null for copies and fills.
 fn groups(work: &Work) -> Value {
     match work {
         Work::Pass(pass) => match pass.grid {

@@ -28,13 +28,13 @@ pub struct ProfileArgs {
     /// Scene to time.
     #[arg(value_name = "SCENE")]
     pub scene: Option<PathBuf>,
-    /// Time the scene of `labelgs synth` instead, with its masks.
+    /// Use the scene of `labelgs synth` and its masks instead of SCENE.
     #[arg(long)]
     pub synthetic: bool,
     /// Folder of id masks.
     #[arg(long, value_name = "DIR", conflicts_with = "synthetic")]
     pub masks: Option<PathBuf>,
-    /// Leave out the masks of --synthetic.
+    /// Use --synthetic without masks.
     #[arg(long, requires = "synthetic")]
     pub no_masks: bool,
     /// Steps to time.
@@ -43,40 +43,47 @@ pub struct ProfileArgs {
     /// Steps before the clock starts.
     #[arg(long, value_name = "N", default_value_t = 20)]
     pub warm_up: u32,
-    /// Train so many steps first, so that a trained scene is measured.
+    /// Train this many steps first, to measure a trained scene.
     #[arg(long, value_name = "S", default_value_t = 0)]
     pub from_step: u32,
-    /// Start from this model, a PLY or the folder that `labelgs train` made, instead of the scene's points.
+    /// Start from this model, a PLY or the folder of a `labelgs train` run, instead of the scene's points.
     #[arg(long, value_name = "MODEL")]
     pub model: Option<PathBuf>,
-    /// Settings of training in TOML, as config.toml of an earlier run. Labels start at --from-step at the latest.
-    #[arg(long, value_name = "FILE.toml")]
+    /// Settings in TOML, such as config.toml of an earlier run. Labels start at --from-step at the latest.
+    #[arg(long, value_name = "FILE.toml", help_heading = "Training")]
     pub config: Option<PathBuf>,
-    /// Let passes overlap as in training: the wall clock is then the true one, times of passes are what each added.
+    /// Let passes overlap as in training. Wall-clock times are then those of training; the time of a pass is what it
+    /// adds.
     #[arg(long)]
     pub overlap: bool,
-    /// Give each sampled object passes of its own, as the paper's reference code does, to see what one traversal saves.
+    /// Run separate passes for each sampled object, as in the paper's code, to measure the gain of one traversal.
     #[cfg(feature = "lab")]
     #[arg(long, conflicts_with = "compare")]
     pub separate_objects: bool,
     /// How the scene is read.
     #[command(flatten)]
     pub reading: SceneArgs,
-    /// Instead compare two files that --json wrote; fail with status 1 if a stage became slower beyond noise.
-    #[arg(long, value_names = ["OLD.json", "NEW.json"], num_args = 2, conflicts_with_all = ["scene", "synthetic", "model"])]
+    /// Compare two files of --json instead. Exit status 1 if a stage became slower beyond noise.
+    #[arg(
+        long, help_heading = "Comparison", value_names = ["OLD.json", "NEW.json"], num_args = 2,
+        conflicts_with_all = ["scene", "synthetic", "model"]
+    )]
     pub compare: Option<Vec<PathBuf>>,
-    /// With --compare: by how much a median may grow.
-    #[arg(long, value_name = "SHARE", value_parser = share, default_value_t = 0.05, requires = "compare")]
+    /// Share by which a median may grow in --compare.
+    #[arg(
+        long, value_name = "SHARE", value_parser = share, default_value_t = 0.05, requires = "compare",
+        help_heading = "Comparison"
+    )]
     pub tolerance: f32,
-    /// Write the numbers as JSON to FILE; without FILE print them.
-    #[arg(id = "json_file", long = "json", value_name = "FILE", num_args = 0..=1)]
+    /// Write the numbers as JSON to FILE, or to standard output without FILE.
+    #[arg(id = "json_file", long = "json", value_name = "FILE", num_args = 0..=1, help_heading = "Output")]
     pub json: Option<Option<PathBuf>>,
 }
 
-/// Steps after the timed ones that count pairs.
+/// Steps after the timed ones; they count pairs.
 const COUNTED: u32 = 10;
 
-/// Times steps inside of real training.
+/// Times steps of a real training.
 pub(crate) fn run(args: &ProfileArgs, context: &Context) -> Result<()> {
     if let Some([old, new]) = args.compare.as_deref() {
         return profile_compare::run([old, new], args.tolerance.into(), context.json || args.json.is_some());
@@ -109,7 +116,7 @@ pub(crate) fn run(args: &ProfileArgs, context: &Context) -> Result<()> {
     if context.json || matches!(args.json, Some(None)) { Ok(()) } else { stdout::print(&profile.to_text()) }
 }
 
-/// The configuration: labels are on in every timed step, and no timed step is the last one.
+/// Returns the configuration: every timed step has labels, and none is the last step.
 fn decide(args: &ProfileArgs) -> Result<TrainConfig> {
     let mut decided = match &args.config {
         Some(path) => Settings::read(path)?.train,
@@ -177,27 +184,27 @@ fn measure(trainer: &mut Trainer, args: &ProfileArgs, context: &Context, profile
     Ok(())
 }
 
-/// How many threads of the host run the passes; none on a graphics card.
+/// Returns the host threads that run the passes; `None` on a graphics card.
 fn workers(gpu: &Gpu) -> Result<Option<Workers>> {
     const NAME: &str = "LP_NUM_THREADS";
-    /// More than these lavapipe does not start.
+    /// lavapipe starts at most this many threads.
     const MOST: usize = 32;
     if !gpu.is_cpu() {
         return Ok(None);
     }
     let set = std::env::var(NAME).ok().filter(|text| !text.is_empty());
     let (count, source) = match set {
-        // 0 runs everything on the thread that submits.
+        // 0 runs everything on the submitting thread.
         Some(text) => match text.parse::<usize>() {
             Ok(count) => (count.max(1), NAME),
-            Err(_) => return Err(Error::usage(NAME, format!("`{text}` is no number of threads"))),
+            Err(_) => return Err(Error::usage(NAME, format!("is {text}, needs a whole number of threads"))),
         },
         None => (std::thread::available_parallelism().map_or(1, usize::from), "processors of this machine"),
     };
     Ok(Some(Workers { count: count.min(MOST), source }))
 }
 
-/// Processor time of this process, user and system, all threads.
+/// Returns the processor time of this process: user and system, all threads.
 #[cfg(unix)]
 fn cpu_time() -> Option<Duration> {
     let time = rustix::time::clock_gettime(rustix::time::ClockId::ProcessCPUTime);

@@ -7,19 +7,19 @@ use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// What `labelgs profile --json` wrote.
+/// A file of `labelgs profile --json`.
 #[derive(Clone, Debug)]
 pub struct Profile {
     json: Value,
-    /// Times of each stage in every step that counts, ms, and under `all` their sum.
+    /// Times of each stage in every counted step, ms; `all` is their sum.
     pub samples: BTreeMap<String, Vec<f64>>,
 }
 
 impl Profile {
-    /// Reads it from a file.
+    /// Reads a profile.
     pub fn read(path: &Path) -> Result<Self> {
         let json = serde_json::from_str(&read::text(path)?).map_err(|error| {
-            Error::data(path, format!("line {}", error.line()), format!("is no JSON of labelgs profile: {error}"))
+            Error::data(path, format!("line {}", error.line()), format!("is not the JSON of labelgs profile: {error}"))
         })?;
         let samples = samples(&json, path)?;
         Ok(Self { json, samples })
@@ -33,12 +33,12 @@ pub struct Row {
     pub stage: String,
     /// Median of the steps, ms, before and after.
     pub median: [f64; 2],
-    /// Slower beyond noise.
+    /// True if it became slower beyond noise.
     pub regressed: bool,
 }
 
-/// Prints stages and counters of both; fails if a stage of the new one is slower beyond noise: its median by more than
-/// `tolerance` (a share), and three quarters of its steps slower than three quarters of the old one's.
+/// Prints stages and counters of both profiles. Fails if a stage became slower beyond noise: its median grew by more
+/// than `tolerance` (a share), and its lower quartile exceeds the old upper quartile.
 pub(crate) fn run(files: [&Path; 2], tolerance: f64, as_json: bool) -> Result<()> {
     let [old, new] = [Profile::read(files[0])?, Profile::read(files[1])?];
     for what in ["device", "kernels", "labels", "size", "views", "worker_threads", "barrier_before_each_pass"] {
@@ -77,7 +77,7 @@ fn samples(profile: &Value, path: &Path) -> Result<BTreeMap<String, Vec<f64>>> {
     if samples.is_empty() { Err(wrong()) } else { Ok(samples) }
 }
 
-/// The stages that both have.
+/// Returns the stages that both profiles have.
 pub fn compare(old: &BTreeMap<String, Vec<f64>>, new: &BTreeMap<String, Vec<f64>>, tolerance: f64) -> Vec<Row> {
     let row = |(stage, before): (&String, &Vec<f64>)| {
         let after = new.get(stage)?;
@@ -94,7 +94,7 @@ fn quantile(values: &[f64], share: f64) -> f64 {
     sorted.get((sorted.len().saturating_sub(1) as f64 * share).round() as usize).copied().unwrap_or(f64::NAN)
 }
 
-/// Medians of the counters that both have.
+/// Returns the medians of the counters that both profiles have.
 fn counters(old: &Value, new: &Value) -> Vec<(String, [f64; 2])> {
     let Some(names) = old["counters"].as_object() else { return Vec::new() };
     let median = |profile: &Value, name: &str| profile["counters"][name]["median"].as_f64();

@@ -1,4 +1,4 @@
-//! What `labelgs profile` found, as a table and as JSON.
+//! The result of `labelgs profile`, as a table and as JSON.
 
 use super::devices::{shape_json, shape_of, shape_text};
 use crate::engine::EngineSize;
@@ -13,35 +13,35 @@ use std::time::Duration;
 /// Threads of the host that run the passes.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Workers {
-    /// How many.
+    /// Number of threads.
     pub count: usize,
-    /// Where the number comes from.
+    /// Source of the number.
     pub source: &'static str,
 }
 
 /// Which steps are timed, and how.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Window {
-    /// Passes overlap as in training.
+    /// True if passes overlap as in training.
     pub overlap: bool,
-    /// Steps of training before.
+    /// Steps of training before the warm-up.
     pub from_step: u32,
-    /// Steps after those whose times do not count.
+    /// Steps of the warm-up; their times do not count.
     pub warm_up: u32,
 }
 
-/// What the host's clocks say.
+/// Times by the clocks of the host.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Clocks {
-    /// All timed steps, with what came between them.
+    /// From the start of the first timed step to the end of the last.
     pub wall: Duration,
-    /// Each call of the trainer; two steps are in flight, so a call waits for an earlier step.
+    /// Each call of the trainer. Two steps are in flight, so a call waits for an earlier step.
     pub steps: Vec<Duration>,
-    /// Processor time of the process, where the system tells.
+    /// Processor time of the process, if the system reports it.
     pub cpu: Option<Duration>,
 }
 
-/// Median and 90th percentile.
+/// Median, 90th percentile and mean.
 #[derive(Clone, Copy, Debug, Default)]
 struct Spread {
     median: f64,
@@ -62,7 +62,7 @@ pub(super) struct Profile {
     pub views: usize,
     /// Gaussians at the end.
     pub gaussians: u32,
-    /// What the memory was sized for.
+    /// Sizes that the memory was planned for.
     pub size: EngineSize,
     clocks: Clocks,
     passes: Vec<(Stage, PassTime)>,
@@ -79,7 +79,7 @@ pub(super) struct Profile {
 }
 
 impl Profile {
-    /// An empty one.
+    /// Returns an empty profile.
     pub(super) fn new(gpu: &Gpu, workers: Option<Workers>, window: Window) -> Self {
         let found = gpu.capabilities();
         Self {
@@ -107,7 +107,7 @@ impl Profile {
         }
     }
 
-    /// Adds what was measured. The first run of a recording, in which drivers compile, counts for no pass.
+    /// Adds the measurements. The times of a recording's first run, in which drivers compile, are left out.
     pub(super) fn fill(&mut self, clocks: Clocks, reports: &[StepReport], mut times: Vec<StepTimes>) {
         let all = times.len();
         self.steps =
@@ -148,14 +148,14 @@ impl Profile {
         });
     }
 
-    /// Adds what further steps counted that were not timed: which share of the walked pairs had a weight.
+    /// Adds the counts of further, untimed steps: the share of the walked pairs with a weight.
     pub(super) fn fill_pairs(&mut self, reports: &[StepReport]) {
         let weighted: f64 = reports.iter().map(|step| f64::from(step.report.counters.contributing_pairs)).sum();
         let walked: f64 = reports.iter().map(walked_splats).sum();
         self.contributing = weighted / (walked * f64::from(self.shape.tile_pixels()));
     }
 
-    /// Steps that count for the passes.
+    /// Returns the number of steps that count for the passes.
     fn counted(&self) -> usize {
         self.steps.len() - self.left_out
     }
@@ -170,7 +170,7 @@ impl Profile {
         self.clocks.cpu.map(|time| time.as_secs_f64() * 1e3 / self.clocks.steps.len().max(1) as f64)
     }
 
-    /// Pairs walked at this device's pace are counted per worker thread, where there are any.
+    /// Returns the time per pair as text; on a software device, per worker thread.
     fn per_pair_text(&self) -> String {
         let [forward, backward] = self.ns_per_pair;
         let whose = match self.workers {
@@ -190,7 +190,7 @@ impl Profile {
         )
     }
 
-    /// The table.
+    /// Returns the profile as a table.
     pub(super) fn to_text(&self) -> String {
         let (first, last) =
             (self.from_step + self.warm_up + 1, self.from_step + self.warm_up + self.steps.len() as u32);
@@ -227,7 +227,7 @@ impl Profile {
         text + "\n" + &self.per_pair_text()
     }
 
-    /// Everything.
+    /// Returns the profile as JSON.
     pub(super) fn to_json(&self) -> Value {
         let row = |(stage, pass): &(Stage, PassTime)| {
             json!({
@@ -301,7 +301,8 @@ fn walked_splats(step: &StepReport) -> f64 {
     step.report.counters.walked_splats() as f64
 }
 
-/// What the fuller half of the workgroups walks, by the mean of both: 1 is even, 2 is all in one half.
+/// Returns the pairs walked by the busier half of the workgroups over the mean of both halves: 1 is even, 2 is all in
+/// one half.
 fn balance(step: &StepReport) -> f64 {
     let counters = &step.report.counters;
     f64::from(counters.walked_first.max(counters.walked_second)) / (0.5 * walked_splats(step)).max(1.0)
@@ -311,7 +312,7 @@ fn ms(ns: u64) -> f64 {
     ns as f64 / 1e6
 }
 
-/// Rows by stage and by what `label` makes of an item's name, in the order of the step.
+/// Returns rows by stage and by `label` of an item's name, in the order of the step.
 fn rows(times: &[StepTimes], label: impl Fn(&str) -> &str) -> Vec<(Stage, PassTime)> {
     let mut profiler = Profiler::with_warm_up(0);
     let mut named: HashMap<String, (Stage, String)> = HashMap::new();

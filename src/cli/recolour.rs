@@ -18,12 +18,12 @@ pub struct RecolourArgs {
     /// Colour of the labels: black, white, or R,G,B from 0 to 1.
     #[arg(long, value_name = "COLOUR", value_parser = colour)]
     pub colour: [f32; 3],
-    /// Share of that colour; below 1 the rest is the old one, with its light and shade.
+    /// Share of the new colour, 0 to 1; the rest is the old colour, which keeps light and shade.
     #[arg(long, value_name = "SHARE", value_parser = share, default_value_t = 1.0)]
     pub mix: f32,
 }
 
-/// Writes the model with the colour.
+/// Writes the model with the new colour.
 pub(crate) fn run(args: &RecolourArgs, context: &Context) -> Result<()> {
     let select = &args.select;
     let (model, known) = open(&select.model, &select.choice.prompts.table)?;

@@ -15,7 +15,8 @@ pub struct RelabelArgs {
     /// Model and output.
     #[command(flatten)]
     pub edit: EditArgs,
-    /// Old and new ids, all changed at once, such as 3=7,4=0; 0 is no label, and a new id that is in use is joined.
+    /// Old and new ids, all changed at once, such as 3=7,4=0. 0 means no label; a new id that is in use merges with its
+    /// label.
     #[arg(long, value_name = "OLD=NEW,..", value_parser = renumbering)]
     pub map: Renumbering,
 }

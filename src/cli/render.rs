@@ -21,7 +21,7 @@ use std::path::PathBuf;
 #[derive(Args, Clone, Debug)]
 #[command(group(clap::ArgGroup::new("from").required(true).args(["scene", "camera"])))]
 pub struct RenderArgs {
-    /// The model: a PLY, or the folder that `labelgs train` made.
+    /// The model: a PLY, or the folder of a `labelgs train` run.
     #[arg(value_name = "MODEL")]
     pub model: PathBuf,
     /// Scene whose cameras to use.
@@ -30,13 +30,13 @@ pub struct RenderArgs {
     /// Which views: test, train, all, or names with commas between.
     #[arg(long, value_name = "VIEWS", default_value = "test", conflicts_with = "camera")]
     pub views: String,
-    /// A camera of its own: JSON with w2c (4 x 4), fx, fy, cx, cy, W, H.
+    /// Camera to use instead of a scene: JSON with w2c (4 x 4), fx, fy, cx, cy, W, H.
     #[arg(long, value_name = "CAM.json")]
     pub camera: Option<PathBuf>,
     /// Folder for the pictures, NAME.WHAT.png or .exr.
     #[arg(short, long, value_name = "DIR")]
     pub output: PathBuf,
-    /// What to write of each view, with commas between.
+    /// Pictures to write of each view, with commas between.
     #[arg(long, value_name = "WHAT", value_enum, value_delimiter = ',', default_value = "rgb")]
     pub what: Vec<What>,
     /// Render only these labels, such as 1,4-6,cup, or those that --name, --at, --box and --mask choose.
@@ -45,17 +45,17 @@ pub struct RenderArgs {
     /// Render all but these labels, or all but those that --name, --at, --box and --mask choose.
     #[arg(long, value_name = "LABELS", value_parser = picks, num_args = 0..=1)]
     pub without: Option<Option<Picks>>,
-    /// Which Gaussians of the labels of --only.
+    /// Gaussians of `--only`.
     #[command(flatten)]
     pub sure: MinConfidenceArg,
     /// Labels by name and by place.
     #[command(flatten)]
     pub prompts: PromptArgs,
-    /// Kind of file.
-    #[arg(long, value_name = "FORMAT", value_enum, default_value = "png")]
+    /// File format.
+    #[arg(long, value_name = "FORMAT", value_enum, default_value = "png", help_heading = "Output")]
     pub format: Format,
     /// Colour behind the scene: black, white, or R,G,B from 0 to 1.
-    #[arg(long, value_name = "COLOUR", value_parser = colour, default_value = "black")]
+    #[arg(long, value_name = "COLOUR", value_parser = colour, default_value = "black", help_heading = "Rendering")]
     pub background: [f32; 3],
     /// How the scene is read.
     #[command(flatten)]
@@ -69,7 +69,7 @@ pub struct RenderArgs {
 pub(crate) fn run(args: &RenderArgs, context: &Context) -> Result<()> {
     let exr_only = args.what.iter().find(|what| matches!(what, What::TopId | What::TopWeight));
     if args.format == Format::Png && exr_only.is_some() {
-        return Err(Error::usage("--what", "top-id and top-weight are 32-bit values; say --format exr"));
+        return Err(Error::usage("--what", "top-id and top-weight are 32-bit values; use --format exr"));
     }
     let shown = shown(args, context)?;
     let near = near_plane(&args.model, args.prompts.near)?;
@@ -92,15 +92,15 @@ pub(crate) fn run(args: &RenderArgs, context: &Context) -> Result<()> {
     files.iter().try_for_each(|file| stdout::print(&format!("{file}\n")))
 }
 
-/// The part of the model that is to be seen.
+/// Returns the visible part of the model.
 fn shown(args: &RenderArgs, context: &Context) -> Result<Gaussians> {
     let (flag, picks) = match (&args.only, &args.without) {
         (Some(picks), _) => ("--only", picks),
         (None, Some(picks)) => ("--without", picks),
         (None, None) if args.prompts.is_empty() => return open_model(&args.model),
         (None, None) => {
-            let problem = "or --without is needed to say what becomes of the labels that --name, --at, --box or --mask \
-                           choose";
+            let problem = "or --without is needed: it says what to do with the labels that --name, --at, --box or \
+                           --mask choose";
             return Err(Error::usage("--only", problem));
         }
     };

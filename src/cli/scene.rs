@@ -1,4 +1,4 @@
-//! What the verbs that render share: the device, the scene, its views.
+//! What commands that render share: the device, the scene, its views.
 
 use super::args::SceneArgs;
 use super::context::Context;
@@ -15,8 +15,8 @@ use crate::verify::selftest;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// The near plane to render a model with, world units: what was typed, else what the run of the model was trained with
-/// (its config.toml), else 0.2 (3DGS).
+/// Returns the near plane to render a model with, world units: the typed value, else that of the model's run (its
+/// config.toml), else 0.2 (3DGS).
 pub fn near_plane(model: &Path, typed: Option<f32>) -> Result<f32> {
     match typed {
         Some(near) => Ok(near),
@@ -24,18 +24,17 @@ pub fn near_plane(model: &Path, typed: Option<f32>) -> Result<f32> {
     }
 }
 
-/// Opens the device that was asked for and says which it is. One whose subgroups may not be what it tells has to prove
-/// itself first.
+/// Opens the chosen device and logs its name. If its subgroup size cannot be set, it runs a trial step first.
 pub(crate) fn open_gpu(context: &Context) -> Result<Arc<Gpu>> {
     let gpu = open_untried(context)?;
     if !gpu.capabilities().subgroup.is_pinned {
-        tracing::info!("this device does not let subgroup sizes be chosen: a step is tried first");
+        tracing::info!("the subgroup size of this device cannot be set: running a trial step first");
         selftest::canary(&gpu)?;
     }
     Ok(gpu)
 }
 
-/// The same without proof.
+/// Opens the chosen device without a trial step.
 pub(crate) fn open_untried(context: &Context) -> Result<Arc<Gpu>> {
     let mut options = GpuOptions::from_env()?;
     if let Some(device) = &context.global.device {
@@ -50,7 +49,7 @@ pub(crate) fn open_untried(context: &Context) -> Result<Arc<Gpu>> {
     Ok(gpu)
 }
 
-/// Reads a scene and logs what a person should know about it.
+/// Reads a scene and logs its notes.
 pub(crate) fn open_scene(
     path: &Path,
     reading: &SceneArgs,
@@ -64,7 +63,7 @@ pub(crate) fn open_scene(
     io::open_logged(path, &reading.read.into_options(options))
 }
 
-/// The views that `test`, `train`, `all` or a list of names means.
+/// Returns the views for `test`, `train`, `all` or a list of names.
 pub(crate) fn pick_views<'a>(dataset: &'a Dataset, which: &str) -> Result<Vec<&'a View>> {
     let views: Vec<&View> = match which {
         "test" => dataset.test.iter().collect(),
@@ -75,13 +74,13 @@ pub(crate) fn pick_views<'a>(dataset: &'a Dataset, which: &str) -> Result<Vec<&'
     if views.is_empty() {
         return Err(Error::usage(
             "--views",
-            format!("the scene has no {which} views; say --views all, or see --test-every"),
+            format!("the scene has no {which} views; use --views all, or change --test-every"),
         ));
     }
     Ok(views)
 }
 
-/// The view of a name, with or without its extension.
+/// Returns the view with a name, with or without its extension.
 pub(crate) fn find_view<'a>(dataset: &'a Dataset, name: &str) -> Result<&'a View> {
     let all = dataset.all();
     let found =
@@ -89,8 +88,8 @@ pub(crate) fn find_view<'a>(dataset: &'a Dataset, name: &str) -> Result<&'a View
     found.copied().ok_or_else(|| {
         let some: Vec<&str> = all.iter().take(8).map(|view| view.name.as_str()).collect();
         Error::usage(
-            "view",
-            format!("there is no view {name}; the scene has {} ... ({} in all)", some.join(", "), all.len()),
+            "name of a view",
+            format!("no view is called {name}; the scene has {} ... ({} in all)", some.join(", "), all.len()),
         )
     })
 }
@@ -99,7 +98,7 @@ fn without_extension(name: &str) -> String {
     Path::new(name).with_extension("").to_string_lossy().into_owned()
 }
 
-/// An engine that renders `model`, which is not yet on it, at up to the largest of `sizes`.
+/// Returns an engine with memory for `model` and the largest of `sizes`; the model is not uploaded.
 pub(crate) fn render_engine(
     gpu: Arc<Gpu>,
     model: &Gaussians,

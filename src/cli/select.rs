@@ -18,10 +18,10 @@ use std::path::PathBuf;
 /// `labelgs remove`, and most of `labelgs extract`.
 #[derive(Args, Clone, Debug)]
 pub struct SelectArgs {
-    /// The model: a PLY, or the folder that `labelgs train` made.
+    /// The model: a PLY, or the folder of a `labelgs train` run.
     #[arg(value_name = "MODEL")]
     pub model: PathBuf,
-    /// File to write; names of its labels go to OUT.labels.json beside it.
+    /// File to write. Names of its labels go to OUT.labels.json beside it.
     #[arg(short, long, value_name = "OUT.ply")]
     pub output: PathBuf,
     /// Which labels.
@@ -41,7 +41,7 @@ pub struct ExtractArgs {
     /// Which Gaussians of the labels.
     #[command(flatten)]
     pub sure: MinConfidenceArg,
-    /// Leave out detached specks: connected parts of a label that are smaller than --min-share.
+    /// Leave out specks: connected parts of a label that are smaller than --min-share.
     #[arg(long)]
     pub drop_specks: bool,
     /// What a speck is.
@@ -49,26 +49,26 @@ pub struct ExtractArgs {
     pub grouping: GroupingArgs,
 }
 
-/// What is connected, and what is a speck.
+/// Definition of connected parts and specks.
 #[derive(Args, Clone, Debug)]
 #[command(next_help_heading = "Connected parts")]
 pub struct GroupingArgs {
-    /// A part with a smaller share of the label's Gaussians is a speck; the largest part never is.
+    /// Least share of the label's Gaussians; a smaller part is a speck. The largest part never is one.
     #[arg(long, value_name = "SHARE", value_parser = share, default_value_t = 0.05)]
     pub min_share: f32,
-    /// Gaussians are connected when their ellipsoids of two standard deviations are at most this far apart, world units.
+    /// Largest gap between the ellipsoids (two standard deviations) of connected Gaussians, world units.
     #[arg(long, value_name = "DISTANCE", value_parser = distance, default_value_t = 0.0)]
     pub gap: f64,
 }
 
 impl GroupingArgs {
-    /// As the components want it.
+    /// Returns the rule for connected parts.
     pub fn grouping(&self) -> Grouping {
         Grouping { gap: self.gap, min_share: f64::from(self.min_share) }
     }
 }
 
-/// Writes the chosen labels.
+/// Writes the Gaussians of the chosen labels.
 pub(crate) fn run_extract(args: &ExtractArgs, context: &Context) -> Result<()> {
     let select = &args.select;
     let (model, known) = open(&select.model, &select.choice.prompts.table)?;
@@ -85,7 +85,7 @@ pub(crate) fn run_extract(args: &ExtractArgs, context: &Context) -> Result<()> {
     edited.finish(wants_json(context, &select.json), json!({ "specks": whole.len() - part.len() }))
 }
 
-/// Writes all but the chosen labels.
+/// Writes the Gaussians of all other labels.
 pub(crate) fn run_remove(args: &SelectArgs, context: &Context) -> Result<()> {
     let (model, known) = open(&args.model, &args.choice.prompts.table)?;
     let labels = args.choice.labels(&args.model, &model, &known, context)?;

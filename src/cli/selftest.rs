@@ -19,7 +19,7 @@ pub struct SelftestArgs {
     pub json: JsonFlag,
 }
 
-/// Runs the checks and prints a row for each. Fails if one does.
+/// Runs the checks and prints a row for each. Fails if a check fails.
 pub(crate) fn run(args: &SelftestArgs, context: &Context) -> Result<()> {
     let gpu = open_untried(context)?;
     let (found, kernels) = (gpu.capabilities(), KernelShape::of(gpu.capabilities()));

@@ -16,10 +16,10 @@ pub struct SplitArgs {
     /// Model and output.
     #[command(flatten)]
     pub edit: EditArgs,
-    /// The labels to split, each for itself, by id or by name. The largest part keeps the id, others get free ones.
+    /// Labels to split, by id or by name. The largest part of a label keeps its id; the other parts get free ids.
     #[arg(long, value_name = "LABELS", value_parser = picks)]
     pub labels: Picks,
-    /// What becomes of parts below --min-share.
+    /// What to do with parts smaller than --min-share.
     #[arg(long, value_name = "WHAT", value_enum, default_value = "keep")]
     pub specks: Specks,
     /// What is connected.

@@ -1,4 +1,4 @@
-//! Results, on standard output and nowhere else.
+//! Results, on standard output.
 
 use crate::{Error, Result};
 use std::io::{ErrorKind, Write};
@@ -17,7 +17,7 @@ pub(crate) fn print_json(value: &impl serde::Serialize) -> Result<()> {
     print(&format!("{text}\n"))
 }
 
-/// True for the error of a reader that has seen enough, such as `head`.
+/// Returns true if the reader of standard output closed it, as `head` does.
 pub(crate) fn is_closed(error: &Error) -> bool {
     matches!(error, Error::Write { path, source }
         if path.as_os_str() == NAME && source.kind() == ErrorKind::BrokenPipe)

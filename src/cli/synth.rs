@@ -14,10 +14,10 @@ use std::path::PathBuf;
 /// `labelgs synth`.
 #[derive(Args, Clone, Debug)]
 pub struct SynthArgs {
-    /// Folder to make; must be new or empty.
+    /// Folder to write; must be new or empty.
     #[arg(value_name = "DIR")]
     pub folder: PathBuf,
-    /// Which objects.
+    /// Set of objects.
     #[arg(long, value_name = "PRESET", value_enum, default_value = "default")]
     pub preset: Preset,
     /// Size of a picture, px.
@@ -26,7 +26,7 @@ pub struct SynthArgs {
     /// Number of views.
     #[arg(long, value_name = "N", default_value_t = 40)]
     pub views: u32,
-    /// Number of 3-D points.
+    /// Number of 3D points.
     #[arg(long, value_name = "N", default_value_t = 4000)]
     pub points: u32,
     /// Seed of colours, camera jitter and points.
@@ -37,7 +37,7 @@ pub struct SynthArgs {
     pub json: JsonFlag,
 }
 
-/// Makes the scene.
+/// Writes the scene.
 pub(crate) fn run(args: &SynthArgs, context: &Context) -> Result<()> {
     let options = SynthOptions {
         preset: args.preset,

@@ -8,7 +8,7 @@ use super::{interrupt, stdout};
 use crate::Result;
 use crate::run::{self, Event, Flow, Live, Observer, Request, Settings, Summary};
 
-/// Trains a model and prints what came of it.
+/// Trains a model and prints a summary.
 pub(crate) fn run(args: &TrainArgs, context: &Context) -> Result<()> {
     let settings = |checkpoint: Option<&Settings>| args.how.settings(checkpoint);
     let request = args.how.request((&args.scene, &args.output), args.masks.clone(), &settings)?;
@@ -19,7 +19,7 @@ pub(crate) fn run(args: &TrainArgs, context: &Context) -> Result<()> {
     stdout::print(&sentence(&summary))
 }
 
-/// Trains before the eyes of whoever sits at the terminal; a signal ends it, with everything saved.
+/// Trains with progress on the terminal. A signal ends the run after it saved its state.
 pub(super) fn train(request: &Request, context: &Context) -> Result<Summary> {
     let open = || {
         interrupt::check()?;
@@ -29,7 +29,7 @@ pub(super) fn train(request: &Request, context: &Context) -> Result<Summary> {
     if summary.stopped { interrupt::check().map(|()| summary) } else { Ok(summary) }
 }
 
-/// Shows the progress, and turns a signal into the end of the run.
+/// Shows progress, and stops the run after a signal.
 struct Terminal<'a> {
     context: &'a Context,
     progress: Option<Progress>,
@@ -39,7 +39,7 @@ impl Observer for Terminal<'_> {
     fn on(&mut self, event: &Event<'_>, live: &mut Live<'_>) -> Result<Flow> {
         match *event {
             Event::Started { steps, .. } => {
-                // From here on there is something to save.
+                // From here on the run has work to save.
                 interrupt::note_only();
                 self.progress = Some(Progress::new(u64::from(steps), "steps", &self.context.global));
             }
@@ -57,7 +57,7 @@ impl Observer for Terminal<'_> {
             }
             _ => {}
         }
-        Ok(if interrupt::status().is_some() { Flow::Stop } else { Flow::Continue })
+        Ok(if interrupt::is_noted() { Flow::Stop } else { Flow::Continue })
     }
 }
 

@@ -1,4 +1,5 @@
-//! What `labelgs train` can be told. Every setting is a field of the run's own structs; see [`crate::options`](mod@crate::options).
+//! Arguments of `labelgs train`. The settings are fields of the run's own structs; see
+//! [`crate::options`](mod@crate::options).
 
 use super::args::{JsonFlag, ReadArgs};
 use super::values::bytes;
@@ -17,10 +18,10 @@ pub struct TrainArgs {
     /// Folder of the scene (COLMAP or transforms.json), or one .json file.
     #[arg(value_name = "SCENE")]
     pub scene: PathBuf,
-    /// Folder for the model, the configuration and the records of the run.
+    /// Folder for the model, its settings and the logs of the run.
     #[arg(short, long, value_name = "OUT")]
     pub output: PathBuf,
-    /// Folder of id masks, one per view by name; without it the model has no labels.
+    /// Folder of id masks, one per view by name. Without masks the model has no labels.
     #[arg(long, value_name = "DIR")]
     pub masks: Option<PathBuf>,
     /// JSON.
@@ -31,39 +32,39 @@ pub struct TrainArgs {
     pub how: TrainFlags,
 }
 
-/// How a training is done, whatever its scene and folder.
+/// Flags of a training, without scene and folder.
 #[derive(Args, Clone, Debug)]
 pub struct TrainFlags {
-    /// Go on from the newest checkpoint in OUT, with its settings and masks; without one, start at step 1.
+    /// Go on from the newest checkpoint in OUT, with its settings and masks. Without a checkpoint, start at step 1.
     #[arg(long)]
     pub resume: bool,
-    /// Open the device again if it is lost, and go on from the newest checkpoint, as long as there is a new one each
-    /// time. The pass that lost it is named, at some cost in time.
-    #[arg(long)]
+    /// Reopen a lost device and go on from the newest checkpoint, as long as each attempt makes a new checkpoint. Names
+    /// the pass that lost the device; this costs some time.
+    #[arg(long, help_heading = "Device")]
     pub restart: bool,
     /// Folder of depth maps for --occlusion depth, one per photo by name: 16-bit PNG, EXR, NPY or PFM.
-    #[arg(long, value_name = "DIR", requires = "depth_kind")]
+    #[arg(long, value_name = "DIR", requires = "depth_kind", help_heading = "Labels")]
     pub depths: Option<PathBuf>,
-    /// What the numbers of --depths mean.
-    #[arg(long, value_name = "KIND", value_enum, requires = "depths")]
+    /// Meaning of the values in --depths.
+    #[arg(long, value_name = "KIND", value_enum, requires = "depths", help_heading = "Labels")]
     pub depth_kind: Option<DepthKind>,
-    /// Occluders to use, as `labelgs occlusion` and an earlier run write them.
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["occlusion", "depths"])]
+    /// File of occluders, as written by `labelgs occlusion` or an earlier run.
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["occlusion", "depths"], help_heading = "Labels")]
     pub occlusion_file: Option<PathBuf>,
-    /// Settings in TOML, as config.toml of an earlier run; flags win over it.
-    #[arg(long, value_name = "FILE.toml")]
+    /// Settings in TOML, such as config.toml of an earlier run. Flags override them.
+    #[arg(long, value_name = "FILE.toml", help_heading = "Training")]
     pub config: Option<PathBuf>,
-    /// Most memory of the device to use, such as 1500M or 2G: the number of Gaussians stays below what that holds.
-    #[arg(long, value_name = "SIZE", value_parser = bytes)]
+    /// Limit of device memory, such as 1500M or 2G. It bounds the number of Gaussians.
+    #[arg(long, value_name = "SIZE", value_parser = bytes, help_heading = "Device")]
     pub memory_limit: Option<u64>,
-    /// What is let through of the scene; the same has to be typed again with --resume.
+    /// Tolerance for the scene. `--resume` needs the same flags again.
     #[command(flatten)]
     pub trust: ReadArgs,
     /// Start from the settings of the LabelGS paper, where ours differ:
-    #[arg(long, conflicts_with = "config", help_heading = "Run")]
+    #[arg(long, conflicts_with = "config", help_heading = "Training")]
     pub paper: bool,
-    /// Hold out nothing.
-    #[arg(long, conflicts_with = "test_every", help_heading = "Run")]
+    /// Train on all views; hold out none.
+    #[arg(long, conflicts_with = "test_every", help_heading = "Scene")]
     pub no_test: bool,
     /// How the scene is read.
     #[command(flatten)]
@@ -71,16 +72,16 @@ pub struct TrainFlags {
     /// The training.
     #[command(flatten)]
     pub train: Typed<TrainConfig>,
-    /// What is written on the way.
+    /// Files of the run.
     #[command(flatten)]
     pub run: Typed<RunOptions>,
 }
 
 impl TrainFlags {
-    /// The settings, checked: flag before file before those of the checkpoint before default.
+    /// Returns the checked settings. A flag overrides a file, a file overrides a checkpoint, a checkpoint the default.
     pub fn settings(&self, checkpoint: Option<&Settings>) -> Result<Settings> {
         let mut settings = match (&self.config, checkpoint) {
-            // A configuration that is named again is compared as a whole.
+            // A run that goes on compares the whole file with its checkpoint.
             (Some(path), _) => Settings::read(path)?,
             (None, _) if self.paper => Settings::paper(),
             (None, found) => found.cloned().unwrap_or_default(),
@@ -99,7 +100,7 @@ impl TrainFlags {
         Ok(settings)
     }
 
-    /// A training of a scene into a folder, with settings that follow from those of a checkpoint or of none.
+    /// Returns the request to train a scene into a folder. `settings` maps a checkpoint's settings to the new ones.
     pub fn request<'a>(
         &self,
         (scene, output): (&Path, &Path),
@@ -113,7 +114,7 @@ impl TrainFlags {
         };
         if masks.is_none() && occluders.is_some() {
             let flag = if self.depths.is_some() { "--depths" } else { "--occlusion-file" };
-            return Err(Error::usage(flag, "needs the masks of the objects too: --masks DIR"));
+            return Err(Error::usage(flag, "needs the masks of the objects: --masks DIR"));
         }
         let inputs = Inputs {
             masks,

@@ -19,7 +19,7 @@ pub struct At {
     pub pixel: [u32; 2],
 }
 
-/// A box in a view: first column and row, and the ones behind the last.
+/// A box in a view: first column and row, and one past the last.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct BoxAt {
     /// Name of the view.
@@ -36,7 +36,7 @@ pub struct Renumbering(pub BTreeMap<u32, u32>);
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Size(pub u32, pub u32);
 
-/// Labels such as `1,4-6,cup`. What has only digits and dashes is an id or a range of ids.
+/// Parses labels such as `1,4-6,cup`. Digits and dashes alone are an id or a range of ids.
 pub(crate) fn picks(text: &str) -> Result<Picks, String> {
     let pick = |part: &str| {
         if part.is_empty() {
@@ -47,22 +47,26 @@ pub(crate) fn picks(text: &str) -> Result<Picks, String> {
         }
         let (first, last) = part.split_once('-').unwrap_or((part, part));
         let (first, last) = (label(first)?, label(last)?);
-        if first > last { Err(format!("`{part}` runs backwards")) } else { Ok(Pick::Ids(first, last)) }
+        if first > last {
+            Err(format!("`{part}` runs backwards; expected FIRST-LAST"))
+        } else {
+            Ok(Pick::Ids(first, last))
+        }
     };
     text.split(',').map(|part| pick(part.trim())).collect::<Result<_, _>>().map(Picks)
 }
 
-/// A label, 0 for none.
+/// Parses a label; 0 means no label.
 pub(crate) fn label(text: &str) -> Result<u32, String> {
     let id = text.trim().parse().ok().filter(|&id| id <= LABEL_MAX);
-    id.ok_or_else(|| format!("`{text}` is no label; labels are whole numbers from 0 to {LABEL_MAX}, such as 1,4-6"))
+    id.ok_or_else(|| format!("`{text}` is not a label; labels are whole numbers from 0 to {LABEL_MAX}, such as 1,4-6"))
 }
 
-/// Old and new labels such as `3=7,4=0`.
+/// Parses old and new labels such as `3=7,4=0`.
 pub(crate) fn renumbering(text: &str) -> Result<Renumbering, String> {
     let mut map = BTreeMap::new();
     for part in text.split(',') {
-        let (old, new) = part.split_once('=').ok_or_else(|| format!("`{part}` is no OLD=NEW, such as 3=7"))?;
+        let (old, new) = part.split_once('=').ok_or_else(|| format!("`{part}` is not OLD=NEW, such as 3=7"))?;
         let (old, new) = (label(old)?, label(new)?);
         if map.insert(old, new).is_some() {
             return Err(format!("{old} gets two new labels"));
@@ -71,13 +75,13 @@ pub(crate) fn renumbering(text: &str) -> Result<Renumbering, String> {
     Ok(Renumbering(map))
 }
 
-/// A pixel of a view such as `004:120,80`.
+/// Parses a pixel of a view such as `004:120,80`.
 pub(crate) fn at(text: &str) -> Result<At, String> {
     let (view, pixel) = in_view(text, "VIEW:x,y in whole px, such as 004:120,80")?;
     Ok(At { view, pixel })
 }
 
-/// A box in a view such as `004:100,60,160,120`.
+/// Parses a box in a view such as `004:100,60,160,120`.
 pub(crate) fn box_at(text: &str) -> Result<BoxAt, String> {
     let (view, corners) = in_view(text, "VIEW:x0,y0,x1,y1 in whole px, such as 004:100,60,160,120")?;
     let [x0, y0, x1, y1] = corners;
@@ -87,45 +91,45 @@ pub(crate) fn box_at(text: &str) -> Result<BoxAt, String> {
     Ok(BoxAt { view, corners })
 }
 
-/// The name of a view and numbers behind its last colon.
+/// Parses the name of a view and the numbers after the last colon.
 fn in_view<const N: usize>(text: &str, expected: &str) -> Result<(String, [u32; N]), String> {
-    let wrong = || format!("`{text}` is no {expected}");
+    let wrong = || format!("`{text}` is not {expected}");
     let (view, numbers) = text.rsplit_once(':').filter(|(view, _)| !view.is_empty()).ok_or_else(wrong)?;
     let numbers: Option<Vec<u32>> = numbers.split(',').map(|number| number.trim().parse().ok()).collect();
     let numbers = numbers.and_then(|numbers| numbers.try_into().ok()).ok_or_else(wrong)?;
     Ok((view.to_owned(), numbers))
 }
 
-/// A part of a whole, 0 to 1.
+/// Parses a share, 0 to 1.
 pub(crate) fn share(text: &str) -> Result<f32, String> {
     let value = text.parse().ok().filter(|value| (0.0..=1.0).contains(value));
-    value.ok_or_else(|| format!("`{text}` is no share; expected 0 to 1"))
+    value.ok_or_else(|| format!("`{text}` is not a share; expected 0 to 1"))
 }
 
-/// A distance, world units, 0 or more.
+/// Parses a distance, world units, 0 or more.
 pub(crate) fn distance(text: &str) -> Result<f64, String> {
     let value = text.parse().ok().filter(|value: &f64| value.is_finite() && *value >= 0.0);
-    value.ok_or_else(|| format!("`{text}` is no distance; expected 0 or more, in world units"))
+    value.ok_or_else(|| format!("`{text}` is not a distance; expected 0 or more, in world units"))
 }
 
-/// A near plane, world units, more than 0.
+/// Parses a near plane, world units, more than 0.
 pub(crate) fn near(text: &str) -> Result<f32, String> {
     let value = text.parse().ok().filter(|value: &f32| value.is_finite() && *value > 0.0);
-    value.ok_or_else(|| format!("`{text}` is no near plane; expected more than 0, in world units"))
+    value.ok_or_else(|| format!("`{text}` is not a near plane; expected more than 0, in world units"))
 }
 
-/// A size such as `320x240`.
+/// Parses a size such as `320x240`.
 pub(crate) fn size(text: &str) -> Result<Size, String> {
-    let wrong = || format!("`{text}` is no size; expected WIDTHxHEIGHT in px, 1 to 16384 each, such as 320x240");
+    let wrong = || format!("`{text}` is not a size; expected WIDTHxHEIGHT in px, 1 to 16384 each, such as 320x240");
     let (width, height) = text.split_once(['x', 'X']).ok_or_else(wrong)?;
     let side = |text: &str| text.trim().parse().ok().filter(|side| (1..=16_384).contains(side)).ok_or_else(wrong);
     Ok(Size(side(width)?, side(height)?))
 }
 
-/// Bytes, such as `1500M` or `2G`, in powers of 1024.
+/// Parses a number of bytes such as `1500M` or `2G`, in powers of 1024.
 pub(crate) fn bytes(text: &str) -> Result<u64, String> {
     let wrong =
-        || format!("`{text}` is no amount of memory; expected a number with K, M or G behind it, such as 1500M");
+        || format!("`{text}` is not an amount of memory; expected a number followed by K, M or G, such as 1500M");
     let (number, unit) = text.trim().split_at(text.trim().len().saturating_sub(1));
     let shift = match unit.to_ascii_uppercase().as_str() {
         "K" => 10,

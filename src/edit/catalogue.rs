@@ -92,7 +92,7 @@ impl Catalogue {
             return "the model has no labelled Gaussian; train it with masks".to_owned();
         }
         let more = objects.count() - texts.len();
-        let more = if more > 0 { format!(" and {more} more, see labelgs list") } else { String::new() };
+        let more = if more > 0 { format!(" and {more} more") } else { String::new() };
         let zero = if self.gaussians.contains_key(&UNLABELLED) { ", and 0 for the unlabelled" } else { "" };
         format!("the model has {}{more}{zero}", texts.join(", "))
     }

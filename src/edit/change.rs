@@ -78,7 +78,7 @@ pub fn split_components(
         let found = components(model, &rows_of(&old, label), how)?;
         let mut own = vec![label];
         for part in found.parts.iter().skip(1) {
-            let none = || Error::usage("--labels", format!("{} parts, and no id is free", found.parts.len()));
+            let none = || Error::usage("labels", format!("{} parts, and no id is free", found.parts.len()));
             let id = free.next().ok_or_else(none)?;
             part.iter().for_each(|&row| new[row] = id);
             own.push(id);

@@ -63,7 +63,7 @@ pub fn require_labels(argument: &str, map: &LabelMap, mask: &[bool], known: &Cat
     } else {
         format!(
             "selects nothing, because no label has more than half of its pixels inside; it touches {}; \
-             widen it or name one with --labels",
+             widen it or name one in `labels`",
             near.join(", ")
         )
     };

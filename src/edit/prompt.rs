@@ -53,7 +53,7 @@ pub fn choose(
     if rest.is_empty() {
         let lost: Vec<String> = chosen.iter().map(|&id| known.title(id)).collect();
         let lost = if lost.is_empty() { "nothing was chosen".into() } else { format!("it takes {}", lost.join(", ")) };
-        return Err(Error::usage("--not-at", format!("leaves no label: {lost}; {}", known.there_is())));
+        return Err(Error::usage("not_at", format!("leaves no label: {lost}; {}", known.there_is())));
     }
     Ok(rest)
 }

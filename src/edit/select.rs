@@ -74,7 +74,7 @@ pub fn remove(model: &Gaussians, labels: &[u32]) -> Result<Gaussians> {
     let wanted = check_labels(model, labels)?;
     let rest = model.filtered(|row| !wanted.contains(&label_of(model, row)));
     if rest.is_empty() {
-        return Err(Error::usage("--labels", "names every label of the model; nothing would be left"));
+        return Err(Error::usage("labels", "names every label of the model; nothing would be left"));
     }
     Ok(rest)
 }
@@ -82,7 +82,7 @@ pub fn remove(model: &Gaussians, labels: &[u32]) -> Result<Gaussians> {
 /// The labels as a set, if each of them occurs in the model.
 fn check_labels(model: &Gaussians, labels: &[u32]) -> Result<BTreeSet<u32>> {
     let wanted = labels.iter().copied().collect();
-    Catalogue::new(model, None).check("--labels", &wanted)?;
+    Catalogue::new(model, None).check("labels", &wanted)?;
     Ok(wanted)
 }
 

@@ -70,7 +70,7 @@ impl EngineSize {
         let problem = format!(
             "{width} x {height} px make {tiles_x} x {tiles_y} tiles, at most {most} are supported; choose a smaller size"
         );
-        Err(Error::usage("--max-resolution", problem))
+        Err(Error::usage("max_resolution", problem))
     }
 
     /// Refuses an image that the buffers have no place for.

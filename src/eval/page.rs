@@ -11,7 +11,7 @@ const ONLY_FOUND: [u8; 3] = [230, 60, 40];
 const ONLY_TRUE: [u8; 3] = [40, 110, 240];
 const BOTH: [u8; 3] = [60, 190, 90];
 
-const HEAD: &str = "<!doctype html>\n<html lang=\"en\">\n<meta charset=\"utf-8\">\n<title>labelgs eval</title>\n<style>\n\
+const HEAD: &str = "<!doctype html>\n<html lang=\"en\">\n<meta charset=\"utf-8\">\n<title>labelgs: scores</title>\n<style>\n\
     body { font-family: sans-serif; margin: 1em; background: #fff; color: #222 }\n\
     table { border-collapse: collapse }\n\
     td, th { padding: 4px 8px; text-align: left; vertical-align: top; border-bottom: 1px solid #ccc }\n\
@@ -31,7 +31,7 @@ impl Page {
     /// A page in `folder`, which is made. It must not hold another page's pictures, which would stay there.
     pub fn new(folder: &Path) -> Result<Self> {
         std::fs::create_dir_all(folder).map_err(Error::write(folder))?;
-        atomic::require_empty("--page", folder)?;
+        atomic::require_empty("page", folder)?;
         Ok(Self { folder: folder.to_owned(), rows: String::new(), count: 0 })
     }
 
@@ -42,7 +42,7 @@ impl Page {
                       it is the absolute difference of colours.</p>";
         let head = "<tr><th>view</th><th>truth</th><th>prediction</th><th>difference</th></tr>";
         let body = format!(
-            "{HEAD}<h1>labelgs eval</h1>\n<pre>{}</pre>\n{legend}\n<table>\n{head}\n{}</table>\n</html>\n",
+            "{HEAD}<h1>labelgs: scores</h1>\n<pre>{}</pre>\n{legend}\n<table>\n{head}\n{}</table>\n</html>\n",
             escaped(summary),
             self.rows
         );

@@ -227,8 +227,8 @@ impl Scores {
     pub fn warn_of_odd_view(&self, near: f32) {
         if let Some((name, found, median)) = self.odd_view() {
             tracing::warn!(
-                "view {name} has {found:.1} dB, the one in the middle {median:.1}: if it is foggy, try --near of a tenth of the \
-                 distance to what is seen (it is {near})"
+                "view {name} has {found:.1} dB, the one in the middle {median:.1}: if it is foggy, set `near` to a tenth of the \
+                 distance to the scene (it is {near})"
             );
         }
     }

@@ -77,7 +77,7 @@ impl Buffer {
                 needed: self.bytes,
                 limit_name: "the largest heap of this device (of which that much is no longer free)".to_owned(),
                 limit: self.gpu.limits().heap,
-                cure: "lower --max-gaussians, use smaller images or free memory of the device".to_owned(),
+                cure: "lower `max_gaussians`, use smaller images or free memory of the device".to_owned(),
             },
             // The crate tells of some failures by their names alone.
             AllocationError::Internal(text) if text.contains("DEVICE_LOST") => {

@@ -58,14 +58,14 @@ impl Gpu {
     }
 }
 
-/// A kernel that the driver does not take, unless it is memory that is short or the device that is gone.
+/// The error of a kernel that the driver refuses. Errors of memory and of a lost device pass through.
 fn refused(gpu: &Gpu, shader: &ShaderDesc, error: Error) -> Error {
-    if matches!(error.exit_status(), 5 | 6) {
+    if error.is_out_of_memory() || error.is_device_lost() {
         return error;
     }
     let device = gpu.capabilities();
     Error::NoDevice(format!(
-        "{} ({} {}) does not compile the shader {}: {error}; try another version of the driver or another --device",
+        "{} ({} {}) does not compile the shader {}: {error}; try another version of the driver or another device",
         device.name, device.driver_name, device.driver_info, shader.name
     ))
 }

@@ -36,7 +36,7 @@ pub(crate) fn skip(
         return Err(bad.remove(0));
     }
     let problem = format!(
-        "{count} of {total} photos cannot be decoded, --max-bad-photos {} allows {allowed}; write them anew, take them out \
+        "{count} of {total} photos cannot be decoded, `max_bad_photos = {}` allows {allowed}; write them anew, take them out \
          of the scene, or allow more:{}{more}",
         options.max_bad_photos,
         listed()

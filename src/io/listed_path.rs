@@ -43,8 +43,8 @@ impl<'a> Place<'a> {
         let inside = path.components().all(|part| matches!(part, Component::Normal(_) | Component::CurDir));
         if !self.allow_outside && (!inside || has_drive(&text)) {
             return refuse(
-                "lies outside the scene folder; list photos by paths relative to it, without `..`, or say \
-                 --allow-outside if the scene may read them there",
+                "lies outside the scene folder; list photos by paths relative to it, without `..`, or set \
+                 `allow_outside` if the scene may read them there",
             );
         }
         Ok(ListedPath { path: if inside { PathBuf::from(&name) } else { path }, name })

@@ -93,8 +93,8 @@ pub(crate) fn read_checked(path: &Path, accept: impl FnOnce((u32, u32)) -> Resul
     let raw = read_raw(path, |header| {
         if !matches!(header.colour, png::ColorType::Grayscale | png::ColorType::Indexed) {
             let text = format!(
-                "a mask holds one id per pixel as grey value or palette index; this PNG is {:?}. Convert the folder \
-                 with `labelgs masks import`, which reads ids coded as R + 256 G + 65536 B; for display colours use \
+                "a mask holds one id per pixel as grey value or palette index; this PNG is {:?}. Import the \
+                 folder first: the import reads ids coded as R + 256 G + 65536 B; for display colours use \
                  the id image they were made from",
                 header.colour
             );

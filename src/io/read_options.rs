@@ -6,7 +6,7 @@ use crate::options::Options;
 crate::options::options! {
     /// What decides which pixels of a scene a run trains on, and which views are held out.
     pub struct ReadOptions {
-        "Run" {
+        "Scene" {
             /// Longest side of a photo, px; 0 keeps its size.
             ///
             /// 0 (the reference shrinks to a height of 1080). Smaller is faster and loses fine texture.
@@ -21,11 +21,11 @@ crate::options::options! {
 }
 
 impl ReadOptions {
-    /// Refuses values that make no sense; messages name the flag.
+    /// Refuses values that make no sense; messages name the option.
     pub fn check(&self) -> Result<()> {
         if self.test_every == 1 {
-            let problem = "is 1, which leaves no view to train on; 2 or more, or --no-test";
-            return Err(Error::usage("--test-every", problem));
+            let problem = "is 1, which leaves no view to train on; expected 2 or more, or 0 to hold out none";
+            return Err(Error::usage("test_every", problem));
         }
         self.check_ranges()
     }

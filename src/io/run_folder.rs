@@ -38,7 +38,7 @@ impl Lock {
         let file = File::options().create(true).append(true).open(&path).map_err(Error::write(&path))?;
         match file.try_lock() {
             Err(TryLockError::WouldBlock) => {
-                let problem = "another labelgs trains into this folder; wait for it, or name another folder with -o";
+                let problem = "another labelgs trains into this folder; wait for it, or choose another folder";
                 Err(Error::write(folder)(std::io::Error::new(std::io::ErrorKind::ResourceBusy, problem)))
             }
             Ok(()) | Err(TryLockError::Error(_)) => Ok(Self { folder: folder.to_owned(), file }),

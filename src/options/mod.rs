@@ -71,11 +71,6 @@ impl Key {
         Self { range: Range::PositiveUpTo(most), ..self }
     }
 
-    /// The flag, with its dashes.
-    pub fn flag(&self) -> String {
-        format!("--{}", self.name.replace('_', "-"))
-    }
-
     /// Refuses a value outside of the range.
     pub fn check(&self, value: &impl Numbers) -> Result<()> {
         let is_wrong = |&number: &f64| match self.range {
@@ -96,7 +91,7 @@ impl Key {
             Range::UpTo(most) => format!("0 to {most}"),
             Range::PositiveUpTo(most) => format!("more than 0, at most {most}"),
         };
-        Err(Error::usage(self.flag(), format!("is {wrong}, needs {needed}")))
+        Err(Error::usage(self.name, format!("is {wrong}, needs {needed}")))
     }
 }
 
@@ -132,7 +127,7 @@ pub(crate) trait Options: Serialize + DeserializeOwned + Default {
     /// Its options, in order.
     const KEYS: &'static [Key];
 
-    /// Refuses values outside of their ranges; the message names the flag.
+    /// Refuses values outside of their ranges; the message names the option.
     fn check_ranges(&self) -> Result<()>;
 
     /// The values as one types them, by key; an option that is not set has none.

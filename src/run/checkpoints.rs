@@ -28,7 +28,7 @@ impl Checkpoints {
             && let Some(old) = checkpoint_folder::list(out)?.first()
         {
             tracing::warn!(
-                "{} is of an earlier run and goes when this one has a checkpoint; --resume goes on from it",
+                "{} is of an earlier run; this run deletes it at its first checkpoint. Go on with that run to keep it",
                 old.path.display()
             );
         }

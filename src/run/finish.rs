@@ -72,7 +72,7 @@ impl Run<'_> {
         summary.write(&self.request.output)?;
         let is_kept = kept?;
         if self.stopped {
-            let further = if is_kept { "--resume goes on" } else { "only the scores are missing" };
+            let further = if is_kept { "the run can go on from its checkpoint" } else { "only the scores are missing" };
             tracing::info!("stopped after step {step} of {}; {further}", self.settings.train.iterations);
         } else {
             self.checkpoints.finish()?;

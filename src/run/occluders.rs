@@ -26,10 +26,12 @@ pub enum OccluderFiles {
 pub(super) fn check(source: Occlusion, files: Option<&OccluderFiles>) -> Result<()> {
     match (source, files) {
         (Occlusion::Depth, Some(OccluderFiles::Depths { .. })) => Ok(()),
-        (Occlusion::Depth, _) => Err(Error::usage("--occlusion", "depth needs the folder: --depths DIR")),
-        (_, Some(OccluderFiles::Depths { .. })) => Err(Error::usage("--depths", "is only read with --occlusion depth")),
+        (Occlusion::Depth, _) => {
+            Err(Error::usage("occlusion", "is depth, which needs a folder of depth maps in `depths`"))
+        }
+        (_, Some(OccluderFiles::Depths { .. })) => Err(Error::usage("depths", "is only read with `occlusion = depth`")),
         (Occlusion::File, None) => {
-            Err(Error::usage("--config", "takes the occluders from a file; name it: --occlusion-file FILE"))
+            Err(Error::usage("occlusion", "is file, and no file was named; name it in `occlusion_file`"))
         }
         _ => Ok(()),
     }

@@ -55,7 +55,7 @@ pub(super) fn prepare(request: &Request, is_again: bool) -> Result<Prepared> {
         }
     };
     if request.restart && settings.run.checkpoint_every == 0 {
-        return Err(Error::usage("--restart", "goes on from checkpoints, and --checkpoint-every is 0"));
+        return Err(Error::usage("restart", "goes on from checkpoints, and `checkpoint_every` is 0"));
     }
     clear(out, &settings)?;
     let models = Models::new(out, resumed.as_ref().map_or(0, |resumed| resumed.state.step))?;
@@ -92,7 +92,7 @@ fn read_scene(request: &Request, settings: &Settings, inputs: &Inputs) -> Result
     options.allow_outside = inputs.allow_outside;
     let dataset = io::open_logged(&request.scene, &options)?;
     if dataset.train.is_empty() {
-        let problem = "no view is left to train on; use --no-test or a larger --test-every";
+        let problem = "no view is left to train on; set `test_every` to 0 or to a larger number";
         return Err(Error::data(&request.scene, "", problem));
     }
     Ok(dataset)
@@ -186,7 +186,7 @@ fn bound_start(model: &mut Gaussians, config: &TrainConfig) {
     let (count, bound) = (model.len() as u64, config.max_gaussians);
     if bound > 0 && count > bound {
         tracing::warn!(
-            "{count} initial points, --max-gaussians {bound}: every {:.1}-th is used",
+            "{count} initial points, and `max_gaussians` is {bound}: every {:.1}-th is used",
             count as f64 / bound as f64
         );
         // Row i is kept where i * bound / count steps up: an even choice.

@@ -72,7 +72,7 @@ fn decide(request: &Request, changed: &Changed, mut resumed: Resumed) -> Result<
     if wanted.train.iterations < resumed.state.step {
         let (path, steps) = (resumed.state.path.display(), resumed.state.step);
         let problem = format!("is {}, and {path} has {steps} steps", wanted.train.iterations);
-        return Err(Error::usage("--iterations", problem));
+        return Err(Error::usage("iterations", problem));
     }
     resumed.state.config = wanted.train.clone();
     resumed.settings = wanted;
@@ -94,10 +94,10 @@ fn compare(then: &Settings, now: &Settings) -> Result<()> {
         let text = |value: Option<&String>| value.map_or("not set", String::as_str).to_owned();
         let change = format!("{} in the checkpoint, now {}", text(then), text(now));
         if key.is_fixed {
-            let problem = format!("{change}; it cannot change within a run: leave it out, or train without --resume");
-            return Err(Error::usage(key.flag(), problem));
+            let problem = format!("{change}; it cannot change within a run: keep the old value, or start a new run");
+            return Err(Error::usage(key.name, problem));
         }
-        tracing::warn!("{}: {change}", key.flag());
+        tracing::warn!("`{}`: {change}", key.name);
     }
     Ok(())
 }
@@ -108,7 +108,7 @@ fn merge(then: &mut Inputs, now: &Inputs) {
         && then.memory_limit != Some(bytes)
     {
         let text = then.memory_limit.map_or("not set".to_owned(), |bytes| bytes.to_string());
-        tracing::warn!("--memory-limit: {text} in the checkpoint, now {bytes}");
+        tracing::warn!("`memory_limit`: {text} in the checkpoint, now {bytes}");
         then.memory_limit = Some(bytes);
     }
     if let Some(masks) = &now.masks {

@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 crate::options::options! {
     /// What a run writes on its way.
     pub struct RunOptions {
-        "Run" {
+        "Output" {
             /// Steps after which to save the model too, with commas between.
             #[cfg_attr(feature = "cli", arg(value_delimiter = ','))]
             save_at <"LIST">: Vec<u32> = Vec::new();
@@ -58,7 +58,7 @@ impl Settings {
         self.read.texts().into_iter().chain(self.train.texts()).chain(self.run.texts()).collect()
     }
 
-    /// Refuses values that make no sense; messages name the flag.
+    /// Refuses values that make no sense; messages name the option.
     pub fn check(&self) -> Result<()> {
         self.read.check()?;
         self.train.check()?;
@@ -70,7 +70,7 @@ impl Settings {
         let text = io::read::text(path)?;
         let named: BTreeMap<toml::Spanned<String>, IgnoredAny> = parse(path, &text)?;
         if let Some(key) = named.keys().find(|key| !Self::keys().any(|known| known.name == key.get_ref())) {
-            let problem = format!("there is no setting {}; `labelgs train --help` lists all", key.get_ref());
+            let problem = format!("there is no setting {}; config.toml of any run lists all", key.get_ref());
             return Err(Error::data(path, line(&text, key.span().start), problem));
         }
         Self::parse(path, &text)
@@ -95,7 +95,7 @@ impl Settings {
             *near = NEAR;
         }
         if !near.is_finite() || *near < 0.0 {
-            return Err(Error::data(&file, "near", format!("is {near}, needs more than 0; or say --near")));
+            return Err(Error::data(&file, "near", format!("is {near}, needs more than 0; correct it or set `near`")));
         }
         Ok(Some(settings))
     }

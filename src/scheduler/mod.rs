@@ -329,7 +329,7 @@ impl Scheduler {
             Some((busy, pass)) if busy == self.submitted => pass,
             Some((_, pass)) => format!("{pass}, or what came after it"),
             None if self.options.crash_markers => "none; memory was being set up".to_owned(),
-            None => "unknown: crash markers are off (`train --restart` has them on)".to_owned(),
+            None => "unknown: crash markers are off (`restart` turns them on)".to_owned(),
         };
         Error::DeviceLost { pass }
     }

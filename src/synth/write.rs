@@ -33,10 +33,10 @@ pub struct Summary {
 /// done and may stop the work with an error.
 pub fn write(options: &SynthOptions, folder: &Path, after_view: &dyn Fn(u32) -> Result<()>) -> Result<Summary> {
     if options.width == 0 || options.height == 0 || options.width > 16_384 || options.height > 16_384 {
-        return Err(Error::usage("--size", "both sides need 1 to 16384 px"));
+        return Err(Error::usage("width, height", "need 1 to 16384 px each"));
     }
     if options.views == 0 || options.views > 10_000 {
-        return Err(Error::usage("--views", "needs 1 to 10000"));
+        return Err(Error::usage("views", "needs 1 to 10000"));
     }
     let world = World::new(options.preset, options.seed);
     let cameras = ring_of_cameras(options);

@@ -45,7 +45,7 @@ crate::options::options! {
     ///
     /// Steps count from 1, as in the reference code.
     pub struct TrainConfig {
-        "Run" {
+        "Training" {
             /// Number of steps, one view each.
             ///
             /// 15000 (LabelGS).
@@ -67,7 +67,9 @@ crate::options::options! {
             /// 0. At the bound only the Gaussians that need it most still grow.
             #[cfg_attr(feature = "cli", arg(value_parser = count))]
             max_gaussians <"N">: u64 = 0;
+        }
 
+        "Rendering" {
             /// Colour behind the scene: black, white, or R,G,B from 0 to 1.
             ///
             /// Black (LabelGS, 3DGS). The label loss is always on black.
@@ -152,7 +154,7 @@ crate::options::options! {
             occlusion_every <"STEPS">: u32 = 1000, at_least(1);
         }
 
-        "Optimiser" {
+        "Training" {
             /// Share of D-SSIM in the photometric loss.
             ///
             /// 0.2 (3DGS); the rest is L1.
@@ -167,7 +169,9 @@ crate::options::options! {
             ///
             /// 1000 (3DGS).
             sh_degree_interval <"STEPS">: u32 = 1000, at_least(1);
+        }
 
+        "Learning rates" {
             /// Rate of positions at the start, scene extents.
             ///
             /// 1.6e-4 (3DGS).
@@ -320,7 +324,7 @@ impl TrainConfig {
         if self.coarse_until < self.label_from { self.label_from } else { self.coarse_until.saturating_add(1) }
     }
 
-    /// Refuses values that make no sense; messages name the flag.
+    /// Refuses values that make no sense; messages name the option.
     pub fn check(&self) -> Result<()> {
         self.check_ranges()
     }

@@ -127,10 +127,10 @@ impl TrainState {
         if then != now {
             let had = |masks| if masks { "masks" } else { "no masks" };
             let problem = format!("{} was made with {}, now there are {}", self.path.display(), had(then), had(now));
-            return Err(Error::usage("--masks", problem));
+            return Err(Error::usage("masks", problem));
         }
         let refuse = |view: &str, what: &str| {
-            let cure = "resume with the scene as it was, or train without --resume";
+            let cure = "go on with the scene as it was, or start a new run";
             Err(Error::data(scene, view, format!("{what} {}; {cure}", self.path.display())))
         };
         if self.views.len() != views.len() {

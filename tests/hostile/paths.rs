@@ -34,7 +34,7 @@ fn colmap_names_that_leave_the_scene_need_the_flag() {
         around.write("scene/sparse/0/images.bin", images_bin(&[listed], 1));
         let scene = around.path().join("scene");
         let text = refusal(open(&scene, false));
-        let named = text.contains("outside the scene") && text.contains("--allow-outside") && text.contains("a.png");
+        let named = text.contains("outside the scene") && text.contains("allow_outside") && text.contains("a.png");
         assert!(named && text.contains("images.bin"), "{text}");
         let dataset = open(&scene, true).expect("the flag allows it");
         assert!(dataset.train[0].photo.is_some(), "the photo was read");

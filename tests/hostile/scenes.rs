@@ -2,6 +2,7 @@
 
 use crate::io::fixtures::{ColmapCamera, Scene, images_bin, pinhole, refusal, simple};
 use labelgs::Result;
+use labelgs::internals::cli::status::exit_status;
 use labelgs::internals::io;
 use labelgs::io::{LoadOptions, initial_gaussians};
 use labelgs::scene::Dataset;
@@ -25,7 +26,7 @@ fn a_few_undecodable_photos_are_skipped_and_listed() {
     let dataset = io::open(scene.path(), &split).expect("a scene");
     let test: Vec<&str> = dataset.test.iter().map(|view| view.name.as_str()).collect();
     assert_eq!(test, ["00.png", "04.png", "08.png", "12.png", "16.png"]);
-    assert!(refusal(open(&scene, 0.0)).contains("--max-bad-photos 0 allows 0"));
+    assert!(refusal(open(&scene, 0.0)).contains("`max_bad_photos = 0` allows 0"));
     scene.write("images/12.png", b"no picture");
     let text = refusal(open(&scene, 0.1));
     let parts = ["3 of 20 photos cannot be decoded", "allows 2", "03.png", "11.png", "12.png"];
@@ -43,7 +44,7 @@ fn many_undecodable_photos_are_listed_up_to_twenty() {
     (25..30).for_each(|index| drop(scene.write(&format!("images/{index:02}.png"), b"no picture")));
     assert!(refusal(open(&scene, 1.0)).contains("30 of 30"), "none is left");
     for share in [-0.1, 1.5, f32::NAN] {
-        assert_eq!(open(&scene, share).expect_err("no share").exit_status(), 2);
+        assert_eq!(exit_status(&open(&scene, share).expect_err("no share")), 2);
     }
 }
 

@@ -5,6 +5,7 @@ use crate::support::device;
 use crate::support::scenes::{Shape, scene};
 use labelgs::Error;
 use labelgs::engine::{Engine, EngineSize, LabelSize};
+use labelgs::internals::cli::status::exit_status;
 use labelgs::internals::label::vote::ballot::{Sweep, Voter, sweep};
 use labelgs::internals::scheduler::SchedulerOptions;
 use labelgs::internals::scheduler::plan::PlanOptions;
@@ -25,7 +26,7 @@ fn model_and_camera() -> (Gaussians, Camera) {
 #[track_caller]
 fn refused<T>(result: Result<T, Error>) {
     let error = result.err().expect("the image is larger than the engine's");
-    assert_eq!(error.exit_status(), 2, "{error}");
+    assert_eq!(exit_status(&error), 2, "{error}");
     let text = error.to_string();
     let parts = ["64 x 49 px", "64 x 48 px", "grow_image"];
     assert!(parts.iter().all(|part| text.contains(part)), "{text}");

@@ -4,6 +4,7 @@ use crate::support::compare::{check, exact};
 use crate::support::device;
 use crate::support::device::Turn;
 use labelgs::engine::Engine;
+use labelgs::internals::cli::status::exit_status;
 use labelgs::internals::scheduler::SchedulerOptions;
 use labelgs::internals::scheduler::plan::{Capacity, PlanOptions};
 use labelgs::internals::train::{StepReport, Trainer};
@@ -173,7 +174,7 @@ fn a_memory_limit_bounds_the_gaussians() {
     let first = initial_gaussians(&small(), 0, 100).expect("points");
     let refused = Trainer::new(turn.gpu(), config(LabelRule::Votes), &small(), &first, options);
     let error = refused.err().expect("what staging takes leaves nothing for a model");
-    assert_eq!(error.exit_status(), 5, "{error}");
+    assert_eq!(exit_status(&error), 5, "{error}");
 }
 
 /// Gaussians with a label in the bytes of a PLY.

@@ -1,6 +1,7 @@
 //! Files of checkpoints: what comes back, and that nothing damaged does.
 
 use super::fixtures::*;
+use labelgs::internals::cli::status::exit_status;
 use labelgs::internals::io::checkpoint::{Checkpoint, Plane, VERSION};
 use labelgs::internals::io::checkpoint_folder;
 use serde_json::json;
@@ -31,7 +32,7 @@ fn a_checkpoint_comes_back_to_the_last_bit() {
     file.write(&path).expect("written over");
     assert_eq!(Checkpoint::read(&path).expect("read"), file);
     file.planes[0].data.pop();
-    assert_eq!(file.write(&path).expect_err("half a row").exit_status(), 70);
+    assert_eq!(exit_status(&file.write(&path).expect_err("half a row")), 70);
 }
 
 /// The message of a refusal, which names the file and ends with status 3.
@@ -39,7 +40,7 @@ fn a_checkpoint_comes_back_to_the_last_bit() {
 fn refused(scene: &Scene, bytes: &[u8]) -> String {
     let path = scene.write("damaged.ckpt", bytes);
     let error = Checkpoint::read(&path).expect_err("it is damaged");
-    assert_eq!(error.exit_status(), 3, "{error}");
+    assert_eq!(exit_status(&error), 3, "{error}");
     let text = error.to_string();
     assert!(text.contains("damaged.ckpt"), "{text}");
     text

@@ -2,6 +2,7 @@
 
 use super::fixtures::*;
 use glam::{DQuat, DVec3};
+use labelgs::internals::cli::status::exit_status;
 use labelgs::internals::io;
 use labelgs::io::LoadOptions;
 use labelgs::scene::Dataset;
@@ -124,7 +125,7 @@ fn a_single_photo_is_trained_on() {
     let dataset = io::open(simple(1).path(), &LoadOptions::default()).expect("a scene");
     assert_eq!((dataset.train.len(), dataset.test.len()), (1, 0));
     let zero = LoadOptions { test_every: Some(0), ..LoadOptions::default() };
-    assert_eq!(io::open(simple(2).path(), &zero).expect_err("no split").exit_status(), 2);
+    assert_eq!(exit_status(&io::open(simple(2).path(), &zero).expect_err("no split")), 2);
 }
 
 #[test]

@@ -1,5 +1,6 @@
 //! Small scenes in temporary folders.
 
+use labelgs::internals::cli::status::exit_status;
 use std::fs;
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
@@ -137,7 +138,7 @@ pub fn refusal<T>(result: labelgs::Result<T>) -> String {
     match result {
         Ok(_) => panic!("the input was accepted"),
         Err(error) => {
-            assert_eq!(error.exit_status(), 3, "{error}");
+            assert_eq!(exit_status(&error), 3, "{error}");
             error.to_string()
         }
     }

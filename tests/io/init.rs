@@ -1,6 +1,7 @@
 //! The first Gaussians of a scene.
 
 use glam::{DMat3, DVec3};
+use labelgs::internals::cli::status::exit_status;
 use labelgs::internals::shaders::constants::exact::SH_C0;
 use labelgs::io::initial_gaussians;
 use labelgs::scene::{Camera, Dataset, Photo, Point, View};
@@ -136,7 +137,7 @@ fn odd_rigs_get_their_gaussians() {
             assert!(g.means.iter().chain(&g.scales).flatten().all(|value| value.is_finite()), "{name}");
         }
     }
-    assert_eq!(initial_gaussians(&Dataset::default(), 1, 10).expect_err("no views").exit_status(), 3);
+    assert_eq!(exit_status(&initial_gaussians(&Dataset::default(), 1, 10).expect_err("no views")), 3);
 }
 
 #[test]

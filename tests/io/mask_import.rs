@@ -2,6 +2,7 @@
 
 use super::fixtures::*;
 use super::mask_forms::*;
+use labelgs::internals::cli::status::exit_status;
 use labelgs::internals::io;
 use labelgs::internals::io::label_table::FILE;
 use labelgs::io::LabelTable;
@@ -205,7 +206,7 @@ fn soft_edges_are_cut_only_when_asked() {
     let bytes: Vec<u8> = (0..96).map(|index| [0, 0, 100, 127, 128, 200, 255, 255, 255, 90, 0, 0][index % 12]).collect();
     grey8(&scene.path().join("m/cup/00.png"), &bytes);
     let message = refusal(auto(&scene, "m"));
-    assert!(message.contains("cup/00.png is not") && message.contains("--format binary-folders"), "{message}");
+    assert!(message.contains("cup/00.png is not") && message.contains("format = binary-folders"), "{message}");
     let done = run(&scene, "m", |options| options.format = Format::BinaryFolders).expect("imported");
     assert!(done.notes.iter().any(|note| note.contains("1 masks have more values")), "{:?}", done.notes);
     let ids = read_mask(scene.path().join("out/00.png")).expect("a mask").ids;
@@ -223,7 +224,7 @@ fn what_fits_two_readings_is_refused_with_the_flags_that_decide() {
         grey8(&scene.path().join(format!("m/left/{name}.png")), &bytes);
     });
     let message = refusal(auto(&scene, "m"));
-    for part in ["NAME.png (2 photos)", "OBJECT/NAME.png (2 photos)", "--format binary-folders", "deva-short"] {
+    for part in ["NAME.png (2 photos)", "OBJECT/NAME.png (2 photos)", "format = binary-folders", "deva-short"] {
         assert!(message.contains(part), "{part}: {message}");
     }
     let sources_as = |format| run(&scene, "m", |o| o.format = format).expect("imported").labels[0].source.clone();
@@ -241,7 +242,7 @@ fn colours_are_ids_only_if_told_or_proved() {
     let ids = [300, 256, 70_000];
     id_pictures(&scene.path().join("m"), ColorType::Rgb, BitDepth::Eight, ids);
     let message = refusal(auto(&scene, "m"));
-    assert!(message.contains("--format deva-long") && message.contains("--pred"), "{message}");
+    assert!(message.contains("format = deva-long") && message.contains("`pred`"), "{message}");
     same_as_truth(&scene, &run(&scene, "m", |o| o.format = Format::DevaLong).expect("imported"), [2, 1, 3]);
     let wrong = scene.write("pred.json", pred([300, 256, 9]));
     let message = refusal(run(&scene, "m", |options| options.pred = Some(wrong)));
@@ -328,7 +329,7 @@ fn a_named_form_that_the_pictures_do_not_have_is_refused() {
     fs::create_dir_all(scene.path().join("full/x")).expect("made");
     let options = ImportOptions { folder: scene.path().join("m"), ..ImportOptions::default() };
     let error = import(&dataset(&scene), &options, &scene.path().join("full")).expect_err("not empty");
-    assert_eq!(error.exit_status(), 2, "{error}");
+    assert_eq!(exit_status(&error), 2, "{error}");
 }
 
 #[test]

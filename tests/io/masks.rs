@@ -51,7 +51,7 @@ fn colours_jpegs_and_bombs_are_refused() {
     for (colour, samples) in [(png::ColorType::Rgb, 3), (png::ColorType::Rgba, 4), (png::ColorType::GrayscaleAlpha, 2)]
     {
         png(&path, (2, 2), colour, png::BitDepth::Eight, &vec![1; 4 * samples]);
-        assert!(refusal(read_mask(&path)).contains("masks import"));
+        assert!(refusal(read_mask(&path)).contains("Import the folder"));
     }
     png(&path, (40_000, 40_000), png::ColorType::Grayscale, png::BitDepth::One, &vec![0; 5000 * 40_000]);
     assert!(refusal(read_mask(&path)).contains("40000 x 40000"));

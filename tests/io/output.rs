@@ -2,6 +2,7 @@
 
 use super::fixtures::*;
 use glam::{DMat3, DVec3};
+use labelgs::internals::cli::status::exit_status;
 use labelgs::internals::io::{atomic, camera_json, image as images};
 use labelgs::scene::Camera;
 use std::fs;
@@ -28,14 +29,14 @@ fn a_failed_write_leaves_the_old_file_and_no_litter() {
             Err(Error::other("disk full"))
         })
         .expect_err("the write fails");
-        assert_eq!(error.exit_status(), 7);
+        assert_eq!(exit_status(&error), 7);
         assert!(error.to_string().contains("out.bin") && error.to_string().contains("disk full"));
         assert_eq!((fs::read(&path).expect("bytes"), entries(&scene)), (b"old".to_vec(), vec!["out.bin".to_owned()]));
     }
     atomic::write(&path, |out| out.write_all(b"new")).expect("written");
     assert_eq!(fs::read(&path).expect("bytes"), b"new");
     atomic::write(scene.path().join("deep/er/file"), |out| out.write_all(b"x")).expect("folders are made");
-    assert_eq!(atomic::write(scene.path(), |_| Ok(())).expect_err("a folder").exit_status(), 7);
+    assert_eq!(exit_status(&atomic::write(scene.path(), |_| Ok(())).expect_err("a folder")), 7);
 }
 
 #[cfg(unix)]
@@ -52,7 +53,7 @@ fn links_and_devices_are_written_through() {
     assert_eq!(fs::metadata(&target).expect("metadata").permissions().mode() & 0o600, 0o600);
     atomic::write("/dev/null", |out| out.write_all(b"new")).expect("written");
     if cfg!(target_os = "linux") {
-        assert_eq!(atomic::write("/dev/full", |out| out.write_all(b"new")).expect_err("full").exit_status(), 7);
+        assert_eq!(exit_status(&atomic::write("/dev/full", |out| out.write_all(b"new")).expect_err("full")), 7);
         scene.write(".labelgs-4194305-abc.tmp", b"");
         scene.write(&format!(".labelgs-{}-abc.tmp", std::process::id()), b"");
         scene.write(".labelgs-notes.tmp", b"");
@@ -100,7 +101,7 @@ fn pixels_come_back_from_png_and_exr() {
     let names: Vec<&str> = list.iter().map(|(name, _)| name.as_str()).collect();
     assert_eq!(names, ["B", "G", "R"]);
     assert_eq!((list[2].1.clone(), list[1].1[0]), (values.to_vec(), 2.0));
-    assert_eq!(images::write_exr_y(scene.at("bad.exr"), 3, 3, &values).expect_err("too few").exit_status(), 70);
+    assert_eq!(exit_status(&images::write_exr_y(scene.at("bad.exr"), 3, 3, &values).expect_err("too few")), 70);
 }
 
 #[test]

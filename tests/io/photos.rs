@@ -2,6 +2,7 @@
 
 use super::fixtures::*;
 use glam::DVec2;
+use labelgs::internals::cli::status::exit_status;
 use labelgs::internals::io;
 use labelgs::internals::io::image::photo_size;
 use labelgs::internals::io::lens::{Distortion, Lens, Polynomial};
@@ -72,7 +73,7 @@ fn the_longest_side_is_bounded_by_one_rounding_rule() {
         assert_eq!(photo.rgba.len() as u32, expected.0 * expected.1);
     }
     let none = LoadOptions { max_resolution: Some(0), ..LoadOptions::default() };
-    assert_eq!(io::open(simple(1).path(), &none).expect_err("no image").exit_status(), 2);
+    assert_eq!(exit_status(&io::open(simple(1).path(), &none).expect_err("no image")), 2);
 }
 
 /// Mean of `photo` over the box of target pixel (x, y), by brute force on a grid of 1/60 px.

@@ -1,5 +1,6 @@
 //! LPIPS with made weights whose answer can be worked out.
 
+use labelgs::internals::cli::status::exit_status;
 use labelgs::internals::eval::lpips::convolution::{Layer, Planes, convolve, halve};
 use labelgs::internals::eval::lpips::{CHANNELS, STAGES, Weights};
 use labelgs::internals::eval::protocol::score::Distance;
@@ -87,7 +88,7 @@ fn the_distance_of_plain_pictures_by_hand() {
     let square: f64 = direction(a).iter().zip(direction(b)).map(|(a, b)| (a - b).powi(2)).sum();
     let found = weights.distance(&plain(a), &plain(b), 16, 16).expect("large enough");
     assert!((found - 5.0 * square).abs() < 1e-5 && square > 0.01, "{found} {square}");
-    assert!(weights.distance(&[a; 60], &[a; 60], 10, 6).is_err_and(|error| error.exit_status() == 2));
+    assert!(weights.distance(&[a; 60], &[a; 60], 10, 6).is_err_and(|error| exit_status(&error) == 2));
 }
 
 #[test]

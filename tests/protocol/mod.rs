@@ -10,6 +10,7 @@ use labelgs::eval::protocol::Painter;
 use labelgs::eval::protocol::Report;
 use labelgs::eval::protocol::run;
 use labelgs::eval::protocol::{Ask, By, Layout, Protocol};
+use labelgs::internals::cli::status::exit_status;
 use labelgs::internals::eval::protocol::score::Drawn;
 use labelgs::internals::io::image::write_png_grey8;
 use labelgs::internals::io::truth::{files_below, read_truth};
@@ -117,6 +118,6 @@ pub fn run_on(
 /// What a failure says.
 pub fn message<T: std::fmt::Debug>(result: Result<T>) -> String {
     let error: Error = result.expect_err("it fails");
-    assert_eq!(error.exit_status(), 3, "{error}");
+    assert_eq!(exit_status(&error), 3, "{error}");
     error.to_string()
 }

@@ -2,6 +2,7 @@
 
 use super::*;
 use labelgs::Error;
+use labelgs::internals::cli::status::exit_status;
 
 toy_shader!(
     overrun,
@@ -37,7 +38,7 @@ fn what_does_not_fit_is_refused_before_anything_is_allocated() {
     let too_large = Capacity { gaussians: 1 << 40, ..pixels(64) };
     let error = Scheduler::new(gpu.gpu(), TABLE, too_large, SchedulerOptions::default()).unwrap_err();
     assert!(matches!(error, Error::OutOfMemory { .. }), "{error}");
-    assert_eq!(error.exit_status(), 5);
+    assert_eq!(exit_status(&error), 5);
     let mut scheduler = Scheduler::new(gpu.gpu(), TABLE, pixels(64), SchedulerOptions::default()).unwrap();
     scheduler.upload(MODEL, 0, 0, &ramp(100)).unwrap();
     assert!(scheduler.set_capacity(too_large).is_err());

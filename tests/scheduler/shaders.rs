@@ -3,6 +3,7 @@
 use super::*;
 use crate::support::device::options as gpu_options;
 use labelgs::gpu::{Gpu, GpuOptions};
+use labelgs::internals::cli::status::exit_status;
 
 toy_shader!(
     fetch,
@@ -107,9 +108,9 @@ fn devices_are_chosen_by_name_index_and_uuid() {
     }
     let error = open("no such device").unwrap_err();
     assert!(error.to_string().contains(&found.name), "{error}");
-    assert_eq!(error.exit_status(), 4);
+    assert_eq!(exit_status(&error), 4);
     let odd = GpuOptions { subgroup_size: Some(3), ..GpuOptions::default() };
-    assert_eq!(Gpu::new(&odd).unwrap_err().exit_status(), 2);
+    assert_eq!(exit_status(&Gpu::new(&odd).unwrap_err()), 2);
     let (devices, picked) = labelgs::gpu::devices(&GpuOptions::default()).unwrap();
     assert!(picked.is_some_and(|index| devices[index].missing().is_empty()));
     let listed = devices.iter().find(|device| device.uuid == found.uuid).unwrap();

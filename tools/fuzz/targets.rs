@@ -289,7 +289,7 @@ impl Place {
         let named = match &error {
             Error::Data { path, problem, .. } => path.starts_with(self.folder.path()) && problem.len() > 5,
             Error::Read { path, .. } => path.starts_with(self.folder.path()),
-            Error::Usage { argument, problem } => argument.starts_with("--") && problem.len() > 5,
+            Error::Usage { argument, problem } => !argument.is_empty() && problem.len() > 5,
             _ => false,
         };
         assert!(named, "{}: the answer is `{text}` ({error:?})", self.target.name);

@@ -8,7 +8,7 @@ use super::args::JsonFlag;
 use super::context::Context;
 use super::eval::EvalArgs;
 use super::train_args::TrainFlags;
-use super::{eval, interrupt, stdout, train};
+use super::{eval, interrupt, stdout, train, wording};
 use crate::eval::scores::{MeanScores, Scores};
 use crate::io::atomic;
 use crate::run::Settings;
@@ -28,23 +28,23 @@ pub struct AblateArgs {
     /// Folder of id masks, to train and to score with.
     #[arg(long, value_name = "DIR")]
     pub masks: PathBuf,
-    /// Masks that were tracked on the photos alone, for the variant paper-no-dov.
+    /// Folder of masks tracked on the photos alone, for the variant paper-no-dov.
     #[arg(long, value_name = "DIR")]
     pub masks_without_dov: Option<PathBuf>,
-    /// Masks to score with, where those to train with are spoilt.
+    /// Folder of masks to score with. Default: those of --masks.
     #[arg(long, value_name = "DIR")]
     pub truth: Option<PathBuf>,
-    /// Folder for the runs, VARIANT-SEED, and ablation.json.
+    /// Folder for ablation.json and the runs, VARIANT-SEED.
     #[arg(short, long, value_name = "OUT")]
     pub output: PathBuf,
     /// Variants, with commas between: no-labels, paper, paper-no-dov, paper-no-gpf, paper-no-oam, paper-votes, ours,
-    /// ours-no-oam; otherwise all.
+    /// ours-no-oam. Default: all.
     #[arg(long, value_name = "NAMES", value_delimiter = ',')]
     pub rows: Vec<String>,
-    /// A variant of one's own, NAME=FLAGS of `labelgs train`; may be given several times.
+    /// Another variant, NAME=FLAGS of `labelgs train`. May be given several times.
     #[arg(long = "row", value_name = "NAME=FLAGS")]
     pub own_rows: Vec<String>,
-    /// Runs of each variant, with seeds 0, 1, ..
+    /// Number of runs of each variant; their seeds are 0, 1, ...
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..=100))]
     pub seeds: u64,
     /// JSON.
@@ -71,7 +71,7 @@ struct Outcome {
 /// Runs all variants and prints the table.
 pub(crate) fn run(args: &AblateArgs, context: &Context) -> Result<()> {
     let rows = rows(&args.rows, &args.own_rows, args.masks_without_dov.is_some())?;
-    // A typing error in the last variant is found before the first is trained.
+    // A wrong flag of any variant is found before the first training.
     for row in &rows {
         flags(row, args)?;
     }
@@ -81,9 +81,7 @@ pub(crate) fn run(args: &AblateArgs, context: &Context) -> Result<()> {
         for seed in 0..args.seeds {
             tracing::info!("variant {}, seed {seed}", row.name);
             runs.push(one(&row, seed, args, context)?);
-            if let Some(status) = interrupt::status() {
-                return Err(Error::Interrupted(status));
-            }
+            interrupt::check()?;
         }
         outcomes.push((row, runs));
     }
@@ -99,7 +97,7 @@ pub(crate) fn run(args: &AblateArgs, context: &Context) -> Result<()> {
     stdout::print(&(table::table(&rows) + &quoted::table()))
 }
 
-/// The flags of a variant.
+/// Parses the flags of a variant.
 fn flags(row: &Row, args: &AblateArgs) -> Result<TrainFlags> {
     let typed = std::iter::once("train").chain(row.flags.iter().chain(&args.common).map(String::as_str));
     let command = TrainFlags::augment_args(clap::Command::new("labelgs"));
@@ -107,9 +105,9 @@ fn flags(row: &Row, args: &AblateArgs) -> Result<TrainFlags> {
     let wrong = |problem: &str| Error::usage("--row", format!("{}: {problem}", row.name));
     let flags = flags.map_err(|error| wrong(error.to_string().lines().next().unwrap_or_default()))?;
     if flags.train.is_typed("seed") {
-        return Err(wrong("--seed is what differs between the runs of a variant; say --seeds N"));
+        return Err(wrong("the runs of a variant differ in --seed; use --seeds N instead"));
     }
-    flags.settings(None).map_err(|error| wrong(&error.to_string()))?;
+    flags.settings(None).map_err(|error| wrong(&wording::error(&error)))?;
     Ok(flags)
 }
 
@@ -133,7 +131,7 @@ fn one(row: &Row, seed: u64, args: &AblateArgs, context: &Context) -> Result<Out
     Ok(Outcome { seed, scores: scores.mean, gaussians: summary.gaussians, seconds: summary.seconds })
 }
 
-/// Scores what a variant has made, on the views that it did not train on.
+/// Scores the model of a variant on its test views.
 fn score(out: &Path, settings: &Settings, args: &AblateArgs, context: &Context) -> Result<Scores> {
     let mut eval = EvalArgs::new(out, &args.scene);
     eval.masks = Some(args.truth.as_ref().unwrap_or(&args.masks).clone());

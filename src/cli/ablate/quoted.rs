@@ -1,4 +1,4 @@
-//! What the paper prints, for comparison. Its data sets are other ones: these numbers are quoted, not reproduced.
+//! The results of the paper, for comparison. They are quoted, not reproduced: its data sets differ.
 
 /// Data sets of the paper's tables.
 const SETS: [&str; 4] = ["3D-OVS", "LLFF", "LERF", "Mip-NeRF360"];
@@ -14,9 +14,9 @@ const ROWS: [Row; 4] = [
     ("without OAM", [Some((0.928, 34.19)), Some((0.844, 28.01)), Some((0.80, 32.92)), Some((0.79, 32.47))]),
 ];
 
-/// The table for people.
+/// Returns the results as text.
 pub(super) fn table() -> String {
-    let mut text = "\nquoted from the paper, whose scenes are others: mIoU / PSNR of the objects\n".to_owned();
+    let mut text = "\nquoted from the paper, on other scenes: mIoU / PSNR of the objects\n".to_owned();
     text += &format!("{:>24}", "");
     SETS.iter().for_each(|set| text += &format!(" {set:>14}"));
     for (name, cells) in ROWS {

@@ -1,4 +1,4 @@
-//! The table of an ablation: a row per variant, means over its seeds, with the spread where there are several.
+//! The table of an ablation: a row per variant with the mean over its seeds, and their spread if there are several.
 
 use super::Outcome;
 
@@ -18,7 +18,7 @@ const COLUMNS: [Column; 10] = [
     ("seconds", 1, |run| Some(run.seconds)),
 ];
 
-/// The table for people.
+/// Returns the table as text.
 pub(super) fn table(rows: &[(&str, &[Outcome])]) -> String {
     let several = rows.iter().any(|(_, runs)| runs.len() > 1);
     let width = if several { 17 } else { 12 };

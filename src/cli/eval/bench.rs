@@ -25,7 +25,7 @@ pub(super) fn run(protocol: Protocol, args: &EvalArgs, context: &Context) -> Res
         let problem = format!("no published scorer of {} is known; it is for labelgs and lerf-mask", protocol.name());
         return Err(Error::usage("--compat", problem));
     }
-    let Some(folder) = &args.truth else { return Err(Error::usage("--truth", "--protocol needs it")) };
+    let Some(folder) = &args.truth else { return Err(Error::usage("--truth", "is missing; --protocol needs it")) };
     let root = protocol.root(folder);
     let by = args.by.unwrap_or(protocol.chooses_by());
     let mut layout = read_layout(protocol, &root, by, args)?;
@@ -68,7 +68,7 @@ fn read_layout(protocol: Protocol, root: &Path, by: By, args: &EvalArgs) -> Resu
     let files = files_below(root)?;
     let list = root.join("classes.txt");
     let classes = if list.is_file() { Some(read::text(&list)?) } else { None };
-    // `--scene .` has a name too.
+    // `--scene .` has no file name until it is resolved.
     let scene = std::fs::canonicalize(&args.scene).unwrap_or_else(|_| args.scene.clone());
     let scene = scene.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
     protocol.layout(&files, classes.as_deref(), Ask { truth: root, scene: &scene, by })
@@ -88,7 +88,7 @@ fn keep_objects(layout: &mut Layout, wanted: &[String]) -> Result<()> {
     Ok(())
 }
 
-/// The names of the labels, which objects chosen by name need.
+/// Reads the names of the labels. Fails if objects are chosen by name and no name is known.
 fn read_names(args: &EvalArgs, layout: &Layout) -> Result<Option<LabelTable>> {
     let found = args.names.clone().or_else(|| LabelTable::find_for_model(&args.model));
     let names = found.as_deref().map(LabelTable::read).transpose()?;
@@ -100,7 +100,7 @@ fn read_names(args: &EvalArgs, layout: &Layout) -> Result<Option<LabelTable>> {
         return Ok(names);
     }
     let Some((file, table)) = found.zip(names) else {
-        let problem = "the model has no labels.json, and objects are chosen by name; write one, say --names FILE, or \
+        let problem = "the model has no labels.json, and objects are chosen by name; write one, use --names FILE, or \
                        choose by masks with --by prompt";
         return Err(Error::data(&args.model, "", problem));
     };
@@ -113,7 +113,8 @@ fn read_names(args: &EvalArgs, layout: &Layout) -> Result<Option<LabelTable>> {
     Err(Error::data(file, "", problem))
 }
 
-/// Test views by name. A benchmark that lists its training photos in `images_train` has the others.
+/// Returns the test views by name. If a benchmark lists its training photos in `images_train`, the others are test
+/// views.
 fn test_views<'a>(protocol: Protocol, dataset: &'a Dataset, scene: &Path) -> Vec<&'a View> {
     let train = scene.join("images_train");
     if !protocol.numbers_views() || !train.is_dir() {

@@ -22,7 +22,7 @@ pub(crate) fn run(args: &EvalArgs, context: &Context) -> Result<()> {
     }
 }
 
-/// Scores where they were asked for: JSON in a file or printed, and the table unless JSON is printed.
+/// Writes or prints the scores as JSON if asked to. Prints the table unless JSON is printed.
 fn put_out(scores: &impl serde::Serialize, table: &str, args: &EvalArgs, context: &Context) -> Result<()> {
     match &args.json {
         Some(Some(file)) => write_json(file, scores)?,

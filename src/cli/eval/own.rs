@@ -43,7 +43,7 @@ pub(in crate::cli) fn score(args: &EvalArgs, context: &Context) -> Result<Scores
     Ok(scores)
 }
 
-/// Folders with what is known about whole objects, `ID/NAME.png` in each.
+/// Folders of ground truth about whole objects, `ID/NAME.png` in each.
 struct Folders {
     /// Outlines.
     amodal: Option<PathBuf>,
@@ -54,7 +54,7 @@ struct Folders {
 impl Folders {
     fn find(args: &EvalArgs) -> Result<Self> {
         if let Some(folder) = args.amodal.as_ref().filter(|folder| !folder.is_dir()) {
-            return Err(Error::data(folder, "", "is no folder; --amodal needs a folder with ID/NAME.png"));
+            return Err(Error::data(folder, "", "is not a folder; --amodal needs a folder with ID/NAME.png"));
         }
         let inside = |name: &str| Some(args.scene.join(name)).filter(|folder| folder.is_dir());
         Ok(Self { amodal: args.amodal.clone().or_else(|| inside("amodal")), objects: inside("objects") })
@@ -73,20 +73,20 @@ impl AmodalTruth for Folders {
     }
 }
 
-/// The whole outline of an object in a view: `ID/NAME.png`, sized like the view by nearest pixels.
+/// Reads the whole outline of an object in a view from `ID/NAME.png`, scaled to the view by nearest pixels.
 pub(crate) fn read_outline(folder: &Path, id: u32, view: &View) -> Result<Option<Vec<bool>>> {
     let Some(file) = file_of(folder, id, view) else { return Ok(None) };
     let map = read_mask(&file)?;
     Ok(Some(at_view(view, (map.width, map.height), |index| map.ids[index] != 0)))
 }
 
-/// `ID/NAME.png`, if it is there.
+/// Returns the path of `ID/NAME.png` if the file exists.
 fn file_of(folder: &Path, id: u32, view: &View) -> Option<PathBuf> {
     let file = folder.join(id.to_string()).join(Path::new(&view.name).with_extension("png"));
     file.is_file().then_some(file)
 }
 
-/// A picture of `size` at the view's size, each pixel from the nearest one.
+/// Scales a picture of `size` to the view by nearest pixels.
 fn at_view<T>(view: &View, size: (u32, u32), value: impl Fn(usize) -> T) -> Vec<T> {
     let (width, height) = (view.camera.width, view.camera.height);
     let nearest = |at: u32, side: u32, from: u32| ((f64::from(at) + 0.5) * f64::from(from) / f64::from(side)) as usize;

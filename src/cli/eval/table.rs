@@ -8,7 +8,7 @@ fn number(value: Option<f64>, digits: usize) -> String {
     value.map_or("-".to_owned(), |value| format!("{value:.digits$}"))
 }
 
-/// Views, then objects.
+/// Returns the table of views, then of objects.
 pub(super) fn own_table(scores: &Scores) -> String {
     let mut text = format!("{:>10} {:>8} {:>8}\n", "view", "PSNR", "SSIM");
     for (name, view) in &scores.views {
@@ -47,7 +47,7 @@ pub(super) fn own_table(scores: &Scores) -> String {
     text
 }
 
-/// Objects, averages, and everything that is not there.
+/// Returns the table of objects with averages, then everything that is missing.
 pub(super) fn bench_table(report: &Report) -> String {
     let names = report.objects.keys().map(String::len);
     let wide = names.chain(["mean of objects".len()]).max().unwrap_or_default();

@@ -1,4 +1,4 @@
-//! Progress, and the page where one was asked for.
+//! Progress, and the web page of `--page`.
 
 use crate::Result;
 use crate::cli::context::Context;
@@ -7,7 +7,7 @@ use crate::eval::compared::{Compared, Watch};
 use crate::eval::page::Page;
 use std::path::Path;
 
-/// Counts pictures and shows them.
+/// Counts pictures and adds them to the page.
 pub(super) struct Watcher {
     progress: Progress,
     done: u64,
@@ -15,7 +15,7 @@ pub(super) struct Watcher {
 }
 
 impl Watcher {
-    /// A watcher of `total` pictures with a page in `folder`.
+    /// Starts a watcher of `total` pictures with a page in `folder`.
     pub(super) fn new(total: u64, folder: Option<&Path>, context: &Context) -> Result<Self> {
         let page = folder.map(Page::new).transpose()?;
         Ok(Self { progress: Progress::new(total, "pictures", &context.global), done: 0, page })

@@ -21,7 +21,7 @@ pub struct CheckArgs {
     /// Scene whose photos the masks belong to.
     #[arg(long, value_name = "SCENE")]
     pub scene: PathBuf,
-    /// What is let through of the scene.
+    /// Tolerance for the scene.
     #[command(flatten)]
     pub read: ReadArgs,
     /// JSON.
@@ -29,7 +29,7 @@ pub struct CheckArgs {
     pub json: JsonFlag,
 }
 
-/// Reports on the masks; fails if anything is wrong with them.
+/// Prints the findings. Fails if there are any.
 pub(crate) fn run(args: &CheckArgs, context: &Context) -> Result<()> {
     let dataset = open_photos(&args.scene, args.read)?;
     let report = inspect(&dataset, &args.masks)?;

@@ -1,4 +1,4 @@
-//! `labelgs masks collect`: the paper's E, from the masks of all frames to those of the photos.
+//! `labelgs masks collect`: from the masks of all frames to those of the photos (E in the paper).
 
 use crate::cli::args::JsonFlag;
 use crate::cli::context::Context;
@@ -33,7 +33,7 @@ pub struct CollectArgs {
 pub(crate) fn run(args: &CollectArgs, context: &Context) -> Result<()> {
     let video = Frames::read(&args.frames)?;
     if !args.tracked.is_dir() {
-        return Err(Error::data(&args.tracked, "", "there is no such folder of tracked masks"));
+        return Err(Error::data(&args.tracked, "", "this folder of tracked masks does not exist"));
     }
     let photos: Vec<(&Frame, &str)> =
         video.frames.iter().filter_map(|frame| Some((frame, frame.photo.as_deref()?))).collect();
@@ -71,13 +71,13 @@ fn tracked_file(folder: &Path, frame: &Frame) -> PathBuf {
     folder.join(format!("{stem}.png"))
 }
 
-/// Where the mask of a photo is looked for first: the photo's name, ending in `.png`.
+/// Returns the path of a photo's mask: the photo's name, ending in `.png`.
 fn target(args: &CollectArgs, name: &str) -> Result<PathBuf> {
     let path = Path::new(name).with_extension("png");
     if path.components().all(|part| matches!(part, Component::Normal(_))) {
         return Ok(args.output.join(path));
     }
-    Err(Error::data(&args.frames, format!("photo {name}"), "would lie outside of the folder of masks"))
+    Err(Error::data(&args.frames, format!("photo {name}"), "would lie outside the folder of masks"))
 }
 
 fn collect(source: &Path, frame: &Frame, target: &Path) -> Result<()> {
@@ -85,7 +85,7 @@ fn collect(source: &Path, frame: &Frame, target: &Path) -> Result<()> {
     let (found, expected) = ((ids.width, ids.height), (frame.camera.width, frame.camera.height));
     if !mask_size_fits(found, expected) {
         let problem = format!(
-            "has {} x {} px and its frame {} x {} px, which no scale explains; track the frames as they are",
+            "has {} x {} px and its frame {} x {} px, which is another shape; track the frames in their own size",
             found.0, found.1, expected.0, expected.1
         );
         return Err(Error::data(source, "", problem));

@@ -20,19 +20,19 @@ pub struct ImportArgs {
     /// Scene whose photos the masks belong to.
     #[arg(long, value_name = "SCENE")]
     pub scene: PathBuf,
-    /// Folder to make; must be new or empty.
+    /// Folder to write; must be new or empty.
     #[arg(short, long, value_name = "MASKS")]
     pub output: PathBuf,
-    /// How the masks are to be read; auto fails where two readings fit.
+    /// Format of the masks; auto fails if two formats fit.
     #[arg(long, value_name = "FORMAT", value_enum, default_value = "auto")]
     pub format: Format,
-    /// The pred.json that DEVA wrote with the masks; otherwise that in DIR.
+    /// The pred.json of DEVA. Default: pred.json in DIR, if it exists.
     #[arg(long, value_name = "FILE")]
     pub pred: Option<PathBuf>,
-    /// Whose pixels are that two black and white masks share.
+    /// Owner of pixels that two black and white masks share.
     #[arg(long, value_name = "RULE", value_enum, default_value = "error")]
     pub overlap: Overlap,
-    /// What is let through of the scene.
+    /// Tolerance for the scene.
     #[command(flatten)]
     pub read: ReadArgs,
     /// JSON.
@@ -59,7 +59,7 @@ pub(crate) fn run(args: &ImportArgs, context: &Context) -> Result<()> {
         }));
     }
     let pred = done.pred.as_ref().map_or(String::new(), |pred| format!(", {}", pred.display()));
-    let mut text = format!("{}{pred}: {} ({})\n", done.source.display(), done.format.flag(), done.why);
+    let mut text = format!("{}{pred}: {} ({})\n", done.source.display(), done.format.name(), done.why);
     text += &format!(
         "{}: {} masks for {} photos, {} labels, {} bits\n",
         args.output.display(),

@@ -1,4 +1,4 @@
-//! `labelgs masks`: what is done with masks before training.
+//! `labelgs masks`: masks before training.
 
 pub(crate) mod check;
 pub(crate) mod collect;
@@ -21,36 +21,42 @@ use std::path::Path;
 /// `labelgs masks`.
 #[derive(Args, Clone, Debug)]
 pub struct MasksArgs {
-    /// What to do.
+    /// The command.
     #[command(subcommand)]
     pub verb: MasksVerb,
 }
 
-/// What can be done with masks.
+/// The commands for masks.
 #[derive(Clone, Debug, Subcommand)]
 pub enum MasksVerb {
-    /// Convert masks of trackers and data sets to one id picture per photo, with labels.json.
-    #[command(after_help = "Example: labelgs masks import deva_out --scene garden -o garden/masks")]
-    Import(import::ImportArgs),
-    /// Report missing, mis-sized, mis-named, inverted and nearly empty masks, and ids that come and go.
-    #[command(
-        after_help = "Exit status 1 if anything was found. Example: labelgs masks check garden/masks --scene garden"
-    )]
+    /// Report missing, misnamed, inverted and nearly empty masks, wrong sizes, and ids that come and go. Exit status 1
+    /// if there are any.
+    ///
+    /// Example: labelgs masks check scene/masks --scene scene
     Check(check::CheckArgs),
-    /// Take the masks of the photos out of a tracker's output on the video of `labelgs densify`.
-    #[command(after_help = "Example: labelgs masks collect tracked --frames video/frames.json -o masks")]
-    Collect(collect::CollectArgs),
-    /// Give ids that go from frame to frame by overlap to the masks of a segmenter of single pictures.
-    #[command(after_help = "Example: labelgs masks track segmented -o tracked, between densify and collect")]
-    Track(track::TrackArgs),
-    /// Make masks of all views agree, by the Gaussians of a trained model that they own.
-    #[command(after_help = "Example: labelgs masks repair sam_masks --per-view --model out --scene garden -o masks")]
+    /// Convert masks of trackers and data sets to one id picture per photo, with labels.json.
+    ///
+    /// Example: labelgs masks import scene/masks --scene scene -o imported
+    Import(import::ImportArgs),
+    /// Write masks whose ids agree in all views, with the help of a trained model.
+    ///
+    /// Example: labelgs masks repair scene/masks --model out --scene scene -o repaired
     Repair(repair::RepairArgs),
-    /// Put faults of trackers into right masks, to test what a method does with them.
+    /// Write masks of video frames whose ids agree from frame to frame, where each frame has ids of its own.
+    ///
+    /// Example: labelgs masks track scene/masks -o tracked
+    Track(track::TrackArgs),
+    /// Write the masks of the photos, from the output of a tracker on the video of `labelgs densify`.
+    ///
+    /// Example: labelgs masks collect tracked --frames video/frames.json -o collected
+    Collect(collect::CollectArgs),
+    /// Write masks with the faults of a tracker, to test what a method does with them.
+    ///
+    /// Example: labelgs masks spoil scene/masks --fault swap -o spoilt
     Spoil(spoil::SpoilArgs),
 }
 
-/// Does it.
+/// Runs a command for masks.
 pub(crate) fn run(args: &MasksArgs, context: &Context) -> Result<()> {
     match &args.verb {
         MasksVerb::Import(args) => import::run(args, context),
@@ -68,7 +74,7 @@ fn open_photos(scene: &Path, read: ReadArgs) -> Result<Dataset> {
     io::open_logged(scene, &read.into_options(options))
 }
 
-/// Writes ids as grey, with 8 bits where they suffice.
+/// Writes ids as a grey PNG of 8 bits, or of 16 bits if an id needs them.
 fn write_mask(path: &Path, mask: &LabelMap) -> Result<()> {
     if mask.ids.iter().all(|&id| id <= u16::from(u8::MAX)) {
         let bytes: Vec<u8> = mask.ids.iter().map(|&id| id as u8).collect();
@@ -77,7 +83,7 @@ fn write_mask(path: &Path, mask: &LabelMap) -> Result<()> {
     write_png_grey16(path, mask.width, mask.height, &mask.ids)
 }
 
-/// Names of the PNGs of a folder, sorted.
+/// Returns the sorted names of the PNGs in a folder.
 fn pngs(folder: &Path) -> Result<Vec<String>> {
     let entries = read::folder(folder)?;
     let names = entries.iter().filter_map(|path| path.file_name()?.to_str().map(str::to_owned));

@@ -26,7 +26,7 @@ pub struct RepairArgs {
     /// Folder of id masks.
     #[arg(value_name = "MASKS")]
     pub masks: PathBuf,
-    /// A model of the scene, of any trainer, with or without labels: it tells which masks show the same thing.
+    /// A model of the scene, of any trainer, with or without labels. It shows which masks belong to one object.
     #[arg(long, value_name = "MODEL")]
     pub model: PathBuf,
     /// Scene of the masks.
@@ -35,19 +35,19 @@ pub struct RepairArgs {
     /// Folder to write; must be new or empty.
     #[arg(short, long, value_name = "DIR")]
     pub output: PathBuf,
-    /// The ids of different views mean nothing to each other, as those of a segmenter of single photos.
+    /// The ids of each view are its own, as from a segmenter of single photos.
     #[arg(long)]
     pub per_view: bool,
-    /// Objects that fewer views show are left out.
+    /// Least number of views that show an object; objects in fewer views are left out.
     #[arg(long, value_name = "N", default_value_t = 2)]
     pub min_views: usize,
-    /// Make masks for photos that have none.
+    /// Make masks for photos without one.
     #[arg(long)]
     pub make_missing: bool,
-    /// Gaussians nearer to the camera are not seen, world units; otherwise as in the run of the model, otherwise 0.2.
-    #[arg(long, value_name = "Z", value_parser = near)]
+    /// Near plane, world units: nearer Gaussians are not seen. Default: the value of the model's run, else 0.2.
+    #[arg(long, value_name = "Z", value_parser = near, help_heading = "Rendering")]
     pub near: Option<f32>,
-    /// How the scene is read; masks of test views are left out.
+    /// How the scene is read. Masks of test views are left out.
     #[command(flatten)]
     pub reading: SceneArgs,
     /// JSON.
@@ -55,14 +55,18 @@ pub struct RepairArgs {
     pub json: JsonFlag,
 }
 
-/// Makes masks of all views agree with each other.
+/// Writes masks whose ids agree in all views.
 pub(crate) fn run(args: &RepairArgs, context: &Context) -> Result<()> {
     atomic::require_empty("--output", &args.output)?;
     let model = open_model(&args.model)?;
     let dataset = open_scene(&args.scene, &args.reading, Some(args.masks.clone()), [0.0; 3], true)?;
     let views: Vec<&View> = dataset.train.iter().collect();
     if views.iter().all(|view| view.mask.is_none()) {
-        return Err(Error::data(&args.masks, "", "no training view has a mask here; see --test-every"));
+        return Err(Error::data(
+            &args.masks,
+            "",
+            "no training view has a mask here; check the names of the masks and --test-every",
+        ));
     }
     let mut files = BTreeMap::new();
     for view in &views {
@@ -90,7 +94,7 @@ pub(crate) fn run(args: &RepairArgs, context: &Context) -> Result<()> {
     report(&views, &masks, &repairs, args, context)
 }
 
-/// The file of a view's mask in the folder of all.
+/// Returns the path of a view's mask inside the folder.
 fn file_of(view: &View) -> PathBuf {
     Path::new(&view.name).with_extension("png")
 }

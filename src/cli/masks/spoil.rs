@@ -16,19 +16,19 @@ use std::path::PathBuf;
 /// `labelgs masks spoil`.
 #[derive(Args, Clone, Debug)]
 pub struct SpoilArgs {
-    /// Folder of id masks that are right.
+    /// Folder of correct id masks.
     #[arg(value_name = "MASKS")]
     pub masks: PathBuf,
     /// Folder to write; must be new or empty.
     #[arg(short, long, value_name = "DIR")]
     pub output: PathBuf,
-    /// The fault.
+    /// Fault to add.
     #[arg(long, value_name = "FAULT", value_enum)]
     pub fault: Fault,
-    /// Share of the views that have it.
+    /// Share of the views with the fault.
     #[arg(long, value_name = "SHARE", default_value_t = 0.1)]
     pub share: f64,
-    /// Seed of the draw.
+    /// Seed that draws the views.
     #[arg(long, value_name = "SEED", default_value_t = 0)]
     pub seed: u64,
     /// JSON.
@@ -36,7 +36,7 @@ pub struct SpoilArgs {
     pub json: JsonFlag,
 }
 
-/// Writes masks with faults on purpose.
+/// Writes masks with deliberate faults.
 pub(crate) fn run(args: &SpoilArgs, context: &Context) -> Result<()> {
     if !(0.0..=1.0).contains(&args.share) {
         return Err(Error::usage("--share", format!("is {}, needs 0 to 1", args.share)));

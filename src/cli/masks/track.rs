@@ -1,4 +1,4 @@
-//! `labelgs masks track`: ids that go from frame to frame by overlap.
+//! `labelgs masks track`: ids that follow objects from frame to frame by overlap.
 
 use super::{pngs, write_mask};
 use crate::cli::args::JsonFlag;
@@ -27,7 +27,7 @@ pub struct TrackArgs {
     /// Least intersection over union of an object's regions in two frames.
     #[arg(long, value_name = "IOU", value_parser = share, default_value_t = 0.1)]
     pub min_overlap: f32,
-    /// Frames that an object may be out of sight.
+    /// Most frames in a row without the object before its id is dropped.
     #[arg(long, value_name = "FRAMES", default_value_t = 5)]
     pub memory: usize,
     /// JSON.
@@ -43,7 +43,7 @@ pub(crate) fn run(args: &TrackArgs, context: &Context) -> Result<()> {
     let size = |frame: &LabelMap| (frame.width, frame.height);
     if let Some(other) = frames.iter().position(|frame| size(frame) != size(&frames[0])) {
         let ((w, h), (width, height)) = (size(&frames[other]), size(&frames[0]));
-        let problem = format!("has {w} x {h} px and {} {width} x {height} px; frames have one size", names[0]);
+        let problem = format!("has {w} x {h} px and {} {width} x {height} px; all frames need one size", names[0]);
         return Err(Error::data(args.segmented.join(&names[other]), "", problem));
     }
     let tracked = track(&frames, Overlap { least: f64::from(args.min_overlap), memory: args.memory })?;

@@ -30,22 +30,22 @@ pub struct OcclusionArgs {
     /// Folder of depth maps, one per photo by name: 16-bit PNG, EXR, NPY or PFM. Uses the paper's rule.
     #[arg(long, value_name = "DIR", requires = "depth_kind")]
     pub depths: Option<PathBuf>,
-    /// What the numbers of --depths mean.
+    /// Meaning of the values in --depths.
     #[arg(long, value_name = "KIND", value_enum, requires = "depths")]
     pub depth_kind: Option<DepthKind>,
-    /// A model whose own depth to use: a PLY, or the folder that `labelgs train` made.
+    /// Model whose rendered depth to use: a PLY, or the folder of a `labelgs train` run.
     #[arg(long, value_name = "MODEL")]
     pub model: Option<PathBuf>,
     /// File to write.
     #[arg(short, long, value_name = "FILE.json")]
     pub output: PathBuf,
-    /// Folder for a picture of each view, NAME.png: contours are white in front, black behind, grey where neither is.
+    /// Folder for a picture of each view, NAME.png: contours are white in front, black behind, grey if undecided.
     #[arg(long, value_name = "DIR")]
     pub pictures: Option<PathBuf>,
-    /// Longest side of a picture, px; otherwise its own size.
-    #[arg(long, value_name = "PX", value_parser = clap::value_parser!(u32).range(1..))]
+    /// Longest side of a picture, px. Default: the size of the photo.
+    #[arg(long, value_name = "PX", value_parser = clap::value_parser!(u32).range(1..), help_heading = "Scene")]
     pub max_resolution: Option<u32>,
-    /// What is let through of the scene.
+    /// Tolerance for the scene.
     #[command(flatten)]
     pub read: ReadArgs,
     /// JSON.
@@ -66,7 +66,7 @@ pub(crate) fn run(args: &OcclusionArgs, context: &Context) -> Result<()> {
     let table = match (&args.depths, args.depth_kind, &args.model) {
         (Some(depths), Some(kind), _) => OcclusionTable::new("depth", from_depths(&args.scene, depths, kind, &views)?),
         (_, _, Some(model)) => OcclusionTable::new("rendered", from_model(model, &views, context)?),
-        _ => return Err(Error::usage("--depths", "--depths with --depth-kind, or --model is needed")),
+        _ => return Err(Error::usage("--depths", "needs --depth-kind, or use --model instead")),
     };
     if let Some(folder) = &args.pictures {
         views.iter().zip(stems(&views)).try_for_each(|(view, stem)| draw(folder, (view, &stem), &table))?;

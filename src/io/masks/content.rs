@@ -61,7 +61,11 @@ pub(super) fn read_ids(
         if found == expected {
             return accept(header.size);
         }
-        let problem = format!("is a {} picture where {} is expected; see --format", found.text(), expected.text());
+        let problem = format!(
+            "is a {} picture where {} is expected; set `format` to what the folder holds",
+            found.text(),
+            expected.text()
+        );
         Err(Error::data(path, "", problem))
     })?;
     let samples = raw.samples();

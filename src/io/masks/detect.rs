@@ -26,8 +26,8 @@ pub(super) struct Reading {
     pub(super) notes: Vec<String>,
 }
 
-const NESTED_FLAGS: &str = "--format binary-folders if a folder is an object (OBJECT/NAME.png), --format photo-folders if \
-                            a folder is a photo (NAME/OBJECT.png)";
+const NESTED_FORMATS: &str = "`format = binary-folders` if a folder is an object (OBJECT/NAME.png), \
+                              `format = photo-folders` if a folder is a photo (NAME/OBJECT.png)";
 
 /// Finds out how the folder is to be read, for the photos of these names.
 pub(super) fn detect(photos: &[&str], options: &ImportOptions) -> Result<Reading> {
@@ -38,7 +38,7 @@ pub(super) fn detect(photos: &[&str], options: &ImportOptions) -> Result<Reading
     let pred = pred.as_deref().map(Pred::read).transpose()?;
     let (format, why) = match options.format {
         Format::Auto => recognise(&root, &layouts, pred.as_ref(), photos)?,
-        format => (format, "as --format says".to_owned()),
+        format => (format, "as asked for".to_owned()),
     };
     let (claims, ids) = match format {
         Format::DevaShort | Format::ObjectMask | Format::Auto => (layouts.flat, Some(Kind::Grey8)),
@@ -53,7 +53,7 @@ pub(super) fn detect(photos: &[&str], options: &ImportOptions) -> Result<Reading
     }
     if ids.is_none() && options.pred.is_some() {
         let problem = "belongs to id pictures, and this folder has black and white ones; leave it out";
-        return Err(Error::usage("--pred", problem));
+        return Err(Error::usage("pred", problem));
     }
     let notes = if format == Format::ThreeDOvs { classes_without_mask(&root, &claims)? } else { Vec::new() };
     Ok(Reading { format, root, ids, claims, pred: pred.filter(|_| ids.is_some()), why, notes })
@@ -85,7 +85,7 @@ fn recognise(root: &Path, layouts: &Layouts, pred: Option<&Pred>, photos: &[&str
             Some(file) => {
                 let problem = format!(
                     "pictures in folders must be black and white to be recognised, with one value besides 0, and \
-                     {file} is not. If it has soft edges, say {NESTED_FLAGS}: values in the upper half are then the \
+                     {file} is not. If it has soft edges, set {NESTED_FORMATS}: values in the upper half are then the \
                      object. Id pictures belong into one folder, named like the photos"
                 );
                 Error::data(root, "", problem)
@@ -101,7 +101,7 @@ fn recognise(root: &Path, layouts: &Layouts, pred: Option<&Pred>, photos: &[&str
             let fits = readings.iter().filter(|(fits, ..)| *fits);
             let fits = fits.map(|(_, text, claims)| format!("{text} ({} photos)", claims.photos()));
             let problem = format!(
-                "can be read in more than one way: {}. Say {NESTED_FLAGS}, or for id pictures one of --format \
+                "can be read in more than one way: {}. Set {NESTED_FORMATS}, or for id pictures `format` to one of \
                  deva-short, deva-long, palette and grey16",
                 fits.collect::<Vec<_>>().join(", ")
             );
@@ -148,7 +148,7 @@ fn flat_format(root: &Path, claims: &Claims, pred: Option<&Pred>) -> Result<(For
         Kind::Rgb if pred.is_some() => Format::DevaLong,
         Kind::Rgb => {
             let problem = "holds RGB pictures and no pred.json, so they may be ids as of DEVA or colours for looking \
-                           at. Say --format deva-long if R + 256 G + 65536 B is the id, or --pred with the pred.json of \
+                           at. Set `format = deva-long` if R + 256 G + 65536 B is the id, or `pred` to the pred.json of \
                            the run; colours for looking at cannot be read, import the id pictures that they were made \
                            from";
             return Err(Error::data(root, "", problem));

@@ -67,11 +67,12 @@ pub(super) fn root(folder: &Path, format: Format) -> Result<PathBuf> {
         [(name, _)] => Ok(folder.join(name)),
         ref several => {
             let names: Vec<&str> = several.iter().map(|(name, _)| *name).collect();
-            let flags: Vec<String> = several.iter().map(|(_, format)| format!("--format {}", format.flag())).collect();
+            let formats: Vec<String> =
+                several.iter().map(|(_, format)| format!("`format = {}`", format.name())).collect();
             let problem = format!(
-                "holds more than one kind of masks ({}); name one of these folders, or say {}",
+                "holds more than one kind of masks ({}); name one of these folders, or set {}",
                 names.join(", "),
-                flags.join(" or ")
+                formats.join(" or ")
             );
             Err(Error::data(folder, "", problem))
         }

@@ -78,7 +78,7 @@ struct Survey {
 
 /// Imports the masks of the photos of `dataset` into the folder `output`, which must be new or empty.
 pub fn import(dataset: &Dataset, options: &ImportOptions, output: &Path) -> Result<Imported> {
-    atomic::require_empty("--output", output)?;
+    atomic::require_empty("output", output)?;
     let views = dataset.all();
     let names: Vec<&str> = views.iter().map(|view| view.name.as_str()).collect();
     let reading = detect(&names, options)?;
@@ -219,7 +219,7 @@ fn overlaps<'a>(
         let object = |id: u32| objects.get(id as usize - 1).map_or("", String::as_str);
         let problem = format!(
             "{pixels} pixels in {photos} photos belong to more than one object, most of them in {}: {count} of {} and \
-             {}. Say --overlap smaller if the object with fewer pixels in the photo has them, or --overlap later if the \
+             {}. Set `overlap = smaller` if the object with fewer pixels in the photo has them, or `overlap = later` if the \
              later one by name has",
             name(at),
             object(a),

@@ -49,8 +49,8 @@ pub enum Format {
 }
 
 impl Format {
-    /// What is typed for it.
-    pub fn flag(self) -> &'static str {
+    /// Its name in settings and messages.
+    pub fn name(self) -> &'static str {
         match self {
             Self::Auto => "auto",
             Self::DevaShort => "deva-short",

@@ -86,7 +86,7 @@ impl Pred {
         }
         let problem = format!(
             "{} of {} ids in the pictures are not in {} (such as {}): the pictures are display colours or of another \
-             run; name the right file with --pred, or move the wrong one away and name the --format",
+             run; name the right file in `pred`, or move the wrong one away and set `format`",
             unknown.len(),
             found.len(),
             self.path.display(),

@@ -2,12 +2,12 @@
 
 /// What the user can do, by what decides a domain: `{fits}` and `{name}` stand for the number that fits, and of what.
 mod cures {
-    pub(super) const MODEL: &str = "lower --max-gaussians to {fits} or use another device";
-    pub(super) const VOTES: &str = "at most {fits} {name} fit; lower --max-gaussians or use another device";
+    pub(super) const MODEL: &str = "lower `max_gaussians` to {fits} or use another device";
+    pub(super) const VOTES: &str = "at most {fits} {name} fit; lower `max_gaussians` or use another device";
     pub(super) const PAIRS: &str =
-        "at most {fits} {name} fit; lower --max-gaussians or --max-resolution, or use another device";
-    pub(super) const IMAGE: &str = "at most {fits} {name} fit; lower --max-resolution or use another device";
-    pub(super) const LAYERS: &str = "at most {fits} {name} fit; lower --label-samples or use another device";
+        "at most {fits} {name} fit; lower `max_gaussians` or `max_resolution`, or use another device";
+    pub(super) const IMAGE: &str = "at most {fits} {name} fit; lower `max_resolution` or use another device";
+    pub(super) const LAYERS: &str = "at most {fits} {name} fit; lower `label_samples` or use another device";
     pub(super) const NONE: &str = "use another device";
 }
 

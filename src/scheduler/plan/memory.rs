@@ -142,7 +142,7 @@ impl MemoryReport {
             needed: self.total,
             limit_name: "the memory of this device that may be used".to_owned(),
             limit: limits.max_memory,
-            cure: "lower --max-gaussians, use smaller images or use another device".to_owned(),
+            cure: "lower `max_gaussians`, use smaller images or use another device".to_owned(),
         })
     }
 }

@@ -74,7 +74,7 @@ impl<'a> Population<'a> {
             let room = self.engine.size().gaussians;
             match self.engine.make_room_for_gaussians(u64::from(counted.densified_count)) {
                 Err(error) if error.is_out_of_memory() && most > room => {
-                    tracing::warn!("{error}; from here on there are no more than {room} Gaussians (until --resume)");
+                    tracing::warn!("{error}; the number of Gaussians stays at {room} until the run is resumed");
                     *self.bound = Bound { most: room, by_memory: true };
                     most = room;
                 }

@@ -52,7 +52,7 @@ pub fn canary(gpu: &Arc<Gpu>) -> Result<()> {
     };
     Err(Error::NoDevice(format!(
         "{} ({} {}) tells of subgroups of {} and does not let their size be chosen; a step with such subgroups goes wrong \
-         ({problem}): see `labelgs selftest`; try another version of the driver or another --device",
+         ({problem}); try another version of the driver or another device",
         found.name,
         found.driver_name,
         found.driver_info,

@@ -2,6 +2,7 @@
 
 use super::*;
 use labelgs::Error;
+use labelgs::internals::cli::status::exit_status;
 
 fn plan_with(list: &PassList, limits: &Limits) -> labelgs::Result<Plan> {
     Plan::new(table::TABLE, &capacity(), list, limits, PlanOptions::default())
@@ -25,7 +26,7 @@ fn a_binding_that_is_too_large_names_the_capacity_that_fits() {
         "model needs 16000 bytes, the largest storage binding of this device is 15999 bytes; \
          lower --max-gaussians to 999 or use another device"
     );
-    assert_eq!(error.exit_status(), 5);
+    assert_eq!(exit_status(&error), 5);
     plan_with(&list, &Limits { max_storage_range: 16_000, ..Limits::default() }).unwrap();
 }
 
