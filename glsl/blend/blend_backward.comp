@@ -13,8 +13,7 @@
 //          v_colour b, stamp of the step
 //          (records without the current stamp were not walked; they count as 0)
 // Math:    p = dL/d ln alpha = w (u - s), where u = colour . g, and s is the colour behind, times g; geometry and
-// opacity
-//          gradients are linear in six moments of p about the tile's centre. T by division. Clamped alpha: p = 0.
+//          opacity gradients are linear in six moments of p about the tile's centre. T by division. Clamped alpha: p = 0.
 // Order:   fixed, bitwise reproducible.
 // Mirror:  src/verify/reference/blend.rs::blend_backward
 

@@ -7,8 +7,7 @@
 // Work:    one invocation.
 // Reads:   step; label_from_layer, layer_weights [layers]; layer_occluders [layers, words]
 // Writes:  object: the layer, from 1; object_counters: the counters of all passes so far; counters; object_step, and
-//          entry 1 of object_label, object_weight, object_occluders: inputs of the object's passes, instead of the
-// step's
+//          entry 1 of object_label, object_weight, object_occluders: inputs of the object's passes
 // Mirror:  none (bookkeeping; tests/pass/separate.rs)
 
 layout(local_size_x = 1) in;

@@ -65,8 +65,7 @@ void main() {
 #ifndef OBJECT
     if (total > 0u) {
         float size = length(scene_mean * vec2(0.5 * float(step.width), 0.5 * float(step.height)));
-        // Same rule as in project_backward, which drops the gradients of such a splat: an infinity would stay in the
-        // sum.
+        // As in project_backward, which drops the gradients of such a splat: an infinity would stay in the sum.
         if (finite(size) && size < GRADIENT_MAX) {
             densify_stats[gaussian] += vec2(size, 1.0);
         }

@@ -7,8 +7,7 @@ layout(constant_id = 2) const uint TILE_HEIGHT = 8;
 layout(local_size_x_id = 0) in;
 
 // lavapipe ends all loops of an invocation after 65,535 rounds in total. Several dispatches (SEGMENTED) walk a list
-// that
-// is longer than a segment, and pass on the state of the pixels through memory.
+// longer than a segment, and pass on the state of the pixels through memory.
 #ifdef SEGMENTED
 layout(constant_id = 12) const uint SEGMENT = 0;
 layout(constant_id = 13) const uint SEGMENTS = 1;

@@ -36,8 +36,8 @@ struct Counters {
     uint layer_tile_count;  // tiles of object layers with a splat
     uint longest_list;      // splats in the fullest tile
     uint nonfinite_count, nonfinite_first; // Gaussians with a dropped, nonfinite gradient; lowest index
-    uint broken_count, broken_first; // Gaussians with a nonfinite position, opacity or scale (cull)
-    uint unprojected_count, unprojected_first; // Gaussians with a nonfinite splat (project_forward)
+    uint broken_count, broken_first; // Gaussians with a nonfinite position, opacity or scale (cull); lowest index
+    uint unprojected_count, unprojected_first; // Gaussians with a nonfinite splat (project_forward); lowest index
     uint densified_count;   // Gaussians after densification
     uint walked_first, walked_second; // splats walked by tiles in blend_forward, in the first and second half
                             // of its workgroups; times the pixels per tile: pairs

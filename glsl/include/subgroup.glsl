@@ -1,6 +1,5 @@
-// Butterflies over one subgroup; the shuffle is the one subgroup operation that is fast on every kind of device. They
-// are
-// unrolled by hand, because some drivers do not unroll a loop over the distances, and lavapipe counts loop rounds.
+// Butterflies over one subgroup by shuffles, the one subgroup operation that is fast on all devices. Unrolled by hand,
+// because some drivers do not unroll a loop over the distances, and lavapipe counts loop rounds.
 
 layout(constant_id = 0) const uint SUBGROUP_SIZE = 8;
 

@@ -5,9 +5,8 @@
 #include "dispatch.glsl"
 #include "blend_tile.glsl"
 // vote — sum, for each Gaussian and each label, the blending weights of the Gaussian in the pixels of that label.
-// Work:    one subgroup (= workgroup) per tile of the scene, jobs as in blend_forward. One walk counts four labels of
-// the
-//          tile; tiles with more labels are walked again (specialisation constant ROUND).
+// Work:    one subgroup (= workgroup) per tile of the scene, jobs as in blend_forward. One walk counts four labels
+//          of the tile; tiles with more labels are walked again (specialisation constant ROUND).
 // Reads:   step; tile_starts, tile_ends [T]; instance_from_sorted, splat_from_instance [I]; splats [V,3]; gaussian_from_splat [V];
 //          view_labels [P] column of each pixel's label, VOTE_NONE for pixels without votes; vote_weights [columns]
 // Writes:  votes_low, votes_high [N, columns]: 64 bits, VOTE_ONE for a pixel of weight 1, times the column's weight

@@ -153,8 +153,7 @@ impl Engine {
         self.capacity_for(&EngineSize { gaussians, ..self.size })
     }
 
-    /// Returns capacities for a larger size, with at least the pairs, tiles and segments that the scene has needed so
-    /// far.
+    /// Returns capacities for a larger size, with at least the pairs, tiles and segments needed so far.
     fn capacity_for(&self, size: &EngineSize) -> Capacity {
         let old = self.sched.capacity();
         let mut new = capacity(&self.shape, size);

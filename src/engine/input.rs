@@ -84,8 +84,7 @@ impl<'a> From<&'a VoteInput<'a>> for Input<'a> {
 }
 
 impl Engine {
-    /// Writes the input of a list into a frame. Every camera reaches the device here, so the image size is checked
-    /// here.
+    /// Writes the input of a list into a frame. Checks the image size, because every camera passes through here.
     pub(crate) fn write(&mut self, frame: usize, input: Input) -> Result<()> {
         let uniforms = match input {
             Input::Uniforms(uniforms) => uniforms,

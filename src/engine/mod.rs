@@ -1,7 +1,7 @@
 //! The engine below training and rendering: one device, one model in its memory, and the pass lists that work on it.
 //!
-//! All modules above use the scheduler through this module: [`Engine::run`] runs a list and waits for it,
-//! [`Engine::submit`] and [`Engine::retire`] keep steps in flight, and transfers are typed.
+//! All modules above use the scheduler through this module: `Engine::run` runs a list and waits for it,
+//! `Engine::submit` and `Engine::retire` keep steps in flight, and transfers are typed.
 
 mod data;
 pub(crate) mod growth;

@@ -6,8 +6,7 @@ use crate::scene::Gaussians;
 use crate::scheduler::Scheduler;
 use crate::scheduler::plan::Buf;
 
-/// Bands above degree 0: plane, vec4 per Gaussian, index of the first coefficient (without degree 0), number of
-/// coefficients.
+/// Bands above degree 0: plane, vec4 per Gaussian, first coefficient (without degree 0), number of coefficients.
 const BANDS: [(Buf, usize, usize, usize); 3] = [(Buf::SH1, 3, 0, 3), (Buf::SH2, 4, 3, 5), (Buf::SH3, 6, 8, 7)];
 
 /// Writes the planes; sets the optimiser state to 0.

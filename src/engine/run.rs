@@ -54,8 +54,7 @@ pub(crate) struct Recording {
 }
 
 impl Engine {
-    /// Returns the recorded list for a key; records it on first use. Public for tests and benchmarks, with
-    /// [`Engine::raw`].
+    /// Returns the recorded list for a key; records it on first use. Public for tests and benchmarks.
     #[doc(hidden)]
     pub fn list(&mut self, key: ListKey) -> Result<ListId> {
         if let Some(&id) = self.lists.get(&key) {
@@ -80,8 +79,7 @@ impl Engine {
         Ok(id)
     }
 
-    /// Runs a list and waits for it. If a buffer was too small, grows it and runs the list again. No list may be in
-    /// flight.
+    /// Runs a list and waits for it; grows buffers that were too small and repeats. No list may be in flight.
     pub(crate) fn run<'a>(&mut self, key: ListKey, input: impl Into<Input<'a>>) -> Result<Report> {
         let input = input.into();
         self.check_idle()?;

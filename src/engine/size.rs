@@ -62,8 +62,7 @@ impl EngineSize {
     pub(crate) fn check(&self, shape: &KernelShape) -> Result<()> {
         let (width, height) = self.image;
         let (tiles_x, tiles_y) = shape.tiles(width, height);
-        // A splat may touch every tile, and again every tile of its object's layer. One loop of at most 65,535 rounds
-        // walks them.
+        // A splat may touch every tile twice, with its object's layer. One loop of 65,535 rounds at most walks them.
         let most = if self.labels.is_some() { 32_500 } else { 65_000 };
         if u64::from(tiles_x) * u64::from(tiles_y) <= most {
             return Ok(());

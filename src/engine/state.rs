@@ -9,8 +9,7 @@ use crate::scheduler::plan::{Buf, TABLE};
 use glam::DVec3;
 use std::collections::BTreeMap;
 
-/// Buffers and row counts of the state of a training with this degree of the spherical harmonics, including buffers
-/// that its strategy keeps.
+/// Buffers of a training's state, with row counts; `kept` are the buffers that its strategy keeps.
 fn buffers(sh_degree: u32, labels: bool, kept: &[Buf], [count, shared_rows]: [u32; 2]) -> Vec<(Buf, u32)> {
     let attributes = ATTRIBUTES.iter().filter(|a| a.from_degree <= sh_degree).flat_map(|a| a.planes);
     let labels = labels.then_some(Buf::LABELS);

@@ -6,8 +6,7 @@ use ash::vk;
 use std::fmt::Debug;
 use std::sync::Arc;
 
-/// Storage of compiled pipelines between runs. A failure only costs time at the next start, so neither method returns
-/// an error.
+/// Storage of compiled pipelines between runs. A failure only costs time at the next start, so it is no error.
 pub trait PipelineStore: Debug + Send + Sync {
     /// Returns the saved data of a device; empty if there is none.
     fn load(&self, device: &str) -> Vec<u8>;

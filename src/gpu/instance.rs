@@ -218,8 +218,7 @@ unsafe extern "system" fn on_message(
         // SAFETY: the layer passes strings with a terminating 0.
         unsafe { CStr::from_ptr(pointer) }.to_string_lossy().into_owned()
     };
-    // SAFETY: `user` is the `Messages` given at creation, which outlives the messenger; `data` is valid during the
-    // call.
+    // SAFETY: `user` is the `Messages` given at creation, which outlives the messenger; `data` is valid here.
     let (data, messages) = unsafe { (&*data, &*user.cast::<Messages>()) };
     let is_error = severity.contains(vk::DebugUtilsMessageSeverityFlagsEXT::ERROR);
     let mut messages = lock(&messages.0);

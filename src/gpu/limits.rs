@@ -22,8 +22,7 @@ pub struct PlanLimits {
     pub max_storage_buffers: u32,
     /// Maximum number of texel buffers per shader.
     pub max_texel_buffers: u32,
-    /// Memory that the engine may use in total, in bytes: a share of the free memory that the driver reports, or of the
-    /// heap.
+    /// Memory that the engine may use in total, in bytes: a share of the driver's free memory, or of the heap.
     pub max_memory: u64,
 }
 

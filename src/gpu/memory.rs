@@ -113,8 +113,7 @@ impl Buffer {
     /// Copies bytes to host-visible memory. The caller ensures that the device does not use them meanwhile.
     pub(crate) fn write(&self, offset: u64, data: &[u8]) -> Result<()> {
         let to = self.mapped(offset, data.len())?;
-        // SAFETY: `mapped` checked the range. The source is a Rust slice of the same length, so it cannot overlap
-        // device memory.
+        // SAFETY: `mapped` checked the range. A Rust slice of the same length cannot overlap device memory.
         unsafe { std::ptr::copy_nonoverlapping(data.as_ptr(), to, data.len()) };
         Ok(())
     }

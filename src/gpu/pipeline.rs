@@ -27,8 +27,7 @@ pub(crate) struct Pipeline {
 }
 
 impl Gpu {
-    /// Returns the pipeline of a shader with these specialisation constants (empty for the defaults); creates it on
-    /// first use.
+    /// Returns the pipeline of a shader; creates it on first use. `spec` is empty for the default constants.
     pub(crate) fn pipeline(&self, shader: &'static ShaderDesc, spec: &[u32]) -> Result<Arc<Pipeline>> {
         let spec =
             if spec.is_empty() { shader.spec.iter().map(|constant| constant.default).collect() } else { spec.to_vec() };

@@ -39,8 +39,7 @@ impl Builder<'_> {
         self.capacity.segments.max(1) as u32
     }
 
-    /// Appends a pass; [`pass!`](crate::pass) expands to this call. Buffers and constants that the variant lacks are
-    /// skipped.
+    /// Appends a pass; [`pass!`](crate::pass) expands to this call. Skips buffers and constants that the variant lacks.
     ///
     /// # Panics
     ///
@@ -94,8 +93,7 @@ pub(crate) fn over_splats() -> Grid {
 /// Grid of one workgroup.
 pub(crate) const ONE: Grid = Grid::Groups(1, 1, 1);
 
-/// `pass!(builder, file(macro: bool, ..) { binding: BUF, .. } [constant: value, ..], grid)`: declares a pass of a
-/// kernel.
+/// `pass!(builder, file(macro: bool, ..) { binding: BUF, .. } [constant: value, ..], grid)`: declares a kernel's pass.
 ///
 /// Name every binding that any variant of the file uses. Constants without a value come from the shape or from the
 /// defaults in GLSL; unnamed macros are off.

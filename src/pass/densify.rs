@@ -1,5 +1,4 @@
-//! Clones, splits and prunes on the device: marks and counts the Gaussians, then rewrites every attribute in the new
-//! order.
+//! Clones, splits and prunes on the device: marks and counts Gaussians, then rewrites attributes in the new order.
 
 use super::build::{Builder, Count, args, over_gaussians};
 use super::optimize::ATTRIBUTES;

@@ -1,5 +1,4 @@
-//! Labels from masks: the lift of one step (`blend_forward_labels` casts its votes), and votes from sweeps over all
-//! views.
+//! Labels from masks: the lift of a step (`blend_forward_labels` casts its votes), and sweeps of votes over all views.
 
 use super::build::{Builder, args, over_gaussians};
 use super::project::GAUSSIAN_FROM_SPLAT;

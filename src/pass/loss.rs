@@ -1,5 +1,4 @@
-//! L1 and D-SSIM against the photo: value and gradient with respect to the image. The filter is separable and needs no
-//! barriers.
+//! L1 and D-SSIM against the photo: value and gradient. The filter is separable and needs no barriers.
 
 use super::build::{Builder, ONE};
 use crate::pass::build::pass;

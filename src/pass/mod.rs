@@ -59,8 +59,8 @@ pub enum Hook {
     Updated,
 }
 
-/// Changes to training steps, by a strategy or an owner of [shared parameters](SHARED_PLANES). `passes` numbers the
-/// variants of the extension from 1; each variant has its own recording.
+/// Changes to training steps, by a strategy or an owner of shared parameters. `passes` numbers the variants of the
+/// extension from 1; each variant has its own recording.
 pub trait Extension: std::fmt::Debug + Send + Sync {
     /// Adds passes at a hook.
     fn extend(&self, _passes: u32, _hook: Hook, _b: &mut Builder) {}

@@ -1,5 +1,4 @@
-//! Exclusive prefix sum of u32 values by reduce-then-scan. Workgroups never wait for each other, so it runs on any
-//! device.
+//! Exclusive prefix sum of u32 values by reduce-then-scan. Workgroups never wait, so it runs on any device.
 
 use super::build::{Builder, Count, ONE};
 use crate::pass::build::pass;

@@ -26,8 +26,7 @@ pub struct KernelShape {
 /// and one more per load of a subgroup.
 const SEGMENT_LENGTH: u32 = 40_960;
 
-/// Least number of elements that texel buffers must hold: 1 GiB of vec4. A smaller limit would bound the model before
-/// memory does.
+/// Minimum elements of texel buffers: 1 GiB of vec4. A smaller limit would bound the model before memory does.
 const TEXELS_MIN: u64 = 1 << 26;
 
 impl KernelShape {

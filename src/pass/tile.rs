@@ -26,8 +26,7 @@ pub(super) fn bin_object(b: &mut Builder) -> Buf {
     bin(b, false, 1)
 }
 
-/// Bins each splat into the scene and, with `layers`, into the layer of its object; without `layers`, into `layer`
-/// only.
+/// Bins each splat into the scene and, with `layers`, into its object's layer; else into `layer` only.
 fn bin(b: &mut Builder, layers: bool, layer: u32) -> Buf {
     let instances = b.capacity.instances as u32;
     b.list.stage = Stage::Tile;

@@ -196,8 +196,7 @@ impl Scheduler {
             return Ok(());
         }
         self.timeline.wait(ticket.0).map_err(|error| {
-            // After this error the caller may free memory in use, so wait for the device. A lost device returns at
-            // once.
+            // The caller may free memory in use after this error, so wait. A lost device returns at once.
             let _ = self.gpu.wait_idle();
             self.name_pass(error)
         })

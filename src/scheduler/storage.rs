@@ -91,8 +91,7 @@ impl Scheduler {
         if resized.is_ok() {
             self.capacity = capacity;
         } else {
-            // Shrink the buffers that have grown, since others need that memory now; a buffer that fails to shrink
-            // stays large.
+            // Shrink again what has grown, since others need that memory; a buffer that fails to shrink stays large.
             let old = self.capacity;
             if let Err(error) = self.resize_those(&old, false) {
                 tracing::debug!("some buffers keep their larger size: {error}");
@@ -153,8 +152,7 @@ impl Scheduler {
                     Ok(())
                 }
                 Err(error) => {
-                    // The old size fitted a moment ago. If it fails now, report the first error; the next list tries
-                    // again.
+                    // The old size fitted a moment ago. If it fails now, report the first error; the next list retries.
                     self.storage.own[index] = allocate(&self.gpu, decl, old_bytes).unwrap_or_default();
                     Err(error)
                 }

@@ -106,8 +106,7 @@ pub struct Compiled {
 include!(concat!(env!("OUT_DIR"), "/shaders.rs"));
 
 impl structs::Counters {
-    /// Number of splats that tiles walked, over all tiles; times the pixels per tile, this is the number of (pixel,
-    /// splat) pairs.
+    /// Splats that tiles walked, over all tiles; times the pixels per tile, the number of (pixel, splat) pairs.
     pub fn walked_splats(&self) -> u64 {
         u64::from(self.walked_first) + u64::from(self.walked_second)
     }

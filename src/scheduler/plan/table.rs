@@ -1,5 +1,4 @@
-//! The table of all buffers of the engine: element, length, lifetime and description. Search for a name to find its
-//! uses.
+//! The table of all buffers of the engine: element, length, lifetime and description.
 
 use super::buffers::{Class, TexelFormat};
 use super::capacity::Domain;

@@ -111,8 +111,7 @@ pub fn mark(rules: &Rules, before: &Population, extent: f64, step: u32) -> Vec<u
     counts
 }
 
-/// Adds a view to the statistic: the gradient's norm, and one view for each visible Gaussian. Skips gradients that are
-/// also withheld from Adam.
+/// Adds a view to the statistic: gradient norm and one view per visible Gaussian. Skips dropped gradients.
 pub fn accumulate(population: &mut Population, gradient2d: &[f64], visible: &[bool]) {
     let counts = |index: &usize| visible[*index] && gradient2d[*index] < wide(constants::GRADIENT_MAX);
     for index in (0..visible.len()).filter(counts) {

@@ -69,8 +69,7 @@ pub fn window(rules: &Rules) -> Vec<f64> {
     raw.iter().map(|v| v / sum).collect()
 }
 
-/// Window mean of a plane, with zeros outside of the plane. The window is symmetric, so this function is its own
-/// adjoint.
+/// Window mean of a plane, with zeros outside. The window is symmetric, so this function is its own adjoint.
 pub fn blur(plane: &[f64], (width, height): (usize, usize), window: &[f64]) -> Vec<f64> {
     let reach = (window.len() / 2) as isize;
     let along = |plane: &[f64], horizontal: bool| -> Vec<f64> {

@@ -1,5 +1,4 @@
-//! Finds the tiles in which a splat counts: by testing every pixel, and by a continuous test over the rectangle of
-//! pixel centres.
+//! Tiles in which a splat counts: by testing every pixel, and by a continuous test over the tile's pixel centres.
 
 use super::Rules;
 use super::splat::Splat;
@@ -159,7 +158,7 @@ pub fn tile_lengths(ranges: &[[u32; 2]]) -> (u32, Vec<bool>) {
     (lengths.clone().max().unwrap_or(0), lengths.map(|length| length > 0).collect())
 }
 
-/// `[start, end)` of each key in a sorted list of keys; keys that do not occur begin and end where they would be.
+/// `[start, end)` of each key in a sorted list of keys; a missing key gets the empty range at its place.
 pub fn tile_ranges(sorted_keys: &[u32], keys: usize) -> Vec<[u32; 2]> {
     let before = |key: usize| sorted_keys.iter().filter(|&&found| (found as usize) < key).count() as u32;
     (0..keys).map(|key| [before(key), before(key + 1)]).collect()

@@ -49,8 +49,7 @@ pub fn picture(actual: &[[f32; 4]], expected: &Blended, (tolerance, band): (Tole
     close_with_band(&actual, &wanted, &margins, (tolerance, band), |_, _| true)
 }
 
-/// Compares the gradients of splats with a margin above `sure`, each kind of float separately. At least 70 % of all
-/// splats must have such a margin.
+/// Compares gradients of splats with a margin above `sure` (at least 70 % of all), each kind of float separately.
 pub fn splat_gradients(
     actual: &[SplatGradient],
     expected: &[SplatGradient],

@@ -183,15 +183,18 @@ impl Lifted {
         let changed = expected.iter().zip(before).filter(|(a, b)| a != b).count();
         let sure: Vec<usize> = (0..before.len()).filter(|&i| votes.margins[i] > 1e-5).collect();
         if changed < 3 || sure.len() * 10 <= before.len() * 9 {
-            return Err(format!("{changed} labels change; {} of {} are away from all thresholds", sure.len(), before.len()));
+            return Err(format!(
+                "{changed} labels change; {} of {} are away from all thresholds",
+                sure.len(),
+                before.len()
+            ));
         }
         let pick = |of: &[u32]| sure.iter().map(|&i| of[i]).collect::<Vec<_>>();
         exact(&pick(&self.after), &pick(&expected))
     }
 }
 
-/// A scene with Gaussians large and opaque enough to dominate pixels; masks are three columns, empty at the upper
-/// border.
+/// A scene of Gaussians that dominate pixels; masks are three columns, empty at the upper border.
 pub fn dominant(seed: u64) -> Scene {
     let shape = Shape { scales: (0.1, 0.5), opacities: (1.0, 8.0), ..Shape::default() };
     let mut s = scene(seed, &Shape { gaussians: 50, width: 61, height: 45, ..shape });

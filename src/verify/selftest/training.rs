@@ -12,8 +12,7 @@ use std::sync::Arc;
 
 const STEPS: u32 = 60;
 
-/// Checks that 60 steps with labels, votes and two densifications give the same model twice, bit by bit, and a smaller
-/// loss.
+/// Checks that 60 steps with votes and two densifications give the same bits twice, and a smaller loss.
 pub(super) fn twice(gpu: &Arc<Gpu>, kernels: KernelShape) -> Result<Verdict> {
     let (first, loss) = train(gpu, kernels)?;
     let (second, _) = train(gpu, kernels)?;
