@@ -5,15 +5,15 @@
 #include "dispatch.glsl"
 #include "record.glsl"
 #include "blend_tile.glsl"
-// blend_backward — walk one tile of one layer back to front and write one gradient record per (splat, tile) pair.
-// Work:    one subgroup (= workgroup) a tile, jobs as in blend_forward.
+// blend_backward — walk one tile of one layer back to front; write one gradient record per (splat, tile) pair.
+// Work:    one subgroup (= workgroup) per tile, jobs as in blend_forward.
 // Reads:   step; tile_starts [layers * T]; instance_from_sorted, splat_from_instance [I]; splats [V,3]; image [P] (w = transmittance),
 //          last [P]; v_image [P]; variant labels: counters, layer_tiles, layer_state, layer_weights
 // Writes:  v_instances_a, _b, _c [I] by instance: v_mean2d (px), v_conic xy; v_conic z, v_log_opacity, v_colour rg;
 //          v_colour b, stamp of the step
-//          (records without the current stamp were not walked and count as 0)
-// Math:    p = dL/d ln alpha = w (u - s) with u = colour . g and s the colour behind, times g; geometry and opacity
-//          gradients are linear in six moments of p about the tile's centre. T by division. Clamped alpha: p = 0.
+//          (records without the current stamp were not walked; they count as 0)
+// Math:    p = dL/d ln alpha = w (u - s), where u = colour . g, and s is the colour behind, times g; geometry and
+//          opacity gradients are linear in six moments of p about the tile's centre. T by division. Clamped alpha: p = 0.
 // Order:   fixed, bitwise reproducible.
 // Mirror:  src/verify/reference/blend.rs::blend_backward
 
@@ -36,7 +36,7 @@ READ(14, float, layer_weights);
 #include "label_state.glsl"
 #endif
 #ifdef SEGMENTED
-INOUT(30, vec2, segment_back); // [jobs, pixels of a tile] (transmittance, light behind)
+INOUT(30, vec2, segment_back); // [jobs, pixels of a tile] (transmittance, light from behind)
 #endif
 
 void main() {
@@ -82,7 +82,7 @@ void main() {
             final_[k] = state.y & LAST_MASK;
             vec4 v = unpack_signs(state.y) * (u.label_weight * u.loss_scale * layer_weights[t.layer]);
             g = v.xyz;
-            behind[k] = -u.label_alpha * v.w; // alpha = 1 - T: as a background of the opposite sign
+            behind[k] = -u.label_alpha * v.w; // alpha = 1 - T acts like a background of opposite sign
         } else
 #endif
         {
@@ -115,7 +115,7 @@ void main() {
     batches = min(first + SEGMENT_LENGTH / SUBGROUP_SIZE, batches);
 #endif
     for (uint batch = batches; batch > first; batch--) {
-        uint base = (batch - 1u) * SUBGROUP_SIZE; // within the list
+        uint base = (batch - 1u) * SUBGROUP_SIZE; // index in the list
         uint count = min(SUBGROUP_SIZE, deepest - base);
         uint at = list_start + min(base + lane, deepest - 1u);
         uint instance = fetchu(instance_from_sorted, at), index = fetchu(splat_from_instance, instance);
@@ -165,7 +165,7 @@ void main() {
             og = me ? sg : og;
             ob = me ? sb : ob;
         }
-        // moments about the tile's centre to gradients of the lane's own splat
+        // convert moments about the tile's centre to gradients of the lane's own splat
         vec2 d = vec2(mine.x, mine.y) - centre;
         vec3 conic = conic_from_exponent(vec3(mine.a, mine.b, mine.c));
         float Sx = d.x * o0 - ox, Sy = d.y * o0 - oy;

@@ -4,22 +4,22 @@
 #include "step.glsl"
 #include "dispatch.glsl"
 #include "blend_tile.glsl"
-layout(constant_id = 17) const uint COUNTS = 0; // 1: contributing pairs are counted
+layout(constant_id = 17) const uint COUNTS = 0; // 1: count contributing pairs
 // blend_forward — alpha-blend one tile of one layer front to back.
-// Work:    one subgroup (= workgroup) a tile: the scene's tiles, then (variant labels) the occupied layer tiles.
+// Work:    one subgroup (= workgroup) per tile: the scene's tiles, then (variant labels) the occupied layer tiles.
 // Reads:   step, counters; tile_starts, tile_ends [layers * T]; instance_from_sorted [I]; splat_from_instance [I]; splats [V,3]
 //          variant labels: layer_tiles; target [P] RGBA8; view_labels [P]; layer_occluders; label_from_layer;
 //          layer_weights; gaussian_from_splat [V]
 // Writes:  image [P] linear RGB over the background, w = final transmittance; last [P] = 1 + index of the last splat
-//          that contributed, within the tile's list (0: none); variant main: main_gaussian [P] (NO_SPLAT: none) and
+//          that contributed, in the tile's list (0: none); variant main: main_gaussian [P] (NO_SPLAT: none) and
 //          main_weight_depth [P] (weight, weighted sum of z);
 //          variant labels: layer_state [layer tiles, pixels of a tile] (transmittance, last and signs of the loss gradient),
-//          layer_loss [layer tiles] (label loss less that of an empty picture, which the host knows: tiles that hold no splat
-//          are not walked), label_keys [N] (integer maximum, any order)
+//          layer_loss [layer tiles] (label loss minus that of an empty picture; the host adds the loss of empty tiles,
+//          which no pass walks), label_keys [N] (integer maximum, any order)
 // Math:    LabelGS eq. 5; alpha <= ALPHA_MAX; a pair counts where alpha >= ALPHA_MIN, tested on the exponent; a pixel
-//          stops before the splat that would take its transmittance below TRANSMITTANCE_MIN (3DGS).
+//          stops before a splat that would take its transmittance below TRANSMITTANCE_MIN (3DGS).
 //          Layers: eq. 8 and 9, black background, and an L1 term of alpha against the mask; the L1 gradient of a layer
-//          is local to the pixel, so its sign is taken here. Lift: eq. 6 and 7.
+//          is local to the pixel, so its sign is stored here. Lift: eq. 6 and 7.
 // Order:   fixed, bitwise reproducible.
 // Mirror:  src/verify/reference/blend.rs::blend_forward
 
@@ -59,7 +59,7 @@ INOUT(31, uvec4, segment_rest);   // (last, main splat, its weight, depth)
 #include "label_state.glsl"
 #include "label_rules.glsl"
 #else
-const bool REMEMBERS_MAIN = true; // where there is a main splat at all
+const bool REMEMBERS_MAIN = true; // in variants with a main splat
 #endif
 
 void main() {
@@ -110,7 +110,7 @@ void main() {
             inside = fetchc(target, p).w > 0.5 && !left_out(t.layer, fetchu(view_labels, p), u);
         }
 #endif
-        T[k] = inside ? 1.0 : -1.0; // the sign says whether the pixel still takes splats
+        T[k] = inside ? 1.0 : -1.0; // positive while the pixel takes splats
         cr[k] = cg[k] = cb[k] = 0.0;
         final_[k] = 0u;
 #if defined(MAIN) || defined(LABELS)

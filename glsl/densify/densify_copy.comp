@@ -4,10 +4,10 @@
 #include "step.glsl"
 #include "dispatch.glsl"
 #include "densify_rules.glsl"
-// densify_copy — carry one attribute, or one moment, over to the densified model.
-// Work:    one vec4 of one old Gaussian an invocation; STRIDE vec4 a Gaussian.
+// densify_copy — copy one attribute, or one moment, to the densified model.
+// Work:    one vec4 of one old Gaussian per invocation; STRIDE vec4 per Gaussian.
 // Reads:   step; old_values [N,STRIDE]; densify_actions [N]; child_offsets [N]
-// Writes:  values [new N,STRIDE]. MOMENTS: new Gaussians start at 0; the parent of a clone keeps its own.
+// Writes:  values [new N,STRIDE]. MOMENTS: new Gaussians start at 0; a cloned parent keeps its moments.
 // Mirror:  src/verify/reference/densify.rs::densify
 
 layout(constant_id = 14) const uint STRIDE = 1;

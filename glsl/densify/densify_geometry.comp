@@ -7,7 +7,7 @@
 #include "densify_rules.glsl"
 #include "random.glsl"
 // densify_geometry — write positions, scales and rotations of the densified model.
-// Work:    64 old Gaussians a workgroup; children stand next to each other at their parent's place in the order.
+// Work:    64 old Gaussians per workgroup; the children of a parent are neighbours and take its place in the order.
 // Reads:   step; old_means, old_scales, old_quats [N]; densify_actions [N]; child_offsets [N]
 // Writes:  means, scales, quats [new N]
 // Math:    clone: exact copy; split: mean + R (s * normal), ln s - ln 1.6 (3DGS).

@@ -5,7 +5,7 @@
 #include "dispatch.glsl"
 #include "densify_rules.glsl"
 // densify_labels — children inherit the label of their parent.
-// Work:    64 old Gaussians a workgroup.
+// Work:    64 old Gaussians per workgroup.
 // Reads:   step; old_labels [N]; densify_actions [N]; child_offsets [N]
 // Writes:  labels [new N]
 // Mirror:  src/verify/reference/densify.rs::densify

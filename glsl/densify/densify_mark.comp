@@ -4,11 +4,11 @@
 #include "step.glsl"
 #include "dispatch.glsl"
 #include "densify_rules.glsl"
-// densify_mark — how many Gaussians each one becomes: 0 pruned, 1 kept, 2 cloned or split.
-// Work:    64 Gaussians a workgroup.
+// densify_mark — decide how many Gaussians each one becomes: 0 pruned, 1 kept, 2 cloned or split.
+// Work:    64 Gaussians per workgroup.
 // Reads:   step; means.w, scales [N]; densify_stats [N] (sum, count)
 // Writes:  densify_actions [N]; children_counts [N]; counters.cloned_count, split_count, pruned_count (integer add)
-// Math:    method of 3DGS; children are tested for size after the split.
+// Math:    method of 3DGS; the size test for children uses their size after the split.
 // Mirror:  src/verify/reference/densify.rs::mark
 
 layout(local_size_x = 64) in;

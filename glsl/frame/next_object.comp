@@ -2,12 +2,12 @@
 #include "layout.glsl"
 #include "constants.glsl"
 #include "step.glsl"
-// next_object — make the next sampled object the only layer of the passes that follow; after the last one leave the
-// counters of the whole step.
+// next_object — make the next sampled object the only layer of the following passes; after the last object, restore
+// the counters of the whole step.
 // Work:    one invocation.
 // Reads:   step; label_from_layer, layer_weights [layers]; layer_occluders [layers, words]
-// Writes:  object: the layer, from 1; object_counters: what all passes so far needed; counters; object_step, and entry 1
-//          of object_label, object_weight, object_occluders: what the object's passes read in place of the step's
+// Writes:  object: the layer, from 1; object_counters: the counters of all passes so far; counters; object_step, and
+//          entry 1 of object_label, object_weight, object_occluders: inputs of the object's passes
 // Mirror:  none (bookkeeping; tests/pass/separate.rs)
 
 layout(local_size_x = 1) in;
@@ -26,7 +26,7 @@ WRITE(10, uint, object_occluders);
 void main() {
     StepUniforms u = step;
     uint done = object;
-    // Sums and maxima by atomics go on through all passes.
+    // Sums and maxima by atomics continue over all passes.
     Counters sum = counters;
     if (done > 0u) {
         Counters before = object_counters;
@@ -53,7 +53,7 @@ void main() {
         object_occluders[words + w] = layer_occluders[layer * words + w];
     }
     u.layer_count = 1u;
-    // Gradient records of the passes before are none of this object's; the host counts in the lower bits.
+    // Gradient records of earlier passes do not belong to this object; the host uses the lower bits of the stamp.
     u.stamp ^= layer << 24;
     object_step = u;
 }

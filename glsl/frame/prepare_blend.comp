@@ -11,7 +11,7 @@
 
 layout(local_size_x = 1) in;
 layout(constant_id = 3) const uint LAYER_TILE_CAPACITY = 0;
-layout(constant_id = 4) const uint LONGEST_LIST = 0; // splats that the recorded segments of the blend loops can walk
+layout(constant_id = 4) const uint LONGEST_LIST = 0; // longest list that the recorded segments can walk
 READ1(0, StepUniforms, step);
 READ1(1, Counters, counters);
 INOUT(2, uint, dispatch_args);

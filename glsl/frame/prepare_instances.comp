@@ -2,10 +2,10 @@
 #include "layout.glsl"
 #include "constants.glsl"
 #include "step.glsl"
-// prepare_instances — flag an overflow of the buffers of (splat, tile) pairs, and make none.
+// prepare_instances — detect an overflow of the buffers of (splat, tile) pairs; on overflow, no pairs are written.
 // Work:    one invocation.
-// Reads:   counters.instance_count (what is needed, even beyond capacity)
-// Writes:  on overflow failure (sticky bit), and dispatch_args (splats) become 0
+// Reads:   counters.instance_count (the need, even beyond capacity)
+// Writes:  on overflow: failure (sticky bit); dispatch_args (splats) become 0
 // Mirror:  none (bookkeeping; tests/overflow.rs)
 
 layout(local_size_x = 1) in;

@@ -3,7 +3,7 @@
 #include "constants.glsl"
 #include "step.glsl"
 #include "dispatch.glsl"
-// prepare_splats — size the dispatches that run over the visible splats.
+// prepare_splats — size the dispatches over the visible splats.
 // Work:    one invocation.
 // Reads:   counters.visible_count
 // Writes:  dispatch_args (splats)

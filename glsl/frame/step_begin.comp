@@ -3,10 +3,10 @@
 #include "constants.glsl"
 #include "step.glsl"
 #include "dispatch.glsl"
-// step_begin — clear the counters and size the dispatches that depend on the number of Gaussians or of layers.
+// step_begin — clear the counters and size the dispatches over all Gaussians or all layers.
 // Work:    one invocation.
 // Reads:   step
-// Writes:  counters; dispatch_args (all entries; those of later stages 0)
+// Writes:  counters; dispatch_args (all entries; 0 for later stages)
 // Mirror:  none (bookkeeping; every later pass fails without it)
 
 layout(local_size_x = 1) in;

@@ -4,13 +4,13 @@
 #include "step.glsl"
 #include "dispatch.glsl"
 #include "gaussian.glsl"
-// gather — add up the gradient records of each splat, in the order of instances; note the densification statistic.
-// Work:    64 splats a workgroup.
+// gather — sum the gradient records of each splat, in the order of instances; update the densification statistic.
+// Work:    64 splats per workgroup.
 // Reads:   step, counters, failure; tiles_touched, instance_offsets [V]; v_instances_a, _b, _c [I];
-//          gaussian_from_splat [V], not in variant object; variant labels: labels [N], layer_from_label
+//          gaussian_from_splat [V], except in variant object; variant labels: labels [N], layer_from_label
 // Writes:  v_splats [V,3]: v_mean2d (px), v_conic xy..; v_conic z, v_log_opacity, v_colour rg; v_colour b
-//          densify_stats [N] += (|scene v_mean2d| in NDC units, 1), not in variant object
-// Math:    the statistic sees the scene layer only, never the label loss.
+//          densify_stats [N] += (|scene v_mean2d| in NDC units, 1), except in variant object
+// Math:    the statistic uses the scene layer only, without the label loss.
 // Order:   fixed, bitwise reproducible; no atomics.
 // Mirror:  src/verify/reference/blend.rs::blend_backward, densify.rs::accumulate
 
@@ -65,7 +65,7 @@ void main() {
 #ifndef OBJECT
     if (total > 0u) {
         float size = length(scene_mean * vec2(0.5 * float(step.width), 0.5 * float(step.height)));
-        // As project_backward, which drops the gradients of such a splat: one infinity would stay in the sum.
+        // As in project_backward, which drops the gradients of such a splat: an infinity would stay in the sum.
         if (finite(size) && size < GRADIENT_MAX) {
             densify_stats[gaussian] += vec2(size, 1.0);
         }

@@ -1,13 +1,13 @@
-// What the blend passes share: one subgroup owns one tile of one layer. A lane owns ROWS pixels of one column, in
-// registers; splats are loaded one per lane and broadcast by shuffle. No shared memory, no barriers.
+// Common code of the blend passes: one subgroup owns one tile of one layer. A lane owns ROWS pixels of one column in
+// registers. Each lane loads one splat, and shuffles broadcast it. No shared memory, no barriers.
 
 #include "subgroup.glsl"
 layout(constant_id = 1) const uint TILE_WIDTH = 8;
 layout(constant_id = 2) const uint TILE_HEIGHT = 8;
 layout(local_size_x_id = 0) in;
 
-// lavapipe ends all loops of an invocation after 65,535 rounds in all. Lists longer than a segment are walked by several
-// dispatches (SEGMENTED), which hand the state of the pixels on through memory.
+// lavapipe ends all loops of an invocation after 65,535 rounds in total. Several dispatches (SEGMENTED) walk a list
+// longer than a segment, and pass on the state of the pixels through memory.
 #ifdef SEGMENTED
 layout(constant_id = 12) const uint SEGMENT = 0;
 layout(constant_id = 13) const uint SEGMENTS = 1;
@@ -25,13 +25,13 @@ struct TileJob {
     float row0;      // first row of the lane relative to the tile's top edge
 };
 
-// Devices that split a dispatch do so at its middle.
+// Some devices split a dispatch in two halves; they split it here.
 bool in_first_half(uint i, uint n) {
     return i < (n + 1u) / 2u;
 }
 
-// Neighbouring tiles cost about the same, so the even ones make the first half of the groups and the odd ones the
-// second: devices that split a dispatch into fixed halves get two halves of equal cost.
+// Neighbouring tiles cost about the same. The even ones form the first half of the groups and the odd ones the second,
+// so devices that split a dispatch into fixed halves get two halves of equal cost.
 uint interleave(uint i, uint n) {
     return in_first_half(i, n) ? 2u * i : 2u * (i - (n + 1u) / 2u) + 1u;
 }
@@ -50,7 +50,7 @@ TileJob locate(uint virtual_tile, uint layer_tile, StepUniforms u) {
     return t;
 }
 
-// One splat's exponent form relative to the tile's corner, as loaded by one lane.
+// Exponent form of one splat relative to the tile's corner, as loaded by one lane.
 struct TileSplat {
     float x, y, a, b, c, lo;
     vec3 colour;

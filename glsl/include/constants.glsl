@@ -1,14 +1,14 @@
-// Every constant of the algorithm, once. Exported to Rust by the build. The f64 reference types its own, so that a slip
-// here shows; a test compares them (src/verify/reference/rules.rs).
-// Only the benchmark of kernels (tools/bench/kernels/modes.rs) defines a macro in place of a constant.
+// All constants of the algorithm. The build exports them to Rust. The f64 reference has its own copy, so that a slip
+// here shows; a test compares the two (src/verify/reference/rules.rs).
+// Only the kernel benchmark (tools/bench/kernels/modes.rs) replaces a constant by a macro.
 
 #ifndef ALPHA_MIN
-const float ALPHA_MIN = 1.0 / 255.0;         // a pair with less opacity at a pixel does not count (3DGS)
+const float ALPHA_MIN = 1.0 / 255.0;         // pairs with less opacity at a pixel are skipped (3DGS)
 #endif
 const float LOG2_ALPHA_MIN = log2(ALPHA_MIN);
-const float ALPHA_MAX = 0.99;                // clamp of a pair's opacity (3DGS)
+const float ALPHA_MAX = 0.99;                // upper limit of a pair's opacity (3DGS)
 #ifndef TRANSMITTANCE_MIN
-const float TRANSMITTANCE_MIN = 1e-4;        // a pixel stops before the splat that would go below (3DGS)
+const float TRANSMITTANCE_MIN = 1e-4;        // a pixel stops before a splat that would go below this (3DGS)
 #endif
 const float COV2D_BLUR = 0.3;                // px^2 on the diagonal of the projected covariance (3DGS)
 const float SSIM_C1 = 0.01 * 0.01;
@@ -19,16 +19,16 @@ const float ADAM_EPSILON = 1e-15;
 const float OPACITY_RESET_LOGIT = -4.5951198501345898; // logit(0.01)
 const float SPLIT_SHRINK = 0.47000362924573558;        // ln 1.6
 const float LN2 = 0.69314718055994531;
-const float GRADIENT_MAX = 1e18;            // larger gradients are dropped: their squares would overflow in Adam
-const float COLOUR_BIAS = 0.5;               // colour of a Gaussian without spherical harmonics (3DGS)
-const float NEAR = 0.2;                      // near plane, world units, unless the scene is small (3DGS); host only
-const float JACOBIAN_MARGIN = 0.3;           // how far slopes may leave the image, in half images (3DGS); host only
+const float GRADIENT_MAX = 1e18;            // larger gradients are dropped: their square overflows in Adam
+const float COLOUR_BIAS = 0.5;               // offset of the colour from spherical harmonics (3DGS)
+const float NEAR = 0.2;                      // near plane, world units, smaller in small scenes (3DGS); host only
+const float JACOBIAN_MARGIN = 0.3;           // limit of slopes beyond the image, in half images (3DGS); host only
 const uint NO_SPLAT = 0xffffffffu;
 const uint NO_ROW = 0xffffffffu;
-const uint LABEL_MASK = 0xffffu;             // id of a pixel of view_labels; above it:
-const uint LABEL_BORDER = 0x10000u;          // so near to a contour of the mask that it says nothing
-const uint VOTE_NONE = 0xffffffffu;         // column of a pixel that has no say
-const float VOTE_ONE = 65536.0;              // fixed point of the votes for labels
+const uint LABEL_MASK = 0xffffu;             // object id in a pixel of view_labels; the next bit is a flag:
+const uint LABEL_BORDER = 0x10000u;          // pixel near a contour of the mask; ignored
+const uint VOTE_NONE = 0xffffffffu;         // column of a pixel without votes
+const float VOTE_ONE = 65536.0;              // scale of the fixed-point votes for labels
 const uint KEY_INVISIBLE = 0xffffffffu;
 
 // Factors of the real spherical harmonics (sh.glsl).

@@ -1,4 +1,4 @@
-// Where a kernel finds its number of items; fixed per recording.
+// Number of items of a kernel; its source is fixed per recording.
 
 layout(constant_id = 5) const uint COUNT_SOURCE = 0;
 

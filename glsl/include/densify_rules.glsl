@@ -1,4 +1,4 @@
-// What densification decides for one Gaussian. One function for counting and for applying.
+// Densification decision for one Gaussian; the same function serves counting and applying.
 
 const uint ACTION_PRUNE = 0u;
 const uint ACTION_KEEP = 1u;

@@ -1,4 +1,4 @@
-// One-dimensional work folded over two axes, because an axis holds at most 65,535 groups.
+// One-dimensional work folded over two axes, because one axis has at most 65,535 groups.
 
 const uint FOLD = 32768u;
 

@@ -1,9 +1,9 @@
-// Projection of one Gaussian: the forward quantities that project_forward writes and project_backward needs again.
+// Projection of one Gaussian: the forward quantities of project_forward, which project_backward recomputes.
 
 struct Projection {
     vec3 view;      // mean in camera space
     vec2 slope;     // x/z and y/z, clamped
-    vec2 slope_raw; // the same before the clamp
+    vec2 slope_raw; // x/z and y/z before the clamp
     vec3 t0, t1;    // rows of J W (2x3)
     mat3 rotation;  // of the Gaussian; columns are its axes in world space
     vec3 sigma;     // standard deviations
@@ -13,8 +13,8 @@ struct Projection {
     vec3 q_m0, q_m1; // rows of Q M, Q being the matrix of the conic
 };
 
-// Unit quaternion, and one over the length. Where the square of the length leaves f32, the largest component becomes 1
-// first; 0 has no direction and becomes NaN.
+// Unit quaternion, and 1 / length. If the squared length leaves the range of f32, the largest component is scaled to
+// 1 first; a quaternion of 0 has no direction and gives NaN.
 vec4 unit_quat(vec4 q, out float inv_norm) {
     float squared = dot(q, q);
     bool usual = squared > 1e-24 && squared < 1e24;
@@ -33,7 +33,7 @@ mat3 rotation_from_quat(vec4 q) { // unit (w, x, y, z)
         2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y));
 }
 
-// The difference to the camera first, the rotation second: scenes far from the origin keep their digits.
+// Subtracts the camera centre before the rotation, so that scenes far from the origin keep their precision.
 vec3 to_view(StepUniforms step, vec3 mean) {
     vec3 d = mean - step.camera_centre;
     return vec3(dot(step.view_row0, d), dot(step.view_row1, d), dot(step.view_row2, d));
@@ -54,21 +54,21 @@ Projection project_gaussian(StepUniforms step, vec3 mean, vec3 log_scale, vec4 q
     p.m1 = (p.t1 * p.rotation) * p.sigma;
     float a = dot(p.m0, p.m0), b = dot(p.m0, p.m1), c = dot(p.m1, p.m1);
     vec3 crossed = cross(p.m0, p.m1);
-    // Cauchy-Binet: every term is >= 0, so needles keep a correct, positive determinant.
+    // Cauchy-Binet: every term is >= 0, so needles keep an accurate, positive determinant.
     float det = dot(crossed, crossed) + COV2D_BLUR * (a + c) + COV2D_BLUR * COV2D_BLUR;
     p.cov = vec3(a + COV2D_BLUR, b, c + COV2D_BLUR);
     p.conic = vec3(p.cov.z, -b, p.cov.x) / det;
-    // The adjugate of M M^T times M is (m1 x n, n x m0): along a needle, where conic and M cancel, no digit is lost.
+    // The adjugate of M M^T times M is (m1 x n, n x m0). For a needle, conic times M would cancel; this form does not.
     p.q_m0 = (COV2D_BLUR * p.m0 + cross(p.m1, crossed)) / det;
     p.q_m1 = (COV2D_BLUR * p.m1 + cross(crossed, p.m0)) / det;
     return p;
 }
 
-// log2 of the sigmoid, without a rounded sigmoid in between.
+// log2 of the sigmoid, without rounding the sigmoid first.
 float log2_opacity(float logit) {
     return -log2(1.0 + exp(-clamp(logit, -30.0, 30.0)));
 }
 
-bool finite(float x) { // by the exponent bits: drivers fold x - x
+bool finite(float x) { // tests the exponent bits, because drivers fold x - x
     return (floatBitsToUint(x) & 0x7f800000u) != 0x7f800000u;
 }

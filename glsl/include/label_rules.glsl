@@ -1,10 +1,10 @@
-// Rules of the labels: which pixels are hidden from an object, and the lift.
+// Label rules: the pixels at which an object is hidden, and the lift.
 
-// 1: the paper's lift is on, for which each pixel remembers its main splat.
+// 1: the paper's lift is on; each pixel then remembers its main splat.
 layout(constant_id = 16) const uint LIFT = 0;
 const bool REMEMBERS_MAIN = LIFT != 0u;
 
-// U_k(v) = 0: the pixel belongs to an object that hides this layer's object, or lies too near to a contour.
+// U_k(v) = 0: the pixel belongs to an object that hides this layer's object, or is near a contour.
 bool left_out(uint layer, uint here, StepUniforms u) {
     if ((here & LABEL_BORDER) != 0u) {
         return true;
@@ -18,7 +18,7 @@ bool left_out(uint layer, uint here, StepUniforms u) {
 // dominates it. Keys order by weight, then label, so the maximum does not depend on the order of the votes.
 void lift(uint p, uint splat, float weight, StepUniforms u) {
     uint label = fetchu(view_labels, p);
-    // A pixel near a contour has the bit above the label too.
+    // A pixel near a contour also has LABEL_BORDER set.
     if (label == 0u || label > LABEL_MASK || fetchu(layer_from_label, label) == 0u) {
         return;
     }
@@ -34,7 +34,7 @@ void lift(uint p, uint splat, float weight, StepUniforms u) {
     atomicMax(label_keys[fetchu(gaussian_from_splat, splat)], key);
 }
 
-// What blend_forward keeps of a layer's tile: its loss, and the state from which the backward pass starts.
+// Output of blend_forward for a layer's tile: its loss, and the state at the start of the backward pass.
 void finish_layer(TileJob t, float T[ROWS], float cr[ROWS], float cg[ROWS], float cb[ROWS], uint final_[ROWS],
                   StepUniforms u) {
     float loss = 0.0;

@@ -1,10 +1,10 @@
-// How a layer's pixels wait for the backward pass: transmittance, position of the last splat, signs of the L1 gradients.
+// State of a layer's pixel for the backward pass: transmittance, position of the last splat, signs of the L1 gradients.
 
 uint layer_pixel(TileJob t, uint k) { // index into layer_state
     return t.layer_tile * (TILE_WIDTH * TILE_HEIGHT) + k * SUBGROUP_SIZE + gl_LocalInvocationID.x;
 }
 
-const uint LAST_MASK = 0x00ffffffu; // 24 bits of position, above them four signs (0: 0, 1: +, 2: -): alpha, rgb
+const uint LAST_MASK = 0x00ffffffu; // 24 bits of position, then four signs (0: 0, 1: +, 2: -): alpha, rgb
 
 uint pack_signs(vec4 d) {
     uvec4 s = mix(mix(uvec4(0u), uvec4(2u), lessThan(d, vec4(0.0))), uvec4(1u), greaterThan(d, vec4(0.0)));

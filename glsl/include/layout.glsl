@@ -1,6 +1,6 @@
-// Extensions and the words in which every shader declares its interface. First include of every .comp file.
+// Extensions, and the macros with which every shader declares its interface. First include of every .comp file.
 //
-// A storage block has exactly one member, and the member's name is the buffer's name in GLSL and in Rust:
+// A storage block has exactly one member. The member's name is the buffer's name in GLSL and in Rust:
 //   READ(0, vec4, means)       readonly array       WRITE, INOUT likewise
 //   READ1(1, Counters, counts) one readonly struct  WRITE1, INOUT1 likewise
 //   FETCH4(2, quats)           array of vec4 that is only read by fetch4(quats, i); a texel buffer if TEXEL is defined
@@ -39,7 +39,7 @@
 #define fetch4(name, i) name[i]
 #define fetchu(name, i) name[i]
 #endif
-// Unpacked by the shader, not by the texel unit: the same bits on every device.
+// The shader unpacks the bytes, not the texel unit: the same bits on every device.
 #define FETCHC(number, name) FETCHU(number, name)
 #define fetchc(name, i) unpackUnorm4x8(fetchu(name, i))
 

@@ -1,4 +1,4 @@
-// Sums that stop at the largest number instead of beginning anew at 0: a need beyond 2^32 must look like one.
+// Sums that saturate at the largest number instead of wrapping to 0, so that a need beyond 2^32 stays visible.
 
 uint saturating_add(uint a, uint b) {
     uint sum = a + b;

@@ -1,4 +1,4 @@
-// Real spherical harmonics up to degree 3 in the order and with the signs of 3DGS, and their derivatives by direction.
+// Real spherical harmonics up to degree 3, with order and signs of 3DGS, and their derivatives by direction.
 
 // Basis values of degree 1 (3), 2 (5) and 3 (7) for a unit direction.
 void sh_basis(vec3 d, uint degree, out float basis[15]) {
@@ -21,7 +21,7 @@ void sh_basis(vec3 d, uint degree, out float basis[15]) {
     basis[14] = -SH_C3_0 * x * (xx - 3.0 * yy);
 }
 
-// Gradients of the same basis values by the (unnormalised) direction components.
+// Gradients of these basis values with respect to the (unnormalised) direction.
 void sh_basis_gradient(vec3 d, out vec3 g[15]) {
     float x = d.x, y = d.y, z = d.z;
     g[0] = vec3(0, -SH_C1, 0);

@@ -1,4 +1,4 @@
-// Gradients through the spherical harmonics: to the direction, and to the coefficients of splat s, by PUT.
+// Gradients through the spherical harmonics: to the direction (returned), and to the coefficients of splat s (by PUT).
 
 vec3 sh_direction_gradient(uint i, vec3 direction, vec3 v_colour) {
     vec3 v = vec3(0.0);

@@ -1,4 +1,4 @@
-// Colour of Gaussian i before the clamp at 0; coefficients sit in vec4 planes by band, rgb triples one after another.
+// Colour of Gaussian i before the clamp at 0. Each band has a plane of vec4, packed with consecutive rgb triples.
 
 vec3 band1(uint i, uint k) {
     vec4 a = fetch4(sh1, 3u * i), b = fetch4(sh1, 3u * i + 1u);

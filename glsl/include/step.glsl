@@ -1,4 +1,4 @@
-// What changes every step, written by the host for the step's frame; and what the device reports back.
+// Uniforms of a step, written by the host for the step's frame; and the counters that the device reports back.
 
 struct StepUniforms {
     vec3 view_row0;         // rows of the rotation of camera_from_world
@@ -17,7 +17,7 @@ struct StepUniforms {
     float loss_scale;       // 1 / (3 valid pixels)
     float label_weight;     // lambda_2
     float label_alpha;      // weight of the alpha term within the label loss
-    float label_threshold;  // lift where the main weight is at least this
+    float label_threshold;  // the lift needs at least this main weight
     uint gpf;               // 1: projection filter on
     uint occluder_words;    // words of occluder bits per layer
     uint stamp;             // differs from step to step, never 0
@@ -32,21 +32,21 @@ struct StepUniforms {
 
 struct Counters {
     uint visible_count;     // splats of this view
-    uint instance_count;    // (splat, tile) pairs over all layers; what was needed, even beyond capacity
-    uint layer_tile_count;  // tiles of object layers that hold a splat
+    uint instance_count;    // (splat, tile) pairs over all layers; the need, even beyond capacity
+    uint layer_tile_count;  // tiles of object layers with a splat
     uint longest_list;      // splats in the fullest tile
-    uint nonfinite_count, nonfinite_first; // Gaussians whose gradient was not finite and was dropped; the lowest index
-    uint broken_count, broken_first; // Gaussians whose position, opacity or scale is not finite (cull); the same
-    uint unprojected_count, unprojected_first; // Gaussians whose splat is not finite (project_forward); the same
+    uint nonfinite_count, nonfinite_first; // Gaussians with a dropped, nonfinite gradient; lowest index
+    uint broken_count, broken_first; // Gaussians with a nonfinite position, opacity or scale (cull); lowest index
+    uint unprojected_count, unprojected_first; // Gaussians with a nonfinite splat (project_forward); lowest index
     uint densified_count;   // Gaussians after densification
-    uint walked_first, walked_second; // splats that tiles walked in blend_forward, in the first and in the second half
-                            // of its workgroups; times the pixels of a tile: pairs
-    uint contributing_pairs; // (pixel, splat) pairs with a weight; counted on demand only
+    uint walked_first, walked_second; // splats walked by tiles in blend_forward, in the first and second half
+                            // of its workgroups; times the pixels per tile: pairs
+    uint contributing_pairs; // (pixel, splat) pairs with a weight; counted only on request
     uint cloned_count, split_count, pruned_count;
-    float loss_l1, loss_ssim, loss_label; // sums, not yet divided; the label loss less that of empty layers
+    float loss_l1, loss_ssim, loss_label; // sums without normalisation; the label loss minus that of empty layers
 };
 
-// Bits of the sticky failure word; passes that change the model do nothing while it is not 0.
+// Bits of the sticky failure word. While it is not 0, passes do not change the model.
 const uint FAILED_INSTANCES = 1u;
 const uint FAILED_LAYER_TILES = 2u;
 const uint FAILED_SEGMENTS = 4u;

@@ -1,5 +1,5 @@
-// Butterflies over one subgroup; the shuffle is the one fast subgroup operation on every kind of device. Written out,
-// because a loop over the distances is not unrolled by every driver, and loops are what lavapipe counts.
+// Butterflies over one subgroup by shuffles, the one subgroup operation that is fast on all devices. Unrolled by hand,
+// because some drivers do not unroll a loop over the distances, and lavapipe counts loop rounds.
 
 layout(constant_id = 0) const uint SUBGROUP_SIZE = 8;
 

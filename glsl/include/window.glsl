@@ -1,4 +1,4 @@
-// The SSIM window (11 taps, sigma 1.5, sum 1) and the strip that one lane filters in registers.
+// The SSIM window (11 taps, sigma 1.5, sum 1), and the strip length that one lane filters in registers.
 
 const uint STRIP = 8u;
 const float WINDOW[11] = float[11](0.00102838008447911, 0.00759875813523919, 0.0360007721284308, 0.109360689509700,

@@ -3,11 +3,11 @@
 #include "constants.glsl"
 #include "step.glsl"
 #include "dispatch.glsl"
-// lift_resolve — the label with the highest key of this step becomes the label of the Gaussian.
-// Work:    64 Gaussians a workgroup.
+// lift_resolve — give each Gaussian the label with its highest key of this step.
+// Work:    64 Gaussians per workgroup.
 // Reads:   step, failure; label_keys [N]
-// Writes:  labels [N] where a key was voted; label_keys [N] = 0
-// Math:    LabelGS eq. 6 and 7; without the filter the larger weight wins, then the larger label.
+// Writes:  labels [N] of Gaussians with a key; label_keys [N] = 0
+// Math:    LabelGS eq. 6 and 7; without the filter, the larger weight wins, then the larger label.
 // Mirror:  src/verify/reference/lift.rs::lift
 
 layout(local_size_x = 64) in;

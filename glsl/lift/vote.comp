@@ -4,14 +4,14 @@
 #include "step.glsl"
 #include "dispatch.glsl"
 #include "blend_tile.glsl"
-// vote — add up, for each Gaussian and each label, the weight with which it shows in the pixels of that label.
-// Work:    one subgroup (= workgroup) a tile of the scene, jobs as in blend_forward. A walk counts four labels of the
-//          tile; tiles with more are walked again (specialisation ROUND).
+// vote — sum, for each Gaussian and each label, the blending weights of the Gaussian in the pixels of that label.
+// Work:    one subgroup (= workgroup) per tile of the scene, jobs as in blend_forward. One walk counts four labels
+//          of the tile; tiles with more labels are walked again (specialisation constant ROUND).
 // Reads:   step; tile_starts, tile_ends [T]; instance_from_sorted, splat_from_instance [I]; splats [V,3]; gaussian_from_splat [V];
-//          view_labels [P] column of each pixel's label, VOTE_NONE: the pixel has no say; vote_weights [columns]
-// Writes:  votes_low, votes_high [N, columns]: 64 bits with VOTE_ONE to a pixel of weight 1, times the column's weight
-// Math:    A[j, k] = sum over pixels v with label k of alpha_j T_j (FlashSplat's sums, every contributor counts)
-// Order:   a tile's sum has a fixed order and is rounded once; integers add up in any order.
+//          view_labels [P] column of each pixel's label, VOTE_NONE for pixels without votes; vote_weights [columns]
+// Writes:  votes_low, votes_high [N, columns]: 64 bits, VOTE_ONE for a pixel of weight 1, times the column's weight
+// Math:    A[j, k] = sum over pixels v with label k of alpha_j T_j (the sums of FlashSplat; every contributor counts)
+// Order:   a tile's sum has a fixed order and is rounded once; the order of integer sums does not matter.
 // Mirror:  src/verify/reference/lift.rs::vote
 
 layout(constant_id = 15) const uint ROUND = 0;
@@ -32,7 +32,7 @@ INOUT(30, vec4, segment_colours); // [jobs, pixels of a tile], w: transmittance 
 
 const uint LABELS_PER_WALK = 4u;
 
-// The smallest of the lanes' values above `floor_`, or VOTE_NONE.
+// The smallest value of all lanes that is above `floor_`, or VOTE_NONE.
 uint next_label(uint own[ROWS], uint floor_) {
     uint least = VOTE_NONE;
     [[unroll]] for (uint k = 0u; k < ROWS; k++) {
@@ -55,7 +55,7 @@ void main() {
     uint own[ROWS];
     [[unroll]] for (uint k = 0u; k < ROWS; k++) {
         bool inside = t.x < u.width && t.y0 + k < u.height;
-        T[k] = inside ? 1.0 : -1.0; // the sign says whether the pixel still takes splats
+        T[k] = inside ? 1.0 : -1.0; // positive while the pixel takes splats
         own[k] = inside ? fetchu(view_labels, (t.y0 + k) * u.width + t.x) : VOTE_NONE;
     }
     uint from = 0u;

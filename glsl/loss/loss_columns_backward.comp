@@ -2,8 +2,8 @@
 #include "layout.glsl"
 #include "constants.glsl"
 #include "step.glsl"
-// loss_columns_backward — last of four: vertical window, the gradient of L1 and SSIM by the image, and the loss sums.
-// Work:    64 columns a workgroup, strips of STRIP rows.
+// loss_columns_backward — last of four: vertical window, gradient of L1 and SSIM with respect to the image, loss sums.
+// Work:    64 columns per workgroup, strips of STRIP rows.
 // Reads:   step; v_rows [3, P]; image [P]; target [P]
 // Writes:  v_image [P] (rgb, 0); loss_partials [strips, subgroups of columns] (sum |x - y|, sum ssim)
 // Math:    (1 - lambda) |x - y| + lambda (1 - ssim), times loss_scale = 1 / (3 valid pixels)

@@ -2,8 +2,8 @@
 #include "layout.glsl"
 #include "constants.glsl"
 #include "step.glsl"
-// loss_reduce — add up the loss sums of the photo, and (variant labels) of the object layers.
-// Work:    one workgroup of one subgroup; lane i adds every W-th value, then a butterfly.
+// loss_reduce — sum the loss partials of the photo and (variant labels) of the object layers.
+// Work:    one workgroup of one subgroup; lane i sums every W-th value, then a butterfly.
 // Reads:   loss_partials [PARTIALS]; variant labels: layer_loss [counters.layer_tile_count]
 // Writes:  counters.loss_l1, loss_ssim, loss_label
 // Order:   fixed, bitwise reproducible.
@@ -27,7 +27,7 @@ void main() {
     }
     float l1 = subgroup_sum(sum.x), ssim = subgroup_sum(sum.y), label = 0.0;
 #ifdef LABELS
-    // Where there are more than there is room for, the step has failed and its loss is nobody's.
+    // If there are more layer tiles than capacity, the step has failed and its loss is unused.
     uint count = min(counters.layer_tile_count, LAYER_TILE_CAPACITY);
     for (uint i = lane; i < count; i += SUBGROUP_SIZE) {
         label += layer_loss[i];

@@ -3,10 +3,10 @@
 #include "constants.glsl"
 #include "step.glsl"
 // ssim_columns — first of four: vertical Gaussian window over x, y, x^2 + y^2 and x y.
-// Work:    x: 64 columns a workgroup, y: strips of STRIP rows, z: channel. A lane reads STRIP + 10 rows once.
-// Reads:   step; image [P]; target [P] RGBA8 (alpha 0: left out, both images count as 0 there)
+// Work:    x: 64 columns per workgroup, y: strips of STRIP rows, z: channel. A lane reads STRIP + 10 rows once.
+// Reads:   step; image [P]; target [P] RGBA8 (pixels with alpha 0 are ignored; both images count as 0 there)
 // Writes:  moments [3, P] vec4 (mean x, mean y, mean x^2 + y^2, mean x y), filtered along columns
-// Math:    SSIM needs the two second moments only as their sum. 11 taps, sigma 1.5, zero padding.
+// Math:    SSIM needs only the sum of the two second moments. 11 taps, sigma 1.5, zero padding.
 // Mirror:  src/verify/reference/loss.rs::ssim
 
 layout(local_size_x = 64) in;

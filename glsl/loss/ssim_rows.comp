@@ -2,10 +2,10 @@
 #include "layout.glsl"
 #include "constants.glsl"
 #include "step.glsl"
-// ssim_rows — second of four: horizontal window, the SSIM value and its derivatives by the filtered moments.
-// Work:    x: 64 rows a workgroup, y: strips of STRIP columns, z: channel.
-// Reads:   step; moments [3, P]; target [P] (alpha 0: the value does not count)
-// Writes:  v_moments [3, P] vec4: d ssim / d mean x, / d mean (x^2 + y^2), / d mean x y, and the value; 0 where left out
+// ssim_rows — second of four: horizontal window, SSIM and its derivatives with respect to the filtered moments.
+// Work:    x: 64 rows per workgroup, y: strips of STRIP columns, z: channel.
+// Reads:   step; moments [3, P]; target [P] (the value of pixels with alpha 0 is ignored)
+// Writes:  v_moments [3, P] vec4: d ssim / d mean x, / d mean (x^2 + y^2), / d mean x y, value; 0 for ignored pixels
 // Math:    ((2 mx my + C1)(2 sxy + C2)) / ((mx^2 + my^2 + C1)(sxx + syy + C2))
 // Mirror:  src/verify/reference/loss.rs::ssim
 

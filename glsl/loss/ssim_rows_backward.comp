@@ -2,8 +2,8 @@
 #include "layout.glsl"
 #include "constants.glsl"
 #include "step.glsl"
-// ssim_rows_backward — third of four: horizontal window over the three derivative maps; the SSIM sum by row strips.
-// Work:    x: 64 rows a workgroup, y: strips of STRIP columns, z: channel.
+// ssim_rows_backward — third of four: horizontal window over the three derivative maps; SSIM sum over row strips.
+// Work:    x: 64 rows per workgroup, y: strips of STRIP columns, z: channel.
 // Reads:   step; v_moments [3, P]
 // Writes:  v_rows [3, P] vec4 (three filtered maps, 0)
 // Mirror:  src/verify/reference/loss.rs::ssim_backward

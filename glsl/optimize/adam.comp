@@ -3,15 +3,15 @@
 #include "constants.glsl"
 #include "step.glsl"
 #include "dispatch.glsl"
-// adam — one Adam update of one attribute of all Gaussians; a Gaussian that is not visible has gradient 0, or with
-//        SEEN_ONLY stays as it is. With SHARED of the shared rows that the step names and has rates for; others stay as
-//        they are, and each row's moments are corrected by its own number of updates.
-// Work:    one vec4 of one Gaussian an invocation; STRIDE vec4 a Gaussian. SHARED: one row of the step.
+// adam — one Adam update of one attribute of all Gaussians. An invisible Gaussian has gradient 0; with SEEN_ONLY it
+//        stays unchanged. SHARED: one update of the step's shared rows with a rate above 0; all other rows stay
+//        unchanged, and the number of updates of each row corrects its moments.
+// Work:    one vec4 of one Gaussian per invocation; STRIDE vec4 per Gaussian. SHARED: one row of the step.
 // Reads:   step, failure; splat_from_gaussian [N]; gradients [V,STRIDE]; parameters_in, first_moments_in,
 //          second_moments_in [N,STRIDE]. SHARED: failure; step_rows, step_rates, gradients, weights and the rest [S]
-// Writes:  parameters, first_moments, second_moments [N,STRIDE], the same buffers. SHARED: these and weights [S]
-// Math:    Kingma and Ba; beta 0.9 / 0.999, epsilon 1e-15, no weight decay; rates by RATE. SHARED: 1 - beta^t is the
-//          moment of gradients that are all 1: no power, and no count beside it.
+// Writes:  parameters, first_moments, second_moments [N,STRIDE], the same buffers. SHARED: also weights [S]
+// Math:    Kingma and Ba; beta 0.9 / 0.999, epsilon 1e-15, no weight decay; rates by RATE. SHARED: 1 - beta^t is
+//          kept as the moment of a gradient of 1, without a power or a count of updates.
 // Mirror:  src/verify/reference/adam.rs::adam, adam.rs::adam_value
 
 layout(local_size_x = 64) in;
@@ -29,8 +29,8 @@ FETCHU(2, splat_from_gaussian);
 #endif
 READ1(1, uint, failure);
 FETCH4(3, gradients);
-// One buffer, two bindings: read as texels where that is fast, written as storage. An invocation reads its own elements
-// only, before it writes them.
+// Two bindings for one buffer: texel reads where they are fast, storage writes. An invocation reads only its own
+// elements, before it writes them.
 FETCH4(4, parameters_in);
 FETCH4(5, first_moments_in);
 FETCH4(6, second_moments_in);

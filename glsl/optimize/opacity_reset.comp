@@ -3,8 +3,8 @@
 #include "constants.glsl"
 #include "step.glsl"
 #include "dispatch.glsl"
-// opacity_reset — no opacity above 0.01; the moments of the opacity start over.
-// Work:    64 Gaussians a workgroup.
+// opacity_reset — limit opacities to 0.01; set the moments of the opacity to 0.
+// Work:    64 Gaussians per workgroup.
 // Reads:   step
 // Writes:  means.w, m_means.w, u_means.w [N]
 // Mirror:  src/verify/reference/densify.rs::opacity_reset

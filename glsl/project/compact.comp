@@ -4,7 +4,7 @@
 #include "step.glsl"
 #include "dispatch.glsl"
 // compact — list the visible Gaussians, in the order of the model.
-// Work:    64 Gaussians a workgroup.
+// Work:    64 Gaussians per workgroup.
 // Reads:   step, failure; depth_keys [N]; visible_offsets [N]
 // Writes:  keys_out [V] depth bits; values_out [V] Gaussian index
 // Mirror:  src/verify/reference/scan.rs::compact
@@ -19,7 +19,7 @@ READ1(5, uint, failure);
 
 void main() {
     uint i = linear_group_id() * 64u + gl_LocalInvocationID.x;
-    // After a failure the scan counts nothing, and the offsets are those of another step.
+    // After a failure, the scan counts nothing, and the offsets belong to an earlier step.
     if (i >= step.gaussian_count || failure != 0u) {
         return;
     }

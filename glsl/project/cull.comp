@@ -4,13 +4,13 @@
 #include "step.glsl"
 #include "dispatch.glsl"
 #include "gaussian.glsl"
-// cull — drop Gaussians that cannot count at any pixel: behind the near plane, too transparent, or surely off the image.
-// Work:    64 Gaussians a workgroup.
+// cull — drop Gaussians that count at no pixel: behind the near plane, too transparent, or certainly outside the image.
+// Work:    64 Gaussians per workgroup.
 // Reads:   step; means [N] (xyz world, w opacity logit); scales [N] (ln); variant object: labels [N], label_from_layer
 // Writes:  depth_keys [N]: bits of z, or KEY_INVISIBLE; splat_from_gaussian [N] = NO_SPLAT; counters.broken_* (integer
-//          atomics): positions, scales and opacities that are not finite
-// Math:    |cov2d| <= |J|^2 max(s)^2 + blur; radius where alpha falls to ALPHA_MIN. Conservative, never drops a splat
-//          that project_forward would give a tile. Variant object: of layer 1's object alone.
+//          atomics): nonfinite positions, scales and opacities
+// Math:    |cov2d| <= |J|^2 max(s)^2 + blur; radius where alpha falls to ALPHA_MIN. Conservative: never drops a splat
+//          with a tile in project_forward. Variant object: keeps only Gaussians of layer 1's object.
 // Mirror:  src/verify/reference/project.rs::cull
 
 layout(local_size_x = 64) in;

@@ -5,14 +5,14 @@
 #include "dispatch.glsl"
 #include "gaussian.glsl"
 #include "sh.glsl"
-// project_backward — gradients of the splat back to the parameters of its Gaussian.
-// Work:    64 splats a workgroup.
+// project_backward — carry the gradients of each splat back to the parameters of its Gaussian.
+// Work:    64 splats per workgroup.
 // Reads:   step, failure; gaussian_from_splat [V]; means, scales, quats, sh0..sh3 [N]; v_splats [V,3]
 // Writes:  v_means [V] (xyz world, w opacity logit), v_scales [V] (ln), v_quats [V], v_sh0 [V], v_sh1 [V,3], v_sh2 [V,4],
-//          v_sh3 [V,6]; counters.nonfinite_* (integer atomics): such a Gaussian gets gradient 0
+//          v_sh3 [V,6]; counters.nonfinite_* (integer atomics): Gaussians with a nonfinite gradient, which becomes 0;
 //          variant object: adds to the gradients of the scene's splats (splat_from_gaussian)
 // Math:    dSigma = -Q dQ Q through the inverse; dM = 2 G M; Jacobian, view direction and mean2d paths reach the mean;
-//          a clamped x/z or y/z passes nothing on; the clamp of the colour at 0 passes nothing on.
+//          a clamped x/z or y/z has gradient 0; so does a colour clamped at 0.
 // Mirror:  src/verify/reference/project.rs::project_backward
 
 layout(constant_id = 11) const uint SH_DEGREE = 3;
@@ -63,7 +63,6 @@ void main() {
     float blue = fetch4(v_splats, 3u * s + 2u).x;
     bool sane = finite(dot(abs(a), vec4(1.0)) + dot(abs(b), vec4(1.0)) + abs(blue));
 
-    // colour
     vec3 offset = mean.xyz - u.camera_centre;
     float inv_distance = inversesqrt(max(dot(offset, offset), 1e-24));
     vec3 direction = offset * inv_distance;

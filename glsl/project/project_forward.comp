@@ -7,12 +7,12 @@
 #include "sh.glsl"
 #include "record.glsl"
 #include "ellipse.glsl"
-// project_forward — project the visible Gaussians, colour them, count the tiles each one touches.
-// Work:    64 splats a workgroup, splats in depth order.
+// project_forward — project and colour the visible Gaussians, and count the tiles of each.
+// Work:    64 splats per workgroup, splats in depth order.
 // Reads:   step, counters; gaussian_from_splat [V]; means, scales, quats, sh0 [N]; sh1 [N,3], sh2 [N,4], sh3 [N,6];
 //          variant labels: labels [N], layer_from_label
 // Writes:  splats [V,3] (record.glsl); tiles_touched [V] over all layers; splat_from_gaussian [N]; counters.unprojected_*
-//          (integer atomics): splats that are not finite, which touch no tile
+//          (integer atomics): nonfinite splats, which touch no tile
 // Math:    EWA splatting with Cauchy-Binet determinant; SH colour, clamped at 0; ellipse.glsl for the tiles.
 // Mirror:  src/verify/reference/project.rs::project_forward
 
@@ -55,7 +55,7 @@ void main() {
     vec3 direction = normalize(mean.xyz - u.camera_centre);
     float basis[15];
     sh_basis(direction, SH_DEGREE, basis);
-    vec3 raw = sh_colour(i, basis), colour = max(raw, 0.0); // drivers take 0 for the larger of it and NaN
+    vec3 raw = sh_colour(i, basis), colour = max(raw, 0.0); // in drivers, max(NaN, 0) is 0
 
     TileRect rect = tile_rect(u, centre, extent);
     uint touched = 0u, tx = rect.x_min, ty = rect.y_min;

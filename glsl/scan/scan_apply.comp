@@ -4,11 +4,11 @@
 #include "step.glsl"
 #include "count.glsl"
 #include "saturate.glsl"
-// scan_apply — third of three: each lane writes the exclusive prefix of its share.
+// scan_apply — third of three: each lane writes the exclusive prefix sum of its share.
 // Work:    as scan_reduce.
 // Reads:   step, counters, failure; values [n]; partials [LANES] (exclusive)
 // Writes:  offsets [n]
-// Order:   exact integers, same in every run.
+// Order:   exact integers, equal in every run.
 // Mirror:  src/verify/reference/scan.rs::exclusive_scan
 
 layout(constant_id = 0) const uint SUBGROUP_SIZE = 8;

@@ -4,11 +4,11 @@
 #include "step.glsl"
 #include "count.glsl"
 #include "saturate.glsl"
-// scan_reduce — first of three: each lane adds up its contiguous share of the values.
+// scan_reduce — first of three: each lane sums its contiguous share of the values.
 // Work:    LANES lanes over all workgroups; lane i owns values [i c, (i+1) c), c = ceil(n / LANES).
-// Reads:   step, counters, failure; values [n] (variant flag: counts values that are not KEY_INVISIBLE)
+// Reads:   step, counters, failure; values [n] (variant flag: counts values other than KEY_INVISIBLE)
 // Writes:  partials [LANES]
-// Order:   exact integers, same in every run.
+// Order:   exact integers, equal in every run.
 // Mirror:  src/verify/reference/scan.rs::exclusive_scan
 
 layout(constant_id = 0) const uint SUBGROUP_SIZE = 8;

@@ -3,11 +3,11 @@
 #include "constants.glsl"
 #include "step.glsl"
 #include "saturate.glsl"
-// scan_spine — second of three: exclusive scan of the lanes' sums, and the total into a counter.
+// scan_spine — second of three: exclusive scan of the lanes' sums; the total goes to a counter.
 // Work:    one workgroup of one subgroup.
 // Reads:   partials [LANES]
-// Writes:  partials [LANES] (exclusive); counters (the field that TOTAL names)
-// Order:   exact integers, same in every run.
+// Writes:  partials [LANES] (exclusive); counters (the field of TOTAL)
+// Order:   exact integers, equal in every run.
 // Mirror:  src/verify/reference/scan.rs::exclusive_scan
 
 layout(constant_id = 0) const uint SUBGROUP_SIZE = 8;
@@ -25,7 +25,7 @@ void main() {
     for (uint i = begin; i < end; i++) {
         sum = saturating_add(sum, partials[i]);
     }
-    // In two halves, neither of which can overflow.
+    // The sum is split into two halves; neither can overflow.
     uint low = subgroupExclusiveAdd(sum & 0xffffu);
     uint high = subgroupExclusiveAdd(sum >> 16u) + (low >> 16u);
     uint running = high > 0xffffu ? 0xffffffffu : (high << 16u) | (low & 0xffffu);

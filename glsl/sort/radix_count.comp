@@ -5,10 +5,10 @@
 #include "count.glsl"
 // radix_count — histogram of one digit of the keys, one histogram per lane.
 // Work:    LANES lanes over all workgroups; lane i owns keys [i c, (i+1) c). Each lane has its own column of the
-//          shared table, so there are no atomics and no barriers, and equal keys keep their order.
+//          table: this needs no atomics and no barriers, and equal keys keep their order.
 // Reads:   step, counters, failure; keys_in [n]
 // Writes:  histogram [2^DIGIT_BITS, LANES]
-// Order:   exact integers, same in every run.
+// Order:   exact integers, equal in every run.
 // Mirror:  src/verify/reference/sort.rs::radix_sort
 
 layout(constant_id = 0) const uint SUBGROUP_SIZE = 8;

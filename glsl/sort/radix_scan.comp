@@ -1,11 +1,11 @@
 #version 460
 #include "layout.glsl"
 // radix_scan — exclusive scan of the whole histogram, digit-major, in place.
-// Work:    one workgroup of one subgroup; lane i owns a contiguous share, a multiple of four cells, and takes four a round:
-//          lavapipe ends both loops together after 65,535 rounds.
+// Work:    one workgroup of one subgroup; lane i owns a contiguous share, a multiple of four cells, and adds four per
+//          round: lavapipe ends both loops after 65,535 rounds in total.
 // Reads:   histogram [CELLS]
 // Writes:  histogram [CELLS]
-// Order:   exact integers, same in every run.
+// Order:   exact integers, equal in every run.
 // Mirror:  src/verify/reference/sort.rs::radix_sort
 
 layout(constant_id = 0) const uint SUBGROUP_SIZE = 8;

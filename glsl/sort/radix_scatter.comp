@@ -3,11 +3,11 @@
 #include "constants.glsl"
 #include "step.glsl"
 #include "count.glsl"
-// radix_scatter — move keys and values to their places for one digit; stable.
+// radix_scatter — move keys and values to their sorted positions for one digit; stable.
 // Work:    as radix_count.
 // Reads:   step, counters, failure; keys_in [n], values_in [n] (IDENTITY: the value is the index); histogram (scanned)
 // Writes:  keys_out [n], values_out [n]
-// Order:   exact integers, same in every run.
+// Order:   exact integers, equal in every run.
 // Mirror:  src/verify/reference/sort.rs::radix_sort
 
 layout(constant_id = 0) const uint SUBGROUP_SIZE = 8;

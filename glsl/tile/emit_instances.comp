@@ -5,15 +5,15 @@
 #include "dispatch.glsl"
 #include "record.glsl"
 #include "ellipse.glsl"
-// emit_instances — write one (tile key, splat) pair for every tile that a splat touches.
-// Work:    64 splats a workgroup. A splat's instances are contiguous: first those of the scene layer, then
+// emit_instances — write one (tile key, splat) pair for every tile of a splat.
+// Work:    64 splats per workgroup. A splat's instances are contiguous: first those of the scene layer, then
 //          those of its object layer; keys are layer * tile_count + tile.
 // Reads:   step, counters, failure; splats [V,3]; tiles_touched [V]; instance_offsets [V];
 //          variant labels: gaussian_from_splat [V], labels [N], layer_from_label
 // Writes:  tile_keys [I]; splat_from_instance [I]
 // Mirror:  src/verify/reference/tile.rs::emit_instances
 
-layout(constant_id = 18) const uint LAYER = 0; // of what is not in a layer of its object
+layout(constant_id = 18) const uint LAYER = 0; // layer of the pairs outside of object layers
 layout(local_size_x = 64) in;
 READ1(0, StepUniforms, step);
 READ1(1, Counters, counters);

@@ -4,7 +4,7 @@
 #include "step.glsl"
 #include "dispatch.glsl"
 // layer_list — list the occupied tiles of the object layers.
-// Work:    one tile of one layer an invocation.
+// Work:    one tile of one layer per invocation.
 // Reads:   step, failure; layer_occupied, layer_offsets [layers * T]
 // Writes:  layer_tiles [occupied] (layer * T + tile)
 // Mirror:  src/verify/reference/scan.rs::compact

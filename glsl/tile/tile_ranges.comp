@@ -3,12 +3,12 @@
 #include "constants.glsl"
 #include "step.glsl"
 #include "dispatch.glsl"
-// tile_ranges — where each tile's list begins and ends among the sorted pairs, the longest list, and (variant labels)
-// which tiles of object layers hold anything.
-// Work:    one tile of one layer an invocation; the grid covers the step's layers. Tiles are few beside
-//          pairs, so that a binary search by each tile is cheaper than a look at each pair.
+// tile_ranges — find the start and end of each tile's list among the sorted pairs, the longest list, and (variant
+// labels) the occupied tiles of object layers.
+// Work:    one tile of one layer per invocation; the grid covers the step's layers. There are far fewer tiles than
+//          pairs, so a binary search per tile is cheaper than a test per pair.
 // Reads:   step, counters, failure; tile_keys [I] sorted
-// Writes:  tile_starts, tile_ends [layers * T], equal where a list is empty; counters.longest_list (integer maximum, any
+// Writes:  tile_starts, tile_ends [layers * T], equal for an empty list; counters.longest_list (integer maximum, any
 //          order); variant labels: layer_occupied [layers * T] 0 or 1
 // Mirror:  src/verify/reference/tile.rs::tile_ranges, tile.rs::tile_lengths
 
@@ -23,7 +23,7 @@ WRITE(5, uint, tile_ends);
 WRITE(6, uint, layer_occupied);
 #endif
 
-// The first pair whose key is not less.
+// The first pair with a key of at least `key`.
 uint first_not_less(uint key, uint count) {
     uint low = 0u, high = count;
     while (low < high) {

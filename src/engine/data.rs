@@ -1,4 +1,4 @@
-//! What is on the device, typed. Nothing may be in flight.
+//! Typed access to the buffers on the device. No list may be in flight.
 
 use super::Engine;
 use crate::error::Result;
@@ -13,7 +13,7 @@ impl Engine {
         Ok(rows.iter().map(|&[x, y, z, _]| [x, y, z]).collect())
     }
 
-    /// Labels of the Gaussians; the engine must have been made with labels.
+    /// Labels of the Gaussians; only for an engine with labels.
     pub fn labels(&mut self) -> Result<Vec<u32>> {
         self.sched.download(Buf::LABELS, 0, 0, self.gaussian_count as usize)
     }
@@ -23,13 +23,13 @@ impl Engine {
         self.sched.upload(Buf::LABELS, 0, 0, labels)
     }
 
-    /// The shared parameters; none if the engine was made without rows of them.
+    /// The shared parameters; empty if the engine has none.
     #[doc(hidden)]
     pub fn shared(&mut self) -> Result<Vec<[f32; 4]>> {
         self.sched.download(Buf::SHARED, 0, 0, self.size.shared_rows as usize)
     }
 
-    /// Replaces the first shared parameters; the moments of all start over.
+    /// Replaces the first shared parameters; the moments of all of them become 0.
     pub(crate) fn set_shared(&mut self, rows: &[[f32; 4]]) -> Result<()> {
         for plane in &SHARED_PLANES[1..] {
             self.sched.fill(*plane, 0)?;
@@ -43,7 +43,7 @@ impl Engine {
         self.sched.fill(Buf::VOTES_HIGH, 0)
     }
 
-    /// The votes for each Gaussian and column [N, columns].
+    /// Votes for each Gaussian and column, `[N, columns]`.
     pub(crate) fn votes(&mut self, columns: usize) -> Result<Vec<u64>> {
         let cells = self.gaussian_count as usize * columns;
         let low = self.sched.download::<u32>(Buf::VOTES_LOW, 0, 0, cells)?;
@@ -51,33 +51,33 @@ impl Engine {
         Ok(low.into_iter().zip(high).map(|(low, high)| u64::from(high) << 32 | u64::from(low)).collect())
     }
 
-    /// The picture of the last list: r, g, b over the background, and the final transmittance.
+    /// Picture of the last list: r, g, b over the background, and the final transmittance.
     pub(crate) fn picture(&mut self, pixels: usize) -> Result<Vec<[f32; 4]>> {
         self.sched.download(Buf::IMAGE, 0, 0, pixels)
     }
 
-    /// Main Gaussian of each pixel of the last render, -1 where none contributes.
+    /// Main Gaussian of each pixel of the last render, -1 if no Gaussian contributes.
     pub(crate) fn main_gaussians(&mut self, pixels: usize) -> Result<Vec<i32>> {
         self.sched.download(Buf::MAIN_GAUSSIAN, 0, 0, pixels)
     }
 
-    /// Weight of that Gaussian, and the weighted sum of z over all Gaussians.
+    /// Weight of each pixel's main Gaussian, and the weighted sum of z over all Gaussians.
     pub(crate) fn weights_and_depths(&mut self, pixels: usize) -> Result<Vec<[f32; 2]>> {
         self.sched.download(Buf::MAIN_WEIGHT_DEPTH, 0, 0, pixels)
     }
 
-    /// Makes a position NaN, as a broken device would.
+    /// Sets a coordinate of the first position to NaN, as a faulty device would.
     pub(crate) fn spoil(&mut self) -> Result<()> {
         self.sched.upload(Buf::MEANS, 0, 0, &[f32::NAN])
     }
 
-    /// The scheduler underneath, for tests, the self-test and benchmarks that read buffers of their own choice.
+    /// The scheduler, for tests, the self-test and benchmarks that read buffers directly.
     #[doc(hidden)]
     pub fn raw(&self) -> &Scheduler {
         &self.sched
     }
 
-    /// As [`Engine::raw`], for uploads, downloads and lists of their own.
+    /// Same as [`Engine::raw`], for uploads, downloads and custom lists.
     #[doc(hidden)]
     pub fn raw_mut(&mut self) -> &mut Scheduler {
         &mut self.sched

@@ -1,4 +1,4 @@
-//! How much memory an engine takes: capacities for what is known at first, which follow what a scene turns out to need.
+//! Memory of an engine: initial capacities from known sizes, then growth to what the scene needs.
 
 use super::{Engine, EngineSize, Report};
 use crate::error::{Error, Result};
@@ -9,10 +9,10 @@ use crate::scheduler::{Scheduler, SchedulerOptions};
 use crate::shaders::structs::Counters;
 use serde::{Deserialize, Serialize};
 
-/// How far the memory of an engine has grown: what bounded memory leaves room for depends on it.
+/// Grown sizes of an engine's memory. Under a memory bound, the room that is left depends on them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct GrownSizes {
-    /// Gaussians that there is room for.
+    /// Gaussians that fit.
     pub gaussians: u32,
     /// (splat, tile) pairs.
     pub instances: u32,
@@ -22,7 +22,7 @@ pub struct GrownSizes {
     pub segments: u32,
 }
 
-/// Capacities for some room, before any measurement.
+/// Returns initial capacities for `size`, before any measurement.
 pub fn capacity(shape: &KernelShape, size: &EngineSize) -> Capacity {
     let (width, height) = size.image;
     let (tiles_x, tiles_y) = shape.tiles(width, height);
@@ -30,7 +30,7 @@ pub fn capacity(shape: &KernelShape, size: &EngineSize) -> Capacity {
     let layers = size.labels.map_or(0, |labels| u64::from(labels.layers));
     let labels = size.labels.map_or(0, |labels| u64::from(labels.max_label) + 1);
     let label_words = if labels > 0 { labels.div_ceil(32) * (layers + 1) } else { 0 };
-    // Lists bind the model even if it is empty.
+    // Lists bind the model's buffers even if the model is empty.
     let gaussians = size.gaussians.max(1);
     let instances = (gaussians * 6).max(tiles * 16);
     let mut capacity = Capacity {
@@ -55,7 +55,7 @@ pub fn capacity(shape: &KernelShape, size: &EngineSize) -> Capacity {
     capacity
 }
 
-/// Fills in what follows from the number of instances and of layer tiles.
+/// Sets the capacities that follow from the numbers of instances and of layer tiles.
 fn derive(shape: &KernelShape, capacity: &mut Capacity, instances: u64, trained: bool) {
     capacity.instances = instances;
     capacity.trained_instances = if trained { instances } else { 0 };
@@ -68,7 +68,7 @@ fn derive(shape: &KernelShape, capacity: &mut Capacity, instances: u64, trained:
 }
 
 impl Engine {
-    /// The memory that an engine for `room` would take, before anything is allocated.
+    /// Predicts the memory of an engine of this size, without allocating.
     #[doc(hidden)]
     pub fn predict(gpu: &Gpu, size: &EngineSize, options: SchedulerOptions) -> Result<MemoryReport> {
         let shape = KernelShape::of(gpu.capabilities());
@@ -77,7 +77,7 @@ impl Engine {
         Scheduler::predict(TABLE, &capacity, &lists, &options.limits(gpu))
     }
 
-    /// The lists that decide how much scratch memory is needed.
+    /// Returns the lists that decide the amount of scratch memory.
     #[doc(hidden)]
     pub fn lists_of(shape: &KernelShape, capacity: &Capacity, size: &EngineSize) -> Vec<PassList> {
         let mut lists = vec![pass::render_view(shape, capacity, 3)];
@@ -96,7 +96,7 @@ impl Engine {
         lists
     }
 
-    /// Grows the model's buffers if `count` Gaussians do not fit. All lists are recorded again.
+    /// Grows the model's buffers if `count` Gaussians do not fit. All lists are then recorded again.
     #[doc(hidden)]
     pub fn make_room_for_gaussians(&mut self, count: u64) -> Result<()> {
         if count <= self.size.gaussians {
@@ -106,7 +106,7 @@ impl Engine {
         let roomy = Capacity::grown(self.size.gaussians, count);
         let gaussians = if self.fits(&self.with_gaussians(roomy))? { roomy } else { count };
         let gaussians = match self.set_capacity(self.with_gaussians(gaussians)) {
-            // Drivers may hold less than they tell.
+            // Drivers may offer less memory than they report.
             Err(error) if error.is_out_of_memory() && gaussians > count => {
                 self.set_capacity(self.with_gaussians(count))?;
                 count
@@ -117,8 +117,8 @@ impl Engine {
         Ok(())
     }
 
-    /// Makes the largest image at least `width` x `height` px; the model stays. Nothing may be in flight. All lists are
-    /// recorded again.
+    /// Raises the largest image size to at least `width` x `height` px and keeps the model. No list may be in flight.
+    /// All lists are then recorded again.
     pub fn grow_image(&mut self, width: u32, height: u32) -> Result<()> {
         let image = (self.size.image.0.max(width), self.size.image.1.max(height));
         if image == self.size.image {
@@ -132,7 +132,7 @@ impl Engine {
         Ok(())
     }
 
-    /// The most Gaussians, up to `wanted`, that there is memory for. What there is room for already is never less.
+    /// Returns the largest number of Gaussians, up to `wanted`, that fits in memory; at least the present room.
     pub(crate) fn most_gaussians(&self, wanted: u64) -> Result<u64> {
         let (mut fits, mut too_many) = (self.size.gaussians, wanted + 1);
         if wanted <= fits || self.fits(&self.with_gaussians(wanted))? {
@@ -153,7 +153,7 @@ impl Engine {
         self.capacity_for(&EngineSize { gaussians, ..self.size })
     }
 
-    /// Capacities for a larger room, with no fewer pairs, tiles and segments than the scene has needed so far.
+    /// Returns capacities for a larger size, with at least the pairs, tiles and segments needed so far.
     fn capacity_for(&self, size: &EngineSize) -> Capacity {
         let old = self.sched.capacity();
         let mut new = capacity(&self.shape, size);
@@ -164,7 +164,7 @@ impl Engine {
         new
     }
 
-    /// True if the memory suffices for these capacities and all lists.
+    /// Returns true if the memory suffices for these capacities and all lists.
     fn fits(&self, capacity: &Capacity) -> Result<bool> {
         let lists = Self::lists_of(&self.shape, capacity, &self.size);
         match self.sched.predict_here(capacity, &lists) {
@@ -174,8 +174,8 @@ impl Engine {
         }
     }
 
-    /// Grows what a failed list needed, and clears the failure. True if something grew; lists that were in flight have
-    /// changed nothing then.
+    /// Grows the buffers that were too small for a failed list, and clears the failure. Returns true if a buffer grew;
+    /// lists that were in flight have then changed nothing.
     #[doc(hidden)]
     pub fn recover(&mut self, report: &Report) -> Result<bool> {
         if report.failure == 0 {
@@ -184,11 +184,14 @@ impl Engine {
         self.abandon()?;
         let needed = &report.counters;
         let grown = self.capacity_of(needed, Capacity::grown);
-        // Where there is no room for more than what is needed, that must do.
+        // If reserves do not fit, allocate exactly what is needed.
         let least = self.capacity_of(needed, |_, needed| needed);
         let new = if self.fits(&grown)? { grown } else { least };
         if new == *self.sched.capacity() {
-            return Err(Error::Bug(format!("failure {} without a need: {needed:?}", report.failure)));
+            return Err(Error::Bug(format!(
+                "failure {}, but all buffers are large enough: {needed:?}",
+                report.failure
+            )));
         }
         tracing::debug!(
             "buffers grow: {} instances, {} layer tiles, {} segments",
@@ -204,7 +207,7 @@ impl Engine {
         Ok(true)
     }
 
-    /// The capacities in force, grown where they were too small.
+    /// Returns the present capacities, grown where they were too small.
     fn capacity_of(&self, needed: &Counters, grown: impl Fn(u64, u64) -> u64) -> Capacity {
         let mut new = *self.sched.capacity();
         let follow = |have: &mut u64, needed: u32| {
@@ -220,7 +223,7 @@ impl Engine {
         new
     }
 
-    /// How far the memory has grown.
+    /// Returns the grown sizes.
     pub(crate) fn sizes(&self) -> GrownSizes {
         let capacity = self.sched.capacity();
         let word = |size: u64| u32::try_from(size).unwrap_or(u32::MAX);
@@ -232,7 +235,7 @@ impl Engine {
         }
     }
 
-    /// Makes the memory of a new engine as large as another one's had become.
+    /// Grows a new engine's memory to the sizes of an earlier engine.
     pub(crate) fn grow_to(&mut self, sizes: GrownSizes) -> Result<()> {
         let gaussians = self.size.gaussians.max(u64::from(sizes.gaussians));
         let mut new = capacity(&self.shape, &EngineSize { gaussians, ..self.size });

@@ -1,4 +1,4 @@
-//! What the host gives to a list, by its kind.
+//! Host inputs of the lists, by kind of list.
 
 use super::Engine;
 use crate::error::{Error, Result};
@@ -6,60 +6,60 @@ use crate::scheduler::plan::Buf;
 use crate::shaders::constants::NO_ROW;
 use crate::shaders::structs::StepUniforms;
 
-/// What a list reads besides the model.
+/// The input of a list besides the model.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Input<'a> {
-    /// Of a render, a densification or an opacity reset.
+    /// Input of a render, a densification or an opacity reset.
     Uniforms(&'a StepUniforms),
-    /// Of a training step.
+    /// Input of a training step.
     Train(&'a TrainInput<'a>),
-    /// Of the votes of a view.
+    /// Input of a vote on a view.
     Vote(&'a VoteInput<'a>),
 }
 
-/// What a training step reads.
+/// Input of a training step.
 #[derive(Clone, Debug)]
 pub(crate) struct TrainInput<'a> {
     /// Uniforms.
     pub uniforms: StepUniforms,
-    /// The photo [P], RGBA8; alpha 0: left out.
+    /// The photo, `[P]`, RGBA8; pixels with alpha 0 are ignored.
     pub photo: &'a [[u8; 4]],
-    /// Of a step with labels.
+    /// Labels, in a step with labels.
     pub layers: Option<LayerInput<'a>>,
-    /// Rows of shared parameters that belong to the step, in the order that its passes know them by.
+    /// Rows of shared parameters that the step uses; its passes refer to them by index in this order.
     pub shared: Vec<SharedRow>,
 }
 
-/// A row of shared parameters in a step.
+/// A row of shared parameters, as used in a step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct SharedRow {
-    /// Which one.
+    /// Index of the row.
     pub row: u32,
-    /// Learning rates; if all are 0 the row rests, with its moments.
+    /// Learning rates; if all are 0, the row and its moments stay unchanged.
     pub rates: [f32; 4],
 }
 
-/// What a training step with labels reads.
+/// Label input of a training step.
 #[derive(Clone, Debug)]
 pub(crate) struct LayerInput<'a> {
-    /// Visible object of each pixel [P].
+    /// Visible object of each pixel, `[P]`.
     pub view_labels: &'a [u32],
-    /// Layer of each label id, 0: not sampled in this step.
+    /// Layer of each label id; 0 if the step does not sample the label.
     pub layer_from_label: Vec<u32>,
     /// Label id of each layer.
     pub label_from_layer: Vec<u32>,
     /// Weight of each layer's label loss.
     pub weights: Vec<f32>,
-    /// For each layer a bit per label id: set where that object hides the layer's.
+    /// A bit per label id for each layer; set if that object hides the layer's object.
     pub occluders: Vec<u32>,
 }
 
-/// What the votes of a view read.
+/// Input of a vote on a view.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct VoteInput<'a> {
     /// Uniforms.
     pub uniforms: StepUniforms,
-    /// Column of each pixel [P].
+    /// Column of each pixel, `[P]`.
     pub columns: &'a [u32],
     /// Weight of the votes of each column.
     pub weights: &'a [f32],
@@ -84,8 +84,7 @@ impl<'a> From<&'a VoteInput<'a>> for Input<'a> {
 }
 
 impl Engine {
-    /// Writes the input of a list into a frame. The only place where a camera reaches the device, so its size is checked
-    /// here. Public for tests and benchmarks that run lists of their own.
+    /// Writes the input of a list into a frame. Checks the image size, because every camera passes through here.
     pub(crate) fn write(&mut self, frame: usize, input: Input) -> Result<()> {
         let uniforms = match input {
             Input::Uniforms(uniforms) => uniforms,
@@ -93,7 +92,7 @@ impl Engine {
             Input::Vote(vote) => &vote.uniforms,
         };
         self.size.check_image(uniforms.width, uniforms.height)?;
-        // Records of (splat, tile) pairs are valid by the mark of their submit.
+        // A record of a (splat, tile) pair is valid only if it carries the stamp of its submit.
         self.stamp = self.stamp.wrapping_add(1).max(1);
         if let Input::Train(train) = input {
             self.write_shared(frame, &train.shared)?;
@@ -118,7 +117,7 @@ impl Engine {
         }
     }
 
-    /// Writes the rows of a step, each once, and the end behind them.
+    /// Writes the rows of a step and marks the end of their list. Each row may occur once.
     fn write_shared(&mut self, frame: usize, shared: &[SharedRow]) -> Result<()> {
         let mut rows: Vec<u32> = shared.iter().map(|step| step.row).collect();
         let mut sorted = rows.clone();
@@ -126,7 +125,7 @@ impl Engine {
         sorted.dedup();
         let all = self.size.shared_rows;
         if sorted.len() < rows.len() || sorted.last().is_some_and(|&row| row >= all) {
-            return Err(Error::Bug(format!("the shared rows {rows:?} of a step are not different ones of {all}")));
+            return Err(Error::Bug(format!("shared rows {rows:?} of a step: expected different indices below {all}")));
         }
         if all == 0 {
             return Ok(());

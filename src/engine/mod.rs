@@ -1,7 +1,7 @@
-//! What training and rendering share: one device, one model in its memory, and the pass lists that work on it.
+//! The engine below training and rendering: one device, one model in its memory, and the pass lists that work on it.
 //!
-//! Everything above uses the scheduler through this module: [`Engine::run`] for a list that is waited for,
-//! [`Engine::submit`] and [`Engine::retire`] for steps in flight, and typed transfers.
+//! All modules above use the scheduler through this module: `Engine::run` runs a list and waits for it,
+//! `Engine::submit` and `Engine::retire` keep steps in flight, and transfers are typed.
 
 mod data;
 pub(crate) mod growth;
@@ -36,21 +36,21 @@ pub struct Engine {
     lists: HashMap<ListKey, ListId>,
     gaussian_count: u32,
     sh_degree: u32,
-    /// What the positions of the model are relative to.
+    /// World position of the model's local origin.
     origin: DVec3,
-    /// What extended steps have more than others.
+    /// Passes that extended steps add.
     extension: Arc<dyn Extension>,
-    /// Mark of the last submit, never 0.
+    /// Stamp of the last submit, never 0.
     stamp: u32,
     last_frame: usize,
-    /// Frames whose report was not read yet.
+    /// Frames with an unread report.
     in_flight: [bool; FRAMES_IN_FLIGHT],
-    /// Each run is checked for writes outside of its buffers.
+    /// Every run is checked for writes outside of its buffers.
     has_guards: bool,
 }
 
 impl Engine {
-    /// Allocates for `size`.
+    /// Creates an engine with memory for `size`.
     #[doc(hidden)]
     pub fn new(gpu: Arc<Gpu>, size: EngineSize, options: SchedulerOptions) -> Result<Self> {
         let shape = KernelShape::of(gpu.capabilities());
@@ -66,7 +66,7 @@ impl Engine {
         Ok(engine)
     }
 
-    /// As [`Engine::new`], with kernels of a given shape.
+    /// Same as [`Engine::new`], with kernels of a given shape.
     #[doc(hidden)]
     pub fn with_shape(gpu: Arc<Gpu>, shape: KernelShape, size: EngineSize, options: SchedulerOptions) -> Result<Self> {
         shape.check()?;
@@ -98,22 +98,22 @@ impl Engine {
         &self.shape
     }
 
-    /// What the memory is sized for.
+    /// Sizes of the memory.
     pub fn size(&self) -> &EngineSize {
         &self.size
     }
 
-    /// Gaussians of the model.
+    /// Number of Gaussians in the model.
     pub fn gaussian_count(&self) -> u32 {
         self.gaussian_count
     }
 
-    /// Says that the device now holds so many Gaussians (after a densification).
+    /// Sets the number of Gaussians that the device holds, after a densification.
     pub(crate) fn set_gaussian_count(&mut self, count: u32) {
         self.gaussian_count = count;
     }
 
-    /// The world position that the positions on the device are relative to.
+    /// World position of the model's local origin: positions on the device are relative to it.
     pub fn origin(&self) -> DVec3 {
         self.origin
     }
@@ -123,17 +123,17 @@ impl Engine {
         self.sh_degree
     }
 
-    /// Gives the model another degree; bands that were not uploaded are 0.
+    /// Changes the degree of the model; bands without uploaded coefficients are 0.
     pub(crate) fn set_sh_degree(&mut self, sh_degree: u32) {
         self.sh_degree = sh_degree;
     }
 
-    /// What [`ListKey::Extended`] adds to a step; before the first of them.
+    /// Sets the passes that [`ListKey::Extended`] adds; call it before the first such step.
     pub(crate) fn set_extension(&mut self, extension: Arc<dyn Extension>) {
         self.extension = extension;
     }
 
-    /// Puts a model into the device's memory; moments and statistics start at 0.
+    /// Copies a model into the device's memory; moments and statistics become 0.
     pub fn upload_model(&mut self, gaussians: &Gaussians) -> Result<()> {
         self.make_room_for_gaussians(gaussians.len() as u64)?;
         model::upload(&mut self.sched, gaussians, self.size.labels.is_some())?;
@@ -150,7 +150,7 @@ impl Engine {
         Ok(Gaussians { origin: self.origin, ..model })
     }
 
-    /// A camera's part of the uniforms for the model; everything else is 0.
+    /// Returns the camera's part of the uniforms for the model; all other fields are 0.
     pub(crate) fn view_uniforms(&self, camera: &Camera, near: f32, background: [f32; 3]) -> StepUniforms {
         uniforms::view_uniforms(camera, self.origin, &self.shape, near, background, self.gaussian_count)
     }

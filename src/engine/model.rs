@@ -1,4 +1,4 @@
-//! The model between its host form and the device's planes of vec4.
+//! Converts the model between its host form and the planes of vec4 on the device.
 
 use crate::error::Result;
 use crate::pass::ATTRIBUTES;
@@ -6,10 +6,10 @@ use crate::scene::Gaussians;
 use crate::scheduler::Scheduler;
 use crate::scheduler::plan::Buf;
 
-/// Bands above degree 0: plane, vec4 per Gaussian, first coefficient among the rest, coefficients.
+/// Bands above degree 0: plane, vec4 per Gaussian, first coefficient (without degree 0), number of coefficients.
 const BANDS: [(Buf, usize, usize, usize); 3] = [(Buf::SH1, 3, 0, 3), (Buf::SH2, 4, 3, 5), (Buf::SH3, 6, 8, 7)];
 
-/// Writes the planes; optimiser state becomes 0.
+/// Writes the planes; sets the optimiser state to 0.
 pub(crate) fn upload(sched: &mut Scheduler, model: &Gaussians, labels: bool) -> Result<()> {
     model.check()?;
     let with = |rows: &[[f32; 3]], last: &dyn Fn(usize) -> f32| -> Vec<[f32; 4]> {

@@ -1,4 +1,4 @@
-//! Lists: recorded on first use, run and waited for, or submitted while others are in flight.
+//! Lists: recorded on first use, then either run and awaited, or submitted while others are in flight.
 
 use super::{Engine, Input};
 use crate::error::{Error, Result};
@@ -7,21 +7,21 @@ use crate::scheduler::plan::{Buf, FRAMES_IN_FLIGHT};
 use crate::scheduler::{ListId, Ticket};
 use crate::shaders::structs::Counters;
 
-/// Which list.
+/// Identifies a list.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum ListKey {
     /// One optimiser step.
     Train(Variant),
-    /// The same with passes of the [`pass::Extension`] under some number.
+    /// One optimiser step with the passes of a numbered variant of the [`pass::Extension`].
     Extended(Variant, u32),
-    /// One optimiser step with so many sampled objects that have passes of their own, see [`pass::separate_step`].
+    /// One optimiser step with separate passes for this many sampled objects, see [`pass::separate_step`].
     #[cfg(feature = "lab")]
     Separate(Variant, u32),
-    /// One picture, with this degree of the spherical harmonics.
+    /// One picture, with this active degree of the spherical harmonics.
     Render(u32),
-    /// Votes of one view; tiles are walked so many times, four labels each.
+    /// Votes of one view; each tile is walked this many times, for four labels each time.
     Vote(u32),
-    /// Count of a densification.
+    /// Counts the result of a densification.
     DensifyCount,
     /// Densification.
     DensifyApply,
@@ -29,7 +29,7 @@ pub enum ListKey {
     OpacityReset,
 }
 
-/// What a list reports.
+/// Results of a list.
 #[derive(Clone, Copy, Debug)]
 pub struct Report {
     /// Counters.
@@ -41,12 +41,12 @@ pub struct Report {
 /// A list in flight; [`Engine::retire`] waits for it.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct InFlight {
-    /// What tells its recording from others.
+    /// Recording that runs.
     pub recording: Recording,
     ticket: Ticket,
 }
 
-/// A list as it was recorded for a frame. After buffers have grown it is another one.
+/// A recording of a list for a frame. After buffers have grown, the list is recorded anew.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(crate) struct Recording {
     list: ListId,
@@ -54,7 +54,7 @@ pub(crate) struct Recording {
 }
 
 impl Engine {
-    /// The recorded list for a key; recorded on first use. Public for tests and benchmarks, with [`Engine::raw`].
+    /// Returns the recorded list for a key; records it on first use. Public for tests and benchmarks.
     #[doc(hidden)]
     pub fn list(&mut self, key: ListKey) -> Result<ListId> {
         if let Some(&id) = self.lists.get(&key) {
@@ -79,7 +79,7 @@ impl Engine {
         Ok(id)
     }
 
-    /// Runs a list and waits for it; again with more memory where a buffer was too small. Nothing may be in flight.
+    /// Runs a list and waits for it; grows buffers that were too small and repeats. No list may be in flight.
     pub(crate) fn run<'a>(&mut self, key: ListKey, input: impl Into<Input<'a>>) -> Result<Report> {
         let input = input.into();
         self.check_idle()?;
@@ -97,7 +97,7 @@ impl Engine {
         }
     }
 
-    /// Submits a list and does not wait for it. At most one per frame may be in flight.
+    /// Submits a list without waiting. At most one list per frame may be in flight.
     pub(crate) fn submit<'a>(&mut self, key: ListKey, input: impl Into<Input<'a>>) -> Result<InFlight> {
         let frame = (self.last_frame + 1) % FRAMES_IN_FLIGHT;
         if self.in_flight[frame] {
@@ -110,22 +110,22 @@ impl Engine {
         Ok(InFlight { recording: Recording { list, frame }, ticket })
     }
 
-    /// Waits for a list in flight. If the report has a failure, [`Engine::recover`] must follow, and the list and those
-    /// submitted after it must be submitted again.
+    /// Waits for a list in flight. If the report has a failure, call [`Engine::recover`], then submit this list and all
+    /// later ones again.
     pub(crate) fn retire(&mut self, flight: &InFlight) -> Result<Report> {
         self.sched.wait(flight.ticket)?;
         self.in_flight[flight.recording.frame] = false;
         self.report(flight.recording.frame)
     }
 
-    /// Waits for all lists in flight; nobody will ask for their reports.
+    /// Waits for all lists in flight and discards their reports.
     pub(crate) fn abandon(&mut self) -> Result<()> {
         self.sched.wait_all()?;
         self.in_flight = [false; FRAMES_IN_FLIGHT];
         Ok(())
     }
 
-    /// Refuses what would lose the reports of lists in flight, and with them that a list has to run again.
+    /// Fails if lists are in flight: their reports, and with them any need to repeat a list, would be lost.
     pub(super) fn check_idle(&self) -> Result<()> {
         match self.in_flight.contains(&true) {
             true => Err(Error::Bug("steps are in flight; wait for them first (Trainer::drain)".to_owned())),
@@ -133,7 +133,7 @@ impl Engine {
         }
     }
 
-    /// What the last list of a frame reports; waits for it.
+    /// Waits for the last list of a frame and returns its report.
     #[doc(hidden)]
     pub fn report(&mut self, frame: usize) -> Result<Report> {
         self.sched.wait_frame(frame)?;
@@ -142,8 +142,8 @@ impl Engine {
         Ok(Report { counters, failure })
     }
 
-    /// Stage, name and nanoseconds of each item of a list that was retired and whose frame was not used again. Empty
-    /// without [timestamps](crate::scheduler::SchedulerOptions::timestamps).
+    /// Stage, name and nanoseconds of each item of a retired list; its frame must not be in use again. Empty without
+    /// [timestamps](crate::scheduler::SchedulerOptions::timestamps).
     pub(crate) fn times(&self, recording: Recording) -> Result<Vec<(Stage, String, u64)>> {
         let times = self.sched.timings(recording.list, recording.frame)?;
         let stages = pass::stage::stages(&self.sched.plan(recording.list)?.list);

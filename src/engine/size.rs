@@ -1,68 +1,68 @@
-//! What the memory of an engine is sized for.
+//! Sizes that the memory of an engine is made for.
 
 use crate::error::{Error, Result};
 use crate::pass::KernelShape;
 use crate::scene::Gaussians;
 
-/// Sizes that labels need.
+/// Sizes of the label buffers.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct LabelSize {
     /// Largest id.
     pub max_label: u32,
-    /// Objects sampled in one step, at most.
+    /// Maximum number of objects sampled in one step.
     pub layers: u32,
-    /// Labels that one sweep of votes counts, 0 without votes.
+    /// Labels that one sweep of votes counts; 0 without votes.
     pub vote_columns: u32,
 }
 
-/// What the memory of an engine is sized for.
+/// Sizes that the memory of an engine is made for.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct EngineSize {
     /// Gaussians.
     pub gaussians: u64,
     /// Largest image, px.
     pub image: (u32, u32),
-    /// Optimiser state and gradients.
+    /// True with optimiser state and gradients.
     pub trained: bool,
-    /// Labels; none for a scene without masks, which then pays nothing for them.
+    /// Sizes for labels; `None` for a scene without masks, which then has no label buffers.
     pub labels: Option<LabelSize>,
-    /// Rows of four parameters that are no Gaussian's.
+    /// Rows of four shared parameters.
     pub shared_rows: u32,
 }
 
 impl EngineSize {
-    /// For rendering so many Gaussians in images of up to `image` px.
+    /// Sizes for rendering this many Gaussians in images of up to `image` px.
     pub const fn new(gaussians: u64, image: (u32, u32)) -> Self {
         Self { gaussians, image, trained: false, labels: None, shared_rows: 0 }
     }
 
-    /// For rendering a model in images of up to the largest of `sizes`, px.
+    /// Sizes for rendering a model in images of up to the largest of `sizes`, px.
     pub fn of_model(model: &Gaussians, sizes: impl Iterator<Item = (u32, u32)>) -> Self {
         let image = sizes.reduce(|a, b| (a.0.max(b.0), a.1.max(b.1))).unwrap_or((1, 1));
         Self::new((model.len() as u64).max(1), image)
     }
 
-    /// The same with optimiser state and gradients.
+    /// Adds optimiser state and gradients.
     pub const fn for_training(self) -> Self {
         Self { trained: true, ..self }
     }
 
-    /// The same with labels, if any are given.
+    /// Sets the sizes for labels, if any.
     pub const fn with_labels(self, labels: Option<LabelSize>) -> Self {
         Self { labels, ..self }
     }
 
-    /// The same with so many rows of four parameters that are no Gaussian's.
+    /// Sets the number of rows of four shared parameters.
     #[doc(hidden)]
     pub const fn with_shared_rows(self, shared_rows: u32) -> Self {
         Self { shared_rows, ..self }
     }
 
-    /// Refuses images of more tiles than the kernels can walk.
+    /// Fails if the image has more tiles than the kernels can walk.
     pub(crate) fn check(&self, shape: &KernelShape) -> Result<()> {
         let (width, height) = self.image;
         let (tiles_x, tiles_y) = shape.tiles(width, height);
-        // A splat may touch every tile, once more in its object's layer, and one loop walks them (65,535 rounds).
+        // A splat may touch every tile twice, with its object's layer. One loop of 65,535 rounds at most walks them.
         let most = if self.labels.is_some() { 32_500 } else { 65_000 };
         if u64::from(tiles_x) * u64::from(tiles_y) <= most {
             return Ok(());
@@ -73,13 +73,13 @@ impl EngineSize {
         Err(Error::usage("max_resolution", problem))
     }
 
-    /// Refuses an image that the buffers have no place for.
+    /// Fails if the image is larger than the buffers.
     pub fn check_image(&self, width: u32, height: u32) -> Result<()> {
         if width <= self.image.0 && height <= self.image.1 {
             return Ok(());
         }
         let problem = format!(
-            "its image has {width} x {height} px, the engine has memory for {} x {} px; call Engine::grow_image first",
+            "the image has {width} x {height} px, but the engine has memory for {} x {} px; call Engine::grow_image first",
             self.image.0, self.image.1
         );
         Err(Error::usage("camera", problem))

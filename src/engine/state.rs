@@ -1,5 +1,5 @@
-//! What of the device's memory a training needs to go on: the Model buffers, as they are. All others start as zeros, here
-//! as in a training that goes on.
+//! Device state that a training needs to continue: the buffers of kind Model, unchanged. All other buffers start at
+//! zero, both in a new and in a continued training.
 
 use super::Engine;
 use crate::error::Result;
@@ -9,8 +9,7 @@ use crate::scheduler::plan::{Buf, TABLE};
 use glam::DVec3;
 use std::collections::BTreeMap;
 
-/// The buffers of the state of a training with this degree of the spherical harmonics, with those that its strategy keeps,
-/// and the rows of each.
+/// Buffers of a training's state, with row counts; `kept` are the buffers that its strategy keeps.
 fn buffers(sh_degree: u32, labels: bool, kept: &[Buf], [count, shared_rows]: [u32; 2]) -> Vec<(Buf, u32)> {
     let attributes = ATTRIBUTES.iter().filter(|a| a.from_degree <= sh_degree).flat_map(|a| a.planes);
     let labels = labels.then_some(Buf::LABELS);
@@ -27,8 +26,8 @@ fn words(buf: Buf) -> u32 {
     TABLE[buf.index()].element_bytes / 4
 }
 
-/// Says what is wrong with planes that are to be the state of so many Gaussians and shared rows. `labels` is true with
-/// masks; `kept` are the names of what the strategy keeps.
+/// Checks that planes form the state of `counts` Gaussians and shared rows. `labels` is true with masks; `kept` names
+/// the buffers that the strategy keeps. The error says what is wrong.
 pub(crate) fn check(
     planes: &[Plane],
     counts: [u32; 2],
@@ -36,25 +35,27 @@ pub(crate) fn check(
     labels: bool,
     kept: &[String],
 ) -> Result<(), String> {
-    let kept = kept.iter().map(|name| named(name).ok_or_else(|| format!("there is no plane {name}")));
+    let kept = kept
+        .iter()
+        .map(|name| named(name).ok_or_else(|| format!("the strategy keeps plane {name}, which does not exist")));
     let kept = kept.collect::<Result<Vec<_>, _>>()?;
     let mut given: BTreeMap<&str, &Plane> = planes.iter().map(|plane| (plane.name.as_str(), plane)).collect();
     for (buf, count) in buffers(sh_degree, labels, &kept, counts) {
         let (name, words) = (TABLE[buf.index()].name, words(buf));
-        let plane = given.remove(name).ok_or_else(|| format!("the plane {name} is missing"))?;
+        let plane = given.remove(name).ok_or_else(|| format!("plane {name} is missing"))?;
         let rows = plane.data.len() as u64 / u64::from(plane.words.max(1));
         if (plane.words, rows) != (words, u64::from(count)) {
             return Err(format!(
-                "the plane {name} has {rows} rows of {} words, {count} of {words} are expected",
+                "plane {name} has {rows} rows of {} words, expected {count} rows of {words} words",
                 plane.words
             ));
         }
     }
-    given.keys().next().map_or(Ok(()), |name| Err(format!("there is a plane {name}, which nothing needs")))
+    given.keys().next().map_or(Ok(()), |name| Err(format!("unexpected plane {name}")))
 }
 
 impl Engine {
-    /// Reads the state with what the strategy keeps; nothing may be in flight.
+    /// Downloads the state, including the buffers that the strategy keeps. No list may be in flight.
     pub(crate) fn download_state(&mut self, kept: &[Buf]) -> Result<Vec<Plane>> {
         let counts = [self.gaussian_count, self.size.shared_rows];
         let planes =
@@ -65,7 +66,7 @@ impl Engine {
         planes.collect()
     }
 
-    /// Puts a state that [`check`] has nothing against into the memory of a new engine.
+    /// Uploads a state that has passed [`check`] to a new engine.
     pub(crate) fn upload_state(&mut self, count: u32, origin: DVec3, planes: &[Plane]) -> Result<()> {
         self.make_room_for_gaussians(u64::from(count))?;
         for plane in planes {

@@ -1,4 +1,4 @@
-//! From a camera to what the shaders read.
+//! Converts a camera to shader uniforms.
 
 use crate::pass::KernelShape;
 use crate::scene::Camera;
@@ -7,7 +7,7 @@ use crate::shaders::structs::StepUniforms;
 use bytemuck::Zeroable;
 use glam::DVec3;
 
-/// The camera's part of the uniforms; everything else is 0. Positions on the device are relative to `origin`.
+/// Returns the camera's part of the uniforms; all other fields are 0. Positions on the device are relative to `origin`.
 pub(crate) fn view_uniforms(
     camera: &Camera,
     origin: DVec3,

@@ -1,4 +1,4 @@
-//! Compiled pipelines that outlive the process, where the driver hands them out (VkPipelineCache).
+//! Compiled pipelines that outlive the process, if the driver returns them (VkPipelineCache).
 
 use super::call::vk_call;
 use super::capabilities::Capabilities;
@@ -6,12 +6,11 @@ use ash::vk;
 use std::fmt::Debug;
 use std::sync::Arc;
 
-/// Where compiled pipelines are kept between runs. Failing at it costs time at the next start and nothing else, so that
-/// neither way returns an error.
+/// Storage of compiled pipelines between runs. A failure only costs time at the next start, so it is no error.
 pub trait PipelineStore: Debug + Send + Sync {
-    /// What was saved for a device, empty if nothing was.
+    /// Returns the saved data of a device; empty if there is none.
     fn load(&self, device: &str) -> Vec<u8>;
-    /// Keeps `data` for the next run.
+    /// Saves `data` for the next run.
     fn save(&self, device: &str, data: &[u8]);
 }
 
@@ -19,13 +18,13 @@ pub trait PipelineStore: Debug + Send + Sync {
 pub(super) struct PipelineCache {
     handle: vk::PipelineCache,
     store: Option<Arc<dyn PipelineStore>>,
-    /// Bytes that came from the store.
+    /// Number of bytes that the store returned.
     loaded: usize,
     device: String,
 }
 
 impl PipelineCache {
-    /// A driver that refuses a cache, or what was in it, does without one.
+    /// If a driver refuses a cache or its saved contents, the engine runs without one.
     pub(super) fn new(
         device: &ash::Device,
         capabilities: &Capabilities,
@@ -35,7 +34,7 @@ impl PipelineCache {
         let data = store.map_or_else(Vec::new, |store| store.load(&name));
         let make = |data: &[u8]| {
             let info = vk::PipelineCacheCreateInfo::default().initial_data(data);
-            // SAFETY: the device is alive. The driver checks the header of the data, the store all of it.
+            // SAFETY: the device is alive. The driver checks the header of the data, the store checks all of it.
             vk_call("vkCreatePipelineCache", || unsafe { device.create_pipeline_cache(&info, None) })
         };
         let handle = make(&data).or_else(|_| make(&[])).unwrap_or_default();
@@ -46,17 +45,17 @@ impl PipelineCache {
         self.handle
     }
 
-    /// Hands new pipelines to the store and frees the cache, whose device is about to go.
+    /// Passes new pipelines to the store and frees the cache; the device is destroyed next.
     pub(super) fn close(&mut self, device: &ash::Device) {
-        // There is none where the driver refused one.
+        // The handle is null if the driver refused a cache.
         if let Some(store) = self.store.as_ref().filter(|_| self.handle != vk::PipelineCache::null()) {
-            // SAFETY: device and cache are alive. A lost device has nothing to hand out.
+            // SAFETY: device and cache are alive. A lost device returns nothing.
             let data = unsafe { device.get_pipeline_cache_data(self.handle) }.unwrap_or_default();
             if !data.is_empty() && data.len() != self.loaded {
                 store.save(&self.device, &data);
             }
         }
-        // SAFETY: no pipeline is being made. Destroying a null handle does nothing.
+        // SAFETY: no pipeline is under construction. Destroying a null handle does nothing.
         unsafe { device.destroy_pipeline_cache(self.handle, None) };
         self.handle = vk::PipelineCache::null();
     }

@@ -1,4 +1,4 @@
-//! The one way to call a Vulkan function that may fail.
+//! Calls Vulkan functions that may fail; all such calls go through here.
 
 use crate::error::{Error, Result};
 use crate::lab::fault::{self, Kind};
@@ -6,7 +6,7 @@ use ash::vk;
 
 /// Calls Vulkan and names the call in the error.
 ///
-/// A [fault](fault) on purpose fails the call without making it.
+/// An injected [fault](fault) fails the call without making it.
 pub(crate) fn vk_call<T>(call: &'static str, function: impl FnOnce() -> ash::prelude::VkResult<T>) -> Result<T> {
     let outcome = match fault(call) {
         Some(result) => Err(result),
@@ -15,7 +15,7 @@ pub(crate) fn vk_call<T>(call: &'static str, function: impl FnOnce() -> ash::pre
     outcome.map_err(|result| error(call, result))
 }
 
-/// The fault that this call meets, if one was asked for.
+/// The injected fault for this call, if any.
 pub(super) fn fault(call: &str) -> Option<vk::Result> {
     let kind = match fault::at(call) {
         None => fault::at("vulkan"),

@@ -1,17 +1,17 @@
-//! What a device is and can do, against what the engine needs.
+//! Properties and features of a device, and the engine's requirements.
 
 use super::limits::Limits;
 use crate::error::{Error, Result};
 use ash::vk;
 
-/// What kind of device it is.
+/// Kind of a device.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum DeviceKind {
     /// A graphics card; preferred.
     Discrete,
-    /// Graphics in the processor.
+    /// A graphics unit inside the processor.
     Integrated,
-    /// A device of a virtual machine.
+    /// A virtual machine's device.
     Virtual,
     /// Unknown.
     Other,
@@ -24,42 +24,42 @@ pub enum DeviceKind {
 pub struct Need {
     /// The feature or limit.
     pub what: &'static str,
-    /// Without it the engine does not run.
+    /// True if the engine does not run without it.
     pub is_required: bool,
-    /// What is needed.
+    /// Needed value.
     pub needed: String,
-    /// What the device has.
+    /// Value of the device.
     pub found: String,
-    /// True if that is enough.
+    /// True if the value suffices.
     pub is_met: bool,
-    /// What it is for.
+    /// Purpose of the feature or limit.
     pub reason: &'static str,
 }
 
-/// The smallest subgroups that there are kernels for.
+/// Smallest subgroup size with kernels.
 pub(crate) const SUBGROUP_MIN: u32 = 8;
-/// The largest ones: a strip of the loss and the longest butterfly have 64 lanes.
+/// Largest subgroup size with kernels: a strip of the loss and the longest butterfly have 64 lanes.
 pub(crate) const SUBGROUP_MAX: u32 = 64;
 
-/// Subgroups of a device.
+/// Subgroup properties of a device.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Subgroup {
-    /// Size of the subgroups of our pipelines.
+    /// Subgroup size of the engine's pipelines.
     pub size: u32,
     /// Smallest size that can be pinned.
     pub min: u32,
     /// Largest size that can be pinned.
     pub max: u32,
-    /// Most subgroups of a workgroup whose size is pinned.
+    /// Maximum number of subgroups per workgroup with a pinned size.
     pub max_per_group: u32,
-    /// True if the size is pinned; else it is the driver's default, which may be another than it tells.
+    /// True if the size is pinned. If false, the driver chooses the size, which may differ from its reported default.
     pub is_pinned: bool,
-    /// Operations in compute shaders.
+    /// Subgroup operations available in compute shaders.
     pub operations: vk::SubgroupFeatureFlags,
 }
 
 impl Subgroup {
-    /// Chooses the size.
+    /// Sets the subgroup size.
     pub(super) fn pin(&mut self, size: Option<u32>) -> Result<()> {
         let Some(size) = size.filter(|&size| size != self.size) else { return Ok(()) };
         let (min, max) = (self.min, self.max);
@@ -76,7 +76,7 @@ impl Subgroup {
     }
 }
 
-/// Features that are switched on where the device has them.
+/// Features that are enabled if the device has them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Features {
     pub(super) memory_model: bool,
@@ -87,42 +87,42 @@ pub(super) struct Features {
     pub(super) full_subgroups: bool,
 }
 
-/// What a device is and can do.
+/// Properties and features of a device.
 #[derive(Clone, Debug)]
 pub struct Capabilities {
     /// Position in the loader's list.
     pub index: usize,
     /// Name of the device.
     pub name: String,
-    /// What kind it is.
+    /// Kind of the device.
     pub kind: DeviceKind,
     /// Vulkan version of the device.
     pub api_version: (u32, u32, u32),
     /// Name of the driver.
     pub driver_name: String,
-    /// Version of the driver, as the driver writes it.
+    /// Version of the driver, in the driver's own format.
     pub driver_info: String,
-    /// Identifies the device across processes.
+    /// Identifier of the device across processes.
     pub uuid: [u8; 16],
     /// Limits.
     pub limits: Limits,
     /// Subgroups.
     pub subgroup: Subgroup,
-    /// Requirements and options, met or not.
+    /// Requirements and optional features, met or not.
     pub needs: Vec<Need>,
     pub(super) features: Features,
     pub(super) queue_family: u32,
-    /// Subgroup size control comes from the extension, not from Vulkan 1.3.
+    /// True if subgroup size control is an extension, not part of Vulkan 1.3.
     pub(super) size_control_is_extension: bool,
 }
 
 impl Capabilities {
-    /// True if the "device" is the host's processor.
+    /// True if the device is the host's processor.
     pub fn is_cpu(&self) -> bool {
         self.kind == DeviceKind::Cpu
     }
 
-    /// The requirements that the device does not meet.
+    /// Requirements that the device does not meet.
     pub fn missing(&self) -> Vec<&Need> {
         self.needs.iter().filter(|need| need.is_required && !need.is_met).collect()
     }

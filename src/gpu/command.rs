@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use crate::error::Result;
 
-/// A primary command buffer with a pool of its own, so that nobody has to agree on who uses the pool.
+/// A primary command buffer with its own pool, so that no other code has to synchronise with it.
 pub(crate) struct CommandBuffer {
     gpu: Arc<Gpu>,
     pool: vk::CommandPool,
@@ -19,14 +19,14 @@ impl CommandBuffer {
         let info = vk::CommandPoolCreateInfo::default()
             .queue_family_index(gpu.capabilities.queue_family)
             .flags(vk::CommandPoolCreateFlags::RESET_COMMAND_BUFFER);
-        // SAFETY: the family is the one the device was created with.
+        // SAFETY: the device was created with this family.
         let pool = vk_call("vkCreateCommandPool", || unsafe { gpu.raw().create_command_pool(&info, None) })?;
         let mut command = Self { gpu: Arc::clone(gpu), pool, handle: vk::CommandBuffer::null() };
         let info = vk::CommandBufferAllocateInfo::default()
             .command_pool(pool)
             .level(vk::CommandBufferLevel::PRIMARY)
             .command_buffer_count(1);
-        // SAFETY: the pool is fresh and ours alone.
+        // SAFETY: the pool is new and used here only.
         let handles = vk_call("vkAllocateCommandBuffers", || unsafe { gpu.raw().allocate_command_buffers(&info) })?;
         command.handle = handles.first().copied().unwrap_or_default();
         Ok(command)
@@ -39,7 +39,7 @@ impl CommandBuffer {
 
 impl Drop for CommandBuffer {
     fn drop(&mut self) {
-        // SAFETY: the scheduler waits for what it submitted before it drops a command buffer; the pool frees it.
+        // SAFETY: the scheduler waits for its submits before it drops a command buffer; the pool frees it.
         unsafe { self.gpu.raw().destroy_command_pool(self.pool, None) };
     }
 }

@@ -1,4 +1,4 @@
-//! Descriptor sets, written once, and the texel views that some of them hold.
+//! Descriptor sets, written once, and their texel views.
 
 use super::Gpu;
 use super::call::vk_call;
@@ -17,7 +17,7 @@ pub(crate) struct BufferView {
 impl BufferView {
     pub(crate) fn new(gpu: &Arc<Gpu>, buffer: &Buffer, format: vk::Format, offset: u64, bytes: u64) -> Result<Self> {
         let info = vk::BufferViewCreateInfo::default().buffer(buffer.raw()).format(format).offset(offset).range(bytes);
-        // SAFETY: the planner aligned the offset and checked the size; all four formats are always offered.
+        // SAFETY: the planner aligned the offset and checked the size; every device supports all four formats.
         let handle = vk_call("vkCreateBufferView", || unsafe { gpu.raw().create_buffer_view(&info, None) })?;
         Ok(Self { gpu: Arc::clone(gpu), handle })
     }
@@ -25,12 +25,12 @@ impl BufferView {
 
 impl Drop for BufferView {
     fn drop(&mut self) {
-        // SAFETY: the scheduler waits for the recordings that use it before it drops them.
+        // SAFETY: the scheduler waits for the recordings with this view before it drops them.
         unsafe { self.gpu.raw().destroy_buffer_view(self.handle, None) };
     }
 }
 
-/// What a descriptor shows.
+/// A resource for a descriptor.
 pub(crate) enum Binding<'a> {
     /// A range of a buffer.
     Storage {
@@ -45,7 +45,7 @@ pub(crate) enum Binding<'a> {
     Texel(&'a BufferView),
 }
 
-/// A pool that holds exactly the sets of one recording.
+/// A pool with exactly the sets of one recording.
 pub(crate) struct DescriptorPool {
     gpu: Arc<Gpu>,
     handle: vk::DescriptorPool,
@@ -63,11 +63,11 @@ impl DescriptorPool {
         Ok(Self { gpu: Arc::clone(gpu), handle })
     }
 
-    /// Allocates a set of the pipeline and writes its bindings, given in the order of the shader's.
+    /// Allocates a set of the pipeline and writes its bindings, in the order of the shader's.
     pub(crate) fn set(&self, pipeline: &Pipeline, bindings: &[Binding<'_>]) -> Result<vk::DescriptorSet> {
         let layouts = [pipeline.set_layout()];
         let info = vk::DescriptorSetAllocateInfo::default().descriptor_pool(self.handle).set_layouts(&layouts);
-        // SAFETY: the pool is ours alone, the layout is alive.
+        // SAFETY: the pool is used here only, and the layout is alive.
         let sets = vk_call("vkAllocateDescriptorSets", || unsafe { self.gpu.raw().allocate_descriptor_sets(&info) })?;
         let set = sets.first().copied().unwrap_or_default();
         let buffers = bindings
@@ -98,7 +98,7 @@ impl DescriptorPool {
             }
         });
         let writes = writes.collect::<Vec<_>>();
-        // SAFETY: the set is fresh and not in use; buffers and views are kept alive by the recording's owner.
+        // SAFETY: the set is new and not in use; the recording's owner keeps buffers and views alive.
         unsafe { self.gpu.raw().update_descriptor_sets(&writes, &[]) };
         Ok(set)
     }
@@ -106,7 +106,7 @@ impl DescriptorPool {
 
 impl Drop for DescriptorPool {
     fn drop(&mut self) {
-        // SAFETY: the scheduler waits for the recordings that use its sets before it drops them.
+        // SAFETY: the scheduler waits for the recordings with these sets before it drops them.
         unsafe { self.gpu.raw().destroy_descriptor_pool(self.handle, None) };
     }
 }

@@ -6,13 +6,13 @@ use super::instance::{Instance, Validation};
 use super::select;
 use crate::error::Result;
 
-/// All devices, and the position of the one that [`Gpu::new`](super::Gpu::new) would take with these options.
+/// Lists all devices, and the position of the one that [`Gpu::new`](super::Gpu::new) picks with these options.
 pub fn devices(options: &GpuOptions) -> Result<(Vec<Capabilities>, Option<usize>)> {
     let instance = Instance::new(Validation::Off)?;
     let mut found: Vec<Capabilities> = select::all(&instance)?.into_iter().map(|(_, device)| device).collect();
     let picked = select::pick(&instance, options.device.as_deref()).ok().map(|(_, device)| device.index);
     for device in &mut found {
-        // A device that cannot do the size keeps its own; opening it would say so.
+        // A device without this subgroup size keeps its own; opening it reports the error.
         let _ = device.subgroup.pin(options.subgroup_size);
     }
     Ok((found, picked))

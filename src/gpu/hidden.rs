@@ -1,4 +1,4 @@
-//! Features that a device has and that are not to be seen, so that tests try out a poorer device on a richer one.
+//! Hides features of a device, so that tests can try out a poorer device on a richer one.
 
 use super::capabilities::{Features, Subgroup};
 use super::limits::Limits;
@@ -6,11 +6,11 @@ use crate::error::{Error, Result};
 use crate::lab;
 use ash::vk;
 
-/// What can be hidden.
+/// Names of features that can be hidden.
 const NAMES: [&str; 8] =
     ["memory_model", "scalar", "timeline", "robust", "size_control", "full_subgroups", "shuffle", "timestamps"];
 
-/// What `LABELGS_HIDE` names, separated by commas.
+/// The names in `LABELGS_HIDE`, separated by commas.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Hidden(Vec<String>);
 
@@ -19,7 +19,9 @@ impl Hidden {
         let Some(text) = lab::var("LABELGS_HIDE") else { return Ok(Self::default()) };
         let names: Vec<String> = text.split(',').filter(|name| !name.is_empty()).map(str::to_owned).collect();
         match names.iter().find(|name| !NAMES.contains(&name.as_str())) {
-            Some(name) => Err(Error::usage("LABELGS_HIDE", format!("{name} is none of {}", NAMES.join(", ")))),
+            Some(name) => {
+                Err(Error::usage("LABELGS_HIDE", format!("{name} is unknown; expected one of {}", NAMES.join(", "))))
+            }
             None => Ok(Self(names)),
         }
     }

@@ -1,4 +1,4 @@
-//! Loader, instance, and the validation layer with its messages.
+//! Loader, instance, and the messages of the validation layer.
 
 use super::call::vk_call;
 use super::lock;
@@ -10,17 +10,17 @@ use std::sync::{Arc, Mutex};
 
 const LAYER: &CStr = c"VK_LAYER_KHRONOS_validation";
 
-/// What the validation layer checks, if it is installed. The layer's modes are used one at a time.
+/// Checks of the validation layer, if it is installed. Only one mode is active at a time.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Validation {
     /// Nothing.
     #[default]
     Off,
-    /// Correct use of the interface.
+    /// Correct use of the API.
     On,
-    /// The same and hazards between commands.
+    /// Also hazards between commands.
     Sync,
-    /// The same and accesses of shaders; slow.
+    /// Also memory accesses of shaders; slow.
     GpuAssisted,
 }
 
@@ -33,7 +33,7 @@ impl std::str::FromStr for Validation {
             "on" | "1" => Ok(Self::On),
             "sync" => Ok(Self::Sync),
             "gpu" => Ok(Self::GpuAssisted),
-            _ => Err(Error::usage("LABELGS_VALIDATION", format!("{text} is none of off, on, sync, gpu"))),
+            _ => Err(Error::usage("LABELGS_VALIDATION", format!("{text} is unknown; expected off, on, sync or gpu"))),
         }
     }
 }
@@ -41,23 +41,23 @@ impl std::str::FromStr for Validation {
 /// A message of the validation layer.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Message {
-    /// Errors are broken rules; the others are warnings.
+    /// True for an error (a broken rule), false for a warning.
     pub is_error: bool,
     /// Name of the rule, such as `VUID-vkCmdDispatch-None-02706`.
     pub id: String,
-    /// What the layer says.
+    /// Text of the message.
     pub text: String,
 }
 
-/// Messages beyond this number are counted by nobody; a broken kernel makes one per invocation.
+/// Messages beyond this number are dropped; a broken kernel makes one per invocation.
 const MESSAGES_KEPT: usize = 1000;
 
-/// The messages of the validation layer; outlives the device, as its end has messages too.
+/// Messages of the validation layer. The log outlives the device, because destroying the device also makes messages.
 #[derive(Clone, Debug, Default)]
 pub struct MessageLog(Arc<Messages>);
 
 impl MessageLog {
-    /// What was said so far.
+    /// All messages so far.
     pub fn messages(&self) -> Vec<Message> {
         lock(&self.0.0).clone()
     }
@@ -71,13 +71,13 @@ struct Messenger {
     handle: vk::DebugUtilsMessengerEXT,
 }
 
-/// An instance, alive as long as anything made from it.
+/// An instance; it outlives everything made from it.
 pub(super) struct Instance {
     instance: ash::Instance,
     messenger: Option<Messenger>,
-    /// The messenger keeps a pointer into it.
+    /// The messenger keeps a pointer to the log.
     log: MessageLog,
-    // Holds the loader library; last, as the functions above live in it.
+    // Owns the loader library; the last field, because the functions above are part of the library.
     _entry: ash::Entry,
 }
 
@@ -91,21 +91,23 @@ impl Instance {
         if fault::at("loader").is_some() {
             return Err(missing(&"a fault on purpose"));
         }
-        // SAFETY: loading the system's Vulkan loader runs its initialisers, as every Vulkan program does.
+        // SAFETY: loading the system's Vulkan loader runs its initialisers, as in every Vulkan program.
         let entry = unsafe { ash::Entry::load() }.map_err(|error| missing(&error))?;
         // SAFETY: no preconditions.
         let version = vk_call("vkEnumerateInstanceVersion", || unsafe { entry.try_enumerate_instance_version() })?;
         let version = version.unwrap_or(vk::API_VERSION_1_0);
         if version < vk::API_VERSION_1_2 {
             let (major, minor) = (vk::api_version_major(version), vk::api_version_minor(version));
-            return Err(Error::NoDevice(format!("the Vulkan loader has version {major}.{minor}, 1.2 is needed")));
+            return Err(Error::NoDevice(format!(
+                "the Vulkan loader has version {major}.{minor}; 1.2 or newer is needed"
+            )));
         }
         let log = MessageLog::default();
         let validated = validation != Validation::Off && has_layer(&entry)?;
         let instance = create(&entry, version.min(vk::API_VERSION_1_3), validation, validated, &log.0)?;
         let messenger = validated.then(|| Messenger::new(&entry, &instance, &log.0)).transpose();
         let messenger = messenger.inspect_err(|_| {
-            // SAFETY: nothing was made from the instance.
+            // SAFETY: no object was made from the instance.
             unsafe { instance.destroy_instance(None) };
         })?;
         Ok(Self { instance, messenger, log, _entry: entry })
@@ -131,10 +133,10 @@ impl Instance {
 impl Drop for Instance {
     fn drop(&mut self) {
         if let Some(messenger) = &self.messenger {
-            // SAFETY: made from this instance, destroyed once.
+            // SAFETY: created by this instance, destroyed once.
             unsafe { messenger.functions.destroy_debug_utils_messenger(messenger.handle, None) };
         }
-        // SAFETY: the device, the only object made from the instance, is gone: its owner holds this.
+        // SAFETY: the device is the only object made from the instance; it is gone, because its owner holds this.
         unsafe { self.instance.destroy_instance(None) };
     }
 }
@@ -189,7 +191,7 @@ fn create(
         ],
     };
     let mut features = vk::ValidationFeaturesEXT::default().enabled_validation_features(enabled);
-    // Messages about the creation and destruction of the instance itself.
+    // For messages about creating and destroying the instance itself.
     let mut early = messenger_info(messages);
     let mut info = vk::InstanceCreateInfo::default()
         .application_info(&application)
@@ -213,10 +215,10 @@ unsafe extern "system" fn on_message(
         if pointer.is_null() {
             return String::new();
         }
-        // SAFETY: the layer passes strings that end with 0.
+        // SAFETY: the layer passes strings with a terminating 0.
         unsafe { CStr::from_ptr(pointer) }.to_string_lossy().into_owned()
     };
-    // SAFETY: `user` is the `Messages` given at creation, which outlives the messenger; `data` is valid in the call.
+    // SAFETY: `user` is the `Messages` given at creation, which outlives the messenger; `data` is valid here.
     let (data, messages) = unsafe { (&*data, &*user.cast::<Messages>()) };
     let is_error = severity.contains(vk::DebugUtilsMessageSeverityFlagsEXT::ERROR);
     let mut messages = lock(&messages.0);

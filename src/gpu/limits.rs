@@ -1,4 +1,4 @@
-//! Limits of a device that decide sizes.
+//! Limits of a device that affect sizes.
 
 use crate::error::{Error, Result};
 use crate::lab;
@@ -18,16 +18,16 @@ pub struct PlanLimits {
     pub max_groups: [u32; 3],
     /// Largest memory allocation (and buffer), in bytes.
     pub max_allocation: u64,
-    /// Storage buffers of one shader.
+    /// Maximum number of storage buffers per shader.
     pub max_storage_buffers: u32,
-    /// Texel buffers of one shader.
+    /// Maximum number of texel buffers per shader.
     pub max_texel_buffers: u32,
-    /// Memory that the engine may use in all, in bytes: part of what the driver says is free, or of the heap.
+    /// Memory that the engine may use in total, in bytes: a share of the driver's free memory, or of the heap.
     pub max_memory: u64,
 }
 
 impl Default for PlanLimits {
-    /// Modest limits that any device the engine runs on is likely to reach, without a bound on all memory.
+    /// Modest limits that every suitable device is likely to reach, without a bound on total memory.
     fn default() -> Self {
         Self {
             max_storage_range: 128 << 20,
@@ -44,34 +44,34 @@ impl Default for PlanLimits {
 }
 
 impl PlanLimits {
-    /// Alignment of every buffer in a page: fit for storage bindings, texel views and cache lines.
+    /// Alignment of every buffer in a page, for storage bindings, texel views and cache lines.
     pub fn alignment(&self) -> u64 {
         self.storage_alignment.max(self.texel_alignment).max(64)
     }
 }
 
-/// What a device can hold and run at most.
+/// Limits of a device.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Limits {
-    /// What plans respect.
+    /// Limits that plans respect.
     pub plan: PlanLimits,
     /// Invocations per axis of a workgroup.
     pub max_group_size: [u32; 3],
-    /// Invocations of a workgroup.
+    /// Maximum invocations per workgroup.
     pub max_invocations: u32,
-    /// Bytes of shared memory of a workgroup.
+    /// Bytes of shared memory per workgroup.
     pub max_shared: u32,
-    /// Size of the device's largest own heap, in bytes.
+    /// Size of the largest device-local heap, in bytes.
     pub heap: u64,
-    /// Nanoseconds of one timestamp tick; 0 if compute queues have no timestamps.
+    /// Nanoseconds per timestamp tick; 0 if compute queues have no timestamps.
     pub timestamp_period: f32,
-    /// Bits of a timestamp that count.
+    /// Number of valid bits in a timestamp.
     pub timestamp_bits: u32,
 }
 
 impl Limits {
-    /// Lowers limits to what `LABELGS_LIMIT_SSBO`, `_TEXELS`, `_ALLOCATION` and `_MEMORY` say (numbers with K, M or G),
-    /// so that tests try out a small device on a large one.
+    /// Lowers limits to the values of `LABELGS_LIMIT_SSBO`, `_TEXELS`, `_ALLOCATION` and `_MEMORY` (numbers with K, M
+    /// or G), so that tests can try out a small device on a large one.
     pub(super) fn lower_by_env(&mut self) -> Result<()> {
         for (name, limit) in [
             ("LABELGS_LIMIT_SSBO", &mut self.plan.max_storage_range),
@@ -80,7 +80,7 @@ impl Limits {
             ("LABELGS_LIMIT_MEMORY", &mut self.plan.max_memory),
         ] {
             if let Some(text) = lab::var(name) {
-                let problem = || Error::usage(name, format!("{text} is no size; a number with K, M or G is expected"));
+                let problem = || Error::usage(name, format!("{text} is not a size; expected a number with K, M or G"));
                 *limit = (*limit).min(parse_size(&text).ok_or_else(problem)?);
             }
         }
@@ -88,7 +88,7 @@ impl Limits {
     }
 }
 
-/// A number with an optional binary unit.
+/// Parses a number with an optional binary unit.
 fn parse_size(text: &str) -> Option<u64> {
     let (digits, shift) = match text.strip_suffix(['K', 'k']) {
         Some(digits) => (digits, 10),

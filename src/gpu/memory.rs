@@ -8,7 +8,7 @@ use gpu_allocator::vulkan::{Allocation, AllocationCreateDesc, AllocationScheme};
 use gpu_allocator::{AllocationError, MemoryLocation};
 use std::sync::Arc;
 
-/// Who uses the memory of a buffer.
+/// Users of a buffer's memory.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum MemoryKind {
     /// The device only.
@@ -37,11 +37,11 @@ impl Buffer {
             | vk::BufferUsageFlags::TRANSFER_SRC
             | vk::BufferUsageFlags::TRANSFER_DST;
         let info = vk::BufferCreateInfo::default().size(bytes).usage(usage);
-        // SAFETY: the device is alive, the size is not 0 (the planner makes room for at least one element).
+        // SAFETY: the device is alive and the size is not 0 (the planner reserves at least one element).
         let handle = vk_call("vkCreateBuffer", || unsafe { gpu.raw().create_buffer(&info, None) })?;
         // From here on, dropping `buffer` destroys the handle.
         let mut buffer = Self { gpu: Arc::clone(gpu), name: name.to_owned(), handle, bytes, allocation: None };
-        // SAFETY: the handle was just made by this device.
+        // SAFETY: this device just created the handle.
         let requirements = unsafe { gpu.raw().get_buffer_memory_requirements(handle) };
         let location = match kind {
             MemoryKind::Device => MemoryLocation::GpuOnly,
@@ -60,7 +60,7 @@ impl Buffer {
         };
         let allocation = allocated.map_err(|error| buffer.refused(error))?;
         let allocation = buffer.allocation.insert(allocation);
-        // SAFETY: fresh memory of the right type and size; nothing else is bound to it or to the buffer.
+        // SAFETY: new memory of the right type and size; nothing else is bound to it or to the buffer.
         vk_call("vkBindBufferMemory", || unsafe {
             gpu.raw().bind_buffer_memory(handle, allocation.memory(), allocation.offset())
         })?;
@@ -79,12 +79,12 @@ impl Buffer {
                 limit: self.gpu.limits().heap,
                 cure: "lower `max_gaussians`, use smaller images or free memory of the device".to_owned(),
             },
-            // The crate tells of some failures by their names alone.
+            // The allocator reports some failures only by name.
             AllocationError::Internal(text) if text.contains("DEVICE_LOST") => {
                 Error::DeviceLost { pass: "unknown".to_owned() }
             }
             AllocationError::Internal(text) => {
-                // The last two are no answers that a driver should give here, and one that does is not this program's fault.
+                // Drivers should not return the last two here; if one does, the driver is at fault, not this program.
                 let known = [
                     vk::Result::ERROR_OUT_OF_HOST_MEMORY,
                     vk::Result::ERROR_TOO_MANY_OBJECTS,
@@ -110,19 +110,18 @@ impl Buffer {
         self.handle
     }
 
-    /// Copies bytes to memory that the host sees. The caller sees to it that the device does not use them meanwhile.
+    /// Copies bytes to host-visible memory. The caller ensures that the device does not use them meanwhile.
     pub(crate) fn write(&self, offset: u64, data: &[u8]) -> Result<()> {
         let to = self.mapped(offset, data.len())?;
-        // SAFETY: `mapped` checked the range; the source is host memory of the same length, and as a Rust slice it does
-        // not overlap memory of the device.
+        // SAFETY: `mapped` checked the range. A Rust slice of the same length cannot overlap device memory.
         unsafe { std::ptr::copy_nonoverlapping(data.as_ptr(), to, data.len()) };
         Ok(())
     }
 
-    /// Copies bytes from memory that the host sees. The caller sees to it that the device does not write them meanwhile.
+    /// Copies bytes from host-visible memory. The caller ensures that the device does not write them meanwhile.
     pub(crate) fn read(&self, offset: u64, data: &mut [u8]) -> Result<()> {
         let from = self.mapped(offset, data.len())?;
-        // SAFETY: as in `write`.
+        // SAFETY: same as in `write`.
         unsafe { std::ptr::copy_nonoverlapping(from.cast_const(), data.as_mut_ptr(), data.len()) };
         Ok(())
     }
@@ -131,9 +130,9 @@ impl Buffer {
         let inside = offset.checked_add(length as u64).is_some_and(|end| end <= self.bytes);
         let pointer = self.allocation.as_ref().and_then(Allocation::mapped_ptr);
         match pointer {
-            // SAFETY: the offset lies in the mapped range, as just checked.
+            // SAFETY: the offset is inside the mapped range, as checked above.
             Some(pointer) if inside => Ok(unsafe { pointer.as_ptr().cast::<u8>().add(offset as usize) }),
-            Some(_) => Err(Error::Bug(format!("{length} bytes at {offset} are outside of {}", self.name))),
+            Some(_) => Err(Error::Bug(format!("{length} bytes at offset {offset} exceed buffer {}", self.name))),
             None => Err(Error::Bug(format!("memory of {} is not visible to the host", self.name))),
         }
     }
@@ -141,10 +140,10 @@ impl Buffer {
 
 impl Drop for Buffer {
     fn drop(&mut self) {
-        // SAFETY: made by this device; the scheduler waits for the device before it drops buffers.
+        // SAFETY: created by this device; the scheduler waits for the device before it drops buffers.
         unsafe { self.gpu.raw().destroy_buffer(self.handle, None) };
         if let (Some(allocation), Some(allocator)) = (self.allocation.take(), lock(&self.gpu.allocator).as_mut()) {
-            // Freeing fails only for memory of another allocator.
+            // Freeing only fails for memory of another allocator.
             let _ = allocator.free(allocation);
         }
     }

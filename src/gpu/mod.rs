@@ -1,8 +1,8 @@
 //! Thin layer over Vulkan: one instance, one device, one compute queue, and owners of the objects made from them.
 //!
-//! Everything that Vulkan asks the caller to guarantee is guaranteed here or in `scheduler/recorder.rs`, so that the rest
-//! of the crate is safe code. Objects hold an `Arc<Gpu>`: no handle outlives its device.
-// Vulkan is a foreign interface: every call is unsafe. This module and the recorder are the only places for it.
+//! This module and `scheduler/recorder.rs` fulfil all guarantees that Vulkan demands of the caller, so the rest of the
+//! crate is safe code. Objects hold an `Arc<Gpu>`: no handle outlives its device.
+// Vulkan calls are foreign functions: every call is unsafe. Only this module and the recorder make them.
 #![allow(unsafe_code)]
 
 mod cache;
@@ -46,29 +46,29 @@ use instance::Instance;
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, MutexGuard};
 
-/// How to open a device.
+/// Options for opening a device.
 #[derive(Clone, Debug, Default)]
 pub struct GpuOptions {
-    /// Index, part of the name, or UUID of the device; the most capable one if none.
+    /// Index, part of the name, or UUID of the device; `None` for the most capable one.
     pub device: Option<String>,
     /// Validation layer.
     pub validation: Validation,
     /// Bounds checks of the driver on every buffer access.
     pub robust_buffer_access: bool,
-    /// Subgroup size to pin; the device's default if none.
+    /// Pinned subgroup size; `None` for the device's default.
     pub subgroup_size: Option<u32>,
-    /// Where compiled pipelines are kept between runs; nowhere if none.
+    /// Storage of compiled pipelines between runs; `None` to keep none.
     pub pipelines: Option<Arc<dyn PipelineStore>>,
 }
 
 impl GpuOptions {
-    /// Options from `LABELGS_DEVICE` and `LABELGS_VALIDATION` (`off`, `on`, `sync`, `gpu`); for tests also from
+    /// Reads options from `LABELGS_DEVICE` and `LABELGS_VALIDATION` (`off`, `on`, `sync`, `gpu`); in tests also from
     /// `LABELGS_SUBGROUP_SIZE`.
     pub fn from_env() -> Result<Self> {
         let set = |name| std::env::var(name).ok().filter(|value| !value.is_empty());
         let validation = set("LABELGS_VALIDATION").map(|value| value.parse()).transpose()?.unwrap_or_default();
         let subgroup_size = lab::var("LABELGS_SUBGROUP_SIZE")
-            .map(|value| value.parse().map_err(|_| Error::usage("LABELGS_SUBGROUP_SIZE", "a whole number is expected")))
+            .map(|value| value.parse().map_err(|_| Error::usage("LABELGS_SUBGROUP_SIZE", "expected a whole number")))
             .transpose()?;
         Ok(Self { device: set("LABELGS_DEVICE"), validation, subgroup_size, ..Self::default() })
     }
@@ -88,13 +88,13 @@ pub struct Gpu {
 }
 
 impl Gpu {
-    /// Opens a device; fails with the list of devices and what each lacks.
+    /// Opens a device. The error lists all devices and the missing features of each.
     pub fn new(options: &GpuOptions) -> Result<Arc<Self>> {
         let instance = Instance::new(options.validation)?;
         let (physical, mut capabilities) = select::pick(&instance, options.device.as_deref())?;
         capabilities.subgroup.pin(options.subgroup_size)?;
         let device = select::open(&instance, physical, &capabilities, options.robust_buffer_access)?;
-        // SAFETY: the family was found on this device, and one queue of it was created with the device.
+        // SAFETY: the device has this family and was created with one queue of it.
         let queue = unsafe { device.get_device_queue(capabilities.queue_family, 0) };
         let allocator = Allocator::new(&AllocatorCreateDesc {
             instance: instance.raw().clone(),
@@ -105,7 +105,7 @@ impl Gpu {
             allocation_sizes: gpu_allocator::AllocationSizes::new(64 << 20, 16 << 20),
         });
         let allocator = allocator.map_err(|error| {
-            // SAFETY: nothing was made from the device yet.
+            // SAFETY: no object was made from the device yet.
             unsafe { device.destroy_device(None) };
             Error::NoDevice(format!("the memory allocator does not start: {error}"))
         })?;
@@ -123,7 +123,7 @@ impl Gpu {
         }))
     }
 
-    /// What the device is and can do.
+    /// Properties and features of the device.
     pub fn capabilities(&self) -> &Capabilities {
         &self.capabilities
     }
@@ -139,7 +139,7 @@ impl Gpu {
         self.capabilities.subgroup.size
     }
 
-    /// True if the "device" is the host's processor.
+    /// True if the device is the host's processor.
     pub fn is_cpu(&self) -> bool {
         self.capabilities.is_cpu()
     }
@@ -149,24 +149,24 @@ impl Gpu {
         self.instance.log().messages()
     }
 
-    /// The log of the validation layer, to be read after the device is gone.
+    /// Log of the validation layer; it can still be read after the device is destroyed.
     pub fn message_log(&self) -> MessageLog {
         self.instance.log().clone()
     }
 
-    /// True if the validation layer was found and is on.
+    /// True if the validation layer is installed and enabled.
     pub fn is_validated(&self) -> bool {
         self.instance.is_validated()
     }
 
-    /// Waits until the device has nothing to do.
+    /// Waits until the device is idle.
     pub(crate) fn wait_idle(&self) -> Result<()> {
         let _queue = lock(&self.queue);
-        // SAFETY: the queue's lock is held, so nothing is submitted meanwhile.
+        // SAFETY: the lock on the queue prevents submits meanwhile.
         vk_call("vkDeviceWaitIdle", || unsafe { self.device.device_wait_idle() })
     }
 
-    /// Submits a command buffer; the timeline reaches `value` when it is done.
+    /// Submits a command buffer; the timeline reaches `value` when the commands are done.
     pub(crate) fn submit(&self, command: &CommandBuffer, timeline: &Timeline, value: u64) -> Result<()> {
         let (commands, semaphores, values) = ([command.raw()], [timeline.raw()], [value]);
         let mut signal = vk::TimelineSemaphoreSubmitInfo::default().signal_semaphore_values(&values);
@@ -177,32 +177,32 @@ impl Gpu {
         vk_call("vkQueueSubmit", || unsafe { self.device.queue_submit(*queue, &[info], vk::Fence::null()) })
     }
 
-    /// The cache that pipelines are made through.
+    /// The cache for new pipelines.
     fn pipeline_cache(&self) -> vk::PipelineCache {
         lock(&self.cache).raw()
     }
 
-    /// The device's functions, for the modules that may be unsafe.
+    /// Functions of the device, for the modules that may use unsafe code.
     pub(crate) fn raw(&self) -> &ash::Device {
         &self.device
     }
 
-    /// Gives an object a name in messages of the validation layer.
+    /// Names an object for messages of the validation layer.
     fn name_object<H: vk::Handle>(&self, handle: H, name: &str) {
         let (Some(names), Ok(name)) = (&self.names, std::ffi::CString::new(name)) else { return };
         let info = vk::DebugUtilsObjectNameInfoEXT::default().object_handle(handle).object_name(&name);
-        // SAFETY: the handle is alive. A failure loses a name and nothing else.
+        // SAFETY: the handle is alive. A failure only loses the name.
         let _ = unsafe { names.set_debug_utils_object_name(&info) };
     }
 }
 
 impl Drop for Gpu {
     fn drop(&mut self) {
-        // A lost device reports an error here; it is destroyed all the same.
+        // A lost device reports an error here; it is destroyed nevertheless.
         let _ = self.wait_idle();
         lock(&self.pipelines).clear();
         lock(&self.cache).close(&self.device);
-        // The allocator frees its blocks with the device's functions, so it goes first.
+        // The allocator frees its blocks through the device's functions, so it is dropped first.
         drop(lock(&self.allocator).take());
         // SAFETY: every object made from the device holds an `Arc` of this, so none is left; pipelines and memory were
         // destroyed above.
@@ -216,7 +216,7 @@ impl std::fmt::Debug for Gpu {
     }
 }
 
-/// A lock that a panic elsewhere does not take away: what these guard is valid between any two statements.
+/// Locks a mutex even after a panic in another thread: the guarded data is valid between any two statements.
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(std::sync::PoisonError::into_inner)
 }

@@ -7,11 +7,11 @@ use crate::shaders::{BindingDesc, BindingKind, ShaderDesc};
 use ash::vk;
 use std::sync::Arc;
 
-/// What makes a pipeline different from others.
+/// Properties that distinguish pipelines.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub(crate) struct PipelineKey {
     name: &'static str,
-    /// Address of the SPIR-V: tests may have two shaders of one name.
+    /// Address of the SPIR-V: tests may have two shaders with the same name.
     spirv: usize,
     spec: Vec<u32>,
     subgroup_size: Option<u32>,
@@ -27,7 +27,7 @@ pub(crate) struct Pipeline {
 }
 
 impl Gpu {
-    /// The pipeline of a shader with these specialisation constants (empty for the defaults), made on first use.
+    /// Returns the pipeline of a shader; creates it on first use. `spec` is empty for the default constants.
     pub(crate) fn pipeline(&self, shader: &'static ShaderDesc, spec: &[u32]) -> Result<Arc<Pipeline>> {
         let spec =
             if spec.is_empty() { shader.spec.iter().map(|constant| constant.default).collect() } else { spec.to_vec() };
@@ -38,12 +38,12 @@ impl Gpu {
         if let Some(pipeline) = lock(&self.pipelines).get(&key) {
             return Ok(Arc::clone(pipeline));
         }
-        // Made outside of the lock: it may take long, and two equal ones do no harm.
+        // Created outside of the lock: this may take long, and two equal pipelines do no harm.
         let pipeline = Arc::new(Pipeline::new(self, shader, &key.spec, subgroup_size)?);
         Ok(Arc::clone(lock(&self.pipelines).entry(key).or_insert(pipeline)))
     }
 
-    /// Width of the workgroup of a shader; fails if it is too large, which drivers answer in their own ways.
+    /// Width of a shader's workgroup. Fails if the workgroup is too large, because drivers differ in their reaction.
     fn check_workgroup(&self, shader: &ShaderDesc, spec: &[u32], subgroup_size: Option<u32>) -> Result<u32> {
         let (size, limits) = (shader.workgroup(spec), self.limits());
         let invocations = size.iter().map(|&count| u64::from(count)).product::<u64>();
@@ -54,11 +54,13 @@ impl Gpu {
             return Ok(size[0]);
         }
         let name = shader.name;
-        Err(Error::NoDevice(format!("shader {name} has workgroups of {size:?}, the device takes {most} invocations")))
+        Err(Error::NoDevice(format!(
+            "shader {name} has workgroups of {size:?}; the device supports at most {most} invocations"
+        )))
     }
 }
 
-/// The error of a kernel that the driver refuses. Errors of memory and of a lost device pass through.
+/// The error for a shader that the driver refuses; errors of memory and a lost device stay as they are.
 fn refused(gpu: &Gpu, shader: &ShaderDesc, error: Error) -> Error {
     if error.is_out_of_memory() || error.is_device_lost() {
         return error;
@@ -74,7 +76,7 @@ impl Pipeline {
     fn new(gpu: &Gpu, shader: &'static ShaderDesc, spec: &[u32], subgroup_size: Option<u32>) -> Result<Self> {
         let width = gpu.check_workgroup(shader, spec, subgroup_size)?;
         let device = gpu.raw().clone();
-        // From here on, dropping `pipeline` destroys what it holds; destroying a null handle does nothing.
+        // From here on, dropping `pipeline` destroys its handles; destroying a null handle does nothing.
         let mut pipeline = Self {
             device,
             shader,
@@ -95,7 +97,7 @@ impl Pipeline {
         let full =
             gpu.capabilities.features.full_subgroups && subgroup_size.is_some_and(|size| width.is_multiple_of(size));
         let made = pipeline.make(gpu.pipeline_cache(), module, spec, subgroup_size, full);
-        // SAFETY: pipelines do not need their modules once they are made.
+        // SAFETY: finished pipelines do not need their modules.
         unsafe { gpu.raw().destroy_shader_module(module, None) };
         made.map_err(|error| refused(gpu, shader, error))?;
         gpu.name_object(pipeline.handle, shader.name);
@@ -122,7 +124,7 @@ impl Pipeline {
         })?;
         let layouts = [self.set_layout];
         let info = vk::PipelineLayoutCreateInfo::default().set_layouts(&layouts);
-        // SAFETY: as above.
+        // SAFETY: same as above.
         self.layout = vk_call("vkCreatePipelineLayout", || unsafe { self.device.create_pipeline_layout(&info, None) })?;
         Ok(())
     }
@@ -156,7 +158,7 @@ impl Pipeline {
             stage = stage.flags(vk::PipelineShaderStageCreateFlags::REQUIRE_FULL_SUBGROUPS);
         }
         let infos = [vk::ComputePipelineCreateInfo::default().stage(stage).layout(self.layout)];
-        // SAFETY: module and layout are alive and made for the same shader; caches synchronise themselves.
+        // SAFETY: module and layout are alive and belong to the same shader; caches synchronise themselves.
         let made = vk_call("vkCreateComputePipelines", || {
             unsafe { self.device.create_compute_pipelines(cache, &infos, None) }.map_err(|(_, result)| result)
         })?;

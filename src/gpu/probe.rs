@@ -1,4 +1,4 @@
-//! The questions behind [`Capabilities`].
+//! Queries that fill [`Capabilities`].
 
 use super::call::vk_call;
 use super::capabilities::{Capabilities, DeviceKind, Features, Need, SUBGROUP_MAX, SUBGROUP_MIN, Subgroup};
@@ -8,7 +8,7 @@ use crate::error::Result;
 use crate::shaders::{self, BindingKind, ShaderDesc};
 use ash::vk;
 
-/// Subgroup operations that the kernels are written with.
+/// Subgroup operations that the kernels use.
 const SUBGROUP_OPERATIONS: vk::SubgroupFeatureFlags = vk::SubgroupFeatureFlags::from_raw(
     vk::SubgroupFeatureFlags::BASIC.as_raw()
         | vk::SubgroupFeatureFlags::ARITHMETIC.as_raw()
@@ -16,9 +16,9 @@ const SUBGROUP_OPERATIONS: vk::SubgroupFeatureFlags = vk::SubgroupFeatureFlags::
 );
 
 impl Capabilities {
-    /// Asks a device.
+    /// Queries a device.
     pub(super) fn probe(instance: &ash::Instance, index: usize, physical: vk::PhysicalDevice) -> Result<Self> {
-        // SAFETY: the handle comes from this instance; here and below the structs match the device's version.
+        // SAFETY: the handle belongs to this instance; here and below, the structs match the device's version.
         let core = unsafe { instance.get_physical_device_properties(physical) };
         let version = core.api_version;
         let api_version =
@@ -77,11 +77,11 @@ impl Capabilities {
     }
 }
 
-/// Features of the device that we know of.
+/// Queries the known features of the device.
 fn features(instance: &ash::Instance, physical: vk::PhysicalDevice, size_control: bool) -> Features {
     let mut twelve = vk::PhysicalDeviceVulkan12Features::default();
     let mut control = vk::PhysicalDeviceSubgroupSizeControlFeatures::default();
-    // SAFETY: the handle comes from this instance.
+    // SAFETY: the handle belongs to this instance.
     let version = unsafe { instance.get_physical_device_properties(physical) }.api_version;
     let mut all = vk::PhysicalDeviceFeatures2::default();
     if version >= vk::API_VERSION_1_2 {
@@ -90,7 +90,7 @@ fn features(instance: &ash::Instance, physical: vk::PhysicalDevice, size_control
     if size_control {
         all = all.push_next(&mut control);
     }
-    // SAFETY: the chained structs are known to the device's version and extensions.
+    // SAFETY: the device's version and extensions support the chained structs.
     unsafe { instance.get_physical_device_features2(physical, &mut all) };
     let core = all.features;
     let on = |flag: vk::Bool32| flag == vk::TRUE;
@@ -104,25 +104,25 @@ fn features(instance: &ash::Instance, physical: vk::PhysicalDevice, size_control
     }
 }
 
-/// The queue family to use: one that computes without drawing, as it is the least busy, else any that computes.
+/// Picks the queue family: one with compute but without graphics, because it is least busy; else any with compute.
 fn compute_family(families: &[vk::QueueFamilyProperties]) -> Option<(u32, vk::QueueFamilyProperties)> {
     let computes = |family: &&(u32, vk::QueueFamilyProperties)| family.1.queue_flags.contains(vk::QueueFlags::COMPUTE);
     let numbered = families.iter().enumerate().map(|(index, family)| (index as u32, *family)).collect::<Vec<_>>();
     let draws = |family: &&(u32, vk::QueueFamilyProperties)| family.1.queue_flags.contains(vk::QueueFlags::GRAPHICS);
-    // A family without timestamps is only taken if there is no other.
+    // A family without timestamps is the last choice.
     let rank =
         |family: &&(u32, vk::QueueFamilyProperties)| (family.1.timestamp_valid_bits == 0, draws(family), family.0);
     numbered.iter().filter(computes).min_by_key(rank).copied()
 }
 
-/// Size of the largest heap of the device, and how much of it we may use.
+/// Size of the device's largest heap, and the part of it that the engine may use.
 fn memory(instance: &ash::Instance, physical: vk::PhysicalDevice, has_budget: bool) -> (u64, u64) {
     let mut budget = vk::PhysicalDeviceMemoryBudgetPropertiesEXT::default();
     let mut all = vk::PhysicalDeviceMemoryProperties2::default();
     if has_budget {
         all = all.push_next(&mut budget);
     }
-    // SAFETY: the handle comes from this instance, and the chained struct is known to the device.
+    // SAFETY: the handle belongs to this instance, and the device supports the chained struct.
     unsafe { instance.get_physical_device_memory_properties2(physical, &mut all) };
     let heaps = all.memory_properties;
     let local = |heap: &vk::MemoryHeap| heap.flags.contains(vk::MemoryHeapFlags::DEVICE_LOCAL);
@@ -130,12 +130,12 @@ fn memory(instance: &ash::Instance, physical: vk::PhysicalDevice, has_budget: bo
     let Some((index, heap)) = heaps.filter(|(_, heap)| local(heap)).max_by_key(|(_, heap)| heap.size) else {
         return (0, 0);
     };
-    // Beyond its budget a driver may swap, slow down or lose the device, so a part stays free.
+    // Beyond its budget, a driver may swap, slow down or lose the device, so a part stays free.
     let free = if has_budget { budget.heap_budget[index].min(heap.size) } else { heap.size };
     (heap.size, free / 100 * 90)
 }
 
-/// Limits in our words.
+/// Converts the limits.
 fn limits(
     core: &vk::PhysicalDeviceLimits,
     eleven: &vk::PhysicalDeviceVulkan11Properties<'_>,
@@ -171,7 +171,7 @@ fn limits(
     }
 }
 
-/// Subgroups in our words.
+/// Converts the subgroup properties.
 fn subgroup(
     eleven: &vk::PhysicalDeviceVulkan11Properties<'_>,
     control: &vk::PhysicalDeviceSubgroupSizeControlProperties<'_>,
@@ -196,7 +196,7 @@ fn subgroup(
     }
 }
 
-/// Requirements and options against what was found.
+/// Compares the requirements and optional features with the device.
 fn needs(found: &Capabilities, has_queue: bool) -> Vec<Need> {
     let (limits, features, subgroup) = (&found.limits, &found.features, &found.subgroup);
     let (major, minor, patch) = found.api_version;
@@ -226,7 +226,7 @@ fn needs(found: &Capabilities, has_queue: bool) -> Vec<Need> {
     needs
 }
 
-/// What the engine runs without, at a price.
+/// Optional features; without them, the engine runs with a drawback.
 fn wishes(limits: &Limits, subgroup: &Subgroup) -> [Need; 3] {
     let wish = |what, is_met, found: String, reason| Need {
         is_required: false,

@@ -29,11 +29,11 @@ impl QueryPool {
         self.count
     }
 
-    /// Nanoseconds from each timestamp to the next; the command buffer must have finished.
+    /// Nanoseconds between successive timestamps; the command buffer must have finished.
     pub(crate) fn intervals(&self) -> Result<Vec<u64>> {
         let mut ticks = vec![0_u64; self.count as usize];
         let flags = vk::QueryResultFlags::TYPE_64 | vk::QueryResultFlags::WAIT;
-        // SAFETY: the pool has as many queries as the slice has room for.
+        // SAFETY: the slice has room for all queries of the pool.
         vk_call("vkGetQueryPoolResults", || unsafe {
             self.gpu.raw().get_query_pool_results(self.handle, 0, &mut ticks, flags)
         })?;
@@ -50,7 +50,7 @@ impl QueryPool {
 
 impl Drop for QueryPool {
     fn drop(&mut self) {
-        // SAFETY: the scheduler waits for the recordings that use it before it drops them.
+        // SAFETY: the scheduler waits for the recordings with this pool before it drops them.
         unsafe { self.gpu.raw().destroy_query_pool(self.handle, None) };
     }
 }

@@ -1,4 +1,4 @@
-//! Choice of the physical device, and its opening.
+//! Chooses and opens the physical device.
 
 use super::call::vk_call;
 use super::capabilities::Capabilities;
@@ -14,17 +14,17 @@ pub(super) fn all(instance: &Instance) -> Result<Vec<(vk::PhysicalDevice, Capabi
     devices.into_iter().enumerate().map(probe).collect()
 }
 
-/// The device that was asked for by index, UUID or part of its name; else the best that meets the requirements.
+/// Picks a device by index, UUID or part of its name; by default the best that meets the requirements.
 pub(super) fn pick(instance: &Instance, wanted: Option<&str>) -> Result<(vk::PhysicalDevice, Capabilities)> {
     let mut devices = all(instance)?;
     let listing = devices.iter().map(|(_, device)| line(device)).collect::<Vec<_>>().join("; ");
     if devices.is_empty() {
-        return Err(Error::NoDevice("the Vulkan loader knows no device; install a Vulkan driver".to_owned()));
+        return Err(Error::NoDevice("the Vulkan loader found no device; install a Vulkan driver".to_owned()));
     }
     if let Some(wanted) = wanted {
         devices.retain(|(_, device)| matches(device, wanted));
         if devices.is_empty() {
-            return Err(Error::NoDevice(format!("none is called {wanted}; there are {listing}")));
+            return Err(Error::NoDevice(format!("none matches {wanted}; found: {listing}")));
         }
     }
     devices.retain(|(_, device)| device.missing().is_empty());
@@ -48,7 +48,7 @@ fn line(device: &Capabilities) -> String {
     format!("{}: {}, {lacks}", device.index, device.name)
 }
 
-/// Creates the logical device with one compute queue and what it has of the features we know.
+/// Creates the logical device with one compute queue and the known features that the device has.
 pub(super) fn open(
     instance: &Instance,
     physical: vk::PhysicalDevice,
@@ -82,7 +82,7 @@ pub(super) fn open(
     if features.size_control {
         info = info.push_next(&mut control);
     }
-    // SAFETY: every feature and extension was found on the device; all pointers live until the call returns.
+    // SAFETY: the device has every feature and extension in the list; all pointers live until the call returns.
     let created = vk_call("vkCreateDevice", || unsafe { instance.raw().create_device(physical, &info, None) });
     created.map_err(|error| Error::NoDevice(format!("{} cannot be opened: {error}", capabilities.name)))
 }

@@ -1,4 +1,4 @@
-//! Timeline semaphores: a number that grows as submits finish.
+//! Timeline semaphores: a counter that grows as submits finish.
 
 use super::Gpu;
 use super::call::vk_call;
@@ -16,7 +16,7 @@ impl Timeline {
     pub(crate) fn new(gpu: &Arc<Gpu>) -> Result<Self> {
         let mut kind = vk::SemaphoreTypeCreateInfo::default().semaphore_type(vk::SemaphoreType::TIMELINE);
         let info = vk::SemaphoreCreateInfo::default().push_next(&mut kind);
-        // SAFETY: the feature is on, it is required of every device.
+        // SAFETY: every device must have this feature, and it is enabled.
         let handle = vk_call("vkCreateSemaphore", || unsafe { gpu.raw().create_semaphore(&info, None) })?;
         Ok(Self { gpu: Arc::clone(gpu), handle })
     }
@@ -36,7 +36,7 @@ impl Timeline {
 
 impl Drop for Timeline {
     fn drop(&mut self) {
-        // SAFETY: the scheduler waits for what it submitted before it drops its timeline.
+        // SAFETY: the scheduler waits for its submits before it drops its timeline.
         unsafe { self.gpu.raw().destroy_semaphore(self.handle, None) };
     }
 }

@@ -1,19 +1,19 @@
-//! Faults on purpose, so that every failure can be tested: in a build with the feature `lab` the environment variable
-//! `LABELGS_FAULT=SITE:N:KIND` makes the N-th event of a site fail; with `:COUNT` behind it, so many from there on. Several
-//! stand with commas between.
+//! Injected faults, so that every failure can be tested. In a build with the feature `lab`, the environment variable
+//! `LABELGS_FAULT=SITE:N:KIND` makes the N-th event of a site fail; `SITE:N:KIND:COUNT` makes COUNT events fail from
+//! there on. Commas separate several faults.
 //!
 //! | site | events | kinds |
 //! | --- | --- | --- |
 //! | a Vulkan call, such as `vkQueueSubmit` | its calls | `DEVICE_LOST`, `HOST_MEMORY`, `DEVICE_MEMORY`, `INITIALIZATION` |
 //! | `vulkan` | all Vulkan calls that can fail | the same |
-//! | `write` | what is done to write files: making, writing, syncing, renaming | `NO_SPACE`, `IO`, `SHORT`, `INTERRUPTED` |
-//! | `read` | what is done to read files: opening, reading, listing a folder | `IO`, `SHORT`, `INTERRUPTED` |
+//! | `write` | operations on a file to write: create, write, sync, rename | `NO_SPACE`, `IO`, `SHORT`, `INTERRUPTED` |
+//! | `read` | operations on a file to read: open, read, list a folder | `IO`, `SHORT`, `INTERRUPTED` |
 //! | `loader` | loading Vulkan | any |
-//! | `nan` | steps of a training | `NUMBER`: a Gaussian gets a position that is none |
+//! | `nan` | steps of a training | `NUMBER`: a Gaussian gets a NaN position |
 //! | any | | `SLOW`: the event takes a minute |
 //!
-//! `SHORT` and `INTERRUPTED` are what every system may do at any time: a part is read or written, or nothing, and the call
-//! has to be made again. They may change nothing.
+//! Every system may cause `SHORT` and `INTERRUPTED` at any time: it transfers only a part or nothing, and the call must
+//! be repeated. They must not change any result.
 
 use std::io;
 use std::ops::Range;
@@ -21,14 +21,14 @@ use std::sync::OnceLock;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
-/// What a fault does.
+/// Effect of a fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Kind {
     /// The device is lost.
     DeviceLost,
-    /// The host has no memory.
+    /// The host is out of memory.
     HostMemory,
-    /// The device has no memory.
+    /// The device is out of memory.
     DeviceMemory,
     /// The driver cannot start.
     Initialization,
@@ -36,26 +36,26 @@ pub(crate) enum Kind {
     NoSpace,
     /// The disk fails.
     Io,
-    /// One byte is read or written, whatever was asked for.
+    /// Only one byte is read or written.
     Short,
-    /// A signal came first.
+    /// A signal interrupts the call.
     Interrupted,
-    /// A number is none.
+    /// A value becomes NaN.
     Number,
-    /// Nothing fails, but takes a minute.
+    /// The event takes a minute, but succeeds.
     Slow,
 }
 
 struct Fault {
     site: String,
-    /// Events that are to fail.
+    /// Events that fail.
     events: Range<u64>,
-    /// Events so far.
+    /// Number of events so far.
     seen: AtomicU64,
     kind: Kind,
 }
 
-/// The fault that this event of a site meets, if one was asked for.
+/// The fault that is set for this event of a site, if any.
 #[inline(always)]
 pub(crate) fn at(site: &str) -> Option<Kind> {
     if super::ON { asked(site) } else { None }
@@ -68,13 +68,13 @@ fn asked(site: &str) -> Option<Kind> {
         let read = |text: &str| {
             let fault = parse(text);
             if fault.is_none() {
-                tracing::warn!("LABELGS_FAULT: {text} is not SITE:N:KIND or SITE:N:KIND:COUNT, nothing will fail");
+                tracing::warn!("LABELGS_FAULT: {text} is ignored; expected SITE:N:KIND or SITE:N:KIND:COUNT");
             }
             fault
         };
         text.split(',').filter(|text| !text.is_empty()).filter_map(read).collect()
     });
-    // All of them count this event, also those behind one that it meets.
+    // Every fault of the site counts this event, also those after the first match.
     let met =
         |fault: &&Fault| fault.site == site && fault.events.contains(&(fault.seen.fetch_add(1, Ordering::Relaxed) + 1));
     let kind = faults.iter().filter(met).last()?.kind;
@@ -86,7 +86,7 @@ fn asked(site: &str) -> Option<Kind> {
     Some(kind)
 }
 
-/// The fault of a transfer of bytes from or to a file. True if only a part may be transferred.
+/// Applies a fault to a transfer of bytes from or to a file. Returns true if only a part may be transferred.
 pub(crate) fn of_transfer(site: &str) -> io::Result<bool> {
     match at(site) {
         Some(Kind::NoSpace) => Err(io::ErrorKind::StorageFull.into()),
@@ -97,7 +97,7 @@ pub(crate) fn of_transfer(site: &str) -> io::Result<bool> {
     }
 }
 
-/// The fault of any other step with a file, which is done whole or fails.
+/// Applies a fault to any other file operation, which succeeds or fails as a whole.
 pub(crate) fn of_file(site: &str) -> io::Result<()> {
     match of_transfer(site) {
         Err(error) if error.kind() == io::ErrorKind::Interrupted => Ok(()),

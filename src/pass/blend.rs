@@ -1,4 +1,4 @@
-//! Blending of the tiles, forward and backward. Lists that are too long for one dispatch are walked in segments.
+//! Blends the tiles, forward and backward. A list that is too long for one dispatch is walked in segments.
 
 use super::build::{Builder, args};
 use super::project::GAUSSIAN_FROM_SPLAT;
@@ -6,12 +6,12 @@ use crate::pass::build::pass;
 use crate::scheduler::plan::{Buf, Stage};
 use crate::shaders::constants;
 
-/// Blends all tiles front to back; with labels also the object layers and their loss, and the lift if it is asked for.
+/// Blends all tiles front to back; with labels also the object layers and their loss; with `lift` also the labels.
 pub(super) fn blend_forward(b: &mut Builder, pairs: Buf, lift: bool) {
     forward(b, pairs, false, lift);
 }
 
-/// Blends all tiles of the scene and keeps the main Gaussian of each pixel, its weight, and depth.
+/// Blends all tiles of the scene; writes the main Gaussian of each pixel, its weight, and the depth.
 pub(super) fn blend_forward_main(b: &mut Builder, pairs: Buf) {
     forward(b, pairs, true, false);
 }
@@ -33,7 +33,7 @@ fn forward(b: &mut Builder, pairs: Buf, main: bool, lift: bool) {
     }
 }
 
-/// Walks all tiles back to front and writes a gradient record per (splat, tile) pair.
+/// Walks all tiles back to front and writes one gradient record per (splat, tile) pair.
 pub(super) fn blend_backward(b: &mut Builder, pairs: Buf) {
     let segments = b.segments();
     b.list.stage = Stage::BlendBackward;

@@ -1,22 +1,22 @@
-//! What the pass families share while a list is put together.
+//! Builds a pass list; all pass families use it.
 
 use super::KernelShape;
 use crate::scheduler::plan::{Buf, Capacity, Grid, PassDecl, PassList};
 use crate::shaders::{Compiled, ShaderDesc, constants};
 
-/// A list in the making.
+/// A pass list under construction.
 pub struct Builder<'a> {
     /// Shape of the kernels.
     pub shape: &'a KernelShape,
-    /// Capacities, for grids and limits that are recorded.
+    /// Capacities; recorded grids and limits follow from them.
     pub capacity: &'a Capacity,
-    /// The scene knows labels: object layers exist.
+    /// True if object layers exist.
     pub labels: bool,
     /// Active degree of the spherical harmonics.
     pub sh_degree: u32,
-    /// Blending counts the pairs that have a weight.
+    /// True if the blend passes count the pairs with a weight.
     pub counts: bool,
-    /// The list.
+    /// The list so far.
     pub list: PassList,
 }
 
@@ -34,17 +34,16 @@ pub enum Count {
 }
 
 impl Builder<'_> {
-    /// Dispatches that walk the longest list of a tile, at least one.
+    /// Number of dispatches that walk the longest list of a tile, at least 1.
     pub fn segments(&self) -> u32 {
         self.capacity.segments.max(1) as u32
     }
 
-    /// Appends a pass: what [`pass!`](crate::pass) expands to. Of the named buffers and constants the variant takes those
-    /// that it has.
+    /// Appends a pass; [`pass!`](crate::pass) expands to this call. Skips buffers and constants that the variant lacks.
     ///
     /// # Panics
     ///
-    /// If the kernel is not compiled with these macros.
+    /// If the kernel has no variant with these macros.
     pub fn pass(
         &mut self,
         kernel: &'static [Compiled],
@@ -61,7 +60,7 @@ impl Builder<'_> {
     }
 }
 
-/// The variant with these macros, and with `TEXEL` if that is wished and the kernel fetches.
+/// Finds the variant with these macros; adds `TEXEL` if `texel` is set and the kernel reads texels.
 fn variant(kernel: &'static [Compiled], mut macros: Vec<&str>, texel: bool) -> &'static ShaderDesc {
     let find = |macros: &[&str]| kernel.iter().find(|compiled| compiled.macros == macros);
     macros.sort_unstable();
@@ -76,17 +75,17 @@ fn value<T: Copy>(named: &[(&str, T)], wanted: &str) -> Option<T> {
     named.iter().find(|(name, _)| *name == wanted).map(|(_, value)| *value)
 }
 
-/// An indirect grid at one of the `ARGS_` words of `dispatch_args`.
+/// An indirect grid, read from one of the `ARGS_` words of `dispatch_args`.
 pub(crate) fn args(word: u32) -> Grid {
     Grid::Indirect(Buf::DISPATCH_ARGS, word * 4)
 }
 
-/// Grid over the Gaussians, 64 a workgroup.
+/// Grid over the Gaussians, 64 per workgroup.
 pub(crate) fn over_gaussians() -> Grid {
     args(constants::ARGS_GAUSSIANS)
 }
 
-/// Grid over the visible splats, 64 a workgroup.
+/// Grid over the visible splats, 64 per workgroup.
 pub(crate) fn over_splats() -> Grid {
     args(constants::ARGS_SPLATS)
 }
@@ -94,10 +93,10 @@ pub(crate) fn over_splats() -> Grid {
 /// Grid of one workgroup.
 pub(crate) const ONE: Grid = Grid::Groups(1, 1, 1);
 
-/// `pass!(builder, file(macro: bool, ..) { binding: BUF, .. } [constant: value, ..], grid)`: declares a pass of a kernel.
+/// `pass!(builder, file(macro: bool, ..) { binding: BUF, .. } [constant: value, ..], grid)`: declares a kernel's pass.
 ///
-/// Every binding that some sibling of the file has is named. Constants that are not named come from the shape, or are the
-/// defaults of the GLSL; macros that are not named are off.
+/// Name every binding that any variant of the file uses. Constants without a value come from the shape or from the
+/// defaults in GLSL; unnamed macros are off.
 macro_rules! pass {
     ($b:expr, $file:ident $(($($macro:ident: $on:expr),*))? { $($name:ident: $buf:expr),* $(,)? }
         [$($constant:ident: $value:expr),* $(,)?], $grid:expr) => {{
@@ -124,7 +123,7 @@ mod tests {
         assert_eq!(name(&[], false), "blend_forward");
         assert_eq!(name(&["SEGMENTED", "LABELS"], false), "blend_forward_labels_segmented");
         assert_eq!(name(&["MAIN"], true), "blend_forward_main_texel");
-        // A kernel that fetches nothing has no variant of its own for texels.
+        // A kernel without texel reads has no `TEXEL` variant.
         assert_eq!(variant(&crate::shaders::radix_scan::VARIANTS, Vec::new(), true).name, "radix_scan");
     }
 

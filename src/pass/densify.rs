@@ -1,4 +1,4 @@
-//! Clone, split and prune on the device: mark and count, then rewrite every attribute in a new order.
+//! Clones, splits and prunes on the device: marks and counts Gaussians, then rewrites attributes in the new order.
 
 use super::build::{Builder, Count, args, over_gaussians};
 use super::optimize::ATTRIBUTES;
@@ -6,7 +6,7 @@ use super::scan::{self, Total};
 use crate::pass::build::pass;
 use crate::scheduler::plan::{Buf, Stage};
 
-/// Decides for each Gaussian and counts the result.
+/// Decides the fate of each Gaussian and counts the result.
 pub(super) fn mark(b: &mut Builder) {
     b.list.stage = Stage::Optimise;
     pass!(b, densify_mark {

@@ -1,16 +1,16 @@
-//! Sum of the gradient records of each splat; no atomics, so every run gives the same bits.
+//! Sums the gradient records of each splat without atomics, so that every run gives the same bits.
 
 use super::build::{Builder, over_splats};
 use super::project::GAUSSIAN_FROM_SPLAT;
 use crate::pass::build::pass;
 use crate::scheduler::plan::{Buf, Stage};
 
-/// Adds up the records and notes the densification statistic.
+/// Sums the records and updates the densification statistic.
 pub(super) fn gather(b: &mut Builder) {
     records(b, b.labels, false);
 }
 
-/// Adds up the records of an object's splats, which densification does not see.
+/// Sums the records of one object's splats; the densification statistic ignores them.
 #[cfg(feature = "lab")]
 pub(super) fn gather_object(b: &mut Builder) {
     records(b, false, true);

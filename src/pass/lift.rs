@@ -1,4 +1,4 @@
-//! Labels from masks: the lift of a step, whose votes `blend_forward_labels` casts, and the votes of whole sweeps.
+//! Labels from masks: the lift of a step (`blend_forward_labels` casts its votes), and sweeps of votes over all views.
 
 use super::build::{Builder, args, over_gaussians};
 use super::project::GAUSSIAN_FROM_SPLAT;
@@ -6,7 +6,7 @@ use crate::pass::build::pass;
 use crate::scheduler::plan::{Buf, Stage};
 use crate::shaders::constants;
 
-/// The highest vote of this step becomes the label of its Gaussian.
+/// Gives each Gaussian the label with the highest vote of this step.
 pub(super) fn resolve(b: &mut Builder) {
     b.list.stage = Stage::Labels;
     pass!(b, lift_resolve {
@@ -14,7 +14,7 @@ pub(super) fn resolve(b: &mut Builder) {
     } [], over_gaussians());
 }
 
-/// Adds the weights of all contributors to the votes for the labels of their pixels.
+/// Adds the weight of every contributor to the vote for its pixel's label.
 pub(super) fn vote(b: &mut Builder, pairs: Buf, rounds: u32) {
     let segments = b.segments();
     b.list.stage = Stage::Labels;

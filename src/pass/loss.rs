@@ -1,4 +1,4 @@
-//! L1 and D-SSIM against the photo: value and gradient by the image, separable and without barriers.
+//! L1 and D-SSIM against the photo: value and gradient. The filter is separable and needs no barriers.
 
 use super::build::{Builder, ONE};
 use crate::pass::build::pass;
@@ -24,7 +24,7 @@ pub(crate) fn photo_loss(b: &mut Builder, width: u32, height: u32) {
     reduce(b, partials(b.shape.subgroup, width, height));
 }
 
-/// Sums up the label loss of the layers alone.
+/// Sums the label loss of the layers, without the photo loss.
 #[cfg(feature = "lab")]
 pub(crate) fn label_loss(b: &mut Builder) {
     b.list.stage = Stage::Loss;
@@ -38,7 +38,7 @@ fn reduce(b: &mut Builder, partials: u32) {
     } [layer_tile_capacity: layer_tiles, partials: partials], ONE);
 }
 
-/// Partial loss sums of an image: one for each subgroup of each strip.
+/// Number of partial loss sums of an image: one for each subgroup of each strip.
 pub(crate) fn partials(subgroup: u32, width: u32, height: u32) -> u32 {
     width.div_ceil(64) * (64 / subgroup) * height.div_ceil(STRIP)
 }

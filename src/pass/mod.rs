@@ -1,6 +1,6 @@
-//! What the engine does, as lists of GPU passes. Declares, never records.
+//! The work of the engine as lists of GPU passes. This module declares passes; the scheduler records them.
 //!
-//! [`training_step`] is the table of contents of the engine.
+//! Start with [`training_step`]: it lists all stages of a step.
 
 mod blend;
 pub(crate) mod build;
@@ -29,43 +29,44 @@ use crate::scheduler::plan::{Buf, Capacity, PassList};
 
 pub use crate::scheduler::plan::Stage;
 
-/// What a recorded list depends on.
+/// Options of a training step; each combination has its own recording.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Variant {
-    /// Object layers are in the list.
+    /// The step has object layers.
     pub labels: bool,
-    /// So is the paper's lift of labels from the view; only with `labels`.
+    /// The step lifts labels from the view's mask, as in the paper; needs `labels`.
     pub lift: bool,
     /// Active degree of the spherical harmonics.
     pub sh_degree: u32,
-    /// Largest image, px; bounds the grids of the loss.
+    /// Largest image, px; the grids of the loss cover it.
     pub size: (u32, u32),
-    /// Parameters are updated at the end.
+    /// The step ends with an update of the parameters.
     pub update: bool,
-    /// The (pixel, splat) pairs that have a weight are counted, which takes time.
+    /// The step counts (pixel, splat) pairs with a weight, which costs time.
     pub counts: bool,
 }
 
-/// Where a training step can be extended.
+/// Points where an extension can add passes to a training step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Hook {
-    /// Behind blend_forward: the picture is known. What is changed in it must be undone at [`Hook::Loss`].
+    /// After `blend_forward`: the picture is complete. [`Hook::Loss`] must undo any change of it.
     Picture,
-    /// Behind the photo loss: its gradient by the picture is known, and may be changed.
+    /// After the photo loss: its gradient with respect to the picture is complete and may be changed.
     Loss,
-    /// Behind project_backward: the gradients of the visible Gaussians are known.
+    /// After `project_backward`: the gradients of the visible Gaussians are complete.
     Gradients,
-    /// Behind Adam, in steps that update the parameters.
+    /// After Adam, in steps that update the parameters.
     Updated,
 }
 
-/// What a strategy, or whoever has [shared parameters](SHARED_PLANES), changes in training steps. `passes` is a number of its own, from 1: each has its recording.
+/// Changes to training steps, by a strategy or an owner of shared parameters. `passes` numbers the variants of the
+/// extension from 1; each variant has its own recording.
 pub trait Extension: std::fmt::Debug + Send + Sync {
-    /// Adds passes.
+    /// Adds passes at a hook.
     fn extend(&self, _passes: u32, _hook: Hook, _b: &mut Builder) {}
 
-    /// True if Adam moves Gaussians that the step does not show, whose gradient is 0, as 3DGS does. Otherwise they and
-    /// their moments stay as they are.
+    /// Returns true if Adam also moves Gaussians outside the view, whose gradient is 0, as 3DGS does. Otherwise those
+    /// Gaussians and their moments stay unchanged.
     fn updates_unseen(&self, _passes: u32) -> bool {
         true
     }
@@ -93,7 +94,7 @@ pub fn training_step(shape: &KernelShape, capacity: &Capacity, variant: Variant)
     extended_step(shape, capacity, variant, (&(), 0))
 }
 
-/// The same with what an extension adds under some number.
+/// One optimiser step with the passes of an extension's variant.
 pub(crate) fn extended_step(
     shape: &KernelShape,
     capacity: &Capacity,
@@ -133,7 +134,7 @@ pub fn render_view(shape: &KernelShape, capacity: &Capacity, sh_degree: u32) -> 
     end(b)
 }
 
-/// What one view says about the label of every Gaussian; a tile is walked `rounds` times, four labels each.
+/// Votes of one view for the label of every Gaussian. Each tile is walked `rounds` times, for four labels each time.
 pub fn vote_view(shape: &KernelShape, capacity: &Capacity, rounds: u32) -> PassList {
     let mut b = begin("votes", shape, capacity, false, 0);
     project::visible_splats(&mut b);
@@ -142,14 +143,14 @@ pub fn vote_view(shape: &KernelShape, capacity: &Capacity, rounds: u32) -> PassL
     end(b)
 }
 
-/// How many Gaussians densification would leave.
+/// Counts the Gaussians that densification would leave.
 pub fn densify_count(shape: &KernelShape, capacity: &Capacity) -> PassList {
     let mut b = begin("densify: count", shape, capacity, false, 0);
     densify::mark(&mut b);
     end(b)
 }
 
-/// Densification; the model must have room for the count that [`densify_count`] found.
+/// Densifies the model; it must have room for the count from [`densify_count`].
 pub fn densify_apply(shape: &KernelShape, capacity: &Capacity, labels: bool) -> PassList {
     let mut b = begin("densify", shape, capacity, labels, 0);
     densify::mark(&mut b);

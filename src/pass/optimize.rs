@@ -1,4 +1,4 @@
-//! Adam on every attribute of the Gaussians and on shared parameters, and the reset of opacities.
+//! Adam on every attribute of the Gaussians and on shared parameters; the opacity reset.
 
 use super::build::{Builder, args, over_gaussians};
 use crate::pass::build::pass;
@@ -14,9 +14,9 @@ pub(crate) struct Attribute {
     pub gradient: Buf,
     /// vec4 per Gaussian.
     pub stride: u32,
-    /// Which learning rate (glsl/optimize/adam.comp).
+    /// Index of the learning rate (glsl/optimize/adam.comp).
     pub rate: u32,
-    /// Degree of the spherical harmonics from which on it is active.
+    /// Active degree of the spherical harmonics from which the attribute is trained.
     pub from_degree: u32,
     /// Word of `dispatch_args`.
     pub args: u32,
@@ -37,11 +37,11 @@ const fn attribute(planes: [Buf; 3], gradient: Buf, stride: u32, rate: u32, from
     Attribute { planes, gradient, stride, rate, from_degree, args }
 }
 
-/// Parameters that are no Gaussian's, their moments, and the weights that correct these. A capacity without rows of them
-/// has neither these buffers nor passes on them.
+/// Parameters shared by Gaussians, their moments, and the bias corrections of the moments. With a capacity of no rows,
+/// neither these buffers nor their passes exist.
 pub(crate) const SHARED_PLANES: [Buf; 4] = [Buf::SHARED, Buf::M_SHARED, Buf::U_SHARED, Buf::W_SHARED];
 
-/// One Adam update of the attributes that are active; of all Gaussians, or of those alone that the step shows.
+/// One Adam update of the active attributes: of all Gaussians if `unseen`, else only of those in the view.
 pub(super) fn adam(b: &mut Builder, unseen: bool) {
     let (degree, seen_only) = (b.sh_degree, u32::from(!unseen));
     b.list.stage = Stage::Optimise;
@@ -50,14 +50,14 @@ pub(super) fn adam(b: &mut Builder, unseen: bool) {
     }
 }
 
-/// Shared parameters have gradient 0 until a pass of an extension writes another.
+/// Sets the gradients of shared parameters to 0; an extension's passes may then write them.
 pub(super) fn clear_shared(b: &mut Builder) {
     if b.capacity.shared_rows > 0 {
         b.list.fill(Buf::V_SHARED, 0);
     }
 }
 
-/// One Adam update of the shared parameters that belong to the step.
+/// One Adam update of the shared parameters of the step.
 pub(super) fn adam_shared(b: &mut Builder) {
     if b.capacity.shared_rows > 0 {
         let [parameters, first, second, _] = SHARED_PLANES;
@@ -83,7 +83,7 @@ fn update(
     } [stride: stride, rate: rate, seen_only: seen_only, rows: rows], grid);
 }
 
-/// No opacity above 0.01; its moments start over.
+/// Limits opacities to 0.01 and zeroes their moments.
 pub(super) fn opacity_reset(b: &mut Builder) {
     b.list.stage = Stage::Optimise;
     pass!(b, opacity_reset { step: Buf::STEP, means: Buf::MEANS, m_means: Buf::M_MEANS, u_means: Buf::U_MEANS } [],

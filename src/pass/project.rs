@@ -1,4 +1,4 @@
-//! From Gaussians to splats in depth order, and gradients back.
+//! Projects Gaussians to splats in depth order, and carries gradients back.
 
 use super::build::{Builder, Count, ONE, over_gaussians, over_splats};
 use super::scan::{self, Total};
@@ -6,7 +6,7 @@ use super::sort::{self, SortBuffers};
 use crate::pass::build::pass;
 use crate::scheduler::plan::{Buf, Stage};
 
-/// Gaussian of each splat; the depth sort ends there.
+/// Gaussian of each splat; the depth sort ends in this buffer.
 pub(super) const GAUSSIAN_FROM_SPLAT: Buf = Buf::DEPTH_VALUES_A;
 
 /// Bits of a depth key.
@@ -19,7 +19,7 @@ pub(super) fn visible_splats(b: &mut Builder) {
     order_and_project(b);
 }
 
-/// As [`visible_splats`], for the object of layer 1 alone.
+/// Same as [`visible_splats`], for the object of layer 1 only.
 #[cfg(feature = "lab")]
 pub(super) fn visible_splats_of_object(b: &mut Builder) {
     b.list.stage = Stage::Project;
@@ -62,12 +62,12 @@ fn project_forward(b: &mut Builder) {
     } [sh_degree: sh_degree], over_splats());
 }
 
-/// Gradients of the splats back to the parameters of their Gaussians.
+/// Carries the gradients of splats back to the parameters of their Gaussians.
 pub(super) fn project_backward(b: &mut Builder) {
     backward(b, false, Buf::SPLAT_FROM_GAUSSIAN);
 }
 
-/// As [`project_backward`] for the splats of an object; added to the gradients of `scene_splats`.
+/// Same as [`project_backward`] for the splats of one object; adds to the gradients of `scene_splats`.
 #[cfg(feature = "lab")]
 pub(super) fn project_backward_of_object(b: &mut Builder, scene_splats: Buf) {
     backward(b, true, scene_splats);

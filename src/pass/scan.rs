@@ -1,10 +1,10 @@
-//! Exclusive scan of u32 values, reduce-then-scan: no waiting between workgroups, so it runs on any device.
+//! Exclusive prefix sum of u32 values by reduce-then-scan. Workgroups never wait, so it runs on any device.
 
 use super::build::{Builder, Count, ONE};
 use crate::pass::build::pass;
 use crate::scheduler::plan::{Buf, Grid};
 
-/// Which counter the total goes to.
+/// The counter that receives the total.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Total {
     /// `visible_count`.
@@ -17,12 +17,12 @@ pub enum Total {
     Densified = 3,
 }
 
-/// `offsets[i]` = sum of `values[..i]`; the sum of all goes to a counter.
+/// Writes `offsets[i]` = sum of `values[..i]`, and the sum of all values to the counter `total`.
 pub fn scan(b: &mut Builder, values: Buf, offsets: Buf, count: Count, total: Total) {
     reduce_then_scan(b, (values, offsets), count, total, false);
 }
 
-/// As [`scan`], each key that is not `KEY_INVISIBLE` counting as 1.
+/// Same as [`scan`]; each key other than `KEY_INVISIBLE` counts as 1.
 pub fn scan_visible(b: &mut Builder, keys: Buf, offsets: Buf) {
     reduce_then_scan(b, (keys, offsets), Count::Gaussians, Total::Visible, true);
 }

@@ -1,9 +1,10 @@
-//! A training step in which every sampled object has passes of its own, as in the reference code of LabelGS: its Gaussians
-//! are culled, sorted, projected, listed, blended and differentiated again, and its gradients are added to the scene's.
+//! A training step with separate passes for every sampled object, as in the reference code of LabelGS. For each object,
+//! the step culls, sorts, projects, bins, blends and differentiates its Gaussians again, and adds the gradients to the
+//! scene's.
 //!
-//! It gives what [`training_step`](super::training_step) gives, up to the order of sums, and exists to measure what one
-//! traversal of all layers saves: the kernels and the culling are the same, only the structure differs. Each object is
-//! layer 1 of passes that have no other layer, so that one recording serves every object.
+//! The result equals that of [`training_step`](super::training_step) up to the order of sums. It exists to measure the
+//! gain from one traversal of all layers: kernels and culling are the same, only the structure differs. Each object is
+//! layer 1 of passes without other layers, so one recording serves all objects.
 
 use super::build::{Builder, ONE};
 use super::{Variant, begin, blend, end, gather, lift, loss, optimize, project, tile};
@@ -11,7 +12,7 @@ use crate::pass::KernelShape;
 use crate::pass::build::pass;
 use crate::scheduler::plan::{Buf, Capacity, PassList, Stage, Work};
 
-/// What the passes of an object read and write in place of the step's buffers.
+/// (Buffer of the step, buffer that replaces it in the passes of an object).
 const OF_OBJECT: [(Buf, Buf); 5] = [
     (Buf::STEP, Buf::OBJECT_STEP),
     (Buf::LABEL_FROM_LAYER, Buf::OBJECT_LABEL),
@@ -20,11 +21,11 @@ const OF_OBJECT: [(Buf, Buf); 5] = [
     (Buf::SPLAT_FROM_GAUSSIAN, Buf::OBJECT_SPLATS),
 ];
 
-/// One optimiser step on one view with `objects` sampled objects, one after the other.
+/// One optimiser step on one view with `objects` sampled objects, one after another.
 pub fn separate_step(shape: &KernelShape, capacity: &Capacity, variant: Variant, objects: u32) -> PassList {
     let mut b = begin("training step, objects one by one", shape, capacity, false, variant.sh_degree);
     project::visible_splats(&mut b);
-    // The lift is in the labelled kernel, which then finds its layers empty.
+    // The kernel variant with labels does the lift; here it finds its layers empty.
     b.labels = variant.lift;
     let pairs = tile::bin_scene(&mut b);
     blend::blend_forward(&mut b, pairs, variant.lift);
@@ -80,7 +81,7 @@ fn object_passes(shape: &KernelShape, capacity: &Capacity, sh_degree: u32) -> Ve
             pass.buffers.iter_mut().for_each(|buf| *buf = of_object(*buf));
         }
     }
-    // The gradients stay by the scene's splats.
+    // The gradients stay indexed by the scene's splats.
     let list = PassList { work, ..PassList::default() };
     let mut b = Builder { shape, capacity: &capacity, labels: true, sh_degree, counts: false, list };
     project::project_backward_of_object(&mut b, Buf::SPLAT_FROM_GAUSSIAN);

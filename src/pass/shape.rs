@@ -1,4 +1,4 @@
-//! Which variant of the kernels a device gets: subgroup size, tile, texel or storage reads, digits of the sort.
+//! Kernel shape of a device: subgroup size, tile size, texel or storage reads, digit width of the sort.
 
 use crate::error::{Error, Result};
 use crate::gpu::{Capabilities, SUBGROUP_MAX, SUBGROUP_MIN};
@@ -6,38 +6,37 @@ use crate::gpu::{Capabilities, SUBGROUP_MAX, SUBGROUP_MIN};
 /// Shape of the kernels, fixed for a device.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct KernelShape {
-    /// Invocations of a subgroup: 8, 16, 32 or 64.
+    /// Invocations per subgroup: 8, 16, 32 or 64.
     pub subgroup: u32,
     /// Tile width, px.
     pub tile_width: u32,
     /// Tile height, px.
     pub tile_height: u32,
-    /// Hot reads go through texel buffers.
+    /// Frequent reads use texel buffers.
     pub texel: bool,
-    /// Bits of a digit of the radix sort.
+    /// Bits per digit of the radix sort.
     pub digit_bits: u32,
-    /// Workgroups of the sort and scan passes, at least.
+    /// Minimum number of workgroups of the sort and scan passes.
     pub lane_groups: u32,
-    /// Splats that one dispatch of a blend pass walks in a tile; a multiple of the subgroup size.
+    /// Splats per tile that one dispatch of a blend pass walks; a multiple of the subgroup size.
     pub segment_length: u32,
 }
 
-/// The longest segment: lavapipe ends all loops of an invocation after 65,535 rounds, and a walk of n splats costs n
-/// rounds and one more for each subgroup's load.
+/// Longest segment. Lavapipe ends all loops of an invocation after 65,535 rounds. A walk over n splats takes n rounds
+/// and one more per load of a subgroup.
 const SEGMENT_LENGTH: u32 = 40_960;
 
-/// Elements that a device's texel buffers must hold for reads through them: vec4 of a GiB. Smaller ones would bound
-/// the model before memory does.
+/// Minimum elements of texel buffers: 1 GiB of vec4. A smaller limit would bound the model before memory does.
 const TEXELS_MIN: u64 = 1 << 26;
 
 impl KernelShape {
-    /// The shape for a device.
+    /// Returns the shape for a device.
     pub fn of(device: &Capabilities) -> Self {
         let shape = Self::new(device.subgroup.size, device.is_cpu());
         Self { texel: shape.texel && device.limits.plan.max_texel_elements >= TEXELS_MIN, ..shape }
     }
 
-    /// The shape for a subgroup size; `cpu` says that the device is a processor.
+    /// Returns the shape for a subgroup size; `cpu` is true if the device is a processor.
     pub fn new(subgroup: u32, cpu: bool) -> Self {
         let (tile_width, tile_height) = match subgroup {
             ..=8 => (8, 8),
@@ -55,7 +54,7 @@ impl KernelShape {
         }
     }
 
-    /// Refuses shapes that the blend kernels cannot take: a lane owns whole pixels of one column of a tile.
+    /// Checks that the blend kernels can use this shape: each lane owns whole pixels in one column of a tile.
     pub fn check(&self) -> Result<()> {
         let (width, pixels) = (self.tile_width, self.tile_pixels());
         if (SUBGROUP_MIN..=SUBGROUP_MAX).contains(&self.subgroup)
@@ -66,28 +65,28 @@ impl KernelShape {
             return Ok(());
         }
         Err(Error::Bug(format!(
-            "tiles of {width} x {} px do not suit subgroups of {}",
+            "tiles of {width} x {} px do not fit subgroups of {} lanes",
             self.tile_height, self.subgroup
         )))
     }
 
-    /// Tiles in a row and in a column of an image.
+    /// Tiles per row and per column of an image.
     pub fn tiles(&self, width: u32, height: u32) -> (u32, u32) {
         (width.div_ceil(self.tile_width), height.div_ceil(self.tile_height))
     }
 
-    /// Pixels of a tile.
+    /// Pixels per tile.
     pub fn tile_pixels(&self) -> u32 {
         self.tile_width * self.tile_height
     }
 
-    /// Lanes of a sort or scan over at most `items`; no lane walks more than 30,000 of them.
+    /// Number of lanes of a sort or scan over at most `items` items; each lane walks at most 30,000 of them.
     pub fn lanes(&self, items: u64) -> u32 {
         let groups = items.div_ceil(u64::from(self.subgroup) * 30_000) as u32;
         groups.next_multiple_of(2).max(self.lane_groups) * self.subgroup
     }
 
-    /// The specialisation constants that follow from the shape alone, by their GLSL names.
+    /// Looks up a specialisation constant that follows from the shape, by its GLSL name.
     pub fn constant(&self, name: &str) -> Option<u32> {
         match name {
             "SUBGROUP_SIZE" => Some(self.subgroup),

@@ -5,30 +5,31 @@ use super::build::{Builder, Count, ONE};
 use crate::pass::build::pass;
 use crate::scheduler::plan::{Buf, Grid, Stage, Work};
 
-/// Two pairs of buffers that the passes of a sort go back and forth between.
+/// Two pairs of buffers; the passes of a sort alternate between them.
 #[derive(Clone, Copy, Debug)]
 pub struct SortBuffers {
-    /// Keys; the input stands in the first.
+    /// Keys; the input is in the first buffer.
     pub keys: [Buf; 2],
     /// Values.
     pub values: [Buf; 2],
 }
 
 impl SortBuffers {
-    /// In the order in which a sort by `bits` bits ends in the first pair: its input then belongs into the new first one.
+    /// Orders the pairs so that a sort by `bits` bits ends in the first pair of `self`; write its input to the first
+    /// pair of the result.
     pub fn ending_in_first(self, shape: &KernelShape, bits: u32) -> Self {
         let Self { keys: [a, b], values: [c, d] } = self;
         if passes(shape, bits).is_multiple_of(2) { self } else { Self { keys: [b, a], values: [d, c] } }
     }
 }
 
-/// Passes of a sort by `bits` bits.
+/// Number of passes of a sort by `bits` bits.
 fn passes(shape: &KernelShape, bits: u32) -> u32 {
     bits.div_ceil(shape.digit_bits).max(1)
 }
 
-/// Sorts by the low `bits` bits; with `identity` the values are the places of the keys before the sort. Tables of times
-/// say what is sorted `by`. Returns the buffers that hold the sorted keys and values.
+/// Sorts by the low `bits` bits. With `identity`, the values are the positions of the keys before the sort. `by` is
+/// appended to the pass titles. Returns the buffers with the sorted keys and values.
 pub fn sort(b: &mut Builder, buffers: SortBuffers, bits: u32, count: Count, by: &str, identity: bool) -> (Buf, Buf) {
     let (first, around) = (b.list.work.len(), std::mem::replace(&mut b.list.stage, Stage::Sort));
     let lanes = b.capacity.sort_lanes as u32;
@@ -38,9 +39,9 @@ pub fn sort(b: &mut Builder, buffers: SortBuffers, bits: u32, count: Count, by: 
     for pass in 0..passes {
         let (from, to) = ((pass % 2) as usize, 1 - (pass % 2) as usize);
         let shift = pass * digit_bits;
-        // The last digit has the bits that are left: its tables, and their scan by one subgroup, are smaller.
+        // The last digit covers only the remaining bits: its tables and their scan by one subgroup are smaller.
         let digit_bits = digit_bits.min(bits.max(1) - shift);
-        // The first pass of an identity sort reads no values; the keys stand in for the buffer that nothing wrote yet.
+        // The first pass of an identity sort reads no values; the keys replace the unwritten values buffer.
         let identity_now = identity && pass == 0;
         let values_in = if identity_now { buffers.keys[from] } else { buffers.values[from] };
         pass!(b, radix_count {

@@ -1,4 +1,4 @@
-//! Stages and names of the items of a step, for reports.
+//! Stages and names of the items of a list, for reports.
 
 use crate::scheduler::plan::{PassList, Stage, TABLE, Work};
 
@@ -32,7 +32,7 @@ mod tests {
         assert_eq!(of("layer_list"), Some(Stage::Tile));
         assert_eq!(of("scan_reduce_flag"), Some(Stage::Project));
         assert_eq!(named.last().map(|(stage, _)| *stage), Some(Stage::Report));
-        // Apart from the two sorts and the two projections a step never goes back.
+        // A step never returns to an earlier stage, except for its two sorts and two projections.
         let mut order: Vec<Stage> = named.iter().map(|(stage, _)| *stage).collect();
         order.dedup();
         let expected = [

@@ -1,4 +1,4 @@
-//! Which splats each tile holds, front to back, for the scene and for each object layer.
+//! Bins splats: lists the splats of each tile, front to back, for the scene and for each object layer.
 
 use super::build::{Builder, Count, ONE, args, over_splats};
 use super::project::GAUSSIAN_FROM_SPLAT;
@@ -8,25 +8,25 @@ use crate::pass::build::pass;
 use crate::scheduler::plan::{Buf, Stage};
 use crate::shaders::constants;
 
-/// Lists the (splat, tile) pairs, sorts them by layer and tile, and finds each tile's range. Returns the buffer that
-/// holds the place before the sort of each sorted pair.
+/// Lists the (splat, tile) pairs, sorts them by layer and tile, and finds each tile's range. Returns the buffer with
+/// each sorted pair's position before the sort.
 pub(super) fn bin_splats(b: &mut Builder) -> Buf {
     bin(b, b.labels, 0)
 }
 
-/// The scene's splats alone, in the first of the layers that the list has.
+/// Bins the scene's splats only, into the first layer of the list.
 #[cfg(feature = "lab")]
 pub(super) fn bin_scene(b: &mut Builder) -> Buf {
     bin(b, false, 0)
 }
 
-/// An object's splats, in layer 1 alone.
+/// Bins an object's splats, into layer 1 only.
 #[cfg(feature = "lab")]
 pub(super) fn bin_object(b: &mut Builder) -> Buf {
     bin(b, false, 1)
 }
 
-/// With `layers` each splat also in the layer of its object, else all in `layer` alone.
+/// Bins each splat into the scene and, with `layers`, into its object's layer; else into `layer` only.
 fn bin(b: &mut Builder, layers: bool, layer: u32) -> Buf {
     let instances = b.capacity.instances as u32;
     b.list.stage = Stage::Tile;

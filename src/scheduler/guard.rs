@@ -1,4 +1,4 @@
-//! Guards: a pattern behind each buffer that no pass may touch. For tests.
+//! Guards: a known pattern behind each buffer, which no pass may overwrite. For tests.
 
 use super::Scheduler;
 use super::recorder::Recorder;
@@ -8,18 +8,18 @@ use crate::scheduler::plan::{Buf, Class, FRAMES_IN_FLIGHT, GUARD_BYTES};
 
 const PATTERN: u32 = 0x5AFE_C0DE;
 
-/// Writes the guard that begins at a byte offset.
+/// Writes the guard that starts at a byte offset.
 pub(super) fn write(recorder: &Recorder<'_>, buffer: &Buffer, offset: u64) -> Result<()> {
     recorder.fill(buffer, offset, GUARD_BYTES, PATTERN)
 }
 
 impl Scheduler {
-    /// Fails if some pass wrote behind the end of a buffer; names the buffer and the first wrong word.
+    /// Fails if a pass wrote behind the end of a buffer; the error names the buffer and the first wrong word.
     ///
-    /// Sees the buffers that are not scratch, and the scratch of the list that was prepared or submitted last.
+    /// Checks all buffers outside of scratch, and the scratch of the list that was prepared or submitted last.
     pub fn check_guards(&mut self) -> Result<()> {
         if !self.options.plan.guards {
-            return Err(Error::Bug("the scheduler was made without guards".to_owned()));
+            return Err(Error::Bug("the scheduler was made without guards; set PlanOptions::guards".to_owned()));
         }
         self.wait_all()?;
         for index in 0..self.table.len() {
@@ -38,7 +38,7 @@ impl Scheduler {
                 if let Some(position) = words.iter().position(|&word| word != PATTERN) {
                     let (name, value) = (decl.name, words[position]);
                     return Err(Error::Bug(format!(
-                        "something wrote {value:#010x} at byte {} behind the end of buffer {name} ({end} bytes)",
+                        "a pass wrote {value:#010x} at byte {} behind the end of buffer {name} ({end} bytes)",
                         position * 4
                     )));
                 }

@@ -1,7 +1,7 @@
-//! The scheduler: plans pass lists ([`plan`], pure), owns the memory of all buffers, and replays what was recorded.
+//! The scheduler: plans pass lists ([`plan`], pure), owns the memory of all buffers, and replays recordings.
 //!
-//! Two steps are in flight, one per frame, on one queue with one timeline. Every recording opens with a full barrier, so
-//! lists run in the order of their submits; what is inside of a list is ordered by the plan's barriers.
+//! Two steps are in flight, one per frame, on one queue with one timeline. Every recording begins with a full barrier,
+//! so lists run in the order of their submits. Inside a list, the plan's barriers order the items.
 
 mod guard;
 pub(crate) mod plan;
@@ -24,23 +24,23 @@ use std::sync::Arc;
 use storage::Storage;
 use transfer::Staging;
 
-/// Choices of a scheduler.
+/// Options of a scheduler.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct SchedulerOptions {
-    /// Choices of the plans. With `barrier_everywhere`, times belong to their passes.
+    /// Options of the plans. With `barrier_everywhere`, each time belongs to one pass.
     pub plan: PlanOptions,
-    /// A timestamp after each item, see [`Scheduler::timings`].
+    /// Writes a timestamp after each item, see [`Scheduler::timings`].
     pub timestamps: bool,
-    /// Scratch memory is filled with 0xFFFFFFFF (NaN) whenever a list is prepared.
+    /// Fills scratch memory with 0xFFFFFFFF (NaN) whenever a list is prepared.
     pub poison_step: bool,
-    /// Each item leaves a mark that the host sees, to name the last one when the device is lost.
+    /// Each item leaves a mark for the host; when the device is lost, the error names the last item.
     pub crash_markers: bool,
-    /// Use no more than so many bytes of the device's memory.
+    /// Upper limit on the device memory in use, bytes.
     pub memory_limit: Option<u64>,
 }
 
 impl SchedulerOptions {
-    /// The limits that plans respect on a device.
+    /// Returns the limits of a device for plans.
     pub fn limits(&self, gpu: &Gpu) -> Limits {
         let limits = gpu.limits().plan;
         Limits { max_memory: self.memory_limit.unwrap_or(u64::MAX).min(limits.max_memory), ..limits }
@@ -51,11 +51,11 @@ impl SchedulerOptions {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct ListId {
     index: usize,
-    /// Lists are forgotten when capacities change; an id of an earlier generation is refused.
+    /// A change of capacities discards all lists; ids of earlier generations are refused.
     generation: u64,
 }
 
-/// A submit that can be waited for.
+/// A submit to wait for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Ticket(u64);
 
@@ -73,23 +73,23 @@ pub struct Scheduler {
     /// For transfers outside of lists.
     immediate: CommandBuffer,
     timeline: Timeline,
-    /// Value of the last submit.
+    /// Timeline value of the last submit.
     submitted: u64,
-    /// Value of the last submit of each frame.
+    /// Timeline value of the last submit of each frame.
     frame_busy: [u64; FRAMES_IN_FLIGHT],
-    /// The list whose scratch buffers `upload` and `download` mean: the last one prepared or submitted.
+    /// The list that was prepared or submitted last; `upload` and `download` access its scratch buffers.
     current: Option<usize>,
     generation: u64,
     capacity: Capacity,
     options: SchedulerOptions,
     limits: Limits,
     table: &'static [BufferDecl],
-    // Last, so that the device outlives what was made from it.
+    // Last field, so that the device outlives everything made from it.
     gpu: Arc<Gpu>,
 }
 
 impl Scheduler {
-    /// Allocates everything but scratch memory; Model and Kept buffers start as zeros.
+    /// Allocates everything except scratch memory; Model and Kept buffers start as zeros.
     pub fn new(
         gpu: Arc<Gpu>,
         table: &'static [BufferDecl],
@@ -118,7 +118,7 @@ impl Scheduler {
         Ok(scheduler)
     }
 
-    /// The memory that some lists would need, before anything is allocated.
+    /// Predicts the memory of lists, without allocating.
     pub fn predict(
         table: &'static [BufferDecl],
         capacity: &Capacity,
@@ -128,7 +128,7 @@ impl Scheduler {
         MemoryReport::predict(table, capacity, lists, limits, PlanOptions::default())
     }
 
-    /// The memory that some lists would need with other capacities, under the limits and options of this scheduler.
+    /// Predicts the memory of lists with other capacities, under the limits and options of this scheduler.
     pub fn predict_here(&self, capacity: &Capacity, lists: &[PassList]) -> Result<MemoryReport> {
         MemoryReport::predict(self.table, capacity, lists, &self.limits, self.options.plan)
     }
@@ -139,7 +139,7 @@ impl Scheduler {
         ids.first().copied().ok_or_else(|| Error::Bug("no list was prepared".to_owned()))
     }
 
-    /// Plans and records several lists; cheaper than one by one if scratch memory has to grow.
+    /// Plans and records several lists; this is cheaper than one by one if scratch memory must grow.
     pub fn prepare_all(&mut self, lists: &[&PassList]) -> Result<Vec<ListId>> {
         self.replace_lost()?;
         let mut plans = Vec::new();
@@ -165,7 +165,7 @@ impl Scheduler {
 
     /// Submits a prepared list with the host-visible buffers of a frame.
     ///
-    /// Nothing is allocated. Blocks only if the same list is still running in the same frame.
+    /// Allocates nothing. Blocks only if the same list still runs in the same frame.
     pub fn submit(&mut self, id: ListId, frame: usize) -> Result<Ticket> {
         let index = self.index(id)?;
         self.check_frame(frame)?;
@@ -196,7 +196,7 @@ impl Scheduler {
             return Ok(());
         }
         self.timeline.wait(ticket.0).map_err(|error| {
-            // Whoever gets the error may free what the device was to be done with. A lost device returns at once.
+            // The caller may free memory in use after this error, so wait. A lost device returns at once.
             let _ = self.gpu.wait_idle();
             self.name_pass(error)
         })
@@ -213,8 +213,8 @@ impl Scheduler {
         self.wait(Ticket(self.frame_busy[frame]))
     }
 
-    /// Changes capacities: Model buffers keep their contents (the common prefix; new elements are 0), all others start
-    /// afresh, and all lists are forgotten. If memory does not suffice, the old capacities stay in force.
+    /// Changes capacities. Model buffers keep their contents (the common prefix; new elements are 0), all others start
+    /// over, and all lists are discarded. If memory does not suffice, the old capacities stay in force.
     pub fn set_capacity(&mut self, capacity: Capacity) -> Result<()> {
         self.wait_all()?;
         MemoryReport::predict(self.table, &capacity, &[], &self.limits, self.options.plan)?;
@@ -225,7 +225,7 @@ impl Scheduler {
         self.resize_own(capacity)
     }
 
-    /// The capacities in force.
+    /// Present capacities.
     pub fn capacity(&self) -> &Capacity {
         &self.capacity
     }
@@ -235,7 +235,7 @@ impl Scheduler {
         self.table
     }
 
-    /// The limits that plans respect.
+    /// Limits that plans respect.
     pub fn limits(&self) -> &Limits {
         &self.limits
     }
@@ -245,14 +245,14 @@ impl Scheduler {
         &self.gpu
     }
 
-    /// Allocated bytes by buffer, scratch page and staging.
+    /// Allocated bytes of each buffer, each scratch page and the staging memory.
     pub fn memory(&self) -> Vec<(String, u64)> {
         let mut rows = self.storage.memory(self.table);
         rows.push(("staging".to_owned(), self.staging.bytes()));
         rows
     }
 
-    /// All allocated bytes.
+    /// Total of allocated bytes.
     pub fn memory_total(&self) -> u64 {
         self.memory().iter().map(|(_, bytes)| bytes).sum()
     }
@@ -262,15 +262,15 @@ impl Scheduler {
         Ok(&self.lists[self.index(id)?].plan)
     }
 
-    /// The barriers of a list, one entry per item.
+    /// Barriers of a list, one entry per item.
     pub fn barriers(&self, id: ListId) -> Result<Vec<Option<Barrier>>> {
         Ok(self.plan(id)?.items.iter().map(|item| item.barrier.clone()).collect())
     }
 
-    /// Nanoseconds of each item of a list in its last submit with a frame; waits for it.
+    /// Nanoseconds of each item of a list, from its last submit with a frame. Waits for that submit.
     ///
-    /// Without `barrier_everywhere` items overlap, and an entry is the time that the item added. Empty if timestamps
-    /// were off when the list was prepared, if the device has none, or before the first submit.
+    /// Without `barrier_everywhere`, items overlap, and an entry is the time that the item added. The result is empty
+    /// if timestamps were off when the list was prepared, if the device has none, or before the first submit.
     pub fn timings(&self, id: ListId, frame: usize) -> Result<Vec<(String, u64)>> {
         let list = &self.lists[self.index(id)?];
         self.check_frame(frame)?;
@@ -315,7 +315,7 @@ impl Scheduler {
         self.wait(Ticket(value))
     }
 
-    /// Puts the name of the last pass that is known to have begun into the error of a lost device.
+    /// Adds the name of the last pass that is known to have begun to the error of a lost device.
     fn name_pass(&self, error: Error) -> Error {
         if !matches!(error, Error::DeviceLost { .. }) {
             return error;
@@ -327,7 +327,7 @@ impl Scheduler {
         });
         let pass = match marked.max_by_key(|(busy, _)| *busy) {
             Some((busy, pass)) if busy == self.submitted => pass,
-            Some((_, pass)) => format!("{pass}, or what came after it"),
+            Some((_, pass)) => format!("{pass}, or an item after it"),
             None if self.options.crash_markers => "none; memory was being set up".to_owned(),
             None => "unknown: crash markers are off (`restart` turns them on)".to_owned(),
         };
@@ -337,7 +337,7 @@ impl Scheduler {
 
 impl Drop for Scheduler {
     fn drop(&mut self) {
-        // Nothing may be in use when it is freed. A lost device has nothing in use.
+        // Memory in use must not be freed. A lost device uses none.
         let _ = self.wait_all();
     }
 }

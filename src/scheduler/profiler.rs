@@ -1,8 +1,8 @@
-//! Times of passes over many steps. Returns values, prints nothing.
+//! Times of passes over many steps, as values.
 
 use std::collections::HashMap;
 
-/// The first steps of a list include the compilation of its pipelines on some drivers.
+/// On some drivers, the first steps of a list include the compilation of its pipelines.
 const WARM_UP: usize = 2;
 
 /// Times of one pass label.
@@ -10,13 +10,13 @@ const WARM_UP: usize = 2;
 pub(crate) struct PassTime {
     /// Label of the pass.
     pub label: String,
-    /// Items of the list with this label.
+    /// Number of items with this label in the list.
     pub items: usize,
-    /// Median over the steps of the time of all its items in a step, ns.
+    /// Median over the steps, ns; a step's time is the sum of all items with this label.
     pub median: u64,
-    /// The time that nine of ten steps stay below, ns.
+    /// 90th percentile over the steps, ns.
     pub p90: u64,
-    /// Its part of the sum of all medians.
+    /// Share in the sum of all medians, 0 to 1.
     pub share: f64,
 }
 
@@ -38,17 +38,17 @@ impl Default for Profiler {
 }
 
 impl Profiler {
-    /// Nothing collected yet.
+    /// Creates an empty profiler.
     pub(crate) fn new() -> Self {
         Self::with_warm_up(WARM_UP)
     }
 
-    /// Leaves out the first `warm_up` steps.
+    /// Creates a profiler that ignores the first `warm_up` steps.
     pub(crate) fn with_warm_up(warm_up: usize) -> Self {
         Self { seen: 0, warm_up, order: Vec::new(), items: HashMap::new(), samples: HashMap::new() }
     }
 
-    /// Adds what [`Scheduler::timings`](super::Scheduler::timings) gave for a step; the first steps are left out.
+    /// Adds the [`Scheduler::timings`](super::Scheduler::timings) of a step; the first steps are ignored.
     pub(crate) fn add(&mut self, timings: &[(String, u64)]) {
         self.seen += 1;
         if self.seen <= self.warm_up || timings.is_empty() {
@@ -68,13 +68,13 @@ impl Profiler {
         }
     }
 
-    /// Steps that count.
+    /// Number of steps that count.
     #[cfg(test)]
     fn steps(&self) -> usize {
         self.seen.saturating_sub(self.warm_up)
     }
 
-    /// One row per label, in the order of the list.
+    /// Returns one row per label, in the order of the list.
     pub(crate) fn rows(&self) -> Vec<PassTime> {
         let mut rows = Vec::new();
         for label in &self.order {

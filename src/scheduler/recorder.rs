@@ -1,8 +1,8 @@
-//! The choke point: the only code that dispatches or places barriers.
+//! Records commands. No other code dispatches or places barriers.
 //!
-//! What the planner promises is asserted here once more against the limits of the device, as a wrong command buffer is
-//! undefined behaviour of the whole process.
-// Recording commands is a foreign interface: every call is unsafe.
+//! This module checks the planner's results again against the limits of the device, because a wrong command buffer is
+//! undefined behaviour for the whole process.
+// Vulkan commands are foreign functions: every call is unsafe.
 #![allow(unsafe_code)]
 
 use crate::error::{Error, Result};
@@ -10,11 +10,11 @@ use crate::gpu::{Buffer, CommandBuffer, Gpu, Pipeline, QueryPool, vk_call};
 use crate::scheduler::plan::{Use, Uses};
 use ash::vk;
 
-/// Workgroups of a dispatch, with the buffer resolved.
+/// Workgroups of a dispatch, with the resolved buffer.
 pub(super) enum Groups<'a> {
-    /// Known now.
+    /// Known when the list is recorded.
     Count([u32; 3]),
-    /// Read by the device at this byte offset.
+    /// Read by the device at this byte offset of the buffer.
     Indirect(&'a Buffer, u64),
 }
 
@@ -25,7 +25,7 @@ pub(super) struct Recorder<'a> {
 }
 
 impl<'a> Recorder<'a> {
-    /// Begins a recording with a full barrier, so that it sees all that was submitted or written by the host before.
+    /// Begins a recording with a full barrier, which makes all earlier submits and host writes visible to it.
     pub(super) fn begin(gpu: &'a Gpu, command: &CommandBuffer) -> Result<Self> {
         let command = command.raw();
         let info = vk::CommandBufferBeginInfo::default();
@@ -40,7 +40,7 @@ impl<'a> Recorder<'a> {
         Ok(recorder)
     }
 
-    /// Makes all writes visible to the host, and ends the recording.
+    /// Makes all writes visible to the host and ends the recording.
     pub(super) fn end(self) -> Result<()> {
         self.memory_barrier(
             (vk::PipelineStageFlags::ALL_COMMANDS, vk::PipelineStageFlags::HOST),
@@ -51,7 +51,7 @@ impl<'a> Recorder<'a> {
         vk_call("vkEndCommandBuffer", || unsafe { self.gpu.raw().end_command_buffer(self.command) })
     }
 
-    /// Everything before against everything after, for these kinds of use.
+    /// Orders all earlier commands before all later ones, for these kinds of use.
     pub(super) fn barrier(&self, src: Uses, dst: Uses) {
         let (src_stages, src_access) = masks(src, true);
         let (dst_stages, dst_access) = masks(dst, false);
@@ -82,7 +82,7 @@ impl<'a> Recorder<'a> {
     /// Sets every word of a range.
     pub(super) fn fill(&self, buffer: &Buffer, offset: u64, bytes: u64, word: u32) -> Result<()> {
         check_range(buffer, offset, bytes)?;
-        // SAFETY: recording; the range lies in the buffer and is aligned, as just checked.
+        // SAFETY: recording; the range is aligned and inside the buffer, as checked above.
         unsafe { self.gpu.raw().cmd_fill_buffer(self.command, buffer.raw(), offset, bytes, word) };
         Ok(())
     }
@@ -93,10 +93,10 @@ impl<'a> Recorder<'a> {
         check_range(to.0, to.1, bytes)?;
         let overlap = from.0.raw() == to.0.raw() && from.1 < to.1 + bytes && to.1 < from.1 + bytes;
         if overlap {
-            return Err(Error::Bug(format!("copy within {:?} overlaps itself", from.0)));
+            return Err(Error::Bug(format!("copy within {:?}: the two ranges overlap", from.0)));
         }
         let regions = [vk::BufferCopy { src_offset: from.1, dst_offset: to.1, size: bytes }];
-        // SAFETY: recording; the ranges lie in the buffers and do not overlap, as just checked.
+        // SAFETY: recording; the ranges are inside the buffers and do not overlap, as checked above.
         unsafe { self.gpu.raw().cmd_copy_buffer(self.command, from.0.raw(), to.0.raw(), &regions) };
         Ok(())
     }
@@ -106,13 +106,16 @@ impl<'a> Recorder<'a> {
         let (raw, command, limits) = (self.gpu.raw(), self.command, self.gpu.limits().plan);
         match groups {
             Groups::Count(count) if count.iter().zip(&limits.max_groups).any(|(count, limit)| count > limit) => {
-                return Err(Error::Bug(format!("{count:?} workgroups, the device takes {:?}", limits.max_groups)));
+                return Err(Error::Bug(format!(
+                    "{count:?} workgroups; the device supports at most {:?}",
+                    limits.max_groups
+                )));
             }
             Groups::Count(_) => {}
             Groups::Indirect(buffer, offset) => check_range(buffer, *offset, 12)?,
         }
-        // SAFETY: recording; pipeline, set and buffers outlive the recording (the scheduler owns both), the layouts come
-        // from the same shader, and counts and ranges were just checked.
+        // SAFETY: recording; pipeline, set and buffers outlive the recording (the scheduler owns them), the layouts
+        // come from the same shader, and counts and ranges are checked above.
         unsafe {
             raw.cmd_bind_pipeline(command, vk::PipelineBindPoint::COMPUTE, pipeline.raw());
             raw.cmd_bind_descriptor_sets(command, vk::PipelineBindPoint::COMPUTE, pipeline.layout(), 0, &[set], &[]);
@@ -124,19 +127,19 @@ impl<'a> Recorder<'a> {
         Ok(())
     }
 
-    /// Empties a pool of timestamps; before the first is written.
+    /// Resets a pool of timestamps; must run before the first is written.
     pub(super) fn reset_timestamps(&self, pool: &QueryPool) {
         // SAFETY: recording; the pool outlives the recording.
         unsafe { self.gpu.raw().cmd_reset_query_pool(self.command, pool.raw(), 0, pool.count()) };
     }
 
-    /// Writes a timestamp once all commands before it are done.
+    /// Writes a timestamp after all earlier commands are done.
     pub(super) fn timestamp(&self, pool: &QueryPool, index: u32) -> Result<()> {
         if index >= pool.count() {
-            return Err(Error::Bug(format!("timestamp {index} of {}", pool.count())));
+            return Err(Error::Bug(format!("timestamp {index} is out of range: the pool has {}", pool.count())));
         }
         let stage = vk::PipelineStageFlags::BOTTOM_OF_PIPE;
-        // SAFETY: recording; the index lies in the pool, which was reset at the start.
+        // SAFETY: recording; the index is inside the pool, which was reset at the start.
         unsafe { self.gpu.raw().cmd_write_timestamp(self.command, stage, pool.raw(), index) };
         Ok(())
     }
@@ -147,10 +150,10 @@ fn check_range(buffer: &Buffer, offset: u64, bytes: u64) -> Result<()> {
     if inside && bytes > 0 && offset.is_multiple_of(4) && bytes.is_multiple_of(4) {
         return Ok(());
     }
-    Err(Error::Bug(format!("{bytes} bytes at {offset} of {buffer:?} are no range of words in it")))
+    Err(Error::Bug(format!("{bytes} bytes at offset {offset} of {buffer:?}: no range of words inside the buffer")))
 }
 
-/// Stages and accesses of kinds of use. On the side that waits for, reads need no access: they leave nothing to flush.
+/// Stages and accesses of kinds of use. On the source side, reads need no access mask: they leave nothing to flush.
 fn masks(uses: Uses, is_src: bool) -> (vk::PipelineStageFlags, vk::AccessFlags) {
     let (mut stages, mut access) = (vk::PipelineStageFlags::empty(), vk::AccessFlags::empty());
     for kind in Use::ALL.into_iter().filter(|kind| uses.contains(*kind)) {

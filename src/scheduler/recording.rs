@@ -12,7 +12,7 @@ use ash::vk;
 use std::collections::HashMap;
 use std::sync::Arc;
 
-/// A recorded list, ready to be submitted again and again.
+/// A recorded list, ready for any number of submits.
 pub(super) struct Recording {
     pub(super) command: CommandBuffer,
     pub(super) queries: Option<QueryPool>,
@@ -23,7 +23,7 @@ pub(super) struct Recording {
     _views: HashMap<Buf, BufferView>,
 }
 
-/// What the recording of one list needs at hand.
+/// Inputs for the recording of one list.
 struct Writer<'a> {
     gpu: &'a Arc<Gpu>,
     plan: &'a Plan,
@@ -62,7 +62,7 @@ impl Recording {
 }
 
 impl Writer<'_> {
-    /// Fresh guards and timestamps.
+    /// Writes the guards and resets the timestamps.
     fn prologue(&self, queries: Option<&QueryPool>) -> Result<()> {
         if self.plan.options.guards {
             write_scratch_guards(&self.recorder, self.plan, self.storage)?;
@@ -129,7 +129,7 @@ impl Writer<'_> {
     }
 }
 
-/// A view of each buffer that some pass reads as texels.
+/// Creates a view of each buffer that a pass reads as texels.
 fn views(gpu: &Arc<Gpu>, plan: &Plan, storage: &Storage, frame: usize) -> Result<HashMap<Buf, BufferView>> {
     let mut views = HashMap::new();
     for work in &plan.list.work {

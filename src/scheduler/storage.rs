@@ -1,4 +1,4 @@
-//! The memory behind the plan: a VkBuffer for each buffer that is not scratch, and the pages of the Step arena.
+//! Memory of a plan: a VkBuffer for each buffer outside of scratch, and the pages of the Step arena.
 
 use super::{Scheduler, guard};
 use crate::error::{Error, Result};
@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 /// All buffers of a scheduler.
 pub(super) struct Storage {
-    /// By row of the table, one per copy; empty for scratch.
+    /// By row of the table, then by copy; empty for scratch.
     own: Vec<Vec<Buffer>>,
     /// Pages of the Step arena.
     step: Vec<Buffer>,
@@ -19,7 +19,7 @@ impl Storage {
         Self { own: (0..rows).map(|_| Vec::new()).collect(), step: Vec::new() }
     }
 
-    /// Where a buffer of a plan lies for a frame.
+    /// Returns the memory and byte offset of a plan's buffer in a frame.
     pub(super) fn place(&self, plan: &Plan, buf: Buf, frame: usize) -> Result<(&Buffer, u64)> {
         let place = plan.placement(buf)?;
         let buffer = match place.page {
@@ -29,13 +29,13 @@ impl Storage {
         Ok((buffer.ok_or_else(|| Error::Bug(format!("no memory for buffer {}", buf.0)))?, place.offset))
     }
 
-    /// One copy of a buffer that is not scratch.
+    /// Returns one copy of a buffer outside of scratch.
     pub(super) fn own(&self, buf: Buf, copy: usize) -> Result<&Buffer> {
         let buffer = self.own.get(buf.index()).and_then(|copies| copies.get(copy));
         buffer.ok_or_else(|| Error::Bug(format!("no memory for copy {copy} of buffer {}", buf.0)))
     }
 
-    /// A page of the Step arena.
+    /// Pages of the Step arena.
     pub(super) fn step_pages(&self) -> &[Buffer] {
         &self.step
     }
@@ -44,7 +44,7 @@ impl Storage {
         self.step.clear();
     }
 
-    /// Allocated bytes.
+    /// Allocated bytes of each buffer and page.
     pub(super) fn memory(&self, table: &'static [BufferDecl]) -> Vec<(String, u64)> {
         let own = table.iter().zip(&self.own).filter(|(_, copies)| !copies.is_empty());
         let own = own.map(|(decl, copies)| (decl.name.to_owned(), copies.iter().map(Buffer::bytes).sum()));
@@ -53,7 +53,7 @@ impl Storage {
     }
 }
 
-/// Allocates all copies of a buffer; none of a buffer without bytes.
+/// Allocates all copies of a buffer; returns none for a buffer of 0 bytes.
 fn allocate(gpu: &Arc<Gpu>, decl: &BufferDecl, bytes: u64) -> Result<Vec<Buffer>> {
     let kind = match decl.class {
         Class::Model | Class::Persistent | Class::Step => MemoryKind::Device,
@@ -65,12 +65,12 @@ fn allocate(gpu: &Arc<Gpu>, decl: &BufferDecl, bytes: u64) -> Result<Vec<Buffer>
 }
 
 impl Scheduler {
-    /// Bytes of one copy of a buffer in its VkBuffer.
+    /// Bytes of the VkBuffer of one copy of a buffer.
     fn own_bytes(&self, decl: &BufferDecl, capacity: &Capacity) -> Result<u64> {
         memory::own_bytes(decl, capacity, self.options.plan, self.limits.alignment())
     }
 
-    /// Allocates every buffer that is not scratch.
+    /// Allocates every buffer outside of scratch.
     pub(super) fn allocate_own(&mut self) -> Result<()> {
         for index in 0..self.table.len() {
             let decl = &self.table[index];
@@ -82,19 +82,19 @@ impl Scheduler {
         self.write_own_guards()
     }
 
-    /// Reallocates what changes its size; Model buffers keep the common prefix, all others start afresh.
+    /// Reallocates every buffer whose size changes. Model buffers keep the common prefix, all others start over.
     ///
-    /// Growing buffers go first: should one not fit, those that grew already are merely larger than the old capacities
-    /// ask for, and nothing is lost.
+    /// Growing buffers go first. If one does not fit, those that grew before are only larger than the old capacities
+    /// need, and nothing is lost.
     pub(super) fn resize_own(&mut self, capacity: Capacity) -> Result<()> {
         let resized = self.resize_those(&capacity, true).and_then(|()| self.resize_those(&capacity, false));
         if resized.is_ok() {
             self.capacity = capacity;
         } else {
-            // What grew in vain takes memory that others need now; what cannot shrink stays large.
+            // Shrink again what has grown, since others need that memory; a buffer that fails to shrink stays large.
             let old = self.capacity;
             if let Err(error) = self.resize_those(&old, false) {
-                tracing::debug!("not all memory is given back: {error}");
+                tracing::debug!("some buffers keep their larger size: {error}");
             }
         }
         for index in 0..self.table.len() {
@@ -106,8 +106,8 @@ impl Scheduler {
         resized
     }
 
-    /// Allocates what a failed [`Self::resize_own`] has lost: buffers without content, whose old memory was given up for
-    /// the new and could not be had back.
+    /// Allocates the buffers that a failed [`Self::resize_own`] has lost: they have no contents to keep, their old
+    /// memory was freed for the new one, and could not be allocated again.
     pub(super) fn replace_lost(&mut self) -> Result<()> {
         for index in 0..self.table.len() {
             if self.grows(index, &self.capacity)? == Some(true) {
@@ -126,7 +126,7 @@ impl Scheduler {
         Ok(())
     }
 
-    /// True if a buffer must grow, false if it may shrink, none if it stays.
+    /// Returns true if a buffer must grow, false if it may shrink, `None` if it stays.
     fn grows(&self, index: usize, capacity: &Capacity) -> Result<Option<bool>> {
         let decl = &self.table[index];
         if decl.class == Class::Step {
@@ -142,7 +142,7 @@ impl Scheduler {
         let keep = memory::bytes_of(decl, capacity)?.min(memory::bytes_of(decl, &self.capacity)?);
         let bytes = self.own_bytes(decl, capacity)?;
         if decl.class != Class::Model {
-            // Nothing to keep: the old memory is free for the new.
+            // There are no contents to keep, so the old memory is freed before the new is allocated.
             let old = std::mem::take(&mut self.storage.own[index]);
             let old_bytes = old.first().map_or(0, Buffer::bytes);
             drop(old);
@@ -152,8 +152,7 @@ impl Scheduler {
                     Ok(())
                 }
                 Err(error) => {
-                    // The old size fitted a moment ago; should it not now, the first error is still the one to tell, and
-                    // the next list asks again.
+                    // The old size fitted a moment ago. If it fails now, report the first error; the next list retries.
                     self.storage.own[index] = allocate(&self.gpu, decl, old_bytes).unwrap_or_default();
                     Err(error)
                 }
@@ -174,7 +173,7 @@ impl Scheduler {
         })
     }
 
-    /// Zeros in all copies of a buffer that is not scratch.
+    /// Zeroes all copies of a buffer outside of scratch.
     fn clear(&mut self, buf: Buf) -> Result<()> {
         self.immediately(|recorder, storage, _| {
             for buffer in &storage.own[buf.index()] {
@@ -184,7 +183,7 @@ impl Scheduler {
         })
     }
 
-    /// Makes the Step arena at least this large; if it has to grow, lists that exist are recorded anew.
+    /// Grows the Step arena to at least these page sizes. If it has to grow, all existing lists are recorded again.
     pub(super) fn grow_arena(&mut self, pages: &[u64]) -> Result<()> {
         let now = self.storage.step.iter().map(Buffer::bytes).collect::<Vec<_>>();
         let merged = memory::merge_pages([now.as_slice(), pages].into_iter());
@@ -194,8 +193,8 @@ impl Scheduler {
         self.wait_all()?;
         let current = self.current.take();
         let plans = std::mem::take(&mut self.lists).into_iter().map(|list| list.plan).collect::<Vec<_>>();
-        // Scratch has nothing to keep, so the old memory is free for the new. Should the new not fit, no list is left
-        // that could use what is not there, and ids of lists are refused.
+        // Scratch has no contents to keep, so the old memory is freed before the new is allocated. If the new does not
+        // fit, no list is left that could use the missing memory, and ids of lists are refused.
         self.storage.step.clear();
         let generation = self.generation;
         self.generation += 1;
@@ -218,7 +217,7 @@ impl Scheduler {
         })
     }
 
-    /// Writes the guards behind the buffers that are not scratch.
+    /// Writes the guards behind the buffers outside of scratch.
     fn write_own_guards(&mut self) -> Result<()> {
         if !self.options.plan.guards {
             return Ok(());
@@ -234,7 +233,7 @@ impl Scheduler {
     }
 }
 
-/// Buffers of a class have one copy per frame, or one in all.
+/// Index of a buffer's copy for a frame: classes have one copy per frame, or one in total.
 pub(super) fn copy_of(class: Class, frame: usize) -> usize {
     if class.copies() > 1 { frame } else { 0 }
 }

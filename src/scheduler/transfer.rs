@@ -10,7 +10,7 @@ use crate::scheduler::plan::{Buf, Class, memory};
 use bytemuck::Pod;
 use std::sync::Arc;
 
-/// Host-visible memory through which the host reaches device memory.
+/// Host-visible memory for transfers to and from device memory.
 pub(super) struct Staging {
     up: Buffer,
     down: Buffer,
@@ -29,10 +29,10 @@ impl Staging {
 }
 
 impl Scheduler {
-    /// Writes elements to a buffer, from its element `first` on; `T` may be any plain type.
+    /// Writes elements to a buffer, starting at element `first`; `T` may be any plain type.
     ///
-    /// Waits for what still uses the buffer. The frame counts for PerFrame and Report buffers only. For a scratch buffer, the
-    /// list that was prepared or submitted last is meant, and it must have been planned without aliasing.
+    /// Waits for all uses of the buffer. `frame` matters for PerFrame and Report buffers only. A scratch buffer is that
+    /// of the list that was prepared or submitted last; its plan must not alias.
     pub fn upload<T: Pod>(&mut self, buf: Buf, frame: usize, first: u64, data: &[T]) -> Result<()> {
         let data: &[u8] = bytemuck::cast_slice(data);
         let start = self.range(buf, frame, first, data.len() as u64)?;
@@ -47,7 +47,7 @@ impl Scheduler {
         if class == Class::Step && self.options.plan.aliases() {
             let name = self.decl(buf)?.name;
             return Err(Error::Bug(format!(
-                "{name} is scratch, its bytes are shared; plan without aliasing to upload to it"
+                "{name} is a scratch buffer with shared bytes; plan without aliasing to upload to it"
             )));
         }
         let half = self.staging.up.bytes();
@@ -63,10 +63,10 @@ impl Scheduler {
         Ok(())
     }
 
-    /// Reads `count` values from a buffer, from its element `first` on; `T` may be any plain type.
+    /// Reads `count` values from a buffer, starting at element `first`; `T` may be any plain type.
     ///
-    /// Waits for what still writes the buffer. The frame counts for PerFrame and Report buffers only. For a scratch buffer,
-    /// the list that was prepared or submitted last is meant; fails if later passes of the list reused its bytes.
+    /// Waits for all writes to the buffer. `frame` matters for PerFrame and Report buffers only. A scratch buffer is
+    /// that of the list that was prepared or submitted last; fails if later passes of the list have reused its bytes.
     pub fn download<T: Pod>(&mut self, buf: Buf, frame: usize, first: u64, count: usize) -> Result<Vec<T>> {
         let mut values = vec![T::zeroed(); count];
         let bytes: &mut [u8] = bytemuck::cast_slice_mut(&mut values);
@@ -76,7 +76,7 @@ impl Scheduler {
         Ok(values)
     }
 
-    /// Sets every word of a buffer, in all its copies; waits for what still uses it.
+    /// Sets every word of all copies of a buffer; waits for all uses of it.
     pub fn fill(&mut self, buf: Buf, word: u32) -> Result<()> {
         self.wait_all()?;
         if self.decl(buf)?.class != Class::Step && self.is_empty(buf)? {
@@ -93,17 +93,17 @@ impl Scheduler {
         Ok(())
     }
 
-    /// Bytes of the elements of a buffer.
+    /// Bytes of all elements of a buffer.
     pub fn bytes(&self, buf: Buf) -> Result<u64> {
         memory::bytes_of(self.decl(buf)?, &self.capacity)
     }
 
-    /// True if the capacities give a buffer no elements, and so no memory of its own.
+    /// Returns true if the capacities give a buffer no elements; it then has no memory of its own.
     pub(super) fn is_empty(&self, buf: Buf) -> Result<bool> {
         Ok(self.capacity.count(self.decl(buf)?.domain) == 0)
     }
 
-    /// True if the current list touches a scratch buffer.
+    /// Returns true if the current list uses a scratch buffer.
     pub(super) fn is_placed(&self, buf: Buf) -> bool {
         self.current.is_some_and(|list| self.lists[list].plan.placements[buf.index()].is_some())
     }
@@ -112,7 +112,7 @@ impl Scheduler {
         self.lists[list].recordings.iter().any(|recording| recording.busy > 0)
     }
 
-    /// Words of a range that may lie behind the end of a buffer.
+    /// Reads a range of words that may lie behind the end of a buffer.
     pub(super) fn read_words(&mut self, buf: Buf, frame: usize, start: u64, bytes: u64) -> Result<Vec<u32>> {
         let mut words = vec![0_u32; bytes as usize / 4];
         self.read_bytes(buf, frame, start, bytemuck::cast_slice_mut(&mut words))?;
@@ -140,7 +140,7 @@ impl Scheduler {
         Ok(())
     }
 
-    /// Byte offset of an element, if the range lies in the buffer.
+    /// Returns the byte offset of an element; fails if the range leaves the buffer.
     fn range(&self, buf: Buf, frame: usize, first: u64, bytes: u64) -> Result<u64> {
         self.check_frame(frame)?;
         let (decl, all) = (self.decl(buf)?, self.bytes(buf)?);
@@ -149,17 +149,19 @@ impl Scheduler {
             .filter(|start| start.checked_add(bytes).is_some_and(|end| end <= all) && bytes.is_multiple_of(4));
         start.ok_or_else(|| {
             let name = decl.name;
-            Error::Bug(format!("{bytes} bytes from element {first} are no range of words of {name} ({all} bytes)"))
+            Error::Bug(format!(
+                "{bytes} bytes from element {first} of {name} ({all} bytes): no range of words inside the buffer"
+            ))
         })
     }
 
-    /// Where a buffer lies now.
+    /// Returns the present place of a buffer.
     fn locate(&self, buf: Buf, frame: usize) -> Result<Place> {
         let decl = self.decl(buf)?;
         if decl.class != Class::Step {
             return Ok(Place::Own(buf, copy_of(decl.class, frame)));
         }
-        let none = || Error::Bug(format!("{} is scratch, and no list that uses it was prepared", decl.name));
+        let none = || Error::Bug(format!("{} is a scratch buffer, and no prepared list uses it", decl.name));
         let list = self.current.ok_or_else(none)?;
         let place = self.lists[list].plan.placement(buf)?;
         match place.page {
@@ -184,7 +186,7 @@ impl Scheduler {
     }
 }
 
-/// A place that can be looked up while commands are recorded.
+/// A buffer's place, without a borrow of the scheduler while commands are recorded.
 #[derive(Clone, Copy)]
 enum Place {
     Own(Buf, usize),

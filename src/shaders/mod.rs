@@ -1,28 +1,28 @@
-//! Generated interface of the GLSL shaders, and the types that it is made of.
+//! Generated interface of the GLSL shaders, and its types.
 //!
 //! `build.rs` compiles every `glsl/**/*.comp`, reflects the SPIR-V and writes one module per file with `Macros`,
-//! `Bindings<B>` and `Spec` (field names are the GLSL names; all that some sibling of the file has) and the [`Compiled`]
-//! variants. Layouts, bindings and access are written in GLSL and nowhere else.
-// The generated side is public throughout, whatever of it is used.
+//! `Bindings<B>`, `Spec` and the [`Compiled`] variants. Fields have their GLSL names and cover all variants of the
+//! file. Layouts, bindings and access are defined in GLSL only.
+// All generated items are public, even unused ones.
 #![allow(unreachable_pub)]
 
-/// What a shader does with a binding; from the GLSL qualifiers `readonly` and `writeonly`.
+/// Access of a shader to a binding; from the GLSL qualifiers `readonly` and `writeonly`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Access {
     /// `readonly`, and every texel buffer.
     Read,
     /// `writeonly`.
     Write,
-    /// Neither.
+    /// Without a qualifier.
     ReadWrite,
 }
 
-/// How a buffer is bound.
+/// Kind of a binding.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum BindingKind {
     /// `buffer` block.
     Storage,
-    /// `uniform textureBuffer` or `utextureBuffer`; the view's format is the buffer's (see `plan::buffers`).
+    /// `uniform textureBuffer` or `utextureBuffer`; the buffer decides the view's format (see `plan::buffers`).
     Texel,
 }
 
@@ -33,9 +33,9 @@ pub struct BindingDesc {
     pub name: &'static str,
     /// Binding number.
     pub binding: u32,
-    /// How it is bound.
+    /// Kind of the binding.
     pub kind: BindingKind,
-    /// What is done with it.
+    /// Access of the shader.
     pub access: Access,
     /// Bytes of one element of the runtime array, or of the whole struct; 0 for texel buffers.
     pub element_bytes: u32,
@@ -76,12 +76,12 @@ pub struct ShaderDesc {
     pub spec: &'static [SpecDesc],
     /// Invocations on each axis of a workgroup.
     pub local_size: [LocalSize; 3],
-    /// True if the shader uses subgroup operations, so that the subgroup size must be pinned.
+    /// True if the shader uses subgroup operations; its subgroup size must then be pinned.
     pub uses_subgroups: bool,
 }
 
 impl ShaderDesc {
-    /// Invocations on each axis of a workgroup with these words of the specialisation constants.
+    /// Invocations on each axis of a workgroup, with these values of the specialisation constants.
     pub fn workgroup(&self, words: &[u32]) -> [u32; 3] {
         self.local_size.map(|size| match size {
             LocalSize::Fixed(size) => size,
@@ -93,12 +93,12 @@ impl ShaderDesc {
     }
 }
 
-/// One way in which a GLSL file is compiled.
+/// One variant of a GLSL file.
 #[derive(Debug)]
 pub struct Compiled {
     /// Its macros, in the order of their names.
     pub macros: &'static [&'static str],
-    /// What came of it.
+    /// The compiled shader.
     pub shader: ShaderDesc,
 }
 
@@ -106,7 +106,7 @@ pub struct Compiled {
 include!(concat!(env!("OUT_DIR"), "/shaders.rs"));
 
 impl structs::Counters {
-    /// Splats that tiles walked, over all tiles; times the pixels of a tile these are the (pixel, splat) pairs.
+    /// Splats that tiles walked, over all tiles; times the pixels per tile, the number of (pixel, splat) pairs.
     pub fn walked_splats(&self) -> u64 {
         u64::from(self.walked_first) + u64::from(self.walked_second)
     }

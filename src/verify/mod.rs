@@ -1,4 +1,4 @@
-//! The engine against the method in double precision: the mirrors, and the comparison on the user's own device.
+//! The engine compared with the method in double precision: the mirrors, and the comparison on the user's own device.
 
 pub mod reference;
 pub mod selftest;

@@ -1,4 +1,4 @@
-//! Places of buffers: Step buffers share pages by first fit, all others have memory of their own.
+//! Places buffers: Step buffers share pages by first fit, all others have their own memory.
 
 use super::Limits;
 use super::buffers::{Buf, BufferDecl, Class};
@@ -14,10 +14,10 @@ struct Placed {
     life: Life,
 }
 
-/// Places every buffer that is not scratch, and the scratch that the list touches; returns the sizes of the Step pages.
+/// Places every buffer outside of scratch, and the scratch buffers of the list; returns the sizes of the Step pages.
 ///
-/// Larger buffers go first, equal ones by name: first fit then wastes little, and the result does not depend on the
-/// order of the table.
+/// Larger buffers go first, equal ones in the order of their names: this wastes little space in first fit, and the
+/// result does not depend on the order of the table.
 pub(super) fn place(
     table: &'static [BufferDecl],
     sizes: &[Size],
@@ -54,7 +54,7 @@ pub(super) fn place(
     Ok((placements, pages))
 }
 
-/// The lowest place in the first page with room, or the start of a new page.
+/// Returns the lowest place in the first page with room, or the start of a new page.
 fn first_fit(placed: &[Placed], pages: usize, bytes: u64, life: Life, limits: &Limits) -> (usize, u64) {
     for page in 0..pages {
         let mut taken = placed
@@ -78,7 +78,7 @@ fn first_fit(placed: &[Placed], pages: usize, bytes: u64, life: Life, limits: &L
 }
 
 fn check_allocation(decl: &BufferDecl, bytes: u64, limits: &Limits) -> Result<()> {
-    // The page of a buffer is rounded up to the alignment.
+    // A buffer's page is rounded up to the alignment.
     let needed = bytes.next_multiple_of(limits.alignment());
     if needed <= limits.max_allocation {
         return Ok(());

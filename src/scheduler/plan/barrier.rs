@@ -1,8 +1,8 @@
-//! Hazards on byte ranges, and the barriers that remove them.
+//! Finds hazards on byte ranges, and the barriers that remove them.
 //!
-//! Ranges are compared, not buffers, so the reuse of bytes by aliasing needs no rule of its own: it is a write after a
-//! read, like any other. All barriers are global memory barriers: one before an item orders everything before it
-//! against everything after it, for the kinds of use in its masks.
+//! Hazards compare byte ranges, not buffers. Aliasing therefore needs no special rule: reused bytes are a write after a
+//! read, like any other. All barriers are global memory barriers: a barrier orders all earlier items before all later
+//! items, for the kinds of use in its masks.
 
 use super::buffers::{Buf, BufferDecl};
 use super::memory::Size;
@@ -43,7 +43,7 @@ impl Use {
 pub struct Uses(u8);
 
 impl Uses {
-    /// Every kind.
+    /// The set of all kinds.
     pub const ALL: Self = Self(0b1_1111);
 
     /// Adds a kind.
@@ -51,38 +51,38 @@ impl Uses {
         self.0 |= 1 << kind as u8;
     }
 
-    /// True if it holds the kind.
+    /// Returns true if the set contains the kind.
     pub fn contains(self, kind: Use) -> bool {
         self.0 & (1 << kind as u8) != 0
     }
 }
 
-/// A use of some bytes of a buffer, before it has a place.
+/// A use of bytes of a buffer that has no place yet.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct BufferUse {
     pub(super) buf: Buf,
     pub(super) kind: Use,
-    /// Byte range in the buffer; none for all of it.
+    /// Byte range in the buffer; `None` for the whole buffer.
     range: Option<(u64, u64)>,
 }
 
-/// A use of a range of memory by an item.
+/// An item's use of a range of memory.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Touch {
     /// The buffer.
     pub buf: Buf,
-    /// What is done.
+    /// Kind of use.
     pub kind: Use,
     /// The memory.
     pub page: Page,
     /// First byte.
     pub start: u64,
-    /// Byte after the last.
+    /// First byte after the range.
     pub end: u64,
 }
 
 impl Touch {
-    /// True if the two must not be reordered: they share bytes and one of them writes.
+    /// Returns true if the order of the two matters: they share bytes and at least one writes.
     pub fn conflicts(&self, other: &Self) -> bool {
         self.page == other.page
             && self.start < other.end
@@ -94,15 +94,15 @@ impl Touch {
 /// A global memory barrier before an item.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Barrier {
-    /// Uses before it that it waits for.
+    /// Earlier uses that the barrier waits for.
     pub src: Uses,
-    /// Uses after it that wait.
+    /// Later uses that wait for the barrier.
     pub dst: Uses,
-    /// Why it is there.
+    /// Hazards that need the barrier, as text.
     pub reason: String,
 }
 
-/// What an item does with buffers.
+/// Lists an item's uses of buffers.
 pub(super) fn uses(work: &Work, sizes: &[Size]) -> Vec<BufferUse> {
     let whole = |buf, kind| BufferUse { buf, kind, range: None };
     match work {
@@ -134,12 +134,12 @@ pub(super) fn uses(work: &Work, sizes: &[Size]) -> Vec<BufferUse> {
     }
 }
 
-/// The same uses as ranges of memory.
+/// Converts uses of buffers to uses of ranges of memory.
 pub(super) fn touches(uses: &[BufferUse], placements: &[Option<Placement>]) -> Result<Vec<Touch>> {
     uses.iter()
         .map(|used| {
             let place = placements[used.buf.index()]
-                .ok_or_else(|| Error::Bug(format!("buffer {} is used and has no place", used.buf.0)))?;
+                .ok_or_else(|| Error::Bug(format!("buffer {} is in use but has no place", used.buf.0)))?;
             let (start, end) = used.range.unwrap_or((0, place.bound));
             let (page, buf, kind) = (place.page, used.buf, used.kind);
             Ok(Touch { buf, kind, page, start: place.offset + start, end: place.offset + end })
@@ -147,10 +147,10 @@ pub(super) fn touches(uses: &[BufferUse], placements: &[Option<Placement>]) -> R
         .collect()
 }
 
-/// At most one barrier before each item, as few as possible.
+/// Derives the barriers: at most one before each item, and as few as possible.
 ///
-/// A barrier is put as late as possible, just before the item that needs it; every later hazard across it is then
-/// covered by widening its masks, which costs nothing as it is global anyway.
+/// A barrier is placed as late as possible, directly before the item that needs it. Later hazards across it only widen
+/// its masks, which costs nothing, because it is global.
 pub(super) fn derive(
     table: &'static [BufferDecl],
     labels: &[String],
@@ -185,7 +185,7 @@ pub(super) fn derive(
         if !reasons.is_empty() || (everywhere && item > 0) {
             if everywhere {
                 (fresh.src, fresh.dst) = (Uses::ALL, Uses::ALL);
-                reasons.push("a barrier before every item was asked for".to_owned());
+                reasons.push("barrier_everywhere puts a barrier before every item".to_owned());
             }
             fresh.reason = reasons.join("; ");
             barriers[item] = Some(fresh);

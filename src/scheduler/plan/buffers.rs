@@ -1,29 +1,29 @@
-//! What a table of buffers is made of; the table itself is `plan/table.rs`.
+//! Types for the rows of a table of buffers; the table itself is `plan/table.rs`.
 //!
-//! A buffer is a plane of equal elements. What it is bound as (read, written, texel) stands in the shaders; where it
-//! lies in memory is decided by the planner from its class.
+//! A buffer is an array of equal elements. The shaders declare its bindings (read, written, texel); the planner chooses
+//! its place in memory by its class.
 
 use super::capacity::Domain;
 
-/// A buffer: the index of its row in the table. Made by [`buffers!`](crate::buffers).
+/// A buffer: the index of its row in the table. [`buffers!`](crate::buffers) makes the constants.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Buf(pub u16);
 
 impl Buf {
-    /// Row of the table.
+    /// Index of the buffer's row in the table.
     pub fn index(self) -> usize {
         usize::from(self.0)
     }
 }
 
-/// How long the contents of a buffer live, and who may see them.
+/// Lifetime of a buffer's contents, and who accesses them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Class {
-    /// The trained model and what belongs to it; kept when capacities change; never aliased.
+    /// The trained model and its state; kept when capacities change; never aliased.
     Model,
-    /// Kept from step to step and never aliased, but zeroed whenever it is (re)allocated.
+    /// Kept from step to step and never aliased; zeroed whenever it is (re)allocated.
     Persistent,
-    /// Scratch of one pass list; buffers whose lives do not overlap share bytes.
+    /// Scratch of one pass list; buffers with disjoint lifetimes share bytes.
     Step,
     /// Written by the host for each step; one copy per frame, in host-visible memory.
     PerFrame,
@@ -32,7 +32,7 @@ pub enum Class {
 }
 
 impl Class {
-    /// Number of copies: two for what the host shares with the steps in flight.
+    /// Number of copies: two for buffers that the host shares with the steps in flight.
     pub fn copies(self) -> u64 {
         match self {
             Self::PerFrame | Self::Report => super::FRAMES_IN_FLIGHT as u64,
@@ -78,13 +78,13 @@ impl TexelFormat {
 pub struct BufferDecl {
     /// Plural noun, the same in GLSL, plan and reference.
     pub name: &'static str,
-    /// Bytes of one element; a multiple of 4.
+    /// Bytes per element; a multiple of 4.
     pub element_bytes: u32,
-    /// What is counted: the number of elements is the capacity of this domain.
+    /// Domain; its capacity is the number of elements.
     pub domain: Domain,
-    /// How long it lives.
+    /// Lifetime of the contents.
     pub class: Class,
-    /// Format of the texel view, if shaders fetch from it as a texel buffer.
+    /// Format of the texel view, if shaders read the buffer as texels.
     pub texel: Option<TexelFormat>,
     /// Shape, unit and meaning.
     pub doc: &'static str,
@@ -92,9 +92,9 @@ pub struct BufferDecl {
 
 /// Declares a table of buffers.
 ///
-/// Each row is `NAME "name": element_bytes, domain, class, texel, "doc";`. The plain form yields the constants
-/// `Buf::NAME` and `pub static TABLE: &[BufferDecl]` (only this crate can use it, as `Buf` is its type); the form
-/// that starts with `consts;` yields free constants `NAME` instead, for tables of tests. A row may have a `#[cfg]`.
+/// Each row is `NAME "name": element_bytes, domain, class, texel, "doc";` and may have a `#[cfg]`. The plain form
+/// defines the constants `Buf::NAME` and `pub static TABLE: &[BufferDecl]`; only this crate can use it, because `Buf`
+/// is its type. The form that starts with `consts;` defines free constants `NAME` instead, for tables of tests.
 #[doc(hidden)]
 #[macro_export]
 macro_rules! buffers {
@@ -106,7 +106,7 @@ macro_rules! buffers {
     (@table $($(#[$gate:meta])? $ident:ident $name:literal : $bytes:expr, $domain:expr, $class:expr, $texel:expr, $doc:literal;)*) => {
         #[allow(non_camel_case_types, clippy::upper_case_acronyms, dead_code)]
         enum BufferIndex { $($(#[$gate])? $ident),* }
-        /// The rows of the table of buffers, in the order of their declaration.
+        /// All rows of the table of buffers, in the order of their declaration.
         pub static TABLE: &[$crate::internals::scheduler::plan::BufferDecl] = &[$($(#[$gate])? $crate::internals::scheduler::plan::BufferDecl {
             name: $name, element_bytes: $bytes, domain: $domain, class: $class, texel: $texel, doc: $doc,
         }),*];

@@ -1,6 +1,6 @@
-//! Domains (what buffers count) and capacities (how many there may be): one table, a row for each domain.
+//! Domains (the things that buffers count) and capacities (their maximum numbers): one table, with a row per domain.
 
-/// What the user can do, by what decides a domain: `{fits}` and `{name}` stand for the number that fits, and of what.
+/// Cures by the cause of a domain's size. `{fits}` stands for the number that fits, `{name}` for the domain's name.
 mod cures {
     pub(super) const MODEL: &str = "lower `max_gaussians` to {fits} or use another device";
     pub(super) const VOTES: &str = "at most {fits} {name} fit; lower `max_gaussians` or use another device";
@@ -13,18 +13,18 @@ mod cures {
 
 /// Declares a table of domains and the capacities that count them.
 ///
-/// Each row is `Variant field: "name", cure, "doc";`. Behind `..` stand capacities that no buffer counts.
+/// Each row is `Variant field: "name", cure, "doc";`. The rows after `..` are capacities without a buffer.
 macro_rules! domains {
     ($domain:ident, $capacity:ident;
         $($row:ident $field:ident: $name:literal, $cure:expr, $doc:literal;)*
         .. $($other:ident: $other_doc:literal;)*) => {
-        /// What the elements of a buffer are.
+        /// Things that the elements of a buffer stand for.
         #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
         pub enum $domain {
             /// A single element.
             One,
             $(#[doc = $doc] $row,)*
-            /// A fixed number, whatever the capacity.
+            /// A fixed number, independent of the capacity.
             Fixed(u32),
         }
 
@@ -38,7 +38,7 @@ macro_rules! domains {
                 }
             }
 
-            /// What the user can do when at most `fits` elements fit.
+            /// Advice to the user if at most `fits` elements fit.
             pub fn cure(self, fits: u64) -> String {
                 let cure = match self {
                     Self::One | Self::Fixed(_) => cures::NONE,
@@ -48,7 +48,7 @@ macro_rules! domains {
             }
         }
 
-        /// The most there may be of each domain; decides the size of every buffer.
+        /// Maximum number of each domain; decides the size of every buffer.
         #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
         pub struct $capacity {
             $(#[doc = $doc] pub $field: u64,)*
@@ -70,33 +70,33 @@ macro_rules! domains {
 
 domains! { Domain, Capacity;
     Gaussians gaussians: "gaussians", cures::MODEL,
-        "Rows of the model; visible splats are at most as many.";
+        "Rows of the model; also the maximum number of visible splats.";
     Trained trained: "trained", cures::MODEL,
-        "Rows with optimiser state: the same as Gaussians, or 0 where nothing is trained.";
+        "Rows with optimiser state: equal to Gaussians, or 0 without training.";
     Labelled labelled: "labelled", cures::MODEL,
-        "Rows with labels: the same as Gaussians, or 0 in a scene without masks.";
+        "Rows with labels: equal to Gaussians, or 0 in a scene without masks.";
     Instances instances: "instances", cures::PAIRS,
-        "Pairs of splat and tile.";
+        "(splat, tile) pairs.";
     TrainedInstances trained_instances: "trained instances", cures::PAIRS,
-        "Pairs with a gradient record: the same as Instances, or 0 where nothing is trained.";
+        "Pairs with a gradient record: equal to Instances, or 0 without training.";
     VirtualTiles virtual_tiles: "virtual tiles", cures::IMAGE,
         "Tiles of all layers: the scene and each sampled object.";
     LayerTiles layer_tiles: "layer tiles", cures::LAYERS,
-        "Tiles of object layers that hold a splat.";
+        "Tiles of object layers with at least one splat.";
     LayerPixels layer_pixels: "layer pixels", cures::LAYERS,
-        "Pixels of those tiles.";
+        "Pixels of the layer tiles.";
     Pixels pixels: "pixels", cures::IMAGE,
         "Pixels of one image.";
     LabelledPixels labelled_pixels: "labelled pixels", cures::IMAGE,
-        "Pixels with labels: the same as Pixels, or 0 in a scene without masks.";
+        "Pixels with labels: equal to Pixels, or 0 in a scene without masks.";
     Labels labels: "labels", cures::LAYERS,
-        "Label ids, 0 included.";
+        "Label ids, including 0.";
     VoteColumns vote_columns: "vote columns", cures::VOTES,
         "Labels that a sweep of votes counts at once.";
     VoteCells vote_cells: "vote cells", cures::VOTES,
-        "Gaussians times these.";
+        "Gaussians times vote columns.";
     Layers layers: "layers", cures::LAYERS,
-        "Layers, the scene included.";
+        "Layers, including the scene.";
     OccluderWords occluder_words: "occluder words", cures::LAYERS,
         "Words of occluder bits of all layers.";
     SortCells sort_cells: "sort cells", cures::PAIRS,
@@ -106,16 +106,16 @@ domains! { Domain, Capacity;
     LossPartials loss_partials: "loss partials", cures::IMAGE,
         "Partial sums of the loss.";
     SegmentPixels segment_pixels: "segment pixels", cures::IMAGE,
-        "Pixels of all jobs of the blend passes, or 0 while no tile's list is too long for one dispatch.";
+        "Pixels of all jobs of the blend passes, or 0 while one dispatch can walk each tile's list.";
     SharedRows shared_rows: "shared rows", cures::NONE,
-        "Rows of four parameters that are no Gaussian's, or 0 in a training without any.";
+        "Rows of four shared parameters, or 0 without any.";
     .. sort_lanes: "Lanes of the sort.";
-    segments: "Dispatches that one walk of a tile's list may take.";
+    segments: "Maximum number of dispatches for one walk of a tile's list.";
 }
 
 impl Capacity {
-    /// The next capacity when `needed` elements did not fit into `current`: half as much again, and at least a tenth
-    /// more than what was needed, so that a slowly growing need does not overflow at each step.
+    /// Returns the next capacity after `needed` elements did not fit into `current`: 1.5 times `current`, and at least
+    /// 1.1 times `needed`, so that slow growth does not overflow at every step.
     pub fn grown(current: u64, needed: u64) -> u64 {
         let half_again = current.saturating_add(current / 2);
         let tenth_more = needed.saturating_add(needed.div_ceil(10));
@@ -125,7 +125,7 @@ impl Capacity {
 
 #[cfg(test)]
 mod tests {
-    /// A domain of another table: what a row says is all that there is to say.
+    /// A domain of another table, to show that a row is complete.
     #[allow(unreachable_pub, reason = "the macro makes a public table")]
     mod shelves {
         use super::super::cures;

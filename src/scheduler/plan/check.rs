@@ -1,4 +1,4 @@
-//! Checks of a pass list against the shaders' interfaces and the device's limits, before anything is planned.
+//! Checks a pass list against the shaders' interfaces and the device's limits, before planning.
 
 use super::Limits;
 use super::buffers::{Buf, BufferDecl};
@@ -37,7 +37,7 @@ fn check_copy(table: &'static [BufferDecl], sizes: &[Size], from: Buf, to: Buf, 
     if from == to || bytes > most || !bytes.is_multiple_of(4) {
         let (from, to) = (name(table, from), name(table, to));
         return Err(Error::Bug(format!(
-            "copy of {bytes} bytes from {from} to {to}: two different buffers, a multiple of 4 and at most {most} expected"
+            "copy of {bytes} bytes from {from} to {to}: expected two different buffers, a multiple of 4 bytes, at most {most}"
         )));
     }
     Ok(())
@@ -72,8 +72,10 @@ fn check_counts(pass: &PassDecl, limits: &Limits) -> Result<()> {
         [("storage", storage, limits.max_storage_buffers), ("texel", texel, limits.max_texel_buffers)]
     {
         if found > limit as usize {
-            let problem =
-                format!("the shader {} has {found} {what} buffers, the device takes {limit}", pass.shader.name);
+            let problem = format!(
+                "the shader {} has {found} {what} buffers; the device supports at most {limit}",
+                pass.shader.name
+            );
             return Err(Error::NoDevice(problem));
         }
     }
@@ -84,13 +86,13 @@ fn check_grid(table: &'static [BufferDecl], sizes: &[Size], pass: &PassDecl, lim
     match pass.grid {
         Grid::Groups(x, y, z) => {
             let fits = [x, y, z].iter().zip(&limits.max_groups).all(|(count, limit)| count <= limit);
-            let problem = || format!("{x} x {y} x {z} workgroups, the device takes {:?}", limits.max_groups);
+            let problem = || format!("{x} x {y} x {z} workgroups; the device supports at most {:?}", limits.max_groups);
             if fits { Ok(()) } else { Err(Error::Bug(problem())) }
         }
         Grid::Indirect(buf, offset) => {
             let decl = row(table, buf)?;
             let inside = u64::from(offset) + 12 <= sizes[buf.index()].bytes && offset.is_multiple_of(4);
-            let problem = || format!("indirect arguments at byte {offset} of {} do not lie in it", decl.name);
+            let problem = || format!("indirect arguments at byte {offset} of {}: outside of the buffer", decl.name);
             if inside { Ok(()) } else { Err(Error::Bug(problem())) }
         }
     }
@@ -98,7 +100,8 @@ fn check_grid(table: &'static [BufferDecl], sizes: &[Size], pass: &PassDecl, lim
 
 fn check_storage(decl: &BufferDecl, size: Size, binding: &BindingDesc, limits: &Limits) -> Result<()> {
     let (ours, shaders) = (decl.element_bytes, binding.element_bytes);
-    // A struct may span words of a buffer of fixed size; elsewhere wider elements would be read past the last one.
+    // In a buffer of fixed size, a shader's struct may span several elements. In other buffers, wider elements would
+    // read past the end.
     let fixed = matches!(decl.domain, Domain::Fixed(_)) && shaders.is_multiple_of(ours);
     let divides = shaders == 0 || ours.is_multiple_of(shaders) || fixed;
     if !divides || size.bytes < u64::from(shaders) {
@@ -107,7 +110,7 @@ fn check_storage(decl: &BufferDecl, size: Size, binding: &BindingDesc, limits: &
             "buffer {name} ({bytes} bytes, elements of {ours}) is bound as {block}, whose elements have {shaders} bytes"
         )));
     }
-    // The guard counts too, but it exists in tests only and would make the message name a size nobody asked for.
+    // Compare without the guard: it exists in tests only, and the message would name a size that includes it.
     if size.bytes <= limits.max_storage_range {
         return Ok(());
     }
@@ -123,13 +126,13 @@ fn check_storage(decl: &BufferDecl, size: Size, binding: &BindingDesc, limits: &
 fn check_texel(decl: &BufferDecl, size: Size, binding: &BindingDesc, limits: &Limits) -> Result<()> {
     let Some(format) = decl.texel else {
         let (name, block) = (decl.name, binding.name);
-        return Err(Error::Bug(format!("buffer {name} has no texel format and is bound as the texel buffer {block}")));
+        return Err(Error::Bug(format!("buffer {name} has no texel format but is bound as the texel buffer {block}")));
     };
     let texel = u64::from(format.bytes());
     if !u64::from(decl.element_bytes).is_multiple_of(texel) {
         let (name, ours) = (decl.name, decl.element_bytes);
         return Err(Error::Bug(format!(
-            "elements of {name} have {ours} bytes, which are no whole number of texels of {texel}"
+            "elements of {name} have {ours} bytes; expected a multiple of the texel size, {texel}"
         )));
     }
     if size.bytes / texel <= limits.max_texel_elements {

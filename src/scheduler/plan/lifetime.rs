@@ -4,17 +4,17 @@ use super::barrier::BufferUse;
 use super::buffers::{BufferDecl, Class};
 use crate::error::{Error, Result};
 
-/// The items between which a buffer's contents matter, both inclusive.
+/// The range of items in which a buffer's contents matter, both ends inclusive.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Life {
-    /// First item that touches it.
+    /// First item that uses the buffer.
     pub first: usize,
-    /// Last item that touches it.
+    /// Last item that uses the buffer.
     pub last: usize,
 }
 
 impl Life {
-    /// True if both are alive during some item.
+    /// Returns true if both are alive during at least one item.
     pub fn overlaps(self, other: Self) -> bool {
         self.first <= other.last && other.first <= self.last
     }
@@ -31,7 +31,7 @@ pub(super) fn lives(buffers: usize, uses: &[Vec<BufferUse>]) -> Vec<Option<Life>
     lives
 }
 
-/// Scratch that is only read when it is first touched holds whatever its bytes held before: a forgotten pass.
+/// Fails if the first use of a scratch buffer only reads it: its contents are undefined, so a pass is missing.
 pub(super) fn check_written_first(
     table: &'static [BufferDecl],
     labels: &[String],

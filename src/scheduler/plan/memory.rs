@@ -1,4 +1,4 @@
-//! Sizes of buffers, and the memory that pass lists need, predicted before anything is allocated.
+//! Sizes of buffers, and the memory of pass lists, predicted before anything is allocated.
 
 use super::Limits;
 use super::buffers::{BufferDecl, Class};
@@ -7,13 +7,13 @@ use super::pass::PassList;
 use super::{GUARD_BYTES, Plan, PlanOptions};
 use crate::error::{Error, Result};
 
-/// Bytes of the staging memory through which the host reaches device memory: one half up, one half down.
+/// Bytes of the staging memory for transfers to and from device memory: one half for each direction.
 pub(crate) const STAGING_BYTES: u64 = 8 << 20;
 
-/// Elements and bytes of one copy of a buffer.
+/// Size of one copy of a buffer.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Size {
-    /// Bytes; room for at least one element.
+    /// Bytes, for at least one element.
     pub(super) bytes: u64,
 }
 
@@ -22,11 +22,11 @@ pub(super) fn sizes(table: &'static [BufferDecl], capacity: &Capacity) -> Result
     table.iter().map(|decl| Ok(Size { bytes: bytes_of(decl, capacity)? })).collect()
 }
 
-/// Bytes of one copy of a buffer; room for at least one element, as Vulkan knows no empty buffers.
+/// Bytes of one copy of a buffer, for at least one element: Vulkan has no empty buffers.
 pub(crate) fn bytes_of(decl: &BufferDecl, capacity: &Capacity) -> Result<u64> {
     if decl.element_bytes == 0 || !decl.element_bytes.is_multiple_of(4) {
         let (name, bytes) = (decl.name, decl.element_bytes);
-        return Err(Error::Bug(format!("elements of buffer {name} have {bytes} bytes, a multiple of 4 expected")));
+        return Err(Error::Bug(format!("elements of buffer {name} have {bytes} bytes; expected a multiple of 4")));
     }
     let count = capacity.count(decl.domain).max(1);
     count.checked_mul(u64::from(decl.element_bytes)).filter(|&bytes| bytes < 1 << 62).ok_or_else(|| {
@@ -40,13 +40,13 @@ pub(crate) fn bytes_of(decl: &BufferDecl, capacity: &Capacity) -> Result<u64> {
     })
 }
 
-/// Bytes allocated for one copy of a buffer that has memory of its own.
+/// Bytes allocated for one copy of a buffer with its own memory.
 pub(crate) fn allocated_bytes(bytes: u64, options: PlanOptions, alignment: u64) -> u64 {
     (bytes + if options.guards { GUARD_BYTES } else { 0 }).next_multiple_of(alignment)
 }
 
-/// Bytes allocated for one copy of a buffer with memory of its own; nothing where it has no elements, so that what a run
-/// does not need costs nothing. No list may bind such a buffer.
+/// Bytes allocated for one copy of a buffer with its own memory; 0 if it has no elements, so that unused features cost
+/// no memory. No list may bind a buffer of 0 bytes.
 pub(crate) fn own_bytes(decl: &BufferDecl, capacity: &Capacity, options: PlanOptions, alignment: u64) -> Result<u64> {
     let bytes = bytes_of(decl, capacity)?;
     Ok(if capacity.count(decl.domain) == 0 { 0 } else { allocated_bytes(bytes, options, alignment) })
@@ -61,29 +61,29 @@ pub struct MemoryRow {
     pub class: Class,
     /// Number of elements.
     pub count: u64,
-    /// Bytes of one element.
+    /// Bytes per element.
     pub element_bytes: u32,
-    /// Bytes of all copies; for Step buffers what they would take alone.
+    /// Bytes of all copies; for Step buffers the size without aliasing.
     pub bytes: u64,
 }
 
-/// The memory that the engine needs.
+/// Memory needs of the engine.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct MemoryReport {
-    /// Every buffer that is used, in the order of the table.
+    /// Every used buffer, in the order of the table.
     pub rows: Vec<MemoryRow>,
-    /// Bytes of the pages of the Step arena: the largest of the lists, as they share it.
+    /// Bytes of each page of the Step arena. Lists share the pages, so each has the size of the largest list.
     pub step_pages: Vec<u64>,
-    /// Bytes that Step buffers would take without aliasing, of the list that needs most.
+    /// Bytes of the Step buffers without aliasing, for the list that needs most.
     pub step_unaliased: u64,
     /// Bytes of staging memory.
     pub staging: u64,
-    /// All bytes.
+    /// Total bytes.
     pub total: u64,
 }
 
 impl MemoryReport {
-    /// Predicts the memory of some lists; fails with a cure when a buffer or the sum does not fit.
+    /// Predicts the memory of lists. If a buffer or the total does not fit, the error suggests a cure.
     pub fn predict(
         table: &'static [BufferDecl],
         capacity: &Capacity,
@@ -96,7 +96,7 @@ impl MemoryReport {
         Self::of_plans(table, capacity, &plans.iter().collect::<Vec<_>>(), limits, options)
     }
 
-    /// The memory of plans that are already made.
+    /// Memory of existing plans.
     pub fn of_plans(
         table: &'static [BufferDecl],
         capacity: &Capacity,
@@ -113,7 +113,7 @@ impl MemoryReport {
                 own_bytes(decl, capacity, options, limits.alignment())?
             };
             let bytes = one * decl.class.copies();
-            // Of what only users of the library add there is nothing to say where nobody did.
+            // Only users of the library add shared rows; without any, the report omits their buffers.
             let added = decl.domain != Domain::SharedRows || capacity.shared_rows > 0;
             let used = decl.class != Class::Step || plans.iter().any(|plan| plan.placements[index].is_some());
             if decl.class != Class::Step {
@@ -132,7 +132,7 @@ impl MemoryReport {
         Ok(report)
     }
 
-    /// Fails if the sum does not fit.
+    /// Fails if the total does not fit.
     fn check(&self, limits: &Limits) -> Result<()> {
         if self.total <= limits.max_memory {
             return Ok(());
@@ -152,7 +152,7 @@ fn unaliased(plan: &Plan) -> u64 {
     step.filter_map(|(_, place)| place.map(|place| place.bound)).sum()
 }
 
-/// Sizes of pages that hold every one of several arenas.
+/// Page sizes that fit each of several arenas.
 pub(crate) fn merge_pages<'a>(arenas: impl Iterator<Item = &'a [u64]>) -> Vec<u64> {
     let mut merged: Vec<u64> = Vec::new();
     for pages in arenas {

@@ -1,6 +1,6 @@
-//! The planner: from capacities, a pass list and the limits of a device to sizes, places in memory and barriers.
+//! The planner: derives sizes, places in memory and barriers from capacities, a pass list and the limits of a device.
 //!
-//! Pure functions without Vulkan: what a plan holds is decided before anything is allocated, can be printed
+//! These are pure functions without Vulkan. A plan exists before anything is allocated, can be printed
 //! ([`Plan::report`]) and is tested without a GPU. The same input gives the same plan, byte for byte.
 
 mod arena;
@@ -29,20 +29,20 @@ pub use table::TABLE;
 use crate::error::{Error, Result};
 use crate::shaders::BindingKind;
 
-/// Steps in flight, and so copies of what the host shares with them.
+/// Number of steps in flight, and of copies of the buffers that the host shares with them.
 pub(crate) const FRAMES_IN_FLIGHT: usize = 2;
 
 /// Bytes of the guard after each buffer in test mode.
 pub(crate) const GUARD_BYTES: u64 = 256;
 
-/// Choices of a plan.
+/// Options of a plan.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PlanOptions {
-    /// Step buffers whose lives do not overlap share bytes.
+    /// Step buffers with disjoint lifetimes share bytes.
     pub alias: bool,
-    /// A guard after each buffer; switches aliasing off, so that guards outlive their buffer's neighbours.
+    /// A guard after each buffer. Guards turn aliasing off, because a neighbour in shared bytes would overwrite them.
     pub guards: bool,
-    /// A full barrier before each item: times become attributable, and results must not change.
+    /// A full barrier before each item, so that each time belongs to one item. Results do not change.
     pub barrier_everywhere: bool,
 }
 
@@ -53,38 +53,38 @@ impl Default for PlanOptions {
 }
 
 impl PlanOptions {
-    /// True if Step buffers may share bytes.
+    /// Returns true if Step buffers may share bytes.
     pub fn aliases(&self) -> bool {
         self.alias && !self.guards
     }
 }
 
-/// The memory that a buffer lies in.
+/// The memory that contains a buffer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Page {
-    /// A VkBuffer of its own (one per frame in flight for the classes with copies).
+    /// Its own VkBuffer (one per frame in flight for classes with copies).
     Own(Buf),
     /// A page of the Step arena.
     Step(u32),
 }
 
-/// Where a buffer lies.
+/// Place of a buffer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Placement {
     /// The memory.
     pub page: Page,
     /// Byte offset in the page.
     pub offset: u64,
-    /// Bytes of the elements; room for at least one.
+    /// Bytes of the elements, at least one element.
     pub bytes: u64,
-    /// Bytes bound to shaders: the elements, and in test mode the guard, so that writes past the end are seen there.
+    /// Bytes bound to shaders: the elements and, with guards, the guard, so that it catches writes past the end.
     pub bound: u64,
 }
 
-/// Number of descriptors of one frame.
+/// Number of descriptors per frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct DescriptorCounts {
-    /// Sets: one per pass.
+    /// Descriptor sets: one per pass.
     pub sets: u32,
     /// Storage buffers.
     pub storage: u32,
@@ -97,7 +97,7 @@ pub struct DescriptorCounts {
 pub struct PlanItem {
     /// Name in reports.
     pub label: String,
-    /// What it does with memory.
+    /// Memory that the item uses.
     pub touches: Vec<Touch>,
     /// The barrier before it.
     pub barrier: Option<Barrier>,
@@ -112,17 +112,17 @@ pub struct Plan {
     pub list: PassList,
     /// The capacities.
     pub capacity: Capacity,
-    /// The choices.
+    /// The options.
     pub options: PlanOptions,
-    /// Place of each buffer by row of the table; none for Step buffers that the list does not touch.
+    /// Place of each buffer by row of the table; `None` for Step buffers outside of the list.
     pub placements: Vec<Option<Placement>>,
-    /// First and last item that touches each buffer.
+    /// First and last use of each buffer.
     pub lives: Vec<Option<Life>>,
     /// Bytes of each page of the Step arena.
     pub step_pages: Vec<u64>,
-    /// The items, as many as the list's.
+    /// The items, one for each of the list.
     pub items: Vec<PlanItem>,
-    /// Descriptors of one frame.
+    /// Descriptors per frame.
     pub descriptors: DescriptorCounts,
 }
 
@@ -153,19 +153,19 @@ impl Plan {
         Ok(Self { table, list, capacity, options, placements, lives, step_pages, items, descriptors })
     }
 
-    /// Place of a buffer that the list touches, or that is not scratch.
+    /// Returns the place of a buffer; a scratch buffer must be part of the list.
     pub fn placement(&self, buf: Buf) -> Result<Placement> {
         self.placements.get(buf.index()).copied().flatten().ok_or_else(|| {
             Error::Bug(format!("pass list {} does not touch buffer {}", self.list.name, name(self.table, buf)))
         })
     }
 
-    /// Bytes of the Step arena.
+    /// Total bytes of the Step arena.
     pub fn step_bytes(&self) -> u64 {
         self.step_pages.iter().sum()
     }
 
-    /// The item that destroys the contents of a Step buffer after its last use, if bytes were reused.
+    /// Returns the buffer that overwrites a Step buffer after its last use, if any.
     pub fn overwritten_by(&self, buf: Buf) -> Option<Buf> {
         let place = self.placements.get(buf.index()).copied().flatten()?;
         let life = self.lives.get(buf.index()).copied().flatten()?;
@@ -187,7 +187,7 @@ impl Plan {
     }
 }
 
-/// Name of a buffer, for messages; safe for rows that do not exist.
+/// Name of a buffer, for messages; also for invalid rows.
 pub(crate) fn name(table: &'static [BufferDecl], buf: Buf) -> &'static str {
     table.get(buf.index()).map_or("(no such buffer)", |decl| decl.name)
 }

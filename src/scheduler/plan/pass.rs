@@ -1,10 +1,10 @@
-//! Passes as declarations: which shader, which buffers, how many workgroups.
+//! Declarations of passes: shader, buffers, number of workgroups.
 
 use super::Stage;
 use super::buffers::Buf;
 use crate::shaders::ShaderDesc;
 
-/// How many workgroups a pass runs.
+/// Number of workgroups of a pass.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Grid {
     /// Known when the list is prepared.
@@ -16,9 +16,9 @@ pub enum Grid {
 /// One dispatch.
 #[derive(Clone, Debug)]
 pub struct PassDecl {
-    /// Name in reports, timings and crash messages; the shader's name unless given.
+    /// Name in reports, timings and crash messages; by default the shader's name.
     pub label: String,
-    /// Name in tables of times, which variants share; the shader's stem unless given.
+    /// Name in tables of times, shared by variants; by default the shader's stem.
     pub title: String,
     /// Stage of the step; set when the pass enters a list.
     pub stage: Stage,
@@ -59,7 +59,7 @@ impl PassDecl {
 pub enum Work {
     /// A dispatch.
     Pass(PassDecl),
-    /// Every word of a buffer is set.
+    /// Sets every word of a buffer.
     Fill {
         /// The buffer.
         buf: Buf,
@@ -68,13 +68,13 @@ pub enum Work {
         /// Stage of the step.
         stage: Stage,
     },
-    /// The first bytes of a buffer are copied to the start of another.
+    /// Copies the first bytes of a buffer to the start of another buffer.
     Copy {
         /// Source.
         from: Buf,
         /// Destination.
         to: Buf,
-        /// Number of bytes, a multiple of 4; 0 copies as much as both hold.
+        /// Number of bytes, a multiple of 4; 0 copies as many bytes as both buffers hold.
         bytes: u64,
         /// Stage of the step.
         stage: Stage,
@@ -87,14 +87,14 @@ impl From<PassDecl> for Work {
     }
 }
 
-/// A list of work that is planned, recorded and replayed as one.
+/// A list of work, planned, recorded and replayed as a unit.
 #[derive(Clone, Debug, Default)]
 pub struct PassList {
     /// Name in reports and messages.
     pub name: String,
     /// The work, in order.
     pub work: Vec<Work>,
-    /// Stage of the items that are appended from now on.
+    /// Stage of the items that follow.
     pub stage: Stage,
 }
 
@@ -116,7 +116,7 @@ impl PassList {
         self
     }
 
-    /// Appends a copy of `bytes` bytes, or of as much as both buffers hold if 0.
+    /// Appends a copy of `bytes` bytes; 0 copies as many bytes as both buffers hold.
     pub fn copy(&mut self, from: Buf, to: Buf, bytes: u64) -> &mut Self {
         self.work.push(Work::Copy { from, to, bytes, stage: self.stage });
         self

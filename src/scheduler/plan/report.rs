@@ -1,11 +1,11 @@
-//! Plans as text: what `labelgs plan` prints.
+//! Plans as text, for `labelgs plan`.
 
 use super::buffers::Class;
 use super::memory::MemoryReport;
 use super::{Grid, Page, Plan, Touch, Work, name};
 use std::fmt::Write;
 
-/// Bytes as text, in the unit that keeps the number short.
+/// Formats bytes in the unit that gives the shortest number.
 fn human(bytes: u64) -> String {
     match bytes {
         0..10_240 => format!("{bytes} B"),
@@ -15,7 +15,7 @@ fn human(bytes: u64) -> String {
 }
 
 impl MemoryReport {
-    /// A table of all buffers with their sizes, and sums by class.
+    /// Formats a table of all buffers with their sizes, and sums by class.
     pub fn report(&self) -> String {
         let mut text = String::new();
         let _ = writeln!(text, "{:<24} {:<6} {:>12} {:>5} {:>12}", "buffer", "class", "elements", "B/el", "bytes");
@@ -38,7 +38,7 @@ impl MemoryReport {
 }
 
 impl Plan {
-    /// The list of items with what each reads and writes, and the barriers with their reasons.
+    /// Formats the list of items with their reads and writes, and the barriers with their reasons.
     pub fn report(&self) -> String {
         let mut text = String::new();
         let (items, barriers) = (self.items.len(), self.barrier_count());
@@ -61,7 +61,7 @@ impl Plan {
         text
     }
 
-    /// Where each scratch buffer of the list lies, and during which items it lives.
+    /// Formats the place and the lifetime of each scratch buffer of the list.
     pub fn arena_report(&self) -> String {
         let mut rows = (0..self.table.len())
             .filter_map(|index| Some((self.placements[index]?, self.lives[index]?, self.table[index].name)))

@@ -1,28 +1,28 @@
-//! The stages of a step, which reports sum up the items of a list by.
+//! Stages of a step; reports sum times by stage.
 
-/// A stage of a training step, in the order of the step.
+/// A stage of a training step, in execution order.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Stage {
-    /// From Gaussians to splats.
+    /// Projection of Gaussians to splats.
     #[default]
     Project,
     /// Both radix sorts.
     Sort,
-    /// Splats into lists of tiles.
+    /// Binning of splats into tile lists.
     Tile,
-    /// Blending; with labels also the label loss and the lift's votes.
+    /// Forward blending; with labels also the label loss and the lift's votes.
     BlendForward,
-    /// Photo loss and its gradient by the picture.
+    /// Photo loss and its gradient with respect to the picture.
     Loss,
-    /// Gradients of the tiles' splats.
+    /// Backward blending: gradients of (splat, tile) pairs.
     BlendBackward,
-    /// Sum of these by splat.
+    /// Sum of these gradients per splat.
     Gather,
     /// Gradients of the Gaussians.
     ProjectBackward,
     /// Adam, resets and densification.
     Optimise,
-    /// Votes to labels.
+    /// Labels from votes.
     Labels,
     /// Counters for the host.
     Report,

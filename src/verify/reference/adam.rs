@@ -17,7 +17,7 @@ pub struct Optimised {
     pub u: Row,
 }
 
-/// One update of one Gaussian; `step` counts from 1 and corrects the bias of young moments.
+/// One update of one Gaussian; `step` counts from 1 and corrects the bias of the moments.
 pub fn adam(rules: &Rules, rates: &Rates, step: u32, state: &Optimised, gradient: &Row) -> Optimised {
     let (mut row, mut m, mut u) = (state.row.floats(), state.m.floats(), state.u.floats());
     let g = gradient.floats();
@@ -29,7 +29,7 @@ pub fn adam(rules: &Rules, rates: &Rates, step: u32, state: &Optimised, gradient
     Optimised { row: Row::from_floats(&row), m: Row::from_floats(&m), u: Row::from_floats(&u) }
 }
 
-/// One update of one parameter with its moments: its `step`-th.
+/// One update of one parameter with its moments; `step` counts from 1.
 pub fn adam_value(rules: &Rules, rate: f64, step: u32, [value, m, u]: [f64; 3], g: f64) -> [f64; 3] {
     let (beta1, beta2, exponent) = (rules.adam_beta1, rules.adam_beta2, f64::from(step));
     let m = beta1 * m + (1.0 - beta1) * g;
@@ -38,7 +38,7 @@ pub fn adam_value(rules: &Rules, rate: f64, step: u32, [value, m, u]: [f64; 3], 
     [value - rate * m_hat / (u_hat.sqrt() + rules.adam_eps), m, u]
 }
 
-/// Rate that falls from `first` to `last` along an exponential over `steps`.
+/// Learning rate that falls exponentially from `first` to `last` over `steps`.
 pub fn falling_rate(first: f64, last: f64, steps: u32, step: u32) -> f64 {
     let t = (f64::from(step) / f64::from(steps)).clamp(0.0, 1.0);
     ((1.0 - t) * first.ln() + t * last.ln()).exp()

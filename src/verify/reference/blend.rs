@@ -4,16 +4,16 @@ use super::Rules;
 use super::splat::{Splat, SplatGradient};
 use super::tile::exponent;
 
-/// Distances to the nearest decision that would have gone the other way.
+/// Distances of decisions to their opposite.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Margins {
-    /// Exponent to the smallest that counts, log2 units.
+    /// Distance of the exponent to the smallest that counts, log2 units.
     pub cut: f64,
-    /// Remaining transmittance to the one that stops, relative.
+    /// Distance of the remaining transmittance to the stop threshold, relative.
     pub stop: f64,
-    /// Unclamped alpha to the largest alpha, relative; matters for gradients only.
+    /// Distance of the unclamped alpha to the largest alpha, relative; matters for gradients only.
     pub clamp: f64,
-    /// Largest weight to the second largest, relative; matters for the main Gaussian only.
+    /// Distance of the largest weight to the second largest, relative; matters for the main Gaussian only.
     pub main: f64,
 }
 
@@ -25,51 +25,51 @@ impl Default for Margins {
 }
 
 impl Margins {
-    /// For colour, depth and transmittance.
+    /// Margin for colour, depth and transmittance.
     pub fn image(&self) -> f64 {
         self.cut.min(self.stop)
     }
 
-    /// For gradients.
+    /// Margin for gradients.
     pub fn gradient(&self) -> f64 {
         self.image().min(self.clamp)
     }
 }
 
-/// One splat that is blended at a pixel.
+/// A splat's contribution to a pixel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Contribution {
-    /// Place in the list of splats.
+    /// Index in the list of splats.
     pub splat: usize,
     /// Clamped alpha.
     pub alpha: f64,
     /// Transmittance in front of it.
     pub transmittance: f64,
-    /// True where alpha was cut to the largest.
+    /// True if alpha was clamped to the maximum.
     pub clamped: bool,
 }
 
 impl Contribution {
-    /// alpha T.
+    /// Blending weight, alpha T.
     pub fn weight(&self) -> f64 {
         self.alpha * self.transmittance
     }
 }
 
-/// All that happens along the ray of one pixel.
+/// Everything along the ray of one pixel.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Trace {
     /// Front to back.
     pub contributions: Vec<Contribution>,
-    /// Left for the background.
+    /// Transmittance left for the background.
     pub transmittance: f64,
-    /// Nearest decisions (without `main`).
+    /// Margins of the nearest decisions (without `main`).
     pub margins: Margins,
-    /// True where the transmittance rule ended the ray.
+    /// True if the transmittance rule ended the ray.
     pub stopped: bool,
 }
 
-/// Half the width and height of the box around {alpha >= alpha_min}, px; `None` where it is empty.
+/// Half the width and height of the box around {alpha >= alpha_min}, px; `None` if it is empty.
 pub fn reach(rules: &Rules, splat: &Splat) -> Option<[f64; 2]> {
     let level = 2.0 * (splat.opacity / rules.alpha_min).ln();
     let [a, b, c] = splat.conic;
@@ -77,7 +77,7 @@ pub fn reach(rules: &Rules, splat: &Splat) -> Option<[f64; 2]> {
     (level > -0.1).then(|| [c, a].map(|other| (level.max(0.0) * other / det).sqrt()))
 }
 
-/// Splats with their boxes (one pixel wider than exact, so that margins near the border are seen).
+/// Splats with their boxes, one pixel wider than exact, so that margins near the border are included.
 struct Boxed<'a> {
     splats: &'a [Splat],
     reaches: Vec<[f64; 2]>,
@@ -98,7 +98,7 @@ impl<'a> Boxed<'a> {
     }
 }
 
-/// Blends `splats` (nearest first) at a position; places refer to the iterator's numbers.
+/// Blends `splats` (nearest first) at a position; indices in the result are the iterator's.
 pub fn trace<'a>(rules: &Rules, splats: impl Iterator<Item = (usize, &'a Splat)>, at: [f64; 2]) -> Trace {
     let mut ray = Trace { transmittance: 1.0, ..Trace::default() };
     for (place, splat) in splats {
@@ -110,7 +110,7 @@ pub fn trace<'a>(rules: &Rules, splats: impl Iterator<Item = (usize, &'a Splat)>
 }
 
 impl Trace {
-    /// Adds one splat; false where the ray ends before it.
+    /// Adds one splat; returns false if the ray ends before it.
     fn blend(&mut self, rules: &Rules, place: usize, splat: &Splat, at: [f64; 2]) -> bool {
         let above = exponent(splat, at) - rules.exponent_min();
         self.margins.cut = self.margins.cut.min(above.abs());
@@ -133,24 +133,24 @@ impl Trace {
     }
 }
 
-/// What blending leaves at a pixel.
+/// Result of blending at a pixel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pixel {
-    /// Sum of alpha T c, plus what is left of the background.
+    /// Sum of alpha T c, plus the background times the remaining transmittance.
     pub colour: [f64; 3],
-    /// Transmittance behind the last splat; 1 - alpha of the pixel.
+    /// Transmittance after the last splat; 1 - alpha of the pixel.
     pub transmittance: f64,
     /// Sum of alpha T z, world units, not normalised.
     pub depth: f64,
-    /// Gaussian of the largest weight, the nearer of equals; -1 without any.
+    /// Gaussian with the largest weight, the nearer of equals; -1 without any.
     pub main: i32,
     /// Largest weight.
     pub main_weight: f64,
-    /// Place of the last blended splat in the list, plus 1; 0 without any.
+    /// 1 + index of the last blended splat in the list; 0 without any.
     pub last: usize,
-    /// Blended splats.
+    /// Number of blended splats.
     pub count: usize,
-    /// Nearest decisions.
+    /// Margins of the nearest decisions.
     pub margins: Margins,
 }
 
@@ -159,12 +159,12 @@ pub struct Pixel {
 pub struct Blended {
     /// Width and height, px.
     pub size: (usize, usize),
-    /// [height, width].
+    /// `[height, width]`.
     pub pixels: Vec<Pixel>,
 }
 
 impl Blended {
-    /// The colours alone.
+    /// Colours of the pixels.
     pub fn colours(&self) -> Vec<[f64; 3]> {
         self.pixels.iter().map(|pixel| pixel.colour).collect()
     }
@@ -175,7 +175,7 @@ impl Blended {
     }
 }
 
-/// Sums up a ray.
+/// Sums the contributions of a ray.
 pub fn shade(splats: &[Splat], ray: &Trace, background: [f64; 3]) -> Pixel {
     let mut pixel = Pixel {
         colour: background.map(|channel| channel * ray.transmittance),
@@ -205,7 +205,7 @@ pub fn shade(splats: &[Splat], ray: &Trace, background: [f64; 3]) -> Pixel {
     pixel
 }
 
-/// Centre of pixel number `index`.
+/// Centre of pixel `index`.
 pub fn centre(index: usize, width: usize) -> [f64; 2] {
     [(index % width) as f64 + 0.5, (index / width) as f64 + 0.5]
 }
@@ -220,32 +220,32 @@ pub fn blend_forward(rules: &Rules, splats: &[Splat], size: (usize, usize), back
     Blended { size, pixels: (0..size.0 * size.1).map(pixel).collect() }
 }
 
-/// Gradients of splats, and how near a decision that bears on each was.
+/// Gradients of splats, with the margins of the decisions that affect them.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SplatGradients {
     /// By splat, in the order of the list.
     pub values: Vec<SplatGradient>,
-    /// Smallest gradient margin of the pixels that each splat counts in.
+    /// Smallest gradient margin of all pixels in which each splat counts.
     pub margins: Vec<f64>,
 }
 
-/// Gradient of a loss by an image.
+/// Gradient of a loss with respect to an image.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Upstream {
-    /// By the colours, [height, width].
+    /// With respect to the colours, `[height, width]`.
     pub colours: Vec<[f64; 3]>,
-    /// By the opacities, [height, width].
+    /// With respect to the opacities, `[height, width]`.
     pub alphas: Vec<f64>,
 }
 
 impl Upstream {
-    /// Of a loss that looks at colours alone.
+    /// Gradient of a loss that depends on colours only.
     pub fn of_colours(colours: &[[f64; 3]]) -> Self {
         Self { colours: colours.to_vec(), alphas: vec![0.0; colours.len()] }
     }
 }
 
-/// Gradients of depth-ordered splats for the gradient of the image.
+/// Gradients of depth-ordered splats, given the gradient of the image.
 pub fn blend_backward(
     rules: &Rules,
     splats: &[Splat],
@@ -256,7 +256,7 @@ pub fn blend_backward(
     layer_backward(rules, &Boxed::new(rules, splats), |_| true, size, background, v_image)
 }
 
-/// The gradient of a layer that holds the splats of `member`; the others get 0.
+/// Gradients of a layer with the splats of `member`; all other splats get 0.
 fn layer_backward(
     rules: &Rules,
     boxed: &Boxed,
@@ -281,7 +281,7 @@ fn layer_backward(
     out
 }
 
-/// Smallest of the pixels' values at which each splat is large enough to count (hidden or not), by splat.
+/// For each splat, the smallest of the values of all pixels where it is large enough to count (hidden or not).
 pub fn smallest_over_pixels(rules: &Rules, splats: &[Splat], size: (usize, usize), values: &[f64]) -> Vec<f64> {
     let boxed = Boxed::new(rules, splats);
     let mut out = vec![f64::INFINITY; splats.len()];
@@ -301,7 +301,8 @@ fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
 }
 
 /// Adds one ray's share. With C = sum w_i c_i + T b: dC/d alpha_i = T_i c_i - (everything behind i) / (1 - alpha_i).
-/// `v_transmittance` is the gradient by what is left at the end: b times that of the colour, less that of the opacity.
+/// `v_transmittance` is the gradient with respect to the final transmittance: b times that of the colour, minus that of
+/// the opacity.
 fn ray_backward(
     splats: &[Splat],
     ray: &Trace,
@@ -334,8 +335,8 @@ fn ray_backward(
     }
 }
 
-/// Scene and objects in one walk along each ray: layer 0 blends every splat over `background`, layer 1 + j only the
-/// splats of `slots[j]` over black, each with its own transmittance.
+/// Walks each ray once for the scene and the objects: layer 0 blends every splat over `background`, layer 1 + j only
+/// the splats of `slots[j]` over black, each layer with its own transmittance.
 pub fn blend_layers_forward(
     rules: &Rules,
     splats: &[Splat],
@@ -365,7 +366,7 @@ pub fn blend_layers_forward(
     layers
 }
 
-/// Gradients of all layers: the scene's share alone, and the sum over the object layers.
+/// Gradients of all layers: the scene's share, and the sum over the object layers.
 pub fn blend_layers_backward(
     rules: &Rules,
     splats: &[Splat],

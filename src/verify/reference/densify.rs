@@ -1,4 +1,4 @@
-//! Cloning, splitting and removing Gaussians.
+//! Clones, splits and removes Gaussians.
 
 use super::project::{normalised, rotation, sigmoid};
 use super::rules::wide;
@@ -6,33 +6,33 @@ use super::{Model, Row, Rules};
 use crate::shaders::constants;
 use glam::DVec3;
 
-/// What densification knows.
+/// Input of densification.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Population {
     /// Parameters and labels.
     pub model: Model,
-    /// First moments, [N].
+    /// First moments, `[N]`.
     pub m: Vec<Row>,
-    /// Second moments, [N].
+    /// Second moments, `[N]`.
     pub u: Vec<Row>,
-    /// Sum over views of the 2-D gradient's norm (NDC units), [N].
+    /// Sum over views of the 2-D gradient's norm (NDC units), `[N]`.
     pub gradient_sum: Vec<f64>,
-    /// Views that saw the Gaussian, [N].
+    /// Number of views that saw the Gaussian, `[N]`.
     pub gradient_count: Vec<f64>,
 }
 
-/// How a row came to be.
+/// Origin of a row.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Origin {
-    /// The row as it was.
+    /// An unchanged row.
     Kept,
-    /// A copy behind its parent.
+    /// A copy, directly after its parent.
     Clone,
-    /// First (0) or second (1) child of a parent that is gone.
+    /// First (0) or second (1) child of a removed parent.
     Child(u32),
 }
 
-/// The population afterwards.
+/// The population after densification.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Densified {
     /// Parameters and labels.
@@ -41,9 +41,9 @@ pub struct Densified {
     pub m: Vec<Row>,
     /// Second moments.
     pub u: Vec<Row>,
-    /// (row before, how) of each row.
+    /// (Earlier row, origin) of each row.
     pub origins: Vec<(usize, Origin)>,
-    /// Distance of the nearest decision about each row before, relative to its threshold.
+    /// Distance of the nearest decision about each earlier row, relative to its threshold.
     pub margins: Vec<f64>,
 }
 
@@ -51,15 +51,15 @@ fn largest_scale(row: &Row) -> f64 {
     row.scale.iter().fold(f64::NEG_INFINITY, |most, &s| most.max(s)).exp()
 }
 
-/// Child of a split at `noise` standard deviations along the parent's axes.
+/// Child of a split, at `noise` standard deviations along the parent's axes.
 pub fn split_child(rules: &Rules, parent: &Row, noise: [f64; 3]) -> Row {
     let offset = DVec3::from([0, 1, 2].map(|axis| parent.scale[axis].exp() * noise[axis]));
     let mean = DVec3::from(parent.mean) + rotation(normalised(parent.quat).0) * offset;
     Row { mean: mean.into(), scale: parent.scale.map(|s| s - rules.split_shrink.ln()), ..*parent }
 }
 
-/// Clones and splits by the mean gradient, then removes faint and (late) huge rows. Order is kept: a clone stands behind
-/// its parent, children stand in their parent's place. `normal(row, child, axis)` is a standard normal number.
+/// Clones and splits by the mean gradient, then removes faint and (late) huge rows. The order is kept: a clone directly
+/// follows its parent, children replace their parent. `normal(row, child, axis)` is a standard normal number.
 pub fn densify(
     rules: &Rules,
     before: &Population,
@@ -103,7 +103,7 @@ pub fn densify(
     out
 }
 
-/// Rows that each row before becomes: 0 removed, 1 kept, 2 cloned or split.
+/// Number of rows that each earlier row becomes: 0 removed, 1 kept, 2 cloned or split.
 pub fn mark(rules: &Rules, before: &Population, extent: f64, step: u32) -> Vec<u32> {
     let mut counts = vec![0; before.model.rows.len()];
     let after = densify(rules, before, extent, step, |_, _, _| 0.0);
@@ -111,8 +111,7 @@ pub fn mark(rules: &Rules, before: &Population, extent: f64, step: u32) -> Vec<u
     counts
 }
 
-/// Adds a view to the statistic: the gradient's norm and one view where the Gaussian is visible. A norm that Adam would not
-/// be given either is left out.
+/// Adds a view to the statistic: gradient norm and one view per visible Gaussian. Skips dropped gradients.
 pub fn accumulate(population: &mut Population, gradient2d: &[f64], visible: &[bool]) {
     let counts = |index: &usize| visible[*index] && gradient2d[*index] < wide(constants::GRADIENT_MAX);
     for index in (0..visible.len()).filter(counts) {
@@ -141,7 +140,7 @@ impl Densified {
     }
 }
 
-/// Opacity no higher than the reset's ceiling, and no moments of it.
+/// Limits the opacity to the reset's ceiling and zeroes its moments.
 pub fn opacity_reset(rules: &Rules, row: &mut Row, m: &mut Row, u: &mut Row) {
     let ceiling = (rules.reset_opacity / (1.0 - rules.reset_opacity)).ln();
     row.opacity = row.opacity.min(ceiling);

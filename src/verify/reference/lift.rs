@@ -4,35 +4,35 @@ use super::Rules;
 use super::blend::{Blended, centre, trace};
 use super::splat::Splat;
 
-/// What one view votes.
+/// Votes of one view.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Votes {
-    /// Largest key of each Gaussian, [N]: weight quantised to 16 bits, then the label; 0 without a vote.
+    /// Largest key of each Gaussian, `[N]`: weight quantised to 16 bits, then the label; 0 without a vote.
     pub keys: Vec<u32>,
-    /// Distance of the nearest decision about each Gaussian, [N]: of its weight to the threshold (relative), of its
-    /// centre to a pixel border (px), of a pixel's blending to another outcome.
+    /// Distance of the nearest decision about each Gaussian, `[N]`: of its weight to the threshold (relative), of its
+    /// centre to a pixel border (px), or of a pixel's blending to a different result.
     pub margins: Vec<f64>,
 }
 
-/// A view's masks and the labels that are sampled from it.
+/// Masks of a view, and the labels sampled from them.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Masks<'a> {
-    /// Object id per pixel, [height, width].
+    /// Object id per pixel, `[height, width]`.
     pub label_map: &'a [u32],
-    /// Sampled labels; 0 is never among them.
+    /// Sampled labels, without 0.
     pub sampled: &'a [u32],
     /// Gaussian projection filter.
     pub gpf: bool,
 }
 
-/// Centre of each of `count` Gaussians in the view; `None` where it has no splat.
+/// Centre of each of `count` Gaussians in the view; `None` without a splat.
 pub fn centres_of(splats: &[Splat], count: usize) -> Vec<Option<[f64; 2]>> {
     let mut centres = vec![None; count];
     splats.iter().for_each(|splat| centres[splat.gaussian] = Some(splat.mean2d));
     centres
 }
 
-/// Number of the pixel that holds a position; `None` outside the image.
+/// Index of the pixel at a position; `None` outside the image.
 pub fn pixel_of(at: [f64; 2], size: (usize, usize)) -> Option<usize> {
     let (x, y) = (at[0].floor(), at[1].floor());
     let inside = x >= 0.0 && y >= 0.0 && x < size.0 as f64 && y < size.1 as f64;
@@ -44,12 +44,12 @@ pub fn border_distance(at: [f64; 2]) -> f64 {
     at.iter().map(|v| (v - v.round()).abs()).fold(f64::INFINITY, f64::min)
 }
 
-/// 16 bits of weight (rounded down) above 16 bits of label.
+/// Vote key: 16 bits of weight (rounded down) above 16 bits of label.
 pub fn vote_key(weight: f64, label: u32) -> u32 {
     ((weight * 65_535.0).floor() as u32) << 16 | label
 }
 
-/// Votes of one scene image. `centres[gaussian]` is its centre in the view, px; `None` where it is not drawn.
+/// Votes of one scene image. `centres[gaussian]` is its centre in the view, px; `None` if it is not drawn.
 pub fn lift(rules: &Rules, image: &Blended, centres: &[Option<[f64; 2]>], masks: &Masks) -> Votes {
     let mut votes = Votes { keys: vec![0; centres.len()], margins: vec![f64::INFINITY; centres.len()] };
     for (pixel, &label) in image.pixels.iter().zip(masks.label_map) {
@@ -72,7 +72,7 @@ pub fn lift(rules: &Rules, image: &Blended, centres: &[Option<[f64; 2]>], masks:
     votes
 }
 
-/// Writes the voted labels; Gaussians without a vote keep theirs.
+/// Writes the voted labels; Gaussians without a vote keep their label.
 pub fn lift_resolve(votes: &Votes, labels: &mut [u32]) {
     for (label, key) in labels.iter_mut().zip(&votes.keys) {
         if *key != 0 {
@@ -81,8 +81,8 @@ pub fn lift_resolve(votes: &Votes, labels: &mut [u32]) {
     }
 }
 
-/// Votes of one view [N, columns], px: sums of blending weights over the pixels of each column, times its weight.
-/// `columns` says for each pixel which column it speaks for, if any.
+/// Votes of one view, `[N, columns]`, px: sums of blending weights over the pixels of each column, times the column's
+/// weight. `columns` gives the column of each pixel, if any.
 pub fn vote(
     rules: &Rules,
     splats: &[Splat],

@@ -1,40 +1,40 @@
-//! Photo loss (L1 and SSIM) and label loss, with their gradients by the image.
+//! Photo loss (L1 and SSIM) and label loss, with their gradients with respect to the image.
 
 use super::Rules;
 use super::blend::Upstream;
 
-/// A photo with the pixels that count.
+/// A photo with its valid pixels.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Photo {
     /// Width and height, px.
     pub size: (usize, usize),
-    /// [height, width], linear 0 to 1.
+    /// `[height, width]`, linear 0 to 1.
     pub colours: Vec<[f64; 3]>,
-    /// [height, width]; false where the photo has no source.
+    /// `[height, width]`; false for pixels without a source in the photo.
     pub valid: Vec<bool>,
 }
 
 impl Photo {
-    /// Three times the number of pixels that count: the denominator of every loss.
+    /// Three times the number of valid pixels: the denominator of every loss.
     pub fn elements(&self) -> f64 {
         3.0 * self.valid.iter().filter(|&&valid| valid).count() as f64
     }
 }
 
-/// A loss with its gradient by the image.
+/// A loss with its gradient with respect to the image.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Loss {
     /// Mean absolute difference.
     pub l1: f64,
     /// Mean structural similarity.
     pub ssim: f64,
-    /// Weighted sum that is trained on.
+    /// Weighted sum, the training objective.
     pub value: f64,
-    /// Gradient of `value` by the image, [height, width].
+    /// Gradient of `value` with respect to the image, `[height, width]`.
     pub v_image: Vec<[f64; 3]>,
-    /// Gradient of `value` by the opacity, [height, width].
+    /// Gradient of `value` with respect to the opacity, `[height, width]`.
     pub v_alpha: Vec<f64>,
-    /// Smallest absolute difference of a pixel's channels: distance to the kink of L1, [height, width].
+    /// Smallest absolute difference of a pixel's channels: distance to the kink of L1, `[height, width]`.
     pub margins: Vec<f64>,
 }
 
@@ -48,7 +48,7 @@ impl Loss {
         }
     }
 
-    /// Its gradient as the blending takes it.
+    /// The gradient in the form that blending takes.
     pub fn upstream(&self) -> Upstream {
         Upstream { colours: self.v_image.clone(), alphas: self.v_alpha.clone() }
     }
@@ -59,7 +59,7 @@ impl Loss {
     }
 }
 
-/// Gaussian window of unit sum, [2 reach + 1].
+/// Gaussian window of unit sum, `[2 reach + 1]`.
 pub fn window(rules: &Rules) -> Vec<f64> {
     let reach = rules.ssim_reach as f64;
     let raw: Vec<f64> = (0..=2 * rules.ssim_reach)
@@ -69,7 +69,7 @@ pub fn window(rules: &Rules) -> Vec<f64> {
     raw.iter().map(|v| v / sum).collect()
 }
 
-/// Window mean of a plane with zeros outside it. The window is symmetric, so this is its own adjoint.
+/// Window mean of a plane, with zeros outside. The window is symmetric, so this function is its own adjoint.
 pub fn blur(plane: &[f64], (width, height): (usize, usize), window: &[f64]) -> Vec<f64> {
     let reach = (window.len() / 2) as isize;
     let along = |plane: &[f64], horizontal: bool| -> Vec<f64> {
@@ -90,7 +90,7 @@ pub fn blur(plane: &[f64], (width, height): (usize, usize), window: &[f64]) -> V
     along(&along(plane, true), false)
 }
 
-/// Window means of two planes, and SSIM's four factors made of them.
+/// Window means of two planes, and the four factors of SSIM.
 struct Moments {
     mu_x: Vec<f64>,
     mu_y: Vec<f64>,
@@ -135,10 +135,10 @@ pub fn ssim(rules: &Rules, size: (usize, usize), x: &[f64], y: &[f64]) -> Vec<f6
     (0..x.len()).map(|i| moments.ssim(i)).collect()
 }
 
-/// Gradient by the first plane for the gradient of the map.
+/// Gradient with respect to the first plane, given the gradient of the map.
 pub fn ssim_backward(rules: &Rules, size: (usize, usize), x: &[f64], y: &[f64], v_map: &[f64]) -> Vec<f64> {
     let m = ssim_moments(rules, size, x, y);
-    // By x's mean, mean square and mean product, each taken as an independent quantity.
+    // Derivatives with respect to the mean, mean square and mean product of x, treated as independent quantities.
     let v_mu = |i: usize| {
         let below = m.energy[i] * m.spread[i];
         let by_means = 2.0 * m.mu_y[i] * (m.contrast[i] - m.luminance[i]) / below;
@@ -152,12 +152,12 @@ pub fn ssim_backward(rules: &Rules, size: (usize, usize), x: &[f64], y: &[f64], 
     (0..x.len()).map(|i| b_mu[i] + 2.0 * x[i] * b_xx[i] + y[i] * b_xy[i]).collect()
 }
 
-/// -1, 0 or 1; 0 at 0.
+/// Sign: -1, 0 or 1.
 pub fn sign(value: f64) -> f64 {
     if value == 0.0 { 0.0 } else { value.signum() }
 }
 
-/// 0.8 L1 + 0.2 (1 - SSIM) over the pixels that count; both images are 0 elsewhere.
+/// 0.8 L1 + 0.2 (1 - SSIM) over the valid pixels; both images are 0 elsewhere.
 pub fn photo_loss(rules: &Rules, image: &[[f64; 3]], photo: &Photo) -> Loss {
     let elements = photo.elements();
     let mut loss = Loss::empty(image.len());
@@ -184,7 +184,7 @@ pub fn photo_loss(rules: &Rules, image: &[[f64; 3]], photo: &Photo) -> Loss {
     loss
 }
 
-/// Bit of a label map's pixel that lies too near to a contour to say anything about objects.
+/// Bit of a label map's pixel near a contour; the label loss ignores such pixels.
 pub const BORDER: u32 = 0x1_0000;
 
 /// One object of a step: its label and the labels that hide it in this view.
@@ -192,13 +192,13 @@ pub const BORDER: u32 = 0x1_0000;
 pub struct ObjectPixel {
     /// Label of the object, not 0.
     pub label: u32,
-    /// Labels in front of it: their pixels say nothing about it.
+    /// Labels in front of it; the label loss ignores their pixels.
     pub occluders: Vec<u32>,
-    /// Weight of its loss beside those of other objects.
+    /// Relative weight of its loss.
     pub weight: f64,
 }
 
-/// |U_k (R_k - M_k I)|, and |U_k (alpha_k - M_k)| with its weight, over the pixels that count, times the label weight.
+/// |U_k (R_k - M_k I)|, and |U_k (alpha_k - M_k)| with its weight, over the valid pixels, times the label weight.
 /// `picture` is R_k over black and alpha_k.
 pub fn label_loss(
     rules: &Rules,
@@ -218,12 +218,12 @@ pub fn label_loss(
             let difference = image[i][channel] - target;
             loss.l1 += difference.abs();
             loss.v_image[i][channel] = pixel_weight * sign(difference);
-            // An untouched pixel outside the mask is 0 on both sides and stays so: no kink there.
+            // An untouched pixel outside the mask is 0 on both sides and stays 0, so it has no kink.
             if difference != 0.0 {
                 loss.margins[i] = loss.margins[i].min(difference.abs());
             }
         }
-        // Opacity is from 0 to 1, so its sign never turns.
+        // Opacity is between 0 and 1, so the sign never changes.
         let difference = alphas[i] - f64::from(u8::from(inside));
         loss.l1 += 3.0 * rules.label_alpha * difference.abs();
         loss.v_alpha[i] = 3.0 * rules.label_alpha * pixel_weight * sign(difference);

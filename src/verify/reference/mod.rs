@@ -1,8 +1,8 @@
-//! The method in f64, written from its equations: one function per pass, under the name of the pass.
+//! The method in f64, written from its equations: one function per pass, with the name of the pass.
 //!
-//! Nothing here is shaped like a kernel. Rules (every constant) are an argument, so that a mutant can change one.
-//! Each function that decides something also returns a *margin*: how far the nearest decision was from going the other
-//! way, as a fraction of the threshold (for the exponent of alpha: in units of log2, an absolute distance).
+//! The code does not imitate the kernels. The rules (all constants) are an argument, so that a mutant can change one.
+//! Every function with decisions also returns a *margin*: the distance of the nearest decision to its opposite, as a
+//! fraction of the threshold (for the exponent of alpha: an absolute distance in units of log2).
 
 pub mod adam;
 pub mod blend;

@@ -1,4 +1,4 @@
-//! Rows of parameters, and the same rows as gradients or moments.
+//! Rows of parameters; gradients and moments use the same rows.
 
 use crate::scene::Gaussians;
 use std::ops::Range;
@@ -11,17 +11,17 @@ pub const ROW_FLOATS: usize = 59;
 pub struct Row {
     /// World position.
     pub mean: [f64; 3],
-    /// Rotation (w, x, y, z), of any length but 0.
+    /// Rotation (w, x, y, z), of any length above 0.
     pub quat: [f64; 4],
     /// Natural logarithms of the standard deviations.
     pub scale: [f64; 3],
     /// Logit of the opacity.
     pub opacity: f64,
-    /// Colour coefficients (r, g, b); those above the active degree are not read.
+    /// Colour coefficients (r, g, b); those above the active degree are ignored.
     pub sh: [[f64; 3]; 16],
 }
 
-/// A run of a row's floats that the engine keeps in one buffer.
+/// A range of a row's floats that the engine keeps in one buffer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Group {
     /// Position.
@@ -47,7 +47,7 @@ impl Group {
     pub const ALL: [Self; 8] =
         [Self::Means, Self::Quats, Self::Scales, Self::Opacities, Self::Sh0, Self::Sh1, Self::Sh2, Self::Sh3];
 
-    /// Where the group stands in `Row::floats`.
+    /// Range of the group in `Row::floats`.
     pub fn range(self) -> Range<usize> {
         match self {
             Self::Means => 0..3,
@@ -92,7 +92,7 @@ impl Row {
     }
 }
 
-/// One group of all rows, [N, group].
+/// One group of all rows, `[N, group]`.
 pub fn flatten(rows: &[Row], group: Group) -> Vec<f64> {
     rows.iter().flat_map(|row| row.floats()[group.range()].to_vec()).collect()
 }
@@ -100,16 +100,16 @@ pub fn flatten(rows: &[Row], group: Group) -> Vec<f64> {
 /// Gaussians with their labels.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Model {
-    /// Parameters, [N].
+    /// Parameters, `[N]`.
     pub rows: Vec<Row>,
-    /// Object ids, [N], 0 = unlabelled.
+    /// Object ids, `[N]`; 0 = unlabelled.
     pub labels: Vec<u32>,
     /// Active degree of the spherical harmonics, 0 to 3.
     pub sh_degree: u32,
 }
 
 impl Model {
-    /// The same numbers, widened.
+    /// Widens the same numbers to f64.
     pub fn from_gaussians(gaussians: &Gaussians) -> Self {
         let rest = gaussians.rest_per_gaussian();
         let row = |i: usize| {
@@ -133,7 +133,7 @@ impl Model {
         }
     }
 
-    /// The rows for which `keep` holds, in order.
+    /// Rows for which `keep` returns true, in order.
     pub fn filtered(&self, keep: impl Fn(usize) -> bool) -> Self {
         let kept: Vec<usize> = (0..self.rows.len()).filter(|&i| keep(i)).collect();
         Self {

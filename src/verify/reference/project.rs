@@ -1,18 +1,18 @@
-//! From a Gaussian in the world to a splat in a view, and the gradient back.
+//! Projects Gaussians of the world to splats of a view, and carries gradients back.
 
 use super::splat::{Splat, SplatGradient};
 use super::{Model, Row, Rules, sh, sort, tile};
 use crate::scene::Camera;
 use glam::{DMat3, DVec2, DVec3};
 
-/// A splat with what led to it.
+/// A splat with the intermediate results of its projection.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Projection {
     /// The splat.
     pub splat: Splat,
     /// (xx, xy, yy) of the dilated covariance, px^2.
     pub cov2d: [f64; 3],
-    /// Relative distance of x/z and y/z to the Jacobian's clamp.
+    /// Relative distance of x/z and y/z to the clamp in the Jacobian.
     pub clamp_margin: f64,
     /// Distance of a colour channel to its clamp at 0.
     pub colour_margin: f64,
@@ -28,7 +28,7 @@ pub fn rotation(q: [f64; 4]) -> DMat3 {
     )
 }
 
-/// The quaternion scaled to length 1, and its length before.
+/// Scales a quaternion to length 1; also returns its original length.
 pub fn normalised(q: [f64; 4]) -> ([f64; 4], f64) {
     let length = q.iter().map(|v| v * v).sum::<f64>().sqrt();
     (q.map(|v| v / length), length)
@@ -39,10 +39,10 @@ pub fn sigmoid(logit: f64) -> f64 {
     1.0 / (1.0 + (-logit).exp())
 }
 
-/// Gradient of a quaternion (before normalisation) for a gradient of its rotation matrix.
+/// Gradient of a quaternion (before normalisation), given the gradient of its rotation matrix.
 fn quat_backward(quat: [f64; 4], v_rotation: DMat3) -> [f64; 4] {
     let ([w, x, y, z], length) = normalised(quat);
-    // g(r, c) = derivative by row r, column c.
+    // g(r, c) = derivative with respect to row r, column c.
     let g = |row: usize, column: usize| v_rotation.col(column)[row];
     let v_unit = [
         2.0 * (x * (g(2, 1) - g(1, 2)) + y * (g(0, 2) - g(2, 0)) + z * (g(1, 0) - g(0, 1))),
@@ -66,7 +66,7 @@ struct Slope {
     margin: f64,
 }
 
-/// `ratio` = x/z; limits reach `jacobian_margin` half-widths beyond the image borders.
+/// Computes a slope for `ratio` = x/z or y/z; limits are `jacobian_margin` half-widths beyond the image borders.
 fn slope(rules: &Rules, ratio: f64, focal: f64, centre: f64, size: f64) -> Slope {
     let half = 0.5 * size / focal;
     let (low, high) =
@@ -78,7 +78,7 @@ fn slope(rules: &Rules, ratio: f64, focal: f64, centre: f64, size: f64) -> Slope
     }
 }
 
-/// All quantities between a row and its splat.
+/// All intermediate quantities between a row and its splat.
 struct Chain {
     /// Camera-space position.
     camera: DVec3,
@@ -107,7 +107,7 @@ fn chain(rules: &Rules, camera: &Camera, row: &Row) -> Chain {
     let m = screen_from_world.map(|b| spread.transpose() * b);
     let (xx, xy, yy) = (m[0].length_squared(), m[0].dot(m[1]), m[1].length_squared());
     let s = rules.dilation;
-    // Cauchy-Binet: det(M M^T) = |m0 x m1|^2 has no cancellation.
+    // Cauchy-Binet: det(M M^T) = |m0 x m1|^2 avoids cancellation.
     let det = m[0].cross(m[1]).length_squared() + s * (xx + yy) + s * s;
     let cov2d = [xx + s, xy, yy + s];
     let conic = [cov2d[2] / det, -xy / det, cov2d[0] / det];
@@ -144,7 +144,7 @@ pub fn project_forward(rules: &Rules, camera: &Camera, model: &Model, gaussian: 
     })
 }
 
-/// True where the Gaussian counts somewhere between the outermost pixel centres. A kernel may keep more, never fewer.
+/// True if the Gaussian counts somewhere between the outermost pixel centres. A kernel may keep more, never fewer.
 pub fn cull(rules: &Rules, camera: &Camera, model: &Model, gaussian: usize) -> bool {
     let size = (camera.width as usize, camera.height as usize);
     project_forward(rules, camera, model, gaussian)
@@ -161,7 +161,7 @@ pub fn project_all(rules: &Rules, camera: &Camera, model: &Model) -> Vec<Project
     order.iter().map(|&i| found[i]).collect()
 }
 
-/// Gradient of a row for the gradient of its splat.
+/// Gradient of a row, given the gradient of its splat.
 pub fn project_backward(rules: &Rules, camera: &Camera, model: &Model, gaussian: usize, v: &SplatGradient) -> Row {
     let row = &model.rows[gaussian];
     let chain = chain(rules, camera, row);
@@ -202,9 +202,9 @@ pub fn project_backward(rules: &Rules, camera: &Camera, model: &Model, gaussian:
     }
 }
 
-/// Gradients of J W (two rows) and of R_q S for a gradient of the conic.
+/// Gradients of J W (two rows) and of R_q S, given the gradient of the conic.
 fn covariance_backward(chain: &Chain, v_conic: [f64; 3]) -> ([DVec3; 2], DMat3) {
-    // conic = cov^-1, so d cov = -conic (d conic) conic, with half of B's derivative in each off-diagonal place.
+    // conic = cov^-1, so d cov = -conic (d conic) conic; each off-diagonal entry has half of B's derivative.
     let [a, b, c] = chain.conic;
     let [ga, gb, gc] = [v_conic[0], 0.5 * v_conic[1], v_conic[2]];
     let left = [[a * ga + b * gb, a * gb + b * gc], [b * ga + c * gb, b * gb + c * gc]];

@@ -1,4 +1,4 @@
-//! The random numbers of densification, which depend on the seed, the Gaussian and the number of the draw alone.
+//! Random numbers of densification; they depend only on the seed, the Gaussian and the index of the draw.
 
 fn pcg_hash(v: u32) -> u32 {
     let state = v.wrapping_mul(747_796_405).wrapping_add(2_891_336_453);

@@ -1,22 +1,22 @@
-//! Every constant of the method, as the f32 value that the engine uses, widened to f64.
+//! All constants of the method: the engine's f32 values, widened to f64.
 //!
-//! They are typed here once more, so that a slip in the shaders' constants is no slip of the mirrors too; the test below
+//! This is an independent copy, so that an error in the shaders' constants does not enter the mirrors; the test below
 //! compares the two.
 
 /// Constants of all passes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Rules {
-    /// Camera-space depth at and below which a Gaussian is not drawn, world units.
+    /// Camera-space depth up to which a Gaussian is not drawn, world units.
     pub near: f64,
     /// Added to the diagonal of the 2-D covariance, px^2.
     pub dilation: f64,
-    /// How far outside the image x/z and y/z may go in the Jacobian, in units of tan(fov/2).
+    /// Limit of x/z and y/z in the Jacobian beyond the image, in units of tan(fov/2).
     pub jacobian_margin: f64,
     /// Smallest alpha that counts.
     pub alpha_min: f64,
     /// Largest alpha.
     pub alpha_max: f64,
-    /// A splat that would leave less than this is not drawn, nor anything behind it.
+    /// The ray ends before a splat that would leave less transmittance than this.
     pub transmittance_min: f64,
     /// Added to the colour of the spherical harmonics.
     pub colour_bias: f64,
@@ -38,7 +38,7 @@ pub struct Rules {
     pub label_alpha: f64,
     /// Standard deviation of the SSIM window, px.
     pub ssim_sigma: f64,
-    /// Reach of the SSIM window from its centre, px (window = 2 reach + 1).
+    /// Radius of the SSIM window, px (window = 2 reach + 1).
     pub ssim_reach: usize,
     /// Stabiliser of the SSIM luminance term.
     pub ssim_c1: f64,
@@ -50,11 +50,11 @@ pub struct Rules {
     pub adam_beta2: f64,
     /// Added to Adam's denominator.
     pub adam_eps: f64,
-    /// Mean 2-D gradient (NDC units) from which a Gaussian is cloned or split.
+    /// Mean 2-D gradient (NDC units) at which a Gaussian is cloned or split.
     pub densify_gradient: f64,
-    /// Largest scale that is cloned; larger ones are split, in units of the scene extent.
+    /// Largest scale that is cloned, in units of the scene extent; larger Gaussians are split.
     pub percent_dense: f64,
-    /// A split child has this fraction of its parent's scale, as a divisor.
+    /// Divisor of the scale: a split child has its parent's scale divided by this.
     pub split_shrink: f64,
     /// Gaussians below this opacity are removed.
     pub prune_opacity: f64,
@@ -64,7 +64,7 @@ pub struct Rules {
     pub prune_scale_after: u32,
     /// Ceiling of an opacity reset.
     pub reset_opacity: f64,
-    /// Weight from which a main Gaussian takes the label of its pixel.
+    /// Minimum weight at which a main Gaussian takes the label of its pixel.
     pub lift_threshold: f64,
 }
 
@@ -96,7 +96,7 @@ impl Default for Rules {
             ssim_reach: 5,
             ssim_c1: wide(0.01 * 0.01),
             ssim_c2: wide(0.03 * 0.03),
-            // The compiler of the shaders takes 1 - beta from the decimal numbers.
+            // The shader compiler computes 1 - beta from the decimal numbers.
             adam_beta1: 0.9,
             adam_beta2: 0.999,
             adam_eps: wide(1e-15),
@@ -119,7 +119,7 @@ impl Rules {
     }
 }
 
-/// Where a constant bears.
+/// Passes that a constant affects.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Family {
     /// Splats of a view.
@@ -145,13 +145,13 @@ pub enum Family {
 pub struct Mutant {
     /// Name of the constant.
     pub name: &'static str,
-    /// Where it bears.
+    /// Passes that it affects.
     pub family: Family,
-    /// All constants, this one changed.
+    /// All constants, with this one changed.
     pub rules: Rules,
 }
 
-/// One mutant for each constant, most of them off by a few per cent.
+/// One mutant for each constant; most change it by a few per cent.
 pub fn mutants() -> Vec<Mutant> {
     use Family::{Adam, Blend, Densify, Lift, Loss, Project, Reset, Sh};
     type Change = fn(&mut Rules);

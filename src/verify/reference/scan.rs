@@ -1,6 +1,6 @@
-//! Prefix sums and compaction: exact answers.
+//! Prefix sums and compaction: exact results.
 
-/// Sums of all earlier values, and the total; they stop at the largest number.
+/// Exclusive prefix sums and the total; they saturate at the largest number.
 pub fn exclusive_scan(values: &[u32]) -> (Vec<u32>, u32) {
     let mut total = 0_u32;
     let sums = values.iter().map(|&value| {
@@ -11,7 +11,7 @@ pub fn exclusive_scan(values: &[u32]) -> (Vec<u32>, u32) {
     (sums.collect(), total)
 }
 
-/// Places whose flag is not 0, in order.
+/// Indices of nonzero flags, in order.
 pub fn compact(flags: &[u32]) -> Vec<u32> {
     (0..flags.len()).filter(|&place| flags[place] != 0).map(|place| place as u32).collect()
 }

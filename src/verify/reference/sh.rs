@@ -3,7 +3,7 @@
 use super::Rules;
 use glam::DVec3;
 
-/// Coefficients of a degree: (degree + 1)^2.
+/// Number of coefficients up to a degree: (degree + 1)^2.
 pub fn coefficients(degree: u32) -> usize {
     ((degree + 1) * (degree + 1)) as usize
 }
@@ -57,12 +57,12 @@ pub fn basis_gradient(rules: &Rules, dir: DVec3) -> [DVec3; 16] {
     ]
 }
 
-/// A colour and how it came about.
+/// A colour with its intermediate results.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Colour {
     /// max(0, SH + bias).
     pub rgb: [f64; 3],
-    /// Before the clamp.
+    /// Colour before the clamp.
     pub raw: [f64; 3],
     /// Distance of the nearest channel to the clamp.
     pub margin: f64,
@@ -79,7 +79,7 @@ pub fn sh_forward(rules: &Rules, degree: u32, sh: &[[f64; 3]; 16], mean: DVec3, 
     Colour { rgb: raw.map(|value| value.max(0.0)), raw, margin }
 }
 
-/// Gradients of the coefficients and of the mean for a gradient of the colour.
+/// Gradients of the coefficients and of the mean, given the gradient of the colour.
 pub fn sh_backward(
     rules: &Rules,
     degree: u32,

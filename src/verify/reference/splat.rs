@@ -1,6 +1,6 @@
-//! What projection makes of a Gaussian, and what blending gives back.
+//! Output of projection, and the gradients that blending returns.
 
-/// A Gaussian as one view sees it.
+/// A Gaussian as seen in one view.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Splat {
     /// Row of the model.
@@ -17,16 +17,16 @@ pub struct Splat {
     pub colour: [f64; 3],
 }
 
-/// Gradients of a splat's fields. `conic[1]` is the derivative by B, which stands twice in the matrix.
+/// Gradients of a splat's fields. `conic[1]` is the derivative with respect to B, which occurs twice in the matrix.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SplatGradient {
-    /// By the centre, px^-1.
+    /// With respect to the centre, px^-1.
     pub mean2d: [f64; 2],
-    /// By (A, B, C).
+    /// With respect to (A, B, C).
     pub conic: [f64; 3],
-    /// By the opacity after the sigmoid.
+    /// With respect to the opacity after the sigmoid.
     pub opacity: f64,
-    /// By the colour.
+    /// With respect to the colour.
     pub colour: [f64; 3],
 }
 

@@ -1,4 +1,4 @@
-//! A whole training step: losses of a view and their gradients by every parameter.
+//! A complete training step: losses of a view and their gradients with respect to every parameter.
 
 use super::blend::{self, Blended, Upstream};
 use super::loss::{self, Loss, ObjectPixel, Photo};
@@ -7,12 +7,12 @@ use super::splat::{Splat, SplatGradient};
 use super::{Model, Row, Rules};
 use crate::scene::Camera;
 
-/// What a view trains towards.
+/// Training target of a view.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Target {
     /// The photo.
     pub photo: Photo,
-    /// Object id per pixel, [height, width].
+    /// Object id per pixel, `[height, width]`.
     pub label_map: Vec<u32>,
     /// Sampled objects, each label at most once.
     pub slots: Vec<ObjectPixel>,
@@ -20,7 +20,7 @@ pub struct Target {
     pub background: [f64; 3],
 }
 
-/// Outcome of a step before the optimiser.
+/// Result of a step before the optimiser.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StepGradient {
     /// Photo loss plus label losses.
@@ -29,23 +29,23 @@ pub struct StepGradient {
     pub photo: Loss,
     /// Label loss of each slot.
     pub objects: Vec<Loss>,
-    /// Gradient of `value`, [N].
+    /// Gradient of `value`, `[N]`.
     pub rows: Vec<Row>,
-    /// Norm of the scene's 2-D gradient, NDC units, [N]; 0 where unseen.
+    /// Norm of the scene's 2-D gradient, NDC units, `[N]`; 0 if not visible.
     pub gradient2d: Vec<f64>,
-    /// True where the Gaussian counts somewhere in the image, [N].
+    /// True if the Gaussian counts somewhere in the image, `[N]`.
     pub visible: Vec<bool>,
     /// Splats, nearest first.
     pub splats: Vec<Projection>,
-    /// Scene, then each slot over black.
+    /// The scene, then each slot over black.
     pub layers: Vec<Blended>,
-    /// Distance of the nearest decision of any pass (arg max left out: it bears on no gradient).
+    /// Smallest margin of the decisions of all passes (without the main Gaussian, which affects no gradient).
     pub margin: f64,
-    /// The same for the decisions that bear on each Gaussian's gradient, [N]; the order of depths left out.
+    /// Smallest margin of the decisions that affect each Gaussian's gradient, `[N]`, without the order of depths.
     pub margins: Vec<f64>,
 }
 
-/// The splats alone.
+/// Splats of projections.
 pub fn splats_of(projections: &[Projection]) -> Vec<Splat> {
     projections.iter().map(|projection| projection.splat).collect()
 }
@@ -94,7 +94,7 @@ pub fn step(rules: &Rules, camera: &Camera, model: &Model, target: &Target) -> S
     out
 }
 
-/// Distance of the pixels under each splat to the kink of a loss, by splat.
+/// For each splat, the distance of the pixels under it to the kink of a loss.
 fn kinks(rules: &Rules, splats: &[Splat], size: (usize, usize), out: &StepGradient) -> Vec<f64> {
     let mut margins = out.photo.margins.clone();
     for loss in &out.objects {
@@ -103,7 +103,7 @@ fn kinks(rules: &Rules, splats: &[Splat], size: (usize, usize), out: &StepGradie
     blend::smallest_over_pixels(rules, splats, size, &margins)
 }
 
-/// Norm of a 2-D mean gradient in NDC units (the image is 2 wide and 2 high).
+/// Norm of a 2-D mean gradient in NDC units (the image has width 2 and height 2).
 pub fn ndc_norm(v: &SplatGradient, size: (usize, usize)) -> f64 {
     (v.mean2d[0] * 0.5 * size.0 as f64).hypot(v.mean2d[1] * 0.5 * size.1 as f64)
 }

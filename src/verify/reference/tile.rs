@@ -1,16 +1,16 @@
-//! Which tiles a splat counts in: by every pixel, and by the continuous test over the rectangle of pixel centres.
+//! Tiles in which a splat counts: by testing every pixel, and by a continuous test over the tile's pixel centres.
 
 use super::Rules;
 use super::splat::Splat;
 
-/// log2 of alpha before the clamp at a position, px.
+/// log2 of alpha at a position (px), before the clamp.
 pub fn exponent(splat: &Splat, at: [f64; 2]) -> f64 {
     let (dx, dy) = (splat.mean2d[0] - at[0], splat.mean2d[1] - at[1]);
     let [a, b, c] = splat.conic;
     splat.opacity.log2() - (0.5 * (a * dx * dx + c * dy * dy) + b * dx * dy) * std::f64::consts::LOG2_E
 }
 
-/// A grid of tiles over an image; the last column and row may be cut by the image border.
+/// A grid of tiles over an image; the image border may cut the last column and row.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TileGrid {
     /// Image size, px.
@@ -20,36 +20,36 @@ pub struct TileGrid {
 }
 
 impl TileGrid {
-    /// Tiles in a row.
+    /// Number of tile columns.
     pub fn columns(&self) -> usize {
         self.size.0.div_ceil(self.tile.0)
     }
 
-    /// Rows of tiles.
+    /// Number of tile rows.
     pub fn rows(&self) -> usize {
         self.size.1.div_ceil(self.tile.1)
     }
 
-    /// Tiles of the image.
+    /// Number of tiles.
     pub fn count(&self) -> usize {
         self.columns() * self.rows()
     }
 
-    /// Pixel columns [start, end) of tile column `column`.
+    /// Pixel columns `[start, end)` of tile column `column`.
     pub fn span_x(&self, column: usize) -> (usize, usize) {
         (column * self.tile.0, ((column + 1) * self.tile.0).min(self.size.0))
     }
 
-    /// Pixel rows [start, end) of tile row `row`.
+    /// Pixel rows `[start, end)` of tile row `row`.
     pub fn span_y(&self, row: usize) -> (usize, usize) {
         (row * self.tile.1, ((row + 1) * self.tile.1).min(self.size.1))
     }
 }
 
-/// The answer of a continuous test.
+/// Result of a continuous test.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Touch {
-    /// True where alpha reaches the minimum somewhere in the rectangle.
+    /// True if alpha reaches the minimum somewhere in the rectangle.
     pub touches: bool,
     /// Distance of the largest exponent to the cut, log2 units.
     pub margin: f64,
@@ -62,7 +62,7 @@ pub fn largest_exponent(splat: &Splat, low: [f64; 2], high: [f64; 2]) -> f64 {
     if nearest == m {
         return exponent(splat, m);
     }
-    // The form is convex: outside its centre the maximum lies on an edge, at the edge's own best point.
+    // The form is concave: unless its centre is inside, the maximum is on an edge, at that edge's own best point.
     let [a, b, c] = splat.conic;
     let on_vertical = |x: f64| [x, (m[1] + b * (m[0] - x) / c).clamp(low[1], high[1])];
     let on_horizontal = |y: f64| [(m[0] + b * (m[1] - y) / a).clamp(low[0], high[0]), y];
@@ -72,7 +72,7 @@ pub fn largest_exponent(splat: &Splat, low: [f64; 2], high: [f64; 2]) -> f64 {
         .fold(f64::NEG_INFINITY, f64::max)
 }
 
-/// Continuous test of the pixel centres of columns [x0, x1) and rows [y0, y1).
+/// Continuous test of the pixel centres of columns `[x0, x1)` and rows `[y0, y1)`.
 pub fn touch(rules: &Rules, splat: &Splat, (x0, x1): (usize, usize), (y0, y1): (usize, usize)) -> Touch {
     let low = [x0 as f64 + 0.5, y0 as f64 + 0.5];
     let high = [x1 as f64 - 0.5, y1 as f64 - 0.5];
@@ -80,12 +80,12 @@ pub fn touch(rules: &Rules, splat: &Splat, (x0, x1): (usize, usize), (y0, y1): (
     Touch { touches: above >= 0.0, margin: above.abs() }
 }
 
-/// Does the splat count anywhere between the outermost pixel centres of the image?
+/// Tests if the splat counts anywhere between the outermost pixel centres of the image.
 pub fn cull(rules: &Rules, splat: &Splat, size: (usize, usize)) -> Touch {
     touch(rules, splat, (0, size.0), (0, size.1))
 }
 
-/// Tiles of the continuous test, in row-major order, and the smallest margin of all tiles.
+/// Tiles that pass the continuous test, in row-major order, and the smallest margin of all tiles.
 pub fn touched_tiles(rules: &Rules, splat: &Splat, grid: &TileGrid) -> (Vec<u32>, f64) {
     let mut tiles = Vec::new();
     let mut margin = f64::INFINITY;
@@ -101,14 +101,14 @@ pub fn touched_tiles(rules: &Rules, splat: &Splat, grid: &TileGrid) -> (Vec<u32>
     (tiles, margin)
 }
 
-/// Tiles whose largest exponent is at most `slack` (log2 units) below the cut: an engine that errs on the side of one
-/// tile too many lies between slack 0 and its own.
+/// Tiles whose largest exponent is at most `slack` (log2 units) below the cut. An engine that may add tiles lists at
+/// least those of slack 0 and at most those of its own slack.
 pub fn tiles_within(rules: &Rules, splat: &Splat, grid: &TileGrid, slack: f64) -> Vec<u32> {
     let lower = Rules { alpha_min: rules.alpha_min * (-slack).exp2(), ..rules.clone() };
     touched_tiles(&lower, splat, grid).0
 }
 
-/// Tiles in which at least one pixel counts, by trying each; always a subset of `touched_tiles`.
+/// Tiles in which at least one pixel counts, by testing each pixel; always a subset of `touched_tiles`.
 pub fn counted_tiles(rules: &Rules, splat: &Splat, grid: &TileGrid) -> Vec<u32> {
     let counts = |x: usize, y: usize| exponent(splat, [x as f64 + 0.5, y as f64 + 0.5]) >= rules.exponent_min();
     let mut tiles = Vec::new();
@@ -128,11 +128,11 @@ pub fn counted_tiles(rules: &Rules, splat: &Splat, grid: &TileGrid) -> Vec<u32> 
 pub struct Instance {
     /// layer * tiles + tile; layer 0 is the scene, layer 1 + j the object slot j.
     pub key: u32,
-    /// Place in the depth-ordered list of splats.
+    /// Index in the depth-ordered list of splats.
     pub splat: u32,
 }
 
-/// Instances of all splats: by splat, the scene's tiles first, then the same tiles in the splat's object layer.
+/// Instances of all splats: for each splat, first the scene's tiles, then the same tiles in its object layer.
 /// `slot_of(gaussian)` is the object slot of a labelled Gaussian in this step.
 pub fn emit_instances(
     rules: &Rules,
@@ -152,13 +152,13 @@ pub fn emit_instances(
     instances
 }
 
-/// The longest list, and for each key whether its list holds anything.
+/// Length of the longest list, and for each key whether its list has entries.
 pub fn tile_lengths(ranges: &[[u32; 2]]) -> (u32, Vec<bool>) {
     let lengths = ranges.iter().map(|[start, end]| end - start);
     (lengths.clone().max().unwrap_or(0), lengths.map(|length| length > 0).collect())
 }
 
-/// [start, end) of each key in a sorted list of keys; keys that do not occur begin and end where they would be.
+/// `[start, end)` of each key in a sorted list of keys; a missing key gets the empty range at its place.
 pub fn tile_ranges(sorted_keys: &[u32], keys: usize) -> Vec<[u32; 2]> {
     let before = |key: usize| sorted_keys.iter().filter(|&&found| (found as usize) < key).count() as u32;
     (0..keys).map(|key| [before(key), before(key + 1)]).collect()

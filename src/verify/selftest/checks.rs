@@ -23,10 +23,10 @@ use crate::verify::reference::tile::{TileGrid, counted_tiles, tiles_within};
 use crate::verify::reference::{Row, Rules};
 use std::sync::Arc;
 
-/// Vulkan lets `exp2`, division, square roots and their like be off by several units in the last place, lavapipe is off
-/// by about one: bounds are this many times what the tests hold lavapipe to.
+/// Vulkan allows `exp2`, division, square roots and similar functions an error of several units in the last place;
+/// lavapipe's error is about one. Bounds are this many times those of the tests on lavapipe.
 pub(super) const LEEWAY: f64 = 8.0;
-/// Decisions (alpha 1/255, the stop) nearer to their threshold than this may fall either way.
+/// Decisions (alpha 1/255, the stop) with a smaller distance to their threshold may go either way.
 const MARGIN: f64 = 1e-4;
 const COLOUR: Tolerance = Tolerance { absolute: 6.5e-7 * LEEWAY, relative: 0.0 };
 const CUT: Band = Band { width: MARGIN, flip: 0.01, ratio: 0.005 };
@@ -41,7 +41,7 @@ const fn bounds(element: f64, whole: f64) -> GradientBounds {
     }
 }
 
-/// A step that has run, with every buffer still there.
+/// A finished step, with every buffer still readable.
 pub(super) struct Ran {
     fixture: Fixture,
     report: Report,
@@ -50,7 +50,7 @@ pub(super) struct Ran {
 }
 
 impl Ran {
-    /// Runs a step with labels, without an update, to be compared with the reference under `rules`.
+    /// Runs a step with labels and without an update, for comparison with the reference under `rules`.
     pub(super) fn new(rules: &Rules, gpu: &Arc<Gpu>, kernels: KernelShape) -> Result<Self> {
         let shape = Shape { gaussians: 150, width: 61, height: 45, opacities: (-4.0, 7.0), ..Shape::default() };
         let mut fixture = Fixture::new(Arc::clone(gpu), scene(62, &shape), true, kernels, readable())?;
@@ -66,7 +66,7 @@ impl Ran {
         self.fixture.get(Buf::IMAGE, pixels)
     }
 
-    /// Visible Gaussians come front to back, equals in the order of their rows.
+    /// Checks that visible Gaussians are in depth order, equal depths in row order.
     pub(super) fn order(&mut self) -> Result<Verdict> {
         let visible = self.splats.len();
         let count = self.fixture.scene.gaussians.len();
@@ -78,24 +78,24 @@ impl Ran {
         Ok(if visible * 2 > keys.len() && distinct {
             exact(&order, &expected)
         } else {
-            Err(format!("{visible} of {} Gaussians are visible, or some are twice", keys.len()))
+            Err(format!("{visible} of {} Gaussians are visible, or some occur twice", keys.len()))
         })
     }
 
-    /// Centres, conics, opacities and colours of splats.
+    /// Checks centres, conics, opacities and colours of splats.
     pub(super) fn projection(&mut self) -> Result<Verdict> {
         let (model, camera) = (self.fixture.model(), self.fixture.scene.camera.clone());
         let projected = |s: &Splat| project_forward(&self.rules, &camera, &model, s.gaussian);
         let expected: Vec<Splat> = self.splats.iter().map(|s| projected(s).map_or(*s, |p| p.splat)).collect();
         let kept = self.splats.iter().filter(|s| projected(s).is_some()).count();
         if kept < self.splats.len() {
-            return Ok(Err(format!("{} splats cannot be seen at all", self.splats.len() - kept)));
+            return Ok(Err(format!("{} splats count at no pixel", self.splats.len() - kept)));
         }
-        // Centres are some 50 px times the roundings of a quotient.
+        // Centres are about 50 px times the rounding errors of a quotient.
         Ok(judge::splats(&self.splats, &expected, Tolerance { absolute: 1.4e-5 * LEEWAY, relative: 0.0 }))
     }
 
-    /// Every tile in which a splat counts is in its list, and the lists are sorted.
+    /// Checks that each splat is listed in every tile in which it counts, and that the lists are sorted.
     pub(super) fn tiles(&mut self) -> Result<Verdict> {
         let pairs = self.report.counters.instance_count as usize;
         let (keys, _) = self.fixture.sorted_pairs(pairs)?;
@@ -115,16 +115,18 @@ impl Ran {
         }
         for (index, (splat, found)) in self.splats.iter().zip(&found).enumerate() {
             let least = counted_tiles(&self.rules, splat, &grid);
-            // The device may list a tile too many within 0.02 in log2 of alpha.
+            // The device may list additional tiles within 0.02 in log2 of alpha.
             let most = tiles_within(&self.rules, splat, &grid, 0.02);
             if !least.iter().all(|t| found.contains(t)) || !found.iter().all(|t| most.contains(t)) {
-                return Ok(Err(format!("splat {index} is listed in {found:?}; it counts in {least:?} of {most:?}")));
+                return Ok(Err(format!(
+                    "splat {index} is listed in tiles {found:?}; expected at least {least:?}, at most {most:?}"
+                )));
             }
         }
         Ok(Ok(Summary::default()))
     }
 
-    /// Colours and transmittance.
+    /// Checks colours and transmittance.
     pub(super) fn blend(&mut self) -> Result<Verdict> {
         let image = self.pixels()?;
         let expected =
@@ -132,7 +134,7 @@ impl Ran {
         Ok(judge::picture(&image, &expected, (COLOUR, CUT)))
     }
 
-    /// L1, SSIM, and their gradient by the picture.
+    /// Checks L1, SSIM, and their gradient with respect to the picture.
     pub(super) fn loss(&mut self) -> Result<Verdict> {
         let image: Vec<[f64; 3]> = self.pixels()?.iter().map(|&[r, g, b, _]| [r, g, b].map(f64::from)).collect();
         let v_image = self.fixture.get::<[f32; 4]>(Buf::V_IMAGE, image.len())?;
@@ -141,14 +143,14 @@ impl Ran {
         let counters = &self.report.counters;
         let sums = [counters.loss_l1, counters.loss_ssim].map(|sum| f64::from(sum) / photo.elements());
         let values = close(&sums, &[expected.l1, expected.ssim], Tolerance { absolute: 1e-6 * LEEWAY, relative: 0.0 });
-        // Near its kink the sign of L1 is anyone's.
+        // Near its kink, the sign of L1 is not determined.
         let sure: Vec<usize> = (0..image.len()).filter(|&i| expected.margins[i] > 1e-5).collect();
         let actual: Vec<f64> = sure.iter().flat_map(|&i| [0, 1, 2].map(|c| f64::from(v_image[i][c]))).collect();
         let wanted: Vec<f64> = sure.iter().flat_map(|&i| expected.v_image[i]).collect();
         Ok(judge::all([values, gradients(&actual, &wanted, bounds(1.1e-6, 4.6e-6))]))
     }
 
-    /// Gradients of the splats by a step without object layers, from the device's own picture gradient.
+    /// Checks the gradients of the splats in a step without object layers, from the device's own picture gradient.
     pub(super) fn blend_backward(&mut self) -> Result<Verdict> {
         let layers = std::mem::take(&mut self.fixture.input.layers);
         self.fixture.input.labels = false;
@@ -166,7 +168,7 @@ impl Ran {
         Ok(judge::splat_gradients(&actual, &expected.values, margins, bounds(4e-7, 4e-7)))
     }
 
-    /// The gradient of every parameter by photo loss and label losses.
+    /// Checks the gradient of photo loss and label losses with respect to every parameter.
     pub(super) fn gradient(&mut self) -> Result<Verdict> {
         self.fixture.train()?;
         let (model, camera, target) =
@@ -175,13 +177,13 @@ impl Ran {
         let expected = step(&self.rules, &camera, &model, &target);
         let sure: Vec<usize> = (0..actual.len()).filter(|&i| expected.margins[i] > 2e-5).collect();
         if sure.len() * 10 < actual.len() * 4 {
-            return Ok(Err(format!("only {} of {} Gaussians are sure", sure.len(), actual.len())));
+            return Ok(Err(format!("only {} of {} Gaussians are away from all thresholds", sure.len(), actual.len())));
         }
         let pick = |rows: &[Row]| sure.iter().map(|&i| rows[i]).collect::<Vec<_>>();
         Ok(judge::rows(&pick(&actual), &pick(&expected.rows), model.sh_degree, bounds(6.7e-6, 2.3e-6)))
     }
 
-    /// The same step twice: the same bits.
+    /// Checks that the same step gives the same bits twice.
     pub(super) fn repeated(&mut self) -> Result<Verdict> {
         let mut bits = || -> Result<Vec<u32>> {
             self.fixture.train()?;
@@ -196,7 +198,7 @@ impl Ran {
         Ok(exact(&second, &first))
     }
 
-    /// Sums of blending weights by label of the mask.
+    /// Checks the sums of blending weights by label of the mask.
     pub(super) fn votes(&mut self) -> Result<Verdict> {
         let (size, count) = (self.fixture.size(), self.fixture.scene.gaussians.len());
         let (camera, target) = (self.fixture.scene.camera.clone(), &self.fixture.scene.target);
@@ -209,11 +211,11 @@ impl Ran {
         let column = |id: &u16| ballot.labels.iter().position(|label| label == id);
         let columns: Vec<Option<usize>> = mask.ids.iter().map(column).collect();
         let expected = vote(&self.rules, &self.splats, size, count, &columns, &vec![1.0; ballot.labels.len()]);
-        // Each tile's sum is rounded to 2^-16, and there are at most 48 tiles; what is at the cut may fall either way.
+        // Each tile's sum is rounded to 2^-16, and there are at most 48 tiles; pairs near the cut may go either way.
         Ok(close(&actual, &expected, Tolerance { absolute: 48.0 * 0.5 / 65_536.0 + 0.02, relative: 1e-4 }))
     }
 
-    /// Adam on all attributes, each of three steps from the state that the device had before it.
+    /// Checks Adam on all attributes; each of three steps starts from the device's own state.
     pub(super) fn adam(&mut self) -> Result<Verdict> {
         let count = self.fixture.scene.gaussians.len();
         let mut verdicts = Vec::new();
@@ -242,8 +244,8 @@ fn states(fixture: &mut Fixture, count: usize) -> Result<Vec<Optimised>> {
     Ok((0..count).map(|i| Optimised { row: rows[i], m: m[i], u: u[i] }).collect())
 }
 
-/// More splats in one tile than some drivers run rounds of a loop (65,535). Nearly all are over one corner; those behind
-/// them all are over the opposite one, where they show only if the walk goes to its end.
+/// Checks a tile with more splats than some drivers run rounds of a loop (65,535). Nearly all cover one corner. The
+/// last ones cover the opposite corner, where they are visible only if the walk reaches its end.
 pub(super) fn long_list(gpu: &Arc<Gpu>, kernels: KernelShape) -> Result<Verdict> {
     const SPLATS: usize = 70_000;
     let camera = plain_camera(8, 8);
@@ -258,7 +260,7 @@ pub(super) fn long_list(gpu: &Arc<Gpu>, kernels: KernelShape) -> Result<Verdict>
     let report = fixture.render()?;
     let listed = report.counters.longest_list;
     if (listed as usize) < SPLATS - 5 {
-        return Ok(Err(format!("the longest list has {listed} splats, {SPLATS} are in the tile")));
+        return Ok(Err(format!("the longest list has {listed} splats; expected {SPLATS}")));
     }
     let splats = fixture.splats()?;
     let expected = blend_forward(&Rules::default(), &splats, fixture.size(), fixture.scene.target.background);

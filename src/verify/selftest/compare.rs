@@ -1,18 +1,18 @@
-//! Predicates. Each answers `Err` with the place and the numbers; `tests/compare_self.rs` has seen each one fail.
+//! Comparisons. A failure names the place and the numbers; `tests/compare_self.rs` makes each comparison fail.
 
 use std::fmt::Debug;
 
 /// Outcome of a comparison.
 pub type Verdict = Result<Summary, String>;
 
-/// What a passed comparison measured, for written tolerances (worst observed x 1.5).
+/// Measured errors of a passed comparison; tolerances in the tests are the worst observed error x 1.5.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Summary {
     /// Largest error in units of the tolerance.
     pub worst: f64,
-    /// Where it was.
+    /// Index of the largest error.
     pub place: usize,
-    /// Elements that were beyond the tolerance for an allowed reason.
+    /// Number of elements beyond the tolerance for an allowed reason.
     pub flips: usize,
     /// For gradients: the largest of norm, angle and bias in units of their bounds.
     pub whole: f64,
@@ -23,7 +23,7 @@ pub struct Summary {
 pub struct Tolerance {
     /// Absolute part.
     pub absolute: f64,
-    /// Part of the expected magnitude.
+    /// Part relative to the expected magnitude.
     pub relative: f64,
 }
 
@@ -40,7 +40,7 @@ fn same_length<A, B>(actual: &[A], expected: &[B]) -> Result<(), String> {
     Err(format!("{} elements where {} are expected", actual.len(), expected.len()))
 }
 
-/// Every element equal.
+/// Every element is equal.
 pub fn exact<T: PartialEq + Debug>(actual: &[T], expected: &[T]) -> Verdict {
     same_length(actual, expected)?;
     let wrong: Vec<usize> = (0..actual.len()).filter(|&i| actual[i] != expected[i]).collect();
@@ -56,7 +56,7 @@ pub fn exact<T: PartialEq + Debug>(actual: &[T], expected: &[T]) -> Verdict {
     }
 }
 
-/// Every element within the tolerance; NaN never is.
+/// Every element is within the tolerance; NaN never is.
 pub fn close(actual: &[f64], expected: &[f64], tolerance: Tolerance) -> Verdict {
     same_length(actual, expected)?;
     let mut summary = Summary::default();
@@ -77,22 +77,22 @@ pub fn close(actual: &[f64], expected: &[f64], tolerance: Tolerance) -> Verdict 
     Ok(summary)
 }
 
-/// What is allowed near a discontinuity.
+/// Allowed deviations near a discontinuity.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Band {
-    /// Elements with a margin below this may flip.
+    /// Elements with a smaller margin may flip.
     pub width: f64,
     /// A flip changes an element by at most this.
     pub flip: f64,
-    /// At most this part of all elements may flip, and at least one may.
+    /// At most this share of all elements may flip, but at least one may.
     pub ratio: f64,
 }
 
-/// With fewer flips than this their signs say nothing.
+/// With fewer flips, their signs are not significant.
 const FLIPS_TO_JUDGE: usize = 12;
 
-/// Tight outside the band; inside it a capped share of flips of bounded size, towards both sides alike.
-/// `crossing(place, actual)` proves a flip: true where the actual value is what the other decision gives.
+/// Tight bounds outside the band; inside it, a limited share of bounded flips, balanced between both directions.
+/// `crossing(place, actual)` proves a flip: it returns true if the actual value is the result of the opposite decision.
 pub fn close_with_band(
     actual: &[f64],
     expected: &[f64],
@@ -137,19 +137,19 @@ pub fn close_with_band(
 /// Bounds of a gradient comparison.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GradientBounds {
-    /// Per element, absolute part in units of the largest expected magnitude.
+    /// Bound per element; the absolute part is in units of the largest expected magnitude.
     pub element: Tolerance,
-    /// Part of the elements that may be beyond the element bound.
+    /// Share of the elements that may exceed the element bound.
     pub outliers: f64,
     /// |a - e|_2 / |e|_2.
     pub norm: f64,
     /// 1 - cosine.
     pub angle: f64,
-    /// |sum (a - e) sign(e)| / sum |e|: a small common factor fails here even where every element passes.
+    /// |sum (a - e) sign(e)| / sum |e|: detects a small common factor even if every element passes.
     pub bias: f64,
 }
 
-/// Element bound with a capped share of outliers, and norm, angle and signed bias of the whole.
+/// Element bound with a limited share of outliers, and bounds on norm, angle and signed bias of the whole.
 pub fn gradients(actual: &[f64], expected: &[f64], bounds: GradientBounds) -> Verdict {
     same_length(actual, expected)?;
     if let Some(i) = actual.iter().position(|a| !a.is_finite()) {

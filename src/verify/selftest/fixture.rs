@@ -1,4 +1,4 @@
-//! A scene on the device: runs the engine's own pass lists and reads every buffer back.
+//! A scene on the device: runs the engine's own pass lists and reads all buffers back.
 
 use super::scenes::Scene;
 use crate::engine::{Engine, EngineSize, Input, LabelSize, ListKey, Report};
@@ -32,7 +32,7 @@ pub const MOMENTS_2: [Buf; 7] =
 pub const GRADIENTS: [Buf; 7] =
     [Buf::V_MEANS, Buf::V_SCALES, Buf::V_QUATS, Buf::V_SH0, Buf::V_SH1, Buf::V_SH2, Buf::V_SH3];
 
-/// Floats of each plane, and where they go in `Row::floats`: (floats, runs of (from, to, length)).
+/// Floats of each plane, and their positions in `Row::floats`: (floats, runs of (from, to, length)).
 const LAYOUT: [(usize, &[(usize, usize, usize)]); 7] = [
     (4, &[(0, 0, 3), (3, 10, 1)]),
     (4, &[(0, 7, 3)]),
@@ -43,18 +43,18 @@ const LAYOUT: [(usize, &[(usize, usize, usize)]); 7] = [
     (24, &[(0, 38, 21)]),
 ];
 
-/// Labels that the engine counts votes for at once: few, so that sweeps need several rounds.
+/// Labels that one sweep of votes counts: few, so that sweeps need several rounds.
 pub const VOTE_COLUMNS: u32 = 3;
 
-/// A scene, an engine with its model, and the step that is run.
+/// A scene, an engine with its model, and a training step.
 pub struct Fixture {
     /// The engine.
     pub engine: Engine,
     /// The scene.
     pub scene: Scene,
-    /// What the host knows of the view.
+    /// Host data of the view.
     pub view: TrainView,
-    /// The step.
+    /// Input of the step.
     pub input: StepInput,
     /// The settings.
     pub config: TrainConfig,
@@ -62,13 +62,13 @@ pub struct Fixture {
     pub fixed: SceneScale,
 }
 
-/// Scheduler options in which every buffer can be read back.
+/// Scheduler options that keep every buffer readable.
 pub fn readable() -> SchedulerOptions {
     let plan = PlanOptions { alias: false, guards: true, barrier_everywhere: false };
     SchedulerOptions { plan, poison_step: true, ..SchedulerOptions::default() }
 }
 
-/// What the trainer keeps of a scene's only view.
+/// The trainer's data of a scene's only view.
 pub fn train_view(scene: &Scene) -> TrainView {
     let (target, camera) = (&scene.target, scene.camera.clone());
     let rgba = (target.photo.colours.iter().zip(&target.photo.valid))
@@ -95,8 +95,8 @@ pub fn train_view(scene: &Scene) -> TrainView {
 }
 
 impl Fixture {
-    /// The scene on a device, with or without labels, with kernels of a given shape. Without [`readable`] only some
-    /// buffers can be read back.
+    /// Uploads the scene to a device, with or without labels, with kernels of a given shape. Without [`readable`], only
+    /// some buffers can be read back.
     pub fn new(
         gpu: Arc<Gpu>,
         scene: Scene,
@@ -117,7 +117,7 @@ impl Fixture {
             background: scene.target.background.map(|v| v as f32),
             sh_degree: scene.gaussians.sh_degree,
             label_rule: LabelRule::Main,
-            // What the mirrors' rules have.
+            // Weights of the mirrors' rules.
             label_weight: 1.0,
             label_alpha: 0.1,
             label_balance: true,
@@ -139,7 +139,7 @@ impl Fixture {
         step_input::uniforms(&self.input, &self.view, &self.config, self.fixed, &self.engine)
     }
 
-    /// The list of a training step.
+    /// Key of the training step's list.
     pub fn key(&self) -> ListKey {
         let (labels, update) = (self.input.labels, self.input.update);
         let size = (self.scene.camera.width, self.scene.camera.height);
@@ -147,7 +147,7 @@ impl Fixture {
         ListKey::Train(Variant { labels, lift, sh_degree: self.config.sh_degree, size, update, counts: false })
     }
 
-    /// The device's sorted pairs: keys, and places before the sort.
+    /// Sorted pairs of the device: keys, and positions before the sort.
     pub fn sorted_pairs(&mut self, count: usize) -> Result<(Vec<u32>, Vec<u32>)> {
         let virtual_tiles = self.engine.raw().capacity().virtual_tiles;
         let bits = 64 - (virtual_tiles - 1).leading_zeros();
@@ -175,14 +175,14 @@ impl Fixture {
         self.train_as(self.key())
     }
 
-    /// The same as another list.
+    /// Same as [`Fixture::train`], with another list.
     pub fn train_as(&mut self, key: ListKey) -> Result<Report> {
         let uniforms = self.uniforms();
         let data = step_input::train_input(&self.input, &self.view, &self.config, uniforms, &self.engine);
         self.engine.run(key, &data)
     }
 
-    /// Writes what the host gives to a step, for lists of the caller.
+    /// Writes the host inputs of a step, for the caller's own lists.
     pub fn write(&mut self) -> Result<()> {
         let uniforms = self.uniforms();
         let data = step_input::train_input(&self.input, &self.view, &self.config, uniforms, &self.engine);
@@ -209,7 +209,7 @@ impl Fixture {
         self.size().0 * self.size().1
     }
 
-    /// Splats that the device projected, in its order.
+    /// Splats of the device, in its order.
     pub fn splats(&mut self) -> Result<Vec<Splat>> {
         let visible = self.engine.report(0)?.counters.visible_count as usize;
         let order = self.get::<u32>(Buf::DEPTH_VALUES_A, visible)?;
@@ -225,7 +225,7 @@ impl Fixture {
             .map(|(v, splat)| SplatGradient {
                 mean2d: [v[0], v[1]],
                 conic: [v[2], v[3], v[4]],
-                // The record holds the derivative by ln o.
+                // The record has the derivative with respect to ln o.
                 opacity: v[5] / splat.opacity,
                 colour: [v[6], v[7], v[8]],
             })
@@ -265,7 +265,7 @@ impl Fixture {
         Ok(())
     }
 
-    /// The gradients of the last step by Gaussian; 0 where it has no splat.
+    /// Gradients of the last step by Gaussian; 0 without a splat.
     pub fn gradient_rows(&mut self) -> Result<Vec<Row>> {
         let splats = self.splats()?;
         let by_splat = self.rows(GRADIENTS, splats.len())?;
@@ -289,7 +289,7 @@ impl Fixture {
     }
 }
 
-/// A splat from its record (glsl/include/record.glsl).
+/// Decodes a splat from its record (glsl/include/record.glsl).
 pub fn splat_of(gaussian: u32, record: &[f32; 12]) -> Splat {
     let [x, y, a, b, c, log2_o, red, green, blue, depth, _, _] = record.map(f64::from);
     Splat {

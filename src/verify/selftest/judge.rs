@@ -1,4 +1,4 @@
-//! What a pass left on the device beside what the reference says, as verdicts.
+//! Compares the buffers of the device with the reference, pass by pass.
 
 use super::compare::{
     Band, GradientBounds, Summary, Tolerance, Verdict, close, close_with_band, gradients as compare_gradients,
@@ -9,7 +9,7 @@ use crate::verify::reference::model::flatten;
 use crate::verify::reference::splat::{Splat, SplatGradient};
 use crate::verify::reference::{Group, Row};
 
-/// Several verdicts into one.
+/// Combines several verdicts.
 pub fn all(verdicts: impl IntoIterator<Item = Verdict>) -> Verdict {
     let mut worst = Summary::default();
     for verdict in verdicts {
@@ -21,7 +21,7 @@ pub fn all(verdicts: impl IntoIterator<Item = Verdict>) -> Verdict {
     Ok(worst)
 }
 
-/// Splats, one for one. Shapes are compared relative to their size.
+/// Compares splats one by one. Shapes are compared relative to their size.
 pub fn splats(actual: &[Splat], expected: &[Splat], tolerance: Tolerance) -> Verdict {
     let floats = |of: &[Splat]| of.iter().zip(expected).flat_map(|(s, e)| splat_floats(s, e)).collect::<Vec<_>>();
     close(&floats(actual), &floats(expected), tolerance)
@@ -31,7 +31,7 @@ pub fn splats(actual: &[Splat], expected: &[Splat], tolerance: Tolerance) -> Ver
 fn splat_floats(splat: &Splat, scale: &Splat) -> [f64; 10] {
     let (size_a, size_c) = (scale.conic[0].sqrt(), scale.conic[2].sqrt());
     let [x, y] = splat.mean2d;
-    // Far outside of the image a px is not worth what it is inside.
+    // Far outside of the image, an error in px matters less.
     let [fx, fy] = scale.mean2d.map(|v| 1.0 + (v / 50.0).abs());
     let [a, b, c] = splat.conic;
     let [red, green, blue] = splat.colour;
@@ -39,7 +39,7 @@ fn splat_floats(splat: &Splat, scale: &Splat) -> [f64; 10] {
     [x / fx, y / fy, shape[0], shape[1], shape[2], splat.opacity.log2(), red, green, blue, splat.depth]
 }
 
-/// Colours and transmittance of each pixel; pixels with a decision in the band may flip.
+/// Compares colours and transmittance of each pixel; pixels with a decision in the band may flip.
 pub fn picture(actual: &[[f32; 4]], expected: &Blended, (tolerance, band): (Tolerance, Band)) -> Verdict {
     let wanted: Vec<f64> =
         expected.pixels.iter().flat_map(|p| [p.colour[0], p.colour[1], p.colour[2], p.transmittance]).collect();
@@ -49,8 +49,7 @@ pub fn picture(actual: &[[f32; 4]], expected: &Blended, (tolerance, band): (Tole
     close_with_band(&actual, &wanted, &margins, (tolerance, band), |_, _| true)
 }
 
-/// Gradients of splats with a margin of more than `sure`, each kind of float on its own. At least 0.7 of all must be
-/// sure.
+/// Compares gradients of splats with a margin above `sure` (at least 70 % of all), each kind of float separately.
 pub fn splat_gradients(
     actual: &[SplatGradient],
     expected: &[SplatGradient],
@@ -59,7 +58,7 @@ pub fn splat_gradients(
 ) -> Verdict {
     let sure: Vec<usize> = (0..actual.len().min(margins.len())).filter(|&i| margins[i] > sure).collect();
     if sure.len() * 10 <= actual.len() * 7 {
-        return Err(format!("only {} of {} splats are sure", sure.len(), actual.len()));
+        return Err(format!("only {} of {} splats are away from all thresholds", sure.len(), actual.len()));
     }
     let pick = |of: &[SplatGradient], kind: usize| -> Vec<f64> {
         let floats = |v: &SplatGradient| match kind {
@@ -75,7 +74,7 @@ pub fn splat_gradients(
     }))
 }
 
-/// Rows of gradients, each group of floats on its own: their magnitudes have nothing to do with each other.
+/// Compares rows of gradients, each group of floats separately, because their magnitudes are unrelated.
 pub fn rows(actual: &[Row], expected: &[Row], degree: u32, bounds: GradientBounds) -> Verdict {
     let active = Group::ALL.into_iter().take(5 + degree as usize);
     all(active.map(|group| {
@@ -84,8 +83,9 @@ pub fn rows(actual: &[Row], expected: &[Row], degree: u32, bounds: GradientBound
     }))
 }
 
-/// Parameters and moments after an update. In units of what is expected: rounding of an f32 parameter and of its update
-/// (a few roundings, and the host's bias correction, which takes 0.999 as the nearest f32: 1.3e-5 of 1 - 0.999).
+/// Compares parameters and moments after an update. Errors are in units of the expected rounding error of an f32
+/// parameter and of its update (a few roundings, and the host's bias correction, which uses the nearest f32 of 0.999:
+/// 1.3e-5 of 1 - 0.999).
 pub fn updates(actual: &[Optimised], expected: &[Optimised], rates: &Rates) -> Verdict {
     let mut pairs = (Vec::new(), Vec::new());
     for (a, e) in actual.iter().zip(expected) {

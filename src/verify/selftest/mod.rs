@@ -1,4 +1,4 @@
-//! The device against the reference: what `labelgs selftest` runs for a user, and what the tests build on.
+//! Compares the device with the reference: `labelgs selftest` runs these checks, and the tests use them.
 
 mod checks;
 pub mod compare;
@@ -20,23 +20,23 @@ use std::time::Instant;
 /// One check of the self-test.
 #[derive(Clone, Debug)]
 pub struct Check {
-    /// What was checked.
+    /// Name of the check.
     pub name: String,
-    /// What was measured, or what is wrong.
+    /// Measured errors, or the failure.
     pub verdict: Verdict,
-    /// Seconds that it took, compilation by the driver included.
+    /// Duration in seconds, including compilation by the driver.
     pub seconds: f64,
 }
 
 impl Check {
-    /// Largest error in units of what is allowed; none where it failed.
+    /// Largest error in units of its bound; `None` after a failure.
     pub fn worst(&self) -> Option<f64> {
         self.verdict.as_ref().ok().map(|summary| summary.worst.max(summary.whole))
     }
 }
 
-/// One step against the reference, where a driver does not let subgroup sizes be chosen: kernels for other subgroups than
-/// those that run compute nonsense and write where they may not.
+/// Compares one step with the reference. For drivers that do not let subgroup sizes be chosen: kernels for a wrong
+/// subgroup size compute nonsense and write out of bounds.
 pub fn canary(gpu: &Arc<Gpu>) -> Result<()> {
     let found = gpu.capabilities();
     let step = || -> Result<Verdict> {
@@ -47,7 +47,7 @@ pub fn canary(gpu: &Arc<Gpu>) -> Result<()> {
         Ok(Ok(_)) => return Ok(()),
         Ok(Err(problem)) => problem,
         Err(lost @ Error::DeviceLost { .. }) => return Err(lost),
-        // Sums that are nonsense ask for all memory there is.
+        // A nonsensical prefix sum may request all memory.
         Err(other) => other.to_string(),
     };
     Err(Error::NoDevice(format!(
@@ -60,13 +60,13 @@ pub fn canary(gpu: &Arc<Gpu>) -> Result<()> {
     )))
 }
 
-/// Runs every check on a device and hands each to `done` as it ends. An error is a failure of the device itself, such
-/// as a lack of memory.
+/// Runs every check on a device and passes each to `done` when it ends. An error is a failure of the device itself,
+/// such as a lack of memory.
 pub fn run(gpu: &Arc<Gpu>, done: impl FnMut(Check)) -> Result<()> {
     run_against(&Rules::default(), gpu, done)
 }
 
-/// The same against other rules than the engine's, to see that the checks can fail.
+/// Same as [`run`], against different rules, to prove that the checks can fail.
 pub fn run_against(rules: &Rules, gpu: &Arc<Gpu>, mut done: impl FnMut(Check)) -> Result<()> {
     let kernels = KernelShape::of(gpu.capabilities());
     let other = KernelShape { texel: !kernels.texel, ..kernels };

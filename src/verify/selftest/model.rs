@@ -1,4 +1,4 @@
-//! What changes the model besides Adam, against the reference: densification, the reset of opacities, the lift of labels.
+//! Checks the model changes other than Adam against the reference: densification, opacity reset, lift of labels.
 
 use super::compare::{Tolerance, Verdict, close, exact};
 use super::fixture::{Fixture, MOMENTS_1, MOMENTS_2, PARAMETERS, readable};
@@ -23,8 +23,8 @@ use std::sync::Arc;
 
 const SEED: u32 = 0x1234_5678;
 
-/// A fixture whose model is a population, with moments and statistics, and the uniforms that change it at `step` in a scene of
-/// extent 1.
+/// Uploads a population with moments and statistics to a fixture; returns the uniforms that change it at `step` in a
+/// scene of extent 1.
 fn holding(fixture: &mut Fixture, before: &Population, step: u32) -> Result<StepUniforms> {
     fixture.put_rows(MOMENTS_1, &before.m)?;
     fixture.put_rows(MOMENTS_2, &before.u)?;
@@ -43,7 +43,7 @@ fn holding(fixture: &mut Fixture, before: &Population, step: u32) -> Result<Step
     })
 }
 
-/// A scene for a population: its picture does not matter.
+/// A scene for a population; its picture does not matter.
 pub fn scene_of(population: &Population) -> Scene {
     let template = scene(1, &Shape { gaussians: 1, ..Shape::default() });
     Scene { gaussians: gaussians(population), ..template }
@@ -65,7 +65,7 @@ fn gaussians(population: &Population) -> Gaussians {
     }
 }
 
-/// A densification that has run.
+/// A finished densification.
 pub struct Densified {
     step: u32,
     before: Population,
@@ -78,7 +78,7 @@ pub struct Densified {
 }
 
 impl Densified {
-    /// Counts and applies a densification at `step`; the fixture has the population as its model.
+    /// Counts and applies a densification at `step`; the fixture's model is the population.
     pub fn new(fixture: &mut Fixture, before: Population, step: u32) -> Result<Self> {
         let rows = before.model.rows.len();
         fixture.engine.make_room_for_gaussians(2 * rows as u64 + 1)?;
@@ -93,17 +93,17 @@ impl Densified {
         Ok(Self { step, before, counted, applied, marks, after, labels, stats })
     }
 
-    /// The same by the reference under `rules`. Everything is copied but the places and scales of children, which may be
-    /// off by `tolerance`.
+    /// Compares with the reference under `rules`. Everything must be copied exactly, except that positions and scales
+    /// of children may differ by `tolerance`.
     pub fn verdict(&self, rules: &Rules, tolerance: Tolerance) -> Verdict {
         let normal = |row: usize, child: u32, axis: usize| normal_draw(SEED, row as u32, 3 * child + axis as u32);
         let expected = densify(rules, &self.before, 1.0, self.step, normal);
         let nearest = expected.margins.iter().copied().fold(f64::INFINITY, f64::min);
         if nearest <= 1e-6 {
-            return Err(format!("a decision of this seed is too near to a threshold: {nearest}"));
+            return Err(format!("a decision of this seed is too close to a threshold: distance {nearest}"));
         }
         if self.counted != self.applied {
-            return Err(format!("counted {:?}, applied {:?}", self.counted, self.applied));
+            return Err(format!("the count is {:?}, but the result is {:?}", self.counted, self.applied));
         }
         exact(&self.marks, &mark(rules, &self.before, 1.0, self.step))?;
         exact(&self.labels, &expected.model.labels)?;
@@ -118,7 +118,7 @@ impl Densified {
     }
 }
 
-/// A reset of opacities that has run.
+/// A finished reset of opacities.
 pub struct Reset {
     before: Population,
     after: Vec<f64>,
@@ -126,7 +126,7 @@ pub struct Reset {
 }
 
 impl Reset {
-    /// Resets; the fixture has the population as its model.
+    /// Resets opacities; the fixture's model is the population.
     pub fn new(fixture: &mut Fixture, before: Population) -> Result<Self> {
         let uniforms = holding(fixture, &before, 3000)?;
         fixture.engine.run(ListKey::OpacityReset, &uniforms)?;
@@ -137,7 +137,7 @@ impl Reset {
         Ok(Self { before, after, labels: fixture.get(Buf::LABELS, count)? })
     }
 
-    /// The same by the reference under `rules`.
+    /// Compares with the reference under `rules`.
     pub fn verdict(&self, rules: &Rules, tolerance: Tolerance) -> Verdict {
         let mut planes = [self.before.model.rows.clone(), self.before.m.clone(), self.before.u.clone()];
         let [rows, m, u] = &mut planes;
@@ -150,7 +150,7 @@ impl Reset {
     }
 }
 
-/// The paper's lift of labels in a step that has run.
+/// A finished step with the paper's lift of labels.
 pub struct Lifted {
     before: Vec<u32>,
     after: Vec<u32>,
@@ -162,7 +162,7 @@ pub struct Lifted {
 }
 
 impl Lifted {
-    /// Runs a training step; the scene has the labels before it.
+    /// Runs a training step; the scene has the labels from before.
     pub fn new(fixture: &mut Fixture) -> Result<Self> {
         let before = fixture.model().labels;
         fixture.train()?;
@@ -171,8 +171,8 @@ impl Lifted {
         Ok(Self { before, after, splats, sampled, target, size: fixture.size(), gpf: fixture.config.gpf })
     }
 
-    /// The same by the reference under `rules`: those that it must change are changed, and no others. Where several
-    /// Gaussians have nearly the same weight, either may win.
+    /// Compares with the reference under `rules`: exactly the expected labels must change. If several Gaussians have
+    /// nearly the same weight, any of them may win.
     pub fn verdict(&self, rules: &Rules) -> Verdict {
         let (before, target) = (&self.before, &self.target);
         let image = blend_forward(rules, &self.splats, self.size, target.background);
@@ -183,14 +183,18 @@ impl Lifted {
         let changed = expected.iter().zip(before).filter(|(a, b)| a != b).count();
         let sure: Vec<usize> = (0..before.len()).filter(|&i| votes.margins[i] > 1e-5).collect();
         if changed < 3 || sure.len() * 10 <= before.len() * 9 {
-            return Err(format!("{changed} labels change, {} of {} are sure", sure.len(), before.len()));
+            return Err(format!(
+                "{changed} labels change; {} of {} are away from all thresholds",
+                sure.len(),
+                before.len()
+            ));
         }
         let pick = |of: &[u32]| sure.iter().map(|&i| of[i]).collect::<Vec<_>>();
         exact(&pick(&self.after), &pick(&expected))
     }
 }
 
-/// Gaussians large and opaque enough to dominate pixels; masks are three columns, with nothing at the upper border.
+/// A scene of Gaussians that dominate pixels; masks are three columns, empty at the upper border.
 pub fn dominant(seed: u64) -> Scene {
     let shape = Shape { scales: (0.1, 0.5), opacities: (1.0, 8.0), ..Shape::default() };
     let mut s = scene(seed, &Shape { gaussians: 50, width: 61, height: 45, ..shape });
@@ -204,7 +208,7 @@ fn rig_of(gpu: &Arc<Gpu>, kernels: KernelShape, scene: Scene) -> Result<Fixture>
     Fixture::new(Arc::clone(gpu), scene, true, kernels, readable())
 }
 
-/// Densification of 500 Gaussians, some below and some above each threshold.
+/// Checks a densification of 500 Gaussians, some below and some above each threshold.
 pub(super) fn densification(rules: &Rules, gpu: &Arc<Gpu>, kernels: KernelShape, leeway: f64) -> Result<Verdict> {
     let before = population(710, 500);
     let mut fixture = rig_of(gpu, kernels, scene_of(&before))?;
@@ -212,14 +216,14 @@ pub(super) fn densification(rules: &Rules, gpu: &Arc<Gpu>, kernels: KernelShape,
     Ok(Densified::new(&mut fixture, before, 600)?.verdict(rules, tolerance))
 }
 
-/// A reset of the opacities of 300 Gaussians.
+/// Checks a reset of the opacities of 300 Gaussians.
 pub(super) fn reset(rules: &Rules, gpu: &Arc<Gpu>, kernels: KernelShape, leeway: f64) -> Result<Verdict> {
     let before = population(120, 300);
     let mut fixture = rig_of(gpu, kernels, scene_of(&before))?;
     Ok(Reset::new(&mut fixture, before)?.verdict(rules, Tolerance { absolute: 1.2e-7 * leeway, relative: 0.0 }))
 }
 
-/// The paper's lift of labels in one step.
+/// Checks the paper's lift of labels in one step.
 pub(super) fn lift_of_a_step(rules: &Rules, gpu: &Arc<Gpu>, kernels: KernelShape, _: f64) -> Result<Verdict> {
     Ok(Lifted::new(&mut rig_of(gpu, kernels, dominant(131))?)?.verdict(rules))
 }

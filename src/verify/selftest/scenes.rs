@@ -1,4 +1,4 @@
-//! Small seeded scenes. Every number is an f32, so that an engine in f32 and a mirror in f64 start from the same.
+//! Small seeded scenes. Every number is an f32, so that an engine in f32 and a mirror in f64 start with equal values.
 
 use crate::scene::{Camera, Gaussians};
 use crate::verify::reference::densify::Population;
@@ -42,7 +42,7 @@ impl Default for Shape {
     }
 }
 
-/// A camera, Gaussians and what to train them towards.
+/// A camera, Gaussians and a training target.
 #[derive(Clone, Debug)]
 pub struct Scene {
     /// The camera.
@@ -54,28 +54,28 @@ pub struct Scene {
 }
 
 impl Scene {
-    /// The Gaussians for the mirrors.
+    /// The Gaussians as the mirrors' model.
     pub fn model(&self) -> Model {
         Model::from_gaussians(&self.gaussians)
     }
 }
 
-/// The nearest f32.
+/// Rounds to the nearest f32.
 pub fn round(value: f64) -> f64 {
     f64::from(value as f32)
 }
 
-/// A number from [low, high), an f32.
+/// Draws a number from [low, high), rounded to f32.
 pub fn uniform(random: &mut Pcg32, low: f64, high: f64) -> f64 {
     round(random.random_range(low..high))
 }
 
-/// Generator of a seed.
+/// Random number generator for a seed.
 pub fn generator(seed: u64) -> Pcg32 {
     Pcg32::seed_from_u64(seed)
 }
 
-/// A camera at about 4 units from the origin, looking at it, with an off-centre principal point.
+/// A camera about 4 units from the origin that looks at it, with an off-centre principal point.
 pub fn camera(random: &mut Pcg32, width: u32, height: u32) -> Camera {
     let mut near = |spread: f64| uniform(random, -spread, spread);
     let eye = DVec3::new(near(0.6), near(0.6), -4.0 + near(0.3));
@@ -116,7 +116,7 @@ pub fn gaussians(random: &mut Pcg32, shape: &Shape) -> Gaussians {
     out
 }
 
-/// A photo of smooth noise with a strip of pixels that do not count, rectangular masks, and occluders.
+/// A photo of smooth noise with a strip of invalid pixels, rectangular masks, and occluders.
 pub fn target(random: &mut Pcg32, shape: &Shape) -> Target {
     let (width, height) = (shape.width as usize, shape.height as usize);
     let waves = [0; 9].map(|_| uniform(random, 0.1, 0.6));
@@ -125,12 +125,12 @@ pub fn target(random: &mut Pcg32, shape: &Shape) -> Target {
         let (x, y) = ((index % width) as f64, (index / width) as f64);
         let channel = |c: usize| 0.5 + 0.35 * (waves[3 * c] * x + waves[3 * c + 1] * y + 6.0 * waves[3 * c + 2]).sin();
         let noise = uniform(random, -0.1, 0.1);
-        // As from an 8-bit photo, but never exactly on the value that an f32 division gives a flat area.
+        // Similar to an 8-bit photo, but never exactly the value that f32 division gives in a flat area.
         colours.push([0, 1, 2].map(|c| round(((channel(c) + noise).clamp(0.0, 1.0) * 255.0).round() / 255.0)));
     }
     let mut label_map = vec![0_u32; width * height];
     for label in 1..=shape.objects {
-        // From a quarter of the picture to half of it, and a pixel at least.
+        // From a quarter to half of the picture, at least one pixel.
         let mut start = |size: usize| random.random_range(0..(size / 2).max(1));
         let (x0, y0) = (start(width), start(height));
         let mut length = |size: usize| random.random_range(size / 4..(size / 2).max(size / 4 + 1)).max(1);
@@ -149,7 +149,7 @@ pub fn target(random: &mut Pcg32, shape: &Shape) -> Target {
     Target { photo: Photo { size: (width, height), colours, valid }, label_map, slots, background }
 }
 
-/// A scene of a seed.
+/// Makes the scene of a seed.
 pub fn scene(seed: u64, shape: &Shape) -> Scene {
     let mut random = generator(seed);
     let camera = camera(&mut random, shape.width, shape.height);
@@ -172,7 +172,7 @@ pub fn plain_camera(width: u32, height: u32) -> Camera {
     }
 }
 
-/// A round grey Gaussian for `plain_camera`: centre at a pixel position and depth, deviation in px, opacity.
+/// A round grey Gaussian for `plain_camera`, given its centre in px, depth, deviation in px, and opacity.
 pub fn dot(camera: &Camera, at: [f64; 2], depth: f64, deviation: f64, opacity: f64) -> Row {
     let scale = (deviation * depth / camera.fx).ln();
     Row {

@@ -1,4 +1,4 @@
-//! A short training, twice.
+//! A short training, run twice.
 
 use super::compare::{Verdict, exact};
 use crate::error::Result;
@@ -12,13 +12,15 @@ use std::sync::Arc;
 
 const STEPS: u32 = 60;
 
-/// Sixty steps with labels, votes and two densifications give the same model twice, bit by bit, and a smaller loss.
+/// Checks that 60 steps with votes and two densifications give the same bits twice, and a smaller loss.
 pub(super) fn twice(gpu: &Arc<Gpu>, kernels: KernelShape) -> Result<Verdict> {
     let (first, loss) = train(gpu, kernels)?;
     let (second, _) = train(gpu, kernels)?;
     let [before, after] = loss;
     if !(after < 0.7 * before) {
-        return Ok(Err(format!("the loss goes from {before:.4} to {after:.4} in {STEPS} steps")));
+        return Ok(Err(format!(
+            "the loss changes from {before:.4} to {after:.4} in {STEPS} steps; expected a smaller loss"
+        )));
     }
     let bits = |model: &Gaussians| -> Vec<u32> {
         let floats = |rows: &[[f32; 3]]| rows.as_flattened().iter().map(|v| v.to_bits()).collect::<Vec<_>>();
@@ -31,7 +33,7 @@ pub(super) fn twice(gpu: &Arc<Gpu>, kernels: KernelShape) -> Result<Verdict> {
     Ok(exact(&bits(&second), &bits(&first)))
 }
 
-/// The model, and the mean loss of the first and of the last ten steps.
+/// Trains; returns the model, and the mean loss of the first and of the last ten steps.
 fn train(gpu: &Arc<Gpu>, kernels: KernelShape) -> Result<(Gaussians, [f64; 2])> {
     let options = SynthOptions { preset: Preset::Simple, width: 72, height: 52, views: 6, points: 400, seed: 3 };
     let dataset = synth::dataset(&options, 0);
