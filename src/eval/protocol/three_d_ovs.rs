@@ -1,5 +1,5 @@
-//! 3D-OVS: `segmentations/classes.txt` names the classes, `segmentations/FRAME/CLASS.png` are their masks in the frames
-//! that were annotated. The published score is the mean IoU over classes and frames.
+//! 3D-OVS: `segmentations/classes.txt` lists the classes, `segmentations/FRAME/CLASS.png` are their masks in the
+//! annotated frames. The published score is the mean IoU over classes and frames.
 
 use super::{Ask, Layout, by_frame_and_object, tasks};
 use std::path::PathBuf;

@@ -1,4 +1,4 @@
-//! Which of the known forms a folder of masks has. Two readings that both fit are an error, never a choice.
+//! Detects the format of a folder of masks. Two formats that both fit are an error.
 
 use super::content::{Kind, read_binary};
 use super::folder::{Claims, Layouts, files, layouts, root};
@@ -11,25 +11,25 @@ use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-/// A folder of masks as it is going to be read.
+/// The detected format of a folder of masks.
 pub(super) struct Reading {
     pub(super) format: Format,
-    /// The folder that really holds the masks.
+    /// Folder of the masks, possibly below the given one.
     pub(super) root: PathBuf,
-    /// Kind of the id pictures; `None` for black and white ones.
+    /// Kind of the id images; `None` for black and white ones.
     pub(super) ids: Option<Kind>,
     pub(super) claims: Claims,
     pub(super) pred: Option<Pred>,
-    /// What it was recognised by.
+    /// Reason for the choice.
     pub(super) why: String,
-    /// Classes that `classes.txt` lists and no picture shows.
+    /// Notes on classes in `classes.txt` without a mask.
     pub(super) notes: Vec<String>,
 }
 
 const NESTED_FLAGS: &str = "--format binary-folders if a folder is an object (OBJECT/NAME.png), --format photo-folders if \
                             a folder is a photo (NAME/OBJECT.png)";
 
-/// Finds out how the folder is to be read, for the photos of these names.
+/// Detects the format for photos with these names.
 pub(super) fn detect(photos: &[&str], options: &ImportOptions) -> Result<Reading> {
     let root = root(&options.folder, options.format)?;
     let files = files(&root)?;
@@ -110,14 +110,14 @@ fn recognise(root: &Path, layouts: &Layouts, pred: Option<&Pred>, photos: &[&str
     }
 }
 
-/// The first picture that is not plainly black and white, if there is one. One that cannot be read is not.
+/// Returns the first image that is not black and white, if there is one. Unreadable images count too.
 fn first_grey(root: &Path, claims: &Claims) -> Option<String> {
     let files: Vec<&str> = claims.files().collect();
     let grey = files.par_iter().find_first(|file| !read_binary(&root.join(file), |_| Ok(())).is_ok_and(|b| b.sharp));
     grey.map(|file| (*file).to_owned())
 }
 
-/// The form of id pictures, by their headers.
+/// Detects the format of id images from their headers.
 fn flat_format(root: &Path, claims: &Claims, pred: Option<&Pred>) -> Result<(Format, String)> {
     let mut kinds: BTreeMap<Kind, Vec<&str>> = BTreeMap::new();
     for file in claims.files() {
@@ -176,7 +176,7 @@ fn nothing_found(root: &Path, files: &[String], photos: &[&str]) -> Error {
     Error::data(root, "", problem)
 }
 
-/// Notes on classes that 3D-OVS lists and of which there is no picture.
+/// Notes the classes in 3D-OVS's list that have no mask.
 fn classes_without_mask(root: &Path, claims: &Claims) -> Result<Vec<String>> {
     let path = root.join("classes.txt");
     if !path.is_file() {

@@ -1,4 +1,4 @@
-//! Plain coloured points.
+//! Coloured points.
 
 use super::table::Table;
 use crate::error::{Error, Result};
@@ -7,9 +7,9 @@ use crate::scene::Point;
 use glam::DVec3;
 use std::path::Path;
 
-/// Reads points from a PLY with `x y z` and, if it has them, `red green blue`: integers from 0 to 255, or floats,
-/// which count as 0 to 1 unless one of them is larger. Points without colour are mid-grey. Points that are not
-/// finite, or so far away that f32 cannot hold the squares, are left out.
+/// Reads points from a PLY with `x y z` and optional `red green blue`. Colours are integers from 0 to 255, or floats
+/// from 0 to 1; floats count as 0 to 255 if one of them exceeds 1. Points without colour become mid-grey. Leaves out
+/// points that are not finite or whose squares do not fit into f32.
 pub fn read_points(path: impl AsRef<Path>) -> Result<Vec<Point>> {
     let path = path.as_ref();
     let table = Table::open(path)?;
