@@ -39,9 +39,9 @@ impl Page {
     /// Writes `index.html`, with `summary` above the pictures.
     pub fn finish(self, summary: &str) -> Result<PathBuf> {
         let path = self.folder.join("index.html");
-        let legend = "<p>Difference of masks: green is found and true, red only found, blue only true. Without a mask \
-                      it is the absolute difference of colours.</p>";
-        let head = "<tr><th>view</th><th>truth</th><th>prediction</th><th>difference</th></tr>";
+        let legend = "<p>Difference of masks: green is in both, red only in the prediction, blue only in the ground \
+                      truth. Without a mask it is the absolute difference of colours.</p>";
+        let head = "<tr><th>view</th><th>ground truth</th><th>prediction</th><th>difference</th></tr>";
         let body = format!(
             "{HEAD}<h1>labelgs eval</h1>\n<pre>{}</pre>\n{legend}\n<table>\n{head}\n{}</table>\n</html>\n",
             escaped(summary),

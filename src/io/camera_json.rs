@@ -51,7 +51,7 @@ pub fn read_camera(path: impl AsRef<Path>) -> Result<Camera> {
         Error::data(path, format!("line {}", error.line()), format!("{error}; {expected}"))
     })?;
     let refuse =
-        || Error::data(path, "w2c", "is no camera-from-world pose: 4 x 4 numbers, the upper left 3 x 3 a rotation");
+        || Error::data(path, "w2c", "is not a camera-from-world pose: 4 x 4 numbers, the upper left 3 x 3 a rotation");
     let pose = affine(&file.w2c).ok_or_else(refuse)?;
     let rotation = rotation_of(pose.matrix3).ok_or_else(refuse)?;
     // A pose with a scale would need a scaled translation too. No known program writes one.

@@ -108,7 +108,7 @@ impl Checkpoint {
         let odd = |problem: String| Error::data(path, "contents", problem);
         let mut rest = length - HEADER as u64;
         let mut take = |bytes: u64| {
-            rest = rest.checked_sub(bytes).ok_or_else(|| odd(format!("{bytes} bytes are more than there are")))?;
+            rest = rest.checked_sub(bytes).ok_or_else(|| odd(format!("{bytes} bytes are more than the file has")))?;
             Ok::<usize, Error>(bytes as usize)
         };
         let mut word = [0; 8];
@@ -125,7 +125,7 @@ impl Checkpoint {
             planes.push(Plane { name, words, data });
         }
         if rest > 0 {
-            return Err(odd(format!("{rest} bytes belong to nothing")));
+            return Err(odd(format!("{rest} bytes are left over")));
         }
         Ok(Self { meta: contents.meta, planes })
     }

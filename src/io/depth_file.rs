@@ -19,12 +19,12 @@ pub(crate) fn read_depth(path: &Path) -> Result<DepthMap> {
         "exr" => read_exr(path),
         "npy" => read_npy(path),
         "pfm" => read_pfm(path),
-        _ => Err(Error::data(path, "", "is no depth file; expected 16-bit grey .png, .exr, .npy or .pfm")),
+        _ => Err(Error::data(path, "", "is not a depth file; expected 16-bit grey .png, .exr, .npy or .pfm")),
     }
 }
 
 fn refuse(path: &Path, kind: &str) -> impl Fn(&dyn std::fmt::Display) -> Error {
-    let prefix = format!("is no readable {kind} depth map: ");
+    let prefix = format!("is not a readable {kind} depth map: ");
     move |cause| Error::data(path, "", format!("{prefix}{cause}"))
 }
 
@@ -36,7 +36,7 @@ fn read_png(path: &Path) -> Result<DepthMap> {
     let (colour, bits) = (reader.info().color_type, reader.info().bit_depth);
     if (colour, bits) != (png::ColorType::Grayscale, png::BitDepth::Sixteen) {
         let problem = format!(
-            "is {colour:?} with {} bits; depth needs 16-bit grey, because 256 steps cannot tell near things apart. \
+            "is {colour:?} with {} bits; depth needs 16-bit grey, because 8 bits are too coarse. \
              Write .npy, .exr, .pfm or 16-bit PNG",
             bits as u8
         );
@@ -77,7 +77,7 @@ fn read_exr(path: &Path) -> Result<DepthMap> {
         _ => ["Y", "Z", "R"].into_iter().find_map(named),
     };
     let Some(channel) = channel else {
-        return Err(Error::data(path, "channels", "has none of the name Y, Z or R; depth is one channel"));
+        return Err(Error::data(path, "channels", "has no channel named Y, Z or R; depth has one channel"));
     };
     let values: Vec<f32> = channel.sample_data.values_as_f32().collect();
     if values.len() as u64 != u64::from(width) * u64::from(height) {
@@ -166,7 +166,9 @@ fn read_pfm(path: &Path) -> Result<DepthMap> {
     };
     let (width, height, scale) = (number("width")?, number("height")?, number("scale")?);
     if [width, height].iter().any(|side| side.fract() != 0.0) || !scale.is_finite() || scale == 0.0 {
-        return Err(refuse(&format!("{width} x {height} px with the scale {scale}; sides are whole, scales not 0")));
+        return Err(refuse(&format!(
+            "{width} x {height} px with the scale {scale}; sides must be whole, the scale not 0"
+        )));
     }
     let (width, height) = (width as u32, height as u32);
     check_size(path, (width, height))?;

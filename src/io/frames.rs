@@ -46,7 +46,7 @@ impl Frames {
             Error::data(path, format!("line {}", error.line()), format!("{error}; {expected}"))
         })?;
         if video.schema_version != SCHEMA_VERSION {
-            let problem = format!("has version {}, this program reads {SCHEMA_VERSION}", video.schema_version);
+            let problem = format!("has version {}, labelgs reads {SCHEMA_VERSION}", video.schema_version);
             return Err(Error::data(path, "schema_version", problem));
         }
         let mut seen = BTreeSet::new();

@@ -48,7 +48,7 @@ fn check_palette(path: &Path, bytes: &[u8]) -> Result<()> {
     if bytes.is_multiple_of(3) {
         return Ok(());
     }
-    let problem = format!("has {bytes} bytes, no whole number of colours; write the picture anew");
+    let problem = format!("has {bytes} bytes, expected a multiple of 3; write the image again");
     Err(Error::data(path, "palette", problem))
 }
 

@@ -68,7 +68,7 @@ pub(crate) fn check_camera(path: &Path, place: &str, camera: &Camera, lens: &Len
         return refuse(format!("principal point ({cx}, {cy}) lies outside the image of {width} x {height} px"));
     }
     if lens.distortion().is_some_and(|lens| !lens.is_finite()) {
-        return refuse("a distortion coefficient is not a number".into());
+        return refuse("a distortion coefficient is NaN or infinite".into());
     }
     if !camera.translation.is_finite() || !camera.rotation.is_finite() {
         return refuse("the pose is not finite".into());

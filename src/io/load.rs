@@ -63,7 +63,7 @@ pub(crate) fn shortened(names: &[&str]) -> String {
     if names.len() > 3 { format!("{shown}, ...") } else { shown }
 }
 
-/// Returns the views whose photos exist. If photos are optional and none exists, returns all views with a known size.
+/// Returns the views whose photos exist. If photos are not requested and none exists, returns all views with a known size.
 fn existing(listing: &Listing, options: &LoadOptions, notes: &mut Vec<String>) -> Result<Vec<Listed>> {
     let total = listing.views.len() + listing.missing.len();
     if total + listing.bad.len() == 0 {
@@ -186,7 +186,7 @@ fn at_size(listed: &Listed, stored: Option<(u32, u32)>) -> Result<Camera> {
     if !same_aspect(size, (camera.width, camera.height)) {
         let problem = format!(
             "the photo has {} x {} px and its camera {} x {} px, which no scale explains; use the photos that the \
-             cameras were made for (an EXIF orientation is ignored on purpose, poses belong to the stored pixels)",
+             cameras were made for (an EXIF orientation is ignored, because poses belong to the stored pixels)",
             size.0, size.1, camera.width, camera.height
         );
         return Err(Error::data(path, "", problem));

@@ -38,7 +38,7 @@ impl OcclusionTable {
             Error::data(path, format!("line {}", error.line()), format!("{error}; {expected}"))
         })?;
         if table.schema_version != SCHEMA_VERSION {
-            let problem = format!("has version {}, this program reads {SCHEMA_VERSION}", table.schema_version);
+            let problem = format!("has version {}, labelgs reads {SCHEMA_VERSION}", table.schema_version);
             return Err(Error::data(path, "schema_version", problem));
         }
         for (name, objects) in &mut table.views {

@@ -187,7 +187,7 @@ fn side(path: &Path, place: &str, value: f64) -> Result<u32> {
     if value.fract() == 0.0 && (1.0..=f64::from(u32::MAX)).contains(&value) {
         return Ok(value as u32);
     }
-    Err(Error::data(path, place, format!("image side {value} is no positive whole number")))
+    Err(Error::data(path, place, format!("image side {value} is not a positive whole number")))
 }
 
 fn lens(path: &Path, place: &str, i: &Intrinsics) -> Result<Lens> {
@@ -215,8 +215,7 @@ fn camera(path: &Path, place: &str, i: &Intrinsics, (width, height): (u32, u32))
     // The tangent is periodic: degrees, for example, would pass as some angle in radians.
     for (name, angle) in [("camera_angle_x", i.camera_angle_x), ("camera_angle_y", i.camera_angle_y)] {
         if let Some(angle) = angle.filter(|angle| !(*angle > 0.0 && *angle < std::f64::consts::PI)) {
-            let problem =
-                format!("{name} is {angle}, the focal length of no pinhole; expected radians between 0 and pi");
+            let problem = format!("{name} is {angle}, which gives no focal length; expected radians between 0 and pi");
             return Err(Error::data(path, place, problem));
         }
     }
@@ -246,7 +245,7 @@ pub(crate) fn affine(rows: &[Vec<f64>]) -> Option<DAffine3> {
 }
 
 fn pose(path: &Path, place: &str, rows: &[Vec<f64>]) -> Result<(DMat3, DVec3)> {
-    let problem = "transform_matrix is no camera-to-world pose: 4 x 4 numbers, the upper left 3 x 3 a rotation";
+    let problem = "transform_matrix is not a camera-to-world pose: 4 x 4 numbers, the upper left 3 x 3 a rotation";
     let refuse = || Error::data(path, place, problem);
     let matrix = affine(rows).ok_or_else(refuse)?;
     let rotation = rotation_of(matrix.matrix3).ok_or_else(refuse)?;
@@ -266,16 +265,16 @@ fn in_the_frame_of(
 ) -> Result<Vec<Point>> {
     let Some(rows) = applied else { return Ok(points) };
     let Some(matrix) = affine(rows) else {
-        return Err(Error::data(path, "applied_transform", "is no 3 x 4 or 4 x 4 matrix of numbers"));
+        return Err(Error::data(path, "applied_transform", "is not a 3 x 4 or 4 x 4 matrix of numbers"));
     };
     let moved = points.iter().map(|p| Point { position: matrix.transform_point3(p.position), ..*p });
     let moved: Vec<Point> = moved.collect();
     if !moved.iter().all(|point| point.position.abs().max_element() <= FAR) {
-        let problem = format!("moves points beyond {FAR:e}; expected a rotation and a scale of the usual size");
+        let problem = format!("moves points beyond {FAR:e}; expected a rotation and a moderate scale");
         return Err(Error::data(path, "applied_transform", problem));
     }
     if seen(views, &moved) as f64 > 1.2 * seen(views, &points) as f64 {
-        notes.push("applied_transform was applied to the points, which fit the cameras only so".into());
+        notes.push("applied_transform was applied to the points, because they fit the cameras better with it".into());
         return Ok(moved);
     }
     Ok(points)

@@ -68,7 +68,7 @@ impl Models {
             let (from, to) = (model_path(&self.out, old), model_path(&self.out.join(EARLIER), old));
             let moved = to.parent().map_or(Ok(()), std::fs::create_dir_all).and_then(|()| std::fs::rename(&from, &to));
             if let Err(error) = moved {
-                tracing::warn!("{}: not moved: {error}", from.display());
+                tracing::warn!("{}: cannot be moved: {error}", from.display());
             }
             // This fails, as it should, if the folder holds other files.
             let _ = from.parent().map(std::fs::remove_dir);

@@ -92,7 +92,7 @@ fn read_scene(request: &Request, settings: &Settings, inputs: &Inputs) -> Result
     options.allow_outside = inputs.allow_outside;
     let dataset = io::open_logged(&request.scene, &options)?;
     if dataset.train.is_empty() {
-        let problem = "no view is left to train on; use --no-test or a larger --test-every";
+        let problem = "no view is left for training; use --no-test or a larger --test-every";
         return Err(Error::data(&request.scene, "", problem));
     }
     Ok(dataset)
@@ -164,7 +164,7 @@ fn start(
     let size = train::start_size(&gpu, dataset, config, model.len(), options)?;
     let memory = Engine::predict(&gpu, &size, options)?;
     tracing::info!(
-        "memory at the start: {:.1} MiB on the device for {} Gaussians and {} x {} px; it grows with the model",
+        "memory to start with: {:.1} MiB on the device for {} Gaussians and {} x {} px; it grows with the model",
         memory.total as f64 / f64::from(1 << 20),
         size.gaussians,
         size.image.0,

@@ -51,7 +51,7 @@ pub(super) fn over_numeric_failures(run: &mut Run) -> Result<()> {
             Err(error @ Error::Numeric { .. }) if run.checkpoints.restore(&mut run.trainer, &error)? => {
                 if is_slower {
                     run.trainer.halve_rates();
-                    run.warn("training failed again: all learning rates are halved from here on")?;
+                    run.warn("training failed again: from here on all learning rates are half of what they were")?;
                 }
                 steps(run)
             }

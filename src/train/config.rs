@@ -215,12 +215,12 @@ crate::options::options! {
         }
 
         "Densification" {
-            /// Last step without densification.
+            /// Step after which densification starts.
             ///
             /// 500 (3DGS).
             densify_from <"STEP">: u32 = 500;
 
-            /// Last step of densification, at the earliest 1000 steps after --densify-from if not given [default: half
+            /// Step at which densification stops, at the earliest 1000 steps after --densify-from if not given [default: half
             /// of the run].
             ///
             /// Pruning and opacity resets end there too. 3DGS also stops at half of the run (15000 of 30000). LabelGS

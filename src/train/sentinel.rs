@@ -56,7 +56,7 @@ impl Trainer {
                 seen.next_word = seen.dropped * 10;
                 tracing::warn!(
                     "step {}, view {view}: project_backward dropped the gradients of {count} Gaussians that are not \
-                     finite, the first of Gaussian {}; {} so far",
+                     finite, the first is that of Gaussian {}; {} so far",
                     input.step,
                     counters.nonfinite_first,
                     seen.dropped

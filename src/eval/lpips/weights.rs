@@ -70,5 +70,5 @@ fn floats(path: &Path, file: &SafeTensors, name: &str, shape: &[usize]) -> Resul
     if values.iter().all(|value| value.is_finite()) {
         return Ok(values);
     }
-    Err(Error::data(path, name, "holds a number that is not finite"))
+    Err(Error::data(path, name, "has a value that is not finite"))
 }

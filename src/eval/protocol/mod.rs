@@ -163,7 +163,8 @@ impl Protocol {
         };
         let layout = layout.map_err(|problem| Error::data(ask.truth, "", problem))?;
         if layout.tasks.iter().all(|task| task.truths.is_empty()) {
-            let problem = "leaves no mask to score: the first frame is the prompt, and no other shows the same object";
+            let problem =
+                "has no mask to score: the first frame is the prompt, and no other frame shows the same object";
             return Err(Error::data(ask.truth, "", problem));
         }
         Ok(layout)
@@ -194,7 +195,7 @@ fn by_frame_and_object(files: &[PathBuf], left_out: &mut Vec<String>) -> BTreeMa
             [frame] => {
                 objects.entry(stem(file)).or_default().push(Truth { frame: frame.clone(), file: file.clone() });
             }
-            _ => left_out.push(format!("{} is no FRAME/OBJECT.png", file.display())),
+            _ => left_out.push(format!("{} is not FRAME/OBJECT.png", file.display())),
         }
     }
     objects

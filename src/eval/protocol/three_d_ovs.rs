@@ -21,7 +21,7 @@ pub(super) fn layout(files: &[PathBuf], classes: Option<&str>, ask: Ask) -> Resu
     objects.retain(|name, truths| {
         let known = classes.contains(&name.as_str());
         if !known {
-            left_out.push(format!("{name} ({} masks) is no class of classes.txt", truths.len()));
+            left_out.push(format!("{name} ({} masks) is not in classes.txt", truths.len()));
         }
         known
     });

@@ -117,7 +117,7 @@ fn listed(
     let quaternion = DQuat::from_xyzw(x, y, z, w);
     let length = quaternion.length();
     if !(length.is_finite() && length > 1e-9) {
-        return Err(Error::data(images_path, place, "its rotation is zero or not finite"));
+        return Err(Error::data(images_path, place, "has a rotation that is zero or not finite"));
     }
     let (mut camera, lens) = record.intrinsics(cameras_path)?;
     camera.rotation = DMat3::from_quat(quaternion.normalize());

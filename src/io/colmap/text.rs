@@ -52,7 +52,7 @@ impl<'a> Words<'a> {
 
     fn number<T: FromStr>(&mut self, what: &str) -> Result<T> {
         let word = self.word(what)?;
-        word.parse().map_err(|_| self.error(format!("`{word}` is no {what}")))
+        word.parse().map_err(|_| self.error(format!("`{word}` is not a valid {what}")))
     }
 
     fn numbers<const N: usize>(&mut self, what: &str) -> Result<[f64; N]> {

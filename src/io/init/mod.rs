@@ -57,9 +57,9 @@ fn check_seen(dataset: &Dataset) -> Result<()> {
         return Ok(());
     }
     let problem = format!(
-        "none of the {} points is in the picture of any of {} training cameras: poses are of another kind than the \
-         format says (world-to-camera for camera-to-world, or other axes), or the points belong to another scene; \
-         without points training would start anywhere before the cameras",
+        "none of the {} points is in the image of any of {} training cameras: the poses follow another convention than \
+         the format (world-to-camera for camera-to-world, or other axes), or the points belong to another scene; \
+         without the points, training starts from random ones before the cameras",
         dataset.points.len(),
         dataset.train.len()
     );

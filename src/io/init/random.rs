@@ -40,7 +40,11 @@ struct Test<'a> {
 pub(super) fn points(dataset: &Dataset, seed: u64, count: usize) -> Result<Vec<Point>> {
     let views = &dataset.train;
     if views.is_empty() {
-        return Err(Error::data(&dataset.root, "", "has neither points nor training views to place Gaussians by"));
+        return Err(Error::data(
+            &dataset.root,
+            "",
+            "has neither points nor training views, which place the first Gaussians",
+        ));
     }
     let region = region::find(views, dataset.extent());
     let mut test = Test { views, seen_by: views.len().min(3), backdrop: backdrop(views) };

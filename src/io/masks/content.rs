@@ -96,7 +96,7 @@ pub(super) fn read_binary(path: &Path, accept: impl FnOnce((u32, u32)) -> Result
     let distinct: BTreeSet<u16> = values.iter().copied().collect();
     let sharp = distinct.iter().filter(|&&value| value != 0).count() <= 1;
     if !sharp && raw.header.colour == ColorType::Indexed {
-        let problem = format!("has {} palette indices where an object and its surroundings make two", distinct.len());
+        let problem = format!("has {} palette indices, expected two (object and background)", distinct.len());
         return Err(Error::data(path, "", problem));
     }
     let half = (1_u32 << (raw.header.depth as u32)) / 2;
@@ -112,7 +112,7 @@ fn brightness(path: &Path, raw: &Raw) -> Result<Vec<u16>> {
     let alpha = matches!(raw.header.colour, ColorType::GrayscaleAlpha | ColorType::Rgba);
     let pixels = samples.chunks_exact(channels);
     if alpha && pixels.clone().any(|pixel| pixel[channels - 1] != opaque) {
-        let problem = "is transparent in places, and whether those belong to the object cannot be known; write black \
+        let problem = "has transparent pixels, which may or may not belong to the object; write black \
                        and white without transparency";
         return Err(Error::data(path, "", problem));
     }

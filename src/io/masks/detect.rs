@@ -72,7 +72,7 @@ fn recognise(root: &Path, layouts: &Layouts, pred: Option<&Pred>, photos: &[&str
         }
         (false, false, true) => {
             let named = |name: &str| root.file_name().is_some_and(|found| found == name);
-            let why = format!("{} folders of the names of photos hold black and white pictures", by_photo.photos());
+            let why = format!("{} folders named after photos hold black and white pictures", by_photo.photos());
             Ok(if root.join("classes.txt").is_file() {
                 (Format::ThreeDOvs, format!("{why}, and there is a classes.txt"))
             } else if named("test_mask") {
@@ -126,14 +126,14 @@ fn flat_format(root: &Path, claims: &Claims, pred: Option<&Pred>) -> Result<(For
     if kinds.len() > 1 {
         let counts = kinds.iter().map(|(kind, files)| format!("{} {} ({})", files.len(), kind.text(), files[0]));
         let problem = format!(
-            "holds pictures of different kinds, {}; ids of different kinds cannot be told to be the same. Keep those \
-             of one kind",
+            "holds pictures of different kinds, {}; ids of different kinds cannot be matched. Keep the \
+             pictures of one kind",
             counts.collect::<Vec<_>>().join(", ")
         );
         return Err(Error::data(root, "", problem));
     }
     let Some((kind, files)) = kinds.into_iter().next() else { return Err(Error::Bug("no mask has a kind".into())) };
-    let mut why = format!("{} pictures of the names of photos, all {}", files.len(), kind.text());
+    let mut why = format!("{} pictures named after photos, all {}", files.len(), kind.text());
     if let Some(pred) = pred {
         why += &format!(", with ids of {}", pred.path.display());
     }
@@ -171,7 +171,7 @@ fn nothing_found(root: &Path, files: &[String], photos: &[&str]) -> Error {
     };
     let problem = format!(
         "no picture belongs to a photo of the scene: expected for example {name}.png, OBJECT/{name}.png or \
-         {name}/OBJECT.png, and {there}. Masks are named after the photos, and PNG, as JPEG changes ids"
+         {name}/OBJECT.png, and {there}. Masks have the names of the photos and are PNG, because JPEG changes ids"
     );
     Error::data(root, "", problem)
 }

@@ -197,8 +197,8 @@ fn survey(reading: &Reading, decoded: Decoded) -> Result<Survey> {
 
 fn too_many(root: &Path, count: usize) -> Error {
     let problem = format!(
-        "{count} different ids, and a label is at most {LABEL_MAX}; if these are colours of a picture and no ids, \
-         import the id pictures, otherwise leave out small tracks before"
+        "{count} different ids, and a label is at most {LABEL_MAX}; if these are colours and not ids, \
+         import the id pictures, otherwise remove small tracks first"
     );
     Error::data(root, "", problem)
 }

@@ -63,7 +63,7 @@ impl Pred {
         let mut ids: BTreeMap<u32, Option<String>> = BTreeMap::new();
         for segment in file.annotations.iter().flat_map(|annotation| &annotation.segments_info) {
             if segment.id == 0 {
-                return Err(Error::data(path, "segments_info", "has the id 0, which pictures use for no object"));
+                return Err(Error::data(path, "segments_info", "has the id 0, which is the background"));
             }
             let known = ids.entry(segment.id).or_default();
             *known = known.take().or_else(|| name(&segment.category_id));

@@ -76,7 +76,7 @@ fn read(path: &Path) -> Result<ReadModel> {
     }
     if looks_activated(&read.gaussians) {
         let note = "every opacity is from 0 to 1 and every scale positive: they seem to be written after their sigmoid \
-                    and exponential, where a 3DGS PLY has them before; such a model looks like fog";
+                    and exponential, but a 3DGS PLY has the values before; such a model looks like fog";
         read.notes.push(note.to_owned());
     }
     if odd.extra_bytes > 0 {
@@ -120,7 +120,7 @@ fn confidence_of(path: &Path, index: u64, value: f64) -> Result<f32> {
     if (0.0..=1.0).contains(&value) {
         return Ok(value as f32);
     }
-    let problem = format!("label_confidence {value} is not from 0 to 1; leave the column out to do without");
+    let problem = format!("label_confidence {value} is not from 0 to 1; correct it or leave out the column");
     Err(Error::data(path, format!("vertex {index}"), problem))
 }
 

@@ -27,7 +27,7 @@ pub fn read_points(path: impl AsRef<Path>) -> Result<Vec<Point>> {
             colour.copy_from_slice(&row[3..6]);
         }
         if colour.iter().any(|value| !value.is_finite()) {
-            return Err(Error::data(path, format!("vertex {index}"), "a colour that is not a number"));
+            return Err(Error::data(path, format!("vertex {index}"), "has a colour of NaN or infinity"));
         }
         if row[..3].iter().all(|value| value.abs() <= FAR) {
             rows.push(([row[0], row[1], row[2]], colour));

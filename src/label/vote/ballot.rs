@@ -106,7 +106,7 @@ pub(crate) fn columns_for(objects: usize) -> u32 {
 pub fn sweep(engine: &mut Engine, voters: &[Voter], how: Sweep) -> Result<Ballot> {
     let room = engine.size().labels.map_or(0, |room| room.vote_columns) as usize;
     if room == 0 {
-        return Err(Error::Bug("the engine has no room for votes".to_owned()));
+        return Err(Error::Bug("the engine has no memory for votes".to_owned()));
     }
     let objects: BTreeSet<u16> = voters.iter().flat_map(|voter| voter.mask.objects()).collect();
     let labels: Vec<u16> = std::iter::once(UNLABELLED as u16).chain(objects).collect();
