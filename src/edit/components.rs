@@ -75,10 +75,8 @@ fn join(bodies: &[Body]) -> Result<Vec<usize>> {
     Ok(groups.into_labeling())
 }
 
-/// The ellipsoid of a Gaussian.
 struct Body {
     centre: DVec3,
-    /// Longest half axis.
     radius: f64,
     /// Rotation times squared half axes times inverse rotation.
     shape: DMat3,

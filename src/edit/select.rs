@@ -79,7 +79,6 @@ pub fn remove(model: &Gaussians, labels: &[u32]) -> Result<Gaussians> {
     Ok(rest)
 }
 
-/// Returns the labels as a set if each of them occurs in the model.
 fn check_labels(model: &Gaussians, labels: &[u32]) -> Result<BTreeSet<u32>> {
     let wanted = labels.iter().copied().collect();
     Catalogue::new(model, None).check("--labels", &wanted)?;

@@ -119,7 +119,6 @@ pub(crate) fn picture_count(views: &[&View]) -> u64 {
     (views.len() * (1 + objects(views).len())) as u64
 }
 
-/// Returns the objects in the views' masks, sorted.
 fn objects(views: &[&View]) -> Vec<u32> {
     let ids = views.iter().filter_map(|view| view.mask.as_deref()).flat_map(LabelMap::objects).map(u32::from);
     ids.collect::<std::collections::BTreeSet<u32>>().into_iter().collect()

@@ -82,7 +82,6 @@ impl Watch for Page {
     }
 }
 
-/// Returns ground truth, prediction and difference.
 fn panels(picture: &Compared) -> [Vec<[u8; 3]>; 3] {
     let pixels = picture.photo.rgba.len();
     let photo = |index: usize| {
@@ -106,7 +105,6 @@ fn panels(picture: &Compared) -> [Vec<[u8; 3]>; 3] {
     [(0..pixels).map(truth).collect(), (0..pixels).map(found).collect(), (0..pixels).map(difference).collect()]
 }
 
-/// Escapes text for HTML.
 fn escaped(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }

@@ -7,7 +7,6 @@ use rayon::prelude::*;
 
 /// Half of the window, px.
 const REACH: usize = 5;
-/// Standard deviation of the window, px.
 const SIGMA: f64 = 1.5;
 /// Stabilising constants for values in 0 to 1.
 const C1: f64 = 0.01 * 0.01;

@@ -22,7 +22,6 @@ pub fn ssim8(a: &[[u8; 3]], b: &[[u8; 3]], width: usize, height: usize) -> Optio
     Some(total / count as f64)
 }
 
-/// Returns the sum of SSIM over the windows of one channel.
 fn channel_sum(a: &[[u8; 3]], b: &[[u8; 3]], width: usize, height: usize, channel: usize) -> f64 {
     // Summed-area tables of a, b, aa, bb and ab.
     let stride = width + 1;

@@ -20,7 +20,6 @@ pub fn write(path: impl AsRef<Path>, body: impl FnOnce(&mut dyn Write) -> io::Re
     write_inner(path, body).map_err(Error::write(path))
 }
 
-/// Writes JSON, atomically.
 pub(crate) fn write_json(path: &Path, value: &impl serde::Serialize) -> Result<()> {
     let text = serde_json::to_string_pretty(value).map_err(|error| Error::Bug(format!("JSON: {error}")))?;
     write(path, |out| out.write_all(text.as_bytes()))

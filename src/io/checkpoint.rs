@@ -47,7 +47,6 @@ pub struct Checkpoint {
     pub planes: Vec<Plane>,
 }
 
-/// The JSON part of a file.
 #[derive(Serialize, Deserialize)]
 struct Contents {
     meta: Value,
@@ -84,7 +83,6 @@ impl Checkpoint {
         })
     }
 
-    /// Writes the checksummed part.
     fn put(&self, json: &[u8], out: &mut dyn Write) -> io::Result<()> {
         out.write_all(&(json.len() as u64).to_le_bytes())?;
         out.write_all(json)?;
@@ -193,7 +191,6 @@ fn check(file: &mut impl BufRead, path: &Path, length: u64) -> Result<()> {
     Ok(())
 }
 
-/// Reads `bytes` bytes as words.
 fn words_of(file: &mut impl Read, bytes: usize) -> io::Result<Vec<u32>> {
     let mut data = Vec::with_capacity(bytes / 4);
     let mut chunk = vec![0; CHUNK];

@@ -8,7 +8,6 @@ use std::path::{Component, Path, PathBuf};
 
 /// The folder of a scene, and the permission for files elsewhere.
 pub(crate) struct Place<'a> {
-    /// The folder.
     pub(crate) root: &'a Path,
     /// Paths may leave the folder.
     allow_outside: bool,

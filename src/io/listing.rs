@@ -21,7 +21,6 @@ pub(crate) struct Listed {
     pub(crate) photo: Option<PathBuf>,
     /// Camera at the size in the data set.
     pub(crate) camera: Camera,
-    /// Lens of the photo.
     pub(crate) lens: Lens,
     /// Split of the data set itself: true for held-out.
     pub(crate) test: Option<bool>,

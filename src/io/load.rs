@@ -13,7 +13,6 @@ use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 
-/// Loads the data set of a listing.
 pub(crate) fn load(root: &Path, mut listing: Listing, options: &LoadOptions) -> Result<Dataset> {
     let mut notes = std::mem::take(&mut listing.notes);
     let mut views = existing(&listing, options, &mut notes)?;
@@ -134,7 +133,6 @@ pub(crate) fn all_or_one_error<T>(root: &Path, loaded: Vec<Result<T>>) -> Result
 /// The size in a photo's file, and its pixels if they are wanted.
 type Decoded = (Option<(u32, u32)>, Option<Photo>);
 
-/// Decodes the photo of a view, if there is one.
 fn decode(listed: &Listed, options: &LoadOptions) -> Result<Decoded> {
     let Some(path) = &listed.photo else { return Ok((None, None)) };
     if !options.photos {

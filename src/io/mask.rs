@@ -32,7 +32,6 @@ fn problem(path: &Path, problem: impl std::fmt::Display) -> Error {
 pub(crate) struct Header {
     /// Width and height, px.
     pub(crate) size: (u32, u32),
-    /// Colour type.
     pub(crate) colour: png::ColorType,
     /// Bits per sample.
     pub(crate) depth: png::BitDepth,
@@ -40,7 +39,6 @@ pub(crate) struct Header {
 
 /// A PNG with its samples as stored.
 pub(crate) struct Raw {
-    /// The header.
     pub(crate) header: Header,
     bytes: Vec<u8>,
     line_size: usize,
@@ -106,7 +104,6 @@ pub(crate) fn read_checked(path: &Path, accept: impl FnOnce((u32, u32)) -> Resul
     Ok(LabelMap { width, height, ids: raw.samples() })
 }
 
-/// Unpacks the samples of one row.
 fn unpack(line: &[u8], depth: png::BitDepth, width: usize) -> Vec<u16> {
     let packed = |bits: usize| {
         let per_byte = 8 / bits;

@@ -7,12 +7,10 @@ use std::fs::{self, File};
 use std::io::{self, BufReader, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
-/// An open file.
 #[derive(Debug)]
 pub(crate) struct Source(File);
 
 impl Source {
-    /// Returns the number of bytes in the file.
     pub(crate) fn length(&self) -> io::Result<u64> {
         Ok(self.0.metadata()?.len())
     }
@@ -46,13 +44,11 @@ fn source(path: &Path) -> io::Result<Source> {
     Ok(Source(File::open(path)?))
 }
 
-/// Opens a file.
 pub(crate) fn open(path: &Path) -> Result<BufReader<Source>> {
     let file = source(path).map_err(Error::read(path))?;
     Ok(BufReader::with_capacity(1 << 16, file))
 }
 
-/// Reads a file.
 pub(crate) fn bytes(path: &Path) -> Result<Vec<u8>> {
     let all = || {
         let mut file = source(path)?;

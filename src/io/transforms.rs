@@ -86,7 +86,6 @@ pub(crate) fn list(scene: &Place) -> Result<Option<Listing>> {
     Ok(Some(listing))
 }
 
-/// Reads the given file.
 pub(crate) fn list_file(scene: &Place, path: &Path) -> Result<Listing> {
     let mut listing = Listing { source: path.to_owned(), ..Listing::default() };
     read(scene, path, None, &mut listing)?;

@@ -10,14 +10,12 @@ use std::path::{Path, PathBuf};
 /// Number of checkpoints that a run keeps while it goes on. The older one is the fallback if the newest is damaged.
 const KEPT: usize = 2;
 
-/// The checkpoints of a run.
 pub(super) struct Checkpoints {
     out: PathBuf,
     lock: Lock,
     record: Record,
     /// Files of this run, the newest last.
     kept: Vec<PathBuf>,
-    /// Step of the newest checkpoint.
     step: u32,
 }
 

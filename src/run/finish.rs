@@ -35,7 +35,6 @@ impl Run<'_> {
         Ok(())
     }
 
-    /// Writes the model with its final labels.
     pub(super) fn save_labelled(&mut self) -> Result<PathBuf> {
         let model = self.trainer.labelled_model().map_err(|error| self.keep_model(error))?;
         self.models.save(self.trainer.steps_done(), &model)

@@ -121,7 +121,6 @@ fn train_once(request: &Request, is_again: bool, open: &Open, observer: &mut dyn
     Ok(summary)
 }
 
-/// A run in progress.
 struct Run<'a> {
     request: &'a Request<'a>,
     settings: Settings,
@@ -137,7 +136,6 @@ struct Run<'a> {
     checkpoints: Checkpoints,
     models: Models,
     observer: &'a mut dyn Observer,
-    /// The observer has stopped the run.
     stopped: bool,
 }
 

@@ -57,7 +57,6 @@ impl Models {
         Ok(Self { out: out.to_owned(), earlier })
     }
 
-    /// Writes the model of a step.
     pub(crate) fn save(&mut self, step: u32, model: &Gaussians) -> Result<PathBuf> {
         let path = model_path(&self.out, step);
         let left_out = write_model(&path, model)?;
@@ -77,7 +76,6 @@ impl Models {
     }
 }
 
-/// Writes `cameras.json`.
 pub(crate) fn save_cameras(out: &Path, cameras: &[(&str, &Camera)]) -> Result<()> {
     camera_json::write_cameras(out.join("cameras.json"), cameras)
 }

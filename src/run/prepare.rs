@@ -196,7 +196,6 @@ fn bound_start(model: &mut Gaussians, config: &TrainConfig) {
     }
 }
 
-/// Returns the comments for `config.toml`.
 fn facts(request: &Request, masks: Option<&Path>, gpu: &Gpu) -> Vec<(&'static str, String)> {
     let found = gpu.capabilities();
     let mut facts = vec![

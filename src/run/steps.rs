@@ -67,7 +67,6 @@ impl Run<'_> {
         self.checkpoints.hold_folder()
     }
 
-    /// Writes a checkpoint unless this step has one.
     pub(super) fn save_checkpoint(&mut self) -> Result<()> {
         self.hold_folder()?;
         let step = self.trainer.steps_done();

@@ -6,7 +6,6 @@ use crate::io::atomic;
 use serde_json::json;
 use std::path::{Path, PathBuf};
 
-/// Name of the file in the folder of a run.
 const FILE: &str = "metrics.json";
 
 /// The result of a run.

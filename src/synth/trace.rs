@@ -26,7 +26,6 @@ pub struct Picture {
     pub whole: Vec<Vec<bool>>,
 }
 
-/// The values of one pixel.
 struct Pixel {
     rgb: [u8; 3],
     id: u8,
@@ -102,7 +101,6 @@ fn samples(camera: &Camera, view: u32, x: u32, y: u32) -> impl Iterator<Item = (
     })
 }
 
-/// Returns the direction of the ray through the centre of a pixel.
 fn middle(camera: &Camera, x: u32, y: u32) -> DVec3 {
     ray(camera, f64::from(x) + 0.5, f64::from(y) + 0.5)
 }

@@ -55,7 +55,6 @@ pub fn write(options: &SynthOptions, folder: &Path, after_view: &dyn Fn(u32) -> 
     Ok(Summary { scene: folder.to_owned(), views: options.views, points: seen.len(), objects: table.labels })
 }
 
-/// Adds the pixels of a mask to the counts.
 fn count(table: &mut LabelTable, ids: &[u8]) {
     for entry in &mut table.labels {
         let pixels = ids.iter().filter(|&&id| u32::from(id) == entry.id).count() as u64;

@@ -43,7 +43,7 @@ pub enum LabelRule {
 }
 
 crate::options::options! {
-    /// The settings of a training. `Default` follows the paper except for labels, where measurements favour other
+    /// The settings of a training. `Default` follows the paper except where measurements favour other
     /// values. [`TrainConfig::paper`] follows the paper throughout.
     ///
     /// Steps count from 1, as in the reference code.
@@ -290,7 +290,6 @@ impl TrainConfig {
         self.feature_rest_lr.unwrap_or(self.feature_lr / 20.0)
     }
 
-    /// Halves all learning rates.
     pub(super) fn halve_rates(&mut self) {
         for rate in [
             &mut self.position_lr_init,

@@ -66,7 +66,6 @@ pub struct Trainer {
     image: (u32, u32),
     /// Submitted steps that are not retired yet, at most one per frame.
     in_flight: VecDeque<(StepInput, InFlight)>,
-    /// Number of submitted steps.
     step: u32,
     updates: u32,
     bound: Bound,
@@ -81,7 +80,6 @@ pub struct Trainer {
     seen: sentinel::Seen,
     /// Fingerprints of the views; empty until first used.
     fingerprints: Vec<ViewFingerprint>,
-    /// Report of the newest finished step.
     newest: Option<StepReport>,
     /// The last densification, until it is taken.
     densified: Option<Densified>,

@@ -24,7 +24,6 @@ pub(super) struct ViewOrder {
 }
 
 impl ViewOrder {
-    /// Makes an order over `views` views.
     pub(super) fn new(seed: u64, views: usize) -> Self {
         Self { random: stream(seed, VIEW_STREAM), views, stack: Vec::new() }
     }
@@ -38,7 +37,6 @@ impl ViewOrder {
         order
     }
 
-    /// Returns the next view.
     pub(super) fn draw(&mut self) -> usize {
         if self.stack.is_empty() {
             self.stack = (0..self.views).collect();

@@ -18,7 +18,6 @@ const COUNT_MAX: u32 = 10;
 /// Number of successive steps above that share which ends a training.
 const STEPS_MAX: u32 = 3;
 
-/// The counts so far.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Seen {
     /// Number of dropped gradients so far, and the number for the next log message.
@@ -29,7 +28,6 @@ pub(super) struct Seen {
 }
 
 impl Trainer {
-    /// Checks the counters of a step.
     pub(super) fn watch(&mut self, input: &StepInput, report: &Report, losses: [f64; 2]) -> Result<()> {
         let counters = &report.counters;
         let view = &self.views[input.view].name;

@@ -4,7 +4,6 @@ use super::step_input::StepInput;
 use crate::engine::ListKey;
 use crate::pass::Variant;
 
-/// Whether each object has passes of its own.
 #[derive(Default)]
 pub(super) struct Separate {
     #[cfg(feature = "lab")]

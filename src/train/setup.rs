@@ -74,7 +74,6 @@ pub(crate) fn start_size(
     }
 }
 
-/// Prepares a view for training.
 pub(super) fn train_view(view: &View, border: u32) -> Result<TrainView> {
     let photo = view.photo.clone().ok_or_else(|| Error::Bug(format!("{} came without its photo", view.name)))?;
     let valid_pixels = step_input::valid_pixels(&photo);

@@ -93,7 +93,6 @@ impl Shared {
         Ok(rows)
     }
 
-    /// Returns the rows of a step.
     pub(super) fn of_step(&self, at: At, view: usize) -> Result<Vec<SharedRow>> {
         let (Some(parameters), layout) = (&self.0, self.layout()) else { return Ok(Vec::new()) };
         let rates = checked(parameters.rates(at), layout.scene + layout.photo, "rates")?;
@@ -113,12 +112,10 @@ impl Shared {
         of_strategy + u32::from(self.0.is_some())
     }
 
-    /// Returns the entry for checkpoints.
     pub(super) fn kept(&self) -> Option<KeptShared> {
         self.0.as_ref().map(|parameters| KeptShared { name: parameters.name().to_owned(), layout: parameters.layout() })
     }
 
-    /// Refuses a checkpoint with other parameters.
     pub(super) fn check(&self, kept: Option<&KeptShared>) -> Result<(), String> {
         let own = self.kept();
         let text = |kept: Option<&KeptShared>| kept.map_or("none".to_owned(), ToString::to_string);

@@ -147,7 +147,6 @@ pub struct SceneScale {
     pub extent: f64,
 }
 
-/// Returns the uniforms of a step.
 pub(crate) fn uniforms(
     input: &StepInput,
     view: &TrainView,

@@ -17,7 +17,6 @@ pub struct StepTimes {
     pub items: Vec<(Stage, String, u64)>,
 }
 
-/// The times collected so far.
 #[derive(Debug, Default)]
 pub(super) struct Timing {
     seen: HashSet<Recording>,

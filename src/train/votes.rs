@@ -11,7 +11,6 @@ impl Trainer {
         self.engine.size().labels.is_some() && self.config.label_rule == LabelRule::Votes
     }
 
-    /// Returns true before the steps at which votes are counted.
     pub(super) fn counts_votes(&self, step: u32) -> bool {
         let config = &self.config;
         self.votes()

@@ -171,7 +171,6 @@ impl Protocol {
     }
 }
 
-/// Returns the file name without extension.
 fn stem(path: &Path) -> String {
     path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default()
 }

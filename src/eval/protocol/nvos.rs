@@ -49,7 +49,6 @@ pub(super) fn layout(files: &[PathBuf], ask: Ask) -> Result<Layout, String> {
     Ok(layout)
 }
 
-/// Returns the mask in a file FRAME_mask.png.
 fn truth(file: PathBuf) -> Option<Truth> {
     is_png(&file).then_some(())?;
     let frame = stem(&file).strip_suffix(MASK)?.to_owned();

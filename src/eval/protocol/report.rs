@@ -121,7 +121,6 @@ impl Report {
         self.views.entry(frame.to_owned()).or_default().insert(object.to_owned(), scores);
     }
 
-    /// Averages the added scores.
     pub(super) fn finish(&mut self) {
         for (name, row) in &mut self.objects {
             let own: Vec<&PairScores> = self.views.values().filter_map(|view| view.get(name)).collect();

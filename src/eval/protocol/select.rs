@@ -9,7 +9,6 @@ use crate::io::truth::TruthMask;
 use crate::scene::{LabelMap, View};
 use std::path::Path;
 
-/// The result of an object's prompt.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum Choice {
     /// The chosen labels, at least one.

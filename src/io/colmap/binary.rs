@@ -63,7 +63,6 @@ impl Source {
         Ok(values)
     }
 
-    /// Skips `count` items of `size` bytes.
     fn skip(&mut self, count: u64, size: u64, what: &str) -> Result<()> {
         let left = self.length - self.at.min(self.length);
         let bytes = u128::from(count) * u128::from(size);
@@ -75,7 +74,6 @@ impl Source {
         Ok(())
     }
 
-    /// Reads text up to a zero byte.
     fn name(&mut self) -> Result<String> {
         let mut bytes = Vec::new();
         (&mut self.file).take(NAME_MAX).read_until(0, &mut bytes).map_err(Error::read(&self.path))?;
@@ -99,7 +97,6 @@ impl Source {
     }
 }
 
-/// Reads `cameras.bin`.
 pub(super) fn cameras(path: &Path) -> Result<Vec<CameraRecord>> {
     Source::open(path)?.records("camera", |source| {
         let (id, number) = (source.u32()?, source.u32()?);
@@ -115,7 +112,6 @@ pub(super) fn cameras(path: &Path) -> Result<Vec<CameraRecord>> {
     })
 }
 
-/// Reads `images.bin`.
 pub(super) fn images(path: &Path) -> Result<Vec<ImageRecord>> {
     Source::open(path)?.records("image", |source| {
         let id = source.u32()?;

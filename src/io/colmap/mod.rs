@@ -19,7 +19,6 @@ use std::path::{Path, PathBuf};
 /// Folders below the scene that may hold the model, in order of preference.
 const FOLDERS: [&str; 4] = ["sparse/0", "sparse", "colmap/sparse/0", "."];
 
-/// The three files of a model.
 struct Files {
     folder: PathBuf,
     extension: &'static str,
@@ -70,7 +69,6 @@ fn finite(mut points: Vec<Point>, notes: &mut Vec<String>) -> Vec<Point> {
     points
 }
 
-/// Joins each image with its camera.
 fn join(
     scene: &Place,
     cameras_path: &Path,

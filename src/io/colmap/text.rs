@@ -76,7 +76,6 @@ fn records<T>(path: &Path, read: impl Fn(Words) -> Result<T>) -> Result<Vec<T>> 
     Ok(all)
 }
 
-/// Reads `cameras.txt`.
 pub(super) fn cameras(path: &Path) -> Result<Vec<CameraRecord>> {
     records(path, |mut words| {
         let (id, name) = (words.number("camera id")?, words.word("a camera model")?);

@@ -27,7 +27,6 @@ const BACKGROUND_TOLERANCE: u8 = 3;
 /// Number of views whose border is examined.
 const BORDER_VIEWS: usize = 40;
 
-/// The test for candidates.
 struct Test<'a> {
     views: &'a [View],
     /// Number of cameras that must see the candidate.

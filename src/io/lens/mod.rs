@@ -75,7 +75,6 @@ pub(crate) const MODELS: [CameraModel; 6] = [
     CameraModel { of_names: None, ..polynomial("FULL_OPENCV", 2, 8) },
 ];
 
-/// Returns the camera model with this name.
 pub(crate) fn model(name: &str) -> Option<&'static CameraModel> {
     const ALL: &[CameraModel] = &MODELS;
     ALL.iter().find(|model| model.name == name)

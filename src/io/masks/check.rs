@@ -73,7 +73,6 @@ pub struct Finding {
     pub text: String,
 }
 
-/// The pixels of an object in a mask.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 struct Area {
     pixels: u64,

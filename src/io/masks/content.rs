@@ -9,13 +9,9 @@ use std::path::Path;
 /// The kind of ids in a PNG, from its header.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Kind {
-    /// Grey with up to 8 bits.
     Grey8,
-    /// Grey with 16 bits.
     Grey16,
-    /// Palette indices.
     Palette,
-    /// 8-bit RGB.
     Rgb,
     /// Transparency or 16-bit colours: no ids.
     Other,
@@ -75,7 +71,6 @@ pub(super) fn read_ids(
     Ok(SourceIds { size: raw.header.size, ids })
 }
 
-/// A black and white mask.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Binary {
     pub(super) size: (u32, u32),

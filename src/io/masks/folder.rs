@@ -106,12 +106,10 @@ pub(super) struct Claims {
 }
 
 impl Claims {
-    /// Returns the number of photos with a file.
     pub(super) fn photos(&self) -> usize {
         self.of_photo.iter().filter(|files| !files.is_empty()).count()
     }
 
-    /// Returns all files.
     pub(super) fn files(&self) -> impl Iterator<Item = &str> {
         self.of_photo.iter().flatten().map(|(_, file)| file.as_str())
     }

@@ -168,7 +168,6 @@ fn decode(reading: &Reading, objects: &[String], photo: usize, view: &View, rule
     Ok(Decoded { size, ids, shared, cut })
 }
 
-/// Paints layers in order.
 fn paint((width, height): (u32, u32), layers: &[(u32, Vec<bool>)]) -> (Vec<u32>, Shared) {
     let mut ids = vec![0; width as usize * height as usize];
     let mut shared = Shared::new();

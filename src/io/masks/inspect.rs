@@ -62,7 +62,6 @@ fn look(dataset: &Dataset, view: &View, path: Option<&Path>) -> Result<Look, Fin
     Ok(Look::new(&map, &view.camera, &dataset.points))
 }
 
-/// Finds files without a photo.
 fn misnamed(folder: &Path, used: &[Option<PathBuf>]) -> Result<Vec<Finding>> {
     let used: BTreeSet<&Path> = used.iter().flatten().map(PathBuf::as_path).collect();
     let unused = files(folder)?.into_iter().filter(|file| file != FILE && !used.contains(folder.join(file).as_path()));

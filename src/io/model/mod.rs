@@ -25,7 +25,6 @@ pub fn register(format: &'static ModelFormat) {
     REGISTERED.write().unwrap_or_else(PoisonError::into_inner).insert(0, format);
 }
 
-/// Returns all formats in order of preference.
 fn formats() -> Vec<&'static ModelFormat> {
     let mut all = REGISTERED.read().unwrap_or_else(PoisonError::into_inner).clone();
     all.extend(SHIPPED);

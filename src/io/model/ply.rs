@@ -124,7 +124,6 @@ fn confidence_of(path: &Path, index: u64, value: f64) -> Result<f32> {
     Err(Error::data(path, format!("vertex {index}"), problem))
 }
 
-/// Numbers of rows left out, by reason.
 #[derive(Default)]
 struct Dropped {
     not_finite: u64,

@@ -218,7 +218,6 @@ impl Table {
     }
 }
 
-/// Irregularities in the rows.
 pub(in crate::io) struct Notes {
     /// Number of bytes after the last declared element.
     pub(in crate::io) extra_bytes: u64,

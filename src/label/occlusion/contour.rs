@@ -91,7 +91,6 @@ fn sides(labels: &LabelMap, depth: &[f32], margin: f64) -> Sides {
     sides
 }
 
-/// The data for following chains.
 struct Chains<'a> {
     direct: &'a Occluders,
     sides: &'a Sides,

@@ -122,7 +122,6 @@ pub fn trust(views: &[Agreement]) -> Vec<BTreeMap<u16, f32>> {
     views.iter().map(of_view).collect()
 }
 
-/// Stores a decision in a model.
 pub(crate) fn apply(model: &mut Gaussians, decision: Decision) {
     model.labels = Some(decision.labels);
     model.label_confidence = Some(decision.confidence);

@@ -58,7 +58,6 @@ fn uniforms(at: At, step: StepUniforms) -> StepUniforms {
     }
 }
 
-/// Returns the step at which densification ends.
 pub(crate) fn densify_until(config: &TrainConfig) -> u32 {
     /// Fewest steps of densification in a short run.
     const LEAST: u32 = 1000;

@@ -15,7 +15,6 @@ pub struct Densified {
     pub pruned: u32,
 }
 
-/// The limit on the number of Gaussians.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Bound {
     /// Limit of the user or of the device.
