@@ -19,7 +19,8 @@ fn commands(page: &Path) -> Vec<String> {
     let text = fs::read_to_string(page).expect("a page");
     let boxes = text.split("\n```").collect::<Vec<_>>();
     let shell = boxes.iter().filter_map(|part| part.strip_prefix("sh\n"));
-    let lines = shell.flat_map(str::lines).filter(|line| !line.is_empty() && (!line.starts_with('#') || *line == TRACKER));
+    let lines =
+        shell.flat_map(str::lines).filter(|line| !line.is_empty() && (!line.starts_with('#') || *line == TRACKER));
     lines.map(str::to_owned).collect()
 }
 

@@ -1,33 +1,33 @@
-//! The labels of a model by id and by name: what people type, and what they are told.
+//! The labels of a model by id and by name, for command lines and messages.
 
 use crate::io::label_table::LabelTable;
 use crate::scene::{Gaussians, UNLABELLED};
 use crate::{Error, Result};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Most labels that a message lists.
+/// Most labels in a message.
 const LISTED_MAX: usize = 24;
 
-/// Labels as one types them.
+/// A choice of labels on the command line.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Pick {
-    /// All ids from the first to the last.
+    /// All ids from the first to the last, both included.
     Ids(u32, u32),
-    /// The label of this name, whatever the case.
+    /// The label with this name, ignoring case.
     Name(String),
 }
 
-/// What is known about the labels of a model.
+/// The labels of a model with their counts and names.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Catalogue {
-    /// Gaussians of each label that occurs, 0 included.
+    /// Number of Gaussians per label in the model, 0 included.
     pub gaussians: BTreeMap<u32, u64>,
-    /// Names and pixels, where a table tells them.
+    /// Names and pixel counts, if there is a table.
     pub table: Option<LabelTable>,
 }
 
 impl Catalogue {
-    /// Counts the labels of a model; one without labels is all 0.
+    /// Counts the labels of a model. Without labels all Gaussians have label 0.
     pub fn new(model: &Gaussians, table: Option<LabelTable>) -> Self {
         let mut gaussians = BTreeMap::new();
         match &model.labels {
@@ -38,7 +38,7 @@ impl Catalogue {
         Self { gaussians, table }
     }
 
-    /// The ids that `picks` mean, each of which occurs in the model; an error names `argument` and lists what there is.
+    /// Returns the ids of `picks`; each must occur in the model. Errors name `argument` and list the known labels.
     pub fn resolve(&self, argument: &str, picks: &[Pick]) -> Result<BTreeSet<u32>> {
         let mut ids = BTreeSet::new();
         for pick in picks {
@@ -69,17 +69,18 @@ impl Catalogue {
         Ok(())
     }
 
-    /// Name of a label, if it has one.
+    /// Returns the name of a label, if it has one.
     pub fn name(&self, id: u32) -> Option<&str> {
         self.table.as_ref()?.entry(id)?.name.as_deref()
     }
 
-    /// Id and, where there is one, name: `3 cup`.
+    /// Returns the id and, if there is one, the name: `3 cup`.
     pub fn title(&self, id: u32) -> String {
         self.name(id).map_or_else(|| id.to_string(), |name| format!("{id} {name}"))
     }
 
-    /// "the model has 1 cup (80 Gaussians, 2400 px in the masks), 3 (5 Gaussians)", for messages.
+    /// Returns a list of the labels for messages: "the model has 1 cup (80 Gaussians, 2400 px in the masks), 3 (5
+    /// Gaussians)".
     pub fn there_is(&self) -> String {
         let text = |(&id, &count): (&u32, &u64)| {
             let pixels = self.table.as_ref().and_then(|table| table.entry(id)).map_or(0, |entry| entry.pixels);

@@ -1,4 +1,4 @@
-//! Models with other colours or other labels.
+//! Changes of the colours or labels of a model.
 
 use super::components::{Grouping, components};
 use crate::scene::labels::LABEL_MAX;
@@ -7,7 +7,7 @@ use crate::shaders::constants::exact::SH_C0;
 use crate::{Error, Result};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// What becomes of parts that are too small.
+/// The treatment of parts that are too small.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 pub enum Specks {
@@ -16,17 +16,17 @@ pub enum Specks {
     Keep,
     /// They lose their label.
     Unlabel,
-    /// They are left out of the model.
+    /// They are removed from the model.
     Drop,
 }
 
-/// Label of each row; all 0 in a model without labels.
+/// Returns the label of each row; all 0 in a model without labels.
 fn labels_of(model: &Gaussians) -> Vec<u32> {
     model.labels.clone().unwrap_or_else(|| vec![UNLABELLED; model.len()])
 }
 
-/// Mixes the colour (0 to 1) into the Gaussians of some labels: `mix` 1 replaces their colour in every direction, 0
-/// leaves it.
+/// Mixes a colour (r, g, b, 0 to 1) into the Gaussians of some labels. `mix` 1 replaces their colour in every
+/// direction, 0 keeps it.
 pub fn recolour(model: &Gaussians, labels: &BTreeSet<u32>, colour: [f32; 3], mix: f32) -> Gaussians {
     let mut out = model.clone();
     let rest = model.rest_per_gaussian();
@@ -41,25 +41,25 @@ pub fn recolour(model: &Gaussians, labels: &BTreeSet<u32>, colour: [f32; 3], mix
     out
 }
 
-/// Gives labels new ids, all at once; labels that the map does not name stay.
+/// Replaces labels by new ids, all at once. Labels that are not in the map stay.
 pub fn relabel(model: &Gaussians, map: &BTreeMap<u32, u32>) -> Gaussians {
     let labels = labels_of(model).iter().map(|label| *map.get(label).unwrap_or(label)).collect();
     Gaussians { labels: Some(labels), ..model.clone() }
 }
 
-/// A model with its labels split into connected parts.
+/// The result of [`split_components`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct Split {
-    /// The model.
+    /// The model with its new labels.
     pub model: Gaussians,
-    /// For each label that was split, in order: the ids of its parts, the largest first, which keeps the old id.
+    /// For each split label, the ids of its parts by decreasing size. The largest part keeps the old id.
     pub ids: BTreeMap<u32, Vec<u32>>,
-    /// Gaussians in parts that were too small.
+    /// Number of Gaussians in parts that were too small.
     pub specks: u64,
 }
 
-/// Splits each of `labels` into connected parts. The largest part keeps the id, the others get the next ids that
-/// neither the model nor `taken` has.
+/// Splits each of `labels` into connected parts. The largest part keeps the id; the others get the next ids that are
+/// neither in the model nor in `taken`.
 pub fn split_components(
     model: &Gaussians,
     labels: &BTreeSet<u32>,
@@ -71,7 +71,7 @@ pub fn split_components(
     let old = new.clone();
     let used: BTreeSet<u32> = taken.iter().copied().chain(old.iter().copied()).collect();
     let last = used.last().copied().unwrap_or(UNLABELLED);
-    // Ids behind the last one, then gaps.
+    // Ids after the last one, then gaps.
     let mut free = (last + 1..=LABEL_MAX).chain((1..last).filter(|id| !used.contains(id)));
     let (mut ids, mut small) = (BTreeMap::new(), BTreeSet::new());
     for &label in labels {
@@ -94,7 +94,7 @@ pub fn split_components(
     Ok(Split { model, ids, specks: small.len() as u64 })
 }
 
-/// The model without the specks of its labels, each label for itself.
+/// Returns the model without the specks of each label.
 pub fn without_specks(model: &Gaussians, how: Grouping) -> Result<Gaussians> {
     let labels = labels_of(model);
     let mut specks = BTreeSet::new();

@@ -1,21 +1,21 @@
-//! From a mask in one view to labels.
+//! Chooses labels by a mask in one view.
 
 use super::catalogue::Catalogue;
 use crate::scene::{LabelMap, UNLABELLED};
 use crate::{Error, Result};
 
-/// A label that a mask touches.
+/// A label with pixels in a mask.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Candidate {
     /// The label.
     pub label: u32,
-    /// Pixels of the label inside the mask.
+    /// Number of its pixels inside the mask.
     pub inside: u64,
-    /// Pixels of the label in the whole view.
+    /// Number of its pixels in the whole view.
     pub pixels: u64,
 }
 
-/// Labels with a pixel inside the mask, most pixels inside first.
+/// Returns the labels with a pixel inside the mask, by decreasing number of pixels inside.
 pub fn candidates(map: &LabelMap, mask: &[bool]) -> Vec<Candidate> {
     let mut counts = vec![(0_u64, 0_u64); 65_536];
     for (&id, &inside) in map.ids.iter().zip(mask) {
@@ -32,7 +32,8 @@ pub fn candidates(map: &LabelMap, mask: &[bool]) -> Vec<Candidate> {
     found
 }
 
-/// The paper's rule: labels with more than half of their pixels of the view inside the mask, sorted. May be empty.
+/// Returns the labels with more than half of their pixels of the view inside the mask (rule of the paper), sorted. May
+/// be empty.
 pub fn choose_labels(map: &LabelMap, mask: &[bool]) -> Vec<u32> {
     let mut labels: Vec<u32> = candidates(map, mask)
         .iter()
@@ -43,7 +44,7 @@ pub fn choose_labels(map: &LabelMap, mask: &[bool]) -> Vec<u32> {
     labels
 }
 
-/// [`choose_labels`], or an error that names `argument` and lists the labels that came closest, with their names.
+/// Like [`choose_labels`], but no label is an error, which names `argument` and lists the closest labels.
 pub fn require_labels(argument: &str, map: &LabelMap, mask: &[bool], known: &Catalogue) -> Result<Vec<u32>> {
     if mask.len() != map.ids.len() {
         let problem = format!("has {} pixels, the view has {} x {}", mask.len(), map.width, map.height);

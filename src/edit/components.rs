@@ -1,7 +1,7 @@
 //! Connected parts of a set of Gaussians.
 //!
-//! Two Gaussians are connected when their ellipsoids of [`REACH`] standard deviations, grown by half of a gap, meet.
-//! Whether two ellipsoids meet is asked with the contact function of Perram and Wertheim (1985).
+//! Two Gaussians are connected if their ellipsoids of `REACH` standard deviations, grown by half of a gap, intersect.
+//! The test uses the contact function of Perram and Wertheim (1985).
 
 use crate::scene::Gaussians;
 use crate::{Error, Result};
@@ -10,15 +10,15 @@ use kiddo::{ImmutableKdTree, SquaredEuclidean};
 use petgraph::unionfind::UnionFind;
 use std::collections::BTreeMap;
 
-/// Standard deviations from the centre to the border of an ellipsoid: an eighth of the opacity is left there.
+/// Half axes of an ellipsoid in standard deviations: at its surface an eighth of the opacity is left.
 pub(crate) const REACH: f64 = 2.0;
 
-/// What counts as connected, and what as a speck.
+/// The rules for connected parts and specks.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Grouping {
-    /// Two ellipsoids that are at most this far apart are connected, world units; 0: they must touch.
+    /// Largest gap between two connected ellipsoids, world units; 0: they must touch.
     pub gap: f64,
-    /// A part with a smaller share of the Gaussians is a speck, 0 to 1. The largest part never is.
+    /// Share of the Gaussians below which a part is a speck, 0 to 1. The largest part never is.
     pub min_share: f64,
 }
 
@@ -28,12 +28,12 @@ impl Default for Grouping {
     }
 }
 
-/// The parts of a set of rows; each sorted.
+/// The connected parts of a set of rows; the rows of each are sorted.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Parts {
-    /// Parts that are large enough, the largest first; parts of one size by their first row.
+    /// Parts that are large enough, by decreasing size, then by first row.
     pub parts: Vec<Vec<usize>>,
-    /// The rows of all others.
+    /// Rows of all other parts.
     pub specks: Vec<usize>,
 }
 
@@ -53,7 +53,7 @@ pub fn components(model: &Gaussians, rows: &[usize], how: Grouping) -> Result<Pa
     Ok(Parts { parts, specks })
 }
 
-/// A representative of the group of each body.
+/// Returns the representative of each body's group.
 fn join(bodies: &[Body]) -> Result<Vec<usize>> {
     let mut groups = UnionFind::new(bodies.len());
     let centres: Vec<[f64; 3]> = bodies.iter().map(|body| body.centre.to_array()).collect();
@@ -61,7 +61,7 @@ fn join(bodies: &[Body]) -> Result<Vec<usize>> {
         let tree: ImmutableKdTree<f64, 3> = ImmutableKdTree::new_from_slice(&centres)
             .map_err(|error| Error::Bug(format!("the k-d tree of the Gaussians failed: {error:?}")))?;
         for (index, body) in bodies.iter().enumerate() {
-            // A pair is looked at from its larger body, so that a small one has few to look at.
+            // Each pair is tested from its larger body, so that a small one has few tests.
             let reach = (2.0 * body.radius).powi(2);
             for found in tree.query(&centres[index]).within::<SquaredEuclidean<f64>>(reach).unsorted().execute() {
                 let other = found.item as usize;
@@ -75,18 +75,16 @@ fn join(bodies: &[Body]) -> Result<Vec<usize>> {
     Ok(groups.into_labeling())
 }
 
-/// The ellipsoid of a Gaussian.
 struct Body {
     centre: DVec3,
-    /// Longest half axis.
     radius: f64,
-    /// Rotation times squared half axes times its inverse.
+    /// Rotation times squared half axes times inverse rotation.
     shape: DMat3,
 }
 
 impl Body {
     fn new(model: &Gaussians, row: usize, gap: f64) -> Self {
-        // Never flat, so that sums of shapes can be inverted.
+        // Never flat, so that sums of shapes are invertible.
         let axes = DVec3::from_array(model.scales[row].map(f64::from)).map(|scale| REACH * scale.exp() + gap / 2.0);
         let axes = axes.clamp(DVec3::splat(axes.max_element() * 1e-6), DVec3::splat(1e100)).max(DVec3::splat(1e-100));
         let [w, x, y, z] = model.quats[row].map(f64::from);
@@ -98,8 +96,8 @@ impl Body {
         }
     }
 
-    /// True if the two ellipsoids share a point: the largest of s (1 - s) d' ((1 - s) A + s B)^-1 d over s in 0 to 1 is
-    /// at most 1. The function is concave, so a search by thirds finds it.
+    /// Returns true if the two ellipsoids intersect: the largest value of s (1 - s) d' ((1 - s) A + s B)^-1 d over s in
+    /// 0 to 1 is at most 1. The function is concave, so a ternary search finds it.
     fn meets(&self, other: &Self) -> bool {
         let between = other.centre - self.centre;
         if between.length() > self.radius + other.radius {
@@ -110,7 +108,7 @@ impl Body {
             s * (1.0 - s) * between.dot(mixed.inverse() * between)
         };
         let (mut low, mut high) = (0.0, 1.0);
-        // (2/3)^40 of the way is less than the error of an f32.
+        // (2/3)^40 is below the precision of f32.
         for _ in 0..40 {
             let (a, b) = (low + (high - low) / 3.0, high - (high - low) / 3.0);
             let (at_a, at_b) = (contact(a), contact(b));

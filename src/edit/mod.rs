@@ -1,4 +1,8 @@
-//! Choice and change of the labels of a model.
+//! Chooses and changes the labels of a model, without a device.
+//!
+//! A [`Catalogue`] resolves ids and names, and [`choose`] resolves points, boxes and masks in a view. [`extract`],
+//! [`remove`], [`recolour`], [`relabel`] and [`split_components`] return changed models; [`summarise`] lists the
+//! labels.
 
 pub(crate) mod catalogue;
 pub(crate) mod change;

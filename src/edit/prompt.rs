@@ -1,4 +1,4 @@
-//! Points, boxes and masks in a view, and the labels that they mean.
+//! Chooses labels by points, boxes and masks in views.
 
 use super::catalogue::Catalogue;
 use super::choose::{candidates, require_labels};
@@ -6,33 +6,34 @@ use crate::scene::{LabelMap, UNLABELLED};
 use crate::{Error, Result};
 use std::collections::BTreeSet;
 
-/// A place in a view. Pixels count from 0 at the top left, in the size in which the label map is rendered.
+/// A place in a view. Pixels count from 0 at the top left, at the size of the label map.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Place {
-    /// The label of this pixel: column, row.
+    /// The label at this pixel: column, row.
     Point(u32, u32),
-    /// Labels with more than half of their pixels in here: first column and row, and the ones behind the last.
+    /// Labels with more than half of their pixels in this box: first column and row, then end column and row,
+    /// exclusive.
     Box([u32; 4]),
-    /// Labels with more than half of their pixels in here, row-major.
+    /// Labels with more than half of their pixels in this mask, row-major.
     Mask(Vec<bool>),
 }
 
-/// A place with what it is for.
+/// A place, and what to do with its labels.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Prompt {
-    /// The flag that it came with, for messages.
+    /// Flag of the prompt, for messages.
     pub argument: &'static str,
     /// Name of the view.
     pub view: String,
-    /// Size of the label map, px; otherwise the view's.
+    /// Size of the label map, px; `None`: the size of the view.
     pub size: Option<(u32, u32)>,
-    /// Where.
+    /// The place.
     pub place: Place,
-    /// True if the labels there are taken away from the choice instead of added.
+    /// Removes its labels from the choice instead of adding them.
     pub away: bool,
 }
 
-/// Adds to `start` what the prompts mean, then takes away what they take away. An empty choice is an error.
+/// Adds the labels of prompts to `start`, then removes those of prompts with `away`. An empty choice is an error.
 pub fn choose(
     start: BTreeSet<u32>,
     prompts: &[Prompt],
@@ -43,7 +44,7 @@ pub fn choose(
     for prompt in prompts {
         let map = map_of(prompt)?;
         match prompt.place {
-            // Nothing is no label to take away.
+            // The background is no label to remove.
             Place::Point(x, y) if prompt.away && map.get(x, y) == Some(0) => {}
             _ if prompt.away => away.extend(labels_at(prompt.argument, &prompt.place, &map, known)?),
             _ => chosen.extend(labels_at(prompt.argument, &prompt.place, &map, known)?),
@@ -58,7 +59,7 @@ pub fn choose(
     Ok(rest)
 }
 
-/// The labels that a place means in the label map of its view; an error names `argument` and lists candidates.
+/// Returns the labels of a place in the label map of its view. Errors name `argument` and list candidates.
 fn labels_at(argument: &str, place: &Place, map: &LabelMap, known: &Catalogue) -> Result<BTreeSet<u32>> {
     let outside = |what: String| {
         Error::usage(argument, format!("{what} is outside of the view, which has {} x {} px", map.width, map.height))
@@ -83,7 +84,7 @@ fn labels_at(argument: &str, place: &Place, map: &LabelMap, known: &Catalogue) -
     }
 }
 
-/// Labels of a view with their pixels, most first.
+/// Lists the labels of a view by decreasing number of pixels, for messages.
 fn shown(map: &LabelMap, known: &Catalogue) -> String {
     let found = candidates(map, &vec![true; map.ids.len()]);
     let texts: Vec<String> =

@@ -1,4 +1,4 @@
-//! Tables of labels that follow an edited model.
+//! Updates the table of labels after an edit of the model.
 
 use super::catalogue::Catalogue;
 use crate::io::label_table::{LabelEntry, LabelTable};
@@ -6,13 +6,13 @@ use crate::scene::UNLABELLED;
 use crate::{Error, Result};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// The entries whose id is wanted.
+/// Returns the entries whose id is wanted.
 pub fn keep(table: &LabelTable, wanted: impl Fn(u32) -> bool) -> LabelTable {
     LabelTable::new(table.labels.iter().filter(|entry| wanted(entry.id)).cloned().collect())
 }
 
-/// The table after labels got new ids. Where several become one, the entry that had the id all along gives name and
-/// colour, else the first; pixels add up, and so that no mask counts twice, views are those of the label with most.
+/// Returns the table after a change of ids. If labels are merged, the entry that already had the id gives name and
+/// colour, else the first one. Pixels add up; views are the maximum, so that no mask counts twice.
 pub fn renumber(table: &LabelTable, map: &BTreeMap<u32, u32>) -> LabelTable {
     let mut groups: BTreeMap<u32, Vec<&LabelEntry>> = BTreeMap::new();
     for entry in &table.labels {
@@ -33,7 +33,7 @@ pub fn renumber(table: &LabelTable, map: &BTreeMap<u32, u32>) -> LabelTable {
     LabelTable::new(groups.into_iter().map(merged).collect())
 }
 
-/// The table after a split: `NAME 2`, `NAME 3` and so on for the parts of a label that has a name.
+/// Returns the table after a split. The parts of a named label are `NAME 2`, `NAME 3` and so on.
 pub fn split(table: &LabelTable, ids: &BTreeMap<u32, Vec<u32>>) -> LabelTable {
     let mut names: BTreeSet<String> = table.labels.iter().filter_map(|entry| entry.name.clone()).collect();
     let mut labels = table.labels.clone();
@@ -51,7 +51,7 @@ pub fn split(table: &LabelTable, ids: &BTreeMap<u32, Vec<u32>>) -> LabelTable {
     LabelTable::new(labels)
 }
 
-/// The table with a name for a label; a table is made where there is none. A name of another label is an error.
+/// Returns the table with a name for a label; makes the table if there is none. The name of another label is an error.
 pub fn give_name(known: &Catalogue, table: Option<LabelTable>, id: u32, name: &str) -> Result<LabelTable> {
     let made = || known.gaussians.keys().filter(|&&id| id != UNLABELLED).map(|&id| LabelEntry::new(id)).collect();
     let mut labels = table.map_or_else(made, |table| table.labels);

@@ -1,4 +1,4 @@
-//! The labels of a model: what there is, and models of some of them.
+//! Lists the labels of a model, and makes models of some of them.
 
 use super::catalogue::Catalogue;
 use crate::scene::{Gaussians, UNLABELLED};
@@ -7,28 +7,28 @@ use glam::DVec3;
 use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Least confidence of the Gaussians that an object is made of when it stands alone. What straddles an object and its
-/// surroundings, or shows in few pixels, sticks out of the object once nothing is around it.
+/// Least label confidence of Gaussians in objects that stand alone. Gaussians that straddle an object and its
+/// background, or cover few pixels, stick out when nothing is around them.
 pub const MIN_LABEL_CONFIDENCE: f32 = 0.6;
 
-/// What a model knows about one label.
+/// The Gaussians of a label in numbers.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct LabelSummary {
     /// The label; 0 is unlabelled.
     pub label: u32,
     /// Number of Gaussians.
     pub count: u64,
-    /// Sum of their opacities after the sigmoid.
+    /// Sum of the opacities after the sigmoid.
     pub opacity_mass: f64,
-    /// Smallest coordinates of the means, world.
+    /// Smallest coordinates of the means, world units.
     pub min: [f64; 3],
-    /// Largest coordinates of the means, world.
+    /// Largest coordinates of the means, world units.
     pub max: [f64; 3],
-    /// Mean of the means, weighted by opacity, world.
+    /// Mean of the means, weighted by opacity, world units.
     pub centre: [f64; 3],
 }
 
-/// One row per label, sorted, 0 (unlabelled) included. A model without labels is all 0.
+/// Returns one row per label, sorted, 0 (unlabelled) included. Without labels all Gaussians have label 0.
 pub fn summarise(model: &Gaussians) -> Vec<LabelSummary> {
     struct Sum {
         count: u64,
@@ -61,32 +61,31 @@ pub fn summarise(model: &Gaussians) -> Vec<LabelSummary> {
     sums.into_iter().map(row).collect()
 }
 
-/// The Gaussians of these labels, in order, but for those whose confidence is known and less than `least` ([`MIN_LABEL_CONFIDENCE`]);
-/// there may be none left. An error, which lists what there is, if one of the labels does not occur.
+/// Returns the Gaussians of these labels, in order, possibly none. Leaves out Gaussians with a known confidence below
+/// `least` ([`MIN_LABEL_CONFIDENCE`]). A label that does not occur is an error, which lists the known labels.
 pub fn extract(model: &Gaussians, labels: &[u32], least: f32) -> Result<Gaussians> {
     let wanted = check_labels(model, labels)?;
     let sure = |row: usize| model.label_confidence.as_ref().is_none_or(|shares| shares[row] >= least);
     Ok(model.filtered(|row| wanted.contains(&label_of(model, row)) && sure(row)))
 }
 
-/// All but the Gaussians of these labels, in order. The same errors as [`extract`], and one if nothing is left.
+/// Returns the Gaussians of all other labels, in order. Errors as in [`extract`], or if no Gaussian remains.
 pub fn remove(model: &Gaussians, labels: &[u32]) -> Result<Gaussians> {
     let wanted = check_labels(model, labels)?;
     let rest = model.filtered(|row| !wanted.contains(&label_of(model, row)));
     if rest.is_empty() {
-        return Err(Error::usage("labels", "names every label of the model; nothing would be left"));
+        return Err(Error::usage("labels", "names every label of the model; no Gaussian would be left"));
     }
     Ok(rest)
 }
 
-/// The labels as a set, if each of them occurs in the model.
 fn check_labels(model: &Gaussians, labels: &[u32]) -> Result<BTreeSet<u32>> {
     let wanted = labels.iter().copied().collect();
     Catalogue::new(model, None).check("labels", &wanted)?;
     Ok(wanted)
 }
 
-/// Label of a row; 0 in a model without labels.
+/// Returns the label of a row; 0 in a model without labels.
 fn label_of(model: &Gaussians, row: usize) -> u32 {
     model.labels.as_ref().map_or(UNLABELLED, |labels| labels[row])
 }

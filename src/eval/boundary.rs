@@ -1,24 +1,24 @@
-//! Boundary IoU (Cheng et al. 2021): the overlap of the rims of two masks, which a large inside cannot drown.
+//! Boundary IoU (Cheng et al. 2021): the overlap of the rims of two masks, which does not depend on a large interior.
 
 use super::metrics::Overlap;
 
-/// Width of the rim over the diagonal of the image.
+/// Width of the rim as a share of the image diagonal.
 pub(crate) const RATIO: f64 = 0.02;
 
-/// Width of the rim, px: [`RATIO`] times the diagonal, rounded, at least 1.
+/// Returns the width of the rim, px: `RATIO` times the diagonal, rounded, at least 1.
 pub fn rim_width(width: usize, height: usize) -> usize {
     ((RATIO * (width as f64).hypot(height as f64)).round() as usize).max(1)
 }
 
-/// The pixels of a mask (row-major) with a pixel outside of it at most `reach` px away, diagonals included. What lies
-/// beyond the image is outside. The same as the mask less its erosion by `reach` turns of a 3x3 square.
+/// Returns the pixels of a mask (row-major) within `reach` px of a pixel outside of it, diagonals included. Everything
+/// beyond the image is outside. The result equals the mask without its erosion by `reach` passes of a 3x3 square.
 pub fn rim(mask: &[bool], width: usize, height: usize, reach: usize) -> Vec<bool> {
     let rows = eroded(mask, width, height, reach, |line, at| line * width + at);
     let both = eroded(&rows, height, width, reach, |line, at| at * width + line);
     mask.iter().zip(&both).map(|(&inside, &deep)| inside && !deep).collect()
 }
 
-/// Erosion along lines of `length` pixels; `place` maps line and position to an index.
+/// Erodes along lines of `length` pixels; `place` maps line and position to an index.
 fn eroded(
     mask: &[bool],
     length: usize,
@@ -39,7 +39,7 @@ fn eroded(
     kept
 }
 
-/// IoU of the rims of two masks over the pixels with `counts`; `None` where neither has a rim there.
+/// Returns the IoU of the rims of two masks over the pixels with `counts`; `None` if neither has a rim there.
 pub fn boundary_iou(
     found: &[bool],
     truth: &[bool],

@@ -1,4 +1,4 @@
-//! A picture beside its truth, for whoever wants to see what is scored.
+//! Scored pictures beside their ground truth, for display.
 
 use crate::Result;
 use crate::scene::Photo;
@@ -12,35 +12,35 @@ pub struct Compared<'a> {
     pub object: Option<String>,
     /// The photo, at the size of the picture.
     pub photo: &'a Photo,
-    /// The picture, not clamped, row-major.
+    /// The picture, r, g, b, not clamped, row-major.
     pub rgb: &'a [[f32; 3]],
-    /// What was found to be the object, and what is.
+    /// Predicted and ground-truth mask of the object, row-major.
     pub masks: Option<(&'a [bool], &'a [bool])>,
-    /// Scores by name.
+    /// Scores with their names.
     pub numbers: Vec<(&'static str, Option<f64>)>,
-    /// What a person should know about it, such as why there is no prediction.
+    /// Note for the user, such as the reason for a missing prediction.
     pub note: String,
 }
 
 impl<'a> Compared<'a> {
-    /// A whole view without scores.
+    /// Makes an entry for a whole view, without scores.
     pub fn new(view: &'a str, photo: &'a Photo, rgb: &'a [[f32; 3]]) -> Self {
         Self { view, object: None, photo, rgb, masks: None, numbers: Vec::new(), note: String::new() }
     }
 }
 
-/// Sees every picture after it was scored.
+/// Receives every scored picture.
 pub trait Watch {
-    /// A scored picture.
+    /// Receives a picture after it was scored.
     fn see(&mut self, _picture: &Compared) -> Result<()> {
         Ok(())
     }
 
-    /// A picture for which there is no truth.
+    /// Counts a picture without ground truth.
     fn skip(&mut self) -> Result<()> {
         Ok(())
     }
 }
 
-/// Nobody looks.
+/// Ignores all pictures.
 impl Watch for () {}

@@ -1,6 +1,6 @@
-//! The part of a picture around an object.
+//! The crop of a picture around an object.
 
-/// A rectangle of pixels, ends excluded.
+/// A rectangle of pixels; the end is exclusive.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Crop {
     /// First column and row.
@@ -9,12 +9,13 @@ pub struct Crop {
     pub end: (usize, usize),
 }
 
-/// How much is added on each side, over the side of the object's box.
+/// Padding on each side, as a share of the side of the object's box.
 const PADDING: f64 = 0.15;
 
 impl Crop {
-    /// The crop in which the paper's later scorer compares an object: the box of its mask, 15 % larger on each side,
-    /// then enlarged about its centre to the shape of the image, each time within the image. `None` for no pixel.
+    /// Returns the crop in which the paper's later scorer compares an object: the box of its mask, padded by 15 % on
+    /// each side, then enlarged about its centre to the aspect ratio of the image, both times clipped to the image.
+    /// `None` for an empty mask.
     pub fn around(mask: &[bool], width: usize, height: usize) -> Option<Self> {
         let (mut low, mut high) = ((width, height), (0, 0));
         for index in (0..mask.len()).filter(|&index| mask[index]) {
@@ -34,7 +35,7 @@ impl Crop {
         let ratio = ((x.1 - x.0) / width as f64).max((y.1 - y.0) / height as f64);
         let fitted = |(low, high): (f64, f64), side: usize| {
             let (centre, half) = (0.5 * (low + high), 0.5 * ratio * side as f64);
-            // Half a millionth of a pixel keeps a whole number whole.
+            // Half a millionth of a pixel protects whole numbers from rounding errors.
             let whole = |value: f64| (value.clamp(0.0, side as f64) + 5e-7) as usize;
             (whole(centre - half), whole(centre + half).min(side))
         };
@@ -42,12 +43,12 @@ impl Crop {
         Some(Self { start: (x.0, y.0), end: (x.1, y.1) })
     }
 
-    /// Columns and rows.
+    /// Returns the numbers of columns and rows.
     pub fn size(&self) -> (usize, usize) {
         (self.end.0 - self.start.0, self.end.1 - self.start.1)
     }
 
-    /// The indices of its pixels in an image `width` px wide, row-major.
+    /// Returns the indices of its pixels in a row-major image `width` px wide.
     pub fn indices(self, width: usize) -> impl Iterator<Item = usize> {
         (self.start.1..self.end.1).flat_map(move |y| (self.start.0..self.end.0).map(move |x| y * width + x))
     }

@@ -1,4 +1,4 @@
-//! Scores of a model on posed photos: renders every view, then every object alone.
+//! Scores a model on posed photos: renders every view, then every object alone.
 
 use super::compared::{Compared, Watch};
 use super::metrics::COVERED;
@@ -11,33 +11,34 @@ use crate::render::{Parts, RenderOptions, Rendered, render};
 use crate::scene::{Gaussians, LabelMap, View};
 use std::collections::BTreeMap;
 
-/// How views are rendered for scoring.
+/// The options of the renders.
 #[derive(Clone, Copy, Debug)]
 pub struct Rendering {
-    /// Of whole scenes; objects are rendered on black.
+    /// Options for whole scenes; objects are rendered on black.
     pub options: RenderOptions,
-    /// Least confidence of an object's Gaussians where it is rendered alone.
+    /// Least label confidence of Gaussians in objects rendered alone, 0 to 1.
     pub min_confidence: f32,
 }
 
-/// What a scene knows about objects beyond what is visible of them.
+/// Ground truth of objects including their hidden parts.
 pub trait AmodalTruth {
-    /// Whole outline of an object in a view, at the view's size.
+    /// Returns the whole outline of an object in a view, row-major, at the size of the view; `None` if unknown.
     fn outline(&self, _id: u32, _view: &View) -> Result<Option<Vec<bool>>> {
         Ok(None)
     }
 
-    /// Colour and opacity of an object in a view without anything before it, at the view's size.
+    /// Returns r, g, b and opacity of an object without occluders in a view, row-major, at the size of the view; `None`
+    /// if unknown.
     fn alone(&self, _id: u32, _view: &View) -> Result<Option<Vec<[u8; 4]>>> {
         Ok(None)
     }
 }
 
-/// Nothing is known.
+/// No ground truth beyond the masks.
 impl AmodalTruth for () {}
 
-/// Scores `model` on `views`, which come with photos; objects where the views have masks. The engine's model is
-/// replaced; `watch` sees each picture.
+/// Scores `model` on `views`, which have photos; scores objects too in views with masks. Replaces the model in the
+/// engine; `watch` receives each picture.
 pub fn evaluate(
     engine: &mut Engine,
     model: &Gaussians,
@@ -89,7 +90,7 @@ pub fn evaluate(
     Ok(Scores::new(views.iter().map(|view| view.name.clone()).zip(scores).collect()))
 }
 
-/// Shows an object of a view to `watch`, if it has a truth there.
+/// Passes an object of a view to `watch`, if it has ground truth there.
 fn show(
     watch: &mut dyn Watch,
     id: u32,
@@ -113,12 +114,11 @@ fn show(
     })
 }
 
-/// Pictures that [`evaluate`] renders.
+/// Returns the number of pictures that [`evaluate`] renders.
 pub(crate) fn picture_count(views: &[&View]) -> u64 {
     (views.len() * (1 + objects(views).len())) as u64
 }
 
-/// Objects of the views' masks, sorted.
 fn objects(views: &[&View]) -> Vec<u32> {
     let ids = views.iter().filter_map(|view| view.mask.as_deref()).flat_map(LabelMap::objects).map(u32::from);
     ids.collect::<std::collections::BTreeSet<u32>>().into_iter().collect()
@@ -133,7 +133,7 @@ fn hidden_by(mask: Option<&LabelMap>, rendered: &Rendered) -> Result<BTreeMap<u1
     Ok(by_contour(mask, &rendered.mean_depth()?, Rule::default()))
 }
 
-/// True where the mask shows one of `ids`.
+/// Returns the pixels at which the mask shows one of `ids`.
 fn pixels_of(mask: Option<&LabelMap>, ids: Option<&Vec<u16>>) -> Option<Vec<bool>> {
     let (mask, ids) = (mask?, ids?);
     Some(mask.ids.iter().map(|id| ids.contains(id)).collect())

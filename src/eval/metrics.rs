@@ -1,24 +1,25 @@
-//! Scores of one image against another. Colours are r, g, b in 0 to 1; everything is summed in f64.
+//! Scores of one image against another. Colours are r, g, b in 0 to 1. Sums are in f64.
 
 use crate::scene::Photo;
 
-/// Opacity above which a pixel counts as covered by an object that is rendered alone.
+/// Opacity above which an object rendered alone covers a pixel.
 pub(crate) const COVERED: f32 = 0.5;
-/// Channel value above which the paper counts a pixel as covered, on black.
+/// Channel value above which an object on black covers a pixel, in the rule of the paper.
 pub(crate) const PAPER_COVERED: f32 = 0.01;
 
-/// Value of a photo's byte in 0 to 1, in f32 as the device has it, so that an exact render has no error.
+/// Returns the value of a photo's byte in 0 to 1, rounded to f32 as on the device, so that an exact render has no
+/// error.
 pub(crate) fn byte_value(byte: u8) -> f64 {
     f64::from(f32::from(byte) / 255.0)
 }
 
-/// Peak signal-to-noise ratio of a mean squared error, dB; infinite for equal images.
+/// Returns the peak signal-to-noise ratio for a mean squared error, dB; infinite for equal images.
 pub(crate) fn psnr_of(mean_squared_error: f64) -> f64 {
     -10.0 * mean_squared_error.log10()
 }
 
-/// PSNR of a render against a photo, dB: the render clamped to 0..1, one mean squared error over all channels of the
-/// photo's valid pixels. NaN for a photo without a valid pixel.
+/// Returns the PSNR of a render against a photo, dB. The render is clamped to 0..1, and the mean is over all channels
+/// of the photo's valid pixels. NaN without valid pixels.
 pub fn psnr(render: &[[f32; 3]], photo: &Photo) -> f64 {
     let (mut sum, mut count) = (0.0, 0_u64);
     for (colour, &[r, g, b, valid]) in render.iter().zip(&photo.rgba) {
@@ -34,17 +35,17 @@ pub fn psnr(render: &[[f32; 3]], photo: &Photo) -> f64 {
     psnr_of(sum / count as f64)
 }
 
-/// Pixels that two masks share, and pixels of either.
+/// Pixel counts of the intersection and union of two masks.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Overlap {
-    /// In both.
+    /// Pixels in both masks.
     pub both: u64,
-    /// In one or the other.
+    /// Pixels in at least one mask.
     pub either: u64,
 }
 
 impl Overlap {
-    /// Counts over pairs (predicted, true).
+    /// Counts over pairs (predicted, ground truth).
     pub fn count(pairs: impl IntoIterator<Item = (bool, bool)>) -> Self {
         pairs.into_iter().fold(Self::default(), |sum, (a, b)| Self {
             both: sum.both + u64::from(a && b),
@@ -52,22 +53,22 @@ impl Overlap {
         })
     }
 
-    /// Intersection over union; `None` where both masks are empty.
+    /// Returns the intersection over union; `None` if both masks are empty.
     pub fn iou(&self) -> Option<f64> {
         (self.either > 0).then(|| self.both as f64 / self.either as f64)
     }
 }
 
-/// What the paper's evaluation says about one object in one view.
+/// The scores of the paper for one object in one view.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PaperScore {
-    /// Intersection over union of "any channel above 0.01" and the mask; `None` where both are empty.
+    /// Intersection over union of "any channel above 0.01" and the mask; `None` if both are empty.
     pub iou: Option<f64>,
-    /// PSNR per channel over the whole frame against photo times mask, mean of the three, dB.
+    /// PSNR against photo times mask over the whole frame, mean over the three channels, dB.
     pub psnr: f64,
 }
 
-/// Scores an object, rendered alone on black and not clamped, as the paper's code does. `inside` is the object's mask.
+/// Scores an object, rendered alone on black and not clamped, by the rule of the paper. `inside` is the object's mask.
 pub fn paper_score(object: &[[f32; 3]], photo: &Photo, inside: &[bool]) -> PaperScore {
     let mut squares = [0.0; 3];
     for ((colour, truth), &inside) in object.iter().zip(&photo.rgba).zip(inside) {
@@ -82,7 +83,7 @@ pub fn paper_score(object: &[[f32; 3]], photo: &Photo, inside: &[bool]) -> Paper
     PaperScore { iou: Overlap::count(covered.zip(inside.iter().copied())).iou(), psnr }
 }
 
-/// Mean of the numbers there are; `None` without any.
+/// Returns the mean of the values; `None` without values.
 pub(crate) fn mean(values: impl IntoIterator<Item = f64>) -> Option<f64> {
     let (sum, count) = values.into_iter().fold((0.0, 0_u64), |(sum, count), value| (sum + value, count + 1));
     (count > 0).then(|| sum / count as f64)

@@ -1,4 +1,8 @@
-//! Scores: pictures and outlines against the truth, published benchmarks, and pages to look at.
+//! Scores of a model against ground truth.
+//!
+//! [`evaluate`] renders held-out views and objects and returns their [`Scores`]: PSNR, SSIM, IoU. [`protocol`] runs
+//! published benchmarks of object masks. [`psnr`] and [`ssim`] score single pictures. A [`Watch`] receives every scored
+//! picture with its ground truth.
 
 pub(crate) mod boundary;
 pub(crate) mod compared;

@@ -1,4 +1,4 @@
-//! A page to look at: truth, prediction and difference of every scored picture, as HTML and PNG in one folder.
+//! An HTML page with ground truth, prediction and difference of every scored picture, in one folder with its PNGs.
 
 use super::compared::{Compared, Watch};
 use crate::io::{atomic, image::write_png_rgb8};
@@ -6,7 +6,7 @@ use crate::{Error, Result};
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
-/// A colour for each kind of pixel of two masks.
+/// Colours in the difference of two masks.
 const ONLY_FOUND: [u8; 3] = [230, 60, 40];
 const ONLY_TRUE: [u8; 3] = [40, 110, 240];
 const BOTH: [u8; 3] = [60, 190, 90];
@@ -19,7 +19,7 @@ const HEAD: &str = "<!doctype html>\n<html lang=\"en\">\n<meta charset=\"utf-8\"
     .note { color: #b00020 }\n\
     </style>\n";
 
-/// The page of a run. The pictures are written at once, the page by [`Page::finish`].
+/// The page of a run. Pictures are written at once, the page itself by [`Page::finish`].
 #[derive(Debug)]
 pub struct Page {
     folder: PathBuf,
@@ -28,7 +28,8 @@ pub struct Page {
 }
 
 impl Page {
-    /// A page in `folder`, which is made. It must not hold another page's pictures, which would stay there.
+    /// Makes a page in `folder`, which is created. Refuses a folder with files, because pictures of another page would
+    /// remain.
     pub fn new(folder: &Path) -> Result<Self> {
         std::fs::create_dir_all(folder).map_err(Error::write(folder))?;
         atomic::require_empty("page", folder)?;
@@ -38,9 +39,9 @@ impl Page {
     /// Writes `index.html`, with `summary` above the pictures.
     pub fn finish(self, summary: &str) -> Result<PathBuf> {
         let path = self.folder.join("index.html");
-        let legend = "<p>Difference of masks: green is found and true, red only found, blue only true. Without a mask \
-                      it is the absolute difference of colours.</p>";
-        let head = "<tr><th>view</th><th>truth</th><th>prediction</th><th>difference</th></tr>";
+        let legend = "<p>Difference of masks: green is in both, red only in the prediction, blue only in the ground \
+                      truth. Without a mask it is the absolute difference of colours.</p>";
+        let head = "<tr><th>view</th><th>ground truth</th><th>prediction</th><th>difference</th></tr>";
         let body = format!(
             "{HEAD}<h1>labelgs: scores</h1>\n<pre>{}</pre>\n{legend}\n<table>\n{head}\n{}</table>\n</html>\n",
             escaped(summary),
@@ -65,7 +66,7 @@ impl Watch for Page {
         let mut cells = String::new();
         for (kind, pixels) in files {
             let file = self.picture(kind, picture, &pixels)?;
-            // Writing to a String does not fail.
+            // Writing to a String cannot fail.
             let _ = write!(cells, "<td><img loading=\"lazy\" alt=\"{kind}\" src=\"{file}\"></td>");
         }
         let object = picture.object.as_deref().map_or(String::new(), |name| format!("<br><b>{}</b>", escaped(name)));
@@ -81,7 +82,6 @@ impl Watch for Page {
     }
 }
 
-/// Truth, prediction and difference.
 fn panels(picture: &Compared) -> [Vec<[u8; 3]>; 3] {
     let pixels = picture.photo.rgba.len();
     let photo = |index: usize| {
@@ -105,7 +105,6 @@ fn panels(picture: &Compared) -> [Vec<[u8; 3]>; 3] {
     [(0..pixels).map(truth).collect(), (0..pixels).map(found).collect(), (0..pixels).map(difference).collect()]
 }
 
-/// Text as HTML shows it.
 fn escaped(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }

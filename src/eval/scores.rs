@@ -1,4 +1,4 @@
-//! The scores of a model: per view, per object and on average, as numbers and as JSON.
+//! The scores of a model: per view, per object and on average, for programs and as JSON.
 //!
 //! Averages over objects are over pairs of view and object, as in the paper's published evaluation.
 
@@ -11,31 +11,32 @@ use crate::{Error, Result};
 use serde::Serialize;
 use std::collections::BTreeMap;
 
-/// How far below the median a view is odd, dB. The views of a scene that was learnt lie within some 3 dB.
+/// Distance below the median PSNR from which a view is an outlier, dB. The views of a trained scene usually lie within
+/// 3 dB.
 const ODD: f64 = 6.0;
 
-/// Scores of one object, in one view or on average over views. `None` where there was nothing to compare.
+/// Scores of one object, in one view or on average over views; `None` if there was nothing to compare.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct ObjectScores {
     /// Intersection over union of the rendered label map and the mask of the view.
     pub iou_map: Option<f64>,
-    /// Intersection over union of the object rendered alone (opacity above 0.5) and its whole outline; without a whole
-    /// outline its mask in the view.
+    /// Intersection over union of the object rendered alone (opacity above 0.5) and its whole outline, or its mask in
+    /// the view if the outline is unknown.
     pub iou_object: Option<f64>,
-    /// The same by the paper's rule: any channel above 0.01 against the mask of the view.
+    /// Intersection over union by the rule of the paper: any channel above 0.01 against the mask of the view.
     pub paper_iou: Option<f64>,
-    /// PSNR of the object alone on black against photo times mask, by the paper's rule, dB.
+    /// PSNR of the object alone on black against photo times mask, by the rule of the paper, dB.
     pub object_psnr: Option<f64>,
     /// Boundary IoU of the rendered label map and the mask of the view.
     pub boundary_iou: Option<f64>,
-    /// SSIM of the object alone on black against photo times mask over the [`Crop`] around its mask, without the
-    /// pixels at which something hides the object.
+    /// SSIM of the object alone on black against photo times mask, over the `Crop` around its mask, without the pixels
+    /// of occluders.
     pub object_ssim: Option<f64>,
-    /// Intersection over union of the object alone (opacity above 0.5) and its whole outline, over the pixels at which
-    /// the mask of the view shows another object.
+    /// Intersection over union of the object alone (opacity above 0.5) and its whole outline, over the pixels where the
+    /// mask of the view shows another object.
     pub iou_hidden: Option<f64>,
-    /// PSNR of the object alone on black against its true picture without occluders, over the pixels of its whole
-    /// outline at which the mask of the view does not show it, dB.
+    /// PSNR of the object alone on black against its ground truth without occluders, over the pixels of its whole
+    /// outline where the mask of the view does not show it, dB.
     pub psnr_hidden: Option<f64>,
 }
 
@@ -46,42 +47,42 @@ pub struct ViewScores {
     pub psnr: f64,
     /// SSIM over the photo's valid pixels.
     pub ssim: f64,
-    /// Objects by id.
+    /// Scores of the objects by id.
     pub objects: BTreeMap<u32, ObjectScores>,
 }
 
-/// An object rendered alone on black: colour (not clamped) and opacity per pixel.
+/// An object rendered alone on black.
 #[derive(Clone, Copy, Debug)]
 pub struct ObjectRender<'a> {
-    /// r, g, b per pixel.
+    /// r, g, b per pixel, not clamped, row-major.
     pub colour: &'a [[f32; 3]],
-    /// Opacity per pixel.
+    /// Opacity per pixel, row-major, 0 to 1.
     pub alpha: &'a [f32],
 }
 
-/// What is known about an object in a view.
+/// The ground truth of an object in a view.
 #[derive(Clone, Copy, Debug)]
 pub struct ObjectTruth<'a> {
     /// The photo.
     pub photo: &'a Photo,
-    /// Visible objects.
+    /// Mask of the view.
     pub mask: Option<&'a LabelMap>,
-    /// The object's whole outline, where the scene knows it.
+    /// Whole outline of the object, if known.
     pub whole: Option<&'a [bool]>,
-    /// Pixels of objects in front of this one, where without a whole outline nobody knows whether it goes on.
+    /// Pixels of objects in front of this one. They are left out if the whole outline is unknown.
     pub hidden: Option<&'a [bool]>,
-    /// Colour and opacity of the object without occluders, where the scene knows it.
+    /// r, g, b and opacity of the object without occluders, if known.
     pub alone: Option<&'a [[u8; 4]]>,
 }
 
 impl ObjectTruth<'_> {
-    /// Which pixels the mask shows the object at; `None` without any.
+    /// Returns the pixels of the object in the mask; `None` without any.
     fn visible(&self, id: u32) -> Option<Vec<bool>> {
         let visible: Vec<bool> = self.mask?.ids.iter().map(|&found| u32::from(found) == id).collect();
         visible.contains(&true).then_some(visible)
     }
 
-    /// What the object alone is compared with: its whole outline, or what is visible of it.
+    /// Returns the pixels to compare the object with: its whole outline, else its visible pixels.
     pub fn outline(&self, id: u32) -> Option<Vec<bool>> {
         let outline = self.whole.map(<[bool]>::to_vec).or_else(|| self.visible(id));
         outline.filter(|outline| outline.contains(&true))
@@ -94,7 +95,7 @@ impl ObjectTruth<'_> {
 }
 
 impl ViewScores {
-    /// Scores a render, and its label map if both it and the mask of the view are there.
+    /// Scores a render, and its label map if both it and the mask of the view are given.
     pub fn new(render: &[[f32; 3]], photo: &Photo, map: Option<&LabelMap>, mask: Option<&LabelMap>) -> Result<Self> {
         let pixels = photo.rgba.len();
         let lengths = [Some(render.len()), map.map(|map| map.ids.len()), mask.map(|mask| mask.ids.len())];
@@ -117,7 +118,7 @@ impl ViewScores {
         Ok(scores)
     }
 
-    /// Scores object `id` rendered alone; `None` for a label without Gaussians, which is an empty picture.
+    /// Scores object `id` rendered alone. `None` is an empty picture, for a label without Gaussians.
     pub fn add_object(&mut self, id: u32, render: Option<ObjectRender>, truth: ObjectTruth) -> Result<()> {
         let photo = truth.photo;
         let pixels = photo.rgba.len();
@@ -152,7 +153,8 @@ impl ViewScores {
     }
 }
 
-/// PSNR of a render on black, clamped, against colour times opacity over some pixels; `None` for no pixel.
+/// Returns the PSNR of a render on black, clamped, against colour times opacity over some pixels; `None` without
+/// pixels.
 fn psnr_alone(render: &[[f32; 3]], truth: &[[u8; 4]], pixels: impl Iterator<Item = usize>) -> Option<f64> {
     let square = |index: usize| {
         let [r, g, b, opacity] = truth[index].map(byte_value);
@@ -162,7 +164,8 @@ fn psnr_alone(render: &[[f32; 3]], truth: &[[u8; 4]], pixels: impl Iterator<Item
     mean(pixels.map(square)).map(psnr_of)
 }
 
-/// SSIM of a render against photo times mask in the crop around the mask; pixels with `left_out` do not count.
+/// Returns the SSIM of a render against photo times mask in the crop around the mask, without the pixels with
+/// `left_out`.
 fn ssim_around(render: &[[f32; 3]], photo: &Photo, mask: &[bool], left_out: impl Fn(usize) -> bool) -> Option<f64> {
     let crop = Crop::around(mask, photo.width as usize, photo.height as usize)?;
     let texel = |index: usize| {
@@ -177,33 +180,34 @@ fn ssim_around(render: &[[f32; 3]], photo: &Photo, mask: &[bool], left_out: impl
     Some(ssim(&found, &truth)).filter(|value| value.is_finite())
 }
 
-/// Averages over everything.
+/// The averages of a model.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct MeanScores {
-    /// Mean over views of their PSNR, dB.
+    /// Mean PSNR over views, dB.
     pub psnr: Option<f64>,
-    /// Mean over views of their SSIM.
+    /// Mean SSIM over views.
     pub ssim: Option<f64>,
     /// Means over pairs of view and object.
     #[serde(flatten)]
     pub objects: ObjectScores,
 }
 
-/// Scores of a model on a scene. Serialises to the JSON of `labelgs eval`; what is not finite becomes null.
+/// Scores of a model on a scene. They serialise to the JSON of `labelgs eval`, with null for values that are not
+/// finite.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Scores {
-    /// Version of this layout.
+    /// Version of the layout.
     pub schema_version: u32,
     /// Averages.
     pub mean: MeanScores,
-    /// Averages of each object over the views that show it.
+    /// Averages of each object over its views, by id.
     pub objects: BTreeMap<u32, ObjectScores>,
-    /// Views by name.
+    /// Scores of the views by name.
     pub views: BTreeMap<String, ViewScores>,
 }
 
 impl Scores {
-    /// Averages the views.
+    /// Computes the averages from the views.
     pub fn new(views: BTreeMap<String, ViewScores>) -> Self {
         let mut by_object: BTreeMap<u32, Vec<ObjectScores>> = BTreeMap::new();
         for view in views.values() {
@@ -222,8 +226,8 @@ impl Scores {
         }
     }
 
-    /// Points to a view that is seen much worse than the others, and to what helps most often: Gaussians hang in the air before
-    /// its camera, where no photo of the training shows them.
+    /// Warns of a view with a much lower PSNR than the others, and names the most frequent remedy. The usual cause are
+    /// Gaussians close to its camera, where no training photo shows them.
     pub fn warn_of_odd_view(&self, near: f32) {
         if let Some((name, found, median)) = self.odd_view() {
             tracing::warn!(
@@ -233,8 +237,8 @@ impl Scores {
         }
     }
 
-    /// The view that is seen worst, with its PSNR and the median of all, dB, if it is so far below that something must
-    /// stand before its camera, or be wrong with its pose or photo.
+    /// Returns the view with the lowest PSNR, its PSNR and the median, dB, if it is an outlier. Then something is in
+    /// front of its camera, or its pose or photo is wrong.
     pub fn odd_view(&self) -> Option<(&str, f64, f64)> {
         let mut sorted: Vec<(&str, f64)> = self.views.iter().map(|(name, view)| (name.as_str(), view.psnr)).collect();
         sorted.sort_by(|a, b| a.1.total_cmp(&b.1));
@@ -242,7 +246,7 @@ impl Scores {
         (worst < median - ODD).then_some((name, worst, median))
     }
 
-    /// The checks of `--min-psnr` and `--min-iou`: mean PSNR, and mean IoU of the label map.
+    /// Compares the mean PSNR and the mean IoU of the label map with the bounds of `--min-psnr` and `--min-iou`.
     pub fn check(&self, min_psnr: Option<f64>, min_iou: Option<f64>) -> Result<()> {
         let rows = [("PSNR", self.mean.psnr, min_psnr, " dB"), ("IoU", self.mean.objects.iou_map, min_iou, "")];
         for (what, found, least, unit) in rows {
@@ -250,7 +254,7 @@ impl Scores {
             let Some(found) = found else {
                 return Err(Error::Check(format!("there is no {what} to compare with {least}{unit}")));
             };
-            // A NaN is not enough either.
+            // A NaN fails too.
             if !matches!(found.partial_cmp(&least), Some(std::cmp::Ordering::Greater | std::cmp::Ordering::Equal)) {
                 return Err(Error::Check(format!("mean {what} is {found:.4}{unit}, less than {least}{unit}")));
             }

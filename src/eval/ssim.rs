@@ -1,20 +1,19 @@
-//! Structural similarity as 3DGS computes it: an 11x11 Gaussian window of standard deviation 1.5, zeros outside the
-//! image, each channel alone, data range 1.
+//! Structural similarity as in 3DGS: an 11x11 Gaussian window with standard deviation 1.5, zero padding, each channel
+//! alone, data range 1.
 
 use super::metrics::byte_value;
 use crate::scene::Photo;
 use rayon::prelude::*;
 
-/// Half the window, px.
+/// Half of the window, px.
 const REACH: usize = 5;
-/// Standard deviation of the window, px.
 const SIGMA: f64 = 1.5;
 /// Stabilising constants for values in 0 to 1.
 const C1: f64 = 0.01 * 0.01;
 const C2: f64 = 0.03 * 0.03;
 
-/// Mean SSIM of a render, clamped to 0..1, against a photo over its valid pixels and three channels. Invalid pixels are
-/// black in both images. NaN for a photo without a valid pixel.
+/// Returns the mean SSIM of a render, clamped to 0..1, against a photo over its valid pixels and three channels.
+/// Invalid pixels are black in both images. NaN without valid pixels.
 pub fn ssim(render: &[[f32; 3]], photo: &Photo) -> f64 {
     let (width, height) = (photo.width as usize, photo.height as usize);
     let valid: Vec<bool> = photo.rgba.iter().map(|pixel| pixel[3] > 0).collect();
@@ -33,7 +32,7 @@ pub fn ssim(render: &[[f32; 3]], photo: &Photo) -> f64 {
     total / count as f64
 }
 
-/// SSIM of every pixel of one channel, row-major.
+/// Returns the SSIM of every pixel of one channel, row-major.
 pub fn ssim_map(a: &[f64], b: &[f64], width: usize, height: usize) -> Vec<f64> {
     let product = |x: &[f64], y: &[f64]| blur(&x.iter().zip(y).map(|(x, y)| x * y).collect::<Vec<_>>(), width, height);
     let (mean_a, mean_b) = (blur(a, width, height), blur(b, width, height));
@@ -47,7 +46,7 @@ pub fn ssim_map(a: &[f64], b: &[f64], width: usize, height: usize) -> Vec<f64> {
         .collect()
 }
 
-/// The window in one direction, sum 1.
+/// Returns the window in one dimension, with sum 1.
 pub fn window() -> [f64; 2 * REACH + 1] {
     let mut weights = [0.0; 2 * REACH + 1];
     for (index, weight) in weights.iter_mut().enumerate() {
@@ -58,7 +57,7 @@ pub fn window() -> [f64; 2 * REACH + 1] {
     weights.map(|weight| weight / sum)
 }
 
-/// The window over rows, then over columns; zeros outside.
+/// Applies the window along rows, then along columns, with zero padding.
 fn blur(image: &[f64], width: usize, height: usize) -> Vec<f64> {
     let weights = window();
     let tap = |centre: usize, length: usize, value: &dyn Fn(usize) -> f64| {

@@ -1,18 +1,18 @@
-//! Structural similarity of 8-bit pictures as scikit-image computes it by default, for comparison with published numbers:
-//! a uniform window of 7 x 7 px within the image, sample covariance, data range 255, each channel alone.
+//! Structural similarity of 8-bit pictures with the defaults of scikit-image, for comparison with published numbers: a
+//! uniform window of 7 x 7 px inside the image, sample covariance, data range 255, each channel alone.
 
 /// Side of the window, px.
 const SIDE: usize = 7;
 const C1: f64 = (0.01 * 255.0) * (0.01 * 255.0);
 const C2: f64 = (0.03 * 255.0) * (0.03 * 255.0);
 
-/// A colour as an 8-bit picture stores it.
+/// Converts a colour to 8 bits.
 pub fn to_bytes(colour: [f32; 3]) -> [u8; 3] {
     // A NaN becomes 0.
     colour.map(|value| (value * 255.0 + 0.5).clamp(0.0, 255.0) as u8)
 }
 
-/// Mean over all windows and channels; `None` for pictures smaller than the window.
+/// Returns the mean over all windows and channels; `None` for pictures smaller than the window.
 pub fn ssim8(a: &[[u8; 3]], b: &[[u8; 3]], width: usize, height: usize) -> Option<f64> {
     if width < SIDE || height < SIDE {
         return None;
@@ -22,9 +22,8 @@ pub fn ssim8(a: &[[u8; 3]], b: &[[u8; 3]], width: usize, height: usize) -> Optio
     Some(total / count as f64)
 }
 
-/// Sum of SSIM over the windows of one channel.
 fn channel_sum(a: &[[u8; 3]], b: &[[u8; 3]], width: usize, height: usize, channel: usize) -> f64 {
-    // Sums of a, b, aa, bb and ab over the rectangle above and left of each corner.
+    // Summed-area tables of a, b, aa, bb and ab.
     let stride = width + 1;
     let mut sums = vec![[0_u64; 5]; stride * (height + 1)];
     for y in 0..height {

@@ -1,4 +1,4 @@
-//! Files that are either the old one or the complete new one, whatever happens in between.
+//! Atomic file writes: after a crash a file is the old one or the complete new one.
 
 use crate::error::{Error, Result};
 use crate::lab::fault;
@@ -12,22 +12,21 @@ use std::time::Duration;
 const PREFIX: &str = ".labelgs-";
 const SUFFIX: &str = ".tmp";
 
-/// Writes `path` through `body` so that no crash leaves a partial file: a temporary file in the same folder is
-/// filled, flushed and synced, then renamed, and the folder is synced. Missing folders are made. A symbolic link is
-/// followed; a device or pipe is written directly. On an error the previous file is untouched.
+/// Writes `path` through `body`, atomically: fills, flushes and syncs a temporary file in the same folder, renames it,
+/// and syncs the folder. Makes missing folders. Follows a symbolic link; writes to a device or pipe directly. On an
+/// error the previous file is untouched.
 pub fn write(path: impl AsRef<Path>, body: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> Result<()> {
     let path = path.as_ref();
     write_inner(path, body).map_err(Error::write(path))
 }
 
-/// Writes JSON.
 pub(crate) fn write_json(path: &Path, value: &impl serde::Serialize) -> Result<()> {
     let text = serde_json::to_string_pretty(value).map_err(|error| Error::Bug(format!("JSON: {error}")))?;
     write(path, |out| out.write_all(text.as_bytes()))
 }
 
-/// Refuses a folder that holds something: old files among new ones would be read as one set. `argument` named it. A
-/// folder that is not there yet is fine.
+/// Refuses a folder that is not empty: a reader would take old and new files for one set. A missing folder is fine.
+/// `argument` is the flag that named it.
 pub(crate) fn require_empty(argument: &str, folder: &Path) -> Result<()> {
     match fs::read_dir(folder) {
         Ok(mut entries) => match entries.next() {
@@ -64,11 +63,11 @@ fn write_inner(path: &Path, body: impl FnOnce(&mut dyn Write) -> io::Result<()>)
     sync_folder(folder)
 }
 
-/// The file that a chain of symbolic links ends at, so that a rename replaces it and not the link. It need not be there
-/// yet. Links of the system to pipes (`/dev/stdout`) lead nowhere by name and stay as they are.
+/// Returns the file at the end of a chain of symbolic links, so that a rename replaces the file and not the link. The
+/// file may be missing. Links of the system to pipes (`/dev/stdout`) have no path to follow and stay as they are.
 fn follow(path: &Path) -> io::Result<PathBuf> {
     let mut at = path.to_owned();
-    // As many as Linux follows.
+    // Linux follows as many.
     for _ in 0..40 {
         match (fs::symlink_metadata(&at), fs::metadata(&at)) {
             (Ok(found), target) if found.is_symlink() && target.as_ref().map_or(true, fs::Metadata::is_file) => {
@@ -87,7 +86,7 @@ fn temporary_in(folder: &Path) -> io::Result<tempfile::NamedTempFile> {
     builder.prefix(&prefix).suffix(SUFFIX);
     #[cfg(unix)]
     {
-        // The crate makes private files; ours replace ordinary output, so the umask decides.
+        // The crate makes private files. Outputs are ordinary files, so the umask decides.
         use std::os::unix::fs::PermissionsExt;
         builder.permissions(fs::Permissions::from_mode(0o666));
     }
@@ -97,11 +96,11 @@ fn temporary_in(folder: &Path) -> io::Result<tempfile::NamedTempFile> {
 fn fill(file: &File, body: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> io::Result<()> {
     let mut buffered = BufWriter::with_capacity(1 << 18, Fallible(file));
     body(&mut buffered)?;
-    // Dropping a BufWriter loses the error of its last write, so the flush is spelled out.
+    // Dropping a BufWriter hides the error of its last write, so flush here.
     buffered.flush()
 }
 
-/// A file whose writes can be made to fail.
+/// A file whose writes can be made to fail, for tests.
 struct Fallible<'a>(&'a File);
 
 impl Write for Fallible<'_> {
@@ -111,7 +110,7 @@ impl Write for Fallible<'_> {
             Ok(true) => self.0.write(&bytes[..bytes.len().min(1)]),
             Err(error) => {
                 if error.kind() == io::ErrorKind::StorageFull {
-                    // A disk that fills up takes what it has room for.
+                    // A full disk takes a part of a write.
                     let _ = self.0.write(&bytes[..bytes.len() / 2]);
                 }
                 Err(error)
@@ -124,8 +123,8 @@ impl Write for Fallible<'_> {
     }
 }
 
-/// Some file systems of networks and of users know no syncing of folders, and some folders may be written but not read:
-/// then the system decides when the new name is on the disk.
+/// Syncs a folder if possible. Some network and user file systems cannot sync folders, and some folders are writable
+/// but not readable. The system then decides when the new name reaches the disk.
 #[cfg(unix)]
 fn sync_folder(folder: &Path) -> io::Result<()> {
     match File::open(folder).and_then(|folder| folder.sync_all()) {
@@ -146,11 +145,11 @@ fn sync_folder(_folder: &Path) -> io::Result<()> {
     Ok(())
 }
 
-/// How old a temporary file must be before a command that does not own the folder removes it. On a disk that several
-/// computers share, its process may live where this one cannot see it.
+/// Least age of a temporary file before a command that has not locked the folder removes it. On a shared disk, its
+/// process may run on another computer.
 const STALE: Duration = Duration::from_secs(3600);
 
-/// Removes what killed commands left in a folder, at this process's first write there.
+/// Removes temporary files of killed commands from a folder, at the first write of this process there.
 fn clean_once(folder: &Path) {
     static CLEANED: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
     let is_new = CLEANED.lock().is_ok_and(|mut cleaned| cleaned.insert(folder.to_owned()));
@@ -159,8 +158,8 @@ fn clean_once(folder: &Path) {
     }
 }
 
-/// Removes the temporary files, not changed for so long, that killed runs of this program left in `folder`; returns how
-/// many. Files of processes that still live are kept, and where liveness cannot be told (no `/proc`) nothing is removed.
+/// Removes temporary files of killed processes of this program from `folder` if they are at least `unchanged` old;
+/// returns their number. Keeps files of running processes, and all files on systems without `/proc`.
 pub fn remove_stale(folder: impl AsRef<Path>, unchanged: Duration) -> usize {
     let processes = Path::new("/proc");
     if !processes.join("self").exists() {

@@ -10,7 +10,7 @@ use crate::scene::Camera;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
-/// A camera as the file of `labelgs render --camera` holds it.
+/// A camera in the JSON layout of `labelgs render --camera`.
 #[derive(Clone, Debug, Deserialize, Serialize)]
 pub struct CameraFile {
     /// Camera-from-world, 4 x 4, row-major, OpenCV axes.
@@ -19,9 +19,9 @@ pub struct CameraFile {
     pub fx: f64,
     /// Vertical focal length, px.
     pub fy: f64,
-    /// Principal point, px.
+    /// Principal point x, px; the centre of the first pixel is at 0.5.
     pub cx: f64,
-    /// Principal point, px.
+    /// Principal point y, px.
     pub cy: f64,
     /// Width, px.
     #[serde(rename = "W")]
@@ -42,7 +42,7 @@ impl From<&Camera> for CameraFile {
     }
 }
 
-/// Reads `{"w2c": 4x4 row-major with OpenCV axes, "fx", "fy", "cx", "cy", "W", "H"}`.
+/// Reads a camera: `{"w2c": 4x4 row-major with OpenCV axes, "fx", "fy", "cx", "cy", "W", "H"}`.
 pub fn read_camera(path: impl AsRef<Path>) -> Result<Camera> {
     let path = path.as_ref();
     let text = read::text(path)?;
@@ -51,10 +51,10 @@ pub fn read_camera(path: impl AsRef<Path>) -> Result<Camera> {
         Error::data(path, format!("line {}", error.line()), format!("{error}; {expected}"))
     })?;
     let refuse =
-        || Error::data(path, "w2c", "is no camera-from-world pose: 4 x 4 numbers, the upper left 3 x 3 a rotation");
+        || Error::data(path, "w2c", "is not a camera-from-world pose: 4 x 4 numbers, the upper left 3 x 3 a rotation");
     let pose = affine(&file.w2c).ok_or_else(refuse)?;
     let rotation = rotation_of(pose.matrix3).ok_or_else(refuse)?;
-    // A pose with a scale would need its translation scaled too; nothing writes one.
+    // A pose with a scale would need a scaled translation too. No known program writes one.
     if (pose.matrix3.determinant() - 1.0).abs() > 1e-2 {
         return Err(refuse());
     }
@@ -64,7 +64,7 @@ pub fn read_camera(path: impl AsRef<Path>) -> Result<Camera> {
     Ok(camera)
 }
 
-/// An entry of `cameras.json`; the order of the fields is that of 3DGS, with the principal point added.
+/// An entry of `cameras.json`: the fields in the order of 3DGS, then the principal point.
 #[derive(Debug, Serialize)]
 struct Entry<'a> {
     id: usize,
@@ -79,7 +79,7 @@ struct Entry<'a> {
     cy: f64,
 }
 
-/// Writes the `cameras.json` of 3DGS: name, size, centre and rows of the world-from-camera rotation of each camera.
+/// Writes the `cameras.json` of 3DGS: name, size, centre and world-from-camera rotation (rows) of each camera.
 pub fn write_cameras<'a>(path: impl AsRef<Path>, cameras: &[(&'a str, &Camera)]) -> Result<()> {
     let entry = |(id, &(img_name, camera)): (usize, &(&'a str, &Camera))| Entry {
         id,

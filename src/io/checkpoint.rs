@@ -1,4 +1,5 @@
-//! The file of a checkpoint: planes of 32-bit words by name, and everything else as JSON. It is whole or it is refused.
+//! The file format of checkpoints: named planes of 32-bit words, and JSON for everything else. A damaged file is
+//! refused.
 //!
 //! | byte | content, little-endian |
 //! | --- | --- |
@@ -17,36 +18,35 @@ use serde_json::Value;
 use std::io::{self, BufRead, Read, Seek, SeekFrom, Write};
 use std::path::Path;
 
-/// Version of the format that is written and read.
+/// Version of the format.
 pub const VERSION: u32 = 2;
 
 const MAGIC: [u8; 8] = *b"labelgsC";
-/// Bytes before those that the checksum covers.
+/// Number of bytes before the checksummed part.
 const HEADER: usize = 24;
-/// Bytes of words that are turned around at a time.
+/// Number of bytes per conversion between words and little-endian bytes.
 const CHUNK: usize = 1 << 16;
 
-/// Equal rows of words, such as the positions of all Gaussians.
+/// A table of words with one name, such as the positions of all Gaussians.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Plane {
     /// Name, unique in its file.
     pub name: String,
     /// Words per row.
     pub words: u32,
-    /// [rows, words]; floats as their bits.
+    /// Values, `[rows, words]`; floats as their bits.
     pub data: Vec<u32>,
 }
 
-/// What a file holds.
+/// The content of a checkpoint file.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Checkpoint {
-    /// What is no plane.
+    /// Everything except the planes.
     pub meta: Value,
     /// The planes.
     pub planes: Vec<Plane>,
 }
 
-/// The JSON of a file.
 #[derive(Serialize, Deserialize)]
 struct Contents {
     meta: Value,
@@ -61,7 +61,7 @@ struct Shape {
 }
 
 impl Checkpoint {
-    /// Writes the file, whole or not at all: what was there before stays until the new one is safe on the disk.
+    /// Writes the file, atomically: the old file stays until the new one is safe on the disk.
     pub fn write(&self, path: &Path) -> Result<()> {
         let shape = |plane: &Plane| {
             let (all, words) = (plane.data.len() as u64, u64::from(plane.words));
@@ -83,7 +83,6 @@ impl Checkpoint {
         })
     }
 
-    /// Writes what the checksum covers.
     fn put(&self, json: &[u8], out: &mut dyn Write) -> io::Result<()> {
         out.write_all(&(json.len() as u64).to_le_bytes())?;
         out.write_all(json)?;
@@ -96,18 +95,18 @@ impl Checkpoint {
         Ok(())
     }
 
-    /// Reads a file. What is cut short, longer than it was, changed in any bit, or of another version is an error that
-    /// says so. Takes about as much memory as the file has bytes, whatever they are.
+    /// Reads a file. A truncated, extended or changed file, or another version, is an error that says so. Memory use is
+    /// about the size of the file, whatever its content.
     pub fn read(path: &Path) -> Result<Self> {
         let mut file = read::open(path)?;
         let length = file.get_ref().length().map_err(Error::read(path))?;
         check(&mut file, path, length)?;
         file.seek(SeekFrom::Start(HEADER as u64)).map_err(Error::read(path))?;
-        // From here on the bytes are those that were written; what does not fit together was written so.
+        // The checksum was right: an inconsistency from here on was written that way.
         let odd = |problem: String| Error::data(path, "contents", problem);
         let mut rest = length - HEADER as u64;
         let mut take = |bytes: u64| {
-            rest = rest.checked_sub(bytes).ok_or_else(|| odd(format!("{bytes} bytes are more than there are")))?;
+            rest = rest.checked_sub(bytes).ok_or_else(|| odd(format!("{bytes} bytes are more than the file has")))?;
             Ok::<usize, Error>(bytes as usize)
         };
         let mut word = [0; 8];
@@ -124,13 +123,13 @@ impl Checkpoint {
             planes.push(Plane { name, words, data });
         }
         if rest > 0 {
-            return Err(odd(format!("{rest} bytes belong to nothing")));
+            return Err(odd(format!("{rest} bytes are left over")));
         }
         Ok(Self { meta: contents.meta, planes })
     }
 }
 
-/// Counts and sums up what is written to it.
+/// A writer that counts bytes and computes the checksum.
 #[derive(Default)]
 struct Body {
     sum: Hasher,
@@ -149,7 +148,7 @@ impl Write for Body {
     }
 }
 
-/// Compares a file of `length` bytes with its header and its checksum.
+/// Checks the header, the checksum and the length (`length` bytes) of a file.
 fn check(file: &mut impl BufRead, path: &Path, length: u64) -> Result<()> {
     let refuse = |problem: String| Err(Error::data(path, "", problem));
     let mut header = Vec::with_capacity(HEADER);
@@ -192,7 +191,6 @@ fn check(file: &mut impl BufRead, path: &Path, length: u64) -> Result<()> {
     Ok(())
 }
 
-/// Reads `bytes` bytes as words.
 fn words_of(file: &mut impl Read, bytes: usize) -> io::Result<Vec<u32>> {
     let mut data = Vec::with_capacity(bytes / 4);
     let mut chunk = vec![0; CHUNK];

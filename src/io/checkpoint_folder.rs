@@ -1,26 +1,26 @@
-//! The checkpoints of a run: `checkpoints/NUMBER-step-STEP.ckpt`. Numbers count up over all runs in a folder, so that the
-//! newest is found without a clock, also where a run was started anew at step 1.
+//! The checkpoints of a run: `checkpoints/NUMBER-step-STEP.ckpt`. Numbers increase over all runs in a folder. So the
+//! newest file is known without a clock, also after a restart from step 1.
 
 use crate::error::{Error, Result};
 use crate::io::read;
 use std::path::{Path, PathBuf};
 
-/// Name of the folder in that of a run.
+/// Name of the folder inside the folder of the run.
 pub(crate) const FOLDER: &str = "checkpoints";
 const EXTENSION: &str = ".ckpt";
 
-/// A file by its name; what it holds was not looked at.
+/// A checkpoint, known by its file name only.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Found {
-    /// Number, larger for newer ones.
+    /// Number in the file name; larger is newer.
     pub number: u64,
     /// Step after which it was written.
     pub step: u32,
-    /// The file.
+    /// Path of the file.
     pub path: PathBuf,
 }
 
-/// The checkpoints in the folder of a run, the newest first; none if there is no such folder.
+/// Lists the checkpoints in the folder of a run, the newest first; empty without the folder.
 pub fn list(out: &Path) -> Result<Vec<Found>> {
     let folder = out.join(FOLDER);
     let entries = match read::folder(&folder) {
@@ -37,13 +37,13 @@ fn parse(path: PathBuf) -> Option<Found> {
     Some(Found { number: number.parse().ok()?, step: step.parse().ok()?, path })
 }
 
-/// The path of a new checkpoint.
+/// Returns the path for a new checkpoint.
 pub fn next(out: &Path, step: u32) -> Result<PathBuf> {
     let newest = list(out)?.first().map_or(0, |found| found.number);
     Ok(out.join(FOLDER).join(format!("{}-step-{step}{EXTENSION}", newest.saturating_add(1))))
 }
 
-/// Removes all but `kept`; one that cannot be removed is in nobody's way, and stays.
+/// Removes all checkpoints except `kept`. Leftovers do no harm, so a failure is only logged.
 pub fn keep(out: &Path, kept: &[PathBuf]) -> Result<()> {
     for found in list(out)?.into_iter().filter(|found| !kept.contains(&found.path)) {
         if let Err(error) = std::fs::remove_file(&found.path) {

@@ -1,6 +1,6 @@
 //! Depth maps of the photos of a scene, from a folder.
 //!
-//! A map belongs to a photo as it lies on the disk; it is undistorted and resized as the photo's mask is.
+//! A map belongs to the photo file. It is undistorted and resized in the same way as the mask of the photo.
 
 use super::depth_file::{EXTENSIONS, read_depth};
 use super::listing::Listed;
@@ -11,11 +11,11 @@ use crate::scene::{DepthMap, View};
 use std::collections::{BTreeMap, HashMap};
 use std::path::{Path, PathBuf};
 
-/// A folder of depth maps and what is needed to bring them to the views of a scene.
+/// A folder of depth maps, with the lenses and names to match them to the views of a scene.
 pub struct DepthFolder {
     folder: PathBuf,
     listed: BTreeMap<String, Listed>,
-    /// How many photos share a file stem; a map in no folder of its own serves only stems that are unique.
+    /// Number of photos per file stem. A map outside of the photo's folder serves only unique stems.
     stems: HashMap<PathBuf, usize>,
 }
 
@@ -24,7 +24,7 @@ fn stem(name: &str) -> PathBuf {
 }
 
 impl DepthFolder {
-    /// The maps in `folder` for the photos of `scene`, which was opened before.
+    /// Opens the maps in `folder` for the photos of `scene`. The scene must have been opened before.
     pub fn open(folder: &Path, scene: &Path) -> Result<Self> {
         if !folder.is_dir() {
             return Err(Error::data(folder, "", "there is no such folder of depth maps"));
@@ -36,7 +36,7 @@ impl DepthFolder {
         Ok(Self { folder: folder.to_owned(), listed, stems })
     }
 
-    /// Refuses a folder that lacks the map of one of `views`.
+    /// Refuses a folder without a map for one of `views`.
     pub fn check_complete(&self, views: &[&View]) -> Result<()> {
         let without: Vec<&str> =
             views.iter().map(|view| view.name.as_str()).filter(|name| self.find(name).is_none()).collect();
@@ -44,7 +44,7 @@ impl DepthFolder {
             return Ok(());
         }
         let problem = format!(
-            "{} of {} photos with masks have no depth map: {}; expected files named as the photos, ending in .{}",
+            "{} of {} photos with masks have no depth map: {}; expected files with the names of the photos, ending in .{}",
             without.len(),
             views.len(),
             shortened(&without),
@@ -53,7 +53,7 @@ impl DepthFolder {
         Err(Error::data(&self.folder, "", problem))
     }
 
-    /// The map of `view`, with its size; pixels that the photo does not cover are holes.
+    /// Reads the map of `view`, at its size. Pixels outside of the photo are holes.
     pub fn read(&self, view: &View) -> Result<DepthMap> {
         let (Some(listed), Some(path)) = (self.listed.get(&view.name), self.find(&view.name)) else {
             return Err(Error::data(&self.folder, &view.name, "has no depth map"));
@@ -77,7 +77,7 @@ impl DepthFolder {
         Ok(DepthMap { width, height, values })
     }
 
-    /// The file of a photo: its name with another extension or with one added, then the same without folders.
+    /// Finds the file of a photo: its name with the extension replaced or appended, then the same without folders.
     fn find(&self, name: &str) -> Option<PathBuf> {
         let stem = stem(name);
         let flat = (self.stems.get(&stem) == Some(&1)).then_some(stem);

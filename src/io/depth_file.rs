@@ -1,4 +1,4 @@
-//! One depth map in a file: 16-bit PNG, EXR, NPY or PFM. Values are handed on as they are written.
+//! Files with one depth map: 16-bit PNG, EXR, NPY or PFM. Values stay as stored.
 
 use super::image::{PIXELS_MAX, check_length, check_png_length, check_size};
 use crate::error::{Error, Result};
@@ -8,10 +8,10 @@ use exr::prelude::{MetaData, ReadChannels, ReadLayers};
 use std::io::Cursor;
 use std::path::Path;
 
-/// Extensions of depth files, the preferred first: a PNG beside another file is often only a picture of it.
+/// Extensions of depth files in order of preference. PNG is last, because it is often only a picture of the other file.
 pub(crate) const EXTENSIONS: [&str; 4] = ["exr", "npy", "pfm", "png"];
 
-/// Reads a depth map; the extension tells the kind of file.
+/// Reads a depth map; the extension gives the format.
 pub(crate) fn read_depth(path: &Path) -> Result<DepthMap> {
     let extension = path.extension().map(|extension| extension.to_string_lossy().to_lowercase()).unwrap_or_default();
     match extension.as_str() {
@@ -19,12 +19,12 @@ pub(crate) fn read_depth(path: &Path) -> Result<DepthMap> {
         "exr" => read_exr(path),
         "npy" => read_npy(path),
         "pfm" => read_pfm(path),
-        _ => Err(Error::data(path, "", "is no depth file; expected 16-bit grey .png, .exr, .npy or .pfm")),
+        _ => Err(Error::data(path, "", "is not a depth file; expected 16-bit grey .png, .exr, .npy or .pfm")),
     }
 }
 
 fn refuse(path: &Path, kind: &str) -> impl Fn(&dyn std::fmt::Display) -> Error {
-    let prefix = format!("is no readable {kind} depth map: ");
+    let prefix = format!("is not a readable {kind} depth map: ");
     move |cause| Error::data(path, "", format!("{prefix}{cause}"))
 }
 
@@ -36,7 +36,7 @@ fn read_png(path: &Path) -> Result<DepthMap> {
     let (colour, bits) = (reader.info().color_type, reader.info().bit_depth);
     if (colour, bits) != (png::ColorType::Grayscale, png::BitDepth::Sixteen) {
         let problem = format!(
-            "is {colour:?} with {} bits; depth needs 16-bit grey, because 256 steps cannot tell near things apart. \
+            "is {colour:?} with {} bits; depth needs 16-bit grey, because 8 bits are too coarse. \
              Write .npy, .exr, .pfm or 16-bit PNG",
             bits as u8
         );
@@ -49,7 +49,7 @@ fn read_png(path: &Path) -> Result<DepthMap> {
     Ok(DepthMap { width, height, values })
 }
 
-/// The only channel of the first layer, or that of the name Y, Z or R.
+/// Reads the only channel of the first layer, or the one named Y, Z or R.
 fn read_exr(path: &Path) -> Result<DepthMap> {
     let refuse = refuse(path, "EXR");
     let bytes = read::bytes(path)?;
@@ -57,7 +57,7 @@ fn read_exr(path: &Path) -> Result<DepthMap> {
     let side = |side: usize| u32::try_from(side).unwrap_or(u32::MAX);
     let (mut samples, mut first) = (0, None);
     for header in &header.headers {
-        // Which layer is read is the crate's choice, and all channels of it take memory.
+        // The crate chooses the layer and takes memory for all its channels.
         let (size, channels) = ((side(header.layer_size.x()), side(header.layer_size.y())), header.channels.list.len());
         check_size(path, size)?;
         check_length(path, size, channels as u64)?;
@@ -77,7 +77,7 @@ fn read_exr(path: &Path) -> Result<DepthMap> {
         _ => ["Y", "Z", "R"].into_iter().find_map(named),
     };
     let Some(channel) = channel else {
-        return Err(Error::data(path, "channels", "has none of the name Y, Z or R; depth is one channel"));
+        return Err(Error::data(path, "channels", "has no channel named Y, Z or R; depth has one channel"));
     };
     let values: Vec<f32> = channel.sample_data.values_as_f32().collect();
     if values.len() as u64 != u64::from(width) * u64::from(height) {
@@ -86,8 +86,8 @@ fn read_exr(path: &Path) -> Result<DepthMap> {
     Ok(DepthMap { width, height, values })
 }
 
-/// A two-dimensional array of floats in C order: rows, then columns. The format is numpy's, versions 1 to 3: magic,
-/// version, length of the header, a Python dictionary of three known keys, then the numbers.
+/// Reads a two-dimensional array of floats in C order, `[height, width]`. Format of numpy, versions 1 to 3: magic,
+/// version, header length, a Python dictionary with three keys, the values.
 fn read_npy(path: &Path) -> Result<DepthMap> {
     let refuse = refuse(path, "NPY");
     let bytes = read::bytes(path)?;
@@ -144,7 +144,7 @@ fn read_npy(path: &Path) -> Result<DepthMap> {
     Ok(DepthMap { width, height, values: data.chunks_exact(each).map(value).collect() })
 }
 
-/// `Pf`, width and height, scale (below 0 for little-endian), then rows from the bottom up.
+/// Reads a PFM: `Pf`, width and height, scale (negative for little-endian), then rows from bottom to top.
 fn read_pfm(path: &Path) -> Result<DepthMap> {
     let refuse = refuse(path, "PFM");
     let bytes = read::bytes(path)?;
@@ -152,7 +152,7 @@ fn read_pfm(path: &Path) -> Result<DepthMap> {
     let mut word = || {
         let start = at + bytes[at..].iter().position(|byte| !byte.is_ascii_whitespace())?;
         let end = start + bytes[start..].iter().take(32).position(u8::is_ascii_whitespace)?;
-        // One white space ends a word; the one after the scale is the last before the numbers.
+        // A word ends at one white space. After the scale this is the last byte of the header.
         at = end + 1;
         std::str::from_utf8(&bytes[start..end]).ok()
     };
@@ -166,7 +166,9 @@ fn read_pfm(path: &Path) -> Result<DepthMap> {
     };
     let (width, height, scale) = (number("width")?, number("height")?, number("scale")?);
     if [width, height].iter().any(|side| side.fract() != 0.0) || !scale.is_finite() || scale == 0.0 {
-        return Err(refuse(&format!("{width} x {height} px with the scale {scale}; sides are whole, scales not 0")));
+        return Err(refuse(&format!(
+            "{width} x {height} px with the scale {scale}; sides must be whole, the scale not 0"
+        )));
     }
     let (width, height) = (width as u32, height as u32);
     check_size(path, (width, height))?;

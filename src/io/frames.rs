@@ -1,4 +1,4 @@
-//! `frames.json`: the frames of a video through the photos of a scene, and which of them stands for which photo.
+//! `frames.json`: the frames of a video through the photos of a scene, and the photo of some frames.
 
 use super::atomic;
 use super::camera_json::CameraFile;
@@ -12,18 +12,18 @@ use std::path::Path;
 pub(crate) const FILE: &str = "frames.json";
 const SCHEMA_VERSION: u32 = 1;
 
-/// One frame.
+/// A frame of the video.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Frame {
-    /// Its picture, below the folder of the file.
+    /// Its picture, relative to the folder of the file.
     pub file: String,
-    /// Name of the photo whose pose it has; null between photos.
+    /// Name of the photo with the same pose; null between photos.
     pub photo: Option<String>,
-    /// Its camera, as `labelgs render --camera` reads one.
+    /// Its camera, in the layout of `labelgs render --camera`.
     pub camera: CameraFile,
 }
 
-/// All frames, in the order of the video.
+/// The frames of a video, in order.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Frames {
     /// Version of the layout.
@@ -33,12 +33,12 @@ pub struct Frames {
 }
 
 impl Frames {
-    /// A video of these frames.
+    /// Makes a video of these frames.
     pub fn new(frames: Vec<Frame>) -> Self {
         Self { schema_version: SCHEMA_VERSION, frames }
     }
 
-    /// Reads a video. Another version, a photo with two frames and a video without photos are errors.
+    /// Reads the file. Another version, a photo with two frames and a video without photos are errors.
     pub fn read(path: &Path) -> Result<Self> {
         let text = read::text(path)?;
         let video: Self = serde_json::from_str(&text).map_err(|error| {
@@ -46,7 +46,7 @@ impl Frames {
             Error::data(path, format!("line {}", error.line()), format!("{error}; {expected}"))
         })?;
         if video.schema_version != SCHEMA_VERSION {
-            let problem = format!("has version {}, this program reads {SCHEMA_VERSION}", video.schema_version);
+            let problem = format!("has version {}, labelgs reads {SCHEMA_VERSION}", video.schema_version);
             return Err(Error::data(path, "schema_version", problem));
         }
         let mut seen = BTreeSet::new();
@@ -61,7 +61,7 @@ impl Frames {
         Ok(video)
     }
 
-    /// Writes the video's description, whole or not at all.
+    /// Writes the file, atomically.
     pub fn write(&self, path: &Path) -> Result<()> {
         let text = serde_json::to_string_pretty(self).map_err(|error| Error::Bug(format!("JSON: {error}")))?;
         atomic::write(path, |out| out.write_all(text.as_bytes()))

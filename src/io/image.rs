@@ -1,4 +1,4 @@
-//! Pixels in files: photos in, PNG and EXR out.
+//! Image files: reads photos, writes PNG and EXR.
 
 use super::atomic;
 use crate::error::{Error, Result};
@@ -9,10 +9,10 @@ use image::{ImageDecoder, ImageReader};
 use std::io::{BufRead, Cursor, ErrorKind, Seek};
 use std::path::Path;
 
-/// Most pixels that an image may have; larger ones are refused before they are decoded.
+/// Most pixels of an image. Larger ones are refused before decoding.
 pub(crate) const PIXELS_MAX: u64 = 1 << 28;
 
-/// Refuses sizes of zero or beyond [`PIXELS_MAX`].
+/// Refuses sizes of 0 or above [`PIXELS_MAX`].
 pub(crate) fn check_size(path: &Path, (width, height): (u32, u32)) -> Result<()> {
     let pixels = u64::from(width) * u64::from(height);
     if pixels == 0 || pixels > PIXELS_MAX {
@@ -22,25 +22,25 @@ pub(crate) fn check_size(path: &Path, (width, height): (u32, u32)) -> Result<()>
     Ok(())
 }
 
-/// Most bytes that deflate makes of one; few bytes of header around them are forgiven.
+/// Most bytes that one byte of deflate expands to. Headers are not subtracted, because they are a few bytes.
 const DEFLATE_MAX: u64 = 1032;
-/// Most samples that one byte stands for in the other formats: a JPEG has at least a bit for each block of 64 and each of
-/// the parts that it may be interleaved of.
+/// Most samples per byte in the other formats. A JPEG has at least one bit for each block of 64 samples, times the
+/// number of interleaved components.
 const SAMPLES_MAX: u64 = 8192;
 
-/// Refuses a PNG of `bits` a pixel whose file is too short for its pixels, before memory is taken for them.
+/// Refuses a PNG with `bits` per pixel whose file is too short for its pixels, before memory is allocated.
 pub(crate) fn check_png_length(path: &Path, (width, height): (u32, u32), bits: u32) -> Result<()> {
     let bytes = (u64::from(width) * u64::from(bits)).div_ceil(8) * u64::from(height);
     if bytes <= (file_length(path)? + 64) * DEFLATE_MAX { Ok(()) } else { Err(too_short(path, (width, height))) }
 }
 
-/// Refuses a file that is too short for `channels` of so many pixels, whatever packed them.
+/// Refuses a file that is too short for its pixels with `channels` samples each, whatever the compression.
 pub(crate) fn check_length(path: &Path, (width, height): (u32, u32), channels: u64) -> Result<()> {
     let samples = u64::from(width) * u64::from(height) * channels;
     if samples <= (file_length(path)? + 64) * SAMPLES_MAX { Ok(()) } else { Err(too_short(path, (width, height))) }
 }
 
-/// Refuses a palette that is no whole number of colours, which the decoder would read beyond the end of.
+/// Refuses a palette whose length is no multiple of 3: the decoder would read beyond its end.
 fn check_palette(path: &Path, bytes: &[u8]) -> Result<()> {
     let reader = png::Decoder::new(Cursor::new(bytes)).read_info();
     let reader = reader.map_err(|error| Error::data(path, "", format!("cannot be decoded: {error}")))?;
@@ -48,7 +48,7 @@ fn check_palette(path: &Path, bytes: &[u8]) -> Result<()> {
     if bytes.is_multiple_of(3) {
         return Ok(());
     }
-    let problem = format!("has {bytes} bytes, no whole number of colours; write the picture anew");
+    let problem = format!("has {bytes} bytes, expected a multiple of 3; write the image again");
     Err(Error::data(path, "palette", problem))
 }
 
@@ -63,7 +63,7 @@ fn too_short(path: &Path, (width, height): (u32, u32)) -> Error {
 }
 
 fn reader<R: BufRead + Seek>(path: &Path, file: R) -> Result<ImageReader<R>> {
-    // The kind is guessed from the first bytes, so a PNG called .jpg is read all the same.
+    // The first bytes give the format, so that a PNG named .jpg works.
     let mut reader = ImageReader::new(file).with_guessed_format().map_err(Error::read(path))?;
     let mut limits = image::Limits::default();
     limits.max_alloc = Some(PIXELS_MAX * 16);
@@ -71,19 +71,19 @@ fn reader<R: BufRead + Seek>(path: &Path, file: R) -> Result<ImageReader<R>> {
     Ok(reader)
 }
 
-/// Width and height from the header alone, px.
+/// Reads width and height from the header, px.
 pub fn photo_size(path: impl AsRef<Path>) -> Result<(u32, u32)> {
     let path = path.as_ref();
     reader(path, read::open(path)?)?.into_dimensions().map_err(|error| match error {
-        // A file that was cut short ends too early, as no failing disk does.
+        // A truncated file ends early. A failing disk reports another error.
         image::ImageError::IoError(cause) if cause.kind() != ErrorKind::UnexpectedEof => Error::read(path)(cause),
         other => Error::data(path, "", format!("cannot be decoded: {other}")),
     })
 }
 
-/// Reads a PNG or JPEG as 8-bit RGB. Transparency is blended over `background` (components from 0 to 1), so all
-/// pixels have alpha 255. Grey and 16-bit photos are widened and narrowed. An EXIF orientation is ignored, as
-/// COLMAP does: poses belong to the stored pixels.
+/// Reads a PNG or JPEG as 8-bit RGB with alpha 255. Transparency is blended over `background` (R, G, B, 0 to 1). Grey
+/// and 16-bit photos are converted. An EXIF orientation is ignored as in COLMAP, because poses belong to the stored
+/// pixels.
 pub fn read_photo(path: impl AsRef<Path>, background: [f32; 3]) -> Result<Photo> {
     let picture = decode(path.as_ref())?;
     let transparent = picture.color().has_alpha();
@@ -95,12 +95,12 @@ pub fn read_photo(path: impl AsRef<Path>, background: [f32; 3]) -> Result<Photo>
     Ok(photo)
 }
 
-/// Reads a PNG or JPEG as 8-bit RGBA, alpha as it is in the file: opacity, 255 where the file has none.
+/// Reads a PNG or JPEG as 8-bit RGBA. Alpha is opacity as stored, or 255 without an alpha channel.
 pub fn read_rgba(path: impl AsRef<Path>) -> Result<Photo> {
     Ok(as_rgba(decode(path.as_ref())?))
 }
 
-/// Reads a PNG or JPEG as 8-bit grey, row-major: width, height, values. Colours become their luminance.
+/// Reads a PNG or JPEG as 8-bit grey: width, height, row-major values. Colours become their luminance.
 pub fn read_grey(path: impl AsRef<Path>) -> Result<(u32, u32, Vec<u8>)> {
     let picture = decode(path.as_ref())?;
     Ok((picture.width(), picture.height(), picture.into_luma8().into_raw()))
@@ -114,7 +114,7 @@ fn decode(path: &Path) -> Result<image::DynamicImage> {
     let decoder = reader.into_decoder().map_err(undecodable)?;
     let (size, bits) = (decoder.dimensions(), u32::from(decoder.color_type().bits_per_pixel()));
     check_size(path, size)?;
-    // What comes out with 8 bits may have been packed grey or a palette of two colours.
+    // An 8-bit result may come from packed grey or a palette of two colours.
     let packed = if decoder.color_type().bytes_per_pixel() == decoder.color_type().channel_count() { 1 } else { bits };
     if png {
         check_png_length(path, size, packed)?;
@@ -139,22 +139,22 @@ fn over([r, g, b, a]: [u8; 4], background: [f64; 3]) -> [u8; 4] {
     [blend(r, background[0]), blend(g, background[1]), blend(b, background[2]), 255]
 }
 
-/// Writes an 8-bit RGB PNG, `pixels` row-major.
+/// Writes an 8-bit RGB PNG; `pixels` is row-major.
 pub fn write_png_rgb8(path: impl AsRef<Path>, width: u32, height: u32, pixels: &[[u8; 3]]) -> Result<()> {
     write_png(path.as_ref(), (width, height), png::ColorType::Rgb, png::BitDepth::Eight, bytemuck::cast_slice(pixels))
 }
 
-/// Writes an 8-bit RGBA PNG, colours not multiplied by alpha, `pixels` row-major.
+/// Writes an 8-bit RGBA PNG with straight alpha; `pixels` is row-major.
 pub(crate) fn write_png_rgba8(path: impl AsRef<Path>, width: u32, height: u32, pixels: &[[u8; 4]]) -> Result<()> {
     write_png(path.as_ref(), (width, height), png::ColorType::Rgba, png::BitDepth::Eight, bytemuck::cast_slice(pixels))
 }
 
-/// Writes an 8-bit grey PNG, `pixels` row-major.
+/// Writes an 8-bit grey PNG; `pixels` is row-major.
 pub fn write_png_grey8(path: impl AsRef<Path>, width: u32, height: u32, pixels: &[u8]) -> Result<()> {
     write_png(path.as_ref(), (width, height), png::ColorType::Grayscale, png::BitDepth::Eight, pixels)
 }
 
-/// Writes a 16-bit grey PNG, such as an id map, `pixels` row-major.
+/// Writes a 16-bit grey PNG, such as an id map; `pixels` is row-major.
 pub fn write_png_grey16(path: impl AsRef<Path>, width: u32, height: u32, pixels: &[u16]) -> Result<()> {
     let bytes: Vec<u8> = pixels.iter().flat_map(|value| value.to_be_bytes()).collect();
     write_png(path.as_ref(), (width, height), png::ColorType::Grayscale, png::BitDepth::Sixteen, &bytes)
@@ -177,13 +177,13 @@ fn write_png(
     })
 }
 
-/// Writes an EXR with the channels R, G and B, 32-bit floats, `pixels` row-major.
+/// Writes an EXR with 32-bit floats in the channels R, G and B; `pixels` is row-major.
 pub fn write_exr_rgb(path: impl AsRef<Path>, width: u32, height: u32, pixels: &[[f32; 3]]) -> Result<()> {
     let channel = |name: &'static str, index: usize| (name, pixels.iter().map(|pixel| pixel[index]).collect());
     write_exr(path.as_ref(), (width, height), vec![channel("R", 0), channel("G", 1), channel("B", 2)])
 }
 
-/// Writes an EXR with the single channel Y, 32-bit floats, `pixels` row-major.
+/// Writes an EXR with 32-bit floats in the single channel Y; `pixels` is row-major.
 pub fn write_exr_y(path: impl AsRef<Path>, width: u32, height: u32, pixels: &[f32]) -> Result<()> {
     write_exr(path.as_ref(), (width, height), vec![("Y", pixels.to_vec())])
 }
@@ -200,7 +200,7 @@ fn write_exr(path: &Path, (width, height): (u32, u32), channels: Vec<(&'static s
         Encoding::SMALL_LOSSLESS,
         AnyChannels::sort(channels.collect()),
     );
-    // The crate wants a seekable writer and the atomic one is a stream.
+    // The crate needs a seekable writer; the atomic writer is a stream.
     let mut bytes = Cursor::new(Vec::new());
     Image::from_layer(layer)
         .write()

@@ -1,6 +1,6 @@
-//! `labels.json`: what is known about the ids of a folder of masks or of a model, besides the ids themselves.
+//! `labels.json`: names, colours and counts of the ids in a folder of masks or in a model.
 //!
-//! It stands in a folder of masks, in the folder of a run, and beside a PLY of its own as `NAME.labels.json`.
+//! It lies in a folder of masks, in the folder of a run, or beside a single PLY as `NAME.labels.json`.
 
 use super::{atomic, run_folder};
 use crate::error::{Error, Result};
@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 
 /// Name of the file in a folder.
 pub const FILE: &str = "labels.json";
-/// Version of the layout that this program writes and reads.
+/// Version of the layout.
 const SCHEMA_VERSION: u32 = 1;
 
 /// One object.
@@ -20,30 +20,30 @@ const SCHEMA_VERSION: u32 = 1;
 pub struct LabelEntry {
     /// Id in masks and models, 1 to 65535.
     pub id: u32,
-    /// Name for people; unique where it is given.
+    /// Display name; unique.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub name: Option<String>,
     /// Display colour, sRGB bytes.
     pub colour: [u8; 3],
-    /// What the source of the masks called it: an id, a colour or a folder.
+    /// Id, colour or folder of the object in the source of the masks.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub source: Option<String>,
-    /// Pixels over all masks; 0 where there are none.
+    /// Number of pixels over all masks; 0 without masks.
     #[serde(default)]
     pub pixels: u64,
-    /// Masks that show it.
+    /// Number of masks that show it.
     #[serde(default)]
     pub views: u32,
 }
 
 impl LabelEntry {
-    /// An object of which only the id is known.
+    /// Makes an entry with only an id.
     pub fn new(id: u32) -> Self {
         Self { id, name: None, colour: label_colour(id), source: None, pixels: 0, views: 0 }
     }
 }
 
-/// The objects, sorted by id.
+/// A table of objects, sorted by id.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct LabelTable {
     /// Version of the layout.
@@ -53,14 +53,13 @@ pub struct LabelTable {
 }
 
 impl LabelTable {
-    /// A table of these entries, sorted.
+    /// Makes a table of these entries, sorted by id.
     pub fn new(mut labels: Vec<LabelEntry>) -> Self {
         labels.sort_by_key(|entry| entry.id);
         Self { schema_version: SCHEMA_VERSION, labels }
     }
 
-    /// Reads a table. Another version, an id that no label can have, one that occurs twice and a name that stands
-    /// for two ids are errors.
+    /// Reads a table. Another version, an invalid id, and a repeated id or name are errors.
     pub fn read(path: &Path) -> Result<Self> {
         let text = read::text(path)?;
         let table: Self = serde_json::from_str(&text).map_err(|error| {
@@ -69,7 +68,7 @@ impl LabelTable {
             Error::data(path, format!("line {}", error.line()), format!("{error}; {expected}"))
         })?;
         if table.schema_version != SCHEMA_VERSION {
-            let problem = format!("has version {}, this program reads {SCHEMA_VERSION}", table.schema_version);
+            let problem = format!("has version {}, labelgs reads {SCHEMA_VERSION}", table.schema_version);
             return Err(Error::data(path, "schema_version", problem));
         }
         let (mut ids, mut names) = (BTreeSet::new(), BTreeSet::new());
@@ -88,37 +87,37 @@ impl LabelTable {
         Ok(Self::new(table.labels))
     }
 
-    /// Reads the table of a folder of masks, if it has one.
+    /// Reads the table in a folder of masks, if there is one.
     pub fn of_folder(folder: &Path) -> Result<Option<Self>> {
         let path = folder.join(FILE);
         path.is_file().then(|| Self::read(&path)).transpose()
     }
 
-    /// Writes the table, whole or not at all.
+    /// Writes the table, atomically.
     pub fn write(&self, path: &Path) -> Result<()> {
         let text = serde_json::to_string_pretty(self).map_err(|error| Error::Bug(format!("JSON: {error}")))?;
         atomic::write(path, |out| out.write_all(text.as_bytes()))
     }
 
-    /// The entry of an id.
+    /// Returns the entry of an id.
     pub fn entry(&self, id: u32) -> Option<&LabelEntry> {
         self.labels.binary_search_by_key(&id, |entry| entry.id).ok().map(|at| &self.labels[at])
     }
 
-    /// The id that has this name, compared without regard to case.
+    /// Returns the id with this name, ignoring case.
     pub fn by_name(&self, name: &str) -> Option<u32> {
         let found = |entry: &&LabelEntry| entry.name.as_ref().is_some_and(|own| own.eq_ignore_ascii_case(name));
         self.labels.iter().find(found).map(|entry| entry.id)
     }
 
-    /// Where the table of a model is, if there is one: `NAME.labels.json` beside the PLY, else `labels.json` in the
-    /// folder of the run.
+    /// Returns the path of the table of a model, if there is one: `NAME.labels.json` beside the PLY, else `labels.json`
+    /// in the folder of the run.
     pub fn find_for_model(model: &Path) -> Option<PathBuf> {
         let of_run = run_folder::of_model(model).map(|run| run.join(FILE));
         [Some(Self::beside(model)), of_run].into_iter().flatten().find(|path| path.is_file())
     }
 
-    /// Puts the table at `path`; without one, no old table stays there to name labels of something else.
+    /// Writes the table to `path`. Without a table it removes the file, whose names would be wrong.
     pub fn put(table: Option<&Self>, path: &Path) -> Result<()> {
         match table {
             Some(table) => table.write(path),
@@ -127,7 +126,7 @@ impl LabelTable {
         }
     }
 
-    /// The place for the table of a PLY that is not in the folder of a run.
+    /// Returns the path of the table for a PLY outside of the folder of a run.
     pub fn beside(model: &Path) -> PathBuf {
         model.with_extension(FILE)
     }

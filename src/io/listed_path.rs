@@ -1,25 +1,24 @@
 //! Paths of photos and points as a scene lists them.
 //!
-//! A scene comes from anywhere, and what it lists is opened and, as the name of a view, written to. A path that leaves
-//! the folder of the scene is refused by name, unless the user says that it is meant.
+//! A scene is untrusted input. Its paths are opened for reading and, as names of views, used for writing. A path
+//! outside of the scene's folder is refused, unless the user allows it.
 
 use crate::error::{Error, Result};
 use std::path::{Component, Path, PathBuf};
 
-/// The folder of a scene, and whether its files may lie elsewhere.
+/// The folder of a scene, and the permission for files elsewhere.
 pub(crate) struct Place<'a> {
-    /// The folder.
     pub(crate) root: &'a Path,
-    /// Whether paths may leave it.
+    /// Paths may leave the folder.
     allow_outside: bool,
 }
 
-/// A file that a scene lists.
+/// A file in the list of a scene.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct ListedPath {
-    /// Path below the folder of the scene; absolute or with `..` only where that was allowed.
+    /// Path below the folder of the scene. It is absolute or has `..` only if that is allowed.
     pub(crate) path: PathBuf,
-    /// The same as a name: separated by `/`, never absolute and without `..`, so that it is safe below any folder.
+    /// The same path as a name: separated by `/`, relative and without `..`, so that it is safe below any folder.
     pub(crate) name: String,
 }
 
@@ -28,7 +27,7 @@ impl<'a> Place<'a> {
         Self { root, allow_outside }
     }
 
-    /// What `listed` in the file `source` means. Backslashes, which programs on Windows write, separate folders too.
+    /// Resolves the path `listed` in the file `source`. Backslashes also separate folders, as in files from Windows.
     pub(crate) fn resolve(&self, source: &Path, listed: &str) -> Result<ListedPath> {
         let refuse = |problem: &str| Err(Error::data(source, format!("photo `{}`", listed.escape_debug()), problem));
         let text = listed.replace('\\', "/");
@@ -51,7 +50,7 @@ impl<'a> Place<'a> {
     }
 }
 
-/// The path without its root and with `..` carried out, as far as there is anything to go back from.
+/// Returns the path without its root and with `..` resolved as far as possible.
 fn name_of(path: &Path) -> String {
     let mut parts: Vec<&str> = Vec::new();
     for part in path.components() {
@@ -64,7 +63,7 @@ fn name_of(path: &Path) -> String {
     parts.join("/")
 }
 
-/// True for `C:/photo.png`, which is absolute where it was written, if not here.
+/// Returns true for paths such as `C:/photo.png`, which are absolute on Windows only.
 fn has_drive(text: &str) -> bool {
     matches!(text.as_bytes(), [letter, b':', b'/', ..] if letter.is_ascii_alphabetic())
 }

@@ -1,4 +1,4 @@
-//! What a scene lists before any pixel is read, and the checks that all formats share.
+//! The content of a scene before its pixels, and the checks that all formats share.
 
 use super::lens::Lens;
 use crate::error::{Error, Result};
@@ -9,39 +9,38 @@ use std::path::{Path, PathBuf};
 /// Largest side of a camera, px.
 const SIDE_MAX: u32 = 1 << 17;
 
-/// Farthest from the origin that a camera or a point may be, world units: there the squares of f32 are still numbers.
+/// Largest distance of a camera or a point from the origin, world units: squares still fit into f32.
 pub(crate) const FAR: f64 = 1e12;
 
-/// One photo as listed.
+/// A photo in the listing of a scene.
 #[derive(Clone, Debug)]
 pub(crate) struct Listed {
     /// Name relative to the folder of photos.
     pub(crate) name: String,
-    /// Its file, or `None` if there is none.
+    /// Its file; `None` if it does not exist.
     pub(crate) photo: Option<PathBuf>,
-    /// Camera at the size that the data set states.
+    /// Camera at the size in the data set.
     pub(crate) camera: Camera,
-    /// Lens of the photo.
     pub(crate) lens: Lens,
-    /// The split that the data set itself gives: true for held-out.
+    /// Split of the data set itself: true for held-out.
     pub(crate) test: Option<bool>,
 }
 
-/// A scene before any pixel is read.
+/// A scene before its pixels are read.
 #[derive(Debug, Default)]
 pub(crate) struct Listing {
     /// The file that lists the photos, for messages.
     pub(crate) source: PathBuf,
     pub(crate) views: Vec<Listed>,
-    /// Names of photos without a file that could not even be made a camera of.
+    /// Names of photos without a file and without a known size.
     pub(crate) missing: Vec<String>,
-    /// Why photos that are there could not be made a camera of.
+    /// Errors of photos that exist but give no size.
     pub(crate) bad: Vec<Error>,
     pub(crate) points: Vec<Point>,
     pub(crate) notes: Vec<String>,
 }
 
-/// Refuses cameras that no image can be made with. `place` names the camera in `path`.
+/// Refuses cameras that cannot make an image. `place` names the camera in `path`.
 pub(crate) fn check_camera(path: &Path, place: &str, camera: &Camera, lens: &Lens) -> Result<()> {
     let refuse = |problem: String| Err(Error::data(path, place, problem));
     let Camera { fx, fy, cx, cy, width, height, .. } = *camera;
@@ -68,7 +67,7 @@ pub(crate) fn check_camera(path: &Path, place: &str, camera: &Camera, lens: &Len
         return refuse(format!("principal point ({cx}, {cy}) lies outside the image of {width} x {height} px"));
     }
     if lens.distortion().is_some_and(|lens| !lens.is_finite()) {
-        return refuse("a distortion coefficient is not a number".into());
+        return refuse("a distortion coefficient is NaN or infinite".into());
     }
     if !camera.translation.is_finite() || !camera.rotation.is_finite() {
         return refuse("the pose is not finite".into());
@@ -79,7 +78,7 @@ pub(crate) fn check_camera(path: &Path, place: &str, camera: &Camera, lens: &Len
     Ok(())
 }
 
-/// The rotation nearest to `matrix`, which may carry a uniform scale; `None` if it is no rotation.
+/// Returns the rotation nearest to `matrix`, which may have a uniform scale; `None` if it is no rotation.
 pub(crate) fn rotation_of(matrix: DMat3) -> Option<DMat3> {
     let determinant = matrix.determinant();
     if !(determinant.is_finite() && determinant > 0.0) {
@@ -93,13 +92,13 @@ pub(crate) fn rotation_of(matrix: DMat3) -> Option<DMat3> {
     Some(DMat3::from_quat(DQuat::from_mat3(&unit).normalize()))
 }
 
-/// Camera-from-world of an OpenCV camera-to-world pose.
+/// Converts an OpenCV camera-to-world pose to camera-from-world.
 pub(crate) fn invert_pose(rotation: DMat3, centre: DVec3) -> (DMat3, DVec3) {
     let inverse = rotation.transpose();
     (inverse, -(inverse * centre))
 }
 
-/// The first of `folders` (below `root`) that holds `relative`, with one of `extensions` added.
+/// Finds `relative` with one of `extensions` appended in the first of `folders` below `root` that has it.
 pub(crate) fn find_file(root: &Path, folders: &[&str], relative: &Path, extensions: &[&str]) -> Option<PathBuf> {
     folders.iter().find_map(|folder| {
         let path = root.join(folder).join(relative);

@@ -1,4 +1,4 @@
-//! From a listing to a data set: split, decode, undistort, resize, masks.
+//! Loads a data set from a listing: split, decode, undistort, resize, masks.
 
 use super::LoadOptions;
 use super::bad_photos::{self, LISTED_MAX};
@@ -13,7 +13,6 @@ use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 
-/// Loads what `listing` lists.
 pub(crate) fn load(root: &Path, mut listing: Listing, options: &LoadOptions) -> Result<Dataset> {
     let mut notes = std::mem::take(&mut listing.notes);
     let mut views = existing(&listing, options, &mut notes)?;
@@ -63,7 +62,7 @@ pub(crate) fn shortened(names: &[&str]) -> String {
     if names.len() > 3 { format!("{shown}, ...") } else { shown }
 }
 
-/// The views whose photo exists. Without photos asked for and without any there, all views that state their size.
+/// Returns the views whose photos exist. If photos are not requested and none exists, returns all views with a known size.
 fn existing(listing: &Listing, options: &LoadOptions, notes: &mut Vec<String>) -> Result<Vec<Listed>> {
     let total = listing.views.len() + listing.missing.len();
     if total + listing.bad.len() == 0 {
@@ -92,7 +91,7 @@ fn existing(listing: &Listing, options: &LoadOptions, notes: &mut Vec<String>) -
     Ok(listing.views.iter().filter(|view| view.photo.is_some()).cloned().collect())
 }
 
-/// Which of the views, sorted by name, are held out.
+/// Returns which of the views, sorted by name, are held out.
 fn split(views: &[Listed], every: Option<u32>, notes: &mut Vec<String>) -> Result<Vec<bool>> {
     if views.iter().all(|view| view.test.is_some()) {
         return Ok(views.iter().map(|view| view.test == Some(true)).collect());
@@ -108,7 +107,7 @@ fn split(views: &[Listed], every: Option<u32>, notes: &mut Vec<String>) -> Resul
     Ok((0..views.len()).map(|index| index % every as usize == 0).collect())
 }
 
-/// What was made of the views, or one error that lists all that failed.
+/// Returns the loaded views, or one error that lists all failures.
 pub(crate) fn all_or_one_error<T>(root: &Path, loaded: Vec<Result<T>>) -> Result<Vec<T>> {
     let total = loaded.len();
     let mut views = Vec::with_capacity(total);
@@ -131,16 +130,15 @@ pub(crate) fn all_or_one_error<T>(root: &Path, loaded: Vec<Result<T>>) -> Result
     }
 }
 
-/// What the file of a photo says, before anything is asked of it: its size, and its pixels if they are wanted.
+/// The size in a photo's file, and its pixels if they are wanted.
 type Decoded = (Option<(u32, u32)>, Option<Photo>);
 
-/// Decodes the photo of a view, if it has one.
 fn decode(listed: &Listed, options: &LoadOptions) -> Result<Decoded> {
     let Some(path) = &listed.photo else { return Ok((None, None)) };
     if !options.photos {
         return Ok((Some(stored_size(path)?), None));
     }
-    // A photo of another shape is refused later, and before it takes memory.
+    // Check the shape before the pixels take memory; the error comes later.
     let size = stored_size(path)?;
     let fits = same_aspect(size, (listed.camera.width, listed.camera.height));
     let photo = if fits { Some(read_photo(path, options.background)?) } else { None };
@@ -169,7 +167,7 @@ fn load_view(
     })
 }
 
-/// The camera at the size of the photo's file, which may be a scaled version of what the data set states.
+/// Returns the camera at the size of the photo's file, which may be a scaled version of the size in the data set.
 pub(crate) fn at_photo_size(listed: &Listed) -> Result<Camera> {
     at_size(listed, listed.photo.as_deref().map(stored_size).transpose()?)
 }
@@ -186,7 +184,7 @@ fn at_size(listed: &Listed, stored: Option<(u32, u32)>) -> Result<Camera> {
     if !same_aspect(size, (camera.width, camera.height)) {
         let problem = format!(
             "the photo has {} x {} px and its camera {} x {} px, which no scale explains; use the photos that the \
-             cameras were made for (an EXIF orientation is ignored on purpose, poses belong to the stored pixels)",
+             cameras were made for (an EXIF orientation is ignored, because poses belong to the stored pixels)",
             size.0, size.1, camera.width, camera.height
         );
         return Err(Error::data(path, "", problem));
@@ -194,7 +192,7 @@ fn at_size(listed: &Listed, stored: Option<(u32, u32)>) -> Result<Camera> {
     Ok(camera.resized(size.0, size.1))
 }
 
-/// The photo without its lens and in its final size.
+/// Undistorts the photo and scales it to the final size.
 fn fitted(mut photo: Photo, listed: &Listed, original: &Camera, (width, height): (u32, u32)) -> Photo {
     if !listed.lens.is_pinhole() {
         photo = undistort_photo(&photo, original, &listed.lens);

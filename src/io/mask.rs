@@ -1,7 +1,7 @@
-//! Id images: which object each pixel of a photo shows.
+//! Id masks: the object at each pixel of a photo.
 //!
-//! The pixel value is the id and 0 is unlabelled: grey PNG of any depth, or palette PNG, whose *index* is the id.
-//! Colours are never turned into ids: two palette entries may share a colour, and a colour code needs its legend.
+//! The pixel value is the id, and 0 is unlabelled. The file is a grey PNG of any depth, or a palette PNG, whose *index*
+//! is the id. Colours never become ids: two palette entries may share a colour, and a colour code needs its legend.
 
 use super::image::{check_png_length, check_size};
 use super::resample::same_aspect;
@@ -17,7 +17,7 @@ type Reader = png::Reader<BufReader<read::Source>>;
 
 fn unreadable(path: &Path, error: DecodingError) -> Error {
     match error {
-        // A file that was cut short ends too early, as no failing disk does.
+        // A truncated file ends early. A failing disk reports another error.
         DecodingError::IoError(cause) if cause.kind() != ErrorKind::UnexpectedEof => Error::read(path)(cause),
         other => problem(path, other),
     }
@@ -27,27 +27,25 @@ fn problem(path: &Path, problem: impl std::fmt::Display) -> Error {
     Error::data(path, "", format!("is no readable PNG mask: {problem}"))
 }
 
-/// What a PNG says about itself before its pixels.
+/// The header of a PNG.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Header {
     /// Width and height, px.
     pub(crate) size: (u32, u32),
-    /// Kind of samples.
     pub(crate) colour: png::ColorType,
-    /// Bits of a sample.
+    /// Bits per sample.
     pub(crate) depth: png::BitDepth,
 }
 
-/// A PNG with its samples as they are stored.
+/// A PNG with its samples as stored.
 pub(crate) struct Raw {
-    /// Its header.
     pub(crate) header: Header,
     bytes: Vec<u8>,
     line_size: usize,
 }
 
 impl Raw {
-    /// All samples, row-major, the channels of a pixel side by side.
+    /// Returns all samples, row-major, channels interleaved.
     pub(crate) fn samples(&self) -> Vec<u16> {
         let Header { size, colour, depth } = self.header;
         let per_line = size.0 as usize * colour.samples();
@@ -58,7 +56,7 @@ impl Raw {
 
 fn open(path: &Path) -> Result<(Reader, Header)> {
     let mut decoder = png::Decoder::new(read::open(path)?);
-    // Any other choice expands a palette to colours or drops the low half of 16-bit ids.
+    // Other settings expand a palette to colours or drop the low byte of 16-bit ids.
     decoder.set_transformations(png::Transformations::IDENTITY);
     let reader = decoder.read_info().map_err(|error| unreadable(path, error))?;
     let info = reader.info();
@@ -68,12 +66,12 @@ fn open(path: &Path) -> Result<(Reader, Header)> {
     Ok((reader, header))
 }
 
-/// Reads the header of a PNG, and of the file no more than it takes.
+/// Reads only the header of a PNG.
 pub(crate) fn read_header(path: &Path) -> Result<Header> {
     open(path).map(|(_, header)| header)
 }
 
-/// Reads a PNG of any kind, with `accept` asked about the header before a pixel is decoded.
+/// Reads a PNG of any kind. `accept` checks the header before decoding.
 pub(crate) fn read_raw(path: &Path, accept: impl FnOnce(&Header) -> Result<()>) -> Result<Raw> {
     let (mut reader, header) = open(path)?;
     accept(&header)?;
@@ -88,7 +86,7 @@ pub fn read_mask(path: impl AsRef<Path>) -> Result<LabelMap> {
     read_checked(path.as_ref(), |_| Ok(()))
 }
 
-/// Like [`read_mask`], with `accept` asked about the size before a pixel is decoded.
+/// Like [`read_mask`]; `accept` checks the size before decoding.
 pub(crate) fn read_checked(path: &Path, accept: impl FnOnce((u32, u32)) -> Result<()>) -> Result<LabelMap> {
     let raw = read_raw(path, |header| {
         if !matches!(header.colour, png::ColorType::Grayscale | png::ColorType::Indexed) {
@@ -106,7 +104,6 @@ pub(crate) fn read_checked(path: &Path, accept: impl FnOnce((u32, u32)) -> Resul
     Ok(LabelMap { width, height, ids: raw.samples() })
 }
 
-/// The samples of one line.
 fn unpack(line: &[u8], depth: png::BitDepth, width: usize) -> Vec<u16> {
     let packed = |bits: usize| {
         let per_byte = 8 / bits;
@@ -127,16 +124,16 @@ fn unpack(line: &[u8], depth: png::BitDepth, width: usize) -> Vec<u16> {
     }
 }
 
-/// True if a mask of the size `found` can serve a photo of the size `photo`: it is a scaled one.
+/// Returns true if a mask of size `found` can serve a photo of size `photo`: they differ by a scale only.
 pub(crate) fn mask_size_fits(found: (u32, u32), photo: (u32, u32)) -> bool {
     same_aspect(found, photo)
 }
 
-/// Which names the mask of a photo may have.
+/// The possible names for the mask of a photo.
 pub(crate) struct PhotoNames {
-    /// How many photos share a file stem; a flat folder serves only stems that are unique.
+    /// Number of photos per file stem. A flat folder serves only unique stems.
     stems: HashMap<String, usize>,
-    /// How many share a path cut at the first dot of the file name, likewise.
+    /// Number of photos per path cut at the first dot of the file name, for the same reason.
     cut: HashMap<PathBuf, usize>,
 }
 
@@ -144,7 +141,7 @@ fn stem(name: &str) -> String {
     Path::new(name).file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default()
 }
 
-/// The path with the file name cut at its first dot, as Gaussian Grouping does.
+/// Cuts the file name of a path at its first dot, as Gaussian Grouping does.
 fn cut_at_first_dot(name: &str) -> PathBuf {
     let path = Path::new(name);
     let file = path.file_name().map(|file| file.to_string_lossy().into_owned()).unwrap_or_default();
@@ -152,7 +149,7 @@ fn cut_at_first_dot(name: &str) -> PathBuf {
 }
 
 impl PhotoNames {
-    /// `names` are those of all photos of the scene.
+    /// Makes it from the names of all photos of the scene.
     pub(crate) fn new<'a>(names: impl Iterator<Item = &'a str>) -> Self {
         let (mut stems, mut cut) = (HashMap::new(), HashMap::new());
         for name in names {
@@ -162,9 +159,9 @@ impl PhotoNames {
         Self { stems, cut }
     }
 
-    /// What the mask of `name` may be called, without `.png`, in order of preference: the photo's name without its
-    /// extension, with it, cut at the first dot of the file name, and the first two without folders; the last three
-    /// only where no other photo comes to the same name.
+    /// Returns the possible names for the mask of `name`, without `.png`, in order of preference: the photo's name
+    /// without its extension, with it, cut at the first dot of the file name, and the first two without folders. The
+    /// last three need a name that no other photo shares.
     pub(crate) fn keys(&self, name: &str) -> Vec<PathBuf> {
         let path = Path::new(name);
         let mut found = vec![path.with_extension(""), path.to_owned()];
@@ -180,21 +177,21 @@ impl PhotoNames {
     }
 }
 
-/// `key` with `.png` added, whatever dots it has.
+/// Appends `.png` to `key`, which may contain dots.
 pub(crate) fn with_png(key: &Path) -> PathBuf {
     let mut name = key.as_os_str().to_owned();
     name.push(".png");
     name.into()
 }
 
-/// Finds the mask of a photo by its name.
+/// A folder of masks that are found by the name of the photo.
 pub(crate) struct MaskFolder {
     folder: PathBuf,
     names: PhotoNames,
 }
 
 impl MaskFolder {
-    /// `names` are those of all photos of the scene.
+    /// Opens the folder; `names` are those of all photos of the scene.
     pub(crate) fn new<'a>(folder: &Path, names: impl Iterator<Item = &'a str>) -> Result<Self> {
         if !folder.is_dir() {
             return Err(Error::data(folder, "", "there is no such folder of masks"));
@@ -202,12 +199,12 @@ impl MaskFolder {
         Ok(Self { folder: folder.to_owned(), names: PhotoNames::new(names) })
     }
 
-    /// The mask file of `name`, if there is one.
+    /// Returns the mask file of `name`, if there is one.
     pub(crate) fn find(&self, name: &str) -> Option<PathBuf> {
         self.names.keys(name).iter().map(|key| self.folder.join(with_png(key))).find(|path| path.is_file())
     }
 
-    /// The error for a folder in which no photo has a mask.
+    /// Makes the error for a folder without a mask for any photo.
     pub(crate) fn nothing_found(&self, name: &str) -> Error {
         let expected = Path::new(name).with_extension("png");
         let mut text = format!("no photo of the scene has a mask here; expected for example {}", expected.display());

@@ -1,8 +1,8 @@
-//! Files to scenes and back.
+//! Reads and writes files.
 //!
-//! [`open`] reads a captured scene, [`model`] a model, [`image`] and [`mask`] pixels, [`camera_json`] single cameras;
-//! [`masks`] imports and checks whole folders of masks;
-//! [`init`] makes the first Gaussians of a scene. All output goes through [`atomic`].
+//! [`open`] reads a scene with photos, poses and masks. [`read_model`] and [`write_model`] are for models,
+//! [`read_photo`] and [`read_mask`] for single images, [`read_camera`] for a camera. [`initial_gaussians`] makes the
+//! first Gaussians of a scene. [`masks`] imports and checks whole folders of masks. All writes are atomic.
 
 pub(crate) mod atomic;
 mod bad_photos;
@@ -53,27 +53,27 @@ pub use occlusion_table::OcclusionTable;
 pub use pipeline_file::PipelineFolder;
 pub use read_options::ReadOptions;
 
-/// What to read of a scene, and how.
+/// The options for reading a scene.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LoadOptions {
-    /// Folder of id images; none are read without it.
+    /// Folder of id masks; without it no masks are read.
     pub masks: Option<PathBuf>,
-    /// Bound on the longest side of photos, px.
+    /// Limit on the longest side of photos, px.
     pub max_resolution: Option<u32>,
-    /// Every how many-th photo by name is held out (the first, then every K-th); `None` holds out nothing. A scene
-    /// with a split of its own keeps it.
+    /// Every N-th view by name is held out, starting with the first; `None` holds out nothing. A scene with its own
+    /// split keeps it.
     pub test_every: Option<u32>,
-    /// Colour behind transparent photos, components from 0 to 1.
+    /// Colour behind transparent photos, R, G, B, 0 to 1.
     pub background: [f32; 3],
-    /// Whether photos are decoded. Their sizes are read in any case.
+    /// Decodes the photos. Their sizes are read in any case.
     pub photos: bool,
-    /// Largest share of the photos, from 0 to 1, that may be undecodable; they are skipped with a note.
+    /// Largest share of undecodable photos, 0 to 1. They are skipped with a note.
     pub max_bad_photos: f32,
-    /// Whether a scene may list files outside of its folder, by absolute paths or by `..`.
+    /// Accepts files outside of the scene's folder, by absolute paths or `..`.
     pub allow_outside: bool,
 }
 
-/// Largest share of undecodable photos unless another is asked for.
+/// Default for the largest share of undecodable photos.
 pub const MAX_BAD_PHOTOS: f32 = 0.1;
 
 impl Default for LoadOptions {
@@ -90,13 +90,13 @@ impl Default for LoadOptions {
     }
 }
 
-/// Reads the scene in the folder `scene`: a COLMAP model (`sparse/0`, `sparse`, `colmap/sparse/0` or the folder
-/// itself; it wins over the others), or `transforms_train.json` with `transforms_test.json`, or `transforms.json`.
-/// A path to one `.json` file reads that file.
+/// Reads the scene in the folder `scene`: a COLMAP model (in `sparse/0`, `sparse`, `colmap/sparse/0` or the folder
+/// itself), else `transforms_train.json` with `transforms_test.json`, else `transforms.json`. A path to a `.json` file
+/// reads that file.
 ///
-/// Views come undistorted and resized, each with a pinhole camera of its own size; see [`LoadOptions`] and the notes
-/// of the result. Undistortion keeps focal lengths and principal point: pixels for which the photo has no source get
-/// alpha 0 and the id 0. Listed photos without a file are skipped before the split, undecodable ones after it.
+/// Views are undistorted and resized, each with a pinhole camera of its own size; see [`LoadOptions`] and the notes of
+/// the result. Undistortion keeps focal lengths and principal point: pixels outside of the photo get alpha 0 and id 0.
+/// Photos without a file are skipped before the split, undecodable ones after it.
 pub fn open(scene: &Path, options: &LoadOptions) -> Result<Dataset> {
     if options.max_resolution == Some(0) {
         return Err(Error::usage("max_resolution", "0 px leaves no image; expected 1 or more"));
@@ -108,7 +108,7 @@ pub fn open(scene: &Path, options: &LoadOptions) -> Result<Dataset> {
     load::load(folder_of(scene), list(scene, options.allow_outside)?, options)
 }
 
-/// As [`open`]; what a person should know of the scene goes into the log.
+/// Like [`open`]; logs a summary and the notes.
 pub(crate) fn open_logged(scene: &Path, options: &LoadOptions) -> Result<Dataset> {
     let dataset = open(scene, options)?;
     dataset.notes.iter().for_each(|note| tracing::warn!("{note}"));
@@ -117,7 +117,7 @@ pub(crate) fn open_logged(scene: &Path, options: &LoadOptions) -> Result<Dataset
     Ok(dataset)
 }
 
-/// The folder of a scene that is named by its folder or by one file in it.
+/// Returns the folder of a scene, given the folder or one file in it.
 fn folder_of(scene: &Path) -> &Path {
     if !scene.is_file() {
         return scene;
@@ -125,7 +125,7 @@ fn folder_of(scene: &Path) -> &Path {
     scene.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
-/// What a scene lists, with files outside of its folder only where those are allowed.
+/// Lists a scene. Files outside of its folder need `allow_outside`.
 fn list(scene: &Path, allow_outside: bool) -> Result<Listing> {
     if scene.is_file() {
         return transforms::list_file(&Place::new(folder_of(scene), allow_outside), scene);
@@ -143,8 +143,8 @@ fn list(scene: &Path, allow_outside: bool) -> Result<Listing> {
     listing.ok_or_else(|| Error::data(scene, "", problem))
 }
 
-/// The lenses of the photos that `scene` (as in [`open`]) lists, by the name of the view; those of a pinhole are left
-/// out. Where the photos lie is not judged: that was done when the scene was opened.
+/// Returns the lenses of the photos in `scene` (as in [`open`]) by name of the view, without pinholes. Accepts photos
+/// anywhere, because opening the scene has checked their paths.
 pub(crate) fn lenses(scene: &Path) -> Result<BTreeMap<String, Lens>> {
     Ok(list(scene, true)?
         .views

@@ -1,4 +1,4 @@
-//! `occlusion.json`: which objects hide which, view by view.
+//! `occlusion.json`: the occluders of each object in each view.
 
 use super::atomic;
 use crate::error::{Error, Result};
@@ -12,24 +12,24 @@ use std::path::Path;
 pub(crate) const FILE: &str = "occlusion.json";
 const SCHEMA_VERSION: u32 = 1;
 
-/// Occluders of the objects of all views.
+/// A table of occluders.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct OcclusionTable {
     /// Version of the layout.
     pub schema_version: u32,
-    /// What the lists were made from: `none`, `depth` or `rendered`.
+    /// Source of the lists: `none`, `depth` or `rendered`.
     pub kind: String,
-    /// By name of the view: by object, the objects that hide a part of it.
+    /// By name of the view and by object: the objects that hide a part of it.
     pub views: BTreeMap<String, Occluders>,
 }
 
 impl OcclusionTable {
-    /// A table of these lists.
+    /// Makes a table of these lists.
     pub fn new(kind: &str, views: BTreeMap<String, Occluders>) -> Self {
         Self { schema_version: SCHEMA_VERSION, kind: kind.to_owned(), views }
     }
 
-    /// Reads a table. Another version, the id 0 and an object that hides itself are errors; lists come back sorted.
+    /// Reads a table and sorts its lists. Another version, the id 0 and an object that hides itself are errors.
     pub fn read(path: &Path) -> Result<Self> {
         let text = read::text(path)?;
         let mut table: Self = serde_json::from_str(&text).map_err(|error| {
@@ -38,7 +38,7 @@ impl OcclusionTable {
             Error::data(path, format!("line {}", error.line()), format!("{error}; {expected}"))
         })?;
         if table.schema_version != SCHEMA_VERSION {
-            let problem = format!("has version {}, this program reads {SCHEMA_VERSION}", table.schema_version);
+            let problem = format!("has version {}, labelgs reads {SCHEMA_VERSION}", table.schema_version);
             return Err(Error::data(path, "schema_version", problem));
         }
         for (name, objects) in &mut table.views {
@@ -57,13 +57,13 @@ impl OcclusionTable {
         Ok(table)
     }
 
-    /// Writes the table, whole or not at all.
+    /// Writes the table, atomically.
     pub fn write(&self, path: &Path) -> Result<()> {
         let text = serde_json::to_string_pretty(self).map_err(|error| Error::Bug(format!("JSON: {error}")))?;
         atomic::write(path, |out| out.write_all(text.as_bytes()))
     }
 
-    /// Number of (object, occluder) pairs over all views.
+    /// Returns the number of (object, occluder) pairs over all views.
     pub fn pair_count(&self) -> usize {
         self.views.values().flat_map(Occluders::values).map(Vec::len).sum()
     }

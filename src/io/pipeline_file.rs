@@ -1,4 +1,4 @@
-//! Compiled pipelines in a file per device: magic, checksum, length, and what the driver gave.
+//! The pipeline cache: one file per device with magic, checksum, length and the data of the driver.
 
 use super::atomic;
 use crate::gpu::PipelineStore;
@@ -9,19 +9,19 @@ use std::path::PathBuf;
 const MAGIC: [u8; 8] = *b"labelgsP";
 const HEADER: usize = 20;
 
-/// A folder of such files.
+/// A folder of pipeline caches.
 #[derive(Clone, Debug)]
 pub struct PipelineFolder {
     folder: PathBuf,
 }
 
 impl PipelineFolder {
-    /// A folder, made when something is saved.
+    /// Uses a folder; saving creates it.
     pub fn new(folder: impl Into<PathBuf>) -> Self {
         Self { folder: folder.into() }
     }
 
-    /// `LABELGS_CACHE` if it names a folder, otherwise the user's cache folder; none with `off`, or where there is none.
+    /// Returns the folder in `LABELGS_CACHE`, else the user's cache folder; none for `off` or without a cache folder.
     pub fn of_user() -> Option<Self> {
         match std::env::var_os("LABELGS_CACHE").filter(|value| !value.is_empty()) {
             Some(value) if value == "off" => None,
@@ -43,7 +43,7 @@ impl PipelineStore for PipelineFolder {
         let path = self.path(device);
         let Ok(bytes) = read::bytes(&path) else { return Vec::new() };
         unpack(&bytes).map(<[u8]>::to_vec).unwrap_or_else(|| {
-            tracing::warn!("{} is damaged; pipelines are compiled again and it is written anew", path.display());
+            tracing::warn!("{} is damaged; pipelines are compiled and written again", path.display());
             Vec::new()
         })
     }
@@ -56,12 +56,12 @@ impl PipelineStore for PipelineFolder {
             file.write_all(data)
         });
         if let Err(error) = written {
-            tracing::warn!("compiled pipelines were not kept, the next start compiles again: {error}");
+            tracing::warn!("compiled pipelines could not be saved, the next start compiles them again: {error}");
         }
     }
 }
 
-/// The data, if it is whole: what a driver is given it may trust blindly.
+/// Returns the data if it is undamaged: a driver may trust it without checks.
 fn unpack(bytes: &[u8]) -> Option<&[u8]> {
     let (header, data) = bytes.split_at_checked(HEADER)?;
     let (magic, rest) = header.split_at(MAGIC.len());

@@ -1,5 +1,5 @@
-//! How files are read. Every open and every read of every reader goes through here, so that
-//! [faults](crate::lab::fault) reach all of them.
+//! File reading. Every reader opens and reads files through this module, so that [faults](crate::lab::fault) reach all
+//! of them.
 
 use crate::error::{Error, Result};
 use crate::lab::fault;
@@ -7,12 +7,10 @@ use std::fs::{self, File};
 use std::io::{self, BufReader, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
-/// A file that is read.
 #[derive(Debug)]
 pub(crate) struct Source(File);
 
 impl Source {
-    /// Bytes of the file.
     pub(crate) fn length(&self) -> io::Result<u64> {
         Ok(self.0.metadata()?.len())
     }
@@ -26,7 +24,7 @@ impl Read for Source {
             self.0.read(&mut buffer[..most])
         };
         loop {
-            // Not every decoder tries again what a signal interrupted.
+            // Some decoders do not retry after an interrupting signal.
             match once() {
                 Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
                 other => return other,
@@ -46,13 +44,11 @@ fn source(path: &Path) -> io::Result<Source> {
     Ok(Source(File::open(path)?))
 }
 
-/// Opens a file.
 pub(crate) fn open(path: &Path) -> Result<BufReader<Source>> {
     let file = source(path).map_err(Error::read(path))?;
     Ok(BufReader::with_capacity(1 << 16, file))
 }
 
-/// All bytes of a file.
 pub(crate) fn bytes(path: &Path) -> Result<Vec<u8>> {
     let all = || {
         let mut file = source(path)?;
@@ -63,13 +59,13 @@ pub(crate) fn bytes(path: &Path) -> Result<Vec<u8>> {
     all().map_err(Error::read(path))
 }
 
-/// A file of UTF-8 text.
+/// Reads a file of UTF-8 text.
 pub fn text(path: &Path) -> Result<String> {
     String::from_utf8(bytes(path)?)
         .map_err(|error| Error::data(path, format!("byte {}", error.utf8_error().valid_up_to()), "is not UTF-8 text"))
 }
 
-/// Paths of what is in a folder, in no order.
+/// Lists the paths in a folder, in no particular order.
 pub(crate) fn folder(path: &Path) -> Result<Vec<PathBuf>> {
     let all = || {
         fault::of_file("read")?;

@@ -1,15 +1,15 @@
 //! Photos and id maps at another size or through another lens.
 //!
-//! Photos are undistorted with bilinear interpolation at their own size and then shrunk by an exact area average.
-//! Ids are never mixed: each target pixel takes the id at its centre, through size and lens in one step.
+//! Photos are undistorted at their own size with bilinear interpolation, then shrunk by an exact area average. Ids are
+//! never mixed: each target pixel takes the id at its centre, with size and lens in one step.
 
 use super::lens::{Distortion, Lens};
 use crate::scene::{Camera, LabelMap, Photo};
 use glam::DVec2;
 use rayon::prelude::*;
 
-/// The size with `longest` px at the longest side, if the given one is larger: the one rounding rule for cameras,
-/// photos and masks.
+/// Returns the size limited to `longest` px at the longest side. It is the only rounding rule for cameras, photos and
+/// masks.
 pub(crate) fn bounded_size((width, height): (u32, u32), longest: Option<u32>) -> (u32, u32) {
     let Some(longest) = longest.filter(|&longest| longest < width.max(height)) else { return (width, height) };
     let scale = f64::from(longest) / f64::from(width.max(height));
@@ -17,7 +17,7 @@ pub(crate) fn bounded_size((width, height): (u32, u32), longest: Option<u32>) ->
     (side(width), side(height))
 }
 
-/// True if the two sizes differ by a scale only: shrinking the larger to the smaller, the sides agree within 1 px.
+/// Returns true if the sizes differ by a scale only: the larger one shrunk to the smaller agrees within 1 px.
 pub(crate) fn same_aspect(a: (u32, u32), b: (u32, u32)) -> bool {
     let along = |from: (u32, u32), to: (u32, u32)| {
         let height = f64::from(from.1) * f64::from(to.0) / f64::from(from.0);
@@ -28,22 +28,22 @@ pub(crate) fn same_aspect(a: (u32, u32), b: (u32, u32)) -> bool {
     if smaller_first { along(b, a) } else { along(a, b) }
 }
 
-/// Maps pixels of the pinhole image of `camera` to the photo taken through `lens` with the same intrinsics.
+/// A map from pixels of the pinhole image of `camera` to the photo through `lens` with the same intrinsics.
 pub(crate) struct Undistortion<'a> {
     camera: &'a Camera,
-    /// With the distance from the axis up to which it is one to one.
+    /// The lens, and the radius up to which it is one to one.
     lens: Option<(&'a dyn Distortion, f64)>,
 }
 
 impl<'a> Undistortion<'a> {
-    /// `camera` has the size of the photo.
+    /// Makes the map; `camera` has the size of the photo.
     pub(crate) fn new(camera: &'a Camera, lens: Option<&'a dyn Distortion>) -> Self {
         let far = |f: f64, c: f64, side: u32| (c.max(f64::from(side) - c) / f).abs();
         let corner = DVec2::new(far(camera.fx, camera.cx, camera.width), far(camera.fy, camera.cy, camera.height));
         Self { camera, lens: lens.map(|lens| (lens, lens.valid_radius(corner.length().max(1e-9)))) }
     }
 
-    /// Photo position of the pinhole position `pixel`, both in px with centres at halves; `None` outside the photo.
+    /// Returns the photo position of the pinhole position `pixel` (px, centres at 0.5); `None` outside the photo.
     pub(crate) fn source(&self, pixel: DVec2) -> Option<DVec2> {
         let camera = self.camera;
         let Some((lens, valid_radius)) = self.lens else { return Some(pixel) };
@@ -58,8 +58,8 @@ impl<'a> Undistortion<'a> {
     }
 }
 
-/// The pinhole photo with the intrinsics of `camera`, which has the photo's size. Pixels without a source are
-/// black with alpha 0.
+/// Returns the pinhole photo with the intrinsics of `camera`, which has the size of the photo. Pixels outside of the
+/// photo are black with alpha 0.
 pub(crate) fn undistort_photo(photo: &Photo, camera: &Camera, lens: &Lens) -> Photo {
     let map = Undistortion::new(camera, lens.distortion());
     let row = |y: u32| {
@@ -73,7 +73,7 @@ pub(crate) fn undistort_photo(photo: &Photo, camera: &Camera, lens: &Lens) -> Ph
     Photo { width: photo.width, height: photo.height, rgba }
 }
 
-/// Colour between the four nearest pixel centres; the border continues outwards by its half pixel.
+/// Interpolates between the four nearest pixel centres. The colours at the border continue outwards by half a pixel.
 fn bilinear(photo: &Photo, at: DVec2) -> [u8; 4] {
     let split = |value: f64, side: u32| {
         let value = (value - 0.5).clamp(0.0, f64::from(side - 1));
@@ -92,7 +92,7 @@ fn bilinear(photo: &Photo, at: DVec2) -> [u8; 4] {
     colour
 }
 
-/// Along one side: the first source pixel of each target pixel and the weights from there on, which sum to 1.
+/// Returns the first source pixel of each target pixel along one side, and the weights from there on, which sum to 1.
 fn spans(from: u32, to: u32) -> Vec<(usize, Vec<f64>)> {
     let ratio = f64::from(from) / f64::from(to);
     let span = |index: u32| {
@@ -105,8 +105,8 @@ fn spans(from: u32, to: u32) -> Vec<(usize, Vec<f64>)> {
     (0..to).map(span).collect()
 }
 
-/// The photo shrunk to `width` x `height` px: each target pixel is the mean over its exact box of source pixels,
-/// fractions included, over those with alpha 255. It has alpha 255 if they cover at least half of the box.
+/// Shrinks the photo to `width` x `height` px. Each target pixel is the exact area mean over the source pixels with
+/// alpha 255. Its alpha is 255 if they cover at least half of its area.
 pub(crate) fn shrink_photo(photo: &Photo, width: u32, height: u32) -> Photo {
     if (width, height) == (photo.width, photo.height) {
         return photo.clone();
@@ -136,14 +136,14 @@ fn mean(photo: &Photo, (left, across): (usize, &[f64]), (top, down): (usize, &[f
     [r, g, b, 255]
 }
 
-/// The id map that belongs to a photo of size `width` x `height` px, made from a map of the distorted photo at any
-/// scale. `camera` is that of the photo at its own size. Pixels without a source are 0.
+/// Makes the id map for a photo of `width` x `height` px from a map of the distorted photo at any scale. `camera` is
+/// that of the photo at its own size. Pixels outside of the photo get 0.
 pub(crate) fn resample_ids(ids: &LabelMap, camera: &Camera, lens: &Lens, (width, height): (u32, u32)) -> LabelMap {
     let ids = resample_nearest(&ids.ids, (ids.width, ids.height), camera, lens, (width, height), 0);
     LabelMap { width, height, ids }
 }
 
-/// As [`resample_ids`], for values of any kind; pixels without a source are `nothing`.
+/// Like [`resample_ids`] for values of any kind; pixels outside of the photo get `nothing`.
 pub(crate) fn resample_nearest<T: Copy + Send + Sync>(
     values: &[T],
     from: (u32, u32),
@@ -177,7 +177,7 @@ mod tests {
     use super::*;
     use glam::{DMat3, DVec3};
 
-    /// Keeps angles: a ray of angle a from the axis ends at a.
+    /// Keeps angles: a ray at angle a from the axis ends at radius a.
     #[derive(Debug)]
     struct Equidistant;
 

@@ -1,21 +1,21 @@
-//! The folder of a training run, found from its model.
+//! The folder of a training run, found from its model, and its lock.
 
 use crate::error::{Error, Result};
 use std::fs::{File, TryLockError};
 use std::path::{Path, PathBuf};
 
-/// Configuration of the run, in TOML.
+/// File with the settings of the run, in TOML.
 pub const CONFIG: &str = "config.toml";
-/// Locked while a run writes into the folder.
+/// File that is locked while a run writes into the folder.
 const LOCK: &str = ".labelgs-lock";
 
-/// The folder of the run that a model is in: `RUN` for `RUN` itself and for
+/// Returns the folder of the run that a model belongs to: `RUN` for `RUN` itself and for
 /// `RUN/point_cloud/iteration_N/point_cloud.ply`; none for a PLY elsewhere.
 pub fn of_model(model: &Path) -> Option<PathBuf> {
     if model.is_dir() {
         return Some(model.to_owned());
     }
-    // A relative path may start below the run.
+    // The run may be above the start of a relative path.
     let model = std::path::absolute(model).ok()?;
     let step = model.parent()?;
     let models = step.parent()?;
@@ -23,8 +23,8 @@ pub fn of_model(model: &Path) -> Option<PathBuf> {
     (is_step && models.file_name()? == "point_cloud").then(|| models.parent().map(Path::to_owned)).flatten()
 }
 
-/// A folder that is this process's alone until this is dropped or the process ends, however it ends. Where the file system
-/// knows no locks, nothing is locked.
+/// A lock on a folder, held until it is dropped or the process ends in any way. On file systems without locks it does
+/// nothing.
 #[derive(Debug)]
 pub struct Lock {
     folder: PathBuf,
@@ -32,7 +32,7 @@ pub struct Lock {
 }
 
 impl Lock {
-    /// Locks a folder that is there. Fails if another process has it.
+    /// Locks an existing folder. Fails if another process holds it.
     pub fn take(folder: &Path) -> Result<Self> {
         let path = folder.join(LOCK);
         let file = File::options().create(true).append(true).open(&path).map_err(Error::write(&path))?;
@@ -45,8 +45,8 @@ impl Lock {
         }
     }
 
-    /// To be called before anything is written: if the folder was deleted, it is made and locked again. Fails if another
-    /// process was faster; that the folder cannot be made is found by whatever writes into it.
+    /// Keeps the lock; call it before each write. If the folder was deleted, makes and locks it again. Fails if another
+    /// process was faster. A failure to make the folder shows in the next write.
     pub fn hold(&mut self) -> Result<()> {
         if self.is_there() || std::fs::create_dir_all(&self.folder).is_err() {
             return Ok(());
@@ -59,7 +59,7 @@ impl Lock {
         Ok(())
     }
 
-    /// True while the path still leads to the file that is locked.
+    /// Returns true while the path leads to the locked file.
     #[cfg(unix)]
     fn is_there(&self) -> bool {
         use std::os::unix::fs::MetadataExt;
@@ -68,7 +68,7 @@ impl Lock {
         identity(own) == identity(found)
     }
 
-    /// Elsewhere nobody deletes a file that is open.
+    /// Other systems do not delete open files.
     #[cfg(not(unix))]
     fn is_there(&self) -> bool {
         true

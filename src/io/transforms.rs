@@ -1,7 +1,7 @@
 //! `transforms.json` in the styles of Blender, instant-ngp and nerfstudio.
 //!
-//! Poses are camera-to-world with OpenGL axes (y up, looking along -z) and become camera-from-world with OpenCV
-//! axes. The world stays that of `transform_matrix`: nerfstudio's `applied_transform` is already part of it.
+//! Poses are camera-to-world with OpenGL axes (y up, looking along -z) and become camera-from-world with OpenCV axes.
+//! The world is that of `transform_matrix`, which already includes nerfstudio's `applied_transform`.
 
 use super::lens::{self, Lens};
 use super::listed_path::Place;
@@ -15,10 +15,10 @@ use serde::Deserialize;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
-/// Endings tried for a photo that is listed without one.
+/// Extensions to try for a photo that is listed without one.
 const EXTENSIONS: [&str; 7] = ["", ".png", ".jpg", ".jpeg", ".PNG", ".JPG", ".JPEG"];
 
-/// Intrinsics, of the whole file or of one frame.
+/// Intrinsics of the whole file or of one frame.
 #[derive(Clone, Debug, Default, Deserialize)]
 struct Intrinsics {
     camera_angle_x: Option<f64>,
@@ -40,7 +40,7 @@ struct Intrinsics {
 }
 
 impl Intrinsics {
-    /// The frame's own values, and those of the file where it has none.
+    /// Returns the values of the frame, completed by those of the file.
     fn or(&self, file: &Self) -> Self {
         macro_rules! merged {
             ($($field:ident)*) => { Self { $($field: self.$field.clone().or(file.$field.clone())),* } };
@@ -67,8 +67,8 @@ struct Transforms {
     intrinsics: Intrinsics,
 }
 
-/// Reads the scene, if it has transforms: `transforms_train.json` and `transforms_test.json` with their
-/// split, or else `transforms.json`, or else `transforms_train.json` alone.
+/// Reads the scene, if it has transforms: `transforms_train.json` and `transforms_test.json` with their split, else
+/// `transforms.json`, else `transforms_train.json` alone.
 pub(crate) fn list(scene: &Place) -> Result<Option<Listing>> {
     let file = |name: &str| Some(scene.root.join(name)).filter(|path| path.is_file());
     let (train, test) = (file("transforms_train.json"), file("transforms_test.json"));
@@ -86,7 +86,6 @@ pub(crate) fn list(scene: &Place) -> Result<Option<Listing>> {
     Ok(Some(listing))
 }
 
-/// Reads one given file.
 pub(crate) fn list_file(scene: &Place, path: &Path) -> Result<Listing> {
     let mut listing = Listing { source: path.to_owned(), ..Listing::default() };
     read(scene, path, None, &mut listing)?;
@@ -132,7 +131,7 @@ fn read(scene: &Place, path: &Path, test: Option<bool>, listing: &mut Listing) -
             .push(format!("{repeated} frames of {} list a photo a second time and are skipped", path.display()));
     }
     if transforms.frames.iter().any(|frame| frame.mask_path.is_some()) {
-        listing.notes.push("`mask_path` of the frames is not used; id images are given by a folder of masks".into());
+        listing.notes.push("`mask_path` of the frames is not used; id masks come from a folder of masks".into());
     }
     if let Some(name) = &transforms.ply_file_path {
         let points = scene.root.join(scene.resolve(path, name)?.path);
@@ -148,16 +147,16 @@ fn read(scene: &Place, path: &Path, test: Option<bool>, listing: &mut Listing) -
     Ok(())
 }
 
-/// What there is of a frame.
+/// The result for a frame.
 enum Found {
     View(Box<Listed>),
-    /// Its photo does not exist, and nothing tells its size.
+    /// The photo does not exist, and its size is unknown.
     Nothing,
-    /// Its photo exists and does not tell its size either.
+    /// The photo exists and gives no size.
     Bad(Error),
 }
 
-/// The view of a frame.
+/// Makes the view of a frame.
 fn listed(scene: &Place, path: &Path, place: &str, frame: &Frame, file: &Intrinsics) -> Result<Found> {
     let resolved = scene.resolve(path, &frame.file_path)?;
     let photo = find_file(scene.root, &[".", "images"], &resolved.path, &EXTENSIONS);
@@ -176,7 +175,7 @@ fn listed(scene: &Place, path: &Path, place: &str, frame: &Frame, file: &Intrins
     (camera.rotation, camera.translation) = (rotation, translation);
     check_camera(path, place, &camera, &lens)?;
     let mut name = resolved.name;
-    // A photo listed without ending gets that of its file, or `frame.0001` would lose its number later on.
+    // A photo listed without extension gets that of its file. Otherwise `frame.0001` would later lose its number.
     if let Some(found) = photo.as_ref().and_then(|photo| photo.to_str()) {
         name.push_str(EXTENSIONS.iter().rev().find(|ext| found.ends_with(&format!("{name}{ext}"))).unwrap_or(&""));
     }
@@ -187,7 +186,7 @@ fn side(path: &Path, place: &str, value: f64) -> Result<u32> {
     if value.fract() == 0.0 && (1.0..=f64::from(u32::MAX)).contains(&value) {
         return Ok(value as u32);
     }
-    Err(Error::data(path, place, format!("image side {value} is no positive whole number")))
+    Err(Error::data(path, place, format!("image side {value} is not a positive whole number")))
 }
 
 fn lens(path: &Path, place: &str, i: &Intrinsics) -> Result<Lens> {
@@ -208,21 +207,20 @@ fn lens(path: &Path, place: &str, i: &Intrinsics) -> Result<Lens> {
     Ok(of_names(&|name| all.iter().find(|known| known.0 == name).and_then(|known| known.1).unwrap_or(0.0)))
 }
 
-/// Intrinsics at an identity pose. The focal lengths come from `fl_x`, `fl_y` or the field of view, each for the
-/// other where one is missing; the principal point is the middle if none is given.
+/// Makes the intrinsics, at an identity pose. Focal lengths come from `fl_x`, `fl_y` or the fields of view; a missing
+/// one equals the other. The default principal point is the image centre.
 fn camera(path: &Path, place: &str, i: &Intrinsics, (width, height): (u32, u32)) -> Result<Camera> {
     let (w, h) = (f64::from(width), f64::from(height));
-    // Beyond half a turn the tangent comes back: degrees, say, would pass as some angle in radians.
+    // The tangent is periodic: degrees, for example, would pass as some angle in radians.
     for (name, angle) in [("camera_angle_x", i.camera_angle_x), ("camera_angle_y", i.camera_angle_y)] {
         if let Some(angle) = angle.filter(|angle| !(*angle > 0.0 && *angle < std::f64::consts::PI)) {
-            let problem =
-                format!("{name} is {angle}, the focal length of no pinhole; expected radians between 0 and pi");
+            let problem = format!("{name} is {angle}, which gives no focal length; expected radians between 0 and pi");
             return Err(Error::data(path, place, problem));
         }
     }
     let from_angle = |side: f64, angle: f64| side / 2.0 / (angle / 2.0).tan();
     let fx = i.fl_x.or(i.camera_angle_x.map(|angle| from_angle(w, angle)));
-    // With fl_x alone fy is the same; an angle is used only where no length is given for its side.
+    // If only fl_x is given, fy equals it. An angle counts only if its side has no length.
     let fy = i.fl_y.or(if i.fl_x.is_none() { i.camera_angle_y.map(|angle| from_angle(h, angle)) } else { None });
     let (fx, fy) = match (fx, fy) {
         (Some(fx), Some(fy)) => (fx, fy),
@@ -236,7 +234,7 @@ fn camera(path: &Path, place: &str, i: &Intrinsics, (width, height): (u32, u32))
     Ok(Camera { rotation: DMat3::IDENTITY, translation: DVec3::ZERO, fx, fy, cx, cy, width, height })
 }
 
-/// Rows of a 3x4 or 4x4 matrix.
+/// Converts the rows of a 3x4 or 4x4 matrix.
 pub(crate) fn affine(rows: &[Vec<f64>]) -> Option<DAffine3> {
     if !(3..=4).contains(&rows.len()) || rows.iter().any(|row| row.len() != 4 || row.iter().any(|v| !v.is_finite())) {
         return None;
@@ -246,7 +244,7 @@ pub(crate) fn affine(rows: &[Vec<f64>]) -> Option<DAffine3> {
 }
 
 fn pose(path: &Path, place: &str, rows: &[Vec<f64>]) -> Result<(DMat3, DVec3)> {
-    let problem = "transform_matrix is no camera-to-world pose: 4 x 4 numbers, the upper left 3 x 3 a rotation";
+    let problem = "transform_matrix is not a camera-to-world pose: 4 x 4 numbers, the upper left 3 x 3 a rotation";
     let refuse = || Error::data(path, place, problem);
     let matrix = affine(rows).ok_or_else(refuse)?;
     let rotation = rotation_of(matrix.matrix3).ok_or_else(refuse)?;
@@ -255,8 +253,8 @@ fn pose(path: &Path, place: &str, rows: &[Vec<f64>]) -> Result<(DMat3, DVec3)> {
     Ok(invert_pose(rotation, matrix.translation))
 }
 
-/// The points in the world of the poses. nerfstudio writes them there; its early versions wrote them before
-/// `applied_transform`. Whichever lets the cameras see more of them is right.
+/// Returns the points in the world of the poses. nerfstudio writes them there, but its early versions wrote them before
+/// `applied_transform`. The variant in which the cameras see more points is right.
 fn in_the_frame_of(
     views: &[Listed],
     points: Vec<Point>,
@@ -266,22 +264,22 @@ fn in_the_frame_of(
 ) -> Result<Vec<Point>> {
     let Some(rows) = applied else { return Ok(points) };
     let Some(matrix) = affine(rows) else {
-        return Err(Error::data(path, "applied_transform", "is no 3 x 4 or 4 x 4 matrix of numbers"));
+        return Err(Error::data(path, "applied_transform", "is not a 3 x 4 or 4 x 4 matrix of numbers"));
     };
     let moved = points.iter().map(|p| Point { position: matrix.transform_point3(p.position), ..*p });
     let moved: Vec<Point> = moved.collect();
     if !moved.iter().all(|point| point.position.abs().max_element() <= FAR) {
-        let problem = format!("moves points beyond {FAR:e}; expected a rotation and a scale of the usual size");
+        let problem = format!("moves points beyond {FAR:e}; expected a rotation and a moderate scale");
         return Err(Error::data(path, "applied_transform", problem));
     }
     if seen(views, &moved) as f64 > 1.2 * seen(views, &points) as f64 {
-        notes.push("applied_transform was applied to the points, which fit the cameras only so".into());
+        notes.push("applied_transform was applied to the points, because they fit the cameras better with it".into());
         return Ok(moved);
     }
     Ok(points)
 }
 
-/// How often some of the points fall into some of the views.
+/// Counts the points in the views, over samples of both.
 fn seen(views: &[Listed], points: &[Point]) -> usize {
     let some_views: Vec<&Camera> = views.iter().step_by(views.len() / 50 + 1).map(|view| &view.camera).collect();
     let some_points = points.iter().step_by(points.len() / 2000 + 1);
@@ -295,7 +293,7 @@ fn seen(views: &[Listed], points: &[Point]) -> usize {
     some_points.map(|point| some_views.iter().filter(|camera| inside(camera, point)).count()).sum()
 }
 
-/// Takes a leading `images/` off the names if all have it, so that names mean the same as in a COLMAP scene.
+/// Removes a leading `images/` if all names have it, so that names are the same as in a COLMAP scene.
 fn strip_folder(listing: &mut Listing) {
     let stripped = listing.views.iter().map(|view| view.name.strip_prefix("images/").map(str::to_owned));
     if let Some(names) = stripped.collect::<Option<Vec<String>>>() {

@@ -1,4 +1,4 @@
-//! True masks of single objects, as benchmarks ship them: a black and white picture per object and frame.
+//! Ground-truth masks of single objects, as benchmarks ship them: a black and white image per object and frame.
 
 use super::image::read_grey;
 use super::lens::Lens;
@@ -9,23 +9,23 @@ use crate::scene::{LabelMap, Photo, View};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-/// A mask at the size at which it is compared, row-major.
+/// A ground-truth mask at the size of the comparison, row-major.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct TruthMask {
     /// Width, px.
     pub width: u32,
     /// Height, px.
     pub height: u32,
-    /// True where the object is visible.
+    /// True for pixels of the object, `[height, width]`.
     pub inside: Vec<bool>,
 }
 
-/// Kinds of pictures.
+/// Extensions of masks.
 const EXTENSIONS: [&str; 3] = ["png", "jpg", "jpeg"];
-/// Folders below the given one that [`files_below`] looks into.
+/// Number of folder levels that [`files_below`] searches.
 const DEPTH: u32 = 3;
 
-/// The PNG and JPEG files below a folder, relative to it, sorted; hidden ones are left out.
+/// Lists the PNG and JPEG files below a folder by relative path, sorted. Hidden files are left out.
 pub fn files_below(folder: &Path) -> Result<Vec<PathBuf>> {
     if !folder.is_dir() {
         return Err(Error::data(folder, "", "there is no such folder of true masks"));
@@ -56,10 +56,11 @@ fn collect(root: &Path, inside: &Path, depth: u32, found: &mut Vec<PathBuf>) -> 
     Ok(())
 }
 
-/// Reads the mask of an object in `view`. Inside is a value above 128, or above 0 in a file without a value above 1.
+/// Reads the mask of an object in `view`. The object is where the value is above 128, or above 0 in a file without
+/// values above 1.
 ///
-/// The mask belongs to the photo as it was taken; with the photo's lens in `lenses` it is undistorted. It is compared at
-/// its own size, unless that is larger than the view; then it takes the view's size, each pixel from the nearest one.
+/// The mask belongs to the original photo and is undistorted with the lens in `lenses`. It is compared at its own size.
+/// If it is larger than the view, it is resampled (nearest) to the view's size.
 pub fn read_truth(path: &Path, view: &View, lenses: &BTreeMap<String, Lens>) -> Result<TruthMask> {
     let (width, height, values) = read_grey(path)?;
     let camera = &view.camera;
@@ -80,7 +81,7 @@ pub fn read_truth(path: &Path, view: &View, lenses: &BTreeMap<String, Lens>) -> 
     Ok(TruthMask { width: map.width, height: map.height, inside: map.ids.iter().map(|&id| id != 0).collect() })
 }
 
-/// A photo shrunk to the size of a mask, which is not larger.
+/// Shrinks a photo to the size of a mask, which is not larger.
 pub(crate) fn photo_at(photo: &Photo, width: u32, height: u32) -> Photo {
     shrink_photo(photo, width, height)
 }

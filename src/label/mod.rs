@@ -1,4 +1,7 @@
-//! Labels of Gaussians from masks: votes over all views, what hides what, and masks made to agree with each other.
+//! Labels of Gaussians from masks.
+//!
+//! [`label_by_votes`] labels a trained model by the votes of all views, [`label_by_lift`] by the rule of the paper.
+//! [`occlusion`] finds which objects hide which, and [`masks`] makes the masks of different views agree.
 
 pub mod masks;
 pub mod occlusion;

@@ -1,9 +1,8 @@
-//! Options that are written once: name, type, default, range, whether they may change within a run, and help stand at
-//! one field. [`options!`](macro@crate::options) makes of them a struct, its `Default`, its check, its keys in `config.toml`
-//! and, with the feature `cli`, its flags.
+//! Options, each declared in one place: name, type, default, range, whether it may change within a run, and help.
 //!
-//! A flag has no default of its own: what nobody typed stays as it was, so that a flag wins over a file and a file over
-//! the default.
+//! [`options!`](macro@crate::options) makes a struct from the declarations, with its `Default`, its check, its keys in
+//! `config.toml` and, with the feature `cli`, its flags. Flags have no default: only flags on the command line change a
+//! value. So a flag wins over a file, and a file over the default.
 
 pub(crate) mod parse;
 #[cfg(feature = "cli")]
@@ -14,7 +13,7 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 use std::collections::BTreeMap;
 
-/// Values that make sense.
+/// A range of valid values.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Range {
     Any,
@@ -25,48 +24,48 @@ enum Range {
     PositiveUpTo(f64),
 }
 
-/// What is known about an option besides its value.
+/// The description of an option.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Key {
-    /// Its name in `config.toml`; the flag has dashes for the underscores.
+    /// Name in `config.toml`; the flag has dashes instead of underscores.
     pub name: &'static str,
-    /// It cannot change within a run: the scene was read with it, or what is in memory has its shape.
+    /// True if it cannot change within a run, because the scene was read with it or buffers depend on it.
     pub is_fixed: bool,
     range: Range,
 }
 
 impl Key {
-    /// An option that takes any value.
+    /// Makes an option without a range.
     pub const fn new(name: &'static str) -> Self {
         Self { name, is_fixed: false, range: Range::Any }
     }
 
-    /// Cannot change within a run.
+    /// Forbids changes within a run.
     pub const fn fixed(self) -> Self {
         Self { is_fixed: true, ..self }
     }
 
-    /// Whole numbers from `least`.
+    /// Accepts whole numbers from `least`.
     pub const fn at_least(self, least: u32) -> Self {
         Self { range: Range::AtLeast(least), ..self }
     }
 
-    /// 0 or more.
+    /// Accepts 0 or more.
     pub const fn not_negative(self) -> Self {
         Self { range: Range::NotNegative, ..self }
     }
 
-    /// More than 0.
+    /// Accepts more than 0.
     pub const fn positive(self) -> Self {
         Self { range: Range::Positive, ..self }
     }
 
-    /// 0 to `most`.
+    /// Accepts 0 to `most`.
     pub const fn up_to(self, most: f64) -> Self {
         Self { range: Range::UpTo(most), ..self }
     }
 
-    /// More than 0, at most `most`.
+    /// Accepts more than 0, at most `most`.
     pub const fn positive_up_to(self, most: f64) -> Self {
         Self { range: Range::PositiveUpTo(most), ..self }
     }
@@ -76,7 +75,7 @@ impl Key {
         let is_wrong = |&number: &f64| match self.range {
             Range::Any => false,
             Range::AtLeast(least) => number < f64::from(least),
-            // A NaN is in no range.
+            // NaN is in no range.
             Range::NotNegative => !(0.0..=f64::MAX).contains(&number),
             Range::Positive => !(f64::MIN_POSITIVE..=f64::MAX).contains(&number),
             Range::UpTo(most) => !(0.0..=most).contains(&number),
@@ -95,9 +94,9 @@ impl Key {
     }
 }
 
-/// The numbers of a value that its range bounds.
+/// Values with numbers that a range applies to.
 pub trait Numbers {
-    /// All of them; none where the type has no range.
+    /// Returns these numbers; none for types without a range.
     fn numbers(&self) -> Vec<f64>;
 }
 
@@ -122,17 +121,17 @@ numbers! {
     Option<f64> => |value| value.iter().copied().collect();
 }
 
-/// A struct that [`options!`](macro@crate::options) made.
+/// A struct made by [`options!`](macro@crate::options).
 pub(crate) trait Options: Serialize + DeserializeOwned + Default {
-    /// Its options, in order.
+    /// The options, in order.
     const KEYS: &'static [Key];
 
-    /// Refuses values outside of their ranges; the message names the option.
+    /// Refuses values outside of their ranges; messages name the option.
     fn check_ranges(&self) -> Result<()>;
 
-    /// The values as one types them, by key; an option that is not set has none.
+    /// Returns the values by key, in the syntax of the command line. Unset options are absent.
     fn texts(&self) -> BTreeMap<String, String> {
-        // TOML prints a f32 as one would type it.
+        // TOML prints f32 in the shortest form.
         let text = toml::to_string(self).unwrap_or_default();
         let fields = text.lines().filter_map(|line| line.split_once(" = "));
         fields.map(|(key, value)| (key.to_owned(), parse::as_typed(value))).collect()
@@ -140,8 +139,8 @@ pub(crate) trait Options: Serialize + DeserializeOwned + Default {
 }
 
 /// Declares a struct of options. A field is `NAME <"VALUE NAME">: TYPE = DEFAULT, RULES;` with rules of [`Key`] such as
-/// `at_least(1)` and `fixed`; fields stand under the heading of their flags. The first paragraph of a field's doc is the
-/// help, what follows is shown by `--help` only.
+/// `at_least(1)` and `fixed`. Fields are grouped by the headings of their flags. The first paragraph of a field's doc
+/// is the short help; `--help` also shows the rest.
 macro_rules! options {
     ($(#[$outer:meta])* pub struct $name:ident {
         $($heading:literal { $(
@@ -176,7 +175,7 @@ macro_rules! options {
             }
         }
     };
-    // An option without rules has a type without numbers, or takes any.
+    // An option without rules accepts all values.
     (@check $keys:ident, $value:expr) => { let _ = $keys.next(); };
     (@check $keys:ident, $value:expr, fixed) => { let _ = $keys.next(); };
     (@check $keys:ident, $value:expr, $($rule:ident),+) => {

@@ -1,32 +1,32 @@
-//! Values of options as one types them.
+//! Parsers for the values of flags.
 
-/// A colour: a name, or three numbers from 0 to 1.
+/// Parses a colour: a name, or three numbers from 0 to 1.
 pub(crate) fn colour(text: &str) -> Result<[f32; 3], String> {
     match text {
         "black" => return Ok([0.0; 3]),
         "white" => return Ok([1.0; 3]),
         _ => {}
     }
-    let wrong = || format!("`{text}` is no colour; expected black, white, or R,G,B from 0 to 1 each");
+    let wrong = || format!("`{text}` is not a colour; expected black, white, or R,G,B from 0 to 1 each");
     let parts = text.split(',').map(|part| part.trim().parse::<f32>().ok().filter(|value| (0.0..=1.0).contains(value)));
     let parts: Vec<f32> = parts.collect::<Option<_>>().ok_or_else(wrong)?;
     parts.try_into().map_err(|_| wrong())
 }
 
-/// A number of things such as `1500`, `500k` or `2M`.
+/// Parses a count such as `1500`, `500k` or `2M`.
 pub(crate) fn count(text: &str) -> Result<u64, String> {
-    let wrong = || format!("`{text}` is no number of things; expected such as 1500, 500k or 2.5M");
+    let wrong = || format!("`{text}` is not a count; expected for example 1500, 500k or 2.5M");
     let (digits, unit) = match text.char_indices().last() {
         Some((at, 'k' | 'K')) => (&text[..at], 1e3),
         Some((at, 'm' | 'M')) => (&text[..at], 1e6),
         _ => return text.parse().map_err(|_| wrong()),
     };
     let value = digits.parse::<f64>().map_err(|_| wrong())? * unit;
-    // Below 2^53, where every whole number is a f64.
+    // Below 2^53, f64 holds every whole number.
     if !(0.0..9e15).contains(&value) { Err(wrong()) } else { Ok(value.round() as u64) }
 }
 
-/// `on` or `off`.
+/// Parses `on` or `off`.
 pub(crate) fn switch(text: &str) -> Result<bool, String> {
     match text {
         "on" | "true" | "yes" => Ok(true),
@@ -35,7 +35,7 @@ pub(crate) fn switch(text: &str) -> Result<bool, String> {
     }
 }
 
-/// A number of objects, or `all`.
+/// Parses a number of objects, or `all`.
 pub(crate) fn samples(text: &str) -> Result<u32, String> {
     match text {
         "all" => Ok(u32::MAX),
@@ -43,7 +43,7 @@ pub(crate) fn samples(text: &str) -> Result<u32, String> {
     }
 }
 
-/// A value of a TOML file as one types it.
+/// Converts a TOML value to the syntax of the command line.
 pub(super) fn as_typed(value: &str) -> String {
     match value {
         "true" => "on".into(),

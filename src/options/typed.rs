@@ -1,10 +1,10 @@
-//! Options as flags: only what was typed counts.
+//! Options as flags on the command line.
 
 use clap::parser::ValueSource;
 use clap::{ArgMatches, Args, Command, FromArgMatches};
 use std::marker::PhantomData;
 
-/// The flags of the options `T`, none of which has to be typed.
+/// The flags of the options `T`, all optional.
 #[derive(Clone, Debug)]
 pub struct Typed<T> {
     matches: ArgMatches,
@@ -12,14 +12,14 @@ pub struct Typed<T> {
 }
 
 impl<T: Args> Typed<T> {
-    /// Puts what was typed over `options`.
+    /// Applies the flags from the command line to `options`.
     pub fn apply(&self, options: &mut T) -> Result<(), clap::Error> {
         options.update_from_arg_matches(&self.matches)
     }
 }
 
 impl<T> Typed<T> {
-    /// Whether an option was typed, by its key.
+    /// Returns true if the command line has the option with this key.
     pub fn is_typed(&self, key: &str) -> bool {
         self.matches.value_source(key) == Some(ValueSource::CommandLine)
     }

@@ -1,4 +1,7 @@
-//! Pictures of a model: colour, alpha, depth, and the main Gaussian of each pixel.
+//! Renders a model: colour, alpha, depth, and the main Gaussian of each pixel.
+//!
+//! [`render()`] draws the model of an [`Engine`] from a [`Camera`]. [`RenderOptions`] has near plane, background and
+//! the [`Parts`] to read back. The result is a [`Rendered`]; [`write_pictures`] writes it as PNG or EXR.
 
 pub(crate) mod pictures;
 
@@ -8,39 +11,39 @@ use crate::engine::{Engine, ListKey};
 use crate::error::{Error, Result};
 use crate::scene::{Camera, LabelMap};
 
-/// The near plane of 3DGS, world units: what a model is rendered with of which nothing is known.
+/// Default near plane, of 3DGS, world units.
 pub const NEAR: f32 = crate::shaders::constants::NEAR;
 
-/// What is read back of a picture besides colour and alpha.
+/// The parts of a render to read back besides colour and alpha.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Parts {
     /// Depth.
     pub depth: bool,
-    /// The main Gaussians and their weights.
+    /// Main Gaussian and its weight.
     pub main: bool,
 }
 
 impl Parts {
     /// Colour and alpha only.
     pub const COLOUR: Self = Self { depth: false, main: false };
-    /// The same with depth.
+    /// Colour, alpha and depth.
     pub const DEPTH: Self = Self { depth: true, main: false };
-    /// The same with the main Gaussians.
+    /// Colour, alpha and main Gaussians.
     pub const MAIN: Self = Self { depth: false, main: true };
     /// Everything.
     pub const ALL: Self = Self { depth: true, main: true };
 }
 
-/// How a picture is made.
+/// The options of a render.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RenderOptions {
-    /// Gaussians nearer to the camera plane are not drawn, world units.
+    /// Near plane, world units: nearer Gaussians are not drawn.
     pub near: f32,
-    /// Colour behind the scene.
+    /// Colour behind the scene, r, g, b, 0 to 1.
     pub background: [f32; 3],
-    /// Degree of the spherical harmonics; none: the model's.
+    /// Degree of the spherical harmonics; `None`: the degree of the model.
     pub sh_degree: Option<u32>,
-    /// What is read back.
+    /// Parts to read back.
     pub parts: Parts,
 }
 
@@ -51,46 +54,47 @@ impl Default for RenderOptions {
 }
 
 impl RenderOptions {
-    /// Some parts, on black.
+    /// Makes options for some parts, on black.
     pub fn new(near: f32, parts: Parts) -> Self {
         Self { near, parts, ..Self::default() }
     }
 
-    /// For main Gaussians only, whose colour does not matter.
+    /// Makes options for main Gaussians only. Their colour does not matter, so the degree is 0.
     pub fn of_labels(near: f32) -> Self {
         Self { sh_degree: Some(0), ..Self::new(near, Parts::MAIN) }
     }
 }
 
-/// One rendered view, row-major. What was not asked for is empty.
+/// A rendered view, row-major. Parts that were not requested are empty.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Rendered {
     /// Width, px.
     pub width: u32,
     /// Height, px.
     pub height: u32,
-    /// Linear colour over the background, not clamped, [H, W, 3].
+    /// Linear colour over the background, not clamped, `[H, W, 3]`.
     pub rgb: Vec<[f32; 3]>,
-    /// 1 - final transmittance, [H, W].
+    /// 1 - final transmittance, `[H, W]`.
     pub alpha: Vec<f32>,
-    /// Weighted sum of camera-space z, not normalised, [H, W].
+    /// Weighted sum of camera-space z, not normalised, world units, `[H, W]`.
     pub depth: Vec<f32>,
-    /// Gaussian with the largest blending weight, -1 where none contributes, [H, W].
+    /// Row of the Gaussian with the largest blending weight, -1 without any, `[H, W]`.
     pub top_id: Vec<i32>,
-    /// That weight, [H, W].
+    /// Blending weight of that Gaussian, `[H, W]`.
     pub top_weight: Vec<f32>,
 }
 
 impl Rendered {
-    /// Label of the main Gaussian of each pixel (LabelGS, inference), 0 where none contributes. An error without
-    /// [`Parts::main`].
+    /// Returns the label of the main Gaussian of each pixel (LabelGS, inference), 0 without any. `labels` has one label
+    /// per Gaussian. Returns an error without [`Parts::main`].
     pub fn label_map(&self, labels: &[u32]) -> Result<LabelMap> {
         self.check_part(self.top_id.len(), "main Gaussians")?;
         let id = |&top: &i32| usize::try_from(top).map_or(0, |index| labels[index] as u16);
         Ok(LabelMap { width: self.width, height: self.height, ids: self.top_id.iter().map(id).collect() })
     }
 
-    /// Depth divided by alpha; 0 where alpha is below one half. An error without [`Parts::depth`].
+    /// Returns depth divided by alpha, world units; 0 where alpha is below one half. Returns an error without
+    /// [`Parts::depth`].
     pub fn mean_depth(&self) -> Result<Vec<f32>> {
         self.check_part(self.depth.len(), "depth")?;
         let mean = |(&depth, &alpha): (&f32, &f32)| if alpha >= 0.5 { depth / alpha } else { 0.0 };
@@ -103,7 +107,7 @@ impl Rendered {
     }
 }
 
-/// Renders the engine's model; grows buffers as needed. The camera's image must fit the engine's
+/// Renders the model in the engine; grows buffers as needed. The image of the camera must fit that of the engine
 /// ([`Engine::grow_image`]), and nothing may be in flight.
 pub fn render(engine: &mut Engine, camera: &Camera, options: &RenderOptions) -> Result<Rendered> {
     let uniforms = engine.view_uniforms(camera, options.near, options.background);

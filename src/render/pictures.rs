@@ -1,4 +1,4 @@
-//! Pictures of a view as files named NAME.WHAT.png or NAME.WHAT.exr.
+//! Writes pictures of a view as NAME.WHAT.png or NAME.WHAT.exr.
 
 use crate::io::image::{write_exr_rgb, write_exr_y, write_png_grey16, write_png_rgb8};
 use crate::scene::LabelMap;
@@ -12,30 +12,30 @@ use std::path::{Path, PathBuf};
 pub enum What {
     /// Colour.
     Rgb,
-    /// Mean z of what covers the pixel, world units; the numbers are in the EXR, a PNG is only to look at.
+    /// Mean z per pixel, world units; a PNG only shows it in grey, an EXR has the values.
     Depth,
     /// Opacity, 0 to 1.
     Alpha,
-    /// Object ids, 16-bit PNG, and the same in colours.
+    /// Object ids as 16-bit PNG, and in colours.
     Labels,
-    /// Index of the Gaussian with the largest weight, -1 for none; EXR only.
+    /// Row of the Gaussian with the largest weight, -1 for none; EXR only.
     TopId,
-    /// That weight; EXR only.
+    /// Weight of that Gaussian; EXR only.
     TopWeight,
 }
 
-/// A kind of file.
+/// A file format.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 pub enum Format {
-    /// 8 or 16 bits, clamped to 0..1.
+    /// PNG with 8 or 16 bits, clamped to 0..1.
     #[default]
     Png,
-    /// 32-bit floats as rendered.
+    /// EXR with 32-bit floats, not clamped.
     Exr,
 }
 
-/// What was rendered of a view, row-major; what is `None` is not written.
+/// The pictures of a view, row-major; `None` is not written.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Pictures<'a> {
     /// Width, px.
@@ -44,19 +44,19 @@ pub struct Pictures<'a> {
     pub height: u32,
     /// r, g, b, not clamped.
     pub rgb: Option<&'a [[f32; 3]]>,
-    /// z, world units; 0 where nothing is.
+    /// z, world units; 0 for holes.
     pub depth: Option<&'a [f32]>,
     /// Opacity, 0 to 1.
     pub alpha: Option<&'a [f32]>,
     /// Object ids.
     pub labels: Option<&'a LabelMap>,
-    /// Index of the Gaussian with the largest weight, -1 for none.
+    /// Row of the Gaussian with the largest weight, -1 for none.
     pub top_id: Option<&'a [i32]>,
-    /// That weight.
+    /// Weight of that Gaussian.
     pub top_weight: Option<&'a [f32]>,
 }
 
-/// Writes the pictures of the view `stem` into `folder`; returns the files.
+/// Writes the pictures of the view `stem` into `folder`. Returns the paths of the files.
 pub fn write_pictures(folder: &Path, stem: &str, pictures: &Pictures, format: Format) -> Result<Vec<PathBuf>> {
     check_sizes(stem, pictures)?;
     let (width, height) = (pictures.width, pictures.height);
@@ -135,7 +135,7 @@ fn to_word(value: f32) -> u16 {
     (value.clamp(0.0, 1.0) * 65_535.0).round() as u16
 }
 
-/// Near is bright, far is dark, nothing is black.
+/// Converts depth to grey: near is bright, far is dark, holes are black.
 fn depth_preview(depth: &[f32]) -> Vec<u16> {
     let there = |z: &f32| z.is_finite() && *z > 0.0;
     let near = depth.iter().copied().filter(there).fold(f32::INFINITY, f32::min);

@@ -1,4 +1,4 @@
-//! The checkpoints that a run leaves.
+//! The checkpoints that a run writes.
 
 use super::resume::Record;
 use crate::error::{Error, Result};
@@ -7,22 +7,20 @@ use crate::io::run_folder::Lock;
 use crate::train::{TrainState, Trainer};
 use std::path::{Path, PathBuf};
 
-/// Checkpoints that are kept while a run goes on: should the newest be damaged, there is the one before.
+/// Number of checkpoints that a run keeps while it goes on. The older one is the fallback if the newest is damaged.
 const KEPT: usize = 2;
 
-/// The checkpoints of a run.
 pub(super) struct Checkpoints {
     out: PathBuf,
     lock: Lock,
     record: Record,
-    /// Those of this run, the newest last.
+    /// Files of this run, the newest last.
     kept: Vec<PathBuf>,
-    /// Step of the newest.
     step: u32,
 }
 
 impl Checkpoints {
-    /// For a run in the folder `out`, which it has locked, that goes on from `resumed`.
+    /// Makes the list for a run in the locked folder `out` that continues from `resumed`.
     pub(super) fn new(out: &Path, lock: Lock, record: Record, resumed: Option<&TrainState>) -> Result<Self> {
         if resumed.is_none()
             && let Some(old) = checkpoint_folder::list(out)?.first()
@@ -36,19 +34,19 @@ impl Checkpoints {
         Ok(Self { out: out.to_owned(), lock, record, kept, step })
     }
 
-    /// Makes sure that the folder is still this run's, before anything is written: it may have been deleted, and another
-    /// run begun in its place.
+    /// Checks that the folder still belongs to this run. Call it before each write: somebody may have deleted the
+    /// folder and started another run there.
     pub(super) fn hold_folder(&mut self) -> Result<()> {
         self.lock.hold()
     }
 
-    /// True where the schedule asks for one.
+    /// Returns true if the schedule has a checkpoint at `step`.
     pub(super) fn due(&self, step: u32, last: u32) -> bool {
         let every = self.record.run.checkpoint_every;
         every > 0 && (step.is_multiple_of(every) || step == last)
     }
 
-    /// Puts a training back to its last whole checkpoint, because of what has gone wrong since. False if there is none.
+    /// Puts the training back to its last whole checkpoint after the failure `reason`. Returns false if there is none.
     pub(super) fn restore(&mut self, trainer: &mut Trainer, reason: &Error) -> Result<bool> {
         while let Some(path) = self.kept.last() {
             match TrainState::read(path) {
@@ -65,8 +63,7 @@ impl Checkpoints {
         Ok(false)
     }
 
-    /// Writes one that is due. That it cannot be written, or its folder be listed, ends no training: there may be room again
-    /// the next time.
+    /// Writes the checkpoint that is due. A failed write or listing is only a warning: the next one may succeed.
     pub(super) fn save_due(&mut self, trainer: &mut Trainer) -> Result<Option<PathBuf>> {
         self.hold_folder()?;
         match self.save(trainer) {
@@ -79,7 +76,7 @@ impl Checkpoints {
         }
     }
 
-    /// Writes one now, unless this step has one. Older ones go when it is safe.
+    /// Writes a checkpoint unless this step has one. Deletes old ones after the new one is complete.
     pub(super) fn save(&mut self, trainer: &mut Trainer) -> Result<Option<PathBuf>> {
         let step = trainer.steps_done();
         if step == self.step {
@@ -95,7 +92,7 @@ impl Checkpoints {
         Ok(Some(path))
     }
 
-    /// Leaves the last one only: the run has ended.
+    /// Deletes all but the last checkpoint at the end of the run.
     pub(super) fn finish(&mut self) -> Result<()> {
         if self.kept.is_empty() { Ok(()) } else { self.keep(1) }
     }

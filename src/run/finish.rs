@@ -1,4 +1,4 @@
-//! What a run leaves in its folder, and the scores at its end.
+//! The records of a run in its folder, and the scores at its end.
 
 use super::{Event, Run, Summary, models, preview};
 use crate::edit::select::MIN_LABEL_CONFIDENCE;
@@ -14,7 +14,7 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 impl Run<'_> {
-    /// Settings, names of labels and cameras.
+    /// Writes the settings, the names of the labels and the cameras.
     pub(super) fn write_records(&self) -> Result<()> {
         let out = &self.request.output;
         let text = self.settings.dump(&self.facts)?;
@@ -24,24 +24,23 @@ impl Run<'_> {
         models::save_cameras(out, &cameras)
     }
 
-    /// Makes sure that the folder is still this run's, and that its records are in it.
+    /// Checks that the folder still belongs to this run and that its records are in it.
     pub(super) fn hold_records(&mut self) -> Result<()> {
         self.hold_folder()?;
         let out = &self.request.output;
         if !out.join(run_folder::CONFIG).exists() {
-            tracing::warn!("{} was deleted meanwhile; what is known is written again", out.display());
+            tracing::warn!("{} was deleted meanwhile; settings, labels and cameras are written again", out.display());
             self.write_records()?;
         }
         Ok(())
     }
 
-    /// Writes the model with its final labels.
     pub(super) fn save_labelled(&mut self) -> Result<PathBuf> {
         let model = self.trainer.labelled_model().map_err(|error| self.keep_model(error))?;
         self.models.save(self.trainer.steps_done(), &model)
     }
 
-    /// What has come of the training, before it is scored.
+    /// Returns the result of the training, without scores.
     pub(super) fn summary(&self, model: PathBuf, spent: Duration) -> Summary {
         let last = self.trainer.newest_report();
         Summary {
@@ -56,8 +55,8 @@ impl Run<'_> {
         }
     }
 
-    /// Writes the last preview, scores the held-out views unless the run was stopped, and writes what is known. `kept` is
-    /// what became of the checkpoint of a run that was stopped.
+    /// Writes the last preview, scores the held-out views unless the run was stopped, and writes the summary. `kept` is
+    /// the result of writing the checkpoint of a stopped run.
     pub(super) fn finish(&mut self, summary: &mut Summary, kept: Result<bool>) -> Result<()> {
         let step = summary.steps;
         self.save_occluders()?;
@@ -97,7 +96,7 @@ impl Run<'_> {
         OcclusionTable::new(kind, views).write(&self.request.output.join(occlusion_table::FILE))
     }
 
-    /// Scores the held-out views, objects too where they have masks.
+    /// Scores the held-out views, and their objects if they have masks.
     fn score(&mut self) -> Result<Option<Scores>> {
         let views: Vec<&View> = self.dataset.test.iter().collect();
         if views.is_empty() {

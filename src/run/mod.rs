@@ -1,6 +1,8 @@
-//! A training from a folder with photos to a folder with a model: locked, resumed, watched, saved, scored.
+//! Trains a model: from a folder of photos to the folder of a run.
 //!
-//! [`train`] is what `labelgs train` does, without the terminal. Its folder holds what README calls the outputs of a run.
+//! [`train`] is the command `labelgs train` without the terminal. Its input is a [`Request`]: scene, output folder,
+//! [`Settings`] and whether to resume ([`Start`]). An [`Observer`] follows the run and may pause, save or stop it. The
+//! result is a [`Summary`]; README lists the files of the folder.
 
 mod checkpoints;
 mod finish;
@@ -34,50 +36,50 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Instant;
 
-/// Settings to go on with, made of those of the checkpoint; it is given none where there is no checkpoint.
+/// Makes the settings of a resumed run from those of its checkpoint. The argument is `None` if there is no checkpoint.
 pub type Changed<'a> = dyn Fn(Option<&Settings>) -> Result<Settings> + 'a;
 
-/// Where a run starts.
+/// The first step of a run.
 #[allow(clippy::large_enum_variant, reason = "there is one in a run")]
 pub enum Start<'a> {
-    /// At step 1. Checkpoints of an earlier run in the folder go when this run has one.
+    /// Step 1. The first checkpoint of this run replaces those of an earlier run in the folder.
     New(Settings),
-    /// At the newest whole checkpoint in the folder; at step 1 where there is none.
+    /// The newest whole checkpoint in the folder, or step 1 if there is none.
     Newest(&'a Changed<'a>),
 }
 
-/// What a run is given besides its settings, in its checkpoints too.
+/// The inputs of a run besides its settings. Checkpoints store them too.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Inputs {
-    /// Folder of id masks, one per view by name; without it the model has no labels.
+    /// Folder of id masks, one per view by name. Without it the model has no labels.
     pub masks: Option<PathBuf>,
-    /// Most bytes of the device's memory.
+    /// Limit on the device memory, bytes.
     pub memory_limit: Option<u64>,
-    /// Largest share of the photos, from 0 to 1, that may be undecodable.
+    /// Largest share of damaged photos that is accepted, 0 to 1.
     pub max_bad_photos: Option<f32>,
-    /// Photos and points may lie outside of the scene's folder.
+    /// Accepts photos and points outside of the scene's folder.
     pub allow_outside: bool,
 }
 
-/// A training that is asked for.
+/// The description of a run.
 pub struct Request<'a> {
-    /// Folder of the scene (COLMAP or transforms.json), or one .json file.
+    /// Folder of the scene (COLMAP or `transforms.json`), or one `.json` file.
     pub scene: PathBuf,
     /// Folder of the run.
     pub output: PathBuf,
-    /// Where it starts, and its settings.
+    /// First step and settings.
     pub start: Start<'a>,
-    /// Masks and bounds; a run that goes on has those of its checkpoint where none are given.
+    /// Masks and limits. In a resumed run, empty fields take the values of the checkpoint.
     pub inputs: Inputs,
-    /// Files with occluders, where the run does not look for them itself.
+    /// Files with occluders, for [`Occlusion::Depth`] and [`Occlusion::File`].
     pub occluders: Option<OccluderFiles>,
-    /// If the device is lost, open it again and go on from the newest checkpoint, as long as there is a new one each
-    /// time. The pass that lost it is named, at some cost in time.
+    /// Opens a lost device again and continues from the newest checkpoint, as long as each loss has a new one. The
+    /// error names the pass that lost the device, at some cost in time.
     pub restart: bool,
 }
 
 impl<'a> Request<'a> {
-    /// A new run with the default settings and without masks.
+    /// Makes a new run with the default settings and without masks.
     pub fn new(scene: impl Into<PathBuf>, output: impl Into<PathBuf>) -> Self {
         Self {
             scene: scene.into(),
@@ -90,20 +92,20 @@ impl<'a> Request<'a> {
     }
 }
 
-/// Opens the device. It is called anew after a loss of the device.
+/// Opens the device, at the start and after each loss of the device.
 pub type Open<'a> = dyn Fn() -> Result<Arc<Gpu>> + 'a;
 
-/// Trains a model. What was learnt is saved also where the observer stops the run, and where memory ends it.
+/// Trains a model. It saves the model also if the observer stops the run or memory runs out.
 ///
 /// # Errors
 ///
-/// Settings and files that make no sense, before anything is written; a device without memory or that is lost; parameters
-/// that become NaN, also after a second try with half the learning rates; outputs that cannot be written.
+/// Invalid settings and inputs, before anything is written; too little memory or a lost device; parameters that become
+/// NaN, also in a second try with half the learning rates; outputs that cannot be written.
 pub fn train(request: &Request, open: &Open, observer: &mut dyn Observer) -> Result<Summary> {
     recovery::over_losses(request, &mut |is_again| train_once(request, is_again, open, observer))
 }
 
-/// A training as far as one device carries it.
+/// Trains until the end or until the device is lost.
 fn train_once(request: &Request, is_again: bool, open: &Open, observer: &mut dyn Observer) -> Result<Summary> {
     let prepared = prepare::prepare(request, is_again)?;
     let mut run = prepare::begin(prepared, request, open()?, observer)?;
@@ -112,7 +114,7 @@ fn train_once(request: &Request, is_again: bool, open: &Open, observer: &mut dyn
     let start = Instant::now();
     recovery::over_numeric_failures(&mut run).map_err(|error| run.keep_model(error))?;
     run.hold_records()?;
-    // What was learnt is saved either way.
+    // Save the model in either case.
     let kept = run.keep_if_stopped();
     let model = run.save_labelled()?;
     let mut summary = run.summary(model, start.elapsed());
@@ -120,28 +122,26 @@ fn train_once(request: &Request, is_again: bool, open: &Open, observer: &mut dyn
     Ok(summary)
 }
 
-/// A run under way.
 struct Run<'a> {
     request: &'a Request<'a>,
     settings: Settings,
-    /// What the given occluders were made from.
+    /// Source of the given occluders.
     occlusion: Option<String>,
-    /// What `config.toml` says besides the settings.
+    /// Comments for `config.toml`: name and value.
     facts: Vec<(&'static str, String)>,
     names: Option<crate::io::label_table::LabelTable>,
     dataset: Dataset,
-    /// The view of the preview pictures.
+    /// View of the preview pictures.
     preview: Option<View>,
     trainer: Trainer,
     checkpoints: Checkpoints,
     models: Models,
     observer: &'a mut dyn Observer,
-    /// The observer has asked for the end.
     stopped: bool,
 }
 
 impl Run<'_> {
-    /// Tells the observer of an event and does what it answers.
+    /// Passes an event to the observer and follows its answer.
     fn tell(&mut self, event: Event<'_>) -> Result<()> {
         let mut flow = self.observer.on(&event, &mut Live::new(&mut self.trainer))?;
         loop {
@@ -160,7 +160,7 @@ impl Run<'_> {
         }
     }
 
-    /// Says something that a person should know, in the log and to the observer.
+    /// Logs a warning and passes it to the observer.
     fn warn(&mut self, text: &str) -> Result<()> {
         tracing::warn!("{text}");
         self.tell(Event::Warning(text))

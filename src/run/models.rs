@@ -1,4 +1,4 @@
-//! Files of a run: the model, the cameras, the previews. Each is written whole or not at all.
+//! Files of a run: models, cameras and previews. Each write is atomic.
 
 use crate::error::{Error, Result};
 use crate::io::model::write_model;
@@ -9,15 +9,15 @@ use crate::scene::labels::label_colour;
 use crate::scene::{Camera, Gaussians, Photo};
 use std::path::{Path, PathBuf};
 
-/// Where models of earlier runs go.
+/// Folder for the models of earlier runs.
 const EARLIER: &str = "earlier";
 
-/// Where the model of a step is kept, as the viewers of 3DGS expect it.
+/// Returns the path of the model of a step, where viewers of 3DGS look for it.
 pub(crate) fn model_path(out: &Path, step: u32) -> PathBuf {
     out.join("point_cloud").join(format!("iteration_{step}")).join("point_cloud.ply")
 }
 
-/// The steps of the models in the folder of a run.
+/// Returns the steps of the models in the folder of a run.
 fn steps(out: &Path) -> Result<Vec<u32>> {
     let folder = out.join("point_cloud");
     let entries = if folder.is_dir() { read::folder(&folder)? } else { Vec::new() };
@@ -25,7 +25,7 @@ fn steps(out: &Path) -> Result<Vec<u32>> {
     Ok(steps.filter(|&step| model_path(out, step).is_file()).collect())
 }
 
-/// The model of the latest step in the folder of a run.
+/// Returns the model of the latest step in the folder of a run.
 pub fn latest_model(out: &Path) -> Result<PathBuf> {
     steps(out)?.into_iter().max().map(|step| model_path(out, step)).ok_or_else(|| {
         Error::data(
@@ -36,25 +36,27 @@ pub fn latest_model(out: &Path) -> Result<PathBuf> {
     })
 }
 
-/// The models that a run writes. Where an earlier run left some of later steps, they are moved to the folder `earlier` when
-/// this one has its first: the model of the latest step is the one that other commands take.
+/// The models that a run writes. Other commands take the model of the latest step. So the first model of this run moves
+/// later models of an earlier run to the folder `earlier`.
 pub(crate) struct Models {
     out: PathBuf,
     earlier: Vec<u32>,
 }
 
 impl Models {
-    /// For a run in the folder `out` that goes on after step `from`, or starts at 0.
+    /// Makes the list for a run in the folder `out` that continues after step `from`; 0 is a new run.
     pub(crate) fn new(out: &Path, from: u32) -> Result<Self> {
         let earlier: Vec<u32> = steps(out)?.into_iter().filter(|&step| step > from).collect();
         if let Some(step) = earlier.iter().max() {
             let path = model_path(out, *step);
-            tracing::warn!("{} is of an earlier run and goes to {EARLIER} when this one has a model", path.display());
+            tracing::warn!(
+                "{} is of an earlier run and moves to {EARLIER} at the first model of this run",
+                path.display()
+            );
         }
         Ok(Self { out: out.to_owned(), earlier })
     }
 
-    /// Writes the model of a step.
     pub(crate) fn save(&mut self, step: u32, model: &Gaussians) -> Result<PathBuf> {
         let path = model_path(&self.out, step);
         let left_out = write_model(&path, model)?;
@@ -65,16 +67,15 @@ impl Models {
             let (from, to) = (model_path(&self.out, old), model_path(&self.out.join(EARLIER), old));
             let moved = to.parent().map_or(Ok(()), std::fs::create_dir_all).and_then(|()| std::fs::rename(&from, &to));
             if let Err(error) = moved {
-                tracing::warn!("{}: not moved: {error}", from.display());
+                tracing::warn!("{}: cannot be moved: {error}", from.display());
             }
-            // Unless somebody keeps something else in there.
+            // This fails, as it should, if the folder holds other files.
             let _ = from.parent().map(std::fs::remove_dir);
         }
         Ok(path)
     }
 }
 
-/// Writes `cameras.json`.
 pub(crate) fn save_cameras(out: &Path, cameras: &[(&str, &Camera)]) -> Result<()> {
     camera_json::write_cameras(out.join("cameras.json"), cameras)
 }

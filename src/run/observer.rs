@@ -1,5 +1,5 @@
-//! What a terminal, a web page and a test all are: they hear what a run does, may look at the scene between two steps,
-//! and may pause, save and stop.
+//! Events of a run, and the observers that receive them: a terminal, a web page, a test. An observer may look at the
+//! scene between two steps, and may pause, save and stop the run.
 
 use super::Summary;
 use crate::error::Result;
@@ -9,13 +9,13 @@ use crate::scene::{Camera, Gaussians};
 use crate::train::{Densified, StepReport, Trainer};
 use std::path::Path;
 
-/// Something that happened in a run.
+/// An event in a run.
 #[derive(Clone, Copy, Debug)]
 #[non_exhaustive]
 pub enum Event<'a> {
-    /// The scene is read and the model is on the device; the first step comes next.
+    /// The scene is read and the model is on the device. The first step is next.
     Started {
-        /// Step that the run goes on after, 0 at its start.
+        /// Last step of the checkpoint that the run continues from; 0 for a new run.
         after: u32,
         /// Steps of the whole run.
         steps: u32,
@@ -24,18 +24,18 @@ pub enum Event<'a> {
     Step {
         /// Step, from 1.
         step: u32,
-        /// The newest step whose numbers are known; it lags behind, because two steps are in flight.
+        /// Report of the newest finished step. It lags behind, because two steps are in flight.
         report: Option<&'a StepReport>,
-        /// No step comes after it.
+        /// This is the last step.
         is_last: bool,
     },
     /// Gaussians were cloned, split and pruned after a step.
     Densified {
         /// Step.
         step: u32,
-        /// What was done.
+        /// Counts of the densification.
         what: Densified,
-        /// Gaussians since.
+        /// Number of Gaussians afterwards.
         gaussians: u32,
     },
     /// A preview picture was written.
@@ -61,9 +61,9 @@ pub enum Event<'a> {
     },
     /// The held-out views were scored.
     Evaluated(&'a Scores),
-    /// Something that a person should know; the run goes on. It is in the log too.
+    /// A warning for the user; the run goes on. The log has it too.
     Warning(&'a str),
-    /// The run stands still because the observer paused it; it is asked again and again whether to go on.
+    /// The observer paused the run. The event repeats until the observer answers otherwise.
     Paused {
         /// Steps done.
         step: u32,
@@ -72,34 +72,35 @@ pub enum Event<'a> {
     Done(&'a Summary),
 }
 
-/// What an observer wants of the run.
+/// The answer of an observer to an event.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Flow {
-    /// Go on.
+    /// Continue.
     #[default]
     Continue,
-    /// Stand still: [`Event::Paused`] comes until another answer is given. The observer decides how long it waits then.
+    /// Pause: [`Event::Paused`] repeats until the answer changes. The observer sets the time between two of them by
+    /// waiting.
     Pause,
-    /// Write a checkpoint now, and go on.
+    /// Write a checkpoint now and continue.
     Save,
-    /// Write the model and a checkpoint, and end. [`Summary::stopped`] tells of it.
+    /// Write the model and a checkpoint, and end. [`Summary::stopped`] is then true.
     Stop,
 }
 
-/// Hears what a run does.
+/// Receives the events of a run.
 pub trait Observer {
-    /// An event. An error ends the run as an error of its own would.
+    /// Receives an event. An error ends the run.
     fn on(&mut self, event: &Event<'_>, live: &mut Live<'_>) -> Result<Flow>;
 }
 
-/// Nobody listens.
+/// Ignores all events.
 impl Observer for () {
     fn on(&mut self, _: &Event<'_>, _: &mut Live<'_>) -> Result<Flow> {
         Ok(Flow::Continue)
     }
 }
 
-/// The scene in training, between two steps. What is asked of it changes no bit of the training.
+/// The scene in training, between two steps. Queries do not change the training, bit for bit.
 pub struct Live<'a> {
     trainer: &'a mut Trainer,
 }
@@ -109,17 +110,17 @@ impl<'a> Live<'a> {
         Self { trainer }
     }
 
-    /// Steps done.
+    /// Returns the number of finished steps.
     pub fn step(&self) -> u32 {
         self.trainer.steps_done()
     }
 
-    /// Gaussians of the model.
+    /// Returns the number of Gaussians in the model.
     pub fn gaussian_count(&self) -> u32 {
         self.trainer.gaussian_count()
     }
 
-    /// A picture of the scene as it is now, from any camera and of any size, with the parts that are asked for.
+    /// Renders the current scene from any camera, at any size, with the requested parts.
     pub fn render(&mut self, camera: &Camera, parts: Parts) -> Result<Rendered> {
         self.trainer.drain()?;
         let options = RenderOptions { parts, ..self.trainer.render_options() };
@@ -128,7 +129,7 @@ impl<'a> Live<'a> {
         render(engine, camera, &options)
     }
 
-    /// The model as it is now, with the labels of the last count of votes.
+    /// Returns the current model, with the labels of the last count of votes.
     pub fn model(&mut self) -> Result<Gaussians> {
         self.trainer.model()
     }

@@ -1,4 +1,4 @@
-//! Occluders that are known before the first step.
+//! Occluders from files.
 
 use super::Request;
 use crate::error::{Error, Result};
@@ -8,21 +8,21 @@ use crate::scene::{Dataset, DepthKind, View};
 use crate::train::Occlusion;
 use std::path::PathBuf;
 
-/// Files that occluders come from.
+/// Files with occluders.
 #[derive(Clone, Debug, PartialEq)]
 pub enum OccluderFiles {
-    /// Depth maps, one per photo by name, for the paper's rule.
+    /// Depth maps, one per photo by name, for the rule of the paper.
     Depths {
         /// Their folder.
         folder: PathBuf,
-        /// What their numbers mean.
+        /// Meaning of their values.
         kind: DepthKind,
     },
-    /// Lists, as an earlier run wrote them.
+    /// Occluder lists of an earlier run.
     Lists(PathBuf),
 }
 
-/// Refuses a source of occluders without the files that it needs, and files that the source does not read.
+/// Refuses a source of occluders without its files, and files that the source does not read.
 pub(super) fn check(source: Occlusion, files: Option<&OccluderFiles>) -> Result<()> {
     match (source, files) {
         (Occlusion::Depth, Some(OccluderFiles::Depths { .. })) => Ok(()),
@@ -37,7 +37,7 @@ pub(super) fn check(source: Occlusion, files: Option<&OccluderFiles>) -> Result<
     }
 }
 
-/// The table that a run starts with, if it does not look for occluders itself.
+/// Reads the given occluders. Returns none if the run finds its own.
 pub(super) fn table(request: &Request, dataset: &Dataset) -> Result<Option<OcclusionTable>> {
     let views: Vec<&View> = dataset.train.iter().filter(|view| view.mask.is_some()).collect();
     let path = match &request.occluders {

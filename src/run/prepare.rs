@@ -1,4 +1,4 @@
-//! What happens before the first step: the folder, the settings, the scene, the first model.
+//! Everything before the first step: the folder, the settings, the scene, the initial model.
 
 use super::checkpoints::Checkpoints;
 use super::models::Models;
@@ -18,7 +18,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
 
-/// Everything that a run knows before a device is open.
+/// The state of a run before it opens a device.
 pub(super) struct Prepared {
     lock: Lock,
     settings: Settings,
@@ -30,10 +30,10 @@ pub(super) struct Prepared {
     table: Option<OcclusionTable>,
 }
 
-/// Takes the folder, decides the settings and reads the scene. `is_again` goes on from the newest checkpoint.
+/// Locks the folder, decides the settings and reads the scene. `is_again` continues from the newest checkpoint.
 pub(super) fn prepare(request: &Request, is_again: bool) -> Result<Prepared> {
-    // Bad settings leave no folder behind. Checkpoints are looked for when the folder is this run's: the one that it goes
-    // on from may be writing its last.
+    // Check the settings first, so that bad ones leave no folder behind. List checkpoints only after the lock: another
+    // run may be writing its last one.
     if let Start::New(settings) = &request.start {
         check_new(settings, request)?;
     }
@@ -72,13 +72,13 @@ fn check_new(settings: &Settings, request: &Request) -> Result<()> {
     occluders::check(settings.train.occlusion, request.occluders.as_ref())
 }
 
-/// Clears the folder of what killed runs left, and refuses one that cannot be used before any work is done.
+/// Deletes temporary files of killed runs. Refuses an unusable folder before any work is done.
 fn clear(out: &Path, settings: &Settings) -> Result<()> {
     let checkpoints = out.join(checkpoint_folder::FOLDER);
     if settings.run.checkpoint_every > 0 {
         std::fs::create_dir_all(&checkpoints).map_err(Error::write(&checkpoints))?;
     }
-    // A folder that is not there, or that nobody may list, holds nothing to clear.
+    // A missing or unreadable folder needs no clearing.
     let models = io::read::folder(&out.join("point_cloud")).unwrap_or_default();
     for folder in [out.to_owned(), checkpoints, out.join("preview")].into_iter().chain(models) {
         atomic::remove_stale(folder, Duration::ZERO);
@@ -98,7 +98,7 @@ fn read_scene(request: &Request, settings: &Settings, inputs: &Inputs) -> Result
     Ok(dataset)
 }
 
-/// Puts the model on the device: the checkpoint's, or the initial one.
+/// Puts the model on the device: that of the checkpoint, or the initial one.
 pub(super) fn begin<'a>(
     prepared: Prepared,
     request: &'a Request,
@@ -128,7 +128,7 @@ pub(super) fn begin<'a>(
         Some(resumed) => Trainer::resume(gpu, &dataset, resumed.state, options)?,
         None => start(gpu, &settings.train, &dataset, table.as_ref(), options)?,
     };
-    // The near plane is known now.
+    // The near plane is decided now.
     let settings = Settings { train: trainer.config().clone(), ..settings };
     Ok(Run {
         request,
@@ -146,12 +146,12 @@ pub(super) fn begin<'a>(
     })
 }
 
-/// The folder of the masks for a checkpoint. One that cannot be written as text must be named again.
+/// Returns the mask folder as a checkpoint stores it. A path that is not Unicode must be given again.
 fn recorded(masks: Option<&Path>) -> Option<PathBuf> {
     masks.filter(|masks| masks.to_str().is_some()).map(absolute)
 }
 
-/// A trainer with the initial model of the scene.
+/// Makes a trainer with the initial model of the scene.
 fn start(
     gpu: Arc<Gpu>,
     config: &TrainConfig,
@@ -164,7 +164,7 @@ fn start(
     let size = train::start_size(&gpu, dataset, config, model.len(), options)?;
     let memory = Engine::predict(&gpu, &size, options)?;
     tracing::info!(
-        "memory to start with: {:.1} MiB on the device, for {} Gaussians and {} x {} px; it grows with the model",
+        "memory to start with: {:.1} MiB on the device for {} Gaussians and {} x {} px; it grows with the model",
         memory.total as f64 / f64::from(1 << 20),
         size.gaussians,
         size.image.0,
@@ -175,13 +175,15 @@ fn start(
         let without = trainer.set_occluders(&table.views);
         if let Some(first) = without.first() {
             let count = without.len();
-            tracing::warn!("{count} training views have no list of occluders, such as {first}; nothing hides there");
+            tracing::warn!(
+                "{count} training views have no list of occluders, such as {first}; their objects count as not hidden"
+            );
         }
     }
     Ok(trainer)
 }
 
-/// No more initial points than `max_gaussians`: every n-th is kept.
+/// Thins the initial points to `max_gaussians`, evenly.
 fn bound_start(model: &mut Gaussians, config: &TrainConfig) {
     let (count, bound) = (model.len() as u64, config.max_gaussians);
     if bound > 0 && count > bound {
@@ -189,12 +191,11 @@ fn bound_start(model: &mut Gaussians, config: &TrainConfig) {
             "{count} initial points, and `max_gaussians` is {bound}: every {:.1}-th is used",
             count as f64 / bound as f64
         );
-        // Row i is kept where i * bound / count steps up: an even choice.
+        // Keep row i if `i * bound / count` steps up there.
         *model = model.filtered(|row| row as u64 * bound / count != (row as u64 + 1) * bound / count);
     }
 }
 
-/// What `config.toml` says besides the settings.
 fn facts(request: &Request, masks: Option<&Path>, gpu: &Gpu) -> Vec<(&'static str, String)> {
     let found = gpu.capabilities();
     let mut facts = vec![

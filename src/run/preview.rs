@@ -5,7 +5,7 @@ use crate::error::Result;
 use crate::render::Parts;
 use std::path::PathBuf;
 
-/// Writes the picture of the preview view as the scene is now; none without a photo.
+/// Writes a preview of the current scene. Returns none without a photo.
 pub(super) fn write(run: &mut Run) -> Result<Option<PathBuf>> {
     let Some(view) = &run.preview else { return Ok(None) };
     let Some(photo) = &view.photo else { return Ok(None) };

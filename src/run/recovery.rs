@@ -1,4 +1,4 @@
-//! What is done when a device or the numbers fail.
+//! Recovery from lost devices and from NaNs.
 
 use super::steps::steps;
 use super::{Request, Run};
@@ -7,11 +7,12 @@ use crate::io::checkpoint_folder;
 use crate::run::Summary;
 use std::time::Duration;
 
-/// Seconds between looks for a device after one was lost.
+/// Waits between attempts to open a lost device, s.
 const WAITS: [u64; 3] = [1, 4, 16];
 
-/// Runs a training, with [`Request::restart`] also over losses of the device: one that is lost twice without a checkpoint
-/// in between would be lost again. The training is told whether it goes on from the newest checkpoint.
+/// Runs a training. With [`Request::restart`] it starts again after a lost device, unless no checkpoint was written
+/// since the last loss: the same work would lose it again. `run` receives true if it continues from the newest
+/// checkpoint.
 pub(super) fn over_losses(request: &Request, run: &mut dyn FnMut(bool) -> Result<Summary>) -> Result<Summary> {
     if !request.restart {
         return run(false);
@@ -22,7 +23,7 @@ pub(super) fn over_losses(request: &Request, run: &mut dyn FnMut(bool) -> Result
     loop {
         let error = match run(was_lost) {
             Err(error @ Error::DeviceLost { .. }) => error,
-            // A driver may take a while until it has a device again.
+            // A driver may need time to offer a device again.
             Err(error) if was_lost && error.is_without_device() => {
                 let Some(&seconds) = waits.next() else { return Err(error) };
                 tracing::warn!("{error}; tried again in {seconds} s");
@@ -36,13 +37,13 @@ pub(super) fn over_losses(request: &Request, run: &mut dyn FnMut(bool) -> Result
         if number <= before {
             return Err(error);
         }
-        tracing::warn!("{error}; it is opened again, and training goes on from the newest checkpoint");
+        tracing::warn!("{error}; it is opened again, and training continues from the newest checkpoint");
         (before, was_lost) = (number, true);
     }
 }
 
-/// Runs the steps. First a device that erred once is made up for, bit for bit. What fails again has its reason in the
-/// scene or in the settings, and slower steps may get past it.
+/// Runs the steps. The first failure may be a fault of the device: the repeated steps give the same bits. A second
+/// failure comes from the scene or the settings, and lower learning rates may avoid it.
 pub(super) fn over_numeric_failures(run: &mut Run) -> Result<()> {
     let mut last = steps(run);
     for is_slower in [false, true] {
@@ -50,7 +51,7 @@ pub(super) fn over_numeric_failures(run: &mut Run) -> Result<()> {
             Err(error @ Error::Numeric { .. }) if run.checkpoints.restore(&mut run.trainer, &error)? => {
                 if is_slower {
                     run.trainer.halve_rates();
-                    run.warn("it went wrong again: from here on all learning rates are half of what they were")?;
+                    run.warn("training failed again: from here on all learning rates are half of what they were")?;
                 }
                 steps(run)
             }
@@ -61,7 +62,7 @@ pub(super) fn over_numeric_failures(run: &mut Run) -> Result<()> {
 }
 
 impl Run<'_> {
-    /// A run that memory ended keeps what it has learnt: steps that did not fit changed nothing.
+    /// Saves the model if memory ended the run. Steps that did not fit have not changed it.
     pub(super) fn keep_model(&mut self, error: Error) -> Error {
         if !error.is_out_of_memory() {
             return error;

@@ -1,4 +1,4 @@
-//! From which checkpoint and with what settings a run goes on.
+//! The checkpoint and the settings that a resumed run continues from.
 
 use super::{Changed, Inputs, Request, Settings};
 use crate::error::{Error, Result};
@@ -8,25 +8,25 @@ use crate::train::TrainState;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
-/// What a checkpoint holds of the run, besides the state of the training.
+/// The part of a checkpoint about the run. The state of the training is separate.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub(super) struct Record {
     pub inputs: Inputs,
-    /// What the occluders that it started with were made from.
+    /// Source of the occluders at the start.
     pub occlusion: Option<String>,
     pub read: ReadOptions,
     pub run: RunOptions,
 }
 
-/// A checkpoint to go on from.
+/// A checkpoint to continue from.
 pub(super) struct Resumed {
     pub state: TrainState,
     pub settings: Settings,
     pub record: Record,
 }
 
-/// The newest whole checkpoint of the folder, with the settings that the run is to go on with. None if there is nothing
-/// to go on from; an error if there are checkpoints, and all are damaged.
+/// Returns the newest whole checkpoint of the folder, with the settings for the resumed run. Returns none without
+/// checkpoints, and an error if all are damaged.
 pub(super) fn find(request: &Request, changed: &Changed) -> Result<Option<Resumed>> {
     let mut first = None;
     for found in checkpoint_folder::list(&request.output)? {
@@ -59,13 +59,13 @@ fn read(path: &Path) -> Result<Resumed> {
     Ok(Resumed { state, settings, record })
 }
 
-/// Puts what was asked for over the settings of the checkpoint, and says what that changes.
+/// Applies the requested settings to the checkpoint and logs each change.
 fn decide(request: &Request, changed: &Changed, mut resumed: Resumed) -> Result<Resumed> {
     let then = &resumed.settings;
     let mut wanted = changed(Some(then))?;
     wanted.check()?;
     if wanted.train.near == 0.0 {
-        // Left to the scene, and that was decided when the run began.
+        // The automatic value was decided when the run began.
         wanted.train.near = then.train.near;
     }
     compare(then, &wanted)?;
@@ -83,7 +83,7 @@ fn decide(request: &Request, changed: &Changed, mut resumed: Resumed) -> Result<
     Ok(resumed)
 }
 
-/// Says what has changed, and refuses what cannot change within a run.
+/// Logs changed settings, and refuses changes of settings that are fixed within a run.
 fn compare(then: &Settings, now: &Settings) -> Result<()> {
     let (then, now) = (then.texts(), now.texts());
     for key in Settings::keys() {
@@ -102,7 +102,7 @@ fn compare(then: &Settings, now: &Settings) -> Result<()> {
     Ok(())
 }
 
-/// Puts what is given now over what the checkpoint was given.
+/// Replaces the inputs of the checkpoint by those given now.
 fn merge(then: &mut Inputs, now: &Inputs) {
     if let Some(bytes) = now.memory_limit
         && then.memory_limit != Some(bytes)
@@ -118,7 +118,7 @@ fn merge(then: &mut Inputs, now: &Inputs) {
     then.allow_outside |= now.allow_outside;
 }
 
-/// A folder as another working directory finds it.
+/// Returns an absolute path, independent of the working directory.
 pub(super) fn absolute(folder: &Path) -> PathBuf {
     std::path::absolute(folder).unwrap_or_else(|_| folder.to_owned())
 }

@@ -1,4 +1,4 @@
-//! Everything that is decided about a run, and the file that keeps it.
+//! All settings of a run, and the file that stores them.
 
 use crate::error::{Error, Result};
 use crate::io::{self, LoadOptions, ReadOptions, run_folder};
@@ -11,10 +11,10 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 crate::options::options! {
-    /// What a run writes on its way.
+    /// The files that a run writes before its end.
     pub struct RunOptions {
         "Output" {
-            /// Steps after which to save the model too, with commas between.
+            /// Steps after which the model is saved too, separated by commas.
             #[cfg_attr(feature = "cli", arg(value_delimiter = ','))]
             save_at <"LIST">: Vec<u32> = Vec::new();
 
@@ -23,49 +23,49 @@ crate::options::options! {
             /// They show the first held-out view.
             preview_every <"N">: u32 = 1000;
 
-            /// Steps between two checkpoints; 0 writes one when interrupted only.
+            /// Steps between two checkpoints; 0 writes one only when the run is interrupted.
             ///
-            /// A run goes on from its newest checkpoint with --resume.
+            /// --resume continues from the newest checkpoint.
             checkpoint_every <"N">: u32 = 1000;
         }
     }
 }
 
-/// The options of a run, in three parts.
+/// The settings of a run, in three parts.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Settings {
     /// How the scene is read.
     pub read: ReadOptions,
-    /// What the training does.
+    /// How the training works.
     pub train: TrainConfig,
-    /// What is written on the way.
+    /// What the run writes before its end.
     pub run: RunOptions,
 }
 
 impl Settings {
-    /// The paper's settings where they differ from the default.
+    /// Returns the settings of the paper where they differ from the default.
     pub fn paper() -> Self {
         Self { train: TrainConfig::paper(), ..Self::default() }
     }
 
-    /// Every option, in the order of the file.
+    /// Returns every option, in the order of the file.
     pub fn keys() -> impl Iterator<Item = &'static Key> {
         ReadOptions::KEYS.iter().chain(TrainConfig::KEYS).chain(RunOptions::KEYS)
     }
 
-    /// The values as one types them, by key; an option that is not set has none.
+    /// Returns the values by key, in the syntax of the command line. Unset options are absent.
     pub fn texts(&self) -> BTreeMap<String, String> {
         self.read.texts().into_iter().chain(self.train.texts()).chain(self.run.texts()).collect()
     }
 
-    /// Refuses values that make no sense; messages name the option.
+    /// Refuses invalid values; messages name the option.
     pub fn check(&self) -> Result<()> {
         self.read.check()?;
         self.train.check()?;
         self.run.check_ranges()
     }
 
-    /// Reads a file as [`Self::dump`] writes it; what it does not name keeps its default.
+    /// Reads a file of [`Self::dump`]. Missing keys keep their defaults.
     pub fn read(path: &Path) -> Result<Self> {
         let text = io::read::text(path)?;
         let named: BTreeMap<toml::Spanned<String>, IgnoredAny> = parse(path, &text)?;
@@ -76,21 +76,20 @@ impl Settings {
         Self::parse(path, &text)
     }
 
-    /// Each part takes its own keys and leaves the others alone.
+    /// Parses the keys of each part. A part ignores keys of other parts.
     fn parse(path: &Path, text: &str) -> Result<Self> {
         Ok(Self { read: parse(path, text)?, train: parse(path, text)?, run: parse(path, text)? })
     }
 
-    /// The settings of the run that a model is in, if it is in one; its folder is that of
-    /// [`run_folder::of_model`].
+    /// Reads the settings of the run that a model belongs to. Returns none if the model is not in the folder of a run.
     pub fn of_model(model: &Path) -> Result<Option<Self>> {
         let file = run_folder::of_model(model).map(|run| run.join(run_folder::CONFIG)).filter(|file| file.is_file());
         let Some(file) = file else { return Ok(None) };
-        // Rows that other versions of the program know are no reason to refuse a model.
+        // Accept keys of other versions of labelgs: they must not make a model unreadable.
         let text = io::read::text(&file)?;
         let mut settings = Self::parse(&file, &text)?;
         let near = &mut settings.train.near;
-        // 0 leaves it to a scene, which is not known here.
+        // 0 means automatic, which needs a scene.
         if *near == 0.0 {
             *near = NEAR;
         }
@@ -100,7 +99,7 @@ impl Settings {
         Ok(Some(settings))
     }
 
-    /// The file that [`Self::read`] reads. Facts, such as the device, become comments.
+    /// Returns the text for [`Self::read`]. Facts, such as the device, become comments.
     pub fn dump(&self, facts: &[(&str, String)]) -> Result<String> {
         let mut text = format!("# labelgs {}\n", env!("CARGO_PKG_VERSION"));
         for (name, value) in facts {
@@ -113,7 +112,7 @@ impl Settings {
         Ok(text)
     }
 
-    /// How the run reads its scene.
+    /// Returns the options for reading the scene.
     pub fn load_options(&self, masks: Option<PathBuf>) -> LoadOptions {
         let some = |value: u32| (value > 0).then_some(value);
         LoadOptions {

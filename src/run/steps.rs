@@ -1,9 +1,9 @@
-//! The loop over steps, and what is written between two of them.
+//! The loop over steps, and the files written between steps.
 
 use super::{Event, Run, preview};
 use crate::error::{Error, Result};
 
-/// Runs the steps that are left; the observer may end it after any.
+/// Runs the remaining steps, until the last one or until the observer stops the run.
 pub(super) fn steps(run: &mut Run) -> Result<()> {
     let last = run.settings.train.iterations;
     for step in run.trainer.steps_done() + 1..=last {
@@ -30,7 +30,7 @@ pub(super) fn steps(run: &mut Run) -> Result<()> {
     run.trainer.drain().map(drop)
 }
 
-/// The model and the preview, where the schedule asks for them.
+/// Writes the model and the preview if the schedule has them at this step.
 fn write_between(run: &mut Run, step: u32) -> Result<()> {
     let options = &run.settings.run;
     let (saves, previews) =
@@ -53,7 +53,7 @@ fn write_between(run: &mut Run, step: u32) -> Result<()> {
     Ok(())
 }
 
-/// That something cannot be written on the way ends no training: there may be room again at its end.
+/// Turns a failed write into a warning: there may be space again at the end of the training.
 fn tolerate<T>(run: &mut Run, written: Result<T>) -> Result<Option<T>> {
     match written {
         Err(error @ Error::Write { .. }) => run.warn(&format!("{error}; training goes on without it")).map(|()| None),
@@ -62,23 +62,22 @@ fn tolerate<T>(run: &mut Run, written: Result<T>) -> Result<Option<T>> {
 }
 
 impl Run<'_> {
-    /// Makes sure that the folder is still this run's, before anything is written.
+    /// Checks that the folder still belongs to this run. Call it before each write.
     pub(super) fn hold_folder(&mut self) -> Result<()> {
         self.checkpoints.hold_folder()
     }
 
-    /// Writes a checkpoint now, unless this step has one.
     pub(super) fn save_checkpoint(&mut self) -> Result<()> {
         self.hold_folder()?;
         let step = self.trainer.steps_done();
         match self.checkpoints.save_due(&mut self.trainer)? {
-            // A Save in answer to this would find that the step has one.
+            // If the observer answers Save again, the step has its checkpoint already: no endless loop.
             Some(path) => self.tell(Event::Checkpoint { step, path: &path }),
             None => Ok(()),
         }
     }
 
-    /// The checkpoint of a run that was stopped. Returns whether there is one.
+    /// Writes the checkpoint of a stopped run. Returns whether there is one.
     pub(super) fn keep_if_stopped(&mut self) -> Result<bool> {
         if self.stopped { self.checkpoints.save(&mut self.trainer).map(|_| true) } else { Ok(false) }
     }

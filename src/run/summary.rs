@@ -1,4 +1,4 @@
-//! What came of a run: for the caller, and `metrics.json`.
+//! The result of a run: for the caller, and in `metrics.json`.
 
 use crate::error::Result;
 use crate::eval::scores::Scores;
@@ -6,32 +6,31 @@ use crate::io::atomic;
 use serde_json::json;
 use std::path::{Path, PathBuf};
 
-/// Name of the file in the folder of a run.
 const FILE: &str = "metrics.json";
 
-/// What came of a run.
+/// The result of a run.
 #[derive(Clone, Debug)]
 pub struct Summary {
-    /// Steps done.
+    /// Number of finished steps.
     pub steps: u32,
     /// Time of the training without reading and scoring, s.
     pub seconds: f64,
-    /// Gaussians of the model.
+    /// Number of Gaussians in the model.
     pub gaussians: u32,
-    /// Photo loss of the last step; none if no step was done.
+    /// Photo loss of the last step; none if the run had no step.
     pub loss: Option<f64>,
-    /// Its label loss, weighted.
+    /// Weighted label loss of the last step.
     pub label_loss: Option<f64>,
-    /// The model.
+    /// Path of the model.
     pub model: PathBuf,
-    /// Scores of the held-out views; none without such views, and of a run that was stopped.
+    /// Scores of the held-out views; none without such views and in a stopped run.
     pub scores: Option<Scores>,
-    /// The observer stopped the run; the model and, where steps are left, a checkpoint are written.
+    /// True if the observer stopped the run. The model is written, and a checkpoint if steps remain.
     pub stopped: bool,
 }
 
 impl Summary {
-    /// The content of `metrics.json`.
+    /// Returns the content of `metrics.json`.
     pub fn to_json(&self) -> serde_json::Value {
         json!({
             "schema_version": 1,

@@ -1,24 +1,24 @@
 //! A pinhole camera with an off-centre principal point.
 //!
-//! Axes are OpenCV's: x right, y down, z forward. Pixel (0, 0) has its centre at (0.5, 0.5), so a point
-//! (x, y, z) in camera space lands at (fx x/z + cx, fy y/z + cy).
+//! Axes are OpenCV's: x right, y down, z forward. The centre of pixel (0, 0) is at (0.5, 0.5), so a point (x, y, z) in
+//! camera space projects to (fx x/z + cx, fy y/z + cy).
 
 use glam::{DMat3, DVec2, DVec3};
 
 /// Pose and intrinsics of one view, in f64.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Camera {
-    /// Rotation of camera_from_world.
+    /// Rotation of camera-from-world.
     pub rotation: DMat3,
-    /// Translation of camera_from_world, world units.
+    /// Translation of camera-from-world, world units.
     pub translation: DVec3,
     /// Horizontal focal length, px.
     pub fx: f64,
     /// Vertical focal length, px.
     pub fy: f64,
-    /// Principal point, px.
+    /// Principal point x, px.
     pub cx: f64,
-    /// Principal point, px.
+    /// Principal point y, px.
     pub cy: f64,
     /// Image width, px.
     pub width: u32,
@@ -27,27 +27,27 @@ pub struct Camera {
 }
 
 impl Camera {
-    /// Centre of the camera in world space.
+    /// Returns the centre of the camera in world space.
     pub fn centre(&self) -> DVec3 {
         -(self.rotation.transpose() * self.translation)
     }
 
-    /// The same camera in a world whose origin is moved to `origin`.
+    /// Returns the camera in a world with its origin moved to `origin`.
     pub fn relative_to(&self, origin: DVec3) -> Self {
         Self { translation: self.to_camera(origin), ..self.clone() }
     }
 
-    /// Camera-space position of a world point.
+    /// Returns the camera-space position of a world point.
     pub fn to_camera(&self, world: DVec3) -> DVec3 {
         self.rotation * world + self.translation
     }
 
-    /// Pixel position of a camera-space point, px. Meaningful for z > 0 only.
+    /// Projects a camera-space point, px. The result is meaningful for z > 0 only.
     pub fn project(&self, camera: DVec3) -> DVec2 {
         DVec2::new(self.fx * camera.x / camera.z + self.cx, self.fy * camera.y / camera.z + self.cy)
     }
 
-    /// The same camera for an image resized to `width` x `height` px.
+    /// Returns the camera for an image resized to `width` x `height` px.
     pub fn resized(&self, width: u32, height: u32) -> Self {
         let (sx, sy) = (f64::from(width) / f64::from(self.width), f64::from(height) / f64::from(self.height));
         Self { fx: self.fx * sx, fy: self.fy * sy, cx: self.cx * sx, cy: self.cy * sy, width, height, ..self.clone() }

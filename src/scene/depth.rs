@@ -1,22 +1,22 @@
-//! A depth per pixel.
+//! Depth maps.
 
-/// How numbers of a depth map are to be read.
+/// The meaning of the values in a depth map.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 pub enum DepthKind {
-    /// Larger is nearer, up to an unknown scale and offset, as networks for single photos predict it.
+    /// Inverse depth up to an unknown scale and offset, as from monocular networks: larger is nearer.
     Inverse,
-    /// z or distance: larger is farther; 0 is no depth.
+    /// z or distance: larger is farther; 0 is a hole.
     Metric,
 }
 
-/// Depths of a view, row-major; what is not finite is a hole.
+/// The depth map of a view, row-major. Values that are not finite are holes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DepthMap {
     /// Width, px.
     pub width: u32,
     /// Height, px.
     pub height: u32,
-    /// Depths, [height, width].
+    /// Depths, `[height, width]`.
     pub values: Vec<f32>,
 }

@@ -1,56 +1,56 @@
-//! Host copy of the model: a structure of arrays, one row per Gaussian.
+//! The model on the host: a structure of arrays, one row per Gaussian.
 
 use crate::error::{Error, Result};
 use glam::DVec3;
 
-/// The Gaussians of a scene, parameters stored before activation as in the standard 3DGS PLY.
+/// The Gaussians of a scene. Parameters are stored before activation, as in the standard 3DGS PLY.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Gaussians {
-    /// The world position that `means` are relative to: 0 but for scenes far from the origin, see
-    /// [`far_origin`](super::origin::far_origin).
+    /// World position of the origin of `means`: 0 except in scenes far from the origin.
     pub origin: DVec3,
-    /// Positions, [N, 3], world units.
+    /// Positions relative to `origin`, `[N, 3]`, world units.
     pub means: Vec<[f32; 3]>,
-    /// Rotations (w, x, y, z), not necessarily of unit length, [N, 4].
+    /// Rotations (w, x, y, z), not necessarily of unit length, `[N, 4]`.
     pub quats: Vec<[f32; 4]>,
-    /// Natural logarithms of the standard deviations, [N, 3].
+    /// Natural logarithms of the standard deviations, `[N, 3]`.
     pub scales: Vec<[f32; 3]>,
-    /// Opacity before the sigmoid, [N].
+    /// Opacities before the sigmoid, `[N]`.
     pub opacities: Vec<f32>,
-    /// Degree-0 colour coefficients, [N, 3] (r, g, b).
+    /// Colour coefficients of degree 0 (r, g, b), `[N, 3]`.
     pub sh0: Vec<[f32; 3]>,
-    /// Coefficients above degree 0, [N, coefficients - 1] triples (r, g, b), coefficient-major.
+    /// Coefficients above degree 0 as triples (r, g, b), `[N, coefficients - 1, 3]`: 0, 3, 8 or 15 triples per
+    /// Gaussian.
     pub sh_rest: Vec<[f32; 3]>,
     /// Degree of the spherical harmonics, 0 to 3.
     pub sh_degree: u32,
-    /// Object ids, [N], 0 = unlabelled; `None` for a scene that knows no labels.
+    /// Object ids, `[N]`, 0 = unlabelled; `None` in a scene without labels.
     pub labels: Option<Vec<u32>>,
-    /// How sure each label is, [N], 0 to 1: the share of its votes; `None` where nobody counted votes.
+    /// Confidence of each label, `[N]`, 0 to 1: its share of the votes; `None` without votes.
     pub label_confidence: Option<Vec<f32>>,
 }
 
 impl Gaussians {
-    /// Number of Gaussians.
+    /// Returns the number of Gaussians.
     pub fn len(&self) -> usize {
         self.means.len()
     }
 
-    /// World position of a Gaussian.
+    /// Returns the world position of a Gaussian.
     pub fn world(&self, row: usize) -> DVec3 {
         self.origin + DVec3::from_array(self.means[row].map(f64::from))
     }
 
-    /// True without any Gaussian.
+    /// Returns true without any Gaussian.
     pub fn is_empty(&self) -> bool {
         self.means.is_empty()
     }
 
-    /// Coefficients per Gaussian and channel above degree 0: 0, 3, 8 or 15.
+    /// Returns the number of coefficients per Gaussian and channel above degree 0: 0, 3, 8 or 15.
     pub fn rest_per_gaussian(&self) -> usize {
         ((self.sh_degree + 1) * (self.sh_degree + 1) - 1) as usize
     }
 
-    /// An error unless all columns have a row for each Gaussian, as what reads them expects.
+    /// Returns an error unless all columns have the right length.
     pub fn check(&self) -> Result<()> {
         let (count, rest) = (self.len(), self.len() * self.rest_per_gaussian());
         let columns = [
@@ -69,7 +69,7 @@ impl Gaussians {
         Err(Error::usage(format!("Gaussians::{name}"), problem))
     }
 
-    /// True if no value of a row is infinite or NaN.
+    /// Returns true if no value of a row is infinite or NaN.
     pub fn is_finite(&self, row: usize) -> bool {
         let rest = self.rest_per_gaussian();
         let triples = [self.means[row], self.scales[row], self.sh0[row]];
@@ -78,7 +78,7 @@ impl Gaussians {
             && self.opacities[row].is_finite()
     }
 
-    /// Keeps the rows for which `keep` holds, in order.
+    /// Returns the rows for which `keep` holds, in order.
     pub fn filtered(&self, mut keep: impl FnMut(usize) -> bool) -> Self {
         let rows: Vec<usize> = (0..self.len()).filter(|&row| keep(row)).collect();
         let rest = self.rest_per_gaussian();

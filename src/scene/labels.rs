@@ -1,39 +1,39 @@
 //! Object ids: 0 is unlabelled, 1 to 65535 are objects.
 
-/// Id of a Gaussian or pixel that belongs to no object.
+/// Id of the background, in masks and in models.
 pub const UNLABELLED: u32 = 0;
 
-/// For each object of a view, sorted: the objects that hide a part of it, sorted.
+/// Occluders of each object in a view: the objects that hide a part of it. Keys and lists are sorted.
 pub type Occluders = std::collections::BTreeMap<u16, Vec<u16>>;
 
-/// Largest id that a mask or a Gaussian can carry.
+/// Largest id in masks and models.
 pub const LABEL_MAX: u32 = 65_535;
 
-/// An id per pixel, row-major.
+/// A map of ids, row-major.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct LabelMap {
     /// Width, px.
     pub width: u32,
     /// Height, px.
     pub height: u32,
-    /// Ids, [height, width].
+    /// Ids, `[height, width]`.
     pub ids: Vec<u16>,
 }
 
 impl LabelMap {
-    /// The id at column `x` and row `y`.
+    /// Returns the id at column `x` and row `y`.
     pub fn at(&self, x: u32, y: u32) -> u16 {
         self.ids[(y * self.width + x) as usize]
     }
 
-    /// The id at column `x` and row `y`, if that is inside.
+    /// Returns the id at column `x` and row `y`; `None` outside.
     pub fn get(&self, x: u32, y: u32) -> Option<u16> {
         (x < self.width && y < self.height).then(|| self.at(x, y))
     }
 
-    /// The ids that occur, sorted, without 0.
+    /// Returns the ids in the map, sorted, without 0.
     pub fn objects(&self) -> Vec<u16> {
-        // A bit per id.
+        // One bit per id.
         let mut seen = [0_u64; 1024];
         self.ids.iter().for_each(|&id| seen[usize::from(id / 64)] |= 1 << (id % 64));
         seen[0] &= !1;
@@ -42,11 +42,11 @@ impl LabelMap {
         (0..).zip(&seen).filter(|(_, word)| **word != 0).flat_map(of_word).collect()
     }
 
-    /// True for the pixels that have another id within `distance` px, in a square around them.
+    /// Returns true for pixels with another id within `distance` px, in a square window.
     pub fn near_contour(&self, distance: u32) -> Vec<bool> {
         let (width, height) = (self.width as usize, self.height as usize);
         let distance = distance as usize;
-        // Smallest and largest id over rows, then over columns: a pixel is near a contour where they differ.
+        // Smallest and largest id over rows, then over columns: they differ near a contour.
         let window = |at: usize, size: usize| at.saturating_sub(distance)..(at + distance + 1).min(size);
         let over = |range: std::ops::Range<usize>, index: &dyn Fn(usize) -> usize, low: &[u16], high: &[u16]| {
             let places = || range.clone().map(index);
@@ -60,7 +60,7 @@ impl LabelMap {
     }
 }
 
-/// Display colour of an id: hues a golden ratio apart, 0 is black.
+/// Returns the display colour of an id: hues a golden ratio apart; 0 is black.
 pub fn label_colour(id: u32) -> [u8; 3] {
     if id == UNLABELLED {
         return [0; 3];

@@ -1,4 +1,7 @@
-//! Plain host data of a scene: cameras, Gaussians, labels, views. No Vulkan, no files.
+//! Plain host data of a scene; no Vulkan, no files.
+//!
+//! A [`Dataset`] has [`View`]s (a [`Camera`] with photo and mask) and [`Point`]s; [`Gaussians`] is the model. A
+//! [`LabelMap`] has an object id per pixel, a [`DepthMap`] a depth. [`path`] makes smooth paths through cameras.
 
 pub(crate) mod camera;
 pub(crate) mod depth;

@@ -1,23 +1,23 @@
-//! Scenes far from the origin, such as in UTM coordinates: f32 holds positions relative to a point in their middle.
+//! Scenes far from the origin, such as in UTM coordinates: f32 positions are relative to a point near their middle.
 
 use glam::DVec3;
 
-/// A scene is far away if its middle is more than so many times its size from the origin. There f32 rounds positions to
-/// 1.5e-5 of the scene, a hundredth of a pixel; beyond it, soon to pixels.
+/// Ratio of distance from the origin to size above which a scene counts as far. At this ratio f32 rounds positions to
+/// 1.5e-5 of the scene size, a hundredth of a pixel; farther away the error soon reaches pixels.
 const FAR: f64 = 256.0;
-/// World units.
+/// Size of a scene with a single position, world units.
 const SIZE_OF_A_POINT: f64 = 10.0;
 
-/// The point that positions are best kept relative to: the origin unless the scene is far from it. Its coordinates are
-/// multiples of a power of two above the size of the scene, so that little is lost in the subtraction.
+/// Returns the best origin for positions: 0 unless the scene is far away. Its coordinates are multiples of a power of
+/// two above the size of the scene, so that the subtraction loses little.
 pub(crate) fn far_origin(positions: &[DVec3]) -> DVec3 {
     if positions.is_empty() {
         return DVec3::ZERO;
     }
-    // Medians, because a stray point may be anywhere.
+    // Medians, because outliers may be anywhere.
     let middle = by_axis(|axis| median(positions.iter().map(|p| p[axis]).collect()));
     let size = by_axis(|axis| median(positions.iter().map(|p| (p[axis] - middle[axis]).abs()).collect())).length();
-    // One point, or many at one place, have no size to compare with.
+    // Positions at one place have no size.
     let size = if size > 0.0 { size } else { SIZE_OF_A_POINT };
     if !(middle.length() > FAR * size) || !middle.is_finite() {
         return DVec3::ZERO;

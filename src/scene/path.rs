@@ -1,24 +1,24 @@
-//! A smooth path through posed cameras: their order, and cameras between two of them.
+//! A smooth path through posed cameras: an order of the cameras, and interpolated cameras between neighbours.
 
 use super::Camera;
 use glam::{DMat3, DQuat, DVec3};
 
-/// Cameras from which the greedy search starts, at most: more cost more and hardly shorten the path.
+/// Most start cameras of the greedy search; more cost time and hardly shorten the path.
 const STARTS: usize = 32;
-/// Least gain that an exchange needs, so that rounding cannot make the search go round in circles.
+/// Least gain of an exchange, so that rounding errors cannot cause an endless loop.
 const GAIN: f64 = 1e-12;
 
-/// How a camera between two others is made.
+/// The interpolation between two cameras.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Between {
-    /// The centre moves on the straight line and the intrinsics change with it.
+    /// Interpolates centres and intrinsics linearly.
     Centres,
-    /// As the code of LabelGS: the translation of camera-from-world is interpolated, so that the centre may swing off the
-    /// line, and the intrinsics are those of the first camera.
+    /// As in the code of LabelGS: interpolates the translation of camera-from-world, so that the centre may leave the
+    /// line. The intrinsics are those of the first camera.
     Translations,
 }
 
-/// What distances are measured with: centres in units of the cameras' radius, and rotations.
+/// Centres in units of the cameras' radius, and rotations, for distances.
 struct Places {
     centres: Vec<DVec3>,
     rotations: Vec<DQuat>,
@@ -29,24 +29,24 @@ impl Places {
         let centres: Vec<DVec3> = cameras.iter().map(|camera| camera.centre()).collect();
         let mean = centres.iter().sum::<DVec3>() / centres.len().max(1) as f64;
         let radius = centres.iter().map(|centre| centre.distance(mean)).fold(0.0, f64::max);
-        // Centres come from poses by arithmetic: cameras that only turn are a rounding apart, which is no radius.
+        // Centres have rounding errors. Rotating cameras at one place differ only by these, which is no radius.
         let far = centres.iter().map(|centre| centre.length()).fold(0.0, f64::max);
         let unit = if radius > 1e-9 * far { radius } else { far.max(1.0) };
         let rotations = cameras.iter().map(|camera| DQuat::from_mat3(&camera.rotation).normalize()).collect();
         Self { centres: centres.iter().map(|centre| *centre / unit).collect(), rotations }
     }
 
-    /// Distance of the centres plus the angle between the poses in radians: a picture changes about as much when the
-    /// camera turns by a radian as when it goes by the distance to what it looks at, which the radius stands for.
+    /// Returns the distance of the centres plus the angle between the poses in radians. An image changes about equally
+    /// when the camera turns by a radian and when it moves by its distance to the subject. The radius stands for this
+    /// distance.
     fn distance(&self, a: usize, b: usize) -> f64 {
         let cosine = self.rotations[a].dot(self.rotations[b]).abs().min(1.0);
         self.centres[a].distance(self.centres[b]) + 2.0 * cosine.acos()
     }
 }
 
-/// An order of the cameras in which neighbours have similar poses: the shortest of some greedy paths, then every exchange
-/// of two edges (2-opt) that shortens it. The same cameras in the same order give the same result; of both directions
-/// it is that in which the end with the smaller index comes first.
+/// Returns an order of the cameras in which neighbours have similar poses: the shortest of some greedy paths, improved
+/// by exchanges of two edges (2-opt). The result is deterministic. The end with the smaller index comes first.
 pub fn short_order(cameras: &[&Camera]) -> Vec<usize> {
     let (places, count) = (Places::new(cameras), cameras.len());
     let starts = count.min(STARTS);
@@ -63,7 +63,7 @@ fn length(places: &Places, order: &[usize]) -> f64 {
     order.windows(2).map(|pair| places.distance(pair[0], pair[1])).sum()
 }
 
-/// Always on to the nearest that is left, from `start`.
+/// Returns the greedy path from `start`, always to the nearest remaining camera.
 fn greedy(places: &Places, start: usize) -> Vec<usize> {
     let mut left: Vec<usize> = (0..places.centres.len()).filter(|&other| other != start).collect();
     let mut order = vec![start];
@@ -77,8 +77,8 @@ fn greedy(places: &Places, start: usize) -> Vec<usize> {
     order
 }
 
-/// One round of turning stretches round where that shortens the path; true if any was. The ends are free, so that a
-/// stretch at an end has one edge to lose.
+/// Reverses each section of the path if that shortens it; returns true if any was reversed. The ends are free, so that
+/// a section at an end loses only one edge.
 fn exchange(places: &Places, order: &mut [usize]) -> bool {
     let mut shorter = false;
     for first in 0..order.len() {
@@ -99,8 +99,8 @@ fn exchange(places: &Places, order: &mut [usize]) -> bool {
     shorter
 }
 
-/// The camera at `t` from 0 to 1 on the way from `a` to `b`; its size is that of `a`. Rotations turn at an even rate on
-/// the short way round, equal ones stay.
+/// Returns the camera at `t` from 0 to 1 between `a` and `b`, with the size of `a`. The rotation turns evenly along the
+/// shorter way.
 pub fn between(a: &Camera, b: &Camera, t: f64, how: Between) -> Camera {
     let turn = DQuat::from_mat3(&a.rotation).normalize().slerp(DQuat::from_mat3(&b.rotation).normalize(), t);
     let rotation = DMat3::from_quat(turn.normalize());
@@ -123,14 +123,14 @@ pub fn between(a: &Camera, b: &Camera, t: f64, how: Between) -> Camera {
 /// A frame of a video through cameras.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Stop {
-    /// Index of the camera that it stands on; `None` between two.
+    /// Index of the camera at this frame; `None` between two cameras.
     pub camera_index: Option<usize>,
-    /// The camera; that of the index itself, untouched.
+    /// Camera of the frame; at an index, exactly that camera.
     pub camera: Camera,
 }
 
-/// All frames of a video through `cameras` in their order, with `count` frames between each two: n cameras give
-/// (count + 1)(n - 1) + 1 frames, and camera i is frame (count + 1) i.
+/// Returns the frames of a video through `cameras` in their order, with `count` frames between neighbours. n cameras
+/// give (count + 1)(n - 1) + 1 frames, and camera i is frame (count + 1) i.
 pub fn video(cameras: &[&Camera], count: u32, how: Between) -> Vec<Stop> {
     let at = |index: usize| Stop { camera_index: Some(index), camera: cameras[index].clone() };
     let on_the_way = |index: usize| {

@@ -1,4 +1,4 @@
-//! Posed photos with their masks, and the scene they make up.
+//! Posed photos with masks, and the scene that they form.
 
 use super::{Camera, LabelMap};
 use glam::DVec3;
@@ -6,41 +6,41 @@ use std::collections::BTreeSet;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-/// A decoded photo, row-major RGBA8. Alpha is 255 where the photo holds a colour and 0 where it has no source
-/// (outside the original image after undistortion); pixels with alpha 0 stay out of every loss and score.
+/// A decoded photo, row-major RGBA8. Alpha is 255 for valid pixels, and 0 for pixels outside of the original image
+/// after undistortion. Pixels with alpha 0 do not count in any loss or score.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Photo {
     /// Width, px.
     pub width: u32,
     /// Height, px.
     pub height: u32,
-    /// [height, width] of (r, g, b, valid).
+    /// r, g, b and validity, `[height, width]`.
     pub rgba: Vec<[u8; 4]>,
 }
 
-/// One posed photo. Photo and mask are shared by all its copies.
+/// A posed photo. Copies share photo and mask.
 #[derive(Clone, Debug)]
 pub struct View {
-    /// Name as the data set lists it, such as `00.jpg` or `left/00.jpg`.
+    /// Name in the data set, such as `00.jpg` or `left/00.jpg`.
     pub name: String,
-    /// Camera of the photo as it is in memory (undistorted, resized).
+    /// Camera of the photo in memory (undistorted, resized).
     pub camera: Camera,
-    /// The photo; `None` if photos were not asked for.
+    /// The photo; `None` if photos were not requested.
     pub photo: Option<Arc<Photo>>,
-    /// Visible objects; `None` if no masks were asked for or this view has none.
+    /// Mask of the visible objects; `None` if masks were not requested or the view has none.
     pub mask: Option<Arc<LabelMap>>,
 }
 
 impl View {
-    /// Name for output files: without extension, path separators as `_`.
+    /// Returns the name for output files: without extension, path separators replaced by `_`.
     pub fn stem(&self) -> String {
         let path = std::path::Path::new(&self.name).with_extension("");
         path.to_string_lossy().replace(['/', '\\'], "_")
     }
 }
 
-/// Names for output files of several views, none twice: [`View::stem`], with a number behind it where another view before
-/// it has the same (`a/1.jpg` and `a_1.png`).
+/// Returns unique names for output files of several views: [`View::stem`], with a number appended if an earlier view
+/// has the same one (`a/1.jpg` and `a_1.png`).
 pub(crate) fn stems(views: &[&View]) -> Vec<String> {
     let mut taken = BTreeSet::new();
     let mut name = |view: &&View| {
@@ -53,16 +53,16 @@ pub(crate) fn stems(views: &[&View]) -> Vec<String> {
     views.iter().map(&mut name).collect()
 }
 
-/// A coloured 3-D point.
+/// A coloured 3D point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Point {
     /// World position.
     pub position: DVec3,
-    /// Colour.
+    /// Colour, r, g, b, sRGB bytes.
     pub colour: [u8; 3],
 }
 
-/// A scene as read from disk.
+/// A scene in memory.
 #[derive(Clone, Debug, Default)]
 pub struct Dataset {
     /// Folder of the scene.
@@ -71,22 +71,22 @@ pub struct Dataset {
     pub train: Vec<View>,
     /// Held-out views, sorted by name.
     pub test: Vec<View>,
-    /// Points to start from; may be empty.
+    /// Initial points; may be empty.
     pub points: Vec<Point>,
-    /// What a person should know about the way it was read, a line each.
+    /// Notes for the user about reading, a line each.
     pub notes: Vec<String>,
 }
 
 impl Dataset {
-    /// All views, sorted by name.
+    /// Returns all views, sorted by name.
     pub fn all(&self) -> Vec<&View> {
         let mut views: Vec<&View> = self.train.iter().chain(&self.test).collect();
         views.sort_by(|a, b| a.name.cmp(&b.name));
         views
     }
 
-    /// Radius of the training cameras around their mean, times 1.1 (method of 3DGS); 1 where that is nothing but
-    /// rounding.
+    /// Returns the radius of the training cameras around their mean, times 1.1 (as in 3DGS), world units; 1 if it is
+    /// only rounding errors.
     pub fn extent(&self) -> f64 {
         let centres: Vec<DVec3> = self.train.iter().map(|view| view.camera.centre()).collect();
         if centres.is_empty() {

@@ -1,16 +1,17 @@
-//! Cameras on a dome around the scene, looking in.
+//! Cameras on a dome around the scene, facing inwards.
 
 use super::{SynthOptions, hash01};
 use crate::scene::Camera;
 use glam::{DMat3, DQuat, DVec3};
 use std::f64::consts::TAU;
 
-/// Distance to the point that all cameras look at.
+/// Distance to the common target of the cameras, world units.
 const DISTANCE: f64 = 4.0;
 /// Elevations of the three rings, degrees.
 const ELEVATIONS: [f64; 3] = [16.0, 33.0, 52.0];
 
-/// One camera per view: once around, every third at the same height, so that a held-out view has neighbours near by.
+/// Returns one camera per view, once around the scene. Every third camera has the same height, so that a held-out view
+/// has close neighbours.
 pub fn ring_of_cameras(options: &SynthOptions) -> Vec<Camera> {
     (0..options.views).map(|view| camera(options, view)).collect()
 }
@@ -25,7 +26,7 @@ fn camera(options: &SynthOptions, view: u32) -> Camera {
     let forward = -outward;
     let right = forward.cross(DVec3::Z).normalize();
     let down = forward.cross(right);
-    // Through the quaternion, because that is what the files hold.
+    // Through the quaternion, because the files store that.
     let rotation = DMat3::from_quat(DQuat::from_mat3(&DMat3::from_cols(right, down, forward).transpose()).normalize());
     let (width, height) = (f64::from(options.width), f64::from(options.height));
     let focal = 1.08 * width.min(height * 4.0 / 3.0);

@@ -1,45 +1,45 @@
-//! Solid textures: colour as a function of the place in an object's own frame. No pattern is finer than a few pixels of
+//! Solid textures: colour as a function of the position in the object's frame. The finest patterns have a few pixels in
 //! the usual view.
 
 use super::hash01;
 use glam::DVec3;
 
-/// How the two colours of a material share the space.
+/// The pattern of the two colours of a material. Lengths are world units.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Pattern {
-    /// Cubes of this edge.
+    /// Cubes with this edge.
     Checks(f64),
-    /// Slabs of this thickness across an axis (0, 1, 2).
+    /// Slabs with this thickness across an axis (0, 1, 2).
     Stripes(f64, usize),
-    /// Wedges around the z axis, this many of each colour.
+    /// Wedges around the z axis, with this number of each colour.
     Wedges(u32),
-    /// Smooth noise of this wavelength.
+    /// Smooth noise with this wavelength.
     Noise(f64),
-    /// Balls on a grid of this pitch.
+    /// Balls on a grid with this pitch.
     Spots(f64),
     /// Only the first colour.
     Plain,
-    /// As the ground below, for an object that is not turned and whose offset is its position.
+    /// The pattern of the ground, for an object without rotation whose offset is its position.
     Ground,
 }
 
-/// Colour of an object.
+/// The colours of an object.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Material {
-    /// How the colours share the space.
+    /// Pattern of the two colours.
     pub pattern: Pattern,
-    /// First colour, 0 to 1.
+    /// First colour, r, g, b, 0 to 1.
     pub first: DVec3,
-    /// Second colour, 0 to 1.
+    /// Second colour, r, g, b, 0 to 1.
     pub second: DVec3,
-    /// Shift of the pattern, which also keeps its edges off the faces of a box.
+    /// Shift of the pattern, world units. It also keeps pattern edges off the faces of a box.
     pub offset: DVec3,
     /// Seed of the noise.
     pub seed: u64,
 }
 
 impl Material {
-    /// Albedo at a place in the object's frame.
+    /// Returns the albedo at a position in the object's frame.
     pub fn albedo(&self, place: DVec3) -> DVec3 {
         let p = place + self.offset;
         let share = match self.pattern {
@@ -53,7 +53,7 @@ impl Material {
             }
             Pattern::Noise(wavelength) => {
                 let t = 0.7 * noise(p / wavelength, self.seed) + 0.3 * noise(p / wavelength * 2.0, self.seed + 1);
-                // Value noise keeps to the middle; spread it.
+                // Value noise stays near its mean; stretch it.
                 ((t - 0.5) * 3.0 + 0.5).clamp(0.0, 1.0)
             }
             Pattern::Spots(pitch) => {
@@ -61,13 +61,13 @@ impl Material {
                 f64::from((cell - cell.floor() - 0.5).length() < 0.42)
             }
         };
-        // A slow change of brightness, so that no two patches are equal.
+        // A slow change of brightness makes all patches different.
         let shade = 0.88 + 0.24 * noise(p / 0.45, self.seed + 2);
         self.first.lerp(self.second, share) * shade
     }
 }
 
-/// Albedo of the ground at a place of the world; the seed is the world's.
+/// Returns the albedo of the ground at a world position; the seed is that of the world.
 pub(super) fn ground_albedo(place: DVec3, seed: u64) -> DVec3 {
     let tile = (place / 0.55 + 0.21).floor();
     let odd = (tile.x + tile.y).rem_euclid(2.0);
@@ -75,7 +75,7 @@ pub(super) fn ground_albedo(place: DVec3, seed: u64) -> DVec3 {
     base * (0.75 + 0.5 * noise(place / 0.35, seed + 77))
 }
 
-/// Value noise in 0 to 1, one random value per unit cube's corner, smooth in between.
+/// Returns value noise in 0 to 1: one random value per lattice point, smooth in between.
 pub(super) fn noise(p: DVec3, seed: u64) -> f64 {
     let cell = p.floor();
     let f = p - cell;
@@ -90,7 +90,7 @@ pub(super) fn noise(p: DVec3, seed: u64) -> f64 {
     mix(side(0.0), side(1.0), s.z)
 }
 
-/// A colour from hue (0 to 1, wraps), saturation and value.
+/// Returns a colour from hue (0 to 1, periodic), saturation and value.
 pub(super) fn hsv(hue: f64, saturation: f64, value: f64) -> DVec3 {
     let channel = |offset: f64| {
         let k = (offset + hue.rem_euclid(1.0) * 6.0) % 6.0;

@@ -1,7 +1,8 @@
-//! A posed test scene, ray-traced from analytic shapes: photos, masks of visible and of whole objects, objects alone,
-//! depth, points.
+//! Makes posed test scenes with complete ground truth, ray-traced from analytic shapes.
 //!
-//! Nothing in it is made of Gaussians, so a score on it is not a score of the engine against itself.
+//! [`write()`] writes photos, masks of visible and of whole objects, objects alone, depth and points to files.
+//! [`dataset`] keeps photos and masks in memory, and [`spoil`] puts faults into masks. The scenes are not made of
+//! Gaussians, so a score on them does not compare the engine with itself.
 
 pub(crate) mod cameras;
 mod hard;
@@ -25,7 +26,7 @@ use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 use trace::picture;
 
-/// Which objects stand in the scene.
+/// The objects in the scene.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 #[serde(rename_all = "lowercase")]
@@ -35,14 +36,15 @@ pub enum Preset {
     Default,
     /// Three objects; for quick tests.
     Simple,
-    /// What labels find hard: thin parts, the ground's colours, black, inside another, cut by the border, touching.
+    /// Objects that are hard to label: thin parts, the ground's colours, black, inside another, cut by the border,
+    /// touching.
     Hard,
 }
 
-/// What to make.
+/// The options of a made scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SynthOptions {
-    /// Which objects.
+    /// Objects in the scene.
     pub preset: Preset,
     /// Width of a picture, px.
     pub width: u32,
@@ -62,7 +64,7 @@ impl Default for SynthOptions {
     }
 }
 
-/// The scene in memory, with photos and masks; every `test_every`-th view is held out, 0 for none.
+/// Makes the scene in memory, with photos and masks. Every `test_every`-th view is held out; 0 holds out none.
 pub fn dataset(options: &SynthOptions, test_every: u32) -> Dataset {
     let world = World::new(options.preset, options.seed);
     let cameras = ring_of_cameras(options);
@@ -87,12 +89,12 @@ pub fn dataset(options: &SynthOptions, test_every: u32) -> Dataset {
     dataset
 }
 
-/// File name of a view.
+/// Returns the file name of a view.
 fn view_name(index: usize) -> String {
     format!("{index:03}.png")
 }
 
-/// A number in 0 to 1 that depends on every bit of the four words; the same on every machine.
+/// Returns a number in 0 to 1 that depends on every bit of the four words, the same on every machine.
 fn hash01(a: u64, b: u64, c: u64, d: u64) -> f64 {
     let mut state = 0x9e37_79b9_7f4a_7c15_u64;
     for word in [a, b, c, d] {

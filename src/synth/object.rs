@@ -4,7 +4,7 @@ use super::material::{Material, Pattern};
 use super::shape::Shape;
 use glam::{DQuat, DVec3};
 
-/// One row of an arrangement: name, shape, position, turn about z in degrees, pattern.
+/// A row of a preset: name, shape, position, rotation about z in degrees, pattern.
 pub(super) type Row = (&'static str, Shape, [f64; 3], f64, Pattern);
 
 /// A labelled object.
@@ -14,24 +14,24 @@ pub struct Object {
     pub id: u8,
     /// Name.
     pub name: &'static str,
-    /// Shape in its own frame.
+    /// Shape, in the object's frame.
     pub shape: Shape,
-    /// Centre, world.
+    /// Centre, world position.
     pub position: DVec3,
-    /// World from own frame.
+    /// Rotation from the object's frame to the world.
     pub rotation: DQuat,
-    /// Colour.
+    /// Colours.
     pub material: Material,
 }
 
 impl Object {
-    /// Place and direction in the object's own frame.
+    /// Converts position and direction of a ray to the object's frame.
     pub(super) fn to_own(&self, origin: DVec3, direction: DVec3) -> (DVec3, DVec3) {
         let back = self.rotation.conjugate();
         (back * (origin - self.position), back * direction)
     }
 
-    /// Distance at which a ray meets the object alone.
+    /// Returns the distance at which a ray hits the object alone.
     pub fn distance(&self, origin: DVec3, direction: DVec3) -> Option<f64> {
         let (origin, direction) = self.to_own(origin, direction);
         self.shape.enter(origin, direction).map(|entry| entry.distance)

@@ -1,4 +1,4 @@
-//! The sparse cloud that a structure-from-motion tool would have found, with the views that see each point.
+//! A sparse point cloud as from structure from motion, with the views of each point.
 
 use super::SynthOptions;
 use super::trace::ray;
@@ -8,23 +8,23 @@ use glam::{DVec2, DVec3};
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64;
 
-/// Standard deviation of a point's error, in units of its distance.
+/// Standard deviation of the position error, as a share of the distance.
 const NOISE: f64 = 0.0015;
 
-/// A point and where it is seen.
+/// A point and its observations.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Seen {
-    /// Place and colour.
+    /// Position and colour.
     pub point: Point,
-    /// View number and place in its image, px.
+    /// Indices of views and image positions, px.
     pub track: Vec<(u32, DVec2)>,
 }
 
-/// Points on visible surfaces, as dense as pixels see them; each is seen by two views or more.
+/// Samples points on visible surfaces, with the density of pixels. At least two views see each point.
 pub(super) fn sample(world: &World, cameras: &[Camera], options: &SynthOptions) -> Vec<Seen> {
     let mut random = Pcg64::seed_from_u64(options.seed);
     let mut found = Vec::new();
-    // A scene of few views may have fewer points than asked for; never search for ever.
+    // A scene with few views may have fewer points than requested, so the number of tries is limited.
     for _ in 0..u64::from(options.points) * 4 {
         if found.len() >= options.points as usize || cameras.is_empty() {
             break;
@@ -34,7 +34,7 @@ pub(super) fn sample(world: &World, cameras: &[Camera], options: &SynthOptions) 
             (random.random::<f64>() * f64::from(camera.width), random.random::<f64>() * f64::from(camera.height));
         let hit = world.hit(camera.centre(), ray(camera, x, y));
         let mut normal = || {
-            // Sum of uniform numbers: close enough to a normal one, and the same on every machine.
+            // A sum of uniform numbers is close to normal and the same on every machine.
             (0..12).map(|_| random.random::<f64>()).sum::<f64>() - 6.0
         };
         let error = DVec3::new(normal(), normal(), normal()) * (NOISE * hit.distance);
@@ -52,7 +52,7 @@ pub(super) fn sample(world: &World, cameras: &[Camera], options: &SynthOptions) 
     found
 }
 
-/// Where a camera sees a place on a surface, if it does.
+/// Returns the image position of a surface point in a camera that sees it.
 fn sees(world: &World, camera: &Camera, place: DVec3) -> Option<DVec2> {
     let own = camera.to_camera(place);
     if own.z <= 0.0 {

@@ -1,4 +1,4 @@
-//! The arrangements of objects.
+//! The objects of the presets.
 
 use super::material::{Material, Pattern, hsv};
 use super::object::{Object, Row};
@@ -6,7 +6,7 @@ use super::shape::Shape;
 use super::{Preset, hard, hash01};
 use glam::{DQuat, DVec3};
 
-/// The objects of a preset, ids 1, 2, .. in order.
+/// Returns the objects of a preset, with ids 1, 2, ... in order.
 pub(super) fn objects(preset: Preset, seed: u64) -> Vec<Object> {
     let rows = match preset {
         Preset::Default => default_rows(),
@@ -16,10 +16,10 @@ pub(super) fn objects(preset: Preset, seed: u64) -> Vec<Object> {
     rows.into_iter().enumerate().map(|(index, row)| object(index, row, seed)).collect()
 }
 
-/// A crate in the middle, the others against its faces, on top of it and in each other.
+/// A crate in the middle, and others against its faces, on top of it and in each other.
 fn default_rows() -> Vec<Row> {
     let turn = 25.0_f64;
-    // Place at a distance from the crate's centre, across one of its four faces.
+    // Position at a distance from the crate's centre, across one of its four faces.
     let across = |quarter: f64, distance: f64, height: f64| {
         let angle = (turn + 90.0 * quarter).to_radians();
         [angle.cos() * distance, angle.sin() * distance, height]

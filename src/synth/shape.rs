@@ -1,27 +1,27 @@
-//! Solid shapes around their own origin, and where a ray meets them.
+//! Solid shapes around their own origin, and ray intersection. Lengths are world units.
 
 use glam::DVec3;
 
-/// A solid, centred at the origin of its own frame.
+/// A solid, centred at the origin of its frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Shape {
-    /// Ellipsoid of these radii.
+    /// Ellipsoid: radii.
     Ball(DVec3),
-    /// Box of these half sizes.
+    /// Box: half sizes.
     Block(DVec3),
-    /// Box of these half sizes, thickened by a radius; with one half size other than 0 a capsule.
+    /// Rounded box: half sizes and added radius. With one half size other than 0 it is a capsule.
     RoundBlock(DVec3, f64),
     /// Upright cylinder: radius, half height.
     Cylinder(f64, f64),
     /// Lying torus: radius of the ring, radius of its tube.
     Ring(f64, f64),
-    /// Upright bars along x with two rails across: number of bars, their pitch, half height, radius of all of it.
+    /// Upright bars along x with two rails: number of bars, pitch, half height, radius of bars and rails.
     Fence(u32, f64, f64, f64),
-    /// Box of these outer half sizes without a lid: thickness of floor and walls.
+    /// Open box: outer half sizes, thickness of floor and walls.
     Bin(DVec3, f64),
 }
 
-/// Where a ray enters a shape.
+/// The point at which a ray enters a shape.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Entry {
     /// Distance along the ray.
@@ -31,7 +31,7 @@ pub struct Entry {
 }
 
 impl Shape {
-    /// Radius of a sphere around the origin that holds the shape.
+    /// Returns the radius of a sphere around the origin that contains the shape.
     pub fn bound(&self) -> f64 {
         match *self {
             Self::Ball(radii) => radii.max_element(),
@@ -44,7 +44,7 @@ impl Shape {
         }
     }
 
-    /// First entry of the ray from `origin` (outside the shape) along the unit vector `direction`.
+    /// Returns the first entry of the ray from `origin` (outside the shape) along the unit vector `direction`.
     pub fn enter(&self, origin: DVec3, direction: DVec3) -> Option<Entry> {
         let (near, far) = sphere_span(origin, direction, self.bound() * 1.0001)?;
         if far <= 0.0 {
@@ -73,7 +73,7 @@ impl Shape {
     }
 }
 
-/// A simple shape and where its centre is in the frame of the whole.
+/// A simple shape and its centre in the frame of the whole.
 type Part = (Shape, DVec3);
 
 fn fence_parts(bars: u32, pitch: f64, half: f64, radius: f64) -> Vec<Part> {
@@ -83,7 +83,7 @@ fn fence_parts(bars: u32, pitch: f64, half: f64, radius: f64) -> Vec<Part> {
     (0..bars).map(bar).chain([rail(0.5 * half), rail(-0.5 * half)]).collect()
 }
 
-/// A floor and four walls that meet without overlap.
+/// Returns a floor and four walls that meet without overlap.
 fn bin_parts(half: DVec3, wall: f64) -> [Part; 5] {
     let thin = wall / 2.0;
     let inner = half.y - wall;
@@ -98,7 +98,7 @@ fn enter_parts(parts: &[Part], origin: DVec3, direction: DVec3) -> Option<Entry>
     entries.min_by(|a, b| a.distance.total_cmp(&b.distance))
 }
 
-/// Distances at which a ray enters and leaves a sphere around the origin.
+/// Returns the distances at which a ray enters and leaves a sphere around the origin.
 fn sphere_span(origin: DVec3, direction: DVec3, radius: f64) -> Option<(f64, f64)> {
     let b = origin.dot(direction);
     let discriminant = b * b - origin.length_squared() + radius * radius;
@@ -110,7 +110,7 @@ fn sphere_span(origin: DVec3, direction: DVec3, radius: f64) -> Option<(f64, f64
 }
 
 fn enter_ball(origin: DVec3, direction: DVec3, radii: DVec3) -> Option<Entry> {
-    // In the frame where the ellipsoid is a unit sphere the direction is no longer of unit length.
+    // In the frame where the ellipsoid is a unit sphere, the direction is not of unit length.
     let (o, d) = (origin / radii, direction / radii);
     let length = d.length();
     let (near, _) = sphere_span(o, d / length, 1.0)?;
@@ -154,7 +154,7 @@ fn enter_cylinder(origin: DVec3, direction: DVec3, radius: f64, half: f64) -> Op
         .then(|| Entry { distance, normal: DVec3::new(0.0, 0.0, -direction.z.signum()) })
 }
 
-/// Sphere tracing between two distances with an exact signed distance.
+/// Traces a ray between two distances with an exact signed distance.
 fn march(distance_to: impl Fn(DVec3) -> f64, origin: DVec3, direction: DVec3, near: f64, far: f64) -> Option<Entry> {
     const CLOSE: f64 = 1e-7;
     let mut distance = near;

@@ -1,33 +1,33 @@
-//! Faults of trackers, made on purpose: to see what a method does with them.
+//! Puts the faults of trackers into masks, to measure their effect.
 
 use super::hash01;
 use crate::scene::LabelMap;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// By how much trackers shrink photos before they look at them: 480 of 1080 lines.
+/// Factor by which trackers shrink photos: 1080 to 480 lines.
 const SHRINK: f64 = 2.25;
 
-/// A fault.
+/// A kind of fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 pub enum Fault {
-    /// Two objects have each other's ids in a share of the views.
+    /// Two objects swap their ids in a share of the views.
     Swap,
-    /// Masks are made on a picture of 1 / 2.25 of the size and enlarged again.
+    /// Masks have 1 / 2.25 of the resolution and are enlarged again.
     Coarse,
-    /// Every view but the first has ids of its own, as a segmenter of single photos gives them.
+    /// Every view except the first has ids of its own, as from a segmenter of single images.
     PerView,
     /// A share of the views has no mask.
     Missing,
-    /// One object has the id of another in a share of the views.
+    /// An object has the id of another one in a share of the views.
     Merge,
 }
 
-/// The masks with a fault; `None` for one that is missing. `share` of the views have it, drawn by `seed`.
+/// Returns the masks with a fault; `None` is a missing mask. A `share` of the views has it, drawn by `seed`.
 pub fn spoil(masks: &[LabelMap], fault: Fault, share: f64, seed: u64) -> Vec<Option<LabelMap>> {
     let objects: Vec<u16> = masks.iter().flat_map(LabelMap::objects).collect::<BTreeSet<u16>>().into_iter().collect();
     let random = |view: usize, number: u64| hash01(seed, view as u64, number, 0x5b011);
-    // As near to the share as whole views come, whatever the numbers drawn.
+    // The number of views is exact up to rounding, for any random numbers.
     let mut order: Vec<usize> = (0..masks.len()).collect();
     order.sort_by(|&a, &b| random(a, 0).total_cmp(&random(b, 0)).then(a.cmp(&b)));
     let drawn: BTreeSet<usize> = order.into_iter().take((share * masks.len() as f64).round() as usize).collect();
@@ -63,7 +63,7 @@ pub fn spoil(masks: &[LabelMap], fault: Fault, share: f64, seed: u64) -> Vec<Opt
 }
 
 fn with_ids(mask: &LabelMap, new: &BTreeMap<u16, u16>) -> LabelMap {
-    // 0 stays nothing, also where a view has too few objects to choose from.
+    // 0 stays 0, also if a view has too few objects to choose from.
     let id = |&id: &u16| if id == 0 { 0 } else { new.get(&id).copied().filter(|&id| id != 0).unwrap_or(id) };
     LabelMap { ids: mask.ids.iter().map(id).collect(), ..mask.clone() }
 }

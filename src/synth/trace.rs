@@ -1,4 +1,4 @@
-//! One picture: colour over the pixel, ids, depth and whole objects at its centre; and an object alone.
+//! Renders one view: colours as pixel means; ids, depth and whole objects at pixel centres; and objects alone.
 
 use super::hash01;
 use super::world::World;
@@ -6,34 +6,33 @@ use crate::scene::Camera;
 use glam::DVec3;
 use rayon::prelude::*;
 
-/// Samples along each side of a pixel.
+/// Number of samples along each side of a pixel.
 const SIDE: u32 = 3;
 
-/// Everything known about a view, row-major.
+/// A rendered view with its ground truth, row-major.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Picture {
     /// Width, px.
     pub width: u32,
     /// Height, px.
     pub height: u32,
-    /// Colour, the mean over the pixel.
+    /// Colour, mean over the pixel.
     pub rgb: Vec<[u8; 3]>,
-    /// Id of what the pixel's centre sees, 0 = ground or sky.
+    /// Id at the pixel centre, 0 = ground or sky.
     pub ids: Vec<u8>,
-    /// z in the camera's frame of what the pixel's centre sees, world units.
+    /// Camera-space z at the pixel centre, world units.
     pub depth: Vec<f32>,
-    /// For each object of the world in order: does it cover the pixel's centre if it stands alone?
+    /// For each object of the world in order: true where it covers the pixel centre if it stands alone.
     pub whole: Vec<Vec<bool>>,
 }
 
-/// What the centre of a pixel knows.
 struct Pixel {
     rgb: [u8; 3],
     id: u8,
     depth: f32,
 }
 
-/// Renders view number `view`; the number only moves the samples within a pixel.
+/// Renders view number `view`. The number only decides the sample positions within pixels.
 pub fn picture(world: &World, camera: &Camera, view: u32) -> Picture {
     let (width, height) = (camera.width, camera.height);
     let pixels: Vec<Pixel> = (0..width * height)
@@ -61,16 +60,16 @@ pub fn picture(world: &World, camera: &Camera, view: u32) -> Picture {
     }
 }
 
-/// Unit direction, world, of the ray through a place of the image.
+/// Returns the unit direction, world, of the ray through an image position.
 pub(super) fn ray(camera: &Camera, x: f64, y: f64) -> DVec3 {
     let own = DVec3::new((x - camera.cx) / camera.fx, (y - camera.cy) / camera.fy, 1.0);
     (camera.rotation.transpose() * own).normalize()
 }
 
-/// The object of this index as the camera of a view sees it with nothing before it, RGBA, row-major: alpha is 255 where
-/// the object covers the pixel's centre, else all is 0. Light and shadows are those of the photo: taking the others
-/// away would not leave the colours that photos can teach. The colour is the mean over the part of the pixel that the
-/// object covers, so that where it fills the pixel and nothing hides it, it is the photo's.
+/// Renders an object without occluders, RGBA, row-major. Alpha is 255 where the object covers the pixel centre; other
+/// pixels are 0. Light and shadows are those of the photo, because photos cannot teach other colours. The colour is the
+/// mean over the covered part of the pixel. It equals that of the photo where the object fills the pixel and nothing
+/// hides it.
 pub fn alone(world: &World, camera: &Camera, view: u32, index: usize) -> Vec<[u8; 4]> {
     let origin = camera.centre();
     let pixel = |at: u32| {
@@ -89,20 +88,19 @@ pub fn alone(world: &World, camera: &Camera, view: u32, index: usize) -> Vec<[u8
     (0..camera.width * camera.height).into_par_iter().map(pixel).collect()
 }
 
-/// Directions of the samples of a pixel, each with its place on the light.
+/// Returns the directions of the samples of a pixel, each with its position on the light.
 fn samples(camera: &Camera, view: u32, x: u32, y: u32) -> impl Iterator<Item = (DVec3, [f64; 2])> {
     (0..SIDE * SIDE).map(move |sample| {
         let random = |what: u64| hash01(u64::from(view), u64::from(y) << 32 | u64::from(x), u64::from(sample), what);
         let (column, row) = (sample % SIDE, sample / SIDE);
         let within = |cell: u32, what: u64| (f64::from(cell) + random(what)) / f64::from(SIDE);
         let direction = ray(camera, f64::from(x) + within(column, 0), f64::from(y) + within(row, 1));
-        // The spots on the light are the same in every pixel: shadows have no noise that differs between views.
+        // Every pixel has the same positions on the light, so that shadows have no noise that differs between views.
         let spot = |cell: u32| (f64::from(cell) + 0.5) / f64::from(SIDE) * 2.0 - 1.0;
         (direction, [spot(column), spot(row)])
     })
 }
 
-/// Direction of the ray through a pixel's centre.
 fn middle(camera: &Camera, x: u32, y: u32) -> DVec3 {
     ray(camera, f64::from(x) + 0.5, f64::from(y) + 0.5)
 }

@@ -1,19 +1,19 @@
-//! Objects on a textured ground under a sky: what a ray sees.
+//! The world: objects on a textured ground under a sky.
 
 use super::material::ground_albedo;
 use super::object::Object;
 use super::{Preset, hash01, presets};
 use glam::DVec3;
 
-/// Radius of the sky, a real surface around the scene: what is far must be learnable too.
+/// Radius of the sky, a real surface around the scene, so that its distance can be learnt.
 const SKY_RADIUS: f64 = 9.0;
-/// Radii between which the ground takes the colour of the horizon.
+/// Radii between which the ground fades to the colour of the horizon.
 const HAZE: (f64, f64) = (2.2, 6.5);
 
-/// What a ray meets first.
+/// The surface that a ray hits first.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Surface {
-    /// The object of this index.
+    /// The object with this index.
     Object(usize),
     /// The ground, z = 0.
     Ground,
@@ -21,33 +21,33 @@ pub enum Surface {
     Sky,
 }
 
-/// Where a ray ends.
+/// The point where a ray ends.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hit {
     /// Distance along the ray.
     pub distance: f64,
-    /// Place, world.
+    /// World position.
     pub place: DVec3,
     /// Unit normal, world.
     pub normal: DVec3,
-    /// On what.
+    /// Surface at the point.
     pub surface: Surface,
 }
 
-/// The whole scene.
+/// The world of a scene.
 #[derive(Clone, Debug, PartialEq)]
 pub struct World {
-    /// Objects, ids 1, 2, .. in order.
+    /// Objects, with ids 1, 2, ... in order.
     pub objects: Vec<Object>,
     /// Unit vector to the light.
     light: DVec3,
-    /// Two unit vectors across it.
+    /// Two unit vectors across the light's direction.
     light_sides: [DVec3; 2],
     seed: u64,
 }
 
 impl World {
-    /// The scene of a preset; the seed changes colours, offsets and the direction of the light.
+    /// Makes the world of a preset. The seed decides colours, offsets and the direction of the light.
     pub fn new(preset: Preset, seed: u64) -> Self {
         let turn = 0.6 + hash01(seed, 2, 0, 0);
         let light = DVec3::new(turn.cos() * 0.5, turn.sin() * 0.5, 0.87).normalize();
@@ -55,7 +55,7 @@ impl World {
         Self { objects: presets::objects(preset, seed), light, light_sides: [side, light.cross(side)], seed }
     }
 
-    /// Id of what a ray met: 0 for ground and sky.
+    /// Returns the id at a hit: 0 for ground and sky.
     pub fn id(&self, hit: &Hit) -> u8 {
         match hit.surface {
             Surface::Object(index) => self.objects[index].id,
@@ -63,7 +63,7 @@ impl World {
         }
     }
 
-    /// Follows a ray to the first surface. `origin` is above the ground and inside the sky.
+    /// Returns the first hit of a ray. `origin` is above the ground and inside the sky.
     pub fn hit(&self, origin: DVec3, direction: DVec3) -> Hit {
         let mut best = ground_or_sky(origin, direction);
         best.place = origin + direction * best.distance;
@@ -77,7 +77,7 @@ impl World {
         best
     }
 
-    /// Where a ray meets the object of this index, whatever else is in the way.
+    /// Returns the hit of a ray with the object of this index, ignoring all others.
     pub fn hit_object(&self, index: usize, origin: DVec3, direction: DVec3) -> Option<Hit> {
         let object = &self.objects[index];
         let (own_origin, own_direction) = object.to_own(origin, direction);
@@ -86,8 +86,8 @@ impl World {
         Some(Hit { distance, place: origin + direction * distance, normal, surface: Surface::Object(index) })
     }
 
-    /// Colour that leaves a surface in every direction alike, 0 to 1. `spot` in -1 to 1 picks the place on the light, so
-    /// that an average over spots has soft shadows.
+    /// Returns the colour of a surface point, the same in every direction, 0 to 1. `spot` (-1 to 1) picks a position on
+    /// the light; a mean over spots gives soft shadows.
     pub fn colour(&self, hit: &Hit, spot: [f64; 2]) -> DVec3 {
         let albedo = match hit.surface {
             Surface::Sky => return sky_colour(hit.place),
@@ -122,7 +122,7 @@ fn ground_or_sky(origin: DVec3, direction: DVec3) -> Hit {
     Hit { distance: sky, place: DVec3::ZERO, normal: -direction, surface: Surface::Sky }
 }
 
-/// From the haze of the horizon to a blue zenith.
+/// Returns the sky colour, from haze at the horizon to a blue zenith.
 fn sky_colour(place: DVec3) -> DVec3 {
     let height = (place.z / SKY_RADIUS).clamp(0.0, 1.0);
     DVec3::new(0.78, 0.82, 0.86).lerp(DVec3::new(0.36, 0.55, 0.82), height.powf(0.6))

@@ -1,4 +1,4 @@
-//! The files of a made scene: COLMAP model, pictures, masks with names, objects alone, depth.
+//! The files of a made scene: COLMAP model, photos, masks with names, objects alone, depth.
 
 use super::object::Object;
 use super::points::Seen;
@@ -16,7 +16,7 @@ use serde::Serialize;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// What was made.
+/// The result of [`write()`].
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Summary {
     /// Folder of the scene.
@@ -25,12 +25,12 @@ pub struct Summary {
     pub views: u32,
     /// Number of points.
     pub points: usize,
-    /// The objects, with the pixels and views that show them.
+    /// The objects, with their numbers of pixels and views.
     pub objects: Vec<LabelEntry>,
 }
 
-/// Makes a scene and writes it into `folder`, which must be empty or new. `after_view` is told how many views are
-/// done and may stop the work with an error.
+/// Makes a scene and writes it into `folder`, which must be empty or new. `after_view` receives the number of finished
+/// views; its error ends the work.
 pub fn write(options: &SynthOptions, folder: &Path, after_view: &dyn Fn(u32) -> Result<()>) -> Result<Summary> {
     if options.width == 0 || options.height == 0 || options.width > 16_384 || options.height > 16_384 {
         return Err(Error::usage("width, height", "need 1 to 16384 px each"));
@@ -55,7 +55,6 @@ pub fn write(options: &SynthOptions, folder: &Path, after_view: &dyn Fn(u32) -> 
     Ok(Summary { scene: folder.to_owned(), views: options.views, points: seen.len(), objects: table.labels })
 }
 
-/// Adds a mask to the counts.
 fn count(table: &mut LabelTable, ids: &[u8]) {
     for entry in &mut table.labels {
         let pixels = ids.iter().filter(|&&id| u32::from(id) == entry.id).count() as u64;
@@ -95,7 +94,7 @@ fn save(path: &Path, bytes: &[u8]) -> Result<()> {
     atomic::write(path, |out| out.write_all(bytes))
 }
 
-/// `cameras.bin`, `images.bin` and `points3D.bin`, little-endian as COLMAP writes them.
+/// Writes `cameras.bin`, `images.bin` and `points3D.bin`, little-endian as in COLMAP.
 fn write_colmap(folder: &Path, cameras: &[Camera], seen: &[Seen]) -> Result<()> {
     let folder = folder.join("sparse/0");
     if let Some(camera) = cameras.first() {

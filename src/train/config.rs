@@ -1,7 +1,7 @@
 //! Every hyper-parameter of training: value, source, effect.
 //!
-//! Defaults are what LabelGS and 3DGS print or ship. "LabelGS" below is the paper (arXiv 2508.19699) with its authors'
-//! code, "3DGS" is Kerbl et al. 2023 with its code.
+//! Most defaults are those of LabelGS and 3DGS, from the paper or the code. "LabelGS" below is the paper (arXiv
+//! 2508.19699) with its authors' code, "3DGS" is Kerbl et al. 2023 with its code.
 
 use crate::Result;
 use crate::options::Options;
@@ -9,16 +9,17 @@ use crate::options::Options;
 use crate::options::parse::{colour, count, samples, switch};
 use serde::{Deserialize, Serialize};
 
-/// Where the label loss gets its occluders from.
+/// The source of the occluders for the label loss.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 #[serde(rename_all = "lowercase")]
 pub enum Occlusion {
-    /// No occluder is known: every pixel outside an object's mask is expected to be black.
+    /// No occluders: every pixel outside an object's mask is expected to be black.
     None,
-    /// Monocular depth from files, --depths, by the paper's rule: who is nearer on the average along the contour.
+    /// Monocular depth from files, --depths, by the paper's rule: the object with the smaller mean depth along the
+    /// contour is in front.
     Depth,
-    /// Depth of the model itself, rendered every --occlusion-every steps. The paper asks a network for monocular depth
+    /// Depth of the model itself, rendered every --occlusion-every steps. The paper uses monocular depth of a network
     /// instead.
     #[default]
     Rendered,
@@ -27,21 +28,23 @@ pub enum Occlusion {
     File,
 }
 
-/// How a Gaussian gets its label.
+/// The rule that gives a Gaussian its label.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 #[serde(rename_all = "lowercase")]
 pub enum LabelRule {
-    /// From the pixels of the step's view in which it has most weight; the last view wins (LabelGS).
+    /// The label of the pixels in the step's view where the Gaussian has the largest weight; the last view wins
+    /// (LabelGS).
     Main,
-    /// From the sums of its weights in the pixels of all views, counted every --vote-every steps and at the end.
+    /// The label with the largest sum of weights over the pixels of all views, counted every --vote-every steps and at
+    /// the end.
     #[default]
     Votes,
 }
 
 crate::options::options! {
-    /// What a training does. `Default` is the paper's setting but for labels, where it is what was measured to be better;
-    /// [`TrainConfig::paper`] is the paper's throughout.
+    /// The settings of a training. `Default` follows the paper except where measurements favour other
+    /// values. [`TrainConfig::paper`] follows the paper throughout.
     ///
     /// Steps count from 1, as in the reference code.
     pub struct TrainConfig {
@@ -51,20 +54,20 @@ crate::options::options! {
             /// 15000 (LabelGS).
             iterations <"N">: u32 = 15_000, at_least(1);
 
-            /// Last step that looks at photos of half the size, without labels; 0 for none.
+            /// Last step on photos of half the size, without labels; 0 for none.
             ///
-            /// 0 (3DGS). A quarter of the pixels while the model is rough anyway: with a third of the steps a run takes a
-            /// tenth less time, for the same PSNR.
+            /// 0 (3DGS). Early steps are rough anyway, and a quarter of the pixels is enough for them: with a third of
+            /// the steps a run takes 10 % less time for the same PSNR.
             coarse_until <"STEP">: u32 = 0;
 
-            /// Seed of every random number; the same seed, device and driver give the same model.
+            /// Seed of all random numbers; the same seed, device and driver give the same model.
             ///
-            /// 0 (LabelGS). Order of views, sampled objects and splits draw from it.
+            /// 0 (LabelGS). It decides the order of views, the sampled objects and the splits.
             seed <"S">: u64 = 0, fixed;
 
-            /// Most Gaussians, such as 500k or 2M; 0 lets the memory of the device decide.
+            /// Most Gaussians, such as 500k or 2M; 0 leaves the bound to the memory of the device.
             ///
-            /// 0. At the bound only the Gaussians that need it most still grow.
+            /// 0. At the bound only the Gaussians with the largest gradients grow.
             #[cfg_attr(feature = "cli", arg(value_parser = count))]
             max_gaussians <"N">: u64 = 0;
         }
@@ -72,49 +75,50 @@ crate::options::options! {
         "Rendering" {
             /// Colour behind the scene: black, white, or R,G,B from 0 to 1.
             ///
-            /// Black (LabelGS, 3DGS). The label loss is always on black.
+            /// Black (LabelGS, 3DGS). The label loss always uses black.
             #[cfg_attr(feature = "cli", arg(value_parser = colour))]
             background <"COLOUR">: [f32; 3] = [0.0; 3], up_to(1.0), fixed;
 
-            /// Gaussians nearer to the camera are not drawn, world units.
+            /// Near plane, world units: nearer Gaussians are not drawn.
             ///
-            /// 0 lets the scene decide: 0.2 (3DGS), or a twentieth of the median depth of its first Gaussians where that
-            /// is less.
+            /// 0 chooses by the scene: 0.2 (3DGS), or a twentieth of the median depth of the first Gaussians if that is
+            /// less.
             near <"Z">: f32 = 0.0, not_negative;
         }
 
         "Labels" {
             /// First step with labels.
             ///
-            /// 1000 (LabelGS): before, the geometry is too rough. From then on labels are lifted and have a loss.
+            /// 1000 (LabelGS): earlier geometry is too rough. From this step on Gaussians get labels, and labels have a
+            /// loss.
             label_from <"STEP">: u32 = 1000;
 
-            /// How a Gaussian gets its label.
+            /// Rule that gives a Gaussian its label.
             ///
-            /// Votes; the paper's rule is `main`, to which --label-threshold and --gpf belong.
+            /// Votes; the rule of the paper is `main`, which uses --label-threshold and --gpf.
             label_rule <"RULE">: LabelRule = LabelRule::Votes, fixed;
 
             /// Steps between two counts of votes.
             vote_every <"STEPS">: u32 = 500, at_least(1);
 
-            /// Less weight for masks that disagree with all others, on or off.
+            /// Gives less weight to masks that disagree with the others, on or off.
             ///
-            /// Masks are compared with what the votes of all views have made of the model.
+            /// Each mask is compared with the labels of the model, which come from the votes of all views.
             #[cfg_attr(feature = "cli", arg(value_parser = switch, action = clap::ArgAction::Set))]
             vote_trust <"SWITCH">: bool = true;
 
-            /// Pixels so near to a contour of their mask are left out, px.
+            /// Width of the band along mask contours that is left out, px.
             ///
-            /// 0: masks are taken as exact. 2 suits masks of trackers, which work on shrunk photos. Such pixels have
+            /// 0: masks count as exact. 2 suits masks of trackers, which work on shrunk photos. Pixels in the band have
             /// neither votes nor label loss.
             mask_border <"PX">: u32 = 0;
 
-            /// Least blending weight at a pixel that gives its label to a Gaussian.
+            /// Least blending weight with which a pixel gives its label to a Gaussian.
             ///
-            /// 0.6 (LabelGS). Higher labels fewer Gaussians, more surely.
+            /// 0.6 (LabelGS). Higher values label fewer Gaussians with more certainty.
             label_threshold <"WEIGHT">: f32 = 0.6, positive_up_to(1.0);
 
-            /// Gaussian projection filter, on or off: the centre must project into the mask too.
+            /// Gaussian projection filter, on or off: the projected centre must lie in the mask too.
             ///
             /// On (LabelGS).
             #[cfg_attr(feature = "cli", arg(value_parser = switch, action = clap::ArgAction::Set))]
@@ -122,35 +126,35 @@ crate::options::options! {
 
             /// Objects per step.
             ///
-            /// 10 (LabelGS), where it bounds memory. They are sampled anew for lift and label loss.
+            /// 10 (LabelGS, to bound memory). Each step samples them anew, for labels and label loss.
             #[cfg_attr(feature = "cli", arg(value_parser = samples))]
             label_samples <"N|all">: u32 = 10, at_least(1);
 
             /// Weight of the label loss.
             ///
-            /// 0.3 for the sum over the objects of a step; LabelGS's code has 1.0 (the paper's lambda 2 has no value),
-            /// which costs the whole picture more and makes objects no better.
+            /// 0.3 for the sum over the objects of a step. LabelGS's code has 1.0 (the paper gives no value for lambda
+            /// 2); that lowers the quality of the picture and does not improve the objects.
             label_weight <"WEIGHT">: f32 = 0.3, not_negative;
 
-            /// Small objects weigh more per pixel than large ones, on or off.
+            /// Weighs small objects more per pixel than large ones, on or off.
             ///
-            /// Off (LabelGS). On: as one over the root of their area in the view. With votes small objects are not lost
-            /// beside large ones, and the weight costs the whole picture.
+            /// Off (LabelGS). On: the weight is proportional to 1 / sqrt(area in the view). With votes, small objects
+            /// survive without it, and it lowers the quality of the picture.
             #[cfg_attr(feature = "cli", arg(value_parser = switch, action = clap::ArgAction::Set))]
             label_balance <"SWITCH">: bool = false;
 
             /// Weight of the alpha term in the label loss.
             ///
-            /// 0 (LabelGS has none). The object's opacity against its mask: of use for objects as dark as the black behind
-            /// them, which may vanish without cost.
+            /// 0 (LabelGS has none). The term compares the object's opacity with its mask. It helps objects that are as
+            /// dark as the black behind them, which otherwise may vanish at no cost.
             label_alpha <"WEIGHT">: f32 = 0.0, not_negative;
 
-            /// Where occluders come from.
+            /// Source of the occluders.
             ///
-            /// The label loss leaves out the pixels of what hides an object. Rendered depth.
+            /// Rendered depth. The label loss leaves out the pixels of objects in front.
             occlusion <"SOURCE">: Occlusion = Occlusion::Rendered, fixed;
 
-            /// Steps between two looks at the occluders.
+            /// Steps between two updates of the occluders.
             occlusion_every <"STEPS">: u32 = 1000, at_least(1);
         }
 
@@ -162,106 +166,104 @@ crate::options::options! {
 
             /// Degree of the spherical harmonics, 0 to 3.
             ///
-            /// 3 (3DGS). Lower saves memory and loses shine.
+            /// 3 (3DGS). Lower degrees save memory and lose highlights.
             sh_degree <"DEGREE">: u32 = 3, up_to(3.0), fixed;
 
-            /// Steps until the next degree is let in.
+            /// Steps before the degree rises by one.
             ///
             /// 1000 (3DGS).
             sh_degree_interval <"STEPS">: u32 = 1000, at_least(1);
         }
 
         "Learning rates" {
-            /// Rate of positions at the start, scene extents.
+            /// Initial learning rate of positions, scene extents.
             ///
             /// 1.6e-4 (3DGS).
             position_lr_init <"RATE">: f64 = 1.6e-4, positive;
 
-            /// Rate of positions at the end, scene extents.
+            /// Final learning rate of positions, scene extents.
             ///
             /// 1.6e-6 (3DGS), at --position-lr-max-steps; log-linear in between.
             position_lr_final <"RATE">: f64 = 1.6e-6, positive;
 
-            /// Step that has the final rate of positions.
+            /// Step with the final learning rate of positions.
             ///
-            /// 30000: LabelGS keeps 3DGS's value for its 15000 steps.
+            /// 30000: LabelGS keeps the value of 3DGS for its 15000 steps.
             position_lr_max_steps <"STEP">: u32 = 30_000, at_least(1);
 
-            /// Rate of the degree-0 colour.
+            /// Learning rate of the colour of degree 0.
             ///
             /// 2.5e-3 (3DGS).
             feature_lr <"RATE">: f64 = 2.5e-3, not_negative;
 
-            /// Rate of the other colours.
+            /// Learning rate of the colours of higher degrees.
             ///
             /// A twentieth of --feature-lr (3DGS).
             #[serde(skip_serializing_if = "Option::is_none")]
             feature_rest_lr <"RATE">: Option<f64> = None, not_negative;
 
-            /// Rate of opacity logits.
+            /// Learning rate of opacity logits.
             ///
             /// 0.05 (3DGS of 2023).
             opacity_lr <"RATE">: f64 = 0.05, not_negative;
 
-            /// Rate of log-scales.
+            /// Learning rate of log-scales.
             ///
             /// 0.005 (3DGS).
             scaling_lr <"RATE">: f64 = 0.005, not_negative;
 
-            /// Rate of quaternions.
+            /// Learning rate of quaternions.
             ///
             /// 0.001 (3DGS).
             rotation_lr <"RATE">: f64 = 0.001, not_negative;
         }
 
         "Densification" {
-            /// Step after which it starts.
+            /// Step after which densification starts.
             ///
             /// 500 (3DGS).
             densify_from <"STEP">: u32 = 500;
 
-            /// Step at which it ends, at the earliest 1000 steps after --densify-from if not given [default: half of the
-            /// run].
+            /// Step at which densification stops, at the earliest 1000 steps after --densify-from if not given [default: half
+            /// of the run].
             ///
-            /// Pruning and opacity resets end there too. Half of the run is 3DGS's choice (15000 of 30000). LabelGS has
-            /// 40000, to the end of its runs: that makes three quarters more Gaussians, and slower steps, for the same
-            /// PSNR.
+            /// Pruning and opacity resets end there too. 3DGS also stops at half of the run (15000 of 30000). LabelGS
+            /// has 40000, the end of its runs: that makes 75 % more Gaussians and slower steps for the same PSNR.
             #[serde(skip_serializing_if = "Option::is_none")]
             densify_until <"STEP">: Option<u32> = None;
 
-            /// Steps between two.
+            /// Steps between two densifications.
             ///
             /// 100 (3DGS).
             densify_interval <"STEPS">: u32 = 100, at_least(1);
 
-            /// Mean screen gradient that clones or splits, half images.
+            /// Mean screen-space gradient above which a Gaussian is cloned or split, half images.
             ///
-            /// 2e-4 (3DGS), in units of half the image (normalised device coordinates). Lower grows more Gaussians.
+            /// 2e-4 (3DGS), in normalised device coordinates. Lower values make more Gaussians.
             densify_grad_threshold <"GRADIENT">: f32 = 2e-4, positive;
 
-            /// Largest size that is cloned instead of split, scene extents.
+            /// Largest Gaussian that is cloned instead of split, scene extents.
             ///
             /// 0.01 (3DGS), a standard deviation.
             percent_dense <"SIZE">: f32 = 0.01, not_negative;
 
-            /// Least opacity that is kept.
+            /// Least opacity; fainter Gaussians are pruned.
             ///
-            /// 0.005 (3DGS). Fainter Gaussians are pruned.
+            /// 0.005 (3DGS).
             min_opacity <"OPACITY">: f32 = 0.005, up_to(1.0);
 
-            /// Largest size that is kept, scene extents.
+            /// Largest standard deviation, scene extents; larger Gaussians are pruned after the first opacity reset.
             ///
-            /// 0.1 (3DGS), a standard deviation. Larger Gaussians are pruned once the first opacity reset is past; never
-            /// where there is none.
+            /// 0.1 (3DGS). Without opacity resets nothing is pruned by size.
             max_scale <"SIZE">: f32 = 0.1, not_negative;
 
             /// Steps between two opacity resets; 0 makes none.
             ///
-            /// 0: after resets (3DGS: 3000) Gaussians next to the cameras take the place of a sky or of what else is far,
-            /// and views between those cameras turn to fog.
+            /// 0: after resets (3DGS: every 3000 steps) Gaussians next to the cameras replace the sky and other distant
+            /// things, and views between those cameras look foggy.
             opacity_reset_interval <"STEPS">: u32 = 0;
 
-            /// Steps before the end without an opacity reset.
+            /// Steps without an opacity reset at the end of the run.
             ///
             /// 1500 (LabelGS).
             opacity_reset_margin <"STEPS">: u32 = 1500;
@@ -270,7 +272,7 @@ crate::options::options! {
 }
 
 impl TrainConfig {
-    /// The paper's settings where they differ from the default.
+    /// Returns the settings of the paper where they differ from the default.
     pub fn paper() -> Self {
         Self {
             label_rule: LabelRule::Main,
@@ -281,18 +283,17 @@ impl TrainConfig {
         }
     }
 
-    /// Learning rate of positions at `step`, before the scene extent.
+    /// Returns the learning rate of positions at `step`, in scene extents.
     pub fn position_lr(&self, step: u32) -> f64 {
         let t = (f64::from(step) / f64::from(self.position_lr_max_steps)).clamp(0.0, 1.0);
         ((1.0 - t) * self.position_lr_init.ln() + t * self.position_lr_final.ln()).exp()
     }
 
-    /// Learning rate of the colours above degree 0.
+    /// Returns the learning rate of the colours above degree 0.
     pub fn feature_rest_lr(&self) -> f64 {
         self.feature_rest_lr.unwrap_or(self.feature_lr / 20.0)
     }
 
-    /// Makes all learning rates half of what they are.
     pub(super) fn halve_rates(&mut self) {
         for rate in [
             &mut self.position_lr_init,
@@ -309,22 +310,22 @@ impl TrainConfig {
         }
     }
 
-    /// Degree of the spherical harmonics that `step` uses.
+    /// Returns the degree of the spherical harmonics at `step`.
     pub fn sh_degree_at(&self, step: u32) -> u32 {
         (step / self.sh_degree_interval).min(self.sh_degree)
     }
 
-    /// True for steps that lift labels and add the label loss, given masks.
+    /// Returns true for steps that set labels and have a label loss, given masks.
     pub fn labels_at(&self, step: u32) -> bool {
         step >= self.labels_from()
     }
 
-    /// First step with labels.
+    /// Returns the first step with labels.
     pub fn labels_from(&self) -> u32 {
         if self.coarse_until < self.label_from { self.label_from } else { self.coarse_until.saturating_add(1) }
     }
 
-    /// Refuses values that make no sense; messages name the option.
+    /// Refuses invalid values; messages name the option.
     pub fn check(&self) -> Result<()> {
         self.check_ranges()
     }

@@ -1,4 +1,8 @@
-//! Training: the loop over steps, and what happens between them.
+//! Training: the loop over steps, and the work between steps.
+//!
+//! [`Trainer`] owns the model on the device. [`TrainConfig`] has every hyper-parameter; a [`Strategy`] changes the
+//! number of Gaussians, and [`Shared`] parameters belong to the scene or to a photo. [`crate::run`] wraps a training
+//! with folder, checkpoints and scores.
 
 pub(crate) mod config;
 pub(crate) mod near;
@@ -38,16 +42,16 @@ use step_input::{SceneScale, StepInput, TrainView};
 use strategy::{At, Bound, Population, Strategy};
 use views::Views;
 
-/// What is known about a finished step.
+/// The numbers of a finished step.
 #[derive(Clone, Copy, Debug)]
 pub struct StepReport {
     /// Step, from 1.
     pub step: u32,
     /// Photo loss: (1 - lambda) L1 + lambda (1 - SSIM).
     pub loss: f64,
-    /// Label loss, weighted.
+    /// Weighted label loss.
     pub label_loss: f64,
-    /// What the device counted.
+    /// Counters of the device.
     pub report: Report,
 }
 
@@ -58,28 +62,26 @@ pub struct Trainer {
     views: Views,
     fixed: SceneScale,
     order: ViewOrder,
-    /// Largest photo, px. The engine's image may have grown beyond it since.
+    /// Size of the largest photo, px. The image of the engine may be larger, because it grows.
     image: (u32, u32),
-    /// Steps submitted and not retired yet; at most one per frame.
+    /// Submitted steps that are not retired yet, at most one per frame.
     in_flight: VecDeque<(StepInput, InFlight)>,
-    /// Steps submitted so far.
     step: u32,
     updates: u32,
     bound: Bound,
     strategy: Box<dyn Strategy>,
     shared: Shared,
-    /// Votes were counted before, so that masks can be compared with their outcome.
+    /// Votes were counted before, so that masks can be compared with the labels.
     labelled_once: bool,
     separate: separate::Separate,
     timing: Option<timing::Timing>,
-    /// Blending counts the pairs that have a weight.
+    /// The blend passes count the pairs with a weight.
     counts_pairs: bool,
     seen: sentinel::Seen,
-    /// What the views are told apart by; empty until somebody asks.
+    /// Fingerprints of the views; empty until first used.
     fingerprints: Vec<ViewFingerprint>,
-    /// The last step whose numbers are known.
     newest: Option<StepReport>,
-    /// The last densification, until somebody asks.
+    /// The last densification, until it is taken.
     densified: Option<Densified>,
 }
 
@@ -103,7 +105,7 @@ impl Trainer {
         let mut trainer = Self::without_model(gpu, config, dataset, size, options)?;
         trainer.engine.upload_model(model)?;
         trainer.engine.set_shared(&trainer.shared.start(trainer.views.len())?)?;
-        // Bands that the model does not have start as 0.
+        // Colour bands that the model lacks start at 0.
         trainer.engine.set_sh_degree(trainer.config.sh_degree);
         Ok(trainer)
     }
@@ -150,58 +152,58 @@ impl Trainer {
         })
     }
 
-    /// The engine, for renders between steps; nothing may be in flight ([`Trainer::drain`]).
+    /// Returns the engine, for renders between steps. Nothing may be in flight ([`Trainer::drain`]).
     pub fn engine_mut(&mut self) -> &mut Engine {
         &mut self.engine
     }
 
-    /// The configuration.
+    /// Returns the configuration.
     pub fn config(&self) -> &TrainConfig {
         &self.config
     }
 
-    /// Makes all learning rates half of what they are, for the rest of the run.
+    /// Halves all learning rates for the rest of the run.
     pub fn halve_rates(&mut self) {
         self.config.halve_rates();
     }
 
-    /// The training views.
+    /// Returns the training views.
     pub fn views(&self) -> &[TrainView] {
         &self.views
     }
 
-    /// Steps submitted so far.
+    /// Returns the number of submitted steps.
     pub fn steps_done(&self) -> u32 {
         self.step
     }
 
-    /// The last step whose numbers are known.
+    /// Returns the report of the newest finished step.
     pub fn newest_report(&self) -> Option<StepReport> {
         self.newest
     }
 
-    /// What the last densification did; none if that was asked for already.
+    /// Takes the counts of the last densification; none if they were taken before.
     pub fn take_densified(&mut self) -> Option<Densified> {
         self.densified.take()
     }
 
-    /// Gaussians of the model.
+    /// Returns the number of Gaussians in the model.
     pub fn gaussian_count(&self) -> u32 {
         self.engine.gaussian_count()
     }
 
-    /// Degree of the spherical harmonics in use.
+    /// Returns the current degree of the spherical harmonics.
     pub fn sh_degree(&self) -> u32 {
         self.config.sh_degree_at(self.step)
     }
 
-    /// How previews are rendered: as the steps do.
+    /// Returns the options of the steps, for previews.
     pub fn render_options(&self) -> RenderOptions {
         let (near, background) = (self.config.near, self.config.background);
         RenderOptions { near, background, sh_degree: Some(self.sh_degree()), ..RenderOptions::default() }
     }
 
-    /// Reads the model back. Steps that failed for want of memory changed nothing in it.
+    /// Reads the model back. Steps that failed for lack of memory have not changed it.
     pub fn model(&mut self) -> Result<Gaussians> {
         if let Err(error) = self.drain() {
             if !error.is_out_of_memory() {
@@ -213,8 +215,8 @@ impl Trainer {
         self.engine.download_model()
     }
 
-    /// One step: submits it and, where the schedule says so, densifies. Returns the reports of steps that are done;
-    /// they lag behind, because two steps are in flight.
+    /// Submits a step and densifies if the schedule says so. Returns the reports of finished steps; they lag behind,
+    /// because two steps are in flight.
     pub fn step(&mut self) -> Result<Vec<StepReport>> {
         let step = self.step + 1;
         let mut done = Vec::new();
@@ -259,7 +261,7 @@ impl Trainer {
         let view = self.order.draw();
         let samples = if self.config.labels_at(step) { self.config.label_samples as usize } else { 0 };
         let layers = sampler::sample_objects(self.config.seed, step, &self.views[view].objects, samples);
-        // A view whose mask shows nothing, or that has none, costs what a scene without masks costs.
+        // A view without a mask, or with an empty one, costs as much as in a scene without masks.
         let labels = !layers.is_empty();
         let update = self.strategy.updates(self.at(step));
         self.updates += u32::from(update);
@@ -270,7 +272,7 @@ impl Trainer {
         At { step, config: &self.config, extent: self.fixed.extent }
     }
 
-    /// True if the model does not show what is in front before a step.
+    /// Returns true if the depth of the model is unreliable before `step`.
     fn blurs_depth_before(&self, step: u32) -> bool {
         step > 1 && self.strategy.blurs_depth_after(self.at(step - 1))
     }
@@ -310,14 +312,14 @@ impl Trainer {
         }
     }
 
-    /// Waits for the oldest step in flight. If a buffer was too small, the step changed nothing, nor did those after it:
-    /// the buffer grows and they run again.
+    /// Waits for the oldest step in flight. If a buffer was too small, this step and those after it have changed
+    /// nothing: the buffer grows and they run again.
     fn retire(&mut self) -> Result<Option<StepReport>> {
         let Some((input, flight)) = self.in_flight.front().cloned() else { return Ok(None) };
         let report = self.engine.retire(&flight)?;
         let recovered = self.engine.recover(&report);
         if recovered.is_err() {
-            // Nothing came of these steps, nor will it.
+            // These steps have no result and will get none.
             self.in_flight.clear();
             self.step = input.step - 1;
         }

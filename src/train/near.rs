@@ -7,11 +7,12 @@ pub(crate) use crate::render::NEAR;
 
 /// The near plane of a small scene, in median depths of its Gaussians.
 const SHARE: f64 = 0.05;
-/// Cameras and Gaussians that are looked at, evenly chosen.
+/// Number of cameras and of Gaussians in the sample, evenly chosen.
 const CAMERAS: usize = 64;
 const GAUSSIANS: usize = 4096;
 
-/// [`NEAR`], or [`SHARE`] of the median depth at which training cameras see the first Gaussians where that is less.
+/// Returns [`NEAR`], or [`SHARE`] times the median depth of the first Gaussians in the training cameras if that is
+/// less.
 pub(crate) fn near_plane<'a>(cameras: impl ExactSizeIterator<Item = &'a Camera>, model: &Gaussians) -> f32 {
     let rows: Vec<DVec3> =
         (0..model.len()).step_by(model.len().div_ceil(GAUSSIANS).max(1)).map(|row| model.world(row)).collect();
@@ -30,7 +31,7 @@ pub(crate) fn near_plane<'a>(cameras: impl ExactSizeIterator<Item = &'a Camera>,
     }
     let middle = depths.len() / 2;
     let median = *depths.select_nth_unstable_by(middle, f64::total_cmp).1;
-    // A plane at 0 would divide by it.
+    // The projection divides by the near plane.
     NEAR.min((SHARE * median) as f32).max(f32::MIN_POSITIVE)
 }
 

@@ -1,5 +1,5 @@
-//! Occluders of each view's objects: given before the first step, or from the model's own depth, looked at anew every so
-//! often.
+//! Occluders of the objects in each view: given before the first step, or from the rendered depth of the model at
+//! intervals.
 
 use super::{Occlusion, Trainer};
 use crate::error::Result;
@@ -9,8 +9,8 @@ use crate::scene::Occluders;
 use std::collections::BTreeMap;
 
 impl Trainer {
-    /// Takes the occluders of views by name. Ids that the view's mask does not show are left out: they have no pixel.
-    /// Returns the names of views with masks that `found` does not have; nothing is known to hide anything there.
+    /// Sets the occluders by name of the view. Drops ids without pixels in the mask of the view. Returns the names of
+    /// views with masks that `found` lacks; their objects count as not hidden.
     pub fn set_occluders(&mut self, found: &BTreeMap<String, Occluders>) -> Vec<String> {
         let mut without = Vec::new();
         for view in self.views.iter_mut().filter(|view| view.mask.is_some()) {
@@ -27,7 +27,7 @@ impl Trainer {
         without
     }
 
-    /// The occluders that the last step used, by name of the view; every object of a view has an entry.
+    /// Returns the occluders of the last step, by name of the view. Every object of a view has an entry.
     pub fn occluders(&self) -> BTreeMap<String, Occluders> {
         let with_masks = self.views.iter().filter(|view| view.mask.is_some());
         let lists = with_masks.map(|view| {
@@ -37,7 +37,7 @@ impl Trainer {
         lists.collect()
     }
 
-    /// True before the steps at which the occluders are looked at.
+    /// Returns true before the steps at which the occluders are updated.
     pub(super) fn refreshes_occluders(&self, step: u32) -> bool {
         let config = &self.config;
         self.engine.size().labels.is_some()
@@ -47,7 +47,7 @@ impl Trainer {
             && !self.blurs_depth_before(step)
     }
 
-    /// Renders the depth of every view with masks; nothing may be in flight.
+    /// Updates the occluders from the rendered depth of every view with masks. Nothing may be in flight.
     pub(super) fn refresh_occluders(&mut self) -> Result<()> {
         let options = RenderOptions { parts: Parts::DEPTH, ..self.render_options() };
         for index in 0..self.views.len() {

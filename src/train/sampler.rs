@@ -1,21 +1,21 @@
-//! Which view a step takes, and which of its objects; the same for the same seed, on every machine.
+//! The view of each step and its sampled objects: the same for the same seed, on every machine.
 
 use rand::SeedableRng;
 use rand::seq::SliceRandom;
 use rand_pcg::Pcg64Mcg;
 
-/// Stream of the order of views; other streams are the steps themselves.
+/// Random stream of the order of views. The other streams are the step numbers.
 const VIEW_STREAM: u64 = u64::MAX;
 
 fn stream(seed: u64, stream: u64) -> Pcg64Mcg {
-    // Two words of state: any two different (seed, stream) give unrelated numbers.
+    // The state is two words: different pairs (seed, stream) give unrelated numbers.
     let mut state = [0; 16];
     state[..8].copy_from_slice(&seed.wrapping_mul(0x9e37_79b9_7f4a_7c15).to_le_bytes());
     state[8..].copy_from_slice(&stream.wrapping_add(1).wrapping_mul(0xbf58_476d_1ce4_e5b9).to_le_bytes());
     Pcg64Mcg::from_seed(state)
 }
 
-/// Draws views without replacement until all were seen, then starts over (3DGS).
+/// Draws views without replacement until all are drawn, then starts over (3DGS).
 #[derive(Debug)]
 pub(super) struct ViewOrder {
     random: Pcg64Mcg,
@@ -24,12 +24,11 @@ pub(super) struct ViewOrder {
 }
 
 impl ViewOrder {
-    /// An order over `views` views.
     pub(super) fn new(seed: u64, views: usize) -> Self {
         Self { random: stream(seed, VIEW_STREAM), views, stack: Vec::new() }
     }
 
-    /// The order after so many draws.
+    /// Returns the order after `draws` draws.
     pub(super) fn after(seed: u64, views: usize, draws: u32) -> Self {
         let mut order = Self::new(seed, views);
         (0..draws).for_each(|_| {
@@ -38,7 +37,6 @@ impl ViewOrder {
         order
     }
 
-    /// The next view.
     pub(super) fn draw(&mut self) -> usize {
         if self.stack.is_empty() {
             self.stack = (0..self.views).collect();
@@ -48,7 +46,7 @@ impl ViewOrder {
     }
 }
 
-/// At most `count` of the objects of a view, sorted.
+/// Samples at most `count` of the objects of a view, sorted.
 pub(super) fn sample_objects(seed: u64, step: u32, objects: &[u16], count: usize) -> Vec<u16> {
     let mut chosen = objects.to_vec();
     if chosen.len() > count {

@@ -1,35 +1,33 @@
-//! Watches the numbers of a training through what the device counts.
+//! Watches for NaNs and infinities through the counters of the device.
 //!
-//! * A Gaussian whose *gradient* is not finite, or beyond 1e18 so that its square would not be, has gradient 0 in that
-//!   step (project_backward). It is counted and said; three steps in a row in which that befalls more than
-//!   [`SHARE_MAX`] of the splats end the training.
-//! * A *parameter* that is not finite, or so large that the projection is not, can come from no such step: a device
-//!   has gone wrong, or what it was given. The first one found by cull or project_forward ends the training, as does a
-//!   loss that is no number. Whoever runs it restores what was saved before ([`Trainer::restore`](super::Trainer::restore)).
+//! * A *gradient* that is not finite, or above 1e18 so that its square overflows, counts as 0 in that step
+//!   (project_backward). The log counts them. The training ends after three steps in a row in which more than
+//!   [`SHARE_MAX`] of the splats have such gradients.
+//! * A *parameter* that is not finite, or so large that its projection is not, is the fault of the device or of its
+//!   input, not of such a step. The first one that cull or project_forward finds ends the training, and so does a loss
+//!   of NaN. The caller can go back to a saved state ([`Trainer::restore`](super::Trainer::restore)).
 
 use super::Trainer;
 use super::step_input::StepInput;
 use crate::engine::Report;
 use crate::error::{Error, Result};
 
-/// Part of the splats whose gradients may be dropped, and at least [`COUNT_MAX`] of them.
+/// Share of the splats whose gradients may be dropped; [`COUNT_MAX`] are always accepted.
 const SHARE_MAX: f64 = 1e-3;
 const COUNT_MAX: u32 = 10;
-/// Steps in a row beyond that which end a training.
+/// Number of successive steps above that share which ends a training.
 const STEPS_MAX: u32 = 3;
 
-/// What was seen so far.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Seen {
-    /// Gradients dropped so far, and the number at which that is said again.
+    /// Number of dropped gradients so far, and the number for the next log message.
     dropped: u64,
     next_word: u64,
-    /// Steps in a row with too many.
+    /// Successive steps with too many dropped gradients.
     bad_steps: u32,
 }
 
 impl Trainer {
-    /// Looks at what a step counted.
     pub(super) fn watch(&mut self, input: &StepInput, report: &Report, losses: [f64; 2]) -> Result<()> {
         let counters = &report.counters;
         let view = &self.views[input.view].name;
@@ -45,7 +43,7 @@ impl Trainer {
             }
         }
         if !losses.iter().all(|loss| loss.is_finite()) {
-            return Err(failure(format!("loss_reduce: the loss is {}, the label loss {}", losses[0], losses[1])));
+            return Err(failure(format!("loss_reduce: the loss is {} and the label loss {}", losses[0], losses[1])));
         }
         let (count, seen) = (counters.nonfinite_count, &mut self.seen);
         let most = COUNT_MAX.max((SHARE_MAX * f64::from(counters.visible_count)) as u32);
@@ -56,7 +54,7 @@ impl Trainer {
                 seen.next_word = seen.dropped * 10;
                 tracing::warn!(
                     "step {}, view {view}: project_backward dropped the gradients of {count} Gaussians that are not \
-                     finite, the first of Gaussian {}; {} so far",
+                     finite, the first is that of Gaussian {}; {} so far",
                     input.step,
                     counters.nonfinite_first,
                     seen.dropped

@@ -1,10 +1,9 @@
-//! Whether a step runs a list with a pass for each object, which is possible with the feature `lab` only.
+//! The passes of each object in lists of their own, for measurements. Needs the feature `lab`.
 
 use super::step_input::StepInput;
 use crate::engine::ListKey;
 use crate::pass::Variant;
 
-/// Whether objects have passes of their own.
 #[derive(Default)]
 pub(super) struct Separate {
     #[cfg(feature = "lab")]
@@ -25,8 +24,8 @@ impl Separate {
 
 #[cfg(feature = "lab")]
 impl super::Trainer {
-    /// From the next step on each sampled object has passes of its own, as in the reference code: slower, and up to
-    /// rounding the same. For measurements; nothing may be in flight ([`Trainer::drain`](super::Trainer::drain)).
+    /// Gives each sampled object passes of its own from the next step on, as in the reference code. That is slower,
+    /// with equal results up to rounding. Nothing may be in flight ([`Trainer::drain`](super::Trainer::drain)).
     pub fn separate_objects(&mut self, separate: bool) {
         self.separate.on = separate;
     }

@@ -1,4 +1,4 @@
-//! What a training is made from: options, sizes, views.
+//! The inputs of a training: options, sizes, views.
 
 use super::shared::Shared;
 use super::step_input::{self, TrainView};
@@ -13,16 +13,16 @@ use crate::scene::{Dataset, LabelMap, View};
 use crate::scheduler::SchedulerOptions;
 use std::collections::BTreeSet;
 
-/// What a trainer is made with besides its configuration.
+/// Options of a trainer besides its configuration.
 #[derive(Debug)]
 pub struct TrainerOptions {
-    /// Shape of the kernels; none: the device's.
+    /// Shape of the kernels; none takes the default of the device.
     pub shape: Option<KernelShape>,
-    /// Of the engine.
+    /// Options of the engine.
     pub scheduler: SchedulerOptions,
-    /// What happens to the Gaussians besides the optimiser.
+    /// The strategy for the number of Gaussians.
     pub strategy: Box<dyn Strategy>,
-    /// Parameters that are no Gaussian's.
+    /// Parameters of the scene or of photos.
     pub shared: Shared,
 }
 
@@ -38,7 +38,7 @@ impl From<SchedulerOptions> for TrainerOptions {
     }
 }
 
-/// Room for training on a data set.
+/// Returns the sizes for training on a data set.
 pub fn engine_size(dataset: &Dataset, config: &TrainConfig, gaussians: u64) -> Result<EngineSize> {
     let sizes = dataset.train.iter().chain(&dataset.test).map(|view| (view.camera.width, view.camera.height));
     let image = sizes.reduce(|a, b| (a.0.max(b.0), a.1.max(b.1)));
@@ -57,7 +57,7 @@ pub fn engine_size(dataset: &Dataset, config: &TrainConfig, gaussians: u64) -> R
     Ok(EngineSize::new(gaussians, image).for_training().with_labels(labels))
 }
 
-/// Room to start with: for twice as many Gaussians as there are, or for those where memory is short.
+/// Makes the initial sizes: for twice the number of Gaussians, or for that number if memory is short.
 pub(crate) fn start_size(
     gpu: &Gpu,
     dataset: &Dataset,
@@ -74,7 +74,6 @@ pub(crate) fn start_size(
     }
 }
 
-/// A view as training keeps it.
 pub(super) fn train_view(view: &View, border: u32) -> Result<TrainView> {
     let photo = view.photo.clone().ok_or_else(|| Error::Bug(format!("{} came without its photo", view.name)))?;
     let valid_pixels = step_input::valid_pixels(&photo);

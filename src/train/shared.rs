@@ -1,9 +1,10 @@
-//! Parameters that are no Gaussian's: of the whole scene, such as a background, or of each photo, such as its exposure.
-//! They are rows of four numbers that steps train beside the Gaussians, with the same optimiser, in the same checkpoints.
+//! Parameters that belong to no Gaussian: of the whole scene, such as a background, or of each photo, such as its
+//! exposure. They are rows of four numbers. Steps train them beside the Gaussians, with the same optimiser, and
+//! checkpoints store them.
 //!
-//! A step knows the rows of the scene and those of its photo; all others stay as they are, with their moments. The moments
-//! of a row are corrected by the number of updates that it had itself, so that a photo's first step is as long as it should
-//! be however late it comes.
+//! A step uses the rows of the scene and of its photo. All other rows keep their values and moments. The bias
+//! correction of a row counts its own updates, so that the first update of a photo has the right length however late it
+//! comes.
 
 use super::strategy::At;
 use crate::engine::SharedRow;
@@ -14,55 +15,55 @@ use std::fmt::Debug;
 use std::ops::Range;
 use std::sync::Arc;
 
-/// How many rows there are: first those of the scene, then those of each training view in turn.
+/// Number of rows: first those of the scene, then those of each training view in turn.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SharedLayout {
-    /// Rows of the scene.
+    /// Number of rows of the scene.
     pub scene: u32,
-    /// Rows of each photo.
+    /// Number of rows of each photo.
     pub photo: u32,
 }
 
 impl SharedLayout {
-    /// Rows in all.
+    /// Returns the total number of rows.
     pub fn count(self, views: usize) -> u32 {
         self.photo.saturating_mul(views as u32).saturating_add(self.scene)
     }
 
-    /// The rows of a view.
+    /// Returns the rows of a view.
     pub fn of_view(self, view: usize) -> Range<u32> {
         self.count(view)..self.count(view + 1)
     }
 
-    /// The rows that a step on a view knows.
+    /// Returns the rows of a step on a view.
     fn of_step(self, view: usize) -> impl Iterator<Item = u32> {
         (0..self.scene).chain(self.of_view(view))
     }
 }
 
-/// What is trained besides the Gaussians. All answers must follow from the arguments: steps are repeated after a buffer had
-/// to grow, and a training that is resumed asks again.
+/// Parameters to train besides the Gaussians. All results must be functions of the arguments: a step is repeated after
+/// a buffer has grown, and a resumed training calls again.
 pub trait SharedParameters: Debug + Send {
-    /// Name in checkpoints.
+    /// Returns the name for checkpoints.
     fn name(&self) -> &'static str;
 
-    /// Rows.
+    /// Returns the number of rows.
     fn layout(&self) -> SharedLayout;
 
-    /// What the rows of a view, or of the scene, start with.
+    /// Returns the initial rows of a view, or of the scene for `None`.
     fn start(&self, view: Option<usize>) -> Vec<[f32; 4]>;
 
-    /// Learning rates of the rows of a step, in their order: those of the scene, then those of its photo. A row whose rates
-    /// are all 0 rests in this step, with its moments.
+    /// Returns the learning rates of the rows of a step: those of the scene, then those of its photo. A row with rates
+    /// of 0 keeps its values and moments in this step.
     fn rates(&self, at: At) -> Vec<[f32; 4]>;
 
-    /// Passes of every step, asked once. They find the rows of the step in `Buf::STEP_ROWS`, their values in `Buf::SHARED`,
-    /// and write their gradients, which are 0 until then, to the same rows of `Buf::V_SHARED`.
+    /// Returns the passes of every step; called once. `Buf::STEP_ROWS` has the rows of the step and `Buf::SHARED` their
+    /// values. The passes write the gradients to the same rows of `Buf::V_SHARED`, which are 0 before.
     fn extension(&self) -> Arc<dyn Extension>;
 }
 
-/// The shared parameters of a training; by default it has none, and does not pay for them.
+/// The shared parameters of a training. The default has none and costs nothing.
 #[derive(Debug, Default)]
 pub struct Shared(Option<Box<dyn SharedParameters>>);
 
@@ -77,12 +78,12 @@ impl Shared {
         self.0.as_ref().map(|parameters| parameters.layout()).unwrap_or_default()
     }
 
-    /// Rows in all.
+    /// Returns the total number of rows.
     pub(super) fn rows(&self, views: usize) -> u32 {
         self.layout().count(views)
     }
 
-    /// What the rows start with.
+    /// Returns the initial rows.
     pub(super) fn start(&self, views: usize) -> Result<Vec<[f32; 4]>> {
         let (Some(parameters), SharedLayout { scene, photo }) = (&self.0, self.layout()) else { return Ok(Vec::new()) };
         let mut rows = checked(parameters.start(None), scene, "start")?;
@@ -92,14 +93,13 @@ impl Shared {
         Ok(rows)
     }
 
-    /// The rows of a step.
     pub(super) fn of_step(&self, at: At, view: usize) -> Result<Vec<SharedRow>> {
         let (Some(parameters), layout) = (&self.0, self.layout()) else { return Ok(Vec::new()) };
         let rates = checked(parameters.rates(at), layout.scene + layout.photo, "rates")?;
         Ok(layout.of_step(view).zip(rates).map(|(row, rates)| SharedRow { row, rates }).collect())
     }
 
-    /// The passes of a strategy, and with them those of the parameters.
+    /// Joins the passes of a strategy and of the parameters.
     pub(super) fn extended(&self, strategy: Arc<dyn Extension>) -> Arc<dyn Extension> {
         match &self.0 {
             None => strategy,
@@ -107,17 +107,15 @@ impl Shared {
         }
     }
 
-    /// The number of these for a strategy's number.
+    /// Returns the pass number of [`Both`] for the number of the strategy.
     pub(super) fn passes(&self, of_strategy: u32) -> u32 {
         of_strategy + u32::from(self.0.is_some())
     }
 
-    /// What checkpoints say.
     pub(super) fn kept(&self) -> Option<KeptShared> {
         self.0.as_ref().map(|parameters| KeptShared { name: parameters.name().to_owned(), layout: parameters.layout() })
     }
 
-    /// Refuses what other parameters have left.
     pub(super) fn check(&self, kept: Option<&KeptShared>) -> Result<(), String> {
         let own = self.kept();
         let text = |kept: Option<&KeptShared>| kept.map_or("none".to_owned(), ToString::to_string);
@@ -135,13 +133,13 @@ fn checked(rows: Vec<[f32; 4]>, wanted: u32, what: &str) -> Result<Vec<[f32; 4]>
     }
 }
 
-/// Shared parameters in a checkpoint.
+/// The entry of the shared parameters in a checkpoint.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct KeptShared {
-    /// Their name.
+    /// Name of the parameters.
     pub name: String,
-    /// Their rows.
+    /// Number of their rows.
     pub layout: SharedLayout,
 }
 
@@ -151,7 +149,7 @@ impl std::fmt::Display for KeptShared {
     }
 }
 
-/// What a strategy adds, under a number that is one higher, and what shared parameters add.
+/// The passes of a strategy, under a number that is one higher, and the passes of the shared parameters.
 #[derive(Debug)]
 struct Both {
     strategy: Arc<dyn Extension>,

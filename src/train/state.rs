@@ -1,7 +1,7 @@
-//! Everything that a training needs to go on as if it had never stopped, and its file.
+//! The complete state of a training, and its file. A resumed training gives the same bits as an uninterrupted one.
 //!
-//! What is not here follows from what is: learning rates and degrees from the step, the order of the views and sampled
-//! objects from the seed and the step, gradients and votes from the next step's own passes.
+//! The file leaves out derived values: learning rates and degrees follow from the step, the order of views and the
+//! sampled objects from seed and step, gradients and votes from the passes of the next step.
 
 use super::sampler::ViewOrder;
 use super::shared::KeptShared;
@@ -20,52 +20,52 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// A training between two steps.
+/// The state of a training between two steps.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct TrainState {
-    /// The labelgs that wrote it.
+    /// Version of labelgs that wrote it.
     pub labelgs: String,
-    /// Device, driver and subgroup size; other ones round differently.
+    /// Device, driver and subgroup size. Others round differently.
     pub device: String,
-    /// Steps done.
+    /// Number of finished steps.
     pub step: u32,
-    /// Steps that updated the parameters, which the moments are corrected by.
+    /// Number of updates of the parameters, for the bias correction of the moments.
     pub updates: u32,
-    /// Gaussians.
+    /// Number of Gaussians.
     pub gaussians: u32,
-    /// The world position that the positions are relative to.
+    /// World position of the origin of the positions.
     #[serde(default)]
     pub origin: [f64; 3],
-    /// Votes were counted before.
+    /// Votes were counted at least once.
     pub labelled_once: bool,
-    /// Memory has bounded the number of Gaussians.
+    /// Memory has limited the number of Gaussians.
     pub memory_bounds: bool,
-    /// How far memory had grown.
+    /// Sizes that the buffers had grown to.
     pub sizes: GrownSizes,
     /// The configuration.
     pub config: TrainConfig,
-    /// The training views, in their order.
+    /// Fingerprints of the training views, in their order.
     pub views: Vec<ViewFingerprint>,
-    /// By name of the view: the occluders of its objects.
+    /// Occluders of the objects of each view, by name of the view.
     pub occluders: BTreeMap<String, Occluders>,
-    /// What whoever runs the training keeps in the file, null for nothing.
+    /// Data of the caller; null for none.
     pub run: serde_json::Value,
-    /// What the strategy keeps; the default one is not mentioned.
+    /// State of the strategy; the default strategy has no entry.
     #[serde(default, skip_serializing_if = "Kept::is_default")]
     pub strategy: Kept,
-    /// Whose the shared parameters are, if there are any.
+    /// Entry of the shared parameters, if there are any.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub shared: Option<KeptShared>,
     /// Parameters, moments, statistics and labels.
     #[serde(skip)]
     pub planes: Vec<Plane>,
-    /// The file that it was read from, for messages.
+    /// File that the state was read from, for messages.
     #[serde(skip)]
     pub path: PathBuf,
 }
 
-/// What a view is told apart by.
+/// The fingerprint of a view.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ViewFingerprint {
@@ -97,13 +97,13 @@ impl ViewFingerprint {
 }
 
 impl TrainState {
-    /// Writes the checkpoint, whole or not at all.
+    /// Writes the checkpoint, atomically.
     pub fn write(self, path: &Path) -> Result<()> {
         let meta = serde_json::to_value(&self).map_err(|error| Error::Bug(format!("checkpoint: {error}")))?;
         Checkpoint { meta, planes: self.planes }.write(path)
     }
 
-    /// Reads a checkpoint. One that is damaged, of another version or not to be made sense of is an error that says why.
+    /// Reads a checkpoint. A damaged file, another version or inconsistent content is an error that gives the reason.
     pub fn read(path: &Path) -> Result<Self> {
         let file = Checkpoint::read(path)?;
         let odd = |problem: String| Error::data(path, "contents", problem);
@@ -113,14 +113,14 @@ impl TrainState {
         if state.updates > state.step {
             return Err(odd(format!("{} updates in {} steps", state.updates, state.step)));
         }
-        // Masks may be there and show no object.
+        // Masks may be given and show no object.
         let labels = state.planes.iter().any(|plane| plane.name == TABLE[Buf::LABELS.index()].name);
         let counts = [state.gaussians, state.shared.as_ref().map_or(0, |kept| kept.layout.count(state.views.len()))];
         state::check(&state.planes, counts, state.config.sh_degree, labels, &state.strategy.planes).map_err(odd)?;
         Ok(state)
     }
 
-    /// Refuses a scene that is not the one of the checkpoint, with the first thing that differs.
+    /// Refuses a scene that differs from that of the checkpoint; the error names the first difference.
     fn check_scene(&self, scene: &Path, views: &[ViewFingerprint]) -> Result<()> {
         let masks = |views: &[ViewFingerprint]| views.iter().any(|view| view.mask.is_some());
         let (then, now) = (masks(&self.views), masks(views));
@@ -151,7 +151,7 @@ impl TrainState {
 }
 
 impl Trainer {
-    /// The training as it is now, once the steps in flight are done.
+    /// Waits for the steps in flight and returns the state of the training.
     pub fn state(&mut self) -> Result<TrainState> {
         self.drain()?;
         let print = |view: &super::TrainView| {
@@ -181,8 +181,8 @@ impl Trainer {
         })
     }
 
-    /// The planes of the state, unless one holds a number that is none: to go on from that would help nobody, and what
-    /// the last step has spoilt no pass has looked at yet.
+    /// Reads the planes of the state. A NaN or infinity is an error: the checkpoint would be useless. No pass has
+    /// checked the result of the last step yet.
     fn finite_planes(&mut self) -> Result<Vec<Plane>> {
         let planes = self.engine.download_state(self.strategy.planes())?;
         let is_finite = |word: &u32| f32::from_bits(*word).is_finite();
@@ -201,8 +201,8 @@ impl Trainer {
         Ok(planes)
     }
 
-    /// Goes on where `state` stopped, to the same bits on the same device as if it had not. `dataset` must be what
-    /// the state was made with.
+    /// Resumes a training from `state`, with the same bits on the same device as without the interruption. `dataset`
+    /// must be the data set of the state.
     pub fn resume(
         gpu: Arc<Gpu>,
         dataset: &Dataset,
@@ -234,7 +234,7 @@ impl Trainer {
         Ok(trainer)
     }
 
-    /// Goes back to a state of this very training, whatever has become of it since.
+    /// Restores an earlier state of the same training.
     pub fn restore(&mut self, state: &TrainState) -> Result<()> {
         self.engine.abandon()?;
         self.in_flight.clear();
@@ -248,7 +248,7 @@ impl Trainer {
             .check(state.shared.as_ref())
             .map_err(|problem| Error::data(&state.path, "shared parameters", problem))?;
         match self.engine.grow_to(state.sizes) {
-            // On a smaller device there is less room to grow.
+            // A smaller device has less room to grow.
             Err(Error::OutOfMemory { .. }) => {}
             other => other?,
         }
@@ -262,7 +262,7 @@ impl Trainer {
     }
 }
 
-/// What equal bits are promised for.
+/// Returns the description of the device: equal descriptions give equal bits.
 fn device(gpu: &Gpu) -> String {
     let found = gpu.capabilities();
     let driver = format!("{} {}", found.driver_name, found.driver_info);

@@ -1,4 +1,4 @@
-//! One step as the host prepares it: the uniforms, the photo, the masks.
+//! The input of one step: uniforms, photo, masks.
 
 use super::TrainConfig;
 use super::config::LabelRule;
@@ -10,10 +10,10 @@ use crate::shaders::structs::StepUniforms;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// Largest weight of a small object beside large ones.
+/// Largest weight of a small object relative to the mean.
 const WEIGHT_MAX: f64 = 10.0;
 
-/// A view as training keeps it.
+/// A training view.
 #[derive(Debug)]
 pub struct TrainView {
     /// Name, for messages.
@@ -22,22 +22,22 @@ pub struct TrainView {
     pub camera: Camera,
     /// Photo.
     pub photo: Arc<Photo>,
-    /// Pixels of the photo that count.
+    /// Number of pixels of the photo that count.
     pub valid_pixels: u64,
-    /// Masks, if the view has any.
+    /// Mask, if the view has one.
     pub mask: Option<Arc<LabelMap>>,
-    /// Objects of the mask, sorted.
+    /// Ids of the objects in the mask, sorted.
     pub objects: Vec<u16>,
-    /// The mask as the device reads it; empty without a mask.
+    /// The mask in the layout of the device, one word per pixel, row-major; empty without a mask.
     pub view_labels: Vec<u32>,
-    /// What each object shows of itself.
+    /// Light and area of each object, by id.
     pub shown: BTreeMap<u16, Shown>,
-    /// For each object, the objects that hide it in this view.
+    /// Occluders of each object in this view.
     pub occluders: Occluders,
 }
 
 impl TrainView {
-    /// The same view at half the size, without its masks.
+    /// Returns the view at half the size, without its mask.
     pub fn halved(&self) -> Self {
         let (width, height) = (self.camera.width.div_ceil(2), self.camera.height.div_ceil(2));
         let photo = shrink_photo(&self.photo, width, height);
@@ -55,21 +55,21 @@ impl TrainView {
     }
 }
 
-/// Pixels of a photo that count.
+/// Returns the number of pixels of a photo that count.
 pub(crate) fn valid_pixels(photo: &Photo) -> u64 {
     photo.rgba.iter().filter(|pixel| pixel[3] > 127).count() as u64
 }
 
-/// What an object shows in a view.
+/// The pixels of an object in a view that the label loss uses.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Shown {
-    /// Sum of r + g + b over its pixels of the photo that the label loss looks at.
+    /// Sum of r + g + b over these pixels of the photo.
     pub light: f64,
     /// Number of these pixels.
     pub pixels: u64,
 }
 
-/// The mask as the device reads it: ids, with [`LABEL_BORDER`] within `border` px of a contour.
+/// Returns the mask in the layout of the device: ids, with [`LABEL_BORDER`] within `border` px of a contour.
 pub(crate) fn view_labels(mask: &LabelMap, border: u32) -> Vec<u32> {
     let ids = mask.ids.iter().map(|&id| u32::from(id));
     if border == 0 {
@@ -78,7 +78,7 @@ pub(crate) fn view_labels(mask: &LabelMap, border: u32) -> Vec<u32> {
     ids.zip(mask.near_contour(border)).map(|(id, near)| if near { id | LABEL_BORDER } else { id }).collect()
 }
 
-/// What each object shows of itself: the label loss of an empty layer.
+/// Sums light and area of each object. The label loss of an empty layer follows from them.
 pub(crate) fn shown_objects(photo: &Photo, view_labels: &[u32]) -> BTreeMap<u16, Shown> {
     let mut objects: BTreeMap<u16, Shown> = BTreeMap::new();
     for (&id, &[r, g, b, valid]) in view_labels.iter().zip(&photo.rgba) {
@@ -91,8 +91,8 @@ pub(crate) fn shown_objects(photo: &Photo, view_labels: &[u32]) -> BTreeMap<u16,
     objects
 }
 
-/// Weights of the layers of a step: 1, or as one over the root of the object's area, with a mean of 1 over an area of
-/// the mean size and at most [`WEIGHT_MAX`].
+/// Returns the weights of the layers of a step: 1, or proportional to 1 / sqrt(area). An object of the mean area then
+/// has weight 1; [`WEIGHT_MAX`] is the upper bound.
 pub(crate) fn layer_weights(input: &StepInput, view: &TrainView, config: &TrainConfig) -> Vec<f32> {
     let areas: Vec<f64> =
         input.layers.iter().map(|label| view.shown.get(label).map_or(0.0, |shown| shown.pixels as f64)).collect();
@@ -101,7 +101,7 @@ pub(crate) fn layer_weights(input: &StepInput, view: &TrainView, config: &TrainC
     areas.into_iter().map(|area| weight(area) as f32).collect()
 }
 
-/// Label loss of a step, weighted, from what the device summed up.
+/// Returns the weighted label loss of a step from the sums of the device.
 pub fn label_loss(input: &StepInput, view: &TrainView, config: &TrainConfig, loss_label: f32) -> f64 {
     let empty = |(label, weight): (&u16, f32)| {
         let shown = view.shown.get(label).copied().unwrap_or_default();
@@ -111,43 +111,42 @@ pub fn label_loss(input: &StepInput, view: &TrainView, config: &TrainConfig, los
     (f64::from(loss_label) + empty) / (3.0 * view.valid_pixels.max(1) as f64) * f64::from(config.label_weight)
 }
 
-/// The alpha term is a mean over pixels, where the others are means over pixels and channels.
+/// The alpha term is a mean over pixels; the other terms are means over pixels and channels.
 fn alpha_weight(config: &TrainConfig) -> f32 {
     3.0 * config.label_alpha
 }
 
-/// What a step needs to be submitted, and submitted again after a buffer had to grow.
+/// The input of a step, kept until the step is done because it may run again after a buffer has grown.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct StepInput {
     /// Step, from 1.
     pub step: u32,
-    /// Index of the view.
+    /// Index of the training view.
     pub view: usize,
-    /// Sampled objects; layer j is `layers[j - 1]`.
+    /// Ids of the sampled objects; layer `j` of the render is `layers[j - 1]`.
     pub layers: Vec<u16>,
-    /// Labels are in the list.
+    /// The step has the label passes.
     pub labels: bool,
-    /// Parameters are updated.
+    /// The step updates the parameters.
     pub update: bool,
-    /// Updates so far, this one included.
+    /// Number of updates, this one included.
     pub updates: u32,
 }
 
 impl StepInput {
-    /// True if the paper's lift is in the step.
+    /// Returns true if the step lifts labels by the rule of the paper.
     pub fn lifts(&self, config: &TrainConfig) -> bool {
         self.labels && config.label_rule == LabelRule::Main
     }
 }
 
-/// What is the same for all steps.
+/// Scale of the scene, constant over the training.
 #[derive(Clone, Copy, Debug)]
 pub struct SceneScale {
     /// Extent of the scene, world units.
     pub extent: f64,
 }
 
-/// The uniforms of a step.
 pub(crate) fn uniforms(
     input: &StepInput,
     view: &TrainView,
@@ -180,7 +179,7 @@ pub(crate) fn uniforms(
     }
 }
 
-/// What the device reads of a step.
+/// Returns the buffers of a step for the device.
 pub(crate) fn train_input<'a>(
     input: &StepInput,
     view: &'a TrainView,

@@ -11,13 +11,12 @@ use std::collections::HashSet;
 pub struct StepTimes {
     /// Step, from 1.
     pub step: u32,
-    /// The first run of a recording: drivers compile then.
+    /// The first run of a recording, in which drivers compile.
     pub is_first: bool,
     /// Stage, name and nanoseconds of each item, in order.
     pub items: Vec<(Stage, String, u64)>,
 }
 
-/// What was collected.
 #[derive(Debug, Default)]
 pub(super) struct Timing {
     seen: HashSet<Recording>,
@@ -25,22 +24,22 @@ pub(super) struct Timing {
 }
 
 impl Trainer {
-    /// From now on the times of steps are kept; the scheduler must have been made with timestamps.
+    /// Collects the times of steps from now on. The scheduler needs timestamps.
     pub fn keep_times(&mut self) {
         self.timing.get_or_insert_default();
     }
 
-    /// Whether the steps to come count the (pixel, splat) pairs that have a weight, which slows them.
+    /// Sets whether the next steps count the (pixel, splat) pairs with a weight. Counting slows them down.
     pub fn count_pairs(&mut self, on: bool) {
         self.counts_pairs = on;
     }
 
-    /// The times of the steps that ended since the last call.
+    /// Takes the times of the steps that ended since the last call.
     pub fn take_times(&mut self) -> Vec<StepTimes> {
         self.timing.as_mut().map(|timing| std::mem::take(&mut timing.times)).unwrap_or_default()
     }
 
-    /// Reads the times of a step that has ended and whose frame was not used again.
+    /// Reads the times of a finished step whose frame was not used again.
     pub(super) fn note_times(&mut self, step: u32, recording: Recording) -> Result<()> {
         if let Some(timing) = &mut self.timing {
             let items = self.engine.times(recording)?;

@@ -1,25 +1,25 @@
-//! The views of a training, at the sizes that steps look at them.
+//! The training views, at full and at half size.
 
 use super::step_input::{StepInput, TrainView};
 use std::ops::{Deref, DerefMut};
 
-/// The training views; as a slice, those at their full size.
+/// The training views. As a slice, those at full size.
 #[derive(Debug)]
 pub(super) struct Views {
     whole: Vec<TrainView>,
-    /// The same at half the size, if some steps look at them.
+    /// The views at half size, if some steps use them.
     halved: Vec<TrainView>,
     coarse_until: u32,
 }
 
 impl Views {
-    /// Views of which steps up to `coarse_until` look at halves.
+    /// Makes the views; steps up to `coarse_until` use half size.
     pub(super) fn new(whole: Vec<TrainView>, coarse_until: u32) -> Self {
         let halved = if coarse_until > 0 { whole.iter().map(TrainView::halved).collect() } else { Vec::new() };
         Self { whole, halved, coarse_until }
     }
 
-    /// The view of a step, as the step looks at it.
+    /// Returns the view of a step at the size of the step.
     pub(super) fn of(&self, input: &StepInput) -> &TrainView {
         if input.step <= self.coarse_until { &self.halved[input.view] } else { &self.whole[input.view] }
     }

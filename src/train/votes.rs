@@ -1,4 +1,4 @@
-//! Labels by votes, counted over all training views every so often and at the end.
+//! Labels by votes, counted over all training views at intervals and at the end.
 
 use super::{LabelRule, Trainer};
 use crate::error::Result;
@@ -11,7 +11,6 @@ impl Trainer {
         self.engine.size().labels.is_some() && self.config.label_rule == LabelRule::Votes
     }
 
-    /// True before the steps at which votes are counted.
     pub(super) fn counts_votes(&self, step: u32) -> bool {
         let config = &self.config;
         self.votes()
@@ -20,7 +19,7 @@ impl Trainer {
             && !self.blurs_depth_before(step)
     }
 
-    /// Counts the votes of all views and gives the labels to the device; nothing may be in flight.
+    /// Counts the votes of all views and writes the labels to the device. Nothing may be in flight.
     pub(super) fn refresh_labels(&mut self) -> Result<()> {
         let decision = self.count_votes()?;
         self.engine.set_labels(&decision.labels)?;
@@ -28,7 +27,7 @@ impl Trainer {
         Ok(())
     }
 
-    /// The labels on the device, once the steps in flight are done; none without masks.
+    /// Waits for the steps in flight and returns the labels on the device; none without masks.
     pub fn labels(&mut self) -> Result<Option<Vec<u32>>> {
         self.drain()?;
         self.engine.size().labels.is_some().then(|| self.engine.labels()).transpose()
@@ -46,7 +45,8 @@ impl Trainer {
         decide::count(&mut self.engine, &voters, judges.as_deref(), &means, how, true)
     }
 
-    /// The model with its final labels: where votes decide they are counted again, and confidence is known.
+    /// Returns the model with its final labels. With [`LabelRule::Votes`](super::LabelRule::Votes) it counts them again
+    /// and sets the confidence.
     pub fn labelled_model(&mut self) -> Result<Gaussians> {
         self.drain()?;
         let decision = if self.votes() { Some(self.count_votes()?) } else { None };

@@ -1,8 +1,8 @@
-//! The two operations of VGG16.
+//! The operations of VGG16: convolution and pooling.
 
 use rayon::prelude::*;
 
-/// An image of many channels, each row-major, one after the other.
+/// An image with many channels, one row-major plane after another.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Planes {
     /// Number of channels.
@@ -11,21 +11,20 @@ pub struct Planes {
     pub width: usize,
     /// Height, px.
     pub height: usize,
-    /// [channels, height, width].
+    /// Values, `[channels, height, width]`.
     pub values: Vec<f32>,
 }
 
-/// A convolution with a 3 x 3 window.
+/// A convolution layer with a 3 x 3 window.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Layer {
-    /// [outputs, inputs, 3, 3].
+    /// Weights, `[outputs, inputs, 3, 3]`.
     pub weight: Vec<f32>,
-    /// [outputs].
+    /// Biases, `[outputs]`.
     pub bias: Vec<f32>,
 }
 
-/// Convolution (zeros outside of the image), bias, and the positive part. Each output channel is summed by one thread in
-/// a fixed order.
+/// Applies convolution (zero padding), bias and ReLU. One thread sums each output channel in a fixed order.
 pub fn convolve(input: &Planes, layer: &Layer) -> Planes {
     let (width, height, area) = (input.width, input.height, input.width * input.height);
     let channel = |(output, plane): (usize, &mut [f32])| {
@@ -47,7 +46,7 @@ pub fn convolve(input: &Planes, layer: &Layer) -> Planes {
     Planes { channels: layer.bias.len(), width, height, values }
 }
 
-/// Adds a row seen through three weights.
+/// Adds a source row convolved with three weights.
 fn add_row(row: &mut [f32], source: &[f32], weight: &[f32]) {
     let last = row.len() - 1;
     for (sum, three) in row[1..].iter_mut().zip(source.windows(3)) {
@@ -60,7 +59,7 @@ fn add_row(row: &mut [f32], source: &[f32], weight: &[f32]) {
     }
 }
 
-/// The largest of each 2 x 2 pixels; an odd last row or column is dropped.
+/// Max-pools 2 x 2 pixels; an odd last row or column is dropped.
 pub fn halve(input: &Planes) -> Planes {
     let (width, height, area) = (input.width / 2, input.height / 2, input.width * input.height);
     let one = |channel: usize, x: usize, y: usize| {

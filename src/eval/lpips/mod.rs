@@ -1,8 +1,8 @@
 //! LPIPS v0.1 with VGG16 (Zhang et al. 2018) on the processor.
 //!
-//! Both pictures go through the 13 convolutions of VGG16. After the last one of each of its five stages the features of
-//! a pixel are scaled to length 1; the squared difference of each channel is weighted, summed over channels, averaged
-//! over pixels, and summed over stages.
+//! Both pictures go through the 13 convolutions of VGG16. After each of its five stages, the features of a pixel are
+//! scaled to length 1. The squared differences of the channels are weighted, summed over channels, averaged over
+//! pixels, and summed over stages.
 
 pub(crate) mod convolution;
 pub(crate) mod weights;
@@ -12,16 +12,17 @@ use crate::eval::protocol::score::Distance;
 use convolution::{Planes, convolve, halve};
 pub use weights::Weights;
 
-/// Convolutions of each stage: their numbers in torchvision's `features`. A stage after the first starts with a pooling.
+/// Indices of the convolutions of each stage in torchvision's `features`. Each stage after the first starts with a
+/// pooling.
 pub const STAGES: [&[usize]; 5] = [&[0, 2], &[5, 7], &[10, 12, 14], &[17, 19, 21], &[24, 26, 28]];
-/// Output channels of each stage.
+/// Number of output channels of each stage.
 pub const CHANNELS: [usize; 5] = [64, 128, 256, 512, 512];
-/// Smallest side that four poolings leave a pixel of, px.
+/// Smallest side of a picture, px: four poolings leave one pixel.
 const SIDE_MIN: usize = 16;
-/// Mean and deviation of each input channel, for values from -1 to 1.
+/// Mean and standard deviation of each input channel, for values from -1 to 1.
 const SHIFT: [f32; 3] = [-0.030, -0.088, -0.188];
 const SCALE: [f32; 3] = [0.458, 0.448, 0.450];
-/// Added to the length of a feature vector.
+/// Added to the length of a feature vector, against division by zero.
 const EPSILON: f32 = 1e-10;
 
 impl Distance for Weights {
@@ -46,13 +47,13 @@ impl Distance for Weights {
     }
 }
 
-/// Colours from 0 to 1 as VGG16 takes them.
+/// Converts colours from 0 to 1 to the input of VGG16.
 fn input(colours: &[[f32; 3]], width: usize, height: usize) -> Planes {
     let channel = |c: usize| colours.iter().map(move |colour| (2.0 * colour[c] - 1.0 - SHIFT[c]) / SCALE[c]);
     Planes { channels: 3, width, height, values: (0..3).flat_map(channel).collect() }
 }
 
-/// Mean over pixels of the weighted squared difference of the features, each pixel's scaled to length 1.
+/// Returns the mean over pixels of the weighted squared difference of normalised features.
 fn difference(a: &Planes, b: &Planes, weights: &[f32]) -> f64 {
     let area = a.width * a.height;
     let at = |planes: &Planes, channel: usize, pixel: usize| planes.values[channel * area + pixel];

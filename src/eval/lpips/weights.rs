@@ -1,9 +1,9 @@
 //! The weights of LPIPS in a safetensors file.
 //!
-//! The names are those of the two published state dictionaries in one file, 32-bit floats: torchvision's VGG16
-//! `features.N.weight` [outputs, inputs, 3, 3] and `features.N.bias` [outputs] for N of 0, 2, 5, 7, 10, 12, 14, 17, 19, 21,
-//! 24, 26, 28, and LPIPS v0.1 `linK.model.1.weight` [1, channels, 1, 1] for K of 0 to 4 with 64, 128, 256, 512, 512
-//! channels. Other tensors are left alone.
+//! The file joins two published state dictionaries, names unchanged, as 32-bit floats. From torchvision's VGG16 come
+//! `features.N.weight` `[outputs, inputs, 3, 3]` and `features.N.bias` `[outputs]` for N of 0, 2, 5, 7, 10, 12, 14, 17,
+//! 19, 21, 24, 26, 28. From LPIPS v0.1 comes `linK.model.1.weight` `[1, channels, 1, 1]` for K of 0 to 4 with 64, 128,
+//! 256, 512, 512 channels. Other tensors are ignored.
 
 use super::convolution::Layer;
 use super::{CHANNELS, STAGES};
@@ -13,7 +13,7 @@ use safetensors::{Dtype, SafeTensors};
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// VGG16's convolutions and the weight of each of its features.
+/// The convolutions of VGG16 and the weights of the features.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Weights {
     layers: BTreeMap<usize, Layer>,
@@ -21,7 +21,7 @@ pub struct Weights {
 }
 
 impl Weights {
-    /// Reads the file; every tensor must be there with its shape.
+    /// Reads the file. Every tensor must exist with its shape.
     pub fn read(path: &Path) -> Result<Self> {
         let numbers: Vec<(usize, usize)> =
             STAGES.iter().zip(CHANNELS).flat_map(|(stage, outputs)| stage.iter().map(move |&n| (n, outputs))).collect();
@@ -50,7 +50,7 @@ impl Weights {
     }
 }
 
-/// Tensors of a safetensors file by name and shape, all of finite 32-bit floats.
+/// Reads tensors by name and shape from a safetensors file; all must be finite 32-bit floats.
 pub fn read_tensors(path: &Path, wanted: &[(String, Vec<usize>)]) -> Result<Vec<Vec<f32>>> {
     let bytes = read::bytes(path)?;
     let file = SafeTensors::deserialize(&bytes)
@@ -60,7 +60,7 @@ pub fn read_tensors(path: &Path, wanted: &[(String, Vec<usize>)]) -> Result<Vec<
 
 fn floats(path: &Path, file: &SafeTensors, name: &str, shape: &[usize]) -> Result<Vec<f32>> {
     let cure = "expected torchvision's VGG16 `features` and the `lin` layers of LPIPS v0.1 in one file, 32-bit floats";
-    let view = file.tensor(name).map_err(|_| Error::data(path, name, format!("is not there; {cure}")))?;
+    let view = file.tensor(name).map_err(|_| Error::data(path, name, format!("is missing; {cure}")))?;
     if view.dtype() != Dtype::F32 || view.shape() != shape {
         let problem = format!("is {:?} {:?} instead of F32 {shape:?}; {cure}", view.dtype(), view.shape());
         return Err(Error::data(path, name, problem));
@@ -70,5 +70,5 @@ fn floats(path: &Path, file: &SafeTensors, name: &str, shape: &[usize]) -> Resul
     if values.iter().all(|value| value.is_finite()) {
         return Ok(values);
     }
-    Err(Error::data(path, name, "holds a number that is not finite"))
+    Err(Error::data(path, name, "has a value that is not finite"))
 }

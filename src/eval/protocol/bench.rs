@@ -1,4 +1,4 @@
-//! What a benchmark is run on.
+//! The inputs of a benchmark.
 
 use super::score::Distance;
 use super::{Layout, Protocol};
@@ -9,28 +9,28 @@ use crate::scene::View;
 use std::collections::BTreeSet;
 use std::path::Path;
 
-/// What a benchmark is run on.
+/// The inputs of a benchmark.
 pub struct Bench<'a> {
     /// The benchmark.
     pub protocol: Protocol,
-    /// Whether the published scorer's ways are followed.
+    /// Follows the published scorer instead of our rules.
     pub compat: bool,
-    /// All views with their photos.
+    /// All views, with their photos.
     pub views: &'a [&'a View],
-    /// Test views by name, for benchmarks that number them.
+    /// Test views sorted by name, for benchmarks that number them.
     pub test: &'a [&'a View],
-    /// Names of labels.
+    /// Names of the labels.
     pub names: Option<&'a LabelTable>,
-    /// Labels that a Gaussian of the model has.
+    /// Labels of the Gaussians in the model.
     pub labels: &'a BTreeSet<u32>,
-    /// Reads a mask of a view, by its path in the layout.
+    /// Reads the mask of a view, by its path in the layout.
     pub truth: &'a dyn Fn(&Path, &View) -> Result<TruthMask>,
-    /// LPIPS, where there are weights.
+    /// LPIPS, if weights are given.
     pub lpips: Option<&'a dyn Distance>,
 }
 
 impl Bench<'_> {
-    /// An error if the scene has none of the frames of the layout: then it is another scene.
+    /// Returns an error if the scene has none of the frames of the layout, because then it is another scene.
     pub fn check(&self, layout: &Layout, root: &Path) -> Result<()> {
         let mut frames = layout.tasks.iter().flat_map(|task| &task.truths).map(|truth| truth.frame.as_str());
         if frames.clone().any(|frame| self.view(frame).is_some()) {
@@ -38,14 +38,14 @@ impl Bench<'_> {
         }
         let name = |view: &&View| view.name.clone();
         let problem = format!(
-            "the scene has none of the frames, such as {}; its views are {} ...; use the truth of this scene",
+            "the scene has none of the frames, such as {}; its views are {} ...; use the ground truth of this scene",
             frames.next().unwrap_or_default(),
             self.views.iter().take(3).map(name).collect::<Vec<_>>().join(", ")
         );
         Err(Error::data(root, "", problem))
     }
 
-    /// The view of a frame: by its name with or without extension, or by its number where the benchmark has numbers.
+    /// Returns the view of a frame: by name with or without extension, or by number if the benchmark uses numbers.
     pub(super) fn view(&self, frame: &str) -> Option<&View> {
         let called = |view: &&&View| {
             let without = Path::new(&view.name).with_extension("");

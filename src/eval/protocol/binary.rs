@@ -1,6 +1,6 @@
-//! Plain black and white masks: `OBJECT/FRAME.png`, or `FRAME.png` of a single object, which takes the folder's name.
+//! Black and white masks: `OBJECT/FRAME.png`, or `FRAME.png` for a single object with the name of the folder.
 //!
-//! As in SPIn-NeRF, the first frame is the prompt. It is not scored.
+//! As in SPIn-NeRF, the first frame is the prompt and has no score.
 
 use super::{Ask, Layout, Truth, folders, is_png, stem, tasks};
 use std::collections::BTreeMap;
@@ -23,7 +23,7 @@ pub(super) fn layout(files: &[PathBuf], ask: Ask) -> Result<Layout, String> {
     if objects.is_empty() {
         return Err("holds no mask; expected FRAME.png, or OBJECT/FRAME.png".into());
     }
-    // Each object has a first frame of its own.
+    // The first frame differs between objects.
     let mut layout = Layout { tasks: Vec::new(), left_out };
     for (object, truths) in objects {
         let one = tasks(BTreeMap::from([(object, truths)]), ask);

@@ -1,8 +1,8 @@
 //! The evaluation of the LabelGS paper.
 //!
 //! `segmentations/FRAME/OBJECT.png`, white where the object is visible. The first frame by name is a training view and
-//! the prompt; an object is scored in all others. Labels chosen by name leave the first frame out all the same, because
-//! the model was trained on it.
+//! the prompt; the other frames are scored. The first frame is left out even if labels are chosen by name, because the
+//! model was trained on it.
 
 use super::{Ask, By, Layout, by_frame_and_object, tasks};
 use std::path::PathBuf;

@@ -1,8 +1,8 @@
 //! LERF-Mask, the benchmark of Gaussian Grouping.
 //!
-//! `test_mask/VIEW/PROMPT.png`, white where the object of the text prompt is visible. VIEW is the name of a view, or the
-//! number of a test view, from 0. The published score averages over the views of a prompt, then over prompts. Its scorer
-//! leaves out predictions that do not exist.
+//! `test_mask/VIEW/PROMPT.png`, white where the object of the text prompt is visible. VIEW is the name of a view, or
+//! the number of a test view, from 0. The published score averages over the views of a prompt, then over prompts. Its
+//! scorer leaves out missing predictions.
 
 use super::{Ask, Layout, by_frame_and_object, tasks};
 use std::path::PathBuf;

@@ -1,8 +1,8 @@
-//! Published benchmarks of object masks: where their files are, how labels are chosen, what is averaged.
+//! Published benchmarks of object masks.
 //!
-//! A file per benchmark turns the list of true masks into a [`Layout`]: objects, the frames in which they are scored, and
-//! how each is chosen. [`run`] chooses and scores, [`report`] averages. Nothing is left out in silence: an object that
-//! cannot be chosen and a frame that cannot be rendered count as 0 and are listed.
+//! [`Protocol::layout`] sorts the mask files of a benchmark into a [`Layout`]: objects, the frames with scores, and how
+//! to choose the labels of each object. `run` chooses and scores, `report` averages. An object without labels and a
+//! frame without a prediction count as 0 and are listed.
 
 pub(crate) mod bench;
 mod binary;
@@ -42,26 +42,26 @@ pub enum Protocol {
     Binary,
 }
 
-/// How labels are chosen for an object.
+/// The way to choose the labels of an object.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 pub enum By {
-    /// By a mask in one view: labels with more than half of their pixels under it.
+    /// Labels with more than half of their pixels under a mask in one view.
     Prompt,
-    /// By the object's name in labels.json.
+    /// The label with the object's name in labels.json.
     Name,
 }
 
-/// A true mask.
+/// A ground-truth mask.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Truth {
     /// Name of the frame, without extension.
     pub frame: String,
-    /// File, relative to the folder of the truth.
+    /// File, relative to the folder of the ground truth.
     pub file: PathBuf,
 }
 
-/// What an object is chosen by.
+/// The prompt of an object.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Prompt {
     /// A mask in one frame.
@@ -75,43 +75,43 @@ pub enum Prompt {
         /// Strokes elsewhere.
         off: Vec<PathBuf>,
     },
-    /// Its name.
+    /// The name of the object.
     Name,
 }
 
-/// An object and its true masks.
+/// An object and its ground-truth masks.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Task {
     /// Name of the object.
     pub object: String,
-    /// What it is chosen by.
+    /// Its prompt.
     pub prompt: Prompt,
-    /// The masks it is scored by, sorted by frame.
+    /// Masks to score against, sorted by frame.
     pub truths: Vec<Truth>,
 }
 
-/// What a benchmark asks for.
+/// The objects and masks of a benchmark.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Layout {
     /// Objects, sorted by name.
     pub tasks: Vec<Task>,
-    /// Masks that the rules leave out, and why.
+    /// Masks that the rules leave out, with reasons.
     pub left_out: Vec<String>,
 }
 
-/// What decides about a layout besides the files.
+/// The inputs of a layout besides the files.
 #[derive(Clone, Copy, Debug)]
 pub struct Ask<'a> {
-    /// Folder of the truth, after [`Protocol::root`].
+    /// Folder of the ground truth, from [`Protocol::root`].
     pub truth: &'a Path,
     /// Name of the scene's folder.
     pub scene: &'a str,
-    /// How objects are chosen.
+    /// The way to choose labels.
     pub by: By,
 }
 
 impl Protocol {
-    /// Name on the command line.
+    /// Returns the name on the command line.
     pub fn name(self) -> &'static str {
         match self {
             Self::Labelgs => "labelgs",
@@ -122,7 +122,7 @@ impl Protocol {
         }
     }
 
-    /// Where the masks are below a folder that a person names: there, or where the data set keeps them.
+    /// Returns the folder of the masks: `folder`, or the subfolder of the data set.
     pub fn root(self, folder: &Path) -> PathBuf {
         let inside = match self {
             Self::Labelgs | Self::ThreeDOvs => "segmentations",
@@ -133,7 +133,7 @@ impl Protocol {
         Some(folder.join(inside)).filter(|folder| folder.is_dir()).unwrap_or_else(|| folder.to_owned())
     }
 
-    /// How this benchmark chooses objects.
+    /// Returns the way in which this benchmark chooses labels.
     pub fn chooses_by(self) -> By {
         match self {
             Self::Labelgs | Self::Nvos | Self::Binary => By::Prompt,
@@ -141,17 +141,18 @@ impl Protocol {
         }
     }
 
-    /// True if a published scorer is known that `--compat` can follow.
+    /// Returns true if `--compat` can follow a published scorer.
     pub fn has_scorer(self) -> bool {
         matches!(self, Self::Labelgs | Self::LerfMask)
     }
 
-    /// True if masks may lie in folders that are numbers of test views instead of names.
+    /// Returns true if folders of masks may have numbers of test views instead of names.
     pub fn numbers_views(self) -> bool {
         self == Self::LerfMask
     }
 
-    /// Sorts `files` (relative to the truth; and the words of classes.txt, where there is one) into objects.
+    /// Sorts `files` (relative to the ground truth) into objects. `classes` is the content of classes.txt, if it
+    /// exists.
     pub fn layout(self, files: &[PathBuf], classes: Option<&str>, ask: Ask) -> Result<Layout> {
         let layout = match self {
             Self::Labelgs => labelgs::layout(files, ask),
@@ -162,30 +163,30 @@ impl Protocol {
         };
         let layout = layout.map_err(|problem| Error::data(ask.truth, "", problem))?;
         if layout.tasks.iter().all(|task| task.truths.is_empty()) {
-            let problem = "leaves no mask to score: the first frame is the prompt, and no other shows the same object";
+            let problem =
+                "has no mask to score: the first frame is the prompt, and no other frame shows the same object";
             return Err(Error::data(ask.truth, "", problem));
         }
         Ok(layout)
     }
 }
 
-/// File name without extension.
 fn stem(path: &Path) -> String {
     path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default()
 }
 
-/// True for the files that can be masks: compression of a JPEG moves edges.
+/// Returns true for PNG files. JPEG is no mask format, because its compression moves edges.
 fn is_png(path: &Path) -> bool {
     path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("png"))
 }
 
-/// The names of the folders that a file lies in, outermost first.
+/// Returns the names of the folders of a file, outermost first.
 fn folders(path: &Path) -> Vec<String> {
     let parent = path.parent().unwrap_or(Path::new(""));
     parent.components().map(|part| part.as_os_str().to_string_lossy().into_owned()).collect()
 }
 
-/// Objects, each with its masks, of files FRAME/OBJECT.png; files elsewhere are left out.
+/// Returns the masks of each object from files FRAME/OBJECT.png. Other files are left out.
 fn by_frame_and_object(files: &[PathBuf], left_out: &mut Vec<String>) -> BTreeMap<String, Vec<Truth>> {
     let mut objects: BTreeMap<String, Vec<Truth>> = BTreeMap::new();
     for file in files.iter().filter(|file| is_png(file)) {
@@ -193,14 +194,14 @@ fn by_frame_and_object(files: &[PathBuf], left_out: &mut Vec<String>) -> BTreeMa
             [frame] => {
                 objects.entry(stem(file)).or_default().push(Truth { frame: frame.clone(), file: file.clone() });
             }
-            _ => left_out.push(format!("{} is no FRAME/OBJECT.png", file.display())),
+            _ => left_out.push(format!("{} is not FRAME/OBJECT.png", file.display())),
         }
     }
     objects
 }
 
-/// One task per object: by name and in all frames, or by the mask in the first of all frames and in the others. Objects
-/// that the first frame does not show cannot be chosen by it and are left out.
+/// Makes one task per object: by name in all frames, or by the mask in the first frame in all others. An object that is
+/// not in the first frame then has no prompt and is left out.
 fn tasks(objects: BTreeMap<String, Vec<Truth>>, ask: Ask) -> Layout {
     let first = objects.values().flatten().map(|truth| truth.frame.clone()).min().unwrap_or_default();
     let mut layout = Layout::default();

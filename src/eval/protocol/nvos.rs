@@ -1,8 +1,9 @@
 //! NVOS: one object per scene, strokes in a reference view, a mask in another view.
 //!
-//! `reference_image/SCENE/FRAME.*`, `scribbles/SCENE/pos_*.png` and `neg_*.png`, `masks/SCENE/FRAME_mask.png`. `horns` is
-//! there twice, as `horns_center` and `horns_left`. A mask `reference_image/SCENE/FRAME_mask.png` of the reference view,
-//! which many follow-ups draw from the strokes, is used in place of the strokes.
+//! `reference_image/SCENE/FRAME.*`, `scribbles/SCENE/pos_*.png` and `neg_*.png`, `masks/SCENE/FRAME_mask.png`. The
+//! scene `horns` occurs twice, as `horns_center` and `horns_left`. If there is a mask
+//! `reference_image/SCENE/FRAME_mask.png` of the reference view, which many later papers derive from the strokes, it
+//! replaces the strokes.
 
 use super::{Ask, By, Layout, Prompt, Task, Truth, folders, is_png, stem};
 use std::collections::BTreeSet;
@@ -48,7 +49,6 @@ pub(super) fn layout(files: &[PathBuf], ask: Ask) -> Result<Layout, String> {
     Ok(layout)
 }
 
-/// The mask in a file FRAME_mask.png.
 fn truth(file: PathBuf) -> Option<Truth> {
     is_png(&file).then_some(())?;
     let frame = stem(&file).strip_suffix(MASK)?.to_owned();

@@ -1,4 +1,4 @@
-//! Who renders for a benchmark.
+//! The renderer of a benchmark.
 
 use super::score::Drawn;
 use crate::edit::select::extract;
@@ -9,9 +9,9 @@ use crate::scene::{Camera, Gaussians, LabelMap};
 
 /// Renders a model with labels.
 pub trait Painter {
-    /// The label of each pixel of the whole scene.
+    /// Renders the label of each pixel of the whole scene.
     fn label_map(&mut self, camera: &Camera) -> Result<LabelMap>;
-    /// Some labels, or with `None` the whole scene, on black.
+    /// Renders some labels, or the whole scene for `None`, on black.
     fn draw(&mut self, labels: Option<&[u32]>, camera: &Camera) -> Result<Drawn>;
 }
 
@@ -21,13 +21,13 @@ pub struct EnginePainter<'a> {
     model: &'a Gaussians,
     near: f32,
     min_confidence: f32,
-    /// The labels on the device; the whole model is `Some(None)`.
+    /// The labels on the device; `Some(None)` is the whole model.
     there: Option<Option<Vec<u32>>>,
 }
 
 impl<'a> EnginePainter<'a> {
-    /// `near` is the near plane, world units; an object's Gaussians of less confidence are left out where it is drawn
-    /// alone.
+    /// Makes a painter. `near` is the near plane, world units. Objects drawn alone leave out Gaussians with less than
+    /// `min_confidence`.
     pub fn new(engine: &'a mut Engine, model: &'a Gaussians, near: f32, min_confidence: f32) -> Self {
         Self { engine, model, near, min_confidence, there: None }
     }

@@ -1,4 +1,4 @@
-//! The result of a benchmark, as numbers and as JSON.
+//! The result of a benchmark, for programs and as JSON.
 
 use super::Protocol;
 use super::score::PairScores;
@@ -6,48 +6,48 @@ use crate::error::{Error, Result};
 use serde::Serialize;
 use std::collections::BTreeMap;
 
-/// A prediction that is not there.
+/// A missing prediction.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Absent {
     /// Name of the object.
     pub object: String,
-    /// The frame; without one it is every frame of the object.
+    /// Name of the frame; `None` stands for every frame of the object.
     pub frame: Option<String>,
-    /// Why.
+    /// Reason.
     pub reason: String,
 }
 
-/// An object over its frames.
+/// The result for an object over its frames.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct ObjectRow {
-    /// The labels that were chosen for it.
+    /// The chosen labels.
     pub labels: Vec<u32>,
-    /// Frames that count.
+    /// Number of scored frames.
     pub frames: u64,
-    /// Means over those frames.
+    /// Means over these frames.
     #[serde(flatten)]
     pub mean: PairScores,
 }
 
-/// Averages of the scene.
+/// The averages of the scene.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Means {
-    /// Over pairs of object and frame.
+    /// Mean over pairs of object and frame.
     pub pairs: PairScores,
-    /// Over objects of their means over frames.
+    /// Mean over objects of their means over frames.
     pub objects: PairScores,
     /// Number of pairs.
     pub pair_count: u64,
-    /// Number of objects with a pair.
+    /// Number of objects with at least one pair.
     pub object_count: u64,
 }
 
-/// The number that the benchmark's tables print.
+/// The number in the benchmark's tables.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Headline {
-    /// Which IoU it is: `iou` or `iou_colour`.
+    /// Kind of IoU: `iou` or `iou_colour`.
     pub key: &'static str,
-    /// Which average: `pairs` or `objects`.
+    /// Kind of average: `pairs` or `objects`.
     pub average: &'static str,
     /// Mean IoU.
     pub iou: Option<f64>,
@@ -55,32 +55,32 @@ pub struct Headline {
     pub psnr: Option<f64>,
 }
 
-/// Scores of a model in a benchmark; what is not finite becomes null in JSON.
+/// Scores of a model in a benchmark. JSON has null for values that are not finite.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Report {
-    /// Version of this layout.
+    /// Version of the layout.
     pub schema_version: u32,
     /// Name of the benchmark.
     pub protocol: &'static str,
-    /// Whether the published scorer's ways were followed.
+    /// True if the rules are those of the published scorer.
     pub compat: bool,
-    /// The rules, in words.
+    /// The rules in words.
     pub rules: Vec<&'static str>,
     /// `VGG16, v0.1`, or `no weights`.
     pub lpips: &'static str,
-    /// The number for tables.
+    /// The number in the benchmark's tables.
     pub headline: Headline,
     /// Averages.
     pub mean: Means,
-    /// Objects by name.
+    /// Results by name of the object.
     pub objects: BTreeMap<String, ObjectRow>,
     /// Scores by frame and object.
     pub views: BTreeMap<String, BTreeMap<String, PairScores>>,
-    /// Predictions that could not be made.
+    /// Missing predictions.
     pub missing: Vec<Absent>,
     /// Prompts that select nothing.
     pub empty: Vec<Absent>,
-    /// True masks that the rules leave out.
+    /// Ground-truth masks that the rules leave out, with reasons.
     pub left_out: Vec<String>,
 }
 
@@ -121,7 +121,6 @@ impl Report {
         self.views.entry(frame.to_owned()).or_default().insert(object.to_owned(), scores);
     }
 
-    /// Averages what was added.
     pub(super) fn finish(&mut self) {
         for (name, row) in &mut self.objects {
             let own: Vec<&PairScores> = self.views.values().filter_map(|view| view.get(name)).collect();
@@ -147,12 +146,12 @@ impl Report {
         };
     }
 
-    /// The checks of `--min-psnr` and `--min-iou` on the headline.
+    /// Compares the headline with the bounds of `--min-psnr` and `--min-iou`.
     pub fn check(&self, min_psnr: Option<f64>, min_iou: Option<f64>) -> Result<()> {
         let rows = [("PSNR", self.headline.psnr, min_psnr), ("IoU", self.headline.iou, min_iou)];
         for (what, found, least) in rows {
             let Some(least) = least else { continue };
-            // A NaN is not enough either.
+            // A NaN fails too.
             if !found.is_some_and(|found| found >= least) {
                 let found = found.map_or("nothing".to_owned(), |found| format!("{found:.4}"));
                 return Err(Error::Check(format!("mean {what} is {found}, less than {least}")));

@@ -1,4 +1,4 @@
-//! A benchmark on a model: choose labels, render, score.
+//! Runs a benchmark on a model: chooses labels, renders, scores.
 
 use super::bench::Bench;
 use super::paint::Painter;
@@ -12,16 +12,16 @@ use crate::eval::metrics::COVERED;
 use crate::io::truth::photo_at;
 use crate::scene::View;
 
-/// Pictures that [`run`] renders at most, but for prompts.
+/// Returns the largest number of pictures that [`run`] renders, without prompts.
 pub(crate) fn picture_count(layout: &Layout) -> u64 {
     layout.tasks.iter().map(|task| task.truths.len() as u64).sum()
 }
 
-/// Runs a benchmark. `watch` sees every picture.
+/// Runs a benchmark. `watch` receives every picture.
 pub fn run(layout: &Layout, bench: &Bench, painter: &mut dyn Painter, watch: &mut dyn Watch) -> Result<Report> {
     let mut report = Report::new(bench.protocol, bench.compat, bench.lpips.is_some());
     report.left_out.clone_from(&layout.left_out);
-    // Prompts first: they need the whole model.
+    // Choose all labels first: prompts need the whole model.
     let choices: Vec<Choice> = layout.tasks.iter().map(|task| choose(task, bench, painter)).collect::<Result<_>>()?;
     for (task, choice) in layout.tasks.iter().zip(&choices) {
         let object = || task.object.clone();
@@ -45,7 +45,7 @@ pub fn run(layout: &Layout, bench: &Bench, painter: &mut dyn Painter, watch: &mu
                 watch.skip()?;
                 continue;
             };
-            // The paper's wrapper renders everything when nothing is selected.
+            // The wrapper in the paper's code renders everything if nothing is selected.
             let whole_scene = bench.compat && bench.protocol == Protocol::Labelgs;
             match (&labels[..], absent) {
                 ([], Some(reason)) if !whole_scene => {
@@ -64,7 +64,7 @@ pub fn run(layout: &Layout, bench: &Bench, painter: &mut dyn Painter, watch: &mu
     Ok(report)
 }
 
-/// An absent prediction counts as 0; the scorer of Gaussian Grouping does not see it.
+/// Adds a missing prediction. It counts as 0; the scorer of Gaussian Grouping leaves it out.
 fn add_absent(report: &mut Report, bench: &Bench, task: &Task, truth: &Truth) {
     if bench.compat && bench.protocol == Protocol::LerfMask {
         report.left_out.push(format!("{} in {} has no prediction and is not counted", task.object, truth.frame));

@@ -8,40 +8,40 @@ use crate::io::truth::TruthMask;
 use crate::scene::Photo;
 use serde::Serialize;
 
-/// A perceptual distance of two pictures, colours from 0 to 1.
+/// A perceptual distance of two pictures with colours from 0 to 1.
 pub trait Distance {
-    /// The distance; 0 for equal pictures.
+    /// Returns the distance; 0 for equal pictures.
     fn distance(&self, a: &[[f32; 3]], b: &[[f32; 3]], width: usize, height: usize) -> crate::Result<f64>;
 }
 
-/// Scores of an object, in one frame or on average. `None` where there was nothing to compare.
+/// Scores of an object, in one frame or on average; `None` if there was nothing to compare.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct PairScores {
-    /// Intersection over union of opacity above 0.5 and the true mask.
+    /// Intersection over union of opacity above 0.5 and the ground-truth mask.
     pub iou: Option<f64>,
-    /// The same of any channel above 0.01, the rule of the LabelGS paper.
+    /// Intersection over union of "any channel above 0.01" and the mask, the rule of the LabelGS paper.
     pub iou_colour: Option<f64>,
-    /// Intersection over union of the rims of opacity above 0.5 and of the true mask.
+    /// Intersection over union of the rims of opacity above 0.5 and of the mask.
     pub boundary_iou: Option<f64>,
-    /// Share of pixels at which opacity above 0.5 agrees with the true mask.
+    /// Share of pixels at which opacity above 0.5 agrees with the mask.
     pub accuracy: Option<f64>,
     /// PSNR of the object on black against photo times mask over the whole frame, dB.
     pub psnr: Option<f64>,
-    /// SSIM of the same.
+    /// SSIM of the object on black against photo times mask.
     pub ssim: Option<f64>,
-    /// LPIPS of the same.
+    /// LPIPS of the object on black against photo times mask.
     pub lpips: Option<f64>,
 }
 
 impl PairScores {
-    /// What an absent prediction gets: the worst of everything, for LPIPS 1.
+    /// Returns the scores of a missing prediction: the worst of each; 1 for LPIPS.
     pub fn absent(with_lpips: bool) -> Self {
         let zero = Some(0.0);
         let lpips = with_lpips.then_some(1.0);
         Self { iou: zero, iou_colour: zero, boundary_iou: zero, accuracy: zero, psnr: zero, ssim: zero, lpips }
     }
 
-    /// The mean of each score over those that are there.
+    /// Returns the mean of each score over its values.
     pub fn average<'a>(scores: impl Iterator<Item = &'a Self> + Clone) -> Self {
         let over = |field: fn(&Self) -> Option<f64>| mean(scores.clone().filter_map(field));
         Self {
@@ -55,7 +55,7 @@ impl PairScores {
         }
     }
 
-    /// The scores with their names.
+    /// Returns the scores with their names.
     pub fn named(&self) -> [(&'static str, Option<f64>); 7] {
         [
             ("iou", self.iou),
@@ -74,13 +74,13 @@ impl PairScores {
 pub struct Drawn {
     /// r, g, b, not clamped, row-major.
     pub rgb: Vec<[f32; 3]>,
-    /// Opacity.
+    /// Opacity, row-major, 0 to 1.
     pub alpha: Vec<f32>,
 }
 
-/// Scores a picture against a mask and a photo of its size. Pixels without a photo do not count. With `compat` PSNR and
-/// SSIM are those of the paper's scorer: every pixel, PSNR of the unclamped picture as the mean over channels, SSIM of
-/// 8-bit pictures with a uniform window.
+/// Scores a picture against a mask and a photo of the same size. Invalid pixels of the photo do not count. `compat`
+/// uses the PSNR and SSIM of the paper's scorer: every pixel, PSNR of the unclamped picture as the mean over channels,
+/// SSIM of 8-bit pictures with a uniform window.
 pub(crate) fn score(
     drawn: &Drawn,
     truth: &TruthMask,
@@ -125,7 +125,7 @@ pub(crate) fn score(
     })
 }
 
-/// The photo, black outside of the mask.
+/// Returns the photo with black outside of the mask.
 fn times_mask(photo: &Photo, inside: &[bool]) -> Photo {
     let texel = |(&[r, g, b, valid], &inside): (&[u8; 4], &bool)| {
         if inside { [r, g, b, valid] } else { [0, 0, 0, valid] }

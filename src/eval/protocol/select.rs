@@ -1,4 +1,4 @@
-//! Which labels an object of a benchmark has in the model.
+//! Chooses the labels of a benchmark's object in the model.
 
 use super::bench::Bench;
 use super::paint::Painter;
@@ -9,18 +9,17 @@ use crate::io::truth::TruthMask;
 use crate::scene::{LabelMap, View};
 use std::path::Path;
 
-/// What the prompt of an object came to.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum Choice {
-    /// These labels, at least one.
+    /// The chosen labels, at least one.
     Labels(Vec<u32>),
-    /// The prompt was followed and selects nothing; why.
+    /// The prompt works and selects nothing, with the reason.
     Empty(String),
-    /// The prompt cannot be followed; why.
+    /// The prompt does not work, with the reason.
     Missing(String),
 }
 
-/// Share of the strokes on an object that a label needs, so that a stroke that slips does not choose a neighbour.
+/// Least share of the strokes on an object for a label, against strokes that slip onto a neighbour.
 const STROKES: f64 = 0.05;
 
 pub(super) fn choose(task: &Task, bench: &Bench, painter: &mut dyn Painter) -> Result<Choice> {
@@ -47,7 +46,7 @@ fn no_view(frame: &str) -> Choice {
     Choice::Missing(format!("the scene has no view {frame}, which holds the prompt"))
 }
 
-/// A name in the table, or an id.
+/// Chooses by a name in the table, or an id.
 fn by_name(object: &str, bench: &Bench) -> Choice {
     let named = bench.names.and_then(|names| names.by_name(object));
     let Some(id) = named.or_else(|| object.parse().ok()) else {
@@ -71,7 +70,8 @@ fn why_empty(map: &LabelMap, mask: &TruthMask) -> String {
     }
 }
 
-/// Labels with more pixels under the strokes on the object than under the others, and a share of the former.
+/// Chooses labels with more pixels under the strokes on the object than under the other strokes, and a least share of
+/// the strokes.
 fn under_strokes(on: &[TruthMask], off: &[TruthMask], view: &View, painter: &mut dyn Painter) -> Result<Choice> {
     let mut counts = std::collections::BTreeMap::<u32, (u64, u64)>::new();
     for (stroke, wanted) in on.iter().map(|mask| (mask, true)).chain(off.iter().map(|mask| (mask, false))) {

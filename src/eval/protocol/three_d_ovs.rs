@@ -1,5 +1,5 @@
-//! 3D-OVS: `segmentations/classes.txt` names the classes, `segmentations/FRAME/CLASS.png` are their masks in the frames
-//! that were annotated. The published score is the mean IoU over classes and frames.
+//! 3D-OVS: `segmentations/classes.txt` lists the classes, `segmentations/FRAME/CLASS.png` are their masks in the
+//! annotated frames. The published score is the mean IoU over classes and frames.
 
 use super::{Ask, Layout, by_frame_and_object, tasks};
 use std::path::PathBuf;
@@ -21,7 +21,7 @@ pub(super) fn layout(files: &[PathBuf], classes: Option<&str>, ask: Ask) -> Resu
     objects.retain(|name, truths| {
         let known = classes.contains(&name.as_str());
         if !known {
-            left_out.push(format!("{name} ({} masks) is no class of classes.txt", truths.len()));
+            left_out.push(format!("{name} ({} masks) is not in classes.txt", truths.len()));
         }
         known
     });

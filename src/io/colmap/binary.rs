@@ -1,4 +1,4 @@
-//! The binary files: little-endian, fixed widths, a count in front. Counts are never trusted for memory.
+//! The binary files: little-endian, fixed widths, a count in front. No memory is allocated by a count alone.
 
 use super::model::{CameraRecord, ImageRecord, NAMES, model_of};
 use crate::error::{Error, Result};
@@ -8,16 +8,16 @@ use glam::DVec3;
 use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
 
-/// Longest file name of an image.
+/// Most bytes in the file name of an image.
 const NAME_MAX: u64 = 4096;
 
-/// A file read front to back, which knows where it is.
+/// A file that is read front to back, with its position.
 struct Source {
     path: PathBuf,
     file: BufReader<read::Source>,
     length: u64,
     at: u64,
-    /// Kind, number from 1 and announced count of the record being read.
+    /// Kind, number from 1 and total count of the current record.
     record: (&'static str, u64, u64),
 }
 
@@ -63,7 +63,6 @@ impl Source {
         Ok(values)
     }
 
-    /// Passes over `count` items of `size` bytes.
     fn skip(&mut self, count: u64, size: u64, what: &str) -> Result<()> {
         let left = self.length - self.at.min(self.length);
         let bytes = u128::from(count) * u128::from(size);
@@ -75,7 +74,6 @@ impl Source {
         Ok(())
     }
 
-    /// Text up to a zero byte.
     fn name(&mut self) -> Result<String> {
         let mut bytes = Vec::new();
         (&mut self.file).take(NAME_MAX).read_until(0, &mut bytes).map_err(Error::read(&self.path))?;
@@ -87,7 +85,7 @@ impl Source {
         Ok(name)
     }
 
-    /// Calls `record` for each of the records that the count in front announces.
+    /// Reads the count in front, then calls `record` for each record.
     fn records<T>(mut self, kind: &'static str, mut record: impl FnMut(&mut Self) -> Result<T>) -> Result<Vec<T>> {
         let count = self.u64()?;
         let mut all = Vec::new();
@@ -99,7 +97,6 @@ impl Source {
     }
 }
 
-/// Reads `cameras.bin`.
 pub(super) fn cameras(path: &Path) -> Result<Vec<CameraRecord>> {
     Source::open(path)?.records("camera", |source| {
         let (id, number) = (source.u32()?, source.u32()?);
@@ -115,7 +112,6 @@ pub(super) fn cameras(path: &Path) -> Result<Vec<CameraRecord>> {
     })
 }
 
-/// Reads `images.bin`.
 pub(super) fn images(path: &Path) -> Result<Vec<ImageRecord>> {
     Source::open(path)?.records("image", |source| {
         let id = source.u32()?;

@@ -1,7 +1,7 @@
 //! COLMAP sparse models: `cameras`, `images` and `points3D`, binary or text.
 //!
-//! Poses are camera-from-world with OpenCV axes, and COLMAP's pixel (0, 0) has its centre at (0.5, 0.5): both as
-//! here, so nothing is converted. The `rigs` and `frames` files of newer versions are not needed and not read.
+//! Poses are camera-from-world with OpenCV axes, and the centre of pixel (0, 0) is at (0.5, 0.5). Both conventions are
+//! ours, so nothing is converted. The `rigs` and `frames` files of newer versions are not read.
 
 mod binary;
 mod model;
@@ -16,16 +16,15 @@ use model::{CameraRecord, ImageRecord};
 use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
 
-/// Where a model may lie below the scene, in order of preference.
+/// Folders below the scene that may hold the model, in order of preference.
 const FOLDERS: [&str; 4] = ["sparse/0", "sparse", "colmap/sparse/0", "."];
 
-/// The three files of a model.
 struct Files {
     folder: PathBuf,
     extension: &'static str,
 }
 
-/// Finds a model below `root`; binary is preferred to text.
+/// Finds a model below `root`. Binary wins over text.
 fn find(root: &Path) -> Option<Files> {
     FOLDERS.iter().find_map(|folder| {
         let folder = root.join(folder);
@@ -36,7 +35,7 @@ fn find(root: &Path) -> Option<Files> {
     })
 }
 
-/// Reads the model of the scene, if it has one.
+/// Reads the model of the scene, if there is one.
 pub(crate) fn list(scene: &Place) -> Result<Option<Listing>> {
     let Some(files) = find(scene.root) else { return Ok(None) };
     let path = |stem: &str| files.folder.join(stem).with_extension(files.extension);
@@ -70,7 +69,6 @@ fn finite(mut points: Vec<Point>, notes: &mut Vec<String>) -> Vec<Point> {
     points
 }
 
-/// Gives each image its camera.
 fn join(
     scene: &Place,
     cameras_path: &Path,
@@ -117,7 +115,7 @@ fn listed(
     let quaternion = DQuat::from_xyzw(x, y, z, w);
     let length = quaternion.length();
     if !(length.is_finite() && length > 1e-9) {
-        return Err(Error::data(images_path, place, "its rotation is zero or not finite"));
+        return Err(Error::data(images_path, place, "has a rotation that is zero or not finite"));
     }
     let (mut camera, lens) = record.intrinsics(cameras_path)?;
     camera.rotation = DMat3::from_quat(quaternion.normalize());

@@ -1,4 +1,4 @@
-//! Records of a COLMAP model and what its camera models mean.
+//! Records of a COLMAP model, and its camera models.
 
 use crate::error::{Error, Result};
 use crate::io::lens::{self, CameraModel, Lens};
@@ -6,7 +6,7 @@ use crate::scene::Camera;
 use glam::{DMat3, DVec3};
 use std::path::Path;
 
-/// Names of the camera models by COLMAP's number.
+/// Names of the camera models; the index is COLMAP's number.
 pub(super) const NAMES: [&str; 12] = [
     "SIMPLE_PINHOLE",
     "PINHOLE",
@@ -34,14 +34,14 @@ pub(super) struct CameraRecord {
 /// A line of `images`, without its observations.
 pub(super) struct ImageRecord {
     pub(super) id: u32,
-    /// (w, x, y, z) of camera-from-world.
+    /// Camera-from-world rotation, (w, x, y, z).
     pub(super) quaternion: [f64; 4],
     pub(super) translation: [f64; 3],
     pub(super) camera: u32,
     pub(super) name: String,
 }
 
-/// The camera model of one of [`NAMES`]; an error for those that cannot be undone to a pinhole here.
+/// Returns the camera model of one of [`NAMES`]. Refuses models that cannot be undistorted to a pinhole.
 pub(super) fn model_of(path: &Path, place: &str, name: &str) -> Result<&'static CameraModel> {
     lens::model(name).ok_or_else(|| {
         let known: Vec<&str> = NAMES.into_iter().filter(|name| lens::model(name).is_some()).collect();
@@ -54,7 +54,7 @@ pub(super) fn model_of(path: &Path, place: &str, name: &str) -> Result<&'static 
 }
 
 impl CameraRecord {
-    /// Intrinsics with an identity pose, and the lens.
+    /// Returns the intrinsics, with an identity pose, and the lens.
     pub(super) fn intrinsics(&self, path: &Path) -> Result<(Camera, Lens)> {
         let place = format!("camera {}", self.id);
         let CameraModel { name, focals, coefficients, of_list, .. } = *self.model;

@@ -1,4 +1,4 @@
-//! The text files: a record a line, `#` starts a comment.
+//! The text files: one record per line; `#` starts a comment.
 
 use super::model::{CameraRecord, ImageRecord, NAMES, model_of};
 use crate::error::{Error, Result};
@@ -9,7 +9,7 @@ use std::io::BufRead;
 use std::path::Path;
 use std::str::FromStr;
 
-/// Lines with their numbers from 1.
+/// Reads the lines with their numbers from 1.
 fn lines(path: &Path) -> Result<impl Iterator<Item = Result<(usize, String)>>> {
     let file = read::open(path)?;
     let path = path.to_owned();
@@ -28,7 +28,7 @@ fn is_record(line: &str) -> bool {
     !line.is_empty() && !line.starts_with('#')
 }
 
-/// The words of a line, taken one by one.
+/// The words of a line, read one by one.
 struct Words<'a> {
     path: &'a Path,
     number: usize,
@@ -52,7 +52,7 @@ impl<'a> Words<'a> {
 
     fn number<T: FromStr>(&mut self, what: &str) -> Result<T> {
         let word = self.word(what)?;
-        word.parse().map_err(|_| self.error(format!("`{word}` is no {what}")))
+        word.parse().map_err(|_| self.error(format!("`{word}` is not a valid {what}")))
     }
 
     fn numbers<const N: usize>(&mut self, what: &str) -> Result<[f64; N]> {
@@ -64,7 +64,7 @@ impl<'a> Words<'a> {
     }
 }
 
-/// Reads a file with one record a line.
+/// Reads a file with one record per line.
 fn records<T>(path: &Path, read: impl Fn(Words) -> Result<T>) -> Result<Vec<T>> {
     let mut all = Vec::new();
     for line in lines(path)? {
@@ -76,7 +76,6 @@ fn records<T>(path: &Path, read: impl Fn(Words) -> Result<T>) -> Result<Vec<T>> 
     Ok(all)
 }
 
-/// Reads `cameras.txt`.
 pub(super) fn cameras(path: &Path) -> Result<Vec<CameraRecord>> {
     records(path, |mut words| {
         let (id, name) = (words.number("camera id")?, words.word("a camera model")?);
@@ -95,7 +94,7 @@ pub(super) fn cameras(path: &Path) -> Result<Vec<CameraRecord>> {
     })
 }
 
-/// Reads `images.txt`: two lines an image, the second with its observations, which may be empty.
+/// Reads `images.txt`: two lines per image, the second with its observations, possibly empty.
 pub(super) fn images(path: &Path) -> Result<Vec<ImageRecord>> {
     let mut all = Vec::new();
     let mut lines = lines(path)?;
@@ -108,7 +107,7 @@ pub(super) fn images(path: &Path) -> Result<Vec<ImageRecord>> {
         let id = words.number("image id")?;
         let (quaternion, translation) = (words.numbers("rotation")?, words.numbers("translation")?);
         let camera = words.number("camera id")?;
-        // The rest of the line is the name: it may hold spaces.
+        // The name is the rest of the line, because it may contain spaces.
         let name = words.rest.trim().to_owned();
         if name.is_empty() {
             return Err(words.error("the line ends where the image name is expected"));

@@ -1,4 +1,4 @@
-//! The first Gaussians of a scene: on its points, or where its cameras look if it has none.
+//! The first Gaussians of a scene: at its points, or in the space that its cameras see.
 
 mod random;
 mod region;
@@ -15,26 +15,26 @@ use std::num::NonZero;
 
 /// Opacity of a new Gaussian.
 const OPACITY: f64 = 0.1;
-/// Smallest mean squared distance to the neighbours (3DGS): world units squared, or squared extents of the scene where
-/// that is smaller than 1.
+/// Least mean squared distance to the neighbours (3DGS), world units squared; for scenes smaller than 1, squared scene
+/// extents.
 const DISTANCE2_MIN: f64 = 1e-7;
-/// Neighbours that decide the size of a Gaussian.
+/// Number of neighbours that decide the size of a Gaussian.
 const NEIGHBOURS: usize = 3;
-/// Largest standard deviation of a Gaussian on a point that was made up, as a part of the longer side of the image in
-/// the nearest camera that sees it. Points in the wide gaps before the cameras would cover whole pictures, and cost more
-/// than all others together; half of this costs quality at first.
+/// Largest standard deviation of a Gaussian at a random point, as a share of the longer image side in the nearest
+/// camera that sees it. Random points in wide gaps before the cameras would otherwise cover whole pictures and cost
+/// more than all others together. Half of this value lowers the early quality.
 const SIZE_MAX: f64 = 0.02;
-/// With fewer points a scene counts as one without points.
+/// Fewest points; a scene with fewer counts as one without points.
 const POINTS_MIN: usize = 16;
-/// A sensible number of Gaussians for a scene without points.
+/// Default number of Gaussians for a scene without points.
 pub const RANDOM_COUNT: usize = 50_000;
 
-/// Gaussians to start training from: SH degree 3 with only the constant colour set, opacity 0.1, no rotation, the
-/// same size in all directions, namely the root mean square distance to the three nearest neighbours, no labels.
+/// Makes the initial Gaussians: SH degree 3 with only the constant colour set, opacity 0.1, no rotation, isotropic, no
+/// labels. The standard deviation is the root mean square distance to the three nearest neighbours.
 ///
-/// They stand on the points of the scene. Without points (or with fewer than 16), `count_if_no_points` of them are
-/// placed where the training cameras look and, with photos, where the photos agree on a colour; none is then larger
-/// than a fiftieth of a picture.
+/// There is one Gaussian per point of the scene. A scene with fewer than 16 points gets `count_if_no_points` Gaussians
+/// in the space that the training cameras see, if possible where the photos agree on a colour; none is then larger than
+/// a fiftieth of a picture.
 pub fn initial_gaussians(dataset: &Dataset, seed: u64, count_if_no_points: usize) -> Result<Gaussians> {
     if dataset.points.len() >= POINTS_MIN {
         check_seen(dataset)?;
@@ -50,23 +50,23 @@ pub fn initial_gaussians(dataset: &Dataset, seed: u64, count_if_no_points: usize
     Ok(from_points(&points, &distances2, dataset.extent()))
 }
 
-/// Refuses points of which no camera sees any: nothing would ever be drawn, and nothing learnt.
+/// Refuses a scene in which no camera sees a point: nothing would be drawn or learnt.
 fn check_seen(dataset: &Dataset) -> Result<()> {
     let seen = |point: &Point| dataset.train.iter().any(|view| region::sees(&view.camera, point.position).is_some());
     if dataset.train.is_empty() || dataset.points.par_iter().any(seen) {
         return Ok(());
     }
     let problem = format!(
-        "none of the {} points is in the picture of any of {} training cameras: poses are of another kind than the \
-         format says (world-to-camera for camera-to-world, or other axes), or the points belong to another scene; \
-         without points training would start anywhere before the cameras",
+        "none of the {} points is in the image of any of {} training cameras: the poses follow another convention than \
+         the format (world-to-camera for camera-to-world, or other axes), or the points belong to another scene; \
+         without the points, training starts from random ones before the cameras",
         dataset.points.len(),
         dataset.train.len()
     );
     Err(Error::data(&dataset.root, "points", problem))
 }
 
-/// One Gaussian per point, in their order; `distances2` are their squared sizes.
+/// Makes one Gaussian per point, in order. `distances2` has the squared standard deviations.
 fn from_points(points: &[Point], distances2: &[f64], extent: f64) -> Gaussians {
     let least = DISTANCE2_MIN * extent.min(1.0).powi(2);
     let logit = (OPACITY / (1.0 - OPACITY)).ln() as f32;
@@ -88,12 +88,12 @@ fn from_points(points: &[Point], distances2: &[f64], extent: f64) -> Gaussians {
     gaussians
 }
 
-/// Mean squared distance of each point to its three nearest neighbours; to fewer where there are fewer, and a
-/// hundredth of the scene for a lone point.
+/// Returns the mean squared distance of each point to its three nearest neighbours, or to all others if there are
+/// fewer. A single point gets a hundredth of the scene extent.
 fn neighbour_distances2(points: &[Point], extent: f64) -> Result<Vec<f64>> {
     let positions: Vec<[f64; 3]> = points.iter().map(|point| point.position.to_array()).collect();
     let nearest = NEIGHBOURS.min(positions.len().saturating_sub(1));
-    // One more than wanted, because a point is its own nearest neighbour.
+    // One more neighbour, because each point finds itself.
     let Some(asked) = NonZero::new(nearest + 1).filter(|_| nearest > 0) else {
         return Ok(vec![(extent * 0.01).powi(2); positions.len()]);
     };
@@ -101,7 +101,7 @@ fn neighbour_distances2(points: &[Point], extent: f64) -> Result<Vec<f64>> {
         .map_err(|error| Error::Bug(format!("the k-d tree of the points failed: {error:?}")))?;
     let mean = |(index, position): (usize, &[f64; 3])| {
         let found = tree.query(position).nearest_n::<SquaredEuclidean<f64>>(asked).execute();
-        // Among many points at one place the point itself may be missing from the answer.
+        // With many points at one place, a point may not find itself.
         let others = found.iter().filter(|item| item.item as usize != index).take(nearest);
         others.map(|item| item.distance).sum::<f64>() / nearest as f64
     };

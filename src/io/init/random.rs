@@ -1,12 +1,12 @@
-//! Points for a scene that has none.
+//! Points for a scene without points.
 //!
-//! Where the border of the photos has one colour throughout (a synthetic scene over a plain background), candidates
-//! are drawn evenly in the ball that the cameras see in common, and one that is seen in the background colour is free
-//! space: what remains is the visual hull. A point gets the mean colour of the pixels it falls on.
+//! Some scenes have photos with a border of one colour (synthetic scenes over a plain background). Candidates are then
+//! drawn evenly in the ball that all cameras see. A candidate that a photo shows in the background colour is in free
+//! space; the remaining ones fill the visual hull. The colour of a point is the mean over its pixels.
 //!
-//! Elsewhere four of five points come from [`sweep`](super::sweep), which finds the depth of random pixels, and the
-//! rest, even in inverse depth, from anywhere before the cameras. All are seen by three training cameras where there
-//! are as many. Without photos every place before the cameras is as good and colours are random.
+//! In other scenes four of five points come from [`sweep`](super::sweep), which finds the depth of random pixels. The
+//! others lie anywhere before the cameras, evenly in inverse depth. Three training cameras see each point if possible.
+//! Without photos all places before the cameras are equal, and colours are random.
 
 use super::region::{self, Region};
 use super::sweep::Sweep;
@@ -18,29 +18,32 @@ use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use rayon::prelude::*;
 
-/// Candidates are drawn in batches; after this many batches without enough points the tests are eased.
+/// Number of batches of candidates without enough points before the tests are relaxed.
 const BATCHES: usize = 24;
-/// Part of the points that may lie anywhere before the cameras, if photos tell where most should.
+/// Share of the points that may lie anywhere before the cameras if photos place the others.
 const ANYWHERE: f64 = 0.2;
-/// Colour difference up to which a pixel counts as background.
+/// Largest colour difference from the background for a background pixel.
 const BACKGROUND_TOLERANCE: u8 = 3;
-/// Views whose border is looked at.
+/// Number of views whose border is examined.
 const BORDER_VIEWS: usize = 40;
 
-/// What a candidate must pass.
 struct Test<'a> {
     views: &'a [View],
-    /// Cameras that must see it.
+    /// Number of cameras that must see the candidate.
     seen_by: usize,
-    /// Colour of free space.
+    /// Colour of the background.
     backdrop: Option<[u8; 3]>,
 }
 
-/// `count` points, the same for the same seed and scene.
+/// Returns `count` points: the same for the same seed and scene.
 pub(super) fn points(dataset: &Dataset, seed: u64, count: usize) -> Result<Vec<Point>> {
     let views = &dataset.train;
     if views.is_empty() {
-        return Err(Error::data(&dataset.root, "", "has neither points nor training views to place Gaussians by"));
+        return Err(Error::data(
+            &dataset.root,
+            "",
+            "has neither points nor training views, which place the first Gaussians",
+        ));
     }
     let region = region::find(views, dataset.extent());
     let mut test = Test { views, seen_by: views.len().min(3), backdrop: backdrop(views) };
@@ -50,7 +53,7 @@ pub(super) fn points(dataset: &Dataset, seed: u64, count: usize) -> Result<Vec<P
         let found = Sweep::new(views, region.depths()).points(&mut random, count);
         points.extend(found.into_iter().take(((1.0 - ANYWHERE) * count as f64) as usize));
     }
-    // The tests are eased until they leave enough: no free space, then two cameras, one, none.
+    // Relax the tests until enough points pass: first free space, then two cameras, one, none.
     loop {
         for _ in 0..BATCHES {
             if points.len() >= count {
@@ -69,7 +72,7 @@ pub(super) fn points(dataset: &Dataset, seed: u64, count: usize) -> Result<Vec<P
     }
 }
 
-/// A point with a random colour: in the ball if there is one and nothing around it, else before some camera.
+/// Draws a point with a random colour: in the ball if there is one over a plain background, else before some camera.
 fn candidate(random: &mut Pcg64Mcg, views: &[View], region: Region, plain: bool) -> Point {
     let colour = random.random::<[u8; 3]>();
     let position = match region {
@@ -92,7 +95,7 @@ fn in_unit_ball(random: &mut Pcg64Mcg) -> DVec3 {
     }
 }
 
-/// A point in some pixel of `camera`, evenly in inverse depth between two depths.
+/// Draws a point in a random pixel of `camera`, evenly in inverse depth between two depths.
 fn ahead(random: &mut Pcg64Mcg, camera: &Camera, (near, far): (f64, f64)) -> DVec3 {
     let pixel = DVec2::new(
         random.random_range(0.0..f64::from(camera.width)),
@@ -103,7 +106,7 @@ fn ahead(random: &mut Pcg64Mcg, camera: &Camera, (near, far): (f64, f64)) -> DVe
 }
 
 impl Test<'_> {
-    /// The point with its colour, if it passes.
+    /// Returns the point with its colour if it passes the test.
     fn judge(&self, point: Point) -> Option<Point> {
         let (mut seen, mut coloured, mut free, mut sum) = (0, 0u32, 0, [0u32; 3]);
         for view in self.views {
@@ -114,7 +117,7 @@ impl Test<'_> {
             (0..3).for_each(|channel| sum[channel] += u32::from(texel[channel]));
             free += u32::from(self.backdrop.is_some_and(|backdrop| near(texel, backdrop)));
         }
-        // A part of a dark subject may have the colour of the background now and then, free space has it soon.
+        // Some pixels of a dark subject may have the colour of the background, so a few are accepted.
         if seen < self.seen_by || free * 10 > coloured {
             return None;
         }
@@ -128,7 +131,7 @@ fn near(a: [u8; 3], b: [u8; 3]) -> bool {
     a.iter().zip(b).all(|(&a, b)| a.abs_diff(b) <= BACKGROUND_TOLERANCE)
 }
 
-/// The colour of nine tenths of the border pixels of some views, if there is one.
+/// Returns the colour of nine tenths of the border pixels of some views, if there is one.
 fn backdrop(views: &[View]) -> Option<[u8; 3]> {
     let mut border: Vec<[u8; 3]> = Vec::new();
     for photo in views.iter().step_by(views.len() / BORDER_VIEWS + 1).filter_map(|view| view.photo.as_ref()) {

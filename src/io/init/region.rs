@@ -1,32 +1,32 @@
-//! Where the cameras of a scene look.
+//! The region that the cameras of a scene see.
 
 use crate::scene::{Camera, View};
 use glam::{DMat3, DVec2, DVec3};
 
-/// The space that is worth filling with Gaussians.
+/// The region to fill with Gaussians.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Region {
-    /// Cameras around a subject: the ball around the point nearest to all optical axes that the typical
-    /// camera sees whole.
+    /// For cameras around a subject: a ball around the point nearest to all optical axes. The typical camera sees it
+    /// completely.
     Ball {
-        /// World position.
+        /// Centre, world position.
         centre: DVec3,
-        /// World units.
+        /// Radius, world units.
         radius: f64,
         /// Typical distance of a camera from the centre, world units.
         distance: f64,
     },
-    /// Cameras that look the same way, or outwards: what lies before them between two depths.
+    /// For cameras with parallel or outward axes: the space before them between two depths.
     Frusta {
-        /// World units.
+        /// Smallest depth, world units.
         near: f64,
-        /// World units.
+        /// Largest depth, world units.
         far: f64,
     },
 }
 
 impl Region {
-    /// Depths before a camera between which the scene lies.
+    /// Returns the range of depths of the scene before a camera.
     pub(super) fn depths(&self) -> (f64, f64) {
         match *self {
             Self::Ball { radius, distance, .. } => (0.4 * distance, 5.0 * (distance + radius)),
@@ -35,7 +35,7 @@ impl Region {
     }
 }
 
-/// The pixel of `camera` that shows `point`, if its image has one.
+/// Returns the pixel of `camera` at which `point` appears, if it is in the image.
 pub(super) fn sees(camera: &Camera, point: DVec3) -> Option<DVec2> {
     let at = camera.to_camera(point);
     let pixel = camera.project(at);
@@ -45,8 +45,8 @@ pub(super) fn sees(camera: &Camera, point: DVec3) -> Option<DVec2> {
     inside.then_some(pixel)
 }
 
-/// What the longer side of an image spans at `point`, world units, in the view where that is least; infinite where no
-/// view sees the point.
+/// Returns the smallest extent of the longer image side at `point` over all views that see it, world units; infinite if
+/// none does.
 pub(super) fn image_side(views: &[View], point: DVec3) -> f64 {
     let side = |camera: &Camera| {
         let sizes = DVec2::new(f64::from(camera.width) / camera.fx, f64::from(camera.height) / camera.fy);
@@ -55,18 +55,18 @@ pub(super) fn image_side(views: &[View], point: DVec3) -> f64 {
     views.iter().filter_map(|view| side(&view.camera)).fold(f64::INFINITY, f64::min)
 }
 
-/// The world point at `depth` behind `pixel`.
+/// Returns the world point at `depth` behind `pixel`.
 pub(super) fn unproject(camera: &Camera, pixel: DVec2, depth: f64) -> DVec3 {
     let ray = DVec3::new((pixel.x - camera.cx) / camera.fx, (pixel.y - camera.cy) / camera.fy, 1.0);
     camera.rotation.transpose() * (ray * depth - camera.translation)
 }
 
-/// Direction of the optical axis in world space.
+/// Returns the direction of the optical axis in world space.
 pub(super) fn axis(camera: &Camera) -> DVec3 {
     camera.rotation.transpose() * DVec3::Z
 }
 
-/// Sine of the angle from the optical axis to the nearest edge of the image.
+/// Returns the sine of the angle from the optical axis to the nearest edge of the image.
 fn narrow_sine(camera: &Camera) -> f64 {
     let side = |f: f64, c: f64, size: u32| c.min(f64::from(size) - c).max(0.0) / f;
     let tangent = side(camera.fx, camera.cx, camera.width).min(side(camera.fy, camera.cy, camera.height));
@@ -85,17 +85,17 @@ pub(super) fn find(views: &[View], extent: f64) -> Region {
         let inward = cameras.iter().filter(|camera| sees(camera, centre).is_some()).count();
         let radius = median(cameras.iter().map(|c| c.centre().distance(centre) * narrow_sine(c)).collect());
         let distance = median(cameras.iter().map(|c| c.centre().distance(centre)).collect());
-        // Cameras at one place that turn are a rounding apart, which is no distance.
+        // Rotating cameras at one place differ only by rounding errors, which give no distance.
         if inward * 4 >= cameras.len() * 3 && radius > 1e-6 * extent {
             return Region::Ball { centre, radius, distance };
         }
     }
-    // Nothing tells the depth of the scene but the spread of the cameras. Between one and fifty times that, evenly in
-    // inverse depth, the shift of a point between the photos grows evenly too.
+    // Only the spread of the cameras gives a scale. Depths are 1 to 50 times that, evenly in inverse depth, so that the
+    // parallax grows evenly too.
     Region::Frusta { near: extent, far: 50.0 * extent }
 }
 
-/// The point with the least sum of squared distances to the optical axes, if they determine it well.
+/// Returns the point with the least sum of squared distances to the optical axes, if it is well determined.
 fn nearest_to_axes(cameras: &[&Camera]) -> Option<DVec3> {
     let (mut matrix, mut right) = (DMat3::ZERO, DVec3::ZERO);
     for camera in cameras {
@@ -107,6 +107,7 @@ fn nearest_to_axes(cameras: &[&Camera]) -> Option<DVec3> {
     }
     matrix *= 1.0 / cameras.len().max(1) as f64;
     right /= cameras.len().max(1) as f64;
-    // The matrix has trace 2 and, for parallel axes, determinant 0; axes 6 degrees around a common one give 0.01.
+    // The matrix has trace 2. Its determinant is 0 for parallel axes and 0.01 for axes within 6 degrees of a common
+    // one.
     (matrix.determinant() > 0.01).then(|| matrix.inverse() * right)
 }

@@ -1,7 +1,7 @@
-//! Depths of random pixels: the depth at which the other photos show the same colour.
+//! Depths of random pixels: the depth at which other photos show the same colour.
 //!
-//! A plain plane sweep without windows or smoothing. Most of its points lie near a surface, which is all that the
-//! first Gaussians need; training moves the others or removes them.
+//! It is a plane sweep without windows or smoothing. Most points end up near a surface, which is enough for the first
+//! Gaussians: training moves or removes the others.
 
 use super::region::{sees, unproject};
 use super::texel::texel;
@@ -12,15 +12,15 @@ use rand::Rng;
 use rand_pcg::Pcg64Mcg;
 use rayon::prelude::*;
 
-/// Longest side of the photos compared, px: small enough that neighbouring depths are about a pixel apart.
+/// Longest side of the compared photos, px: neighbouring depths are about a pixel apart.
 const LONGEST: u32 = 160;
-/// Depths tried for a pixel, even in inverse depth.
+/// Number of depths per pixel, even in inverse depth.
 const DEPTHS: u32 = 48;
-/// Difference from which on a pixel counts as unrelated: hidden, or of another surface.
+/// Colour difference of a pixel that counts as unrelated: hidden, or of another surface.
 const UNRELATED: u32 = 48 * 3;
-/// Photos that a pixel is compared with, at most.
+/// Most photos to compare a pixel with.
 const COMPARED: usize = 24;
-/// Tries for a point until the search is given up.
+/// Most tries per point.
 const TRIES: usize = 3;
 
 /// Small photos with their cameras.
@@ -30,7 +30,7 @@ pub(super) struct Sweep {
 }
 
 impl Sweep {
-    /// `depths` are the nearest and the farthest.
+    /// Makes the sweep; `depths` are the smallest and the largest depth.
     pub(super) fn new(views: &[View], depths: (f64, f64)) -> Self {
         let small = |view: &View| {
             let photo = view.photo.as_ref()?;
@@ -40,7 +40,7 @@ impl Sweep {
         Self { photos: views.iter().filter_map(small).collect(), depths }
     }
 
-    /// At most `count` points: one behind each of so many random pixels, where three photos show it.
+    /// Returns at most `count` points: one behind each random pixel that three photos agree on.
     pub(super) fn points(&self, random: &mut Pcg64Mcg, count: usize) -> Vec<Point> {
         let mut points = Vec::new();
         if self.photos.len() < 2 {
@@ -57,7 +57,7 @@ impl Sweep {
         points
     }
 
-    /// A photo, a position in it and where between two depths the sweep begins.
+    /// Draws a photo, a position in it, and the offset of the first depth.
     fn pixel(&self, random: &mut Pcg64Mcg) -> (usize, DVec2, f64) {
         let index = random.random_range(0..self.photos.len());
         let camera = &self.photos[index].0;
@@ -83,11 +83,11 @@ impl Sweep {
         costs.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, point)| point)
     }
 
-    /// Mean difference to the photos that see the point, if at least `others` do.
+    /// Returns the mean difference to the photos that see the point, if they are at least `others`.
     fn difference(&self, own: usize, point: &Point, others: usize) -> Option<f64> {
         let (mut sum, mut seen) = (0, 0);
         let step = self.photos.len().div_ceil(COMPARED);
-        // Beginning at the own photo spreads the compared ones evenly over all.
+        // Start at the own photo, so that the compared photos vary evenly.
         let compared = (own % step..self.photos.len()).step_by(step).filter(|&index| index != own);
         for (camera, photo) in compared.map(|index| &self.photos[index]) {
             let Some(texel) = sees(camera, point.position).and_then(|pixel| texel(photo, pixel)) else { continue };

@@ -1,9 +1,9 @@
-//! What a photo shows at a point.
+//! Colours of a photo at points.
 
 use crate::scene::Photo;
 use glam::DVec2;
 
-/// Colour of the pixel that a point (px) lies in, if the photo has one there.
+/// Returns the colour of the pixel at a point (px), if the photo has one there.
 pub(super) fn texel(photo: &Photo, pixel: DVec2) -> Option<[u8; 3]> {
     let [r, g, b, valid] = photo.rgba[pixel.y as usize * photo.width as usize + pixel.x as usize];
     (valid == 255).then_some([r, g, b])

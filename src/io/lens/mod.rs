@@ -1,7 +1,7 @@
-//! Lens distortion: where a pixel of the ideal pinhole image lies in the photo.
+//! Lens distortion: the position in the photo of a pixel of the ideal pinhole image.
 //!
-//! A lens is a file with its coefficients, how they are read, and how they bend rays ([`Distortion`]); then a kind of
-//! [`Lens`], and in [`MODELS`] the names that files have for it.
+//! To add a lens, add a file with its coefficients, their parsing and its [`Distortion`], a variant of [`Lens`], and
+//! its names in `MODELS`.
 
 mod distortion;
 mod polynomial;
@@ -12,15 +12,15 @@ pub use polynomial::Polynomial;
 /// The lens of a photo.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Lens {
-    /// None that would have to be undone.
+    /// No distortion.
     #[default]
     Pinhole,
-    /// OpenCV's radial and tangential distortion.
+    /// Radial and tangential distortion of OpenCV.
     Polynomial(Polynomial),
 }
 
 impl Lens {
-    /// What it does to rays; nothing for a pinhole.
+    /// Returns the distortion; none for a pinhole.
     pub fn distortion(&self) -> Option<&dyn Distortion> {
         match self {
             Self::Pinhole => None,
@@ -28,7 +28,7 @@ impl Lens {
         }
     }
 
-    /// True if nothing has to be undone.
+    /// Returns true for a lens without distortion.
     pub fn is_pinhole(&self) -> bool {
         self.distortion().is_none()
     }
@@ -40,19 +40,19 @@ impl From<Polynomial> for Lens {
     }
 }
 
-/// A camera model that files name, and its parameters there.
+/// A camera model as files name it, with its parameters.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct CameraModel {
-    /// COLMAP's name.
+    /// Name in COLMAP.
     pub(crate) name: &'static str,
-    /// Focal lengths that COLMAP lists: 1, or 2 for x and y. The principal point follows.
+    /// Number of focal lengths in COLMAP's list: 1, or 2 for x and y. The principal point follows.
     pub(crate) focals: usize,
-    /// Coefficients of the lens that COLMAP lists behind them.
+    /// Number of lens coefficients after them.
     pub(crate) coefficients: usize,
-    /// The lens of that list.
+    /// Makes the lens from that list.
     pub(crate) of_list: fn(&[f64]) -> Lens,
-    /// The lens of coefficients by their names in `transforms.json`, 0 for those it lacks; `None` where it has no such
-    /// model.
+    /// Makes the lens from the named coefficients of `transforms.json`, 0 for missing ones; `None` if that format lacks
+    /// the model.
     pub(crate) of_names: Option<fn(&dyn Fn(&str) -> f64) -> Lens>,
 }
 
@@ -65,7 +65,7 @@ const fn polynomial(name: &'static str, focals: usize, coefficients: usize) -> C
     CameraModel { name, focals, coefficients, of_list, of_names: Some(|value| Polynomial::of_names(value).into()) }
 }
 
-/// The camera models that can be undone to a pinhole.
+/// The camera models that can be undistorted to a pinhole.
 pub(crate) const MODELS: [CameraModel; 6] = [
     pinhole("PINHOLE", 2),
     pinhole("SIMPLE_PINHOLE", 1),
@@ -75,7 +75,6 @@ pub(crate) const MODELS: [CameraModel; 6] = [
     CameraModel { of_names: None, ..polynomial("FULL_OPENCV", 2, 8) },
 ];
 
-/// The camera model of a name.
 pub(crate) fn model(name: &str) -> Option<&'static CameraModel> {
     const ALL: &[CameraModel] = &MODELS;
     ALL.iter().find(|model| model.name == name)

@@ -1,31 +1,31 @@
-//! OpenCV's lens.
+//! The lens model of OpenCV.
 
 use super::distortion::Distortion;
 use glam::DVec2;
 
-/// OpenCV's radial and tangential model; all zero is a pinhole.
+/// Radial and tangential distortion of OpenCV; with all coefficients 0 a pinhole.
 ///
-/// With (x, y) on the plane z = 1 and r the distance from the axis, the ray is bent to
-/// (x, y) (1 + n1 r^2 + n2 r^4 + n3 r^6 + n4 r^8) / (1 + d1 r^2 + d2 r^4 + d3 r^6) plus the tangential part.
+/// A point (x, y) on the plane z = 1 with distance r from the axis moves to (x, y) (1 + n1 r^2 + n2 r^4 + n3 r^6 + n4
+/// r^8) / (1 + d1 r^2 + d2 r^4 + d3 r^6) plus the tangential part.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Polynomial {
-    /// Numerator: k1, k2, k3 of OpenCV and a term in r^8 that nerfstudio calls k4.
+    /// Numerator: k1, k2 and k3 of OpenCV, and the factor of r^8 that nerfstudio calls k4.
     pub numerator: [f64; 4],
-    /// Denominator: k4, k5, k6 of OpenCV's full model.
+    /// Denominator: k4, k5 and k6 of OpenCV's full model.
     pub denominator: [f64; 3],
-    /// p1, p2.
+    /// Tangential part: p1 and p2.
     pub tangential: [f64; 2],
 }
 
 impl Polynomial {
-    /// As COLMAP lists the coefficients: k1 k2 p1 p2 k3 k4 k5 k6, or the first of them.
+    /// Reads COLMAP's list: k1 k2 p1 p2 k3 k4 k5 k6, or the first of them.
     pub(super) fn of_list(list: &[f64]) -> Self {
         let at = |index: usize| list.get(index).copied().unwrap_or(0.0);
         let (numerator, denominator) = ([at(0), at(1), at(4), 0.0], [at(5), at(6), at(7)]);
         Self { numerator, denominator, tangential: [at(2), at(3)] }
     }
 
-    /// As `transforms.json` names them.
+    /// Reads the names of `transforms.json`.
     pub(super) fn of_names(value: &dyn Fn(&str) -> f64) -> Self {
         let numerator = ["k1", "k2", "k3", "k4"].map(value);
         Self { numerator, denominator: [0.0; 3], tangential: ["p1", "p2"].map(value) }

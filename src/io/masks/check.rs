@@ -1,28 +1,28 @@
-//! What looks wrong in masks, by comparing each with those of the other photos. No files in here.
+//! Checks of masks, by comparison with the masks of the other photos. This module reads no files.
 
 use crate::scene::{Camera, LabelMap, Point};
 use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Share of the border of a picture above which an object surrounds the picture. A little less than all, because the
-/// true object may itself touch the border.
+/// Share of the image border above which an object surrounds the image. It is a little below 1, because the true object
+/// may touch the border.
 pub(crate) const INVERTED_BORDER: f64 = 0.9;
-/// Share of a picture above which an object covers most of it. Objects of interest rarely do; their surroundings always.
+/// Share of the image above which an object covers most of it. Objects of interest rarely do; backgrounds always do.
 pub(crate) const INVERTED_SHARE: f64 = 0.5;
-/// Border share up to which the same id in the other masks counts as not surrounding them.
+/// Border share up to which an id in the other masks does not surround the image.
 pub(crate) const INVERTED_ELSEWHERE: f64 = 0.5;
-/// A mask with less than this part of the usual labelled area is nearly empty: distance and the edge of the picture
-/// change areas by a few times, lost tracks leave nothing or specks.
+/// Labelled area relative to the median below which a mask is nearly empty. Distance and image borders change areas by
+/// small factors; lost tracks leave nothing or specks.
 pub(crate) const EMPTY_MASK: f64 = 0.05;
-/// The same for one object. Lower, because an object may truly show a sliver from behind another.
+/// The same for one object. It is lower, because an object may really show a sliver behind another.
 pub(crate) const EMPTY_OBJECT: f64 = 0.005;
-/// Masks that must show an object before one of them is compared with their median.
+/// Fewest masks with an object before one of them is compared with their median.
 pub(crate) const VIEWS_FOR_MEDIAN: usize = 4;
-/// Share of the picture that both neighbours must show of an object for its absence between them to count; less may
-/// truly vanish.
+/// Least share of the image that an object has in both neighbours for its absence between them to count. Smaller
+/// objects may really disappear.
 pub(crate) const BLINK_SHARE: f64 = 0.002;
 
-/// What can be wrong.
+/// A kind of problem in masks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Problem {
@@ -30,22 +30,22 @@ pub enum Problem {
     Missing,
     /// A file belongs to no photo.
     Misnamed,
-    /// No scale makes the mask the size of the photo.
+    /// No scale brings the mask to the size of the photo.
     Missized,
-    /// The file holds no ids.
+    /// The file is no id mask.
     Unreadable,
-    /// Object and surroundings look swapped.
+    /// Object and background look swapped.
     Inverted,
     /// Much less is labelled than in the other masks.
     NearlyEmpty,
-    /// An id is in one mask only.
+    /// Only one mask has the id.
     SingleView,
-    /// An id is absent between two masks that show it.
+    /// An id is absent between two masks that have it.
     Blink,
 }
 
 impl Problem {
-    /// Name for people.
+    /// Returns the display name.
     pub fn text(self) -> &'static str {
         match self {
             Self::Missing => "missing",
@@ -60,39 +60,38 @@ impl Problem {
     }
 }
 
-/// One thing that looks wrong.
+/// A suspicious mask or object.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 pub struct Finding {
-    /// Its kind.
+    /// Kind of problem.
     pub problem: Problem,
-    /// The photo, if it is about one.
+    /// Name of the photo, if the problem is about one.
     pub view: Option<String>,
-    /// The object, if it is about one.
+    /// Id of the object, if the problem is about one.
     pub id: Option<u32>,
-    /// What was found.
+    /// Description.
     pub text: String,
 }
 
-/// Pixels of one object in one mask.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 struct Area {
     pixels: u64,
     border: u64,
 }
 
-/// What the rules need of one mask.
+/// The measurements of a mask that the checks need.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Look {
     pixels: u64,
     border: u64,
     objects: BTreeMap<u16, Area>,
-    /// The id at the projection of each point of the scene; `None` outside the picture.
+    /// Id at the projection of each point of the scene; `None` outside the image.
     at_points: Vec<Option<u16>>,
 }
 
 impl Look {
-    /// Measures a mask. `camera` is that of the photo, at any scale; lens distortion is ignored, for the question is
-    /// only what is about where.
+    /// Measures a mask. `camera` is that of the photo, at any scale. Lens distortion is ignored, because positions need
+    /// only be approximate.
     pub fn new(map: &LabelMap, camera: &Camera, points: &[Point]) -> Self {
         let mut objects: BTreeMap<u16, Area> = BTreeMap::new();
         for run in map.ids.chunk_by(|a, b| a == b).filter(|run| run[0] != 0) {
@@ -121,7 +120,7 @@ impl Look {
         Self { pixels: map.ids.len() as u64, border, objects, at_points: points.iter().map(at).collect() }
     }
 
-    /// The ids that occur.
+    /// Returns the ids in the mask.
     pub fn ids(&self) -> impl Iterator<Item = u32> {
         self.objects.keys().map(|&id| u32::from(id))
     }
@@ -139,7 +138,7 @@ impl Look {
     }
 }
 
-/// What looks wrong in these masks, given with the names of their photos in the order of these names.
+/// Checks masks, given with the names of their photos and sorted by name.
 pub fn findings(masks: &[(&str, &Look)]) -> Vec<Finding> {
     let ids: BTreeSet<u16> = masks.iter().flat_map(|(_, look)| look.objects.keys().copied()).collect();
     let mut found = nearly_empty_masks(masks);
@@ -166,8 +165,8 @@ fn percent(share: f64) -> String {
     format!("{:.2} %", share * 100.0)
 }
 
-/// An id that surrounds and fills the picture, and does not surround the other masks or is the only id at all: a scene
-/// has one floor or wall in most views, but an object that is all around in one photo is its surroundings.
+/// Finds masks in which an id surrounds and fills the image, although it does not in the other masks or is the only id.
+/// A scene has one floor or wall in most views; an object that is all around in one photo only is its background.
 fn inverted(masks: &[(&str, &Look)], id: u16, only: bool) -> Vec<Finding> {
     let with: Vec<&(&str, &Look)> = masks.iter().filter(|(_, look)| look.objects.contains_key(&id)).collect();
     let surrounds = |look: &Look| look.border_share(id) >= INVERTED_BORDER && look.share(id) >= INVERTED_SHARE;
@@ -219,9 +218,9 @@ fn single_view(masks: &[(&str, &Look)], id: u16) -> Option<Finding> {
     (masks.len() > 1 && with.next().is_none()).then(|| finding(Problem::SingleView, name, Some(id), text()))
 }
 
-/// Absence in one mask between neighbours by name that both show the object. Points of the scene that lie on the
-/// object in both neighbours excuse it: if none of them falls into the picture, or if most of those that do fall on
-/// other objects that both neighbours show too, behind which it may be hidden.
+/// Finds masks without an object between two neighbours by name that both show it. Points of the scene that lie on the
+/// object in both neighbours can excuse the absence: either none of them is in the image, or most of those in the image
+/// are on other objects that both neighbours show too and that may hide the object.
 fn blinks(masks: &[(&str, &Look)], id: u16) -> Vec<Finding> {
     let shown = |look: &Look| look.share(id) >= BLINK_SHARE;
     let blinking = masks.windows(3).filter(|three| {
@@ -240,6 +239,6 @@ fn excused(before: &Look, between: &Look, after: &Look, id: u16) -> bool {
     let inside: Vec<u16> = between.iter().copied().flatten().collect();
     let known = |other: &&u16| before.objects.contains_key(other) && after.objects.contains_key(other);
     let behind = inside.iter().filter(known).count();
-    // Without any point on the object nothing speaks for it.
+    // Without a point on the object there is no excuse.
     !between.is_empty() && (inside.is_empty() || behind * 2 > inside.len())
 }

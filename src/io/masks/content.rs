@@ -1,4 +1,4 @@
-//! From the samples of a PNG to source ids, or to black and white.
+//! Converts the samples of a PNG to source ids, or to black and white.
 
 use crate::error::{Error, Result};
 use crate::io::mask::{Header, Raw, read_raw};
@@ -6,18 +6,14 @@ use png::{BitDepth, ColorType};
 use std::collections::BTreeSet;
 use std::path::Path;
 
-/// What ids a PNG can hold, by its header.
+/// The kind of ids in a PNG, from its header.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Kind {
-    /// Grey of up to 8 bits.
     Grey8,
-    /// Grey of 16 bits.
     Grey16,
-    /// Indices.
     Palette,
-    /// Three bytes.
     Rgb,
-    /// Anything with transparency or 16-bit colours: never ids.
+    /// Transparency or 16-bit colours: no ids.
     Other,
 }
 
@@ -43,14 +39,14 @@ impl Kind {
     }
 }
 
-/// An id per pixel as the source numbers them.
+/// Ids of the source, one per pixel.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct SourceIds {
     pub(super) size: (u32, u32),
     pub(super) ids: Vec<u32>,
 }
 
-/// Reads ids from a PNG of the kind `expected`: its value or index, or R + 256 G + 65536 B.
+/// Reads ids from a PNG of the kind `expected`: value, index, or R + 256 G + 65536 B.
 pub(super) fn read_ids(
     path: &Path,
     expected: Kind,
@@ -79,20 +75,19 @@ pub(super) fn read_ids(
     Ok(SourceIds { size: raw.header.size, ids })
 }
 
-/// A black and white mask.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Binary {
     pub(super) size: (u32, u32),
-    /// Pixels of the object.
+    /// True for pixels of the object, row-major.
     pub(super) inside: Vec<bool>,
-    /// Different values of its pixels, 0 among them or not.
+    /// Number of distinct values, 0 included if present.
     pub(super) values: usize,
-    /// True if the pixels have one value besides 0, so that nothing had to be cut.
+    /// True if the pixels have only one value besides 0, so that no threshold was needed.
     pub(super) sharp: bool,
 }
 
-/// Reads a black and white PNG of any kind. With one value besides 0, that is the object; with more, the upper half
-/// of the range is, as the scorers of LERF-Mask cut it.
+/// Reads a black and white PNG of any kind. If there is one value besides 0, it is the object. If there are more, the
+/// object is the upper half of the range, as in the scorers of LERF-Mask.
 pub(super) fn read_binary(path: &Path, accept: impl FnOnce((u32, u32)) -> Result<()>) -> Result<Binary> {
     let raw = read_raw(path, |header| accept(header.size))?;
     let size = raw.header.size;
@@ -100,7 +95,7 @@ pub(super) fn read_binary(path: &Path, accept: impl FnOnce((u32, u32)) -> Result
     let distinct: BTreeSet<u16> = values.iter().copied().collect();
     let sharp = distinct.iter().filter(|&&value| value != 0).count() <= 1;
     if !sharp && raw.header.colour == ColorType::Indexed {
-        let problem = format!("has {} palette indices where an object and its surroundings make two", distinct.len());
+        let problem = format!("has {} palette indices, expected two (object and background)", distinct.len());
         return Err(Error::data(path, "", problem));
     }
     let half = (1_u32 << (raw.header.depth as u32)) / 2;
@@ -108,7 +103,7 @@ pub(super) fn read_binary(path: &Path, accept: impl FnOnce((u32, u32)) -> Result
     Ok(Binary { size, inside: values.iter().map(inside).collect(), values: distinct.len(), sharp })
 }
 
-/// The value of each pixel: grey, index, or the largest of its colours.
+/// Returns the value of each pixel: grey, index, or the largest of its colours.
 fn brightness(path: &Path, raw: &Raw) -> Result<Vec<u16>> {
     let samples = raw.samples();
     let opaque = ((1_u32 << (raw.header.depth as u32)) - 1) as u16;
@@ -116,7 +111,7 @@ fn brightness(path: &Path, raw: &Raw) -> Result<Vec<u16>> {
     let alpha = matches!(raw.header.colour, ColorType::GrayscaleAlpha | ColorType::Rgba);
     let pixels = samples.chunks_exact(channels);
     if alpha && pixels.clone().any(|pixel| pixel[channels - 1] != opaque) {
-        let problem = "is transparent in places, and whether those belong to the object cannot be known; write black \
+        let problem = "has transparent pixels, which may or may not belong to the object; write black \
                        and white without transparency";
         return Err(Error::data(path, "", problem));
     }

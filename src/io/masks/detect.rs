@@ -1,4 +1,4 @@
-//! Which of the known forms a folder of masks has. Two readings that both fit are an error, never a choice.
+//! Detects the format of a folder of masks. Two formats that both fit are an error.
 
 use super::content::{Kind, read_binary};
 use super::folder::{Claims, Layouts, files, layouts, root};
@@ -11,25 +11,25 @@ use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-/// A folder of masks as it is going to be read.
+/// The detected format of a folder of masks.
 pub(super) struct Reading {
     pub(super) format: Format,
-    /// The folder that really holds the masks.
+    /// Folder of the masks, possibly below the given one.
     pub(super) root: PathBuf,
-    /// Kind of the id pictures; `None` for black and white ones.
+    /// Kind of the id images; `None` for black and white ones.
     pub(super) ids: Option<Kind>,
     pub(super) claims: Claims,
     pub(super) pred: Option<Pred>,
-    /// What it was recognised by.
+    /// Reason for the choice.
     pub(super) why: String,
-    /// Classes that `classes.txt` lists and no picture shows.
+    /// Notes on classes in `classes.txt` without a mask.
     pub(super) notes: Vec<String>,
 }
 
 const NESTED_FORMATS: &str = "`format = binary-folders` if a folder is an object (OBJECT/NAME.png), \
                               `format = photo-folders` if a folder is a photo (NAME/OBJECT.png)";
 
-/// Finds out how the folder is to be read, for the photos of these names.
+/// Detects the format for photos with these names.
 pub(super) fn detect(photos: &[&str], options: &ImportOptions) -> Result<Reading> {
     let root = root(&options.folder, options.format)?;
     let files = files(&root)?;
@@ -72,7 +72,7 @@ fn recognise(root: &Path, layouts: &Layouts, pred: Option<&Pred>, photos: &[&str
         }
         (false, false, true) => {
             let named = |name: &str| root.file_name().is_some_and(|found| found == name);
-            let why = format!("{} folders of the names of photos hold black and white pictures", by_photo.photos());
+            let why = format!("{} folders named after photos hold black and white pictures", by_photo.photos());
             Ok(if root.join("classes.txt").is_file() {
                 (Format::ThreeDOvs, format!("{why}, and there is a classes.txt"))
             } else if named("test_mask") {
@@ -110,14 +110,14 @@ fn recognise(root: &Path, layouts: &Layouts, pred: Option<&Pred>, photos: &[&str
     }
 }
 
-/// The first picture that is not plainly black and white, if there is one. One that cannot be read is not.
+/// Returns the first image that is not black and white, if there is one. Unreadable images count too.
 fn first_grey(root: &Path, claims: &Claims) -> Option<String> {
     let files: Vec<&str> = claims.files().collect();
     let grey = files.par_iter().find_first(|file| !read_binary(&root.join(file), |_| Ok(())).is_ok_and(|b| b.sharp));
     grey.map(|file| (*file).to_owned())
 }
 
-/// The form of id pictures, by their headers.
+/// Detects the format of id images from their headers.
 fn flat_format(root: &Path, claims: &Claims, pred: Option<&Pred>) -> Result<(Format, String)> {
     let mut kinds: BTreeMap<Kind, Vec<&str>> = BTreeMap::new();
     for file in claims.files() {
@@ -126,14 +126,14 @@ fn flat_format(root: &Path, claims: &Claims, pred: Option<&Pred>) -> Result<(For
     if kinds.len() > 1 {
         let counts = kinds.iter().map(|(kind, files)| format!("{} {} ({})", files.len(), kind.text(), files[0]));
         let problem = format!(
-            "holds pictures of different kinds, {}; ids of different kinds cannot be told to be the same. Keep those \
-             of one kind",
+            "holds pictures of different kinds, {}; ids of different kinds cannot be matched. Keep the \
+             pictures of one kind",
             counts.collect::<Vec<_>>().join(", ")
         );
         return Err(Error::data(root, "", problem));
     }
     let Some((kind, files)) = kinds.into_iter().next() else { return Err(Error::Bug("no mask has a kind".into())) };
-    let mut why = format!("{} pictures of the names of photos, all {}", files.len(), kind.text());
+    let mut why = format!("{} pictures named after photos, all {}", files.len(), kind.text());
     if let Some(pred) = pred {
         why += &format!(", with ids of {}", pred.path.display());
     }
@@ -171,12 +171,12 @@ fn nothing_found(root: &Path, files: &[String], photos: &[&str]) -> Error {
     };
     let problem = format!(
         "no picture belongs to a photo of the scene: expected for example {name}.png, OBJECT/{name}.png or \
-         {name}/OBJECT.png, and {there}. Masks are named after the photos, and PNG, as JPEG changes ids"
+         {name}/OBJECT.png, and {there}. Masks have the names of the photos and are PNG, because JPEG changes ids"
     );
     Error::data(root, "", problem)
 }
 
-/// Notes on classes that 3D-OVS lists and of which there is no picture.
+/// Notes the classes in 3D-OVS's list that have no mask.
 fn classes_without_mask(root: &Path, claims: &Claims) -> Result<Vec<String>> {
     let path = root.join("classes.txt");
     if !path.is_file() {

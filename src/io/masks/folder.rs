@@ -1,4 +1,4 @@
-//! What lies in a folder of masks, and which of it belongs to which photo.
+//! The files in a folder of masks, and the photo of each.
 
 use super::Format;
 use crate::error::{Error, Result};
@@ -7,10 +7,10 @@ use crate::io::read;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-/// Folders deeper than this are not looked into; a link to a parent ends there.
+/// Largest depth of folders; it also ends links to a parent.
 const DEPTH_MAX: usize = 8;
 
-/// Folders in which data sets and trackers keep masks, and what then is typed.
+/// Folders in which data sets and trackers keep masks, with their formats.
 const KNOWN: [(&str, &[Format]); 4] = [
     ("Annotations", &[Format::DevaLong, Format::DevaShort, Format::Palette]),
     ("object_mask", &[Format::ObjectMask]),
@@ -18,7 +18,7 @@ const KNOWN: [(&str, &[Format]); 4] = [
     ("segmentations", &[Format::ThreeDOvs]),
 ];
 
-/// The files below a folder, sorted, by their path in it with `/` between. Hidden ones are left out.
+/// Lists the files below a folder, sorted, by relative path with `/`. Hidden files are left out.
 pub(super) fn files(root: &Path) -> Result<Vec<String>> {
     let mut found = Vec::new();
     walk(root, "", 0, &mut found)?;
@@ -41,13 +41,13 @@ fn walk(folder: &Path, prefix: &str, depth: usize, found: &mut Vec<String>) -> R
     Ok(())
 }
 
-/// `name` without `.png`, in any case of letters, or `None` for another kind of file.
+/// Returns `name` without `.png` (any case), or `None` for other files.
 pub(super) fn png_key(name: &str) -> Option<&str> {
     let at = name.len().checked_sub(4)?;
     name.get(at..)?.eq_ignore_ascii_case(".png").then(|| &name[..at])
 }
 
-/// The folder that really holds the masks: `folder`, or the one in it that is known to.
+/// Returns the folder of the masks: `folder`, or a known subfolder.
 pub(super) fn root(folder: &Path, format: Format) -> Result<PathBuf> {
     if !folder.is_dir() {
         return Err(Error::data(folder, "", "there is no such folder of masks"));
@@ -79,45 +79,43 @@ pub(super) fn root(folder: &Path, format: Format) -> Result<PathBuf> {
     }
 }
 
-/// What masks of a photo may be called, without `.png`, for each photo.
+/// Returns the possible mask names of each photo, without `.png`.
 pub(super) fn photo_keys(photos: &[&str]) -> Vec<Vec<String>> {
     let names = PhotoNames::new(photos.iter().copied());
     let keys = |photo: &&str| {
         let keys = names.keys(photo).into_iter();
         let mut keys: Vec<String> = keys.map(|key| key.to_string_lossy().replace('\\', "/")).collect();
-        // DEVA takes four characters away whatever the extension is: `a.jpeg` becomes `a..png`.
+        // DEVA removes the last four characters, whatever the extension is: `a.jpeg` becomes `a..png`.
         keys.extend(photo.len().checked_sub(4).and_then(|at| photo.get(..at)).map(str::to_owned));
         keys
     };
     photos.iter().map(keys).collect()
 }
 
-/// The first key of each photo that is in `there`.
+/// Returns the first key of each photo that is in `there`.
 pub(super) fn claim(keys: &[Vec<String>], there: &BTreeSet<&str>) -> Vec<Option<String>> {
     keys.iter().map(|keys| keys.iter().find(|key| there.contains(key.as_str())).cloned()).collect()
 }
 
-/// Files by photo for one way in which they may be laid out.
+/// The files of each photo in one layout.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Claims {
-    /// For each photo: its files with the object that each shows; the object is empty where a file shows all.
+    /// For each photo, its files and their objects; the object is empty if the file shows all.
     pub(super) of_photo: Vec<Vec<(String, String)>>,
-    /// PNG files that belong to no photo.
+    /// PNG files without a photo.
     pub(super) strays: Vec<String>,
 }
 
 impl Claims {
-    /// Photos that have a file.
     pub(super) fn photos(&self) -> usize {
         self.of_photo.iter().filter(|files| !files.is_empty()).count()
     }
 
-    /// All files.
     pub(super) fn files(&self) -> impl Iterator<Item = &str> {
         self.of_photo.iter().flatten().map(|(_, file)| file.as_str())
     }
 
-    /// Names of the objects: in the order of their numbers if all are numbers, otherwise of their letters.
+    /// Returns the names of the objects: in numeric order if all are numbers, else in alphabetical order.
     pub(super) fn objects(&self) -> Vec<String> {
         let names: BTreeSet<&String> = self.of_photo.iter().flatten().map(|(object, _)| object).collect();
         let mut names: Vec<String> = names.into_iter().cloned().collect();
@@ -155,7 +153,7 @@ fn claims<'a>(
     Claims { of_photo, strays: strays.collect() }
 }
 
-/// The three ways to lay out masks.
+/// The files in each of the three layouts.
 pub(super) struct Layouts {
     /// `NAME.png`.
     pub(super) flat: Claims,
@@ -165,7 +163,7 @@ pub(super) struct Layouts {
     pub(super) by_photo: Claims,
 }
 
-/// All three readings of a list of files.
+/// Matches a list of files with each layout.
 pub(super) fn layouts(photos: &[&str], files: &[String]) -> Layouts {
     let keys = photo_keys(photos);
     let pngs: Vec<(&str, &str)> =

@@ -1,6 +1,6 @@
-//! Masks in any known form to our own.
+//! Imports masks of any known format.
 //!
-//! Everything is read and checked before the first file is written.
+//! It reads and checks everything before it writes the first file.
 
 use super::content::{read_binary, read_ids};
 use super::detect::{Reading, detect};
@@ -17,59 +17,59 @@ use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::path::{Path, PathBuf};
 
-/// Pixels that more than one black and white mask claimed.
+/// Pixels that several black and white masks share.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Overlaps {
-    /// Who got them.
+    /// Rule that decided them.
     pub rule: Overlap,
-    /// Over all photos.
+    /// Number over all photos.
     pub pixels: u64,
-    /// Photos with any.
+    /// Number of photos with such pixels.
     pub photos: usize,
 }
 
-/// What an import found and made.
+/// The result of an import.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Imported {
-    /// How the masks were read.
+    /// Format of the source.
     pub format: Format,
-    /// What that was recognised by.
+    /// Reason for the format.
     pub why: String,
-    /// The folder that really held the masks.
+    /// Folder of the source masks, possibly below the given one.
     pub source: PathBuf,
-    /// The `pred.json` that was used.
+    /// Path of the `pred.json`, if one was used.
     pub pred: Option<PathBuf>,
-    /// Photos of the scene.
+    /// Number of photos in the scene.
     pub photos: usize,
-    /// Masks written.
+    /// Number of masks written.
     pub masks: usize,
-    /// Bits of a pixel in them: 8 or 16.
+    /// Bits per pixel of the masks: 8 or 16.
     pub bits: u8,
     /// The labels, as in `labels.json`.
     pub labels: Vec<LabelEntry>,
-    /// Pixels in several black and white masks.
+    /// Pixels that several black and white masks share.
     pub overlaps: Overlaps,
     /// Photos without a mask.
     pub photos_without_mask: Vec<String>,
-    /// Pictures that belong to no photo.
+    /// Images without a photo.
     pub masks_without_photo: Vec<String>,
-    /// What else a person should know.
+    /// Notes for the user.
     pub notes: Vec<String>,
 }
 
-/// Pixels shared by two source ids, the smaller first.
+/// Numbers of pixels that two source ids share, the smaller id first.
 type Shared = BTreeMap<(u32, u32), u64>;
 
-/// The mask of a photo with ids of the source.
+/// The mask of a photo with source ids.
 struct Decoded {
     size: (u32, u32),
     ids: Vec<u32>,
     shared: Shared,
-    /// Black and white pictures that had to be cut at half of their range.
+    /// Number of black and white images that needed a threshold.
     cut: usize,
 }
 
-/// What is kept of a mask between the two readings.
+/// The part of a mask that is kept between the two passes.
 struct Survey {
     pixels: BTreeMap<u32, u64>,
     shared: Shared,
@@ -94,7 +94,7 @@ pub fn import(dataset: &Dataset, options: &ImportOptions, output: &Path) -> Resu
     let files = output_names(&names);
     let written = with_mask.par_iter().map(|&photo| {
         let decoded = decode(photo)?;
-        // Every id is known from the first reading; 0 is none's.
+        // The first pass found every id; other pixels become 0.
         let ids = decoded.ids.iter().map(|id| new_ids.get(id).copied().unwrap_or(0));
         let (path, (width, height)) = (output.join(&files[photo]), decoded.size);
         match bits {
@@ -161,14 +161,13 @@ fn decode(reading: &Reading, objects: &[String], photo: usize, view: &View, rule
     let mut layers: Vec<(u32, Vec<bool>)> = layers.into_iter().map(|(id, _, mask)| (id, mask.inside)).collect();
     layers.sort_by_key(|(id, inside)| {
         let pixels = inside.iter().filter(|&&inside| inside).count();
-        // Painted later is on top.
+        // Later layers cover earlier ones.
         (if rule == Overlap::Smaller { std::cmp::Reverse(pixels) } else { std::cmp::Reverse(0) }, *id)
     });
     let (ids, shared) = paint(size, &layers);
     Ok(Decoded { size, ids, shared, cut })
 }
 
-/// Paints layers over each other.
 fn paint((width, height): (u32, u32), layers: &[(u32, Vec<bool>)]) -> (Vec<u32>, Shared) {
     let mut ids = vec![0; width as usize * height as usize];
     let mut shared = Shared::new();
@@ -185,7 +184,7 @@ fn paint((width, height): (u32, u32), layers: &[(u32, Vec<bool>)]) -> (Vec<u32>,
 
 fn survey(reading: &Reading, decoded: Decoded) -> Result<Survey> {
     let mut pixels = BTreeMap::new();
-    // Whole runs at once: neighbours mostly have one id.
+    // Count whole runs, because neighbours mostly have the same id.
     for run in decoded.ids.chunk_by(|a, b| a == b).filter(|run| run[0] != 0) {
         *pixels.entry(run[0]).or_default() += run.len() as u64;
     }
@@ -197,8 +196,8 @@ fn survey(reading: &Reading, decoded: Decoded) -> Result<Survey> {
 
 fn too_many(root: &Path, count: usize) -> Error {
     let problem = format!(
-        "{count} different ids, and a label is at most {LABEL_MAX}; if these are colours of a picture and no ids, \
-         import the id pictures, otherwise leave out small tracks before"
+        "{count} different ids, and a label is at most {LABEL_MAX}; if these are colours and not ids, \
+         import the id pictures, otherwise remove small tracks first"
     );
     Error::data(root, "", problem)
 }
@@ -230,12 +229,12 @@ fn overlaps<'a>(
     Ok(Overlaps { rule, pixels, photos })
 }
 
-/// The entries of the new labels, and the new id of each id of the source.
+/// Returns the entries of the new labels, and a map from source ids to new ids.
 fn labels(reading: &Reading, surveys: &[Survey], objects: &[String]) -> Result<(Vec<LabelEntry>, HashMap<u32, u16>)> {
     let black_and_white = reading.ids.is_none();
     let mut found: BTreeMap<u32, (u64, u32)> = BTreeMap::new();
     if black_and_white {
-        // An object whose masks are all empty keeps its place, so that ids depend on names alone.
+        // An object without pixels keeps its id, so that ids depend on names only.
         found.extend((1..=objects.len() as u32).map(|id| (id, (0, 0))));
     }
     for (id, pixels) in surveys.iter().flat_map(|survey| &survey.pixels) {
@@ -267,7 +266,7 @@ fn labels(reading: &Reading, surveys: &[Survey], objects: &[String]) -> Result<(
     Ok((entries, new_ids))
 }
 
-/// `name`, or with the first number behind it that makes it one of a kind.
+/// Returns `name`, with the first number appended that makes it unique.
 fn unique(name: String, taken: &mut BTreeSet<String>) -> String {
     let numbered = (2..).map(|number| format!("{name} {number}"));
     let free = std::iter::once(name.clone()).chain(numbered).find(|name| !taken.contains(name)).unwrap_or(name);
@@ -275,8 +274,8 @@ fn unique(name: String, taken: &mut BTreeSet<String>) -> String {
     free
 }
 
-/// Names of the masks: those of the photos with `.png` in place of the extension, or after it where two photos differ
-/// in nothing else.
+/// Returns the names of the masks: the photo's name with `.png` in place of the extension, or appended if two photos
+/// differ only in the extension.
 fn output_names(photos: &[&str]) -> Vec<PathBuf> {
     let mut count: HashMap<PathBuf, usize> = HashMap::new();
     photos.iter().for_each(|name| *count.entry(Path::new(name).with_extension("")).or_default() += 1);
@@ -291,7 +290,9 @@ fn notes(reading: &Reading, surveys: &[Survey], table: &LabelTable) -> Vec<Strin
     let mut notes = reading.notes.clone();
     let cut: usize = surveys.iter().map(|survey| survey.cut).sum();
     if cut > 0 {
-        notes.push(format!("{cut} masks have more values than black and one other; the upper half of the range is in"));
+        notes.push(format!(
+            "{cut} masks have more values than black and one other; the upper half of the range counts as the object"
+        ));
     }
     let empty = table.labels.iter().filter(|entry| entry.pixels == 0).filter_map(|entry| entry.name.clone());
     let empty: Vec<String> = empty.collect();

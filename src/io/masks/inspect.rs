@@ -1,4 +1,4 @@
-//! A folder of masks in our own form against its scene.
+//! Checks a folder of masks against its scene.
 
 use super::check::{Finding, Look, Problem, findings};
 use super::folder::files;
@@ -12,20 +12,20 @@ use serde::Serialize;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-/// What is in a folder of masks, and what is wrong with it.
+/// The content of a folder of masks, and its problems.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Report {
-    /// Photos of the scene.
+    /// Number of photos in the scene.
     pub photos: usize,
-    /// Photos with a usable mask.
+    /// Number of photos with a usable mask.
     pub masks: usize,
-    /// Ids in them.
+    /// Ids in the masks.
     pub ids: Vec<u32>,
-    /// What looks wrong, by kind.
+    /// Problems, by kind.
     pub findings: Vec<Finding>,
 }
 
-/// Looks at the masks in `folder` of the photos of `dataset`. What cannot be used is a finding, not an error.
+/// Checks the masks in `folder` for the photos of `dataset`. An unusable mask is a finding, not an error.
 pub fn inspect(dataset: &Dataset, folder: &Path) -> Result<Report> {
     let views = dataset.all();
     let masks = MaskFolder::new(folder, views.iter().map(|view| view.name.as_str()))?;
@@ -62,7 +62,6 @@ fn look(dataset: &Dataset, view: &View, path: Option<&Path>) -> Result<Look, Fin
     Ok(Look::new(&map, &view.camera, &dataset.points))
 }
 
-/// Files that no photo uses.
 fn misnamed(folder: &Path, used: &[Option<PathBuf>]) -> Result<Vec<Finding>> {
     let used: BTreeSet<&Path> = used.iter().flatten().map(PathBuf::as_path).collect();
     let unused = files(folder)?.into_iter().filter(|file| file != FILE && !used.contains(folder.join(file).as_path()));

@@ -1,7 +1,7 @@
-//! Folders of masks: what trackers and data sets write, made into our own form, and what is wrong with a folder.
+//! Folders of masks: [`import`] converts the formats of trackers and data sets, [`inspect`] checks a folder.
 //!
-//! Our own form is one grey PNG per photo, named like the photo, whose value is the id, with a `labels.json`
-//! ([`super::label_table`]). [`import`] makes it from what [`Format`] lists; [`inspect`] reports on it.
+//! Our own format is one grey PNG per photo with the photo's name, whose pixel value is the id, and a `labels.json`
+//! ([`LabelTable`](super::LabelTable)).
 
 pub(crate) mod check;
 mod content;
@@ -18,25 +18,25 @@ pub use inspect::{Report, inspect};
 use serde::Serialize;
 use std::path::PathBuf;
 
-/// How a folder of masks is to be read.
+/// The format of a folder of masks.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 #[serde(rename_all = "kebab-case")]
 pub enum Format {
-    /// What fits, if only one reading does.
+    /// The format that fits, if only one does.
     #[default]
     Auto,
     /// DEVA with --use_short_id: 8-bit grey, the value is the id.
     DevaShort,
-    /// DEVA as it is: RGB, the id is R + 256 G + 65536 B.
+    /// DEVA with default settings: RGB, the id is R + 256 G + 65536 B.
     DevaLong,
-    /// Palette pictures as of DAVIS: the index is the id.
+    /// Palette images as in DAVIS: the index is the id.
     Palette,
     /// 16-bit grey, the value is the id.
     Grey16,
-    /// A folder per object with a black and white picture per photo: OBJECT/NAME.png.
+    /// A folder per object with a black and white image per photo: OBJECT/NAME.png.
     BinaryFolders,
-    /// A folder per photo with a black and white picture per object: NAME/OBJECT.png.
+    /// A folder per photo with a black and white image per object: NAME/OBJECT.png.
     PhotoFolders,
     /// `object_mask` of Gaussian Grouping: 8-bit grey, the value is the id.
     ObjectMask,
@@ -49,7 +49,7 @@ pub enum Format {
 }
 
 impl Format {
-    /// Its name in settings and messages.
+    /// Returns the name in settings and messages.
     pub fn name(self) -> &'static str {
         match self {
             Self::Auto => "auto",
@@ -66,34 +66,34 @@ impl Format {
     }
 }
 
-/// Whose a pixel is that two black and white masks of a photo claim.
+/// The rule for pixels that two black and white masks of a photo share.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 #[serde(rename_all = "kebab-case")]
 pub enum Overlap {
-    /// Nobody's: the import fails and tells how many there are.
+    /// The import fails and reports their number.
     #[default]
     Error,
-    /// The object's with fewer pixels in this photo; the larger id's between equals.
+    /// The object with fewer pixels in this photo wins; between equals, the larger id.
     Smaller,
-    /// The object's with the larger id.
+    /// The object with the larger id wins.
     Later,
 }
 
-/// What to import.
+/// The options of an import.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct ImportOptions {
     /// Folder with the masks.
     pub folder: PathBuf,
-    /// How to read it.
+    /// Format of the folder.
     pub format: Format,
-    /// The `pred.json` of DEVA; otherwise that beside the masks, if there is one.
+    /// The `pred.json` of DEVA; `None` looks for one beside the masks.
     pub pred: Option<PathBuf>,
-    /// Whose shared pixels are.
+    /// Rule for shared pixels.
     pub overlap: Overlap,
 }
 
-/// The first names of many, for messages.
+/// Returns the first few names, for messages.
 fn shortened(names: &[impl AsRef<str>]) -> String {
     let shown = names.iter().take(5).map(AsRef::as_ref).collect::<Vec<&str>>().join(", ");
     if names.len() > 5 { format!("{shown}, ...") } else { shown }

@@ -1,4 +1,4 @@
-//! `pred.json` of DEVA: which ids a run gave, and what it called them.
+//! `pred.json` of DEVA: the ids of a run and their categories.
 
 use super::shortened;
 use crate::error::{Error, Result};
@@ -33,16 +33,16 @@ struct Category {
     name: String,
 }
 
-/// The ids of a run.
+/// The ids of a run of DEVA.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Pred {
     pub(super) path: PathBuf,
-    /// Id and the name of its category, where it has one.
+    /// Names of the categories by id, where known.
     pub(super) ids: BTreeMap<u32, Option<String>>,
 }
 
 impl Pred {
-    /// Reads the file. A category is called as `categories` calls it, otherwise `category N`.
+    /// Reads the file. Names come from `categories`; other categories are named `category N`.
     pub(super) fn read(path: &Path) -> Result<Self> {
         let text = read::text(path)?;
         let file: File = serde_json::from_str(&text).map_err(|error| {
@@ -63,7 +63,7 @@ impl Pred {
         let mut ids: BTreeMap<u32, Option<String>> = BTreeMap::new();
         for segment in file.annotations.iter().flat_map(|annotation| &annotation.segments_info) {
             if segment.id == 0 {
-                return Err(Error::data(path, "segments_info", "has the id 0, which pictures use for no object"));
+                return Err(Error::data(path, "segments_info", "has the id 0, which is the background"));
             }
             let known = ids.entry(segment.id).or_default();
             *known = known.take().or_else(|| name(&segment.category_id));
@@ -71,13 +71,13 @@ impl Pred {
         Ok(Self { path: path.to_owned(), ids })
     }
 
-    /// Where the file of a folder of masks is: in it, or beside it if it is called `Annotations`.
+    /// Returns the path of the file for a folder of masks: in it, or beside it if it is called `Annotations`.
     pub(super) fn find(root: &Path) -> Option<PathBuf> {
         let beside = root.file_name().filter(|name| *name == "Annotations").and(root.parent());
         [Some(root), beside].into_iter().flatten().map(|folder| folder.join("pred.json")).find(|path| path.is_file())
     }
 
-    /// Refuses pictures that hold ids which the run never gave.
+    /// Refuses images with ids that the run does not list.
     pub(super) fn check(&self, root: &Path, found: &BTreeSet<u32>) -> Result<()> {
         let unknown: Vec<String> =
             found.iter().filter(|id| !self.ids.contains_key(id)).map(ToString::to_string).collect();

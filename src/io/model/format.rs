@@ -1,30 +1,30 @@
-//! What a kind of model file must be able to do.
+//! The interface of model file formats.
 
 use crate::error::Result;
 use crate::scene::Gaussians;
 use std::io::{self, Write};
 use std::path::Path;
 
-/// A model as a file holds it.
+/// The content of a model file.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ReadModel {
     /// The usable Gaussians.
     pub gaussians: Gaussians,
-    /// Gaussians left out because they cannot be rendered.
+    /// Number of Gaussians left out because they cannot be rendered.
     pub dropped: u64,
-    /// What a person should know about the file, a line each.
+    /// Notes for the user, a line each.
     pub notes: Vec<String>,
 }
 
-/// A kind of model file.
+/// A model file format.
 #[derive(Clone, Copy, Debug)]
 pub struct ModelFormat {
-    /// What it is called.
+    /// Display name.
     pub name: &'static str,
-    /// How names of its files end: lower case, with the dot.
+    /// Extensions of its files: lower case, with the dot.
     pub endings: &'static [&'static str],
-    /// Reads a file. Its path is for messages and for [`crate::io::read`], through which all files are opened.
+    /// Reads a file, through `crate::io::read`.
     pub read: fn(&Path) -> Result<ReadModel>,
-    /// Writes these rows, all of which are finite, of a model whose columns agree in length.
+    /// Writes the rows with these indices, all finite, of a model whose columns have equal lengths.
     pub write: fn(&mut dyn Write, &Gaussians, &[usize]) -> io::Result<()>,
 }

@@ -1,6 +1,7 @@
-//! Files of models, by the ending of their names. Every command reads and writes models here.
+//! Model files, by extension. Every command reads and writes models here.
 //!
-//! A new format is a file beside [`ply`] with a [`ModelFormat`], and its line in [`SHIPPED`].
+//! To add a format, add a file beside `ply` with a `ModelFormat`, and an entry in `SHIPPED`. Other crates call
+//! [`register`].
 
 mod format;
 mod ply;
@@ -13,32 +14,31 @@ use std::sync::{PoisonError, RwLock};
 
 pub use format::{ModelFormat, ReadModel};
 
-/// The formats of this program. The first is that of files whose ending belongs to no format, such as `/dev/stdout`.
+/// Formats of labelgs. The first one also serves unknown extensions, such as `/dev/stdout`.
 const SHIPPED: [&ModelFormat; 1] = [&ply::FORMAT];
 
-/// Formats of the programs that use this crate.
+/// Formats that other crates have registered.
 static REGISTERED: RwLock<Vec<&'static ModelFormat>> = RwLock::new(Vec::new());
 
-/// Adds a format, for all models that are read and written from now on. It wins over others with its endings.
+/// Registers a format for all models from now on. It wins over earlier ones with the same extensions.
 pub fn register(format: &'static ModelFormat) {
     REGISTERED.write().unwrap_or_else(PoisonError::into_inner).insert(0, format);
 }
 
-/// All formats, in the order in which they are asked.
 fn formats() -> Vec<&'static ModelFormat> {
     let mut all = REGISTERED.read().unwrap_or_else(PoisonError::into_inner).clone();
     all.extend(SHIPPED);
     all
 }
 
-/// The format that a path names by its ending, in any case.
+/// Returns the format for the extension of a path, ignoring case.
 fn by_ending(path: &Path) -> Option<&'static ModelFormat> {
     let name = path.file_name()?.to_string_lossy().to_lowercase();
     formats().into_iter().find(|format| format.endings.iter().any(|ending| name.ends_with(ending)))
 }
 
-/// Reads a model in the format of its ending. A file whose ending belongs to no format may be a PLY all the same; if it
-/// is none, the error names the endings that are known.
+/// Reads a model in the format of its extension. A file with an unknown extension is read as PLY; if that fails, the
+/// error lists the known extensions.
 pub fn read_model(path: impl AsRef<Path>) -> Result<ReadModel> {
     let path = path.as_ref();
     let Some(format) = by_ending(path) else {
@@ -49,7 +49,7 @@ pub fn read_model(path: impl AsRef<Path>) -> Result<ReadModel> {
     Ok(read)
 }
 
-/// The error of a file that was read as the first format for want of a better one.
+/// Adds the known extensions to the error of a file that was read as the first format by default.
 fn with_endings(path: &Path, error: Error) -> Error {
     match (error, path.extension()) {
         (Error::Data { path, place, problem }, Some(ending)) => {
@@ -62,8 +62,8 @@ fn with_endings(path: &Path, error: Error) -> Error {
     }
 }
 
-/// Writes a model in the format of its ending, a PLY where that belongs to no format. Rows that are not finite are left
-/// out; returns how many. The file appears complete or not at all.
+/// Writes a model in the format of its extension; PLY if it is unknown. Leaves out rows that are not finite and returns
+/// their number. The write is atomic.
 pub fn write_model(path: impl AsRef<Path>, model: &Gaussians) -> Result<u64> {
     let path = path.as_ref();
     model.check()?;

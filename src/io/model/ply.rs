@@ -1,5 +1,5 @@
-//! The standard 3DGS PLY, with `property uint label` as its last column where the scene has labels, and before it
-//! `property float label_confidence` where votes were counted.
+//! The standard 3DGS PLY. If the scene has labels, the last column is `property uint label`. If votes were counted,
+//! `property float label_confidence` precedes it.
 
 use super::format::{ModelFormat, ReadModel};
 use crate::error::{Error, Result};
@@ -13,24 +13,24 @@ use ply_rs_bw::writer::Writer;
 use std::io::{self, Write};
 use std::path::Path;
 
-/// Columns that every 3DGS PLY has, in the order in which rows are decoded.
+/// Columns of every 3DGS PLY, in the order of decoding.
 const REQUIRED: [&str; 14] = [
     "x", "y", "z", "f_dc_0", "f_dc_1", "f_dc_2", "opacity", "scale_0", "scale_1", "scale_2", "rot_0", "rot_1", "rot_2",
     "rot_3",
 ];
 
-/// Largest log-scale whose square is finite in f32 after the exponential, as covariances need it.
+/// Largest log-scale: the square of its exponential fits into f32, as covariances need it.
 const LOG_SCALE_MAX: f32 = 44.0;
-/// Gaussians from which on chance does not make all values look activated.
+/// Fewest Gaussians for the check for activated values; with fewer, chance may look like it.
 const ACTIVATED_MIN: usize = 16;
 
-/// What the viewers of 3DGS read.
+/// The format that viewers of 3DGS read.
 pub(super) const FORMAT: ModelFormat = ModelFormat { name: "PLY", endings: &[".ply"], read, write };
 
-/// Reads a 3DGS PLY: little-endian, big-endian or ascii, columns by name in any order and of any scalar type, SH
-/// degree by the number of `f_rest_*` (0, 9, 24 or 45, channel-major), `label` if there is one. Other columns are
-/// ignored. Rows with values that cannot be rendered are dropped and counted; a label that is no whole number from
-/// 0 to 65535 is an error.
+/// Reads a 3DGS PLY: little-endian, big-endian or ascii, columns by name in any order and of any scalar type. The
+/// number of `f_rest_*` (0, 9, 24 or 45, channel-major) gives the SH degree; `label` is optional; other columns are
+/// ignored. Rows that cannot be rendered are dropped and counted. A label outside of the whole numbers 0 to 65535 is an
+/// error.
 fn read(path: &Path) -> Result<ReadModel> {
     let table = Table::open(path)?;
     let sh_degree = sh_degree(path, &table)?;
@@ -76,7 +76,7 @@ fn read(path: &Path) -> Result<ReadModel> {
     }
     if looks_activated(&read.gaussians) {
         let note = "every opacity is from 0 to 1 and every scale positive: they seem to be written after their sigmoid \
-                    and exponential, where a 3DGS PLY has them before; such a model looks like fog";
+                    and exponential, but a 3DGS PLY has the values before; such a model looks like fog";
         read.notes.push(note.to_owned());
     }
     if odd.extra_bytes > 0 {
@@ -85,14 +85,14 @@ fn read(path: &Path) -> Result<ReadModel> {
     Ok(read)
 }
 
-/// True for what a writer leaves that activates values once more than the format says.
+/// Returns true if the values look activated, although the format stores logits and logarithms.
 fn looks_activated(gaussians: &Gaussians) -> bool {
     gaussians.len() >= ACTIVATED_MIN
         && gaussians.opacities.iter().all(|opacity| (0.0..=1.0).contains(opacity))
         && gaussians.scales.iter().flatten().all(|&scale| scale > 0.0)
 }
 
-/// Degree from the number of `f_rest_*` columns.
+/// Returns the degree for the number of `f_rest_*` columns.
 fn sh_degree(path: &Path, table: &Table) -> Result<u32> {
     let count = table.names().filter(|name| name.starts_with("f_rest_")).count();
     match count {
@@ -120,11 +120,10 @@ fn confidence_of(path: &Path, index: u64, value: f64) -> Result<f32> {
     if (0.0..=1.0).contains(&value) {
         return Ok(value as f32);
     }
-    let problem = format!("label_confidence {value} is not from 0 to 1; leave the column out to do without");
+    let problem = format!("label_confidence {value} is not from 0 to 1; correct it or leave out the column");
     Err(Error::data(path, format!("vertex {index}"), problem))
 }
 
-/// Rows left out, by reason.
 #[derive(Default)]
 struct Dropped {
     not_finite: u64,
@@ -148,8 +147,8 @@ impl Dropped {
     }
 }
 
-/// Appends a row in the order of [`REQUIRED`] and `f_rest_*`, but for its position, which it returns; or counts why it
-/// is left out.
+/// Appends a row in the order of [`REQUIRED`] and `f_rest_*` and returns its position, which is not appended; or counts
+/// the reason for leaving it out.
 fn push_row(
     to: &mut Gaussians,
     dropped: &mut Dropped,
@@ -186,7 +185,7 @@ fn push_row(
     Some(DVec3::new(row[0], row[1], row[2]))
 }
 
-/// The rotation as stored; normalised only if its squared length would leave f32. `None` for zero.
+/// Returns the rotation as stored, normalised only if its squared length does not fit into f32; `None` for zero.
 fn rotation(quat: [f64; 4]) -> Option<[f32; 4]> {
     let length = quat.iter().map(|v| v * v).sum::<f64>().sqrt();
     if length == 0.0 {
@@ -196,14 +195,14 @@ fn rotation(quat: [f64; 4]) -> Option<[f32; 4]> {
     Some(quat.map(|v| if usual { v as f32 } else { (v / length) as f32 }))
 }
 
-/// Writes the standard 3DGS PLY (little-endian, no comments, normals zero), with `label` as last column only if
-/// the scene has labels, and `label_confidence` before it only if that is known. Positions are world positions, as
-/// doubles where floats would round them, which is only far from the origin.
+/// Writes the standard 3DGS PLY (little-endian, no comments, zero normals). `label` is the last column if the scene has
+/// labels; `label_confidence` precedes it if known. Positions are world positions. They are doubles where floats would
+/// round them, which happens only far from the origin.
 fn write(out: &mut dyn Write, gaussians: &Gaussians, rows: &[usize]) -> io::Result<()> {
     let rest = gaussians.rest_per_gaussian();
     let wide = gaussians.origin != DVec3::ZERO
         && rows.iter().any(|&row| gaussians.world(row) != gaussians.world(row).as_vec3().as_dvec3());
-    // The header goes through a buffer because the crate wants a sized writer.
+    // The crate needs a sized writer for the header.
     let mut text = Vec::new();
     Writer::<DefaultElement>::new().write_header(&mut text, &header(rows.len(), rest * 3, gaussians, wide))?;
     out.write_all(&text)?;

@@ -1,8 +1,8 @@
-//! PLY files as tables, and the plain coloured points in some; models are read by [`super::model`].
+//! PLY files as tables, and coloured points in them; [`super::model`] reads models.
 //!
-//! Headers are read and written by the `ply-rs-bw` crate, behind a cap on their length. Rows are decoded here: a splat
-//! file has 62 columns and millions of rows, and the crate's own row reader asks for each value by name and
-//! returns a value per row only; a scene is wanted column by column, in any order and any scalar type.
+//! The crate `ply-rs-bw` reads and writes headers; their length is limited. Rows are decoded here, column by column, in
+//! any order and of any scalar type: a 3DGS file has 62 columns and millions of rows, and the row reader of the crate
+//! asks for each value by name.
 
 mod points;
 mod table;

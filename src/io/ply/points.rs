@@ -1,4 +1,4 @@
-//! Plain coloured points.
+//! Coloured points.
 
 use super::table::Table;
 use crate::error::{Error, Result};
@@ -7,9 +7,9 @@ use crate::scene::Point;
 use glam::DVec3;
 use std::path::Path;
 
-/// Reads points from a PLY with `x y z` and, if it has them, `red green blue`: integers from 0 to 255, or floats,
-/// which count as 0 to 1 unless one of them is larger. Points without colour are mid-grey. Points that are not
-/// finite, or so far away that f32 cannot hold the squares, are left out.
+/// Reads points from a PLY with `x y z` and optional `red green blue`. Colours are integers from 0 to 255, or floats
+/// from 0 to 1; floats count as 0 to 255 if one of them exceeds 1. Points without colour become mid-grey. Leaves out
+/// points that are not finite or whose squares do not fit into f32.
 pub fn read_points(path: impl AsRef<Path>) -> Result<Vec<Point>> {
     let path = path.as_ref();
     let table = Table::open(path)?;
@@ -27,7 +27,7 @@ pub fn read_points(path: impl AsRef<Path>) -> Result<Vec<Point>> {
             colour.copy_from_slice(&row[3..6]);
         }
         if colour.iter().any(|value| !value.is_finite()) {
-            return Err(Error::data(path, format!("vertex {index}"), "a colour that is not a number"));
+            return Err(Error::data(path, format!("vertex {index}"), "has a colour of NaN or infinity"));
         }
         if row[..3].iter().all(|value| value.abs() <= FAR) {
             rows.push(([row[0], row[1], row[2]], colour));

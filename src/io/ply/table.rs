@@ -7,25 +7,25 @@ use ply_rs_bw::ply::{DefaultElement, ElementDef, Encoding, Header, PropertyType,
 use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
 
-/// Longest header that is read; a 3DGS header takes about 1.5 KiB.
+/// Most bytes of a header; that of a 3DGS file has about 1.5 KiB.
 const HEADER_MAX: u64 = 64 * 1024;
-/// Longest line of an ascii row.
+/// Most bytes in a line of an ascii row.
 const LINE_MAX: u64 = 64 * 1024;
 
-/// An open PLY file, its header understood and its `vertex` rows not yet read.
+/// An open PLY file after its header, before its `vertex` rows.
 pub(in crate::io) struct Table {
     path: PathBuf,
     file: BufReader<Source>,
     encoding: Encoding,
     vertex: ElementDef,
-    /// Elements before `vertex`, whose rows are skipped.
+    /// Elements before `vertex`; their rows are skipped.
     before: Vec<ElementDef>,
     after: bool,
     header_bytes: u64,
     file_bytes: u64,
 }
 
-/// One column of a row: where it lies and what it is.
+/// A column: its offset in a row and its type.
 struct Column {
     index: usize,
     offset: usize,
@@ -41,7 +41,7 @@ fn size_of(scalar: &ScalarType) -> usize {
     }
 }
 
-/// The scalar at the head of `bytes` as f64, which holds every PLY scalar exactly.
+/// Decodes the scalar at the start of `bytes`; f64 holds every PLY scalar exactly.
 fn decode(scalar: &ScalarType, bytes: &[u8], big_endian: bool) -> f64 {
     macro_rules! number {
         ($type:ty, $bytes:expr) => {{
@@ -98,12 +98,12 @@ impl Table {
         })
     }
 
-    /// Names of the vertex properties in the order of the file.
+    /// Returns the names of the vertex properties in file order.
     pub(in crate::io) fn names(&self) -> impl Iterator<Item = &str> {
         self.vertex.properties.iter().map(|(_, property)| property.name.as_str())
     }
 
-    /// True if the property exists and is `float` or `double`.
+    /// Returns true if the property exists and is `float` or `double`.
     pub(in crate::io) fn is_float(&self, name: &str) -> bool {
         self.vertex
             .properties
@@ -199,7 +199,7 @@ impl Table {
         Ok(Notes { extra_bytes: 0 })
     }
 
-    /// The next line with something on it.
+    /// Reads the next line that is not empty.
     fn line(&mut self, line: &mut Vec<u8>, what: &str) -> Result<()> {
         loop {
             line.clear();
@@ -218,13 +218,12 @@ impl Table {
     }
 }
 
-/// What was odd about the rows.
 pub(in crate::io) struct Notes {
-    /// Bytes after the last declared element.
+    /// Number of bytes after the last declared element.
     pub(in crate::io) extra_bytes: u64,
 }
 
-/// Reads up to and with the `end_header` line, at most [`HEADER_MAX`] bytes.
+/// Reads the header including the `end_header` line, at most [`HEADER_MAX`] bytes.
 fn header_bytes(path: &Path, file: &mut impl BufRead) -> Result<Vec<u8>> {
     let mut text = Vec::new();
     let mut limited = file.take(HEADER_MAX);
@@ -253,7 +252,7 @@ fn parse_header(path: &Path, text: &[u8]) -> Result<Header> {
     let header = Parser::<DefaultElement>::new()
         .read_header(&mut Reader::new(text))
         .map_err(|error| problem(error.to_string().split_whitespace().collect::<Vec<_>>().join(" ")))?;
-    // The crate keeps the last of two properties with one name, which would move every later column.
+    // The crate keeps the last of two properties with the same name, which would move the later columns.
     let declared = text.split(|&byte| byte == b'\n').filter(|line| line.trim_ascii().starts_with(b"property")).count();
     let kept: usize = header.elements.values().map(|element| element.properties.len()).sum();
     let elements = text.split(|&byte| byte == b'\n').filter(|line| line.trim_ascii().starts_with(b"element")).count();
@@ -263,7 +262,7 @@ fn parse_header(path: &Path, text: &[u8]) -> Result<Header> {
     Ok(header)
 }
 
-/// Offset and scalar of each property of a binary row; lists are refused.
+/// Returns the offset and scalar type of each property of a binary row. Refuses lists.
 fn layout_of(path: &Path, element: &ElementDef) -> Result<Vec<(usize, ScalarType)>> {
     let mut offset = 0;
     let mut layout = Vec::with_capacity(element.properties.len());

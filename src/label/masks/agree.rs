@@ -1,4 +1,4 @@
-//! Masks of all views made to agree with each other, by the Gaussians of a model that all of them show.
+//! Makes the masks of all views agree, through the Gaussians of a model.
 
 use super::associate::{Owners, Segment, associate};
 use super::repair::{Naming, Repairs, mend, name_groups, rename};
@@ -10,21 +10,21 @@ use crate::render::{RenderOptions, render};
 use crate::scene::{Gaussians, LabelMap, View};
 use std::collections::BTreeMap;
 
-/// How masks are made to agree.
+/// The options of [`agree`].
 #[derive(Clone, Copy, Debug)]
 pub struct Agreement {
     /// Near plane, world units.
     pub near: f32,
-    /// The ids of different views mean nothing to each other.
+    /// The ids of different views are unrelated.
     pub per_view: bool,
-    /// Objects that fewer views show are left out.
+    /// Fewest views of an object; objects in fewer views are dropped.
     pub min_views: usize,
-    /// Views without a mask get one.
+    /// Makes masks for views without one.
     pub make_missing: bool,
 }
 
-/// Masks of the views, where there are any, and what was done to them. `engine` holds the model and has memory for votes;
-/// `tick` is called twice for each view.
+/// Returns the masks of the views (`None` without a mask) and the changes. `engine` holds the model and has memory for
+/// votes; `tick` is called twice per view.
 pub fn agree(
     engine: &mut Engine,
     model: &Gaussians,
@@ -51,7 +51,7 @@ pub fn agree(
     let renamed: Vec<Option<LabelMap>> = (views.iter().enumerate())
         .map(|(index, view)| view.mask.as_ref().map(|mask| rename(index, mask, &names)))
         .collect();
-    // What all renamed masks together make of the model tells what each of them should show.
+    // The labels that all renamed masks give the model decide the content of each mask.
     let voters = views.iter().zip(&renamed).filter_map(|(view, mask)| Some(Voter::of(view, mask.as_ref()?)));
     let decision = count(engine, &voters.collect::<Vec<_>>(), None, &model.means, counting, true)?;
     let mut masks = Vec::with_capacity(views.len());

@@ -1,32 +1,32 @@
-//! Which masks of different views show the same object, by the Gaussians that they own.
+//! Groups the masks of different views into objects, by the Gaussians that they own.
 //!
-//! Per-image segmentation numbers its masks anew in every photo, and trackers lose and swap numbers. A trained scene
-//! knows better: two masks show one object if the Gaussians that make their pixels are the same (Gaga's idea of a memory
-//! of Gaussians, here with an exact count instead of the front-most layer).
+//! A segmenter of single images numbers its masks anew in every photo, and trackers lose and swap ids. A trained scene
+//! connects the views: two masks show one object if the same Gaussians make their pixels (the Gaussian memory of Gaga,
+//! here with exact counts instead of the front-most layer).
 
 use crate::label::vote::ballot::{Ballot, weight};
 use std::cmp::Ordering;
 use std::collections::{BTreeMap, BTreeSet, BinaryHeap};
 
-/// Weight in a view above which a Gaussian counts as seen there, px.
+/// Weight in a view above which a Gaussian counts as visible there, px.
 const SEEN: f64 = 0.25;
-/// Share of it that must lie in one mask for the mask to own it.
+/// Share of this weight in one mask above which the mask owns the Gaussian.
 const OWNED: f64 = 0.5;
 /// Overlap of two groups of masks above which they are one object.
 pub(crate) const SAME_OBJECT: f64 = 0.25;
 
-/// Which mask of a view owns each Gaussian.
+/// The owner of each Gaussian among the masks of a view.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Owners {
-    /// Ids of the view's masks, sorted; 0 among them stands for what has none.
+    /// Ids of the view's masks, sorted; 0 is the background.
     pub ids: Vec<u16>,
-    /// For each Gaussian the place of its owner in `ids`, and its weight in the view, px; none where it is not seen or
-    /// belongs to no mask in particular.
+    /// For each Gaussian, the index of its owner in `ids` and its weight in the view, px. `None` if it is not visible
+    /// or no mask has a majority.
     pub rows: Vec<Option<(u16, f32)>>,
 }
 
 impl Owners {
-    /// From the votes of this view alone.
+    /// Finds the owners from the votes of this view alone.
     pub fn new(ballot: &Ballot) -> Self {
         let owner = |row: usize| {
             let votes = ballot.row(row);
@@ -38,10 +38,11 @@ impl Owners {
     }
 }
 
-/// A mask: index of its view, id in that view.
+/// A mask: index of its view, and its id there.
 pub type Segment = (usize, u16);
 
-/// Overlap of two groups: what both own, and what either owns of what both views see.
+/// The overlap of two groups: the weight that both own, and the weight that either owns, over Gaussians visible in both
+/// views.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Overlap {
     both: f64,
@@ -58,7 +59,7 @@ impl Overlap {
     }
 }
 
-/// A pair of groups that may be joined, best first, then by number so that the order is the same everywhere.
+/// A pair of groups to join, ordered by overlap, then by number, so that the order is the same everywhere.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Candidate {
     ratio: f64,
@@ -79,9 +80,9 @@ impl Ord for Candidate {
     }
 }
 
-/// Groups the masks of all views (0 left out) into objects: the two groups with the largest overlap are joined, until
-/// none overlap by [`SAME_OBJECT`]. Masks of one view are never one object. Returns the groups, each sorted, in the
-/// order of their first masks.
+/// Groups the masks of all views, without 0, into objects. It joins the two groups with the largest overlap until no
+/// overlap exceeds `SAME_OBJECT`. Two masks of one view never join. Returns the groups, each sorted, in the order of
+/// their first masks.
 pub fn associate(views: &[Owners]) -> Vec<Vec<Segment>> {
     let segments: Vec<Segment> = (views.iter().enumerate())
         .flat_map(|(view, owners)| owners.ids.iter().filter(|&&id| id != 0).map(move |&id| (view, id)))
@@ -100,7 +101,7 @@ pub fn associate(views: &[Owners]) -> Vec<Vec<Segment>> {
     join(&segments, links)
 }
 
-/// Overlaps of the masks of two views, by ids, over the Gaussians that both views see.
+/// Returns the overlaps of the masks of two views, by ids, over the Gaussians visible in both.
 fn overlaps(first: &Owners, second: &Owners) -> Vec<((u16, u16), Overlap)> {
     let (columns, mut table) = (second.ids.len(), vec![0.0; first.ids.len() * second.ids.len()]);
     for (a, b) in first.rows.iter().zip(&second.rows) {
@@ -125,7 +126,7 @@ fn overlaps(first: &Owners, second: &Owners) -> Vec<((u16, u16), Overlap)> {
     found
 }
 
-/// Agglomeration with average linkage.
+/// Agglomerative clustering with average linkage.
 fn join(segments: &[Segment], mut links: Vec<BTreeMap<usize, Overlap>>) -> Vec<Vec<Segment>> {
     let mut groups: Vec<Vec<Segment>> = segments.iter().map(|&segment| vec![segment]).collect();
     let mut seen_in: Vec<BTreeSet<usize>> = segments.iter().map(|&(view, _)| [view].into()).collect();
@@ -137,7 +138,7 @@ fn join(segments: &[Segment], mut links: Vec<BTreeMap<usize, Overlap>>) -> Vec<V
     let mut heap: BinaryHeap<Candidate> =
         pairs.filter(|(a, b, _)| a < b).filter_map(|(a, b, overlap)| candidate(a, b, overlap)).collect();
     while let Some(Candidate { ratio, pair: (a, b) }) = heap.pop() {
-        // An entry is stale once one of its groups has grown or gone.
+        // An entry is stale if one of its groups has changed.
         let current = links[a].get(&b).is_some_and(|overlap| overlap.ratio() == ratio);
         if !current || groups[a].is_empty() || groups[b].is_empty() || !seen_in[a].is_disjoint(&seen_in[b]) {
             continue;

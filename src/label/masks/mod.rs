@@ -1,4 +1,5 @@
-//! Masks made to agree between views: by overlap from frame to frame, or by the Gaussians that they own.
+//! Masks that agree between views: [`track`] connects frames of a video by overlap, [`agree`] connects views by the
+//! Gaussians of a model.
 
 pub(crate) mod agree;
 pub(crate) mod associate;

@@ -1,43 +1,42 @@
-//! Masks that agree with each other, from masks that do not and a model that all of them made.
+//! Repairs inconsistent masks by the model that all of them made.
 
 use super::associate::Segment;
 use crate::scene::LabelMap;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Share of a mask that must be one object for the whole mask to become it; below, the mask covers several objects and
-/// is divided along the model's own borders.
+/// Share of one object in a mask above which the whole mask becomes that object. Otherwise the mask covers several
+/// objects and is divided along the borders in the model.
 const ONE_OBJECT: f64 = 0.85;
-/// Smallest share of a mask that is divided off as another object: less is a border that the model has elsewhere.
+/// Smallest share of a mask that is split off as another object. Less is a shifted border.
 const PART: f64 = 0.05;
-/// Share of what the model shows of an object in a view that must lie where the mask has nothing for the object to count
-/// as missed there.
+/// Share of an object's rendered pixels outside of all masks above which the object counts as missing in the view.
 const MISSED: f64 = 0.6;
-/// Smallest area that is divided off or filled in, as a share of the picture: below are borders, not objects.
+/// Smallest area to split off or fill in, as a share of the image. Smaller areas are borders, not objects.
 const SMALLEST: f64 = 0.0005;
 
-/// How objects get their ids.
+/// The rule for the ids of objects.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Naming {
-    /// The id that most of the object's pixels have in the masks; what is left over gets the next free ones.
+    /// The most frequent id of the object's pixels in the masks; conflicts get the next free ids.
     Majority,
-    /// 1, 2, .. by size: the ids of different views mean nothing to each other.
+    /// 1, 2, ... by size, for views with unrelated ids.
     Fresh,
 }
 
-/// What was done to the masks.
+/// The changes to the masks.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Repairs {
-    /// Masks (view and old id) that got another id, with the new one.
+    /// Masks with a new id: view, old id, new id.
     pub renamed: Vec<(Segment, u16)>,
-    /// Masks that were divided, with the ids of their parts.
+    /// Divided masks, with the ids of their parts.
     pub divided: Vec<(Segment, Vec<u16>)>,
-    /// Objects that a view had missed and now shows.
+    /// Objects that were missing in a view: view and id.
     pub filled: Vec<Segment>,
-    /// Views that had no mask and got one from the model.
+    /// Views that got their mask from the model.
     pub made: Vec<usize>,
 }
 
-/// Id of every mask, from its group.
+/// Returns the id of each mask from its group.
 pub fn name_groups(groups: &[Vec<Segment>], pixels: &BTreeMap<Segment, u64>, naming: Naming) -> BTreeMap<Segment, u16> {
     let area = |group: &[Segment]| group.iter().map(|segment| pixels.get(segment).copied().unwrap_or(0)).sum::<u64>();
     let mut by_size: Vec<usize> = (0..groups.len()).collect();
@@ -74,7 +73,7 @@ pub fn name_groups(groups: &[Vec<Segment>], pixels: &BTreeMap<Segment, u64>, nam
     groups.iter().enumerate().flat_map(named).collect()
 }
 
-/// The masks with the ids of their groups.
+/// Returns the mask with the ids of its groups.
 pub fn rename(view: usize, mask: &LabelMap, names: &BTreeMap<Segment, u16>) -> LabelMap {
     let new: BTreeMap<u16, u16> =
         mask.objects().into_iter().map(|id| (id, names.get(&(view, id)).copied().unwrap_or(0))).collect();
@@ -82,8 +81,8 @@ pub fn rename(view: usize, mask: &LabelMap, names: &BTreeMap<Segment, u16>) -> L
     LabelMap { ids, ..mask.clone() }
 }
 
-/// Repairs one renamed mask by what the model shows in its view: divides masks that cover several objects, gives masks of
-/// another object its id, and fills in objects that were missed.
+/// Repairs a renamed mask by the rendered labels of its view. Divides masks that cover several objects, corrects the
+/// ids of others, and fills in missing objects.
 pub fn mend(view: usize, mask: &LabelMap, shown: &LabelMap, repairs: &mut Repairs) -> LabelMap {
     let smallest = (SMALLEST * mask.ids.len() as f64).max(4.0) as u64;
     let mut counts: BTreeMap<u16, BTreeMap<u16, u64>> = BTreeMap::new();
@@ -124,7 +123,7 @@ pub fn mend(view: usize, mask: &LabelMap, shown: &LabelMap, repairs: &mut Repair
     out
 }
 
-/// Gives the pixels of `id` new ids by their place.
+/// Sets the pixels of `id` to the new id at their index.
 fn recolour(out: &mut LabelMap, mask: &LabelMap, id: u16, new: impl Fn(usize) -> u16) {
     for (at, to) in out.ids.iter_mut().enumerate().filter(|(at, _)| mask.ids[*at] == id) {
         *to = new(at);

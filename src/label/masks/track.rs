@@ -1,32 +1,32 @@
-//! Ids that go from frame to frame by overlap: the simplest tracker, for the masks of a segmenter of single pictures.
+//! A simple tracker: connects the masks of a single-image segmenter from frame to frame by overlap.
 //!
-//! It knows nothing but outlines, so it needs frames in which objects hardly move: those of `labelgs densify`, which are
-//! there for that (LabelGS, densification of views).
+//! It uses only outlines. So objects must hardly move between frames, as in the videos of `labelgs densify` (LabelGS,
+//! densification of views).
 
 use crate::scene::LabelMap;
 use crate::scene::labels::LABEL_MAX;
 use crate::{Error, Result};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// When two regions are the same object.
+/// The rule for the same object in two frames.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Overlap {
-    /// Least intersection over union of a region and the object's last region.
+    /// Least intersection over union of a region and the last region of the object.
     pub least: f64,
-    /// Frames that an object may be out of sight before it is forgotten.
+    /// Number of frames that an object may be absent before it is forgotten.
     pub memory: usize,
 }
 
-/// An object's last region.
+/// The last region of an object.
 struct Track {
     id: u16,
     frame: usize,
     pixels: BTreeSet<u32>,
 }
 
-/// The frames with ids of objects, 1 to N in the order of their appearance, instead of the ids of their regions, which may
-/// mean something else in every frame. Regions and objects are paired by overlap, the most alike first. All frames have
-/// one size; an error if more objects appear than there are ids.
+/// Replaces the ids of regions, which may differ in every frame, by ids of objects: 1 to N in the order of appearance.
+/// Pairs regions and objects by overlap, the largest first. All frames have the same size. Returns an error if there
+/// are more objects than ids.
 pub fn track(frames: &[LabelMap], how: Overlap) -> Result<Vec<LabelMap>> {
     let mut tracks: Vec<Track> = Vec::new();
     let mut next = 0_u32;
@@ -56,7 +56,7 @@ pub fn track(frames: &[LabelMap], how: Overlap) -> Result<Vec<LabelMap>> {
     Ok(named)
 }
 
-/// Pixels of each region but 0.
+/// Returns the pixels of each region except 0.
 fn regions(frame: &LabelMap) -> BTreeMap<u16, BTreeSet<u32>> {
     let mut regions: BTreeMap<u16, BTreeSet<u32>> = BTreeMap::new();
     for (&id, pixel) in frame.ids.iter().zip(0..).filter(|(id, _)| **id != 0) {
@@ -65,7 +65,7 @@ fn regions(frame: &LabelMap) -> BTreeMap<u16, BTreeSet<u32>> {
     regions
 }
 
-/// The object of each region that overlaps one enough; every object has one region at most.
+/// Returns the object of each region with enough overlap. Every object has at most one region.
 fn pair(tracks: &[Track], regions: &BTreeMap<u16, BTreeSet<u32>>, least: f64) -> BTreeMap<u16, u16> {
     let mut pairs = Vec::new();
     for (&region, pixels) in regions {

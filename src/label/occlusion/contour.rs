@@ -1,20 +1,20 @@
-//! Occluders from depth that means the same everywhere: a vote of the contour's pixels, and chains of occluders.
+//! Occluders from consistent depth: a vote of the pixels along a contour, and chains of occluders.
 
 use super::hull::Outline;
 use super::walk;
 use crate::scene::{LabelMap, Occluders};
 use std::collections::BTreeMap;
 
-/// When one side of a contour is in front.
+/// The rule that decides which side of a contour is in front.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rule {
-    /// Relative difference of depth at which a pixel takes sides. 0.02: a floor seen at 15 degrees in a picture of 320 px
-    /// changes by 1 % from one pixel to the next, and is not in front of what stands on it.
+    /// Relative difference of depth from which a pixel votes. 0.02: a floor seen at 15 degrees in an image of 320 px
+    /// changes by 1 % from one pixel to the next, and is not in front of the things on it.
     pub margin: f64,
-    /// Share of the pixels that take sides which must agree, at least 0.5. 0.5: something that stands on another thing is
-    /// in front of it along most of its contour, and along the rest, where the two touch, no pixel takes sides.
+    /// Share of the votes that must agree, at least 0.5. 0.5: a thing on top of another is in front of it along most of
+    /// its contour; where the two touch, no pixel votes.
     pub majority: f64,
-    /// Share of all pixels of the contour that must agree. 0.1: less is noise of a few pixels.
+    /// Share of all pixels of the contour that must agree. 0.1: less is noise.
     pub least: f64,
 }
 
@@ -24,16 +24,16 @@ impl Default for Rule {
     }
 }
 
-/// What the pixels of one side of a contour say.
+/// The votes of one side of a contour.
 #[derive(Clone, Copy, Default)]
 struct Side {
-    /// Pixels with depth here and across.
+    /// Number of pixels with depth on both sides.
     votes: u64,
-    /// Those that find the other side nearer by the margin.
+    /// Number of pixels where the other side is nearer by the margin.
     other_nearer: u64,
-    /// Those that find themselves nearer by the margin.
+    /// Number of pixels where this side is nearer by the margin.
     self_nearer: u64,
-    /// Sum of their own depths.
+    /// Sum of the depths on this side.
     depth: f64,
 }
 
@@ -45,16 +45,18 @@ impl Side {
 
 type Sides = BTreeMap<(u16, u16), Side>;
 
-/// Occluders of each object. `depth` is z per pixel, smaller is nearer; what is not finite or not positive is none.
+/// Returns the occluders of each object. `depth` is z per pixel, smaller is nearer; values that are not finite or not
+/// positive are holes.
 ///
-/// k' hides k directly if they touch and the pixels on both sides of their contour vote for it by `rule`; each compares
-/// its own depth with the mean of its neighbours across.
+/// k' hides k directly if they touch and the pixels on both sides of their contour vote for it by `rule`. Each pixel
+/// compares its depth with the mean of its neighbours on the other side.
 ///
-/// k' hides k through a chain k, a, .., k' in which each hides the one before directly: k goes on behind a, and where k'
-/// covers a nothing says that k ends there, so that its pixels cannot say that k is absent. Each further link must
-/// * lie within k: the mean of its pixels is in the convex hull of those of k, because what is interrupted goes on
-///   between its visible parts, and without this nearly everything in a crowd would hide everything;
-/// * be nearer by the margin, along its contour towards the link before, than k is where it goes under a;
+/// k' hides k through a chain k, a, .., k' in which each object hides the previous one directly. k continues behind a,
+/// and may also continue behind k' where k' covers a, so these pixels do not show that k is absent. Each further link
+/// must
+/// * lie within k: the mean of its pixels is in the convex hull of the pixels of k. An interrupted object continues
+///   between its visible parts; without this rule nearly everything in a crowd would hide everything.
+/// * be nearer by the margin, along its contour with the previous link, than k is along its contour with a.
 /// * not be hidden by k directly.
 pub fn by_contour(labels: &LabelMap, depth: &[f32], rule: Rule) -> Occluders {
     let sides = sides(labels, depth, rule.margin);
@@ -89,7 +91,6 @@ fn sides(labels: &LabelMap, depth: &[f32], margin: f64) -> Sides {
     sides
 }
 
-/// What chains are followed with.
 struct Chains<'a> {
     direct: &'a Occluders,
     sides: &'a Sides,
@@ -113,9 +114,9 @@ impl Chains<'_> {
         }
     }
 
-    /// The direct occluders of `label` and those at the end of a chain, sorted.
+    /// Returns the direct occluders of `label` and the ends of its chains, sorted.
     fn occluders(&self, label: u16) -> Vec<u16> {
-        // For each occluder the largest depth at which `label` goes under the first link of a chain to it.
+        // For each occluder, the largest depth of `label` at the first link of a chain to it.
         let mut reached: BTreeMap<u16, f64> = BTreeMap::new();
         let first = self.hidden_by(label).iter();
         let mut open: Vec<(u16, f64)> =

@@ -1,4 +1,4 @@
-//! Occluders from depth maps in files, by the paper's rule.
+//! Occluders from depth files, by the rule of the paper.
 
 use super::{by_mean, distances};
 use crate::error::{Error, Result};
@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// Occluders of `views` of a scene, which have masks, by name of the view. One depth map is in memory per thread.
+/// Returns the occluders of `views`, which have masks, by name of the view. Each thread keeps one depth map in memory.
 pub fn from_depths(
     scene: &Path,
     depths: &Path,

@@ -1,4 +1,4 @@
-//! Occluders to look at.
+//! Pictures of occluders.
 
 use super::walk;
 use crate::scene::labels::label_colour;
@@ -8,15 +8,15 @@ const IN_FRONT: [u8; 3] = [255; 3];
 const BEHIND: [u8; 3] = [0; 3];
 const NEITHER: [u8; 3] = [128; 3];
 
-/// The objects in their colours, a third darker, and along each contour a line of two pixels: white on the side in
-/// front and black on the side behind, or grey where neither hides the other. Chains have no contour and no line.
+/// Draws the objects in their colours, darkened by a third, with a line of two pixels along each contour: white in
+/// front and black behind, or grey if neither object hides the other. Chains have no contour and no line.
 pub fn picture(labels: &LabelMap, occluders: &Occluders) -> Vec<[u8; 3]> {
     let fill = |&id: &u16| label_colour(u32::from(id)).map(|channel| (u16::from(channel) * 2 / 3) as u8);
     let mut pixels: Vec<[u8; 3]> = labels.ids.iter().map(fill).collect();
     let hides = |front: u16, back: u16| occluders.get(&back).is_some_and(|by| by.contains(&front));
     let mut drawn = vec![0_u8; pixels.len()];
     walk(labels, |own, other, pixel, _| {
-        // Where three objects meet, what is in front of any wins over what is behind.
+        // Where three objects meet, front wins over back.
         let (rank, colour) = match (hides(own, other), hides(other, own)) {
             (true, _) => (3, IN_FRONT),
             (_, true) => (2, BEHIND),

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 
 type Point = (i64, i64);
 
-/// Where an object's pixels are.
+/// The convex hull of an object's pixels and their mean.
 pub(super) struct Outline {
     /// Corners, counter-clockwise for y up.
     hull: Vec<Point>,
@@ -13,12 +13,12 @@ pub(super) struct Outline {
     count: i64,
 }
 
-/// Twice the area of the triangle; positive if it turns left for y up.
+/// Returns twice the area of the triangle, positive for a left turn with y up.
 fn area(a: Point, b: Point, c: Point) -> i64 {
     (b.0 - a.0) * (c.1 - a.1) - (b.1 - a.1) * (c.0 - a.0)
 }
 
-/// Half of the hull of points that are sorted one way (monotone chain, Andrew 1979), without its last point.
+/// Returns half of the hull of points sorted in one direction (monotone chain, Andrew 1979), without its last point.
 fn half(points: impl Iterator<Item = Point>) -> Vec<Point> {
     let mut hull: Vec<Point> = Vec::new();
     for point in points {
@@ -32,9 +32,9 @@ fn half(points: impl Iterator<Item = Point>) -> Vec<Point> {
 }
 
 impl Outline {
-    /// The outlines of all objects, by id.
+    /// Returns the outlines of all objects, by id.
     pub(super) fn of_all(labels: &LabelMap) -> BTreeMap<u16, Self> {
-        // The leftmost and the rightmost pixel of each row span the hull.
+        // The leftmost and rightmost pixels of the rows are enough for the hull.
         let mut rows: BTreeMap<u16, BTreeMap<i64, (i64, i64)>> = BTreeMap::new();
         let mut sums: BTreeMap<u16, (Point, i64)> = BTreeMap::new();
         for (index, &id) in labels.ids.iter().enumerate().filter(|&(_, &id)| id != 0) {
@@ -56,13 +56,13 @@ impl Outline {
         sums.into_iter().map(outline).collect()
     }
 
-    /// The pixel nearest to the mean of all pixels.
+    /// Returns the pixel nearest to the mean of all pixels.
     pub(super) fn mean(&self) -> (i64, i64) {
         let round = |sum: i64| (2 * sum + self.count) / (2 * self.count);
         (round(self.sum.0), round(self.sum.1))
     }
 
-    /// True for a pixel in the hull or on its edge. A hull without area holds nothing.
+    /// Returns true for a pixel in the hull or on its edge. A hull without area contains no pixel.
     pub(super) fn contains(&self, pixel: (i64, i64)) -> bool {
         let corners = self.hull.len();
         corners > 2 && (0..corners).all(|at| area(self.hull[at], self.hull[(at + 1) % corners], pixel) >= 0)

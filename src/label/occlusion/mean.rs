@@ -1,13 +1,13 @@
-//! The paper's rule: whose contour is nearer on the average.
+//! The rule of the paper: the object with the smaller mean distance along the contour is in front.
 
 use super::walk;
 use crate::scene::{DepthKind, DepthMap, LabelMap, Occluders};
 use std::collections::BTreeMap;
 
-/// Distances for [`by_mean`], [H, W]; 0 or not a number is none.
+/// Returns the distances for [`by_mean`], `[H, W]`; 0 and NaN are holes.
 ///
-/// Of inverse depth d the paper takes 1 - (d - min) / (max - min), with the extremes of the picture; its nearest pixel
-/// becomes 0 and thereby counts as none. Metric depth stays as it is.
+/// For inverse depth d the paper takes 1 - (d - min) / (max - min), with the extremes of the image. Its nearest pixel
+/// becomes 0 and so a hole. Metric depth stays as it is.
 pub fn distances(map: &DepthMap, kind: DepthKind) -> Vec<f64> {
     let values = map.values.iter().map(|&value| f64::from(value));
     match kind {
@@ -20,7 +20,7 @@ pub fn distances(map: &DepthMap, kind: DepthKind) -> Vec<f64> {
     }
 }
 
-/// Sum and count of distances along a contour.
+/// Sum and number of the distances along a contour.
 #[derive(Clone, Copy, Default)]
 struct Band {
     sum: f64,
@@ -33,8 +33,9 @@ impl Band {
     }
 }
 
-/// LabelGS, occlusion analysis: k' hides k where they touch and the mean distance of the contour of k' towards k is
-/// less than that of k towards k'. There is no margin, because the scale of the distances is unknown.
+/// Returns the occluders of each object (LabelGS, occlusion analysis). k' hides k if they touch and the mean distance
+/// of the contour of k' with k is smaller than that of k with k'. There is no margin, because the scale of the
+/// distances is unknown.
 pub fn by_mean(labels: &LabelMap, distance: &[f64]) -> Occluders {
     let mut bands: BTreeMap<(u16, u16), Band> = BTreeMap::new();
     walk(labels, |own, other, pixel, _| {

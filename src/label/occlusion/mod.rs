@@ -1,8 +1,9 @@
-//! Which objects hide which, seen in one view: the paper's O_k, from which U_k leaves out the pixels of what hides k.
+//! Occluders: which objects hide which in one view. They are the paper's O_k; U_k leaves out the pixels of the
+//! occluders of k.
 //!
-//! [`by_mean`] is the paper's rule for depth that a network guessed from the photo; [`by_contour`] is for depth that
-//! means the same in every pixel, such as the model's own. Both look at the contours between objects: a pixel is on the
-//! contour of k towards k' if its label is k and one of its 8 neighbours is k'. 0 never hides and is never hidden.
+//! [`by_mean`] is the rule of the paper, for monocular depth of a network. [`by_contour`] needs consistent depth, such
+//! as that of the model. Both use the contours between objects: a pixel is on the contour of k with k' if its label is
+//! k and one of its 8 neighbours is k'. The background (0) neither hides nor is hidden.
 
 mod contour;
 mod depths;
@@ -19,8 +20,8 @@ pub(crate) use mean::distances;
 use crate::scene::LabelMap;
 use std::collections::BTreeMap;
 
-/// Calls `visit(own label, other label, pixel, neighbours)` for each pixel on a contour and each label on its other
-/// side, sorted; `neighbours` are those of its 8 neighbours that have the other label.
+/// Calls `visit(own label, other label, pixel, neighbours)` for each pixel on a contour and each label on the other
+/// side, sorted. `neighbours` are the ones of its 8 neighbours with the other label.
 fn walk(labels: &LabelMap, mut visit: impl FnMut(u16, u16, usize, &[usize])) {
     let (width, height) = (i64::from(labels.width), i64::from(labels.height));
     let mut others: BTreeMap<u16, Vec<usize>> = BTreeMap::new();

@@ -1,8 +1,9 @@
-//! Votes for labels: every contributor of every pixel of every masked view counts (FlashSplat's sums), background too.
+//! Votes for labels: sums over all contributors of all pixels of all masked views, background included (as in
+//! FlashSplat).
 //!
-//! The paper writes a label where one Gaussian makes most of a pixel, and the last view to write wins. Sums over all
-//! views do not depend on their order, reach Gaussians that never dominate a pixel, can be revoked by the background,
-//! and say how sure they are.
+//! In the paper the main Gaussian of a pixel takes its label, and the last view wins. Sums over all views do not depend
+//! on the order of views and reach Gaussians that dominate no pixel. The background can outvote a label, and the share
+//! of the winner is a confidence.
 
 use crate::engine::{Engine, ListKey, VoteInput};
 use crate::error::{Error, Result};
@@ -12,9 +13,9 @@ use crate::shaders::structs::StepUniforms;
 use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Labels that one walk over a tile counts (glsl/lift/vote.comp).
+/// Number of labels that one walk over a tile counts (glsl/lift/vote.comp).
 const LABELS_PER_WALK: usize = 4;
-/// Most labels that a sweep counts at once; more take more sweeps. Bounds memory at 128 bytes a Gaussian.
+/// Most labels per sweep; more labels take more sweeps. It bounds memory at 128 bytes per Gaussian.
 pub(crate) const COLUMNS_MAX: u32 = 16;
 
 /// A view that votes.
@@ -22,46 +23,46 @@ pub(crate) const COLUMNS_MAX: u32 = 16;
 pub struct Voter<'a> {
     /// Camera.
     pub camera: &'a Camera,
-    /// Visible objects.
+    /// Mask of the view.
     pub mask: &'a LabelMap,
-    /// The photo, for the pixels that have no source and no say.
+    /// Photo of the view; its invalid pixels do not vote.
     pub photo: Option<&'a Photo>,
-    /// Weight of this view's votes by label, 0 to 1; 1 where nothing is said.
+    /// Weight of the votes of this view by label, 0 to 1; 1 for labels without an entry.
     pub trust: Option<&'a BTreeMap<u16, f32>>,
 }
 
 impl<'a> Voter<'a> {
-    /// A view with a mask, which need not be its own.
+    /// Makes a voter of a view and any mask of its size.
     pub fn of(view: &'a View, mask: &'a LabelMap) -> Self {
         Self { camera: &view.camera, mask, photo: view.photo.as_deref(), trust: None }
     }
 }
 
-/// How a sweep is made.
+/// The options of a sweep.
 #[derive(Clone, Copy, Debug)]
 pub struct Sweep {
     /// Near plane, world units.
     pub near: f32,
-    /// Pixels within this distance of a contour of their mask have no say, px.
+    /// Width of the band along mask contours without votes, px.
     pub border: u32,
 }
 
-/// Votes for one Gaussian: columns in order, with sums of blending weights, [`VOTE_ONE`] to a pixel of weight 1. Columns
-/// without votes are left out: of thousands of objects a Gaussian meets a few.
+/// The votes for one Gaussian: column and sum of blending weights, in the order of columns; a pixel of weight 1 is
+/// [`VOTE_ONE`]. Columns without votes are absent, because a Gaussian meets only a few of thousands of objects.
 pub(crate) type Row = [(u16, u64)];
 
-/// What all views together say.
+/// The votes of all views.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Ballot {
-    /// Label of each column, sorted; the first is 0, no object.
+    /// Label of each column, sorted; the first is 0, the background.
     pub labels: Vec<u16>,
-    /// Where each row begins among the cells [N + 1].
+    /// Start of each row among the cells, `[N + 1]`.
     starts: Vec<usize>,
     cells: Vec<(u16, u64)>,
 }
 
 impl Ballot {
-    /// From (row, column, votes) of `count` rows, in any order, each place once at most.
+    /// Makes a ballot from (row, column, votes) in any order, each pair (row, column) at most once, for `count` rows.
     pub fn new(labels: Vec<u16>, count: usize, mut votes: Vec<(u32, u16, u64)>) -> Self {
         votes.par_sort_unstable();
         let mut starts = vec![0; count + 1];
@@ -70,22 +71,22 @@ impl Ballot {
         Self { labels, starts, cells: votes.into_iter().map(|(_, column, votes)| (column, votes)).collect() }
     }
 
-    /// Number of Gaussians.
+    /// Returns the number of Gaussians.
     pub fn len(&self) -> usize {
         self.starts.len() - 1
     }
 
-    /// True without Gaussians.
+    /// Returns true without Gaussians.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// Votes for Gaussian `row`.
+    /// Returns the votes for Gaussian `row`.
     pub fn row(&self, row: usize) -> &Row {
         &self.cells[self.starts[row]..self.starts[row + 1]]
     }
 
-    /// Blending weights, px, of all columns [N, columns], as the mirrors have them.
+    /// Returns the blending weights of all columns, px, `[N, columns]`, in the layout of the mirrors.
     pub fn weights(&self) -> Vec<f64> {
         let mut dense = vec![0.0; self.len() * self.labels.len()];
         for (row, cells) in dense.chunks_mut(self.labels.len()).enumerate() {
@@ -95,17 +96,17 @@ impl Ballot {
     }
 }
 
-/// Columns to make room for in an engine that is to count votes for `objects` objects.
+/// Returns the number of vote columns that an engine needs for `objects` objects.
 pub(crate) fn columns_for(objects: usize) -> u32 {
     (objects as u32 + 1).min(COLUMNS_MAX)
 }
 
-/// Counts the votes of all views for the engine's model. The engine needs room for votes
+/// Counts the votes of all views for the model in the engine. The engine needs memory for votes
 /// ([`LabelSize::vote_columns`](crate::engine::LabelSize)), and nothing may be in flight.
 pub fn sweep(engine: &mut Engine, voters: &[Voter], how: Sweep) -> Result<Ballot> {
     let room = engine.size().labels.map_or(0, |room| room.vote_columns) as usize;
     if room == 0 {
-        return Err(Error::Bug("the engine has no room for votes".to_owned()));
+        return Err(Error::Bug("the engine has no memory for votes".to_owned()));
     }
     let objects: BTreeSet<u16> = voters.iter().flat_map(|voter| voter.mask.objects()).collect();
     let labels: Vec<u16> = std::iter::once(UNLABELLED as u16).chain(objects).collect();
@@ -124,7 +125,7 @@ pub fn sweep(engine: &mut Engine, voters: &[Voter], how: Sweep) -> Result<Ballot
     Ok(Ballot::new(labels, count, votes))
 }
 
-/// Adds the votes of one view for the labels of `chunk`.
+/// Adds the votes of one view for the labels in `chunk`.
 fn vote(engine: &mut Engine, voter: &Voter, chunk: &[u16], how: Sweep) -> Result<()> {
     let columns = columns_of(voter, chunk, how.border);
     let rounds = most_labels(&columns, voter.mask.width, engine.shape().tile_width, engine.shape().tile_height)
@@ -136,12 +137,12 @@ fn vote(engine: &mut Engine, voter: &Voter, chunk: &[u16], how: Sweep) -> Result
     let weights: Vec<f32> = chunk.iter().map(trust).collect();
     let base = engine.view_uniforms(voter.camera, how.near, [0.0; 3]);
     let uniforms = StepUniforms { vote_columns: chunk.len() as u32, ..base };
-    // What does not fit is not counted, and counted when the list runs again.
+    // Votes that do not fit are not counted, and the list runs again.
     engine.run(ListKey::Vote(rounds), &VoteInput { uniforms, columns: &columns, weights: &weights })?;
     Ok(())
 }
 
-/// Column of each pixel's label, or [`VOTE_NONE`].
+/// Returns the column of each pixel's label, or [`VOTE_NONE`].
 fn columns_of(voter: &Voter, chunk: &[u16], border: u32) -> Vec<u32> {
     let mut column = vec![VOTE_NONE; 1 << 16];
     chunk.iter().zip(0..).for_each(|(&id, at)| column[usize::from(id)] = at);
@@ -156,11 +157,11 @@ fn columns_of(voter: &Voter, chunk: &[u16], border: u32) -> Vec<u32> {
     columns
 }
 
-/// The most different columns in a tile.
+/// Returns the largest number of distinct columns in a tile.
 fn most_labels(columns: &[u32], width: u32, tile_width: u32, tile_height: u32) -> usize {
     let tiles_x = width.div_ceil(tile_width) as usize;
     let height = columns.len() / width.max(1) as usize;
-    // A bit per column, of which there are at most COLUMNS_MAX.
+    // One bit per column; there are at most COLUMNS_MAX.
     let mut seen = vec![0_u32; tiles_x * height.div_ceil(tile_height as usize)];
     for (y, row) in columns.chunks_exact(width as usize).enumerate() {
         for (x, &column) in row.iter().enumerate().filter(|(_, column)| **column != VOTE_NONE) {
@@ -171,7 +172,7 @@ fn most_labels(columns: &[u32], width: u32, tile_width: u32, tile_height: u32) -
     seen.iter().map(|bits| bits.count_ones() as usize).max().unwrap_or(0)
 }
 
-/// Blending weight in pixels of a number of votes.
+/// Converts a number of votes to blending weight, px.
 pub(crate) fn weight(votes: u64) -> f64 {
     votes as f64 / f64::from(VOTE_ONE)
 }

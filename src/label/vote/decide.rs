@@ -1,4 +1,4 @@
-//! From votes to a label and a confidence for every Gaussian.
+//! Decides label and confidence of every Gaussian from the votes.
 
 use super::ballot::{Ballot, Sweep, Voter, sweep, weight};
 use crate::engine::Engine;
@@ -10,23 +10,23 @@ use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::num::NonZero;
 
-/// Weight over all views below which a Gaussian's own votes count for less than its neighbours', px. What shows less
-/// than a pixel in all views together is inside an object or behind it, and no pixel speaks for it.
+/// Weight over all views up to which neighbours vote too, px. A Gaussian with less than one pixel in all views is inside
+/// or behind an object, and its own votes mean little.
 const EVIDENCE: f64 = 1.0;
-/// Neighbours that speak for it instead.
+/// Number of these neighbours.
 const NEIGHBOURS: usize = 8;
 
-/// A label per Gaussian.
+/// The labels of a model.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Decision {
-    /// Labels [N], 0: no object.
+    /// Labels, `[N]`; 0 is the background.
     pub labels: Vec<u32>,
-    /// Share of the winner in all votes [N], 0 to 1; 0 where nobody voted.
+    /// Share of the winning label in all votes, `[N]`, 0 to 1; 0 without votes.
     pub confidence: Vec<f32>,
 }
 
 impl Decision {
-    /// Labels of less confidence become 0.
+    /// Sets labels with a confidence below `least` to 0.
     pub fn drop_unsure(&mut self, least: f32) {
         for (label, _) in self.labels.iter_mut().zip(&self.confidence).filter(|(_, share)| **share < least) {
             *label = UNLABELLED;
@@ -34,9 +34,9 @@ impl Decision {
     }
 }
 
-/// The label with most votes, the smaller of equals. A Gaussian with little weight of its own asks its nearest
-/// neighbours that have more: the object's inside gets the object's label, so that nothing of it stays behind when it is
-/// taken out (with `complete`; without, it decides by what little it has).
+/// Decides for the label with the most votes; ties go to the smaller label. With `complete`, the nearest neighbours with
+/// enough weight vote too for a Gaussian with little weight. So the inside of an object gets its label and is removed
+/// with it.
 pub fn decide(ballot: &Ballot, means: &[[f32; 3]], complete: bool) -> Result<Decision> {
     if ballot.len() != means.len() {
         return Err(Error::Bug(format!("{} rows of votes for {} Gaussians", ballot.len(), means.len())));
@@ -68,12 +68,12 @@ pub fn decide(ballot: &Ballot, means: &[[f32; 3]], complete: bool) -> Result<Dec
     Ok(Decision { labels, confidence })
 }
 
-/// The column with the largest share, the first of equals; 0 if there is none.
+/// Returns the column with the largest share, the first of equals; 0 without columns.
 fn winner(shares: impl Iterator<Item = (u16, f64)>) -> u16 {
     shares.fold((0, 0.0), |best, at| if at.1 > best.1 { at } else { best }).0
 }
 
-/// The Gaussians with enough weight of their own, as a tree with their rows.
+/// Returns a k-d tree of the Gaussians with enough weight, and their rows.
 fn tree_of(means: &[[f32; 3]], totals: &[f64]) -> Result<Option<(ImmutableKdTree<f64, 3>, Vec<usize>)>> {
     let sure = |&row: &usize| totals[row] >= EVIDENCE && means[row].iter().all(|value| value.is_finite());
     let rows: Vec<usize> = (0..means.len()).filter(sure).collect();
@@ -86,10 +86,10 @@ fn tree_of(means: &[[f32; 3]], totals: &[f64]) -> Result<Option<(ImmutableKdTree
     Ok(Some((tree, rows)))
 }
 
-/// Pixels of a mask by label: where the model shows the same label, and all.
+/// For each label, the number of mask pixels where the model shows the same label, and of all its mask pixels.
 pub type Agreement = BTreeMap<u16, (u64, u64)>;
 
-/// Where a view's mask agrees with the labels that the model shows there.
+/// Compares the mask of a view with the rendered labels.
 pub fn agreement(mask: &LabelMap, rendered: &LabelMap) -> Agreement {
     let mut counts = Agreement::new();
     for (&id, &shown) in mask.ids.iter().zip(&rendered.ids) {
@@ -100,10 +100,10 @@ pub fn agreement(mask: &LabelMap, rendered: &LabelMap) -> Agreement {
     counts
 }
 
-/// How far each view's mask can be trusted, by label: the square of its agreement with the model, which all views made,
-/// over the agreement of all views together; 1 at most. A mask whose ids were swapped or merged speaks with little
-/// weight in the next count. A label that the model shows badly everywhere is nobody's mistake: were its votes to count
-/// less for that, thin objects would lose to what surrounds them, and what is gone from the model could never return.
+/// Returns the trust in the mask of each view by label, at most 1: the squared ratio of the view's agreement with the
+/// model to the agreement of all views together. So masks with swapped or merged ids count little in the next round.
+/// The ratio is relative, because a label with poor agreement in all views is the fault of no mask: otherwise thin
+/// objects would lose to their background, and a lost label could not return.
 pub fn trust(views: &[Agreement]) -> Vec<BTreeMap<u16, f32>> {
     let mut together = Agreement::new();
     for (&id, &(same, all)) in views.iter().flatten() {
@@ -122,14 +122,13 @@ pub fn trust(views: &[Agreement]) -> Vec<BTreeMap<u16, f32>> {
     views.iter().map(of_view).collect()
 }
 
-/// Puts a decision into a model.
 pub(crate) fn apply(model: &mut Gaussians, decision: Decision) {
     model.labels = Some(decision.labels);
     model.label_confidence = Some(decision.confidence);
 }
 
-/// Counts the votes of `voters` for the engine's model and decides. With the labels that the model has, `judges`, masks
-/// that disagree with them count less ([`trust`]). Nothing may be in flight.
+/// Counts the votes of `voters` for the model in the engine and decides. `judges` are the current labels of the model:
+/// masks that disagree with them count less ([`trust`]). Nothing may be in flight.
 pub(crate) fn count(
     engine: &mut Engine,
     voters: &[Voter],

@@ -1,21 +1,20 @@
-//! The paper's lift, on a model that is not being trained: for comparison with votes.
+//! The lift of the paper on a trained model, for comparison with votes.
 
 use crate::render::Rendered;
 use crate::scene::{Camera, LabelMap, UNLABELLED};
 use glam::DVec3;
 
-/// Settings of the lift (LabelGS, equations 6 and 7).
+/// The settings of the lift (LabelGS, equations 6 and 7).
 #[derive(Clone, Copy, Debug)]
 pub struct Lift {
-    /// Least blending weight of a pixel's main Gaussian.
+    /// Least blending weight of the main Gaussian of a pixel.
     pub threshold: f32,
-    /// Gaussian projection filter: its centre must project into the same mask.
+    /// Gaussian projection filter: the centre of the Gaussian must project into the same mask.
     pub gpf: bool,
 }
 
-/// Writes the labels of one view's mask into the main Gaussians of its pixels; whatever was there before is lost. Within
-/// the view the heavier weight wins, then the larger label. `camera` is [relative](Camera::relative_to) to the origin of
-/// `means`.
+/// Writes the labels of one view's mask to the main Gaussians of its pixels, over previous labels. Within the view the
+/// larger weight wins, then the larger label. `camera` is [relative](Camera::relative_to) to the origin of `means`.
 pub(crate) fn lift(
     labels: &mut [u32],
     means: &[[f32; 3]],

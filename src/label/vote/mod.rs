@@ -1,4 +1,4 @@
-//! Labels for a trained model from masks: votes of all views, and the paper's lift for comparison.
+//! Labels for a trained model from masks: votes of all views, and the lift of the paper for comparison.
 
 pub(crate) mod ballot;
 pub(crate) mod decide;

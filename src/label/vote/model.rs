@@ -1,4 +1,4 @@
-//! Labels for a model that is not being trained, of any trainer.
+//! Labels for a trained model of any trainer.
 
 use super::ballot::{Sweep, Voter, columns_for};
 use super::decide::{apply, count};
@@ -15,25 +15,25 @@ use rand_pcg::Pcg64Mcg;
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
-/// How votes are counted.
+/// The options for counting votes.
 #[derive(Clone, Copy, Debug)]
 pub struct Counting {
     /// Near plane, world units.
     pub near: f32,
-    /// Pixels so near to a contour of their mask have no say, px.
+    /// Width of the band along mask contours without votes, px.
     pub mask_border: u32,
-    /// Counts; from the second on, masks are judged by the outcome of the one before.
+    /// Number of counts. From the second on, masks that disagree with the previous result count less.
     pub rounds: u32,
-    /// Gaussians that show in no pixel ask their neighbours.
+    /// Gaussians that no pixel shows take the label of their neighbours.
     pub complete: bool,
-    /// Labels of less confidence are taken back at the end.
+    /// Labels of less confidence become 0 at the end, 0 to 1.
     pub min_confidence: f32,
 }
 
-/// An engine with a model and memory to count votes for so many labels at once ([`columns_for`]).
+/// Makes an engine with a model and memory for `columns` vote columns ([`columns_of`]).
 pub fn vote_engine(gpu: Arc<Gpu>, model: &Gaussians, views: &[&View], columns: u32) -> Result<Engine> {
     let sizes = views.iter().map(|view| (view.camera.width, view.camera.height));
-    // No layer is ever sampled, so no id needs a place among them.
+    // No step samples layers, so no id needs a layer.
     let labels = LabelSize { max_label: 0, layers: 0, vote_columns: columns };
     let size = EngineSize::of_model(model, sizes).with_labels(Some(labels));
     let mut engine = Engine::new(gpu, size, SchedulerOptions::default())?;
@@ -41,13 +41,13 @@ pub fn vote_engine(gpu: Arc<Gpu>, model: &Gaussians, views: &[&View], columns: u
     Ok(engine)
 }
 
-/// Columns for the objects of the masks of some views.
+/// Returns the number of vote columns for the objects in the masks of some views.
 pub fn columns_of(views: &[&View]) -> u32 {
     let objects: BTreeSet<u16> = views.iter().filter_map(|view| view.mask.as_ref()).flat_map(|m| m.objects()).collect();
     columns_for(objects.len())
 }
 
-/// Labels by votes. `engine` holds the model; `tick` is told of each round.
+/// Labels a model by votes. `engine` holds the model; `tick` is called in each round.
 pub fn label_by_votes(
     engine: &mut Engine,
     model: &mut Gaussians,
@@ -69,7 +69,7 @@ pub fn label_by_votes(
     Ok(())
 }
 
-/// Labels by the paper's rule: every view writes its own, one after the other in an order that `seed` decides.
+/// Labels a model by the rule of the paper: every view writes its labels, in an order that `seed` decides.
 pub fn label_by_lift(
     engine: &mut Engine,
     model: &mut Gaussians,

@@ -1,5 +1,5 @@
-//! The strategy of 3DGS, adaptive density control: clones and splits what has a large screen-space gradient, prunes what is faint or too
-//! large, and resets opacities if it is asked to.
+//! The strategy of 3DGS, adaptive density control: clones and splits Gaussians with large screen-space gradients,
+//! prunes faint or too large ones, and resets opacities if the settings say so.
 
 use super::{At, Population, Strategy};
 use crate::error::Result;
@@ -7,7 +7,7 @@ use crate::scheduler::plan::Buf;
 use crate::shaders::structs::StepUniforms;
 use crate::train::TrainConfig;
 
-/// The strategy of 3DGS. All of it follows from the step and the configuration.
+/// The strategy of 3DGS. It has no state: all decisions follow from the step and the configuration.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct DefaultStrategy;
 
@@ -32,7 +32,7 @@ impl Strategy for DefaultStrategy {
         Ok(())
     }
 
-    /// A densification replaces the parameters that the gradients belong to: no update then (3DGS).
+    /// A densification replaces the parameters of the gradients, so that no update follows (3DGS).
     fn updates(&self, at: At) -> bool {
         at.is_last() || !densifies_at(at.config, at.step)
     }
@@ -58,24 +58,23 @@ fn uniforms(at: At, step: StepUniforms) -> StepUniforms {
     }
 }
 
-/// Step at which densification ends.
 pub(crate) fn densify_until(config: &TrainConfig) -> u32 {
-    /// Steps of densification that a short run needs.
+    /// Fewest steps of densification in a short run.
     const LEAST: u32 = 1000;
     config.densify_until.unwrap_or((config.iterations / 2).max(config.densify_from.saturating_add(LEAST)))
 }
 
-/// True for steps that end with a densification.
+/// Returns true for steps that end with a densification.
 pub fn densifies_at(config: &TrainConfig, step: u32) -> bool {
     step < densify_until(config) && step > config.densify_from && step.is_multiple_of(config.densify_interval)
 }
 
-/// True where a densification at `step` also prunes by size.
+/// Returns true if a densification at `step` also prunes by size.
 pub(crate) fn prunes_large_at(config: &TrainConfig, step: u32) -> bool {
     config.opacity_reset_interval > 0 && step > config.opacity_reset_interval
 }
 
-/// True for steps that end with an opacity reset.
+/// Returns true for steps that end with an opacity reset.
 pub fn resets_opacity_at(config: &TrainConfig, step: u32) -> bool {
     config.opacity_reset_interval > 0
         && step < densify_until(config)

@@ -1,5 +1,5 @@
-//! What happens to the Gaussians besides the optimiser: when, and what. [`DefaultStrategy`] is that of 3DGS; others
-//! implement [`Strategy`], and go into a [`TrainerOptions`](super::TrainerOptions).
+//! Strategies that change the set of Gaussians between steps. [`DefaultStrategy`] is that of 3DGS. Another one
+//! implements [`Strategy`] and goes into [`TrainerOptions`](super::TrainerOptions).
 
 pub(crate) mod default;
 pub(crate) mod population;
@@ -18,7 +18,7 @@ use serde_json::Value;
 use std::fmt::Debug;
 use std::sync::Arc;
 
-/// A step as a strategy sees it.
+/// The step that a strategy decides about.
 #[derive(Clone, Copy, Debug)]
 pub struct At<'a> {
     /// Step, from 1.
@@ -30,73 +30,73 @@ pub struct At<'a> {
 }
 
 impl At<'_> {
-    /// True for the last step of the run, or beyond it.
+    /// Returns true for the last step of the run and beyond it.
     pub fn is_last(&self) -> bool {
         self.step >= self.config.iterations
     }
 }
 
-/// Densification in the widest sense. All answers must follow from the arguments and from what is [kept](Strategy::keep):
-/// steps are repeated after a buffer had to grow, and a training that is resumed asks again.
+/// Rules for the set of Gaussians. All results must be functions of the arguments and of the [kept](Strategy::keep)
+/// state: a step is repeated after a buffer has grown, and a resumed training calls again.
 pub trait Strategy: Debug + Send {
-    /// Name in checkpoints.
+    /// Returns the name for checkpoints.
     fn name(&self) -> &'static str;
 
-    /// True if it acts after this step. Steps in flight are waited for then.
+    /// Returns true if it acts after this step. The trainer then waits for the steps in flight.
     fn acts_after(&self, at: At) -> bool;
 
     /// Acts after such a step.
     fn act(&mut self, at: At, population: &mut Population) -> Result<()>;
 
-    /// True if a step updates the parameters.
+    /// Returns true if the step updates the parameters.
     fn updates(&self, _at: At) -> bool {
         true
     }
 
-    /// True if the model does not show what is in front right after this step: votes and occluders wait for their next
-    /// turn.
+    /// Returns true if the depth of the model is unreliable right after this step. Votes and occluders then wait for
+    /// their next turn.
     fn blurs_depth_after(&self, _at: At) -> bool {
         false
     }
 
-    /// Sets its uniforms of a step.
+    /// Sets uniforms of a step.
     fn uniforms(&self, _at: At, _to: &mut StepUniforms) {}
 
-    /// Passes that it adds to steps; asked once.
+    /// Returns the passes to add to steps; called once.
     fn extension(&self) -> Arc<dyn Extension> {
         Arc::new(())
     }
 
-    /// Which of its passes a step has; it is handed to [`Extension::extend`]. 0: the step is recorded without them.
+    /// Returns the number of its pass list for a step, for [`Extension::extend`]. 0: the step has none of its passes.
     fn passes(&self, _at: At) -> u32 {
         0
     }
 
-    /// Buffers of the model, besides parameters, moments and labels, that checkpoints hold. Their words are floats.
+    /// Returns the buffers to store in checkpoints besides parameters, moments and labels. Their words are floats.
     fn planes(&self) -> &'static [Buf] {
         &[]
     }
 
-    /// What else checkpoints hold.
+    /// Returns other state to store in checkpoints.
     fn keep(&self) -> Value {
         Value::Null
     }
 
-    /// Goes on from what was kept, or says what is wrong with it.
+    /// Restores the stored state, or returns what is wrong with it.
     fn restore(&mut self, _kept: &Value) -> Result<(), String> {
         Ok(())
     }
 }
 
-/// A strategy in a checkpoint.
+/// The state of a strategy in a checkpoint.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Kept {
-    /// Its name.
+    /// Name of the strategy.
     pub name: String,
     /// Names of its planes.
     pub planes: Vec<String>,
-    /// What else it keeps.
+    /// Other state.
     pub value: Value,
 }
 
@@ -107,18 +107,18 @@ impl Default for Kept {
 }
 
 impl Kept {
-    /// What a strategy keeps.
+    /// Returns the state of a strategy.
     pub fn of(strategy: &dyn Strategy) -> Self {
         let planes = strategy.planes().iter().map(|buf| TABLE[buf.index()].name.to_owned()).collect();
         Self { name: strategy.name().to_owned(), planes, value: strategy.keep() }
     }
 
-    /// True for [`DefaultStrategy`], which checkpoints do not mention.
+    /// Returns true for [`DefaultStrategy`], which has no entry in checkpoints.
     pub fn is_default(&self) -> bool {
         *self == Self::default()
     }
 
-    /// Gives it back to a strategy of the same name and planes.
+    /// Restores a strategy of the same name and planes.
     pub fn restore(&self, strategy: &mut dyn Strategy) -> Result<(), String> {
         let own = Self::of(strategy);
         if (&own.name, &own.planes) != (&self.name, &self.planes) {

@@ -1,10 +1,10 @@
-//! The Gaussians between two steps, as strategies change them, with a bound on their number.
+//! The Gaussians between two steps, as a strategy changes them, with a limit on their number.
 
 use crate::engine::{Engine, ListKey};
 use crate::error::{Error, Result};
 use crate::shaders::structs::{Counters, StepUniforms};
 
-/// What a densification did.
+/// Counts of a densification.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Densified {
     /// Gaussians cloned.
@@ -15,12 +15,11 @@ pub struct Densified {
     pub pruned: u32,
 }
 
-/// The most Gaussians that there may be.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Bound {
-    /// As the user or the device has it.
+    /// Limit of the user or of the device.
     pub most: u64,
-    /// Memory has bounded the number of Gaussians, which was said.
+    /// Memory has limited the number, and the log says so.
     pub by_memory: bool,
 }
 
@@ -34,7 +33,7 @@ pub struct Population<'a> {
 }
 
 impl<'a> Population<'a> {
-    /// After a step with these uniforms.
+    /// Makes the population after a step with these uniforms.
     pub(in crate::train) fn new(
         engine: &'a mut Engine,
         bound: &'a mut Bound,
@@ -44,27 +43,27 @@ impl<'a> Population<'a> {
         Self { engine, bound, uniforms, step, densified: None }
     }
 
-    /// Gaussians.
+    /// Returns the number of Gaussians.
     pub fn count(&self) -> u32 {
         self.engine.gaussian_count()
     }
 
-    /// What was densified since the step.
+    /// Returns the counts of the densification since the step.
     pub fn densified(&self) -> Option<Densified> {
         self.densified
     }
 
-    /// The uniforms of the step, with a seed of its own.
+    /// Returns the uniforms of the step, with a seed of its own.
     pub fn uniforms(&self) -> StepUniforms {
         self.uniforms
     }
 
-    /// The engine.
+    /// Returns the engine.
     pub fn engine(&mut self) -> &mut Engine {
         self.engine
     }
 
-    /// Clones, splits and prunes by the thresholds in `uniforms`, no more than there may be. Statistics start over.
+    /// Clones, splits and prunes by the thresholds in `uniforms`, within the limit. Statistics start over.
     pub fn densify(&mut self, uniforms: StepUniforms) -> Result<Densified> {
         let wanted = self.count_densified(uniforms)?.densified_count;
         let mut most = self.most(wanted)?;
@@ -91,7 +90,7 @@ impl<'a> Population<'a> {
         Ok(done)
     }
 
-    /// Brings all opacities down to at most 0.01.
+    /// Lowers all opacities to at most 0.01.
     pub fn reset_opacity(&mut self) -> Result<()> {
         let uniforms = StepUniforms { gaussian_count: self.count(), ..self.uniforms };
         self.engine.run(ListKey::OpacityReset, &uniforms).map(drop)
@@ -101,7 +100,7 @@ impl<'a> Population<'a> {
         Ok(self.engine.run(ListKey::DensifyCount, &uniforms)?.counters)
     }
 
-    /// The most Gaussians that there may be, of `count` that are wanted: what was asked for, and what memory holds.
+    /// Returns the limit for `count` wanted Gaussians: the setting, or the number that fits into memory.
     fn most(&mut self, count: u32) -> Result<u64> {
         let wanted = u64::from(count).min(self.bound.most);
         let fits = self.engine.most_gaussians(wanted)?;
@@ -112,15 +111,16 @@ impl<'a> Population<'a> {
         Ok(fits.min(self.bound.most))
     }
 
-    /// Raises the gradient threshold until the result fits the bound: those that need it most grow first.
+    /// Raises the gradient threshold until the result is within the limit, so that Gaussians with the largest gradients
+    /// grow.
     fn bounded(&mut self, uniforms: StepUniforms, count: u32, most: u64) -> Result<StepUniforms> {
-        // Where nothing grows there is nothing to bound.
+        // Without growth there is nothing to limit.
         if u64::from(count) <= most || uniforms.densify_threshold <= 0.0 {
             return Ok(uniforms);
         }
         let (mut low, mut high) = (uniforms.densify_threshold, uniforms.densify_threshold * 2.0);
         let with = |threshold| StepUniforms { densify_threshold: threshold, ..uniforms };
-        // The statistic has no infinite gradients, so some threshold lets nothing grow.
+        // Gradients in the statistic are finite, so a high enough threshold stops all growth.
         while high < f32::MAX && u64::from(self.count_densified(with(high))?.densified_count) > most {
             (low, high) = (high, (high * 2.0).min(f32::MAX));
         }
