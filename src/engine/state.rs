@@ -42,16 +42,16 @@ pub(crate) fn check(
     let mut given: BTreeMap<&str, &Plane> = planes.iter().map(|plane| (plane.name.as_str(), plane)).collect();
     for (buf, count) in buffers(sh_degree, labels, &kept, counts) {
         let (name, words) = (TABLE[buf.index()].name, words(buf));
-        let plane = given.remove(name).ok_or_else(|| format!("plane {name} is missing"))?;
+        let plane = given.remove(name).ok_or_else(|| format!("the plane {name} is missing"))?;
         let rows = plane.data.len() as u64 / u64::from(plane.words.max(1));
         if (plane.words, rows) != (words, u64::from(count)) {
             return Err(format!(
-                "plane {name} has {rows} rows of {} words, expected {count} rows of {words} words",
+                "the plane {name} has {rows} rows of {} words, {count} of {words} are expected",
                 plane.words
             ));
         }
     }
-    given.keys().next().map_or(Ok(()), |name| Err(format!("unexpected plane {name}")))
+    given.keys().next().map_or(Ok(()), |name| Err(format!("there is a plane {name}, which nothing needs")))
 }
 
 impl Engine {
