@@ -28,8 +28,9 @@ fn commands(page: &Path) -> Vec<String> {
 fn pages() -> Vec<PathBuf> {
     let folder = Path::new(ROOT).join("src/guide");
     let text = fs::read_to_string(folder.join("mod.rs")).expect("the guide");
-    let names = text.split("include_str!(\"").skip(1).filter_map(|rest| rest.split('"').next());
-    let pages: Vec<PathBuf> = names.map(|name| folder.join(name)).collect();
+    let table = text.split("\npages! {").nth(1).expect("the pages");
+    let names = table.lines().filter_map(|line| line.trim().split_once(": \"")).map(|(name, _)| name);
+    let pages: Vec<PathBuf> = names.map(|name| folder.join(name).with_extension("md")).collect();
     let files = fs::read_dir(&folder).expect("the guide").flatten();
     let written = files.filter(|file| file.path().extension().is_some_and(|ending| ending == "md")).count();
     assert_eq!(pages.len(), written, "a page that the guide does not show");

@@ -15,44 +15,35 @@
 //!
 //! Commands in boxes run one after the other, page after page, in an empty folder; a test runs them all, with fewer steps.
 
-/// From photos to a labelled model, step by step.
-#[doc = include_str!(concat!(env!("OUT_DIR"), "/pictures.md"))]
-#[doc = include_str!("start.md")]
-pub mod start {}
+#[allow(unused_imports, reason = "the pages link to them")]
+use crate::{Error, edit, engine, eval, gpu, io, label, render, run, scene, synth};
 
-/// Scenes, photos, cameras and depth maps that are read.
-#[doc = include_str!("data.md")]
-pub mod data {}
+/// A module for each page, with the text of its file. Definitions of links come first and win over those at the end of a
+/// file, which serve readers of the file itself.
+macro_rules! pages {
+    ($($name:ident: $summary:literal;)*) => {$(
+        #[doc = $summary]
+        ///
+        #[doc = include_str!(concat!(env!("OUT_DIR"), "/pictures.md"))]
+        /// [page data]: data
+        /// [page masks]: masks
+        /// [page labels]: labels
+        /// [page outputs]: outputs
+        ///
+        #[doc = include_str!(concat!(stringify!($name), ".md"))]
+        pub mod $name {}
+    )*};
+}
 
-/// Masks: their form, trackers, checks and repair.
-#[doc = include_str!("masks.md")]
-pub mod masks {}
-
-/// Objects chosen, taken out, renamed and drawn.
-#[doc = include_str!(concat!(env!("OUT_DIR"), "/pictures.md"))]
-#[doc = include_str!("labels.md")]
-pub mod labels {}
-
-/// Scores: held-out views and published benchmarks.
-#[doc = include_str!("benchmarks.md")]
-pub mod benchmarks {}
-
-/// The method, and its differences from LabelGS and 3DGS.
-#[doc = include_str!("method.md")]
-pub mod method {}
-
-/// Files, exit statuses and determinism.
-#[doc = include_str!("outputs.md")]
-pub mod outputs {}
-
-/// Devices, memory and speed.
-#[doc = include_str!("devices.md")]
-pub mod devices {}
-
-/// Symptoms and what to do.
-#[doc = include_str!("troubleshooting.md")]
-pub mod troubleshooting {}
-
-/// The code: floors, words, the life of a step.
-#[doc = include_str!("inside.md")]
-pub mod inside {}
+pages! {
+    start: "From photos to a labelled model, step by step.";
+    data: "Scenes, photos, cameras and depth maps that are read.";
+    masks: "Masks: their form, trackers, checks and repair.";
+    labels: "Objects chosen, taken out, renamed and drawn.";
+    benchmarks: "Scores: held-out views and published benchmarks.";
+    method: "The method, and its differences from LabelGS and 3DGS.";
+    outputs: "Files, exit statuses and determinism.";
+    devices: "Devices, memory and speed.";
+    troubleshooting: "Symptoms and what to do.";
+    inside: "The code: the way of the data, floors, words, the life of a step.";
+}
