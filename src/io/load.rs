@@ -62,7 +62,7 @@ pub(crate) fn shortened(names: &[&str]) -> String {
     if names.len() > 3 { format!("{shown}, ...") } else { shown }
 }
 
-/// Returns the views whose photos exist. If photos are not requested and none exists, returns all views with a known size.
+/// Returns the views whose photos exist; if photos are not requested and none exists, all views with a known size.
 fn existing(listing: &Listing, options: &LoadOptions, notes: &mut Vec<String>) -> Result<Vec<Listed>> {
     let total = listing.views.len() + listing.missing.len();
     if total + listing.bad.len() == 0 {

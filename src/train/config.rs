@@ -224,8 +224,8 @@ crate::options::options! {
             /// 500 (3DGS).
             densify_from <"STEP">: u32 = 500;
 
-            /// Step at which densification stops, at the earliest 1000 steps after --densify-from if not given [default: half
-            /// of the run].
+            /// Step at which densification stops, at the earliest 1000 steps after --densify-from if not given [default:
+            /// half of the run].
             ///
             /// Pruning and opacity resets end there too. 3DGS also stops at half of the run (15000 of 30000). LabelGS
             /// has 40000, the end of its runs: that makes 75 % more Gaussians and slower steps for the same PSNR.

@@ -10,8 +10,8 @@ use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::num::NonZero;
 
-/// Weight over all views up to which neighbours vote too, px. A Gaussian with less than one pixel in all views is inside
-/// or behind an object, and its own votes mean little.
+/// Weight over all views up to which neighbours vote too, px. A Gaussian with less than one pixel in all views is
+/// inside or behind an object, and its own votes mean little.
 const EVIDENCE: f64 = 1.0;
 /// Number of these neighbours.
 const NEIGHBOURS: usize = 8;
@@ -34,9 +34,9 @@ impl Decision {
     }
 }
 
-/// Decides for the label with the most votes; ties go to the smaller label. With `complete`, the nearest neighbours with
-/// enough weight vote too for a Gaussian with little weight. So the inside of an object gets its label and is removed
-/// with it.
+/// Decides for the label with the most votes; ties go to the smaller label. With `complete`, the nearest neighbours
+/// with enough weight vote too for a Gaussian with little weight. So the inside of an object gets its label and is
+/// removed with it.
 pub fn decide(ballot: &Ballot, means: &[[f32; 3]], complete: bool) -> Result<Decision> {
     if ballot.len() != means.len() {
         return Err(Error::Bug(format!("{} rows of votes for {} Gaussians", ballot.len(), means.len())));
