@@ -1,4 +1,9 @@
 //! Integration tests, one binary; those of the program as it ships are in `shipped.rs`.
+#![allow(
+    clippy::disallowed_methods,
+    clippy::too_many_lines,
+    reason = "the rules of files and lengths are those of the library"
+)]
 
 use labelgs::internals::verify::reference;
 

@@ -1,5 +1,7 @@
 //! Files that are either the old one or the complete new one, whatever happens in between.
 
+#![expect(clippy::disallowed_methods, reason = "the place that opens files for writing")]
+
 use crate::error::{Error, Result};
 use crate::lab::fault;
 use std::collections::BTreeSet;

@@ -4,6 +4,7 @@
 //! undefined behaviour of the whole process.
 // Recording commands is a foreign interface: every call is unsafe.
 #![allow(unsafe_code)]
+#![expect(clippy::disallowed_methods, reason = "the place that records dispatches and barriers")]
 
 use crate::error::{Error, Result};
 use crate::gpu::{Buffer, CommandBuffer, Gpu, Pipeline, QueryPool, vk_call};

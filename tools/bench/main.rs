@@ -2,6 +2,11 @@
 //!
 //! `tools/bench/run COMMAND` builds with optimisation and runs one of them. Each prints its tables and writes JSON and
 //! charts into `--output`. With `--small` it does the same in seconds on tiny scenes, as the tests run it.
+#![allow(
+    clippy::disallowed_methods,
+    clippy::too_many_lines,
+    reason = "the rules of files and lengths are those of the library"
+)]
 
 mod compiler;
 mod device;
