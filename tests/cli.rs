@@ -188,7 +188,7 @@ fn every_setting_of_a_file_survives_flags_that_nobody_typed() {
 }
 
 #[test]
-fn flag_before_file_before_default() {
+fn flags_override_the_file_and_the_file_the_defaults() {
     let folder = folder();
     let path = folder.path().join("mine.toml");
     std::fs::write(&path, "iterations = 300\nocclusion = \"none\"\nbackground = [1, 0.5, 0]\n").expect("file");
@@ -323,7 +323,7 @@ fn synth_makes_a_scene_once() {
 
 #[cfg(unix)]
 #[test]
-fn a_reader_that_has_seen_enough_is_no_failure() {
+fn a_closed_pipe_is_no_failure() {
     let folder = folder();
     let model = model(folder.path());
     let (reader, writer) = std::io::pipe().expect("pipe");

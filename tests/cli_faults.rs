@@ -318,7 +318,7 @@ fn any_allocation_may_fail() {
 /// A number that is none, in the memory of a device that goes wrong once: the training goes back, and ends as it would
 /// have.
 #[test]
-fn a_number_that_is_none_is_found_and_undone() {
+fn a_nan_is_found_and_undone() {
     let Some(_turn) = device() else { return };
     let place = Place::new();
     let flags = ["--config", &place.settings()];

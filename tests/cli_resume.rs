@@ -218,7 +218,7 @@ fn a_resumed_run_reads_the_scene_as_the_first_did() {
 /// Folders that nobody may write to, and previews that cannot be written on the way.
 #[cfg(target_os = "linux")]
 #[test]
-fn what_cannot_be_written_is_said_early_or_borne() {
+fn unwritable_folders_are_refused_and_lost_previews_warned_of() {
     let Some(_turn) = device() else { return };
     let place = Place::new();
     let masks = place.text("scene/masks");

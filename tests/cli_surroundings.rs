@@ -76,7 +76,7 @@ fn languages_and_zones_change_nothing() {
 
 /// Streams that are closed, or whose reader is gone, end nothing: results are in files.
 #[test]
-fn nobody_has_to_listen() {
+fn closed_streams_do_not_end_a_run() {
     let Some(_turn) = device() else { return };
     let place = Place::new();
     succeeded(&place.trained("right", &["--iterations", "4"]));
@@ -142,7 +142,7 @@ fn within(place: &Place, megabytes: u32, args: &[String]) -> Output {
 /// A computer without memory: the status for that, with the number, and no half of a file.
 #[cfg(target_os = "linux")]
 #[test]
-fn a_computer_may_be_out_of_memory() {
+fn host_memory_may_run_out() {
     let Some(_turn) = device() else { return };
     let place = Place::new();
     let [model, part, right] = ["model.ply", "part.ply", "right.ply"].map(|name| place.text(name));

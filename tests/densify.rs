@@ -187,7 +187,7 @@ fn model(folder: &Path) -> (String, String) {
 }
 
 #[test]
-fn there_and_back_again_with_a_device() {
+fn masks_of_a_rendered_video_return_to_their_photos() {
     let Some(_gpu) = crate::support::device() else { return };
     let folder = tempfile::tempdir().expect("a folder");
     let (scene, out) = model(folder.path());

@@ -51,7 +51,7 @@ fn touching_gaussians_are_one_part() {
 }
 
 #[test]
-fn shape_and_rotation_of_gaussians_count() {
+fn contact_depends_on_shape_and_rotation() {
     let rod = [1.0, 0.05, 0.05];
     // A quarter turn about z: the long axis is y.
     let turned = [0.5_f32.sqrt(), 0.0, 0.0, 0.5_f32.sqrt()];
@@ -74,7 +74,7 @@ fn a_small_part_between_large_ones_joins_them() {
 }
 
 #[test]
-fn many_gaussians_at_one_place_and_in_one_plane_are_no_trouble() {
+fn many_gaussians_at_one_place_or_in_one_plane_are_grouped() {
     let plane = |index: usize| ([0.0, (index % 20) as f32 * 0.5, (index / 20) as f32 * 0.5], [0.15; 3], UPRIGHT);
     let mut rows: Vec<_> = (0..400).map(plane).collect();
     rows.extend(vec![([9.0; 3], [1e-4; 3], UPRIGHT); 300]);

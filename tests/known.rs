@@ -65,7 +65,7 @@ fn commands_break_no_rule_of_vulkan() {
 
 /// Labels beyond those of the masks, up to the last that there is: tables made for the masks' ids do not hold them.
 #[test]
-fn labels_beyond_those_of_the_masks_are_no_surprise() {
+fn labels_beyond_those_of_the_masks_are_handled() {
     let Some(_turn) = device() else { return };
     let place = Place::new();
     let [scene, masks, model] = ["scene", "scene/masks", "model.ply"].map(|name| place.text(name));
@@ -91,7 +91,7 @@ fn labels_beyond_those_of_the_masks_are_no_surprise() {
 /// Buffers that a device bounds below what a training grows to: it goes on with as many Gaussians as fit, or ends with the
 /// numbers; it never asks for more than the limit.
 #[test]
-fn a_training_meets_the_limits_of_a_device() {
+fn a_training_stays_within_the_limits_of_a_device() {
     let Some(_turn) = device() else { return };
     let place = Place::new();
     let flags = ["--config", &place.settings(), "--densify-grad-threshold", "1e-9"];

@@ -35,7 +35,7 @@ fn lifted(image: &Blended, gaussians: usize) -> Vec<u32> {
 }
 
 #[test]
-fn two_gaussians_on_a_ray() {
+fn the_nearer_of_two_gaussians_on_a_ray_is_main() {
     let image = one_pixel(&[0.7, 0.9]);
     let pixel = &image.pixels[0];
     assert_eq!(pixel.main, 0);
@@ -204,7 +204,7 @@ fn densification_counts_the_views_that_see_a_gaussian() {
 }
 
 #[test]
-fn label_loss_of_a_right_object_is_0() {
+fn label_loss_of_a_correct_object_is_0() {
     let s = scene(21, &Shape::default());
     let (photo, map, slot) = (&s.target.photo, &s.target.label_map, &s.target.slots[0]);
     let image: Vec<[f64; 3]> =
@@ -217,7 +217,7 @@ fn label_loss_of_a_right_object_is_0() {
 }
 
 #[test]
-fn pixels_near_a_contour_say_nothing_and_weights_scale() {
+fn pixels_near_a_contour_are_ignored_and_weights_scale() {
     let photo = Photo { size: (4, 1), colours: vec![[0.5; 3]; 4], valid: vec![true; 4] };
     let loss = |map: &[u32], weight: f64| {
         let slot = ObjectPixel { label: 1, occluders: Vec::new(), weight };
@@ -248,7 +248,7 @@ fn label_loss_of_an_empty_object_is_its_masked_photo_without_gradient() {
 }
 
 #[test]
-fn occluded_and_invalid_pixels_say_nothing_about_an_object() {
+fn occluded_and_invalid_pixels_are_ignored() {
     let photo = Photo { size: (4, 1), colours: vec![[0.5; 3]; 4], valid: vec![true, true, true, false] };
     let slot = ObjectPixel { label: 1, occluders: vec![2], weight: 1.0 };
     let rules = Rules { label_alpha: 0.5, ..Rules::default() };

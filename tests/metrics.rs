@@ -269,7 +269,7 @@ fn labels_are_summarised() {
 }
 
 #[test]
-fn extract_and_remove_share_the_model_out() {
+fn extract_and_remove_divide_the_model() {
     let (object, rest) =
         (extract(&model(), &[2], MIN_LABEL_CONFIDENCE).expect("2"), remove(&model(), &[2]).expect("2"));
     assert_eq!((object.labels, rest.labels), (Some(vec![2, 2]), Some(vec![5, 0])));

@@ -90,7 +90,7 @@ fn odd_camera(place: &Place) -> Camera {
 }
 
 #[test]
-fn a_watched_paused_and_saved_run_has_the_bits_of_one_that_nobody_watches() {
+fn a_watched_paused_and_saved_run_has_the_bits_of_an_unwatched_one() {
     let Some(turn) = device() else { return };
     let place = Place::new();
     let alone = train(&turn, &request(&place, "alone", Start::New(settings(&place))), &mut ());

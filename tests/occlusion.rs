@@ -147,7 +147,7 @@ fn a_vote_needs_the_margin_and_the_majority() {
 }
 
 #[test]
-fn a_few_pixels_decide_nothing() {
+fn a_few_pixels_do_not_make_an_occluder() {
     let rows = 40;
     let labels = map(4, &[1, 1, 2, 2].repeat(rows));
     let mut depth = vec![2.0; 4 * rows];
@@ -159,7 +159,7 @@ fn a_few_pixels_decide_nothing() {
 }
 
 #[test]
-fn holes_have_no_vote() {
+fn holes_do_not_vote() {
     let (labels, mut depth) = strips(&[1.0, 2.0]);
     for hole in [0.0, -1.0, f32::NAN, f32::INFINITY] {
         // Only the last row is left.
@@ -249,7 +249,7 @@ fn a_picture_shows_the_side_in_front() {
 }
 
 #[test]
-fn the_table_comes_back_and_nonsense_is_refused() {
+fn a_table_is_read_back_and_an_invalid_one_refused() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("occlusion.json");
     let table =

@@ -47,7 +47,7 @@ fn crowd(count: usize) -> (Gaussians, Camera) {
 }
 
 #[test]
-fn sixty_thousand_gaussians_in_one_tile() {
+fn sixty_thousand_gaussians_in_one_tile_equal_the_mirror() {
     let Some(turn) = device() else { return };
     let gpu = turn.gpu();
     let (model, camera) = crowd(60_000);
@@ -79,7 +79,7 @@ fn sixty_thousand_gaussians_in_one_tile() {
 
 /// A short training whose lists are walked in many segments equals one whose lists are walked at once, bit for bit.
 #[test]
-fn segments_change_nothing() {
+fn segments_change_no_bit() {
     let Some(turn) = device() else { return };
     let gpu = turn.gpu();
     let options = labelgs::synth::SynthOptions {
@@ -110,7 +110,7 @@ fn segments_change_nothing() {
 
 /// Pictures narrower than a tile have more tiles than pixels by a tile's pixels; all have their segments.
 #[test]
-fn segments_of_narrow_pictures_have_their_room() {
+fn segments_of_narrow_pictures_fit_their_buffer() {
     for (width, height) in [(3, 200), (1, 150), (200, 3)] {
         let Some(turn) = device() else { return };
         let shape = KernelShape { segment_length: 16, ..KernelShape::of(turn.capabilities()) };

@@ -18,14 +18,14 @@ fn failures(rules: &Rules, gpu: &Arc<labelgs::gpu::Gpu>) -> Vec<String> {
 }
 
 #[test]
-fn passes_on_this_device() {
+fn the_selftest_passes_on_this_device() {
     let Some(turn) = device() else { return };
     assert_eq!(failures(&Rules::default(), &turn.gpu()), Vec::<String>::new());
 }
 
 /// An engine that differs from the reference in one constant fails in the checks of the passes that use it.
 #[test]
-fn sees_each_pass_go_wrong() {
+fn the_selftest_detects_a_fault_in_each_pass() {
     let Some(turn) = device() else { return };
     for (mutant, check) in [
         ("dilation", "projection"),

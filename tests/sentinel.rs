@@ -28,7 +28,7 @@ fn with(change: impl Fn(&mut Gaussians, usize)) -> (Scene, usize) {
 /// A quaternion of length 1e-25 is a rotation like any other, but its gradient is 1e25 times as large and no square of it
 /// is a float: the Gaussian stays as it is in that step, and nothing else notices.
 #[test]
-fn a_gradient_beyond_floats_is_dropped_and_nothing_else() {
+fn only_the_gradient_that_overflows_is_dropped() {
     let Some(turn) = device() else { return };
     let (made, row) = with(|g, row| g.quats[row] = [3e-26, 8e-26, -5e-26, 2e-26]);
     let mut fixture = Fixture::new(turn, made, false);
@@ -88,7 +88,7 @@ fn the_pass_that_finds_a_broken_parameter_is_counted_by_itself() {
 
 /// What a step has spoilt no pass has looked at when the checkpoint is written: it is not.
 #[test]
-fn a_state_with_a_number_that_is_none_is_no_checkpoint() {
+fn a_state_with_a_nan_is_refused_as_a_checkpoint() {
     let Some(turn) = device() else { return };
     let options = SynthOptions { preset: Preset::Simple, width: 48, height: 36, views: 4, points: 300, seed: 3 };
     let dataset = dataset(&options, 0);
@@ -110,7 +110,7 @@ fn a_state_with_a_number_that_is_none_is_no_checkpoint() {
 
 /// More than ten dropped gradients in each of three steps are no accident.
 #[test]
-fn a_training_that_drops_gradients_all_the_time_ends() {
+fn a_training_that_keeps_dropping_gradients_ends() {
     let Some(turn) = device() else { return };
     let run = |broken: usize| -> Result<u32, Error> {
         let options = SynthOptions { preset: Preset::Simple, width: 48, height: 36, views: 4, points: 300, seed: 3 };

@@ -109,7 +109,7 @@ fn plane<'a>(state: &'a TrainState, name: &str) -> Option<&'a [u32]> {
 }
 
 #[test]
-fn a_strategy_decides_what_becomes_of_the_gaussians() {
+fn a_strategy_controls_the_population() {
     let Some(turn) = device() else { return };
     let mut trainer = fresh(&turn, options());
     let first = go_on(&mut trainer, 5);

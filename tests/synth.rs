@@ -219,7 +219,7 @@ fn mean_run(pixels: &[bool], width: usize) -> f64 {
 }
 
 #[test]
-fn the_hard_scene_is_hard() {
+fn the_hard_scene_has_thin_cut_dark_and_hidden_objects() {
     let (world, cameras, made) = hard();
     let (width, height) = (made[0].width as usize, made[0].height as usize);
     let views = made.len() as u32 as f64;

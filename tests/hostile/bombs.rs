@@ -130,7 +130,7 @@ fn exr(names: &[&'static str], blocks: Blocks, compression: Compression) -> Vec<
 }
 
 #[test]
-fn exrs_with_odd_channels_and_tiles() {
+fn exrs_with_tiles_and_any_channel_name_are_read() {
     let tiles = Blocks::Tiles(Vec2(5, 3));
     for (blocks, compression) in [
         (tiles, Compression::ZIP1),

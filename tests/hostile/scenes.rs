@@ -106,7 +106,7 @@ fn a_field_of_view_of_half_a_turn_or_more_is_refused() {
 }
 
 #[test]
-fn poses_and_points_beyond_all_numbers() {
+fn poses_that_overflow_are_refused_and_points_skipped() {
     let scene = simple(1);
     let path = scene.path().join("sparse/0/images.bin");
     for far in [1e13, 1e300, f64::MAX] {

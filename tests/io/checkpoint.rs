@@ -46,7 +46,7 @@ fn refused(scene: &Scene, bytes: &[u8]) -> String {
 }
 
 #[test]
-fn what_is_damaged_is_refused_with_the_reason() {
+fn a_damaged_checkpoint_is_refused_with_the_reason() {
     let scene = Scene::new();
     let path = scene.at("a.ckpt");
     example().write(&path).expect("written");
@@ -79,7 +79,7 @@ fn what_is_damaged_is_refused_with_the_reason() {
 
 /// Contents that a checksum agrees with and that make no sense take no memory and end in no panic.
 #[test]
-fn nonsense_with_a_right_checksum_is_refused() {
+fn invalid_values_with_a_correct_checksum_are_refused() {
     let scene = Scene::new();
     let file = |json: &str, rest: &[u8], json_bytes: u64| {
         let body = [&json_bytes.to_le_bytes()[..], json.as_bytes(), rest].concat();

@@ -118,7 +118,7 @@ fn in_a_room_points_are_swept_onto_the_surfaces() {
 }
 
 #[test]
-fn odd_rigs_get_their_gaussians() {
+fn unusual_camera_rigs_get_initial_gaussians() {
     let same = vec![looking(DVec3::ZERO, DVec3::Z); 2];
     let outward = (0..8).map(|index| {
         let angle = std::f64::consts::TAU * f64::from(index) / 8.0;

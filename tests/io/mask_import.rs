@@ -213,7 +213,7 @@ fn soft_edges_are_cut_only_when_asked() {
 }
 
 #[test]
-fn what_fits_two_readings_is_refused_with_the_flags_that_decide() {
+fn ambiguous_masks_are_refused_with_the_flags_that_decide() {
     // A mirrored folder of black and white id pictures, or the object `left`.
     let scene = Scene::new();
     scene.colmap_bin("sparse/0", &[pinhole()], &["left/a.png", "left/b.png"]);

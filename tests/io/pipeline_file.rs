@@ -8,7 +8,7 @@ use labelgs::io::PipelineFolder;
 use std::sync::Arc;
 
 #[test]
-fn what_is_damaged_is_not_given_to_a_driver() {
+fn a_damaged_cache_is_not_given_to_the_driver() {
     let folder = tempfile::tempdir().expect("a folder");
     let store = PipelineFolder::new(folder.path().join("new"));
     assert!(store.load("gpu").is_empty(), "nothing was saved");

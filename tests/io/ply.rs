@@ -28,7 +28,7 @@ fn gaussians(count: usize, degree: u32, labelled: bool) -> Gaussians {
 }
 
 #[test]
-fn what_is_written_is_read() {
+fn a_written_ply_is_read_back() {
     let scene = Scene::new();
     for degree in 0..=3 {
         for labelled in [false, true] {

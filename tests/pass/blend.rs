@@ -42,7 +42,7 @@ fn last_splats(fixture: &mut Fixture) -> Vec<usize> {
 }
 
 #[test]
-fn blend_forward_of_the_scene() {
+fn blend_forward_of_the_scene_equals_its_mirror() {
     let Some(turn) = device() else { return };
     let mut fixture = Fixture::new(turn, opaque_scene(51), false);
     fixture.train();
@@ -68,7 +68,7 @@ fn blend_forward_of_the_scene() {
 }
 
 #[test]
-fn blend_forward_main_of_a_render() {
+fn main_gaussians_of_a_render_equal_the_mirror() {
     let Some(turn) = device() else { return };
     let mut fixture = Fixture::new(turn, opaque_scene(52), false);
     fixture.render();
@@ -105,7 +105,7 @@ const BOUNDS: GradientBounds = GradientBounds {
 };
 
 #[test]
-fn blend_backward_and_gather_of_the_scene() {
+fn blend_backward_and_gather_equal_their_mirrors() {
     let Some(turn) = device() else { return };
     let mut fixture = Fixture::new(turn, opaque_scene(53), false);
     fixture.train();
@@ -173,7 +173,7 @@ fn object_layers_equal_filtered_renders() {
 
 /// The device's boxes and tile test let nothing through that counts: a pixel outside of a splat's tiles never sees it.
 #[test]
-fn no_tile_misses_a_splat_that_counts() {
+fn no_tile_misses_a_visible_splat() {
     let Some(turn) = device() else { return };
     let mut fixture = Fixture::new(turn, opaque_scene(55), false);
     fixture.train();

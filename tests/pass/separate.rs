@@ -48,7 +48,7 @@ fn gradient_rows(fixture: &mut Fixture, report: &Report) -> Vec<Row> {
 }
 
 #[test]
-fn gradients_are_those_of_one_traversal() {
+fn separate_passes_give_the_gradients_of_one_traversal() {
     for (seed, objects, lift) in [(62, 3, LabelRule::Main), (64, 5, LabelRule::Votes), (65, 1, LabelRule::Main)] {
         let Some(turn) = device() else { return };
         let shape = Shape { gaussians: 120, objects, width: 61, height: 45, ..Shape::default() };
@@ -88,7 +88,7 @@ fn gradients_are_those_of_one_traversal() {
 
 /// An object pass must not take the records that the scene or another object left in its slots.
 #[test]
-fn a_hidden_object_gets_no_gradient_of_others() {
+fn a_hidden_object_gets_no_gradient_from_others() {
     let Some(turn) = device() else { return };
     let shape = Shape { gaussians: 200, opacities: (2.0, 8.0), ..Shape::default() };
     let mut fixture = Fixture::new(turn, scene(66, &shape), true);
@@ -102,7 +102,7 @@ fn a_hidden_object_gets_no_gradient_of_others() {
 }
 
 #[test]
-fn a_short_training_stays_close() {
+fn a_short_training_with_separate_passes_stays_close() {
     let Some(turn) = device() else { return };
     let options = SynthOptions { preset: Preset::Simple, width: 72, height: 52, views: 5, points: 400, seed: 3 };
     let run = |separate: bool, small: bool| -> Vec<StepReport> {

@@ -40,7 +40,7 @@ toy_shader!(
 );
 
 #[test]
-fn a_missing_barrier_is_heard() {
+fn a_missing_barrier_is_reported() {
     let Some(turn) = device() else { return };
     let mut list = PassList::new("race");
     list.fill(A, 5);
@@ -55,7 +55,7 @@ fn a_missing_barrier_is_heard() {
 }
 
 #[test]
-fn a_write_beyond_a_buffer_is_heard() {
+fn a_write_beyond_a_buffer_is_reported() {
     let Some(turn) = device() else { return };
     let mut list = PassList::new("beyond");
     list.pass(PassDecl::new(beyond(), vec![A], Grid::Groups(1, 1, 1)));

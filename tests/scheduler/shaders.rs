@@ -118,7 +118,7 @@ fn devices_are_chosen_by_name_index_and_uuid() {
 
 /// The negative control of all other tests: what the layer says is heard.
 #[test]
-fn the_validation_layer_is_heard() {
+fn messages_of_the_validation_layer_are_recorded() {
     let Some(mut gpu) = device() else { return };
     if !gpu.is_validated() {
         eprintln!("skipped: the validation layer is not installed or off");

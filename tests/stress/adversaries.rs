@@ -92,28 +92,28 @@ fn small() -> Shape {
 /// 1e6 : 1 in every rotation. The conic's small eigenvalue is 1e-6 of the large one, so that the exponent is a small
 /// difference of terms ten times as large.
 #[test]
-fn needles() {
+fn needles_stay_within_the_bound() {
     let made = changed(201, small(), |row, g| g.scales[row] = [0.0, (1e-6_f32).ln(), (1e-6_f32).ln()]);
     holds("needles", made, true, Bound { colour: 5e-5, gradient: 1.1e-4 });
 }
 
 /// Flat discs of which one axis is smaller than any float of a position.
 #[test]
-fn discs() {
+fn discs_stay_within_the_bound() {
     let made = changed(202, small(), |row, g| g.scales[row] = [-1.0, -1.5, -30.0]);
     holds("discs", made, true, Bound { colour: 5e-6, gradient: 1.1e-5 });
 }
 
 /// Far below a pixel: the blur alone makes the splat.
 #[test]
-fn points() {
+fn points_stay_within_the_bound() {
     let made = changed(203, small(), |row, g| g.scales[row] = [-15.0, -14.0, -13.0]);
     holds("points", made, true, Bound { colour: 1.1e-5, gradient: 2e-5 });
 }
 
 /// Larger than the scene: every pixel sees the middle of every splat.
 #[test]
-fn giants() {
+fn giants_stay_within_the_bound() {
     let made = changed(204, small(), |row, g| {
         g.scales[row] = [6.0, 7.0, 5.0];
         g.opacities[row] = -3.0;
@@ -123,7 +123,7 @@ fn giants() {
 
 /// Rotations of any length that f32 squares.
 #[test]
-fn rotations_of_any_length() {
+fn rotations_of_any_length_stay_within_the_bound() {
     let made = changed(205, small(), |row, g| {
         let length = [1e-15_f32, 1e-6, 1.0, 1e6, 1e15][row % 5];
         g.quats[row] = g.quats[row].map(|v| v * length);
@@ -134,7 +134,7 @@ fn rotations_of_any_length() {
 /// Rotations of which f32 squares nothing, or no float, are still rotations. The gradient of one of length 1e-20 is 1e20
 /// times as large as of one of length 1, and what is beyond 1e18 is dropped: all of it is missing, nothing is wrong.
 #[test]
-fn rotations_that_cannot_be_squared() {
+fn rotations_whose_square_overflows_stay_within_the_bound() {
     let of_length = |length: f32| changed(213, small(), |row, g| g.quats[row] = g.quats[row].map(|v| v * length));
     holds("rotations of 1e20", of_length(1e20), true, Bound { colour: 5e-6, gradient: 1.1e-5 });
     holds("rotations of 1e-20", of_length(1e-20), true, Bound { colour: 5e-6, gradient: 1.0 });
@@ -142,7 +142,7 @@ fn rotations_that_cannot_be_squared() {
 
 /// A rotation of length 0 is none: the projection is not a number, the Gaussian has no splat, and is counted.
 #[test]
-fn rotations_of_length_zero() {
+fn rotations_of_length_zero_are_counted_and_not_drawn() {
     let Some(turn) = device() else { return };
     let made = changed(214, small(), |row, g| {
         if row % 8 == 0 {
@@ -162,7 +162,7 @@ fn rotations_of_length_zero() {
 /// As small as a logarithm makes them, and so large that squares of squares are just floats. Nothing clamps scales; those
 /// beyond are counted and not drawn (`sentinel`).
 #[test]
-fn scales_at_both_ends_of_floats() {
+fn scales_at_both_limits_of_f32_stay_within_the_bound() {
     let made = changed(215, small(), |row, g| {
         g.scales[row] = if row % 2 == 0 { [-44.0; 3] } else { [18.0, 17.0, 19.0] };
         g.opacities[row] = -3.0;
@@ -173,7 +173,7 @@ fn scales_at_both_ends_of_floats() {
 /// One pixel wide, one high, and one in all: its gradient by scales is 4e-4 in norm, off by 2e-8, which is what f32 rounds
 /// the terms by that it is the small difference of.
 #[test]
-fn pictures_of_one_pixel() {
+fn pictures_of_one_pixel_stay_within_the_bound() {
     for (width, height, gradient) in [(1, 17, 1.1e-5), (17, 1, 1.1e-5), (1, 1, 2.2e-4)] {
         let made = scene(216, &Shape { width, height, ..small() });
         holds(&format!("{width} x {height} px"), made, true, Bound { colour: 5e-6, gradient });
@@ -182,7 +182,7 @@ fn pictures_of_one_pixel() {
 
 /// Opacities from nothing to all: logits of 15 are 3e-7 from 1, those of 100 are 1.
 #[test]
-fn opacities_at_their_ends() {
+fn opacities_at_their_limits_stay_within_the_bound() {
     let made = changed(206, small(), |row, g| g.opacities[row] = [-100.0, -15.0, -5.5, 0.0, 15.0, 100.0][row % 6]);
     holds("opacities at their ends", made, true, Bound { colour: 5e-6, gradient: 1.1e-5 });
 }
@@ -206,7 +206,7 @@ fn stack(count: usize, opacity: f64, depth: impl Fn(usize) -> f32) -> Scene {
 
 /// 2,000 layers of alpha 0.01: transmittance is a product of as many factors, and is divided again going back.
 #[test]
-fn two_thousand_faint_layers() {
+fn two_thousand_faint_layers_stay_within_the_bound() {
     let made = stack(2000, 0.01, |i| 4.0 + i as f32 * 1e-3);
     holds("2,000 faint layers", made, true, Bound { colour: 5e-6, gradient: 1.1e-5 });
 }
@@ -214,21 +214,21 @@ fn two_thousand_faint_layers() {
 /// Every alpha at its clamp: two layers leave T at 1e-4 but for rounding, which is just where a pixel stops. It may stop a
 /// layer later, which has a ten-thousandth of the weight.
 #[test]
-fn layers_at_the_clamp() {
+fn layers_at_the_clamp_stay_within_the_bound() {
     let made = stack(60, 0.9999, |i| 4.0 + i as f32 * 1e-2);
     holds("layers at the clamp", made, true, Bound { colour: 5e-6, gradient: 1e-3 });
 }
 
 /// Equal depths: the order is that of the rows, there as here.
 #[test]
-fn ties_of_depth() {
+fn ties_of_depth_stay_within_the_bound() {
     let made = stack(400, 0.05, |_| 5.0);
     holds("ties of depth", made, true, Bound { colour: 5e-6, gradient: 1.1e-5 });
 }
 
 /// Centres on the near plane, one float before and behind it, and large splats across it.
 #[test]
-fn across_the_near_plane() {
+fn splats_across_the_near_plane_stay_within_the_bound() {
     let near = 0.2_f32;
     let depths = [near, f32::from_bits(near.to_bits() + 1), f32::from_bits(near.to_bits() - 1), -1.0, 0.21, 0.5];
     let mut made = stack(120, 0.3, |i| if i % 2 == 0 { depths[i / 2 % 6] } else { 4.0 + i as f32 * 0.01 });
@@ -238,7 +238,7 @@ fn across_the_near_plane() {
 
 /// Fields of view of 170 and of 1 degree.
 #[test]
-fn wide_and_narrow_cameras() {
+fn wide_and_narrow_cameras_stay_within_the_bound() {
     for (name, degrees) in [("170 degrees", 170.0_f64), ("1 degree", 1.0)] {
         let mut made = scene(209, &small());
         let focal = 24.0 / (degrees.to_radians() / 2.0).tan();
@@ -249,7 +249,7 @@ fn wide_and_narrow_cameras() {
 
 /// Harmonics of 1e6: colours far beyond any photo, negative ones clamped to 0.
 #[test]
-fn harmonics_that_overflow_a_photo() {
+fn harmonics_beyond_photo_colours_stay_within_the_bound() {
     let made = changed(210, small(), |row, g| {
         let rest = g.rest_per_gaussian();
         g.sh0[row] = [1e6, -1e6, 1.0];
@@ -261,7 +261,7 @@ fn harmonics_that_overflow_a_photo() {
 /// Harmonics of 3e38: sums that are floats are colours, whose gradients are beyond all bounds and dropped; sums that are
 /// none have no splat. Both are counted, and no number of the step is lost.
 #[test]
-fn harmonics_that_overflow_floats() {
+fn harmonics_that_overflow_f32_are_counted_and_leave_no_nan() {
     let Some(turn) = device() else { return };
     let made = changed(217, small(), |row, g| {
         let rest = g.rest_per_gaussian();
@@ -283,7 +283,7 @@ fn harmonics_that_overflow_floats() {
 
 /// Masks of everything and of nothing, and the smallest and the largest label.
 #[test]
-fn masks_and_labels_at_their_ends() {
+fn masks_and_labels_at_their_limits_stay_within_the_bound() {
     for (name, id) in [("a mask of everything", 1_u32), ("the largest label", 65_535)] {
         let mut made = scene(211, &Shape { objects: 1, ..small() });
         made.target.label_map.fill(id);

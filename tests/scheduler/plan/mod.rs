@@ -77,7 +77,7 @@ fn small_list() -> PassList {
 }
 
 #[test]
-fn the_text_of_a_small_plan() {
+fn the_text_of_a_small_plan_equals_the_stored_one() {
     let list = small_list();
     let plan = Plan::new(table::TABLE, &capacity(), &list, &Limits::default(), PlanOptions::default()).unwrap();
     let options = PlanOptions::default();
@@ -131,7 +131,7 @@ pub fn engine_lists(shape: KernelShape) -> (Capacity, Vec<PassList>) {
 }
 
 #[test]
-fn the_lists_of_the_engine_are_safe() {
+fn the_lists_of_the_engine_have_no_race() {
     let (capacity, lists) = engine_lists(KernelShape::new(8, true));
     for list in &lists {
         for options in checker::all_options() {
