@@ -9,8 +9,8 @@ const ROOT: &str = env!("CARGO_MANIFEST_DIR");
 /// Columns of the names in the table of floors.
 const NAMES: usize = 23;
 
-/// Modules by floor, the lowest first, as the head of `src/lib.rs` lists them: a module may use those of lower floors only,
-/// and modules of one floor do not know each other.
+/// Modules by floor, the lowest first, as listed at the top of `src/lib.rs`. A module may use modules of lower floors
+/// only; modules of one floor do not use each other.
 fn floors() -> &'static [Vec<String>] {
     static FLOORS: LazyLock<Vec<Vec<String>>> = LazyLock::new(|| {
         let text = fs::read_to_string(Path::new(ROOT).join("src/lib.rs")).expect("lib.rs");
@@ -25,9 +25,9 @@ fn floors() -> &'static [Vec<String>] {
     &FLOORS
 }
 
-/// What lies on a lower floor and does not follow the rule, with the reason.
+/// Exceptions from the rule: (module, the module above that it may use).
 const EXCEPTIONS: [(&str, &str); 1] = [
-    // Tables of needs come from the shaders' own interfaces.
+    // The table of required features is generated from the shaders.
     ("gpu", "shaders"),
 ];
 
@@ -57,7 +57,7 @@ fn floor(module: &str) -> usize {
     found.unwrap_or_else(|| panic!("{module} is on no floor of src/lib.rs"))
 }
 
-/// Modules of this crate that a text names, but for its tests: `crate::name` and `crate::{name, ..}`.
+/// Modules of this crate that a source file names outside of its unit tests: `crate::name` and `crate::{name, ..}`.
 fn used(text: &str) -> Vec<String> {
     let code = text.split("#[cfg(test)]").next().unwrap_or_default();
     let code: String = code.lines().filter(|line| !line.trim_start().starts_with("//")).collect::<Vec<_>>().join("\n");
@@ -79,7 +79,7 @@ fn used(text: &str) -> Vec<String> {
             None => names.push(word(rest)),
         }
     }
-    // Types that the crate shows at its root, and macros.
+    // Upper case: types and macros at the root of the crate.
     names.retain(|name| name.chars().next().is_some_and(char::is_lowercase));
     names
 }
@@ -97,7 +97,7 @@ fn modules_use_lower_floors_only() {
     for (path, text) in files("src", &["rs"]) {
         let own = module(&path);
         for other in used(&text) {
-            // `buffers!` is expanded in tests too, and names what it needs by the way in for tests.
+            // `buffers!` is also expanded in tests, so it uses paths of `internals`.
             let is_macro = own == "scheduler" && ["buffers", "internals"].contains(&other.as_str());
             let allowed = is_macro
                 || other == own
@@ -122,7 +122,7 @@ fn files_stay_short() {
     assert_eq!(long.collect::<Vec<_>>(), Vec::<String>::new());
 }
 
-/// Files with a word, but for comments and the attributes that speak about it.
+/// Files that have a word outside of comments and inner attributes.
 fn with_word(word: &str) -> Vec<String> {
     let has = |text: &str| {
         let mut lines = text.lines().map(|line| line.split("//").next().unwrap_or_default());
@@ -142,7 +142,7 @@ fn unsafe_code_has_three_places() {
     assert!(with_word("unsafe ").contains(&"src/scheduler/recorder.rs".to_owned()), "the search finds what is there");
 }
 
-/// Above the engine only what checks it touches its scheduler.
+/// Above the engine, only the modules that verify it use its scheduler.
 #[test]
 fn the_scheduler_is_the_engines_own() {
     let above = |path: &Path| {

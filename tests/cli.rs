@@ -80,13 +80,13 @@ fn every_setting_has_a_flag_with_its_default() {
             assert!(help.contains("[default: "), "{}: {help}", key.flag());
         }
     }
-    // A link of the crate's documentation means nothing to whoever reads the help.
+    // Links of rustdoc must not appear in the help.
     for verb in root.get_subcommands() {
         let help = verb.clone().render_long_help().to_string();
         assert!(!help.contains("[`") && !help.contains("`]"), "{help}");
     }
     let help = text(&labelgs(&["train", "--help"]).stdout);
-    // Lines are wrapped anywhere.
+    // Lines of the help are wrapped, so compare without line breaks.
     let help = help.split_whitespace().collect::<Vec<_>>().join(" ");
     for default in ["[default: 15000]", "[default: 0.6]", "[default: 0.00016]", "[default: rendered]", "[default: on]"]
     {
@@ -101,7 +101,7 @@ fn every_setting_has_a_flag_with_its_default() {
     }
 }
 
-/// A value of every setting that is not its default.
+/// A value other than the default for each setting.
 const TYPED: [(&str, &str); 44] = [
     ("--iterations", "7"),
     ("--max-resolution", "99"),
@@ -349,7 +349,7 @@ fn a_signal_has_its_own_status() {
             .stderr(Stdio::null())
             .spawn()
             .expect("it runs");
-        // The handlers are there before the first picture.
+        // The signal handlers are installed before the first picture.
         while !scene.join("images/000.png").exists() {
             assert_eq!(child.try_wait().expect("child"), None);
             std::thread::sleep(std::time::Duration::from_millis(5));

@@ -1,4 +1,4 @@
-//! The command line with a device: what it can do, what it plans, what it times, and a scene from synth to pictures.
+//! The command line with a device: `devices`, `plan`, `profile`, and a scene from `synth` to pictures.
 
 use assert_cmd::Command;
 use labelgs::io::read_model;
@@ -8,11 +8,11 @@ use std::process::Output;
 
 fn labelgs(args: &[&str]) -> Output {
     let mut command = Command::cargo_bin("labelgs").expect("the tool is built");
-    // The layer is for the tests inside of this process.
+    // The validation layer watches this process only.
     command.env("LABELGS_VALIDATION", "off").args(args).output().expect("it runs")
 }
 
-/// A turn with the device: several at once would only wait for each other.
+/// Returns a turn with the device: processes that run at once would only wait for each other.
 fn turn() -> Option<crate::support::device::Turn> {
     crate::support::device()
 }

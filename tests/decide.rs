@@ -42,7 +42,7 @@ fn unseen_gaussians_take_the_label_of_their_neighbours() {
     assert_eq!(alone.labels[..10], complete.labels[..10], "who has votes decides alone");
 }
 
-/// Every label of every Gaussian would be 12 GB of votes; what was voted is some kilobytes.
+/// A dense table of Gaussians and labels would take 12 GB; the votes that were cast take some kilobytes.
 #[test]
 fn memory_grows_with_votes_and_not_with_labels() {
     let (labels, count) = ((0..30_000).collect::<Vec<u16>>(), 50_000_u32);

@@ -1,7 +1,7 @@
 //! The analytic gradients of the mirrors against central differences in f64.
 //!
-//! Differences are taken only where every decision is farther from its threshold than the step can move it; the scenes
-//! are chosen (by seed, once) so that this holds, and the tests refuse a scene where it does not.
+//! A difference is meaningful only if every decision is farther from its threshold than the step can move it. Seeds are
+//! chosen so that this holds, and the tests refuse other scenes.
 
 use crate::reference::blend::{Upstream, blend_backward, blend_forward, centre, trace};
 use crate::reference::loss::{label_loss, photo_loss};
@@ -121,12 +121,12 @@ fn projection_gradient_equals_central_differences() {
     assert!(clamped > 5, "only {clamped} rows reach the clamp");
 }
 
-/// Splats so opaque that alpha is clamped and rays end early.
+/// Opaque splats: alpha is clamped and rays end early.
 fn opaque() -> Shape {
     Shape { scales: (0.6, 2.0), opacities: (7.0, 12.0), ..small() }
 }
 
-/// Two clamped splats leave 1e-4 but for rounding, right at the usual threshold: take another one.
+/// Two clamped splats leave a transmittance of 1e-4 up to rounding, exactly the default threshold, so use another one.
 fn opaque_rules() -> Rules {
     Rules { transmittance_min: 3e-4, ..Rules::default() }
 }

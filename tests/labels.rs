@@ -1,4 +1,4 @@
-//! What labels must do, on the mirrors: weights and thresholds, the lift, densification, the label loss, object layers.
+//! Label rules on the mirrors: weights and thresholds, the lift, densification, the label loss, object layers.
 
 use crate::reference::blend::{Blended, Contribution, Trace, blend_backward, blend_forward, shade};
 use crate::reference::densify::{Origin, Population, accumulate, densify, mark};
@@ -56,7 +56,7 @@ fn the_nearer_of_equal_weights_is_main() {
     let ray = Trace { contributions, transmittance: 0.375, ..Trace::default() };
     let pixel = shade(&[on_ray(0, 0.25), on_ray(1, 0.5)], &ray, BLACK);
     assert_eq!((pixel.main, pixel.main_weight, pixel.margins.main), (0, 0.25, 0.0));
-    // A third of what 0.25 leaves is 0.25 too, but for rounding: the margin says so.
+    // Alpha 1/3 behind alpha 0.25 has weight 0.25 too, up to rounding; the margin shows it.
     assert!(one_pixel(&[0.25, 1.0 / 3.0]).pixels[0].margins.main < 1e-7);
 }
 
@@ -253,7 +253,8 @@ fn occluded_and_invalid_pixels_are_ignored() {
     let slot = ObjectPixel { label: 1, occluders: vec![2], weight: 1.0 };
     let rules = Rules { label_alpha: 0.5, ..Rules::default() };
     let loss = label_loss(&rules, (&[[0.8; 3]; 4], &[0.8; 4]), &photo, &[1, 2, 0, 1], &slot);
-    // Mask: 0.3 off; occluder: left out; elsewhere 0.8 off; invalid: left out of the count, too. Opacity: 0.2 and 0.8 off.
+    // Mask: 0.3 off; occluder: left out; elsewhere 0.8 off; invalid: left out of the count, too. Opacity: 0.2 and 0.8
+    // off.
     assert!((loss.value - (0.3 + 0.8 + 0.5 * (0.2 + 0.8)) / 3.0).abs() < 1e-12);
     assert_eq!(loss.v_alpha, [-0.5 / 3.0, 0.0, 0.5 / 3.0, 0.0]);
     let v = 1.0 / 9.0;

@@ -1,4 +1,4 @@
-//! Scores, label choice and selections against slow or hand-made answers.
+//! Scores, choice of labels and selections against brute force or values worked out by hand.
 
 use labelgs::edit::Catalogue;
 use labelgs::edit::{MIN_LABEL_CONFIDENCE, extract, remove, summarise};
@@ -187,7 +187,7 @@ fn ssim_of_bytes_equals_the_direct_sum() {
             count += 1.0;
         }
     }
-    // The one sums squares, the other squared differences.
+    // `ssim8` sums squares; this loop sums squared differences.
     assert!((ssim8(&a, &b, width, height).expect("large enough") - sum / count).abs() < 1e-9);
     assert_eq!(ssim8(&a, &a, width, height), Some(1.0));
     assert_eq!(ssim8(&a[..24], &b[..24], 6, 4), None);
@@ -196,7 +196,7 @@ fn ssim_of_bytes_equals_the_direct_sum() {
 
 #[test]
 fn hidden_parts_are_scored_where_the_truth_is_known() {
-    // Object 1 goes on behind object 2 for two pixels; the last is not a part of it.
+    // Object 1 continues behind object 2 for two pixels; the last pixel is not part of it.
     let photo = Photo { width: 5, height: 1, rgba: vec![[255, 255, 255, 255]; 5] };
     let mask = map(5, &[1, 1, 2, 2, 2]);
     let whole = [true, true, true, true, false];
@@ -211,7 +211,7 @@ fn hidden_parts_are_scored_where_the_truth_is_known() {
         view.objects[&1]
     };
     let found = scored(truth);
-    // Of the pixels of object 2: one found and true, one only true, one only found.
+    // Object 2: one true positive, one false negative, one false positive.
     assert_eq!(found.iou_hidden, Some(1.0 / 3.0));
     // One channel of six is off by a tenth.
     let expected = -10.0 * (0.01_f64 / 6.0).log10();

@@ -1,4 +1,4 @@
-//! Every constant bears: with one of them changed, the mirrors' own checks fail.
+//! Every constant matters: with one constant changed, the checks of the mirrors fail.
 
 use crate::gradient::differences;
 use crate::reference::adam::{Optimised, Rates, adam};
@@ -22,7 +22,7 @@ fn wide_scene() -> (Scene, Model) {
     (s, model)
 }
 
-/// Everything a family computes, as numbers.
+/// All numbers that a family of mirrors computes.
 fn outcome(family: Family, rules: &Rules, (s, model): &(Scene, Model)) -> Vec<f64> {
     let all = |rows: &[Row]| -> Vec<f64> { rows.iter().flat_map(Row::floats).collect() };
     match family {

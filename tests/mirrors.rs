@@ -1,4 +1,4 @@
-//! The mirrors against what is known without them: identities, closed forms and brute force.
+//! The mirrors against identities, closed forms and brute force.
 
 use crate::reference::adam::{Optimised, Rates, adam, falling_rate};
 use crate::reference::blend::{blend_forward, centre, shade, trace};

@@ -1,4 +1,4 @@
-//! What watches the numbers of a training: what it counts, names, drops and ends.
+//! NaN and overflow in a training: they are counted, named and dropped, and too many end it.
 
 use crate::pass::fixture::{Fixture, PARAMETERS};
 use crate::reference::Rules;
@@ -25,8 +25,8 @@ fn with(change: impl Fn(&mut Gaussians, usize)) -> (Scene, usize) {
     (made, row)
 }
 
-/// A quaternion of length 1e-25 is a rotation like any other, but its gradient is 1e25 times as large and no square of it
-/// is a float: the Gaussian stays as it is in that step, and nothing else notices.
+/// A quaternion of length 1e-25 is a valid rotation, but its gradient is 1e25 times as large and its square overflows
+/// f32. The Gaussian keeps its parameters in that step, and no other Gaussian is affected.
 #[test]
 fn only_the_gradient_that_overflows_is_dropped() {
     let Some(turn) = device() else { return };
@@ -86,7 +86,7 @@ fn the_pass_that_finds_a_broken_parameter_is_counted_by_itself() {
     }
 }
 
-/// What a step has spoilt no pass has looked at when the checkpoint is written: it is not.
+/// A NaN of the last step, which no pass has checked yet, keeps the checkpoint from being written.
 #[test]
 fn a_state_with_a_nan_is_refused_as_a_checkpoint() {
     let Some(turn) = device() else { return };
@@ -108,7 +108,7 @@ fn a_state_with_a_nan_is_refused_as_a_checkpoint() {
     assert_eq!(trainer.state().expect("a state").planes, sound.planes);
 }
 
-/// More than ten dropped gradients in each of three steps are no accident.
+/// More than ten dropped gradients in each of three steps end the training.
 #[test]
 fn a_training_that_keeps_dropping_gradients_ends() {
     let Some(turn) = device() else { return };

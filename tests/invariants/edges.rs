@@ -79,7 +79,7 @@ fn without_visible_gaussians_a_step_changes_nothing() {
     assert_eq!(fixture.get::<u32>(Buf::MEANS, 80), before);
 }
 
-/// Numbers that are none, and that overflow on their way to the screen, spoil nothing beside them.
+/// A Gaussian with NaN, or with values that overflow in the projection, affects no other Gaussian and no pixel.
 #[test]
 fn nan_gaussians_do_not_spread() {
     let Some(turn) = device() else { return };
@@ -126,7 +126,6 @@ const LABEL_BUFFERS: [&str; 8] = [
     "layer_state",
 ];
 
-/// A scene without masks pays nothing for labels.
 #[test]
 fn a_scene_without_labels_has_no_label_buffers_or_passes() {
     let Some(turn) = device() else { return };
@@ -148,7 +147,7 @@ fn a_scene_without_labels_has_no_label_buffers_or_passes() {
             assert!(!LABEL_BUFFERS.contains(&plan.table[buf.index()].name), "{} binds labels", pass.shader.name);
         }
     }
-    // Nor does a render pay for training.
+    // A render allocates no buffers of training.
     let labels = Some(LabelSize { max_label: 3, layers: 2, vote_columns: 0 });
     let size = |trained, labels| EngineSize { trained, labels, ..EngineSize::new(1000, (64, 48)) };
     let total = |size: &EngineSize| {

@@ -1,4 +1,4 @@
-//! Files of checkpoints: what comes back, and that nothing damaged does.
+//! Checkpoint files: exact round trips, and damaged files refused.
 
 use super::fixtures::*;
 use labelgs::internals::io::checkpoint::{Checkpoint, Plane, VERSION};
@@ -20,7 +20,7 @@ fn example() -> Checkpoint {
 #[test]
 fn a_checkpoint_comes_back_to_the_last_bit() {
     let scene = Scene::new();
-    // More than one buffer of everything.
+    // A plane that is longer than any I/O buffer.
     let large = Plane { name: "large".to_owned(), words: 5, data: (0..500_000).collect() };
     let mut file = example();
     file.planes.push(large);
@@ -77,7 +77,7 @@ fn a_damaged_checkpoint_is_refused_with_the_reason() {
     assert!(refused(&scene, b"ply\nformat binary_little_endian 1.0\n").contains("no checkpoint"));
 }
 
-/// Contents that a checksum agrees with and that make no sense take no memory and end in no panic.
+/// Invalid contents with a correct checksum cause no large allocation and no panic.
 #[test]
 fn invalid_values_with_a_correct_checksum_are_refused() {
     let scene = Scene::new();

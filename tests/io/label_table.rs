@@ -1,4 +1,4 @@
-//! labels.json: what is written comes back, and what cannot be meant is refused.
+//! labels.json: round trips, and invalid tables refused.
 
 use labelgs::internals::io::label_table::FILE;
 use labelgs::io::{LabelEntry, LabelTable};

@@ -1,4 +1,4 @@
-//! What `masks check` finds: each kind where it was planted, and nothing in clean masks.
+//! `masks check` finds each kind of planted fault, and nothing in clean masks.
 
 use super::mask_forms::*;
 use labelgs::internals::io;
@@ -162,7 +162,7 @@ fn map(width: u32, height: u32, id: impl Fn(usize) -> u16) -> LabelMap {
     LabelMap { width, height, ids: (0..(width * height) as usize).map(id).collect() }
 }
 
-/// An absence is no blink if the points of the object are out of the picture or behind what all three masks show.
+/// A missing id is no finding if the points of the object are out of the picture or hidden in all three masks.
 #[test]
 fn points_excuse_an_absence() {
     // Points at depth 1 of a camera with a focal length of 100 px: 100 times their place from the middle.
@@ -185,7 +185,7 @@ fn points_excuse_an_absence() {
     assert_eq!(looks(&left(0, 5), &away, &points), [], "out of the picture");
     let behind = Camera { translation: glam::DVec3::new(0.0, 0.0, -3.0), ..here.clone() };
     assert_eq!(looks(&left(0, 5), &behind, &points), [], "behind the camera");
-    // Covered by an id that the neighbours do not know: another name for the same object.
+    // Covered by an id that neighbouring views lack: another id for the same object.
     let found = looks(&left(9, 5), &here, &points);
     assert_eq!(short(&found), [(Problem::SingleView, Some("b"), Some(9)), (Problem::Blink, Some("b"), Some(3))]);
 }

@@ -1,4 +1,4 @@
-//! Lift, label loss, and what labels must not change.
+//! Lift, label loss, and independence of densification from labels.
 
 use super::fixture::{Fixture, prove};
 use crate::reference::blend::blend_layers_forward;
@@ -48,7 +48,7 @@ fn label_loss_of_a_step_equals_its_mirror() {
     });
 }
 
-/// The statistic of densification sees the scene's layer only.
+/// The statistic of densification comes from the layer of the scene only.
 #[test]
 fn the_label_loss_does_not_drive_densification() {
     let run = |label_weight: f32| -> Option<(Vec<u32>, Vec<u32>)> {
@@ -125,7 +125,8 @@ fn the_nearer_of_two_gaussians_on_a_ray_is_main() {
     }
 }
 
-/// method.md check 2: what is left behind two saturated splats is below the limit, so the second does not count.
+/// method.md check 2: the transmittance behind two saturated splats is below the limit, so the ray stops before the
+/// second.
 #[test]
 fn two_saturated_splats_stop_the_ray() {
     let Some(turn) = device() else { return };
@@ -190,7 +191,7 @@ fn a_centre_beside_the_image_lifts_nothing() {
     }
 }
 
-/// method.md check 8: a mask without a Gaussian costs its light and moves nothing.
+/// method.md check 8: a mask without a Gaussian has a loss and no gradient.
 #[test]
 fn label_loss_of_an_empty_object_is_its_masked_photo_without_gradient() {
     let Some(turn) = device() else { return };
@@ -209,7 +210,8 @@ fn label_loss_of_an_empty_object_is_its_masked_photo_without_gradient() {
     check("gradient", exact(&fixture.get::<u32>(Buf::V_SPLATS, 12), &with));
 }
 
-/// method.md check 8: the picture of an object is its photo. A flat layer of opacity 0.5 over black shows half its colour.
+/// method.md check 8: the picture of an object is its photo. A flat layer of opacity 0.5 over black shows half its
+/// colour.
 #[test]
 fn label_loss_of_a_correct_object_is_0() {
     let Some(turn) = device() else { return };
@@ -224,7 +226,7 @@ fn label_loss_of_a_correct_object_is_0() {
     check("loss", close(&[loss], &[0.0], Tolerance { absolute: 1e-5, relative: 0.0 }));
 }
 
-/// method.md check 7, U_k on the device: pixels of an occluder say nothing, not even where the object shines through.
+/// method.md check 7, U_k on the device: pixels of an occluder are ignored, even where the object shows through.
 #[test]
 fn pixels_of_occluders_are_left_out() {
     let Some(turn) = device() else { return };

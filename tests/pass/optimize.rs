@@ -17,7 +17,7 @@ fn states(fixture: &mut Fixture) -> Vec<Optimised> {
     (0..count).map(|i| Optimised { row: rows[i], m: m[i], u: u[i] }).collect()
 }
 
-/// Five steps, each from the state that the device had before it.
+/// Five steps, each from the previous state of the device.
 #[test]
 fn adam_of_every_attribute_equals_its_mirror() {
     let Some(turn) = device() else { return };

@@ -37,7 +37,7 @@ fn list(engine: &mut Engine, declare: impl FnOnce(&mut Builder)) -> ListId {
     engine.raw_mut().prepare(&list).expect("the list is planned")
 }
 
-/// Says that there are so many Gaussians, splats and pairs.
+/// Sets the numbers of Gaussians, splats and pairs to `count`.
 fn announce(engine: &mut Engine, count: usize) {
     let count = count as u32;
     let uniforms = StepUniforms { gaussian_count: count, ..StepUniforms::zeroed() };
@@ -106,7 +106,7 @@ fn sort_of_keys_and_values_is_exact_and_stable() {
     sort_exactly(&mut engine(turn.gpu()), &cases);
 }
 
-/// Sorts so many keys of so many different ones.
+/// Sorts keys and compares. Cases are (number of keys, number of distinct keys).
 fn sort_exactly(engine: &mut Engine, cases: &[(usize, u32)]) {
     let buffers = SortBuffers {
         keys: [Buf::DEPTH_KEYS_A, Buf::DEPTH_KEYS_B],

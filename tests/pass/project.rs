@@ -26,7 +26,7 @@ pub fn wide_scene(seed: u64, sh_degree: u32) -> Scene {
     s
 }
 
-/// The device drops nothing that counts, and keeps nothing at or behind the near plane or too faint.
+/// The device drops no visible Gaussian, and keeps none that is behind the near plane or too faint.
 #[test]
 fn visible_gaussians_come_in_depth_order() {
     let Some(turn) = device() else { return };

@@ -52,14 +52,14 @@ const ALL: [Family; 4] = [Family::Project, Family::Sh, Family::Blend, Family::Lo
 
 #[test]
 fn gradients_of_a_step_equal_the_mirror() {
-    // Nothing in this scene is near a Jacobian's clamp; without labels no label weight bears.
+    // No splat is near the clamp of the Jacobian, and label weights have no effect without labels.
     let bearing = named(&ALL, &["label_weight", "label_alpha", "jacobian_margin"]);
     case("whole step", 61, &Shape { gaussians: 120, ..Shape::default() }, false, &bearing);
 }
 
 #[test]
 fn gradients_of_a_step_with_labels_equal_the_mirror() {
-    // Beside the gradients of the label losses, those of C1 are too small to be seen.
+    // Gradients of the label losses outweigh those of C1.
     let bearing = named(&ALL, &["jacobian_margin", "ssim_c1"]);
     case("whole step with labels", 62, &Shape { gaussians: 120, ..Shape::default() }, true, &bearing);
 }

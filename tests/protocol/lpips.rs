@@ -1,4 +1,4 @@
-//! LPIPS with made weights whose answer can be worked out.
+//! LPIPS with weights for which the distance is known.
 
 use labelgs::internals::eval::lpips::convolution::{Layer, Planes, convolve, halve};
 use labelgs::internals::eval::lpips::{CHANNELS, STAGES, Weights};

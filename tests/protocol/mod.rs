@@ -1,4 +1,4 @@
-//! Benchmarks: each layout with a known result, absent predictions, the published scorers' ways, broken inputs.
+//! Benchmarks: each layout with a known score, missing predictions, rules of the published scorers, broken inputs.
 
 mod layouts;
 mod lpips;
@@ -22,8 +22,8 @@ use std::path::Path;
 /// Width and height of every picture, px.
 const SIDE: usize = 8;
 
-/// A scene of labels in columns: pixel (x, y) has the label of its column, in every view. Objects have the colour of the
-/// photo, which is 0.8 grey; a label of `dark` is opaque and black.
+/// A scene of labels in columns: pixel (x, y) has the label of its column, in every view. Objects have the colour of
+/// the photo, which is 0.8 grey; a label of `dark` is opaque and black.
 pub struct Columns {
     /// Label of each column.
     pub labels: [u16; SIDE],
@@ -114,7 +114,7 @@ pub fn run_on(
     run(&layout, &bench, &mut columns, &mut ())
 }
 
-/// What a failure says.
+/// Message of an error.
 pub fn message<T: std::fmt::Debug>(result: Result<T>) -> String {
     let error: Error = result.expect_err("it fails");
     assert_eq!(error.exit_status(), 3, "{error}");

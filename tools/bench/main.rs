@@ -1,4 +1,4 @@
-//! Benchmarks: run time against error, and what a step, an object and a label cost.
+//! Benchmarks: run time against error, and the cost of a step, an object and a label.
 //!
 //! `tools/bench/run COMMAND` builds with optimisation and runs one of them. Each prints its tables and writes JSON and
 //! charts into `--output`. With `--small` it does the same in seconds on tiny scenes, as the tests run it.
@@ -34,12 +34,12 @@ use std::path::PathBuf;
 struct Arguments {
     #[command(subcommand)]
     command: Command,
-    /// What cargo hands to every benchmark.
+    /// Argument that cargo passes to every benchmark.
     #[arg(long, hide = true, global = true)]
     bench: bool,
 }
 
-/// What all benchmarks know.
+/// Options of all benchmarks.
 #[derive(clap::Args, Clone, Debug)]
 pub struct Common {
     /// Tiny scenes and few repetitions; times mean nothing then.

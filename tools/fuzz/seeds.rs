@@ -1,4 +1,4 @@
-//! Small valid files of every kind, made by the program's own writers where it has one.
+//! Small valid files of every kind, made by the program's own writers where they exist.
 
 use labelgs::gpu::PipelineStore;
 use labelgs::internals::io::image as pixels;
@@ -329,7 +329,7 @@ pub fn photo_jpeg() -> Vec<Vec<u8>> {
     all
 }
 
-/// What the checksum of a checkpoint covers.
+/// The part of a checkpoint that its checksum covers.
 pub fn checkpoint() -> Vec<u8> {
     let json = r#"{"meta": {"step": 7, "views": ["a.png"]}, "planes": [{"name": "means", "rows": 2, "words": 4},
 {"name": "none", "rows": 0, "words": 3}, {"name": "bits", "rows": 1, "words": 1}]}"#;

@@ -5,7 +5,7 @@ use super::source::{line_of, without_comments};
 use super::{Finding, Shader, Variant, constants, is_snake_case};
 use std::collections::BTreeMap;
 
-/// Names that Rust keeps for itself, or that stand for something else in the generated modules.
+/// Keywords of Rust, and names with another meaning in the generated modules.
 const RESERVED: &[&str] = &[
     "as",
     "async",

@@ -56,7 +56,7 @@ pub struct Shader {
     pub source: String,
     /// Base first.
     pub variants: Vec<Variant>,
-    /// It is in this build. Of a sibling that is not, the file still has the names of its bindings.
+    /// Whether it is in this build. A sibling outside of it still adds its binding names to the module.
     pub is_in: bool,
 }
 
@@ -104,7 +104,7 @@ impl Variant {
     }
 }
 
-/// What is written.
+/// Generated files.
 #[derive(Debug)]
 pub struct Generated {
     /// Text of `shaders.rs`.

@@ -5,7 +5,7 @@ use rspirv::dr::{Instruction, Module, Operand};
 use rspirv::spirv::{BuiltIn, Decoration, Dim, ExecutionMode, Op, StorageClass, Word};
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
-/// A module with what is needed to find one's way in it.
+/// A module with lookup tables.
 struct Reflector<'a> {
     module: &'a Module,
     names: HashMap<Word, &'a str>,
@@ -269,7 +269,7 @@ impl<'a> Reflector<'a> {
         }
     }
 
-    /// The constant that holds the size of a workgroup, if it is not written out in the execution mode.
+    /// The constant with the size of a workgroup, if the execution mode does not state it.
     fn workgroup_size(&self) -> Option<&'a Instruction> {
         let is_size = |value: &&Instruction| {
             value.result_id.and_then(|id| self.decoration(id, Decoration::BuiltIn))

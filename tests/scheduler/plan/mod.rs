@@ -141,7 +141,7 @@ fn the_lists_of_the_engine_have_no_race() {
         }
     }
     let options = PlanOptions::default();
-    // Objects one by one are for measurements; their scratch lives longer.
+    // The list of objects one by one is for benchmarks; its scratch lives longer.
     let lists: Vec<PassList> = lists.into_iter().filter(|list| !list.name.contains("one by one")).collect();
     let memory = MemoryReport::predict(TABLE, &capacity, &lists, &Limits::default(), options).unwrap();
     assert!(memory.step_pages.iter().sum::<u64>() * 3 < memory.step_unaliased * 2, "{}", memory.report());

@@ -66,7 +66,7 @@ pub fn scene(scene: &SceneResult) {
         "rounding: alone, in {} pixels and {} Gaussians with no decision near",
         scene.rounding.pixels, scene.rounding.rows
     );
-    // The other scenes ask what breaks, not what pays.
+    // The other scenes test accuracy, not speed.
     if scene.name.starts_with('S') {
         for (name, knee) in knee::all(scene) {
             println!("{name}: {knee}");
