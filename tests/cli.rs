@@ -1,4 +1,4 @@
-//! The command line: every flag, what goes where, exit statuses.
+//! The command line: flags, output streams and exit statuses.
 
 use assert_cmd::Command;
 use clap::Parser;

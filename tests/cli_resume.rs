@@ -338,6 +338,6 @@ fn checkpoints_of_an_earlier_run_stay_until_there_are_new_ones() {
     succeeded(&place.trained("out", &["--iterations", "5", "--checkpoint-every", "2", "--save-at", "2"]));
     assert_eq!(models().len(), 2, "{:?}", models());
     let steps: Vec<u32> = place.checkpoints("out").iter().map(|found| found.step).collect();
-    assert_eq!(steps, [5], "the run of 9 steps is nobody's business any more");
+    assert_eq!(steps, [5], "no checkpoint of the run of 9 steps remains");
     assert!(succeeded(&place.trained("out", &["--resume"])).contains("goes on after step 5"));
 }

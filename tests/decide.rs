@@ -39,7 +39,7 @@ fn unseen_gaussians_take_the_label_of_their_neighbours() {
     assert!(complete.confidence[10] > 0.5 && complete.confidence[10] < 1.0);
     let alone = decide(&ballot(&[0, 4], &rows), &means, false).expect("decided");
     assert_eq!((alone.labels[10], alone.confidence[10]), (0, 0.0));
-    assert_eq!(alone.labels[..10], complete.labels[..10], "who has votes decides alone");
+    assert_eq!(alone.labels[..10], complete.labels[..10], "Gaussians with votes ignore their neighbours");
 }
 
 /// A dense table of Gaussians and labels would take 12 GB; the votes that were cast take some kilobytes.

@@ -130,7 +130,7 @@ fn the_order_is_a_short_path() {
     assert_eq!(short_order(&ring[..1]), [0]);
 }
 
-/// Three photos, one in a folder, of which the second and the last have tracked masks of other sizes.
+/// Three photos, one in a folder. The tracked masks of the second and the last have other sizes.
 fn tracked(folder: &Path) -> (String, String, String) {
     let path = |name: &str| folder.join(name).to_str().expect("UTF-8").to_owned();
     let at = camera(DQuat::IDENTITY, [0.0; 3]);
@@ -178,7 +178,7 @@ fn masks_go_back_to_their_photos() {
     refused(r#"{"schema_version": 7, "frames": []}"#, "version 7");
 }
 
-/// A model, made quickly, and its scene of 12 views of 96 x 72 px.
+/// A quickly trained model and its scene: 12 views of 96 x 72 px.
 fn model(folder: &Path) -> (String, String) {
     let path = |name: &str| folder.join(name).to_str().expect("UTF-8").to_owned();
     let (scene, out) = (path("scene"), path("out"));

@@ -281,7 +281,7 @@ fn extract_and_remove_divide_the_model() {
     let doubtful = Gaussians { label_confidence: Some(vec![0.59, 0.6, 0.5, 0.4]), ..model() };
     let of = |least| extract(&doubtful, &[2], least).expect("2").means;
     assert!(of(0.0) == object.means && of(2.0).is_empty());
-    assert_eq!(of(MIN_LABEL_CONFIDENCE), [model().means[1]], "who has less than 0.6 is left out");
+    assert_eq!(of(MIN_LABEL_CONFIDENCE), [model().means[1]], "a Gaussian below 0.6 is left out");
     assert!(extract(&model(), &[], MIN_LABEL_CONFIDENCE).is_err());
     assert!(remove(&model(), &[0, 2, 5]).is_err());
     let unlabelled = Gaussians { labels: None, ..model() };

@@ -14,7 +14,7 @@ use labelgs::run::TrainConfig;
 use labelgs::scene::Gaussians;
 use labelgs::synth::{Preset, SynthOptions, dataset};
 
-/// A scene of which one Gaussian, in full view, is changed.
+/// A scene with one changed Gaussian in full view.
 fn with(change: impl Fn(&mut Gaussians, usize)) -> (Scene, usize) {
     let mut made = scene(221, &Shape { gaussians: 60, ..Shape::default() });
     let row = 17;

@@ -70,7 +70,7 @@ fn a_png_that_is_shorter_than_its_header_says_takes_no_memory() {
     }
 }
 
-/// A JPEG of 12 x 8 px whose header says another size.
+/// A JPEG of 12 x 8 px with another size in its header.
 fn jpeg_of(width: u16, height: u16) -> Vec<u8> {
     let mut bytes = super::seeds::photo_jpeg()[0].clone();
     let frame = bytes.windows(2).position(|pair| pair == [0xff, 0xc0]).expect("a frame");

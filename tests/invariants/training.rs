@@ -66,7 +66,7 @@ pub fn train(turn: &Turn, rule: LabelRule, options: SchedulerOptions, change: im
     })
 }
 
-/// Trains; `between` is called before each step, and returns what it has drained.
+/// Trains and calls `between` before each step; it returns the reports that it drained.
 pub fn train_with(
     turn: &Turn,
     rule: LabelRule,

@@ -125,5 +125,5 @@ fn the_newest_is_the_one_with_the_largest_number() {
     assert!(checkpoint_folder::next(out, 40).expect("a name").ends_with("11-step-40.ckpt"));
     checkpoint_folder::keep(out, &[found[0].path.clone()]).expect("kept");
     assert_eq!(checkpoint_folder::list(out).expect("a list"), [found[0].clone()]);
-    assert!(scene.at("checkpoints/notes.txt").exists(), "what is no checkpoint is nobody's business");
+    assert!(scene.at("checkpoints/notes.txt").exists(), "files other than checkpoints stay");
 }

@@ -114,7 +114,7 @@ fn nearly_empty_masks_and_objects_are_found() {
     let empty: Vec<Finding> = found.into_iter().filter(|finding| finding.problem == Problem::NearlyEmpty).collect();
     assert_eq!(short(&empty), [(Problem::NearlyEmpty, Some("010.png"), None)]);
 
-    // Masks of 600 px with 400 of an id, but for one with a single pixel of it.
+    // Masks of 600 px with 400 px of an id, except one mask with a single pixel of it.
     let id = |pixels: usize| {
         move |index: usize| match index {
             400.. => 5,
@@ -178,7 +178,7 @@ fn points_excuse_an_absence() {
     let here = camera(20, 20);
     let blink = [(Problem::Blink, Some("b"), Some(3))];
     assert_eq!(short(&looks(&left(0, 5), &here, &points)), blink);
-    assert_eq!(short(&looks(&left(0, 5), &here, &[])), blink, "without points there is no excuse");
+    assert_eq!(short(&looks(&left(0, 5), &here, &[])), blink, "without points the missing id is a finding");
     let covered = map(20, 20, |index| if (2..8).contains(&(index % 20)) || index % 20 >= 10 { 5 } else { 0 });
     assert_eq!(looks(&covered, &here, &points), [], "behind another object");
     let away = Camera { translation: glam::DVec3::new(5.0, 0.0, 0.0), ..here.clone() };

@@ -27,7 +27,7 @@ fn engine(gpu: std::sync::Arc<labelgs::gpu::Gpu>) -> Engine {
     Engine::new(gpu, room, readable()).expect("the engine starts")
 }
 
-/// Records what `declare` says.
+/// Records the passes that `declare` adds.
 fn list(engine: &mut Engine, declare: impl FnOnce(&mut Builder)) -> ListId {
     let (shape, capacity): (KernelShape, Capacity) = (*engine.shape(), *engine.raw().capacity());
     let list = PassList::new("test");

@@ -1,4 +1,4 @@
-//! Votes for labels: the sums of a sweep against the mirror, whatever the number of columns and walks.
+//! Votes for labels: the sums of a sweep against the mirror, for any number of columns and walks.
 
 use super::fixture::{Fixture, VOTE_COLUMNS, prove};
 use crate::reference::Rules;

@@ -85,7 +85,7 @@ pub fn layout(protocol: Protocol, truth: &Path, scene: &str, by: By) -> Result<L
     protocol.layout(&files_below(truth)?, classes.as_deref(), Ask { truth, scene, by })
 }
 
-/// Runs a benchmark on the views of these names, of which those from `test` on are held out.
+/// Runs a benchmark on views of these names; the views from index `test` on are held out.
 pub fn run_on(
     (protocol, compat, by): (Protocol, bool, By),
     truth: &Path,

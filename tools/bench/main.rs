@@ -54,13 +54,13 @@ pub struct Common {
 enum Command {
     /// Time against error of every mode of the kernels.
     Kernels(kernels::KernelArgs),
-    /// What a step with labels costs beside one without, by covered area and number of objects.
+    /// Cost of a step with labels relative to one without, by covered area and number of objects.
     Steps(Common),
     /// One traversal for all objects against a pass for each, as in the paper's reference code.
     Paper(paper::Options),
     /// Quality against seconds of training, with and without labels, and the time to the first step.
     Training(training::Options),
-    /// How near each stage of a step comes to what the device could do, measured in the same run.
+    /// How near each stage of a step comes to the limit of the device, measured in the same run.
     Limits(Common),
     /// Predicted against measured memory of training.
     Memory(Common),

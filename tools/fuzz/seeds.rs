@@ -312,7 +312,7 @@ pub fn photo_png() -> Vec<Vec<u8>> {
     kinds.map(|(colour, depth)| png(colour, depth, |i| (i * 7) as u8)).to_vec()
 }
 
-/// JPEG in colour and grey, and what other programs wrote: progressive, CMYK, with restarts and an orientation.
+/// JPEG in colour and grey, and JPEG of other programs: progressive, CMYK, with restarts and an orientation.
 pub fn photo_jpeg() -> Vec<Vec<u8>> {
     let colour = image::RgbImage::from_fn(SIZE.0, SIZE.1, |x, y| image::Rgb([x as u8 * 20, y as u8 * 30, 90]));
     let jpeg = |picture: image::DynamicImage| {
@@ -374,7 +374,7 @@ pub fn frames_json() -> Vec<u8> {
     .into_bytes()
 }
 
-/// Two steps of a profile, of which the first does not count.
+/// Two steps of a profile; the first is not counted.
 pub fn profile_json() -> Vec<u8> {
     br#"{"schema_version": 1, "device": "x", "size": [12, 8], "counters": {"visible": {"median": 7, "p90": 8}},
 "steps": [{"step": 1, "first_run": true, "stages_ms": {"sort": 1.5}},

@@ -74,7 +74,7 @@ pub fn text(path: &str, source: &str) -> Vec<Finding> {
     findings
 }
 
-/// Structs of one name must be one struct, whatever shader they stand in.
+/// Structs of one name must be equal in all shaders.
 pub fn shared_structs(shaders: &[Shader]) -> Vec<Finding> {
     let mut known = BTreeMap::new();
     let mut findings = Vec::new();
@@ -151,7 +151,7 @@ fn interface(shader: &Shader, variant: &Variant) -> Vec<Finding> {
     findings
 }
 
-/// Variants of one shader share their Rust types, so their interfaces must be equal but for the kind of a binding.
+/// Variants of one shader share their Rust types, so their interfaces must be equal except for the kind of a binding.
 fn agreement(shader: &Shader, base: &Variant, other: &Variant) -> Option<Finding> {
     let shape = |interface: &Interface| -> Vec<_> {
         interface.bindings.iter().map(|b| (b.name.clone(), b.binding, b.access)).collect()

@@ -190,7 +190,7 @@ fn emit_spec(out: &mut String, siblings: &[&Shader]) {
         })
         .collect();
     emit_named(out, "Specialisation constants; a sibling takes what it has.", ("Spec", ""), &fields);
-    put!(out, "    impl Spec {{\n        /// The defaults, but for constants whose bits `given` knows.");
+    put!(out, "    impl Spec {{\n        /// The defaults, except for constants whose bits `given` returns.");
     put!(out, "        #[allow(unused_variables)]");
     put!(out, "        pub fn with(given: impl Fn(&str) -> Option<u32>) -> Self {{\n            Self {{");
     for SpecConstant { name, rust, default, .. } in constants {

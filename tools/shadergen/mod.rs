@@ -23,7 +23,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 pub struct Finding {
     /// File and line.
     pub place: String,
-    /// What is wrong and what to do.
+    /// The problem and its remedy.
     pub rule: String,
 }
 
@@ -87,7 +87,7 @@ pub struct Variant {
     pub defines: Vec<Define>,
     /// The module that ships.
     pub words: Vec<u32>,
-    /// What the module without optimisation declares.
+    /// Interface of the module without optimisation.
     pub interface: Interface,
     /// Binding numbers that the shipped module touches.
     pub used: BTreeSet<u32>,

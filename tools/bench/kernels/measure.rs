@@ -46,7 +46,7 @@ pub struct ModeResult {
 pub struct SceneResult {
     /// Name.
     pub name: &'static str,
-    /// What it is.
+    /// Description.
     pub about: &'static str,
     /// Gaussians.
     pub gaussians: usize,

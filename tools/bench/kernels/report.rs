@@ -1,4 +1,4 @@
-//! Tables for people.
+//! Tables of the benchmark.
 
 use super::errors::Errors;
 use super::knee;
@@ -18,7 +18,7 @@ const STAGES: [Stage; 7] = [
     Stage::ProjectBackward,
 ];
 
-/// What the columns mean, and the modes behind the numbers of the charts.
+/// Legend of the columns, and the modes behind the numbers of the charts.
 pub fn legend(modes: &[Mode]) {
     println!(
         "times by those of the default, medians of the rounds' ratios: `passes` of all stages but loss and report, `CPU` \

@@ -13,7 +13,7 @@ use rand_pcg::Pcg32;
 pub struct Plan {
     /// Name in tables: S1, S2, A1 to A5.
     pub name: &'static str,
-    /// What it is.
+    /// Description.
     pub about: &'static str,
     /// Gaussians.
     pub gaussians: usize,
@@ -21,11 +21,11 @@ pub struct Plan {
     pub size: (u32, u32),
     /// Timed rounds over all modes.
     pub rounds: usize,
-    /// What it holds.
+    /// Content.
     pub kind: Kind,
 }
 
-/// What a scene holds.
+/// Content of a scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
     /// Four wavy sheets of mostly small splats, most of them faint.

@@ -34,7 +34,7 @@ pub struct Ceilings {
     pub dispatch: f64,
 }
 
-/// What the arithmetic kernel repeats.
+/// The operation that the arithmetic kernel repeats.
 #[derive(Clone, Copy)]
 enum Operation {
     MultiplyAdd = 0,
@@ -42,7 +42,7 @@ enum Operation {
     Divide = 2,
 }
 
-/// Measures them; `texel` says how the engine's kernels read on this device.
+/// Measures the rates; `texel` selects the engine's way of reading on this device.
 pub fn measure(gpu: &Arc<Gpu>, texel: bool, small: bool) -> Result<Ceilings> {
     let (groups, vecs) = if small { (2, 1 << 12) } else { (GROUPS, VECS) };
     let row = |name, elements| BufferDecl {
