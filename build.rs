@@ -1,4 +1,5 @@
 //! Compiles the shaders and generates their Rust side; see `tools/shadergen`.
+#![allow(clippy::disallowed_methods, reason = "the rules of files are those of the library")]
 
 #[path = "tools/shadergen/mod.rs"]
 mod shadergen;

@@ -58,6 +58,7 @@
 //! purpose, for tests.
 #![deny(unsafe_code)]
 #![warn(unreachable_pub)]
+#![deny(clippy::print_stdout, clippy::print_stderr, clippy::dbg_macro)]
 #![cfg_attr(
     not(feature = "cli"),
     allow(dead_code, unused_imports, reason = "what only the commands use is left out by the linker")

@@ -1,4 +1,4 @@
-//! The shape of the code: floors, lengths, and where the dangerous things may be.
+//! Floors of modules, lengths of files and places of unsafe code; `clippy.toml` has the rules that a lint can check.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -9,8 +9,8 @@ const ROOT: &str = env!("CARGO_MANIFEST_DIR");
 /// Columns of the names in the table of floors.
 const NAMES: usize = 23;
 
-/// Modules by floor, the lowest first, as `src/guide/inside.md` lists them: a module may use those of lower floors only,
-/// and modules of one floor do not know each other.
+/// Modules by floor, the lowest first, as `src/guide/inside.md` lists them. A module may use modules of lower floors
+/// only; modules of one floor do not use each other.
 fn floors() -> &'static [Vec<String>] {
     static FLOORS: LazyLock<Vec<Vec<String>>> = LazyLock::new(|| {
         let text = fs::read_to_string(Path::new(ROOT).join("src/guide/inside.md")).expect("inside.md");
@@ -26,9 +26,9 @@ fn floors() -> &'static [Vec<String>] {
     &FLOORS
 }
 
-/// What lies on a lower floor and does not follow the rule, with the reason.
+/// Exceptions from the rule: (module, the module above that it may use).
 const EXCEPTIONS: [(&str, &str); 1] = [
-    // Tables of needs come from the shaders' own interfaces.
+    // The table of required features is generated from the shaders.
     ("gpu", "shaders"),
 ];
 
@@ -58,7 +58,7 @@ fn floor(module: &str) -> usize {
     found.unwrap_or_else(|| panic!("{module} is on no floor of src/guide/inside.md"))
 }
 
-/// Modules of this crate that a text names, but for its tests: `crate::name` and `crate::{name, ..}`.
+/// Modules of this crate that a source file names outside of its unit tests: `crate::name` and `crate::{name, ..}`.
 fn used(text: &str) -> Vec<String> {
     let code = text.split("#[cfg(test)]").next().unwrap_or_default();
     let code: String = code.lines().filter(|line| !line.trim_start().starts_with("//")).collect::<Vec<_>>().join("\n");
@@ -80,7 +80,7 @@ fn used(text: &str) -> Vec<String> {
             None => names.push(word(rest)),
         }
     }
-    // Types that the crate shows at its root, and macros.
+    // Upper case: types and macros at the root of the crate.
     names.retain(|name| name.chars().next().is_some_and(char::is_lowercase));
     names
 }
@@ -98,7 +98,7 @@ fn modules_use_lower_floors_only() {
     for (path, text) in files("src", &["rs"]) {
         let own = module(&path);
         for other in used(&text) {
-            // `buffers!` is expanded in tests too, and names what it needs by the way in for tests.
+            // `buffers!` is also expanded in tests, so it uses paths of `internals`.
             let is_macro = own == "scheduler" && ["buffers", "internals"].contains(&other.as_str());
             let allowed = is_macro
                 || other == own
@@ -123,7 +123,7 @@ fn files_stay_short() {
     assert_eq!(long.collect::<Vec<_>>(), Vec::<String>::new());
 }
 
-/// Files with a word, but for comments and the attributes that speak about it.
+/// Files that have a word outside of comments and inner attributes.
 fn with_word(word: &str) -> Vec<String> {
     let has = |text: &str| {
         let mut lines = text.lines().map(|line| line.split("//").next().unwrap_or_default());
@@ -140,39 +140,10 @@ fn unsafe_code_has_three_places() {
         .into_iter()
         .filter(|file| !file.starts_with("src/gpu/") && file != "src/scheduler/recorder.rs" && file != "src/main.rs");
     assert_eq!(elsewhere.collect::<Vec<_>>(), Vec::<String>::new());
-    assert!(with_word("unsafe ").contains(&"src/scheduler/recorder.rs".to_owned()), "the search finds what is there");
+    assert!(with_word("unsafe ").contains(&"src/scheduler/recorder.rs".to_owned()), "the search finds a known place");
 }
 
-/// Faults of reads and half-written files are tried in two modules; what opens files elsewhere would escape that.
-#[test]
-fn files_are_opened_in_two_places() {
-    const CALLS: [&str; 7] =
-        ["File::open", "File::create", "fs::read", "fs::write", "fs::copy", "_from_file(", "ImageReader::open"];
-    const ALLOWED: [&str; 2] = ["io/read.rs", "io/atomic.rs"];
-    for (path, text) in files("src", &["rs"]) {
-        let code = text.split("#[cfg(test)]").next().unwrap_or_default();
-        let code = code.lines().filter(|line| !line.trim_start().starts_with("//"));
-        let found: Vec<&str> = code.filter(|line| CALLS.iter().any(|call| line.contains(call))).collect();
-        let is_allowed = ALLOWED.iter().any(|name| path.ends_with(name));
-        assert!(is_allowed || found.is_empty(), "{} opens files itself: {found:?}", path.display());
-    }
-}
-
-#[test]
-fn commands_are_recorded_in_one_place() {
-    for word in ["cmd_dispatch", "cmd_pipeline_barrier"] {
-        assert_eq!(with_word(word), ["src/scheduler/recorder.rs"], "{word}");
-    }
-}
-
-#[test]
-fn the_library_prints_nothing() {
-    for word in ["println!", "print!(", "eprint", "dbg!"] {
-        assert_eq!(with_word(word), Vec::<String>::new(), "{word}");
-    }
-}
-
-/// Above the engine only what checks it touches its scheduler.
+/// Above the engine, only the modules that verify it use its scheduler.
 #[test]
 fn the_scheduler_is_the_engines_own() {
     let above = |path: &Path| {

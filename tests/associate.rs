@@ -20,7 +20,7 @@ fn some(ids: &[u16]) -> Owners {
 
 #[test]
 fn ids_of_each_view_become_objects() {
-    // Two objects of four Gaussians each and a background of 0; the ids of every view are its own.
+    // Two objects of four Gaussians each, and background 0. Each view has its own ids.
     let views = [
         some(&[1, 1, 1, 1, 2, 2, 2, 2, 0, 0]),
         some(&[7, 7, 7, 7, 3, 3, 3, 0, 0, 0]),
@@ -40,7 +40,7 @@ fn masks_of_one_view_stay_apart() {
 #[test]
 fn masks_of_different_things_stay_apart() {
     let views = [some(&[1, 1, 1, 1, 0, 0, 0, 0]), some(&[0, 0, 0, 1, 1, 1, 1, 0])];
-    // One of seven Gaussians in common, whatever the ids say.
+    // The masks share one of seven Gaussians; equal ids do not matter.
     assert_eq!(associate(&views), [vec![(0, 1)], vec![(1, 1)]]);
     assert_eq!(associate(&[Owners::default(), some(&[3])]), [vec![(1, 3)]], "a view without masks");
 }
@@ -81,7 +81,7 @@ fn a_mask_over_two_objects_is_divided_and_its_outline_stays() {
     let mask = runs(&[(0, 20), (1, 60), (0, 20)]);
     let shown = runs(&[(0, 22), (1, 30), (2, 26), (0, 22)]);
     let mended = mend(3, &mask, &shown, &mut repairs);
-    // Where the model shows nothing, the larger part takes it.
+    // Pixels without a Gaussian go to the larger part.
     assert_eq!(mended, runs(&[(0, 20), (1, 32), (2, 26), (1, 2), (0, 20)]));
     assert_eq!(repairs.divided, [((3, 1), vec![1, 2])]);
 }
@@ -100,7 +100,7 @@ fn a_mask_of_another_object_gets_its_id_and_a_right_one_stays() {
 fn an_object_that_was_missed_is_filled_in_but_no_border() {
     let mut repairs = Repairs::default();
     let mask = runs(&[(0, 50), (2, 40), (0, 10)]);
-    // Object 1 is not in the mask at all; object 2 only reaches a little further than its mask.
+    // Object 1 is missing in the mask; object 2 extends a little beyond its mask.
     let shown = runs(&[(1, 30), (0, 15), (2, 50), (0, 5)]);
     assert_eq!(mend(5, &mask, &shown, &mut repairs), runs(&[(1, 30), (0, 20), (2, 40), (0, 10)]));
     assert_eq!(repairs.filled, [(5, 1)]);

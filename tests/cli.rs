@@ -1,4 +1,4 @@
-//! The command line: every flag, what goes where, exit statuses.
+//! The command line: flags, output streams and exit statuses.
 
 use assert_cmd::Command;
 use clap::Parser;
@@ -81,13 +81,13 @@ fn every_setting_has_a_flag_with_its_default() {
             assert!(help.contains("[default: "), "{}: {help}", key.name);
         }
     }
-    // A link of the crate's documentation means nothing to whoever reads the help.
+    // Links of rustdoc must not appear in the help.
     for verb in root.get_subcommands() {
         let help = verb.clone().render_long_help().to_string();
         assert!(!help.contains("[`") && !help.contains("`]"), "{help}");
     }
     let help = text(&labelgs(&["train", "--help"]).stdout);
-    // Lines are wrapped anywhere.
+    // Lines of the help are wrapped, so compare without line breaks.
     let help = help.split_whitespace().collect::<Vec<_>>().join(" ");
     for default in ["[default: 15000]", "[default: 0.6]", "[default: 0.00016]", "[default: rendered]", "[default: on]"]
     {
@@ -175,7 +175,7 @@ fn a_flag_has_one_heading() {
     }
 }
 
-/// A value of every setting that is not its default.
+/// A value other than the default for each setting.
 const TYPED: [(&str, &str); 44] = [
     ("--iterations", "7"),
     ("--max-resolution", "99"),
@@ -262,7 +262,7 @@ fn every_setting_of_a_file_survives_flags_that_nobody_typed() {
 }
 
 #[test]
-fn flag_before_file_before_default() {
+fn flags_override_the_file_and_the_file_the_defaults() {
     let folder = folder();
     let path = folder.path().join("mine.toml");
     std::fs::write(&path, "iterations = 300\nocclusion = \"none\"\nbackground = [1, 0.5, 0]\n").expect("file");
@@ -397,7 +397,7 @@ fn synth_makes_a_scene_once() {
 
 #[cfg(unix)]
 #[test]
-fn a_reader_that_has_seen_enough_is_no_failure() {
+fn a_closed_pipe_is_no_failure() {
     let folder = folder();
     let model = model(folder.path());
     let (reader, writer) = std::io::pipe().expect("pipe");
@@ -423,7 +423,7 @@ fn a_signal_has_its_own_status() {
             .stderr(Stdio::null())
             .spawn()
             .expect("it runs");
-        // The handlers are there before the first picture.
+        // The signal handlers are installed before the first picture.
         while !scene.join("images/000.png").exists() {
             assert_eq!(child.try_wait().expect("child"), None);
             std::thread::sleep(std::time::Duration::from_millis(5));

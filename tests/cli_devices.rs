@@ -1,4 +1,4 @@
-//! The command line with devices that are poorer than the one that is there, or with none.
+//! The command line without a device, or with features of the device hidden.
 
 use crate::support::device;
 use assert_cmd::Command;
@@ -20,7 +20,7 @@ fn without_a_driver_devices_fails_and_plan_does_not() {
     let text_of_driver =
         r#"{"file_format_version": "1.0.0", "ICD": {"library_path": "/dev/null", "api_version": "1.3.0"}}"#;
     std::fs::write(&broken, text_of_driver).expect("a file");
-    // No driver, a driver whose library is none, no loader.
+    // No driver; a driver with an invalid library; no loader.
     for (driver, fault) in
         [("/nonexistent/driver.json", ""), (broken.to_str().expect("text"), ""), ("", "loader:1:INITIALIZATION")]
     {
@@ -42,7 +42,7 @@ fn without_a_driver_devices_fails_and_plan_does_not() {
     }
 }
 
-/// What the kernels cannot do without is named, with the status of a device that does not fit.
+/// A missing feature that the kernels require is named, with status 4.
 #[test]
 fn required_features_are_missed_by_name() {
     let Some(_gpu) = device() else { return };
@@ -58,7 +58,7 @@ fn required_features_are_missed_by_name() {
     let mut command = Command::cargo_bin("labelgs").expect("the tool is built");
     let output = command.env("LABELGS_HIDE", "colour").args(["devices"]).output().expect("it runs");
     assert_eq!(output.status.code(), Some(2), "{}", text(&output.stderr));
-    // Where there are no timestamps, `profile` has nothing to say.
+    // Without timestamps `profile` cannot measure.
     let mut command = Command::cargo_bin("labelgs").expect("the tool is built");
     command.env("LABELGS_HIDE", "timestamps").env("LABELGS_VALIDATION", "off");
     let output = command.args(["profile", "--synthetic", "--steps", "1"]).output().expect("it runs");
@@ -66,8 +66,8 @@ fn required_features_are_missed_by_name() {
     assert!(text(&output.stderr).contains("no timestamps"), "{}", text(&output.stderr));
 }
 
-/// A driver whose subgroups cannot be pinned and are of another size than it tells is found out before it does harm.
-/// Debian 12's lavapipe is one with vectors of 512 bits, and is none with those of 256.
+/// A driver that runs another subgroup size than it reports, and cannot pin the size, is refused before any work.
+/// Debian 12's lavapipe does so with vectors of 512 bits, but not with 256.
 #[test]
 fn subgroups_that_are_not_as_told_are_refused() {
     if !device().is_some_and(|gpu| gpu.is_cpu()) {

@@ -96,7 +96,7 @@ fn names_choose_labels_and_go_with_them() {
     let listed = succeeds(&["list", text(&model)]);
     assert_eq!((&listed["labels"][1]["name"], &listed["labels"][0]["name"]), (&"cup".into(), &Value::Null));
 
-    // Another table than the one beside the model.
+    // A table other than the one beside the model.
     let other = folder.path().join("other.json");
     LabelTable::new(vec![LabelEntry { name: Some("ladle".into()), ..LabelEntry::new(3) }]).write(&other).expect("ok");
     let args = ["recolour", text(&model), "--labels", "ladle", "--label-table", text(&other)];
@@ -106,7 +106,7 @@ fn names_choose_labels_and_go_with_them() {
     assert!(painted.sh0[0] == [0.5; 3] && (painted.sh0[4][0] - 1.772_454).abs() < 1e-5, "{:?}", painted.sh0);
     assert_eq!(names(&beside), [(3, "ladle".to_owned())]);
 
-    // A model without names leaves no names of an earlier one.
+    // Writing a model without names removes the names of an earlier model.
     std::fs::remove_file(LabelTable::beside(&model)).expect("removed");
     succeeds(&["extract", text(&model), "--labels", "1", "-o", text(&out)]);
     assert!(!beside.exists());
@@ -174,7 +174,7 @@ fn places_in_views_choose_labels() {
     let cameras =
         ring_of_cameras(&SynthOptions { width: 96, height: 72, views: 4, points: 20, ..SynthOptions::default() });
     let places = [[-0.6, -0.5, 0.4], [0.5, 0.7, 0.4], [0.0, 0.0, 1.3]];
-    // In the folder of a run, so that its near plane counts.
+    // The model lies in the folder of a run, so the near plane of that run applies.
     let run = folder.path().join("run");
     let ply = run.join("point_cloud/iteration_1/point_cloud.ply");
     balls(&ply, &places, &[1, 3, 4]);
@@ -218,7 +218,7 @@ fn places_in_views_choose_labels() {
     assert_eq!(map(), [3]);
     assert!(refused(&[&render[..], &["--at", &at(0, 2)]].concat()).contains("--without is needed"));
 
-    // Beyond everything: nothing is drawn, unless the flag says otherwise.
+    // The near plane of the run is behind the scene: nothing is drawn, unless `--near` overrides it.
     std::fs::write(run.join(run_folder::CONFIG), "near = 50.0\n").expect("file");
     succeeds(&render);
     assert_eq!(map(), Vec::<u16>::new());

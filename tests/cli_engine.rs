@@ -1,4 +1,4 @@
-//! The command line with a device: what it can do, what it plans, what it times, and a scene from synth to pictures.
+//! The command line with a device: `devices`, `plan`, `profile`, and a scene from `synth` to pictures.
 
 use assert_cmd::Command;
 use labelgs::io::read_model;
@@ -8,11 +8,11 @@ use std::process::Output;
 
 fn labelgs(args: &[&str]) -> Output {
     let mut command = Command::cargo_bin("labelgs").expect("the tool is built");
-    // The layer is for the tests inside of this process.
+    // The validation layer watches this process only.
     command.env("LABELGS_VALIDATION", "off").args(args).output().expect("it runs")
 }
 
-/// A turn with the device: several at once would only wait for each other.
+/// Returns a turn with the device: processes that run at once would only wait for each other.
 fn turn() -> Option<crate::support::device::Turn> {
     crate::support::device()
 }
@@ -66,7 +66,7 @@ fn devices_tells_what_is_needed_and_found() {
 }
 
 #[test]
-fn plan_adds_up() {
+fn the_sizes_of_a_plan_add_up_to_its_total() {
     let args = ["plan", "--gaussians", "2k", "--size", "160x120", "--label-samples", "4", "--sh-degree", "2"];
     let table = succeeds(&args);
     for part in ["MEMORY", "SCRATCH ARENA", "PASSES", "barrier: cull", "blend_backward_labels", "v_instances", "total"]
@@ -176,7 +176,7 @@ fn profile_times_every_stage() {
 }
 
 #[test]
-fn from_a_scene_to_objects_and_pictures() {
+fn a_made_scene_is_trained_scored_edited_and_rendered() {
     let Some(_gpu) = turn() else { return };
     let folder = tempfile::tempdir().expect("folder");
     let scene = scene(folder.path());

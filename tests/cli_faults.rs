@@ -1,6 +1,7 @@
-//! The tool under faults made on purpose: statuses as README lists them, nothing half-written, nothing lost.
+//! The program under injected faults: exit statuses as README.md lists them, no partial files, no lost results.
 //!
-//! N rises until a command ends without having met its fault. `LABELGS_TEST_FAULTS=all` tries every N in place of some.
+//! The N-th event of a kind fails, for rising N, until a command ends before event N. `LABELGS_TEST_FAULTS=all` tries
+//! every N.
 
 use crate::support::device;
 use crate::support::runs::{Place, all_whole, contents, copy, files, stderr, succeeded};
@@ -14,12 +15,12 @@ fn all() -> bool {
     std::env::var("LABELGS_TEST_FAULTS").is_ok_and(|value| value == "all")
 }
 
-/// The events that are tried: the first few, then fewer and fewer.
+/// Event numbers to try: the first few, then at growing distances.
 fn events() -> impl Iterator<Item = u32> {
     std::iter::successors(Some(1_u32), |&n| Some(if all() || n < 3 { n + 1 } else { n + n / 2 }))
 }
 
-/// Kinds of faults with the events that they are tried at: all of them at each, or in turn.
+/// Kinds of faults with the event numbers to try: every kind at each number, or the kinds in turn.
 fn cases(kinds: &'static [&str]) -> impl Iterator<Item = (&'static str, u32)> {
     let each = if all() { kinds.len() } else { 1 };
     events()
@@ -27,7 +28,7 @@ fn cases(kinds: &'static [&str]) -> impl Iterator<Item = (&'static str, u32)> {
         .flat_map(move |(turn, nth)| (0..each).map(move |kind| (kinds[(turn + kind) % kinds.len()], nth)))
 }
 
-/// True if the command came to the event that was to fail.
+/// Whether the command reached the event that fails.
 fn met(output: &Output) -> bool {
     stderr(output).contains("a fault on purpose")
 }
@@ -40,7 +41,7 @@ fn status(output: &Output, allowed: &[i32], what: &str) -> i32 {
     status
 }
 
-/// Whatever Vulkan call fails, `render` ends with the status of the failure and leaves whole pictures or none.
+/// If any Vulkan call fails, `render` ends with the status of the failure and leaves complete pictures or none.
 #[test]
 fn any_vulkan_call_may_fail() {
     let Some(_turn) = device() else { return };
@@ -65,7 +66,7 @@ fn any_vulkan_call_may_fail() {
                 break;
             }
             tried += 1;
-            // Those of caches of pipelines.
+            // Failures of pipeline caches are harmless.
             harmless += u32::from(status == 0);
         }
         println!("{kind}: {tried} of the Vulkan calls of a render, {harmless} of them harmless");
@@ -76,12 +77,12 @@ fn any_vulkan_call_may_fail() {
     }
 }
 
-/// Whatever Vulkan call of a training fails: its status, whole files, and a run that goes on afterwards to the same bits.
+/// If any Vulkan call of a training fails: the right exit status, complete files, and a resumed run with the same bits.
 #[test]
 fn any_vulkan_call_of_a_training_may_fail() {
     let Some(_turn) = device() else { return };
     let place = Place::new();
-    // Votes, densification, a checkpoint and a preview in six steps.
+    // Six steps with votes, densification, a checkpoint and a preview.
     std::fs::write(place.path("short.toml"), SHORT).expect("settings");
     let short = place.text("short.toml");
     let flags = ["--config", &short];
@@ -131,7 +132,7 @@ densify_interval = 2
 densify_grad_threshold = 1e-4
 ";
 
-/// A full or broken disk at any moment of a training: its status, whole files, and a run that goes on afterwards.
+/// If any write of a training fails: the right exit status, complete files, and a run that can be resumed.
 #[test]
 fn any_write_may_fail() {
     let Some(_turn) = device() else { return };
@@ -167,7 +168,7 @@ fn any_write_may_fail() {
     assert!(failed > 3, "only {failed} of {tried} faults ended the training");
 }
 
-/// A disk that fails while something is read: its status, the name of the file, and no other result than without.
+/// If any read fails: status 3 and the name of the file, or the same result as without the fault.
 #[test]
 fn any_read_may_fail() {
     let Some(_turn) = device() else { return };
@@ -229,7 +230,8 @@ fn results(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
     found
 }
 
-/// A device that is lost is opened again, and the pass that lost it is named. Without a new checkpoint it stays lost.
+/// A lost device is opened again, and the message names the pass that was running. A second loss before the next
+/// checkpoint ends the run.
 #[test]
 fn a_lost_device_is_opened_again() {
     let Some(_turn) = device() else { return };
@@ -261,19 +263,20 @@ fn a_lost_device_is_opened_again() {
         "devices lost at {} of the submits of a training: {healed} made up for, the pass of {named} of them known",
         healed + lost
     );
-    // The others were lost while memory was set up, when there is no pass.
+    // The remaining losses happen during memory setup, before any pass.
     assert!(healed > 2 && lost > 2 && named > 0, "{healed} healed, {named} named, {lost} lost");
     // A driver may need a while until it has a device again.
     let fault = "vkQueueSubmit:300:DEVICE_LOST,vkEnumeratePhysicalDevices:2:INITIALIZATION";
     let said = succeeded(&place.trained_with(Some(fault), "slow", &flags));
     assert!(said.contains("tried again in 1 s") && place.model("slow", 40) == expected, "{said}");
-    // Checkpoints of an earlier run are nothing to go on from.
+    // `--restart` does not use checkpoints of an earlier run.
     let output =
         place.trained_with(Some("vkQueueSubmit:30:DEVICE_LOST"), "right", &["--restart", "--iterations", "40"]);
     assert_eq!(output.status.code(), Some(6), "{}", stderr(&output));
 }
 
-/// Whatever memory the driver refuses: the training ends with its status, or goes on with fewer Gaussians and says so.
+/// If any allocation is refused, the training ends with status 5, or goes on with a bound on the Gaussians and reports
+/// it.
 #[test]
 fn any_allocation_may_fail() {
     let Some(_turn) = device() else { return };
@@ -283,7 +286,7 @@ fn any_allocation_may_fail() {
     succeeded(&place.trained("right", &flags));
     let expected = place.model("right", 40);
     let (mut tried, mut went_on, mut bounded) = (0, 0, 0);
-    // One refusal may be made up for by asking for less, two or three by a bound, many by nothing.
+    // One refusal is met by a smaller request, two or three by a bound on the Gaussians; many end the run.
     for (nth, count) in (1..).step_by(if all() { 1 } else { 5 }).zip([1, 2, 3, 40].into_iter().cycle()) {
         let (fault, out) = (format!("vkAllocateMemory:{nth}:DEVICE_MEMORY:{count}"), format!("out-{nth}"));
         let output = place.trained_with(Some(&fault), &out, &flags);
@@ -315,10 +318,10 @@ fn any_allocation_may_fail() {
     assert!(tried > 10 && went_on > bounded && bounded > 0 && tried > went_on, "{tried}, {went_on}, {bounded}");
 }
 
-/// A number that is none, in the memory of a device that goes wrong once: the training goes back, and ends as it would
-/// have.
+/// After a single NaN in device memory, the training returns to the last checkpoint and ends in the same bits as
+/// without it.
 #[test]
-fn a_number_that_is_none_is_found_and_undone() {
+fn a_nan_is_found_and_undone() {
     let Some(_turn) = device() else { return };
     let place = Place::new();
     let flags = ["--config", &place.settings()];
@@ -332,7 +335,7 @@ fn a_number_that_is_none_is_found_and_undone() {
         "{said}"
     );
     assert!(place.model("healed", 40) == place.model("right", 40), "healed, the model is the same");
-    // What comes again is met with smaller steps, once.
+    // A repeated NaN halves the learning rates, once.
     let said = succeeded(&place.trained_with(Some("nan:27:NUMBER:2"), "slower", &flags));
     assert!(said.contains("all learning rates are half of what they were"), "{said}");
     assert!(place.model("slower", 40) != place.model("right", 40));
@@ -363,7 +366,7 @@ fn a_folder_has_one_run_at_a_time() {
     succeeded(&place.trained("out", &["--iterations", "1"]));
 }
 
-/// A step that takes a minute: the first signal waits for it, the second does not.
+/// In a step of a minute, the first signal waits for the end of the step, the second ends the program at once.
 #[cfg(unix)]
 #[test]
 fn two_signals_end_a_slow_step_at_once() {

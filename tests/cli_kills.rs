@@ -1,5 +1,5 @@
-//! Commands other than `train` that are killed while they write: what they leave is whole, and a second run ends as one
-//! that nobody killed.
+//! Commands other than `train`, killed while they write: all files are complete, and a second run writes the same files
+//! as an uninterrupted one.
 
 use crate::support::device;
 use crate::support::runs::{Place, all_whole, contents, kills, succeeded};
@@ -13,7 +13,7 @@ use std::time::Instant;
 /// Kills of each command.
 const KILLS: u32 = 3;
 
-/// Bytes of all files below a folder, but for temporary ones.
+/// Bytes of all files below a folder, without temporary files.
 fn results(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
     contents(folder, |path| path.extension().is_none_or(|extension| extension != "tmp"))
 }
@@ -49,7 +49,7 @@ fn exports_may_be_killed_at_any_moment() {
         assert!(!right.is_empty(), "{name} writes nothing");
         let (mut killed, mut started) = (0, 0);
         while killed < kills {
-            // Half of them over files that are there.
+            // Half of the kills hit a run that replaces existing files.
             if started % 2 == 0 {
                 std::fs::remove_dir_all(&out).and_then(|()| std::fs::create_dir(&out)).expect("an empty folder");
             }

@@ -1,4 +1,4 @@
-//! The verbs around labels, from a trained model to repaired masks, on a small scene.
+//! `label`, `masks repair` and `ablate` on a small scene.
 
 use crate::support;
 use assert_cmd::Command;
@@ -48,7 +48,7 @@ fn a_model_without_labels_gets_them_and_mends_masks() {
     let scores = json(&labelgs(&["eval", &model, "--scene", &scene, "--masks", &masks, "--json", "-q"], 0));
     let iou = scores["mean"]["iou_map"].as_f64().expect("a score");
     assert!(iou > 0.8, "{iou} after a short training");
-    // The paper's rule on the same model labels less.
+    // The paper's rule labels fewer Gaussians of the same model.
     let main = path("main.ply");
     let rule = ["label", &plain, "--scene", &scene, "--masks", &masks, "--rule", "main", "-o", &main, "-q"];
     labelgs(&rule, 0);
@@ -57,7 +57,7 @@ fn a_model_without_labels_gets_them_and_mends_masks() {
     let votes = read_model(&model).expect("model").gaussians.labels.expect("labels");
     assert!(count(&of_rule) < count(&votes) && count(&of_rule) > 0);
 
-    // Ids of their own in every view, then made to agree again.
+    // Give each view its own ids, then repair them.
     let (spoilt, mended) = (path("spoilt"), path("mended"));
     labelgs(&["masks", "spoil", &masks, "--fault", "per-view", "-o", &spoilt, "-q"], 0);
     let repair =

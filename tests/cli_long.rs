@@ -1,4 +1,5 @@
-//! A long training is the same to the last bit: run again, interrupted in the middle, on other numbers of threads.
+//! A long training gives the same bits when it is repeated, interrupted in the middle, or run on other numbers of
+//! threads.
 
 use crate::support::device;
 use crate::support::runs::{Place, succeeded};

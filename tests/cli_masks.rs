@@ -1,4 +1,4 @@
-//! `labelgs masks`: what goes where, and exit statuses.
+//! `labelgs masks`: output files and exit statuses.
 
 use assert_cmd::Command;
 use serde_json::Value;
@@ -32,7 +32,7 @@ fn imported_masks_pass_the_check_until_they_are_broken() {
     assert_eq!((&done["schema_version"], &done["import"]["format"]), (&1.into(), &"deva-short".into()));
     assert_eq!((&done["import"]["masks"], &done["import"]["bits"]), (&9.into(), &8.into()));
     assert_eq!(done["import"]["labels"][2]["source"], "3");
-    // The truth has its ids from 1 on without gaps, so nothing changes.
+    // The ids of the ground truth are 1 and up without gaps, so import keeps them.
     for entry in fs::read_dir(&source).expect("folder") {
         let path = entry.expect("entry").path();
         if path.extension().is_none_or(|extension| extension != "png") {

@@ -1,4 +1,4 @@
-//! `labelgs train` that is stopped, killed or out of space, and goes on with `--resume`.
+//! `labelgs train` is stopped, killed or out of disk space, and resumed with `--resume`.
 
 use crate::support::device;
 use crate::support::runs::{Place, all_whole, files, kills, stderr, succeeded};
@@ -11,7 +11,7 @@ use std::path::PathBuf;
 use std::process::{Child, Stdio};
 use std::time::{Duration, Instant};
 
-/// Kills of the test.
+/// Number of kills.
 const KILLS: u32 = 6;
 /// Steps of a run.
 const STEPS: u32 = 40;
@@ -36,13 +36,13 @@ fn kills_at_any_moment_cost_no_bit() {
     let kills = kills(KILLS);
     let mut random = Pcg32::seed_from_u64(u64::from(kills));
     let newest = || place.checkpoints("out").first().map_or((0, 0), |found| (found.number, found.step));
-    // Steps of the checkpoints that the kills of a run left.
+    // Steps of the checkpoints after each kill.
     let (mut killed, mut steps, mut ended, mut began) = (0, Vec::new(), 0, 0);
     while killed < kills || !steps.is_empty() {
         let (before, step) = newest();
         let mut child = place.spawned(&place.train("out", &["--config", &place.settings(), "--resume"]));
         if killed < kills {
-            // Every second one dies anywhere, the others in or after writing.
+            // Every second kill comes at any moment, the others during or after a write.
             if killed % 2 == 0 {
                 wait_until(&mut child, || newest().0 > before);
                 std::thread::sleep(Duration::from_micros(random.random_range(0..40_000)));
@@ -59,7 +59,7 @@ fn kills_at_any_moment_cost_no_bit() {
             steps.push(newest().1);
             continue;
         }
-        // It has got to its end between the kills.
+        // The run ended before the kill.
         assert!(status.success(), "{status}");
         assert!(
             place.model("out", STEPS) == place.model("straight", STEPS),
@@ -133,7 +133,7 @@ fn a_resumed_run_says_what_changed_and_what_cannot() {
     refused(&["--iterations", "5"], 2, &["--iterations", "6 steps"]);
     assert_eq!(place.model("out", 6), first);
 
-    // The masks are found by what the checkpoint says.
+    // The checkpoint records the folder of the masks.
     let args = ["train", &place.text("scene"), "-o", &place.text("out"), "--resume", "--iterations", "9"];
     let text = succeeded(&place.labelgs(&[&args[..], &["--feature-lr", "0.003", "--memory-limit", "2G"]].concat()));
     for part in ["--iterations: 6 in the checkpoint, now 9", "--feature-lr: 0.0025 in", "--memory-limit: not set in"] {
@@ -143,13 +143,13 @@ fn a_resumed_run_says_what_changed_and_what_cannot() {
     let text = succeeded(&place.trained("out", &["--resume", "-q"]));
     assert!(!text.contains("now"), "what was changed is in the new checkpoint: {text}");
 
-    // A file that leaves the near plane to the scene does not change what was decided for it.
+    // Settings without a near plane keep the near plane of the checkpoint.
     let near = || TrainState::read(&place.checkpoints("out")[0].path).expect("a whole one").config.near;
     let decided = near();
     let text = succeeded(&place.trained("out", &["--resume", "--config", &place.settings(), "--iterations", "10"]));
     assert!(decided > 0.0 && near() == decided && !text.contains("--near"), "{decided}, {}: {text}", near());
 
-    // Masks that are not those of the checkpoint.
+    // Masks that differ from the run's are refused.
     std::fs::rename(place.path("scene/masks"), place.path("masks")).expect("moved");
     refused(&[], 3, &["masks"]);
     let mask = place.path("masks/001.png");
@@ -178,7 +178,7 @@ fn a_damaged_checkpoint_gives_way_to_the_one_before() {
     let name = found[0].path.file_name().expect("a name").to_string_lossy().into_owned();
     assert!(text.contains(&name) && text.contains("cut short") && text.contains("before it is tried"), "{text}");
     assert!(place.model("out", 9) == place.model("straight", 9));
-    // Nothing whole: nothing is trained over what may be saved by hand.
+    // Without an intact checkpoint, training refuses to overwrite files that a user may still rescue.
     for found in place.checkpoints("out") {
         std::fs::write(&found.path, b"labelgs").expect("damaged");
     }
@@ -186,7 +186,7 @@ fn a_damaged_checkpoint_gives_way_to_the_one_before() {
     assert_eq!(output.status.code(), Some(3), "{}", stderr(&output));
 }
 
-/// Masks in which no object is to be seen: there are labels to ask for, and none to learn.
+/// Masks without objects: labels are requested, but there is none to learn.
 #[test]
 fn masks_without_objects_are_resumed_like_others() {
     let Some(_turn) = device() else { return };
@@ -202,7 +202,7 @@ fn masks_without_objects_are_resumed_like_others() {
     assert!(place.model("out", 8) == place.model("straight", 8));
 }
 
-/// What the scene was read with is in the checkpoint.
+/// The checkpoint records the options that the scene was read with.
 #[test]
 fn a_resumed_run_reads_the_scene_as_the_first_did() {
     let Some(_turn) = device() else { return };
@@ -215,10 +215,10 @@ fn a_resumed_run_reads_the_scene_as_the_first_did() {
     assert!(!place.model("out", 6).is_empty());
 }
 
-/// Folders that nobody may write to, and previews that cannot be written on the way.
+/// Folders without write permission, and previews that cannot be written during a run.
 #[cfg(target_os = "linux")]
 #[test]
-fn what_cannot_be_written_is_said_early_or_borne() {
+fn unwritable_folders_are_refused_and_lost_previews_warned_of() {
     let Some(_turn) = device() else { return };
     let place = Place::new();
     let masks = place.text("scene/masks");
@@ -236,7 +236,7 @@ fn what_cannot_be_written_is_said_early_or_borne() {
     assert!(!place.model("out", 6).is_empty() && place.checkpoints("out")[0].step == 6);
 }
 
-/// A bound on the size of files stands for a full disk: the model fits, a checkpoint does not.
+/// A limit on file size (`ulimit -f`) imitates a full disk: the model fits, a checkpoint does not.
 #[cfg(target_os = "linux")]
 #[test]
 fn without_space_the_run_ends_and_the_last_checkpoint_stays() {
@@ -246,7 +246,7 @@ fn without_space_the_run_ends_and_the_last_checkpoint_stays() {
     succeeded(&place.trained("out", &flags));
     let old = place.checkpoints("out");
     let mut args = place.train("out", &["--resume", "--iterations", "8"]);
-    // Blocks of 512 bytes; what is written beyond fails with an error, as the signal is ignored.
+    // In blocks of 512 bytes. A write beyond the limit returns an error because the signal is ignored.
     let size = std::fs::metadata(&old[0].path).expect("a file").len() / 512 - 1;
     let script = format!("trap '' XFSZ; ulimit -f {size}; exec \"$@\"");
     args.insert(0, env!("CARGO_BIN_EXE_labelgs").to_owned());
@@ -259,7 +259,7 @@ fn without_space_the_run_ends_and_the_last_checkpoint_stays() {
     TrainState::read(&old[0].path).expect("and whole");
     assert!(!place.model("out", 8).is_empty());
     assert!(files(&place.path("out")).iter().all(|path| path.extension().is_none_or(|name| name != "tmp")));
-    // What stands in the folder's place is found before any work.
+    // A file in place of the folder is found before any work.
     std::fs::create_dir_all(place.path("blocked")).expect("a folder");
     std::fs::write(place.path("blocked/checkpoints"), b"").expect("a file");
     let output = place.trained("blocked", &flags);
@@ -286,8 +286,8 @@ fn an_output_that_was_deleted_meanwhile_is_made_anew() {
     all_whole(&place.path("out"));
 }
 
-/// A run whose folder was deleted, and where another one has begun meanwhile, ends; there may be the checkpoint that it was
-/// writing at that moment, and nothing else.
+/// A run ends if its folder was deleted and another run has started there. It may leave the checkpoint that it was
+/// writing, and nothing else.
 #[test]
 fn a_deleted_folder_may_be_the_folder_of_another_run() {
     let Some(_turn) = device() else { return };
@@ -299,7 +299,7 @@ fn a_deleted_folder_may_be_the_folder_of_another_run() {
     wait_until(&mut child, || !place.checkpoints("out").is_empty());
     let out = place.path("out");
     let lock = loop {
-        // The run takes the folder again at its next checkpoint, unless the other one is faster.
+        // The first run locks the folder again at its next checkpoint, unless the second run is faster.
         if std::fs::remove_dir_all(&out).is_ok()
             && std::fs::create_dir(&out).is_ok()
             && let Ok(lock) = Lock::take(&out)
@@ -316,7 +316,7 @@ fn a_deleted_folder_may_be_the_folder_of_another_run() {
     drop(lock);
 }
 
-/// A run that starts anew where another one was has its own checkpoints in the end.
+/// A new run in the folder of an earlier run ends with its own checkpoints only.
 #[test]
 fn checkpoints_of_an_earlier_run_stay_until_there_are_new_ones() {
     let Some(_turn) = device() else { return };
@@ -338,6 +338,6 @@ fn checkpoints_of_an_earlier_run_stay_until_there_are_new_ones() {
     succeeded(&place.trained("out", &["--iterations", "5", "--checkpoint-every", "2", "--save-at", "2"]));
     assert_eq!(models().len(), 2, "{:?}", models());
     let steps: Vec<u32> = place.checkpoints("out").iter().map(|found| found.step).collect();
-    assert_eq!(steps, [5], "the run of 9 steps is nobody's business any more");
+    assert_eq!(steps, [5], "no checkpoint of the run of 9 steps remains");
     assert!(succeeded(&place.trained("out", &["--resume"])).contains("goes on after step 5"));
 }

@@ -1,5 +1,5 @@
-//! The tool where things are arranged otherwise than at home: names of folders, languages, closed streams, links, folders
-//! that nobody may write to.
+//! The program in unusual surroundings: folder names, languages, closed streams, links, read-only folders, little
+//! memory.
 #![cfg(target_os = "linux")]
 
 use crate::support::device;
@@ -36,7 +36,7 @@ fn folders_may_have_any_name() {
         let (scene, out) = (place.path("scenes").join(name), place.path("models").join(name));
         copy(&place.path("scene"), &scene);
         succeeded(&train(&place, &scene, &out, &["--iterations", "4"]));
-        // A name that is no text cannot be kept in a checkpoint: the masks are typed again, here as everywhere.
+        // A name that is not UTF-8 cannot be kept in a checkpoint, so `--masks` is given again for every name.
         let said = succeeded(&train(&place, &scene, &out, &["--resume", "--iterations", "6"]));
         assert!(said.contains("goes on after step 4"), "{name:?}: {said}");
         let pictures = place.path("pictures").join(name);
@@ -46,7 +46,7 @@ fn folders_may_have_any_name() {
         assert!(!files(&pictures).is_empty(), "{name:?}");
         succeeded(&labelgs(&place).arg("list").arg(&out).output().expect("it runs"));
     }
-    // Longer than a system takes.
+    // Longer than the file system allows.
     let long: PathBuf = std::iter::repeat_n("folder", 700).collect();
     let output = train(&place, &place.path("scene"), &place.path("models").join(&long), &["--iterations", "4"]);
     assert_eq!(output.status.code(), Some(7), "{}", stderr(&output));
@@ -55,7 +55,7 @@ fn folders_may_have_any_name() {
     assert_eq!(output.status.code(), Some(3), "{}", stderr(&output));
 }
 
-/// Numbers are written and read alike under every language, and no zone or date changes a result.
+/// Numbers are read and written alike under every language, and time zone and date change no result.
 #[test]
 fn languages_and_zones_change_nothing() {
     let Some(_turn) = device() else { return };
@@ -74,9 +74,9 @@ fn languages_and_zones_change_nothing() {
     }
 }
 
-/// Streams that are closed, or whose reader is gone, end nothing: results are in files.
+/// Closed streams and closed pipes do not end a run, because results are in files.
 #[test]
-fn nobody_has_to_listen() {
+fn closed_streams_do_not_end_a_run() {
     let Some(_turn) = device() else { return };
     let place = Place::new();
     succeeded(&place.trained("right", &["--iterations", "4"]));
@@ -95,7 +95,7 @@ fn nobody_has_to_listen() {
         assert_eq!(shell(redirection, &out), Some(0), "{redirection}");
         assert!(place.model(&out, 4) == model, "{redirection}");
     }
-    // A result that cannot be printed is an output that cannot be written.
+    // A result that cannot be printed has the status of a failed write.
     assert_eq!(shell(">/dev/full", "full"), Some(7));
     assert!(place.model("full", 4) == model);
     // `labelgs train ... 2>&1 | head -n 1`
@@ -111,7 +111,7 @@ fn nobody_has_to_listen() {
     }
 }
 
-/// Compiled pipelines go where the user's caches are, unless `LABELGS_CACHE` says otherwise.
+/// Compiled pipelines go to the user's cache folder, unless `LABELGS_CACHE` names another.
 #[test]
 fn caches_are_kept_where_the_system_has_them() {
     let Some(_turn) = device() else { return };
@@ -131,7 +131,7 @@ fn caches_are_kept_where_the_system_has_them() {
     }
 }
 
-/// Runs the tool with so much address space, MiB.
+/// Runs the program with a limit on its address space, MiB.
 fn within(place: &Place, megabytes: u32, args: &[String]) -> Output {
     let mut command = Command::new("sh");
     command.args(["-c", r#"ulimit -c 0; ulimit -v "$1"; shift; exec "$@""#, "sh", &(megabytes * 1024).to_string()]);
@@ -139,10 +139,10 @@ fn within(place: &Place, megabytes: u32, args: &[String]) -> Output {
     command.arg(env!("CARGO_BIN_EXE_labelgs")).args(args).output().expect("a shell")
 }
 
-/// A computer without memory: the status for that, with the number, and no half of a file.
+/// Without host memory: status 5, the number of bytes, and no partial file.
 #[cfg(target_os = "linux")]
 #[test]
-fn a_computer_may_be_out_of_memory() {
+fn host_memory_may_run_out() {
     let Some(_turn) = device() else { return };
     let place = Place::new();
     let [model, part, right] = ["model.ply", "part.ply", "right.ply"].map(|name| place.text(name));
@@ -179,8 +179,8 @@ fn a_computer_may_be_out_of_memory() {
     }
     println!("{refused} of {} runs had too little memory", done + refused);
     assert!(done > 3 && refused > 3, "{done}, {refused}");
-    // In a training the driver may be the one that finds no memory. It may end the process by a signal, then; what is
-    // written stays whole, and the training goes on where there is memory.
+    // In a training, an allocation of the driver may fail and end the process by a signal. Files stay complete, and the
+    // training can be resumed with more memory.
     succeeded(&place.trained("right", &["--iterations", "8", "--checkpoint-every", "4"]));
     for megabytes in (200..1200).step_by(200) {
         let out = format!("out-{megabytes}");
@@ -202,7 +202,7 @@ fn state(folder: &Path) -> BTreeMap<PathBuf, (Vec<u8>, std::time::SystemTime)> {
     let mut found: BTreeMap<_, _> = (files(folder).into_iter())
         .map(|path| (path.clone(), (std::fs::read(&path).expect("a file"), time(&path))))
         .collect();
-    // A file that was made and deleted again leaves its mark on its folder.
+    // Includes folders: creating and deleting a file changes the time of its folder.
     let folders: Vec<PathBuf> = found.keys().filter_map(|path| path.parent()).map(Path::to_owned).collect();
     for folder in folders {
         let time = time(&folder);
@@ -254,7 +254,7 @@ fn links_are_followed() {
     symlink(place.path("gone"), place.path("nowhere")).expect("a link");
     let output = train(&place, &linked, &place.path("nowhere"), &["--iterations", "4"]);
     assert_eq!(output.status.code(), Some(7), "{}", stderr(&output));
-    // A file that is not there yet may be named by a link, and a link may be the system's name of a pipe.
+    // A link may name a missing file, or a pipe of the system.
     let model = place.text("right/point_cloud/iteration_4/point_cloud.ply");
     symlink("later.ply", place.path("link.ply")).expect("a link");
     let extract = ["extract", &model, "--labels", "0", "-o"];

@@ -39,7 +39,7 @@ fn half(photo: &Photo) -> Photo {
     Photo { width, height, rgba }
 }
 
-/// They are those of a scene of half the size without masks; after them come steps on whole photos, with labels.
+/// Coarse steps equal those of a scene of half the size without masks. Steps on whole photos, with labels, follow.
 #[test]
 fn coarse_steps_are_those_of_a_smaller_scene() {
     let Some(gpu) = device() else { return };

@@ -1,4 +1,4 @@
-//! The predicates of `support::compare`, each seen to fail for each of its reasons.
+//! Each predicate of `support::compare` fails for each of its reasons.
 
 use crate::support::compare::{Band, GradientBounds, Tolerance, Verdict, close, close_with_band, exact, gradients};
 

@@ -32,7 +32,7 @@ fn densification_ends_at_half_of_the_run() {
 }
 
 #[test]
-fn nonsense_is_refused_by_name() {
+fn invalid_settings_are_refused_by_name() {
     let broken = [
         (TrainConfig { iterations: 0, ..Default::default() }, "iterations"),
         (TrainConfig { label_threshold: f32::NAN, ..Default::default() }, "label_threshold"),

@@ -27,7 +27,7 @@ fn most_votes_win_and_the_background_may() {
 }
 
 #[test]
-fn who_is_never_seen_asks_the_neighbours() {
+fn unseen_gaussians_take_the_label_of_their_neighbours() {
     // The last two rows have no votes: one inside the object, one on the background's side.
     let rows: [&[u64]; 12] =
         [&[0, 5], &[0, 5], &[0, 5], &[0, 5], &[0, 5], &[8, 0], &[8, 0], &[8, 0], &[8, 0], &[8, 0], &[0, 0], &[0, 0]];
@@ -39,12 +39,12 @@ fn who_is_never_seen_asks_the_neighbours() {
     assert!(complete.confidence[10] > 0.5 && complete.confidence[10] < 1.0);
     let alone = decide(&ballot(&[0, 4], &rows), &means, false).expect("decided");
     assert_eq!((alone.labels[10], alone.confidence[10]), (0, 0.0));
-    assert_eq!(alone.labels[..10], complete.labels[..10], "who has votes decides alone");
+    assert_eq!(alone.labels[..10], complete.labels[..10], "Gaussians with votes ignore their neighbours");
 }
 
-/// Every label of every Gaussian would be 12 GB of votes; what was voted is some kilobytes.
+/// A dense table of Gaussians and labels would take 12 GB; the votes that were cast take some kilobytes.
 #[test]
-fn thousands_of_labels_take_memory_for_what_was_voted_only() {
+fn memory_grows_with_votes_and_not_with_labels() {
     let (labels, count) = ((0..30_000).collect::<Vec<u16>>(), 50_000_u32);
     let votes = (0..count).flat_map(|row| [(row, (row % 29_999) as u16 + 1, 5 << 16), (row, 0, 2 << 16)]);
     let ballot = Ballot::new(labels, count as usize, votes.collect());
@@ -53,7 +53,7 @@ fn thousands_of_labels_take_memory_for_what_was_voted_only() {
 }
 
 #[test]
-fn nobody_to_ask_is_no_failure() {
+fn gaussians_without_votes_or_neighbours_stay_unlabelled() {
     let rows: [&[u64]; 2] = [&[0, 0], &[0, 0]];
     assert_eq!(decide(&ballot(&[0, 4], &rows), &places(2), true).expect("decided").labels, [0, 0]);
     assert_eq!(decide(&ballot(&[0], &[]), &[], true).expect("decided").labels, [0_u32; 0]);

@@ -112,11 +112,12 @@ fn the_order_is_a_short_path() {
     let visited: Vec<f64> = order.iter().map(|&index| places[index]).collect();
     assert_eq!(visited, [7.0, 6.0, 5.0, 4.0, 3.0, 2.0, 1.0, 0.0], "index 2 comes before index 4");
     assert_eq!(short_order(&line), order, "the same twice");
-    // At one place only the directions differ.
+    // Cameras at one place, which differ in direction only.
     let angles = [0.9, 0.1, 0.5, 0.3, 0.7];
     let turned: Vec<Camera> = angles.iter().map(|&a| camera(DQuat::from_rotation_y(a), [1.0; 3])).collect();
     assert_eq!(short_order(&turned.iter().collect::<Vec<_>>()), [0, 4, 2, 3, 1]);
-    // A ring whose heights jump by name: never longer than by name, and every camera once.
+    // A ring with heights that jump in the order of names: the path is no longer than that order and visits every
+    // camera once.
     let ring = ring_of_cameras(&SynthOptions { views: 60, ..SynthOptions::default() });
     let ring: Vec<&Camera> = ring.iter().collect();
     let order = short_order(&ring);
@@ -129,7 +130,7 @@ fn the_order_is_a_short_path() {
     assert_eq!(short_order(&ring[..1]), [0]);
 }
 
-/// Three photos, one in a folder, of which the second and the last have tracked masks of other sizes.
+/// Three photos, one in a folder. The tracked masks of the second and the last have other sizes.
 fn tracked(folder: &Path) -> (String, String, String) {
     let path = |name: &str| folder.join(name).to_str().expect("UTF-8").to_owned();
     let at = camera(DQuat::IDENTITY, [0.0; 3]);
@@ -177,7 +178,7 @@ fn masks_go_back_to_their_photos() {
     refused(r#"{"schema_version": 7, "frames": []}"#, "version 7");
 }
 
-/// A model, made quickly, and its scene of 12 views of 96 x 72 px.
+/// A quickly trained model and its scene: 12 views of 96 x 72 px.
 fn model(folder: &Path) -> (String, String) {
     let path = |name: &str| folder.join(name).to_str().expect("UTF-8").to_owned();
     let (scene, out) = (path("scene"), path("out"));
@@ -187,7 +188,7 @@ fn model(folder: &Path) -> (String, String) {
 }
 
 #[test]
-fn there_and_back_again_with_a_device() {
+fn masks_of_a_rendered_video_return_to_their_photos() {
     let Some(_gpu) = crate::support::device() else { return };
     let folder = tempfile::tempdir().expect("a folder");
     let (scene, out) = model(folder.path());
@@ -204,7 +205,7 @@ fn there_and_back_again_with_a_device() {
         let bytes = std::fs::read(Path::new(&video).join(&frame.file)).expect("a frame");
         let tracked = Path::new(&video).join("tracked").join(Path::new(&frame.file).file_name().expect("a name"));
         std::fs::create_dir_all(tracked.parent().expect("a folder")).expect("made");
-        // Perfect tracking: the truth where there is one, and something else between.
+        // Perfect tracking: ground truth for the photos, other ids between them.
         let Some(photo) = &frame.photo else {
             labelgs::internals::io::image::write_png_grey16(tracked, 96, 72, &[9; 96 * 72]).expect("written");
             continue;

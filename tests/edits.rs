@@ -31,7 +31,7 @@ fn model(rows: &[([f32; 3], [f32; 3], [f32; 4])]) -> Gaussians {
     }
 }
 
-/// Round ones of deviation 0.3 along x: they reach 0.6, so that those up to 1.2 apart touch.
+/// Round Gaussians of standard deviation 0.3 along x. Each reaches 0.6, so two touch at a distance up to 1.2.
 fn beads(places: &[f32]) -> Gaussians {
     model(&places.iter().map(|&x| ([x, 0.0, 0.0], [0.3; 3], UPRIGHT)).collect::<Vec<_>>())
 }
@@ -52,7 +52,7 @@ fn touching_gaussians_are_one_part() {
 }
 
 #[test]
-fn shape_and_rotation_of_gaussians_count() {
+fn contact_depends_on_shape_and_rotation() {
     let rod = [1.0, 0.05, 0.05];
     // A quarter turn about z: the long axis is y.
     let turned = [0.5_f32.sqrt(), 0.0, 0.0, 0.5_f32.sqrt()];
@@ -61,7 +61,7 @@ fn shape_and_rotation_of_gaussians_count() {
     assert_eq!([pair([3.9, 0.0, 0.0], UPRIGHT), pair([4.1, 0.0, 0.0], UPRIGHT)], [1, 2]);
     assert_eq!([pair([0.0, 0.19, 0.0], UPRIGHT), pair([0.0, 0.21, 0.0], UPRIGHT)], [1, 2]);
     assert_eq!([pair([0.0, 3.9, 0.0], turned), pair([3.9, 0.0, 0.0], turned)], [1, 2]);
-    // A rod and a rod across it, whose tip just meets its side, or not.
+    // A second rod across the first; its tip just touches the first one's side, or just misses it.
     let across = |y: f32| parts(&model(&[([0.0; 3], rod, UPRIGHT), ([0.0, y, 0.0], rod, turned)]), 0.0).len();
     assert_eq!([across(2.09), across(2.11)], [1, 2]);
 }
@@ -75,7 +75,7 @@ fn a_small_part_between_large_ones_joins_them() {
 }
 
 #[test]
-fn many_gaussians_at_one_place_and_in_one_plane_are_no_trouble() {
+fn many_gaussians_at_one_place_or_in_one_plane_are_grouped() {
     let plane = |index: usize| ([0.0, (index % 20) as f32 * 0.5, (index / 20) as f32 * 0.5], [0.15; 3], UPRIGHT);
     let mut rows: Vec<_> = (0..400).map(plane).collect();
     rows.extend(vec![([9.0; 3], [1e-4; 3], UPRIGHT); 300]);
@@ -102,7 +102,7 @@ fn parts_of_a_label_get_the_next_free_ids() {
     let dropped = run(Specks::Drop).model;
     assert_eq!(dropped.labels, Some(vec![1, 1, 1, 1, 11, 11, 11, 2, 9]));
     assert_eq!(dropped.means[7], [30.0, 0.0, 0.0]);
-    // No id is left behind the last one: gaps are filled.
+    // No id is free above the largest, so gaps are filled.
     let full = split_components(&scattered(), &ones, &BTreeSet::from([65_535]), how, Specks::Keep).expect("split");
     assert_eq!(full.ids[&1], [1, 3]);
     let all: BTreeSet<u32> = (1..=65_535).collect();
@@ -113,7 +113,7 @@ fn parts_of_a_label_get_the_next_free_ids() {
 #[test]
 fn specks_are_left_out_label_by_label() {
     let how = Grouping { gap: 0.0, min_share: 0.2 };
-    // 20.0 is an eighth of label 1; the single ones of 2 and 9 are all that there is of them.
+    // The Gaussian at 20.0 is an eighth of label 1. Labels 2 and 9 have a single Gaussian each, which stays.
     assert_eq!(without_specks(&scattered(), how).expect("specks").labels, Some(vec![1, 1, 1, 1, 1, 1, 1, 2, 9]));
 }
 
@@ -127,7 +127,7 @@ fn colours_are_mixed_into_the_chosen_labels() {
     assert!(colour.iter().zip([1.0, 0.5, 0.0]).all(|(a, b)| (a - b).abs() < 1e-6), "{colour:?}");
     assert!(painted.sh_rest[3..].iter().all(|rest| *rest == [0.0; 3]));
     let quarter = recolour(&model, &BTreeSet::from([2]), [1.0, 0.5, 0.0], 0.25);
-    // Colours are linear in their coefficients, and so is the mix.
+    // Colours are linear in their coefficients, so the mix is too.
     let expected = [0, 1, 2].map(|c| 0.75 * model.sh0[1][c] + 0.25 * painted.sh0[1][c]);
     assert!(quarter.sh0[1].iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-6));
     assert_eq!(quarter.sh_rest[3], [0.1875; 3]);

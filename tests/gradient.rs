@@ -1,7 +1,7 @@
 //! The analytic gradients of the mirrors against central differences in f64.
 //!
-//! Differences are taken only where every decision is farther from its threshold than the step can move it; the scenes
-//! are chosen (by seed, once) so that this holds, and the tests refuse a scene where it does not.
+//! A difference is meaningful only if every decision is farther from its threshold than the step can move it. Seeds are
+//! chosen so that this holds, and the tests refuse other scenes.
 
 use crate::reference::blend::{Upstream, blend_backward, blend_forward, centre, trace};
 use crate::reference::loss::{label_loss, photo_loss};
@@ -55,7 +55,7 @@ fn safe_scene(rules: &Rules, first: u64, shape: &Shape) -> Scene {
 }
 
 #[test]
-fn sh_colour() {
+fn sh_colour_gradient_equals_central_differences() {
     let rules = Rules::default();
     let model = scene(1, &Shape { gaussians: 6, ..small() }).model();
     let (centre, weights) = (DVec3::new(0.3, -0.2, -4.0), [0.7, -1.1, 0.4]);
@@ -103,7 +103,7 @@ fn project_case(row: &Row, camera: &labelgs::scene::Camera) {
 }
 
 #[test]
-fn project() {
+fn projection_gradient_equals_central_differences() {
     let s = scene(2, &Shape { gaussians: 30, ..small() });
     let (mut clamped, rules) = (0, Rules::default());
     for mut row in s.model().rows {
@@ -121,24 +121,24 @@ fn project() {
     assert!(clamped > 5, "only {clamped} rows reach the clamp");
 }
 
-/// Splats so opaque that alpha is clamped and rays end early.
+/// Opaque splats: alpha is clamped and rays end early.
 fn opaque() -> Shape {
     Shape { scales: (0.6, 2.0), opacities: (7.0, 12.0), ..small() }
 }
 
-/// Two clamped splats leave 1e-4 but for rounding, right at the usual threshold: take another one.
+/// Two clamped splats leave a transmittance of 1e-4 up to rounding, exactly the default threshold, so use another one.
 fn opaque_rules() -> Rules {
     Rules { transmittance_min: 3e-4, ..Rules::default() }
 }
 
 #[test]
-fn blend() {
+fn blend_gradient_equals_central_differences() {
     let rules = Rules::default();
     blend_case(&rules, &safe_scene(&rules, 100, &small()));
 }
 
 #[test]
-fn blend_where_alpha_clamps_and_rays_stop() {
+fn blend_gradient_is_right_where_alpha_clamps_and_rays_stop() {
     let rules = opaque_rules();
     let s = safe_scene(&rules, 5000, &opaque());
     let splats = splats_of(&project::project_all(&rules, &s.camera, &s.model()));
@@ -180,7 +180,7 @@ fn blend_case(rules: &Rules, s: &Scene) {
 }
 
 #[test]
-fn losses() {
+fn loss_gradients_equal_central_differences() {
     let (rules, s) = (Rules::default(), scene(4, &small()));
     let mut random = generator(8);
     let image: Vec<[f64; 3]> =
@@ -214,16 +214,16 @@ fn step_case(rules: &Rules, first: u64, shape: &Shape) {
 }
 
 #[test]
-fn whole_step() {
+fn step_gradient_equals_central_differences() {
     step_case(&Rules::default(), 1000, &small());
 }
 
 #[test]
-fn whole_step_of_degree_0() {
+fn step_gradient_of_degree_0_equals_central_differences() {
     step_case(&Rules::default(), 2000, &Shape { sh_degree: 0, ..small() });
 }
 
 #[test]
-fn whole_step_of_opaque_gaussians() {
+fn step_gradient_of_opaque_gaussians_equals_central_differences() {
     step_case(&opaque_rules(), 3000, &Shape { gaussians: 6, ..opaque() });
 }

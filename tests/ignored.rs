@@ -1,4 +1,4 @@
-//! What a build with the feature `lab` does for tests, the program as it ships does not.
+//! The program as it ships ignores the variables and flags of the feature `lab`.
 
 use crate::support::device;
 use crate::support::runs::{Place, stderr, succeeded};

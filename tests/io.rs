@@ -1,4 +1,4 @@
-//! Files to scenes and back, on fixtures that the tests write themselves.
+//! Readers and writers of all file formats, on files that the tests write.
 
 mod checkpoint;
 mod colmap;

@@ -1,5 +1,4 @@
-//! Failures that users of other trainers have reported, where no other test stands for them; tests/README.md has the whole
-//! list.
+//! Failures that users of other trainers reported and that no other module tests; tests/README.md has the whole list.
 
 use crate::support::device;
 use crate::support::runs::{Place, stderr, succeeded};
@@ -7,8 +6,8 @@ use labelgs::internals::shaders;
 use rspirv::dr::Operand;
 use rspirv::spirv::{Capability, Op};
 
-/// Atomics on floats are missing on some devices and add in no fixed order: no kernel has any. Integers and floats of 64
-/// bits are missing on others.
+/// No kernel uses atomics on floats, which some devices lack and which add in no fixed order, nor 64-bit integers or
+/// floats, which other devices lack.
 #[test]
 fn no_kernel_has_atomics_on_floats() {
     for shader in shaders::ALL {
@@ -37,7 +36,8 @@ fn no_kernel_has_atomics_on_floats() {
     }
 }
 
-/// The tool under the validation layer, in the mode that the tests run in: a broken rule is a bug of ours, with its status.
+/// The program under the validation layer, in the mode of the tests: a message of the layer is a bug with its own exit
+/// status.
 #[test]
 fn commands_break_no_rule_of_vulkan() {
     let Some(turn) = device() else { return };
@@ -63,9 +63,9 @@ fn commands_break_no_rule_of_vulkan() {
     }
 }
 
-/// Labels beyond those of the masks, up to the last that there is: tables made for the masks' ids do not hold them.
+/// Labels above those of the masks, up to 65535: tables with a row per id of the masks have no row for them.
 #[test]
-fn labels_beyond_those_of_the_masks_are_no_surprise() {
+fn labels_beyond_those_of_the_masks_are_handled() {
     let Some(_turn) = device() else { return };
     let place = Place::new();
     let [scene, masks, model] = ["scene", "scene/masks", "model.ply"].map(|name| place.text(name));
@@ -88,10 +88,10 @@ fn labels_beyond_those_of_the_masks_are_no_surprise() {
     }
 }
 
-/// Buffers that a device bounds below what a training grows to: it goes on with as many Gaussians as fit, or ends with the
-/// numbers; it never asks for more than the limit.
+/// A device limits buffers below what a training would grow to. The training goes on with the Gaussians that fit, or
+/// ends with an error that has the numbers; it never exceeds the limit.
 #[test]
-fn a_training_meets_the_limits_of_a_device() {
+fn a_training_stays_within_the_limits_of_a_device() {
     let Some(_turn) = device() else { return };
     let place = Place::new();
     let flags = ["--config", &place.settings(), "--densify-grad-threshold", "1e-9"];
@@ -129,7 +129,7 @@ fn a_training_meets_the_limits_of_a_device() {
     assert!(outcomes.contains_key("with a bound") && outcomes.contains_key("refused with numbers"), "{outcomes:?}");
 }
 
-/// A model is no checkpoint, whatever it is called: the moments of Adam would be missing.
+/// A model is refused as a checkpoint under any file name, because it lacks the moments of Adam.
 #[test]
 fn a_model_in_the_place_of_a_checkpoint_is_refused() {
     let Some(_turn) = device() else { return };
@@ -144,7 +144,7 @@ fn a_model_in_the_place_of_a_checkpoint_is_refused() {
     }
     let output = place.trained("out", &["--resume", "--iterations", "8"]);
     assert_eq!(output.status.code(), Some(3), "{}", stderr(&output));
-    // A model in the place of the scene or of the settings is no better.
+    // A model in place of the scene or the settings is refused too.
     let model = model.to_str().expect("text");
     for args in [
         ["train", model, "-o", &place.text("other")].as_slice(),
@@ -156,7 +156,7 @@ fn a_model_in_the_place_of_a_checkpoint_is_refused() {
     }
 }
 
-/// Where nothing is left to train, that is said, with what may have caused it.
+/// When no Gaussian is left, the error says so and lists likely causes.
 #[test]
 fn a_training_that_prunes_everything_says_so() {
     let Some(_turn) = device() else { return };

@@ -1,4 +1,4 @@
-//! What labels must do, on the mirrors: weights and thresholds, the lift, densification, the label loss, object layers.
+//! Label rules on the mirrors: weights and thresholds, the lift, densification, the label loss, object layers.
 
 use crate::reference::blend::{Blended, Contribution, Trace, blend_backward, blend_forward, shade};
 use crate::reference::densify::{Origin, Population, accumulate, densify, mark};
@@ -35,7 +35,7 @@ fn lifted(image: &Blended, gaussians: usize) -> Vec<u32> {
 }
 
 #[test]
-fn two_gaussians_on_a_ray() {
+fn the_nearer_of_two_gaussians_on_a_ray_is_main() {
     let image = one_pixel(&[0.7, 0.9]);
     let pixel = &image.pixels[0];
     assert_eq!(pixel.main, 0);
@@ -56,7 +56,7 @@ fn the_nearer_of_equal_weights_is_main() {
     let ray = Trace { contributions, transmittance: 0.375, ..Trace::default() };
     let pixel = shade(&[on_ray(0, 0.25), on_ray(1, 0.5)], &ray, BLACK);
     assert_eq!((pixel.main, pixel.main_weight, pixel.margins.main), (0, 0.25, 0.0));
-    // A third of what 0.25 leaves is 0.25 too, but for rounding: the margin says so.
+    // Alpha 1/3 behind alpha 0.25 has weight 0.25 too, up to rounding; the margin shows it.
     assert!(one_pixel(&[0.25, 1.0 / 3.0]).pixels[0].margins.main < 1e-7);
 }
 
@@ -204,7 +204,7 @@ fn densification_counts_the_views_that_see_a_gaussian() {
 }
 
 #[test]
-fn label_loss_of_a_right_object_is_0() {
+fn label_loss_of_a_correct_object_is_0() {
     let s = scene(21, &Shape::default());
     let (photo, map, slot) = (&s.target.photo, &s.target.label_map, &s.target.slots[0]);
     let image: Vec<[f64; 3]> =
@@ -217,7 +217,7 @@ fn label_loss_of_a_right_object_is_0() {
 }
 
 #[test]
-fn pixels_near_a_contour_say_nothing_and_weights_scale() {
+fn pixels_near_a_contour_are_ignored_and_weights_scale() {
     let photo = Photo { size: (4, 1), colours: vec![[0.5; 3]; 4], valid: vec![true; 4] };
     let loss = |map: &[u32], weight: f64| {
         let slot = ObjectPixel { label: 1, occluders: Vec::new(), weight };
@@ -248,12 +248,13 @@ fn label_loss_of_an_empty_object_is_its_masked_photo_without_gradient() {
 }
 
 #[test]
-fn occluded_and_invalid_pixels_say_nothing_about_an_object() {
+fn occluded_and_invalid_pixels_are_ignored() {
     let photo = Photo { size: (4, 1), colours: vec![[0.5; 3]; 4], valid: vec![true, true, true, false] };
     let slot = ObjectPixel { label: 1, occluders: vec![2], weight: 1.0 };
     let rules = Rules { label_alpha: 0.5, ..Rules::default() };
     let loss = label_loss(&rules, (&[[0.8; 3]; 4], &[0.8; 4]), &photo, &[1, 2, 0, 1], &slot);
-    // Mask: 0.3 off; occluder: left out; elsewhere 0.8 off; invalid: left out of the count, too. Opacity: 0.2 and 0.8 off.
+    // Mask: 0.3 off; occluder: left out; elsewhere 0.8 off; invalid: left out of the count, too. Opacity: 0.2 and 0.8
+    // off.
     assert!((loss.value - (0.3 + 0.8 + 0.5 * (0.2 + 0.8)) / 3.0).abs() < 1e-12);
     assert_eq!(loss.v_alpha, [-0.5 / 3.0, 0.0, 0.5 / 3.0, 0.0]);
     let v = 1.0 / 9.0;

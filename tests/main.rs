@@ -1,53 +1,58 @@
-//! Integration tests, one binary; those of the program as it ships are in `shipped.rs`.
+//! Integration tests in one binary, built with the feature `lab`; `shipped.rs` tests the program as it ships.
+#![allow(
+    clippy::disallowed_methods,
+    clippy::too_many_lines,
+    reason = "the rules of files and lengths are those of the library"
+)]
 
 use labelgs::internals::verify::reference;
 
-#[allow(dead_code, reason = "helpers are shared by tests that come and go")]
+#[allow(dead_code, reason = "not every helper is always in use")]
 mod support;
 
 #[global_allocator]
 static MEMORY: support::memory::Counting = support::memory::Counting;
 
-mod architecture;
-mod associate;
-mod cli;
-mod cli_devices;
-mod cli_edit;
-mod cli_faults;
-mod cli_labels;
-mod cli_long;
-mod cli_masks;
-mod cli_surroundings;
-mod coarse;
-mod compare_self;
-mod config;
-mod decide;
-mod densify;
-mod edits;
-mod gradient;
-mod guide;
-mod hostile;
-mod invariants;
-mod io;
-mod known;
-mod labels;
-mod metrics;
-mod mirror_mutants;
-mod mirrors;
-mod observer;
-mod occlusion;
-mod output;
-mod overflow;
-mod pass;
-mod protocol;
-mod registry;
-mod scheduler;
-mod segments;
-mod selftest;
-mod sentinel;
-mod shadergen;
-mod shared;
-mod strategy;
-mod stress;
-mod synth;
-mod track;
+mod architecture; // layers of the crate, file lengths, places of unsafe code
+mod associate; // masks of one object in different views get one id
+mod cli; // flags, defaults, streams and exit statuses
+mod cli_devices; // a missing or poorer device is refused by name
+mod cli_edit; // labels are chosen and edited from the command line
+mod cli_faults; // failing calls, disks and memory lose no data
+mod cli_labels; // labels of a model from masks, and masks from labels
+mod cli_long; // bit-identical results over 1,000 steps
+mod cli_masks; // import, check and spoil masks from the command line
+mod cli_surroundings; // odd names, locales, closed streams, links, little memory
+mod coarse; // steps at half resolution equal those of a smaller scene
+mod compare_self; // the comparisons of all other tests do fail
+mod config; // schedules and ranges of the settings
+mod decide; // labels from votes
+mod densify; // the video for a tracker, and its masks on the photos
+mod edits; // labels by name, pixel and box; parts, specks and colours of a model
+mod gradient; // gradients of the f64 mirrors, which the kernels are compared with
+mod guide; // every command of README.md and of the guide runs
+mod hostile; // damaged and hostile files are refused in bounded memory
+mod invariants; // results do not depend on kernel shape, threads or a resume
+mod io; // formats of scenes, masks, models and checkpoints
+mod known; // failures that users of other trainers reported
+mod labels; // label rules of the paper, on the mirrors
+mod metrics; // PSNR, SSIM, IoU and boundary scores
+mod mirror_mutants; // a wrong constant in a mirror fails its checks
+mod mirrors; // mirrors against closed forms and brute force
+mod observer; // watching, pausing and stopping a run change no bit
+mod occlusion; // which object hides which
+mod output; // files of rendered pictures
+mod overflow; // a buffer that is too small costs a step and no bit
+mod pass; // each kernel against its mirror
+mod protocol; // scores of the published benchmarks
+mod registry; // every shader has a header, a mirror and a pass
+mod scheduler; // barriers, memory, faults and recorded lists of GPU work
+mod segments; // long splat lists are cut to bounded dispatches
+mod selftest; // `labelgs selftest` passes, and detects each fault
+mod sentinel; // NaN and overflow are counted, dropped or end a run
+mod shadergen; // the generator reports each fault of a shader
+mod shared; // parameters of the scene and of photos, trained beside the Gaussians
+mod strategy; // strategies of densification other than the default
+mod stress; // error bounds on adversarial scenes
+mod synth; // the made scene is consistent ground truth
+mod track; // ids from frame to frame

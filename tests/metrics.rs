@@ -1,4 +1,4 @@
-//! Scores, label choice and selections against slow or hand-made answers.
+//! Scores, choice of labels and selections against brute force or values worked out by hand.
 
 use labelgs::edit::Catalogue;
 use labelgs::edit::{MIN_LABEL_CONFIDENCE, extract, remove, summarise};
@@ -188,7 +188,7 @@ fn ssim_of_bytes_equals_the_direct_sum() {
             count += 1.0;
         }
     }
-    // The one sums squares, the other squared differences.
+    // `ssim8` sums squares; this loop sums squared differences.
     assert!((ssim8(&a, &b, width, height).expect("large enough") - sum / count).abs() < 1e-9);
     assert_eq!(ssim8(&a, &a, width, height), Some(1.0));
     assert_eq!(ssim8(&a[..24], &b[..24], 6, 4), None);
@@ -197,7 +197,7 @@ fn ssim_of_bytes_equals_the_direct_sum() {
 
 #[test]
 fn hidden_parts_are_scored_where_the_truth_is_known() {
-    // Object 1 goes on behind object 2 for two pixels; the last is not a part of it.
+    // Object 1 continues behind object 2 for two pixels; the last pixel is not part of it.
     let photo = Photo { width: 5, height: 1, rgba: vec![[255, 255, 255, 255]; 5] };
     let mask = map(5, &[1, 1, 2, 2, 2]);
     let whole = [true, true, true, true, false];
@@ -212,7 +212,7 @@ fn hidden_parts_are_scored_where_the_truth_is_known() {
         view.objects[&1]
     };
     let found = scored(truth);
-    // Of the pixels of object 2: one found and true, one only true, one only found.
+    // Object 2: one true positive, one false negative, one false positive.
     assert_eq!(found.iou_hidden, Some(1.0 / 3.0));
     // One channel of six is off by a tenth.
     let expected = -10.0 * (0.01_f64 / 6.0).log10();
@@ -270,7 +270,7 @@ fn labels_are_summarised() {
 }
 
 #[test]
-fn extract_and_remove_share_the_model_out() {
+fn extract_and_remove_divide_the_model() {
     let (object, rest) =
         (extract(&model(), &[2], MIN_LABEL_CONFIDENCE).expect("2"), remove(&model(), &[2]).expect("2"));
     assert_eq!((object.labels, rest.labels), (Some(vec![2, 2]), Some(vec![5, 0])));
@@ -282,7 +282,7 @@ fn extract_and_remove_share_the_model_out() {
     let doubtful = Gaussians { label_confidence: Some(vec![0.59, 0.6, 0.5, 0.4]), ..model() };
     let of = |least| extract(&doubtful, &[2], least).expect("2").means;
     assert!(of(0.0) == object.means && of(2.0).is_empty());
-    assert_eq!(of(MIN_LABEL_CONFIDENCE), [model().means[1]], "who has less than 0.6 is left out");
+    assert_eq!(of(MIN_LABEL_CONFIDENCE), [model().means[1]], "a Gaussian below 0.6 is left out");
     assert!(extract(&model(), &[], MIN_LABEL_CONFIDENCE).is_err());
     assert!(remove(&model(), &[0, 2, 5]).is_err());
     let unlabelled = Gaussians { labels: None, ..model() };

@@ -1,4 +1,4 @@
-//! Every constant bears: with one of them changed, the mirrors' own checks fail.
+//! Every constant matters: with one constant changed, the checks of the mirrors fail.
 
 use crate::gradient::differences;
 use crate::reference::adam::{Optimised, Rates, adam};
@@ -22,7 +22,7 @@ fn wide_scene() -> (Scene, Model) {
     (s, model)
 }
 
-/// Everything a family computes, as numbers.
+/// All numbers that a family of mirrors computes.
 fn outcome(family: Family, rules: &Rules, (s, model): &(Scene, Model)) -> Vec<f64> {
     let all = |rows: &[Row]| -> Vec<f64> { rows.iter().flat_map(Row::floats).collect() };
     match family {
@@ -54,7 +54,7 @@ fn outcome(family: Family, rules: &Rules, (s, model): &(Scene, Model)) -> Vec<f6
 }
 
 #[test]
-fn every_constant_bears_on_its_family() {
+fn changing_a_constant_fails_the_checks_of_its_family() {
     let setting = wide_scene();
     let families: Vec<Family> = mutants().iter().map(|m| m.family).collect();
     let mut expected: Vec<(Family, Vec<f64>)> = Vec::new();
@@ -75,7 +75,7 @@ fn every_constant_bears_on_its_family() {
 
 /// The check of `gradient::whole_step` must see an analytic gradient of other constants.
 #[test]
-fn a_gradient_of_another_constant_is_seen() {
+fn a_gradient_with_a_changed_constant_is_detected() {
     let shape = Shape { gaussians: 6, width: 20, height: 16, objects: 2, ..Shape::default() };
     let (rules, s) = (Rules::default(), scene(42, &shape));
     let model = s.model();

@@ -1,4 +1,4 @@
-//! The mirrors against what is known without them: identities, closed forms and brute force.
+//! The mirrors against identities, closed forms and brute force.
 
 use crate::reference::adam::{Optimised, Rates, adam, falling_rate};
 use crate::reference::blend::{blend_forward, centre, shade, trace};
@@ -19,7 +19,7 @@ use glam::{DMat3, DQuat, DVec3};
 const EQUAL: Tolerance = Tolerance { absolute: 1e-12, relative: 1e-10 };
 
 #[test]
-fn rotation_of_a_quaternion() {
+fn a_quaternion_gives_its_rotation_matrix() {
     let mut random = generator(1);
     for _ in 0..20 {
         let q = normalised([0; 4].map(|_| uniform(&mut random, -1.0, 1.0))).0;
@@ -71,7 +71,7 @@ fn projection_is_linearised_at_the_centre() {
 }
 
 #[test]
-fn a_plain_dot_has_the_footprint_it_was_made_for() {
+fn a_round_splat_has_the_expected_footprint() {
     let camera = plain_camera(40, 30);
     let model = Model { rows: vec![dot(&camera, [20.0, 15.0], 5.0, 3.0, 0.7)], labels: vec![0], sh_degree: 0 };
     let splat = project_forward(&Rules::default(), &camera, &model, 0).expect("in front").splat;
@@ -98,7 +98,7 @@ fn splats(seed: u64, shape: &Shape) -> (Scene, Vec<Splat>) {
 }
 
 #[test]
-fn blending_leaves_out_only_what_does_not_count() {
+fn blending_skips_only_negligible_splats() {
     let rules = Rules::default();
     let (s, splats) = splats(5, &Shape { opacities: (-5.0, 8.0), gaussians: 80, ..Shape::default() });
     let image = blend_forward(&rules, &splats, (48, 40), s.target.background);
@@ -122,7 +122,7 @@ fn largest_by_trial(splat: &Splat, (x0, x1): (usize, usize), (y0, y1): (usize, u
 }
 
 #[test]
-fn tiles_of_an_ellipse() {
+fn tiles_of_an_ellipse_equal_brute_force() {
     let rules = Rules::default();
     let shape =
         Shape { scales: (0.01, 0.6), opacities: (-5.5, 3.0), gaussians: 60, width: 45, height: 37, ..Shape::default() };
@@ -152,7 +152,7 @@ fn tiles_of_an_ellipse() {
 }
 
 #[test]
-fn instances_and_ranges() {
+fn instances_and_ranges_equal_brute_force() {
     let rules = Rules::default();
     let (s, splats) = splats(7, &Shape::default());
     let (labels, grid) = (s.model().labels, TileGrid { size: (48, 40), tile: (16, 16) });
@@ -175,7 +175,7 @@ fn instances_and_ranges() {
 }
 
 #[test]
-fn orders_and_sums() {
+fn sorts_and_scans_equal_brute_force() {
     assert_eq!(depth_sort(&[3.0, 1.0, 2.0, 1.0]), [1, 3, 2, 0]);
     assert_eq!(radix_sort(&[5, 1, 5, 0, 1]), [3, 1, 4, 0, 2]);
     assert_eq!(exclusive_scan(&[3, 0, 2, 7]), (vec![0, 3, 3, 5], 12));
@@ -207,7 +207,7 @@ fn ssim_at(rules: &Rules, size: (usize, usize), x: &[f64], y: &[f64], (px, py): 
 }
 
 #[test]
-fn ssim_is_its_definition() {
+fn ssim_equals_its_definition() {
     let (rules, mut random, size) = (Rules::default(), generator(9), (17, 14));
     let mut plane = || -> Vec<f64> { (0..17 * 14).map(|_| uniform(&mut random, 0.0, 1.0)).collect() };
     let (x, y) = (plane(), plane());

@@ -1,4 +1,4 @@
-//! A run of the library with somebody who watches: what is heard, what may be asked for, and that it changes no bit.
+//! A run of the library with an observer: its events, its requests, and that neither changes a bit of the result.
 
 use crate::support::runs::Place;
 use crate::support::{device, device::Turn};
@@ -10,14 +10,14 @@ use labelgs::run::{Event, Flow, Live, Observer, Request, Settings, Start, Summar
 use labelgs::scene::Camera;
 use std::collections::BTreeMap;
 
-/// Counts events, looks at the scene, and answers what it is told to.
+/// Counts events, downloads the scene, and returns the answer that a test set.
 #[derive(Default)]
 struct Watcher {
     heard: BTreeMap<&'static str, u32>,
     steps: Vec<u32>,
-    /// What is answered to a step.
+    /// Answer to a step.
     answers: BTreeMap<u32, Flow>,
-    /// A picture is taken every so many steps.
+    /// Steps between pictures.
     looks_every: u32,
     camera: Option<Camera>,
     pictures: Vec<(u32, usize)>,
@@ -91,7 +91,7 @@ fn odd_camera(place: &Place) -> Camera {
 }
 
 #[test]
-fn a_watched_paused_and_saved_run_has_the_bits_of_one_that_nobody_watches() {
+fn a_watched_paused_and_saved_run_has_the_bits_of_an_unwatched_one() {
     let Some(turn) = device() else { return };
     let place = Place::new();
     let alone = train(&turn, &request(&place, "alone", Start::New(settings(&place))), &mut ());
@@ -109,7 +109,7 @@ fn a_watched_paused_and_saved_run_has_the_bits_of_one_that_nobody_watches() {
     for (name, count) in [("started", 1), ("step", 40), ("paused", 2), ("preview", 6), ("evaluated", 1), ("done", 1)] {
         assert_eq!(watcher.heard.get(name), Some(&count), "{name}: {:?}", watcher.heard);
     }
-    // Ten by the schedule and one that was asked for.
+    // Ten by the schedule and one requested.
     assert_eq!(watcher.heard.get("checkpoint"), Some(&11), "{:?}", watcher.heard);
     assert!(watcher.heard.contains_key("densified") && !watcher.heard.contains_key("unknown"));
 }

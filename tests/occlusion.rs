@@ -1,4 +1,4 @@
-//! Who hides whom: both rules against hand-made and slow answers, and against a scene that knows the truth.
+//! Occlusion: both rules against answers by hand and by brute force, and against the ground truth of a made scene.
 
 use labelgs::internals::cli::status::exit_status;
 use labelgs::internals::label::occlusion::{distances, picture};
@@ -134,11 +134,11 @@ fn a_vote_needs_the_margin_and_the_majority() {
     assert_eq!(found(&[1.0, 1.01]), nobody, "1 % is within the margin of 2 %");
     let (labels, depth) = strips(&[1.0, 1.01]);
     assert_eq!(by_contour(&labels, &depth, Rule { margin: 0.005, ..rule })[&2], [1]);
-    // Of what takes sides, half is no majority.
+    // Half of the votes is no majority.
     let (labels, mut depth) = strips(&[1.0, 2.0]);
     (2..4).for_each(|row| depth[row * 4..row * 4 + 4].copy_from_slice(&[2.0, 2.0, 1.0, 1.0]));
     assert_eq!(by_contour(&labels, &depth, rule), nobody);
-    // What touches takes no sides: two rows of four decide, against one at a higher majority they do not.
+    // Pixels of equal depth do not vote. Two rows of four decide; at a higher majority, two against one do not.
     let (labels, mut depth) = strips(&[1.0, 1.0]);
     (0..2).for_each(|row| depth[row * 4..row * 4 + 2].fill(0.5));
     assert_eq!(by_contour(&labels, &depth, rule), lists(&[(1, &[]), (2, &[1])]));
@@ -148,7 +148,7 @@ fn a_vote_needs_the_margin_and_the_majority() {
 }
 
 #[test]
-fn a_few_pixels_decide_nothing() {
+fn a_few_pixels_do_not_make_an_occluder() {
     let rows = 40;
     let labels = map(4, &[1, 1, 2, 2].repeat(rows));
     let mut depth = vec![2.0; 4 * rows];
@@ -160,10 +160,10 @@ fn a_few_pixels_decide_nothing() {
 }
 
 #[test]
-fn holes_have_no_vote() {
+fn holes_do_not_vote() {
     let (labels, mut depth) = strips(&[1.0, 2.0]);
     for hole in [0.0, -1.0, f32::NAN, f32::INFINITY] {
-        // Only the last row is left.
+        // Only the last row remains.
         (0..3).for_each(|row| depth[row * 4..row * 4 + 4].fill(hole));
         assert_eq!(by_contour(&labels, &depth, Rule::default())[&2], [1], "{hole}");
         assert!(by_contour(&labels, &[hole; 16], Rule::default()).values().all(Vec::is_empty), "{hole}");
@@ -202,7 +202,7 @@ fn occluders_come_in_chains() {
     }
 }
 
-/// True depth of a scene whose whole outlines are known: what hides what is then no matter of opinion.
+/// Depth and amodal outlines of a made scene are ground truth for which object hides which.
 #[test]
 fn the_vote_finds_what_hides_in_a_known_scene() {
     let options = SynthOptions { preset: Preset::Default, width: 160, height: 120, views: 10, points: 1, seed: 1 };
@@ -232,7 +232,8 @@ fn the_vote_finds_what_hides_in_a_known_scene() {
         mean_pairs += mean.len();
         true_pairs += truth.len();
     }
-    // 94 of 100, against 94 of 101 by the mean, of 107. Those that are missed hide without touching or by a pixel or two.
+    // 94 of 100, against 94 of 101 by the mean, of 107. Those that are missed hide without touching or by a pixel or
+    // two.
     let all =
         format!("{both} of {found_pairs} are right, by the mean {mean_both} of {mean_pairs}; {true_pairs} are true");
     assert!(both as f64 >= 0.85 * true_pairs as f64 && both as f64 >= 0.92 * found_pairs as f64, "{all}");
@@ -250,7 +251,7 @@ fn a_picture_shows_the_side_in_front() {
 }
 
 #[test]
-fn the_table_comes_back_and_nonsense_is_refused() {
+fn a_table_is_read_back_and_an_invalid_one_refused() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("occlusion.json");
     let table =

@@ -11,8 +11,8 @@ use labelgs::synth::{Preset, SynthOptions, dataset};
 const SCENE: SynthOptions =
     SynthOptions { preset: Preset::Simple, width: 96, height: 72, views: 6, points: 200, seed: 1 };
 
-/// The model after a few steps with labels, in memory that has room for `room` Gaussians from the start; and whether
-/// the pairs of splat and tile had to grow.
+/// The model after a few steps with labels, in an engine of initial capacity `room`, and whether the buffer of (splat,
+/// tile) pairs had to grow.
 fn trained(gpu: &std::sync::Arc<labelgs::gpu::Gpu>, room: u64) -> (Gaussians, bool) {
     let data = dataset(&SCENE, 0);
     let config = TrainConfig { iterations: 100, label_from: 3, ..TrainConfig::default() };

@@ -93,7 +93,7 @@ fn every_mirror_is_there() {
         let mirror = header(&text, "Mirror").expect("see the test above");
         if let Some(reason) = mirror.strip_prefix("none (") {
             assert!(reason.len() > 4, "{stem}: without a mirror the reason is needed");
-            // A reason may name the test that stands in for the mirror.
+            // Instead of a mirror, the header may name the test that covers the kernel.
             let named = reason.split([' ', ')', ';']).filter(|word| word.starts_with("tests/"));
             named.for_each(|file| assert!(Path::new(ROOT).join(file).is_file(), "{stem}: there is no {file}"));
             continue;
@@ -212,7 +212,7 @@ fn module_file(path: &[&str]) -> Option<PathBuf> {
     [place.with_extension("rs"), place.join("mod.rs")].into_iter().find(|file| file.is_file())
 }
 
-/// `tests/README.md` names tests and modules of tests; a test that is renamed must not leave a hole there.
+/// Each test and module that `tests/README.md` names exists.
 #[test]
 fn every_test_that_the_list_of_faults_names_is_there() {
     let text = fs::read_to_string(Path::new(ROOT).join("tests/README.md")).expect("the list");

@@ -35,7 +35,7 @@ fn crowd(count: usize) -> (Gaussians, Camera) {
             .collect(),
         quats: vec![[1.0, 0.0, 0.0, 0.0]; count],
         scales: vec![[-9.0; 3]; count],
-        // a little more than what counts at all
+        // just above the smallest visible opacity
         opacities: vec![-5.0; count],
         sh0: (0..count).map(|i| [part(i, 7) * 2.0, part(i, 11), part(i, 13)]).collect(),
         sh_rest: Vec::new(),
@@ -47,7 +47,7 @@ fn crowd(count: usize) -> (Gaussians, Camera) {
 }
 
 #[test]
-fn sixty_thousand_gaussians_in_one_tile() {
+fn sixty_thousand_gaussians_in_one_tile_equal_the_mirror() {
     let Some(turn) = device() else { return };
     let gpu = turn.gpu();
     let (model, camera) = crowd(60_000);
@@ -79,7 +79,7 @@ fn sixty_thousand_gaussians_in_one_tile() {
 
 /// A short training whose lists are walked in many segments equals one whose lists are walked at once, bit for bit.
 #[test]
-fn segments_change_nothing() {
+fn segments_change_no_bit() {
     let Some(turn) = device() else { return };
     let gpu = turn.gpu();
     let options = labelgs::synth::SynthOptions {
@@ -108,14 +108,15 @@ fn segments_change_nothing() {
     assert_eq!(whole, parts);
 }
 
-/// Pictures narrower than a tile have more tiles than pixels by a tile's pixels; all have their segments.
+/// Pictures narrower than a tile have more tiles than their pixels divided by the pixels of a tile; each tile has its
+/// segments.
 #[test]
-fn segments_of_narrow_pictures_have_their_room() {
+fn segments_of_narrow_pictures_fit_their_buffer() {
     for (width, height) in [(3, 200), (1, 150), (200, 3)] {
         let Some(turn) = device() else { return };
         let shape = KernelShape { segment_length: 16, ..KernelShape::of(turn.capabilities()) };
         let made = scene(61, &Shape { gaussians: 400, width, height, scales: (0.3, 1.5), ..Shape::default() });
-        // Guards behind the buffers are looked at after each run.
+        // Guards behind the buffers are checked after each run.
         let mut fixture = Fixture::with_options(turn, made, true, shape, readable());
         fixture.train();
         let segments = fixture.engine.raw().capacity().segments;

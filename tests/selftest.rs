@@ -1,4 +1,4 @@
-//! The self-test: passes here, and sees every kind of fault.
+//! The self-test passes on this device and detects every kind of fault.
 
 use crate::reference::Rules;
 use crate::reference::rules::mutants;
@@ -18,14 +18,14 @@ fn failures(rules: &Rules, gpu: &Arc<labelgs::gpu::Gpu>) -> Vec<String> {
 }
 
 #[test]
-fn passes_on_this_device() {
+fn the_selftest_passes_on_this_device() {
     let Some(turn) = device() else { return };
     assert_eq!(failures(&Rules::default(), &turn.gpu()), Vec::<String>::new());
 }
 
 /// An engine that differs from the reference in one constant fails in the checks of the passes that use it.
 #[test]
-fn sees_each_pass_go_wrong() {
+fn the_selftest_detects_a_fault_in_each_pass() {
     let Some(turn) = device() else { return };
     for (mutant, check) in [
         ("dilation", "projection"),
@@ -43,7 +43,7 @@ fn sees_each_pass_go_wrong() {
         let found = all.iter().find(|found| found.name == mutant).unwrap_or_else(|| panic!("no mutant {mutant}"));
         let failed = failures(&found.rules, &turn.gpu());
         assert!(failed.iter().any(|name| name == check), "{mutant}: only {failed:?} fail");
-        // The passes of a step are tried with both kinds of reads.
+        // The passes of a step run with both kinds of reads.
         let is_of_a_step = !["densification", "reset", "lift"].iter().any(|change| check.starts_with(change));
         let other = failed.iter().any(|name| name.starts_with(check) && name.ends_with("reads"));
         assert!(other == is_of_a_step, "{mutant}: {failed:?}");

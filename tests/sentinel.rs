@@ -1,4 +1,4 @@
-//! What watches the numbers of a training: what it counts, names, drops and ends.
+//! NaN and overflow in a training: they are counted, named and dropped, and too many end it.
 
 use crate::pass::fixture::{Fixture, PARAMETERS};
 use crate::reference::Rules;
@@ -15,7 +15,7 @@ use labelgs::run::TrainConfig;
 use labelgs::scene::Gaussians;
 use labelgs::synth::{Preset, SynthOptions, dataset};
 
-/// A scene of which one Gaussian, in full view, is changed.
+/// A scene with one changed Gaussian in full view.
 fn with(change: impl Fn(&mut Gaussians, usize)) -> (Scene, usize) {
     let mut made = scene(221, &Shape { gaussians: 60, ..Shape::default() });
     let row = 17;
@@ -26,10 +26,10 @@ fn with(change: impl Fn(&mut Gaussians, usize)) -> (Scene, usize) {
     (made, row)
 }
 
-/// A quaternion of length 1e-25 is a rotation like any other, but its gradient is 1e25 times as large and no square of it
-/// is a float: the Gaussian stays as it is in that step, and nothing else notices.
+/// A quaternion of length 1e-25 is a valid rotation, but its gradient is 1e25 times as large and its square overflows
+/// f32. The Gaussian keeps its parameters in that step, and no other Gaussian is affected.
 #[test]
-fn a_gradient_beyond_floats_is_dropped_and_nothing_else() {
+fn only_the_gradient_that_overflows_is_dropped() {
     let Some(turn) = device() else { return };
     let (made, row) = with(|g, row| g.quats[row] = [3e-26, 8e-26, -5e-26, 2e-26]);
     let mut fixture = Fixture::new(turn, made, false);
@@ -87,9 +87,9 @@ fn the_pass_that_finds_a_broken_parameter_is_counted_by_itself() {
     }
 }
 
-/// What a step has spoilt no pass has looked at when the checkpoint is written: it is not.
+/// A NaN of the last step, which no pass has checked yet, keeps the checkpoint from being written.
 #[test]
-fn a_state_with_a_number_that_is_none_is_no_checkpoint() {
+fn a_state_with_a_nan_is_refused_as_a_checkpoint() {
     let Some(turn) = device() else { return };
     let options = SynthOptions { preset: Preset::Simple, width: 48, height: 36, views: 4, points: 300, seed: 3 };
     let dataset = dataset(&options, 0);
@@ -109,9 +109,9 @@ fn a_state_with_a_number_that_is_none_is_no_checkpoint() {
     assert_eq!(trainer.state().expect("a state").planes, sound.planes);
 }
 
-/// More than ten dropped gradients in each of three steps are no accident.
+/// More than ten dropped gradients in each of three steps end the training.
 #[test]
-fn a_training_that_drops_gradients_all_the_time_ends() {
+fn a_training_that_keeps_dropping_gradients_ends() {
     let Some(turn) = device() else { return };
     let run = |broken: usize| -> Result<u32, Error> {
         let options = SynthOptions { preset: Preset::Simple, width: 48, height: 36, views: 4, points: 300, seed: 3 };

@@ -1,4 +1,4 @@
-//! The shader generator: what it reads from a shader, and that each of its findings is found.
+//! The shader generator: the interface that it reads from a shader, and each fault that it reports.
 
 #[path = "../tools/shadergen/mod.rs"]
 pub mod tool;

@@ -1,4 +1,4 @@
-//! Parameters that are no Gaussian's: one row of the scene and one of each photo, with gradients from kernels of this test.
+//! Shared parameters: one row of the scene and one of each photo, with gradients from kernels of this test.
 
 use crate::invariants::training::{config, small};
 use crate::pass::fixture::prove;
@@ -99,7 +99,7 @@ toy_shader!(
 #[derive(Debug)]
 struct Pulled;
 
-/// A brightness of each photo, which its picture has and the model has not.
+/// Brightness of each photo, which is not part of the model.
 #[derive(Debug)]
 struct Brightness;
 
@@ -143,7 +143,7 @@ impl SharedParameters for Pulled {
     }
 
     fn rates(&self, at: At) -> Vec<[f32; 4]> {
-        // The scene's row rests in every fourth step.
+        // The row of the scene is skipped in every fourth step.
         vec![if at.step.is_multiple_of(4) { [0.0; 4] } else { RATES[0] }, RATES[1]]
     }
 
@@ -204,7 +204,7 @@ fn rows(trainer: &mut Trainer) -> Vec<[[f32; 4]; 3]> {
     values.into_iter().zip(m.into_iter().zip(u)).map(|(value, (m, u))| [value, m, u]).collect()
 }
 
-/// Each step from what the device had before it; every row with the number of its own updates.
+/// Each step starts from the device's previous state; each row counts its own updates.
 #[test]
 fn shared_rows_are_updated_as_the_mirror_says_and_others_rest() {
     let Some(turn) = device() else { return };
@@ -217,7 +217,7 @@ fn shared_rows_are_updated_as_the_mirror_says_and_others_rest() {
         trainer.step().expect("a step");
         let after = rows(&mut trainer);
         let changed: Vec<usize> = (0..ROWS).filter(|&row| after[row] != before[row]).collect();
-        // Steps that densify update nothing; the scene's row rests in every fourth.
+        // Steps that densify update nothing; the row of the scene is skipped in every fourth step.
         let of_photos = usize::from(step % 8 != 0);
         let of_scene = usize::from(step % 4 != 0);
         assert_eq!(changed.len(), of_photos + of_scene, "step {step}: {changed:?}");
@@ -276,7 +276,7 @@ fn shared_rows_go_on_from_a_checkpoint() {
     assert!(error.contains("the plane m_shared is missing"), "{error}");
 }
 
-/// What an exposure model needs: the picture is changed between blending and loss, and its gradient is summed up.
+/// As in an exposure model: a kernel changes the picture between blending and loss, and sums up its gradient.
 #[test]
 fn a_brightness_of_each_photo_is_found() {
     let Some(turn) = device() else { return };

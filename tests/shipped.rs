@@ -1,5 +1,10 @@
-//! Integration tests of the program as it ships, without the feature `lab`; with that feature this is empty.
+//! Integration tests of the program as it ships, without the feature `lab`. With that feature the binary is empty.
 #![cfg(not(feature = "lab"))]
+#![allow(
+    clippy::disallowed_methods,
+    clippy::too_many_lines,
+    reason = "the rules of files and lengths are those of the library"
+)]
 
 #[allow(dead_code, reason = "helpers are shared with the other binary")]
 mod support {
@@ -8,11 +13,11 @@ mod support {
     pub use device::device;
 }
 
-mod cli_engine;
-mod cli_kills;
-mod cli_resume;
-mod ignored;
-mod output;
+mod cli_engine; // commands with a device, from a made scene to pictures
+mod cli_kills; // killed exports leave whole files
+mod cli_resume; // killed, stopped and damaged runs resume to the same bits
+mod ignored; // the shipped program has no fault injection
+mod output; // files of rendered pictures
 #[path = "scheduler/plan/mod.rs"]
-mod plan;
-mod registry;
+mod plan; // barriers and memory of the lists without `lab`
+mod registry; // every shader without `lab` has a header, a mirror and a pass

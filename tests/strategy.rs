@@ -1,4 +1,4 @@
-//! Strategies of other makes than the default: what they may change, and that a checkpoint knows them.
+//! Strategies other than the default: what they may change, and that a checkpoint records them.
 
 use crate::invariants::training::{config, small};
 use crate::support::device;
@@ -16,8 +16,8 @@ use labelgs::scene::Gaussians;
 use serde_json::{Value, json};
 use std::sync::Arc;
 
-/// Never grows; drops what is faint every seven steps; leaves colours alone; in every second step it forgets the momentum
-/// of positions and leaves alone what the step does not show.
+/// Never grows. Drops faint Gaussians every seven steps and does not train colours. In every second step it resets the
+/// momentum of positions and skips Gaussians that the view does not show.
 #[derive(Debug, Default)]
 struct Thinning {
     rounds: u32,
@@ -86,7 +86,7 @@ fn settings() -> TrainConfig {
     TrainConfig { iterations: 30, ..config(LabelRule::Votes) }
 }
 
-/// Each third Gaussian is fainter than those before.
+/// Every third Gaussian is faint.
 fn start() -> Gaussians {
     let mut model = initial_gaussians(&small(), 0, 100).expect("points");
     model.opacities.iter_mut().enumerate().for_each(|(row, logit)| *logit = if row % 3 == 0 { -3.5 } else { -0.5 });
@@ -109,7 +109,7 @@ fn plane<'a>(state: &'a TrainState, name: &str) -> Option<&'a [u32]> {
 }
 
 #[test]
-fn a_strategy_decides_what_becomes_of_the_gaussians() {
+fn a_strategy_controls_the_population() {
     let Some(turn) = device() else { return };
     let mut trainer = fresh(&turn, options());
     let first = go_on(&mut trainer, 5);
@@ -144,7 +144,7 @@ fn a_strategy_goes_on_from_a_checkpoint_of_its_own() {
     assert!(error.contains("thinning") && error.contains("default"), "{error}");
 }
 
-/// The default costs nothing in files either.
+/// The default strategy adds nothing to a checkpoint.
 #[test]
 fn checkpoints_do_not_mention_the_default_strategy() {
     let Some(turn) = device() else { return };
@@ -154,7 +154,8 @@ fn checkpoints_do_not_mention_the_default_strategy() {
     assert!(plane(&state, "densify_stats").is_some());
 }
 
-/// A Gaussian that no view shows has gradient 0: its momentum moves it on, unless the strategy says otherwise.
+/// A Gaussian that no view shows has gradient 0. Its momentum still moves it, unless the strategy skips unseen
+/// Gaussians.
 #[test]
 fn unseen_gaussians_move_or_rest() {
     let Some(turn) = device() else { return };

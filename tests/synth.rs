@@ -76,7 +76,7 @@ fn depth_and_ids_agree_between_views() {
                 continue;
             }
             let other = there.y as usize * 64 + there.x as usize;
-            // Visible there too: then both views must name the same object.
+            // Visible in both views: both must name the same object.
             if (f64::from(made[1].depth[other]) - own.z).abs() < 0.02 * own.z {
                 seen += 1;
                 same += usize::from(made[0].ids[index] == made[1].ids[other]);
@@ -194,12 +194,12 @@ fn an_object_alone_is_the_photo_where_nothing_hides_it() {
             }
         }
         assert!(compared > 800 && hidden > 100, "{compared} pixels compared, {hidden} hidden ones have own colours");
-        // Tips of other objects that reach between the centres of pixels.
+        // Tips of other objects between the centres of pixels.
         assert!(slivers * 200 <= compared, "{slivers} of {compared} pixels of view {view} differ");
     }
 }
 
-/// The hard scene at half the usual size, which is enough to see it.
+/// The hard scene at half of its default size.
 fn hard() -> (World, Vec<Camera>, Vec<Picture>) {
     let world = World::new(Preset::Hard, 0);
     let options = SynthOptions { width: 160, height: 120, ..SynthOptions::default() };
@@ -220,7 +220,7 @@ fn mean_run(pixels: &[bool], width: usize) -> f64 {
 }
 
 #[test]
-fn the_hard_scene_is_hard() {
+fn the_hard_scene_has_thin_cut_dark_and_hidden_objects() {
     let (world, cameras, made) = hard();
     let (width, height) = (made[0].width as usize, made[0].height as usize);
     let views = made.len() as u32 as f64;
@@ -241,7 +241,7 @@ fn the_hard_scene_is_hard() {
                 .collect();
             mean_run(&made.whole[index], width).min(mean_run(&columns, height))
         });
-        // Twice as many at the usual size.
+        // Twice as wide at the default size.
         let mean = widths.sum::<f64>() / views;
         assert!(mean < 2.0, "{name} is {mean} px wide");
     }
@@ -271,7 +271,7 @@ fn the_hard_scene_is_hard() {
 #[test]
 fn the_flagstone_looks_like_the_ground_and_the_twins_touch() {
     let (world, cameras, made) = hard();
-    // What the photo shows without the object, where the object was.
+    // The photo without the object, at the pixels of the object.
     let change = |name: &str| {
         let index = index_of(&world, name);
         let mut without = world.clone();

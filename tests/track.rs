@@ -39,7 +39,7 @@ fn an_object_out_of_sight_is_remembered_for_a_while() {
 
 #[test]
 fn too_many_objects_are_an_error() {
-    // Gone for longer than it is remembered, so that every second frame has a new object.
+    // Missing for longer than the memory of the tracker, so every second frame has a new object.
     let frames = [row(&[1]), row(&[0])];
     let many: Vec<LabelMap> = frames.iter().cycle().take(2 * 65_536).cloned().collect();
     let forgetful = Overlap { memory: 0, ..HOW };
@@ -72,8 +72,7 @@ fn the_verb_reads_and_writes_folders() {
     assert!(status == Some(3) && text.contains("00002.png") && text.contains("1 x 3 px"), "{text}");
 }
 
-/// Mean over objects and photos of the intersection over union with the truth, an object being what has the id that it
-/// got where it was first seen.
+/// Mean IoU with the ground truth over objects and photos. An object keeps the id of its first appearance.
 fn score(truth: &[LabelMap], found: &[LabelMap]) -> f64 {
     let mut shares = Vec::new();
     for object in 1..=8_u16 {
@@ -90,8 +89,8 @@ fn score(truth: &[LabelMap], found: &[LabelMap]) -> f64 {
     shares.iter().sum::<f64>() / shares.len() as f64
 }
 
-/// LabelGS, densification of views: what a tracker gains from frames between eight photos. The frames are the true
-/// pictures, so that the numbers are about tracking and not about a model.
+/// View densification of LabelGS: what a tracker gains from frames between eight photos. The frames are ground truth,
+/// so the numbers do not depend on a model.
 #[test]
 fn frames_between_sparse_photos_keep_ids() {
     let options = SynthOptions { preset: Preset::Default, width: 160, height: 120, views: 8, points: 10, seed: 0 };

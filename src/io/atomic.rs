@@ -1,5 +1,7 @@
 //! Atomic file writes: after a crash a file is the old one or the complete new one.
 
+#![expect(clippy::disallowed_methods, reason = "the place that opens files for writing")]
+
 use crate::error::{Error, Result};
 use crate::lab::fault;
 use std::collections::BTreeSet;

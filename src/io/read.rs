@@ -1,6 +1,8 @@
 //! File reading. Every reader opens and reads files through this module, so that [faults](crate::lab::fault) reach all
 //! of them.
 
+#![expect(clippy::disallowed_methods, reason = "the place that opens files for reading")]
+
 use crate::error::{Error, Result};
 use crate::lab::fault;
 use std::fs::{self, File};

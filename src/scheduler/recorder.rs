@@ -4,6 +4,7 @@
 //! undefined behaviour for the whole process.
 // Vulkan commands are foreign functions: every call is unsafe.
 #![allow(unsafe_code)]
+#![expect(clippy::disallowed_methods, reason = "the place that records dispatches and barriers")]
 
 use crate::error::{Error, Result};
 use crate::gpu::{Buffer, CommandBuffer, Gpu, Pipeline, QueryPool, vk_call};

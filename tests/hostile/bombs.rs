@@ -1,4 +1,4 @@
-//! Files whose header promises more than there is, or more than anybody has memory for.
+//! Files whose header claims more data than the file has, or more than memory holds.
 
 use crate::io::fixtures::{Scene, refusal, simple};
 use crate::support::memory::peak_of;
@@ -18,7 +18,7 @@ use labelgs::io::read_photo;
 use labelgs::scene::DepthMap;
 use std::path::Path;
 
-/// The refusal of a reader, which must not have taken memory for what the header says.
+/// Returns the message of a reader, and checks that it did not allocate the size in the header.
 #[track_caller]
 fn refused<T>(read: impl FnOnce() -> Result<T>) -> String {
     let (answer, peak) = peak_of(read);
@@ -70,7 +70,7 @@ fn a_png_that_is_shorter_than_its_header_says_takes_no_memory() {
     }
 }
 
-/// A JPEG of 12 x 8 px whose header says another size.
+/// A JPEG of 12 x 8 px with another size in its header.
 fn jpeg_of(width: u16, height: u16) -> Vec<u8> {
     let mut bytes = super::seeds::photo_jpeg()[0].clone();
     let frame = bytes.windows(2).position(|pair| pair == [0xff, 0xc0]).expect("a frame");
@@ -85,7 +85,7 @@ fn a_jpeg_header_of_65535_by_65535_is_refused() {
     let large = scene.write("large.jpg", jpeg_of(65_535, 65_535));
     assert_eq!(photo_size(&large).expect("a size"), (65_535, 65_535));
     assert!(refused(|| read_photo(&large, [0.0; 3])).contains("65535 x 65535"));
-    // Few enough pixels, and far too many for the file.
+    // An allowed number of pixels, but far too many for the size of the file.
     let short = scene.write("short.jpg", jpeg_of(16_000, 16_000));
     assert!(refused(|| read_photo(&short, [0.0; 3])).contains("so few bytes"));
     let none = scene.write("none.jpg", jpeg_of(0, 8));
@@ -130,7 +130,7 @@ fn exr(names: &[&'static str], blocks: Blocks, compression: Compression) -> Vec<
 }
 
 #[test]
-fn exrs_with_odd_channels_and_tiles() {
+fn exrs_with_tiles_and_any_channel_name_are_read() {
     let tiles = Blocks::Tiles(Vec2(5, 3));
     for (blocks, compression) in [
         (tiles, Compression::ZIP1),
@@ -139,7 +139,7 @@ fn exrs_with_odd_channels_and_tiles() {
         (Blocks::ScanLines, Compression::RLE),
         (Blocks::ScanLines, Compression::ZIP16),
     ] {
-        // One channel is the depth whatever it is called; of several, Y, Z or R.
+        // A single channel of any name is the depth; of several channels, Y, Z or R.
         for (names, from) in [(&["depth"][..], 0), (&["A", "Z"], 1), (&["B", "G", "R"], 2), (&["R", "Y"], 1)] {
             let map = depth(&exr(names, blocks, compression)).expect("a map");
             assert_eq!(map.values[7], (7 + 100 * from) as f32, "{names:?}");

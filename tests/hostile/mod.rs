@@ -1,4 +1,4 @@
-//! What comes from outside: hostile files, and scenes that lie.
+//! Untrusted input: hostile files and inconsistent scenes.
 
 #[path = "../../tools/fuzz/readers.rs"]
 mod readers;

@@ -104,7 +104,7 @@ fn names_that_are_no_files_are_refused() {
         open(scene.path(), allow)
     };
     assert!(refusal(refused("images", false)).contains("1 of 1 listed photos do not exist"));
-    // A name that is all prefix once ended in a panic.
+    // A name that consists of a prefix only once caused a panic.
     let cameras = LoadOptions { photos: false, test_every: None, ..LoadOptions::default() };
     assert_eq!(names(&io::open(scene.path(), &cameras).expect("cameras are enough")), ["images"]);
     scene.photo("images/images.png", 12, 8);
@@ -117,7 +117,7 @@ fn names_that_are_no_files_are_refused() {
     }
 }
 
-/// Links are the user's own and lead where he wants them to.
+/// Links may lead out of the scene, because the user made them.
 #[cfg(unix)]
 #[test]
 fn links_in_a_scene_are_followed() {

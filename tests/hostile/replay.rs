@@ -1,10 +1,10 @@
-//! What fuzzing has found, and the seeds that it started from, through every reader again.
+//! Replays the findings of fuzzing and its seeds through every reader.
 
 use super::targets::{Place, TARGETS, find};
 use std::fs;
 use std::path::Path;
 
-/// Every seed is a valid file, or fuzzing would start from nothing.
+/// Every seed is a valid file, so fuzzing starts from accepted input.
 #[test]
 fn seeds_are_accepted() {
     for target in &TARGETS {

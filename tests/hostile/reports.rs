@@ -1,4 +1,4 @@
-//! Failures of other programs that people reported, each as a test under its own name.
+//! Reported failures of other programs, one test each.
 
 use crate::io::fixtures::{ColmapCamera, Scene, images_bin, pinhole, refusal, simple};
 use labelgs::internals::io;
@@ -199,7 +199,7 @@ fn values_that_were_activated_twice_are_pointed_out() {
     write_model(&path, &activated).expect("written");
     let read = read_model(&path).expect("read");
     assert!(read.notes.len() == 1 && read.notes[0].contains("after their sigmoid and exponential"), "{:?}", read.notes);
-    // Sizes whose squares no f32 holds are left out, whatever made them.
+    // Sizes whose square overflows f32 are always dropped.
     let mut huge = raw.clone();
     huge.scales[3] = [45.0, 0.0, 0.0];
     huge.scales[5] = [0.0, 1e30, 0.0];

@@ -1,4 +1,4 @@
-//! Scenes that say what is not so, up to the point where training would start.
+//! Inconsistent scenes, read up to the start of training.
 
 use crate::io::fixtures::{ColmapCamera, Scene, images_bin, pinhole, refusal, simple};
 use labelgs::Result;
@@ -21,7 +21,7 @@ fn a_few_undecodable_photos_are_skipped_and_listed() {
     assert!(dataset.train.iter().all(|view| view.name != "03.png" && view.name != "11.png"));
     let note = dataset.notes.iter().find(|note| note.contains("cannot be decoded")).expect("a note");
     assert!(note.contains("2 of 20") && note.contains("03.png") && note.contains("11.png"), "{note}");
-    // Who is held out does not depend on it.
+    // The split into training and test views does not depend on skipped photos.
     let split = LoadOptions { test_every: Some(4), ..LoadOptions::default() };
     let dataset = io::open(scene.path(), &split).expect("a scene");
     let test: Vec<&str> = dataset.test.iter().map(|view| view.name.as_str()).collect();
@@ -48,7 +48,7 @@ fn many_undecodable_photos_are_listed_up_to_twenty() {
     }
 }
 
-/// Sizes come from the photos here, so that a damaged one has not even a camera.
+/// Sizes come from the photos here, so a damaged photo has no camera.
 #[test]
 fn an_undecodable_photo_of_transforms_is_skipped_too() {
     let scene = Scene::new();
@@ -107,7 +107,7 @@ fn a_field_of_view_of_half_a_turn_or_more_is_refused() {
 }
 
 #[test]
-fn poses_and_points_beyond_all_numbers() {
+fn poses_that_overflow_are_refused_and_points_skipped() {
     let scene = simple(1);
     let path = scene.path().join("sparse/0/images.bin");
     for far in [1e13, 1e300, f64::MAX] {

@@ -1,4 +1,4 @@
-//! Odd scenes that are none the less scenes: they train, and what comes out is a model.
+//! Unusual but valid scenes train to a finite model.
 
 use crate::support::device;
 use assert_cmd::Command;
@@ -64,7 +64,7 @@ fn views_of_one_pose_train() {
     trains("one pose", scene.clone());
     scene.points.clear();
     trains("one pose, no points", scene.clone());
-    // A rounding apart, as poses out of a program are.
+    // Apart by rounding, like poses from a program.
     for (index, view) in scene.train.iter_mut().enumerate() {
         view.camera.translation.x += 1e-17 * index as f64;
     }
@@ -136,7 +136,7 @@ fn tiny(width: u32, height: u32) -> Dataset {
     let mut scene = scene();
     for view in &mut scene.train {
         let (old, camera) = (view.camera.clone(), view.camera.resized(width, height));
-        // Square pixels, the middle where it was.
+        // Square pixels, the principal point unchanged.
         let focal = camera.fx.min(camera.fy);
         let camera = Camera { fx: focal, fy: focal, ..camera };
         let pixels = (width * height) as usize;

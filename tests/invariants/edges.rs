@@ -18,7 +18,7 @@ fn shape(gaussians: usize, width: u32, height: u32) -> Shape {
 
 /// Sizes that are no multiple of a tile, and smaller than one.
 #[test]
-fn pictures_of_any_size() {
+fn pictures_of_any_size_equal_the_mirror() {
     for (width, height) in [(13, 12), (33, 12), (12, 67)] {
         let Some(turn) = device() else { return };
         let mut fixture = Fixture::new(turn, scene(211, &shape(30, width, height)), true);
@@ -36,7 +36,7 @@ fn pictures_of_any_size() {
 }
 
 #[test]
-fn one_pixel() {
+fn a_picture_of_one_pixel_trains() {
     let Some(turn) = device() else { return };
     let mut s = scene(212, &shape(5, 12, 12));
     s.camera = s.camera.resized(1, 1);
@@ -51,7 +51,7 @@ fn one_pixel() {
 }
 
 #[test]
-fn one_gaussian() {
+fn one_gaussian_trains() {
     let Some(turn) = device() else { return };
     let mut s = scene(213, &shape(1, 30, 20));
     s.gaussians.means = vec![[0.0; 3]];
@@ -64,7 +64,7 @@ fn one_gaussian() {
 
 /// No gradient, no update, and the picture is the background.
 #[test]
-fn nothing_visible() {
+fn without_visible_gaussians_a_step_changes_nothing() {
     let Some(turn) = device() else { return };
     let mut s = scene(214, &shape(20, 30, 20));
     s.gaussians.means.iter_mut().for_each(|mean| mean[2] = -50.0);
@@ -79,9 +79,9 @@ fn nothing_visible() {
     assert_eq!(fixture.get::<u32>(Buf::MEANS, 80), before);
 }
 
-/// Numbers that are none, and that overflow on their way to the screen, spoil nothing beside them.
+/// A Gaussian with NaN, or with values that overflow in the projection, affects no other Gaussian and no pixel.
 #[test]
-fn gaussians_that_are_not_numbers() {
+fn nan_gaussians_do_not_spread() {
     let Some(turn) = device() else { return };
     let mut s = scene(215, &shape(20, 30, 20));
     s.gaussians.means[3] = [f32::NAN; 3];
@@ -102,7 +102,7 @@ fn gaussians_that_are_not_numbers() {
 }
 
 #[test]
-fn a_model_without_gaussians() {
+fn a_model_without_gaussians_renders_the_background() {
     let Some(turn) = device() else { return };
     let camera = scene(216, &shape(1, 30, 20)).camera;
     let room = EngineSize::new(0, (30, 20));
@@ -126,9 +126,8 @@ const LABEL_BUFFERS: [&str; 8] = [
     "layer_state",
 ];
 
-/// A scene without masks pays nothing for labels.
 #[test]
-fn no_labels_no_cost() {
+fn a_scene_without_labels_has_no_label_buffers_or_passes() {
     let Some(turn) = device() else { return };
     let s = scene(217, &shape(40, 30, 20));
     let mut fixture = Fixture::new(turn, s, false);
@@ -148,7 +147,7 @@ fn no_labels_no_cost() {
             assert!(!LABEL_BUFFERS.contains(&plan.table[buf.index()].name), "{} binds labels", pass.shader.name);
         }
     }
-    // Nor does a render pay for training.
+    // A render allocates no buffers of training.
     let labels = Some(LabelSize { max_label: 3, layers: 2, vote_columns: 0 });
     let size = |trained, labels| EngineSize { trained, labels, ..EngineSize::new(1000, (64, 48)) };
     let total = |size: &EngineSize| {

@@ -1,4 +1,4 @@
-//! Images larger than what an engine was made for: refused, and after growing rendered as by a larger engine.
+//! Images beyond the size of an engine are refused. After growing, the engine renders them as a larger engine does.
 
 use super::training::{small, train, train_with};
 use crate::support::device;
@@ -13,7 +13,7 @@ use labelgs::render::{Parts, RenderOptions, render};
 use labelgs::run::LabelRule;
 use labelgs::scene::{Camera, Gaussians, LabelMap};
 
-/// Guards behind the buffers are looked at after each run.
+/// Guards behind the buffers are checked after each run.
 fn guarded() -> SchedulerOptions {
     SchedulerOptions { plan: PlanOptions { guards: true, ..PlanOptions::default() }, ..SchedulerOptions::default() }
 }
@@ -86,7 +86,7 @@ fn an_engine_that_has_grown_renders_as_one_made_so_large() {
     assert_eq!(render(&mut grown, &large, &RenderOptions::default()).expect("a picture"), expected);
 }
 
-/// A viewer's picture between two steps, larger than any photo, changes no bit of the training.
+/// A render between two steps, larger than any photo, changes no bit of the training.
 #[test]
 fn a_training_goes_on_after_a_large_picture() {
     let Some(turn) = device() else { return };

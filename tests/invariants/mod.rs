@@ -1,4 +1,4 @@
-//! What must not change a result: kernel shapes, memory, barriers, threads, overflows. And scenes at the edge.
+//! Results do not depend on kernel shapes, memory, barriers, threads or overflows. Also: edge cases of scenes.
 
 mod edges;
 mod images;

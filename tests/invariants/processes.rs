@@ -1,4 +1,4 @@
-//! Runs of this test program in other environments: numbers of threads, and another width of the vectors.
+//! Child processes of this test binary with other numbers of threads and another vector width.
 
 use super::training::train;
 use crate::support::device;
@@ -10,7 +10,7 @@ use std::process::Command;
 /// Set in the children, which then print the hash.
 const CHILD: &str = "LABELGS_TEST_CHILD";
 
-/// Not a test by itself: what the children of the next one run.
+/// Not a test by itself: child processes of the tests below run it.
 #[test]
 fn hash_of_a_training() {
     if std::env::var_os(CHILD).is_none() {
@@ -25,7 +25,8 @@ fn hash_of_a_training() {
     println!("subgroup {} hash {:016x}", turn.subgroup_size(), hasher.finish());
 }
 
-/// Standard output of some tests of this program with environment variables; they must pass.
+/// Runs some tests of this binary with environment variables, requires that they pass, and returns their standard
+/// output.
 fn child(tests: &[&str], environment: &[(&str, &str)]) -> String {
     let mut command = Command::new(std::env::current_exe().expect("this program has a path"));
     command.args(tests).args(["--nocapture", "--test-threads", "1"]).env(CHILD, "1");
@@ -37,7 +38,7 @@ fn child(tests: &[&str], environment: &[(&str, &str)]) -> String {
     text
 }
 
-/// True if the device is lavapipe, which these variables are for.
+/// Whether the device is lavapipe, which reads these variables.
 fn is_lavapipe() -> bool {
     device().is_some_and(|turn| turn.is_cpu())
 }
@@ -58,8 +59,8 @@ fn a_training_is_the_same_on_any_number_of_threads() {
     }
 }
 
-/// Without each feature that a device may lack the engine does the same with something else. Bits may differ only where
-/// kernels differ: nowhere, as reads of texels and of storage are the same numbers.
+/// Without an optional feature the engine takes another way to the same bits: texel and storage reads return the same
+/// numbers.
 #[test]
 fn without_optional_features_a_training_is_the_same() {
     if std::env::var_os(CHILD).is_some() || !is_lavapipe() {

@@ -1,4 +1,4 @@
-//! A training that was stopped and goes on in a new trainer, from a file, ends in the same bits as one that was not.
+//! A training that is resumed from a file in a new trainer ends in the same bits as an uninterrupted one.
 
 use super::training::{config, labels_of, small};
 use crate::support::device;
@@ -16,7 +16,7 @@ use labelgs::scene::Dataset;
 use std::path::Path;
 use std::sync::Arc;
 
-/// Densification, opacity resets, votes and looks at the occluders before and after step 30, and nothing twice alike.
+/// Densification, opacity resets, votes and occluder updates before and after step 30, all at different steps.
 fn long(rule: LabelRule) -> TrainConfig {
     TrainConfig { iterations: 60, ..config(rule) }
 }
@@ -30,7 +30,7 @@ fn plain() -> Dataset {
     dataset
 }
 
-/// Steps to the end. At each stop the state goes to a file of that name.
+/// Trains to the end. At each stop it writes the state to a file of that name.
 fn go_on(trainer: &mut Trainer, stops: &[u32], folder: &Path) -> (Vec<u8>, Vec<u64>) {
     let bits = |reports: Vec<StepReport>| reports.into_iter().map(|r| (r.loss + r.label_loss).to_bits());
     let mut losses = Vec::new();
@@ -100,7 +100,7 @@ fn a_training_without_masks_goes_on_to_the_same_bits() {
     assert_eq!(labels_of(&ply), 0);
 }
 
-/// Where memory is short, how much may grow depends on what has grown before.
+/// With little memory, the allowed growth depends on earlier growth.
 #[test]
 fn a_training_that_memory_bounds_goes_on_to_the_same_bits() {
     let Some(turn) = device() else { return };

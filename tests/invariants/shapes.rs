@@ -1,4 +1,4 @@
-//! Kernel shapes: tiles and ways to read change nothing, or only the last bits.
+//! Kernel shapes: the way of reading changes no bit, and the tile size only the last bits.
 
 use crate::pass::fixture::{Fixture, GRADIENTS};
 use crate::support::compare::{Band, Tolerance, check, close_with_band, exact};
@@ -41,7 +41,7 @@ fn the_picture_does_not_depend_on_the_tile_size() {
         .filter(|size| size.0 <= subgroup && size.0 * size.1 >= subgroup)
     {
         let Some(other) = tile(size) else { return };
-        // Offsets are taken from the tile's corner, so their last bits differ; a pair at the cut may then flip.
+        // Offsets are relative to the corner of the tile, so their last bits differ, and a pair at the cut may flip.
         let tolerance = Tolerance { absolute: 1e-6, relative: 0.0 };
         let band = Band { width: 1.0, flip: 0.01, ratio: 0.0005 };
         let summary = check(
@@ -55,7 +55,7 @@ fn the_picture_does_not_depend_on_the_tile_size() {
     }
 }
 
-/// Everything that a step leaves, as bits.
+/// All results of a step, as bits.
 fn everything(fixture: &mut Fixture) -> Vec<u32> {
     fixture.input.update = true;
     fixture.train();

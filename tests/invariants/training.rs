@@ -1,4 +1,4 @@
-//! Short trainings with densification, labels and occluders: what may not change their result, to the last bit.
+//! Short trainings with densification, labels and occluders give the same bits in every configuration.
 
 use crate::support::compare::{check, exact};
 use crate::support::device;
@@ -43,7 +43,7 @@ pub fn small() -> Dataset {
     dataset(&options, 0)
 }
 
-/// What a training leaves.
+/// Results of a training.
 #[derive(Debug, PartialEq)]
 pub struct Outcome {
     /// The bytes of the PLY.
@@ -67,7 +67,7 @@ pub fn train(turn: &Turn, rule: LabelRule, options: SchedulerOptions, change: im
     })
 }
 
-/// Trains; `between` is called before each step, and returns what it has drained.
+/// Trains and calls `between` before each step; it returns the reports that it drained.
 pub fn train_with(
     turn: &Turn,
     rule: LabelRule,
@@ -111,7 +111,7 @@ fn same(what: &str, other: &Outcome, first: &Outcome) {
     assert!(other.ply == first.ply, "{what}: the models differ");
 }
 
-/// Far too small for the first step already.
+/// Capacity that is too small for the first step.
 pub fn tiny(trainer: &mut Trainer) {
     let engine = trainer.engine_mut();
     let old = *engine.raw().capacity();
@@ -169,7 +169,7 @@ fn a_memory_limit_bounds_the_gaussians() {
     assert!(held.memory <= limit, "{} bytes of {limit}", held.memory);
     assert!(held.counts.1 > start + 20 && held.counts.1 < end - 20, "{:?} and without a limit {end}", held.counts);
     assert!(held.losses.last() != free.losses.last());
-    // Less than the start needs is refused, with the number that would fit.
+    // A limit below the initial need is refused, with the number that would fit.
     let options = SchedulerOptions { memory_limit: Some(8 << 20), ..SchedulerOptions::default() };
     let first = initial_gaussians(&small(), 0, 100).expect("points");
     let refused = Trainer::new(turn.gpu(), config(LabelRule::Votes), &small(), &first, options);

@@ -1,4 +1,4 @@
-//! Files of checkpoints: what comes back, and that nothing damaged does.
+//! Checkpoint files: exact round trips, and damaged files refused.
 
 use super::fixtures::*;
 use labelgs::internals::cli::status::exit_status;
@@ -21,7 +21,7 @@ fn example() -> Checkpoint {
 #[test]
 fn a_checkpoint_comes_back_to_the_last_bit() {
     let scene = Scene::new();
-    // More than one buffer of everything.
+    // A plane that is longer than any I/O buffer.
     let large = Plane { name: "large".to_owned(), words: 5, data: (0..500_000).collect() };
     let mut file = example();
     file.planes.push(large);
@@ -47,7 +47,7 @@ fn refused(scene: &Scene, bytes: &[u8]) -> String {
 }
 
 #[test]
-fn what_is_damaged_is_refused_with_the_reason() {
+fn a_damaged_checkpoint_is_refused_with_the_reason() {
     let scene = Scene::new();
     let path = scene.at("a.ckpt");
     example().write(&path).expect("written");
@@ -78,9 +78,9 @@ fn what_is_damaged_is_refused_with_the_reason() {
     assert!(refused(&scene, b"ply\nformat binary_little_endian 1.0\n").contains("no checkpoint"));
 }
 
-/// Contents that a checksum agrees with and that make no sense take no memory and end in no panic.
+/// Invalid contents with a correct checksum cause no large allocation and no panic.
 #[test]
-fn nonsense_with_a_right_checksum_is_refused() {
+fn invalid_values_with_a_correct_checksum_are_refused() {
     let scene = Scene::new();
     let file = |json: &str, rest: &[u8], json_bytes: u64| {
         let body = [&json_bytes.to_le_bytes()[..], json.as_bytes(), rest].concat();
@@ -126,5 +126,5 @@ fn the_newest_is_the_one_with_the_largest_number() {
     assert!(checkpoint_folder::next(out, 40).expect("a name").ends_with("11-step-40.ckpt"));
     checkpoint_folder::keep(out, &[found[0].path.clone()]).expect("kept");
     assert_eq!(checkpoint_folder::list(out).expect("a list"), [found[0].clone()]);
-    assert!(scene.at("checkpoints/notes.txt").exists(), "what is no checkpoint is nobody's business");
+    assert!(scene.at("checkpoints/notes.txt").exists(), "files other than checkpoints stay");
 }

@@ -38,7 +38,7 @@ fn binary_and_text_read_alike_in_every_folder() {
                 scene.colmap_txt(folder, &[pinhole()], &names);
             }
             names.iter().for_each(|name| scene.photo(&format!("images/{name}"), 12, 8));
-            // Newer versions write these too; nothing in them is needed, so nothing is wrong with them either.
+            // Files of newer versions, which are ignored.
             for file in ["rigs.bin", "frames.bin", "rigs.txt", "frames.txt"] {
                 std::fs::write(scene.path().join(folder).join(file), [0xff; 9]).expect("written");
             }
@@ -152,7 +152,7 @@ fn damaged_binaries_are_refused_at_every_cut() {
             let text = refusal(open(&scene));
             assert!(text.contains(file) && text.contains("byte "), "{text}");
         }
-        // A count that no memory holds must end at the end of the file.
+        // A huge count must fail at the end of the file, not in an allocation.
         for count in [u64::MAX, u64::MAX / 2, 1 << 40] {
             let mut hostile = whole.clone();
             hostile[..8].copy_from_slice(&count.to_le_bytes());

@@ -69,7 +69,7 @@ fn gaussians_stand_on_the_points() {
     // Neighbours of 9 among the squares: 4, 16 and 1 or 0.
     let expected = 0.5 * f64::ln((25.0 + 49.0 + 64.0) / 3.0);
     assert!(g.scales[3].iter().all(|&s| (f64::from(s) - expected).abs() < 1e-6));
-    // Points at one place have the smallest size that is allowed.
+    // Points at one place get the smallest allowed size.
     assert!((f64::from(g.scales[22][0]) - 0.5 * f64::ln(1e-7)).abs() < 1e-5);
 }
 
@@ -119,7 +119,7 @@ fn in_a_room_points_are_swept_onto_the_surfaces() {
 }
 
 #[test]
-fn odd_rigs_get_their_gaussians() {
+fn unusual_camera_rigs_get_initial_gaussians() {
     let same = vec![looking(DVec3::ZERO, DVec3::Z); 2];
     let outward = (0..8).map(|index| {
         let angle = std::f64::consts::TAU * f64::from(index) / 8.0;
@@ -142,7 +142,7 @@ fn odd_rigs_get_their_gaussians() {
 
 #[test]
 fn no_gaussian_of_a_made_up_point_covers_a_picture() {
-    // Few points for a whole room: their neighbours are far, so that only the bound keeps them small.
+    // Few points in a room have distant neighbours, so only the bound keeps them small.
     let scene = dataset(ring(8), |_, direction| [(127.0 + 120.0 * direction.x) as u8, 90, 60]);
     let model = initial_gaussians(&scene, 1, 64).expect("Gaussians");
     let mut bounded = 0;

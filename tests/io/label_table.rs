@@ -1,4 +1,4 @@
-//! labels.json: what is written comes back, and what cannot be meant is refused.
+//! labels.json: round trips, and invalid tables refused.
 
 use labelgs::internals::io::label_table::FILE;
 use labelgs::io::{LabelEntry, LabelTable};
@@ -38,7 +38,7 @@ fn a_models_table_is_beside_it_or_in_the_folder_of_its_run() {
 }
 
 #[test]
-fn a_table_that_cannot_be_meant_is_refused_with_its_place() {
+fn an_invalid_table_is_refused_with_its_place() {
     let folder = tempfile::tempdir().expect("folder");
     let path = folder.path().join(FILE);
     let entry = |id: u32, name: &str| format!(r#"{{"id": {id}, "name": "{name}", "colour": [1, 2, 3]}}"#);

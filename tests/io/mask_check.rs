@@ -1,4 +1,4 @@
-//! What `masks check` finds: each kind where it was planted, and nothing in clean masks.
+//! `masks check` finds each kind of planted fault, and nothing in clean masks.
 
 use super::mask_forms::*;
 use labelgs::internals::io;
@@ -114,7 +114,7 @@ fn nearly_empty_masks_and_objects_are_found() {
     let empty: Vec<Finding> = found.into_iter().filter(|finding| finding.problem == Problem::NearlyEmpty).collect();
     assert_eq!(short(&empty), [(Problem::NearlyEmpty, Some("010.png"), None)]);
 
-    // Masks of 600 px with 400 of an id, but for one with a single pixel of it.
+    // Masks of 600 px with 400 px of an id, except one mask with a single pixel of it.
     let id = |pixels: usize| {
         move |index: usize| match index {
             400.. => 5,
@@ -162,7 +162,7 @@ fn map(width: u32, height: u32, id: impl Fn(usize) -> u16) -> LabelMap {
     LabelMap { width, height, ids: (0..(width * height) as usize).map(id).collect() }
 }
 
-/// An absence is no blink if the points of the object are out of the picture or behind what all three masks show.
+/// A missing id is no finding if the points of the object are out of the picture or hidden in all three masks.
 #[test]
 fn points_excuse_an_absence() {
     // Points at depth 1 of a camera with a focal length of 100 px: 100 times their place from the middle.
@@ -178,14 +178,14 @@ fn points_excuse_an_absence() {
     let here = camera(20, 20);
     let blink = [(Problem::Blink, Some("b"), Some(3))];
     assert_eq!(short(&looks(&left(0, 5), &here, &points)), blink);
-    assert_eq!(short(&looks(&left(0, 5), &here, &[])), blink, "without points there is no excuse");
+    assert_eq!(short(&looks(&left(0, 5), &here, &[])), blink, "without points the missing id is a finding");
     let covered = map(20, 20, |index| if (2..8).contains(&(index % 20)) || index % 20 >= 10 { 5 } else { 0 });
     assert_eq!(looks(&covered, &here, &points), [], "behind another object");
     let away = Camera { translation: glam::DVec3::new(5.0, 0.0, 0.0), ..here.clone() };
     assert_eq!(looks(&left(0, 5), &away, &points), [], "out of the picture");
     let behind = Camera { translation: glam::DVec3::new(0.0, 0.0, -3.0), ..here.clone() };
     assert_eq!(looks(&left(0, 5), &behind, &points), [], "behind the camera");
-    // Covered by an id that the neighbours do not know: another name for the same object.
+    // Covered by an id that neighbouring views lack: another id for the same object.
     let found = looks(&left(9, 5), &here, &points);
     assert_eq!(short(&found), [(Problem::SingleView, Some("b"), Some(9)), (Problem::Blink, Some("b"), Some(3))]);
 }

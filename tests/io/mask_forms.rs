@@ -1,4 +1,4 @@
-//! Writers of every form of masks that is imported, from one truth.
+//! Writers of every mask format that can be imported, from one ground truth.
 
 use super::fixtures::{Scene, simple};
 use std::fs;
@@ -36,7 +36,7 @@ pub fn png(path: &Path, size: (u32, u32), colour: png::ColorType, depth: png::Bi
     encoder.set_color(colour);
     encoder.set_depth(depth);
     if colour == png::ColorType::Indexed {
-        // One colour for all: whoever reads colours loses the ids.
+        // All entries have one colour, so a reader of colours loses the ids.
         encoder.set_palette(vec![9; 768]);
     }
     encoder.write_header().expect("a header").write_image_data(bytes).expect("pixels");

@@ -1,4 +1,4 @@
-//! Every form of masks comes back as the truth it was written from, and what is broken or doubtful is refused.
+//! Every mask format is imported exactly; broken and ambiguous masks are refused.
 
 use super::fixtures::*;
 use super::mask_forms::*;
@@ -31,7 +31,8 @@ fn auto(scene: &Scene, folder: &str) -> labelgs::Result<Imported> {
     run(scene, folder, |_| ())
 }
 
-/// The imported masks hold the truth, in which the objects 1, 2 and 3 are now called `ids`, and training reads them.
+/// Checks that the imported masks equal the ground truth, with ids 1, 2 and 3 replaced by `ids`, and that training
+/// reads them.
 #[track_caller]
 fn same_as_truth(scene: &Scene, done: &Imported, ids: [u16; 3]) {
     let masks = scene.path().join("out");
@@ -99,7 +100,7 @@ fn a_run_of_deva_is_found_by_its_folder_and_named_by_its_categories() {
     scene.write("deva/pred.json", pred(ids));
     scene.photo("deva/Visualizations/00.jpg", 12, 8);
     for folder in ["deva", "deva/Annotations"] {
-        // The name of the folder above tells of the run only if the pictures were not moved.
+        // The name of the parent folder identifies the run only if the pictures were not moved.
         let done = run(&scene, folder, |o| o.pred = Some(scene.path().join("deva/pred.json"))).expect("imported");
         assert_eq!(
             (done.format, names(&done)),
@@ -214,7 +215,7 @@ fn soft_edges_are_cut_only_when_asked() {
 }
 
 #[test]
-fn what_fits_two_readings_is_refused_with_the_flags_that_decide() {
+fn ambiguous_masks_are_refused_with_the_flags_that_decide() {
     // A mirrored folder of black and white id pictures, or the object `left`.
     let scene = Scene::new();
     scene.colmap_bin("sparse/0", &[pinhole()], &["left/a.png", "left/b.png"]);

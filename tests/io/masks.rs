@@ -13,7 +13,7 @@ fn png(path: &Path, size: (u32, u32), colour: png::ColorType, depth: png::BitDep
     encoder.set_color(colour);
     encoder.set_depth(depth);
     if colour == png::ColorType::Indexed {
-        // All entries share one colour: whoever reads colours instead of indices loses the ids.
+        // All entries have one colour, so a reader of colours loses the ids.
         encoder.set_palette(vec![9u8; 3 * (1 << (depth as usize).min(8))]);
     }
     encoder.write_header().expect("a header").write_image_data(bytes).expect("pixels");

@@ -1,4 +1,4 @@
-//! Models by the ending of their files, and a format that a program adds.
+//! Model formats by file extension, and a format that a program adds.
 
 use super::fixtures::*;
 use labelgs::internals::cli::context::open_model;
@@ -63,7 +63,7 @@ fn a_format_that_is_added_is_read_and_written_by_its_endings() {
     assert_eq!(read_model(scene.at("a.balls")).expect("read").gaussians.means, model.means[1..]);
     let refused = refusal(read_model(scene.write("a.balls", "1 2 3\n")));
     assert!(refused.ends_with("a.balls: line 1: is no row of 8 numbers"), "{refused}");
-    // Nothing changes for the others, but that one more ending is known.
+    // The other formats are unchanged, apart from one more known extension in messages.
     write_model(scene.at("a.ply"), &balls()).expect("written");
     assert!(std::fs::read(scene.at("a.ply")).expect("bytes").starts_with(b"ply\n"));
     let refused = refusal(read_model(scene.write("a.splat", "1 2 3\n")));

@@ -63,7 +63,7 @@ fn links_and_devices_are_written_through() {
     }
 }
 
-/// A command that writes into a folder removes what one that was killed left there long ago.
+/// A command removes old temporary files of a killed command from the folder that it writes to.
 #[cfg(target_os = "linux")]
 #[test]
 fn old_litter_goes_with_the_next_write() {

@@ -112,7 +112,7 @@ fn shrinking_averages_the_exact_box() {
 }
 
 #[test]
-fn the_lens_is_opencvs() {
+fn distortion_equals_opencv() {
     let at = DVec2::new(0.3, -0.2);
     let lens =
         Polynomial { numerator: [0.1, -0.05, 0.02, 0.0], denominator: [0.01, 0.02, 0.03], tangential: [0.004, -0.003] };

@@ -8,7 +8,7 @@ use labelgs::io::PipelineFolder;
 use std::sync::Arc;
 
 #[test]
-fn what_is_damaged_is_not_given_to_a_driver() {
+fn a_damaged_cache_is_not_given_to_the_driver() {
     let folder = tempfile::tempdir().expect("a folder");
     let store = PipelineFolder::new(folder.path().join("new"));
     assert!(store.load("gpu").is_empty(), "nothing was saved");
@@ -28,7 +28,7 @@ fn what_is_damaged_is_not_given_to_a_driver() {
         std::fs::write(&path, &flipped).expect("written");
         assert!(store.load("gpu").is_empty(), "byte {at}");
     }
-    // A file in the folder's place: a warning, no failure.
+    // A file in place of the folder is a warning only.
     std::fs::write(folder.path().join("file"), b"").expect("written");
     PipelineFolder::new(folder.path().join("file")).save("gpu", &data);
 }
@@ -53,11 +53,11 @@ fn a_device_saves_what_it_compiled_and_takes_it_back() {
     };
     let device = use_it();
     let first = store.load(&device);
-    // A header at least: drivers that keep nothing hand out just that.
+    // At least a header: drivers without a cache return only that.
     assert!(first.len() >= 16, "{} bytes", first.len());
     use_it();
     assert!(store.load(&device).len() >= 16);
-    // What another driver wrote is refused by the header, not by a crash.
+    // A cache of another driver is refused by its header.
     let mut foreign = first.clone();
     foreign[8..12].copy_from_slice(&[0xff; 4]);
     store.save(&device, &foreign);

@@ -6,7 +6,7 @@ use labelgs::io::{read_model, write_model};
 use labelgs::scene::Gaussians;
 use std::fs;
 
-/// Values that differ everywhere, so that no mixed-up column goes unseen.
+/// All values differ, so a swapped column is found.
 fn gaussians(count: usize, degree: u32, labelled: bool) -> Gaussians {
     let mut g = Gaussians { sh_degree: degree, ..Gaussians::default() };
     let rest = g.rest_per_gaussian();
@@ -28,7 +28,7 @@ fn gaussians(count: usize, degree: u32, labelled: bool) -> Gaussians {
 }
 
 #[test]
-fn what_is_written_is_read() {
+fn a_written_ply_is_read_back() {
     let scene = Scene::new();
     for degree in 0..=3 {
         for labelled in [false, true] {
@@ -64,7 +64,7 @@ fn the_layout_is_the_standard_one() {
     assert_eq!((&row[3..6], &row[9..18], row.len()), (&[0.0; 3][..], &expected[..], 27));
 }
 
-/// A PLY of one Gaussian in another order, other types and with columns nobody asked for.
+/// A PLY of one Gaussian with other order and types of columns, and with unknown columns.
 fn foreign(format: &str, line_end: &str) -> Vec<u8> {
     let columns: [(&str, &str, f64); 19] = [
         ("double", "rot_3", 0.4),
@@ -150,7 +150,7 @@ fn unusable_rows_are_dropped_and_counted() {
         poisoned.means[1][2] = f32::NAN;
         poisoned.quats[3] = [0.0; 4];
         poisoned.scales[4][1] = 90.0;
-        // The writer leaves out what is not finite, the reader the rest.
+        // The writer drops rows that are not finite, the reader the other invalid rows.
         assert_eq!(write_model(scene.at("a.ply"), &poisoned).expect("written"), 1);
         let read = read_model(scene.at("a.ply")).expect("read");
         assert_eq!(read.gaussians, clean.filtered(|row| ![1, 3, 4].contains(&row)));
@@ -224,7 +224,7 @@ fn a_file_cut_anywhere_is_refused() {
     let scene = Scene::new();
     for format in ["ascii", "binary_little_endian", "binary_big_endian"] {
         let whole = foreign(format, "\n");
-        // An ascii file may lose its last line end; losing a digit more cannot be told from another number.
+        // An ASCII file may lose its last line end. The loss of one more digit gives another valid number.
         let last = if format == "ascii" { whole.len() - 3 } else { whole.len() };
         (0..last).for_each(|length| {
             refusal(read_model(scene.write("a.ply", &whole[..length])));

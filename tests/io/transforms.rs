@@ -118,7 +118,7 @@ fn colmap_wins_and_a_json_can_be_named() {
 }
 
 #[test]
-fn nonsense_is_refused_with_its_place() {
+fn invalid_values_are_refused_with_their_place() {
     let broken = |text: String| {
         let scene = Scene::new();
         scene.photo("images/a.png", 12, 8);

@@ -16,7 +16,7 @@ pub fn opaque_scene(seed: u64) -> Scene {
     scene(seed, &Shape { gaussians: 400, width: 61, height: 45, opacities: (-4.0, 9.0), ..Shape::default() })
 }
 
-/// A pair that falls just beside the cut moves a colour by 1/255 of it; a stop moves it by 1e-4.
+/// A flip at the alpha cut changes a colour by 1/255; a flip at the stop of a ray changes it by 1e-4.
 const CUT: Band = Band { width: 2e-5, flip: 0.01, ratio: 0.001 };
 /// Sums of some 50 f32 products; 4.1e-7 seen.
 const COLOUR: Tolerance = Tolerance { absolute: 6.5e-7, relative: 0.0 };
@@ -42,7 +42,7 @@ fn last_splats(fixture: &mut Fixture) -> Vec<usize> {
 }
 
 #[test]
-fn blend_forward_of_the_scene() {
+fn blend_forward_of_the_scene_equals_its_mirror() {
     let Some(turn) = device() else { return };
     let mut fixture = Fixture::new(turn, opaque_scene(51), false);
     fixture.train();
@@ -68,7 +68,7 @@ fn blend_forward_of_the_scene() {
 }
 
 #[test]
-fn blend_forward_main_of_a_render() {
+fn main_gaussians_of_a_render_equal_the_mirror() {
     let Some(turn) = device() else { return };
     let mut fixture = Fixture::new(turn, opaque_scene(52), false);
     fixture.render();
@@ -105,7 +105,7 @@ const BOUNDS: GradientBounds = GradientBounds {
 };
 
 #[test]
-fn blend_backward_and_gather_of_the_scene() {
+fn blend_backward_and_gather_equal_their_mirrors() {
     let Some(turn) = device() else { return };
     let mut fixture = Fixture::new(turn, opaque_scene(53), false);
     fixture.train();
@@ -125,8 +125,8 @@ fn v_image(fixture: &mut Fixture) -> Upstream {
     Upstream::of_colours(&rows.iter().map(|&[r, g, b, _]| [r, g, b].map(f64::from)).collect::<Vec<_>>())
 }
 
-/// Gradient of every layer: the scene's from the device, the objects' from their mirror (a sign of each difference), and
-/// the distance of each splat to a kink of a label loss.
+/// Gradient of every layer: the scene's from the device, the objects' from their mirror (a sign of each difference),
+/// and the distance of each splat to a kink of a label loss.
 fn v_layers(rules: &Rules, fixture: &Fixture, splats: &[Splat], v_scene: &Upstream) -> (Vec<Upstream>, Vec<f64>) {
     let (target, labels, size) = (&fixture.scene.target, fixture.model().labels, fixture.size());
     let layers = blend_layers_forward(rules, splats, &labels, &fixture.slots(), size, target.background);
@@ -171,9 +171,9 @@ fn object_layers_equal_filtered_renders() {
     });
 }
 
-/// The device's boxes and tile test let nothing through that counts: a pixel outside of a splat's tiles never sees it.
+/// Boxes and tile test of the device drop no visible splat: a pixel outside of a splat's tiles has alpha below the cut.
 #[test]
-fn no_tile_misses_a_splat_that_counts() {
+fn no_tile_misses_a_visible_splat() {
     let Some(turn) = device() else { return };
     let mut fixture = Fixture::new(turn, opaque_scene(55), false);
     fixture.train();

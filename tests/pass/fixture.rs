@@ -1,4 +1,4 @@
-//! The fixture of the self-test on the tests' device; what goes wrong ends the test.
+//! The fixture of the self-test on the shared device; errors panic.
 
 use crate::reference::rules::mutants;
 use crate::reference::splat::{Splat, SplatGradient};
@@ -19,7 +19,7 @@ pub use fixture::{GRADIENTS, MOMENTS_1, MOMENTS_2, PARAMETERS, VOTE_COLUMNS, rea
 /// A scene, an engine with its model, and the step that is run.
 pub struct Fixture {
     inner: fixture::Fixture,
-    // Last: it looks for messages of the validation layer when everything else is gone.
+    // Last, so that its drop sees all messages of the validation layer.
     _turn: Turn,
 }
 
@@ -106,7 +106,7 @@ impl Fixture {
     }
 }
 
-/// Checks with the rules, then with each named constant changed: that must fail. Prints the worst error.
+/// Checks with the rules, then with each named constant changed, which must fail. Prints the largest error.
 #[track_caller]
 pub fn prove(name: &str, bearing: &[&str], compare: impl Fn(&Rules) -> Verdict) {
     let summary = check(name, compare(&Rules::default()));

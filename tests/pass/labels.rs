@@ -1,4 +1,4 @@
-//! Lift, label loss, and what labels must not change.
+//! Lift, label loss, and independence of densification from labels.
 
 use super::fixture::{Fixture, prove};
 use crate::reference::blend::blend_layers_forward;
@@ -14,7 +14,7 @@ use labelgs::internals::verify::selftest::model::{Lifted, dominant};
 use labelgs::scene::Gaussians;
 
 #[test]
-fn lift_with_and_without_the_filter() {
+fn lift_equals_its_mirror_with_and_without_the_filter() {
     for gpf in [true, false] {
         let Some(turn) = device() else { return };
         let mut fixture = Fixture::new(turn, dominant(131), true);
@@ -29,7 +29,7 @@ fn lift_with_and_without_the_filter() {
 }
 
 #[test]
-fn label_loss_of_a_step() {
+fn label_loss_of_a_step_equals_its_mirror() {
     let Some(turn) = device() else { return };
     let mut fixture = Fixture::new(turn, dominant(132), true);
     let counters = fixture.train().counters;
@@ -48,9 +48,9 @@ fn label_loss_of_a_step() {
     });
 }
 
-/// The statistic of densification sees the scene's layer only.
+/// The statistic of densification comes from the layer of the scene only.
 #[test]
-fn densification_does_not_see_the_label_loss() {
+fn the_label_loss_does_not_drive_densification() {
     let run = |label_weight: f32| -> Option<(Vec<u32>, Vec<u32>)> {
         let mut fixture = Fixture::new(device()?, dominant(133), true);
         fixture.config.label_weight = label_weight;
@@ -112,7 +112,7 @@ fn on_a_ray(opacities: &[f64]) -> Scene {
 
 /// method.md check 1.
 #[test]
-fn two_gaussians_on_a_ray() {
+fn the_nearer_of_two_gaussians_on_a_ray_is_main() {
     for (opacities, weight, labels) in [([0.7, 0.9], 0.7, [7, 0]), ([0.5, 0.999], 0.5, [0, 0])] {
         let Some(turn) = device() else { return };
         let mut fixture = Fixture::new(turn, on_a_ray(&opacities), true);
@@ -125,9 +125,10 @@ fn two_gaussians_on_a_ray() {
     }
 }
 
-/// method.md check 2: what is left behind two saturated splats is below the limit, so the second does not count.
+/// method.md check 2: the transmittance behind two saturated splats is below the limit, so the ray stops before the
+/// second.
 #[test]
-fn two_saturated_splats_stop() {
+fn two_saturated_splats_stop_the_ray() {
     let Some(turn) = device() else { return };
     let mut fixture = Fixture::new(turn, on_a_ray(&[0.9999, 0.9999, 0.5]), false);
     fixture.train();
@@ -152,7 +153,7 @@ fn a_pixel_without_a_splat_has_no_main_gaussian() {
 
 /// method.md check 4: centre in mask 1, main pixels in mask 2 only.
 #[test]
-fn a_gaussian_across_two_masks() {
+fn the_filter_keeps_a_gaussian_across_two_masks_unlabelled() {
     for (gpf, expected) in [(true, 0), (false, 2)] {
         let Some(turn) = device() else { return };
         let camera = plain_camera(48, 8);
@@ -190,9 +191,9 @@ fn a_centre_beside_the_image_lifts_nothing() {
     }
 }
 
-/// method.md check 8: a mask without a Gaussian costs its light and moves nothing.
+/// method.md check 8: a mask without a Gaussian has a loss and no gradient.
 #[test]
-fn label_loss_of_an_empty_object() {
+fn label_loss_of_an_empty_object_is_its_masked_photo_without_gradient() {
     let Some(turn) = device() else { return };
     let camera = plain_camera(SIDE, SIDE);
     let s = drawn(&[dot(&camera, [8.5, 8.5], 5.0, 3.0, 0.4)], vec![0], SIDE, SIDE, vec![7; 289]);
@@ -209,9 +210,10 @@ fn label_loss_of_an_empty_object() {
     check("gradient", exact(&fixture.get::<u32>(Buf::V_SPLATS, 12), &with));
 }
 
-/// method.md check 8: the picture of an object is its photo. A flat layer of opacity 0.5 over black shows half its colour.
+/// method.md check 8: the picture of an object is its photo. A flat layer of opacity 0.5 over black shows half its
+/// colour.
 #[test]
-fn label_loss_of_a_right_object() {
+fn label_loss_of_a_correct_object_is_0() {
     let Some(turn) = device() else { return };
     let camera = plain_camera(SIDE, SIDE);
     let mut row = dot(&camera, [8.5, 8.5], 5.0, 1e4, 0.5);
@@ -224,7 +226,7 @@ fn label_loss_of_a_right_object() {
     check("loss", close(&[loss], &[0.0], Tolerance { absolute: 1e-5, relative: 0.0 }));
 }
 
-/// method.md check 7, U_k on the device: pixels of an occluder say nothing, not even where the object shines through.
+/// method.md check 7, U_k on the device: pixels of an occluder are ignored, even where the object shows through.
 #[test]
 fn pixels_of_occluders_are_left_out() {
     let Some(turn) = device() else { return };

@@ -22,7 +22,7 @@ const KINK: f64 = 1e-6;
 
 /// Sizes below and above a workgroup, none a multiple of a strip.
 #[test]
-fn loss_of_the_photo() {
+fn photo_loss_equals_its_mirror() {
     for (seed, width, height) in [(91, 61, 45), (92, 70, 133)] {
         let Some(turn) = device() else { return };
         let shape = Shape { gaussians: 150, width, height, ..Shape::default() };

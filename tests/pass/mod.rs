@@ -1,8 +1,9 @@
-//! Every pass on the device against its mirror in f64, each comparison repeated with every constant that bears on it
-//! changed: then it must fail.
+//! Every pass on the device against its mirror in f64. Each comparison is repeated with every relevant constant
+//! changed, and must fail then.
 //!
-//! A mirror gets what the device's pass got (downloaded, widened to f64), so that tolerances measure one pass at a time;
-//! `step` compares the whole chain. Tolerances are 1.5 times the worst value seen on lavapipe, written beside them.
+//! A mirror gets the inputs of the device's pass (downloaded, widened to f64), so tolerances measure one pass at a
+//! time; `step` compares the whole chain. Tolerances are 1.5 times the largest error on lavapipe, which is written
+//! beside them.
 
 mod blend;
 pub mod fixture;

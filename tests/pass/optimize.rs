@@ -17,9 +17,9 @@ fn states(fixture: &mut Fixture) -> Vec<Optimised> {
     (0..count).map(|i| Optimised { row: rows[i], m: m[i], u: u[i] }).collect()
 }
 
-/// Five steps, each from the state that the device had before it.
+/// Five steps, each from the previous state of the device.
 #[test]
-fn adam_of_every_attribute() {
+fn adam_of_every_attribute_equals_its_mirror() {
     let Some(turn) = device() else { return };
     let mut fixture = Fixture::new(turn, scene(101, &Shape { gaussians: 60, ..Shape::default() }), true);
     fixture.fixed = SceneScale { extent: 4.0 };
@@ -71,18 +71,18 @@ fn densify_case(step: u32, bearing: &[&str]) {
 }
 
 #[test]
-fn densify_early() {
+fn early_densification_equals_its_mirror() {
     let bearing = ["densify_gradient", "percent_dense", "split_shrink", "prune_opacity", "prune_scale_after"];
     densify_case(600, &bearing);
 }
 
 #[test]
-fn densify_late_removes_the_huge() {
+fn late_densification_removes_huge_gaussians() {
     densify_case(3100, &["densify_gradient", "percent_dense", "split_shrink", "prune_opacity", "prune_scale"]);
 }
 
 #[test]
-fn opacity_reset_of_a_population() {
+fn opacity_reset_equals_its_mirror() {
     let Some(turn) = device() else { return };
     let before = population(120, 300);
     let mut fixture = Fixture::new(turn, scene_of(&before), true);

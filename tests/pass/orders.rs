@@ -27,7 +27,7 @@ fn engine(gpu: std::sync::Arc<labelgs::gpu::Gpu>) -> Engine {
     Engine::new(gpu, room, readable()).expect("the engine starts")
 }
 
-/// Records what `declare` says.
+/// Records the passes that `declare` adds.
 fn list(engine: &mut Engine, declare: impl FnOnce(&mut Builder)) -> ListId {
     let (shape, capacity): (KernelShape, Capacity) = (*engine.shape(), *engine.raw().capacity());
     let list = PassList::new("test");
@@ -37,7 +37,7 @@ fn list(engine: &mut Engine, declare: impl FnOnce(&mut Builder)) -> ListId {
     engine.raw_mut().prepare(&list).expect("the list is planned")
 }
 
-/// Says that there are so many Gaussians, splats and pairs.
+/// Sets the numbers of Gaussians, splats and pairs to `count`.
 fn announce(engine: &mut Engine, count: usize) {
     let count = count as u32;
     let uniforms = StepUniforms { gaussian_count: count, ..StepUniforms::zeroed() };
@@ -57,7 +57,7 @@ fn counters(engine: &mut Engine) -> Counters {
 const COUNTS: [usize; 7] = [0, 1, 7, 63, 64, 1000, ITEMS];
 
 #[test]
-fn scan_of_numbers() {
+fn scan_is_exact_and_saturates() {
     let Some(turn) = device() else { return };
     let mut engine = engine(turn.gpu());
     let id = list(&mut engine, |b| {
@@ -80,7 +80,7 @@ fn scan_of_numbers() {
 }
 
 #[test]
-fn scan_of_visible_keys() {
+fn scan_of_visible_keys_is_exact() {
     let Some(turn) = device() else { return };
     let mut engine = engine(turn.gpu());
     let id = list(&mut engine, |b| scan::scan_visible(b, Buf::DEPTH_KEYS, Buf::VISIBLE_OFFSETS));
@@ -100,13 +100,13 @@ fn scan_of_visible_keys() {
 
 /// All 32 bits, few different keys (equal ones must keep their order), and one key.
 #[test]
-fn sort_of_keys_and_values() {
+fn sort_of_keys_and_values_is_exact_and_stable() {
     let Some(turn) = device() else { return };
     let cases = [(ITEMS, u32::MAX), (ITEMS, 3), (ITEMS, 1), (1000, 300), (9, 4), (1, 9), (0, 1)];
     sort_exactly(&mut engine(turn.gpu()), &cases);
 }
 
-/// Sorts so many keys of so many different ones.
+/// Sorts keys and compares. Cases are (number of keys, number of distinct keys).
 fn sort_exactly(engine: &mut Engine, cases: &[(usize, u32)]) {
     let buffers = SortBuffers {
         keys: [Buf::DEPTH_KEYS_A, Buf::DEPTH_KEYS_B],
@@ -133,7 +133,7 @@ fn sort_exactly(engine: &mut Engine, cases: &[(usize, u32)]) {
 
 /// As many lanes as 33 million pairs have: the scan of their histogram stays below lavapipe's 65,535 rounds.
 #[test]
-fn sort_with_the_lanes_of_a_large_scene() {
+fn sort_with_the_lanes_of_a_large_scene_is_exact() {
     let Some(turn) = device() else { return };
     let mut engine = engine(turn.gpu());
     let (subgroup, digit_bits) = (u64::from(engine.shape().subgroup), engine.shape().digit_bits);
@@ -145,7 +145,7 @@ fn sort_with_the_lanes_of_a_large_scene() {
 
 /// From one pass of the sort to all that 32 bits take; the values are the places before the sort.
 #[test]
-fn sort_of_places_by_some_bits() {
+fn sort_by_some_bits_is_exact() {
     let Some(turn) = device() else { return };
     let mut engine = engine(turn.gpu());
     let mut random = generator(74);

@@ -26,9 +26,9 @@ pub fn wide_scene(seed: u64, sh_degree: u32) -> Scene {
     s
 }
 
-/// The device drops nothing that counts, and keeps nothing at or behind the near plane or too faint.
+/// The device drops no visible Gaussian, and keeps none that is behind the near plane or too faint.
 #[test]
-fn visible_gaussians_in_depth_order() {
+fn visible_gaussians_come_in_depth_order() {
     let Some(turn) = device() else { return };
     let mut fixture = Fixture::new(turn, wide_scene(11, 3), false);
     let report = fixture.train();
@@ -71,7 +71,7 @@ fn visible_gaussians_in_depth_order() {
 }
 
 #[test]
-fn project_forward_of_each_degree() {
+fn project_forward_of_each_degree_equals_its_mirror() {
     for sh_degree in 0..=3 {
         let Some(turn) = device() else { return };
         let mut fixture = Fixture::new(turn, wide_scene(20 + u64::from(sh_degree), sh_degree), false);
@@ -99,7 +99,7 @@ const BOUNDS: GradientBounds = GradientBounds {
 };
 
 #[test]
-fn project_backward_of_each_degree() {
+fn project_backward_of_each_degree_equals_its_mirror() {
     for sh_degree in [3, 1] {
         let Some(turn) = device() else { return };
         let mut fixture = Fixture::new(turn, wide_scene(30 + u64::from(sh_degree), sh_degree), false);

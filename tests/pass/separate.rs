@@ -16,8 +16,8 @@ use labelgs::io::initial_gaussians;
 use labelgs::run::{LabelRule, TrainConfig};
 use labelgs::synth::{Preset, SynthOptions, dataset};
 
-/// Both are f32 sums of the same terms, scene and object apart or together: what is left is rounding, which large terms
-/// of opposite sign make more of. 0.67 of the bounds seen, by element and as a whole.
+/// Both are f32 sums of the same terms in different order, so they differ by rounding, more so for large terms of
+/// opposite sign. 0.67 of the bounds seen, by element and as a whole.
 const BOUNDS: GradientBounds = GradientBounds {
     element: Tolerance { absolute: 3e-7, relative: 6e-6 },
     outliers: 0.0,
@@ -48,7 +48,7 @@ fn gradient_rows(fixture: &mut Fixture, report: &Report) -> Vec<Row> {
 }
 
 #[test]
-fn gradients_are_those_of_one_traversal() {
+fn separate_passes_give_the_gradients_of_one_traversal() {
     for (seed, objects, lift) in [(62, 3, LabelRule::Main), (64, 5, LabelRule::Votes), (65, 1, LabelRule::Main)] {
         let Some(turn) = device() else { return };
         let shape = Shape { gaussians: 120, objects, width: 61, height: 45, ..Shape::default() };
@@ -79,16 +79,16 @@ fn gradients_are_those_of_one_traversal() {
         let summary = check("gradients", judge::rows(&actual, &expected, degree, BOUNDS));
         println!("{objects} objects: {:.3}, as a whole {:.3} of the tolerance", summary.worst, summary.whole);
         check("labels", exact(&fixture.get::<u32>(Buf::LABELS, count), &labels));
-        // The statistic is the scene's: it is summed up alike.
+        // The statistic comes from the scene alone, so its order of sums is the same.
         check("statistics", exact(&fixture.get::<u32>(Buf::DENSIFY_STATS, 2 * count), &statistics));
         // One update of Adam: its first moments are linear in the gradient, where parameters take its sign.
         check("moments", judge::rows(&fixture.rows(MOMENTS_1, count), &moments, degree, BOUNDS));
     }
 }
 
-/// An object pass must not take the records that the scene or another object left in its slots.
+/// An object pass must not read records that the scene or another object left in its slots.
 #[test]
-fn a_hidden_object_gets_no_gradient_of_others() {
+fn a_hidden_object_gets_no_gradient_from_others() {
     let Some(turn) = device() else { return };
     let shape = Shape { gaussians: 200, opacities: (2.0, 8.0), ..Shape::default() };
     let mut fixture = Fixture::new(turn, scene(66, &shape), true);
@@ -102,7 +102,7 @@ fn a_hidden_object_gets_no_gradient_of_others() {
 }
 
 #[test]
-fn a_short_training_stays_close() {
+fn a_short_training_with_separate_passes_stays_close() {
     let Some(turn) = device() else { return };
     let options = SynthOptions { preset: Preset::Simple, width: 72, height: 52, views: 5, points: 400, seed: 3 };
     let run = |separate: bool, small: bool| -> Vec<StepReport> {
@@ -126,7 +126,7 @@ fn a_short_training_stays_close() {
     let losses = |reports: &[StepReport]| reports.iter().map(|r| r.loss + r.label_loss).collect::<Vec<_>>();
     let (together, apart, grown) = (run(false, false), run(true, false), run(true, true));
     assert!(together.iter().any(|report| report.label_loss > 0.0));
-    // Adam makes a whole step of a gradient of any size, so that rounding near 0 grows; 4e-5 seen after 30 steps.
+    // Adam normalises gradients of any size, so rounding near 0 grows; 4e-5 seen after 30 steps.
     check("losses", close(&losses(&apart), &losses(&together), Tolerance { absolute: 0.0, relative: 1e-3 }));
     check("with growing buffers", exact(&losses(&grown), &losses(&apart)));
 }

@@ -51,21 +51,21 @@ fn named(families: &[Family], without: &[&str]) -> Vec<&'static str> {
 const ALL: [Family; 4] = [Family::Project, Family::Sh, Family::Blend, Family::Loss];
 
 #[test]
-fn whole_step() {
-    // Nothing in this scene is near a Jacobian's clamp; without labels no label weight bears.
+fn gradients_of_a_step_equal_the_mirror() {
+    // No splat is near the clamp of the Jacobian, and label weights have no effect without labels.
     let bearing = named(&ALL, &["label_weight", "label_alpha", "jacobian_margin"]);
     case("whole step", 61, &Shape { gaussians: 120, ..Shape::default() }, false, &bearing);
 }
 
 #[test]
-fn whole_step_with_labels() {
-    // Beside the gradients of the label losses, those of C1 are too small to be seen.
+fn gradients_of_a_step_with_labels_equal_the_mirror() {
+    // Gradients of the label losses outweigh those of C1.
     let bearing = named(&ALL, &["jacobian_margin", "ssim_c1"]);
     case("whole step with labels", 62, &Shape { gaussians: 120, ..Shape::default() }, true, &bearing);
 }
 
 #[test]
-fn whole_step_of_opaque_gaussians() {
+fn gradients_of_a_step_on_opaque_gaussians_equal_the_mirror() {
     let shape = Shape { gaussians: 200, width: 61, height: 45, opacities: (-3.0, 9.0), ..Shape::default() };
     case("whole step, opaque", 63, &shape, true, &["alpha_max", "transmittance_min", "alpha_min", "dilation"]);
 }

@@ -13,7 +13,7 @@ use labelgs::internals::scheduler::plan::Buf;
 const SLACK: f64 = 0.02;
 
 #[test]
-fn tiles_of_splats_and_lists_of_tiles() {
+fn tile_lists_equal_their_mirror() {
     let Some(turn) = device() else { return };
     let mut fixture = Fixture::new(turn, opaque_scene(81), true);
     let counters = fixture.train().counters;

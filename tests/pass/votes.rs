@@ -1,4 +1,4 @@
-//! Votes for labels: the sums of a sweep against the mirror, whatever the number of columns and walks.
+//! Votes for labels: the sums of a sweep against the mirror, for any number of columns and walks.
 
 use super::fixture::{Fixture, VOTE_COLUMNS, prove};
 use crate::reference::Rules;
@@ -28,7 +28,7 @@ fn mask_of(s: &Scene) -> LabelMap {
 }
 
 #[test]
-fn sums_of_weights_by_label() {
+fn vote_sums_equal_the_mirror() {
     let Some(turn) = device() else { return };
     let mut fixture = Fixture::new(turn, patches(141), true);
     fixture.render();
@@ -58,7 +58,7 @@ fn sums_of_weights_by_label() {
 }
 
 #[test]
-fn pixels_near_a_contour_have_no_say() {
+fn pixels_near_a_contour_do_not_vote() {
     let Some(turn) = device() else { return };
     let mut fixture = Fixture::new(turn, patches(142), true);
     fixture.render();

@@ -1,4 +1,4 @@
-//! Each benchmark's files, written here, scored with a known result.
+//! Files of each benchmark, written here, with a known score.
 
 use super::{Columns, columns_file, layout, run_on};
 use labelgs::eval::protocol::{By, Prompt, Protocol};
@@ -19,7 +19,7 @@ fn labelgs_takes_the_first_frame_as_the_prompt() {
             .expect("scored");
     assert_eq!(found.objects["red cup"].labels, [1, 4]);
     assert_eq!(found.views.keys().collect::<Vec<_>>(), ["05", "09"], "the prompt is no test");
-    // Two columns found; three are true, then four.
+    // Two columns found; the ground truth has three, then four.
     assert_eq!(found.views["05"]["red cup"].iou, Some(2.0 / 3.0));
     assert_eq!(found.views["09"]["red cup"].iou, Some(0.5));
     assert_eq!(found.views["05"]["red cup"].accuracy, Some(7.0 / 8.0));

@@ -1,4 +1,4 @@
-//! LPIPS with made weights whose answer can be worked out.
+//! LPIPS with weights for which the distance is known.
 
 use labelgs::internals::cli::status::exit_status;
 use labelgs::internals::eval::lpips::convolution::{Layer, Planes, convolve, halve};
@@ -92,7 +92,7 @@ fn the_distance_of_plain_pictures_by_hand() {
 }
 
 #[test]
-fn weights_that_are_not_there_are_named() {
+fn missing_weights_are_named() {
     let folder = tempdir().expect("folder");
     let file = folder.path().join("weights.safetensors");
     write_weights(&file, "features.14.bias");

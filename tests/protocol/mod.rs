@@ -1,4 +1,4 @@
-//! Benchmarks: each layout with a known result, absent predictions, the published scorers' ways, broken inputs.
+//! Benchmarks: each layout with a known score, missing predictions, rules of the published scorers, broken inputs.
 
 mod layouts;
 mod lpips;
@@ -23,8 +23,8 @@ use std::path::Path;
 /// Width and height of every picture, px.
 const SIDE: usize = 8;
 
-/// A scene of labels in columns: pixel (x, y) has the label of its column, in every view. Objects have the colour of the
-/// photo, which is 0.8 grey; a label of `dark` is opaque and black.
+/// A scene of labels in columns: pixel (x, y) has the label of its column, in every view. Objects have the colour of
+/// the photo, which is 0.8 grey; a label of `dark` is opaque and black.
 pub struct Columns {
     /// Label of each column.
     pub labels: [u16; SIDE],
@@ -86,7 +86,7 @@ pub fn layout(protocol: Protocol, truth: &Path, scene: &str, by: By) -> Result<L
     protocol.layout(&files_below(truth)?, classes.as_deref(), Ask { truth, scene, by })
 }
 
-/// Runs a benchmark on the views of these names, of which those from `test` on are held out.
+/// Runs a benchmark on views of these names; the views from index `test` on are held out.
 pub fn run_on(
     (protocol, compat, by): (Protocol, bool, By),
     truth: &Path,
@@ -115,7 +115,7 @@ pub fn run_on(
     run(&layout, &bench, &mut columns, &mut ())
 }
 
-/// What a failure says.
+/// Message of an error.
 pub fn message<T: std::fmt::Debug>(result: Result<T>) -> String {
     let error: Error = result.expect_err("it fails");
     assert_eq!(exit_status(&error), 3, "{error}");

@@ -1,4 +1,4 @@
-//! Broken inputs and what is said about them, without a device.
+//! Broken inputs and their messages, without a device.
 
 use super::{Columns, columns_file, layout, message, run_on};
 use assert_cmd::Command;

@@ -1,4 +1,4 @@
-//! What counts and what does not: absent predictions, empty selections, the published scorers' ways, the page.
+//! Rules of scoring: missing predictions, empty selections, variants of the published scorers, and the HTML page.
 
 use super::{Columns, columns_file, run_on, view};
 use labelgs::eval::protocol::{By, Protocol};

@@ -1,10 +1,10 @@
-//! Negative controls: what each mode of the validation layer is there for, it must find.
+//! Negative controls: each mode of the validation layer finds the error that it is for.
 
 use super::*;
 use crate::support::device::{NO_LAYER, layer_is_required};
 use labelgs::gpu::{Gpu, GpuOptions, Message, Validation};
 
-/// Messages of a device of its own in a mode; none where the layer is not installed.
+/// Messages of a new device in a mode, or `None` without the layer.
 fn messages(validation: Validation, list: &PassList) -> Option<Vec<Message>> {
     let gpu = Gpu::new(&GpuOptions { validation, ..GpuOptions::from_env().unwrap() }).unwrap();
     if !gpu.is_validated() {
@@ -20,7 +20,7 @@ fn messages(validation: Validation, list: &PassList) -> Option<Vec<Message>> {
     Some(log.messages())
 }
 
-// Says that it reads, and writes: nobody plans a barrier for that.
+// The declaration says that it reads, but it writes, so the planner leaves out a barrier.
 toy_shader!(
     liar,
     [],
@@ -40,7 +40,7 @@ toy_shader!(
 );
 
 #[test]
-fn a_missing_barrier_is_heard() {
+fn a_missing_barrier_is_reported() {
     let Some(turn) = device() else { return };
     let mut list = PassList::new("race");
     list.fill(A, 5);
@@ -48,14 +48,14 @@ fn a_missing_barrier_is_heard() {
     list.pass(scaled(A, B, 3, 1, 256)).copy(B, REPORT, 0);
     let Some(found) = messages(Validation::Sync, &list) else { return };
     assert!(found.iter().any(|message| message.is_error && message.id.contains("SYNC-HAZARD")), "{found:?}");
-    // The core alone is deaf to it: that is why there are modes.
+    // Core validation alone does not find it.
     let Some(found) = messages(Validation::On, &list) else { return };
     assert!(!found.iter().any(|message| message.id.contains("SYNC-HAZARD")), "{found:?}");
     drop(turn);
 }
 
 #[test]
-fn a_write_beyond_a_buffer_is_heard() {
+fn a_write_beyond_a_buffer_is_reported() {
     let Some(turn) = device() else { return };
     let mut list = PassList::new("beyond");
     list.pass(PassDecl::new(beyond(), vec![A], Grid::Groups(1, 1, 1)));

@@ -1,4 +1,4 @@
-//! Every failure of Vulkan that tests can ask for ends in an error, never in a crash or a hang.
+//! Every injected failure of Vulkan ends in an error, never in a crash or a hang.
 
 use super::*;
 use labelgs::internals::cli::status::exit_status;
@@ -6,7 +6,7 @@ use std::process::Command;
 
 const CHILD: &str = "LABELGS_FAULT_CHILD";
 
-/// Does a little of everything; a test of its own so that it can run in a process of its own.
+/// Uses all parts of the scheduler. It is a test so that the other tests can run it in a child process.
 #[test]
 fn child() {
     if std::env::var_os(CHILD).is_none() {
@@ -30,7 +30,7 @@ fn work() -> labelgs::Result<()> {
     scheduler.upload(MODEL, 0, 0, &ramp)?;
     if let Err(error) = scheduler.set_capacity(Capacity { gaussians: 200, ..pixels(512) }) {
         if exit_status(&error) == 5 {
-            // The model is as it was, and the old capacities still work.
+            // The model is unchanged and the old capacities still work.
             assert_eq!(scheduler.capacity(), &pixels(256));
             assert_eq!(scheduler.download_all::<u32>(MODEL, 0)?, ramp);
             let id = scheduler.prepare(&list)?;
@@ -91,7 +91,7 @@ fn failures_become_errors() {
     drop(turn);
 }
 
-/// Fails the first, second, third... call of a name, until there is none left; the outcomes.
+/// Fails the first, second, third... call of a name until there is none left, and returns the outcomes.
 fn outcomes(call: &str, result: &str) -> Vec<String> {
     let all = (1..200).map(|nth| outcome(&format!("{call}:{nth}:{result}")));
     all.take_while(|outcome| outcome != "done").collect()

@@ -19,7 +19,7 @@ fn ramp(count: u32) -> Vec<u32> {
 }
 
 #[test]
-fn memory_is_what_was_predicted() {
+fn allocated_memory_equals_the_prediction() {
     let Some(gpu) = device() else { return };
     let mut list = PassList::new("toy");
     list.fill(A, 5).pass(scaled(A, B, 3, 1, 5000)).copy(B, REPORT, 0);
@@ -92,7 +92,7 @@ fn a_larger_list_leaves_earlier_ones_usable() {
 }
 
 #[test]
-fn guards_see_a_write_behind_the_end() {
+fn guards_detect_a_write_beyond_the_end() {
     let Some(gpu) = device() else { return };
     let guarded = options(PlanOptions { guards: true, ..PlanOptions::default() });
     for (buf, name, count) in [(B, "b", 1000), (MODEL, "model", 100), (REPORT, "report", 1000)] {

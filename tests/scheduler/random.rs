@@ -1,10 +1,12 @@
-//! Random pass lists: whatever the plan shares and leaves out, the results are those of one item after another.
+//! Random pass lists: with any aliasing of memory and any barriers left out, results equal those of one item after
+//! another.
 
 use super::*;
 use rand::rngs::SmallRng;
 use rand::{Rng, SeedableRng};
 
-// Each element needs a far one, so that a pass that starts too early, or scratch that is reused too early, shows.
+// Each element reads a distant one, so a pass that starts too early, or scratch that is reused too early, changes
+// results.
 toy_shader!(
     shift,
     [("BY", 0, 0), ("COUNT", 1, 0)],

@@ -85,7 +85,7 @@ fn an_earlier_pass_writes_the_grid_of_a_later() {
 fn lists_run_in_the_order_of_their_submits() {
     let Some(gpu) = device() else { return };
     let mut scheduler = Scheduler::new(gpu.gpu(), TABLE, pixels(100_000), SchedulerOptions::default()).unwrap();
-    // Both lists use the same bytes of scratch, and hand over through `model`.
+    // Both lists use the same bytes of scratch and pass data through `model`.
     let lists = [(2, 1), (3, 0)].map(|(factor, term)| {
         let mut list = PassList::new(format!("times {factor}"));
         list.copy(MODEL, A, 0);

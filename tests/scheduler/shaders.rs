@@ -1,4 +1,4 @@
-//! What shaders are given: texels, constants, subgroups; and what the validation layer says.
+//! Inputs of shaders (texels, constants, subgroups) and messages of the validation layer.
 
 use super::*;
 use crate::support::device::options as gpu_options;
@@ -59,7 +59,7 @@ fn buffers_can_be_read_as_texels() {
     let capacity = Capacity { gaussians: 128, ..pixels(128) };
     let mut scheduler = Scheduler::new(gpu.gpu(), TABLE, capacity, SchedulerOptions::default()).unwrap();
     let mut list = PassList::new("texels");
-    // A scratch buffer that does not lie at the start of its page.
+    // A scratch buffer with an offset in its page.
     list.fill(A, 1).copy(MODEL, B, 0);
     list.pass(PassDecl::new(fetch(), vec![B, PLANES, FLOATS, C], Grid::Groups(2, 1, 1)));
     list.pass(PassDecl::new(twice(), vec![C, C], Grid::Groups(2, 1, 1)));
@@ -117,9 +117,9 @@ fn devices_are_chosen_by_name_index_and_uuid() {
     assert_eq!(listed.needs, found.needs);
 }
 
-/// The negative control of all other tests: what the layer says is heard.
+/// Negative control of all other tests: messages of the layer arrive.
 #[test]
-fn the_validation_layer_is_heard() {
+fn messages_of_the_validation_layer_are_recorded() {
     let Some(mut gpu) = device() else { return };
     if !gpu.is_validated() {
         eprintln!("skipped: the validation layer is not installed or off");

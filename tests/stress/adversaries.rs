@@ -1,7 +1,7 @@
 //! Adversarial models on the device against float64, from the model to the picture and the gradient.
 //!
-//! Bounds are some five times what lavapipe shows: f32 rounds by 6e-8, exponents of about 5 add their roundings, and a
-//! pixel sums tens of such terms. Where a scene loses more, it says why.
+//! Bounds are about five times the errors on lavapipe: f32 rounds by 6e-8, exponents of about 5 add their rounding
+//! errors, and a pixel sums tens of such terms. A scene with a larger bound gives the reason.
 
 use crate::pass::fixture::Fixture;
 use crate::reference::model::flatten;
@@ -15,15 +15,15 @@ use labelgs::scene::Gaussians;
 struct Bound {
     /// Largest error of a colour where no decision (cut, stop, order) is near, and its reason.
     colour: f64,
-    /// Largest relative error in norm of the gradient of a kind of parameter, over the Gaussians of which all decisions
-    /// are sure, or over all where hardly any are.
+    /// Largest relative error in norm of the gradient of a kind of parameter, over the Gaussians without a decision
+    /// near its threshold, or over all Gaussians where few are left.
     gradient: f64,
 }
 
-/// Decisions nearer than this may fall either way.
+/// A decision nearer to its threshold than this may go either way.
 const MARGIN: f64 = 1e-4;
 
-/// Runs a step and compares; prints what was seen.
+/// Runs a step, compares, and prints the errors.
 fn holds(name: &str, scene: Scene, labels: bool, bound: Bound) {
     let Some(turn) = device() else { return };
     let mut fixture = Fixture::new(turn, scene, labels);
@@ -47,7 +47,7 @@ fn holds(name: &str, scene: Scene, labels: bool, bound: Bound) {
     }
     let mut sure: Vec<usize> = (0..actual.len()).filter(|&i| expected.margins[i] > MARGIN).collect();
     if sure.len() * 4 < actual.len() {
-        // Every splat is at its cut somewhere; then a flip there is part of the bound.
+        // Every splat reaches its cut somewhere, so the bound includes flips there.
         sure = (0..actual.len()).collect();
     }
     let pick = |rows: &[crate::reference::Row]| sure.iter().map(|&i| rows[i]).collect::<Vec<_>>();
@@ -89,31 +89,31 @@ fn small() -> Shape {
     Shape { gaussians: 80, ..Shape::default() }
 }
 
-/// 1e6 : 1 in every rotation. The conic's small eigenvalue is 1e-6 of the large one, so that the exponent is a small
+/// Axes of 1e6 : 1 in every rotation. The conic's small eigenvalue is 1e-6 of the large one, so the exponent is a small
 /// difference of terms ten times as large.
 #[test]
-fn needles() {
+fn needles_stay_within_the_bound() {
     let made = changed(201, small(), |row, g| g.scales[row] = [0.0, (1e-6_f32).ln(), (1e-6_f32).ln()]);
     holds("needles", made, true, Bound { colour: 5e-5, gradient: 1.1e-4 });
 }
 
-/// Flat discs of which one axis is smaller than any float of a position.
+/// Flat discs with one axis below the f32 spacing of positions.
 #[test]
-fn discs() {
+fn discs_stay_within_the_bound() {
     let made = changed(202, small(), |row, g| g.scales[row] = [-1.0, -1.5, -30.0]);
     holds("discs", made, true, Bound { colour: 5e-6, gradient: 1.1e-5 });
 }
 
 /// Far below a pixel: the blur alone makes the splat.
 #[test]
-fn points() {
+fn points_stay_within_the_bound() {
     let made = changed(203, small(), |row, g| g.scales[row] = [-15.0, -14.0, -13.0]);
     holds("points", made, true, Bound { colour: 1.1e-5, gradient: 2e-5 });
 }
 
 /// Larger than the scene: every pixel sees the middle of every splat.
 #[test]
-fn giants() {
+fn giants_stay_within_the_bound() {
     let made = changed(204, small(), |row, g| {
         g.scales[row] = [6.0, 7.0, 5.0];
         g.opacities[row] = -3.0;
@@ -121,9 +121,9 @@ fn giants() {
     holds("giants", made, false, Bound { colour: 5e-6, gradient: 1.1e-5 });
 }
 
-/// Rotations of any length that f32 squares.
+/// Quaternions of any length whose square fits f32.
 #[test]
-fn rotations_of_any_length() {
+fn rotations_of_any_length_stay_within_the_bound() {
     let made = changed(205, small(), |row, g| {
         let length = [1e-15_f32, 1e-6, 1.0, 1e6, 1e15][row % 5];
         g.quats[row] = g.quats[row].map(|v| v * length);
@@ -131,18 +131,18 @@ fn rotations_of_any_length() {
     holds("rotations of any length", made, true, Bound { colour: 5e-6, gradient: 1.1e-5 });
 }
 
-/// Rotations of which f32 squares nothing, or no float, are still rotations. The gradient of one of length 1e-20 is 1e20
-/// times as large as of one of length 1, and what is beyond 1e18 is dropped: all of it is missing, nothing is wrong.
+/// Quaternions whose square overflows or underflows f32 are still rotations. At length 1e-20 the gradient is 1e20 times
+/// as large as at length 1. Gradients beyond 1e18 are dropped, so it is missing but never wrong.
 #[test]
-fn rotations_that_cannot_be_squared() {
+fn rotations_whose_square_overflows_stay_within_the_bound() {
     let of_length = |length: f32| changed(213, small(), |row, g| g.quats[row] = g.quats[row].map(|v| v * length));
     holds("rotations of 1e20", of_length(1e20), true, Bound { colour: 5e-6, gradient: 1.1e-5 });
     holds("rotations of 1e-20", of_length(1e-20), true, Bound { colour: 5e-6, gradient: 1.0 });
 }
 
-/// A rotation of length 0 is none: the projection is not a number, the Gaussian has no splat, and is counted.
+/// A quaternion of length 0 projects to NaN: the Gaussian has no splat and is counted.
 #[test]
-fn rotations_of_length_zero() {
+fn rotations_of_length_zero_are_counted_and_not_drawn() {
     let Some(turn) = device() else { return };
     let made = changed(214, small(), |row, g| {
         if row % 8 == 0 {
@@ -159,10 +159,10 @@ fn rotations_of_length_zero() {
     assert!(image.iter().flatten().all(|value| value.is_finite()));
 }
 
-/// As small as a logarithm makes them, and so large that squares of squares are just floats. Nothing clamps scales; those
-/// beyond are counted and not drawn (`sentinel`).
+/// The smallest scales, and scales whose fourth power just fits f32. Scales are not clamped; Gaussians with larger ones
+/// are counted and not drawn (`sentinel`).
 #[test]
-fn scales_at_both_ends_of_floats() {
+fn scales_at_both_limits_of_f32_stay_within_the_bound() {
     let made = changed(215, small(), |row, g| {
         g.scales[row] = if row % 2 == 0 { [-44.0; 3] } else { [18.0, 17.0, 19.0] };
         g.opacities[row] = -3.0;
@@ -170,19 +170,19 @@ fn scales_at_both_ends_of_floats() {
     holds("scales at both ends", made, true, Bound { colour: 5e-6, gradient: 1.1e-5 });
 }
 
-/// One pixel wide, one high, and one in all: its gradient by scales is 4e-4 in norm, off by 2e-8, which is what f32 rounds
-/// the terms by that it is the small difference of.
+/// One pixel wide, one pixel high, and a single pixel. The last one's gradient by scales is 4e-4 in norm and off by
+/// 2e-8: it is a small difference of terms, and 2e-8 is their rounding error in f32.
 #[test]
-fn pictures_of_one_pixel() {
+fn pictures_of_one_pixel_stay_within_the_bound() {
     for (width, height, gradient) in [(1, 17, 1.1e-5), (17, 1, 1.1e-5), (1, 1, 2.2e-4)] {
         let made = scene(216, &Shape { width, height, ..small() });
         holds(&format!("{width} x {height} px"), made, true, Bound { colour: 5e-6, gradient });
     }
 }
 
-/// Opacities from nothing to all: logits of 15 are 3e-7 from 1, those of 100 are 1.
+/// Opacities from 0 to 1: a logit of 15 is 3e-7 below 1, a logit of 100 rounds to 1.
 #[test]
-fn opacities_at_their_ends() {
+fn opacities_at_their_limits_stay_within_the_bound() {
     let made = changed(206, small(), |row, g| g.opacities[row] = [-100.0, -15.0, -5.5, 0.0, 15.0, 100.0][row % 6]);
     holds("opacities at their ends", made, true, Bound { colour: 5e-6, gradient: 1.1e-5 });
 }
@@ -204,31 +204,31 @@ fn stack(count: usize, opacity: f64, depth: impl Fn(usize) -> f32) -> Scene {
     made
 }
 
-/// 2,000 layers of alpha 0.01: transmittance is a product of as many factors, and is divided again going back.
+/// 2,000 layers of alpha 0.01: transmittance is a product of 2,000 factors, and the backward pass divides by each.
 #[test]
-fn two_thousand_faint_layers() {
+fn two_thousand_faint_layers_stay_within_the_bound() {
     let made = stack(2000, 0.01, |i| 4.0 + i as f32 * 1e-3);
     holds("2,000 faint layers", made, true, Bound { colour: 5e-6, gradient: 1.1e-5 });
 }
 
-/// Every alpha at its clamp: two layers leave T at 1e-4 but for rounding, which is just where a pixel stops. It may stop a
-/// layer later, which has a ten-thousandth of the weight.
+/// Every alpha at its clamp: two layers leave a transmittance of 1e-4 up to rounding, exactly where a pixel stops. The
+/// pixel may stop one layer later, and that layer has a ten-thousandth of the weight.
 #[test]
-fn layers_at_the_clamp() {
+fn layers_at_the_clamp_stay_within_the_bound() {
     let made = stack(60, 0.9999, |i| 4.0 + i as f32 * 1e-2);
     holds("layers at the clamp", made, true, Bound { colour: 5e-6, gradient: 1e-3 });
 }
 
-/// Equal depths: the order is that of the rows, there as here.
+/// Equal depths: device and mirror both keep the order of rows.
 #[test]
-fn ties_of_depth() {
+fn ties_of_depth_stay_within_the_bound() {
     let made = stack(400, 0.05, |_| 5.0);
     holds("ties of depth", made, true, Bound { colour: 5e-6, gradient: 1.1e-5 });
 }
 
-/// Centres on the near plane, one float before and behind it, and large splats across it.
+/// Centres on the near plane and one f32 before and behind it, and large splats across it.
 #[test]
-fn across_the_near_plane() {
+fn splats_across_the_near_plane_stay_within_the_bound() {
     let near = 0.2_f32;
     let depths = [near, f32::from_bits(near.to_bits() + 1), f32::from_bits(near.to_bits() - 1), -1.0, 0.21, 0.5];
     let mut made = stack(120, 0.3, |i| if i % 2 == 0 { depths[i / 2 % 6] } else { 4.0 + i as f32 * 0.01 });
@@ -238,7 +238,7 @@ fn across_the_near_plane() {
 
 /// Fields of view of 170 and of 1 degree.
 #[test]
-fn wide_and_narrow_cameras() {
+fn wide_and_narrow_cameras_stay_within_the_bound() {
     for (name, degrees) in [("170 degrees", 170.0_f64), ("1 degree", 1.0)] {
         let mut made = scene(209, &small());
         let focal = 24.0 / (degrees.to_radians() / 2.0).tan();
@@ -249,7 +249,7 @@ fn wide_and_narrow_cameras() {
 
 /// Harmonics of 1e6: colours far beyond any photo, negative ones clamped to 0.
 #[test]
-fn harmonics_that_overflow_a_photo() {
+fn harmonics_beyond_photo_colours_stay_within_the_bound() {
     let made = changed(210, small(), |row, g| {
         let rest = g.rest_per_gaussian();
         g.sh0[row] = [1e6, -1e6, 1.0];
@@ -258,10 +258,10 @@ fn harmonics_that_overflow_a_photo() {
     holds("harmonics of 1e6", made, true, Bound { colour: 2.0, gradient: 1.1e-5 });
 }
 
-/// Harmonics of 3e38: sums that are floats are colours, whose gradients are beyond all bounds and dropped; sums that are
-/// none have no splat. Both are counted, and no number of the step is lost.
+/// Harmonics of 3e38: a finite sum is a colour, and its gradient overflows and is dropped. A sum that overflows has no
+/// splat. Both are counted, and every other number of the step stays finite.
 #[test]
-fn harmonics_that_overflow_floats() {
+fn harmonics_that_overflow_f32_are_counted_and_leave_no_nan() {
     let Some(turn) = device() else { return };
     let made = changed(217, small(), |row, g| {
         let rest = g.rest_per_gaussian();
@@ -281,9 +281,9 @@ fn harmonics_that_overflow_floats() {
     assert!(fixture.gradient_rows().iter().flat_map(|row| row.floats()).all(f64::is_finite));
 }
 
-/// Masks of everything and of nothing, and the smallest and the largest label.
+/// A mask of the whole picture, an empty mask, and the smallest and the largest label.
 #[test]
-fn masks_and_labels_at_their_ends() {
+fn masks_and_labels_at_their_limits_stay_within_the_bound() {
     for (name, id) in [("a mask of everything", 1_u32), ("the largest label", 65_535)] {
         let mut made = scene(211, &Shape { objects: 1, ..small() });
         made.target.label_map.fill(id);

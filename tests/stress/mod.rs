@@ -1,4 +1,4 @@
-//! Scenes that are made to break arithmetic, each with the bound that it is held to and why.
+//! Scenes that strain f32 arithmetic, each with an error bound and its reason.
 
 mod adversaries;
 mod places;

@@ -13,7 +13,7 @@ use labelgs::scene::{Dataset, Gaussians, View};
 use labelgs::synth::{Preset, SynthOptions, dataset};
 use std::sync::Arc;
 
-/// Where UTM puts a place in Bavaria, m.
+/// UTM coordinates of a place in Bavaria, m.
 const UTM: DVec3 = DVec3::new(691_607.25, 5_334_760.5, 519.0);
 
 fn scene(scale: f64, offset: DVec3) -> Dataset {
@@ -73,9 +73,8 @@ fn scenes_of_any_size_and_place_train_alike() {
     }
 }
 
-/// The same model, before any training, looks the same at any size and anywhere: 70 dB between the pictures are a thousandth
-/// of a colour in each pixel, and mostly that some splat ends a pixel earlier. Training goes its own way from there, see
-/// above.
+/// Before training, the model looks the same at any scale and place. 70 dB between pictures is an error of 0.001 per
+/// colour, mostly from splats that end one pixel earlier. Training amplifies such differences, see above.
 #[test]
 fn pictures_are_the_same_at_any_size_and_place() {
     let Some(turn) = device() else { return };
@@ -106,7 +105,7 @@ fn pictures_are_the_same_at_any_size_and_place() {
     }
 }
 
-/// What is saved is in world coordinates, and read back to the same picture.
+/// A saved model is in world coordinates and renders to the same picture after reading.
 #[test]
 fn far_models_are_saved_without_loss() {
     let Some(turn) = device() else { return };
@@ -127,12 +126,12 @@ fn far_models_are_saved_without_loss() {
     engine.upload_model(&read).expect("the model");
     let after = psnr(&mut engine, near, &scene(1.0, UTM).train[0]);
     assert!((after - before).abs() < 0.01, "{after:.4} and {before:.4} dB");
-    // A part of it stays where it is.
+    // An extracted part keeps its place.
     let part = read.filtered(|row| row % 5 == 0);
     assert_eq!(part.world(1), read.world(5));
 }
 
-/// Models near the origin are written as everybody writes them.
+/// Models near the origin are written with f32 positions, as in other programs.
 #[test]
 fn near_models_have_floats() {
     let folder = tempfile::tempdir().expect("a folder");

@@ -1,12 +1,12 @@
 //! The device of the test process.
 //!
-//! One device for all tests, lent to one test at a time: `device()` holds a lock until its result is dropped. A software
-//! device uses all cores by itself, so turns cost little, and a message of the validation layer belongs to the test
-//! whose turn it is. Dropping the turn fails the test if the layer said anything.
+//! All tests share one device, one test at a time: `device()` holds a lock until its result is dropped. A software
+//! device uses all cores by itself, so taking turns costs little, and each message of the validation layer belongs to
+//! one test. Dropping the turn fails the test if the layer reported anything.
 //!
 //! Without a device, tests that call `device()` return early with a message on stderr; with `LABELGS_REQUIRE_VULKAN=1`
-//! they fail instead. `LABELGS_DEVICE` chooses a device, `LABELGS_VALIDATION` (`off`, `on`, `sync`, `gpu`) what the layer
-//! checks, if it is installed (with `LABELGS_REQUIRE_VALIDATION=1` it has to be); `sync` unless given.
+//! they fail instead. `LABELGS_DEVICE` chooses a device, `LABELGS_VALIDATION` (`off`, `on`, `sync`, `gpu`; default
+//! `sync`) what the layer checks, if it is installed. `LABELGS_REQUIRE_VALIDATION=1` requires it.
 
 use labelgs::gpu::{Gpu, GpuOptions, Validation};
 use std::ops::Deref;
@@ -14,7 +14,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
 
 static TURN: Mutex<()> = Mutex::new(());
 
-/// Weak, so that the device is destroyed (and its leaks found) when nobody needs it, not in the middle of `exit`.
+/// Weak, so that the last user destroys the device and finds its leaks, rather than `exit`.
 static DEVICE: Mutex<Weak<Gpu>> = Mutex::new(Weak::new());
 
 /// A test's turn with the device.
@@ -30,7 +30,7 @@ impl Turn {
         Arc::clone(&self.gpu)
     }
 
-    /// A turn with a device that the caller opened himself.
+    /// A turn with a device that the caller opened.
     #[allow(dead_code)]
     pub fn with(gpu: Arc<Gpu>) -> Self {
         let turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
@@ -38,7 +38,7 @@ impl Turn {
         Self { gpu, messages_before, _turn: turn }
     }
 
-    /// Takes note of messages that were expected.
+    /// Takes the messages that a test expects.
     #[allow(dead_code)]
     pub fn forgive(&mut self) {
         self.messages_before = self.gpu.messages().len();
@@ -63,7 +63,7 @@ impl Drop for Turn {
     }
 }
 
-/// This test's turn with the device; none, with a message, if there is no device.
+/// Returns this test's turn with the device, or `None` and a message if there is no device.
 pub fn device() -> Option<Turn> {
     let turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
     let mut shared = DEVICE.lock().unwrap_or_else(PoisonError::into_inner);
@@ -88,7 +88,7 @@ pub fn options() -> GpuOptions {
     options
 }
 
-/// What to say where the layer is missing and must not be.
+/// Message for a missing validation layer that is required.
 pub const NO_LAYER: &str = "LABELGS_REQUIRE_VALIDATION=1 and the validation layer is not there";
 
 /// True if tests that need the validation layer may not be skipped.

@@ -1,4 +1,4 @@
-//! Memory that a piece of code asks for, by a counting allocator under the whole binary.
+//! Memory that a piece of code allocates, by a counting allocator of the whole binary.
 //!
 //! Counters belong to the thread, for tests run side by side. Readers that work on several threads are measured in a
 //! pool of one.
@@ -15,14 +15,14 @@ thread_local! {
 pub struct Counting;
 
 fn count(bytes: isize) {
-    // A thread that ends frees memory when its counters are gone.
+    // A thread that ends frees memory after its counters are gone.
     let _ = LIVE.try_with(|live| {
         live.set(live.get() + bytes);
         let _ = PEAK.try_with(|peak| peak.set(peak.get().max(live.get())));
     });
 }
 
-// SAFETY: every call is handed on as it came; counting allocates nothing.
+// SAFETY: every call goes unchanged to the system's allocator; counting allocates nothing.
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         count(layout.size() as isize);
@@ -45,7 +45,7 @@ unsafe impl GlobalAlloc for Counting {
     }
 }
 
-/// What `work` returns, and the most bytes that it had at once.
+/// Returns the result of `work` and its peak of allocated bytes.
 pub fn peak_of<T>(work: impl FnOnce() -> T) -> (T, usize) {
     let before = LIVE.get();
     PEAK.set(before);

@@ -1,4 +1,4 @@
-//! What the tests share: a device, memory counted, comparison predicates, small scenes, toy shaders.
+//! Helpers of the tests: a device, counted memory, comparison predicates, small scenes, toy shaders.
 
 pub mod compare;
 pub mod device;

@@ -1,4 +1,4 @@
-//! Runs of the tool on a small scene, and what they leave.
+//! Runs of the program on a small scene, and the files of such runs.
 
 use assert_cmd::Command;
 use labelgs::internals::io::checkpoint_folder;
@@ -55,7 +55,7 @@ impl Place {
         self.faulty(args, None)
     }
 
-    /// Runs the tool with a fault (src/fault.rs).
+    /// Runs the program with an injected fault (`src/lab/fault.rs`).
     pub fn faulty(&self, args: &[&str], fault: Option<&str>) -> Output {
         let mut command = Command::cargo_bin("labelgs").expect("the tool is built");
         command.env("LABELGS_VALIDATION", "off").env("LABELGS_CACHE", self.path("cache"));
@@ -106,7 +106,7 @@ impl Place {
     }
 }
 
-/// What was said.
+/// Standard error as text.
 pub fn stderr(output: &Output) -> String {
     String::from_utf8_lossy(&output.stderr).into_owned()
 }
@@ -139,12 +139,12 @@ pub fn copy(from: &Path, to: &Path) {
     }
 }
 
-/// How often a test kills; `LABELGS_TEST_KILLS` asks for more.
+/// Number of kills of a test; `LABELGS_TEST_KILLS` overrides it.
 pub fn kills(usual: u32) -> u32 {
     std::env::var("LABELGS_TEST_KILLS").ok().and_then(|kills| kills.parse().ok()).unwrap_or(usual)
 }
 
-/// Every file that a killed run left can be read by its name, but for temporary ones, which have another.
+/// Checks that every file of a killed run can be read, except temporary files.
 pub fn all_whole(out: &Path) {
     for path in files(out) {
         let name = path.file_name().expect("a name").to_string_lossy().into_owned();

@@ -4,7 +4,7 @@ use labelgs::gpu::{Gpu, GpuOptions, MessageLog};
 use labelgs::{Error, Result};
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// What the validation layer says of each device; outlives the device.
+/// Messages of the validation layer for each device; outlives the device.
 static LOGS: Mutex<Vec<MessageLog>> = Mutex::new(Vec::new());
 
 /// The device that LABELGS_DEVICE names, or the best.
@@ -14,7 +14,7 @@ pub fn open() -> Result<Arc<Gpu>> {
     Ok(gpu)
 }
 
-/// Fails if the validation layer said anything, up to the ends of the devices.
+/// Fails if the validation layer reported anything before the devices were destroyed.
 pub fn require_silence() -> Result<()> {
     let logs = LOGS.lock().unwrap_or_else(PoisonError::into_inner);
     let messages: Vec<_> = logs.iter().flat_map(MessageLog::messages).collect();

@@ -1,7 +1,12 @@
-//! Benchmarks: run time against error, and what a step, an object and a label cost.
+//! Benchmarks: run time against error, and the cost of a step, an object and a label.
 //!
 //! `tools/bench/run COMMAND` builds with optimisation and runs one of them. Each prints its tables and writes JSON and
 //! charts into `--output`. With `--small` it does the same in seconds on tiny scenes, as the tests run it.
+#![allow(
+    clippy::disallowed_methods,
+    clippy::too_many_lines,
+    reason = "the rules of files and lengths are those of the library"
+)]
 
 mod compiler;
 mod device;
@@ -29,12 +34,12 @@ use std::path::PathBuf;
 struct Arguments {
     #[command(subcommand)]
     command: Command,
-    /// What cargo hands to every benchmark.
+    /// Argument that cargo passes to every benchmark.
     #[arg(long, hide = true, global = true)]
     bench: bool,
 }
 
-/// What all benchmarks know.
+/// Options of all benchmarks.
 #[derive(clap::Args, Clone, Debug)]
 pub struct Common {
     /// Tiny scenes and few repetitions; times mean nothing then.
@@ -49,13 +54,13 @@ pub struct Common {
 enum Command {
     /// Time against error of every mode of the kernels.
     Kernels(kernels::KernelArgs),
-    /// What a step with labels costs beside one without, by covered area and number of objects.
+    /// Cost of a step with labels relative to one without, by covered area and number of objects.
     Steps(Common),
     /// One traversal for all objects against a pass for each, as in the paper's reference code.
     Paper(paper::Options),
     /// Quality against seconds of training, with and without labels, and the time to the first step.
     Training(training::Options),
-    /// How near each stage of a step comes to what the device could do, measured in the same run.
+    /// How near each stage of a step comes to the limit of the device, measured in the same run.
     Limits(Common),
     /// Predicted against measured memory of training.
     Memory(Common),

@@ -7,7 +7,7 @@ use std::fmt::Write as _;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-/// What a piece of work took.
+/// Time of a piece of work.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Cost {
     /// Wall clock, ms.
@@ -16,7 +16,7 @@ pub struct Cost {
     pub cpu: f64,
 }
 
-/// Runs `work` and says what it took.
+/// Runs `work` and returns its result and time.
 pub fn timed<T>(work: impl FnOnce() -> Result<T>) -> Result<(T, Cost)> {
     let (wall, cpu) = (Instant::now(), cpu_time());
     let done = work()?;
@@ -31,13 +31,13 @@ fn cpu_time() -> Duration {
     Duration::new(time.tv_sec.try_into().unwrap_or(0), time.tv_nsec.try_into().unwrap_or(0))
 }
 
-/// The system does not tell.
+/// Without a source of processor time.
 #[cfg(not(unix))]
 fn cpu_time() -> Duration {
     Duration::ZERO
 }
 
-/// The middle value, the mean of the two middle ones of an even number; NaN of nothing.
+/// Median; NaN for no values.
 pub fn median(values: impl IntoIterator<Item = f64>) -> f64 {
     let mut sorted: Vec<f64> = values.into_iter().collect();
     sorted.sort_by(f64::total_cmp);
@@ -53,12 +53,12 @@ pub fn median_cost(costs: &[Cost]) -> Cost {
     Cost { wall: median(costs.iter().map(|cost| cost.wall)), cpu: median(costs.iter().map(|cost| cost.cpu)) }
 }
 
-/// Average number of processes that wanted a processor in the last minute, if the system tells.
+/// Load average of the last minute, if the system reports it.
 pub fn load() -> Option<f64> {
     std::fs::read_to_string("/proc/loadavg").ok()?.split(' ').next()?.parse().ok()
 }
 
-/// Columns aligned to the right, the first to the left; the first row is the head.
+/// Formats a table: first row as head, first column aligned to the left, others to the right.
 pub fn table(rows: &[Vec<String>]) -> String {
     let columns = rows.iter().map(Vec::len).max().unwrap_or(0);
     let width = |column: usize| rows.iter().filter_map(|row| row.get(column)).map(|cell| cell.chars().count()).max();
@@ -83,14 +83,14 @@ pub fn write_json(path: &Path, value: &impl Serialize) -> Result<()> {
     write_text(path, &format!("{text}\n"))
 }
 
-/// Writes a text, and makes the folder that it goes into.
+/// Writes a text file and creates its folder.
 pub fn write_text(path: &Path, text: &str) -> Result<()> {
     atomic::write(path, |file| file.write_all(text.as_bytes()))?;
     println!("wrote {}", path.display());
     Ok(())
 }
 
-/// Fails with a message where something does not hold.
+/// Fails with a message unless a condition holds.
 pub fn require(holds: bool, otherwise: impl FnOnce() -> String) -> Result<()> {
     if holds { Ok(()) } else { Err(Error::Check(otherwise())) }
 }

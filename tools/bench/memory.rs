@@ -16,12 +16,12 @@ use serde_json::{Value, json};
 use std::process::Command;
 use std::sync::Arc;
 
-/// Prediction and measurement may differ by so much.
+/// Allowed difference between prediction and measurement.
 const TOLERANCE: f64 = 0.1;
 /// Steps of each training.
 const STEPS: u32 = 2;
 
-/// Measures each size in a process of its own, so that no size finds memory that another one left.
+/// Measures each size in a process of its own, so that no size reuses memory of an earlier one.
 pub fn run(common: &Common) -> Result<()> {
     if !device::open()?.is_cpu() {
         println!("memory: the memory of this device is not the host's; nothing to measure");
@@ -69,12 +69,12 @@ fn in_a_process(count: u32, width: u32, height: u32) -> Result<Value> {
     serde_json::from_slice(&output.stdout).map_err(|error| problem(error.to_string()))
 }
 
-/// Trains two steps and prints, as JSON, what was predicted and by how much the resident memory grew at its peak.
+/// Trains two steps and prints, as JSON, the predicted memory and the peak growth of resident memory.
 pub fn measure(count: u32, width: u32, height: u32) -> Result<()> {
     let gpu = device::open()?;
     let config = TrainConfig { iterations: 10, label_from: 1, densify_from: u32::MAX, ..TrainConfig::default() };
     let options = SchedulerOptions { poison_step: true, ..SchedulerOptions::default() };
-    // A training on one Gaussian compiles what there is to compile, which is not the engine's memory.
+    // A training on one Gaussian compiles all kernels first, because compiled code is not the engine's memory.
     let small = scene(1, width, height);
     steps(&mut Trainer::new(Arc::clone(&gpu), config.clone(), &small.0, &small.1, options)?)?;
     let (dataset, model) = scene(count, width, height);
@@ -92,7 +92,7 @@ pub fn measure(count: u32, width: u32, height: u32) -> Result<()> {
     Ok(())
 }
 
-/// Runs the steps; the seconds of the last one.
+/// Runs the steps and returns the seconds of the last one.
 fn steps(trainer: &mut Trainer) -> Result<f64> {
     let mut seconds = 0.0;
     for _ in 0..STEPS {

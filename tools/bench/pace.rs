@@ -13,7 +13,7 @@ use std::sync::Arc;
 
 /// A training whose steps are timed one by one.
 pub struct Pace {
-    /// What it is called in tables.
+    /// Name in tables.
     pub name: String,
     trainer: Trainer,
     /// Sum of the passes, ms, by step.
@@ -37,7 +37,8 @@ pub struct Pace {
 }
 
 impl Pace {
-    /// A training that starts from `model`; nothing grows, and labels are on from the first step if there are masks.
+    /// A training that starts from `model`, without densification, and with labels from the first step if there are
+    /// masks.
     pub fn new(name: &str, gpu: &Arc<Gpu>, dataset: Dataset, model: &Gaussians, label_samples: u32) -> Result<Self> {
         // Bands of colour come in as in any training.
         let sh_degree_interval = TrainConfig::default().sh_degree_interval;
@@ -60,7 +61,7 @@ impl Pace {
         })
     }
 
-    /// One step, waited for. Steps in which the driver compiles are run, and count for nothing.
+    /// Runs one step and waits for it. Steps in which the driver compiles are not counted.
     pub fn step(&mut self) -> Result<()> {
         let (reports, cost) = timed_step(&mut self.trainer)?;
         let (times, last) = (self.trainer.take_times(), reports.last());
@@ -89,7 +90,7 @@ impl Pace {
     }
 }
 
-/// Runs the trainings in turn until each has so many timed steps.
+/// Runs the trainings in turn until each has the wanted number of timed steps.
 pub fn race(paces: &mut [Pace], steps: usize) -> Result<()> {
     while paces.iter().any(|pace| pace.wall.len() < steps) {
         for pace in paces.iter_mut() {

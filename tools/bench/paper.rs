@@ -1,10 +1,11 @@
-//! One traversal for the scene and all sampled objects against a pass for each, as the reference code of LabelGS does it.
+//! One traversal for the scene and all sampled objects against a pass for each, as the reference code of LabelGS does
+//! it.
 //!
-//! Both use the same kernels and the same culling ([`labelgs::internals::pass::separate_step`]), so that their ratio is what the
-//! structure saves. Steps of both and of a plain training run in turn, from the same model, on the same views.
+//! Both use the same kernels and the same culling ([`labelgs::internals::pass::separate_step`]), so their ratio is the
+//! saving by the structure. Steps of both and of a plain training run in turn, from the same model, on the same views.
 //!
-//! What favours a pass for each: it culls to the object's Gaussians first, adds gradients for visible splats only, and
-//! has its loss in the blend kernel. What does not: as in the reference, each pass visits all tiles of the image.
+//! In favour of separate passes: each culls to the object's Gaussians first, adds gradients for visible splats only,
+//! and has its loss in the blend kernel. Against them: as in the reference, each pass visits all tiles of the image.
 
 use super::measure::{self, Cost, median, median_cost, require, table, timed};
 use super::trained::{Judge, labelled_model, start, timed_step, timing_config, trainer, without_masks};
@@ -23,7 +24,7 @@ use serde::Serialize;
 use std::sync::Arc;
 
 /// Largest relative difference of the losses of two steps that should be equal: both modes start from one model, and
-/// Adam makes whole steps of gradients that differ by their rounding.
+/// Adam amplifies rounding differences of small gradients.
 const SAME_LOSS: f64 = 0.02;
 /// Walked pairs that may differ for the same reason.
 const SAME_PAIRS: f64 = 0.01;
@@ -36,7 +37,7 @@ pub struct Options {
     /// Steps of each mode that are timed.
     #[arg(long, value_name = "N", default_value_t = 60, value_parser = clap::value_parser!(u32).range(1..))]
     steps: u32,
-    /// Steps before, from which all modes start.
+    /// Steps of the common model that all modes start from.
     #[arg(long, value_name = "N", default_value_t = 1500)]
     from_step: u32,
     /// Steps of the trainings whose scores are compared; 0 leaves them out.
@@ -67,7 +68,7 @@ impl Plan {
     }
 }
 
-/// What is known about one way to do a step.
+/// Measurements of one way to do a step.
 #[derive(Clone, Debug, Serialize)]
 struct Mode {
     name: &'static str,
@@ -80,7 +81,7 @@ struct Mode {
     mega_pairs: f64,
 }
 
-/// Everything, as it is written.
+/// The written results.
 #[derive(Debug, Serialize)]
 struct Outcome {
     device: String,
@@ -187,7 +188,7 @@ fn time(gpu: &Arc<Gpu>, dataset: &Dataset, model: &Gaussians, plan: &Plan) -> Re
     })
 }
 
-/// Both modes do the same step.
+/// Checks that both modes do the same step.
 fn same(together: &[StepReport], apart: &[StepReport]) -> Result<()> {
     let (Some(a), Some(b)) = (together.last(), apart.last()) else { return Ok(()) };
     let (walked_a, walked_b) = (a.report.counters.walked_splats() as f64, b.report.counters.walked_splats() as f64);

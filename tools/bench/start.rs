@@ -1,4 +1,4 @@
-//! From the start of the program to the first picture, with empty and with filled caches.
+//! Time from the start of the program to its first picture, with empty and with filled caches.
 
 use super::measure::median;
 use super::measure::write_json;

@@ -1,4 +1,4 @@
-//! What a step with labels costs beside one without: by the area that masks cover, and by the number of objects.
+//! Cost of a step with labels relative to one without, by the area of masks and by the number of objects.
 
 use super::measure::{median, write_json};
 use super::pace::{Pace, race};
@@ -17,7 +17,7 @@ use std::sync::Arc;
 
 /// Sizes of a run.
 struct Size {
-    /// Of the pictures that the model is trained on; the second table has twice the width and height.
+    /// Size of the training pictures; the second table has twice the width and height.
     picture: (u32, u32),
     views: u32,
     training: u32,
@@ -45,7 +45,7 @@ pub fn run(common: &Common) -> Result<()> {
     )
 }
 
-/// Masks as they are made, and masks that leave no pixel out.
+/// Compares the made masks with masks that cover every pixel.
 fn by_area(gpu: &Arc<Gpu>, options: &SynthOptions, model: &Gaussians, timed: usize) -> Result<Vec<Value>> {
     let made = synth::dataset(options, TEST_EVERY);
     let share = covered(&made);
@@ -64,7 +64,7 @@ fn by_area(gpu: &Arc<Gpu>, options: &SynthOptions, model: &Gaussians, timed: usi
     table(paces, timed, (options.width, options.height), model)
 }
 
-/// The same space divided among few and among many objects, all of them in the loss.
+/// Divides the same space among few and among many objects, all of them in the loss.
 fn by_number(gpu: &Arc<Gpu>, options: &SynthOptions, model: &Gaussians, size: &Size) -> Result<Vec<Value>> {
     let made = synth::dataset(options, TEST_EVERY);
     let mut paces = vec![Pace::new("no masks", gpu, without_masks(&made), model, 0)?];
@@ -81,7 +81,7 @@ fn covered(dataset: &Dataset) -> f64 {
     ids().filter(|&&id| id != 0).count() as f64 / ids().count().max(1) as f64
 }
 
-/// Masks of `objects` regions of space, which together cover what the model covers.
+/// Masks of `objects` regions of space, which together cover the model.
 fn divided(gpu: &Arc<Gpu>, dataset: &Dataset, model: &Gaussians, objects: usize) -> Result<Dataset> {
     let mut labels = vec![0; model.len()];
     let mut all: Vec<usize> = (0..model.len()).collect();
@@ -98,7 +98,7 @@ fn divided(gpu: &Arc<Gpu>, dataset: &Dataset, model: &Gaussians, objects: usize)
     Ok(dataset)
 }
 
-/// Cuts a set of Gaussians across its longest side until there are so many parts of about equal counts.
+/// Divides a set of Gaussians across its longest side, repeatedly, into parts of about equal counts.
 fn divide(rows: &mut [usize], means: &[[f32; 3]], parts: usize, next: &mut u32, labels: &mut [u32]) {
     if parts <= 1 || rows.len() < 2 {
         rows.iter().for_each(|&row| labels[row] = *next);

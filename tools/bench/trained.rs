@@ -18,10 +18,10 @@ use labelgs::scene::{Dataset, Gaussians, View};
 use labelgs::synth::{Preset, SynthOptions};
 use std::sync::Arc;
 
-/// Every so many-th view of a made scene is held out.
+/// One view in this many of a made scene is held out.
 pub const TEST_EVERY: u32 = 8;
 
-/// A scene of which steps take milliseconds.
+/// A scene with steps of milliseconds.
 pub fn small_scene() -> SynthOptions {
     SynthOptions { preset: Preset::Simple, width: 72, height: 52, views: 5, points: 300, seed: 3 }
 }
@@ -36,7 +36,7 @@ pub fn trainer(gpu: &Arc<Gpu>, dataset: &Dataset, model: &Gaussians, config: Tra
     Trainer::new(Arc::clone(gpu), config, dataset, model, SchedulerOptions::default())
 }
 
-/// One step, waited for: what it reports and what it took.
+/// Runs one step and waits for it; returns its report and its time.
 pub fn timed_step(trainer: &mut Trainer) -> Result<(Vec<StepReport>, Cost)> {
     timed(|| {
         let mut reports = trainer.step()?;
@@ -45,7 +45,7 @@ pub fn timed_step(trainer: &mut Trainer) -> Result<(Vec<StepReport>, Cost)> {
     })
 }
 
-/// A made scene after so many steps without masks.
+/// Model of a made scene after a number of steps without masks.
 pub fn plain_model(gpu: &Arc<Gpu>, options: &SynthOptions, steps: u32) -> Result<Gaussians> {
     let dataset = without_masks(&synth::dataset(options, TEST_EVERY));
     let config = TrainConfig { iterations: steps, ..TrainConfig::default() };
@@ -56,7 +56,7 @@ pub fn plain_model(gpu: &Arc<Gpu>, options: &SynthOptions, steps: u32) -> Result
     trainer.model()
 }
 
-/// A labelled model after so many steps.
+/// A labelled model after a number of steps.
 pub fn labelled_model(gpu: &Arc<Gpu>, dataset: &Dataset, steps: u32) -> Result<Gaussians> {
     let steps = steps.max(1);
     let config = TrainConfig { iterations: steps + 1, label_from: steps.div_ceil(2), ..TrainConfig::default() };

@@ -1,4 +1,4 @@
-//! What the targets do with a file: what else is in its folder, how it is read, and what must hold for what was read.
+//! For each target: the other files of its folder, the reader, and checks of its result.
 
 use super::seeds;
 use labelgs::Result;
@@ -54,7 +54,7 @@ pub fn open(folder: &Path) -> Result<Dataset> {
     io::open(folder, &LoadOptions { photos: false, test_every: None, ..LoadOptions::default() })
 }
 
-/// A scene, and what training would start from.
+/// Reads a scene and its initial Gaussians.
 pub fn scene(folder: &Path, _: &Path) -> Result<()> {
     let dataset = open(folder)?;
     dataset.train.iter().for_each(|view| sound_camera(&view.camera));
@@ -91,7 +91,7 @@ pub fn sound_model(model: &Gaussians) {
     assert!(all.into_iter().all(|value| value.is_finite()), "a value that is not finite");
 }
 
-/// A model; what was read comes back when it is written and read again.
+/// Reads a model, and checks that it survives writing and reading.
 pub fn ply_model(folder: &Path, file: &Path) -> Result<()> {
     let read = model::read_model(file)?;
     sound_model(&read.gaussians);
@@ -178,12 +178,12 @@ pub fn occlusion(_: &Path, file: &Path) -> Result<()> {
 pub fn profile(_: &Path, file: &Path) -> Result<()> {
     let profile = Profile::read(file)?;
     assert!(!profile.samples.is_empty(), "a profile without a step");
-    // As with its own figures, so with those of another one.
+    // Compared with itself and with another profile.
     compare(&profile.samples, &profile.samples, 0.05).iter().for_each(|row| assert!(!row.regressed, "{row:?}"));
     Ok(())
 }
 
-/// Two small tensors: those of VGG16 fit no small file.
+/// Two small tensors, because the weights of VGG16 are too large for a seed.
 pub fn weights(_: &Path, file: &Path) -> Result<()> {
     let wanted = [("features.0.bias".into(), vec![4]), ("lin0.model.1.weight".into(), vec![1, 2, 1, 1])];
     let read = read_tensors(file, &wanted)?;

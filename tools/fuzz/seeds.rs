@@ -1,4 +1,4 @@
-//! Small valid files of every kind, made by the program's own writers where it has one.
+//! Small valid files of every kind, made by the program's own writers where they exist.
 
 use labelgs::gpu::PipelineStore;
 use labelgs::internals::io::image as pixels;
@@ -312,7 +312,7 @@ pub fn photo_png() -> Vec<Vec<u8>> {
     kinds.map(|(colour, depth)| png(colour, depth, |i| (i * 7) as u8)).to_vec()
 }
 
-/// JPEG in colour and grey, and what other programs wrote: progressive, CMYK, with restarts and an orientation.
+/// JPEG in colour and grey, and JPEG of other programs: progressive, CMYK, with restarts and an orientation.
 pub fn photo_jpeg() -> Vec<Vec<u8>> {
     let colour = image::RgbImage::from_fn(SIZE.0, SIZE.1, |x, y| image::Rgb([x as u8 * 20, y as u8 * 30, 90]));
     let jpeg = |picture: image::DynamicImage| {
@@ -329,7 +329,7 @@ pub fn photo_jpeg() -> Vec<Vec<u8>> {
     all
 }
 
-/// What the checksum of a checkpoint covers.
+/// The part of a checkpoint that its checksum covers.
 pub fn checkpoint() -> Vec<u8> {
     let json = r#"{"meta": {"step": 7, "views": ["a.png"]}, "planes": [{"name": "means", "rows": 2, "words": 4},
 {"name": "none", "rows": 0, "words": 3}, {"name": "bits", "rows": 1, "words": 1}]}"#;
@@ -374,7 +374,7 @@ pub fn frames_json() -> Vec<u8> {
     .into_bytes()
 }
 
-/// Two steps of a profile, of which the first does not count.
+/// Two steps of a profile; the first is not counted.
 pub fn profile_json() -> Vec<u8> {
     br#"{"schema_version": 1, "device": "x", "size": [12, 8], "counters": {"visible": {"median": 7, "p90": 8}},
 "steps": [{"step": 1, "first_run": true, "stages_ms": {"sort": 1.5}},

@@ -1,9 +1,8 @@
-//! What is fuzzed: every reader of files that people hand in, as a table of names and functions. The fuzzer and the
-//! tests of the suite share it.
+//! The fuzzed readers of user files, as a table of names and functions. The fuzzer and the tests share it.
 //!
 //! Each target is a folder in which one file changes. Bytes are written to that file and read as the program reads
-//! them. They must be accepted, with a result that makes sense, or refused with an error that is not a bug's and names
-//! a file.
+//! them. The reader must accept them with a consistent result, or refuse them with an error that names a file and is
+//! not `Error::Bug`.
 
 use super::readers::*;
 use super::seeds;
@@ -17,17 +16,17 @@ use tempfile::TempDir;
 
 /// A reader.
 pub struct Target {
-    /// What it is called.
+    /// Name.
     pub name: &'static str,
     /// The file that the bytes go to, below the folder.
     file: &'static str,
-    /// Writes what else is in the folder.
+    /// Writes the other files of the folder.
     prepare: fn(&Path),
-    /// Reads, with the folder and the file, and looks at what came out.
+    /// Reads the file in the folder and checks the result.
     read: fn(&Path, &Path) -> Result<()>,
     /// Small valid files.
     pub seeds: fn() -> Vec<Vec<u8>>,
-    /// Makes a file of the bytes, where a checksum would keep all changes out.
+    /// Adds a correct checksum to the bytes, for formats in which a checksum would reject every change.
     dress: fn(&[u8]) -> Vec<u8>,
     /// Bytes of memory that each byte of the file may take.
     per_byte: usize,
@@ -260,29 +259,30 @@ impl Place {
         Self { target, folder, file }
     }
 
-    /// Bytes of memory that the reader may take for a file of `length` bytes; the constant part is what decoders and the
-    /// rest of a scene need.
+    /// Bytes of memory that the reader may take for a file of `length` bytes; the constant part is what decoders and
+    /// the rest of a scene need.
     pub fn memory_bound(&self, length: usize) -> usize {
         (64 << 20) + self.target.per_byte * length
     }
 
-    /// Puts the bytes into their file.
+    /// Writes the bytes to their file.
     pub fn put(&self, bytes: &[u8]) {
         std::fs::write(&self.file, (self.target.dress)(bytes)).expect("a file");
     }
 
-    /// Reads what was put.
+    /// Reads the file.
     pub fn read(&self) -> Result<()> {
         (self.target.read)(self.folder.path(), &self.file)
     }
 
-    /// Puts the bytes, reads them, and panics if the answer is none that a user should get; true if they were accepted.
+    /// Writes the bytes, reads them, and panics on an answer that no user should get. Returns whether they were
+    /// accepted.
     pub fn check(&self, bytes: &[u8]) -> bool {
         self.put(bytes);
         self.judge(self.read())
     }
 
-    /// What [`Place::check`] thinks of an answer.
+    /// The verdict of [`Place::check`] on an answer.
     pub fn judge(&self, answer: Result<()>) -> bool {
         let Err(error) = answer else { return true };
         let text = error.to_string();

@@ -5,7 +5,7 @@ use super::source::{line_of, without_comments};
 use super::{Finding, Shader, Variant, constants, is_snake_case};
 use std::collections::BTreeMap;
 
-/// Names that Rust keeps for itself, or that stand for something else in the generated modules.
+/// Keywords of Rust, and names with another meaning in the generated modules.
 const RESERVED: &[&str] = &[
     "as",
     "async",
@@ -74,7 +74,7 @@ pub fn text(path: &str, source: &str) -> Vec<Finding> {
     findings
 }
 
-/// Structs of one name must be one struct, whatever shader they stand in.
+/// Structs of one name must be equal in all shaders.
 pub fn shared_structs(shaders: &[Shader]) -> Vec<Finding> {
     let mut known = BTreeMap::new();
     let mut findings = Vec::new();
@@ -151,7 +151,7 @@ fn interface(shader: &Shader, variant: &Variant) -> Vec<Finding> {
     findings
 }
 
-/// Variants of one shader share their Rust types, so their interfaces must be equal but for the kind of a binding.
+/// Variants of one shader share their Rust types, so their interfaces must be equal except for the kind of a binding.
 fn agreement(shader: &Shader, base: &Variant, other: &Variant) -> Option<Finding> {
     let shape = |interface: &Interface| -> Vec<_> {
         interface.bindings.iter().map(|b| (b.name.clone(), b.binding, b.access)).collect()

@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 /// A macro of a variant: name and, if it has one, value.
 pub type Define = (String, Option<String>);
 
-/// What a module is compiled for.
+/// Purpose of a compiled module.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub enum Purpose {
     /// Not optimised: keeps the names and the bindings that are declared but not used.
@@ -31,7 +31,7 @@ impl GlslCompiler {
         Ok(Self { compiler, include: include.to_owned() })
     }
 
-    /// SPIR-V words of a compute shader. `name` is what messages call the file.
+    /// SPIR-V words of a compute shader. Messages call the file `name`.
     pub fn compile(&self, name: &str, source: &str, defines: &[Define], purpose: Purpose) -> Result<Vec<u32>, String> {
         let mut options = CompileOptions::new().map_err(|error| error.to_string())?;
         options.set_source_language(SourceLanguage::GLSL);

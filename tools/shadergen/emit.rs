@@ -95,8 +95,8 @@ fn emit_struct(out: &mut String, body: &Struct, doc: &str) {
     put!(out, "    const _: () = assert!(size_of::<{name}>() == {});", body.bytes);
 }
 
-/// One module for a file: what all its siblings need, each name once. Returns the number of variants in this build; a file
-/// without any has no module.
+/// Writes one module for a file, with each name of its siblings once. Returns the number of variants in this build; a
+/// file without variants has no module.
 fn emit_file(out: &mut String, file: &str, siblings: &[&Shader]) -> usize {
     let here = siblings.iter().filter(|shader| shader.is_in);
     let variants: Vec<_> =
@@ -190,7 +190,7 @@ fn emit_spec(out: &mut String, siblings: &[&Shader]) {
         })
         .collect();
     emit_named(out, "Specialisation constants; a sibling takes what it has.", ("Spec", ""), &fields);
-    put!(out, "    impl Spec {{\n        /// The defaults, but for constants whose bits `given` knows.");
+    put!(out, "    impl Spec {{\n        /// The defaults, except for constants whose bits `given` returns.");
     put!(out, "        #[allow(unused_variables)]");
     put!(out, "        pub fn with(given: impl Fn(&str) -> Option<u32>) -> Self {{\n            Self {{");
     for SpecConstant { name, rust, default, .. } in constants {

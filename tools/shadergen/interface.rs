@@ -1,8 +1,8 @@
-//! What a shader declares: bindings, specialisation constants and the structs in them.
+//! Declarations of a shader: bindings, specialisation constants and the structs in them.
 
 use std::collections::BTreeMap;
 
-/// What a shader does with a binding.
+/// Access of a shader to a binding.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Access {
     /// `readonly`, and every texel buffer.
@@ -122,6 +122,6 @@ pub struct Interface {
     pub local_size: [LocalSize; 3],
     /// Whether subgroup operations are used.
     pub uses_subgroups: bool,
-    /// What is wrong with it.
+    /// Problems of the module.
     pub problems: Vec<Problem>,
 }

@@ -23,7 +23,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 pub struct Finding {
     /// File and line.
     pub place: String,
-    /// What is wrong and what to do.
+    /// The problem and its remedy.
     pub rule: String,
 }
 
@@ -56,7 +56,7 @@ pub struct Shader {
     pub source: String,
     /// Base first.
     pub variants: Vec<Variant>,
-    /// It is in this build. Of a sibling that is not, the file still has the names of its bindings.
+    /// Whether it is in this build. A sibling outside of it still adds its binding names to the module.
     pub is_in: bool,
 }
 
@@ -87,7 +87,7 @@ pub struct Variant {
     pub defines: Vec<Define>,
     /// The module that ships.
     pub words: Vec<u32>,
-    /// What the module without optimisation declares.
+    /// Interface of the module without optimisation.
     pub interface: Interface,
     /// Binding numbers that the shipped module touches.
     pub used: BTreeSet<u32>,
@@ -104,7 +104,7 @@ impl Variant {
     }
 }
 
-/// What is written.
+/// Generated files.
 #[derive(Debug)]
 pub struct Generated {
     /// Text of `shaders.rs`.

@@ -5,7 +5,7 @@ use rspirv::dr::{Instruction, Module, Operand};
 use rspirv::spirv::{BuiltIn, Decoration, Dim, ExecutionMode, Op, StorageClass, Word};
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
-/// A module with what is needed to find one's way in it.
+/// A module with lookup tables.
 struct Reflector<'a> {
     module: &'a Module,
     names: HashMap<Word, &'a str>,
@@ -203,7 +203,7 @@ impl<'a> Reflector<'a> {
         Some(Struct { name: name.to_owned(), fields, bytes: end.next_multiple_of(align) })
     }
 
-    /// The Rust type of a GLSL type; `name` is what a problem is reported for.
+    /// The Rust type of a GLSL type; problems are reported for `name`.
     fn ty(&mut self, name: &str, id: Word) -> Option<Type> {
         let instruction = self.values.get(&id).copied()?;
         match instruction.class.opcode {
@@ -269,7 +269,7 @@ impl<'a> Reflector<'a> {
         }
     }
 
-    /// The constant that holds the size of a workgroup, if it is not written out in the execution mode.
+    /// The constant with the size of a workgroup, if the execution mode does not state it.
     fn workgroup_size(&self) -> Option<&'a Instruction> {
         let is_size = |value: &&Instruction| {
             value.result_id.and_then(|id| self.decoration(id, Decoration::BuiltIn))
@@ -278,7 +278,7 @@ impl<'a> Reflector<'a> {
         self.module.types_global_values.iter().find(is_size)
     }
 
-    /// Invocations on each axis. The built-in wins over the execution mode, says the SPIR-V specification.
+    /// Invocations on each axis. By the SPIR-V specification, the built-in takes precedence over the execution mode.
     fn local_size(&self) -> [LocalSize; 3] {
         if let Some(size) = self.workgroup_size() {
             let constant = |id| LocalSize::Fixed(self.values.get(&id).map_or(0, |value| word(value, 0)));

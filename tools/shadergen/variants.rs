@@ -18,7 +18,7 @@ const LAB: &str = "lab:";
 pub struct VariantLine {
     /// Stem of the shader file, or `*`.
     pub stem: String,
-    /// What the variant is called after the stem; for a sibling its own stem.
+    /// Suffix of the variant after the stem; for a sibling its own stem.
     pub suffix: String,
     /// Whether the line makes a sibling.
     pub sibling: bool,
@@ -36,7 +36,7 @@ impl VariantLine {
     }
 }
 
-/// All lines of the text; `name` is what messages call the file.
+/// All lines of the text; Messages call the file `name`.
 pub fn parse(name: &str, text: &str) -> Result<Vec<VariantLine>, Vec<Finding>> {
     let mut lines = Vec::new();
     let mut findings = Vec::new();

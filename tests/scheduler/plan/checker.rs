@@ -1,4 +1,4 @@
-//! What a plan must be, checked by brute force and written from the rules of Vulkan, not from the planner.
+//! Checks a plan by brute force, from the rules of Vulkan and independent of the planner.
 
 use super::*;
 use labelgs::internals::scheduler::plan::{Class, Use};
@@ -25,7 +25,8 @@ fn users(list: &PassList, buf: Buf) -> Vec<usize> {
     (0..list.work.len()).filter(|&item| uses(&list.work[item])).collect()
 }
 
-/// No two buffers that are alive at once share bytes, and all places are aligned and inside of their pages.
+/// Checks that no two buffers that are alive at once share bytes, and that all places are aligned and inside their
+/// pages.
 pub fn check_places(plan: &Plan, limits: &Limits) {
     let mut scratch = Vec::new();
     for (index, decl) in plan.table.iter().enumerate() {
@@ -59,7 +60,7 @@ pub fn check_places(plan: &Plan, limits: &Limits) {
     }
 }
 
-/// What an item does: page, first byte, byte after the last, kind.
+/// Accesses of an item: page, first byte, byte after the last, kind.
 fn accesses(plan: &Plan, item: usize) -> Vec<(Page, u64, u64, Use)> {
     let mut accesses = Vec::new();
     let mut add = |buf: Buf, kind: Use, range: Option<(u64, u64)>| {

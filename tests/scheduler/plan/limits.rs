@@ -1,4 +1,4 @@
-//! What does not fit or does not match is refused with the thing, the number and the cure.
+//! Plans that exceed a limit or mismatch a shader are refused; the error names the buffer, the number and the remedy.
 
 use super::*;
 use labelgs::Error;

@@ -77,7 +77,7 @@ fn small_list() -> PassList {
 }
 
 #[test]
-fn the_text_of_a_small_plan() {
+fn the_text_of_a_small_plan_equals_the_stored_one() {
     let list = small_list();
     let plan = Plan::new(table::TABLE, &capacity(), &list, &Limits::default(), PlanOptions::default()).unwrap();
     let options = PlanOptions::default();
@@ -131,7 +131,7 @@ pub fn engine_lists(shape: KernelShape) -> (Capacity, Vec<PassList>) {
 }
 
 #[test]
-fn the_lists_of_the_engine_are_safe() {
+fn the_lists_of_the_engine_have_no_race() {
     let (capacity, lists) = engine_lists(KernelShape::new(8, true));
     for list in &lists {
         for options in checker::all_options() {
@@ -141,7 +141,7 @@ fn the_lists_of_the_engine_are_safe() {
         }
     }
     let options = PlanOptions::default();
-    // Objects one by one are for measurements; their scratch lives longer.
+    // The list of objects one by one is for benchmarks; its scratch lives longer.
     let lists: Vec<PassList> = lists.into_iter().filter(|list| !list.name.contains("one by one")).collect();
     let memory = MemoryReport::predict(TABLE, &capacity, &lists, &Limits::default(), options).unwrap();
     assert!(memory.step_pages.iter().sum::<u64>() * 3 < memory.step_unaliased * 2, "{}", memory.report());

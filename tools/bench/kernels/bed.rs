@@ -23,7 +23,7 @@ pub struct Sample {
     pub stages: BTreeMap<Stage, f64>,
     /// Processor time of the process, ms; none where the system does not tell.
     pub cpu: Option<f64>,
-    /// What the device counted.
+    /// Counters of the device.
     pub counters: Counters,
 }
 

@@ -61,7 +61,7 @@ impl Errors {
     }
 }
 
-/// What a device made of a step.
+/// Results of a step on a device.
 pub struct Outcome {
     /// Picture, [height, width].
     pub colours: Vec<[f64; 3]>,

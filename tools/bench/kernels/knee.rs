@@ -1,4 +1,4 @@
-//! Which modes nothing else beats, and which of them is the knee. Differences within noise count for nothing.
+//! The Pareto front of modes, and its knee. Differences within noise are ignored.
 
 use super::measure::{ModeResult, SceneResult};
 
@@ -22,7 +22,7 @@ pub const MEASURES: [Measure; 4] = [
 
 /// A difference of relative time that is noise.
 const NOISE: f64 = 0.04;
-/// A factor between errors that is none to speak of.
+/// A factor between errors that is negligible.
 const ALIKE: f64 = 1.25;
 
 /// Time and error of the modes.
@@ -42,7 +42,7 @@ impl Points {
         not_worse && (time_a < time_b - NOISE || error_a * ALIKE < error_b)
     }
 
-    /// No difference to speak of.
+    /// Equal within noise.
     fn tie(&self, a: usize, b: usize) -> bool {
         let ((time_a, error_a), (time_b, error_b)) = (self.0[a], self.0[b]);
         (time_a - time_b).abs() <= NOISE && error_a <= error_b * ALIKE && error_b <= error_a * ALIKE

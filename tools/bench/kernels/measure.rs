@@ -46,7 +46,7 @@ pub struct ModeResult {
 pub struct SceneResult {
     /// Name.
     pub name: &'static str,
-    /// What it is.
+    /// Description.
     pub about: &'static str,
     /// Gaussians.
     pub gaussians: usize,
@@ -153,8 +153,8 @@ fn ratio(own: &[Sample], of_default: &[Sample], ms: impl Fn(&Sample) -> Option<f
     ratios.collect::<Option<Vec<f64>>>().map(median)
 }
 
-/// What is wrong with the default mode, if anything. Where no decision is near, all that is left is rounding, and in
-/// large scenes a few pairs whose depths are the same f32; the bounds are three times what lavapipe shows.
+/// What is wrong with the default mode, if anything. Without near decisions, errors come from rounding, and in large
+/// scenes from a few pairs of equal f32 depth. Bounds are three times the errors on lavapipe.
 pub fn fault_of_default(scene: &SceneResult, kind: Kind) -> Option<String> {
     let errors = &scene.rounding;
     let (colour, gradient) = match kind {
@@ -164,7 +164,7 @@ pub fn fault_of_default(scene: &SceneResult, kind: Kind) -> Option<String> {
         Kind::Trained => (1e-5, 2.4e-4),
         _ => (5e-6, 3e-5),
     };
-    // Where nearly every Gaussian is near some decision, all of them are looked at.
+    // Where nearly every Gaussian is near some decision, all of them are compared.
     let all = &scene.modes.first()?.against_rules;
     let gradients = if errors.rows * 10 < scene.gaussians { &all.gradients } else { &errors.gradients };
     let found = (errors.colours.p999, gradients.worst.rms);

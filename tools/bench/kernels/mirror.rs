@@ -13,7 +13,7 @@ use rayon::prelude::*;
 /// Side of a block, px.
 const BLOCK: usize = 32;
 
-/// What a step gives in float64.
+/// Results of a step in float64.
 pub struct Mirror {
     /// Picture, [height, width].
     pub colours: Vec<[f64; 3]>,
@@ -25,7 +25,7 @@ pub struct Mirror {
     pub row_margins: Vec<f64>,
 }
 
-/// Splats of a view, and what a step works on.
+/// Splats of a view and the inputs of a step.
 pub struct View<'a> {
     rules: &'a Rules,
     scene: &'a Scene,

@@ -27,7 +27,7 @@ use measure::SceneResult;
 use modes::{MODES, Mode, Replacements};
 use serde_json::json;
 
-/// What this benchmark knows beside the others.
+/// Options of this benchmark.
 #[derive(clap::Args, Clone, Debug)]
 pub struct KernelArgs {
     #[command(flatten)]
@@ -86,7 +86,7 @@ fn compile(gpu: &Gpu, args: &KernelArgs) -> Result<Vec<(Mode, Replacements)>> {
     modes.map(|(_, mode)| Ok((*mode, mode.compile(&list)?))).collect()
 }
 
-/// What must not be: a number that is none, or a default mode that is off.
+/// Failures: a NaN, or a default mode with too large an error.
 fn faults(scene: &SceneResult, kind: scenes::Kind) -> Vec<String> {
     let mut faults: Vec<String> = measure::fault_of_default(scene, kind).into_iter().collect();
     for mode in &scene.modes {

@@ -10,7 +10,7 @@ use std::collections::HashMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// What a mode trades.
+/// The accuracy that a mode trades for time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Family {
     /// Nothing: the step as the engine runs it.
@@ -28,9 +28,9 @@ pub enum Family {
 pub struct Mode {
     /// Name in tables and charts.
     pub name: &'static str,
-    /// What it trades.
+    /// The accuracy that it trades.
     pub family: Family,
-    /// What is different, for the legend.
+    /// The difference from the default, for the legend.
     pub about: &'static str,
     /// Macro and value that its kernels are compiled with.
     define: Option<(&'static str, &'static str)>,

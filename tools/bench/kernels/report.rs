@@ -1,4 +1,4 @@
-//! Tables for people.
+//! Tables of the benchmark.
 
 use super::errors::Errors;
 use super::knee;
@@ -18,7 +18,7 @@ const STAGES: [Stage; 7] = [
     Stage::ProjectBackward,
 ];
 
-/// What the columns mean, and the modes behind the numbers of the charts.
+/// Legend of the columns, and the modes behind the numbers of the charts.
 pub fn legend(modes: &[Mode]) {
     println!(
         "times by those of the default, medians of the rounds' ratios: `passes` of all stages but loss and report, `CPU` \
@@ -66,7 +66,7 @@ pub fn scene(scene: &SceneResult) {
         "rounding: alone, in {} pixels and {} Gaussians with no decision near",
         scene.rounding.pixels, scene.rounding.rows
     );
-    // The other scenes ask what breaks, not what pays.
+    // The other scenes test accuracy, not speed.
     if scene.name.starts_with('S') {
         for (name, knee) in knee::all(scene) {
             println!("{name}: {knee}");

@@ -13,7 +13,7 @@ use rand_pcg::Pcg32;
 pub struct Plan {
     /// Name in tables: S1, S2, A1 to A5.
     pub name: &'static str,
-    /// What it is.
+    /// Description.
     pub about: &'static str,
     /// Gaussians.
     pub gaussians: usize,
@@ -21,11 +21,11 @@ pub struct Plan {
     pub size: (u32, u32),
     /// Timed rounds over all modes.
     pub rounds: usize,
-    /// What it holds.
+    /// Content.
     pub kind: Kind,
 }
 
-/// What a scene holds.
+/// Content of a scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
     /// Four wavy sheets of mostly small splats, most of them faint.
@@ -130,7 +130,7 @@ fn draw(random: &mut Pcg32, kind: Kind, index: usize, count: usize) -> Drawn {
             Drawn { at, depth: uniform(random, 2.0, 9.0), deviations: [long, long * 1e-4, long * 1e-4], opacity: 0.9 }
         }
         Kind::Faint => {
-            // Sizes and places differ, or one splat's error would be everyone's.
+            // Sizes and places differ, so that errors of splats differ.
             let deviations = turn.map(|share| 60.0 + 60.0 * share);
             let depth = 2.0 + 8.0 * (index as f64 + 0.5) / count as f64;
             Drawn { at: at.map(|v| 0.3 + 0.4 * v), depth, deviations, opacity: 0.0101 }
@@ -147,8 +147,9 @@ fn draw(random: &mut Pcg32, kind: Kind, index: usize, count: usize) -> Drawn {
     }
 }
 
-/// Median width 2.5 px with a tail to some 25 px, flattened along one axis; opacities from faint to opaque with a median
-/// of 0.6, so that most pixels are opaque, and what is behind is hidden; on one of four sheets, each of which waves.
+/// Median width 2.5 px with a tail to some 25 px, flattened along one axis; opacities from faint to opaque with a
+/// median of 0.6, so that most pixels are opaque, and what is behind is hidden; on one of four sheets, each of which
+/// waves.
 fn trained(random: &mut Pcg32, at: [f64; 2]) -> Drawn {
     let width = 2.5 * (0.7 * normal(random)).exp();
     let flat = uniform(random, 0.05, 0.6);

@@ -1,4 +1,4 @@
-//! What the device does at best, measured with kernels that do one thing.
+//! Peak rates of the device, measured with kernels that do one thing.
 
 use crate::compiler::shader;
 use labelgs::Result;
@@ -15,7 +15,7 @@ const VECS: u32 = 65_535 * 64;
 /// Workgroups of 64 and rounds of eight operations each.
 const GROUPS: u32 = 1024;
 const ROUNDS: u32 = 2048;
-/// Dispatches of the list that costs nothing but dispatches.
+/// Dispatches of the list that measures the cost of a dispatch.
 const EMPTY: u32 = 64;
 const REPETITIONS: usize = 8;
 
@@ -34,7 +34,7 @@ pub struct Ceilings {
     pub dispatch: f64,
 }
 
-/// What the arithmetic kernel repeats.
+/// The operation that the arithmetic kernel repeats.
 #[derive(Clone, Copy)]
 enum Operation {
     MultiplyAdd = 0,
@@ -42,7 +42,7 @@ enum Operation {
     Divide = 2,
 }
 
-/// Measures them; `texel` says how the engine's kernels read on this device.
+/// Measures the rates; `texel` selects the engine's way of reading on this device.
 pub fn measure(gpu: &Arc<Gpu>, texel: bool, small: bool) -> Result<Ceilings> {
     let (groups, vecs) = if small { (2, 1 << 12) } else { (GROUPS, VECS) };
     let row = |name, elements| BufferDecl {
@@ -64,7 +64,7 @@ pub fn measure(gpu: &Arc<Gpu>, texel: bool, small: bool) -> Result<Ceilings> {
         least(&mut sched, &list)
     };
     let count = f64::from(groups) * 64.0 * 8.0;
-    // What does not grow with the rounds is not counted.
+    // The difference of two runs removes the constant cost.
     let mut rate = |operation, rounds: u32| -> Result<f64> {
         let net = seconds(operation, rounds)? - seconds(operation, 1)?;
         Ok(count * f64::from(rounds - 1) / net.max(1e-9))

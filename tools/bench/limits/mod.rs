@@ -1,8 +1,8 @@
-//! How near each stage of a step comes to what the device could do.
+//! How near each stage of a step comes to the limit of the device.
 //!
-//! The limit of a stage is the larger of its arithmetic by the rate of arithmetic and of its bytes by the rate of a copy,
-//! both measured in the same run, plus what its dispatches take by themselves. The counts are floors: what the method
-//! needs, not what the kernels happen to do.
+//! The limit of a stage is the larger of its arithmetic by the rate of arithmetic and of its bytes by the rate of a
+//! copy, both measured in the same run, plus the time of empty dispatches. The counts are lower bounds: the work of the
+//! method, not of the kernels.
 
 mod ceilings;
 
@@ -17,7 +17,7 @@ use labelgs::internals::synth;
 use labelgs::synth::SynthOptions;
 use serde_json::{Value, json};
 
-/// What a stage needs.
+/// Work of a stage.
 #[derive(Clone, Copy, Default)]
 struct Need {
     /// Multiplications and additions.
@@ -46,7 +46,7 @@ struct Step {
     tiles: u32,
 }
 
-/// What each stage of a step without labels needs at degree 0 of the colours.
+/// Work of each stage of a step without labels, for colours of degree 0.
 fn need(stage: Stage, s: &Step, digit_bits: u32) -> Need {
     let passes = |bits: u32| f64::from(bits.div_ceil(digit_bits));
     let tile_bits = u32::BITS - s.tiles.saturating_sub(1).leading_zeros();

@@ -10,7 +10,7 @@ use std::path::Path;
 /// Colours by kind.
 const COLOURS: [RGBColor; 4] =
     [RGBColor(90, 90, 90), RGBColor(31, 119, 180), RGBColor(214, 120, 20), RGBColor(190, 40, 60)];
-/// A panel: its name, and what it shows.
+/// A panel: its name and its value.
 const PANELS: [(&str, fn(&Sample) -> Option<f64>); 4] = [
     ("PSNR, dB", |sample| sample.psnr),
     ("SSIM", |sample| sample.ssim),

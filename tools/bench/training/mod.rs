@@ -1,9 +1,9 @@
-//! Quality against seconds of training: plain, with our labels, with the paper's settings, and with the paper's settings
-//! and a pass for each object.
+//! Quality against seconds of training: plain, with our labels, with the paper's settings, and with the paper's
+//! settings and a pass for each object.
 //!
-//! The clock starts with the scene in memory and an open device, before the model is on it, and stands still while models
-//! are scored. What a driver compiles is in it; the time to the first step is measured on its own, in new processes with
-//! empty and with filled caches.
+//! The clock starts with the scene in memory and an open device, before the model is on it, and stands still while
+//! models are scored. What a driver compiles is in it; the time to the first step is measured on its own, in new
+//! processes with empty and with filled caches.
 
 mod chart;
 mod curve;
@@ -24,7 +24,7 @@ use std::process::Command;
 use std::sync::Arc;
 use std::time::Instant;
 
-/// A reference quality is met where it is missed by no more: PSNR, dB, and IoU.
+/// Tolerances within which a reference quality counts as met: PSNR (dB), and IoU.
 const NEAR: (f64, f64) = (0.1, 0.01);
 
 /// Options of the comparison.
