@@ -101,7 +101,7 @@ pub enum Command {
     Label(LabelArgs),
     /// Import, check and repair masks before training.
     ///
-    /// Example: labelgs masks check scene/masks --scene scene
+    /// Example: labelgs masks import scene/masks --scene scene -o imported
     Masks(MasksArgs),
     /// List which objects hide which in each view, without training.
     ///
