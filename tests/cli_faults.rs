@@ -1,7 +1,6 @@
 //! The program under injected faults: exit statuses as README.md lists them, no partial files, no lost results.
 //!
-//! The N-th event of a kind fails, for rising N, until a command ends before event N. `LABELGS_TEST_FAULTS=all` tries
-//! every N.
+//! Event N of a kind fails, for rising N until a command ends before it. `LABELGS_TEST_FAULTS=all` tries every N.
 
 use crate::support::device;
 use crate::support::runs::{Place, all_whole, contents, copy, files, stderr, succeeded};
@@ -275,8 +274,7 @@ fn a_lost_device_is_opened_again() {
     assert_eq!(output.status.code(), Some(6), "{}", stderr(&output));
 }
 
-/// If any allocation is refused, the training ends with status 5, or goes on with a bound on the Gaussians and reports
-/// it.
+/// If an allocation is refused, the training ends with status 5, or goes on and reports a bound on the Gaussians.
 #[test]
 fn any_allocation_may_fail() {
     let Some(_turn) = device() else { return };
@@ -318,8 +316,7 @@ fn any_allocation_may_fail() {
     assert!(tried > 10 && went_on > bounded && bounded > 0 && tried > went_on, "{tried}, {went_on}, {bounded}");
 }
 
-/// After a single NaN in device memory, the training returns to the last checkpoint and ends in the same bits as
-/// without it.
+/// After one NaN in device memory, the training returns to a checkpoint and ends in the same bits as without it.
 #[test]
 fn a_nan_is_found_and_undone() {
     let Some(_turn) = device() else { return };

@@ -1,5 +1,4 @@
-//! Commands other than `train`, killed while they write: all files are complete, and a second run writes the same files
-//! as an uninterrupted one.
+//! Commands other than `train`, killed while they write: all files are complete, and a second run writes the same.
 
 use crate::support::device;
 use crate::support::runs::{Place, all_whole, contents, kills, succeeded};

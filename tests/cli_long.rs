@@ -1,5 +1,4 @@
-//! A long training gives the same bits when it is repeated, interrupted in the middle, or run on other numbers of
-//! threads.
+//! A long training gives the same bits when repeated, interrupted in the middle, or run on other numbers of threads.
 
 use crate::support::device;
 use crate::support::runs::{Place, succeeded};

@@ -1,5 +1,4 @@
-//! The program in unusual surroundings: folder names, languages, closed streams, links, read-only folders, little
-//! memory.
+//! The program in unusual surroundings: folder names, languages, streams, links, read-only folders, little memory.
 #![cfg(target_os = "linux")]
 
 use crate::support::device;

@@ -116,8 +116,7 @@ fn the_order_is_a_short_path() {
     let angles = [0.9, 0.1, 0.5, 0.3, 0.7];
     let turned: Vec<Camera> = angles.iter().map(|&a| camera(DQuat::from_rotation_y(a), [1.0; 3])).collect();
     assert_eq!(short_order(&turned.iter().collect::<Vec<_>>()), [0, 4, 2, 3, 1]);
-    // A ring with heights that jump in the order of names: the path is no longer than that order and visits every
-    // camera once.
+    // A ring with heights that jump by name: the path is no longer than by name and visits every camera once.
     let ring = ring_of_cameras(&SynthOptions { views: 60, ..SynthOptions::default() });
     let ring: Vec<&Camera> = ring.iter().collect();
     let order = short_order(&ring);

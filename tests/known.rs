@@ -6,8 +6,7 @@ use labelgs::internals::shaders;
 use rspirv::dr::Operand;
 use rspirv::spirv::{Capability, Op};
 
-/// No kernel uses atomics on floats, which some devices lack and which add in no fixed order, nor 64-bit integers or
-/// floats, which other devices lack.
+/// No kernel uses atomics on floats (missing on some devices, no fixed order of sums) or 64-bit types (also missing).
 #[test]
 fn no_kernel_has_atomics_on_floats() {
     for shader in shaders::ALL {
@@ -36,8 +35,7 @@ fn no_kernel_has_atomics_on_floats() {
     }
 }
 
-/// The program under the validation layer, in the mode of the tests: a message of the layer is a bug with its own exit
-/// status.
+/// The program under the validation layer: a message of the layer is a bug with its own exit status.
 #[test]
 fn commands_break_no_rule_of_vulkan() {
     let Some(turn) = device() else { return };

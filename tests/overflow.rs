@@ -11,8 +11,7 @@ use labelgs::synth::{Preset, SynthOptions, dataset};
 const SCENE: SynthOptions =
     SynthOptions { preset: Preset::Simple, width: 96, height: 72, views: 6, points: 200, seed: 1 };
 
-/// The model after a few steps with labels, in an engine of initial capacity `room`, and whether the buffer of (splat,
-/// tile) pairs had to grow.
+/// Model after a few labelled steps with initial capacity `room`, and whether the (splat, tile) pairs had to grow.
 fn trained(gpu: &std::sync::Arc<labelgs::gpu::Gpu>, room: u64) -> (Gaussians, bool) {
     let data = dataset(&SCENE, 0);
     let config = TrainConfig { iterations: 100, label_from: 3, ..TrainConfig::default() };

@@ -108,8 +108,7 @@ fn segments_change_no_bit() {
     assert_eq!(whole, parts);
 }
 
-/// Pictures narrower than a tile have more tiles than their pixels divided by the pixels of a tile; each tile has its
-/// segments.
+/// Pictures narrower than a tile have more tiles than their pixels divided by a tile's; each tile has its segments.
 #[test]
 fn segments_of_narrow_pictures_fit_their_buffer() {
     for (width, height) in [(3, 200), (1, 150), (200, 3)] {

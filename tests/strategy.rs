@@ -154,8 +154,7 @@ fn checkpoints_do_not_mention_the_default_strategy() {
     assert!(plane(&state, "densify_stats").is_some());
 }
 
-/// A Gaussian that no view shows has gradient 0. Its momentum still moves it, unless the strategy skips unseen
-/// Gaussians.
+/// An unseen Gaussian has gradient 0. Its momentum still moves it, unless the strategy skips unseen Gaussians.
 #[test]
 fn unseen_gaussians_move_or_rest() {
     let Some(turn) = device() else { return };

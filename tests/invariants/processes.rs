@@ -25,8 +25,7 @@ fn hash_of_a_training() {
     println!("subgroup {} hash {:016x}", turn.subgroup_size(), hasher.finish());
 }
 
-/// Runs some tests of this binary with environment variables, requires that they pass, and returns their standard
-/// output.
+/// Runs tests of this binary with environment variables, requires that they pass, and returns standard output.
 fn child(tests: &[&str], environment: &[(&str, &str)]) -> String {
     let mut command = Command::new(std::env::current_exe().expect("this program has a path"));
     command.args(tests).args(["--nocapture", "--test-threads", "1"]).env(CHILD, "1");
@@ -59,8 +58,7 @@ fn a_training_is_the_same_on_any_number_of_threads() {
     }
 }
 
-/// Without an optional feature the engine takes another way to the same bits: texel and storage reads return the same
-/// numbers.
+/// Without an optional feature the bits are the same, because texel and storage reads return the same numbers.
 #[test]
 fn without_optional_features_a_training_is_the_same() {
     if std::env::var_os(CHILD).is_some() || !is_lavapipe() {

@@ -31,8 +31,7 @@ fn auto(scene: &Scene, folder: &str) -> labelgs::Result<Imported> {
     run(scene, folder, |_| ())
 }
 
-/// Checks that the imported masks equal the ground truth, with ids 1, 2 and 3 replaced by `ids`, and that training
-/// reads them.
+/// Checks that imported masks equal the ground truth with ids 1, 2, 3 replaced by `ids`, and that training reads them.
 #[track_caller]
 fn same_as_truth(scene: &Scene, done: &Imported, ids: [u16; 3]) {
     let masks = scene.path().join("out");

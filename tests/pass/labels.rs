@@ -125,8 +125,7 @@ fn the_nearer_of_two_gaussians_on_a_ray_is_main() {
     }
 }
 
-/// method.md check 2: the transmittance behind two saturated splats is below the limit, so the ray stops before the
-/// second.
+/// method.md check 2: the transmittance behind two saturated splats is too low, so the ray stops before the second.
 #[test]
 fn two_saturated_splats_stop_the_ray() {
     let Some(turn) = device() else { return };

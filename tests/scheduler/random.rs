@@ -1,12 +1,10 @@
-//! Random pass lists: with any aliasing of memory and any barriers left out, results equal those of one item after
-//! another.
+//! Random pass lists: with aliasing and with barriers left out, results equal those of one item after another.
 
 use super::*;
 use rand::rngs::SmallRng;
 use rand::{Rng, SeedableRng};
 
-// Each element reads a distant one, so a pass that starts too early, or scratch that is reused too early, changes
-// results.
+// Each element reads a distant one, so a pass that starts, or scratch that is reused, too early changes results.
 toy_shader!(
     shift,
     [("BY", 0, 0), ("COUNT", 1, 0)],

@@ -37,8 +37,7 @@ pub struct Pace {
 }
 
 impl Pace {
-    /// A training that starts from `model`, without densification, and with labels from the first step if there are
-    /// masks.
+    /// Starts a training from `model`, without densification, and with labels from the first step if there are masks.
     pub fn new(name: &str, gpu: &Arc<Gpu>, dataset: Dataset, model: &Gaussians, label_samples: u32) -> Result<Self> {
         // Bands of colour come in as in any training.
         let sh_degree_interval = TrainConfig::default().sh_degree_interval;

@@ -1,5 +1,4 @@
-//! One traversal for the scene and all sampled objects against a pass for each, as the reference code of LabelGS does
-//! it.
+//! One traversal for the scene and all sampled objects, against a pass for each as in the reference code of LabelGS.
 //!
 //! Both use the same kernels and the same culling ([`labelgs::internals::pass::separate_step`]), so their ratio is the
 //! saving by the structure. Steps of both and of a plain training run in turn, from the same model, on the same views.

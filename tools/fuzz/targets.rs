@@ -275,8 +275,7 @@ impl Place {
         (self.target.read)(self.folder.path(), &self.file)
     }
 
-    /// Writes the bytes, reads them, and panics on an answer that no user should get. Returns whether they were
-    /// accepted.
+    /// Writes and reads the bytes, and panics on an answer that no user should get. Returns whether they were accepted.
     pub fn check(&self, bytes: &[u8]) -> bool {
         self.put(bytes);
         self.judge(self.read())

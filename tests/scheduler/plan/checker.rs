@@ -25,8 +25,7 @@ fn users(list: &PassList, buf: Buf) -> Vec<usize> {
     (0..list.work.len()).filter(|&item| uses(&list.work[item])).collect()
 }
 
-/// Checks that no two buffers that are alive at once share bytes, and that all places are aligned and inside their
-/// pages.
+/// Checks that buffers alive at once share no bytes, and that all places are aligned and inside their pages.
 pub fn check_places(plan: &Plan, limits: &Limits) {
     let mut scratch = Vec::new();
     for (index, decl) in plan.table.iter().enumerate() {
