@@ -188,7 +188,7 @@ fn shared_pixels_need_a_rule() {
     write("a", 0..4);
     write("b", 2..10);
     let message = refusal(auto(&scene, "m"));
-    for part in ["16 pixels in 1 photos", "00.png: 16 of a and b", "--overlap smaller", "--overlap later"] {
+    for part in ["16 pixels in 1 photos", "00.png: 16 of a and b", "`overlap = smaller`", "`overlap = later`"] {
         assert!(message.contains(part), "{part}: {message}");
     }
     assert!(!scene.path().join("out").exists(), "nothing is written before everything is read");
@@ -308,7 +308,7 @@ fn each_broken_folder_has_its_message() {
             grey8(&folder.join("object_mask/00.png"), &[1; 96]);
             grey8(&folder.join("test_mask/00/cup.png"), &[1; 96]);
         },
-        "--format object-mask or --format lerf-mask",
+        "`format = object-mask` or `format = lerf-mask`",
     );
     refused(
         &|folder| {
