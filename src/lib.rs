@@ -89,3 +89,8 @@ mod train;
 mod verify;
 
 pub use error::{Error, Result};
+
+/// The programs of README.md compile.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
