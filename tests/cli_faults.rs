@@ -110,7 +110,7 @@ fn any_vulkan_call_of_a_training_may_fail() {
         if status != 0 {
             succeeded(&place.trained(&out, &[&flags[..], &["--resume"]].concat()));
         }
-        let is_bounded = said.contains("from here on there are no more than");
+        let is_bounded = said.contains("the number of Gaussians stays at");
         assert!(
             is_bounded || place.model(&out, 6) == expected,
             "{fault}: another model than without the fault; {said}"
@@ -296,7 +296,7 @@ fn any_allocation_may_fail() {
         tried += 1;
         let model = if status == 0 {
             went_on += 1;
-            bounded += u32::from(stderr(&output).contains("from here on there are no more than"));
+            bounded += u32::from(stderr(&output).contains("the number of Gaussians stays at"));
             place.model(&out, 40)
         } else {
             assert!(
@@ -307,7 +307,7 @@ fn any_allocation_may_fail() {
             succeeded(&place.trained(&out, &[&flags[..], &["--resume"]].concat()));
             place.model(&out, 40)
         };
-        let is_bounded = stderr(&output).contains("from here on there are no more than");
+        let is_bounded = stderr(&output).contains("the number of Gaussians stays at");
         assert!(is_bounded || model == expected, "{fault}: another model than with memory; {}", stderr(&output));
     }
     println!(

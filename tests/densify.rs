@@ -166,7 +166,7 @@ fn masks_go_back_to_their_photos() {
     std::fs::remove_file(file("00002.png")).expect("removed");
     fails(3, "1 of 3 photos have no tracked mask", &args);
     std::fs::remove_dir_all(file("")).expect("removed");
-    fails(3, "no such folder", &args);
+    fails(3, "does not exist", &args);
     let refused = |text: &str, part: &str| {
         std::fs::write(&frames, text).expect("written");
         std::fs::create_dir_all(&source).expect("a folder");
@@ -266,7 +266,7 @@ fn occluders_go_from_the_verb_into_a_run() {
     assert_eq!(train("c", &["--occlusion", "none"])["kind"], "none");
     assert_eq!(train("d", &[])["kind"], "rendered");
     let bare = ["train", &scene, "-o", &path("e"), "--masks", &masks];
-    fails(2, "--depths DIR", &[&bare[..], &["--occlusion", "depth"]].concat());
+    fails(2, "a folder of depth maps in --depths", &[&bare[..], &["--occlusion", "depth"]].concat());
     fails(2, "only read with", &[&bare[..], &["--depths", &depths, "--depth-kind", "metric"]].concat());
     fails(2, "cannot be used with", &[&bare[..], &["--occlusion-file", &by_depth, "--occlusion", "none"]].concat());
 }

@@ -24,7 +24,7 @@ fn a_binding_that_is_too_large_names_the_capacity_that_fits() {
     assert_eq!(
         error.to_string(),
         "model needs 16000 bytes, the largest storage binding of this device is 15999 bytes; \
-         lower --max-gaussians to 999 or use another device"
+         lower `max_gaussians` to 999 or use another device"
     );
     assert_eq!(exit_status(&error), 5);
     plan_with(&list, &Limits { max_storage_range: 16_000, ..Limits::default() }).unwrap();
