@@ -1,7 +1,8 @@
-//! The engine below training and rendering: one device, one model in its memory, and the pass lists that work on it.
+//! A device with a model in its memory.
 //!
-//! All modules above use the scheduler through this module: `Engine::run` runs a list and waits for it,
-//! `Engine::submit` and `Engine::retire` keep steps in flight, and transfers are typed.
+//! [`Engine::of_model`] opens one that is ready to [`render`](crate::render::render()). Inside of the crate, all modules
+//! above use the scheduler through this module: `Engine::run` runs a pass list and waits for it, `Engine::submit` and
+//! `Engine::retire` keep steps in flight, and transfers are typed.
 
 mod data;
 pub(crate) mod growth;

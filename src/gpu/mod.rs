@@ -1,5 +1,6 @@
-//! Thin layer over Vulkan: one instance, one device, one compute queue, and owners of the objects made from them.
+//! Opens Vulkan devices: [`Gpu::new`] opens one, [`devices`] lists all with their [`Capabilities`].
 //!
+//! A thin layer over Vulkan: one instance, one device, one compute queue, and owners of the objects made from them.
 //! This module and `scheduler/recorder.rs` fulfil all guarantees that Vulkan demands of the caller, so the rest of the
 //! crate is safe code. Objects hold an `Arc<Gpu>`: no handle outlives its device.
 // Vulkan calls are foreign functions: every call is unsafe. Only this module and the recorder make them.

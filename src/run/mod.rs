@@ -2,7 +2,7 @@
 //!
 //! [`train`] is the command `labelgs train` without the terminal. Its input is a [`Request`]: scene, output folder,
 //! [`Settings`] and whether to resume ([`Start`]). An [`Observer`] follows the run and may pause, save or stop it. The
-//! result is a [`Summary`]; README lists the files of the folder.
+//! result is a [`Summary`]; [`guide::outputs`](crate::guide::outputs) lists the files of the folder.
 
 mod checkpoints;
 mod finish;
