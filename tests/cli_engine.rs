@@ -273,7 +273,9 @@ fn render_and_eval_take_the_resolution_of_the_run() {
     let path = |name: &str| folder.path().join(name).to_str().expect("UTF-8").to_owned();
     let (scene, out) = (path("scene"), path("out"));
     succeeds(&["synth", &scene, "--preset", "simple", "--size", "64x48", "--views", "6", "--points", "100"]);
-    succeeds(&["train", &scene, "-o", &out, "--iterations", "5", "--max-resolution", "32", "--test-every", "3"]);
+    let masks = path("scene/masks");
+    let train = ["train", &scene, "--masks", &masks, "-o", &out, "--iterations", "5", "--max-resolution", "32"];
+    succeeds(&[&train[..], &["--test-every", "3"]].concat());
     let size = |flags: &[&str]| {
         let pictures = path(&format!("pictures{}", flags.len()));
         let base = ["render", &out, "--scene", &scene, "-o", &pictures, "--json"];
@@ -284,8 +286,11 @@ fn render_and_eval_take_the_resolution_of_the_run() {
     };
     assert_eq!(size(&[]), (2, (32, 24)), "what the run was trained at, and its own test views");
     assert_eq!(size(&["--max-resolution", "64", "--test-every", "2"]), (3, (64, 48)), "what is typed wins");
-    let printed = json(&succeeds(&["eval", &out, "--scene", &scene, "--json"]));
+    let printed = json(&succeeds(&["eval", &out, "--scene", &scene, "--masks", &masks, "--json"]));
     assert_eq!(printed["views"].as_object().expect("views").len(), 2);
     let stored = json(&std::fs::read_to_string(path("out/metrics.json")).expect("metrics"));
     assert_eq!(printed["mean"]["psnr"], stored["test"]["psnr"], "scores of the run and of `eval` are of one size");
+    let iou = |scores: &Value| scores["iou_map"].as_f64().expect("a score");
+    assert!(iou(&printed["mean"]) > 0.0, "{printed}");
+    assert_eq!(iou(&printed["mean"]), iou(&stored["test"]), "the run scores the labels that it saves");
 }

@@ -8,7 +8,7 @@ use crate::eval::scores::Scores;
 use crate::io::label_table::{self, LabelTable};
 use crate::io::occlusion_table::{self, OcclusionTable};
 use crate::io::{atomic, run_folder};
-use crate::scene::View;
+use crate::scene::{Gaussians, View};
 use crate::train::Occlusion;
 use std::path::PathBuf;
 use std::time::Duration;
@@ -35,9 +35,11 @@ impl Run<'_> {
         Ok(())
     }
 
-    pub(super) fn save_labelled(&mut self) -> Result<PathBuf> {
+    /// Writes the model with its final labels. Returns it with its path.
+    pub(super) fn save_labelled(&mut self) -> Result<(PathBuf, Gaussians)> {
         let model = self.trainer.labelled_model().map_err(|error| self.keep_model(error))?;
-        self.models.save(self.trainer.steps_done(), &model)
+        let path = self.models.save(self.trainer.steps_done(), &model)?;
+        Ok((path, model))
     }
 
     /// Returns the result of the training, without scores.
@@ -55,9 +57,9 @@ impl Run<'_> {
         }
     }
 
-    /// Writes the last preview, scores the held-out views unless the run was stopped, and writes the summary. `kept` is
-    /// the result of writing the checkpoint of a stopped run.
-    pub(super) fn finish(&mut self, summary: &mut Summary, kept: Result<bool>) -> Result<()> {
+    /// Writes the last preview, scores the saved model on the held-out views unless the run was stopped, and writes the
+    /// summary. `kept` is the result of writing the checkpoint of a stopped run.
+    pub(super) fn finish(&mut self, summary: &mut Summary, model: &Gaussians, kept: Result<bool>) -> Result<()> {
         let step = summary.steps;
         self.save_occluders()?;
         if let Some(path) = preview::write(self)? {
@@ -65,7 +67,7 @@ impl Run<'_> {
         }
         self.tell(Event::Model { step, path: &summary.model })?;
         if !self.stopped {
-            summary.scores = self.score()?;
+            summary.scores = self.score(model)?;
         }
         summary.stopped = self.stopped;
         summary.write(&self.request.output)?;
@@ -97,14 +99,13 @@ impl Run<'_> {
     }
 
     /// Scores the held-out views, and their objects if they have masks.
-    fn score(&mut self) -> Result<Option<Scores>> {
+    fn score(&mut self, model: &Gaussians) -> Result<Option<Scores>> {
         let views: Vec<&View> = self.dataset.test.iter().collect();
         if views.is_empty() {
             return Ok(None);
         }
-        let model = self.trainer.model()?;
         let how = Rendering { options: self.trainer.render_options(), min_confidence: MIN_LABEL_CONFIDENCE };
-        let scores = evaluate(self.trainer.engine_mut(), &model, &views, how, &(), &mut ())?;
+        let scores = evaluate(self.trainer.engine_mut(), model, &views, how, &(), &mut ())?;
         scores.warn_of_odd_view(self.settings.train.near);
         Ok(Some(scores))
     }

@@ -116,9 +116,9 @@ fn train_once(request: &Request, is_again: bool, open: &Open, observer: &mut dyn
     run.hold_records()?;
     // Save the model in either case.
     let kept = run.keep_if_stopped();
-    let model = run.save_labelled()?;
-    let mut summary = run.summary(model, start.elapsed());
-    run.finish(&mut summary, kept)?;
+    let (path, model) = run.save_labelled()?;
+    let mut summary = run.summary(path, start.elapsed());
+    run.finish(&mut summary, &model, kept)?;
     Ok(summary)
 }
 
