@@ -24,7 +24,8 @@ macro_rules! pages {
     ($($name:ident: $summary:literal;)*) => {$(
         #[doc = $summary]
         ///
-        #[doc = include_str!(concat!(env!("OUT_DIR"), "/pictures.md"))]
+        // Only the documentation carries the pictures, not every build of the library.
+        #[cfg_attr(doc, doc = include_str!(concat!(env!("OUT_DIR"), "/pictures.md")))]
         /// [page data]: data
         /// [page masks]: masks
         /// [page labels]: labels
