@@ -3,10 +3,11 @@
 use super::args::{ReadArgs, SceneArgs};
 use super::context::Context;
 use super::labelled::TableArg;
-use super::scene::{find_view, near_plane, open_gpu, open_scene, render_engine};
+use super::scene::{find_view, near_plane, open_gpu, open_scene};
 use super::values::{At, BoxAt, Picks, at, box_at, near, picks};
 use crate::edit::catalogue::{Catalogue, Pick};
 use crate::edit::prompt::{Place, Prompt, choose};
+use crate::engine::Engine;
 use crate::render::{Parts, RenderOptions, render};
 use crate::scene::{Camera, Gaussians, LabelMap};
 use crate::{Error, Result};
@@ -172,8 +173,7 @@ impl PromptArgs {
         }
         let near = near_plane(asked.path, self.near)?;
         let sizes = cameras.values().map(|camera| (camera.width, camera.height));
-        let mut engine = render_engine(open_gpu(context)?, asked.model, sizes)?;
-        engine.upload_model(asked.model)?;
+        let mut engine = Engine::of_model(open_gpu(context)?, asked.model, sizes)?;
         let mut map = |(key, camera): (Key, Camera)| {
             let rendered = render(&mut engine, &camera, &RenderOptions::new(near, Parts::MAIN))?;
             Ok((key, rendered.label_map(labels)?))

@@ -3,9 +3,10 @@
 use super::args::{JsonFlag, SceneArgs};
 use super::context::{Context, open_model};
 use super::log::Progress;
-use super::scene::{near_plane, open_gpu, open_scene, render_engine};
+use super::scene::{near_plane, open_gpu, open_scene};
 use super::stdout;
 use super::values::{colour, near};
+use crate::engine::Engine;
 use crate::io::frames::{self, Frame, Frames};
 use crate::render::pictures::{Format, write_rgb};
 use crate::render::{Parts, RenderOptions, render};
@@ -75,8 +76,7 @@ pub(crate) fn run(args: &DensifyArgs, context: &Context) -> Result<()> {
     let stops = video(&cameras, args.between, how);
     let gpu = open_gpu(context)?;
     let size = (cameras[0].width, cameras[0].height);
-    let mut engine = render_engine(gpu, &model, std::iter::once(size))?;
-    engine.upload_model(&model)?;
+    let mut engine = Engine::of_model(gpu, &model, std::iter::once(size))?;
     let options = RenderOptions { background: args.background, ..RenderOptions::new(near, Parts::COLOUR) };
     let mut progress = Progress::new(stops.len() as u64, "frames", &context.global);
     let mut written = Vec::new();

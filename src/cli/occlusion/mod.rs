@@ -3,8 +3,9 @@
 use super::args::{JsonFlag, ReadArgs};
 use super::context::{Context, open_model};
 use super::log::Progress;
-use super::scene::{near_plane, open_gpu, render_engine};
+use super::scene::{near_plane, open_gpu};
 use super::stdout;
+use crate::engine::Engine;
 use crate::io::image::write_png_rgb8;
 use crate::io::occlusion_table::OcclusionTable;
 use crate::io::{self, LoadOptions};
@@ -88,8 +89,7 @@ pub(crate) fn run(args: &OcclusionArgs, context: &Context) -> Result<()> {
 fn from_model(path: &Path, views: &[&View], context: &Context) -> Result<BTreeMap<String, Occluders>> {
     let (model, near) = (open_model(path)?, near_plane(path, None)?);
     let gpu = open_gpu(context)?;
-    let mut engine = render_engine(gpu, &model, views.iter().map(|view| (view.camera.width, view.camera.height)))?;
-    engine.upload_model(&model)?;
+    let mut engine = Engine::of_model(gpu, &model, views.iter().map(|view| (view.camera.width, view.camera.height)))?;
     let mut progress = Progress::new(views.len() as u64, "views", &context.global);
     let mut found = BTreeMap::new();
     for view in views {
