@@ -151,19 +151,18 @@ void main() {
                 vb += w * g2[k];
             }
             float my = m1 + qy0 * m0, myy = m2 + qy0 * (2.0 * m1 + qy0 * m0);
-            float s0 = subgroup_sum(m0), sx = subgroup_sum(m0 * qx), sy = subgroup_sum(my);
-            float sxx = subgroup_sum(m0 * qx * qx), sxy = subgroup_sum(my * qx), syy = subgroup_sum(myy);
-            float sr = subgroup_sum(vr), sg = subgroup_sum(vg), sb = subgroup_sum(vb);
+            vec3 low = subgroup_sum(vec3(m0, m0 * qx, my)), high = subgroup_sum(vec3(m0 * qx * qx, my * qx, myy));
+            vec3 colour = subgroup_sum(vec3(vr, vg, vb));
             bool me = lane == j;
-            o0 = me ? s0 : o0;
-            ox = me ? sx : ox;
-            oy = me ? sy : oy;
-            oxx = me ? sxx : oxx;
-            oxy = me ? sxy : oxy;
-            oyy = me ? syy : oyy;
-            or_ = me ? sr : or_;
-            og = me ? sg : og;
-            ob = me ? sb : ob;
+            o0 = me ? low.x : o0;
+            ox = me ? low.y : ox;
+            oy = me ? low.z : oy;
+            oxx = me ? high.x : oxx;
+            oxy = me ? high.y : oxy;
+            oyy = me ? high.z : oyy;
+            or_ = me ? colour.x : or_;
+            og = me ? colour.y : og;
+            ob = me ? colour.z : ob;
         }
         // convert moments about the tile's centre to gradients of the lane's own splat
         vec2 d = vec2(mine.x, mine.y) - centre;

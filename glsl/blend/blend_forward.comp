@@ -157,7 +157,7 @@ void main() {
         for (uint j = 0u; j < count; j++) {
             TileSplat s = broadcast(mine, j);
 #if defined(MAIN) || defined(LABELS)
-            uint id = subgroupShuffle(index, j);
+            uint id = subgroup_shuffle(index, j);
 #endif
             uint position = base - list_start + j + 1u;
             float dx = s.x - t.px;

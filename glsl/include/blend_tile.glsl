@@ -1,5 +1,5 @@
 // Common code of the blend passes: one subgroup owns one tile of one layer. A lane owns ROWS pixels of one column in
-// registers. Each lane loads one splat, and shuffles broadcast it. No shared memory, no barriers.
+// registers. Each lane loads one splat, and shuffles broadcast it.
 
 #include "subgroup.glsl"
 layout(constant_id = 1) const uint TILE_WIDTH = 8;
@@ -59,13 +59,14 @@ struct TileSplat {
 
 TileSplat broadcast(TileSplat s, uint lane) {
     TileSplat r;
-    r.x = subgroupShuffle(s.x, lane);
-    r.y = subgroupShuffle(s.y, lane);
-    r.a = subgroupShuffle(s.a, lane);
-    r.b = subgroupShuffle(s.b, lane);
-    r.c = subgroupShuffle(s.c, lane);
-    r.lo = subgroupShuffle(s.lo, lane);
-    r.colour = vec3(subgroupShuffle(s.colour.x, lane), subgroupShuffle(s.colour.y, lane), subgroupShuffle(s.colour.z, lane));
-    r.z = subgroupShuffle(s.z, lane);
+    vec3 conic = subgroup_shuffle(vec3(s.a, s.b, s.c), lane), place = subgroup_shuffle(vec3(s.x, s.y, s.lo), lane);
+    r.x = place.x;
+    r.y = place.y;
+    r.lo = place.z;
+    r.a = conic.x;
+    r.b = conic.y;
+    r.c = conic.z;
+    r.colour = subgroup_shuffle(s.colour, lane);
+    r.z = subgroup_shuffle(s.z, lane);
     return r;
 }

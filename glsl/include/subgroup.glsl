@@ -1,11 +1,68 @@
-// Butterflies over one subgroup by shuffles, the one subgroup operation that is fast on all devices. Unrolled by hand,
-// because some drivers do not unroll a loop over the distances, and lavapipe counts loop rounds.
+// Operations over the lanes of one subgroup; kernels use no others. A sum or maximum is a butterfly of shuffles, the
+// one subgroup operation that is fast on all devices. It is unrolled by hand, because some drivers do not unroll a loop
+// over the distances, and lavapipe counts loop rounds.
+//
+// EMULATED: SUBGROUP_SIZE neighbouring invocations of a workgroup form a subgroup, and shuffles go through shared
+// memory. All invocations of the workgroup must call an operation together.
 
 layout(constant_id = 0) const uint SUBGROUP_SIZE = 8;
 
+#ifdef EMULATED
+const uint EXCHANGE_LANES = 64u; // the largest workgroup with subgroup operations
+// Exchanges use the two halves in turn. One barrier each is then enough: no invocation writes to a half again before
+// all have read it, because the exchange between has a barrier too.
+shared uvec3 exchange[2u * EXCHANGE_LANES];
+uint exchange_half = 0u;
+
+uint subgroup_lane() {
+    return gl_LocalInvocationIndex % SUBGROUP_SIZE;
+}
+
+uvec3 subgroup_shuffle(uvec3 v, uint lane) {
+    exchange_half = EXCHANGE_LANES - exchange_half;
+    exchange[exchange_half + gl_LocalInvocationIndex] = v;
+    barrier();
+    return exchange[exchange_half + gl_LocalInvocationIndex - subgroup_lane() + lane];
+}
+
+uint subgroup_shuffle(uint v, uint lane) {
+    return subgroup_shuffle(uvec3(v, 0u, 0u), lane).x;
+}
+
+float subgroup_shuffle(float v, uint lane) {
+    return uintBitsToFloat(subgroup_shuffle(floatBitsToUint(v), lane));
+}
+
+vec3 subgroup_shuffle(vec3 v, uint lane) {
+    return uintBitsToFloat(subgroup_shuffle(floatBitsToUint(v), lane));
+}
+
+#define subgroup_shuffle_xor(v, distance) subgroup_shuffle(v, subgroup_lane() ^ (distance))
+
+uint subgroup_exclusive_add(uint v) {
+    uint sum = v;
+    [[unroll]] for (uint distance = 1u; distance < EXCHANGE_LANES; distance *= 2u) {
+        if (distance < SUBGROUP_SIZE) {
+            uint before = subgroup_shuffle(sum, subgroup_lane() - min(distance, subgroup_lane()));
+            sum += subgroup_lane() >= distance ? before : 0u;
+        }
+    }
+    return sum - v;
+}
+
+bool subgroup_elect() {
+    return subgroup_lane() == 0u;
+}
+#else
+#define subgroup_shuffle(v, lane) subgroupShuffle(v, lane)
+#define subgroup_shuffle_xor(v, distance) subgroupShuffleXor(v, distance)
+#define subgroup_exclusive_add(v) subgroupExclusiveAdd(v)
+#define subgroup_elect() subgroupElect()
+#endif
+
 #define BUTTERFLY_STEP(DISTANCE, COMBINE) \
     if (SUBGROUP_SIZE > DISTANCE) { \
-        v = COMBINE(v, subgroupShuffleXor(v, DISTANCE)); \
+        v = COMBINE(v, subgroup_shuffle_xor(v, DISTANCE)); \
     }
 #define BUTTERFLY(T, NAME, COMBINE) \
     T NAME(T v) { \
@@ -23,3 +80,21 @@ BUTTERFLY(float, subgroup_sum, PLUS)
 BUTTERFLY(float, subgroup_max, max)
 BUTTERFLY(uint, subgroup_max, max)
 BUTTERFLY(uint, subgroup_min, min)
+
+// Three sums at once: the same additions, but a third of the exchanges where they are emulated.
+#ifdef EMULATED
+BUTTERFLY(vec3, subgroup_sum, PLUS)
+#else
+vec3 subgroup_sum(vec3 v) {
+    return vec3(subgroup_sum(v.x), subgroup_sum(v.y), subgroup_sum(v.z));
+}
+#endif
+
+// The sum in the device's own order.
+float subgroup_add(float v) {
+#ifdef EMULATED
+    return subgroup_sum(v);
+#else
+    return subgroupAdd(v);
+#endif
+}

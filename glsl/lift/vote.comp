@@ -103,10 +103,11 @@ void main() {
             sum[q] = 0.0;
         }
         for (uint j = 0u; j < count; j++) {
-            float x = subgroupShuffle(r0.x, j) - corner.x, y = subgroupShuffle(r0.y, j) - corner.y;
-            float a = subgroupShuffle(r0.z, j), b = subgroupShuffle(r0.w, j), c = subgroupShuffle(r1.x, j);
+            vec3 place = subgroup_shuffle(vec3(r0.xy, r1.y), j), conic = subgroup_shuffle(vec3(r0.zw, r1.x), j);
+            float x = place.x - corner.x, y = place.y - corner.y;
+            float a = conic.x, b = conic.y, c = conic.z;
             float dx = x - t.px;
-            float ax = subgroupShuffle(r1.y, j) + a * dx * dx, bx = b * dx;
+            float ax = place.z + a * dx * dx, bx = b * dx;
             float dy0 = y - t.row0;
             float part[LABELS_PER_WALK];
             [[unroll]] for (uint q = 0u; q < LABELS_PER_WALK; q++) {

@@ -2,6 +2,7 @@
 #include "layout.glsl"
 #include "constants.glsl"
 #include "step.glsl"
+#include "subgroup.glsl"
 // loss_columns_backward — last of four: vertical window, gradient of L1 and SSIM with respect to the image, loss sums.
 // Work:    64 columns per workgroup, strips of STRIP rows.
 // Reads:   step; v_rows [3, P]; image [P]; target [P]
@@ -66,9 +67,9 @@ void main() {
         }
     }
     losses = x < width ? losses : vec2(0.0);
-    vec2 total = vec2(subgroupAdd(losses.x), subgroupAdd(losses.y));
-    if (subgroupElect()) {
-        uint groups = gl_NumWorkGroups.x * gl_NumSubgroups;
-        loss_partials[gl_WorkGroupID.y * groups + gl_WorkGroupID.x * gl_NumSubgroups + gl_SubgroupID] = total;
+    vec2 total = vec2(subgroup_add(losses.x), subgroup_add(losses.y));
+    if (subgroup_elect()) {
+        uint subgroups = gl_NumWorkGroups.x * 64u / SUBGROUP_SIZE;
+        loss_partials[gl_WorkGroupID.y * subgroups + gl_GlobalInvocationID.x / SUBGROUP_SIZE] = total;
     }
 }

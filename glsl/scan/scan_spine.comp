@@ -10,7 +10,7 @@
 // Order:   exact integers, equal in every run.
 // Mirror:  src/verify/reference/scan.rs::exclusive_scan
 
-layout(constant_id = 0) const uint SUBGROUP_SIZE = 8;
+#include "subgroup.glsl"
 layout(constant_id = 6) const uint LANES = 64;
 layout(constant_id = 7) const uint TOTAL = 0; // 0 visible, 1 instances, 2 layer tiles, 3 densified
 layout(local_size_x_id = 0) in;
@@ -26,8 +26,8 @@ void main() {
         sum = saturating_add(sum, partials[i]);
     }
     // The sum is split into two halves; neither can overflow.
-    uint low = subgroupExclusiveAdd(sum & 0xffffu);
-    uint high = subgroupExclusiveAdd(sum >> 16u) + (low >> 16u);
+    uint low = subgroup_exclusive_add(sum & 0xffffu);
+    uint high = subgroup_exclusive_add(sum >> 16u) + (low >> 16u);
     uint running = high > 0xffffu ? 0xffffffffu : (high << 16u) | (low & 0xffffu);
     if (lane == SUBGROUP_SIZE - 1u) {
         uint total = saturating_add(running, sum);

@@ -8,7 +8,7 @@
 // Order:   exact integers, equal in every run.
 // Mirror:  src/verify/reference/sort.rs::radix_sort
 
-layout(constant_id = 0) const uint SUBGROUP_SIZE = 8;
+#include "subgroup.glsl"
 layout(constant_id = 6) const uint CELLS = 8192;
 layout(local_size_x_id = 0) in;
 INOUT(0, uint, histogram);
@@ -21,7 +21,7 @@ void main() {
     for (uint i = begin; i < end; i += 4u) {
         sum += histogram[i] + histogram[i + 1u] + histogram[i + 2u] + histogram[i + 3u];
     }
-    uint running = subgroupExclusiveAdd(sum);
+    uint running = subgroup_exclusive_add(sum);
     for (uint i = begin; i < end; i += 4u) {
         uvec4 v = uvec4(histogram[i], histogram[i + 1u], histogram[i + 2u], histogram[i + 3u]);
         histogram[i] = running;

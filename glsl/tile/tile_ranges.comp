@@ -3,6 +3,7 @@
 #include "constants.glsl"
 #include "step.glsl"
 #include "dispatch.glsl"
+#include "subgroup.glsl"
 // tile_ranges — find the start and end of each tile's list among the sorted pairs, the longest list, and (variant
 // labels) the occupied tiles of object layers.
 // Work:    one tile of one layer per invocation; the grid covers the step's layers. There are far fewer tiles than
@@ -40,8 +41,8 @@ void main() {
     bool some = t < step.tile_count * (step.layer_count + 1u);
     uint count = some && failure == 0u ? counters.instance_count : 0u;
     uint start = first_not_less(t, count), end = first_not_less(t + 1u, count);
-    uint longest = subgroupMax(end - start);
-    if (subgroupElect() && longest > 0u) {
+    uint longest = subgroup_max(end - start);
+    if (subgroup_elect() && longest > 0u) {
         atomicMax(counters.longest_list, longest);
     }
     if (some) {

@@ -50,7 +50,8 @@ pub(crate) fn shape_of(device: &Capabilities) -> KernelShape {
 /// Returns the kernel shape as text.
 pub(crate) fn shape_text(shape: &KernelShape) -> String {
     format!(
-        "subgroups of {}, tiles of {} x {} px, {} reads, sort digits of {} bits",
+        "{}subgroups of {}, tiles of {} x {} px, {} reads, sort digits of {} bits",
+        if shape.emulated { "emulated " } else { "" },
         shape.subgroup,
         shape.tile_width,
         shape.tile_height,
@@ -63,6 +64,7 @@ pub(crate) fn shape_text(shape: &KernelShape) -> String {
 pub(crate) fn shape_json(shape: &KernelShape) -> Value {
     json!({
         "subgroup_size": shape.subgroup,
+        "emulated": shape.emulated,
         "tile": [shape.tile_width, shape.tile_height],
         "reads": reads(shape),
         "digit_bits": shape.digit_bits,

@@ -11,7 +11,6 @@ use crate::run::Settings;
 use crate::scene::{Dataset, Gaussians, View};
 use crate::scheduler::SchedulerOptions;
 use crate::train::near::NEAR;
-use crate::verify::selftest;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -24,18 +23,8 @@ pub fn near_plane(model: &Path, typed: Option<f32>) -> Result<f32> {
     }
 }
 
-/// Opens the chosen device and logs its name. If its subgroup size cannot be set, it runs a trial step first.
+/// Opens the chosen device and logs its name.
 pub(crate) fn open_gpu(context: &Context) -> Result<Arc<Gpu>> {
-    let gpu = open_untried(context)?;
-    if !gpu.capabilities().subgroup.is_pinned {
-        tracing::info!("the subgroup size of this device cannot be set: running a trial step first");
-        selftest::canary(&gpu)?;
-    }
-    Ok(gpu)
-}
-
-/// Opens the chosen device without a trial step.
-pub(crate) fn open_untried(context: &Context) -> Result<Arc<Gpu>> {
     let mut options = GpuOptions::from_env()?;
     if let Some(device) = &context.global.device {
         options.device = Some(device.clone());

@@ -3,7 +3,7 @@
 use super::args::JsonFlag;
 use super::context::Context;
 use super::devices::{needs_json, needs_text, shape_json, shape_text};
-use super::scene::open_untried;
+use super::scene::open_gpu;
 use super::stdout;
 use crate::pass::KernelShape;
 use crate::verify::selftest::{self, Check};
@@ -21,7 +21,7 @@ pub struct SelftestArgs {
 
 /// Runs the checks and prints a row for each. Fails if a check fails.
 pub(crate) fn run(args: &SelftestArgs, context: &Context) -> Result<()> {
-    let gpu = open_untried(context)?;
+    let gpu = open_gpu(context)?;
     let (found, kernels) = (gpu.capabilities(), KernelShape::of(gpu.capabilities()));
     let as_json = context.json || args.json.json;
     if !as_json {

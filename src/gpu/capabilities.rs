@@ -1,8 +1,10 @@
 //! Properties and features of a device, and the engine's requirements.
 
+use super::GpuOptions;
 use super::limits::Limits;
 use crate::error::{Error, Result};
 use ash::vk;
+use std::fmt;
 
 /// Kind of a device.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -37,7 +39,17 @@ pub struct Need {
 }
 
 /// Smallest subgroup size with kernels.
-pub(crate) const SUBGROUP_MIN: u32 = 8;
+pub(crate) const SUBGROUP_MIN: u32 = 4;
+/// Smallest size of the device's own subgroups that kernels use; smaller ones are emulated.
+const OWN_SUBGROUP_MIN: u32 = 8;
+/// Size of emulated subgroups on cards.
+const EMULATED_SUBGROUP: u32 = 32;
+/// Subgroup operations that the kernels use.
+const SUBGROUP_OPERATIONS: vk::SubgroupFeatureFlags = vk::SubgroupFeatureFlags::from_raw(
+    vk::SubgroupFeatureFlags::BASIC.as_raw()
+        | vk::SubgroupFeatureFlags::ARITHMETIC.as_raw()
+        | vk::SubgroupFeatureFlags::SHUFFLE.as_raw(),
+);
 /// Largest subgroup size with kernels: a strip of the loss and the longest butterfly have 64 lanes.
 pub(crate) const SUBGROUP_MAX: u32 = 64;
 
@@ -46,33 +58,64 @@ pub(crate) const SUBGROUP_MAX: u32 = 64;
 pub struct Subgroup {
     /// Subgroup size of the engine's pipelines.
     pub size: u32,
-    /// Smallest size that can be pinned.
+    /// Smallest size to choose from.
     pub min: u32,
-    /// Largest size that can be pinned.
+    /// Largest size to choose from.
     pub max: u32,
     /// Maximum number of subgroups per workgroup with a pinned size.
     pub max_per_group: u32,
-    /// True if the size is pinned. If false, the driver chooses the size, which may differ from its reported default.
+    /// True if the device lets the size be pinned. If false, the driver chooses the size, which may differ from its
+    /// reported default.
     pub is_pinned: bool,
+    /// True if kernels do without the device's subgroups: neighbouring invocations exchange values through shared
+    /// memory.
+    pub is_emulated: bool,
     /// Subgroup operations available in compute shaders.
     pub operations: vk::SubgroupFeatureFlags,
 }
 
 impl Subgroup {
+    /// True if the device has the operations that the kernels use.
+    pub(super) fn has_operations(&self) -> bool {
+        self.operations.contains(SUBGROUP_OPERATIONS)
+    }
+
+    /// True if the kernels can use subgroups of the device's default size.
+    pub(super) fn has_size(&self) -> bool {
+        (OWN_SUBGROUP_MIN..=SUBGROUP_MAX).contains(&self.size)
+    }
+
+    /// True if the kernels can use the device's own subgroups.
+    pub(super) fn serves(&self) -> bool {
+        self.is_pinned && self.has_size() && self.has_operations()
+    }
+
+    /// Has subgroups of any size emulated. A processor keeps the width of its vectors.
+    pub(super) fn emulate(&mut self, is_cpu: bool) {
+        (self.is_emulated, self.min, self.max) = (true, SUBGROUP_MIN, SUBGROUP_MAX);
+        self.size = if is_cpu && self.size.is_power_of_two() { self.size } else { EMULATED_SUBGROUP };
+        self.size = self.size.clamp(self.min, self.max);
+    }
+
     /// Sets the subgroup size.
     pub(super) fn pin(&mut self, size: Option<u32>) -> Result<()> {
         let Some(size) = size.filter(|&size| size != self.size) else { return Ok(()) };
         let (min, max) = (self.min, self.max);
-        if !self.is_pinned || !size.is_power_of_two() || !(min..=max).contains(&size) {
-            let offered =
-                if self.is_pinned { format!("powers of two from {min} to {max}") } else { self.size.to_string() };
+        if !size.is_power_of_two() || !(min..=max).contains(&size) {
             return Err(Error::usage(
                 "subgroup size",
-                format!("this device has no subgroups of {size}; it offers {offered}"),
+                format!("this device has no subgroups of {size}; it offers powers of two from {min} to {max}"),
             ));
         }
         self.size = size;
         Ok(())
+    }
+}
+
+impl fmt::Display for Subgroup {
+    /// `subgroups of 32`, or `emulated subgroups of 32`.
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(formatter, "{}subgroups of {}", if self.is_emulated { "emulated " } else { "" }, self.size)
     }
 }
 
@@ -120,6 +163,14 @@ impl Capabilities {
     /// True if the device is the host's processor.
     pub fn is_cpu(&self) -> bool {
         self.kind == DeviceKind::Cpu
+    }
+
+    /// Sets the subgroups that the options ask for.
+    pub(super) fn choose_subgroup(&mut self, options: &GpuOptions) -> Result<()> {
+        if options.emulate_subgroups {
+            self.subgroup.emulate(self.is_cpu());
+        }
+        self.subgroup.pin(options.subgroup_size)
     }
 
     /// Requirements that the device does not meet.

@@ -13,7 +13,7 @@ pub fn devices(options: &GpuOptions) -> Result<(Vec<Capabilities>, Option<usize>
     let picked = select::pick(&instance, options.device.as_deref()).ok().map(|(_, device)| device.index);
     for device in &mut found {
         // A device without this subgroup size keeps its own; opening it reports the error.
-        let _ = device.subgroup.pin(options.subgroup_size);
+        let _ = device.choose_subgroup(options);
     }
     Ok((found, picked))
 }

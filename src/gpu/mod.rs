@@ -56,22 +56,26 @@ pub struct GpuOptions {
     pub validation: Validation,
     /// Bounds checks of the driver on every buffer access.
     pub robust_buffer_access: bool,
-    /// Pinned subgroup size; `None` for the device's default.
+    /// Subgroup size, a power of two that the device offers; `None` for the device's default.
     pub subgroup_size: Option<u32>,
+    /// Emulates subgroups through shared memory, as on devices whose own subgroups do not serve: slower, but every size
+    /// from 4 to 64 runs on every device.
+    pub emulate_subgroups: bool,
     /// Storage of compiled pipelines between runs; `None` to keep none.
     pub pipelines: Option<Arc<dyn PipelineStore>>,
 }
 
 impl GpuOptions {
     /// Reads options from `LABELGS_DEVICE` and `LABELGS_VALIDATION` (`off`, `on`, `sync`, `gpu`); in tests also from
-    /// `LABELGS_SUBGROUP_SIZE`.
+    /// `LABELGS_SUBGROUP_SIZE` and `LABELGS_EMULATE`.
     pub fn from_env() -> Result<Self> {
         let set = |name| std::env::var(name).ok().filter(|value| !value.is_empty());
         let validation = set("LABELGS_VALIDATION").map(|value| value.parse()).transpose()?.unwrap_or_default();
         let subgroup_size = lab::var("LABELGS_SUBGROUP_SIZE")
             .map(|value| value.parse().map_err(|_| Error::usage("LABELGS_SUBGROUP_SIZE", "expected a whole number")))
             .transpose()?;
-        Ok(Self { device: set("LABELGS_DEVICE"), validation, subgroup_size, ..Self::default() })
+        let emulate_subgroups = lab::var("LABELGS_EMULATE").is_some();
+        Ok(Self { device: set("LABELGS_DEVICE"), validation, subgroup_size, emulate_subgroups, ..Self::default() })
     }
 }
 
@@ -93,7 +97,7 @@ impl Gpu {
     pub fn new(options: &GpuOptions) -> Result<Arc<Self>> {
         let instance = Instance::new(options.validation)?;
         let (physical, mut capabilities) = select::pick(&instance, options.device.as_deref())?;
-        capabilities.subgroup.pin(options.subgroup_size)?;
+        capabilities.choose_subgroup(options)?;
         let device = select::open(&instance, physical, &capabilities, options.robust_buffer_access)?;
         // SAFETY: the device has this family and was created with one queue of it.
         let queue = unsafe { device.get_device_queue(capabilities.queue_family, 0) };

@@ -1,19 +1,15 @@
 //! Queries that fill [`Capabilities`].
 
 use super::call::vk_call;
-use super::capabilities::{Capabilities, DeviceKind, Features, Need, SUBGROUP_MAX, SUBGROUP_MIN, Subgroup};
+use super::capabilities::{Capabilities, DeviceKind, Features, Need, SUBGROUP_MAX, Subgroup};
 use super::hidden::Hidden;
 use super::limits::{Limits, PlanLimits};
 use crate::error::Result;
 use crate::shaders::{self, BindingKind, ShaderDesc};
 use ash::vk;
 
-/// Subgroup operations that the kernels use.
-const SUBGROUP_OPERATIONS: vk::SubgroupFeatureFlags = vk::SubgroupFeatureFlags::from_raw(
-    vk::SubgroupFeatureFlags::BASIC.as_raw()
-        | vk::SubgroupFeatureFlags::ARITHMETIC.as_raw()
-        | vk::SubgroupFeatureFlags::SHUFFLE.as_raw(),
-);
+/// Least memory of a device: one block of the allocator. A driver that only compiles has none at all.
+const MEMORY_MIN: u64 = 64 << 20;
 
 impl Capabilities {
     /// Queries a device.
@@ -73,6 +69,9 @@ impl Capabilities {
             size_control_is_extension: has_size_control && !is_1_3,
         };
         found.needs = needs(&found, family.is_some());
+        if !found.subgroup.serves() {
+            found.subgroup.emulate(found.is_cpu());
+        }
         Ok(found)
     }
 }
@@ -192,50 +191,46 @@ fn subgroup(
         max,
         max_per_group: if is_pinned { control.max_compute_workgroup_subgroups } else { u32::MAX },
         is_pinned,
+        is_emulated: false,
         operations: if in_compute { eleven.subgroup_supported_operations } else { none },
     }
 }
 
 /// Compares the requirements and optional features with the device.
 fn needs(found: &Capabilities, has_queue: bool) -> Vec<Need> {
-    let (limits, features, subgroup) = (&found.limits, &found.features, &found.subgroup);
+    let (limits, features) = (&found.limits, &found.features);
     let (major, minor, patch) = found.api_version;
     let flag = |what, is_met, reason| need(what, is_met, "yes", if is_met { "yes" } else { "no" }.to_owned(), reason);
     let least = |what, needed: u32, found: u32, reason| {
         need(what, found >= needed, &needed.to_string(), found.to_string(), reason)
     };
     let bindings = shaders::ALL.iter().map(|shader| storage_bindings(shader)).max().unwrap_or(0);
-    let shuffles = subgroup.operations.contains(SUBGROUP_OPERATIONS);
     let mut needs = vec![
         need("Vulkan", (major, minor) >= (1, 2), "1.2", format!("{major}.{minor}.{patch}"), "everything"),
         flag("compute queue", has_queue, "everything"),
+        need("memory", limits.heap >= MEMORY_MIN, "64 MiB", format!("{} MiB", limits.heap >> 20), "everything"),
         flag("scalarBlockLayout", features.scalar, "one layout for shaders and host"),
         flag("timelineSemaphore", features.timeline, "two steps in flight"),
-        flag("subgroup shuffle, arithmetic", shuffles, "blending without shared memory"),
-        need(
-            "subgroup size",
-            (SUBGROUP_MIN..=SUBGROUP_MAX).contains(&subgroup.size),
-            &format!("{SUBGROUP_MIN} to {SUBGROUP_MAX}"),
-            subgroup.size.to_string(),
-            "one tile per subgroup",
-        ),
         least("workgroup size", 256, limits.max_invocations, "scan and sort"),
         least("storage buffers per shader", bindings, limits.plan.max_storage_buffers, "bindings of the largest pass"),
     ];
-    needs.extend(wishes(limits, subgroup));
+    needs.extend(wishes(limits, &found.subgroup));
     needs
 }
 
 /// Optional features; without them, the engine runs with a drawback.
-fn wishes(limits: &Limits, subgroup: &Subgroup) -> [Need; 3] {
+fn wishes(limits: &Limits, subgroup: &Subgroup) -> [Need; 5] {
     let wish = |what, is_met, found: String, reason| Need {
         is_required: false,
         ..need(what, is_met, "wished", found, reason)
     };
+    let operations = if subgroup.has_operations() { "yes" } else { "no" }.to_owned();
     let pins = format!("{} of {}..{}", subgroup.size, subgroup.min, subgroup.max);
     let (range, bits, period) = (limits.plan.max_storage_range, limits.timestamp_bits, limits.timestamp_period);
     [
-        wish("pinned subgroup size", subgroup.is_pinned, pins, "else a step is tried before the work"),
+        wish("subgroup shuffle, arithmetic", subgroup.has_operations(), operations, "else through shared memory"),
+        wish("subgroups of 8 to 64", subgroup.has_size(), subgroup.size.to_string(), "else through shared memory"),
+        wish("pinned subgroup size", subgroup.is_pinned, pins, "else through shared memory"),
         wish("storage binding of 1 GiB", range >= 1 << 30, format!("{range} B"), "bounds the number of Gaussians"),
         wish("timestamps", bits > 0, format!("{bits} bits, {period} ns"), "time of each pass"),
     ]

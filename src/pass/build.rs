@@ -53,21 +53,21 @@ impl Builder<'_> {
         grid: Grid,
     ) {
         let macros = macros.iter().filter(|(_, on)| *on != 0).map(|(name, _)| *name).collect();
-        let shader = variant(kernel, macros, self.shape.texel);
+        let shader = variant(kernel, macros, self.shape);
         let buffers = shader.bindings.iter().filter_map(|binding| value(buffers, binding.name)).collect();
         let words = shader.spec.iter().filter_map(|constant| value(constants, constant.name)).collect();
         self.list.pass(PassDecl::new(shader, buffers, grid).spec(words));
     }
 }
 
-/// Finds the variant with these macros; adds `TEXEL` if `texel` is set and the kernel reads texels.
-fn variant(kernel: &'static [Compiled], mut macros: Vec<&str>, texel: bool) -> &'static ShaderDesc {
-    let find = |macros: &[&str]| kernel.iter().find(|compiled| compiled.macros == macros);
+/// Finds the variant with these macros and those of the shape. A kernel without texel reads or subgroup operations has
+/// no such variant.
+fn variant(kernel: &'static [Compiled], mut macros: Vec<&str>, shape: &KernelShape) -> &'static ShaderDesc {
+    let of_shape = [("EMULATED", shape.emulated), ("TEXEL", shape.texel)];
+    let known = |name| kernel.iter().any(|compiled| compiled.macros.contains(&name));
+    macros.extend(of_shape.into_iter().filter(|&(name, on)| on && known(name)).map(|(name, _)| name));
     macros.sort_unstable();
-    let plain = find(&macros);
-    macros.extend(texel.then_some("TEXEL"));
-    macros.sort_unstable();
-    let found = find(&macros).or(plain);
+    let found = kernel.iter().find(|compiled| compiled.macros == macros);
     &found.unwrap_or_else(|| panic!("{} is not compiled with {macros:?}", kernel[0].shader.name)).shader
 }
 
@@ -114,22 +114,27 @@ pub(crate) use pass;
 
 #[cfg(test)]
 mod tests {
-    use super::variant;
+    use super::{KernelShape, variant};
     use crate::shaders::blend_forward::VARIANTS;
 
     #[test]
     fn the_variant_has_the_macros_that_are_on() {
-        let name = |macros: &[&'static str], texel| variant(&VARIANTS, macros.to_vec(), texel).name;
-        assert_eq!(name(&[], false), "blend_forward");
-        assert_eq!(name(&["SEGMENTED", "LABELS"], false), "blend_forward_labels_segmented");
-        assert_eq!(name(&["MAIN"], true), "blend_forward_main_texel");
-        // A kernel without texel reads has no `TEXEL` variant.
-        assert_eq!(variant(&crate::shaders::radix_scan::VARIANTS, Vec::new(), true).name, "radix_scan");
+        let card = KernelShape::new(32, false);
+        let cpu = KernelShape { texel: true, ..card };
+        let emulated = KernelShape { emulated: true, ..cpu };
+        let name = |macros: &[&'static str], shape| variant(&VARIANTS, macros.to_vec(), shape).name;
+        assert_eq!(name(&[], &card), "blend_forward");
+        assert_eq!(name(&["SEGMENTED", "LABELS"], &card), "blend_forward_labels_segmented");
+        assert_eq!(name(&["MAIN"], &cpu), "blend_forward_main_texel");
+        assert_eq!(name(&["MAIN"], &emulated), "blend_forward_main_emulated_texel");
+        // No texel reads here, and no subgroup operations there.
+        assert_eq!(variant(&crate::shaders::radix_scan::VARIANTS, Vec::new(), &emulated).name, "radix_scan_emulated");
+        assert_eq!(variant(&crate::shaders::radix_count::VARIANTS, Vec::new(), &emulated).name, "radix_count_texel");
     }
 
     #[test]
     #[should_panic(expected = "blend_forward is not compiled with [\"LABELS\", \"MAIN\"]")]
     fn macros_that_no_variant_has_end_the_program() {
-        variant(&VARIANTS, vec!["MAIN", "LABELS"], false);
+        variant(&VARIANTS, vec!["MAIN", "LABELS"], &KernelShape::new(32, false));
     }
 }

@@ -1,4 +1,4 @@
-//! Kernel shape of a device: subgroup size, tile size, texel or storage reads, digit width of the sort.
+//! Kernel shape of a device: subgroups, tile size, texel or storage reads, digit width of the sort.
 
 use crate::error::{Error, Result};
 use crate::gpu::{Capabilities, SUBGROUP_MAX, SUBGROUP_MIN};
@@ -6,8 +6,10 @@ use crate::gpu::{Capabilities, SUBGROUP_MAX, SUBGROUP_MIN};
 /// Shape of the kernels, fixed for a device.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct KernelShape {
-    /// Invocations per subgroup: 8, 16, 32 or 64.
+    /// Invocations per subgroup: 4, 8, 16, 32 or 64.
     pub subgroup: u32,
+    /// Subgroup operations go through shared memory: workgroups of any size then serve as subgroups.
+    pub emulated: bool,
     /// Tile width, px.
     pub tile_width: u32,
     /// Tile height, px.
@@ -33,18 +35,21 @@ impl KernelShape {
     /// Returns the shape for a device.
     pub fn of(device: &Capabilities) -> Self {
         let shape = Self::new(device.subgroup.size, device.is_cpu());
-        Self { texel: shape.texel && device.limits.plan.max_texel_elements >= TEXELS_MIN, ..shape }
+        let texel = shape.texel && device.limits.plan.max_texel_elements >= TEXELS_MIN;
+        Self { texel, emulated: device.subgroup.is_emulated, ..shape }
     }
 
     /// Returns the shape for a subgroup size; `cpu` is true if the device is a processor.
     pub fn new(subgroup: u32, cpu: bool) -> Self {
         let (tile_width, tile_height) = match subgroup {
-            ..=8 => (8, 8),
+            ..=4 => (4, 8),
+            8 => (8, 8),
             16 => (16, 8),
             _ => (16, 16),
         };
         Self {
             subgroup,
+            emulated: false,
             tile_width,
             tile_height,
             texel: cpu,

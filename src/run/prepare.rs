@@ -201,7 +201,7 @@ fn facts(request: &Request, masks: Option<&Path>, gpu: &Gpu) -> Vec<(&'static st
     let mut facts = vec![
         ("scene", request.scene.display().to_string()),
         ("device", format!("{} ({} {})", found.name, found.driver_name, found.driver_info)),
-        ("subgroup size", gpu.subgroup_size().to_string()),
+        ("subgroups", found.subgroup.to_string()),
     ];
     if let Some(masks) = masks {
         facts.push(("masks", masks.display().to_string()));

@@ -26,7 +26,7 @@ use std::sync::Arc;
 pub struct TrainState {
     /// Version of labelgs that wrote it.
     pub labelgs: String,
-    /// Device, driver and subgroup size. Others round differently.
+    /// Device, driver and subgroups. Others round differently.
     pub device: String,
     /// Number of finished steps.
     pub step: u32,
@@ -266,5 +266,5 @@ impl Trainer {
 fn device(gpu: &Gpu) -> String {
     let found = gpu.capabilities();
     let driver = format!("{} {}", found.driver_name, found.driver_info);
-    format!("{} ({driver}, subgroups of {})", found.name, gpu.subgroup_size())
+    format!("{} ({driver}, {})", found.name, found.subgroup)
 }

@@ -217,7 +217,7 @@ fn declare_variants(glsl: &Path, shaders: &mut Vec<Shader>, lab: bool) -> Result
         if shaders.iter().any(|shader| shader.stem == full) {
             findings.push(Finding::new(place.clone(), format!("`{full}` is a shader's name already")));
         }
-        if line.stem != "*" && !shaders.iter().any(|shader| shader.stem == line.stem) {
+        if line.prefix().is_none() && !shaders.iter().any(|shader| shader.stem == line.stem) {
             findings.push(Finding::new(place, format!("there is no shader `{}`", line.stem)));
             continue;
         }
@@ -225,9 +225,12 @@ fn declare_variants(glsl: &Path, shaders: &mut Vec<Shader>, lab: bool) -> Result
             declare_sibling(shaders, line);
         } else {
             shaders.iter_mut().filter(|shader| line.applies_to(shader)).for_each(|shader| {
-                let defines = [shader.variants[0].defines.clone(), line.defines.clone()].concat();
-                let name = format!("{}_{}", shader.stem, line.suffix);
-                shader.variants.push(Variant { name, defines, ..Variant::default() });
+                let from = if line.prefix().is_some() { shader.variants.len() } else { 1 };
+                for base in shader.variants[..from].to_vec() {
+                    let defines = [base.defines, line.defines.clone()].concat();
+                    let name = format!("{}_{}", base.name, line.suffix);
+                    shader.variants.push(Variant { name, defines, ..Variant::default() });
+                }
             });
         }
     }

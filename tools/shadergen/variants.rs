@@ -1,7 +1,7 @@
 //! Parser of `glsl/variants.txt`: which shaders are compiled more than once, and with which macros.
 //!
 //! `stem + suffix: DEFINE OTHER=4` compiles `stem.comp` once more as `stem_suffix`, with the same interface.
-//! `* + suffix: DEFINE` does so for every shader that fetches through FETCH4, FETCHU or FETCHC.
+//! `call* + suffix: DEFINE` does so for every shader that calls a function of this prefix, and for its variants so far.
 //! `sibling = stem: DEFINE` makes a shader of its own, with an interface of its own, from the same file.
 //! `lab: STEM STEM` leaves these shaders out of builds without the feature `lab`.
 //! Every stem has its base variant without macros; it needs no line. Lines work in order: a `*` reaches the siblings
@@ -16,7 +16,7 @@ const LAB: &str = "lab:";
 /// One line of the file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct VariantLine {
-    /// Stem of the shader file, or `*`.
+    /// Stem of the shader file, or a prefix of functions and `*`.
     pub stem: String,
     /// Suffix of the variant after the stem; for a sibling its own stem.
     pub suffix: String,
@@ -31,8 +31,13 @@ pub struct VariantLine {
 impl VariantLine {
     /// Whether the line adds a variant to this shader.
     pub fn applies_to(&self, shader: &super::Shader) -> bool {
-        let fetches = || ["FETCH4(", "FETCHU(", "FETCHC("].iter().any(|word| shader.source.contains(word));
-        !self.sibling && (self.stem == shader.stem || (self.stem == "*" && fetches()))
+        let calls = |prefix| calls(&shader.source, prefix);
+        !self.sibling && self.prefix().map_or(self.stem == shader.stem, calls)
+    }
+
+    /// The prefix of the functions whose callers get the variant.
+    pub fn prefix(&self) -> Option<&str> {
+        self.stem.strip_suffix('*')
     }
 }
 
@@ -69,6 +74,14 @@ pub fn of_lab<'a>(name: &str, text: &'a str) -> Vec<(String, &'a str)> {
     text.lines().enumerate().flat_map(of_line).collect()
 }
 
+/// Whether a text calls a function whose name begins with `prefix`.
+fn calls(source: &str, prefix: &str) -> bool {
+    let is_name = |c: char| c.is_ascii_alphanumeric() || c == '_';
+    source
+        .match_indices(prefix)
+        .any(|(at, _)| !source[..at].ends_with(is_name) && source[at..].trim_start_matches(is_name).starts_with('('))
+}
+
 fn content(raw: &str) -> &str {
     raw.split('#').next().unwrap_or("").trim()
 }
@@ -87,7 +100,7 @@ fn parse_line(content: &str, line: usize) -> Option<VariantLine> {
             None => (text.to_owned(), None),
         })
         .collect();
-    let named = is_snake_case(&stem) || (stem == "*" && !sibling);
+    let named = is_snake_case(&stem) || (!sibling && stem.strip_suffix('*').is_some_and(is_snake_case));
     let good = named && is_snake_case(&suffix) && suffix != "base" && !defines.is_empty();
     good.then_some(VariantLine { stem, suffix, sibling, defines, line })
 }

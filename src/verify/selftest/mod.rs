@@ -8,7 +8,7 @@ pub mod model;
 pub mod scenes;
 mod training;
 
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::pass::KernelShape;
 use crate::verify::reference::Rules;
@@ -33,31 +33,6 @@ impl Check {
     pub fn worst(&self) -> Option<f64> {
         self.verdict.as_ref().ok().map(|summary| summary.worst.max(summary.whole))
     }
-}
-
-/// Compares one step with the reference. For drivers that do not let subgroup sizes be chosen: kernels for a wrong
-/// subgroup size compute nonsense and write out of bounds.
-pub fn canary(gpu: &Arc<Gpu>) -> Result<()> {
-    let found = gpu.capabilities();
-    let step = || -> Result<Verdict> {
-        let mut ran = Ran::new(&Rules::default(), gpu, KernelShape::of(found))?;
-        Ok(judge::all([ran.tiles()?, ran.blend()?, ran.loss()?, ran.gradient()?]))
-    };
-    let problem = match step() {
-        Ok(Ok(_)) => return Ok(()),
-        Ok(Err(problem)) => problem,
-        Err(lost @ Error::DeviceLost { .. }) => return Err(lost),
-        // A nonsensical prefix sum may request all memory.
-        Err(other) => other.to_string(),
-    };
-    Err(Error::NoDevice(format!(
-        "{} ({} {}) tells of subgroups of {} and does not let their size be chosen; a step with such subgroups goes wrong \
-         ({problem}); try another version of the driver or another device",
-        found.name,
-        found.driver_name,
-        found.driver_info,
-        gpu.subgroup_size()
-    )))
 }
 
 /// Runs every check on a device and passes each to `done` when it ends. An error is a failure of the device itself,
