@@ -10,7 +10,24 @@ float uniform_draw(uint seed, uint index, uint draw) { // in (0, 1)
     return (float(pcg_hash(pcg_hash(pcg_hash(seed) + index) + draw) >> 8) + 0.5) * (1.0 / 16777216.0);
 }
 
+// Vulkan lets `cos` err by 5e-4, and `log` by 5e-7 where it is near zero. Drivers use this, so series stand in for both.
+
+float cos_of_turns(float turns) { // turns in [0, 1]; Taylor series over a quarter of a turn
+    float half_turn = abs(turns - 0.5); // cos(2 pi turns) = -cos(2 pi half_turn)
+    bool second = half_turn > 0.25;
+    float x = 6.2831853071795865 * (second ? 0.5 - half_turn : half_turn), y = x * x;
+    float c = 1.0 + y * (-1.0 / 2.0 + y * (1.0 / 24.0 + y * (-1.0 / 720.0 + y * (1.0 / 40320.0
+        + y * (-1.0 / 3628800.0 + y * (1.0 / 479001600.0))))));
+    return second ? c : -c;
+}
+
+float minus_log(float u) { // u in (0, 1)
+    float x = 1.0 - u;
+    float series = x * (1.0 + x * (1.0 / 2.0 + x * (1.0 / 3.0 + x * (1.0 / 4.0 + x * (1.0 / 5.0 + x * (1.0 / 6.0))))));
+    return x < 0.0625 ? series : -log(u);
+}
+
 float normal_draw(uint seed, uint index, uint draw) { // Box and Muller
-    float r = sqrt(-2.0 * log(uniform_draw(seed, index, 2u * draw)));
-    return r * cos(6.2831853071795865 * uniform_draw(seed, index, 2u * draw + 1u));
+    float r = sqrt(2.0 * minus_log(uniform_draw(seed, index, 2u * draw)));
+    return r * cos_of_turns(uniform_draw(seed, index, 2u * draw + 1u));
 }
