@@ -2,6 +2,7 @@
 
 use super::args::JsonFlag;
 use super::context::Context;
+use super::kernels;
 use super::stdout;
 use crate::gpu::{self, Capabilities, GpuOptions, Need};
 use crate::pass::KernelShape;
@@ -15,12 +16,18 @@ pub struct DevicesArgs {
     /// JSON.
     #[command(flatten)]
     pub json: JsonFlag,
+    /// Compile every kernel, and print what the driver tells of it: registers, spills, instructions. Fails if one spills.
+    #[arg(long)]
+    pub kernels: bool,
 }
 
 /// Prints the devices. Fails if none is usable.
 pub(crate) fn run(args: &DevicesArgs, context: &Context) -> Result<()> {
     let mut options = GpuOptions::from_env()?;
     options.device = context.global.device.clone().or(options.device);
+    if args.kernels {
+        return kernels::run(options, context.json || args.json.json, context);
+    }
     let (devices, picked) = gpu::devices(&options)?;
     if context.json || args.json.json {
         let rows: Vec<Value> = devices.iter().map(|device| to_json(device, picked)).collect();

@@ -9,6 +9,7 @@ pub(crate) mod densify;
 pub(crate) mod devices;
 pub(crate) mod eval;
 pub(crate) mod interrupt;
+mod kernels;
 pub(crate) mod label;
 pub(crate) mod labelled;
 pub(crate) mod list;

@@ -38,6 +38,8 @@ pub struct Need {
     pub reason: &'static str,
 }
 
+/// The need for memory, which compiling does without.
+pub(super) const MEMORY: &str = "memory";
 /// Smallest subgroup size with kernels.
 pub(crate) const SUBGROUP_MIN: u32 = 4;
 /// Smallest size of the device's own subgroups that kernels use; smaller ones are emulated.
@@ -64,9 +66,11 @@ pub struct Subgroup {
     pub max: u32,
     /// Maximum number of subgroups per workgroup with a pinned size.
     pub max_per_group: u32,
-    /// True if the device lets the size be pinned. If false, the driver chooses the size, which may differ from its
-    /// reported default.
+    /// True if pipelines pin the size.
     pub is_pinned: bool,
+    /// True if the size is certain: it is pinned, or the device has only one. Else the driver chooses the size, which may
+    /// differ from its reported default.
+    pub is_certain: bool,
     /// True if kernels do without the device's subgroups: neighbouring invocations exchange values through shared
     /// memory.
     pub is_emulated: bool,
@@ -87,7 +91,7 @@ impl Subgroup {
 
     /// True if the kernels can use the device's own subgroups.
     pub(super) fn serves(&self) -> bool {
-        self.is_pinned && self.has_size() && self.has_operations()
+        self.is_certain && self.has_size() && self.has_operations()
     }
 
     /// Has subgroups of any size emulated. A processor keeps the width of its vectors.
@@ -128,6 +132,7 @@ pub(super) struct Features {
     pub(super) robust: bool,
     pub(super) size_control: bool,
     pub(super) full_subgroups: bool,
+    pub(super) statistics: bool,
 }
 
 /// Properties and features of a device.

@@ -10,7 +10,7 @@ use crate::error::Result;
 pub fn devices(options: &GpuOptions) -> Result<(Vec<Capabilities>, Option<usize>)> {
     let instance = Instance::new(Validation::Off)?;
     let mut found: Vec<Capabilities> = select::all(&instance)?.into_iter().map(|(_, device)| device).collect();
-    let picked = select::pick(&instance, options.device.as_deref()).ok().map(|(_, device)| device.index);
+    let picked = select::pick(&instance, options).ok().map(|(_, device)| device.index);
     for device in &mut found {
         // A device without this subgroup size keeps its own; opening it reports the error.
         let _ = device.choose_subgroup(options);

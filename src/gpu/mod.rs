@@ -21,6 +21,7 @@ mod pipeline;
 mod probe;
 mod query;
 mod select;
+mod statistics;
 mod timeline;
 
 pub use cache::PipelineStore;
@@ -30,6 +31,7 @@ pub use devices::devices;
 pub use instance::{Message, MessageLog, Validation};
 pub(crate) use limits::Limits;
 pub(crate) use memory::{Buffer, MemoryKind};
+pub use statistics::Statistic;
 
 pub(crate) use call::vk_call;
 pub(crate) use command::CommandBuffer;
@@ -61,6 +63,9 @@ pub struct GpuOptions {
     /// Emulates subgroups through shared memory, as on devices whose own subgroups do not serve: slower, but every size
     /// from 4 to 64 runs on every device.
     pub emulate_subgroups: bool,
+    /// Opens the device to ask for statistics of compiled kernels. It may then have no memory, like a driver that only
+    /// compiles.
+    pub statistics: bool,
     /// Storage of compiled pipelines between runs; `None` to keep none.
     pub pipelines: Option<Arc<dyn PipelineStore>>,
 }
@@ -85,6 +90,7 @@ pub struct Gpu {
     allocator: Mutex<Option<Allocator>>,
     queue: Mutex<vk::Queue>,
     names: Option<ash::ext::debug_utils::Device>,
+    statistics: Option<statistics::Functions>,
     cache: Mutex<cache::PipelineCache>,
     device: ash::Device,
     capabilities: Capabilities,
@@ -96,9 +102,9 @@ impl Gpu {
     /// Opens a device. The error lists all devices and the missing features of each.
     pub fn new(options: &GpuOptions) -> Result<Arc<Self>> {
         let instance = Instance::new(options.validation)?;
-        let (physical, mut capabilities) = select::pick(&instance, options.device.as_deref())?;
+        let (physical, mut capabilities) = select::pick(&instance, options)?;
         capabilities.choose_subgroup(options)?;
-        let device = select::open(&instance, physical, &capabilities, options.robust_buffer_access)?;
+        let device = select::open(&instance, physical, &capabilities, options)?;
         // SAFETY: the device has this family and was created with one queue of it.
         let queue = unsafe { device.get_device_queue(capabilities.queue_family, 0) };
         let allocator = Allocator::new(&AllocatorCreateDesc {
@@ -115,6 +121,7 @@ impl Gpu {
             Error::NoDevice(format!("the memory allocator does not start: {error}"))
         })?;
         let names = instance.has_debug_utils().then(|| ash::ext::debug_utils::Device::new(instance.raw(), &device));
+        let statistics = options.statistics.then(|| statistics::Functions::new(instance.raw(), &device));
         let cache = cache::PipelineCache::new(&device, &capabilities, options.pipelines.as_ref());
         Ok(Arc::new(Self {
             pipelines: Mutex::new(HashMap::new()),
@@ -122,6 +129,7 @@ impl Gpu {
             allocator: Mutex::new(Some(allocator)),
             queue: Mutex::new(queue),
             names,
+            statistics,
             device,
             capabilities,
             instance,
@@ -203,8 +211,10 @@ impl Gpu {
 
 impl Drop for Gpu {
     fn drop(&mut self) {
-        // A lost device reports an error here; it is destroyed nevertheless.
-        let _ = self.wait_idle();
+        // A lost device reports an error here; it is destroyed nevertheless. A driver that only compiles cannot wait.
+        if self.limits().heap > 0 {
+            let _ = self.wait_idle();
+        }
         lock(&self.pipelines).clear();
         lock(&self.cache).close(&self.device);
         // The allocator frees its blocks through the device's functions, so it is dropped first.

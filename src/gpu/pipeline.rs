@@ -31,8 +31,7 @@ impl Gpu {
     pub(crate) fn pipeline(&self, shader: &'static ShaderDesc, spec: &[u32]) -> Result<Arc<Pipeline>> {
         let spec =
             if spec.is_empty() { shader.spec.iter().map(|constant| constant.default).collect() } else { spec.to_vec() };
-        let pinned = shader.uses_subgroups && self.capabilities.subgroup.is_pinned;
-        let subgroup_size = pinned.then_some(self.capabilities.subgroup.size);
+        let subgroup_size = self.pinned(shader, self.subgroup_size());
         let spirv = shader.spirv.as_ptr() as usize;
         let key = PipelineKey { name: shader.name, spirv, spec, subgroup_size };
         if let Some(pipeline) = lock(&self.pipelines).get(&key) {
@@ -41,6 +40,11 @@ impl Gpu {
         // Created outside of the lock: this may take long, and two equal pipelines do no harm.
         let pipeline = Arc::new(Pipeline::new(self, shader, &key.spec, subgroup_size)?);
         Ok(Arc::clone(lock(&self.pipelines).entry(key).or_insert(pipeline)))
+    }
+
+    /// The subgroup size to pin for a shader, if it uses subgroups.
+    pub(super) fn pinned(&self, shader: &ShaderDesc, size: u32) -> Option<u32> {
+        (shader.uses_subgroups && self.capabilities.subgroup.is_pinned).then_some(size)
     }
 
     /// Width of a shader's workgroup. Fails if the workgroup is too large, because drivers differ in their reaction.
@@ -73,7 +77,12 @@ fn refused(gpu: &Gpu, shader: &ShaderDesc, error: Error) -> Error {
 }
 
 impl Pipeline {
-    fn new(gpu: &Gpu, shader: &'static ShaderDesc, spec: &[u32], subgroup_size: Option<u32>) -> Result<Self> {
+    pub(super) fn new(
+        gpu: &Gpu,
+        shader: &'static ShaderDesc,
+        spec: &[u32],
+        subgroup_size: Option<u32>,
+    ) -> Result<Self> {
         let width = gpu.check_workgroup(shader, spec, subgroup_size)?;
         let device = gpu.raw().clone();
         // From here on, dropping `pipeline` destroys its handles; destroying a null handle does nothing.
@@ -96,7 +105,8 @@ impl Pipeline {
         let module = vk_call("vkCreateShaderModule", || unsafe { gpu.raw().create_shader_module(&info, None) })?;
         let full =
             gpu.capabilities.features.full_subgroups && subgroup_size.is_some_and(|size| width.is_multiple_of(size));
-        let made = pipeline.make(gpu.pipeline_cache(), module, spec, subgroup_size, full);
+        let flags = gpu.pipeline_flags();
+        let made = pipeline.make(gpu.pipeline_cache(), module, spec, (subgroup_size, full), flags);
         // SAFETY: finished pipelines do not need their modules.
         unsafe { gpu.raw().destroy_shader_module(module, None) };
         made.map_err(|error| refused(gpu, shader, error))?;
@@ -134,8 +144,8 @@ impl Pipeline {
         cache: vk::PipelineCache,
         module: vk::ShaderModule,
         spec: &[u32],
-        size: Option<u32>,
-        full: bool,
+        (size, full): (Option<u32>, bool),
+        flags: vk::PipelineCreateFlags,
     ) -> Result<()> {
         let entries = self.shader.spec.iter().enumerate().map(|(index, constant)| vk::SpecializationMapEntry {
             constant_id: constant.id,
@@ -157,7 +167,7 @@ impl Pipeline {
         if full {
             stage = stage.flags(vk::PipelineShaderStageCreateFlags::REQUIRE_FULL_SUBGROUPS);
         }
-        let infos = [vk::ComputePipelineCreateInfo::default().stage(stage).layout(self.layout)];
+        let infos = [vk::ComputePipelineCreateInfo::default().stage(stage).layout(self.layout).flags(flags)];
         // SAFETY: module and layout are alive and belong to the same shader; caches synchronise themselves.
         let made = vk_call("vkCreateComputePipelines", || {
             unsafe { self.device.create_compute_pipelines(cache, &infos, None) }.map_err(|(_, result)| result)

@@ -1,7 +1,7 @@
 //! Queries that fill [`Capabilities`].
 
 use super::call::vk_call;
-use super::capabilities::{Capabilities, DeviceKind, Features, Need, SUBGROUP_MAX, Subgroup};
+use super::capabilities::{Capabilities, DeviceKind, Features, MEMORY, Need, SUBGROUP_MAX, Subgroup};
 use super::hidden::Hidden;
 use super::limits::{Limits, PlanLimits};
 use crate::error::Result;
@@ -26,7 +26,8 @@ impl Capabilities {
         let is_1_3 = version >= vk::API_VERSION_1_3;
         let has_size_control = is_1_3 || has(ash::ext::subgroup_size_control::NAME);
         let hidden = Hidden::by_env()?;
-        let mut features = features(instance, physical, has_size_control);
+        let has_statistics = has(ash::khr::pipeline_executable_properties::NAME);
+        let mut features = features(instance, physical, has_size_control, has_statistics);
         hidden.features(&mut features);
         let mut eleven = vk::PhysicalDeviceVulkan11Properties::default();
         let mut twelve = vk::PhysicalDeviceVulkan12Properties::default();
@@ -77,7 +78,7 @@ impl Capabilities {
 }
 
 /// Queries the known features of the device.
-fn features(instance: &ash::Instance, physical: vk::PhysicalDevice, size_control: bool) -> Features {
+fn features(instance: &ash::Instance, physical: vk::PhysicalDevice, size_control: bool, statistics: bool) -> Features {
     let mut twelve = vk::PhysicalDeviceVulkan12Features::default();
     let mut control = vk::PhysicalDeviceSubgroupSizeControlFeatures::default();
     // SAFETY: the handle belongs to this instance.
@@ -100,6 +101,7 @@ fn features(instance: &ash::Instance, physical: vk::PhysicalDevice, size_control
         robust: on(core.robust_buffer_access),
         size_control: on(control.subgroup_size_control),
         full_subgroups: on(control.compute_full_subgroups),
+        statistics,
     }
 }
 
@@ -178,6 +180,7 @@ fn subgroup(
 ) -> Subgroup {
     let compute = vk::ShaderStageFlags::COMPUTE;
     let is_pinned = features.size_control && control.required_subgroup_size_stages.contains(compute);
+    let is_certain = is_pinned || (features.size_control && control.min_subgroup_size == control.max_subgroup_size);
     let in_compute = eleven.subgroup_supported_stages.contains(compute);
     let none = vk::SubgroupFeatureFlags::empty();
     let size = eleven.subgroup_size;
@@ -191,6 +194,7 @@ fn subgroup(
         max,
         max_per_group: if is_pinned { control.max_compute_workgroup_subgroups } else { u32::MAX },
         is_pinned,
+        is_certain,
         is_emulated: false,
         operations: if in_compute { eleven.subgroup_supported_operations } else { none },
     }
@@ -208,7 +212,7 @@ fn needs(found: &Capabilities, has_queue: bool) -> Vec<Need> {
     let mut needs = vec![
         need("Vulkan", (major, minor) >= (1, 2), "1.2", format!("{major}.{minor}.{patch}"), "everything"),
         flag("compute queue", has_queue, "everything"),
-        need("memory", limits.heap >= MEMORY_MIN, "64 MiB", format!("{} MiB", limits.heap >> 20), "everything"),
+        need(MEMORY, limits.heap >= MEMORY_MIN, "64 MiB", format!("{} MiB", limits.heap >> 20), "everything"),
         flag("scalarBlockLayout", features.scalar, "one layout for shaders and host"),
         flag("timelineSemaphore", features.timeline, "two steps in flight"),
         least("workgroup size", 256, limits.max_invocations, "scan and sort"),
@@ -230,7 +234,7 @@ fn wishes(limits: &Limits, subgroup: &Subgroup) -> [Need; 5] {
     [
         wish("subgroup shuffle, arithmetic", subgroup.has_operations(), operations, "else through shared memory"),
         wish("subgroups of 8 to 64", subgroup.has_size(), subgroup.size.to_string(), "else through shared memory"),
-        wish("pinned subgroup size", subgroup.is_pinned, pins, "else through shared memory"),
+        wish("one subgroup size, or pinned", subgroup.is_certain, pins, "else through shared memory"),
         wish("storage binding of 1 GiB", range >= 1 << 30, format!("{range} B"), "bounds the number of Gaussians"),
         wish("timestamps", bits > 0, format!("{bits} bits, {period} ns"), "time of each pass"),
     ]

@@ -1,8 +1,10 @@
 //! Chooses and opens the physical device.
 
+use super::GpuOptions;
 use super::call::vk_call;
-use super::capabilities::Capabilities;
+use super::capabilities::{Capabilities, MEMORY};
 use super::instance::Instance;
+use super::statistics;
 use crate::error::{Error, Result};
 use ash::vk;
 
@@ -15,7 +17,8 @@ pub(super) fn all(instance: &Instance) -> Result<Vec<(vk::PhysicalDevice, Capabi
 }
 
 /// Picks a device by index, UUID or part of its name; by default the best that meets the requirements.
-pub(super) fn pick(instance: &Instance, wanted: Option<&str>) -> Result<(vk::PhysicalDevice, Capabilities)> {
+pub(super) fn pick(instance: &Instance, options: &GpuOptions) -> Result<(vk::PhysicalDevice, Capabilities)> {
+    let wanted = options.device.as_deref();
     let mut devices = all(instance)?;
     let listing = devices.iter().map(|(_, device)| line(device)).collect::<Vec<_>>().join("; ");
     if devices.is_empty() {
@@ -27,7 +30,7 @@ pub(super) fn pick(instance: &Instance, wanted: Option<&str>) -> Result<(vk::Phy
             return Err(Error::NoDevice(format!("none matches {wanted}; found: {listing}")));
         }
     }
-    devices.retain(|(_, device)| device.missing().is_empty());
+    devices.retain(|(_, device)| device.missing().iter().all(|need| options.statistics && need.what == MEMORY));
     let best = devices.into_iter().min_by_key(|(_, device)| (device.kind, device.index));
     best.ok_or_else(|| Error::NoDevice(format!("none meets the requirements: {listing}")))
 }
@@ -53,10 +56,11 @@ pub(super) fn open(
     instance: &Instance,
     physical: vk::PhysicalDevice,
     capabilities: &Capabilities,
-    robust: bool,
+    options: &GpuOptions,
 ) -> Result<ash::Device> {
     let features = &capabilities.features;
-    let core = vk::PhysicalDeviceFeatures::default().robust_buffer_access(robust && features.robust);
+    let core =
+        vk::PhysicalDeviceFeatures::default().robust_buffer_access(options.robust_buffer_access && features.robust);
     let mut twelve = vk::PhysicalDeviceVulkan12Features::default()
         .scalar_block_layout(true)
         .timeline_semaphore(true)
@@ -69,11 +73,18 @@ pub(super) fn open(
     let queues = [vk::DeviceQueueCreateInfo::default()
         .queue_family_index(capabilities.queue_family)
         .queue_priorities(&priorities)];
-    let extensions = if capabilities.size_control_is_extension {
-        vec![ash::ext::subgroup_size_control::NAME.as_ptr()]
-    } else {
-        Vec::new()
-    };
+    let mut extensions = Vec::new();
+    if capabilities.size_control_is_extension {
+        extensions.push(ash::ext::subgroup_size_control::NAME.as_ptr());
+    }
+    let mut executables =
+        vk::PhysicalDevicePipelineExecutablePropertiesFeaturesKHR::default().pipeline_executable_info(true);
+    if options.statistics {
+        if !features.statistics {
+            return Err(statistics::unknown(capabilities));
+        }
+        extensions.push(ash::khr::pipeline_executable_properties::NAME.as_ptr());
+    }
     let mut info = vk::DeviceCreateInfo::default()
         .queue_create_infos(&queues)
         .enabled_features(&core)
@@ -81,6 +92,9 @@ pub(super) fn open(
         .push_next(&mut twelve);
     if features.size_control {
         info = info.push_next(&mut control);
+    }
+    if options.statistics {
+        info = info.push_next(&mut executables);
     }
     // SAFETY: the device has every feature and extension in the list; all pointers live until the call returns.
     let created = vk_call("vkCreateDevice", || unsafe { instance.raw().create_device(physical, &info, None) });

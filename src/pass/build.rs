@@ -2,7 +2,7 @@
 
 use super::KernelShape;
 use crate::scheduler::plan::{Buf, Capacity, Grid, PassDecl, PassList};
-use crate::shaders::{Compiled, ShaderDesc, constants};
+use crate::shaders::{ShaderDesc, constants};
 
 /// A pass list under construction.
 pub struct Builder<'a> {
@@ -46,7 +46,7 @@ impl Builder<'_> {
     /// If the kernel has no variant with these macros.
     pub fn pass(
         &mut self,
-        kernel: &'static [Compiled],
+        kernel: &'static [ShaderDesc],
         macros: &[(&'static str, u32)],
         buffers: &[(&str, Buf)],
         constants: &[(&str, u32)],
@@ -62,13 +62,13 @@ impl Builder<'_> {
 
 /// Finds the variant with these macros and those of the shape. A kernel without texel reads or subgroup operations has
 /// no such variant.
-fn variant(kernel: &'static [Compiled], mut macros: Vec<&str>, shape: &KernelShape) -> &'static ShaderDesc {
+fn variant(kernel: &'static [ShaderDesc], mut macros: Vec<&str>, shape: &KernelShape) -> &'static ShaderDesc {
     let of_shape = [("EMULATED", shape.emulated), ("TEXEL", shape.texel)];
-    let known = |name| kernel.iter().any(|compiled| compiled.macros.contains(&name));
+    let known = |name| kernel.iter().any(|variant| variant.macros.contains(&name));
     macros.extend(of_shape.into_iter().filter(|&(name, on)| on && known(name)).map(|(name, _)| name));
     macros.sort_unstable();
-    let found = kernel.iter().find(|compiled| compiled.macros == macros);
-    &found.unwrap_or_else(|| panic!("{} is not compiled with {macros:?}", kernel[0].shader.name)).shader
+    let found = kernel.iter().find(|variant| variant.macros == macros);
+    found.unwrap_or_else(|| panic!("{} is not compiled with {macros:?}", kernel[0].name))
 }
 
 fn value<T: Copy>(named: &[(&str, T)], wanted: &str) -> Option<T> {

@@ -6,6 +6,7 @@ mod blend;
 pub(crate) mod build;
 mod densify;
 mod gather;
+mod kernels;
 mod lift;
 pub(crate) mod loss;
 mod optimize;
@@ -19,6 +20,7 @@ pub(crate) mod stage;
 mod tile;
 
 pub use build::Builder;
+pub(crate) use kernels::{CompiledKernel, FIGURES, compiled_kernels};
 pub(crate) use optimize::{ATTRIBUTES, SHARED_PLANES};
 #[cfg(feature = "lab")]
 pub use separate::separate_step;

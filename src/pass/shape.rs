@@ -97,6 +97,7 @@ impl KernelShape {
             "SUBGROUP_SIZE" => Some(self.subgroup),
             "TILE_WIDTH" => Some(self.tile_width),
             "TILE_HEIGHT" => Some(self.tile_height),
+            "DIGIT_BITS" => Some(self.digit_bits),
             "SEGMENT_LENGTH" => Some(self.segment_length),
             _ => None,
         }

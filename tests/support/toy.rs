@@ -29,6 +29,7 @@ pub fn shader(name: &'static str, glsl: &str, bindings: &[(&'static str, Access,
     ShaderDesc {
         stem: name,
         name,
+        macros: &[],
         spirv: Box::leak(compiled.as_binary_u8().to_vec().into_boxed_slice()),
         bindings: Box::leak(bindings.collect::<Vec<_>>().into_boxed_slice()),
         spec: &[],

@@ -53,6 +53,7 @@ pub fn shader(name: &'static str, source: &str, texel: bool) -> Result<&'static 
     Ok(Box::leak(Box::new(ShaderDesc {
         stem: name,
         name,
+        macros: &[],
         spirv: spirv(name, source, &defines)?,
         bindings: bindings.collect::<Vec<_>>().leak(),
         spec: spec.collect::<Vec<_>>().leak(),

@@ -20,7 +20,7 @@ pub fn rust(shaders: &[Shader], constants: &[Constant]) -> String {
     for (file, siblings) in by_file(shaders) {
         let variants = emit_file(&mut out, file, &siblings);
         for index in 0..variants {
-            put!(all, "    &{file}::VARIANTS[{index}].shader,");
+            put!(all, "    &{file}::VARIANTS[{index}],");
         }
     }
     put!(out, "\n/// Every variant of every shader.\npub static ALL: &[&ShaderDesc] = &[\n{all}];");
@@ -107,7 +107,7 @@ fn emit_file(out: &mut String, file: &str, siblings: &[&Shader]) -> usize {
     emit_macros(out, siblings);
     emit_bindings(out, siblings);
     emit_spec(out, siblings);
-    put!(out, "    /// All variants.\n    pub static VARIANTS: [super::Compiled; {}] = [", variants.len());
+    put!(out, "    /// All variants.\n    pub static VARIANTS: [super::ShaderDesc; {}] = [", variants.len());
     for (shader, variant) in &variants {
         emit_variant(out, shader, variant);
     }
@@ -207,8 +207,8 @@ fn emit_spec(out: &mut String, siblings: &[&Shader]) {
 
 fn emit_variant(out: &mut String, shader: &Shader, variant: &Variant) {
     let interface = &variant.interface;
-    put!(out, "        super::Compiled {{ macros: &{:?}, shader: super::ShaderDesc {{", variant.macros());
-    put!(out, "        stem: {:?},\n        name: {:?},", shader.stem, variant.name);
+    put!(out, "        super::ShaderDesc {{ stem: {:?},\n        name: {:?},", shader.stem, variant.name);
+    put!(out, "        macros: &{:?},", variant.macros());
     put!(out, "        spirv: include_bytes!(concat!(env!(\"OUT_DIR\"), \"/{}.spv\")),", variant.name);
     put!(out, "        bindings: &[");
     for Binding { name, binding, kind, access, element_bytes, .. } in &interface.bindings {
@@ -229,7 +229,7 @@ fn emit_variant(out: &mut String, shader: &Shader, variant: &Variant) {
     put!(out, "        ],");
     let local_size = interface.local_size.map_join(|size| format!("super::LocalSize::{size:?}"));
     put!(out, "        local_size: [{local_size}],");
-    put!(out, "        uses_subgroups: {},\n        }} }},", interface.uses_subgroups);
+    put!(out, "        uses_subgroups: {},\n        }},", interface.uses_subgroups);
 }
 
 /// A Rust literal of the value with these bits.

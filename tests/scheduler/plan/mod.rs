@@ -49,6 +49,7 @@ fn shader(name: &'static str, accesses: &[Access]) -> &'static ShaderDesc {
     Box::leak(Box::new(ShaderDesc {
         stem: name,
         name,
+        macros: &[],
         spirv: &[],
         bindings: Box::leak(bindings.collect::<Vec<_>>().into_boxed_slice()),
         spec: &[],

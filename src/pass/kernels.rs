@@ -1,0 +1,63 @@
+//! What a device's compiler makes of every kernel.
+
+use super::KernelShape;
+use crate::error::Result;
+use crate::gpu::{Gpu, Statistic};
+use crate::shaders::{self, ShaderDesc};
+
+/// A kernel as compiled for one subgroup size.
+#[derive(Clone, Debug)]
+pub(crate) struct CompiledKernel {
+    /// Name of the variant, such as `blend_forward_labels`.
+    pub name: &'static str,
+    /// Subgroup size.
+    pub subgroup: u32,
+    /// All that the driver tells.
+    pub statistics: Vec<Statistic>,
+}
+
+/// Names under which drivers (Mesa's for AMD and Intel, NVIDIA's) tell the same figure.
+pub(crate) const FIGURES: [(&str, &[&str]); 7] = [
+    ("registers", &["VGPRs", "Register Count", "Max live registers"]),
+    ("spills", &["Spilled VGPRs", "Spilled SGPRs", "Spill Count", "Fill Count", "Local Memory Size"]),
+    ("shared B", &["LDS size", "Shared Memory Size", "Workgroup Memory Size"]),
+    ("waves", &["Subgroups per SIMD"]),
+    ("instructions", &["Instructions", "Instruction Count"]),
+    ("latency", &["Latency", "Cycle Count"]),
+    ("cycles", &["Inverse Throughput"]),
+];
+
+impl CompiledKernel {
+    /// Sum of the statistics with these names; `None` if the driver tells none of them.
+    pub(crate) fn figure(&self, names: &[&str]) -> Option<f64> {
+        let values =
+            self.statistics.iter().filter(|found| names.contains(&found.name.as_str())).map(|found| found.value);
+        values.fold(None, |sum, value| Some(sum.unwrap_or(0.0) + value))
+    }
+
+    /// Registers that did not fit, and were put into memory.
+    pub(crate) fn spills(&self) -> f64 {
+        FIGURES.iter().find(|(name, _)| *name == "spills").and_then(|(_, names)| self.figure(names)).unwrap_or(0.0)
+    }
+}
+
+/// Compiles every variant of every kernel with the default constants: for each subgroup size that the device offers, and
+/// with emulated subgroups. `gpu` must be open for statistics.
+pub(crate) fn compiled_kernels(gpu: &Gpu) -> Result<Vec<CompiledKernel>> {
+    let (own, is_cpu) = (&gpu.capabilities().subgroup, gpu.is_cpu());
+    let own_sizes = [8, 16, 32, 64].into_iter().filter(|size| !own.is_emulated && (own.min..=own.max).contains(size));
+    let shapes = own_sizes.map(|size| KernelShape::new(size, is_cpu));
+    let emulated = KernelShape { emulated: true, ..KernelShape::new(32, is_cpu) };
+    let mut kernels = Vec::new();
+    for shape in shapes.chain([emulated]) {
+        let of_shape = |shader: &&&'static ShaderDesc| shader.macros.contains(&"EMULATED") == shape.emulated;
+        for shader in shaders::ALL.iter().filter(of_shape) {
+            let spec = shader.spec.iter().map(|constant| shape.constant(constant.name).unwrap_or(constant.default));
+            let spec: Vec<u32> = spec.collect();
+            let statistics = gpu.statistics(shader, &spec, shape.subgroup)?;
+            kernels.push(CompiledKernel { name: shader.name, subgroup: shape.subgroup, statistics });
+        }
+    }
+    kernels.sort_by_key(|kernel| (kernel.name, kernel.subgroup));
+    Ok(kernels)
+}
