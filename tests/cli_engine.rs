@@ -33,19 +33,6 @@ fn json(text: &str) -> Value {
     serde_json::from_str(text).unwrap_or_else(|error| panic!("{error}: {text}"))
 }
 
-/// Vectors of 128 bits make subgroups of 4, which no kernel serves.
-#[test]
-fn a_subgroup_size_without_kernels_is_refused_by_name() {
-    if !turn().is_some_and(|gpu| gpu.is_cpu()) {
-        return;
-    }
-    let mut command = Command::cargo_bin("labelgs").expect("the tool is built");
-    command.env("LP_NATIVE_VECTOR_WIDTH", "128").env("LABELGS_VALIDATION", "off");
-    let output = command.args(["profile", "--synthetic", "--steps", "1"]).output().expect("it runs");
-    assert_eq!(output.status.code(), Some(4), "{}", text(&output.stderr));
-    assert!(text(&output.stderr).contains("lacks subgroup size (needed 8 to 64, found 4)"), "{}", text(&output.stderr));
-}
-
 #[test]
 fn devices_tells_what_is_needed_and_found() {
     let Some(gpu) = turn() else { return };

@@ -15,6 +15,7 @@ static MEMORY: support::memory::Counting = support::memory::Counting;
 
 mod architecture; // layers of the crate, file lengths, places of unsafe code
 mod associate; // masks of one object in different views get one id
+mod cards; // kernels compile for cards that are not there
 mod cli; // flags, defaults, streams and exit statuses
 mod cli_devices; // a missing or poorer device is refused by name
 mod cli_edit; // labels are chosen and edited from the command line
@@ -28,6 +29,7 @@ mod compare_self; // the comparisons of all other tests do fail
 mod config; // schedules and ranges of the settings
 mod decide; // labels from votes
 mod densify; // the video for a tracker, and its masks on the photos
+mod drivers; // every subgroup size, and drivers other than the usual one
 mod edits; // labels by name, pixel and box; parts, specks and colours of a model
 mod gradient; // gradients of the f64 mirrors, which the kernels are compared with
 mod guide; // every command of README.md and of the guide runs

@@ -329,7 +329,7 @@ fn bad_lines_of_the_variants_are_found() {
 }
 
 #[test]
-fn siblings_have_an_interface_of_their_own_and_a_star_reaches_all_that_fetch() {
+fn siblings_have_an_interface_of_their_own_and_a_star_reaches_all_callers() {
     let fetching = small(
         "FETCHU(1, keys);\n#ifdef MORE\nREAD(2, uint, more);\n#else\n#define more keys\n#endif",
         "words[1] = more[0];",
@@ -338,7 +338,7 @@ fn siblings_have_an_interface_of_their_own_and_a_star_reaches_all_that_fetch() {
         .replace("words[1] =", "words[2] = fetchu(keys, 1);\n#ifdef MORE\n    words[1] =")
         .replace("[0];\n}", "[0];\n#endif\n}");
     let plain = small("", "").replace("probe —", "plain —");
-    let lines = "wide = probe: MORE\n* + texel: TEXEL\n";
+    let lines = "wide = probe: MORE\nfetchu* + half: HALF\nfetch* + texel: TEXEL\netchu* + none: A\nkeys* + none: A\n";
     let files = [("test/probe.comp", fetching.as_str()), ("test/plain.comp", &plain), ("variants.txt", lines)];
     let generated = generate(&files).unwrap_or_else(|findings| panic!("{findings:#?}"));
     let shaders: Vec<_> = generated
@@ -351,8 +351,8 @@ fn siblings_have_an_interface_of_their_own_and_a_star_reaches_all_that_fetch() {
         .collect();
     let expected = [
         ("plain", vec!["plain"], 1),
-        ("probe", vec!["probe", "probe_texel"], 2),
-        ("wide", vec!["wide", "wide_texel"], 3),
+        ("probe", vec!["probe", "probe_half", "probe_texel", "probe_half_texel"], 2),
+        ("wide", vec!["wide", "wide_half", "wide_texel", "wide_half_texel"], 3),
     ];
     assert_eq!(shaders, expected);
     // One module for both: the macro that chooses, and every binding once.

@@ -27,12 +27,18 @@ opacity_reset_margin = 10
 /// A scene, and a folder for compiled pipelines, which make starts quick.
 pub struct Place {
     folder: tempfile::TempDir,
+    environment: Vec<(&'static str, String)>,
 }
 
 impl Place {
     /// Makes the scene.
     pub fn new() -> Self {
-        let place = Self { folder: tempfile::tempdir().expect("a folder") };
+        Self::on(Vec::new())
+    }
+
+    /// The same for another driver, which these environment variables choose.
+    pub fn on(environment: Vec<(&'static str, String)>) -> Self {
+        let place = Self { folder: tempfile::tempdir().expect("a folder"), environment };
         let scene = place.text("scene");
         let made = ["synth", &scene, "--preset", "simple", "--size", "64x48", "--views", "6", "--points", "200"];
         assert!(place.labelgs(&made).status.success());
@@ -59,6 +65,7 @@ impl Place {
     pub fn faulty(&self, args: &[&str], fault: Option<&str>) -> Output {
         let mut command = Command::cargo_bin("labelgs").expect("the tool is built");
         command.env("LABELGS_VALIDATION", "off").env("LABELGS_CACHE", self.path("cache"));
+        command.envs(self.environment.iter().cloned());
         if let Some(fault) = fault {
             command.env("LABELGS_FAULT", fault);
         }
@@ -86,6 +93,7 @@ impl Place {
     pub fn spawned(&self, args: &[String]) -> Child {
         let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_labelgs"));
         command.env("LABELGS_VALIDATION", "off").env("LABELGS_CACHE", self.path("cache")).args(args);
+        command.envs(self.environment.iter().cloned());
         command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().expect("it runs")
     }
 

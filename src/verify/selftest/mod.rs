@@ -45,30 +45,55 @@ pub fn run(gpu: &Arc<Gpu>, done: impl FnMut(Check)) -> Result<()> {
 pub fn run_against(rules: &Rules, gpu: &Arc<Gpu>, mut done: impl FnMut(Check)) -> Result<()> {
     let kernels = KernelShape::of(gpu.capabilities());
     let other = KernelShape { texel: !kernels.texel, ..kernels };
-    for (kernels, reads) in [(kernels, ""), (other, if other.texel { ", texel reads" } else { ", storage reads" })] {
+    passes(rules, gpu, kernels, "", &mut done)?;
+    passes(rules, gpu, other, if other.texel { ", texel reads" } else { ", storage reads" }, &mut done)?;
+    changes(rules, gpu, kernels, &mut done)?;
+    type Whole = fn(&Arc<Gpu>, KernelShape) -> Result<Verdict>;
+    let wholes: [(&str, Whole); 2] =
+        [("70,000 splats in a tile", checks::long_list), ("training twice, bit by bit", training::twice)];
+    for (name, whole) in wholes {
         let start = Instant::now();
-        let mut ran = Ran::new(rules, gpu, kernels)?;
-        let prepared = start.elapsed().as_secs_f64();
-        type Pass = fn(&mut Ran) -> Result<Verdict>;
-        let passes: [(&str, Pass); 10] = [
-            ("depth order", Ran::order),
-            ("projection", Ran::projection),
-            ("tile lists", Ran::tiles),
-            ("blend forward", Ran::blend),
-            ("photo loss and its gradient", Ran::loss),
-            ("votes", Ran::votes),
-            ("blend backward", Ran::blend_backward),
-            ("gradient of a step with labels", Ran::gradient),
-            ("the same step twice, bit by bit", Ran::repeated),
-            ("Adam", Ran::adam),
-        ];
-        for (index, (name, pass)) in passes.into_iter().enumerate() {
-            let start = Instant::now();
-            let verdict = pass(&mut ran)?;
-            let before = if index == 0 { prepared } else { 0.0 };
-            done(Check { name: format!("{name}{reads}"), verdict, seconds: start.elapsed().as_secs_f64() + before });
-        }
+        let verdict = whole(gpu, kernels)?;
+        done(Check { name: name.to_owned(), verdict, seconds: start.elapsed().as_secs_f64() });
     }
+    Ok(())
+}
+
+/// Runs the checks of the passes of a step, with kernels of a shape. `suffix` follows their names.
+pub fn passes(
+    rules: &Rules,
+    gpu: &Arc<Gpu>,
+    kernels: KernelShape,
+    suffix: &str,
+    mut done: impl FnMut(Check),
+) -> Result<()> {
+    let start = Instant::now();
+    let mut ran = Ran::new(rules, gpu, kernels)?;
+    let prepared = start.elapsed().as_secs_f64();
+    type Pass = fn(&mut Ran) -> Result<Verdict>;
+    let passes: [(&str, Pass); 10] = [
+        ("depth order", Ran::order),
+        ("projection", Ran::projection),
+        ("tile lists", Ran::tiles),
+        ("blend forward", Ran::blend),
+        ("photo loss and its gradient", Ran::loss),
+        ("votes", Ran::votes),
+        ("blend backward", Ran::blend_backward),
+        ("gradient of a step with labels", Ran::gradient),
+        ("the same step twice, bit by bit", Ran::repeated),
+        ("Adam", Ran::adam),
+    ];
+    for (index, (name, pass)) in passes.into_iter().enumerate() {
+        let start = Instant::now();
+        let verdict = pass(&mut ran)?;
+        let before = if index == 0 { prepared } else { 0.0 };
+        done(Check { name: format!("{name}{suffix}"), verdict, seconds: start.elapsed().as_secs_f64() + before });
+    }
+    Ok(())
+}
+
+/// Runs the checks of passes that change the model.
+pub fn changes(rules: &Rules, gpu: &Arc<Gpu>, kernels: KernelShape, mut done: impl FnMut(Check)) -> Result<()> {
     type Change = fn(&Rules, &Arc<Gpu>, KernelShape, f64) -> Result<Verdict>;
     let changes: [(&str, Change); 3] = [
         ("densification", model::densification),
@@ -78,14 +103,6 @@ pub fn run_against(rules: &Rules, gpu: &Arc<Gpu>, mut done: impl FnMut(Check)) -
     for (name, change) in changes {
         let start = Instant::now();
         let verdict = change(rules, gpu, kernels, checks::LEEWAY)?;
-        done(Check { name: name.to_owned(), verdict, seconds: start.elapsed().as_secs_f64() });
-    }
-    type Whole = fn(&Arc<Gpu>, KernelShape) -> Result<Verdict>;
-    let wholes: [(&str, Whole); 2] =
-        [("70,000 splats in a tile", checks::long_list), ("training twice, bit by bit", training::twice)];
-    for (name, whole) in wholes {
-        let start = Instant::now();
-        let verdict = whole(gpu, kernels)?;
         done(Check { name: name.to_owned(), verdict, seconds: start.elapsed().as_secs_f64() });
     }
     Ok(())

@@ -1,0 +1,118 @@
+//! Mesa's compiler for AMD cards, without a card: every kernel compiles for each family without spilled registers, and
+//! what it compiles to is known. Where the driver is missing, tests say so and return; `LABELGS_REQUIRE_VULKAN=1`
+//! requires it.
+
+use assert_cmd::Command;
+use std::fmt::Write;
+use std::fs;
+use std::hash::{DefaultHasher, Hash, Hasher};
+use std::path::{Path, PathBuf};
+use std::process::Output;
+
+/// Families that Mesa 22.3 knows: two generations with subgroups of 64 only, two with 32 and 64.
+const FAMILIES: [&str; 4] = ["polaris10", "vega20", "navi10", "navi21"];
+
+const TABLES: &str = "tests/golden/kernels";
+
+/// The driver's file, or `None` with a message.
+fn driver() -> Option<PathBuf> {
+    let folder = Path::new("/usr/share/vulkan/icd.d");
+    let is_radeon =
+        |path: &PathBuf| path.file_name().is_some_and(|name| name.to_string_lossy().starts_with("radeon_icd"));
+    let files = fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path());
+    let found = files.into_iter().find(is_radeon);
+    if found.is_none() {
+        let required = std::env::var("LABELGS_REQUIRE_VULKAN").is_ok_and(|value| value == "1");
+        // Debian builds this driver for processors of PCs only.
+        assert!(!required || !cfg!(target_arch = "x86_64"), "no radeon_icd*.json in {}", folder.display());
+        eprintln!("skipped: no driver for AMD cards");
+    }
+    found
+}
+
+/// Runs the tool on a card of the family that is not there.
+fn on(driver: &Path, family: &str, args: &[&str]) -> Output {
+    let mut command = Command::cargo_bin("labelgs").expect("the tool is built");
+    command.env("RADV_FORCE_FAMILY", family).env("VK_DRIVER_FILES", driver).env("VK_ICD_FILENAMES", driver);
+    command.env("LABELGS_VALIDATION", "off").env_remove("LABELGS_DEVICE");
+    command.args(args).output().expect("it runs")
+}
+
+fn text(bytes: &[u8]) -> String {
+    String::from_utf8_lossy(bytes).into_owned()
+}
+
+/// Rows that are in one table only, the old ones with `-`, the new ones with `+`.
+fn difference(old: &str, new: &str) -> String {
+    let only = |of: &str, other: &str, sign: char| {
+        let rows: Vec<&str> = other.lines().collect();
+        of.lines().filter(|row| !rows.contains(row)).fold(String::new(), |mut text, row| {
+            let _ = writeln!(text, "{sign} {row}");
+            text
+        })
+    };
+    only(old, new, '-') + &only(new, old, '+')
+}
+
+/// A change of what a kernel compiles to is seen, and explained in `changes.txt`.
+#[test]
+fn kernels_compile_for_cards_as_the_tables_say() {
+    let Some(driver) = driver() else { return };
+    let mut hasher = DefaultHasher::new();
+    let mut differences = String::new();
+    let out = Path::new("target/kernels");
+    fs::create_dir_all(out).expect("a folder");
+    for family in FAMILIES {
+        let output = on(&driver, family, &["devices", "--kernels"]);
+        // The status is 1 if a kernel spills.
+        assert_eq!(output.status.code(), Some(0), "{family}: {}", text(&output.stderr));
+        let (new, file) = (text(&output.stdout), format!("{family}.txt"));
+        let old = fs::read_to_string(Path::new(TABLES).join(&file)).unwrap_or_default();
+        let compiler = |table: &str| table.lines().next().unwrap_or_default().to_owned();
+        if !old.is_empty() && compiler(&old) != compiler(&new) {
+            eprintln!("not compared: the tables are of {}, this is {}", compiler(&old), compiler(&new));
+            return;
+        }
+        fs::write(out.join(&file), &new).expect("a table");
+        new.hash(&mut hasher);
+        if old != new {
+            let _ = write!(differences, "{family}:\n{}", difference(&old, &new));
+        }
+    }
+    let hash = format!("{:016x}", hasher.finish());
+    assert!(
+        differences.is_empty(),
+        "kernels compile to something else. If that is meant: cp target/kernels/*.txt {TABLES}, and add a line to \
+         {TABLES}/changes.txt: {hash} and why.\n{differences}"
+    );
+    let changes = fs::read_to_string(Path::new(TABLES).join("changes.txt")).expect("changes.txt");
+    let why = changes.lines().last().unwrap_or_default().strip_prefix(&hash).unwrap_or_default().trim();
+    assert!(
+        why.len() > 20,
+        "the last line of {TABLES}/changes.txt must begin with {hash} and say why the tables changed"
+    );
+}
+
+/// A driver without hardware has no memory: commands that compute are refused before they touch it.
+#[test]
+fn a_card_that_only_compiles_runs_nothing() {
+    let Some(driver) = driver() else { return };
+    for args in [&["selftest"][..], &["profile", "--synthetic", "--steps", "1"]] {
+        let output = on(&driver, "navi21", args);
+        assert_eq!(output.status.code(), Some(4), "{args:?}: {:?} {}", output.status, text(&output.stderr));
+        let said = text(&output.stderr);
+        assert!(said.contains("lacks memory (needed 64 MiB, found 0 MiB)"), "{args:?}: {said}");
+    }
+}
+
+/// Where a driver tells nothing of its kernels, this is said.
+#[test]
+fn a_driver_without_statistics_is_named() {
+    if !crate::support::device().is_some_and(|turn| turn.is_cpu()) {
+        return;
+    }
+    let output = Command::cargo_bin("labelgs").expect("the tool is built").args(["devices", "--kernels"]).output();
+    let output = output.expect("it runs");
+    assert_eq!(output.status.code(), Some(4), "{}", text(&output.stderr));
+    assert!(text(&output.stderr).contains("lacks VK_KHR_pipeline_executable_properties"), "{}", text(&output.stderr));
+}

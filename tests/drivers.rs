@@ -1,0 +1,149 @@
+//! Drivers other than the one of the test process: SwiftShader, a software Vulkan that shares no code with Mesa, and
+//! lavapipe with vectors of 128 bits, as on ARM. Both have subgroups of 4, so subgroups are emulated.
+
+use crate::reference::Rules;
+use crate::support::device::{Turn, device, options};
+use crate::support::runs::{Place, files, kills, succeeded};
+use labelgs::gpu::{Gpu, GpuOptions};
+use labelgs::internals::pass::KernelShape;
+use labelgs::internals::verify::selftest;
+use rand::{Rng, SeedableRng};
+use rand_pcg::Pcg32;
+use std::os::unix::process::ExitStatusExt;
+use std::path::Path;
+use std::time::Instant;
+
+/// Environment variables that choose a driver.
+type Driver = Vec<(&'static str, String)>;
+
+/// SwiftShader, whose driver file `LABELGS_SWIFTSHADER` names (tools/test fetches it), or `None` with a message.
+fn swiftshader() -> Option<Driver> {
+    match std::env::var("LABELGS_SWIFTSHADER") {
+        Ok(file) if file != "none" => Some(vec![("VK_DRIVER_FILES", file.clone()), ("VK_ICD_FILENAMES", file)]),
+        _ => {
+            let required = std::env::var("LABELGS_REQUIRE_SWIFTSHADER").is_ok_and(|value| value == "1");
+            assert!(!required, "LABELGS_REQUIRE_SWIFTSHADER=1, and LABELGS_SWIFTSHADER names no driver file");
+            eprintln!("skipped: no SwiftShader");
+            None
+        }
+    }
+}
+
+/// Lavapipe with vectors of 128 bits, if this is lavapipe.
+fn narrow_lavapipe() -> Option<Driver> {
+    device().is_some_and(|turn| turn.is_cpu()).then(|| vec![("LP_NATIVE_VECTOR_WIDTH", "128".to_owned())])
+}
+
+fn drivers() -> Vec<Driver> {
+    swiftshader().into_iter().chain(narrow_lavapipe()).collect()
+}
+
+#[test]
+fn the_selftest_passes_on_other_drivers() {
+    for driver in drivers() {
+        let place = Place::on(driver.clone());
+        let said = String::from_utf8_lossy(&succeeded_output(&place.labelgs(&["selftest", "--json"]))).into_owned();
+        let found: serde_json::Value = serde_json::from_str(&said).expect("JSON");
+        assert_eq!(found["kernels"]["emulated"], true, "{driver:?}: {found}");
+        assert_eq!(found["kernels"]["subgroup_size"], 4, "{driver:?}: {found}");
+        assert_eq!(found["checks"].as_array().map(Vec::len), Some(25), "{driver:?}: {found}");
+    }
+}
+
+fn succeeded_output(output: &std::process::Output) -> Vec<u8> {
+    succeeded(output);
+    output.stdout.clone()
+}
+
+/// A labelled training that is killed and resumed ends in the same bits, and both drivers draw its model alike.
+#[test]
+fn trainings_survive_kills_on_other_drivers_and_models_look_the_same() {
+    // The list takes its turn with the device, and gives it back.
+    let drivers = drivers();
+    let Some(_turn) = device() else { return };
+    for driver in drivers {
+        let (place, usual) = (Place::on(driver.clone()), Place::on(Vec::new()));
+        let settings = place.settings();
+        let flags = ["--config", settings.as_str()];
+        let start = Instant::now();
+        succeeded(&place.trained("whole", &flags));
+        let took = start.elapsed();
+        let whole = place.model("whole", 40);
+        let mut random = Pcg32::seed_from_u64(4);
+        for _ in 0..kills(2) {
+            let mut child = place.spawned(&place.train("killed", &flags));
+            std::thread::sleep(took.mul_f64(random.random_range(0.2..0.9)));
+            child.kill().expect("killed or done");
+            let status = child.wait().expect("a child");
+            let resumed = if place.checkpoints("killed").is_empty() { vec![] } else { vec!["--resume"] };
+            succeeded(&place.trained("killed", &[&flags[..], &resumed].concat()));
+            assert!(
+                place.model("killed", 40) == whole,
+                "{driver:?}: other bits after {status:?} {:?}",
+                status.signal()
+            );
+            std::fs::remove_dir_all(place.path("killed")).expect("removed");
+        }
+        let scene = place.text("scene");
+        let render = |on: &Place, out: &str| {
+            let (run, out) = (place.text("whole"), place.text(out));
+            let what = ["--what", "rgb,labels", "--format", "exr"];
+            let views = ["--scene", scene.as_str(), "--views", "all", "-o", &out];
+            succeeded(&on.labelgs(&[&["render", run.as_str()][..], &views, &what].concat()));
+        };
+        render(&place, "here");
+        render(&usual, "there");
+        pictures_agree(&place.path("here"), &place.path("there"));
+    }
+}
+
+/// Compares the pictures of two drivers. Each is within 1e-6 of float64 (src/verify/selftest), so they differ by at most
+/// 2e-6, except at pixels where a pair lies so close to the least opacity of 1/255 or to the last transmittance that
+/// one driver takes it and the other does not: at most one pixel in a thousand, by at most that opacity. There two
+/// weights may also tie for the label.
+fn pictures_agree(here: &Path, there: &Path) {
+    let (mut pixels, mut flipped, mut labels_differ) = (0, 0, 0);
+    for file in files(here) {
+        let other = there.join(file.file_name().expect("a name"));
+        match file.extension().and_then(|extension| extension.to_str()) {
+            Some("exr") => {
+                let differences = samples(&file).into_iter().zip(samples(&other)).map(|(a, b)| (a - b).abs());
+                for difference in differences {
+                    assert!(difference <= 1.0 / 255.0, "{}: {difference}", file.display());
+                    (pixels, flipped) = (pixels + 1, flipped + u32::from(difference > 2e-6));
+                }
+            }
+            _ => {
+                let open = |path: &Path| image::open(path).expect("a PNG").into_bytes();
+                labels_differ += open(&file).iter().zip(open(&other)).filter(|(a, b)| **a != *b).count();
+            }
+        }
+    }
+    println!("{pixels} samples, {flipped} beyond 2e-6; {labels_differ} bytes of label maps differ");
+    assert!(pixels > 10_000 && flipped * 1000 <= pixels, "{flipped} of {pixels} samples differ by more than 2e-6");
+    assert!(labels_differ * 1000 <= pixels as usize, "{labels_differ} bytes of the label maps differ");
+}
+
+/// All channels of an EXR.
+fn samples(path: &Path) -> Vec<f32> {
+    let image = exr::prelude::read_first_flat_layer_from_file(path).expect("an EXR");
+    image.layer_data.channel_data.list.iter().flat_map(|channel| channel.sample_data.values_as_f32()).collect()
+}
+
+/// Subgroups of each size on this device, through shared memory: no shuffle or scan of 32 or 64 lanes meets them first on
+/// a card. The pass list has the tiles and digits of a card of that size.
+#[test]
+fn every_subgroup_size_agrees_with_the_mirrors() {
+    for size in [4, 8, 16, 32, 64] {
+        let options = GpuOptions { subgroup_size: Some(size), emulate_subgroups: true, ..options() };
+        let Ok(gpu) = Gpu::new(&options) else { return };
+        let turn = Turn::with(gpu);
+        let shape = KernelShape { texel: false, ..KernelShape::of(turn.capabilities()) };
+        assert!(shape.emulated && shape.subgroup == size, "{shape:?}");
+        let passes = |check: selftest::Check| {
+            assert!(check.verdict.is_ok(), "{} at {size}: {:?}", check.name, check.verdict);
+        };
+        selftest::passes(&Rules::default(), &turn.gpu(), shape, "", passes).expect("the device works");
+        selftest::changes(&Rules::default(), &turn.gpu(), shape, passes).expect("the device works");
+    }
+}
