@@ -5,7 +5,7 @@
 
 use super::compiled::Compiler;
 use super::price::{Chain, Work};
-use super::scene::{Counts, all, some};
+use super::scene::{Counts, all, front, some};
 use super::step::Item;
 use labelgs::internals::scheduler::plan::{Grid, PassDecl};
 use labelgs::{Error, Result};
@@ -193,7 +193,7 @@ impl Kernel<'_> {
             (_, "tiles_touched" | "instance_offsets" | "gaussian_from_splat") => read(all(v, 4.0)),
             ("emit_instances", "splats") => read(all(v, 48.0)),
             ("emit_instances", "tile_keys" | "splat_from_instance") => written(all(e, 4.0)),
-            ("tile_ranges", "tile_keys") => read(searched(e, tiles)),
+            ("tile_ranges", "tile_keys") => read(searched(e, c.jobs())),
             ("tile_ranges", "tile_starts" | "tile_ends" | "layer_occupied") => written(all(tiles, 4.0)),
             ("layer_list", "layer_occupied") => read(all(tiles, 4.0)),
             ("layer_list", "layer_offsets") => read(some(tiles, c.layer_tiles, 4)),
@@ -207,27 +207,31 @@ impl Kernel<'_> {
 
     fn of_blends(&self, binding: &str) -> Option<Bytes> {
         let c = self.c;
-        let (e, w, p, jobs) = (c.instances, c.walked, c.pixels(), c.jobs());
+        let (e, p, jobs) = (c.instances, c.pixels(), c.jobs());
+        let w = if self.stem() == "blend_forward" { c.walked } else { c.weighted };
         // A splat is read if one of its tiles walks as far.
-        let seen = c.visible * (1.0 - (1.0 - c.walked_share()).powf(c.tiles_of_splat()));
+        let seen = c.visible * (1.0 - (1.0 - w / e.max(1.0)).powf(c.tiles_of_splat()));
         let layer_pixels = c.layer_tiles * c.tile_pixels;
         Some(match (self.stem(), binding) {
             (_, "tile_starts" | "tile_ends") => read(some(c.virtual_tiles(), jobs, 4)),
             // A tile's list begins anywhere in a sector.
             (_, "instance_from_sorted") => read((all(w, 4.0) + jobs * 28.0).min(all(e, 4.0))),
-            (_, "splat_from_instance") => read(some(e, w, 4)),
+            (_, "splat_from_instance") => read(front(e, w, 4.0)),
             (_, "splats") => read(some(c.visible, seen, 48)),
             (_, "layer_tiles") => read(all(c.layer_tiles, 4.0)),
             ("blend_forward", "image") => written(all(p, 16.0)),
             ("blend_forward", "last") => written(all(p, 4.0)),
-            ("blend_forward", "target" | "view_labels") => read(all(p.min(layer_pixels), 4.0)),
+            ("blend_forward", "target" | "view_labels") => read(all(p.min(c.object_tiles * c.tile_pixels), 4.0)),
             ("blend_forward", "layer_state") => written(all(layer_pixels, 8.0)),
             ("blend_forward", "layer_loss") => written(all(c.layer_tiles, 4.0)),
             ("blend_forward", "label_keys" | "gaussian_from_splat") => read(0.0),
             ("blend_backward", "image" | "v_image") => read(all(p, 16.0)),
             ("blend_backward", "last") => read(all(p, 4.0)),
             ("blend_backward", "layer_state") => read(all(layer_pixels, 8.0)),
-            ("blend_backward", "v_instances_a" | "v_instances_b" | "v_instances_c") => written(some(e, w, 16)),
+            ("blend_backward", "v_instances_a" | "v_instances_b" | "v_instances_c") => {
+                // Two records fill a sector: those of a splat's neighbouring tiles, which stop at about the same depth.
+                written(all(w, 16.0))
+            }
             _ => return None,
         })
     }
@@ -289,7 +293,8 @@ impl Kernel<'_> {
         let doubled = 1.0 + c.layer_visible / c.visible.max(1.0);
         let shares = self.items() / LANES;
         match self.stem() {
-            "blend_forward" | "blend_backward" => vec![c.walked / LANES + 0.5 * c.jobs(), c.walked],
+            "blend_forward" => vec![c.walked / LANES + 0.5 * c.jobs(), c.walked],
+            "blend_backward" => vec![c.weighted / LANES + 0.5 * c.jobs(), c.weighted],
             "emit_instances" | "project_forward" => vec![splat_waves * most_tiles / doubled],
             "gather" => vec![splat_waves * most_tiles],
             "radix_count" | "radix_scatter" | "scan_reduce" | "scan_apply" => vec![shares],

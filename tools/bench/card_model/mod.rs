@@ -5,7 +5,9 @@
 //! `step.rs` takes the list of passes from the engine.
 
 mod compiled;
+mod counters;
 mod devices;
+mod instrument;
 mod kernels;
 mod price;
 mod scene;
@@ -99,6 +101,7 @@ fn counts(subject: &Subject) -> Counts {
         visible: 0.45 * n,
         instances,
         walked: 0.9 * instances,
+        weighted: 0.85 * instances,
         largest_splat: 0.1 * tiles,
         divergence: 3.0,
         longest_list: 5.0 * 2.0 * n / tiles,
@@ -108,6 +111,7 @@ fn counts(subject: &Subject) -> Counts {
         tile_pixels: f64::from(shape.tile_pixels()),
         layers: f64::from(subject.layers),
         layer_tiles: 1.5 * share * tiles,
+        object_tiles: share * tiles,
         layer_visible: objects * 0.45 * n,
     }
 }
@@ -121,9 +125,10 @@ pub fn run(common: &Common) -> Result<()> {
         let subject = Subject { gaussians, size: (1600, 1064), layers, sh_degree: 3 };
         found.push(report(&subject, &compiler)?);
     }
+    let counted = counters::check(common, &compiler)?;
     measure::write_json(
         &common.output.join("card_model.json"),
-        &json!({ "schema_version": 1, "cards": CARDS, "efficiency": EFFICIENCY, "steps": found }),
+        &json!({ "schema_version": 1, "cards": CARDS, "efficiency": EFFICIENCY, "steps": found, "counters": counted }),
     )
 }
 

@@ -16,6 +16,8 @@ pub struct Counts {
     pub instances: f64,
     /// Of these, pairs that tiles walk before all their pixels stop.
     pub walked: f64,
+    /// Pairs up to the last that has a weight at a pixel of its tile: the backward pass walks these.
+    pub weighted: f64,
     /// Pairs of the splat with the most tiles.
     pub largest_splat: f64,
     /// Mean over groups of 32 neighbouring splats of the most tiles of one, by the mean number of tiles of a splat.
@@ -34,6 +36,8 @@ pub struct Counts {
     pub layers: f64,
     /// Tiles of these layers with a splat.
     pub layer_tiles: f64,
+    /// Tiles of the picture with a splat of at least one layer.
+    pub object_tiles: f64,
     /// Gaussians in the view that belong to one of the layers.
     pub layer_visible: f64,
 }
@@ -86,4 +90,16 @@ pub fn some(rows: f64, chosen: f64, bytes: u32) -> f64 {
         })
         .sum();
     touched * SECTOR * rows * f64::from(bytes) / f64::from(period)
+}
+
+/// Bytes of the sectors that are touched if `chosen` of `rows` rows are, and the chance of a row falls evenly with its
+/// number. So do pairs in the order of depth: tiles stop walking at different depths.
+pub fn front(rows: f64, chosen: f64, bytes: f64) -> f64 {
+    if rows <= 0.0 {
+        return 0.0;
+    }
+    let (share, together) = ((chosen / rows).min(1.0), (SECTOR / bytes).max(1.0));
+    // Rows beyond `reach` are never chosen; the chance falls from 1 to `1 - fall` there.
+    let (reach, fall) = if share < 0.5 { (2.0 * share, 1.0) } else { (1.0, 2.0 - 2.0 * share) };
+    rows * bytes * reach * (1.0 - fall.powf(together) / (together + 1.0))
 }
