@@ -76,6 +76,7 @@ fn compare(common: &Common, compiler: &Compiler, labels: bool) -> Result<Value> 
         let (_, touches) = kernels::work(item, c, compiler)?;
         let counted = passes.next().ok_or_else(|| Error::Bug("a pass was not counted".to_owned()))?;
         for (touch, (name, read, written)) in touches.iter().zip(counted) {
+            require(touch.binding == *name, || format!("{name} was counted for {}", touch.binding))?;
             let entry = stages.entry(item.stage).or_default();
             *entry = (entry.0 + touch.read + touch.written, entry.1 + read + written);
             let text = format!(

@@ -12,6 +12,7 @@ mod kernels;
 mod price;
 mod scene;
 mod step;
+mod trainers;
 
 use super::Common;
 use super::measure::{self, table};
@@ -24,6 +25,16 @@ use scene::Counts;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use step::Subject;
+
+/// Share of the Gaussians that a view sees.
+const VISIBLE: f64 = 0.45;
+
+/// (splat, tile) pairs of the scene for each Gaussian, with tiles of 16 x 16 px.
+const PAIRS: f64 = 2.0;
+
+/// Share of the pairs that tiles walk before all their pixels stop, and up to the last pair with a weight.
+const WALKED: f64 = 0.9;
+const WEIGHTED: f64 = 0.85;
 
 const CARDS: [Card; 2] = [RTX_4090, A100];
 
@@ -95,16 +106,16 @@ fn counts(subject: &Subject) -> Counts {
     let tiles = f64::from(tiles_x) * f64::from(tiles_y);
     // Masks on 27 % of the pixels add 0.38 object pairs to a scene pair (the benchmark `steps`).
     let (objects, share) = if subject.layers > 0 { (0.38, 0.27) } else { (0.0, 0.0) };
-    let instances = 2.0 * n * (1.0 + objects);
+    let instances = PAIRS * n * (1.0 + objects);
     Counts {
         gaussians: n,
-        visible: 0.45 * n,
+        visible: VISIBLE * n,
         instances,
-        walked: 0.9 * instances,
-        weighted: 0.85 * instances,
+        walked: WALKED * instances,
+        weighted: WEIGHTED * instances,
         largest_splat: 0.1 * tiles,
         divergence: 3.0,
-        longest_list: 5.0 * 2.0 * n / tiles,
+        longest_list: 5.0 * PAIRS * n / tiles,
         width: f64::from(subject.size.0),
         height: f64::from(subject.size.1),
         tiles,
@@ -112,7 +123,7 @@ fn counts(subject: &Subject) -> Counts {
         layers: f64::from(subject.layers),
         layer_tiles: 1.5 * share * tiles,
         object_tiles: share * tiles,
-        layer_visible: objects * 0.45 * n,
+        layer_visible: objects * VISIBLE * n,
     }
 }
 
@@ -125,10 +136,12 @@ pub fn run(common: &Common) -> Result<()> {
         let subject = Subject { gaussians, size: (1600, 1064), layers, sh_degree: 3 };
         found.push(report(&subject, &compiler)?);
     }
+    let published = trainers::check(&compiler)?;
     let counted = counters::check(common, &compiler)?;
     measure::write_json(
         &common.output.join("card_model.json"),
-        &json!({ "schema_version": 1, "cards": CARDS, "efficiency": EFFICIENCY, "steps": found, "counters": counted }),
+        &json!({ "schema_version": 1, "cards": CARDS, "efficiency": EFFICIENCY, "steps": found, "published": published,
+            "counters": counted }),
     )
 }
 
