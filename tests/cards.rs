@@ -133,7 +133,10 @@ fn a_report_says_nothing_private() {
     assert!(checks.len() == 25 && checks.iter().all(|check| check["passed"] == true), "{checks:?}");
     assert!(report["steps"]["stages"].as_array().is_some_and(|stages| stages.len() > 8), "{}", report["steps"]);
     let compiler = &report["compiler"];
-    assert!(compiler.is_array() || compiler["error"].as_str().is_some_and(|error| error.contains("lacks")), "{compiler}");
+    assert!(
+        compiler.is_array() || compiler["error"].as_str().is_some_and(|error| error.contains("lacks")),
+        "{compiler}"
+    );
     let variable = |name: &str| std::env::var(name).unwrap_or_default();
     let host = fs::read_to_string("/proc/sys/kernel/hostname").unwrap_or_default();
     let here = std::env::current_dir().expect("a folder").display().to_string();

@@ -95,8 +95,7 @@ pub(crate) fn run(args: &ProfileArgs, context: &Context) -> Result<()> {
         Some(path) => open_model(path)?,
         None => init::initial_gaussians(&dataset, config.seed, init::RANDOM_COUNT)?,
     };
-    let window =
-        Window { overlap: args.overlap, from_step: args.from_step, warm_up: args.warm_up, steps: args.steps };
+    let window = Window { overlap: args.overlap, from_step: args.from_step, warm_up: args.warm_up, steps: args.steps };
     #[cfg(feature = "lab")]
     let change = |trainer: &mut Trainer| trainer.separate_objects(args.separate_objects);
     #[cfg(not(feature = "lab"))]

@@ -79,10 +79,6 @@ pub const EFFICIENCY: f64 = 0.75;
 /// Graphs": 3.4 us a kernel in a graph of kernels that run one after another, of which the kernel itself takes 2.9 us.
 pub const DISPATCH: f64 = 0.5e-6;
 
-/// Seconds that a host with Python and PyTorch needs for one operator: the middle of the 5 to 25 us from the statement to
-/// the launched kernel that J. Huang, "From PyTorch op to kernel launch", counts layer by layer.
-pub const OPERATOR: f64 = 15e-6;
-
 impl Card {
     /// Seconds of a barrier besides the next start: the last stores leave for memory, the first loads come back.
     pub fn barrier(&self) -> f64 {
