@@ -10,8 +10,8 @@
 // Mirror:  none (bookkeeping; tests/overflow.rs)
 
 layout(local_size_x = 1) in;
-layout(constant_id = 3) const uint LAYER_TILE_CAPACITY = 0;
-layout(constant_id = 4) const uint LONGEST_LIST = 0; // longest list that the recorded segments can walk
+layout(constant_id = 3) const uint LAYER_TILE_CAPACITY = 65536;
+layout(constant_id = 4) const uint LONGEST_LIST = 65536; // longest list that the recorded segments can walk
 READ1(0, StepUniforms, step);
 READ1(1, Counters, counters);
 INOUT(2, uint, dispatch_args);

@@ -9,7 +9,7 @@
 // Mirror:  none (bookkeeping; tests/overflow.rs)
 
 layout(local_size_x = 1) in;
-layout(constant_id = 3) const uint INSTANCE_CAPACITY = 0;
+layout(constant_id = 3) const uint INSTANCE_CAPACITY = 65536;
 INOUT1(0, Counters, counters);
 INOUT(1, uint, dispatch_args);
 INOUT1(2, uint, failure);

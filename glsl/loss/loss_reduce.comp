@@ -15,7 +15,7 @@ layout(local_size_x_id = 0) in;
 READ(0, vec2, loss_partials);
 INOUT1(1, Counters, counters);
 #ifdef LABELS
-layout(constant_id = 3) const uint LAYER_TILE_CAPACITY = 0;
+layout(constant_id = 3) const uint LAYER_TILE_CAPACITY = 65536;
 READ(2, float, layer_loss);
 #endif
 

@@ -16,7 +16,7 @@
 
 layout(local_size_x = 64) in;
 #ifdef SHARED
-layout(constant_id = 14) const uint ROWS = 0; // elements of step_rows
+layout(constant_id = 14) const uint ROWS = 65536; // elements of step_rows
 READ(0, uint, step_rows);
 READ(2, vec4, step_rates);
 INOUT(10, vec2, weights);

@@ -10,7 +10,7 @@
 // Mirror:  src/verify/reference/scan.rs::compact
 
 layout(local_size_x = 64) in;
-layout(constant_id = 3) const uint LAYER_TILE_CAPACITY = 0;
+layout(constant_id = 3) const uint LAYER_TILE_CAPACITY = 65536;
 READ1(0, StepUniforms, step);
 READ1(1, uint, failure);
 FETCHU(2, layer_occupied);

@@ -119,7 +119,8 @@ pub(crate) fn needs_json(device: &Capabilities) -> Vec<Value> {
     device.needs.iter().map(row).collect()
 }
 
-fn to_json(device: &Capabilities, picked: Option<usize>) -> Value {
+/// Returns a device as JSON.
+pub(super) fn to_json(device: &Capabilities, picked: Option<usize>) -> Value {
     let (major, minor, patch) = device.api_version;
     let usable = device.missing().is_empty();
     json!({

@@ -21,6 +21,7 @@ pub(crate) mod plan;
 pub(crate) mod profile;
 pub(crate) mod profile_compare;
 mod profile_report;
+mod report;
 pub(crate) mod recolour;
 pub(crate) mod relabel;
 pub(crate) mod render;

@@ -10,7 +10,7 @@ use super::{profile_compare, stdout};
 use crate::gpu::Gpu;
 use crate::io::init;
 use crate::run::Settings;
-use crate::scene::Dataset;
+use crate::scene::{Dataset, Gaussians};
 use crate::scheduler::SchedulerOptions;
 use crate::scheduler::plan::PlanOptions;
 use crate::synth::{self, SynthOptions};
@@ -91,22 +91,17 @@ pub(crate) fn run(args: &ProfileArgs, context: &Context) -> Result<()> {
     let config = decide(args)?;
     let dataset = open(args, &config)?;
     let gpu = open_gpu(context)?;
-    if gpu.limits().timestamp_bits == 0 {
-        return Err(Error::NoDevice("this device has no timestamps on its compute queue".into()));
-    }
-    let window = Window { overlap: args.overlap, from_step: args.from_step, warm_up: args.warm_up };
-    let mut profile = Profile::new(&gpu, workers(&gpu)?, window);
-    profile.views = dataset.train.len();
     let model = match &args.model {
         Some(path) => open_model(path)?,
         None => init::initial_gaussians(&dataset, config.seed, init::RANDOM_COUNT)?,
     };
-    let plan = PlanOptions { barrier_everywhere: !args.overlap, ..PlanOptions::default() };
-    let options = SchedulerOptions { plan, timestamps: true, ..SchedulerOptions::default() };
-    let mut trainer = Trainer::new(Arc::clone(&gpu), config, &dataset, &model, options)?;
+    let window =
+        Window { overlap: args.overlap, from_step: args.from_step, warm_up: args.warm_up, steps: args.steps };
     #[cfg(feature = "lab")]
-    trainer.separate_objects(args.separate_objects);
-    measure(&mut trainer, args, context, &mut profile)?;
+    let change = |trainer: &mut Trainer| trainer.separate_objects(args.separate_objects);
+    #[cfg(not(feature = "lab"))]
+    let change = |_: &mut Trainer| ();
+    let profile = profile(&gpu, (&dataset, &model, config), window, change, context)?;
     match &args.json {
         Some(Some(file)) => crate::io::atomic::write_json(file, &profile.to_json())?,
         Some(None) => stdout::print_json(&profile.to_json())?,
@@ -145,11 +140,32 @@ fn open(args: &ProfileArgs, config: &TrainConfig) -> Result<Dataset> {
     Ok(dataset)
 }
 
-fn measure(trainer: &mut Trainer, args: &ProfileArgs, context: &Context, profile: &mut Profile) -> Result<()> {
-    let before = args.from_step + args.warm_up;
-    let mut progress = Progress::new(u64::from(before + args.steps), "steps", &context.global);
+/// Times steps of a training of `model` on a dataset; `change` is applied to the trainer first.
+pub(super) fn profile(
+    gpu: &Arc<Gpu>,
+    (dataset, model, config): (&Dataset, &Gaussians, TrainConfig),
+    window: Window,
+    change: impl FnOnce(&mut Trainer),
+    context: &Context,
+) -> Result<Profile> {
+    if gpu.limits().timestamp_bits == 0 {
+        return Err(Error::NoDevice("this device has no timestamps on its compute queue".into()));
+    }
+    let mut profile = Profile::new(gpu, workers(gpu)?, window);
+    profile.views = dataset.train.len();
+    let plan = PlanOptions { barrier_everywhere: !window.overlap, ..PlanOptions::default() };
+    let options = SchedulerOptions { plan, timestamps: true, ..SchedulerOptions::default() };
+    let mut trainer = Trainer::new(Arc::clone(gpu), config, dataset, model, options)?;
+    change(&mut trainer);
+    measure(&mut trainer, window, context, &mut profile)?;
+    Ok(profile)
+}
+
+fn measure(trainer: &mut Trainer, window: Window, context: &Context, profile: &mut Profile) -> Result<()> {
+    let before = window.from_step + window.warm_up;
+    let mut progress = Progress::new(u64::from(before + window.steps), "steps", &context.global);
     for step in 1..=before {
-        if step == args.from_step + 1 {
+        if step == window.from_step + 1 {
             trainer.keep_times();
         }
         trainer.step()?;
@@ -159,7 +175,7 @@ fn measure(trainer: &mut Trainer, args: &ProfileArgs, context: &Context, profile
     let (wall, cpu) = (Instant::now(), cpu_time());
     let mut steps = Vec::new();
     let mut reports = Vec::new();
-    for step in 1..=args.steps {
+    for step in 1..=window.steps {
         let start = Instant::now();
         reports.extend(trainer.step()?);
         steps.push(start.elapsed());
@@ -176,7 +192,7 @@ fn measure(trainer: &mut Trainer, args: &ProfileArgs, context: &Context, profile
     profile.fill(clocks, &reports, times);
     trainer.count_pairs(true);
     let mut counted = Vec::new();
-    for _ in 0..COUNTED.min(args.steps) {
+    for _ in 0..COUNTED.min(window.steps) {
         counted.extend(trainer.step()?);
     }
     counted.extend(trainer.drain()?);

@@ -28,6 +28,8 @@ pub(super) struct Window {
     pub from_step: u32,
     /// Steps of the warm-up; their times do not count.
     pub warm_up: u32,
+    /// Steps that are timed.
+    pub steps: u32,
 }
 
 /// Times by the clocks of the host.

@@ -4,12 +4,13 @@ use super::args::JsonFlag;
 use super::context::Context;
 use super::devices::{needs_json, needs_text, shape_json, shape_text};
 use super::scene::open_gpu;
-use super::stdout;
+use super::{report, stdout};
 use crate::pass::KernelShape;
 use crate::verify::selftest::{self, Check};
 use crate::{Error, Result};
 use clap::Args;
 use serde_json::json;
+use std::path::PathBuf;
 
 /// `labelgs selftest`.
 #[derive(Args, Clone, Debug)]
@@ -17,10 +18,24 @@ pub struct SelftestArgs {
     /// JSON.
     #[command(flatten)]
     pub json: JsonFlag,
+    /// Write a report of this device to FILE, to send to the authors: the device and its driver, the checks, what the
+    /// driver's compiler makes of every kernel, and the times of training steps. Nothing in it is private.
+    #[arg(long, value_name = "FILE.json", help_heading = "Output")]
+    pub report: Option<PathBuf>,
 }
 
-/// Runs the checks and prints a row for each. Fails if a check fails.
+/// Runs the checks and prints a row for each, and writes the report. Fails if a check fails.
 pub(crate) fn run(args: &SelftestArgs, context: &Context) -> Result<()> {
+    let Some(file) = &args.report else { return checked(args, context, &mut Vec::new()) };
+    let mut checks = Vec::new();
+    let outcome = checked(args, context, &mut checks);
+    crate::io::atomic::write_json(file, &report::report(&checks, outcome.as_ref().err(), context)?)?;
+    tracing::info!("wrote {}; please send it to the authors of labelgs", file.display());
+    outcome
+}
+
+/// Runs the checks, and collects them.
+fn checked(args: &SelftestArgs, context: &Context, checks: &mut Vec<Check>) -> Result<()> {
     let gpu = open_gpu(context)?;
     let (found, kernels) = (gpu.capabilities(), KernelShape::of(gpu.capabilities()));
     let as_json = context.json || args.json.json;
@@ -38,7 +53,6 @@ pub(crate) fn run(args: &SelftestArgs, context: &Context) -> Result<()> {
             "(1 is the largest error allowed)"
         ))?;
     }
-    let mut checks = Vec::new();
     let mut printed = Ok(());
     selftest::run(&gpu, |check| {
         if !as_json && printed.is_ok() {
@@ -77,7 +91,8 @@ fn row(check: &Check) -> String {
     }
 }
 
-fn to_json(check: &Check) -> serde_json::Value {
+/// Returns a check as JSON.
+pub(super) fn to_json(check: &Check) -> serde_json::Value {
     json!({
         "name": check.name,
         "passed": check.verdict.is_ok(),

@@ -37,6 +37,12 @@ fn child(tests: &[&str], environment: &[(&str, &str)]) -> String {
     text
 }
 
+/// The hash that a child printed.
+fn hash_in(text: &str) -> String {
+    let hash = text.split("hash ").nth(1).and_then(|rest| rest.split_whitespace().next());
+    hash.unwrap_or_else(|| panic!("no hash in {text}")).to_owned()
+}
+
 /// Whether the device is lavapipe, which reads these variables.
 fn is_lavapipe() -> bool {
     device().is_some_and(|turn| turn.is_cpu())
@@ -48,9 +54,8 @@ fn a_training_is_the_same_on_any_number_of_threads() {
         return;
     }
     let run = |threads: &str| {
-        let text = child(&["invariants::processes::hash_of_a_training", "--exact"], &[("LP_NUM_THREADS", threads)]);
-        let hash = text.split("hash ").nth(1).and_then(|rest| rest.split_whitespace().next()).map(str::to_owned);
-        hash.unwrap_or_else(|| panic!("no hash in {text}"))
+        let tests = ["invariants::processes::hash_of_a_training", "--exact"];
+        hash_in(&child(&tests, &[("LP_NUM_THREADS", threads)]))
     };
     let one = run("1");
     for threads in ["2", "16"] {
@@ -58,26 +63,25 @@ fn a_training_is_the_same_on_any_number_of_threads() {
     }
 }
 
-/// Without an optional feature the bits are the same, because texel and storage reads return the same numbers.
+/// Without an optional feature the bits are the same, because texel and storage reads return the same numbers. Without
+/// pinned subgroups they are those of emulated ones.
 #[test]
 fn without_optional_features_a_training_is_the_same() {
     if std::env::var_os(CHILD).is_some() || !is_lavapipe() {
         return;
     }
-    let run = |name: &str, value: &str| {
+    let run = |environment: &[(&str, &str)]| {
         let tests = ["invariants::processes::hash_of_a_training", "pass::step", "pass::blend"];
-        let text = child(&tests, &[(name, value)]);
-        let hash = text.split("hash ").nth(1).and_then(|rest| rest.split_whitespace().next()).map(str::to_owned);
-        hash.unwrap_or_else(|| panic!("no hash in {text}"))
+        hash_in(&child(&tests, environment))
     };
-    let all = run("LABELGS_HIDE", "");
-    for (name, value) in [
-        ("LABELGS_HIDE", "size_control,full_subgroups"),
-        ("LABELGS_HIDE", "timestamps,memory_model,robust"),
-        ("LABELGS_LIMIT_TEXELS", "64K"),
-    ] {
-        assert_eq!(run(name, value), all, "with {name}={value}");
+    let all = run(&[]);
+    for (name, value) in [("LABELGS_HIDE", "timestamps,memory_model,robust"), ("LABELGS_LIMIT_TEXELS", "64K")] {
+        assert_eq!(run(&[(name, value)]), all, "with {name}={value}");
     }
+    // Emulated subgroups add in another order than lavapipe's.
+    let emulated = run(&[("LABELGS_EMULATE", "1")]);
+    assert_ne!(emulated, all, "nothing is emulated");
+    assert_eq!(run(&[("LABELGS_HIDE", "size_control,full_subgroups")]), emulated, "without a pinned subgroup size");
 }
 
 /// Subgroups of 16 where the processor has vectors for them (elsewhere the same size again).

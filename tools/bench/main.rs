@@ -8,6 +8,7 @@
     reason = "the rules of files and lengths are those of the library"
 )]
 
+mod card_model;
 mod compiler;
 mod device;
 mod kernels;
@@ -62,6 +63,8 @@ enum Command {
     Training(training::Options),
     /// How near each stage of a step comes to the limit of the device, measured in the same run.
     Limits(Common),
+    /// A model of a step on graphics cards, checked against counted accesses and published times.
+    CardModel(Common),
     /// Predicted against measured memory of training.
     Memory(Common),
     /// From the start of the program to its first picture, with empty and with filled caches.
@@ -91,6 +94,7 @@ fn run() -> Result<()> {
         Command::Training(options) => training::run(&options),
         Command::FirstStep(common) => training::first_step(&common),
         Command::Limits(common) => limits::run(&common),
+        Command::CardModel(common) => card_model::run(&common),
         Command::Memory(common) => memory::run(&common),
         Command::Start(common) => start::run(&common),
         Command::MemoryOf { gaussians, width, height } => memory::measure(gaussians, width, height),
