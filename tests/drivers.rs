@@ -97,6 +97,18 @@ fn trainings_survive_kills_on_other_drivers_and_models_look_the_same() {
     }
 }
 
+/// Pictures that two systems drew of one model: `LABELGS_PICTURES` names their folders, as `here:there`. tools/newer-mesa
+/// draws them on this machine's Mesa and on a newer one.
+#[test]
+fn pictures_of_two_systems_agree() {
+    let Ok(folders) = std::env::var("LABELGS_PICTURES") else {
+        eprintln!("skipped: LABELGS_PICTURES names no folders");
+        return;
+    };
+    let (here, there) = folders.split_once(':').expect("LABELGS_PICTURES=here:there");
+    pictures_agree(Path::new(here), Path::new(there));
+}
+
 /// Compares the pictures of two drivers. Each is within 1e-6 of float64 (src/verify/selftest), so they differ by at most
 /// 2e-6, except at pixels where a pair lies so close to the least opacity of 1/255 or to the last transmittance that
 /// one driver takes it and the other does not: at most one pixel in a thousand, by at most that opacity. There two
