@@ -226,8 +226,9 @@ fn declare_variants(glsl: &Path, shaders: &mut Vec<Shader>, lab: bool) -> Result
         } else {
             shaders.iter_mut().filter(|shader| line.applies_to(shader)).for_each(|shader| {
                 let from = if line.prefix().is_some() { shader.variants.len() } else { 1 };
-                for base in shader.variants[..from].to_vec() {
-                    let defines = [base.defines, line.defines.clone()].concat();
+                for at in 0..from {
+                    let base = &shader.variants[at];
+                    let defines = [&base.defines[..], &line.defines].concat();
                     let name = format!("{}_{}", base.name, line.suffix);
                     shader.variants.push(Variant { name, defines, ..Variant::default() });
                 }
