@@ -157,5 +157,6 @@ fn every_subgroup_size_agrees_with_the_mirrors() {
         };
         selftest::passes(&Rules::default(), &turn.gpu(), shape, "", passes).expect("the device works");
         selftest::changes(&Rules::default(), &turn.gpu(), shape, passes).expect("the device works");
+        selftest::wholes(&turn.gpu(), shape, passes).expect("the device works");
     }
 }

@@ -244,17 +244,27 @@ fn states(fixture: &mut Fixture, count: usize) -> Result<Vec<Optimised>> {
     Ok((0..count).map(|i| Optimised { row: rows[i], m: m[i], u: u[i] }).collect())
 }
 
-/// Checks a tile with more splats than some drivers run rounds of a loop (65,535). Nearly all cover one corner. The
-/// last ones cover the opposite corner, where they are visible only if the walk reaches its end.
+/// Checks a tile with more splats than some drivers run rounds of a loop (65,535). The first ones close all pixels except
+/// those around the tile's last, so that most lanes of a subgroup are done. The last ones cover the last pixel, where
+/// they are visible only if the walk goes on to its end for the lanes that are left.
 pub(super) fn long_list(gpu: &Arc<Gpu>, kernels: KernelShape) -> Result<Verdict> {
     const SPLATS: usize = 70_000;
-    let camera = plain_camera(8, 8);
+    let (width, height) = (kernels.tile_width, kernels.tile_height);
+    let (camera, last) = (plain_camera(width, height), [f64::from(width) - 0.5, f64::from(height) - 0.5]);
+    let centres = (0..height).flat_map(|y| (0..width).map(move |x| [f64::from(x) + 0.5, f64::from(y) + 0.5]));
+    // Beyond this distance, px, a dot has no weight at the last pixel.
+    let closed: Vec<[f64; 2]> = centres.filter(|at| (at[0] - last[0]).hypot(at[1] - last[1]) > 2.5).collect();
     let row = |i: usize| {
-        let at = if i + 5 < SPLATS { [0.5, 0.5] } else { [7.5, 7.5] };
-        dot(&camera, at, 1.0 + i as f64 * 1e-4, 0.3, 0.3)
+        let (at, opacity) = match closed.get(i % closed.len()) {
+            // Four times 0.99 ends a ray.
+            Some(&centre) if i < 4 * closed.len() => (centre, 0.999),
+            _ if i + 5 < SPLATS => ([0.5, 0.5], 0.3),
+            _ => (last, 0.3),
+        };
+        dot(&camera, at, 1.0 + i as f64 * 1e-4, 0.3, opacity)
     };
     let rows: Vec<Row> = (0..SPLATS).map(row).collect();
-    let template = scene(1, &Shape { gaussians: 1, width: 8, height: 8, objects: 1, ..Shape::default() });
+    let template = scene(1, &Shape { gaussians: 1, width, height, objects: 1, ..Shape::default() });
     let scene = Scene { camera, gaussians: grey(&rows), ..template };
     let mut fixture = Fixture::new(Arc::clone(gpu), scene, false, kernels, readable())?;
     let report = fixture.render()?;

@@ -48,6 +48,11 @@ pub fn run_against(rules: &Rules, gpu: &Arc<Gpu>, mut done: impl FnMut(Check)) -
     passes(rules, gpu, kernels, "", &mut done)?;
     passes(rules, gpu, other, if other.texel { ", texel reads" } else { ", storage reads" }, &mut done)?;
     changes(rules, gpu, kernels, &mut done)?;
+    wholes(gpu, kernels, &mut done)
+}
+
+/// Runs the checks of a long list and of a training.
+pub fn wholes(gpu: &Arc<Gpu>, kernels: KernelShape, mut done: impl FnMut(Check)) -> Result<()> {
     type Whole = fn(&Arc<Gpu>, KernelShape) -> Result<Verdict>;
     let wholes: [(&str, Whole); 2] =
         [("70,000 splats in a tile", checks::long_list), ("training twice, bit by bit", training::twice)];
