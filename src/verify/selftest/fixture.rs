@@ -2,7 +2,7 @@
 
 use super::scenes::Scene;
 use crate::engine::{Engine, EngineSize, Input, LabelSize, ListKey, Report};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::pass::{KernelShape, Variant};
 use crate::scene::{LabelMap, Photo};
@@ -214,6 +214,11 @@ impl Fixture {
         let visible = self.engine.report(0)?.counters.visible_count as usize;
         let order = self.get::<u32>(Buf::DEPTH_VALUES_A, visible)?;
         let records = self.get::<[f32; 12]>(Buf::SPLATS, visible)?;
+        // The mirrors look these Gaussians up.
+        let count = self.scene.gaussians.len();
+        if let Some(wrong) = order.iter().find(|&&gaussian| gaussian as usize >= count) {
+            return Err(Error::Check(format!("the device sorts {count} Gaussians and lists number {wrong}")));
+        }
         Ok(order.iter().zip(&records).map(|(&gaussian, record)| splat_of(gaussian, record)).collect())
     }
 
