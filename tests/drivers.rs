@@ -29,9 +29,10 @@ fn swiftshader() -> Option<Driver> {
     }
 }
 
-/// Lavapipe with vectors of 128 bits, if this is lavapipe.
+/// Lavapipe with vectors of 128 bits, if this is lavapipe. Mesa 25 does not tell vector widths apart in its cache on disk.
 fn narrow_lavapipe() -> Option<Driver> {
-    device().is_some_and(|turn| turn.is_cpu()).then(|| vec![("LP_NATIVE_VECTOR_WIDTH", "128".to_owned())])
+    let narrow = || vec![("LP_NATIVE_VECTOR_WIDTH", "128".into()), ("MESA_SHADER_CACHE_DISABLE", "true".into())];
+    device().is_some_and(|turn| turn.is_cpu()).then(narrow)
 }
 
 fn drivers() -> Vec<Driver> {

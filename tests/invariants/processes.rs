@@ -92,7 +92,8 @@ fn passes_agree_with_their_mirrors_on_wide_vectors() {
     }
     let text = child(
         &["pass::", "invariants::shapes", "invariants::processes::hash_of_a_training"],
-        &[("LP_NATIVE_VECTOR_WIDTH", "512")],
+        // Mesa 25 does not tell vector widths apart in its cache on disk.
+        &[("LP_NATIVE_VECTOR_WIDTH", "512"), ("MESA_SHADER_CACHE_DISABLE", "true")],
     );
     assert!(text.contains("subgroup 16 hash"), "no subgroups of 16: {text}");
 }
