@@ -2,6 +2,7 @@
 
 use super::compared::{Compared, Watch};
 use super::metrics::COVERED;
+use super::regions::{RegionScores, Witnesses};
 use super::scores::{ObjectRender, ObjectTruth, Scores, ViewScores};
 use crate::edit::select::extract;
 use crate::engine::Engine;
@@ -13,11 +14,13 @@ use std::collections::BTreeMap;
 
 /// The options of the renders.
 #[derive(Clone, Copy, Debug)]
-pub struct Rendering {
+pub struct Rendering<'a> {
     /// Options for whole scenes; objects are rendered on black.
     pub options: RenderOptions,
     /// Least label confidence of Gaussians in objects rendered alone, 0 to 1.
     pub min_confidence: f32,
+    /// Training views, for scores by region; none leaves them out.
+    pub train: &'a [View],
 }
 
 /// Ground truth of objects including their hidden parts.
@@ -48,6 +51,10 @@ pub fn evaluate(
     watch: &mut dyn Watch,
 ) -> Result<Scores> {
     engine.upload_model(model)?;
+    let witnesses = match how.train {
+        [] => None,
+        train => Some(Witnesses::new(engine, train, how.options)?),
+    };
     let of_scene = RenderOptions { parts: Parts::ALL, ..how.options };
     let of_object = RenderOptions { background: [0.0; 3], parts: Parts::COLOUR, ..how.options };
     let labels = model.labels.as_deref();
@@ -56,7 +63,11 @@ pub fn evaluate(
     for view in views {
         let rendered = render(engine, &view.camera, &of_scene)?;
         let map = labels.map(|labels| rendered.label_map(labels)).transpose()?;
-        let score = ViewScores::new(&rendered.rgb, photo(view)?, map.as_ref(), view.mask.as_deref())?;
+        let mut score = ViewScores::new(&rendered.rgb, photo(view)?, map.as_ref(), view.mask.as_deref())?;
+        if let Some(witnesses) = &witnesses {
+            let seen = witnesses.see(&view.camera, &rendered)?;
+            score.regions = Some(RegionScores::new(&rendered.rgb, photo(view)?, view.mask.as_deref(), &seen));
+        }
         let numbers = vec![("PSNR", Some(score.psnr)), ("SSIM", Some(score.ssim))];
         watch.see(&Compared { numbers, ..Compared::new(&view.name, photo(view)?, &rendered.rgb) })?;
         scores.push(score);

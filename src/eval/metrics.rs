@@ -21,9 +21,14 @@ pub(crate) fn psnr_of(mean_squared_error: f64) -> f64 {
 /// Returns the PSNR of a render against a photo, dB. The render is clamped to 0..1, and the mean is over all channels
 /// of the photo's valid pixels. NaN without valid pixels.
 pub fn psnr(render: &[[f32; 3]], photo: &Photo) -> f64 {
+    psnr_over(render, photo, |_| true).unwrap_or(f64::NAN)
+}
+
+/// Like [`psnr`] over the valid pixels that count; `None` without any.
+pub(crate) fn psnr_over(render: &[[f32; 3]], photo: &Photo, counts: impl Fn(usize) -> bool) -> Option<f64> {
     let (mut sum, mut count) = (0.0, 0_u64);
-    for (colour, &[r, g, b, valid]) in render.iter().zip(&photo.rgba) {
-        if valid == 0 {
+    for (index, (colour, &[r, g, b, valid])) in render.iter().zip(&photo.rgba).enumerate() {
+        if valid == 0 || !counts(index) {
             continue;
         }
         for (&value, truth) in colour.iter().zip([r, g, b]) {
@@ -32,7 +37,7 @@ pub fn psnr(render: &[[f32; 3]], photo: &Photo) -> f64 {
         }
         count += 3;
     }
-    psnr_of(sum / count as f64)
+    (count > 0).then(|| psnr_of(sum / count as f64))
 }
 
 /// Pixel counts of the intersection and union of two masks.

@@ -5,6 +5,7 @@
 use super::boundary::boundary_iou;
 use super::crop::Crop;
 use super::metrics::{COVERED, Overlap, byte_value, mean, paper_score, psnr, psnr_of};
+use super::regions::RegionScores;
 use super::ssim::ssim;
 use crate::scene::{LabelMap, Photo};
 use crate::{Error, Result};
@@ -47,6 +48,9 @@ pub struct ViewScores {
     pub psnr: f64,
     /// SSIM over the photo's valid pixels.
     pub ssim: f64,
+    /// PSNR by region, if the training views are known.
+    #[serde(flatten)]
+    pub regions: Option<RegionScores>,
     /// Scores of the objects by id.
     pub objects: BTreeMap<u32, ObjectScores>,
 }
@@ -102,7 +106,7 @@ impl ViewScores {
         if lengths.into_iter().flatten().any(|length| length != pixels) {
             return Err(Error::Bug("render, label map, mask and photo differ in size".into()));
         }
-        let mut scores = Self { psnr: psnr(render, photo), ssim: ssim(render, photo), objects: BTreeMap::new() };
+        let mut scores = Self { psnr: psnr(render, photo), ssim: ssim(render, photo), ..Self::default() };
         let valid = |index: usize| photo.rgba[index][3] > 0;
         for id in mask.into_iter().flat_map(LabelMap::objects) {
             let mut row = ObjectScores::default();
@@ -187,6 +191,9 @@ pub struct MeanScores {
     pub psnr: Option<f64>,
     /// Mean SSIM over views.
     pub ssim: Option<f64>,
+    /// Means over views by region, if the training views are known.
+    #[serde(flatten)]
+    pub regions: Option<RegionScores>,
     /// Means over pairs of view and object.
     #[serde(flatten)]
     pub objects: ObjectScores,
@@ -204,6 +211,41 @@ pub struct Scores {
     pub objects: BTreeMap<u32, ObjectScores>,
     /// Scores of the views by name.
     pub views: BTreeMap<String, ViewScores>,
+    /// Scores at other near planes, if asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub near: Option<NearSweep>,
+}
+
+/// The scene at several near planes. Gaussians before the cameras fog pictures unless a near plane hides them.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct NearSweep {
+    /// Mean PSNR by near plane, in the order of the planes.
+    pub planes: Vec<NearScores>,
+    /// Best mean PSNR of all planes minus that of the nearest plane, dB.
+    pub fog: f64,
+    /// Best mean PSNR of all planes minus that of the model's own plane, dB.
+    pub fog_default: f64,
+}
+
+/// The scene at one near plane.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct NearScores {
+    /// Near plane, world units.
+    pub near: f32,
+    /// Mean PSNR over views, dB.
+    pub psnr: f64,
+    /// PSNR of the worst view, dB.
+    pub worst: f64,
+}
+
+impl NearSweep {
+    /// Compares the planes; `own` is the mean PSNR at the model's own.
+    pub fn new(mut planes: Vec<NearScores>, own: f64) -> Self {
+        planes.sort_by(|a, b| a.near.total_cmp(&b.near));
+        let best = planes.iter().map(|scores| scores.psnr).fold(own, f64::max);
+        let nearest = planes.first().map_or(own, |scores| scores.psnr);
+        Self { planes, fog: best - nearest, fog_default: best - own }
+    }
 }
 
 impl Scores {
@@ -219,10 +261,12 @@ impl Scores {
             mean: MeanScores {
                 psnr: mean(views.values().map(|view| view.psnr)),
                 ssim: mean(views.values().map(|view| view.ssim)),
+                regions: RegionScores::mean(views.values().filter_map(|view| view.regions.as_ref())),
                 objects: average(&pairs),
             },
             objects: by_object.iter().map(|(&id, scores)| (id, average(scores))).collect(),
             views,
+            near: None,
         }
     }
 

@@ -104,7 +104,8 @@ impl Run<'_> {
         if views.is_empty() {
             return Ok(None);
         }
-        let how = Rendering { options: self.trainer.render_options(), min_confidence: MIN_LABEL_CONFIDENCE };
+        let options = self.trainer.render_options();
+        let how = Rendering { options, min_confidence: MIN_LABEL_CONFIDENCE, train: &[] };
         let scores = evaluate(self.trainer.engine_mut(), model, &views, how, &(), &mut ())?;
         scores.warn_of_odd_view(self.settings.train.near);
         Ok(Some(scores))

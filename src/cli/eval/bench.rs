@@ -55,8 +55,12 @@ pub(super) fn run(protocol: Protocol, args: &EvalArgs, context: &Context) -> Res
     let mut watcher = Watcher::new(picture_count(&layout), args.page.as_deref(), context)?;
     let sizes = views.iter().map(|view| (view.camera.width, view.camera.height));
     let mut engine = render_engine(open_gpu(context)?, &model, sizes)?;
-    let mut painter =
-        EnginePainter::new(&mut engine, &model, near_plane(&args.model, args.near)?, args.sure.min_confidence);
+    let mut painter = EnginePainter::new(
+        &mut engine,
+        &model,
+        near_plane(&args.model, args.near.first().copied())?,
+        args.sure.min_confidence,
+    );
     let report = run_bench(&layout, &bench, &mut painter, &mut watcher)?;
     let table = bench_table(&report);
     watcher.finish(&table)?;

@@ -5,12 +5,13 @@ use super::watch::Watcher;
 use super::{EvalArgs, put_out};
 use crate::cli::context::{Context, open_model};
 use crate::cli::scene::{near_plane, open_gpu, open_scene, pick_views, render_engine};
+use crate::engine::Engine;
 use crate::eval::evaluate::{AmodalTruth, Rendering, evaluate, picture_count};
-use crate::eval::scores::Scores;
+use crate::eval::scores::{NearScores, NearSweep, Scores};
 use crate::io::image::read_rgba;
 use crate::io::mask::read_mask;
 use crate::render::RenderOptions;
-use crate::scene::View;
+use crate::scene::{Gaussians, View};
 use crate::{Error, Result};
 use std::path::{Path, PathBuf};
 
@@ -32,15 +33,39 @@ pub(in crate::cli) fn score(args: &EvalArgs, context: &Context) -> Result<Scores
     let gpu = open_gpu(context)?;
     let sizes = views.iter().map(|view| (view.camera.width, view.camera.height));
     let mut engine = render_engine(gpu, &model, sizes)?;
-    let near = near_plane(&args.model, args.near)?;
+    let near = near_plane(&args.model, args.near.first().copied().filter(|_| args.near.len() == 1))?;
     let how = Rendering {
         options: RenderOptions { near, background: args.background, ..RenderOptions::default() },
         min_confidence: args.sure.min_confidence,
+        train: &dataset.train,
     };
-    let scores = evaluate(&mut engine, &model, &views, how, &wholes, &mut watcher)?;
+    let mut scores = evaluate(&mut engine, &model, &views, how, &wholes, &mut watcher)?;
+    if args.near.len() > 1 {
+        scores.near = Some(compare_planes(&mut engine, &model, &views, how.options, (&args.near, &scores))?);
+    }
     watcher.finish(&own_table(&scores))?;
     scores.warn_of_odd_view(near);
     Ok(scores)
+}
+
+/// Scores the scene at every near plane.
+fn compare_planes(
+    engine: &mut Engine,
+    model: &Gaussians,
+    views: &[&View],
+    options: RenderOptions,
+    (planes, own): (&[f32], &Scores),
+) -> Result<NearSweep> {
+    let scenes: Vec<View> = views.iter().map(|&view| View { mask: None, ..view.clone() }).collect();
+    let scenes: Vec<&View> = scenes.iter().collect();
+    let mut found = Vec::new();
+    for &near in planes {
+        let how = Rendering { options: RenderOptions { near, ..options }, min_confidence: 0.0, train: &[] };
+        let scores = evaluate(engine, model, &scenes, how, &(), &mut ())?;
+        let worst = scores.views.values().map(|view| view.psnr).fold(f64::INFINITY, f64::min);
+        found.push(NearScores { near, psnr: scores.mean.psnr.unwrap_or(f64::NAN), worst });
+    }
+    Ok(NearSweep::new(found, own.mean.psnr.unwrap_or(f64::NAN)))
 }
 
 /// Folders of ground truth about whole objects, `ID/NAME.png` in each.

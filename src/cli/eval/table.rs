@@ -15,6 +15,7 @@ pub(super) fn own_table(scores: &Scores) -> String {
         text += &format!("{name:>10} {:>8.2} {:>8.4}\n", view.psnr, view.ssim);
     }
     text += &format!("{:>10} {:>8} {:>8}\n", "mean", number(scores.mean.psnr, 2), number(scores.mean.ssim, 4));
+    text += &regions(scores);
     if scores.objects.is_empty() {
         return text;
     }
@@ -43,6 +44,36 @@ pub(super) fn own_table(scores: &Scores) -> String {
             number(row.iou_hidden, 4),
             number(row.psnr_hidden, 2)
         );
+    }
+    text
+}
+
+/// Returns the PSNR by region, and by near plane.
+fn regions(scores: &Scores) -> String {
+    let mut text = String::new();
+    if let Some(mean) = &scores.mean.regions {
+        text += &format!(
+            "\nPSNR by region: {} where three training views see ({:.0} % of the pixels), {} elsewhere",
+            number(mean.psnr_seen, 2),
+            100.0 * mean.seen_share,
+            number(mean.psnr_unseen, 2)
+        );
+        if mean.psnr_objects.is_some() {
+            text += &format!(
+                "; objects {}, contours {}, rest {}",
+                number(mean.psnr_objects, 2),
+                number(mean.psnr_contours, 2),
+                number(mean.psnr_rest, 2)
+            );
+        }
+        text += "\n";
+    }
+    if let Some(sweep) = &scores.near {
+        text += &format!("\n{:>10} {:>8} {:>8}\n", "near plane", "PSNR", "worst");
+        for plane in &sweep.planes {
+            text += &format!("{:>10} {:>8.2} {:>8.2}\n", plane.near, plane.psnr, plane.worst);
+        }
+        text += &format!("fog: {:.2} dB at the nearest plane, {:.2} dB at the default\n", sweep.fog, sweep.fog_default);
     }
     text
 }

@@ -1,0 +1,119 @@
+//! Regions of held-out views: what training views see and what none shows; objects, their contours, and the rest.
+//!
+//! A score over whole views mixes pixels that training can know with pixels that it has to make up.
+
+use crate::Result;
+use crate::engine::Engine;
+use crate::eval::metrics::{mean, psnr_over};
+use crate::render::{Parts, RenderOptions, Rendered, render};
+use crate::scene::{Camera, LabelMap, Photo, View};
+use glam::{DVec2, DVec3};
+use rayon::prelude::*;
+use serde::Serialize;
+
+/// Training views that have to see a pixel of a held-out view.
+const VIEWS_MIN: usize = 3;
+/// A training view sees a point if its own depth there is not less than this share of the point's.
+const DEPTH_SHARE: f64 = 0.95;
+/// Distance of what has no depth, such as the sky, in distances of the farthest depth.
+const BEYOND: f64 = 1e3;
+/// Pixels within this distance of a contour of the mask, px, are its contour.
+const CONTOUR: u32 = 2;
+
+/// PSNR by region, dB; `None` for a region without pixels.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct RegionScores {
+    /// Share of the pixels that at least three training views see, by the depth of the model.
+    pub seen_share: f64,
+    /// Over these pixels.
+    pub psnr_seen: Option<f64>,
+    /// Over all others.
+    pub psnr_unseen: Option<f64>,
+    /// Over the objects of the mask, without their contours.
+    pub psnr_objects: Option<f64>,
+    /// Within 2 px of the contours of the mask.
+    pub psnr_contours: Option<f64>,
+    /// Over the unlabelled rest.
+    pub psnr_rest: Option<f64>,
+}
+
+impl RegionScores {
+    /// Scores a picture.
+    pub(super) fn new(rgb: &[[f32; 3]], photo: &Photo, mask: Option<&LabelMap>, seen: &[bool]) -> Self {
+        let over = |counts: &dyn Fn(usize) -> bool| psnr_over(rgb, photo, counts);
+        let near = mask.map(|mask| mask.near_contour(CONTOUR));
+        let labelled = |counts: &dyn Fn(bool, bool) -> bool| {
+            let (mask, near) = (mask?, near.as_ref()?);
+            over(&|index| counts(mask.ids[index] != 0, near[index]))
+        };
+        Self {
+            seen_share: seen.iter().filter(|&&seen| seen).count() as f64 / seen.len().max(1) as f64,
+            psnr_seen: over(&|index| seen[index]),
+            psnr_unseen: over(&|index| !seen[index]),
+            psnr_objects: labelled(&|object, near| object && !near),
+            psnr_contours: labelled(&|_, near| near),
+            psnr_rest: labelled(&|object, near| !object && !near),
+        }
+    }
+
+    /// Returns the means over views.
+    pub(super) fn mean<'a>(of: impl Iterator<Item = &'a Self> + Clone) -> Option<Self> {
+        let over = |field: fn(&Self) -> Option<f64>| mean(of.clone().filter_map(field));
+        Some(Self {
+            seen_share: mean(of.clone().map(|scores| scores.seen_share))?,
+            psnr_seen: over(|scores| scores.psnr_seen),
+            psnr_unseen: over(|scores| scores.psnr_unseen),
+            psnr_objects: over(|scores| scores.psnr_objects),
+            psnr_contours: over(|scores| scores.psnr_contours),
+            psnr_rest: over(|scores| scores.psnr_rest),
+        })
+    }
+}
+
+/// What the training views see, by the depth of the model.
+pub(super) struct Witnesses {
+    cameras: Vec<(Camera, Vec<f32>)>,
+}
+
+impl Witnesses {
+    /// Renders the depth of every training view; the model is in the engine.
+    pub(super) fn new(engine: &mut Engine, train: &[View], options: RenderOptions) -> Result<Self> {
+        let depth = |view: &View| {
+            let of_depth = RenderOptions { parts: Parts::DEPTH, sh_degree: Some(0), ..options };
+            let depth = render(engine, &view.camera, &of_depth)?.mean_depth()?;
+            Ok((view.camera.clone(), depth))
+        };
+        Ok(Self { cameras: train.iter().map(depth).collect::<Result<_>>()? })
+    }
+
+    /// Returns the pixels of a rendered view that enough training views see.
+    pub(super) fn see(&self, camera: &Camera, rendered: &Rendered) -> Result<Vec<bool>> {
+        let depths = rendered.mean_depth()?;
+        let far = BEYOND * f64::from(depths.iter().copied().fold(1e-6_f32, f32::max));
+        let to_world = camera.rotation.transpose();
+        let is_seen = |(index, &depth): (usize, &f32)| {
+            let (x, y) = (index % camera.width as usize, index / camera.width as usize);
+            let pixel = DVec2::new(x as f64 + 0.5, y as f64 + 0.5);
+            let ray = DVec3::new((pixel.x - camera.cx) / camera.fx, (pixel.y - camera.cy) / camera.fy, 1.0);
+            let depth = if depth > 0.0 { f64::from(depth) } else { far };
+            let world = to_world * (ray * depth - camera.translation);
+            let views = self.cameras.iter().filter(|(other, depths)| sees(other, depths, world));
+            views.take(VIEWS_MIN).count() == VIEWS_MIN
+        };
+        Ok(depths.par_iter().enumerate().map(is_seen).collect())
+    }
+}
+
+/// Returns true if the point is in the picture and nothing of the model is in front of it.
+fn sees(camera: &Camera, depths: &[f32], world: DVec3) -> bool {
+    let place = camera.to_camera(world);
+    let pixel = camera.project(place);
+    let inside = place.z > 0.0
+        && (0.0..f64::from(camera.width)).contains(&pixel.x)
+        && (0.0..f64::from(camera.height)).contains(&pixel.y);
+    if !inside {
+        return false;
+    }
+    let depth = f64::from(depths[pixel.y as usize * camera.width as usize + pixel.x as usize]);
+    depth <= 0.0 || depth >= DEPTH_SHARE * place.z
+}
