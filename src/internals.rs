@@ -215,8 +215,8 @@ pub mod train {
     pub mod strategy {
         pub use crate::train::strategy::population::Population;
         pub use crate::train::strategy::{At, Strategy};
-        pub mod default {
-            pub use crate::train::strategy::default::{densifies_at, resets_opacity_at};
+        pub mod adc {
+            pub use crate::train::strategy::adc::resets_opacity_at;
         }
     }
 }

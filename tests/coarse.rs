@@ -1,4 +1,4 @@
-//! Steps on photos of half the size.
+//! Steps on small photos.
 
 use crate::support::device;
 use labelgs::internals::io::init;
@@ -11,10 +11,13 @@ use std::sync::Arc;
 
 const SCENE: SynthOptions =
     SynthOptions { preset: Preset::Simple, width: 96, height: 72, views: 6, points: 200, seed: 1 };
+/// Steps at half of the size.
 const COARSE: u32 = 6;
 
-fn steps(gpu: &Arc<labelgs::gpu::Gpu>, data: Dataset, coarse_until: u32) -> Vec<StepReport> {
-    let config = TrainConfig { iterations: 100, label_from: 3, coarse_until, ..TrainConfig::default() };
+/// Runs steps of a training that starts at a share of the size; full size comes at `full_size_from`.
+fn steps(gpu: &Arc<labelgs::gpu::Gpu>, data: Dataset, start_size: f32, full_size_from: u32) -> Vec<StepReport> {
+    let (label_from, full_size_from) = (Some(3), Some(full_size_from));
+    let config = TrainConfig { iterations: 100, label_from, start_size, full_size_from, ..TrainConfig::default() };
     let model = init::initial_gaussians(&dataset(&SCENE, 0), 0, 100).expect("a model");
     let mut trainer =
         Trainer::new(Arc::clone(gpu), config, &data, &model, SchedulerOptions::default()).expect("a trainer");
@@ -39,7 +42,7 @@ fn half(photo: &Photo) -> Photo {
     Photo { width, height, rgba }
 }
 
-/// Coarse steps equal those of a scene of half the size without masks. Steps on whole photos, with labels, follow.
+/// Coarse steps equal those of a scene of half the size without masks.
 #[test]
 fn coarse_steps_are_those_of_a_smaller_scene() {
     let Some(gpu) = device() else { return };
@@ -49,14 +52,26 @@ fn coarse_steps_are_those_of_a_smaller_scene() {
         view.photo = view.photo.as_deref().map(|photo| half(photo).into());
         view.mask = None;
     }
-    let (coarse, small) = (steps(&gpu.gpu(), dataset(&SCENE, 0), COARSE), steps(&gpu.gpu(), small, 0));
+    // The first of eight sizes lasts for an eighth of the steps below full size.
+    let coarse = steps(&gpu.gpu(), dataset(&SCENE, 0), 0.5, 8 * (COARSE + 1));
+    let small = steps(&gpu.gpu(), small, 1.0, 0);
     for (a, b) in coarse.iter().zip(&small).take(COARSE as usize) {
         // Sums of losses are rounded in another order where there is room for larger pictures.
         assert!((a.loss - b.loss).abs() < 1e-5 * b.loss, "step {}: {} and {}", a.step, a.loss, b.loss);
         assert_eq!((a.step, a.report.counters.visible_count), (b.step, b.report.counters.visible_count));
         assert_eq!(a.label_loss, 0.0, "step {} is without labels", a.step);
     }
-    assert!(coarse[COARSE as usize..].iter().all(|report| report.label_loss > 0.0 && report.loss.is_finite()));
-    let pixels = |report: &StepReport| report.report.counters.walked_splats();
-    assert!(pixels(&coarse[COARSE as usize]) > 2 * pixels(&coarse[COARSE as usize - 1]), "whole photos come after");
+}
+
+/// The photos grow from step to step up to full size; from there on steps have labels.
+#[test]
+fn photos_grow_to_their_full_size() {
+    let Some(gpu) = device() else { return };
+    let reports = steps(&gpu.gpu(), dataset(&SCENE, 0), 0.25, COARSE);
+    let walked = |report: &StepReport| report.report.counters.walked_splats();
+    assert!(walked(&reports[COARSE as usize]) > 4 * walked(&reports[0]), "the first pictures are small");
+    for (report, step) in reports.iter().zip(1..) {
+        assert_eq!(report.label_loss > 0.0, step >= COARSE, "labels in step {step}");
+        assert!(report.loss.is_finite());
+    }
 }

@@ -2,7 +2,7 @@
 
 use crate::gradient::differences;
 use crate::reference::adam::{Optimised, Rates, adam};
-use crate::reference::densify::{densify, opacity_reset};
+use crate::reference::densify::{densify, is_near, opacity_reset};
 use crate::reference::lift::{Masks, centres_of, lift};
 use crate::reference::model::ROW_FLOATS;
 use crate::reference::rules::{Family, mutants};
@@ -10,6 +10,7 @@ use crate::reference::step::{splats_of, step};
 use crate::reference::{Model, Row, Rules};
 use crate::support::compare::{Tolerance, close};
 use crate::support::scenes::{Scene, Shape, population, scene};
+use labelgs::internals::verify::selftest::model::large;
 
 /// Opaque and faint Gaussians, half of them far outside the image.
 fn wide_scene() -> (Scene, Model) {
@@ -36,8 +37,15 @@ fn outcome(family: Family, rules: &Rules, (s, model): &(Scene, Model)) -> Vec<f6
         }
         Family::Densify => {
             let noise = |row: usize, child: u32, axis: usize| ((row * 6 + axis) as f64 + 3.0 * f64::from(child)).sin();
-            let steps = [500, 3100].map(|step| all(&densify(rules, &population(41, 300), 1.0, step, noise).model.rows));
-            steps.concat()
+            let densified = |(step, splits_long)| {
+                let rules = Rules { splits_long, ..rules.clone() };
+                all(&densify(&rules, &population(41, 300), 1.0, step, noise).model.rows)
+            };
+            [(500, false), (3100, false), (500, true)].map(densified).concat()
+        }
+        Family::FreeSpace => {
+            let s = large(41);
+            s.model().rows.iter().map(|row| f64::from(u8::from(is_near(rules, &s.camera, row).0))).collect()
         }
         Family::Reset => {
             let (mut row, mut m, mut u) = (Row { opacity: 2.0, ..Row::default() }, Row::default(), Row::default());

@@ -92,7 +92,7 @@ fn segments_change_no_bit() {
     };
     let dataset = labelgs::synth::dataset(&options, 0);
     let start = labelgs::io::initial_gaussians(&dataset, 0, 400).expect("points");
-    let config = TrainConfig { iterations: 20, label_from: 5, ..TrainConfig::default() };
+    let config = TrainConfig { iterations: 20, label_from: Some(5), ..TrainConfig::default() };
     let run = |segment_length: u32| {
         let shape = KernelShape { segment_length, ..KernelShape::of(gpu.capabilities()) };
         let options = TrainerOptions { shape: Some(shape), ..TrainerOptions::default() };

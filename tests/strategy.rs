@@ -11,7 +11,7 @@ use labelgs::internals::shaders::structs::StepUniforms;
 use labelgs::internals::train::strategy::{At, Population, Strategy};
 use labelgs::internals::train::{TrainState, Trainer, TrainerOptions};
 use labelgs::io::initial_gaussians;
-use labelgs::run::{LabelRule, TrainConfig};
+use labelgs::run::{LabelRule, StrategyKind, TrainConfig};
 use labelgs::scene::Gaussians;
 use serde_json::{Value, json};
 use std::sync::Arc;
@@ -51,7 +51,7 @@ impl Strategy for Thinning {
         self.rounds += 1;
         let prune_opacity = 0.02 * self.rounds as f32 + 0.05;
         let uniforms = StepUniforms { densify_threshold: 0.0, prune_opacity, ..population.uniforms() };
-        let what = population.densify(uniforms)?;
+        let what = population.densify(uniforms, u64::MAX)?;
         assert_eq!((what.cloned, what.split), (0, 0));
         Ok(())
     }
@@ -79,7 +79,7 @@ impl Strategy for Thinning {
 }
 
 fn options() -> TrainerOptions {
-    TrainerOptions { strategy: Box::new(Thinning::default()), ..TrainerOptions::default() }
+    TrainerOptions { strategy: Some(Box::new(Thinning::default())), ..TrainerOptions::default() }
 }
 
 fn settings() -> TrainConfig {
@@ -141,14 +141,17 @@ fn a_strategy_goes_on_from_a_checkpoint_of_its_own() {
     assert_eq!(found.planes, expected.planes);
     let refused = Trainer::resume(turn.gpu(), &small(), read(), SchedulerOptions::default());
     let error = refused.err().expect("another strategy").to_string();
-    assert!(error.contains("thinning") && error.contains("default"), "{error}");
+    assert!(error.contains("thinning") && error.contains("budget"), "{error}");
 }
 
-/// The default strategy adds nothing to a checkpoint.
+/// The strategy of 3DGS adds nothing to a checkpoint.
 #[test]
-fn checkpoints_do_not_mention_the_default_strategy() {
+fn checkpoints_do_not_mention_the_strategy_of_3dgs() {
     let Some(turn) = device() else { return };
-    let state = go_on(&mut fresh(&turn, SchedulerOptions::default()), 3);
+    let config = TrainConfig { strategy: StrategyKind::Adc, ..settings() };
+    let mut trainer =
+        Trainer::new(turn.gpu(), config, &small(), &start(), SchedulerOptions::default()).expect("a trainer");
+    let state = go_on(&mut trainer, 3);
     let json = serde_json::to_value(&state).expect("JSON");
     assert!(json.get("strategy").is_none() && json.get("step").is_some());
     assert!(plane(&state, "densify_stats").is_some());

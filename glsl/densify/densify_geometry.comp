@@ -37,7 +37,14 @@ void main() {
     mat3 rotation = rotation_from_quat(unit_quat(quat, inv_norm));
     for (uint child = 0u; child < children(action); child++) {
         vec4 m = mean, s = scale;
-        if (action == ACTION_SPLIT) {
+        if (action == ACTION_SPLIT && u.split_long != 0u) {
+            float longest = max(scale.x, max(scale.y, scale.z));
+            vec3 along = scale.x == longest ? vec3(1.0, 0.0, 0.0) : scale.y == longest ? vec3(0.0, 1.0, 0.0) : vec3(0.0, 0.0, 1.0);
+            m.xyz += rotation * along * (exp(longest) * (child == 0u ? SPLIT_OFFSET : -SPLIT_OFFSET));
+            s.xyz -= mix(vec3(SPLIT_OTHERS), vec3(SPLIT_LONG), along);
+            float opacity = SPLIT_OPACITY / (1.0 + exp(-mean.w));
+            m.w = log(opacity / (1.0 - opacity));
+        } else if (action == ACTION_SPLIT) {
             vec3 draw = vec3(normal_draw(u.seed, i, 3u * child), normal_draw(u.seed, i, 3u * child + 1u),
                 normal_draw(u.seed, i, 3u * child + 2u));
             m.xyz += rotation * (exp(scale.xyz) * draw);

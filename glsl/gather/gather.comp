@@ -57,7 +57,8 @@ void main() {
         a += current ? ra : vec4(0.0);
         b += current ? rb : vec4(0.0);
         c += current ? rc.x : 0.0;
-        scene_mean += current && k < scene ? ra.xy : vec2(0.0);
+        vec2 tile_mean = step.sum_absolute != 0u ? abs(ra.xy) : ra.xy;
+        scene_mean += current && k < scene ? tile_mean : vec2(0.0);
     }
     v_splats[3u * s] = a;
     v_splats[3u * s + 1u] = b;

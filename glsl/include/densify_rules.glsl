@@ -12,7 +12,7 @@ uint densify_action(StepUniforms u, float logit, vec3 log_scale, vec2 stats) {
     bool splits = grows && size > u.densify_scale;
     float child = splits ? exp(max(log_scale.x, max(log_scale.y, log_scale.z)) - SPLIT_SHRINK) : size;
     bool drop = exp2(-log2(1.0 + exp(-clamp(logit, -30.0, 30.0)))) < u.prune_opacity
-        || (u.prune_big != 0u && child > u.prune_scale);
+        || (u.prune_big != 0u && child > u.prune_scale) || stats.y >= STAT_NEAR;
     return drop ? ACTION_PRUNE : splits ? ACTION_SPLIT : grows ? ACTION_CLONE : ACTION_KEEP;
 }
 

@@ -26,6 +26,8 @@ struct StepUniforms {
     float rate_scales, rate_quats, rate_sh0, rate_sh_rest;
     float densify_threshold, densify_scale, prune_scale, prune_opacity; // scales in world units
     uint prune_big;
+    uint split_long;        // 1: splits along the longest axis, else at random
+    uint sum_absolute;      // 1: the statistic sums absolute gradients over tiles
     uint seed;
     uint vote_columns;      // labels that a sweep counts at once
 };

@@ -116,7 +116,7 @@ fn decide(args: &ProfileArgs) -> Result<TrainConfig> {
         Some(path) => Settings::read(path)?.train,
         None => TrainConfig::default(),
     };
-    decided.label_from = decided.label_from.min(args.from_step.saturating_add(1));
+    decided.label_from = Some(decided.labels_from().min(args.from_step.saturating_add(1)));
     let steps = u64::from(args.from_step) + u64::from(args.warm_up) + u64::from(args.steps.saturating_add(COUNTED)) + 1;
     let steps = u32::try_from(steps).map_err(|_| Error::usage("--steps", "there are too many steps in all"))?;
     decided.iterations = decided.iterations.max(steps);

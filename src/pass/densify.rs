@@ -6,6 +6,13 @@ use super::scan::{self, Total};
 use crate::pass::build::pass;
 use crate::scheduler::plan::{Buf, Stage};
 
+/// Marks the Gaussians in the free space of the step's camera.
+pub(crate) fn mark_near(b: &mut Builder) {
+    b.list.stage = Stage::Optimise;
+    pass!(b, mark_near { step: Buf::STEP, means: Buf::MEANS, scales: Buf::SCALES, densify_stats: Buf::DENSIFY_STATS } [],
+        over_gaussians());
+}
+
 /// Decides the fate of each Gaussian and counts the result.
 pub(super) fn mark(b: &mut Builder) {
     b.list.stage = Stage::Optimise;

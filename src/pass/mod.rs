@@ -4,7 +4,7 @@
 
 mod blend;
 pub(crate) mod build;
-mod densify;
+pub(crate) mod densify;
 mod gather;
 mod kernels;
 mod lift;

@@ -23,6 +23,7 @@ pub use occluders::OccluderFiles;
 pub use settings::{RunOptions, Settings};
 pub use summary::Summary;
 
+pub use crate::train::StrategyKind;
 pub use crate::train::{Densified, LabelRule, Occlusion, StepReport, TrainConfig};
 
 use crate::error::Result;

@@ -160,6 +160,7 @@ fn start(
     options: SchedulerOptions,
 ) -> Result<Trainer> {
     let mut model = init::initial_gaussians(dataset, config.seed, init::RANDOM_COUNT)?;
+    init::add_far_gaussians(&mut model, dataset, config.far_points);
     bound_start(&mut model, config);
     let size = train::start_size(&gpu, dataset, config, model.len(), options)?;
     let memory = Engine::predict(&gpu, &size, options)?;

@@ -28,6 +28,18 @@ pub enum Occlusion {
     File,
 }
 
+/// The rule for the number of Gaussians.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
+#[serde(rename_all = "lowercase")]
+pub enum StrategyKind {
+    /// Growth where it helps most, within a budget that rises over the run.
+    #[default]
+    Budget,
+    /// Adaptive density control of 3DGS: every large gradient grows.
+    Adc,
+}
+
 /// The rule that gives a Gaussian its label.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
@@ -54,11 +66,17 @@ crate::options::options! {
             /// 15000 (LabelGS).
             iterations <"N">: u32 = 15_000, at_least(1);
 
-            /// Last step on photos of half the size, without labels; 0 for none.
+            /// Size of the photos in the first steps, as a share of their full size; 1 has all steps at full size.
             ///
-            /// 0 (3DGS). Early steps are rough anyway, and a quarter of the pixels is enough for them: with a third of
-            /// the steps a run takes 10 % less time for the same PSNR.
-            coarse_until <"STEP">: u32 = 0;
+            /// The size grows up to --full-size-from. Early steps are rough anyway, and cost in proportion to the pixels.
+            /// 3DGS trains at full size.
+            start_size <"SHARE">: f32 = 0.4, positive_up_to(1.0);
+
+            /// First step at full size [default: 0.6 of the run].
+            ///
+            /// Steps before it have no labels.
+            #[serde(skip_serializing_if = "Option::is_none")]
+            full_size_from <"STEP">: Option<u32> = None;
 
             /// Seed of all random numbers; the same seed, device and driver give the same model.
             ///
@@ -86,20 +104,48 @@ crate::options::options! {
             near <"Z">: f32 = 0.0, not_negative;
         }
 
-        "Labels" {
-            /// First step with labels.
+        "Densification" {
+            /// Rule for the number of Gaussians.
+            strategy <"RULE">: StrategyKind = StrategyKind::Budget, fixed;
+
+            /// Prunes Gaussians that fog the cameras, on or off.
             ///
-            /// 1000 (LabelGS): earlier geometry is too rough. From this step on Gaussians get labels, and labels have a
-            /// loss.
-            label_from <"STEP">: u32 = 1000;
+            /// They are nearer than a quarter of all that a camera sees of the first Gaussians, or their deviation is
+            /// more than half their distance from a camera. Off in 3DGS, where such Gaussians stand for the sky and other
+            /// distant things.
+            #[cfg_attr(feature = "cli", arg(value_parser = switch, action = clap::ArgAction::Set))]
+            free_space <"SWITCH">: bool = true;
+
+            /// Directions around the cameras in which far Gaussians are tried; 0 adds none.
+            ///
+            /// The first Gaussians then stand also for the sky and other distant things without points. Only directions in
+            /// which most photos look past all points get one. 3DGS has none.
+            far_points <"N">: u32 = 800;
+
+            /// Gaussians at the end of densification, such as 30k, for the strategy budget.
+            ///
+            /// 0 chooses by the size of the photos and the length of the run: 0.5 for each pixel of a photo, and at most
+            /// 30 for each step. More make finer detail and cost time.
+            #[cfg_attr(feature = "cli", arg(value_parser = count))]
+            budget <"N">: u64 = 0;
+        }
+
+        "Labels" {
+            /// First step with labels [default: 0.6 of the run].
+            ///
+            /// From this step on Gaussians get labels, and labels have a loss. LabelGS has 1000; labels from the end of
+            /// densification on cost the picture nothing, and objects are as good.
+            #[serde(skip_serializing_if = "Option::is_none")]
+            label_from <"STEP">: Option<u32> = None;
 
             /// Rule that gives a Gaussian its label.
             ///
             /// Votes; the rule of the paper is `main`, which uses --label-threshold and --gpf.
             label_rule <"RULE">: LabelRule = LabelRule::Votes, fixed;
 
-            /// Steps between two counts of votes.
-            vote_every <"STEPS">: u32 = 500, at_least(1);
+            /// Steps between two counts of votes [default: a thirtieth of the run].
+            #[serde(skip_serializing_if = "Option::is_none")]
+            vote_every <"STEPS">: Option<u32> = None, at_least(1);
 
             /// Gives less weight to masks that disagree with the others, on or off.
             ///
@@ -154,8 +200,9 @@ crate::options::options! {
             /// Rendered depth. The label loss leaves out the pixels of objects in front.
             occlusion <"SOURCE">: Occlusion = Occlusion::Rendered, fixed;
 
-            /// Steps between two updates of the occluders.
-            occlusion_every <"STEPS">: u32 = 1000, at_least(1);
+            /// Steps between two updates of the occluders [default: a fifteenth of the run].
+            #[serde(skip_serializing_if = "Option::is_none")]
+            occlusion_every <"STEPS">: Option<u32> = None, at_least(1);
         }
 
         "Training" {
@@ -169,13 +216,30 @@ crate::options::options! {
             /// 3 (3DGS). Lower degrees save memory and lose highlights.
             sh_degree <"DEGREE">: u32 = 3, up_to(3.0), fixed;
 
-            /// Steps before the degree rises by one.
+            /// Steps before the degree rises by one [default: a tenth of the run, at most 1000].
             ///
-            /// 1000 (3DGS).
-            sh_degree_interval <"STEPS">: u32 = 1000, at_least(1);
+            /// 1000 in 3DGS.
+            #[serde(skip_serializing_if = "Option::is_none")]
+            sh_degree_interval <"STEPS">: Option<u32> = None, at_least(1);
         }
 
         "Learning rates" {
+            /// Factor of the learning rates of positions, scales, rotations and colours [default: (30000 /
+            /// iterations)^0.3, from 1 to 3].
+            ///
+            /// The rates are those of 3DGS for 30000 steps; a shorter run has to travel as far in fewer steps.
+            #[serde(skip_serializing_if = "Option::is_none")]
+            rate_factor <"FACTOR">: Option<f64> = None, positive;
+
+            /// Learning rates at the last step, as a share of those before --rate-fall-from.
+            ///
+            /// The rates of all parameters fall log-linearly. 3DGS lowers that of positions only.
+            rate_final <"SHARE">: f64 = 0.1, positive_up_to(1.0);
+
+            /// First step with falling learning rates [default: 0.6 of the run].
+            #[serde(skip_serializing_if = "Option::is_none")]
+            rate_fall_from <"STEP">: Option<u32> = None;
+
             /// Initial learning rate of positions, scene extents.
             ///
             /// 1.6e-4 (3DGS).
@@ -219,23 +283,24 @@ crate::options::options! {
         }
 
         "Densification" {
-            /// Step after which densification starts.
+            /// Step after which densification starts [default: a twentieth of the run, at most 500].
             ///
-            /// 500 (3DGS).
-            densify_from <"STEP">: u32 = 500;
+            /// 500 in 3DGS.
+            #[serde(skip_serializing_if = "Option::is_none")]
+            densify_from <"STEP">: Option<u32> = None;
 
-            /// Step at which densification stops, at the earliest 1000 steps after --densify-from if not given [default:
-            /// half of the run].
+            /// Step at which densification stops [default: half of the run].
             ///
             /// Pruning and opacity resets end there too. 3DGS also stops at half of the run (15000 of 30000). LabelGS
             /// has 40000, the end of its runs: that makes 75 % more Gaussians and slower steps for the same PSNR.
             #[serde(skip_serializing_if = "Option::is_none")]
             densify_until <"STEP">: Option<u32> = None;
 
-            /// Steps between two densifications.
+            /// Steps between two densifications [default: a thirtieth of the run, from 20 to 100].
             ///
-            /// 100 (3DGS).
-            densify_interval <"STEPS">: u32 = 100, at_least(1);
+            /// 100 in 3DGS.
+            #[serde(skip_serializing_if = "Option::is_none")]
+            densify_interval <"STEPS">: Option<u32> = None, at_least(1);
 
             /// Mean screen-space gradient above which a Gaussian is cloned or split, half images.
             ///
@@ -279,50 +344,28 @@ impl TrainConfig {
             label_weight: 1.0,
             densify_until: Some(40_000),
             opacity_reset_interval: 3000,
+            ..Self::adc()
+        }
+    }
+
+    /// Returns the schedule and the rates of 3DGS, in steps whatever the length of the run.
+    pub fn adc() -> Self {
+        Self {
+            strategy: StrategyKind::Adc,
+            start_size: 1.0,
+            free_space: false,
+            far_points: 0,
+            full_size_from: Some(0),
+            label_from: Some(1000),
+            vote_every: Some(500),
+            occlusion_every: Some(1000),
+            sh_degree_interval: Some(1000),
+            rate_factor: Some(1.0),
+            rate_final: 1.0,
+            densify_from: Some(500),
+            densify_interval: Some(100),
             ..Self::default()
         }
-    }
-
-    /// Returns the learning rate of positions at `step`, in scene extents.
-    pub fn position_lr(&self, step: u32) -> f64 {
-        let t = (f64::from(step) / f64::from(self.position_lr_max_steps)).clamp(0.0, 1.0);
-        ((1.0 - t) * self.position_lr_init.ln() + t * self.position_lr_final.ln()).exp()
-    }
-
-    /// Returns the learning rate of the colours above degree 0.
-    pub fn feature_rest_lr(&self) -> f64 {
-        self.feature_rest_lr.unwrap_or(self.feature_lr / 20.0)
-    }
-
-    pub(super) fn halve_rates(&mut self) {
-        for rate in [
-            &mut self.position_lr_init,
-            &mut self.position_lr_final,
-            &mut self.feature_lr,
-            &mut self.opacity_lr,
-            &mut self.scaling_lr,
-            &mut self.rotation_lr,
-        ]
-        .into_iter()
-        .chain(&mut self.feature_rest_lr)
-        {
-            *rate *= 0.5;
-        }
-    }
-
-    /// Returns the degree of the spherical harmonics at `step`.
-    pub fn sh_degree_at(&self, step: u32) -> u32 {
-        (step / self.sh_degree_interval).min(self.sh_degree)
-    }
-
-    /// Returns true for steps that set labels and have a label loss, given masks.
-    pub fn labels_at(&self, step: u32) -> bool {
-        step >= self.labels_from()
-    }
-
-    /// Returns the first step with labels.
-    pub fn labels_from(&self) -> u32 {
-        if self.coarse_until < self.label_from { self.label_from } else { self.coarse_until.saturating_add(1) }
     }
 
     /// Refuses invalid values; messages name the option.

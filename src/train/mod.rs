@@ -8,6 +8,7 @@ pub(crate) mod config;
 pub(crate) mod near;
 mod occlusion;
 mod sampler;
+mod schedule;
 mod sentinel;
 mod separate;
 pub(crate) mod setup;
@@ -19,7 +20,7 @@ mod timing;
 mod views;
 mod votes;
 
-pub use config::{LabelRule, Occlusion, TrainConfig};
+pub use config::{LabelRule, Occlusion, StrategyKind, TrainConfig};
 pub(crate) use setup::{TrainerOptions, engine_size, start_size};
 pub(crate) use state::{TrainState, ViewFingerprint};
 pub use strategy::Densified;
@@ -101,9 +102,16 @@ impl Trainer {
             0.0 => near::near_plane(dataset.train.iter().map(|view| &view.camera), model),
             near => near,
         };
-        let config = TrainConfig { near, ..config };
+        let budget = if config.budget > 0 { config.budget } else { config.budget_for(size.image) };
+        let config = TrainConfig { near, budget, ..config };
         let mut trainer = Self::without_model(gpu, config, dataset, size, options)?;
         trainer.engine.upload_model(model)?;
+        let planes = if trainer.config.free_space {
+            near::view_planes(dataset.train.iter().map(|view| &view.camera), model, near)
+        } else {
+            vec![near; trainer.views.len()]
+        };
+        trainer.set_near_planes(&planes);
         trainer.engine.set_shared(&trainer.shared.start(trainer.views.len())?)?;
         // Colour bands that the model lacks start at 0.
         trainer.engine.set_sh_degree(trainer.config.sh_degree);
@@ -118,10 +126,11 @@ impl Trainer {
         TrainerOptions { shape, scheduler, strategy, shared }: TrainerOptions,
     ) -> Result<Self> {
         let fixed = SceneScale { extent: dataset.extent() };
+        let strategy = strategy.unwrap_or_else(|| strategy::of(config.strategy));
         let most = if config.max_gaussians > 0 { config.max_gaussians } else { u64::from(u32::MAX) };
         let views =
             dataset.train.iter().map(|view| setup::train_view(view, config.mask_border)).collect::<Result<Vec<_>>>()?;
-        let views = Views::new(views, config.coarse_until);
+        let views = Views::new(views, &config);
         let shape = shape.unwrap_or_else(|| KernelShape::of(gpu.capabilities()));
         let size = size.with_shared_rows(shared.rows(views.len()));
         let mut engine = Engine::with_shape(gpu, shape, size, scheduler)?;
@@ -150,6 +159,10 @@ impl Trainer {
             newest: None,
             densified: None,
         })
+    }
+
+    fn set_near_planes(&mut self, planes: &[f32]) {
+        self.views.iter_mut().zip(planes).for_each(|(view, &near)| view.near = near);
     }
 
     /// Returns the engine, for renders between steps. Nothing may be in flight ([`Trainer::drain`]).
@@ -259,6 +272,7 @@ impl Trainer {
 
     fn input(&mut self, step: u32) -> StepInput {
         let view = self.order.draw();
+        self.views.prepare(step, view);
         let samples = if self.config.labels_at(step) { self.config.label_samples as usize } else { 0 };
         let layers = sampler::sample_objects(self.config.seed, step, &self.views[view].objects, samples);
         // A view without a mask, or with an empty one, costs as much as in a scene without masks.
@@ -299,7 +313,7 @@ impl Trainer {
             labels: input.labels,
             lift: input.lifts(&self.config),
             sh_degree: self.config.sh_degree_at(input.step),
-            size: self.image,
+            size: self.views.largest_at(input.step, self.image),
             update: input.update,
             counts: self.counts_pairs,
         };

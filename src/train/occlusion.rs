@@ -42,8 +42,7 @@ impl Trainer {
         let config = &self.config;
         self.engine.size().labels.is_some()
             && config.occlusion == Occlusion::Rendered
-            && config.labels_at(step)
-            && (step - config.labels_from()).is_multiple_of(config.occlusion_every)
+            && config.updates_occluders_at(step)
             && !self.blurs_depth_before(step)
     }
 

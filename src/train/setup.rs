@@ -2,7 +2,7 @@
 
 use super::shared::Shared;
 use super::step_input::{self, TrainView};
-use super::strategy::{DefaultStrategy, Strategy};
+use super::strategy::Strategy;
 use super::{LabelRule, TrainConfig};
 use crate::engine::{Engine, EngineSize, LabelSize};
 use crate::error::{Error, Result};
@@ -20,8 +20,8 @@ pub struct TrainerOptions {
     pub shape: Option<KernelShape>,
     /// Options of the engine.
     pub scheduler: SchedulerOptions,
-    /// The strategy for the number of Gaussians.
-    pub strategy: Box<dyn Strategy>,
+    /// The strategy for the number of Gaussians; none takes that of the configuration.
+    pub strategy: Option<Box<dyn Strategy>>,
     /// Parameters of the scene or of photos.
     pub shared: Shared,
 }
@@ -34,7 +34,7 @@ impl Default for TrainerOptions {
 
 impl From<SchedulerOptions> for TrainerOptions {
     fn from(scheduler: SchedulerOptions) -> Self {
-        Self { shape: None, scheduler, strategy: Box::new(DefaultStrategy), shared: Shared::default() }
+        Self { shape: None, scheduler, strategy: None, shared: Shared::default() }
     }
 }
 
@@ -83,5 +83,5 @@ pub(super) fn train_view(view: &View, border: u32) -> Result<TrainView> {
     let view_labels = mask.as_ref().map(|mask| step_input::view_labels(mask, border)).unwrap_or_default();
     let shown = step_input::shown_objects(&photo, &view_labels);
     let occluders = Default::default();
-    Ok(TrainView { name, camera, photo, valid_pixels, mask, objects, view_labels, shown, occluders })
+    Ok(TrainView { name, camera, near: 0.0, photo, valid_pixels, mask, objects, view_labels, shown, occluders })
 }

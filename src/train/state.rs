@@ -45,6 +45,9 @@ pub struct TrainState {
     pub sizes: GrownSizes,
     /// The configuration.
     pub config: TrainConfig,
+    /// Near planes of the training views, world units; empty if all have that of the configuration.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub near_planes: Vec<f32>,
     /// Fingerprints of the training views, in their order.
     pub views: Vec<ViewFingerprint>,
     /// Occluders of the objects of each view, by name of the view.
@@ -107,7 +110,9 @@ impl TrainState {
     pub fn read(path: &Path) -> Result<Self> {
         let file = Checkpoint::read(path)?;
         let odd = |problem: String| Error::data(path, "contents", problem);
-        let state: Self = serde_json::from_value(file.meta).map_err(|error| odd(error.to_string()))?;
+        let mut meta = file.meta;
+        complete(&mut meta["config"]).map_err(|error| odd(error.to_string()))?;
+        let state: Self = serde_json::from_value(meta).map_err(|error| odd(error.to_string()))?;
         let state = Self { planes: file.planes, path: path.to_owned(), ..state };
         state.config.check().map_err(|error| odd(error.to_string()))?;
         if state.updates > state.step {
@@ -171,6 +176,7 @@ impl Trainer {
             memory_bounds: self.bound.by_memory,
             sizes: self.engine.sizes(),
             config: self.config.clone(),
+            near_planes: self.near_planes(),
             views: self.fingerprints.clone(),
             occluders: self.occluders(),
             run: serde_json::Value::Null,
@@ -241,7 +247,14 @@ impl Trainer {
         self.put(state)
     }
 
+    fn near_planes(&self) -> Vec<f32> {
+        let planes: Vec<f32> = self.views.iter().map(|view| view.near).collect();
+        if planes.iter().all(|&near| near == self.config.near) { Vec::new() } else { planes }
+    }
+
     fn put(&mut self, state: &TrainState) -> Result<()> {
+        let same = vec![state.config.near; self.views.len()];
+        self.set_near_planes(if state.near_planes.is_empty() { &same } else { &state.near_planes });
         let odd = |problem| Error::data(&state.path, "strategy", problem);
         state.strategy.restore(&mut *self.strategy).map_err(odd)?;
         self.shared
@@ -260,6 +273,16 @@ impl Trainer {
         self.seen = Default::default();
         Ok(())
     }
+}
+
+/// Settings that a checkpoint lacks were not there when it was written: its training has the schedule of 3DGS.
+fn complete(config: &mut serde_json::Value) -> serde_json::Result<()> {
+    if let Some(found) = config.as_object_mut().filter(|found| !found.contains_key("strategy")) {
+        let serde_json::Value::Object(mut earlier) = serde_json::to_value(TrainConfig::adc())? else { return Ok(()) };
+        earlier.append(found);
+        *found = earlier;
+    }
+    Ok(())
 }
 
 /// Returns the description of the device: equal descriptions give equal bits.

@@ -20,6 +20,8 @@ pub struct TrainView {
     pub name: String,
     /// Camera.
     pub camera: Camera,
+    /// Near plane, world units.
+    pub near: f32,
     /// Photo.
     pub photo: Arc<Photo>,
     /// Number of pixels of the photo that count.
@@ -37,12 +39,13 @@ pub struct TrainView {
 }
 
 impl TrainView {
-    /// Returns the view at half the size, without its mask.
-    pub fn halved(&self) -> Self {
-        let (width, height) = (self.camera.width.div_ceil(2), self.camera.height.div_ceil(2));
+    /// Returns the view at a share of its size, without its mask.
+    pub fn shrunk(&self, share: f64) -> Self {
+        let (width, height) = (side_at(self.camera.width, share), side_at(self.camera.height, share));
         let photo = shrink_photo(&self.photo, width, height);
         Self {
             name: self.name.clone(),
+            near: self.near,
             camera: self.camera.resized(width, height),
             valid_pixels: valid_pixels(&photo),
             photo: Arc::new(photo),
@@ -53,6 +56,11 @@ impl TrainView {
             occluders: Occluders::new(),
         }
     }
+}
+
+/// Returns a side of a photo at a share of its size, px.
+pub(crate) fn side_at(full: u32, share: f64) -> u32 {
+    ((f64::from(full) * share).round() as u32).clamp(1, full)
 }
 
 /// Returns the number of pixels of a photo that count.
@@ -154,8 +162,9 @@ pub(crate) fn uniforms(
     fixed: SceneScale,
     engine: &Engine,
 ) -> StepUniforms {
-    let base = engine.view_uniforms(&view.camera, config.near, config.background);
-    let rate = (config.position_lr(input.step) * fixed.extent) as f32;
+    let base = engine.view_uniforms(&view.camera, view.near, config.background);
+    let rates = config.rates_at(input.step);
+    let rate = (rates.position * fixed.extent) as f32;
     let correction = |beta: f32| (1.0 / (1.0 - f64::from(beta).powi(input.updates.max(1) as i32))) as f32;
     let labels = engine.size().labels.map_or(0, |room| room.max_label + 1);
     StepUniforms {
@@ -170,11 +179,11 @@ pub(crate) fn uniforms(
         seed: (config.seed as u32) ^ input.step.wrapping_mul(0x9e37_79b9),
         adam_correction1: correction(ADAM_BETA1),
         adam_correction2: correction(ADAM_BETA2),
-        rate_means: [rate, rate, rate, config.opacity_lr as f32],
-        rate_scales: config.scaling_lr as f32,
-        rate_quats: config.rotation_lr as f32,
-        rate_sh0: config.feature_lr as f32,
-        rate_sh_rest: config.feature_rest_lr() as f32,
+        rate_means: [rate, rate, rate, rates.opacity as f32],
+        rate_scales: rates.scale as f32,
+        rate_quats: rates.rotation as f32,
+        rate_sh0: rates.colour as f32,
+        rate_sh_rest: rates.colour_rest as f32,
         ..base
     }
 }

@@ -12,11 +12,7 @@ impl Trainer {
     }
 
     pub(super) fn counts_votes(&self, step: u32) -> bool {
-        let config = &self.config;
-        self.votes()
-            && config.labels_at(step)
-            && (step - config.labels_from()).is_multiple_of(config.vote_every)
-            && !self.blurs_depth_before(step)
+        self.votes() && self.config.counts_votes_at(step) && !self.blurs_depth_before(step)
     }
 
     /// Counts the votes of all views and writes the labels to the device. Nothing may be in flight.

@@ -22,12 +22,12 @@ fn trains(name: &str, scene: Dataset) {
     let Some(turn) = device() else { return };
     let config = TrainConfig {
         iterations: 12,
-        label_from: 3,
-        occlusion_every: 4,
-        vote_every: 4,
-        densify_from: 2,
-        densify_interval: 4,
-        sh_degree_interval: 3,
+        label_from: Some(3),
+        occlusion_every: Some(4),
+        vote_every: Some(4),
+        densify_from: Some(2),
+        densify_interval: Some(4),
+        sh_degree_interval: Some(3),
         ..TrainConfig::default()
     };
     let start = initial_gaussians(&scene, 1, 150).unwrap_or_else(|error| panic!("{name}: {error}"));

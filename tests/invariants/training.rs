@@ -19,11 +19,11 @@ use labelgs::synth::{Preset, SynthOptions, dataset};
 pub fn config(label_rule: LabelRule) -> TrainConfig {
     TrainConfig {
         iterations: 45,
-        label_from: 4,
-        occlusion_every: 15,
-        sh_degree_interval: 6,
-        densify_from: 5,
-        densify_interval: 8,
+        label_from: Some(4),
+        occlusion_every: Some(15),
+        sh_degree_interval: Some(6),
+        densify_from: Some(5),
+        densify_interval: Some(8),
         densify_grad_threshold: 1e-4,
         opacity_reset_interval: 20,
         opacity_reset_margin: 10,
@@ -32,7 +32,7 @@ pub fn config(label_rule: LabelRule) -> TrainConfig {
         label_threshold: 0.4,
         label_samples: 2,
         label_rule,
-        vote_every: 12,
+        vote_every: Some(12),
         ..TrainConfig::default()
     }
 }

@@ -1,14 +1,19 @@
 //! The optimiser, densification and the opacity reset.
 
 use super::fixture::{Fixture, MOMENTS_1, MOMENTS_2, PARAMETERS, prove};
+use crate::reference::Rules;
 use crate::reference::adam::{Optimised, Rates, adam};
+use crate::reference::densify::absolute_gradient2d;
 use crate::reference::random::normal_draw;
-use crate::support::compare::Tolerance;
+use crate::reference::step::{Target, splats_of, step};
+use crate::support::compare::{Tolerance, close};
 use crate::support::device;
 use crate::support::scenes::{Shape, population, scene};
+use labelgs::internals::scheduler::plan::Buf;
 use labelgs::internals::train::step_input::SceneScale;
 use labelgs::internals::verify::selftest::judge;
-use labelgs::internals::verify::selftest::model::{Densified, Reset, scene_of};
+use labelgs::internals::verify::selftest::model::{Densified, Fog, Reset, large, scene_of};
+use labelgs::run::StrategyKind;
 
 fn states(fixture: &mut Fixture) -> Vec<Optimised> {
     let count = fixture.scene.gaussians.len();
@@ -55,7 +60,7 @@ fn draws_are_standard_normal() {
     assert!(neighbours.abs() < 0.015);
 }
 
-fn densify_case(step: u32, bearing: &[&str]) {
+fn densify_case(step: u32, splits_long: bool, bearing: &[&str]) {
     let Some(turn) = device() else { return };
     let mut before = population(110 + u64::from(step), 500);
     // Rotations have any length.
@@ -63,7 +68,7 @@ fn densify_case(step: u32, bearing: &[&str]) {
         row.quat = row.quat.map(|value| f64::from((value * length) as f32));
     }
     let mut fixture = Fixture::new(turn, scene_of(&before), true);
-    let ran = Densified::new(&mut fixture, before, step).expect("it runs");
+    let ran = Densified::new(&mut fixture, before, step, splits_long).expect("it runs");
     prove(&format!("densify at {step}"), bearing, |rules| {
         // 0.23 of (1e-6, 1e-7) seen.
         ran.verdict(rules, Tolerance { absolute: 3.5e-7, relative: 3.5e-8 })
@@ -73,12 +78,51 @@ fn densify_case(step: u32, bearing: &[&str]) {
 #[test]
 fn early_densification_equals_its_mirror() {
     let bearing = ["densify_gradient", "percent_dense", "split_shrink", "prune_opacity", "prune_scale_after"];
-    densify_case(600, &bearing);
+    densify_case(600, false, &bearing);
+}
+
+#[test]
+fn splits_along_the_longest_axis_equal_their_mirror() {
+    let bearing = ["stat_near", "split_offset", "split_long", "split_others", "split_opacity"];
+    densify_case(600, true, &bearing);
+}
+
+#[test]
+fn absolute_gradients_of_tiles_equal_their_mirror() {
+    let Some(turn) = device() else { return };
+    let shape = Shape { gaussians: 60, width: 61, height: 45, ..Shape::default() };
+    let mut fixture = Fixture::new(turn, scene(64, &shape), false);
+    fixture.config.strategy = StrategyKind::Budget;
+    fixture.train();
+    let found = fixture.get::<[f32; 2]>(Buf::DENSIFY_STATS, 60);
+    let (model, camera, target) = (fixture.model(), fixture.scene.camera.clone(), fixture.scene.target.clone());
+    let rules = Rules::default();
+    let out = step(&rules, &camera, &model, &Target { slots: Vec::new(), ..target.clone() });
+    let tile = (fixture.engine.shape().tile_width as usize, fixture.engine.shape().tile_height as usize);
+    let (splats, v_image) = (splats_of(&out.splats), out.photo.upstream().colours);
+    let sums = absolute_gradient2d(&rules, &splats, ((61, 45), tile), target.background, &v_image);
+    let sure: Vec<usize> = (0..splats.len()).filter(|&place| out.margins[splats[place].gaussian] > 2e-5).collect();
+    assert!(sure.len() * 10 > splats.len() * 6 && splats.len() > 30, "{} of {}", sure.len(), splats.len());
+    let pick = |of: &dyn Fn(usize) -> f64| sure.iter().map(|&place| of(place)).collect::<Vec<f64>>();
+    let actual = pick(&|place| f64::from(found[splats[place].gaussian][0]));
+    // As of the gradients of a whole step.
+    let tolerance = Tolerance { absolute: 1.4e-6, relative: 6.7e-5 };
+    close(&actual, &pick(&|place| sums[place]), tolerance).expect("the sums over tiles");
+    let plain = pick(&|place| out.gradient2d[splats[place].gaussian]);
+    assert!(close(&actual, &plain, tolerance).is_err(), "plain sums differ");
+}
+
+#[test]
+fn marks_of_fog_equal_their_mirror() {
+    let Some(turn) = device() else { return };
+    let mut fixture = Fixture::new(turn, large(63), false);
+    let ran = Fog::new(&mut fixture).expect("it runs");
+    prove("fog", &["free_size", "jacobian_margin"], |rules| ran.verdict(rules));
 }
 
 #[test]
 fn late_densification_removes_huge_gaussians() {
-    densify_case(3100, &["densify_gradient", "percent_dense", "split_shrink", "prune_opacity", "prune_scale"]);
+    densify_case(3100, false, &["densify_gradient", "percent_dense", "split_shrink", "prune_opacity", "prune_scale"]);
 }
 
 #[test]

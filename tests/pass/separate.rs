@@ -108,7 +108,7 @@ fn a_short_training_with_separate_passes_stays_close() {
     let run = |separate: bool, small: bool| -> Vec<StepReport> {
         let dataset = dataset(&options, 0);
         let config =
-            TrainConfig { iterations: 30, label_from: 5, label_rule: LabelRule::Main, ..TrainConfig::default() };
+            TrainConfig { iterations: 30, label_from: Some(5), label_rule: LabelRule::Main, ..TrainConfig::default() };
         let start = initial_gaussians(&dataset, 0, 100).expect("points");
         let mut trainer =
             Trainer::new(turn.gpu(), config, &dataset, &start, SchedulerOptions::default()).expect("a trainer");

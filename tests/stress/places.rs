@@ -41,7 +41,8 @@ fn psnr(engine: &mut Engine, near: f32, view: &View) -> f64 {
 /// PSNR of the first view after 150 steps, the near plane, and the model.
 fn train(gpu: &Arc<labelgs::gpu::Gpu>, dataset: Dataset) -> (f64, f32, Gaussians) {
     let seen = dataset.train[0].clone();
-    let config = TrainConfig { iterations: 150, densify_from: 40, densify_interval: 40, ..TrainConfig::default() };
+    let config =
+        TrainConfig { iterations: 150, densify_from: Some(40), densify_interval: Some(40), ..TrainConfig::default() };
     let model = initial_gaussians(&dataset, 0, 500).expect("points");
     let options = SchedulerOptions::default();
     let mut trainer = Trainer::new(Arc::clone(gpu), config, &dataset, &model, options).expect("it starts");

@@ -72,7 +72,13 @@ fn in_a_process(count: u32, width: u32, height: u32) -> Result<Value> {
 /// Trains two steps and prints, as JSON, the predicted memory and the peak growth of resident memory.
 pub fn measure(count: u32, width: u32, height: u32) -> Result<()> {
     let gpu = device::open()?;
-    let config = TrainConfig { iterations: 10, label_from: 1, densify_from: u32::MAX, ..TrainConfig::default() };
+    let config = TrainConfig {
+        iterations: 10,
+        label_from: Some(1),
+        densify_from: Some(u32::MAX),
+        start_size: 1.0,
+        ..TrainConfig::default()
+    };
     let options = SchedulerOptions { poison_step: true, ..SchedulerOptions::default() };
     // A training on one Gaussian compiles all kernels first, because compiled code is not the engine's memory.
     let small = scene(1, width, height);

@@ -40,7 +40,7 @@ impl Pace {
     /// Starts a training from `model`, without densification, and with labels from the first step if there are masks.
     pub fn new(name: &str, gpu: &Arc<Gpu>, dataset: Dataset, model: &Gaussians, label_samples: u32) -> Result<Self> {
         // Bands of colour come in as in any training.
-        let sh_degree_interval = TrainConfig::default().sh_degree_interval;
+        let sh_degree_interval = Some(1000);
         let config = TrainConfig { label_samples: label_samples.max(1), sh_degree_interval, ..timing_config() };
         let options = SchedulerOptions { timestamps: true, ..SchedulerOptions::default() };
         let mut trainer = Trainer::new(Arc::clone(gpu), config, &dataset, model, options)?;

@@ -219,8 +219,11 @@ fn lists(trainer: &mut Trainer, objects: u32) -> [usize; 3] {
 }
 
 fn train(gpu: &Arc<Gpu>, dataset: &Dataset, plan: &Plan, name: &'static str, separate: bool) -> Result<Training> {
-    let config =
-        TrainConfig { iterations: plan.iterations, label_from: plan.iterations.div_ceil(3), ..TrainConfig::paper() };
+    let config = TrainConfig {
+        iterations: plan.iterations,
+        label_from: Some(plan.iterations.div_ceil(3)),
+        ..TrainConfig::paper()
+    };
     let mut trainer = trainer(gpu, dataset, &start(dataset, &config)?, config.clone())?;
     trainer.separate_objects(separate);
     let ((), cost) = timed(|| {

@@ -59,7 +59,12 @@ pub fn plain_model(gpu: &Arc<Gpu>, options: &SynthOptions, steps: u32) -> Result
 /// A labelled model after a number of steps.
 pub fn labelled_model(gpu: &Arc<Gpu>, dataset: &Dataset, steps: u32) -> Result<Gaussians> {
     let steps = steps.max(1);
-    let config = TrainConfig { iterations: steps + 1, label_from: steps.div_ceil(2), ..TrainConfig::default() };
+    let config = TrainConfig {
+        iterations: steps + 1,
+        label_from: Some(steps.div_ceil(2)),
+        start_size: 1.0,
+        ..TrainConfig::default()
+    };
     let mut trainer = trainer(gpu, dataset, &start(dataset, &config)?, config)?;
     for _ in 0..steps {
         trainer.step()?;
@@ -71,13 +76,14 @@ pub fn labelled_model(gpu: &Arc<Gpu>, dataset: &Dataset, steps: u32) -> Result<G
 pub fn timing_config() -> TrainConfig {
     TrainConfig {
         iterations: u32::MAX,
-        label_from: 1,
-        vote_every: u32::MAX,
-        occlusion_every: u32::MAX,
-        sh_degree_interval: 1,
-        densify_from: u32::MAX,
+        label_from: Some(1),
+        vote_every: Some(u32::MAX),
+        occlusion_every: Some(u32::MAX),
+        sh_degree_interval: Some(1),
+        densify_from: Some(u32::MAX),
         densify_until: Some(u32::MAX),
         opacity_reset_interval: 0,
+        start_size: 1.0,
         ..TrainConfig::default()
     }
 }

@@ -2,6 +2,7 @@
 
 mod random;
 mod region;
+mod shell;
 mod sweep;
 mod texel;
 
@@ -9,6 +10,7 @@ use crate::error::{Error, Result};
 use crate::scene::origin::far_origin;
 use crate::scene::{Dataset, Gaussians, Point};
 use crate::shaders::constants::exact::SH_C0;
+use glam::DVec3;
 use kiddo::{ImmutableKdTree, SquaredEuclidean};
 use rayon::prelude::*;
 use std::num::NonZero;
@@ -48,6 +50,26 @@ pub fn initial_gaussians(dataset: &Dataset, seed: u64, count_if_no_points: usize
         *distance2 = distance2.min((SIZE_MAX * region::image_side(&dataset.train, point.position)).powi(2));
     });
     Ok(from_points(&points, &distances2, dataset.extent()))
+}
+
+/// Adds far Gaussians to the initial ones where photos look past all points of the scene, such as at the sky:
+/// `directions` are tried. A scene without points has none, because its random points lie at all depths.
+pub(crate) fn add_far_gaussians(model: &mut Gaussians, dataset: &Dataset, directions: u32) {
+    if dataset.points.len() < POINTS_MIN {
+        return;
+    }
+    let (points, deviation) = shell::points(dataset, directions as usize);
+    tracing::debug!("{} of {directions} directions look past all points", points.len());
+    let distances2 = vec![deviation * deviation; points.len()];
+    let mut far = from_points(&points, &distances2, dataset.extent());
+    let shift = far.origin - model.origin;
+    far.means.iter_mut().for_each(|mean| *mean = (DVec3::from(mean.map(f64::from)) + shift).as_vec3().to_array());
+    model.means.append(&mut far.means);
+    model.quats.append(&mut far.quats);
+    model.scales.append(&mut far.scales);
+    model.opacities.append(&mut far.opacities);
+    model.sh0.append(&mut far.sh0);
+    model.sh_rest.append(&mut far.sh_rest);
 }
 
 /// Refuses a scene in which no camera sees a point: nothing would be drawn or learnt.

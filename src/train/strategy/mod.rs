@@ -1,14 +1,16 @@
-//! Strategies that change the set of Gaussians between steps. [`DefaultStrategy`] is that of 3DGS. Another one
-//! implements [`Strategy`] and goes into [`TrainerOptions`](super::TrainerOptions).
+//! Strategies that change the set of Gaussians between steps: [`StrategyKind`] names them. Another one implements
+//! [`Strategy`] and goes into [`TrainerOptions`](super::TrainerOptions).
 
-pub(crate) mod default;
+pub(crate) mod adc;
+pub(crate) mod budget;
 pub(crate) mod population;
 
-pub(crate) use default::DefaultStrategy;
+use adc::AdcStrategy;
+use budget::BudgetStrategy;
 pub use population::Densified;
 pub(crate) use population::{Bound, Population};
 
-use super::TrainConfig;
+use super::{StrategyKind, TrainConfig};
 use crate::error::Result;
 use crate::pass::Extension;
 use crate::scheduler::plan::{Buf, TABLE};
@@ -17,6 +19,14 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::fmt::Debug;
 use std::sync::Arc;
+
+/// Makes the strategy of a configuration.
+pub(crate) fn of(kind: StrategyKind) -> Box<dyn Strategy> {
+    match kind {
+        StrategyKind::Budget => Box::new(BudgetStrategy::default()),
+        StrategyKind::Adc => Box::new(AdcStrategy),
+    }
+}
 
 /// The step that a strategy decides about.
 #[derive(Clone, Copy, Debug)]
@@ -102,7 +112,7 @@ pub struct Kept {
 
 impl Default for Kept {
     fn default() -> Self {
-        Self::of(&DefaultStrategy)
+        Self::of(&AdcStrategy)
     }
 }
 
@@ -113,7 +123,7 @@ impl Kept {
         Self { name: strategy.name().to_owned(), planes, value: strategy.keep() }
     }
 
-    /// Returns true for [`DefaultStrategy`], which has no entry in checkpoints.
+    /// Returns true for [`AdcStrategy`], which has no entry in checkpoints.
     pub fn is_default(&self) -> bool {
         *self == Self::default()
     }

@@ -63,10 +63,11 @@ impl<'a> Population<'a> {
         self.engine
     }
 
-    /// Clones, splits and prunes by the thresholds in `uniforms`, within the limit. Statistics start over.
-    pub fn densify(&mut self, uniforms: StepUniforms) -> Result<Densified> {
+    /// Clones, splits and prunes by the thresholds in `uniforms`, up to `budget` Gaussians and within the limit.
+    /// Statistics start over.
+    pub fn densify(&mut self, uniforms: StepUniforms, budget: u64) -> Result<Densified> {
         let wanted = self.count_densified(uniforms)?.densified_count;
-        let mut most = self.most(wanted)?;
+        let mut most = self.most(wanted)?.min(budget);
         let (uniforms, counted) = loop {
             let bounded = self.bounded(uniforms, wanted, most)?;
             let counted = self.count_densified(bounded)?;

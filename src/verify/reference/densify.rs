@@ -1,8 +1,11 @@
 //! Clones, splits and removes Gaussians.
 
+use super::blend::{Upstream, blend_backward};
 use super::project::{normalised, rotation, sigmoid};
 use super::rules::wide;
+use super::splat::Splat;
 use super::{Model, Row, Rules};
+use crate::scene::Camera;
 use crate::shaders::constants;
 use glam::DVec3;
 
@@ -58,6 +61,37 @@ pub fn split_child(rules: &Rules, parent: &Row, noise: [f64; 3]) -> Row {
     Row { mean: mean.into(), scale: parent.scale.map(|s| s - rules.split_shrink.ln()), ..*parent }
 }
 
+/// Child 0 or 1 of a split along the longest axis.
+pub fn split_long_child(rules: &Rules, parent: &Row, child: u32) -> Row {
+    let longest = (1..3).fold(0, |best, axis| if parent.scale[axis] > parent.scale[best] { axis } else { best });
+    let side = if child == 0 { rules.split_offset } else { -rules.split_offset };
+    let mut offset = DVec3::ZERO;
+    offset[longest] = side * parent.scale[longest].exp();
+    let mean = DVec3::from(parent.mean) + rotation(normalised(parent.quat).0) * offset;
+    let shrink = |axis: usize| if axis == longest { rules.split_long } else { rules.split_others };
+    let opacity = rules.split_opacity * sigmoid(parent.opacity);
+    let scale = [0, 1, 2].map(|axis| parent.scale[axis] + shrink(axis).ln());
+    Row { mean: mean.into(), scale, opacity: (opacity / (1.0 - opacity)).ln(), ..*parent }
+}
+
+/// Returns true if a Gaussian fogs a camera, and the distance of this decision, relative to its threshold.
+pub fn is_near(rules: &Rules, camera: &Camera, row: &Row) -> (bool, f64) {
+    let place = camera.to_camera(DVec3::from(row.mean));
+    let ratio = |value: f64, limit: f64| (value / limit - 1.0).abs();
+    let size = rules.free_size * place.length();
+    let engulfs = largest_scale(row) > size;
+    let mut margin = ratio(largest_scale(row), size);
+    let slope = |at: f64, focal: f64, centre: f64, side: u32| {
+        let (side, spare) = (f64::from(side), rules.jacobian_margin * 0.5 * f64::from(side));
+        let pixel = focal * at / place.z + centre;
+        ((-spare..=side + spare).contains(&pixel), ratio(pixel, -spare).min(ratio(pixel, side + spare)))
+    };
+    let (x, x_margin) = slope(place.x, camera.fx, camera.cx, camera.width);
+    let (y, y_margin) = slope(place.y, camera.fy, camera.cy, camera.height);
+    margin = margin.min(x_margin).min(y_margin).min(ratio(place.z, rules.near)).min(place.z.abs());
+    (engulfs || (place.z > 0.0 && place.z <= rules.near && x && y), margin)
+}
+
 /// Clones and splits by the mean gradient, then removes faint and (late) huge rows. The order is kept: a clone directly
 /// follows its parent, children replace their parent. `normal(row, child, axis)` is a standard normal number.
 pub fn densify(
@@ -71,6 +105,9 @@ pub fn densify(
     out.model.sh_degree = before.model.sh_degree;
     for (index, row) in before.model.rows.iter().enumerate() {
         let count = before.gradient_count[index];
+        if count >= rules.stat_near {
+            continue;
+        }
         let mean = if count > 0.0 { before.gradient_sum[index] / count } else { 0.0 };
         let (gradient, limit, scale) = (rules.densify_gradient, rules.percent_dense * extent, largest_scale(row));
         out.note(index, mean / gradient);
@@ -86,7 +123,12 @@ pub fn densify(
             out.note(index, scale / limit);
             let child = |child: u32| {
                 let noise = [0, 1, 2].map(|axis| normal(index, child, axis));
-                (split_child(rules, row, noise), (zero, zero), Origin::Child(child))
+                let row = if rules.splits_long {
+                    split_long_child(rules, row, child)
+                } else {
+                    split_child(rules, row, noise)
+                };
+                (row, (zero, zero), Origin::Child(child))
             };
             vec![child(0), child(1)]
         };
@@ -109,6 +151,32 @@ pub fn mark(rules: &Rules, before: &Population, extent: f64, step: u32) -> Vec<u
     let after = densify(rules, before, extent, step, |_, _, _| 0.0);
     after.origins.iter().for_each(|(parent, _)| counts[*parent] += 1);
     counts
+}
+
+/// Length of the sum over tiles of the absolute 2-D gradients of each splat, NDC units.
+pub fn absolute_gradient2d(
+    rules: &Rules,
+    splats: &[Splat],
+    (size, tile): ((usize, usize), (usize, usize)),
+    background: [f64; 3],
+    v_image: &[[f64; 3]],
+) -> Vec<f64> {
+    let mut sums = vec![[0.0; 2]; splats.len()];
+    for corner in (0..size.1).step_by(tile.1).flat_map(|y| (0..size.0).step_by(tile.0).map(move |x| (x, y))) {
+        // The gradient is linear in that of the image: that of a tile has zeros elsewhere.
+        let inside = |index: usize| {
+            let (x, y) = (index % size.0, index / size.0);
+            (corner.0..corner.0 + tile.0).contains(&x) && (corner.1..corner.1 + tile.1).contains(&y)
+        };
+        let of_tile: Vec<[f64; 3]> =
+            v_image.iter().enumerate().map(|(index, &v)| if inside(index) { v } else { [0.0; 3] }).collect();
+        let found = blend_backward(rules, splats, size, background, &Upstream::of_colours(&of_tile));
+        for (sum, v) in sums.iter_mut().zip(&found.values) {
+            (0..2).for_each(|axis| sum[axis] += v.mean2d[axis].abs());
+        }
+    }
+    let length = |sum: &[f64; 2]| (sum[0] * 0.5 * size.0 as f64).hypot(sum[1] * 0.5 * size.1 as f64);
+    sums.iter().map(length).collect()
 }
 
 /// Adds a view to the statistic: gradient norm and one view per visible Gaussian. Skips dropped gradients.

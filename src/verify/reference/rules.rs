@@ -56,6 +56,20 @@ pub struct Rules {
     pub percent_dense: f64,
     /// Divisor of the scale: a split child has its parent's scale divided by this.
     pub split_shrink: f64,
+    /// Splits go along the longest axis instead of to random places.
+    pub splits_long: bool,
+    /// Distance of the children of such a split from their parent, standard deviations.
+    pub split_offset: f64,
+    /// Factor of the longest axis in such a split.
+    pub split_long: f64,
+    /// Factor of the other axes.
+    pub split_others: f64,
+    /// Factor of the opacity.
+    pub split_opacity: f64,
+    /// Number of views with which a Gaussian counts as marked for removal.
+    pub stat_near: f64,
+    /// Largest standard deviation in distances from a camera; larger Gaussians are marked.
+    pub free_size: f64,
     /// Gaussians below this opacity are removed.
     pub prune_opacity: f64,
     /// Gaussians above this scale are removed, in units of the scene extent.
@@ -103,6 +117,13 @@ impl Default for Rules {
             densify_gradient: wide(2e-4),
             percent_dense: wide(0.01),
             split_shrink: wide(1.6),
+            splits_long: false,
+            split_offset: 0.5,
+            split_long: 0.5,
+            split_others: 0.85,
+            split_opacity: wide(0.6),
+            stat_near: 1e9,
+            free_size: 0.5,
             prune_opacity: wide(0.005),
             prune_scale: wide(0.1),
             prune_scale_after: 3000,
@@ -134,6 +155,8 @@ pub enum Family {
     Adam,
     /// Cloning, splitting, removing.
     Densify,
+    /// Marks of Gaussians that fog a camera.
+    FreeSpace,
     /// Opacity reset.
     Reset,
     /// Labelling.
@@ -153,9 +176,9 @@ pub struct Mutant {
 
 /// One mutant for each constant; most change it by a few per cent.
 pub fn mutants() -> Vec<Mutant> {
-    use Family::{Adam, Blend, Densify, Lift, Loss, Project, Reset, Sh};
+    use Family::{Adam, Blend, Densify, FreeSpace, Lift, Loss, Project, Reset, Sh};
     type Change = fn(&mut Rules);
-    let changes: [(&'static str, Family, Change); 29] = [
+    let changes: [(&'static str, Family, Change); 35] = [
         ("near", Project, |r| r.near = 3.8),
         ("dilation", Project, |r| r.dilation *= 1.03),
         ("jacobian_margin", Project, |r| r.jacobian_margin *= 0.97),
@@ -181,6 +204,12 @@ pub fn mutants() -> Vec<Mutant> {
         ("densify_gradient", Densify, |r| r.densify_gradient *= 1.5),
         ("percent_dense", Densify, |r| r.percent_dense *= 1.5),
         ("split_shrink", Densify, |r| r.split_shrink *= 1.03),
+        ("split_offset", Densify, |r| r.split_offset *= 1.03),
+        ("split_long", Densify, |r| r.split_long *= 1.03),
+        ("split_others", Densify, |r| r.split_others *= 1.03),
+        ("split_opacity", Densify, |r| r.split_opacity *= 1.03),
+        ("stat_near", Densify, |r| r.stat_near *= 1.03),
+        ("free_size", FreeSpace, |r| r.free_size *= 1.1),
         ("prune_opacity", Densify, |r| r.prune_opacity *= 4.0),
         ("prune_scale", Densify, |r| r.prune_scale *= 0.5),
         ("prune_scale_after", Densify, |r| r.prune_scale_after = 100),
@@ -222,6 +251,12 @@ mod tests {
             (r.adam_beta2, glsl::ADAM_BETA2),
             (r.adam_eps, glsl::ADAM_EPSILON),
             (r.split_shrink.ln(), glsl::SPLIT_SHRINK),
+            (r.split_offset, glsl::SPLIT_OFFSET),
+            (-r.split_long.ln(), glsl::SPLIT_LONG),
+            (-r.split_others.ln(), glsl::SPLIT_OTHERS),
+            (r.split_opacity, glsl::SPLIT_OPACITY),
+            (r.stat_near, glsl::STAT_NEAR),
+            (r.free_size, glsl::FREE_SIZE),
             ((r.reset_opacity / (1.0 - r.reset_opacity)).ln(), glsl::OPACITY_RESET_LOGIT),
         ];
         let degree_2 = r.sh_c2.into_iter().zip([c20, -c20, c22, -c20, c24]);

@@ -11,6 +11,7 @@ use crate::scheduler::plan::{Buf, PlanOptions};
 use crate::shaders::structs::StepUniforms;
 use crate::train::near::NEAR;
 use crate::train::step_input::{self, SceneScale, StepInput, TrainView};
+use crate::train::strategy::{self, At};
 use crate::train::{LabelRule, TrainConfig};
 use crate::verify::reference::loss::ObjectPixel;
 use crate::verify::reference::model::ROW_FLOATS;
@@ -83,6 +84,7 @@ pub fn train_view(scene: &Scene) -> TrainView {
     let photo = Photo { width, height, rgba };
     TrainView {
         name: "the view".to_owned(),
+        near: NEAR,
         shown: step_input::shown_objects(&photo, &target.label_map),
         view_labels: target.label_map.clone(),
         photo: Arc::new(photo),
@@ -122,7 +124,7 @@ impl Fixture {
             label_alpha: 0.1,
             label_balance: true,
             near: NEAR,
-            ..TrainConfig::default()
+            ..TrainConfig::adc()
         };
         let layers =
             if labels { scene.target.slots.iter().map(|slot| slot.label as u16).collect() } else { Vec::new() };
@@ -136,7 +138,10 @@ impl Fixture {
 
     /// The uniforms of the step.
     pub fn uniforms(&self) -> StepUniforms {
-        step_input::uniforms(&self.input, &self.view, &self.config, self.fixed, &self.engine)
+        let mut uniforms = step_input::uniforms(&self.input, &self.view, &self.config, self.fixed, &self.engine);
+        let at = At { step: self.input.step, config: &self.config, extent: self.fixed.extent };
+        strategy::of(self.config.strategy).uniforms(at, &mut uniforms);
+        uniforms
     }
 
     /// Key of the training step's list.

@@ -100,8 +100,10 @@ pub fn passes(
 /// Runs the checks of passes that change the model.
 pub fn changes(rules: &Rules, gpu: &Arc<Gpu>, kernels: KernelShape, mut done: impl FnMut(Check)) -> Result<()> {
     type Change = fn(&Rules, &Arc<Gpu>, KernelShape, f64) -> Result<Verdict>;
-    let changes: [(&str, Change); 3] = [
+    let changes: [(&str, Change); 5] = [
         ("densification", model::densification),
+        ("densification along the longest axis", model::long_splits),
+        ("marks of fog", model::fog_of_a_step),
         ("reset of opacities", model::reset),
         ("lift of labels by the paper's rule", model::lift_of_a_step),
     ];

@@ -4,16 +4,18 @@ use super::compare::{Tolerance, Verdict, close, exact};
 use super::fixture::{Fixture, MOMENTS_1, MOMENTS_2, PARAMETERS, readable};
 use super::scenes::{Scene, Shape, population, scene};
 use crate::engine::ListKey;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::pass::KernelShape;
 use crate::scene::Gaussians;
 use crate::scheduler::plan::Buf;
 use crate::shaders::structs::{Counters, StepUniforms};
 use crate::train::TrainConfig;
-use crate::train::strategy::default::prunes_large_at;
+use crate::train::strategy::Strategy as _;
+use crate::train::strategy::adc::prunes_large_at;
+use crate::train::strategy::budget::BudgetStrategy;
 use crate::verify::reference::blend::blend_forward;
-use crate::verify::reference::densify::{Origin, Population, densify, mark, opacity_reset};
+use crate::verify::reference::densify::{Origin, Population, densify, is_near, mark, opacity_reset};
 use crate::verify::reference::lift::{Masks, centres_of, lift, lift_resolve};
 use crate::verify::reference::random::normal_draw;
 use crate::verify::reference::splat::Splat;
@@ -25,7 +27,7 @@ const SEED: u32 = 0x1234_5678;
 
 /// Uploads a population with moments and statistics to a fixture; returns the uniforms that change it at `step` in a
 /// scene of extent 1.
-fn holding(fixture: &mut Fixture, before: &Population, step: u32) -> Result<StepUniforms> {
+fn holding(fixture: &mut Fixture, before: &Population, step: u32, splits_long: bool) -> Result<StepUniforms> {
     fixture.put_rows(MOMENTS_1, &before.m)?;
     fixture.put_rows(MOMENTS_2, &before.u)?;
     let stats: Vec<[f32; 2]> =
@@ -38,6 +40,7 @@ fn holding(fixture: &mut Fixture, before: &Population, step: u32) -> Result<Step
         prune_scale: config.max_scale,
         prune_opacity: config.min_opacity,
         prune_big: u32::from(prunes_large_at(&with_resets, step)),
+        split_long: u32::from(splits_long),
         seed: SEED,
         ..fixture.uniforms()
     })
@@ -68,6 +71,7 @@ fn gaussians(population: &Population) -> Gaussians {
 /// A finished densification.
 pub struct Densified {
     step: u32,
+    splits_long: bool,
     before: Population,
     counted: Counters,
     applied: Counters,
@@ -78,11 +82,12 @@ pub struct Densified {
 }
 
 impl Densified {
-    /// Counts and applies a densification at `step`; the fixture's model is the population.
-    pub fn new(fixture: &mut Fixture, before: Population, step: u32) -> Result<Self> {
+    /// Counts and applies a densification at `step`; the fixture's model is the population. Splits go along the longest
+    /// axis or to random places.
+    pub fn new(fixture: &mut Fixture, before: Population, step: u32, splits_long: bool) -> Result<Self> {
         let rows = before.model.rows.len();
         fixture.engine.make_room_for_gaussians(2 * rows as u64 + 1)?;
-        let uniforms = holding(fixture, &before, step)?;
+        let uniforms = holding(fixture, &before, step, splits_long)?;
         let counted = fixture.engine.run(ListKey::DensifyCount, &uniforms)?.counters;
         let marks = fixture.get::<u32>(Buf::CHILDREN_COUNTS, rows)?;
         let applied = fixture.engine.run(ListKey::DensifyApply, &uniforms)?.counters;
@@ -90,13 +95,14 @@ impl Densified {
         let after =
             [fixture.rows(PARAMETERS, count)?, fixture.rows(MOMENTS_1, count)?, fixture.rows(MOMENTS_2, count)?];
         let (labels, stats) = (fixture.get(Buf::LABELS, count)?, fixture.get(Buf::DENSIFY_STATS, 2 * count)?);
-        Ok(Self { step, before, counted, applied, marks, after, labels, stats })
+        Ok(Self { step, splits_long, before, counted, applied, marks, after, labels, stats })
     }
 
     /// Compares with the reference under `rules`. Everything must be copied exactly, except that positions and scales
     /// of children may differ by `tolerance`.
     pub fn verdict(&self, rules: &Rules, tolerance: Tolerance) -> Verdict {
         let normal = |row: usize, child: u32, axis: usize| normal_draw(SEED, row as u32, 3 * child + axis as u32);
+        let rules = &Rules { splits_long: self.splits_long, ..rules.clone() };
         let expected = densify(rules, &self.before, 1.0, self.step, normal);
         let nearest = expected.margins.iter().copied().fold(f64::INFINITY, f64::min);
         if nearest <= 1e-6 {
@@ -128,7 +134,7 @@ pub struct Reset {
 impl Reset {
     /// Resets opacities; the fixture's model is the population.
     pub fn new(fixture: &mut Fixture, before: Population) -> Result<Self> {
-        let uniforms = holding(fixture, &before, 3000)?;
+        let uniforms = holding(fixture, &before, 3000, false)?;
         fixture.engine.run(ListKey::OpacityReset, &uniforms)?;
         let count = before.model.rows.len();
         let planes =
@@ -204,16 +210,75 @@ pub fn dominant(seed: u64) -> Scene {
     s
 }
 
+/// A scene in which some Gaussians are before the near plane of [`Fog`], and some engulf the camera.
+pub fn large(seed: u64) -> Scene {
+    scene(seed, &Shape { gaussians: 400, scales: (0.2, 5.0), ..Shape::default() })
+}
+
+/// A finished step with the pass that marks Gaussians that fog its camera.
+pub struct Fog {
+    scene: Scene,
+    rows: Vec<Row>,
+    counts: Vec<f32>,
+}
+
+impl Fog {
+    /// Near plane; about half of the Gaussians of [`large`] are before it, world units.
+    const NEAR: f32 = 4.0;
+
+    /// Runs the step.
+    pub fn new(fixture: &mut Fixture) -> Result<Self> {
+        let count = fixture.scene.gaussians.len();
+        fixture.view.near = Self::NEAR;
+        fixture.input.update = true;
+        fixture.engine.set_extension(BudgetStrategy::default().extension());
+        let ListKey::Train(variant) = fixture.key() else {
+            return Err(Error::Bug("the key of a step is that of another list".to_owned()));
+        };
+        fixture.train_as(ListKey::Extended(variant, 1))?;
+        let stats = fixture.get::<[f32; 2]>(Buf::DENSIFY_STATS, count)?;
+        let rows = fixture.rows(PARAMETERS, count)?;
+        Ok(Self { scene: fixture.scene.clone(), rows, counts: stats.iter().map(|pair| pair[1]).collect() })
+    }
+
+    /// Compares with the reference under `rules`, except for decisions too near to a threshold.
+    pub fn verdict(&self, rules: &Rules) -> Verdict {
+        let rules = Rules { near: f64::from(Self::NEAR), ..rules.clone() };
+        let expected: Vec<(bool, f64)> = self.rows.iter().map(|row| is_near(&rules, &self.scene.camera, row)).collect();
+        let sure: Vec<usize> = (0..expected.len()).filter(|&row| expected[row].1 > 1e-4).collect();
+        let marked = expected.iter().filter(|(marked, _)| *marked).count();
+        if sure.len() * 10 < expected.len() * 9 || marked * 10 < expected.len() || marked * 10 > expected.len() * 9 {
+            return Err(format!("{} decisions are sure, {marked} Gaussians are marked", sure.len()));
+        }
+        let found: Vec<u32> = sure.iter().map(|&row| u32::from(f64::from(self.counts[row]) >= 1e9)).collect();
+        exact(&found, &sure.iter().map(|&row| u32::from(expected[row].0)).collect::<Vec<_>>())
+    }
+}
+
 fn rig_of(gpu: &Arc<Gpu>, kernels: KernelShape, scene: Scene) -> Result<Fixture> {
     Fixture::new(Arc::clone(gpu), scene, true, kernels, readable())
 }
 
 /// Checks a densification of 500 Gaussians, some below and some above each threshold.
 pub(super) fn densification(rules: &Rules, gpu: &Arc<Gpu>, kernels: KernelShape, leeway: f64) -> Result<Verdict> {
+    densified(rules, gpu, kernels, (leeway, false))
+}
+
+/// Same as [`densification`], with splits along the longest axis.
+pub(super) fn long_splits(rules: &Rules, gpu: &Arc<Gpu>, kernels: KernelShape, leeway: f64) -> Result<Verdict> {
+    densified(rules, gpu, kernels, (leeway, true))
+}
+
+fn densified(
+    rules: &Rules,
+    gpu: &Arc<Gpu>,
+    kernels: KernelShape,
+    (leeway, splits_long): (f64, bool),
+) -> Result<Verdict> {
     let before = population(710, 500);
     let mut fixture = rig_of(gpu, kernels, scene_of(&before))?;
     let tolerance = Tolerance { absolute: 3.5e-7 * leeway, relative: 3.5e-8 * leeway };
-    Ok(Densified::new(&mut fixture, before, 600)?.verdict(rules, tolerance))
+    Ok(Densified::new(&mut fixture, before, 600, splits_long)?.verdict(rules, tolerance))
 }
 
 /// Checks a reset of the opacities of 300 Gaussians.
@@ -221,6 +286,11 @@ pub(super) fn reset(rules: &Rules, gpu: &Arc<Gpu>, kernels: KernelShape, leeway:
     let before = population(120, 300);
     let mut fixture = rig_of(gpu, kernels, scene_of(&before))?;
     Ok(Reset::new(&mut fixture, before)?.verdict(rules, Tolerance { absolute: 1.2e-7 * leeway, relative: 0.0 }))
+}
+
+/// Checks the marks of Gaussians that fog the camera of a step.
+pub(super) fn fog_of_a_step(rules: &Rules, gpu: &Arc<Gpu>, kernels: KernelShape, _: f64) -> Result<Verdict> {
+    Ok(Fog::new(&mut rig_of(gpu, kernels, large(63))?)?.verdict(rules))
 }
 
 /// Checks the paper's lift of labels in one step.

@@ -195,6 +195,9 @@ pub fn population(seed: u64, count: usize) -> Population {
     let gradient_count: Vec<f64> = (0..count).map(|_| f64::from(random.random_range(0..6))).collect();
     let mut sum = |views: &f64| round(views * uniform(&mut random, 5e-5_f64.ln(), 1e-3_f64.ln()).exp());
     let gradient_sum = gradient_count.iter().map(&mut sum).collect();
+    // Some are marked for removal.
+    let gradient_count =
+        gradient_count.iter().enumerate().map(|(row, &n)| if row % 23 == 7 { 1e9 } else { n }).collect();
     let model = Model::from_gaussians(&gaussians(&mut random, &shape));
     Population { model, m, u, gradient_sum, gradient_count }
 }

@@ -39,11 +39,11 @@ fn train(gpu: &Arc<Gpu>, kernels: KernelShape) -> Result<(Gaussians, [f64; 2])> 
     let dataset = synth::dataset(&options, 0);
     let config = TrainConfig {
         iterations: STEPS,
-        label_from: 10,
-        vote_every: 20,
-        densify_from: 15,
+        label_from: Some(10),
+        vote_every: Some(20),
+        densify_from: Some(15),
         densify_until: Some(STEPS),
-        densify_interval: 20,
+        densify_interval: Some(20),
         densify_grad_threshold: 5e-5,
         ..TrainConfig::default()
     };

@@ -5,8 +5,11 @@
 //! models are scored. What a driver compiles is in it; the time to the first step is measured on its own, in new
 //! processes with empty and with filled caches.
 
+mod against;
 mod chart;
 mod curve;
+mod ladder;
+mod rows;
 
 use super::measure::{self, median, require, table};
 use super::trained::{Judge, small_scene, start, trainer, without_masks};
@@ -38,6 +41,8 @@ pub struct Options {
     /// Seeds, each a training of every kind.
     #[arg(long, value_name = "SEED,SEED", value_delimiter = ',', default_values_t = [0, 1, 2])]
     seeds: Vec<u64>,
+    #[command(flatten)]
+    against: against::Against,
 }
 
 /// A kind of training.
@@ -81,6 +86,9 @@ struct Outcome {
 /// Runs it.
 pub fn run(options: &Options) -> Result<()> {
     let small = options.common.small;
+    if let Some(other) = &options.against.against {
+        return against::run(other, &options.against, &options.seeds, &options.common);
+    }
     let scene = scene(small);
     let (iterations, seeds) = if small { (60, vec![0, 1]) } else { (options.iterations, options.seeds.clone()) };
     require(!seeds.is_empty(), || "no seed is given".to_owned())?;
@@ -124,7 +132,7 @@ fn scene(small: bool) -> SynthOptions {
 fn config(kind: Kind, iterations: u32, seed: u64) -> TrainConfig {
     let base = if kind.paper { TrainConfig::paper() } else { TrainConfig::default() };
     // Short runs let labels in after a third of their steps, as a run of 3,000 does after 1,000.
-    let label_from = base.label_from.min(iterations.div_ceil(3));
+    let label_from = Some(base.labels_from().min(iterations.div_ceil(3)));
     TrainConfig { iterations, seed, label_from, ..base }
 }
 
@@ -151,7 +159,7 @@ fn train(gpu: &Arc<Gpu>, dataset: &Dataset, kind: Kind, iterations: u32, seed: u
         }
         let pause = Instant::now();
         let gaussians = trainer.gaussian_count();
-        let mut model = if step < config.label_from { trainer.model()? } else { trainer.labelled_model()? };
+        let mut model = if step < config.labels_from() { trainer.model()? } else { trainer.labelled_model()? };
         model.labels = model.labels.filter(|_| kind.labels);
         let scores = judge.scores(dataset, &model, &config)?;
         curve.samples.push(Sample {
@@ -189,7 +197,7 @@ fn starts(small: bool) -> Result<Start> {
 /// The hidden command behind [`starts`]: prints the seconds from here to the end of a labelled step.
 pub fn first_step(common: &Common) -> Result<()> {
     let dataset = synth::dataset(&scene(common.small), 8);
-    let config = TrainConfig { label_from: 1, ..TrainConfig::default() };
+    let config = TrainConfig { label_from: Some(1), ..TrainConfig::default() };
     let model = start(&dataset, &config)?;
     let begin = Instant::now();
     let mut options = GpuOptions::from_env()?;

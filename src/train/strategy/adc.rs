@@ -9,21 +9,21 @@ use crate::train::TrainConfig;
 
 /// The strategy of 3DGS. It has no state: all decisions follow from the step and the configuration.
 #[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct DefaultStrategy;
+pub(crate) struct AdcStrategy;
 
-impl Strategy for DefaultStrategy {
+impl Strategy for AdcStrategy {
     fn name(&self) -> &'static str {
-        "default"
+        "adc"
     }
 
     fn acts_after(&self, at: At) -> bool {
-        !at.is_last() && (densifies_at(at.config, at.step) || resets_opacity_at(at.config, at.step))
+        !at.is_last() && (at.config.densifies_at(at.step) || resets_opacity_at(at.config, at.step))
     }
 
     fn act(&mut self, at: At, population: &mut Population) -> Result<()> {
         let uniforms = uniforms(at, population.uniforms());
-        if densifies_at(at.config, at.step) {
-            let what = population.densify(uniforms)?;
+        if at.config.densifies_at(at.step) {
+            let what = population.densify(uniforms, u64::MAX)?;
             tracing::debug!("step {}: {what:?}, {} Gaussians", at.step, population.count());
         }
         if resets_opacity_at(at.config, at.step) {
@@ -34,7 +34,7 @@ impl Strategy for DefaultStrategy {
 
     /// A densification replaces the parameters of the gradients, so that no update follows (3DGS).
     fn updates(&self, at: At) -> bool {
-        at.is_last() || !densifies_at(at.config, at.step)
+        at.is_last() || !at.config.densifies_at(at.step)
     }
 
     fn blurs_depth_after(&self, at: At) -> bool {
@@ -58,17 +58,6 @@ fn uniforms(at: At, step: StepUniforms) -> StepUniforms {
     }
 }
 
-pub(crate) fn densify_until(config: &TrainConfig) -> u32 {
-    /// Fewest steps of densification in a short run.
-    const LEAST: u32 = 1000;
-    config.densify_until.unwrap_or((config.iterations / 2).max(config.densify_from.saturating_add(LEAST)))
-}
-
-/// Returns true for steps that end with a densification.
-pub fn densifies_at(config: &TrainConfig, step: u32) -> bool {
-    step < densify_until(config) && step > config.densify_from && step.is_multiple_of(config.densify_interval)
-}
-
 /// Returns true if a densification at `step` also prunes by size.
 pub(crate) fn prunes_large_at(config: &TrainConfig, step: u32) -> bool {
     config.opacity_reset_interval > 0 && step > config.opacity_reset_interval
@@ -77,7 +66,7 @@ pub(crate) fn prunes_large_at(config: &TrainConfig, step: u32) -> bool {
 /// Returns true for steps that end with an opacity reset.
 pub fn resets_opacity_at(config: &TrainConfig, step: u32) -> bool {
     config.opacity_reset_interval > 0
-        && step < densify_until(config)
+        && step < config.densify_until()
         && step.is_multiple_of(config.opacity_reset_interval)
         && config.iterations.saturating_sub(step) > config.opacity_reset_margin
 }

@@ -1,0 +1,92 @@
+//! Far points where photos look past all others, such as at the sky.
+//!
+//! Without them nothing stands for what is far away, and training puts Gaussians right before the cameras instead.
+
+use super::region::sees;
+use crate::io::init::texel::texel;
+use crate::scene::{Camera, Dataset, Point, View};
+use glam::{DVec2, DVec3};
+use rayon::prelude::*;
+use std::f64::consts::TAU;
+
+/// Radius of the sphere, in scene extents, and in distances of the points: at least this much of this quantile.
+const RADIUS: f64 = 2.5;
+const BEYOND: f64 = 1.0;
+const FARTHEST: f64 = 0.99;
+/// A photo is divided into cells with this many along its longer side. It looks past the points in cells without one.
+const CELLS: u32 = 16;
+/// Fewest views that see a point of the sphere.
+const VIEWS_MIN: usize = 2;
+
+/// The cells of a photo with points.
+struct Covered {
+    columns: u32,
+    rows: u32,
+    cells: Vec<bool>,
+}
+
+impl Covered {
+    fn new(camera: &Camera, points: &[Point]) -> Self {
+        let longest = camera.width.max(camera.height);
+        let count = |side: u32| (side * CELLS).div_ceil(longest).max(1);
+        let (columns, rows) = (count(camera.width), count(camera.height));
+        let mut covered = Self { columns, rows, cells: vec![false; (columns * rows) as usize] };
+        for pixel in points.iter().filter_map(|point| sees(camera, point.position)) {
+            let (x, y) = covered.cell(camera, pixel);
+            covered.cells[(y * columns + x) as usize] = true;
+        }
+        covered
+    }
+
+    fn cell(&self, camera: &Camera, pixel: DVec2) -> (u32, u32) {
+        let at =
+            |value: f64, side: u32, count: u32| ((value / f64::from(side) * f64::from(count)) as u32).min(count - 1);
+        (at(pixel.x, camera.width, self.columns), at(pixel.y, camera.height, self.rows))
+    }
+
+    fn is_covered(&self, camera: &Camera, pixel: DVec2) -> bool {
+        let (x, y) = self.cell(camera, pixel);
+        self.cells[(y * self.columns + x) as usize]
+    }
+}
+
+/// Returns the points of a sphere of `count` directions around the cameras at which most of the views that see them look
+/// past the points of the scene, in the median colour of the pixels there; and half their spacing, world units.
+pub(super) fn points(dataset: &Dataset, count: usize) -> (Vec<Point>, f64) {
+    let points = &dataset.points;
+    let views: Vec<&View> = dataset.train.iter().filter(|view| view.photo.is_some()).collect();
+    if views.is_empty() || count == 0 {
+        return (Vec::new(), 0.0);
+    }
+    let centre = views.iter().map(|view| view.camera.centre()).sum::<DVec3>() / views.len() as f64;
+    let mut distances: Vec<f64> = points.iter().map(|point| point.position.distance(centre)).collect();
+    distances.sort_by(f64::total_cmp);
+    let far = distances.get((FARTHEST * distances.len() as f64) as usize).copied().unwrap_or(0.0);
+    let radius = (RADIUS * dataset.extent()).max(BEYOND * far);
+    let covered: Vec<Covered> = views.par_iter().map(|view| Covered::new(&view.camera, points)).collect();
+    let point = |index: usize| {
+        // Even directions: a Fibonacci lattice.
+        let height = 1.0 - (2.0 * index as f64 + 1.0) / count as f64;
+        let (angle, width) = (TAU * index as f64 * 0.618_033_988_749_894_8, (1.0 - height * height).sqrt());
+        let position = centre + radius * DVec3::new(width * angle.cos(), height, width * angle.sin());
+        let (mut past, mut colours) = (0, Vec::new());
+        for (view, covered) in views.iter().zip(&covered) {
+            let Some(pixel) = sees(&view.camera, position) else { continue };
+            let Some(colour) = view.photo.as_ref().and_then(|photo| texel(photo, pixel)) else { continue };
+            past += usize::from(!covered.is_covered(&view.camera, pixel));
+            colours.push(colour);
+        }
+        let seen = colours.len();
+        (seen >= VIEWS_MIN && 2 * past > seen).then(|| Point { position, colour: median(colours) })
+    };
+    let spacing = radius * (2.0 * TAU / count as f64).sqrt();
+    ((0..count).into_par_iter().filter_map(point).collect(), 0.5 * spacing)
+}
+
+fn median(colours: Vec<[u8; 3]>) -> [u8; 3] {
+    [0, 1, 2].map(|channel| {
+        let mut values: Vec<u8> = colours.iter().map(|colour| colour[channel]).collect();
+        values.sort_unstable();
+        values[values.len() / 2]
+    })
+}

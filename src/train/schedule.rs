@@ -1,0 +1,152 @@
+//! The settings of a step: schedules in steps, given or as fractions of the run, and learning rates.
+
+use super::TrainConfig;
+
+/// Length of the runs that the learning rates of 3DGS are made for, steps.
+const LONG_RUN: f64 = 30_000.0;
+/// Rates of a run of N steps are multiplied by (LONG_RUN / N)^RATE_POWER, at most by RATE_MOST.
+const RATE_POWER: f64 = 0.3;
+const RATE_MOST: f64 = 3.0;
+/// Gaussians of a run by default: for each pixel of a photo, and at most for each step.
+const BUDGET_PER_PIXEL: f64 = 0.5;
+const BUDGET_PER_STEP: u64 = 30;
+
+/// Learning rates of a step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Rates {
+    /// Positions, scene extents.
+    pub position: f64,
+    /// Opacity logits.
+    pub opacity: f64,
+    /// Log-scales.
+    pub scale: f64,
+    /// Quaternions.
+    pub rotation: f64,
+    /// Colour of degree 0.
+    pub colour: f64,
+    /// Colours above degree 0.
+    pub colour_rest: f64,
+}
+
+impl TrainConfig {
+    /// Returns a share of the run, steps.
+    fn share(&self, share: f64) -> u32 {
+        (share * f64::from(self.iterations)).round() as u32
+    }
+
+    /// Returns the factor of the learning rates.
+    fn rate_factor(&self) -> f64 {
+        let derived = (LONG_RUN / f64::from(self.iterations)).powf(RATE_POWER).clamp(1.0, RATE_MOST);
+        self.rate_factor.unwrap_or(derived)
+    }
+
+    /// Returns the factor by which all rates have fallen at `step`.
+    fn rate_fall(&self, step: u32) -> f64 {
+        let from = self.rate_fall_from.unwrap_or(self.share(0.6)).min(self.iterations);
+        let late = f64::from(step.saturating_sub(from)) / f64::from((self.iterations - from).max(1));
+        self.rate_final.powf(late.min(1.0))
+    }
+
+    /// Returns the learning rates of `step`.
+    pub fn rates_at(&self, step: u32) -> Rates {
+        let t = (f64::from(step) / f64::from(self.position_lr_max_steps)).clamp(0.0, 1.0);
+        let position = ((1.0 - t) * self.position_lr_init.ln() + t * self.position_lr_final.ln()).exp();
+        let (fall, factor) = (self.rate_fall(step), self.rate_factor() * self.rate_fall(step));
+        Rates {
+            position: factor * position,
+            opacity: fall * self.opacity_lr,
+            scale: factor * self.scaling_lr,
+            rotation: factor * self.rotation_lr,
+            colour: factor * self.feature_lr,
+            colour_rest: factor * self.feature_rest_lr.unwrap_or(self.feature_lr / 20.0),
+        }
+    }
+
+    pub(super) fn halve_rates(&mut self) {
+        for rate in [
+            &mut self.position_lr_init,
+            &mut self.position_lr_final,
+            &mut self.feature_lr,
+            &mut self.opacity_lr,
+            &mut self.scaling_lr,
+            &mut self.rotation_lr,
+        ]
+        .into_iter()
+        .chain(&mut self.feature_rest_lr)
+        {
+            *rate *= 0.5;
+        }
+    }
+
+    /// Returns the degree of the spherical harmonics at `step`.
+    pub fn sh_degree_at(&self, step: u32) -> u32 {
+        let interval = self.sh_degree_interval.unwrap_or(self.share(0.1).min(1000)).max(1);
+        (step / interval).min(self.sh_degree)
+    }
+
+    /// Returns the first step at full size.
+    pub fn full_size_from(&self) -> u32 {
+        if self.start_size < 1.0 { self.full_size_from.unwrap_or(self.share(0.6)) } else { 0 }
+    }
+
+    /// Returns true for steps that set labels and have a label loss, given masks.
+    pub fn labels_at(&self, step: u32) -> bool {
+        step >= self.labels_from()
+    }
+
+    /// Returns the first step with labels; steps on small photos have none.
+    pub fn labels_from(&self) -> u32 {
+        self.label_from.unwrap_or(self.share(0.6)).max(self.full_size_from())
+    }
+
+    /// Returns true if the votes are counted before `step`.
+    pub fn counts_votes_at(&self, step: u32) -> bool {
+        self.is_label_turn(step, self.vote_every.unwrap_or(self.share(1.0 / 30.0)))
+    }
+
+    /// Returns true if the occluders are updated before `step`.
+    pub fn updates_occluders_at(&self, step: u32) -> bool {
+        self.is_label_turn(step, self.occlusion_every.unwrap_or(self.share(1.0 / 15.0)))
+    }
+
+    fn is_label_turn(&self, step: u32, every: u32) -> bool {
+        self.labels_at(step) && (step - self.labels_from()).is_multiple_of(every.max(1))
+    }
+
+    /// Returns the step after which densification starts.
+    pub fn densify_from(&self) -> u32 {
+        self.densify_from.unwrap_or(self.share(0.05).min(500))
+    }
+
+    /// Returns the budget of a run on photos of this size, Gaussians.
+    pub(super) fn budget_for(&self, (width, height): (u32, u32)) -> u64 {
+        let by_pixels = (BUDGET_PER_PIXEL * f64::from(width) * f64::from(height)) as u64;
+        by_pixels.min(BUDGET_PER_STEP * u64::from(self.iterations)).max(1)
+    }
+
+    /// Returns the most Gaussians after a densification at `step`. It rises linearly from `start` to the budget.
+    pub fn budget_at(&self, step: u32, start: u64) -> u64 {
+        let (from, last) = (self.densify_from(), self.densify_until().saturating_sub(self.densify_interval()));
+        let part = f64::from(step.saturating_sub(from)) / f64::from(last.saturating_sub(from).max(1));
+        start + (self.budget.saturating_sub(start) as f64 * part.min(1.0)) as u64
+    }
+
+    fn densify_interval(&self) -> u32 {
+        self.densify_interval.unwrap_or(self.share(1.0 / 30.0).clamp(20, 100)).max(1)
+    }
+
+    /// Returns the step at which densification stops.
+    pub fn densify_until(&self) -> u32 {
+        self.densify_until.unwrap_or(self.share(0.5))
+    }
+
+    /// Returns true for steps after densification that end with pruning.
+    pub fn prunes_at(&self, step: u32) -> bool {
+        step >= self.densify_until() && step.is_multiple_of(2 * self.densify_interval())
+    }
+
+    /// Returns true for steps that end with a densification.
+    pub fn densifies_at(&self, step: u32) -> bool {
+        step < self.densify_until() && step > self.densify_from() && step.is_multiple_of(self.densify_interval())
+    }
+}

@@ -1,0 +1,84 @@
+//! Growth within a budget: the Gaussians with the largest gradients split along their longest axis (Improved-GS).
+//!
+//! The statistic adds absolute gradients of tiles, because those of a Gaussian's two sides cancel (AbsGS, by pixel). The
+//! budget rises linearly to its end. After it, densifications go on without growth, to prune. A pass of its own
+//! marks Gaussians that fog the cameras.
+
+use super::{At, Population, Strategy};
+use crate::error::Result;
+use crate::pass::{Builder, Extension, Hook, densify};
+use crate::scheduler::plan::Buf;
+use crate::shaders::structs::StepUniforms;
+use serde_json::Value;
+use std::sync::Arc;
+
+/// Growth within a budget.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct BudgetStrategy {
+    /// Number of Gaussians before the first densification.
+    start: Option<u32>,
+}
+
+/// The pass that marks Gaussians that fog the camera of the step.
+#[derive(Debug)]
+struct FreeSpace;
+
+impl Extension for FreeSpace {
+    fn extend(&self, _: u32, hook: Hook, b: &mut Builder) {
+        if hook == Hook::Updated {
+            densify::mark_near(b);
+        }
+    }
+}
+
+impl Strategy for BudgetStrategy {
+    fn name(&self) -> &'static str {
+        "budget"
+    }
+
+    fn acts_after(&self, at: At) -> bool {
+        !at.is_last() && (at.config.densifies_at(at.step) || at.config.prunes_at(at.step))
+    }
+
+    fn act(&mut self, at: At, population: &mut Population) -> Result<()> {
+        let config = at.config;
+        let grows = config.densifies_at(at.step);
+        let start = *self.start.get_or_insert(population.count());
+        let uniforms = StepUniforms {
+            densify_threshold: if grows { config.densify_grad_threshold } else { 0.0 },
+            // All that grow split.
+            densify_scale: 0.0,
+            split_long: 1,
+            prune_opacity: config.min_opacity,
+            ..population.uniforms()
+        };
+        let what = population.densify(uniforms, config.budget_at(at.step, u64::from(start)))?;
+        tracing::debug!("step {}: {what:?}, {} Gaussians", at.step, population.count());
+        Ok(())
+    }
+
+    fn uniforms(&self, _at: At, to: &mut StepUniforms) {
+        to.sum_absolute = 1;
+    }
+
+    fn extension(&self) -> Arc<dyn Extension> {
+        Arc::new(FreeSpace)
+    }
+
+    fn passes(&self, at: At) -> u32 {
+        u32::from(at.config.free_space)
+    }
+
+    fn planes(&self) -> &'static [Buf] {
+        &[Buf::DENSIFY_STATS]
+    }
+
+    fn keep(&self) -> Value {
+        self.start.into()
+    }
+
+    fn restore(&mut self, kept: &Value) -> Result<(), String> {
+        self.start = serde_json::from_value(kept.clone()).map_err(|error| format!("first number: {error}"))?;
+        Ok(())
+    }
+}

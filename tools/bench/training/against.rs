@@ -1,0 +1,132 @@
+//! Quality against processor time of two programs: this one at several lengths of a run, and another one.
+//!
+//! Both train the same scenes from the same seeds in processes of their own, one after another. The scores are those of
+//! this program. Each length of a run is a training of its own, because schedules are fractions of the run.
+
+use super::super::measure::{table, write_text};
+use super::rows::{Plan, Row, Rows, SceneOf};
+use super::{Common, ladder};
+use labelgs::internals::synth;
+use labelgs::synth::{Preset, SynthOptions};
+use labelgs::{Error, Result};
+use std::path::{Path, PathBuf};
+
+/// Name of the other program in tables.
+const OTHER: &str = "other";
+/// Name of this program without further flags.
+const OWN: &str = "this";
+
+/// Options of the comparison with another program.
+#[derive(clap::Args, Clone, Debug)]
+pub struct Against {
+    /// Another labelgs program to compare with, such as one of an earlier revision.
+    #[arg(long, value_name = "PROGRAM")]
+    pub against: Option<PathBuf>,
+    /// Scenes: plain, hard (built in), or FOLDER@PX with the longest side of a photo; with +MASKS, the name of a folder
+    /// in the scene, the training has labels.
+    #[arg(long, value_name = "SCENE,SCENE", value_delimiter = ',', default_values_t = ["plain".to_owned()])]
+    pub scenes: Vec<String>,
+    /// Steps of the trainings of this program.
+    #[arg(long, value_name = "N,N", value_delimiter = ',', default_values_t = [750, 1500, 3000])]
+    pub lengths: Vec<u32>,
+    /// Steps of the other program.
+    #[arg(long, value_name = "N,N", value_delimiter = ',', default_values_t = [3000])]
+    pub against_lengths: Vec<u32>,
+    /// A further kind of training of this program: its name, and its flags after an equals sign. May be repeated.
+    #[arg(long = "kind", value_name = "NAME=FLAGS")]
+    pub kinds: Vec<String>,
+}
+
+/// A kind of training.
+struct Kind {
+    name: String,
+    program: PathBuf,
+    flags: Vec<String>,
+    lengths: Vec<u32>,
+}
+
+/// Compares the programs.
+pub fn run(other: &Path, options: &Against, seeds: &[u64], common: &Common) -> Result<()> {
+    let own = PathBuf::from(env!("CARGO_BIN_EXE_labelgs"));
+    let (lengths, against) = match common.small {
+        true => (vec![20, 40], vec![30]),
+        false => (options.lengths.clone(), options.against_lengths.clone()),
+    };
+    let kind = |name: &str, flags: &str, program: &Path, lengths: &[u32]| Kind {
+        name: name.to_owned(),
+        program: program.to_owned(),
+        flags: flags.split_whitespace().map(str::to_owned).collect(),
+        lengths: lengths.to_vec(),
+    };
+    let mut kinds = vec![kind(OTHER, "", other, &against), kind(OWN, "", &own, &lengths)];
+    for text in &options.kinds {
+        let (name, flags) = text.split_once('=').unwrap_or((text, ""));
+        kinds.push(kind(name, flags, &own, &lengths));
+    }
+    let made = tempfile::tempdir().map_err(Error::write("a folder for scenes"))?;
+    let scenes =
+        options.scenes.iter().map(|text| scene(text, made.path(), common.small)).collect::<Result<Vec<_>>>()?;
+    let mut rows = Rows::open(&common.output.join("against.jsonl"))?;
+    let mut found = Vec::new();
+    for scene in &scenes {
+        for &seed in seeds {
+            for kind in &kinds {
+                for &steps in &kind.lengths {
+                    let (name, flags) = (kind.name.as_str(), kind.flags.as_slice());
+                    let row = rows.row(&Plan { name, program: &kind.program, flags, scene, seed, steps }, &own)?;
+                    println!("{}", line(&row));
+                    found.push(row);
+                }
+            }
+        }
+    }
+    println!("\n{}", table(&ladder::table_of(&found, OTHER)));
+    write_text(&common.output.join("against.svg"), &ladder::chart(&found)?)
+}
+
+fn line(row: &Row) -> String {
+    format!(
+        "{} {} steps, {}, seed {}: {:.1} CPU s, {} Gaussians, PSNR {:.2}, seen {:.2}, worst {:.2}, fog {:.2}",
+        row.program,
+        row.steps,
+        row.scene,
+        row.seed,
+        row.cpu,
+        row.gaussians,
+        row.psnr,
+        row.psnr_seen.unwrap_or(f64::NAN),
+        row.worst,
+        row.fog
+    )
+}
+
+/// Parses a scene; writes a built-in one into `folder`.
+fn scene(text: &str, folder: &Path, small: bool) -> Result<SceneOf> {
+    let (place, masks) = text.split_once('+').map_or((text, None), |(place, masks)| (place, Some(masks)));
+    let (place, size) = place.split_once('@').map_or((place, "0"), |(place, size)| (place, size));
+    let max_resolution =
+        size.parse().map_err(|_| Error::usage("scenes", format!("`{size}` is not a number of pixels")))?;
+    let preset = match place {
+        "plain" => Some(Preset::Default),
+        "hard" => Some(Preset::Hard),
+        _ => None,
+    };
+    let path = match preset {
+        Some(preset) => {
+            let path = folder.join(text);
+            let options = SynthOptions { preset, ..SynthOptions::default() };
+            let tiny = SynthOptions { width: 64, height: 48, views: 9, points: 300, ..options };
+            synth::write(&if small { tiny } else { options }, &path, &|_| Ok(()))?;
+            path
+        }
+        None => PathBuf::from(place),
+    };
+    let name = match preset {
+        Some(_) => text.to_owned(),
+        None => {
+            let stem = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+            format!("{stem}@{size}{}", masks.map_or(String::new(), |masks| format!("+{masks}")))
+        }
+    };
+    Ok(SceneOf { name, masks: masks.map(|masks| path.join(masks)), path, max_resolution })
+}
