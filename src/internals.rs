@@ -96,7 +96,7 @@ pub mod io {
         };
     }
     pub mod init {
-        pub use crate::io::init::{RANDOM_COUNT, initial_gaussians};
+        pub use crate::io::init::{RANDOM_COUNT, add_far_gaussians, initial_gaussians};
     }
     pub mod label_table {
         pub use crate::io::label_table::FILE;
@@ -154,8 +154,8 @@ pub mod pass {
     #[cfg(feature = "lab")]
     pub use crate::pass::separate_step;
     pub use crate::pass::{
-        Builder, Extension, Hook, KernelShape, Stage, Variant, densify_apply, densify_count, opacity_reset,
-        render_view, training_step, vote_view,
+        Builder, Extension, Hook, KernelShape, Stage, Variant, densify_apply, densify_count, extended_step,
+        opacity_reset, render_view, training_step, vote_view,
     };
     pub mod build {
         pub use crate::pass::build::Count;
@@ -214,7 +214,7 @@ pub mod train {
     }
     pub mod strategy {
         pub use crate::train::strategy::population::Population;
-        pub use crate::train::strategy::{At, Strategy};
+        pub use crate::train::strategy::{At, Strategy, of};
         pub mod adc {
             pub use crate::train::strategy::adc::resets_opacity_at;
         }

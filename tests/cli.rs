@@ -94,7 +94,10 @@ fn every_setting_has_a_flag_with_its_default() {
         assert!(help.contains(default), "{default} is not in\n{help}");
     }
     assert!(
-        help.contains("where ours differ: --label-rule main --label-weight 1.0 --densify-until 40000 --opacity-reset-interval 3000"),
+        help.contains(
+            "where ours differ: --start-size 1.0 --full-size-from 0 --strategy adc --free-space off --far-points 0"
+        ) && help.contains("--label-rule main")
+            && help.contains("--densify-until 40000 --densify-interval 100 --opacity-reset-interval 3000"),
         "{help}"
     );
     for heading in [
@@ -177,10 +180,18 @@ fn a_flag_has_one_heading() {
 }
 
 /// A value other than the default for each setting.
-const TYPED: [(&str, &str); 44] = [
+const TYPED: [(&str, &str); 52] = [
     ("--iterations", "7"),
     ("--max-resolution", "99"),
-    ("--coarse-until", "4"),
+    ("--start-size", "0.7"),
+    ("--full-size-from", "4"),
+    ("--strategy", "adc"),
+    ("--budget", "9k"),
+    ("--free-space", "off"),
+    ("--far-points", "30"),
+    ("--rate-factor", "1.5"),
+    ("--rate-final", "0.5"),
+    ("--rate-fall-from", "6"),
     ("--test-every", "5"),
     ("--seed", "11"),
     ("--max-gaussians", "2.5M"),

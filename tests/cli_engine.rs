@@ -162,6 +162,32 @@ fn profile_times_every_stage() {
     assert!(overlap["labels"] == false && overlap["barrier_before_each_pass"] == false);
 }
 
+/// The regions cover a view; a near plane beyond the scene leaves nothing, which fog is measured against.
+fn scores_by_region_and_near_plane(out: &str, scene: &str, masks: &str) {
+    let base = ["eval", out, "--scene", scene, "--masks", masks];
+    let scores = json(&succeeds(&[&base[..], &["--json", "--near", "50,0.01,0.2"]].concat()));
+    let number = |value: &Value| value.as_f64().unwrap_or_else(|| panic!("no number in {scores}"));
+    for view in scores["views"].as_object().expect("views").values() {
+        let error = |key: &str| 10.0_f64.powf(-0.1 * number(&view[key]));
+        let share = number(&view["seen_share"]);
+        assert!(share > 0.2 && share <= 1.0, "{share}");
+        if share < 1.0 {
+            let all = share * error("psnr_seen") + (1.0 - share) * error("psnr_unseen");
+            assert!((all / error("psnr") - 1.0).abs() < 1e-6, "the regions make up the view: {view}");
+        }
+        assert!(number(&view["psnr_objects"]) > 5.0 && number(&view["psnr_contours"]) > 5.0);
+    }
+    let planes = scores["near"]["planes"].as_array().expect("planes");
+    let nears: Vec<f64> = planes.iter().map(|plane| number(&plane["near"])).collect();
+    assert!(nears.is_sorted() && nears.len() == 3, "{nears:?}");
+    let psnr: Vec<f64> = planes.iter().map(|plane| number(&plane["psnr"])).collect();
+    assert!(psnr[2] + 1.0 < psnr[0], "nothing is left beyond 50: {psnr:?}");
+    let best = psnr.iter().copied().fold(number(&scores["mean"]["psnr"]), f64::max);
+    assert!((number(&scores["near"]["fog"]) - (best - psnr[0])).abs() < 1e-9);
+    let text = succeeds(&[&base[..], &["--near", "0.01,0.2"]].concat());
+    assert!(text.contains("PSNR by region: ") && text.contains("contours") && text.contains("fog: "), "{text}");
+}
+
 #[test]
 fn a_made_scene_is_trained_scored_edited_and_rendered() {
     let Some(_gpu) = turn() else { return };
@@ -186,6 +212,7 @@ fn a_made_scene_is_trained_scored_edited_and_rendered() {
     for key in ["iou_map", "boundary_iou", "object_ssim"] {
         assert!(scores["objects"]["2"][key].is_number(), "{key}: {scores}");
     }
+    scores_by_region_and_near_plane(&out, &scene, &masks);
     let failed = labelgs(&["eval", &out, "--scene", &scene, "--min-psnr", "90"]);
     assert_eq!(failed.status.code(), Some(1), "{}", text(&failed.stderr));
     assert!(text(&failed.stdout).contains("PSNR"), "a failed check comes after the scores");

@@ -122,6 +122,7 @@ fn any_vulkan_call_of_a_training_may_fail() {
 
 const SHORT: &str = "
 iterations = 6
+start_size = 1.0
 checkpoint_every = 3
 preview_every = 4
 label_from = 2

@@ -10,6 +10,8 @@ const MIDDLE: u32 = 500;
 
 const SETTINGS: &str = "
 iterations = 1000
+strategy = \"adc\"
+start_size = 1.0
 checkpoint_every = 500
 preview_every = 0
 label_from = 100

@@ -23,6 +23,15 @@ fn schedules_follow_the_reference() {
     assert!((config.rates_at(7000).colour_rest - 1.25e-4).abs() < 1e-15);
 }
 
+#[test]
+fn densification_of_3dgs_ends_at_half_of_the_run() {
+    let last = |iterations| {
+        let config = TrainConfig { iterations, ..TrainConfig::adc() };
+        (1..=iterations).filter(|&step| config.densifies_at(step)).max()
+    };
+    assert_eq!([400, 1500, 3000, 30_000].map(last), [None, Some(1400), Some(1400), Some(14_900)]);
+}
+
 /// Schedules without a given step are fractions of the run, and the rates fit its length.
 #[test]
 fn schedules_are_fractions_of_the_run() {
@@ -35,7 +44,7 @@ fn schedules_are_fractions_of_the_run() {
     assert!((scale(&short, 1) - 30.0_f64.powf(0.3)).abs() < 1e-9 && (scale(&long, 1) - 1.0).abs() < 1e-9);
     assert!((scale(&long, 30_000) - 0.1).abs() < 1e-9 && (scale(&of(10), 1) - 3.0).abs() < 1e-12);
     let bounded = TrainConfig { budget: 9000, ..short };
-    assert_eq!([51, 275, 467, 900].map(|step| bounded.budget_at(step, 1000)), [1019, 5315, 9000, 9000]);
+    assert_eq!([51, 275, 467, 900].map(|step| bounded.budget_at(step, 1000)), [1019, 5316, 9000, 9000]);
     assert_eq!(TrainConfig { label_from: Some(3), ..of(1000) }.labels_from(), 600, "small photos have no labels");
 }
 

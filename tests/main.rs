@@ -15,6 +15,7 @@ static MEMORY: support::memory::Counting = support::memory::Counting;
 
 mod architecture; // layers of the crate, file lengths, places of unsafe code
 mod associate; // masks of one object in different views get one id
+mod capture; // faults of photos and poses are found before training
 mod cards; // kernels compile for cards that are not there
 mod cli; // flags, defaults, streams and exit statuses
 mod cli_devices; // a missing or poorer device is refused by name
@@ -24,7 +25,7 @@ mod cli_labels; // labels of a model from masks, and masks from labels
 mod cli_long; // bit-identical results over 1,000 steps
 mod cli_masks; // import, check and spoil masks from the command line
 mod cli_surroundings; // odd names, locales, closed streams, links, little memory
-mod coarse; // steps at half resolution equal those of a smaller scene
+mod coarse; // steps on small photos equal those of a smaller scene
 mod compare_self; // the comparisons of all other tests do fail
 mod config; // schedules and ranges of the settings
 mod decide; // labels from votes

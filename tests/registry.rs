@@ -6,6 +6,8 @@ use labelgs::internals::pass;
 use labelgs::internals::pass::{KernelShape, Variant};
 use labelgs::internals::scheduler::plan::{Capacity, Grid, Limits, PassList, Plan, PlanOptions, TABLE, Work};
 use labelgs::internals::shaders;
+use labelgs::internals::train::strategy;
+use labelgs::run::StrategyKind;
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -67,6 +69,9 @@ fn lists() -> Vec<(Capacity, PassList)> {
             ));
             add(pass::render_view(&shape, &capacity, 3));
             add(pass::vote_view(&shape, &capacity, 2));
+            let variant = Variant { labels: false, lift: false, sh_degree: 3, size, update: true, counts: false };
+            let extension = strategy::of(StrategyKind::Budget).extension();
+            add(pass::extended_step(&shape, &capacity, variant, (&*extension, 1)));
             add(pass::densify_count(&shape, &capacity));
             add(pass::densify_apply(&shape, &capacity, true));
             add(pass::opacity_reset(&shape, &capacity));

@@ -285,7 +285,7 @@ fn a_brightness_of_each_photo_is_found() {
         let photo = Arc::make_mut(view.photo.as_mut().expect("a photo"));
         photo.rgba.iter_mut().for_each(|[r, g, b, _]| [r, g, b].into_iter().for_each(|v| *v = v.saturating_sub(50)));
     }
-    let config = TrainConfig { iterations: 60, densify_from: Some(1000), ..TrainConfig::default() };
+    let config = TrainConfig { iterations: 60, densify_from: Some(1000), ..TrainConfig::adc() };
     let mut trainer = trainer(&turn, scene, config, with(Brightness));
     go_on(&mut trainer, 60);
     let found: Vec<f32> = trainer.engine_mut().shared().expect("rows")[1..].iter().map(|row| row[0]).collect();

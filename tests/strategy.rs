@@ -141,7 +141,7 @@ fn a_strategy_goes_on_from_a_checkpoint_of_its_own() {
     assert_eq!(found.planes, expected.planes);
     let refused = Trainer::resume(turn.gpu(), &small(), read(), SchedulerOptions::default());
     let error = refused.err().expect("another strategy").to_string();
-    assert!(error.contains("thinning") && error.contains("budget"), "{error}");
+    assert!(error.contains("thinning") && error.contains("adc"), "{error}");
 }
 
 /// The strategy of 3DGS adds nothing to a checkpoint.

@@ -42,8 +42,7 @@ void main() {
             vec3 along = scale.x == longest ? vec3(1.0, 0.0, 0.0) : scale.y == longest ? vec3(0.0, 1.0, 0.0) : vec3(0.0, 0.0, 1.0);
             m.xyz += rotation * along * (exp(longest) * (child == 0u ? SPLIT_OFFSET : -SPLIT_OFFSET));
             s.xyz -= mix(vec3(SPLIT_OTHERS), vec3(SPLIT_LONG), along);
-            float opacity = SPLIT_OPACITY / (1.0 + exp(-mean.w));
-            m.w = log(opacity / (1.0 - opacity));
+            m.w = -log((1.0 - SPLIT_OPACITY + exp(-mean.w)) / SPLIT_OPACITY); // logit of SPLIT_OPACITY times the opacity
         } else if (action == ACTION_SPLIT) {
             vec3 draw = vec3(normal_draw(u.seed, i, 3u * child), normal_draw(u.seed, i, 3u * child + 1u),
                 normal_draw(u.seed, i, 3u * child + 2u));

@@ -7,7 +7,7 @@
 // mark_near — mark the Gaussians that fog the camera of the step: before its near plane, or so large that they engulf
 //             it. The next densification prunes them.
 // Work:    64 Gaussians per workgroup.
-// Reads:   step; means, scales [N]
+// Reads:   step, failure; means, scales [N]
 // Writes:  densify_stats [N]: (0, STAT_NEAR) for a marked Gaussian
 // Math:    0 < z <= near and the slopes of the centre within the limits of the Jacobian, which are the image and a
 //          margin; or max(s) > FREE_SIZE |p|, whatever the direction. Views between the training cameras would show them.
@@ -18,11 +18,12 @@ READ1(0, StepUniforms, step);
 FETCH4(1, means);
 FETCH4(2, scales);
 INOUT(3, vec2, densify_stats);
+READ1(4, uint, failure);
 
 void main() {
     StepUniforms u = step;
     uint i = linear_group_id() * 64u + gl_LocalInvocationID.x;
-    if (i >= u.gaussian_count) {
+    if (i >= u.gaussian_count || failure != 0u) {
         return;
     }
     vec3 view = to_view(u, fetch4(means, i).xyz);

@@ -10,8 +10,10 @@ uint densify_action(StepUniforms u, float logit, vec3 log_scale, vec2 stats) {
     float size = exp(max(log_scale.x, max(log_scale.y, log_scale.z)));
     bool grows = gradient >= u.densify_threshold && u.densify_threshold > 0.0;
     bool splits = grows && size > u.densify_scale;
-    float child = splits ? exp(max(log_scale.x, max(log_scale.y, log_scale.z)) - SPLIT_SHRINK) : size;
-    bool drop = exp2(-log2(1.0 + exp(-clamp(logit, -30.0, 30.0)))) < u.prune_opacity
+    float child = splits && u.split_long == 0u ? exp(max(log_scale.x, max(log_scale.y, log_scale.z)) - SPLIT_SHRINK) : size;
+    float opacity = exp2(-log2(1.0 + exp(-clamp(logit, -30.0, 30.0))));
+    opacity *= splits && u.split_long != 0u ? SPLIT_OPACITY : 1.0;
+    bool drop = opacity < u.prune_opacity
         || (u.prune_big != 0u && child > u.prune_scale) || stats.y >= STAT_NEAR;
     return drop ? ACTION_PRUNE : splits ? ACTION_SPLIT : grows ? ACTION_CLONE : ACTION_KEEP;
 }

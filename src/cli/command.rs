@@ -2,6 +2,7 @@
 
 use super::ablate::AblateArgs;
 use super::args::GlobalArgs;
+use super::check::CheckArgs;
 use super::densify::DensifyArgs;
 use super::devices::DevicesArgs;
 use super::eval::EvalArgs;
@@ -103,6 +104,11 @@ pub enum Command {
     ///
     /// Example: labelgs masks import scene/masks --scene scene -o imported
     Masks(MasksArgs),
+    /// Look for faults of a capture before training: poses, blur, exposure, photos without neighbours, scale. Exit status
+    /// 1 if there are any.
+    ///
+    /// Example: labelgs check scene
+    Check(CheckArgs),
     /// List which objects hide which in each view, without training.
     ///
     /// Example: labelgs occlusion scene --masks scene/masks --model out -o occlusion.json

@@ -67,6 +67,12 @@ fn derive(shape: &KernelShape, capacity: &mut Capacity, instances: u64, trained:
     capacity.scan_lanes = 2 * u64::from(shape.lanes(capacity.gaussians.max(capacity.virtual_tiles)));
 }
 
+/// The training step with the most buffers.
+fn widest(size: &EngineSize) -> Variant {
+    let labels = size.labels.is_some();
+    Variant { labels, lift: labels, sh_degree: 3, size: size.image, update: true, counts: false }
+}
+
 impl Engine {
     /// Predicts the memory of an engine of this size, without allocating.
     #[doc(hidden)]
@@ -82,15 +88,7 @@ impl Engine {
     pub fn lists_of(shape: &KernelShape, capacity: &Capacity, size: &EngineSize) -> Vec<PassList> {
         let mut lists = vec![pass::render_view(shape, capacity, 3)];
         if size.trained {
-            let variant = Variant {
-                labels: size.labels.is_some(),
-                lift: size.labels.is_some(),
-                sh_degree: 3,
-                size: size.image,
-                update: true,
-                counts: false,
-            };
-            lists.insert(0, pass::training_step(shape, capacity, variant));
+            lists.insert(0, pass::training_step(shape, capacity, widest(size)));
             lists.push(pass::densify_apply(shape, capacity, size.labels.is_some()));
         }
         lists
@@ -166,7 +164,11 @@ impl Engine {
 
     /// Returns true if the memory suffices for these capacities and all lists.
     fn fits(&self, capacity: &Capacity) -> Result<bool> {
-        let lists = Self::lists_of(&self.shape, capacity, &self.size);
+        let mut lists = Self::lists_of(&self.shape, capacity, &self.size);
+        if self.size.trained && self.passes > 0 {
+            let variant = widest(&self.size);
+            lists.push(pass::extended_step(&self.shape, capacity, variant, (&*self.extension, self.passes)));
+        }
         match self.sched.predict_here(capacity, &lists) {
             Ok(_) => Ok(true),
             Err(Error::OutOfMemory { .. }) => Ok(false),

@@ -41,6 +41,8 @@ pub struct Engine {
     origin: DVec3,
     /// Passes that extended steps add.
     extension: Arc<dyn Extension>,
+    /// Variant of these passes that counts in predictions of memory; 0 for none.
+    passes: u32,
     /// Stamp of the last submit, never 0.
     stamp: u32,
     last_frame: usize,
@@ -81,6 +83,7 @@ impl Engine {
             sh_degree: 0,
             origin: DVec3::ZERO,
             extension: Arc::new(()),
+            passes: 0,
             stamp: 0,
             last_frame: 0,
             in_flight: [false; FRAMES_IN_FLIGHT],
@@ -129,9 +132,10 @@ impl Engine {
         self.sh_degree = sh_degree;
     }
 
-    /// Sets the passes that [`ListKey::Extended`] adds; call it before the first such step.
-    pub(crate) fn set_extension(&mut self, extension: Arc<dyn Extension>) {
-        self.extension = extension;
+    /// Sets the passes that [`ListKey::Extended`] adds; call it before the first such step. Steps with the variant
+    /// `passes` count in predictions of memory; 0 for none.
+    pub(crate) fn set_extension(&mut self, extension: Arc<dyn Extension>, passes: u32) {
+        (self.extension, self.passes) = (extension, passes);
     }
 
     /// Copies a model into the device's memory; moments and statistics become 0.

@@ -2,11 +2,12 @@
 //!
 //! [`open`] reads a scene with photos, poses and masks. [`read_model`] and [`write_model`] are for models,
 //! [`read_photo`] and [`read_mask`] for single images, [`read_camera`] for a camera. [`initial_gaussians`] makes the
-//! first Gaussians of a scene. [`masks`] imports and checks whole folders of masks. All writes are atomic.
+//! first Gaussians of a scene. [`capture`] looks for faults of photos and poses. [`masks`] imports and checks whole folders of masks. All writes are atomic.
 
 pub(crate) mod atomic;
 mod bad_photos;
 pub(crate) mod camera_json;
+pub mod capture;
 pub(crate) mod checkpoint;
 pub(crate) mod checkpoint_folder;
 mod colmap;

@@ -9,7 +9,7 @@ use crate::scheduler::plan::{Buf, Stage};
 /// Marks the Gaussians in the free space of the step's camera.
 pub(crate) fn mark_near(b: &mut Builder) {
     b.list.stage = Stage::Optimise;
-    pass!(b, mark_near { step: Buf::STEP, means: Buf::MEANS, scales: Buf::SCALES, densify_stats: Buf::DENSIFY_STATS } [],
+    pass!(b, mark_near { step: Buf::STEP, means: Buf::MEANS, scales: Buf::SCALES, densify_stats: Buf::DENSIFY_STATS, failure: Buf::FAILURE } [],
         over_gaussians());
 }
 

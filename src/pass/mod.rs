@@ -97,7 +97,7 @@ pub fn training_step(shape: &KernelShape, capacity: &Capacity, variant: Variant)
 }
 
 /// One optimiser step with the passes of an extension's variant.
-pub(crate) fn extended_step(
+pub fn extended_step(
     shape: &KernelShape,
     capacity: &Capacity,
     variant: Variant,

@@ -291,6 +291,7 @@ crate::options::options! {
 
             /// Step at which densification stops [default: half of the run].
             ///
+            /// With the strategy adc, the default is at least 1000 steps after --densify-from.
             /// Pruning and opacity resets end there too. 3DGS also stops at half of the run (15000 of 30000). LabelGS
             /// has 40000, the end of its runs: that makes 75 % more Gaussians and slower steps for the same PSNR.
             #[serde(skip_serializing_if = "Option::is_none")]

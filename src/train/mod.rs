@@ -135,7 +135,8 @@ impl Trainer {
         let size = size.with_shared_rows(shared.rows(views.len()));
         let mut engine = Engine::with_shape(gpu, shape, size, scheduler)?;
         engine.set_sh_degree(config.sh_degree);
-        engine.set_extension(shared.extended(strategy.extension()));
+        let passes = shared.passes(strategy.passes(At { step: 1, config: &config, extent: fixed.extent }));
+        engine.set_extension(shared.extended(strategy.extension()), passes);
         let order = ViewOrder::new(config.seed, views.len());
         Ok(Self {
             engine,

@@ -1,12 +1,14 @@
 //! The settings of a step: schedules in steps, given or as fractions of the run, and learning rates.
 
-use super::TrainConfig;
+use super::{StrategyKind, TrainConfig};
 
 /// Length of the runs that the learning rates of 3DGS are made for, steps.
 const LONG_RUN: f64 = 30_000.0;
 /// Rates of a run of N steps are multiplied by (LONG_RUN / N)^RATE_POWER, at most by RATE_MOST.
 const RATE_POWER: f64 = 0.3;
 const RATE_MOST: f64 = 3.0;
+/// Fewest steps of densification with the strategy of 3DGS.
+const ADC_LEAST: u32 = 1000;
 /// Gaussians of a run by default: for each pixel of a photo, and at most for each step.
 const BUDGET_PER_PIXEL: f64 = 0.5;
 const BUDGET_PER_STEP: u64 = 30;
@@ -137,7 +139,9 @@ impl TrainConfig {
 
     /// Returns the step at which densification stops.
     pub fn densify_until(&self) -> u32 {
-        self.densify_until.unwrap_or(self.share(0.5))
+        // The schedule of 3DGS starts late, whatever the length of the run.
+        let least = if self.strategy == StrategyKind::Adc { self.densify_from().saturating_add(ADC_LEAST) } else { 0 };
+        self.densify_until.unwrap_or(self.share(0.5).max(least))
     }
 
     /// Returns true for steps after densification that end with pruning.

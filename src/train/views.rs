@@ -2,6 +2,7 @@
 
 use super::TrainConfig;
 use super::step_input::{StepInput, TrainView, side_at};
+use crate::scheduler::plan::FRAMES_IN_FLIGHT;
 use std::collections::BTreeMap;
 use std::ops::{Deref, DerefMut};
 
@@ -48,8 +49,9 @@ impl Views {
     /// Makes the view of a step at the size of the step.
     pub(super) fn prepare(&mut self, step: u32, view: usize) {
         let size = self.size_at(step);
-        // Steps in flight may still use the size before.
-        self.shrunk.retain(|&(kept, _), _| kept + 1 >= size);
+        // Steps in flight still use their sizes.
+        let oldest = self.size_at(step.saturating_sub(FRAMES_IN_FLIGHT as u32));
+        self.shrunk.retain(|&(kept, _), _| kept >= oldest);
         if size < SIZES && !self.shrunk.contains_key(&(size, view)) {
             let shrunk = self.whole[view].shrunk(self.share_at(step));
             self.shrunk.insert((size, view), shrunk);

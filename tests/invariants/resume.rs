@@ -1,6 +1,6 @@
 //! A training that is resumed from a file in a new trainer ends in the same bits as an uninterrupted one.
 
-use super::training::{config, labels_of, small};
+use super::training::{budgeted, config, labels_of, small};
 use crate::support::device;
 use crate::support::device::Turn;
 use labelgs::Result;
@@ -82,6 +82,19 @@ fn same_when_resumed(turn: &Turn, config: TrainConfig, data: fn() -> Dataset, op
 fn a_training_with_votes_goes_on_to_the_same_bits() {
     let Some(turn) = device() else { return };
     let ply = same_when_resumed(&turn, long(LabelRule::Votes), small, SchedulerOptions::default());
+    assert!(labels_of(&ply) > 10);
+}
+
+/// Growing photos, a budget, marks of fog, and near planes of the views, which follow from the first model.
+#[test]
+fn a_training_within_a_budget_goes_on_to_the_same_bits() {
+    let Some(turn) = device() else { return };
+    let config = TrainConfig { iterations: 60, ..budgeted() };
+    let ply = same_when_resumed(&turn, config, small, SchedulerOptions::default());
+    let folder = tempfile::tempdir().expect("a folder");
+    std::fs::write(folder.path().join("model.ply"), &ply).expect("a PLY");
+    let count = labelgs::io::read_model(folder.path().join("model.ply")).expect("a model").gaussians.len();
+    assert!(count > 600 && count <= 900, "{count} Gaussians within the budget");
     assert!(labels_of(&ply) > 10);
 }
 

@@ -33,6 +33,21 @@ pub fn config(label_rule: LabelRule) -> TrainConfig {
         label_samples: 2,
         label_rule,
         vote_every: Some(12),
+        ..TrainConfig::adc()
+    }
+}
+
+/// 45 steps of the default strategy: photos that grow, a budget, fog that is pruned, labels at full size.
+pub fn budgeted() -> TrainConfig {
+    TrainConfig {
+        iterations: 45,
+        start_size: 0.5,
+        full_size_from: Some(20),
+        densify_interval: Some(4),
+        densify_grad_threshold: 1e-5,
+        budget: 900,
+        vote_every: Some(6),
+        occlusion_every: Some(8),
         ..TrainConfig::default()
     }
 }

@@ -2,6 +2,7 @@
 
 use glam::{DMat3, DVec3};
 use labelgs::internals::cli::status::exit_status;
+use labelgs::internals::io::init::add_far_gaussians;
 use labelgs::internals::shaders::constants::exact::SH_C0;
 use labelgs::io::initial_gaussians;
 use labelgs::scene::{Camera, Dataset, Photo, Point, View};
@@ -158,4 +159,32 @@ fn no_gaussian_of_a_made_up_point_covers_a_picture() {
         }
     }
     assert!(bounded > 20, "the bound was reached {bounded} times only");
+}
+
+/// Cameras on a ring look over a ground with points at a blue sky. Only directions above all points get far Gaussians,
+/// in the colour of the sky.
+#[test]
+fn far_gaussians_stand_where_photos_look_past_the_points() {
+    let cameras = (0..12).map(|index| {
+        let angle = f64::from(index) * std::f64::consts::TAU / 12.0;
+        looking(DVec3::new(3.0 * angle.cos(), 0.5, 3.0 * angle.sin()), DVec3::ZERO)
+    });
+    let mut scene = dataset(cameras, |_, ray| if ray.y > 0.0 { [30, 60, 200] } else { [90, 80, 40] });
+    let ground = |index: i32| point(f64::from(index % 40) - 19.5, -0.2, f64::from(index / 40) - 19.5);
+    scene.points = (0..1600).map(ground).collect();
+    let first = initial_gaussians(&scene, 0, 10).expect("Gaussians");
+    let mut model = first.clone();
+    add_far_gaussians(&mut model, &scene, 2000);
+    let added = model.len() - first.len();
+    assert!(added > 20 && model.means[..first.len()] == first.means[..], "{added} far Gaussians");
+    model.check().expect("a sound model");
+    for row in first.len()..model.len() {
+        let place = model.world(row);
+        assert!(place.y > 0.0 && place.length() > 7.0, "{place}");
+        let colour = model.sh0[row].map(|value| f64::from(value) * SH_C0 + 0.5);
+        assert!((colour[2] - 200.0 / 255.0).abs() < 0.01 && colour[0] < 0.2, "{colour:?}");
+    }
+    let mut none = first.clone();
+    add_far_gaussians(&mut none, &scene, 0);
+    assert_eq!(none, first);
 }

@@ -70,8 +70,10 @@ fn densify_case(step: u32, splits_long: bool, bearing: &[&str]) {
     let mut fixture = Fixture::new(turn, scene_of(&before), true);
     let ran = Densified::new(&mut fixture, before, step, splits_long).expect("it runs");
     prove(&format!("densify at {step}"), bearing, |rules| {
-        // 0.23 of (1e-6, 1e-7) seen.
-        ran.verdict(rules, Tolerance { absolute: 3.5e-7, relative: 3.5e-8 })
+        // 0.23 of (1e-6, 1e-7) seen. The logits of opacities after long splits reach -7.5, where numbers are 4.8e-7
+        // apart; 3.9e-7 seen.
+        let absolute = if splits_long { 1e-6 } else { 3.5e-7 };
+        ran.verdict(rules, Tolerance { absolute, relative: 3.5e-8 })
     });
 }
 

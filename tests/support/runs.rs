@@ -11,6 +11,8 @@ use std::process::{Child, Output, Stdio};
 
 const SETTINGS: &str = "
 iterations = 40
+strategy = \"adc\"
+start_size = 1.0
 checkpoint_every = 4
 preview_every = 7
 label_from = 4

@@ -1,10 +1,10 @@
 //! The binary files: little-endian, fixed widths, a count in front. No memory is allocated by a count alone.
 
-use super::model::{CameraRecord, ImageRecord, NAMES, model_of};
+use super::model::{CameraRecord, ImageRecord, NAMES, Observed, model_of};
 use crate::error::{Error, Result};
 use crate::io::read;
 use crate::scene::Point;
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
 
@@ -112,26 +112,38 @@ pub(super) fn cameras(path: &Path) -> Result<Vec<CameraRecord>> {
     })
 }
 
-pub(super) fn images(path: &Path) -> Result<Vec<ImageRecord>> {
+/// Reads `images.bin`, with the observations of points if they are asked for.
+pub(super) fn images(path: &Path, with_observations: bool) -> Result<Vec<ImageRecord>> {
     Source::open(path)?.records("image", |source| {
         let id = source.u32()?;
         let (quaternion, translation) = (source.f64s()?, source.f64s()?);
         let (camera, name) = (source.u32()?, source.name()?);
         let observations = source.u64()?;
-        source.skip(observations, 24, "observations")?;
-        Ok(ImageRecord { id, quaternion, translation, camera, name })
+        let mut points = Vec::new();
+        if with_observations {
+            for _ in 0..observations {
+                let (pixel, point) = (DVec2::from_array(source.f64s()?), source.u64()?);
+                // All bits set: an image feature without a point.
+                if point != u64::MAX {
+                    points.push((pixel, point));
+                }
+            }
+        } else {
+            source.skip(observations, 24, "observations")?;
+        }
+        Ok(ImageRecord { id, quaternion, translation, camera, name, observed: Observed { points } })
     })
 }
 
-/// Reads `points3D.bin`, without the tracks.
-pub(super) fn points(path: &Path) -> Result<Vec<Point>> {
+/// Reads `points3D.bin` with the ids, without the tracks.
+pub(super) fn points(path: &Path) -> Result<Vec<(u64, Point)>> {
     Source::open(path)?.records("point", |source| {
-        source.u64()?;
+        let id = source.u64()?;
         let position = DVec3::from_array(source.f64s()?);
         let colour = source.bytes()?;
         source.f64()?;
         let track = source.u64()?;
         source.skip(track, 8, "track elements")?;
-        Ok(Point { position, colour })
+        Ok((id, Point { position, colour }))
     })
 }

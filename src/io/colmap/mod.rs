@@ -11,9 +11,9 @@ use super::listed_path::Place;
 use super::listing::{FAR, Listed, Listing, check_camera, find_file};
 use crate::error::{Error, Result};
 use crate::scene::{Camera, Point};
-use glam::{DMat3, DQuat, DVec3};
+use glam::{DMat3, DQuat, DVec2, DVec3};
 use model::{CameraRecord, ImageRecord};
-use std::collections::{HashMap, HashSet};
+use std::collections::{BTreeMap, HashMap, HashSet};
 use std::path::{Path, PathBuf};
 
 /// Folders below the scene that may hold the model, in order of preference.
@@ -42,19 +42,44 @@ pub(crate) fn list(scene: &Place) -> Result<Option<Listing>> {
     let binary = files.extension == "bin";
     let (cameras_path, images_path, points_path) = (path("cameras"), path("images"), path("points3D"));
     let cameras = if binary { binary::cameras(&cameras_path) } else { text::cameras(&cameras_path) }?;
-    let images = if binary { binary::images(&images_path) } else { text::images(&images_path) }?;
+    let images = if binary { binary::images(&images_path, false) } else { text::images(&images_path, false) }?;
     let mut notes = Vec::new();
     let points = match (points_path.is_file(), binary) {
         (false, _) => Vec::new(),
         (true, true) => binary::points(&points_path)?,
         (true, false) => text::points(&points_path)?,
     };
-    let points = finite(points, &mut notes);
+    let points = finite(points.into_iter().map(|(_, point)| point).collect(), &mut notes);
     if files.folder.ends_with("sparse/0") && files.folder.with_file_name("1").is_dir() {
         notes.push(format!("only the model {} is used; its neighbours are ignored", files.folder.display()));
     }
     let views = join(scene, &cameras_path, &cameras, &images_path, &images)?;
     Ok(Some(Listing { source: images_path, views, points, notes, ..Listing::default() }))
+}
+
+/// A point in a photo, and the same point in the world.
+pub(crate) type Seen = (DVec2, DVec3);
+
+/// Reads which points each photo of a COLMAP model shows, by name of the view; none without a model.
+pub(crate) fn observations(scene: &Place) -> Result<Option<BTreeMap<String, (Listed, Vec<Seen>)>>> {
+    let Some(files) = find(scene.root) else { return Ok(None) };
+    let path = |stem: &str| files.folder.join(stem).with_extension(files.extension);
+    let (cameras_path, images_path, points_path) = (path("cameras"), path("images"), path("points3D"));
+    if !points_path.is_file() {
+        return Ok(None);
+    }
+    let (cameras, images, points) = match files.extension {
+        "bin" => (binary::cameras(&cameras_path)?, binary::images(&images_path, true)?, binary::points(&points_path)?),
+        _ => (text::cameras(&cameras_path)?, text::images(&images_path, true)?, text::points(&points_path)?),
+    };
+    let places: HashMap<u64, DVec3> = points.into_iter().map(|(id, point)| (id, point.position)).collect();
+    let views = join(scene, &cameras_path, &cameras, &images_path, &images)?;
+    let seen = |(listed, image): (Listed, ImageRecord)| {
+        let points = image.observed.points.into_iter();
+        let points = points.filter_map(|(pixel, id)| Some((pixel, *places.get(&id)?))).collect();
+        (listed.name.clone(), (listed, points))
+    };
+    Ok(Some(views.into_iter().zip(images).map(seen).collect()))
 }
 
 fn finite(mut points: Vec<Point>, notes: &mut Vec<String>) -> Vec<Point> {

@@ -3,7 +3,7 @@
 use crate::error::{Error, Result};
 use crate::io::lens::{self, CameraModel, Lens};
 use crate::scene::Camera;
-use glam::{DMat3, DVec3};
+use glam::{DMat3, DVec2, DVec3};
 use std::path::Path;
 
 /// Names of the camera models; the index is COLMAP's number.
@@ -31,7 +31,13 @@ pub(super) struct CameraRecord {
     pub(super) parameters: Vec<f64>,
 }
 
-/// A line of `images`, without its observations.
+/// Points of a reconstruction as its images show them.
+pub(crate) struct Observed {
+    /// Position in the photo, px, and id of the point.
+    pub(crate) points: Vec<(DVec2, u64)>,
+}
+
+/// A line of `images`.
 pub(super) struct ImageRecord {
     pub(super) id: u32,
     /// Camera-from-world rotation, (w, x, y, z).
@@ -39,6 +45,8 @@ pub(super) struct ImageRecord {
     pub(super) translation: [f64; 3],
     pub(super) camera: u32,
     pub(super) name: String,
+    /// Empty unless asked for.
+    pub(super) observed: Observed,
 }
 
 /// Returns the camera model of one of [`NAMES`]. Refuses models that cannot be undistorted to a pinhole.

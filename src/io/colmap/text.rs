@@ -1,10 +1,10 @@
 //! The text files: one record per line; `#` starts a comment.
 
-use super::model::{CameraRecord, ImageRecord, NAMES, model_of};
+use super::model::{CameraRecord, ImageRecord, NAMES, Observed, model_of};
 use crate::error::{Error, Result};
 use crate::io::read;
 use crate::scene::Point;
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 use std::io::BufRead;
 use std::path::Path;
 use std::str::FromStr;
@@ -95,7 +95,7 @@ pub(super) fn cameras(path: &Path) -> Result<Vec<CameraRecord>> {
 }
 
 /// Reads `images.txt`: two lines per image, the second with its observations, possibly empty.
-pub(super) fn images(path: &Path) -> Result<Vec<ImageRecord>> {
+pub(super) fn images(path: &Path, with_observations: bool) -> Result<Vec<ImageRecord>> {
     let mut all = Vec::new();
     let mut lines = lines(path)?;
     while let Some(line) = lines.next() {
@@ -112,23 +112,31 @@ pub(super) fn images(path: &Path) -> Result<Vec<ImageRecord>> {
         if name.is_empty() {
             return Err(words.error("the line ends where the image name is expected"));
         }
-        all.push(ImageRecord { id, quaternion, translation, camera, name });
+        let mut observed = Observed { points: Vec::new() };
         if let Some(observations) = lines.next() {
-            observations?;
+            let (number, line) = observations?;
+            let mut words = Words { path, number, rest: line.trim() };
+            while with_observations && !words.rest.trim().is_empty() {
+                let pixel = DVec2::from_array(words.numbers("position in the photo")?);
+                let point: i64 = words.number("point id")?;
+                // -1: an image feature without a point.
+                observed.points.extend(u64::try_from(point).ok().map(|point| (pixel, point)));
+            }
         }
+        all.push(ImageRecord { id, quaternion, translation, camera, name, observed });
     }
     Ok(all)
 }
 
-/// Reads `points3D.txt`, without the tracks.
-pub(super) fn points(path: &Path) -> Result<Vec<Point>> {
+/// Reads `points3D.txt` with the ids, without the tracks.
+pub(super) fn points(path: &Path) -> Result<Vec<(u64, Point)>> {
     records(path, |mut words| {
-        words.word("a point id")?;
+        let id = words.number("point id")?;
         let position = DVec3::from_array(words.numbers("coordinate")?);
         let mut colour = [0u8; 3];
         for value in &mut colour {
             *value = words.number("colour from 0 to 255")?;
         }
-        Ok(Point { position, colour })
+        Ok((id, Point { position, colour }))
     })
 }

@@ -54,7 +54,7 @@ pub fn initial_gaussians(dataset: &Dataset, seed: u64, count_if_no_points: usize
 
 /// Adds far Gaussians to the initial ones where photos look past all points of the scene, such as at the sky:
 /// `directions` are tried. A scene without points has none, because its random points lie at all depths.
-pub(crate) fn add_far_gaussians(model: &mut Gaussians, dataset: &Dataset, directions: u32) {
+pub fn add_far_gaussians(model: &mut Gaussians, dataset: &Dataset, directions: u32) {
     if dataset.points.len() < POINTS_MIN {
         return;
     }

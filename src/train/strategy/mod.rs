@@ -21,7 +21,7 @@ use std::fmt::Debug;
 use std::sync::Arc;
 
 /// Makes the strategy of a configuration.
-pub(crate) fn of(kind: StrategyKind) -> Box<dyn Strategy> {
+pub fn of(kind: StrategyKind) -> Box<dyn Strategy> {
     match kind {
         StrategyKind::Budget => Box::new(BudgetStrategy::default()),
         StrategyKind::Adc => Box::new(AdcStrategy),

@@ -210,9 +210,12 @@ pub fn dominant(seed: u64) -> Scene {
     s
 }
 
-/// A scene in which some Gaussians are before the near plane of [`Fog`], and some engulf the camera.
+/// A scene in which some Gaussians are before the near plane of [`Fog`], and some engulf the camera. Its step runs twice,
+/// because its pairs need more room.
 pub fn large(seed: u64) -> Scene {
-    scene(seed, &Shape { gaussians: 400, scales: (0.2, 5.0), ..Shape::default() })
+    let mut scene = scene(seed, &Shape { gaussians: 1500, scales: (0.2, 5.0), ..Shape::default() });
+    scene.gaussians.means.iter_mut().for_each(|mean| *mean = mean.map(|value| 2.5 * value));
+    scene
 }
 
 /// A finished step with the pass that marks Gaussians that fog its camera.
@@ -231,7 +234,7 @@ impl Fog {
         let count = fixture.scene.gaussians.len();
         fixture.view.near = Self::NEAR;
         fixture.input.update = true;
-        fixture.engine.set_extension(BudgetStrategy::default().extension());
+        fixture.engine.set_extension(BudgetStrategy::default().extension(), 1);
         let ListKey::Train(variant) = fixture.key() else {
             return Err(Error::Bug("the key of a step is that of another list".to_owned()));
         };

@@ -1,0 +1,67 @@
+//! `labelgs check`: faults of a capture before training.
+
+use super::args::{JsonFlag, ReadArgs};
+use super::context::Context;
+use super::stdout;
+use crate::io::capture::{Fault, Report, scan};
+use crate::io::{self, LoadOptions};
+use crate::{Error, Result};
+use clap::Args;
+use serde_json::json;
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+/// `labelgs check`.
+#[derive(Args, Clone, Debug)]
+pub struct CheckArgs {
+    /// Folder of the scene (COLMAP or transforms.json), or one .json file.
+    #[arg(value_name = "SCENE")]
+    pub scene: PathBuf,
+    /// Tolerance for the scene.
+    #[command(flatten)]
+    pub read: ReadArgs,
+    /// JSON.
+    #[command(flatten)]
+    pub json: JsonFlag,
+}
+
+/// Prints what the scan finds. Fails if it finds a fault.
+pub(crate) fn run(args: &CheckArgs, context: &Context) -> Result<()> {
+    let options = LoadOptions { test_every: None, ..LoadOptions::default() };
+    let dataset = io::open_logged(&args.scene, &args.read.into_options(options))?;
+    let report = scan(&args.scene, &dataset)?;
+    let mut counts: BTreeMap<Fault, usize> = BTreeMap::new();
+    report.findings.iter().for_each(|finding| *counts.entry(finding.fault).or_default() += 1);
+    if context.json || args.json.json {
+        let scene = args.scene.display().to_string();
+        stdout::print_json(&json!({ "schema_version": 1, "scene": scene, "counts": counts, "report": report }))?;
+    } else {
+        stdout::print(&table(&report))?;
+    }
+    if report.findings.is_empty() {
+        return Ok(());
+    }
+    let counts: Vec<String> = counts.iter().map(|(fault, count)| format!("{count} {}", fault.text())).collect();
+    Err(Error::Check(format!("{}: {}", args.scene.display(), counts.join(", "))))
+}
+
+fn table(report: &Report) -> String {
+    let number = |value: Option<f64>| value.map_or("unknown".to_owned(), |value| format!("{value:.2}"));
+    let mut text = format!(
+        "{} photos, {} points, extent {:.3}; reprojection error {} px, brightest photo / darkest {}\n",
+        report.views.len(),
+        report.points,
+        report.extent,
+        number(report.reprojection),
+        number(report.gain_spread)
+    );
+    if report.findings.is_empty() {
+        return text + "nothing found\n";
+    }
+    text += &format!("{:>12} {:>20}  what\n", "fault", "photo");
+    for finding in &report.findings {
+        let view = finding.view.as_deref().unwrap_or("-");
+        text += &format!("{:>12} {view:>20}  {}; {}\n", finding.fault.text(), finding.text, finding.cure);
+    }
+    text
+}

@@ -1,0 +1,149 @@
+//! Scans a capture for what spoils a training: wrong poses, blurred photos, changing exposure, photos without
+//! neighbours, an odd scale. Each finding names its cure.
+
+mod neighbours;
+mod photos;
+mod poses;
+
+use super::listed_path::Place;
+use super::{colmap, folder_of};
+use crate::error::Result;
+use crate::scene::{Dataset, View};
+use serde::Serialize;
+use std::path::Path;
+
+/// A kind of fault in a capture.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Fault {
+    /// Points are far from where the photo shows them.
+    Reprojection,
+    /// The photo is less sharp than those beside it.
+    Blur,
+    /// The photo is brighter or darker than others that show the same points.
+    Exposure,
+    /// Hardly any point of the photo is seen by others.
+    Alone,
+    /// Sizes or distances that training cannot handle well.
+    Scale,
+}
+
+impl Fault {
+    /// Returns the display name.
+    pub fn text(self) -> &'static str {
+        match self {
+            Self::Reprojection => "reprojection",
+            Self::Blur => "blur",
+            Self::Exposure => "exposure",
+            Self::Alone => "alone",
+            Self::Scale => "scale",
+        }
+    }
+
+    /// Returns what to do about it.
+    pub fn cure(self) -> &'static str {
+        match self {
+            Self::Reprojection => "leave the photo out, or adjust the reconstruction again",
+            Self::Blur => "leave the photo out",
+            Self::Exposure => "take photos with fixed exposure and white balance, or equalise them",
+            Self::Alone => "leave the photo out, or add photos between it and the others",
+            Self::Scale => "scale and centre the reconstruction, or remove stray points",
+        }
+    }
+}
+
+/// A fault of a capture.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Finding {
+    /// Kind.
+    pub fault: Fault,
+    /// Name of the photo, if the fault is that of one.
+    pub view: Option<String>,
+    /// Description with numbers.
+    pub text: String,
+    /// What to do about it.
+    pub cure: &'static str,
+}
+
+impl Finding {
+    fn new(fault: Fault, view: Option<&str>, text: String) -> Self {
+        Self { fault, view: view.map(str::to_owned), text, cure: fault.cure() }
+    }
+}
+
+/// What a scan measures of a photo.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct ViewReport {
+    /// Name of the photo.
+    pub name: String,
+    /// Points that it shows.
+    pub points: usize,
+    /// Points that it shows and at least two others show too.
+    pub shared: usize,
+    /// Median distance of its points from where the photo shows them, px; none without observations.
+    pub reprojection: Option<f64>,
+    /// Sharpness relative to the photos beside it; none without a photo.
+    pub sharpness: Option<f64>,
+    /// Brightness relative to the photos that show the same points: the median factor; none without shared points.
+    pub gain: Option<f64>,
+}
+
+/// The result of a scan.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Report {
+    /// Radius of the cameras around their mean, times 1.1, world units.
+    pub extent: f64,
+    /// Points of the reconstruction.
+    pub points: usize,
+    /// Median of the photos' reprojection errors, px.
+    pub reprojection: Option<f64>,
+    /// Largest gain of a photo over the smallest.
+    pub gain_spread: Option<f64>,
+    /// All photos, by name.
+    pub views: Vec<ViewReport>,
+    /// Faults, by kind and photo.
+    pub findings: Vec<Finding>,
+}
+
+/// Scans a scene that was read with its photos.
+pub fn scan(scene: &Path, dataset: &Dataset) -> Result<Report> {
+    // Opening the scene has checked its paths.
+    let observed = colmap::observations(&Place::new(folder_of(scene), true))?.unwrap_or_default();
+    let views: Vec<&View> = dataset.all();
+    let seen = neighbours::seen(&views, &dataset.points, &observed);
+    let shared = neighbours::shared(&seen, dataset.points.len());
+    let errors: Vec<Option<f64>> = views.iter().map(|view| observed.get(&view.name).and_then(poses::error)).collect();
+    let sharpness = photos::sharpness(&views);
+    let gains = photos::gains(&views, &seen, &dataset.points);
+    let reports: Vec<ViewReport> = (0..views.len())
+        .map(|index| ViewReport {
+            name: views[index].name.clone(),
+            points: seen[index].len(),
+            shared: shared[index],
+            reprojection: errors[index],
+            sharpness: sharpness[index],
+            gain: gains[index],
+        })
+        .collect();
+    let mut findings = poses::findings(&reports);
+    findings.extend(photos::findings(&reports));
+    findings.extend(neighbours::findings(&reports, dataset.points.len()));
+    findings.extend(poses::scale(dataset));
+    findings.sort_by(|a, b| (a.fault, &a.view).cmp(&(b.fault, &b.view)));
+    let known = || reports.iter().filter_map(|view| view.gain);
+    let (least, most) = (known().fold(f64::INFINITY, f64::min), known().fold(0.0, f64::max));
+    Ok(Report {
+        extent: dataset.extent(),
+        points: dataset.points.len(),
+        reprojection: median(errors.into_iter().flatten()),
+        gain_spread: (most > 0.0).then(|| most / least),
+        views: reports,
+        findings,
+    })
+}
+
+fn median(values: impl Iterator<Item = f64>) -> Option<f64> {
+    let mut sorted: Vec<f64> = values.filter(|value| value.is_finite()).collect();
+    sorted.sort_by(f64::total_cmp);
+    sorted.get(sorted.len() / 2).copied()
+}

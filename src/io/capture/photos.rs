@@ -1,0 +1,105 @@
+//! Sharpness and brightness of photos, by comparison with others.
+
+use super::{Fault, Finding, ViewReport, median};
+use crate::io::resample::{bounded_size, shrink_photo};
+use crate::scene::{Photo, Point, View};
+use glam::DVec2;
+use rayon::prelude::*;
+
+/// Longest side of the photos that are compared, px: noise of sensors is gone at this size.
+const LONGEST: u32 = 800;
+/// Photos that a photo's sharpness is compared with, the nearest by place.
+const BESIDE: usize = 6;
+/// Sharpness relative to theirs below which a photo is blurred.
+const BLURRED: f64 = 0.4;
+/// Brightness relative to the others, up or down, from which a photo's exposure differs.
+const GAIN: f64 = 1.15;
+/// Fewest shared points for a gain.
+const POINTS_MIN: usize = 30;
+/// Pixels darker or brighter than these say nothing about exposure.
+const DARK: f64 = 0.04;
+const BRIGHT: f64 = 0.95;
+
+fn grey([r, g, b, _]: [u8; 4]) -> f64 {
+    (0.299 * f64::from(r) + 0.587 * f64::from(g) + 0.114 * f64::from(b)) / 255.0
+}
+
+/// Mean square of the Laplacian over that of the brightness: fine detail at any exposure.
+fn detail(photo: &Photo) -> f64 {
+    let (width, height) = bounded_size((photo.width, photo.height), Some(LONGEST));
+    let small = shrink_photo(photo, width, height);
+    let (width, height) = (width as usize, height as usize);
+    let at = |x: usize, y: usize| grey(small.rgba[y * width + x]);
+    let (mut sum, mut light, mut count) = (0.0, 0.0, 0.0);
+    for y in 1..height.saturating_sub(1) {
+        for x in 1..width.saturating_sub(1) {
+            let around = at(x - 1, y) + at(x + 1, y) + at(x, y - 1) + at(x, y + 1);
+            sum += (around - 4.0 * at(x, y)).powi(2);
+            light += at(x, y).powi(2);
+            count += 1.0;
+        }
+    }
+    if count > 0.0 && light > 0.0 { sum / light } else { f64::NAN }
+}
+
+/// Returns the sharpness of each photo relative to the photos beside it.
+pub(super) fn sharpness(views: &[&View]) -> Vec<Option<f64>> {
+    let details: Vec<Option<f64>> =
+        views.par_iter().map(|view| view.photo.as_deref().map(detail).filter(|value| value.is_finite())).collect();
+    let relative = |(index, view): (usize, &&View)| {
+        let mut near: Vec<(f64, f64)> = views
+            .iter()
+            .zip(&details)
+            .enumerate()
+            .filter(|(other, _)| *other != index)
+            .filter_map(|(_, (other, detail))| Some((other.camera.centre().distance(view.camera.centre()), (*detail)?)))
+            .collect();
+        near.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let usual = median(near.iter().take(BESIDE).map(|&(_, detail)| detail))?;
+        // The square root: half is half the contrast of fine detail.
+        (usual > 0.0).then_some((details[index]? / usual).sqrt())
+    };
+    views.iter().enumerate().map(relative).collect()
+}
+
+/// Returns the brightness of each photo relative to the others at the points that it shares with them.
+pub(super) fn gains(views: &[&View], seen: &[Vec<(usize, DVec2)>], points: &[Point]) -> Vec<Option<f64>> {
+    let sample = |view: &View, pixel: DVec2| {
+        let photo = view.photo.as_deref()?;
+        let (x, y) = ((pixel.x as u32).min(photo.width - 1), (pixel.y as u32).min(photo.height - 1));
+        let texel = photo.rgba[(y * photo.width + x) as usize];
+        Some(grey(texel)).filter(|value| texel[3] == 255 && (DARK..=BRIGHT).contains(value))
+    };
+    let samples: Vec<Vec<(usize, f64)>> = views
+        .par_iter()
+        .zip(seen)
+        .map(|(view, seen)| seen.iter().filter_map(|&(index, pixel)| Some((index, sample(view, pixel)?))).collect())
+        .collect();
+    let mut of_point: Vec<Vec<f64>> = vec![Vec::new(); points.len()];
+    samples.iter().flatten().for_each(|&(index, value)| of_point[index].push(value));
+    let usual: Vec<Option<f64>> = of_point
+        .into_par_iter()
+        .map(|values| if values.len() >= 3 { median(values.into_iter()) } else { None })
+        .collect();
+    let gain = |samples: &Vec<(usize, f64)>| {
+        let ratios: Vec<f64> = samples.iter().filter_map(|&(index, value)| Some(value / usual[index]?)).collect();
+        if ratios.len() >= POINTS_MIN { median(ratios.into_iter()) } else { None }
+    };
+    samples.iter().map(gain).collect()
+}
+
+/// Finds blurred photos, and photos with another exposure.
+pub(super) fn findings(views: &[ViewReport]) -> Vec<Finding> {
+    let mut found = Vec::new();
+    for view in views {
+        if let Some(sharpness) = view.sharpness.filter(|&sharpness| sharpness < BLURRED) {
+            let text = format!("has {:.0} % of the fine detail of the photos beside it", 100.0 * sharpness);
+            found.push(Finding::new(Fault::Blur, Some(&view.name), text));
+        }
+        if let Some(gain) = view.gain.filter(|&gain| !(1.0 / GAIN..=GAIN).contains(&gain)) {
+            let text = format!("is {gain:.2} times as bright as other photos of the same points");
+            found.push(Finding::new(Fault::Exposure, Some(&view.name), text));
+        }
+    }
+    found
+}
