@@ -119,7 +119,9 @@ fn marks_of_fog_equal_their_mirror() {
     let Some(turn) = device() else { return };
     let mut fixture = Fixture::new(turn, large(63), false);
     let ran = Fog::new(&mut fixture).expect("it runs");
-    prove("fog", &["free_size", "jacobian_margin"], |rules| ran.verdict(rules));
+    prove("fog", &["free_size"], |rules| ran.verdict(rules));
+    let narrow = Rules { jacobian_margin: 0.1, ..Rules::default() };
+    assert!(ran.verdict(&narrow).is_err(), "the margin beyond the image matters");
 }
 
 #[test]

@@ -213,7 +213,7 @@ pub fn dominant(seed: u64) -> Scene {
 /// A scene in which some Gaussians are before the near plane of [`Fog`], and some engulf the camera. Its step runs twice,
 /// because its pairs need more room.
 pub fn large(seed: u64) -> Scene {
-    let mut scene = scene(seed, &Shape { gaussians: 1500, scales: (0.2, 5.0), ..Shape::default() });
+    let mut scene = scene(seed, &Shape { gaussians: 3000, scales: (0.02, 5.0), ..Shape::default() });
     scene.gaussians.means.iter_mut().for_each(|mean| *mean = mean.map(|value| 2.5 * value));
     scene
 }
