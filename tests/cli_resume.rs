@@ -143,11 +143,16 @@ fn a_resumed_run_says_what_changed_and_what_cannot() {
     let text = succeeded(&place.trained("out", &["--resume", "-q"]));
     assert!(!text.contains("now"), "what was changed is in the new checkpoint: {text}");
 
-    // Settings without a near plane keep the near plane of the checkpoint.
-    let near = || TrainState::read(&place.checkpoints("out")[0].path).expect("a whole one").config.near;
-    let decided = near();
-    let text = succeeded(&place.trained("out", &["--resume", "--config", &place.settings(), "--iterations", "10"]));
-    assert!(decided > 0.0 && near() == decided && !text.contains("--near"), "{decided}, {}: {text}", near());
+    // Settings without a near plane or a budget keep those of the checkpoint.
+    let decided = || {
+        let config = TrainState::read(&place.checkpoints("out")[0].path).expect("a whole one").config;
+        (config.near, config.budget)
+    };
+    let before = decided();
+    std::fs::write(place.path("few.toml"), "iterations = 10\n").expect("settings");
+    let text = succeeded(&place.trained("out", &["--resume", "--config", &place.text("few.toml")]));
+    assert!(before.0 > 0.0 && before.1 > 0 && decided() == before, "{before:?}, {:?}: {text}", decided());
+    assert!(!text.contains("--near") && !text.contains("--budget"), "{text}");
 
     // Masks that differ from the run's are refused.
     std::fs::rename(place.path("scene/masks"), place.path("masks")).expect("moved");
@@ -194,7 +199,9 @@ fn masks_without_objects_are_resumed_like_others() {
     for mask in files(&place.path("scene/masks")).iter().filter(|path| path.extension().is_some_and(|e| e == "png")) {
         image::GrayImage::new(64, 48).save(mask).expect("a mask");
     }
-    let flags = ["--checkpoint-every", "2", "--label-from", "2"];
+    // Schedules that do not depend on the length of the run.
+    let schedule = ["--strategy", "adc", "--start-size", "1", "--rate-final", "1", "--sh-degree-interval", "9"];
+    let flags = [&["--checkpoint-every", "2", "--label-from", "2"][..], &schedule].concat();
     succeeded(&place.trained("straight", &[&flags[..], &["--iterations", "8"]].concat()));
     succeeded(&place.trained("out", &[&flags[..], &["--iterations", "4"]].concat()));
     let text = succeeded(&place.trained("out", &["--resume", "--iterations", "8"]));

@@ -64,9 +64,12 @@ fn decide(request: &Request, changed: &Changed, mut resumed: Resumed) -> Result<
     let then = &resumed.settings;
     let mut wanted = changed(Some(then))?;
     wanted.check()?;
+    // Automatic values were decided when the run began.
     if wanted.train.near == 0.0 {
-        // The automatic value was decided when the run began.
         wanted.train.near = then.train.near;
+    }
+    if wanted.train.budget == 0 {
+        wanted.train.budget = then.train.budget;
     }
     compare(then, &wanted)?;
     if wanted.train.iterations < resumed.state.step {
