@@ -106,14 +106,7 @@ impl Witnesses {
 
 /// Returns true if the point is in the picture and nothing of the model is in front of it.
 fn sees(camera: &Camera, depths: &[f32], world: DVec3) -> bool {
-    let place = camera.to_camera(world);
-    let pixel = camera.project(place);
-    let inside = place.z > 0.0
-        && (0.0..f64::from(camera.width)).contains(&pixel.x)
-        && (0.0..f64::from(camera.height)).contains(&pixel.y);
-    if !inside {
-        return false;
-    }
+    let Some(pixel) = camera.sees(world) else { return false };
     let depth = f64::from(depths[pixel.y as usize * camera.width as usize + pixel.x as usize]);
-    depth <= 0.0 || depth >= DEPTH_SHARE * place.z
+    depth <= 0.0 || depth >= DEPTH_SHARE * camera.to_camera(world).z
 }

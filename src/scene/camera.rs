@@ -47,6 +47,16 @@ impl Camera {
         DVec2::new(self.fx * camera.x / camera.z + self.cx, self.fy * camera.y / camera.z + self.cy)
     }
 
+    /// Returns the position of a world point in the image, px, if it is in the image.
+    pub fn sees(&self, world: DVec3) -> Option<DVec2> {
+        let at = self.to_camera(world);
+        let pixel = self.project(at);
+        let inside = at.z > 0.0
+            && (0.0..f64::from(self.width)).contains(&pixel.x)
+            && (0.0..f64::from(self.height)).contains(&pixel.y);
+        inside.then_some(pixel)
+    }
+
     /// Returns the camera for an image resized to `width` x `height` px.
     pub fn resized(&self, width: u32, height: u32) -> Self {
         let (sx, sy) = (f64::from(width) / f64::from(self.width), f64::from(height) / f64::from(self.height));

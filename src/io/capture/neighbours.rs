@@ -27,14 +27,7 @@ pub(super) fn seen(
         points.iter().enumerate().map(|(index, point)| (key(point.position), index)).collect();
     let of_view = |view: &&View| {
         let camera = &view.camera;
-        let inside = |index: usize| {
-            let place = camera.to_camera(points[index].position);
-            let pixel = camera.project(place);
-            let is_inside = place.z > 0.0
-                && (0.0..f64::from(camera.width)).contains(&pixel.x)
-                && (0.0..f64::from(camera.height)).contains(&pixel.y);
-            is_inside.then_some((index, pixel))
-        };
+        let inside = |index: usize| Some((index, camera.sees(points[index].position)?));
         match observed.get(&view.name).filter(|(_, seen)| !seen.is_empty()) {
             Some((_, seen)) => seen.iter().filter_map(|(_, world)| inside(*index.get(&key(*world))?)).collect(),
             None => (0..points.len()).filter_map(inside).collect(),

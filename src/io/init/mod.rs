@@ -74,7 +74,7 @@ pub fn add_far_gaussians(model: &mut Gaussians, dataset: &Dataset, directions: u
 
 /// Refuses a scene in which no camera sees a point: nothing would be drawn or learnt.
 fn check_seen(dataset: &Dataset) -> Result<()> {
-    let seen = |point: &Point| dataset.train.iter().any(|view| region::sees(&view.camera, point.position).is_some());
+    let seen = |point: &Point| dataset.train.iter().any(|view| view.camera.sees(point.position).is_some());
     if dataset.train.is_empty() || dataset.points.par_iter().any(seen) {
         return Ok(());
     }

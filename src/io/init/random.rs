@@ -110,7 +110,7 @@ impl Test<'_> {
     fn judge(&self, point: Point) -> Option<Point> {
         let (mut seen, mut coloured, mut free, mut sum) = (0, 0u32, 0, [0u32; 3]);
         for view in self.views {
-            let Some(pixel) = region::sees(&view.camera, point.position) else { continue };
+            let Some(pixel) = view.camera.sees(point.position) else { continue };
             seen += 1;
             let Some(texel) = view.photo.as_ref().and_then(|photo| texel(photo, pixel)) else { continue };
             coloured += 1;

@@ -35,22 +35,12 @@ impl Region {
     }
 }
 
-/// Returns the pixel of `camera` at which `point` appears, if it is in the image.
-pub(super) fn sees(camera: &Camera, point: DVec3) -> Option<DVec2> {
-    let at = camera.to_camera(point);
-    let pixel = camera.project(at);
-    let inside = at.z > 0.0
-        && (0.0..f64::from(camera.width)).contains(&pixel.x)
-        && (0.0..f64::from(camera.height)).contains(&pixel.y);
-    inside.then_some(pixel)
-}
-
 /// Returns the smallest extent of the longer image side at `point` over all views that see it, world units; infinite if
 /// none does.
 pub(super) fn image_side(views: &[View], point: DVec3) -> f64 {
     let side = |camera: &Camera| {
         let sizes = DVec2::new(f64::from(camera.width) / camera.fx, f64::from(camera.height) / camera.fy);
-        sees(camera, point).map(|_| camera.to_camera(point).z * sizes.max_element())
+        camera.sees(point).map(|_| camera.to_camera(point).z * sizes.max_element())
     };
     views.iter().filter_map(|view| side(&view.camera)).fold(f64::INFINITY, f64::min)
 }
@@ -82,7 +72,7 @@ fn median(mut values: Vec<f64>) -> f64 {
 pub(super) fn find(views: &[View], extent: f64) -> Region {
     let cameras: Vec<&Camera> = views.iter().map(|view| &view.camera).collect();
     if let Some(centre) = nearest_to_axes(&cameras) {
-        let inward = cameras.iter().filter(|camera| sees(camera, centre).is_some()).count();
+        let inward = cameras.iter().filter(|camera| camera.sees(centre).is_some()).count();
         let radius = median(cameras.iter().map(|c| c.centre().distance(centre) * narrow_sine(c)).collect());
         let distance = median(cameras.iter().map(|c| c.centre().distance(centre)).collect());
         // Rotating cameras at one place differ only by rounding errors, which give no distance.

@@ -2,7 +2,6 @@
 //!
 //! Without them nothing stands for what is far away, and training puts Gaussians right before the cameras instead.
 
-use super::region::sees;
 use crate::io::init::texel::texel;
 use crate::scene::{Camera, Dataset, Point, View};
 use glam::{DVec2, DVec3};
@@ -31,7 +30,7 @@ impl Covered {
         let count = |side: u32| (side * CELLS).div_ceil(longest).max(1);
         let (columns, rows) = (count(camera.width), count(camera.height));
         let mut covered = Self { columns, rows, cells: vec![false; (columns * rows) as usize] };
-        for pixel in points.iter().filter_map(|point| sees(camera, point.position)) {
+        for pixel in points.iter().filter_map(|point| camera.sees(point.position)) {
             let (x, y) = covered.cell(camera, pixel);
             covered.cells[(y * columns + x) as usize] = true;
         }
@@ -71,7 +70,7 @@ pub(super) fn points(dataset: &Dataset, count: usize) -> (Vec<Point>, f64) {
         let position = centre + radius * DVec3::new(width * angle.cos(), height, width * angle.sin());
         let (mut past, mut colours) = (0, Vec::new());
         for (view, covered) in views.iter().zip(&covered) {
-            let Some(pixel) = sees(&view.camera, position) else { continue };
+            let Some(pixel) = view.camera.sees(position) else { continue };
             let Some(colour) = view.photo.as_ref().and_then(|photo| texel(photo, pixel)) else { continue };
             past += usize::from(!covered.is_covered(&view.camera, pixel));
             colours.push(colour);

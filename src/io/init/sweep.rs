@@ -3,7 +3,7 @@
 //! It is a plane sweep without windows or smoothing. Most points end up near a surface, which is enough for the first
 //! Gaussians: training moves or removes the others.
 
-use super::region::{sees, unproject};
+use super::region::unproject;
 use super::texel::texel;
 use crate::io::resample::{bounded_size, shrink_photo};
 use crate::scene::{Camera, Photo, Point, View};
@@ -90,7 +90,7 @@ impl Sweep {
         // Start at the own photo, so that the compared photos vary evenly.
         let compared = (own % step..self.photos.len()).step_by(step).filter(|&index| index != own);
         for (camera, photo) in compared.map(|index| &self.photos[index]) {
-            let Some(texel) = sees(camera, point.position).and_then(|pixel| texel(photo, pixel)) else { continue };
+            let Some(texel) = camera.sees(point.position).and_then(|pixel| texel(photo, pixel)) else { continue };
             let difference: u32 = (0..3).map(|c| u32::from(texel[c].abs_diff(point.colour[c]))).sum();
             sum += difference.min(UNRELATED);
             seen += 1;
