@@ -96,7 +96,7 @@ pub mod io {
         };
     }
     pub mod init {
-        pub use crate::io::init::{RANDOM_COUNT, add_far_gaussians, initial_gaussians};
+        pub use crate::io::init::{add_far_gaussians, initial_gaussians};
     }
     pub mod label_table {
         pub use crate::io::label_table::FILE;
@@ -155,7 +155,7 @@ pub mod pass {
     pub use crate::pass::separate_step;
     pub use crate::pass::{
         Builder, Extension, Hook, KernelShape, Stage, Variant, densify_apply, densify_count, extended_step,
-        opacity_reset, render_view, training_step, vote_view,
+        opacity_reset, relocate_apply, relocate_count, render_view, training_step, vote_view,
     };
     pub mod build {
         pub use crate::pass::build::Count;
@@ -205,7 +205,7 @@ pub mod synth {
 pub mod train {
     pub use crate::train::setup::{TrainerOptions, engine_size};
     pub use crate::train::state::TrainState;
-    pub use crate::train::{StepReport, Trainer};
+    pub use crate::train::{StepReport, Trainer, first_model};
     pub mod shared {
         pub use crate::train::shared::{SharedLayout, SharedParameters};
     }

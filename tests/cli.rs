@@ -89,13 +89,12 @@ fn every_setting_has_a_flag_with_its_default() {
     let help = text(&labelgs(&["train", "--help"]).stdout);
     // Lines of the help are wrapped, so compare without line breaks.
     let help = help.split_whitespace().collect::<Vec<_>>().join(" ");
-    for default in ["[default: 15000]", "[default: 0.6]", "[default: 0.00016]", "[default: rendered]", "[default: on]"]
-    {
+    for default in ["[default: 7000]", "[default: 0.6]", "[default: 0.00016]", "[default: rendered]", "[default: on]"] {
         assert!(help.contains(default), "{default} is not in\n{help}");
     }
     assert!(
         help.contains(
-            "where ours differ: --start-size 1.0 --full-size-from 0 --strategy adc --free-space off --far-points 0"
+            "where ours differ: --iterations 15000 --start-size 1.0 --full-size-from 0 --strategy adc --free-space off --far-points 0"
         ) && help.contains("--label-rule main")
             && help.contains("--densify-until 40000 --densify-interval 100 --opacity-reset-interval 3000"),
         "{help}"
@@ -180,7 +179,7 @@ fn a_flag_has_one_heading() {
 }
 
 /// A value other than the default for each setting.
-const TYPED: [(&str, &str); 52] = [
+const TYPED: [(&str, &str); 55] = [
     ("--iterations", "7"),
     ("--max-resolution", "99"),
     ("--start-size", "0.7"),
@@ -221,6 +220,9 @@ const TYPED: [(&str, &str); 52] = [
     ("--opacity-lr", "0.3"),
     ("--scaling-lr", "0.4"),
     ("--rotation-lr", "0.5"),
+    ("--opacity-weight", "0.02"),
+    ("--scale-weight", "0.03"),
+    ("--detail", "0.25"),
     ("--densify-from", "1"),
     ("--densify-until", "2"),
     ("--densify-interval", "3"),
@@ -249,6 +251,21 @@ fn every_setting_follows_its_flag() {
     assert_eq!(train(&["--no-test"]).expect("decided").read.test_every, 0);
     assert_eq!(train(&["--background", "white"]).expect("decided").train.background, [1.0; 3]);
     assert_eq!(train(&[]).expect("decided"), Settings::default());
+}
+
+#[test]
+fn presets_decide_length_and_detail_and_flags_override_them() {
+    let of = |flags: &[&str]| train(flags).expect("decided").train;
+    let short = of(&["--preset", "draft", "--budget", "9k"]);
+    assert_eq!((short.iterations, short.budget), (2000, 9000));
+    assert_eq!(train(&["--preset", "standard"]).expect("decided"), Settings::default());
+    let long = of(&["--preset", "best"]);
+    assert!(long.iterations == 30_000 && long.detail > of(&[]).detail);
+    assert_eq!(of(&["--preset", "best", "--iterations", "500"]).iterations, 500);
+    for other in [&["--paper"][..], &["--config", "settings.toml"]] {
+        let line = ["labelgs", "train", "scene", "-o", "out", "--preset", "draft"].iter().chain(other);
+        assert!(Cli::try_parse_from(line).is_err(), "{other:?}");
+    }
 }
 
 #[test]

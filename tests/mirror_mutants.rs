@@ -5,6 +5,7 @@ use crate::reference::adam::{Optimised, Rates, adam};
 use crate::reference::densify::{densify, is_near, opacity_reset};
 use crate::reference::lift::{Masks, centres_of, lift};
 use crate::reference::model::ROW_FLOATS;
+use crate::reference::relocate::{explored, relocate};
 use crate::reference::rules::{Family, mutants};
 use crate::reference::step::{splats_of, step};
 use crate::reference::{Model, Row, Rules};
@@ -45,7 +46,12 @@ fn outcome(family: Family, rules: &Rules, (s, model): &(Scene, Model)) -> Vec<f6
         }
         Family::FreeSpace => {
             let s = large(41);
-            s.model().rows.iter().map(|row| f64::from(u8::from(is_near(rules, &s.camera, row).0))).collect()
+            s.model().rows.iter().map(|row| f64::from(u8::from(is_near(rules, &s.camera, None, row).0))).collect()
+        }
+        Family::Relocate => all(&relocate(rules, &population(42, 300), 900, 0.3).model.rows),
+        Family::Explore => {
+            let row = Row { opacity: -5.0, quat: [1.0, 0.0, 0.0, 0.0], ..Row::default() };
+            explored(rules, &row, 1.0, [1.0, 2.0, 3.0]).mean.to_vec()
         }
         Family::Reset => {
             let (mut row, mut m, mut u) = (Row { opacity: 2.0, ..Row::default() }, Row::default(), Row::default());

@@ -70,10 +70,13 @@ fn lists() -> Vec<(Capacity, PassList)> {
             add(pass::render_view(&shape, &capacity, 3));
             add(pass::vote_view(&shape, &capacity, 2));
             let variant = Variant { labels: false, lift: false, sh_degree: 3, size, update: true, counts: false };
-            let extension = strategy::of(StrategyKind::Budget).extension();
-            add(pass::extended_step(&shape, &capacity, variant, (&*extension, 1)));
+            let extension = strategy::of(StrategyKind::Mcmc).extension();
+            let all_passes = 7;
+            add(pass::extended_step(&shape, &capacity, variant, (&*extension, all_passes)));
             add(pass::densify_count(&shape, &capacity));
             add(pass::densify_apply(&shape, &capacity, true));
+            add(pass::relocate_count(&shape, &capacity));
+            add(pass::relocate_apply(&shape, &capacity, true));
             add(pass::opacity_reset(&shape, &capacity));
         }
     }

@@ -7,7 +7,7 @@
 // densify_copy — copy one attribute, or one moment, to the densified model.
 // Work:    one vec4 of one old Gaussian per invocation; STRIDE vec4 per Gaussian.
 // Reads:   step; old_values [N,STRIDE]; densify_actions [N]; child_offsets [N]
-// Writes:  values [new N,STRIDE]. MOMENTS: new Gaussians start at 0; a cloned parent keeps its moments.
+// Writes:  values [new N,STRIDE]. MOMENTS: those of all Gaussians start at 0, except of kept ones and of cloned parents.
 // Mirror:  src/verify/reference/densify.rs::densify
 
 layout(constant_id = 14) const uint STRIDE = 1;
@@ -27,10 +27,8 @@ void main() {
     }
     uint action = fetchu(densify_actions, i), to = fetchu(child_offsets, i) * STRIDE + (e - i * STRIDE);
     vec4 v = fetch4(old_values, e);
-    if (action != ACTION_PRUNE) {
-        values[to] = MOMENTS != 0u && action == ACTION_SPLIT ? vec4(0.0) : v;
-    }
-    if (action == ACTION_CLONE || action == ACTION_SPLIT) {
-        values[to + STRIDE] = MOMENTS != 0u ? vec4(0.0) : v;
+    bool kept = action == ACTION_KEEP || action == ACTION_CLONE;
+    for (uint child = 0u; child < children(action); child++) {
+        values[to + child * STRIDE] = MOMENTS == 0u || (kept && child == 0u) ? v : vec4(0.0);
     }
 }

@@ -10,7 +10,8 @@
 // Work:    64 old Gaussians per workgroup; the children of a parent are neighbours and take its place in the order.
 // Reads:   step; old_means, old_scales, old_quats [N]; densify_actions [N]; child_offsets [N]
 // Writes:  means, scales, quats [new N]
-// Math:    clone: exact copy; split: mean + R (s * normal), ln s - ln 1.6 (3DGS).
+// Math:    clone: exact copy; split: mean + R (s * normal), ln s - ln 1.6 (3DGS); stack: r copies at one place with
+//          1 - (1 - o')^r = o and the light of the one (3DGS-MCMC, see stack).
 // Mirror:  src/verify/reference/densify.rs::densify
 
 layout(local_size_x = 64) in;
@@ -23,6 +24,21 @@ FETCHU(5, child_offsets);
 WRITE(6, vec4, means);
 WRITE(7, vec4, scales);
 WRITE(8, vec4, quats);
+
+// Opacity and size of r copies that together look like one Gaussian. In a picture, the copies take the light
+// 2 pi s'^2 sum_j (1 - (1 - o')^j) / j, and the one 2 pi s^2 o.
+void stack(uint r, float opacity_min, inout float logit, inout vec3 log_scale) {
+    float opacity = sigmoid(logit);
+    float sum = logit > 0.0 ? logit + log(1.0 + exp(-logit)) : minus_log1m(opacity); // -ln(1 - o)
+    float odds = expm1(max(sum / float(r), minus_log1m(opacity_min)));               // o' / (1 - o')
+    float part = odds / (1.0 + odds), covered = 0.0, light = 0.0;
+    for (uint j = 1u; j <= r; j++) {
+        covered += (1.0 - covered) * part; // 1 - (1 - o')^j
+        light += covered / float(j);
+    }
+    log_scale += 0.5 * log(opacity / light);
+    logit = log(odds);
+}
 
 void main() {
     StepUniforms u = step;
@@ -48,6 +64,8 @@ void main() {
                 normal_draw(u.seed, i, 3u * child + 2u));
             m.xyz += rotation * (exp(scale.xyz) * draw);
             s.xyz -= SPLIT_SHRINK;
+        } else if (action > ACTION_STACK) {
+            stack(children(action), u.prune_opacity, m.w, s.xyz);
         }
         means[to + child] = m;
         scales[to + child] = s;

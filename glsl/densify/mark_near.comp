@@ -4,13 +4,14 @@
 #include "step.glsl"
 #include "dispatch.glsl"
 #include "gaussian.glsl"
-// mark_near — mark the Gaussians that fog the camera of the step: before its near plane, or so large that they engulf
-//             it. The next densification prunes them.
+// mark_near — mark the Gaussians that fog the camera of the step or one on the way to another camera: before its near
+//             plane, or so large that they engulf the camera of the step. The next densification prunes them.
 // Work:    64 Gaussians per workgroup.
 // Reads:   step, failure; means, scales [N]
 // Writes:  densify_stats [N]: (0, STAT_NEAR) for a marked Gaussian
-// Math:    0 < z <= near and the slopes of the centre within the limits of the Jacobian, which are the image and a
+// Math:    0 <= z <= near and the slopes of the centre within the limits of the Jacobian, which are the image and a
 //          margin; or max(s) > FREE_SIZE |p|, whatever the direction. Views between the training cameras would show them.
+//          On the way the camera keeps its direction, so that each condition is linear in the share t of the way.
 // Mirror:  src/verify/reference/densify.rs::is_near
 
 layout(local_size_x = 64) in;
@@ -20,20 +21,34 @@ FETCH4(2, scales);
 INOUT(3, vec2, densify_stats);
 READ1(4, uint, failure);
 
+// The six conditions, each true if not negative.
+float[6] conditions(StepUniforms u, vec3 p, float near) {
+    return float[6](p.z, near - p.z, p.x - u.clamp_x_min * p.z, u.clamp_x_max * p.z - p.x, p.y - u.clamp_y_min * p.z,
+        u.clamp_y_max * p.z - p.y);
+}
+
+// Whether all conditions hold somewhere between a camera that sees the centre at `from` and one that sees it at `to`.
+bool fogs(StepUniforms u, vec3 from, vec3 to, float near) {
+    float first[6] = conditions(u, from, near), last[6] = conditions(u, to, near);
+    float low = 0.0, high = 1.0;
+    for (uint k = 0u; k < 6u; k++) {
+        float zero = first[k] / (first[k] - last[k]);
+        low = first[k] >= 0.0 ? low : last[k] >= 0.0 ? max(low, zero) : 2.0;
+        high = last[k] >= 0.0 || first[k] < 0.0 ? high : min(high, zero);
+    }
+    return low <= high;
+}
+
 void main() {
     StepUniforms u = step;
     uint i = linear_group_id() * 64u + gl_LocalInvocationID.x;
     if (i >= u.gaussian_count || failure != 0u) {
         return;
     }
-    vec3 view = to_view(u, fetch4(means, i).xyz);
-    vec2 slope = view.xy / view.z;
-    bool inside = all(greaterThanEqual(slope, vec2(u.clamp_x_min, u.clamp_y_min)))
-        && all(lessThanEqual(slope, vec2(u.clamp_x_max, u.clamp_y_max)));
-    vec3 s = fetch4(scales, i).xyz;
-    float sigma = exp(max(s.x, max(s.y, s.z)));
-    bool is_near = view.z > 0.0 && view.z <= u.near && inside;
-    if (is_near || sigma > FREE_SIZE * length(view)) {
+    vec3 mean = fetch4(means, i).xyz, s = fetch4(scales, i).xyz, d = mean - u.free_centre;
+    vec3 from = to_view(u, mean), to = vec3(dot(u.view_row0, d), dot(u.view_row1, d), dot(u.view_row2, d));
+    bool engulfs = exp(max(s.x, max(s.y, s.z))) > FREE_SIZE * length(from);
+    if (engulfs || fogs(u, from, from, u.near) || (u.free_near > 0.0 && fogs(u, from, to, u.free_near))) {
         densify_stats[i] = vec2(0.0, STAT_NEAR);
     }
 }

@@ -4,6 +4,7 @@ const uint ACTION_PRUNE = 0u;
 const uint ACTION_KEEP = 1u;
 const uint ACTION_CLONE = 2u;
 const uint ACTION_SPLIT = 3u;
+const uint ACTION_STACK = 4u; // plus the number of copies, 2 to RELOCATE_MOST
 
 uint densify_action(StepUniforms u, float logit, vec3 log_scale, vec2 stats) {
     float gradient = stats.y > 0.0 ? stats.x / stats.y : 0.0;
@@ -19,5 +20,5 @@ uint densify_action(StepUniforms u, float logit, vec3 log_scale, vec2 stats) {
 }
 
 uint children(uint action) {
-    return action == ACTION_PRUNE ? 0u : action == ACTION_KEEP ? 1u : 2u;
+    return action > ACTION_STACK ? action - ACTION_STACK : action == ACTION_PRUNE ? 0u : action == ACTION_KEEP ? 1u : 2u;
 }

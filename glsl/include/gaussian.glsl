@@ -69,6 +69,10 @@ float log2_opacity(float logit) {
     return -log2(1.0 + exp(-clamp(logit, -30.0, 30.0)));
 }
 
+float sigmoid(float logit) {
+    return exp2(log2_opacity(logit));
+}
+
 bool finite(float x) { // tests the exponent bits, because drivers fold x - x
     return (floatBitsToUint(x) & 0x7f800000u) != 0x7f800000u;
 }

@@ -1,4 +1,5 @@
 // Counter-based random numbers: a hash of (seed, index, draw), the same on every device.
+#include "near_zero.glsl"
 
 uint pcg_hash(uint v) {
     uint state = v * 747796405u + 2891336453u;
@@ -10,7 +11,7 @@ float uniform_draw(uint seed, uint index, uint draw) { // in (0, 1)
     return (float(pcg_hash(pcg_hash(pcg_hash(seed) + index) + draw) >> 8) + 0.5) * (1.0 / 16777216.0);
 }
 
-// Vulkan lets `cos` err by 5e-4, and `log` by 5e-7 where it is near zero. Drivers use this, so series stand in for both.
+// Vulkan lets `cos` err by 5e-4. Drivers use this, so a series stands in for it.
 
 float cos_of_turns(float turns) { // turns in [0, 1]; Taylor series over a quarter of a turn
     float half_turn = abs(turns - 0.5); // cos(2 pi turns) = -cos(2 pi half_turn)
@@ -21,13 +22,7 @@ float cos_of_turns(float turns) { // turns in [0, 1]; Taylor series over a quart
     return second ? c : -c;
 }
 
-float minus_log(float u) { // u in (0, 1)
-    float x = 1.0 - u;
-    float series = x * (1.0 + x * (1.0 / 2.0 + x * (1.0 / 3.0 + x * (1.0 / 4.0 + x * (1.0 / 5.0 + x * (1.0 / 6.0))))));
-    return x < 0.0625 ? series : -log(u);
-}
-
 float normal_draw(uint seed, uint index, uint draw) { // Box and Muller
-    float r = sqrt(2.0 * minus_log(uniform_draw(seed, index, 2u * draw)));
+    float r = sqrt(2.0 * minus_log1m(1.0 - uniform_draw(seed, index, 2u * draw)));
     return r * cos_of_turns(uniform_draw(seed, index, 2u * draw + 1u));
 }

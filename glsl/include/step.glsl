@@ -28,6 +28,12 @@ struct StepUniforms {
     uint prune_big;
     uint split_long;        // 1: splits along the longest axis, else at random
     uint sum_absolute;      // 1: the statistic sums absolute gradients over tiles
+    vec3 free_centre;       // space before all cameras between this one and another one is free (mark_near): its centre,
+    float free_near;        // and the near plane on the way; 0: there is none
+    uint draws;             // Gaussians to draw for relocation
+    float draws_per_weight; // draws over the sum of all weights
+    float opacity_weight, scale_weight; // of a Gaussian's opacity and standard deviations in the loss
+    float noise;            // factor of random moves, 1 / world unit
     uint seed;
     uint vote_columns;      // labels that a sweep counts at once
 };

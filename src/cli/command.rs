@@ -140,7 +140,7 @@ pub enum Command {
 }
 
 /// Settings of training that a newcomer needs: the help shows them with the flags that have no heading.
-const FIRST: [&str; 2] = ["iterations", "max_resolution"];
+const FIRST: [&str; 3] = ["iterations", "max_resolution", "preset"];
 
 /// Returns the command line with the defaults of training in its help.
 pub fn command() -> clap::Command {

@@ -8,13 +8,12 @@ use super::scene::{open_gpu, open_scene};
 use super::values::share;
 use super::{profile_compare, stdout};
 use crate::gpu::Gpu;
-use crate::io::init;
 use crate::run::Settings;
 use crate::scene::{Dataset, Gaussians};
 use crate::scheduler::SchedulerOptions;
 use crate::scheduler::plan::PlanOptions;
 use crate::synth::{self, SynthOptions};
-use crate::train::{StepReport, TrainConfig, Trainer};
+use crate::train::{StepReport, TrainConfig, Trainer, first_model};
 use crate::{Error, Result};
 use clap::Args;
 use std::path::{Path, PathBuf};
@@ -93,7 +92,7 @@ pub(crate) fn run(args: &ProfileArgs, context: &Context) -> Result<()> {
     let gpu = open_gpu(context)?;
     let model = match &args.model {
         Some(path) => open_model(path)?,
-        None => init::initial_gaussians(&dataset, config.seed, init::RANDOM_COUNT)?,
+        None => first_model(&dataset, &config)?,
     };
     let window = Window { overlap: args.overlap, from_step: args.from_step, warm_up: args.warm_up, steps: args.steps };
     #[cfg(feature = "lab")]

@@ -7,10 +7,9 @@ use super::profile_report::Window;
 use super::scene::open_gpu;
 use super::{devices, selftest};
 use crate::gpu::{self, Gpu, GpuOptions};
-use crate::io::init;
 use crate::pass::compiled_kernels;
 use crate::synth::{self, SynthOptions};
-use crate::train::TrainConfig;
+use crate::train::{TrainConfig, first_model};
 use crate::verify::selftest::Check;
 use crate::{Error, Result};
 use serde_json::{Value, json};
@@ -65,7 +64,7 @@ fn steps(context: &Context) -> Result<Value> {
     };
     let dataset = synth::dataset(&scene, 0);
     let config = TrainConfig { label_from: Some(1), start_size: 1.0, ..TrainConfig::default() };
-    let model = init::initial_gaussians(&dataset, config.seed, init::RANDOM_COUNT)?;
+    let model = first_model(&dataset, &config)?;
     let window = Window { overlap: true, from_step: 0, warm_up: 10, steps: 20 };
     Ok(profile(&gpu, (&dataset, &model, config), window, |_| (), context)?.to_json())
 }

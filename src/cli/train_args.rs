@@ -7,7 +7,7 @@ use crate::io::ReadOptions;
 use crate::options::typed::Typed;
 use crate::run::{Changed, Inputs, OccluderFiles, Request, RunOptions, Settings, Start};
 use crate::scene::DepthKind;
-use crate::train::{Occlusion, TrainConfig};
+use crate::train::{Occlusion, Preset, TrainConfig};
 use crate::{Error, Result};
 use clap::Args;
 use std::path::{Path, PathBuf};
@@ -60,6 +60,12 @@ pub struct TrainFlags {
     /// Tolerance for the scene. `--resume` needs the same flags again.
     #[command(flatten)]
     pub trust: ReadArgs,
+    /// Start from settings for a length and a level of detail: draft for a first look, standard, or best.
+    ///
+    /// Flags override them: draft has 2000 steps, standard the 7000 of the default, best 30000 and up to twice as many
+    /// Gaussians.
+    #[arg(long, value_name = "NAME", conflicts_with_all = ["config", "paper"])]
+    pub preset: Option<Preset>,
     /// Start from the settings of the LabelGS paper, where ours differ:
     #[arg(long, conflicts_with = "config", help_heading = "Training")]
     pub paper: bool,
@@ -84,7 +90,8 @@ impl TrainFlags {
             // A run that goes on compares the whole file with its checkpoint.
             (Some(path), _) => Settings::read(path)?,
             (None, _) if self.paper => Settings::paper(),
-            (None, found) => found.cloned().unwrap_or_default(),
+            (None, Some(found)) => found.clone(),
+            (None, None) => self.preset.map(Settings::preset).unwrap_or_default(),
         };
         let applied = self.read.apply(&mut settings.read);
         let applied = applied.and_then(|()| self.train.apply(&mut settings.train));

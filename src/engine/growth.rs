@@ -90,6 +90,7 @@ impl Engine {
         if size.trained {
             lists.insert(0, pass::training_step(shape, capacity, widest(size)));
             lists.push(pass::densify_apply(shape, capacity, size.labels.is_some()));
+            lists.push(pass::relocate_apply(shape, capacity, size.labels.is_some()));
         }
         lists
     }

@@ -159,4 +159,10 @@ impl Engine {
     pub(crate) fn view_uniforms(&self, camera: &Camera, near: f32, background: [f32; 3]) -> StepUniforms {
         uniforms::view_uniforms(camera, self.origin, &self.shape, near, background, self.gaussian_count)
     }
+
+    /// Adds free space on the way to another camera.
+    pub(crate) fn with_free_space(&self, uniforms: StepUniforms, camera: &Camera, near: f32) -> StepUniforms {
+        let free_centre = camera.relative_to(self.origin).centre().as_vec3().to_array();
+        StepUniforms { free_centre, free_near: near, ..uniforms }
+    }
 }

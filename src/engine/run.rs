@@ -25,6 +25,10 @@ pub enum ListKey {
     DensifyCount,
     /// Densification.
     DensifyApply,
+    /// Weighs the Gaussians for a relocation.
+    RelocateCount,
+    /// Relocation.
+    RelocateApply,
     /// Opacity reset.
     OpacityReset,
 }
@@ -72,6 +76,8 @@ impl Engine {
             ListKey::Vote(rounds) => pass::vote_view(shape, capacity, rounds),
             ListKey::DensifyCount => pass::densify_count(shape, capacity),
             ListKey::DensifyApply => pass::densify_apply(shape, capacity, self.size.labels.is_some()),
+            ListKey::RelocateCount => pass::relocate_count(shape, capacity),
+            ListKey::RelocateApply => pass::relocate_apply(shape, capacity, self.size.labels.is_some()),
             ListKey::OpacityReset => pass::opacity_reset(shape, capacity),
         };
         let id = self.sched.prepare(&list)?;

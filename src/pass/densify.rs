@@ -23,7 +23,27 @@ pub(super) fn mark(b: &mut Builder) {
     scan::scan(b, Buf::CHILDREN_COUNTS, Buf::CHILD_OFFSETS, Count::Gaussians, Total::Densified);
 }
 
-/// Rewrites the model; needs [`mark`] before it in the same list.
+/// Weighs the Gaussians for [`relocate`], and counts those to be removed.
+pub(super) fn weigh(b: &mut Builder) {
+    b.list.stage = Stage::Optimise;
+    pass!(b, relocate_weigh {
+        step: Buf::STEP, means: Buf::MEANS, densify_stats: Buf::DENSIFY_STATS, children_counts: Buf::CHILDREN_COUNTS,
+        counters: Buf::COUNTERS,
+    } [], over_gaussians());
+    scan::scan(b, Buf::CHILDREN_COUNTS, Buf::CHILD_OFFSETS, Count::Gaussians, Total::Densified);
+}
+
+/// Draws Gaussians and decides their numbers of copies.
+pub(super) fn relocate(b: &mut Builder) {
+    weigh(b);
+    pass!(b, relocate_draw {
+        step: Buf::STEP, child_offsets: Buf::CHILD_OFFSETS, children_counts: Buf::CHILDREN_COUNTS,
+        counters: Buf::COUNTERS, densify_actions: Buf::DENSIFY_ACTIONS,
+    } [], over_gaussians());
+    scan::scan(b, Buf::CHILDREN_COUNTS, Buf::CHILD_OFFSETS, Count::Gaussians, Total::Densified);
+}
+
+/// Rewrites the model; needs [`mark`] or [`relocate`] before it in the same list.
 pub(super) fn apply(b: &mut Builder) {
     b.list.copy(Buf::MEANS, Buf::OLD_MEANS, 0);
     b.list.copy(Buf::SCALES, Buf::OLD_SCALES, 0);

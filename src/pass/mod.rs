@@ -9,7 +9,7 @@ mod gather;
 mod kernels;
 mod lift;
 pub(crate) mod loss;
-mod optimize;
+pub(crate) mod optimize;
 mod project;
 pub(crate) mod scan;
 #[cfg(feature = "lab")]
@@ -156,6 +156,21 @@ pub fn densify_count(shape: &KernelShape, capacity: &Capacity) -> PassList {
 pub fn densify_apply(shape: &KernelShape, capacity: &Capacity, labels: bool) -> PassList {
     let mut b = begin("densify", shape, capacity, labels, 0);
     densify::mark(&mut b);
+    densify::apply(&mut b);
+    end(b)
+}
+
+/// Sums the weights of the Gaussians that a relocation draws from, and counts those that it removes.
+pub fn relocate_count(shape: &KernelShape, capacity: &Capacity) -> PassList {
+    let mut b = begin("relocation: count", shape, capacity, false, 0);
+    densify::weigh(&mut b);
+    end(b)
+}
+
+/// Removes Gaussians and draws others to copy; the model must have room for them.
+pub fn relocate_apply(shape: &KernelShape, capacity: &Capacity, labels: bool) -> PassList {
+    let mut b = begin("relocation", shape, capacity, labels, 0);
+    densify::relocate(&mut b);
     densify::apply(&mut b);
     end(b)
 }

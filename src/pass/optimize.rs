@@ -1,6 +1,7 @@
 //! Adam on every attribute of the Gaussians and on shared parameters; the opacity reset.
 
-use super::build::{Builder, args, over_gaussians};
+use super::build::{Builder, args, over_gaussians, over_splats};
+use super::project::GAUSSIAN_FROM_SPLAT;
 use crate::pass::build::pass;
 use crate::scheduler::plan::{Buf, Grid, Stage};
 use crate::shaders::constants;
@@ -81,6 +82,24 @@ fn update(
         first_moments: first, second_moments: second, step_rows: Buf::STEP_ROWS, step_rates: Buf::STEP_RATES,
         weights: Buf::W_SHARED,
     } [stride: stride, rate: rate, seen_only: seen_only, rows: rows], grid);
+}
+
+/// Adds the gradients of the mean opacity and size to those of the visible Gaussians.
+pub(crate) fn regularise(b: &mut Builder) {
+    b.list.stage = Stage::Optimise;
+    pass!(b, regularise {
+        step: Buf::STEP, failure: Buf::FAILURE, counters: Buf::COUNTERS, gaussian_from_splat: GAUSSIAN_FROM_SPLAT,
+        means: Buf::MEANS, scales: Buf::SCALES, v_means: Buf::V_MEANS, v_scales: Buf::V_SCALES,
+    } [], over_splats());
+}
+
+/// Moves faint Gaussians at random.
+pub(crate) fn explore(b: &mut Builder) {
+    b.list.stage = Stage::Optimise;
+    pass!(b, explore {
+        step: Buf::STEP, failure: Buf::FAILURE, means_in: Buf::MEANS, scales: Buf::SCALES, quats: Buf::QUATS,
+        means: Buf::MEANS,
+    } [], over_gaussians());
 }
 
 /// Limits opacities to 0.01 and zeroes their moments.

@@ -23,8 +23,8 @@ pub use occluders::OccluderFiles;
 pub use settings::{RunOptions, Settings};
 pub use summary::Summary;
 
-pub use crate::train::StrategyKind;
 pub use crate::train::{Densified, LabelRule, Occlusion, StepReport, TrainConfig};
+pub use crate::train::{Preset, StrategyKind};
 
 use crate::error::Result;
 use crate::gpu::Gpu;

@@ -10,8 +10,8 @@ use crate::gpu::Gpu;
 use crate::io::label_table::LabelTable;
 use crate::io::occlusion_table::OcclusionTable;
 use crate::io::run_folder::Lock;
-use crate::io::{self, atomic, checkpoint_folder, init};
-use crate::scene::{Dataset, Gaussians};
+use crate::io::{self, atomic, checkpoint_folder};
+use crate::scene::Dataset;
 use crate::scheduler::SchedulerOptions;
 use crate::train::{self, TrainConfig, Trainer};
 use std::path::{Path, PathBuf};
@@ -159,9 +159,7 @@ fn start(
     occluders: Option<&OcclusionTable>,
     options: SchedulerOptions,
 ) -> Result<Trainer> {
-    let mut model = init::initial_gaussians(dataset, config.seed, init::RANDOM_COUNT)?;
-    init::add_far_gaussians(&mut model, dataset, config.far_points);
-    bound_start(&mut model, config);
+    let model = train::first_model(dataset, config)?;
     let size = train::start_size(&gpu, dataset, config, model.len(), options)?;
     let memory = Engine::predict(&gpu, &size, options)?;
     tracing::info!(
@@ -182,19 +180,6 @@ fn start(
         }
     }
     Ok(trainer)
-}
-
-/// Thins the initial points to `max_gaussians`, evenly.
-fn bound_start(model: &mut Gaussians, config: &TrainConfig) {
-    let (count, bound) = (model.len() as u64, config.max_gaussians);
-    if bound > 0 && count > bound {
-        tracing::warn!(
-            "{count} initial points, and `max_gaussians` is {bound}: every {:.1}-th is used",
-            count as f64 / bound as f64
-        );
-        // Keep row i if `i * bound / count` steps up there.
-        *model = model.filtered(|row| row as u64 * bound / count != (row as u64 + 1) * bound / count);
-    }
 }
 
 fn facts(request: &Request, masks: Option<&Path>, gpu: &Gpu) -> Vec<(&'static str, String)> {

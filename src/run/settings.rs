@@ -3,8 +3,8 @@
 use crate::error::{Error, Result};
 use crate::io::{self, LoadOptions, ReadOptions, run_folder};
 use crate::options::{Key, Options};
-use crate::train::TrainConfig;
 use crate::train::near::NEAR;
+use crate::train::{Preset, TrainConfig};
 use serde::de::{DeserializeOwned, IgnoredAny};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -43,6 +43,11 @@ pub struct Settings {
 }
 
 impl Settings {
+    /// Returns the settings of a preset.
+    pub fn preset(preset: Preset) -> Self {
+        Self { train: TrainConfig::preset(preset), ..Self::default() }
+    }
+
     /// Returns the settings of the paper where they differ from the default.
     pub fn paper() -> Self {
         Self { train: TrainConfig::paper(), ..Self::default() }

@@ -36,6 +36,8 @@ pub enum StrategyKind {
     /// Growth where it helps most, within a budget that rises over the run.
     #[default]
     Budget,
+    /// Relocation of 3DGS-MCMC: dead Gaussians become copies of others, and faint ones move at random.
+    Mcmc,
     /// Adaptive density control of 3DGS: every large gradient grows.
     Adc,
 }
@@ -63,8 +65,8 @@ crate::options::options! {
         "Training" {
             /// Number of steps, one view each.
             ///
-            /// 15000 (LabelGS).
-            iterations <"N">: u32 = 15_000, at_least(1);
+            /// 7000, as in the short runs of 3DGS; LabelGS has 15000. Schedules and learning rates follow the length.
+            iterations <"N">: u32 = 7_000, at_least(1);
 
             /// Size of the photos in the first steps, as a share of their full size; 1 has all steps at full size.
             ///
@@ -122,12 +124,30 @@ crate::options::options! {
             /// which most photos look past all points get one. 3DGS has none.
             far_points <"N">: u32 = 800;
 
-            /// Gaussians at the end of densification, such as 30k, for the strategy budget.
+            /// Weight of the mean opacity in the loss [default: 0.01 with the strategy mcmc, else 0].
             ///
-            /// 0 chooses by the size of the photos and the length of the run: 0.5 for each pixel of a photo, and at most
-            /// 30 for each step. More make finer detail and cost time.
+            /// Gaussians that no photo supports then fade. The strategy adc has no such term.
+            #[serde(skip_serializing_if = "Option::is_none")]
+            opacity_weight <"WEIGHT">: Option<f64> = None, not_negative;
+
+            /// Weight of the mean standard deviation in the loss, by the scene extent [default: 0.01 with the strategy
+            /// mcmc, else 0].
+            ///
+            /// The strategy adc has no such term.
+            #[serde(skip_serializing_if = "Option::is_none")]
+            scale_weight <"WEIGHT">: Option<f64> = None, not_negative;
+
+            /// Gaussians at the end of densification, such as 30k, for the strategies budget and mcmc.
+            ///
+            /// 0 chooses by the size of the photos and the length of the run: --detail for each pixel of a photo, and at
+            /// most 30 for each step.
             #[cfg_attr(feature = "cli", arg(value_parser = count))]
             budget <"N">: u64 = 0;
+
+            /// Gaussians for each pixel of the largest photo, for --budget 0.
+            ///
+            /// More make finer detail and cost time.
+            detail <"NUMBER">: f64 = 0.5, positive;
         }
 
         "Labels" {
@@ -338,37 +358,6 @@ crate::options::options! {
 }
 
 impl TrainConfig {
-    /// Returns the settings of the paper where they differ from the default.
-    pub fn paper() -> Self {
-        Self {
-            label_rule: LabelRule::Main,
-            label_weight: 1.0,
-            densify_until: Some(40_000),
-            opacity_reset_interval: 3000,
-            ..Self::adc()
-        }
-    }
-
-    /// Returns the schedule and the rates of 3DGS, in steps whatever the length of the run.
-    pub fn adc() -> Self {
-        Self {
-            strategy: StrategyKind::Adc,
-            start_size: 1.0,
-            free_space: false,
-            far_points: 0,
-            full_size_from: Some(0),
-            label_from: Some(1000),
-            vote_every: Some(500),
-            occlusion_every: Some(1000),
-            sh_degree_interval: Some(1000),
-            rate_factor: Some(1.0),
-            rate_final: 1.0,
-            densify_from: Some(500),
-            densify_interval: Some(100),
-            ..Self::default()
-        }
-    }
-
     /// Refuses invalid values; messages name the option.
     pub fn check(&self) -> Result<()> {
         self.check_ranges()

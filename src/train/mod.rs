@@ -5,8 +5,11 @@
 //! with folder, checkpoints and scores.
 
 pub(crate) mod config;
+mod first;
+pub(crate) mod free_space;
 pub(crate) mod near;
 mod occlusion;
+mod presets;
 mod sampler;
 mod schedule;
 mod sentinel;
@@ -21,6 +24,8 @@ mod views;
 mod votes;
 
 pub use config::{LabelRule, Occlusion, StrategyKind, TrainConfig};
+pub use first::first_model;
+pub use presets::Preset;
 pub(crate) use setup::{TrainerOptions, engine_size, start_size};
 pub(crate) use state::{TrainState, ViewFingerprint};
 pub use strategy::Densified;
@@ -102,12 +107,11 @@ impl Trainer {
             0.0 => near::near_plane(dataset.train.iter().map(|view| &view.camera), model),
             near => near,
         };
-        let budget = if config.budget > 0 { config.budget } else { config.budget_for(size.image) };
-        let config = TrainConfig { near, budget, ..config };
+        let config = TrainConfig { near, ..setup::with_budget(&config, dataset)? };
         let mut trainer = Self::without_model(gpu, config, dataset, size, options)?;
         trainer.engine.upload_model(model)?;
         let planes = if trainer.config.free_space {
-            near::view_planes(dataset.train.iter().map(|view| &view.camera), model, near)
+            free_space::view_planes(dataset, model, near)
         } else {
             vec![near; trainer.views.len()]
         };
@@ -163,7 +167,7 @@ impl Trainer {
     }
 
     fn set_near_planes(&mut self, planes: &[f32]) {
-        self.views.iter_mut().zip(planes).for_each(|(view, &near)| view.near = near);
+        self.views.set_near_planes(planes);
     }
 
     /// Returns the engine, for renders between steps. Nothing may be in flight ([`Trainer::drain`]).
@@ -295,6 +299,9 @@ impl Trainer {
     fn uniforms(&self, input: &StepInput) -> StepUniforms {
         let view = self.views.of(input);
         let mut uniforms = step_input::uniforms(input, view, &self.config, self.fixed, &self.engine);
+        if let Some((camera, near)) = self.views.partner(self.config.seed, input) {
+            uniforms = self.engine.with_free_space(uniforms, camera, near);
+        }
         self.strategy.uniforms(self.at(input.step), &mut uniforms);
         uniforms
     }

@@ -35,38 +35,6 @@ pub(crate) fn near_plane<'a>(cameras: impl ExactSizeIterator<Item = &'a Camera>,
     NEAR.min((SHARE * median) as f32).max(f32::MIN_POSITIVE)
 }
 
-/// Near plane of a camera in the depths of the Gaussians that it sees: this share of this quantile.
-const FREE: f64 = 0.25;
-const NEAREST: f64 = 0.01;
-/// Number of cameras whose median a camera takes, itself included.
-const NEIGHBOURS: usize = 5;
-
-/// Returns the near plane of each camera, at least `least`. Up to there space is taken as free: no Gaussian stands for
-/// anything so much nearer than all that the camera sees of the initial `model`.
-pub(crate) fn view_planes<'a>(cameras: impl Iterator<Item = &'a Camera>, model: &Gaussians, least: f32) -> Vec<f32> {
-    let every = model.len().div_ceil(16 * GAUSSIANS).max(1);
-    let rows: Vec<DVec3> = (0..model.len()).step_by(every).map(|row| model.world(row)).collect();
-    let nearest = |camera: &Camera| {
-        let inside = |place: &DVec3| {
-            let at = camera.project(*place);
-            at.x >= 0.0 && at.y >= 0.0 && at.x <= f64::from(camera.width) && at.y <= f64::from(camera.height)
-        };
-        let places = rows.iter().map(|&world| camera.to_camera(world)).filter(|place| place.z > 0.0);
-        let mut depths: Vec<f64> = places.filter(inside).map(|place| place.z).collect();
-        let at = (NEAREST * depths.len() as f64) as usize;
-        (!depths.is_empty()).then(|| *depths.select_nth_unstable_by(at, f64::total_cmp).1)
-    };
-    let found: Vec<(DVec3, f64)> = cameras.map(|camera| (camera.centre(), nearest(camera).unwrap_or(0.0))).collect();
-    let plane = |centre: DVec3| {
-        let mut near: Vec<(f64, f64)> = found.iter().map(|&(other, depth)| (other.distance(centre), depth)).collect();
-        near.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let mut depths: Vec<f64> = near.iter().take(NEIGHBOURS).map(|&(_, depth)| depth).collect();
-        depths.sort_by(f64::total_cmp);
-        least.max((FREE * depths[depths.len() / 2]) as f32)
-    };
-    found.iter().map(|&(centre, _)| plane(centre)).collect()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;

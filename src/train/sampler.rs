@@ -7,7 +7,7 @@ use rand_pcg::Pcg64Mcg;
 /// Random stream of the order of views. The other streams are the step numbers.
 const VIEW_STREAM: u64 = u64::MAX;
 
-fn stream(seed: u64, stream: u64) -> Pcg64Mcg {
+pub(super) fn stream(seed: u64, stream: u64) -> Pcg64Mcg {
     // The state is two words: different pairs (seed, stream) give unrelated numbers.
     let mut state = [0; 16];
     state[..8].copy_from_slice(&seed.wrapping_mul(0x9e37_79b9_7f4a_7c15).to_le_bytes());

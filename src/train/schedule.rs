@@ -9,9 +9,11 @@ const RATE_POWER: f64 = 0.3;
 const RATE_MOST: f64 = 3.0;
 /// Fewest steps of densification with the strategy of 3DGS.
 const ADC_LEAST: u32 = 1000;
-/// Gaussians of a run by default: for each pixel of a photo, and at most for each step.
-const BUDGET_PER_PIXEL: f64 = 0.5;
+/// Gaussians of a run by default: at most for each step.
 const BUDGET_PER_STEP: u64 = 30;
+/// Weights of opacity and size in the loss, and the share of the run in which Gaussians relocate (3DGS-MCMC).
+const REGULAR: f64 = 0.01;
+const RELOCATE_UNTIL: f64 = 25.0 / 30.0;
 
 /// Learning rates of a step.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -37,7 +39,7 @@ impl TrainConfig {
     }
 
     /// Returns the factor of the learning rates.
-    fn rate_factor(&self) -> f64 {
+    pub(super) fn rate_factor(&self) -> f64 {
         let derived = (LONG_RUN / f64::from(self.iterations)).powf(RATE_POWER).clamp(1.0, RATE_MOST);
         self.rate_factor.unwrap_or(derived)
     }
@@ -122,7 +124,7 @@ impl TrainConfig {
 
     /// Returns the budget of a run on photos of this size, Gaussians.
     pub(super) fn budget_for(&self, (width, height): (u32, u32)) -> u64 {
-        let by_pixels = (BUDGET_PER_PIXEL * f64::from(width) * f64::from(height)) as u64;
+        let by_pixels = (self.detail * f64::from(width) * f64::from(height)) as u64;
         by_pixels.min(BUDGET_PER_STEP * u64::from(self.iterations)).max(1)
     }
 
@@ -142,6 +144,26 @@ impl TrainConfig {
         // The schedule of 3DGS starts late, whatever the length of the run.
         let least = if self.strategy == StrategyKind::Adc { self.densify_from().saturating_add(ADC_LEAST) } else { 0 };
         self.densify_until.unwrap_or(self.share(0.5).max(least))
+    }
+
+    /// Returns the weight of the mean opacity in the loss.
+    pub(super) fn opacity_weight(&self) -> f64 {
+        self.opacity_weight.unwrap_or(self.regular())
+    }
+
+    /// Returns the weight of the mean standard deviation in the loss.
+    pub(super) fn scale_weight(&self) -> f64 {
+        self.scale_weight.unwrap_or(self.regular())
+    }
+
+    fn regular(&self) -> f64 {
+        if self.strategy == StrategyKind::Mcmc { REGULAR } else { 0.0 }
+    }
+
+    /// Returns true for steps that end with a relocation.
+    pub fn relocates_at(&self, step: u32) -> bool {
+        let until = self.densify_until().max(self.share(RELOCATE_UNTIL));
+        step < until && step > self.densify_from() && step.is_multiple_of(self.densify_interval())
     }
 
     /// Returns true for steps after densification that end with pruning.

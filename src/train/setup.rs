@@ -57,6 +57,12 @@ pub fn engine_size(dataset: &Dataset, config: &TrainConfig, gaussians: u64) -> R
     Ok(EngineSize::new(gaussians, image).for_training().with_labels(labels))
 }
 
+/// Sets the budget of a run whose settings leave it to the photos.
+pub(super) fn with_budget(config: &TrainConfig, dataset: &Dataset) -> Result<TrainConfig> {
+    let derived = config.budget_for(engine_size(dataset, config, 0)?.image);
+    Ok(TrainConfig { budget: if config.budget > 0 { config.budget } else { derived }, ..config.clone() })
+}
+
 /// Makes the initial sizes: for twice the number of Gaussians, or for that number if memory is short.
 pub(crate) fn start_size(
     gpu: &Gpu,

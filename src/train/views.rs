@@ -1,7 +1,8 @@
 //! The training views, at the size of each step.
 
-use super::TrainConfig;
 use super::step_input::{StepInput, TrainView, side_at};
+use super::{TrainConfig, free_space};
+use crate::scene::Camera;
 use crate::scheduler::plan::FRAMES_IN_FLIGHT;
 use std::collections::BTreeMap;
 use std::ops::{Deref, DerefMut};
@@ -15,6 +16,8 @@ pub(super) struct Views {
     whole: Vec<TrainView>,
     /// Shrunk views that steps in flight use, by size and view.
     shrunk: BTreeMap<(u32, usize), TrainView>,
+    /// Other views of each view, with free space on the way.
+    partners: Vec<Vec<usize>>,
     start: f64,
     full_from: u32,
 }
@@ -23,7 +26,20 @@ impl Views {
     /// Makes the views of a training.
     pub(super) fn new(whole: Vec<TrainView>, config: &TrainConfig) -> Self {
         let (start, full_from) = (f64::from(config.start_size), config.full_size_from());
-        Self { whole, shrunk: BTreeMap::new(), start, full_from }
+        Self { whole, shrunk: BTreeMap::new(), partners: Vec::new(), start, full_from }
+    }
+
+    /// Sets the near plane of each view.
+    pub(super) fn set_near_planes(&mut self, planes: &[f32]) {
+        self.whole.iter_mut().zip(planes).for_each(|(view, &near)| view.near = near);
+        let cameras: Vec<&Camera> = self.whole.iter().map(|view| &view.camera).collect();
+        self.partners = free_space::partners(&cameras, planes);
+    }
+
+    /// Returns the camera to which the space is free in a step, and the near plane of all cameras on the way.
+    pub(super) fn partner(&self, seed: u64, input: &StepInput) -> Option<(&Camera, f32)> {
+        let partner = free_space::partner(seed, input.step, self.partners.get(input.view)?)?;
+        Some((&self.whole[partner].camera, self.whole[partner].near.min(self.whole[input.view].near)))
     }
 
     /// Returns the number of the size of `step`, from 0; [`SIZES`] is the full one.

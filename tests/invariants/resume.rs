@@ -11,7 +11,7 @@ use labelgs::internals::scheduler::SchedulerOptions;
 use labelgs::internals::train::{StepReport, TrainState, Trainer};
 use labelgs::io::initial_gaussians;
 use labelgs::io::write_model;
-use labelgs::run::{LabelRule, TrainConfig};
+use labelgs::run::{LabelRule, StrategyKind, TrainConfig};
 use labelgs::scene::Dataset;
 use std::path::Path;
 use std::sync::Arc;
@@ -95,6 +95,19 @@ fn a_training_within_a_budget_goes_on_to_the_same_bits() {
     std::fs::write(folder.path().join("model.ply"), &ply).expect("a PLY");
     let count = labelgs::io::read_model(folder.path().join("model.ply")).expect("a model").gaussians.len();
     assert!(count > 600 && count <= 900, "{count} Gaussians within the budget");
+    assert!(labels_of(&ply) > 10);
+}
+
+/// Relocations, random moves and the terms of opacity and size in the loss.
+#[test]
+fn a_training_with_relocation_goes_on_to_the_same_bits() {
+    let Some(turn) = device() else { return };
+    let config = TrainConfig { iterations: 60, strategy: StrategyKind::Mcmc, ..budgeted() };
+    let ply = same_when_resumed(&turn, config, small, SchedulerOptions::default());
+    let folder = tempfile::tempdir().expect("a folder");
+    std::fs::write(folder.path().join("model.ply"), &ply).expect("a PLY");
+    let count = labelgs::io::read_model(folder.path().join("model.ply")).expect("a model").gaussians.len();
+    assert!(count > 850 && count <= 900, "{count} Gaussians: the budget is full");
     assert!(labels_of(&ply) > 10);
 }
 

@@ -4,7 +4,9 @@ use glam::{DMat3, DVec3};
 use labelgs::internals::cli::status::exit_status;
 use labelgs::internals::io::init::add_far_gaussians;
 use labelgs::internals::shaders::constants::exact::SH_C0;
+use labelgs::internals::train::first_model;
 use labelgs::io::initial_gaussians;
+use labelgs::run::{StrategyKind, TrainConfig};
 use labelgs::scene::{Camera, Dataset, Photo, Point, View};
 
 fn point(x: f64, y: f64, z: f64) -> Point {
@@ -72,6 +74,22 @@ fn gaussians_stand_on_the_points() {
     assert!(g.scales[3].iter().all(|&s| (f64::from(s) - expected).abs() < 1e-6));
     // Points at one place get the smallest allowed size.
     assert!((f64::from(g.scales[22][0]) - 0.5 * f64::ln(1e-7)).abs() < 1e-5);
+}
+
+/// Growth chooses the places of most Gaussians; relocation starts with small opaque ones.
+#[test]
+fn a_training_starts_with_a_part_of_its_budget() {
+    let scene = dataset(ring(12), |_, _| [90, 60, 30]);
+    let of = |strategy, max_gaussians| {
+        let config = TrainConfig { strategy, budget: 4000, max_gaussians, far_points: 0, ..TrainConfig::default() };
+        first_model(&scene, &config).expect("Gaussians")
+    };
+    let (grown, drawn) = (of(StrategyKind::Budget, 0), of(StrategyKind::Mcmc, 0));
+    assert_eq!((grown.len(), drawn.len()), (1000, 1000));
+    assert_eq!(drawn.means, grown.means);
+    assert!(drawn.scales[0][0] < grown.scales[0][0] && drawn.opacities[0] > grown.opacities[0]);
+    assert_eq!(of(StrategyKind::Adc, 0).len(), 50_000);
+    assert_eq!(of(StrategyKind::Budget, 300).len(), 300);
 }
 
 #[test]

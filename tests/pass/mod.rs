@@ -12,6 +12,7 @@ mod loss;
 mod optimize;
 mod orders;
 mod project;
+mod relocate;
 mod separate;
 mod step;
 mod tile;

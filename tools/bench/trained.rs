@@ -7,11 +7,9 @@ use labelgs::engine::{Engine, EngineSize};
 use labelgs::eval::MeanScores;
 use labelgs::eval::{Rendering, evaluate};
 use labelgs::gpu::Gpu;
-use labelgs::internals::io::init::RANDOM_COUNT;
 use labelgs::internals::scheduler::SchedulerOptions;
 use labelgs::internals::synth;
-use labelgs::internals::train::{StepReport, Trainer};
-use labelgs::io::initial_gaussians;
+use labelgs::internals::train::{StepReport, Trainer, first_model};
 use labelgs::render::{NEAR, RenderOptions};
 use labelgs::run::TrainConfig;
 use labelgs::scene::{Dataset, Gaussians, View};
@@ -28,7 +26,7 @@ pub fn small_scene() -> SynthOptions {
 
 /// The model that a training of the scene starts from.
 pub fn start(dataset: &Dataset, config: &TrainConfig) -> Result<Gaussians> {
-    initial_gaussians(dataset, config.seed, RANDOM_COUNT)
+    first_model(dataset, config)
 }
 
 /// A trainer on a copy of the scene.

@@ -28,8 +28,6 @@ const NEIGHBOURS: usize = 3;
 const SIZE_MAX: f64 = 0.02;
 /// Fewest points; a scene with fewer counts as one without points.
 const POINTS_MIN: usize = 16;
-/// Default number of Gaussians for a scene without points.
-pub const RANDOM_COUNT: usize = 50_000;
 
 /// Makes the initial Gaussians: SH degree 3 with only the constant colour set, opacity 0.1, no rotation, isotropic, no
 /// labels. The standard deviation is the root mean square distance to the three nearest neighbours.
@@ -38,7 +36,7 @@ pub const RANDOM_COUNT: usize = 50_000;
 /// in the space that the training cameras see, if possible where the photos agree on a colour; none is then larger than
 /// a fiftieth of a picture.
 pub fn initial_gaussians(dataset: &Dataset, seed: u64, count_if_no_points: usize) -> Result<Gaussians> {
-    if dataset.points.len() >= POINTS_MIN {
+    if has_points(dataset) {
         check_seen(dataset)?;
         let distances2 = neighbour_distances2(&dataset.points, dataset.extent())?;
         return Ok(from_points(&dataset.points, &distances2, dataset.extent()));
@@ -52,10 +50,15 @@ pub fn initial_gaussians(dataset: &Dataset, seed: u64, count_if_no_points: usize
     Ok(from_points(&points, &distances2, dataset.extent()))
 }
 
+/// Returns true if the first Gaussians lie at the points of the scene, not at random places.
+pub(crate) fn has_points(dataset: &Dataset) -> bool {
+    dataset.points.len() >= POINTS_MIN
+}
+
 /// Adds far Gaussians to the initial ones where photos look past all points of the scene, such as at the sky:
 /// `directions` are tried. A scene without points has none, because its random points lie at all depths.
 pub fn add_far_gaussians(model: &mut Gaussians, dataset: &Dataset, directions: u32) {
-    if dataset.points.len() < POINTS_MIN {
+    if !has_points(dataset) {
         return;
     }
     let (points, deviation) = shell::points(dataset, directions as usize);

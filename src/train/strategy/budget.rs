@@ -4,9 +4,9 @@
 //! budget rises linearly to its end. After it, densifications go on without growth, to prune. A pass of its own
 //! marks Gaussians that fog the cameras.
 
-use super::{At, Population, Strategy};
+use super::{At, Population, Strategy, passes};
 use crate::error::Result;
-use crate::pass::{Builder, Extension, Hook, densify};
+use crate::pass::Extension;
 use crate::scheduler::plan::Buf;
 use crate::shaders::structs::StepUniforms;
 use serde_json::Value;
@@ -17,18 +17,6 @@ use std::sync::Arc;
 pub(crate) struct BudgetStrategy {
     /// Number of Gaussians before the first densification.
     start: Option<u32>,
-}
-
-/// The pass that marks Gaussians that fog the camera of the step.
-#[derive(Debug)]
-struct FreeSpace;
-
-impl Extension for FreeSpace {
-    fn extend(&self, _: u32, hook: Hook, b: &mut Builder) {
-        if hook == Hook::Updated {
-            densify::mark_near(b);
-        }
-    }
 }
 
 impl Strategy for BudgetStrategy {
@@ -57,16 +45,17 @@ impl Strategy for BudgetStrategy {
         Ok(())
     }
 
-    fn uniforms(&self, _at: At, to: &mut StepUniforms) {
+    fn uniforms(&self, at: At, to: &mut StepUniforms) {
+        passes::regularise(at, to);
         to.sum_absolute = 1;
     }
 
     fn extension(&self) -> Arc<dyn Extension> {
-        Arc::new(FreeSpace)
+        Arc::new(passes::Passes)
     }
 
     fn passes(&self, at: At) -> u32 {
-        u32::from(at.config.free_space)
+        passes::of(at)
     }
 
     fn planes(&self) -> &'static [Buf] {

@@ -3,10 +3,13 @@
 
 pub(crate) mod adc;
 pub(crate) mod budget;
+pub(crate) mod mcmc;
+pub(crate) mod passes;
 pub(crate) mod population;
 
 use adc::AdcStrategy;
 use budget::BudgetStrategy;
+use mcmc::McmcStrategy;
 pub use population::Densified;
 pub(crate) use population::{Bound, Population};
 
@@ -24,6 +27,7 @@ use std::sync::Arc;
 pub fn of(kind: StrategyKind) -> Box<dyn Strategy> {
     match kind {
         StrategyKind::Budget => Box::new(BudgetStrategy::default()),
+        StrategyKind::Mcmc => Box::new(McmcStrategy::default()),
         StrategyKind::Adc => Box::new(AdcStrategy),
     }
 }

@@ -73,11 +73,7 @@ impl<'a> Population<'a> {
             let counted = self.count_densified(bounded)?;
             let room = self.engine.size().gaussians;
             match self.engine.make_room_for_gaussians(u64::from(counted.densified_count)) {
-                Err(error) if error.is_out_of_memory() && most > room => {
-                    tracing::warn!("{error}; the number of Gaussians stays at {room} until the run is resumed");
-                    *self.bound = Bound { most: room, by_memory: true };
-                    most = room;
-                }
+                Err(error) if error.is_out_of_memory() && most > room => most = self.bound_to_room(&error),
                 other => break other.map(|()| (bounded, counted))?,
             }
         };
@@ -89,6 +85,39 @@ impl<'a> Population<'a> {
         let done = Densified { cloned: counted.cloned_count, split: counted.split_count, pruned: counted.pruned_count };
         self.densified = Some(done);
         Ok(done)
+    }
+
+    /// Removes faint and marked Gaussians, and draws others in proportion to their opacity until there are `wanted`, within
+    /// the limit. Each one drawn becomes a stack of copies that look like it. Statistics start over.
+    pub fn relocate(&mut self, uniforms: StepUniforms, wanted: u64) -> Result<Densified> {
+        let counted = self.engine.run(ListKey::RelocateCount, &uniforms)?.counters;
+        let (alive, weight) = (u64::from(self.count() - counted.pruned_count), counted.densified_count);
+        if alive == 0 {
+            return Err(Error::Pruned { step: self.step });
+        }
+        let mut most = self.most(u32::try_from(wanted).unwrap_or(u32::MAX))?.max(alive);
+        loop {
+            let room = self.engine.size().gaussians;
+            match self.engine.make_room_for_gaussians(most) {
+                Err(error) if error.is_out_of_memory() && most > room => most = self.bound_to_room(&error),
+                other => break other?,
+            }
+        }
+        let draws = (most - alive) as u32;
+        let uniforms = StepUniforms { draws, draws_per_weight: draws as f32 / weight as f32, ..uniforms };
+        let applied = self.engine.run(ListKey::RelocateApply, &uniforms)?.counters;
+        self.engine.set_gaussian_count(applied.densified_count);
+        let done = Densified { cloned: applied.cloned_count, split: 0, pruned: applied.pruned_count };
+        self.densified = Some(done);
+        Ok(done)
+    }
+
+    /// Memory limits the number of Gaussians to that of now.
+    fn bound_to_room(&mut self, error: &Error) -> u64 {
+        let room = self.engine.size().gaussians;
+        tracing::warn!("{error}; the number of Gaussians stays at {room} until the run is resumed");
+        *self.bound = Bound { most: room, by_memory: true };
+        room
     }
 
     /// Lowers all opacities to at most 0.01.

@@ -74,22 +74,41 @@ pub fn split_long_child(rules: &Rules, parent: &Row, child: u32) -> Row {
     Row { mean: mean.into(), scale, opacity: (opacity / (1.0 - opacity)).ln(), ..*parent }
 }
 
-/// Returns true if a Gaussian fogs a camera, and the distance of this decision, relative to its threshold.
-pub fn is_near(rules: &Rules, camera: &Camera, row: &Row) -> (bool, f64) {
-    let place = camera.to_camera(DVec3::from(row.mean));
-    let ratio = |value: f64, limit: f64| (value / limit - 1.0).abs();
+/// Returns true if a Gaussian fogs a camera or one on the way to `other`, where the near plane is that of the pair, and
+/// the distance of this decision.
+pub fn is_near(rules: &Rules, camera: &Camera, other: Option<(DVec3, f64)>, row: &Row) -> (bool, f64) {
+    let mean = DVec3::from(row.mean);
+    let place = camera.to_camera(mean);
     let size = rules.free_size * place.length();
-    let engulfs = largest_scale(row) > size;
-    let mut margin = ratio(largest_scale(row), size);
-    let slope = |at: f64, focal: f64, centre: f64, side: u32| {
+    let engulfs = largest_scale(row) - size;
+    let own = before(rules, camera, [place, place], rules.near);
+    let on_the_way =
+        other.map(|(centre, near)| before(rules, camera, [place, camera.rotation * (mean - centre)], near));
+    let slacks = [Some(engulfs / size), Some(own), on_the_way];
+    let margin = slacks.iter().flatten().fold(f64::INFINITY, |least: f64, slack| least.min(slack.abs()));
+    (slacks.iter().flatten().any(|&slack| slack >= 0.0), margin)
+}
+
+/// How much of the way from the first to the last place, in camera space, is before the near plane and inside the image
+/// with its margin. Negative: by how much it is outside.
+fn before(rules: &Rules, camera: &Camera, places: [DVec3; 2], near: f64) -> f64 {
+    let limits = |focal: f64, centre: f64, side: u32| {
         let (side, spare) = (f64::from(side), rules.jacobian_margin * 0.5 * f64::from(side));
-        let pixel = focal * at / place.z + centre;
-        ((-spare..=side + spare).contains(&pixel), ratio(pixel, -spare).min(ratio(pixel, side + spare)))
+        [(-spare - centre) / focal, (side + spare - centre) / focal]
     };
-    let (x, x_margin) = slope(place.x, camera.fx, camera.cx, camera.width);
-    let (y, y_margin) = slope(place.y, camera.fy, camera.cy, camera.height);
-    margin = margin.min(x_margin).min(y_margin).min(ratio(place.z, rules.near)).min(place.z.abs());
-    (engulfs || (place.z > 0.0 && place.z <= rules.near && x && y), margin)
+    let ([left, right], [top, bottom]) =
+        (limits(camera.fx, camera.cx, camera.width), limits(camera.fy, camera.cy, camera.height));
+    let [first, last] =
+        places.map(|p| [p.z, near - p.z, p.x - left * p.z, right * p.z - p.x, p.y - top * p.z, bottom * p.z - p.y]);
+    let (mut low, mut high, mut least) = (0.0_f64, 1.0_f64, f64::INFINITY);
+    for (a, b) in first.into_iter().zip(last) {
+        least = least.min(a.max(b));
+        if (a < 0.0) != (b < 0.0) {
+            let zero = a / (a - b);
+            (low, high) = if a < 0.0 { (low.max(zero), high) } else { (low, high.min(zero)) };
+        }
+    }
+    if least < 0.0 { least } else { (high - low).min(least) }
 }
 
 /// Clones and splits by the mean gradient, then removes faint and (late) huge rows. The order is kept: a clone directly

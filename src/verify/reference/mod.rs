@@ -12,6 +12,7 @@ pub mod loss;
 pub mod model;
 pub mod project;
 pub mod random;
+pub mod relocate;
 pub mod rules;
 pub mod scan;
 pub mod sh;

@@ -6,7 +6,8 @@ fn pcg_hash(v: u32) -> u32 {
     (word >> 22) ^ word
 }
 
-fn uniform_draw(seed: u32, index: u32, draw: u32) -> f64 {
+/// A number in 0 to 1, both excluded.
+pub fn uniform_draw(seed: u32, index: u32, draw: u32) -> f64 {
     let hash = pcg_hash(pcg_hash(pcg_hash(seed).wrapping_add(index)).wrapping_add(draw));
     (f64::from(hash >> 8) + 0.5) / 16_777_216.0
 }

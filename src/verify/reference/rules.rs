@@ -76,6 +76,14 @@ pub struct Rules {
     pub prune_scale: f64,
     /// Large Gaussians are removed after this step.
     pub prune_scale_after: u32,
+    /// Weight of an opaque Gaussian in a draw.
+    pub relocate_one: f64,
+    /// Most copies of a Gaussian in a stack.
+    pub relocate_most: u32,
+    /// Steepness in opacity at which Gaussians stop to move at random.
+    pub noise_steep: f64,
+    /// The opacity at which they do.
+    pub noise_opacity: f64,
     /// Ceiling of an opacity reset.
     pub reset_opacity: f64,
     /// Minimum weight at which a main Gaussian takes the label of its pixel.
@@ -127,6 +135,10 @@ impl Default for Rules {
             prune_opacity: wide(0.005),
             prune_scale: wide(0.1),
             prune_scale_after: 3000,
+            relocate_one: 255.0,
+            relocate_most: 51,
+            noise_steep: 100.0,
+            noise_opacity: wide(0.005),
             reset_opacity: wide(0.01),
             lift_threshold: wide(0.6),
         }
@@ -157,6 +169,10 @@ pub enum Family {
     Densify,
     /// Marks of Gaussians that fog a camera.
     FreeSpace,
+    /// Relocation.
+    Relocate,
+    /// Random moves.
+    Explore,
     /// Opacity reset.
     Reset,
     /// Labelling.
@@ -176,9 +192,9 @@ pub struct Mutant {
 
 /// One mutant for each constant; most change it by a few per cent.
 pub fn mutants() -> Vec<Mutant> {
-    use Family::{Adam, Blend, Densify, FreeSpace, Lift, Loss, Project, Reset, Sh};
+    use Family::{Adam, Blend, Densify, Explore, FreeSpace, Lift, Loss, Project, Relocate, Reset, Sh};
     type Change = fn(&mut Rules);
-    let changes: [(&'static str, Family, Change); 35] = [
+    let changes: [(&'static str, Family, Change); 39] = [
         ("near", Project, |r| r.near = 3.8),
         ("dilation", Project, |r| r.dilation *= 1.03),
         ("jacobian_margin", Project, |r| r.jacobian_margin *= 0.97),
@@ -213,6 +229,10 @@ pub fn mutants() -> Vec<Mutant> {
         ("prune_opacity", Densify, |r| r.prune_opacity *= 4.0),
         ("prune_scale", Densify, |r| r.prune_scale *= 0.5),
         ("prune_scale_after", Densify, |r| r.prune_scale_after = 100),
+        ("relocate_one", Relocate, |r| r.relocate_one *= 0.5),
+        ("relocate_most", Relocate, |r| r.relocate_most = 4),
+        ("noise_steep", Explore, |r| r.noise_steep *= 1.03),
+        ("noise_opacity", Explore, |r| r.noise_opacity *= 1.1),
         ("reset_opacity", Reset, |r| r.reset_opacity *= 1.03),
     ];
     let lift: (&'static str, Family, Change) = ("lift_threshold", Lift, |r| r.lift_threshold *= 0.75);
@@ -257,6 +277,10 @@ mod tests {
             (r.split_opacity, glsl::SPLIT_OPACITY),
             (r.stat_near, glsl::STAT_NEAR),
             (r.free_size, glsl::FREE_SIZE),
+            (r.relocate_one, glsl::RELOCATE_ONE),
+            (f64::from(r.relocate_most), glsl::RELOCATE_MOST as f32),
+            (r.noise_steep, glsl::NOISE_STEEP),
+            (r.noise_opacity, glsl::NOISE_OPACITY),
             ((r.reset_opacity / (1.0 - r.reset_opacity)).ln(), glsl::OPACITY_RESET_LOGIT),
         ];
         let degree_2 = r.sh_c2.into_iter().zip([c20, -c20, c22, -c20, c24]);

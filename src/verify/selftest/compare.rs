@@ -28,6 +28,11 @@ pub struct Tolerance {
 }
 
 impl Tolerance {
+    /// Returns the tolerance times a factor.
+    pub fn times(self, factor: f64) -> Self {
+        Self { absolute: self.absolute * factor, relative: self.relative * factor }
+    }
+
     fn bound(&self, expected: f64) -> f64 {
         self.absolute + self.relative * expected.abs()
     }

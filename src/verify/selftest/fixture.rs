@@ -5,7 +5,7 @@ use crate::engine::{Engine, EngineSize, Input, LabelSize, ListKey, Report};
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::pass::{KernelShape, Variant};
-use crate::scene::{LabelMap, Photo};
+use crate::scene::{Camera, LabelMap, Photo};
 use crate::scheduler::SchedulerOptions;
 use crate::scheduler::plan::{Buf, PlanOptions};
 use crate::shaders::structs::StepUniforms;
@@ -61,6 +61,8 @@ pub struct Fixture {
     pub config: TrainConfig,
     /// Extent of the scene.
     pub fixed: SceneScale,
+    /// Another camera with free space on the way to it, and the near plane there.
+    pub free_space: Option<(Camera, f32)>,
 }
 
 /// Scheduler options that keep every buffer readable.
@@ -130,7 +132,8 @@ impl Fixture {
             if labels { scene.target.slots.iter().map(|slot| slot.label as u16).collect() } else { Vec::new() };
         let input = StepInput { step: 1, view: 0, layers, labels, update: false, updates: 1 };
         let view = train_view(&scene);
-        let mut fixture = Self { view, engine, scene, input, config, fixed: SceneScale { extent: 1.0 } };
+        let mut fixture =
+            Self { view, engine, scene, input, config, fixed: SceneScale { extent: 1.0 }, free_space: None };
         let weights = step_input::layer_weights(&fixture.input, &fixture.view, &fixture.config);
         fixture.scene.target.slots.iter_mut().zip(weights).for_each(|(slot, weight)| slot.weight = f64::from(weight));
         Ok(fixture)
@@ -139,6 +142,9 @@ impl Fixture {
     /// The uniforms of the step.
     pub fn uniforms(&self) -> StepUniforms {
         let mut uniforms = step_input::uniforms(&self.input, &self.view, &self.config, self.fixed, &self.engine);
+        if let Some((camera, near)) = &self.free_space {
+            uniforms = self.engine.with_free_space(uniforms, camera, *near);
+        }
         let at = At { step: self.input.step, config: &self.config, extent: self.fixed.extent };
         strategy::of(self.config.strategy).uniforms(at, &mut uniforms);
         uniforms

@@ -5,6 +5,7 @@ pub mod compare;
 pub mod fixture;
 pub mod judge;
 pub mod model;
+pub mod relocation;
 pub mod scenes;
 mod training;
 
@@ -100,10 +101,12 @@ pub fn passes(
 /// Runs the checks of passes that change the model.
 pub fn changes(rules: &Rules, gpu: &Arc<Gpu>, kernels: KernelShape, mut done: impl FnMut(Check)) -> Result<()> {
     type Change = fn(&Rules, &Arc<Gpu>, KernelShape, f64) -> Result<Verdict>;
-    let changes: [(&str, Change); 5] = [
+    let changes: [(&str, Change); 7] = [
         ("densification", model::densification),
         ("densification along the longest axis", model::long_splits),
         ("marks of fog", model::fog_of_a_step),
+        ("relocation", relocation::relocation),
+        ("random moves", relocation::exploration),
         ("reset of opacities", model::reset),
         ("lift of labels by the paper's rule", model::lift_of_a_step),
     ];

@@ -7,13 +7,14 @@ use crate::engine::ListKey;
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::pass::KernelShape;
-use crate::scene::Gaussians;
+use crate::scene::{Camera, Gaussians};
 use crate::scheduler::plan::Buf;
 use crate::shaders::structs::{Counters, StepUniforms};
 use crate::train::TrainConfig;
 use crate::train::strategy::Strategy as _;
 use crate::train::strategy::adc::prunes_large_at;
 use crate::train::strategy::budget::BudgetStrategy;
+use crate::train::strategy::passes::FREE_SPACE;
 use crate::verify::reference::blend::blend_forward;
 use crate::verify::reference::densify::{Origin, Population, densify, is_near, mark, opacity_reset};
 use crate::verify::reference::lift::{Masks, centres_of, lift, lift_resolve};
@@ -21,13 +22,19 @@ use crate::verify::reference::random::normal_draw;
 use crate::verify::reference::splat::Splat;
 use crate::verify::reference::step::Target;
 use crate::verify::reference::{Row, Rules};
+use glam::DVec3;
 use std::sync::Arc;
 
-const SEED: u32 = 0x1234_5678;
+pub(super) const SEED: u32 = 0x1234_5678;
 
 /// Uploads a population with moments and statistics to a fixture; returns the uniforms that change it at `step` in a
 /// scene of extent 1.
-fn holding(fixture: &mut Fixture, before: &Population, step: u32, splits_long: bool) -> Result<StepUniforms> {
+pub(super) fn holding(
+    fixture: &mut Fixture,
+    before: &Population,
+    step: u32,
+    splits_long: bool,
+) -> Result<StepUniforms> {
     fixture.put_rows(MOMENTS_1, &before.m)?;
     fixture.put_rows(MOMENTS_2, &before.u)?;
     let stats: Vec<[f32; 2]> =
@@ -218,6 +225,12 @@ pub fn large(seed: u64) -> Scene {
     scene
 }
 
+/// A camera beside another one.
+fn other_camera(camera: &Camera) -> Camera {
+    let centre = camera.centre() + DVec3::new(1.5, 0.5, -0.5);
+    Camera { translation: -(camera.rotation * centre), ..camera.clone() }
+}
+
 /// A finished step with the pass that marks Gaussians that fog its camera.
 pub struct Fog {
     scene: Scene,
@@ -229,16 +242,20 @@ impl Fog {
     /// Near plane; about half of the Gaussians of [`large`] are before it, world units.
     const NEAR: f32 = 4.0;
 
+    /// Near plane of the other camera, world units.
+    const OTHER_NEAR: f32 = 2.5;
+
     /// Runs the step.
     pub fn new(fixture: &mut Fixture) -> Result<Self> {
         let count = fixture.scene.gaussians.len();
         fixture.view.near = Self::NEAR;
+        fixture.free_space = Some((other_camera(&fixture.scene.camera), Self::OTHER_NEAR));
         fixture.input.update = true;
-        fixture.engine.set_extension(BudgetStrategy::default().extension(), 1);
+        fixture.engine.set_extension(BudgetStrategy::default().extension(), FREE_SPACE);
         let ListKey::Train(variant) = fixture.key() else {
             return Err(Error::Bug("the key of a step is that of another list".to_owned()));
         };
-        fixture.train_as(ListKey::Extended(variant, 1))?;
+        fixture.train_as(ListKey::Extended(variant, FREE_SPACE))?;
         let stats = fixture.get::<[f32; 2]>(Buf::DENSIFY_STATS, count)?;
         let rows = fixture.rows(PARAMETERS, count)?;
         Ok(Self { scene: fixture.scene.clone(), rows, counts: stats.iter().map(|pair| pair[1]).collect() })
@@ -247,7 +264,9 @@ impl Fog {
     /// Compares with the reference under `rules`, except for decisions too near to a threshold.
     pub fn verdict(&self, rules: &Rules) -> Verdict {
         let rules = Rules { near: f64::from(Self::NEAR), ..rules.clone() };
-        let expected: Vec<(bool, f64)> = self.rows.iter().map(|row| is_near(&rules, &self.scene.camera, row)).collect();
+        let other = (other_camera(&self.scene.camera).centre(), f64::from(Self::OTHER_NEAR));
+        let decide = |row: &Row| is_near(&rules, &self.scene.camera, Some(other), row);
+        let expected: Vec<(bool, f64)> = self.rows.iter().map(decide).collect();
         let sure: Vec<usize> = (0..expected.len()).filter(|&row| expected[row].1 > 1e-4).collect();
         let marked = expected.iter().filter(|(marked, _)| *marked).count();
         if sure.len() * 10 < expected.len() * 9 || marked * 10 < expected.len() || marked * 10 > expected.len() * 9 {
@@ -258,7 +277,7 @@ impl Fog {
     }
 }
 
-fn rig_of(gpu: &Arc<Gpu>, kernels: KernelShape, scene: Scene) -> Result<Fixture> {
+pub(super) fn rig_of(gpu: &Arc<Gpu>, kernels: KernelShape, scene: Scene) -> Result<Fixture> {
     Fixture::new(Arc::clone(gpu), scene, true, kernels, readable())
 }
 

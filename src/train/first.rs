@@ -1,0 +1,47 @@
+//! The model that a training starts from.
+
+use super::setup::with_budget;
+use super::{StrategyKind, TrainConfig};
+use crate::error::Result;
+use crate::io::init;
+use crate::scene::{Dataset, Gaussians};
+
+/// Random Gaussians for a scene without points: at most this many, and this share of the budget, so that growth chooses
+/// the places of the others.
+const RANDOM_MOST: u64 = 50_000;
+const RANDOM_SHARE: f64 = 0.25;
+/// First opacity with the strategy mcmc, and factor of the first deviations. 3DGS-MCMC has 0.5 and 0.1; its long runs
+/// have the time to grow.
+const MCMC_OPACITY: f32 = 0.5;
+const MCMC_SIZE: f32 = 0.3;
+
+/// Makes the initial Gaussians of a training: at the points of the scene or at random places, and far ones. If they are
+/// more than `max_gaussians`, they are thinned evenly.
+pub fn first_model(dataset: &Dataset, config: &TrainConfig) -> Result<Gaussians> {
+    let random = match config.strategy {
+        StrategyKind::Adc => RANDOM_MOST,
+        StrategyKind::Budget | StrategyKind::Mcmc => {
+            RANDOM_MOST.min((RANDOM_SHARE * with_budget(config, dataset)?.budget as f64) as u64).max(1)
+        }
+    };
+    let mut model = init::initial_gaussians(dataset, config.seed, random as usize)?;
+    init::add_far_gaussians(&mut model, dataset, config.far_points);
+    if config.strategy == StrategyKind::Mcmc {
+        model.opacities.fill((MCMC_OPACITY / (1.0 - MCMC_OPACITY)).ln());
+        model.scales.iter_mut().flatten().for_each(|scale| *scale += MCMC_SIZE.ln());
+    }
+    thin(&mut model, config.max_gaussians);
+    Ok(model)
+}
+
+fn thin(model: &mut Gaussians, bound: u64) {
+    let count = model.len() as u64;
+    if bound > 0 && count > bound {
+        tracing::warn!(
+            "{count} initial points, and `max_gaussians` is {bound}: every {:.1}-th is used",
+            count as f64 / bound as f64
+        );
+        // Keep row i if `i * bound / count` steps up there.
+        *model = model.filtered(|row| row as u64 * bound / count != (row as u64 + 1) * bound / count);
+    }
+}

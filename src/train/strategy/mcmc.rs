@@ -1,0 +1,71 @@
+//! A fixed number of Gaussians that explore the scene (3DGS-MCMC, Kheradmand et al. 2024): faint ones move at random;
+//! dead ones become copies of others, drawn by their opacity. The loss keeps opacities and sizes small.
+//!
+//! Three things differ from the paper. The number rises linearly to the budget, because a twentieth more at each event takes
+//! as many events as only long runs have. A stack of copies keeps the light of the one in a picture, not along a line. The
+//! factor of the learning rates for short runs does not apply to the moves.
+
+use super::{At, Population, Strategy, passes};
+use crate::error::Result;
+use crate::pass::Extension;
+use crate::scheduler::plan::Buf;
+use crate::shaders::structs::StepUniforms;
+use serde_json::Value;
+use std::sync::Arc;
+
+/// Random moves by the learning rate of positions, both in scene extents (3DGS-MCMC).
+const NOISE: f64 = 5e5;
+
+/// Relocation.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct McmcStrategy {
+    /// Number of Gaussians before the first relocation.
+    start: Option<u32>,
+}
+
+impl Strategy for McmcStrategy {
+    fn name(&self) -> &'static str {
+        "mcmc"
+    }
+
+    fn acts_after(&self, at: At) -> bool {
+        !at.is_last() && (at.config.relocates_at(at.step) || at.config.prunes_at(at.step))
+    }
+
+    fn act(&mut self, at: At, population: &mut Population) -> Result<()> {
+        let config = at.config;
+        let start = *self.start.get_or_insert(population.count());
+        let wanted = if config.relocates_at(at.step) { config.budget_at(at.step, u64::from(start)) } else { 0 };
+        let uniforms = StepUniforms { prune_opacity: config.min_opacity, ..population.uniforms() };
+        let what = population.relocate(uniforms, wanted)?;
+        tracing::debug!("step {}: {what:?}, {} Gaussians", at.step, population.count());
+        Ok(())
+    }
+
+    fn uniforms(&self, at: At, to: &mut StepUniforms) {
+        passes::regularise(at, to);
+        let rate = at.config.rates_at(at.step).position / at.config.rate_factor();
+        to.noise = (NOISE * rate / at.extent) as f32;
+    }
+
+    fn extension(&self) -> Arc<dyn Extension> {
+        Arc::new(passes::Passes)
+    }
+
+    fn passes(&self, at: At) -> u32 {
+        passes::of(at) | passes::EXPLORE
+    }
+
+    fn planes(&self) -> &'static [Buf] {
+        &[Buf::DENSIFY_STATS]
+    }
+
+    fn keep(&self) -> Value {
+        self.start.into()
+    }
+
+    fn restore(&mut self, kept: &Value) -> Result<(), String> {
+        self.start = serde_json::from_value(kept.clone()).map_err(|error| format!("first number: {error}"))?;
+        Ok(())
+    }
+}
