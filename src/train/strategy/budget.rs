@@ -4,7 +4,7 @@
 //! budget rises linearly to its end. After it, densifications go on without growth, to prune. A pass of its own
 //! marks Gaussians that fog the cameras.
 
-use super::{At, Population, Strategy, passes};
+use super::{At, FirstCount, Population, Strategy, passes};
 use crate::error::Result;
 use crate::pass::Extension;
 use crate::scheduler::plan::Buf;
@@ -15,8 +15,7 @@ use std::sync::Arc;
 /// Growth within a budget.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct BudgetStrategy {
-    /// Number of Gaussians before the first densification.
-    start: Option<u32>,
+    start: FirstCount,
 }
 
 impl Strategy for BudgetStrategy {
@@ -31,7 +30,7 @@ impl Strategy for BudgetStrategy {
     fn act(&mut self, at: At, population: &mut Population) -> Result<()> {
         let config = at.config;
         let grows = config.densifies_at(at.step);
-        let start = *self.start.get_or_insert(population.count());
+        let start = self.start.of(population);
         let uniforms = StepUniforms {
             densify_threshold: if grows { config.densify_grad_threshold } else { 0.0 },
             // All that grow split.
@@ -40,7 +39,7 @@ impl Strategy for BudgetStrategy {
             prune_opacity: config.min_opacity,
             ..population.uniforms()
         };
-        let what = population.densify(uniforms, config.budget_at(at.step, u64::from(start)))?;
+        let what = population.densify(uniforms, config.budget_at(at.step, start))?;
         tracing::debug!("step {}: {what:?}, {} Gaussians", at.step, population.count());
         Ok(())
     }
@@ -63,11 +62,10 @@ impl Strategy for BudgetStrategy {
     }
 
     fn keep(&self) -> Value {
-        self.start.into()
+        self.start.keep()
     }
 
     fn restore(&mut self, kept: &Value) -> Result<(), String> {
-        self.start = serde_json::from_value(kept.clone()).map_err(|error| format!("first number: {error}"))?;
-        Ok(())
+        self.start.restore(kept)
     }
 }

@@ -5,7 +5,7 @@
 //! as many events as only long runs have. A stack of copies keeps the light of the one in a picture, not along a line. The
 //! factor of the learning rates for short runs does not apply to the moves.
 
-use super::{At, Population, Strategy, passes};
+use super::{At, FirstCount, Population, Strategy, passes};
 use crate::error::Result;
 use crate::pass::Extension;
 use crate::scheduler::plan::Buf;
@@ -19,8 +19,7 @@ const NOISE: f64 = 5e5;
 /// Relocation.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct McmcStrategy {
-    /// Number of Gaussians before the first relocation.
-    start: Option<u32>,
+    start: FirstCount,
 }
 
 impl Strategy for McmcStrategy {
@@ -34,8 +33,8 @@ impl Strategy for McmcStrategy {
 
     fn act(&mut self, at: At, population: &mut Population) -> Result<()> {
         let config = at.config;
-        let start = *self.start.get_or_insert(population.count());
-        let wanted = if config.relocates_at(at.step) { config.budget_at(at.step, u64::from(start)) } else { 0 };
+        let start = self.start.of(population);
+        let wanted = if config.relocates_at(at.step) { config.budget_at(at.step, start) } else { 0 };
         let uniforms = StepUniforms { prune_opacity: config.min_opacity, ..population.uniforms() };
         let what = population.relocate(uniforms, wanted)?;
         tracing::debug!("step {}: {what:?}, {} Gaussians", at.step, population.count());
@@ -61,11 +60,10 @@ impl Strategy for McmcStrategy {
     }
 
     fn keep(&self) -> Value {
-        self.start.into()
+        self.start.keep()
     }
 
     fn restore(&mut self, kept: &Value) -> Result<(), String> {
-        self.start = serde_json::from_value(kept.clone()).map_err(|error| format!("first number: {error}"))?;
-        Ok(())
+        self.start.restore(kept)
     }
 }

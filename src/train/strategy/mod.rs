@@ -102,6 +102,26 @@ pub trait Strategy: Debug + Send {
     }
 }
 
+/// The number of Gaussians before the first change of a strategy, from which a budget rises.
+#[derive(Clone, Copy, Debug, Default)]
+struct FirstCount(Option<u32>);
+
+impl FirstCount {
+    /// Returns the number, which the first call decides.
+    fn of(&mut self, population: &Population) -> u64 {
+        u64::from(*self.0.get_or_insert(population.count()))
+    }
+
+    fn keep(self) -> Value {
+        self.0.into()
+    }
+
+    fn restore(&mut self, kept: &Value) -> Result<(), String> {
+        self.0 = serde_json::from_value(kept.clone()).map_err(|error| format!("first number: {error}"))?;
+        Ok(())
+    }
+}
+
 /// The state of a strategy in a checkpoint.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
