@@ -62,8 +62,7 @@ pub struct TrainFlags {
     pub trust: ReadArgs,
     /// Start from settings for a length and a level of detail: draft for a first look, standard, or best.
     ///
-    /// Flags override them: draft has 2000 steps, standard the 7000 of the default, best 30000 and up to twice as many
-    /// Gaussians.
+    /// Flags override them.
     #[arg(long, value_name = "NAME", conflicts_with_all = ["config", "paper"])]
     pub preset: Option<Preset>,
     /// Start from the settings of the LabelGS paper, where ours differ:

@@ -8,7 +8,7 @@ use super::{LabelRule, StrategyKind, TrainConfig};
 pub enum Preset {
     /// 2000 steps: a first look.
     Draft,
-    /// 7000 steps.
+    /// 7000 steps, the default.
     Standard,
     /// 30000 steps and up to twice as many Gaussians.
     Best,

@@ -78,6 +78,12 @@ fn same_when_resumed(turn: &Turn, config: TrainConfig, data: fn() -> Dataset, op
     first.0
 }
 
+fn gaussians_of(ply: &[u8]) -> usize {
+    let folder = tempfile::tempdir().expect("a folder");
+    std::fs::write(folder.path().join("model.ply"), ply).expect("a PLY");
+    labelgs::io::read_model(folder.path().join("model.ply")).expect("a model").gaussians.len()
+}
+
 #[test]
 fn a_training_with_votes_goes_on_to_the_same_bits() {
     let Some(turn) = device() else { return };
@@ -91,9 +97,7 @@ fn a_training_within_a_budget_goes_on_to_the_same_bits() {
     let Some(turn) = device() else { return };
     let config = TrainConfig { iterations: 60, ..budgeted() };
     let ply = same_when_resumed(&turn, config, small, SchedulerOptions::default());
-    let folder = tempfile::tempdir().expect("a folder");
-    std::fs::write(folder.path().join("model.ply"), &ply).expect("a PLY");
-    let count = labelgs::io::read_model(folder.path().join("model.ply")).expect("a model").gaussians.len();
+    let count = gaussians_of(&ply);
     assert!(count > 600 && count <= 900, "{count} Gaussians within the budget");
     assert!(labels_of(&ply) > 10);
 }
@@ -104,9 +108,7 @@ fn a_training_with_relocation_goes_on_to_the_same_bits() {
     let Some(turn) = device() else { return };
     let config = TrainConfig { iterations: 60, strategy: StrategyKind::Mcmc, ..budgeted() };
     let ply = same_when_resumed(&turn, config, small, SchedulerOptions::default());
-    let folder = tempfile::tempdir().expect("a folder");
-    std::fs::write(folder.path().join("model.ply"), &ply).expect("a PLY");
-    let count = labelgs::io::read_model(folder.path().join("model.ply")).expect("a model").gaussians.len();
+    let count = gaussians_of(&ply);
     assert!(count > 850 && count <= 900, "{count} Gaussians: the budget is full");
     assert!(labels_of(&ply) > 10);
 }
