@@ -155,7 +155,7 @@ pub mod pass {
     pub use crate::pass::separate_step;
     pub use crate::pass::{
         Builder, Extension, Hook, KernelShape, Stage, Variant, densify_apply, densify_count, extended_step,
-        opacity_reset, relocate_apply, relocate_count, render_view, training_step, vote_view,
+        opacity_reset, relocate_apply, relocate_count, render_view, training_step, vote_view, weigh_view,
     };
     pub mod build {
         pub use crate::pass::build::Count;
@@ -214,6 +214,7 @@ pub mod train {
     }
     pub mod strategy {
         pub use crate::train::strategy::population::Population;
+        pub use crate::train::strategy::weights::weights;
         pub use crate::train::strategy::{At, Strategy, of};
         pub mod adc {
             pub use crate::train::strategy::adc::resets_opacity_at;

@@ -179,13 +179,14 @@ fn a_flag_has_one_heading() {
 }
 
 /// A value other than the default for each setting.
-const TYPED: [(&str, &str); 55] = [
+const TYPED: [(&str, &str); 56] = [
     ("--iterations", "7"),
     ("--max-resolution", "99"),
     ("--start-size", "0.7"),
     ("--full-size-from", "4"),
     ("--strategy", "adc"),
     ("--budget", "9k"),
+    ("--prune-share", "0.2"),
     ("--free-space", "off"),
     ("--far-points", "30"),
     ("--rate-factor", "1.5"),

@@ -73,6 +73,7 @@ fn lists() -> Vec<(Capacity, PassList)> {
             let extension = strategy::of(StrategyKind::Mcmc).extension();
             let all_passes = 7;
             add(pass::extended_step(&shape, &capacity, variant, (&*extension, all_passes)));
+            add(pass::weigh_view(&shape, &capacity));
             add(pass::densify_count(&shape, &capacity));
             add(pass::densify_apply(&shape, &capacity, true));
             add(pass::relocate_count(&shape, &capacity));

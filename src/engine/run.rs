@@ -21,6 +21,8 @@ pub enum ListKey {
     Render(u32),
     /// Votes of one view; each tile is walked this many times, for four labels each time.
     Vote(u32),
+    /// Adds up blending weights of one view.
+    Weigh,
     /// Counts the result of a densification.
     DensifyCount,
     /// Densification.
@@ -74,6 +76,7 @@ impl Engine {
             ListKey::Separate(variant, objects) => pass::separate_step(shape, capacity, variant, objects),
             ListKey::Render(sh_degree) => pass::render_view(shape, capacity, sh_degree),
             ListKey::Vote(rounds) => pass::vote_view(shape, capacity, rounds),
+            ListKey::Weigh => pass::weigh_view(shape, capacity),
             ListKey::DensifyCount => pass::densify_count(shape, capacity),
             ListKey::DensifyApply => pass::densify_apply(shape, capacity, self.size.labels.is_some()),
             ListKey::RelocateCount => pass::relocate_count(shape, capacity),

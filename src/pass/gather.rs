@@ -10,6 +10,16 @@ pub(super) fn gather(b: &mut Builder) {
     records(b, b.labels, false);
 }
 
+/// Adds the blending weights of the view to those of the Gaussians, if every pixel has a gradient of 1.
+pub(super) fn weigh(b: &mut Builder) {
+    b.list.stage = Stage::Gather;
+    pass!(b, weigh {
+        step: Buf::STEP, counters: Buf::COUNTERS, failure: Buf::FAILURE, tiles_touched: Buf::TILES_TOUCHED,
+        instance_offsets: Buf::INSTANCE_OFFSETS, gaussian_from_splat: GAUSSIAN_FROM_SPLAT,
+        v_instances_b: Buf::V_INSTANCES_B, v_instances_c: Buf::V_INSTANCES_C, densify_stats: Buf::DENSIFY_STATS,
+    } [], over_splats());
+}
+
 /// Sums the records of one object's splats; the densification statistic ignores them.
 #[cfg(feature = "lab")]
 pub(super) fn gather_object(b: &mut Builder) {

@@ -145,6 +145,18 @@ pub fn vote_view(shape: &KernelShape, capacity: &Capacity, rounds: u32) -> PassL
     end(b)
 }
 
+/// Adds the blending weights of one view to the x of the densification statistic.
+pub fn weigh_view(shape: &KernelShape, capacity: &Capacity) -> PassList {
+    let mut b = begin("weights", shape, capacity, false, 0);
+    project::visible_splats(&mut b);
+    let pairs = tile::bin_splats(&mut b);
+    blend::blend_forward(&mut b, pairs, false);
+    b.list.fill(Buf::V_IMAGE, 1.0_f32.to_bits());
+    blend::blend_backward(&mut b, pairs);
+    gather::weigh(&mut b);
+    end(b)
+}
+
 /// Counts the Gaussians that densification would leave.
 pub fn densify_count(shape: &KernelShape, capacity: &Capacity) -> PassList {
     let mut b = begin("densify: count", shape, capacity, false, 0);

@@ -144,6 +144,12 @@ crate::options::options! {
             #[cfg_attr(feature = "cli", arg(value_parser = count))]
             budget <"N">: u64 = 0;
 
+            /// Share of the Gaussians that the strategy budget prunes after growth: those with the least weight in all
+            /// photos.
+            ///
+            /// They cost time and show little. With 0 none are pruned.
+            prune_share <"SHARE">: f64 = 0.3, up_to(0.9);
+
             /// Gaussians for each pixel of the largest photo, for --budget 0.
             ///
             /// More make finer detail and cost time.

@@ -258,7 +258,7 @@ impl Trainer {
         if self.strategy.acts_after(self.at(step)) {
             done.extend(self.drain()?);
             let uniforms = self.uniforms(&input);
-            let mut population = Population::new(&mut self.engine, &mut self.bound, uniforms, step);
+            let mut population = Population::new(&mut self.engine, &mut self.bound, &self.views, uniforms, step);
             let at = At { step, config: &self.config, extent: self.fixed.extent };
             self.strategy.act(at, &mut population)?;
             self.densified = population.densified().or(self.densified);

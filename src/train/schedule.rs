@@ -14,6 +14,8 @@ const BUDGET_PER_STEP: u64 = 30;
 /// Weights of opacity and size in the loss, and the share of the run in which Gaussians relocate (3DGS-MCMC).
 const REGULAR: f64 = 0.01;
 const RELOCATE_UNTIL: f64 = 25.0 / 30.0;
+/// Share of the run after which Gaussians with little weight are pruned: soon after growth, so that the others adapt.
+const PRUNE_AT: f64 = 0.55;
 
 /// Learning rates of a step.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -169,6 +171,11 @@ impl TrainConfig {
     /// Returns true for steps after densification that end with pruning.
     pub fn prunes_at(&self, step: u32) -> bool {
         step >= self.densify_until() && step.is_multiple_of(2 * self.densify_interval())
+    }
+
+    /// Returns true for the step that ends with pruning by weight.
+    pub fn prunes_least_at(&self, step: u32) -> bool {
+        step == self.share(PRUNE_AT) && self.prune_share > 0.0
     }
 
     /// Returns true for steps that end with a densification.

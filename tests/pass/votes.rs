@@ -7,6 +7,7 @@ use crate::support::compare::{Tolerance, check, close};
 use crate::support::device;
 use crate::support::scenes::{Scene, Shape, scene};
 use labelgs::internals::label::vote::ballot::{Sweep, Voter, sweep};
+use labelgs::internals::train::strategy::weights;
 use labelgs::scene::{LabelMap, Photo};
 use std::collections::BTreeMap;
 
@@ -54,6 +55,25 @@ fn vote_sums_equal_the_mirror() {
         let expected = vote(rules, &splats, size, count, &columns, &weights);
         // Each tile's sum is rounded to 2^-16; a splat meets up to 30 tiles in each of three views.
         close(&actual, &expected, Tolerance { absolute: 90.0 * 0.5 / 65_536.0, relative: 1e-5 })
+    });
+}
+
+#[test]
+fn weights_equal_the_mirror() {
+    let Some(turn) = device() else { return };
+    let mut fixture = Fixture::new(turn, patches(142), true);
+    fixture.render();
+    let (splats, size, count) = (fixture.splats(), fixture.size(), fixture.scene.gaussians.len());
+    let (camera, near) = (fixture.scene.camera.clone(), fixture.config.near);
+    // A step before, so that records with gradients of a photo are there, and a statistic.
+    fixture.train();
+    let found = weights(&mut fixture.engine, [(&camera, near); 3].into_iter()).expect("weights");
+    let found: Vec<f64> = found.into_iter().map(f64::from).collect();
+    assert!(found.iter().any(|&weight| weight > 30.0), "{found:?}");
+    prove("weights", &["alpha_min", "alpha_max"], |rules| {
+        let expected = vote(rules, &splats, size, count, &vec![Some(0); size.0 * size.1], &[3.0]);
+        // Sums of three times 1665 pixels.
+        close(&found, &expected, Tolerance { absolute: 1e-4, relative: 1e-5 })
     });
 }
 

@@ -47,7 +47,7 @@ crate::buffers! {
     M_SHARED "m_shared": 16, Domain::SharedRows, Class::Model, VEC4, "First moments of shared_parameters.";
     U_SHARED "u_shared": 16, Domain::SharedRows, Class::Model, VEC4, "Second moments of shared_parameters.";
     W_SHARED "w_shared": 8, Domain::SharedRows, Class::Model, None, "Bias correction of both moments of each row, `[S]`: 1 - beta^t after its t-th update.";
-    DENSIFY_STATS "densify_stats": 8, Domain::Trained, Class::Model, None, "Sum of screen gradients and number of views since the last densification, `[N]`.";
+    DENSIFY_STATS "densify_stats": 8, Domain::Trained, Class::Model, None, "Sum of screen gradients and number of views since the last densification, or the weights of a pruning by weight, `[N]`.";
     LABEL_KEYS "label_keys": 4, Domain::Labelled, Class::Persistent, None, "Highest vote of the step, `[N]`: weight in the high half, label in the low half; 0 without votes.";
     VOTES_LOW "votes_low": 4, Domain::VoteCells, Class::Model, None, "Votes of a sweep by Gaussian and label, `[N, columns]`: low words.";
     VOTES_HIGH "votes_high": 4, Domain::VoteCells, Class::Model, None, "Votes of a sweep by Gaussian and label, `[N, columns]`: high words.";

@@ -24,7 +24,8 @@ impl Strategy for BudgetStrategy {
     }
 
     fn acts_after(&self, at: At) -> bool {
-        !at.is_last() && (at.config.densifies_at(at.step) || at.config.prunes_at(at.step))
+        !at.is_last()
+            && (at.config.densifies_at(at.step) || at.config.prunes_at(at.step) || at.config.prunes_least_at(at.step))
     }
 
     fn act(&mut self, at: At, population: &mut Population) -> Result<()> {
@@ -39,7 +40,11 @@ impl Strategy for BudgetStrategy {
             prune_opacity: config.min_opacity,
             ..population.uniforms()
         };
-        let what = population.densify(uniforms, config.budget_at(at.step, start))?;
+        let mut what = population.densify(uniforms, config.budget_at(at.step, start))?;
+        if config.prunes_least_at(at.step) {
+            let least = population.prune_least(config.prune_share)?;
+            what.pruned += least.pruned;
+        }
         tracing::debug!("step {}: {what:?}, {} Gaussians", at.step, population.count());
         Ok(())
     }

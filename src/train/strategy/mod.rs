@@ -6,6 +6,7 @@ pub(crate) mod budget;
 pub(crate) mod mcmc;
 pub(crate) mod passes;
 pub(crate) mod population;
+pub(crate) mod weights;
 
 use adc::AdcStrategy;
 use budget::BudgetStrategy;

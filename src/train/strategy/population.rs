@@ -2,7 +2,10 @@
 
 use crate::engine::{Engine, ListKey};
 use crate::error::{Error, Result};
+use crate::shaders::constants::STAT_NEAR;
 use crate::shaders::structs::{Counters, StepUniforms};
+use crate::train::step_input::TrainView;
+use crate::train::strategy::weights::weights;
 
 /// Counts of a densification.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -27,6 +30,7 @@ pub(crate) struct Bound {
 pub struct Population<'a> {
     engine: &'a mut Engine,
     bound: &'a mut Bound,
+    views: &'a [TrainView],
     uniforms: StepUniforms,
     step: u32,
     densified: Option<Densified>,
@@ -37,10 +41,11 @@ impl<'a> Population<'a> {
     pub(in crate::train) fn new(
         engine: &'a mut Engine,
         bound: &'a mut Bound,
+        views: &'a [TrainView],
         uniforms: StepUniforms,
         step: u32,
     ) -> Self {
-        Self { engine, bound, uniforms, step, densified: None }
+        Self { engine, bound, views, uniforms, step, densified: None }
     }
 
     /// Returns the number of Gaussians.
@@ -85,6 +90,20 @@ impl<'a> Population<'a> {
         let done = Densified { cloned: counted.cloned_count, split: counted.split_count, pruned: counted.pruned_count };
         self.densified = Some(done);
         Ok(done)
+    }
+
+    /// Removes the `share` of the Gaussians with the least blending weight over all pixels of all views. Statistics start
+    /// over.
+    pub fn prune_least(&mut self, share: f64) -> Result<Densified> {
+        let weights = weights(self.engine, self.views.iter().map(|view| (&view.camera, view.near)))?;
+        let mut order: Vec<usize> = (0..weights.len()).collect();
+        order.sort_by(|&a, &b| weights[a].total_cmp(&weights[b]));
+        let mut marks = vec![[0.0; 2]; weights.len()];
+        let least = (share * weights.len() as f64) as usize;
+        order[..least].iter().for_each(|&row| marks[row][1] = STAT_NEAR);
+        self.engine.set_densify_stats(&marks)?;
+        let uniforms = StepUniforms { densify_threshold: 0.0, prune_opacity: 0.0, prune_big: 0, ..self.uniforms };
+        self.densify(uniforms, u64::MAX)
     }
 
     /// Removes faint and marked Gaussians, and draws others in proportion to their opacity until there are `wanted`, within

@@ -12,6 +12,7 @@ use crate::pass::KernelShape;
 use crate::scene::{Gaussians, LabelMap};
 use crate::scheduler::plan::Buf;
 use crate::train::LabelRule;
+use crate::train::strategy::weights::weights;
 use crate::verify::reference::adam::{Optimised, Rates, adam};
 use crate::verify::reference::blend::{Upstream, blend_backward, blend_forward};
 use crate::verify::reference::lift::vote;
@@ -213,6 +214,17 @@ impl Ran {
         let expected = vote(&self.rules, &self.splats, size, count, &columns, &vec![1.0; ballot.labels.len()]);
         // Each tile's sum is rounded to 2^-16, and there are at most 48 tiles; pairs near the cut may go either way.
         Ok(close(&actual, &expected, Tolerance { absolute: 48.0 * 0.5 / 65_536.0 + 0.02, relative: 1e-4 }))
+    }
+
+    /// Checks the sums of blending weights of two views that are the same.
+    pub(super) fn weights(&mut self) -> Result<Verdict> {
+        let (size, count) = (self.fixture.size(), self.fixture.scene.gaussians.len());
+        let (camera, near) = (self.fixture.scene.camera.clone(), self.fixture.config.near);
+        let actual = weights(&mut self.fixture.engine, [(&camera, near); 2].into_iter())?;
+        let actual: Vec<f64> = actual.into_iter().map(f64::from).collect();
+        let expected = vote(&self.rules, &self.splats, size, count, &vec![Some(0); size.0 * size.1], &[2.0]);
+        // Sums of up to 3072 pixels; pairs near the cut may go either way.
+        Ok(close(&actual, &expected, Tolerance { absolute: 0.02, relative: 1e-4 }))
     }
 
     /// Checks Adam on all attributes; each of three steps starts from the device's own state.

@@ -1,0 +1,16 @@
+//! How much of the pictures each Gaussian makes.
+
+use crate::engine::{Engine, ListKey};
+use crate::error::Result;
+use crate::scene::Camera;
+
+/// Returns the blending weight of each Gaussian over all pixels of some views, given with their near planes, px. The
+/// densification statistic becomes that weight. Nothing may be in flight.
+pub fn weights<'a>(engine: &mut Engine, views: impl Iterator<Item = (&'a Camera, f32)>) -> Result<Vec<f32>> {
+    engine.set_densify_stats(&vec![[0.0; 2]; engine.gaussian_count() as usize])?;
+    for (camera, near) in views {
+        let uniforms = engine.view_uniforms(camera, near, [0.0; 3]);
+        engine.run(ListKey::Weigh, &uniforms)?;
+    }
+    Ok(engine.densify_stats()?.into_iter().map(|[weight, _]| weight).collect())
+}
