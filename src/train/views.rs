@@ -16,8 +16,9 @@ pub(super) struct Views {
     whole: Vec<TrainView>,
     /// Shrunk views that steps in flight use, by size and view.
     shrunk: BTreeMap<(u32, usize), TrainView>,
-    /// Other views of each view, with free space on the way.
+    /// Other views of each view, with free space on the way; empty without pruning of fog.
     partners: Vec<Vec<usize>>,
+    free_space: bool,
     start: f64,
     full_from: u32,
 }
@@ -26,14 +27,16 @@ impl Views {
     /// Makes the views of a training.
     pub(super) fn new(whole: Vec<TrainView>, config: &TrainConfig) -> Self {
         let (start, full_from) = (f64::from(config.start_size), config.full_size_from());
-        Self { whole, shrunk: BTreeMap::new(), partners: Vec::new(), start, full_from }
+        Self { whole, shrunk: BTreeMap::new(), partners: Vec::new(), free_space: config.free_space, start, full_from }
     }
 
     /// Sets the near plane of each view.
     pub(super) fn set_near_planes(&mut self, planes: &[f32]) {
         self.whole.iter_mut().zip(planes).for_each(|(view, &near)| view.near = near);
-        let cameras: Vec<&Camera> = self.whole.iter().map(|view| &view.camera).collect();
-        self.partners = free_space::partners(&cameras, planes);
+        if self.free_space {
+            let cameras: Vec<&Camera> = self.whole.iter().map(|view| &view.camera).collect();
+            self.partners = free_space::partners(&cameras, planes);
+        }
     }
 
     /// Returns the camera to which the space is free in a step, and the near plane of all cameras on the way.

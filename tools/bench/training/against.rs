@@ -35,6 +35,9 @@ pub struct Against {
     /// A further kind of training of this program: its name, and its flags after an equals sign. May be repeated.
     #[arg(long = "kind", value_name = "NAME=FLAGS")]
     pub kinds: Vec<String>,
+    /// Table and chart of the rows in a file, such as tools/bench/training/rows.jsonl, without training.
+    #[arg(long, value_name = "FILE", conflicts_with = "against")]
+    pub rows: Option<PathBuf>,
 }
 
 /// A kind of training.
@@ -80,8 +83,13 @@ pub fn run(other: &Path, options: &Against, seeds: &[u64], common: &Common) -> R
             }
         }
     }
-    println!("\n{}", table(&ladder::table_of(&found, OTHER)));
-    write_text(&common.output.join("against.svg"), &ladder::chart(&found)?)
+    show(&found, &common.output)
+}
+
+/// Prints the table of rows and writes their chart.
+pub fn show(rows: &[Row], output: &Path) -> Result<()> {
+    println!("\n{}", table(&ladder::table_of(rows, OTHER)));
+    write_text(&output.join("against.svg"), &ladder::chart(rows)?)
 }
 
 fn line(row: &Row) -> String {

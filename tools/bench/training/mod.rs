@@ -86,6 +86,12 @@ struct Outcome {
 /// Runs it.
 pub fn run(options: &Options) -> Result<()> {
     let small = options.common.small;
+    if let Some(file) = &options.against.rows {
+        if !file.is_file() {
+            return Err(Error::usage("rows", format!("there is no file {}", file.display())));
+        }
+        return against::show(&rows::Rows::open(file)?.rows, &options.common.output);
+    }
     if let Some(other) = &options.against.against {
         return against::run(other, &options.against, &options.seeds, &options.common);
     }
