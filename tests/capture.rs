@@ -50,6 +50,13 @@ fn each_fault_is_found_in_its_photo() {
     assert_eq!(found(&dark), [(Fault::Exposure, Some("003.png"))]);
     assert!((dark.views[3].gain.expect("a gain") - 0.7).abs() < 0.05, "{:?}", dark.views[3]);
 
+    let tinted = with_photo(&scene, 4, |photo| {
+        photo.rgba.iter_mut().for_each(|texel| texel[2] = (f32::from(texel[2]) * 0.8) as u8);
+    });
+    assert_eq!(found(&tinted), [(Fault::WhiteBalance, Some("004.png"))]);
+    let [red, green, blue] = tinted.views[4].channel_gains.expect("gains");
+    assert!((blue / red - 0.8).abs() < 0.05 && (green / red - 1.0).abs() < 0.05, "{:?}", tinted.views[4]);
+
     let blurred = with_photo(&scene, 5, |photo| {
         // Means of 5 x 5 pixels.
         let (before, width, height) = (photo.rgba.clone(), photo.width as i32, photo.height as i32);

@@ -104,7 +104,7 @@ pub enum Command {
     ///
     /// Example: labelgs masks import scene/masks --scene scene -o imported
     Masks(MasksArgs),
-    /// Look for faults of a capture before training: poses, blur, exposure, photos without neighbours, scale. Exit status
+    /// Look for faults of a capture before training: poses, blur, exposure, white balance, lonely photos, scale. Status
     /// 1 if there are any.
     ///
     /// Example: labelgs check scene

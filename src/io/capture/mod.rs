@@ -1,4 +1,4 @@
-//! Scans a capture for what spoils a training: wrong poses, blurred photos, changing exposure, photos without
+//! Scans a capture for what spoils a training: wrong poses, blurred photos, changing exposure or tint, photos without
 //! neighbours, an odd scale. Each finding names its cure.
 
 mod neighbours;
@@ -22,6 +22,8 @@ pub enum Fault {
     Blur,
     /// The photo is brighter or darker than others that show the same points.
     Exposure,
+    /// The photo has another tint than others that show the same points.
+    WhiteBalance,
     /// Hardly any point of the photo is seen by others.
     Alone,
     /// Sizes or distances that training cannot handle well.
@@ -35,6 +37,7 @@ impl Fault {
             Self::Reprojection => "reprojection",
             Self::Blur => "blur",
             Self::Exposure => "exposure",
+            Self::WhiteBalance => "white balance",
             Self::Alone => "alone",
             Self::Scale => "scale",
         }
@@ -45,7 +48,9 @@ impl Fault {
         match self {
             Self::Reprojection => "leave the photo out, or adjust the reconstruction again",
             Self::Blur => "leave the photo out",
-            Self::Exposure => "take photos with fixed exposure and white balance, or equalise them",
+            Self::Exposure | Self::WhiteBalance => {
+                "take photos with fixed exposure and white balance, or equalise them"
+            }
             Self::Alone => "leave the photo out, or add photos between it and the others",
             Self::Scale => "scale and centre the reconstruction, or remove stray points",
         }
@@ -86,6 +91,8 @@ pub struct ViewReport {
     pub sharpness: Option<f64>,
     /// Brightness relative to the photos that show the same points: the median factor; none without shared points.
     pub gain: Option<f64>,
+    /// The same of red, green and blue.
+    pub channel_gains: Option<[f64; 3]>,
 }
 
 /// The result of a scan.
@@ -122,7 +129,8 @@ pub fn scan(scene: &Path, dataset: &Dataset) -> Result<Report> {
             shared: shared[index],
             reprojection: errors[index],
             sharpness: sharpness[index],
-            gain: gains[index],
+            gain: gains[index].map(|of| of.grey),
+            channel_gains: gains[index].map(|of| of.channels),
         })
         .collect();
     let mut findings = poses::findings(&reports);
