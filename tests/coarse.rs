@@ -16,7 +16,7 @@ const COARSE: u32 = 6;
 
 /// Runs steps of a training that starts at a share of the size; full size comes at `full_size_from`.
 fn steps(gpu: &Arc<labelgs::gpu::Gpu>, data: Dataset, start_size: f32, full_size_from: u32) -> Vec<StepReport> {
-    let (label_from, full_size_from) = (Some(3), Some(full_size_from));
+    let (label_from, start_size, full_size_from) = (Some(3), Some(start_size), Some(full_size_from));
     let config = TrainConfig { iterations: 100, label_from, start_size, full_size_from, ..TrainConfig::default() };
     let model = init::initial_gaussians(&dataset(&SCENE, 0), 0, 100).expect("a model");
     let mut trainer =

@@ -43,6 +43,12 @@ fn schedules_are_fractions_of_the_run() {
     let scale = |config: &TrainConfig, step| config.rates_at(step).scale / 0.005;
     assert!((scale(&short, 1) - 30.0_f64.powf(0.3)).abs() < 1e-9 && (scale(&long, 1) - 1.0).abs() < 1e-9);
     assert!((scale(&long, 30_000) - 0.1).abs() < 1e-9 && (scale(&of(10), 1) - 3.0).abs() < 1e-12);
+    // Photos that so many Gaussians as 30 a step cannot resolve stay small for longer.
+    let large = short.for_size((1000, 600));
+    assert_eq!((large.budget, large.start_size, large.full_size_from()), (30_000, Some(0.16), 805));
+    let small = short.for_size((200, 100));
+    assert_eq!((small.budget, small.start_size, small.full_size_from()), (10_000, Some(0.4), 600));
+    assert_eq!(TrainConfig { start_size: Some(1.0), ..of(1000) }.for_size((1000, 600)).full_size_from(), 0);
     let bounded = TrainConfig { budget: 9000, ..short };
     assert_eq!([51, 275, 467, 900].map(|step| bounded.budget_at(step, 1000)), [1019, 5316, 9000, 9000]);
     assert_eq!(TrainConfig { label_from: Some(3), ..of(1000) }.labels_from(), 600, "small photos have no labels");

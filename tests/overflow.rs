@@ -14,7 +14,7 @@ const SCENE: SynthOptions =
 /// Model after a few labelled steps with initial capacity `room`, and whether the (splat, tile) pairs had to grow.
 fn trained(gpu: &std::sync::Arc<labelgs::gpu::Gpu>, room: u64) -> (Gaussians, bool) {
     let data = dataset(&SCENE, 0);
-    let config = TrainConfig { iterations: 100, label_from: Some(3), start_size: 1.0, ..TrainConfig::default() };
+    let config = TrainConfig { iterations: 100, label_from: Some(3), start_size: Some(1.0), ..TrainConfig::default() };
     let mut model = init::initial_gaussians(&data, 0, 100).expect("a model");
     // Large and opaque: many tiles each, and labels at once.
     model.scales.iter_mut().flatten().for_each(|scale| *scale = -1.2);

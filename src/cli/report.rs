@@ -63,7 +63,7 @@ fn steps(context: &Context) -> Result<Value> {
         SynthOptions { width: 1600, height: 1064, points: 1_000_000, ..scene }
     };
     let dataset = synth::dataset(&scene, 0);
-    let config = TrainConfig { label_from: Some(1), start_size: 1.0, ..TrainConfig::default() };
+    let config = TrainConfig { label_from: Some(1), start_size: Some(1.0), ..TrainConfig::default() };
     let model = first_model(&dataset, &config)?;
     let window = Window { overlap: true, from_step: 0, warm_up: 10, steps: 20 };
     Ok(profile(&gpu, (&dataset, &model, config), window, |_| (), context)?.to_json())

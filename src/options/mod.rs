@@ -118,6 +118,7 @@ numbers! {
     f64 => |value| vec![*value];
     [f32; 3] => |value| value.map(f64::from).to_vec();
     Option<u32> => |value| value.iter().map(|&number| f64::from(number)).collect();
+    Option<f32> => |value| value.iter().map(|&number| f64::from(number)).collect();
     Option<f64> => |value| value.iter().copied().collect();
 }
 

@@ -65,12 +65,7 @@ fn decide(request: &Request, changed: &Changed, mut resumed: Resumed) -> Result<
     let mut wanted = changed(Some(then))?;
     wanted.check()?;
     // Automatic values were decided when the run began.
-    if wanted.train.near == 0.0 {
-        wanted.train.near = then.train.near;
-    }
-    if wanted.train.budget == 0 {
-        wanted.train.budget = then.train.budget;
-    }
+    wanted.train.keep_decided(&then.train);
     compare(then, &wanted)?;
     if wanted.train.iterations < resumed.state.step {
         let (path, steps) = (resumed.state.path.display(), resumed.state.step);

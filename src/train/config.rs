@@ -68,13 +68,15 @@ crate::options::options! {
             /// 7000, as in the short runs of 3DGS; LabelGS has 15000. Schedules and learning rates follow the length.
             iterations <"N">: u32 = 7_000, at_least(1);
 
-            /// Size of the photos in the first steps, as a share of their full size; 1 has all steps at full size.
+            /// Size of the photos in the first steps, as a share of their full size; 1 has all steps at full size
+            /// [default: 0.4, for photos above 400 px less: 160 px].
             ///
             /// The size grows up to --full-size-from. Early steps are rough anyway, and cost in proportion to the pixels.
             /// 3DGS trains at full size.
-            start_size <"SHARE">: f32 = 0.4, positive_up_to(1.0);
+            #[serde(skip_serializing_if = "Option::is_none")]
+            start_size <"SHARE">: Option<f32> = None, positive_up_to(1.0);
 
-            /// First step at full size [default: 0.6 of the run].
+            /// First step at full size [default: 0.6 of the run, later where the run is short for such large photos].
             ///
             /// Steps before it have no labels.
             #[serde(skip_serializing_if = "Option::is_none")]

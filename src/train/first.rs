@@ -1,6 +1,6 @@
 //! The model that a training starts from.
 
-use super::setup::with_budget;
+use super::setup::for_photos;
 use super::{StrategyKind, TrainConfig};
 use crate::error::Result;
 use crate::io::init;
@@ -21,7 +21,7 @@ pub fn first_model(dataset: &Dataset, config: &TrainConfig) -> Result<Gaussians>
     let random = match config.strategy {
         StrategyKind::Adc => RANDOM_MOST,
         StrategyKind::Budget | StrategyKind::Mcmc => {
-            RANDOM_MOST.min((RANDOM_SHARE * with_budget(config, dataset)?.budget as f64) as u64).max(1)
+            RANDOM_MOST.min((RANDOM_SHARE * for_photos(config, dataset)?.budget as f64) as u64).max(1)
         }
     };
     let mut model = init::initial_gaussians(dataset, config.seed, random as usize)?;

@@ -107,7 +107,7 @@ impl Trainer {
             0.0 => near::near_plane(dataset.train.iter().map(|view| &view.camera), model),
             near => near,
         };
-        let config = TrainConfig { near, ..setup::with_budget(&config, dataset)? };
+        let config = TrainConfig { near, ..setup::for_photos(&config, dataset)? };
         let mut trainer = Self::without_model(gpu, config, dataset, size, options)?;
         trainer.engine.upload_model(model)?;
         let planes = if trainer.config.free_space {

@@ -41,7 +41,7 @@ impl TrainConfig {
         Self {
             iterations: 15_000,
             strategy: StrategyKind::Adc,
-            start_size: 1.0,
+            start_size: Some(1.0),
             free_space: false,
             far_points: 0,
             full_size_from: Some(0),

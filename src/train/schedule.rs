@@ -10,7 +10,13 @@ const RATE_MOST: f64 = 3.0;
 /// Fewest steps of densification with the strategy of 3DGS.
 const ADC_LEAST: u32 = 1000;
 /// Gaussians of a run by default: at most for each step.
-const BUDGET_PER_STEP: u64 = 30;
+const BUDGET_PER_STEP: f64 = 30.0;
+/// Size of the photos in the first steps: share of the full one, and longest side at most, px.
+const START_SIZE: f32 = 0.4;
+const START_PX: f32 = 160.0;
+/// Share of the run after which photos have their full size, and that for a run too short to resolve it.
+const FULL_FROM: f64 = 0.6;
+const FULL_FROM_LATEST: f64 = 0.9;
 /// Weights of opacity and size in the loss, and the share of the run in which Gaussians relocate (3DGS-MCMC).
 const REGULAR: f64 = 0.01;
 const RELOCATE_UNTIL: f64 = 25.0 / 30.0;
@@ -92,7 +98,7 @@ impl TrainConfig {
 
     /// Returns the first step at full size.
     pub fn full_size_from(&self) -> u32 {
-        if self.start_size < 1.0 { self.full_size_from.unwrap_or(self.share(0.6)) } else { 0 }
+        if self.start_size == Some(1.0) { 0 } else { self.full_size_from.unwrap_or(self.share(FULL_FROM)) }
     }
 
     /// Returns true for steps that set labels and have a label loss, given masks.
@@ -124,10 +130,25 @@ impl TrainConfig {
         self.densify_from.unwrap_or(self.share(0.05).min(500))
     }
 
-    /// Returns the budget of a run on photos of this size, Gaussians.
-    pub(super) fn budget_for(&self, (width, height): (u32, u32)) -> u64 {
-        let by_pixels = (self.detail * f64::from(width) * f64::from(height)) as u64;
-        by_pixels.min(BUDGET_PER_STEP * u64::from(self.iterations)).max(1)
+    /// Returns the settings with what they leave to the size of the photos: budget, first size, first step at full size.
+    pub fn for_size(&self, (width, height): (u32, u32)) -> Self {
+        let by_pixels = self.detail * f64::from(width) * f64::from(height);
+        let by_steps = BUDGET_PER_STEP * f64::from(self.iterations);
+        let budget = if self.budget > 0 { self.budget } else { by_pixels.min(by_steps).max(1.0) as u64 };
+        let start_size = self.start_size.unwrap_or(START_SIZE.min(START_PX / width.max(height).max(1) as f32));
+        // Side of the size that as many Gaussians can resolve as the steps allow, as a share of the full one.
+        let resolved = (by_steps / by_pixels).min(1.0).sqrt();
+        let derived = self.share(resolved * FULL_FROM + (1.0 - resolved) * FULL_FROM_LATEST);
+        let full_size_from = Some(self.full_size_from.unwrap_or(derived));
+        Self { budget, start_size: Some(start_size), full_size_from, ..self.clone() }
+    }
+
+    /// Takes over what the beginning of a run has decided, where the settings leave it open.
+    pub(crate) fn keep_decided(&mut self, then: &Self) {
+        self.near = if self.near == 0.0 { then.near } else { self.near };
+        self.budget = if self.budget == 0 { then.budget } else { self.budget };
+        self.start_size = self.start_size.or(then.start_size);
+        self.full_size_from = self.full_size_from.or(then.full_size_from);
     }
 
     /// Returns the most Gaussians after a densification at `step`. It rises linearly from `start` to the budget.

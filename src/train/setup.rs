@@ -57,10 +57,9 @@ pub fn engine_size(dataset: &Dataset, config: &TrainConfig, gaussians: u64) -> R
     Ok(EngineSize::new(gaussians, image).for_training().with_labels(labels))
 }
 
-/// Sets the budget of a run whose settings leave it to the photos.
-pub(super) fn with_budget(config: &TrainConfig, dataset: &Dataset) -> Result<TrainConfig> {
-    let derived = config.budget_for(engine_size(dataset, config, 0)?.image);
-    Ok(TrainConfig { budget: if config.budget > 0 { config.budget } else { derived }, ..config.clone() })
+/// Sets what the settings leave to the photos.
+pub(super) fn for_photos(config: &TrainConfig, dataset: &Dataset) -> Result<TrainConfig> {
+    Ok(config.for_size(engine_size(dataset, config, 0)?.image))
 }
 
 /// Makes the initial sizes: for twice the number of Gaussians, or for that number if memory is short.

@@ -26,7 +26,7 @@ pub(super) struct Views {
 impl Views {
     /// Makes the views of a training.
     pub(super) fn new(whole: Vec<TrainView>, config: &TrainConfig) -> Self {
-        let (start, full_from) = (f64::from(config.start_size), config.full_size_from());
+        let (start, full_from) = (f64::from(config.start_size.unwrap_or(1.0)), config.full_size_from());
         Self { whole, shrunk: BTreeMap::new(), partners: Vec::new(), free_space: config.free_space, start, full_from }
     }
 

@@ -41,7 +41,7 @@ pub fn config(label_rule: LabelRule) -> TrainConfig {
 pub fn budgeted() -> TrainConfig {
     TrainConfig {
         iterations: 45,
-        start_size: 0.5,
+        start_size: Some(0.5),
         full_size_from: Some(20),
         densify_interval: Some(4),
         densify_grad_threshold: 1e-5,

@@ -76,7 +76,7 @@ pub fn measure(count: u32, width: u32, height: u32) -> Result<()> {
         iterations: 10,
         label_from: Some(1),
         densify_from: Some(u32::MAX),
-        start_size: 1.0,
+        start_size: Some(1.0),
         ..TrainConfig::default()
     };
     let options = SchedulerOptions { poison_step: true, ..SchedulerOptions::default() };

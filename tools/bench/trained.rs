@@ -60,7 +60,7 @@ pub fn labelled_model(gpu: &Arc<Gpu>, dataset: &Dataset, steps: u32) -> Result<G
     let config = TrainConfig {
         iterations: steps + 1,
         label_from: Some(steps.div_ceil(2)),
-        start_size: 1.0,
+        start_size: Some(1.0),
         ..TrainConfig::default()
     };
     let mut trainer = trainer(gpu, dataset, &start(dataset, &config)?, config)?;
@@ -81,7 +81,7 @@ pub fn timing_config() -> TrainConfig {
         densify_from: Some(u32::MAX),
         densify_until: Some(u32::MAX),
         opacity_reset_interval: 0,
-        start_size: 1.0,
+        start_size: Some(1.0),
         ..TrainConfig::default()
     }
 }

@@ -39,7 +39,7 @@ fn train(gpu: &Arc<Gpu>, kernels: KernelShape) -> Result<(Gaussians, [f64; 2])> 
     let dataset = synth::dataset(&options, 0);
     let config = TrainConfig {
         iterations: STEPS,
-        start_size: 1.0,
+        start_size: Some(1.0),
         label_from: Some(10),
         vote_every: Some(20),
         densify_from: Some(15),
