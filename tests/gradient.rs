@@ -4,6 +4,7 @@
 //! chosen so that this holds, and the tests refuse other scenes.
 
 use crate::reference::blend::{Upstream, blend_backward, blend_forward, centre, trace};
+use crate::reference::disagreement::disagreement;
 use crate::reference::loss::{label_loss, photo_loss};
 use crate::reference::model::ROW_FLOATS;
 use crate::reference::project::{project_backward, project_forward};
@@ -135,6 +136,24 @@ fn opaque_rules() -> Rules {
 fn blend_gradient_equals_central_differences() {
     let rules = Rules::default();
     blend_case(&rules, &safe_scene(&rules, 100, &small()));
+}
+
+#[test]
+fn disagreement_gradient_equals_central_differences() {
+    let rules = Rules::default();
+    let s = safe_scene(&rules, 200, &small());
+    let (size, labels) = ((s.camera.width as usize, s.camera.height as usize), s.model().labels);
+    let splats = splats_of(&project::project_all(&rules, &s.camera, &s.model()));
+    let pixels: Vec<Option<(u32, f64)>> = (s.target.label_map.iter().enumerate())
+        .map(|(at, &label)| (at % 7 != 0).then_some((label, 1.0 + (at % 3) as f64)))
+        .collect();
+    let of = |splats: &[Splat]| disagreement(&rules, splats, &labels, size, &pixels);
+    let opacities: Vec<f64> = splats.iter().map(|splat| splat.opacity).collect();
+    let numeric = differences(&opacities, |moved| {
+        let moved: Vec<Splat> = splats.iter().zip(moved).map(|(s, &opacity)| Splat { opacity, ..*s }).collect();
+        of(&moved).value
+    });
+    agree("disagreement", &of(&splats).v_opacities, &numeric);
 }
 
 #[test]

@@ -47,29 +47,43 @@ fn lists() -> Vec<(Capacity, PassList)> {
             capacity.segment_pixels = if segments > 1 { 100_000 } else { 0 };
             let size = ROOM.image;
             let mut add = |list| all.push((capacity, list));
-            for (labels, lift, sh_degree, update) in [
-                (true, true, 3, true),
-                (true, false, 3, true),
-                (true, true, 0, false),
-                (false, false, 3, true),
-                (false, false, 1, false),
+            for (labels, lift, disagreement, sh_degree, update) in [
+                (true, true, false, 3, true),
+                (true, false, false, 3, true),
+                (true, true, false, 0, false),
+                (false, false, true, 3, true),
+                (false, false, false, 3, true),
+                (false, false, false, 1, false),
             ] {
-                add(pass::training_step(
-                    &shape,
-                    &capacity,
-                    Variant { labels, lift, sh_degree, size, update, counts: false },
-                ));
+                let variant = Variant { labels, disagreement, lift, sh_degree, size, update, counts: false };
+                add(pass::training_step(&shape, &capacity, variant));
             }
             #[cfg(feature = "lab")]
             add(pass::separate_step(
                 &shape,
                 &capacity,
-                Variant { labels: true, lift: true, sh_degree: 3, size, update: true, counts: false },
+                Variant {
+                    labels: true,
+                    lift: true,
+                    sh_degree: 3,
+                    size,
+                    update: true,
+                    counts: false,
+                    disagreement: false,
+                },
                 2,
             ));
             add(pass::render_view(&shape, &capacity, 3));
-            add(pass::vote_view(&shape, &capacity, 2));
-            let variant = Variant { labels: false, lift: false, sh_degree: 3, size, update: true, counts: false };
+            add(pass::vote_view(&shape, &capacity, 2, false));
+            let variant = Variant {
+                labels: false,
+                lift: false,
+                sh_degree: 3,
+                size,
+                update: true,
+                counts: false,
+                disagreement: false,
+            };
             let extension = strategy::of(StrategyKind::Mcmc).extension();
             let all_passes = 7;
             add(pass::extended_step(&shape, &capacity, variant, (&*extension, all_passes)));

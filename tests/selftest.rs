@@ -34,6 +34,7 @@ fn the_selftest_detects_a_fault_in_each_pass() {
         ("ssim_c2", "photo loss and its gradient"),
         ("alpha_max", "blend backward"),
         ("label_weight", "gradient of a step with labels"),
+        ("label_weight", "disagreement of labels"),
         ("adam_beta2", "Adam"),
         ("densify_gradient", "densification"),
         ("reset_opacity", "reset of opacities"),

@@ -10,11 +10,13 @@
 // Reads:   step; tile_starts, tile_ends [T]; instance_from_sorted, splat_from_instance [I]; splats [V,3]; gaussian_from_splat [V];
 //          view_labels [P] column of each pixel's label, VOTE_NONE for pixels without votes; vote_weights [columns]
 // Writes:  votes_low, votes_high [N, columns]: 64 bits, VOTE_ONE for a pixel of weight 1, times the column's weight
-// Math:    A[j, k] = sum over pixels v with label k of alpha_j T_j (the sums of FlashSplat; every contributor counts)
+// Math:    A[j, k] = sum over pixels v with label k of alpha_j T_j (the sums of FlashSplat; every contributor counts);
+//          with ALONE, of alpha_j
 // Order:   a tile's sum has a fixed order and is rounded once; the order of integer sums does not matter.
 // Mirror:  src/verify/reference/lift.rs::vote
 
 layout(constant_id = 15) const uint ROUND = 0;
+layout(constant_id = 16) const uint ALONE = 0; // 1: each Gaussian as if nothing were in front of it
 READ1(0, StepUniforms, step);
 FETCHU(1, tile_starts);
 FETCHU(2, tile_ends);
@@ -119,9 +121,9 @@ void main() {
                 float alpha = min(ALPHA_MAX, exp2(max(e, -20.0)));
                 alpha = e < LOG2_ALPHA_MIN ? 0.0 : alpha;
                 precise float next = T[k] * (1.0 - alpha);
-                bool takes = next >= TRANSMITTANCE_MIN;
+                bool takes = ALONE != 0u ? T[k] > 0.0 : next >= TRANSMITTANCE_MIN;
                 float w = takes ? alpha * T[k] : 0.0;
-                T[k] = takes ? next : -abs(T[k]);
+                T[k] = ALONE != 0u ? T[k] : takes ? next : -abs(T[k]);
                 [[unroll]] for (uint q = 0u; q < LABELS_PER_WALK; q++) {
                     part[q] += own[k] == label[q] ? w : 0.0;
                 }

@@ -4,7 +4,8 @@
 #include "step.glsl"
 // loss_reduce — sum the loss partials of the photo and (variant labels) of the object layers.
 // Work:    one workgroup of one subgroup; lane i sums every W-th value, then a butterfly.
-// Reads:   loss_partials [PARTIALS]; variant labels: layer_loss [counters.layer_tile_count]
+// Reads:   loss_partials [PARTIALS]; variant labels: layer_loss [counters.layer_tile_count];
+//          variant disagreement: step; disagreement [T]
 // Writes:  counters.loss_l1, loss_ssim, loss_label
 // Order:   fixed, bitwise reproducible.
 // Mirror:  src/verify/reference/loss.rs::photo_loss
@@ -17,6 +18,10 @@ INOUT1(1, Counters, counters);
 #ifdef LABELS
 layout(constant_id = 3) const uint LAYER_TILE_CAPACITY = 65536;
 READ(2, float, layer_loss);
+#endif
+#ifdef DISAGREEMENT
+READ1(2, StepUniforms, step);
+READ(3, float, disagreement);
 #endif
 
 void main() {
@@ -31,6 +36,12 @@ void main() {
     uint count = min(counters.layer_tile_count, LAYER_TILE_CAPACITY);
     for (uint i = lane; i < count; i += SUBGROUP_SIZE) {
         label += layer_loss[i];
+    }
+    label = subgroup_sum(label);
+#endif
+#ifdef DISAGREEMENT
+    for (uint i = lane; i < step.tile_count; i += SUBGROUP_SIZE) {
+        label += disagreement[i];
     }
     label = subgroup_sum(label);
 #endif

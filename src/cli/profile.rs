@@ -116,6 +116,10 @@ fn decide(args: &ProfileArgs) -> Result<TrainConfig> {
         None => TrainConfig::default(),
     };
     decided.label_from = Some(decided.labels_from().min(args.from_step.saturating_add(1)));
+    #[cfg(feature = "lab")]
+    if args.separate_objects {
+        decided.layer_every = Some(1);
+    }
     let steps = u64::from(args.from_step) + u64::from(args.warm_up) + u64::from(args.steps.saturating_add(COUNTED)) + 1;
     let steps = u32::try_from(steps).map_err(|_| Error::usage("--steps", "there are too many steps in all"))?;
     decided.iterations = decided.iterations.max(steps);

@@ -41,6 +41,7 @@ pub fn capacity(shape: &KernelShape, size: &EngineSize) -> Capacity {
         layer_tiles: if layers > 0 { tiles } else { 0 },
         pixels: u64::from(width) * u64::from(height),
         labelled_pixels: if labels > 0 { u64::from(width) * u64::from(height) } else { 0 },
+        labelled_tiles: if labels > 0 { tiles } else { 0 },
         labels,
         vote_columns: size.labels.map_or(0, |labels| u64::from(labels.vote_columns)),
         vote_cells: size.labels.map_or(0, |labels| u64::from(labels.vote_columns)) * gaussians,
@@ -69,8 +70,10 @@ fn derive(shape: &KernelShape, capacity: &mut Capacity, instances: u64, trained:
 
 /// The training step with the most buffers.
 fn widest(size: &EngineSize) -> Variant {
-    let labels = size.labels.is_some();
-    Variant { labels, lift: labels, sh_degree: 3, size: size.image, update: true, counts: false }
+    // Layers need more memory than a disagreement; a size without layers has none.
+    let layers = size.labels.is_some_and(|labels| labels.layers > 0);
+    let disagreement = size.labels.is_some() && !layers;
+    Variant { labels: layers, disagreement, lift: layers, sh_degree: 3, size: size.image, update: true, counts: false }
 }
 
 impl Engine {

@@ -24,8 +24,10 @@ pub(crate) struct TrainInput<'a> {
     pub uniforms: StepUniforms,
     /// The photo, `[P]`, RGBA8; pixels with alpha 0 are ignored.
     pub photo: &'a [[u8; 4]],
-    /// Labels, in a step with labels.
+    /// Labels, in a step with object layers.
     pub layers: Option<LayerInput<'a>>,
+    /// Labels, in a step that compares them with the view's mask.
+    pub disagreement: Option<DisagreementInput<'a>>,
     /// Rows of shared parameters that the step uses; its passes refer to them by index in this order.
     pub shared: Vec<SharedRow>,
 }
@@ -52,6 +54,15 @@ pub(crate) struct LayerInput<'a> {
     pub weights: Vec<f32>,
     /// A bit per label id for each layer; set if that object hides the layer's object.
     pub occluders: Vec<u32>,
+}
+
+/// Label input of a step that compares labels with the view's mask.
+#[derive(Clone, Debug)]
+pub(crate) struct DisagreementInput<'a> {
+    /// Visible object of each pixel, `[P]`.
+    pub view_labels: &'a [u32],
+    /// Weight of the pixels of each label id.
+    pub weights: Vec<f32>,
 }
 
 /// Input of a vote on a view.
@@ -103,6 +114,10 @@ impl Engine {
             Input::Uniforms(_) => Ok(()),
             Input::Train(train) => {
                 sched.upload(Buf::TARGET, frame, 0, train.photo)?;
+                if let Some(labels) = &train.disagreement {
+                    sched.upload(Buf::VIEW_LABELS, frame, 0, labels.view_labels)?;
+                    sched.upload(Buf::LABEL_WEIGHTS, frame, 0, &labels.weights)?;
+                }
                 let Some(layers) = &train.layers else { return Ok(()) };
                 sched.upload(Buf::VIEW_LABELS, frame, 0, layers.view_labels)?;
                 sched.upload(Buf::LAYER_FROM_LABEL, frame, 0, &layers.layer_from_label)?;

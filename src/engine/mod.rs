@@ -14,7 +14,7 @@ pub(crate) mod state;
 pub(crate) mod uniforms;
 
 pub(crate) use growth::{GrownSizes, capacity};
-pub(crate) use input::{Input, LayerInput, SharedRow, TrainInput, VoteInput};
+pub(crate) use input::{DisagreementInput, Input, LayerInput, SharedRow, TrainInput, VoteInput};
 pub(crate) use run::{InFlight, ListKey, Recording, Report};
 pub use size::{EngineSize, LabelSize};
 

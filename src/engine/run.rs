@@ -19,8 +19,9 @@ pub enum ListKey {
     Separate(Variant, u32),
     /// One picture, with this active degree of the spherical harmonics.
     Render(u32),
-    /// Votes of one view; each tile is walked this many times, for four labels each time.
-    Vote(u32),
+    /// Votes of one view; each tile is walked this many times, for four labels each time. True: as if nothing were in
+    /// front of a Gaussian.
+    Vote(u32, bool),
     /// Adds up blending weights of one view.
     Weigh,
     /// Counts the result of a densification.
@@ -75,7 +76,7 @@ impl Engine {
             #[cfg(feature = "lab")]
             ListKey::Separate(variant, objects) => pass::separate_step(shape, capacity, variant, objects),
             ListKey::Render(sh_degree) => pass::render_view(shape, capacity, sh_degree),
-            ListKey::Vote(rounds) => pass::vote_view(shape, capacity, rounds),
+            ListKey::Vote(rounds, alone) => pass::vote_view(shape, capacity, rounds, alone),
             ListKey::Weigh => pass::weigh_view(shape, capacity),
             ListKey::DensifyCount => pass::densify_count(shape, capacity),
             ListKey::DensifyApply => pass::densify_apply(shape, capacity, self.size.labels.is_some()),

@@ -12,6 +12,8 @@ pub struct Builder<'a> {
     pub capacity: &'a Capacity,
     /// True if object layers exist.
     pub labels: bool,
+    /// True if the labels of the splats are compared with the view's mask.
+    pub disagreement: bool,
     /// Active degree of the spherical harmonics.
     pub sh_degree: u32,
     /// True if the blend passes count the pairs with a weight.

@@ -14,8 +14,8 @@ pub(super) fn resolve(b: &mut Builder) {
     } [], over_gaussians());
 }
 
-/// Adds the weight of every contributor to the vote for its pixel's label.
-pub(super) fn vote(b: &mut Builder, pairs: Buf, rounds: u32) {
+/// Adds the weight of every contributor to the vote for its pixel's label; with `alone` its alpha, whatever is in front.
+pub(super) fn vote(b: &mut Builder, pairs: Buf, rounds: u32, alone: bool) {
     let segments = b.segments();
     b.list.stage = Stage::Labels;
     for (round, segment) in (0..rounds).flat_map(|round| (0..segments).map(move |segment| (round, segment))) {
@@ -24,6 +24,6 @@ pub(super) fn vote(b: &mut Builder, pairs: Buf, rounds: u32) {
             instance_from_sorted: pairs, splat_from_instance: Buf::SPLAT_FROM_INSTANCE, splats: Buf::SPLATS,
             gaussian_from_splat: GAUSSIAN_FROM_SPLAT, view_labels: Buf::VIEW_LABELS, vote_weights: Buf::VOTE_WEIGHTS,
             votes_low: Buf::VOTES_LOW, votes_high: Buf::VOTES_HIGH, segment_colours: Buf::SEGMENT_COLOURS,
-        } [round: round, segment: segment, segments: segments], args(constants::ARGS_BLEND));
+        } [round: round, alone: alone.into(), segment: segment, segments: segments], args(constants::ARGS_BLEND));
     }
 }

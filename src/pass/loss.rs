@@ -21,6 +21,14 @@ pub(crate) fn photo_loss(b: &mut Builder, width: u32, height: u32) {
         step: Buf::STEP, v_rows: Buf::SSIM_A, image: Buf::IMAGE, target: Buf::TARGET, v_image: Buf::V_IMAGE,
         loss_partials: Buf::LOSS_PARTIALS,
     } [], columns(1));
+    if !b.disagreement {
+        reduce(b, partials(b.shape.subgroup, width, height));
+    }
+}
+
+/// Sums the loss after the backward walk, which finds the disagreement of the labels.
+pub(super) fn reduce_last(b: &mut Builder, width: u32, height: u32) {
+    b.list.stage = Stage::Loss;
     reduce(b, partials(b.shape.subgroup, width, height));
 }
 
@@ -33,8 +41,9 @@ pub(crate) fn label_loss(b: &mut Builder) {
 
 fn reduce(b: &mut Builder, partials: u32) {
     let layer_tiles = b.capacity.layer_tiles as u32;
-    pass!(b, loss_reduce(labels: b.labels) {
-        loss_partials: Buf::LOSS_PARTIALS, counters: Buf::COUNTERS, layer_loss: Buf::LAYER_LOSS,
+    pass!(b, loss_reduce(labels: b.labels, disagreement: b.disagreement) {
+        loss_partials: Buf::LOSS_PARTIALS, counters: Buf::COUNTERS, layer_loss: Buf::LAYER_LOSS, step: Buf::STEP,
+        disagreement: Buf::DISAGREEMENT,
     } [layer_tile_capacity: layer_tiles, partials: partials], ONE);
 }
 

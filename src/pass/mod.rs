@@ -36,6 +36,8 @@ pub use crate::scheduler::plan::Stage;
 pub struct Variant {
     /// The step has object layers.
     pub labels: bool,
+    /// The step compares the labels of the splats with the view's mask; not together with `labels`.
+    pub disagreement: bool,
     /// The step lifts labels from the view's mask, as in the paper; needs `labels`.
     pub lift: bool,
     /// Active degree of the spherical harmonics.
@@ -78,7 +80,8 @@ pub trait Extension: std::fmt::Debug + Send + Sync {
 impl Extension for () {}
 
 fn begin<'a>(name: &str, shape: &'a KernelShape, capacity: &'a Capacity, labels: bool, sh_degree: u32) -> Builder<'a> {
-    let mut b = Builder { shape, capacity, labels, sh_degree, counts: false, list: PassList::new(name) };
+    let list = PassList::new(name);
+    let mut b = Builder { shape, capacity, labels, disagreement: false, sh_degree, counts: false, list };
     pass!(b, step_begin { step: Buf::STEP, counters: Buf::COUNTERS, dispatch_args: Buf::DISPATCH_ARGS } [],
         build::ONE);
     b
@@ -104,7 +107,7 @@ pub fn extended_step(
     (extension, passes): (&dyn Extension, u32),
 ) -> PassList {
     let mut b = begin("training step", shape, capacity, variant.labels, variant.sh_degree);
-    b.counts = variant.counts;
+    (b.counts, b.disagreement) = (variant.counts, variant.disagreement);
     project::visible_splats(&mut b);
     let pairs = tile::bin_splats(&mut b);
     blend::blend_forward(&mut b, pairs, variant.lift);
@@ -113,6 +116,9 @@ pub fn extended_step(
     loss::photo_loss(&mut b, variant.size.0, variant.size.1);
     extension.extend(passes, Hook::Loss, &mut b);
     blend::blend_backward(&mut b, pairs);
+    if variant.disagreement {
+        loss::reduce_last(&mut b, variant.size.0, variant.size.1);
+    }
     gather::gather(&mut b);
     project::project_backward(&mut b);
     extension.extend(passes, Hook::Gradients, &mut b);
@@ -136,12 +142,13 @@ pub fn render_view(shape: &KernelShape, capacity: &Capacity, sh_degree: u32) -> 
     end(b)
 }
 
-/// Votes of one view for the label of every Gaussian. Each tile is walked `rounds` times, for four labels each time.
-pub fn vote_view(shape: &KernelShape, capacity: &Capacity, rounds: u32) -> PassList {
+/// Votes of one view for the label of every Gaussian. Each tile is walked `rounds` times, for four labels each time. With
+/// `alone`, Gaussians vote as if nothing were in front of them.
+pub fn vote_view(shape: &KernelShape, capacity: &Capacity, rounds: u32, alone: bool) -> PassList {
     let mut b = begin("votes", shape, capacity, false, 0);
     project::visible_splats(&mut b);
     let pairs = tile::bin_splats(&mut b);
-    lift::vote(&mut b, pairs, rounds);
+    lift::vote(&mut b, pairs, rounds, alone);
     end(b)
 }
 

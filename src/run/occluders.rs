@@ -5,7 +5,7 @@ use crate::error::{Error, Result};
 use crate::io::occlusion_table::OcclusionTable;
 use crate::label::occlusion::from_depths;
 use crate::scene::{Dataset, DepthKind, View};
-use crate::train::Occlusion;
+use crate::train::{Occlusion, TrainConfig};
 use std::path::PathBuf;
 
 /// Files with occluders.
@@ -23,8 +23,14 @@ pub enum OccluderFiles {
 }
 
 /// Refuses a source of occluders without its files, and files that the source does not read.
-pub(super) fn check(source: Occlusion, files: Option<&OccluderFiles>) -> Result<()> {
-    match (source, files) {
+pub(super) fn check(config: &TrainConfig, files: Option<&OccluderFiles>) -> Result<()> {
+    if config.layer_every() == 0 && files.is_some() {
+        return Err(Error::usage(
+            "layer_every",
+            "is 0, and only steps with object layers read occluders; choose 1 or more",
+        ));
+    }
+    match (config.occlusion, files) {
         (Occlusion::Depth, Some(OccluderFiles::Depths { .. })) => Ok(()),
         (Occlusion::Depth, _) => {
             Err(Error::usage("occlusion", "is depth, which needs a folder of depth maps in `depths`"))

@@ -69,7 +69,7 @@ pub(super) fn prepare(request: &Request, is_again: bool) -> Result<Prepared> {
 
 fn check_new(settings: &Settings, request: &Request) -> Result<()> {
     settings.check()?;
-    occluders::check(settings.train.occlusion, request.occluders.as_ref())
+    occluders::check(&settings.train, request.occluders.as_ref())
 }
 
 /// Deletes temporary files of killed runs. Refuses an unusable folder before any work is done.

@@ -3,10 +3,10 @@
 //! Most defaults are those of LabelGS and 3DGS, from the paper or the code. "LabelGS" below is the paper (arXiv
 //! 2508.19699) with its authors' code, "3DGS" is Kerbl et al. 2023 with its code.
 
-use crate::Result;
 use crate::options::Options;
 #[cfg(feature = "cli")]
 use crate::options::parse::{colour, count, samples, switch};
+use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
 
 /// The source of the occluders for the label loss.
@@ -171,7 +171,7 @@ crate::options::options! {
             /// Votes; the rule of the paper is `main`, which uses --label-threshold and --gpf.
             label_rule <"RULE">: LabelRule = LabelRule::Votes, fixed;
 
-            /// Steps between two counts of votes [default: a thirtieth of the run].
+            /// Steps between two counts of votes [default: a fifth of the run].
             #[serde(skip_serializing_if = "Option::is_none")]
             vote_every <"STEPS">: Option<u32> = None, at_least(1);
 
@@ -198,6 +198,14 @@ crate::options::options! {
             #[cfg_attr(feature = "cli", arg(value_parser = switch, action = clap::ArgAction::Set))]
             gpf <"SWITCH">: bool = true;
 
+            /// Steps between two with object layers; 0 makes none [default: 8; 1 with --label-rule main].
+            ///
+            /// Such a step renders each sampled object alone on black, and compares it with its pixels of the photo,
+            /// without occluders; its label loss counts this many times. 1 is LabelGS, which takes up to twice the time. The
+            /// other steps with labels reduce the weight of wrong labels in the scene's own picture, by opacity only.
+            #[serde(skip_serializing_if = "Option::is_none")]
+            layer_every <"STEPS">: Option<u32> = None, fixed;
+
             /// Objects per step.
             ///
             /// 10 (LabelGS, to bound memory). Each step samples them anew, for labels and label loss.
@@ -206,9 +214,9 @@ crate::options::options! {
 
             /// Weight of the label loss.
             ///
-            /// 0.3 for the sum over the objects of a step. LabelGS's code has 1.0 (the paper gives no value for lambda
+            /// 0.15 for the sum over the objects of a step. LabelGS's code has 1.0 (the paper gives no value for lambda
             /// 2); that lowers the quality of the picture and does not improve the objects.
-            label_weight <"WEIGHT">: f32 = 0.3, not_negative;
+            label_weight <"WEIGHT">: f32 = 0.15, not_negative;
 
             /// Weighs small objects more per pixel than large ones, on or off.
             ///
@@ -228,7 +236,7 @@ crate::options::options! {
             /// Rendered depth. The label loss leaves out the pixels of objects in front.
             occlusion <"SOURCE">: Occlusion = Occlusion::Rendered, fixed;
 
-            /// Steps between two updates of the occluders [default: a fifteenth of the run].
+            /// Steps between two updates of the occluders [default: two fifths of the run].
             #[serde(skip_serializing_if = "Option::is_none")]
             occlusion_every <"STEPS">: Option<u32> = None, at_least(1);
         }
@@ -368,6 +376,10 @@ crate::options::options! {
 impl TrainConfig {
     /// Refuses invalid values; messages name the option.
     pub fn check(&self) -> Result<()> {
-        self.check_ranges()
+        self.check_ranges()?;
+        if self.label_rule == LabelRule::Main && self.layer_every() != 1 {
+            return Err(Error::usage("label_rule", "is main, which needs `layer_every = 1`"));
+        }
+        Ok(())
     }
 }

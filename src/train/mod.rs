@@ -278,10 +278,14 @@ impl Trainer {
     fn input(&mut self, step: u32) -> StepInput {
         let view = self.order.draw();
         self.views.prepare(step, view);
-        let samples = if self.config.labels_at(step) { self.config.label_samples as usize } else { 0 };
-        let layers = sampler::sample_objects(self.config.seed, step, &self.views[view].objects, samples);
+        let objects = &self.views[view].objects;
         // A view without a mask, or with an empty one, costs as much as in a scene without masks.
-        let labels = !layers.is_empty();
+        let labels = self.config.labels_at(step) && !objects.is_empty();
+        let layers = if labels && self.config.has_layers_at(step) {
+            sampler::sample_objects(self.config.seed, step, objects, self.config.label_samples as usize)
+        } else {
+            Vec::new()
+        };
         let update = self.strategy.updates(self.at(step));
         self.updates += u32::from(update);
         StepInput { step, view, layers, labels, update, updates: self.updates }
@@ -318,7 +322,8 @@ impl Trainer {
 
     fn key(&self, input: &StepInput) -> ListKey {
         let variant = Variant {
-            labels: input.labels,
+            labels: !input.layers.is_empty(),
+            disagreement: input.labels && input.layers.is_empty(),
             lift: input.lifts(&self.config),
             sh_degree: self.config.sh_degree_at(input.step),
             size: self.views.largest_at(input.step, self.image),

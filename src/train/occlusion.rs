@@ -41,6 +41,7 @@ impl Trainer {
     pub(super) fn refreshes_occluders(&self, step: u32) -> bool {
         let config = &self.config;
         self.engine.size().labels.is_some()
+            && config.layer_every() > 0
             && config.occlusion == Occlusion::Rendered
             && config.updates_occluders_at(step)
             && !self.blurs_depth_before(step)

@@ -41,6 +41,7 @@ impl TrainConfig {
         Self {
             iterations: 15_000,
             strategy: StrategyKind::Adc,
+            layer_every: Some(1),
             start_size: Some(1.0),
             free_space: false,
             far_points: 0,

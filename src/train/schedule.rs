@@ -1,6 +1,6 @@
 //! The settings of a step: schedules in steps, given or as fractions of the run, and learning rates.
 
-use super::{StrategyKind, TrainConfig};
+use super::{LabelRule, StrategyKind, TrainConfig};
 
 /// Length of the runs that the learning rates of 3DGS are made for, steps.
 const LONG_RUN: f64 = 30_000.0;
@@ -22,6 +22,12 @@ const REGULAR: f64 = 0.01;
 const RELOCATE_UNTIL: f64 = 25.0 / 30.0;
 /// Share of the run after which Gaussians with little weight are pruned: soon after growth, so that the others adapt.
 const PRUNE_AT: f64 = 0.55;
+
+/// Steps between two with object layers. Only these see the hidden parts of objects, and they cost up to twice as much.
+const LAYER_EVERY: u32 = 8;
+/// Shares of the run between two counts of votes, and between two searches for occluders. Both walk all views.
+const VOTE_EVERY: f64 = 0.2;
+const OCCLUSION_EVERY: f64 = 0.4;
 
 /// Learning rates of a step.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -111,14 +117,24 @@ impl TrainConfig {
         self.label_from.unwrap_or(self.share(0.6)).max(self.full_size_from())
     }
 
+    /// Returns the steps between two with object layers; 0 without any.
+    pub fn layer_every(&self) -> u32 {
+        self.layer_every.unwrap_or(if self.label_rule == LabelRule::Main { 1 } else { LAYER_EVERY })
+    }
+
+    /// Returns true for steps with labels that render objects alone.
+    pub fn has_layers_at(&self, step: u32) -> bool {
+        self.layer_every() > 0 && self.is_label_turn(step, self.layer_every())
+    }
+
     /// Returns true if the votes are counted before `step`.
     pub fn counts_votes_at(&self, step: u32) -> bool {
-        self.is_label_turn(step, self.vote_every.unwrap_or(self.share(1.0 / 30.0)))
+        self.is_label_turn(step, self.vote_every.unwrap_or(self.share(VOTE_EVERY)))
     }
 
     /// Returns true if the occluders are updated before `step`.
     pub fn updates_occluders_at(&self, step: u32) -> bool {
-        self.is_label_turn(step, self.occlusion_every.unwrap_or(self.share(1.0 / 15.0)))
+        self.is_label_turn(step, self.occlusion_every.unwrap_or(self.share(OCCLUSION_EVERY)))
     }
 
     fn is_label_turn(&self, step: u32, every: u32) -> bool {

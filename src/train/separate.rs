@@ -18,7 +18,7 @@ impl Separate {
 
     #[cfg(feature = "lab")]
     pub(super) fn key(&self, variant: Variant, input: &StepInput) -> Option<ListKey> {
-        (self.on && input.labels).then_some(ListKey::Separate(variant, input.layers.len() as u32))
+        (self.on && !input.layers.is_empty()).then_some(ListKey::Separate(variant, input.layers.len() as u32))
     }
 }
 

@@ -48,7 +48,7 @@ pub fn engine_size(dataset: &Dataset, config: &TrainConfig, gaussians: u64) -> R
     let most = dataset.train.iter().filter_map(|view| view.mask.as_ref().map(|mask| mask.objects().len())).max();
     let labels = objects.iter().max().map(|&max_label| LabelSize {
         max_label: u32::from(max_label),
-        layers: config.label_samples.min(most.unwrap_or(0) as u32),
+        layers: if config.layer_every() > 0 { config.label_samples.min(most.unwrap_or(0) as u32) } else { 0 },
         vote_columns: match config.label_rule {
             LabelRule::Votes => columns_for(objects.iter().collect::<BTreeSet<_>>().len()),
             LabelRule::Main => 0,

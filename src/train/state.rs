@@ -275,8 +275,12 @@ impl Trainer {
     }
 }
 
-/// Settings that a checkpoint lacks were not there when it was written: its training has the schedule of 3DGS.
+/// Settings that a checkpoint lacks were not there when it was written: its training has the schedule of 3DGS, and
+/// object layers in every step with labels.
 fn complete(config: &mut serde_json::Value) -> serde_json::Result<()> {
+    if let Some(found) = config.as_object_mut().filter(|found| !found.contains_key("layer_every")) {
+        found.insert("layer_every".to_owned(), 1.into());
+    }
     if let Some(found) = config.as_object_mut().filter(|found| !found.contains_key("strategy")) {
         let serde_json::Value::Object(mut earlier) = serde_json::to_value(TrainConfig::adc())? else { return Ok(()) };
         earlier.append(found);

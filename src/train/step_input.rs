@@ -2,7 +2,7 @@
 
 use super::TrainConfig;
 use super::config::LabelRule;
-use crate::engine::{Engine, LayerInput, TrainInput};
+use crate::engine::{DisagreementInput, Engine, LayerInput, TrainInput};
 use crate::io::resample::shrink_photo;
 use crate::scene::{Camera, LabelMap, Occluders, Photo};
 use crate::shaders::constants::{ADAM_BETA1, ADAM_BETA2, LABEL_BORDER};
@@ -111,12 +111,21 @@ pub(crate) fn layer_weights(input: &StepInput, view: &TrainView, config: &TrainC
 
 /// Returns the weighted label loss of a step from the sums of the device.
 pub fn label_loss(input: &StepInput, view: &TrainView, config: &TrainConfig, loss_label: f32) -> f64 {
+    if input.layers.is_empty() {
+        return f64::from(loss_label);
+    }
     let empty = |(label, weight): (&u16, f32)| {
         let shown = view.shown.get(label).copied().unwrap_or_default();
         f64::from(weight) * (shown.light + f64::from(alpha_weight(config)) * shown.pixels as f64)
     };
     let empty: f64 = input.layers.iter().zip(layer_weights(input, view, config)).map(empty).sum();
-    (f64::from(loss_label) + empty) / (3.0 * view.valid_pixels.max(1) as f64) * f64::from(config.label_weight)
+    (f64::from(loss_label) + empty) / (3.0 * view.valid_pixels.max(1) as f64) * f64::from(label_weight(input, config))
+}
+
+/// Weight of the label loss of a step. Layers stand for all steps from one turn to the next.
+fn label_weight(input: &StepInput, config: &TrainConfig) -> f32 {
+    let times = if input.layers.is_empty() { 1 } else { config.layer_every().max(1) };
+    config.label_weight * times as f32
 }
 
 /// The alpha term is a mean over pixels; the other terms are means over pixels and channels.
@@ -131,7 +140,7 @@ pub struct StepInput {
     pub step: u32,
     /// Index of the training view.
     pub view: usize,
-    /// Ids of the sampled objects; layer `j` of the render is `layers[j - 1]`.
+    /// Ids of the sampled objects; layer `j` of the render is `layers[j - 1]`. Empty in a step without layers.
     pub layers: Vec<u16>,
     /// The step has the label passes.
     pub labels: bool,
@@ -171,7 +180,7 @@ pub(crate) fn uniforms(
         layer_count: input.layers.len() as u32,
         lambda_dssim: config.lambda_dssim,
         loss_scale: (1.0 / (3.0 * view.valid_pixels.max(1) as f64)) as f32,
-        label_weight: config.label_weight,
+        label_weight: label_weight(input, config),
         label_alpha: alpha_weight(config),
         label_threshold: config.label_threshold,
         gpf: u32::from(config.gpf),
@@ -197,7 +206,12 @@ pub(crate) fn train_input<'a>(
     engine: &Engine,
 ) -> TrainInput<'a> {
     let room = engine.size().labels.filter(|_| input.labels);
-    let layers = room.map(|room| {
+    let (disagrees, layered) = if input.layers.is_empty() { (room, None) } else { (None, room) };
+    let disagreement = disagrees.map(|room| {
+        let weights = vec![1.0; room.max_label as usize + 1];
+        DisagreementInput { view_labels: &view.view_labels, weights }
+    });
+    let layers = layered.map(|room| {
         let words = uniforms.occluder_words as usize;
         let mut layer_from_label = vec![0_u32; room.max_label as usize + 1];
         let mut label_from_layer = vec![0_u32; room.layers as usize + 1];
@@ -214,5 +228,5 @@ pub(crate) fn train_input<'a>(
         }
         LayerInput { view_labels: &view.view_labels, layer_from_label, label_from_layer, weights, occluders }
     });
-    TrainInput { uniforms, photo: &view.photo.rgba, layers, shared: Vec::new() }
+    TrainInput { uniforms, photo: &view.photo.rgba, layers, disagreement, shared: Vec::new() }
 }

@@ -30,7 +30,7 @@ impl Trainer {
     }
 
     fn count_votes(&mut self) -> Result<Decision> {
-        let how = Sweep { near: self.config.near, border: self.config.mask_border };
+        let how = Sweep { near: self.config.near, border: self.config.mask_border, alone: false };
         let means = self.engine.means()?;
         let voters = self.views.iter().filter_map(|view| {
             Some(Voter { camera: &view.camera, mask: view.mask.as_ref()?, photo: Some(&view.photo), trust: None })

@@ -6,6 +6,7 @@
 //! beside them.
 
 mod blend;
+mod disagreement;
 pub mod fixture;
 mod labels;
 mod loss;

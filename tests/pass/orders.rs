@@ -31,7 +31,15 @@ fn engine(gpu: std::sync::Arc<labelgs::gpu::Gpu>) -> Engine {
 fn list(engine: &mut Engine, declare: impl FnOnce(&mut Builder)) -> ListId {
     let (shape, capacity): (KernelShape, Capacity) = (*engine.shape(), *engine.raw().capacity());
     let list = PassList::new("test");
-    let mut builder = Builder { shape: &shape, capacity: &capacity, labels: false, sh_degree: 0, counts: false, list };
+    let mut builder = Builder {
+        shape: &shape,
+        capacity: &capacity,
+        labels: false,
+        disagreement: false,
+        sh_degree: 0,
+        counts: false,
+        list,
+    };
     declare(&mut builder);
     let list = builder.list;
     engine.raw_mut().prepare(&list).expect("the list is planned")

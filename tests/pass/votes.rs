@@ -40,7 +40,7 @@ fn vote_sums_equal_the_mirror() {
     let trust = BTreeMap::from([(3_u16, 0.25_f32), (8, 0.0)]);
     let voter = Voter { camera: &camera, mask: &mask, photo: Some(&photo), trust: Some(&trust) };
     // Three views that are the same: thrice the votes.
-    let how = Sweep { near: fixture.config.near, border: 0 };
+    let how = Sweep { near: fixture.config.near, border: 0, alone: false };
     let ballot = sweep(&mut fixture.engine, &[voter, voter, voter], how).expect("votes");
     assert_eq!(ballot.labels, [0, 2, 3, 5, 7, 8, 11]);
     assert!(ballot.labels.len() > 2 * VOTE_COLUMNS as usize, "the sweep takes several rounds");
@@ -89,7 +89,7 @@ fn pixels_near_a_contour_do_not_vote() {
     mask.ids.iter_mut().enumerate().for_each(|(index, id)| *id = if index % width < 20 { 2 } else { 0 });
     let camera = fixture.scene.camera.clone();
     let voter = Voter { camera: &camera, mask: &mask, photo: None, trust: None };
-    let how = Sweep { near: fixture.config.near, border: 2 };
+    let how = Sweep { near: fixture.config.near, border: 2, alone: false };
     let ballot = sweep(&mut fixture.engine, &[voter], how).expect("votes");
     let actual = ballot.weights();
     let column = |index: usize| match index % width {

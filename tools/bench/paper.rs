@@ -138,7 +138,8 @@ fn crowded(dataset: &Dataset, objects: usize) -> Dataset {
 fn time(gpu: &Arc<Gpu>, dataset: &Dataset, model: &Gaussians, plan: &Plan) -> Result<Outcome> {
     let crowd = crowded(dataset, plan.objects);
     require(!crowd.train.is_empty(), || format!("no view shows {} objects", plan.objects))?;
-    let config = timing_config;
+    // Every step has layers, the only passes that can run apart.
+    let config = || TrainConfig { layer_every: Some(1), ..timing_config() };
     let mut trainers = [
         trainer(gpu, &without_masks(&crowd), model, config())?,
         trainer(gpu, &crowd, model, config())?,
@@ -211,7 +212,8 @@ fn median_pairs(reports: &[StepReport]) -> f64 {
 fn lists(trainer: &mut Trainer, objects: u32) -> [usize; 3] {
     let engine = trainer.engine_mut();
     let (shape, capacity, size) = (engine.shape(), engine.raw().capacity(), engine.size().image);
-    let variant = Variant { labels: true, lift: false, sh_degree: 3, size, update: true, counts: false };
+    let variant =
+        Variant { labels: true, lift: false, sh_degree: 3, size, update: true, counts: false, disagreement: false };
     let plain = pass::training_step(shape, capacity, Variant { labels: false, ..variant });
     let together = pass::training_step(shape, capacity, variant);
     let apart = pass::separate_step(shape, capacity, variant, objects);

@@ -45,6 +45,8 @@ pub struct Sweep {
     pub near: f32,
     /// Width of the band along mask contours without votes, px.
     pub border: u32,
+    /// Gaussians vote with their alpha, as if nothing were in front of them.
+    pub alone: bool,
 }
 
 /// The votes for one Gaussian: column and sum of blending weights, in the order of columns; a pixel of weight 1 is
@@ -138,7 +140,7 @@ fn vote(engine: &mut Engine, voter: &Voter, chunk: &[u16], how: Sweep) -> Result
     let base = engine.view_uniforms(voter.camera, how.near, [0.0; 3]);
     let uniforms = StepUniforms { vote_columns: chunk.len() as u32, ..base };
     // Votes that do not fit are not counted, and the list runs again.
-    engine.run(ListKey::Vote(rounds), &VoteInput { uniforms, columns: &columns, weights: &weights })?;
+    engine.run(ListKey::Vote(rounds, how.alone), &VoteInput { uniforms, columns: &columns, weights: &weights })?;
     Ok(())
 }
 

@@ -68,6 +68,26 @@ pub fn decide(ballot: &Ballot, means: &[[f32; 3]], complete: bool) -> Result<Dec
     Ok(Decision { labels, confidence })
 }
 
+/// Lowers the confidence of Gaussians that stick out of their object to the share of their alpha that falls on it: in all
+/// pixels where the masks show their label or nothing, whatever is in front of them. Such Gaussians hide behind
+/// other things in the scene, and would show when the object is taken out.
+pub(crate) fn lower_outside(engine: &mut Engine, voters: &[Voter], how: Sweep, decision: &mut Decision) -> Result<()> {
+    let ballot = sweep(engine, voters, Sweep { alone: true, ..how })?;
+    let rows = decision.labels.iter().zip(&mut decision.confidence).enumerate();
+    for (row, (&label, confidence)) in rows.filter(|(_, (label, _))| **label != UNLABELLED) {
+        let of = |wanted: u32| {
+            let cells = ballot.row(row).iter();
+            let found = cells.filter(|(column, _)| u32::from(ballot.labels[usize::from(*column)]) == wanted);
+            found.map(|&(_, votes)| weight(votes)).sum::<f64>()
+        };
+        let (inside, outside) = (of(label), of(UNLABELLED));
+        if inside + outside > 0.0 {
+            *confidence = confidence.min((inside / (inside + outside)) as f32);
+        }
+    }
+    Ok(())
+}
+
 /// Returns the column with the largest share, the first of equals; 0 without columns.
 fn winner(shares: impl Iterator<Item = (u16, f64)>) -> u16 {
     shares.fold((0, 0.0), |best, at| if at.1 > best.1 { at } else { best }).0

@@ -1,7 +1,7 @@
 //! Labels for a trained model of any trainer.
 
 use super::ballot::{Sweep, Voter, columns_for};
-use super::decide::{apply, count};
+use super::decide::{apply, count, lower_outside};
 use super::lift::{Lift, lift};
 use crate::engine::{Engine, EngineSize, LabelSize};
 use crate::error::Result;
@@ -56,11 +56,12 @@ pub fn label_by_votes(
     tick: &mut dyn FnMut(u32),
 ) -> Result<()> {
     let voters: Vec<Voter> = views.iter().filter_map(|view| Some(Voter::of(view, view.mask.as_ref()?))).collect();
-    let sweep = Sweep { near: how.near, border: how.mask_border };
+    let sweep = Sweep { near: how.near, border: how.mask_border, alone: false };
     for round in 0..how.rounds {
         let judges = model.labels.as_deref().filter(|_| round > 0);
         let mut decision = count(engine, &voters, judges, &model.means, sweep, how.complete)?;
         if round + 1 == how.rounds {
+            lower_outside(engine, &voters, sweep, &mut decision)?;
             decision.drop_unsure(how.min_confidence);
         }
         apply(model, decision);

@@ -89,6 +89,8 @@ domains! { Domain, Capacity;
         "Pixels of one image.";
     LabelledPixels labelled_pixels: "labelled pixels", cures::IMAGE,
         "Pixels with labels: equal to Pixels, or 0 in a scene without masks.";
+    LabelledTiles labelled_tiles: "labelled tiles", cures::IMAGE,
+        "Tiles of one image, or 0 in a scene without masks.";
     Labels labels: "labels", cures::LAYERS,
         "Label ids, including 0.";
     VoteColumns vote_columns: "vote columns", cures::VOTES,

@@ -15,6 +15,7 @@ crate::buffers! {
     LABEL_FROM_LAYER "label_from_layer": 4, Domain::Layers, Class::PerFrame, WORD, "Label id of each layer; layer 0 is the scene.";
     LAYER_WEIGHTS "layer_weights": 4, Domain::Layers, Class::PerFrame, None, "Weight of each layer's label loss.";
     LAYER_OCCLUDERS "layer_occluders": 4, Domain::OccluderWords, Class::PerFrame, WORD, "A bit per label id for each layer; set if that object hides the layer's object.";
+    LABEL_WEIGHTS "label_weights": 4, Domain::Labels, Class::PerFrame, None, "Weight of the disagreement of pixels with each label id in this view.";
     VOTE_WEIGHTS "vote_weights": 4, Domain::VoteColumns, Class::PerFrame, None, "Weight of the votes for each label in this view.";
     STEP_ROWS "step_rows": 4, Domain::SharedRows, Class::PerFrame, WORD, "Shared rows of the step: the scene's, then the photo's, then NO_ROW.";
     STEP_RATES "step_rates": 16, Domain::SharedRows, Class::PerFrame, None, "Learning rates of these rows; rows with rates of 0 stay unchanged.";
@@ -82,6 +83,7 @@ crate::buffers! {
     LAYER_TILES "layer_tiles": 4, Domain::LayerTiles, Class::Step, WORD, "Occupied tiles of object layers.";
     LAYER_STATE "layer_state": 8, Domain::LayerPixels, Class::Step, None, "Transmittance, last splat and gradient signs of each pixel of an occupied layer tile.";
     LAYER_LOSS "layer_loss": 4, Domain::LayerTiles, Class::Step, None, "Label loss of each occupied layer tile minus the loss of an empty picture, without the layer's weight.";
+    DISAGREEMENT "disagreement": 4, Domain::LabelledTiles, Class::Step, None, "Weighted disagreement of the labels in each tile of the scene.";
     IMAGE "image": 16, Domain::Pixels, Class::Step, VEC4, "Picture, `[P]`: r, g, b over the background, final transmittance.";
     LAST "last": 4, Domain::Pixels, Class::Step, WORD, "1 + index in the tile's list of the last splat that contributes, `[P]`.";
     SEGMENT_COLOURS "segment_colours": 16, Domain::SegmentPixels, Class::Step, None, "State of each pixel of each job between two segments of a long list: colour, transmittance.";

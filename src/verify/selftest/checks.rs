@@ -11,10 +11,12 @@ use crate::label::vote::ballot::{Sweep, Voter, sweep};
 use crate::pass::KernelShape;
 use crate::scene::{Gaussians, LabelMap};
 use crate::scheduler::plan::Buf;
+use crate::shaders::constants::LABEL_MASK;
 use crate::train::LabelRule;
 use crate::train::strategy::weights::weights;
 use crate::verify::reference::adam::{Optimised, Rates, adam};
 use crate::verify::reference::blend::{Upstream, blend_backward, blend_forward};
+use crate::verify::reference::disagreement::disagreement;
 use crate::verify::reference::lift::vote;
 use crate::verify::reference::loss::photo_loss;
 use crate::verify::reference::project::project_forward;
@@ -169,6 +171,37 @@ impl Ran {
         Ok(judge::splat_gradients(&actual, &expected.values, margins, bounds(4e-7, 4e-7)))
     }
 
+    /// Checks the disagreement of a step's labels: value, and the change of the gradient by opacity.
+    pub(super) fn disagreement(&mut self) -> Result<Verdict> {
+        // Far above the photo's weight, so that the difference of two steps is exact enough.
+        const WEIGHT: f32 = 1e5;
+        let layers = std::mem::take(&mut self.fixture.input.layers);
+        let label_weight = std::mem::replace(&mut self.fixture.config.label_weight, WEIGHT);
+        let with = self.fixture.train()?.counters.loss_label;
+        let splats = self.fixture.splats()?;
+        let of_labels = self.fixture.splat_gradients(&splats)?;
+        self.fixture.input.labels = false;
+        self.fixture.train()?;
+        let of_photo = self.fixture.splat_gradients(&splats)?;
+        (self.fixture.input.labels, self.fixture.input.layers) = (true, layers);
+        self.fixture.config.label_weight = label_weight;
+        let (model, target) = (self.fixture.model(), &self.fixture.scene.target);
+        let weight = f64::from(WEIGHT) / target.photo.elements();
+        let pixels: Vec<Option<(u32, f64)>> = (target.label_map.iter().zip(&target.photo.valid))
+            .map(|(&here, &valid)| (valid && here <= LABEL_MASK).then_some((here, weight)))
+            .collect();
+        let expected = disagreement(&self.rules, &splats, &model.labels, self.fixture.size(), &pixels);
+        // A sum of 2745 pixels in f32.
+        let tolerance = Tolerance { absolute: 0.0, relative: 2e-6 * LEEWAY };
+        let value = close(&[f64::from(with)], &[expected.value], tolerance);
+        let sure: Vec<usize> = (0..splats.len()).filter(|&row| expected.margins[row] > 1e-5).collect();
+        let of = |row: usize| splats[row].opacity;
+        let actual: Vec<f64> =
+            sure.iter().map(|&row| (of_labels[row].opacity - of_photo[row].opacity) * of(row)).collect();
+        let wanted: Vec<f64> = sure.iter().map(|&row| expected.v_opacities[row] * of(row)).collect();
+        Ok(judge::all([value, gradients(&actual, &wanted, bounds(4e-6, 4e-6))]))
+    }
+
     /// Checks the gradient of photo loss and label losses with respect to every parameter.
     pub(super) fn gradient(&mut self) -> Result<Verdict> {
         self.fixture.train()?;
@@ -206,7 +239,7 @@ impl Ran {
         let ids = target.label_map.iter().map(|&id| id as u16).collect();
         let mask = LabelMap { width: camera.width, height: camera.height, ids };
         let voter = Voter { camera: &camera, mask: &mask, photo: None, trust: None };
-        let how = Sweep { near: self.fixture.config.near, border: 0 };
+        let how = Sweep { near: self.fixture.config.near, border: 0, alone: false };
         let ballot = sweep(&mut self.fixture.engine, &[voter], how)?;
         let actual = ballot.weights();
         let column = |id: &u16| ballot.labels.iter().position(|label| label == id);

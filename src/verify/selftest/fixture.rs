@@ -155,7 +155,9 @@ impl Fixture {
         let (labels, update) = (self.input.labels, self.input.update);
         let size = (self.scene.camera.width, self.scene.camera.height);
         let lift = self.input.lifts(&self.config);
-        ListKey::Train(Variant { labels, lift, sh_degree: self.config.sh_degree, size, update, counts: false })
+        let disagreement = labels && self.input.layers.is_empty();
+        let (labels, sh_degree) = (labels && !disagreement, self.config.sh_degree);
+        ListKey::Train(Variant { labels, disagreement, lift, sh_degree, size, update, counts: false })
     }
 
     /// Sorted pairs of the device: keys, and positions before the sort.

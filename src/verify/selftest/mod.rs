@@ -77,7 +77,7 @@ pub fn passes(
     let mut ran = Ran::new(rules, gpu, kernels)?;
     let prepared = start.elapsed().as_secs_f64();
     type Pass = fn(&mut Ran) -> Result<Verdict>;
-    let passes: [(&str, Pass); 11] = [
+    let passes: [(&str, Pass); 12] = [
         ("depth order", Ran::order),
         ("projection", Ran::projection),
         ("tile lists", Ran::tiles),
@@ -85,6 +85,7 @@ pub fn passes(
         ("photo loss and its gradient", Ran::loss),
         ("votes", Ran::votes),
         ("blend backward", Ran::blend_backward),
+        ("disagreement of labels", Ran::disagreement),
         ("weights of Gaussians", Ran::weights),
         ("gradient of a step with labels", Ran::gradient),
         ("the same step twice, bit by bit", Ran::repeated),

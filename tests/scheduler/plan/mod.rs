@@ -105,6 +105,7 @@ pub fn engine_lists(shape: KernelShape) -> (Capacity, Vec<PassList>) {
         layer_pixels: 65_536,
         pixels: 65_536,
         labelled_pixels: 65_536,
+        labelled_tiles: 1024,
         labels: 16,
         vote_columns: 9,
         vote_cells: 90_000,
@@ -117,7 +118,15 @@ pub fn engine_lists(shape: KernelShape) -> (Capacity, Vec<PassList>) {
         shared_rows: 70,
         segments: 2,
     };
-    let variant = Variant { labels: true, lift: true, sh_degree: 3, size: (256, 256), update: true, counts: false };
+    let variant = Variant {
+        labels: true,
+        lift: true,
+        sh_degree: 3,
+        size: (256, 256),
+        update: true,
+        counts: false,
+        disagreement: false,
+    };
     let lists = vec![
         pass::training_step(&shape, &capacity, variant),
         pass::training_step(&shape, &capacity, Variant { labels: false, lift: false, sh_degree: 0, ..variant }),

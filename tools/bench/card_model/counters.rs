@@ -133,7 +133,7 @@ fn measure(common: &Common, labels: bool) -> Result<Measured> {
     let gpu =
         device::open_as(&GpuOptions { subgroup_size: Some(32), emulate_subgroups: true, ..GpuOptions::from_env()? })?;
     let shape = KernelShape { emulated: true, ..Subject::shape() };
-    let config = TrainConfig { label_samples: 4, ..timing_config() };
+    let config = TrainConfig { label_samples: 4, layer_every: Some(1), ..timing_config() };
     let options = TrainerOptions { shape: Some(shape), ..TrainerOptions::default() };
     let mut model = start(&dataset, &config)?;
     make_sparse(&mut model);
@@ -145,7 +145,7 @@ fn measure(common: &Common, labels: bool) -> Result<Measured> {
     let engine = trainer.engine_mut();
     let capacity = *engine.raw().capacity();
     let size = (scene.width, scene.height);
-    let variant = Variant { labels, lift: false, sh_degree: 3, size, update: true, counts: false };
+    let variant = Variant { labels, lift: false, sh_degree: 3, size, update: true, counts: false, disagreement: false };
     let list = training_step(&shape, &capacity, variant);
     let plan_options = PlanOptions { alias: false, ..PlanOptions::default() };
     let limits = SchedulerOptions::default().limits(&gpu);

@@ -52,6 +52,7 @@ impl Subject {
             size: self.size,
             update: true,
             counts: false,
+            disagreement: false,
         };
         // Of an ideal card: what fits is the matter of `labelgs plan`.
         let much = 1 << 60;

@@ -1,0 +1,63 @@
+//! The weight of wrong labels in the scene's own picture, and its gradient by opacity.
+
+use super::Rules;
+use super::blend::{Trace, centre, trace};
+use super::splat::Splat;
+
+/// The disagreement of a picture with a mask.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Disagreement {
+    /// Weighted sum over the pixels.
+    pub value: f64,
+    /// Derivative of `value` by the opacity of each splat, with everything else fixed.
+    pub v_opacities: Vec<f64>,
+    /// Smallest gradient margin of the pixels in which each splat counts.
+    pub margins: Vec<f64>,
+}
+
+/// Sums E(v) = sum_i w_i [label of i is not L] + T [L is not 0] over the pixels v with a label L and its weight;
+/// pixels with none are left out. `labels` is by Gaussian, `pixels` is `[height, width]`.
+pub fn disagreement(
+    rules: &Rules,
+    splats: &[Splat],
+    labels: &[u32],
+    size: (usize, usize),
+    pixels: &[Option<(u32, f64)>],
+) -> Disagreement {
+    let count = splats.len();
+    let mut out = Disagreement { value: 0.0, v_opacities: vec![0.0; count], margins: vec![f64::INFINITY; count] };
+    for (index, pixel) in pixels.iter().enumerate() {
+        let ray = trace(rules, splats.iter().enumerate(), centre(index, size.0));
+        for contribution in &ray.contributions {
+            let least = &mut out.margins[contribution.splat];
+            *least = least.min(ray.margins.gradient());
+        }
+        if let Some((own, weight)) = *pixel {
+            let differs = |splat: &Splat| f64::from(u8::from(labels[splat.gaussian] != own));
+            let open = f64::from(u8::from(own != 0));
+            add_ray(&mut out, splats, &ray, differs, (open, rules.label_weight * weight));
+        }
+    }
+    out
+}
+
+/// Adds a ray: dE/d alpha_i = T_i d_i - (everything behind i) / (1 - alpha_i).
+fn add_ray(
+    out: &mut Disagreement,
+    splats: &[Splat],
+    ray: &Trace,
+    differs: impl Fn(&Splat) -> f64,
+    (open, weight): (f64, f64),
+) {
+    let mut behind = ray.transmittance * open;
+    for contribution in ray.contributions.iter().rev() {
+        let splat = &splats[contribution.splat];
+        let own = differs(splat);
+        let v_alpha = contribution.transmittance * own - behind / (1.0 - contribution.alpha);
+        behind += contribution.weight() * own;
+        if !contribution.clamped {
+            out.v_opacities[contribution.splat] += weight * contribution.alpha / splat.opacity * v_alpha;
+        }
+    }
+    out.value += weight * behind;
+}
