@@ -67,7 +67,8 @@ fn lists() -> Vec<(Capacity, PassList)> {
                 Variant { labels: true, lift: true, sh_degree: 3, size, update: true, counts: false },
                 2,
             ));
-            add(pass::render_view(&shape, &capacity, 3));
+            add(pass::render_view(&shape, &capacity, 3, 2));
+            add(pass::label_view(&shape, &capacity, 2));
             add(pass::vote_view(&shape, &capacity, 2));
             let variant = Variant { labels: false, lift: false, sh_degree: 3, size, update: true, counts: false };
             let extension = strategy::of(StrategyKind::Mcmc).extension();

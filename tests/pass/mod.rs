@@ -7,6 +7,7 @@
 
 mod blend;
 pub mod fixture;
+mod label_map;
 mod labels;
 mod loss;
 mod optimize;

@@ -49,6 +49,9 @@ crate::buffers! {
     W_SHARED "w_shared": 8, Domain::SharedRows, Class::Model, None, "Bias correction of both moments of each row, `[S]`: 1 - beta^t after its t-th update.";
     DENSIFY_STATS "densify_stats": 8, Domain::Trained, Class::Model, None, "Sum of screen gradients and number of views since the last densification, or the weights of a pruning by weight, `[N]`.";
     LABEL_KEYS "label_keys": 4, Domain::Labelled, Class::Persistent, None, "Highest vote of the step, `[N]`: weight in the high half, label in the low half; 0 without votes.";
+    LABEL_MAP "label_map": 4, Domain::LabelledPixels, Class::Persistent, None, "Label of each pixel, `[P]`: the one with the largest sum of weights.";
+    LABEL_WEIGHTS "label_weights": 4, Domain::LabelledPixels, Class::Step, None, "Sum of the weights of that label, `[P]`.";
+    LABEL_TABLES "label_tables": 16, Domain::LabelTables, Class::Step, None, "Labels that each walk of a tile sums, `[T, rounds]`.";
     VOTES_LOW "votes_low": 4, Domain::VoteCells, Class::Model, None, "Votes of a sweep by Gaussian and label, `[N, columns]`: low words.";
     VOTES_HIGH "votes_high": 4, Domain::VoteCells, Class::Model, None, "Votes of a sweep by Gaussian and label, `[N, columns]`: high words.";
     FAILURE "failure": 4, Domain::One, Class::Persistent, None, "Sticky failure bits; while one is set, passes do not change the model.";
