@@ -3,7 +3,7 @@
 use crate::gradient::differences;
 use crate::reference::adam::{Optimised, Rates, adam};
 use crate::reference::densify::{densify, is_near, opacity_reset};
-use crate::reference::lift::{Masks, centres_of, lift};
+use crate::reference::lift::{Masks, centres_of, label_map, lift};
 use crate::reference::model::ROW_FLOATS;
 use crate::reference::relocate::{explored, relocate};
 use crate::reference::rules::{Family, mutants};
@@ -63,6 +63,11 @@ fn outcome(family: Family, rules: &Rules, (s, model): &(Scene, Model)) -> Vec<f6
             let centres = centres_of(&splats_of(&out.splats), model.rows.len());
             let masks = Masks { label_map: &s.target.label_map, sampled: &[1, 2, 3], gpf: false };
             lift(rules, &out.layers[0], &centres, &masks).keys.iter().map(|&key| f64::from(key)).collect()
+        }
+        Family::LabelMap => {
+            let splats = splats_of(&step(rules, &s.camera, model, &s.target).splats);
+            let size = (s.camera.width as usize, s.camera.height as usize);
+            label_map(rules, &splats, &model.labels, size).iter().map(|pixel| f64::from(pixel.label)).collect()
         }
     }
 }

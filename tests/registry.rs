@@ -73,7 +73,8 @@ fn lists() -> Vec<(Capacity, PassList)> {
                 },
                 2,
             ));
-            add(pass::render_view(&shape, &capacity, 3));
+            add(pass::render_view(&shape, &capacity, 3, 2));
+            add(pass::label_view(&shape, &capacity, 2));
             add(pass::vote_view(&shape, &capacity, 2, false));
             let variant = Variant {
                 labels: false,

@@ -1,7 +1,7 @@
 //! Lists of splats that are longer than one dispatch may walk.
 
 use crate::pass::fixture::{Fixture, readable};
-use crate::reference::{blend, model::Model, project, rules::Rules};
+use crate::reference::{blend, lift, model::Model, project, rules::Rules};
 use crate::support::device;
 use crate::support::scenes::{Shape, scene};
 use labelgs::engine::{Engine, EngineSize};
@@ -50,7 +50,11 @@ fn crowd(count: usize) -> (Gaussians, Camera) {
 fn sixty_thousand_gaussians_in_one_tile_equal_the_mirror() {
     let Some(turn) = device() else { return };
     let gpu = turn.gpu();
-    let (model, camera) = crowd(60_000);
+    let (mut model, camera) = crowd(60_000);
+    // More labels than one walk sums; the last to appear have twice the weight of the others.
+    let label = |(i, mean): (u32, &[f32; 3])| if i % 7 < 5 { i % 7 } else { 5 + u32::from(mean[0] < 0.0) };
+    let labels: Vec<u32> = (0..).zip(&model.means).map(label).collect();
+    model.labels = Some(labels.clone());
     let room = EngineSize::new(60_000, (8, 8));
     let mut engine = Engine::new(gpu, room, SchedulerOptions::default()).expect("room");
     engine.upload_model(&model).expect("model");
@@ -75,6 +79,10 @@ fn sixty_thousand_gaussians_in_one_tile_equal_the_mirror() {
         }
         assert!(expected.count > 300, "pixel {pixel} has {} splats; the crowd is too thin", expected.count);
     }
+    let expected = lift::label_map(&rules, &splats, &labels, (8, 8));
+    let found: Vec<u32> = rendered.labels.iter().map(|&label| u32::from(label)).collect();
+    let expected: Vec<u32> = expected.iter().map(|pixel| pixel.label).collect();
+    assert!(found == expected && [5, 6].iter().all(|label| found.contains(label)), "{found:?} for {expected:?}");
 }
 
 /// A short training whose lists are walked in many segments equals one whose lists are walked at once, bit for bit.

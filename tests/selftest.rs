@@ -36,6 +36,7 @@ fn the_selftest_detects_a_fault_in_each_pass() {
         ("label_weight", "gradient of a step with labels"),
         ("label_weight", "disagreement of labels"),
         ("adam_beta2", "Adam"),
+        ("label_sums", "label map"),
         ("densify_gradient", "densification"),
         ("reset_opacity", "reset of opacities"),
         ("lift_threshold", "lift of labels by the paper's rule"),

@@ -9,7 +9,7 @@
 // Work:    one subgroup (= workgroup) per tile, jobs as in blend_forward.
 // Reads:   step; tile_starts [layers * T]; instance_from_sorted, splat_from_instance [I]; splats [V,3]; image [P] (w = transmittance),
 //          last [P]; v_image [P]; variant labels: counters, layer_tiles, layer_state, layer_weights
-//          variant disagreement: target [P]; view_labels [P]; labels [N]; gaussian_from_splat [V]; label_weights [labels]
+//          variant disagreement: target [P]; view_labels [P]; labels [N]; gaussian_from_splat [V]; label_trust [labels]
 // Writes:  v_instances_a, _b, _c [I] by instance: v_mean2d (px), v_conic xy; v_conic z, v_log_opacity, v_colour rg;
 //          v_colour b, stamp of the step
 //          (records without the current stamp were not walked; they count as 0)
@@ -44,7 +44,7 @@ FETCHC(11, target);
 FETCHU(12, view_labels);
 FETCHU(13, labels);
 FETCHU(14, gaussian_from_splat);
-READ(15, float, label_weights);
+READ(15, float, label_trust);
 WRITE(16, float, disagreement);
 #endif
 #ifdef SEGMENTED
@@ -114,7 +114,7 @@ void main() {
         uint here = fetchu(view_labels, p);
         bool counts = inside && fetchc(target, p).w > 0.5 && (here & LABEL_BORDER) == 0u;
         own[k] = here & LABEL_MASK;
-        differs[k] = counts ? u.label_weight * u.loss_scale * label_weights[own[k]] : 0.0;
+        differs[k] = counts ? u.label_weight * u.loss_scale * label_trust[own[k]] : 0.0;
         wrong[k] = own[k] != 0u ? differs[k] : 0.0;
 #endif
 #ifdef SEGMENTED

@@ -8,7 +8,7 @@ use super::values::{At, BoxAt, Picks, at, box_at, near, picks};
 use crate::edit::catalogue::{Catalogue, Pick};
 use crate::edit::prompt::{Place, Prompt, choose};
 use crate::engine::Engine;
-use crate::render::{Parts, RenderOptions, render};
+use crate::render::label_map;
 use crate::scene::{Camera, Gaussians, LabelMap};
 use crate::{Error, Result};
 use clap::Args;
@@ -160,9 +160,9 @@ impl PromptArgs {
         let Some(scene) = asked.scene else {
             return Err(Error::usage(prompts[0].argument, "needs the scene of the view: --scene SCENE"));
         };
-        let Some(labels) = &asked.model.labels else {
+        if asked.model.labels.is_none() {
             return Err(Error::data(asked.path, "", "the model has no labels; train it with --masks"));
-        };
+        }
         let reading = SceneArgs { max_resolution: asked.max_resolution, read: asked.read, ..SceneArgs::default() };
         let dataset = open_scene(scene, &reading, None, [0.0; 3], false)?;
         let mut cameras: BTreeMap<Key, Camera> = BTreeMap::new();
@@ -174,10 +174,7 @@ impl PromptArgs {
         let near = near_plane(asked.path, self.near)?;
         let sizes = cameras.values().map(|camera| (camera.width, camera.height));
         let mut engine = Engine::of_model(open_gpu(context)?, asked.model, sizes)?;
-        let mut map = |(key, camera): (Key, Camera)| {
-            let rendered = render(&mut engine, &camera, &RenderOptions::new(near, Parts::MAIN))?;
-            Ok((key, rendered.label_map(labels)?))
-        };
+        let mut map = |(key, camera): (Key, Camera)| Ok((key, label_map(&mut engine, &camera, near)?));
         cameras.into_iter().map(&mut map).collect()
     }
 }

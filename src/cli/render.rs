@@ -11,7 +11,7 @@ use crate::edit::select::remove;
 use crate::engine::Engine;
 use crate::io::camera_json::read_camera;
 use crate::render::pictures::{Format, Pictures, What, write_pictures};
-use crate::render::{Parts, RenderOptions, render};
+use crate::render::{Parts, RenderOptions, Rendered, render};
 use crate::scene::{Camera, Gaussians, stems};
 use crate::{Error, Result};
 use clap::Args;
@@ -78,12 +78,16 @@ pub(crate) fn run(args: &RenderArgs, context: &Context) -> Result<()> {
     let gpu = open_gpu(context)?;
     let mut engine = Engine::of_model(gpu, &shown, cameras.iter().map(|(_, camera)| (camera.width, camera.height)))?;
     let asked = |of: &[What]| args.what.iter().any(|what| of.contains(what));
-    let parts = Parts { depth: asked(&[What::Depth]), main: asked(&[What::Labels, What::TopId, What::TopWeight]) };
+    let parts = Parts {
+        depth: asked(&[What::Depth]),
+        main: asked(&[What::TopId, What::TopWeight]),
+        labels: asked(&[What::Labels]),
+    };
     let options = RenderOptions { background: args.background, ..RenderOptions::new(near, parts) };
     let mut files = Vec::new();
     for (stem, camera) in &cameras {
         let rendered = render(&mut engine, camera, &options)?;
-        files.extend(write(args, stem, &rendered, &shown)?);
+        files.extend(write(args, stem, &rendered)?);
     }
     let files: Vec<String> = files.iter().map(|file| file.display().to_string()).collect();
     if context.json || args.json.json {
@@ -129,26 +133,9 @@ fn cameras(args: &RenderArgs) -> Result<Vec<(String, Camera)>> {
     Ok(stems(&views).into_iter().zip(&views).map(|(stem, view)| (stem, view.camera.clone())).collect())
 }
 
-fn write(
-    args: &RenderArgs,
-    stem: &str,
-    rendered: &crate::render::Rendered,
-    model: &Gaussians,
-) -> Result<Vec<std::path::PathBuf>> {
+fn write(args: &RenderArgs, stem: &str, rendered: &Rendered) -> Result<Vec<PathBuf>> {
     let asked = |what| args.what.contains(&what);
-    let unlabelled;
-    let map = if asked(What::Labels) {
-        let labels = match &model.labels {
-            Some(labels) => labels,
-            None => {
-                unlabelled = vec![0; model.len()];
-                &unlabelled
-            }
-        };
-        Some(rendered.label_map(labels)?)
-    } else {
-        None
-    };
+    let map = if asked(What::Labels) { Some(rendered.label_map()?) } else { None };
     let pictures = Pictures {
         width: rendered.width,
         height: rendered.height,

@@ -5,6 +5,7 @@ use crate::error::Result;
 use crate::pass::SHARED_PLANES;
 use crate::scheduler::Scheduler;
 use crate::scheduler::plan::Buf;
+use crate::shaders::constants::LABEL_MASK;
 
 impl Engine {
     /// Positions of the Gaussians, relative to [`Engine::origin`].
@@ -74,6 +75,12 @@ impl Engine {
     /// Weight of each pixel's main Gaussian, and the weighted sum of z over all Gaussians.
     pub(crate) fn weights_and_depths(&mut self, pixels: usize) -> Result<Vec<[f32; 2]>> {
         self.sched.download(Buf::MAIN_WEIGHT_DEPTH, 0, 0, pixels)
+    }
+
+    /// Label of each pixel of the last list with a label map.
+    pub(crate) fn label_map(&mut self, pixels: usize) -> Result<Vec<u16>> {
+        let words = self.sched.download::<u32>(Buf::LABEL_MAP, 0, 0, pixels)?;
+        Ok(words.into_iter().map(|word| (word & LABEL_MASK) as u16).collect())
     }
 
     /// Sets a coordinate of the first position to NaN, as a faulty device would.

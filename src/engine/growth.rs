@@ -1,11 +1,12 @@
 //! Memory of an engine: initial capacities from known sizes, then growth to what the scene needs.
 
-use super::{Engine, EngineSize, Report};
+use super::{Engine, EngineSize, LabelSize, Report};
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::pass::{self, KernelShape, Variant, loss};
 use crate::scheduler::plan::{Buf, Capacity, MemoryReport, PassList, TABLE};
 use crate::scheduler::{Scheduler, SchedulerOptions};
+use crate::shaders::constants::LABEL_ROUNDS;
 use crate::shaders::structs::Counters;
 use serde::{Deserialize, Serialize};
 
@@ -42,6 +43,7 @@ pub fn capacity(shape: &KernelShape, size: &EngineSize) -> Capacity {
         pixels: u64::from(width) * u64::from(height),
         labelled_pixels: if labels > 0 { u64::from(width) * u64::from(height) } else { 0 },
         labelled_tiles: if labels > 0 { tiles } else { 0 },
+        label_tables: if labels > 0 { tiles * u64::from(LABEL_ROUNDS) } else { 0 },
         labels,
         vote_columns: size.labels.map_or(0, |labels| u64::from(labels.vote_columns)),
         vote_cells: size.labels.map_or(0, |labels| u64::from(labels.vote_columns)) * gaussians,
@@ -89,7 +91,7 @@ impl Engine {
     /// Returns the lists that decide the amount of scratch memory.
     #[doc(hidden)]
     pub fn lists_of(shape: &KernelShape, capacity: &Capacity, size: &EngineSize) -> Vec<PassList> {
-        let mut lists = vec![pass::render_view(shape, capacity, 3)];
+        let mut lists = vec![pass::render_view(shape, capacity, 3, size.labels.map_or(0, |_| 1))];
         if size.trained {
             lists.insert(0, pass::training_step(shape, capacity, widest(size)));
             lists.push(pass::densify_apply(shape, capacity, size.labels.is_some()));
@@ -116,6 +118,15 @@ impl Engine {
             other => other.map(|()| gaussians)?,
         };
         self.size.gaussians = gaussians;
+        Ok(())
+    }
+
+    /// Adds memory for the labels of a model. No list may be in flight.
+    pub(super) fn make_room_for_labels(&mut self) -> Result<()> {
+        self.check_idle()?;
+        let size = self.size.with_labels(Some(LabelSize::default()));
+        self.set_capacity(self.capacity_for(&size))?;
+        self.size = size;
         Ok(())
     }
 

@@ -62,7 +62,7 @@ pub(crate) struct DisagreementInput<'a> {
     /// Visible object of each pixel, `[P]`.
     pub view_labels: &'a [u32],
     /// Weight of the pixels of each label id.
-    pub weights: Vec<f32>,
+    pub trust: Vec<f32>,
 }
 
 /// Input of a vote on a view.
@@ -116,7 +116,7 @@ impl Engine {
                 sched.upload(Buf::TARGET, frame, 0, train.photo)?;
                 if let Some(labels) = &train.disagreement {
                     sched.upload(Buf::VIEW_LABELS, frame, 0, labels.view_labels)?;
-                    sched.upload(Buf::LABEL_WEIGHTS, frame, 0, &labels.weights)?;
+                    sched.upload(Buf::LABEL_TRUST, frame, 0, &labels.trust)?;
                 }
                 let Some(layers) = &train.layers else { return Ok(()) };
                 sched.upload(Buf::VIEW_LABELS, frame, 0, layers.view_labels)?;

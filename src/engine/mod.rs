@@ -43,6 +43,8 @@ pub struct Engine {
     extension: Arc<dyn Extension>,
     /// Variant of these passes that counts in predictions of memory; 0 for none.
     passes: u32,
+    /// Walks of each tile with which label maps start; grows to what they needed so far.
+    label_rounds: u32,
     /// Stamp of the last submit, never 0.
     stamp: u32,
     last_frame: usize,
@@ -84,6 +86,7 @@ impl Engine {
             origin: DVec3::ZERO,
             extension: Arc::new(()),
             passes: 0,
+            label_rounds: 1,
             stamp: 0,
             last_frame: 0,
             in_flight: [false; FRAMES_IN_FLIGHT],
@@ -138,8 +141,12 @@ impl Engine {
         (self.extension, self.passes) = (extension, passes);
     }
 
-    /// Copies a model into the device's memory; moments and statistics become 0.
+    /// Copies a model into the device's memory; moments and statistics become 0. An engine for rendering gets memory for
+    /// labels with the first model that has some.
     pub fn upload_model(&mut self, gaussians: &Gaussians) -> Result<()> {
+        if gaussians.labels.is_some() && self.size.labels.is_none() && !self.size.trained {
+            self.make_room_for_labels()?;
+        }
         self.make_room_for_gaussians(gaussians.len() as u64)?;
         model::upload(&mut self.sched, gaussians, self.size.labels.is_some())?;
         self.gaussian_count = gaussians.len() as u32;

@@ -5,7 +5,8 @@ use crate::error::{Error, Result};
 use crate::pass::{self, Stage, Variant};
 use crate::scheduler::plan::{Buf, FRAMES_IN_FLIGHT};
 use crate::scheduler::{ListId, Ticket};
-use crate::shaders::structs::Counters;
+use crate::shaders::constants::LABEL_ROUNDS;
+use crate::shaders::structs::{Counters, StepUniforms};
 
 /// Identifies a list.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -17,8 +18,15 @@ pub enum ListKey {
     /// One optimiser step with separate passes for this many sampled objects, see [`pass::separate_step`].
     #[cfg(feature = "lab")]
     Separate(Variant, u32),
-    /// One picture, with this active degree of the spherical harmonics.
-    Render(u32),
+    /// One picture.
+    Render {
+        /// Active degree of the spherical harmonics.
+        sh_degree: u32,
+        /// Most walks of each tile for the label map, for four labels each time; 0 without a label map.
+        label_rounds: u32,
+    },
+    /// The label map of one view; each tile is walked up to this many times, for four labels each time.
+    LabelMap(u32),
     /// Votes of one view; each tile is walked this many times, for four labels each time. True: as if nothing were in
     /// front of a Gaussian.
     Vote(u32, bool),
@@ -75,7 +83,8 @@ impl Engine {
             }
             #[cfg(feature = "lab")]
             ListKey::Separate(variant, objects) => pass::separate_step(shape, capacity, variant, objects),
-            ListKey::Render(sh_degree) => pass::render_view(shape, capacity, sh_degree),
+            ListKey::Render { sh_degree, label_rounds } => pass::render_view(shape, capacity, sh_degree, label_rounds),
+            ListKey::LabelMap(rounds) => pass::label_view(shape, capacity, rounds),
             ListKey::Vote(rounds, alone) => pass::vote_view(shape, capacity, rounds, alone),
             ListKey::Weigh => pass::weigh_view(shape, capacity),
             ListKey::DensifyCount => pass::densify_count(shape, capacity),
@@ -104,6 +113,18 @@ impl Engine {
             if !self.recover(&report)? {
                 return Ok(report);
             }
+        }
+    }
+
+    /// Runs a list with a label map; again with more walks while they do not decide all tiles, up to [`LABEL_ROUNDS`].
+    /// Later lists start with as many.
+    pub(crate) fn run_labels(&mut self, key: impl Fn(u32) -> ListKey, uniforms: &StepUniforms) -> Result<()> {
+        loop {
+            let report = self.run(key(self.label_rounds), uniforms)?;
+            if report.counters.undecided_tiles == 0 || self.label_rounds == LABEL_ROUNDS {
+                return Ok(());
+            }
+            self.label_rounds = (2 * self.label_rounds).min(LABEL_ROUNDS);
         }
     }
 

@@ -7,7 +7,7 @@ use crate::scene::Gaussians;
 /// Sizes of the label buffers.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct LabelSize {
-    /// Largest id.
+    /// Largest id in a step's masks; 0 without object layers.
     pub max_label: u32,
     /// Maximum number of objects sampled in one step.
     pub layers: u32,
@@ -36,10 +36,11 @@ impl EngineSize {
         Self { gaussians, image, trained: false, labels: None, shared_rows: 0 }
     }
 
-    /// Sizes for rendering a model in images of up to the largest of `sizes`, px.
+    /// Sizes for rendering a model, and its labels if it has some, in images of up to the largest of `sizes`, px.
     pub fn of_model(model: &Gaussians, sizes: impl Iterator<Item = (u32, u32)>) -> Self {
         let image = sizes.reduce(|a, b| (a.0.max(b.0), a.1.max(b.1))).unwrap_or((1, 1));
-        Self::new((model.len() as u64).max(1), image)
+        let labels = model.labels.as_ref().map(|_| LabelSize::default());
+        Self::new((model.len() as u64).max(1), image).with_labels(labels)
     }
 
     /// Adds optimiser state and gradients.
@@ -63,7 +64,7 @@ impl EngineSize {
         let (width, height) = self.image;
         let (tiles_x, tiles_y) = shape.tiles(width, height);
         // A splat may touch every tile twice, with its object's layer. One loop of 65,535 rounds at most walks them.
-        let most = if self.labels.is_some() { 32_500 } else { 65_000 };
+        let most = if self.labels.is_some_and(|labels| labels.layers > 0) { 32_500 } else { 65_000 };
         if u64::from(tiles_x) * u64::from(tiles_y) <= most {
             return Ok(());
         }

@@ -21,6 +21,9 @@ pub struct Rendering<'a> {
     pub min_confidence: f32,
     /// Training views, for scores by region; none leaves them out.
     pub train: &'a [View],
+    /// The label of a pixel is that of its main Gaussian, as in LabelGS, instead of the one with the largest sum of
+    /// weights.
+    pub by_main: bool,
 }
 
 /// Ground truth of objects including their hidden parts.
@@ -55,14 +58,19 @@ pub fn evaluate(
         [] => None,
         train => Some(Witnesses::new(engine, train, how.options)?),
     };
-    let of_scene = RenderOptions { parts: Parts::ALL, ..how.options };
-    let of_object = RenderOptions { background: [0.0; 3], parts: Parts::COLOUR, ..how.options };
     let labels = model.labels.as_deref();
+    let parts = Parts { main: how.by_main, labels: labels.is_some() && !how.by_main, ..Parts::DEPTH };
+    let of_scene = RenderOptions { parts, ..how.options };
+    let of_object = RenderOptions { background: [0.0; 3], parts: Parts::COLOUR, ..how.options };
     let mut scores = Vec::new();
     let mut hidden = Vec::new();
     for view in views {
         let rendered = render(engine, &view.camera, &of_scene)?;
-        let map = labels.map(|labels| rendered.label_map(labels)).transpose()?;
+        let map = labels.map(|labels| match how.by_main {
+            true => rendered.main_label_map(labels),
+            false => rendered.label_map(),
+        });
+        let map = map.transpose()?;
         let mut score = ViewScores::new(&rendered.rgb, photo(view)?, map.as_ref(), view.mask.as_deref())?;
         if let Some(witnesses) = &witnesses {
             let seen = witnesses.see(&view.camera, &rendered)?;

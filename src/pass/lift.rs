@@ -1,4 +1,5 @@
 //! Labels from masks: the lift of a step (`blend_forward_labels` casts its votes), and sweeps of votes over all views.
+//! And back: the label map of a view.
 
 use super::build::{Builder, args, over_gaussians};
 use super::project::GAUSSIAN_FROM_SPLAT;
@@ -12,6 +13,22 @@ pub(super) fn resolve(b: &mut Builder) {
     pass!(b, lift_resolve {
         step: Buf::STEP, failure: Buf::FAILURE, label_keys: Buf::LABEL_KEYS, labels: Buf::LABELS,
     } [], over_gaussians());
+}
+
+/// Finds the label with the largest sum of weights in each pixel. Each tile is walked up to `rounds` times, for four
+/// labels each time.
+pub(super) fn label_map(b: &mut Builder, pairs: Buf, rounds: u32) {
+    let segments = b.segments();
+    b.list.stage = Stage::Labels;
+    for (round, segment) in (0..rounds).flat_map(|round| (0..segments).map(move |segment| (round, segment))) {
+        pass!(b, label_map(segmented: segments > 1) {
+            step: Buf::STEP, counters: Buf::COUNTERS, tile_starts: Buf::TILE_STARTS, tile_ends: Buf::TILE_ENDS,
+            instance_from_sorted: pairs, splat_from_instance: Buf::SPLAT_FROM_INSTANCE, splats: Buf::SPLATS,
+            gaussian_from_splat: GAUSSIAN_FROM_SPLAT, labels: Buf::LABELS, label_map: Buf::LABEL_MAP,
+            label_weights: Buf::LABEL_WEIGHTS, label_tables: Buf::LABEL_TABLES, segment_colours: Buf::SEGMENT_COLOURS,
+            segment_rest: Buf::SEGMENT_REST,
+        } [round: round, rounds: rounds, segment: segment, segments: segments], args(constants::ARGS_BLEND));
+    }
 }
 
 /// Adds the weight of every contributor to the vote for its pixel's label; with `alone` its alpha, whatever is in front.

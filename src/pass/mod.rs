@@ -133,12 +133,24 @@ pub fn extended_step(
     end(b)
 }
 
-/// One picture of the scene: colour, transmittance, main Gaussian and its weight, depth.
-pub fn render_view(shape: &KernelShape, capacity: &Capacity, sh_degree: u32) -> PassList {
+/// One picture of the scene: colour, transmittance, main Gaussian and its weight, depth. With `label_rounds` above 0 it
+/// has a label map too, of up to so many walks of each tile.
+pub fn render_view(shape: &KernelShape, capacity: &Capacity, sh_degree: u32, label_rounds: u32) -> PassList {
     let mut b = begin("render", shape, capacity, false, sh_degree);
     project::visible_splats(&mut b);
     let pairs = tile::bin_splats(&mut b);
+    // The picture comes last, because it is read from scratch memory.
+    lift::label_map(&mut b, pairs, label_rounds);
     blend::blend_forward_main(&mut b, pairs);
+    end(b)
+}
+
+/// The label map of one view. Each tile is walked up to `rounds` times, for four labels each time.
+pub fn label_view(shape: &KernelShape, capacity: &Capacity, rounds: u32) -> PassList {
+    let mut b = begin("label map", shape, capacity, false, 0);
+    project::visible_splats(&mut b);
+    let pairs = tile::bin_splats(&mut b);
+    lift::label_map(&mut b, pairs, rounds);
     end(b)
 }
 

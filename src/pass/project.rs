@@ -95,7 +95,7 @@ mod tests {
     fn the_depth_sort_ends_in_one_buffer_whatever_its_passes() {
         for (digit_bits, passes) in [(4, 8), (7, 5), (8, 4), (11, 3), (16, 2)] {
             let shape = KernelShape { digit_bits, ..KernelShape::new(8, true) };
-            let list = render_view(&shape, &Capacity { segments: 1, ..Capacity::default() }, 0);
+            let list = render_view(&shape, &Capacity { segments: 1, ..Capacity::default() }, 0, 0);
             let bound = |title: &str, name: &str| -> Vec<Buf> {
                 let passes = list.work.iter().filter_map(|work| match work {
                     Work::Pass(pass) if pass.title == title => Some(pass),

@@ -1,4 +1,4 @@
-//! Renders a model: colour, alpha, depth, and the main Gaussian of each pixel.
+//! Renders a model: colour, alpha, depth, label and main Gaussian of each pixel.
 //!
 //! [`render()`] draws the model of an [`Engine`] from a [`Camera`]. [`RenderOptions`] has near plane, background and
 //! the [`Parts`] to read back. The result is a [`Rendered`]; [`write_pictures`] writes it as PNG or EXR.
@@ -9,7 +9,7 @@ pub use pictures::{Format, Pictures, What, write_pictures, write_rgb};
 
 use crate::engine::{Engine, ListKey};
 use crate::error::{Error, Result};
-use crate::scene::{Camera, LabelMap};
+use crate::scene::{Camera, LabelMap, UNLABELLED};
 
 /// Default near plane, of 3DGS, world units.
 pub const NEAR: f32 = crate::shaders::constants::NEAR;
@@ -21,17 +21,21 @@ pub struct Parts {
     pub depth: bool,
     /// Main Gaussian and its weight.
     pub main: bool,
+    /// Label.
+    pub labels: bool,
 }
 
 impl Parts {
     /// Colour and alpha only.
-    pub const COLOUR: Self = Self { depth: false, main: false };
+    pub const COLOUR: Self = Self { depth: false, main: false, labels: false };
     /// Colour, alpha and depth.
-    pub const DEPTH: Self = Self { depth: true, main: false };
+    pub const DEPTH: Self = Self { depth: true, ..Self::COLOUR };
     /// Colour, alpha and main Gaussians.
-    pub const MAIN: Self = Self { depth: false, main: true };
+    pub const MAIN: Self = Self { main: true, ..Self::COLOUR };
+    /// Colour, alpha and labels.
+    pub const LABELS: Self = Self { labels: true, ..Self::COLOUR };
     /// Everything.
-    pub const ALL: Self = Self { depth: true, main: true };
+    pub const ALL: Self = Self { depth: true, main: true, labels: true };
 }
 
 /// The options of a render.
@@ -60,7 +64,7 @@ impl RenderOptions {
     }
 
     /// Makes options for main Gaussians only. Their colour does not matter, so the degree is 0.
-    pub fn of_labels(near: f32) -> Self {
+    pub fn of_main(near: f32) -> Self {
         Self { sh_degree: Some(0), ..Self::new(near, Parts::MAIN) }
     }
 }
@@ -82,12 +86,22 @@ pub struct Rendered {
     pub top_id: Vec<i32>,
     /// Blending weight of that Gaussian, `[H, W]`.
     pub top_weight: Vec<f32>,
+    /// Label with the largest sum of blending weights, the smaller of equals; 0 is a label like others, and that of
+    /// pixels without a Gaussian, `[H, W]`.
+    pub labels: Vec<u16>,
 }
 
 impl Rendered {
+    /// Returns the label of each pixel: of all labels, the one with the largest sum of blending weights. Returns an error
+    /// without [`Parts::labels`].
+    pub fn label_map(&self) -> Result<LabelMap> {
+        self.check_part(self.labels.len(), "labels")?;
+        Ok(LabelMap { width: self.width, height: self.height, ids: self.labels.clone() })
+    }
+
     /// Returns the label of the main Gaussian of each pixel (LabelGS, inference), 0 without any. `labels` has one label
     /// per Gaussian. Returns an error without [`Parts::main`].
-    pub fn label_map(&self, labels: &[u32]) -> Result<LabelMap> {
+    pub fn main_label_map(&self, labels: &[u32]) -> Result<LabelMap> {
         self.check_part(self.top_id.len(), "main Gaussians")?;
         let id = |&top: &i32| usize::try_from(top).map_or(0, |index| labels[index] as u16);
         Ok(LabelMap { width: self.width, height: self.height, ids: self.top_id.iter().map(id).collect() })
@@ -111,9 +125,15 @@ impl Rendered {
 /// ([`Engine::grow_image`]), and nothing may be in flight.
 pub fn render(engine: &mut Engine, camera: &Camera, options: &RenderOptions) -> Result<Rendered> {
     let uniforms = engine.view_uniforms(camera, options.near, options.background);
-    engine.run(ListKey::Render(options.sh_degree.unwrap_or(engine.sh_degree())), &uniforms)?;
+    let sh_degree = options.sh_degree.unwrap_or(engine.sh_degree());
+    let Parts { depth, main, labels } = options.parts;
+    let has_labels = engine.size().labels.is_some();
+    if labels && has_labels {
+        engine.run_labels(|label_rounds| ListKey::Render { sh_degree, label_rounds }, &uniforms)?;
+    } else {
+        engine.run(ListKey::Render { sh_degree, label_rounds: 0 }, &uniforms)?;
+    }
     let pixels = camera.width as usize * camera.height as usize;
-    let Parts { depth, main } = options.parts;
     let image = engine.picture(pixels)?;
     let weight_depth = if depth || main { engine.weights_and_depths(pixels)? } else { Vec::new() };
     let pick = |asked: bool, part: usize| weight_depth.iter().filter(|_| asked).map(|pair| pair[part]).collect();
@@ -125,5 +145,24 @@ pub fn render(engine: &mut Engine, camera: &Camera, options: &RenderOptions) -> 
         depth: pick(depth, 1),
         top_id: if main { engine.main_gaussians(pixels)? } else { Vec::new() },
         top_weight: pick(main, 0),
+        labels: match (labels, has_labels) {
+            (false, _) => Vec::new(),
+            (true, true) => engine.label_map(pixels)?,
+            (true, false) => vec![UNLABELLED as u16; pixels],
+        },
     })
+}
+
+/// Renders the label of each pixel of the model in the engine, without a picture, which takes about half the time. The
+/// engine has the labels of [`Engine::upload_model`] or [`Engine::set_labels`]; without any, all are 0.
+pub fn label_map(engine: &mut Engine, camera: &Camera, near: f32) -> Result<LabelMap> {
+    let pixels = camera.width as usize * camera.height as usize;
+    let ids = if engine.size().labels.is_some() {
+        let uniforms = engine.view_uniforms(camera, near, [0.0; 3]);
+        engine.run_labels(ListKey::LabelMap, &uniforms)?;
+        engine.label_map(pixels)?
+    } else {
+        vec![UNLABELLED as u16; pixels]
+    };
+    Ok(LabelMap { width: camera.width, height: camera.height, ids })
 }

@@ -105,7 +105,7 @@ impl Run<'_> {
             return Ok(None);
         }
         let options = self.trainer.render_options();
-        let how = Rendering { options, min_confidence: MIN_LABEL_CONFIDENCE, train: &[] };
+        let how = Rendering { options, min_confidence: MIN_LABEL_CONFIDENCE, train: &[], by_main: false };
         let scores = evaluate(self.trainer.engine_mut(), model, &views, how, &(), &mut ())?;
         scores.warn_of_odd_view(self.settings.train.near);
         Ok(Some(scores))

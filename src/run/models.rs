@@ -80,12 +80,12 @@ pub(crate) fn save_cameras(out: &Path, cameras: &[(&str, &Camera)]) -> Result<()
     camera_json::write_cameras(out.join("cameras.json"), cameras)
 }
 
-/// Writes photo, render and (with labels) label map side by side.
-pub(crate) fn save_preview(path: &Path, photo: &Photo, rendered: &Rendered, labels: Option<&[u32]>) -> Result<()> {
+/// Writes photo, render and (if it was rendered) label map side by side.
+pub(crate) fn save_preview(path: &Path, photo: &Photo, rendered: &Rendered) -> Result<()> {
     let (width, height) = (rendered.width as usize, rendered.height as usize);
     let byte = |value: f32| (value.clamp(0.0, 1.0) * 255.0).round() as u8;
-    let map = labels.map(|labels| rendered.label_map(labels)).transpose()?;
-    let panels = if map.is_some() { 3 } else { 2 };
+    let labels = &rendered.labels;
+    let panels = if labels.is_empty() { 2 } else { 3 };
     let mut pixels = vec![[0_u8; 3]; width * panels * height];
     for y in 0..height {
         let row = &mut pixels[y * width * panels..][..width * panels];
@@ -94,8 +94,8 @@ pub(crate) fn save_preview(path: &Path, photo: &Photo, rendered: &Rendered, labe
             let [r, g, b, _] = photo.rgba[at];
             row[x] = [r, g, b];
             row[width + x] = rendered.rgb[at].map(byte);
-            if let Some(map) = &map {
-                row[2 * width + x] = label_colour(u32::from(map.ids[at]));
+            if let Some(&label) = labels.get(at) {
+                row[2 * width + x] = label_colour(u32::from(label));
             }
         }
     }

@@ -208,8 +208,8 @@ pub(crate) fn train_input<'a>(
     let room = engine.size().labels.filter(|_| input.labels);
     let (disagrees, layered) = if input.layers.is_empty() { (room, None) } else { (None, room) };
     let disagreement = disagrees.map(|room| {
-        let weights = vec![1.0; room.max_label as usize + 1];
-        DisagreementInput { view_labels: &view.view_labels, weights }
+        let trust = vec![1.0; room.max_label as usize + 1];
+        DisagreementInput { view_labels: &view.view_labels, trust }
     });
     let layers = layered.map(|room| {
         let words = uniforms.occluder_words as usize;

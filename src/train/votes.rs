@@ -23,10 +23,9 @@ impl Trainer {
         Ok(())
     }
 
-    /// Waits for the steps in flight and returns the labels on the device; none without masks.
-    pub fn labels(&mut self) -> Result<Option<Vec<u32>>> {
-        self.drain()?;
-        self.engine.size().labels.is_some().then(|| self.engine.labels()).transpose()
+    /// Returns true if the Gaussians on the device have labels: in a scene with masks.
+    pub fn has_labels(&self) -> bool {
+        self.engine.size().labels.is_some()
     }
 
     fn count_votes(&mut self) -> Result<Decision> {
@@ -37,8 +36,7 @@ impl Trainer {
         });
         let voters: Vec<Voter> = voters.collect();
         let is_judged = self.config.vote_trust && self.labelled_once;
-        let judges = if is_judged { Some(self.engine.labels()?) } else { None };
-        decide::count(&mut self.engine, &voters, judges.as_deref(), &means, how, true)
+        decide::count(&mut self.engine, &voters, is_judged, &means, how, true)
     }
 
     /// Returns the model with its final labels. With [`LabelRule::Votes`](super::LabelRule::Votes) it counts them again

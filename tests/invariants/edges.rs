@@ -115,7 +115,7 @@ fn a_model_without_gaussians_renders_the_background() {
     assert!(engine.download_model().expect("a model").is_empty());
 }
 
-const LABEL_BUFFERS: [&str; 8] = [
+const LABEL_BUFFERS: [&str; 11] = [
     "labels",
     "label_keys",
     "view_labels",
@@ -124,6 +124,9 @@ const LABEL_BUFFERS: [&str; 8] = [
     "layer_occluders",
     "old_labels",
     "layer_state",
+    "label_map",
+    "label_weights",
+    "label_tables",
 ];
 
 #[test]

@@ -58,9 +58,12 @@ fn a_picture_without_a_part_says_so() {
     let colour = render(&mut engine, &camera, &RenderOptions::new(0.2, Parts::COLOUR)).expect("a picture");
     assert_eq!((&all.rgb, &all.alpha), (&colour.rgb, &colour.alpha));
     let labels = vec![1; model.len()];
-    assert!(all.label_map(&labels).is_ok() && all.mean_depth().is_ok());
-    let missing = [colour.label_map(&labels).err(), colour.mean_depth().err()].map(|error| error.expect("refused"));
-    assert!(missing[0].to_string().contains("main Gaussians") && missing[1].to_string().contains("depth"));
+    assert!(all.main_label_map(&labels).is_ok() && all.label_map().is_ok() && all.mean_depth().is_ok());
+    let missing = [colour.main_label_map(&labels).err(), colour.mean_depth().err(), colour.label_map().err()];
+    for (error, part) in missing.into_iter().zip(["main Gaussians", "depth", "labels"]) {
+        let text = error.expect("refused").to_string();
+        assert!(text.contains(part), "{text}");
+    }
 }
 
 #[test]

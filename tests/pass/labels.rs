@@ -100,10 +100,10 @@ fn drawn(rows: &[Row], labels: Vec<u32>, width: u32, height: u32, label_map: Vec
 
 const SIDE: u32 = 17;
 /// Index of the pixel that holds the dots' centre.
-const MIDDLE: usize = 8 * 17 + 8;
+pub(super) const MIDDLE: usize = 8 * 17 + 8;
 
 /// Dots one behind the other at the middle of a picture that is all object 7.
-fn on_a_ray(opacities: &[f64]) -> Scene {
+pub(super) fn on_a_ray(opacities: &[f64]) -> Scene {
     let camera = plain_camera(SIDE, SIDE);
     let rows: Vec<Row> =
         opacities.iter().enumerate().map(|(i, &o)| dot(&camera, [8.5, 8.5], 5.0 + i as f64, 3.0, o)).collect();

@@ -8,6 +8,7 @@
 mod blend;
 mod disagreement;
 pub mod fixture;
+mod label_map;
 mod labels;
 mod loss;
 mod optimize;

@@ -92,8 +92,8 @@ fn divided(gpu: &Arc<Gpu>, dataset: &Dataset, model: &Gaussians, objects: usize)
     engine.upload_model(model)?;
     let mut dataset = dataset.clone();
     for view in &mut dataset.train {
-        let seen = render(&mut engine, &view.camera, &RenderOptions::of_labels(NEAR))?;
-        view.mask = Some(Arc::new(seen.label_map(&labels)?));
+        let seen = render(&mut engine, &view.camera, &RenderOptions::of_main(NEAR))?;
+        view.mask = Some(Arc::new(seen.main_label_map(&labels)?));
     }
     Ok(dataset)
 }

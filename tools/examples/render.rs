@@ -24,10 +24,9 @@ fn main() -> labelgs::Result<()> {
 
     let size = (camera.width, camera.height);
     let mut engine = Engine::of_model(Gpu::new(&GpuOptions::default())?, &model, [size])?;
-    let rendered = render(&mut engine, camera, &RenderOptions { parts: Parts::MAIN, ..RenderOptions::default() })?;
+    let rendered = render(&mut engine, camera, &RenderOptions { parts: Parts::LABELS, ..RenderOptions::default() })?;
     write_rgb(Path::new(out), size, &rendered.rgb, Format::Png)?;
 
-    let map = rendered.label_map(model.labels.as_deref().unwrap_or(&vec![0; model.len()]))?;
-    let colours = map.ids.iter().map(|&id| label_colour(id.into()).map(|byte| f32::from(byte) / 255.0));
+    let colours = rendered.labels.iter().map(|&id| label_colour(id.into()).map(|byte| f32::from(byte) / 255.0));
     write_rgb(Path::new(labels_out), size, &colours.collect::<Vec<_>>(), Format::Png)
 }

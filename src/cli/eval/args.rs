@@ -55,8 +55,10 @@ pub struct EvalArgs {
     /// Score only these objects, names with commas between.
     #[arg(long, value_name = "NAMES", requires = "protocol", value_delimiter = ',', help_heading = "Benchmarks")]
     pub objects: Vec<String>,
-    /// Follow the published scorer, mistakes included. Only for labelgs and lerf-mask.
-    #[arg(long, requires = "protocol", help_heading = "Benchmarks")]
+    /// The label of a pixel is that of its Gaussian with the largest weight, as in the LabelGS paper, instead of the
+    /// label with the largest sum of weights. With --protocol, follow the published scorer, mistakes included; only for
+    /// labelgs and lerf-mask.
+    #[arg(long, help_heading = "Benchmarks")]
     pub compat: bool,
     /// Weights of LPIPS v0.1 with VGG16, safetensors. Without weights LPIPS is left out.
     #[arg(long, value_name = "WEIGHTS", requires = "protocol", help_heading = "Benchmarks")]

@@ -60,6 +60,7 @@ pub(super) fn run(protocol: Protocol, args: &EvalArgs, context: &Context) -> Res
         &model,
         near_plane(&args.model, args.near.first().copied())?,
         args.sure.min_confidence,
+        args.compat,
     );
     let report = run_bench(&layout, &bench, &mut painter, &mut watcher)?;
     let table = bench_table(&report);

@@ -38,6 +38,7 @@ pub(in crate::cli) fn score(args: &EvalArgs, context: &Context) -> Result<Scores
         options: RenderOptions { near, background: args.background, ..RenderOptions::default() },
         min_confidence: args.sure.min_confidence,
         train: &dataset.train,
+        by_main: args.compat,
     };
     let mut scores = evaluate(&mut engine, &model, &views, how, &wholes, &mut watcher)?;
     if args.near.len() > 1 {
@@ -60,7 +61,8 @@ fn compare_planes(
     let scenes: Vec<&View> = scenes.iter().collect();
     let mut found = Vec::new();
     for &near in planes {
-        let how = Rendering { options: RenderOptions { near, ..options }, min_confidence: 0.0, train: &[] };
+        let options = RenderOptions { near, ..options };
+        let how = Rendering { options, min_confidence: 0.0, train: &[], by_main: false };
         let scores = evaluate(engine, model, &scenes, how, &(), &mut ())?;
         let worst = scores.views.values().map(|view| view.psnr).fold(f64::INFINITY, f64::min);
         found.push(NearScores { near, psnr: scores.mean.psnr.unwrap_or(f64::NAN), worst });

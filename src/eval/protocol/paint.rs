@@ -4,7 +4,7 @@ use super::score::Drawn;
 use crate::edit::select::extract;
 use crate::engine::Engine;
 use crate::error::Result;
-use crate::render::{Parts, RenderOptions, render};
+use crate::render::{Parts, RenderOptions, label_map, render};
 use crate::scene::{Camera, Gaussians, LabelMap};
 
 /// Renders a model with labels.
@@ -21,15 +21,16 @@ pub struct EnginePainter<'a> {
     model: &'a Gaussians,
     near: f32,
     min_confidence: f32,
+    by_main: bool,
     /// The labels on the device; `Some(None)` is the whole model.
     there: Option<Option<Vec<u32>>>,
 }
 
 impl<'a> EnginePainter<'a> {
     /// Makes a painter. `near` is the near plane, world units. Objects drawn alone leave out Gaussians with less than
-    /// `min_confidence`.
-    pub fn new(engine: &'a mut Engine, model: &'a Gaussians, near: f32, min_confidence: f32) -> Self {
-        Self { engine, model, near, min_confidence, there: None }
+    /// `min_confidence`. With `by_main`, the label of a pixel is that of its main Gaussian, as in LabelGS.
+    pub fn new(engine: &'a mut Engine, model: &'a Gaussians, near: f32, min_confidence: f32, by_main: bool) -> Self {
+        Self { engine, model, near, min_confidence, by_main, there: None }
     }
 
     fn upload(&mut self, labels: Option<&[u32]>) -> Result<()> {
@@ -48,16 +49,12 @@ impl<'a> EnginePainter<'a> {
 impl Painter for EnginePainter<'_> {
     fn label_map(&mut self, camera: &Camera) -> Result<LabelMap> {
         self.upload(None)?;
-        let rendered = render(self.engine, camera, &RenderOptions::new(self.near, Parts::MAIN))?;
-        let unlabelled;
-        let labels = match &self.model.labels {
-            Some(labels) => labels,
-            None => {
-                unlabelled = vec![0; self.model.len()];
-                &unlabelled
+        match &self.model.labels {
+            Some(labels) if self.by_main => {
+                render(self.engine, camera, &RenderOptions::of_main(self.near))?.main_label_map(labels)
             }
-        };
-        rendered.label_map(labels)
+            _ => label_map(self.engine, camera, self.near),
+        }
     }
 
     fn draw(&mut self, labels: Option<&[u32]>, camera: &Camera) -> Result<Drawn> {

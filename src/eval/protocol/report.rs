@@ -90,13 +90,15 @@ const STRICT: [&str; 4] = [
     "psnr: clamped to 0..1, one error over all channels and pixels of the frame, object on black against photo x mask",
     "ssim: 11x11 Gaussian window over the whole frame",
 ];
-const LABELGS_COMPAT: [&str; 4] = [
+const LABELGS_COMPAT: [&str; 5] = [
+    "prompts choose by the label of the Gaussian with the largest weight in a pixel",
     "an empty selection renders the whole scene",
     "iou: any channel above 0.01 is the published one, here iou_colour",
     "psnr: mean of the PSNR of each channel over the whole frame, not clamped",
     "ssim: 8-bit pictures, uniform 7x7 window, sample covariance, over the whole frame",
 ];
-const LERF_MASK_COMPAT: [&str; 3] = [
+const LERF_MASK_COMPAT: [&str; 4] = [
+    "prompts choose by the label of the Gaussian with the largest weight in a pixel",
     "a missing prediction and an empty selection are left out of the averages",
     "psnr: mean of the PSNR of each channel over the whole frame, not clamped",
     "ssim: 8-bit pictures, uniform 7x7 window, sample covariance, over the whole frame",

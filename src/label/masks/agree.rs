@@ -6,7 +6,7 @@ use crate::engine::Engine;
 use crate::error::Result;
 use crate::label::vote::ballot::{Sweep, Voter, sweep};
 use crate::label::vote::decide::count;
-use crate::render::{RenderOptions, render};
+use crate::render::label_map;
 use crate::scene::{Gaussians, LabelMap, View};
 use std::collections::BTreeMap;
 
@@ -53,11 +53,11 @@ pub fn agree(
         .collect();
     // The labels that all renamed masks give the model decide the content of each mask.
     let voters = views.iter().zip(&renamed).filter_map(|(view, mask)| Some(Voter::of(view, mask.as_ref()?)));
-    let decision = count(engine, &voters.collect::<Vec<_>>(), None, &model.means, counting, true)?;
+    let decision = count(engine, &voters.collect::<Vec<_>>(), false, &model.means, counting, true)?;
+    engine.set_labels(&decision.labels)?;
     let mut masks = Vec::with_capacity(views.len());
     for (index, (view, mask)) in views.iter().zip(&renamed).enumerate() {
-        let options = RenderOptions::of_labels(how.near);
-        let shown = render(engine, &view.camera, &options)?.label_map(&decision.labels)?;
+        let shown = label_map(engine, &view.camera, how.near)?;
         masks.push(match mask {
             Some(mask) => Some(mend(index, mask, &shown, &mut repairs)),
             None if how.make_missing => {

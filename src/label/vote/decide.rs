@@ -3,7 +3,7 @@
 use super::ballot::{Ballot, Sweep, Voter, sweep, weight};
 use crate::engine::Engine;
 use crate::error::{Error, Result};
-use crate::render::{RenderOptions, render};
+use crate::render::label_map;
 use crate::scene::{Gaussians, LabelMap, UNLABELLED};
 use kiddo::{ImmutableKdTree, SquaredEuclidean};
 use rayon::prelude::*;
@@ -147,22 +147,19 @@ pub(crate) fn apply(model: &mut Gaussians, decision: Decision) {
     model.label_confidence = Some(decision.confidence);
 }
 
-/// Counts the votes of `voters` for the model in the engine and decides. `judges` are the current labels of the model:
-/// masks that disagree with them count less ([`trust`]). Nothing may be in flight.
+/// Counts the votes of `voters` for the model in the engine and decides. If it `is_judged`, masks that disagree with the
+/// labels in the engine count less ([`trust`]). Nothing may be in flight.
 pub(crate) fn count(
     engine: &mut Engine,
     voters: &[Voter],
-    judges: Option<&[u32]>,
+    is_judged: bool,
     means: &[[f32; 3]],
     how: Sweep,
     complete: bool,
 ) -> Result<Decision> {
     let mut agreements = Vec::new();
-    if let Some(labels) = judges {
-        for voter in voters {
-            let shown = render(engine, voter.camera, &RenderOptions::of_labels(how.near))?;
-            agreements.push(agreement(voter.mask, &shown.label_map(labels)?));
-        }
+    for voter in voters.iter().filter(|_| is_judged) {
+        agreements.push(agreement(voter.mask, &label_map(engine, voter.camera, how.near)?));
     }
     let trusts = trust(&agreements);
     let voters: Vec<Voter> =

@@ -33,8 +33,7 @@ pub struct Counting {
 /// Makes an engine with a model and memory for `columns` vote columns ([`columns_of`]).
 pub fn vote_engine(gpu: Arc<Gpu>, model: &Gaussians, views: &[&View], columns: u32) -> Result<Engine> {
     let sizes = views.iter().map(|view| (view.camera.width, view.camera.height));
-    // No step samples layers, so no id needs a layer.
-    let labels = LabelSize { max_label: 0, layers: 0, vote_columns: columns };
+    let labels = LabelSize { vote_columns: columns, ..LabelSize::default() };
     let size = EngineSize::of_model(model, sizes).with_labels(Some(labels));
     let mut engine = Engine::new(gpu, size, SchedulerOptions::default())?;
     engine.upload_model(model)?;
@@ -58,12 +57,12 @@ pub fn label_by_votes(
     let voters: Vec<Voter> = views.iter().filter_map(|view| Some(Voter::of(view, view.mask.as_ref()?))).collect();
     let sweep = Sweep { near: how.near, border: how.mask_border, alone: false };
     for round in 0..how.rounds {
-        let judges = model.labels.as_deref().filter(|_| round > 0);
-        let mut decision = count(engine, &voters, judges, &model.means, sweep, how.complete)?;
+        let mut decision = count(engine, &voters, round > 0, &model.means, sweep, how.complete)?;
         if round + 1 == how.rounds {
             lower_outside(engine, &voters, sweep, &mut decision)?;
             decision.drop_unsure(how.min_confidence);
         }
+        engine.set_labels(&decision.labels)?;
         apply(model, decision);
         tick(round + 1);
     }
@@ -82,7 +81,7 @@ pub fn label_by_lift(
     let mut labels = vec![UNLABELLED; model.len()];
     for view in order.into_iter().map(|index| views[index]) {
         let Some(mask) = &view.mask else { continue };
-        let rendered = render(engine, &view.camera, &RenderOptions::of_labels(near))?;
+        let rendered = render(engine, &view.camera, &RenderOptions::of_main(near))?;
         lift(&mut labels, &model.means, &view.camera.relative_to(model.origin), &rendered, mask, how);
     }
     model.labels = Some(labels);

@@ -91,6 +91,8 @@ domains! { Domain, Capacity;
         "Pixels with labels: equal to Pixels, or 0 in a scene without masks.";
     LabelledTiles labelled_tiles: "labelled tiles", cures::IMAGE,
         "Tiles of one image, or 0 in a scene without masks.";
+    LabelTables label_tables: "label tables", cures::IMAGE,
+        "Tiles times walks for the label map, or 0 in a scene without masks.";
     Labels labels: "labels", cures::LAYERS,
         "Label ids, including 0.";
     VoteColumns vote_columns: "vote columns", cures::VOTES,

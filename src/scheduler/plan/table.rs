@@ -15,7 +15,7 @@ crate::buffers! {
     LABEL_FROM_LAYER "label_from_layer": 4, Domain::Layers, Class::PerFrame, WORD, "Label id of each layer; layer 0 is the scene.";
     LAYER_WEIGHTS "layer_weights": 4, Domain::Layers, Class::PerFrame, None, "Weight of each layer's label loss.";
     LAYER_OCCLUDERS "layer_occluders": 4, Domain::OccluderWords, Class::PerFrame, WORD, "A bit per label id for each layer; set if that object hides the layer's object.";
-    LABEL_WEIGHTS "label_weights": 4, Domain::Labels, Class::PerFrame, None, "Weight of the disagreement of pixels with each label id in this view.";
+    LABEL_TRUST "label_trust": 4, Domain::Labels, Class::PerFrame, None, "Weight of the disagreement of pixels with each label id in this view.";
     VOTE_WEIGHTS "vote_weights": 4, Domain::VoteColumns, Class::PerFrame, None, "Weight of the votes for each label in this view.";
     STEP_ROWS "step_rows": 4, Domain::SharedRows, Class::PerFrame, WORD, "Shared rows of the step: the scene's, then the photo's, then NO_ROW.";
     STEP_RATES "step_rates": 16, Domain::SharedRows, Class::PerFrame, None, "Learning rates of these rows; rows with rates of 0 stay unchanged.";
@@ -50,6 +50,9 @@ crate::buffers! {
     W_SHARED "w_shared": 8, Domain::SharedRows, Class::Model, None, "Bias correction of both moments of each row, `[S]`: 1 - beta^t after its t-th update.";
     DENSIFY_STATS "densify_stats": 8, Domain::Trained, Class::Model, None, "Sum of screen gradients and number of views since the last densification, or the weights of a pruning by weight, `[N]`.";
     LABEL_KEYS "label_keys": 4, Domain::Labelled, Class::Persistent, None, "Highest vote of the step, `[N]`: weight in the high half, label in the low half; 0 without votes.";
+    LABEL_MAP "label_map": 4, Domain::LabelledPixels, Class::Persistent, None, "Label of each pixel, `[P]`: the one with the largest sum of weights.";
+    LABEL_WEIGHTS "label_weights": 4, Domain::LabelledPixels, Class::Step, None, "Sum of the weights of that label, `[P]`.";
+    LABEL_TABLES "label_tables": 16, Domain::LabelTables, Class::Step, None, "Labels that each walk of a tile sums, `[T, rounds]`.";
     VOTES_LOW "votes_low": 4, Domain::VoteCells, Class::Model, None, "Votes of a sweep by Gaussian and label, `[N, columns]`: low words.";
     VOTES_HIGH "votes_high": 4, Domain::VoteCells, Class::Model, None, "Votes of a sweep by Gaussian and label, `[N, columns]`: high words.";
     FAILURE "failure": 4, Domain::One, Class::Persistent, None, "Sticky failure bits; while one is set, passes do not change the model.";

@@ -1,8 +1,9 @@
-//! Labels from masks: main Gaussian labelling and the Gaussian projection filter.
+//! Labels from masks: main Gaussian labelling and the Gaussian projection filter. And back: the label map of a view.
 
 use super::Rules;
 use super::blend::{Blended, centre, trace};
 use super::splat::Splat;
+use std::collections::BTreeMap;
 
 /// Votes of one view.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -100,4 +101,43 @@ pub fn vote(
         }
     }
     votes
+}
+
+/// Label of a pixel.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Labelled {
+    /// Label with the largest sum of blending weights, the smaller of equals; 0 without any.
+    pub label: u32,
+    /// That sum.
+    pub weight: f64,
+    /// Number of labels with a weight.
+    pub labels: usize,
+    /// Distance of the nearest decision: of the sum to the second largest, or of the pixel's blending to a different
+    /// result.
+    pub margin: f64,
+}
+
+/// Label map of one view, `[height, width]`.
+pub fn label_map(rules: &Rules, splats: &[Splat], labels: &[u32], size: (usize, usize)) -> Vec<Labelled> {
+    let pixel = |index: usize| {
+        let ray = trace(rules, splats.iter().enumerate(), centre(index, size.0));
+        let mut sums = BTreeMap::<u32, f64>::new();
+        for contribution in &ray.contributions {
+            let sum = sums.entry(labels[splats[contribution.splat].gaussian]).or_default();
+            let weight = contribution.weight();
+            *sum = if rules.label_sums { *sum + weight } else { sum.max(weight) };
+        }
+        let (mut label, mut best, mut second) = (0, 0.0, 0.0_f64);
+        for (&other, &sum) in &sums {
+            if sum > best {
+                (label, best, second) = (other, sum, best);
+            } else {
+                second = second.max(sum);
+            }
+        }
+        let margin =
+            ray.margins.cut.min(ray.margins.stop).min(if sums.is_empty() { f64::INFINITY } else { best - second });
+        Labelled { label, weight: best, labels: sums.len(), margin }
+    };
+    (0..size.0 * size.1).map(pixel).collect()
 }

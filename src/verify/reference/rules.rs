@@ -88,6 +88,8 @@ pub struct Rules {
     pub reset_opacity: f64,
     /// Minimum weight at which a main Gaussian takes the label of its pixel.
     pub lift_threshold: f64,
+    /// The label of a pixel has the largest sum of weights; otherwise it is that of the main Gaussian.
+    pub label_sums: bool,
 }
 
 /// The f32 constant as f64.
@@ -141,6 +143,7 @@ impl Default for Rules {
             noise_opacity: wide(0.005),
             reset_opacity: wide(0.01),
             lift_threshold: wide(0.6),
+            label_sums: true,
         }
     }
 }
@@ -177,6 +180,8 @@ pub enum Family {
     Reset,
     /// Labelling.
     Lift,
+    /// Label map of a view.
+    LabelMap,
 }
 
 /// A set of rules with one constant changed; a comparison with it must fail.
@@ -192,7 +197,7 @@ pub struct Mutant {
 
 /// One mutant for each constant; most change it by a few per cent.
 pub fn mutants() -> Vec<Mutant> {
-    use Family::{Adam, Blend, Densify, Explore, FreeSpace, Lift, Loss, Project, Relocate, Reset, Sh};
+    use Family::{Adam, Blend, Densify, Explore, FreeSpace, LabelMap, Lift, Loss, Project, Relocate, Reset, Sh};
     type Change = fn(&mut Rules);
     let changes: [(&'static str, Family, Change); 39] = [
         ("near", Project, |r| r.near = 3.8),
@@ -235,13 +240,14 @@ pub fn mutants() -> Vec<Mutant> {
         ("noise_opacity", Explore, |r| r.noise_opacity *= 1.1),
         ("reset_opacity", Reset, |r| r.reset_opacity *= 1.03),
     ];
-    let lift: (&'static str, Family, Change) = ("lift_threshold", Lift, |r| r.lift_threshold *= 0.75);
+    let labels: [(&'static str, Family, Change); 2] =
+        [("lift_threshold", Lift, |r| r.lift_threshold *= 0.75), ("label_sums", LabelMap, |r| r.label_sums = false)];
     let changed = |(name, family, change): (&'static str, Family, Change)| {
         let mut rules = Rules::default();
         change(&mut rules);
         Mutant { name, family, rules }
     };
-    changes.into_iter().chain([lift]).map(changed).collect()
+    changes.into_iter().chain(labels).map(changed).collect()
 }
 
 #[cfg(test)]

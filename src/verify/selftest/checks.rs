@@ -9,6 +9,7 @@ use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::label::vote::ballot::{Sweep, Voter, sweep};
 use crate::pass::KernelShape;
+use crate::render::label_map;
 use crate::scene::{Gaussians, LabelMap};
 use crate::scheduler::plan::Buf;
 use crate::shaders::constants::LABEL_MASK;
@@ -17,7 +18,7 @@ use crate::train::strategy::weights::weights;
 use crate::verify::reference::adam::{Optimised, Rates, adam};
 use crate::verify::reference::blend::{Upstream, blend_backward, blend_forward};
 use crate::verify::reference::disagreement::disagreement;
-use crate::verify::reference::lift::vote;
+use crate::verify::reference::lift::{self, vote};
 use crate::verify::reference::loss::photo_loss;
 use crate::verify::reference::project::project_forward;
 use crate::verify::reference::splat::Splat;
@@ -247,6 +248,16 @@ impl Ran {
         let expected = vote(&self.rules, &self.splats, size, count, &columns, &vec![1.0; ballot.labels.len()]);
         // Each tile's sum is rounded to 2^-16, and there are at most 48 tiles; pairs near the cut may go either way.
         Ok(close(&actual, &expected, Tolerance { absolute: 48.0 * 0.5 / 65_536.0 + 0.02, relative: 1e-4 }))
+    }
+
+    /// Checks the label with the largest sum of blending weights in each pixel, and that sum.
+    pub(super) fn label_map(&mut self) -> Result<Verdict> {
+        let (size, pixels, labels) = (self.fixture.size(), self.fixture.pixels(), self.fixture.model().labels);
+        let (camera, near) = (self.fixture.scene.camera.clone(), self.fixture.config.near);
+        let shown = label_map(&mut self.fixture.engine, &camera, near)?;
+        let weights = self.fixture.get::<f32>(Buf::LABEL_WEIGHTS, pixels)?;
+        let expected = lift::label_map(&self.rules, &self.splats, &labels, size);
+        Ok(judge::label_map((&shown.ids, &weights), &expected, (COLOUR, MARGIN)))
     }
 
     /// Checks the sums of blending weights of two views that are the same.

@@ -204,7 +204,8 @@ impl Fixture {
 
     /// Runs the list of a render.
     pub fn render(&mut self) -> Result<Report> {
-        self.engine.run(ListKey::Render(self.config.sh_degree), &self.uniforms())
+        let key = ListKey::Render { sh_degree: self.config.sh_degree, label_rounds: 0 };
+        self.engine.run(key, &self.uniforms())
     }
 
     /// The first `count` values of a buffer.

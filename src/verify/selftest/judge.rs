@@ -1,10 +1,11 @@
 //! Compares the buffers of the device with the reference, pass by pass.
 
 use super::compare::{
-    Band, GradientBounds, Summary, Tolerance, Verdict, close, close_with_band, gradients as compare_gradients,
+    Band, GradientBounds, Summary, Tolerance, Verdict, close, close_with_band, exact, gradients as compare_gradients,
 };
 use crate::verify::reference::adam::{Optimised, Rates};
 use crate::verify::reference::blend::Blended;
+use crate::verify::reference::lift::Labelled;
 use crate::verify::reference::model::flatten;
 use crate::verify::reference::splat::{Splat, SplatGradient};
 use crate::verify::reference::{Group, Row};
@@ -47,6 +48,22 @@ pub fn picture(actual: &[[f32; 4]], expected: &Blended, (tolerance, band): (Tole
     let margins: Vec<f64> =
         expected.pixels.iter().flat_map(|pixel| std::iter::repeat_n(pixel.margins.image(), 4)).collect();
     close_with_band(&actual, &wanted, &margins, (tolerance, band), |_, _| true)
+}
+
+/// Compares label and weight of each pixel with a margin above `sure` (at least 95 % of all).
+pub fn label_map(
+    (ids, weights): (&[u16], &[f32]),
+    expected: &[Labelled],
+    (tolerance, sure): (Tolerance, f64),
+) -> Verdict {
+    let all = expected.len();
+    let sure: Vec<usize> = (0..all).filter(|&i| expected[i].margin > sure).collect();
+    if sure.len() * 100 < all * 95 {
+        return Err(format!("only {} of {all} pixels are away from all decisions", sure.len()));
+    }
+    let labels: (Vec<u32>, Vec<u32>) = sure.iter().map(|&i| (u32::from(ids[i]), expected[i].label)).unzip();
+    let sums: (Vec<f64>, Vec<f64>) = sure.iter().map(|&i| (f64::from(weights[i]), expected[i].weight)).unzip();
+    self::all([exact(&labels.0, &labels.1), close(&sums.0, &sums.1, tolerance)])
 }
 
 /// Compares gradients of splats with a margin above `sure` (at least 70 % of all), each kind of float separately.

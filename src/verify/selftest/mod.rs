@@ -77,13 +77,14 @@ pub fn passes(
     let mut ran = Ran::new(rules, gpu, kernels)?;
     let prepared = start.elapsed().as_secs_f64();
     type Pass = fn(&mut Ran) -> Result<Verdict>;
-    let passes: [(&str, Pass); 12] = [
+    let passes: [(&str, Pass); 13] = [
         ("depth order", Ran::order),
         ("projection", Ran::projection),
         ("tile lists", Ran::tiles),
         ("blend forward", Ran::blend),
         ("photo loss and its gradient", Ran::loss),
         ("votes", Ran::votes),
+        ("label map", Ran::label_map),
         ("blend backward", Ran::blend_backward),
         ("disagreement of labels", Ran::disagreement),
         ("weights of Gaussians", Ran::weights),

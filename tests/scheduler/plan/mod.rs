@@ -106,6 +106,7 @@ pub fn engine_lists(shape: KernelShape) -> (Capacity, Vec<PassList>) {
         pixels: 65_536,
         labelled_pixels: 65_536,
         labelled_tiles: 1024,
+        label_tables: 4096,
         labels: 16,
         vote_columns: 9,
         vote_cells: 90_000,
@@ -132,7 +133,8 @@ pub fn engine_lists(shape: KernelShape) -> (Capacity, Vec<PassList>) {
         pass::training_step(&shape, &capacity, Variant { labels: false, lift: false, sh_degree: 0, ..variant }),
         #[cfg(feature = "lab")]
         pass::separate_step(&shape, &capacity, variant, 2),
-        pass::render_view(&shape, &capacity, 3),
+        pass::render_view(&shape, &capacity, 3, 2),
+        pass::label_view(&shape, &capacity, 2),
         pass::densify_count(&shape, &capacity),
         pass::densify_apply(&shape, &capacity, true),
         pass::opacity_reset(&shape, &capacity),
