@@ -204,6 +204,7 @@ const TYPED: [(&str, &str); 56] = [
     ("--mask-border", "3"),
     ("--label-threshold", "0.7"),
     ("--gpf", "off"),
+    ("--layer-every", "1"),
     ("--label-samples", "4"),
     ("--label-weight", "0.5"),
     ("--label-balance", "on"),
