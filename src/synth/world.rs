@@ -55,6 +55,13 @@ impl World {
         Self { objects: presets::objects(preset, seed), light, light_sides: [side, light.cross(side)], seed }
     }
 
+    /// Returns the world without one object: nothing hides behind it, and it throws no shadow. Other objects stay where
+    /// they are, also those that stand on it.
+    pub fn without(&self, id: u8) -> Self {
+        let objects = self.objects.iter().filter(|object| object.id != id).cloned().collect();
+        Self { objects, ..self.clone() }
+    }
+
     /// Returns the id at a hit: 0 for ground and sky.
     pub fn id(&self, hit: &Hit) -> u8 {
         match hit.surface {
