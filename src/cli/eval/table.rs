@@ -45,6 +45,46 @@ pub(super) fn own_table(scores: &Scores) -> String {
             number(row.psnr_hidden, 2)
         );
     }
+    text + &removals(scores)
+}
+
+/// Returns the table of removals.
+fn removals(scores: &Scores) -> String {
+    let Some(removal) = &scores.removal else { return String::new() };
+    let mut text = format!(
+        "\nplace of a removed object, against photos without it\n\
+         {:>10} {:>8} {:>8} {:>8} {:>11} {:>8} {:>9} {:>10} {:>8} {:>11} {:>6} {:>6} {:>6}\n",
+        "object",
+        "PSNR",
+        "filled",
+        "paper's",
+        "mean colour",
+        "leftover",
+        "paper's",
+        "left weight",
+        "paper's",
+        "hole",
+        "filled",
+        "added",
+        ""
+    );
+    let rows = removal.objects.iter().map(|(id, row)| (id.to_string(), row));
+    for (name, row) in rows.chain([("mean".to_owned(), &removal.mean)]) {
+        text += &format!(
+            "{name:>10} {:>8} {:>8} {:>8} {:>11} {:>8} {:>9} {:>10} {:>8} {:>11} {:>6} {:>6}\n",
+            number(row.votes.psnr, 2),
+            number(row.filled.psnr, 2),
+            number(row.main.psnr, 2),
+            number(row.psnr_mean_colour, 2),
+            number(row.votes.leftover, 4),
+            number(row.main.leftover, 4),
+            number(row.votes.leftover_weight, 4),
+            number(row.main.leftover_weight, 4),
+            number(row.hole, 4),
+            number(row.hole_filled, 4),
+            row.added
+        );
+    }
     text
 }
 
