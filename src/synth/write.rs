@@ -68,7 +68,7 @@ fn count(table: &mut LabelTable, ids: &[u8]) {
 
 fn create_folders(folder: &Path, world: &World) -> Result<()> {
     atomic::require_empty("DIR", folder)?;
-    let of_objects = ["amodal", "objects", "without"]
+    let of_objects = ["amodal", "objects", "without", "shadowed"]
         .map(|kind| world.objects.iter().map(move |object| format!("{kind}/{}", object.id)));
     let names = ["images", "sparse/0", "masks", "depth"].map(str::to_owned);
     for name in names.into_iter().chain(of_objects.into_iter().flatten()) {
@@ -93,13 +93,15 @@ fn write_view(folder: &Path, index: usize, world: &World, camera: &Camera, made:
     image::write_exr_y(folder.join("depth").join(format!("{index:03}.exr")), width, height, &made.depth)
 }
 
-/// Writes `without/ID/NAME.png`, the photo of the view in the world without the object. Only views that are held out by
-/// default have them, because removals are scored there.
+/// Writes the photo of the view in the world without each object: `without/ID/NAME.png`, and `shadowed/ID/NAME.png` where
+/// its shadow stays. Only views that are held out by default have them, because removals are scored there.
 fn write_without(folder: &Path, index: usize, world: &World, camera: &Camera) -> Result<()> {
     for object in &world.objects {
-        let path = folder.join("without").join(object.id.to_string()).join(view_name(index));
-        let rgb = photo(&world.without(object.id), camera, index as u32);
-        image::write_png_rgb8(&path, camera.width, camera.height, &rgb)?;
+        for (kind, shadow) in [("without", false), ("shadowed", true)] {
+            let path = folder.join(kind).join(object.id.to_string()).join(view_name(index));
+            let rgb = photo(&world.without(object.id, shadow), camera, index as u32);
+            image::write_png_rgb8(&path, camera.width, camera.height, &rgb)?;
+        }
     }
     Ok(())
 }

@@ -27,8 +27,8 @@ pub struct EvalArgs {
     #[arg(long, value_name = "DIR", help_heading = "Labels")]
     pub amodal: Option<PathBuf>,
     /// Also remove each object and score what is left: by the labels of the model, the same with `remove --fill`, and by the
-    /// paper's rule. Photos without an object are SCENE/without/ID/NAME.png; without them only the share of Gaussians
-    /// that stay is given.
+    /// paper's rule. Photos without an object are SCENE/without/ID/NAME.png, those with its shadow
+    /// SCENE/shadowed/ID/NAME.png; without any, only the weight of Gaussians that stay is given.
     #[arg(long, requires = "masks", help_heading = "Labels")]
     pub removal: bool,
     /// Colour behind the scene: black, white, or R,G,B from 0 to 1.

@@ -76,18 +76,28 @@ impl<'a> Removing<'a> {
             let problem = "no training view has a mask; --removal shows the paper's rule, which needs some";
             return Err(Error::data(args.masks.clone().unwrap_or_default(), "", problem));
         }
-        Ok(Self { train, truth: Without { folder: args.scene.join("without") } })
+        Ok(Self { train, truth: Without { scene: args.scene.clone() } })
     }
 }
 
-/// Photos without an object, `ID/NAME.png` in a folder that need not exist.
+/// Photos without an object, `ID/NAME.png` in folders of a scene that need not exist.
 struct Without {
-    folder: PathBuf,
+    scene: PathBuf,
 }
 
 impl RemovalTruth for Without {
     fn without(&self, id: u32, view: &View) -> Result<Option<Photo>> {
-        let Some(file) = file_of(&self.folder, id, view) else { return Ok(None) };
+        self.read("without", id, view)
+    }
+
+    fn shadowed(&self, id: u32, view: &View) -> Result<Option<Photo>> {
+        self.read("shadowed", id, view)
+    }
+}
+
+impl Without {
+    fn read(&self, kind: &str, id: u32, view: &View) -> Result<Option<Photo>> {
+        let Some(file) = file_of(&self.scene.join(kind), id, view) else { return Ok(None) };
         let picture = read_rgba(&file)?;
         let (width, height) = (view.camera.width, view.camera.height);
         if (picture.width, picture.height) != (width, height) {

@@ -5,6 +5,7 @@
 //! to what the views show around the object. New flat Gaussians stand on these planes, only at hidden places between seen
 //! ones, so that they cover nothing that a view has seen. Their colours continue those around them.
 
+mod evidence;
 mod plane;
 mod sheet;
 
@@ -65,7 +66,7 @@ pub fn fill(model: &Gaussians, labels: &[u32], sights: &[Sight]) -> Result<Fille
         let Some(place) = Place::new(model, label, sights)? else { continue };
         for (label, points) in place.ring(labels, sights) {
             for plane in planes(&points, place.cell) {
-                let sheet = Sheet::new(plane, &place, labels, sights);
+                let sheet = Sheet::new((plane, label), &place, labels, sights);
                 let added = sheet.holes();
                 if !added.is_empty() {
                     *filled.added.entry(label).or_default() += added.len() as u64;
@@ -135,8 +136,7 @@ impl Place {
                     continue;
                 }
                 let world = sight.at(index, f64::from(depth));
-                let outside = world.max(self.low).min(self.high).distance(world) > self.ring;
-                if !outside && self.distance(world) <= self.ring {
+                if self.is_near(world, self.ring) && self.distance(world) <= self.ring {
                     found.entry(u32::from(id)).or_default().push(world);
                 }
             }
@@ -146,6 +146,11 @@ impl Place {
             *points = points.iter().copied().step_by(step).collect();
         }
         found
+    }
+
+    /// Returns true for points in the box around the object, grown by a margin.
+    fn is_near(&self, world: DVec3, margin: f64) -> bool {
+        world.max(self.low).min(self.high).distance(world) <= margin
     }
 
     /// Returns the distance to the nearest Gaussian of the object.
@@ -162,6 +167,13 @@ impl Sight {
         let pixel = DVec2::new((index % width) as f64 + 0.5, (index / width) as f64 + 0.5);
         let camera = &self.camera;
         DVec3::new((pixel.x - camera.cx) / camera.fx, (pixel.y - camera.cy) / camera.fy, 1.0)
+    }
+
+    /// Returns true for a pixel beside one of these labels.
+    fn is_beside(&self, index: usize, labels: &[u32]) -> bool {
+        let (x, y) = (index as u32 % self.labels.width, index as u32 / self.labels.width);
+        let is_one = |x: u32, y: u32| self.labels.get(x, y).is_some_and(|id| labels.contains(&u32::from(id)));
+        (x.saturating_sub(1)..=x + 1).any(|x| (y.saturating_sub(1)..=y + 1).any(|y| is_one(x, y)))
     }
 
     /// Returns the world position at a depth of a pixel.

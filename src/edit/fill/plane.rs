@@ -12,6 +12,10 @@ const PLANES_MAX: usize = 6;
 const LEAST: (usize, f64) = (60, 0.03);
 /// Largest distance of a point from its plane, in cells.
 const NEAR: f64 = 1.5;
+/// Distance of points from a plane that may lie on another, in cells, and the least cosine of the normals of two planes
+/// that are one if they are near.
+const APART: f64 = 4.0;
+const PARALLEL: f64 = 0.97;
 /// Seed of the samples.
 const SEED: u64 = 0;
 
@@ -66,7 +70,10 @@ pub(super) fn planes(points: &[DVec3], cell: f64) -> Vec<Plane> {
     let mut random = Pcg64::seed_from_u64(SEED);
     let (mut left, mut found) = (points.to_vec(), Vec::new());
     let least = LEAST.0.max((LEAST.1 * points.len() as f64) as usize);
-    while found.len() < PLANES_MAX && left.len() >= least {
+    for _ in 0..PLANES_MAX {
+        if left.len() < least {
+            break;
+        }
         let near = |plane: &Plane, point: &DVec3| plane.height(*point).abs() <= NEAR * cell;
         let count = |plane: &Plane| left.iter().filter(|point| near(plane, point)).count();
         let mut best: Option<(usize, Plane)> = None;
@@ -86,8 +93,13 @@ pub(super) fn planes(points: &[DVec3], cell: f64) -> Vec<Plane> {
         let on: Vec<DVec3> = left.iter().copied().filter(|point| near(&rough, point)).collect();
         let plane = rough.refined(&on).unwrap_or(rough);
         // Also those of the rough plane, so that each round takes points away.
-        left.retain(|point| plane.height(*point).abs() > 2.0 * NEAR * cell && !near(&rough, point));
-        found.push(plane);
+        left.retain(|point| plane.height(*point).abs() > APART * cell && !near(&rough, point));
+        let is_same = |other: &Plane| {
+            other.normal.dot(plane.normal).abs() > PARALLEL && other.height(plane.origin).abs() < 2.0 * APART * cell
+        };
+        if !found.iter().any(is_same) {
+            found.push(plane);
+        }
     }
     found
 }

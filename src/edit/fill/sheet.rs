@@ -1,34 +1,18 @@
 //! A plane as a grid of cells: what the views show of each, and the colour of those that none shows.
 
+use super::evidence::{Evidence, Shown, State};
 use super::plane::Plane;
 use super::{Place, Sight};
 use glam::DVec3;
 use rayon::prelude::*;
 
-/// Tolerance of depths, in cells.
-const DEPTH: f64 = 2.5;
-/// Views that have to show the removed object before a hole.
-const HIDING_MIN: u32 = 2;
 /// Of the eight directions in the plane, those in which a hole has to be bounded by what is seen.
-const BOUNDED_MIN: usize = 5;
+const BOUNDED_MIN: usize = 6;
 /// Most cells along a side.
 const SIDE_MAX: usize = 1024;
 /// Rounds and over-relaxation of the colours.
 const ROUNDS: usize = 600;
 const RELAXATION: f64 = 1.9;
-
-/// What the views show at a cell.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum State {
-    /// A view shows the surface.
-    Seen,
-    /// A view looks through it.
-    Free,
-    /// Nothing but the removed object was ever seen here.
-    Hole,
-    /// Other things hide it, or no view has it.
-    Unknown,
-}
 
 /// The cells of a plane around a removed object, row-major.
 pub(super) struct Sheet {
@@ -44,8 +28,8 @@ pub(super) struct Sheet {
 }
 
 impl Sheet {
-    /// Looks at the cells of a plane in every view.
-    pub(super) fn new(plane: Plane, place: &Place, removed: &[u32], sights: &[Sight]) -> Self {
+    /// Looks at the cells of a plane, the surface of a label, in every view.
+    pub(super) fn new((plane, label): (Plane, u32), place: &Place, removed: &[u32], sights: &[Sight]) -> Self {
         let corners = (0..8).map(|bits: u32| {
             let side = |axis: usize| if bits >> axis & 1 == 0 { place.low[axis] } else { place.high[axis] };
             DVec3::new(side(0), side(1), side(2)) - plane.origin
@@ -61,7 +45,7 @@ impl Sheet {
         let (width, height) = (cells(0), cells(1));
         let mut sheet =
             Self { plane, cell: place.cell, corner: low, width, height, states: Vec::new(), colours: Vec::new() };
-        let look = |index: usize| sheet.look(sheet.place(index), removed, sights);
+        let look = |index: usize| sheet.look(sheet.place(index), label, removed, sights);
         (sheet.states, sheet.colours) = (0..width * height).into_par_iter().map(look).unzip();
         sheet
     }
@@ -73,45 +57,24 @@ impl Sheet {
         plane.origin + (self.corner[0] + x * self.cell) * plane.u + (self.corner[1] + y * self.cell) * plane.v
     }
 
-    fn look(&self, world: DVec3, removed: &[u32], sights: &[Sight]) -> (State, Option<DVec3>) {
-        let (mut seen, mut free, mut hiding) = (0, 0, 0);
-        let (mut sum, mut count) = (DVec3::ZERO, 0.0);
+    /// Returns the state of a place on the surface of a label, and its colour.
+    fn look(&self, world: DVec3, label: u32, removed: &[u32], sights: &[Sight]) -> (State, Option<DVec3>) {
+        let (mut evidence, mut sum, mut count) = (Evidence::default(), DVec3::ZERO, 0.0);
         for sight in sights {
-            let Some(pixel) = sight.camera.sees(world) else { continue };
-            let (x, y) = (pixel.x as u32, pixel.y as u32);
-            let index = (y * sight.camera.width + x) as usize;
-            // The depth of the plane at the middle of the pixel, because a flat view changes it much within the pixel.
-            let (ray, centre) = (sight.camera.rotation.transpose() * sight.ray(index), sight.camera.centre());
-            let depth = -self.plane.height(centre) / ray.dot(self.plane.normal);
-            if !(depth > 0.0) {
+            let Some((index, shown)) = evidence.add(world, (&self.plane, label), self.cell, removed, sight) else {
+                continue;
+            };
+            if u32::from(sight.labels.ids[index]) != label || shown != Shown::Surface {
                 continue;
             }
-            let is_removed = |x: u32, y: u32| sight.labels.get(x, y).is_some_and(|id| removed.contains(&u32::from(id)));
-            let shown = f64::from(sight.depth[index]);
-            let behind = if shown > 0.0 { depth - shown } else { f64::NEG_INFINITY };
-            let slack = DEPTH * self.cell;
-            if is_removed(x, y) {
-                hiding += u32::from(behind >= -slack);
-                free += u32::from(behind < -slack);
-            } else if behind < -slack {
-                free += 1;
-            } else if behind <= slack {
-                seen += 1;
-                // Pixels at the contour of the object have some of its colour.
-                let near =
-                    (x.saturating_sub(1)..=x + 1).any(|x| (y.saturating_sub(1)..=y + 1).any(|y| is_removed(x, y)));
-                if !near {
-                    sum += DVec3::from_array(sight.rgb[index].map(|value| f64::from(value.clamp(0.0, 1.0))));
-                    count += 1.0;
-                }
+            evidence.own += 1;
+            // Pixels at the contour of the object have some of its colour.
+            if !sight.is_beside(index, removed) {
+                sum += DVec3::from_array(sight.rgb[index].map(|value| f64::from(value.clamp(0.0, 1.0))));
+                count += 1.0;
             }
         }
-        let state = match (free, seen, hiding) {
-            (0, 0, HIDING_MIN..) => State::Hole,
-            (0, 0, _) => State::Unknown,
-            (free, seen, _) if free > seen => State::Free,
-            _ => State::Seen,
-        };
+        let state = evidence.state();
         let colour = (state == State::Seen && count > 0.0).then(|| sum / count);
         (state, colour)
     }

@@ -23,6 +23,9 @@ const LIFT: Lift = Lift { threshold: 0.6, gpf: true };
 pub trait RemovalTruth {
     /// Returns the photo of a view without object `id`, at the size of the view; `None` if there is none.
     fn without(&self, id: u32, view: &View) -> Result<Option<Photo>>;
+
+    /// Returns the same photo with the shadow of the object.
+    fn shadowed(&self, id: u32, view: &View) -> Result<Option<Photo>>;
 }
 
 /// Renders what training views show of the model in the engine, for [`fill`]. `labels` are those of its Gaussians.
@@ -82,9 +85,10 @@ pub fn removals(
             for view in views {
                 let (Some(mask), Some(photo)) = (&view.mask, &view.photo) else { continue };
                 let Some(region) = Region::new(mask, id as u16, photo) else { continue };
-                let without = truth.without(id, view)?;
+                let (without, shadowed) = (truth.without(id, view)?, truth.shadowed(id, view)?);
                 let rendered = drawn(engine, part, view, options)?;
-                let compare = Compare { rendered: &rendered, photo, truth: without.as_ref() };
+                let compare =
+                    Compare { rendered: &rendered, photo, truth: without.as_ref(), shadowed: shadowed.as_ref() };
                 tally.add(&region, &compare);
                 let Some(without) = without.as_ref().filter(|_| what != MAIN) else { continue };
                 watch.see(&Compared {
@@ -106,7 +110,7 @@ pub fn removals(
             votes: plain.scores(votes_left(&own)),
             main: main.scores(votes_left(labels)),
             filled: filled.scores(None),
-            psnr_mean_colour: plain.psnr_mean_colour(),
+            mean_colour: plain.mean_colour(),
             hole: plain.hole(),
             hole_filled: filled.hole(),
             added,

@@ -20,8 +20,10 @@ const DIFFERENT: f64 = 0.1;
 pub struct RuleScores {
     /// PSNR against the photos without the object, over its pixels and 2 px around them in all views together, dB.
     pub psnr: Option<f64>,
+    /// The same against photos in which its shadow stays: no photo shows the colours outside of that shadow.
+    pub psnr_shadowed: Option<f64>,
     /// Of the object's pixels where photos with and without it differ and the model shows anything, the share whose colour
-    /// is nearer to the photo with it.
+    /// is nearer to the photo with it. Its shadow stays in both, if such photos are given.
     pub leftover: Option<f64>,
     /// Of the blending weight in the object's pixels before the removal, the share of Gaussians that stay. It needs no photo
     /// without the object.
@@ -38,9 +40,8 @@ pub struct ObjectRemoval {
     pub main: RuleScores,
     /// By the labels of the model, and filled.
     pub filled: RuleScores,
-    /// PSNR of the removal by the labels of the model with its holes painted in the mean colour of a ring around the
-    /// object in the picture, dB.
-    pub psnr_mean_colour: Option<f64>,
+    /// By the labels of the model, with holes painted in the mean colour of a ring around the object in the picture.
+    pub mean_colour: RuleScores,
     /// Share of the object's place that is a hole (opacity below one half) after the removal by the labels of the model.
     pub hole: Option<f64>,
     /// The same after filling.
@@ -64,6 +65,7 @@ impl RemovalScores {
         let over = |field: &dyn Fn(&ObjectRemoval) -> Option<f64>| mean(objects.values().filter_map(field));
         let rule = |of: fn(&ObjectRemoval) -> &RuleScores| RuleScores {
             psnr: over(&|row| of(row).psnr),
+            psnr_shadowed: over(&|row| of(row).psnr_shadowed),
             leftover: over(&|row| of(row).leftover),
             leftover_weight: over(&|row| of(row).leftover_weight),
         };
@@ -71,7 +73,7 @@ impl RemovalScores {
             votes: rule(|row| &row.votes),
             main: rule(|row| &row.main),
             filled: rule(|row| &row.filled),
-            psnr_mean_colour: over(&|row| row.psnr_mean_colour),
+            mean_colour: rule(|row| &row.mean_colour),
             hole: over(&|row| row.hole),
             hole_filled: over(&|row| row.hole_filled),
             added: objects.values().map(|row| row.added).sum(),
@@ -115,6 +117,8 @@ pub(super) struct Compare<'a> {
     pub photo: &'a Photo,
     /// The photo without it, if there is one.
     pub truth: Option<&'a Photo>,
+    /// The same with its shadow.
+    pub shadowed: Option<&'a Photo>,
 }
 
 impl Compare<'_> {
@@ -129,14 +133,34 @@ impl Compare<'_> {
     }
 }
 
+/// A sum of squared errors.
+#[derive(Clone, Copy, Debug, Default)]
+struct Squares {
+    sum: f64,
+    count: u64,
+}
+
+impl Squares {
+    fn add(&mut self, shown: [f64; 3], truth: Option<&Photo>, index: usize) {
+        if let Some(truth) = truth {
+            self.sum += square(shown, bytes(truth, index));
+            self.count += 1;
+        }
+    }
+
+    fn psnr(&self) -> Option<f64> {
+        (self.count > 0).then(|| psnr_of(self.sum / self.count as f64))
+    }
+}
+
 /// Sums over the views of an object.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Tally {
     pixels: u64,
     holes: u64,
-    compared: u64,
-    squares: f64,
-    squares_mean_colour: f64,
+    /// As rendered, against both truths, and with holes painted.
+    squares: [Squares; 2],
+    painted: [Squares; 2],
     different: u64,
     leftover: u64,
 }
@@ -146,15 +170,18 @@ impl Tally {
         let is_hole = |index: usize| compare.rendered.alpha[index] < HOLE;
         self.pixels += region.place.len() as u64;
         self.holes += region.place.iter().filter(|&&index| is_hole(index)).count() as u64;
-        let Some(truth) = compare.truth else { return };
         let around = |channel: usize| mean(region.ring.iter().map(|&index| compare.shown(index)[channel]));
         let around = [0, 1, 2].map(|channel| around(channel).unwrap_or(0.0));
         for &index in &region.place {
-            let (shown, goal) = (compare.shown(index), bytes(truth, index));
-            self.compared += 1;
-            self.squares += square(shown, goal);
-            self.squares_mean_colour += square(if is_hole(index) { around } else { shown }, goal);
+            let shown = compare.shown(index);
+            let painted = if is_hole(index) { around } else { shown };
+            for (at, truth) in [compare.truth, compare.shadowed].into_iter().enumerate() {
+                self.squares[at].add(shown, truth, index);
+                self.painted[at].add(painted, truth, index);
+            }
         }
+        // A shadow that stays is nothing of the object.
+        let Some(truth) = compare.shadowed.or(compare.truth) else { return };
         for &index in region.inside.iter().filter(|&&index| !is_hole(index)) {
             let (shown, with, goal) = (compare.shown(index), bytes(compare.photo, index), bytes(truth, index));
             if 3.0 * square(with, goal) > DIFFERENT * DIFFERENT {
@@ -166,19 +193,18 @@ impl Tally {
 
     pub(super) fn scores(&self, leftover_weight: Option<f64>) -> RuleScores {
         let leftover = (self.different > 0).then(|| self.leftover as f64 / self.different as f64);
-        RuleScores { psnr: self.psnr_of(self.squares), leftover, leftover_weight }
+        let [psnr, psnr_shadowed] = self.squares.map(|squares| squares.psnr());
+        RuleScores { psnr, psnr_shadowed, leftover, leftover_weight }
     }
 
-    pub(super) fn psnr_mean_colour(&self) -> Option<f64> {
-        self.psnr_of(self.squares_mean_colour)
+    /// Returns the PSNRs with holes painted in the mean colour around the object.
+    pub(super) fn mean_colour(&self) -> RuleScores {
+        let [psnr, psnr_shadowed] = self.painted.map(|squares| squares.psnr());
+        RuleScores { psnr, psnr_shadowed, ..RuleScores::default() }
     }
 
     pub(super) fn hole(&self) -> Option<f64> {
         (self.pixels > 0).then(|| self.holes as f64 / self.pixels as f64)
-    }
-
-    fn psnr_of(&self, squares: f64) -> Option<f64> {
-        (self.compared > 0).then(|| psnr_of(squares / self.compared as f64))
     }
 }
 
