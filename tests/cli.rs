@@ -419,6 +419,8 @@ fn synth_makes_a_scene_once() {
         "depth/002.exr",
         "sparse/0/points3D.bin",
         "objects/2/002.png",
+        "without/2/000.png",
+        "shadowed/3/000.png",
         "masks/labels.json",
     ] {
         assert!(Path::new(scene).join(file).is_file(), "{file}");

@@ -32,6 +32,7 @@ mod decide; // labels from votes
 mod densify; // the video for a tracker, and its masks on the photos
 mod drivers; // every subgroup size, and drivers other than the usual one
 mod edits; // labels by name, pixel and box; parts, specks and colours of a model
+mod fill; // the place of a removed object is closed
 mod gradient; // gradients of the f64 mirrors, which the kernels are compared with
 mod guide; // every command of README.md and of the guide runs
 mod hostile; // damaged and hostile files are refused in bounded memory
@@ -49,6 +50,7 @@ mod overflow; // a buffer that is too small costs a step and no bit
 mod pass; // each kernel against its mirror
 mod protocol; // scores of the published benchmarks
 mod registry; // every shader has a header, a mirror and a pass
+mod removal; // scores of removals, and filling from the command line
 mod scheduler; // barriers, memory, faults and recorded lists of GPU work
 mod segments; // long splat lists are cut to bounded dispatches
 mod selftest; // `labelgs selftest` passes, and detects each fault

@@ -119,8 +119,9 @@ fn files_are_complete_and_the_same_every_time() {
     synth::write(&options, &again, &|_| Ok(())).expect("written");
     synth::write(&SynthOptions { seed: 1, ..options }, &other, &|_| Ok(())).expect("written");
     let (a, b, c) = (files(&first), files(&again), files(&other));
-    // Per view a photo, a mask, a depth map, 8 whole outlines and 8 objects alone; 3 of COLMAP; the names.
-    assert_eq!(a.len(), 6 * 19 + 4);
+    // Per view a photo, a mask, a depth map, 8 whole outlines and 8 objects alone; 3 of COLMAP; the names; in the
+    // held-out view photos without each of 8 objects, with its shadow and without.
+    assert_eq!(a.len(), 6 * 19 + 4 + 16);
     assert!(a.values().eq(b.values()), "two runs differ");
     assert_ne!(a[&first.join("images/000.png")], c[&other.join("images/000.png")]);
     let table = LabelTable::read(&first.join("masks/labels.json")).expect("the names");
@@ -137,6 +138,31 @@ fn files_are_complete_and_the_same_every_time() {
     let world = World::new(options.preset, options.seed);
     let made = synth::alone(&world, &ring_of_cameras(&options)[0], 0, 1);
     assert_eq!(file.into_raw(), made.concat());
+}
+
+#[test]
+fn a_world_without_an_object_has_its_shadow_or_not() {
+    let world = World::new(Preset::Simple, 0);
+    let camera = &ring_of_cameras(&small())[0];
+    let made = picture(&world, camera, 0);
+    for object in &world.objects {
+        let (bare, shadowed) = (world.without(object.id, false), world.without(object.id, true));
+        let (bare, shadowed) = (picture(&bare, camera, 0), picture(&shadowed, camera, 0));
+        assert_eq!((&bare.ids, &bare.depth), (&shadowed.ids, &shadowed.depth));
+        assert!(!bare.ids.contains(&object.id), "object {} is still there", object.id);
+        let (mut lighter, mut other) = (0, 0);
+        for at in 0..made.ids.len() {
+            // Away from the object, photos differ by its shadow only.
+            if is_other(&made, at, object.id) {
+                assert_eq!(shadowed.rgb[at], made.rgb[at]);
+                other += 1;
+                let sum = |rgb: [u8; 3]| rgb.map(u32::from).into_iter().sum::<u32>();
+                assert!(sum(bare.rgb[at]) >= sum(made.rgb[at]), "without a shadow nothing is darker");
+                lighter += u32::from(sum(bare.rgb[at]) > sum(made.rgb[at]) + 30);
+            }
+        }
+        assert!(other > 1000 && lighter > 5, "object {}: {lighter} of {other} pixels", object.id);
+    }
 }
 
 #[test]
@@ -164,6 +190,14 @@ fn a_filled_folder_is_left_alone() {
     let error = synth::write(&small(), folder.path(), &|_| Ok(())).expect_err("not empty");
     assert_eq!(exit_status(&error), 2);
     assert!(error.to_string().contains("not empty"), "{error}");
+}
+
+/// True where the mask names `id` nowhere in the neighbourhood of a pixel.
+fn is_other(made: &Picture, at: usize, id: u8) -> bool {
+    let (width, height) = (made.width as usize, made.height as usize);
+    let (x, y) = (at % width, at / width);
+    let inside = (1..width - 1).contains(&x) && (1..height - 1).contains(&y);
+    inside && (y - 1..=y + 1).all(|y| (x - 1..=x + 1).all(|x| made.ids[y * width + x] != id))
 }
 
 /// True where the mask names `id` in the whole neighbourhood of a pixel.

@@ -16,7 +16,7 @@ use super::profile::ProfileArgs;
 use super::recolour::RecolourArgs;
 use super::relabel::RelabelArgs;
 use super::render::RenderArgs;
-use super::select::{ExtractArgs, SelectArgs};
+use super::select::{ExtractArgs, RemoveArgs};
 use super::selftest::SelftestArgs;
 use super::split_components::SplitArgs;
 use super::synth::SynthArgs;
@@ -75,7 +75,7 @@ pub enum Command {
     /// Write a model without the chosen objects.
     ///
     /// Example: labelgs remove out --labels 3 -o rest.ply
-    Remove(SelectArgs),
+    Remove(RemoveArgs),
     /// Render pictures, depth or label maps of a model, or of chosen objects.
     ///
     /// Example: labelgs render out --scene scene --only 3 -o pictures

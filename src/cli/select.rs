@@ -1,21 +1,26 @@
 //! `labelgs extract` and `labelgs remove`.
 
-use super::args::JsonFlag;
+use super::args::{JsonFlag, SceneArgs};
 use super::choose::ChooseArgs;
 use super::context::Context;
 use super::labelled::{Edited, MinConfidenceArg, open, wants_json};
+use super::scene::{near_plane, open_gpu, open_scene};
 use super::values::{distance, share};
-use crate::Result;
 use crate::edit::change::without_specks;
 use crate::edit::components::Grouping;
+use crate::edit::fill::{Filled, fill};
 use crate::edit::rename::keep;
 use crate::edit::select::remove;
+use crate::engine::Engine;
+use crate::eval::removal::sights;
+use crate::scene::{Gaussians, View};
+use crate::{Error, Result};
 use clap::Args;
 use serde_json::json;
 use std::collections::BTreeSet;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-/// `labelgs remove`, and most of `labelgs extract`.
+/// What `labelgs extract` and `labelgs remove` have in common.
 #[derive(Args, Clone, Debug)]
 pub struct SelectArgs {
     /// The model: a PLY, or the folder of a `labelgs train` run.
@@ -30,6 +35,18 @@ pub struct SelectArgs {
     /// JSON.
     #[command(flatten)]
     pub json: JsonFlag,
+}
+
+/// `labelgs remove`.
+#[derive(Args, Clone, Debug)]
+pub struct RemoveArgs {
+    /// Model, choice and output.
+    #[command(flatten)]
+    pub select: SelectArgs,
+    /// Close what no view ever saw, under and behind the objects: the surfaces around them are continued. Needs --scene,
+    /// whose training views tell what was seen.
+    #[arg(long, requires = "scene")]
+    pub fill: bool,
 }
 
 /// `labelgs extract`.
@@ -86,18 +103,45 @@ pub(crate) fn run_extract(args: &ExtractArgs, context: &Context) -> Result<()> {
 }
 
 /// Writes the Gaussians of all other labels.
-pub(crate) fn run_remove(args: &SelectArgs, context: &Context) -> Result<()> {
-    let (model, known) = open(&args.model, &args.choice.prompts.table)?;
-    let labels = args.choice.labels(&args.model, &model, &known, context)?;
-    let part = remove(&model, &listed(&labels))?;
+pub(crate) fn run_remove(args: &RemoveArgs, context: &Context) -> Result<()> {
+    let select = &args.select;
+    let (model, known) = open(&select.model, &select.choice.prompts.table)?;
+    let labels = select.choice.labels(&select.model, &model, &known, context)?;
+    let (part, more) = match select.choice.scene.as_deref().filter(|_| args.fill) {
+        None => (remove(&model, &listed(&labels))?, json!({})),
+        Some(scene) => {
+            let filled = filled(select, scene, &model, &listed(&labels), context)?;
+            let added: u64 = filled.added.values().sum();
+            tracing::info!("filled: {added} new Gaussians");
+            (filled.model, json!({ "added": filled.added }))
+        }
+    };
     let edited = Edited {
-        output: &args.output,
+        output: &select.output,
         model: &part,
         table: known.table.as_ref().map(|table| keep(table, |id| !labels.contains(&id))),
         of: model.len(),
         labels: &labels,
     };
-    edited.finish(wants_json(context, &args.json), json!({}))
+    edited.finish(wants_json(context, &select.json), more)
+}
+
+/// Removes labels and closes their place by what the training views of a scene show.
+fn filled(args: &SelectArgs, scene: &Path, model: &Gaussians, labels: &[u32], context: &Context) -> Result<Filled> {
+    let (max_resolution, read) = (args.choice.max_resolution, args.choice.read);
+    let reading = SceneArgs { max_resolution, read, ..SceneArgs::default() }.of_run(&args.model)?;
+    let dataset = open_scene(scene, &reading, None, [0.0; 3], false)?;
+    let views: Vec<&View> = dataset.train.iter().collect();
+    if views.is_empty() {
+        return Err(Error::data(scene, "", "has no training view to fill from; with --fill a scene needs some"));
+    }
+    // A choice of nothing or of everything is refused before any picture.
+    remove(model, labels)?;
+    let near = near_plane(&args.model, args.choice.prompts.near)?;
+    let sizes = views.iter().map(|view| (view.camera.width, view.camera.height));
+    let mut engine = Engine::of_model(open_gpu(context)?, model, sizes)?;
+    let own = model.labels.as_deref().unwrap_or(&[]);
+    fill(model, labels, &sights(&mut engine, own, &views, near)?)
 }
 
 fn listed(labels: &BTreeSet<u32>) -> Vec<u32> {

@@ -1,13 +1,14 @@
 //! Chooses and changes the labels of a model, without a device.
 //!
 //! A [`Catalogue`] resolves ids and names, and [`choose`] resolves points, boxes and masks in a view. [`extract`],
-//! [`remove`], [`recolour`], [`relabel`] and [`split_components`] return changed models; [`summarise`] lists the
-//! labels.
+//! [`remove`], [`recolour`], [`relabel`] and [`split_components`] return changed models; [`fill()`] removes and closes the
+//! hole; [`summarise`] lists the labels.
 
 pub(crate) mod catalogue;
 pub(crate) mod change;
 pub(crate) mod choose;
 pub(crate) mod components;
+pub(crate) mod fill;
 pub(crate) mod prompt;
 pub(crate) mod rename;
 pub(crate) mod select;
@@ -15,5 +16,6 @@ pub(crate) mod select;
 pub use catalogue::{Catalogue, Pick};
 pub use change::{Specks, Split, recolour, relabel, split_components, without_specks};
 pub use components::Grouping;
+pub use fill::{Filled, SIGHT_SIDE, Sight, fill};
 pub use prompt::{Place, Prompt, choose};
 pub use select::{LabelSummary, MIN_LABEL_CONFIDENCE, extract, remove, summarise};

@@ -2,7 +2,7 @@
 //!
 //! [`evaluate`] renders held-out views and objects and returns their [`Scores`]: PSNR, SSIM, IoU. [`protocol`] runs
 //! published benchmarks of object masks. [`psnr`] and [`ssim`] score single pictures. A [`Watch`] receives every scored
-//! picture with its ground truth.
+//! picture with its ground truth. [`removals`] scores what is left where objects were removed.
 
 pub(crate) mod boundary;
 pub(crate) mod compared;
@@ -13,6 +13,7 @@ pub(crate) mod metrics;
 pub(crate) mod page;
 pub mod protocol;
 pub(crate) mod regions;
+pub(crate) mod removal;
 pub(crate) mod scores;
 pub(crate) mod ssim;
 pub(crate) mod ssim8;
@@ -21,5 +22,6 @@ pub use compared::{Compared, Watch};
 pub use evaluate::{AmodalTruth, Rendering, evaluate};
 pub use metrics::psnr;
 pub use regions::RegionScores;
+pub use removal::{ObjectRemoval, RemovalScores, RemovalTruth, RuleScores, removals, sights};
 pub use scores::{MeanScores, ObjectScores, Scores, ViewScores};
 pub use ssim::ssim;

@@ -6,6 +6,7 @@ use super::boundary::boundary_iou;
 use super::crop::Crop;
 use super::metrics::{COVERED, Overlap, byte_value, mean, paper_score, psnr, psnr_of};
 use super::regions::RegionScores;
+use super::removal::RemovalScores;
 use super::ssim::ssim;
 use crate::scene::{LabelMap, Photo};
 use crate::{Error, Result};
@@ -214,6 +215,9 @@ pub struct Scores {
     /// Scores at other near planes, if asked for.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub near: Option<NearSweep>,
+    /// Scores of removals, if asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub removal: Option<RemovalScores>,
 }
 
 /// The scene at several near planes. Gaussians before the cameras fog pictures unless a near plane hides them.
@@ -267,6 +271,7 @@ impl Scores {
             objects: by_object.iter().map(|(&id, scores)| (id, average(scores))).collect(),
             views,
             near: None,
+            removal: None,
         }
     }
 

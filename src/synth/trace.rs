@@ -60,6 +60,12 @@ pub fn picture(world: &World, camera: &Camera, view: u32) -> Picture {
     }
 }
 
+/// Renders the photo of view number `view` alone.
+pub(super) fn photo(world: &World, camera: &Camera, view: u32) -> Vec<[u8; 3]> {
+    let (width, pixels) = (camera.width, camera.width * camera.height);
+    (0..pixels).into_par_iter().map(|index| colour(world, camera, view, (index % width, index / width))).collect()
+}
+
 /// Returns the unit direction, world, of the ray through an image position.
 pub(super) fn ray(camera: &Camera, x: f64, y: f64) -> DVec3 {
     let own = DVec3::new((x - camera.cx) / camera.fx, (y - camera.cy) / camera.fy, 1.0);
@@ -110,15 +116,19 @@ fn bytes(colour: DVec3) -> [u8; 3] {
 }
 
 fn pixel(world: &World, camera: &Camera, view: u32, x: u32, y: u32) -> Pixel {
-    let origin = camera.centre();
-    let mut sum = DVec3::ZERO;
-    for (direction, spot) in samples(camera, view, x, y) {
-        sum += world.colour(&world.hit(origin, direction), spot);
-    }
-    let centre = world.hit(origin, middle(camera, x, y));
+    let centre = world.hit(camera.centre(), middle(camera, x, y));
     Pixel {
-        rgb: bytes(sum / f64::from(SIDE * SIDE)),
+        rgb: colour(world, camera, view, (x, y)),
         id: world.id(&centre),
         depth: camera.to_camera(centre.place).z as f32,
     }
+}
+
+/// Returns the mean colour over a pixel.
+fn colour(world: &World, camera: &Camera, view: u32, (x, y): (u32, u32)) -> [u8; 3] {
+    let origin = camera.centre();
+    let sum: DVec3 = samples(camera, view, x, y)
+        .map(|(direction, spot)| world.colour(&world.hit(origin, direction), spot))
+        .fold(DVec3::ZERO, |sum, colour| sum + colour);
+    bytes(sum / f64::from(SIDE * SIDE))
 }

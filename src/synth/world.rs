@@ -39,6 +39,8 @@ pub struct Hit {
 pub struct World {
     /// Objects, with ids 1, 2, ... in order.
     pub objects: Vec<Object>,
+    /// Objects of which only the shadow is there.
+    shadows: Vec<Object>,
     /// Unit vector to the light.
     light: DVec3,
     /// Two unit vectors across the light's direction.
@@ -52,7 +54,20 @@ impl World {
         let turn = 0.6 + hash01(seed, 2, 0, 0);
         let light = DVec3::new(turn.cos() * 0.5, turn.sin() * 0.5, 0.87).normalize();
         let side = light.cross(DVec3::Y).normalize();
-        Self { objects: presets::objects(preset, seed), light, light_sides: [side, light.cross(side)], seed }
+        Self {
+            objects: presets::objects(preset, seed),
+            shadows: Vec::new(),
+            light,
+            light_sides: [side, light.cross(side)],
+            seed,
+        }
+    }
+
+    /// Returns the world without one object, or with nothing but its shadow. Other objects stay where they are, also those
+    /// that stand on it.
+    pub fn without(&self, id: u8, shadow: bool) -> Self {
+        let (gone, objects): (Vec<Object>, _) = self.objects.iter().cloned().partition(|object| object.id == id);
+        Self { objects, shadows: if shadow { gone } else { Vec::new() }, ..self.clone() }
     }
 
     /// Returns the id at a hit: 0 for ground and sky.
@@ -101,7 +116,15 @@ impl World {
             (self.light + (self.light_sides[0] * spot[0] + self.light_sides[1] * spot[1]) * 0.09).normalize();
         let facing = hit.normal.dot(to_light).max(0.0);
         let start = hit.place + hit.normal * 1e-4;
-        let lit = facing > 0.0 && !self.objects.iter().any(|object| object.distance(start, to_light).is_some());
+        let is_lit = || {
+            // What only throws a shadow may have the point inside, where a ray meets nothing on its way out. So this one
+            // comes from the light.
+            let outside = start + to_light * (2.0 * SKY_RADIUS);
+            let before = |object: &Object| object.distance(outside, -to_light).is_some_and(|at| at < 2.0 * SKY_RADIUS);
+            !self.objects.iter().any(|object| object.distance(start, to_light).is_some())
+                && !self.shadows.iter().any(before)
+        };
+        let lit = facing > 0.0 && is_lit();
         let ambient = 0.42 * (0.8 + 0.2 * hit.normal.z);
         let shaded = albedo * (ambient + if lit { 0.62 * facing } else { 0.0 });
         let haze = match hit.surface {

@@ -4,11 +4,11 @@ use super::object::Object;
 use super::points::Seen;
 
 use super::cameras::ring_of_cameras;
-use super::trace::{Picture, alone, picture};
+use super::trace::{Picture, alone, photo, picture};
 use super::world::World;
 use super::{SynthOptions, points, view_name};
 use crate::io::label_table::{self, LabelEntry, LabelTable};
-use crate::io::{atomic, image};
+use crate::io::{ReadOptions, atomic, image};
 use crate::scene::Camera;
 use crate::{Error, Result};
 use glam::DQuat;
@@ -48,6 +48,9 @@ pub fn write(options: &SynthOptions, folder: &Path, after_view: &dyn Fn(u32) -> 
     for (index, camera) in cameras.iter().enumerate() {
         let made = picture(&world, camera, index as u32);
         write_view(folder, index, &world, camera, &made)?;
+        if index.is_multiple_of(ReadOptions::default().test_every as usize) {
+            write_without(folder, index, &world, camera)?;
+        }
         count(&mut table, &made.ids);
         after_view(index as u32 + 1)?;
     }
@@ -65,8 +68,8 @@ fn count(table: &mut LabelTable, ids: &[u8]) {
 
 fn create_folders(folder: &Path, world: &World) -> Result<()> {
     atomic::require_empty("DIR", folder)?;
-    let of_objects =
-        ["amodal", "objects"].map(|kind| world.objects.iter().map(move |object| format!("{kind}/{}", object.id)));
+    let of_objects = ["amodal", "objects", "without", "shadowed"]
+        .map(|kind| world.objects.iter().map(move |object| format!("{kind}/{}", object.id)));
     let names = ["images", "sparse/0", "masks", "depth"].map(str::to_owned);
     for name in names.into_iter().chain(of_objects.into_iter().flatten()) {
         let path = folder.join(name);
@@ -88,6 +91,19 @@ fn write_view(folder: &Path, index: usize, world: &World, camera: &Camera, made:
         image::write_png_rgba8(&path, width, height, &alone(world, camera, index as u32, place))?;
     }
     image::write_exr_y(folder.join("depth").join(format!("{index:03}.exr")), width, height, &made.depth)
+}
+
+/// Writes the photo of the view in the world without each object: `without/ID/NAME.png`, and `shadowed/ID/NAME.png` where
+/// its shadow stays. Only views that are held out by default have them, because removals are scored there.
+fn write_without(folder: &Path, index: usize, world: &World, camera: &Camera) -> Result<()> {
+    for object in &world.objects {
+        for (kind, shadow) in [("without", false), ("shadowed", true)] {
+            let path = folder.join(kind).join(object.id.to_string()).join(view_name(index));
+            let rgb = photo(&world.without(object.id, shadow), camera, index as u32);
+            image::write_png_rgb8(&path, camera.width, camera.height, &rgb)?;
+        }
+    }
+    Ok(())
 }
 
 fn save(path: &Path, bytes: &[u8]) -> Result<()> {

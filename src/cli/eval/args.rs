@@ -26,6 +26,11 @@ pub struct EvalArgs {
     /// Folder of outlines of whole objects, ID/NAME.png. Default: SCENE/amodal, if it exists.
     #[arg(long, value_name = "DIR", help_heading = "Labels")]
     pub amodal: Option<PathBuf>,
+    /// Also remove each object and score what is left: by the labels of the model, the same with `remove --fill`, and by the
+    /// paper's rule. Photos without an object are SCENE/without/ID/NAME.png, those with its shadow
+    /// SCENE/shadowed/ID/NAME.png; without any, only the weight of Gaussians that stay is given.
+    #[arg(long, requires = "masks", help_heading = "Labels")]
+    pub removal: bool,
     /// Colour behind the scene: black, white, or R,G,B from 0 to 1.
     #[arg(long, value_name = "COLOUR", value_parser = colour, default_value = "black", help_heading = "Rendering")]
     pub background: [f32; 3],
@@ -40,7 +45,7 @@ pub struct EvalArgs {
     /// Score by a published benchmark instead, with its masks, its choice of objects and its averages.
     #[arg(
         long, value_name = "NAME", value_enum, requires = "truth", help_heading = "Benchmarks",
-        conflicts_with_all = ["masks", "amodal", "views", "background"]
+        conflicts_with_all = ["masks", "amodal", "removal", "views", "background"]
     )]
     pub protocol: Option<Protocol>,
     /// Folder with the benchmark's masks of this scene.
@@ -89,6 +94,7 @@ impl EvalArgs {
             views: "test".to_owned(),
             masks: None,
             amodal: None,
+            removal: false,
             background: [0.0; 3],
             near: Vec::new(),
             sure: MinConfidenceArg { min_confidence: MIN_LABEL_CONFIDENCE },

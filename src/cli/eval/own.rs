@@ -7,11 +7,13 @@ use crate::cli::context::{Context, open_model};
 use crate::cli::scene::{near_plane, open_gpu, open_scene, pick_views, render_engine};
 use crate::engine::Engine;
 use crate::eval::evaluate::{AmodalTruth, Rendering, evaluate, picture_count};
+use crate::eval::removal::{self, RemovalTruth, removals};
 use crate::eval::scores::{NearScores, NearSweep, Scores};
 use crate::io::image::read_rgba;
 use crate::io::mask::read_mask;
+use crate::label::vote::model::{columns_of, vote_engine};
 use crate::render::RenderOptions;
-use crate::scene::{Gaussians, View};
+use crate::scene::{Dataset, Gaussians, Photo, View};
 use crate::{Error, Result};
 use std::path::{Path, PathBuf};
 
@@ -29,10 +31,12 @@ pub(in crate::cli) fn score(args: &EvalArgs, context: &Context) -> Result<Scores
     let dataset = open_scene(&args.scene, &reading, args.masks.clone(), args.background, true)?;
     let views = pick_views(&dataset, &args.views)?;
     let wholes = Folders::find(args)?;
-    let mut watcher = Watcher::new(picture_count(&views), args.page.as_deref(), context)?;
+    let removing = if args.removal { Some(Removing::new(args, &model, &dataset)?) } else { None };
+    let pictures = picture_count(&views) + removing.as_ref().map_or(0, |_| removal::picture_count(&views));
+    let mut watcher = Watcher::new(pictures, args.page.as_deref(), context)?;
     let gpu = open_gpu(context)?;
     let sizes = views.iter().map(|view| (view.camera.width, view.camera.height));
-    let mut engine = render_engine(gpu, &model, sizes)?;
+    let mut engine = render_engine(gpu.clone(), &model, sizes)?;
     let near = near_plane(&args.model, args.near.first().copied().filter(|_| args.near.len() == 1))?;
     let how = Rendering {
         options: RenderOptions { near, background: args.background, ..RenderOptions::default() },
@@ -44,9 +48,69 @@ pub(in crate::cli) fn score(args: &EvalArgs, context: &Context) -> Result<Scores
     if args.near.len() > 1 {
         scores.near = Some(compare_planes(&mut engine, &model, &views, how.options, (&args.near, &scores))?);
     }
+    if let Some(removing) = removing {
+        drop(engine);
+        let all: Vec<&View> = views.iter().copied().chain(removing.train.iter().copied()).collect();
+        let mut engine = vote_engine(gpu, &model, &all, columns_of(&all))?;
+        let (train, truth) = (&removing.train, &removing.truth);
+        scores.removal = Some(removals(&mut engine, &model, &views, train, how.options, truth, &mut watcher)?);
+    }
     watcher.finish(&own_table(&scores))?;
     scores.warn_of_odd_view(near);
     Ok(scores)
+}
+
+/// What scores of removals need besides the views.
+struct Removing<'a> {
+    /// Training views with masks.
+    train: Vec<&'a View>,
+    truth: Without,
+}
+
+impl<'a> Removing<'a> {
+    fn new(args: &EvalArgs, model: &Gaussians, dataset: &'a Dataset) -> Result<Self> {
+        if model.labels.is_none() {
+            return Err(Error::data(&args.model, "", "has no labels to remove objects by; train it with --masks"));
+        }
+        let train: Vec<&View> = dataset.train.iter().filter(|view| view.mask.is_some()).collect();
+        if train.is_empty() {
+            let problem = "no training view has a mask; --removal shows the paper's rule, which needs some";
+            return Err(Error::data(args.masks.clone().unwrap_or_default(), "", problem));
+        }
+        Ok(Self { train, truth: Without { scene: args.scene.clone() } })
+    }
+}
+
+/// Photos without an object, `ID/NAME.png` in folders of a scene that need not exist.
+struct Without {
+    scene: PathBuf,
+}
+
+impl RemovalTruth for Without {
+    fn without(&self, id: u32, view: &View) -> Result<Option<Photo>> {
+        self.read("without", id, view)
+    }
+
+    fn shadowed(&self, id: u32, view: &View) -> Result<Option<Photo>> {
+        self.read("shadowed", id, view)
+    }
+}
+
+impl Without {
+    fn read(&self, kind: &str, id: u32, view: &View) -> Result<Option<Photo>> {
+        let Some(file) = file_of(&self.scene.join(kind), id, view) else { return Ok(None) };
+        let picture = read_rgba(&file)?;
+        let (width, height) = (view.camera.width, view.camera.height);
+        if (picture.width, picture.height) != (width, height) {
+            let problem = format!(
+                "has {} x {} px, and view {} has {width} x {height} px; a photo without an object has the pixels of the \
+                 view, so score without --max-resolution",
+                picture.width, picture.height, view.name
+            );
+            return Err(Error::data(file, "", problem));
+        }
+        Ok(Some(picture))
+    }
 }
 
 /// Scores the scene at every near plane.

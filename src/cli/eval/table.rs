@@ -45,6 +45,42 @@ pub(super) fn own_table(scores: &Scores) -> String {
             number(row.psnr_hidden, 2)
         );
     }
+    text + &removals(scores)
+}
+
+/// Returns the table of removals.
+fn removals(scores: &Scores) -> String {
+    let Some(removal) = &scores.removal else { return String::new() };
+    let head = ["removed", "filled", "mean colour", "paper's"];
+    let mut text =
+        "\nPSNR at the place of a removed object, against photos without it, and with its shadow\n".to_owned();
+    text += &format!("{:>10}", "object");
+    head.iter().chain(&head).for_each(|name| text += &format!(" {name:>11}"));
+    text += "\n";
+    let rows = || removal.objects.iter().map(|(id, row)| (id.to_string(), row)).chain([("mean".into(), &removal.mean)]);
+    for (name, row) in rows() {
+        let ways = [row.votes, row.filled, row.mean_colour, row.main];
+        text += &format!("{name:>10}");
+        ways.iter().for_each(|way| text += &format!(" {:>11}", number(way.psnr, 2)));
+        ways.iter().for_each(|way| text += &format!(" {:>11}", number(way.psnr_shadowed, 2)));
+        text += "\n";
+    }
+    text += &format!(
+        "\n{:>10} {:>10} {:>10} {:>13} {:>13} {:>8} {:>8} {:>8}\n",
+        "object", "leftover", "paper's", "weight left", "paper's", "hole", "filled", "added"
+    );
+    for (name, row) in rows() {
+        text += &format!(
+            "{name:>10} {:>10} {:>10} {:>13} {:>13} {:>8} {:>8} {:>8}\n",
+            number(row.votes.leftover, 4),
+            number(row.main.leftover, 4),
+            number(row.votes.leftover_weight, 4),
+            number(row.main.leftover_weight, 4),
+            number(row.hole, 4),
+            number(row.hole_filled, 4),
+            row.added
+        );
+    }
     text
 }
 

@@ -1,0 +1,110 @@
+//! What the views show at a place on a plane.
+
+use super::Sight;
+use super::plane::Plane;
+use glam::DVec3;
+
+/// Tolerance of depths, in cells.
+const DEPTH: f64 = 2.5;
+/// Distance from the surface in question, and depth below any, that still counts as that surface, in tolerances: where
+/// little is seen, as in shadows and corners, surfaces of a model are uneven.
+const OWN: f64 = 3.0;
+/// Least sine of the angle between a view and the plane: a flatter one cannot tell its places apart.
+const STEEP: f64 = 0.15;
+/// Views that have to show the removed object before a hole, and the share of them that may show something else: at
+/// contours a pixel is decided by chance.
+const HIDING: (u32, f64) = (2, 0.1);
+
+/// What a view shows at a place.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Shown {
+    /// The removed object is there or before it.
+    Removed,
+    /// A surface is there.
+    Surface,
+    /// The view looks through the place.
+    Through,
+    /// Something else is before it.
+    Hidden,
+}
+
+/// What all views show at a place.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum State {
+    /// The surface in question.
+    Seen,
+    /// Nothing.
+    Free,
+    /// Nothing but the removed object was ever seen here.
+    Hole,
+    /// Other things are there or hide it, or no view has it.
+    Unknown,
+}
+
+/// Numbers of views.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Evidence {
+    removed: u32,
+    surface: u32,
+    through: u32,
+    /// Views of the surface in question, part of those of any surface.
+    pub own: u32,
+}
+
+impl Evidence {
+    /// Adds what a view shows at a place on a plane, the surface of the label `own`, and returns its pixel. Depths are
+    /// compared at the middle of the pixel, because a flat view changes them much within it.
+    pub(super) fn add(
+        &mut self,
+        world: DVec3,
+        (plane, own): (&Plane, u32),
+        cell: f64,
+        removed: &[u32],
+        sight: &Sight,
+    ) -> Option<(usize, Shown)> {
+        let camera = &sight.camera;
+        let pixel = camera.sees(world)?;
+        let index = pixel.y as usize * camera.width as usize + pixel.x as usize;
+        let ray = camera.rotation.transpose() * sight.ray(index);
+        let depth = -plane.height(camera.centre()) / ray.dot(plane.normal);
+        if ray.normalize().dot(plane.normal).abs() < STEEP || !(depth > 0.0 && depth.is_finite()) {
+            return None;
+        }
+        let shown = f64::from(sight.depth[index]);
+        let behind = if shown > 0.0 { depth - shown } else { f64::NEG_INFINITY };
+        // Distance from the plane of the surface that the view shows: flat views change depths much from pixel to pixel.
+        let off = if shown > 0.0 { plane.height(sight.at(index, shown)).abs() } else { f64::INFINITY };
+        let slack = DEPTH * cell;
+        let label = u32::from(sight.labels.ids[index]);
+        let is_removed = removed.contains(&label);
+        let (shown, count) = if is_removed && (behind >= -slack || off <= OWN * slack) {
+            (Shown::Removed, Some(&mut self.removed))
+        } else if !is_removed && off <= if label == own { OWN * slack } else { slack } {
+            (Shown::Surface, Some(&mut self.surface))
+        } else if behind < -slack {
+            (Shown::Through, Some(&mut self.through))
+        } else if !is_removed && behind <= OWN * slack {
+            (Shown::Hidden, Some(&mut self.surface))
+        } else {
+            (Shown::Hidden, None)
+        };
+        if let Some(count) = count {
+            *count += 1;
+        }
+        Some((index, shown))
+    }
+
+    /// Returns what the views show together.
+    pub(super) fn state(&self) -> State {
+        let other = self.surface + self.through;
+        if self.removed >= HIDING.0 && f64::from(other) <= HIDING.1 * f64::from(self.removed) {
+            State::Hole
+        } else if self.own > self.through {
+            State::Seen
+        } else if self.through > 0 {
+            State::Free
+        } else {
+            State::Unknown
+        }
+    }
+}

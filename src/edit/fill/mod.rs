@@ -1,0 +1,205 @@
+//! Closes what a removed object leaves open: its neighbours' surfaces are continued where no view ever looked.
+//!
+//! The views of the whole model say what was seen: a place on a surface is *seen* if a view shows it, *free* if a view
+//! looks through it, and *hidden* if it lies at or behind the removed object in every view that has it. Planes are fitted
+//! to what the views show around the object. New flat Gaussians stand on these planes, only at hidden places between seen
+//! ones, so that they cover nothing that a view has seen. Their colours continue those around them.
+
+mod evidence;
+mod plane;
+mod sheet;
+
+use super::select::{MIN_LABEL_CONFIDENCE, remove};
+use crate::scene::{Camera, Gaussians, LabelMap};
+use crate::shaders::constants::exact::SH_C0;
+use crate::{Error, Result};
+use glam::{DMat3, DQuat, DVec2, DVec3};
+use kiddo::{ImmutableKdTree, SquaredEuclidean};
+use plane::{Plane, planes};
+use sheet::Sheet;
+use std::collections::BTreeMap;
+
+/// Longest side of a [`Sight`], px: finer ones take memory and add little.
+pub const SIGHT_SIDE: u32 = 640;
+/// Width of the ring around the object from which surfaces are continued, as a share of the object's diagonal, and its
+/// least width, in cells.
+const RING: (f64, f64) = (0.25, 8.0);
+/// Most points that one surface is looked for among.
+const POINTS_MAX: usize = 20_000;
+/// Standard deviation of a new Gaussian in and across its surface, in cells: neighbours overlap without gaps.
+const SPREAD: (f64, f64) = (0.7, 0.1);
+/// Opacity of a new Gaussian before the sigmoid, 0.97.
+const OPACITY: f32 = 3.5;
+
+/// What a view shows of the whole model, row-major.
+#[derive(Clone, Debug)]
+pub struct Sight {
+    /// The camera, at the size of the picture.
+    pub camera: Camera,
+    /// r, g, b.
+    pub rgb: Vec<[f32; 3]>,
+    /// Mean z, world units; 0 where nothing is.
+    pub depth: Vec<f32>,
+    /// Label of the main Gaussian of each pixel.
+    pub labels: LabelMap,
+}
+
+/// A model in which the place of removed objects was closed.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Filled {
+    /// The rest of the model, then the new Gaussians.
+    pub model: Gaussians,
+    /// Number of new Gaussians by the label of the surface that they continue.
+    pub added: BTreeMap<u32, u64>,
+}
+
+/// Removes the Gaussians of `labels`, as [`remove`] does, and continues the surfaces around them where `sights`, views of
+/// the whole `model`, show nothing but the removed. Errors as in [`remove`], or without a sight.
+pub fn fill(model: &Gaussians, labels: &[u32], sights: &[Sight]) -> Result<Filled> {
+    let rest = remove(model, labels)?;
+    if sights.is_empty() {
+        return Err(Error::usage("fill", "needs at least one view of the scene"));
+    }
+    let mut filled = Filled { model: rest, added: BTreeMap::new() };
+    // Each label is an object of its own: two far from each other have no common surroundings.
+    for &label in labels {
+        let Some(place) = Place::new(model, label, sights)? else { continue };
+        for (label, points) in place.ring(labels, sights) {
+            for plane in planes(&points, place.cell) {
+                let sheet = Sheet::new((plane, label), &place, labels, sights);
+                let added = sheet.holes();
+                if !added.is_empty() {
+                    *filled.added.entry(label).or_default() += added.len() as u64;
+                    append(&mut filled.model, (&sheet.plane, place.cell), &added, label);
+                }
+            }
+        }
+    }
+    Ok(filled)
+}
+
+/// Where a removed object was.
+struct Place {
+    tree: ImmutableKdTree<f64, 3>,
+    /// Corners of the object.
+    low: DVec3,
+    high: DVec3,
+    /// Size of a pixel at the object, world units: the spacing of new Gaussians.
+    cell: f64,
+    /// Width of the ring around the object, world units.
+    ring: f64,
+}
+
+impl Place {
+    /// Finds the place of a label; `None` if no view shows it.
+    fn new(model: &Gaussians, label: u32, sights: &[Sight]) -> Result<Option<Self>> {
+        let of_label = |row: &usize| model.labels.as_ref().map_or(0, |labels| labels[*row]) == label;
+        let is_sure = |row: &usize| {
+            let shares = model.label_confidence.as_ref();
+            model.opacities[*row] > 0.0 && shares.is_none_or(|shares| shares[*row] >= MIN_LABEL_CONFIDENCE)
+        };
+        let all: Vec<usize> = (0..model.len()).filter(of_label).filter(|&row| model.is_finite(row)).collect();
+        let sure: Vec<usize> = all.iter().copied().filter(is_sure).collect();
+        let points: Vec<DVec3> =
+            if sure.is_empty() { &all } else { &sure }.iter().map(|&row| model.world(row)).collect();
+        if points.is_empty() {
+            return Ok(None);
+        }
+        // Single Gaussians may be anywhere, so the corners leave a few out.
+        let corner = |axis: usize, share: f64| {
+            let mut values: Vec<f64> = points.iter().map(|point| point[axis]).collect();
+            values.sort_unstable_by(f64::total_cmp);
+            values[((values.len() - 1) as f64 * share).round() as usize]
+        };
+        let at = |share: f64| DVec3::new(corner(0, share), corner(1, share), corner(2, share));
+        let (low, high, middle) = (at(0.01), at(0.99), at(0.5));
+        let mut pixels: Vec<f64> = sights
+            .iter()
+            .filter(|sight| sight.camera.sees(middle).is_some())
+            .map(|sight| sight.camera.to_camera(middle).z / sight.camera.fx)
+            .collect();
+        pixels.sort_unstable_by(f64::total_cmp);
+        let Some(&cell) = pixels.get(pixels.len() / 2) else { return Ok(None) };
+        let places: Vec<[f64; 3]> = points.iter().map(DVec3::to_array).collect();
+        let tree = ImmutableKdTree::new_from_slice(&places)
+            .map_err(|error| Error::Bug(format!("the k-d tree of the Gaussians failed: {error:?}")))?;
+        let ring = (RING.0 * (high - low).length()).max(RING.1 * cell);
+        Ok(Some(Self { tree, low, high, cell, ring }))
+    }
+
+    /// Returns the points that views show around the object, by label.
+    fn ring(&self, removed: &[u32], sights: &[Sight]) -> BTreeMap<u32, Vec<DVec3>> {
+        let mut found: BTreeMap<u32, Vec<DVec3>> = BTreeMap::new();
+        for sight in sights {
+            for (index, (&depth, &id)) in sight.depth.iter().zip(&sight.labels.ids).enumerate() {
+                if depth <= 0.0 || removed.contains(&u32::from(id)) {
+                    continue;
+                }
+                let world = sight.at(index, f64::from(depth));
+                if self.is_near(world, self.ring) && self.distance(world) <= self.ring {
+                    found.entry(u32::from(id)).or_default().push(world);
+                }
+            }
+        }
+        for points in found.values_mut() {
+            let step = points.len().div_ceil(POINTS_MAX).max(1);
+            *points = points.iter().copied().step_by(step).collect();
+        }
+        found
+    }
+
+    /// Returns true for points in the box around the object, grown by a margin.
+    fn is_near(&self, world: DVec3, margin: f64) -> bool {
+        world.max(self.low).min(self.high).distance(world) <= margin
+    }
+
+    /// Returns the distance to the nearest Gaussian of the object.
+    fn distance(&self, world: DVec3) -> f64 {
+        let nearest = self.tree.query(&world.to_array()).nearest_one::<SquaredEuclidean<f64>>().execute();
+        nearest.distance.sqrt()
+    }
+}
+
+impl Sight {
+    /// Returns the direction of the ray through the centre of a pixel, with z 1, in camera space.
+    fn ray(&self, index: usize) -> DVec3 {
+        let width = self.camera.width as usize;
+        let pixel = DVec2::new((index % width) as f64 + 0.5, (index / width) as f64 + 0.5);
+        let camera = &self.camera;
+        DVec3::new((pixel.x - camera.cx) / camera.fx, (pixel.y - camera.cy) / camera.fy, 1.0)
+    }
+
+    /// Returns true for a pixel beside one of these labels.
+    fn is_beside(&self, index: usize, labels: &[u32]) -> bool {
+        let (x, y) = (index as u32 % self.labels.width, index as u32 / self.labels.width);
+        let is_one = |x: u32, y: u32| self.labels.get(x, y).is_some_and(|id| labels.contains(&u32::from(id)));
+        (x.saturating_sub(1)..=x + 1).any(|x| (y.saturating_sub(1)..=y + 1).any(|y| is_one(x, y)))
+    }
+
+    /// Returns the world position at a depth of a pixel.
+    fn at(&self, index: usize, depth: f64) -> DVec3 {
+        self.camera.rotation.transpose() * (self.ray(index) * depth - self.camera.translation)
+    }
+}
+
+/// Adds flat Gaussians on a plane.
+fn append(model: &mut Gaussians, (plane, cell): (&Plane, f64), places: &[(DVec3, DVec3)], label: u32) {
+    let turn = DQuat::from_mat3(&DMat3::from_cols(plane.u, plane.v, plane.normal)).normalize();
+    let quat = [turn.w, turn.x, turn.y, turn.z].map(|value| value as f32);
+    let scale = [SPREAD.0, SPREAD.0, SPREAD.1].map(|share| (share * cell).ln() as f32);
+    let rest = model.rest_per_gaussian();
+    for (world, colour) in places {
+        model.means.push((*world - model.origin).to_array().map(|value| value as f32));
+        model.quats.push(quat);
+        model.scales.push(scale);
+        model.opacities.push(OPACITY);
+        model.sh0.push(colour.to_array().map(|value| ((value - 0.5) / SH_C0) as f32));
+        model.sh_rest.extend(std::iter::repeat_n([0.0; 3], rest));
+        if let Some(labels) = &mut model.labels {
+            labels.push(label);
+        }
+        if let Some(shares) = &mut model.label_confidence {
+            shares.push(1.0);
+        }
+    }
+}

@@ -1,0 +1,130 @@
+//! Scores of removals: what a model shows where an object was, against photos of the scene without it.
+
+mod score;
+
+pub use score::{ObjectRemoval, RemovalScores, RuleScores};
+
+use super::compared::{Compared, Watch};
+use crate::edit::fill::{SIGHT_SIDE, Sight, fill};
+use crate::engine::Engine;
+use crate::error::Result;
+use crate::label::vote::ballot::{Sweep, Voter, sweep, weight};
+use crate::label::vote::lift::Lift;
+use crate::label::vote::model::label_by_lift;
+use crate::render::{Parts, RenderOptions, Rendered, render};
+use crate::scene::{Gaussians, LabelMap, Photo, View};
+use score::{Compare, Region, Tally};
+use std::collections::{BTreeMap, BTreeSet};
+
+/// Least weight with which the main Gaussian of a pixel takes its label by the rule of the paper.
+const LIFT: Lift = Lift { threshold: 0.6, gpf: true };
+
+/// Photos of the scene without an object.
+pub trait RemovalTruth {
+    /// Returns the photo of a view without object `id`, at the size of the view; `None` if there is none.
+    fn without(&self, id: u32, view: &View) -> Result<Option<Photo>>;
+
+    /// Returns the same photo with the shadow of the object.
+    fn shadowed(&self, id: u32, view: &View) -> Result<Option<Photo>>;
+}
+
+/// Renders what training views show of the model in the engine, for [`fill`]. `labels` are those of its Gaussians.
+pub fn sights(engine: &mut Engine, labels: &[u32], views: &[&View], near: f32) -> Result<Vec<Sight>> {
+    let sight = |view: &&View| {
+        let (width, height) = (view.camera.width, view.camera.height);
+        let shrink = f64::from(SIGHT_SIDE) / f64::from(width.max(height));
+        let size = |side: u32| if shrink < 1.0 { (f64::from(side) * shrink).round().max(1.0) as u32 } else { side };
+        let camera = view.camera.resized(size(width), size(height));
+        let rendered = render(engine, &camera, &RenderOptions::new(near, Parts::ALL))?;
+        let (depth, labels) = (rendered.mean_depth()?, rendered.label_map(labels)?);
+        Ok(Sight { camera, rgb: rendered.rgb, depth, labels })
+    };
+    views.iter().map(sight).collect()
+}
+
+/// Returns the number of pictures that [`removals`] shows.
+pub(crate) fn picture_count(views: &[&View]) -> u64 {
+    2 * views.iter().filter_map(|view| view.mask.as_deref()).map(|mask| mask.objects().len() as u64).sum::<u64>()
+}
+
+/// Removes each object of the masks from `model` and scores what is left in `views`: by the labels of the model, the same
+/// filled, and by labels of the paper's rule. `train` are the training views with masks, for the last two. `engine` has
+/// memory for votes ([`vote_engine`](crate::label::vote::model::vote_engine)); its model is replaced.
+pub fn removals(
+    engine: &mut Engine,
+    model: &Gaussians,
+    views: &[&View],
+    train: &[&View],
+    options: RenderOptions,
+    truth: &dyn RemovalTruth,
+    watch: &mut dyn Watch,
+) -> Result<RemovalScores> {
+    engine.upload_model(model)?;
+    let own = model.labels.clone().unwrap_or_else(|| vec![0; model.len()]);
+    let sights = sights(engine, &own, train, options.near)?;
+    let mut paper = model.clone();
+    label_by_lift(engine, &mut paper, train, (options.near, LIFT, 0))?;
+    let voters: Vec<Voter> = views.iter().filter_map(|view| Some(Voter::of(view, view.mask.as_ref()?))).collect();
+    let ballot = sweep(engine, &voters, Sweep { near: options.near, border: 0 })?;
+    let ids: BTreeSet<u16> = views.iter().filter_map(|view| view.mask.as_deref()).flat_map(LabelMap::objects).collect();
+    let mut objects = BTreeMap::new();
+    for id in ids {
+        let votes_left = |labels: &[u32]| {
+            let column = ballot.labels.iter().position(|&label| label == id);
+            let of = |row: usize| ballot.row(row).iter().filter(|cell| Some(usize::from(cell.0)) == column);
+            let sum = |rows: &dyn Fn(usize) -> bool| -> f64 {
+                (0..ballot.len()).filter(|&row| rows(row)).flat_map(of).map(|&(_, votes)| weight(votes)).sum()
+            };
+            let all = sum(&|_| true);
+            (all > 0.0).then(|| sum(&|row| labels[row] != u32::from(id)) / all)
+        };
+        let id = u32::from(id);
+        let rest = |labels: &[u32]| model.filtered(|row| labels[row] != id);
+        let (mut plain, mut filled, mut main) = (Tally::default(), Tally::default(), Tally::default());
+        let mut draw = |part: &Gaussians, tally: &mut Tally, what: &'static str, watch: &mut dyn Watch| {
+            for view in views {
+                let (Some(mask), Some(photo)) = (&view.mask, &view.photo) else { continue };
+                let Some(region) = Region::new(mask, id as u16, photo) else { continue };
+                let (without, shadowed) = (truth.without(id, view)?, truth.shadowed(id, view)?);
+                let rendered = drawn(engine, part, view, options)?;
+                let compare =
+                    Compare { rendered: &rendered, photo, truth: without.as_ref(), shadowed: shadowed.as_ref() };
+                tally.add(&region, &compare);
+                let Some(without) = without.as_ref().filter(|_| what != MAIN) else { continue };
+                watch.see(&Compared {
+                    object: Some(format!("{id} {what}")),
+                    numbers: vec![("PSNR", compare.psnr(&region))],
+                    ..Compared::new(&view.name, without, &rendered.rgb)
+                })?;
+            }
+            Ok::<(), crate::Error>(())
+        };
+        let without = rest(&own);
+        draw(&without, &mut plain, "removed", watch)?;
+        let closed = if own.contains(&id) && !without.is_empty() { Some(fill(model, &[id], &sights)?) } else { None };
+        let added = closed.as_ref().map_or(0, |closed| closed.added.values().sum());
+        draw(closed.as_ref().map_or(&without, |closed| &closed.model), &mut filled, "filled", watch)?;
+        let labels = paper.labels.as_deref().unwrap_or(&own);
+        draw(&rest(labels), &mut main, MAIN, watch)?;
+        let scores = ObjectRemoval {
+            votes: plain.scores(votes_left(&own)),
+            main: main.scores(votes_left(labels)),
+            filled: filled.scores(None),
+            mean_colour: plain.mean_colour(),
+            hole: plain.hole(),
+            hole_filled: filled.hole(),
+            added,
+        };
+        objects.insert(id, scores);
+    }
+    Ok(RemovalScores::new(objects))
+}
+
+/// Name of the picture by the rule of the paper.
+const MAIN: &str = "removed by main Gaussians";
+
+/// Renders a part of the model, which may be empty.
+fn drawn(engine: &mut Engine, part: &Gaussians, view: &View, options: RenderOptions) -> Result<Rendered> {
+    engine.upload_model(part)?;
+    render(engine, &view.camera, &RenderOptions { parts: Parts::COLOUR, ..options })
+}

@@ -1,0 +1,172 @@
+//! Closing the place of a removed object: surfaces are continued where no view looked, and nowhere else.
+
+use glam::{DMat3, DVec3};
+use labelgs::edit::{Filled, Sight, fill};
+use labelgs::internals::shaders::constants::exact::SH_C0;
+use labelgs::scene::{Camera, Gaussians, LabelMap};
+
+/// Radius of a dome, label 1, that stands on the plane z = 0, label 0.
+const RADIUS: f64 = 0.4;
+const SIDE: u32 = 200;
+const FOCAL: f64 = 220.0;
+/// Distance of the cameras.
+const FAR: f64 = 3.0;
+
+/// What is under the dome.
+#[derive(Clone, Copy, PartialEq)]
+enum Under {
+    /// Nobody knows.
+    Hidden,
+    /// Every view sees a pit where x is above 0, as if the dome were glass there.
+    Pit,
+}
+
+/// Colour of the plane: a gradient along x and y.
+fn gradient(place: DVec3) -> [f64; 3] {
+    [0.5 + 0.3 * place.x, 0.5 + 0.3 * place.y, 0.4]
+}
+
+/// Eight cameras in a ring that look at the origin.
+fn cameras() -> Vec<Camera> {
+    let camera = |index: u32| {
+        let angle = f64::from(index) * std::f64::consts::TAU / 8.0;
+        let outward = DVec3::new(angle.cos() * 0.8, angle.sin() * 0.8, 0.6);
+        let forward = -outward;
+        let right = forward.cross(DVec3::Z).normalize();
+        let rotation = DMat3::from_cols(right, forward.cross(right), forward).transpose();
+        let (half, translation) = (f64::from(SIDE) / 2.0, -(rotation * outward * FAR));
+        Camera { rotation, translation, fx: FOCAL, fy: FOCAL, cx: half, cy: half, width: SIDE, height: SIDE }
+    };
+    (0..8).map(camera).collect()
+}
+
+/// The view of a camera, by its rays.
+fn sight(camera: Camera, under: Under) -> Sight {
+    let (mut rgb, mut depth, mut ids) = (Vec::new(), Vec::new(), Vec::new());
+    let centre = camera.centre();
+    for index in 0..SIDE * SIDE {
+        let (x, y) = (f64::from(index % SIDE) + 0.5, f64::from(index / SIDE) + 0.5);
+        let own = DVec3::new((x - camera.cx) / camera.fx, (y - camera.cy) / camera.fy, 1.0);
+        let ray = camera.rotation.transpose() * own;
+        // |centre + t ray| = RADIUS
+        let (a, b, c) = (ray.length_squared(), ray.dot(centre), centre.length_squared() - RADIUS * RADIUS);
+        let root = b * b - a * c;
+        let dome = (root > 0.0).then(|| (-b - root.sqrt()) / a).filter(|t| (centre + ray * *t).z > 0.0);
+        let ground = -centre.z / ray.z;
+        let floor = centre + ray * ground;
+        let in_pit = under == Under::Pit && floor.x > 0.0 && floor.truncate().length() < RADIUS;
+        let (t, label, colour) = match dome {
+            Some(t) if !in_pit => (t, 1, [0.9, 0.1, 0.9]),
+            _ if in_pit => (-(centre.z + 1.0) / ray.z, 0, [0.1; 3]),
+            _ if ray.z < 0.0 => (ground, 0, gradient(floor)),
+            _ => (0.0, 0, [0.0; 3]),
+        };
+        depth.push(t as f32);
+        ids.push(label);
+        rgb.push(colour.map(|value| value as f32));
+    }
+    Sight { camera, rgb, depth, labels: LabelMap { width: SIDE, height: SIDE, ids } }
+}
+
+/// A model of the dome, and of the plane without its disc.
+fn model(origin: DVec3) -> Gaussians {
+    let mut means = Vec::new();
+    let mut labels = Vec::new();
+    for (turn, height) in (0..40).flat_map(|turn| (0..10).map(move |height| (turn, height))) {
+        let (angle, up) = (f64::from(turn) * 0.157, f64::from(height) * 0.15);
+        means.push(RADIUS * DVec3::new(angle.cos() * up.cos(), angle.sin() * up.cos(), up.sin()));
+        labels.push(1);
+    }
+    for (x, y) in (-20..=20).flat_map(|x| (-20..=20).map(move |y| (x, y))) {
+        let place = DVec3::new(f64::from(x), f64::from(y), 0.0) * 0.05;
+        if place.length() > RADIUS {
+            means.push(place);
+            labels.push(0);
+        }
+    }
+    let count = means.len();
+    Gaussians {
+        origin,
+        means: means.iter().map(|mean| mean.as_vec3().to_array()).collect(),
+        quats: vec![[1.0, 0.0, 0.0, 0.0]; count],
+        scales: vec![[-3.5; 3]; count],
+        opacities: vec![3.0; count],
+        sh0: vec![[0.0; 3]; count],
+        sh_rest: vec![[0.1; 3]; count * 3],
+        sh_degree: 1,
+        labels: Some(labels),
+        label_confidence: Some(vec![0.9; count]),
+    }
+}
+
+fn filled(under: Under) -> (Filled, usize) {
+    let sights: Vec<Sight> = cameras().into_iter().map(|camera| sight(camera, under)).collect();
+    let model = model(DVec3::ZERO);
+    let rest = labelgs::edit::remove(&model, &[1]).expect("rest").len();
+    (fill(&model, &[1], &sights).expect("filled"), rest)
+}
+
+/// Size of a pixel at the dome, the spacing of new Gaussians.
+const CELL: f64 = FAR / FOCAL;
+
+#[test]
+fn a_missing_disc_is_closed_in_the_colours_around_it() {
+    let (Filled { model, added }, rest) = filled(Under::Hidden);
+    model.check().expect("all columns have the same length");
+    let new: Vec<usize> = (rest..model.len()).collect();
+    assert_eq!(added.into_iter().collect::<Vec<_>>(), [(0, new.len() as u64)]);
+    // A Gaussian is 0.7 of its spacing wide.
+    let spacing = f64::from(model.scales[rest][0].exp()) / 0.7;
+    let area = new.len() as f64 * spacing * spacing / (std::f64::consts::PI * RADIUS * RADIUS);
+    assert!((0.9..1.06).contains(&area), "{area} of the disc is filled");
+    for row in new {
+        let place = model.world(row);
+        assert!(place.z.abs() < 0.5 * CELL, "{place} is off the plane");
+        assert!(place.truncate().length() < RADIUS + CELL, "{place} is outside of the disc");
+        let shown = model.sh0[row].map(|value| 0.5 + f64::from(value) * SH_C0);
+        let off = (0..3).map(|c| (shown[c] - gradient(place)[c]).abs()).fold(0.0, f64::max);
+        // A gradient is its own smoothest continuation; pixels round the places of its colours.
+        assert!(off < 0.01, "{place}: {shown:?} is {off} from the gradient");
+        assert_eq!(model.labels.as_ref().map(|labels| labels[row]), Some(0));
+        // Flat, along the plane, and opaque.
+        let [u, v, normal] = model.scales[row];
+        assert!(u == v && normal < u - 1.0 && model.opacities[row] > 2.0, "{:?}", model.scales[row]);
+        let [w, x, y, z] = model.quats[row].map(f64::from);
+        let up = glam::DQuat::from_xyzw(x, y, z, w) * DVec3::Z;
+        assert!(up.z.abs() > 0.999, "{up}");
+    }
+}
+
+#[test]
+fn the_rest_stays_and_every_run_is_the_same() {
+    let (first, rest) = filled(Under::Hidden);
+    let removed = labelgs::edit::remove(&model(DVec3::ZERO), &[1]).expect("rest");
+    assert_eq!(first.model.filtered(|row| row < rest), removed);
+    assert_eq!(first, filled(Under::Hidden).0);
+}
+
+#[test]
+fn nothing_covers_what_a_view_saw() {
+    let (Filled { model, .. }, rest) = filled(Under::Pit);
+    let new: Vec<DVec3> = (rest..model.len()).map(|row| model.world(row)).collect();
+    assert!(new.len() > 100, "{} Gaussians in the half that nobody saw", new.len());
+    for place in new {
+        assert!(place.x < CELL, "{place} covers the pit that every view saw");
+    }
+}
+
+#[test]
+fn without_surroundings_nothing_is_made_up() {
+    // The dome in empty space.
+    let mut sights: Vec<Sight> = cameras().into_iter().map(|camera| sight(camera, Under::Hidden)).collect();
+    for sight in &mut sights {
+        let labels = &sight.labels.ids;
+        sight.depth.iter_mut().zip(labels).filter(|(_, label)| **label == 0).for_each(|(depth, _)| *depth = 0.0);
+    }
+    let filled = fill(&model(DVec3::ZERO), &[1], &sights).expect("filled");
+    assert!(filled.added.is_empty(), "{:?}", filled.added);
+    let error = fill(&model(DVec3::ZERO), &[1], &[]).expect_err("no view");
+    assert!(error.to_string().contains("needs at least one view"), "{error}");
+    let error = fill(&model(DVec3::ZERO), &[7], &sights).expect_err("no such label");
+    assert!(error.to_string().contains("no Gaussian has label 7"), "{error}");
+}
