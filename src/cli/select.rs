@@ -140,8 +140,7 @@ fn filled(args: &SelectArgs, scene: &Path, model: &Gaussians, labels: &[u32], co
     let near = near_plane(&args.model, args.choice.prompts.near)?;
     let sizes = views.iter().map(|view| (view.camera.width, view.camera.height));
     let mut engine = Engine::of_model(open_gpu(context)?, model, sizes)?;
-    let own = model.labels.as_deref().unwrap_or(&[]);
-    fill(model, labels, &sights(&mut engine, own, &views, near)?)
+    fill(model, labels, &sights(&mut engine, &views, near)?)
 }
 
 fn listed(labels: &BTreeSet<u32>) -> Vec<u32> {

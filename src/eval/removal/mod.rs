@@ -28,15 +28,15 @@ pub trait RemovalTruth {
     fn shadowed(&self, id: u32, view: &View) -> Result<Option<Photo>>;
 }
 
-/// Renders what training views show of the model in the engine, for [`fill`]. `labels` are those of its Gaussians.
-pub fn sights(engine: &mut Engine, labels: &[u32], views: &[&View], near: f32) -> Result<Vec<Sight>> {
+/// Renders what training views show of the model in the engine, for [`fill`].
+pub fn sights(engine: &mut Engine, views: &[&View], near: f32) -> Result<Vec<Sight>> {
     let sight = |view: &&View| {
         let (width, height) = (view.camera.width, view.camera.height);
         let shrink = f64::from(SIGHT_SIDE) / f64::from(width.max(height));
         let size = |side: u32| if shrink < 1.0 { (f64::from(side) * shrink).round().max(1.0) as u32 } else { side };
         let camera = view.camera.resized(size(width), size(height));
-        let rendered = render(engine, &camera, &RenderOptions::new(near, Parts::ALL))?;
-        let (depth, labels) = (rendered.mean_depth()?, rendered.label_map(labels)?);
+        let rendered = render(engine, &camera, &RenderOptions::new(near, Parts { depth: true, ..Parts::LABELS }))?;
+        let (depth, labels) = (rendered.mean_depth()?, rendered.label_map()?);
         Ok(Sight { camera, rgb: rendered.rgb, depth, labels })
     };
     views.iter().map(sight).collect()
@@ -61,11 +61,11 @@ pub fn removals(
 ) -> Result<RemovalScores> {
     engine.upload_model(model)?;
     let own = model.labels.clone().unwrap_or_else(|| vec![0; model.len()]);
-    let sights = sights(engine, &own, train, options.near)?;
+    let sights = sights(engine, train, options.near)?;
     let mut paper = model.clone();
     label_by_lift(engine, &mut paper, train, (options.near, LIFT, 0))?;
     let voters: Vec<Voter> = views.iter().filter_map(|view| Some(Voter::of(view, view.mask.as_ref()?))).collect();
-    let ballot = sweep(engine, &voters, Sweep { near: options.near, border: 0 })?;
+    let ballot = sweep(engine, &voters, Sweep { near: options.near, border: 0, alone: false })?;
     let ids: BTreeSet<u16> = views.iter().filter_map(|view| view.mask.as_deref()).flat_map(LabelMap::objects).collect();
     let mut objects = BTreeMap::new();
     for id in ids {
