@@ -179,7 +179,7 @@ fn a_flag_has_one_heading() {
 }
 
 /// A value other than the default for each setting.
-const TYPED: [(&str, &str); 56] = [
+const TYPED: [(&str, &str); 57] = [
     ("--iterations", "7"),
     ("--max-resolution", "99"),
     ("--start-size", "0.7"),
