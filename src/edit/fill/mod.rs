@@ -1,8 +1,9 @@
 //! Closes what a removed object leaves open: its neighbours' surfaces are continued where no view ever looked.
 //!
 //! The views of the whole model say what was seen: a place on a surface is *seen* if a view shows it, *free* if a view
-//! looks through it, and *hidden* if it lies at or behind the removed object in every view that has it. Planes are fitted
-//! to what the views show around the object. New flat Gaussians stand on these planes, only at hidden places between seen
+//! looks through it, and a *hole* if it lies at or behind the removed object in the views that tell (a tenth of them may
+//! err, as they do at contours). Planes are fitted
+//! to what the views show around the object. New flat Gaussians stand on these planes, only in holes between seen
 //! ones, so that they cover nothing that a view has seen. Their colours continue those around them.
 
 mod evidence;
