@@ -146,7 +146,8 @@ impl TrainConfig {
         self.densify_from.unwrap_or(self.share(0.05).min(500))
     }
 
-    /// Returns the settings with what they leave to the size of the photos: budget, first size, first step at full size.
+    /// Returns the settings with what they leave open: by the size of the photos budget, first size and first step at
+    /// full size; and the steps between two with object layers.
     pub fn for_size(&self, (width, height): (u32, u32)) -> Self {
         let by_pixels = self.detail * f64::from(width) * f64::from(height);
         let by_steps = BUDGET_PER_STEP * f64::from(self.iterations);
@@ -156,7 +157,8 @@ impl TrainConfig {
         let resolved = (by_steps / by_pixels).min(1.0).sqrt();
         let derived = self.share(resolved * FULL_FROM + (1.0 - resolved) * FULL_FROM_LATEST);
         let full_size_from = Some(self.full_size_from.unwrap_or(derived));
-        Self { budget, start_size: Some(start_size), full_size_from, ..self.clone() }
+        let layer_every = Some(self.layer_every());
+        Self { budget, start_size: Some(start_size), full_size_from, layer_every, ..self.clone() }
     }
 
     /// Takes over what the beginning of a run has decided, where the settings leave it open.
@@ -165,6 +167,7 @@ impl TrainConfig {
         self.budget = if self.budget == 0 { then.budget } else { self.budget };
         self.start_size = self.start_size.or(then.start_size);
         self.full_size_from = self.full_size_from.or(then.full_size_from);
+        self.layer_every = self.layer_every.or(then.layer_every);
     }
 
     /// Returns the most Gaussians after a densification at `step`. It rises linearly from `start` to the budget.
