@@ -59,7 +59,9 @@ fn removals_are_scored_and_filled() {
     }
     let objects = (1..=3).map(|id| number(&format!("/objects/{id}/filled/psnr"))).sum::<f64>() / 3.0;
     assert!((number("/mean/filled/psnr") - objects).abs() < 1e-9);
-    assert!(number("/mean/filled/psnr_shadowed") > number("/mean/votes/psnr_shadowed"), "filling gains: {scores}");
+    // Against the world without the object. Its shadow is not in that truth, and the fill does not try to draw one.
+    assert!(number("/mean/filled/psnr") > number("/mean/votes/psnr") + 1.0, "filling gains: {scores}");
+    assert!(number("/mean/hole_filled") < 0.6 * number("/mean/hole"), "holes close: {scores}");
 
     let (plain, closed) = (folder.path().join("plain.ply"), folder.path().join("closed.ply"));
     succeeds(&["remove", &run, "--labels", "1", "-o", text(&plain)]);
