@@ -2,7 +2,7 @@
 
 use super::fixture::{Fixture, VOTE_COLUMNS, prove};
 use crate::reference::Rules;
-use crate::reference::lift::vote;
+use crate::reference::lift::{vote, vote_alone};
 use crate::support::compare::{Tolerance, check, close};
 use crate::support::device;
 use crate::support::scenes::{Scene, Shape, scene};
@@ -55,6 +55,29 @@ fn vote_sums_equal_the_mirror() {
         let expected = vote(rules, &splats, size, count, &columns, &weights);
         // Each tile's sum is rounded to 2^-16; a splat meets up to 30 tiles in each of three views.
         close(&actual, &expected, Tolerance { absolute: 90.0 * 0.5 / 65_536.0, relative: 1e-5 })
+    });
+}
+
+#[test]
+fn votes_alone_equal_the_mirror() {
+    let Some(turn) = device() else { return };
+    let mut fixture = Fixture::new(turn, patches(143), true);
+    fixture.render();
+    let (splats, size, count) = (fixture.splats(), fixture.size(), fixture.scene.gaussians.len());
+    let (mask, camera) = (mask_of(&fixture.scene), fixture.scene.camera.clone());
+    let voter = Voter { camera: &camera, mask: &mask, photo: None, trust: None };
+    let how = Sweep { near: fixture.config.near, border: 0, alone: true };
+    let ballot = sweep(&mut fixture.engine, &[voter], how).expect("votes");
+    let column = |id: &u16| ballot.labels.iter().position(|label| label == id);
+    let columns: Vec<Option<usize>> = mask.ids.iter().map(column).collect();
+    let labels = ballot.labels.len();
+    let actual = ballot.weights();
+    let seen = vote(&Rules::default(), &splats, size, count, &columns, &vec![1.0; labels]);
+    assert!(actual.iter().sum::<f64>() > 1.5 * seen.iter().sum::<f64>(), "most Gaussians hide each other");
+    prove("votes alone", &["alpha_min", "alpha_max"], |rules| {
+        let expected = vote_alone(rules, &splats, size, count, (&columns, labels));
+        // Each tile's sum is rounded to 2^-16; a splat meets up to 30 tiles.
+        close(&actual, &expected, Tolerance { absolute: 30.0 * 0.5 / 65_536.0, relative: 1e-5 })
     });
 }
 

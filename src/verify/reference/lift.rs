@@ -3,6 +3,7 @@
 use super::Rules;
 use super::blend::{Blended, centre, trace};
 use super::splat::Splat;
+use super::tile::exponent;
 use std::collections::BTreeMap;
 
 /// Votes of one view.
@@ -140,4 +141,26 @@ pub fn label_map(rules: &Rules, splats: &[Splat], labels: &[u32], size: (usize, 
         Labelled { label, weight: best, labels: sums.len(), margin }
     };
     (0..size.0 * size.1).map(pixel).collect()
+}
+
+/// Votes of one view as if nothing were in front of a Gaussian, `[N, columns]`, px: sums of alpha over the pixels of each
+/// column.
+pub fn vote_alone(
+    rules: &Rules,
+    splats: &[Splat],
+    size: (usize, usize),
+    count: usize,
+    (columns, labels): (&[Option<usize>], usize),
+) -> Vec<f64> {
+    let mut votes = vec![0.0; count * labels];
+    for (index, column) in columns.iter().enumerate() {
+        let Some(column) = *column else { continue };
+        for splat in splats {
+            let at = exponent(splat, centre(index, size.0));
+            if at >= rules.exponent_min() {
+                votes[splat.gaussian * labels + column] += at.exp2().min(rules.alpha_max);
+            }
+        }
+    }
+    votes
 }
