@@ -15,23 +15,31 @@ use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 use std::process::Output;
 
-fn labelgs(args: &[&str]) -> Output {
+/// Runs the program without the validation layer.
+pub fn labelgs(args: &[&str]) -> Output {
     let mut command = Command::cargo_bin("labelgs").expect("the tool is built");
     command.env("LABELGS_VALIDATION", "off").args(args).output().expect("it runs")
 }
 
+/// The JSON of a command that succeeds.
 #[track_caller]
-fn succeeds(args: &[&str]) -> Value {
+pub fn succeeds(args: &[&str]) -> Value {
     let output = labelgs(&[args, &["--json"]].concat());
     assert_eq!(output.status.code(), Some(0), "{args:?}: {}", String::from_utf8_lossy(&output.stderr));
     serde_json::from_slice(&output.stdout).expect("JSON alone on standard output")
 }
 
+/// The message of a command that ends with this status.
+#[track_caller]
+pub fn refused_with(args: &[&str], status: i32) -> String {
+    let output = labelgs(args);
+    assert_eq!(output.status.code(), Some(status), "{args:?}: {}", String::from_utf8_lossy(&output.stderr));
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
 #[track_caller]
 fn refused(args: &[&str]) -> String {
-    let output = labelgs(args);
-    assert_eq!(output.status.code(), Some(2), "{args:?}: {}", String::from_utf8_lossy(&output.stderr));
-    String::from_utf8_lossy(&output.stderr).into_owned()
+    refused_with(args, 2)
 }
 
 /// Opaque balls at these places, one label each from 1.

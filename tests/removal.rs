@@ -1,29 +1,9 @@
 //! `eval --removal` and `remove --fill` on a made scene, and their bad inputs.
 
-use assert_cmd::Command;
+use crate::cli_edit::{refused_with as refused, succeeds};
 use labelgs::io::{read_model, write_model};
 use serde_json::Value;
 use std::path::Path;
-use std::process::Output;
-
-fn labelgs(args: &[&str]) -> Output {
-    let mut command = Command::cargo_bin("labelgs").expect("the tool is built");
-    command.env("LABELGS_VALIDATION", "off").args(args).output().expect("it runs")
-}
-
-#[track_caller]
-fn succeeds(args: &[&str]) -> Value {
-    let output = labelgs(&[args, &["--json"]].concat());
-    assert_eq!(output.status.code(), Some(0), "{args:?}: {}", String::from_utf8_lossy(&output.stderr));
-    serde_json::from_slice(&output.stdout).expect("JSON alone on standard output")
-}
-
-#[track_caller]
-fn refused(args: &[&str], status: i32) -> String {
-    let output = labelgs(args);
-    assert_eq!(output.status.code(), Some(status), "{args:?}: {}", String::from_utf8_lossy(&output.stderr));
-    String::from_utf8_lossy(&output.stderr).into_owned()
-}
 
 fn text(path: &Path) -> &str {
     path.to_str().expect("UTF-8")

@@ -19,7 +19,7 @@
 //          Disagreement of pixel v with label L: E = sum of w d + T_end [L != 0], with d = [the splat's label is not L].
 //          It is one more channel with the colour d, a background of [L != 0], and gradients of opacities only.
 // Order:   fixed, bitwise reproducible.
-// Mirror:  src/verify/reference/blend.rs::blend_backward
+// Mirror:  src/verify/reference/blend.rs::blend_backward, disagreement.rs::disagreement
 
 READ1(0, StepUniforms, step);
 FETCHU(1, tile_starts);
