@@ -7,7 +7,6 @@ use super::values::{Size, bytes, count, size};
 use super::{stdout, wording};
 use crate::engine::{Engine, EngineSize, LabelSize, capacity};
 use crate::gpu::{self, GpuOptions};
-use crate::label::vote::ballot::COLUMNS_MAX;
 use crate::pass::{KernelShape, Variant, training_step};
 use crate::scheduler::plan::{
     Capacity, Grid, Limits, MemoryReport, Page, PassList, Plan, PlanOptions, TABLE, Touch, Work,
@@ -75,7 +74,7 @@ fn subject(args: &PlanArgs, context: &Context) -> Result<Subject> {
     let labels = (args.label_samples > 0).then(|| LabelSize {
         max_label: MAX_LABEL.max(args.label_samples),
         layers: args.label_samples,
-        vote_columns: COLUMNS_MAX,
+        vote_columns: MAX_LABEL.max(args.label_samples) + 1,
     });
     let size = (args.size.0, args.size.1);
     let room = EngineSize::new(args.gaussians.max(1), size).for_training().with_labels(labels);

@@ -23,6 +23,11 @@ pub struct GrownSizes {
     pub segments: u32,
 }
 
+/// Pairs (Gaussian, label) that one sweep of votes counts, of 8 bytes: 128 MiB.
+const VOTE_CELLS: u64 = 1 << 24;
+/// Labels that one sweep counts whatever the number of Gaussians.
+const VOTE_COLUMNS: u64 = 16;
+
 /// Returns initial capacities for `size`, before any measurement.
 pub fn capacity(shape: &KernelShape, size: &EngineSize) -> Capacity {
     let (width, height) = size.image;
@@ -45,8 +50,8 @@ pub fn capacity(shape: &KernelShape, size: &EngineSize) -> Capacity {
         labelled_tiles: if labels > 0 { tiles } else { 0 },
         label_tables: if labels > 0 { tiles * u64::from(LABEL_ROUNDS) } else { 0 },
         labels,
-        vote_columns: size.labels.map_or(0, |labels| u64::from(labels.vote_columns)),
-        vote_cells: size.labels.map_or(0, |labels| u64::from(labels.vote_columns)) * gaussians,
+        vote_columns: vote_columns(size),
+        vote_cells: vote_columns(size) * gaussians,
         layers: if labels > 0 { layers + 1 } else { 0 },
         occluder_words: label_words,
         loss_partials: u64::from(loss::partials(shape.subgroup, width, height)),
@@ -56,6 +61,12 @@ pub fn capacity(shape: &KernelShape, size: &EngineSize) -> Capacity {
     };
     derive(shape, &mut capacity, instances, size.trained);
     capacity
+}
+
+/// Returns the labels that one sweep of votes counts: all, if they fit in [`VOTE_CELLS`], and always [`VOTE_COLUMNS`].
+fn vote_columns(size: &EngineSize) -> u64 {
+    let fit = (VOTE_CELLS / size.gaussians.max(1)).max(VOTE_COLUMNS);
+    size.labels.map_or(0, |labels| u64::from(labels.vote_columns)).min(fit)
 }
 
 /// Sets the capacities that follow from the numbers of instances and of layer tiles.
@@ -79,6 +90,11 @@ fn widest(size: &EngineSize) -> Variant {
 }
 
 impl Engine {
+    /// Labels that one sweep of votes counts; 0 without memory for votes.
+    pub(crate) fn vote_columns(&self) -> usize {
+        vote_columns(&self.size) as usize
+    }
+
     /// Predicts the memory of an engine of this size, without allocating.
     #[doc(hidden)]
     pub fn predict(gpu: &Gpu, size: &EngineSize, options: SchedulerOptions) -> Result<MemoryReport> {

@@ -11,7 +11,8 @@ pub struct LabelSize {
     pub max_label: u32,
     /// Maximum number of objects sampled in one step.
     pub layers: u32,
-    /// Labels that one sweep of votes counts; 0 without votes.
+    /// Labels that votes are counted for, the background included; 0 without votes. Many labels of many Gaussians take
+    /// several sweeps ([`Engine::vote_columns`](super::Engine::vote_columns)).
     pub vote_columns: u32,
 }
 

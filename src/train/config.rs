@@ -171,7 +171,7 @@ crate::options::options! {
             /// Votes; the rule of the paper is `main`, which uses --label-threshold and --gpf.
             label_rule <"RULE">: LabelRule = LabelRule::Votes, fixed;
 
-            /// Steps between two counts of votes [default: a fifth of the run].
+            /// Steps between two counts of votes [default: half of the run].
             #[serde(skip_serializing_if = "Option::is_none")]
             vote_every <"STEPS">: Option<u32> = None, at_least(1);
 
@@ -236,7 +236,7 @@ crate::options::options! {
             /// Rendered depth. The label loss leaves out the pixels of objects in front.
             occlusion <"SOURCE">: Occlusion = Occlusion::Rendered, fixed;
 
-            /// Steps between two updates of the occluders [default: two fifths of the run].
+            /// Steps between two updates of the occluders [default: half of the run].
             #[serde(skip_serializing_if = "Option::is_none")]
             occlusion_every <"STEPS">: Option<u32> = None, at_least(1);
         }

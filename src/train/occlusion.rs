@@ -48,7 +48,7 @@ impl Trainer {
     }
 
     /// Updates the occluders from the rendered depth of every view with masks. Nothing may be in flight.
-    pub(super) fn refresh_occluders(&mut self) -> Result<()> {
+    pub fn refresh_occluders(&mut self) -> Result<()> {
         let options = RenderOptions { parts: Parts::DEPTH, ..self.render_options() };
         for index in 0..self.views.len() {
             let view = &self.views[index];

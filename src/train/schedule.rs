@@ -25,9 +25,10 @@ const PRUNE_AT: f64 = 0.55;
 
 /// Steps between two with object layers. Only these see the hidden parts of objects, and they cost up to twice as much.
 const LAYER_EVERY: u32 = 8;
-/// Shares of the run between two counts of votes, and between two searches for occluders. Both walk all views.
-const VOTE_EVERY: f64 = 0.2;
-const OCCLUSION_EVERY: f64 = 0.4;
+/// Shares of the run between two counts of votes, and between two searches for occluders. Both walk all views, so a run
+/// of default settings has one of each when labels start, and votes at the end.
+const VOTE_EVERY: f64 = 0.5;
+const OCCLUSION_EVERY: f64 = 0.5;
 
 /// Learning rates of a step.
 #[derive(Clone, Copy, Debug, PartialEq)]

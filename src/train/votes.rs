@@ -16,7 +16,7 @@ impl Trainer {
     }
 
     /// Counts the votes of all views and writes the labels to the device. Nothing may be in flight.
-    pub(super) fn refresh_labels(&mut self) -> Result<()> {
+    pub fn refresh_labels(&mut self) -> Result<()> {
         let decision = self.count_votes()?;
         self.engine.set_labels(&decision.labels)?;
         self.labelled_once = true;

@@ -8,7 +8,8 @@ use crate::support::device;
 use crate::support::scenes::{Scene, Shape, scene};
 use labelgs::internals::label::vote::ballot::{Sweep, Voter, sweep};
 use labelgs::internals::train::strategy::weights;
-use labelgs::scene::{LabelMap, Photo};
+use labelgs::label::vote_engine;
+use labelgs::scene::{LabelMap, Photo, View};
 use std::collections::BTreeMap;
 
 /// More labels than a walk counts and than the engine has columns for, many of them in one tile.
@@ -123,4 +124,24 @@ fn pixels_near_a_contour_do_not_vote() {
     let columns: Vec<Option<usize>> = (0..mask.ids.len()).map(column).collect();
     let expected = vote(&Rules::default(), &splats, size, count, &columns, &[1.0, 1.0]);
     check("votes", close(&actual, &expected, Tolerance { absolute: 30.0 * 0.5 / 65_536.0, relative: 1e-5 }));
+}
+
+/// As many columns as labels, more than a word has bits: the same votes as in sweeps of three labels.
+#[test]
+fn one_sweep_of_many_labels_equals_many_sweeps() {
+    let Some(turn) = device() else { return };
+    let scene = patches(144);
+    let mut mask = mask_of(&scene);
+    let width = mask.width as usize;
+    let patch = |index: usize| (index % width / 3 + 15 * (index / width / 3)) as u16;
+    mask.ids.iter_mut().enumerate().for_each(|(index, id)| *id = 7 * patch(index));
+    let view = View { name: "0.png".into(), camera: scene.camera.clone(), photo: None, mask: None };
+    let how = Sweep { near: 0.2, border: 0, alone: false };
+    let [few, many] = [3, 400].map(|columns| {
+        let mut engine = vote_engine(turn.gpu(), &scene.gaussians, &[&view], columns).expect("the engine starts");
+        sweep(&mut engine, &[Voter::of(&view, &mask)], how).expect("votes")
+    });
+    assert!(many.labels.len() > 150, "{} labels", many.labels.len());
+    assert!((0..many.len()).any(|row| many.row(row).len() > 64), "a Gaussian meets many labels");
+    assert!(few == many, "the votes differ");
 }

@@ -1,5 +1,6 @@
 //! Steps of several trainings, timed in turn, so that a busy machine is equally busy for all of them.
 
+use super::measure::timed;
 use super::trained::{timed_step, timing_config};
 use labelgs::gpu::Gpu;
 use labelgs::internals::pass::Stage;
@@ -38,10 +39,9 @@ pub struct Pace {
 
 impl Pace {
     /// Starts a training from `model`, without densification, and with labels from the first step if there are masks.
-    pub fn new(name: &str, gpu: &Arc<Gpu>, dataset: Dataset, model: &Gaussians, label_samples: u32) -> Result<Self> {
+    pub fn new(name: &str, gpu: &Arc<Gpu>, dataset: Dataset, model: &Gaussians) -> Result<Self> {
         // Bands of colour come in as in any training.
-        let sh_degree_interval = Some(1000);
-        let config = TrainConfig { label_samples: label_samples.max(1), sh_degree_interval, ..timing_config() };
+        let config = TrainConfig { sh_degree_interval: Some(1000), ..timing_config() };
         let options = SchedulerOptions { timestamps: true, ..SchedulerOptions::default() };
         let mut trainer = Trainer::new(Arc::clone(gpu), config, &dataset, model, options)?;
         trainer.keep_times();
@@ -58,6 +58,25 @@ impl Pace {
             instances: Vec::new(),
             items: 0,
         })
+    }
+
+    /// Does what a run of default settings does for labels besides its steps, and returns the processor time, ms: votes
+    /// and occluders when labels start, and votes at the end.
+    pub fn sweeps(&mut self) -> Result<f64> {
+        if !self.trainer.has_labels() {
+            return Ok(0.0);
+        }
+        // The driver compiles in the first round.
+        let mut cpu = 0.0;
+        for _ in 0..2 {
+            let (_, cost) = timed(|| {
+                self.trainer.refresh_labels()?;
+                self.trainer.refresh_occluders()?;
+                self.trainer.labelled_model()
+            })?;
+            cpu = cost.cpu;
+        }
+        Ok(cpu)
     }
 
     /// Runs one step and waits for it. Steps in which the driver compiles are not counted.

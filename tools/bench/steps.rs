@@ -1,6 +1,7 @@
-//! Cost of a step with labels relative to one without, by the area of masks and by the number of objects.
+//! Cost of labels relative to the same steps without masks, by the area of the masks and by the number of objects: of the
+//! steps, and of the whole part of a run that has labels, with its votes and occluders.
 
-use super::measure::{median, write_json};
+use super::measure::write_json;
 use super::pace::{Pace, race};
 use super::trained::{TEST_EVERY, plain_model, without_masks};
 use super::{Common, device};
@@ -15,12 +16,16 @@ use labelgs::synth::SynthOptions;
 use serde_json::{Value, json};
 use std::sync::Arc;
 
+/// Steps with labels in a run of 3,000 steps.
+const LABEL_STEPS: f64 = 1200.0;
+
 /// Sizes of a run.
 struct Size {
-    /// Size of the training pictures; the second table has twice the width and height.
+    /// Size of the training pictures.
     picture: (u32, u32),
     views: u32,
     training: u32,
+    /// Timed steps of each; a multiple of the steps between two with object layers.
     timed: usize,
     objects: [usize; 2],
 }
@@ -28,17 +33,16 @@ struct Size {
 /// Runs it.
 pub fn run(common: &Common) -> Result<()> {
     let size = if common.small {
-        Size { picture: (48, 40), views: 9, training: 20, timed: 2, objects: [3, 12] }
+        Size { picture: (48, 40), views: 9, training: 20, timed: 8, objects: [3, 12] }
     } else {
-        Size { picture: (320, 240), views: 40, training: 1500, timed: 60, objects: [10, 100] }
+        Size { picture: (320, 240), views: 40, training: 1500, timed: 64, objects: [10, 500] }
     };
     let gpu = device::open()?;
     let options =
         SynthOptions { width: size.picture.0, height: size.picture.1, views: size.views, ..Default::default() };
     let model = plain_model(&gpu, &options, size.training)?;
     let first = by_area(&gpu, &options, &model, size.timed)?;
-    let larger = SynthOptions { width: 2 * options.width, height: 2 * options.height, ..options };
-    let second = by_number(&gpu, &larger, &model, &size)?;
+    let second = by_number(&gpu, &options, &model, &size)?;
     write_json(
         &common.output.join("steps.json"),
         &json!({ "schema_version": 1, "by_area": first, "by_number": second }),
@@ -57,20 +61,20 @@ fn by_area(gpu: &Arc<Gpu>, options: &SynthOptions, model: &Gaussians, timed: usi
         mask.ids.iter_mut().filter(|id| **id == 0).for_each(|id| *id = ground);
     }
     let paces = vec![
-        Pace::new("no masks", gpu, without_masks(&made), model, 0)?,
-        Pace::new(&format!("masks cover {:.0} %", share * 100.0), gpu, made, model, u32::from(ground))?,
-        Pace::new("masks cover everything", gpu, whole, model, u32::from(ground))?,
+        Pace::new("no masks", gpu, without_masks(&made), model)?,
+        Pace::new(&format!("masks cover {:.0} %", share * 100.0), gpu, made, model)?,
+        Pace::new("masks cover everything", gpu, whole, model)?,
     ];
     table(paces, timed, (options.width, options.height), model)
 }
 
-/// Divides the same space among few and among many objects, all of them in the loss.
+/// Divides the same space among few and among many objects.
 fn by_number(gpu: &Arc<Gpu>, options: &SynthOptions, model: &Gaussians, size: &Size) -> Result<Vec<Value>> {
     let made = synth::dataset(options, TEST_EVERY);
-    let mut paces = vec![Pace::new("no masks", gpu, without_masks(&made), model, 0)?];
+    let mut paces = vec![Pace::new("no masks", gpu, without_masks(&made), model)?];
     for objects in size.objects {
         let divided = divided(gpu, &made, model, objects)?;
-        paces.push(Pace::new(&format!("{objects} objects"), gpu, divided, model, objects as u32)?);
+        paces.push(Pace::new(&format!("{objects} objects"), gpu, divided, model)?);
     }
     table(paces, size.timed, (options.width, options.height), model)
 }
@@ -119,29 +123,34 @@ fn divide(rows: &mut [usize], means: &[[f32; 3]], parts: usize, next: &mut u32, 
 
 fn table(mut paces: Vec<Pace>, timed: usize, (width, height): (u32, u32), model: &Gaussians) -> Result<Vec<Value>> {
     race(&mut paces, timed)?;
+    // A mean, because a few steps have object layers.
     let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
-    let (plain, scene_pairs) = (median(paces[0].passes.iter().copied()), mean(&paces[0].pairs));
+    let plain = (mean(&paces[0].passes), mean(&paces[0].processor), mean(&paces[0].pairs));
     println!("{} Gaussians, {width} x {height} px, {timed} steps of each in turn", model.len());
     println!(
-        "{:<24} {:>9} {:>9} {:>9} {:>7} {:>9} {:>12}",
-        "", "passes ms", "ratio", "cpu ms", "items", "pairs/px", "object/scene"
+        "{:<24} {:>9} {:>7} {:>9} {:>9} {:>10} {:>9} {:>9} {:>12}",
+        "", "passes ms", "ratio", "cpu ms", "ratio", "sweeps ms", "ratio", "pairs/px", "object/scene"
     );
     let mut rows = Vec::new();
-    for pace in &paces {
-        let (passes, processor, pairs) =
-            (median(pace.passes.iter().copied()), median(pace.processor.iter().copied()), mean(&pace.pairs));
-        let (ratio, objects) = (passes / plain, pairs / scene_pairs - 1.0);
+    for pace in &mut paces {
+        let sweeps = pace.sweeps()?;
+        let (passes, processor, pairs) = (mean(&pace.passes), mean(&pace.processor), mean(&pace.pairs));
+        let (ratio, cpu_ratio, objects) = (passes / plain.0, processor / plain.1, pairs / plain.2 - 1.0);
+        let phase_ratio = (LABEL_STEPS * processor + sweeps) / (LABEL_STEPS * plain.1);
         let per_pixel = pairs / (f64::from(width) * f64::from(height));
         println!(
-            "{:<24} {passes:>9.2} {ratio:>9.2} {processor:>9.1} {:>7} {per_pixel:>9.1} {objects:>12.2}",
-            pace.name, pace.items
+            "{:<24} {passes:>9.2} {ratio:>7.2} {processor:>9.1} {cpu_ratio:>9.2} {sweeps:>10.0} {phase_ratio:>9.3} \
+             {per_pixel:>9.1} {objects:>12.2}",
+            pace.name
         );
         rows.push(json!({
             "name": pace.name, "size": [width, height], "gaussians": model.len(), "passes_ms": passes, "ratio": ratio,
-            "processor_ms": processor, "wall_ms": median(pace.wall.iter().copied()), "items": pace.items, "pairs": pairs,
-            "object_pairs_by_scene_pairs": objects,
+            "processor_ms": processor, "processor_ratio": cpu_ratio, "sweeps_ms": sweeps, "phase_ratio": phase_ratio,
+            "wall_ms": mean(&pace.wall), "pairs": pairs, "object_pairs_by_scene_pairs": objects,
         }));
     }
-    println!();
+    println!(
+        "the last ratio: {LABEL_STEPS} steps with the sweeps of votes and occluders, by {LABEL_STEPS} steps without masks\n"
+    );
     Ok(rows)
 }

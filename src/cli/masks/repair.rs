@@ -11,8 +11,7 @@ use crate::io::atomic;
 use crate::io::label_table::{FILE, LabelEntry, LabelTable};
 use crate::label::masks::agree::{Agreement, agree};
 use crate::label::masks::repair::Repairs;
-use crate::label::vote::ballot::COLUMNS_MAX;
-use crate::label::vote::model::vote_engine;
+use crate::label::vote::model::{columns_of, vote_engine};
 use crate::scene::{LabelMap, View};
 use crate::{Error, Result};
 use clap::Args;
@@ -75,7 +74,7 @@ pub(crate) fn run(args: &RepairArgs, context: &Context) -> Result<()> {
             return Err(Error::data(&args.scene, &view.name, problem));
         }
     }
-    let mut engine = vote_engine(open_gpu(context)?, &model, &views, COLUMNS_MAX)?;
+    let mut engine = vote_engine(open_gpu(context)?, &model, &views, columns_of(&views))?;
     let mut progress = Progress::new(2 * views.len() as u64, "views", &context.global);
     let mut done = 0;
     let mut tick = || {

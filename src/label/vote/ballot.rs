@@ -15,8 +15,6 @@ use std::collections::{BTreeMap, BTreeSet};
 
 /// Number of labels that one walk over a tile counts (glsl/lift/vote.comp).
 const LABELS_PER_WALK: usize = 4;
-/// Most labels per sweep; more labels take more sweeps. It bounds memory at 128 bytes per Gaussian.
-pub(crate) const COLUMNS_MAX: u32 = 16;
 
 /// A view that votes.
 #[derive(Clone, Copy, Debug)]
@@ -98,15 +96,16 @@ impl Ballot {
     }
 }
 
-/// Returns the number of vote columns that an engine needs for `objects` objects.
+/// Returns the number of vote columns for `objects` objects and the background.
 pub(crate) fn columns_for(objects: usize) -> u32 {
-    (objects as u32 + 1).min(COLUMNS_MAX)
+    objects as u32 + 1
 }
 
 /// Counts the votes of all views for the model in the engine. The engine needs memory for votes
-/// ([`LabelSize::vote_columns`](crate::engine::LabelSize)), and nothing may be in flight.
+/// ([`LabelSize::vote_columns`](crate::engine::LabelSize)), and nothing may be in flight. All labels are counted in one
+/// walk over the views if the engine has a column for each, otherwise in as many as needed.
 pub fn sweep(engine: &mut Engine, voters: &[Voter], how: Sweep) -> Result<Ballot> {
-    let room = engine.size().labels.map_or(0, |room| room.vote_columns) as usize;
+    let room = engine.vote_columns();
     if room == 0 {
         return Err(Error::Bug("the engine has no memory for votes".to_owned()));
     }
@@ -161,17 +160,16 @@ fn columns_of(voter: &Voter, chunk: &[u16], border: u32) -> Vec<u32> {
 
 /// Returns the largest number of distinct columns in a tile.
 fn most_labels(columns: &[u32], width: u32, tile_width: u32, tile_height: u32) -> usize {
-    let tiles_x = width.div_ceil(tile_width) as usize;
-    let height = columns.len() / width.max(1) as usize;
-    // One bit per column; there are at most COLUMNS_MAX.
-    let mut seen = vec![0_u32; tiles_x * height.div_ceil(tile_height as usize)];
-    for (y, row) in columns.chunks_exact(width as usize).enumerate() {
-        for (x, &column) in row.iter().enumerate().filter(|(_, column)| **column != VOTE_NONE) {
-            let tile = y / tile_height as usize * tiles_x + x / tile_width as usize;
-            seen[tile] |= 1 << column;
-        }
+    let mut most = 0;
+    for rows in columns.chunks((width * tile_height).max(1) as usize) {
+        let tiles = (0..width).map(|x| x / tile_width).cycle();
+        let mut found: Vec<(u32, u32)> = tiles.zip(rows.iter().copied()).filter(|at| at.1 != VOTE_NONE).collect();
+        found.dedup();
+        found.sort_unstable();
+        found.dedup();
+        most = found.chunk_by(|a, b| a.0 == b.0).map(<[_]>::len).max().unwrap_or(0).max(most);
     }
-    seen.iter().map(|bits| bits.count_ones() as usize).max().unwrap_or(0)
+    most
 }
 
 /// Converts a number of votes to blending weight, px.

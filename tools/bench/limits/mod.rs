@@ -123,7 +123,7 @@ pub fn run(common: &Common) -> Result<()> {
     );
     let model = plain_model(&gpu, &options, training)?;
     let dataset = without_masks(&synth::dataset(&options, TEST_EVERY));
-    let mut paces = [Pace::new("plain step", &gpu, dataset, &model, 0)?];
+    let mut paces = [Pace::new("plain step", &gpu, dataset, &model)?];
     race(&mut paces, timed)?;
     let [pace] = &paces;
     let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
