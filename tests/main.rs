@@ -43,6 +43,7 @@ mod labels; // label rules of the paper, on the mirrors
 mod metrics; // PSNR, SSIM, IoU and boundary scores
 mod mirror_mutants; // a wrong constant in a mirror fails its checks
 mod mirrors; // mirrors against closed forms and brute force
+mod near_things; // rules against fog spare things that are near
 mod observer; // watching, pausing and stopping a run change no bit
 mod occlusion; // which object hides which
 mod output; // files of rendered pictures
