@@ -80,6 +80,7 @@ pub mod label;
 mod options;
 mod pass;
 pub mod render;
+mod report;
 pub mod run;
 pub mod scene;
 mod scheduler;

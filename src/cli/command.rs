@@ -16,6 +16,7 @@ use super::profile::ProfileArgs;
 use super::recolour::RecolourArgs;
 use super::relabel::RelabelArgs;
 use super::render::RenderArgs;
+use super::report::ReportArgs;
 use super::select::{ExtractArgs, RemoveArgs};
 use super::selftest::SelftestArgs;
 use super::split_components::SplitArgs;
@@ -64,6 +65,10 @@ pub enum Command {
     ///
     /// Example: labelgs eval out --scene scene --masks scene/masks
     Eval(Box<EvalArgs>),
+    /// Write the report of a training anew, or compare several trainings in one page.
+    ///
+    /// Example: labelgs report out
+    Report(ReportArgs),
     /// Show the labels of a model: Gaussians, position, size and name of each.
     ///
     /// Example: labelgs list out

@@ -5,9 +5,14 @@ use super::wording;
 use crate::Error;
 use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::{IsTerminal, Write};
-use std::sync::LazyLock;
+use std::sync::{LazyLock, Mutex};
 use std::time::{Duration, Instant};
-use tracing_subscriber::EnvFilter;
+use tracing::Level;
+use tracing::field::{Field, Visit};
+use tracing_subscriber::filter::Targets;
+use tracing_subscriber::layer::{Context, SubscriberExt};
+use tracing_subscriber::util::SubscriberInitExt;
+use tracing_subscriber::{EnvFilter, Layer};
 
 /// All progress bars of the process.
 static BARS: LazyLock<MultiProgress> =
@@ -32,6 +37,40 @@ impl Write for AboveBars {
     }
 }
 
+/// Most warnings that are kept.
+const WARNINGS_MAX: usize = 2000;
+
+/// The warnings of this process, for reports.
+static WARNINGS: Mutex<Vec<String>> = Mutex::new(Vec::new());
+
+/// Returns the text of all warnings so far.
+pub(crate) fn warnings() -> Vec<String> {
+    WARNINGS.lock().map(|kept| kept.clone()).unwrap_or_default()
+}
+
+/// Keeps warnings.
+struct Keep;
+
+impl<S: tracing::Subscriber> Layer<S> for Keep {
+    fn on_event(&self, event: &tracing::Event<'_>, _: Context<'_, S>) {
+        struct Message(String);
+        impl Visit for Message {
+            fn record_debug(&mut self, field: &Field, value: &dyn std::fmt::Debug) {
+                if field.name() == "message" {
+                    self.0 = format!("{value:?}");
+                }
+            }
+        }
+        let mut message = Message(String::new());
+        event.record(&mut message);
+        if let Ok(mut kept) = WARNINGS.lock()
+            && kept.len() < WARNINGS_MAX
+        {
+            kept.push(wording::message(&message.0));
+        }
+    }
+}
+
 /// Starts logging; `RUST_LOG` overrides the flags. Later calls do nothing.
 pub(crate) fn start(args: &GlobalArgs) {
     let level = match (args.quiet, args.verbose) {
@@ -42,12 +81,11 @@ pub(crate) fn start(args: &GlobalArgs) {
     };
     let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new(level));
     let colour = std::io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none_or(|value| value.is_empty());
-    let started = tracing_subscriber::fmt()
-        .with_env_filter(filter)
-        .with_writer(|| AboveBars)
-        .with_ansi(colour)
-        .with_target(false)
-        .without_time()
+    let shown = tracing_subscriber::fmt::layer().with_writer(|| AboveBars).with_ansi(colour).with_target(false);
+    let own = Targets::new().with_target("labelgs", Level::WARN);
+    let started = tracing_subscriber::registry()
+        .with(shown.without_time().with_filter(filter))
+        .with(Keep.with_filter(own))
         .try_init();
     // A second start in one process, as in tests, keeps the first logger.
     drop(started);

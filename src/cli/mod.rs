@@ -7,6 +7,7 @@ pub(crate) mod choose;
 pub(crate) mod command;
 pub(crate) mod context;
 pub(crate) mod densify;
+mod device_report;
 pub(crate) mod devices;
 pub(crate) mod eval;
 pub(crate) mod interrupt;
@@ -25,7 +26,7 @@ mod profile_report;
 pub(crate) mod recolour;
 pub(crate) mod relabel;
 pub(crate) mod render;
-mod report;
+pub(crate) mod report;
 pub(crate) mod scene;
 pub(crate) mod select;
 pub(crate) mod selftest;
@@ -114,6 +115,7 @@ fn run(args: Vec<OsString>) -> Result<(), Exit> {
         Command::Merge(args) => merge::run(&args, &context),
         Command::SplitComponents(args) => split_components::run(&args, &context),
         Command::Eval(args) => eval::run(&args, &context),
+        Command::Report(args) => report::run(&args, &context),
         Command::Densify(args) => densify::run(&args, &context),
         Command::Occlusion(args) => occlusion::run(&args, &context),
         Command::Synth(args) => synth::run(&args, &context),

@@ -4,7 +4,7 @@ use super::args::JsonFlag;
 use super::context::Context;
 use super::devices::{needs_json, needs_text, shape_json, shape_text};
 use super::scene::open_gpu;
-use super::{report, stdout};
+use super::{device_report, stdout};
 use crate::pass::KernelShape;
 use crate::verify::selftest::{self, Check};
 use crate::{Error, Result};
@@ -29,7 +29,7 @@ pub(crate) fn run(args: &SelftestArgs, context: &Context) -> Result<()> {
     let Some(file) = &args.report else { return checked(args, context, &mut Vec::new()) };
     let mut checks = Vec::new();
     let outcome = checked(args, context, &mut checks);
-    crate::io::atomic::write_json(file, &report::report(&checks, outcome.as_ref().err(), context)?)?;
+    crate::io::atomic::write_json(file, &device_report::report(&checks, outcome.as_ref().err(), context)?)?;
     tracing::info!("wrote {}; please send it to the authors of labelgs", file.display());
     outcome
 }

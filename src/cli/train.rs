@@ -1,7 +1,7 @@
 //! `labelgs train`.
 
 use super::context::Context;
-use super::log::Progress;
+use super::log::{self, Progress};
 use super::scene::open_gpu;
 use super::train_args::TrainArgs;
 use super::{interrupt, stdout};
@@ -12,18 +12,40 @@ use crate::run::{self, Event, Flow, Live, Observer, Request, Settings, Summary};
 pub(crate) fn run(args: &TrainArgs, context: &Context) -> Result<()> {
     let settings = |checkpoint: Option<&Settings>| args.how.settings(checkpoint);
     let request = args.how.request((&args.scene, &args.output), args.masks.clone(), &settings)?;
-    let summary = train(&request, context)?;
+    let summary = train(request, context)?;
     if context.json || args.json.json {
         return stdout::print_json(&summary.to_json());
     }
     stdout::print(&sentence(&summary))
 }
 
+/// Returns the command line as a shell would read it.
+fn typed() -> String {
+    let plain = |c: char| c.is_ascii_alphanumeric() || "-_./=:,+@%".contains(c);
+    let words = std::env::args_os().enumerate().map(|(index, word)| {
+        let word = word.to_string_lossy();
+        match index {
+            // Where the program lies tells nothing.
+            0 => "labelgs".to_owned(),
+            _ if !word.is_empty() && word.chars().all(plain) => word.into_owned(),
+            _ => format!("'{}'", word.replace('\'', "'\\''")),
+        }
+    });
+    words.collect::<Vec<_>>().join(" ")
+}
+
 /// Trains with progress on the terminal. A signal ends the run after it saved its state.
-pub(super) fn train(request: &Request, context: &Context) -> Result<Summary> {
+pub(super) fn train(request: Request, context: &Context) -> Result<Summary> {
     let open = || {
         interrupt::check()?;
         open_gpu(context)
+    };
+    let warnings = || log::warnings();
+    let request = &Request {
+        command: Some(typed()),
+        warnings: Some(&warnings),
+        warned_before: log::warnings().len(),
+        ..request
     };
     let summary = run::train(request, &open, &mut Terminal { context, progress: None })?;
     if summary.stopped { interrupt::check().map(|()| summary) } else { Ok(summary) }

@@ -1,7 +1,7 @@
 //! Scored pictures beside their ground truth, for display.
 
 use crate::Result;
-use crate::scene::Photo;
+use crate::scene::{LabelMap, Photo};
 
 /// A scored picture.
 #[derive(Clone, Debug)]
@@ -14,6 +14,10 @@ pub struct Compared<'a> {
     pub photo: &'a Photo,
     /// The picture, r, g, b, not clamped, row-major.
     pub rgb: &'a [[f32; 3]],
+    /// Label map of the picture, of a whole view.
+    pub labels: Option<&'a LabelMap>,
+    /// Mask of the view, for its label map.
+    pub truth: Option<&'a LabelMap>,
     /// Predicted and ground-truth mask of the object, row-major.
     pub masks: Option<(&'a [bool], &'a [bool])>,
     /// Scores with their names.
@@ -25,7 +29,12 @@ pub struct Compared<'a> {
 impl<'a> Compared<'a> {
     /// Makes an entry for a whole view, without scores.
     pub fn new(view: &'a str, photo: &'a Photo, rgb: &'a [[f32; 3]]) -> Self {
-        Self { view, object: None, photo, rgb, masks: None, numbers: Vec::new(), note: String::new() }
+        Self { view, object: None, photo, rgb, labels: None, truth: None, masks: None, numbers: Vec::new(), note: String::new() }
+    }
+
+    /// Returns a score by its name.
+    pub fn number(&self, name: &str) -> Option<f64> {
+        self.numbers.iter().find(|number| number.0 == name)?.1
     }
 }
 

@@ -77,7 +77,8 @@ pub fn evaluate(
             score.regions = Some(RegionScores::new(&rendered.rgb, photo(view)?, view.mask.as_deref(), &seen));
         }
         let numbers = vec![("PSNR", Some(score.psnr)), ("SSIM", Some(score.ssim))];
-        watch.see(&Compared { numbers, ..Compared::new(&view.name, photo(view)?, &rendered.rgb) })?;
+        let (labels, truth) = (map.as_ref(), view.mask.as_deref());
+        watch.see(&Compared { numbers, labels, truth, ..Compared::new(&view.name, photo(view)?, &rendered.rgb) })?;
         scores.push(score);
         hidden.push(hidden_by(view.mask.as_deref(), &rendered)?);
     }

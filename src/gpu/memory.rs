@@ -7,6 +7,7 @@ use ash::vk;
 use gpu_allocator::vulkan::{Allocation, AllocationCreateDesc, AllocationScheme};
 use gpu_allocator::{AllocationError, MemoryLocation};
 use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Users of a buffer's memory.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -17,6 +18,31 @@ pub(crate) enum MemoryKind {
     Upload,
     /// Written by the device, read by the host.
     Download,
+}
+
+/// Bytes of all buffers.
+#[derive(Debug, Default)]
+pub(super) struct Used {
+    now: AtomicU64,
+    peak: AtomicU64,
+}
+
+impl Used {
+    fn add(&self, bytes: u64) {
+        let now = self.now.fetch_add(bytes, Ordering::Relaxed) + bytes;
+        self.peak.fetch_max(now, Ordering::Relaxed);
+    }
+
+    fn subtract(&self, bytes: u64) {
+        self.now.fetch_sub(bytes, Ordering::Relaxed);
+    }
+}
+
+impl Gpu {
+    /// Returns the most bytes that all buffers had together since the device was opened.
+    pub fn peak_memory(&self) -> u64 {
+        self.used.peak.load(Ordering::Relaxed)
+    }
 }
 
 /// A buffer with its memory; freed when dropped.
@@ -60,6 +86,7 @@ impl Buffer {
         };
         let allocation = allocated.map_err(|error| buffer.refused(error))?;
         let allocation = buffer.allocation.insert(allocation);
+        gpu.used.add(allocation.size());
         // SAFETY: new memory of the right type and size; nothing else is bound to it or to the buffer.
         vk_call("vkBindBufferMemory", || unsafe {
             gpu.raw().bind_buffer_memory(handle, allocation.memory(), allocation.offset())
@@ -143,6 +170,7 @@ impl Drop for Buffer {
         // SAFETY: created by this device; the scheduler waits for the device before it drops buffers.
         unsafe { self.gpu.raw().destroy_buffer(self.handle, None) };
         if let (Some(allocation), Some(allocator)) = (self.allocation.take(), lock(&self.gpu.allocator).as_mut()) {
+            self.gpu.used.subtract(allocation.size());
             // Freeing only fails for memory of another allocator.
             let _ = allocator.free(allocation);
         }

@@ -88,6 +88,7 @@ impl GpuOptions {
 pub struct Gpu {
     pipelines: Mutex<HashMap<PipelineKey, Arc<Pipeline>>>,
     allocator: Mutex<Option<Allocator>>,
+    used: memory::Used,
     queue: Mutex<vk::Queue>,
     names: Option<ash::ext::debug_utils::Device>,
     statistics: Option<statistics::Functions>,
@@ -127,6 +128,7 @@ impl Gpu {
             pipelines: Mutex::new(HashMap::new()),
             cache: Mutex::new(cache),
             allocator: Mutex::new(Some(allocator)),
+            used: memory::Used::default(),
             queue: Mutex::new(queue),
             names,
             statistics,

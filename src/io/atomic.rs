@@ -103,7 +103,7 @@ fn fill(file: &File, body: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> io:
 }
 
 /// A file whose writes can be made to fail, for tests.
-struct Fallible<'a>(&'a File);
+pub(super) struct Fallible<'a>(pub(super) &'a File);
 
 impl Write for Fallible<'_> {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {

@@ -4,6 +4,7 @@
 //! [`read_photo`] and [`read_mask`] for single images, [`read_camera`] for a camera. [`initial_gaussians`] makes the
 //! first Gaussians of a scene. [`capture`] looks for faults of photos and poses. [`masks`] imports and checks whole folders of masks. All writes are atomic.
 
+pub(crate) mod append;
 pub(crate) mod atomic;
 mod bad_photos;
 pub(crate) mod camera_json;

@@ -1,5 +1,6 @@
 //! The checkpoints that a run writes.
 
+use super::history::{Recorder, Sums};
 use super::resume::Record;
 use crate::error::{Error, Result};
 use crate::io::checkpoint_folder;
@@ -46,27 +47,28 @@ impl Checkpoints {
         every > 0 && (step.is_multiple_of(every) || step == last)
     }
 
-    /// Puts the training back to its last whole checkpoint after the failure `reason`. Returns false if there is none.
-    pub(super) fn restore(&mut self, trainer: &mut Trainer, reason: &Error) -> Result<bool> {
+    /// Puts the training back to its last whole checkpoint after the failure `reason`. Returns its step and the sums of
+    /// its history, none if there is no checkpoint.
+    pub(super) fn restore(&mut self, trainer: &mut Trainer, reason: &Error) -> Result<Option<(u32, Sums)>> {
         while let Some(path) = self.kept.last() {
-            match TrainState::read(path) {
-                Ok(state) => {
+            match TrainState::read(path).and_then(|state| Ok((Record::of(&state)?, state))) {
+                Ok((record, state)) => {
                     tracing::warn!("{reason}; training goes back to {}", path.display());
                     trainer.restore(&state)?;
                     self.step = state.step;
-                    return Ok(true);
+                    return Ok(Some((state.step, record.history)));
                 }
                 Err(error) => tracing::warn!("{error}; the checkpoint before it is tried"),
             }
             self.kept.pop();
         }
-        Ok(false)
+        Ok(None)
     }
 
     /// Writes the checkpoint that is due. A failed write or listing is only a warning: the next one may succeed.
-    pub(super) fn save_due(&mut self, trainer: &mut Trainer) -> Result<Option<PathBuf>> {
+    pub(super) fn save_due(&mut self, trainer: &mut Trainer, history: &mut Recorder) -> Result<Option<PathBuf>> {
         self.hold_folder()?;
-        match self.save(trainer) {
+        match self.save(trainer, history) {
             Err(error @ (Error::Write { .. } | Error::Read { .. })) => {
                 let last = self.kept.last().map_or("there is none yet".to_owned(), |path| path.display().to_string());
                 tracing::warn!("{error}; training goes on, the last checkpoint is: {last}");
@@ -76,12 +78,15 @@ impl Checkpoints {
         }
     }
 
-    /// Writes a checkpoint unless this step has one. Deletes old ones after the new one is complete.
-    pub(super) fn save(&mut self, trainer: &mut Trainer) -> Result<Option<PathBuf>> {
+    /// Writes a checkpoint unless this step has one. Deletes old ones after the new one is complete. Nothing may be in
+    /// flight, so that the history has all steps.
+    pub(super) fn save(&mut self, trainer: &mut Trainer, history: &mut Recorder) -> Result<Option<PathBuf>> {
         let step = trainer.steps_done();
         if step == self.step {
             return Ok(None);
         }
+        history.sync();
+        self.record.history = history.unfinished();
         let mut state = trainer.state()?;
         state.run = serde_json::to_value(&self.record).map_err(|error| Error::Bug(format!("checkpoint: {error}")))?;
         let path = checkpoint_folder::next(&self.out, step)?;

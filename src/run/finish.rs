@@ -1,10 +1,12 @@
 //! The records of a run in its folder, and the scores at its end.
 
-use super::{Event, Run, Summary, models, preview};
+use super::history::{Entry, Scored};
+use super::pictures::Worst;
+use super::{Event, Run, Summary, info, models, objects, preview, report};
 use crate::edit::select::MIN_LABEL_CONFIDENCE;
 use crate::error::Result;
 use crate::eval::evaluate::{Rendering, evaluate};
-use crate::eval::scores::Scores;
+use crate::eval::scores::{MeanScores, Scores};
 use crate::io::label_table::{self, LabelTable};
 use crate::io::occlusion_table::{self, OcclusionTable};
 use crate::io::{atomic, run_folder};
@@ -53,6 +55,7 @@ impl Run<'_> {
             label_loss: last.map(|report| report.label_loss),
             model,
             scores: None,
+            objects: Vec::new(),
             stopped: false,
         }
     }
@@ -70,7 +73,9 @@ impl Run<'_> {
             summary.scores = self.score(model)?;
         }
         summary.stopped = self.stopped;
+        summary.objects = objects::of(model, self.names.as_ref(), summary.scores.as_ref());
         summary.write(&self.request.output)?;
+        self.finish_records(summary)?;
         let is_kept = kept?;
         if self.stopped {
             let further = if is_kept { "the run can go on from its checkpoint" } else { "only the scores are missing" };
@@ -82,6 +87,23 @@ impl Run<'_> {
             self.tell(Event::Evaluated(scores))?;
         }
         self.tell(Event::Done(summary))
+    }
+
+    /// Ends the history and `run.json`, and writes the report.
+    fn finish_records(&mut self, summary: &Summary) -> Result<()> {
+        if let Some(scores) = &summary.scores {
+            let MeanScores { psnr, ssim, objects, .. } = scores.mean;
+            let scored = Scored { step: summary.steps, view: None, psnr, ssim, iou: objects.iou_map };
+            self.history.put(&Entry::Scores(scored));
+        }
+        self.history.sync();
+        self.note_memory();
+        info::end(&mut self.info, self.stopped, &self.history);
+        self.write_info()?;
+        let out = &self.request.output;
+        let path = report::write(std::slice::from_ref(out), &out.join(report::FILE))?;
+        tracing::info!("report: {}", path.display());
+        Ok(())
     }
 
     /// Writes the occluders that the last step used.
@@ -106,8 +128,10 @@ impl Run<'_> {
         }
         let options = self.trainer.render_options();
         let how = Rendering { options, min_confidence: MIN_LABEL_CONFIDENCE, train: &[], by_main: false };
-        let scores = evaluate(self.trainer.engine_mut(), model, &views, how, &(), &mut ())?;
+        let mut worst = Worst::default();
+        let scores = evaluate(self.trainer.engine_mut(), model, &views, how, &(), &mut worst)?;
         scores.warn_of_odd_view(self.settings.train.near);
+        self.info.pictures = worst.write(&self.request.output)?;
         Ok(Some(scores))
     }
 }

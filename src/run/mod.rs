@@ -6,19 +6,26 @@
 
 mod checkpoints;
 mod finish;
+pub(crate) mod history;
+pub(crate) mod info;
 pub(crate) mod models;
 pub(crate) mod observer;
+mod objects;
 mod occluders;
+mod pictures;
 mod prepare;
 mod preview;
 mod recovery;
+pub(crate) mod report;
 mod resume;
 pub(crate) mod settings;
 mod steps;
 mod summary;
 
 pub use models::latest_model;
+pub use report::write as write_report;
 pub use observer::{Event, Flow, Live, Observer};
+pub use objects::ObjectSummary;
 pub use occluders::OccluderFiles;
 pub use settings::{RunOptions, Settings};
 pub use summary::Summary;
@@ -31,6 +38,8 @@ use crate::gpu::Gpu;
 use crate::scene::{Dataset, View};
 use crate::train::Trainer;
 use checkpoints::Checkpoints;
+use history::Recorder;
+use info::{Info, Warned};
 use models::Models;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
@@ -77,7 +86,16 @@ pub struct Request<'a> {
     /// Opens a lost device again and continues from the newest checkpoint, as long as each loss has a new one. The
     /// error names the pass that lost the device, at some cost in time.
     pub restart: bool,
+    /// The command as it was typed, for the report.
+    pub command: Option<String>,
+    /// The warnings of the log, for the report. Without it, the report has only those of the run itself.
+    pub warnings: Option<&'a Warnings<'a>>,
+    /// The number of warnings in the log that belong to other work before.
+    pub warned_before: usize,
 }
+
+/// Returns the text of all warnings that the log has had so far.
+pub type Warnings<'a> = dyn Fn() -> Vec<String> + 'a;
 
 impl<'a> Request<'a> {
     /// Makes a new run with the default settings and without masks.
@@ -89,6 +107,9 @@ impl<'a> Request<'a> {
             inputs: Inputs::default(),
             occluders: None,
             restart: false,
+            command: None,
+            warnings: None,
+            warned_before: 0,
         }
     }
 }
@@ -111,8 +132,10 @@ fn train_once(request: &Request, is_again: bool, open: &Open, observer: &mut dyn
     let prepared = prepare::prepare(request, is_again)?;
     let mut run = prepare::begin(prepared, request, open()?, observer)?;
     run.write_records()?;
+    run.write_info()?;
     run.tell(Event::Started { after: run.trainer.steps_done(), steps: run.settings.train.iterations })?;
     let start = Instant::now();
+    run.history.start();
     recovery::over_numeric_failures(&mut run).map_err(|error| run.keep_model(error))?;
     run.hold_records()?;
     // Save the model in either case.
@@ -137,6 +160,9 @@ struct Run<'a> {
     trainer: Trainer,
     checkpoints: Checkpoints,
     models: Models,
+    history: Recorder,
+    info: Info,
+    warned: Warned<'a>,
     observer: &'a mut dyn Observer,
     stopped: bool,
 }
@@ -144,7 +170,7 @@ struct Run<'a> {
 impl Run<'_> {
     /// Passes an event to the observer and follows its answer.
     fn tell(&mut self, event: Event<'_>) -> Result<()> {
-        let mut flow = self.observer.on(&event, &mut Live::new(&mut self.trainer))?;
+        let mut flow = self.observer.on(&event, &mut Live::new(&mut self.trainer, &mut self.history))?;
         loop {
             match flow {
                 Flow::Continue => return Ok(()),
@@ -155,7 +181,7 @@ impl Run<'_> {
                 }
                 Flow::Pause => {
                     let step = self.trainer.steps_done();
-                    flow = self.observer.on(&Event::Paused { step }, &mut Live::new(&mut self.trainer))?;
+                    flow = self.observer.on(&Event::Paused { step }, &mut Live::new(&mut self.trainer, &mut self.history))?;
                 }
             }
         }
@@ -164,6 +190,7 @@ impl Run<'_> {
     /// Logs a warning and passes it to the observer.
     fn warn(&mut self, text: &str) -> Result<()> {
         tracing::warn!("{text}");
+        self.note_warning(text);
         self.tell(Event::Warning(text))
     }
 }

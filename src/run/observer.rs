@@ -2,6 +2,7 @@
 //! scene between two steps, and may pause, save and stop the run.
 
 use super::Summary;
+use super::history::Recorder;
 use crate::error::Result;
 use crate::eval::scores::Scores;
 use crate::render::{Parts, RenderOptions, Rendered, render};
@@ -103,11 +104,19 @@ impl Observer for () {
 /// The scene in training, between two steps. Queries do not change the training, bit for bit.
 pub struct Live<'a> {
     trainer: &'a mut Trainer,
+    history: &'a mut Recorder,
 }
 
 impl<'a> Live<'a> {
-    pub(super) fn new(trainer: &'a mut Trainer) -> Self {
-        Self { trainer }
+    pub(super) fn new(trainer: &'a mut Trainer, history: &'a mut Recorder) -> Self {
+        Self { trainer, history }
+    }
+
+    /// Waits for all steps, whose reports belong in the history.
+    fn drain(&mut self) -> Result<()> {
+        let reports = self.trainer.drain()?;
+        self.history.finished(&reports);
+        Ok(())
     }
 
     /// Returns the number of finished steps.
@@ -122,7 +131,7 @@ impl<'a> Live<'a> {
 
     /// Renders the current scene from any camera, at any size, with the requested parts.
     pub fn render(&mut self, camera: &Camera, parts: Parts) -> Result<Rendered> {
-        self.trainer.drain()?;
+        self.drain()?;
         let options = RenderOptions { parts, ..self.trainer.render_options() };
         let engine = self.trainer.engine_mut();
         engine.grow_image(camera.width, camera.height)?;
@@ -131,6 +140,7 @@ impl<'a> Live<'a> {
 
     /// Returns the current model, with the labels of the last count of votes.
     pub fn model(&mut self) -> Result<Gaussians> {
+        self.drain()?;
         self.trainer.model()
     }
 }

@@ -1,6 +1,8 @@
 //! Everything before the first step: the folder, the settings, the scene, the initial model.
 
 use super::checkpoints::Checkpoints;
+use super::history::{Recorder, Sums};
+use super::info::{Info, Warned};
 use super::models::Models;
 use super::resume::{self, Record, Resumed, absolute};
 use super::{Inputs, Observer, OccluderFiles, Request, Run, Settings, Start, occluders};
@@ -122,7 +124,12 @@ pub(super) fn begin<'a>(
         occlusion: occlusion.clone(),
         read: settings.read.clone(),
         run: settings.run.clone(),
+        history: Sums::default(),
     };
+    let after = resumed.as_ref().map_or(0, |resumed| resumed.state.step);
+    let sums = resumed.as_ref().map(|resumed| resumed.record.history).unwrap_or_default();
+    let info = Info::new(request, after, inputs.masks.as_deref(), &dataset, &gpu);
+    let history = Recorder::new(out, (after, settings.train.iterations), sums);
     let checkpoints = Checkpoints::new(out, lock, record, resumed.as_ref().map(|resumed| &resumed.state))?;
     let trainer = match resumed {
         Some(resumed) => Trainer::resume(gpu, &dataset, resumed.state, options)?,
@@ -141,6 +148,9 @@ pub(super) fn begin<'a>(
         trainer,
         checkpoints,
         models,
+        history,
+        info,
+        warned: Warned::new(request),
         observer,
         stopped: false,
     })

@@ -1,7 +1,10 @@
 //! Preview pictures: photo, render and label map side by side.
 
+use super::history::{Entry, Scored};
+use super::pictures::label_iou;
 use super::{Live, Run, models};
 use crate::error::Result;
+use crate::eval::metrics::psnr;
 use crate::render::Parts;
 use std::path::PathBuf;
 
@@ -10,9 +13,21 @@ pub(super) fn write(run: &mut Run) -> Result<Option<PathBuf>> {
     let Some(view) = &run.preview else { return Ok(None) };
     let Some(photo) = &view.photo else { return Ok(None) };
     let parts = if run.trainer.has_labels() { Parts::LABELS } else { Parts::COLOUR };
-    let rendered = Live::new(&mut run.trainer).render(&view.camera, parts)?;
+    let rendered = Live::new(&mut run.trainer, &mut run.history).render(&view.camera, parts)?;
     let name = format!("{:06}_{}.png", run.trainer.steps_done(), view.stem());
     let path = run.request.output.join("preview").join(name);
     models::save_preview(&path, photo, &rendered)?;
+    // The preview of a stopped run is not on the schedule, which a run that goes on keeps.
+    if !run.stopped {
+        let finite = |value: f64| Some(value).filter(|value| value.is_finite());
+        let iou = view.mask.as_deref().filter(|_| !rendered.labels.is_empty());
+        run.history.put(&Entry::Preview(Scored {
+            step: run.trainer.steps_done(),
+            view: Some(view.name.clone()),
+            psnr: finite(psnr(&rendered.rgb, photo)),
+            ssim: None,
+            iou: iou.and_then(|mask| label_iou(&rendered.labels, mask)),
+        }));
+    }
     Ok(Some(path))
 }

@@ -48,7 +48,9 @@ pub(super) fn over_numeric_failures(run: &mut Run) -> Result<()> {
     let mut last = steps(run);
     for is_slower in [false, true] {
         last = match last {
-            Err(error @ Error::Numeric { .. }) if run.checkpoints.restore(&mut run.trainer, &error)? => {
+            Err(error @ Error::Numeric { .. }) => {
+                let Some((step, sums)) = run.checkpoints.restore(&mut run.trainer, &error)? else { return Err(error) };
+                run.history.go_back(step, run.settings.train.iterations, sums);
                 if is_slower {
                     run.trainer.halve_rates();
                     run.warn("training failed again: from here on all learning rates are half of what they were")?;

@@ -1,5 +1,6 @@
 //! The checkpoint and the settings that a resumed run continues from.
 
+use super::history::Sums;
 use super::{Changed, Inputs, Request, Settings};
 use crate::error::{Error, Result};
 use crate::io::{ReadOptions, checkpoint_folder};
@@ -16,6 +17,17 @@ pub(super) struct Record {
     pub occlusion: Option<String>,
     pub read: ReadOptions,
     pub run: RunOptions,
+    /// Sums of the line of the history that was not finished.
+    #[serde(default)]
+    pub history: Sums,
+}
+
+impl Record {
+    /// Reads the part of a checkpoint.
+    pub(super) fn of(state: &TrainState) -> Result<Self> {
+        serde_json::from_value(state.run.clone())
+            .map_err(|error| Error::data(&state.path, "contents", format!("of the run: {error}")))
+    }
 }
 
 /// A checkpoint to continue from.
@@ -52,8 +64,7 @@ pub(super) fn find(request: &Request, changed: &Changed) -> Result<Option<Resume
 
 fn read(path: &Path) -> Result<Resumed> {
     let state = TrainState::read(path)?;
-    let record: Record = serde_json::from_value(state.run.clone())
-        .map_err(|error| Error::data(path, "contents", format!("of the run: {error}")))?;
+    let record = Record::of(&state)?;
     let settings = Settings { read: record.read.clone(), train: state.config.clone(), run: record.run.clone() };
     settings.check().map_err(|error| Error::data(path, "contents", error.to_string()))?;
     Ok(Resumed { state, settings, record })

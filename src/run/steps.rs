@@ -2,14 +2,20 @@
 
 use super::{Event, Run, preview};
 use crate::error::{Error, Result};
+use std::path::PathBuf;
+use std::time::Instant;
 
 /// Runs the remaining steps, until the last one or until the observer stops the run.
 pub(super) fn steps(run: &mut Run) -> Result<()> {
     let last = run.settings.train.iterations;
     for step in run.trainer.steps_done() + 1..=last {
-        run.trainer.step()?;
+        let start = Instant::now();
+        let finished = run.trainer.step()?;
+        let gaussians = run.trainer.gaussian_count();
+        run.history.submitted(step, step == last, gaussians, start.elapsed());
+        run.history.finished(&finished);
         if let Some(what) = run.trainer.take_densified() {
-            let gaussians = run.trainer.gaussian_count();
+            run.history.densified(step, what);
             run.tell(Event::Densified { step, what, gaussians })?;
         }
         let report = run.trainer.newest_report();
@@ -18,8 +24,7 @@ pub(super) fn steps(run: &mut Run) -> Result<()> {
             write_between(run, step)?;
         }
         if run.checkpoints.due(step, last) {
-            run.trainer.drain()?;
-            if let Some(path) = run.checkpoints.save_due(&mut run.trainer)? {
+            if let Some(path) = run.save_due()? {
                 run.tell(Event::Checkpoint { step, path: &path })?;
             }
         }
@@ -27,7 +32,7 @@ pub(super) fn steps(run: &mut Run) -> Result<()> {
             break;
         }
     }
-    run.trainer.drain().map(drop)
+    run.drain()
 }
 
 /// Writes the model and the preview if the schedule has them at this step.
@@ -37,6 +42,7 @@ fn write_between(run: &mut Run, step: u32) -> Result<()> {
         (options.save_at.contains(&step), options.preview_every > 0 && step.is_multiple_of(options.preview_every));
     if saves {
         run.hold_folder()?;
+        run.drain()?;
         let model = run.trainer.labelled_model()?;
         let saved = run.models.save(step, &model);
         if let Some(path) = tolerate(run, saved)? {
@@ -70,7 +76,7 @@ impl Run<'_> {
     pub(super) fn save_checkpoint(&mut self) -> Result<()> {
         self.hold_folder()?;
         let step = self.trainer.steps_done();
-        match self.checkpoints.save_due(&mut self.trainer)? {
+        match self.save_due()? {
             // If the observer answers Save again, the step has its checkpoint already: no endless loop.
             Some(path) => self.tell(Event::Checkpoint { step, path: &path }),
             None => Ok(()),
@@ -79,6 +85,25 @@ impl Run<'_> {
 
     /// Writes the checkpoint of a stopped run. Returns whether there is one.
     pub(super) fn keep_if_stopped(&mut self) -> Result<bool> {
-        if self.stopped { self.checkpoints.save(&mut self.trainer).map(|_| true) } else { Ok(false) }
+        if !self.stopped {
+            return Ok(false);
+        }
+        self.checkpoints.save(&mut self.trainer, &mut self.history).map(|_| true)
+    }
+
+    /// Waits for all steps, whose reports belong in the history.
+    fn drain(&mut self) -> Result<()> {
+        let reports = self.trainer.drain()?;
+        self.history.finished(&reports);
+        Ok(())
+    }
+
+    /// Writes a checkpoint, and what a report of the run until then needs.
+    fn save_due(&mut self) -> Result<Option<PathBuf>> {
+        self.drain()?;
+        let saved = self.checkpoints.save_due(&mut self.trainer, &mut self.history)?;
+        let written = self.write_info();
+        tolerate(self, written)?;
+        Ok(saved)
     }
 }

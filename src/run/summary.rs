@@ -1,12 +1,13 @@
 //! The result of a run: for the caller, and in `metrics.json`.
 
+use super::ObjectSummary;
 use crate::error::Result;
 use crate::eval::scores::Scores;
 use crate::io::atomic;
 use serde_json::json;
 use std::path::{Path, PathBuf};
 
-const FILE: &str = "metrics.json";
+pub(super) const FILE: &str = "metrics.json";
 
 /// The result of a run.
 #[derive(Clone, Debug)]
@@ -25,6 +26,8 @@ pub struct Summary {
     pub model: PathBuf,
     /// Scores of the held-out views; none without such views and in a stopped run.
     pub scores: Option<Scores>,
+    /// The objects of the model, by id; none without masks.
+    pub objects: Vec<ObjectSummary>,
     /// True if the observer stopped the run. The model is written, and a checkpoint if steps remain.
     pub stopped: bool,
 }
@@ -40,6 +43,7 @@ impl Summary {
             "loss": self.loss,
             "label_loss": self.label_loss,
             "model": self.model.display().to_string(),
+            "objects": self.objects,
             "test": self.scores.as_ref().map(|scores| &scores.mean),
             "views": self.scores.as_ref().map(|scores| &scores.views),
         })

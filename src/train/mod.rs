@@ -55,6 +55,10 @@ pub struct StepReport {
     pub step: u32,
     /// Photo loss: (1 - lambda) L1 + lambda (1 - SSIM).
     pub loss: f64,
+    /// Mean absolute difference of colours.
+    pub l1: f64,
+    /// Structural similarity.
+    pub ssim: f64,
     /// Weighted label loss.
     pub label_loss: f64,
     /// Counters of the device.
@@ -363,10 +367,11 @@ impl Trainer {
         let scale = 1.0 / (3.0 * view.valid_pixels.max(1) as f64);
         let (counters, lambda) = (&report.counters, f64::from(self.config.lambda_dssim));
         let l1 = f64::from(counters.loss_l1) * scale;
-        let loss = (1.0 - lambda) * l1 + lambda * (1.0 - f64::from(counters.loss_ssim) * scale);
+        let ssim = f64::from(counters.loss_ssim) * scale;
+        let loss = (1.0 - lambda) * l1 + lambda * (1.0 - ssim);
         let label_loss = step_input::label_loss(&input, view, &self.config, counters.loss_label);
         self.watch(&input, &report, [loss, label_loss])?;
-        self.newest = Some(StepReport { step: input.step, loss, label_loss, report });
+        self.newest = Some(StepReport { step: input.step, loss, l1, ssim, label_loss, report });
         Ok(self.newest)
     }
 }

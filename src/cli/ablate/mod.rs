@@ -11,7 +11,7 @@ use super::train_args::TrainFlags;
 use super::{eval, interrupt, stdout, train, wording};
 use crate::eval::scores::{MeanScores, Scores};
 use crate::io::atomic;
-use crate::run::Settings;
+use crate::run::{Settings, report};
 use crate::{Error, Result};
 use clap::{Args, FromArgMatches};
 use rows::{Masks, Row, rows};
@@ -34,7 +34,7 @@ pub struct AblateArgs {
     /// Folder of masks to score with. Default: those of --masks.
     #[arg(long, value_name = "DIR")]
     pub truth: Option<PathBuf>,
-    /// Folder for ablation.json and the runs, VARIANT-SEED.
+    /// Folder for ablation.json, report.html and the runs, VARIANT-SEED.
     #[arg(short, long, value_name = "OUT")]
     pub output: PathBuf,
     /// Variants, with commas between: no-labels, paper, paper-no-dov, paper-no-gpf, paper-no-oam, paper-votes, ours,
@@ -89,12 +89,22 @@ pub(crate) fn run(args: &AblateArgs, context: &Context) -> Result<()> {
         outcomes.iter().map(|(row, runs)| json!({ "name": row.name, "flags": row.flags, "runs": runs })).collect();
     let record = json!({ "schema_version": 1, "scene": args.scene.display().to_string(), "rows": table });
     atomic::write_json(&args.output.join("ablation.json"), &record)?;
+    let rows: Vec<(&str, &[Outcome])> =
+        outcomes.iter().map(|(row, runs)| (row.name.as_str(), runs.as_slice())).collect();
+    let text = table::table(&rows) + &quoted::table();
+    let folders: Vec<PathBuf> =
+        outcomes.iter().flat_map(|(row, runs)| runs.iter().map(|run| folder(args, row, run.seed))).collect();
+    let page = report::write_with(&folders, &args.output.join(report::FILE), &text)?;
+    tracing::info!("report: {}", page.display());
     if context.json || args.json.json {
         return stdout::print_json(&record);
     }
-    let rows: Vec<(&str, &[Outcome])> =
-        outcomes.iter().map(|(row, runs)| (row.name.as_str(), runs.as_slice())).collect();
-    stdout::print(&(table::table(&rows) + &quoted::table()))
+    stdout::print(&text)
+}
+
+/// Returns the folder of a run.
+fn folder(args: &AblateArgs, row: &Row, seed: u64) -> PathBuf {
+    args.output.join(format!("{}-{seed}", row.name))
 }
 
 /// Parses the flags of a variant.
@@ -118,14 +128,14 @@ fn one(row: &Row, seed: u64, args: &AblateArgs, context: &Context) -> Result<Out
         Masks::Given => Some(args.masks.clone()),
         Masks::WithoutDov => args.masks_without_dov.clone(),
     };
-    let out = args.output.join(format!("{}-{seed}", row.name));
+    let out = folder(args, row, seed);
     let settings = |checkpoint: Option<&Settings>| {
         let mut settings = flags.settings(checkpoint)?;
         settings.train.seed = seed;
         Ok(settings)
     };
     let request = flags.request((&args.scene, &out), masks, &settings)?;
-    let summary = train::train(&request, context)?;
+    let summary = train::train(request, context)?;
     let scores = score(&out, &settings(None)?, args, context)?;
     atomic::write_json(&out.join("scores.json"), &scores)?;
     Ok(Outcome { seed, scores: scores.mean, gaussians: summary.gaussians, seconds: summary.seconds })

@@ -1,0 +1,70 @@
+//! `labelgs selftest --report`: what the authors need to know of a device that they do not have.
+
+use super::context::Context;
+use super::kernels::kernels_json;
+use super::profile::profile;
+use super::profile_report::Window;
+use super::scene::open_gpu;
+use super::{devices, selftest};
+use crate::gpu::{self, Gpu, GpuOptions};
+use crate::pass::compiled_kernels;
+use crate::synth::{self, SynthOptions};
+use crate::train::{TrainConfig, first_model};
+use crate::verify::selftest::Check;
+use crate::{Error, Result};
+use serde_json::{Value, json};
+
+/// Returns the report. `error` ended the checks. What cannot be measured stands in the report as an error of its own.
+pub(super) fn report(checks: &[Check], error: Option<&Error>, context: &Context) -> Result<Value> {
+    let mut options = GpuOptions::from_env()?;
+    options.device = context.global.device.clone().or(options.device);
+    let (found, picked) = gpu::devices(&options)?;
+    let listed = found.iter().map(|device| {
+        let mut row = devices::to_json(device, picked);
+        // It tells two cards of the same kind apart.
+        row.as_object_mut().and_then(|row| row.remove("uuid"));
+        row
+    });
+    Ok(json!({
+        "schema_version": 1,
+        "labelgs": env!("CARGO_PKG_VERSION"),
+        "system": { "os": std::env::consts::OS, "processor": std::env::consts::ARCH },
+        "devices": listed.collect::<Vec<_>>(),
+        "checks": checks.iter().map(selftest::to_json).collect::<Vec<_>>(),
+        "error": error.map(Error::to_string),
+        "compiler": measured(picked.is_some(), || compiler(options)),
+        "steps": measured(picked.is_some(), || steps(context)),
+    }))
+}
+
+/// A measurement, or the error that prevented it; null without a device.
+fn measured(has_device: bool, measure: impl FnOnce() -> Result<Value>) -> Value {
+    if !has_device {
+        return Value::Null;
+    }
+    measure().unwrap_or_else(|error| json!({ "error": error.to_string() }))
+}
+
+/// What the driver's compiler makes of every kernel.
+fn compiler(options: GpuOptions) -> Result<Value> {
+    let gpu = Gpu::new(&GpuOptions { statistics: true, ..options })?;
+    Ok(json!(kernels_json(&compiled_kernels(&gpu)?)))
+}
+
+/// The profile of steps with labels on the built-in scene: a million Gaussians at 1600 x 1064 px on a card with the
+/// memory for them, else the scene's own size.
+fn steps(context: &Context) -> Result<Value> {
+    const LARGE_MIN: u64 = 3 << 30;
+    let gpu = open_gpu(context)?;
+    let scene = SynthOptions { views: 8, ..SynthOptions::default() };
+    let scene = if gpu.is_cpu() || gpu.limits().plan.max_memory < LARGE_MIN {
+        scene
+    } else {
+        SynthOptions { width: 1600, height: 1064, points: 1_000_000, ..scene }
+    };
+    let dataset = synth::dataset(&scene, 0);
+    let config = TrainConfig { label_from: Some(1), start_size: Some(1.0), ..TrainConfig::default() };
+    let model = first_model(&dataset, &config)?;
+    let window = Window { overlap: true, from_step: 0, warm_up: 10, steps: 20 };
+    Ok(profile(&gpu, (&dataset, &model, config), window, |_| (), context)?.to_json())
+}

@@ -1,0 +1,132 @@
+//! The lines of a history.
+
+use crate::train::StepReport;
+use serde::{Deserialize, Serialize};
+
+/// A line.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "snake_case")]
+pub(crate) enum Entry {
+    /// Numbers of some steps.
+    Steps(Steps),
+    /// A densification.
+    Densified {
+        /// Step after which it was.
+        step: u32,
+        /// Gaussians cloned.
+        cloned: u32,
+        /// Gaussians split.
+        split: u32,
+        /// Gaussians removed.
+        pruned: u32,
+    },
+    /// Scores of one view, in its preview.
+    Preview(Scored),
+    /// Mean scores of the held-out views at the end of the run.
+    Scores(Scored),
+    /// A warning.
+    Warning {
+        /// Steps done.
+        step: u32,
+        /// Its text.
+        text: String,
+    },
+}
+
+/// Means over the steps after the line before, up to this one.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Steps {
+    /// Last step.
+    pub step: u32,
+    /// Photo loss.
+    pub loss: f64,
+    /// Largest photo loss of a step.
+    pub loss_max: f64,
+    /// Mean absolute difference of colours.
+    pub l1: f64,
+    /// Structural similarity.
+    pub ssim: f64,
+    /// Weighted label loss.
+    pub label_loss: f64,
+    /// Gaussians after the last step.
+    pub gaussians: u32,
+    /// Time of a step, ms.
+    pub ms: f64,
+    /// Time of the training until then, s.
+    pub seconds: f64,
+}
+
+/// Scores of one or more views. A value that is not finite is absent.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub(crate) struct Scored {
+    /// Steps done.
+    pub step: u32,
+    /// The view, if it is one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub view: Option<String>,
+    /// PSNR, dB.
+    pub psnr: Option<f64>,
+    /// SSIM.
+    pub ssim: Option<f64>,
+    /// Mean IoU of the label map.
+    pub iou: Option<f64>,
+}
+
+impl Entry {
+    /// Returns the number of steps done.
+    pub(crate) fn step(&self) -> u32 {
+        match self {
+            Self::Steps(steps) => steps.step,
+            Self::Preview(scored) | Self::Scores(scored) => scored.step,
+            Self::Densified { step, .. } | Self::Warning { step, .. } => *step,
+        }
+    }
+
+    /// Returns true for lines that the end of a run writes.
+    pub(super) fn is_of_end(&self) -> bool {
+        matches!(self, Self::Preview(_) | Self::Scores(_))
+    }
+
+    pub(super) fn seconds(&self) -> Option<f64> {
+        if let Self::Steps(steps) = self { Some(steps.seconds) } else { None }
+    }
+}
+
+/// Sums over the steps of a line that is not finished.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub(crate) struct Sums {
+    steps: u32,
+    loss: f64,
+    loss_max: f64,
+    l1: f64,
+    ssim: f64,
+    label_loss: f64,
+}
+
+impl Sums {
+    pub(super) fn add(&mut self, report: &StepReport) {
+        self.steps += 1;
+        self.loss += report.loss;
+        self.loss_max = self.loss_max.max(report.loss);
+        self.l1 += report.l1;
+        self.ssim += report.ssim;
+        self.label_loss += report.label_loss;
+    }
+
+    pub(super) fn line(self, step: u32, gaussians: u32, ms: f64, seconds: f64) -> Steps {
+        let mean = |sum: f64| sum / f64::from(self.steps.max(1));
+        Steps {
+            step,
+            loss: mean(self.loss),
+            loss_max: self.loss_max,
+            l1: mean(self.l1),
+            ssim: mean(self.ssim),
+            label_loss: mean(self.label_loss),
+            gaussians,
+            ms,
+            seconds,
+        }
+    }
+}

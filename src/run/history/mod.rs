@@ -1,0 +1,171 @@
+//! `history.jsonl`: the numbers of a run over its steps, a line of JSON each.
+//!
+//! A line is written and flushed when its numbers are known, about every ten steps. A run that goes on from a checkpoint
+//! first drops the lines after it; sums of unfinished lines are in the checkpoint. So an interrupted run has the history
+//! of an uninterrupted one, except for times.
+
+mod entry;
+mod read;
+
+pub(crate) use entry::{Entry, Scored, Steps, Sums};
+pub(crate) use read::read;
+
+use crate::error::{Error, Result};
+use crate::io::append::Lines;
+use crate::train::{Densified, StepReport};
+use std::collections::VecDeque;
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+/// Name of the file.
+pub(crate) const FILE: &str = "history.jsonl";
+
+/// Steps of a line.
+pub(crate) const EVERY: u32 = 10;
+
+/// Writes the history of a run.
+pub(super) struct Recorder {
+    path: PathBuf,
+    /// None if the file could not be opened.
+    lines: Option<Lines>,
+    sums: Sums,
+    /// Lines whose reports are not known yet.
+    due: VecDeque<Due>,
+    /// Time in steps since the last line, and their number.
+    spent: (Duration, u32),
+    /// Seconds of the run before `start`.
+    before: f64,
+    start: Instant,
+    has_warned: bool,
+}
+
+/// What a line holds besides the reports of its steps.
+struct Due {
+    step: u32,
+    gaussians: u32,
+    ms: f64,
+    seconds: f64,
+}
+
+impl Recorder {
+    /// Opens the history of a run in the folder `out` that goes on after `step`, of `last` steps. 0 begins a new history.
+    pub(super) fn new(out: &Path, (step, last): (u32, u32), sums: Sums) -> Self {
+        let path = out.join(FILE);
+        let (bytes, before) = kept(&path, step, last);
+        let mut recorder = Self {
+            lines: None,
+            sums,
+            due: VecDeque::new(),
+            spent: (Duration::ZERO, 0),
+            before,
+            start: Instant::now(),
+            has_warned: false,
+            path,
+        };
+        match Lines::open(&recorder.path, bytes) {
+            Ok(lines) => recorder.lines = Some(lines),
+            Err(error) => recorder.warn(&error),
+        }
+        recorder
+    }
+
+    /// Starts the clock, at the first step.
+    pub(super) fn start(&mut self) {
+        self.start = Instant::now();
+    }
+
+    /// Goes back to `step` after a failure.
+    pub(super) fn go_back(&mut self, step: u32, last: u32, sums: Sums) {
+        let (bytes, _) = kept(&self.path, step, last);
+        self.due.clear();
+        (self.sums, self.spent) = (sums, (Duration::ZERO, 0));
+        self.write(|lines| lines.cut(bytes));
+    }
+
+    /// Notes that a step was submitted, which took some time.
+    pub(super) fn submitted(&mut self, step: u32, is_last: bool, gaussians: u32, time: Duration) {
+        self.spent = (self.spent.0 + time, self.spent.1 + 1);
+        if step.is_multiple_of(EVERY) || is_last {
+            let ms = 1000.0 * self.spent.0.as_secs_f64() / f64::from(self.spent.1);
+            self.spent = (Duration::ZERO, 0);
+            self.due.push_back(Due { step, gaussians, ms, seconds: self.seconds() });
+        }
+    }
+
+    /// Adds the reports of finished steps, in order.
+    pub(super) fn finished(&mut self, reports: &[StepReport]) {
+        for report in reports {
+            self.sums.add(report);
+            if self.due.front().is_none_or(|due| due.step != report.step) {
+                continue;
+            }
+            let Some(due) = self.due.pop_front() else { continue };
+            let steps = std::mem::take(&mut self.sums).line(due.step, due.gaussians, due.ms, due.seconds);
+            self.put(&Entry::Steps(steps));
+        }
+    }
+
+    /// Returns the sums of the line that is not finished, for a checkpoint. Nothing may be in flight.
+    pub(super) fn unfinished(&self) -> Sums {
+        self.sums
+    }
+
+    /// Adds a densification.
+    pub(super) fn densified(&mut self, step: u32, what: Densified) {
+        let Densified { cloned, split, pruned } = what;
+        self.put(&Entry::Densified { step, cloned, split, pruned });
+    }
+
+    /// Adds a line.
+    pub(super) fn put(&mut self, entry: &Entry) {
+        match serde_json::to_string(entry) {
+            Ok(text) => self.write(|lines| lines.add(&text)),
+            Err(error) => self.warn(&Error::Bug(format!("history: {error}"))),
+        }
+    }
+
+    /// Waits until all lines are on the disk; before a checkpoint, which is of no later step than they.
+    pub(super) fn sync(&mut self) {
+        self.write(Lines::sync);
+    }
+
+    /// Returns the time of the training until now, with earlier parts of an interrupted run, s.
+    pub(super) fn seconds(&self) -> f64 {
+        self.before + self.start.elapsed().as_secs_f64()
+    }
+
+    fn write(&mut self, what: impl FnOnce(&mut Lines) -> Result<()>) {
+        let Some(lines) = &mut self.lines else { return };
+        if let Err(error) = what(lines) {
+            self.warn(&error);
+        }
+    }
+
+    /// A training is worth more than its history.
+    fn warn(&mut self, error: &Error) {
+        if !std::mem::replace(&mut self.has_warned, true) {
+            tracing::warn!("{error}; training goes on, its report will have gaps");
+        }
+    }
+}
+
+/// Returns the length of the history up to `step`, and the seconds until then. A run that ended at `step` is scored
+/// again, so its last scores go.
+fn kept(path: &Path, step: u32, last: u32) -> (u64, f64) {
+    if step == 0 || !path.is_file() {
+        return (0, 0.0);
+    }
+    let history = match read(path) {
+        Ok(history) => history,
+        Err(error) => {
+            tracing::warn!("{error}; the history begins anew after step {step}");
+            return (0, 0.0);
+        }
+    };
+    let stays = |entry: &Entry| {
+        entry.step() < step || entry.step() == step && !(entry.is_of_end() && step == last)
+    };
+    let count = history.entries.iter().take_while(|entry| stays(entry)).count();
+    let seconds = history.entries[..count].iter().filter_map(Entry::seconds).fold(0.0, f64::max);
+    (history.ends.get(count.wrapping_sub(1)).copied().unwrap_or(0), seconds)
+}

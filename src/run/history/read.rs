@@ -1,0 +1,42 @@
+//! Reads a history.
+
+use super::Entry;
+use crate::error::{Error, Result};
+use crate::io::read::bytes;
+use std::path::Path;
+
+/// A history.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct History {
+    /// Its lines, by rising step.
+    pub entries: Vec<Entry>,
+    /// The byte after each line.
+    pub ends: Vec<u64>,
+}
+
+/// Reads a history. What follows the last end of a line is dropped: a kill left it.
+pub(crate) fn read(path: &Path) -> Result<History> {
+    let bytes = bytes(path)?;
+    let mut history = History::default();
+    let mut start = 0;
+    while let Some(length) = bytes[start..].iter().position(|&byte| byte == b'\n') {
+        let end = start + length;
+        let entry: Entry = serde_json::from_slice(&bytes[start..end]).map_err(|error| {
+            let place = format!("line {}", history.entries.len() + 1);
+            Error::data(path, place, format!("is not a line of a history ({error}); correct or delete the line"))
+        })?;
+        if let Some(before) = history.entries.last().filter(|before| before.step() > entry.step()) {
+            let place = format!("line {}", history.entries.len() + 1);
+            let problem = format!(
+                "step {} comes after step {}; steps never fall; correct or delete the line",
+                entry.step(),
+                before.step()
+            );
+            return Err(Error::data(path, place, problem));
+        }
+        start = end + 1;
+        history.entries.push(entry);
+        history.ends.push(start as u64);
+    }
+    Ok(history)
+}

@@ -1,0 +1,206 @@
+//! `run.json`: what was run, on what, and what it said. The report is made from it.
+
+use super::history::{Entry, Recorder};
+use super::{Request, Run, Warnings};
+use crate::engine::Engine;
+use crate::error::Result;
+use crate::gpu::Gpu;
+use crate::io::atomic;
+use crate::scene::Dataset;
+use crate::scheduler::SchedulerOptions;
+use serde::{Deserialize, Serialize};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::SystemTime;
+
+/// Name of the file.
+pub(crate) const FILE: &str = "run.json";
+/// Most warnings that are kept of a part.
+const WARNINGS_MAX: usize = 200;
+/// Buffers that are listed, the largest.
+const BUFFERS: usize = 12;
+
+/// What was run.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub(crate) struct Info {
+    pub schema_version: u32,
+    pub scene: String,
+    pub masks: Option<String>,
+    pub train_views: u64,
+    pub test_views: u64,
+    /// Whenever the run was started or went on, in turn.
+    pub parts: Vec<Part>,
+    pub memory: Memory,
+    /// The end; none while the run goes on, and after a kill.
+    pub ended: Option<Ended>,
+    /// Views with pictures, the worst first.
+    pub pictures: Vec<Pictured>,
+}
+
+/// A start of the program for the run.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub(crate) struct Part {
+    /// What was typed.
+    pub command: Option<String>,
+    /// Version of labelgs.
+    pub labelgs: String,
+    pub device: String,
+    /// Steps of the checkpoint it went on from; 0 for a new run.
+    pub after: u32,
+    /// Begin, seconds since 1970.
+    pub began: u64,
+    pub warnings: Vec<String>,
+}
+
+/// Bytes, planned and measured.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub(crate) struct Memory {
+    /// Plan of the device's memory for the first model.
+    pub planned_start: Option<u64>,
+    /// Plan for the last model.
+    pub planned_end: Option<u64>,
+    /// The most that buffers had on the device.
+    pub device_peak: Option<u64>,
+    /// The most that the process had in the host's memory.
+    pub host_peak: Option<u64>,
+    /// The largest buffers of the last plan, and the bytes of all others.
+    pub buffers: Vec<(String, u64)>,
+}
+
+/// The end of a run.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Ended {
+    /// The observer stopped it.
+    pub stopped: bool,
+    /// Time of the training in all parts, s.
+    pub seconds: f64,
+}
+
+/// A view with pictures.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub(crate) struct Pictured {
+    pub view: String,
+    pub psnr: Option<f64>,
+    pub ssim: Option<f64>,
+    pub iou: Option<f64>,
+    /// The pictures of the view are `NUMBER-KIND` in the folder of pictures.
+    pub number: u32,
+}
+
+impl Info {
+    /// Begins a run, or goes on with that in the folder.
+    pub(super) fn new(request: &Request, after: u32, masks: Option<&Path>, dataset: &Dataset, gpu: &Gpu) -> Self {
+        let before = if after > 0 { Self::read(&request.output.join(FILE)) } else { Ok(None) };
+        let before = before.unwrap_or_else(|error| {
+            tracing::warn!("{error}; the report will not know what was before step {after}");
+            None
+        });
+        let mut info = before.unwrap_or_default();
+        let found = gpu.capabilities();
+        info.parts.push(Part {
+            command: request.command.clone(),
+            labelgs: env!("CARGO_PKG_VERSION").to_owned(),
+            device: format!("{} ({} {})", found.name, found.driver_name, found.driver_info),
+            after,
+            began: SystemTime::UNIX_EPOCH.elapsed().map_or(0, |since| since.as_secs()),
+            warnings: Vec::new(),
+        });
+        Self {
+            schema_version: 1,
+            scene: request.scene.display().to_string(),
+            masks: masks.map(|masks| masks.display().to_string()),
+            train_views: dataset.train.len() as u64,
+            test_views: dataset.test.len() as u64,
+            ended: None,
+            pictures: Vec::new(),
+            ..info
+        }
+    }
+
+    /// Reads the file; none if there is none.
+    pub(crate) fn read(path: &Path) -> Result<Option<Self>> {
+        super::report::json(path)
+    }
+
+    /// Writes the file.
+    pub(super) fn write(&self, out: &Path) -> Result<()> {
+        atomic::write_json(&out.join(FILE), self)
+    }
+
+    pub(super) fn warned(&mut self, text: String) {
+        if let Some(part) = self.parts.last_mut() {
+            match part.warnings.len() {
+                0..WARNINGS_MAX => part.warnings.push(text),
+                WARNINGS_MAX => part.warnings.push("there were more warnings than are kept here".to_owned()),
+                _ => {}
+            }
+        }
+    }
+}
+
+/// Collects the warnings of a run.
+pub(super) struct Warned<'a> {
+    /// The program's log, and the number of warnings in it before this run.
+    log: Option<(&'a Warnings<'a>, usize)>,
+    taken: usize,
+}
+
+impl<'a> Warned<'a> {
+    pub(super) fn new(request: &'a Request) -> Self {
+        Self { log: request.warnings.map(|log| (log, request.warned_before)), taken: 0 }
+    }
+}
+
+impl Run<'_> {
+    /// Notes a warning that the run itself gives.
+    pub(super) fn note_warning(&mut self, text: &str) {
+        self.history.put(&Entry::Warning { step: self.trainer.steps_done(), text: text.to_owned() });
+        // A log has it too.
+        if self.warned.log.is_none() {
+            self.info.warned(text.to_owned());
+        }
+    }
+
+    /// Writes `run.json` with the warnings until now.
+    pub(super) fn write_info(&mut self) -> Result<()> {
+        if let Some((log, before)) = self.warned.log {
+            let new: Vec<String> = log().into_iter().skip(before + self.warned.taken).collect();
+            self.warned.taken += new.len();
+            new.into_iter().for_each(|text| self.info.warned(text));
+        }
+        self.info.write(&self.request.output)
+    }
+
+    /// Notes what memory was planned and used.
+    pub(super) fn note_memory(&mut self) {
+        let engine = self.trainer.engine_mut();
+        let (gpu, size): (Arc<Gpu>, _) = (Arc::clone(engine.gpu()), *engine.size());
+        let memory = &mut self.info.memory;
+        memory.device_peak = memory.device_peak.max(Some(gpu.peak_memory()));
+        memory.host_peak = memory.host_peak.max(host_peak());
+        if let Ok(plan) = Engine::predict(&gpu, &size, SchedulerOptions::default()) {
+            memory.planned_end = Some(plan.total);
+            let mut rows: Vec<(String, u64)> = plan.rows.iter().map(|row| (row.name.to_owned(), row.bytes)).collect();
+            rows.sort_by(|a, b| b.1.cmp(&a.1).then_with(|| a.0.cmp(&b.0)));
+            rows.truncate(BUFFERS);
+            memory.buffers = rows;
+        }
+    }
+}
+
+/// Ends the record of a run.
+pub(super) fn end(info: &mut Info, stopped: bool, history: &Recorder) {
+    info.ended = Some(Ended { stopped, seconds: history.seconds() });
+}
+
+/// Returns the most memory that this process had, where Linux tells.
+#[expect(clippy::disallowed_methods, reason = "a file of the system, and no input")]
+fn host_peak() -> Option<u64> {
+    let text = std::fs::read_to_string(PathBuf::from("/proc/self/status")).ok()?;
+    let line = text.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
+    line.trim().strip_suffix("kB")?.trim().parse::<u64>().ok().map(|kib| kib << 10)
+}

@@ -1,0 +1,105 @@
+//! Small copies of the worst held-out views, for the report.
+
+use super::info::Pictured;
+use crate::error::{Error, Result};
+use crate::eval::compared::{Compared, Watch};
+use crate::eval::metrics::{Overlap, mean};
+use crate::io::atomic;
+use crate::report::panels::{self, Kind, encoded};
+use crate::scene::LabelMap;
+use std::path::{Path, PathBuf};
+
+/// Folder of the copies.
+const FOLDER: &str = "report";
+/// Views that are kept.
+const VIEWS: usize = 6;
+/// Most bytes of all copies.
+const BYTES_MAX: usize = 6 << 20;
+
+/// The pictures of a view: name in the page, name of the file.
+pub(crate) const KINDS: [(&str, &str); 5] = [
+    ("photo", "photo.jpg"),
+    ("render", "render.jpg"),
+    ("labels", "labels.png"),
+    ("masks", "masks.png"),
+    ("difference", "difference.jpg"),
+];
+
+/// Returns the path of a picture.
+pub(crate) fn path(out: &Path, number: u32, file: &str) -> PathBuf {
+    out.join(FOLDER).join(format!("{number}-{file}"))
+}
+
+/// The worst views that were seen.
+#[derive(Default)]
+pub(super) struct Worst {
+    views: Vec<(Pictured, Vec<Option<Vec<u8>>>)>,
+}
+
+impl Watch for Worst {
+    fn see(&mut self, picture: &Compared) -> Result<()> {
+        let Some(psnr) = picture.number("PSNR").filter(|_| picture.object.is_none()) else { return Ok(()) };
+        let worse = |view: &(Pictured, _)| view.0.psnr.is_some_and(|other| other <= psnr);
+        let place = self.views.iter().take_while(|view| worse(view)).count();
+        if place >= VIEWS {
+            return Ok(());
+        }
+        let size = (picture.photo.width, picture.photo.height);
+        let copy = |pixels: &[[u8; 3]], kind| encoded(size, pixels, kind).map(Some);
+        let map = |map: Option<&LabelMap>| map.map_or(Ok(None), |map| copy(&panels::label_pixels(map), Kind::Flat));
+        let render: Vec<[u8; 3]> = picture.rgb.iter().map(|&colour| panels::byte_colour(colour)).collect();
+        let files = vec![
+            copy(&panels::photo_pixels(picture.photo), Kind::Smooth)?,
+            copy(&render, Kind::Smooth)?,
+            map(picture.labels)?,
+            map(picture.truth)?,
+            copy(&panels::difference(picture.photo, picture.rgb), Kind::Smooth)?,
+        ];
+        let iou = picture.labels.zip(picture.truth).and_then(|(found, truth)| label_iou(&found.ids, truth));
+        let (view, ssim) = (picture.view.to_owned(), picture.number("SSIM"));
+        self.views.insert(place, (Pictured { view, psnr: Some(psnr), ssim, iou, number: 0 }, files));
+        self.views.truncate(VIEWS);
+        Ok(())
+    }
+}
+
+impl Worst {
+    /// Writes the pictures into the folder of the run, as many as the limit allows. Returns their views, the worst first.
+    pub(super) fn write(self, out: &Path) -> Result<Vec<Pictured>> {
+        remove_old(out)?;
+        let mut written = Vec::new();
+        let mut bytes = 0;
+        for (number, (view, files)) in (1..).zip(self.views) {
+            bytes += files.iter().flatten().map(Vec::len).sum::<usize>();
+            if bytes > BYTES_MAX {
+                break;
+            }
+            for ((_, file), content) in KINDS.iter().zip(&files) {
+                if let Some(content) = content {
+                    atomic::write(path(out, number, file), |out| out.write_all(content))?;
+                }
+            }
+            written.push(Pictured { number, ..view });
+        }
+        Ok(written)
+    }
+}
+
+/// Deletes the pictures of an earlier end of the run.
+fn remove_old(out: &Path) -> Result<()> {
+    for number in 1..=VIEWS as u32 {
+        for (_, file) in KINDS {
+            let path = path(out, number, file);
+            if path.is_file() {
+                std::fs::remove_file(&path).map_err(Error::write(&path))?;
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Returns the mean IoU of a label map over the objects of a mask.
+pub(super) fn label_iou(found: &[u16], truth: &LabelMap) -> Option<f64> {
+    let pairs = |id: u16| found.iter().zip(&truth.ids).map(move |(&a, &b)| (a == id, b == id));
+    mean(truth.objects().into_iter().filter_map(|id| Overlap::count(pairs(id)).iou()))
+}

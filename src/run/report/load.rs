@@ -1,0 +1,141 @@
+//! The files of a run, as a report needs them.
+
+use crate::error::{Error, Result};
+use crate::io::{read, run_folder};
+use crate::run::history::{self, Entry};
+use crate::run::info::{self, Info};
+use crate::run::{ObjectSummary, Settings, summary};
+use serde::Deserialize;
+use serde::de::DeserializeOwned;
+use std::path::{Path, PathBuf};
+
+/// File with the times of passes, if the user put one there.
+const PROFILE: &str = "profile.json";
+
+/// A run.
+pub(super) struct Ran {
+    pub name: String,
+    pub folder: PathBuf,
+    pub settings: Settings,
+    pub info: Info,
+    pub history: Vec<Entry>,
+    /// None unless the run has ended.
+    pub metrics: Option<Metrics>,
+    pub profile: Option<Profile>,
+}
+
+/// `metrics.json`.
+#[derive(Clone, Debug, Default, Deserialize)]
+#[serde(default)]
+pub(super) struct Metrics {
+    pub steps: u32,
+    pub gaussians: u32,
+    pub loss: Option<f64>,
+    pub label_loss: Option<f64>,
+    pub objects: Vec<ObjectSummary>,
+    pub test: Option<Test>,
+}
+
+/// Mean scores of the held-out views.
+#[derive(Clone, Debug, Default, Deserialize)]
+#[serde(default)]
+pub(super) struct Test {
+    pub psnr: Option<f64>,
+    pub ssim: Option<f64>,
+    pub iou_map: Option<f64>,
+    pub iou_object: Option<f64>,
+    pub boundary_iou: Option<f64>,
+    pub object_psnr: Option<f64>,
+}
+
+/// Times of the stages of a step.
+#[derive(Clone, Debug, Default, Deserialize)]
+#[serde(default)]
+pub(super) struct Profile {
+    pub device: String,
+    pub gaussians: u32,
+    pub passes: Vec<Pass>,
+}
+
+/// Times of a pass.
+#[derive(Clone, Debug, Default, Deserialize)]
+#[serde(default)]
+pub(super) struct Pass {
+    pub stage: String,
+    pub name: String,
+    pub median_ms: f64,
+    pub share: f64,
+}
+
+/// Reads a file of JSON; none if there is none.
+pub(crate) fn json<T: DeserializeOwned>(path: &Path) -> Result<Option<T>> {
+    if !path.is_file() {
+        return Ok(None);
+    }
+    let text = read::text(path)?;
+    serde_json::from_str(&text).map(Some).map_err(|error| {
+        let place = format!("line {}", error.line());
+        Error::data(path, place, format!("has not the content that a training writes ({error}); correct or delete it"))
+    })
+}
+
+impl Ran {
+    /// Reads the files in the folder of a run. All but `config.toml` may be missing: an interrupted run lacks some.
+    pub(super) fn read(folder: &Path) -> Result<Self> {
+        if !folder.is_dir() {
+            return Err(Error::data(folder, "", "is not a folder; name the folder that a training wrote"));
+        }
+        let Some(settings) = Settings::of_model(folder)? else {
+            let problem = format!("has no {}; name the folder that a training wrote", run_folder::CONFIG);
+            return Err(Error::data(folder, "", problem));
+        };
+        let path = folder.join(history::FILE);
+        let history = if path.is_file() { history::read(&path)?.entries } else { Vec::new() };
+        let info = Info::read(&folder.join(info::FILE))?.unwrap_or_default();
+        // Without an end, the file is of another run in this folder.
+        let metrics = if info.ended.is_some() { json(&folder.join(summary::FILE))? } else { None };
+        let whole = std::path::absolute(folder).unwrap_or_else(|_| folder.to_owned());
+        let name = whole.file_name().map_or_else(|| whole.display().to_string(), |name| name.to_string_lossy().into());
+        let profile = json(&folder.join(PROFILE))?;
+        Ok(Self { name, folder: folder.to_owned(), settings, info, history, metrics, profile })
+    }
+
+    /// Returns the mean scores.
+    pub(super) fn test(&self) -> Option<&Test> {
+        self.metrics.as_ref()?.test.as_ref()
+    }
+
+    /// Returns the seconds of the training, until its end or its last line.
+    pub(super) fn seconds(&self) -> Option<f64> {
+        let last = self.history.iter().rev().find_map(|entry| match entry {
+            Entry::Steps(steps) => Some(steps.seconds),
+            _ => None,
+        });
+        self.info.ended.map(|ended| ended.seconds).or(last)
+    }
+
+    /// Returns the steps done.
+    pub(super) fn steps(&self) -> u32 {
+        let last = self.history.last().map_or(0, Entry::step);
+        self.metrics.as_ref().map_or(last, |metrics| metrics.steps)
+    }
+
+    /// Returns the number of Gaussians.
+    pub(super) fn gaussians(&self) -> Option<u64> {
+        let last = self.history.iter().rev().find_map(|entry| match entry {
+            Entry::Steps(steps) => Some(steps.gaussians),
+            _ => None,
+        });
+        self.metrics.as_ref().map(|metrics| metrics.gaussians).or(last).map(u64::from)
+    }
+}
+
+/// Gives runs of the same name the path of their folder as name.
+pub(super) fn tell_apart(runs: &mut [Ran]) {
+    let names: Vec<String> = runs.iter().map(|run| run.name.clone()).collect();
+    for run in runs {
+        if names.iter().filter(|name| **name == run.name).count() > 1 {
+            run.name = run.folder.display().to_string();
+        }
+    }
+}

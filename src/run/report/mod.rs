@@ -1,0 +1,98 @@
+//! `report.html`: a run, or several beside each other, in one file.
+//!
+//! A report is made of the files in the folders of the runs alone, without scene and device, so it can be made anew at
+//! any time. [`guide::outputs`](crate::guide::outputs) lists what it shows.
+
+mod costs;
+mod curves;
+mod head;
+mod load;
+mod objects;
+mod views;
+
+pub(crate) use load::json;
+
+use crate::error::{Error, Result};
+use crate::io::atomic;
+use crate::report::chart::colour_class;
+use crate::report::{page, section};
+use load::Ran;
+use maud::{Markup, html};
+use std::path::{Path, PathBuf};
+
+/// Name of the report of one run, in its folder.
+pub(crate) const FILE: &str = "report.html";
+
+/// Writes the report of the runs in some folders to `path`, and returns it.
+///
+/// # Errors
+///
+/// A folder that is none of a run; files in it that cannot be read; an output that cannot be written.
+pub fn write(folders: &[PathBuf], path: &Path) -> Result<PathBuf> {
+    write_with(folders, path, "")
+}
+
+/// The same with a text above the runs.
+pub(crate) fn write_with(folders: &[PathBuf], path: &Path, text: &str) -> Result<PathBuf> {
+    if folders.is_empty() {
+        return Err(Error::usage("runs", "names no run; name the folder of one or more trainings"));
+    }
+    let mut runs = folders.iter().map(|folder| Ran::read(folder)).collect::<Result<Vec<_>>>()?;
+    load::tell_apart(&mut runs);
+    let page = compose(&runs, text)?;
+    atomic::write(path, |out| out.write_all(page.as_bytes()))?;
+    Ok(path.to_owned())
+}
+
+fn compose(runs: &[Ran], text: &str) -> Result<String> {
+    let title = match runs {
+        [run] => run.name.clone(),
+        _ => format!("{} runs", runs.len()),
+    };
+    let parts = [
+        ("", head::numbers(runs)),
+        ("What was run", head::what(runs)),
+        ("Curves", curves::curves(runs)),
+        ("Objects", objects::objects(runs)),
+        ("Views", views::views(runs)?),
+        ("Time and memory", costs::costs(runs)),
+        ("Warnings", head::warnings(runs)),
+        ("Settings", head::settings(runs)),
+    ];
+    let body = html! {
+        @if !text.is_empty() { div.scroll { pre { (text) } } }
+        @for (title, part) in &parts {
+            @if title.is_empty() { (part) } @else { (section(title, part)) }
+        }
+    };
+    Ok(page(&title, &head::lead(runs), &body))
+}
+
+/// Returns a table with a column for each run; rows without any value are left out.
+fn columns(runs: &[Ran], rows: &[(String, Vec<Option<String>>)]) -> Markup {
+    let rows = rows.iter().filter(|(_, cells)| cells.iter().any(Option::is_some));
+    html! {
+        div.scroll {
+            table {
+                @if runs.len() > 1 {
+                    thead { tr { th {} @for (index, run) in runs.iter().enumerate() { th { (run_name(index, run)) } } } }
+                }
+                tbody {
+                    @for (name, cells) in rows {
+                        tr { th { (name) } @for cell in cells { td { (cell.as_deref().unwrap_or("–")) } } }
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Returns a row of [`columns`].
+fn row(runs: &[Ran], name: &str, value: impl Fn(&Ran) -> Option<String>) -> (String, Vec<Option<String>>) {
+    (name.to_owned(), runs.iter().map(value).collect())
+}
+
+/// Returns the name of a run with its colour.
+fn run_name(index: usize, run: &Ran) -> Markup {
+    html! { span.run { i class=(colour_class(index)) {} (run.name) } }
+}
