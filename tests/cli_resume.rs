@@ -33,6 +33,10 @@ fn kills_at_any_moment_cost_no_bit() {
     succeeded(&place.trained("straight", &["--config", &place.settings()]));
     let run = start.elapsed();
     assert_eq!(place.checkpoints("straight").len(), 1, "a run that has ended leaves its last one");
+    let kinds: Vec<String> = place.history("straight").iter().map(|line| line["kind"].to_string()).collect();
+    let count = |kind: &str| kinds.iter().filter(|found| found.trim_matches('"') == kind).count();
+    assert_eq!((count("steps"), count("preview"), count("scores")), (4, 6, 1), "{kinds:?}");
+    assert!(count("densified") > 0, "{kinds:?}");
     let kills = kills(KILLS);
     let mut random = Pcg32::seed_from_u64(u64::from(kills));
     let newest = || place.checkpoints("out").first().map_or((0, 0), |found| (found.number, found.step));
@@ -65,6 +69,7 @@ fn kills_at_any_moment_cost_no_bit() {
             place.model("out", STEPS) == place.model("straight", STEPS),
             "killed after {steps:?}: the models differ"
         );
+        assert_eq!(place.history("out"), place.history("straight"), "killed after {steps:?}");
         assert!(files(&place.path("out")).iter().all(|path| path.extension().is_none_or(|name| name != "tmp")));
         assert_eq!(place.checkpoints("out").iter().map(|found| found.step).collect::<Vec<_>>(), [STEPS]);
         std::fs::remove_dir_all(place.path("out")).expect("removed");

@@ -52,6 +52,7 @@ mod pass; // each kernel against its mirror
 mod protocol; // scores of the published benchmarks
 mod registry; // every shader has a header, a mirror and a pass
 mod removal; // scores of removals, and filling from the command line
+mod report; // pages of runs, made anew and compared
 mod scheduler; // barriers, memory, faults and recorded lists of GPU work
 mod segments; // long splat lists are cut to bounded dispatches
 mod selftest; // `labelgs selftest` passes, and detects each fault

@@ -41,12 +41,8 @@ pub(super) fn train(request: Request, context: &Context) -> Result<Summary> {
         open_gpu(context)
     };
     let warnings = || log::warnings();
-    let request = &Request {
-        command: Some(typed()),
-        warnings: Some(&warnings),
-        warned_before: log::warnings().len(),
-        ..request
-    };
+    let request =
+        &Request { command: Some(typed()), warnings: Some(&warnings), warned_before: log::warnings().len(), ..request };
     let summary = run::train(request, &open, &mut Terminal { context, progress: None })?;
     if summary.stopped { interrupt::check().map(|()| summary) } else { Ok(summary) }
 }

@@ -29,7 +29,17 @@ pub struct Compared<'a> {
 impl<'a> Compared<'a> {
     /// Makes an entry for a whole view, without scores.
     pub fn new(view: &'a str, photo: &'a Photo, rgb: &'a [[f32; 3]]) -> Self {
-        Self { view, object: None, photo, rgb, labels: None, truth: None, masks: None, numbers: Vec::new(), note: String::new() }
+        Self {
+            view,
+            object: None,
+            photo,
+            rgb,
+            labels: None,
+            truth: None,
+            masks: None,
+            numbers: Vec::new(),
+            note: String::new(),
+        }
     }
 
     /// Returns a score by its name.

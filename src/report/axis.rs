@@ -68,12 +68,16 @@ mod tests {
                 let axis = Axis::new(low, high, is_rounded);
                 assert!((2..=8).contains(&axis.ticks.len()), "{axis:?}");
                 assert!(axis.low <= low && axis.high >= high, "{axis:?}");
-                let texts: std::collections::BTreeSet<String> = axis.ticks.iter().map(|&tick| axis.text(tick)).collect();
+                let texts: std::collections::BTreeSet<String> =
+                    axis.ticks.iter().map(|&tick| axis.text(tick)).collect();
                 assert_eq!(texts.len(), axis.ticks.len(), "{texts:?}");
             }
         }
         let axis = Axis::new(0.031, 0.27, true);
-        assert_eq!(axis.ticks.iter().map(|&tick| axis.text(tick)).collect::<Vec<_>>(), ["0.00", "0.05", "0.10", "0.15", "0.20", "0.25", "0.30"]);
+        assert_eq!(
+            axis.ticks.iter().map(|&tick| axis.text(tick)).collect::<Vec<_>>(),
+            ["0.00", "0.05", "0.10", "0.15", "0.20", "0.25", "0.30"]
+        );
         assert_eq!(Axis::new(0.0, 30_000.0, false).text(30_000.0), "30k");
     }
 

@@ -102,7 +102,7 @@ fn mark_markup(mark: &Mark, place: f64) -> Markup {
         return html! {};
     }
     let class = mark.colour.map(colour_class).unwrap_or_default();
-    let side = if place > 0.75 { " left" } else { "" };
+    let side = if place > 0.5 { " left" } else { "" };
     html! {
         span class=(format!("mark{side} {class}")) style=(format!("left:{:.2}%", 100.0 * place)) title=(mark.text) {
             @if mark.colour.is_none() { b { (mark.text) } }

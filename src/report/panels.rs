@@ -31,6 +31,11 @@ pub(crate) fn difference(photo: &Photo, rgb: &[[f32; 3]]) -> Vec<[u8; 3]> {
     photo.rgba.iter().zip(rgb).map(of).collect()
 }
 
+/// Returns a difference that is easier to see.
+pub(crate) fn brighter(difference: &[[u8; 3]], times: u8) -> Vec<[u8; 3]> {
+    difference.iter().map(|colour| colour.map(|value| value.saturating_mul(times))).collect()
+}
+
 /// Returns the display colours of a map of labels.
 pub(crate) fn label_pixels(map: &LabelMap) -> Vec<[u8; 3]> {
     map.ids.iter().map(|&id| label_colour(u32::from(id))).collect()

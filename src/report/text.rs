@@ -58,10 +58,19 @@ mod tests {
 
     #[test]
     fn numbers_read_well() {
-        assert_eq!((number(Some(1.25), 1), number(None, 2), number(Some(f64::NAN), 2)), ("1.2".into(), "–".into(), "–".into()));
-        assert_eq!((count(0), count(999), count(1_234_567)), ("0".into(), "999".into(), "1\u{202f}234\u{202f}567".into()));
+        assert_eq!(
+            (number(Some(1.25), 1), number(None, 2), number(Some(f64::NAN), 2)),
+            ("1.2".into(), "–".into(), "–".into())
+        );
+        assert_eq!(
+            (count(0), count(999), count(1_234_567)),
+            ("0".into(), "999".into(), "1\u{202f}234\u{202f}567".into())
+        );
         assert_eq!((bytes(3 << 20), bytes(3 << 29)), ("3.0 MiB".into(), "1.50 GiB".into()));
-        assert_eq!((duration(9.04), duration(125.2), duration(7260.0)), ("9.0 s".into(), "2 min 05 s".into(), "2 h 01 min".into()));
+        assert_eq!(
+            (duration(9.04), duration(125.2), duration(7260.0)),
+            ("9.0 s".into(), "2 min 05 s".into(), "2 h 01 min".into())
+        );
     }
 
     #[test]

@@ -8,6 +8,7 @@ use crate::gpu::Gpu;
 use crate::io::atomic;
 use crate::scene::Dataset;
 use crate::scheduler::SchedulerOptions;
+use crate::train::Trainer;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -66,7 +67,7 @@ pub(crate) struct Memory {
     pub device_peak: Option<u64>,
     /// The most that the process had in the host's memory.
     pub host_peak: Option<u64>,
-    /// The largest buffers of the last plan, and the bytes of all others.
+    /// The largest buffers of the last plan.
     pub buffers: Vec<(String, u64)>,
 }
 
@@ -119,6 +120,13 @@ impl Info {
             pictures: Vec::new(),
             ..info
         }
+    }
+
+    /// Notes the plan of the first model's memory. A run that goes on keeps that of its begin.
+    pub(super) fn plan(&mut self, trainer: &mut Trainer) {
+        let engine = trainer.engine_mut();
+        let plan = Engine::predict(engine.gpu(), engine.size(), SchedulerOptions::default());
+        self.memory.planned_start = self.memory.planned_start.or(plan.ok().map(|plan| plan.total));
     }
 
     /// Reads the file; none if there is none.

@@ -9,8 +9,8 @@ mod finish;
 pub(crate) mod history;
 pub(crate) mod info;
 pub(crate) mod models;
-pub(crate) mod observer;
 mod objects;
+pub(crate) mod observer;
 mod occluders;
 mod pictures;
 mod prepare;
@@ -23,10 +23,10 @@ mod steps;
 mod summary;
 
 pub use models::latest_model;
-pub use report::write as write_report;
-pub use observer::{Event, Flow, Live, Observer};
 pub use objects::ObjectSummary;
+pub use observer::{Event, Flow, Live, Observer};
 pub use occluders::OccluderFiles;
+pub use report::write as write_report;
 pub use settings::{RunOptions, Settings};
 pub use summary::Summary;
 
@@ -181,7 +181,9 @@ impl Run<'_> {
                 }
                 Flow::Pause => {
                     let step = self.trainer.steps_done();
-                    flow = self.observer.on(&Event::Paused { step }, &mut Live::new(&mut self.trainer, &mut self.history))?;
+                    flow = self
+                        .observer
+                        .on(&Event::Paused { step }, &mut Live::new(&mut self.trainer, &mut self.history))?;
                 }
             }
         }

@@ -16,13 +16,16 @@ const VIEWS: usize = 6;
 /// Most bytes of all copies.
 const BYTES_MAX: usize = 6 << 20;
 
+/// Factor of the differences; those of a trained scene are dark.
+const BRIGHTER: u8 = 4;
+
 /// The pictures of a view: name in the page, name of the file.
 pub(crate) const KINDS: [(&str, &str); 5] = [
     ("photo", "photo.jpg"),
     ("render", "render.jpg"),
     ("labels", "labels.png"),
     ("masks", "masks.png"),
-    ("difference", "difference.jpg"),
+    ("4 × difference", "difference.jpg"),
 ];
 
 /// Returns the path of a picture.
@@ -53,7 +56,7 @@ impl Watch for Worst {
             copy(&render, Kind::Smooth)?,
             map(picture.labels)?,
             map(picture.truth)?,
-            copy(&panels::difference(picture.photo, picture.rgb), Kind::Smooth)?,
+            copy(&panels::brighter(&panels::difference(picture.photo, picture.rgb), BRIGHTER), Kind::Smooth)?,
         ];
         let iou = picture.labels.zip(picture.truth).and_then(|(found, truth)| label_iou(&found.ids, truth));
         let (view, ssim) = (picture.view.to_owned(), picture.number("SSIM"));

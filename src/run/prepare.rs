@@ -128,13 +128,14 @@ pub(super) fn begin<'a>(
     };
     let after = resumed.as_ref().map_or(0, |resumed| resumed.state.step);
     let sums = resumed.as_ref().map(|resumed| resumed.record.history).unwrap_or_default();
-    let info = Info::new(request, after, inputs.masks.as_deref(), &dataset, &gpu);
+    let mut info = Info::new(request, after, inputs.masks.as_deref(), &dataset, &gpu);
     let history = Recorder::new(out, (after, settings.train.iterations), sums);
     let checkpoints = Checkpoints::new(out, lock, record, resumed.as_ref().map(|resumed| &resumed.state))?;
-    let trainer = match resumed {
+    let mut trainer = match resumed {
         Some(resumed) => Trainer::resume(gpu, &dataset, resumed.state, options)?,
         None => start(gpu, &settings.train, &dataset, table.as_ref(), options)?,
     };
+    info.plan(&mut trainer);
     // The near plane is decided now.
     let settings = Settings { train: trainer.config().clone(), ..settings };
     Ok(Run {

@@ -20,7 +20,8 @@ pub(super) fn write(run: &mut Run) -> Result<Option<PathBuf>> {
     // The preview of a stopped run is not on the schedule, which a run that goes on keeps.
     if !run.stopped {
         let finite = |value: f64| Some(value).filter(|value| value.is_finite());
-        let iou = view.mask.as_deref().filter(|_| !rendered.labels.is_empty());
+        let has_labels = !rendered.labels.is_empty() && run.trainer.config().labels_at(run.trainer.steps_done());
+        let iou = view.mask.as_deref().filter(|_| has_labels);
         run.history.put(&Entry::Preview(Scored {
             step: run.trainer.steps_done(),
             view: Some(view.name.clone()),

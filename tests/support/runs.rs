@@ -109,6 +109,18 @@ impl Place {
         checkpoint_folder::list(&self.path(out)).expect("a list")
     }
 
+    /// The history of a run without its times.
+    pub fn history(&self, out: &str) -> Vec<serde_json::Value> {
+        let text = std::fs::read_to_string(self.path(out).join("history.jsonl")).expect("a history");
+        assert!(text.ends_with('\n'), "a run that has ended leaves whole lines");
+        let mut lines = lines(&text).expect("JSON");
+        for line in &mut lines {
+            let line = line.as_object_mut().expect("an object");
+            line.retain(|key, _| !["ms", "seconds"].contains(&key.as_str()));
+        }
+        lines
+    }
+
     /// Bytes of the model of a step.
     pub fn model(&self, out: &str, step: u32) -> Vec<u8> {
         let path = self.path(out).join(format!("point_cloud/iteration_{step}/point_cloud.ply"));
@@ -149,6 +161,12 @@ pub fn copy(from: &Path, to: &Path) {
     }
 }
 
+/// The whole lines of a history.
+fn lines(text: &str) -> Result<Vec<serde_json::Value>, String> {
+    let whole = text.split_inclusive('\n').filter(|line| line.ends_with('\n'));
+    whole.map(|line| serde_json::from_str(line).map_err(|error| error.to_string())).collect()
+}
+
 /// Number of kills of a test; `LABELGS_TEST_KILLS` overrides it.
 pub fn kills(usual: u32) -> u32 {
     std::env::var("LABELGS_TEST_KILLS").ok().and_then(|kills| kills.parse().ok()).unwrap_or(usual)
@@ -167,7 +185,10 @@ pub fn all_whole(out: &Path) {
             Some("ply") => read_model(&path).map(drop).map_err(|error| error.to_string()),
             Some("json") => serde_json::from_str::<serde_json::Value>(&read()).map(drop).map_err(|e| e.to_string()),
             Some("toml") => toml::from_str::<toml::Table>(&read()).map(drop).map_err(|error| error.to_string()),
-            Some("png") => image::open(&path).map(drop).map_err(|error| error.to_string()),
+            // A kill may leave a part of its last line.
+            Some("jsonl") => lines(&read()).map(drop),
+            Some("html") if read().ends_with("</html>\n") => Ok(()),
+            Some("png" | "jpg") => image::open(&path).map(drop).map_err(|error| error.to_string()),
             _ => Err("what is this?".to_owned()),
         };
         whole.unwrap_or_else(|error| panic!("{}: {error}", path.display()));

@@ -97,7 +97,8 @@ pub(super) fn settings(runs: &[Ran]) -> Markup {
     let defaults = Settings::default().texts();
     let texts: Vec<_> = runs.iter().map(|run| run.settings.texts()).collect();
     let changed = Settings::keys().filter(|key| texts.iter().any(|own| own.get(key.name) != defaults.get(key.name)));
-    let rows: Vec<_> = changed.map(|key| (key.name, texts.iter().map(|own| own.get(key.name)).collect::<Vec<_>>())).collect();
+    let rows: Vec<_> =
+        changed.map(|key| (key.name, texts.iter().map(|own| own.get(key.name)).collect::<Vec<_>>())).collect();
     let default = |key: &str| match defaults.get(key).map(String::as_str) {
         None => AUTOMATIC,
         Some("0" | "0.0") if ["near", "budget"].contains(&key) => AUTOMATIC,

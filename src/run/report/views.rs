@@ -24,7 +24,7 @@ pub(super) fn views(runs: &[Ran]) -> Result<Markup> {
     let figures: Vec<&Figure> = figures.iter().filter(|figure| !figure.panels.is_empty()).collect();
     Ok(html! {
         @if figures.is_empty() { p.quiet { "There are no pictures: the run has not ended, or holds out no views." } }
-        @else { p.quiet { "The held-out views with the lowest PSNR. A difference is that of colours." } }
+        @else { p.quiet { "The held-out views with the lowest PSNR." } }
         @for figure in figures { (figure.markup()) }
         @if book.is_full { p.quiet { "More pictures would make this page too large." } }
     })
@@ -37,8 +37,7 @@ fn single(book: &mut Book, run: &Ran, view: &Pictured) -> Result<Figure> {
     }
     let numbers = [("PSNR", view.psnr, 2, " dB"), ("SSIM", view.ssim, 4, ""), ("IoU", view.iou, 4, "")];
     let numbers = numbers.into_iter().filter(|(_, value, ..)| value.is_some());
-    let numbers =
-        numbers.map(|(name, value, digits, unit)| (name.to_owned(), number(value, digits) + unit)).collect();
+    let numbers = numbers.map(|(name, value, digits, unit)| (name.to_owned(), number(value, digits) + unit)).collect();
     Ok(Figure { view: view.view.clone(), numbers, panels, ..Figure::default() })
 }
 
