@@ -100,6 +100,8 @@ fn an_ablation_compares_variants() {
     let rows = record["rows"].as_array().expect("rows");
     assert_eq!(rows.len(), 3);
     assert!(rows.iter().all(|row| row["runs"][0]["scores"]["psnr"].as_f64() > Some(5.0)), "{record}");
+    let page = std::fs::read_to_string(Path::new(&out).join("report.html")).expect("a page");
+    assert!(page.contains("3 runs") && page.contains("half-0") && page.contains("quoted from the paper"));
     let wrong = labelgs(&["ablate", &scene, "--masks", &masks, "-o", &out, "--row", "x=--no-such-flag 1"], 2);
     assert!(wrong.contains("x: ") && wrong.contains("--no-such-flag"), "{wrong}");
 }

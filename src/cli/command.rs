@@ -65,10 +65,6 @@ pub enum Command {
     ///
     /// Example: labelgs eval out --scene scene --masks scene/masks
     Eval(Box<EvalArgs>),
-    /// Write the report of a training anew, or compare several trainings in one page.
-    ///
-    /// Example: labelgs report out
-    Report(ReportArgs),
     /// Show the labels of a model: Gaussians, position, size and name of each.
     ///
     /// Example: labelgs list out
@@ -85,6 +81,10 @@ pub enum Command {
     ///
     /// Example: labelgs render out --scene scene --only 3 -o pictures
     Render(RenderArgs),
+    /// Write the report of a training anew, or compare several trainings in one page.
+    ///
+    /// Example: labelgs report out
+    Report(ReportArgs),
     /// Write a model with the chosen objects in another colour.
     ///
     /// Example: labelgs recolour out --labels barrel --colour 0.9,0.1,0.1 --mix 0.7 -o red.ply

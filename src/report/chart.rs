@@ -70,7 +70,7 @@ impl Chart {
                         span.y style=(format!("bottom:{}", percent(y.place(tick)))) { (y.text(tick)) }
                     }
                     @for &tick in &x.ticks { span.x style=(format!("left:{}", percent(x.place(tick)))) { (x.text(tick)) } }
-                    @for mark in &self.marks { (mark_markup(mark, x.place(mark.step))) }
+                    @for (index, mark) in self.marks.iter().enumerate() { (mark_markup(mark, index, x.place(mark.step))) }
                     svg viewBox="0 0 1000 1000" preserveAspectRatio="none" role="img" aria-label=(self.title) {
                         @for (series, points) in series.iter().zip(&thinned) {
                             (curve(series, points, &x, &y))
@@ -97,14 +97,16 @@ fn curve(series: &Series, points: &[(f64, f64)], x: &Axis, y: &Axis) -> Markup {
     html! { polyline class=(class) data-name=(series.name) points=(text.trim_end()) {} }
 }
 
-fn mark_markup(mark: &Mark, place: f64) -> Markup {
+/// A mark; texts stand in two lines in turn, because neighbours may be close.
+fn mark_markup(mark: &Mark, index: usize, place: f64) -> Markup {
     if !(0.0..=1.0).contains(&place) {
         return html! {};
     }
     let class = mark.colour.map(colour_class).unwrap_or_default();
     let side = if place > 0.5 { " left" } else { "" };
+    let line = if index % 2 == 1 { " low" } else { "" };
     html! {
-        span class=(format!("mark{side} {class}")) style=(format!("left:{:.2}%", 100.0 * place)) title=(mark.text) {
+        span class=(format!("mark{side}{line} {class}")) style=(format!("left:{:.2}%", 100.0 * place)) title=(mark.text) {
             @if mark.colour.is_none() { b { (mark.text) } }
         }
     }
