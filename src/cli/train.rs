@@ -40,9 +40,9 @@ pub(super) fn train(request: Request, context: &Context) -> Result<Summary> {
         interrupt::check()?;
         open_gpu(context)
     };
-    let warnings = || log::warnings();
-    let request =
-        &Request { command: Some(typed()), warnings: Some(&warnings), warned_before: log::warnings().len(), ..request };
+    let before = log::warnings().len();
+    let warnings = || log::warnings().split_off(before);
+    let request = &Request { command: Some(typed()), warnings: Some(&warnings), ..request };
     let summary = run::train(request, &open, &mut Terminal { context, progress: None })?;
     if summary.stopped { interrupt::check().map(|()| summary) } else { Ok(summary) }
 }

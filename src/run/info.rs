@@ -1,7 +1,7 @@
 //! `run.json`: what was run, on what, and what it said. The report is made from it.
 
 use super::history::{Entry, Recorder};
-use super::{Request, Run, Warnings};
+use super::{Request, Run};
 use crate::engine::Engine;
 use crate::error::Result;
 use crate::gpu::Gpu;
@@ -139,10 +139,12 @@ impl Info {
         atomic::write_json(&out.join(FILE), self)
     }
 
-    pub(super) fn warned(&mut self, text: String) {
-        if let Some(part) = self.parts.last_mut() {
+    /// Adds a warning, once.
+    fn warned(&mut self, text: &str) {
+        let is_known = self.parts.iter().any(|part| part.warnings.iter().any(|known| known == text));
+        if let Some(part) = self.parts.last_mut().filter(|_| !is_known) {
             match part.warnings.len() {
-                0..WARNINGS_MAX => part.warnings.push(text),
+                0..WARNINGS_MAX => part.warnings.push(text.to_owned()),
                 WARNINGS_MAX => part.warnings.push("there were more warnings than are kept here".to_owned()),
                 _ => {}
             }
@@ -150,35 +152,17 @@ impl Info {
     }
 }
 
-/// Collects the warnings of a run.
-pub(super) struct Warned<'a> {
-    /// The program's log, and the number of warnings in it before this run.
-    log: Option<(&'a Warnings<'a>, usize)>,
-    taken: usize,
-}
-
-impl<'a> Warned<'a> {
-    pub(super) fn new(request: &'a Request) -> Self {
-        Self { log: request.warnings.map(|log| (log, request.warned_before)), taken: 0 }
-    }
-}
-
 impl Run<'_> {
     /// Notes a warning that the run itself gives.
     pub(super) fn note_warning(&mut self, text: &str) {
         self.history.put(&Entry::Warning { step: self.trainer.steps_done(), text: text.to_owned() });
-        // A log has it too.
-        if self.warned.log.is_none() {
-            self.info.warned(text.to_owned());
-        }
+        self.info.warned(text);
     }
 
     /// Writes `run.json` with the warnings until now.
     pub(super) fn write_info(&mut self) -> Result<()> {
-        if let Some((log, before)) = self.warned.log {
-            let new: Vec<String> = log().into_iter().skip(before + self.warned.taken).collect();
-            self.warned.taken += new.len();
-            new.into_iter().for_each(|text| self.info.warned(text));
+        if let Some(log) = self.request.warnings {
+            log().iter().for_each(|text| self.info.warned(text));
         }
         self.info.write(&self.request.output)
     }

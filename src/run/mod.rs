@@ -39,7 +39,7 @@ use crate::scene::{Dataset, View};
 use crate::train::Trainer;
 use checkpoints::Checkpoints;
 use history::Recorder;
-use info::{Info, Warned};
+use info::Info;
 use models::Models;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
@@ -88,13 +88,11 @@ pub struct Request<'a> {
     pub restart: bool,
     /// The command as it was typed, for the report.
     pub command: Option<String>,
-    /// The warnings of the log, for the report. Without it, the report has only those of the run itself.
+    /// The warnings of the log since the run began, for the report. Without it, the report has only those of the run itself.
     pub warnings: Option<&'a Warnings<'a>>,
-    /// The number of warnings in the log that belong to other work before.
-    pub warned_before: usize,
 }
 
-/// Returns the text of all warnings that the log has had so far.
+/// Returns the text of all warnings so far.
 pub type Warnings<'a> = dyn Fn() -> Vec<String> + 'a;
 
 impl<'a> Request<'a> {
@@ -109,7 +107,6 @@ impl<'a> Request<'a> {
             restart: false,
             command: None,
             warnings: None,
-            warned_before: 0,
         }
     }
 }
@@ -162,7 +159,6 @@ struct Run<'a> {
     models: Models,
     history: Recorder,
     info: Info,
-    warned: Warned<'a>,
     observer: &'a mut dyn Observer,
     stopped: bool,
 }

@@ -2,7 +2,7 @@
 
 use super::checkpoints::Checkpoints;
 use super::history::{Recorder, Sums};
-use super::info::{Info, Warned};
+use super::info::Info;
 use super::models::Models;
 use super::resume::{self, Record, Resumed, absolute};
 use super::{Inputs, Observer, OccluderFiles, Request, Run, Settings, Start, occluders};
@@ -151,7 +151,6 @@ pub(super) fn begin<'a>(
         models,
         history,
         info,
-        warned: Warned::new(request),
         observer,
         stopped: false,
     })
