@@ -51,6 +51,9 @@ impl Chart {
         if thinned.is_empty() {
             return html! {};
         }
+        // Curves of one colour belong together, and the first of them names them.
+        let is_named = |at: usize| !series[..at].iter().any(|before| before.colour == series[at].colour);
+        let named: Vec<&Series> = (0..series.len()).filter(|&at| is_named(at)).map(|at| series[at]).collect();
         let ((first, last), (low, high)) = (ends(|point| point.0), ends(|point| point.1));
         let x = Axis::new(first.min(0.0), last, false);
         let y = Axis::new(if self.from_zero { low.min(0.0) } else { low }, high, true);
@@ -60,8 +63,8 @@ impl Chart {
                 figcaption {
                     strong { (self.title) }
                     @if !self.note.is_empty() { " " span.quiet { (self.note) } }
-                    @if series.len() > 1 {
-                        ul.legend { @for series in &series { li { i class=(colour_class(series.colour)) {} (series.name) } } }
+                    @if named.len() > 1 {
+                        ul.legend { @for series in &named { li { i class=(colour_class(series.colour)) {} (series.name) } } }
                     }
                 }
                 div.plot {

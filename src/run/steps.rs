@@ -23,10 +23,10 @@ pub(super) fn steps(run: &mut Run) -> Result<()> {
         if step < last {
             write_between(run, step)?;
         }
-        if run.checkpoints.due(step, last) {
-            if let Some(path) = run.save_due()? {
-                run.tell(Event::Checkpoint { step, path: &path })?;
-            }
+        if run.checkpoints.due(step, last)
+            && let Some(path) = run.save_due()?
+        {
+            run.tell(Event::Checkpoint { step, path: &path })?;
         }
         if run.stopped {
             break;

@@ -39,7 +39,7 @@ fn losses(runs: &[Ran]) -> Vec<Chart> {
         ("largest photo loss of ten steps", |steps| steps.loss_max),
     ];
     let is_there = |part: &(&str, fn(&Steps) -> f64)| {
-        part.0 != "label loss" || runs.iter().flat_map(|run| &run.history).any(|entry| is_labelled(entry))
+        part.0 != "label loss" || runs.iter().flat_map(|run| &run.history).any(is_labelled)
     };
     let parts = parts.into_iter().filter(is_there);
     if let [run] = runs {
