@@ -32,7 +32,7 @@ fn a_report_is_made_anew_and_compares_runs() {
     table["labels"][0]["name"] = HOSTILE.into();
     std::fs::write(&names, table.to_string()).expect("names");
     let out = "<b>bold out";
-    let flags = ["--config", &place.settings(), "--iterations", "20", "--label-rule", "votes"];
+    let flags = ["--config", &place.settings(), "--iterations", "20", "--label-rule", "votes", "--densify-until", "15"];
     succeeded(&place.trained(out, &flags));
     let page = read(&place.path(out).join("report.html"));
     is_harmless(&page);
