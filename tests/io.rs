@@ -4,6 +4,7 @@ mod checkpoint;
 mod colmap;
 mod depths;
 pub mod fixtures;
+mod formats;
 mod init;
 mod label_table;
 mod mask_check;

@@ -3,6 +3,8 @@
 use super::ablate::AblateArgs;
 use super::args::GlobalArgs;
 use super::check::CheckArgs;
+use super::clean::CleanArgs;
+use super::convert::ConvertArgs;
 use super::densify::DensifyArgs;
 use super::devices::DevicesArgs;
 use super::eval::EvalArgs;
@@ -22,6 +24,7 @@ use super::selftest::SelftestArgs;
 use super::split_components::SplitArgs;
 use super::synth::SynthArgs;
 use super::train_args::TrainArgs;
+use super::transform::TransformArgs;
 use super::wording::flag;
 use crate::run::Settings;
 use clap::{CommandFactory, Parser, Subcommand};
@@ -101,6 +104,18 @@ pub enum Command {
     ///
     /// Example: labelgs split-components out --labels 3 --specks drop -o parts.ply
     SplitComponents(SplitArgs),
+    /// Write a model in another format, by the ending of the file, or a file for each object.
+    ///
+    /// Example: labelgs convert out scene.spz
+    Convert(ConvertArgs),
+    /// Write a model without faint, huge, lonely or far Gaussians.
+    ///
+    /// Example: labelgs clean out --min-opacity 0.02 --max-gap 10 -o clean.ply
+    Clean(CleanArgs),
+    /// Write a model turned upright, scaled or moved.
+    ///
+    /// Example: labelgs transform out --up z --scale 0.5 --origin 0,0,1 -o upright.ply
+    Transform(TransformArgs),
     /// Write a model with labels from masks, for a model of any trainer.
     ///
     /// Example: labelgs label out --scene scene --masks scene/masks -o labelled.ply

@@ -3,12 +3,13 @@
 use super::args::{JsonFlag, SceneArgs};
 use super::context::{Context, open_model};
 use super::log::Progress;
+use super::output::WriteArgs;
 use super::scene::{near_plane, open_gpu, open_scene};
 use super::stdout;
 use super::values::{near, switch};
 use crate::edit::select::summarise;
 use crate::io::label_table::LabelTable;
-use crate::io::model::write_model;
+use crate::io::model::export_model;
 use crate::label::vote::lift::Lift;
 use crate::label::vote::model::{Counting, columns_of, label_by_lift, label_by_votes, vote_engine};
 use crate::scene::View;
@@ -34,6 +35,9 @@ pub struct LabelArgs {
     /// File to write.
     #[arg(short, long, value_name = "OUT.ply")]
     pub output: PathBuf,
+    /// How it is written.
+    #[command(flatten)]
+    pub write: WriteArgs,
     /// How a Gaussian gets its label: by the votes of all views, or as in the paper's training, from the last view in
     /// which it is the main Gaussian of a pixel. --seed draws the order of the views.
     #[arg(long, value_name = "RULE", value_enum, default_value = "votes", help_heading = "Labels")]
@@ -106,8 +110,7 @@ pub(crate) fn run(args: &LabelArgs, context: &Context) -> Result<()> {
     }
     drop(progress);
     let seconds = start.elapsed().as_secs_f64();
-    write_model(&args.output, &model)?;
-    LabelTable::put(LabelTable::of_folder(&args.masks)?.as_ref(), &LabelTable::beside(&args.output))?;
+    export_model(&args.output, &model, LabelTable::of_folder(&args.masks)?.as_ref(), args.write.options())?;
     let rows = summarise(&model);
     if context.json || args.json.json {
         return stdout::print_json(&json!({

@@ -1,13 +1,14 @@
 //! Reads a model with the names of its labels, and writes it after an edit.
 
 use super::args::JsonFlag;
-use super::context::{Context, open_model};
+use super::context::{Context, open_read};
+use super::output::WriteArgs;
 use super::stdout;
 use super::values::share;
 use crate::edit::catalogue::Catalogue;
 use crate::edit::select::{MIN_LABEL_CONFIDENCE, extract};
 use crate::io::label_table::LabelTable;
-use crate::io::model::write_model;
+use crate::io::model::export_model;
 use crate::scene::Gaussians;
 use crate::{Error, Result};
 use clap::Args;
@@ -18,16 +19,17 @@ use std::path::{Path, PathBuf};
 /// Source of the names of labels.
 #[derive(Args, Clone, Debug, Default)]
 pub struct TableArg {
-    /// Table with the names of labels. Default: MODEL.labels.json beside the PLY, or labels.json of its run.
+    /// Table with the names of labels. Default: MODEL.labels.json beside the model, labels.json of its run, or the names in the
+    /// file of the model.
     #[arg(long, value_name = "FILE", help_heading = "Labels")]
     pub label_table: Option<PathBuf>,
 }
 
 impl TableArg {
-    /// Reads the table of a model, if there is one.
-    pub fn open(&self, model: &Path) -> Result<Option<LabelTable>> {
+    /// Reads the table of a model, if there is one; `own` are the names in its file.
+    pub fn open(&self, model: &Path, own: Option<LabelTable>) -> Result<Option<LabelTable>> {
         let path = self.label_table.clone().or_else(|| LabelTable::find_for_model(model));
-        path.map(|path| LabelTable::read(&path)).transpose()
+        path.map_or(Ok(own), |path| LabelTable::read(&path).map(Some))
     }
 }
 
@@ -40,6 +42,9 @@ pub struct EditArgs {
     /// File to write. Names of its labels go to OUT.labels.json beside it.
     #[arg(short, long, value_name = "OUT.ply")]
     pub output: PathBuf,
+    /// How it is written.
+    #[command(flatten)]
+    pub write: WriteArgs,
     /// Names.
     #[command(flatten)]
     pub table: TableArg,
@@ -73,9 +78,9 @@ impl MinConfidenceArg {
 
 /// Opens a model and counts its labels.
 pub(crate) fn open(model: &Path, table: &TableArg) -> Result<(Gaussians, Catalogue)> {
-    let gaussians = open_model(model)?;
-    let known = Catalogue::new(&gaussians, table.open(model)?);
-    Ok((gaussians, known))
+    let read = open_read(model)?;
+    let known = Catalogue::new(&read.gaussians, table.open(model, read.names)?);
+    Ok((read.gaussians, known))
 }
 
 /// The result of an edit.
@@ -86,6 +91,8 @@ pub(crate) struct Edited<'a> {
     pub model: &'a Gaussians,
     /// The names of its labels, if the source has names.
     pub table: Option<LabelTable>,
+    /// How it is written.
+    pub write: WriteArgs,
     /// Number of Gaussians of the source.
     pub of: usize,
     /// Labels that were chosen or made.
@@ -95,15 +102,14 @@ pub(crate) struct Edited<'a> {
 impl Edited<'_> {
     /// Writes model and table and prints a summary. `more` holds further fields of the JSON.
     pub(crate) fn finish(&self, print_json: bool, more: serde_json::Value) -> Result<()> {
-        let left_out = write_model(self.output, self.model)?;
+        let left_out = export_model(self.output, self.model, self.table.as_ref(), self.write.options())?;
         let beside = LabelTable::beside(self.output);
-        LabelTable::put(self.table.as_ref(), &beside)?;
         let written = self.model.len() as u64 - left_out;
         if print_json {
             let mut result = json!({
                 "schema_version": 1,
                 "output": self.output.display().to_string(),
-                "label_table": self.table.as_ref().map(|_| beside.display().to_string()),
+                "label_table": self.table.as_ref().filter(|_| beside.is_file()).map(|_| beside.display().to_string()),
                 "labels": self.labels,
                 "gaussians": written,
                 "of": self.of,

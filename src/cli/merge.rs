@@ -51,6 +51,7 @@ pub(crate) fn run(args: &MergeArgs, context: &Context) -> Result<()> {
         table = Some(give_name(&ids, table, into, name)?);
     }
     let labels = BTreeSet::from([into]);
-    let edited = Edited { output: &args.edit.output, model: &merged, table, of: model.len(), labels: &labels };
+    let (output, write) = (&args.edit.output, args.edit.write);
+    let edited = Edited { output, model: &merged, table, write, of: model.len(), labels: &labels };
     edited.finish(wants_json(context, &args.edit.json), json!({ "merged": map.keys().collect::<Vec<_>>() }))
 }

@@ -4,8 +4,10 @@ pub(crate) mod ablate;
 pub(crate) mod args;
 pub(crate) mod check;
 pub(crate) mod choose;
+pub(crate) mod clean;
 pub(crate) mod command;
 pub(crate) mod context;
+pub(crate) mod convert;
 pub(crate) mod densify;
 mod device_report;
 pub(crate) mod devices;
@@ -19,6 +21,7 @@ pub(crate) mod log;
 pub(crate) mod masks;
 pub(crate) mod merge;
 pub(crate) mod occlusion;
+pub(crate) mod output;
 pub(crate) mod plan;
 pub(crate) mod profile;
 pub(crate) mod profile_compare;
@@ -36,6 +39,7 @@ pub(crate) mod stdout;
 pub(crate) mod synth;
 pub(crate) mod train;
 pub(crate) mod train_args;
+pub(crate) mod transform;
 pub(crate) mod values;
 pub(crate) mod wording;
 
@@ -114,6 +118,9 @@ fn run(args: Vec<OsString>) -> Result<(), Exit> {
         Command::Relabel(args) => relabel::run(&args, &context),
         Command::Merge(args) => merge::run(&args, &context),
         Command::SplitComponents(args) => split_components::run(&args, &context),
+        Command::Clean(args) => clean::run(&args, &context),
+        Command::Transform(args) => transform::run(&args, &context),
+        Command::Convert(args) => convert::run(&args, &context),
         Command::Eval(args) => eval::run(&args, &context),
         Command::Report(args) => report::run(&args, &context),
         Command::Densify(args) => densify::run(&args, &context),

@@ -30,7 +30,8 @@ pub(crate) fn run(args: &RecolourArgs, context: &Context) -> Result<()> {
     let labels = select.choice.labels(&select.model, &model, &known, context)?;
     let painted = recolour(&model, &labels, args.colour, args.mix);
     let table = known.table.clone();
-    let edited = Edited { output: &select.output, model: &painted, table, of: model.len(), labels: &labels };
+    let (output, write) = (&select.output, select.write);
+    let edited = Edited { output, model: &painted, table, write, of: model.len(), labels: &labels };
     let count: u64 = labels.iter().filter_map(|label| known.gaussians.get(label)).sum();
     edited.finish(wants_json(context, &select.json), json!({ "recoloured": count }))
 }

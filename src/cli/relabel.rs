@@ -30,6 +30,7 @@ pub(crate) fn run(args: &RelabelArgs, context: &Context) -> Result<()> {
         output: &args.edit.output,
         model: &relabel(&model, map),
         table: known.table.as_ref().map(|table| renumber(table, map)),
+        write: args.edit.write,
         of: model.len(),
         labels: &map.values().copied().collect(),
     };

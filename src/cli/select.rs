@@ -4,6 +4,7 @@ use super::args::{JsonFlag, SceneArgs};
 use super::choose::ChooseArgs;
 use super::context::Context;
 use super::labelled::{Edited, MinConfidenceArg, open, wants_json};
+use super::output::WriteArgs;
 use super::scene::{near_plane, open_gpu, open_scene};
 use super::values::{distance, share};
 use crate::edit::change::without_specks;
@@ -29,6 +30,9 @@ pub struct SelectArgs {
     /// File to write. Names of its labels go to OUT.labels.json beside it.
     #[arg(short, long, value_name = "OUT.ply")]
     pub output: PathBuf,
+    /// How it is written.
+    #[command(flatten)]
+    pub write: WriteArgs,
     /// Which labels.
     #[command(flatten)]
     pub choice: ChooseArgs,
@@ -96,6 +100,7 @@ pub(crate) fn run_extract(args: &ExtractArgs, context: &Context) -> Result<()> {
         output: &select.output,
         model: &part,
         table: known.table.as_ref().map(|table| keep(table, |id| labels.contains(&id))),
+        write: select.write,
         of: model.len(),
         labels: &labels,
     };
@@ -120,6 +125,7 @@ pub(crate) fn run_remove(args: &RemoveArgs, context: &Context) -> Result<()> {
         output: &select.output,
         model: &part,
         table: known.table.as_ref().map(|table| keep(table, |id| !labels.contains(&id))),
+        write: select.write,
         of: model.len(),
         labels: &labels,
     };

@@ -40,6 +40,7 @@ pub(crate) fn run(args: &SplitArgs, context: &Context) -> Result<()> {
         output: &args.edit.output,
         model: &found.model,
         table: known.table.as_ref().map(|table| split(table, &found.ids)),
+        write: args.edit.write,
         of: model.len(),
         labels: &found.ids.values().flatten().copied().collect(),
     };

@@ -2,6 +2,7 @@
 
 use crate::edit::catalogue::Pick;
 use crate::scene::labels::LABEL_MAX;
+use glam::DVec3;
 use std::collections::BTreeMap;
 
 pub(crate) use crate::options::parse::{colour, count, switch};
@@ -110,6 +111,47 @@ pub(crate) fn share(text: &str) -> Result<f32, String> {
 pub(crate) fn distance(text: &str) -> Result<f64, String> {
     let value = text.parse().ok().filter(|value: &f64| value.is_finite() && *value >= 0.0);
     value.ok_or_else(|| format!("`{text}` is not a distance; expected 0 or more, in world units"))
+}
+
+/// Parses a factor, more than 0.
+pub(crate) fn factor(text: &str) -> Result<f64, String> {
+    let value = text.parse().ok().filter(|value: &f64| value.is_finite() && *value > 0.0);
+    value.ok_or_else(|| format!("`{text}` is not a factor; expected more than 0"))
+}
+
+/// Parses a place such as `1.5,0,-2`.
+pub(crate) fn place(text: &str) -> Result<DVec3, String> {
+    numbers(text)
+        .map(DVec3::from_array)
+        .ok_or_else(|| format!("`{text}` is not a place; expected X,Y,Z such as 1.5,0,-2"))
+}
+
+/// Parses a direction: an axis such as `-y`, or X,Y,Z.
+pub(crate) fn direction(text: &str) -> Result<DVec3, String> {
+    let (sign, axis) = text.strip_prefix('-').map_or((1.0, text), |axis| (-1.0, axis));
+    match axis {
+        "x" => Ok(sign * DVec3::X),
+        "y" => Ok(sign * DVec3::Y),
+        "z" => Ok(sign * DVec3::Z),
+        _ => numbers(text).map(DVec3::from_array).filter(|along| *along != DVec3::ZERO).ok_or_else(|| {
+            format!("`{text}` is not a direction; expected x, -x, y, -y, z, -z or X,Y,Z such as 0,0.1,1")
+        }),
+    }
+}
+
+/// Parses two corners of a box in space: the smaller coordinates first.
+pub(crate) fn corners(text: &str) -> Result<[DVec3; 2], String> {
+    let wrong = || format!("`{text}` is not a box; expected x0,y0,z0,x1,y1,z1, the smaller corner first");
+    let [a, b, c, d, e, f] = numbers(text).ok_or_else(wrong)?;
+    let (low, high) = (DVec3::new(a, b, c), DVec3::new(d, e, f));
+    if low.cmple(high).all() { Ok([low, high]) } else { Err(wrong()) }
+}
+
+/// Parses finite numbers between commas.
+fn numbers<const N: usize>(text: &str) -> Option<[f64; N]> {
+    let all: Option<Vec<f64>> =
+        text.split(',').map(|number| number.trim().parse().ok().filter(|value: &f64| value.is_finite())).collect();
+    all?.try_into().ok()
 }
 
 /// Parses a near plane, world units, more than 0.

@@ -2,20 +2,24 @@
 //!
 //! A [`Catalogue`] resolves ids and names, and [`choose`] resolves points, boxes and masks in a view. [`extract`],
 //! [`remove`], [`recolour`], [`relabel`] and [`split_components`] return changed models; [`fill()`] removes and closes the
-//! hole; [`summarise`] lists the labels.
+//! hole; [`clean()`] drops what disturbs, [`Transform`] moves a model; [`summarise`] lists the labels.
 
 pub(crate) mod catalogue;
 pub(crate) mod change;
 pub(crate) mod choose;
+pub(crate) mod clean;
 pub(crate) mod components;
 pub(crate) mod fill;
 pub(crate) mod prompt;
 pub(crate) mod rename;
 pub(crate) mod select;
+pub(crate) mod turn;
 
 pub use catalogue::{Catalogue, Pick};
 pub use change::{Specks, Split, recolour, relabel, split_components, without_specks};
+pub use clean::{Cleaned, Cleaning, clean};
 pub use components::Grouping;
 pub use fill::{Filled, SIGHT_SIDE, Sight, fill};
 pub use prompt::{Place, Prompt, choose};
 pub use select::{LabelSummary, MIN_LABEL_CONFIDENCE, extract, remove, summarise};
+pub use turn::Transform;

@@ -61,8 +61,12 @@ impl LabelTable {
 
     /// Reads a table. Another version, an invalid id, and a repeated id or name are errors.
     pub fn read(path: &Path) -> Result<Self> {
-        let text = read::text(path)?;
-        let table: Self = serde_json::from_str(&text).map_err(|error| {
+        Self::parse(path, read::text(path)?.as_bytes())
+    }
+
+    /// Like [`Self::read`], from bytes of the file `path`.
+    pub(crate) fn parse(path: &Path, text: &[u8]) -> Result<Self> {
+        let table: Self = serde_json::from_slice(text).map_err(|error| {
             let expected =
                 r#"expected {"schema_version": 1, "labels": [{"id": 1, "name": "cup", "colour": [r, g, b]}]}"#;
             Error::data(path, format!("line {}", error.line()), format!("{error}; {expected}"))

@@ -50,7 +50,10 @@ pub use image::read_photo;
 pub use init::initial_gaussians;
 pub use label_table::{LabelEntry, LabelTable};
 pub use mask::read_mask;
-pub use model::{ModelFormat, ReadModel, read_model, register, write_model};
+pub use model::{
+    Export, LabelType, ModelFormat, ModelWriter, ReadModel, SpzVersion, WriteOptions, export_model, read_model,
+    register, write_model,
+};
 pub use occlusion_table::OcclusionTable;
 pub use pipeline_file::PipelineFolder;
 pub use read_options::ReadOptions;

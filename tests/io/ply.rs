@@ -2,7 +2,7 @@
 
 use super::fixtures::*;
 use labelgs::internals::io::ply::read_points;
-use labelgs::io::{read_model, write_model};
+use labelgs::io::{LabelType, WriteOptions, export_model, read_model, write_model};
 use labelgs::scene::Gaussians;
 use std::fs;
 
@@ -52,7 +52,7 @@ fn the_layout_is_the_standard_one() {
                  f_rest_7 f_rest_8 opacity scale_0 scale_1 scale_2 rot_0 rot_1 rot_2 rot_3";
     let properties: String = names.split(' ').map(|name| format!("property float {name}\n")).collect();
     let header = format!(
-        "ply\nformat binary_little_endian 1.0\nelement vertex 1\n{properties}property uint label\nend_header\n"
+        "ply\nformat binary_little_endian 1.0\nelement vertex 1\n{properties}property float label\nend_header\n"
     );
     assert_eq!(str::from_utf8(&bytes[..header.len()]).expect("text"), header);
     let row: Vec<f32> =
@@ -62,6 +62,82 @@ fn the_layout_is_the_standard_one() {
     let expected =
         [rest[0][0], rest[1][0], rest[2][0], rest[0][1], rest[1][1], rest[2][1], rest[0][2], rest[1][2], rest[2][2]];
     assert_eq!((&row[3..6], &row[9..18], row.len()), (&[0.0; 3][..], &expected[..], 27));
+}
+
+/// Rows with `uint label` differ from those with `float label` in nothing else, and both read alike.
+#[test]
+fn labels_are_written_as_floats_integers_or_not_at_all() {
+    let scene = Scene::new();
+    let g = Gaussians { label_confidence: Some(vec![0.5, 0.75, 1.0]), ..gaussians(3, 1, true) };
+    let written = |label_type| {
+        export_model(scene.at("a.ply"), &g, None, WriteOptions { label_type, ..WriteOptions::default() })
+            .expect("written");
+        (fs::read(scene.at("a.ply")).expect("bytes"), read_model(scene.at("a.ply")).expect("read").gaussians)
+    };
+    let ((float, of_float), (uint, of_uint)) = (written(LabelType::Float), written(LabelType::Uint));
+    assert_eq!((&of_float, &of_uint), (&g, &g));
+    let rows = |bytes: &[u8]| bytes[bytes.len() - 3 * 28 * 4..].to_vec();
+    for (row, (float, uint)) in rows(&float).chunks_exact(112).zip(rows(&uint).chunks_exact(112)).enumerate() {
+        let [a, b] = [float, uint].map(|row| <[u8; 4]>::try_from(&row[108..]).expect("4 bytes"));
+        assert_eq!((&float[..108], f32::from_le_bytes(a)), (&uint[..108], u32::from_le_bytes(b) as f32), "row {row}");
+    }
+    let (bytes, without) = written(LabelType::None);
+    assert!(!String::from_utf8_lossy(&bytes).contains("label"));
+    assert_eq!(without, Gaussians { labels: None, label_confidence: None, ..g.clone() });
+    // The first whole number that a float rounds is refused before the old file is touched.
+    let mut large = g;
+    large.labels = Some(vec![1, 1 << 24, (1 << 24) + 1]);
+    let error = write_model(scene.at("a.ply"), &large).expect_err("too large").to_string();
+    assert!(error.contains("16777217") && error.contains("`uint`"), "{error}");
+    assert_eq!(fs::read(scene.at("a.ply")).expect("bytes"), bytes);
+}
+
+/// The `state` of SuperSplat: bit 0 selected, bit 1 locked, bit 2 deleted.
+#[test]
+fn the_selection_of_an_editor_becomes_labels() {
+    let scene = Scene::new();
+    let text = String::from_utf8(foreign("ascii", "\n")).expect("text").replace("ushort label", "uchar state");
+    for (state, label) in [(0, Some(0)), (1, Some(1)), (2, Some(0)), (3, Some(1)), (4, None), (5, None)] {
+        let read = read_model(scene.write("a.ply", text.replace("65535", &state.to_string()))).expect("read");
+        let labels: Vec<u32> = label.into_iter().collect();
+        assert_eq!((read.gaussians.labels, read.dropped), (Some(labels), u64::from(label.is_none())), "state {state}");
+        assert!(read.notes[0].contains("`state`"), "{:?}", read.notes);
+    }
+    // A column of labels wins.
+    let both = text.replace("char opacity", "uchar label").replace("int8 tail", "char opacity").replace(" -5 ", " 7 ");
+    assert_eq!(read_model(scene.write("a.ply", both)).expect("read").gaussians.labels, Some(vec![7]));
+}
+
+/// Positions stay 32-bit floats; the origin is in a comment and beside the file.
+#[test]
+fn a_far_origin_is_in_a_comment_and_beside_the_file() {
+    let scene = Scene::new();
+    let origin = glam::DVec3::new(448_256.0, 5_411_840.0, 0.1);
+    let g = Gaussians { origin, ..gaussians(3, 0, true) };
+    write_model(scene.at("a.ply"), &g).expect("written");
+    let bytes = fs::read(scene.at("a.ply")).expect("bytes");
+    let header = String::from_utf8_lossy(&bytes[..300]).into_owned();
+    assert!(header.contains("\ncomment labelgs world_origin 448256.0 5411840.0 0.1\n"), "{header}");
+    assert!(header.contains("property float x\n"), "{header}");
+    assert_eq!(read_model(scene.at("a.ply")).expect("read").gaussians, g);
+    // Without the comment, as after another program, the file beside it serves, unless it is of another model.
+    let text = "comment labelgs world_origin 448256.0 5411840.0 0.1\n";
+    let at = bytes.windows(text.len()).position(|part| part == text.as_bytes()).expect("the comment");
+    scene.write("a.ply", [&bytes[..at], &bytes[at + text.len()..]].concat());
+    assert_eq!(read_model(scene.at("a.ply")).expect("read").gaussians, g);
+    let beside = fs::read_to_string(scene.at("a.ply.origin.json")).expect("a file");
+    scene.write("a.ply.origin.json", beside.replace("\"gaussians\": 3", "\"gaussians\": 4"));
+    let read = read_model(scene.at("a.ply")).expect("read");
+    assert_eq!((read.gaussians.origin, read.notes.len()), (glam::DVec3::ZERO, 1));
+    for (from, to) in [("448256.0", "1e300"), ("world_origin", "origin"), ("version\": 1", "version\": 2")] {
+        scene.write("a.ply.origin.json", beside.replace(from, to));
+        assert!(refusal(read_model(scene.at("a.ply"))).contains("a.ply.origin.json: "));
+    }
+    let broken = String::from_utf8_lossy(&bytes).replace(" 0.1\n", " one\n");
+    assert!(refusal(read_model(scene.write("b.ply", broken))).contains("three numbers"));
+    // A model near the origin takes the file beside it away.
+    write_model(scene.at("a.ply"), &gaussians(3, 0, true)).expect("written");
+    assert!(!scene.path().join("a.ply.origin.json").exists());
 }
 
 /// A PLY of one Gaussian with other order and types of columns, and with unknown columns.
@@ -210,7 +286,7 @@ fn hostile_headers_are_refused_quickly() {
     assert!(refuse(good.replace("extra_flag", "f_rest_0")).contains("f_rest_"));
     assert!(refuse(good.replace("float scale_1", "quad scale_1")).contains("header"));
     assert!(refuse(good.replace("element vertex", "element points")).contains("vertex"));
-    assert!(refuse(good.replace("extra_flag", "packed_position")).contains("splat-transform"));
+    assert!(refuse(good.replace("extra_flag", "packed_position")).contains("`chunk` and `vertex`"));
     assert!(refuse(good.replace(" 300 ", " three ")).contains("three"));
     assert!(refuse(good.replace(" 300 ", " ")).contains("values"));
     assert!(refuse("solid stl".into()).contains("ply"));

@@ -4,18 +4,27 @@
 //! [`register`].
 
 mod format;
+mod glb;
+mod origin;
 mod ply;
+mod rows;
+mod side_labels;
+mod splat;
+mod spz;
+mod turn;
+mod values;
 
 use crate::error::{Error, Result};
 use crate::io::atomic;
+use crate::io::label_table::LabelTable;
 use crate::scene::Gaussians;
 use std::path::Path;
 use std::sync::{PoisonError, RwLock};
 
-pub use format::{ModelFormat, ReadModel};
+pub use format::{Export, LabelType, ModelFormat, ModelWriter, ReadModel, SpzVersion, WriteOptions};
 
 /// Formats of labelgs. The first one also serves unknown extensions, such as `/dev/stdout`.
-const SHIPPED: [&ModelFormat; 1] = [&ply::FORMAT];
+const SHIPPED: [&ModelFormat; 4] = [&ply::FORMAT, &spz::FORMAT, &glb::FORMAT, &splat::FORMAT];
 
 /// Formats that other crates have registered.
 static REGISTERED: RwLock<Vec<&'static ModelFormat>> = RwLock::new(Vec::new());
@@ -63,12 +72,52 @@ fn with_endings(path: &Path, error: Error) -> Error {
 }
 
 /// Writes a model in the format of its extension; PLY if it is unknown. Leaves out rows that are not finite and returns
-/// their number. The write is atomic.
+/// their number. The write is atomic. What the format cannot hold is logged as a warning.
 pub fn write_model(path: impl AsRef<Path>, model: &Gaussians) -> Result<u64> {
-    let path = path.as_ref();
+    write(path.as_ref(), model, None, WriteOptions::default(), false)
+}
+
+/// Like [`write_model`], with the names of the labels: in the file, where its format has a place for them, and in
+/// `NAME.labels.json` beside it. Without names, an old file of names beside it is removed.
+pub fn export_model(
+    path: impl AsRef<Path>,
+    model: &Gaussians,
+    names: Option<&LabelTable>,
+    options: WriteOptions,
+) -> Result<u64> {
+    let names = names.filter(|_| options.label_type != LabelType::None);
+    write(path.as_ref(), model, names, options, true)
+}
+
+fn write(
+    path: &Path,
+    model: &Gaussians,
+    names: Option<&LabelTable>,
+    options: WriteOptions,
+    with_table: bool,
+) -> Result<u64> {
     model.check()?;
-    let finite: Vec<usize> = (0..model.len()).filter(|&row| model.is_finite(row)).collect();
     let format = by_ending(path).unwrap_or(SHIPPED[0]);
-    atomic::write(path, |out| (format.write)(out, model, &finite))?;
-    Ok((model.len() - finite.len()) as u64)
+    let Some(writer) = format.write else {
+        let all = formats().into_iter().filter(|format| format.write.is_some());
+        let known: Vec<&str> = all.flat_map(|format| format.endings).copied().collect();
+        let problem =
+            format!("{} files are only read; formats that are written end in {}", format.name, known.join(", "));
+        return Err(Error::usage(path.display().to_string(), problem));
+    };
+    let rows: Vec<usize> = (0..model.len()).filter(|&row| model.is_finite(row)).collect();
+    let export = Export::new(model, &rows, names, options);
+    (writer.losses)(&export)?.iter().for_each(|loss| tracing::warn!("{}: {loss}", path.display()));
+    atomic::write(path, |out| (writer.write)(&export, out))?;
+    // A pipe or a device has no files beside it.
+    if path.is_file() {
+        origin::write(path, export.origin, rows.len() as u64)?;
+    }
+    if with_table {
+        match (writer.checksum, export.labels()) {
+            (Some(checksum), Some(labels)) => side_labels::write(path, &export, labels, checksum(&export))?,
+            _ => LabelTable::put(names, &LabelTable::beside(path))?,
+        }
+    }
+    Ok((model.len() - rows.len()) as u64)
 }

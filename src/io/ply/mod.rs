@@ -4,8 +4,10 @@
 //! any order and of any scalar type: a 3DGS file has 62 columns and millions of rows, and the row reader of the crate
 //! asks for each value by name.
 
+mod elements;
 mod points;
 mod table;
 
+pub(super) use elements::Elements;
 pub use points::read_points;
 pub(super) use table::Table;

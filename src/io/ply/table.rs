@@ -17,6 +17,7 @@ pub(in crate::io) struct Table {
     path: PathBuf,
     file: BufReader<Source>,
     encoding: Encoding,
+    comments: Vec<String>,
     vertex: ElementDef,
     /// Elements before `vertex`; their rows are skipped.
     before: Vec<ElementDef>,
@@ -42,7 +43,7 @@ fn size_of(scalar: &ScalarType) -> usize {
 }
 
 /// Decodes the scalar at the start of `bytes`; f64 holds every PLY scalar exactly.
-fn decode(scalar: &ScalarType, bytes: &[u8], big_endian: bool) -> f64 {
+pub(super) fn decode(scalar: &ScalarType, bytes: &[u8], big_endian: bool) -> f64 {
     macro_rules! number {
         ($type:ty, $bytes:expr) => {{
             let mut raw = [0u8; size_of::<$type>()];
@@ -68,11 +69,10 @@ impl Table {
     pub(in crate::io) fn open(path: &Path) -> Result<Self> {
         let mut file = read::open(path)?;
         let file_bytes = file.get_ref().length().map_err(Error::read(path))?;
-        let text = header_bytes(path, &mut file)?;
-        let header = parse_header(path, &text)?;
+        let (header, header_bytes) = read_header(path, &mut file)?;
         let mut elements: Vec<ElementDef> = header.elements.into_iter().map(|(_, element)| element).collect();
         if elements.iter().any(|element| element.properties.contains_key("packed_position")) {
-            let cure = "a compressed PLY; decode it first, for example with `splat-transform in.ply out.ply`";
+            let cure = "a compressed PLY, which is read as a model only; convert it to a plain PLY first";
             return Err(Error::data(path, "header", cure));
         }
         let Some(at) = elements.iter().position(|element| element.name == "vertex") else {
@@ -85,11 +85,12 @@ impl Table {
         let after = elements.len() > at + 1;
         let vertex = elements.swap_remove(at);
         elements.truncate(at);
-        let header_bytes = text.len() as u64;
+        let header_bytes = header_bytes as u64;
         Ok(Self {
             path: path.to_owned(),
             file,
             encoding: header.encoding,
+            comments: header.comments,
             vertex,
             before: elements,
             after,
@@ -101,6 +102,11 @@ impl Table {
     /// Returns the names of the vertex properties in file order.
     pub(in crate::io) fn names(&self) -> impl Iterator<Item = &str> {
         self.vertex.properties.iter().map(|(_, property)| property.name.as_str())
+    }
+
+    /// Returns the comments of the header.
+    pub(in crate::io) fn comments(&self) -> impl Iterator<Item = &str> {
+        self.comments.iter().map(String::as_str)
     }
 
     /// Returns true if the property exists and is `float` or `double`.
@@ -223,6 +229,12 @@ pub(in crate::io) struct Notes {
     pub(in crate::io) extra_bytes: u64,
 }
 
+/// Reads and parses the header; returns its length too.
+pub(super) fn read_header(path: &Path, file: &mut impl BufRead) -> Result<(Header, usize)> {
+    let text = header_bytes(path, file)?;
+    Ok((parse_header(path, &text)?, text.len()))
+}
+
 /// Reads the header including the `end_header` line, at most [`HEADER_MAX`] bytes.
 fn header_bytes(path: &Path, file: &mut impl BufRead) -> Result<Vec<u8>> {
     let mut text = Vec::new();
@@ -263,7 +275,7 @@ fn parse_header(path: &Path, text: &[u8]) -> Result<Header> {
 }
 
 /// Returns the offset and scalar type of each property of a binary row. Refuses lists.
-fn layout_of(path: &Path, element: &ElementDef) -> Result<Vec<(usize, ScalarType)>> {
+pub(super) fn layout_of(path: &Path, element: &ElementDef) -> Result<Vec<(usize, ScalarType)>> {
     let mut offset = 0;
     let mut layout = Vec::with_capacity(element.properties.len());
     for property in element.properties.values() {
@@ -277,6 +289,6 @@ fn layout_of(path: &Path, element: &ElementDef) -> Result<Vec<(usize, ScalarType
     Ok(layout)
 }
 
-fn stride_of(layout: &[(usize, ScalarType)]) -> usize {
+pub(super) fn stride_of(layout: &[(usize, ScalarType)]) -> usize {
     layout.last().map_or(0, |(offset, scalar)| offset + size_of(scalar))
 }

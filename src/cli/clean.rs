@@ -1,0 +1,57 @@
+//! `labelgs clean`.
+
+use super::context::Context;
+use super::labelled::{EditArgs, Edited, open, wants_json};
+use super::values::{corners, distance, share};
+use crate::Result;
+use crate::edit::clean::{Cleaning, clean};
+use clap::Args;
+use glam::DVec3;
+use serde_json::json;
+use std::collections::BTreeSet;
+
+/// `labelgs clean`.
+#[derive(Args, Clone, Debug)]
+#[command(group(clap::ArgGroup::new("rule").required(true).multiple(true)
+    .args(["min_opacity", "max_size", "max_gap", "inside"])))]
+pub struct CleanArgs {
+    /// Model and output.
+    #[command(flatten)]
+    pub edit: EditArgs,
+    /// Drop Gaussians with a smaller opacity, 0 to 1.
+    #[arg(long, value_name = "SHARE", value_parser = share)]
+    pub min_opacity: Option<f32>,
+    /// Drop Gaussians with a larger standard deviation along any axis, world units.
+    #[arg(long, value_name = "SIZE", value_parser = distance)]
+    pub max_size: Option<f64>,
+    /// Drop lonely Gaussians: farther from their eighth neighbour than this many times the median.
+    #[arg(long, value_name = "FACTOR", value_parser = distance)]
+    pub max_gap: Option<f64>,
+    /// Drop Gaussians with a centre outside of this box, world units.
+    #[arg(long, value_name = "x0,y0,z0,x1,y1,z1", value_parser = corners, allow_hyphen_values = true)]
+    pub inside: Option<[DVec3; 2]>,
+}
+
+/// Writes the model without what disturbs.
+pub(crate) fn run(args: &CleanArgs, context: &Context) -> Result<()> {
+    let (model, known) = open(&args.edit.model, &args.edit.table)?;
+    let CleanArgs { min_opacity, max_size, max_gap, inside, .. } = *args;
+    let (cleaned, dropped) = clean(&model, &Cleaning { min_opacity, max_size, max_gap, inside })?;
+    tracing::info!(
+        "dropped {} faint, {} huge, {} outside, {} lonely Gaussians",
+        dropped.faint,
+        dropped.huge,
+        dropped.outside,
+        dropped.lonely
+    );
+    let labels: BTreeSet<u32> = cleaned.labels.iter().flatten().copied().collect();
+    let edited = Edited {
+        output: &args.edit.output,
+        model: &cleaned,
+        table: known.table.clone(),
+        write: args.edit.write,
+        of: model.len(),
+        labels: &labels,
+    };
+    edited.finish(wants_json(context, &args.edit.json), json!({ "dropped": dropped }))
+}

@@ -1,0 +1,95 @@
+//! `labelgs convert`.
+
+use super::args::JsonFlag;
+use super::context::Context;
+use super::labelled::{Edited, TableArg, open, wants_json};
+use super::output::WriteArgs;
+use super::stdout;
+use crate::Result;
+use crate::edit::catalogue::Catalogue;
+use crate::edit::rename::keep;
+use crate::io::model::export_model;
+use crate::scene::{Gaussians, UNLABELLED};
+use clap::Args;
+use serde_json::json;
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+
+/// `labelgs convert`.
+#[derive(Args, Clone, Debug)]
+pub struct ConvertArgs {
+    /// The model: a file that ends in .ply, .spz, .glb, .sog or .splat, or the folder of a `labelgs train` run.
+    #[arg(value_name = "MODEL")]
+    pub model: PathBuf,
+    /// File to write; its ending is the format. Names of its labels go to OUT.labels.json beside it.
+    #[arg(value_name = "OUT")]
+    pub output: PathBuf,
+    /// Write a file for each label instead, such as OUT_003_cup.spz: the way to keep objects apart in programs without
+    /// labels. Gaussians without a label go to OUT_000_none.spz.
+    #[arg(long, help_heading = "Output")]
+    pub per_object: bool,
+    /// How it is written.
+    #[command(flatten)]
+    pub write: WriteArgs,
+    /// Names.
+    #[command(flatten)]
+    pub table: TableArg,
+    /// JSON.
+    #[command(flatten)]
+    pub json: JsonFlag,
+}
+
+/// Writes a model in another format.
+pub(crate) fn run(args: &ConvertArgs, context: &Context) -> Result<()> {
+    let (model, known) = open(&args.model, &args.table)?;
+    let labels: BTreeSet<u32> = known.gaussians.keys().copied().filter(|&label| label != UNLABELLED).collect();
+    let print_json = wants_json(context, &args.json);
+    if args.per_object {
+        return per_object(args, &model, &known, print_json);
+    }
+    let edited = Edited {
+        output: &args.output,
+        model: &model,
+        table: known.table.clone(),
+        write: args.write,
+        of: model.len(),
+        labels: &labels,
+    };
+    edited.finish(print_json, json!({}))
+}
+
+fn per_object(args: &ConvertArgs, model: &Gaussians, known: &Catalogue, print_json: bool) -> Result<()> {
+    let mut files = Vec::new();
+    for &label in known.gaussians.keys() {
+        let name = known.table.as_ref().and_then(|table| table.entry(label)?.name.as_deref());
+        let path = file_of(&args.output, label, name);
+        let of = |row: usize| model.labels.as_ref().map_or(UNLABELLED, |labels| labels[row]);
+        let part = model.filtered(|row| of(row) == label);
+        let names = known.table.as_ref().map(|table| keep(table, |id| id == label));
+        let left_out = export_model(&path, &part, names.as_ref(), args.write.options())?;
+        files.push((path, label, name, part.len() as u64 - left_out));
+    }
+    if print_json {
+        let rows = files.iter().map(|(path, label, name, count)| {
+            json!({ "output": path.display().to_string(), "label": label, "name": name, "gaussians": count })
+        });
+        return stdout::print_json(&json!({
+            "schema_version": 1,
+            "of": model.len(),
+            "files": rows.collect::<Vec<_>>(),
+        }));
+    }
+    let lines =
+        files.iter().map(|(path, _, _, count)| format!("{}: {count} of {} Gaussians\n", path.display(), model.len()));
+    stdout::print(&lines.collect::<String>())
+}
+
+/// The file of a label: its id and name before the ending. Characters that a file system may refuse become `_`.
+fn file_of(output: &Path, label: u32, name: Option<&str>) -> PathBuf {
+    let safe = |c: char| if c.is_alphanumeric() || c == '-' { c } else { '_' };
+    let own = if label == UNLABELLED { Some("none") } else { name };
+    let own: String = own.map(|name| format!("_{name}")).unwrap_or_default().chars().take(60).map(safe).collect();
+    let stem = output.file_stem().unwrap_or_default().to_string_lossy();
+    let ending = output.extension().map(|ending| format!(".{}", ending.to_string_lossy())).unwrap_or_default();
+    output.with_file_name(format!("{stem}_{label:03}{own}{ending}"))
+}

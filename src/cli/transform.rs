@@ -1,0 +1,50 @@
+//! `labelgs transform`.
+
+use super::context::Context;
+use super::labelled::{EditArgs, Edited, open, wants_json};
+use super::values::{direction, factor, place};
+use crate::Result;
+use crate::edit::turn::Transform;
+use clap::Args;
+use glam::{DQuat, DVec3};
+use serde_json::json;
+use std::collections::BTreeSet;
+
+/// `labelgs transform`.
+#[derive(Args, Clone, Debug)]
+#[command(group(clap::ArgGroup::new("change").required(true).multiple(true).args(["up", "scale", "origin"])))]
+pub struct TransformArgs {
+    /// Model and output.
+    #[command(flatten)]
+    pub edit: EditArgs,
+    /// Direction of the model that points up: x, -x, y, -y, z, -z or X,Y,Z. It is turned to -y, which viewers of 3DGS
+    /// files show as up. Colours that depend on the direction are turned along.
+    #[arg(long, value_name = "DIRECTION", value_parser = direction, allow_hyphen_values = true)]
+    pub up: Option<DVec3>,
+    /// Factor of all lengths.
+    #[arg(long, value_name = "FACTOR", value_parser = factor)]
+    pub scale: Option<f64>,
+    /// Place that becomes 0,0,0, before the turn.
+    #[arg(long, value_name = "X,Y,Z", value_parser = place, allow_hyphen_values = true)]
+    pub origin: Option<DVec3>,
+}
+
+/// Writes the model at another place.
+pub(crate) fn run(args: &TransformArgs, context: &Context) -> Result<()> {
+    let (model, known) = open(&args.edit.model, &args.edit.table)?;
+    let turn = args.up.map_or(Ok(DQuat::IDENTITY), Transform::upright)?;
+    let change = Transform { origin: args.origin.unwrap_or_default(), turn, scale: args.scale.unwrap_or(1.0) };
+    let moved = change.apply(&model)?;
+    let labels: BTreeSet<u32> = moved.labels.iter().flatten().copied().collect();
+    let edited = Edited {
+        output: &args.edit.output,
+        model: &moved,
+        table: known.table.clone(),
+        write: args.edit.write,
+        of: model.len(),
+        labels: &labels,
+    };
+    let turn = [turn.w, turn.x, turn.y, turn.z];
+    let more = json!({ "origin": change.origin.to_array(), "turn_wxyz": turn, "scale": change.scale });
+    edited.finish(wants_json(context, &args.edit.json), more)
+}

@@ -1,0 +1,80 @@
+//! Drops Gaussians that only disturb: faint, huge, lonely or far ones.
+
+use crate::error::{Error, Result};
+use crate::scene::Gaussians;
+use glam::DVec3;
+use kiddo::{ImmutableKdTree, SquaredEuclidean};
+use rayon::prelude::*;
+use serde::Serialize;
+use std::num::NonZero;
+
+/// The neighbour whose distance tells how lonely a Gaussian is.
+const NEIGHBOUR: usize = 8;
+
+/// What is dropped. Nothing is, by default.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Cleaning {
+    /// Least opacity after the sigmoid.
+    pub min_opacity: Option<f32>,
+    /// Largest standard deviation along any axis, world units.
+    pub max_size: Option<f64>,
+    /// Largest distance to the eighth neighbour, as a multiple of the median of that distance.
+    pub max_gap: Option<f64>,
+    /// Box of the centres: smallest and largest corner, world units.
+    pub inside: Option<[DVec3; 2]>,
+}
+
+/// Number of Gaussians dropped, each for the first reason.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct Cleaned {
+    /// Fainter than the least opacity.
+    pub faint: u64,
+    /// Larger than the largest size.
+    pub huge: u64,
+    /// Outside of the box.
+    pub outside: u64,
+    /// Farther from the others than the largest gap.
+    pub lonely: u64,
+}
+
+/// Returns the model without what `how` drops, and the numbers of dropped Gaussians. Loneliness counts among those that
+/// are left by the other rules.
+pub fn clean(model: &Gaussians, how: &Cleaning) -> Result<(Gaussians, Cleaned)> {
+    let mut counts = Cleaned::default();
+    let kept = model.filtered(|row| {
+        let opacity = 1.0 / (1.0 + (-model.opacities[row]).exp());
+        let size = model.scales[row].iter().fold(f32::MIN, |most, &scale| most.max(scale));
+        let place = model.world(row);
+        let reasons = [
+            (how.min_opacity.is_some_and(|least| opacity < least), &mut counts.faint),
+            (how.max_size.is_some_and(|most| f64::from(size).exp() > most), &mut counts.huge),
+            (how.inside.is_some_and(|[low, high]| place != place.clamp(low, high)), &mut counts.outside),
+        ];
+        match reasons.into_iter().find(|reason| reason.0) {
+            Some((_, count)) => *count += 1,
+            None => return true,
+        }
+        false
+    });
+    let Some(most) = how.max_gap else { return Ok((kept, counts)) };
+    let gaps = gaps(&kept)?;
+    let mut sorted = gaps.clone();
+    sorted.sort_by(f64::total_cmp);
+    let limit = sorted.get(sorted.len() / 2).map_or(f64::INFINITY, |median| most * median);
+    counts.lonely = gaps.iter().filter(|&&gap| gap > limit).count() as u64;
+    Ok((kept.filtered(|row| gaps[row] <= limit), counts))
+}
+
+/// Distance of each Gaussian to its eighth neighbour, or to the last one in a smaller model.
+fn gaps(model: &Gaussians) -> Result<Vec<f64>> {
+    let places: Vec<[f64; 3]> = model.means.iter().map(|mean| mean.map(f64::from)).collect();
+    // One more, because each finds itself.
+    let Some(asked) = NonZero::new((NEIGHBOUR + 1).min(places.len())) else { return Ok(Vec::new()) };
+    let tree: ImmutableKdTree<f64, 3> = ImmutableKdTree::new_from_slice(&places)
+        .map_err(|error| Error::Bug(format!("the k-d tree of the Gaussians failed: {error:?}")))?;
+    let gap = |place: &[f64; 3]| {
+        let found = tree.query(place).nearest_n::<SquaredEuclidean<f64>>(asked).execute();
+        found.iter().map(|item| item.distance).fold(0.0, f64::max).sqrt()
+    };
+    Ok(places.par_iter().map(gap).collect())
+}

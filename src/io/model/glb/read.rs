@@ -1,0 +1,261 @@
+//! Reads GLB.
+
+use super::{
+    AXES, CONFIDENCE, FEATURE, FEATURES, FLOAT, METADATA, OPACITY, ROTATION, SCALE, SPLATS, file, harmonic, harmonics,
+};
+use crate::error::{Error, Result};
+use crate::io::label_table::{LabelEntry, LabelTable};
+use crate::io::model::format::ReadModel;
+use crate::io::model::rows::{Row, Rows};
+use crate::io::model::values::log_scale;
+use crate::io::read as bytes_of;
+use crate::scene::labels::LABEL_MAX;
+use serde_json::Value;
+use std::collections::BTreeSet;
+use std::path::Path;
+
+/// Opacities at which the logit is still finite in 32 bits.
+const OPACITY_MIN: f32 = 1e-7;
+const OPACITY_MAX: f32 = 1.0 - 1e-7;
+
+struct Glb<'a> {
+    path: &'a Path,
+    root: Value,
+    binary: &'a [u8],
+}
+
+/// Columns of numbers of an accessor.
+struct Column {
+    values: Vec<f32>,
+    width: usize,
+}
+
+impl Column {
+    fn row<const N: usize>(&self, index: usize) -> [f32; N] {
+        std::array::from_fn(|at| self.values[index * self.width + at])
+    }
+}
+
+/// Reads the first primitive with Gaussians. Nodes are not applied, as this program and others write none with a turn.
+pub(super) fn read(path: &Path) -> Result<ReadModel> {
+    let bytes = bytes_of::bytes(path)?;
+    let (root, binary) = file::split(path, &bytes)?;
+    let glb = Glb { path, root, binary };
+    let mut primitives = Vec::new();
+    for mesh in glb.root["meshes"].as_array().into_iter().flatten() {
+        let all = mesh["primitives"].as_array().into_iter().flatten();
+        primitives.extend(all.filter(|primitive| primitive["extensions"][SPLATS].is_object()));
+    }
+    let Some(&primitive) = primitives.first() else {
+        return Err(glb.bad("meshes", format!("no primitive has the extension {SPLATS}; this file has no Gaussians")));
+    };
+    let packed = primitive["extensions"][SPLATS]["extensions"].as_object().and_then(|inner| inner.keys().next());
+    if let Some(packed) = packed {
+        return Err(glb
+            .bad("meshes", format!("the Gaussians are compressed by {packed}, which is not read; export without it")));
+    }
+    let mut read = glb.gaussians(primitive)?;
+    if primitives.len() > 1 {
+        let more = primitives.len() - 1;
+        read.notes.push(format!("{more} more primitives with Gaussians were left out; labelgs reads the first"));
+    }
+    let moved = |node: &Value| ["matrix", "rotation", "scale", "translation"].iter().any(|key| node.get(key).is_some());
+    if glb.root["nodes"].as_array().is_some_and(|nodes| nodes.iter().any(moved)) {
+        read.notes.push("the turns and moves of its nodes were not applied".into());
+    }
+    if primitive["extensions"][SPLATS]["colorSpace"] == "lin_rec709_display" {
+        read.notes.push("its colours are linear, and are taken for sRGB: the pictures are too dark".into());
+    }
+    Ok(read)
+}
+
+impl Glb<'_> {
+    fn bad(&self, place: &str, problem: impl Into<String>) -> Error {
+        Error::data(self.path, place, problem)
+    }
+
+    fn gaussians(&self, primitive: &Value) -> Result<ReadModel> {
+        let attribute = |name: &str, width: usize| self.attribute(primitive, name, width);
+        let needed = |name: &str, width: usize| {
+            let problem = || self.bad("attributes", format!("lacks {name}, which {SPLATS} requires"));
+            attribute(name, width)?.ok_or_else(problem)
+        };
+        let (means, quats) = (needed("POSITION", 3)?, needed(ROTATION, 4)?);
+        let (scales, opacities, sh0) = (needed(SCALE, 3)?, needed(OPACITY, 1)?, needed(&harmonic(0, 0), 3)?);
+        let has = |degree: u32| harmonics(degree).all(|name| primitive["attributes"].get(name).is_some());
+        let degree = (0..=3).rev().find(|&degree| has(degree)).unwrap_or_default();
+        let rest = harmonics(degree).map(|name| needed(&name, 3)).collect::<Result<Vec<_>>>()?;
+        let count = means.values.len() / 3;
+        let labels = self.labels(primitive, count)?;
+        let shares = attribute(CONFIDENCE, 1)?.filter(|_| labels.is_some());
+        let columns = [&quats, &scales, &opacities, &sh0].into_iter().chain(&rest).chain(&shares);
+        if columns.into_iter().any(|column| column.values.len() != count * column.width) {
+            return Err(self.bad("attributes", format!("differ in length; expected {count} of each, as of POSITION")));
+        }
+        let mut rows = Rows::new(degree, labels.is_some(), shares.is_some());
+        let mut triples = vec![[0.0; 3]; rest.len()];
+        for index in 0..count {
+            triples.iter_mut().zip(&rest).for_each(|(triple, column)| *triple = column.row(index));
+            AXES.rest(&mut triples);
+            let [x, y, z, w] = quats.row(index);
+            let [opacity] = opacities.row(index);
+            let inside = opacity.clamp(OPACITY_MIN, OPACITY_MAX);
+            rows.push(&Row {
+                position: AXES.position(means.row(index)).map(f64::from),
+                quat: AXES.quat([w, x, y, z]).map(f64::from),
+                scale: scales.row(index).map(log_scale),
+                opacity: (inside / (1.0 - inside)).ln(),
+                sh0: sh0.row(index),
+                rest: &triples,
+                label: labels.as_ref().map(|found| found.0[index]),
+                confidence: shares.as_ref().map(|column| column.values[index].clamp(0.0, 1.0)),
+            });
+        }
+        let read = rows.finish(self.path, None)?;
+        Ok(ReadModel { names: labels.and_then(|found| found.1), ..read })
+    }
+
+    /// Returns an attribute as floats, if the primitive has it.
+    fn attribute(&self, primitive: &Value, name: &str, width: usize) -> Result<Option<Column>> {
+        let Some(at) = primitive["attributes"].get(name) else { return Ok(None) };
+        let index = at.as_u64().unwrap_or(u64::MAX);
+        let place = format!("accessor {index} of {name}");
+        let accessor = usize::try_from(index).ok().and_then(|at| self.root["accessors"].get(at));
+        let Some(accessor) = accessor else { return Err(self.bad(&place, "is not there; export the file again")) };
+        let kind = ["SCALAR", "VEC2", "VEC3", "VEC4"][width - 1];
+        if accessor["type"] != kind || accessor.get("sparse").is_some() {
+            return Err(self.bad(&place, format!("is {} or sparse; expected a plain {kind}", accessor["type"])));
+        }
+        let number: fn(&[u8], bool) -> f32 = match accessor["componentType"].as_u64() {
+            Some(FLOAT) => |b, _| f32::from_le_bytes([b[0], b[1], b[2], b[3]]),
+            Some(5120) => {
+                |b, unit| if unit { (f32::from(b[0] as i8) / 127.0).max(-1.0) } else { f32::from(b[0] as i8) }
+            }
+            Some(5121) => |b, unit| if unit { f32::from(b[0]) / 255.0 } else { f32::from(b[0]) },
+            Some(5122) => |b, unit| {
+                let value = f32::from(i16::from_le_bytes([b[0], b[1]]));
+                if unit { (value / 32_767.0).max(-1.0) } else { value }
+            },
+            Some(5123) => |b, unit| {
+                let value = f32::from(u16::from_le_bytes([b[0], b[1]]));
+                if unit { value / 65_535.0 } else { value }
+            },
+            _ => return Err(self.bad(&place, "has another component type than float, and signed or not 8 or 16 bits")),
+        };
+        let size = match accessor["componentType"].as_u64() {
+            Some(5120 | 5121) => 1,
+            Some(5122 | 5123) => 2,
+            _ => 4,
+        };
+        let unit = accessor["normalized"].as_bool().unwrap_or(false);
+        let count = accessor["count"].as_u64().unwrap_or(0);
+        let (view, stride) = self.view(&place, &accessor["bufferView"])?;
+        let start = accessor["byteOffset"].as_u64().unwrap_or(0);
+        let stride = stride.unwrap_or(width as u64 * size);
+        let bytes =
+            count.checked_sub(1).map_or(Some(0), |last| last.checked_mul(stride)?.checked_add(width as u64 * size));
+        let end = bytes.and_then(|bytes| bytes.checked_add(start)).filter(|&end| end <= view.len() as u64);
+        if end.is_none() || stride < width as u64 * size {
+            let problem =
+                format!("has {count} elements of {stride} bytes from byte {start}, its view has {}", view.len());
+            return Err(self.bad(&place, format!("{problem}; the file was cut short or changed")));
+        }
+        let at = |row: u64, column: usize| (start + row * stride + column as u64 * size) as usize;
+        let value = |row: u64| (0..width).map(move |column| number(&view[at(row, column)..], unit));
+        Ok(Some(Column { values: (0..count).flat_map(value).collect(), width }))
+    }
+
+    /// Returns the bytes of a view of the numbers, and its stride.
+    fn view(&self, place: &str, index: &Value) -> Result<(&[u8], Option<u64>)> {
+        let view = index.as_u64().and_then(|at| self.root["bufferViews"].get(usize::try_from(at).ok()?));
+        let range = view.filter(|view| view["buffer"] == 0).and_then(|view| {
+            let start = usize::try_from(view["byteOffset"].as_u64().unwrap_or(0)).ok()?;
+            let length = usize::try_from(view["byteLength"].as_u64()?).ok()?;
+            self.binary.get(start..start.checked_add(length)?)
+        });
+        let problem = || {
+            self.bad(place, format!("its buffer view {index} is not in the chunk of numbers; export the file again"))
+        };
+        let stride = view.and_then(|view| view["byteStride"].as_u64());
+        range.map(|range| (range, stride)).ok_or_else(problem)
+    }
+
+    /// Returns the label of each Gaussian, and their names.
+    fn labels(&self, primitive: &Value, count: usize) -> Result<Option<(Vec<u32>, Option<LabelTable>)>> {
+        let sets = &primitive["extensions"][FEATURES]["featureIds"];
+        let own = sets.as_array().into_iter().flatten().find(|set| set["attribute"] == 0);
+        let Some(column) = self.attribute(primitive, FEATURE, 1)? else { return Ok(None) };
+        if column.values.len() != count {
+            return Err(self.bad(FEATURE, format!("has {} ids, expected {count}", column.values.len())));
+        }
+        let table = own.and_then(|set| set["propertyTable"].as_u64());
+        let rows = table.map(|table| self.table(table)).transpose()?;
+        let nothing = own.and_then(|set| set["nullFeatureId"].as_u64());
+        let mut labels = Vec::with_capacity(count);
+        for (index, &feature) in column.values.iter().enumerate() {
+            let place = format!("{FEATURE} {index}");
+            if feature.fract() != 0.0 || !(0.0..=LABEL_MAX as f32).contains(&feature) {
+                return Err(self
+                    .bad(&place, format!("is {feature}, no whole number from 0 to {LABEL_MAX}; renumber the labels")));
+            }
+            let id = match &rows {
+                _ if nothing == Some(feature as u64) => 0,
+                None => feature as u32,
+                Some(rows) => {
+                    let row = rows.get(feature as usize).ok_or_else(|| {
+                        self.bad(
+                            &place,
+                            format!("is {feature}, its table has {} rows; export the file again", rows.len()),
+                        )
+                    })?;
+                    row.0
+                }
+            };
+            labels.push(id);
+        }
+        let names = rows.map(|rows| {
+            let named = rows.into_iter().filter(|row| row.0 != 0);
+            LabelTable::new(named.map(|(id, name)| LabelEntry { name, ..LabelEntry::new(id) }).collect())
+        });
+        Ok(Some((labels, names.filter(|names| names.labels.iter().any(|entry| entry.name.is_some())))))
+    }
+
+    /// Returns the id and the name of each row of a property table. Without a column `id` the row is the id.
+    fn table(&self, index: u64) -> Result<Vec<(u32, Option<String>)>> {
+        let place = format!("property table {index}");
+        let bad = |problem: String| self.bad(&place, format!("{problem}; export the file again"));
+        let table = &self.root["extensions"][METADATA]["propertyTables"][usize::try_from(index).unwrap_or(usize::MAX)];
+        let count = table["count"].as_u64().and_then(|count| usize::try_from(count).ok()).unwrap_or(0);
+        if count == 0 || count > LABEL_MAX as usize + 1 {
+            return Err(bad(format!("has {count} rows, expected 1 to {}", LABEL_MAX + 1)));
+        }
+        let words = |view: &Value, count: usize| -> Result<Vec<u32>> {
+            let (bytes, _) = self.view(&place, view)?;
+            let words: Vec<u32> =
+                bytes.chunks_exact(4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]])).take(count).collect();
+            if words.len() == count { Ok(words) } else { Err(bad(format!("a column has fewer than {count} values"))) }
+        };
+        let properties = &table["properties"];
+        let ids = match properties["id"].get("values") {
+            Some(values) => words(values, count)?,
+            None => (0..count as u32).collect(),
+        };
+        let mut names = vec![None; count];
+        if let Some(values) = properties["name"].get("values") {
+            let (text, _) = self.view(&place, values)?;
+            let offsets = words(&properties["name"]["stringOffsets"], count + 1)?;
+            for (name, ends) in names.iter_mut().zip(offsets.windows(2)) {
+                let part = text.get(ends[0] as usize..ends[1] as usize).and_then(|part| str::from_utf8(part).ok());
+                let part = part.ok_or_else(|| bad("a name is not inside of its text".into()))?;
+                *name = (!part.is_empty()).then(|| part.to_owned());
+            }
+        }
+        let (mut seen, mut known) = (BTreeSet::new(), BTreeSet::new());
+        for (&id, name) in ids.iter().zip(&names) {
+            if id > LABEL_MAX || !seen.insert(id) || name.as_ref().is_some_and(|name| !known.insert(name)) {
+                return Err(bad(format!("the id {id} or its name is there twice, or above {LABEL_MAX}")));
+            }
+        }
+        Ok(ids.into_iter().zip(names).collect())
+    }
+}

@@ -1,0 +1,26 @@
+//! Half turns between the axes of file formats. Ours are those of COLMAP and of the 3DGS PLY: x right, y down, z forward.
+
+/// A half turn, as the signs of the axes x, y, z; two of them are negative. It is its own inverse.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct HalfTurn(pub(super) [f32; 3]);
+
+impl HalfTurn {
+    /// Turns a position.
+    pub(super) fn position(self, at: [f32; 3]) -> [f32; 3] {
+        let Self([x, y, z]) = self;
+        [x * at[0], y * at[1], z * at[2]]
+    }
+
+    /// Turns a rotation (w, x, y, z) along.
+    pub(super) fn quat(self, quat: [f32; 4]) -> [f32; 4] {
+        let Self([x, y, z]) = self;
+        [quat[0], y * z * quat[1], x * z * quat[2], x * y * quat[3]]
+    }
+
+    /// Turns the coefficients above degree 0 along: each basis function is even or odd in each axis.
+    pub(super) fn rest(self, rest: &mut [[f32; 3]]) {
+        let Self([x, y, z]) = self;
+        let signs = [y, z, x, x * y, y * z, 1.0, x * z, 1.0, y, x * y * z, y, z, x, z, x];
+        rest.iter_mut().zip(signs).for_each(|(triple, sign)| *triple = triple.map(|value| sign * value));
+    }
+}

@@ -1,0 +1,289 @@
+//! Formats of models besides PLY: what a round trip may change, what is kept, and how bad files are refused.
+
+use super::fixtures::*;
+use crate::support::device::device;
+use labelgs::engine::Engine;
+use labelgs::io::{LabelEntry, LabelTable, LabelType, SpzVersion, WriteOptions, export_model, read_model, write_model};
+use labelgs::render::{RenderOptions, render};
+use labelgs::scene::Gaussians;
+use std::fs;
+
+/// Most that a value may change in a round trip.
+#[derive(Clone, Copy)]
+struct Bounds {
+    position: f32,
+    /// Of a component of the unit rotation.
+    rotation: f32,
+    scale: f32,
+    /// Of the opacity after the sigmoid.
+    opacity: f32,
+    colour: f32,
+    /// Of coefficients of degree 1, and of higher ones.
+    harmonics: [f32; 2],
+    confidence: f32,
+}
+
+/// Half of a step of each quantised value. Positions: 12 fractional bits. Rotations: each of the three smaller components
+/// is off by up to 1 / (2 * 511 * sqrt 2) = 0.0007, and the largest one, which is what the unit length leaves, by up to
+/// three times that where all are alike. Harmonics are rounded twice: to 1/128, then to 8 or 16 of these.
+const SPZ: Bounds = Bounds {
+    position: 1.01 / 8192.0,
+    rotation: 0.0022,
+    scale: 1.01 / 32.0,
+    opacity: 1.01 / 510.0,
+    colour: 1.01 / 76.5,
+    harmonics: [4.51 / 128.0, 8.51 / 128.0],
+    confidence: 1.01 / 510.0,
+};
+
+/// Floats throughout. Rotations lose their length; sizes and opacities go through an exponential and back, each rounded
+/// to 24 bits.
+const GLB: Bounds = Bounds {
+    position: 0.0,
+    rotation: 1e-6,
+    scale: 1e-5,
+    opacity: 1e-6,
+    colour: 0.0,
+    harmonics: [0.0; 2],
+    confidence: 0.0,
+};
+
+/// Numbers from a fixed sequence, from `low` to `high`.
+struct Numbers(u64);
+
+impl Numbers {
+    fn from(&mut self, low: f32, high: f32) -> f32 {
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        low + (high - low) * ((self.0 >> 40) as f32 / (1_u64 << 24) as f32)
+    }
+
+    fn triple(&mut self, low: f32, high: f32) -> [f32; 3] {
+        [0; 3].map(|_| self.from(low, high))
+    }
+}
+
+/// A model of usual values; rotations have any length and sign.
+fn model(count: usize, degree: u32, labelled: bool) -> Gaussians {
+    let mut n = Numbers(7);
+    let mut g = Gaussians { sh_degree: degree, ..Gaussians::default() };
+    for _ in 0..count {
+        g.means.push(n.triple(-8.0, 8.0));
+        g.quats.push([0; 4].map(|_| n.from(-2.0, 2.0)));
+        g.scales.push(n.triple(-9.0, 1.0));
+        g.opacities.push(n.from(-4.0, 4.0));
+        g.sh0.push(n.triple(-1.5, 1.5));
+        g.sh_rest.extend((0..g.rest_per_gaussian()).map(|_| n.triple(-0.9, 0.9)));
+    }
+    g.labels = labelled.then(|| (0..count as u32).map(|row| [0, 3, 3, 700][row as usize % 4]).collect());
+    g.label_confidence = labelled.then(|| (0..count).map(|_| n.from(0.0, 1.0)).collect());
+    g
+}
+
+fn names() -> LabelTable {
+    let named = |id, name: &str| LabelEntry { name: Some(name.into()), ..LabelEntry::new(id) };
+    LabelTable::new(vec![named(3, "cup"), named(700, "größter Krug")])
+}
+
+fn unit(quat: [f32; 4]) -> [f32; 4] {
+    let length = quat.iter().map(|v| v * v).sum::<f32>().sqrt();
+    quat.map(|v| v / length)
+}
+
+fn sigmoid(value: f32) -> f32 {
+    1.0 / (1.0 + (-value).exp())
+}
+
+/// Fails if a value of `after` differs from `before` by more than its bound.
+#[track_caller]
+fn within(before: &Gaussians, after: &Gaussians, bounds: Bounds) {
+    assert_eq!((before.len(), before.sh_degree, &before.labels), (after.len(), after.sh_degree, &after.labels));
+    let most = |a: &[f32], b: &[f32]| a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0_f32, f32::max);
+    let check = |what: &str, off: f32, bound: f32| {
+        assert!(off <= bound, "{what} are off by {off}, at most {bound} are allowed")
+    };
+    check("positions", most(before.means.as_flattened(), after.means.as_flattened()), bounds.position);
+    check("scales", most(before.scales.as_flattened(), after.scales.as_flattened()), bounds.scale);
+    check("colours", most(before.sh0.as_flattened(), after.sh0.as_flattened()), bounds.colour);
+    for (&a, &b) in before.opacities.iter().zip(&after.opacities) {
+        check("opacities", (sigmoid(a) - sigmoid(b)).abs(), bounds.opacity);
+    }
+    for (&a, &b) in before.quats.iter().zip(&after.quats) {
+        let (a, b) = (unit(a), unit(b));
+        // Both signs are the same rotation.
+        let sign = a.iter().zip(b).map(|(a, b)| a * b).sum::<f32>().signum();
+        check("rotations", most(&a, &b.map(|v| sign * v)), bounds.rotation);
+    }
+    let rest = before.rest_per_gaussian().max(1);
+    for (at, (a, b)) in before.sh_rest.iter().zip(&after.sh_rest).enumerate() {
+        check("harmonics", most(a, b), bounds.harmonics[usize::from(at % rest >= 3)]);
+    }
+    if let (Some(before), Some(after)) = (&before.label_confidence, &after.label_confidence) {
+        check("confidences", most(before, after), bounds.confidence);
+    }
+    assert_eq!(before.label_confidence.is_some(), after.label_confidence.is_some());
+}
+
+fn v4() -> WriteOptions {
+    WriteOptions { spz_version: SpzVersion::V4, ..WriteOptions::default() }
+}
+
+/// Every format that is written: file, choices, bounds.
+fn written() -> [(&'static str, WriteOptions, Bounds); 3] {
+    let usual = WriteOptions::default();
+    [("a.spz", usual, SPZ), ("b.spz", v4(), SPZ), ("a.glb", usual, GLB)]
+}
+
+#[test]
+fn round_trips_stay_within_the_steps_and_keep_labels_and_names() {
+    let scene = Scene::new();
+    for (file, options, bounds) in written() {
+        for degree in 0..=3 {
+            for (count, labelled) in [(1, true), (300, true), (300, false)] {
+                let before = model(count, degree, labelled);
+                let names = labelled.then(names);
+                assert_eq!(export_model(scene.at(file), &before, names.as_ref(), options).expect("written"), 0);
+                let read = read_model(scene.at(file)).expect("read");
+                within(&before, &read.gaussians, bounds);
+                assert_eq!((read.dropped, &read.notes), (0, &Vec::new()), "{file}");
+                let name = |table: Option<&LabelTable>| table.and_then(|table| table.entry(3)?.name.clone());
+                assert!(count == 1 || name(read.names.as_ref()) == name(names.as_ref()), "{file}: {:?}", read.names);
+            }
+        }
+        // Nothing of the labels is left where none are wanted.
+        let none = WriteOptions { label_type: LabelType::None, ..options };
+        export_model(scene.at(file), &model(9, 0, true), Some(&names()), none).expect("written");
+        let read = read_model(scene.at(file)).expect("read");
+        assert_eq!((read.gaussians.labels, read.names), (None, None), "{file}");
+        assert!(!LabelTable::beside(&scene.at(file)).exists());
+        // A second write has the same bytes.
+        let write = || {
+            export_model(scene.at(file), &model(300, 2, true), Some(&names()), options).expect("written");
+            fs::read(scene.at(file)).expect("bytes")
+        };
+        assert!(write() == write(), "{file}");
+    }
+}
+
+/// Positions of a scene far away are relative to an origin beside the file.
+#[test]
+fn far_scenes_keep_their_place() {
+    let scene = Scene::new();
+    let origin = glam::DVec3::new(448_256.0, 5_411_840.0, 128.0);
+    let before = Gaussians { origin, ..model(50, 0, true) };
+    for (file, options, bounds) in written() {
+        export_model(scene.at(file), &before, None, options).expect("written");
+        let after = read_model(scene.at(file)).expect("read").gaussians;
+        assert_eq!(after.origin, origin, "{file}");
+        within(&before, &after, bounds);
+    }
+}
+
+/// 24 bits hold any scene: fewer fractional bits where it is large, more where it is small, and none wraps around.
+#[test]
+fn positions_of_an_spz_never_wrap() {
+    let scene = Scene::new();
+    for size in [1e-6, 1e-3, 0.5, 1.0, 2047.0, 2049.0, 3e5, 8e6] {
+        let mut before = model(100, 0, false);
+        before.means.iter_mut().for_each(|mean| *mean = mean.map(|value| value / 8.0 * size));
+        before.means.push([size, -size, size]);
+        before = Gaussians { means: before.means, ..model(101, 0, false) };
+        write_model(scene.at("a.spz"), &before).expect("written");
+        let after = read_model(scene.at("a.spz")).expect("read").gaussians;
+        // Half of 2^-23 of the size, or of the usual steps; below 2^-23 there are no more bits.
+        let step = (size / 4.19e6).max(1.0 / 4096.0_f32.max(16_384.0 / size).min(8_388_608.0));
+        let off = before.means.as_flattened().iter().zip(after.means.as_flattened()).map(|(a, b)| (a - b).abs());
+        let off = off.fold(0.0_f32, f32::max);
+        assert!(off <= 0.51 * step, "a scene of {size}: off by {off}, steps of {step}");
+    }
+    let mut far = model(1, 0, false);
+    far.means[0][1] = 9e6;
+    let error = write_model(scene.at("b.spz"), &far).expect_err("too far").to_string();
+    assert!(error.contains("9000000 from the origin") && !scene.path().join("b.spz").exists(), "{error}");
+}
+
+/// An opacity of 0 or 1 has no finite logit; it ends a step from there.
+#[test]
+fn opacities_stay_finite() {
+    let scene = Scene::new();
+    let mut before = model(4, 0, false);
+    before.opacities = vec![-200.0, 200.0, -17.0, 17.0];
+    for (file, options, bounds) in written() {
+        export_model(scene.at(file), &before, None, options).expect("written");
+        let after = read_model(scene.at(file)).expect("read").gaussians;
+        for (&a, &b) in before.opacities.iter().zip(&after.opacities) {
+            let off = (sigmoid(a) - sigmoid(b)).abs();
+            assert!(b.is_finite() && off <= 2.01 * bounds.opacity, "{file}: {a} and {b}");
+        }
+    }
+}
+
+/// The labels beside an SPZ serve where another program dropped the record, and only for the same Gaussians.
+#[test]
+fn labels_beside_a_file_hold_for_the_same_gaussians_only() {
+    let scene = Scene::new();
+    let (whole, part) = (model(60, 1, true), model(60, 1, true).filtered(|row| row != 7));
+    let bare = WriteOptions { label_type: LabelType::None, ..WriteOptions::default() };
+    let drop_record = |of: &Gaussians| {
+        export_model(scene.at("bare/a.spz"), of, None, bare).expect("written");
+        fs::copy(scene.at("bare/a.spz"), scene.at("a.spz")).expect("copied");
+    };
+    export_model(scene.at("a.spz"), &whole, Some(&names()), WriteOptions::default()).expect("written");
+    drop_record(&whole);
+    let read = read_model(scene.at("a.spz")).expect("read");
+    assert_eq!((&read.gaussians.labels, read.notes.len()), (&whole.labels, 0));
+    // The table of names beside it is the usual one.
+    assert_eq!(LabelTable::read(&scene.at("a.labels.json")).expect("a table"), names());
+    let text = fs::read_to_string(scene.at("a.labels.json")).expect("text");
+    for (from, to) in [("\"ids\"", "\"id\""), ("700", "70000"), ("\"count\": 60", "\"count\": \"many\"")] {
+        scene.write("a.labels.json", text.replace(from, to));
+        let error = refusal(read_model(scene.at("a.spz")));
+        assert!(error.contains("a.labels.json: "), "{error}");
+    }
+    scene.write("a.labels.json", &text);
+    for other in [part, whole.filtered(|row| row < 30), {
+        let mut moved = whole.clone();
+        moved.means.swap(3, 4);
+        moved
+    }] {
+        drop_record(&other);
+        let read = read_model(scene.at("a.spz")).expect("read");
+        assert!(read.gaussians.labels.is_none() && read.notes[0].contains("a.labels.json"), "{:?}", read.notes);
+    }
+}
+
+/// Positions, rotations and harmonics are turned to the axes of each format and back: the picture stays the same, up to
+/// the steps of the format. A wrong sign anywhere leaves less than 25 dB here.
+#[test]
+fn pictures_of_every_format_are_those_of_the_ply() {
+    let Some(turn) = device() else { return };
+    let scene = Scene::new();
+    let before = picture_model();
+    let options = labelgs::synth::SynthOptions { views: 5, width: 96, height: 64, ..Default::default() };
+    let camera = labelgs::internals::synth::ring_of_cameras(&options)[1].clone();
+    let draw = |model: &Gaussians| {
+        let mut engine = Engine::of_model(turn.gpu(), model, [(96, 64)]).expect("an engine");
+        render(&mut engine, &camera, &RenderOptions::default()).expect("a picture").rgb
+    };
+    let expected = draw(&before);
+    assert!(expected.iter().flatten().any(|&value| value > 0.3), "something is drawn");
+    for (file, options, _) in written() {
+        export_model(scene.at(file), &before, None, options).expect("written");
+        let bytes = fs::metadata(scene.at(file)).expect("a file").len() as f64 / before.len() as f64;
+        let found = draw(&read_model(scene.at(file)).expect("read").gaussians);
+        let squares: f64 =
+            found.as_flattened().iter().zip(expected.as_flattened()).map(|(a, b)| f64::from(a - b).powi(2)).sum();
+        let distance = -10.0 * (squares / (3 * found.len()) as f64).log10();
+        println!("{file} {options:?}: {bytes:.1} bytes a Gaussian, {distance:.1} dB from the PLY");
+        assert!(distance > if file.ends_with("glb") { 80.0 } else { 35.0 }, "{file}: {distance:.1} dB");
+    }
+}
+
+/// Long and thin Gaussians in a ball, in every direction, whose colour depends on the direction.
+fn picture_model() -> Gaussians {
+    let mut n = Numbers(3);
+    let mut g = model(1500, 3, true);
+    g.means.iter_mut().for_each(|mean| *mean = mean.map(|value| value / 8.0));
+    g.scales.iter_mut().for_each(|scale| *scale = [n.from(-2.5, -1.8), n.from(-5.0, -4.0), n.from(-4.0, -3.0)]);
+    g.sh_rest.iter_mut().for_each(|triple| *triple = triple.map(|value| 0.25 * value));
+    g
+}
