@@ -1,7 +1,7 @@
 //! Chooses and changes the labels of a model, without a device.
 //!
 //! A [`Catalogue`] resolves ids and names, and [`choose`] resolves points, boxes and masks in a view. [`extract`],
-//! [`remove`], [`recolour`], [`relabel`] and [`split_components`] return changed models; [`fill()`] removes and closes the
+//! [`remove`], [`recolour`], [`relabel`], [`merge()`] and [`split_components`] return changed models; [`fill()`] removes and closes the
 //! hole; [`summarise`] lists the labels.
 
 pub(crate) mod catalogue;
@@ -9,6 +9,7 @@ pub(crate) mod change;
 pub(crate) mod choose;
 pub(crate) mod components;
 pub(crate) mod fill;
+pub(crate) mod merge;
 pub(crate) mod prompt;
 pub(crate) mod rename;
 pub(crate) mod select;
@@ -17,5 +18,6 @@ pub use catalogue::{Catalogue, Pick};
 pub use change::{Specks, Split, recolour, relabel, split_components, without_specks};
 pub use components::Grouping;
 pub use fill::{Filled, SIGHT_SIDE, Sight, fill};
+pub use merge::{Merged, merge};
 pub use prompt::{Place, Prompt, choose};
 pub use select::{LabelSummary, MIN_LABEL_CONFIDENCE, extract, remove, summarise};

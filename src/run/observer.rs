@@ -4,8 +4,9 @@
 use super::Summary;
 use crate::error::Result;
 use crate::eval::scores::Scores;
+use crate::io::label_table::LabelTable;
 use crate::render::{Parts, RenderOptions, Rendered, render};
-use crate::scene::{Camera, Gaussians};
+use crate::scene::{Camera, Dataset, Gaussians};
 use crate::train::{Densified, StepReport, Trainer};
 use std::path::Path;
 
@@ -103,11 +104,47 @@ impl Observer for () {
 /// The scene in training, between two steps. Queries do not change the training, bit for bit.
 pub struct Live<'a> {
     trainer: &'a mut Trainer,
+    dataset: &'a Dataset,
+    names: Option<&'a LabelTable>,
 }
 
 impl<'a> Live<'a> {
-    pub(super) fn new(trainer: &'a mut Trainer) -> Self {
-        Self { trainer }
+    pub(super) fn new(trainer: &'a mut Trainer, dataset: &'a Dataset, names: Option<&'a LabelTable>) -> Self {
+        Self { trainer, dataset, names }
+    }
+
+    /// Returns the scene of the run, with its photos and masks.
+    pub fn dataset(&self) -> &'a Dataset {
+        self.dataset
+    }
+
+    /// Returns the names of the labels, if the masks have some.
+    pub fn names(&self) -> Option<&'a LabelTable> {
+        self.names
+    }
+
+    /// Returns the size of the largest picture that needs no more memory, px: that of the largest photo.
+    pub fn image(&mut self) -> (u32, u32) {
+        self.trainer.engine_mut().size().image
+    }
+
+    /// Returns the bytes that the run uses on the device.
+    pub fn memory(&mut self) -> u64 {
+        self.trainer.engine_mut().memory()
+    }
+
+    /// Returns the label of each Gaussian, of the last count of votes; none in a scene without masks.
+    pub fn labels(&mut self) -> Result<Option<Vec<u32>>> {
+        if !self.trainer.has_labels() {
+            return Ok(None);
+        }
+        self.trainer.drain()?;
+        self.trainer.engine_mut().labels().map(Some)
+    }
+
+    /// Returns true if the device is a processor.
+    pub fn is_cpu(&mut self) -> bool {
+        self.trainer.engine_mut().gpu().is_cpu()
     }
 
     /// Returns the number of finished steps.
