@@ -39,7 +39,9 @@ pub(super) fn of_training(labels: &[u32], table: Option<&LabelTable>) -> Value {
     let mut counts: BTreeMap<u32, u64> = BTreeMap::new();
     labels.iter().for_each(|&label| *counts.entry(label).or_default() += 1);
     // Objects of the masks that no Gaussian has yet are named too.
-    table.iter().flat_map(|table| &table.labels).for_each(|entry| drop(counts.entry(entry.id).or_default()));
+    table.iter().flat_map(|table| &table.labels).for_each(|entry| {
+        counts.entry(entry.id).or_default();
+    });
     let row = |(&id, &count): (&u32, &u64)| json!({ "id": id, "name": name(table, id), "colour": label_colour(id), "count": count });
     described(counts.iter().take(ROWS_MAX).map(row).collect(), counts.len())
 }
