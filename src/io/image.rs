@@ -182,6 +182,11 @@ pub(crate) fn png_rgb8(size: (u32, u32), pixels: &[[u8; 3]]) -> Result<Vec<u8>> 
     fast_png(size, png::ColorType::Rgb, png::BitDepth::Eight, pixels.as_flattened())
 }
 
+/// Returns 8-bit RGB with opacity as the bytes of a PNG, compressed as fast as possible.
+pub(crate) fn png_rgba8(size: (u32, u32), pixels: &[[u8; 4]]) -> Result<Vec<u8>> {
+    fast_png(size, png::ColorType::Rgba, png::BitDepth::Eight, pixels.as_flattened())
+}
+
 /// Returns 16-bit grey as the bytes of a PNG, compressed as fast as possible.
 pub(crate) fn png_grey16(size: (u32, u32), pixels: &[u16]) -> Result<Vec<u8>> {
     let bytes: Vec<u8> = pixels.iter().flat_map(|value| value.to_be_bytes()).collect();

@@ -294,7 +294,7 @@ mod tests {
     use super::*;
 
     fn look(seq: u32) -> Message {
-        Message::Look(Look { seq, from: Viewpoint::View(0), panes: Vec::new(), moving: true })
+        Message::Look(Look { seq, from: Viewpoint::View(0), panes: Vec::new(), mark: Vec::new(), moving: true })
     }
 
     fn seq(task: Option<(ClientId, Task)>) -> Option<(ClientId, u32)> {

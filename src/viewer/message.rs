@@ -54,6 +54,9 @@ pub(super) struct Look {
     pub(super) from: Viewpoint,
     /// One or two pictures.
     pub(super) panes: Vec<Pane>,
+    /// Labels to draw an outline around.
+    #[serde(default)]
+    pub(super) mark: Vec<u32>,
     /// The camera moves: the picture may be smaller than the camera says.
     pub(super) moving: bool,
 }
@@ -190,6 +193,8 @@ pub(super) struct Frame {
     pub(super) exact: bool,
     /// Time of the render and of the compression, microseconds.
     pub(super) micros: u32,
+    /// The last picture is an outline, to be drawn over the others.
+    pub(super) marked: bool,
     pub(super) pictures: Vec<Vec<u8>>,
 }
 
@@ -201,8 +206,8 @@ impl Frame {
     pub(super) fn encode(&self) -> Vec<u8> {
         let mut bytes = Vec::with_capacity(Self::HEADER + self.pictures.iter().map(|p| p.len() + 4).sum::<usize>());
         let count = self.pictures.len() as u32;
-        for word in [1, self.seq, self.step, self.size.0, self.size.1, self.micros, count << 1 | u32::from(self.exact)]
-        {
+        let flags = count << 2 | u32::from(self.marked) << 1 | u32::from(self.exact);
+        for word in [1, self.seq, self.step, self.size.0, self.size.1, self.micros, flags] {
             bytes.extend_from_slice(&word.to_le_bytes());
         }
         for picture in &self.pictures {

@@ -70,11 +70,16 @@ impl Painter {
         let is_full = size == (full.width, full.height);
         let camera = if is_full { full } else { full.resized(size.0, size.1) };
         let is_lossy = look.moving && hub.is_slow(id, pixels(size), self.target);
-        let rendered = source.render(&camera, pictures::parts(&look.panes))?;
+        let mut parts = pictures::parts(&look.panes);
+        parts.labels |= !look.mark.is_empty();
+        let rendered = source.render(&camera, parts)?;
         let photo = posed.and_then(|posed| posed.photo.as_deref());
         let beside = Beside { confidence: source.confidence(), photo };
         let encode = |&pane| pictures::encode(pane, &rendered, beside, is_lossy);
-        let encoded = look.panes.iter().map(encode).collect::<Result<Vec<_>>>()?;
+        let mut encoded = look.panes.iter().map(encode).collect::<Result<Vec<_>>>()?;
+        if !look.mark.is_empty() {
+            encoded.push(pictures::outline(&rendered, &look.mark)?);
+        }
         let time = start.elapsed();
         self.pace.note(pixels(size), time.as_secs_f64());
         Ok(Frame {
@@ -83,6 +88,7 @@ impl Painter {
             size,
             exact: is_full && !is_lossy,
             micros: u32::try_from(time.as_micros()).unwrap_or(u32::MAX),
+            marked: !look.mark.is_empty(),
             pictures: encoded,
         })
     }

@@ -97,11 +97,11 @@ export class Labels {
     const isVisible = this.isVisible(row.id);
     const name = el("span", { className: row.name ? "name" : "name none", textContent: row.name ?? (row.id === 0 ? "no label" : "unnamed") });
     name.title = row.name ?? "";
-    const facts = el("span", { className: "facts" }, `${number(row.count)} Gaussians`);
+    const facts = el("span", { className: "facts" }, el("span", { className: "size", textContent: `${number(row.count)} Gaussians` }));
     if (typeof row.confidence === "number") {
       const bar = el("span", { className: row.confidence < 0.6 ? "sure low" : "sure", title: `mean confidence ${(100 * row.confidence).toFixed(0)} %` }, el("i"));
       bar.style.setProperty("--share", row.confidence.toFixed(3));
-      facts.append(bar, `${(100 * row.confidence).toFixed(0)} %`);
+      facts.append(bar);
     }
     const swatch = el("span", { className: "swatch" });
     swatch.style.setProperty("--swatch", `rgb(${row.colour.join(" ")})`);

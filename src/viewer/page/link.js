@@ -79,9 +79,9 @@ export class Link {
   async receive(data) {
     const words = new DataView(data);
     const word = (index) => words.getUint32(4 * index, true);
-    const frame = { seq: word(1), step: word(2), width: word(3), height: word(4), ms: word(5) / 1000, exact: (word(6) & 1) === 1, blobs: [] };
+    const frame = { seq: word(1), step: word(2), width: word(3), height: word(4), ms: word(5) / 1000, exact: (word(6) & 1) === 1, marked: (word(6) & 2) === 2, blobs: [] };
     let at = HEADER;
-    for (let index = 0; index < word(6) >> 1; index += 1) {
+    for (let index = 0; index < word(6) >> 2; index += 1) {
       const size = words.getUint32(at, true);
       frame.blobs.push(new Blob([new Uint8Array(data, at + 4, size)]));
       at += 4 + size;

@@ -17,7 +17,13 @@ const picks = new Map();
 
 const link = new Link(hear, (frame) => stage.show(frame), connection);
 stage.link = link;
-const labels = new Labels(link, () => { edits.refresh(); stage.captions(); });
+const labels = new Labels(link, () => {
+  edits.refresh();
+  const mark = edits.chosen.filter((id) => id !== 0).slice(0, 4096);
+  if (mark.join() === stage.mark.join()) return;
+  stage.mark = mark;
+  stage.change();
+});
 const edits = new Edits(link, labels);
 const views = new Views(rig, snap);
 const training = new Training(link);

@@ -28,6 +28,8 @@ export class Stage {
     this.isPhotoHeld = false;
     this.wipeAt = 0.5;
     this.images = [];
+    this.mark = [];
+    this.outline = null;
     this.frame = null;
     this.photos = new Map();
     this.isTraining = false;
@@ -141,14 +143,15 @@ export class Stage {
 
   ask(moving) {
     const from = this.rig.view === null ? { camera: this.rig.file() } : { view: this.rig.view };
-    this.asked = this.link.look({ from, panes: this.wanted(), moving });
+    this.asked = this.link.look({ from, panes: this.wanted(), mark: this.mark, moving });
   }
 
   /** Draws a frame that came. */
   async show(frame) {
     const decode = (blob) => createImageBitmap(blob, { colorSpaceConversion: "none", premultiplyAlpha: "none" });
     const images = await Promise.all(frame.blobs.map(decode));
-    this.images.forEach((image) => image.close());
+    [...this.images, this.outline].forEach((image) => image?.close());
+    this.outline = frame.marked ? images.pop() : null;
     this.images = images;
     this.frame = frame;
     this.drawn = performance.now();
@@ -192,6 +195,10 @@ export class Stage {
       context.restore();
     } else if (this.isPair && second) {
       put(second, this.area(1));
+    }
+    if (this.outline && !isPhoto) {
+      put(this.outline, this.area(0));
+      if (this.isPair) put(this.outline, this.area(1));
     }
   }
 
