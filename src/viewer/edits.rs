@@ -143,7 +143,7 @@ impl<'a> Work<'a> {
             let Done { command, output, .. } = self.done.remove(0);
             self.settled.push((command, output));
         }
-        Ok("Done.".to_owned())
+        Ok(String::new())
     }
 
     /// Takes back the last change.
@@ -163,7 +163,7 @@ impl<'a> Work<'a> {
             }
             Before::Rows { rows, removed } => self.model = interleaved(&self.model, &removed, &rows),
         }
-        Ok("Taken back.".to_owned())
+        Ok(String::new())
     }
 
     /// Writes the model as it is now. Returns a sentence for the page.

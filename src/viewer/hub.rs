@@ -142,9 +142,11 @@ impl Hub {
         }
     }
 
-    /// Takes a request that is no frame, without waiting.
-    pub(super) fn next_message(&self) -> Option<(ClientId, Message)> {
-        self.lock().tasks.pop_front()
+    /// Takes a request that is no frame, without waiting; one that needs a render only if `may_draw`.
+    pub(super) fn next_message(&self, may_draw: bool) -> Option<(ClientId, Message)> {
+        let tasks = &mut self.lock().tasks;
+        let at = tasks.iter().position(|(_, message)| may_draw || !matches!(message, Message::Pick { .. }))?;
+        tasks.remove(at)
     }
 
     /// Returns true if a page waits for a frame.
@@ -337,10 +339,10 @@ mod tests {
             ids.iter().for_each(|&id| hub.finish(id, None));
         }
         (0..1000).for_each(|_| hub.receive(ids[0], Message::Undo));
-        assert_eq!(std::iter::from_fn(|| hub.next_message()).count(), TASKS_MAX);
+        assert_eq!(std::iter::from_fn(|| hub.next_message(true)).count(), TASKS_MAX);
         hub.receive(ids[0], Message::Undo);
         hub.leave(ids[0]);
-        assert!(hub.next_message().is_none() && hub.join().is_some());
+        assert!(hub.next_message(true).is_none() && hub.join().is_some());
     }
 
     #[test]

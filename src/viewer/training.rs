@@ -156,7 +156,7 @@ impl<'a> Watched<'a> {
     }
 
     fn hear_all(&mut self, live: &mut Live) -> Result<()> {
-        while let Some((id, message)) = self.viewer.hub.next_message() {
+        while let Some((id, message)) = self.viewer.hub.next_message(self.budget.allows()) {
             self.timed(|watched| watched.serve(id, Task::Message(message), live))?;
         }
         Ok(())

@@ -261,14 +261,15 @@ fn edits_are_the_commands_that_are_shown() {
     let mut page = server.page();
     let before = page.hear("labels");
     page.hear("edits");
-    for edit in [
+    let edits = [
         json!({ "edit": "rename", "label": 1, "name": "it's a $(cup)" }),
         json!({ "edit": "recolour", "labels": [3], "colour": [0.85, 0.1, 0.05], "mix": 0.7 }),
         json!({ "edit": "merge", "labels": [1, 4] }),
         json!({ "edit": "remove", "labels": [2] }),
-    ] {
-        page.edit(&edit);
-        page.hear("said");
+    ];
+    for (before, edit) in edits.iter().enumerate() {
+        page.edit(edit);
+        page.until("edits", |edits| edits["commands"].as_array().is_some_and(|all| all.len() == before + 1));
     }
     page.send(&json!({ "kind": "write" }));
     page.hear("said");
