@@ -39,6 +39,7 @@ fn the_page_works_in_a_browser() {
     two_tabs_and_a_killed_one(&mut browser, &tab, &server);
     random_events(&mut browser, &tab);
     assert_eq!(browser.complaints, Vec::<String>::new(), "complaints on the console");
+    browser.kill(&tab);
     drop(server);
     many_labels_and_none(&mut browser, &place);
     a_server_goes_away_and_comes_back(&mut browser, &place);
@@ -354,7 +355,7 @@ fn random_events(browser: &mut Browser, tab: &Tab) {
 
 fn many_labels_and_none(browser: &mut Browser, place: &Place) {
     let scene = place.path("scene");
-    let mut many = model(&scene, 4);
+    let mut many = model(&scene);
     many.labels = Some((0..many.len() as u32).map(|row| row % 201).collect());
     write_model(place.path("many.ply"), &many).expect("a model");
     let server = Server::start(place.command(&["view", "many.ply"]));
