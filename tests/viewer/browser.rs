@@ -418,7 +418,7 @@ fn a_training_in_the_page(browser: &mut Browser, place: &Place) {
     );
     browser.key(&tab, "KeyK", "k", 0);
     browser.until(&tab, &format!("labelgs.training.state.step > {step} + 3"));
-    browser.js(&tab, "labelgs.training.ask('stop')");
+    browser.js(&tab, "void labelgs.training.ask('stop')");
     browser.until(&tab, "document.querySelector('#ask').open");
     browser.click_on(&tab, "#ask-yes");
     browser.until(&tab, "document.querySelector('#veil-head').textContent.startsWith('Stopped')");

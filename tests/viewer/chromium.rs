@@ -147,7 +147,10 @@ impl Browser {
     pub fn until(&mut self, tab: &Tab, expression: &str) {
         let end = Instant::now() + PATIENCE;
         while self.js(tab, &format!("Boolean({expression})")) != true {
-            assert!(Instant::now() < end, "never: {expression}; {:?}", self.complaints);
+            if Instant::now() >= end {
+                let text = self.js(tab, "document.body.innerText").to_string();
+                panic!("never: {expression}; the page has {text}; {:?}", self.complaints);
+            }
             std::thread::sleep(Duration::from_millis(20));
         }
     }
