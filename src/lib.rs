@@ -54,6 +54,7 @@
 //! # Features
 //!
 //! `cli` (default): the program, with clap, progress bars and signals; without it the library needs none of them.
+//! `viewer`, a part of `cli`: the page that shows a model or a training in a browser.
 //! `build-shaderc` (default): builds the shader compiler from source instead of linking the system's. `lab`: faults on
 //! purpose, for tests.
 #![deny(unsafe_code)]
@@ -88,6 +89,8 @@ mod shaders;
 pub mod synth;
 mod train;
 mod verify;
+#[cfg(feature = "viewer")]
+pub mod viewer;
 
 pub use error::{Error, Result};
 

@@ -3,8 +3,9 @@
 
 use std::collections::BTreeSet;
 use std::fs;
+use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::process::{Command, Stdio};
 
 const ROOT: &str = env!("CARGO_MANIFEST_DIR");
 
@@ -63,6 +64,16 @@ fn shortened(words: &mut Vec<String>) {
     }
 }
 
+/// Runs a viewer until it prints its address.
+fn shows(command: &mut Command) {
+    let mut child = command.stdout(Stdio::piped()).spawn().expect("it runs");
+    let mut line = String::new();
+    BufReader::new(child.stdout.take().expect("a pipe")).read_line(&mut line).expect("a line");
+    child.kill().expect("it ran until now");
+    child.wait().expect("it ends");
+    assert!(line.starts_with("http://127.0.0.1:"), "{line}");
+}
+
 /// Runs each command of the pages once.
 fn run(pages: &[PathBuf]) {
     if crate::support::device().is_none() {
@@ -91,6 +102,10 @@ fn run(pages: &[PathBuf]) {
             }
             let mut command = Command::new(env!("CARGO_BIN_EXE_labelgs"));
             command.env("LABELGS_VALIDATION", "off").env("LABELGS_CACHE", folder.path().join("cache"));
+            if words[1] == "view" {
+                shows(command.args(&words[1..]).current_dir(folder.path()));
+                continue;
+            }
             let output = command.args(&words[1..]).current_dir(folder.path()).output().expect("it runs");
             let said = String::from_utf8_lossy(&output.stderr);
             // It ends with status 1 where it finds something, as it does on small objects here.

@@ -63,3 +63,4 @@ mod strategy; // strategies of densification other than the default
 mod stress; // error bounds on adversarial scenes
 mod synth; // the made scene is consistent ground truth
 mod track; // ids from frame to frame
+mod viewer; // the server of the viewer, and its page in a browser

@@ -25,6 +25,7 @@ use super::split_components::SplitArgs;
 use super::synth::SynthArgs;
 use super::train_args::TrainArgs;
 use super::transform::TransformArgs;
+use super::view::ViewArgs;
 use super::wording::flag;
 use crate::run::Settings;
 use clap::{CommandFactory, Parser, Subcommand};
@@ -88,6 +89,10 @@ pub enum Command {
     ///
     /// Example: labelgs report out
     Report(ReportArgs),
+    /// Show a model in a browser: from any side, beside its photos, by label; choose, rename, merge and remove objects.
+    ///
+    /// Example: labelgs view out --scene scene --masks scene/masks --open
+    View(Box<ViewArgs>),
     /// Write a model with the chosen objects in another colour.
     ///
     /// Example: labelgs recolour out --labels barrel --colour 0.9,0.1,0.1 --mix 0.7 -o red.ply

@@ -41,6 +41,7 @@ pub(crate) mod train;
 pub(crate) mod train_args;
 pub(crate) mod transform;
 pub(crate) mod values;
+pub(crate) mod view;
 pub(crate) mod wording;
 
 use crate::Error;
@@ -110,6 +111,7 @@ fn run(args: Vec<OsString>) -> Result<(), Exit> {
         Command::Check(args) => check::run(&args, &context),
         Command::Train(args) => train::run(&args, &context),
         Command::Render(args) => render::run(&args, &context),
+        Command::View(args) => view::run(&args, &context),
         Command::Label(args) => label::run(&args, &context),
         Command::List(args) => list::run(&args, &context),
         Command::Extract(args) => select::run_extract(&args, &context),

@@ -4,15 +4,17 @@ use super::context::Context;
 use super::log::{self, Progress};
 use super::scene::open_gpu;
 use super::train_args::TrainArgs;
+use super::view::Typed;
 use super::{interrupt, stdout};
 use crate::Result;
 use crate::run::{self, Event, Flow, Live, Observer, Request, Settings, Summary};
+use crate::viewer::Watched;
 
 /// Trains a model and prints a summary.
 pub(crate) fn run(args: &TrainArgs, context: &Context) -> Result<()> {
     let settings = |checkpoint: Option<&Settings>| args.how.settings(checkpoint);
     let request = args.how.request((&args.scene, &args.output), args.masks.clone(), &settings)?;
-    let summary = train(request, context)?;
+    let summary = if args.watch.view { shown(args, request, context)? } else { train(request, context)? };
     if context.json || args.json.json {
         return stdout::print_json(&summary.to_json());
     }
@@ -36,6 +38,20 @@ fn typed() -> String {
 
 /// Trains with progress on the terminal. A signal ends the run after it saved its state.
 pub(super) fn train(request: Request, context: &Context) -> Result<Summary> {
+    observed(request, context, &mut Terminal { context, progress: None })
+}
+
+/// Trains with progress on the terminal and in a browser.
+fn shown(args: &TrainArgs, request: Request, context: &Context) -> Result<Summary> {
+    let viewer = args.watch.server.start(args.watch.view_share)?;
+    tracing::info!("the training is shown at {}", viewer.address());
+    let words = Typed { scene: Some(args.scene.clone()), masks: args.masks.clone() };
+    let mut terminal = Terminal { context, progress: None };
+    let title = args.output.display().to_string();
+    observed(request, context, &mut Watched::new(&viewer, &mut terminal, title, &words))
+}
+
+fn observed(request: Request, context: &Context, observer: &mut dyn Observer) -> Result<Summary> {
     let open = || {
         interrupt::check()?;
         open_gpu(context)
@@ -43,7 +59,7 @@ pub(super) fn train(request: Request, context: &Context) -> Result<Summary> {
     let before = log::warnings().len();
     let warnings = || log::warnings().split_off(before);
     let request = &Request { command: Some(typed()), warnings: Some(&warnings), ..request };
-    let summary = run::train(request, &open, &mut Terminal { context, progress: None })?;
+    let summary = run::train(request, &open, observer)?;
     if summary.stopped { interrupt::check().map(|()| summary) } else { Ok(summary) }
 }
 

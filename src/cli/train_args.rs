@@ -3,6 +3,7 @@
 
 use super::args::{JsonFlag, ReadArgs};
 use super::values::bytes;
+use super::view::WatchArgs;
 use crate::io::ReadOptions;
 use crate::options::typed::Typed;
 use crate::run::{Changed, Inputs, OccluderFiles, Request, RunOptions, Settings, Start};
@@ -30,6 +31,9 @@ pub struct TrainArgs {
     /// How it trains.
     #[command(flatten)]
     pub how: TrainFlags,
+    /// A page that shows it.
+    #[command(flatten)]
+    pub watch: WatchArgs,
 }
 
 /// Flags of a training, without scene and folder.

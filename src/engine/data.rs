@@ -14,6 +14,11 @@ impl Engine {
         Ok(rows.iter().map(|&[x, y, z, _]| [x, y, z]).collect())
     }
 
+    /// Bytes that it uses on the device.
+    pub fn memory(&self) -> u64 {
+        self.sched.memory_total()
+    }
+
     /// Labels of the Gaussians; only for an engine with labels.
     pub fn labels(&mut self) -> Result<Vec<u32>> {
         self.sched.download(Buf::LABELS, 0, 0, self.gaussian_count as usize)

@@ -6,6 +6,7 @@
 //! | [data] | Which scenes, photos, cameras and depth maps are read? |
 //! | [masks] | Where do masks come from, and how are they checked and repaired? |
 //! | [labels] | How are objects chosen, taken out, renamed and drawn? |
+//! | [viewer] | How is a model, or a training, seen and changed in a browser? |
 //! | [benchmarks] | How is a model scored, on its own views and by published benchmarks? |
 //! | [method] | What does the training do, and where does it differ from the papers? |
 //! | [outputs] | Which files are written, what do statuses mean, what is the same in every run? |
@@ -41,6 +42,7 @@ pages! {
     data: "Scenes, photos, cameras and depth maps that are read.";
     masks: "Masks: their form, trackers, checks and repair.";
     labels: "Objects chosen, taken out, renamed and drawn.";
+    viewer: "A model or a training in a browser.";
     benchmarks: "Scores: held-out views and published benchmarks.";
     method: "The method, and its differences from LabelGS and 3DGS.";
     outputs: "Files, exit statuses and determinism.";

@@ -50,6 +50,11 @@ pub fn read_camera(path: impl AsRef<Path>) -> Result<Camera> {
         let expected = "expected {\"w2c\": 4x4 rows, \"fx\", \"fy\", \"cx\", \"cy\", \"W\", \"H\"}";
         Error::data(path, format!("line {}", error.line()), format!("{error}; {expected}"))
     })?;
+    camera_of(path, &file)
+}
+
+/// Returns the camera, checked. Errors name `path`, where it came from.
+pub(crate) fn camera_of(path: &Path, file: &CameraFile) -> Result<Camera> {
     let refuse =
         || Error::data(path, "w2c", "is not a camera-from-world pose: 4 x 4 numbers, the upper left 3 x 3 a rotation");
     let pose = affine(&file.w2c).ok_or_else(refuse)?;
@@ -58,7 +63,7 @@ pub fn read_camera(path: impl AsRef<Path>) -> Result<Camera> {
     if (pose.matrix3.determinant() - 1.0).abs() > 1e-2 {
         return Err(refuse());
     }
-    let CameraFile { fx, fy, cx, cy, width, height, .. } = file;
+    let CameraFile { fx, fy, cx, cy, width, height, .. } = *file;
     let camera = Camera { rotation, translation: pose.translation, fx, fy, cx, cy, width, height };
     check_camera(path, "", &camera, &Lens::default())?;
     Ok(camera)

@@ -177,6 +177,52 @@ fn write_png(
     })
 }
 
+/// Returns 8-bit RGB as the bytes of a PNG, compressed as fast as possible.
+pub(crate) fn png_rgb8(size: (u32, u32), pixels: &[[u8; 3]]) -> Result<Vec<u8>> {
+    fast_png(size, png::ColorType::Rgb, png::BitDepth::Eight, pixels.as_flattened())
+}
+
+/// Returns 8-bit RGB with opacity as the bytes of a PNG, compressed as fast as possible.
+pub(crate) fn png_rgba8(size: (u32, u32), pixels: &[[u8; 4]]) -> Result<Vec<u8>> {
+    fast_png(size, png::ColorType::Rgba, png::BitDepth::Eight, pixels.as_flattened())
+}
+
+/// Returns 16-bit grey as the bytes of a PNG, compressed as fast as possible.
+pub(crate) fn png_grey16(size: (u32, u32), pixels: &[u16]) -> Result<Vec<u8>> {
+    let bytes: Vec<u8> = pixels.iter().flat_map(|value| value.to_be_bytes()).collect();
+    fast_png(size, png::ColorType::Grayscale, png::BitDepth::Sixteen, &bytes)
+}
+
+fn fast_png(
+    (width, height): (u32, u32),
+    colour: png::ColorType,
+    depth: png::BitDepth,
+    bytes: &[u8],
+) -> Result<Vec<u8>> {
+    let mut out = Vec::with_capacity(bytes.len() / 2 + 256);
+    let mut encoder = png::Encoder::new(&mut out, width, height);
+    encoder.set_color(colour);
+    encoder.set_depth(depth);
+    encoder.set_compression(png::Compression::Fastest);
+    let written = encoder.write_header().and_then(|mut writer| {
+        writer.write_image_data(bytes)?;
+        writer.finish()
+    });
+    written.map(|()| out).map_err(|error| Error::Bug(format!("PNG in memory: {error}")))
+}
+
+/// Returns 8-bit RGB as the bytes of a JPEG, for slow lines.
+pub(crate) fn jpeg_rgb8((width, height): (u32, u32), pixels: &[[u8; 3]], quality: u8) -> Result<Vec<u8>> {
+    let mut out = Vec::new();
+    let written = image::codecs::jpeg::JpegEncoder::new_with_quality(&mut out, quality).encode(
+        pixels.as_flattened(),
+        width,
+        height,
+        image::ExtendedColorType::Rgb8,
+    );
+    written.map(|()| out).map_err(|error| Error::Bug(format!("JPEG in memory: {error}")))
+}
+
 /// Writes an EXR with 32-bit floats in the channels R, G and B; `pixels` is row-major.
 pub fn write_exr_rgb(path: impl AsRef<Path>, width: u32, height: u32, pixels: &[[f32; 3]]) -> Result<()> {
     let channel = |name: &'static str, index: usize| (name, pixels.iter().map(|pixel| pixel[index]).collect());

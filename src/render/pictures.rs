@@ -127,16 +127,18 @@ fn check_sizes(stem: &str, pictures: &Pictures) -> Result<()> {
     }
 }
 
-fn to_byte(value: f32) -> u8 {
+/// Returns the byte of a value from 0 to 1 in a picture.
+pub(crate) fn to_byte(value: f32) -> u8 {
     (value.clamp(0.0, 1.0) * 255.0).round() as u8
 }
 
-fn to_word(value: f32) -> u16 {
+/// Returns the 16-bit value of a value from 0 to 1 in a picture.
+pub(crate) fn to_word(value: f32) -> u16 {
     (value.clamp(0.0, 1.0) * 65_535.0).round() as u16
 }
 
 /// Converts depth to grey: near is bright, far is dark, holes are black.
-fn depth_preview(depth: &[f32]) -> Vec<u16> {
+pub(crate) fn depth_preview(depth: &[f32]) -> Vec<u16> {
     let there = |z: &f32| z.is_finite() && *z > 0.0;
     let near = depth.iter().copied().filter(there).fold(f32::INFINITY, f32::min);
     let far = depth.iter().copied().filter(there).fold(0.0, f32::max);

@@ -166,23 +166,32 @@ struct Run<'a> {
 impl Run<'_> {
     /// Passes an event to the observer and follows its answer.
     fn tell(&mut self, event: Event<'_>) -> Result<()> {
-        let mut flow = self.observer.on(&event, &mut Live::new(&mut self.trainer, &mut self.history))?;
+        let mut flow = self.ask(&event)?;
+        let mut is_paused = false;
         loop {
             match flow {
                 Flow::Continue => return Ok(()),
-                Flow::Save => return self.save_checkpoint(),
+                Flow::Save => {
+                    self.save_checkpoint()?;
+                    // A pause outlasts a save: no step may slip through.
+                    if !is_paused {
+                        return Ok(());
+                    }
+                }
                 Flow::Stop => {
                     self.stopped = true;
                     return Ok(());
                 }
-                Flow::Pause => {
-                    let step = self.trainer.steps_done();
-                    flow = self
-                        .observer
-                        .on(&Event::Paused { step }, &mut Live::new(&mut self.trainer, &mut self.history))?;
-                }
+                Flow::Pause => is_paused = true,
             }
+            let step = self.trainer.steps_done();
+            flow = self.ask(&Event::Paused { step })?;
         }
+    }
+
+    fn ask(&mut self, event: &Event<'_>) -> Result<Flow> {
+        let mut live = Live::new(&mut self.trainer, &mut self.history, &self.dataset, self.names.as_ref());
+        self.observer.on(event, &mut live)
     }
 
     /// Logs a warning and passes it to the observer.

@@ -5,8 +5,9 @@ use super::Summary;
 use super::history::Recorder;
 use crate::error::Result;
 use crate::eval::scores::Scores;
+use crate::io::label_table::LabelTable;
 use crate::render::{Parts, RenderOptions, Rendered, render};
-use crate::scene::{Camera, Gaussians};
+use crate::scene::{Camera, Dataset, Gaussians};
 use crate::train::{Densified, StepReport, Trainer};
 use std::path::Path;
 
@@ -105,11 +106,18 @@ impl Observer for () {
 pub struct Live<'a> {
     trainer: &'a mut Trainer,
     history: &'a mut Recorder,
+    dataset: &'a Dataset,
+    names: Option<&'a LabelTable>,
 }
 
 impl<'a> Live<'a> {
-    pub(super) fn new(trainer: &'a mut Trainer, history: &'a mut Recorder) -> Self {
-        Self { trainer, history }
+    pub(super) fn new(
+        trainer: &'a mut Trainer,
+        history: &'a mut Recorder,
+        dataset: &'a Dataset,
+        names: Option<&'a LabelTable>,
+    ) -> Self {
+        Self { trainer, history, dataset, names }
     }
 
     /// Waits for all steps, whose reports belong in the history.
@@ -117,6 +125,40 @@ impl<'a> Live<'a> {
         let reports = self.trainer.drain()?;
         self.history.finished(&reports);
         Ok(())
+    }
+
+    /// Returns the scene of the run, with its photos and masks.
+    pub fn dataset(&self) -> &'a Dataset {
+        self.dataset
+    }
+
+    /// Returns the names of the labels, if the masks have some.
+    pub fn names(&self) -> Option<&'a LabelTable> {
+        self.names
+    }
+
+    /// Returns the size of the largest picture that needs no more memory, px: that of the largest photo.
+    pub fn image(&mut self) -> (u32, u32) {
+        self.trainer.engine_mut().size().image
+    }
+
+    /// Returns the bytes that the run uses on the device.
+    pub fn memory(&mut self) -> u64 {
+        self.trainer.engine_mut().memory()
+    }
+
+    /// Returns the label of each Gaussian, of the last count of votes; none in a scene without masks.
+    pub fn labels(&mut self) -> Result<Option<Vec<u32>>> {
+        if !self.trainer.has_labels() {
+            return Ok(None);
+        }
+        self.drain()?;
+        self.trainer.engine_mut().labels().map(Some)
+    }
+
+    /// Returns true if the device is a processor.
+    pub fn is_cpu(&mut self) -> bool {
+        self.trainer.engine_mut().gpu().is_cpu()
     }
 
     /// Returns the number of finished steps.

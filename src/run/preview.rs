@@ -13,7 +13,8 @@ pub(super) fn write(run: &mut Run) -> Result<Option<PathBuf>> {
     let Some(view) = &run.preview else { return Ok(None) };
     let Some(photo) = &view.photo else { return Ok(None) };
     let parts = if run.trainer.has_labels() { Parts::LABELS } else { Parts::COLOUR };
-    let rendered = Live::new(&mut run.trainer, &mut run.history).render(&view.camera, parts)?;
+    let mut live = Live::new(&mut run.trainer, &mut run.history, &run.dataset, None);
+    let rendered = live.render(&view.camera, parts)?;
     let name = format!("{:06}_{}.png", run.trainer.steps_done(), view.stem());
     let path = run.request.output.join("preview").join(name);
     models::save_preview(&path, photo, &rendered)?;

@@ -1,0 +1,177 @@
+//! `labelgs view`, and the flags of `labelgs train --view`.
+
+use super::args::SceneArgs;
+use super::context::Context;
+use super::labelled::{TableArg, open};
+use super::scene::{near_plane, open_gpu, open_scene};
+use super::stdout;
+use super::values::{near, share};
+use crate::Result;
+use crate::render::{Parts, RenderOptions};
+use crate::scene::Dataset;
+use crate::viewer::{Edit, Finished, Viewer, ViewerOptions, Words, show};
+use clap::Args;
+use serde_json::json;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+/// `labelgs view`.
+#[derive(Args, Clone, Debug)]
+pub struct ViewArgs {
+    /// The model: a PLY, or the folder of a `labelgs train` run.
+    #[arg(value_name = "MODEL")]
+    pub model: PathBuf,
+    /// Scene whose views to list and whose photos to compare with.
+    #[arg(long, value_name = "SCENE")]
+    pub scene: Option<PathBuf>,
+    /// Folder of id masks, to score the label maps with.
+    #[arg(long, value_name = "DIR", requires = "scene")]
+    pub masks: Option<PathBuf>,
+    /// Names.
+    #[command(flatten)]
+    pub table: TableArg,
+    /// Near plane, world units: nearer Gaussians are not drawn. Default: the value of the model's run, else 0.2.
+    #[arg(long, value_name = "Z", value_parser = near, help_heading = "Rendering")]
+    pub near: Option<f32>,
+    /// How the scene is read.
+    #[command(flatten)]
+    pub reading: SceneArgs,
+    /// The server.
+    #[command(flatten)]
+    pub server: ServerArgs,
+}
+
+/// Where the page of a viewer is.
+#[derive(Args, Clone, Debug)]
+#[command(next_help_heading = "Viewer")]
+pub struct ServerArgs {
+    /// Open the page in the browser of this desktop.
+    #[arg(long)]
+    pub open: bool,
+    /// Address or name to listen on. On another than loopback, who reaches it and has the token sees the scene.
+    #[arg(long, value_name = "HOST", default_value = "127.0.0.1")]
+    pub view_host: String,
+    /// Port to listen on; 0 takes a free one.
+    #[arg(long, value_name = "PORT", default_value_t = 0)]
+    pub view_port: u16,
+    /// Ask for no token. Other users of this machine may then see the scene; only on loopback.
+    #[arg(long)]
+    pub view_no_token: bool,
+}
+
+/// A viewer of a training.
+#[derive(Args, Clone, Debug)]
+#[command(next_help_heading = "Viewer")]
+pub struct WatchArgs {
+    /// Show the training in a browser: its address is printed. It can be paused, saved and stopped there.
+    #[arg(long)]
+    pub view: bool,
+    /// Largest share of the time that viewing may take, 0 to 1, while a page is open.
+    #[arg(long, value_name = "SHARE", value_parser = share, default_value_t = 0.2)]
+    pub view_share: f32,
+    /// The server.
+    #[command(flatten)]
+    pub server: ServerArgs,
+}
+
+impl ServerArgs {
+    /// Starts the server, and the browser if that was asked for.
+    pub(super) fn start(&self, share: f32) -> Result<Viewer> {
+        let options =
+            ViewerOptions { host: self.view_host.clone(), port: self.view_port, has_token: !self.view_no_token, share };
+        let viewer = Viewer::start(&options)?;
+        if self.open {
+            open_browser(&viewer.address());
+        }
+        Ok(viewer)
+    }
+}
+
+/// Shows a model until a signal comes.
+pub(crate) fn run(args: &ViewArgs, context: &Context) -> Result<()> {
+    let (model, known) = open(&args.model, &args.table)?;
+    let dataset = match &args.scene {
+        Some(scene) => open_scene(scene, &args.reading.of_run(&args.model)?, args.masks.clone(), [0.0; 3], true)?,
+        None => Dataset::default(),
+    };
+    let options = RenderOptions::new(near_plane(&args.model, args.near)?, Parts::COLOUR);
+    let gpu = open_gpu(context)?;
+    let viewer = args.server.start(1.0)?;
+    if context.json {
+        stdout::print_json(&json!({ "schema_version": 1, "address": viewer.address() }))?;
+    } else {
+        stdout::print(&format!("{}\n", viewer.address()))?;
+    }
+    let words = Typed { scene: args.scene.clone(), masks: args.masks.clone() };
+    let finished = Finished { path: &args.model, model, table: known.table, dataset: &dataset, options, words: &words };
+    // A signal ends the process.
+    show(&viewer, finished, gpu, &|| true)
+}
+
+/// Opens an address in the browser of the desktop. Without one the printed address is left.
+fn open_browser(address: &str) {
+    let opener = if cfg!(target_os = "macos") { "open" } else { "xdg-open" };
+    let mut command = Command::new(opener);
+    command.arg(address).stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
+    match command.spawn() {
+        // The opener ends by itself; waiting for it leaves no dead process behind.
+        Ok(mut child) => drop(std::thread::spawn(move || child.wait())),
+        Err(error) => tracing::warn!("no browser was opened ({opener}: {error}); open the printed address"),
+    }
+}
+
+/// The commands as a user would type them.
+pub(super) struct Typed {
+    pub(super) scene: Option<PathBuf>,
+    pub(super) masks: Option<PathBuf>,
+}
+
+impl Words for Typed {
+    fn edit(&self, edit: &Edit, input: &Path, output: &Path) -> String {
+        let ids = |labels: &[u32]| labels.iter().map(u32::to_string).collect::<Vec<_>>().join(",");
+        let (verb, flags) = match edit {
+            Edit::Rename { label, name } => ("merge", format!("--labels {label} --name={}", quoted(name))),
+            Edit::Merge { labels } => ("merge", format!("--labels {}", ids(labels))),
+            Edit::Recolour { labels, colour: [r, g, b], mix } => {
+                ("recolour", format!("--labels {} --colour {r},{g},{b} --mix {mix}", ids(labels)))
+            }
+            Edit::Remove { labels } => ("remove", format!("--labels {}", ids(labels))),
+            Edit::Export { labels } => ("extract", format!("--labels {}", ids(labels))),
+        };
+        format!("labelgs {verb} {} {flags} -o {}", path(input), path(output))
+    }
+
+    fn view(&self, model: &Path) -> String {
+        let flag = |name: &str, value: &Option<PathBuf>| {
+            value.as_ref().map_or(String::new(), |value| format!(" --{name} {}", path(value)))
+        };
+        format!("labelgs view {}{}{}", path(model), flag("scene", &self.scene), flag("masks", &self.masks))
+    }
+}
+
+fn path(path: &Path) -> String {
+    quoted(&path.display().to_string())
+}
+
+/// Quotes a word for a POSIX shell where that is needed.
+fn quoted(word: &str) -> String {
+    let is_plain = |c: char| c.is_ascii_alphanumeric() || "/._-+:@%=,".contains(c);
+    if !word.is_empty() && word.chars().all(is_plain) {
+        return word.to_owned();
+    }
+    format!("'{}'", word.replace('\'', r"'\''"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn words_of_any_kind_are_quoted() {
+        for (word, expected) in
+            [("cup", "cup"), ("a b", "'a b'"), ("", "''"), ("it's", r"'it'\''s'"), ("$(x)", "'$(x)'")]
+        {
+            assert_eq!(quoted(word), expected);
+        }
+    }
+}

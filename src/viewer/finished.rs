@@ -1,0 +1,248 @@
+//! Shows a finished model, and changes its labels.
+
+use super::edits::Work;
+use super::hub::{ClientId, Hub, Task};
+use super::message::Message;
+use super::painter::{Painter, Source};
+use super::views::{Score, Views, describe_scores};
+use super::{Viewer, Words, rows};
+use crate::edit::select::{MIN_LABEL_CONFIDENCE, extract, remove};
+use crate::engine::Engine;
+use crate::error::Result;
+use crate::gpu::Gpu;
+use crate::io::label_table::LabelTable;
+use crate::render::{Parts, RenderOptions, Rendered, render};
+use crate::scene::{Camera, Dataset, Gaussians};
+use glam::DVec3;
+use serde_json::json;
+use std::path::Path;
+use std::sync::Arc;
+use std::time::Duration;
+
+/// Time between two looks for work.
+const TURN: Duration = Duration::from_millis(200);
+
+/// What is shown.
+pub struct Finished<'a> {
+    /// The model as it was typed.
+    pub path: &'a Path,
+    /// The model.
+    pub model: Gaussians,
+    /// Names of its labels.
+    pub table: Option<LabelTable>,
+    /// Views with photos, and masks to score with; may be empty.
+    pub dataset: &'a Dataset,
+    /// Near plane and background.
+    pub options: RenderOptions,
+    /// Commands to show.
+    pub words: &'a dyn Words,
+}
+
+/// Serves a finished model until `goes_on` says no.
+///
+/// # Errors
+///
+/// A device that fails. What a page asks for wrongly is told to the page.
+pub fn show(viewer: &Viewer, finished: Finished, gpu: Arc<Gpu>, goes_on: &dyn Fn() -> bool) -> Result<()> {
+    let views = Arc::new(Views::new(finished.dataset));
+    let sizes = views.list.iter().map(|posed| (posed.view.camera.width, posed.view.camera.height));
+    let (hub, is_cpu) = (&*viewer.hub, gpu.is_cpu());
+    let frame = views.frame().unwrap_or_else(|| frame_of(&finished.model));
+    let name = gpu.capabilities().name.clone();
+    hub.set_views(Arc::clone(&views));
+    let scene = scene(&views, frame, &finished.path.display().to_string(), (&name, false));
+    let drawing = Drawing {
+        engine: Engine::of_model(gpu, &finished.model, sizes.chain([(1, 1)]))?,
+        options: finished.options,
+        confidence: finished.model.label_confidence.clone(),
+        is_blank: finished.model.is_empty(),
+    };
+    let mut session = Session {
+        hub,
+        painter: Painter::new(Arc::clone(&views), is_cpu),
+        drawing,
+        work: Work::new(finished.path, finished.model, finished.table, finished.words),
+        hidden: Vec::new(),
+        solo: Vec::new(),
+        scores: Vec::new(),
+    };
+    hub.publish("scene", &scene);
+    session.publish();
+    while goes_on() {
+        match hub.next(TURN) {
+            Some((id, Task::Look(look))) => session.painter.look(hub, id, &look, &mut session.drawing)?,
+            Some((id, Task::Message(message))) => session.hear(id, message)?,
+            None => session.score_one()?,
+        }
+    }
+    Ok(())
+}
+
+/// Returns what a page has to know of the scene.
+pub(super) fn scene(
+    views: &Views,
+    (up, target, distance): (DVec3, DVec3, f64),
+    title: &str,
+    (device, is_training): (&str, bool),
+) -> serde_json::Value {
+    json!({
+        "kind": "scene",
+        "title": title,
+        "training": is_training,
+        "device": device,
+        "views": views.describe(),
+        "up": up.to_array(),
+        "target": target.to_array(),
+        "distance": distance,
+        "masks": views.list.iter().any(|posed| posed.view.mask.is_some()),
+        "version": env!("CARGO_PKG_VERSION"),
+    })
+}
+
+/// Returns up, the middle and a distance to see a model from that has no views: half of it is in the middle.
+fn frame_of(model: &Gaussians) -> (DVec3, DVec3, f64) {
+    let quantile = |axis: usize, share: f64| {
+        let mut values: Vec<f32> = model.means.iter().map(|mean| mean[axis]).filter(|v| v.is_finite()).collect();
+        values.sort_by(f32::total_cmp);
+        let at = ((values.len().max(1) - 1) as f64 * share) as usize;
+        values.get(at).map_or(0.0, |&value| f64::from(value))
+    };
+    let middle = DVec3::from_array([0, 1, 2].map(|axis| quantile(axis, 0.5)));
+    let size = [0, 1, 2].map(|axis| quantile(axis, 0.9) - quantile(axis, 0.1)).into_iter().fold(1e-3, f64::max);
+    // Most captures have the axes of COLMAP, y down.
+    (DVec3::NEG_Y, model.origin + middle, 1.5 * size)
+}
+
+/// The engine with the drawn part of the model.
+struct Drawing {
+    engine: Engine,
+    options: RenderOptions,
+    confidence: Option<Vec<f32>>,
+    /// Every label is hidden.
+    is_blank: bool,
+}
+
+impl Source for Drawing {
+    fn render(&mut self, camera: &Camera, parts: Parts) -> Result<Rendered> {
+        if self.is_blank {
+            return Ok(blank(camera, parts, self.options.background));
+        }
+        self.engine.grow_image(camera.width, camera.height)?;
+        render(&mut self.engine, camera, &RenderOptions { parts, ..self.options })
+    }
+
+    fn confidence(&self) -> Option<&[f32]> {
+        self.confidence.as_deref()
+    }
+
+    fn largest(&mut self) -> Option<(u32, u32)> {
+        None
+    }
+
+    fn step(&self) -> u32 {
+        0
+    }
+}
+
+/// A picture of nothing.
+fn blank(camera: &Camera, parts: Parts, background: [f32; 3]) -> Rendered {
+    let pixels = camera.width as usize * camera.height as usize;
+    let count = |asked: bool| if asked { pixels } else { 0 };
+    Rendered {
+        width: camera.width,
+        height: camera.height,
+        rgb: vec![background; pixels],
+        alpha: vec![0.0; pixels],
+        depth: vec![0.0; count(parts.depth)],
+        top_id: vec![-1; count(parts.main)],
+        top_weight: vec![0.0; count(parts.main)],
+        labels: vec![0; count(parts.labels)],
+    }
+}
+
+struct Session<'a> {
+    hub: &'a Hub,
+    painter: Painter,
+    drawing: Drawing,
+    work: Work<'a>,
+    hidden: Vec<u32>,
+    solo: Vec<u32>,
+    scores: Vec<Score>,
+}
+
+impl Session<'_> {
+    fn hear(&mut self, id: ClientId, message: Message) -> Result<()> {
+        let said = match message {
+            Message::Pick { seq, from, pixel } => {
+                return self.painter.pick(self.hub, id, (seq, &from, pixel), &mut self.drawing);
+            }
+            Message::Show { hidden, solo } => {
+                (self.hidden, self.solo) = (hidden, solo);
+                self.redraw().map(|()| String::new())
+            }
+            Message::Edit { what } => self.work.apply(&what).and_then(|said| self.redraw().map(|()| said)),
+            Message::Undo => self.work.undo().and_then(|said| self.redraw().map(|()| said)),
+            Message::Write => self.work.write(),
+            Message::Train { .. } | Message::Share { .. } => Ok("No training runs.".to_owned()),
+            Message::Look(_) | Message::Ack { .. } | Message::Alive => return Ok(()),
+        };
+        match said {
+            Ok(text) if text.is_empty() => {}
+            Ok(text) => self.hub.reply(id, &json!({ "kind": "said", "text": text })),
+            Err(error) if error.is_device_lost() => return Err(error),
+            Err(error) => self.hub.reply(id, &json!({ "kind": "problem", "text": error.to_string() })),
+        }
+        self.publish();
+        Ok(())
+    }
+
+    fn publish(&self) {
+        self.hub.publish("labels", &rows::of_model(&self.work.model, self.work.table.as_ref()));
+        self.hub.publish("edits", &self.work.describe());
+        self.hub.publish("shown", &json!({ "kind": "shown", "hidden": self.hidden, "solo": self.solo }));
+    }
+
+    /// Puts the visible part of the model on the device: what rendering all but the hidden labels, or only the chosen
+    /// ones, would draw. Labels that are gone do not count.
+    fn redraw(&mut self) -> Result<()> {
+        let model = &self.work.model;
+        let there: std::collections::BTreeSet<u32> = model.labels.iter().flatten().copied().collect();
+        self.hidden.retain(|label| there.contains(label));
+        self.solo.retain(|label| there.contains(label));
+        let part;
+        let shown = if !self.solo.is_empty() {
+            part = extract(model, &self.solo, MIN_LABEL_CONFIDENCE)?;
+            &part
+        } else if self.hidden.is_empty() {
+            model
+        } else if there.iter().all(|label| self.hidden.contains(label)) {
+            self.drawing.is_blank = true;
+            return Ok(());
+        } else {
+            part = remove(model, &self.hidden)?;
+            &part
+        };
+        self.drawing.is_blank = shown.is_empty();
+        if !shown.is_empty() {
+            self.drawing.engine.upload_model(shown)?;
+            self.drawing.confidence.clone_from(&shown.label_confidence);
+        }
+        Ok(())
+    }
+
+    /// Scores the next view of the whole, unchanged model while nothing else is to do.
+    fn score_one(&mut self) -> Result<()> {
+        let (index, views) = (self.scores.len(), Arc::clone(&self.painter.views));
+        let is_whole = self.hidden.is_empty() && self.solo.is_empty() && !self.work.is_changed();
+        if index >= views.list.len() || !is_whole || !self.hub.is_watched() {
+            return Ok(());
+        }
+        if views.list[index].view.photo.is_some() {
+            self.scores.push(self.painter.score(index, &mut self.drawing)?);
+        } else {
+            self.scores.push(Score::default());
+        }
+        self.hub.publish("scores", &describe_scores(&self.scores, 0));
+        Ok(())
+    }
+}

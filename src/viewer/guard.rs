@@ -1,0 +1,140 @@
+//! Who may talk to the server: the checks of Host, Origin and token.
+//!
+//! A web page of any site can send requests to loopback, and a name of its owner can point there. So a request has to
+//! name this server in `Host`, may come only from its own page (`Origin`), and has to know the token.
+
+use crate::error::{Error, Result};
+use rand::TryRngCore;
+use rand::rngs::OsRng;
+use std::net::{IpAddr, SocketAddr};
+
+/// Bytes of a token.
+const TOKEN_BYTES: usize = 16;
+
+/// The rules for requests.
+#[derive(Clone, Debug)]
+pub(super) struct Guard {
+    /// Values of `Host` that name this server.
+    hosts: Vec<String>,
+    token: Option<String>,
+    cookie: String,
+}
+
+impl Guard {
+    /// Makes the rules of a server at `address`, which the user named `host`.
+    pub(super) fn new(address: SocketAddr, host: &str, has_token: bool) -> Result<Self> {
+        let port = address.port();
+        let mut names = vec![host.to_owned(), address.ip().to_string()];
+        if address.ip().is_loopback() {
+            names.push("localhost".to_owned());
+        }
+        let bracketed = |name: &String| match name.parse() {
+            Ok(IpAddr::V6(_)) => format!("[{name}]:{port}"),
+            _ => format!("{}:{port}", name.to_ascii_lowercase()),
+        };
+        let token = if has_token { Some(token()?) } else { None };
+        // A browser shares cookies between the ports of a host.
+        Ok(Self { hosts: names.iter().map(bracketed).collect(), token, cookie: format!("labelgs-{port}") })
+    }
+
+    /// The address to open in a browser.
+    pub(super) fn address(&self) -> String {
+        let query = self.token.as_ref().map_or(String::new(), |token| format!("?token={token}"));
+        format!("http://{}/{query}", self.hosts[0])
+    }
+
+    /// Returns true if `Host` names this server. A name that points at loopback does not.
+    pub(super) fn knows_host(&self, host: Option<&str>) -> bool {
+        host.is_some_and(|host| self.hosts.iter().any(|own| own.eq_ignore_ascii_case(host)))
+    }
+
+    /// Returns true if the page that asks is one of this server. Browsers leave `Origin` out when a user opens a page;
+    /// `is_needed` says that it may not be missing.
+    pub(super) fn knows_origin(&self, origin: Option<&str>, is_needed: bool) -> bool {
+        match origin {
+            Some(origin) => origin.strip_prefix("http://").is_some_and(|host| self.knows_host(Some(host))),
+            None => !is_needed,
+        }
+    }
+
+    /// Returns true if no token is needed, or `given` is it.
+    pub(super) fn knows_token(&self, given: Option<&str>) -> bool {
+        match &self.token {
+            None => true,
+            Some(token) => given.is_some_and(|given| is_equal(given.as_bytes(), token.as_bytes())),
+        }
+    }
+
+    /// Returns true if the cookie of this server is among `cookies` and has the token.
+    pub(super) fn knows_cookie(&self, cookies: Option<&str>) -> bool {
+        let pairs = cookies.unwrap_or_default().split(';').filter_map(|pair| pair.trim().split_once('='));
+        let own = pairs.filter(|(name, _)| *name == self.cookie).map(|(_, value)| value);
+        self.knows_token(None) || own.into_iter().any(|value| self.knows_token(Some(value)))
+    }
+
+    /// The header that makes a browser send the token from now on.
+    pub(super) fn set_cookie(&self) -> Option<String> {
+        let token = self.token.as_ref()?;
+        Some(format!("Set-Cookie: {}={token}; Path=/; HttpOnly; SameSite=Strict\r\n", self.cookie))
+    }
+}
+
+/// Compares in a time that does not depend on the content.
+fn is_equal(a: &[u8], b: &[u8]) -> bool {
+    a.len() == b.len() && a.iter().zip(b).fold(0, |different, (a, b)| different | (a ^ b)) == 0
+}
+
+fn token() -> Result<String> {
+    let mut bytes = [0_u8; TOKEN_BYTES];
+    let failed = |error| Error::Bug(format!("the system has no random numbers: {error}"));
+    OsRng.try_fill_bytes(&mut bytes).map_err(failed)?;
+    Ok(bytes.iter().map(|byte| format!("{byte:02x}")).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn guard(has_token: bool) -> Guard {
+        Guard::new("127.0.0.1:4321".parse().expect("an address"), "127.0.0.1", has_token).expect("rules")
+    }
+
+    #[test]
+    fn only_names_of_this_server_are_hosts() {
+        let guard = guard(true);
+        for host in ["127.0.0.1:4321", "localhost:4321", "LOCALHOST:4321"] {
+            assert!(guard.knows_host(Some(host)), "{host}");
+        }
+        for host in ["rebind.test:4321", "127.0.0.1", "127.0.0.1:80", "127.0.0.1.evil.test:4321", "", "[::1]:4321"] {
+            assert!(!guard.knows_host(Some(host)), "{host}");
+        }
+        assert!(!guard.knows_host(None));
+        let six = Guard::new("[::1]:80".parse().expect("an address"), "::1", false).expect("rules");
+        assert!(six.knows_host(Some("[::1]:80")) && six.address() == "http://[::1]:80/");
+    }
+
+    #[test]
+    fn another_origin_is_refused() {
+        let guard = guard(true);
+        assert!(guard.knows_origin(Some("http://127.0.0.1:4321"), true) && guard.knows_origin(None, false));
+        for origin in ["http://evil.test", "https://127.0.0.1:4321", "http://127.0.0.1:4322", "null", ""] {
+            assert!(!guard.knows_origin(Some(origin), false), "{origin}");
+        }
+        assert!(!guard.knows_origin(None, true));
+    }
+
+    #[test]
+    fn the_token_is_needed_whole() {
+        let guard = guard(true);
+        let address = guard.address();
+        let token = address.split("token=").nth(1).expect("a token");
+        assert_eq!(token.len(), 32);
+        assert!(guard.knows_token(Some(token)) && guard.knows_cookie(Some(&format!("a=b; labelgs-4321={token}; c=d"))));
+        assert!(!guard.knows_token(None) && !guard.knows_token(Some(&token[..31])) && !guard.knows_cookie(None));
+        assert!(
+            !guard.knows_cookie(Some(&format!("labelgs-4322={token}"))) && !guard.knows_cookie(Some("labelgs-4321="))
+        );
+        assert!(self::guard(false).knows_cookie(None));
+        assert_ne!(self::guard(true).address(), address);
+    }
+}

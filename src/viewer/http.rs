@@ -1,0 +1,140 @@
+//! Heads of HTTP requests, read with limits on size and time, and answers.
+
+use std::io::{self, Read, Write};
+use std::net::TcpStream;
+use std::time::{Duration, Instant};
+
+/// Time for a whole head, however slowly its bytes come.
+pub(super) const HEAD_TIME: Duration = Duration::from_secs(5);
+/// Time for the other side to take an answer.
+pub(super) const WRITE_TIME: Duration = Duration::from_secs(10);
+/// Largest head, bytes.
+const HEAD_BYTES: usize = 16 << 10;
+const HEADERS: usize = 64;
+
+/// Nothing is loaded from elsewhere, no script or style of markup is run, and no page frames this one.
+const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob:; connect-src \
+                      'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
+
+/// The head of a request.
+#[derive(Debug, Default, PartialEq, Eq)]
+pub(super) struct Head {
+    pub(super) method: String,
+    pub(super) path: String,
+    pub(super) query: String,
+    headers: Vec<(String, String)>,
+}
+
+impl Head {
+    /// Returns the value of a header that occurs once.
+    pub(super) fn header(&self, name: &str) -> Option<&str> {
+        let mut found = self.headers.iter().filter(|(own, _)| own.eq_ignore_ascii_case(name));
+        let first = found.next()?;
+        found.next().is_none().then_some(&first.1)
+    }
+
+    /// Returns a value of the query.
+    pub(super) fn value(&self, name: &str) -> Option<&str> {
+        self.query
+            .split('&')
+            .filter_map(|pair| pair.split_once('='))
+            .find(|(key, _)| *key == name)
+            .map(|(_, value)| value)
+    }
+}
+
+/// Why there is no head, as the status to answer with.
+#[derive(Debug, PartialEq, Eq)]
+pub(super) enum NoHead {
+    /// The other side is gone.
+    Gone,
+    /// A status and its name.
+    Status(&'static str),
+}
+
+/// Reads a head. Bytes after it are refused: a browser waits for an answer first.
+pub(super) fn read_head(stream: &mut TcpStream) -> Result<Head, NoHead> {
+    let end = Instant::now() + HEAD_TIME;
+    let mut bytes = Vec::new();
+    let mut chunk = [0_u8; 2048];
+    loop {
+        let left = end.saturating_duration_since(Instant::now());
+        if left.is_zero() {
+            return Err(NoHead::Status("408 Request Timeout"));
+        }
+        stream.set_read_timeout(Some(left)).map_err(|_| NoHead::Gone)?;
+        match stream.read(&mut chunk) {
+            Ok(0) => return Err(NoHead::Gone),
+            Ok(count) => bytes.extend_from_slice(&chunk[..count]),
+            Err(error) if error.kind() == io::ErrorKind::Interrupted => continue,
+            Err(error) if matches!(error.kind(), io::ErrorKind::WouldBlock | io::ErrorKind::TimedOut) => {
+                return Err(NoHead::Status("408 Request Timeout"));
+            }
+            Err(_) => return Err(NoHead::Gone),
+        }
+        if bytes.len() > HEAD_BYTES {
+            return Err(NoHead::Status("431 Request Header Fields Too Large"));
+        }
+        if let Some(head) = parse(&bytes)? {
+            return Ok(head);
+        }
+    }
+}
+
+/// Parses a head; none while it is incomplete.
+fn parse(bytes: &[u8]) -> Result<Option<Head>, NoHead> {
+    const BAD: NoHead = NoHead::Status("400 Bad Request");
+    let mut headers = [httparse::EMPTY_HEADER; HEADERS];
+    let mut request = httparse::Request::new(&mut headers);
+    match request.parse(bytes) {
+        Ok(httparse::Status::Partial) => return Ok(None),
+        Ok(httparse::Status::Complete(length)) if length == bytes.len() => {}
+        Ok(httparse::Status::Complete(_)) | Err(_) => return Err(BAD),
+    }
+    let target = request.path.ok_or(BAD)?;
+    let (path, query) = target.split_once('?').unwrap_or((target, ""));
+    let text = |value: &[u8]| String::from_utf8(value.to_vec()).map_err(|_| BAD);
+    let headers = request.headers.iter().map(|header| Ok((header.name.to_owned(), text(header.value)?)));
+    Ok(Some(Head {
+        method: request.method.ok_or(BAD)?.to_owned(),
+        path: path.to_owned(),
+        query: query.to_owned(),
+        headers: headers.collect::<Result<_, _>>()?,
+    }))
+}
+
+/// Writes an answer and ends the connection.
+pub(super) fn answer(stream: &mut TcpStream, status: &str, kind: &str, more: &str, body: &[u8]) {
+    let head = format!(
+        "HTTP/1.1 {status}\r\nContent-Type: {kind}\r\nContent-Length: {}\r\n{more}Cache-Control: no-store\r\n\
+         Content-Security-Policy: {POLICY}\r\nX-Content-Type-Options: nosniff\r\nReferrer-Policy: no-referrer\r\n\
+         Cross-Origin-Resource-Policy: same-origin\r\nCross-Origin-Opener-Policy: same-origin\r\n\
+         Connection: close\r\n\r\n",
+        body.len()
+    );
+    // A browser that went away misses nothing.
+    let _ = stream.write_all(head.as_bytes()).and_then(|()| stream.write_all(body)).and_then(|()| stream.flush());
+    let _ = stream.shutdown(std::net::Shutdown::Write);
+}
+
+/// Answers with a line of text.
+pub(super) fn say(stream: &mut TcpStream, status: &str, text: &str) {
+    answer(stream, status, "text/plain; charset=utf-8", "", format!("{text}\n").as_bytes());
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn heads_are_read_whole_or_not_at_all() {
+        let head =
+            parse(b"GET /a?token=7&b=c HTTP/1.1\r\nHost: h\r\nX: 1\r\nx: 2\r\n\r\n").expect("whole").expect("whole");
+        assert_eq!((&*head.path, head.value("token"), head.header("host")), ("/a", Some("7"), Some("h")));
+        assert_eq!(head.header("x"), None, "a header that occurs twice has no value");
+        assert_eq!(parse(b"GET / HTTP/1.1\r\nHost"), Ok(None));
+        for bad in [&b"\x00\x01\r\n\r\n"[..], b"GET / HTTP/1.1\r\n\r\nmore", b"GET / HTTP/1.1\r\nA: \xff\r\n\r\n"] {
+            assert_eq!(parse(bad), Err(NoHead::Status("400 Bad Request")));
+        }
+    }
+}

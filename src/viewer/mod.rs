@@ -1,0 +1,90 @@
+//! A page that shows a model, or a training that runs, in a browser of this machine.
+//!
+//! [`Viewer::start`] opens a port on loopback. [`show`] serves a finished model, whose labels the page may
+//! change; [`Watched`] is an observer that serves a training. The engine draws every picture; the page only places
+//! them. Page, scripts and styles are in the program (`page/`), and nothing is fetched from elsewhere.
+//!
+//! One thread owns the engine. `server` has a thread per connection, `hub` passes requests and frames between them:
+//! the newest camera wins, one frame is in work and one on the wire. `guard` decides who may ask.
+
+mod edits;
+mod finished;
+mod guard;
+mod http;
+mod hub;
+mod message;
+mod pace;
+mod page;
+mod painter;
+mod pictures;
+mod rows;
+mod server;
+mod socket;
+mod training;
+mod views;
+
+pub use finished::{Finished, show};
+pub use message::Edit;
+pub use training::Watched;
+
+use crate::error::Result;
+use guard::Guard;
+use hub::Hub;
+use std::path::Path;
+use std::sync::Arc;
+use std::time::Duration;
+
+/// Time for pages to hear that the server ends.
+const FAREWELL: Duration = Duration::from_millis(500);
+
+/// Where the server listens, and what viewing may cost.
+#[derive(Clone, Debug)]
+pub struct ViewerOptions {
+    /// Name or address of the network interface.
+    pub host: String,
+    /// Port; 0 takes a free one.
+    pub port: u16,
+    /// A token is needed, which the printed address has.
+    pub has_token: bool,
+    /// Share of the time of a training that viewing may take, 0 to 1.
+    pub share: f32,
+}
+
+/// The commands of the program, for the page to show.
+pub trait Words: Sync {
+    /// Returns the command that makes `output` of `input` by an edit.
+    fn edit(&self, edit: &Edit, input: &Path, output: &Path) -> String;
+    /// Returns the command that shows a model.
+    fn view(&self, model: &Path) -> String;
+}
+
+/// A server for pages.
+pub struct Viewer {
+    hub: Arc<Hub>,
+    guard: Guard,
+    options: ViewerOptions,
+}
+
+impl Viewer {
+    /// Opens the port.
+    ///
+    /// # Errors
+    ///
+    /// A host that cannot be listened on; no token on a host that is not loopback.
+    pub fn start(options: &ViewerOptions) -> Result<Self> {
+        let hub = Arc::new(Hub::default());
+        let guard = server::start(&options.host, options.port, options.has_token, &hub)?;
+        Ok(Self { hub, guard, options: options.clone() })
+    }
+
+    /// The address to open, with the token.
+    pub fn address(&self) -> String {
+        self.guard.address()
+    }
+}
+
+impl Drop for Viewer {
+    fn drop(&mut self) {
+        self.hub.close(FAREWELL);
+    }
+}

@@ -1,0 +1,27 @@
+//! The files of the page, in the program.
+
+/// Path, type and bytes of each file.
+const FILES: &[(&str, &str, &[u8])] = &[
+    ("/", "text/html; charset=utf-8", include_bytes!("page/index.html")),
+    ("/style.css", "text/css; charset=utf-8", include_bytes!("page/style.css")),
+    ("/panels.css", "text/css; charset=utf-8", include_bytes!("page/panels.css")),
+    ("/main.js", SCRIPT, include_bytes!("page/main.js")),
+    ("/link.js", SCRIPT, include_bytes!("page/link.js")),
+    ("/algebra.js", SCRIPT, include_bytes!("page/algebra.js")),
+    ("/camera.js", SCRIPT, include_bytes!("page/camera.js")),
+    ("/input.js", SCRIPT, include_bytes!("page/input.js")),
+    ("/stage.js", SCRIPT, include_bytes!("page/stage.js")),
+    ("/labels.js", SCRIPT, include_bytes!("page/labels.js")),
+    ("/edits.js", SCRIPT, include_bytes!("page/edits.js")),
+    ("/views.js", SCRIPT, include_bytes!("page/views.js")),
+    ("/training.js", SCRIPT, include_bytes!("page/training.js")),
+    ("/dom.js", SCRIPT, include_bytes!("page/dom.js")),
+    ("/icon.svg", "image/svg+xml", include_bytes!("page/icon.svg")),
+];
+
+const SCRIPT: &str = "text/javascript; charset=utf-8";
+
+/// Returns type and bytes of a file.
+pub(super) fn file(path: &str) -> Option<(&'static str, &'static [u8])> {
+    FILES.iter().find(|(own, ..)| *own == path).map(|&(_, kind, bytes)| (kind, bytes))
+}

@@ -1,0 +1,255 @@
+// Puts the parts of the page together.
+
+import { Edits } from "./edits.js";
+import { $, choose, copy, el, toast } from "./dom.js";
+import { Input } from "./input.js";
+import { Labels } from "./labels.js";
+import { Link } from "./link.js";
+import { PANES, Stage } from "./stage.js";
+import { Rig } from "./camera.js";
+import { Training } from "./training.js";
+import { Views } from "./views.js";
+
+const rig = new Rig();
+const stage = new Stage(rig);
+let scene = null;
+const picks = new Map();
+
+const link = new Link(hear, (frame) => stage.show(frame), connection);
+stage.link = link;
+const labels = new Labels(link, () => {
+  edits.refresh();
+  const mark = edits.chosen.filter((id) => id !== 0).slice(0, 4096);
+  if (mark.join() === stage.mark.join()) return;
+  stage.mark = mark;
+  stage.change();
+});
+const edits = new Edits(link, labels);
+const views = new Views(rig, snap);
+const training = new Training(link);
+
+function hear(message) {
+  switch (message.kind) {
+    case "scene": return begin(message);
+    case "labels": return labels.setRows(message);
+    case "shown": labels.setShown(message); return stage.change();
+    case "edits": edits.setState(message); return stage.change();
+    case "scores": views.setScores(message); return training.setScores(message, scene?.views ?? []);
+    case "training": return training.setState(message);
+    case "curve": return training.setCurve(message);
+    case "picked": return picked(message);
+    case "over": return over(message);
+    case "lost": stage.lost(message.seq); return toast(message.text, true);
+    case "problem": return toast(message.text, true);
+    case "said": return toast(message.text);
+    case "notice": return toast(message.text);
+    default: return undefined;
+  }
+}
+
+function begin(message) {
+  // The same scene again after a break keeps the camera.
+  const isSame = scene !== null && JSON.stringify(scene.views) === JSON.stringify(message.views) && scene.title === message.title;
+  scene = message;
+  document.title = `${message.title} – labelgs`;
+  $("title").textContent = message.title;
+  $("title").title = message.device ? `${message.title} on ${message.device}` : message.title;
+  document.body.classList.toggle("bare", message.views.length === 0 && !message.training);
+  stage.isTraining = message.training;
+  labels.isFixed = message.training;
+  edits.isFixed = message.training;
+  for (const option of $("pane-a").options) if (option.value === "confidence") option.disabled = message.training;
+  rig.reset(message, isSame);
+  views.setScene(message.views);
+  labels.render();
+  edits.refresh();
+  veil(null);
+  moved(false);
+}
+
+function connection(state) {
+  const words = { on: "connected", off: "disconnected", token: "disconnected", over: "ended" };
+  $("state-link").textContent = words[state];
+  $("state-link").className = state === "on" ? "dot on" : "dot off";
+  if (state === "on") return stage.change();
+  if (state === "off") return veil("The server is gone", "The program has ended or is not reachable. This page comes back when it does.");
+  if (state === "token") return veil("The server is another one", "It was started anew and asks for its own token. Open the address that labelgs printed last.");
+  return undefined;
+}
+
+function veil(head, ...parts) {
+  $("veil").hidden = head === null;
+  $("veil-head").textContent = head ?? "";
+  $("veil-text").replaceChildren(...parts);
+}
+
+function over(message) {
+  training.end();
+  stage.isTraining = false;
+  const scores = [message.psnr && `PSNR ${message.psnr.toFixed(2)} dB`, message.iou && `IoU ${message.iou.toFixed(3)}`].filter(Boolean).join(", ");
+  const head = message.stopped ? `Stopped after step ${message.steps}` : "The training is done";
+  veil(head, scores ? `Test views: ${scores}. ` : "", "See the model with", el("code", { textContent: message.command }));
+}
+
+function moved(isMotion = true) {
+  stage.change(isMotion);
+  views.mark();
+  const { view } = rig;
+  $("state-view").textContent = view === null ? "free camera" : `view ${rig.views[view].name}`;
+}
+
+function snap(index) {
+  rig.snap(index);
+  if (stage.photo !== "off") stage.setPhoto(stage.photo);
+  moved(false);
+}
+
+stage.onFrame = (frame) => {
+  $("state-exact").hidden = !frame.exact;
+  $("state-size").textContent = `${frame.width} × ${frame.height} px`;
+  $("state-time").textContent = `${frame.ms.toFixed(0)} ms`;
+  if ((rig.view === null) === ($("state-view").textContent.startsWith("view"))) moved(true);
+};
+
+/** Asks what is at a point of the stage. */
+function pick(at, then) {
+  const pixel = stage.pixel(...at);
+  if (!pixel) return;
+  const from = rig.view === null ? { camera: rig.file() } : { view: rig.view };
+  if (picks.size > 32) picks.clear();
+  picks.set(link.pick(from, pixel), { at, then });
+}
+
+function picked(message) {
+  const asked = picks.get(message.seq);
+  picks.delete(message.seq);
+  if (!asked) return;
+  const sure = typeof message.confidence === "number" ? ` · confidence ${(100 * message.confidence).toFixed(0)} %` : "";
+  const depth = message.depth > 0 ? ` · depth ${message.depth.toPrecision(4)}` : "";
+  const which = message.gaussian === null ? "nothing here" : `Gaussian ${message.gaussian}`;
+  $("state-pick").textContent = `${labels.title(message.label)} · ${which}${depth}${sure}`;
+  asked.then(message, asked.at);
+}
+
+function spot([x, y]) {
+  const mark = $("spot");
+  mark.hidden = false;
+  mark.style.left = `${x}px`;
+  mark.style.top = `${y}px`;
+  clearTimeout(spot.timer);
+  spot.timer = setTimeout(() => { mark.hidden = true; }, 700);
+}
+
+function frameLabels(ids) {
+  const box = labels.box(ids);
+  if (!box) return;
+  rig.frame(...box);
+  moved();
+}
+
+function setPane(index, pane) {
+  if (pane === "error") {
+    if (rig.view === null) { toast("The error needs a photo: choose a view first.", true); return stage.captions(); }
+  } else if (pane === "confidence" && scene?.training) {
+    toast("Confidence is known when the training has ended.", true);
+    return stage.captions();
+  }
+  stage.panes[index] = pane;
+  return stage.change();
+}
+
+function fly(isFlight) {
+  input.isFlight = isFlight;
+  stage.box.classList.toggle("fly", isFlight);
+  choose({ orbit: $("mode-orbit"), fly: $("mode-fly") }, isFlight ? "fly" : "orbit");
+}
+
+const act = {
+  home: () => { rig.home(); moved(false); },
+  level: () => { rig.level(); toast("Up is now the up of this picture."); },
+  copyCamera: () => copy(JSON.stringify(rig.file()), "Camera"),
+  help: () => $("help").showModal(),
+  holdPhoto: () => {
+    if (rig.view === null || !rig.views[rig.view].photo) return;
+    stage.isPhotoHeld = true;
+    stage.fetchPhoto(rig.view).then(() => stage.paint());
+    stage.captions();
+  },
+};
+
+const input = new Input(stage, rig, {
+  click: (at, how) => pick(at, (found) => labels.picked(found.label, how)),
+  pivot: (at) => pick(at, (found) => {
+    rig.pivotAt(stage.point(...at), found.depth);
+    spot(at);
+    moved();
+  }),
+  released: { Space: () => { stage.isPhotoHeld = false; stage.paint(); stage.captions(); } },
+  keys: {
+    KeyV: () => fly(!input.isFlight),
+    KeyF: () => frameLabels(edits.chosen),
+    "Shift+KeyF": act.home,
+    KeyC: act.copyCamera,
+    KeyX: () => stage.setLayout(stage.layout === "wipe" ? "one" : "wipe"),
+    "Shift+KeyX": () => stage.setLayout(stage.layout === "pair" ? "one" : "pair"),
+    KeyP: () => stage.setPhoto(stage.photo === "wipe" ? "off" : "wipe"),
+    Space: act.holdPhoto,
+    BracketLeft: () => views.next(-1),
+    BracketRight: () => views.next(1),
+    KeyH: () => { if (edits.chosen.length > 0) labels.toggle(edits.chosen); },
+    "Shift+KeyH": () => labels.showAll(),
+    KeyI: () => { if (edits.chosen.length > 0) labels.alone(edits.chosen); },
+    KeyM: () => edits.merge(),
+    "Ctrl+KeyE": () => edits.export(),
+    "Ctrl+KeyA": () => labels.select(labels.rows.filter((row) => row.id !== 0).map((row) => row.id)),
+    "Ctrl+Shift+KeyA": () => labels.select([]),
+    "Ctrl+KeyI": () => labels.select(labels.rows.filter((row) => row.id !== 0 && !labels.selected.has(row.id)).map((row) => row.id)),
+    "Ctrl+KeyZ": () => edits.undo(),
+    "Ctrl+KeyS": () => edits.save(),
+    F2: () => edits.rename(),
+    Delete: () => edits.remove(),
+    Escape: () => labels.select([]),
+    KeyK: () => training.ask("pause"),
+    "?": act.help,
+    ...Object.fromEntries(PANES.map(([pane], index) => [`Digit${index + 1}`, () => setPane(0, pane)])),
+  },
+});
+labels.onFrame = frameLabels;
+
+const KEYS = [
+  ["Drag", "turn around the pivot; in flight, look around"], ["Right, middle or Shift+drag", "move across"], ["Wheel", "nearer and farther"],
+  ["Double click", "set the pivot at the depth below"], ["Click", "select the object; Shift adds, Ctrl takes away"],
+  ["W A S D, Q E", "move; Shift fast, Alt slow"], ["Arrows", "turn"], ["V", "orbit or fly"], ["F, Shift+F", "frame the selection; first camera"],
+  ["[ ]", "view before, view after"], ["1 – 7", PANES.map(([, name]) => name.toLowerCase()).join(", ")], ["X, Shift+X", "two pictures: wipe, side by side"],
+  ["P, hold Space", "photo: bar, switch"], ["H, Shift+H, I", "hide the selection, show all, show it alone"], ["F2, M, Delete", "rename, merge, remove"],
+  ["Ctrl+A, Ctrl+Shift+A, Ctrl+I", "select all, nothing, the others"], ["Ctrl+E, Ctrl+S, Ctrl+Z", "export the selection, save the model, undo"], ["C", "copy the camera"], ["K", "pause a training, or go on"],
+];
+$("help-keys").append(...KEYS.flatMap(([key, what]) => [el("b", { textContent: key }), el("span", { textContent: what })]));
+
+for (const id of ["pane-a", "pane-b"]) $(id).append(...PANES.map(([value, name]) => el("option", { value, textContent: name })));
+$("pane-a").addEventListener("change", (event) => setPane(0, event.target.value));
+$("pane-b").addEventListener("change", (event) => setPane(1, event.target.value));
+const on = (id, what) => $(id).addEventListener("click", what);
+for (const layout of ["one", "wipe", "pair"]) on(`layout-${layout}`, () => stage.setLayout(layout));
+for (const photo of ["off", "wipe", "switch", "error"]) on(`photo-${photo}`, () => stage.setPhoto(photo));
+on("mode-orbit", () => fly(false));
+on("mode-fly", () => fly(true));
+on("level", act.level);
+on("home", act.home);
+on("copy-camera", act.copyCamera);
+on("help-open", act.help);
+on("act-frame", () => frameLabels(edits.chosen));
+
+const tabs = { stage: $("tab-stage"), labels: $("tab-labels"), views: $("tab-views") };
+for (const [tab, button] of Object.entries(tabs)) {
+  button.addEventListener("click", () => {
+    document.body.dataset.tab = tab;
+    choose(tabs, tab);
+  });
+}
+choose(tabs, "stage");
+fly(false);
+stage.captions();
+
+// For whoever drives the page from outside.
+window.labelgs = { rig, stage, link, labels, edits, views, training, input };

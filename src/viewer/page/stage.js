@@ -1,0 +1,245 @@
+// The picture: draws frames, and asks for the next one when the camera or a control has changed.
+
+import { $, choose } from "./dom.js";
+
+export const PANES = [
+  ["colour", "Colour"], ["labels", "Labels"], ["tinted", "Labels over colour"], ["depth", "Depth"],
+  ["opacity", "Opacity"], ["confidence", "Confidence"], ["error", "Error against photo"],
+];
+const NAMES = Object.fromEntries(PANES);
+
+/** Milliseconds after the last motion until the exact picture is asked for. */
+const STILL = 160;
+/** Milliseconds between two pictures of a training that the camera rests on. */
+const FRESH = 900;
+/** Most pixels of a picture. */
+const PIXELS = 8e6;
+
+export class Stage {
+  constructor(rig) {
+    this.rig = rig;
+    this.link = null;
+    this.box = $("stage");
+    this.canvas = $("canvas");
+    this.context = this.canvas.getContext("2d");
+    this.panes = ["colour", "labels"];
+    this.layout = "one";
+    this.photo = "off";
+    this.isPhotoHeld = false;
+    this.wipeAt = 0.5;
+    this.images = [];
+    this.mark = [];
+    this.outline = null;
+    this.frame = null;
+    this.photos = new Map();
+    this.isTraining = false;
+    this.asked = null;
+    this.isDirty = true;
+    this.moved = 0;
+    this.isStill = false;
+    this.onFrame = () => {};
+    new ResizeObserver(() => this.resize()).observe(this.box);
+    this.resize();
+    this.wire();
+    const turn = (now) => { this.tick(now); requestAnimationFrame(turn); };
+    requestAnimationFrame(turn);
+  }
+
+  wire() {
+    const wipe = $("wipe");
+    const to = (x) => {
+      const { left, width } = this.box.getBoundingClientRect();
+      this.setWipe((x - left) / width);
+    };
+    wipe.addEventListener("pointerdown", (event) => { event.stopPropagation(); wipe.setPointerCapture(event.pointerId); });
+    wipe.addEventListener("pointermove", (event) => { if (wipe.hasPointerCapture(event.pointerId)) to(event.clientX); });
+    for (const kind of ["click", "dblclick", "wheel"]) wipe.addEventListener(kind, (event) => event.stopPropagation());
+    wipe.addEventListener("keydown", (event) => {
+      const step = { ArrowLeft: -0.02, ArrowRight: 0.02 }[event.key];
+      if (!step) return;
+      event.preventDefault();
+      event.stopPropagation();
+      this.setWipe(this.wipeAt + step);
+    });
+    this.setWipe(0.5);
+  }
+
+  setWipe(at) {
+    this.wipeAt = Math.max(0, Math.min(1, at));
+    $("wipe").style.left = `${100 * this.wipeAt}%`;
+    $("wipe").setAttribute("aria-valuenow", String(Math.round(100 * this.wipeAt)));
+    this.paint();
+  }
+
+  /** Pixels of the picture: half of the stage for two side by side. */
+  resize() {
+    const ratio = Math.min(window.devicePixelRatio || 1, 2);
+    const { clientWidth, clientHeight } = this.box;
+    if (clientWidth === 0 || clientHeight === 0) return;
+    this.canvas.width = Math.max(1, Math.round(clientWidth * ratio));
+    this.canvas.height = Math.max(1, Math.round(clientHeight * ratio));
+    const columns = this.isPair ? 2 : 1;
+    const size = [Math.max(2, Math.floor(this.canvas.width / columns)), Math.max(2, this.canvas.height)];
+    const shrink = Math.min(1, Math.sqrt(PIXELS / (size[0] * size[1])));
+    this.rig.size = size.map((side) => Math.max(1, Math.floor(side * shrink)));
+    this.paint();
+    this.change();
+  }
+
+  get isPair() { return this.layout === "pair" && this.photo === "off"; }
+  get isWiped() { return (this.layout === "wipe" && this.photo === "off") || this.photo === "wipe"; }
+
+  /** The panes that the server draws. */
+  wanted() {
+    if (this.photo === "error") return ["error"];
+    if (this.photo !== "off" || this.layout === "one") return [this.panes[0]];
+    return [...this.panes];
+  }
+
+  /** Something else is to be drawn; `isMotion` for the camera. */
+  change(isMotion = false) {
+    this.isDirty = true;
+    this.isStill = false;
+    this.moved = isMotion ? performance.now() : 0;
+    if (this.rig.view === null && this.photo !== "off") this.setPhoto("off");
+    this.captions();
+  }
+
+  setLayout(layout) {
+    if (this.photo !== "off") this.photo = "off";
+    this.layout = layout;
+    this.resize();
+  }
+
+  setPhoto(photo) {
+    this.photo = this.rig.view !== null && this.rig.views[this.rig.view].photo ? photo : "off";
+    this.resize();
+    if (this.photo !== "off" && this.photo !== "error") this.fetchPhoto(this.rig.view).then(() => this.paint());
+  }
+
+  async fetchPhoto(index) {
+    if (!this.photos.has(index)) {
+      const blob = await (await fetch(`/photo/${index}`)).blob();
+      this.photos.clear();
+      this.photos.set(index, await createImageBitmap(blob, { colorSpaceConversion: "none" }));
+    }
+    return this.photos.get(index);
+  }
+
+  tick(now) {
+    if (!this.link?.isOpen || this.canvas.width < 2) return;
+    const isMoving = now - this.moved < STILL;
+    if (this.isDirty) {
+      this.isDirty = false;
+      this.ask(isMoving);
+      this.isStill = !isMoving;
+    } else if (!this.isStill && !isMoving) {
+      this.isStill = true;
+      this.ask(false);
+    } else if (this.isTraining && this.isStill && !document.hidden && this.asked === null && now - this.drawn > FRESH) {
+      this.ask(false);
+    }
+  }
+
+  ask(moving) {
+    const from = this.rig.view === null ? { camera: this.rig.file() } : { view: this.rig.view };
+    this.asked = this.link.look({ from, panes: this.wanted(), mark: this.mark, moving });
+  }
+
+  /** Draws a frame that came. */
+  async show(frame) {
+    const decode = (blob) => createImageBitmap(blob, { colorSpaceConversion: "none", premultiplyAlpha: "none" });
+    const images = await Promise.all(frame.blobs.map(decode));
+    [...this.images, this.outline].forEach((image) => image?.close());
+    this.outline = frame.marked ? images.pop() : null;
+    this.images = images;
+    this.frame = frame;
+    this.drawn = performance.now();
+    if (frame.seq === this.asked) this.asked = null;
+    this.paint();
+    this.onFrame(frame);
+  }
+
+  lost(seq) {
+    if (seq === this.asked) this.asked = null;
+  }
+
+  /** Where the picture is on the canvas, px: the whole, or the place of a view in it. */
+  area(column = 0) {
+    const columns = this.isPair ? 2 : 1;
+    const [width, height] = [this.canvas.width / columns, this.canvas.height];
+    const left = column * width;
+    if (this.rig.view === null) return { x: left, y: 0, width, height };
+    const { camera } = this.rig.views[this.rig.view];
+    const { x, y, fit } = this.rig.placed(camera, [width, height]);
+    return { x: left + x, y, width: camera.W * fit, height: camera.H * fit };
+  }
+
+  paint() {
+    const { context, canvas } = this;
+    context.clearRect(0, 0, canvas.width, canvas.height);
+    context.imageSmoothingQuality = "high";
+    $("wipe").hidden = !this.isWiped;
+    if (this.images.length === 0) return;
+    const put = (image, area) => context.drawImage(image, area.x, area.y, area.width, area.height);
+    const photo = this.rig.view === null ? undefined : this.photos.get(this.rig.view);
+    const isPhoto = photo && (this.photo === "switch" || this.isPhotoHeld);
+    put(isPhoto ? photo : this.images[0], this.area(0));
+    const second = this.photo === "wipe" ? photo : this.images[1];
+    if (this.isWiped && second) {
+      context.save();
+      context.beginPath();
+      context.rect(this.wipeAt * canvas.width, 0, canvas.width, canvas.height);
+      context.clip();
+      put(second, this.area(0));
+      context.restore();
+    } else if (this.isPair && second) {
+      put(second, this.area(1));
+    }
+    if (this.outline && !isPhoto) {
+      put(this.outline, this.area(0));
+      if (this.isPair) put(this.outline, this.area(1));
+    }
+  }
+
+  captions() {
+    const [first, second] = this.panes.map((pane) => NAMES[pane]);
+    const isTwo = (this.layout !== "one" && this.photo === "off") || this.photo === "wipe";
+    $("tag-b").hidden = !isTwo;
+    $("tag-b").textContent = this.photo === "wipe" ? "Photo" : second;
+    $("tag-a").textContent = this.photo === "switch" || this.isPhotoHeld ? "Photo" : this.photo === "error" ? NAMES.error : isTwo ? first : "";
+    choose({ one: $("layout-one"), wipe: $("layout-wipe"), pair: $("layout-pair") }, this.layout);
+    choose({ off: $("photo-off"), wipe: $("photo-wipe"), switch: $("photo-switch"), error: $("photo-error") }, this.photo);
+    $("pane-a").value = this.panes[0];
+    $("pane-b").value = this.panes[1];
+    $("pane-b").closest("label").hidden = this.layout === "one";
+  }
+
+  /** The pixel of the full picture under a point of the stage, CSS px; null outside. */
+  pixel(x, y) {
+    const ratio = this.canvas.width / this.box.clientWidth;
+    const at = [x * ratio, y * ratio];
+    const column = this.isPair && at[0] >= this.canvas.width / 2 ? 1 : 0;
+    const area = this.area(column);
+    const camera = this.rig.file();
+    const pixel = [(at[0] - area.x) / area.width * camera.W, (at[1] - area.y) / area.height * camera.H];
+    const isInside = pixel[0] >= 0 && pixel[1] >= 0 && pixel[0] < camera.W && pixel[1] < camera.H;
+    return isInside ? pixel.map(Math.floor) : null;
+  }
+
+  /** The point of the stage in px of the free camera. */
+  point(x, y) {
+    const ratio = this.rig.size[1] / this.box.clientHeight;
+    const at = [x * ratio, y * ratio];
+    return this.isPair && at[0] >= this.rig.size[0] ? [at[0] - this.rig.size[0], at[1]] : at;
+  }
+
+  /** The pixels of the last frame, for whoever wants to compare them. */
+  pixels(index = 0) {
+    const image = this.images[index];
+    const canvas = new OffscreenCanvas(image.width, image.height);
+    const context = canvas.getContext("2d", { willReadFrequently: true });
+    context.drawImage(image, 0, 0);
+    return context.getImageData(0, 0, image.width, image.height);
+  }
+}

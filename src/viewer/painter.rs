@@ -1,0 +1,182 @@
+//! Draws frames and answers picks, for a finished model and for one in training alike.
+
+use super::hub::{ClientId, Hub};
+use super::message::{Frame, Look, PIXELS_MAX, Viewpoint};
+use super::pace::Pace;
+use super::pictures::{self, Beside};
+use super::views::{Posed, Score, Views};
+use crate::error::{Error, Result};
+use crate::io::camera_json::camera_of;
+use crate::render::{Parts, Rendered};
+use crate::scene::{Camera, View};
+use serde_json::json;
+use std::path::Path;
+use std::sync::Arc;
+use std::time::Instant;
+
+/// Time of a moving frame, s: on a graphics card, and on a processor.
+const TARGETS: [f64; 2] = [0.04, 0.08];
+
+/// What draws.
+pub(super) trait Source {
+    /// Renders the drawn model.
+    fn render(&mut self, camera: &Camera, parts: Parts) -> Result<Rendered>;
+    /// Confidence by row of the drawn model.
+    fn confidence(&self) -> Option<&[f32]>;
+    /// Largest picture, px, if there is a limit.
+    fn largest(&mut self) -> Option<(u32, u32)>;
+    /// Step of the training; 0 for a finished model.
+    fn step(&self) -> u32;
+}
+
+/// Draws at a size that keeps up with the hand.
+pub(super) struct Painter {
+    pub(super) views: Arc<Views>,
+    pace: Pace,
+    target: f64,
+}
+
+impl Painter {
+    /// Makes a painter for some views.
+    pub(super) fn new(views: Arc<Views>, is_cpu: bool) -> Self {
+        Self { views, pace: Pace::default(), target: TARGETS[usize::from(is_cpu)] }
+    }
+
+    /// Draws and sends a frame. Only a broken device is an error; all else is told to the page.
+    pub(super) fn look(&mut self, hub: &Hub, id: ClientId, look: &Look, source: &mut dyn Source) -> Result<()> {
+        let drawn = self.draw(hub, id, look, source);
+        hub.finish(id, drawn.as_ref().ok());
+        match drawn {
+            Ok(_) => Ok(()),
+            Err(error) => {
+                hub.reply(id, &json!({ "kind": "lost", "seq": look.seq, "text": error.to_string() }));
+                if is_fatal(&error) { Err(error) } else { Ok(()) }
+            }
+        }
+    }
+
+    fn draw(&mut self, hub: &Hub, id: ClientId, look: &Look, source: &mut dyn Source) -> Result<Frame> {
+        if look.panes.is_empty() || look.panes.len() > 2 {
+            return Err(Error::usage("panes", "are one or two"));
+        }
+        let start = Instant::now();
+        let views = Arc::clone(&self.views);
+        let (full, posed) = camera(&views, &look.from)?;
+        let fits = fitting(&full, source.largest());
+        let pixels = |size: (u32, u32)| f64::from(size.0) * f64::from(size.1);
+        let scale = if look.moving { self.pace.scale(pixels(fits), self.target) } else { 1.0 };
+        let side = |full: u32| ((f64::from(full) * scale).round() as u32).max(1);
+        let size = (side(fits.0), side(fits.1));
+        let is_full = size == (full.width, full.height);
+        let camera = if is_full { full } else { full.resized(size.0, size.1) };
+        let is_lossy = look.moving && hub.is_slow(id, pixels(size), self.target);
+        let mut parts = pictures::parts(&look.panes);
+        parts.labels |= !look.mark.is_empty();
+        let rendered = source.render(&camera, parts)?;
+        let photo = posed.and_then(|posed| posed.photo.as_deref());
+        let beside = Beside { confidence: source.confidence(), photo };
+        let encode = |&pane| pictures::encode(pane, &rendered, beside, is_lossy);
+        let mut encoded = look.panes.iter().map(encode).collect::<Result<Vec<_>>>()?;
+        if !look.mark.is_empty() {
+            encoded.push(pictures::outline(&rendered, &look.mark)?);
+        }
+        let time = start.elapsed();
+        self.pace.note(pixels(size), time.as_secs_f64());
+        Ok(Frame {
+            seq: look.seq,
+            step: source.step(),
+            size,
+            exact: is_full && !is_lossy,
+            micros: u32::try_from(time.as_micros()).unwrap_or(u32::MAX),
+            marked: !look.mark.is_empty(),
+            pictures: encoded,
+        })
+    }
+
+    /// Says what is at a pixel: the label of the label map, and the main Gaussian.
+    pub(super) fn pick(
+        &self,
+        hub: &Hub,
+        id: ClientId,
+        ask: (u32, &Viewpoint, [u32; 2]),
+        source: &mut dyn Source,
+    ) -> Result<()> {
+        let (seq, from, pixel) = ask;
+        match self.at(from, pixel, source) {
+            Ok(mut found) => {
+                found["kind"] = "picked".into();
+                found["seq"] = seq.into();
+                hub.reply(id, &found);
+                Ok(())
+            }
+            Err(error) if is_fatal(&error) => Err(error),
+            Err(error) => {
+                hub.reply(id, &json!({ "kind": "problem", "text": error.to_string() }));
+                Ok(())
+            }
+        }
+    }
+
+    fn at(&self, from: &Viewpoint, [x, y]: [u32; 2], source: &mut dyn Source) -> Result<serde_json::Value> {
+        let (full, _) = camera(&self.views, from)?;
+        if x >= full.width || y >= full.height {
+            let problem = format!("{x}, {y} is outside of the picture of {} x {} px", full.width, full.height);
+            return Err(Error::usage("pixel", problem));
+        }
+        let (width, height) = fitting(&full, source.largest());
+        let place = |at: u32, of: u32, now: u32| (u64::from(at) * u64::from(now) / u64::from(of)) as usize;
+        let index = place(y, full.height, height) * width as usize + place(x, full.width, width);
+        let camera = if (width, height) == (full.width, full.height) { full } else { full.resized(width, height) };
+        let rendered = source.render(&camera, Parts::ALL)?;
+        let row = usize::try_from(rendered.top_id[index]).ok();
+        let confidence = row.and_then(|row| source.confidence()?.get(row).copied());
+        Ok(json!({
+            "label": rendered.labels[index],
+            "gaussian": row,
+            "weight": rendered.top_weight[index],
+            "depth": rendered.mean_depth()?[index],
+            "opacity": rendered.alpha[index],
+            "confidence": confidence,
+        }))
+    }
+
+    /// Scores a view of the scene.
+    pub(super) fn score(&self, index: usize, source: &mut dyn Source) -> Result<Score> {
+        let posed: &Posed = self.views.get(index)?;
+        let parts = if posed.view.mask.is_some() { Parts::LABELS } else { Parts::COLOUR };
+        Ok(Score::new(posed, &source.render(&posed.view.camera, parts)?))
+    }
+}
+
+/// Returns the camera of a full picture, and its view.
+fn camera<'a>(views: &'a Views, from: &Viewpoint) -> Result<(Camera, Option<&'a View>)> {
+    match from {
+        Viewpoint::View(index) => {
+            let view = &views.get(*index)?.view;
+            Ok((view.camera.clone(), Some(view)))
+        }
+        Viewpoint::Camera(file) => {
+            let camera = camera_of(Path::new("camera"), file)?;
+            let pixels = u64::from(camera.width) * u64::from(camera.height);
+            if pixels > PIXELS_MAX {
+                let problem = format!("{} x {} px are too many; at most {PIXELS_MAX}", camera.width, camera.height);
+                return Err(Error::usage("camera", problem));
+            }
+            Ok((camera, None))
+        }
+    }
+}
+/// Returns true if nothing can be drawn any more.
+fn is_fatal(error: &Error) -> bool {
+    error.is_device_lost() || matches!(error, Error::Interrupted)
+}
+
+/// Returns the size of a camera's picture, smaller if it is larger than `largest` or has too many pixels.
+fn fitting(camera: &Camera, largest: Option<(u32, u32)>) -> (u32, u32) {
+    let (width, height) = (f64::from(camera.width), f64::from(camera.height));
+    let (most_wide, most_high) = largest.map_or((width, height), |(w, h)| (f64::from(w), f64::from(h)));
+    let by_pixels = (PIXELS_MAX as f64 / (width * height)).sqrt();
+    let scale = (most_wide / width).min(most_high / height).min(by_pixels).min(1.0);
+    let side = |full: f64| ((full * scale).floor() as u32).max(1);
+    if scale == 1.0 { (camera.width, camera.height) } else { (side(width), side(height)) }
+}

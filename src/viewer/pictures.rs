@@ -1,0 +1,124 @@
+//! Panes of a frame: parts of a render as PNG or JPEG.
+
+use super::message::Pane;
+use crate::error::Result;
+use crate::io::image::{jpeg_rgb8, png_grey16, png_rgb8, png_rgba8};
+use crate::render::pictures::{depth_preview, to_byte, to_word};
+use crate::render::{Parts, Rendered};
+use crate::scene::labels::label_colour;
+use crate::scene::{Photo, UNLABELLED};
+use std::collections::BTreeSet;
+
+/// Share of the label's colour in labels over colour.
+const TINT: f32 = 0.55;
+/// Error that has the brightest colour, of 1.
+const ERROR_MAX: f32 = 0.25;
+/// Quality of JPEGs, for moving pictures on slow lines.
+const QUALITY: u8 = 70;
+
+/// Colour of outlines.
+const OUTLINE: [u8; 4] = [255, 196, 61, 255];
+/// Colours of no to full confidence.
+const CONFIDENCE: [[u8; 3]; 3] = [[214, 47, 39], [253, 219, 124], [26, 150, 84]];
+/// Colours of no to much error.
+const ERROR: [[u8; 3]; 5] = [[0, 0, 4], [87, 16, 110], [188, 55, 84], [249, 142, 9], [252, 255, 164]];
+
+/// What panes need besides the render.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Beside<'a> {
+    /// Confidence by row of the drawn model.
+    pub(super) confidence: Option<&'a [f32]>,
+    /// Photo of the view.
+    pub(super) photo: Option<&'a Photo>,
+}
+
+/// Returns the parts of a render that panes need.
+pub(super) fn parts(panes: &[Pane]) -> Parts {
+    let asked = |of: &[Pane]| panes.iter().any(|pane| of.contains(pane));
+    Parts {
+        depth: asked(&[Pane::Depth]),
+        main: asked(&[Pane::Confidence]),
+        labels: asked(&[Pane::Labels, Pane::Tinted]),
+    }
+}
+
+/// Returns the bytes of the picture of a pane. Colour, labels, depth and opacity have the pixels that `render` writes.
+pub(super) fn encode(pane: Pane, rendered: &Rendered, beside: Beside, is_lossy: bool) -> Result<Vec<u8>> {
+    let size = (rendered.width, rendered.height);
+    match pane {
+        Pane::Depth => return png_grey16(size, &depth_preview(&rendered.depth)),
+        Pane::Opacity => {
+            let words: Vec<u16> = rendered.alpha.iter().map(|&value| to_word(value)).collect();
+            return png_grey16(size, &words);
+        }
+        _ => {}
+    }
+    let pixels: Vec<[u8; 3]> = match pane {
+        Pane::Labels => rendered.labels.iter().map(|&id| label_colour(u32::from(id))).collect(),
+        Pane::Tinted => rendered.rgb.iter().zip(&rendered.labels).map(tinted).collect(),
+        Pane::Confidence => rendered.top_id.iter().map(|&row| confidence(row, beside.confidence)).collect(),
+        Pane::Error => errors(rendered, beside.photo),
+        _ => rendered.rgb.iter().map(|colour| colour.map(to_byte)).collect(),
+    };
+    if is_lossy { jpeg_rgb8(size, &pixels, QUALITY) } else { png_rgb8(size, &pixels) }
+}
+
+/// Returns a picture that is clear except for a line just inside of the contour of some labels.
+pub(super) fn outline(rendered: &Rendered, labels: &[u32]) -> Result<Vec<u8>> {
+    let (width, height) = (rendered.width as usize, rendered.height as usize);
+    let marked: BTreeSet<u32> = labels.iter().copied().collect();
+    let inside: Vec<bool> = rendered.labels.iter().map(|&id| marked.contains(&u32::from(id))).collect();
+    let thickness = (rendered.width / 500).max(1) as usize;
+    let is_out = |x: usize, y: usize| x >= width || y >= height || !inside[y * width + x];
+    let pixel = |index: usize| {
+        let (x, y) = (index % width, index / width);
+        let around = [(thickness, 0), (0, thickness), (thickness, thickness)];
+        let is_edge = inside[index]
+            && around.iter().any(|&(dx, dy)| {
+                is_out(x + dx, y + dy) || x < dx || y < dy || is_out(x - dx, y - dy) || is_out(x + dy, y + dx)
+            });
+        if is_edge { OUTLINE } else { [0; 4] }
+    };
+    let pixels: Vec<[u8; 4]> = (0..width * height).map(pixel).collect();
+    png_rgba8((rendered.width, rendered.height), &pixels)
+}
+
+fn tinted((colour, &id): (&[f32; 3], &u16)) -> [u8; 3] {
+    if u32::from(id) == UNLABELLED {
+        return colour.map(to_byte);
+    }
+    let label = label_colour(u32::from(id)).map(|byte| f32::from(byte) / 255.0);
+    [0, 1, 2].map(|c| to_byte(colour[c].clamp(0.0, 1.0) * (1.0 - TINT) + label[c] * TINT))
+}
+
+/// Returns the colour of a share from 0 to 1 on a scale.
+fn on_scale(scale: &[[u8; 3]], share: f32) -> [u8; 3] {
+    let at = share.clamp(0.0, 1.0) * (scale.len() - 1) as f32;
+    let low = (at as usize).min(scale.len() - 2);
+    let part = at - low as f32;
+    [0, 1, 2].map(|c| (f32::from(scale[low][c]) * (1.0 - part) + f32::from(scale[low + 1][c]) * part).round() as u8)
+}
+
+fn confidence(row: i32, known: Option<&[f32]>) -> [u8; 3] {
+    let row = usize::try_from(row).ok();
+    row.and_then(|row| known?.get(row)).map_or([0; 3], |&share| on_scale(&CONFIDENCE, share))
+}
+
+/// Mean difference of the channels; black where the photo has no pixel. A smaller render takes the pixel of the photo
+/// in the same place.
+fn errors(rendered: &Rendered, photo: Option<&Photo>) -> Vec<[u8; 3]> {
+    let Some(photo) = photo else { return vec![[0; 3]; rendered.rgb.len()] };
+    let (width, height) = (rendered.width, rendered.height);
+    let pixel = |(index, colour): (usize, &[f32; 3])| {
+        let (x, y) = (index as u32 % width, index as u32 / width);
+        let place = |at: u32, of: u32, all: u32| (u64::from(at) * u64::from(all) / u64::from(of)) as u32;
+        let at = place(y, height, photo.height) * photo.width + place(x, width, photo.width);
+        let [r, g, b, valid] = photo.rgba[at as usize];
+        if valid == 0 {
+            return [0; 3];
+        }
+        let of = |value: f32, truth: u8| (value.clamp(0.0, 1.0) - f32::from(truth) / 255.0).abs();
+        on_scale(&ERROR, (of(colour[0], r) + of(colour[1], g) + of(colour[2], b)) / 3.0 / ERROR_MAX)
+    };
+    rendered.rgb.iter().enumerate().map(pixel).collect()
+}

@@ -1,0 +1,113 @@
+//! Rows of the label panel, and a history of steps of bounded length.
+
+use crate::edit::select::summarise;
+use crate::io::label_table::LabelTable;
+use crate::scene::Gaussians;
+use crate::scene::labels::label_colour;
+use serde_json::{Value, json};
+use std::collections::BTreeMap;
+
+/// Most labels that a page lists.
+const ROWS_MAX: usize = 4096;
+
+/// Returns the rows for the labels of a finished model.
+pub(super) fn of_model(model: &Gaussians, table: Option<&LabelTable>) -> Value {
+    let mut sums: BTreeMap<u32, (f64, u64)> = BTreeMap::new();
+    if let (Some(labels), Some(shares)) = (&model.labels, &model.label_confidence) {
+        for (&label, &share) in labels.iter().zip(shares) {
+            let sum = sums.entry(label).or_default();
+            *sum = (sum.0 + f64::from(share), sum.1 + 1);
+        }
+    }
+    let row = |summary: &crate::edit::select::LabelSummary| {
+        json!({
+            "id": summary.label,
+            "name": name(table, summary.label),
+            "colour": label_colour(summary.label),
+            "count": summary.count,
+            "confidence": sums.get(&summary.label).map(|(sum, count)| sum / *count as f64),
+            "min": summary.min,
+            "max": summary.max,
+        })
+    };
+    let all = if model.labels.is_some() { summarise(model) } else { Vec::new() };
+    described(all.iter().take(ROWS_MAX).map(row).collect(), all.len())
+}
+
+/// Returns the rows for the labels in a training.
+pub(super) fn of_training(labels: &[u32], table: Option<&LabelTable>) -> Value {
+    let mut counts: BTreeMap<u32, u64> = BTreeMap::new();
+    labels.iter().for_each(|&label| *counts.entry(label).or_default() += 1);
+    // Objects of the masks that no Gaussian has yet are named too.
+    table.iter().flat_map(|table| &table.labels).for_each(|entry| {
+        counts.entry(entry.id).or_default();
+    });
+    let row = |(&id, &count): (&u32, &u64)| json!({ "id": id, "name": name(table, id), "colour": label_colour(id), "count": count });
+    described(counts.iter().take(ROWS_MAX).map(row).collect(), counts.len())
+}
+
+fn described(rows: Vec<Value>, all: usize) -> Value {
+    json!({ "kind": "labels", "rows": rows, "all": all })
+}
+
+fn name(table: Option<&LabelTable>, id: u32) -> Option<&str> {
+    table?.entry(id)?.name.as_deref()
+}
+
+/// Most points of a curve.
+const POINTS_MAX: usize = 512;
+
+/// Numbers by step. When it is full, every second point goes, and from then on half as many come.
+#[derive(Clone, Debug)]
+pub(super) struct Curve {
+    points: Vec<(u32, [f64; 3])>,
+    /// Steps between two points.
+    every: u32,
+}
+
+impl Default for Curve {
+    fn default() -> Self {
+        Self { points: Vec::new(), every: 1 }
+    }
+}
+
+impl Curve {
+    /// Adds loss, label loss and Gaussians of a step.
+    pub(super) fn add(&mut self, step: u32, values: [f64; 3]) {
+        if self.points.last().is_some_and(|last| step < last.0 + self.every) {
+            return;
+        }
+        self.points.push((step, values));
+        if self.points.len() >= POINTS_MAX {
+            let mut index = 0;
+            self.points.retain(|_| {
+                index += 1;
+                index % 2 == 1
+            });
+            self.every *= 2;
+        }
+    }
+
+    /// Returns the curves for a page.
+    pub(super) fn describe(&self) -> Value {
+        let of = |index: usize| self.points.iter().map(|point| point.1[index]).collect::<Vec<_>>();
+        let steps: Vec<u32> = self.points.iter().map(|point| point.0).collect();
+        json!({ "kind": "curve", "steps": steps, "loss": of(0), "label": of(1), "gaussians": of(2) })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_curve_stays_short_and_keeps_its_ends() {
+        let mut curve = Curve::default();
+        (1..=30_000).for_each(|step| curve.add(step, [f64::from(step); 3]));
+        assert!((POINTS_MAX / 2 - 1..POINTS_MAX).contains(&curve.points.len()), "{}", curve.points.len());
+        assert_eq!(curve.points[0].0, 1);
+        assert!(curve.points.last().expect("points").0 > 29_800);
+        let gaps = curve.points.windows(2).map(|pair| pair[1].0 - pair[0].0);
+        assert!(gaps.max() <= Some(curve.every * 2));
+    }
+}

@@ -1,0 +1,134 @@
+//! The server: a thread per connection, fixed paths, and one WebSocket per page.
+
+use super::guard::Guard;
+use super::http::{self, Head, NoHead, WRITE_TIME, answer, say};
+use super::hub::Hub;
+use super::{page, socket};
+use crate::error::{Error, Result};
+use std::io::Write;
+use std::net::{TcpListener, TcpStream, ToSocketAddrs};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+/// Most connections at a time, those of WebSockets included.
+const CONNECTIONS_MAX: usize = 64;
+
+/// Opens the port and starts to serve. Returns the rules, which know the address.
+pub(super) fn start(host: &str, port: u16, has_token: bool, hub: &Arc<Hub>) -> Result<Guard> {
+    let failed = |error: &dyn std::fmt::Display| {
+        Error::usage("view_host", format!("cannot listen on {host}, port {port}: {error}; choose another one"))
+    };
+    let address = (host, port).to_socket_addrs().map_err(|error| failed(&error))?.next();
+    let address = address.ok_or_else(|| failed(&"the name has no address"))?;
+    if !has_token && !address.ip().is_loopback() {
+        let problem = format!("without it anyone who reaches {host} could watch and change the model; leave it on");
+        return Err(Error::usage("view_no_token", problem));
+    }
+    let listener = TcpListener::bind(address).map_err(|error| failed(&error))?;
+    let address = listener.local_addr().map_err(|error| failed(&error))?;
+    let guard = Guard::new(address, host, has_token)?;
+    let (rules, hub) = (guard.clone(), Arc::clone(hub));
+    let spawned = std::thread::Builder::new().name("viewer".into()).spawn(move || accept(&listener, &rules, &hub));
+    spawned.map_err(|error| Error::Bug(format!("no thread for the viewer: {error}")))?;
+    Ok(guard)
+}
+
+/// Counts an open connection.
+struct Counted(Arc<AtomicUsize>);
+
+impl Drop for Counted {
+    fn drop(&mut self) {
+        self.0.fetch_sub(1, Ordering::SeqCst);
+    }
+}
+
+fn accept(listener: &TcpListener, guard: &Guard, hub: &Arc<Hub>) {
+    let open = Arc::new(AtomicUsize::new(0));
+    for stream in listener.incoming() {
+        if hub.is_closing() {
+            return;
+        }
+        // Too many open files: the next one may do.
+        let Ok(mut stream) = stream else {
+            std::thread::sleep(std::time::Duration::from_millis(20));
+            continue;
+        };
+        let counted = Counted(Arc::clone(&open));
+        let is_full = open.fetch_add(1, Ordering::SeqCst) >= CONNECTIONS_MAX;
+        if stream.set_write_timeout(Some(WRITE_TIME)).is_err() {
+            continue;
+        }
+        if is_full {
+            say(&mut stream, "503 Service Unavailable", "Too many connections are open.");
+            continue;
+        }
+        let (guard, hub) = (guard.clone(), Arc::clone(hub));
+        let serve = move || {
+            let _counted = counted;
+            connection(stream, &guard, &hub);
+        };
+        // Without a thread the connection closes.
+        let _ = std::thread::Builder::new().name("viewer-page".into()).spawn(serve);
+    }
+}
+
+fn connection(mut stream: TcpStream, guard: &Guard, hub: &Arc<Hub>) {
+    let head = match http::read_head(&mut stream) {
+        Ok(head) => head,
+        Err(NoHead::Gone) => return,
+        Err(NoHead::Status(status)) => return say(&mut stream, status, status),
+    };
+    if !guard.knows_host(head.header("Host")) {
+        return say(&mut stream, "403 Forbidden", "This server does not have that name. Use the printed address.");
+    }
+    let is_socket = head.path == "/socket";
+    if !guard.knows_origin(head.header("Origin"), is_socket) {
+        return say(&mut stream, "403 Forbidden", "Another page may not ask this server.");
+    }
+    if head.method != "GET" {
+        return say(&mut stream, "405 Method Not Allowed", "Only GET is answered.");
+    }
+    if head.path == "/" && head.value("token").is_some() {
+        return enter(&mut stream, guard, &head);
+    }
+    if !guard.knows_cookie(head.header("Cookie")) {
+        return say(&mut stream, "401 Unauthorized", "Open the address with the token that labelgs printed last.");
+    }
+    if is_socket { open_socket(stream, &head, hub) } else { files(&mut stream, &head.path, hub) }
+}
+
+/// Turns the token of the address into a cookie and takes it out of the address.
+fn enter(stream: &mut TcpStream, guard: &Guard, head: &Head) {
+    if !guard.knows_token(head.value("token")) {
+        return say(stream, "401 Unauthorized", "The token is not that of this server. Open the printed address.");
+    }
+    let more = format!("{}Location: /\r\n", guard.set_cookie().unwrap_or_default());
+    answer(stream, "303 See Other", "text/plain; charset=utf-8", &more, b"");
+}
+
+fn open_socket(mut stream: TcpStream, head: &Head, hub: &Arc<Hub>) {
+    let Some(text) = socket::handshake(head) else {
+        return say(&mut stream, "400 Bad Request", "A WebSocket is expected here.");
+    };
+    let Some(id) = hub.join() else {
+        return say(&mut stream, "503 Service Unavailable", "Too many pages are open. Close one.");
+    };
+    if stream.write_all(text.as_bytes()).is_err() {
+        return hub.leave(id);
+    }
+    socket::serve(stream, hub, id);
+}
+
+/// Answers with a file of the page, or a photo by its number. No path of the request reaches the disk.
+fn files(stream: &mut TcpStream, path: &str, hub: &Hub) {
+    if let Some((kind, bytes)) = page::file(path) {
+        return answer(stream, "200 OK", kind, "", bytes);
+    }
+    let photo = path.strip_prefix("/photo/").map(|number| (number, false));
+    let asked = photo.or(path.strip_prefix("/thumb/").map(|number| (number, true)));
+    let found = asked.and_then(|(number, small)| hub.views().picture(number.parse().ok()?, small));
+    match found {
+        Some((kind, bytes)) => answer(stream, "200 OK", kind, "", &bytes),
+        None => say(stream, "404 Not Found", "There is no such page."),
+    }
+}

@@ -1,0 +1,307 @@
+//! Shows a training. Viewing reads the model between two steps and changes no bit of it.
+
+use super::finished::scene;
+use super::hub::{ClientId, Task};
+use super::message::{Command, Message};
+use super::pace::Budget;
+use super::painter::{Painter, Source};
+use super::rows::{self, Curve};
+use super::views::{Score, Views, describe_scores};
+use super::{Viewer, Words};
+use crate::error::{Error, Result};
+use crate::render::{Parts, Rendered};
+use crate::run::{Event, Flow, Live, Observer};
+use crate::scene::Camera;
+use glam::DVec3;
+use serde_json::json;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+/// Time between two reports to the pages.
+const REPORT_EVERY: Duration = Duration::from_millis(250);
+/// Time between two counts of labels.
+const COUNT_EVERY: Duration = Duration::from_secs(5);
+/// Steps between two rounds over the test views.
+const SCORE_EVERY: u32 = 500;
+/// Time between two events of a paused run.
+const PAUSED_TURN: Duration = Duration::from_millis(50);
+
+/// Shows a training to pages, and lets them pause, save and stop it. Passes everything on to another observer, whose
+/// wish to stop wins.
+pub struct Watched<'a> {
+    inner: &'a mut dyn Observer,
+    viewer: &'a Viewer,
+    words: &'a dyn Words,
+    title: String,
+    painter: Painter,
+    budget: Budget,
+    curve: Curve,
+    scores: Vec<Score>,
+    /// Step of the present round of scores.
+    scored_at: u32,
+    scored_to: usize,
+    steps: u32,
+    wish: Wish,
+    pace: Pace,
+}
+
+/// What the pages asked for.
+#[derive(Default)]
+struct Wish {
+    pause: bool,
+    save: bool,
+    stop: bool,
+}
+
+/// Times of the training.
+struct Pace {
+    /// When the last event was answered.
+    last: Instant,
+    reported: Option<Instant>,
+    counted: Option<Instant>,
+    /// Mean time of a step, viewing included, s.
+    step: f64,
+}
+
+/// The model between two steps.
+struct Between<'a, 'b>(&'a mut Live<'b>);
+
+impl Source for Between<'_, '_> {
+    fn render(&mut self, camera: &Camera, parts: Parts) -> Result<Rendered> {
+        self.0.render(camera, parts)
+    }
+
+    fn confidence(&self) -> Option<&[f32]> {
+        None
+    }
+
+    fn largest(&mut self) -> Option<(u32, u32)> {
+        // A larger picture would need memory, which might bound the number of Gaussians.
+        Some(self.0.image())
+    }
+
+    fn step(&self) -> u32 {
+        self.0.step()
+    }
+}
+
+impl<'a> Watched<'a> {
+    /// Shows a run to the pages of `viewer`.
+    pub fn new(viewer: &'a Viewer, inner: &'a mut dyn Observer, title: String, words: &'a dyn Words) -> Self {
+        Self {
+            inner,
+            viewer,
+            words,
+            title,
+            painter: Painter::new(Arc::default(), true),
+            budget: Budget::new(viewer.options.share),
+            curve: Curve::default(),
+            scores: Vec::new(),
+            scored_at: 0,
+            scored_to: 0,
+            steps: 0,
+            wish: Wish::default(),
+            pace: Pace { last: Instant::now(), reported: None, counted: None, step: 0.0 },
+        }
+    }
+
+    fn begin(&mut self, live: &mut Live, steps: u32) {
+        let views = Arc::new(Views::new(live.dataset()));
+        let frame = views.frame().unwrap_or((DVec3::NEG_Y, DVec3::ZERO, 1.0));
+        self.viewer.hub.set_views(Arc::clone(&views));
+        self.viewer.hub.publish("scene", &scene(&views, frame, &self.title, ("", true)));
+        self.painter = Painter::new(views, live.is_cpu());
+        self.steps = steps;
+    }
+
+    /// Serves the pages after a step, as long as the budget allows.
+    fn after_step(&mut self, live: &mut Live) -> Result<()> {
+        let spent = self.pace.last.elapsed();
+        self.budget.trained(spent);
+        let weight = if self.pace.step == 0.0 { 1.0 } else { 0.05 };
+        self.hear_all(live)?;
+        if self.viewer.hub.is_watched() {
+            let start = Instant::now();
+            while self.budget.allows() && self.viewer.hub.has_work() {
+                let Some((id, task)) = self.viewer.hub.next(Duration::ZERO) else { break };
+                self.timed(|watched| watched.serve(id, task, live))?;
+            }
+            if self.budget.allows() {
+                self.timed(|watched| watched.score_one(live))?;
+            }
+            self.report(live, false)?;
+            // Viewing is part of what a step takes.
+            self.pace.step += weight * ((spent + start.elapsed()).as_secs_f64() - self.pace.step);
+        } else {
+            self.pace.step += weight * (spent.as_secs_f64() - self.pace.step);
+        }
+        Ok(())
+    }
+
+    /// Serves the pages for a while, in a pause.
+    fn in_pause(&mut self, live: &mut Live) -> Result<()> {
+        self.report(live, true)?;
+        match self.viewer.hub.next(PAUSED_TURN) {
+            Some((id, task)) => self.serve(id, task, live),
+            None => self.score_one(live),
+        }
+    }
+
+    /// Does something that counts as viewing.
+    fn timed(&mut self, what: impl FnOnce(&mut Self) -> Result<()>) -> Result<()> {
+        let start = Instant::now();
+        let done = what(self);
+        self.budget.viewed(start.elapsed());
+        done
+    }
+
+    fn hear_all(&mut self, live: &mut Live) -> Result<()> {
+        while let Some((id, message)) = self.viewer.hub.next_message(self.budget.allows()) {
+            self.timed(|watched| watched.serve(id, Task::Message(message), live))?;
+        }
+        Ok(())
+    }
+
+    fn serve(&mut self, id: ClientId, task: Task, live: &mut Live) -> Result<()> {
+        let hub = &self.viewer.hub;
+        match task {
+            Task::Look(look) => return self.painter.look(hub, id, &look, &mut Between(live)),
+            Task::Message(Message::Pick { seq, from, pixel }) => {
+                return self.painter.pick(hub, id, (seq, &from, pixel), &mut Between(live));
+            }
+            Task::Message(Message::Share { share }) if (0.0..=1.0).contains(&share) => self.budget.set_share(share),
+            Task::Message(Message::Train { what }) => match what {
+                Command::Pause => self.wish.pause = true,
+                Command::Resume => self.wish.pause = false,
+                Command::Save => self.wish.save = true,
+                Command::Stop => self.wish.stop = true,
+            },
+            Task::Message(_) => {
+                let text = "Labels cannot be changed while a training runs or is paused.";
+                hub.reply(id, &json!({ "kind": "problem", "text": text }));
+            }
+        }
+        self.pace.reported = None;
+        Ok(())
+    }
+
+    /// Scores the next test view. A round begins every few hundred steps.
+    fn score_one(&mut self, live: &mut Live) -> Result<()> {
+        let (step, views) = (live.step(), Arc::clone(&self.painter.views));
+        if self.scored_to >= views.list.len() {
+            if step < self.scored_at + SCORE_EVERY || step == 0 {
+                return Ok(());
+            }
+            (self.scored_to, self.scored_at) = (0, step);
+        }
+        self.scores.resize(views.list.len(), Score::default());
+        let rest = self.scored_to..views.list.len();
+        let next = rest.clone().find(|&index| views.list[index].is_test && views.list[index].view.photo.is_some());
+        self.scored_to = next.map_or(rest.end, |index| index + 1);
+        if let Some(index) = next {
+            self.scores[index] = self.painter.score(index, &mut Between(live))?;
+            self.viewer.hub.publish("scores", &describe_scores(&self.scores, step));
+        }
+        Ok(())
+    }
+
+    fn report(&mut self, live: &mut Live, is_paused: bool) -> Result<()> {
+        let now = Instant::now();
+        if self.pace.reported.is_some_and(|last| now - last < REPORT_EVERY) || !self.viewer.hub.is_watched() {
+            return Ok(());
+        }
+        self.pace.reported = Some(now);
+        let hub = &self.viewer.hub;
+        let left = f64::from(self.steps.saturating_sub(live.step())) * self.pace.step;
+        hub.publish(
+            "training",
+            &json!({
+                "kind": "training",
+                "step": live.step(),
+                "steps": self.steps,
+                "left": left,
+                "stepMs": self.pace.step * 1e3,
+                "gaussians": live.gaussian_count(),
+                "memory": live.memory(),
+                "paused": is_paused,
+                "share": self.budget.share(),
+            }),
+        );
+        hub.publish("curve", &self.curve.describe());
+        let is_due = self.pace.counted.is_none_or(|last| now - last > COUNT_EVERY);
+        if is_due {
+            self.pace.counted = Some(now);
+            return self.timed(|watched| {
+                let labels = live.labels()?.unwrap_or_default();
+                watched.viewer.hub.publish("labels", &rows::of_training(&labels, live.names()));
+                Ok(())
+            });
+        }
+        Ok(())
+    }
+
+    fn notice(&self, text: &str) {
+        self.viewer.hub.publish("notice", &json!({ "kind": "notice", "text": text }));
+    }
+
+    /// Serves what an event is about.
+    fn see(&mut self, event: &Event, live: &mut Live) -> Result<()> {
+        match event {
+            Event::Started { steps, .. } => self.begin(live, *steps),
+            Event::Step { report, is_last, .. } => {
+                if let Some(report) = report {
+                    let values = [report.loss, report.label_loss, f64::from(live.gaussian_count())];
+                    self.curve.add(report.step, values);
+                }
+                self.after_step(live)?;
+                if *is_last {
+                    self.notice("The last step is done. The model is scored and written.");
+                }
+            }
+            Event::Paused { .. } => self.in_pause(live)?,
+            Event::Checkpoint { step, .. } => self.notice(&format!("Step {step} is saved as a checkpoint.")),
+            Event::Model { step, path } => self.notice(&format!("The model of step {step} is in {}.", path.display())),
+            Event::Warning(text) => self.notice(text),
+            Event::Done(summary) => {
+                let (psnr, iou) = summary
+                    .scores
+                    .as_ref()
+                    .map_or((None, None), |scores| (scores.mean.psnr, scores.mean.objects.iou_map));
+                let over = json!({
+                    "kind": "over",
+                    "stopped": summary.stopped,
+                    "steps": summary.steps,
+                    "psnr": psnr,
+                    "iou": iou,
+                    "command": self.words.view(&summary.model),
+                });
+                self.viewer.hub.publish("over", &over);
+            }
+            _ => {}
+        }
+        Ok(())
+    }
+}
+
+impl Observer for Watched<'_> {
+    fn on(&mut self, event: &Event<'_>, live: &mut Live<'_>) -> Result<Flow> {
+        let asked = self.inner.on(event, live)?;
+        match self.see(event, live) {
+            // Pictures that do not fit cost the training nothing.
+            Err(error) if error.is_out_of_memory() => self.notice(&error.to_string()),
+            Err(Error::Usage { problem, .. }) => self.notice(&problem),
+            other => other?,
+        }
+        self.pace.last = Instant::now();
+        if asked == Flow::Stop || self.wish.stop {
+            return Ok(Flow::Stop);
+        }
+        if !matches!(event, Event::Step { .. } | Event::Paused { .. }) {
+            return Ok(asked);
+        }
+        if std::mem::take(&mut self.wish.save) {
+            return Ok(Flow::Save);
+        }
+        Ok(if self.wish.pause { Flow::Pause } else { asked })
+    }
+}

@@ -1,0 +1,136 @@
+//! The views of a scene as a page sees them: cameras, photos, thumbnails, scores.
+
+use crate::error::{Error, Result};
+use crate::eval::metrics::{Overlap, mean, psnr};
+use crate::io::camera_json::CameraFile;
+use crate::io::image::{jpeg_rgb8, png_rgb8};
+use crate::render::Rendered;
+use crate::scene::{Camera, Dataset, LabelMap, Photo, View};
+use glam::{DMat3, DVec3};
+use serde_json::{Value, json};
+
+/// Longest side of a thumbnail, px.
+const THUMB: u32 = 168;
+const THUMB_QUALITY: u8 = 80;
+
+/// A view and whether it is held out.
+#[derive(Clone, Debug)]
+pub(super) struct Posed {
+    pub(super) view: View,
+    pub(super) is_test: bool,
+}
+
+/// Scores of a view; none without a photo or a mask.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Score {
+    pub(super) psnr: Option<f64>,
+    pub(super) iou: Option<f64>,
+}
+
+/// The views of a scene, sorted by name; may be empty.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Views {
+    pub(super) list: Vec<Posed>,
+}
+
+impl Views {
+    /// Takes the views of a scene. Photos and masks are shared with it.
+    pub(super) fn new(dataset: &Dataset) -> Self {
+        let posed = |is_test| move |view: &View| Posed { view: view.clone(), is_test };
+        let mut list: Vec<Posed> = dataset.train.iter().map(posed(false)).collect();
+        list.extend(dataset.test.iter().map(posed(true)));
+        list.sort_by(|a, b| a.view.name.cmp(&b.view.name));
+        Self { list }
+    }
+
+    /// Returns a view by its number.
+    pub(super) fn get(&self, index: usize) -> Result<&Posed> {
+        let missing = || Error::usage("view", format!("there is no view {index}; the scene has {}", self.list.len()));
+        self.list.get(index).ok_or_else(missing)
+    }
+
+    /// Returns the views for a page.
+    pub(super) fn describe(&self) -> Value {
+        let row = |posed: &Posed| {
+            json!({
+                "name": posed.view.name,
+                "test": posed.is_test,
+                "photo": posed.view.photo.is_some(),
+                "camera": CameraFile::from(&posed.view.camera),
+            })
+        };
+        self.list.iter().map(row).collect()
+    }
+
+    /// Returns up, the point that the cameras look at, and their distance from it; none without views.
+    pub(super) fn frame(&self) -> Option<(DVec3, DVec3, f64)> {
+        let cameras = || self.list.iter().map(|posed| &posed.view.camera);
+        let up = -cameras().map(|camera| camera.rotation.row(1)).sum::<DVec3>();
+        let centres: Vec<DVec3> = cameras().map(Camera::centre).collect();
+        let middle = centres.iter().sum::<DVec3>() / centres.len().max(1) as f64;
+        // The point nearest to all optical axes, held near the cameras where these are parallel.
+        let (mut normal, mut right) = (DMat3::IDENTITY * 1e-3, middle * 1e-3);
+        for camera in cameras() {
+            let axis = camera.rotation.row(2);
+            let across = DMat3::IDENTITY - DMat3::from_cols(axis * axis.x, axis * axis.y, axis * axis.z);
+            normal += across;
+            right += across * camera.centre();
+        }
+        let target = normal.inverse() * right;
+        let distance = mean(centres.iter().map(|centre| centre.distance(target)))?;
+        Some((up.try_normalize().unwrap_or(DVec3::NEG_Y), target, distance.max(1e-6)))
+    }
+
+    /// Returns the photo of a view, or its thumbnail, with the type of the file.
+    pub(super) fn picture(&self, index: usize, is_small: bool) -> Option<(&'static str, Vec<u8>)> {
+        let photo = self.list.get(index)?.view.photo.as_ref()?;
+        let size = (photo.width, photo.height);
+        if !is_small {
+            let pixels: Vec<[u8; 3]> = photo.rgba.iter().map(|&[r, g, b, _]| [r, g, b]).collect();
+            return Some(("image/png", png_rgb8(size, &pixels).ok()?));
+        }
+        let (small, pixels) = shrunk(photo);
+        Some(("image/jpeg", jpeg_rgb8(small, &pixels, THUMB_QUALITY).ok()?))
+    }
+}
+
+/// Averages blocks of a photo.
+fn shrunk(photo: &Photo) -> ((u32, u32), Vec<[u8; 3]>) {
+    let block = photo.width.max(photo.height).div_ceil(THUMB).max(1);
+    let (width, height) = ((photo.width / block).max(1), (photo.height / block).max(1));
+    let pixel = |index: u32| {
+        let (left, top) = (index % width * block, index / width * block);
+        let (mut sums, mut count) = ([0_u32; 3], 0);
+        for y in top..(top + block).min(photo.height) {
+            for x in left..(left + block).min(photo.width) {
+                let rgba = photo.rgba[(y * photo.width + x) as usize];
+                (0..3).for_each(|c| sums[c] += u32::from(rgba[c]));
+                count += 1;
+            }
+        }
+        sums.map(|sum| (sum / count.max(1)) as u8)
+    };
+    ((width, height), (0..width * height).map(pixel).collect())
+}
+
+impl Score {
+    /// Scores a render of a view in full size: PSNR, and the mean IoU of the objects of its mask.
+    pub(super) fn new(posed: &Posed, rendered: &Rendered) -> Self {
+        let photo = posed.view.photo.as_deref();
+        let iou = |mask: &LabelMap| {
+            let of = |id| mask.ids.iter().zip(&rendered.labels).map(move |(&truth, &found)| (truth == id, found == id));
+            mean(mask.objects().into_iter().filter_map(|id| Overlap::count(of(id)).iou()))
+        };
+        let mask = posed.view.mask.as_deref().filter(|mask| mask.ids.len() == rendered.labels.len());
+        Self {
+            psnr: photo.map(|photo| psnr(&rendered.rgb, photo)).filter(|value| value.is_finite()),
+            iou: mask.and_then(iou),
+        }
+    }
+}
+
+/// Returns the scores for a page.
+pub(super) fn describe_scores(scores: &[Score], step: u32) -> Value {
+    let rows: Vec<_> = scores.iter().map(|score| json!([score.psnr, score.iou])).collect();
+    json!({ "kind": "scores", "step": step, "rows": rows })
+}

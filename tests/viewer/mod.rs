@@ -1,0 +1,6 @@
+//! The viewer: what the server answers, and the page in a browser.
+
+mod browser; // the page, driven by mouse and keys
+mod chromium; // a browser and its DevTools protocol
+mod protocol; // the server, without a browser
+mod server; // a viewer of a small model, and a page that only speaks the protocol
