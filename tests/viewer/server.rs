@@ -75,7 +75,7 @@ pub fn model(scene: &Path) -> Gaussians {
     let count = points.len();
     let label = |row: usize| {
         let at = points[row].position;
-        if row % 5 == 0 { 0 } else { 1 + u32::from(at.x > 0.0) + 2 * u32::from(at.y > 0.0) }
+        if row.is_multiple_of(5) { 0 } else { 1 + u32::from(at.x > 0.0) + 2 * u32::from(at.y > 0.0) }
     };
     Gaussians {
         means: points.iter().map(|point| point.position.as_vec3().to_array()).collect(),
