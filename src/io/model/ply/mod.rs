@@ -90,7 +90,15 @@ fn read(path: &Path) -> Result<ReadModel> {
     })?;
     let mut read = rows.finish(path, origin)?;
     read.dropped += deleted;
-    if edited {
+    let selected = edited.then_some(deleted);
+    note(&mut read, selected, odd.extra_bytes);
+    Ok(read)
+}
+
+/// Adds what the user should know: `deleted` is the number of Gaussians that an editor deleted, if the labels are its
+/// selection.
+fn note(read: &mut ReadModel, deleted: Option<u64>, extra_bytes: u64) {
+    if let Some(deleted) = deleted {
         let note = "the selection in the column `state` became label 1";
         let more = if deleted > 0 { format!("; {deleted} deleted Gaussians were left out") } else { String::new() };
         read.notes.push(format!("{note}{more}"));
@@ -100,10 +108,9 @@ fn read(path: &Path) -> Result<ReadModel> {
                     and exponential, but a 3DGS PLY has the values before; such a model looks like fog";
         read.notes.push(note.to_owned());
     }
-    if odd.extra_bytes > 0 {
-        read.notes.push(format!("{} bytes after the last Gaussian were ignored", odd.extra_bytes));
+    if extra_bytes > 0 {
+        read.notes.push(format!("{} bytes after the last Gaussian were ignored", extra_bytes));
     }
-    Ok(read)
 }
 
 /// Returns the origin in the comments of the header.
