@@ -243,3 +243,69 @@ fn places_in_views_choose_labels() {
     };
     assert_ne!(psnr(&[]), psnr(&["--near", "0.2"]));
 }
+
+/// `convert` keeps labels and names in every format that is written, and any command reads them.
+#[test]
+fn a_model_is_converted_by_the_ending() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let source = model(folder.path());
+    let at = |name: &str| folder.path().join(name).display().to_string();
+    for name in ["a.spz", "a.glb", "a.sog", "b.ply"] {
+        let result = succeeds(&["convert", &source.display().to_string(), &at(name)]);
+        assert_eq!((&result["gaussians"], &result["of"], &result["labels"]), (&6.into(), &6.into(), &json!([1, 3])));
+        // The names are in the file itself, unless it is a PLY.
+        if !name.ends_with(".ply") {
+            std::fs::remove_file(LabelTable::beside(Path::new(&at(name)))).expect("removed");
+        }
+        let part = at(&format!("part.{name}"));
+        succeeds(&["extract", &at(name), "--labels", "spoon", "-o", &part]);
+        assert_eq!(labels_of(Path::new(&part)), [3, 3, 3], "{name}");
+        assert_eq!(LabelTable::read(&LabelTable::beside(Path::new(&part))).expect("names").labels.len(), 1);
+    }
+    let other = ["convert", &at("model.ply"), &at("v4.spz"), "--spz-version", "4", "--label-type", "none"];
+    succeeds(&other);
+    assert!(read_model(at("v4.spz")).expect("SPZ").gaussians.labels.is_none());
+    assert!(refused(&["convert", &at("model.ply"), &at("a.splat")]).contains(".splat files are only read"));
+}
+
+/// A file for each label, which together are the whole.
+#[test]
+fn objects_are_converted_into_a_file_each() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let source = model(folder.path());
+    let out = folder.path().join("parts/o.ply");
+    let result = succeeds(&["convert", &source.display().to_string(), &out.display().to_string(), "--per-object"]);
+    let files: Vec<PathBuf> =
+        ["o_000_none.ply", "o_001_cup.ply", "o_003_spoon.ply"].map(|name| out.with_file_name(name)).to_vec();
+    let listed = result["files"].as_array().expect("files");
+    assert_eq!(
+        listed.iter().map(|file| file["output"].clone()).collect::<Vec<_>>(),
+        files.iter().map(|path| json!(path)).collect::<Vec<_>>()
+    );
+    let labels: Vec<u32> = files.iter().flat_map(|path| labels_of(path)).collect();
+    assert_eq!(labels, [0, 1, 1, 3, 3, 3]);
+    assert!(!out.exists());
+}
+
+#[test]
+fn models_are_cleaned_and_transformed_with_their_names() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let source = model(folder.path()).display().to_string();
+    let out = folder.path().join("out.ply");
+    let to = out.display().to_string();
+    let result = succeeds(&["clean", &source, "--inside", "-0.5,-1,-1,3.1,1,1", "-o", &to]);
+    assert_eq!((&result["dropped"]["outside"], labels_of(&out)), (&2.into(), vec![0, 1, 1, 3]));
+    let names = || LabelTable::read(&LabelTable::beside(&out)).expect("names");
+    assert_eq!(names(), table());
+    let result = succeeds(&["transform", &source, "--up", "-x", "--scale", "2", "--origin", "1,0,0", "-o", &to]);
+    assert_eq!((&result["scale"], names()), (&2.0.into(), table()));
+    let after = read_model(&out).expect("PLY").gaussians;
+    assert!(after.world(5).distance(DVec3::new(0.0, 16.0, 0.0)) < 1e-5, "{}", after.world(5));
+    for args in [&["clean", &source, "-o", &to] as &[&str], &["transform", &source, "-o", &to]] {
+        refused(args);
+    }
+    for (flag, value) in [("--up", "0,0,0"), ("--up", "w"), ("--scale", "0"), ("--origin", "1,2")] {
+        refused(&["transform", &source, flag, value, "-o", &to]);
+    }
+    refused(&["clean", &source, "--inside", "0,0,0,-1,1,1", "-o", &to]);
+}

@@ -1,7 +1,9 @@
 //! Choosing and editing labels, on Gaussians and label maps made by hand.
 
+use glam::{DQuat, DVec3};
 use labelgs::edit::Grouping;
 use labelgs::edit::{Catalogue, Pick};
+use labelgs::edit::{Cleaned, Cleaning, Transform, clean};
 use labelgs::edit::{Place, Prompt, choose};
 use labelgs::edit::{Specks, recolour, relabel, split_components, without_specks};
 use labelgs::internals::cli::status::exit_status;
@@ -250,4 +252,83 @@ fn points_and_boxes_mean_labels() {
     assert!(half.contains("1 cup (2 of its 4 pixels are inside)"), "{half}");
     let lost = message(&[point(0, 0), not(1, 1)]);
     assert!(lost.starts_with("not_at: leaves no label: it takes 1 cup; the model has 1 cup"), "{lost}");
+}
+
+/// The colour towards each direction is turned with the model, by any turn.
+#[test]
+fn harmonics_are_turned_along() {
+    use labelgs::internals::verify::reference::Rules;
+    use labelgs::internals::verify::reference::sh::basis;
+    let rules = Rules::default();
+    let turn = DQuat::from_euler(glam::EulerRot::XYZ, 0.4, -1.1, 2.3);
+    let before = Gaussians {
+        sh_degree: 3,
+        sh_rest: (0..15).map(|k| [0.1 * k as f32 - 0.7, 0.5 - 0.07 * k as f32, (k as f32).sin()]).collect(),
+        ..model(&[([1.0, 2.0, 3.0], [0.1, 0.2, 0.3], [0.5, 0.5, -0.5, 0.5])])
+    };
+    let after = Transform { turn, ..Transform::default() }.apply(&before).expect("turned");
+    let colour = |g: &Gaussians, direction: DVec3| {
+        let values = basis(&rules, direction);
+        [0, 1, 2].map(|c| (0..15).map(|k| values[k + 1] * f64::from(g.sh_rest[k][c])).sum::<f64>())
+    };
+    for direction in [DVec3::X, DVec3::NEG_Y, DVec3::Z, DVec3::new(0.6, -0.64, 0.48), DVec3::new(-0.36, 0.48, -0.8)] {
+        let (here, there) = (colour(&before, direction), colour(&after, turn * direction));
+        // Coefficients are rounded to 24 bits.
+        here.iter().zip(there).for_each(|(a, b)| assert!((a - b).abs() < 1e-6, "{direction}: {here:?} and {there:?}"));
+    }
+    // And so are places and shapes: the longest axis points where it did.
+    let place = DVec3::from_array(after.means[0].map(f64::from));
+    assert!(place.distance(turn * DVec3::new(1.0, 2.0, 3.0)) < 1e-6);
+    let axis = |g: &Gaussians| {
+        let [w, x, y, z] = g.quats[0].map(f64::from);
+        DQuat::from_xyzw(x, y, z, w) * DVec3::Z
+    };
+    assert!(axis(&after).distance(turn * axis(&before)) < 1e-6);
+}
+
+#[test]
+fn models_are_set_upright_moved_and_scaled() {
+    let before = beads(&[3.0, 5.0]);
+    let upright = |up: DVec3| Transform::upright(up).expect("a turn");
+    for up in [DVec3::X, DVec3::Z, DVec3::Y, DVec3::NEG_Y, DVec3::new(1.0, 2.0, -0.5)] {
+        assert!((upright(up) * up.normalize()).distance(DVec3::NEG_Y) < 1e-12, "{up}");
+    }
+    assert!(Transform::upright(DVec3::ZERO).is_err());
+    let change = Transform { origin: DVec3::new(3.0, 0.0, 0.0), turn: upright(DVec3::X), scale: 2.0 };
+    let after = change.apply(&before).expect("moved");
+    assert!(after.world(0).length() < 1e-6 && after.world(1).distance(DVec3::new(0.0, -4.0, 0.0)) < 1e-6);
+    assert!((after.scales[0][0] - 0.6_f32.ln()).abs() < 1e-6);
+    assert_eq!(Transform::default().apply(&before).expect("the same"), before);
+    assert!(Transform { scale: 0.0, ..Transform::default() }.apply(&before).is_err());
+    // A scene that comes from far away keeps its digits.
+    let far = Gaussians { origin: DVec3::new(4e5, 5e6, 64.0), ..before.clone() };
+    let back = Transform { origin: far.origin, ..Transform::default() }.apply(&far).expect("moved");
+    assert_eq!(back, before);
+}
+
+#[test]
+fn cleaning_drops_by_opacity_size_box_and_loneliness() {
+    let places: Vec<f32> = (0..20).map(|index| 0.1 * index as f32).chain([40.0]).collect();
+    let mut before = beads(&places);
+    before.opacities[3] = -6.0;
+    before.scales[5] = [0.1_f32.ln(), 9.0_f32.ln(), 0.1_f32.ln()];
+    let kept = |how: Cleaning| {
+        let (after, counts) = clean(&before, &how).expect("cleaned");
+        (after.means.iter().map(|mean| mean[0]).collect::<Vec<_>>(), counts)
+    };
+    let without = |rows: &[usize]| {
+        let rows = (0..places.len()).filter(|row| !rows.contains(row));
+        rows.map(|row| places[row]).collect::<Vec<_>>()
+    };
+    let nothing = Cleaning::default();
+    assert_eq!(kept(nothing), (without(&[]), Cleaned::default()));
+    let how = Cleaning { min_opacity: Some(0.01), ..nothing };
+    assert_eq!(kept(how), (without(&[3]), Cleaned { faint: 1, ..Cleaned::default() }));
+    let how = Cleaning { max_size: Some(8.9), ..nothing };
+    assert_eq!(kept(how), (without(&[5]), Cleaned { huge: 1, ..Cleaned::default() }));
+    let how = Cleaning { max_gap: Some(10.0), ..nothing };
+    assert_eq!(kept(how), (without(&[20]), Cleaned { lonely: 1, ..Cleaned::default() }));
+    let inside = Some([DVec3::new(0.05, -1.0, -1.0), DVec3::new(2.0, 1.0, 1.0)]);
+    let all = Cleaning { min_opacity: Some(0.01), max_size: Some(8.9), max_gap: Some(10.0), inside };
+    assert_eq!(kept(all), (without(&[0, 3, 5, 20]), Cleaned { faint: 1, huge: 1, outside: 2, lonely: 0 }));
 }

@@ -7,6 +7,7 @@
 //! | [masks] | Where do masks come from, and how are they checked and repaired? |
 //! | [labels] | How are objects chosen, taken out, renamed and drawn? |
 //! | [viewer] | How is a model, or a training, seen and changed in a browser? |
+//! | [formats] | Which formats of models are read and written, and what does each keep? |
 //! | [benchmarks] | How is a model scored, on its own views and by published benchmarks? |
 //! | [method] | What does the training do, and where does it differ from the papers? |
 //! | [outputs] | Which files are written, what do statuses mean, what is the same in every run? |
@@ -31,6 +32,7 @@ macro_rules! pages {
         /// [page masks]: masks
         /// [page labels]: labels
         /// [page outputs]: outputs
+        /// [page formats]: formats
         ///
         #[doc = include_str!(concat!(stringify!($name), ".md"))]
         pub mod $name {}
@@ -43,6 +45,7 @@ pages! {
     masks: "Masks: their form, trackers, checks and repair.";
     labels: "Objects chosen, taken out, renamed and drawn.";
     viewer: "A model or a training in a browser.";
+    formats: "Formats of models: what each keeps, labels in other programs, axes.";
     benchmarks: "Scores: held-out views and published benchmarks.";
     method: "The method, and its differences from LabelGS and 3DGS.";
     outputs: "Files, exit statuses and determinism.";

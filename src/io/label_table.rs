@@ -71,12 +71,17 @@ impl LabelTable {
                 r#"expected {"schema_version": 1, "labels": [{"id": 1, "name": "cup", "colour": [r, g, b]}]}"#;
             Error::data(path, format!("line {}", error.line()), format!("{error}; {expected}"))
         })?;
-        if table.schema_version != SCHEMA_VERSION {
-            let problem = format!("has version {}, labelgs reads {SCHEMA_VERSION}", table.schema_version);
+        table.checked(path)
+    }
+
+    /// Returns the table sorted, if it obeys the rules of [`Self::read`]; `path` is the file it is from.
+    pub(crate) fn checked(&self, path: &Path) -> Result<Self> {
+        if self.schema_version != SCHEMA_VERSION {
+            let problem = format!("has version {}, labelgs reads {SCHEMA_VERSION}", self.schema_version);
             return Err(Error::data(path, "schema_version", problem));
         }
         let (mut ids, mut names) = (BTreeSet::new(), BTreeSet::new());
-        for entry in &table.labels {
+        for entry in &self.labels {
             let place = format!("label {}", entry.id);
             if entry.id == 0 || entry.id > LABEL_MAX {
                 return Err(Error::data(path, place, format!("labels are from 1 to {LABEL_MAX}")));
@@ -88,7 +93,7 @@ impl LabelTable {
                 return Err(Error::data(path, place, "has the name of another label; names must be unique"));
             }
         }
-        Ok(Self::new(table.labels))
+        Ok(Self::new(self.labels.clone()))
     }
 
     /// Reads the table in a folder of masks, if there is one.

@@ -144,6 +144,11 @@ fn changed_plys_are_read_or_refused() {
 }
 
 #[test]
+fn changed_models_are_read_or_refused() {
+    run_all(&["spz_", "glb", "sog", "splat"]);
+}
+
+#[test]
 fn changed_masks_are_read_or_refused() {
     run_all(&["mask"]);
 }

@@ -72,8 +72,8 @@ fn a_format_that_is_added_is_read_and_written_by_its_endings() {
     // The other formats are unchanged, apart from one more known extension in messages.
     write_model(scene.at("a.ply"), &balls()).expect("written");
     assert!(std::fs::read(scene.at("a.ply")).expect("bytes").starts_with(b"ply\n"));
-    let refused = refusal(read_model(scene.write("a.splat", "1 2 3\n")));
-    assert!(refused.contains(".splat was read as PLY, known endings of models are .balls, .balls.txt, .ply"));
+    let refused = refusal(read_model(scene.write("a.cloud", "1 2 3\n")));
+    assert!(refused.contains(".cloud was read as PLY, known endings of models are .balls, .balls.txt, .ply"));
 }
 
 #[test]
@@ -88,9 +88,9 @@ fn any_other_ending_may_be_a_ply() {
         let path = scene.write(name, "no header\n");
         refusal(read_model(&path)).replace(&path.display().to_string(), "")
     };
-    let (ply, none, other) = (problem("b.ply"), problem("b"), problem("b.spz"));
+    let (ply, none, other) = (problem("b.ply"), problem("b"), problem("b.cloud"));
     assert_eq!(ply, none);
-    assert!(other.starts_with(&format!("{ply}; .spz was read as PLY, known endings of models are ")), "{other}");
+    assert!(other.starts_with(&format!("{ply}; .cloud was read as PLY, known endings of models are ")), "{other}");
     assert!(other.contains(".ply"), "{other}");
 }
 

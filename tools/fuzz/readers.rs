@@ -91,8 +91,8 @@ pub fn sound_model(model: &Gaussians) {
     assert!(all.into_iter().all(|value| value.is_finite()), "a value that is not finite");
 }
 
-/// Reads a model, and checks that it survives writing and reading.
-pub fn ply_model(folder: &Path, file: &Path) -> Result<()> {
+/// Reads a model of any format, and checks that it survives writing and reading as a PLY.
+pub fn model(folder: &Path, file: &Path) -> Result<()> {
     let read = model::read_model(file)?;
     sound_model(&read.gaussians);
     let again = folder.join("again.ply");

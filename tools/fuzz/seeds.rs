@@ -3,11 +3,11 @@
 use labelgs::gpu::PipelineStore;
 use labelgs::internals::io::image as pixels;
 use labelgs::io::PipelineFolder;
-use labelgs::io::write_model;
 use labelgs::io::{LabelEntry, LabelTable};
+use labelgs::io::{SpzVersion, WriteOptions, export_model, write_model};
 use labelgs::run::Settings;
 use labelgs::scene::Gaussians;
-use std::io::Cursor;
+use std::io::{Cursor, Read};
 use std::path::Path;
 
 /// Size of all pictures, px.
@@ -153,6 +153,60 @@ fn gaussians(count: usize, degree: u32, labelled: bool) -> Gaussians {
     g.labels = labelled.then(|| (0..count as u32).map(|index| index * 300).collect());
     g.label_confidence = labelled.then(|| vec![0.75; count]);
     g
+}
+
+/// A file of another program.
+pub fn golden(name: &str) -> Vec<u8> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR"));
+    // The fuzzer is a crate of its own, below the engine's.
+    let root = if folder.ends_with("tools/fuzz") { folder.join("../..") } else { folder.to_owned() };
+    std::fs::read(root.join("tests/golden/formats").join(name)).expect("a file of the tests")
+}
+
+/// A model with labels, names and confidences.
+fn exported(name: &str, degree: u32, options: WriteOptions) -> Vec<u8> {
+    written(name, |path| {
+        let names = LabelTable::new(vec![LabelEntry { name: Some("cup".into()), ..LabelEntry::new(300) }]);
+        export_model(path, &gaussians(3, degree, true), Some(&names), options).expect("written");
+    })
+}
+
+/// SPZ of version 3, packed.
+pub fn spz_gzip() -> Vec<Vec<u8>> {
+    vec![exported("a.spz", 1, WriteOptions::default()), golden("splat-transform-v3.spz")]
+}
+
+/// SPZ of version 3 before it is packed.
+pub fn spz_stream() -> Vec<u8> {
+    let mut bytes = Vec::new();
+    let packed = exported("a.spz", 2, WriteOptions::default());
+    flate2::read::GzDecoder::new(packed.as_slice()).read_to_end(&mut bytes).expect("unpacked");
+    bytes
+}
+
+/// SPZ of version 4.
+pub fn spz_framed() -> Vec<Vec<u8>> {
+    let options = WriteOptions { spz_version: SpzVersion::V4, ..WriteOptions::default() };
+    vec![exported("a.spz", 1, options), golden("splat-transform-v4.spz")]
+}
+
+/// SOG with labels and names.
+pub fn sog() -> Vec<Vec<u8>> {
+    vec![exported("a.sog", 1, WriteOptions::default())]
+}
+
+/// `meta.json` of a SOG.
+pub fn sog_meta() -> Vec<u8> {
+    let own = golden("splat-transform.sog");
+    let mut archive = zip::ZipArchive::new(Cursor::new(own)).expect("an archive");
+    let mut text = Vec::new();
+    archive.by_name("meta.json").expect("an entry").read_to_end(&mut text).expect("unpacked");
+    text
+}
+
+/// GLB with labels and names.
+pub fn glb() -> Vec<Vec<u8>> {
+    vec![exported("a.glb", 0, WriteOptions::default()), exported("a.glb", 1, WriteOptions::default())]
 }
 
 /// Models of every degree, with labels and without, and one as text.

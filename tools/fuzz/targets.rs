@@ -11,6 +11,7 @@ use labelgs::internals::io::checkpoint::VERSION;
 use labelgs::io::PipelineFolder;
 use labelgs::io::masks::Format;
 use labelgs::{Error, Result};
+use std::io::Write;
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
 
@@ -46,7 +47,7 @@ const PLAIN: Target = Target {
 const PIXELS: Target = Target { per_byte: 8192 * 4 * 2, ..PLAIN };
 
 /// All readers.
-pub const TARGETS: [Target; 30] = [
+pub const TARGETS: [Target; 38] = [
     Target {
         name: "colmap_cameras_bin",
         file: "sparse/0/cameras.bin",
@@ -103,7 +104,35 @@ pub const TARGETS: [Target; 30] = [
         seeds: seeds::transforms_json,
         ..PLAIN
     },
-    Target { name: "ply_model", file: "model.ply", read: ply_model, seeds: seeds::ply_model, ..PLAIN },
+    Target { name: "ply_model", file: "model.ply", read: model, seeds: seeds::ply_model, ..PLAIN },
+    Target {
+        name: "ply_packed",
+        file: "model.ply",
+        read: model,
+        seeds: || vec![seeds::golden("splat-transform.compressed.ply")],
+        ..PLAIN
+    },
+    Target {
+        name: "spz_stream",
+        file: "model.spz",
+        read: model,
+        seeds: || vec![seeds::spz_stream()],
+        dress: gzipped,
+        ..PIXELS
+    },
+    Target { name: "spz_gzip", file: "model.spz", read: model, seeds: seeds::spz_gzip, ..PIXELS },
+    Target { name: "spz_framed", file: "model.spz", read: model, seeds: seeds::spz_framed, ..PIXELS },
+    Target { name: "glb", file: "model.glb", read: model, seeds: seeds::glb, ..PLAIN },
+    Target { name: "splat", file: "model.splat", read: model, seeds: || vec![seeds::golden("source.splat")], ..PLAIN },
+    Target { name: "sog", file: "model.sog", read: model, seeds: seeds::sog, ..PIXELS },
+    Target {
+        name: "sog_meta",
+        file: "model.sog",
+        read: model,
+        seeds: || vec![seeds::sog_meta()],
+        dress: sog_of_meta,
+        ..PIXELS
+    },
     Target { name: "ply_cloud", file: "cloud.ply", read: ply_cloud, seeds: seeds::ply_cloud, ..PLAIN },
     Target { name: "mask", file: "mask.png", read: id_mask, seeds: seeds::mask, dress: png_sums, ..PIXELS },
     Target {
@@ -304,6 +333,31 @@ fn dressed(body: &[u8]) -> Vec<u8> {
     bytes.extend((body.len() as u64).to_le_bytes());
     bytes.extend(body);
     bytes
+}
+
+/// A stream of gzip with these bytes, its checksum right.
+fn gzipped(bytes: &[u8]) -> Vec<u8> {
+    let mut packer = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::fast());
+    packer.write_all(bytes).expect("packed");
+    packer.finish().expect("packed")
+}
+
+/// A SOG of another program with this `meta.json`.
+fn sog_of_meta(bytes: &[u8]) -> Vec<u8> {
+    let own = seeds::golden("splat-transform.sog");
+    let mut from = zip::ZipArchive::new(std::io::Cursor::new(own)).expect("an archive");
+    let mut to = zip::ZipWriter::new(std::io::Cursor::new(Vec::new()));
+    let stored = zip::write::SimpleFileOptions::default().compression_method(zip::CompressionMethod::Stored);
+    for index in 0..from.len() {
+        let mut entry = from.by_index(index).expect("an entry");
+        to.start_file(entry.name(), stored).expect("a file");
+        if entry.name() == "meta.json" {
+            to.write_all(bytes).expect("written");
+        } else {
+            std::io::copy(&mut entry, &mut to).expect("copied");
+        }
+    }
+    to.finish().expect("an archive").into_inner()
 }
 
 /// A PNG with the checksums of its chunks right again; anything else as it is.

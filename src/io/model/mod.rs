@@ -9,6 +9,7 @@ mod origin;
 mod ply;
 mod rows;
 mod side_labels;
+mod sog;
 mod splat;
 mod spz;
 mod turn;
@@ -24,7 +25,7 @@ use std::sync::{PoisonError, RwLock};
 pub use format::{Export, LabelType, ModelFormat, ModelWriter, ReadModel, SpzVersion, WriteOptions};
 
 /// Formats of labelgs. The first one also serves unknown extensions, such as `/dev/stdout`.
-const SHIPPED: [&ModelFormat; 4] = [&ply::FORMAT, &spz::FORMAT, &glb::FORMAT, &splat::FORMAT];
+const SHIPPED: [&ModelFormat; 5] = [&ply::FORMAT, &spz::FORMAT, &glb::FORMAT, &sog::FORMAT, &splat::FORMAT];
 
 /// Formats that other crates have registered.
 static REGISTERED: RwLock<Vec<&'static ModelFormat>> = RwLock::new(Vec::new());

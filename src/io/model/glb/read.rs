@@ -92,6 +92,12 @@ impl Glb<'_> {
         if columns.into_iter().any(|column| column.values.len() != count * column.width) {
             return Err(self.bad("attributes", format!("differ in length; expected {count} of each, as of POSITION")));
         }
+        let odd = shares.iter().flat_map(|column| &column.values).position(|share| !(0.0..=1.0).contains(share));
+        if let Some(index) = odd {
+            return Err(
+                self.bad(&format!("{CONFIDENCE} {index}"), "is not from 0 to 1; correct it or leave out the attribute")
+            );
+        }
         let mut rows = Rows::new(degree, labels.is_some(), shares.is_some());
         let mut triples = vec![[0.0; 3]; rest.len()];
         for index in 0..count {
@@ -108,7 +114,7 @@ impl Glb<'_> {
                 sh0: sh0.row(index),
                 rest: &triples,
                 label: labels.as_ref().map(|found| found.0[index]),
-                confidence: shares.as_ref().map(|column| column.values[index].clamp(0.0, 1.0)),
+                confidence: shares.as_ref().map(|column| column.values[index]),
             });
         }
         let read = rows.finish(self.path, None)?;
