@@ -171,6 +171,11 @@ impl<'a> Live<'a> {
         self.trainer.gaussian_count()
     }
 
+    /// Waits for the steps in flight, as every query does first: their time is that of the training.
+    pub fn wait(&mut self) -> Result<()> {
+        self.trainer.drain().map(drop)
+    }
+
     /// Renders the current scene from any camera, at any size, with the requested parts.
     pub fn render(&mut self, camera: &Camera, parts: Parts) -> Result<Rendered> {
         self.drain()?;

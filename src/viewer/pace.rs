@@ -11,7 +11,7 @@ const LEVELS: i32 = 12;
 /// A picture becomes smaller if it is predicted to take longer than this share of the target.
 const TOO_LONG: f64 = 1.25;
 /// A picture becomes larger if the larger one is predicted to take less than this share of the target.
-const SHORT: f64 = 0.8;
+const SHORT: f64 = 0.95;
 
 /// A model of the time of a frame, a + b · pixels, and the size that follows from it. Splats are projected and sorted at
 /// any size, so time per pixel alone would shrink the picture further and further.

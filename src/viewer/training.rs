@@ -122,6 +122,10 @@ impl<'a> Watched<'a> {
         self.hear_all(live)?;
         if self.viewer.hub.is_watched() {
             let start = Instant::now();
+            if self.budget.allows() && self.viewer.hub.has_work() {
+                live.wait()?;
+                self.budget.trained(start.elapsed());
+            }
             while self.budget.allows() && self.viewer.hub.has_work() {
                 let Some((id, task)) = self.viewer.hub.next(Duration::ZERO) else { break };
                 self.timed(|watched| watched.serve(id, task, live))?;
