@@ -36,10 +36,10 @@ impl TableArg {
 /// Arguments of every edit of labels.
 #[derive(Args, Clone, Debug)]
 pub struct EditArgs {
-    /// The model: a PLY, or the folder of a `labelgs train` run.
+    /// The model: a PLY, SPZ, GLB, SOG or .splat, or the folder of a `labelgs train` run.
     #[arg(value_name = "MODEL")]
     pub model: PathBuf,
-    /// File to write. Names of its labels go to OUT.labels.json beside it.
+    /// File to write; its ending is the format. Names of its labels go to OUT.labels.json beside it.
     #[arg(short, long, value_name = "OUT.ply")]
     pub output: PathBuf,
     /// How it is written.

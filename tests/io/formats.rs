@@ -443,7 +443,7 @@ fn bad_files_are_refused_by_file_place_and_cure() {
             &["a.ply: header: ", "0 chunks for 24 Gaussians"],
         ),
         ("a.sog", sog[..sog.len() - 30].to_vec(), &["a.sog: end of the archive: ", "cut short"]),
-        ("a.sog", text(&sog, "quats.webp", "quots.webp"), &["a.sog: quats.webp: "]),
+        ("a.sog", text(&sog, "\"version\":2", "\"version\":1"), &["a.sog: meta.json: cannot be unpacked: "]),
         ("a.sog", text(&sog, "RIFF", "RAFF"), &["a.sog: means_l.webp: "]),
         ("a.splat", splat[..splat.len() - 1].to_vec(), &["a.splat: byte 736: ", "times 32"]),
     ];

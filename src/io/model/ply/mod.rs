@@ -90,14 +90,13 @@ fn read(path: &Path) -> Result<ReadModel> {
     })?;
     let mut read = rows.finish(path, origin)?;
     read.dropped += deleted;
-    let selected = edited.then_some(deleted);
-    note(&mut read, selected, odd.extra_bytes);
+    let deleted = edited.then_some(deleted);
+    add_notes(&mut read, deleted, odd.extra_bytes);
     Ok(read)
 }
 
-/// Adds what the user should know: `deleted` is the number of Gaussians that an editor deleted, if the labels are its
-/// selection.
-fn note(read: &mut ReadModel, deleted: Option<u64>, extra_bytes: u64) {
+/// Adds what the user should know; `deleted` is the number of Gaussians that an editor has deleted, if it was one.
+fn add_notes(read: &mut ReadModel, deleted: Option<u64>, extra_bytes: u64) {
     if let Some(deleted) = deleted {
         let note = "the selection in the column `state` became label 1";
         let more = if deleted > 0 { format!("; {deleted} deleted Gaussians were left out") } else { String::new() };

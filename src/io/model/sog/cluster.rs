@@ -20,9 +20,11 @@ pub(super) fn numbers(values: impl Iterator<Item = f32>, size: usize) -> Vec<f32
         different.resize(size, last);
         return different;
     }
-    // Cells of equal shares of the distinct values: where values crowd at one number, it takes one cell and not most.
-    let start = |cell: usize| different[(2 * cell + 1) * different.len() / (2 * size)];
-    let mut book: Vec<f32> = (0..size).map(start).collect();
+    // Halving the cells with the largest spread leaves numbers for rare values at the ends too.
+    let (cells, _) = vectors(&different, 1, size);
+    let mut book: Vec<f32> = cells.into_iter().flatten().collect();
+    book.sort_unstable_by(f32::total_cmp);
+    book.resize(size, different[different.len() - 1]);
     let sums: Vec<f64> = std::iter::once(0.0)
         .chain(sorted.iter().scan(0.0, |sum, &value| {
             *sum += f64::from(value);

@@ -1,7 +1,7 @@
 //! Reads SOG.
 
 use super::archive::{Archive, Picture};
-use super::meta::{EXTRAS_VERSION, FILE, Meta, VERSION};
+use super::meta::{EXTRAS_VERSION, FILE, Labels, Meta, VERSION};
 use super::{CODEBOOK, PALETTE_ROW, ROTATION, coefficients};
 use crate::error::{Error, Result};
 use crate::io::model::format::ReadModel;
@@ -11,6 +11,18 @@ use crate::io::read as file;
 use std::f64::consts::SQRT_2;
 use std::path::Path;
 
+/// The pictures of a file, each with a pixel for every Gaussian.
+struct Pictures {
+    low: Picture,
+    high: Picture,
+    quats: Picture,
+    scales: Picture,
+    sh0: Picture,
+    /// Entries of the palette, and the palette.
+    rest: Option<(Picture, Picture)>,
+    labels: Option<Picture>,
+}
+
 /// Reads a SOG of version 2.
 pub(super) fn read(path: &Path) -> Result<ReadModel> {
     let bytes = file::bytes(path)?;
@@ -18,61 +30,34 @@ pub(super) fn read(path: &Path) -> Result<ReadModel> {
     let text = archive.file(FILE)?;
     let meta: Meta = serde_json::from_slice(&text)
         .map_err(|error| Error::data(path, FILE, format!("{error}; expected that of a SOG; export the file again")))?;
-    let bad = |place: &str, problem: String| Error::data(path, place, format!("{problem}; export the file again"));
     if meta.version != VERSION {
-        return Err(bad(FILE, format!("has version {}; {VERSION} is read", meta.version)));
-    }
-    let count = meta.count;
-    let [low, high] = [archive.picture(&meta.means.files[0])?, archive.picture(&meta.means.files[1])?];
-    let (quats, scales) = (archive.picture(&meta.quats.files[0])?, archive.picture(&meta.scales.files[0])?);
-    let sh0 = archive.picture(&meta.sh0.files[0])?;
-    let mut rest = None;
-    if let Some(own) = &meta.rest {
-        if !(1..=3).contains(&own.bands) {
-            return Err(bad(FILE, format!("has harmonics of degree {}; expected 1 to 3", own.bands)));
-        }
-        let [entries, palette] = [archive.picture(&own.files[1])?, archive.picture(&own.files[0])?];
-        if palette.width != PALETTE_ROW * coefficients(own.bands) {
-            return Err(bad(&own.files[0], format!("is {} wide, expected {PALETTE_ROW} entries a row", palette.width)));
-        }
-        rest = Some((own, entries, palette));
+        return Err(bad(path, FILE, format!("has version {}; {VERSION} is read", meta.version)));
     }
     let own = meta.extras.as_ref().and_then(|extras| extras.labelgs.as_ref());
     let own = own.filter(|own| own.version == EXTRAS_VERSION);
-    let labels = own.map(|own| archive.picture(&own.file)).transpose()?;
-    let pictures =
-        [&low, &high, &quats, &scales, &sh0].into_iter().chain(&labels).chain(rest.as_ref().map(|rest| &rest.1));
-    if count == 0 || pictures.into_iter().any(|picture| picture.texels.len() < count) {
-        return Err(bad(FILE, format!("has {count} Gaussians, and a picture has fewer pixels")));
-    }
-    let books =
-        [&meta.scales.codebook, &meta.sh0.codebook].into_iter().chain(rest.as_ref().map(|rest| &rest.0.codebook));
-    if books.into_iter().any(|book| book.len() != CODEBOOK) {
-        return Err(bad(FILE, format!("has a codebook of other than {CODEBOOK} numbers")));
-    }
-    let bands = rest.as_ref().map_or(0, |rest| rest.0.bands);
+    let pictures = pictures(path, &meta, own, &mut archive)?;
+    let bands = meta.rest.as_ref().map_or(0, |rest| rest.bands);
     let mut triples = vec![[0.0; 3]; coefficients(bands)];
-    let confident = own.is_some_and(|own| own.confidence);
-    let mut rows = Rows::new(bands, labels.is_some(), confident);
-    for index in 0..count {
-        if let Some((own, entries, palette)) = &rest {
+    let mut rows = Rows::new(bands, own.is_some(), own.is_some_and(|own| own.confidence));
+    for index in 0..meta.count {
+        if let (Some(own), Some((entries, palette))) = (&meta.rest, &pictures.rest) {
             harmonics(&mut triples, &own.codebook, palette, entries.texels[index])
-                .ok_or_else(|| bad(&own.files[1], format!("pixel {index} names no entry of the palette")))?;
+                .ok_or_else(|| bad(path, &own.files[1], format!("pixel {index} names no entry of the palette")))?;
         }
         let place = |axis: usize| {
-            let steps = f64::from(u16::from_le_bytes([low.texels[index][axis], high.texels[index][axis]]));
+            let steps = [&pictures.low, &pictures.high].map(|picture| picture.texels[index][axis]);
             let (least, most) = (meta.means.mins[axis], meta.means.maxs[axis]);
-            let logarithm = least + (most - least) * steps / 65_535.0;
+            let logarithm = least + (most - least) * f64::from(u16::from_le_bytes(steps)) / 65_535.0;
             logarithm.abs().exp_m1().copysign(logarithm)
         };
         let of_book = |book: &[f32], texel: [u8; 4]| [0, 1, 2].map(|at| book[usize::from(texel[at])]);
-        let label = labels.as_ref().map(|labels| labels.texels[index]);
+        let label = pictures.labels.as_ref().map(|labels| labels.texels[index]);
         rows.push(&Row {
             position: [place(0), place(1), place(2)],
-            quat: quat(quats.texels[index]),
-            scale: of_book(&meta.scales.codebook, scales.texels[index]),
-            opacity: logit_of_byte(sh0.texels[index][3]),
-            sh0: of_book(&meta.sh0.codebook, sh0.texels[index]),
+            quat: quat(pictures.quats.texels[index]),
+            scale: of_book(&meta.scales.codebook, pictures.scales.texels[index]),
+            opacity: logit_of_byte(pictures.sh0.texels[index][3]),
+            sh0: of_book(&meta.sh0.codebook, pictures.sh0.texels[index]),
             rest: &triples,
             label: label.map(|[low, high, _, _]| u32::from(u16::from_le_bytes([low, high]))),
             confidence: label.map(|texel| f32::from(texel[2]) / 255.0),
@@ -81,6 +66,46 @@ pub(super) fn read(path: &Path) -> Result<ReadModel> {
     let names = own.and_then(|own| own.names.as_ref());
     let names = names.map(|names| names.checked(path)).transpose()?;
     Ok(ReadModel { names, ..rows.finish(path, None)? })
+}
+
+fn bad(path: &Path, place: &str, problem: String) -> Error {
+    Error::data(path, place, format!("{problem}; export the file again"))
+}
+
+/// Reads the pictures, and checks their sizes and the codebooks.
+fn pictures(path: &Path, meta: &Meta, own: Option<&Labels>, archive: &mut Archive) -> Result<Pictures> {
+    let mut rest = None;
+    if let Some(own) = &meta.rest {
+        if !(1..=3).contains(&own.bands) {
+            return Err(bad(path, FILE, format!("has harmonics of degree {}; expected 1 to 3", own.bands)));
+        }
+        let (entries, palette) = (archive.picture(&own.files[1])?, archive.picture(&own.files[0])?);
+        if palette.width != PALETTE_ROW * coefficients(own.bands) {
+            let problem = format!("is {} wide, expected {PALETTE_ROW} entries a row", palette.width);
+            return Err(bad(path, &own.files[0], problem));
+        }
+        rest = Some((entries, palette));
+    }
+    let all = Pictures {
+        low: archive.picture(&meta.means.files[0])?,
+        high: archive.picture(&meta.means.files[1])?,
+        quats: archive.picture(&meta.quats.files[0])?,
+        scales: archive.picture(&meta.scales.files[0])?,
+        sh0: archive.picture(&meta.sh0.files[0])?,
+        labels: own.map(|own| archive.picture(&own.file)).transpose()?,
+        rest,
+    };
+    let needed = [&all.low, &all.high, &all.quats, &all.scales, &all.sh0].into_iter().chain(&all.labels);
+    let least = needed.chain(all.rest.as_ref().map(|rest| &rest.0)).map(|picture| picture.texels.len()).min();
+    if meta.count == 0 || least < Some(meta.count) {
+        return Err(bad(path, FILE, format!("has {} Gaussians, and a picture has fewer pixels", meta.count)));
+    }
+    let books =
+        [&meta.scales.codebook, &meta.sh0.codebook].into_iter().chain(meta.rest.as_ref().map(|rest| &rest.codebook));
+    if books.into_iter().any(|book| book.len() != CODEBOOK) {
+        return Err(bad(path, FILE, format!("has a codebook of other than {CODEBOOK} numbers")));
+    }
+    Ok(all)
 }
 
 /// Fills in the harmonics of a palette's entry; `None` if there is no such entry.

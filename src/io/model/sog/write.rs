@@ -106,21 +106,7 @@ fn write(export: &Export, out: &mut dyn Write) -> io::Result<()> {
     let sh0 = rows.iter().map(texel).collect::<Vec<_>>();
     let sh0 = Coded { files: [add("sh0.webp", &sh0, width, height)?], codebook: book };
     let rest = if g.sh_degree > 0 { Some(palette(export, &rows, (width, height), &mut add)?) } else { None };
-    let extras = match export.labels() {
-        None => None,
-        Some(labels) => {
-            let shares = export.label_confidence();
-            let texel = |&row: &usize| {
-                let [low, high, _, _] = labels[row].to_le_bytes();
-                [low, high, shares.map_or(255, |shares| byte(255.0 * shares[row])), 255]
-            };
-            let file = add(LABELS, &rows.iter().map(texel).collect::<Vec<_>>(), width, height)?;
-            let names = export.names.cloned();
-            Some(Extras {
-                labelgs: Some(Labels { version: EXTRAS_VERSION, file, confidence: shares.is_some(), names }),
-            })
-        }
-    };
+    let extras = extras(export, &rows, (width, height), &mut add)?;
     let asset = Asset { generator: concat!("labelgs ", env!("CARGO_PKG_VERSION")).into() };
     let meta = Meta { version: VERSION, asset, count: rows.len(), means, scales, quats, sh0, rest, extras };
     files.push((FILE.into(), serde_json::to_vec(&meta)?));
@@ -140,6 +126,24 @@ fn rotation(quat: [f32; 4]) -> [u8; 4] {
 }
 
 type Add<'a> = dyn FnMut(&str, &[[u8; 4]], usize, usize) -> io::Result<String> + 'a;
+
+/// The picture of the labels, if there are any.
+fn extras(
+    export: &Export,
+    rows: &[usize],
+    (width, height): (usize, usize),
+    add: &mut Add,
+) -> io::Result<Option<Extras>> {
+    let Some(labels) = export.labels() else { return Ok(None) };
+    let shares = export.label_confidence();
+    let texel = |&row: &usize| {
+        let [low, high, _, _] = labels[row].to_le_bytes();
+        [low, high, shares.map_or(255, |shares| byte(255.0 * shares[row])), 255]
+    };
+    let file = add(LABELS, &rows.iter().map(texel).collect::<Vec<_>>(), width, height)?;
+    let names = export.names.cloned();
+    Ok(Some(Extras { labelgs: Some(Labels { version: EXTRAS_VERSION, file, confidence: shares.is_some(), names }) }))
+}
 
 /// The palette of harmonics.
 fn palette(export: &Export, rows: &[usize], (width, height): (usize, usize), add: &mut Add) -> io::Result<Palette> {
