@@ -121,7 +121,9 @@ impl Score {
             let of = |id| mask.ids.iter().zip(&rendered.labels).map(move |(&truth, &found)| (truth == id, found == id));
             mean(mask.objects().into_iter().filter_map(|id| Overlap::count(of(id)).iou()))
         };
-        let mask = posed.view.mask.as_deref().filter(|mask| mask.ids.len() == rendered.labels.len());
+        // Before the first labels of a training there is nothing to compare.
+        let is_labelled = rendered.labels.iter().any(|&id| id != 0);
+        let mask = posed.view.mask.as_deref().filter(|mask| is_labelled && mask.ids.len() == rendered.labels.len());
         Self {
             psnr: photo.map(|photo| psnr(&rendered.rgb, photo)).filter(|value| value.is_finite()),
             iou: mask.and_then(iou),
