@@ -86,6 +86,7 @@ export class Labels {
       : rows.length === 0 ? "No label has this name or id." : "";
     $("label-empty").textContent = empty;
     $("label-empty").hidden = !empty;
+    this.list.hidden = Boolean(empty);
     $("label-all").disabled = this.isFixed || (this.hidden.length === 0 && this.solo.length === 0);
     $("selection").hidden = this.selected.size === 0;
     $("selection-count").textContent = this.selected.size === 1 ? this.title([...this.selected][0]) : `${this.selected.size} labels`;
