@@ -120,13 +120,6 @@ impl<'a> Live<'a> {
         Self { trainer, history, dataset, names }
     }
 
-    /// Waits for all steps, whose reports belong in the history.
-    fn drain(&mut self) -> Result<()> {
-        let reports = self.trainer.drain()?;
-        self.history.finished(&reports);
-        Ok(())
-    }
-
     /// Returns the scene of the run, with its photos and masks.
     pub fn dataset(&self) -> &'a Dataset {
         self.dataset
@@ -152,7 +145,7 @@ impl<'a> Live<'a> {
         if !self.trainer.has_labels() {
             return Ok(None);
         }
-        self.drain()?;
+        self.wait()?;
         self.trainer.engine_mut().labels().map(Some)
     }
 
@@ -173,12 +166,12 @@ impl<'a> Live<'a> {
 
     /// Waits for the steps in flight, as every query does first: their time is that of the training.
     pub fn wait(&mut self) -> Result<()> {
-        self.trainer.drain().map(drop)
+        self.history.drain(self.trainer)
     }
 
     /// Renders the current scene from any camera, at any size, with the requested parts.
     pub fn render(&mut self, camera: &Camera, parts: Parts) -> Result<Rendered> {
-        self.drain()?;
+        self.wait()?;
         let options = RenderOptions { parts, ..self.trainer.render_options() };
         let engine = self.trainer.engine_mut();
         engine.grow_image(camera.width, camera.height)?;
@@ -187,7 +180,7 @@ impl<'a> Live<'a> {
 
     /// Returns the current model, with the labels of the last count of votes.
     pub fn model(&mut self) -> Result<Gaussians> {
-        self.drain()?;
+        self.wait()?;
         self.trainer.model()
     }
 }

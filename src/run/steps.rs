@@ -32,7 +32,7 @@ pub(super) fn steps(run: &mut Run) -> Result<()> {
             break;
         }
     }
-    run.drain()
+    run.history.drain(&mut run.trainer)
 }
 
 /// Writes the model and the preview if the schedule has them at this step.
@@ -42,7 +42,7 @@ fn write_between(run: &mut Run, step: u32) -> Result<()> {
         (options.save_at.contains(&step), options.preview_every > 0 && step.is_multiple_of(options.preview_every));
     if saves {
         run.hold_folder()?;
-        run.drain()?;
+        run.history.drain(&mut run.trainer)?;
         let model = run.trainer.labelled_model()?;
         let saved = run.models.save(step, &model);
         if let Some(path) = tolerate(run, saved)? {
@@ -91,16 +91,9 @@ impl Run<'_> {
         self.checkpoints.save(&mut self.trainer, &mut self.history).map(|_| true)
     }
 
-    /// Waits for all steps, whose reports belong in the history.
-    fn drain(&mut self) -> Result<()> {
-        let reports = self.trainer.drain()?;
-        self.history.finished(&reports);
-        Ok(())
-    }
-
     /// Writes a checkpoint, and what a report of the run until then needs.
     fn save_due(&mut self) -> Result<Option<PathBuf>> {
-        self.drain()?;
+        self.history.drain(&mut self.trainer)?;
         let saved = self.checkpoints.save_due(&mut self.trainer, &mut self.history)?;
         let written = self.write_info();
         tolerate(self, written)?;

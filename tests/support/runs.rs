@@ -111,14 +111,7 @@ impl Place {
 
     /// The history of a run without its times.
     pub fn history(&self, out: &str) -> Vec<serde_json::Value> {
-        let text = std::fs::read_to_string(self.path(out).join("history.jsonl")).expect("a history");
-        assert!(text.ends_with('\n'), "a run that has ended leaves whole lines");
-        let mut lines = lines(&text).expect("JSON");
-        for line in &mut lines {
-            let line = line.as_object_mut().expect("an object");
-            line.retain(|key, _| !["ms", "seconds"].contains(&key.as_str()));
-        }
-        lines
+        history(&self.path(out))
     }
 
     /// Bytes of the model of a step.
@@ -126,6 +119,18 @@ impl Place {
         let path = self.path(out).join(format!("point_cloud/iteration_{step}/point_cloud.ply"));
         std::fs::read(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
     }
+}
+
+/// The history of a run that has ended, without its times.
+pub fn history(out: &Path) -> Vec<serde_json::Value> {
+    let text = std::fs::read_to_string(out.join("history.jsonl")).expect("a history");
+    assert!(text.ends_with('\n'), "a run that has ended leaves whole lines");
+    let mut lines = lines(&text).expect("JSON");
+    for line in &mut lines {
+        let line = line.as_object_mut().expect("an object");
+        line.retain(|key, _| !["ms", "seconds"].contains(&key.as_str()));
+    }
+    lines
 }
 
 /// Standard error as text.

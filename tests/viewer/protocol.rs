@@ -2,6 +2,7 @@
 
 use super::server::{Page, Place, Server};
 use crate::support::device;
+use crate::support::runs::history;
 use serde_json::{Value, json};
 use std::io::{Read, Write};
 use std::time::{Duration, Instant};
@@ -395,6 +396,7 @@ fn a_watched_and_paused_training_keeps_its_bits() {
     let model =
         |run: &str| std::fs::read(place.path(run).join("point_cloud/iteration_120/point_cloud.ply")).expect("a model");
     assert!(model("alone") == model("watched"), "watching changed the model");
+    assert_eq!(history(&place.path("alone")), history(&place.path("watched")));
 }
 
 #[test]

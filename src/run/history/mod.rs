@@ -12,7 +12,7 @@ pub(crate) use read::read;
 
 use crate::error::{Error, Result};
 use crate::io::append::Lines;
-use crate::train::{Densified, StepReport};
+use crate::train::{Densified, StepReport, Trainer};
 use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
@@ -103,6 +103,13 @@ impl Recorder {
             let steps = std::mem::take(&mut self.sums).line(due.step, due.gaussians, due.ms, due.seconds);
             self.put(&Entry::Steps(steps));
         }
+    }
+
+    /// Waits for all steps and adds their reports.
+    pub(super) fn drain(&mut self, trainer: &mut Trainer) -> Result<()> {
+        let reports = trainer.drain()?;
+        self.finished(&reports);
+        Ok(())
     }
 
     /// Returns the sums of the line that is not finished, for a checkpoint. Nothing may be in flight.
