@@ -1,6 +1,6 @@
 //! Scores of one image against another. Colours are r, g, b in 0 to 1. Sums are in f64.
 
-use crate::scene::Photo;
+use crate::scene::{LabelMap, Photo};
 
 /// Opacity above which an object rendered alone covers a pixel.
 pub(crate) const COVERED: f32 = 0.5;
@@ -86,6 +86,12 @@ pub fn paper_score(object: &[[f32; 3]], photo: &Photo, inside: &[bool]) -> Paper
     let psnr = squares.iter().map(|sum| psnr_of(sum / pixels)).sum::<f64>() / 3.0;
     let covered = object.iter().map(|colour| colour.iter().any(|&value| value > PAPER_COVERED));
     PaperScore { iou: Overlap::count(covered.zip(inside.iter().copied())).iou(), psnr }
+}
+
+/// Returns the mean IoU of a label map over the objects of a mask of the same size.
+pub(crate) fn label_iou(found: &[u16], truth: &LabelMap) -> Option<f64> {
+    let pairs = |id: u16| found.iter().zip(&truth.ids).map(move |(&a, &b)| (a == id, b == id));
+    mean(truth.objects().into_iter().filter_map(|id| Overlap::count(pairs(id)).iou()))
 }
 
 /// Returns the mean of the values; `None` without values.

@@ -2,8 +2,9 @@
 
 use super::compared::{Compared, Watch};
 use crate::io::{atomic, image::write_png_rgb8};
-use crate::report::panels::{byte_colour, difference, photo_pixels};
+use crate::report::panels::difference;
 use crate::report::{Figure, Panel, page, section};
+use crate::scene::colour::to_byte;
 use crate::{Error, Result};
 use maud::{PreEscaped, html};
 use std::path::{Path, PathBuf};
@@ -77,7 +78,7 @@ impl Watch for Page {
 
 /// Ground truth, prediction and difference.
 fn pixels(picture: &Compared) -> [Vec<[u8; 3]>; 3] {
-    let (photo, found) = (photo_pixels(picture.photo), picture.rgb.iter().map(|&colour| byte_colour(colour)).collect());
+    let (photo, found) = (picture.photo.rgb(), picture.rgb.iter().map(|colour| colour.map(to_byte)).collect());
     let Some((inside, outline)) = picture.masks else {
         return [photo, found, difference(picture.photo, picture.rgb)];
     };

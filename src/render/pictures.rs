@@ -2,7 +2,8 @@
 
 use crate::io::image::{write_exr_rgb, write_exr_y, write_png_grey16, write_png_rgb8};
 use crate::scene::LabelMap;
-use crate::scene::labels::label_colour;
+use crate::scene::colour::to_byte;
+use crate::scene::labels::label_colours;
 use crate::{Error, Result};
 use std::path::{Path, PathBuf};
 
@@ -87,8 +88,7 @@ pub fn write_pictures(folder: &Path, stem: &str, pictures: &Pictures, format: Fo
     }
     if let Some(labels) = pictures.labels {
         write_png_grey16(path("labels", "png"), width, height, &labels.ids)?;
-        let colours: Vec<[u8; 3]> = labels.ids.iter().map(|&id| label_colour(u32::from(id))).collect();
-        write_png_rgb8(path("labels-colour", "png"), width, height, &colours)?;
+        write_png_rgb8(path("labels-colour", "png"), width, height, &label_colours(&labels.ids))?;
     }
     if let Some(ids) = pictures.top_id {
         let values: Vec<f32> = ids.iter().map(|&id| id as f32).collect();
@@ -125,11 +125,6 @@ fn check_sizes(stem: &str, pictures: &Pictures) -> Result<()> {
         None => Ok(()),
         Some(length) => Err(Error::Bug(format!("a picture of {stem} has {length} pixels instead of {pixels}"))),
     }
-}
-
-/// Returns the byte of a value from 0 to 1 in a picture.
-pub(crate) fn to_byte(value: f32) -> u8 {
-    (value.clamp(0.0, 1.0) * 255.0).round() as u8
 }
 
 /// Returns the 16-bit value of a value from 0 to 1 in a picture.

@@ -5,6 +5,7 @@ use crate::io::model::write_model;
 use crate::io::read;
 use crate::io::{camera_json, image};
 use crate::render::Rendered;
+use crate::scene::colour::to_byte;
 use crate::scene::labels::label_colour;
 use crate::scene::{Camera, Gaussians, Photo};
 use std::path::{Path, PathBuf};
@@ -83,7 +84,6 @@ pub(crate) fn save_cameras(out: &Path, cameras: &[(&str, &Camera)]) -> Result<()
 /// Writes photo, render and (if it was rendered) label map side by side.
 pub(crate) fn save_preview(path: &Path, photo: &Photo, rendered: &Rendered) -> Result<()> {
     let (width, height) = (rendered.width as usize, rendered.height as usize);
-    let byte = |value: f32| (value.clamp(0.0, 1.0) * 255.0).round() as u8;
     let labels = &rendered.labels;
     let panels = if labels.is_empty() { 2 } else { 3 };
     let mut pixels = vec![[0_u8; 3]; width * panels * height];
@@ -93,7 +93,7 @@ pub(crate) fn save_preview(path: &Path, photo: &Photo, rendered: &Rendered) -> R
             let at = y * width + x;
             let [r, g, b, _] = photo.rgba[at];
             row[x] = [r, g, b];
-            row[width + x] = rendered.rgb[at].map(byte);
+            row[width + x] = rendered.rgb[at].map(to_byte);
             if let Some(&label) = labels.get(at) {
                 row[2 * width + x] = label_colour(u32::from(label));
             }

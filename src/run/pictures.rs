@@ -3,10 +3,12 @@
 use super::info::Pictured;
 use crate::error::{Error, Result};
 use crate::eval::compared::{Compared, Watch};
-use crate::eval::metrics::{Overlap, mean};
+use crate::eval::metrics::label_iou;
 use crate::io::atomic;
 use crate::report::panels::{self, Kind, encoded};
 use crate::scene::LabelMap;
+use crate::scene::colour::to_byte;
+use crate::scene::labels::label_colours;
 use std::path::{Path, PathBuf};
 
 /// Folder of the copies.
@@ -49,10 +51,10 @@ impl Watch for Worst {
         }
         let size = (picture.photo.width, picture.photo.height);
         let copy = |pixels: &[[u8; 3]], kind| encoded(size, pixels, kind).map(Some);
-        let map = |map: Option<&LabelMap>| map.map_or(Ok(None), |map| copy(&panels::label_pixels(map), Kind::Flat));
-        let render: Vec<[u8; 3]> = picture.rgb.iter().map(|&colour| panels::byte_colour(colour)).collect();
+        let map = |map: Option<&LabelMap>| map.map_or(Ok(None), |map| copy(&label_colours(&map.ids), Kind::Flat));
+        let render: Vec<[u8; 3]> = picture.rgb.iter().map(|colour| colour.map(to_byte)).collect();
         let files = vec![
-            copy(&panels::photo_pixels(picture.photo), Kind::Smooth)?,
+            copy(&picture.photo.rgb(), Kind::Smooth)?,
             copy(&render, Kind::Smooth)?,
             map(picture.labels)?,
             map(picture.truth)?,
@@ -99,10 +101,4 @@ fn remove_old(out: &Path) -> Result<()> {
         }
     }
     Ok(())
-}
-
-/// Returns the mean IoU of a label map over the objects of a mask.
-pub(super) fn label_iou(found: &[u16], truth: &LabelMap) -> Option<f64> {
-    let pairs = |id: u16| found.iter().zip(&truth.ids).map(move |(&a, &b)| (a == id, b == id));
-    mean(truth.objects().into_iter().filter_map(|id| Overlap::count(pairs(id)).iou()))
 }

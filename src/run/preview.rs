@@ -1,10 +1,9 @@
 //! Preview pictures: photo, render and label map side by side.
 
 use super::history::{Entry, Scored};
-use super::pictures::label_iou;
 use super::{Live, Run, models};
 use crate::error::Result;
-use crate::eval::metrics::psnr;
+use crate::eval::metrics::{label_iou, psnr};
 use crate::render::Parts;
 use std::path::PathBuf;
 

@@ -60,6 +60,11 @@ impl LabelMap {
     }
 }
 
+/// Returns the display colours of ids.
+pub(crate) fn label_colours(ids: &[u16]) -> Vec<[u8; 3]> {
+    ids.iter().map(|&id| label_colour(u32::from(id))).collect()
+}
+
 /// Returns the display colour of an id: hues a golden ratio apart; 0 is black.
 pub fn label_colour(id: u32) -> [u8; 3] {
     if id == UNLABELLED {

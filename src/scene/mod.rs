@@ -4,6 +4,7 @@
 //! [`LabelMap`] has an object id per pixel, a [`DepthMap`] a depth. [`path`] makes smooth paths through cameras.
 
 pub(crate) mod camera;
+pub(crate) mod colour;
 pub(crate) mod depth;
 pub(crate) mod gaussians;
 pub(crate) mod labels;

@@ -18,6 +18,13 @@ pub struct Photo {
     pub rgba: Vec<[u8; 4]>,
 }
 
+impl Photo {
+    /// Returns the colours without validity, `[height, width]`.
+    pub fn rgb(&self) -> Vec<[u8; 3]> {
+        self.rgba.iter().map(|&[r, g, b, _]| [r, g, b]).collect()
+    }
+}
+
 /// A posed photo. Copies share photo and mask.
 #[derive(Clone, Debug)]
 pub struct View {

@@ -3,9 +3,10 @@
 use super::message::Pane;
 use crate::error::Result;
 use crate::io::image::{jpeg_rgb8, png_grey16, png_rgb8, png_rgba8};
-use crate::render::pictures::{depth_preview, to_byte, to_word};
+use crate::render::pictures::{depth_preview, to_word};
 use crate::render::{Parts, Rendered};
-use crate::scene::labels::label_colour;
+use crate::scene::colour::to_byte;
+use crate::scene::labels::{label_colour, label_colours};
 use crate::scene::{Photo, UNLABELLED};
 use std::collections::BTreeSet;
 
@@ -54,7 +55,7 @@ pub(super) fn encode(pane: Pane, rendered: &Rendered, beside: Beside, is_lossy: 
         _ => {}
     }
     let pixels: Vec<[u8; 3]> = match pane {
-        Pane::Labels => rendered.labels.iter().map(|&id| label_colour(u32::from(id))).collect(),
+        Pane::Labels => label_colours(&rendered.labels),
         Pane::Tinted => rendered.rgb.iter().zip(&rendered.labels).map(tinted).collect(),
         Pane::Confidence => rendered.top_id.iter().map(|&row| confidence(row, beside.confidence)).collect(),
         Pane::Error => errors(rendered, beside.photo),

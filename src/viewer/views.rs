@@ -1,11 +1,11 @@
 //! The views of a scene as a page sees them: cameras, photos, thumbnails, scores.
 
 use crate::error::{Error, Result};
-use crate::eval::metrics::{Overlap, mean, psnr};
+use crate::eval::metrics::{label_iou, mean, psnr};
 use crate::io::camera_json::CameraFile;
 use crate::io::image::{jpeg_rgb8, png_rgb8};
 use crate::render::Rendered;
-use crate::scene::{Camera, Dataset, LabelMap, Photo, View};
+use crate::scene::{Camera, Dataset, Photo, View};
 use glam::{DMat3, DVec3};
 use serde_json::{Value, json};
 
@@ -86,8 +86,7 @@ impl Views {
         let photo = self.list.get(index)?.view.photo.as_ref()?;
         let size = (photo.width, photo.height);
         if !is_small {
-            let pixels: Vec<[u8; 3]> = photo.rgba.iter().map(|&[r, g, b, _]| [r, g, b]).collect();
-            return Some(("image/png", png_rgb8(size, &pixels).ok()?));
+            return Some(("image/png", png_rgb8(size, &photo.rgb()).ok()?));
         }
         let (small, pixels) = shrunk(photo);
         Some(("image/jpeg", jpeg_rgb8(small, &pixels, THUMB_QUALITY).ok()?))
@@ -117,16 +116,12 @@ impl Score {
     /// Scores a render of a view in full size: PSNR, and the mean IoU of the objects of its mask.
     pub(super) fn new(posed: &Posed, rendered: &Rendered) -> Self {
         let photo = posed.view.photo.as_deref();
-        let iou = |mask: &LabelMap| {
-            let of = |id| mask.ids.iter().zip(&rendered.labels).map(move |(&truth, &found)| (truth == id, found == id));
-            mean(mask.objects().into_iter().filter_map(|id| Overlap::count(of(id)).iou()))
-        };
         // Before the first labels of a training there is nothing to compare.
         let is_labelled = rendered.labels.iter().any(|&id| id != 0);
         let mask = posed.view.mask.as_deref().filter(|mask| is_labelled && mask.ids.len() == rendered.labels.len());
         Self {
             psnr: photo.map(|photo| psnr(&rendered.rgb, photo)).filter(|value| value.is_finite()),
-            iou: mask.and_then(iou),
+            iou: mask.and_then(|mask| label_iou(&rendered.labels, mask)),
         }
     }
 }

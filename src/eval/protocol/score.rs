@@ -101,9 +101,8 @@ pub(crate) fn score(
     let target = times_mask(photo, &truth.inside);
     let (psnr, ssim) = if compat {
         let bytes: Vec<[u8; 3]> = drawn.rgb.iter().map(|&colour| to_bytes(colour)).collect();
-        let truth_bytes: Vec<[u8; 3]> = target.rgba.iter().map(|&[r, g, b, _]| [r, g, b]).collect();
         let psnr = paper_score(&drawn.rgb, photo, &truth.inside).psnr;
-        (psnr, ssim8(&bytes, &truth_bytes, width, height))
+        (psnr, ssim8(&bytes, &target.rgb(), width, height))
     } else {
         (psnr(&drawn.rgb, &target), Some(ssim(&drawn.rgb, &target)))
     };
