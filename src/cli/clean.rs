@@ -1,14 +1,13 @@
 //! `labelgs clean`.
 
 use super::context::Context;
-use super::labelled::{EditArgs, Edited, open, wants_json};
+use super::labelled::{EditArgs, open};
 use super::values::{corners, distance, share};
 use crate::Result;
 use crate::edit::clean::{Cleaning, clean};
 use clap::Args;
 use glam::DVec3;
 use serde_json::json;
-use std::collections::BTreeSet;
 
 /// `labelgs clean`.
 #[derive(Args, Clone, Debug)]
@@ -44,14 +43,5 @@ pub(crate) fn run(args: &CleanArgs, context: &Context) -> Result<()> {
         dropped.outside,
         dropped.lonely
     );
-    let labels: BTreeSet<u32> = cleaned.labels.iter().flatten().copied().collect();
-    let edited = Edited {
-        output: &args.edit.output,
-        model: &cleaned,
-        table: known.table.clone(),
-        write: args.edit.write,
-        of: model.len(),
-        labels: &labels,
-    };
-    edited.finish(wants_json(context, &args.edit.json), json!({ "dropped": dropped }))
+    args.edit.finish(context, (&cleaned, known), model.len(), json!({ "dropped": dropped }))
 }

@@ -2,7 +2,7 @@
 
 use super::args::JsonFlag;
 use super::context::Context;
-use super::labelled::{Edited, TableArg, open, wants_json};
+use super::labelled::{Edited, TableArg, Target, open, wants_json};
 use super::output::WriteArgs;
 use super::stdout;
 use crate::Result;
@@ -47,24 +47,16 @@ pub(crate) fn run(args: &ConvertArgs, context: &Context) -> Result<()> {
     if args.per_object {
         return per_object(args, &model, &known, print_json);
     }
-    let edited = Edited {
-        output: &args.output,
-        model: &model,
-        table: known.table.clone(),
-        write: args.write,
-        of: model.len(),
-        labels: &labels,
-    };
-    edited.finish(print_json, json!({}))
+    let edited = Edited { model: &model, table: known.table, of: model.len(), labels: &labels };
+    edited.finish(&Target { output: &args.output, write: args.write, print_json }, json!({}))
 }
 
 fn per_object(args: &ConvertArgs, model: &Gaussians, known: &Catalogue, print_json: bool) -> Result<()> {
     let mut files = Vec::new();
     for &label in known.gaussians.keys() {
-        let name = known.table.as_ref().and_then(|table| table.entry(label)?.name.as_deref());
+        let name = known.name(label);
         let path = file_of(&args.output, label, name);
-        let of = |row: usize| model.labels.as_ref().map_or(UNLABELLED, |labels| labels[row]);
-        let part = model.filtered(|row| of(row) == label);
+        let part = model.filtered(|row| model.label(row) == label);
         let names = known.table.as_ref().map(|table| keep(table, |id| id == label));
         let left_out = export_model(&path, &part, names.as_ref(), args.write.options())?;
         files.push((path, label, name, part.len() as u64 - left_out));

@@ -53,6 +53,36 @@ pub struct EditArgs {
     pub json: JsonFlag,
 }
 
+impl EditArgs {
+    /// Returns where the result goes.
+    pub(crate) fn target(&self, context: &Context) -> Target<'_> {
+        Target { output: &self.output, write: self.write, print_json: wants_json(context, &self.json) }
+    }
+
+    /// Writes and prints the result of an edit that leaves the labels alone. `of` is the number of Gaussians before.
+    pub(crate) fn finish(
+        &self,
+        context: &Context,
+        (model, known): (&Gaussians, Catalogue),
+        of: usize,
+        more: serde_json::Value,
+    ) -> Result<()> {
+        let labels: BTreeSet<u32> = model.labels.iter().flatten().copied().collect();
+        Edited { model, table: known.table, of, labels: &labels }.finish(&self.target(context), more)
+    }
+}
+
+/// Where the result of an edit goes.
+#[derive(Clone, Copy)]
+pub(crate) struct Target<'a> {
+    /// File to write.
+    pub output: &'a Path,
+    /// How it is written.
+    pub write: WriteArgs,
+    /// The summary is printed as JSON.
+    pub print_json: bool,
+}
+
 /// Which Gaussians an object consists of.
 #[derive(Args, Clone, Copy, Debug)]
 pub struct MinConfidenceArg {
@@ -85,14 +115,10 @@ pub(crate) fn open(model: &Path, table: &TableArg) -> Result<(Gaussians, Catalog
 
 /// The result of an edit.
 pub(crate) struct Edited<'a> {
-    /// File to write.
-    pub output: &'a Path,
     /// The model.
     pub model: &'a Gaussians,
     /// The names of its labels, if the source has names.
     pub table: Option<LabelTable>,
-    /// How it is written.
-    pub write: WriteArgs,
     /// Number of Gaussians of the source.
     pub of: usize,
     /// Labels that were chosen or made.
@@ -101,14 +127,14 @@ pub(crate) struct Edited<'a> {
 
 impl Edited<'_> {
     /// Writes model and table and prints a summary. `more` holds further fields of the JSON.
-    pub(crate) fn finish(&self, print_json: bool, more: serde_json::Value) -> Result<()> {
-        let left_out = export_model(self.output, self.model, self.table.as_ref(), self.write.options())?;
-        let beside = LabelTable::beside(self.output);
+    pub(crate) fn finish(&self, to: &Target, more: serde_json::Value) -> Result<()> {
+        let left_out = export_model(to.output, self.model, self.table.as_ref(), to.write.options())?;
+        let beside = LabelTable::beside(to.output);
         let written = self.model.len() as u64 - left_out;
-        if print_json {
+        if to.print_json {
             let mut result = json!({
                 "schema_version": 1,
-                "output": self.output.display().to_string(),
+                "output": to.output.display().to_string(),
                 "label_table": self.table.as_ref().filter(|_| beside.is_file()).map(|_| beside.display().to_string()),
                 "labels": self.labels,
                 "gaussians": written,
@@ -119,7 +145,7 @@ impl Edited<'_> {
             }
             return stdout::print_json(&result);
         }
-        stdout::print(&format!("{}: {written} of {} Gaussians\n", self.output.display(), self.of))
+        stdout::print(&format!("{}: {written} of {} Gaussians\n", to.output.display(), self.of))
     }
 }
 

@@ -1,7 +1,7 @@
 //! `labelgs merge`.
 
 use super::context::Context;
-use super::labelled::{EditArgs, Edited, open, wants_json};
+use super::labelled::{EditArgs, Edited, open};
 use super::values::{Picks, label, picks};
 use crate::Result;
 use crate::edit::merge::{Merged, merge};
@@ -32,13 +32,6 @@ pub(crate) fn run(args: &MergeArgs, context: &Context) -> Result<()> {
     let labels = known.resolve("--labels", &args.labels.0)?;
     let Merged { model: merged, table, into } = merge(&model, &known, &labels, args.into, args.name.as_deref())?;
     let into = BTreeSet::from([into]);
-    let edited = Edited {
-        output: &args.edit.output,
-        model: &merged,
-        table,
-        write: args.edit.write,
-        of: model.len(),
-        labels: &into,
-    };
-    edited.finish(wants_json(context, &args.edit.json), json!({ "merged": labels }))
+    let edited = Edited { model: &merged, table, of: model.len(), labels: &into };
+    edited.finish(&args.edit.target(context), json!({ "merged": labels }))
 }

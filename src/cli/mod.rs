@@ -33,6 +33,7 @@ pub(crate) mod report;
 pub(crate) mod scene;
 pub(crate) mod select;
 pub(crate) mod selftest;
+mod shell;
 pub(crate) mod split_components;
 pub(crate) mod status;
 pub(crate) mod stdout;

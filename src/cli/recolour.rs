@@ -1,7 +1,7 @@
 //! `labelgs recolour`.
 
 use super::context::Context;
-use super::labelled::{Edited, open, wants_json};
+use super::labelled::{Edited, open};
 use super::select::SelectArgs;
 use super::values::{colour, share};
 use crate::Result;
@@ -30,8 +30,7 @@ pub(crate) fn run(args: &RecolourArgs, context: &Context) -> Result<()> {
     let labels = select.choice.labels(&select.model, &model, &known, context)?;
     let painted = recolour(&model, &labels, args.colour, args.mix);
     let table = known.table.clone();
-    let (output, write) = (&select.output, select.write);
-    let edited = Edited { output, model: &painted, table, write, of: model.len(), labels: &labels };
+    let edited = Edited { model: &painted, table, of: model.len(), labels: &labels };
     let count: u64 = labels.iter().filter_map(|label| known.gaussians.get(label)).sum();
-    edited.finish(wants_json(context, &select.json), json!({ "recoloured": count }))
+    edited.finish(&select.target(context), json!({ "recoloured": count }))
 }

@@ -1,7 +1,7 @@
 //! `labelgs relabel`.
 
 use super::context::Context;
-use super::labelled::{EditArgs, Edited, open, wants_json};
+use super::labelled::{EditArgs, Edited, open};
 use super::values::{Renumbering, renumbering};
 use crate::Result;
 use crate::edit::change::relabel;
@@ -27,12 +27,10 @@ pub(crate) fn run(args: &RelabelArgs, context: &Context) -> Result<()> {
     let map = &args.map.0;
     known.check("--map", &map.keys().copied().collect())?;
     let edited = Edited {
-        output: &args.edit.output,
         model: &relabel(&model, map),
         table: known.table.as_ref().map(|table| renumber(table, map)),
-        write: args.edit.write,
         of: model.len(),
         labels: &map.values().copied().collect(),
     };
-    edited.finish(wants_json(context, &args.edit.json), json!({ "map": map }))
+    edited.finish(&args.edit.target(context), json!({ "map": map }))
 }

@@ -3,7 +3,7 @@
 use super::args::{JsonFlag, SceneArgs};
 use super::choose::ChooseArgs;
 use super::context::Context;
-use super::labelled::{Edited, MinConfidenceArg, open, wants_json};
+use super::labelled::{Edited, MinConfidenceArg, Target, open, wants_json};
 use super::output::WriteArgs;
 use super::scene::{near_plane, open_gpu, open_scene};
 use super::values::{distance, share};
@@ -39,6 +39,13 @@ pub struct SelectArgs {
     /// JSON.
     #[command(flatten)]
     pub json: JsonFlag,
+}
+
+impl SelectArgs {
+    /// Returns where the result goes.
+    pub(crate) fn target(&self, context: &Context) -> Target<'_> {
+        Target { output: &self.output, write: self.write, print_json: wants_json(context, &self.json) }
+    }
 }
 
 /// `labelgs remove`.
@@ -97,14 +104,12 @@ pub(crate) fn run_extract(args: &ExtractArgs, context: &Context) -> Result<()> {
     let whole = args.sure.extract(&model, &listed(&labels))?;
     let part = if args.drop_specks { without_specks(&whole, args.grouping.grouping())? } else { whole.clone() };
     let edited = Edited {
-        output: &select.output,
         model: &part,
         table: known.table.as_ref().map(|table| keep(table, |id| labels.contains(&id))),
-        write: select.write,
         of: model.len(),
         labels: &labels,
     };
-    edited.finish(wants_json(context, &select.json), json!({ "specks": whole.len() - part.len() }))
+    edited.finish(&select.target(context), json!({ "specks": whole.len() - part.len() }))
 }
 
 /// Writes the Gaussians of all other labels.
@@ -122,14 +127,12 @@ pub(crate) fn run_remove(args: &RemoveArgs, context: &Context) -> Result<()> {
         }
     };
     let edited = Edited {
-        output: &select.output,
         model: &part,
         table: known.table.as_ref().map(|table| keep(table, |id| !labels.contains(&id))),
-        write: select.write,
         of: model.len(),
         labels: &labels,
     };
-    edited.finish(wants_json(context, &select.json), more)
+    edited.finish(&select.target(context), more)
 }
 
 /// Removes labels and closes their place by what the training views of a scene show.

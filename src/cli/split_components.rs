@@ -1,7 +1,7 @@
 //! `labelgs split-components`.
 
 use super::context::Context;
-use super::labelled::{EditArgs, Edited, open, wants_json};
+use super::labelled::{EditArgs, Edited, open};
 use super::select::GroupingArgs;
 use super::values::{Picks, picks};
 use crate::Result;
@@ -37,12 +37,10 @@ pub(crate) fn run(args: &SplitArgs, context: &Context) -> Result<()> {
         tracing::info!("{}: {} parts: {ids:?}", known.title(label), ids.len());
     }
     let edited = Edited {
-        output: &args.edit.output,
         model: &found.model,
         table: known.table.as_ref().map(|table| split(table, &found.ids)),
-        write: args.edit.write,
         of: model.len(),
         labels: &found.ids.values().flatten().copied().collect(),
     };
-    edited.finish(wants_json(context, &args.edit.json), json!({ "parts": found.ids, "specks": found.specks }))
+    edited.finish(&args.edit.target(context), json!({ "parts": found.ids, "specks": found.specks }))
 }

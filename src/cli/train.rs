@@ -3,6 +3,7 @@
 use super::context::Context;
 use super::log::{self, Progress};
 use super::scene::open_gpu;
+use super::shell::typed;
 use super::train_args::TrainArgs;
 use super::view::Typed;
 use super::{interrupt, stdout};
@@ -19,21 +20,6 @@ pub(crate) fn run(args: &TrainArgs, context: &Context) -> Result<()> {
         return stdout::print_json(&summary.to_json());
     }
     stdout::print(&sentence(&summary))
-}
-
-/// Returns the command line as a shell would read it.
-fn typed() -> String {
-    let plain = |c: char| c.is_ascii_alphanumeric() || "-_./=:,+@%".contains(c);
-    let words = std::env::args_os().enumerate().map(|(index, word)| {
-        let word = word.to_string_lossy();
-        match index {
-            // Where the program lies tells nothing.
-            0 => "labelgs".to_owned(),
-            _ if !word.is_empty() && word.chars().all(plain) => word.into_owned(),
-            _ => format!("'{}'", word.replace('\'', "'\\''")),
-        }
-    });
-    words.collect::<Vec<_>>().join(" ")
 }
 
 /// Trains with progress on the terminal. A signal ends the run after it saved its state.

@@ -1,14 +1,13 @@
 //! `labelgs transform`.
 
 use super::context::Context;
-use super::labelled::{EditArgs, Edited, open, wants_json};
+use super::labelled::{EditArgs, open};
 use super::values::{direction, factor, place};
 use crate::Result;
 use crate::edit::turn::Transform;
 use clap::Args;
 use glam::{DQuat, DVec3};
 use serde_json::json;
-use std::collections::BTreeSet;
 
 /// `labelgs transform`.
 #[derive(Args, Clone, Debug)]
@@ -35,16 +34,7 @@ pub(crate) fn run(args: &TransformArgs, context: &Context) -> Result<()> {
     let turn = args.up.map_or(Ok(DQuat::IDENTITY), Transform::upright)?;
     let change = Transform { origin: args.origin.unwrap_or_default(), turn, scale: args.scale.unwrap_or(1.0) };
     let moved = change.apply(&model)?;
-    let labels: BTreeSet<u32> = moved.labels.iter().flatten().copied().collect();
-    let edited = Edited {
-        output: &args.edit.output,
-        model: &moved,
-        table: known.table.clone(),
-        write: args.edit.write,
-        of: model.len(),
-        labels: &labels,
-    };
     let turn = [turn.w, turn.x, turn.y, turn.z];
     let more = json!({ "origin": change.origin.to_array(), "turn_wxyz": turn, "scale": change.scale });
-    edited.finish(wants_json(context, &args.edit.json), more)
+    args.edit.finish(context, (&moved, known), model.len(), more)
 }

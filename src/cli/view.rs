@@ -4,6 +4,7 @@ use super::args::SceneArgs;
 use super::context::Context;
 use super::labelled::{TableArg, open};
 use super::scene::{near_plane, open_gpu, open_scene};
+use super::shell::quoted;
 use super::stdout;
 use super::values::{near, share};
 use crate::Result;
@@ -151,27 +152,4 @@ impl Words for Typed {
 
 fn path(path: &Path) -> String {
     quoted(&path.display().to_string())
-}
-
-/// Quotes a word for a POSIX shell where that is needed.
-fn quoted(word: &str) -> String {
-    let is_plain = |c: char| c.is_ascii_alphanumeric() || "/._-+:@%=,".contains(c);
-    if !word.is_empty() && word.chars().all(is_plain) {
-        return word.to_owned();
-    }
-    format!("'{}'", word.replace('\'', r"'\''"))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn words_of_any_kind_are_quoted() {
-        for (word, expected) in
-            [("cup", "cup"), ("a b", "'a b'"), ("", "''"), ("it's", r"'it'\''s'"), ("$(x)", "'$(x)'")]
-        {
-            assert_eq!(quoted(word), expected);
-        }
-    }
 }

@@ -71,7 +71,7 @@ impl Catalogue {
 
     /// Returns the name of a label, if it has one.
     pub fn name(&self, id: u32) -> Option<&str> {
-        self.table.as_ref()?.entry(id)?.name.as_deref()
+        self.table.as_ref()?.name(id)
     }
 
     /// Returns the id and, if there is one, the name: `3 cup`.

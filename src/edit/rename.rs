@@ -38,7 +38,7 @@ pub fn split(table: &LabelTable, ids: &BTreeMap<u32, Vec<u32>>) -> LabelTable {
     let mut names: BTreeSet<String> = table.labels.iter().filter_map(|entry| entry.name.clone()).collect();
     let mut labels = table.labels.clone();
     for (&label, parts) in ids {
-        let name = table.entry(label).and_then(|entry| entry.name.clone());
+        let name = table.name(label).map(str::to_owned);
         let mut free = (2_u32..).filter_map(|number| {
             let name = format!("{} {number}", name.as_deref()?);
             names.insert(name.clone()).then_some(name)

@@ -1,7 +1,7 @@
 //! Lists the labels of a model, and makes models of some of them.
 
 use super::catalogue::Catalogue;
-use crate::scene::{Gaussians, UNLABELLED};
+use crate::scene::Gaussians;
 use crate::{Error, Result};
 use glam::DVec3;
 use serde::Serialize;
@@ -40,7 +40,7 @@ pub fn summarise(model: &Gaussians) -> Vec<LabelSummary> {
     let mut sums: BTreeMap<u32, Sum> = BTreeMap::new();
     for row in 0..model.len() {
         let start = Sum { count: 0, mass: 0.0, min: DVec3::INFINITY, max: DVec3::NEG_INFINITY, weighted: DVec3::ZERO };
-        let sum = sums.entry(label_of(model, row)).or_insert(start);
+        let sum = sums.entry(model.label(row)).or_insert(start);
         let mean = model.world(row);
         // Never 0, so that invisible Gaussians have a centre too.
         let opacity = (1.0 / (1.0 + (-f64::from(model.opacities[row])).exp())).max(1e-200);
@@ -61,18 +61,28 @@ pub fn summarise(model: &Gaussians) -> Vec<LabelSummary> {
     sums.into_iter().map(row).collect()
 }
 
+/// Returns the mean confidence of each label that occurs; nothing without confidences.
+pub(crate) fn mean_confidence(model: &Gaussians) -> BTreeMap<u32, f64> {
+    let mut sums: BTreeMap<u32, (f64, u64)> = BTreeMap::new();
+    for (row, &share) in model.label_confidence.iter().flatten().enumerate() {
+        let (sum, count) = sums.entry(model.label(row)).or_default();
+        (*sum, *count) = (*sum + f64::from(share), *count + 1);
+    }
+    sums.into_iter().map(|(label, (sum, count))| (label, sum / count as f64)).collect()
+}
+
 /// Returns the Gaussians of these labels, in order, possibly none. Leaves out Gaussians with a known confidence below
 /// `least` ([`MIN_LABEL_CONFIDENCE`]). A label that does not occur is an error, which lists the known labels.
 pub fn extract(model: &Gaussians, labels: &[u32], least: f32) -> Result<Gaussians> {
     let wanted = check_labels(model, labels)?;
     let sure = |row: usize| model.label_confidence.as_ref().is_none_or(|shares| shares[row] >= least);
-    Ok(model.filtered(|row| wanted.contains(&label_of(model, row)) && sure(row)))
+    Ok(model.filtered(|row| wanted.contains(&model.label(row)) && sure(row)))
 }
 
 /// Returns the Gaussians of all other labels, in order. Errors as in [`extract`], or if no Gaussian remains.
 pub fn remove(model: &Gaussians, labels: &[u32]) -> Result<Gaussians> {
     let wanted = check_labels(model, labels)?;
-    let rest = model.filtered(|row| !wanted.contains(&label_of(model, row)));
+    let rest = model.filtered(|row| !wanted.contains(&model.label(row)));
     if rest.is_empty() {
         return Err(Error::usage("labels", "names every label of the model; no Gaussian would be left"));
     }
@@ -83,9 +93,4 @@ fn check_labels(model: &Gaussians, labels: &[u32]) -> Result<BTreeSet<u32>> {
     let wanted = labels.iter().copied().collect();
     Catalogue::new(model, None).check("labels", &wanted)?;
     Ok(wanted)
-}
-
-/// Returns the label of a row; 0 in a model without labels.
-fn label_of(model: &Gaussians, row: usize) -> u32 {
-    model.labels.as_ref().map_or(UNLABELLED, |labels| labels[row])
 }

@@ -113,6 +113,11 @@ impl LabelTable {
         self.labels.binary_search_by_key(&id, |entry| entry.id).ok().map(|at| &self.labels[at])
     }
 
+    /// Returns the name of an id, if it has one.
+    pub fn name(&self, id: u32) -> Option<&str> {
+        self.entry(id)?.name.as_deref()
+    }
+
     /// Returns the id with this name, ignoring case.
     pub fn by_name(&self, name: &str) -> Option<u32> {
         let found = |entry: &&LabelEntry| entry.name.as_ref().is_some_and(|own| own.eq_ignore_ascii_case(name));

@@ -2,6 +2,7 @@
 
 use crate::error::{Error, Result};
 use crate::io::image::jpeg_rgb8;
+use crate::io::resample::bounded_size;
 use crate::scene::Photo;
 use crate::scene::colour::to_byte;
 use image::imageops::{FilterType, resize};
@@ -41,11 +42,10 @@ pub(crate) fn encoded((width, height): (u32, u32), pixels: &[[u8; 3]], kind: Kin
     let bytes = bytemuck::cast_slice(pixels).to_vec();
     let mut picture =
         RgbImage::from_raw(width, height, bytes).ok_or_else(|| broken("has too few pixels".to_owned()))?;
-    let longest = width.max(height);
-    if longest > LONGEST {
-        let side = |side: u32| (u64::from(side) * u64::from(LONGEST) / u64::from(longest)).max(1) as u32;
+    let small = bounded_size((width, height), Some(LONGEST));
+    if small != (width, height) {
         let filter = if kind == Kind::Flat { FilterType::Nearest } else { FilterType::Triangle };
-        picture = resize(&picture, side(width), side(height), filter);
+        picture = resize(&picture, small.0, small.1, filter);
     }
     match kind {
         Kind::Smooth => jpeg_rgb8(picture.dimensions(), picture.as_raw().as_chunks().0, QUALITY),

@@ -1,11 +1,11 @@
 //! The objects of a model, as a run reports them.
 
 use crate::edit::catalogue::Catalogue;
+use crate::edit::select::mean_confidence;
 use crate::eval::scores::{ObjectScores, Scores};
 use crate::io::label_table::LabelTable;
 use crate::scene::{Gaussians, UNLABELLED};
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeMap;
 
 /// An object of a model.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -31,13 +31,10 @@ pub struct ObjectSummary {
 
 /// Returns the objects of a model, and of the masks that it was scored with.
 pub(super) fn of(model: &Gaussians, names: Option<&LabelTable>, scores: Option<&Scores>) -> Vec<ObjectSummary> {
-    let Some(labels) = &model.labels else { return Vec::new() };
-    let catalogue = Catalogue::new(model, names.cloned());
-    let mut sure: BTreeMap<u32, f64> = BTreeMap::new();
-    if let Some(confidence) = &model.label_confidence {
-        let pairs = labels.iter().zip(confidence);
-        pairs.for_each(|(&label, &share)| *sure.entry(label).or_default() += f64::from(share));
+    if model.labels.is_none() {
+        return Vec::new();
     }
+    let (catalogue, confidence) = (Catalogue::new(model, names.cloned()), mean_confidence(model));
     let scored = scores.map(|scores| scores.objects.clone()).unwrap_or_default();
     let mut ids: Vec<u32> = catalogue.gaussians.keys().chain(scored.keys()).copied().collect();
     ids.sort_unstable();
@@ -50,7 +47,7 @@ pub(super) fn of(model: &Gaussians, names: Option<&LabelTable>, scores: Option<&
             id,
             name: catalogue.name(id).map(str::to_owned),
             gaussians,
-            confidence: sure.get(&id).map(|sum| sum / gaussians.max(1) as f64),
+            confidence: confidence.get(&id).copied(),
             iou: iou(&of_object),
             psnr: of_object.object_psnr,
             worst_view: worst.as_ref().map(|worst| worst.0.clone()),

@@ -1,5 +1,6 @@
 //! The model on the host: a structure of arrays, one row per Gaussian.
 
+use super::UNLABELLED;
 use crate::error::{Error, Result};
 use glam::DVec3;
 
@@ -38,6 +39,11 @@ impl Gaussians {
     /// Returns the world position of a Gaussian.
     pub fn world(&self, row: usize) -> DVec3 {
         self.origin + DVec3::from_array(self.means[row].map(f64::from))
+    }
+
+    /// Returns the label of a Gaussian; 0 in a model without labels.
+    pub fn label(&self, row: usize) -> u32 {
+        self.labels.as_ref().map_or(UNLABELLED, |labels| labels[row])
     }
 
     /// Returns true without any Gaussian.

@@ -9,7 +9,7 @@ use crate::edit::rename::keep;
 use crate::edit::select::{MIN_LABEL_CONFIDENCE, extract, remove};
 use crate::error::{Error, Result};
 use crate::io::label_table::LabelTable;
-use crate::io::model::write_model;
+use crate::io::model::{WriteOptions, export_model};
 use crate::io::{read, run_folder};
 use crate::scene::Gaussians;
 use serde_json::{Value, json};
@@ -113,7 +113,7 @@ impl<'a> Work<'a> {
                     ));
                 }
                 let names = table.map(|table| keep(table, |id| labels.contains(&id)));
-                put(&output, &part, names.as_ref())?;
+                export_model(&output, &part, names.as_ref(), WriteOptions::default())?;
                 self.next += 1;
                 return Ok(format!("{} Gaussians are in {}. The command was: {command}", part.len(), output.display()));
             }
@@ -172,7 +172,7 @@ impl<'a> Work<'a> {
             return Err(Error::usage("write", "nothing has changed; the model is in its file"));
         }
         let path = self.present().to_owned();
-        put(&path, &self.model, self.table.as_ref())?;
+        export_model(&path, &self.model, self.table.as_ref(), WriteOptions::default())?;
         let text = format!("Saved as {}.", path.display());
         self.written = Some(path);
         Ok(text)
@@ -202,14 +202,8 @@ fn labels_of(edit: &Edit) -> &[u32] {
     }
 }
 
-/// Writes a model and its names, as the commands do.
-fn put(path: &Path, model: &Gaussians, table: Option<&LabelTable>) -> Result<()> {
-    write_model(path, model)?;
-    LabelTable::put(table, &LabelTable::beside(path))
-}
-
 fn rows_of(model: &Gaussians, labels: &BTreeSet<u32>) -> Vec<usize> {
-    let has = |row: &usize| labels.contains(&model.labels.as_ref().map_or(0, |all| all[*row]));
+    let has = |row: &usize| labels.contains(&model.label(*row));
     (0..model.len()).filter(has).collect()
 }
 

@@ -101,14 +101,16 @@ pub(super) fn scene(
 
 /// Returns up, the middle and a distance to see a model from that has no views: half of it is in the middle.
 fn frame_of(model: &Gaussians) -> (DVec3, DVec3, f64) {
-    let quantile = |axis: usize, share: f64| {
+    let quantiles = [0, 1, 2].map(|axis| {
         let mut values: Vec<f32> = model.means.iter().map(|mean| mean[axis]).filter(|v| v.is_finite()).collect();
         values.sort_by(f32::total_cmp);
-        let at = ((values.len().max(1) - 1) as f64 * share) as usize;
-        values.get(at).map_or(0.0, |&value| f64::from(value))
-    };
-    let middle = DVec3::from_array([0, 1, 2].map(|axis| quantile(axis, 0.5)));
-    let size = [0, 1, 2].map(|axis| quantile(axis, 0.9) - quantile(axis, 0.1)).into_iter().fold(1e-3, f64::max);
+        [0.1, 0.5, 0.9].map(|share| {
+            let at = ((values.len().max(1) - 1) as f64 * share) as usize;
+            values.get(at).map_or(0.0, |&value| f64::from(value))
+        })
+    });
+    let middle = DVec3::from_array(quantiles.map(|[_, middle, _]| middle));
+    let size = quantiles.map(|[low, _, high]| high - low).into_iter().fold(1e-3, f64::max);
     // Most captures have the axes of COLMAP, y down.
     (DVec3::NEG_Y, model.origin + middle, 1.5 * size)
 }

@@ -1,6 +1,6 @@
 //! Rows of the label panel, and a history of steps of bounded length.
 
-use crate::edit::select::summarise;
+use crate::edit::select::{LabelSummary, mean_confidence, summarise};
 use crate::io::label_table::LabelTable;
 use crate::scene::Gaussians;
 use crate::scene::labels::label_colour;
@@ -12,20 +12,14 @@ const ROWS_MAX: usize = 4096;
 
 /// Returns the rows for the labels of a finished model.
 pub(super) fn of_model(model: &Gaussians, table: Option<&LabelTable>) -> Value {
-    let mut sums: BTreeMap<u32, (f64, u64)> = BTreeMap::new();
-    if let (Some(labels), Some(shares)) = (&model.labels, &model.label_confidence) {
-        for (&label, &share) in labels.iter().zip(shares) {
-            let sum = sums.entry(label).or_default();
-            *sum = (sum.0 + f64::from(share), sum.1 + 1);
-        }
-    }
-    let row = |summary: &crate::edit::select::LabelSummary| {
+    let confidence = mean_confidence(model);
+    let row = |summary: &LabelSummary| {
         json!({
             "id": summary.label,
-            "name": name(table, summary.label),
+            "name": table.and_then(|table| table.name(summary.label)),
             "colour": label_colour(summary.label),
             "count": summary.count,
-            "confidence": sums.get(&summary.label).map(|(sum, count)| sum / *count as f64),
+            "confidence": confidence.get(&summary.label),
             "min": summary.min,
             "max": summary.max,
         })
@@ -42,16 +36,12 @@ pub(super) fn of_training(labels: &[u32], table: Option<&LabelTable>) -> Value {
     table.iter().flat_map(|table| &table.labels).for_each(|entry| {
         counts.entry(entry.id).or_default();
     });
-    let row = |(&id, &count): (&u32, &u64)| json!({ "id": id, "name": name(table, id), "colour": label_colour(id), "count": count });
+    let row = |(&id, &count): (&u32, &u64)| json!({ "id": id, "name": table.and_then(|table| table.name(id)), "colour": label_colour(id), "count": count });
     described(counts.iter().take(ROWS_MAX).map(row).collect(), counts.len())
 }
 
 fn described(rows: Vec<Value>, all: usize) -> Value {
     json!({ "kind": "labels", "rows": rows, "all": all })
-}
-
-fn name(table: Option<&LabelTable>, id: u32) -> Option<&str> {
-    table?.entry(id)?.name.as_deref()
 }
 
 /// Most points of a curve.

@@ -4,8 +4,9 @@ use crate::error::{Error, Result};
 use crate::eval::metrics::{label_iou, mean, psnr};
 use crate::io::camera_json::CameraFile;
 use crate::io::image::{jpeg_rgb8, png_rgb8};
+use crate::io::resample::{bounded_size, shrink_photo};
 use crate::render::Rendered;
-use crate::scene::{Camera, Dataset, Photo, View};
+use crate::scene::{Camera, Dataset, View};
 use glam::{DMat3, DVec3};
 use serde_json::{Value, json};
 
@@ -88,28 +89,10 @@ impl Views {
         if !is_small {
             return Some(("image/png", png_rgb8(size, &photo.rgb()).ok()?));
         }
-        let (small, pixels) = shrunk(photo);
+        let small = bounded_size(size, Some(THUMB));
+        let pixels = shrink_photo(photo, small.0, small.1).rgb();
         Some(("image/jpeg", jpeg_rgb8(small, &pixels, THUMB_QUALITY).ok()?))
     }
-}
-
-/// Averages blocks of a photo.
-fn shrunk(photo: &Photo) -> ((u32, u32), Vec<[u8; 3]>) {
-    let block = photo.width.max(photo.height).div_ceil(THUMB).max(1);
-    let (width, height) = ((photo.width / block).max(1), (photo.height / block).max(1));
-    let pixel = |index: u32| {
-        let (left, top) = (index % width * block, index / width * block);
-        let (mut sums, mut count) = ([0_u32; 3], 0);
-        for y in top..(top + block).min(photo.height) {
-            for x in left..(left + block).min(photo.width) {
-                let rgba = photo.rgba[(y * photo.width + x) as usize];
-                (0..3).for_each(|c| sums[c] += u32::from(rgba[c]));
-                count += 1;
-            }
-        }
-        sums.map(|sum| (sum / count.max(1)) as u8)
-    };
-    ((width, height), (0..width * height).map(pixel).collect())
 }
 
 impl Score {

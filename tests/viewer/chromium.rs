@@ -1,8 +1,7 @@
 //! Debian's `chromium`, without a window, over its DevTools protocol.
 
-use super::server::PATIENCE;
+use super::server::{PATIENCE, address_of};
 use serde_json::{Value, json};
-use std::io::{BufRead, BufReader};
 use std::net::TcpStream;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
@@ -56,16 +55,7 @@ impl Browser {
                 return None;
             }
         };
-        let mut lines = BufReader::new(child.stderr.take().expect("a pipe"));
-        let mut said = String::new();
-        let address = loop {
-            let before = said.len();
-            assert!(lines.read_line(&mut said).expect("a line") > 0, "chromium ended: {said}");
-            if let Some(at) = said[before..].find("ws://") {
-                break said[before + at..].trim().to_owned();
-            }
-        };
-        std::thread::spawn(move || std::io::copy(&mut lines, &mut std::io::sink()));
+        let address = address_of(&mut child, "ws://");
         let (socket, _) = tungstenite::connect(address).expect("a connection");
         if let MaybeTlsStream::Plain(stream) = socket.get_ref() {
             stream.set_read_timeout(Some(PATIENCE)).expect("a time");

@@ -141,16 +141,7 @@ impl Server {
     pub fn train(mut command: Command) -> Self {
         command.stdout(Stdio::null()).stderr(Stdio::piped());
         let mut child = command.spawn().expect("it starts");
-        let mut lines = BufReader::new(child.stderr.take().expect("a pipe"));
-        let mut said = String::new();
-        let address = loop {
-            let before = said.len();
-            assert!(lines.read_line(&mut said).expect("a line") > 0, "no address: {said}");
-            if let Some(at) = said[before..].find("http://") {
-                break said[before + at..].trim().to_owned();
-            }
-        };
-        std::thread::spawn(move || std::io::copy(&mut lines, &mut std::io::sink()));
+        let address = address_of(&mut child, "http://");
         Self { child, address }
     }
 
@@ -361,4 +352,19 @@ fn parse(bytes: &[u8]) -> Frame {
     }
     assert_eq!(at, bytes.len(), "nothing is left over");
     Frame { seq: word(1), step: word(2), size: (word(3), word(4)), exact: word(6) & 1 == 1, pictures }
+}
+
+/// The address that a program says on standard error. What it says later is dropped.
+pub fn address_of(child: &mut Child, scheme: &str) -> String {
+    let mut lines = BufReader::new(child.stderr.take().expect("a pipe"));
+    let mut said = String::new();
+    let address = loop {
+        let before = said.len();
+        assert!(lines.read_line(&mut said).expect("a line") > 0, "no address: {said}");
+        if let Some(at) = said[before..].find(scheme) {
+            break said[before + at..].trim().to_owned();
+        }
+    };
+    std::thread::spawn(move || std::io::copy(&mut lines, &mut std::io::sink()));
+    address
 }

@@ -94,7 +94,7 @@ struct Place {
 impl Place {
     /// Finds the place of a label; `None` if no view shows it.
     fn new(model: &Gaussians, label: u32, sights: &[Sight]) -> Result<Option<Self>> {
-        let of_label = |row: &usize| model.labels.as_ref().map_or(0, |labels| labels[*row]) == label;
+        let of_label = |row: &usize| model.label(*row) == label;
         let is_sure = |row: &usize| {
             let shares = model.label_confidence.as_ref();
             model.opacities[*row] > 0.0 && shares.is_none_or(|shares| shares[*row] >= MIN_LABEL_CONFIDENCE)

@@ -19,8 +19,12 @@ impl HalfTurn {
 
     /// Turns the coefficients above degree 0 along: each basis function is even or odd in each axis.
     pub(super) fn rest(self, rest: &mut [[f32; 3]]) {
+        rest.iter_mut().zip(self.signs()).for_each(|(triple, sign)| *triple = triple.map(|value| sign * value));
+    }
+
+    /// The factor of each coefficient above degree 0.
+    pub(super) fn signs(self) -> [f32; 15] {
         let Self([x, y, z]) = self;
-        let signs = [y, z, x, x * y, y * z, 1.0, x * z, 1.0, y, x * y * z, y, z, x, z, x];
-        rest.iter_mut().zip(signs).for_each(|(triple, sign)| *triple = triple.map(|value| sign * value));
+        [y, z, x, x * y, y * z, 1.0, x * z, 1.0, y, x * y * z, y, z, x, z, x]
     }
 }

@@ -88,8 +88,9 @@ impl Entry {
         matches!(self, Self::Preview(_) | Self::Scores(_))
     }
 
-    pub(super) fn seconds(&self) -> Option<f64> {
-        if let Self::Steps(steps) = self { Some(steps.seconds) } else { None }
+    /// Returns the numbers of a line about steps.
+    pub(crate) fn steps(&self) -> Option<&Steps> {
+        if let Self::Steps(steps) = self { Some(steps) } else { None }
     }
 }
 

@@ -171,6 +171,7 @@ fn kept(path: &Path, step: u32, last: u32) -> (u64, f64) {
     };
     let stays = |entry: &Entry| entry.step() < step || entry.step() == step && !(entry.is_of_end() && step == last);
     let count = history.entries.iter().take_while(|entry| stays(entry)).count();
-    let seconds = history.entries[..count].iter().filter_map(Entry::seconds).fold(0.0, f64::max);
+    let seconds =
+        history.entries[..count].iter().filter_map(Entry::steps).map(|steps| steps.seconds).fold(0.0, f64::max);
     (history.ends.get(count.wrapping_sub(1)).copied().unwrap_or(0), seconds)
 }

@@ -55,7 +55,7 @@ fn losses(runs: &[Ran]) -> Vec<Chart> {
 }
 
 fn is_labelled(entry: &Entry) -> bool {
-    matches!(entry, Entry::Steps(steps) if steps.label_loss != 0.0)
+    entry.steps().is_some_and(|steps| steps.label_loss != 0.0)
 }
 
 fn chart(title: &str, note: &str, series: Vec<Series>) -> Chart {
@@ -63,11 +63,8 @@ fn chart(title: &str, note: &str, series: Vec<Series>) -> Chart {
 }
 
 fn of_steps(run: &Ran, name: &str, colour: usize, value: impl Fn(&Steps) -> f64) -> Series {
-    let points = run.history.iter().filter_map(|entry| match entry {
-        Entry::Steps(steps) => Some((f64::from(steps.step), value(steps))),
-        _ => None,
-    });
-    Series::new(name, colour, points)
+    let lines = run.history.iter().filter_map(Entry::steps);
+    Series::new(name, colour, lines.map(|steps| (f64::from(steps.step), value(steps))))
 }
 
 fn steps_of(runs: &[Ran], value: impl Fn(&Steps) -> f64) -> Vec<Series> {

@@ -2,7 +2,7 @@
 
 use crate::error::{Error, Result};
 use crate::io::{read, run_folder};
-use crate::run::history::{self, Entry};
+use crate::run::history::{self, Entry, Steps};
 use crate::run::info::{self, Info};
 use crate::run::{ObjectSummary, Settings, summary};
 use serde::Deserialize;
@@ -107,11 +107,7 @@ impl Ran {
 
     /// Returns the seconds of the training, until its end or its last line.
     pub(super) fn seconds(&self) -> Option<f64> {
-        let last = self.history.iter().rev().find_map(|entry| match entry {
-            Entry::Steps(steps) => Some(steps.seconds),
-            _ => None,
-        });
-        self.info.ended.map(|ended| ended.seconds).or(last)
+        self.info.ended.map(|ended| ended.seconds).or(self.last().map(|steps| steps.seconds))
     }
 
     /// Returns the steps done.
@@ -122,11 +118,13 @@ impl Ran {
 
     /// Returns the number of Gaussians.
     pub(super) fn gaussians(&self) -> Option<u64> {
-        let last = self.history.iter().rev().find_map(|entry| match entry {
-            Entry::Steps(steps) => Some(steps.gaussians),
-            _ => None,
-        });
+        let last = self.last().map(|steps| steps.gaussians);
         self.metrics.as_ref().map(|metrics| metrics.gaussians).or(last).map(u64::from)
+    }
+
+    /// Returns the last line about steps.
+    fn last(&self) -> Option<&Steps> {
+        self.history.iter().rev().find_map(Entry::steps)
     }
 }
 

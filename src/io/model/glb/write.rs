@@ -131,12 +131,8 @@ fn attributes(export: &Export, to: &mut Binary) -> Value {
     add(SCALE.into(), to.attribute(false, rows().map(|row| g.scales[row].map(f32::exp))));
     add(OPACITY.into(), to.attribute(false, rows().map(|row| [sigmoid(g.opacities[row])])));
     add(harmonic(0, 0), to.attribute(false, rows().map(|row| g.sh0[row])));
-    for (index, name) in harmonics(g.sh_degree).enumerate() {
-        let value = |row: usize| {
-            let mut rest = export.rest(row).to_vec();
-            AXES.rest(&mut rest);
-            rest[index]
-        };
+    for ((index, name), sign) in harmonics(g.sh_degree).enumerate().zip(AXES.signs()) {
+        let value = |row: usize| export.rest(row)[index].map(|value| sign * value);
         add(name, to.attribute(false, rows().map(value)));
     }
     Value::Object(all)
@@ -144,10 +140,10 @@ fn attributes(export: &Export, to: &mut Binary) -> Value {
 
 /// The table of labels: a row for each id, with its name.
 fn table(ids: &[u32], names: Option<&LabelTable>, to: &mut Binary) -> Value {
-    let name = |id: u32| names.and_then(|names| names.entry(id)?.name.clone()).unwrap_or_default();
-    let texts: Vec<String> = ids.iter().map(|&id| name(id)).collect();
+    let name = |&id: &u32| names.and_then(|names| names.name(id)).unwrap_or_default();
+    let texts: Vec<&str> = ids.iter().map(name).collect();
     // A view may not be empty.
-    let text = texts.concat() + if texts.iter().all(String::is_empty) { " " } else { "" };
+    let text = texts.concat() + if texts.iter().all(|text| text.is_empty()) { " " } else { "" };
     let values = to.view(|bytes| bytes.extend(text.as_bytes()));
     let offsets = to.view(|bytes| {
         let ends = texts.iter().scan(0_u32, |end, text| {
