@@ -30,7 +30,7 @@ pub enum Order {
 /// `labelgs densify`.
 #[derive(Args, Clone, Debug)]
 pub struct DensifyArgs {
-    /// The model: a PLY, or the folder of a `labelgs train` run.
+    /// The model: a PLY, SPZ, GLB, SOG or .splat, or the folder of a `labelgs train` run.
     #[arg(value_name = "MODEL")]
     pub model: PathBuf,
     /// Scene with the photos.

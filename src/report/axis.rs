@@ -29,7 +29,9 @@ impl Axis {
             (first, last)
         };
         let ticks: Vec<f64> = (first..=last).map(|tick| tick as f64 * step).collect();
-        let (low, high) = if is_rounded { (first as f64 * step, last as f64 * step) } else { (low, high) };
+        // A tick may lie beside its round number by a rounding error, and the values have to be on the axis.
+        let (low, high) =
+            if is_rounded { (low.min(first as f64 * step), high.max(last as f64 * step)) } else { (low, high) };
         let digits = (-step.log10().floor()).clamp(0.0, 12.0) as usize;
         Self { low, high, ticks, digits }
     }

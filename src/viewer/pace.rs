@@ -48,15 +48,20 @@ impl Pace {
 
     /// Returns the share of the full width and height for a moving picture that should take `target` seconds.
     pub(super) fn scale(&mut self, full_pixels: f64, target: f64) -> f64 {
-        let at = |level: i32| STEP.powi(-level);
-        let time = |level: i32| self.predict(full_pixels * at(level) * at(level));
+        let time = |level: i32| self.predict(full_pixels * side(level) * side(level));
         if time(self.level) > TOO_LONG * target {
             self.level = (self.level..LEVELS).find(|&level| time(level) <= target).unwrap_or(LEVELS);
         } else if self.level > 0 && time(self.level - 1) < SHORT * target {
             self.level -= 1;
         }
-        at(self.level)
+        side(self.level)
     }
+}
+
+/// Returns the share of the full width at a level. `powi` may differ in its last bit from one place of the program to
+/// another.
+fn side(level: i32) -> f64 {
+    (0..level).fold(1.0, |side, _| side / STEP)
 }
 
 /// The rate of the line to a client, and whether its moving pictures are worth a lossy compression.
@@ -154,7 +159,7 @@ mod tests {
             let late = &scales[100..];
             let changes = late.windows(2).filter(|pair| pair[0] != pair[1]).count();
             assert!(changes <= 2, "a {a}, b {b}: {changes} changes in {late:?}");
-            let (scale, floor) = (late[99], STEP.powi(-LEVELS));
+            let (scale, floor) = (late[99], side(LEVELS));
             let time = |scale: f64| a + b * scale * scale;
             assert!(time(scale) < 0.08 * 1.4 || scale == floor, "a {a}, b {b}: {scale}");
             assert!(scale == 1.0 || time(scale * STEP) > 0.08 * 0.7, "a {a}, b {b}: {scale} could be larger");

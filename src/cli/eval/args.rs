@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 /// `labelgs eval`.
 #[derive(Args, Clone, Debug)]
 pub struct EvalArgs {
-    /// The model: a PLY, or the folder of a `labelgs train` run.
+    /// The model: a PLY, SPZ, GLB, SOG or .splat, or the folder of a `labelgs train` run.
     #[arg(value_name = "MODEL")]
     pub model: PathBuf,
     /// Scene with the photos to compare with.
