@@ -6,8 +6,9 @@ use labelgs::internals::io::run_folder::Lock;
 use labelgs::internals::train::TrainState;
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
+use std::collections::BTreeSet;
 use std::os::unix::process::ExitStatusExt;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::{Child, Stdio};
 use std::time::{Duration, Instant};
 
@@ -77,6 +78,21 @@ fn kills_at_any_moment_cost_no_bit() {
     }
     println!("{killed} kills, {began} of them after a checkpoint; {ended} trainings came to their end between them");
     assert!(killed == kills && began > 0 && ended > 0);
+}
+
+#[test]
+fn leftovers_of_killed_runs_go_from_every_folder() {
+    let Some(_turn) = device() else { return };
+    let place = Place::new();
+    succeeded(&place.trained("out", &["--iterations", "4", "--preview-every", "2", "--checkpoint-every", "2"]));
+    let whole: BTreeSet<PathBuf> = files(&place.path("out")).into_iter().collect();
+    let folders: BTreeSet<&Path> = whole.iter().filter_map(|path| path.parent()).collect();
+    for folder in &folders {
+        // No process has this id.
+        std::fs::write(folder.join(".labelgs-4194305-abc.tmp"), "").expect("written");
+    }
+    succeeded(&place.trained("out", &["--resume"]));
+    assert_eq!(files(&place.path("out")).into_iter().collect::<BTreeSet<_>>(), whole, "{folders:?}");
 }
 
 #[cfg(unix)]

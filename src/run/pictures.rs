@@ -12,7 +12,7 @@ use crate::scene::labels::label_colours;
 use std::path::{Path, PathBuf};
 
 /// Folder of the copies.
-const FOLDER: &str = "report";
+pub(super) const FOLDER: &str = "report";
 /// Views that are kept.
 const VIEWS: usize = 6;
 /// Most bytes of all copies.

@@ -5,7 +5,7 @@ use super::history::{Recorder, Sums};
 use super::info::Info;
 use super::models::Models;
 use super::resume::{self, Record, Resumed, absolute};
-use super::{Inputs, Observer, OccluderFiles, Request, Run, Settings, Start, occluders};
+use super::{Inputs, Observer, OccluderFiles, Request, Run, Settings, Start, occluders, pictures};
 use crate::engine::Engine;
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
@@ -82,7 +82,8 @@ fn clear(out: &Path, settings: &Settings) -> Result<()> {
     }
     // A missing or unreadable folder needs no clearing.
     let models = io::read::folder(&out.join("point_cloud")).unwrap_or_default();
-    for folder in [out.to_owned(), checkpoints, out.join("preview")].into_iter().chain(models) {
+    let own = [out.to_owned(), checkpoints, out.join("preview"), out.join(pictures::FOLDER)];
+    for folder in own.into_iter().chain(models) {
         atomic::remove_stale(folder, Duration::ZERO);
     }
     Ok(())

@@ -248,13 +248,20 @@ impl Page {
         self.send(&json!({ "kind": "ack", "seq": seq }));
     }
 
-    /// The next frame, acknowledged by the caller. None if nothing comes in time.
+    /// The next frame, acknowledged by the caller. None if nothing comes in time, or the training is over.
     pub fn frame_within(&mut self, most: Duration) -> Option<Frame> {
         let end = Instant::now() + most;
         while Instant::now() < end {
             match self.next(end)? {
                 Message::Binary(bytes) => return Some(parse(&bytes)),
-                Message::Text(text) => self.texts.push(serde_json::from_str(&text).expect("JSON")),
+                Message::Text(text) => {
+                    let text: Value = serde_json::from_str(&text).expect("JSON");
+                    let is_over = text["kind"] == "over";
+                    self.texts.push(text);
+                    if is_over {
+                        return None;
+                    }
+                }
                 _ => {}
             }
         }
