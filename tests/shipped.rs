@@ -16,6 +16,7 @@ mod support {
 mod cli_engine; // commands with a device, from a made scene to pictures
 mod cli_kills; // killed exports leave whole files
 mod cli_resume; // killed, stopped and damaged runs resume to the same bits
+mod cli_reuse; // a trained model begins another training, or becomes simpler
 mod ignored; // the shipped program has no fault injection
 mod output; // files of rendered pictures
 #[path = "scheduler/plan/mod.rs"]

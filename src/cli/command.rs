@@ -21,6 +21,7 @@ use super::render::RenderArgs;
 use super::report::ReportArgs;
 use super::select::{ExtractArgs, RemoveArgs};
 use super::selftest::SelftestArgs;
+use super::simplify::SimplifyArgs;
 use super::split_components::SplitArgs;
 use super::synth::SynthArgs;
 use super::train_args::TrainArgs;
@@ -117,6 +118,11 @@ pub enum Command {
     ///
     /// Example: labelgs clean out --min-opacity 0.02 --max-gap 10 -o clean.ply
     Clean(CleanArgs),
+    /// Write a model with fewer Gaussians: neighbours of a label that the pictures can do without are merged. Prints what
+    /// that costs.
+    ///
+    /// Example: labelgs simplify out --scene scene --psnr-loss 0.2 -o small.ply
+    Simplify(SimplifyArgs),
     /// Write a model turned upright, scaled or moved.
     ///
     /// Example: labelgs transform out --up z --scale 0.5 --origin 0,0,1 -o upright.ply

@@ -2,7 +2,7 @@
 
 use super::args::GlobalArgs;
 use crate::gpu::{Gpu, MessageLog};
-use crate::io::model::ReadModel;
+use crate::run::models;
 use crate::scene::Gaussians;
 use crate::{Error, Result};
 use std::cell::RefCell;
@@ -46,13 +46,5 @@ impl Context {
 
 /// Reads a model, or the last model in the folder of a run, and logs the notes of the reader.
 pub fn open_model(path: &Path) -> Result<Gaussians> {
-    open_read(path).map(|read| read.gaussians)
-}
-
-/// Like [`open_model`], with the names in the file.
-pub(crate) fn open_read(path: &Path) -> Result<ReadModel> {
-    let path = &if path.is_dir() { crate::run::models::latest_model(path)? } else { path.to_owned() };
-    let read = crate::io::model::read_model(path)?;
-    read.notes.iter().for_each(|note| tracing::warn!("{}: {note}", path.display()));
-    Ok(read)
+    models::open(path).map(|read| read.gaussians)
 }

@@ -18,7 +18,7 @@ use std::path::{Path, PathBuf};
 /// `labelgs convert`.
 #[derive(Args, Clone, Debug)]
 pub struct ConvertArgs {
-    /// The model: a file that ends in .ply, .spz, .glb, .sog or .splat, or the folder of a `labelgs train` run.
+    /// The model: a file that ends in .ply, .spz, .glb, .sog, .splat or .html, or the folder of a `labelgs train` run.
     #[arg(value_name = "MODEL")]
     pub model: PathBuf,
     /// File to write; its ending is the format. Names of its labels go to OUT.labels.json beside it.
@@ -48,7 +48,7 @@ pub(crate) fn run(args: &ConvertArgs, context: &Context) -> Result<()> {
         return per_object(args, &model, &known, print_json);
     }
     let edited = Edited { model: &model, table: known.table, of: model.len(), labels: &labels };
-    edited.finish(&Target { output: &args.output, write: args.write, print_json }, json!({}))
+    edited.finish(&Target { model: &args.model, output: &args.output, write: args.write, print_json }, json!({}))
 }
 
 fn per_object(args: &ConvertArgs, model: &Gaussians, known: &Catalogue, print_json: bool) -> Result<()> {
@@ -58,7 +58,7 @@ fn per_object(args: &ConvertArgs, model: &Gaussians, known: &Catalogue, print_js
         let path = file_of(&args.output, label, name);
         let part = model.filtered(|row| model.label(row) == label);
         let names = known.table.as_ref().map(|table| keep(table, |id| id == label));
-        let left_out = export_model(&path, &part, names.as_ref(), args.write.options())?;
+        let left_out = export_model(&path, &part, names.as_ref(), args.write.options(&args.model)?)?;
         files.push((path, label, name, part.len() as u64 - left_out));
     }
     if print_json {

@@ -110,7 +110,7 @@ pub(crate) fn run(args: &LabelArgs, context: &Context) -> Result<()> {
     }
     drop(progress);
     let seconds = start.elapsed().as_secs_f64();
-    export_model(&args.output, &model, LabelTable::of_folder(&args.masks)?.as_ref(), args.write.options())?;
+    export_model(&args.output, &model, LabelTable::of_folder(&args.masks)?.as_ref(), args.write.options(&args.model)?)?;
     let rows = summarise(&model);
     if context.json || args.json.json {
         return stdout::print_json(&json!({

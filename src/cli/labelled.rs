@@ -1,7 +1,7 @@
 //! Reads a model with the names of its labels, and writes it after an edit.
 
 use super::args::JsonFlag;
-use super::context::{Context, open_read};
+use super::context::Context;
 use super::output::WriteArgs;
 use super::stdout;
 use super::values::share;
@@ -9,6 +9,7 @@ use crate::edit::catalogue::Catalogue;
 use crate::edit::select::{MIN_LABEL_CONFIDENCE, extract};
 use crate::io::label_table::LabelTable;
 use crate::io::model::export_model;
+use crate::run::models;
 use crate::scene::Gaussians;
 use crate::{Error, Result};
 use clap::Args;
@@ -56,7 +57,12 @@ pub struct EditArgs {
 impl EditArgs {
     /// Returns where the result goes.
     pub(crate) fn target(&self, context: &Context) -> Target<'_> {
-        Target { output: &self.output, write: self.write, print_json: wants_json(context, &self.json) }
+        Target {
+            model: &self.model,
+            output: &self.output,
+            write: self.write,
+            print_json: wants_json(context, &self.json),
+        }
     }
 
     /// Writes and prints the result of an edit that leaves the labels alone. `of` is the number of Gaussians before.
@@ -75,6 +81,8 @@ impl EditArgs {
 /// Where the result of an edit goes.
 #[derive(Clone, Copy)]
 pub(crate) struct Target<'a> {
+    /// The model that it is made of.
+    pub model: &'a Path,
     /// File to write.
     pub output: &'a Path,
     /// How it is written.
@@ -108,7 +116,7 @@ impl MinConfidenceArg {
 
 /// Opens a model and counts its labels.
 pub(crate) fn open(model: &Path, table: &TableArg) -> Result<(Gaussians, Catalogue)> {
-    let read = open_read(model)?;
+    let read = models::open(model)?;
     let known = Catalogue::new(&read.gaussians, table.open(model, read.names)?);
     Ok((read.gaussians, known))
 }
@@ -128,7 +136,7 @@ pub(crate) struct Edited<'a> {
 impl Edited<'_> {
     /// Writes model and table and prints a summary. `more` holds further fields of the JSON.
     pub(crate) fn finish(&self, to: &Target, more: serde_json::Value) -> Result<()> {
-        let left_out = export_model(to.output, self.model, self.table.as_ref(), to.write.options())?;
+        let left_out = export_model(to.output, self.model, self.table.as_ref(), to.write.options(to.model)?)?;
         let beside = LabelTable::beside(to.output);
         let written = self.model.len() as u64 - left_out;
         if to.print_json {

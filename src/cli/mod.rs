@@ -34,6 +34,7 @@ pub(crate) mod scene;
 pub(crate) mod select;
 pub(crate) mod selftest;
 mod shell;
+mod simplify;
 pub(crate) mod split_components;
 pub(crate) mod status;
 pub(crate) mod stdout;
@@ -131,6 +132,7 @@ fn run(args: Vec<OsString>) -> Result<(), Exit> {
         Command::Synth(args) => synth::run(&args, &context),
         Command::Devices(args) => devices::run(&args, &context),
         Command::Selftest(args) => selftest::run(&args, &context),
+        Command::Simplify(args) => simplify::run(&args, &context),
         Command::Masks(args) => masks::run(&args, &context),
         Command::Plan(args) => plan::run(&args, &context),
         Command::Profile(args) => profile::run(&args, &context),

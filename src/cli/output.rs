@@ -1,7 +1,11 @@
 //! How commands write models.
 
-use crate::io::model::{LabelType, SpzVersion, WriteOptions};
+use crate::Result;
+use crate::io::camera_json::views_of_model;
+use crate::io::model::{LabelType, Sight, SpzVersion, WriteOptions};
+use crate::scene::Overview;
 use clap::Args;
+use std::path::Path;
 
 /// Choices for files of models.
 #[derive(Args, Clone, Copy, Debug, Default)]
@@ -17,8 +21,11 @@ pub struct WriteArgs {
 }
 
 impl WriteArgs {
-    /// Returns the choices.
-    pub fn options(self) -> WriteOptions {
-        WriteOptions { label_type: self.label_type, spz_version: self.spz_version }
+    /// Returns the choices for a file made of `model`, whose cameras tell a page where to look from.
+    pub(crate) fn options(self, model: &Path) -> Result<WriteOptions> {
+        let views = views_of_model(model)?;
+        let up = Overview::of(views.iter().map(|view| &view.camera));
+        let sight = up.zip(views.first()).map(|(all, view)| Sight { up: all.up, eye: view.camera.centre() });
+        Ok(WriteOptions { label_type: self.label_type, spz_version: self.spz_version, sight })
     }
 }

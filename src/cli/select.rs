@@ -44,7 +44,12 @@ pub struct SelectArgs {
 impl SelectArgs {
     /// Returns where the result goes.
     pub(crate) fn target(&self, context: &Context) -> Target<'_> {
-        Target { output: &self.output, write: self.write, print_json: wants_json(context, &self.json) }
+        Target {
+            model: &self.model,
+            output: &self.output,
+            write: self.write,
+            print_json: wants_json(context, &self.json),
+        }
     }
 }
 

@@ -55,6 +55,10 @@ pub struct TrainFlags {
     /// File of occluders, as written by `labelgs occlusion` or an earlier run.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["occlusion", "depths"], help_heading = "Labels")]
     pub occlusion_file: Option<PathBuf>,
+    /// Start from this model, of any trainer, in place of the scene's points: a file of any format, or the folder of a
+    /// run. All bands of colour and the full size of the photos count from the first step.
+    #[arg(long, value_name = "MODEL", help_heading = "Training")]
+    pub init: Option<PathBuf>,
     /// Settings in TOML, such as config.toml of an earlier run. Flags override them.
     #[arg(long, value_name = "FILE.toml", help_heading = "Training")]
     pub config: Option<PathBuf>,
@@ -132,6 +136,7 @@ impl TrainFlags {
             max_bad_photos: self.trust.max_bad_photos,
             allow_outside: self.trust.allow_outside,
         };
-        Ok(Request { start, inputs, occluders, restart: self.restart, ..Request::new(scene, output) })
+        let init = self.init.clone();
+        Ok(Request { start, inputs, init, occluders, restart: self.restart, ..Request::new(scene, output) })
     }
 }

@@ -113,6 +113,12 @@ pub(crate) fn distance(text: &str) -> Result<f64, String> {
     value.ok_or_else(|| format!("`{text}` is not a distance; expected 0 or more, in world units"))
 }
 
+/// Parses a loss of PSNR, dB, 0 or more.
+pub(crate) fn loss(text: &str) -> Result<f64, String> {
+    let value = text.parse().ok().filter(|value: &f64| value.is_finite() && *value >= 0.0);
+    value.ok_or_else(|| format!("`{text}` is not a loss of PSNR; expected 0 or more, in dB"))
+}
+
 /// Parses a factor, more than 0.
 pub(crate) fn factor(text: &str) -> Result<f64, String> {
     let value = text.parse().ok().filter(|value: &f64| value.is_finite() && *value > 0.0);

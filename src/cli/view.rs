@@ -8,6 +8,7 @@ use super::shell::quoted;
 use super::stdout;
 use super::values::{near, share};
 use crate::Result;
+use crate::io::camera_json::views_of_model;
 use crate::render::{Parts, RenderOptions};
 use crate::scene::Dataset;
 use crate::viewer::{Edit, Finished, Viewer, ViewerOptions, Words, show};
@@ -93,7 +94,8 @@ pub(crate) fn run(args: &ViewArgs, context: &Context) -> Result<()> {
     let (model, known) = open(&args.model, &args.table)?;
     let dataset = match &args.scene {
         Some(scene) => open_scene(scene, &args.reading.of_run(&args.model)?, args.masks.clone(), [0.0; 3], true)?,
-        None => Dataset::default(),
+        // Without their photos.
+        None => Dataset { train: views_of_model(&args.model)?, ..Dataset::default() },
     };
     let options = RenderOptions::new(near_plane(&args.model, args.near)?, Parts::COLOUR);
     let gpu = open_gpu(context)?;

@@ -2,7 +2,7 @@
 //!
 //! A [`Catalogue`] resolves ids and names, and [`choose`] resolves points, boxes and masks in a view. [`extract`],
 //! [`remove`], [`recolour`], [`relabel`], [`merge()`] and [`split_components`] return changed models; [`fill()`] removes
-//! and closes the hole; [`clean()`] drops what disturbs, [`Transform`] moves a model; [`summarise`] lists the labels.
+//! and closes the hole; [`clean()`] drops what disturbs, [`Simplifier`] makes fewer of many, [`Transform`] moves a model; [`summarise`] lists the labels.
 
 pub(crate) mod catalogue;
 pub(crate) mod change;
@@ -14,6 +14,7 @@ pub(crate) mod merge;
 pub(crate) mod prompt;
 pub(crate) mod rename;
 pub(crate) mod select;
+pub(crate) mod simplify;
 pub(crate) mod turn;
 
 pub use catalogue::{Catalogue, Pick};
@@ -24,4 +25,5 @@ pub use fill::{Filled, SIGHT_SIDE, Sight, fill};
 pub use merge::{Merged, merge};
 pub use prompt::{Place, Prompt, choose};
 pub use select::{LabelSummary, MIN_LABEL_CONFIDENCE, extract, remove, summarise};
+pub use simplify::Simplifier;
 pub use turn::Transform;

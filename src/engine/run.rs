@@ -173,6 +173,15 @@ impl Engine {
         Ok(Report { counters, failure })
     }
 
+    /// Makes all lists from now on write the times of their items ([`Scheduler::time_items`]).
+    ///
+    /// [`Scheduler::time_items`]: crate::scheduler::Scheduler::time_items
+    pub(crate) fn time_items(&mut self) -> Result<()> {
+        self.check_idle()?;
+        self.lists.clear();
+        self.sched.time_items()
+    }
+
     /// Stage, name and nanoseconds of each item of a retired list; its frame must not be in use again. Empty without
     /// [timestamps](crate::scheduler::SchedulerOptions::timestamps).
     pub(crate) fn times(&self, recording: Recording) -> Result<Vec<(Stage, String, u64)>> {

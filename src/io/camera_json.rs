@@ -1,14 +1,19 @@
 //! Single cameras as JSON, and the `cameras.json` that 3DGS viewers read.
 
-use super::atomic;
 use super::lens::Lens;
 use super::listing::{check_camera, rotation_of};
 use super::transforms::affine;
+use super::{atomic, run_folder};
 use crate::error::{Error, Result};
 use crate::io::read;
-use crate::scene::Camera;
+use crate::scene::{Camera, View};
+use glam::{DMat3, DVec3};
 use serde::{Deserialize, Serialize};
+use std::borrow::Cow;
 use std::path::Path;
+
+/// Name of the file with the cameras of a run, as 3DGS has it.
+pub(crate) const CAMERAS: &str = "cameras.json";
 
 /// A camera in the JSON layout of `labelgs render --camera`.
 #[derive(Clone, Debug, Deserialize, Serialize)]
@@ -70,25 +75,27 @@ pub(crate) fn camera_of(path: &Path, file: &CameraFile) -> Result<Camera> {
 }
 
 /// An entry of `cameras.json`: the fields in the order of 3DGS, then the principal point.
-#[derive(Debug, Serialize)]
+#[derive(Debug, Serialize, Deserialize)]
 struct Entry<'a> {
+    #[serde(default)]
     id: usize,
-    img_name: &'a str,
+    img_name: Cow<'a, str>,
     width: u32,
     height: u32,
     position: [f64; 3],
     rotation: [[f64; 3]; 3],
     fy: f64,
     fx: f64,
-    cx: f64,
-    cy: f64,
+    /// 3DGS leaves the principal point out; it is in the middle then.
+    cx: Option<f64>,
+    cy: Option<f64>,
 }
 
 /// Writes the `cameras.json` of 3DGS: name, size, centre and world-from-camera rotation (rows) of each camera.
 pub fn write_cameras<'a>(path: impl AsRef<Path>, cameras: &[(&'a str, &Camera)]) -> Result<()> {
     let entry = |(id, &(img_name, camera)): (usize, &(&'a str, &Camera))| Entry {
         id,
-        img_name,
+        img_name: img_name.into(),
         width: camera.width,
         height: camera.height,
         position: camera.centre().to_array(),
@@ -96,9 +103,79 @@ pub fn write_cameras<'a>(path: impl AsRef<Path>, cameras: &[(&'a str, &Camera)])
         rotation: camera.rotation.to_cols_array_2d(),
         fy: camera.fy,
         fx: camera.fx,
-        cx: camera.cx,
-        cy: camera.cy,
+        cx: Some(camera.cx),
+        cy: Some(camera.cy),
     };
     let entries: Vec<Entry> = cameras.iter().enumerate().map(entry).collect();
     atomic::write(path, |out| Ok(serde_json::to_writer_pretty(out, &entries)?))
+}
+
+/// Reads the views in the `cameras.json` of the run that a model belongs to, of any 3DGS trainer, without photos. Returns none
+/// if there is no such file.
+pub(crate) fn views_of_model(model: &Path) -> Result<Vec<View>> {
+    let path = run_folder::of_model(model).map(|run| run.join(CAMERAS)).filter(|path| path.is_file());
+    let Some(path) = path else { return Ok(Vec::new()) };
+    let text = read::text(&path)?;
+    let entries: Vec<Entry> = serde_json::from_str(&text).map_err(|error| {
+        let cure = "expected a list of cameras, each with img_name, width, height, position, rotation, fx, fy; delete the file \
+                    to go on without";
+        Error::data(&path, format!("line {}", error.line()), format!("{error}; {cure}"))
+    })?;
+    entries.iter().map(|entry| view(&path, entry)).collect()
+}
+
+fn view(path: &Path, entry: &Entry) -> Result<View> {
+    let place = format!("camera {}", entry.img_name);
+    // Rows of world-from-camera are columns of camera-from-world.
+    let rotation = rotation_of(DMat3::from_cols_array_2d(&entry.rotation))
+        .ok_or_else(|| Error::data(path, &place, "has a rotation that is none; delete the file to go on without"))?;
+    let Entry { width, height, fx, fy, .. } = *entry;
+    let (cx, cy) = (entry.cx.unwrap_or(f64::from(width) / 2.0), entry.cy.unwrap_or(f64::from(height) / 2.0));
+    let translation = -(rotation * DVec3::from_array(entry.position));
+    let camera = Camera { rotation, translation, fx, fy, cx, cy, width, height };
+    check_camera(path, &place, &camera, &Lens::default())?;
+    Ok(View { name: entry.img_name.to_string(), camera, photo: None, mask: None })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{views_of_model, write_cameras};
+    use crate::scene::Camera;
+    use glam::{DMat3, DVec3};
+
+    #[test]
+    fn cameras_of_a_run_are_read_back() {
+        let folder = tempfile::tempdir().expect("a folder");
+        assert!(views_of_model(folder.path()).expect("no file").is_empty());
+        let camera = Camera {
+            rotation: DMat3::from_rotation_y(0.7) * DMat3::from_rotation_x(-0.2),
+            translation: DVec3::new(1.0, -2.0, 3.5),
+            fx: 100.0,
+            fy: 101.0,
+            cx: 31.0,
+            cy: 25.5,
+            width: 64,
+            height: 48,
+        };
+        let file = folder.path().join("cameras.json");
+        write_cameras(&file, &[("a.png", &camera)]).expect("written");
+        let found = views_of_model(folder.path()).expect("read");
+        assert_eq!((found.len(), found[0].name.as_str()), (1, "a.png"));
+        assert!(found[0].camera.rotation.abs_diff_eq(camera.rotation, 1e-12));
+        assert!(found[0].camera.translation.abs_diff_eq(camera.translation, 1e-12));
+        assert_eq!(found[0].camera.cx, 31.0);
+
+        // As 3DGS writes it.
+        let entry = r#"[{"id":0,"img_name":"b","width":64,"height":48,"position":[0,0,1],
+            "rotation":[[1,0,0],[0,1,0],[0,0,1]],"fy":50.0,"fx":50.0}]"#;
+        crate::io::atomic::write(&file, |out| out.write_all(entry.as_bytes())).expect("written");
+        let found = views_of_model(folder.path()).expect("read");
+        assert_eq!((found[0].camera.cx, found[0].camera.translation), (32.0, DVec3::new(0.0, 0.0, -1.0)));
+
+        for (bad, part) in [("[{}]", "img_name"), (&entry.replace("[1,0,0]", "[9,0,0]"), "camera b")] {
+            crate::io::atomic::write(&file, |out| out.write_all(bad.as_bytes())).expect("written");
+            let error = views_of_model(folder.path()).expect_err("refused").to_string();
+            assert!(error.contains(part) && error.contains("delete the file"), "{error}");
+        }
+    }
 }

@@ -51,7 +51,7 @@ pub use init::initial_gaussians;
 pub use label_table::{LabelEntry, LabelTable};
 pub use mask::read_mask;
 pub use model::{
-    Export, LabelType, ModelFormat, ModelWriter, ReadModel, SpzVersion, WriteOptions, export_model, read_model,
+    Export, LabelType, ModelFormat, ModelWriter, ReadModel, Sight, SpzVersion, WriteOptions, export_model, read_model,
     register, write_model,
 };
 pub use occlusion_table::OcclusionTable;

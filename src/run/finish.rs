@@ -75,7 +75,7 @@ impl Run<'_> {
         summary.stopped = self.stopped;
         summary.objects = objects::of(model, self.names.as_ref(), summary.scores.as_ref());
         summary.write(&self.request.output)?;
-        self.finish_records(summary)?;
+        self.finish_records(summary, model)?;
         let is_kept = kept?;
         if self.stopped {
             let further = if is_kept { "the run can go on from its checkpoint" } else { "only the scores are missing" };
@@ -90,7 +90,7 @@ impl Run<'_> {
     }
 
     /// Ends the history and `run.json`, and writes the report.
-    fn finish_records(&mut self, summary: &Summary) -> Result<()> {
+    fn finish_records(&mut self, summary: &Summary, model: &Gaussians) -> Result<()> {
         if let Some(scores) = &summary.scores {
             let MeanScores { psnr, ssim, objects, .. } = scores.mean;
             let scored = Scored { step: summary.steps, view: None, psnr, ssim, iou: objects.iou_map };
@@ -98,6 +98,9 @@ impl Run<'_> {
         }
         self.history.sync();
         self.note_memory();
+        if !self.stopped {
+            self.time_passes(model);
+        }
         info::end(&mut self.info, self.stopped, &self.history);
         self.write_info()?;
         let out = &self.request.output;

@@ -1,6 +1,7 @@
 //! `run.json`: what was run, on what, and what it said. The report is made from it.
 
 use super::history::{Entry, Recorder};
+use super::passes::Pass;
 use super::{Request, Run};
 use crate::engine::Engine;
 use crate::error::Result;
@@ -37,6 +38,8 @@ pub(crate) struct Info {
     pub ended: Option<Ended>,
     /// Views with pictures, the worst first.
     pub pictures: Vec<Pictured>,
+    /// Times by pass at the end of the run.
+    pub passes: Vec<Pass>,
 }
 
 /// A start of the program for the run.
@@ -118,6 +121,7 @@ impl Info {
             test_views: dataset.test.len() as u64,
             ended: None,
             pictures: Vec::new(),
+            passes: Vec::new(),
             ..info
         }
     }

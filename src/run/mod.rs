@@ -12,6 +12,7 @@ pub(crate) mod models;
 mod objects;
 pub(crate) mod observer;
 mod occluders;
+mod passes;
 mod pictures;
 mod prepare;
 mod preview;
@@ -81,6 +82,8 @@ pub struct Request<'a> {
     pub start: Start<'a>,
     /// Masks and limits. In a resumed run, empty fields take the values of the checkpoint.
     pub inputs: Inputs,
+    /// Model to start from in place of the scene's points: a file of any format, of any trainer, or the folder of a run.
+    pub init: Option<PathBuf>,
     /// Files with occluders, for [`Occlusion::Depth`] and [`Occlusion::File`].
     pub occluders: Option<OccluderFiles>,
     /// Opens a lost device again and continues from the newest checkpoint, as long as each loss has a new one. The
@@ -103,6 +106,7 @@ impl<'a> Request<'a> {
             output: output.into(),
             start: Start::New(Settings::default()),
             inputs: Inputs::default(),
+            init: None,
             occluders: None,
             restart: false,
             command: None,

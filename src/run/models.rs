@@ -1,7 +1,7 @@
 //! Files of a run: models, cameras and previews. Each write is atomic.
 
 use crate::error::{Error, Result};
-use crate::io::model::write_model;
+use crate::io::model::{ReadModel, read_model, write_model};
 use crate::io::read;
 use crate::io::{camera_json, image};
 use crate::render::Rendered;
@@ -35,6 +35,14 @@ pub fn latest_model(out: &Path) -> Result<PathBuf> {
             "is a folder without point_cloud/iteration_N/point_cloud.ply; name a PLY or the folder of a run",
         )
     })
+}
+
+/// Reads a model, or the latest one in the folder of a run, with the names in the file. Logs the notes of the reader.
+pub(crate) fn open(path: &Path) -> Result<ReadModel> {
+    let path = &if path.is_dir() { latest_model(path)? } else { path.to_owned() };
+    let read = read_model(path)?;
+    read.notes.iter().for_each(|note| tracing::warn!("{}: {note}", path.display()));
+    Ok(read)
 }
 
 /// The models that a run writes. Other commands take the model of the latest step. So the first model of this run moves
@@ -78,7 +86,7 @@ impl Models {
 }
 
 pub(crate) fn save_cameras(out: &Path, cameras: &[(&str, &Camera)]) -> Result<()> {
-    camera_json::write_cameras(out.join("cameras.json"), cameras)
+    camera_json::write_cameras(out.join(camera_json::CAMERAS), cameras)
 }
 
 /// Writes photo, render and (if it was rendered) label map side by side.

@@ -3,7 +3,7 @@
 use super::checkpoints::Checkpoints;
 use super::history::{Recorder, Sums};
 use super::info::Info;
-use super::models::Models;
+use super::models::{Models, open};
 use super::resume::{self, Record, Resumed, absolute};
 use super::{Inputs, Observer, OccluderFiles, Request, Run, Settings, Start, occluders, pictures};
 use crate::engine::Engine;
@@ -13,7 +13,7 @@ use crate::io::label_table::LabelTable;
 use crate::io::occlusion_table::OcclusionTable;
 use crate::io::run_folder::Lock;
 use crate::io::{self, atomic, checkpoint_folder};
-use crate::scene::Dataset;
+use crate::scene::{Dataset, Gaussians};
 use crate::scheduler::SchedulerOptions;
 use crate::train::{self, TrainConfig, Trainer};
 use std::path::{Path, PathBuf};
@@ -30,6 +30,8 @@ pub(super) struct Prepared {
     names: Option<LabelTable>,
     dataset: Dataset,
     table: Option<OcclusionTable>,
+    /// The model to start from, if there is one.
+    first: Option<Gaussians>,
 }
 
 /// Locks the folder, decides the settings and reads the scene. `is_again` continues from the newest checkpoint.
@@ -59,6 +61,7 @@ pub(super) fn prepare(request: &Request, is_again: bool) -> Result<Prepared> {
     if request.restart && settings.run.checkpoint_every == 0 {
         return Err(Error::usage("restart", "goes on from checkpoints, and `checkpoint_every` is 0"));
     }
+    let first = read_first(request, resumed.is_some())?;
     clear(out, &settings)?;
     let models = Models::new(out, resumed.as_ref().map_or(0, |resumed| resumed.state.step))?;
     let mut inputs = resumed.as_ref().map_or(request.inputs.clone(), |resumed| resumed.record.inputs.clone());
@@ -66,7 +69,7 @@ pub(super) fn prepare(request: &Request, is_again: bool) -> Result<Prepared> {
     let names = inputs.masks.as_deref().map(LabelTable::of_folder).transpose()?.flatten();
     let dataset = read_scene(request, &settings, &inputs)?;
     let table = if resumed.is_none() { occluders::table(request, &dataset)? } else { None };
-    Ok(Prepared { lock, settings, resumed, inputs, models, names, dataset, table })
+    Ok(Prepared { lock, settings, resumed, inputs, models, names, dataset, table, first })
 }
 
 fn check_new(settings: &Settings, request: &Request) -> Result<()> {
@@ -108,7 +111,7 @@ pub(super) fn begin<'a>(
     gpu: Arc<Gpu>,
     observer: &'a mut dyn Observer,
 ) -> Result<Run<'a>> {
-    let Prepared { lock, settings, resumed, inputs, models, names, dataset, table } = prepared;
+    let Prepared { lock, settings, resumed, inputs, models, names, dataset, table, first } = prepared;
     let out = request.output.as_path();
     let preview = dataset.test.first().or(dataset.train.first()).cloned();
     let options = SchedulerOptions {
@@ -134,7 +137,7 @@ pub(super) fn begin<'a>(
     let checkpoints = Checkpoints::new(out, lock, record, resumed.as_ref().map(|resumed| &resumed.state))?;
     let mut trainer = match resumed {
         Some(resumed) => Trainer::resume(gpu, &dataset, resumed.state, options)?,
-        None => start(gpu, &settings.train, &dataset, table.as_ref(), options)?,
+        None => start(gpu, (&settings.train, first), &dataset, table.as_ref(), options)?,
     };
     info.plan(&mut trainer);
     // The near plane is decided now.
@@ -162,16 +165,19 @@ fn recorded(masks: Option<&Path>) -> Option<PathBuf> {
     masks.filter(|masks| masks.to_str().is_some()).map(absolute)
 }
 
-/// Makes a trainer with the initial model of the scene.
+/// Makes a trainer with the initial model of the scene, or with a model that was trained before.
 fn start(
     gpu: Arc<Gpu>,
-    config: &TrainConfig,
+    (config, first): (&TrainConfig, Option<Gaussians>),
     dataset: &Dataset,
     occluders: Option<&OcclusionTable>,
     options: SchedulerOptions,
 ) -> Result<Trainer> {
-    let model = train::first_model(dataset, config)?;
-    let size = train::start_size(&gpu, dataset, config, model.len(), options)?;
+    let (model, config) = match first {
+        Some(model) => train::go_on_from(model, dataset, config),
+        None => (train::first_model(dataset, config)?, config.clone()),
+    };
+    let size = train::start_size(&gpu, dataset, &config, model.len(), options)?;
     let memory = Engine::predict(&gpu, &size, options)?;
     tracing::info!(
         "memory to start with: {:.1} MiB on the device for {} Gaussians and {} x {} px; it grows with the model",
@@ -180,7 +186,7 @@ fn start(
         size.image.0,
         size.image.1
     );
-    let mut trainer = Trainer::new(gpu, config.clone(), dataset, &model, options)?;
+    let mut trainer = Trainer::new(gpu, config, dataset, &model, options)?;
     if let Some(table) = occluders {
         let without = trainer.set_occluders(&table.views);
         if let Some(first) = without.first() {
@@ -193,6 +199,20 @@ fn start(
     Ok(trainer)
 }
 
+/// Reads the model that a new run starts from, if the request names one.
+fn read_first(request: &Request, is_resumed: bool) -> Result<Option<Gaussians>> {
+    let Some(path) = &request.init else { return Ok(None) };
+    if is_resumed {
+        tracing::info!("the model comes from the checkpoint; {} is not read again", path.display());
+        return Ok(None);
+    }
+    let model = open(path)?.gaussians;
+    if model.is_empty() {
+        return Err(Error::data(path, "", "has no Gaussians to start from"));
+    }
+    Ok(Some(model))
+}
+
 fn facts(request: &Request, masks: Option<&Path>, gpu: &Gpu) -> Vec<(&'static str, String)> {
     let found = gpu.capabilities();
     let mut facts = vec![
@@ -202,6 +222,9 @@ fn facts(request: &Request, masks: Option<&Path>, gpu: &Gpu) -> Vec<(&'static st
     ];
     if let Some(masks) = masks {
         facts.push(("masks", masks.display().to_string()));
+    }
+    if let Some(init) = &request.init {
+        facts.push(("init", init.display().to_string()));
     }
     match &request.occluders {
         Some(OccluderFiles::Depths { folder, kind }) => {

@@ -225,6 +225,13 @@ impl Scheduler {
         self.resize_own(capacity)
     }
 
+    /// Makes all lists from now on write the times of their items, with a barrier before each. Discards the lists that
+    /// there are.
+    pub fn time_items(&mut self) -> Result<()> {
+        (self.options.timestamps, self.options.plan.barrier_everywhere) = (true, true);
+        self.set_capacity(self.capacity)
+    }
+
     /// Present capacities.
     pub fn capacity(&self) -> &Capacity {
         &self.capacity

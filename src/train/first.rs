@@ -34,11 +34,27 @@ pub fn first_model(dataset: &Dataset, config: &TrainConfig) -> Result<Gaussians>
     Ok(model)
 }
 
+/// Fits a trained model and the settings to each other: the training goes on with all that the model has. The schedules of
+/// a new model, which begin with small pictures and one band of colour, would first spoil it.
+pub(crate) fn go_on_from(mut model: Gaussians, dataset: &Dataset, config: &TrainConfig) -> (Gaussians, TrainConfig) {
+    if model.labels.is_some() && dataset.train.iter().all(|view| view.mask.is_none()) {
+        tracing::warn!("the labels of the first model are lost, because the scene has no masks");
+        (model.labels, model.label_confidence) = (None, None);
+    }
+    thin(&mut model, config.max_gaussians);
+    let config = TrainConfig {
+        start_size: config.start_size.or(Some(1.0)),
+        sh_degree_interval: config.sh_degree_interval.or(Some(1)),
+        ..config.clone()
+    };
+    (model, config)
+}
+
 fn thin(model: &mut Gaussians, bound: u64) {
     let count = model.len() as u64;
     if bound > 0 && count > bound {
         tracing::warn!(
-            "{count} initial points, and `max_gaussians` is {bound}: every {:.1}-th is used",
+            "{count} initial Gaussians, and `max_gaussians` is {bound}: every {:.1}-th is used",
             count as f64 / bound as f64
         );
         // Keep row i if `i * bound / count` steps up there.

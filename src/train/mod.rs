@@ -25,6 +25,7 @@ mod votes;
 
 pub use config::{LabelRule, Occlusion, StrategyKind, TrainConfig};
 pub use first::first_model;
+pub(crate) use first::go_on_from;
 pub use presets::Preset;
 pub(crate) use setup::{TrainerOptions, engine_size, start_size};
 pub(crate) use state::{TrainState, ViewFingerprint};

@@ -169,6 +169,7 @@ impl TrainConfig {
         self.start_size = self.start_size.or(then.start_size);
         self.full_size_from = self.full_size_from.or(then.full_size_from);
         self.layer_every = self.layer_every.or(then.layer_every);
+        self.sh_degree_interval = self.sh_degree_interval.or(then.sh_degree_interval);
     }
 
     /// Returns the most Gaussians after a densification at `step`. It rises linearly from `start` to the budget.

@@ -1,9 +1,11 @@
-//! Times of the passes of each step, for `labelgs profile`.
+//! Times of the passes of each step, for `labelgs profile` and the report of a run.
 
 use super::Trainer;
 use crate::engine::Recording;
 use crate::error::Result;
 use crate::pass::Stage;
+use crate::scene::Gaussians;
+use crate::scheduler::plan::FRAMES_IN_FLIGHT;
 use std::collections::HashSet;
 
 /// Times of the passes of a step.
@@ -37,6 +39,24 @@ impl Trainer {
     /// Takes the times of the steps that ended since the last call.
     pub fn take_times(&mut self) -> Vec<StepTimes> {
         self.timing.as_mut().map(|timing| std::mem::take(&mut timing.times)).unwrap_or_default()
+    }
+
+    /// Runs the last `count` steps again on `model` and returns their times, each with a barrier before every pass. All
+    /// steps are done; the engine's model and the trainer are of no use after this.
+    pub(crate) fn times_of_last(&mut self, count: u32, model: &Gaussians) -> Result<Vec<StepTimes>> {
+        self.drain()?;
+        self.engine.upload_model(model)?;
+        self.engine.time_items()?;
+        self.keep_times();
+        for step in self.step - count.min(self.step)..self.step {
+            let input = self.input(step + 1);
+            if self.in_flight.len() == FRAMES_IN_FLIGHT {
+                self.retire()?;
+            }
+            self.submit(input)?;
+        }
+        self.drain()?;
+        Ok(self.take_times())
     }
 
     /// Reads the times of a finished step whose frame was not used again.

@@ -12,7 +12,7 @@ use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::io::label_table::LabelTable;
 use crate::render::{Parts, RenderOptions, Rendered, render};
-use crate::scene::{Camera, Dataset, Gaussians};
+use crate::scene::{Camera, Dataset, Gaussians, Overview};
 use glam::DVec3;
 use serde_json::json;
 use std::path::Path;
@@ -81,7 +81,7 @@ pub fn show(viewer: &Viewer, finished: Finished, gpu: Arc<Gpu>, goes_on: &dyn Fn
 /// Returns what a page has to know of the scene.
 pub(super) fn scene(
     views: &Views,
-    (up, target, distance): (DVec3, DVec3, f64),
+    Overview { up, target, distance }: Overview,
     title: &str,
     (device, is_training): (&str, bool),
 ) -> serde_json::Value {
@@ -99,8 +99,8 @@ pub(super) fn scene(
     })
 }
 
-/// Returns up, the middle and a distance to see a model from that has no views: half of it is in the middle.
-fn frame_of(model: &Gaussians) -> (DVec3, DVec3, f64) {
+/// Returns where to see a model from that has no views: half of it is in the middle.
+fn frame_of(model: &Gaussians) -> Overview {
     let quantiles = [0, 1, 2].map(|axis| {
         let mut values: Vec<f32> = model.means.iter().map(|mean| mean[axis]).filter(|v| v.is_finite()).collect();
         values.sort_by(f32::total_cmp);
@@ -112,7 +112,7 @@ fn frame_of(model: &Gaussians) -> (DVec3, DVec3, f64) {
     let middle = DVec3::from_array(quantiles.map(|[_, middle, _]| middle));
     let size = quantiles.map(|[low, _, high]| high - low).into_iter().fold(1e-3, f64::max);
     // Most captures have the axes of COLMAP, y down.
-    (DVec3::NEG_Y, model.origin + middle, 1.5 * size)
+    Overview { up: DVec3::NEG_Y, target: model.origin + middle, distance: 1.5 * size }
 }
 
 /// The engine with the drawn part of the model.

@@ -11,7 +11,7 @@ use super::{Viewer, Words};
 use crate::error::{Error, Result};
 use crate::render::{Parts, Rendered};
 use crate::run::{Event, Flow, Live, Observer};
-use crate::scene::Camera;
+use crate::scene::{Camera, Overview};
 use glam::DVec3;
 use serde_json::json;
 use std::sync::Arc;
@@ -107,7 +107,8 @@ impl<'a> Watched<'a> {
 
     fn begin(&mut self, live: &mut Live, steps: u32) {
         let views = Arc::new(Views::new(live.dataset()));
-        let frame = views.frame().unwrap_or((DVec3::NEG_Y, DVec3::ZERO, 1.0));
+        let nothing = Overview { up: DVec3::NEG_Y, target: DVec3::ZERO, distance: 1.0 };
+        let frame = views.frame().unwrap_or(nothing);
         self.viewer.hub.set_views(Arc::clone(&views));
         self.viewer.hub.publish("scene", &scene(&views, frame, &self.title, ("", true)));
         self.painter = Painter::new(views, live.is_cpu());

@@ -1,13 +1,12 @@
 //! The views of a scene as a page sees them: cameras, photos, thumbnails, scores.
 
 use crate::error::{Error, Result};
-use crate::eval::metrics::{label_iou, mean, psnr};
+use crate::eval::metrics::{label_iou, psnr};
 use crate::io::camera_json::CameraFile;
 use crate::io::image::{jpeg_rgb8, png_rgb8};
 use crate::io::resample::{bounded_size, shrink_photo};
 use crate::render::Rendered;
-use crate::scene::{Camera, Dataset, View};
-use glam::{DMat3, DVec3};
+use crate::scene::{Dataset, Overview, View};
 use serde_json::{Value, json};
 
 /// Longest side of a thumbnail, px.
@@ -63,23 +62,9 @@ impl Views {
         self.list.iter().map(row).collect()
     }
 
-    /// Returns up, the point that the cameras look at, and their distance from it; none without views.
-    pub(super) fn frame(&self) -> Option<(DVec3, DVec3, f64)> {
-        let cameras = || self.list.iter().map(|posed| &posed.view.camera);
-        let up = -cameras().map(|camera| camera.rotation.row(1)).sum::<DVec3>();
-        let centres: Vec<DVec3> = cameras().map(Camera::centre).collect();
-        let middle = centres.iter().sum::<DVec3>() / centres.len().max(1) as f64;
-        // The point nearest to all optical axes, held near the cameras where these are parallel.
-        let (mut normal, mut right) = (DMat3::IDENTITY * 1e-3, middle * 1e-3);
-        for camera in cameras() {
-            let axis = camera.rotation.row(2);
-            let across = DMat3::IDENTITY - DMat3::from_cols(axis * axis.x, axis * axis.y, axis * axis.z);
-            normal += across;
-            right += across * camera.centre();
-        }
-        let target = normal.inverse() * right;
-        let distance = mean(centres.iter().map(|centre| centre.distance(target)))?;
-        Some((up.try_normalize().unwrap_or(DVec3::NEG_Y), target, distance.max(1e-6)))
+    /// Returns what the cameras look at; none without views.
+    pub(super) fn frame(&self) -> Option<Overview> {
+        Overview::of(self.list.iter().map(|posed| &posed.view.camera))
     }
 
     /// Returns the photo of a view, or its thumbnail, with the type of the file.

@@ -146,9 +146,9 @@ fn v4() -> WriteOptions {
 }
 
 /// Every format that is written: file, choices, bounds.
-fn written() -> [(&'static str, WriteOptions, Bounds); 4] {
+fn written() -> [(&'static str, WriteOptions, Bounds); 5] {
     let usual = WriteOptions::default();
-    [("a.spz", usual, SPZ), ("b.spz", v4(), SPZ), ("a.glb", usual, GLB), ("a.sog", usual, SOG)]
+    [("a.spz", usual, SPZ), ("b.spz", v4(), SPZ), ("a.glb", usual, GLB), ("a.sog", usual, SOG), ("a.html", usual, SPZ)]
 }
 
 #[test]
@@ -294,7 +294,7 @@ fn pictures_of_every_format_are_those_of_the_ply() {
         println!("{file} {options:?}: {bytes:.1} bytes a Gaussian, {distance:.1} dB from the PLY");
         let least = match &file[2..] {
             "glb" => 80.0,
-            "spz" => 35.0,
+            "spz" | "html" => 35.0,
             _ => 30.0,
         };
         assert!(distance > least, "{file}: {distance:.1} dB");
@@ -397,7 +397,7 @@ fn formats_that_are_only_read_say_so() {
     let scene = Scene::new();
     let error = write_model(scene.at("a.splat"), &model(1, 0, false)).expect_err("read only").to_string();
     assert!(
-        error.ends_with(".splat files are only read; formats that are written end in .ply, .spz, .glb, .sog"),
+        error.ends_with(".splat files are only read; formats that are written end in .ply, .spz, .glb, .sog, .html"),
         "{error}"
     );
 }
@@ -420,7 +420,9 @@ fn bad_files_are_refused_by_file_place_and_cure() {
         [&bytes[..at], to.as_bytes(), &bytes[at + from.len()..]].concat()
     };
     let sog = fs::read(golden("splat-transform.sog")).expect("bytes");
-    let cases: [(&str, Vec<u8>, &[&str]); 17] = [
+    export_model(scene.at("whole.html"), &model(9, 0, true), None, WriteOptions::default()).expect("written");
+    let page = fs::read(scene.at("whole.html")).expect("bytes");
+    let cases: [(&str, Vec<u8>, &[&str]); 20] = [
         ("a.spz", b"PK".to_vec(), &["a.spz: byte 0: ", "no SPZ file"]),
         ("a.spz", v3[..v3.len() / 2].to_vec(), &["a.spz: planes: ", "cut short"]),
         ("a.spz", with(&v4, 4, 9), &["a.spz: byte 4: ", "1 to 4 are read"]),
@@ -445,6 +447,9 @@ fn bad_files_are_refused_by_file_place_and_cure() {
         ("a.sog", sog[..sog.len() - 30].to_vec(), &["a.sog: end of the archive: ", "cut short"]),
         ("a.sog", text(&sog, "\"version\":2", "\"version\":1"), &["a.sog: meta.json: cannot be unpacked: "]),
         ("a.sog", text(&sog, "RIFF", "RAFF"), &["a.sog: means_l.webp: "]),
+        ("a.html", b"<p>A page.</p>".to_vec(), &["a.html: has no model inside", "labelgs has written"]),
+        ("a.html", text(&page, "H4sI", "H4*I"), &["a.html: the model inside: ", "not base64"]),
+        ("a.html", text(&page, "H4sI", "AAAA"), &["a.html: byte 0: ", "no SPZ file"]),
         ("a.splat", splat[..splat.len() - 1].to_vec(), &["a.splat: byte 736: ", "times 32"]),
     ];
     for (name, bytes, expected) in cases {

@@ -2,14 +2,15 @@
 
 use super::chromium::{Browser, Tab};
 use super::server::{HOSTILE, Picture, Place, Server, model};
+use super::{events, page_file};
 use crate::support::device;
 use labelgs::io::write_model;
 use rand::rngs::SmallRng;
 use rand::{Rng, SeedableRng};
 use serde_json::Value;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
-const WIDE: (u32, u32) = (1280, 800);
+pub const WIDE: (u32, u32) = (1280, 800);
 
 /// The picture of the still camera is there.
 const SETTLED: &str = "window.labelgs?.stage.frame?.exact && labelgs.stage.asked === null && labelgs.stage.isStill \
@@ -37,10 +38,11 @@ fn the_page_works_in_a_browser() {
     the_keyboard_is_enough(&mut browser, &tab);
     narrow_windows_hold_everything(&mut browser, &tab);
     two_tabs_and_a_killed_one(&mut browser, &tab, &server);
-    random_events(&mut browser, &tab);
-    assert_eq!(browser.complaints, Vec::<String>::new(), "complaints on the console");
+    events::random_events(&mut browser, &tab, &server);
     browser.kill(&tab);
     drop(server);
+    page_file::a_page_shows_its_model(&mut browser, &place);
+    assert_eq!(browser.complaints, Vec::<String>::new(), "complaints on the console");
     many_labels_and_none(&mut browser, &place);
     a_server_goes_away_and_comes_back(&mut browser, &place);
     a_training_in_the_page(&mut browser, &place);
@@ -289,68 +291,6 @@ fn two_tabs_and_a_killed_one(browser: &mut Browser, tab: &Tab, server: &Server) 
     browser.until(tab, SETTLED);
     browser.js(tab, "labelgs.edits.undo()");
     browser.until(tab, "labelgs.edits.state.commands.length === 0");
-}
-
-/// Some seconds of any events; `LABELGS_TEST_SECONDS` overrides how many.
-fn random_events(browser: &mut Browser, tab: &Tab) {
-    let seconds = std::env::var("LABELGS_TEST_SECONDS").ok().and_then(|text| text.parse().ok()).unwrap_or(6);
-    let mut dice = SmallRng::seed_from_u64(11);
-    let memory = |browser: &mut Browser| {
-        browser.call(Some(tab), "HeapProfiler.collectGarbage", serde_json::json!({}));
-        let metrics = browser.js(tab, "performance.memory.usedJSHeapSize");
-        metrics.as_f64().expect("bytes")
-    };
-    let before = memory(browser);
-    let end = Instant::now() + Duration::from_secs(seconds);
-    let keys = [
-        ("Digit1", "1"),
-        ("Digit2", "2"),
-        ("Digit3", "3"),
-        ("Digit4", "4"),
-        ("Digit5", "5"),
-        ("Digit6", "6"),
-        ("Digit7", "7"),
-        ("KeyV", "v"),
-        ("KeyX", "x"),
-        ("KeyP", "p"),
-        ("KeyF", "f"),
-        ("KeyH", "h"),
-        ("KeyI", "i"),
-        ("BracketLeft", "["),
-        ("BracketRight", "]"),
-        ("Escape", "Escape"),
-        ("ArrowLeft", "ArrowLeft"),
-        ("KeyW", "w"),
-        ("Tab", "Tab"),
-        ("KeyM", "m"),
-    ];
-    while Instant::now() < end {
-        let at = (f64::from(dice.random_range(0..WIDE.0)), f64::from(dice.random_range(60..WIDE.1)));
-        match dice.random_range(0..6) {
-            0 => browser.click(tab, at, [0, 2, 8][dice.random_range(0..3)]),
-            1 => browser.drag(
-                tab,
-                at,
-                (at.0 + dice.random_range(-200.0..200.0), at.1 + dice.random_range(-200.0..200.0)),
-            ),
-            2 => {
-                let event = serde_json::json!({ "type": "mouseWheel", "x": at.0, "y": at.1, "deltaX": 0, "deltaY": dice.random_range(-900..900) });
-                drop(browser.call(Some(tab), "Input.dispatchMouseEvent", event));
-            }
-            3 => browser.resize(tab, (dice.random_range(200..1500), dice.random_range(200..1000))),
-            _ => {
-                let (code, key) = keys[dice.random_range(0..keys.len())];
-                browser.key(tab, code, key, [0, 0, 0, 8][dice.random_range(0..4)]);
-            }
-        }
-    }
-    browser.resize(tab, WIDE);
-    browser.js(tab, "document.querySelectorAll('dialog[open]').forEach((dialog) => dialog.close('no'))");
-    browser.js(tab, "labelgs.labels.showAll()");
-    browser.until(tab, "labelgs.labels.hidden.length === 0 && labelgs.labels.solo.length === 0");
-    browser.until(tab, "labelgs.stage.asked === null && !labelgs.stage.isDirty && labelgs.stage.isStill");
-    let after = memory(browser);
-    assert!(after < before + 20e6, "the page grew from {before} to {after} bytes");
 }
 
 fn many_labels_and_none(browser: &mut Browser, place: &Place) {

@@ -44,7 +44,9 @@ impl Browser {
             "--hide-scrollbars",
             "--no-first-run",
         ]);
-        command.args(["--disable-background-networking", "--disable-gpu", "--mute-audio"]);
+        command.args(["--disable-background-networking", "--mute-audio"]);
+        // WebGL without a graphics card.
+        command.args(["--use-angle=swiftshader", "--enable-unsafe-swiftshader"]);
         command.arg(format!("--user-data-dir={}", folder.path().display())).arg("about:blank");
         let started = command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::piped()).spawn();
         let mut child = match started {

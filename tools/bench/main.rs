@@ -24,6 +24,7 @@ mod start;
 mod steps;
 mod trained;
 mod training;
+mod view;
 
 use clap::{Parser, Subcommand};
 use labelgs::Result;
@@ -69,6 +70,8 @@ enum Command {
     Memory(Common),
     /// From the start of the program to its first picture, with empty and with filled caches.
     Start(Common),
+    /// The viewer: from a camera to its picture, what watching costs a training, bytes of page and program.
+    View(Common),
     /// One measurement of `memory`, in a process of its own.
     #[command(hide = true)]
     MemoryOf { gaussians: u32, width: u32, height: u32 },
@@ -97,6 +100,7 @@ fn run() -> Result<()> {
         Command::CardModel(common) => card_model::run(&common),
         Command::Memory(common) => memory::run(&common),
         Command::Start(common) => start::run(&common),
+        Command::View(common) => view::run(&common),
         Command::MemoryOf { gaussians, width, height } => memory::measure(gaussians, width, height),
     }
 }

@@ -51,12 +51,23 @@ pub enum SpzVersion {
 }
 
 /// Choices for the writers of model files.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct WriteOptions {
     /// How labels are written.
     pub label_type: LabelType,
     /// Version of SPZ files.
     pub spz_version: SpzVersion,
+    /// Where a page shows the model from at first; without it from above, with y as down.
+    pub sight: Option<Sight>,
+}
+
+/// Where to look at a model from.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sight {
+    /// Direction of up in the world, of length 1.
+    pub up: DVec3,
+    /// Position of the eye in the world.
+    pub eye: DVec3,
 }
 
 /// A model on its way into a file.

@@ -5,6 +5,7 @@
 
 mod format;
 mod glb;
+mod html;
 mod origin;
 mod ply;
 mod rows;
@@ -22,10 +23,11 @@ use crate::scene::Gaussians;
 use std::path::Path;
 use std::sync::{PoisonError, RwLock};
 
-pub use format::{Export, LabelType, ModelFormat, ModelWriter, ReadModel, SpzVersion, WriteOptions};
+pub use format::{Export, LabelType, ModelFormat, ModelWriter, ReadModel, Sight, SpzVersion, WriteOptions};
 
 /// Formats of labelgs. The first one also serves unknown extensions, such as `/dev/stdout`.
-const SHIPPED: [&ModelFormat; 5] = [&ply::FORMAT, &spz::FORMAT, &glb::FORMAT, &sog::FORMAT, &splat::FORMAT];
+const SHIPPED: [&ModelFormat; 6] =
+    [&ply::FORMAT, &spz::FORMAT, &glb::FORMAT, &sog::FORMAT, &splat::FORMAT, &html::FORMAT];
 
 /// Formats that other crates have registered.
 static REGISTERED: RwLock<Vec<&'static ModelFormat>> = RwLock::new(Vec::new());

@@ -1,8 +1,9 @@
 //! Memory planned and measured, and times by pass.
 
-use super::load::{Profile, Ran};
+use super::load::Ran;
 use super::{columns, row, run_name};
 use crate::report::text::{bytes, count, number};
+use crate::run::passes::Pass;
 use maud::{Markup, html};
 
 /// Returns both.
@@ -20,11 +21,24 @@ pub(super) fn costs(runs: &[Ran]) -> Markup {
         h3 { "Time by pass" }
         @for (index, run) in runs.iter().enumerate() {
             @if runs.len() > 1 { p { (run_name(index, run)) } }
-            @if let Some(profile) = &run.profile { (passes(profile)) }
-            @else {
-                p.quiet {
-                    "Not measured: a training takes no time by pass, because that would slow it down. A profile of the \
-                     scene that is written to profile.json in the folder of the run is shown here."
+            @match &run.profile {
+                Some(profile) => {
+                    p.quiet {
+                        "A profile on " (profile.device) " with " (count(profile.gaussians.into()))
+                        " Gaussians; medians."
+                    }
+                    (passes(&profile.passes))
+                }
+                None if run.info.passes.is_empty() => p.quiet {
+                    "Not measured: the run has not ended, or is too short, or its device has no clock. A profile of \
+                     the scene that is written to profile.json in the folder of the run is shown here."
+                },
+                None => {
+                    p.quiet {
+                        "Means over the last steps, which ran once more after the end of the training, with a barrier \
+                         before each pass."
+                    }
+                    (passes(&run.info.passes))
                 }
             }
         }
@@ -45,17 +59,13 @@ fn buffers(run: &Ran) -> Markup {
     }
 }
 
-fn passes(profile: &Profile) -> Markup {
-    let largest = profile.passes.iter().map(|pass| pass.share).fold(f64::MIN_POSITIVE, f64::max);
-    let rows = profile.passes.iter().map(|pass| {
+fn passes(passes: &[Pass]) -> Markup {
+    let largest = passes.iter().map(|pass| pass.share).fold(f64::MIN_POSITIVE, f64::max);
+    bars(passes.iter().map(|pass| {
         let title = if pass.name.is_empty() { pass.stage.clone() } else { format!("{}: {}", pass.stage, pass.name) };
-        let time = format!("{} ms, {} %", number(Some(pass.median_ms), 3), number(Some(100.0 * pass.share), 1));
+        let time = format!("{} ms, {} %", number(Some(pass.ms), 3), number(Some(100.0 * pass.share), 1));
         (title, time, pass.share / largest)
-    });
-    html! {
-        p.quiet { "A profile on " (profile.device) " with " (count(profile.gaussians.into())) " Gaussians; medians." }
-        (bars(rows))
-    }
+    }))
 }
 
 fn bars(rows: impl Iterator<Item = (String, String, f64)>) -> Markup {

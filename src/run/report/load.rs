@@ -4,6 +4,7 @@ use crate::error::{Error, Result};
 use crate::io::{read, run_folder};
 use crate::run::history::{self, Entry, Steps};
 use crate::run::info::{self, Info};
+use crate::run::passes::Pass;
 use crate::run::{ObjectSummary, Settings, summary};
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
@@ -55,16 +56,6 @@ pub(super) struct Profile {
     pub device: String,
     pub gaussians: u32,
     pub passes: Vec<Pass>,
-}
-
-/// Times of a pass.
-#[derive(Clone, Debug, Default, Deserialize)]
-#[serde(default)]
-pub(super) struct Pass {
-    pub stage: String,
-    pub name: String,
-    pub median_ms: f64,
-    pub share: f64,
 }
 
 /// Reads a file of JSON; none if there is none.

@@ -11,6 +11,8 @@ mod write;
 
 use super::format::ModelFormat;
 use super::turn::HalfTurn;
+pub(super) use read::read_bytes;
+pub(super) use write::{losses, write_v3};
 
 /// The format by its ending.
 pub(super) const FORMAT: ModelFormat =
@@ -19,7 +21,7 @@ pub(super) const FORMAT: ModelFormat =
 /// First bytes of a header: `NGSP`.
 const MAGIC: u32 = 0x5053_474E;
 /// Axes of the file: x right, y up, z back.
-const AXES: HalfTurn = HalfTurn([1.0, -1.0, -1.0]);
+pub(super) const AXES: HalfTurn = HalfTurn([1.0, -1.0, -1.0]);
 /// Bit of the header's flags: records follow.
 const HAS_RECORDS: u8 = 2;
 /// Most fractional bits of a position: with more, 24 bits end below 1.

@@ -42,10 +42,14 @@ struct Unpacked {
 
 /// Reads an SPZ of version 1 to 4.
 pub(super) fn read(path: &Path) -> Result<ReadModel> {
-    let bytes = file::bytes(path)?;
+    read_bytes(path, &file::bytes(path)?)
+}
+
+/// Reads the bytes of an SPZ; `path` is where they come from.
+pub(in crate::io::model) fn read_bytes(path: &Path, bytes: &[u8]) -> Result<ReadModel> {
     let Unpacked { header, planes, mut records, mut notes } = match bytes.first_chunk::<4>() {
-        Some([0x1f, 0x8b, _, _]) => gzipped(path, &bytes)?,
-        Some(&magic) if u32::from_le_bytes(magic) == MAGIC => framed(path, &bytes)?,
+        Some([0x1f, 0x8b, _, _]) => gzipped(path, bytes)?,
+        Some(&magic) if u32::from_le_bytes(magic) == MAGIC => framed(path, bytes)?,
         _ => {
             let problem = "starts neither with gzip (versions 1 to 3) nor with `NGSP` (version 4); this is no SPZ file";
             return Err(Error::data(path, "byte 0", problem));

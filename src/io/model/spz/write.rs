@@ -34,7 +34,7 @@ fn bits(extent: f32) -> u32 {
     most.min(least.max(BITS_USUAL))
 }
 
-fn losses(export: &Export) -> Result<Vec<String>> {
+pub(in crate::io::model) fn losses(export: &Export) -> Result<Vec<String>> {
     let (g, extent) = (export.model, extent(export));
     if export.rows.is_empty() || export.rows.len() > i32::MAX as usize {
         let problem = format!("an SPZ holds 1 to {} Gaussians, not {}", i32::MAX, export.rows.len());
@@ -95,9 +95,18 @@ fn encode(export: &Export) -> [Vec<u8>; 6] {
 }
 
 fn write(export: &Export, out: &mut dyn Write) -> io::Result<()> {
+    write_version(export, export.options.spz_version == SpzVersion::V4, out)
+}
+
+/// Writes version 3, whatever the options say.
+pub(in crate::io::model) fn write_v3(export: &Export, out: &mut dyn Write) -> io::Result<()> {
+    write_version(export, false, out)
+}
+
+fn write_version(export: &Export, is_v4: bool, out: &mut dyn Write) -> io::Result<()> {
     let records = record::write(export)?;
     let planes = encode(export);
-    let (is_v4, count) = (export.options.spz_version == SpzVersion::V4, export.rows.len() as u32);
+    let count = export.rows.len() as u32;
     let mut header = MAGIC.to_le_bytes().to_vec();
     header.extend(if is_v4 { 4_u32 } else { 3 }.to_le_bytes());
     header.extend(count.to_le_bytes());

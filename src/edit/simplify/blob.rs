@@ -1,0 +1,163 @@
+//! Two Gaussians as one.
+
+use glam::{DMat3, DQuat, DVec3};
+
+/// Weight of a difference of colour, 0 to 1 a channel, beside that of shape and place.
+const COLOUR: f64 = 4.0;
+/// Constant basis function of the harmonics.
+const SH_C0: f64 = 0.282_094_791_773_878;
+/// Largest opacity that a merged Gaussian gets; blending ends there.
+const OPACITY_MAX: f64 = 0.99;
+/// Sweeps of the eigenvalue iteration; five reach double precision for 3 x 3.
+const SWEEPS: usize = 8;
+
+/// A Gaussian as moments.
+#[derive(Clone, Debug)]
+pub(super) struct Blob {
+    pub mean: DVec3,
+    pub covariance: DMat3,
+    /// After the sigmoid.
+    pub opacity: f64,
+    /// Blending weight over all pixels of the views.
+    pub weight: f64,
+    pub label: u32,
+    pub confidence: f32,
+    /// Coefficients of degree 0, then those above.
+    pub harmonics: Vec<[f32; 3]>,
+    /// The row that it was made of, if of one alone.
+    pub row: Option<usize>,
+}
+
+impl Blob {
+    /// Returns what merging costs in the pictures: the lighter weight times how different both are. Shape and place differ by
+    /// the Bhattacharyya distance.
+    pub(super) fn cost(&self, other: &Self) -> f64 {
+        let mean = (self.covariance + other.covariance) * 0.5;
+        let (gap, product) = (self.mean - other.mean, self.covariance.determinant() * other.covariance.determinant());
+        let place = gap.dot(mean.inverse() * gap) / 8.0;
+        let shape = 0.5 * (mean.determinant() / product.max(f64::MIN_POSITIVE).sqrt()).max(1.0).ln();
+        let colour = self.colour().distance_squared(other.colour());
+        let weight = self.weight * other.weight / (self.weight + other.weight).max(f64::MIN_POSITIVE);
+        let cost = weight * (place + shape + COLOUR * colour);
+        // Flat Gaussians that are too thin for an inverse stay.
+        if cost.is_finite() { cost } else { f64::INFINITY }
+    }
+
+    /// Returns both as one: moments and colours by weight. The opacity keeps what both cover, as far as it is visible.
+    pub(super) fn merged(&self, other: &Self) -> Self {
+        let share = if self.weight + other.weight > 0.0 { self.weight / (self.weight + other.weight) } else { 0.5 };
+        let mix = |a: f64, b: f64| share * a + (1.0 - share) * b;
+        let mean = self.mean * share + other.mean * (1.0 - share);
+        let spread = |blob: &Self| {
+            let gap = blob.mean - mean;
+            blob.covariance + DMat3::from_cols(gap * gap.x, gap * gap.y, gap * gap.z)
+        };
+        let covariance = spread(self) * share + spread(other) * (1.0 - share);
+        let area = |covariance: &DMat3| {
+            let (_, mut sizes) = axes(covariance);
+            sizes.sort_by(f64::total_cmp);
+            sizes[1] * sizes[2]
+        };
+        // What a hidden one covers does not count: the share of its cover that the views see, against that of the other.
+        let covers = [self, other].map(|blob| blob.opacity * area(&blob.covariance));
+        let seen = [self, other].map(|blob| blob.weight);
+        let visible = (0..2).map(|at| seen[at] / covers[at].max(f64::MIN_POSITIVE)).fold(0.0, f64::max);
+        let cover = if visible > 0.0 { (seen[0] + seen[1]) / visible } else { covers[0] + covers[1] };
+        let opacity = cover / area(&covariance).max(f64::MIN_POSITIVE);
+        let harmonics = self.harmonics.iter().zip(&other.harmonics);
+        let harmonics = harmonics.map(|(a, b)| [0, 1, 2].map(|c| mix(f64::from(a[c]), f64::from(b[c])) as f32));
+        Self {
+            mean,
+            covariance,
+            opacity: opacity.clamp(1e-6, OPACITY_MAX),
+            weight: self.weight + other.weight,
+            label: self.label,
+            confidence: mix(self.confidence.into(), other.confidence.into()) as f32,
+            harmonics: harmonics.collect(),
+            row: None,
+        }
+    }
+
+    fn colour(&self) -> DVec3 {
+        let [r, g, b] = self.harmonics[0].map(|value| f64::from(value) * SH_C0);
+        DVec3::new(r, g, b)
+    }
+}
+
+/// Returns the covariance of a rotation (w, x, y, z) and the logarithms of deviations.
+pub(super) fn covariance(quat: [f32; 4], scales: [f32; 3]) -> DMat3 {
+    let [w, x, y, z] = quat.map(f64::from);
+    let turn = DMat3::from_quat(DQuat::from_xyzw(x, y, z, w).normalize());
+    let squares = DVec3::from_array(scales.map(|scale| (2.0 * f64::from(scale)).exp()));
+    turn * DMat3::from_diagonal(squares) * turn.transpose()
+}
+
+/// Returns a rotation and the deviations along its axes, of a covariance. Jacobi's method.
+pub(super) fn axes(covariance: &DMat3) -> (DQuat, [f64; 3]) {
+    let (mut matrix, mut turn) = (*covariance, DMat3::IDENTITY);
+    for _ in 0..SWEEPS {
+        for (p, q) in [(0, 1), (0, 2), (1, 2)] {
+            let off = matrix.col(q)[p];
+            if off == 0.0 {
+                continue;
+            }
+            let ratio = (matrix.col(q)[q] - matrix.col(p)[p]) / (2.0 * off);
+            let tangent = ratio.signum() / (ratio.abs() + ratio.hypot(1.0));
+            let cosine = 1.0 / tangent.hypot(1.0);
+            let mut step = DMat3::IDENTITY;
+            *step.col_mut(p) = DVec3::ZERO;
+            *step.col_mut(q) = DVec3::ZERO;
+            (step.col_mut(p)[p], step.col_mut(p)[q]) = (cosine, -tangent * cosine);
+            (step.col_mut(q)[p], step.col_mut(q)[q]) = (tangent * cosine, cosine);
+            matrix = step.transpose() * matrix * step;
+            turn *= step;
+        }
+    }
+    let sizes = [0, 1, 2].map(|axis| matrix.col(axis)[axis].max(0.0).sqrt());
+    (DQuat::from_mat3(&turn).normalize(), sizes)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Blob, axes, covariance};
+    use glam::{DMat3, DVec3};
+
+    fn blob(x: f64, weight: f64) -> Blob {
+        let covariance = covariance([0.9, 0.1, -0.3, 0.2], [-1.0, -2.0, -3.0]);
+        let harmonics = vec![[x as f32, 0.5, 0.0], [0.1; 3]];
+        Blob { mean: DVec3::X * x, covariance, opacity: 0.6, weight, label: 3, confidence: 0.5, harmonics, row: None }
+    }
+
+    #[test]
+    fn axes_give_the_covariance_back() {
+        let matrix = covariance([0.3, -0.8, 0.2, 0.4], [0.5, -4.0, -1.0]);
+        let (turn, sizes) = axes(&matrix);
+        let turn = DMat3::from_quat(turn);
+        let again = turn * DMat3::from_diagonal(DVec3::from_array(sizes.map(|size| size * size))) * turn.transpose();
+        assert!((again - matrix).to_cols_array().iter().all(|gap| gap.abs() < 1e-12), "{again} {matrix}");
+        let mut sorted = sizes;
+        sorted.sort_by(f64::total_cmp);
+        for (size, scale) in sorted.iter().zip([-4.0_f64, -1.0, 0.5]) {
+            assert!((size.ln() - scale).abs() < 1e-9, "{sizes:?}");
+        }
+    }
+
+    #[test]
+    fn a_pair_has_the_moments_of_both() {
+        let (a, b) = (blob(0.0, 1.0), blob(1.0, 3.0));
+        let both = a.merged(&b);
+        assert!((both.mean.x - 0.75).abs() < 1e-12 && both.weight == 4.0);
+        // Variance of two points at 0 and 1 with shares of 1/4 and 3/4.
+        assert!((both.covariance.x_axis.x - a.covariance.x_axis.x - 0.1875).abs() < 1e-12);
+        assert_eq!(both.harmonics, [[0.75, 0.5, 0.0], [0.1; 3]]);
+    }
+
+    #[test]
+    fn equal_ones_in_one_place_cover_twice_and_hidden_ones_nothing() {
+        let twice = blob(0.0, 1.0).merged(&blob(0.0, 1.0));
+        assert!((twice.opacity - 0.99).abs() < 1e-12, "{}", twice.opacity);
+        let hidden = blob(0.0, 1.0).merged(&blob(5.0, 0.0));
+        assert!((hidden.opacity - 0.6).abs() < 1e-12 && hidden.mean.x == 0.0);
+        assert_eq!(blob(0.0, 1.0).cost(&blob(5.0, 0.0)), 0.0);
+    }
+}

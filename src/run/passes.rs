@@ -1,0 +1,75 @@
+//! Times by pass of the last steps, for the report.
+
+use super::Run;
+use crate::scene::Gaussians;
+use crate::train::StepTimes;
+use serde::{Deserialize, Serialize};
+
+/// Most steps that run again for it.
+const STEPS: u32 = 16;
+/// Least steps of the run for each of them: the report costs no more than half a percent of a training.
+const STEPS_EACH: u32 = 200;
+
+/// Mean time of a pass in a step.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub(crate) struct Pass {
+    pub stage: String,
+    pub name: String,
+    /// Time of all its items in a step, ms.
+    #[serde(alias = "median_ms")]
+    pub ms: f64,
+    /// Share of the step, 0 to 1.
+    pub share: f64,
+}
+
+impl Run<'_> {
+    /// Times the passes of the last steps, once more. Nothing is noted of a short run, or where the device has no clock.
+    pub(super) fn time_passes(&mut self, model: &Gaussians) {
+        let has_clock = self.trainer.engine_mut().gpu().limits().timestamp_bits > 0;
+        let count = (self.trainer.steps_done() / STEPS_EACH).min(STEPS);
+        if !has_clock || count == 0 {
+            return;
+        }
+        match self.trainer.times_of_last(count, model) {
+            Ok(times) => self.info.passes = means(&times),
+            // The model is saved and scored.
+            Err(error) => tracing::warn!("{error}; the report has no times by pass"),
+        }
+    }
+}
+
+/// Returns the means over the steps, in the order of a step.
+fn means(times: &[StepTimes]) -> Vec<Pass> {
+    let mut passes: Vec<Pass> = Vec::new();
+    for (stage, name, ns) in times.iter().flat_map(|times| &times.items) {
+        let ms = *ns as f64 / 1e6 / times.len() as f64;
+        match passes.iter_mut().find(|pass| pass.stage == stage.name() && pass.name == *name) {
+            Some(pass) => pass.ms += ms,
+            None => passes.push(Pass { stage: stage.name().to_owned(), name: name.clone(), ms, share: 0.0 }),
+        }
+    }
+    let all: f64 = passes.iter().map(|pass| pass.ms).sum();
+    passes.iter_mut().for_each(|pass| pass.share = pass.ms / all.max(f64::MIN_POSITIVE));
+    passes
+}
+
+#[cfg(test)]
+mod tests {
+    use super::means;
+    use crate::pass::Stage;
+    use crate::train::StepTimes;
+
+    #[test]
+    fn a_pass_that_not_every_step_has_counts_with_its_share() {
+        let step = |items: &[(Stage, &str, u64)]| StepTimes {
+            step: 1,
+            is_first: false,
+            items: items.iter().map(|(stage, name, ns)| (*stage, (*name).to_owned(), *ns)).collect(),
+        };
+        let sort = (Stage::Sort, "scan", 1_000_000);
+        let found = means(&[step(&[sort, sort]), step(&[sort, sort, (Stage::Loss, "labels", 2_000_000)])]);
+        let rows: Vec<_> = found.iter().map(|pass| (pass.name.as_str(), pass.ms, pass.share)).collect();
+        assert_eq!(rows, [("scan", 2.0, 2.0 / 3.0), ("labels", 1.0, 1.0 / 3.0)]);
+    }
+}

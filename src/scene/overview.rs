@@ -1,0 +1,39 @@
+//! What the cameras of a scene look at together.
+
+use super::Camera;
+use glam::{DMat3, DVec3};
+
+/// Where to look at a scene from.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Overview {
+    /// Direction of up in the world, of length 1.
+    pub up: DVec3,
+    /// The point in the middle, world units.
+    pub target: DVec3,
+    /// Distance of the cameras from it, world units.
+    pub distance: f64,
+}
+
+impl Overview {
+    /// Returns the mean up of some cameras, the point that they look at, and their mean distance from it; none without
+    /// cameras.
+    pub fn of<'a>(cameras: impl Iterator<Item = &'a Camera> + Clone) -> Option<Self> {
+        let count = cameras.clone().count();
+        if count == 0 {
+            return None;
+        }
+        let up = -cameras.clone().map(|camera| camera.rotation.row(1)).sum::<DVec3>();
+        let middle = cameras.clone().map(Camera::centre).sum::<DVec3>() / count as f64;
+        // The point nearest to all optical axes, held near the cameras where these are parallel.
+        let (mut normal, mut right) = (DMat3::IDENTITY * 1e-3, middle * 1e-3);
+        for camera in cameras.clone() {
+            let axis = camera.rotation.row(2);
+            let across = DMat3::IDENTITY - DMat3::from_cols(axis * axis.x, axis * axis.y, axis * axis.z);
+            normal += across;
+            right += across * camera.centre();
+        }
+        let target = normal.inverse() * right;
+        let distance = cameras.map(|camera| camera.centre().distance(target)).sum::<f64>() / count as f64;
+        Some(Self { up: up.try_normalize().unwrap_or(DVec3::NEG_Y), target, distance: distance.max(1e-6) })
+    }
+}

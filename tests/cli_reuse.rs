@@ -1,0 +1,79 @@
+//! A trained model begins another training, or becomes simpler.
+
+use crate::support::device;
+use crate::support::runs::{Place, stderr, succeeded};
+use labelgs::io::{read_model, write_model};
+use serde_json::Value;
+use std::collections::BTreeSet;
+use std::path::Path;
+
+fn json(path: &Path) -> Value {
+    serde_json::from_slice(&std::fs::read(path).expect("a file")).expect("JSON")
+}
+
+/// PSNR of the test views at the end of a run.
+fn psnr(place: &Place, out: &str) -> f64 {
+    json(&place.path(out).join("metrics.json"))["test"]["psnr"].as_f64().expect("a number")
+}
+
+#[test]
+fn a_training_goes_on_from_a_model_of_any_format() {
+    let Some(_turn) = device() else { return };
+    let place = Place::new();
+    succeeded(&place.trained("first", &["--iterations", "200"]));
+    succeeded(&place.labelgs(&["convert", &place.text("first"), &place.text("first.spz")]));
+    let [folder, file] = [place.text("first"), place.text("first.spz")];
+    succeeded(&place.trained("anew", &["--iterations", "4"]));
+    let (first, anew) = (psnr(&place, "first"), psnr(&place, "anew"));
+    for (out, init) in [("of-folder", &folder), ("of-file", &file)] {
+        succeeded(&place.trained(out, &["--init", init, "--iterations", "4", "--checkpoint-every", "2"]));
+        let found = psnr(&place, out);
+        assert!(found > first - 1.0 && found > anew + 1.0, "{out}: {found} dB, {first} before, {anew} from points");
+    }
+    let again = place.trained("of-file", &["--init", &file, "--resume", "--iterations", "6"]);
+    assert!(succeeded(&again).contains("first.spz is not read again"), "{}", stderr(&again));
+
+    let scene = place.text("scene");
+    let plain = place.labelgs(&["train", &scene, "-o", &place.text("plain"), "--init", &file, "--iterations", "2"]);
+    assert!(succeeded(&plain).contains("labels of the first model are lost"), "{}", stderr(&plain));
+
+    let missing = place.trained("missing", &["--init", &place.text("nothing.ply"), "--iterations", "2"]);
+    assert_eq!(missing.status.code(), Some(3));
+    assert!(stderr(&missing).contains("nothing.ply"), "{}", stderr(&missing));
+}
+
+#[test]
+fn the_gaussians_that_contribute_most_stay() {
+    let Some(_turn) = device() else { return };
+    let place = Place::new();
+    succeeded(&place.trained("out", &["--iterations", "200"]));
+    let (scene, masks) = (place.text("scene"), place.text("scene/masks"));
+    let simplified = |goal: [&str; 2], output: &str| -> Value {
+        let typed = ["simplify", &place.text("out"), "--scene", &scene, "--masks", &masks, "--json", "-o"];
+        let done = place.labelgs(&[&typed[..], &[&place.text(output)], &goal].concat());
+        succeeded(&done);
+        serde_json::from_slice(&done.stdout).expect("JSON")
+    };
+    let half = simplified(["--gaussians", "120"], "some.ply");
+    assert_eq!((&half["gaussians"], &half["chosen"]["gaussians"]), (&120.into(), &120.into()));
+    let whole = read_model(place.text("out/point_cloud/iteration_200/point_cloud.ply")).expect("a model").gaussians;
+    let some = read_model(place.text("some.ply")).expect("a model").gaussians;
+    let labels = |labels: Option<&Vec<u32>>| labels.into_iter().flatten().copied().collect::<BTreeSet<u32>>();
+    assert_eq!(labels(some.labels.as_ref()), labels(whole.labels.as_ref()), "no label is lost");
+
+    // As many at random are worse.
+    let step = whole.len() / 120;
+    let random = whole.filtered(|row| row % step == 0 && row / step < 120);
+    assert_eq!(random.len(), 120);
+    write_model(place.path("random.ply"), &random).expect("written");
+    let scores = place.text("scores.json");
+    succeeded(&place.labelgs(&["eval", &place.text("random.ply"), "--scene", &scene, "--json", &scores]));
+    let at_random = json(Path::new(&scores))["mean"]["psnr"].as_f64().expect("a number");
+    let chosen = half["chosen"]["psnr"].as_f64().expect("a number");
+    assert!(chosen > at_random + 1.0, "{chosen} dB, at random {at_random} dB");
+
+    let near = simplified(["--psnr-loss", "0.2"], "near.ply");
+    let all = near["table"][0]["psnr"].as_f64().expect("a number");
+    assert!(near["chosen"]["psnr"].as_f64().expect("a number") >= all - 0.2, "{near}");
+    assert!(near["gaussians"].as_u64() < near["of"].as_u64(), "{near}");
+}
