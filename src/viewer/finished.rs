@@ -239,6 +239,9 @@ impl Session<'_> {
         if index >= views.list.len() || !is_whole || !self.hub.is_watched() {
             return Ok(());
         }
+        if views.list.iter().all(|posed| posed.view.photo.is_none()) {
+            return Ok(());
+        }
         if views.list[index].view.photo.is_some() {
             self.scores.push(self.painter.score(index, &mut self.drawing)?);
         } else {

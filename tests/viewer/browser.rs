@@ -4,7 +4,8 @@ use super::chromium::{Browser, Tab};
 use super::server::{HOSTILE, Picture, Place, Server, model};
 use super::{events, page_file};
 use crate::support::device;
-use labelgs::io::write_model;
+use labelgs::internals::io::camera_json::write_cameras;
+use labelgs::io::{LoadOptions, write_model};
 use rand::rngs::SmallRng;
 use rand::{Rng, SeedableRng};
 use serde_json::Value;
@@ -43,6 +44,7 @@ fn the_page_works_in_a_browser() {
     drop(server);
     page_file::a_page_shows_its_model(&mut browser, &place);
     assert_eq!(browser.complaints, Vec::<String>::new(), "complaints on the console");
+    a_run_without_its_scene(&mut browser, &place);
     many_labels_and_none(&mut browser, &place);
     a_server_goes_away_and_comes_back(&mut browser, &place);
     a_training_in_the_page(&mut browser, &place);
@@ -291,6 +293,23 @@ fn two_tabs_and_a_killed_one(browser: &mut Browser, tab: &Tab, server: &Server) 
     browser.until(tab, SETTLED);
     browser.js(tab, "labelgs.edits.undo()");
     browser.until(tab, "labelgs.edits.state.commands.length === 0");
+}
+
+/// The cameras that a run has written stand in for its scene.
+fn a_run_without_its_scene(browser: &mut Browser, place: &Place) {
+    let scene = labelgs::io::open(&place.path("scene"), &LoadOptions::default()).expect("a scene");
+    let cameras: Vec<_> = scene.all().into_iter().map(|view| (view.name.as_str(), &view.camera)).collect();
+    let folder = place.path("run/point_cloud/iteration_1");
+    std::fs::create_dir_all(&folder).expect("a folder");
+    std::fs::copy(place.path("model.ply"), folder.join("point_cloud.ply")).expect("copied");
+    write_cameras(place.path("run/cameras.json"), &cameras).expect("written");
+    let server = Server::start(place.command(&["view", "run"]));
+    let tab = browser.open(&server.address, WIDE);
+    let picture = pixels(browser, &tab);
+    assert_eq!(picture, place.picture("all/000.rgb.png"));
+    assert_eq!(browser.js(&tab, "document.querySelectorAll('#view-list button').length"), 6);
+    assert_eq!(browser.js(&tab, "document.getElementById('compare').hidden"), true);
+    browser.kill(&tab);
 }
 
 fn many_labels_and_none(browser: &mut Browser, place: &Place) {

@@ -28,12 +28,13 @@ export class Views {
 
   setScene(views) {
     $("views").hidden = views.length === 0;
+    const hasPhotos = views.some((view) => view.photo);
     const button = (view, index) => {
       const facts = el("span", { className: "facts" });
       const image = view.photo
         ? el("img", { src: `/thumb/${index}`, alt: "", loading: "lazy", decoding: "async", width: 78, height: 52 })
         : el("span", { className: "blank" });
-      const made = el("button", { type: "button", className: "view", title: view.name }, image, el("span", { className: "name", textContent: view.name }), facts);
+      const made = el("button", { type: "button", className: hasPhotos ? "view" : "view bare", title: view.name }, image, el("span", { className: "name", textContent: view.name }), facts);
       made.addEventListener("click", () => this.snapped(index));
       return { made, facts, view, index };
     };
