@@ -89,6 +89,7 @@ mod shaders;
 pub mod synth;
 mod train;
 mod verify;
+mod version;
 #[cfg(feature = "viewer")]
 pub mod viewer;
 

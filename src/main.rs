@@ -49,6 +49,46 @@ fn given(memory: *mut u8, bytes: usize) -> *mut u8 {
     memory
 }
 
+// `LOG`: git's log of HEAD, or a line of its form.
+include!(concat!(env!("OUT_DIR"), "/commit.rs"));
+
+/// Digits of a commit that are shown, as many as tell any two apart.
+const DIGITS: usize = 12;
+/// A copy, so that nothing else of the log is in the program.
+const NEWEST: Option<[u8; DIGITS]> = newest(LOG);
+
+/// The commit that this program was built from: as the environment of the build says, else the newest in git's log.
+const COMMIT: Option<&str> = match (option_env!("LABELGS_COMMIT"), &NEWEST) {
+    (Some(said), _) => Some(said),
+    (None, Some(digits)) => match std::str::from_utf8(digits) {
+        Ok(digits) => Some(digits),
+        Err(_) => None,
+    },
+    (None, None) => None,
+};
+
+/// Returns the digits in the second word of the last line.
+const fn newest(log: &[u8]) -> Option<[u8; DIGITS]> {
+    let mut at = log.len().saturating_sub(1);
+    while at > 0 && log[at - 1] != b'\n' {
+        at -= 1;
+    }
+    while at < log.len() && log[at] != b' ' {
+        at += 1;
+    }
+    let mut digits = [0; DIGITS];
+    let mut count = 0;
+    while count < DIGITS {
+        at += 1;
+        if at >= log.len() || !log[at].is_ascii_hexdigit() {
+            return None;
+        }
+        digits[count] = log[at];
+        count += 1;
+    }
+    Some(digits)
+}
+
 fn main() -> std::process::ExitCode {
-    labelgs::internals::cli::main(std::env::args_os()).into()
+    labelgs::internals::cli::main(std::env::args_os(), COMMIT).into()
 }

@@ -19,6 +19,7 @@ mod cli_resume; // killed, stopped and damaged runs resume to the same bits
 mod cli_reuse; // a trained model begins another training, or becomes simpler
 mod ignored; // the shipped program has no fault injection
 mod output; // files of rendered pictures
+mod package; // manual pages and completions of every command, and the version
 #[path = "scheduler/plan/mod.rs"]
 mod plan; // barriers and memory of the lists without `lab`
 mod registry; // every shader without `lab` has a header, a mirror and a pass

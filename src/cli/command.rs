@@ -29,8 +29,10 @@ use super::transform::TransformArgs;
 use super::view::ViewArgs;
 use super::wording::flag;
 use crate::run::Settings;
+use crate::version;
 use clap::{CommandFactory, Parser, Subcommand};
 use std::collections::BTreeMap;
+use std::sync::LazyLock;
 
 const EXIT_STATUSES: &str = "\
 Exit status: 0 done, 1 finished but a requested check failed, 2 usage, 3 bad input, 4 no usable device, 5 out of memory, \
@@ -170,10 +172,13 @@ pub enum Command {
     Profile(ProfileArgs),
 }
 
+/// What `--version` prints; clap wants it to last.
+static VERSION: LazyLock<String> = LazyLock::new(version::text);
+
 /// Settings of training that a newcomer needs: the help shows them with the flags that have no heading.
 const FIRST: [&str; 3] = ["iterations", "max_resolution", "preset"];
 
-/// Returns the command line with the defaults of training in its help.
+/// Returns the command line with the defaults of training in its help, and commit and features in its `--version`.
 pub fn command() -> clap::Command {
     let mut defaults = Settings::default().texts();
     let paper = paper_flags(&defaults);
@@ -186,7 +191,7 @@ pub fn command() -> clap::Command {
     ] {
         defaults.insert(key.into(), text.into());
     }
-    Cli::command().mut_subcommand("train", |train| {
+    Cli::command().long_version(VERSION.as_str()).mut_subcommand("train", |train| {
         train.mut_args(|arg| {
             let arg = if FIRST.contains(&arg.get_id().as_str()) { arg.help_heading(None) } else { arg };
             if arg.get_id() == "paper" {

@@ -27,7 +27,7 @@ pub(super) fn report(checks: &[Check], error: Option<&Error>, context: &Context)
     });
     Ok(json!({
         "schema_version": 1,
-        "labelgs": env!("CARGO_PKG_VERSION"),
+        "labelgs": crate::version::text(),
         "system": { "os": std::env::consts::OS, "processor": std::env::consts::ARCH },
         "devices": listed.collect::<Vec<_>>(),
         "checks": checks.iter().map(selftest::to_json).collect::<Vec<_>>(),

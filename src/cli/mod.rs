@@ -46,15 +46,16 @@ pub(crate) mod values;
 pub(crate) mod view;
 pub(crate) mod wording;
 
-use crate::Error;
+use crate::{Error, version};
 use clap::FromArgMatches;
 use command::{Cli, Command, command};
 use context::Context;
 use std::ffi::OsString;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-/// Parses `args`, runs the command, reports an error and returns the exit status.
-pub fn main(args: impl IntoIterator<Item = OsString>) -> u8 {
+/// Parses `args`, runs the command, reports an error and returns the exit status. `commit` is that of the program.
+pub fn main(args: impl IntoIterator<Item = OsString>, commit: Option<&'static str>) -> u8 {
+    version::note_commit(commit);
     std::panic::set_hook(Box::new(|panic| {
         let place = panic.location().map_or(String::new(), |place| format!(" at {}:{}", place.file(), place.line()));
         let payload = panic.payload();

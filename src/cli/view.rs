@@ -113,9 +113,13 @@ pub(crate) fn run(args: &ViewArgs, context: &Context) -> Result<()> {
 
 /// Opens an address in the browser of the desktop. Without one the printed address is left.
 fn open_browser(address: &str) {
-    let opener = if cfg!(target_os = "macos") { "open" } else { "xdg-open" };
+    let (opener, before): (_, &[&str]) = if cfg!(windows) {
+        ("rundll32", &["url.dll,FileProtocolHandler"])
+    } else {
+        (if cfg!(target_os = "macos") { "open" } else { "xdg-open" }, &[])
+    };
     let mut command = Command::new(opener);
-    command.arg(address).stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
+    command.args(before).arg(address).stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
     match command.spawn() {
         // The opener ends by itself; waiting for it leaves no dead process behind.
         Ok(mut child) => drop(std::thread::spawn(move || child.wait())),

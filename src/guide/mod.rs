@@ -2,6 +2,7 @@
 //!
 //! | page | answers |
 //! | --- | --- |
+//! | [install] | How is it installed, and which version is it? |
 //! | [start] | How do photos become a labelled model, step by step? |
 //! | [data] | Which scenes, photos, cameras and depth maps are read? |
 //! | [masks] | Where do masks come from, and how are they checked and repaired? |
@@ -40,6 +41,7 @@ macro_rules! pages {
 }
 
 pages! {
+    install: "Packages, cargo, what is needed at run time, and which version it is.";
     start: "From photos to a labelled model, step by step.";
     data: "Scenes, photos, cameras and depth maps that are read.";
     masks: "Masks: their form, trackers, checks and repair.";

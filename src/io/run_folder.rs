@@ -28,6 +28,7 @@ pub fn of_model(model: &Path) -> Option<PathBuf> {
 #[derive(Debug)]
 pub struct Lock {
     folder: PathBuf,
+    #[cfg_attr(not(unix), expect(dead_code, reason = "it holds the lock"))]
     file: File,
 }
 

@@ -48,7 +48,7 @@ pub(crate) struct Info {
 pub(crate) struct Part {
     /// What was typed.
     pub command: Option<String>,
-    /// Version of labelgs.
+    /// Version, commit and features of labelgs.
     pub labelgs: String,
     pub device: String,
     /// Steps of the checkpoint it went on from; 0 for a new run.
@@ -107,7 +107,7 @@ impl Info {
         let found = gpu.capabilities();
         info.parts.push(Part {
             command: request.command.clone(),
-            labelgs: env!("CARGO_PKG_VERSION").to_owned(),
+            labelgs: crate::version::text(),
             device: format!("{} ({} {})", found.name, found.driver_name, found.driver_info),
             after,
             began: SystemTime::UNIX_EPOCH.elapsed().map_or(0, |since| since.as_secs()),
