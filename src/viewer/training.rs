@@ -21,8 +21,9 @@ use std::time::{Duration, Instant};
 const REPORT_EVERY: Duration = Duration::from_millis(250);
 /// Time between two counts of labels.
 const COUNT_EVERY: Duration = Duration::from_secs(5);
-/// Steps between two rounds over the test views.
-const SCORE_EVERY: u32 = 500;
+/// Rounds over the test views in a run, and the fewest and most steps between two.
+const ROUNDS: u32 = 20;
+const ROUND_STEPS: [u32; 2] = [25, 500];
 /// Time between two events of a paused run.
 const PAUSED_TURN: Duration = Duration::from_millis(50);
 
@@ -190,11 +191,12 @@ impl<'a> Watched<'a> {
         Ok(())
     }
 
-    /// Scores the next test view. A round begins every few hundred steps.
+    /// Scores the next test view. A run has some rounds over them.
     fn score_one(&mut self, live: &mut Live) -> Result<()> {
         let (step, views) = (live.step(), Arc::clone(&self.painter.views));
         if self.scored_to >= views.list.len() {
-            if step < self.scored_at + SCORE_EVERY || step == 0 {
+            let [fewest, most] = ROUND_STEPS;
+            if step < self.scored_at + (self.steps / ROUNDS).clamp(fewest, most) || step == 0 {
                 return Ok(());
             }
             (self.scored_to, self.scored_at) = (0, step);

@@ -8,7 +8,7 @@ use labelgs::scene::Gaussians;
 use std::fmt::Write;
 
 /// Pictures of a page are blended in 8 bits: their error is a few steps of 1/256 where many Gaussians overlap.
-const LEAST: f64 = 38.0;
+const LEAST: f64 = 44.0;
 
 /// The pixels of the page's picture.
 fn pixels(browser: &mut Browser, tab: &Tab) -> Picture {

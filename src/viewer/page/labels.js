@@ -82,7 +82,8 @@ export class Labels {
     if (hadFocus) item?.focus({ preventScroll: true });
     const objects = this.rows.filter((row) => row.id !== 0).length;
     $("label-count").textContent = this.rows.length === 0 ? "" : rows.length === this.rows.length ? `${number(this.all > this.rows.length ? this.all : objects)} objects` : `${rows.length} found`;
-    const empty = this.rows.length === 0 ? "This model has no labels. Train it with masks, or label it afterwards with labelgs label."
+    const empty = this.rows.length === 0 && this.isFixed ? "No labels yet. A training with masks gives them when growth has ended."
+      : this.rows.length === 0 ? "This model has no labels. Train it with masks, or label it afterwards with labelgs label."
       : rows.length === 0 ? "No label has this name or id." : "";
     $("label-empty").textContent = empty;
     $("label-empty").hidden = !empty;
