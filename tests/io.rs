@@ -10,6 +10,7 @@ mod label_table;
 mod mask_check;
 mod mask_forms;
 mod mask_import;
+mod mask_tools;
 mod masks;
 mod model;
 mod output;

@@ -15,6 +15,14 @@ pub const FILE: &str = "labels.json";
 /// Version of the layout.
 const SCHEMA_VERSION: u32 = 1;
 
+/// Returns `name`, with the first number appended that makes it unique.
+pub(crate) fn unique_name(name: String, taken: &mut BTreeSet<String>) -> String {
+    let numbered = (2..).map(|number| format!("{name} {number}"));
+    let free = std::iter::once(name.clone()).chain(numbered).find(|name| !taken.contains(name)).unwrap_or(name);
+    taken.insert(free.clone());
+    free
+}
+
 /// One object.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct LabelEntry {

@@ -19,7 +19,7 @@ fn dataset(scene: &Scene) -> Dataset {
     io::open(scene.path(), &LoadOptions { photos: false, test_every: None, ..LoadOptions::default() }).expect("a scene")
 }
 
-fn run(scene: &Scene, folder: &str, change: impl FnOnce(&mut ImportOptions)) -> labelgs::Result<Imported> {
+pub fn run(scene: &Scene, folder: &str, change: impl FnOnce(&mut ImportOptions)) -> labelgs::Result<Imported> {
     let mut options = ImportOptions { folder: scene.path().join(folder), ..ImportOptions::default() };
     change(&mut options);
     let output = scene.path().join("out");
@@ -27,13 +27,13 @@ fn run(scene: &Scene, folder: &str, change: impl FnOnce(&mut ImportOptions)) -> 
     import(&dataset(scene), &options, &output)
 }
 
-fn auto(scene: &Scene, folder: &str) -> labelgs::Result<Imported> {
+pub fn auto(scene: &Scene, folder: &str) -> labelgs::Result<Imported> {
     run(scene, folder, |_| ())
 }
 
 /// Checks that imported masks equal the ground truth with ids 1, 2, 3 replaced by `ids`, and that training reads them.
 #[track_caller]
-fn same_as_truth(scene: &Scene, done: &Imported, ids: [u16; 3]) {
+pub fn same_as_truth(scene: &Scene, done: &Imported, ids: [u16; 3]) {
     let masks = scene.path().join("out");
     for photo in 0..PHOTOS {
         let expected: Vec<u16> =
@@ -51,11 +51,11 @@ fn same_as_truth(scene: &Scene, done: &Imported, ids: [u16; 3]) {
     assert!(io::open(scene.path(), &options).expect("a scene").all().iter().all(|view| view.mask.is_some()));
 }
 
-fn names(done: &Imported) -> Vec<Option<&str>> {
+pub fn names(done: &Imported) -> Vec<Option<&str>> {
     done.labels.iter().map(|entry| entry.name.as_deref()).collect()
 }
 
-fn sources(done: &Imported) -> Vec<Option<&str>> {
+pub fn sources(done: &Imported) -> Vec<Option<&str>> {
     done.labels.iter().map(|entry| entry.source.as_deref()).collect()
 }
 

@@ -155,12 +155,21 @@ fn gaussians(count: usize, degree: u32, labelled: bool) -> Gaussians {
     g
 }
 
-/// A file of another program.
+/// A model of another program.
 pub fn golden(name: &str) -> Vec<u8> {
+    golden_file(&format!("formats/{name}"))
+}
+
+/// A file of masks of another program.
+pub fn golden_mask(name: &str) -> Vec<u8> {
+    golden_file(&format!("masks/{name}"))
+}
+
+fn golden_file(name: &str) -> Vec<u8> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR"));
     // The fuzzer is a crate of its own, below the engine's.
     let root = if folder.ends_with("tools/fuzz") { folder.join("../..") } else { folder.to_owned() };
-    std::fs::read(root.join("tests/golden/formats").join(name)).expect("a file of the tests")
+    std::fs::read(root.join("tests/golden").join(name)).expect("a file of the tests")
 }
 
 /// A model with labels, names and confidences.
@@ -292,6 +301,26 @@ pub fn mask_rgb() -> Vec<Vec<u8>> {
 pub fn mask_binary() -> Vec<Vec<u8>> {
     let kinds = [(Grayscale, Eight), (Grayscale, Sixteen), (Indexed, One), (Rgb, Eight)];
     kinds.map(|(colour, depth)| png(colour, depth, |i| if i / 24 % 2 == 0 { 255 } else { 0 })).to_vec()
+}
+
+/// Instances of COCO, of CVAT with tracks, and of Label Studio.
+pub fn coco() -> Vec<Vec<u8>> {
+    ["coco.json", "cvat-tracks.json", "label-studio-coco.json"].map(golden_mask).to_vec()
+}
+
+/// A photo of CVAT with this colour on a black ground.
+fn cvat(colour: [u8; 3]) -> Vec<u8> {
+    png(Rgb, Eight, |i| if i / 36 % 2 == 0 { colour[i % 3] } else { 0 })
+}
+
+/// Colours of labels, in the legend of CVAT.
+pub fn cvat_class() -> Vec<u8> {
+    cvat([255, 204, 51])
+}
+
+/// Colours of objects of CVAT.
+pub fn cvat_object() -> Vec<u8> {
+    cvat([128, 0, 0])
 }
 
 /// A run of DEVA.

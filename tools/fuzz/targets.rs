@@ -47,7 +47,7 @@ const PLAIN: Target = Target {
 const PIXELS: Target = Target { per_byte: 8192 * 4 * 2, ..PLAIN };
 
 /// All readers.
-pub const TARGETS: [Target; 38] = [
+pub const TARGETS: [Target; 44] = [
     Target {
         name: "colmap_cameras_bin",
         file: "sparse/0/cameras.bin",
@@ -161,6 +161,55 @@ pub const TARGETS: [Target; 38] = [
         seeds: seeds::mask,
         dress: png_sums,
         ..PIXELS
+    },
+    Target {
+        name: "mask_coco",
+        file: "in/a.json",
+        prepare: colmap_bin,
+        read: |folder, _| imported(folder, Format::Coco),
+        seeds: seeds::coco,
+        ..PLAIN
+    },
+    Target {
+        name: "mask_sam",
+        file: "in/00.json",
+        prepare: colmap_bin,
+        read: |folder, _| imported(folder, Format::SamJson),
+        seeds: || vec![seeds::golden_mask("sam/00.json")],
+        ..PLAIN
+    },
+    Target {
+        name: "mask_sam_table",
+        file: "in/00/metadata.csv",
+        prepare: sam_pictures,
+        read: |folder, _| imported(folder, Format::SamFolders),
+        seeds: || vec![seeds::golden_mask("sam/00.csv")],
+        ..PLAIN
+    },
+    Target {
+        name: "mask_cvat",
+        file: "in/SegmentationObject/00.png",
+        prepare: cvat,
+        read: |folder, _| imported(folder, Format::Cvat),
+        seeds: || vec![seeds::cvat_object()],
+        dress: png_sums,
+        ..PIXELS
+    },
+    Target {
+        name: "mask_cvat_legend",
+        file: "in/labelmap.txt",
+        prepare: cvat,
+        read: |folder, _| imported(folder, Format::Cvat),
+        seeds: || vec![seeds::golden_mask("labelmap.txt")],
+        ..PLAIN
+    },
+    Target {
+        name: "mask_brushes",
+        file: "in/tasks.json",
+        prepare: brushes,
+        read: |folder, _| imported(folder, Format::LabelStudio),
+        seeds: || ["label-studio.json", "label-studio-min.json"].map(seeds::golden_mask).to_vec(),
+        ..PLAIN
     },
     Target {
         name: "pred_json",

@@ -4,9 +4,10 @@ use super::open_photos;
 use crate::Result;
 use crate::cli::args::{JsonFlag, ReadArgs};
 use crate::cli::context::Context;
+use crate::cli::shell::quoted;
 use crate::cli::stdout;
 use crate::io::label_table::LabelEntry;
-use crate::io::masks::{Format, ImportOptions, Imported, Overlap, import};
+use crate::io::masks::{Format, ImportOptions, Imported, ObjectPer, Objects, Overlap, import};
 use clap::Args;
 use serde_json::json;
 use std::path::PathBuf;
@@ -14,24 +15,27 @@ use std::path::PathBuf;
 /// `labelgs masks import`.
 #[derive(Args, Clone, Debug)]
 pub struct ImportArgs {
-    /// Folder with the masks, or the folder of a tracker or data set that holds it.
-    #[arg(value_name = "DIR")]
+    /// Folder with the masks, or the folder of a tool or data set that holds it; or a JSON of COCO.
+    #[arg(value_name = "MASKS")]
     pub folder: PathBuf,
     /// Scene whose photos the masks belong to.
     #[arg(long, value_name = "SCENE")]
     pub scene: PathBuf,
     /// Folder to write; must be new or empty.
-    #[arg(short, long, value_name = "MASKS")]
+    #[arg(short, long, value_name = "DIR")]
     pub output: PathBuf,
     /// Format of the masks; auto fails if two formats fit.
     #[arg(long, value_name = "FORMAT", value_enum, default_value = "auto")]
     pub format: Format,
-    /// The pred.json of DEVA. Default: pred.json in DIR, if it exists.
+    /// The pred.json of DEVA. Default: pred.json in MASKS, if it exists.
     #[arg(long, value_name = "FILE")]
     pub pred: Option<PathBuf>,
-    /// Owner of pixels that two black and white masks share.
-    #[arg(long, value_name = "RULE", value_enum, default_value = "error")]
+    /// Owner of pixels that two masks share, where masks show one object each.
+    #[arg(long, value_name = "RULE", value_enum, default_value = "auto")]
     pub overlap: Overlap,
+    /// What makes two masks one object, where masks show one object each.
+    #[arg(long, value_name = "RULE", value_enum, default_value = "auto")]
+    pub object_per: ObjectPer,
     /// Tolerance for the scene.
     #[command(flatten)]
     pub read: ReadArgs,
@@ -48,6 +52,7 @@ pub(crate) fn run(args: &ImportArgs, context: &Context) -> Result<()> {
         format: args.format,
         pred: args.pred.clone(),
         overlap: args.overlap,
+        object_per: args.object_per,
     };
     let done = import(&dataset, &options, &args.output)?;
     warn(&done);
@@ -70,6 +75,7 @@ pub(crate) fn run(args: &ImportArgs, context: &Context) -> Result<()> {
     );
     text += &format!("{:>6} {:>12} {:>6}  {:<24} source\n", "label", "pixels", "views", "name");
     done.labels.iter().for_each(|entry| text += &line(entry));
+    text += &done.objects.as_ref().map_or(String::new(), |objects| meaning(objects, args));
     stdout::print(&text)
 }
 
@@ -91,7 +97,30 @@ fn warn(done: &Imported) {
     }
     if done.overlaps.pixels > 0 {
         let (pixels, photos) = (done.overlaps.pixels, done.overlaps.photos);
-        tracing::warn!("{pixels} pixels in {photos} photos belong to two objects and went to one by --overlap");
+        let rule = match done.overlaps.rule {
+            Overlap::Smaller => "smaller",
+            _ => "later",
+        };
+        tracing::warn!(
+            "{pixels} pixels in {photos} photos belong to several masks and went to the {rule} one, see --overlap"
+        );
     }
     done.notes.iter().for_each(|note| tracing::warn!("{note}"));
+}
+
+/// Says what the ids mean and, if each photo has its own, how they come to agree.
+fn meaning(objects: &Objects, args: &ImportArgs) -> String {
+    let why = &objects.why;
+    match objects.per {
+        ObjectPer::Mask => {
+            let [scene, masks] = [&args.scene, &args.output].map(|path| quoted(&path.to_string_lossy()));
+            format!(
+                "ids of each photo are its own ({why}; --object-per). To make them agree:\n  \
+                 labelgs train {scene} -o plain\n  \
+                 labelgs masks repair {masks} --per-view --model plain --scene {scene} -o repaired\n"
+            )
+        }
+        ObjectPer::Track => format!("masks of one track are one object ({why})\n"),
+        _ => format!("masks of one name are one object ({why})\n"),
+    }
 }

@@ -10,6 +10,7 @@ use crate::cli::values::near;
 use crate::io::atomic;
 use crate::io::label_table::{FILE, LabelEntry, LabelTable};
 use crate::label::masks::agree::{Agreement, agree};
+use crate::label::masks::names::carried;
 use crate::label::masks::repair::Repairs;
 use crate::label::vote::model::{columns_of, vote_engine};
 use crate::scene::{LabelMap, View};
@@ -89,7 +90,11 @@ pub(crate) fn run(args: &RepairArgs, context: &Context) -> Result<()> {
     };
     let (masks, repairs) = agree(&mut engine, &model, &views, how, &mut tick)?;
     drop(progress);
-    write(&args.output, &args.masks, &views, &masks)?;
+    let table = table(args, &views, &masks)?;
+    for (view, mask) in views.iter().zip(&masks).filter_map(|(view, mask)| Some((view, mask.as_ref()?))) {
+        write_mask(&args.output.join(file_of(view)), mask)?;
+    }
+    table.write(&args.output.join(FILE))?;
     report(&views, &masks, &repairs, args, context)
 }
 
@@ -98,21 +103,30 @@ fn file_of(view: &View) -> PathBuf {
     Path::new(&view.name).with_extension("png")
 }
 
-fn write(folder: &Path, source: &Path, views: &[&View], masks: &[Option<LabelMap>]) -> Result<()> {
+/// Makes the table of the repaired masks. Where each view had ids of its own, an object gets the name of most of its
+/// pixels; else its id keeps its entry.
+fn table(args: &RepairArgs, views: &[&View], masks: &[Option<LabelMap>]) -> Result<LabelTable> {
     let mut entries: BTreeMap<u16, LabelEntry> = BTreeMap::new();
-    let known = LabelTable::of_folder(source)?;
-    for (view, mask) in views.iter().zip(masks) {
-        let Some(mask) = mask else { continue };
-        write_mask(&folder.join(file_of(view)), mask)?;
+    let known = LabelTable::of_folder(&args.masks)?;
+    let names = match &known {
+        Some(known) if args.per_view => {
+            let pairs =
+                views.iter().zip(masks).filter_map(|(view, mask)| Some((view.mask.as_deref()?, mask.as_ref()?)));
+            carried(known, pairs)
+        }
+        _ => BTreeMap::new(),
+    };
+    for mask in masks.iter().flatten() {
         for id in mask.objects() {
-            let old = known.as_ref().and_then(|table| table.entry(u32::from(id)).cloned());
-            let blank = || LabelEntry { pixels: 0, views: 0, ..old.unwrap_or_else(|| LabelEntry::new(u32::from(id))) };
+            let new = LabelEntry { name: names.get(&id).cloned(), ..LabelEntry::new(u32::from(id)) };
+            let old = known.as_ref().filter(|_| !args.per_view).and_then(|table| table.entry(u32::from(id)).cloned());
+            let blank = || LabelEntry { pixels: 0, views: 0, ..old.unwrap_or(new) };
             let entry = entries.entry(id).or_insert_with(blank);
             entry.views += 1;
             entry.pixels += mask.ids.iter().filter(|&&found| found == id).count() as u64;
         }
     }
-    LabelTable::new(entries.into_values().collect()).write(&folder.join(FILE))
+    Ok(LabelTable::new(entries.into_values().collect()))
 }
 
 fn report(

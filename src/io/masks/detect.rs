@@ -2,35 +2,91 @@
 
 use super::content::{Kind, read_binary};
 use super::folder::{Claims, Layouts, files, layouts, root};
+use super::marks::{Found, Mark, Numbering, Object, Shape, number};
 use super::pred::Pred;
-use super::{Format, ImportOptions, shortened};
+use super::tools;
+use super::{Format, ImportOptions, ObjectPer, Overlap, shortened};
 use crate::error::{Error, Result};
 use crate::io::mask::read_header;
 use crate::io::read;
+use crate::scene::View;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+/// The masks of all photos.
+pub(super) enum Content {
+    /// One id picture for each photo that has one.
+    Ids { kind: Kind, of_photo: Vec<Option<String>>, pred: Option<Pred> },
+    /// Masks of one object each.
+    Marks { of_photo: Vec<Vec<Mark>>, numbering: Numbering },
+}
+
 /// The detected format of a folder of masks.
 pub(super) struct Reading {
     pub(super) format: Format,
-    /// Folder of the masks, possibly below the given one.
+    /// Folder or file of the masks, possibly below the given one.
     pub(super) root: PathBuf,
-    /// Kind of the id images; `None` for black and white ones.
-    pub(super) ids: Option<Kind>,
-    pub(super) claims: Claims,
-    pub(super) pred: Option<Pred>,
+    pub(super) content: Content,
+    /// Images without a photo.
+    pub(super) strays: Vec<String>,
+    /// Rule for shared pixels; not `Auto`.
+    pub(super) overlap: Overlap,
     /// Reason for the choice.
     pub(super) why: String,
-    /// Notes on classes in `classes.txt` without a mask.
+    /// Notes for the user.
     pub(super) notes: Vec<String>,
+}
+
+impl Reading {
+    /// True if the photo has a mask.
+    pub(super) fn has_mask(&self, photo: usize) -> bool {
+        match &self.content {
+            Content::Ids { of_photo, .. } => of_photo[photo].is_some(),
+            Content::Marks { of_photo, .. } => !of_photo[photo].is_empty(),
+        }
+    }
+
+    /// The objects of masks of one object each.
+    pub(super) fn objects(&self) -> Option<&[Object]> {
+        match &self.content {
+            Content::Ids { .. } => None,
+            Content::Marks { numbering, .. } => Some(&numbering.objects),
+        }
+    }
+
+    /// The list of ids that came with id pictures.
+    pub(super) fn pred(&self) -> Option<&Pred> {
+        match &self.content {
+            Content::Ids { pred, .. } => pred.as_ref(),
+            Content::Marks { .. } => None,
+        }
+    }
 }
 
 const NESTED_FORMATS: &str = "`format = binary-folders` if a folder is an object (OBJECT/NAME.png), \
                               `format = photo-folders` if a folder is a photo (NAME/OBJECT.png)";
 
-/// Detects the format for photos with these names.
-pub(super) fn detect(photos: &[&str], options: &ImportOptions) -> Result<Reading> {
+/// Detects the format for these photos.
+pub(super) fn detect(views: &[&View], options: &ImportOptions) -> Result<Reading> {
+    let photos: Vec<&str> = views.iter().map(|view| view.name.as_str()).collect();
+    if !options.folder.exists() {
+        return Err(Error::data(&options.folder, "", "there is no such folder of masks"));
+    }
+    let tool = match options.format {
+        Format::Auto => tools::recognise(&options.folder, &photos)?,
+        format => Some((format, "as asked for".to_owned())),
+    };
+    if let Some((format, why)) = tool
+        && let Some((root, found)) = tools::read(&options.folder, format, views)?
+    {
+        return of_marks(root, &photos, found, format, why, options);
+    }
+    folders(&photos, options)
+}
+
+/// Detects the format of masks that no tool marks as its own.
+fn folders(photos: &[&str], options: &ImportOptions) -> Result<Reading> {
     let root = root(&options.folder, options.format)?;
     let files = files(&root)?;
     let layouts = layouts(photos, &files);
@@ -41,22 +97,57 @@ pub(super) fn detect(photos: &[&str], options: &ImportOptions) -> Result<Reading
         format => (format, "as asked for".to_owned()),
     };
     let (claims, ids) = match format {
-        Format::DevaShort | Format::ObjectMask | Format::Auto => (layouts.flat, Some(Kind::Grey8)),
         Format::DevaLong => (layouts.flat, Some(Kind::Rgb)),
         Format::Palette => (layouts.flat, Some(Kind::Palette)),
         Format::Grey16 => (layouts.flat, Some(Kind::Grey16)),
         Format::BinaryFolders => (layouts.by_object, None),
         Format::PhotoFolders | Format::LerfMask | Format::ThreeDOvs => (layouts.by_photo, None),
+        _ => (layouts.flat, Some(Kind::Grey8)),
     };
     if claims.photos() == 0 {
         return Err(nothing_found(&root, &files, photos));
     }
-    if ids.is_none() && options.pred.is_some() {
-        let problem = "belongs to id pictures, and this folder has black and white ones; leave it out";
+    let Some(kind) = ids else {
+        let notes = if format == Format::ThreeDOvs { classes_without_mask(&root, &claims)? } else { Vec::new() };
+        return of_marks(root, photos, Found { notes, ..of_claims(claims) }, format, why, options);
+    };
+    if options.object_per != ObjectPer::Auto {
+        let problem = "belongs to masks of one object each, and these are id pictures; leave it out";
+        return Err(Error::usage("object_per", problem));
+    }
+    let of_photo = claims.of_photo.into_iter().map(|files| files.into_iter().next().map(|(_, file)| file)).collect();
+    let content = Content::Ids { kind, of_photo, pred };
+    Ok(Reading { format, root, content, strays: claims.strays, overlap: Overlap::Error, why, notes: Vec::new() })
+}
+
+/// Gives black and white pictures the names of their objects.
+fn of_claims(claims: Claims) -> Found {
+    let names = claims.objects();
+    let rank = |object: &String| names.iter().position(|name| name == object);
+    let marks = |mut files: Vec<(String, String)>| {
+        files.sort_by_key(|(object, _)| rank(object));
+        files.into_iter().map(|(object, file)| Mark::new(Some(object), Shape::Png(file))).collect()
+    };
+    let of_photo = claims.of_photo.into_iter().map(marks).collect();
+    Found { of_photo, names, strays: claims.strays, notes: Vec::new() }
+}
+
+fn of_marks(
+    root: PathBuf,
+    photos: &[&str],
+    mut found: Found,
+    format: Format,
+    why: String,
+    options: &ImportOptions,
+) -> Result<Reading> {
+    if options.pred.is_some() {
+        let problem = "belongs to id pictures, and here are masks of one object each; leave it out";
         return Err(Error::usage("pred", problem));
     }
-    let notes = if format == Format::ThreeDOvs { classes_without_mask(&root, &claims)? } else { Vec::new() };
-    Ok(Reading { format, root, ids, claims, pred: pred.filter(|_| ids.is_some()), why, notes })
+    let numbering = number(&root, photos, &mut found, options.object_per)?;
+    let overlap = tools::overlap(format, options.overlap);
+    let content = Content::Marks { of_photo: found.of_photo, numbering };
+    Ok(Reading { format, root, content, strays: found.strays, overlap, why, notes: found.notes })
 }
 
 fn recognise(root: &Path, layouts: &Layouts, pred: Option<&Pred>, photos: &[&str]) -> Result<(Format, String)> {

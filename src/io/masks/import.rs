@@ -2,16 +2,16 @@
 //!
 //! It reads and checks everything before it writes the first file.
 
-use super::content::{read_binary, read_ids};
-use super::detect::{Reading, detect};
-use super::{Format, ImportOptions, Overlap, shortened};
+use super::decode::{Decoded, Shared, decode};
+use super::detect::{Content, Reading, detect};
+use super::{Format, ImportOptions, ObjectPer, Overlap, shortened};
 use crate::error::{Error, Result};
-use crate::io::label_table::{FILE, LabelEntry, LabelTable};
+use crate::io::label_table::{FILE, LabelEntry, LabelTable, unique_name};
 use crate::io::load::all_or_one_error;
 use crate::io::mask::with_png;
-use crate::io::{atomic, image, resample::same_aspect};
+use crate::io::{atomic, image};
+use crate::scene::Dataset;
 use crate::scene::labels::LABEL_MAX;
-use crate::scene::{Dataset, View};
 use rayon::prelude::*;
 use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet, HashMap};
@@ -28,6 +28,15 @@ pub struct Overlaps {
     pub photos: usize,
 }
 
+/// What makes two masks of one object each one object.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Objects {
+    /// The rule; not `Auto`. With [`ObjectPer::Mask`] the ids of each photo are its own.
+    pub per: ObjectPer,
+    /// Reason for it.
+    pub why: String,
+}
+
 /// The result of an import.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Imported {
@@ -35,10 +44,12 @@ pub struct Imported {
     pub format: Format,
     /// Reason for the format.
     pub why: String,
-    /// Folder of the source masks, possibly below the given one.
+    /// Folder or file of the source masks, possibly below the given one.
     pub source: PathBuf,
     /// Path of the `pred.json`, if one was used.
     pub pred: Option<PathBuf>,
+    /// How masks became objects; `None` for id pictures.
+    pub objects: Option<Objects>,
     /// Number of photos in the scene.
     pub photos: usize,
     /// Number of masks written.
@@ -57,22 +68,11 @@ pub struct Imported {
     pub notes: Vec<String>,
 }
 
-/// Numbers of pixels that two source ids share, the smaller id first.
-type Shared = BTreeMap<(u32, u32), u64>;
-
-/// The mask of a photo with source ids.
-struct Decoded {
-    size: (u32, u32),
-    ids: Vec<u32>,
-    shared: Shared,
-    /// Number of black and white images that needed a threshold.
-    cut: usize,
-}
-
 /// The part of a mask that is kept between the two passes.
 struct Survey {
     pixels: BTreeMap<u32, u64>,
     shared: Shared,
+    shared_pixels: u64,
     cut: usize,
 }
 
@@ -81,14 +81,13 @@ pub fn import(dataset: &Dataset, options: &ImportOptions, output: &Path) -> Resu
     atomic::require_empty("output", output)?;
     let views = dataset.all();
     let names: Vec<&str> = views.iter().map(|view| view.name.as_str()).collect();
-    let reading = detect(&names, options)?;
-    let objects = reading.claims.objects();
-    let decode = |photo: usize| decode(&reading, &objects, photo, views[photo], options.overlap);
-    let with_mask: Vec<usize> = (0..views.len()).filter(|&at| !reading.claims.of_photo[at].is_empty()).collect();
+    let reading = detect(&views, options)?;
+    let decode = |photo: usize| decode(&reading, photo, views[photo]);
+    let with_mask: Vec<usize> = (0..views.len()).filter(|&at| reading.has_mask(at)).collect();
     let surveys = with_mask.par_iter().map(|&photo| decode(photo).and_then(|decoded| survey(&reading, decoded)));
     let surveys = all_or_one_error(&reading.root, surveys.collect())?;
-    let overlaps = overlaps(&reading, options.overlap, &surveys, &objects, |at| names[with_mask[at]])?;
-    let (labels, new_ids) = labels(&reading, &surveys, &objects)?;
+    let overlaps = overlaps(&reading, &surveys, |at| names[with_mask[at]])?;
+    let (labels, new_ids) = labels(&reading, &surveys)?;
 
     let bits = if labels.len() > 255 { 16 } else { 8 };
     let files = output_names(&names);
@@ -106,80 +105,28 @@ pub fn import(dataset: &Dataset, options: &ImportOptions, output: &Path) -> Resu
     let table = LabelTable::new(labels);
     table.write(&output.join(FILE))?;
 
-    let without = (0..views.len()).filter(|&at| reading.claims.of_photo[at].is_empty());
+    let without = (0..views.len()).filter(|&at| !reading.has_mask(at));
     let notes = notes(&reading, &surveys, &table);
+    let objects = match &reading.content {
+        Content::Ids { .. } => None,
+        Content::Marks { numbering, .. } => Some(Objects { per: numbering.per, why: numbering.why.clone() }),
+    };
+    let pred = reading.pred().map(|pred| pred.path.clone());
     Ok(Imported {
         photos_without_mask: without.map(|at| names[at].to_owned()).collect(),
         format: reading.format,
         why: reading.why,
         source: reading.root,
-        pred: reading.pred.map(|pred| pred.path),
+        pred,
+        objects,
         photos: views.len(),
         masks: with_mask.len(),
         bits,
         labels: table.labels,
         overlaps,
-        masks_without_photo: reading.claims.strays,
+        masks_without_photo: reading.strays,
         notes,
     })
-}
-
-fn decode(reading: &Reading, objects: &[String], photo: usize, view: &View, rule: Overlap) -> Result<Decoded> {
-    let files = &reading.claims.of_photo[photo];
-    let camera = &view.camera;
-    let fits = |path: &Path, found: (u32, u32)| {
-        if same_aspect(found, (camera.width, camera.height)) {
-            return Ok(());
-        }
-        let problem = format!(
-            "the mask has {} x {} px and its photo {} {} x {} px, which no scale explains; make masks of the same photos",
-            found.0, found.1, view.name, camera.width, camera.height
-        );
-        Err(Error::data(path, "", problem))
-    };
-    if let (Some(kind), [(_, file)]) = (reading.ids, files.as_slice()) {
-        let path = reading.root.join(file);
-        let read = read_ids(&path, kind, |found| fits(&path, found))?;
-        return Ok(Decoded { size: read.size, ids: read.ids, shared: Shared::new(), cut: 0 });
-    }
-    let mut layers = Vec::with_capacity(files.len());
-    for (object, file) in files {
-        let path = reading.root.join(file);
-        let mask = read_binary(&path, |found| fits(&path, found))?;
-        let id = objects.iter().position(|name| name == object).map_or(0, |at| at as u32 + 1);
-        layers.push((id, path, mask));
-    }
-    let size = layers.first().map_or((0, 0), |(_, _, mask)| mask.size);
-    if let Some((_, path, mask)) = layers.iter().find(|(_, _, mask)| mask.size != size) {
-        let problem = format!(
-            "has {} x {} px and another mask of {} {} x {} px; masks of a photo need one size",
-            mask.size.0, mask.size.1, view.name, size.0, size.1
-        );
-        return Err(Error::data(path, "", problem));
-    }
-    let cut = layers.iter().filter(|(_, _, mask)| !mask.sharp).count();
-    let mut layers: Vec<(u32, Vec<bool>)> = layers.into_iter().map(|(id, _, mask)| (id, mask.inside)).collect();
-    layers.sort_by_key(|(id, inside)| {
-        let pixels = inside.iter().filter(|&&inside| inside).count();
-        // Later layers cover earlier ones.
-        (if rule == Overlap::Smaller { std::cmp::Reverse(pixels) } else { std::cmp::Reverse(0) }, *id)
-    });
-    let (ids, shared) = paint(size, &layers);
-    Ok(Decoded { size, ids, shared, cut })
-}
-
-fn paint((width, height): (u32, u32), layers: &[(u32, Vec<bool>)]) -> (Vec<u32>, Shared) {
-    let mut ids = vec![0; width as usize * height as usize];
-    let mut shared = Shared::new();
-    for (id, inside) in layers {
-        for (pixel, _) in ids.iter_mut().zip(inside).filter(|(_, inside)| **inside) {
-            if *pixel != 0 {
-                *shared.entry((*id.min(pixel), *id.max(pixel))).or_default() += 1;
-            }
-            *pixel = *id;
-        }
-    }
-    (ids, shared)
 }
 
 fn survey(reading: &Reading, decoded: Decoded) -> Result<Survey> {
@@ -191,7 +138,7 @@ fn survey(reading: &Reading, decoded: Decoded) -> Result<Survey> {
     if pixels.len() > LABEL_MAX as usize {
         return Err(too_many(&reading.root, pixels.len()));
     }
-    Ok(Survey { pixels, shared: decoded.shared, cut: decoded.cut })
+    Ok(Survey { pixels, shared: decoded.shared, shared_pixels: decoded.shared_pixels, cut: decoded.cut })
 }
 
 fn too_many(root: &Path, count: usize) -> Error {
@@ -202,24 +149,22 @@ fn too_many(root: &Path, count: usize) -> Error {
     Error::data(root, "", problem)
 }
 
-fn overlaps<'a>(
-    reading: &Reading,
-    rule: Overlap,
-    surveys: &[Survey],
-    objects: &[String],
-    name: impl Fn(usize) -> &'a str,
-) -> Result<Overlaps> {
-    let pixels = surveys.iter().flat_map(|survey| survey.shared.values()).sum();
+fn overlaps<'a>(reading: &Reading, surveys: &[Survey], name: impl Fn(usize) -> &'a str) -> Result<Overlaps> {
+    let rule = reading.overlap;
+    let pixels = surveys.iter().map(|survey| survey.shared_pixels).sum();
     let photos = surveys.iter().filter(|survey| !survey.shared.is_empty()).count();
     let all = surveys.iter().enumerate();
     let pairs = all.flat_map(|(at, survey)| survey.shared.iter().map(move |(&pair, &count)| (count, at, pair)));
     let worst = pairs.max_by_key(|&(count, at, pair)| (count, std::cmp::Reverse((at, pair))));
     if let (Overlap::Error, Some((count, at, (a, b)))) = (rule, worst) {
-        let object = |id: u32| objects.get(id as usize - 1).map_or("", String::as_str);
+        let object = |id: u32| {
+            let object = reading.objects().and_then(|objects| objects.get(id as usize - 1));
+            object.and_then(|object| object.name.clone()).unwrap_or_else(|| format!("mask {id}"))
+        };
         let problem = format!(
             "{pixels} pixels in {photos} photos belong to more than one object, most of them in {}: {count} of {} and \
              {}. Set `overlap = smaller` if the object with fewer pixels in the photo has them, or `overlap = later` if the \
-             later one by name has",
+             later one has",
             name(at),
             object(a),
             object(b)
@@ -230,10 +175,9 @@ fn overlaps<'a>(
 }
 
 /// Returns the entries of the new labels, and a map from source ids to new ids.
-fn labels(reading: &Reading, surveys: &[Survey], objects: &[String]) -> Result<(Vec<LabelEntry>, HashMap<u32, u16>)> {
-    let black_and_white = reading.ids.is_none();
+fn labels(reading: &Reading, surveys: &[Survey]) -> Result<(Vec<LabelEntry>, HashMap<u32, u16>)> {
     let mut found: BTreeMap<u32, (u64, u32)> = BTreeMap::new();
-    if black_and_white {
+    if let Some(objects) = reading.objects() {
         // An object without pixels keeps its id, so that ids depend on names only.
         found.extend((1..=objects.len() as u32).map(|id| (id, (0, 0))));
     }
@@ -247,31 +191,25 @@ fn labels(reading: &Reading, surveys: &[Survey], objects: &[String]) -> Result<(
     if found.values().all(|&(pixels, _)| pixels == 0) {
         return Err(Error::data(&reading.root, "", "every pixel of every mask is 0, so no object is marked"));
     }
-    if let Some(pred) = &reading.pred {
+    if let Some(pred) = reading.pred() {
         pred.check(&reading.root, &found.keys().copied().collect())?;
     }
     let mut taken = BTreeSet::new();
     let mut entries = Vec::with_capacity(found.len());
     for (at, (&source, &(pixels, views))) in found.iter().enumerate() {
-        let name = match &reading.pred {
-            _ if black_and_white => objects.get(source as usize - 1).cloned(),
-            Some(pred) => pred.ids.get(&source).cloned().flatten(),
-            None => None,
+        let (name, text) = match (reading.objects(), reading.pred()) {
+            (Some(objects), _) => {
+                let object = objects.get(source as usize - 1).cloned().unwrap_or_default();
+                (object.name, object.source)
+            }
+            (None, Some(pred)) => (pred.ids.get(&source).cloned().flatten(), Some(source.to_string())),
+            (None, None) => (None, Some(source.to_string())),
         };
-        let text = if black_and_white { name.clone() } else { Some(source.to_string()) };
-        let name = name.map(|name| unique(name, &mut taken));
+        let name = name.map(|name| unique_name(name, &mut taken));
         entries.push(LabelEntry { name, source: text, pixels, views, ..LabelEntry::new(at as u32 + 1) });
     }
     let new_ids = found.keys().zip(1..=u16::MAX).map(|(&source, id)| (source, id)).collect();
     Ok((entries, new_ids))
-}
-
-/// Returns `name`, with the first number appended that makes it unique.
-fn unique(name: String, taken: &mut BTreeSet<String>) -> String {
-    let numbered = (2..).map(|number| format!("{name} {number}"));
-    let free = std::iter::once(name.clone()).chain(numbered).find(|name| !taken.contains(name)).unwrap_or(name);
-    taken.insert(free.clone());
-    free
 }
 
 /// Returns the names of the masks: the photo's name with `.png` in place of the extension, or appended if two photos

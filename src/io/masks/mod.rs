@@ -1,18 +1,30 @@
-//! Folders of masks: [`import`] converts the formats of trackers and data sets, [`inspect`] checks a folder.
+//! Folders of masks: [`import`] converts the formats of trackers, segmenters, annotation tools and data sets, [`inspect`]
+//! checks a folder.
 //!
 //! Our own format is one grey PNG per photo with the photo's name, whose pixel value is the id, and a `labels.json`
 //! ([`LabelTable`](super::LabelTable)).
 
 pub(crate) mod check;
+mod coco;
 mod content;
+mod cvat;
+mod decode;
 mod detect;
 mod folder;
 mod import;
 mod inspect;
+mod label_studio;
+mod marks;
+mod photos;
+mod polygon;
 mod pred;
+mod rle;
+mod sam;
+mod spans;
+mod tools;
 
 pub use check::{Finding, Problem};
-pub use import::{Imported, Overlaps, import};
+pub use import::{Imported, Objects, Overlaps, import};
 pub use inspect::{Report, inspect};
 
 use serde::Serialize;
@@ -46,6 +58,16 @@ pub enum Format {
     #[serde(rename = "3d-ovs")]
     #[cfg_attr(feature = "cli", value(name = "3d-ovs"))]
     ThreeDOvs,
+    /// JSON with instances as in COCO, also as CVAT and Label Studio export it.
+    Coco,
+    /// Folders of Segment Anything's amg.py: NAME/0.png and NAME/metadata.csv.
+    SamFolders,
+    /// Run lengths of Segment Anything's amg.py: NAME.json.
+    SamJson,
+    /// "Segmentation mask 1.1" of CVAT: SegmentationObject, SegmentationClass, labelmap.txt.
+    Cvat,
+    /// "Brush labels to PNG" of Label Studio: task-1-annotation-2-by-3-tag-NAME-0.png, with a JSON export.
+    LabelStudio,
 }
 
 impl Format {
@@ -62,28 +84,51 @@ impl Format {
             Self::ObjectMask => "object-mask",
             Self::LerfMask => "lerf-mask",
             Self::ThreeDOvs => "3d-ovs",
+            Self::Coco => "coco",
+            Self::SamFolders => "sam-folders",
+            Self::SamJson => "sam-json",
+            Self::Cvat => "cvat",
+            Self::LabelStudio => "label-studio",
         }
     }
 }
 
-/// The rule for pixels that two black and white masks of a photo share.
+/// The rule for pixels that two masks of a photo share. Crowds of COCO yield to all others.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 #[serde(rename_all = "kebab-case")]
 pub enum Overlap {
-    /// The import fails and reports their number.
+    /// That of the format: smaller for Segment Anything, later for COCO, else error.
     #[default]
+    Auto,
+    /// The import fails and reports their number.
     Error,
-    /// The object with fewer pixels in this photo wins; between equals, the larger id.
+    /// The mask with fewer pixels in this photo wins; between equals, the later one.
     Smaller,
-    /// The object with the larger id wins.
+    /// The later mask of the file wins; of black and white pictures, that with the larger id.
     Later,
+}
+
+/// What makes two masks of one object each one object.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
+#[serde(rename_all = "kebab-case")]
+pub enum ObjectPer {
+    /// Track, if every mask has one; else name, if every mask has one and no photo has two of one name; else mask.
+    #[default]
+    Auto,
+    /// Masks with one track are one object in all photos.
+    Track,
+    /// Masks with one name are one object in all photos.
+    Name,
+    /// Each mask is an object of its own, and the ids of each photo are its own.
+    Mask,
 }
 
 /// The options of an import.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct ImportOptions {
-    /// Folder with the masks.
+    /// Folder with the masks, or a JSON of COCO.
     pub folder: PathBuf,
     /// Format of the folder.
     pub format: Format,
@@ -91,6 +136,8 @@ pub struct ImportOptions {
     pub pred: Option<PathBuf>,
     /// Rule for shared pixels.
     pub overlap: Overlap,
+    /// Rule for objects, where masks show one object each.
+    pub object_per: ObjectPer,
 }
 
 /// Returns the first few names, for messages.

@@ -3,6 +3,7 @@
 
 pub(crate) mod agree;
 pub(crate) mod associate;
+pub(crate) mod names;
 pub(crate) mod repair;
 pub(crate) mod track;
 

@@ -1,0 +1,71 @@
+//! The pixels of one object as runs, because a photo may have hundreds of masks.
+
+/// Pixels of an object: runs of indices, row-major.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub(super) struct Spans {
+    runs: Vec<(u32, u32)>,
+}
+
+impl Spans {
+    /// Returns the runs of the pixels that are inside.
+    pub(super) fn of(inside: &[bool]) -> Self {
+        let mut runs = Vec::new();
+        let mut at = 0;
+        for part in inside.chunk_by(|a, b| a == b) {
+            if part[0] {
+                runs.push((at, at + part.len() as u32));
+            }
+            at += part.len() as u32;
+        }
+        Self { runs }
+    }
+
+    /// Appends a run; runs come in order.
+    pub(super) fn push(&mut self, start: usize, end: usize) {
+        self.runs.push((start as u32, end as u32));
+    }
+
+    /// Returns the number of pixels.
+    pub(super) fn area(&self) -> u64 {
+        self.runs.iter().map(|(start, end)| u64::from(end - start)).sum()
+    }
+
+    /// Returns the runs.
+    pub(super) fn runs(&self) -> impl Iterator<Item = std::ops::Range<usize>> + '_ {
+        self.runs.iter().map(|&(start, end)| start as usize..end as usize)
+    }
+}
+
+/// Returns the first of `to` places whose centre lies at or beyond place `at` of `from` places along the same line.
+pub(super) fn first_beyond(at: u64, from: u32, to: u32) -> usize {
+    let (from, to) = (u64::from(from), u64::from(to));
+    ((2 * at * to + from - 1) / (2 * from)).min(to) as usize
+}
+
+/// Returns the place among `to` places that holds the centre of place `at` of `from` places.
+pub(super) fn place_of(at: u32, from: u32, to: u32) -> u64 {
+    (2 * u64::from(at) + 1) * u64::from(to) / (2 * u64::from(from))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn runs_are_those_of_the_pixels() {
+        let inside = [false, true, true, false, true];
+        let spans = Spans::of(&inside);
+        assert_eq!((spans.area(), spans.runs().collect::<Vec<_>>()), (3, vec![1..3, 4..5]));
+        assert_eq!(Spans::of(&[]), Spans::default());
+    }
+
+    #[test]
+    fn both_ways_along_a_line_agree() {
+        for (from, to) in [(1, 1), (7, 7), (12, 5), (5, 12), (3, 1000)] {
+            for at in 0..=from {
+                let first = (0..to).find(|&place| place_of(place, to, from) >= u64::from(at)).unwrap_or(to);
+                assert_eq!(first_beyond(u64::from(at), from, to), first as usize, "{at} of {from} in {to}");
+            }
+        }
+    }
+}

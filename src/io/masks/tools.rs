@@ -1,0 +1,92 @@
+//! Formats of tools for annotation and segmentation, which the files beside the masks show.
+
+use super::folder::files;
+use super::marks::Found;
+use super::{Format, Overlap, coco, cvat, label_studio, sam};
+use crate::error::{Error, Result};
+use crate::scene::View;
+use std::path::{Path, PathBuf};
+
+/// Returns the tool whose files the folder or file holds, with the reason. Two of them are an error.
+pub(super) fn recognise(path: &Path, photos: &[&str]) -> Result<Option<(Format, String)>> {
+    let mut fits = Vec::new();
+    if path.is_file() {
+        return Ok(Some((Format::Coco, "a file is read as instances of COCO".to_owned())));
+    }
+    if let Some(root) = cvat::find(path) {
+        fits.push((Format::Cvat, format!("{} has the folders that CVAT exports", root.display())));
+    }
+    let files = files(path)?;
+    let with = |list: &[Option<String>]| list.iter().flatten().count();
+    let folders = with(&sam::folders(photos, &files));
+    if folders > 0 {
+        fits.push((Format::SamFolders, format!("{folders} folders named after photos hold a metadata.csv")));
+    }
+    let lists = sam::lists(photos, &files);
+    let first = lists.iter().flatten().next();
+    if let Some(first) = first
+        && sam::is_list(&path.join(format!("{first}.json")))?
+    {
+        fits.push((Format::SamJson, format!("{} files named after photos are lists of masks", with(&lists))));
+    }
+    if label_studio::is_it(&files) {
+        fits.push((Format::LabelStudio, "pictures have the names that Label Studio gives".to_owned()));
+    }
+    if let Some(file) = coco::files(path)?.first() {
+        fits.push((Format::Coco, format!("{} has images and annotations", file.display())));
+    }
+    if fits.len() > 1 {
+        let all: Vec<String> =
+            fits.iter().map(|(format, why)| format!("{why} (`format = {}`)", format.name())).collect();
+        let problem = format!(
+            "can be read in more than one way: {}. Set `format`, or name the folder or file of one",
+            all.join("; ")
+        );
+        return Err(Error::data(path, "", problem));
+    }
+    Ok(fits.pop())
+}
+
+/// Reads the masks of a tool. Returns the folder or file that they are in, and none for formats of other kinds.
+pub(super) fn read(path: &Path, format: Format, views: &[&View]) -> Result<Option<(PathBuf, Found)>> {
+    let photos: Vec<&str> = views.iter().map(|view| view.name.as_str()).collect();
+    let is_tool =
+        matches!(format, Format::Coco | Format::Cvat | Format::SamFolders | Format::SamJson | Format::LabelStudio);
+    if is_tool && format != Format::Coco && path.is_file() {
+        return Err(Error::data(
+            path,
+            "",
+            format!("is a file, and `format = {}` is a folder; name the folder", format.name()),
+        ));
+    }
+    let own = || path.to_owned();
+    Ok(Some(match format {
+        Format::Coco => {
+            let file = coco::file(path)?;
+            let found = coco::read(&file, views)?;
+            (file, found)
+        }
+        Format::Cvat => {
+            let Some(root) = cvat::find(path) else {
+                let problem = "has no folder SegmentationObject or SegmentationClass; export \"Segmentation mask 1.1\"";
+                return Err(Error::data(path, "", problem));
+            };
+            let found = cvat::read(&root, &photos)?;
+            (root, found)
+        }
+        Format::SamFolders => (own(), sam::read_folders(path, &photos, &files(path)?)?),
+        Format::SamJson => (own(), sam::read_lists(path, views, &files(path)?)?),
+        Format::LabelStudio => (own(), label_studio::read(path, &photos, &files(path)?)?),
+        _ => return Ok(None),
+    }))
+}
+
+/// Returns the rule for shared pixels that users of a format expect.
+pub(super) fn overlap(format: Format, asked: Overlap) -> Overlap {
+    match (asked, format) {
+        (Overlap::Auto, Format::SamFolders | Format::SamJson) => Overlap::Smaller,
+        (Overlap::Auto, Format::Coco) => Overlap::Later,
+        (Overlap::Auto, _) => Overlap::Error,
+        (asked, _) => asked,
+    }
+}
