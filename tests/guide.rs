@@ -53,6 +53,13 @@ fn track(folder: &Path) {
     }
 }
 
+/// What a segmenter of single photos would leave, in place of `tools/segment.py`: true masks with ids of each photo.
+fn segment(words: &[String]) -> Vec<String> {
+    let output = words.iter().skip_while(|word| *word != "-o").nth(1).expect("an output").clone();
+    let typed = ["labelgs", "masks", "spoil", "scene/masks", "--fault", "per-view", "-o", &output];
+    typed.map(str::to_owned).to_vec()
+}
+
 /// A training's command with fewer steps.
 fn shortened(words: &mut Vec<String>) {
     match words.iter().position(|word| word == "--iterations") {
@@ -92,6 +99,9 @@ fn run(pages: &[PathBuf]) {
             }
             let typed = line.split(" # ").next().expect("a command").trim();
             let mut words: Vec<String> = typed.split_whitespace().map(str::to_owned).collect();
+            if words[0] == "tools/segment.py" {
+                words = segment(&words);
+            }
             if words[0] != "labelgs" {
                 let is_known = words[0] == "cargo" || words.iter().any(|word| Path::new(ROOT).join(word).is_file());
                 assert!(is_known, "{}: no command is known for: {line}", page.display());

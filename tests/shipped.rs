@@ -20,6 +20,7 @@ mod cli_reuse; // a trained model begins another training, or becomes simpler
 mod ignored; // the shipped program has no fault injection
 mod output; // files of rendered pictures
 mod package; // manual pages and completions of every command, and the version
+mod pipeline; // from photos to an object, with a segmenter in Python
 #[path = "scheduler/plan/mod.rs"]
 mod plan; // barriers and memory of the lists without `lab`
 mod registry; // every shader without `lab` has a header, a mirror and a pass
