@@ -77,3 +77,24 @@ fn the_gaussians_that_contribute_most_stay() {
     assert!(near["chosen"]["psnr"].as_f64().expect("a number") >= all - 0.2, "{near}");
     assert!(near["gaussians"].as_u64() < near["of"].as_u64(), "{near}");
 }
+
+#[test]
+fn damaged_cameras_of_a_run_matter_to_pages_only() {
+    let Some(_turn) = device() else { return };
+    let place = Place::new();
+    succeeded(&place.trained("out", &["--iterations", "20"]));
+    let out = place.text("out");
+    let convert = |name: &str| place.labelgs(&["convert", &out, &place.text(name)]);
+    succeeded(&convert("before.html"));
+    std::fs::write(place.path("out/cameras.json"), "[{}]").expect("written");
+    succeeded(&convert("model.ply"));
+    let page = convert("after.html");
+    assert_eq!(page.status.code(), Some(3), "{}", stderr(&page));
+    assert!(
+        stderr(&page).contains("cameras.json: line 1: ") && !place.path("after.html").exists(),
+        "{}",
+        stderr(&page)
+    );
+    let text = std::fs::read_to_string(place.path("before.html")).expect("a page");
+    assert!(text.contains(r#""view":{"eye":["#), "the page begins at the first photo");
+}

@@ -48,17 +48,18 @@ pub(crate) fn run(args: &ConvertArgs, context: &Context) -> Result<()> {
         return per_object(args, &model, &known, print_json);
     }
     let edited = Edited { model: &model, table: known.table, of: model.len(), labels: &labels };
-    edited.finish(&Target { model: &args.model, output: &args.output, write: args.write, print_json }, json!({}))
+    edited.finish(&Target::new((&args.model, &args.output), args.write, print_json), json!({}))
 }
 
 fn per_object(args: &ConvertArgs, model: &Gaussians, known: &Catalogue, print_json: bool) -> Result<()> {
     let mut files = Vec::new();
+    let options = args.write.options(&args.model, &args.output)?;
     for &label in known.gaussians.keys() {
         let name = known.name(label);
         let path = file_of(&args.output, label, name);
         let part = model.filtered(|row| model.label(row) == label);
         let names = known.table.as_ref().map(|table| keep(table, |id| id == label));
-        let left_out = export_model(&path, &part, names.as_ref(), args.write.options(&args.model)?)?;
+        let left_out = export_model(&path, &part, names.as_ref(), options)?;
         files.push((path, label, name, part.len() as u64 - left_out));
     }
     if print_json {

@@ -110,7 +110,8 @@ pub(crate) fn run(args: &LabelArgs, context: &Context) -> Result<()> {
     }
     drop(progress);
     let seconds = start.elapsed().as_secs_f64();
-    export_model(&args.output, &model, LabelTable::of_folder(&args.masks)?.as_ref(), args.write.options(&args.model)?)?;
+    let options = args.write.options(&args.model, &args.output)?;
+    export_model(&args.output, &model, LabelTable::of_folder(&args.masks)?.as_ref(), options)?;
     let rows = summarise(&model);
     if context.json || args.json.json {
         return stdout::print_json(&json!({

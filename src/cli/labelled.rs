@@ -57,12 +57,7 @@ pub struct EditArgs {
 impl EditArgs {
     /// Returns where the result goes.
     pub(crate) fn target(&self, context: &Context) -> Target<'_> {
-        Target {
-            model: &self.model,
-            output: &self.output,
-            write: self.write,
-            print_json: wants_json(context, &self.json),
-        }
+        Target::new((&self.model, &self.output), self.write, wants_json(context, &self.json))
     }
 
     /// Writes and prints the result of an edit that leaves the labels alone. `of` is the number of Gaussians before.
@@ -89,6 +84,12 @@ pub(crate) struct Target<'a> {
     pub write: WriteArgs,
     /// The summary is printed as JSON.
     pub print_json: bool,
+}
+
+impl<'a> Target<'a> {
+    pub(crate) fn new((model, output): (&'a Path, &'a Path), write: WriteArgs, print_json: bool) -> Self {
+        Self { model, output, write, print_json }
+    }
 }
 
 /// Which Gaussians an object consists of.
@@ -136,7 +137,8 @@ pub(crate) struct Edited<'a> {
 impl Edited<'_> {
     /// Writes model and table and prints a summary. `more` holds further fields of the JSON.
     pub(crate) fn finish(&self, to: &Target, more: serde_json::Value) -> Result<()> {
-        let left_out = export_model(to.output, self.model, self.table.as_ref(), to.write.options(to.model)?)?;
+        let left_out =
+            export_model(to.output, self.model, self.table.as_ref(), to.write.options(to.model, to.output)?)?;
         let beside = LabelTable::beside(to.output);
         let written = self.model.len() as u64 - left_out;
         if to.print_json {

@@ -2,7 +2,7 @@
 
 use crate::Result;
 use crate::io::camera_json::views_of_model;
-use crate::io::model::{LabelType, Sight, SpzVersion, WriteOptions};
+use crate::io::model::{FirstView, LabelType, SpzVersion, WriteOptions, is_page};
 use crate::scene::Overview;
 use clap::Args;
 use std::path::Path;
@@ -21,11 +21,12 @@ pub struct WriteArgs {
 }
 
 impl WriteArgs {
-    /// Returns the choices for a file made of `model`, whose cameras tell a page where to look from.
-    pub(crate) fn options(self, model: &Path) -> Result<WriteOptions> {
-        let views = views_of_model(model)?;
-        let up = Overview::of(views.iter().map(|view| &view.camera));
-        let sight = up.zip(views.first()).map(|(all, view)| Sight { up: all.up, eye: view.camera.centre() });
-        Ok(WriteOptions { label_type: self.label_type, spz_version: self.spz_version, sight })
+    /// Returns the choices for the file `output` made of `model`. The cameras of the model's run tell a page where to look
+    /// from at first.
+    pub(crate) fn options(self, model: &Path, output: &Path) -> Result<WriteOptions> {
+        let views = if is_page(output) { views_of_model(model)? } else { Vec::new() };
+        let all = Overview::of(views.iter().map(|view| &view.camera));
+        let first_view = all.zip(views.first()).map(|(all, view)| FirstView { up: all.up, eye: view.camera.centre() });
+        Ok(WriteOptions { label_type: self.label_type, spz_version: self.spz_version, first_view })
     }
 }

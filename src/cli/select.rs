@@ -44,12 +44,7 @@ pub struct SelectArgs {
 impl SelectArgs {
     /// Returns where the result goes.
     pub(crate) fn target(&self, context: &Context) -> Target<'_> {
-        Target {
-            model: &self.model,
-            output: &self.output,
-            write: self.write,
-            print_json: wants_json(context, &self.json),
-        }
+        Target::new((&self.model, &self.output), self.write, wants_json(context, &self.json))
     }
 }
 

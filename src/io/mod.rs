@@ -51,8 +51,8 @@ pub use init::initial_gaussians;
 pub use label_table::{LabelEntry, LabelTable};
 pub use mask::read_mask;
 pub use model::{
-    Export, LabelType, ModelFormat, ModelWriter, ReadModel, Sight, SpzVersion, WriteOptions, export_model, read_model,
-    register, write_model,
+    Export, FirstView, LabelType, ModelFormat, ModelWriter, ReadModel, SpzVersion, WriteOptions, export_model,
+    read_model, register, write_model,
 };
 pub use occlusion_table::OcclusionTable;
 pub use pipeline_file::PipelineFolder;

@@ -58,12 +58,12 @@ pub struct WriteOptions {
     /// Version of SPZ files.
     pub spz_version: SpzVersion,
     /// Where a page shows the model from at first; without it from above, with y as down.
-    pub sight: Option<Sight>,
+    pub first_view: Option<FirstView>,
 }
 
-/// Where to look at a model from.
+/// Where a page looks at a model from at first.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Sight {
+pub struct FirstView {
     /// Direction of up in the world, of length 1.
     pub up: DVec3,
     /// Position of the eye in the world.

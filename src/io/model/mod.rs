@@ -23,7 +23,7 @@ use crate::scene::Gaussians;
 use std::path::Path;
 use std::sync::{PoisonError, RwLock};
 
-pub use format::{Export, LabelType, ModelFormat, ModelWriter, ReadModel, Sight, SpzVersion, WriteOptions};
+pub use format::{Export, FirstView, LabelType, ModelFormat, ModelWriter, ReadModel, SpzVersion, WriteOptions};
 
 /// Formats of labelgs. The first one also serves unknown extensions, such as `/dev/stdout`.
 const SHIPPED: [&ModelFormat; 6] =
@@ -47,6 +47,11 @@ fn formats() -> Vec<&'static ModelFormat> {
 fn by_ending(path: &Path) -> Option<&'static ModelFormat> {
     let name = path.file_name()?.to_string_lossy().to_lowercase();
     formats().into_iter().find(|format| format.endings.iter().any(|ending| name.ends_with(ending)))
+}
+
+/// Returns true if a model at this path is written as a page, which shows it from somewhere at first.
+pub(crate) fn is_page(path: &Path) -> bool {
+    by_ending(path).is_some_and(|format| format.name == html::FORMAT.name)
 }
 
 /// Reads a model in the format of its extension. A file with an unknown extension is read as PLY; if that fails, the

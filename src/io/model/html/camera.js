@@ -9,9 +9,9 @@ const unit = (a) => a.map((value) => value / Math.hypot(...a));
 const middle = (values) => values.sort()[values.length >> 1];
 
 class Camera {
-  constructor(positions, { origin, sight }) {
+  constructor(positions, { origin, view }) {
     this.origin = origin;
-    this.up = unit(sight?.up ?? [0, 1, 0]);
+    this.up = unit(view?.up ?? [0, 1, 0]);
     // Two axes across up; with y up they are x and z.
     this.across = unit(Math.abs(this.up[2]) < 0.9 ? cross(this.up, [0, 0, 1]) : cross([0, 1, 0], this.up));
     this.back = cross(this.across, this.up);
@@ -25,9 +25,9 @@ class Camera {
     const distance = 2.2 * Math.max(far[Math.floor(0.6 * far.length)], 1e-3);
     this.first = { pivot, distance, yaw: 0.5, pitch: 0.35 };
     this.reset();
-    if (sight) {
+    if (view) {
       // As the first photo sees it, but no farther than a small model needs.
-      const gap = pivot.map((value, axis) => value - sight.eye[axis]);
+      const gap = pivot.map((value, axis) => value - view.eye[axis]);
       this.face(unit(gap));
       this.first = { pivot, distance: Math.min(distance, Math.hypot(...gap)), yaw: this.yaw, pitch: this.pitch };
       this.reset();

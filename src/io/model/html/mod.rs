@@ -1,7 +1,7 @@
 //! A page that shows a model in any browser: one HTML file that asks nothing from the network, with the model as an SPZ
 //! in it. It is read back like an SPZ.
 
-use super::format::{Export, ModelFormat, ModelWriter, ReadModel, Sight};
+use super::format::{Export, FirstView, ModelFormat, ModelWriter, ReadModel};
 use super::spz;
 use crate::error::{Error, Result};
 use crate::io::read as file;
@@ -38,16 +38,11 @@ const MODEL: [&str; 2] = ["<script type=\"text/plain\" id=\"model\">", "</script
 fn write(export: &Export, out: &mut dyn Write) -> io::Result<()> {
     let mut packed = Vec::new();
     spz::write_v3(export, &mut packed)?;
-    let [start, end] = MODEL;
-    let page = page(export);
-    // The model is the largest part, so it is not copied into the markup.
-    let (head, tail) = page.split_once(start).map_or((page.as_str(), ""), |(head, tail)| (head, tail));
-    write!(out, "{head}{start}{}", STANDARD.encode(&packed))?;
-    debug_assert!(tail.starts_with(end), "the model is empty in the markup");
-    out.write_all(tail.as_bytes())
+    out.write_all(page(export, &STANDARD.encode(packed)).as_bytes())
 }
 
-fn page(export: &Export) -> String {
+/// Returns the page around a model, which comes as base64.
+fn page(export: &Export, model: &str) -> String {
     let mut counts: BTreeMap<u32, u64> = BTreeMap::new();
     for &row in export.rows {
         *counts.entry(export.labels().map_or(UNLABELLED, |labels| labels[row])).or_default() += 1;
@@ -58,9 +53,9 @@ fn page(export: &Export) -> String {
     });
     // Axes of the model inside.
     let turned = |place: DVec3| spz::AXES.position(place.as_vec3().to_array());
-    let sight =
-        export.options.sight.map(|Sight { up, eye }| json!({ "up": turned(up), "eye": turned(eye - export.origin) }));
-    let about = json!({ "labels": labels.collect::<Vec<_>>(), "origin": export.origin.to_array(), "sight": sight });
+    let view = export.options.first_view;
+    let view = view.map(|FirstView { up, eye }| json!({ "up": turned(up), "eye": turned(eye - export.origin) }));
+    let about = json!({ "labels": labels.collect::<Vec<_>>(), "origin": export.origin.to_array(), "view": view });
     // Nothing in a name may end the script.
     let about = about.to_string().replace('<', "\\u003c");
     let title = format!("{} Gaussians", export.rows.len());
@@ -78,7 +73,7 @@ fn page(export: &Export) -> String {
                 canvas id="picture" tabindex="0" aria-label="Picture of the model. Drag to turn, Shift and drag to move, scroll to come nearer." {}
                 (panels(&title))
                 script type="application/json" id="about" { (PreEscaped(about)) }
-                script type="text/plain" id="model" {}
+                script type="text/plain" id="model" { (PreEscaped(model)) }
                 script { "'use strict';\n" (PreEscaped(SCRIPTS.concat())) }
             }
         }
