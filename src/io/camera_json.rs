@@ -50,11 +50,8 @@ impl From<&Camera> for CameraFile {
 /// Reads a camera: `{"w2c": 4x4 row-major with OpenCV axes, "fx", "fy", "cx", "cy", "W", "H"}`.
 pub fn read_camera(path: impl AsRef<Path>) -> Result<Camera> {
     let path = path.as_ref();
-    let text = read::text(path)?;
-    let file: CameraFile = serde_json::from_str(&text).map_err(|error| {
-        let expected = "expected {\"w2c\": 4x4 rows, \"fx\", \"fy\", \"cx\", \"cy\", \"W\", \"H\"}";
-        Error::data(path, format!("line {}", error.line()), format!("{error}; {expected}"))
-    })?;
+    let expected = "expected {\"w2c\": 4x4 rows, \"fx\", \"fy\", \"cx\", \"cy\", \"W\", \"H\"}";
+    let file: CameraFile = read::json(path, expected)?;
     camera_of(path, &file)
 }
 
@@ -115,12 +112,9 @@ pub fn write_cameras<'a>(path: impl AsRef<Path>, cameras: &[(&'a str, &Camera)])
 pub(crate) fn views_of_model(model: &Path) -> Result<Vec<View>> {
     let path = run_folder::of_model(model).map(|run| run.join(CAMERAS)).filter(|path| path.is_file());
     let Some(path) = path else { return Ok(Vec::new()) };
-    let text = read::text(&path)?;
-    let entries: Vec<Entry> = serde_json::from_str(&text).map_err(|error| {
-        let cure = "expected a list of cameras, each with img_name, width, height, position, rotation, fx, fy; delete the file \
+    let expected = "expected a list of cameras, each with img_name, width, height, position, rotation, fx, fy; delete the file \
                     to go on without";
-        Error::data(&path, format!("line {}", error.line()), format!("{error}; {cure}"))
-    })?;
+    let entries: Vec<Entry> = read::json(&path, expected)?;
     entries.iter().map(|entry| view(&path, entry)).collect()
 }
 

@@ -40,11 +40,8 @@ impl Frames {
 
     /// Reads the file. Another version, a photo with two frames and a video without photos are errors.
     pub fn read(path: &Path) -> Result<Self> {
-        let text = read::text(path)?;
-        let video: Self = serde_json::from_str(&text).map_err(|error| {
-            let expected = r#"expected {"schema_version": 1, "frames": [{"file", "photo", "camera"}]}"#;
-            Error::data(path, format!("line {}", error.line()), format!("{error}; {expected}"))
-        })?;
+        let expected = r#"expected {"schema_version": 1, "frames": [{"file", "photo", "camera"}]}"#;
+        let video: Self = read::json(path, expected)?;
         if video.schema_version != SCHEMA_VERSION {
             let problem = format!("has version {}, labelgs reads {SCHEMA_VERSION}", video.schema_version);
             return Err(Error::data(path, "schema_version", problem));

@@ -74,12 +74,8 @@ impl LabelTable {
 
     /// Like [`Self::read`], from bytes of the file `path`.
     pub(crate) fn parse(path: &Path, text: &[u8]) -> Result<Self> {
-        let table: Self = serde_json::from_slice(text).map_err(|error| {
-            let expected =
-                r#"expected {"schema_version": 1, "labels": [{"id": 1, "name": "cup", "colour": [r, g, b]}]}"#;
-            Error::data(path, format!("line {}", error.line()), format!("{error}; {expected}"))
-        })?;
-        table.checked(path)
+        let expected = r#"expected {"schema_version": 1, "labels": [{"id": 1, "name": "cup", "colour": [r, g, b]}]}"#;
+        read::parse_json::<Self>(path, text, expected)?.checked(path)
     }
 
     /// Returns the table sorted, if it obeys the rules of [`Self::read`]; `path` is the file it is from.

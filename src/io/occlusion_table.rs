@@ -31,12 +31,8 @@ impl OcclusionTable {
 
     /// Reads a table and sorts its lists. Another version, the id 0 and an object that hides itself are errors.
     pub fn read(path: &Path) -> Result<Self> {
-        let text = read::text(path)?;
-        let mut table: Self = serde_json::from_str(&text).map_err(|error| {
-            let expected =
-                r#"expected {"schema_version": 1, "kind": "depth", "views": {"00.png": {"1": [], "2": [1]}}}"#;
-            Error::data(path, format!("line {}", error.line()), format!("{error}; {expected}"))
-        })?;
+        let expected = r#"expected {"schema_version": 1, "kind": "depth", "views": {"00.png": {"1": [], "2": [1]}}}"#;
+        let mut table: Self = read::json(path, expected)?;
         if table.schema_version != SCHEMA_VERSION {
             let problem = format!("has version {}, labelgs reads {SCHEMA_VERSION}", table.schema_version);
             return Err(Error::data(path, "schema_version", problem));

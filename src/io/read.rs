@@ -5,6 +5,7 @@
 
 use crate::error::{Error, Result};
 use crate::lab::fault;
+use serde::de::DeserializeOwned;
 use std::fs::{self, File};
 use std::io::{self, BufReader, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
@@ -65,6 +66,17 @@ pub(crate) fn bytes(path: &Path) -> Result<Vec<u8>> {
 pub fn text(path: &Path) -> Result<String> {
     String::from_utf8(bytes(path)?)
         .map_err(|error| Error::data(path, format!("byte {}", error.utf8_error().valid_up_to()), "is not UTF-8 text"))
+}
+
+/// Reads a file of JSON. `expected` says in errors what it should hold.
+pub(crate) fn json<T: DeserializeOwned>(path: &Path, expected: &str) -> Result<T> {
+    parse_json(path, text(path)?.as_bytes(), expected)
+}
+
+/// The same from the bytes of a file.
+pub(crate) fn parse_json<T: DeserializeOwned>(path: &Path, text: &[u8], expected: &str) -> Result<T> {
+    serde_json::from_slice(text)
+        .map_err(|error| Error::data(path, format!("line {}", error.line()), format!("{error}; {expected}")))
 }
 
 /// Lists the paths in a folder, in no particular order.

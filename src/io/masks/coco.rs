@@ -1,12 +1,11 @@
 //! Instances of COCO: one JSON with all photos. CVAT and Label Studio export it too.
 
-use super::marks::{Found, Mark, Shape};
+use super::marks::{Found, Mark, Shape, require_aspect};
 use super::photos::PhotoIndex;
 use super::polygon::Polygons;
 use super::rle::Rle;
 use crate::error::{Error, Result};
 use crate::io::read;
-use crate::io::resample::same_aspect;
 use crate::scene::View;
 use serde::Deserialize;
 use serde_json::Value;
@@ -96,8 +95,7 @@ pub(super) fn file(path: &Path) -> Result<PathBuf> {
 
 /// Reads the file.
 pub(super) fn read(path: &Path, views: &[&View]) -> Result<Found> {
-    let file: File = serde_json::from_str(&read::text(path)?)
-        .map_err(|error| Error::data(path, format!("line {}", error.line()), format!("{error}; {EXPECTED}")))?;
+    let file: File = read::json(path, EXPECTED)?;
     let photos: Vec<&str> = views.iter().map(|view| view.name.as_str()).collect();
     let images = images(path, &photos, &file.images)?;
     let names: HashMap<String, &str> =
@@ -186,26 +184,17 @@ fn mark(annotation: &Annotation, names: &HashMap<String, &str>, shape: Shape) ->
 /// Returns the pixels, or none for a box; an error is what is wrong.
 fn shape(annotation: &Annotation, image: &Image, view: &View) -> Result<Option<Shape>, String> {
     let photo = (view.camera.width, view.camera.height);
-    let fits = |size: (u32, u32), what: &str| {
-        if size.0 > 0 && size.1 > 0 && same_aspect(size, photo) {
-            return Ok(());
-        }
-        Err(format!(
-            "{what} has {} x {} px and the photo {} x {} px, which no scale explains; use masks of the same photos",
-            size.0, size.1, photo.0, photo.1
-        ))
-    };
     match &annotation.segmentation {
         Value::Null => Ok(None),
         Value::Array(lists) if lists.is_empty() => Ok(None),
         Value::Array(lists) => {
             let size = (image.width.unwrap_or(photo.0), image.height.unwrap_or(photo.1));
-            fits(size, "the image")?;
+            require_aspect("the image", size, view)?;
             Ok(Some(Shape::Polygons(Polygons::read(lists, size)?)))
         }
         value => {
             let rle = Rle::read(value)?;
-            fits(rle.size, "the mask")?;
+            require_aspect("the mask", rle.size, view)?;
             Ok(Some(Shape::Rle(rle)))
         }
     }

@@ -4,11 +4,10 @@ use super::Overlap;
 use super::content::{read_binary, read_ids};
 use super::cvat;
 use super::detect::{Content, Reading};
-use super::marks::{Mark, Shape};
+use super::marks::{Mark, Shape, require_aspect};
 use super::spans::Spans;
 use crate::error::{Error, Result};
 use crate::io::image::check_size;
-use crate::io::resample::same_aspect;
 use crate::scene::View;
 use std::cmp::Reverse;
 use std::collections::BTreeMap;
@@ -41,15 +40,7 @@ pub(super) fn decode(reading: &Reading, photo: usize, view: &View) -> Result<Dec
 }
 
 fn fits(path: &Path, found: (u32, u32), view: &View) -> Result<()> {
-    let camera = &view.camera;
-    if same_aspect(found, (camera.width, camera.height)) {
-        return Ok(());
-    }
-    let problem = format!(
-        "the mask has {} x {} px and its photo {} {} x {} px, which no scale explains; make masks of the same photos",
-        found.0, found.1, view.name, camera.width, camera.height
-    );
-    Err(Error::data(path, "", problem))
+    require_aspect("the mask", found, view).map_err(|problem| Error::data(path, "", problem))
 }
 
 /// Paints the masks of a photo over each other.

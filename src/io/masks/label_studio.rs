@@ -96,8 +96,7 @@ fn tasks(root: &Path, photos: &[&str], files: &[String]) -> Result<BTreeMap<u64,
     for file in jsons {
         let path = root.join(file);
         let expected = r#"expected a list of tasks: [{"id": 1, "data": {"image": "/data/upload/1/a.jpg"}}]"#;
-        let list: Vec<Value> = serde_json::from_str(&read::text(&path)?)
-            .map_err(|error| Error::data(&path, format!("line {}", error.line()), format!("{error}; {expected}")))?;
+        let list: Vec<Value> = read::json(&path, expected)?;
         for (at, task) in list.iter().enumerate() {
             let Some(id) = task.get("id").and_then(Value::as_u64) else {
                 return Err(Error::data(

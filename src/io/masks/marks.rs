@@ -5,6 +5,8 @@ use super::rle::Rle;
 use super::{ObjectPer, shortened};
 use crate::error::{Error, Result};
 use crate::io::label_table::unique_name;
+use crate::io::resample::same_aspect;
+use crate::scene::View;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
@@ -152,4 +154,16 @@ pub(super) fn require_photo(source: &Path, photos: &[&str], found: &Found, named
         if named.is_empty() { "no photo".to_owned() } else { shortened(named) }
     );
     Err(Error::data(source, "", problem))
+}
+
+/// Fails with what is wrong if no scale makes a mask of the photo's size. `what` has that size.
+pub(super) fn require_aspect(what: &str, size: (u32, u32), view: &View) -> Result<(), String> {
+    let photo = (view.camera.width, view.camera.height);
+    if size.0 > 0 && size.1 > 0 && same_aspect(size, photo) {
+        return Ok(());
+    }
+    Err(format!(
+        "{what} has {} x {} px and its photo {} {} x {} px, which no scale explains; use masks of the same photos",
+        size.0, size.1, view.name, photo.0, photo.1
+    ))
 }

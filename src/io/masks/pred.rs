@@ -44,11 +44,8 @@ pub(super) struct Pred {
 impl Pred {
     /// Reads the file. Names come from `categories`; other categories are named `category N`.
     pub(super) fn read(path: &Path) -> Result<Self> {
-        let text = read::text(path)?;
-        let file: File = serde_json::from_str(&text).map_err(|error| {
-            let expected = r#"expected {"annotations": [{"segments_info": [{"id": 1, "category_id": null}]}]}"#;
-            Error::data(path, format!("line {}", error.line()), format!("{error}; {expected}"))
-        })?;
+        let expected = r#"expected {"annotations": [{"segments_info": [{"id": 1, "category_id": null}]}]}"#;
+        let file: File = read::json(path, expected)?;
         let name = |category: &Value| match category {
             Value::Null => None,
             category => {

@@ -2,11 +2,10 @@
 //! `metadata.csv`, or `NAME.json` with run lengths.
 
 use super::folder::{claim, photo_keys, png_key};
-use super::marks::{Found, Mark, Shape};
+use super::marks::{Found, Mark, Shape, require_aspect};
 use super::rle::Rle;
 use crate::error::{Error, Result};
 use crate::io::read;
-use crate::io::resample::same_aspect;
 use crate::scene::View;
 use rayon::prelude::*;
 use serde::Deserialize;
@@ -122,24 +121,15 @@ pub(super) fn read_lists(root: &Path, views: &[&View], files: &[String]) -> Resu
 }
 
 fn masks(path: &Path, view: &View) -> Result<Vec<Mark>> {
-    let text = read::text(path)?;
     // The message of a type with two forms tells neither line nor reason.
-    let value: Value = serde_json::from_str(&text)
-        .map_err(|error| Error::data(path, format!("line {}", error.line()), format!("{error}; {EXPECTED}")))?;
+    let value: Value = read::json(path, EXPECTED)?;
     let (List::Alone(list) | List::WithImage { annotations: list }) =
         serde_json::from_value(value).map_err(|_| Error::data(path, "", format!("is no list of masks; {EXPECTED}")))?;
-    let photo = (view.camera.width, view.camera.height);
     let mut marks = Vec::with_capacity(list.len());
     for (at, annotation) in list.iter().enumerate() {
         let wrong = |problem: String| Error::data(path, format!("mask {at}"), problem);
         let rle = Rle::read(&annotation.segmentation).map_err(wrong)?;
-        if !same_aspect(rle.size, photo) {
-            let (size, name) = (rle.size, &view.name);
-            return Err(wrong(format!(
-                "has {} x {} px and its photo {name} {} x {} px, which no scale explains; use masks of the same photos",
-                size.0, size.1, photo.0, photo.1
-            )));
-        }
+        require_aspect("the mask", rle.size, view).map_err(wrong)?;
         marks.push(Mark::new(None, Shape::Rle(rle)));
     }
     Ok(marks)

@@ -35,8 +35,7 @@ pub(super) fn read(model: &Path, count: u64, notes: &mut Vec<String>) -> Result<
         return Ok(DVec3::ZERO);
     }
     let expected = r#"expected {"schema_version": 1, "world_origin": [x, y, z], "gaussians": N}; correct or delete it"#;
-    let file: File = serde_json::from_str(&read::text(&path)?)
-        .map_err(|error| Error::data(&path, format!("line {}", error.line()), format!("{error}; {expected}")))?;
+    let file: File = read::json(&path, expected)?;
     if file.schema_version != SCHEMA_VERSION {
         let problem = format!("has version {}, labelgs reads {SCHEMA_VERSION}", file.schema_version);
         return Err(Error::data(&path, "schema_version", problem));

@@ -53,11 +53,9 @@ pub(super) fn read(path: &Path, count: usize, checksum: u32, notes: &mut Vec<Str
     if !beside.is_file() {
         return Ok(None);
     }
-    let text = file::text(&beside)?;
-    let found: Found = serde_json::from_str(&text).map_err(|error| {
-        let expected = r#"expected "gaussians": {"count": N, "positions_crc32": C, "ids": [[id, length], ..]}; correct or delete it"#;
-        Error::data(&beside, format!("line {}", error.line()), format!("{error}; {expected}"))
-    })?;
+    let expected =
+        r#"expected "gaussians": {"count": N, "positions_crc32": C, "ids": [[id, length], ..]}; correct or delete it"#;
+    let found: Found = file::json(&beside, expected)?;
     let Some(own) = found.gaussians else { return Ok(None) };
     if own.count != count as u64 || own.positions_crc32 != checksum {
         let name = beside.display();
