@@ -43,7 +43,7 @@ pub fn summarise(model: &Gaussians) -> Vec<LabelSummary> {
         let sum = sums.entry(model.label(row)).or_insert(start);
         let mean = model.world(row);
         // Never 0, so that invisible Gaussians have a centre too.
-        let opacity = (1.0 / (1.0 + (-f64::from(model.opacities[row])).exp())).max(1e-200);
+        let opacity = model.opacity(row).max(1e-200);
         sum.count += 1;
         sum.mass += opacity;
         sum.min = sum.min.min(mean);

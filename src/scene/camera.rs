@@ -27,6 +27,11 @@ pub struct Camera {
 }
 
 impl Camera {
+    /// Returns the direction of the optical axis in world space.
+    pub fn axis(&self) -> DVec3 {
+        self.rotation.row(2)
+    }
+
     /// Returns the centre of the camera in world space.
     pub fn centre(&self) -> DVec3 {
         -(self.rotation.transpose() * self.translation)

@@ -41,6 +41,11 @@ impl Gaussians {
         self.origin + DVec3::from_array(self.means[row].map(f64::from))
     }
 
+    /// Returns the opacity of a Gaussian, after the sigmoid.
+    pub fn opacity(&self, row: usize) -> f64 {
+        1.0 / (1.0 + (-f64::from(self.opacities[row])).exp())
+    }
+
     /// Returns the label of a Gaussian; 0 in a model without labels.
     pub fn label(&self, row: usize) -> u32 {
         self.labels.as_ref().map_or(UNLABELLED, |labels| labels[row])

@@ -24,16 +24,22 @@ impl Overview {
         }
         let up = -cameras.clone().map(|camera| camera.rotation.row(1)).sum::<DVec3>();
         let middle = cameras.clone().map(Camera::centre).sum::<DVec3>() / count as f64;
-        // The point nearest to all optical axes, held near the cameras where these are parallel.
-        let (mut normal, mut right) = (DMat3::IDENTITY * 1e-3, middle * 1e-3);
-        for camera in cameras.clone() {
-            let axis = camera.rotation.row(2);
-            let across = DMat3::IDENTITY - DMat3::from_cols(axis * axis.x, axis * axis.y, axis * axis.z);
-            normal += across;
-            right += across * camera.centre();
-        }
-        let target = normal.inverse() * right;
+        // Held near the cameras where their axes are parallel.
+        let (matrix, right) = nearest_to_axes(cameras.clone());
+        let target = (matrix + DMat3::IDENTITY * 1e-3).inverse() * (right + middle * 1e-3);
         let distance = cameras.map(|camera| camera.centre().distance(target)).sum::<f64>() / count as f64;
         Some(Self { up: up.try_normalize().unwrap_or(DVec3::NEG_Y), target, distance: distance.max(1e-6) })
     }
+}
+
+/// Returns matrix and right side of the equations for the point with the least sum of squared distances to the optical axes.
+pub(crate) fn nearest_to_axes<'a>(cameras: impl Iterator<Item = &'a Camera>) -> (DMat3, DVec3) {
+    let (mut matrix, mut right) = (DMat3::ZERO, DVec3::ZERO);
+    for camera in cameras {
+        let axis = camera.axis();
+        let across = DMat3::IDENTITY - DMat3::from_cols(axis * axis.x, axis * axis.y, axis * axis.z);
+        matrix += across;
+        right += across * camera.centre();
+    }
+    (matrix, right)
 }

@@ -56,7 +56,7 @@ const STREAM: u64 = 1 << 40;
 /// Returns for each camera the nearest ones that look in a similar direction, none of them farther away than the first
 /// thing that the camera sees: nothing stands between such two.
 pub(super) fn partners(cameras: &[&Camera], planes: &[f32]) -> Vec<Vec<usize>> {
-    let places: Vec<(DVec3, DVec3)> = cameras.iter().map(|camera| (camera.centre(), camera.rotation.row(2))).collect();
+    let places: Vec<(DVec3, DVec3)> = cameras.iter().map(|camera| (camera.centre(), camera.axis())).collect();
     let of = |index: usize| {
         let distance = |other: usize| places[index].0.distance(places[other].0);
         let reach = f64::from(planes[index]) / FREE;

@@ -1,13 +1,12 @@
 //! Two Gaussians as one.
 
+use crate::shaders::constants::exact::{ALPHA_MAX, SH_C0};
 use glam::{DMat3, DQuat, DVec3};
 
 /// Weight of a difference of colour, 0 to 1 a channel, beside that of shape and place.
 const COLOUR: f64 = 4.0;
-/// Constant basis function of the harmonics.
-const SH_C0: f64 = 0.282_094_791_773_878;
-/// Largest opacity that a merged Gaussian gets; blending ends there.
-const OPACITY_MAX: f64 = 0.99;
+/// Smallest opacity that a merged Gaussian gets, so that it has a logit. Blending ends at the largest.
+const OPACITY_MIN: f64 = 1e-6;
 /// Sweeps of the eigenvalue iteration; five reach double precision for 3 x 3.
 const SWEEPS: usize = 8;
 
@@ -69,7 +68,7 @@ impl Blob {
         Self {
             mean,
             covariance,
-            opacity: opacity.clamp(1e-6, OPACITY_MAX),
+            opacity: opacity.clamp(OPACITY_MIN, ALPHA_MAX),
             weight: self.weight + other.weight,
             label: self.label,
             confidence: mix(self.confidence.into(), other.confidence.into()) as f32,

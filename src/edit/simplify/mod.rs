@@ -36,7 +36,7 @@ impl<'a> Simplifier<'a> {
         let blob = |row: usize| Blob {
             mean: DVec3::from_array(model.means[row].map(f64::from)),
             covariance: covariance(model.quats[row], model.scales[row]),
-            opacity: 1.0 / (1.0 + (-f64::from(model.opacities[row])).exp()),
+            opacity: model.opacity(row),
             weight: weights[row].into(),
             label: model.label(row),
             confidence: model.label_confidence.as_ref().map_or(1.0, |shares| shares[row]),

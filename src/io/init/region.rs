@@ -1,7 +1,7 @@
 //! The region that the cameras of a scene see.
 
-use crate::scene::{Camera, View};
-use glam::{DMat3, DVec2, DVec3};
+use crate::scene::{Camera, View, overview};
+use glam::{DVec2, DVec3};
 
 /// The region to fill with Gaussians.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -51,11 +51,6 @@ pub(super) fn unproject(camera: &Camera, pixel: DVec2, depth: f64) -> DVec3 {
     camera.rotation.transpose() * (ray * depth - camera.translation)
 }
 
-/// Returns the direction of the optical axis in world space.
-pub(super) fn axis(camera: &Camera) -> DVec3 {
-    camera.rotation.transpose() * DVec3::Z
-}
-
 /// Returns the sine of the angle from the optical axis to the nearest edge of the image.
 fn narrow_sine(camera: &Camera) -> f64 {
     let side = |f: f64, c: f64, size: u32| c.min(f64::from(size) - c).max(0.0) / f;
@@ -87,14 +82,7 @@ pub(super) fn find(views: &[View], extent: f64) -> Region {
 
 /// Returns the point with the least sum of squared distances to the optical axes, if it is well determined.
 fn nearest_to_axes(cameras: &[&Camera]) -> Option<DVec3> {
-    let (mut matrix, mut right) = (DMat3::ZERO, DVec3::ZERO);
-    for camera in cameras {
-        let (direction, centre) = (axis(camera), camera.centre());
-        let across = DMat3::IDENTITY
-            - DMat3::from_cols(direction * direction.x, direction * direction.y, direction * direction.z);
-        matrix += across;
-        right += across * centre;
-    }
+    let (mut matrix, mut right) = overview::nearest_to_axes(cameras.iter().copied());
     matrix *= 1.0 / cameras.len().max(1) as f64;
     right /= cameras.len().max(1) as f64;
     // The matrix has trace 2. Its determinant is 0 for parallel axes and 0.01 for axes within 6 degrees of a common
