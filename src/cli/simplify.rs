@@ -93,42 +93,54 @@ pub(crate) fn run(args: &SimplifyArgs, context: &Context) -> Result<()> {
     let mut scorer = Scorer { engine, views: views.iter().collect(), options };
 
     let mut simplifier = Simplifier::new(&model, &weights);
-    let (mut rows, mut enough) = (Vec::new(), simplifier.clone());
+    let (mut rows, mut enough) = (Vec::new(), None);
     let mut progress = Progress::new(SHARES.len() as u64, "sizes", &context.global);
     for (done, share) in (1..).zip(SHARES) {
         simplifier.reduce_to((model.len() * share).div_ceil(100))?;
         let row = scorer.score(&simplifier.model())?;
         rows.push(row);
         if row.suffices(args, &rows[0]) {
-            enough = simplifier.clone();
+            enough = Some((simplifier.clone(), row));
         }
         progress.set(done, String::new);
     }
     drop(progress);
-    let (simpler, chosen) = match args.gaussians {
-        Some(count) => {
-            if count >= model.len() as u64 {
-                tracing::warn!("the model has {} Gaussians, and {count} may stay: nothing changes", model.len());
-            }
-            enough.reduce_to(usize::try_from(count).unwrap_or(usize::MAX))?;
-            let simpler = enough.model();
-            let row = scorer.score(&simpler)?;
-            (simpler, row)
-        }
+    // The first size, of all Gaussians, always does.
+    let enough = enough.ok_or_else(|| Error::Bug("no size of the table does".to_owned()))?;
+    let (simplifier, chosen) = match args.gaussians {
+        Some(count) => exactly(count, enough, &mut scorer)?,
         None => fewest(args, &rows, enough, &mut scorer)?,
     };
     if !wants_json(context, &args.edit.json) {
         stdout::print(&table(&rows, &chosen))?;
     }
-    args.edit.finish(context, (&simpler, known), model.len(), json!({ "table": rows, "chosen": chosen }))
+    args.edit.finish(context, (&simplifier.model(), known), model.len(), json!({ "table": rows, "chosen": chosen }))
+}
+
+/// Merges until `count` are left.
+fn exactly<'a>(
+    count: u64,
+    (mut simplifier, row): (Simplifier<'a>, Row),
+    scorer: &mut Scorer,
+) -> Result<(Simplifier<'a>, Row)> {
+    let before = simplifier.count();
+    if count > before as u64 {
+        tracing::warn!("the model has {before} Gaussians, and {count} may stay: nothing changes");
+    }
+    simplifier.reduce_to(usize::try_from(count).unwrap_or(usize::MAX))?;
+    let row = if simplifier.count() == before { row } else { scorer.score(&simplifier.model())? };
+    Ok((simplifier, row))
 }
 
 /// Halves the interval between the sizes of the table of which one loses too much. Returns the smallest model found that
 /// does not.
-fn fewest(args: &SimplifyArgs, rows: &[Row], mut enough: Simplifier, scorer: &mut Scorer) -> Result<(Gaussians, Row)> {
+fn fewest<'a>(
+    args: &SimplifyArgs,
+    rows: &[Row],
+    (mut enough, mut chosen): (Simplifier<'a>, Row),
+    scorer: &mut Scorer,
+) -> Result<(Simplifier<'a>, Row)> {
     let mut below = rows.iter().map(|row| row.gaussians).find(|&count| count < enough.count()).unwrap_or(1);
-    let mut best = enough.model();
-    let mut chosen = scorer.score(&best)?;
     for _ in 0..HALVINGS {
         let middle = below.midpoint(enough.count());
         let mut next = enough.clone();
@@ -136,15 +148,14 @@ fn fewest(args: &SimplifyArgs, rows: &[Row], mut enough: Simplifier, scorer: &mu
         if next.count() == enough.count() || middle == below {
             break;
         }
-        let model = next.model();
-        let row = scorer.score(&model)?;
+        let row = scorer.score(&next.model())?;
         if row.suffices(args, &rows[0]) {
-            (enough, best, chosen) = (next, model, row);
+            (enough, chosen) = (next, row);
         } else {
             below = middle;
         }
     }
-    Ok((best, chosen))
+    Ok((enough, chosen))
 }
 
 impl Row {

@@ -109,14 +109,17 @@ pub(crate) fn share(text: &str) -> Result<f32, String> {
 
 /// Parses a distance, world units, 0 or more.
 pub(crate) fn distance(text: &str) -> Result<f64, String> {
-    let value = text.parse().ok().filter(|value: &f64| value.is_finite() && *value >= 0.0);
-    value.ok_or_else(|| format!("`{text}` is not a distance; expected 0 or more, in world units"))
+    zero_or_more(text, "a distance", "in world units")
 }
 
 /// Parses a loss of PSNR, dB, 0 or more.
 pub(crate) fn loss(text: &str) -> Result<f64, String> {
+    zero_or_more(text, "a loss of PSNR", "in dB")
+}
+
+fn zero_or_more(text: &str, what: &str, unit: &str) -> Result<f64, String> {
     let value = text.parse().ok().filter(|value: &f64| value.is_finite() && *value >= 0.0);
-    value.ok_or_else(|| format!("`{text}` is not a loss of PSNR; expected 0 or more, in dB"))
+    value.ok_or_else(|| format!("`{text}` is not {what}; expected 0 or more, {unit}"))
 }
 
 /// Parses a factor, more than 0.

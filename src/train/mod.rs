@@ -255,10 +255,7 @@ impl Trainer {
         if fault::at("nan").is_some() {
             self.engine.spoil()?;
         }
-        if self.in_flight.len() == FRAMES_IN_FLIGHT {
-            done.extend(self.retire()?);
-        }
-        self.submit(input.clone())?;
+        done.extend(self.submit_next(input.clone())?);
         self.step = step;
         if self.strategy.acts_after(self.at(step)) {
             done.extend(self.drain()?);
@@ -313,6 +310,13 @@ impl Trainer {
         }
         self.strategy.uniforms(self.at(input.step), &mut uniforms);
         uniforms
+    }
+
+    /// Submits a step, and first waits for the oldest one if its frame is still in use.
+    fn submit_next(&mut self, input: StepInput) -> Result<Option<StepReport>> {
+        let done = if self.in_flight.len() == FRAMES_IN_FLIGHT { self.retire()? } else { None };
+        self.submit(input)?;
+        Ok(done)
     }
 
     fn submit(&mut self, input: StepInput) -> Result<()> {

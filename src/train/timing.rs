@@ -5,7 +5,6 @@ use crate::engine::Recording;
 use crate::error::Result;
 use crate::pass::Stage;
 use crate::scene::Gaussians;
-use crate::scheduler::plan::FRAMES_IN_FLIGHT;
 use std::collections::HashSet;
 
 /// Times of the passes of a step.
@@ -50,10 +49,7 @@ impl Trainer {
         self.keep_times();
         for step in self.step - count.min(self.step)..self.step {
             let input = self.input(step + 1);
-            if self.in_flight.len() == FRAMES_IN_FLIGHT {
-                self.retire()?;
-            }
-            self.submit(input)?;
+            self.submit_next(input)?;
         }
         self.drain()?;
         Ok(self.take_times())

@@ -234,19 +234,13 @@ impl Session<'_> {
 
     /// Scores the next view of the whole, unchanged model while nothing else is to do.
     fn score_one(&mut self) -> Result<()> {
-        let (index, views) = (self.scores.len(), Arc::clone(&self.painter.views));
+        let views = Arc::clone(&self.painter.views);
         let is_whole = self.hidden.is_empty() && self.solo.is_empty() && !self.work.is_changed();
-        if index >= views.list.len() || !is_whole || !self.hub.is_watched() {
-            return Ok(());
-        }
-        if views.list.iter().all(|posed| posed.view.photo.is_none()) {
-            return Ok(());
-        }
-        if views.list[index].view.photo.is_some() {
-            self.scores.push(self.painter.score(index, &mut self.drawing)?);
-        } else {
-            self.scores.push(Score::default());
-        }
+        // Views without a photo have no score.
+        let next = (self.scores.len()..views.list.len()).find(|&index| views.list[index].view.photo.is_some());
+        let Some(index) = next.filter(|_| is_whole && self.hub.is_watched()) else { return Ok(()) };
+        self.scores.resize(index, Score::default());
+        self.scores.push(self.painter.score(index, &mut self.drawing)?);
         self.hub.publish("scores", &describe_scores(&self.scores, 0));
         Ok(())
     }

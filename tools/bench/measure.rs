@@ -53,6 +53,15 @@ pub fn median_cost(costs: &[Cost]) -> Cost {
     Cost { wall: median(costs.iter().map(|cost| cost.wall)), cpu: median(costs.iter().map(|cost| cost.cpu)) }
 }
 
+/// Returns a quantile, 0 without values. Reorders them.
+pub fn quantile(values: &mut [f64], share: f64) -> f64 {
+    if values.is_empty() {
+        return 0.0;
+    }
+    let place = ((values.len() - 1) as f64 * share).ceil() as usize;
+    *values.select_nth_unstable_by(place, f64::total_cmp).1
+}
+
 /// Load average of the last minute, if the system reports it.
 pub fn load() -> Option<f64> {
     std::fs::read_to_string("/proc/loadavg").ok()?.split(' ').next()?.parse().ok()

@@ -1,6 +1,6 @@
 //! The viewer: time from a camera to its picture, what watching costs a training, and bytes of page and program.
 
-use super::measure::{median, require, table, write_json};
+use super::measure::{median, quantile, require, table, write_json};
 use super::trained::{TEST_EVERY, start, trainer, without_masks};
 use super::{Common, device};
 use labelgs::internals::io::camera_json::CameraFile;
@@ -45,7 +45,12 @@ pub fn run(common: &Common) -> Result<()> {
     let (count, (width, height)) = (trained.len(), size);
     println!("labelgs view: {count} Gaussians, {width} x {height} px, from the camera to the picture, median and 90 %");
     let row = |name: &str, times: &[f64], note: String| {
-        vec![name.to_owned(), format!("{:.0}", median(times.iter().copied())), format!("{:.0}", most(times)), note]
+        vec![
+            name.to_owned(),
+            format!("{:.0}", median(times.iter().copied())),
+            format!("{:.0}", quantile(&mut times.to_vec(), 0.9)),
+            note,
+        ]
     };
     let rows = [
         ["camera", "ms", "90 %", "picture"].map(str::to_owned).to_vec(),
@@ -171,11 +176,4 @@ fn sizes(folder: &Path) -> Result<(u64, u64)> {
     require(strip.is_ok_and(|status| status.success()), || "strip, of binutils, does not run".to_owned())?;
     let program = std::fs::metadata(&stripped).map_err(Error::read(&stripped))?.len();
     Ok((page, program))
-}
-
-/// The 90 % quantile.
-fn most(times: &[f64]) -> f64 {
-    let mut sorted = times.to_vec();
-    sorted.sort_by(f64::total_cmp);
-    sorted.get(sorted.len().saturating_sub(1) * 9 / 10).copied().unwrap_or(f64::NAN)
 }

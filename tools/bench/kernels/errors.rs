@@ -1,6 +1,7 @@
 //! How far a picture and its gradients are from those in float64.
 
 use super::mirror::Mirror;
+use crate::measure::quantile;
 use labelgs::internals::verify::reference::Row;
 use labelgs::internals::verify::reference::model::{Group, flatten};
 use serde::Serialize;
@@ -87,14 +88,6 @@ pub fn compare(outcome: &Outcome, mirror: &Mirror, sure: f64) -> Errors {
 /// A NaN is worse than any number.
 fn larger(a: f64, b: f64) -> f64 {
     if a.is_nan() || a > b { a } else { b }
-}
-
-fn quantile(values: &mut [f64], share: f64) -> f64 {
-    if values.is_empty() {
-        return 0.0;
-    }
-    let place = ((values.len() - 1) as f64 * share).ceil() as usize;
-    *values.select_nth_unstable_by(place, f64::total_cmp).1
 }
 
 fn colours(mut differences: Vec<f64>) -> ColourError {
