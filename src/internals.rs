@@ -102,7 +102,9 @@ pub mod io {
         pub use crate::io::label_table::FILE;
     }
     pub mod lens {
-        pub use crate::io::lens::{Distortion, Lens, Polynomial};
+        pub use crate::io::lens::{
+            Division, Equirectangular, Eucm, Fisheye, Fov, Lens, Optics, Polynomial, Projection, RadTan,
+        };
     }
     pub mod mask {
         pub use crate::io::mask::read_mask;
@@ -126,6 +128,9 @@ pub mod io {
     }
     pub mod truth {
         pub use crate::io::truth::{files_below, read_truth};
+    }
+    pub mod window {
+        pub use crate::io::window::{Window, ids_of_photo, windows};
     }
 }
 pub mod label {
@@ -198,7 +203,7 @@ pub mod shaders {
 }
 pub mod synth {
     pub use crate::synth::cameras::ring_of_cameras;
-    pub use crate::synth::trace::{Picture, alone, picture};
+    pub use crate::synth::trace::{Picture, alone, photograph, picture};
     pub use crate::synth::world::World;
     pub use crate::synth::{dataset, write};
 }

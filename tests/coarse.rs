@@ -6,11 +6,19 @@ use labelgs::internals::scheduler::SchedulerOptions;
 use labelgs::internals::train::{StepReport, Trainer};
 use labelgs::run::TrainConfig;
 use labelgs::scene::{Dataset, Photo};
-use labelgs::synth::{Preset, SynthOptions, dataset};
+use labelgs::synth::{Preset, SynthLens, SynthOptions, dataset};
 use std::sync::Arc;
 
-const SCENE: SynthOptions =
-    SynthOptions { preset: Preset::Simple, width: 96, height: 72, views: 6, points: 200, seed: 1 };
+const SCENE: SynthOptions = SynthOptions {
+    preset: Preset::Simple,
+    width: 96,
+    height: 72,
+    views: 6,
+    points: 200,
+    seed: 1,
+    lens: SynthLens::PINHOLE,
+    fov: None,
+};
 /// Steps at half of the size.
 const COARSE: u32 = 6;
 

@@ -205,7 +205,15 @@ fn occluders_come_in_chains() {
 /// Depth and amodal outlines of a made scene are ground truth for which object hides which.
 #[test]
 fn the_vote_finds_what_hides_in_a_known_scene() {
-    let options = SynthOptions { preset: Preset::Default, width: 160, height: 120, views: 10, points: 1, seed: 1 };
+    let options = SynthOptions {
+        preset: Preset::Default,
+        width: 160,
+        height: 120,
+        views: 10,
+        points: 1,
+        seed: 1,
+        ..SynthOptions::default()
+    };
     let world = World::new(options.preset, options.seed);
     let (mut both, mut found_pairs, mut true_pairs, mut mean_pairs, mut mean_both) = (0, 0, 0, 0, 0);
     for (view, camera) in ring_of_cameras(&options).iter().enumerate() {

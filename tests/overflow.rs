@@ -6,10 +6,18 @@ use labelgs::internals::scheduler::SchedulerOptions;
 use labelgs::internals::train::Trainer;
 use labelgs::run::TrainConfig;
 use labelgs::scene::Gaussians;
-use labelgs::synth::{Preset, SynthOptions, dataset};
+use labelgs::synth::{Preset, SynthLens, SynthOptions, dataset};
 
-const SCENE: SynthOptions =
-    SynthOptions { preset: Preset::Simple, width: 96, height: 72, views: 6, points: 200, seed: 1 };
+const SCENE: SynthOptions = SynthOptions {
+    preset: Preset::Simple,
+    width: 96,
+    height: 72,
+    views: 6,
+    points: 200,
+    seed: 1,
+    lens: SynthLens::PINHOLE,
+    fov: None,
+};
 
 /// Model after a few labelled steps with initial capacity `room`, and whether the (splat, tile) pairs had to grow.
 fn trained(gpu: &std::sync::Arc<labelgs::gpu::Gpu>, room: u64) -> (Gaussians, bool) {

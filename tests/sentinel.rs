@@ -91,7 +91,15 @@ fn the_pass_that_finds_a_broken_parameter_is_counted_by_itself() {
 #[test]
 fn a_state_with_a_nan_is_refused_as_a_checkpoint() {
     let Some(turn) = device() else { return };
-    let options = SynthOptions { preset: Preset::Simple, width: 48, height: 36, views: 4, points: 300, seed: 3 };
+    let options = SynthOptions {
+        preset: Preset::Simple,
+        width: 48,
+        height: 36,
+        views: 4,
+        points: 300,
+        seed: 3,
+        ..SynthOptions::default()
+    };
     let dataset = dataset(&options, 0);
     let model = initial_gaussians(&dataset, 0, 300).expect("points");
     let config = TrainConfig { iterations: 20, ..TrainConfig::default() };
@@ -114,7 +122,15 @@ fn a_state_with_a_nan_is_refused_as_a_checkpoint() {
 fn a_training_that_keeps_dropping_gradients_ends() {
     let Some(turn) = device() else { return };
     let run = |broken: usize| -> Result<u32, Error> {
-        let options = SynthOptions { preset: Preset::Simple, width: 48, height: 36, views: 4, points: 300, seed: 3 };
+        let options = SynthOptions {
+            preset: Preset::Simple,
+            width: 48,
+            height: 36,
+            views: 4,
+            points: 300,
+            seed: 3,
+            ..SynthOptions::default()
+        };
         let dataset = dataset(&options, 0);
         let mut model = initial_gaussians(&dataset, 0, 300).expect("points");
         // Spheres have no gradient of rotations.

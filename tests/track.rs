@@ -93,7 +93,15 @@ fn score(truth: &[LabelMap], found: &[LabelMap]) -> f64 {
 /// so the numbers do not depend on a model.
 #[test]
 fn frames_between_sparse_photos_keep_ids() {
-    let options = SynthOptions { preset: Preset::Default, width: 160, height: 120, views: 8, points: 10, seed: 0 };
+    let options = SynthOptions {
+        preset: Preset::Default,
+        width: 160,
+        height: 120,
+        views: 8,
+        points: 10,
+        seed: 0,
+        ..SynthOptions::default()
+    };
     let (world, cameras) = (World::new(options.preset, options.seed), ring_of_cameras(&options));
     let cameras: Vec<&Camera> = cameras.iter().collect();
     let cameras: Vec<&Camera> = short_order(&cameras).into_iter().map(|index| cameras[index]).collect();

@@ -6,7 +6,7 @@ use super::log::Progress;
 use super::values::{Size, size};
 use super::{interrupt, stdout};
 use crate::Result;
-use crate::synth::{Preset, SynthOptions, write};
+use crate::synth::{Preset, SynthLens, SynthOptions, write};
 use clap::Args;
 use std::cell::RefCell;
 use std::path::PathBuf;
@@ -32,6 +32,13 @@ pub struct SynthArgs {
     /// Seed of colours, camera jitter and points.
     #[arg(long, value_name = "SEED", default_value_t = 0)]
     pub seed: u64,
+    /// Lens of the cameras: a camera model of COLMAP, with coefficients of a usual lens. With a lens that is no pinhole,
+    /// photos, poses and masks are all that is written.
+    #[arg(long, value_name = "MODEL", default_value_t = SynthLens::default())]
+    pub lens: SynthLens,
+    /// Field of view across the picture, degrees. Default: 50 in a picture of 4 : 3; EQUIRECTANGULAR shows everything.
+    #[arg(long, value_name = "DEGREES")]
+    pub fov: Option<u32>,
     /// JSON.
     #[command(flatten)]
     pub json: JsonFlag,
@@ -46,6 +53,8 @@ pub(crate) fn run(args: &SynthArgs, context: &Context) -> Result<()> {
         views: args.views,
         points: args.points,
         seed: args.seed,
+        lens: args.lens,
+        fov: args.fov,
     };
     interrupt::note_only();
     let progress = RefCell::new(Progress::new(u64::from(options.views), "views", &context.global));

@@ -3,18 +3,18 @@
 //! A map belongs to the photo file. It is undistorted and resized in the same way as the mask of the photo.
 
 use super::depth_file::{EXTENSIONS, read_depth};
-use super::listing::Listed;
-use super::load::{at_photo_size, shortened};
+use super::load::shortened;
 use super::resample::{resample_nearest, same_aspect};
+use super::window::{Window, windows};
 use crate::error::{Error, Result};
 use crate::scene::{DepthMap, View};
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::path::{Path, PathBuf};
 
-/// A folder of depth maps, with the lenses and names to match them to the views of a scene.
+/// A folder of depth maps, with what matches them to the views of a scene.
 pub struct DepthFolder {
     folder: PathBuf,
-    listed: BTreeMap<String, Listed>,
+    windows: BTreeMap<String, Window>,
     /// Number of photos per file stem. A map outside of the photo's folder serves only unique stems.
     stems: HashMap<PathBuf, usize>,
 }
@@ -29,11 +29,11 @@ impl DepthFolder {
         if !folder.is_dir() {
             return Err(Error::data(folder, "", "there is no such folder of depth maps"));
         }
-        let listed: BTreeMap<String, Listed> =
-            super::list(scene, true)?.views.into_iter().map(|view| (view.name.clone(), view)).collect();
+        let windows = windows(scene)?;
+        let photos: BTreeSet<&str> = windows.values().map(|window| window.photo.as_str()).collect();
         let mut stems = HashMap::new();
-        listed.keys().for_each(|name| *stems.entry(stem(name)).or_insert(0) += 1);
-        Ok(Self { folder: folder.to_owned(), listed, stems })
+        photos.into_iter().for_each(|name| *stems.entry(stem(name)).or_insert(0) += 1);
+        Ok(Self { folder: folder.to_owned(), windows, stems })
     }
 
     /// Refuses a folder without a map for one of `views`.
@@ -55,11 +55,11 @@ impl DepthFolder {
 
     /// Reads the map of `view`, at its size. Pixels outside of the photo are holes.
     pub fn read(&self, view: &View) -> Result<DepthMap> {
-        let (Some(listed), Some(path)) = (self.listed.get(&view.name), self.find(&view.name)) else {
+        let (Some(window), Some(path)) = (self.windows.get(&view.name), self.find(&view.name)) else {
             return Err(Error::data(&self.folder, &view.name, "has no depth map"));
         };
         let map = read_depth(&path)?;
-        let photo = at_photo_size(listed)?;
+        let photo = &window.optics.camera;
         if !same_aspect((map.width, map.height), (photo.width, photo.height)) {
             let problem = format!(
                 "the depth map has {} x {} px and its photo {} x {} px, which no scale explains; make maps of the same \
@@ -70,15 +70,16 @@ impl DepthFolder {
         }
         let (width, height) = (view.camera.width, view.camera.height);
         let from = (map.width, map.height);
-        let values = resample_nearest(&map.values, from, &photo, &listed.lens, (width, height), f32::NAN);
+        let values = resample_nearest(&map.values, from, window, (width, height), f32::NAN);
         if !values.iter().any(|value| value.is_finite()) {
             return Err(Error::data(&path, "", "holds no finite depth"));
         }
         Ok(DepthMap { width, height, values })
     }
 
-    /// Finds the file of a photo: its name with the extension replaced or appended, then the same without folders.
-    fn find(&self, name: &str) -> Option<PathBuf> {
+    /// Finds the file of a view's photo: its name with the extension replaced or appended, then the same without folders.
+    fn find(&self, view: &str) -> Option<PathBuf> {
+        let name = self.windows.get(view)?.photo.as_str();
         let stem = stem(name);
         let flat = (self.stems.get(&stem) == Some(&1)).then_some(stem);
         let file = flat.is_some().then(|| Path::new(name).file_name().map(PathBuf::from)).flatten();

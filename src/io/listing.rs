@@ -66,8 +66,8 @@ pub(crate) fn check_camera(path: &Path, place: &str, camera: &Camera, lens: &Len
     if !(0.0..=f64::from(width)).contains(&cx) || !(0.0..=f64::from(height)).contains(&cy) {
         return refuse(format!("principal point ({cx}, {cy}) lies outside the image of {width} x {height} px"));
     }
-    if lens.distortion().is_some_and(|lens| !lens.is_finite()) {
-        return refuse("a distortion coefficient is NaN or infinite".into());
+    if lens.projection().is_some_and(|lens| !lens.is_valid()) {
+        return refuse(format!("{lens:?} is no lens; expected finite coefficients in the range of the camera model"));
     }
     if !camera.translation.is_finite() || !camera.rotation.is_finite() {
         return refuse("the pose is not finite".into());
@@ -96,6 +96,26 @@ pub(crate) fn rotation_of(matrix: DMat3) -> Option<DMat3> {
 pub(crate) fn invert_pose(rotation: DMat3, centre: DVec3) -> (DMat3, DVec3) {
     let inverse = rotation.transpose();
     (inverse, -(inverse * centre))
+}
+
+/// Extensions to try for a photo that is listed without one.
+pub(crate) const EXTENSIONS: [&str; 7] = ["", ".png", ".jpg", ".jpeg", ".PNG", ".JPG", ".JPEG"];
+
+/// Returns the name of a view: a photo listed without extension gets that of its file. Otherwise `frame.0001` would later
+/// lose its number.
+pub(crate) fn with_extension(mut name: String, photo: Option<&Path>) -> String {
+    if let Some(found) = photo.and_then(|photo| photo.to_str()) {
+        name.push_str(EXTENSIONS.iter().rev().find(|ext| found.ends_with(&format!("{name}{ext}"))).unwrap_or(&""));
+    }
+    name
+}
+
+/// Returns a side of a photo, px, that is stored as a float.
+pub(crate) fn side(path: &Path, place: &str, value: f64) -> Result<u32> {
+    if value.fract() == 0.0 && (1.0..=f64::from(u32::MAX)).contains(&value) {
+        return Ok(value as u32);
+    }
+    Err(Error::data(path, place, format!("image side {value} is not a positive whole number")))
 }
 
 /// Finds `relative` with one of `extensions` appended in the first of `folders` below `root` that has it.

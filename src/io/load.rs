@@ -6,6 +6,7 @@ use super::image::{check_size, photo_size, read_photo};
 use super::listing::{Listed, Listing};
 use super::mask::{MaskFolder, read_checked};
 use super::resample::{bounded_size, resample_ids, same_aspect, shrink_photo, undistort_photo};
+use super::window::Window;
 use crate::error::{Error, Result};
 use crate::scene::{Camera, Dataset, LabelMap, Photo, View};
 use rayon::prelude::*;
@@ -21,40 +22,62 @@ pub(crate) fn load(root: &Path, mut listing: Listing, options: &LoadOptions) -> 
     let masks = options.masks.as_deref().map(|folder| MaskFolder::new(folder, views.iter().map(|v| v.name.as_str())));
     let masks = masks.transpose()?;
     let resampled = AtomicUsize::new(0);
-    let read = |view| Ok(load_view(view, decode(view, options)?, options, masks.as_ref(), &resampled));
-    let read: Vec<Result<Result<View>>> = views.par_iter().map(read).collect();
+    let read = |view| Ok(load_views(view, decode(view, options)?, options, masks.as_ref(), &resampled));
+    let read: Vec<Result<Result<Vec<View>>>> = views.par_iter().map(read).collect();
     let mut undecodable = std::mem::take(&mut listing.bad);
     let total = views.len() + undecodable.len();
     let mut loaded = Vec::with_capacity(views.len());
     for (view, test) in read.into_iter().zip(test) {
         match view {
-            Ok(view) => loaded.push(view.map(|view| (view, test))),
+            Ok(views) => loaded.push(views.map(|views| (views, test))),
             Err(error) => undecodable.push(error),
         }
     }
     bad_photos::skip(root, undecodable, total, options, &mut notes)?;
-    let (loaded, test): (Vec<View>, Vec<bool>) = all_or_one_error(root, loaded)?.into_iter().unzip();
+    let loaded: Vec<(Vec<View>, bool)> = all_or_one_error(root, loaded)?;
     if let Some(masks) = &masks {
-        let without: Vec<&str> = loaded.iter().filter(|v| v.mask.is_none()).map(|view| view.name.as_str()).collect();
-        if without.len() == loaded.len() {
-            return Err(masks.nothing_found(&loaded[0].name));
+        let without = views.iter().filter(|view| masks.find(&view.name).is_none()).map(|view| view.name.as_str());
+        let without: Vec<&str> = without.collect();
+        if without.len() == views.len() {
+            return Err(masks.nothing_found(&views[0].name));
         }
         if !without.is_empty() {
-            notes.push(format!("{} of {} photos have no mask: {}", without.len(), loaded.len(), shortened(&without)));
+            notes.push(format!("{} of {} photos have no mask: {}", without.len(), views.len(), shortened(&without)));
         }
     }
     if resampled.load(Relaxed) > 0 {
         let count = resampled.load(Relaxed);
         notes.push(format!("{count} masks differ in size from their photos and were scaled (nearest id)"));
     }
-    if views.iter().any(|view| !view.lens.is_pinhole()) {
+    if options.undistort && views.iter().any(|view| !view.lens.is_pinhole()) {
         notes.push("photos and masks were undistorted to a pinhole camera; pixels without a source are ignored".into());
     }
-    let mut dataset = Dataset { root: root.to_owned(), points: listing.points, notes, ..Dataset::default() };
-    for (view, test) in loaded.into_iter().zip(test) {
-        if test { dataset.test.push(view) } else { dataset.train.push(view) }
+    let wide: Vec<&Vec<View>> = loaded.iter().map(|(views, _)| views).filter(|views| views.len() > 1).collect();
+    if !wide.is_empty() {
+        let faces: usize = wide.iter().map(|views| views.len()).sum();
+        notes.push(format!("{} photos are wider than a pinhole picture and became {faces} faces of cubes", wide.len()));
     }
+    let mut dataset = Dataset { root: root.to_owned(), points: listing.points, notes, ..Dataset::default() };
+    for (views, test) in loaded {
+        if test { dataset.test.extend(views) } else { dataset.train.extend(views) }
+    }
+    // Faces of a photo are not in the order of their names.
+    dataset.train.sort_by(|a, b| a.name.cmp(&b.name));
+    dataset.test.sort_by(|a, b| a.name.cmp(&b.name));
+    require_unique(root, &dataset)?;
     Ok(dataset)
+}
+
+/// Refuses a photo that is named as the face of another.
+fn require_unique(root: &Path, dataset: &Dataset) -> Result<()> {
+    let all = dataset.all();
+    match all.windows(2).find(|pair| pair[0].name == pair[1].name) {
+        Some(pair) => {
+            let problem = "is the name of a photo and of a face of a wide photo; rename the photo";
+            Err(Error::data(root, format!("view {}", pair[0].name), problem))
+        }
+        None => Ok(()),
+    }
 }
 
 pub(crate) fn shortened(names: &[&str]) -> String {
@@ -145,27 +168,39 @@ fn decode(listed: &Listed, options: &LoadOptions) -> Result<Decoded> {
     Ok((Some(size), photo))
 }
 
-fn load_view(
+/// Makes the views of a photo, one or several.
+fn load_views(
     listed: &Listed,
     (stored, photo): Decoded,
     options: &LoadOptions,
     masks: Option<&MaskFolder>,
     resampled: &AtomicUsize,
-) -> Result<View> {
+) -> Result<Vec<View>> {
     let original = at_size(listed, stored)?;
-    let size = bounded_size((original.width, original.height), options.max_resolution);
-    let photo = photo.map(|photo| fitted(photo, listed, &original, size));
     let mask = match masks.and_then(|masks| masks.find(&listed.name)) {
-        Some(path) => Some(load_mask(&path, listed, &original, size, resampled)?),
+        Some(path) => Some(load_mask(&path, (original.width, original.height), resampled)?),
         None => None,
     };
-    Ok(View {
-        name: listed.name.clone(),
-        camera: original.resized(size.0, size.1),
-        photo: photo.map(Arc::new),
-        mask: mask.map(Arc::new),
-    })
+    let windows = match options.undistort {
+        true => Window::all(&listed.name, &original, &listed.lens),
+        false => vec![Window::stored(&listed.name, &original)],
+    };
+    if windows.is_empty() {
+        return Err(Error::data(listed.photo.as_deref().unwrap_or(Path::new(&listed.name)), "", NO_WINDOW));
+    }
+    let view = |window: Window| {
+        let size = bounded_size((window.camera.width, window.camera.height), options.max_resolution);
+        View {
+            camera: window.camera.resized(size.0, size.1),
+            photo: photo.as_ref().map(|photo| Arc::new(fitted(photo, &window, size))),
+            mask: mask.as_ref().map(|mask| Arc::new(resample_ids(mask, &window, size))),
+            name: window.name,
+        }
+    };
+    Ok(windows.into_iter().map(view).collect())
 }
+
+const NO_WINDOW: &str = "the lens of its camera shows nothing of the photo; check focal lengths and coefficients";
 
 /// Returns the camera at the size of the photo's file, which may be a scaled version of the size in the data set.
 pub(crate) fn at_photo_size(listed: &Listed) -> Result<Camera> {
@@ -193,24 +228,15 @@ fn at_size(listed: &Listed, stored: Option<(u32, u32)>) -> Result<Camera> {
 }
 
 /// Undistorts the photo and scales it to the final size.
-fn fitted(mut photo: Photo, listed: &Listed, original: &Camera, (width, height): (u32, u32)) -> Photo {
-    if !listed.lens.is_pinhole() {
-        photo = undistort_photo(&photo, original, &listed.lens);
+fn fitted(photo: &Photo, window: &Window, (width, height): (u32, u32)) -> Photo {
+    if window.is_photo() {
+        return shrink_photo(photo, width, height);
     }
-    if (width, height) != (photo.width, photo.height) {
-        photo = shrink_photo(&photo, width, height);
-    }
-    photo
+    let whole = undistort_photo(photo, window);
+    if (width, height) == (whole.width, whole.height) { whole } else { shrink_photo(&whole, width, height) }
 }
 
-fn load_mask(
-    path: &Path,
-    listed: &Listed,
-    original: &Camera,
-    size: (u32, u32),
-    resampled: &AtomicUsize,
-) -> Result<LabelMap> {
-    let photo = (original.width, original.height);
+fn load_mask(path: &Path, photo: (u32, u32), resampled: &AtomicUsize) -> Result<LabelMap> {
     let ids = read_checked(path, |found| {
         if same_aspect(found, photo) {
             return Ok(());
@@ -224,5 +250,5 @@ fn load_mask(
     if (ids.width, ids.height) != photo {
         resampled.fetch_add(1, Relaxed);
     }
-    Ok(resample_ids(&ids, original, &listed.lens, size))
+    Ok(ids)
 }

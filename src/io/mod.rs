@@ -34,13 +34,12 @@ pub(crate) mod resample;
 pub(crate) mod run_folder;
 mod transforms;
 pub(crate) mod truth;
+pub(crate) mod window;
 
 use crate::error::{Error, Result};
 use crate::scene::Dataset;
-use lens::Lens;
 use listed_path::Place;
 use listing::Listing;
-use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 pub use camera_json::{read_camera, write_cameras};
@@ -76,6 +75,9 @@ pub struct LoadOptions {
     pub max_bad_photos: f32,
     /// Accepts files outside of the scene's folder, by absolute paths or `..`.
     pub allow_outside: bool,
+    /// Turns photos into pinhole views. Without it a view has the pixels of the photo as stored, whatever its lens, and a
+    /// camera that is right for pinholes only.
+    pub undistort: bool,
 }
 
 /// Default for the largest share of undecodable photos.
@@ -91,6 +93,7 @@ impl Default for LoadOptions {
             photos: true,
             max_bad_photos: MAX_BAD_PHOTOS,
             allow_outside: false,
+            undistort: true,
         }
     }
 }
@@ -100,7 +103,9 @@ impl Default for LoadOptions {
 /// reads that file.
 ///
 /// Views are undistorted and resized, each with a pinhole camera of its own size; see [`LoadOptions`] and the notes of
-/// the result. Undistortion keeps focal lengths and principal point: pixels outside of the photo get alpha 0 and id 0.
+/// the result. Pixels outside of the photo get alpha 0 and id 0. A polynomial keeps focal lengths and principal point,
+/// other lenses keep the scale of the middle of the photo; one of 110 degrees and more becomes faces of a cube, each a
+/// view with the face in its name (`00.left.jpg`), all of them held out or none.
 /// Photos without a file are skipped before the split, undecodable ones after it.
 pub fn open(scene: &Path, options: &LoadOptions) -> Result<Dataset> {
     if options.max_resolution == Some(0) {
@@ -146,15 +151,4 @@ fn list(scene: &Path, allow_outside: bool) -> Result<Listing> {
     let problem = "holds no scene: expected a COLMAP model (cameras and images, .bin or .txt, in sparse/0, sparse \
                    or colmap/sparse/0) or transforms.json or transforms_train.json";
     listing.ok_or_else(|| Error::data(scene, "", problem))
-}
-
-/// Returns the lenses of the photos in `scene` (as in [`open`]) by name of the view, without pinholes. Accepts photos
-/// anywhere, because opening the scene has checked their paths.
-pub(crate) fn lenses(scene: &Path) -> Result<BTreeMap<String, Lens>> {
-    Ok(list(scene, true)?
-        .views
-        .into_iter()
-        .filter(|view| !view.lens.is_pinhole())
-        .map(|view| (view.name, view.lens))
-        .collect())
 }

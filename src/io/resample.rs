@@ -3,7 +3,7 @@
 //! Photos are undistorted at their own size with bilinear interpolation, then shrunk by an exact area average. Ids are
 //! never mixed: each target pixel takes the id at its centre, with size and lens in one step.
 
-use super::lens::{Distortion, Lens};
+use super::window::Window;
 use crate::scene::{Camera, LabelMap, Photo};
 use glam::DVec2;
 use rayon::prelude::*;
@@ -28,49 +28,17 @@ pub(crate) fn same_aspect(a: (u32, u32), b: (u32, u32)) -> bool {
     if smaller_first { along(b, a) } else { along(a, b) }
 }
 
-/// A map from pixels of the pinhole image of `camera` to the photo through `lens` with the same intrinsics.
-pub(crate) struct Undistortion<'a> {
-    camera: &'a Camera,
-    /// The lens, and the radius up to which it is one to one.
-    lens: Option<(&'a dyn Distortion, f64)>,
-}
-
-impl<'a> Undistortion<'a> {
-    /// Makes the map; `camera` has the size of the photo.
-    pub(crate) fn new(camera: &'a Camera, lens: Option<&'a dyn Distortion>) -> Self {
-        let far = |f: f64, c: f64, side: u32| (c.max(f64::from(side) - c) / f).abs();
-        let corner = DVec2::new(far(camera.fx, camera.cx, camera.width), far(camera.fy, camera.cy, camera.height));
-        Self { camera, lens: lens.map(|lens| (lens, lens.valid_radius(corner.length().max(1e-9)))) }
-    }
-
-    /// Returns the photo position of the pinhole position `pixel` (px, centres at 0.5); `None` outside the photo.
-    pub(crate) fn source(&self, pixel: DVec2) -> Option<DVec2> {
-        let camera = self.camera;
-        let Some((lens, valid_radius)) = self.lens else { return Some(pixel) };
-        let ideal = DVec2::new((pixel.x - camera.cx) / camera.fx, (pixel.y - camera.cy) / camera.fy);
-        if ideal.length() > valid_radius {
-            return None;
-        }
-        let bent = lens.distort(ideal);
-        let at = DVec2::new(bent.x * camera.fx + camera.cx, bent.y * camera.fy + camera.cy);
-        let inside = (0.0..f64::from(camera.width)).contains(&at.x) && (0.0..f64::from(camera.height)).contains(&at.y);
-        inside.then_some(at)
-    }
-}
-
-/// Returns the pinhole photo with the intrinsics of `camera`, which has the size of the photo. Pixels outside of the
-/// photo are black with alpha 0.
-pub(crate) fn undistort_photo(photo: &Photo, camera: &Camera, lens: &Lens) -> Photo {
-    let map = Undistortion::new(camera, lens.distortion());
+/// Returns the photo through the pinhole view of it. Pixels outside of the photo are black with alpha 0.
+pub(crate) fn undistort_photo(photo: &Photo, view: &Window) -> Photo {
+    let Camera { width, height, .. } = view.camera;
     let row = |y: u32| {
-        let map = &map;
-        (0..photo.width).map(move |x| {
+        (0..width).map(move |x| {
             let pixel = DVec2::new(f64::from(x) + 0.5, f64::from(y) + 0.5);
-            map.source(pixel).map_or([0; 4], |at| bilinear(photo, at))
+            view.source(pixel).map_or([0; 4], |at| bilinear(photo, at))
         })
     };
-    let rgba = (0..photo.height).into_par_iter().flat_map_iter(row).collect();
-    Photo { width: photo.width, height: photo.height, rgba }
+    let rgba = (0..height).into_par_iter().flat_map_iter(row).collect();
+    Photo { width, height, rgba }
 }
 
 /// Interpolates between the four nearest pixel centres. The colours at the border continue outwards by half a pixel.
@@ -136,10 +104,10 @@ fn mean(photo: &Photo, (left, across): (usize, &[f64]), (top, down): (usize, &[f
     [r, g, b, 255]
 }
 
-/// Makes the id map for a photo of `width` x `height` px from a map of the distorted photo at any scale. `camera` is
-/// that of the photo at its own size. Pixels outside of the photo get 0.
-pub(crate) fn resample_ids(ids: &LabelMap, camera: &Camera, lens: &Lens, (width, height): (u32, u32)) -> LabelMap {
-    let ids = resample_nearest(&ids.ids, (ids.width, ids.height), camera, lens, (width, height), 0);
+/// Makes the id map of a view with `width` x `height` px from a map of its photo at any scale. Pixels outside of the
+/// photo get 0.
+pub(crate) fn resample_ids(ids: &LabelMap, view: &Window, (width, height): (u32, u32)) -> LabelMap {
+    let ids = resample_nearest(&ids.ids, (ids.width, ids.height), view, (width, height), 0);
     LabelMap { width, height, ids }
 }
 
@@ -147,67 +115,27 @@ pub(crate) fn resample_ids(ids: &LabelMap, camera: &Camera, lens: &Lens, (width,
 pub(crate) fn resample_nearest<T: Copy + Send + Sync>(
     values: &[T],
     from: (u32, u32),
-    camera: &Camera,
-    lens: &Lens,
+    view: &Window,
     (width, height): (u32, u32),
     nothing: T,
 ) -> Vec<T> {
-    if lens.is_pinhole() && from == (width, height) {
+    if view.is_photo() && from == (width, height) {
         return values.to_vec();
     }
-    let map = Undistortion::new(camera, lens.distortion());
-    let to_photo = DVec2::new(f64::from(camera.width) / f64::from(width), f64::from(camera.height) / f64::from(height));
-    let to_values =
-        DVec2::new(f64::from(from.0) / f64::from(camera.width), f64::from(from.1) / f64::from(camera.height));
+    let scale = |to: (u32, u32), from: (u32, u32)| {
+        DVec2::new(f64::from(to.0) / f64::from(from.0), f64::from(to.1) / f64::from(from.1))
+    };
+    let (camera, photo) = (&view.camera, &view.optics.camera);
+    let to_view = scale((camera.width, camera.height), (width, height));
+    let to_values = scale(from, (photo.width, photo.height));
     let row = |y: u32| {
-        let map = &map;
         (0..width).map(move |x| {
-            let pixel = DVec2::new(f64::from(x) + 0.5, f64::from(y) + 0.5) * to_photo;
-            map.source(pixel).map_or(nothing, |at| {
+            let pixel = DVec2::new(f64::from(x) + 0.5, f64::from(y) + 0.5) * to_view;
+            view.source(pixel).map_or(nothing, |at| {
                 let at = at * to_values;
                 values[((at.y as u32).min(from.1 - 1) * from.0 + (at.x as u32).min(from.0 - 1)) as usize]
             })
         })
     };
     (0..height).into_par_iter().flat_map_iter(row).collect()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use glam::{DMat3, DVec3};
-
-    /// Keeps angles: a ray at angle a from the axis ends at radius a.
-    #[derive(Debug)]
-    struct Equidistant;
-
-    impl Distortion for Equidistant {
-        fn is_finite(&self) -> bool {
-            true
-        }
-
-        fn distort(&self, ideal: DVec2) -> DVec2 {
-            ideal.normalize_or_zero() * self.bent_radius(ideal.length())
-        }
-
-        fn bent_radius(&self, radius: f64) -> f64 {
-            radius.atan()
-        }
-    }
-
-    #[test]
-    fn any_lens_is_undone() {
-        let (rotation, translation) = (DMat3::IDENTITY, DVec3::ZERO);
-        let camera = Camera { rotation, translation, fx: 10.0, fy: 20.0, cx: 50.0, cy: 40.0, width: 100, height: 80 };
-        let map = Undistortion::new(&camera, Some(&Equidistant));
-        // 45 degrees to the right, then down.
-        let quarter = std::f64::consts::FRAC_PI_4;
-        for (pixel, expected) in [
-            (DVec2::new(60.0, 40.0), DVec2::new(50.0 + 10.0 * quarter, 40.0)),
-            (DVec2::new(50.0, 60.0), DVec2::new(50.0, 40.0 + 20.0 * quarter)),
-            (DVec2::new(50.0, 40.0), DVec2::new(50.0, 40.0)),
-        ] {
-            assert!(map.source(pixel).expect("inside").distance(expected) < 1e-12, "{pixel}");
-        }
-    }
 }

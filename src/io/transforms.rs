@@ -5,7 +5,9 @@
 
 use super::lens::{self, Lens};
 use super::listed_path::Place;
-use super::listing::{FAR, Listed, Listing, check_camera, find_file, invert_pose, rotation_of};
+use super::listing::{
+    EXTENSIONS, FAR, Listed, Listing, check_camera, find_file, invert_pose, rotation_of, side, with_extension,
+};
 use super::{image, ply};
 use crate::error::{Error, Result};
 use crate::io::read;
@@ -13,10 +15,8 @@ use crate::scene::{Camera, Point};
 use glam::{DAffine3, DMat3, DVec3};
 use serde::Deserialize;
 use std::collections::HashMap;
+use std::f64::consts::PI;
 use std::path::{Path, PathBuf};
-
-/// Extensions to try for a photo that is listed without one.
-const EXTENSIONS: [&str; 7] = ["", ".png", ".jpg", ".jpeg", ".PNG", ".JPG", ".JPEG"];
 
 /// Intrinsics of the whole file or of one frame.
 #[derive(Clone, Debug, Default, Deserialize)]
@@ -171,40 +171,40 @@ fn listed(scene: &Place, path: &Path, place: &str, frame: &Frame, file: &Intrins
         _ => return Ok(Found::Nothing),
     };
     let (rotation, translation) = pose(path, place, &frame.transform_matrix)?;
-    let mut camera = camera(path, place, &intrinsics, size)?;
+    let mut camera = match lens {
+        Lens::Equirectangular => panorama(size),
+        _ => camera(path, place, &intrinsics, size)?,
+    };
     (camera.rotation, camera.translation) = (rotation, translation);
     check_camera(path, place, &camera, &lens)?;
-    let mut name = resolved.name;
-    // A photo listed without extension gets that of its file. Otherwise `frame.0001` would later lose its number.
-    if let Some(found) = photo.as_ref().and_then(|photo| photo.to_str()) {
-        name.push_str(EXTENSIONS.iter().rev().find(|ext| found.ends_with(&format!("{name}{ext}"))).unwrap_or(&""));
-    }
+    let name = with_extension(resolved.name, photo.as_deref());
     Ok(Found::View(Box::new(Listed { name, photo, camera, lens, test: None })))
 }
 
-fn side(path: &Path, place: &str, value: f64) -> Result<u32> {
-    if value.fract() == 0.0 && (1.0..=f64::from(u32::MAX)).contains(&value) {
-        return Ok(value as u32);
-    }
-    Err(Error::data(path, place, format!("image side {value} is not a positive whole number")))
-}
-
 fn lens(path: &Path, place: &str, i: &Intrinsics) -> Result<Lens> {
-    let named = i.camera_model.as_deref().unwrap_or("OPENCV");
-    let fisheye = i.is_fisheye == Some(true);
-    let model = lens::model(if named == "PERSPECTIVE" { "PINHOLE" } else { named }).filter(|_| !fisheye);
-    let Some(of_names) = model.and_then(|model| model.of_names) else {
-        let name = if fisheye { "is_fisheye" } else { named };
+    let named = match (i.is_fisheye, i.camera_model.as_deref()) {
+        // instant-ngp's flag.
+        (Some(true), None) => "OPENCV_FISHEYE",
+        (_, Some("PERSPECTIVE")) => "PINHOLE",
+        (_, named) => named.unwrap_or("OPENCV"),
+    };
+    let Some(of_names) = lens::model(named).and_then(|model| model.of_names) else {
         let known = lens::MODELS.iter().filter(|model| model.of_names.is_some()).map(|model| model.name);
         let problem = format!(
-            "camera model {name} is not supported (supported: {}); undistort the photos first, for example with `colmap \
-             image_undistorter`",
+            "camera model {named} is not supported (supported: {}); undistort the photos first, or pose them with COLMAP",
             known.collect::<Vec<_>>().join(", ")
         );
         return Err(Error::data(path, place, problem));
     };
     let all = [("k1", i.k1), ("k2", i.k2), ("k3", i.k3), ("k4", i.k4), ("p1", i.p1), ("p2", i.p2)];
     Ok(of_names(&|name| all.iter().find(|known| known.0 == name).and_then(|known| known.1).unwrap_or(0.0)))
+}
+
+/// Makes the intrinsics of a panorama, which follow from its size.
+fn panorama((width, height): (u32, u32)) -> Camera {
+    let (w, h) = (f64::from(width), f64::from(height));
+    let (fx, fy, cx, cy) = (w / (2.0 * PI), h / PI, w / 2.0, h / 2.0);
+    Camera { rotation: DMat3::IDENTITY, translation: DVec3::ZERO, fx, fy, cx, cy, width, height }
 }
 
 /// Makes the intrinsics, at an identity pose. Focal lengths come from `fl_x`, `fl_y` or the fields of view; a missing

@@ -1,8 +1,8 @@
 //! Ground-truth masks of single objects, as benchmarks ship them: a black and white image per object and frame.
 
 use super::image::read_grey;
-use super::lens::Lens;
-use super::resample::{resample_ids, same_aspect, shrink_photo};
+use super::resample::{bounded_size, resample_ids, same_aspect, shrink_photo};
+use super::window::Window;
 use crate::error::{Error, Result};
 use crate::io::read;
 use crate::scene::{LabelMap, Photo, View};
@@ -59,25 +59,37 @@ fn collect(root: &Path, inside: &Path, depth: u32, found: &mut Vec<PathBuf>) -> 
 /// Reads the mask of an object in `view`. The object is where the value is above 128, or above 0 in a file without
 /// values above 1.
 ///
-/// The mask belongs to the original photo and is undistorted with the lens in `lenses`. It is compared at its own size.
-/// If it is larger than the view, it is resampled (nearest) to the view's size.
-pub fn read_truth(path: &Path, view: &View, lenses: &BTreeMap<String, Lens>) -> Result<TruthMask> {
+/// The mask belongs to the original photo, and `windows` says how the view lies in it. It is compared at its own size,
+/// undistorted; if it is larger than the view, at the view's size (nearest).
+pub fn read_truth(path: &Path, view: &View, windows: &BTreeMap<String, Window>) -> Result<TruthMask> {
     let (width, height, values) = read_grey(path)?;
-    let camera = &view.camera;
-    if !same_aspect((width, height), (camera.width, camera.height)) {
+    let stored;
+    let window = match windows.get(&view.name) {
+        Some(window) => window,
+        None => {
+            stored = Window::stored(&view.name, &view.camera);
+            &stored
+        }
+    };
+    let photo = &window.optics.camera;
+    if !same_aspect((width, height), (photo.width, photo.height)) {
         let problem = format!(
-            "the mask has {width} x {height} px and view {} {} x {} px, which no scale explains; use masks of the same \
+            "the mask has {width} x {height} px and photo {} {} x {} px, which no scale explains; use masks of the same \
              photos",
-            view.name, camera.width, camera.height
+            window.photo, photo.width, photo.height
         );
         return Err(Error::data(path, "", problem));
     }
     let above = if values.iter().all(|&value| value <= 1) { 0 } else { 128 };
     let ids = values.iter().map(|&value| u16::from(value > above)).collect();
-    let larger = u64::from(width) * u64::from(height) > u64::from(camera.width) * u64::from(camera.height);
-    let size = if larger { (camera.width, camera.height) } else { (width, height) };
-    let lens = lenses.get(&view.name).copied().unwrap_or_default();
-    let map = resample_ids(&LabelMap { width, height, ids }, camera, &lens, size);
+    let own = match window.is_photo() {
+        true => (width, height),
+        false => bounded_size((window.camera.width, window.camera.height), Some(width.max(height))),
+    };
+    let pixels = |(width, height): (u32, u32)| u64::from(width) * u64::from(height);
+    let of_view = (view.camera.width, view.camera.height);
+    let size = if pixels(own) > pixels(of_view) { of_view } else { own };
+    let map = resample_ids(&LabelMap { width, height, ids }, window, size);
     Ok(TruthMask { width: map.width, height: map.height, inside: map.ids.iter().map(|&id| id != 0).collect() })
 }
 

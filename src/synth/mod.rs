@@ -6,6 +6,7 @@
 
 pub(crate) mod cameras;
 mod hard;
+mod lens;
 mod material;
 mod object;
 mod points;
@@ -16,10 +17,12 @@ pub(crate) mod trace;
 pub(crate) mod world;
 mod write;
 
+pub use lens::SynthLens;
 pub use spoil::{Fault, spoil};
 pub(crate) use world::World;
 pub use write::{Summary, write};
 
+use crate::io::lens::{Lens, Optics};
 use crate::scene::{Dataset, LabelMap, Photo, View};
 use cameras::ring_of_cameras;
 use serde::{Deserialize, Serialize};
@@ -56,20 +59,35 @@ pub struct SynthOptions {
     pub points: u32,
     /// Seed of colours, texture offsets, camera jitter and points.
     pub seed: u64,
+    /// Lens of all cameras.
+    pub lens: SynthLens,
+    /// Field of view across the picture, degrees; `None` is 50 degrees in a picture of 4 : 3. A panorama ignores it.
+    pub fov: Option<u32>,
 }
 
 impl Default for SynthOptions {
     fn default() -> Self {
-        Self { preset: Preset::Default, width: 320, height: 240, views: 40, points: 4000, seed: 0 }
+        Self {
+            preset: Preset::Default,
+            width: 320,
+            height: 240,
+            views: 40,
+            points: 4000,
+            seed: 0,
+            lens: SynthLens::default(),
+            fov: None,
+        }
     }
 }
 
-/// Makes the scene in memory, with photos and masks. Every `test_every`-th view is held out; 0 holds out none.
+/// Makes the scene in memory, with photos and masks of pinhole cameras. Every `test_every`-th view is held out; 0 holds out
+/// none.
 pub fn dataset(options: &SynthOptions, test_every: u32) -> Dataset {
     let world = World::new(options.preset, options.seed);
     let cameras = ring_of_cameras(options);
+    let optics: Vec<Optics> = cameras.iter().map(|camera| Optics::new(camera.clone(), Lens::Pinhole)).collect();
     let mut dataset = Dataset {
-        points: points::sample(&world, &cameras, options).into_iter().map(|seen| seen.point).collect(),
+        points: points::sample(&world, &optics, options).into_iter().map(|seen| seen.point).collect(),
         ..Dataset::default()
     };
     for (index, camera) in cameras.iter().enumerate() {

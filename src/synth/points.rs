@@ -3,7 +3,8 @@
 use super::SynthOptions;
 use super::trace::ray;
 use super::world::World;
-use crate::scene::{Camera, Point};
+use crate::io::lens::Optics;
+use crate::scene::Point;
 use glam::{DVec2, DVec3};
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64;
@@ -21,7 +22,7 @@ pub(super) struct Seen {
 }
 
 /// Samples points on visible surfaces, with the density of pixels. At least two views see each point.
-pub(super) fn sample(world: &World, cameras: &[Camera], options: &SynthOptions) -> Vec<Seen> {
+pub(super) fn sample(world: &World, cameras: &[Optics], options: &SynthOptions) -> Vec<Seen> {
     let mut random = Pcg64::seed_from_u64(options.seed);
     let mut found = Vec::new();
     // A scene with few views may have fewer points than requested, so the number of tries is limited.
@@ -29,10 +30,12 @@ pub(super) fn sample(world: &World, cameras: &[Camera], options: &SynthOptions) 
         if found.len() >= options.points as usize || cameras.is_empty() {
             break;
         }
-        let camera = &cameras[random.random_range(0..cameras.len())];
+        let optics = &cameras[random.random_range(0..cameras.len())];
+        let camera = &optics.camera;
         let (x, y) =
             (random.random::<f64>() * f64::from(camera.width), random.random::<f64>() * f64::from(camera.height));
-        let hit = world.hit(camera.centre(), ray(camera, x, y));
+        let Some(ray) = ray(optics, x, y) else { continue };
+        let hit = world.hit(camera.centre(), ray);
         let mut normal = || {
             // A sum of uniform numbers is close to normal and the same on every machine.
             (0..12).map(|_| random.random::<f64>()).sum::<f64>() - 6.0
@@ -43,7 +46,7 @@ pub(super) fn sample(world: &World, cameras: &[Camera], options: &SynthOptions) 
         let track: Vec<_> = cameras
             .iter()
             .enumerate()
-            .filter_map(|(view, camera)| sees(world, camera, hit.place).map(|place| (view as u32, place)))
+            .filter_map(|(view, optics)| sees(world, optics, hit.place).map(|place| (view as u32, place)))
             .collect();
         if track.len() >= 2 {
             found.push(Seen { point, track });
@@ -53,12 +56,9 @@ pub(super) fn sample(world: &World, cameras: &[Camera], options: &SynthOptions) 
 }
 
 /// Returns the image position of a surface point in a camera that sees it.
-fn sees(world: &World, camera: &Camera, place: DVec3) -> Option<DVec2> {
-    let own = camera.to_camera(place);
-    if own.z <= 0.0 {
-        return None;
-    }
-    let pixel = camera.project(own);
+fn sees(world: &World, optics: &Optics, place: DVec3) -> Option<DVec2> {
+    let camera = &optics.camera;
+    let pixel = optics.pixel(camera.to_camera(place))?;
     let inside = pixel.cmpge(DVec2::ZERO).all()
         && pixel.cmplt(DVec2::new(f64::from(camera.width), f64::from(camera.height))).all();
     let towards = place - camera.centre();

@@ -1,9 +1,11 @@
 //! Renders one view: colours as pixel means; ids, depth and whole objects at pixel centres; and objects alone.
 
 use super::hash01;
+use super::object::Object;
 use super::world::World;
+use crate::io::lens::{Lens, Optics};
 use crate::scene::Camera;
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
 /// Number of samples along each side of a pixel.
@@ -35,20 +37,17 @@ struct Pixel {
 /// Renders view number `view`. The number only decides the sample positions within pixels.
 pub fn picture(world: &World, camera: &Camera, view: u32) -> Picture {
     let (width, height) = (camera.width, camera.height);
-    let pixels: Vec<Pixel> = (0..width * height)
-        .into_par_iter()
-        .map(|index| pixel(world, camera, view, index % width, index / width))
-        .collect();
+    let optics = pinhole(camera);
+    let pixels = pixels(world, &optics, view);
     let origin = camera.centre();
+    let covers = |object: &Object, index: u32| {
+        let ray = middle(&optics, index % width, index / width);
+        ray.is_some_and(|ray| object.distance(origin, ray).is_some())
+    };
     let whole = world
         .objects
         .iter()
-        .map(|object| {
-            (0..width * height)
-                .into_par_iter()
-                .map(|index| object.distance(origin, middle(camera, index % width, index / width)).is_some())
-                .collect()
-        })
+        .map(|object| (0..width * height).into_par_iter().map(|index| covers(object, index)).collect())
         .collect();
     Picture {
         width,
@@ -60,16 +59,34 @@ pub fn picture(world: &World, camera: &Camera, view: u32) -> Picture {
     }
 }
 
-/// Renders the photo of view number `view` alone.
-pub(super) fn photo(world: &World, camera: &Camera, view: u32) -> Vec<[u8; 3]> {
-    let (width, pixels) = (camera.width, camera.width * camera.height);
-    (0..pixels).into_par_iter().map(|index| colour(world, camera, view, (index % width, index / width))).collect()
+/// Renders the photo of view number `view` and its ids through a lens. What the lens does not show is black, with id 0.
+pub fn photograph(world: &World, optics: &Optics, view: u32) -> (Vec<[u8; 3]>, Vec<u8>) {
+    pixels(world, optics, view).into_iter().map(|pixel| (pixel.rgb, pixel.id)).unzip()
 }
 
-/// Returns the unit direction, world, of the ray through an image position.
-pub(super) fn ray(camera: &Camera, x: f64, y: f64) -> DVec3 {
-    let own = DVec3::new((x - camera.cx) / camera.fx, (y - camera.cy) / camera.fy, 1.0);
-    (camera.rotation.transpose() * own).normalize()
+fn pixels(world: &World, optics: &Optics, view: u32) -> Vec<Pixel> {
+    let (width, height) = (optics.camera.width, optics.camera.height);
+    (0..width * height).into_par_iter().map(|index| pixel(world, optics, view, index % width, index / width)).collect()
+}
+
+fn pinhole(camera: &Camera) -> Optics {
+    Optics::new(camera.clone(), Lens::Pinhole)
+}
+
+/// Renders the photo of view number `view` alone.
+pub(super) fn photo(world: &World, camera: &Camera, view: u32) -> Vec<[u8; 3]> {
+    let (width, pixels, optics) = (camera.width, camera.width * camera.height, pinhole(camera));
+    (0..pixels).into_par_iter().map(|index| colour(world, &optics, view, (index % width, index / width))).collect()
+}
+
+/// Returns the unit direction, world, of the ray through an image position; `None` if the lens shows nothing there.
+pub(super) fn ray(optics: &Optics, x: f64, y: f64) -> Option<DVec3> {
+    let camera = &optics.camera;
+    let own = match optics.lens.is_pinhole() {
+        true => DVec3::new((x - camera.cx) / camera.fx, (y - camera.cy) / camera.fy, 1.0),
+        false => optics.direction(DVec2::new(x, y))?,
+    };
+    Some((camera.rotation.transpose() * own).normalize())
 }
 
 /// Renders an object without occluders, RGBA, row-major. Alpha is 255 where the object covers the pixel centre; other
@@ -77,11 +94,12 @@ pub(super) fn ray(camera: &Camera, x: f64, y: f64) -> DVec3 {
 /// mean over the covered part of the pixel. It equals that of the photo where the object fills the pixel and nothing
 /// hides it.
 pub fn alone(world: &World, camera: &Camera, view: u32, index: usize) -> Vec<[u8; 4]> {
-    let origin = camera.centre();
+    let (origin, optics) = (camera.centre(), pinhole(camera));
     let pixel = |at: u32| {
         let (x, y) = (at % camera.width, at / camera.width);
-        let Some(centre) = world.hit_object(index, origin, middle(camera, x, y)) else { return [0; 4] };
-        let hits = samples(camera, view, x, y)
+        let ray = middle(&optics, x, y);
+        let Some(centre) = ray.and_then(|ray| world.hit_object(index, origin, ray)) else { return [0; 4] };
+        let hits = samples(&optics, view, x, y)
             .filter_map(|(direction, spot)| Some((world.hit_object(index, origin, direction)?, spot)));
         let (mut sum, mut count) = (DVec3::ZERO, 0);
         for (hit, spot) in hits {
@@ -95,40 +113,41 @@ pub fn alone(world: &World, camera: &Camera, view: u32, index: usize) -> Vec<[u8
 }
 
 /// Returns the directions of the samples of a pixel, each with its position on the light.
-fn samples(camera: &Camera, view: u32, x: u32, y: u32) -> impl Iterator<Item = (DVec3, [f64; 2])> {
-    (0..SIDE * SIDE).map(move |sample| {
+fn samples(optics: &Optics, view: u32, x: u32, y: u32) -> impl Iterator<Item = (DVec3, [f64; 2])> {
+    (0..SIDE * SIDE).filter_map(move |sample| {
         let random = |what: u64| hash01(u64::from(view), u64::from(y) << 32 | u64::from(x), u64::from(sample), what);
         let (column, row) = (sample % SIDE, sample / SIDE);
         let within = |cell: u32, what: u64| (f64::from(cell) + random(what)) / f64::from(SIDE);
-        let direction = ray(camera, f64::from(x) + within(column, 0), f64::from(y) + within(row, 1));
+        let direction = ray(optics, f64::from(x) + within(column, 0), f64::from(y) + within(row, 1))?;
         // Every pixel has the same positions on the light, so that shadows have no noise that differs between views.
         let spot = |cell: u32| (f64::from(cell) + 0.5) / f64::from(SIDE) * 2.0 - 1.0;
-        (direction, [spot(column), spot(row)])
+        Some((direction, [spot(column), spot(row)]))
     })
 }
 
-fn middle(camera: &Camera, x: u32, y: u32) -> DVec3 {
-    ray(camera, f64::from(x) + 0.5, f64::from(y) + 0.5)
+fn middle(optics: &Optics, x: u32, y: u32) -> Option<DVec3> {
+    ray(optics, f64::from(x) + 0.5, f64::from(y) + 0.5)
 }
 
 fn bytes(colour: DVec3) -> [u8; 3] {
     colour.to_array().map(|value| (value * 255.0).round() as u8)
 }
 
-fn pixel(world: &World, camera: &Camera, view: u32, x: u32, y: u32) -> Pixel {
-    let centre = world.hit(camera.centre(), middle(camera, x, y));
+fn pixel(world: &World, optics: &Optics, view: u32, x: u32, y: u32) -> Pixel {
+    let camera = &optics.camera;
+    let centre = middle(optics, x, y).map(|ray| world.hit(camera.centre(), ray));
     Pixel {
-        rgb: colour(world, camera, view, (x, y)),
-        id: world.id(&centre),
-        depth: camera.to_camera(centre.place).z as f32,
+        rgb: colour(world, optics, view, (x, y)),
+        id: centre.as_ref().map_or(0, |hit| world.id(hit)),
+        depth: centre.map_or(f32::NAN, |hit| camera.to_camera(hit.place).z as f32),
     }
 }
 
 /// Returns the mean colour over a pixel.
-fn colour(world: &World, camera: &Camera, view: u32, (x, y): (u32, u32)) -> [u8; 3] {
-    let origin = camera.centre();
-    let sum: DVec3 = samples(camera, view, x, y)
+fn colour(world: &World, optics: &Optics, view: u32, (x, y): (u32, u32)) -> [u8; 3] {
+    let origin = optics.camera.centre();
+    let (sum, count) = samples(optics, view, x, y)
         .map(|(direction, spot)| world.colour(&world.hit(origin, direction), spot))
-        .fold(DVec3::ZERO, |sum, colour| sum + colour);
-    bytes(sum / f64::from(SIDE * SIDE))
+        .fold((DVec3::ZERO, 0), |(sum, count), colour| (sum + colour, count + 1));
+    bytes(sum / f64::from(count.max(1)))
 }

@@ -4,10 +4,11 @@ use super::object::Object;
 use super::points::Seen;
 
 use super::cameras::ring_of_cameras;
-use super::trace::{Picture, alone, photo, picture};
+use super::trace::{Picture, alone, photo, photograph, picture};
 use super::world::World;
-use super::{SynthOptions, points, view_name};
+use super::{SynthLens, SynthOptions, lens, points, view_name};
 use crate::io::label_table::{self, LabelEntry, LabelTable};
+use crate::io::lens::Optics;
 use crate::io::{ReadOptions, atomic, image};
 use crate::scene::Camera;
 use crate::{Error, Result};
@@ -39,19 +40,29 @@ pub fn write(options: &SynthOptions, folder: &Path, after_view: &dyn Fn(u32) -> 
         return Err(Error::usage("views", "needs 1 to 10000"));
     }
     let world = World::new(options.preset, options.seed);
-    let cameras = ring_of_cameras(options);
-    create_folders(folder, &world)?;
+    lens::check(options)?;
+    let optics: Vec<Optics> = ring_of_cameras(options).iter().map(|camera| lens::mounted(options, camera)).collect();
+    create_folders(folder, &world, optics.iter().all(|optics| optics.lens.is_pinhole()))?;
     let entry = |object: &Object| LabelEntry { name: Some(object.name.into()), ..LabelEntry::new(object.id.into()) };
     let mut table = LabelTable::new(world.objects.iter().map(entry).collect());
-    let seen = points::sample(&world, &cameras, options);
-    write_colmap(folder, &cameras, &seen)?;
-    for (index, camera) in cameras.iter().enumerate() {
-        let made = picture(&world, camera, index as u32);
-        write_view(folder, index, &world, camera, &made)?;
-        if index.is_multiple_of(ReadOptions::default().test_every as usize) {
-            write_without(folder, index, &world, camera)?;
+    let seen = points::sample(&world, &optics, options);
+    write_colmap(folder, options.lens, &optics, &seen)?;
+    for (index, optics) in optics.iter().enumerate() {
+        let camera = &optics.camera;
+        if optics.lens.is_pinhole() {
+            let made = picture(&world, camera, index as u32);
+            write_photo(folder, index, camera, &made.rgb, &made.ids)?;
+            write_truth(folder, index, &world, camera, &made)?;
+            if index.is_multiple_of(ReadOptions::default().test_every as usize) {
+                write_without(folder, index, &world, camera)?;
+            }
+            count(&mut table, &made.ids);
+        } else {
+            // The other pictures are compared with renderings, which are pinhole pictures.
+            let (rgb, ids) = photograph(&world, optics, index as u32);
+            write_photo(folder, index, camera, &rgb, &ids)?;
+            count(&mut table, &ids);
         }
-        count(&mut table, &made.ids);
         after_view(index as u32 + 1)?;
     }
     table.write(&folder.join("masks").join(label_table::FILE))?;
@@ -66,23 +77,27 @@ fn count(table: &mut LabelTable, ids: &[u8]) {
     }
 }
 
-fn create_folders(folder: &Path, world: &World) -> Result<()> {
+fn create_folders(folder: &Path, world: &World, with_truth: bool) -> Result<()> {
     atomic::require_empty("DIR", folder)?;
     let of_objects = ["amodal", "objects", "without", "shadowed"]
         .map(|kind| world.objects.iter().map(move |object| format!("{kind}/{}", object.id)));
-    let names = ["images", "sparse/0", "masks", "depth"].map(str::to_owned);
-    for name in names.into_iter().chain(of_objects.into_iter().flatten()) {
+    let truth = of_objects.into_iter().flatten().chain(["depth".to_owned()]).filter(|_| with_truth);
+    for name in ["images", "sparse/0", "masks"].map(str::to_owned).into_iter().chain(truth) {
         let path = folder.join(name);
         fs::create_dir_all(&path).map_err(Error::write(&path))?;
     }
     Ok(())
 }
 
-fn write_view(folder: &Path, index: usize, world: &World, camera: &Camera, made: &Picture) -> Result<()> {
+fn write_photo(folder: &Path, index: usize, camera: &Camera, rgb: &[[u8; 3]], ids: &[u8]) -> Result<()> {
+    let name = view_name(index);
+    image::write_png_rgb8(folder.join("images").join(&name), camera.width, camera.height, rgb)?;
+    image::write_png_grey8(folder.join("masks").join(&name), camera.width, camera.height, ids)
+}
+
+fn write_truth(folder: &Path, index: usize, world: &World, camera: &Camera, made: &Picture) -> Result<()> {
     let name = view_name(index);
     let (width, height) = (made.width, made.height);
-    image::write_png_rgb8(folder.join("images").join(&name), width, height, &made.rgb)?;
-    image::write_png_grey8(folder.join("masks").join(&name), width, height, &made.ids)?;
     for (place, (object, whole)) in world.objects.iter().zip(&made.whole).enumerate() {
         let path = folder.join("amodal").join(object.id.to_string()).join(&name);
         let bytes: Vec<u8> = whole.iter().map(|&covered| if covered { 255 } else { 0 }).collect();
@@ -111,17 +126,17 @@ fn save(path: &Path, bytes: &[u8]) -> Result<()> {
 }
 
 /// Writes `cameras.bin`, `images.bin` and `points3D.bin`, little-endian as in COLMAP.
-fn write_colmap(folder: &Path, cameras: &[Camera], seen: &[Seen]) -> Result<()> {
+fn write_colmap(folder: &Path, lens: SynthLens, optics: &[Optics], seen: &[Seen]) -> Result<()> {
     let folder = folder.join("sparse/0");
+    let cameras: Vec<&Camera> = optics.iter().map(|optics| &optics.camera).collect();
     if let Some(camera) = cameras.first() {
         let mut bytes = Vec::new();
         bytes.extend(1_u64.to_le_bytes());
         bytes.extend(1_u32.to_le_bytes());
-        // Model 1 is PINHOLE: fx, fy, cx, cy.
-        bytes.extend(1_u32.to_le_bytes());
+        bytes.extend(lens.number().to_le_bytes());
         bytes.extend(u64::from(camera.width).to_le_bytes());
         bytes.extend(u64::from(camera.height).to_le_bytes());
-        [camera.fx, camera.fy, camera.cx, camera.cy].iter().for_each(|value| bytes.extend(value.to_le_bytes()));
+        lens.parameters(camera).iter().for_each(|value| bytes.extend(value.to_le_bytes()));
         save(&folder.join("cameras.bin"), &bytes)?;
     }
     let mut observed: Vec<Vec<(f64, f64, u64)>> = vec![Vec::new(); cameras.len()];
@@ -143,10 +158,10 @@ fn write_colmap(folder: &Path, cameras: &[Camera], seen: &[Seen]) -> Result<()> 
         }
     }
     save(&folder.join("points3D.bin"), &points)?;
-    save(&folder.join("images.bin"), &images_bin(cameras, &observed))
+    save(&folder.join("images.bin"), &images_bin(&cameras, &observed))
 }
 
-fn images_bin(cameras: &[Camera], observed: &[Vec<(f64, f64, u64)>]) -> Vec<u8> {
+fn images_bin(cameras: &[&Camera], observed: &[Vec<(f64, f64, u64)>]) -> Vec<u8> {
     let mut bytes = Vec::new();
     bytes.extend((cameras.len() as u64).to_le_bytes());
     for (index, (camera, observed)) in cameras.iter().zip(observed).enumerate() {

@@ -13,7 +13,18 @@ use std::sync::Arc;
 
 /// Four views of 40 x 30 px with masks.
 fn scene() -> Dataset {
-    dataset(&SynthOptions { preset: Preset::Simple, width: 40, height: 30, views: 4, points: 200, seed: 5 }, 0)
+    dataset(
+        &SynthOptions {
+            preset: Preset::Simple,
+            width: 40,
+            height: 30,
+            views: 4,
+            points: 200,
+            seed: 5,
+            ..SynthOptions::default()
+        },
+        0,
+    )
 }
 
 /// Trains a dozen steps with labels, densification and votes; losses and model are numbers.

@@ -54,7 +54,15 @@ pub fn budgeted() -> TrainConfig {
 
 /// Five views with masks.
 pub fn small() -> Dataset {
-    let options = SynthOptions { preset: Preset::Simple, width: 72, height: 52, views: 5, points: 400, seed: 3 };
+    let options = SynthOptions {
+        preset: Preset::Simple,
+        width: 72,
+        height: 52,
+        views: 5,
+        points: 400,
+        seed: 3,
+        ..SynthOptions::default()
+    };
     dataset(&options, 0)
 }
 

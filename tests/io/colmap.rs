@@ -63,20 +63,26 @@ fn binary_wins_over_text_and_photos_may_lie_in_the_root() {
 }
 
 #[test]
-fn every_camera_model_has_its_meaning_or_is_refused_by_name() {
-    let models: [(u32, &str, &[f64]); 12] = [
+fn every_camera_model_has_its_parameters_in_its_order() {
+    let models: [(u32, &str, &[f64]); 18] = [
         (0, "SIMPLE_PINHOLE", &[10.0, 6.0, 4.0]),
         (1, "PINHOLE", &[10.0, 11.0, 6.0, 4.0]),
         (2, "SIMPLE_RADIAL", &[10.0, 6.0, 4.0, 0.01]),
         (3, "RADIAL", &[10.0, 6.0, 4.0, 0.01, 0.001]),
         (4, "OPENCV", &[10.0, 11.0, 6.0, 4.0, 0.01, 0.001, 0.002, 0.003]),
-        (5, "OPENCV_FISHEYE", &[1.0; 8]),
+        (5, "OPENCV_FISHEYE", &[10.0, 11.0, 6.0, 4.0, 0.01, 0.001, 0.002, 0.003]),
         (6, "FULL_OPENCV", &[10.0, 11.0, 6.0, 4.0, 0.01, 0.001, 0.002, 0.003, 0.004, 0.01, 0.0, 0.0]),
-        (7, "FOV", &[1.0; 5]),
-        (8, "SIMPLE_RADIAL_FISHEYE", &[1.0; 4]),
-        (9, "RADIAL_FISHEYE", &[1.0; 5]),
-        (10, "THIN_PRISM_FISHEYE", &[1.0; 12]),
-        (11, "RAD_TAN_THIN_PRISM_FISHEYE", &[1.0; 16]),
+        (7, "FOV", &[10.0, 11.0, 6.0, 4.0, 0.5]),
+        (8, "SIMPLE_RADIAL_FISHEYE", &[10.0, 6.0, 4.0, 0.01]),
+        (9, "RADIAL_FISHEYE", &[10.0, 6.0, 4.0, 0.01, 0.001]),
+        (10, "THIN_PRISM_FISHEYE", &[10.0, 11.0, 6.0, 4.0, 0.01, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]),
+        (11, "RAD_TAN_THIN_PRISM_FISHEYE", &[10.0, 11.0, 6.0, 4.0, 0.01, 0., 0., 0., 0., 0., 0., 0., 0., 0., 0., 0.]),
+        (12, "SIMPLE_DIVISION", &[10.0, 6.0, 4.0, -0.01]),
+        (13, "DIVISION", &[10.0, 11.0, 6.0, 4.0, -0.01]),
+        (14, "SIMPLE_FISHEYE", &[10.0, 6.0, 4.0]),
+        (15, "FISHEYE", &[10.0, 11.0, 6.0, 4.0]),
+        (16, "EUCM", &[10.0, 11.0, 6.0, 4.0, 0.5, 1.1]),
+        (17, "EQUIRECTANGULAR", &[12.0, 8.0]),
     ];
     for (model, name, parameters) in models {
         let camera = ColmapCamera { model, name, size: (12, 8), parameters: parameters.to_vec() };
@@ -88,22 +94,38 @@ fn every_camera_model_has_its_meaning_or_is_refused_by_name() {
             } else {
                 scene.colmap_txt("sparse/0", std::slice::from_ref(&camera), &["a.png"]);
             }
-            let result = open(&scene);
-            if matches!(model, 5 | 7..) {
-                let text = refusal(result);
-                assert!(text.contains(name) && text.contains("image_undistorter"), "{text}");
-                continue;
-            }
-            let dataset = result.expect("a scene");
-            let read = &dataset.train[0].camera;
-            assert_eq!((read.fx, read.cx, read.cy), (10.0, 6.0, 4.0));
-            assert_eq!(read.fy, if matches!(model, 1 | 4 | 6) { 11.0 } else { 10.0 });
+            let dataset = open(&scene).expect("a scene");
+            assert_eq!(dataset.train.len(), if model == 17 { 6 } else { 1 }, "{name}");
             assert_eq!(dataset.notes.iter().any(|note| note.contains("undistorted")), model > 1);
+            // Polynomials keep the intrinsics; the others keep the scale of the middle.
+            let read = &dataset.train[0].camera;
+            if matches!(model, 0..=4 | 6) {
+                assert_eq!((read.fx, read.cx, read.cy), (10.0, 6.0, 4.0));
+            }
+            if model < 17 {
+                let fy = if parameters[1] == 11.0 { 11.0 } else { 10.0 };
+                let middle = if model == 7 { 2.0 * 0.25_f64.tan() / 0.5 } else { 1.0 };
+                assert!(
+                    (read.fx - 10.0 * middle).abs() < 1e-3 && (read.fy - fy * middle).abs() < 1e-3,
+                    "{name}: {read:?}"
+                );
+            }
         }
     }
     let scene = Scene::new();
     scene.colmap_bin("sparse/0", &[ColmapCamera { model: 77, ..pinhole() }], &["a.png"]);
-    assert!(refusal(open(&scene)).contains("unknown model 77"));
+    assert!(refusal(open(&scene)).contains("77 is unknown"));
+    for (model, name, parameters) in [
+        (7, "FOV", vec![10.0, 11.0, 6.0, 4.0, 0.0]),
+        (16, "EUCM", vec![10.0, 11.0, 6.0, 4.0, 1.5, 1.0]),
+        (17, "EQUIRECTANGULAR", vec![24.0, 8.0]),
+    ] {
+        let scene = Scene::new();
+        scene.photo("images/a.png", 12, 8);
+        scene.colmap_bin("sparse/0", &[ColmapCamera { model, name, size: (12, 8), parameters }], &["a.png"]);
+        let text = refusal(open(&scene));
+        assert!(text.contains("camera 1") && text.contains("expected"), "{text}");
+    }
 }
 
 #[test]

@@ -5,7 +5,7 @@ use glam::DVec2;
 use labelgs::internals::cli::status::exit_status;
 use labelgs::internals::io;
 use labelgs::internals::io::image::photo_size;
-use labelgs::internals::io::lens::{Distortion, Lens, Polynomial};
+use labelgs::internals::io::lens::{Lens, Polynomial, Projection};
 use labelgs::io::LoadOptions;
 use labelgs::io::read_photo;
 use labelgs::scene::{Dataset, Photo};
@@ -114,8 +114,12 @@ fn shrinking_averages_the_exact_box() {
 #[test]
 fn distortion_equals_opencv() {
     let at = DVec2::new(0.3, -0.2);
-    let lens =
-        Polynomial { numerator: [0.1, -0.05, 0.02, 0.0], denominator: [0.01, 0.02, 0.03], tangential: [0.004, -0.003] };
+    let lens = Polynomial {
+        numerator: [0.1, -0.05, 0.02, 0.0],
+        denominator: [0.01, 0.02, 0.03],
+        tangential: [0.004, -0.003],
+        ..Polynomial::default()
+    };
     let (x, y, r2) = (at.x, at.y, at.x * at.x + at.y * at.y);
     let radial = (1.0 + 0.1 * r2 - 0.05 * r2.powi(2) + 0.02 * r2.powi(3))
         / (1.0 + 0.01 * r2 + 0.02 * r2.powi(2) + 0.03 * r2.powi(3));
@@ -128,8 +132,7 @@ fn distortion_equals_opencv() {
     assert!(Lens::from(Polynomial::default()).is_pinhole() && !Lens::from(lens).is_pinhole());
     // r (1 - r^2) turns round at r = 1 / sqrt 3.
     let folded = Polynomial { numerator: [-1.0, 0.0, 0.0, 0.0], ..Polynomial::default() };
-    assert!((folded.valid_radius(2.0) - 3f64.powf(-0.5)).abs() < 2e-3);
-    assert_eq!(Polynomial::default().valid_radius(2.0), 2.0);
+    assert!((folded.reach().tan() - 3f64.powf(-0.5)).abs() < 2e-3);
 }
 
 /// A scene photographed through an OPENCV lens: the photo holds its own pixel coordinates as colours.
@@ -158,7 +161,12 @@ fn undistortion_samples_where_the_model_says() {
         let view = &dataset.train[0];
         let (camera, photo) = (&view.camera, view.photo.as_ref().expect("a photo"));
         let mask = view.mask.as_ref().expect("a mask");
-        let lens = Polynomial { numerator: [k[0], k[1], 0.0, 0.0], denominator: [0.0; 3], tangential: [k[2], k[3]] };
+        let lens = Polynomial {
+            numerator: [k[0], k[1], 0.0, 0.0],
+            denominator: [0.0; 3],
+            tangential: [k[2], k[3]],
+            ..Polynomial::default()
+        };
         let (mut inside, mut outside) = (0, 0);
         for y in 0..size.1 {
             for x in 0..size.0 {

@@ -118,6 +118,28 @@ fn colmap_wins_and_a_json_can_be_named() {
 }
 
 #[test]
+fn lenses_have_the_names_of_nerfstudio_and_instant_ngp() {
+    let views = |more: &str| {
+        let scene = Scene::new();
+        scene.photo("images/a.png", 12, 8);
+        scene.write("transforms.json", format!(r#"{{{more} "frames": [{}]}}"#, frame("images/a.png", "")));
+        open(&scene).expect("a scene").train
+    };
+    // The edges are 6 px from the middle, at 10 px a radian.
+    let half = 6.0 / 10.0;
+    for text in [r#""camera_model": "OPENCV_FISHEYE","#, r#""is_fisheye": true,"#, r#""camera_model": "FISHEYE","#] {
+        let all = views(&format!(r#""fl_x": 10, {text}"#));
+        let camera = &all[0].camera;
+        let width = 2.0 * 10.0 * f64::tan(half);
+        assert!((camera.fx - 10.0).abs() < 1e-6 && f64::from(camera.width) == width.round(), "{camera:?}");
+    }
+    let faces = views(r#""camera_model": "EQUIRECTANGULAR", "fl_x": 3, "cx": 1,"#);
+    let names: Vec<&str> = faces.iter().map(|view| view.name.as_str()).collect();
+    assert_eq!(names, ["a.back.png", "a.down.png", "a.front.png", "a.left.png", "a.right.png", "a.up.png"]);
+    assert!(faces.iter().all(|view| view.camera.width == view.camera.height));
+}
+
+#[test]
 fn invalid_values_are_refused_with_their_place() {
     let broken = |text: String| {
         let scene = Scene::new();
@@ -132,8 +154,7 @@ fn invalid_values_are_refused_with_their_place() {
     assert!(one("", IDENTITY).contains("camera_angle_x"));
     assert!(one(r#""fl_x": -1,"#, IDENTITY).contains("frame 0"));
     assert!(one(r#""camera_angle_x": 3.2,"#, IDENTITY).contains("focal"));
-    assert!(one(r#""fl_x": 9, "camera_model": "OPENCV_FISHEYE","#, IDENTITY).contains("OPENCV_FISHEYE"));
-    assert!(one(r#""fl_x": 9, "is_fisheye": true,"#, IDENTITY).contains("is_fisheye"));
+    assert!(one(r#""fl_x": 9, "camera_model": "ORTHOPHOTO","#, IDENTITY).contains("ORTHOPHOTO"));
     assert!(one(r#""fl_x": 9, "w": 11.5, "h": 8,"#, IDENTITY).contains("11.5"));
     assert!(one(r#""fl_x": 9,"#, "[[1,0,0,0],[0,1,0,0],[0,0,-1,0],[0,0,0,1]]").contains("rotation"));
     assert!(one(r#""fl_x": 9,"#, "[[1,0,0,0],[0,1,0,0]]").contains("4 x 4"));

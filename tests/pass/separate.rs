@@ -104,7 +104,15 @@ fn a_hidden_object_gets_no_gradient_from_others() {
 #[test]
 fn a_short_training_with_separate_passes_stays_close() {
     let Some(turn) = device() else { return };
-    let options = SynthOptions { preset: Preset::Simple, width: 72, height: 52, views: 5, points: 400, seed: 3 };
+    let options = SynthOptions {
+        preset: Preset::Simple,
+        width: 72,
+        height: 52,
+        views: 5,
+        points: 400,
+        seed: 3,
+        ..SynthOptions::default()
+    };
     let run = |separate: bool, small: bool| -> Vec<StepReport> {
         let dataset = dataset(&options, 0);
         let config =

@@ -17,7 +17,15 @@ use std::sync::Arc;
 const UTM: DVec3 = DVec3::new(691_607.25, 5_334_760.5, 519.0);
 
 fn scene(scale: f64, offset: DVec3) -> Dataset {
-    let options = SynthOptions { preset: Preset::Simple, width: 72, height: 52, views: 6, points: 600, seed: 3 };
+    let options = SynthOptions {
+        preset: Preset::Simple,
+        width: 72,
+        height: 52,
+        views: 6,
+        points: 600,
+        seed: 3,
+        ..SynthOptions::default()
+    };
     let mut dataset = dataset(&options, 6);
     for view in dataset.train.iter_mut().chain(&mut dataset.test) {
         let camera = &mut view.camera;

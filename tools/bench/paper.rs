@@ -58,7 +58,15 @@ struct Plan {
 impl Plan {
     fn new(options: &Options) -> Self {
         if options.common.small {
-            let scene = SynthOptions { preset: Preset::Simple, width: 72, height: 52, views: 5, points: 300, seed: 3 };
+            let scene = SynthOptions {
+                preset: Preset::Simple,
+                width: 72,
+                height: 52,
+                views: 5,
+                points: 300,
+                seed: 3,
+                ..SynthOptions::default()
+            };
             return Self { scene, objects: 2, warm_up: 1, steps: 3, from_step: 30, iterations: 40 };
         }
         let scene = SynthOptions { preset: Preset::Hard, ..SynthOptions::default() };

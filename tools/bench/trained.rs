@@ -21,7 +21,15 @@ pub const TEST_EVERY: u32 = 8;
 
 /// A scene with steps of milliseconds.
 pub fn small_scene() -> SynthOptions {
-    SynthOptions { preset: Preset::Simple, width: 72, height: 52, views: 5, points: 300, seed: 3 }
+    SynthOptions {
+        preset: Preset::Simple,
+        width: 72,
+        height: 52,
+        views: 5,
+        points: 300,
+        seed: 3,
+        ..SynthOptions::default()
+    }
 }
 
 /// The model that a training of the scene starts from.

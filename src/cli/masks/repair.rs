@@ -9,6 +9,7 @@ use crate::cli::stdout;
 use crate::cli::values::near;
 use crate::io::atomic;
 use crate::io::label_table::{FILE, LabelEntry, LabelTable};
+use crate::io::window::{ids_of_photo, windows};
 use crate::label::masks::agree::{Agreement, agree};
 use crate::label::masks::names::carried;
 use crate::label::masks::repair::Repairs;
@@ -68,12 +69,16 @@ pub(crate) fn run(args: &RepairArgs, context: &Context) -> Result<()> {
             "no training view has a mask here; check the names of the masks and --test-every",
         ));
     }
-    let mut files = BTreeMap::new();
-    for view in &views {
-        if let Some(other) = files.insert(file_of(view), &view.name) {
-            let problem = format!("{other} would have the same mask file; rename one of the photos");
+    let windows = windows(&args.scene)?;
+    let mut photos: BTreeMap<PathBuf, Vec<usize>> = BTreeMap::new();
+    for (at, view) in views.iter().enumerate() {
+        let window = |at: usize| windows.get(&views[at].name).map(|window| window.photo.as_str());
+        let of_file = photos.entry(file_of(window(at).unwrap_or(&view.name))).or_default();
+        if let Some(&other) = of_file.first().filter(|&&other| window(other).is_none() || window(other) != window(at)) {
+            let problem = format!("{} would have the same mask file; rename one of the photos", views[other].name);
             return Err(Error::data(&args.scene, &view.name, problem));
         }
+        of_file.push(at);
     }
     let mut engine = vote_engine(open_gpu(context)?, &model, &views, columns_of(&views))?;
     let mut progress = Progress::new(2 * views.len() as u64, "views", &context.global);
@@ -91,16 +96,20 @@ pub(crate) fn run(args: &RepairArgs, context: &Context) -> Result<()> {
     let (masks, repairs) = agree(&mut engine, &model, &views, how, &mut tick)?;
     drop(progress);
     let table = table(args, &views, &masks)?;
-    for (view, mask) in views.iter().zip(&masks).filter_map(|(view, mask)| Some((view, mask.as_ref()?))) {
-        write_mask(&args.output.join(file_of(view)), mask)?;
+    // Masks belong to the photos as they are stored, whatever their lenses.
+    for (file, views_of) in &photos {
+        let parts = views_of.iter().filter_map(|&at| Some((windows.get(&views[at].name)?, masks[at].as_ref()?)));
+        if let Some(mask) = ids_of_photo(&parts.collect::<Vec<_>>()) {
+            write_mask(&args.output.join(file), &mask)?;
+        }
     }
     table.write(&args.output.join(FILE))?;
     report(&views, &masks, &repairs, args, context)
 }
 
-/// Returns the path of a view's mask inside the folder.
-fn file_of(view: &View) -> PathBuf {
-    Path::new(&view.name).with_extension("png")
+/// Returns the path of a photo's mask inside the folder.
+fn file_of(photo: &str) -> PathBuf {
+    Path::new(photo).with_extension("png")
 }
 
 /// Makes the table of the repaired masks. Where each view had ids of its own, an object gets the name of most of its

@@ -6,6 +6,7 @@ mod photos;
 mod poses;
 
 use super::listed_path::Place;
+use super::window::windows;
 use super::{colmap, folder_of};
 use crate::error::Result;
 use crate::scene::{Dataset, View};
@@ -117,9 +118,12 @@ pub fn scan(scene: &Path, dataset: &Dataset) -> Result<Report> {
     // Opening the scene has checked its paths.
     let observed = colmap::observations(&Place::new(folder_of(scene), true))?.unwrap_or_default();
     let views: Vec<&View> = dataset.all();
+    let windows = windows(scene)?;
+    let of_photo = |view: &&View| observed.get(windows.get(&view.name).map_or(&view.name, |window| &window.photo));
+    let observed: Vec<_> = views.iter().map(of_photo).collect();
     let seen = neighbours::seen(&views, &dataset.points, &observed);
     let shared = neighbours::shared(&seen, dataset.points.len());
-    let errors: Vec<Option<f64>> = views.iter().map(|view| observed.get(&view.name).and_then(poses::error)).collect();
+    let errors: Vec<Option<f64>> = observed.iter().map(|of| of.and_then(poses::error)).collect();
     let sharpness = photos::sharpness(&views);
     let gains = photos::gains(&views, &seen, &dataset.points);
     let reports: Vec<ViewReport> = (0..views.len())

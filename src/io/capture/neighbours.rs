@@ -6,7 +6,7 @@ use crate::io::listing::Listed;
 use crate::scene::{Point, View};
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
-use std::collections::{BTreeMap, HashMap};
+use std::collections::HashMap;
 
 /// Fewest points that a photo has to share with two others.
 const SHARED_MIN: usize = 20;
@@ -20,20 +20,20 @@ const POINTS_MIN: usize = 200;
 pub(super) fn seen(
     views: &[&View],
     points: &[Point],
-    observed: &BTreeMap<String, (Listed, Vec<Seen>)>,
+    observed: &[Option<&(Listed, Vec<Seen>)>],
 ) -> Vec<Vec<(usize, DVec2)>> {
     let key = |place: DVec3| place.to_array().map(f64::to_bits);
     let index: HashMap<[u64; 3], usize> =
         points.iter().enumerate().map(|(index, point)| (key(point.position), index)).collect();
-    let of_view = |view: &&View| {
+    let of_view = |(view, observed): (&&View, &Option<&(Listed, Vec<Seen>)>)| {
         let camera = &view.camera;
         let inside = |index: usize| Some((index, camera.sees(points[index].position)?));
-        match observed.get(&view.name).filter(|(_, seen)| !seen.is_empty()) {
+        match observed.filter(|(_, seen)| !seen.is_empty()) {
             Some((_, seen)) => seen.iter().filter_map(|(_, world)| inside(*index.get(&key(*world))?)).collect(),
             None => (0..points.len()).filter_map(inside).collect(),
         }
     };
-    views.par_iter().map(of_view).collect()
+    views.par_iter().zip(observed).map(of_view).collect()
 }
 
 /// Returns for each view the number of its points that at least two others show.

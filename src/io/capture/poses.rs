@@ -2,9 +2,9 @@
 
 use super::{Fault, Finding, ViewReport, median};
 use crate::io::colmap::Seen;
+use crate::io::lens::Optics;
 use crate::io::listing::Listed;
 use crate::scene::Dataset;
-use glam::DVec2;
 
 /// Reprojection error from which a photo is odd: in px, and relative to the median over photos. Reconstructions of sharp
 /// photos have 0.3 to 1 px.
@@ -18,13 +18,10 @@ const STRAY: f64 = 1000.0;
 
 /// Returns the median distance of the points of a photo from where it shows them, px.
 pub(super) fn error((listed, points): &(Listed, Vec<Seen>)) -> Option<f64> {
-    let camera = &listed.camera;
+    let optics = Optics::new(listed.camera.clone(), listed.lens);
     let distance = |(pixel, world): &Seen| {
-        let place = camera.to_camera(*world);
-        let ideal = DVec2::new(place.x / place.z, place.y / place.z);
-        let bent = listed.lens.distortion().map_or(ideal, |lens| lens.distort(ideal));
-        let found = DVec2::new(camera.fx * bent.x + camera.cx, camera.fy * bent.y + camera.cy);
-        if place.z > 0.0 { found.distance(*pixel) } else { f64::MAX }
+        let found = optics.pixel(listed.camera.to_camera(*world));
+        found.map_or(f64::MAX, |found| found.distance(*pixel))
     };
     median(points.iter().map(distance))
 }

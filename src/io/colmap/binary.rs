@@ -1,8 +1,8 @@
 //! The binary files: little-endian, fixed widths, a count in front. No memory is allocated by a count alone.
 
-use super::model::{CameraRecord, ImageRecord, NAMES, Observed, model_of};
+use super::model::{CameraRecord, ImageRecord, Observed, unknown_model};
 use crate::error::{Error, Result};
-use crate::io::read;
+use crate::io::{lens, read};
 use crate::scene::Point;
 use glam::{DVec2, DVec3};
 use std::io::{BufRead, BufReader, Read};
@@ -101,13 +101,10 @@ pub(super) fn cameras(path: &Path) -> Result<Vec<CameraRecord>> {
     Source::open(path)?.records("camera", |source| {
         let (id, number) = (source.u32()?, source.u32()?);
         let (width, height) = (source.u64()?, source.u64()?);
-        let Some(name) = NAMES.get(number as usize) else {
-            return Err(
-                source.error(format!("camera {id} has the unknown model {number}; run `colmap image_undistorter`"))
-            );
+        let Some(model) = lens::colmap_model(number as usize) else {
+            return Err(unknown_model(path, format!("byte {}, camera {id}", source.at), &number));
         };
-        let model = model_of(path, &format!("camera {id}"), name)?;
-        let parameters = (0..model.focals + 2 + model.coefficients).map(|_| source.f64()).collect::<Result<_>>()?;
+        let parameters = (0..model.before() + model.coefficients).map(|_| source.f64()).collect::<Result<_>>()?;
         Ok(CameraRecord { id, model, width, height, parameters })
     })
 }

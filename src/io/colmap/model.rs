@@ -4,23 +4,8 @@ use crate::error::{Error, Result};
 use crate::io::lens::{self, CameraModel, Lens};
 use crate::scene::Camera;
 use glam::{DMat3, DVec2, DVec3};
+use std::fmt::Display;
 use std::path::Path;
-
-/// Names of the camera models; the index is COLMAP's number.
-pub(super) const NAMES: [&str; 12] = [
-    "SIMPLE_PINHOLE",
-    "PINHOLE",
-    "SIMPLE_RADIAL",
-    "RADIAL",
-    "OPENCV",
-    "OPENCV_FISHEYE",
-    "FULL_OPENCV",
-    "FOV",
-    "SIMPLE_RADIAL_FISHEYE",
-    "RADIAL_FISHEYE",
-    "THIN_PRISM_FISHEYE",
-    "RAD_TAN_THIN_PRISM_FISHEYE",
-];
 
 /// A line of `cameras`.
 pub(super) struct CameraRecord {
@@ -49,24 +34,19 @@ pub(super) struct ImageRecord {
     pub(super) observed: Observed,
 }
 
-/// Returns the camera model of one of [`NAMES`]. Refuses models that cannot be undistorted to a pinhole.
-pub(super) fn model_of(path: &Path, place: &str, name: &str) -> Result<&'static CameraModel> {
-    lens::model(name).ok_or_else(|| {
-        let known: Vec<&str> = NAMES.into_iter().filter(|name| lens::model(name).is_some()).collect();
-        let problem = format!(
-            "camera model {name} is not supported (supported: {}); run `colmap image_undistorter` and use its output",
-            known.join(", ")
-        );
-        Error::data(path, place, problem)
-    })
+/// Makes the error for a camera model that COLMAP has not.
+pub(super) fn unknown_model(path: &Path, place: String, name: &dyn Display) -> Error {
+    let known = lens::MODELS.map(|model| model.name).join(", ");
+    Error::data(path, place, format!("the camera model {name} is unknown; expected one of {known}"))
 }
 
 impl CameraRecord {
     /// Returns the intrinsics, with an identity pose, and the lens.
     pub(super) fn intrinsics(&self, path: &Path) -> Result<(Camera, Lens)> {
         let place = format!("camera {}", self.id);
-        let CameraModel { name, focals, coefficients, of_list, .. } = *self.model;
-        let (p, count) = (&self.parameters, focals + 2 + coefficients);
+        let CameraModel { name, coefficients, of_list, .. } = *self.model;
+        let (p, before) = (&self.parameters, self.model.before());
+        let count = before + coefficients;
         if p.len() != count {
             return Err(Error::data(path, place, format!("{name} has {count} parameters, {} are listed", p.len())));
         }
@@ -75,8 +55,12 @@ impl CameraRecord {
             u32::try_from(side).map_err(|_| problem())
         };
         let (width, height) = (side(self.width)?, side(self.height)?);
-        let (fx, fy, cx, cy) = (p[0], p[focals - 1], p[focals], p[focals + 1]);
+        if self.model.focals == 0 && p[..2] != [f64::from(width), f64::from(height)] {
+            let problem = format!("{name} of {width} x {height} px has the parameters {p:?}; expected its size again");
+            return Err(Error::data(path, place, problem));
+        }
+        let [fx, fy, cx, cy] = self.model.intrinsics(p);
         let camera = Camera { rotation: DMat3::IDENTITY, translation: DVec3::ZERO, fx, fy, cx, cy, width, height };
-        Ok((camera, of_list(&p[focals + 2..])))
+        Ok((camera, of_list(&p[before..])))
     }
 }

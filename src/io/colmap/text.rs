@@ -1,8 +1,8 @@
 //! The text files: one record per line; `#` starts a comment.
 
-use super::model::{CameraRecord, ImageRecord, NAMES, Observed, model_of};
+use super::model::{CameraRecord, ImageRecord, Observed, unknown_model};
 use crate::error::{Error, Result};
-use crate::io::read;
+use crate::io::{lens, read};
 use crate::scene::Point;
 use glam::{DVec2, DVec3};
 use std::io::BufRead;
@@ -78,13 +78,9 @@ fn records<T>(path: &Path, read: impl Fn(Words) -> Result<T>) -> Result<Vec<T>> 
 
 pub(super) fn cameras(path: &Path) -> Result<Vec<CameraRecord>> {
     records(path, |mut words| {
-        let (id, name) = (words.number("camera id")?, words.word("a camera model")?);
-        if !NAMES.contains(&name) {
-            return Err(
-                words.error(format!("camera {id} has the unknown model {name}; run `colmap image_undistorter`"))
-            );
-        }
-        let model = model_of(path, &format!("line {}, camera {id}", words.number), name)?;
+        let (id, name): (u32, _) = (words.number("camera id")?, words.word("a camera model")?);
+        let unknown = || unknown_model(path, format!("line {}, camera {id}", words.number), &name);
+        let model = lens::model(name).ok_or_else(unknown)?;
         let (width, height) = (words.number("width")?, words.number("height")?);
         let mut parameters = Vec::new();
         while !words.rest.trim().is_empty() {

@@ -1,13 +1,32 @@
-//! Lens distortion: the position in the photo of a pixel of the ideal pinhole image.
+//! Lenses: where a photo shows a direction.
 //!
-//! To add a lens, add a file with its coefficients, their parsing and its [`Distortion`], a variant of [`Lens`], and
-//! its names in `MODELS`.
+//! A lens maps a direction to a point of the image plane at focal length 1; [`Optics`] adds focal lengths and principal
+//! point. Sources of the formulas: COLMAP's camera models, and those that their files name.
+//!
+//! To add a lens, add a file with its coefficients and its [`Projection`], a variant of [`Lens`], and its names in
+//! `models.rs`.
 
-mod distortion;
+mod division;
+mod equirectangular;
+mod eucm;
+mod fisheye;
+mod fov;
+mod models;
+mod optics;
 mod polynomial;
+mod projection;
+mod rad_tan;
 
-pub use distortion::Distortion;
+pub use division::Division;
+pub use equirectangular::Equirectangular;
+pub use eucm::Eucm;
+pub use fisheye::Fisheye;
+pub use fov::Fov;
+pub(crate) use models::{CameraModel, MODELS, colmap_model, model};
+pub use optics::Optics;
 pub use polynomial::Polynomial;
+pub use projection::Projection;
+pub use rad_tan::RadTan;
 
 /// The lens of a photo.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -17,20 +36,38 @@ pub enum Lens {
     Pinhole,
     /// Radial and tangential distortion of OpenCV.
     Polynomial(Polynomial),
+    /// Angles in place of tangents, with a polynomial.
+    Fisheye(Fisheye),
+    /// The fisheye of Project Aria.
+    RadTan(RadTan),
+    /// The arc tangent of one angle.
+    Fov(Fov),
+    /// The division model.
+    Division(Division),
+    /// The enhanced unified camera model.
+    Eucm(Eucm),
+    /// A panorama of all directions.
+    Equirectangular,
 }
 
 impl Lens {
-    /// Returns the distortion; none for a pinhole.
-    pub fn distortion(&self) -> Option<&dyn Distortion> {
+    /// Returns the projection; none for a pinhole.
+    pub fn projection(&self) -> Option<&dyn Projection> {
         match self {
             Self::Pinhole => None,
             Self::Polynomial(lens) => Some(lens),
+            Self::Fisheye(lens) => Some(lens),
+            Self::RadTan(lens) => Some(lens),
+            Self::Fov(lens) => Some(lens),
+            Self::Division(lens) => Some(lens),
+            Self::Eucm(lens) => Some(lens),
+            Self::Equirectangular => Some(&Equirectangular),
         }
     }
 
     /// Returns true for a lens without distortion.
     pub fn is_pinhole(&self) -> bool {
-        self.distortion().is_none()
+        matches!(self, Self::Pinhole)
     }
 }
 
@@ -38,44 +75,4 @@ impl From<Polynomial> for Lens {
     fn from(lens: Polynomial) -> Self {
         if lens == Polynomial::default() { Self::Pinhole } else { Self::Polynomial(lens) }
     }
-}
-
-/// A camera model as files name it, with its parameters.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct CameraModel {
-    /// Name in COLMAP.
-    pub(crate) name: &'static str,
-    /// Number of focal lengths in COLMAP's list: 1, or 2 for x and y. The principal point follows.
-    pub(crate) focals: usize,
-    /// Number of lens coefficients after them.
-    pub(crate) coefficients: usize,
-    /// Makes the lens from that list.
-    pub(crate) of_list: fn(&[f64]) -> Lens,
-    /// Makes the lens from the named coefficients of `transforms.json`, 0 for missing ones; `None` if that format lacks
-    /// the model.
-    pub(crate) of_names: Option<fn(&dyn Fn(&str) -> f64) -> Lens>,
-}
-
-const fn pinhole(name: &'static str, focals: usize) -> CameraModel {
-    CameraModel { name, focals, coefficients: 0, of_list: |_| Lens::Pinhole, of_names: Some(|_| Lens::Pinhole) }
-}
-
-const fn polynomial(name: &'static str, focals: usize, coefficients: usize) -> CameraModel {
-    let of_list = |list: &[f64]| Polynomial::of_list(list).into();
-    CameraModel { name, focals, coefficients, of_list, of_names: Some(|value| Polynomial::of_names(value).into()) }
-}
-
-/// The camera models that can be undistorted to a pinhole.
-pub(crate) const MODELS: [CameraModel; 6] = [
-    pinhole("PINHOLE", 2),
-    pinhole("SIMPLE_PINHOLE", 1),
-    polynomial("SIMPLE_RADIAL", 1, 1),
-    polynomial("RADIAL", 1, 2),
-    polynomial("OPENCV", 2, 4),
-    CameraModel { of_names: None, ..polynomial("FULL_OPENCV", 2, 8) },
-];
-
-pub(crate) fn model(name: &str) -> Option<&'static CameraModel> {
-    const ALL: &[CameraModel] = &MODELS;
-    ALL.iter().find(|model| model.name == name)
 }

@@ -35,7 +35,15 @@ pub(super) fn twice(gpu: &Arc<Gpu>, kernels: KernelShape) -> Result<Verdict> {
 
 /// Trains; returns the model, and the mean loss of the first and of the last ten steps.
 fn train(gpu: &Arc<Gpu>, kernels: KernelShape) -> Result<(Gaussians, [f64; 2])> {
-    let options = SynthOptions { preset: Preset::Simple, width: 72, height: 52, views: 6, points: 400, seed: 3 };
+    let options = SynthOptions {
+        preset: Preset::Simple,
+        width: 72,
+        height: 52,
+        views: 6,
+        points: 400,
+        seed: 3,
+        ..SynthOptions::default()
+    };
     let dataset = synth::dataset(&options, 0);
     let config = TrainConfig {
         iterations: STEPS,

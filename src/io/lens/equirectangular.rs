@@ -1,0 +1,38 @@
+//! Panoramas of all directions.
+
+use super::Projection;
+use glam::{DVec2, DVec3};
+use std::f64::consts::{FRAC_PI_2, PI};
+
+/// Longitude to the right and latitude downwards, radians: the axis is in the middle of the photo, whose width is 360 and
+/// whose height 180 degrees.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Equirectangular;
+
+impl Projection for Equirectangular {
+    fn is_valid(&self) -> bool {
+        true
+    }
+
+    fn project(&self, direction: DVec3) -> DVec2 {
+        let DVec3 { x, y, z } = direction;
+        DVec2::new(x.atan2(z), y.atan2(x.hypot(z)))
+    }
+
+    fn radius(&self, angle: f64) -> f64 {
+        angle
+    }
+
+    fn reach(&self) -> f64 {
+        PI
+    }
+
+    fn unproject(&self, point: DVec2, _reach: f64) -> Option<DVec3> {
+        let (longitude, latitude) = (point.x, point.y);
+        if longitude.abs() > PI || latitude.abs() > FRAC_PI_2 {
+            return None;
+        }
+        let across = latitude.cos();
+        Some(DVec3::new(across * longitude.sin(), latitude.sin(), across * longitude.cos()))
+    }
+}
