@@ -17,4 +17,5 @@ mod output;
 mod photos;
 mod pipeline_file;
 mod ply;
+mod poses;
 mod transforms;

@@ -14,7 +14,7 @@ use std::path::PathBuf;
 /// `labelgs check`.
 #[derive(Args, Clone, Debug)]
 pub struct CheckArgs {
-    /// Folder of the scene (COLMAP or transforms.json), or one .json file.
+    /// Folder of the scene (COLMAP, transforms.json, poses_bounds.npy, Metashape), or one .json, .npy or .xml file.
     #[arg(value_name = "SCENE")]
     pub scene: PathBuf,
     /// Tolerance for the scene.

@@ -16,7 +16,7 @@ use std::path::{Path, PathBuf};
 /// `labelgs train`.
 #[derive(Args, Clone, Debug)]
 pub struct TrainArgs {
-    /// Folder of the scene (COLMAP or transforms.json), or one .json file.
+    /// Folder of the scene (COLMAP, transforms.json, poses_bounds.npy, Metashape), or one .json, .npy or .xml file.
     #[arg(value_name = "SCENE")]
     pub scene: PathBuf,
     /// Folder for the model, its settings and the logs of the run.

@@ -1,6 +1,7 @@
 //! Files with one depth map: 16-bit PNG, EXR, NPY or PFM. Values stay as stored.
 
 use super::image::{PIXELS_MAX, check_length, check_png_length, check_size};
+use super::npy;
 use crate::error::{Error, Result};
 use crate::io::read;
 use crate::scene::DepthMap;
@@ -86,62 +87,13 @@ fn read_exr(path: &Path) -> Result<DepthMap> {
     Ok(DepthMap { width, height, values })
 }
 
-/// Reads a two-dimensional array of floats in C order, `[height, width]`. Format of numpy, versions 1 to 3: magic,
-/// version, header length, a Python dictionary with three keys, the values.
+/// Reads a two-dimensional array of floats, `[height, width]`.
 fn read_npy(path: &Path) -> Result<DepthMap> {
-    let refuse = refuse(path, "NPY");
-    let bytes = read::bytes(path)?;
-    let parts = || {
-        let rest = bytes.strip_prefix(b"\x93NUMPY")?;
-        let (start, length) = match *rest.first()? {
-            1 => (4_usize, usize::from(u16::from_le_bytes([*rest.get(2)?, *rest.get(3)?]))),
-            2 | 3 => (6, u32::from_le_bytes([*rest.get(2)?, *rest.get(3)?, *rest.get(4)?, *rest.get(5)?]) as usize),
-            _ => return None,
-        };
-        Some((std::str::from_utf8(rest.get(start..start.checked_add(length)?)?).ok()?, &rest[start + length..]))
-    };
-    let (header, data) = parts().ok_or_else(|| refuse(&"its header is not numpy's"))?;
-    let field = |key: &str| {
-        let (_, value) = header.split_once(&format!("'{key}':"))?;
-        Some(value.trim_start())
-    };
-    let no = |key: &str| refuse(&format!("its header has no {key}"));
-    let shape = field("shape").and_then(|text| text.strip_prefix('(')?.split_once(')')).ok_or_else(|| no("shape"))?.0;
-    let sides: Vec<&str> = shape.split(',').map(str::trim).filter(|side| !side.is_empty()).collect();
-    let &[height, width] = sides.as_slice() else {
-        return Err(Error::data(path, "shape", format!("is ({shape}); expected (height, width)")));
-    };
-    if !field("fortran_order").ok_or_else(|| no("fortran_order"))?.starts_with("False") {
-        let cure = "the array is in Fortran order; save numpy.ascontiguousarray(depth)";
-        return Err(Error::data(path, "fortran_order", cure));
-    }
-    let side = |side: &str| side.parse().map_err(|_| no("shape of whole numbers"));
-    let (width, height) = (side(width)?, side(height)?);
+    let ([height, width], values) = npy::read::<2>(path, "depth map", "(height, width)")?;
+    let side = |side: usize| u32::try_from(side).unwrap_or(u32::MAX);
+    let (width, height) = (side(width), side(height));
     check_size(path, (width, height))?;
-    let kind = field("descr").ok_or_else(|| no("descr"))?;
-    let kind = kind.trim_start_matches('\'').split('\'').next().unwrap_or_default();
-    let (little, each) = match kind {
-        "<f2" | "<f4" | "<f8" => (true, usize::from(kind.as_bytes()[2] - b'0')),
-        ">f2" | ">f4" | ">f8" => (false, usize::from(kind.as_bytes()[2] - b'0')),
-        _ => return Err(Error::data(path, "descr", format!("is {kind}; depth is float16, float32 or float64"))),
-    };
-    let pixels = width as usize * height as usize;
-    if data.len() != pixels * each {
-        return Err(refuse(&format!("{pixels} numbers need {} bytes, it has {}", pixels * each, data.len())));
-    }
-    let value = |number: &[u8]| {
-        let mut eight = [0_u8; 8];
-        eight[..each].copy_from_slice(number);
-        if !little {
-            eight[..each].reverse();
-        }
-        match each {
-            2 => half::f16::from_le_bytes([eight[0], eight[1]]).to_f32(),
-            4 => f32::from_le_bytes([eight[0], eight[1], eight[2], eight[3]]),
-            _ => f64::from_le_bytes(eight) as f32,
-        }
-    };
-    Ok(DepthMap { width, height, values: data.chunks_exact(each).map(value).collect() })
+    Ok(DepthMap { width, height, values: values.into_iter().map(|value| value as f32).collect() })
 }
 
 /// Reads a PFM: `Pf`, width and height, scale (negative for little-endian), then rows from bottom to top.

@@ -21,10 +21,13 @@ pub(crate) mod label_table;
 pub(crate) mod lens;
 mod listed_path;
 mod listing;
+mod llff;
 mod load;
 pub(crate) mod mask;
 pub mod masks;
+mod metashape;
 pub(crate) mod model;
+mod npy;
 pub(crate) mod occlusion_table;
 pub(crate) mod pipeline_file;
 pub(crate) mod ply;
@@ -99,8 +102,8 @@ impl Default for LoadOptions {
 }
 
 /// Reads the scene in the folder `scene`: a COLMAP model (in `sparse/0`, `sparse`, `colmap/sparse/0` or the folder
-/// itself), else `transforms_train.json` with `transforms_test.json`, else `transforms.json`. A path to a `.json` file
-/// reads that file.
+/// itself), else `transforms_train.json` with `transforms_test.json`, else `transforms.json`, else `poses_bounds.npy` of
+/// LLFF, else an `.xml` of Metashape. A path to one of the last three reads that file.
 ///
 /// Views are undistorted and resized, each with a pinhole camera of its own size; see [`LoadOptions`] and the notes of
 /// the result. Pixels outside of the photo get alpha 0 and id 0. A polynomial keeps focal lengths and principal point,
@@ -138,17 +141,25 @@ fn folder_of(scene: &Path) -> &Path {
 /// Lists a scene. Files outside of its folder need `allow_outside`.
 fn list(scene: &Path, allow_outside: bool) -> Result<Listing> {
     if scene.is_file() {
-        return transforms::list_file(&Place::new(folder_of(scene), allow_outside), scene);
+        let place = Place::new(folder_of(scene), allow_outside);
+        let extension = scene.extension().map(|extension| extension.to_string_lossy().to_lowercase());
+        return match extension.as_deref() {
+            Some("npy") => llff::list_file(&place, scene),
+            Some("xml") => metashape::list_file(&place, scene),
+            _ => transforms::list_file(&place, scene),
+        };
     }
     if !scene.is_dir() {
         return Err(Error::data(scene, "", "there is no such folder; expected the folder of a scene"));
     }
     let place = Place::new(scene, allow_outside);
-    let listing = match colmap::list(&place)? {
-        Some(listing) => Some(listing),
-        None => transforms::list(&place)?,
-    };
+    for list in [colmap::list, transforms::list, llff::list, metashape::list] {
+        if let Some(listing) = list(&place)? {
+            return Ok(listing);
+        }
+    }
     let problem = "holds no scene: expected a COLMAP model (cameras and images, .bin or .txt, in sparse/0, sparse \
-                   or colmap/sparse/0) or transforms.json or transforms_train.json";
-    listing.ok_or_else(|| Error::data(scene, "", problem))
+                   or colmap/sparse/0), transforms.json or transforms_train.json, poses_bounds.npy, or the cameras of \
+                   Metashape as .xml";
+    Err(Error::data(scene, "", problem))
 }

@@ -23,13 +23,20 @@ fn written(name: &str, write: impl FnOnce(&Path)) -> Vec<u8> {
 
 /// `cameras.bin` with a camera of each model that can be read.
 pub fn colmap_cameras_bin() -> Vec<Vec<u8>> {
-    let models: [(u32, &[f64]); 6] = [
+    let models: [(u32, &[f64]); 13] = [
         (1, &[10.0, 11.0, 5.5, 4.5]),
         (0, &[10.0, 6.0, 4.0]),
         (2, &[10.0, 6.0, 4.0, 0.01]),
         (3, &[10.0, 6.0, 4.0, 0.01, 0.001]),
         (4, &[10.0, 11.0, 6.0, 4.0, 0.01, 0.001, 0.002, 0.003]),
         (6, &[10.0, 11.0, 6.0, 4.0, 0.01, 0.001, 0.002, 0.003, 0.004, 0.01, 0.0, 0.0]),
+        (5, &[10.0, 11.0, 6.0, 4.0, 0.01, 0.001, 0.002, 0.003]),
+        (7, &[10.0, 11.0, 6.0, 4.0, 0.9]),
+        (10, &[4.0, 4.0, 6.0, 4.0, 0.01, 0.001, 0.002, 0.003, 0.004, 0.01, 0.0, 0.0]),
+        (11, &[10.0, 11.0, 6.0, 4.0, 0.01, 0.001, 0.0, 0.0, 0.0, 0.0, 0.001, 0.001, 0.001, 0.0, 0.0, 0.0]),
+        (13, &[10.0, 11.0, 6.0, 4.0, -0.1]),
+        (16, &[10.0, 11.0, 6.0, 4.0, 0.6, 1.1]),
+        (17, &[12.0, 8.0]),
     ];
     let file = |(model, parameters): (u32, &[f64])| {
         let mut out = 1u64.to_le_bytes().to_vec();
@@ -132,6 +139,24 @@ pub fn transforms_json() -> Vec<Vec<u8>> {
     ]
     .map(String::into_bytes)
     .to_vec()
+}
+
+pub fn poses_npy() -> Vec<u8> {
+    let row = [0.0, 1.0, 0.0, 0.5, 8.0, 1.0, 0.0, 0.0, 0.25, 12.0, 0.0, 0.0, -1.0, 3.0, 10.0, 0.5, 9.0_f64];
+    npy(1, "<f8", "(1, 17)", row.map(f64::to_le_bytes).as_flattened())
+}
+
+pub fn metashape_xml() -> Vec<Vec<u8>> {
+    let of_kind = |kind: &str| {
+        format!(
+            r#"<?xml version="1.0"?><document><chunk><sensors><sensor id="0" type="{kind}"><resolution width="12" height="8"/>
+<calibration class="adjusted"><f>10</f><cx>0.5</cx><k1>0.1</k1><p1>1e-3</p1><b1>0.5</b1><b2>0.1</b2></calibration></sensor></sensors>
+<components><component id="0"><transform><rotation>1 0 0 0 1 0 0 0 1</rotation><translation>0 0 1</translation><scale>2</scale>
+</transform></component></components><cameras><camera id="0" sensor_id="0" component_id="0" label="00">
+<transform>1 0 0 0.5 0 1 0 1 0 0 1 1 0 0 0 1</transform></camera><camera id="1" label="b"/></cameras></chunk></document>"#
+        )
+    };
+    ["frame", "fisheye", "spherical"].map(|kind| of_kind(kind).into_bytes()).to_vec()
 }
 
 fn gaussians(count: usize, degree: u32, labelled: bool) -> Gaussians {
@@ -351,25 +376,27 @@ pub fn depth_exr() -> Vec<Vec<u8>> {
 /// Floats of every width, of both byte orders and both versions of the header.
 pub fn depth_npy() -> Vec<Vec<u8>> {
     let file = |version: u8, descr: &str, number: fn(f32) -> Vec<u8>| {
-        let mut header = format!("{{'descr': '{descr}', 'fortran_order': False, 'shape': (8, 12), }}");
-        while (header.len() + 11) % 64 != 0 {
-            header.push(' ');
-        }
-        header.push('\n');
-        let mut bytes = [b"\x93NUMPY".as_slice(), &[version, 0]].concat();
-        match version {
-            1 => bytes.extend((header.len() as u16).to_le_bytes()),
-            _ => bytes.extend((header.len() as u32).to_le_bytes()),
-        }
-        bytes.extend(header.as_bytes());
-        depths().into_iter().for_each(|value| bytes.extend(number(value)));
-        bytes
+        npy(version, descr, "(8, 12)", &depths().into_iter().flat_map(number).collect::<Vec<u8>>())
     };
     vec![
         file(1, "<f4", |value| value.to_le_bytes().to_vec()),
         file(2, ">f8", |value| f64::from(value).to_be_bytes().to_vec()),
         file(1, "<f2", |value| half::f16::from_f32(value).to_le_bytes().to_vec()),
     ]
+}
+
+fn npy(version: u8, descr: &str, shape: &str, data: &[u8]) -> Vec<u8> {
+    let mut header = format!("{{'descr': '{descr}', 'fortran_order': False, 'shape': {shape}, }}");
+    while (header.len() + 11) % 64 != 0 {
+        header.push(' ');
+    }
+    header.push('\n');
+    let mut bytes = [b"\x93NUMPY".as_slice(), &[version, 0]].concat();
+    match version {
+        1 => bytes.extend((header.len() as u16).to_le_bytes()),
+        _ => bytes.extend((header.len() as u32).to_le_bytes()),
+    }
+    [&bytes, header.as_bytes(), data].concat()
 }
 
 /// Both byte orders.

@@ -47,7 +47,7 @@ const PLAIN: Target = Target {
 const PIXELS: Target = Target { per_byte: 8192 * 4 * 2, ..PLAIN };
 
 /// All readers.
-pub const TARGETS: [Target; 44] = [
+pub const TARGETS: [Target; 46] = [
     Target {
         name: "colmap_cameras_bin",
         file: "sparse/0/cameras.bin",
@@ -102,6 +102,24 @@ pub const TARGETS: [Target; 44] = [
         prepare: transforms,
         read: scene,
         seeds: seeds::transforms_json,
+        ..PLAIN
+    },
+    Target {
+        name: "poses_npy",
+        file: "poses_bounds.npy",
+        prepare: transforms,
+        read: scene,
+        seeds: || vec![seeds::poses_npy()],
+        ..PLAIN
+    },
+    // A node of the tree takes a hundred bytes, and three of the file make one.
+    Target {
+        name: "metashape_xml",
+        file: "cameras.xml",
+        prepare: transforms,
+        read: scene,
+        seeds: seeds::metashape_xml,
+        per_byte: 256,
         ..PLAIN
     },
     Target { name: "ply_model", file: "model.ply", read: model, seeds: seeds::ply_model, ..PLAIN },

@@ -22,7 +22,7 @@ use std::path::{Path, PathBuf};
 #[derive(Args, Clone, Debug)]
 #[command(group(clap::ArgGroup::new("from").required(true).args(["depths", "model"])))]
 pub struct OcclusionArgs {
-    /// Folder of the scene (COLMAP or transforms.json), or one .json file.
+    /// Folder of the scene (COLMAP, transforms.json, poses_bounds.npy, Metashape), or one .json, .npy or .xml file.
     #[arg(value_name = "SCENE")]
     pub scene: PathBuf,
     /// Folder of id masks.

@@ -1,0 +1,248 @@
+//! Cameras of Agisoft Metashape, as "Export Cameras" writes them: XML with sensors, components and cameras.
+//!
+//! A camera's `transform` is camera-to-component with axes x right, y down, z forward; that of its component, or of the
+//! chunk, goes on to the world. Lenses follow appendix D of Metashape's manual, where the focal length is in px, the
+//! principal point relative to the middle of the photo, and p1 and p2 the other way round than in OpenCV.
+
+use super::lens::{Fisheye, Lens, Polynomial};
+use super::listed_path::Place;
+use super::listing::{
+    EXTENSIONS, Listed, Listing, check_camera, find_file, invert_pose, rotation_of, side, with_extension,
+};
+use crate::error::{Error, Result};
+use crate::io::read;
+use crate::scene::Camera;
+use glam::{DAffine3, DMat3, DVec3};
+use roxmltree::{Document, Node, ParsingOptions};
+use std::collections::{BTreeMap, BTreeSet};
+use std::f64::consts::PI;
+use std::path::Path;
+
+/// Most elements and texts of a file; a photo takes a dozen.
+const NODES_MAX: u32 = 1 << 24;
+/// Most elements in each other. The parser calls itself for each of them, and Metashape has seven.
+const DEPTH_MAX: usize = 64;
+
+/// Reads the scene, if its folder has one XML file of Metashape.
+pub(crate) fn list(scene: &Place) -> Result<Option<Listing>> {
+    let is_xml = |path: &std::path::PathBuf| path.extension().is_some_and(|end| end.eq_ignore_ascii_case("xml"));
+    let mut found: Vec<_> = read::folder(scene.root)?.into_iter().filter(is_xml).collect();
+    found.sort();
+    match found.as_slice() {
+        [] => Ok(None),
+        [path] => list_file(scene, path).map(Some),
+        [first, second, ..] => {
+            let problem = format!("lies beside {}; name the one with the cameras as the scene", second.display());
+            Err(Error::data(first, "", problem))
+        }
+    }
+}
+
+pub(crate) fn list_file(scene: &Place, path: &Path) -> Result<Listing> {
+    let text = read::text(path)?;
+    if let Some(line) = too_deep(&text) {
+        let problem = format!("elements are nested deeper than {DEPTH_MAX}; expected cameras of Metashape in XML");
+        return Err(Error::data(path, format!("line {line}"), problem));
+    }
+    let options = ParsingOptions { nodes_limit: NODES_MAX, ..ParsingOptions::default() };
+    let document = Document::parse_with_options(&text, options).map_err(|error| {
+        Error::data(path, format!("line {}", error.pos().row), format!("{error}; expected cameras of Metashape in XML"))
+    })?;
+    let file = File { path, document: &document };
+    let mut chunks = document.root_element().descendants().filter(|node| node.has_tag_name("chunk"));
+    let Some(chunk) = chunks.next() else {
+        return Err(Error::data(path, "", "has no `chunk`; expected the XML of Metashape's \"Export Cameras\""));
+    };
+    let mut listing = Listing { source: path.to_owned(), ..Listing::default() };
+    if chunks.next().is_some() {
+        listing.notes.push(format!("only the first chunk of {} is used", path.display()));
+    }
+    let sensors = file.by_id(chunk, "sensor", |sensor| file.sensor(sensor))?;
+    let components = file.by_id(chunk, "component", |component| file.similarity(component))?;
+    let chunk_to_world = file.similarity(chunk)?;
+    let (mut without, mut names) = (0, BTreeSet::new());
+    for camera in chunk.descendants().filter(|node| node.has_tag_name("camera") && node.has_attribute("label")) {
+        let disabled = matches!(camera.attribute("enabled"), Some("0" | "false"));
+        let Some(transform) = child(camera, "transform").filter(|_| !disabled) else {
+            without += 1;
+            continue;
+        };
+        let label = camera.attribute("label").unwrap_or_default();
+        let place = format!("{}, camera `{label}`", file.line(camera));
+        let of_sensor = camera.attribute("sensor_id").and_then(|id| sensors.get(id));
+        let Some((intrinsics, lens)) = of_sensor else {
+            return Err(Error::data(path, place, "names no sensor of the chunk; export the cameras again"));
+        };
+        // A component's transform takes the place of the chunk's.
+        let of_component = camera.attribute("component_id").and_then(|id| components.get(id)).copied().flatten();
+        let to_world = of_component.or(chunk_to_world).unwrap_or(DAffine3::IDENTITY);
+        let pose = to_world * file.matrix(transform)?;
+        let Some(rotation) = rotation_of(pose.matrix3) else {
+            return Err(Error::data(
+                path,
+                place,
+                "the transform is no rotation with a scale; export the cameras again",
+            ));
+        };
+        let (rotation, translation) = invert_pose(rotation, pose.translation);
+        let own = Camera { rotation, translation, ..intrinsics.clone() };
+        check_camera(path, &place, &own, lens)?;
+        let resolved = scene.resolve(path, label)?;
+        let photo = find_file(scene.root, &["images", "."], &resolved.path, &EXTENSIONS);
+        let name = with_extension(resolved.name, photo.as_deref());
+        if !names.insert(name.clone()) {
+            return Err(Error::data(path, place, "another camera has this label too; rename one of the photos"));
+        }
+        listing.views.push(Listed { name, photo, camera: own, lens: *lens, test: None });
+    }
+    if without > 0 {
+        listing.notes.push(format!("{without} cameras of {} are disabled or not aligned and skipped", path.display()));
+    }
+    Ok(listing)
+}
+
+/// Returns the line in which elements are nested deeper than [`DEPTH_MAX`]. Markup that is not well formed may count more;
+/// the parser refuses it.
+fn too_deep(text: &str) -> Option<usize> {
+    let (mut rest, mut depth) = (text, 0_usize);
+    while let Some(at) = rest.find('<') {
+        rest = &rest[at + 1..];
+        let skipped =
+            [("!--", "-->"), ("![CDATA[", "]]>"), ("?", "?>")].iter().find(|(start, _)| rest.starts_with(start));
+        if let Some((_, end)) = skipped {
+            rest = rest.find(end).map_or("", |at| &rest[at..]);
+        } else if rest.starts_with('/') {
+            depth = depth.saturating_sub(1);
+        } else {
+            // The end of the tag, outside of quotes.
+            let mut quote = None;
+            let end = rest.bytes().position(|byte| match (byte, quote) {
+                (b'"' | b'\'', None) => {
+                    quote = Some(byte);
+                    false
+                }
+                (byte, Some(open)) => {
+                    quote = Some(open).filter(|_| byte != open);
+                    false
+                }
+                (byte, None) => byte == b'>',
+            });
+            let tag = &rest[..end.unwrap_or(rest.len())];
+            depth += usize::from(!tag.ends_with('/'));
+            rest = &rest[tag.len()..];
+        }
+        if depth > DEPTH_MAX {
+            return Some(text[..text.len() - rest.len()].matches('\n').count() + 1);
+        }
+    }
+    None
+}
+
+fn child<'a>(node: Node<'a, 'a>, name: &str) -> Option<Node<'a, 'a>> {
+    node.children().find(|child| child.has_tag_name(name))
+}
+
+/// A parsed file, for messages.
+struct File<'a> {
+    path: &'a Path,
+    document: &'a Document<'a>,
+}
+
+impl<'a> File<'a> {
+    fn line(&self, node: Node) -> String {
+        format!("line {}", self.document.text_pos_at(node.range().start).row)
+    }
+
+    fn refuse<T>(&self, node: Node, problem: impl Into<String>) -> Result<T> {
+        Err(Error::data(self.path, self.line(node), problem))
+    }
+
+    /// Reads all elements of a name below a node, by their ids.
+    fn by_id<T>(
+        &self,
+        chunk: Node<'a, 'a>,
+        name: &str,
+        read: impl Fn(Node<'a, 'a>) -> Result<T>,
+    ) -> Result<BTreeMap<&'a str, T>> {
+        let nodes = chunk.descendants().filter(|node| node.has_tag_name(name));
+        nodes.filter_map(|node| Some((node.attribute("id")?, node))).map(|(id, node)| Ok((id, read(node)?))).collect()
+    }
+
+    fn numbers<const N: usize>(&self, node: Node) -> Result<[f64; N]> {
+        let words: Vec<&str> = node.text().unwrap_or_default().split_whitespace().collect();
+        let numbers: Option<Vec<f64>> =
+            words.iter().map(|word| word.parse().ok().filter(|value: &f64| value.is_finite())).collect();
+        match numbers.and_then(|numbers| numbers.try_into().ok()) {
+            Some(numbers) => Ok(numbers),
+            None => self.refuse(node, format!("`{}` holds no {N} finite numbers", node.tag_name().name())),
+        }
+    }
+
+    /// Reads the number in a child; 0 if there is none.
+    fn number(&self, node: Node<'a, 'a>, name: &str) -> Result<f64> {
+        child(node, name).map_or(Ok(0.0), |child| self.numbers::<1>(child).map(|[value]| value))
+    }
+
+    /// Reads a 4 x 4 matrix, row by row.
+    fn matrix(&self, node: Node) -> Result<DAffine3> {
+        let m: [f64; 16] = self.numbers(node)?;
+        let column = |index: usize| DVec3::new(m[index], m[4 + index], m[8 + index]);
+        let matrix3 = DMat3::from_cols(column(0), column(1), column(2));
+        Ok(DAffine3 { matrix3, translation: column(3) })
+    }
+
+    /// Reads the `transform` of a chunk or a component: rotation, row by row, translation and scale.
+    fn similarity(&self, node: Node<'a, 'a>) -> Result<Option<DAffine3>> {
+        let Some(transform) = child(node, "transform") else { return Ok(None) };
+        let rotation = child(transform, "rotation").map(|node| self.numbers::<9>(node)).transpose()?;
+        let rotation = rotation.map_or(DMat3::IDENTITY, |rows| DMat3::from_cols_array(&rows).transpose());
+        let translation = child(transform, "translation").map(|node| self.numbers::<3>(node)).transpose()?;
+        let scale = child(transform, "scale").map_or(Ok(1.0), |node| self.numbers::<1>(node).map(|[scale]| scale))?;
+        let translation = translation.map_or(DVec3::ZERO, DVec3::from_array);
+        Ok(Some(DAffine3 { matrix3: rotation * scale, translation }))
+    }
+
+    /// Reads a sensor: intrinsics at an identity pose, and the lens.
+    fn sensor(&self, sensor: Node<'a, 'a>) -> Result<(Camera, Lens)> {
+        let place = format!("{}, sensor {}", self.line(sensor), sensor.attribute("id").unwrap_or_default());
+        let mut calibrations = sensor.children().filter(|child| child.has_tag_name("calibration"));
+        let first = calibrations.clone().next();
+        let calibration = calibrations.find(|child| child.attribute("class") == Some("adjusted")).or(first);
+        let resolution = calibration.and_then(|node| child(node, "resolution")).or(child(sensor, "resolution"));
+        let Some(resolution) = resolution else {
+            return self.refuse(sensor, "the sensor has no `resolution`; export the cameras of aligned photos");
+        };
+        let pixels = |name: &str| {
+            let value = resolution.attribute(name).and_then(|text| text.parse().ok()).unwrap_or(f64::NAN);
+            side(self.path, &place, value)
+        };
+        let (width, height) = (pixels("width")?, pixels("height")?);
+        let (w, h) = (f64::from(width), f64::from(height));
+        let (rotation, translation) = (DMat3::IDENTITY, DVec3::ZERO);
+        let kind = sensor.attribute("type").unwrap_or("frame");
+        if kind == "spherical" {
+            let f = w / (2.0 * PI);
+            let (cx, cy) = (w / 2.0, h / 2.0);
+            let camera = Camera { rotation, translation, fx: f, fy: f, cx, cy, width, height };
+            return Ok((camera, Lens::Equirectangular));
+        }
+        let Some(calibration) = calibration else {
+            return self.refuse(sensor, "the sensor has no `calibration`; export the cameras of aligned photos");
+        };
+        let value = |name: &str| self.number(calibration, name);
+        let f = value("f")?;
+        let (fx, cx, cy) = (f + value("b1")?, w / 2.0 + value("cx")?, h / 2.0 + value("cy")?);
+        let radial = [value("k1")?, value("k2")?, value("k3")?, value("k4")?];
+        let (tangential, skew) = ([value("p2")?, value("p1")?], value("b2")? / fx);
+        let lens = match kind {
+            "frame" => Polynomial { numerator: radial, tangential, skew, ..Polynomial::default() }.into(),
+            "fisheye" => Lens::Fisheye(Fisheye { radial, tangential, skew, ..Fisheye::default() }),
+            other => {
+                let problem =
+                    format!("a sensor of type {other} is not supported; expected frame, fisheye or spherical");
+                return Err(Error::data(self.path, place, problem));
+            }
+        };
+        Ok((Camera { rotation, translation, fx, fy: f, cx, cy, width, height }, lens))
+    }
+}

@@ -1,0 +1,216 @@
+//! Poses of LLFF and Metashape, and the dialects of `transforms.json`.
+
+use super::fixtures::*;
+use glam::{DVec2, DVec3};
+use labelgs::internals::io;
+use labelgs::internals::io::window::windows;
+use labelgs::io::LoadOptions;
+use labelgs::scene::{Camera, Dataset};
+use std::path::Path;
+
+fn open(scene: &Path) -> labelgs::Result<Dataset> {
+    io::open(scene, &LoadOptions { test_every: None, ..LoadOptions::default() })
+}
+
+/// A camera at (1, 2, 3) that looks along x of the world, with y of the world up.
+fn check_pose(camera: &Camera) {
+    assert!(camera.centre().distance(DVec3::new(1.0, 2.0, 3.0)) < 1e-12, "{:?}", camera.centre());
+    assert!(camera.to_camera(DVec3::new(5.0, 2.0, 3.0)).distance(DVec3::new(0.0, 0.0, 4.0)) < 1e-12);
+    assert!(camera.to_camera(DVec3::new(1.0, 3.0, 3.0)).distance(DVec3::new(0.0, -1.0, 0.0)) < 1e-12);
+    assert!(camera.to_camera(DVec3::new(1.0, 2.0, 4.0)).distance(DVec3::new(1.0, 0.0, 0.0)) < 1e-12);
+}
+
+fn npy(shape: &str, values: &[f64]) -> Vec<u8> {
+    let header = format!("{{'descr': '<f8', 'fortran_order': False, 'shape': {shape}, }}\n");
+    let mut bytes = [b"\x93NUMPY\x01\x00".as_slice(), &(header.len() as u16).to_le_bytes(), header.as_bytes()].concat();
+    values.iter().for_each(|value| bytes.extend(value.to_le_bytes()));
+    bytes
+}
+
+/// Down, right, backwards, centre, and height, width, focal length as columns; then two depths.
+const LLFF: [f64; 17] = [0.0, 0.0, -1.0, 1.0, 8.0, -1.0, 0.0, 0.0, 2.0, 12.0, 0.0, 1.0, 0.0, 3.0, 10.0, 0.5, 90.0];
+
+fn llff(bytes: &[u8], photos: usize) -> Scene {
+    let scene = Scene::new();
+    scene.write("poses_bounds.npy", bytes);
+    (0..photos).for_each(|index| scene.photo(&format!("images/{index}.png"), 12, 8));
+    scene
+}
+
+#[test]
+fn poses_of_llff_turn_to_opencv() {
+    let mut second = LLFF;
+    second[3] = 7.0;
+    let scene = llff(&npy("(2, 17)", &[LLFF, second].concat()), 2);
+    scene.write("images/notes.txt", "no photo");
+    for place in [scene.path().to_owned(), scene.path().join("poses_bounds.npy")] {
+        let dataset = open(&place).expect("a scene");
+        let names: Vec<&str> = dataset.train.iter().map(|view| view.name.as_str()).collect();
+        assert_eq!(names, ["0.png", "1.png"]);
+        let camera = &dataset.train[0].camera;
+        check_pose(camera);
+        assert_eq!((camera.fx, camera.fy, camera.cx, camera.cy), (10.0, 10.0, 6.0, 4.0));
+        assert!((dataset.train[1].camera.centre().x - 7.0).abs() < 1e-12);
+    }
+}
+
+#[test]
+fn broken_poses_of_llff_name_the_row() {
+    let broken = |bytes: &[u8], photos: usize| refusal(open(llff(bytes, photos).path()));
+    let row = |at: usize, value: f64| {
+        let mut row = LLFF;
+        row[at] = value;
+        npy("(1, 17)", &row)
+    };
+    assert!(broken(&npy("(1, 17)", &LLFF), 3).contains("poses of 1 photos, and `images` holds 3"));
+    assert!(broken(&npy("(1, 15)", &LLFF[..15]), 1).contains("(photos, 17)"));
+    assert!(broken(&npy("(17,)", &LLFF), 1).contains("(photos, 17)"));
+    assert!(broken(&npy("(1, 17)", &LLFF[..16]), 1).contains("136 bytes"));
+    assert!(broken(&npy("(0, 17)", &[]), 1).contains("0 x 17"));
+    assert!(broken(&npy("(99999999999, 99999999999)", &LLFF), 1).contains("99999999999"));
+    assert!(broken(b"text", 1).contains("numpy"));
+    assert!(broken(&row(1, 1.0), 1).contains("row 0 (`0.png`)"));
+    assert!(broken(&row(0, f64::NAN), 1).contains("down, right and backwards"));
+    assert!(broken(&row(4, 8.5), 1).contains("8.5"));
+    assert!(broken(&row(14, 0.0), 1).contains("focal lengths"));
+    assert!(broken(&row(3, f64::INFINITY), 1).contains("finite"));
+    let scene = Scene::new();
+    scene.write("poses_bounds.npy", npy("(1, 17)", &LLFF));
+    assert!(refusal(open(scene.path())).contains("no such folder"));
+}
+
+const SENSOR: &str = r#"<sensor id="0" type="frame"><resolution width="12" height="8"/>
+<calibration class="initial"><resolution width="12" height="8"/><f>99</f></calibration>
+<calibration type="frame" class="adjusted"><resolution width="12" height="8"/>
+<f>10</f><cx>0.5</cx><cy>-0.25</cy><b1>0.5</b1><b2>0.2</b2><k1>0.1</k1><k2>0.01</k2><k3>0.001</k3><p1>0.002</p1><p2>-0.003</p2>
+</calibration></sensor>"#;
+/// The pose of [`check_pose`] in a chunk that is half as large, and moved by (0, 0, 1).
+const POSE: &str = "0 0 1 0.5  0 -1 0 1  1 0 0 1  0 0 0 1";
+const CHUNK: &str =
+    "<transform><rotation>1 0 0 0 1 0 0 0 1</rotation><translation>0 0 1</translation><scale>2</scale></transform>";
+
+fn metashape(sensor: &str, cameras: &str, more: &str) -> Scene {
+    let scene = Scene::new();
+    ["a.png", "b.png"].iter().for_each(|name| scene.photo(&format!("images/{name}"), 12, 8));
+    let text = format!(
+        r#"<?xml version="1.0" encoding="UTF-8"?>
+<document version="2.0.0"><chunk label="Chunk 1" enabled="true"><sensors>{sensor}</sensors>
+{more}<cameras>{cameras}</cameras></chunk></document>"#
+    );
+    scene.write("cameras.xml", text);
+    scene
+}
+
+fn of_camera(label: &str, transform: &str) -> String {
+    format!(
+        r#"<camera id="0" sensor_id="0" component_id="0" label="{label}"><transform>{transform}</transform></camera>"#
+    )
+}
+
+#[test]
+fn cameras_of_metashape_are_read_with_their_lens() {
+    let group = format!(r#"<group id="0">{}</group>"#, of_camera("b.png", POSE));
+    let odd = r#"<camera id="7" sensor_id="0" label="c"/><camera id="8" sensor_id="0" label="d" enabled="false"/>"#;
+    let component = format!(r#"<components><component id="0">{CHUNK}</component></components>"#);
+    for more in [CHUNK, &component] {
+        let scene = metashape(SENSOR, &[&of_camera("a", POSE), &group, odd].concat(), more);
+        for place in [scene.path().to_owned(), scene.path().join("cameras.xml")] {
+            let dataset = open(&place).expect("a scene");
+            let names: Vec<&str> = dataset.train.iter().map(|view| view.name.as_str()).collect();
+            assert_eq!(names, ["a.png", "b.png"]);
+            assert!(dataset.notes.iter().any(|note| note.contains("2 cameras")), "{:?}", dataset.notes);
+            let camera = &dataset.train[0].camera;
+            check_pose(camera);
+            assert_eq!((camera.fx, camera.fy, camera.cx, camera.cy), (10.5, 10.0, 6.5, 3.75));
+        }
+        // The formulas of Metashape's manual, at (0.3, -0.2, 1).
+        let (x, y, r2) = (0.3, -0.2, 0.13_f64);
+        let radial = 1.0 + 0.1 * r2 + 0.01 * r2 * r2 + 0.001 * r2.powi(3);
+        let bent_x = x * radial + 0.002 * (r2 + 2.0 * x * x) + 2.0 * -0.003 * x * y;
+        let bent_y = y * radial + -0.003 * (r2 + 2.0 * y * y) + 2.0 * 0.002 * x * y;
+        let expected = DVec2::new(6.0 + 0.5 + bent_x * 10.0 + bent_x * 0.5 + bent_y * 0.2, 4.0 - 0.25 + bent_y * 10.0);
+        let found = windows(scene.path()).expect("windows")["a.png"].optics.pixel(DVec3::new(x, y, 1.0)).expect("seen");
+        assert!(found.distance(expected) < 1e-12, "{found} {expected}");
+    }
+}
+
+#[test]
+fn metashape_has_fisheyes_and_panoramas() {
+    let fisheye = SENSOR.replace("type=\"frame\"", "type=\"fisheye\"");
+    let scene = metashape(&fisheye, &of_camera("a", POSE), "");
+    assert_eq!(open(scene.path()).expect("a scene").train.len(), 1);
+    let (x, y) = (0.3_f64, -0.2);
+    let factor = x.hypot(y).atan() / x.hypot(y);
+    let at = DVec2::new(x, y) * factor;
+    let a2 = at.length_squared();
+    let radial = 1.0 + 0.1 * a2 + 0.01 * a2 * a2 + 0.001 * a2.powi(3);
+    let bent = at.y * radial - 0.003 * (a2 + 2.0 * at.y * at.y) + 2.0 * 0.002 * at.x * at.y;
+    let found = windows(scene.path()).expect("windows")["a.png"].optics.pixel(DVec3::new(x, y, 1.0)).expect("seen");
+    assert!((found.y - (3.75 + bent * 10.0)).abs() < 1e-12, "{found}");
+    let spherical = r#"<sensor id="0" type="spherical"><resolution width="12" height="8"/></sensor>"#;
+    let dataset = open(metashape(spherical, &of_camera("a", POSE), "").path()).expect("a scene");
+    assert_eq!(dataset.train.len(), 6);
+}
+
+#[test]
+fn broken_xml_names_the_line() {
+    let one = |sensor: &str, camera: &str| refusal(open(metashape(sensor, camera, "").path()));
+    let good = of_camera("a", POSE);
+    assert!(one("<sensor>", &good).contains("line"));
+    assert!(one("", &good).contains("line 3, camera `a`"));
+    assert!(one(&SENSOR.replace("frame", "rpc"), &good).contains("type rpc"));
+    assert!(one(&SENSOR.replace("<f>10</f>", "<f>ten</f>"), &good).contains("`f` holds no 1 finite number"));
+    assert!(one(&SENSOR.replace("<f>10</f>", ""), &good).contains("focal lengths"));
+    assert!(one(&SENSOR.replace("width=\"12\"", "width=\"x\""), &good).contains("image side"));
+    assert!(one(&SENSOR.replace("<k1>0.1", "<k1>1e999"), &good).contains("finite"));
+    assert!(one(r#"<sensor id="0"/>"#, &good).contains("resolution"));
+    assert!(one(SENSOR, &of_camera("a", "1 2 3")).contains("16 finite numbers"));
+    assert!(one(SENSOR, &of_camera("a", "0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 1")).contains("no rotation"));
+    assert!(one(SENSOR, &of_camera("../a", POSE)).contains("outside"));
+    assert!(one(SENSOR, &[good.clone(), good.clone()].concat()).contains("label too"));
+    assert!(one(SENSOR, "").contains("lists no photo"));
+    let of_text = |text: &str| {
+        let scene = Scene::new();
+        scene.write("x.xml", text);
+        refusal(open(scene.path()))
+    };
+    assert!(of_text("<a/>").contains("`chunk`"));
+    assert!(of_text("").contains("Metashape"));
+    let bomb = r#"<!DOCTYPE a [<!ENTITY a "aaaaaaaaaa"><!ENTITY b "&a;&a;&a;&a;&a;&a;&a;&a;">]><a>&b;</a>"#;
+    assert!(of_text(bomb).contains("line"), "{}", of_text(bomb));
+    assert!(of_text(&"<a>".repeat(100_000)).contains("line"));
+    let two = metashape(SENSOR, &good, "");
+    two.write("other.xml", "<a/>");
+    assert!(refusal(open(two.path())).contains("beside"));
+}
+
+/// The fields that the apps write, of which ours are those that we know.
+#[test]
+fn transforms_of_phones_are_read() {
+    let pose = "[[0,0,-1,1],[0,1,0,2],[1,0,0,3],[0,0,0,1]]";
+    let polycam = format!(
+        r#"{{"camera_model": "OPENCV", "ply_file_path": "sparse_pc.ply", "frames": [{{"file_path": "./images/a.png",
+        "depth_file_path": "./depth/a.png", "mask_path": null, "fl_x": 10.5, "fl_y": 10, "cx": 6.5, "cy": 4, "w": 12, "h": 8,
+        "blur_score": 33.1, "transform_matrix": {pose}}}]}}"#
+    );
+    let record3d = format!(
+        r#"{{"fl_x": 10.5, "fl_y": 10.0, "cx": 6.5, "cy": 4.0, "w": 12.0, "h": 8.0, "aabb_scale": 4, "scale": 0.5,
+        "camera_angle_x": 1.03, "camera_angle_y": 0.76, "enable_depth_loading": true, "integer_depth_scale": 0.001,
+        "frames": [{{"file_path": "images/a", "depth_path": "depth/a.png", "transform_matrix": {pose}}}]}}"#
+    );
+    let luma = format!(
+        r#"{{"camera_angle_x": 1.03, "fl_x": 10.5, "fl_y": 10, "cx": 6.5, "cy": 4, "w": 12, "h": 8, "k1": 0, "k2": 0.0,
+        "p1": 0, "p2": 0, "is_fisheye": false, "aabb": [[-1,-1,-1],[1,1,1]], "offset": [0.5, 0.5, 0.5], "n_extra": null,
+        "frames": [{{"file_path": "images/a.png", "sharpness": 20.0, "transform_matrix": {pose}}}]}}"#
+    );
+    for (text, missing) in [(polycam, true), (record3d, false), (luma, false)] {
+        let scene = Scene::new();
+        scene.photo("images/a.png", 12, 8);
+        scene.write("transforms.json", &text);
+        let dataset = open(scene.path()).unwrap_or_else(|error| panic!("{error}\n{text}"));
+        let view = &dataset.train[0];
+        check_pose(&view.camera);
+        assert_eq!((view.name.as_str(), view.camera.fx, view.camera.fy, view.camera.cx), ("a.png", 10.5, 10.0, 6.5));
+        assert_eq!(dataset.notes.iter().any(|note| note.contains("ply_file_path")), missing);
+    }
+}
