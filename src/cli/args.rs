@@ -5,7 +5,7 @@ use crate::Result;
 use crate::io::{LoadOptions, ReadOptions};
 use crate::run::Settings;
 use clap::Args;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Flags of every command.
 #[derive(Args, Clone, Debug, Default)]
@@ -61,6 +61,9 @@ pub struct SceneArgs {
     /// run.
     #[arg(long, value_name = "PX", value_parser = clap::value_parser!(u32).range(1..), help_heading = "Scene")]
     pub max_resolution: Option<u32>,
+    /// Folder of pictures named as masks: pixels above 0 are left out of votes and scores.
+    #[arg(long, value_name = "DIR", help_heading = "Scene")]
+    pub ignore: Option<PathBuf>,
     /// Tolerance.
     #[command(flatten)]
     pub read: ReadArgs,

@@ -48,7 +48,8 @@ pub(crate) fn open_scene(
 ) -> Result<Dataset> {
     let test_every = Some(reading.test_every()).filter(|&every| every > 0);
     let (max_resolution, base) = (reading.max_resolution, LoadOptions::default());
-    let options = LoadOptions { masks, max_resolution, test_every, background, photos, ..base };
+    let ignore = reading.ignore.clone();
+    let options = LoadOptions { masks, ignore, max_resolution, test_every, background, photos, ..base };
     io::open_logged(path, &reading.read.into_options(options))
 }
 

@@ -59,6 +59,9 @@ pub struct TrainFlags {
     /// run. All bands of colour and the full size of the photos count from the first step.
     #[arg(long, value_name = "MODEL", help_heading = "Training")]
     pub init: Option<PathBuf>,
+    /// Folder of pictures named as masks: pixels above 0 are left out of the loss and of votes.
+    #[arg(long, value_name = "DIR", help_heading = "Scene")]
+    pub ignore: Option<PathBuf>,
     /// Settings in TOML, such as config.toml of an earlier run. Flags override them.
     #[arg(long, value_name = "FILE.toml", help_heading = "Training")]
     pub config: Option<PathBuf>,
@@ -132,6 +135,7 @@ impl TrainFlags {
         }
         let inputs = Inputs {
             masks,
+            ignore: self.ignore.clone(),
             memory_limit: self.memory_limit,
             max_bad_photos: self.trust.max_bad_photos,
             allow_outside: self.trust.allow_outside,

@@ -21,8 +21,14 @@ pub(crate) fn load(root: &Path, mut listing: Listing, options: &LoadOptions) -> 
     let test = split(&views, options.test_every, &mut notes)?;
     let masks = options.masks.as_deref().map(|folder| MaskFolder::new(folder, views.iter().map(|v| v.name.as_str())));
     let masks = masks.transpose()?;
+    let ignore = options.ignore.as_deref().map(|folder| MaskFolder::new(folder, views.iter().map(|v| v.name.as_str())));
+    let ignore = ignore.transpose()?;
+    if let Some(ignore) = ignore.as_ref().filter(|ignore| views.iter().all(|view| ignore.find(&view.name).is_none())) {
+        return Err(ignore.nothing_found(&views[0].name));
+    }
     let resampled = AtomicUsize::new(0);
-    let read = |view| Ok(load_views(view, decode(view, options)?, options, masks.as_ref(), &resampled));
+    let folders = (masks.as_ref(), ignore.as_ref());
+    let read = |view| Ok(load_views(view, decode(view, options)?, options, folders, &resampled));
     let read: Vec<Result<Result<Vec<View>>>> = views.par_iter().map(read).collect();
     let mut undecodable = std::mem::take(&mut listing.bad);
     let total = views.len() + undecodable.len();
@@ -171,9 +177,9 @@ fn decode(listed: &Listed, options: &LoadOptions) -> Result<Decoded> {
 /// Makes the views of a photo, one or several.
 fn load_views(
     listed: &Listed,
-    (stored, photo): Decoded,
+    (stored, mut photo): Decoded,
     options: &LoadOptions,
-    masks: Option<&MaskFolder>,
+    (masks, ignore): (Option<&MaskFolder>, Option<&MaskFolder>),
     resampled: &AtomicUsize,
 ) -> Result<Vec<View>> {
     let original = at_size(listed, stored)?;
@@ -181,6 +187,9 @@ fn load_views(
         Some(path) => Some(load_mask(&path, (original.width, original.height), resampled)?),
         None => None,
     };
+    if let (Some(path), Some(photo)) = (ignore.and_then(|ignore| ignore.find(&listed.name)), &mut photo) {
+        leave_out(photo, &load_mask(&path, (original.width, original.height), resampled)?);
+    }
     let windows = match options.undistort {
         true => Window::all(&listed.name, &original, &listed.lens),
         false => vec![Window::stored(&listed.name, &original)],
@@ -198,6 +207,20 @@ fn load_views(
         }
     };
     Ok(windows.into_iter().map(view).collect())
+}
+
+/// Takes the weight of the pixels where `ignored`, of any scale, is not 0.
+fn leave_out(photo: &mut Photo, ignored: &LabelMap) {
+    let nearest = |at: u32, side: u32, from: u32| {
+        (((f64::from(at) + 0.5) * f64::from(from) / f64::from(side)) as u32).min(from - 1)
+    };
+    let (width, height) = (photo.width, photo.height);
+    for (at, texel) in (0..).zip(&mut photo.rgba) {
+        let (x, y) = (at % width, at / width);
+        if ignored.at(nearest(x, width, ignored.width), nearest(y, height, ignored.height)) != 0 {
+            *texel = [0; 4];
+        }
+    }
 }
 
 const NO_WINDOW: &str = "the lens of its camera shows nothing of the photo; check focal lengths and coefficients";

@@ -65,6 +65,9 @@ pub use read_options::ReadOptions;
 pub struct LoadOptions {
     /// Folder of id masks; without it no masks are read.
     pub masks: Option<PathBuf>,
+    /// Folder of pictures named as masks, whose pixels above 0 leave the photo out: of the loss, of votes, of scores. A
+    /// photo without a picture counts as a whole.
+    pub ignore: Option<PathBuf>,
     /// Limit on the longest side of photos, px.
     pub max_resolution: Option<u32>,
     /// Every N-th view by name is held out, starting with the first; `None` holds out nothing. A scene with its own
@@ -90,6 +93,7 @@ impl Default for LoadOptions {
     fn default() -> Self {
         Self {
             masks: None,
+            ignore: None,
             max_resolution: None,
             test_every: Some(8),
             background: [0.0; 3],

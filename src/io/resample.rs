@@ -41,7 +41,8 @@ pub(crate) fn undistort_photo(photo: &Photo, view: &Window) -> Photo {
     Photo { width, height, rgba }
 }
 
-/// Interpolates between the four nearest pixel centres. The colours at the border continue outwards by half a pixel.
+/// Interpolates between the four nearest pixel centres; without weight where one of them is. The colours at the border
+/// continue outwards by half a pixel.
 fn bilinear(photo: &Photo, at: DVec2) -> [u8; 4] {
     let split = |value: f64, side: u32| {
         let value = (value - 0.5).clamp(0.0, f64::from(side - 1));
@@ -51,6 +52,9 @@ fn bilinear(photo: &Photo, at: DVec2) -> [u8; 4] {
     let ((x0, x1, fx), (y0, y1, fy)) = (split(at.x, photo.width), split(at.y, photo.height));
     let texel = |x: u32, y: u32| photo.rgba[y as usize * photo.width as usize + x as usize];
     let (a, b, c, d) = (texel(x0, y0), texel(x1, y0), texel(x0, y1), texel(x1, y1));
+    if [a, b, c, d].iter().any(|texel| texel[3] != 255) {
+        return [0; 4];
+    }
     let mut colour = [255u8; 4];
     for channel in 0..3 {
         let [a, b, c, d] = [a, b, c, d].map(|texel| f64::from(texel[channel]));

@@ -64,6 +64,9 @@ pub enum Start<'a> {
 pub struct Inputs {
     /// Folder of id masks, one per view by name. Without it the model has no labels.
     pub masks: Option<PathBuf>,
+    /// Folder of pictures, named as masks, whose pixels above 0 leave the photo out. See [`crate::io::LoadOptions::ignore`].
+    #[serde(default)]
+    pub ignore: Option<PathBuf>,
     /// Limit on the device memory, bytes.
     pub memory_limit: Option<u64>,
     /// Largest share of damaged photos that is accepted, 0 to 1.

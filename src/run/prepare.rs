@@ -66,6 +66,7 @@ pub(super) fn prepare(request: &Request, is_again: bool) -> Result<Prepared> {
     let models = Models::new(out, resumed.as_ref().map_or(0, |resumed| resumed.state.step))?;
     let mut inputs = resumed.as_ref().map_or(request.inputs.clone(), |resumed| resumed.record.inputs.clone());
     inputs.masks = request.inputs.masks.clone().or(inputs.masks);
+    inputs.ignore = request.inputs.ignore.clone().or(inputs.ignore);
     let names = inputs.masks.as_deref().map(LabelTable::of_folder).transpose()?.flatten();
     let dataset = read_scene(request, &settings, &inputs)?;
     let table = if resumed.is_none() { occluders::table(request, &dataset)? } else { None };
@@ -94,6 +95,7 @@ fn clear(out: &Path, settings: &Settings) -> Result<()> {
 
 fn read_scene(request: &Request, settings: &Settings, inputs: &Inputs) -> Result<Dataset> {
     let mut options = settings.load_options(inputs.masks.clone());
+    options.ignore = inputs.ignore.clone();
     options.max_bad_photos = inputs.max_bad_photos.unwrap_or(options.max_bad_photos);
     options.allow_outside = inputs.allow_outside;
     let dataset = io::open_logged(&request.scene, &options)?;
@@ -124,7 +126,11 @@ pub(super) fn begin<'a>(
     let before = resumed.as_ref().and_then(|resumed| resumed.record.occlusion.clone());
     let occlusion = before.or(table.as_ref().map(|table| table.kind.clone()));
     let record = Record {
-        inputs: Inputs { masks: recorded(inputs.masks.as_deref()), ..inputs.clone() },
+        inputs: Inputs {
+            masks: recorded(inputs.masks.as_deref()),
+            ignore: recorded(inputs.ignore.as_deref()),
+            ..inputs.clone()
+        },
         occlusion: occlusion.clone(),
         read: settings.read.clone(),
         run: settings.run.clone(),

@@ -123,6 +123,9 @@ fn merge(then: &mut Inputs, now: &Inputs) {
     if let Some(masks) = &now.masks {
         then.masks = Some(absolute(masks));
     }
+    if let Some(ignore) = &now.ignore {
+        then.ignore = Some(absolute(ignore));
+    }
     then.max_bad_photos = now.max_bad_photos.or(then.max_bad_photos);
     then.allow_outside |= now.allow_outside;
 }

@@ -115,3 +115,36 @@ fn ids_shrink_with_the_photo() {
     // The pixel under the centre of each target pixel: 1.5, 4.5, 7.5 and 10.5 px from the left.
     assert_eq!(mask.ids[..4], [1, 4, 7, 10]);
 }
+
+#[test]
+fn ignored_pixels_have_no_weight() {
+    let scene = simple(2);
+    let half: Vec<u8> = (0..6 * 4).map(|index| u8::from(index % 6 < 3) * 7).collect();
+    png(&scene.at("ignore/00.png"), (6, 4), png::ColorType::Grayscale, png::BitDepth::Eight, &half);
+    let open = |scene: &Scene| {
+        let ignore = Some(scene.path().join("ignore"));
+        io::open(scene.path(), &LoadOptions { ignore, test_every: None, ..LoadOptions::default() })
+    };
+    let dataset = open(&scene).expect("a scene");
+    let alphas = |view: usize| {
+        let photo = dataset.train[view].photo.as_ref().expect("a photo");
+        photo.rgba.iter().map(|texel| texel[3]).collect::<Vec<u8>>()
+    };
+    assert!(alphas(0).iter().enumerate().all(|(at, &alpha)| alpha == if at % 12 < 6 { 0 } else { 255 }));
+    assert!(alphas(1).iter().all(|&alpha| alpha == 255), "a photo without a picture counts as a whole");
+    // The same through a lens: no colour of an ignored pixel is mixed in.
+    let fisheye = ColmapCamera { model: 15, name: "FISHEYE", size: (12, 8), parameters: vec![10.0, 10.0, 6.0, 4.0] };
+    scene.colmap_bin("sparse/0", &[fisheye], &["00.png", "01.png"]);
+    let bent = open(&scene).expect("a scene");
+    let photo = bent.train[0].photo.as_ref().expect("a photo");
+    let left = photo.rgba.iter().enumerate().filter(|(at, _)| (at % photo.width as usize) < photo.width as usize / 2);
+    assert!(left.into_iter().all(|(_, texel)| *texel == [0; 4]) && photo.rgba.iter().any(|texel| texel[3] == 255));
+    png(&scene.at("ignore/00.png"), (6, 5), png::ColorType::Grayscale, png::BitDepth::Eight, &[0; 30]);
+    assert!(refusal(open(&scene)).contains("no scale explains"));
+    fs::write(scene.at("ignore/00.png"), b"text").expect("written");
+    assert!(refusal(open(&scene)).contains("PNG"));
+    fs::remove_file(scene.at("ignore/00.png")).expect("removed");
+    assert!(refusal(open(&scene)).contains("expected for example 00.png"));
+    fs::remove_dir(scene.at("ignore")).expect("removed");
+    assert!(refusal(open(&scene)).contains("no such folder"));
+}
