@@ -3,7 +3,8 @@
 use super::LoadOptions;
 use super::bad_photos::{self, LISTED_MAX};
 use super::image::{check_size, photo_size, read_photo};
-use super::listing::{Listed, Listing};
+use super::lens::Lens;
+use super::listing::{Listed, Listing, check_camera};
 use super::mask::{MaskFolder, read_checked};
 use super::resample::{bounded_size, resample_ids, same_aspect, shrink_photo, undistort_photo};
 use super::window::Window;
@@ -194,8 +195,13 @@ fn load_views(
         true => Window::all(&listed.name, &original, &listed.lens),
         false => vec![Window::stored(&listed.name, &original)],
     };
+    let photo_path = listed.photo.as_deref().unwrap_or(Path::new(&listed.name));
     if windows.is_empty() {
-        return Err(Error::data(listed.photo.as_deref().unwrap_or(Path::new(&listed.name)), "", NO_WINDOW));
+        return Err(Error::data(photo_path, "", NO_WINDOW));
+    }
+    // A lens of odd coefficients may have no scale at its axis.
+    for window in windows.iter().filter(|window| !window.is_photo()) {
+        check_camera(photo_path, &format!("view {}", window.name), &window.camera, &Lens::Pinhole)?;
     }
     let view = |window: Window| {
         let size = bounded_size((window.camera.width, window.camera.height), options.max_resolution);

@@ -214,13 +214,15 @@ fn fitted(optics: &Optics, edges: [f64; 4]) -> Camera {
     let pixels = PIXELS * f64::from(photo.width) * f64::from(photo.height);
     let scale = scale * (pixels / (size * scale).element_product()).sqrt().min(1.0);
     let side = |side: f64| (side.round() as u32).max(1);
+    let (width, height) = (side(size.x * scale.x), side(size.y * scale.y));
     Camera {
         fx: scale.x,
         fy: scale.y,
-        cx: scale.x * tangents[0],
-        cy: scale.y * tangents[1],
-        width: side(size.x * scale.x),
-        height: side(size.y * scale.y),
+        // Rounding may make the picture smaller than its left or upper part.
+        cx: (scale.x * tangents[0]).min(f64::from(width)),
+        cy: (scale.y * tangents[1]).min(f64::from(height)),
+        width,
+        height,
         ..photo.clone()
     }
 }

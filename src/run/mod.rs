@@ -77,7 +77,7 @@ pub struct Inputs {
 
 /// The description of a run.
 pub struct Request<'a> {
-    /// Folder of the scene (COLMAP or `transforms.json`), or one `.json` file.
+    /// Folder or file of the scene, see [`crate::io::open`].
     pub scene: PathBuf,
     /// Folder of the run.
     pub output: PathBuf,

@@ -139,7 +139,7 @@ fn ignored_pixels_have_no_weight() {
     let photo = bent.train[0].photo.as_ref().expect("a photo");
     let left = photo.rgba.iter().enumerate().filter(|(at, _)| (at % photo.width as usize) < photo.width as usize / 2);
     assert!(left.into_iter().all(|(_, texel)| *texel == [0; 4]) && photo.rgba.iter().any(|texel| texel[3] == 255));
-    png(&scene.at("ignore/00.png"), (6, 5), png::ColorType::Grayscale, png::BitDepth::Eight, &[0; 30]);
+    png(&scene.at("ignore/00.png"), (6, 8), png::ColorType::Grayscale, png::BitDepth::Eight, &[0; 48]);
     assert!(refusal(open(&scene)).contains("no scale explains"));
     fs::write(scene.at("ignore/00.png"), b"text").expect("written");
     assert!(refusal(open(&scene)).contains("PNG"));
