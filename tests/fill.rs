@@ -111,7 +111,8 @@ const CELL: f64 = FAR / FOCAL;
 
 #[test]
 fn a_missing_disc_is_closed_in_the_colours_around_it() {
-    let (Filled { model, added }, rest) = filled(Under::Hidden);
+    let (Filled { model, added, hidden }, rest) = filled(Under::Hidden);
+    assert_eq!(hidden, 0);
     model.check().expect("all columns have the same length");
     let new: Vec<usize> = (rest..model.len()).collect();
     assert_eq!(added.into_iter().collect::<Vec<_>>(), [(0, new.len() as u64)]);
@@ -152,6 +153,32 @@ fn nothing_covers_what_a_view_saw() {
     assert!(new.len() > 100, "{} Gaussians in the half that nobody saw", new.len());
     for place in new {
         assert!(place.x < CELL, "{place} covers the pit that every view saw");
+    }
+}
+
+/// Small Gaussians and a large one under the dome: the dome hides the small ones, and the rim of the large one is seen.
+#[test]
+fn what_the_object_hid_goes_with_it() {
+    let mut model = model(DVec3::ZERO);
+    let rest = labelgs::edit::remove(&model, &[1]).expect("rest").len();
+    let places = [(0.1, 0.0, 0.02), (-0.2, 0.05, 0.02), (0.0, 0.0, 0.01)];
+    for (place, size) in places.into_iter().zip([-5.0, -5.0, 0.0]) {
+        model.means.push([place.0, place.1, place.2]);
+        model.quats.push([1.0, 0.0, 0.0, 0.0]);
+        model.scales.push([size; 3]);
+        model.opacities.push(3.0);
+        model.sh0.push([0.0; 3]);
+        model.sh_rest.extend([[0.0; 3]; 3]);
+        model.labels.as_mut().expect("labels").push(0);
+        model.label_confidence.as_mut().expect("shares").push(0.9);
+    }
+    for (under, hidden) in [(Under::Hidden, 2), (Under::Pit, 1)] {
+        let sights: Vec<Sight> = cameras().into_iter().map(|camera| sight(camera, under)).collect();
+        let filled = fill(&model, &[1], &sights).expect("filled");
+        assert_eq!(filled.hidden, hidden, "a pit shows what is above it");
+        let kept = (0..filled.model.len()).filter(|&row| filled.model.scales[row] == [-5.0; 3]).count();
+        assert_eq!(kept as u64, 2 - hidden);
+        assert_eq!(filled.model.len() as u64 - filled.added.values().sum::<u64>(), (rest + 3) as u64 - hidden);
     }
 }
 

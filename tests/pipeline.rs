@@ -91,7 +91,10 @@ fn photos_become_an_object_without_masks_by_hand() {
     assert!(text(&output.stdout).contains("12/12"), "{}", text(&output.stdout));
     labelgs(folder, "train scene --iterations 100 -o plain");
     labelgs(folder, "masks repair segmented --per-view --model plain --scene scene -o masks");
-    labelgs(folder, "label plain --scene scene --masks masks -o labelled.ply");
+    labelgs(folder, "label plain --scene scene --masks masks -o two.ply");
+    labelgs(folder, "label plain --scene scene --masks segmented --per-view -o labelled.ply");
+    let [two, one] = ["two.ply", "labelled.ply"].map(|name| std::fs::read(folder.join(name)).expect("a model"));
+    assert!(two == one, "agreeing on the way gives the same labels as repaired masks");
     // Pixels of each true object, by the id that the repair gave them.
     let mut counts: BTreeMap<u16, BTreeMap<u16, u32>> = BTreeMap::new();
     let mut views = 0;

@@ -3,21 +3,25 @@
 use super::args::{JsonFlag, SceneArgs};
 use super::context::{Context, open_model};
 use super::log::Progress;
+use super::masks::repair::table;
 use super::output::WriteArgs;
 use super::scene::{near_plane, open_gpu, open_scene};
 use super::stdout;
 use super::values::{near, switch};
 use crate::edit::select::summarise;
+use crate::gpu::Gpu;
 use crate::io::label_table::LabelTable;
 use crate::io::model::export_model;
+use crate::label::masks::agree::{Agreement, MIN_VIEWS, agree};
 use crate::label::vote::lift::Lift;
 use crate::label::vote::model::{Counting, columns_of, label_by_lift, label_by_votes, vote_engine};
-use crate::scene::View;
+use crate::scene::{Gaussians, View};
 use crate::train::LabelRule;
 use crate::{Error, Result};
 use clap::Args;
 use serde_json::json;
 use std::path::PathBuf;
+use std::sync::Arc;
 use std::time::Instant;
 
 /// `labelgs label`.
@@ -32,6 +36,10 @@ pub struct LabelArgs {
     /// Folder of id masks, one per view by name.
     #[arg(long, value_name = "DIR")]
     pub masks: PathBuf,
+    /// The ids of each view are its own, as from a segmenter of single photos: they are made to agree first, as by
+    /// `masks repair`.
+    #[arg(long)]
+    pub per_view: bool,
     /// File to write.
     #[arg(short, long, value_name = "OUT.ply")]
     pub output: PathBuf,
@@ -80,9 +88,9 @@ pub struct LabelArgs {
 /// Gives the Gaussians of a trained model their labels.
 pub(crate) fn run(args: &LabelArgs, context: &Context) -> Result<()> {
     let (mut model, near) = (open_model(&args.model)?, near_plane(&args.model, args.near)?);
-    let dataset = open_scene(&args.scene, &args.reading, Some(args.masks.clone()), [0.0; 3], true)?;
-    let views: Vec<&View> = dataset.train.iter().filter(|view| view.mask.is_some()).collect();
-    if views.is_empty() {
+    let mut dataset = open_scene(&args.scene, &args.reading, Some(args.masks.clone()), [0.0; 3], true)?;
+    dataset.train.retain(|view| view.mask.is_some());
+    if dataset.train.is_empty() {
         return Err(Error::data(
             &args.masks,
             "",
@@ -91,6 +99,11 @@ pub(crate) fn run(args: &LabelArgs, context: &Context) -> Result<()> {
     }
     let gpu = open_gpu(context)?;
     let start = Instant::now();
+    let names = match args.per_view {
+        true => Some(make_agree(args, near, &gpu, &model, &mut dataset.train)?),
+        false => LabelTable::of_folder(&args.masks)?,
+    };
+    let views: Vec<&View> = dataset.train.iter().collect();
     let mut engine = vote_engine(gpu, &model, &views, columns_of(&views))?;
     let mut progress = Progress::new(u64::from(args.rounds), "rounds", &context.global);
     if args.rule == LabelRule::Main {
@@ -111,7 +124,7 @@ pub(crate) fn run(args: &LabelArgs, context: &Context) -> Result<()> {
     drop(progress);
     let seconds = start.elapsed().as_secs_f64();
     let options = args.write.options(&args.model, &args.output)?;
-    export_model(&args.output, &model, LabelTable::of_folder(&args.masks)?.as_ref(), options)?;
+    export_model(&args.output, &model, names.as_ref(), options)?;
     let rows = summarise(&model);
     if context.json || args.json.json {
         return stdout::print_json(&json!({
@@ -131,4 +144,21 @@ pub(crate) fn run(args: &LabelArgs, context: &Context) -> Result<()> {
         rows.iter().filter(|row| row.label != 0).count(),
         views.len()
     ))
+}
+
+/// Replaces the masks of the views by those whose ids agree, and returns their names.
+fn make_agree(
+    args: &LabelArgs,
+    near: f32,
+    gpu: &Arc<Gpu>,
+    model: &Gaussians,
+    views: &mut [View],
+) -> Result<LabelTable> {
+    let borrowed: Vec<&View> = views.iter().collect();
+    let mut engine = vote_engine(Arc::clone(gpu), model, &borrowed, columns_of(&borrowed))?;
+    let how = Agreement { near, per_view: true, min_views: MIN_VIEWS, make_missing: false };
+    let (masks, _) = agree(&mut engine, model, &borrowed, how, &mut || ())?;
+    let names = table(&args.masks, true, &borrowed, &masks)?;
+    views.iter_mut().zip(masks).for_each(|(view, mask)| view.mask = mask.map(Arc::new));
+    Ok(names)
 }

@@ -122,8 +122,8 @@ pub(crate) fn run_remove(args: &RemoveArgs, context: &Context) -> Result<()> {
         Some(scene) => {
             let filled = filled(select, scene, &model, &listed(&labels), context)?;
             let added: u64 = filled.added.values().sum();
-            tracing::info!("filled: {added} new Gaussians");
-            (filled.model, json!({ "added": filled.added }))
+            tracing::info!("filled: {added} new Gaussians; {} that nobody saw are gone", filled.hidden);
+            (filled.model, json!({ "added": filled.added, "hidden": filled.hidden }))
         }
     };
     let edited = Edited {

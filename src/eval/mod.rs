@@ -22,6 +22,6 @@ pub use compared::{Compared, Watch};
 pub use evaluate::{AmodalTruth, Rendering, evaluate};
 pub use metrics::psnr;
 pub use regions::RegionScores;
-pub use removal::{ObjectRemoval, RemovalScores, RemovalTruth, RuleScores, removals, sights};
+pub use removal::{HoleScores, ObjectRemoval, RemovalScores, RemovalTruth, RuleScores, removals, sights};
 pub use scores::{MeanScores, ObjectScores, Scores, ViewScores};
 pub use ssim::ssim;

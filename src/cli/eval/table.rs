@@ -66,19 +66,32 @@ fn removals(scores: &Scores) -> String {
         text += "\n";
     }
     text += &format!(
-        "\n{:>10} {:>10} {:>10} {:>13} {:>13} {:>8} {:>8} {:>8}\n",
-        "object", "leftover", "paper's", "weight left", "paper's", "hole", "filled", "added"
+        "\n{:>10} {:>10} {:>10} {:>13} {:>13} {:>8} {:>8} {:>8} {:>9} {:>9} {:>9}\n",
+        "object",
+        "leftover",
+        "paper's",
+        "weight left",
+        "paper's",
+        "hole",
+        "filled",
+        "added",
+        "in holes",
+        "shadowed",
+        "ring mean"
     );
     for (name, row) in rows() {
         text += &format!(
-            "{name:>10} {:>10} {:>10} {:>13} {:>13} {:>8} {:>8} {:>8}\n",
+            "{name:>10} {:>10} {:>10} {:>13} {:>13} {:>8} {:>8} {:>8} {:>9} {:>9} {:>9}\n",
             number(row.votes.leftover, 4),
             number(row.main.leftover, 4),
             number(row.votes.leftover_weight, 4),
             number(row.main.leftover_weight, 4),
             number(row.hole, 4),
             number(row.hole_filled, 4),
-            row.added
+            row.added,
+            number(row.holes.filled, 2),
+            number(row.holes.filled_shadowed, 2),
+            number(row.holes.mean_colour, 2)
         );
     }
     text

@@ -10,7 +10,7 @@ use crate::cli::values::near;
 use crate::io::atomic;
 use crate::io::label_table::{FILE, LabelEntry, LabelTable};
 use crate::io::window::{ids_of_photo, windows};
-use crate::label::masks::agree::{Agreement, agree};
+use crate::label::masks::agree::{Agreement, MIN_VIEWS, agree};
 use crate::label::masks::names::carried;
 use crate::label::masks::repair::Repairs;
 use crate::label::vote::model::{columns_of, vote_engine};
@@ -40,7 +40,7 @@ pub struct RepairArgs {
     #[arg(long)]
     pub per_view: bool,
     /// Least number of views that show an object; objects in fewer views are left out.
-    #[arg(long, value_name = "N", default_value_t = 2)]
+    #[arg(long, value_name = "N", default_value_t = MIN_VIEWS)]
     pub min_views: usize,
     /// Make masks for photos without one.
     #[arg(long)]
@@ -95,7 +95,7 @@ pub(crate) fn run(args: &RepairArgs, context: &Context) -> Result<()> {
     };
     let (masks, repairs) = agree(&mut engine, &model, &views, how, &mut tick)?;
     drop(progress);
-    let table = table(args, &views, &masks)?;
+    let table = table(&args.masks, args.per_view, &views, &masks)?;
     // Masks belong to the photos as they are stored, whatever their lenses.
     for (file, views_of) in &photos {
         let parts = views_of.iter().filter_map(|&at| Some((windows.get(&views[at].name)?, masks[at].as_ref()?)));
@@ -112,13 +112,18 @@ fn file_of(photo: &str) -> PathBuf {
     Path::new(photo).with_extension("png")
 }
 
-/// Makes the table of the repaired masks. Where each view had ids of its own, an object gets the name of most of its
-/// pixels; else its id keeps its entry.
-fn table(args: &RepairArgs, views: &[&View], masks: &[Option<LabelMap>]) -> Result<LabelTable> {
+/// Makes the table of masks that were repaired, from that of their folder. Where each view had ids of its own, an object
+/// gets the name of most of its pixels; else its id keeps its entry.
+pub(in crate::cli) fn table(
+    folder: &Path,
+    per_view: bool,
+    views: &[&View],
+    masks: &[Option<LabelMap>],
+) -> Result<LabelTable> {
     let mut entries: BTreeMap<u16, LabelEntry> = BTreeMap::new();
-    let known = LabelTable::of_folder(&args.masks)?;
+    let known = LabelTable::of_folder(folder)?;
     let names = match &known {
-        Some(known) if args.per_view => {
+        Some(known) if per_view => {
             let pairs =
                 views.iter().zip(masks).filter_map(|(view, mask)| Some((view.mask.as_deref()?, mask.as_ref()?)));
             carried(known, pairs)
@@ -128,7 +133,7 @@ fn table(args: &RepairArgs, views: &[&View], masks: &[Option<LabelMap>]) -> Resu
     for mask in masks.iter().flatten() {
         for id in mask.objects() {
             let new = LabelEntry { name: names.get(&id).cloned(), ..LabelEntry::new(u32::from(id)) };
-            let old = known.as_ref().filter(|_| !args.per_view).and_then(|table| table.entry(u32::from(id)).cloned());
+            let old = known.as_ref().filter(|_| !per_view).and_then(|table| table.entry(u32::from(id)).cloned());
             let blank = || LabelEntry { pixels: 0, views: 0, ..old.unwrap_or(new) };
             let entry = entries.entry(id).or_insert_with(blank);
             entry.views += 1;

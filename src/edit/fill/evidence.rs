@@ -94,6 +94,24 @@ impl Evidence {
         Some((index, shown))
     }
 
+    /// Adds what a view shows at a point of space: the removed object there or before it, something else there, or something
+    /// behind it.
+    pub(super) fn add_point(&mut self, world: DVec3, cell: f64, removed: &[u32], sight: &Sight) {
+        let camera = &sight.camera;
+        let Some(pixel) = camera.sees(world) else { return };
+        let index = pixel.y as usize * camera.width as usize + pixel.x as usize;
+        let shown = f64::from(sight.depth[index]);
+        let behind = if shown > 0.0 { camera.to_camera(world).z - shown } else { f64::NEG_INFINITY };
+        let slack = DEPTH * cell;
+        if behind < -slack {
+            self.through += 1;
+        } else if removed.contains(&u32::from(sight.labels.ids[index])) {
+            self.removed += 1;
+        } else if behind <= OWN * slack {
+            self.surface += 1;
+        }
+    }
+
     /// Returns what the views show together.
     pub(super) fn state(&self) -> State {
         let other = self.surface + self.through;

@@ -1,4 +1,5 @@
-//! Closes what a removed object leaves open: its neighbours' surfaces are continued where no view ever looked.
+//! Closes what a removed object leaves open: its neighbours' surfaces are continued where no view ever looked. Gaussians
+//! that the object hid in all views go with it.
 //!
 //! The views of the whole model say what was seen: a place on a surface is *seen* if a view shows it, *free* if a view
 //! looks through it, and a *hole* if it lies at or behind the removed object in the views that tell (a tenth of them may
@@ -7,6 +8,7 @@
 //! ones, so that they cover nothing that a view has seen. Their colours continue those around them.
 
 mod evidence;
+mod hidden;
 mod plane;
 mod sheet;
 
@@ -48,8 +50,10 @@ pub struct Sight {
 /// A model in which the place of removed objects was closed.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Filled {
-    /// The rest of the model, then the new Gaussians.
+    /// The rest of the model without what the removed objects hid, then the new Gaussians.
     pub model: Gaussians,
+    /// Number of Gaussians of the rest that are left out because the objects hid them in all views.
+    pub hidden: u64,
     /// Number of new Gaussians by the label of the surface that they continue.
     pub added: BTreeMap<u32, u64>,
 }
@@ -61,13 +65,20 @@ pub fn fill(model: &Gaussians, labels: &[u32], sights: &[Sight]) -> Result<Fille
     if sights.is_empty() {
         return Err(Error::usage("fill", "needs at least one view of the scene"));
     }
-    let mut filled = Filled { model: rest, added: BTreeMap::new() };
+    let places = labels.iter().map(|&label| Place::new(model, label, sights)).collect::<Result<Vec<_>>>()?;
+    let places: Vec<Place> = places.into_iter().flatten().collect();
+    let mut is_hidden = vec![false; rest.len()];
+    for place in &places {
+        let found = place.hidden(&rest, labels, sights);
+        is_hidden.iter_mut().zip(found).for_each(|(all, one)| *all |= one);
+    }
+    let hidden = is_hidden.iter().filter(|&&hidden| hidden).count() as u64;
+    let mut filled = Filled { model: rest.filtered(|row| !is_hidden[row]), hidden, added: BTreeMap::new() };
     // Each label is an object of its own: two far from each other have no common surroundings.
-    for &label in labels {
-        let Some(place) = Place::new(model, label, sights)? else { continue };
+    for place in &places {
         for (label, points) in place.ring(labels, sights) {
             for plane in planes(&points, place.cell) {
-                let sheet = Sheet::new((plane, label), &place, labels, sights);
+                let sheet = Sheet::new((plane, label), place, labels, sights);
                 let added = sheet.holes();
                 if !added.is_empty() {
                     *filled.added.entry(label).or_default() += added.len() as u64;

@@ -79,21 +79,29 @@ impl Sheet {
         (state, colour)
     }
 
-    /// Returns positions and colours of the holes that seen surface surrounds.
+    /// Returns positions and colours of the holes that seen surface surrounds. What was closed bounds the next ones: a hole
+    /// beside another that nothing bounds is closed up to it.
     pub(super) fn holes(&self) -> Vec<(DVec3, DVec3)> {
-        let inside: Vec<usize> = (0..self.states.len())
-            .into_par_iter()
-            .filter(|&index| self.states[index] == State::Hole && self.is_bounded(index))
-            .collect();
-        if inside.is_empty() {
-            return Vec::new();
+        let mut states = self.states.clone();
+        let mut open: Vec<usize> = (0..states.len()).filter(|&index| states[index] == State::Hole).collect();
+        let mut closed = Vec::new();
+        loop {
+            let (found, left): (Vec<usize>, Vec<usize>) =
+                open.into_par_iter().partition(|&index| self.is_bounded(&states, index));
+            if found.is_empty() {
+                break;
+            }
+            found.iter().for_each(|&index| states[index] = State::Seen);
+            closed.extend(found);
+            open = left;
         }
-        let Some(colours) = self.continued() else { return Vec::new() };
-        inside.into_iter().map(|index| (self.place(index), colours[index])).collect()
+        closed.sort_unstable();
+        let Some(colours) = (if closed.is_empty() { None } else { self.continued() }) else { return Vec::new() };
+        closed.into_iter().map(|index| (self.place(index), colours[index])).collect()
     }
 
     /// Returns true if there is seen surface in most directions, before anything free.
-    fn is_bounded(&self, index: usize) -> bool {
+    fn is_bounded(&self, states: &[State], index: usize) -> bool {
         let directions = [(1, 0), (1, 1), (0, 1), (-1, 1), (-1, 0), (-1, -1), (0, -1), (1, -1)];
         let meets = |&(dx, dy): &(isize, isize)| {
             let (mut x, mut y) = ((index % self.width) as isize, (index / self.width) as isize);
@@ -102,7 +110,7 @@ impl Sheet {
                 if x < 0 || y < 0 || x >= self.width as isize || y >= self.height as isize {
                     return false;
                 }
-                match self.states[y as usize * self.width + x as usize] {
+                match states[y as usize * self.width + x as usize] {
                     State::Seen => return true,
                     State::Free => return false,
                     State::Hole | State::Unknown => {}

@@ -2,18 +2,18 @@
 
 mod score;
 
-pub use score::{ObjectRemoval, RemovalScores, RuleScores};
+pub use score::{HoleScores, ObjectRemoval, RemovalScores, RuleScores};
 
 use super::compared::{Compared, Watch};
-use crate::edit::fill::{SIGHT_SIDE, Sight, fill};
+use crate::edit::fill::{Filled, SIGHT_SIDE, Sight, fill};
 use crate::engine::Engine;
 use crate::error::Result;
-use crate::label::vote::ballot::{Sweep, Voter, sweep, weight};
+use crate::label::vote::ballot::{Ballot, Sweep, Voter, sweep, weight};
 use crate::label::vote::lift::Lift;
 use crate::label::vote::model::label_by_lift;
 use crate::render::{Parts, RenderOptions, Rendered, render};
 use crate::scene::{Gaussians, LabelMap, Photo, View};
-use score::{Compare, Region, Tally};
+use score::{Compare, Holes, Region, Tally};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Least weight with which the main Gaussian of a pixel takes its label by the rule of the paper.
@@ -69,15 +69,7 @@ pub fn removals(
     let ids: BTreeSet<u16> = views.iter().filter_map(|view| view.mask.as_deref()).flat_map(LabelMap::objects).collect();
     let mut objects = BTreeMap::new();
     for id in ids {
-        let votes_left = |labels: &[u32]| {
-            let column = ballot.labels.iter().position(|&label| label == id);
-            let of = |row: usize| ballot.row(row).iter().filter(|cell| Some(usize::from(cell.0)) == column);
-            let sum = |rows: &dyn Fn(usize) -> bool| -> f64 {
-                (0..ballot.len()).filter(|&row| rows(row)).flat_map(of).map(|&(_, votes)| weight(votes)).sum()
-            };
-            let all = sum(&|_| true);
-            (all > 0.0).then(|| sum(&|row| labels[row] != u32::from(id)) / all)
-        };
+        let votes_left = |labels: &[u32]| weight_left(&ballot, id, labels);
         let id = u32::from(id);
         let rest = |labels: &[u32]| model.filtered(|row| labels[row] != id);
         let (mut plain, mut filled, mut main) = (Tally::default(), Tally::default(), Tally::default());
@@ -102,15 +94,20 @@ pub fn removals(
         let without = rest(&own);
         draw(&without, &mut plain, "removed", watch)?;
         let closed = if own.contains(&id) && !without.is_empty() { Some(fill(model, &[id], &sights)?) } else { None };
-        let added = closed.as_ref().map_or(0, |closed| closed.added.values().sum());
+        let added: u64 = closed.as_ref().map_or(0, |closed| closed.added.values().sum());
         draw(closed.as_ref().map_or(&without, |closed| &closed.model), &mut filled, "filled", watch)?;
         let labels = paper.labels.as_deref().unwrap_or(&own);
         draw(&rest(labels), &mut main, MAIN, watch)?;
+        let holes = match closed.filter(|_| added > 0) {
+            Some(closed) => holes(engine, (id, &closed), views, options, truth)?,
+            None => Holes::default(),
+        };
         let scores = ObjectRemoval {
             votes: plain.scores(votes_left(&own)),
             main: main.scores(votes_left(labels)),
             filled: filled.scores(None),
             mean_colour: plain.mean_colour(),
+            holes: holes.scores(),
             hole: plain.hole(),
             hole_filled: filled.hole(),
             added,
@@ -118,6 +115,39 @@ pub fn removals(
         objects.insert(id, scores);
     }
     Ok(RemovalScores::new(objects))
+}
+
+/// Returns the share of the votes for a label that Gaussians of other labels have.
+fn weight_left(ballot: &Ballot, id: u16, labels: &[u32]) -> Option<f64> {
+    let column = ballot.labels.iter().position(|&label| label == id);
+    let of = |row: usize| ballot.row(row).iter().filter(|cell| Some(usize::from(cell.0)) == column);
+    let sum = |rows: &dyn Fn(usize) -> bool| -> f64 {
+        (0..ballot.len()).filter(|&row| rows(row)).flat_map(of).map(|&(_, votes)| weight(votes)).sum()
+    };
+    let all = sum(&|_| true);
+    (all > 0.0).then(|| sum(&|row| labels[row] != u32::from(id)) / all)
+}
+
+/// Compares the new Gaussians of a filled model with the colours around, where there is nothing without them.
+fn holes(
+    engine: &mut Engine,
+    (id, closed): (u32, &Filled),
+    views: &[&View],
+    options: RenderOptions,
+    truth: &dyn RemovalTruth,
+) -> Result<Holes> {
+    let old = closed.model.len() as u64 - closed.added.values().sum::<u64>();
+    let bare = closed.model.filtered(|row| (row as u64) < old);
+    let mut holes = Holes::default();
+    for view in views {
+        let (Some(mask), Some(photo)) = (&view.mask, &view.photo) else { continue };
+        let Some(region) = Region::new(mask, id as u16, photo) else { continue };
+        let (without, shadowed) = (truth.without(id, view)?, truth.shadowed(id, view)?);
+        let (bare, rendered) = (drawn(engine, &bare, view, options)?, drawn(engine, &closed.model, view, options)?);
+        let compare = Compare { rendered: &rendered, photo, truth: without.as_ref(), shadowed: shadowed.as_ref() };
+        holes.add(&region, &bare, &compare);
+    }
+    Ok(holes)
 }
 
 /// Name of the picture by the rule of the paper.

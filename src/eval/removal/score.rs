@@ -30,6 +30,21 @@ pub struct RuleScores {
     pub leftover_weight: Option<f64>,
 }
 
+/// What closes the pixels that no photo shows: those where neither another object nor a Gaussian that was seen is left.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct HoleScores {
+    /// Share of the object's place.
+    pub share: Option<f64>,
+    /// PSNR of the filled model there against the photos without the object, dB.
+    pub filled: Option<f64>,
+    /// The same against photos in which its shadow stays.
+    pub filled_shadowed: Option<f64>,
+    /// PSNR of the mean colour of a ring around the object in the picture.
+    pub mean_colour: Option<f64>,
+    /// The same against photos in which its shadow stays.
+    pub mean_colour_shadowed: Option<f64>,
+}
+
 /// What removals of an object leave.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct ObjectRemoval {
@@ -42,6 +57,8 @@ pub struct ObjectRemoval {
     pub filled: RuleScores,
     /// By the labels of the model, with holes painted in the mean colour of a ring around the object in the picture.
     pub mean_colour: RuleScores,
+    /// Of the filled model, where without its new Gaussians there is a hole.
+    pub holes: HoleScores,
     /// Share of the object's place that is a hole (opacity below one half) after the removal by the labels of the model.
     pub hole: Option<f64>,
     /// The same after filling.
@@ -74,6 +91,13 @@ impl RemovalScores {
             main: rule(|row| &row.main),
             filled: rule(|row| &row.filled),
             mean_colour: rule(|row| &row.mean_colour),
+            holes: HoleScores {
+                share: over(&|row| row.holes.share),
+                filled: over(&|row| row.holes.filled),
+                filled_shadowed: over(&|row| row.holes.filled_shadowed),
+                mean_colour: over(&|row| row.holes.mean_colour),
+                mean_colour_shadowed: over(&|row| row.holes.mean_colour_shadowed),
+            },
             hole: over(&|row| row.hole),
             hole_filled: over(&|row| row.hole_filled),
             added: objects.values().map(|row| row.added).sum(),
@@ -110,6 +134,7 @@ impl Region {
 }
 
 /// A removal in a view.
+#[derive(Clone, Copy)]
 pub(super) struct Compare<'a> {
     /// What is left.
     pub rendered: &'a Rendered,
@@ -124,6 +149,11 @@ pub(super) struct Compare<'a> {
 impl Compare<'_> {
     fn shown(&self, index: usize) -> [f64; 3] {
         self.rendered.rgb[index].map(|value| f64::from(value.clamp(0.0, 1.0)))
+    }
+
+    /// Returns the mean colour of the ring around the object.
+    fn around(&self, region: &Region) -> [f64; 3] {
+        [0, 1, 2].map(|channel| mean(region.ring.iter().map(|&index| self.shown(index)[channel])).unwrap_or(0.0))
     }
 
     /// Returns the PSNR over the object's place, dB.
@@ -167,11 +197,10 @@ pub(super) struct Tally {
 
 impl Tally {
     pub(super) fn add(&mut self, region: &Region, compare: &Compare) {
-        let is_hole = |index: usize| compare.rendered.alpha[index] < HOLE;
+        let is_hole = |index: usize| is_hole(compare.rendered, index);
         self.pixels += region.place.len() as u64;
         self.holes += region.place.iter().filter(|&&index| is_hole(index)).count() as u64;
-        let around = |channel: usize| mean(region.ring.iter().map(|&index| compare.shown(index)[channel]));
-        let around = [0, 1, 2].map(|channel| around(channel).unwrap_or(0.0));
+        let around = compare.around(region);
         for &index in &region.place {
             let shown = compare.shown(index);
             let painted = if is_hole(index) { around } else { shown };
@@ -206,6 +235,41 @@ impl Tally {
     pub(super) fn hole(&self) -> Option<f64> {
         (self.pixels > 0).then(|| self.holes as f64 / self.pixels as f64)
     }
+}
+
+/// Sums over the holes of an object in all views.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Holes {
+    pixels: u64,
+    holes: u64,
+    filled: [Squares; 2],
+    mean_colour: [Squares; 2],
+}
+
+impl Holes {
+    /// Adds a view: `bare` is the filled model without its new Gaussians, `compare` has the filled one.
+    pub(super) fn add(&mut self, region: &Region, bare: &Rendered, compare: &Compare) {
+        let around = Compare { rendered: bare, ..*compare }.around(region);
+        self.pixels += region.place.len() as u64;
+        for &index in region.place.iter().filter(|&&index| is_hole(bare, index)) {
+            self.holes += 1;
+            for (at, truth) in [compare.truth, compare.shadowed].into_iter().enumerate() {
+                self.filled[at].add(compare.shown(index), truth, index);
+                self.mean_colour[at].add(around, truth, index);
+            }
+        }
+    }
+
+    pub(super) fn scores(&self) -> HoleScores {
+        let [filled, filled_shadowed] = self.filled.map(|squares| squares.psnr());
+        let [mean_colour, mean_colour_shadowed] = self.mean_colour.map(|squares| squares.psnr());
+        let share = (self.pixels > 0).then(|| self.holes as f64 / self.pixels as f64);
+        HoleScores { share, filled, filled_shadowed, mean_colour, mean_colour_shadowed }
+    }
+}
+
+fn is_hole(rendered: &Rendered, index: usize) -> bool {
+    rendered.alpha[index] < HOLE
 }
 
 fn bytes(photo: &Photo, index: usize) -> [f64; 3] {

@@ -10,6 +10,9 @@ use crate::render::label_map;
 use crate::scene::{Gaussians, LabelMap, View};
 use std::collections::BTreeMap;
 
+/// Fewest views of an object where nothing else is asked for: what one view alone shows may be a mistake of the segmenter.
+pub(crate) const MIN_VIEWS: usize = 2;
+
 /// The options of [`agree`].
 #[derive(Clone, Copy, Debug)]
 pub struct Agreement {

@@ -10,6 +10,8 @@ class Picture {
     if (!gl) throw new Error('This browser has no WebGL 2, which the picture needs.');
     this.gl = gl;
     this.program = this.linked();
+    const uniforms = ['data', 'looks', 'width', 'stride', 'degree', 'turn', 'shift', 'eye', 'lens', 'size'];
+    this.place = Object.fromEntries(uniforms.map((name) => [name, gl.getUniformLocation(this.program, name)]));
     this.vertices = gl.createBuffer();
     gl.bindBuffer(gl.ARRAY_BUFFER, this.vertices);
     gl.bufferData(gl.ARRAY_BUFFER, new Float32Array([-1, -1, 1, -1, -1, 1, 1, 1]), gl.STATIC_DRAW);
@@ -52,7 +54,7 @@ class Picture {
     gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MIN_FILTER, gl.NEAREST);
     gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MAG_FILTER, gl.NEAREST);
     gl.texImage2D(gl.TEXTURE_2D, 0, inner, width, height, 0, format, type, values);
-    gl.uniform1i(gl.getUniformLocation(this.program, name), unit);
+    gl.uniform1i(this.place[name], unit);
   }
 
   // Takes a model, and a number of labels.
@@ -64,7 +66,7 @@ class Picture {
     this.texture(0, 'data', gl.RGBA32UI, model.width, model.height, gl.RGBA_INTEGER, gl.UNSIGNED_INT, model.words);
     this.lookRows = Math.max(1, Math.ceil(labels / 256));
     this.texture(1, 'looks', gl.RGBA8UI, 256, this.lookRows, gl.RGBA_INTEGER, gl.UNSIGNED_BYTE, null);
-    for (const name of ['width', 'stride', 'degree']) gl.uniform1i(gl.getUniformLocation(this.program, name), model[name]);
+    for (const name of ['width', 'stride', 'degree']) gl.uniform1i(this.place[name], model[name]);
   }
 
   // Sets tint and state of each label.
@@ -109,13 +111,12 @@ class Picture {
     if (canvas.width !== width || canvas.height !== height) [canvas.width, canvas.height] = [width, height];
     gl.viewport(0, 0, width, height);
     this.sort(camera);
-    const place = (name) => gl.getUniformLocation(this.program, name);
-    const { turn, shift } = camera;
-    gl.uniformMatrix3fv(place('turn'), true, turn.flat());
-    gl.uniform3fv(place('shift'), shift);
-    gl.uniform3fv(place('eye'), [0, 1, 2].map((axis) => -turn.reduce((sum, row, at) => sum + row[axis] * shift[at], 0)));
-    gl.uniform4fv(place('lens'), camera.lens);
-    gl.uniform2fv(place('size'), camera.size);
+    const { place } = this, { turn, shift } = camera;
+    gl.uniformMatrix3fv(place.turn, true, turn.flat());
+    gl.uniform3fv(place.shift, shift);
+    gl.uniform3fv(place.eye, [0, 1, 2].map((axis) => -turn.reduce((sum, row, at) => sum + row[axis] * shift[at], 0)));
+    gl.uniform4fv(place.lens, camera.lens);
+    gl.uniform2fv(place.size, camera.size);
     gl.clear(gl.COLOR_BUFFER_BIT);
     gl.drawArraysInstanced(gl.TRIANGLE_STRIP, 0, 4, this.shown);
   }

@@ -16,10 +16,12 @@ async function start() {
   picture.hold(model, about.labels.length);
   const camera = new Camera(model.positions, about);
   const looks = about.labels.map(({ colour }) => [...colour, 1]);
-  let asked = false;
+  let asked = false, changed = true;
 
   function draw() {
     asked = false;
+    if (changed) picture.look(looks);
+    changed = false;
     const ratio = Math.min(2, window.devicePixelRatio || 1);
     picture.draw(camera.at(Math.round(canvas.clientWidth * ratio), Math.round(canvas.clientHeight * ratio)));
   }
@@ -30,7 +32,7 @@ async function start() {
   }
   function look(row, state) {
     looks[row][3] = state;
-    picture.look(looks);
+    changed = true;
     ask();
   }
 
@@ -113,7 +115,6 @@ async function start() {
   byId('reset').addEventListener('click', () => { camera.reset(); ask(); });
   window.addEventListener('resize', ask);
   window.addEventListener('hashchange', fromAddress);
-  picture.look(looks);
   fromAddress();
   draw();
   byId('message').hidden = true;
