@@ -135,7 +135,18 @@ fn changed_colmap_models_are_read_or_refused() {
 
 #[test]
 fn changed_text_files_are_read_or_refused() {
-    run_all(&["transforms_", "config_", "camera_", "labels_", "occlusion_", "frames_", "pred_", "profile_"]);
+    run_all(&[
+        "transforms_",
+        "poses_",
+        "metashape_",
+        "config_",
+        "camera_",
+        "labels_",
+        "occlusion_",
+        "frames_",
+        "pred_",
+        "profile_",
+    ]);
 }
 
 #[test]

@@ -141,6 +141,9 @@ pub fn scan(scene: &Path, dataset: &Dataset) -> Result<Report> {
     findings.extend(photos::findings(&reports));
     findings.extend(neighbours::findings(&reports, dataset.points.len()));
     findings.extend(poses::scale(dataset));
+    // The faces of a wide photo look at other things than their neighbours: sky is smooth, and no other photo shows it.
+    let is_face = |name: &String| windows.get(name).is_some_and(|window| window.photo != window.name);
+    findings.retain(|of| !matches!(of.fault, Fault::Blur | Fault::Alone) || !of.view.as_ref().is_some_and(is_face));
     findings.sort_by(|a, b| (a.fault, &a.view).cmp(&(b.fault, &b.view)));
     let known = || reports.iter().filter_map(|view| view.gain);
     let (least, most) = (known().fold(f64::INFINITY, f64::min), known().fold(0.0, f64::max));
