@@ -4,8 +4,9 @@
 //! The test uses the contact function of Perram and Wertheim (1985).
 
 use crate::scene::Gaussians;
+use crate::scene::gaussians::axes_of;
 use crate::{Error, Result};
-use glam::{DMat3, DQuat, DVec3};
+use glam::{DMat3, DVec3};
 use kiddo::{ImmutableKdTree, SquaredEuclidean};
 use petgraph::unionfind::UnionFind;
 use std::collections::BTreeMap;
@@ -87,8 +88,7 @@ impl Body {
         // Never flat, so that sums of shapes are invertible.
         let axes = DVec3::from_array(model.scales[row].map(f64::from)).map(|scale| REACH * scale.exp() + gap / 2.0);
         let axes = axes.clamp(DVec3::splat(axes.max_element() * 1e-6), DVec3::splat(1e100)).max(DVec3::splat(1e-100));
-        let [w, x, y, z] = model.quats[row].map(f64::from);
-        let turn = DMat3::from_quat(DQuat::from_xyzw(x, y, z, w).normalize());
+        let turn = axes_of(model.quats[row]);
         Self {
             centre: DVec3::from_array(model.means[row].map(f64::from)),
             radius: axes.max_element(),

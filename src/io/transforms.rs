@@ -3,7 +3,7 @@
 //! Poses are camera-to-world with OpenGL axes (y up, looking along -z) and become camera-from-world with OpenCV axes.
 //! The world is that of `transform_matrix`, which already includes nerfstudio's `applied_transform`.
 
-use super::lens::{self, Lens};
+use super::lens::{self, Equirectangular, Lens};
 use super::listed_path::Place;
 use super::listing::{
     EXTENSIONS, FAR, Listed, Listing, check_camera, find_file, invert_pose, rotation_of, side, with_extension,
@@ -15,7 +15,6 @@ use crate::scene::{Camera, Point};
 use glam::{DAffine3, DMat3, DVec3};
 use serde::Deserialize;
 use std::collections::HashMap;
-use std::f64::consts::PI;
 use std::path::{Path, PathBuf};
 
 /// Intrinsics of the whole file or of one frame.
@@ -202,8 +201,7 @@ fn lens(path: &Path, place: &str, i: &Intrinsics) -> Result<Lens> {
 
 /// Makes the intrinsics of a panorama, which follow from its size.
 fn panorama((width, height): (u32, u32)) -> Camera {
-    let (w, h) = (f64::from(width), f64::from(height));
-    let (fx, fy, cx, cy) = (w / (2.0 * PI), h / PI, w / 2.0, h / 2.0);
+    let [fx, fy, cx, cy] = Equirectangular::intrinsics(f64::from(width), f64::from(height));
     Camera { rotation: DMat3::IDENTITY, translation: DVec3::ZERO, fx, fy, cx, cy, width, height }
 }
 

@@ -2,7 +2,13 @@
 
 use super::UNLABELLED;
 use crate::error::{Error, Result};
-use glam::DVec3;
+use glam::{DMat3, DQuat, DVec3};
+
+/// Returns the matrix of a rotation (w, x, y, z) of any length: its columns are the axes of the Gaussian.
+pub(crate) fn axes_of(quat: [f32; 4]) -> DMat3 {
+    let [w, x, y, z] = quat.map(f64::from);
+    DMat3::from_quat(DQuat::from_xyzw(x, y, z, w).normalize())
+}
 
 /// The Gaussians of a scene. Parameters are stored before activation, as in the standard 3DGS PLY.
 #[derive(Clone, Debug, Default, PartialEq)]

@@ -4,7 +4,8 @@
 use super::evidence::{Evidence, State};
 use super::{Place, Sight};
 use crate::scene::Gaussians;
-use glam::{DMat3, DQuat, DVec3};
+use crate::scene::gaussians::axes_of;
+use glam::DVec3;
 use rayon::prelude::*;
 
 /// Distance from its centre, in standard deviations, at which a Gaussian must be hidden too: its rim is still seen there.
@@ -23,8 +24,7 @@ impl Place {
             if !model.is_finite(row) || !self.is_near(world, self.ring) || !is_hole(world) {
                 return false;
             }
-            let [w, x, y, z] = model.quats[row].map(f64::from);
-            let turn = DMat3::from_quat(DQuat::from_xyzw(x, y, z, w).normalize());
+            let turn = axes_of(model.quats[row]);
             let arm = |axis: usize| REACH * f64::from(model.scales[row][axis]).exp() * turn.col(axis);
             (0..3).map(arm).all(|arm| is_hole(world + arm) && is_hole(world - arm))
         };

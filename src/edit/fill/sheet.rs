@@ -95,8 +95,11 @@ impl Sheet {
             closed.extend(found);
             open = left;
         }
+        if closed.is_empty() {
+            return Vec::new();
+        }
         closed.sort_unstable();
-        let Some(colours) = (if closed.is_empty() { None } else { self.continued() }) else { return Vec::new() };
+        let Some(colours) = self.continued() else { return Vec::new() };
         closed.into_iter().map(|index| (self.place(index), colours[index])).collect()
     }
 

@@ -1,5 +1,6 @@
 //! Two Gaussians as one.
 
+use crate::scene::gaussians::axes_of;
 use crate::shaders::constants::exact::{ALPHA_MAX, SH_C0};
 use glam::{DMat3, DQuat, DVec3};
 
@@ -85,8 +86,7 @@ impl Blob {
 
 /// Returns the covariance of a rotation (w, x, y, z) and the logarithms of deviations.
 pub(super) fn covariance(quat: [f32; 4], scales: [f32; 3]) -> DMat3 {
-    let [w, x, y, z] = quat.map(f64::from);
-    let turn = DMat3::from_quat(DQuat::from_xyzw(x, y, z, w).normalize());
+    let turn = axes_of(quat);
     let squares = DVec3::from_array(scales.map(|scale| (2.0 * f64::from(scale)).exp()));
     turn * DMat3::from_diagonal(squares) * turn.transpose()
 }

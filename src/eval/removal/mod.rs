@@ -71,22 +71,19 @@ pub fn removals(
     for id in ids {
         let votes_left = |labels: &[u32]| weight_left(&ballot, id, labels);
         let id = u32::from(id);
+        let places = places(id, views, truth)?;
         let rest = |labels: &[u32]| model.filtered(|row| labels[row] != id);
         let (mut plain, mut filled, mut main) = (Tally::default(), Tally::default(), Tally::default());
         let mut draw = |part: &Gaussians, tally: &mut Tally, what: &'static str, watch: &mut dyn Watch| {
-            for view in views {
-                let (Some(mask), Some(photo)) = (&view.mask, &view.photo) else { continue };
-                let Some(region) = Region::new(mask, id as u16, photo) else { continue };
-                let (without, shadowed) = (truth.without(id, view)?, truth.shadowed(id, view)?);
-                let rendered = drawn(engine, part, view, options)?;
-                let compare =
-                    Compare { rendered: &rendered, photo, truth: without.as_ref(), shadowed: shadowed.as_ref() };
-                tally.add(&region, &compare);
-                let Some(without) = without.as_ref().filter(|_| what != MAIN) else { continue };
+            for place in &places {
+                let rendered = drawn(engine, part, place.view, options)?;
+                let compare = place.compare(&rendered);
+                tally.add(&place.region, &compare);
+                let Some(without) = place.without.as_ref().filter(|_| what != MAIN) else { continue };
                 watch.see(&Compared {
                     object: Some(format!("{id} {what}")),
-                    numbers: vec![("PSNR", compare.psnr(&region))],
-                    ..Compared::new(&view.name, without, &rendered.rgb)
+                    numbers: vec![("PSNR", compare.psnr(&place.region))],
+                    ..Compared::new(&place.view.name, without, &rendered.rgb)
                 })?;
             }
             Ok::<(), crate::Error>(())
@@ -99,7 +96,7 @@ pub fn removals(
         let labels = paper.labels.as_deref().unwrap_or(&own);
         draw(&rest(labels), &mut main, MAIN, watch)?;
         let holes = match closed.filter(|_| added > 0) {
-            Some(closed) => holes(engine, (id, &closed), views, options, truth)?,
+            Some(closed) => holes(engine, &closed, &places, options)?,
             None => Holes::default(),
         };
         let scores = ObjectRemoval {
@@ -128,24 +125,42 @@ fn weight_left(ballot: &Ballot, id: u16, labels: &[u32]) -> Option<f64> {
     (all > 0.0).then(|| sum(&|row| labels[row] != u32::from(id)) / all)
 }
 
-/// Compares the new Gaussians of a filled model with the colours around, where there is nothing without them.
-fn holes(
-    engine: &mut Engine,
-    (id, closed): (u32, &Filled),
-    views: &[&View],
-    options: RenderOptions,
-    truth: &dyn RemovalTruth,
-) -> Result<Holes> {
-    let old = closed.model.len() as u64 - closed.added.values().sum::<u64>();
-    let bare = closed.model.filtered(|row| (row as u64) < old);
-    let mut holes = Holes::default();
-    for view in views {
+/// Where a view shows an object, with the photos to compare a removal with.
+struct Place<'a> {
+    view: &'a View,
+    photo: &'a Photo,
+    region: Region,
+    without: Option<Photo>,
+    shadowed: Option<Photo>,
+}
+
+impl Place<'_> {
+    fn compare<'b>(&'b self, rendered: &'b Rendered) -> Compare<'b> {
+        Compare { rendered, photo: self.photo, truth: self.without.as_ref(), shadowed: self.shadowed.as_ref() }
+    }
+}
+
+/// Returns the places of an object in all views that show it.
+fn places<'a>(id: u32, views: &[&'a View], truth: &dyn RemovalTruth) -> Result<Vec<Place<'a>>> {
+    let mut found = Vec::new();
+    for &view in views {
         let (Some(mask), Some(photo)) = (&view.mask, &view.photo) else { continue };
         let Some(region) = Region::new(mask, id as u16, photo) else { continue };
         let (without, shadowed) = (truth.without(id, view)?, truth.shadowed(id, view)?);
-        let (bare, rendered) = (drawn(engine, &bare, view, options)?, drawn(engine, &closed.model, view, options)?);
-        let compare = Compare { rendered: &rendered, photo, truth: without.as_ref(), shadowed: shadowed.as_ref() };
-        holes.add(&region, &bare, &compare);
+        found.push(Place { view, photo, region, without, shadowed });
+    }
+    Ok(found)
+}
+
+/// Compares the new Gaussians of a filled model with the colours around, where there is nothing without them.
+fn holes(engine: &mut Engine, closed: &Filled, places: &[Place], options: RenderOptions) -> Result<Holes> {
+    let old = closed.model.len() as u64 - closed.added.values().sum::<u64>();
+    let bare = closed.model.filtered(|row| (row as u64) < old);
+    let mut holes = Holes::default();
+    for place in places {
+        let bare = drawn(engine, &bare, place.view, options)?;
+        let rendered = drawn(engine, &closed.model, place.view, options)?;
+        holes.add(&place.region, &bare, &place.compare(&rendered));
     }
     Ok(holes)
 }

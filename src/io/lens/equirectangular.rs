@@ -9,6 +9,13 @@ use std::f64::consts::{FRAC_PI_2, PI};
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Equirectangular;
 
+impl Equirectangular {
+    /// Returns fx, fy, cx and cy of a panorama, which follow from its width and height, px.
+    pub(crate) fn intrinsics(width: f64, height: f64) -> [f64; 4] {
+        [width / (2.0 * PI), height / PI, width / 2.0, height / 2.0]
+    }
+}
+
 impl Projection for Equirectangular {
     fn is_valid(&self) -> bool {
         true

@@ -1,7 +1,6 @@
 //! The camera models that files name, with the order of their parameters.
 
-use super::{Division, Eucm, Fisheye, Fov, Lens, Polynomial, RadTan};
-use std::f64::consts::PI;
+use super::{Division, Equirectangular, Eucm, Fisheye, Fov, Lens, Polynomial, RadTan};
 
 /// A camera model as files name it, with its parameters.
 #[derive(Clone, Copy, Debug)]
@@ -25,7 +24,7 @@ impl CameraModel {
     /// size.
     pub(crate) fn intrinsics(&self, list: &[f64]) -> [f64; 4] {
         match self.focals {
-            0 => [list[0] / (2.0 * PI), list[1] / PI, list[0] / 2.0, list[1] / 2.0],
+            0 => Equirectangular::intrinsics(list[0], list[1]),
             focals => [list[0], list[focals - 1], list[focals], list[focals + 1]],
         }
     }
