@@ -179,7 +179,7 @@ fn a_flag_has_one_heading() {
 }
 
 /// A value other than the default for each setting.
-const TYPED: [(&str, &str); 57] = [
+const TYPED: [(&str, &str); 58] = [
     ("--iterations", "7"),
     ("--max-resolution", "99"),
     ("--start-size", "0.7"),
@@ -189,6 +189,7 @@ const TYPED: [(&str, &str); 57] = [
     ("--prune-share", "0.2"),
     ("--free-space", "off"),
     ("--far-points", "30"),
+    ("--grow-box", "-1,-2,0,1,2,3.5"),
     ("--rate-factor", "1.5"),
     ("--rate-final", "0.5"),
     ("--rate-fall-from", "6"),
@@ -251,6 +252,10 @@ fn every_setting_follows_its_flag() {
     assert_eq!(changed.train.max_gaussians, 2_500_000);
     assert_eq!(changed.run.save_at, [2000, 5000]);
     assert_eq!(train(&["--no-test"]).expect("decided").read.test_every, 0);
+    assert_eq!(
+        train(&["--box", "-1,0,0,1,2,3"]).expect("decided").train.grow_box,
+        Some([-1.0, 0.0, 0.0, 1.0, 2.0, 3.0])
+    );
     assert_eq!(train(&["--background", "white"]).expect("decided").train.background, [1.0; 3]);
     assert_eq!(train(&[]).expect("decided"), Settings::default());
 }
@@ -318,12 +323,14 @@ fn flags_override_the_file_and_the_file_the_defaults() {
 
 #[test]
 fn values_that_make_no_sense_are_usage_errors() {
-    let broken: [&[&str]; 10] = [
+    let broken: [&[&str]; 12] = [
         &[],
         &["paint"],
         &["list"],
         &["train", "scene"],
         &["train", "scene", "-o", "out", "--gpf", "maybe"],
+        &["train", "scene", "-o", "out", "--box", "1,0,0,0,1,1"],
+        &["train", "scene", "-o", "out", "--box", "0,0,0,1,1"],
         &["synth", "x", "--size", "320"],
         &["extract", "model.ply", "-o", "x.ply"],
         &["extract", "model.ply", "-o", "x.ply", "--labels", "3-1"],

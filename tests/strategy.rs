@@ -175,3 +175,31 @@ fn unseen_gaussians_move_or_rest() {
         assert_eq!(before == after, rests, "{before:?} {after:?}");
     }
 }
+
+#[test]
+fn gaussians_grow_in_the_box_only() {
+    let Some(turn) = device() else { return };
+    let grown = |strategy: StrategyKind, grow_box: Option<[f64; 6]>| {
+        let config = TrainConfig {
+            iterations: 60,
+            densify_from: Some(5),
+            densify_interval: Some(10),
+            densify_grad_threshold: 1e-7,
+            budget: 4 * start().len() as u64,
+            prune_share: 0.0,
+            strategy,
+            grow_box,
+            ..config(LabelRule::Votes)
+        };
+        let mut trainer = Trainer::new(turn.gpu(), config, &small(), &start(), TrainerOptions::default()).expect("one");
+        go_on(&mut trainer, 60);
+        trainer.model().expect("a model").len()
+    };
+    let before = start().len();
+    for strategy in [StrategyKind::Budget, StrategyKind::Mcmc, StrategyKind::Adc] {
+        let (all, around) = (grown(strategy, None), grown(strategy, Some([-99.0, -99.0, -99.0, 99.0, 99.0, 99.0])));
+        assert!(all > before && all == around, "{strategy:?}: {before} became {all} and {around}");
+        let none = grown(strategy, Some([50.0, 50.0, 50.0, 51.0, 51.0, 51.0]));
+        assert!(none <= before, "{strategy:?}: {before} became {none}, and the box is empty");
+    }
+}

@@ -4,10 +4,12 @@
 #include "step.glsl"
 #include "dispatch.glsl"
 #include "gaussian.glsl"
+#include "densify_rules.glsl"
 // relocate_weigh — the weight of each Gaussian in the draw of relocate_draw: its opacity; 0 for those to be removed.
 // Work:    64 Gaussians per workgroup.
-// Reads:   step; means.w [N]; densify_stats [N]
-// Writes:  children_counts [N]: the weight in steps of 1 / RELOCATE_ONE, at least 1 step; counters.pruned_count
+// Reads:   step; means [N]; densify_stats [N]
+// Writes:  children_counts [N]: the weight in steps of 1 / RELOCATE_ONE, at least 1 step, and
+//          no more where nothing grows; counters.pruned_count
 // Math:    3DGS-MCMC: an opacity below prune_opacity is dead, the others are drawn in proportion to their opacity.
 //          Whole weights have an exact prefix sum.
 // Mirror:  src/verify/reference/relocate.rs::weights
@@ -25,9 +27,11 @@ void main() {
     if (i >= u.gaussian_count) {
         return;
     }
-    float opacity = sigmoid(fetch4(means, i).w);
+    vec4 mean = fetch4(means, i);
+    float opacity = sigmoid(mean.w);
     bool dead = opacity < u.prune_opacity || densify_stats[i].y >= STAT_NEAR;
-    children_counts[i] = dead ? 0u : max(uint(floor(opacity * RELOCATE_ONE + 0.5)), 1u);
+    float weight = grows_at(u, mean.xyz) ? floor(opacity * RELOCATE_ONE + 0.5) : 1.0;
+    children_counts[i] = dead ? 0u : max(uint(weight), 1u);
     if (dead) {
         atomicAdd(counters.pruned_count, 1u);
     }

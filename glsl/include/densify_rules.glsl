@@ -6,10 +6,16 @@ const uint ACTION_CLONE = 2u;
 const uint ACTION_SPLIT = 3u;
 const uint ACTION_STACK = 4u; // plus the number of copies, 2 to RELOCATE_MOST
 
-uint densify_action(StepUniforms u, float logit, vec3 log_scale, vec2 stats) {
+// True where new Gaussians are wanted.
+bool grows_at(StepUniforms u, vec3 mean) {
+    return u.grow_low == u.grow_high || (all(greaterThanEqual(mean, u.grow_low)) && all(lessThan(mean, u.grow_high)));
+}
+
+uint densify_action(StepUniforms u, vec4 mean, vec3 log_scale, vec2 stats) {
+    float logit = mean.w;
     float gradient = stats.y > 0.0 ? stats.x / stats.y : 0.0;
     float size = exp(max(log_scale.x, max(log_scale.y, log_scale.z)));
-    bool grows = gradient >= u.densify_threshold && u.densify_threshold > 0.0;
+    bool grows = gradient >= u.densify_threshold && u.densify_threshold > 0.0 && grows_at(u, mean.xyz);
     bool splits = grows && size > u.densify_scale;
     float child = splits && u.split_long == 0u ? exp(max(log_scale.x, max(log_scale.y, log_scale.z)) - SPLIT_SHRINK) : size;
     float opacity = exp2(-log2(1.0 + exp(-clamp(logit, -30.0, 30.0))));

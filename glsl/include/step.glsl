@@ -30,6 +30,7 @@ struct StepUniforms {
     uint sum_absolute;      // 1: the statistic sums absolute gradients over tiles
     vec3 free_centre;       // space before all cameras between this one and another one is free (mark_near): its centre,
     float free_near;        // and the near plane on the way; 0: there is none
+    vec3 grow_low, grow_high; // Gaussians grow at low <= mean < high; everywhere if both are equal
     uint draws;             // Gaussians to draw for relocation
     float draws_per_weight; // draws over the sum of all weights
     float opacity_weight, scale_weight; // of a Gaussian's opacity and standard deviations in the loss

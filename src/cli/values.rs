@@ -1,6 +1,7 @@
 //! Parsers of single values.
 
 use crate::edit::catalogue::Pick;
+use crate::options::parse;
 use crate::scene::labels::LABEL_MAX;
 use glam::DVec3;
 use std::collections::BTreeMap;
@@ -150,10 +151,8 @@ pub(crate) fn direction(text: &str) -> Result<DVec3, String> {
 
 /// Parses two corners of a box in space: the smaller coordinates first.
 pub(crate) fn corners(text: &str) -> Result<[DVec3; 2], String> {
-    let wrong = || format!("`{text}` is not a box; expected x0,y0,z0,x1,y1,z1, the smaller corner first");
-    let [a, b, c, d, e, f] = numbers(text).ok_or_else(wrong)?;
-    let (low, high) = (DVec3::new(a, b, c), DVec3::new(d, e, f));
-    if low.cmple(high).all() { Ok([low, high]) } else { Err(wrong()) }
+    let [a, b, c, d, e, f] = parse::corners(text)?;
+    Ok([DVec3::new(a, b, c), DVec3::new(d, e, f)])
 }
 
 /// Parses finite numbers between commas.

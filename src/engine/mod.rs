@@ -167,6 +167,12 @@ impl Engine {
         uniforms::view_uniforms(camera, self.origin, &self.shape, near, background, self.gaussian_count)
     }
 
+    /// Adds the box in which Gaussians grow, world units.
+    pub(crate) fn with_grow_box(&self, uniforms: StepUniforms, [x0, y0, z0, x1, y1, z1]: [f64; 6]) -> StepUniforms {
+        let corner = |x, y, z| (DVec3::new(x, y, z) - self.origin).as_vec3().to_array();
+        StepUniforms { grow_low: corner(x0, y0, z0), grow_high: corner(x1, y1, z1), ..uniforms }
+    }
+
     /// Adds free space on the way to another camera.
     pub(crate) fn with_free_space(&self, uniforms: StepUniforms, camera: &Camera, near: f32) -> StepUniforms {
         let free_centre = camera.relative_to(self.origin).centre().as_vec3().to_array();

@@ -35,6 +35,15 @@ pub(crate) fn switch(text: &str) -> Result<bool, String> {
     }
 }
 
+/// Parses two corners of a box in space, the smaller coordinates first.
+pub(crate) fn corners(text: &str) -> Result<[f64; 6], String> {
+    let wrong = || format!("`{text}` is not a box; expected x0,y0,z0,x1,y1,z1, the smaller corner first");
+    let numbers = text.split(',').map(|part| part.trim().parse().ok().filter(|value: &f64| value.is_finite()));
+    let numbers: Vec<f64> = numbers.collect::<Option<_>>().ok_or_else(wrong)?;
+    let corners: [f64; 6] = numbers.try_into().map_err(|_| wrong())?;
+    if (0..3).all(|axis| corners[axis] <= corners[axis + 3]) { Ok(corners) } else { Err(wrong()) }
+}
+
 /// Parses a number of objects, or `all`.
 pub(crate) fn samples(text: &str) -> Result<u32, String> {
     match text {

@@ -38,7 +38,7 @@ pub(super) fn relocate(b: &mut Builder) {
     weigh(b);
     pass!(b, relocate_draw {
         step: Buf::STEP, child_offsets: Buf::CHILD_OFFSETS, children_counts: Buf::CHILDREN_COUNTS,
-        counters: Buf::COUNTERS, densify_actions: Buf::DENSIFY_ACTIONS,
+        counters: Buf::COUNTERS, densify_actions: Buf::DENSIFY_ACTIONS, means: Buf::MEANS,
     } [], over_gaussians());
     scan::scan(b, Buf::CHILDREN_COUNTS, Buf::CHILD_OFFSETS, Count::Gaussians, Total::Densified);
 }

@@ -5,7 +5,7 @@
 
 use crate::options::Options;
 #[cfg(feature = "cli")]
-use crate::options::parse::{colour, count, samples, switch};
+use crate::options::parse::{colour, corners, count, samples, switch};
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
 
@@ -125,6 +125,14 @@ crate::options::options! {
             /// The first Gaussians then stand also for the sky and other distant things without points. Only directions in
             /// which most photos look past all points get one. 3DGS has none.
             far_points <"N">: u32 = 800;
+
+            /// Box in which Gaussians grow, world units: the smaller corner first [default: everywhere].
+            ///
+            /// Outside of it Gaussians still train and are pruned, but none is added. It saves time where photos show
+            /// more than what is wanted; `labelgs clean --box` then drops the rest.
+            #[serde(skip_serializing_if = "Option::is_none")]
+            #[cfg_attr(feature = "cli", arg(value_parser = corners, allow_hyphen_values = true, visible_alias = "box"))]
+            grow_box <"x0,y0,z0,x1,y1,z1">: Option<[f64; 6]> = None;
 
             /// Weight of the mean opacity in the loss [default: 0.01 with the strategy mcmc, else 0].
             ///
@@ -379,6 +387,11 @@ impl TrainConfig {
         self.check_ranges()?;
         if self.label_rule == LabelRule::Main && self.layer_every() != 1 {
             return Err(Error::usage("label_rule", "is main, which needs `layer_every = 1`"));
+        }
+        if let Some([x0, y0, z0, x1, y1, z1]) = self.grow_box
+            && !(x0 < x1 && y0 < y1 && z0 < z1)
+        {
+            return Err(Error::usage("grow_box", "is empty; it needs the smaller corner first, then the larger one"));
         }
         Ok(())
     }

@@ -308,6 +308,9 @@ impl Trainer {
         if let Some((camera, near)) = self.views.partner(self.config.seed, input) {
             uniforms = self.engine.with_free_space(uniforms, camera, near);
         }
+        if let Some(corners) = self.config.grow_box {
+            uniforms = self.engine.with_grow_box(uniforms, corners);
+        }
         self.strategy.uniforms(self.at(input.step), &mut uniforms);
         uniforms
     }

@@ -133,7 +133,7 @@ pub fn densify(
         let zero = Row::default();
         let moments = (before.m[index], before.u[index]);
         let label = before.model.labels[index];
-        let rows = if mean < gradient {
+        let rows = if mean < gradient || !rules.grows_at(row.mean) {
             vec![(*row, moments, Origin::Kept)]
         } else if scale <= limit {
             out.note(index, scale / limit);

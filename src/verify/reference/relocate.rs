@@ -9,7 +9,7 @@ use glam::DVec3;
 pub fn weights(rules: &Rules, before: &Population) -> Vec<(u32, f64)> {
     let weight = |(row, &views): (&Row, &f64)| {
         let opacity = sigmoid(row.opacity);
-        let steps = opacity * rules.relocate_one + 0.5;
+        let steps = if rules.grows_at(row.mean) { opacity * rules.relocate_one + 0.5 } else { 1.25 };
         let margin = (opacity / rules.prune_opacity - 1.0).abs().min((steps - steps.round()).abs() / steps);
         let dead = opacity < rules.prune_opacity || views >= rules.stat_near;
         (if dead { 0 } else { (steps.floor() as u32).max(1) }, margin)
@@ -51,6 +51,11 @@ pub fn stacked(rules: &Rules, row: &Row, count: u32) -> Row {
 pub fn relocate(rules: &Rules, before: &Population, draws: u32, phase: f64) -> Densified {
     let weights = weights(rules, before);
     let counts = copies(rules, &weights.iter().map(|&(weight, _)| weight).collect::<Vec<_>>(), draws, phase);
+    let count_of = |(row, (count, margin)): (&Row, (u32, f64))| {
+        // Draws where nothing grows are void.
+        (if rules.grows_at(row.mean) { count } else { count.min(1) }, margin)
+    };
+    let counts: Vec<(u32, f64)> = before.model.rows.iter().zip(counts).map(count_of).collect();
     let margin = |(weight, count): (&(u32, f64), &(u32, f64))| weight.1.min(count.1);
     let mut out = Densified { margins: weights.iter().zip(&counts).map(margin).collect(), ..Densified::default() };
     out.model.sh_degree = before.model.sh_degree;

@@ -56,6 +56,8 @@ pub struct Rules {
     pub percent_dense: f64,
     /// Divisor of the scale: a split child has its parent's scale divided by this.
     pub split_shrink: f64,
+    /// Box in which Gaussians grow, the upper corner not included; `None`: everywhere.
+    pub grow_box: Option<[[f64; 3]; 2]>,
     /// Splits go along the longest axis instead of to random places.
     pub splits_long: bool,
     /// Distance of the children of such a split from their parent, standard deviations.
@@ -127,6 +129,7 @@ impl Default for Rules {
             densify_gradient: wide(2e-4),
             percent_dense: wide(0.01),
             split_shrink: wide(1.6),
+            grow_box: None,
             splits_long: false,
             split_offset: 0.5,
             split_long: 0.5,
@@ -152,6 +155,12 @@ impl Rules {
     /// The exponent (log2 of alpha) at and above which a pair counts.
     pub fn exponent_min(&self) -> f64 {
         self.alpha_min.log2()
+    }
+
+    /// Returns true where Gaussians grow.
+    pub fn grows_at(&self, mean: [f64; 3]) -> bool {
+        let inside = |[low, high]: [[f64; 3]; 2]| (0..3).all(|axis| (low[axis]..high[axis]).contains(&mean[axis]));
+        self.grow_box.is_none_or(inside)
     }
 }
 

@@ -26,6 +26,8 @@ use glam::DVec3;
 use std::sync::Arc;
 
 pub(super) const SEED: u32 = 0x1234_5678;
+/// Box in which Gaussians of the strategies budget and mcmc grow: a half of the populations.
+pub(super) const GROW: [[f64; 3]; 2] = [[0.0, -64.0, -64.0], [64.0; 3]];
 
 /// Uploads a population with moments and statistics to a fixture; returns the uniforms that change it at `step` in a
 /// scene of extent 1.
@@ -33,13 +35,14 @@ pub(super) fn holding(
     fixture: &mut Fixture,
     before: &Population,
     step: u32,
-    splits_long: bool,
+    (splits_long, grow_box): (bool, Option<[[f64; 3]; 2]>),
 ) -> Result<StepUniforms> {
     fixture.put_rows(MOMENTS_1, &before.m)?;
     fixture.put_rows(MOMENTS_2, &before.u)?;
     let stats: Vec<[f32; 2]> =
         before.gradient_sum.iter().zip(&before.gradient_count).map(|(&s, &n)| [s as f32, n as f32]).collect();
     fixture.engine.raw_mut().upload(Buf::DENSIFY_STATS, 0, 0, &stats)?;
+    let corner = |at: usize| grow_box.map_or([0.0; 3], |corners| corners[at].map(|value| value as f32));
     let (config, with_resets) = (&fixture.config, TrainConfig::paper());
     Ok(StepUniforms {
         densify_threshold: config.densify_grad_threshold,
@@ -48,6 +51,8 @@ pub(super) fn holding(
         prune_opacity: config.min_opacity,
         prune_big: u32::from(prunes_large_at(&with_resets, step)),
         split_long: u32::from(splits_long),
+        grow_low: corner(0),
+        grow_high: corner(1),
         seed: SEED,
         ..fixture.uniforms()
     })
@@ -94,7 +99,7 @@ impl Densified {
     pub fn new(fixture: &mut Fixture, before: Population, step: u32, splits_long: bool) -> Result<Self> {
         let rows = before.model.rows.len();
         fixture.engine.make_room_for_gaussians(2 * rows as u64 + 1)?;
-        let uniforms = holding(fixture, &before, step, splits_long)?;
+        let uniforms = holding(fixture, &before, step, (splits_long, splits_long.then_some(GROW)))?;
         let counted = fixture.engine.run(ListKey::DensifyCount, &uniforms)?.counters;
         let marks = fixture.get::<u32>(Buf::CHILDREN_COUNTS, rows)?;
         let applied = fixture.engine.run(ListKey::DensifyApply, &uniforms)?.counters;
@@ -109,7 +114,8 @@ impl Densified {
     /// of children may differ by `tolerance`.
     pub fn verdict(&self, rules: &Rules, tolerance: Tolerance) -> Verdict {
         let normal = |row: usize, child: u32, axis: usize| normal_draw(SEED, row as u32, 3 * child + axis as u32);
-        let rules = &Rules { splits_long: self.splits_long, ..rules.clone() };
+        let rules =
+            &Rules { splits_long: self.splits_long, grow_box: self.splits_long.then_some(GROW), ..rules.clone() };
         let expected = densify(rules, &self.before, 1.0, self.step, normal);
         let nearest = expected.margins.iter().copied().fold(f64::INFINITY, f64::min);
         if nearest <= 1e-6 {
@@ -141,7 +147,7 @@ pub struct Reset {
 impl Reset {
     /// Resets opacities; the fixture's model is the population.
     pub fn new(fixture: &mut Fixture, before: Population) -> Result<Self> {
-        let uniforms = holding(fixture, &before, 3000, false)?;
+        let uniforms = holding(fixture, &before, 3000, (false, None))?;
         fixture.engine.run(ListKey::OpacityReset, &uniforms)?;
         let count = before.model.rows.len();
         let planes =

@@ -3,7 +3,7 @@
 use super::compare::{Tolerance, Verdict, close, exact};
 use super::fixture::{Fixture, MOMENTS_1, MOMENTS_2, PARAMETERS};
 use super::judge;
-use super::model::{SEED, holding, rig_of, scene_of};
+use super::model::{GROW, SEED, holding, rig_of, scene_of};
 use super::scenes::{Shape, population, scene};
 use crate::engine::ListKey;
 use crate::error::{Error, Result};
@@ -47,7 +47,7 @@ impl Relocated {
     /// Relocates with this many draws; the fixture's model is the population.
     pub fn new(fixture: &mut Fixture, before: Population, draws: u32) -> Result<Self> {
         fixture.engine.make_room_for_gaussians(before.model.rows.len() as u64 + u64::from(draws))?;
-        let uniforms = holding(fixture, &before, 600, false)?;
+        let uniforms = holding(fixture, &before, 600, (false, Some(GROW)))?;
         let counted = fixture.engine.run(ListKey::RelocateCount, &uniforms)?.counters;
         let draws_per_weight = draws as f32 / counted.densified_count as f32;
         let uniforms = StepUniforms { draws, draws_per_weight, ..uniforms };
@@ -62,6 +62,7 @@ impl Relocated {
     /// Compares with the reference under `rules`. Everything must be copied exactly, except that opacities and scales of
     /// copies may differ by `tolerance`.
     pub fn verdict(&self, rules: &Rules, tolerance: Tolerance) -> Verdict {
+        let rules = &Rules { grow_box: Some(GROW), ..rules.clone() };
         let weights: u32 = weights(rules, &self.before).iter().map(|weight| weight.0).sum();
         exact(&[self.counted.densified_count], &[weights])?;
         let expected = relocate(rules, &self.before, self.draws, uniform_draw(SEED, NO_SPLAT, 0));
