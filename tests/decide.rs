@@ -87,3 +87,11 @@ fn contours_are_found_in_a_square() {
     assert_eq!(near, expected);
     assert!(map.near_contour(0).iter().all(|near| !near));
 }
+
+#[test]
+fn a_smaller_map_has_the_ids_at_the_middle_of_its_pixels() {
+    let map = LabelMap { width: 5, height: 2, ids: vec![1, 2, 3, 4, 5, 6, 7, 8, 9, 10] };
+    assert_eq!(map.resized(5, 2), map);
+    assert_eq!(map.resized(3, 1).ids, [6, 8, 10]);
+    assert_eq!(map.resized(1, 2).ids, [3, 8]);
+}

@@ -42,6 +42,14 @@ impl LabelMap {
         (0..).zip(&seen).filter(|(_, word)| **word != 0).flat_map(of_word).collect()
     }
 
+    /// Returns the map at a size of at least 1 x 1 px, by the id at the middle of each pixel.
+    pub fn resized(&self, width: u32, height: u32) -> Self {
+        let from =
+            |to: u32, size: u32, full: u32| ((u64::from(to) * 2 + 1) * u64::from(full) / (2 * u64::from(size))) as u32;
+        let row = |y: u32| (0..width).map(move |x| self.at(from(x, width, self.width), from(y, height, self.height)));
+        Self { width, height, ids: (0..height).flat_map(row).collect() }
+    }
+
     /// Returns true for pixels with another id within `distance` px, in a square window.
     pub fn near_contour(&self, distance: u32) -> Vec<bool> {
         let (width, height) = (self.width as usize, self.height as usize);

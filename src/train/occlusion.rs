@@ -49,7 +49,8 @@ impl Trainer {
 
     /// Updates the occluders from the rendered depth of every view with masks. Nothing may be in flight.
     pub fn refresh_occluders(&mut self) -> Result<()> {
-        let options = RenderOptions { parts: Parts::DEPTH, ..self.render_options() };
+        // Depth has no colour.
+        let options = RenderOptions { sh_degree: Some(0), ..RenderOptions::new(self.config.near, Parts::DEPTH) };
         for index in 0..self.views.len() {
             let view = &self.views[index];
             let Some(mask) = &view.mask else { continue };

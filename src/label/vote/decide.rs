@@ -4,7 +4,7 @@ use super::ballot::{Ballot, Sweep, Voter, sweep, weight};
 use crate::engine::Engine;
 use crate::error::{Error, Result};
 use crate::render::label_map;
-use crate::scene::{Gaussians, LabelMap, UNLABELLED};
+use crate::scene::{Camera, Gaussians, LabelMap, UNLABELLED};
 use kiddo::{ImmutableKdTree, SquaredEuclidean};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
@@ -15,6 +15,9 @@ use std::num::NonZero;
 const EVIDENCE: f64 = 1.0;
 /// Number of these neighbours.
 const NEIGHBOURS: usize = 8;
+/// Least longest side at which masks are compared with the labels of the model, px. An agreement is a ratio over many
+/// pixels, and needs fewer of them than the votes.
+const JUDGED_PX: f64 = 160.0;
 
 /// The labels of a model.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -106,6 +109,15 @@ fn tree_of(means: &[[f32; 3]], totals: &[f64]) -> Result<Option<(ImmutableKdTree
     Ok(Some((tree, rows)))
 }
 
+/// Returns camera and mask at the size at which masks are judged: half of the full one, but no less than
+/// [`JUDGED_PX`].
+fn judged(voter: &Voter) -> (Camera, LabelMap) {
+    let (width, height) = (voter.camera.width, voter.camera.height);
+    let share = (JUDGED_PX / f64::from(width.max(height))).clamp(0.5, 1.0);
+    let side = |full: u32| ((f64::from(full) * share).round() as u32).max(1);
+    (voter.camera.resized(side(width), side(height)), voter.mask.resized(side(width), side(height)))
+}
+
 /// For each label, the number of mask pixels where the model shows the same label, and of all its mask pixels.
 pub type Agreement = BTreeMap<u16, (u64, u64)>;
 
@@ -159,7 +171,8 @@ pub(crate) fn count(
 ) -> Result<Decision> {
     let mut agreements = Vec::new();
     for voter in voters.iter().filter(|_| is_judged) {
-        agreements.push(agreement(voter.mask, &label_map(engine, voter.camera, how.near)?));
+        let (camera, mask) = judged(voter);
+        agreements.push(agreement(&mask, &label_map(engine, &camera, how.near)?));
     }
     let trusts = trust(&agreements);
     let voters: Vec<Voter> =
