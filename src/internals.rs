@@ -211,6 +211,9 @@ pub mod train {
     pub use crate::train::setup::{TrainerOptions, engine_size};
     pub use crate::train::state::TrainState;
     pub use crate::train::{StepReport, Trainer, first_model};
+    pub mod exposure {
+        pub use crate::train::exposure::{Exposure, decided};
+    }
     pub mod shared {
         pub use crate::train::shared::{SharedLayout, SharedParameters};
     }

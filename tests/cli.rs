@@ -94,7 +94,7 @@ fn every_setting_has_a_flag_with_its_default() {
     }
     assert!(
         help.contains(
-            "where ours differ: --iterations 15000 --start-size 1.0 --full-size-from 0 --strategy adc --free-space off --far-points 0"
+            "where ours differ: --iterations 15000 --start-size 1.0 --full-size-from 0 --exposure off --strategy adc --free-space off --far-points 0"
         ) && help.contains("--label-rule main")
             && help.contains("--densify-until 40000 --densify-interval 100 --opacity-reset-interval 3000"),
         "{help}"
@@ -179,7 +179,7 @@ fn a_flag_has_one_heading() {
 }
 
 /// A value other than the default for each setting.
-const TYPED: [(&str, &str); 58] = [
+const TYPED: [(&str, &str); 59] = [
     ("--iterations", "7"),
     ("--max-resolution", "99"),
     ("--start-size", "0.7"),
@@ -189,6 +189,7 @@ const TYPED: [(&str, &str); 58] = [
     ("--prune-share", "0.2"),
     ("--free-space", "off"),
     ("--far-points", "30"),
+    ("--exposure", "on"),
     ("--grow-box", "-1,-2,0,1,2,3.5"),
     ("--rate-factor", "1.5"),
     ("--rate-final", "0.5"),

@@ -18,6 +18,7 @@ const SCENE: SynthOptions = SynthOptions {
     seed: 1,
     lens: SynthLens::PINHOLE,
     fov: None,
+    vary_exposure: false,
 };
 /// Steps at half of the size.
 const COARSE: u32 = 6;

@@ -17,6 +17,7 @@ const SCENE: SynthOptions = SynthOptions {
     seed: 1,
     lens: SynthLens::PINHOLE,
     fov: None,
+    vary_exposure: false,
 };
 
 /// Model after a few labelled steps with initial capacity `room`, and whether the (splat, tile) pairs had to grow.

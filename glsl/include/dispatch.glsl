@@ -1,6 +1,4 @@
-// One-dimensional work folded over two axes, because one axis has at most 65,535 groups.
-
-const uint FOLD = 32768u;
+// One-dimensional work folded over two axes, because one axis has at most 65,535 groups. Needs constants.glsl.
 
 uint linear_group_id() {
     return gl_WorkGroupID.y * FOLD + gl_WorkGroupID.x;

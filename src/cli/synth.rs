@@ -39,6 +39,9 @@ pub struct SynthArgs {
     /// Field of view across the picture, degrees. Default: 50 in a picture of 4 : 3; EQUIRECTANGULAR shows everything.
     #[arg(long, value_name = "DEGREES")]
     pub fov: Option<u32>,
+    /// Photos with gains of 0.7 to 1.4 and colour casts, each its own, as of a camera that chooses its exposure.
+    #[arg(long)]
+    pub vary_exposure: bool,
     /// JSON.
     #[command(flatten)]
     pub json: JsonFlag,
@@ -55,6 +58,7 @@ pub(crate) fn run(args: &SynthArgs, context: &Context) -> Result<()> {
         seed: args.seed,
         lens: args.lens,
         fov: args.fov,
+        vary_exposure: args.vary_exposure,
     };
     interrupt::note_only();
     let progress = RefCell::new(Progress::new(u64::from(options.views), "views", &context.global));

@@ -6,6 +6,7 @@
 
 pub(crate) mod boundary;
 pub(crate) mod compared;
+mod corrected;
 pub(crate) mod crop;
 pub(crate) mod evaluate;
 pub(crate) mod lpips;

@@ -3,6 +3,7 @@
 //! Averages over objects are over pairs of view and object, as in the paper's published evaluation.
 
 use super::boundary::boundary_iou;
+use super::corrected::psnr_corrected;
 use super::crop::Crop;
 use super::metrics::{COVERED, Overlap, byte_value, mean, paper_score, psnr, psnr_of};
 use super::regions::RegionScores;
@@ -47,6 +48,8 @@ pub struct ObjectScores {
 pub struct ViewScores {
     /// PSNR of the clamped render over the photo's valid pixels, dB.
     pub psnr: f64,
+    /// The same after the best affine map of the render's colours to the photo's, dB.
+    pub psnr_corrected: f64,
     /// SSIM over the photo's valid pixels.
     pub ssim: f64,
     /// PSNR by region, if the training views are known.
@@ -107,7 +110,12 @@ impl ViewScores {
         if lengths.into_iter().flatten().any(|length| length != pixels) {
             return Err(Error::Bug("render, label map, mask and photo differ in size".into()));
         }
-        let mut scores = Self { psnr: psnr(render, photo), ssim: ssim(render, photo), ..Self::default() };
+        let mut scores = Self {
+            psnr: psnr(render, photo),
+            psnr_corrected: psnr_corrected(render, photo),
+            ssim: ssim(render, photo),
+            ..Self::default()
+        };
         let valid = |index: usize| photo.rgba[index][3] > 0;
         for id in mask.into_iter().flat_map(LabelMap::objects) {
             let mut row = ObjectScores::default();
@@ -190,6 +198,8 @@ fn ssim_around(render: &[[f32; 3]], photo: &Photo, mask: &[bool], left_out: impl
 pub struct MeanScores {
     /// Mean PSNR over views, dB.
     pub psnr: Option<f64>,
+    /// Mean PSNR over views after a correction of each view's colours, dB.
+    pub psnr_corrected: Option<f64>,
     /// Mean SSIM over views.
     pub ssim: Option<f64>,
     /// Means over views by region, if the training views are known.
@@ -264,6 +274,7 @@ impl Scores {
             schema_version: 1,
             mean: MeanScores {
                 psnr: mean(views.values().map(|view| view.psnr)),
+                psnr_corrected: mean(views.values().map(|view| view.psnr_corrected)),
                 ssim: mean(views.values().map(|view| view.ssim)),
                 regions: RegionScores::mean(views.values().filter_map(|view| view.regions.as_ref())),
                 objects: average(&pairs),

@@ -6,6 +6,8 @@ use std::path::{Path, PathBuf};
 
 /// File with the settings of the run, in TOML.
 pub const CONFIG: &str = "config.toml";
+/// Name of the file with the gains of the photos.
+pub(crate) const EXPOSURES: &str = "exposures.json";
 /// File that is locked while a run writes into the folder.
 const LOCK: &str = ".labelgs-lock";
 

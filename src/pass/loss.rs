@@ -3,6 +3,7 @@
 use super::build::{Builder, ONE};
 use crate::pass::build::pass;
 use crate::scheduler::plan::{Buf, Grid, Stage};
+use crate::shaders::constants;
 
 /// Rows or columns that one lane filters in registers (glsl/include/window.glsl).
 const STRIP: u32 = 8;
@@ -30,6 +31,36 @@ pub(crate) fn photo_loss(b: &mut Builder, width: u32, height: u32) {
 pub(super) fn reduce_last(b: &mut Builder, width: u32, height: u32) {
     b.list.stage = Stage::Loss;
     reduce(b, partials(b.shape.subgroup, width, height));
+}
+
+/// Multiplies the picture by the exposure of its photo.
+pub(crate) fn expose(b: &mut Builder) {
+    b.list.stage = Stage::Loss;
+    pass!(b, expose {
+        step: Buf::STEP, step_rows: Buf::STEP_ROWS, shared_parameters: Buf::SHARED, image: Buf::IMAGE,
+    } [], over_pixels(b, 64));
+}
+
+/// Undoes [`expose`], in the gradient of the picture too, and writes the gradient of the exposure.
+pub(crate) fn expose_backward(b: &mut Builder) {
+    b.list.stage = Stage::Loss;
+    // The maps of SSIM are not needed any more.
+    let partials = Buf::SSIM_B;
+    pass!(b, expose_backward {
+        step: Buf::STEP, step_rows: Buf::STEP_ROWS, shared_parameters: Buf::SHARED, image: Buf::IMAGE,
+        v_image: Buf::V_IMAGE, exposure_partials: partials, target: Buf::TARGET,
+    } [], over_pixels(b, u64::from(constants::EXPOSED)));
+    let rows = b.capacity.shared_rows as u32;
+    pass!(b, expose_reduce {
+        step: Buf::STEP, step_rows: Buf::STEP_ROWS, shared_parameters: Buf::SHARED, exposure_partials: partials,
+        v_shared: Buf::V_SHARED,
+    } [rows: rows], ONE);
+}
+
+/// Grid over the pixels of an image, `each` per workgroup.
+fn over_pixels(b: &Builder, each: u64) -> Grid {
+    let groups = b.capacity.pixels.div_ceil(each).max(1) as u32;
+    Grid::Groups(groups.min(constants::FOLD), groups.div_ceil(constants::FOLD), 1)
 }
 
 /// Sums the label loss of the layers, without the photo loss.

@@ -65,6 +65,7 @@ impl Run<'_> {
     pub(super) fn finish(&mut self, summary: &mut Summary, model: &Gaussians, kept: Result<bool>) -> Result<()> {
         let step = summary.steps;
         self.save_occluders()?;
+        self.save_exposures()?;
         if let Some(path) = preview::write(self)? {
             self.tell(Event::Preview { step, path: &path })?;
         }
@@ -121,6 +122,16 @@ impl Run<'_> {
             (None, _) => "rendered",
         };
         OcclusionTable::new(kind, views).write(&self.request.output.join(occlusion_table::FILE))
+    }
+
+    /// Writes the gains of the photos, if they were trained.
+    fn save_exposures(&mut self) -> Result<()> {
+        let gains = self.trainer.exposures()?;
+        if gains.is_empty() {
+            return Ok(());
+        }
+        let found = serde_json::json!({ "schema_version": 1, "gains": gains });
+        atomic::write_json(&self.request.output.join(run_folder::EXPOSURES), &found)
     }
 
     /// Scores the held-out views, and their objects if they have masks.

@@ -32,7 +32,7 @@ pub use settings::{RunOptions, Settings};
 pub use summary::Summary;
 
 pub use crate::train::{Densified, LabelRule, Occlusion, StepReport, TrainConfig};
-pub use crate::train::{Preset, StrategyKind};
+pub use crate::train::{ExposureMode, Preset, StrategyKind};
 
 use crate::error::Result;
 use crate::gpu::Gpu;

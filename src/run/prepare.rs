@@ -12,10 +12,12 @@ use crate::gpu::Gpu;
 use crate::io::label_table::LabelTable;
 use crate::io::occlusion_table::OcclusionTable;
 use crate::io::run_folder::Lock;
-use crate::io::{self, atomic, checkpoint_folder};
+use crate::io::{self, atomic, capture, checkpoint_folder};
 use crate::scene::{Dataset, Gaussians};
 use crate::scheduler::SchedulerOptions;
-use crate::train::{self, TrainConfig, Trainer};
+use crate::train::exposure::{self, Exposure};
+use crate::train::setup::TrainerOptions;
+use crate::train::{self, ExposureMode, TrainConfig, Trainer};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
@@ -143,7 +145,7 @@ pub(super) fn begin<'a>(
     let checkpoints = Checkpoints::new(out, lock, record, resumed.as_ref().map(|resumed| &resumed.state))?;
     let mut trainer = match resumed {
         Some(resumed) => Trainer::resume(gpu, &dataset, resumed.state, options)?,
-        None => start(gpu, (&settings.train, first), &dataset, table.as_ref(), options)?,
+        None => start(gpu, (&settings.train, first), (&request.scene, &dataset), table.as_ref(), options)?,
     };
     info.plan(&mut trainer);
     // The near plane is decided now.
@@ -175,7 +177,7 @@ fn recorded(masks: Option<&Path>) -> Option<PathBuf> {
 fn start(
     gpu: Arc<Gpu>,
     (config, first): (&TrainConfig, Option<Gaussians>),
-    dataset: &Dataset,
+    (scene, dataset): (&Path, &Dataset),
     occluders: Option<&OcclusionTable>,
     options: SchedulerOptions,
 ) -> Result<Trainer> {
@@ -192,6 +194,15 @@ fn start(
         size.image.0,
         size.image.1
     );
+    let gains = match config.exposure {
+        ExposureMode::Off => Vec::new(),
+        ExposureMode::Auto | ExposureMode::On => capture::gains(scene, dataset)?,
+    };
+    let config = exposure::decided(&config, &gains);
+    let mut options = TrainerOptions::from(options);
+    if config.exposure == ExposureMode::On {
+        options.shared = Exposure::new(&gains).into();
+    }
     let mut trainer = Trainer::new(gpu, config, dataset, &model, options)?;
     if let Some(table) = occluders {
         let without = trainer.set_occluders(&table.views);

@@ -5,6 +5,7 @@
 //! Gaussians, so a score on them does not compare the engine with itself.
 
 pub(crate) mod cameras;
+mod exposure;
 mod hard;
 mod lens;
 mod material;
@@ -63,6 +64,8 @@ pub struct SynthOptions {
     pub lens: SynthLens,
     /// Field of view across the picture, degrees; `None` is 50 degrees in a picture of 4 : 3. A panorama ignores it.
     pub fov: Option<u32>,
+    /// Photos have exposures and white balances of their own, as of a camera that chooses them.
+    pub vary_exposure: bool,
 }
 
 impl Default for SynthOptions {
@@ -76,6 +79,7 @@ impl Default for SynthOptions {
             seed: 0,
             lens: SynthLens::default(),
             fov: None,
+            vary_exposure: false,
         }
     }
 }
@@ -93,7 +97,8 @@ pub fn dataset(options: &SynthOptions, test_every: u32) -> Dataset {
     for (index, camera) in cameras.iter().enumerate() {
         let made = picture(&world, camera, index as u32);
         let (width, height) = (camera.width, camera.height);
-        let rgba = made.rgb.iter().map(|&[r, g, b]| [r, g, b, 255]).collect();
+        let rgb = exposure::exposed(options, index as u32, made.rgb);
+        let rgba = rgb.iter().map(|&[r, g, b]| [r, g, b, 255]).collect();
         let ids = made.ids.iter().map(|&id| u16::from(id)).collect();
         let view = View {
             name: view_name(index),

@@ -6,7 +6,7 @@ use super::points::Seen;
 use super::cameras::ring_of_cameras;
 use super::trace::{Picture, alone, photo, photograph, picture};
 use super::world::World;
-use super::{SynthLens, SynthOptions, lens, points, view_name};
+use super::{SynthLens, SynthOptions, exposure, lens, points, view_name};
 use crate::io::label_table::{self, LabelEntry, LabelTable};
 use crate::io::lens::Optics;
 use crate::io::{ReadOptions, atomic, image};
@@ -51,7 +51,8 @@ pub fn write(options: &SynthOptions, folder: &Path, after_view: &dyn Fn(u32) -> 
         let camera = &optics.camera;
         if optics.lens.is_pinhole() {
             let made = picture(&world, camera, index as u32);
-            write_photo(folder, index, camera, &made.rgb, &made.ids)?;
+            let rgb = exposure::exposed(options, index as u32, made.rgb.clone());
+            write_photo(folder, index, camera, &rgb, &made.ids)?;
             write_truth(folder, index, &world, camera, &made)?;
             if index.is_multiple_of(ReadOptions::default().test_every as usize) {
                 write_without(folder, index, &world, camera)?;
@@ -60,7 +61,7 @@ pub fn write(options: &SynthOptions, folder: &Path, after_view: &dyn Fn(u32) -> 
         } else {
             // The other pictures are compared with renderings, which are pinhole pictures.
             let (rgb, ids) = photograph(&world, optics, index as u32);
-            write_photo(folder, index, camera, &rgb, &ids)?;
+            write_photo(folder, index, camera, &exposure::exposed(options, index as u32, rgb), &ids)?;
             count(&mut table, &ids);
         }
         after_view(index as u32 + 1)?;

@@ -3,58 +3,11 @@
 //! Most defaults are those of LabelGS and 3DGS, from the paper or the code. "LabelGS" below is the paper (arXiv
 //! 2508.19699) with its authors' code, "3DGS" is Kerbl et al. 2023 with its code.
 
+use super::kinds::{ExposureMode, LabelRule, Occlusion, StrategyKind};
 use crate::options::Options;
 #[cfg(feature = "cli")]
 use crate::options::parse::{colour, corners, count, samples, switch};
 use crate::{Error, Result};
-use serde::{Deserialize, Serialize};
-
-/// The source of the occluders for the label loss.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
-#[serde(rename_all = "lowercase")]
-pub enum Occlusion {
-    /// No occluders: every pixel outside an object's mask is expected to be black.
-    None,
-    /// Monocular depth from files, --depths, by the paper's rule: the object with the smaller mean depth along the
-    /// contour is in front.
-    Depth,
-    /// Depth of the model itself, rendered every --occlusion-every steps. The paper uses monocular depth of a network
-    /// instead.
-    #[default]
-    Rendered,
-    /// Lists from a file, --occlusion-file.
-    #[cfg_attr(feature = "cli", value(skip))]
-    File,
-}
-
-/// The rule for the number of Gaussians.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
-#[serde(rename_all = "lowercase")]
-pub enum StrategyKind {
-    /// Growth where it helps most, within a budget that rises over the run.
-    #[default]
-    Budget,
-    /// Relocation of 3DGS-MCMC: dead Gaussians become copies of others, and faint ones move at random.
-    Mcmc,
-    /// Adaptive density control of 3DGS: every large gradient grows.
-    Adc,
-}
-
-/// The rule that gives a Gaussian its label.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
-#[serde(rename_all = "lowercase")]
-pub enum LabelRule {
-    /// The label of the pixels in the step's view where the Gaussian has the largest weight; the last view wins
-    /// (LabelGS).
-    Main,
-    /// The label with the largest sum of weights over the pixels of all views, counted every --vote-every steps and at
-    /// the end.
-    #[default]
-    Votes,
-}
 
 crate::options::options! {
     /// The settings of a training. `Default` follows the paper except where measurements favour other
@@ -100,6 +53,11 @@ crate::options::options! {
             /// Black (LabelGS, 3DGS). The label loss always uses black.
             #[cfg_attr(feature = "cli", arg(value_parser = colour))]
             background <"COLOUR">: [f32; 3] = [0.0; 3], up_to(1.0), fixed;
+
+            /// Trains the exposure and white balance of each photo.
+            ///
+            /// The picture is multiplied by gains of its photo before it is compared; the model has the mean exposure.
+            exposure <"MODE">: ExposureMode = ExposureMode::Auto, fixed;
 
             /// Near plane, world units: nearer Gaussians are not drawn.
             ///

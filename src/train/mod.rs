@@ -5,8 +5,10 @@
 //! with folder, checkpoints and scores.
 
 pub(crate) mod config;
+pub(crate) mod exposure;
 mod first;
 pub(crate) mod free_space;
+pub(crate) mod kinds;
 pub(crate) mod near;
 mod occlusion;
 mod presets;
@@ -23,9 +25,10 @@ mod timing;
 mod views;
 mod votes;
 
-pub use config::{LabelRule, Occlusion, StrategyKind, TrainConfig};
+pub use config::TrainConfig;
 pub use first::first_model;
 pub(crate) use first::go_on_from;
+pub use kinds::{ExposureMode, LabelRule, Occlusion, StrategyKind};
 pub use presets::Preset;
 pub(crate) use setup::{TrainerOptions, engine_size, start_size};
 pub(crate) use state::{TrainState, ViewFingerprint};
@@ -43,7 +46,7 @@ use crate::scheduler::plan::FRAMES_IN_FLIGHT;
 use crate::shaders::structs::StepUniforms;
 use sampler::ViewOrder;
 use shared::Shared;
-use std::collections::VecDeque;
+use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
 use step_input::{SceneScale, StepInput, TrainView};
 use strategy::{At, Bound, Population, Strategy};
@@ -135,6 +138,7 @@ impl Trainer {
         TrainerOptions { shape, scheduler, strategy, shared }: TrainerOptions,
     ) -> Result<Self> {
         let fixed = SceneScale { extent: dataset.extent() };
+        let shared = shared.or_of(&config);
         let strategy = strategy.unwrap_or_else(|| strategy::of(config.strategy));
         let most = if config.max_gaussians > 0 { config.max_gaussians } else { u64::from(u32::MAX) };
         let views =
@@ -224,6 +228,16 @@ impl Trainer {
     pub fn render_options(&self) -> RenderOptions {
         let (near, background) = (self.config.near, self.config.background);
         RenderOptions { near, background, sh_degree: Some(self.sh_degree()), ..RenderOptions::default() }
+    }
+
+    /// Returns the gains of each training photo, r, g, b, by name; none without exposure. Nothing may be in flight.
+    pub fn exposures(&mut self) -> Result<BTreeMap<String, [f32; 3]>> {
+        if self.config.exposure != ExposureMode::On {
+            return Ok(BTreeMap::new());
+        }
+        let rows = self.engine.shared()?;
+        let gains = rows.iter().map(|&[r, g, b, _]| [r, g, b].map(f32::exp));
+        Ok(self.views.iter().map(|view| view.name.clone()).zip(gains).collect())
     }
 
     /// Reads the model back. Steps that failed for lack of memory have not changed it.

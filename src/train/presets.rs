@@ -1,6 +1,6 @@
 //! Whole sets of settings: presets for a newcomer, the schedule of 3DGS, the paper.
 
-use super::{LabelRule, StrategyKind, TrainConfig};
+use super::{ExposureMode, LabelRule, StrategyKind, TrainConfig};
 
 /// How long and how fine a training is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -41,6 +41,7 @@ impl TrainConfig {
         Self {
             iterations: 15_000,
             strategy: StrategyKind::Adc,
+            exposure: ExposureMode::Off,
             layer_every: Some(1),
             start_size: Some(1.0),
             free_space: false,

@@ -60,7 +60,7 @@ impl TrainConfig {
     }
 
     /// Returns the factor by which all rates have fallen at `step`.
-    fn rate_fall(&self, step: u32) -> f64 {
+    pub(super) fn rate_fall(&self, step: u32) -> f64 {
         let from = self.rate_fall_from.unwrap_or(self.share(0.6)).min(self.iterations);
         let late = f64::from(step.saturating_sub(from)) / f64::from((self.iterations - from).max(1));
         self.rate_final.powf(late.min(1.0))

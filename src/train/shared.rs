@@ -6,7 +6,9 @@
 //! correction of a row counts its own updates, so that the first update of a photo has the right length however late it
 //! comes.
 
+use super::exposure::Exposure;
 use super::strategy::At;
+use super::{ExposureMode, TrainConfig};
 use crate::engine::SharedRow;
 use crate::error::{Error, Result};
 use crate::pass::{Builder, Extension, Hook};
@@ -74,6 +76,14 @@ impl<P: SharedParameters + 'static> From<P> for Shared {
 }
 
 impl Shared {
+    /// Returns the parameters, or those that the configuration asks for.
+    pub(super) fn or_of(self, config: &TrainConfig) -> Self {
+        match (self.0, config.exposure) {
+            (None, ExposureMode::On) => Exposure::default().into(),
+            (given, _) => Self(given),
+        }
+    }
+
     fn layout(&self) -> SharedLayout {
         self.0.as_ref().map(|parameters| parameters.layout()).unwrap_or_default()
     }

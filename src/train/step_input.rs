@@ -1,7 +1,7 @@
 //! The input of one step: uniforms, photo, masks.
 
+use super::LabelRule;
 use super::TrainConfig;
-use super::config::LabelRule;
 use crate::engine::{DisagreementInput, Engine, LayerInput, TrainInput};
 use crate::io::resample::shrink_photo;
 use crate::scene::{Camera, LabelMap, Occluders, Photo};

@@ -10,11 +10,13 @@ fn number(value: Option<f64>, digits: usize) -> String {
 
 /// Returns the table of views, then of objects.
 pub(super) fn own_table(scores: &Scores) -> String {
-    let mut text = format!("{:>10} {:>8} {:>8}\n", "view", "PSNR", "SSIM");
+    let mut text = format!("{:>10} {:>8} {:>9} {:>8}\n", "view", "PSNR", "corrected", "SSIM");
     for (name, view) in &scores.views {
-        text += &format!("{name:>10} {:>8.2} {:>8.4}\n", view.psnr, view.ssim);
+        text += &format!("{name:>10} {:>8.2} {:>9.2} {:>8.4}\n", view.psnr, view.psnr_corrected, view.ssim);
     }
-    text += &format!("{:>10} {:>8} {:>8}\n", "mean", number(scores.mean.psnr, 2), number(scores.mean.ssim, 4));
+    let mean = &scores.mean;
+    let cells = (number(mean.psnr, 2), number(mean.psnr_corrected, 2), number(mean.ssim, 4));
+    text += &format!("{:>10} {:>8} {:>9} {:>8}\n", "mean", cells.0, cells.1, cells.2);
     text += &regions(scores);
     if scores.objects.is_empty() {
         return text;

@@ -5,12 +5,15 @@ mod neighbours;
 mod photos;
 mod poses;
 
+use super::colmap::Seen;
 use super::listed_path::Place;
-use super::window::windows;
+use super::listing::Listed;
+use super::window::{Window, windows};
 use super::{colmap, folder_of};
 use crate::error::Result;
 use crate::scene::{Dataset, View};
 use serde::Serialize;
+use std::collections::BTreeMap;
 use std::path::Path;
 
 /// A kind of fault in a capture.
@@ -50,7 +53,7 @@ impl Fault {
             Self::Reprojection => "leave the photo out, or adjust the reconstruction again",
             Self::Blur => "leave the photo out",
             Self::Exposure | Self::WhiteBalance => {
-                "take photos with fixed exposure and white balance, or equalise them"
+                "train gains of each photo (exposure), or take photos with fixed exposure and white balance"
             }
             Self::Alone => "leave the photo out, or add photos between it and the others",
             Self::Scale => "scale and centre the reconstruction, or remove stray points",
@@ -113,14 +116,43 @@ pub struct Report {
     pub findings: Vec<Finding>,
 }
 
+/// What the reconstruction says of each photo: which points it shows.
+struct Observed {
+    photos: BTreeMap<String, (Listed, Vec<Seen>)>,
+    windows: BTreeMap<String, Window>,
+}
+
+impl Observed {
+    fn read(scene: &Path) -> Result<Self> {
+        // Opening the scene has checked its paths.
+        let photos = colmap::observations(&Place::new(folder_of(scene), true))?.unwrap_or_default();
+        Ok(Self { photos, windows: windows(scene)? })
+    }
+
+    fn of(&self, view: &View) -> Option<&(Listed, Vec<Seen>)> {
+        self.photos.get(self.windows.get(&view.name).map_or(&view.name, |window| &window.photo))
+    }
+}
+
+/// Returns how bright each training photo is relative to the others at the points that it shares with them: median
+/// factors of red, green and blue, or `None` with too few such points.
+pub fn gains(scene: &Path, dataset: &Dataset) -> Result<Vec<Option<[f64; 3]>>> {
+    if dataset.points.is_empty() {
+        return Ok(vec![None; dataset.train.len()]);
+    }
+    let observed = Observed::read(scene)?;
+    let views: Vec<&View> = dataset.train.iter().collect();
+    let observed: Vec<_> = views.iter().map(|view| observed.of(view)).collect();
+    let seen = neighbours::seen(&views, &dataset.points, &observed);
+    let gains = photos::gains(&views, &seen, &dataset.points);
+    Ok(gains.into_iter().map(|of| of.map(|of| of.channels)).collect())
+}
+
 /// Scans a scene that was read with its photos.
 pub fn scan(scene: &Path, dataset: &Dataset) -> Result<Report> {
-    // Opening the scene has checked its paths.
-    let observed = colmap::observations(&Place::new(folder_of(scene), true))?.unwrap_or_default();
+    let looked = Observed::read(scene)?;
     let views: Vec<&View> = dataset.all();
-    let windows = windows(scene)?;
-    let of_photo = |view: &&View| observed.get(windows.get(&view.name).map_or(&view.name, |window| &window.photo));
-    let observed: Vec<_> = views.iter().map(of_photo).collect();
+    let observed: Vec<_> = views.iter().map(|view| looked.of(view)).collect();
     let seen = neighbours::seen(&views, &dataset.points, &observed);
     let shared = neighbours::shared(&seen, dataset.points.len());
     let errors: Vec<Option<f64>> = observed.iter().map(|of| of.and_then(poses::error)).collect();
@@ -142,7 +174,7 @@ pub fn scan(scene: &Path, dataset: &Dataset) -> Result<Report> {
     findings.extend(neighbours::findings(&reports, dataset.points.len()));
     findings.extend(poses::scale(dataset));
     // The faces of a wide photo look at other things than their neighbours: sky is smooth, and no other photo shows it.
-    let is_face = |name: &String| windows.get(name).is_some_and(|window| window.photo != window.name);
+    let is_face = |name: &String| looked.windows.get(name).is_some_and(|window| window.photo != window.name);
     findings.retain(|of| !matches!(of.fault, Fault::Blur | Fault::Alone) || !of.view.as_ref().is_some_and(is_face));
     findings.sort_by(|a, b| (a.fault, &a.view).cmp(&(b.fault, &b.view)));
     let known = || reports.iter().filter_map(|view| view.gain);

@@ -8,6 +8,7 @@ pub mod adam;
 pub mod blend;
 pub mod densify;
 pub mod disagreement;
+pub mod exposure;
 pub mod lift;
 pub mod loss;
 pub mod model;

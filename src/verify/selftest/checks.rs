@@ -35,7 +35,7 @@ const MARGIN: f64 = 1e-4;
 const COLOUR: Tolerance = Tolerance { absolute: 6.5e-7 * LEEWAY, relative: 0.0 };
 const CUT: Band = Band { width: MARGIN, flip: 0.01, ratio: 0.005 };
 
-const fn bounds(element: f64, whole: f64) -> GradientBounds {
+pub(super) const fn bounds(element: f64, whole: f64) -> GradientBounds {
     GradientBounds {
         element: Tolerance { absolute: element * LEEWAY, relative: 10.0 * element * LEEWAY },
         outliers: 0.0,

@@ -1,7 +1,7 @@
 //! A scene on the device: runs the engine's own pass lists and reads all buffers back.
 
 use super::scenes::Scene;
-use crate::engine::{Engine, EngineSize, Input, LabelSize, ListKey, Report};
+use crate::engine::{Engine, EngineSize, Input, LabelSize, ListKey, Report, SharedRow, TrainInput};
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::pass::{KernelShape, Variant};
@@ -63,6 +63,8 @@ pub struct Fixture {
     pub fixed: SceneScale,
     /// Another camera with free space on the way to it, and the near plane there.
     pub free_space: Option<(Camera, f32)>,
+    /// Shared rows of the step.
+    pub(crate) shared: Vec<SharedRow>,
 }
 
 /// Scheduler options that keep every buffer readable.
@@ -108,13 +110,24 @@ impl Fixture {
         shape: KernelShape,
         options: SchedulerOptions,
     ) -> Result<Self> {
+        Self::with_rows(gpu, scene, labels, (shape, options), 0)
+    }
+
+    /// Same as [`Fixture::new`], with a number of shared rows.
+    pub(crate) fn with_rows(
+        gpu: Arc<Gpu>,
+        scene: Scene,
+        labels: bool,
+        (shape, options): (KernelShape, SchedulerOptions),
+        rows: u32,
+    ) -> Result<Self> {
         let labels_size = labels.then(|| LabelSize {
             max_label: scene.target.label_map.iter().copied().max().unwrap_or(0).max(1),
             layers: scene.target.slots.len() as u32,
             vote_columns: VOTE_COLUMNS,
         });
         let room = EngineSize::new(scene.gaussians.len().max(1) as u64, (scene.camera.width, scene.camera.height));
-        let room = room.for_training().with_labels(labels_size);
+        let room = room.for_training().with_labels(labels_size).with_shared_rows(rows);
         let mut engine = Engine::with_shape(gpu, shape, room, options)?;
         engine.upload_model(&scene.gaussians)?;
         let config = TrainConfig {
@@ -132,8 +145,8 @@ impl Fixture {
             if labels { scene.target.slots.iter().map(|slot| slot.label as u16).collect() } else { Vec::new() };
         let input = StepInput { step: 1, view: 0, layers, labels, update: false, updates: 1 };
         let view = train_view(&scene);
-        let mut fixture =
-            Self { view, engine, scene, input, config, fixed: SceneScale { extent: 1.0 }, free_space: None };
+        let fixed = SceneScale { extent: 1.0 };
+        let mut fixture = Self { view, engine, scene, input, config, fixed, free_space: None, shared: Vec::new() };
         let weights = step_input::layer_weights(&fixture.input, &fixture.view, &fixture.config);
         fixture.scene.target.slots.iter_mut().zip(weights).for_each(|(slot, weight)| slot.weight = f64::from(weight));
         Ok(fixture)
@@ -192,7 +205,7 @@ impl Fixture {
     pub fn train_as(&mut self, key: ListKey) -> Result<Report> {
         let uniforms = self.uniforms();
         let data = step_input::train_input(&self.input, &self.view, &self.config, uniforms, &self.engine);
-        self.engine.run(key, &data)
+        self.engine.run(key, &TrainInput { shared: self.shared.clone(), ..data })
     }
 
     /// Writes the host inputs of a step, for the caller's own lists.

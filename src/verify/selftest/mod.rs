@@ -2,6 +2,7 @@
 
 mod checks;
 pub mod compare;
+pub mod exposure;
 pub mod fixture;
 pub mod judge;
 pub mod model;
@@ -104,13 +105,14 @@ pub fn passes(
 /// Runs the checks of passes that change the model.
 pub fn changes(rules: &Rules, gpu: &Arc<Gpu>, kernels: KernelShape, mut done: impl FnMut(Check)) -> Result<()> {
     type Change = fn(&Rules, &Arc<Gpu>, KernelShape, f64) -> Result<Verdict>;
-    let changes: [(&str, Change); 7] = [
+    let changes: [(&str, Change); 8] = [
         ("densification", model::densification),
         ("densification along the longest axis", model::long_splits),
         ("marks of fog", model::fog_of_a_step),
         ("relocation", relocation::relocation),
         ("random moves", relocation::exploration),
         ("reset of opacities", model::reset),
+        ("exposure of a photo", exposure::exposure_of_a_step),
         ("lift of labels by the paper's rule", model::lift_of_a_step),
     ];
     for (name, change) in changes {

@@ -1,0 +1,46 @@
+#version 460
+#include "layout.glsl"
+#include "constants.glsl"
+#include "step.glsl"
+// expose_reduce — gradient of the gains of the step's photo.
+// Work:    one workgroup.
+// Reads:   step; step_rows [0], the row of the photo; exposure_partials; shared_parameters [ROWS]
+// Writes:  v_shared [row]
+// Math:    the sum of the partials, and EXPOSURE_PRIOR times the mean of ln gain over all photos: the model can be
+//          brighter and all photos darker, so that the data leave this mean open. It stays near 0.
+// Order:   fixed, bitwise reproducible.
+// Mirror:  src/verify/reference/exposure.rs::backward
+
+layout(constant_id = 17) const uint ROWS = 1;
+layout(local_size_x = 64) in;
+READ1(0, StepUniforms, step);
+READ(1, uint, step_rows);
+READ(2, vec4, shared_parameters);
+READ(3, vec4, exposure_partials);
+WRITE(4, vec4, v_shared);
+
+shared vec3 sums[64];
+shared vec3 means[64];
+
+void main() {
+    uint lane = gl_LocalInvocationID.x, partials = (step.width * step.height + EXPOSED - 1u) / EXPOSED;
+    vec3 sum = vec3(0.0), mean = vec3(0.0);
+    for (uint i = lane; i < partials; i += 64u) {
+        sum += exposure_partials[i].rgb;
+    }
+    for (uint row = lane; row < ROWS; row += 64u) {
+        mean += shared_parameters[row].rgb;
+    }
+    sums[lane] = sum;
+    means[lane] = mean;
+    for (uint half_ = 32u; half_ > 0u; half_ /= 2u) {
+        barrier();
+        if (lane < half_) {
+            sums[lane] += sums[lane + half_];
+            means[lane] += means[lane + half_];
+        }
+    }
+    if (lane == 0u) {
+        v_shared[step_rows[0]] = vec4(sums[0] + EXPOSURE_PRIOR / float(ROWS) * means[0], 0.0);
+    }
+}

@@ -1,0 +1,64 @@
+//! PSNR after a correction of colours: what is left of the error when exposure and white balance do not count.
+//!
+//! The best affine map of the picture's colours to the photo's, of all pixels of a view, as multinerf and nerfstudio
+//! score captures whose exposure changes. It forgives every error of that form, so it is no replacement for the PSNR.
+
+use super::metrics::{byte_value, mean, psnr_of};
+use crate::scene::Photo;
+use glam::{DMat4, DVec4};
+
+/// Keeps the equations of a picture with few colours solvable; much less than a pixel's rounding.
+const RIDGE: f64 = 1e-6;
+
+/// Returns the PSNR of the corrected render over the photo's valid pixels, dB. `render` has the photo's pixels.
+pub(super) fn psnr_corrected(render: &[[f32; 3]], photo: &Photo) -> f64 {
+    let pairs = || {
+        let valid = render.iter().zip(&photo.rgba).filter(|(_, texel)| texel[3] > 0);
+        valid.map(|(colour, &[r, g, b, _])| {
+            let [x, y, z] = colour.map(|value| f64::from(value.clamp(0.0, 1.0)));
+            (DVec4::new(x, y, z, 1.0), [r, g, b].map(byte_value))
+        })
+    };
+    let mut products = DMat4::from_diagonal(DVec4::splat(RIDGE));
+    // Without information the map is the identity.
+    let mut sides = [DVec4::X, DVec4::Y, DVec4::Z].map(|unit| RIDGE * unit);
+    for (colour, truth) in pairs() {
+        for axis in 0..4 {
+            *products.col_mut(axis) += colour * colour[axis];
+        }
+        (0..3).for_each(|channel| sides[channel] += colour * truth[channel]);
+    }
+    let inverse = products.inverse();
+    let maps = sides.map(|side| inverse * side);
+    let square = |(colour, truth): (DVec4, [f64; 3])| {
+        (0..3).map(|c| (maps[c].dot(colour).clamp(0.0, 1.0) - truth[c]).powi(2)).sum::<f64>() / 3.0
+    };
+    mean(pairs().map(square)).map_or(f64::NAN, psnr_of)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::psnr_corrected;
+    use crate::scene::Photo;
+
+    #[test]
+    fn gains_and_casts_do_not_count_and_detail_does() {
+        let at = |i: u32| [(i % 16) as f32 / 20.0, (i / 16) as f32 / 20.0, (i % 7) as f32 / 10.0];
+        let byte = |value: f32| (value * 255.0).round() as u8;
+        let rgba: Vec<[u8; 4]> = (0..256)
+            .map(|i| {
+                let [r, g, b] = at(i);
+                [byte(0.7 * r + 0.1), byte(0.9 * g), byte(0.2 * r + 0.8 * b), 255]
+            })
+            .collect();
+        let photo = Photo { width: 16, height: 16, rgba };
+        let render: Vec<[f32; 3]> = (0..256).map(at).collect();
+        // Rounding to bytes is left.
+        assert!(psnr_corrected(&render, &photo) > 55.0);
+        let mut shuffled = render.clone();
+        shuffled.rotate_left(5);
+        assert!(psnr_corrected(&shuffled, &photo) < 30.0);
+        let grey = vec![[0.5; 3]; 256];
+        assert!(psnr_corrected(&grey, &photo).is_finite());
+    }
+}

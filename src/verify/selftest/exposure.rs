@@ -1,0 +1,83 @@
+//! A step with an exposure of its photo, against the mirrors.
+
+use super::checks::bounds;
+use super::compare::{Tolerance, Verdict, close, gradients};
+use super::fixture::{Fixture, readable};
+use super::judge;
+use super::scenes::{Scene, Shape, scene};
+use crate::engine::{ListKey, SharedRow};
+use crate::error::{Error, Result};
+use crate::gpu::Gpu;
+use crate::pass::KernelShape;
+use crate::scheduler::plan::Buf;
+use crate::shaders::constants::EXPOSURE_PRIOR;
+use crate::train::exposure::Exposure;
+use crate::train::shared::SharedParameters;
+use crate::verify::reference::Rules;
+use crate::verify::reference::exposure::{backward, exposed};
+use crate::verify::reference::loss::photo_loss;
+use std::sync::Arc;
+
+/// ln gain of three photos; the step is on the second one, with some channels above 1.
+const LOGS: [[f32; 4]; 3] = [[0.3, -0.1, 0.0, 0.0], [0.9, 0.4, -0.3, 0.0], [-0.2, 0.1, 0.05, 0.0]];
+const PHOTO: usize = 1;
+
+/// A finished step.
+pub struct Exposed {
+    scene: Scene,
+    image: Vec<[f64; 3]>,
+    v_image: Vec<[f64; 3]>,
+    v_gains: Vec<[f64; 3]>,
+}
+
+impl Exposed {
+    /// Runs a step on a photo with some saturated pixels.
+    pub fn new(gpu: &Arc<Gpu>, kernels: KernelShape) -> Result<Self> {
+        let shape = Shape { gaussians: 150, width: 61, height: 45, ..Shape::default() };
+        let mut scene = scene(91, &shape);
+        scene.target.photo.colours.iter_mut().step_by(5).for_each(|colour| *colour = [1.0; 3]);
+        let rows = LOGS.len() as u32;
+        let mut fixture = Fixture::with_rows(Arc::clone(gpu), scene, false, (kernels, readable()), rows)?;
+        fixture.engine.set_extension(Exposure::default().extension(), 1);
+        fixture.engine.set_shared(&LOGS)?;
+        fixture.shared = vec![SharedRow { row: PHOTO as u32, rates: [0.0; 4] }];
+        let ListKey::Train(variant) = fixture.key() else {
+            return Err(Error::Bug("the key of a step is that of another list".to_owned()));
+        };
+        fixture.train_as(ListKey::Extended(variant, 1))?;
+        let wide = |rows: Vec<[f32; 4]>| rows.iter().map(|&[r, g, b, _]| [r, g, b].map(f64::from)).collect();
+        let pixels = fixture.pixels();
+        Ok(Self {
+            image: wide(fixture.get(Buf::IMAGE, pixels)?),
+            v_image: wide(fixture.get(Buf::V_IMAGE, pixels)?),
+            v_gains: wide(fixture.get(Buf::V_SHARED, LOGS.len())?),
+            scene: fixture.scene,
+        })
+    }
+
+    /// Compares with the reference: gradients of the picture, of the gains of the photo, and 0 for the other photos.
+    pub fn verdict(&self, rules: &Rules, leeway: f64) -> Verdict {
+        let logs = |row: usize| [0, 1, 2].map(|c| f64::from(LOGS[row][c]));
+        let photo = &self.scene.target.photo;
+        let loss = photo_loss(rules, &exposed(&self.image, logs(PHOTO)), photo);
+        if loss.margin() < 1e-6 {
+            return Err(format!("a pixel of this seed is too close to the kink of the loss: {}", loss.margin()));
+        }
+        let mean = [0, 1, 2].map(|c| (0..LOGS.len()).map(|row| logs(row)[c]).sum::<f64>() / LOGS.len() as f64);
+        let prior = (f64::from(EXPOSURE_PRIOR), mean);
+        let (v_image, v_gains) = backward(&self.image, logs(PHOTO), (&loss.v_image, &photo.colours), prior);
+        let flat = |rows: &[[f64; 3]]| rows.as_flattened().to_vec();
+        // As for the photo loss, times a gain of up to 2.5.
+        let of_image = gradients(&flat(&self.v_image), &flat(&v_image), bounds(2.8e-6, 4.6e-6));
+        let mut expected = vec![[0.0; 3]; LOGS.len()];
+        expected[PHOTO] = v_gains;
+        // Sums of 2,745 products of either sign, each with the relative error of its gradient.
+        let tolerance = Tolerance { absolute: 1e-6 * leeway, relative: 1e-6 * leeway };
+        judge::all([of_image, close(&flat(&self.v_gains), &flat(&expected), tolerance)])
+    }
+}
+
+/// Checks the gradients of a step with an exposure of its photo.
+pub(super) fn exposure_of_a_step(rules: &Rules, gpu: &Arc<Gpu>, kernels: KernelShape, leeway: f64) -> Result<Verdict> {
+    Ok(Exposed::new(gpu, kernels)?.verdict(rules, leeway))
+}
