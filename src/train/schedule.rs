@@ -1,6 +1,6 @@
 //! The settings of a step: schedules in steps, given or as fractions of the run, and learning rates.
 
-use super::{LabelRule, StrategyKind, TrainConfig};
+use super::{ExposureMode, LabelRule, StrategyKind, TrainConfig};
 
 /// Length of the runs that the learning rates of 3DGS are made for, steps.
 const LONG_RUN: f64 = 30_000.0;
@@ -166,6 +166,7 @@ impl TrainConfig {
     pub(crate) fn keep_decided(&mut self, then: &Self) {
         self.near = if self.near == 0.0 { then.near } else { self.near };
         self.budget = if self.budget == 0 { then.budget } else { self.budget };
+        self.exposure = if self.exposure == ExposureMode::Auto { then.exposure } else { self.exposure };
         self.start_size = self.start_size.or(then.start_size);
         self.full_size_from = self.full_size_from.or(then.full_size_from);
         self.layer_every = self.layer_every.or(then.layer_every);
