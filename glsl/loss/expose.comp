@@ -7,7 +7,7 @@
 // Work:    64 pixels per workgroup.
 // Reads:   step; step_rows [0], the row of the photo; shared_parameters [S]: ln of the gains of r, g, b
 // Writes:  image [P] rgb, in place
-// Math:    c' = exp(g) c, by channel; expose_backward undoes it.
+// Math:    c' = exp(g) c, by channel. Nothing but the photo loss reads it: the backward walk needs the transmittance only.
 // Mirror:  src/verify/reference/exposure.rs::exposed
 
 layout(local_size_x = 64) in;

@@ -3,10 +3,10 @@
 #include "constants.glsl"
 #include "step.glsl"
 #include "dispatch.glsl"
-// expose_backward — take the exposure back out of the picture and of its gradient; sum the gradient of the gains.
+// expose_backward — gradient of the picture before its exposure; sum the gradient of the gains.
 // Work:    64 invocations per workgroup, EXPOSED pixels.
-// Reads:   step; step_rows [0], the row of the photo; shared_parameters [S]; target [P]
-// Writes:  image [P] rgb and v_image [P] rgb, in place; exposure_partials [ceil(P / EXPOSED)]: r, g, b, 0
+// Reads:   step; step_rows [0], the row of the photo; shared_parameters [S]; image [P]; target [P]
+// Writes:  v_image [P] rgb, in place; exposure_partials [ceil(P / EXPOSED)]: r, g, b, 0
 // Math:    dL/dc = exp(g) dL/dc', dL/dg = sum over pixels of dL/dc' c'; without the channels that are above 1 where the
 //          photo is saturated
 // Order:   fixed, bitwise reproducible.
@@ -16,7 +16,7 @@ layout(local_size_x = 64) in;
 READ1(0, StepUniforms, step);
 READ(1, uint, step_rows);
 READ(2, vec4, shared_parameters);
-INOUT(3, vec4, image);
+READ(3, vec4, image);
 INOUT(4, vec4, v_image);
 WRITE(5, vec4, exposure_partials);
 FETCHC(6, target);
@@ -34,7 +34,6 @@ void main() {
             v = mix(v, vec3(0.0), bvec3(vec3(greaterThan(c, vec3(1.0))) * vec3(equal(fetchc(target, p).rgb, vec3(1.0)))));
             sum += v * c;
             v_image[p].rgb = v * gain;
-            image[p].rgb = c / gain;
         }
     }
     sums[lane] = sum;

@@ -41,7 +41,7 @@ pub(crate) fn expose(b: &mut Builder) {
     } [], over_pixels(b, 64));
 }
 
-/// Undoes [`expose`], in the gradient of the picture too, and writes the gradient of the exposure.
+/// Turns the gradient of the exposed picture into that of the blended one, and writes the gradient of the exposure.
 pub(crate) fn expose_backward(b: &mut Builder) {
     b.list.stage = Stage::Loss;
     // The maps of SSIM are not needed any more.

@@ -53,7 +53,8 @@ pub struct Variant {
 /// Points where an extension can add passes to a training step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Hook {
-    /// After `blend_forward`: the picture is complete. [`Hook::Loss`] must undo any change of it.
+    /// After `blend_forward`: the picture is complete. Its colours may be changed, because only the photo loss reads them;
+    /// not its transmittance.
     Picture,
     /// After the photo loss: its gradient with respect to the picture is complete and may be changed.
     Loss,

@@ -38,6 +38,11 @@ impl Exposed {
         scene.target.photo.colours.iter_mut().step_by(5).for_each(|colour| *colour = [1.0; 3]);
         let rows = LOGS.len() as u32;
         let mut fixture = Fixture::with_rows(Arc::clone(gpu), scene, false, (kernels, readable()), rows)?;
+        let wide = |rows: Vec<[f32; 4]>| rows.iter().map(|&[r, g, b, _]| [r, g, b].map(f64::from)).collect();
+        let pixels = fixture.pixels();
+        // The picture of a step without exposure.
+        fixture.train()?;
+        let image = wide(fixture.get(Buf::IMAGE, pixels)?);
         fixture.engine.set_extension(Exposure::default().extension(), 1);
         fixture.engine.set_shared(&LOGS)?;
         fixture.shared = vec![SharedRow { row: PHOTO as u32, rates: [0.0; 4] }];
@@ -45,10 +50,8 @@ impl Exposed {
             return Err(Error::Bug("the key of a step is that of another list".to_owned()));
         };
         fixture.train_as(ListKey::Extended(variant, 1))?;
-        let wide = |rows: Vec<[f32; 4]>| rows.iter().map(|&[r, g, b, _]| [r, g, b].map(f64::from)).collect();
-        let pixels = fixture.pixels();
         Ok(Self {
-            image: wide(fixture.get(Buf::IMAGE, pixels)?),
+            image,
             v_image: wide(fixture.get(Buf::V_IMAGE, pixels)?),
             v_gains: wide(fixture.get(Buf::V_SHARED, LOGS.len())?),
             scene: fixture.scene,
