@@ -67,4 +67,14 @@ impl Camera {
         let (sx, sy) = (f64::from(width) / f64::from(self.width), f64::from(height) / f64::from(self.height));
         Self { fx: self.fx * sx, fy: self.fy * sy, cx: self.cx * sx, cy: self.cy * sy, width, height, ..self.clone() }
     }
+
+    /// Returns the camera for an image at a share of its size, up to 1.
+    pub fn shrunk(&self, share: f64) -> Self {
+        self.resized(side_at(self.width, share), side_at(self.height, share))
+    }
+}
+
+/// Returns a side of an image at a share of its size, at least 1 px.
+pub(crate) fn side_at(full: u32, share: f64) -> u32 {
+    ((f64::from(full) * share).round() as u32).clamp(1, full)
 }

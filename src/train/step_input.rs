@@ -41,12 +41,12 @@ pub struct TrainView {
 impl TrainView {
     /// Returns the view at a share of its size, without its mask.
     pub fn shrunk(&self, share: f64) -> Self {
-        let (width, height) = (side_at(self.camera.width, share), side_at(self.camera.height, share));
-        let photo = shrink_photo(&self.photo, width, height);
+        let camera = self.camera.shrunk(share);
+        let photo = shrink_photo(&self.photo, camera.width, camera.height);
         Self {
             name: self.name.clone(),
             near: self.near,
-            camera: self.camera.resized(width, height),
+            camera,
             valid_pixels: valid_pixels(&photo),
             photo: Arc::new(photo),
             mask: None,
@@ -56,11 +56,6 @@ impl TrainView {
             occluders: Occluders::new(),
         }
     }
-}
-
-/// Returns a side of a photo at a share of its size, px.
-pub(crate) fn side_at(full: u32, share: f64) -> u32 {
-    ((f64::from(full) * share).round() as u32).clamp(1, full)
 }
 
 /// Returns the number of pixels of a photo that count.

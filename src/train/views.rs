@@ -1,8 +1,9 @@
 //! The training views, at the size of each step.
 
-use super::step_input::{StepInput, TrainView, side_at};
+use super::step_input::{StepInput, TrainView};
 use super::{TrainConfig, free_space};
 use crate::scene::Camera;
+use crate::scene::camera::side_at;
 use crate::scheduler::plan::FRAMES_IN_FLIGHT;
 use std::collections::BTreeMap;
 use std::ops::{Deref, DerefMut};

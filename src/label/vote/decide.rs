@@ -112,10 +112,10 @@ fn tree_of(means: &[[f32; 3]], totals: &[f64]) -> Result<Option<(ImmutableKdTree
 /// Returns camera and mask at the size at which masks are judged: half of the full one, but no less than
 /// [`JUDGED_PX`].
 fn judged(voter: &Voter) -> (Camera, LabelMap) {
-    let (width, height) = (voter.camera.width, voter.camera.height);
-    let share = (JUDGED_PX / f64::from(width.max(height))).clamp(0.5, 1.0);
-    let side = |full: u32| ((f64::from(full) * share).round() as u32).max(1);
-    (voter.camera.resized(side(width), side(height)), voter.mask.resized(side(width), side(height)))
+    let longest = voter.camera.width.max(voter.camera.height);
+    let camera = voter.camera.shrunk((JUDGED_PX / f64::from(longest)).clamp(0.5, 1.0));
+    let mask = voter.mask.resized(camera.width, camera.height);
+    (camera, mask)
 }
 
 /// For each label, the number of mask pixels where the model shows the same label, and of all its mask pixels.
