@@ -50,8 +50,8 @@ pub fn write(options: &SynthOptions, folder: &Path, after_view: &dyn Fn(u32) -> 
     for (index, optics) in optics.iter().enumerate() {
         let camera = &optics.camera;
         if optics.lens.is_pinhole() {
-            let made = picture(&world, camera, index as u32);
-            let rgb = exposure::exposed(options, index as u32, made.rgb.clone());
+            let mut made = picture(&world, camera, index as u32);
+            let rgb = exposure::exposed(options, index as u32, std::mem::take(&mut made.rgb));
             write_photo(folder, index, camera, &rgb, &made.ids)?;
             write_truth(folder, index, &world, camera, &made)?;
             if index.is_multiple_of(ReadOptions::default().test_every as usize) {
