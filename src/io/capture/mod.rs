@@ -1,6 +1,7 @@
 //! Scans a capture for what spoils a training: wrong poses, blurred photos, changing exposure or tint, photos without
 //! neighbours, an odd scale. Each finding names its cure.
 
+mod gains;
 mod neighbours;
 mod photos;
 mod poses;
@@ -93,7 +94,7 @@ pub struct ViewReport {
     pub reprojection: Option<f64>,
     /// Sharpness relative to the photos beside it; none without a photo.
     pub sharpness: Option<f64>,
-    /// Brightness relative to the photos that show the same points: the median factor; none without shared points.
+    /// Brightness relative to the mean of all photos, by the points that they share; none with too few of them.
     pub gain: Option<f64>,
     /// The same of red, green and blue.
     pub channel_gains: Option<[f64; 3]>,
@@ -134,8 +135,8 @@ impl Observed {
     }
 }
 
-/// Returns how bright each training photo is relative to the others at the points that it shares with them: median
-/// factors of red, green and blue, or `None` with too few such points.
+/// Returns how bright each training photo is relative to the mean of all, by the points that they share: factors of red,
+/// green and blue, or `None` with too few such points.
 pub fn gains(scene: &Path, dataset: &Dataset) -> Result<Vec<Option<[f64; 3]>>> {
     if dataset.points.is_empty() {
         return Ok(vec![None; dataset.train.len()]);
@@ -144,7 +145,7 @@ pub fn gains(scene: &Path, dataset: &Dataset) -> Result<Vec<Option<[f64; 3]>>> {
     let views: Vec<&View> = dataset.train.iter().collect();
     let observed: Vec<_> = views.iter().map(|view| observed.of(view)).collect();
     let seen = neighbours::seen(&views, &dataset.points, &observed);
-    let gains = photos::gains(&views, &seen, &dataset.points);
+    let gains = gains::gains(&views, &seen, &dataset.points);
     Ok(gains.into_iter().map(|of| of.map(|of| of.channels)).collect())
 }
 
@@ -157,7 +158,7 @@ pub fn scan(scene: &Path, dataset: &Dataset) -> Result<Report> {
     let shared = neighbours::shared(&seen, dataset.points.len());
     let errors: Vec<Option<f64>> = observed.iter().map(|of| of.and_then(poses::error)).collect();
     let sharpness = photos::sharpness(&views);
-    let gains = photos::gains(&views, &seen, &dataset.points);
+    let gains = gains::gains(&views, &seen, &dataset.points);
     let reports: Vec<ViewReport> = (0..views.len())
         .map(|index| ViewReport {
             name: views[index].name.clone(),

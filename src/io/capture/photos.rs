@@ -1,9 +1,8 @@
-//! Sharpness, brightness and white balance of photos, by comparison with others.
+//! Sharpness of photos, and what is found of their brightness and white balance.
 
 use super::{Fault, Finding, ViewReport, median};
 use crate::io::resample::{bounded_size, shrink_photo};
-use crate::scene::{Photo, Point, View};
-use glam::DVec2;
+use crate::scene::{Photo, View};
 use rayon::prelude::*;
 
 /// Longest side of the photos that are compared, px: noise of sensors is gone at this size.
@@ -16,13 +15,8 @@ const BLURRED: f64 = 0.4;
 const GAIN: f64 = 1.15;
 /// Gain of a colour channel over that of another from which a photo's white balance differs.
 const TINT: f64 = 1.15;
-/// Fewest shared points for a gain.
-const POINTS_MIN: usize = 20;
-/// Pixels darker or brighter than these say nothing about exposure.
-const DARK: f64 = 0.04;
-const BRIGHT: f64 = 0.95;
 
-fn grey([r, g, b, _]: [u8; 4]) -> f64 {
+pub(super) fn grey([r, g, b, _]: [u8; 4]) -> f64 {
     (0.299 * f64::from(r) + 0.587 * f64::from(g) + 0.114 * f64::from(b)) / 255.0
 }
 
@@ -64,49 +58,6 @@ pub(super) fn sharpness(views: &[&View]) -> Vec<Option<f64>> {
     views.iter().enumerate().map(relative).collect()
 }
 
-/// Brightness of a photo relative to the others at the points that it shares with them: median factors.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Gains {
-    pub(super) grey: f64,
-    /// Red, green, blue.
-    pub(super) channels: [f64; 3],
-}
-
-/// Returns the gains of each photo; none with too few shared points.
-pub(super) fn gains(views: &[&View], seen: &[Vec<(usize, DVec2)>], points: &[Point]) -> Vec<Option<Gains>> {
-    let sample = |view: &View, pixel: DVec2| {
-        let photo = view.photo.as_deref()?;
-        let (x, y) = ((pixel.x as u32).min(photo.width - 1), (pixel.y as u32).min(photo.height - 1));
-        let texel = photo.rgba[(y * photo.width + x) as usize];
-        let [r, g, b, alpha] = texel;
-        Some([grey(texel), f64::from(r) / 255.0, f64::from(g) / 255.0, f64::from(b) / 255.0])
-            .filter(|values| alpha == 255 && values.iter().all(|value| (DARK..=BRIGHT).contains(value)))
-    };
-    let samples: Vec<Vec<(usize, [f64; 4])>> = views
-        .par_iter()
-        .zip(seen)
-        .map(|(view, seen)| seen.iter().filter_map(|&(index, pixel)| Some((index, sample(view, pixel)?))).collect())
-        .collect();
-    let mut of_point: Vec<Vec<[f64; 4]>> = vec![Vec::new(); points.len()];
-    samples.iter().flatten().for_each(|&(index, values)| of_point[index].push(values));
-    let relative = |channel: usize| -> Vec<Option<f64>> {
-        let usual: Vec<Option<f64>> = of_point
-            .par_iter()
-            .map(|values| if values.len() >= 3 { median(values.iter().map(|of| of[channel])) } else { None })
-            .collect();
-        let gain = |samples: &Vec<(usize, [f64; 4])>| {
-            let ratios: Vec<f64> =
-                samples.iter().filter_map(|&(index, values)| Some(values[channel] / usual[index]?)).collect();
-            if ratios.len() >= POINTS_MIN { median(ratios.into_iter()) } else { None }
-        };
-        samples.iter().map(gain).collect()
-    };
-    let [all, red, green, blue] = [relative(0), relative(1), relative(2), relative(3)];
-    (0..views.len())
-        .map(|view| Some(Gains { grey: all[view]?, channels: [red[view]?, green[view]?, blue[view]?] }))
-        .collect()
-}
-
 /// Finds blurred photos, and photos with another exposure or white balance.
 pub(super) fn findings(views: &[ViewReport]) -> Vec<Finding> {
     let mut found = Vec::new();
@@ -116,13 +67,13 @@ pub(super) fn findings(views: &[ViewReport]) -> Vec<Finding> {
             found.push(Finding::new(Fault::Blur, Some(&view.name), text));
         }
         if let Some(gain) = view.gain.filter(|&gain| !(1.0 / GAIN..=GAIN).contains(&gain)) {
-            let text = format!("is {gain:.2} times as bright as other photos of the same points");
+            let text = format!("is {gain:.2} times as bright as the mean photo, by the points that photos share");
             found.push(Finding::new(Fault::Exposure, Some(&view.name), text));
         }
         if let Some([red, green, blue]) = view.channel_gains
             && red.max(green).max(blue) > TINT * red.min(green).min(blue)
         {
-            let text = format!("has {red:.2}, {green:.2} and {blue:.2} times the red, green and blue of other photos");
+            let text = format!("has {red:.2}, {green:.2} and {blue:.2} times the red, green and blue of the mean photo");
             found.push(Finding::new(Fault::WhiteBalance, Some(&view.name), text));
         }
     }
