@@ -211,11 +211,14 @@ pub mod train {
     pub use crate::train::setup::{TrainerOptions, engine_size};
     pub use crate::train::state::TrainState;
     pub use crate::train::{StepReport, Trainer, first_model};
+    pub mod poses {
+        pub use crate::train::poses::Poses;
+    }
     pub mod exposure {
         pub use crate::train::exposure::{Exposure, decided};
     }
     pub mod shared {
-        pub use crate::train::shared::{SharedLayout, SharedParameters};
+        pub use crate::train::shared::{Place, SharedLayout, SharedParameters};
     }
     pub mod step_input {
         pub use crate::train::step_input::{SceneScale, label_loss};

@@ -1,7 +1,7 @@
 //! A trained model begins another training, or becomes simpler.
 
 use crate::support::device;
-use crate::support::runs::{Place, stderr, succeeded};
+use crate::support::runs::{Place, copy, stderr, succeeded};
 use labelgs::io::{read_model, write_model};
 use serde_json::Value;
 use std::collections::BTreeSet;
@@ -97,4 +97,36 @@ fn damaged_cameras_of_a_run_matter_to_pages_only() {
     );
     let text = std::fs::read_to_string(place.path("before.html")).expect("a page");
     assert!(text.contains(r#""view":{"eye":["#), "the page begins at the first photo");
+}
+
+#[test]
+fn refined_poses_are_a_reconstruction_of_their_own() {
+    let Some(_turn) = device() else { return };
+    let place = Place::new();
+    succeeded(&place.trained("out", &["--refine-poses", "--iterations", "40"]));
+    let (scene, again) = (place.path("scene"), place.path("again"));
+    copy(&scene, &again);
+    std::fs::remove_dir_all(again.join("sparse")).expect("a reconstruction");
+    copy(&place.path("out").join("refined"), &again.join("sparse/0"));
+    succeeded(&place.labelgs(&["train", &place.text("again"), "-o", &place.text("more"), "--iterations", "2"]));
+    let cameras = |out: &str| json(&place.path(out).join("cameras.json"));
+    let (refined, read) = (cameras("out"), cameras("more"));
+    succeeded(&place.trained("plain", &["--iterations", "2"]));
+    let (mut moved, plain) = (0, cameras("plain"));
+    let number = |value: &Value| value.as_f64().expect("a number");
+    for ((refined, read), plain) in refined
+        .as_array()
+        .expect("a list")
+        .iter()
+        .zip(read.as_array().expect("a list"))
+        .zip(plain.as_array().expect("a list"))
+    {
+        assert_eq!(refined["img_name"], read["img_name"]);
+        for axis in 0..3 {
+            let [refined, read, plain] = [refined, read, plain].map(|of| number(&of["position"][axis]));
+            assert!((refined - read).abs() < 1e-6, "{refined} {read}");
+            moved += usize::from((refined - plain).abs() > 1e-6);
+        }
+    }
+    assert!(moved > 0, "no pose was refined");
 }

@@ -51,6 +51,7 @@ mod occlusion; // which object hides which
 mod output; // files of rendered pictures
 mod overflow; // a buffer that is too small costs a step and no bit
 mod pass; // each kernel against its mirror
+mod poses; // poses of photos are refined, found and resumed
 mod protocol; // scores of the published benchmarks
 mod registry; // every shader has a header, a mirror and a pass
 mod removal; // scores of removals, and filling from the command line

@@ -7,7 +7,8 @@ use labelgs::internals::pass::{KernelShape, Variant};
 use labelgs::internals::scheduler::plan::{Capacity, Grid, Limits, PassList, Plan, PlanOptions, TABLE, Work};
 use labelgs::internals::shaders;
 use labelgs::internals::train::exposure::Exposure;
-use labelgs::internals::train::shared::SharedParameters;
+use labelgs::internals::train::poses::Poses;
+use labelgs::internals::train::shared::{Place, SharedParameters};
 use labelgs::internals::train::strategy;
 use labelgs::run::StrategyKind;
 use std::collections::BTreeSet;
@@ -90,8 +91,10 @@ fn lists() -> Vec<(Capacity, PassList)> {
             let extension = strategy::of(StrategyKind::Mcmc).extension();
             let all_passes = 7;
             add(pass::extended_step(&shape, &capacity, variant, (&*extension, all_passes)));
-            let exposure = Exposure::default().extension();
-            add(pass::extended_step(&shape, &capacity, variant, (&*exposure, 1)));
+            let place = Place::default();
+            for shared in [Exposure::default().extension(place), Poses::default().extension(place)] {
+                add(pass::extended_step(&shape, &capacity, variant, (&*shared, 1)));
+            }
             add(pass::weigh_view(&shape, &capacity));
             add(pass::densify_count(&shape, &capacity));
             add(pass::densify_apply(&shape, &capacity, true));

@@ -15,7 +15,7 @@ use labelgs::internals::scheduler::plan::{
     Buf, Domain, Grid, Limits, MemoryReport, PassDecl, PlanOptions, TABLE, Work,
 };
 use labelgs::internals::shaders::ShaderDesc;
-use labelgs::internals::train::shared::{SharedLayout, SharedParameters};
+use labelgs::internals::train::shared::{Place, SharedLayout, SharedParameters};
 use labelgs::internals::train::strategy::At;
 use labelgs::internals::train::{TrainState, Trainer, TrainerOptions};
 use labelgs::io::initial_gaussians;
@@ -124,7 +124,7 @@ impl Extension for Brightness {
                 pass(darken(), [Buf::SHARED, Buf::IMAGE], groups);
                 pass(sum_up(), [Buf::V_IMAGE, Buf::V_SHARED], 1);
             }
-            Hook::Gradients | Hook::Updated => {}
+            Hook::Camera | Hook::Gradients | Hook::Updated => {}
         }
     }
 }
@@ -147,7 +147,7 @@ impl SharedParameters for Pulled {
         vec![if at.step.is_multiple_of(4) { [0.0; 4] } else { RATES[0] }, RATES[1]]
     }
 
-    fn extension(&self) -> Arc<dyn Extension> {
+    fn extension(&self, _place: Place) -> Arc<dyn Extension> {
         Arc::new(Self)
     }
 }
@@ -169,7 +169,7 @@ impl SharedParameters for Brightness {
         vec![[0.0; 4], [0.01, 0.01, 0.01, 0.0]]
     }
 
-    fn extension(&self) -> Arc<dyn Extension> {
+    fn extension(&self, _place: Place) -> Arc<dyn Extension> {
         Arc::new(Self)
     }
 }

@@ -31,6 +31,7 @@ const float NOISE_OPACITY = 0.005;           // this opacity, and hardly above (
 const uint FOLD = 32768u;                    // groups of one axis, over which one-dimensional work folds
 const uint EXPOSED = 512u;                   // pixels of a workgroup of expose_backward
 const float EXPOSURE_PRIOR = 1e-3;           // pull of the mean ln gain over all photos to 0
+const float POSE_PRIOR = 20.0;               // pull of a pose's correction to 0; a pixel off pulls some hundred times as much
 const float LN2 = 0.69314718055994531;
 const float GRADIENT_MAX = 1e18;            // larger gradients are dropped: their square overflows in Adam
 const float COLOUR_BIAS = 0.5;               // offset of the colour from spherical harmonics (3DGS)

@@ -5,13 +5,14 @@
 #include "dispatch.glsl"
 // expose_backward — gradient of the picture before its exposure; sum the gradient of the gains.
 // Work:    64 invocations per workgroup, EXPOSED pixels.
-// Reads:   step; step_rows [0], the row of the photo; shared_parameters [S]; image [P]; target [P]
+// Reads:   step; step_rows [ROW], the row of the photo; shared_parameters [S]; image [P]; target [P]
 // Writes:  v_image [P] rgb, in place; exposure_partials [ceil(P / EXPOSED)]: r, g, b, 0
 // Math:    dL/dc = exp(g) dL/dc', dL/dg = sum over pixels of dL/dc' c'; without the channels that are above 1 where the
 //          photo is saturated
 // Order:   fixed, bitwise reproducible.
 // Mirror:  src/verify/reference/exposure.rs::backward
 
+layout(constant_id = 17) const uint ROW = 0;
 layout(local_size_x = 64) in;
 READ1(0, StepUniforms, step);
 READ(1, uint, step_rows);
@@ -25,7 +26,7 @@ shared vec3 sums[64];
 
 void main() {
     uint group = linear_group_id(), lane = gl_LocalInvocationID.x, pixels = step.width * step.height;
-    vec3 gain = exp(shared_parameters[step_rows[0]].rgb), sum = vec3(0.0);
+    vec3 gain = exp(shared_parameters[step_rows[ROW]].rgb), sum = vec3(0.0);
     for (uint k = 0u; k < EXPOSED; k += 64u) {
         uint p = group * EXPOSED + k + lane;
         if (p < pixels) {

@@ -4,14 +4,16 @@
 #include "step.glsl"
 // expose_reduce — gradient of the gains of the step's photo.
 // Work:    one workgroup.
-// Reads:   step; step_rows [0], the row of the photo; exposure_partials; shared_parameters [ROWS]
+// Reads:   step; step_rows [ROW], the row of the photo; exposure_partials; shared_parameters [ROWS], STRIDE a photo
 // Writes:  v_shared [row]
 // Math:    the sum of the partials, and EXPOSURE_PRIOR times the mean of ln gain over all photos: the model can be
 //          brighter and all photos darker, so that the data leave this mean open. It stays near 0.
 // Order:   fixed, bitwise reproducible.
 // Mirror:  src/verify/reference/exposure.rs::backward
 
-layout(constant_id = 17) const uint ROWS = 1;
+layout(constant_id = 14) const uint STRIDE = 1;
+layout(constant_id = 15) const uint ROWS = 1;
+layout(constant_id = 17) const uint ROW = 0;
 layout(local_size_x = 64) in;
 READ1(0, StepUniforms, step);
 READ(1, uint, step_rows);
@@ -28,7 +30,7 @@ void main() {
     for (uint i = lane; i < partials; i += 64u) {
         sum += exposure_partials[i].rgb;
     }
-    for (uint row = lane; row < ROWS; row += 64u) {
+    for (uint row = ROW + lane * STRIDE; row < ROWS; row += 64u * STRIDE) {
         mean += shared_parameters[row].rgb;
     }
     sums[lane] = sum;
@@ -41,6 +43,6 @@ void main() {
         }
     }
     if (lane == 0u) {
-        v_shared[step_rows[0]] = vec4(sums[0] + EXPOSURE_PRIOR / float(ROWS) * means[0], 0.0);
+        v_shared[step_rows[ROW]] = vec4(sums[0] + EXPOSURE_PRIOR / float(ROWS / STRIDE) * means[0], 0.0);
     }
 }

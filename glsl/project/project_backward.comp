@@ -48,7 +48,9 @@ FETCHU(19, splat_from_gaussian);
 #endif
 
 #include "sh_fetch.glsl"
+#include "sh_colour.glsl"
 #include "sh_backward.glsl"
+#include "sh_store.glsl"
 
 void main() {
     StepUniforms u = step;

@@ -37,6 +37,7 @@ FETCHU(14, layer_from_label);
 #endif
 
 #include "sh_fetch.glsl"
+#include "sh_colour.glsl"
 
 void main() {
     StepUniforms u = step;

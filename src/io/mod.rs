@@ -11,7 +11,7 @@ pub(crate) mod camera_json;
 pub mod capture;
 pub(crate) mod checkpoint;
 pub(crate) mod checkpoint_folder;
-mod colmap;
+pub(crate) mod colmap;
 pub(crate) mod depth;
 mod depth_file;
 pub(crate) mod frames;

@@ -8,6 +8,8 @@ use std::path::{Path, PathBuf};
 pub const CONFIG: &str = "config.toml";
 /// Name of the file with the gains of the photos.
 pub(crate) const EXPOSURES: &str = "exposures.json";
+/// Name of the folder with the reconstruction of refined poses.
+pub(crate) const REFINED: &str = "refined";
 /// File that is locked while a run writes into the folder.
 const LOCK: &str = ".labelgs-lock";
 

@@ -33,28 +33,29 @@ pub(super) fn reduce_last(b: &mut Builder, width: u32, height: u32) {
     reduce(b, partials(b.shape.subgroup, width, height));
 }
 
-/// Multiplies the picture by the exposure of its photo.
-pub(crate) fn expose(b: &mut Builder) {
+/// Multiplies the picture by the exposure of its photo, row `row` of the step.
+pub(crate) fn expose(b: &mut Builder, row: u32) {
     b.list.stage = Stage::Loss;
     pass!(b, expose {
         step: Buf::STEP, step_rows: Buf::STEP_ROWS, shared_parameters: Buf::SHARED, image: Buf::IMAGE,
-    } [], over_pixels(b, 64));
+    } [row: row], over_pixels(b, 64));
 }
 
-/// Turns the gradient of the exposed picture into that of the blended one, and writes the gradient of the exposure.
-pub(crate) fn expose_backward(b: &mut Builder) {
+/// Turns the gradient of the exposed picture into that of the blended one, and writes the gradient of the exposure, row
+/// `row` of the `stride` rows of a photo.
+pub(crate) fn expose_backward(b: &mut Builder, row: u32, stride: u32) {
     b.list.stage = Stage::Loss;
     // The maps of SSIM are not needed any more.
     let partials = Buf::SSIM_B;
     pass!(b, expose_backward {
         step: Buf::STEP, step_rows: Buf::STEP_ROWS, shared_parameters: Buf::SHARED, image: Buf::IMAGE,
         v_image: Buf::V_IMAGE, exposure_partials: partials, target: Buf::TARGET,
-    } [], over_pixels(b, u64::from(constants::EXPOSED)));
+    } [row: row], over_pixels(b, u64::from(constants::EXPOSED)));
     let rows = b.capacity.shared_rows as u32;
     pass!(b, expose_reduce {
         step: Buf::STEP, step_rows: Buf::STEP_ROWS, shared_parameters: Buf::SHARED, exposure_partials: partials,
         v_shared: Buf::V_SHARED,
-    } [rows: rows], ONE);
+    } [stride: stride, rows: rows, row: row], ONE);
 }
 
 /// Grid over the pixels of an image, `each` per workgroup.

@@ -10,7 +10,7 @@ mod kernels;
 mod lift;
 pub(crate) mod loss;
 pub(crate) mod optimize;
-mod project;
+pub(crate) mod project;
 pub(crate) mod scan;
 #[cfg(feature = "lab")]
 mod separate;
@@ -53,6 +53,8 @@ pub struct Variant {
 /// Points where an extension can add passes to a training step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Hook {
+    /// Before the first pass that needs the camera, whose pose in `Buf::STEP` may be changed.
+    Camera,
     /// After `blend_forward`: the picture is complete. Its colours may be changed, because only the photo loss reads them;
     /// not its transmittance.
     Picture,
@@ -109,6 +111,7 @@ pub fn extended_step(
 ) -> PassList {
     let mut b = begin("training step", shape, capacity, variant.labels, variant.sh_degree);
     (b.counts, b.disagreement) = (variant.counts, variant.disagreement);
+    extension.extend(passes, Hook::Camera, &mut b);
     project::visible_splats(&mut b);
     let pairs = tile::bin_splats(&mut b);
     blend::blend_forward(&mut b, pairs, variant.lift);

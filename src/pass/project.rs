@@ -62,6 +62,28 @@ fn project_forward(b: &mut Builder) {
     } [sh_degree: sh_degree], over_splats());
 }
 
+/// Corrects the pose of the step's camera by rows `row` and the next of the step.
+pub(crate) fn pose(b: &mut Builder, row: u32) {
+    b.list.stage = Stage::Project;
+    pass!(b, pose { step: Buf::STEP, step_rows: Buf::STEP_ROWS, shared_parameters: Buf::SHARED } [row: row], ONE);
+}
+
+/// Writes the gradient of that correction.
+pub(crate) fn pose_backward(b: &mut Builder, row: u32) {
+    // The gradients of the splats are not needed any more.
+    let (sh_degree, partials) = (b.sh_degree, Buf::V_SPLATS);
+    b.list.stage = Stage::ProjectBackward;
+    pass!(b, pose_backward {
+        step: Buf::STEP, counters: Buf::COUNTERS, gaussian_from_splat: GAUSSIAN_FROM_SPLAT, means: Buf::MEANS,
+        quats: Buf::QUATS, sh1: Buf::SH1, sh2: Buf::SH2, sh3: Buf::SH3, v_means: Buf::V_MEANS,
+        v_quats: Buf::V_QUATS, v_sh0: Buf::V_SH0, pose_partials: partials,
+    } [sh_degree: sh_degree], over_splats());
+    pass!(b, pose_reduce {
+        step: Buf::STEP, counters: Buf::COUNTERS, step_rows: Buf::STEP_ROWS, shared_parameters: Buf::SHARED,
+        pose_partials: partials, v_shared: Buf::V_SHARED,
+    } [row: row], ONE);
+}
+
 /// Carries the gradients of splats back to the parameters of their Gaussians.
 pub(super) fn project_backward(b: &mut Builder) {
     backward(b, false, Buf::SPLAT_FROM_GAUSSIAN);

@@ -9,8 +9,8 @@ use crate::eval::evaluate::{Rendering, evaluate};
 use crate::eval::scores::{MeanScores, Scores};
 use crate::io::label_table::{self, LabelTable};
 use crate::io::occlusion_table::{self, OcclusionTable};
-use crate::io::{atomic, run_folder};
-use crate::scene::{Gaussians, View};
+use crate::io::{atomic, colmap, run_folder};
+use crate::scene::{Camera, Gaussians, View};
 use crate::train::Occlusion;
 use std::path::PathBuf;
 use std::time::Duration;
@@ -66,6 +66,7 @@ impl Run<'_> {
         let step = summary.steps;
         self.save_occluders()?;
         self.save_exposures()?;
+        self.save_poses()?;
         if let Some(path) = preview::write(self)? {
             self.tell(Event::Preview { step, path: &path })?;
         }
@@ -132,6 +133,28 @@ impl Run<'_> {
         }
         let found = serde_json::json!({ "schema_version": 1, "gains": gains });
         atomic::write_json(&self.request.output.join(run_folder::EXPOSURES), &found)
+    }
+
+    /// Writes the refined poses, if there are any: as a reconstruction, and in the cameras of the run. Held-out views keep
+    /// theirs.
+    fn save_poses(&mut self) -> Result<()> {
+        let refined = self.trainer.poses()?;
+        if refined.is_empty() {
+            return Ok(());
+        }
+        let (out, views) = (&self.request.output, self.dataset.all());
+        let cameras: Vec<(&str, &Camera)> =
+            views.iter().map(|view| (view.name.as_str(), refined.get(&view.name).unwrap_or(&view.camera))).collect();
+        let changed = || views.iter().filter_map(|view| Some((&view.camera, refined.get(&view.name)?)));
+        let count = refined.len() as f64;
+        let moved = changed().map(|(a, b)| a.centre().distance(b.centre())).sum::<f64>() / count;
+        let turned = changed().map(|(a, b)| a.axis().angle_between(b.axis())).sum::<f64>().to_degrees() / count;
+        tracing::info!(
+            "poses: axes turned by {turned:.3} degrees and cameras moved by {:.2} % of their radius on average",
+            100.0 * moved / self.dataset.extent()
+        );
+        colmap::write::model(&out.join(run_folder::REFINED), &cameras, &self.dataset.points)?;
+        models::save_cameras(out, &cameras)
     }
 
     /// Scores the held-out views, and their objects if they have masks.

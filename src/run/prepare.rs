@@ -15,8 +15,9 @@ use crate::io::run_folder::Lock;
 use crate::io::{self, atomic, capture, checkpoint_folder};
 use crate::scene::{Dataset, Gaussians};
 use crate::scheduler::SchedulerOptions;
-use crate::train::exposure::{self, Exposure};
+use crate::train::exposure;
 use crate::train::setup::TrainerOptions;
+use crate::train::shared::Shared;
 use crate::train::{self, ExposureMode, TrainConfig, Trainer};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -200,9 +201,7 @@ fn start(
     };
     let config = exposure::decided(&config, &gains);
     let mut options = TrainerOptions::from(options);
-    if config.exposure == ExposureMode::On {
-        options.shared = Exposure::new(&gains).into();
-    }
+    options.shared = Shared::of(&config, &gains, dataset);
     let mut trainer = Trainer::new(gpu, config, dataset, &model, options)?;
     if let Some(table) = occluders {
         let without = trainer.set_occluders(&table.views);

@@ -3,7 +3,7 @@
 //! Axes are OpenCV's: x right, y down, z forward. The centre of pixel (0, 0) is at (0.5, 0.5), so a point (x, y, z) in
 //! camera space projects to (fx x/z + cx, fy y/z + cy).
 
-use glam::{DMat3, DVec2, DVec3};
+use glam::{DMat3, DQuat, DVec2, DVec3};
 
 /// Pose and intrinsics of one view, in f64.
 #[derive(Clone, Debug, PartialEq)]
@@ -60,6 +60,15 @@ impl Camera {
             && (0.0..f64::from(self.width)).contains(&pixel.x)
             && (0.0..f64::from(self.height)).contains(&pixel.y);
         inside.then_some(pixel)
+    }
+
+    /// Returns the camera turned around its centre by a Rodrigues vector in camera space, radians for small turns, and moved
+    /// by `shift`, world units. The tangent of half the angle is half the length of the vector.
+    pub fn corrected(&self, turn: DVec3, shift: DVec3) -> Self {
+        let half = 0.5 * turn;
+        let rotation = DMat3::from_quat(DQuat::from_xyzw(half.x, half.y, half.z, 1.0).normalize()) * self.rotation;
+        let translation = -(rotation * (self.centre() + shift));
+        Self { rotation, translation, ..self.clone() }
     }
 
     /// Returns the camera for an image resized to `width` x `height` px.

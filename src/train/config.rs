@@ -59,6 +59,13 @@ crate::options::options! {
             /// The picture is multiplied by gains of its photo before it is compared; the model has the mean exposure.
             exposure <"MODE">: ExposureMode = ExposureMode::Auto, fixed;
 
+            /// Refines the poses of the photos: each is turned and moved while the Gaussians are trained.
+            ///
+            /// For reconstructions whose poses are off by pixels. The refined poses are written beside the model.
+            #[cfg_attr(feature = "cli", arg(value_parser = switch, action = clap::ArgAction::Set, num_args = 0..=1,
+                default_missing_value = "on"))]
+            refine_poses <"SWITCH">: bool = false, fixed;
+
             /// Near plane, world units: nearer Gaussians are not drawn.
             ///
             /// 0 chooses by the scene: 0.2 (3DGS), or a twentieth of the median depth of the first Gaussians if that is

@@ -4,7 +4,7 @@
 //! near the cameras make up for it, which spoils other views. The picture of a step is multiplied by the gains of its
 //! photo before the loss. The mean of their logarithms stays near 0, so that the model has the mean exposure.
 
-use super::shared::{SharedLayout, SharedParameters};
+use super::shared::{Place, SharedLayout, SharedParameters};
 use super::strategy::At;
 use super::{ExposureMode, TrainConfig};
 use crate::pass::{Builder, Extension, Hook, loss};
@@ -13,10 +13,13 @@ use std::sync::Arc;
 /// Learning rate of ln gain. A photo has one update for each of its turns, some dozens in a short run.
 const RATE: f64 = 0.01;
 /// Root mean square of ln gain over the photos from which their exposures differ. Captures with a fixed exposure have up to
-/// 0.03, by what shines and by noise.
-const DIFFERS: f64 = 0.05;
+/// 0.06, by what shines and by noise.
+const DIFFERS: f64 = 0.1;
 /// Share of the photos whose gains must be known for a decision.
 const KNOWN: f64 = 0.5;
+
+/// Name of the parameters.
+pub(super) const NAME: &str = "exposure";
 
 /// Gains of a photo, r, g, b; `None` where nothing tells them.
 pub(crate) type Gains = Option<[f64; 3]>;
@@ -63,7 +66,7 @@ pub fn decided(config: &TrainConfig, gains: &[Gains]) -> TrainConfig {
 
 impl SharedParameters for Exposure {
     fn name(&self) -> &'static str {
-        "exposure"
+        NAME
     }
 
     fn layout(&self) -> SharedLayout {
@@ -83,20 +86,20 @@ impl SharedParameters for Exposure {
         vec![[rate, rate, rate, 0.0]]
     }
 
-    fn extension(&self) -> Arc<dyn Extension> {
-        Arc::new(Passes)
+    fn extension(&self, place: Place) -> Arc<dyn Extension> {
+        Arc::new(Passes(place))
     }
 }
 
 #[derive(Debug)]
-struct Passes;
+struct Passes(Place);
 
 impl Extension for Passes {
     fn extend(&self, _passes: u32, hook: Hook, b: &mut Builder) {
         match hook {
-            Hook::Picture => loss::expose(b),
-            Hook::Loss => loss::expose_backward(b),
-            Hook::Gradients | Hook::Updated => {}
+            Hook::Picture => loss::expose(b, self.0.photo),
+            Hook::Loss => loss::expose_backward(b, self.0.photo, self.0.all.photo),
+            Hook::Camera | Hook::Gradients | Hook::Updated => {}
         }
     }
 }

@@ -11,6 +11,8 @@ pub(crate) mod free_space;
 pub(crate) mod kinds;
 pub(crate) mod near;
 mod occlusion;
+mod photo_rows;
+pub(crate) mod poses;
 mod presets;
 mod sampler;
 mod schedule;
@@ -46,7 +48,7 @@ use crate::scheduler::plan::FRAMES_IN_FLIGHT;
 use crate::shaders::structs::StepUniforms;
 use sampler::ViewOrder;
 use shared::Shared;
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::VecDeque;
 use std::sync::Arc;
 use step_input::{SceneScale, StepInput, TrainView};
 use strategy::{At, Bound, Population, Strategy};
@@ -138,7 +140,7 @@ impl Trainer {
         TrainerOptions { shape, scheduler, strategy, shared }: TrainerOptions,
     ) -> Result<Self> {
         let fixed = SceneScale { extent: dataset.extent() };
-        let shared = shared.or_of(&config);
+        let shared = shared.or_of(&config, dataset);
         let strategy = strategy.unwrap_or_else(|| strategy::of(config.strategy));
         let most = if config.max_gaussians > 0 { config.max_gaussians } else { u64::from(u32::MAX) };
         let views =
@@ -230,16 +232,6 @@ impl Trainer {
         RenderOptions { near, background, sh_degree: Some(self.sh_degree()), ..RenderOptions::default() }
     }
 
-    /// Returns the gains of each training photo, r, g, b, by name; none without exposure. Nothing may be in flight.
-    pub fn exposures(&mut self) -> Result<BTreeMap<String, [f32; 3]>> {
-        if self.config.exposure != ExposureMode::On {
-            return Ok(BTreeMap::new());
-        }
-        let rows = self.engine.shared()?;
-        let gains = rows.iter().map(|&[r, g, b, _]| [r, g, b].map(f32::exp));
-        Ok(self.views.iter().map(|view| view.name.clone()).zip(gains).collect())
-    }
-
     /// Reads the model back. Steps that failed for lack of memory have not changed it.
     pub fn model(&mut self) -> Result<Gaussians> {
         if let Err(error) = self.drain() {
@@ -273,6 +265,7 @@ impl Trainer {
         self.step = step;
         if self.strategy.acts_after(self.at(step)) {
             done.extend(self.drain()?);
+            self.refresh_poses()?;
             let uniforms = self.uniforms(&input);
             let mut population = Population::new(&mut self.engine, &mut self.bound, &self.views, uniforms, step);
             let at = At { step, config: &self.config, extent: self.fixed.extent };

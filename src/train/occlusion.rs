@@ -51,10 +51,10 @@ impl Trainer {
     pub fn refresh_occluders(&mut self) -> Result<()> {
         // Depth has no colour.
         let options = RenderOptions { sh_degree: Some(0), ..RenderOptions::new(self.config.near, Parts::DEPTH) };
+        self.refresh_poses()?;
         for index in 0..self.views.len() {
-            let view = &self.views[index];
-            let Some(mask) = &view.mask else { continue };
-            let rendered = render(&mut self.engine, &view.camera, &options)?;
+            let Some(mask) = &self.views[index].mask else { continue };
+            let rendered = render(&mut self.engine, self.views.camera(index), &options)?;
             let found = by_contour(mask, &rendered.mean_depth()?, Rule::default());
             self.views[index].occluders = found;
         }

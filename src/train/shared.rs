@@ -6,12 +6,14 @@
 //! correction of a row counts its own updates, so that the first update of a photo has the right length however late it
 //! comes.
 
-use super::exposure::Exposure;
+use super::exposure::{Exposure, Gains};
+use super::poses::Poses;
 use super::strategy::At;
 use super::{ExposureMode, TrainConfig};
 use crate::engine::SharedRow;
 use crate::error::{Error, Result};
 use crate::pass::{Builder, Extension, Hook};
+use crate::scene::Dataset;
 use serde::{Deserialize, Serialize};
 use std::fmt::Debug;
 use std::ops::Range;
@@ -33,6 +35,10 @@ impl SharedLayout {
         self.photo.saturating_mul(views as u32).saturating_add(self.scene)
     }
 
+    fn and(self, other: Self) -> Self {
+        Self { scene: self.scene + other.scene, photo: self.photo + other.photo }
+    }
+
     /// Returns the rows of a view.
     pub fn of_view(self, view: usize) -> Range<u32> {
         self.count(view)..self.count(view + 1)
@@ -42,6 +48,17 @@ impl SharedLayout {
     fn of_step(self, view: usize) -> impl Iterator<Item = u32> {
         (0..self.scene).chain(self.of_view(view))
     }
+}
+
+/// Where the rows of one owner are.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Place {
+    /// The first of its rows of the scene among those of a step.
+    pub scene: u32,
+    /// The first of its rows of the photo among those of a step.
+    pub photo: u32,
+    /// Rows of all owners.
+    pub all: SharedLayout,
 }
 
 /// Parameters to train besides the Gaussians. All results must be functions of the arguments: a step is repeated after
@@ -62,30 +79,63 @@ pub trait SharedParameters: Debug + Send {
 
     /// Returns the passes of every step; called once. `Buf::STEP_ROWS` has the rows of the step and `Buf::SHARED` their
     /// values. The passes write the gradients to the same rows of `Buf::V_SHARED`, which are 0 before.
-    fn extension(&self) -> Arc<dyn Extension>;
+    fn extension(&self, place: Place) -> Arc<dyn Extension>;
 }
 
 /// The shared parameters of a training. The default has none and costs nothing.
 #[derive(Debug, Default)]
-pub struct Shared(Option<Box<dyn SharedParameters>>);
+pub struct Shared(Vec<Box<dyn SharedParameters>>);
 
 impl<P: SharedParameters + 'static> From<P> for Shared {
     fn from(parameters: P) -> Self {
-        Self(Some(Box::new(parameters)))
+        Self(vec![Box::new(parameters)])
     }
 }
 
 impl Shared {
-    /// Returns the parameters, or those that the configuration asks for.
-    pub(super) fn or_of(self, config: &TrainConfig) -> Self {
-        match (self.0, config.exposure) {
-            (None, ExposureMode::On) => Exposure::default().into(),
-            (given, _) => Self(given),
+    /// Returns the parameters that the configuration asks for. `gains` are the first gains of each photo.
+    pub(crate) fn of(config: &TrainConfig, gains: &[Gains], dataset: &Dataset) -> Self {
+        let mut all: Vec<Box<dyn SharedParameters>> = Vec::new();
+        if config.exposure == ExposureMode::On {
+            all.push(Box::new(Exposure::new(gains)));
         }
+        if config.refine_poses {
+            all.push(Box::new(Poses::new(dataset)));
+        }
+        Self(all)
+    }
+
+    /// Returns the parameters, or those that the configuration asks for.
+    pub(super) fn or_of(self, config: &TrainConfig, dataset: &Dataset) -> Self {
+        if self.0.is_empty() { Self::of(config, &[], dataset) } else { self }
     }
 
     fn layout(&self) -> SharedLayout {
-        self.0.as_ref().map(|parameters| parameters.layout()).unwrap_or_default()
+        self.0.iter().fold(SharedLayout::default(), |all, of| all.and(of.layout()))
+    }
+
+    /// Returns each owner with the place of its rows.
+    fn placed(&self) -> impl Iterator<Item = (&dyn SharedParameters, Place)> {
+        let all = self.layout();
+        let mut before = SharedLayout::default();
+        self.0.iter().map(move |of| {
+            let place = Place { scene: before.scene, photo: all.scene + before.photo, all };
+            before = before.and(of.layout());
+            (of.as_ref(), place)
+        })
+    }
+
+    /// Returns the rows of an owner among those of a photo.
+    pub(super) fn photo_rows(&self, name: &str) -> Option<Range<usize>> {
+        let (of, place) = self.placed().find(|(of, _)| of.name() == name)?;
+        let first = (place.photo - place.all.scene) as usize;
+        Some(first..first + of.layout().photo as usize)
+    }
+
+    /// Returns the rows of a view among all rows.
+    pub(super) fn of_view(&self, view: usize) -> Range<usize> {
+        let rows = self.layout().of_view(view);
+        rows.start as usize..rows.end as usize
     }
 
     /// Returns the total number of rows.
@@ -95,35 +145,47 @@ impl Shared {
 
     /// Returns the initial rows.
     pub(super) fn start(&self, views: usize) -> Result<Vec<[f32; 4]>> {
-        let (Some(parameters), SharedLayout { scene, photo }) = (&self.0, self.layout()) else { return Ok(Vec::new()) };
-        let mut rows = checked(parameters.start(None), scene, "start")?;
-        for view in 0..views {
-            rows.extend(checked(parameters.start(Some(view)), photo, "start")?);
+        let mut rows = Vec::new();
+        for of_view in std::iter::once(None).chain((0..views).map(Some)) {
+            for of in &self.0 {
+                let layout = of.layout();
+                let wanted = if of_view.is_some() { layout.photo } else { layout.scene };
+                rows.extend(checked(of.start(of_view), wanted, "start")?);
+            }
         }
         Ok(rows)
     }
 
     pub(super) fn of_step(&self, at: At, view: usize) -> Result<Vec<SharedRow>> {
-        let (Some(parameters), layout) = (&self.0, self.layout()) else { return Ok(Vec::new()) };
-        let rates = checked(parameters.rates(at), layout.scene + layout.photo, "rates")?;
-        Ok(layout.of_step(view).zip(rates).map(|(row, rates)| SharedRow { row, rates }).collect())
+        let (mut rates, mut of_photo) = (Vec::new(), Vec::new());
+        for of in &self.0 {
+            let SharedLayout { scene, photo } = of.layout();
+            let of_owner = checked(of.rates(at), scene + photo, "rates")?;
+            let (of_scene, rest) = of_owner.split_at(scene as usize);
+            rates.extend_from_slice(of_scene);
+            of_photo.extend_from_slice(rest);
+        }
+        rates.extend(of_photo);
+        Ok(self.layout().of_step(view).zip(rates).map(|(row, rates)| SharedRow { row, rates }).collect())
     }
 
     /// Joins the passes of a strategy and of the parameters.
     pub(super) fn extended(&self, strategy: Arc<dyn Extension>) -> Arc<dyn Extension> {
-        match &self.0 {
-            None => strategy,
-            Some(parameters) => Arc::new(Both { strategy, shared: parameters.extension() }),
+        if self.0.is_empty() {
+            return strategy;
         }
+        let shared = self.placed().map(|(of, place)| of.extension(place)).collect();
+        Arc::new(Joined { strategy, shared })
     }
 
-    /// Returns the pass number of [`Both`] for the number of the strategy.
+    /// Returns the pass number of [`Joined`] for the number of the strategy.
     pub(super) fn passes(&self, of_strategy: u32) -> u32 {
-        of_strategy + u32::from(self.0.is_some())
+        of_strategy + u32::from(!self.0.is_empty())
     }
 
     pub(super) fn kept(&self) -> Option<KeptShared> {
-        self.0.as_ref().map(|parameters| KeptShared { name: parameters.name().to_owned(), layout: parameters.layout() })
+        let names: Vec<&str> = self.0.iter().map(|of| of.name()).collect();
+        (!names.is_empty()).then(|| KeptShared { name: names.join(" and "), layout: self.layout() })
     }
 
     pub(super) fn check(&self, kept: Option<&KeptShared>) -> Result<(), String> {
@@ -161,17 +223,17 @@ impl std::fmt::Display for KeptShared {
 
 /// The passes of a strategy, under a number that is one higher, and the passes of the shared parameters.
 #[derive(Debug)]
-struct Both {
+struct Joined {
     strategy: Arc<dyn Extension>,
-    shared: Arc<dyn Extension>,
+    shared: Vec<Arc<dyn Extension>>,
 }
 
-impl Extension for Both {
+impl Extension for Joined {
     fn extend(&self, passes: u32, hook: Hook, b: &mut Builder) {
         if passes > 1 {
             self.strategy.extend(passes - 1, hook, b);
         }
-        self.shared.extend(1, hook, b);
+        self.shared.iter().for_each(|of| of.extend(1, hook, b));
     }
 
     fn updates_unseen(&self, passes: u32) -> bool {

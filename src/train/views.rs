@@ -1,7 +1,7 @@
 //! The training views, at the size of each step.
 
 use super::step_input::{StepInput, TrainView};
-use super::{TrainConfig, free_space};
+use super::{TrainConfig, free_space, poses};
 use crate::scene::Camera;
 use crate::scene::camera::side_at;
 use crate::scheduler::plan::FRAMES_IN_FLIGHT;
@@ -20,6 +20,8 @@ pub(super) struct Views {
     /// Other views of each view, with free space on the way; empty without pruning of fog.
     partners: Vec<Vec<usize>>,
     free_space: bool,
+    /// Refined camera of each view, for work between steps; empty without refinement.
+    refined: Vec<Camera>,
     start: f64,
     full_from: u32,
 }
@@ -28,7 +30,15 @@ impl Views {
     /// Makes the views of a training.
     pub(super) fn new(whole: Vec<TrainView>, config: &TrainConfig) -> Self {
         let (start, full_from) = (f64::from(config.start_size.unwrap_or(1.0)), config.full_size_from());
-        Self { whole, shrunk: BTreeMap::new(), partners: Vec::new(), free_space: config.free_space, start, full_from }
+        Self {
+            whole,
+            shrunk: BTreeMap::new(),
+            partners: Vec::new(),
+            free_space: config.free_space,
+            refined: Vec::new(),
+            start,
+            full_from,
+        }
     }
 
     /// Sets the near plane of each view.
@@ -38,6 +48,22 @@ impl Views {
             let cameras: Vec<&Camera> = self.whole.iter().map(|view| &view.camera).collect();
             self.partners = free_space::partners(&cameras, planes);
         }
+    }
+
+    /// Sets the refined cameras by the rows of their photos.
+    pub(super) fn refine(&mut self, rows: &[Vec<[f32; 4]>]) {
+        let refined = |(view, rows): (&TrainView, &Vec<_>)| poses::corrected(&view.camera, [rows[0], rows[1]]);
+        self.refined = self.whole.iter().zip(rows).map(refined).collect();
+    }
+
+    /// Returns the refined cameras; none without refinement.
+    pub(super) fn refined(&self) -> &[Camera] {
+        &self.refined
+    }
+
+    /// Returns the camera of a view for work between steps.
+    pub(super) fn camera(&self, view: usize) -> &Camera {
+        self.refined.get(view).unwrap_or(&self.whole[view].camera)
     }
 
     /// Returns the camera to which the space is free in a step, and the near plane of all cameras on the way.

@@ -31,8 +31,10 @@ impl Trainer {
     fn count_votes(&mut self) -> Result<Decision> {
         let how = Sweep { near: self.config.near, border: self.config.mask_border, alone: false };
         let means = self.engine.means()?;
-        let voters = self.views.iter().filter_map(|view| {
-            Some(Voter { camera: &view.camera, mask: view.mask.as_ref()?, photo: Some(&view.photo), trust: None })
+        self.refresh_poses()?;
+        let voters = self.views.iter().enumerate().filter_map(|(index, view)| {
+            let (camera, mask) = (self.views.camera(index), view.mask.as_ref()?);
+            Some(Voter { camera, mask, photo: Some(&view.photo), trust: None })
         });
         let voters: Vec<Voter> = voters.collect();
         let is_judged = self.config.vote_trust && self.labelled_once;

@@ -17,6 +17,7 @@ mod measure;
 mod memory;
 mod pace;
 mod paper;
+mod poses;
 #[allow(dead_code, reason = "what the build does with shaders; benchmarks generate nothing")]
 #[path = "../shadergen/mod.rs"]
 mod shadergen;
@@ -66,6 +67,8 @@ enum Command {
     Limits(Common),
     /// A model of a step on graphics cards, checked against counted accesses and published times.
     CardModel(Common),
+    /// Poses that are off, with and without refinement: what is left of the errors, and the quality.
+    Poses(poses::Options),
     /// Predicted against measured memory of training.
     Memory(Common),
     /// From the start of the program to its first picture, with empty and with filled caches.
@@ -94,6 +97,7 @@ fn run() -> Result<()> {
         Command::Kernels(args) => kernels::run(&args),
         Command::Steps(common) => steps::run(&common),
         Command::Paper(options) => paper::run(&options),
+        Command::Poses(options) => poses::run(&options),
         Command::Training(options) => training::run(&options),
         Command::FirstStep(common) => training::first_step(&common),
         Command::Limits(common) => limits::run(&common),

@@ -73,7 +73,8 @@ pub(super) fn findings(views: &[ViewReport]) -> Vec<Finding> {
         if let Some([red, green, blue]) = view.channel_gains
             && red.max(green).max(blue) > TINT * red.min(green).min(blue)
         {
-            let text = format!("has {red:.2}, {green:.2} and {blue:.2} times the red, green and blue of the mean photo");
+            let text =
+                format!("has {red:.2}, {green:.2} and {blue:.2} times the red, green and blue of the mean photo");
             found.push(Finding::new(Fault::WhiteBalance, Some(&view.name), text));
         }
     }

@@ -6,6 +6,7 @@
 mod binary;
 mod model;
 mod text;
+pub(crate) mod write;
 
 use super::listed_path::Place;
 use super::listing::{FAR, Listed, Listing, check_camera, find_file};

@@ -4,8 +4,8 @@ use crate::engine::{Engine, ListKey};
 use crate::error::{Error, Result};
 use crate::shaders::constants::STAT_NEAR;
 use crate::shaders::structs::{Counters, StepUniforms};
-use crate::train::step_input::TrainView;
 use crate::train::strategy::weights::weights;
+use crate::train::views::Views;
 
 /// Counts of a densification.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -30,7 +30,7 @@ pub(crate) struct Bound {
 pub struct Population<'a> {
     engine: &'a mut Engine,
     bound: &'a mut Bound,
-    views: &'a [TrainView],
+    views: &'a Views,
     uniforms: StepUniforms,
     step: u32,
     densified: Option<Densified>,
@@ -41,7 +41,7 @@ impl<'a> Population<'a> {
     pub(in crate::train) fn new(
         engine: &'a mut Engine,
         bound: &'a mut Bound,
-        views: &'a [TrainView],
+        views: &'a Views,
         uniforms: StepUniforms,
         step: u32,
     ) -> Self {
@@ -95,7 +95,10 @@ impl<'a> Population<'a> {
     /// Removes the `share` of the Gaussians with the least blending weight over all pixels of all views. Statistics start
     /// over.
     pub fn prune_least(&mut self, share: f64) -> Result<Densified> {
-        let weights = weights(self.engine, self.views.iter().map(|view| (&view.camera, view.near)))?;
+        let weights = weights(
+            self.engine,
+            self.views.iter().enumerate().map(|(index, view)| (self.views.camera(index), view.near)),
+        )?;
         let mut order: Vec<usize> = (0..weights.len()).collect();
         order.sort_by(|&a, &b| weights[a].total_cmp(&weights[b]));
         let mut marks = vec![[0.0; 2]; weights.len()];

@@ -12,6 +12,7 @@ pub mod exposure;
 pub mod lift;
 pub mod loss;
 pub mod model;
+pub mod pose;
 pub mod project;
 pub mod random;
 pub mod relocate;

@@ -18,7 +18,7 @@ use crate::train::strategy::weights::weights;
 use crate::verify::reference::adam::{Optimised, Rates, adam};
 use crate::verify::reference::blend::{Upstream, blend_backward, blend_forward};
 use crate::verify::reference::disagreement::disagreement;
-use crate::verify::reference::lift::{self, vote};
+use crate::verify::reference::lift::{self, vote, vote_alone};
 use crate::verify::reference::loss::photo_loss;
 use crate::verify::reference::project::project_forward;
 use crate::verify::reference::splat::Splat;
@@ -235,17 +235,31 @@ impl Ran {
 
     /// Checks the sums of blending weights by label of the mask.
     pub(super) fn votes(&mut self) -> Result<Verdict> {
+        self.votes_of(false)
+    }
+
+    /// Checks the same sums with each Gaussian as if nothing were in front of it.
+    pub(super) fn votes_alone(&mut self) -> Result<Verdict> {
+        self.votes_of(true)
+    }
+
+    fn votes_of(&mut self, alone: bool) -> Result<Verdict> {
         let (size, count) = (self.fixture.size(), self.fixture.scene.gaussians.len());
         let (camera, target) = (self.fixture.scene.camera.clone(), &self.fixture.scene.target);
         let ids = target.label_map.iter().map(|&id| id as u16).collect();
         let mask = LabelMap { width: camera.width, height: camera.height, ids };
         let voter = Voter { camera: &camera, mask: &mask, photo: None, trust: None };
-        let how = Sweep { near: self.fixture.config.near, border: 0, alone: false };
+        let how = Sweep { near: self.fixture.config.near, border: 0, alone };
         let ballot = sweep(&mut self.fixture.engine, &[voter], how)?;
         let actual = ballot.weights();
         let column = |id: &u16| ballot.labels.iter().position(|label| label == id);
         let columns: Vec<Option<usize>> = mask.ids.iter().map(column).collect();
-        let expected = vote(&self.rules, &self.splats, size, count, &columns, &vec![1.0; ballot.labels.len()]);
+        let labels = ballot.labels.len();
+        let expected = if alone {
+            vote_alone(&self.rules, &self.splats, size, count, (&columns, labels))
+        } else {
+            vote(&self.rules, &self.splats, size, count, &columns, &vec![1.0; labels])
+        };
         // Each tile's sum is rounded to 2^-16, and there are at most 48 tiles; pairs near the cut may go either way.
         Ok(close(&actual, &expected, Tolerance { absolute: 48.0 * 0.5 / 65_536.0 + 0.02, relative: 1e-4 }))
     }

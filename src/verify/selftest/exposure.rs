@@ -12,7 +12,7 @@ use crate::pass::KernelShape;
 use crate::scheduler::plan::Buf;
 use crate::shaders::constants::EXPOSURE_PRIOR;
 use crate::train::exposure::Exposure;
-use crate::train::shared::SharedParameters;
+use crate::train::shared::{Place, SharedLayout, SharedParameters};
 use crate::verify::reference::Rules;
 use crate::verify::reference::exposure::{backward, exposed};
 use crate::verify::reference::loss::photo_loss;
@@ -43,7 +43,8 @@ impl Exposed {
         // The picture of a step without exposure.
         fixture.train()?;
         let image = wide(fixture.get(Buf::IMAGE, pixels)?);
-        fixture.engine.set_extension(Exposure::default().extension(), 1);
+        let place = Place { all: SharedLayout { scene: 0, photo: 1 }, ..Place::default() };
+        fixture.engine.set_extension(Exposure::default().extension(place), 1);
         fixture.engine.set_shared(&LOGS)?;
         fixture.shared = vec![SharedRow { row: PHOTO as u32, rates: [0.0; 4] }];
         let ListKey::Train(variant) = fixture.key() else {

@@ -6,6 +6,7 @@ pub mod exposure;
 pub mod fixture;
 pub mod judge;
 pub mod model;
+pub mod pose;
 pub mod relocation;
 pub mod scenes;
 mod training;
@@ -78,13 +79,14 @@ pub fn passes(
     let mut ran = Ran::new(rules, gpu, kernels)?;
     let prepared = start.elapsed().as_secs_f64();
     type Pass = fn(&mut Ran) -> Result<Verdict>;
-    let passes: [(&str, Pass); 13] = [
+    let passes: [(&str, Pass); 14] = [
         ("depth order", Ran::order),
         ("projection", Ran::projection),
         ("tile lists", Ran::tiles),
         ("blend forward", Ran::blend),
         ("photo loss and its gradient", Ran::loss),
         ("votes", Ran::votes),
+        ("votes of Gaussians alone", Ran::votes_alone),
         ("label map", Ran::label_map),
         ("blend backward", Ran::blend_backward),
         ("disagreement of labels", Ran::disagreement),
@@ -105,7 +107,7 @@ pub fn passes(
 /// Runs the checks of passes that change the model.
 pub fn changes(rules: &Rules, gpu: &Arc<Gpu>, kernels: KernelShape, mut done: impl FnMut(Check)) -> Result<()> {
     type Change = fn(&Rules, &Arc<Gpu>, KernelShape, f64) -> Result<Verdict>;
-    let changes: [(&str, Change); 8] = [
+    let changes: [(&str, Change); 9] = [
         ("densification", model::densification),
         ("densification along the longest axis", model::long_splits),
         ("marks of fog", model::fog_of_a_step),
@@ -113,6 +115,7 @@ pub fn changes(rules: &Rules, gpu: &Arc<Gpu>, kernels: KernelShape, mut done: im
         ("random moves", relocation::exploration),
         ("reset of opacities", model::reset),
         ("exposure of a photo", exposure::exposure_of_a_step),
+        ("pose of a photo", pose::pose_of_a_step),
         ("lift of labels by the paper's rule", model::lift_of_a_step),
     ];
     for (name, change) in changes {

@@ -1,0 +1,67 @@
+#version 460
+#include "layout.glsl"
+#include "constants.glsl"
+#include "step.glsl"
+#include "dispatch.glsl"
+#include "sh.glsl"
+// pose_backward — sum what the gradients of the splats say about the pose of the camera.
+// Work:    64 splats per workgroup.
+// Reads:   step; counters; gaussian_from_splat [V]; means, quats, sh1..sh3 [N]; v_means, v_quats, v_sh0 [V]
+// Writes:  pose_partials [ceil(V / 64), 2]: the force, and the torque around the camera, both in world axes
+// Math:    moving the camera by u moves all Gaussians by -u: force = sum dL/dp. Turning it turns them around the camera,
+//          but not their colours: torque = sum (p - c) x (dL/dp without the view direction's part) + the part of the
+//          orientations, (q v_xyz - v_w q_xyz + q_xyz x v_xyz) / 2.
+// Order:   fixed, bitwise reproducible.
+// Mirror:  src/verify/reference/pose.rs::backward
+
+layout(constant_id = 11) const uint SH_DEGREE = 3;
+layout(local_size_x = 64) in;
+READ1(0, StepUniforms, step);
+READ1(1, Counters, counters);
+FETCHU(2, gaussian_from_splat);
+FETCH4(3, means);
+FETCH4(4, quats);
+FETCH4(5, sh1);
+FETCH4(6, sh2);
+FETCH4(7, sh3);
+READ(8, vec4, v_means);
+READ(9, vec4, v_quats);
+READ(10, vec4, v_sh0);
+WRITE(11, vec4, pose_partials);
+
+#include "sh_fetch.glsl"
+#include "sh_backward.glsl"
+
+shared vec3 forces[64];
+shared vec3 torques[64];
+
+void main() {
+    uint group = linear_group_id(), lane = gl_LocalInvocationID.x, s = group * 64u + lane;
+    vec3 force = vec3(0.0), torque = vec3(0.0);
+    if (s < counters.visible_count) {
+        uint i = fetchu(gaussian_from_splat, s);
+        vec4 q = fetch4(quats, i), v_q = v_quats[s];
+        vec3 offset = fetch4(means, i).xyz - step.camera_centre;
+        float inv_distance = inversesqrt(max(dot(offset, offset), 1e-24));
+        vec3 direction = offset * inv_distance;
+        vec3 v_direction = sh_direction_gradient(i, direction, v_sh0[s].xyz / SH_C0);
+        force = v_means[s].xyz;
+        vec3 of_place = force - (v_direction - direction * dot(direction, v_direction)) * inv_distance;
+        // Quaternions are w, x, y, z.
+        vec3 of_turn = q.x * v_q.yzw - v_q.x * q.yzw + cross(q.yzw, v_q.yzw);
+        torque = cross(offset, of_place) + 0.5 * of_turn;
+    }
+    forces[lane] = force;
+    torques[lane] = torque;
+    for (uint half_ = 32u; half_ > 0u; half_ /= 2u) {
+        barrier();
+        if (lane < half_) {
+            forces[lane] += forces[lane + half_];
+            torques[lane] += torques[lane + half_];
+        }
+    }
+    if (lane == 0u && s < counters.visible_count) {
+        pose_partials[2u * group] = vec4(forces[0], 0.0);
+        pose_partials[2u * group + 1u] = vec4(torques[0], 0.0);
+    }
+}
