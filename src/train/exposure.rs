@@ -13,8 +13,8 @@ use std::sync::Arc;
 /// Learning rate of ln gain. A photo has one update for each of its turns, some dozens in a short run.
 const RATE: f64 = 0.01;
 /// Root mean square of ln gain over the photos from which their exposures differ. Captures with a fixed exposure have up to
-/// 0.06, by what shines and by noise.
-const DIFFERS: f64 = 0.1;
+/// 0.04, by what shines and by noise.
+const DIFFERS: f64 = 0.07;
 /// Share of the photos whose gains must be known for a decision.
 const KNOWN: f64 = 0.5;
 

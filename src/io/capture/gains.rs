@@ -18,8 +18,8 @@ const ROUNDS: usize = 15;
 const DESCENTS: usize = 60;
 /// Differences of logarithms below this have equal weight.
 const EQUAL: f64 = 0.02;
-/// Weight of a gain of 1 against a point's: decides between photos that share nothing.
-const PRIOR: f64 = 1e-3;
+/// Weight of a gain of 1, against 1 / |difference| for each point: a handful of points that disagree do not make a gain.
+const PRIOR: f64 = 100.0;
 
 /// Brightness of a photo relative to the mean of all photos.
 #[derive(Clone, Copy, Debug, PartialEq)]
