@@ -50,7 +50,8 @@ fn settings(exposure: ExposureMode) -> TrainConfig {
     TrainConfig { iterations: 120, exposure, ..config(LabelRule::Votes) }
 }
 
-fn go_on(trainer: &mut Trainer, until: u32) -> TrainState {
+/// Trains up to a step.
+pub fn go_on(trainer: &mut Trainer, until: u32) -> TrainState {
     while trainer.steps_done() < until {
         trainer.step().expect("a step");
     }

@@ -1,5 +1,6 @@
 //! Poses of photos: gradient, recovery, checkpoints.
 
+use crate::exposure::go_on;
 use crate::gradient::{agree, differences};
 use crate::reference::Rules;
 use crate::reference::pose::{backward, corrected};
@@ -47,13 +48,6 @@ fn a_correction_turns_around_the_centre_and_moves_it() {
     let angle = moved.axis().angle_between(camera.axis());
     assert!((angle - 2.0 * 0.1_f64.atan()).abs() < 1e-6, "{angle}");
     assert!((moved.rotation.determinant() - 1.0).abs() < 1e-6);
-}
-
-fn go_on(trainer: &mut Trainer, until: u32) -> TrainState {
-    while trainer.steps_done() < until {
-        trainer.step().expect("a step");
-    }
-    trainer.state().expect("a state")
 }
 
 /// One pose of sixteen is off. Refinement brings it nearer, beside exposures, and a resumed training has the same bits.
