@@ -86,8 +86,8 @@ fn apart(entries: &[Entry], points: usize, logs: &[f64], of: impl Fn(&Entry) -> 
 /// Minimises the weighted squares over the gains by conjugate gradients; the colours of points are eliminated.
 fn descend(entries: &[Entry], points: usize, logs: &mut [f64]) {
     let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
-    let mut residual = apart(entries, points, &vec![0.0; logs.len()], |entry| entry.value - logs[entry.view]);
-    residual.iter_mut().zip(&*logs).for_each(|(of, log)| *of -= PRIOR * log);
+    let less: Vec<f64> = logs.iter().map(|log| -log).collect();
+    let mut residual = apart(entries, points, &less, |entry| entry.value + less[entry.view]);
     let (mut direction, mut square) = (residual.clone(), dot(&residual, &residual));
     for _ in 0..DESCENTS {
         let along = apart(entries, points, &direction, |entry| direction[entry.view]);

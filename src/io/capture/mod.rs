@@ -25,9 +25,9 @@ pub enum Fault {
     Reprojection,
     /// The photo is less sharp than those beside it.
     Blur,
-    /// The photo is brighter or darker than others that show the same points.
+    /// The photo is brighter or darker than the mean photo, by the points that photos share.
     Exposure,
-    /// The photo has another tint than others that show the same points.
+    /// The photo has another tint than the mean photo, by the points that photos share.
     WhiteBalance,
     /// Hardly any point of the photo is seen by others.
     Alone,
