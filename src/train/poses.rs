@@ -30,9 +30,9 @@ impl Poses {
     /// Makes the parameters of a scene.
     pub fn new(dataset: &Dataset) -> Self {
         let depth = |view: &View| {
-            let ahead = |point: &Point| Some(view.camera.to_camera(point.position).z).filter(|&z| z > 0.0);
             let seen = |point: &&Point| view.camera.sees(point.position).is_some();
-            let mut depths: Vec<f64> = dataset.points.iter().filter(seen).filter_map(ahead).collect();
+            let depth = |point: &Point| view.camera.to_camera(point.position).z;
+            let mut depths: Vec<f64> = dataset.points.iter().filter(seen).map(depth).collect();
             depths.sort_by(f64::total_cmp);
             depths.get(depths.len() / 2).copied().unwrap_or(dataset.extent()) as f32
         };
