@@ -26,6 +26,7 @@ fn text(bytes: &[u8]) -> String {
 fn model(folder: &Path) -> PathBuf {
     let path = folder.join("model.ply");
     let gaussians = Gaussians {
+        antialiased: false,
         origin: glam::DVec3::ZERO,
         means: (0..6).map(|i| [i as f32, 0.0, 1.0]).collect(),
         quats: vec![[1.0, 0.0, 0.0, 0.0]; 6],
@@ -179,7 +180,7 @@ fn a_flag_has_one_heading() {
 }
 
 /// A value other than the default for each setting; none for a flag that needs none.
-const TYPED: [(&str, &str); 60] = [
+const TYPED: [(&str, &str); 61] = [
     ("--iterations", "7"),
     ("--max-resolution", "99"),
     ("--start-size", "0.7"),
@@ -190,6 +191,7 @@ const TYPED: [(&str, &str); 60] = [
     ("--free-space", "off"),
     ("--far-points", "30"),
     ("--exposure", "on"),
+    ("--antialias", "on"),
     ("--refine-poses", ""),
     ("--grow-box", "-1,-2,0,1,2,3.5"),
     ("--rate-factor", "1.5"),

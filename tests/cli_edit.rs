@@ -46,6 +46,7 @@ fn refused(args: &[&str]) -> String {
 fn balls(path: &Path, places: &[[f32; 3]], labels: &[u32]) {
     let count = places.len();
     let gaussians = Gaussians {
+        antialiased: false,
         origin: glam::DVec3::ZERO,
         means: places.to_vec(),
         quats: vec![[1.0, 0.0, 0.0, 0.0]; count],

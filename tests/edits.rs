@@ -20,6 +20,7 @@ const UPRIGHT: [f32; 4] = [1.0, 0.0, 0.0, 0.0];
 fn model(rows: &[([f32; 3], [f32; 3], [f32; 4])]) -> Gaussians {
     let count = rows.len();
     Gaussians {
+        antialiased: false,
         origin: glam::DVec3::ZERO,
         means: rows.iter().map(|row| row.0).collect(),
         scales: rows.iter().map(|row| row.1.map(f32::ln)).collect(),

@@ -86,6 +86,7 @@ fn model(origin: DVec3) -> Gaussians {
     }
     let count = means.len();
     Gaussians {
+        antialiased: false,
         origin,
         means: means.iter().map(|mean| mean.as_vec3().to_array()).collect(),
         quats: vec![[1.0, 0.0, 0.0, 0.0]; count],

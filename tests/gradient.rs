@@ -87,15 +87,14 @@ fn gradient_floats(v: &SplatGradient) -> [f64; 9] {
 }
 
 /// Wide scenes put some centres far outside the image, where the Jacobian is clamped.
-fn project_case(row: &Row, camera: &labelgs::scene::Camera) {
-    let rules = Rules::default();
+fn project_case(rules: &Rules, row: &Row, camera: &labelgs::scene::Camera) {
     let model = |row: Row| Model { rows: vec![row], labels: vec![0], sh_degree: 3 };
     let weights =
         SplatGradient { mean2d: [0.3, -0.8], conic: [0.9, -1.7, 0.6], opacity: 1.3, colour: [0.2, -0.5, 0.9] };
-    let analytic = project_backward(&rules, camera, &model(*row), 0, &weights).floats();
+    let analytic = project_backward(rules, camera, &model(*row), 0, &weights).floats();
     let numeric = differences(&row.floats(), |p| {
         let row = Row::from_floats(p.try_into().expect("a row has 59 floats"));
-        let splat = project_forward(&rules, camera, &model(row), 0).expect("in front of the camera").splat;
+        let splat = project_forward(rules, camera, &model(row), 0).expect("in front of the camera").splat;
         splat_floats(&splat).iter().zip(gradient_floats(&weights)).map(|(s, w)| s * w).sum()
     });
     agree("project", &analytic, &numeric);
@@ -105,18 +104,29 @@ fn project_case(row: &Row, camera: &labelgs::scene::Camera) {
 
 #[test]
 fn projection_gradient_equals_central_differences() {
-    let s = scene(2, &Shape { gaussians: 30, ..small() });
-    let (mut clamped, rules) = (0, Rules::default());
+    projection_cases(&Rules::default(), small());
+}
+
+/// Some Gaussians are smaller than the dilation.
+#[test]
+fn antialiased_projection_gradient_equals_central_differences() {
+    let rules = Rules { antialiased: true, ..Rules::default() };
+    projection_cases(&rules, Shape { scales: (0.01, 0.3), ..small() });
+}
+
+fn projection_cases(rules: &Rules, shape: Shape) {
+    let s = scene(2, &Shape { gaussians: 30, ..shape });
+    let mut clamped = 0;
     for mut row in s.model().rows {
-        project_case(&row, &s.camera);
+        project_case(rules, &row, &s.camera);
         row.mean[0] *= 3.0;
         row.mean[1] *= 3.0;
         let p = s.camera.to_camera(DVec3::from(row.mean));
         let model = Model { rows: vec![row], labels: vec![0], sh_degree: 3 };
-        let margin = project_forward(&rules, &s.camera, &model, 0).map_or(0.0, |p| p.clamp_margin);
+        let margin = project_forward(rules, &s.camera, &model, 0).map_or(0.0, |p| p.clamp_margin);
         if p.z > 0.5 && margin > SAFE {
             clamped += usize::from((p.x / p.z).abs() > 0.8 || (p.y / p.z).abs() > 0.8);
-            project_case(&row, &s.camera);
+            project_case(rules, &row, &s.camera);
         }
     }
     assert!(clamped > 5, "only {clamped} rows reach the clamp");

@@ -244,6 +244,7 @@ fn labels_are_chosen_by_containment() {
 
 fn model() -> Gaussians {
     Gaussians {
+        antialiased: false,
         origin: glam::DVec3::ZERO,
         means: vec![[0.0, 0.0, 0.0], [2.0, 0.0, 0.0], [4.0, 4.0, 4.0], [1.0, 1.0, 1.0]],
         quats: vec![[1.0, 0.0, 0.0, 0.0]; 4],

@@ -7,6 +7,7 @@ use crate::reference::lift::{Masks, centres_of, label_map, lift};
 use crate::reference::model::ROW_FLOATS;
 use crate::reference::relocate::{explored, relocate};
 use crate::reference::rules::{Family, mutants};
+use crate::reference::smooth::smooth;
 use crate::reference::step::{splats_of, step};
 use crate::reference::{Model, Row, Rules};
 use crate::support::compare::{Tolerance, close};
@@ -30,6 +31,10 @@ fn outcome(family: Family, rules: &Rules, (s, model): &(Scene, Model)) -> Vec<f6
     match family {
         Family::Project | Family::Sh | Family::Blend | Family::Loss => {
             all(&step(rules, &s.camera, model, &s.target).rows)
+        }
+        Family::Smooth => {
+            let sizes = |row: &Row| smooth(rules, &s.camera, 60.0, row, 0.0);
+            model.rows.iter().map(sizes).flat_map(|(row, limit, _)| row.scale.into_iter().chain([limit])).collect()
         }
         Family::Adam => {
             let gradient = Row { mean: [1.0, 1e-6, 1e-9], ..Row::default() };

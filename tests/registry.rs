@@ -43,7 +43,9 @@ fn header<'a>(text: &'a str, key: &str) -> Option<&'a str> {
 fn lists() -> Vec<(Capacity, PassList)> {
     let mut all = Vec::new();
     let own = [KernelShape::new(8, true), KernelShape::new(32, false)];
-    for shape in own.into_iter().chain(own.map(|shape| KernelShape { emulated: true, ..shape })) {
+    let emulated = own.map(|shape| KernelShape { emulated: true, ..shape });
+    let antialiased = own.map(|shape| KernelShape { antialiased: true, ..shape });
+    for shape in own.into_iter().chain(emulated).chain(antialiased) {
         for segments in [1, 3] {
             let mut capacity = capacity(&shape, &ROOM);
             capacity.segments = segments;
@@ -89,7 +91,7 @@ fn lists() -> Vec<(Capacity, PassList)> {
                 disagreement: false,
             };
             let extension = strategy::of(StrategyKind::Mcmc).extension();
-            let all_passes = 7;
+            let all_passes = 15;
             add(pass::extended_step(&shape, &capacity, variant, (&*extension, all_passes)));
             let place = Place::default();
             for shared in [Exposure::default().extension(place), Poses::default().extension(place)] {

@@ -26,6 +26,7 @@ fn crowd(count: usize) -> (Gaussians, Camera) {
     };
     let part = |i: usize, a: usize| (i * a % 9973) as f32 / 9973.0;
     let gaussians = Gaussians {
+        antialiased: false,
         origin: glam::DVec3::ZERO,
         means: (0..count)
             .map(|i| {

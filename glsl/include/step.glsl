@@ -37,6 +37,7 @@ struct StepUniforms {
     float noise;            // factor of random moves, 1 / world unit
     uint seed;
     uint vote_columns;      // labels that a sweep counts at once
+    float finest;           // least deviation of a Gaussian at depth 1 of this view (smooth)
 };
 
 struct Counters {

@@ -4,6 +4,7 @@
 #include "step.glsl"
 #include "dispatch.glsl"
 #include "gaussian.glsl"
+#include "projection.glsl"
 #include "sh.glsl"
 // project_backward — carry the gradients of each splat back to the parameters of its Gaussian.
 // Work:    64 splats per workgroup.
@@ -12,7 +13,8 @@
 //          v_sh3 [V,6]; counters.nonfinite_* (integer atomics): Gaussians with a nonfinite gradient, which becomes 0;
 //          variant object: adds to the gradients of the scene's splats (splat_from_gaussian)
 // Math:    dSigma = -Q dQ Q through the inverse; dM = 2 G M; Jacobian, view direction and mean2d paths reach the mean;
-//          a clamped x/z or y/z has gradient 0; so does a colour clamped at 0.
+//          a clamped x/z or y/z has gradient 0; so does a colour clamped at 0; variant
+//          antialiased: the opacity reaches M through the coverage.
 // Mirror:  src/verify/reference/project.rs::project_backward
 
 layout(constant_id = 11) const uint SH_DEGREE = 3;
@@ -81,6 +83,12 @@ void main() {
     vec3 e0 = -2.0 * (v.x * p.q_m0 + v.y * p.q_m1), e1 = -2.0 * (v.y * p.q_m0 + v.z * p.q_m1); // -2 V Q M
     vec3 v_m0 = q.x * e0 + q.y * e1, v_m1 = q.y * e0 + q.z * e1;                             // -2 Q V Q M
     vec3 v_log_scale = p.q_m0 * e0 + p.q_m1 * e1; // diagonal of M^T v_M
+#ifdef ANTIALIASED
+    // ln opacity -> coverage -> M
+    v_m0 += b.y * p.i_m0;
+    v_m1 += b.y * p.i_m1;
+    v_log_scale += b.y * (p.m0 * p.i_m0 + p.m1 * p.i_m1);
+#endif
     vec3 w0 = v_m0 * p.sigma, w1 = v_m1 * p.sigma;
     vec3 v_t0 = p.rotation * w0, v_t1 = p.rotation * w1;
     mat3 v_r = mat3(w0.x * p.t0 + w1.x * p.t1, w0.y * p.t0 + w1.y * p.t1, w0.z * p.t0 + w1.z * p.t1);

@@ -4,6 +4,7 @@
 #include "step.glsl"
 #include "dispatch.glsl"
 #include "gaussian.glsl"
+#include "projection.glsl"
 #include "sh.glsl"
 #include "record.glsl"
 #include "ellipse.glsl"
@@ -13,7 +14,8 @@
 //          variant labels: labels [N], layer_from_label
 // Writes:  splats [V,3] (record.glsl); tiles_touched [V] over all layers; splat_from_gaussian [N]; counters.unprojected_*
 //          (integer atomics): nonfinite splats, which touch no tile
-// Math:    EWA splatting with Cauchy-Binet determinant; SH colour, clamped at 0; ellipse.glsl for the tiles.
+// Math:    EWA splatting with Cauchy-Binet determinant; SH colour, clamped at 0; ellipse.glsl for the tiles; variant
+//          antialiased: opacity times the root of the coverage (Mip-Splatting).
 // Mirror:  src/verify/reference/project.rs::project_forward
 
 layout(constant_id = 11) const uint SH_DEGREE = 3;
@@ -50,6 +52,9 @@ void main() {
     Projection p = project_gaussian(u, mean.xyz, fetch4(scales, i).xyz, fetch4(quats, i));
     vec3 q = exponent_from_conic(p.conic);
     float log2_o = log2_opacity(mean.w);
+#ifdef ANTIALIASED
+    log2_o += 0.5 * log2(p.coverage);
+#endif
     vec2 centre = vec2(u.fx, u.fy) * p.slope_raw + vec2(u.cx, u.cy);
     float reach = 2.0 * LN2 * (log2_o - LOG2_ALPHA_MIN);
     vec2 extent = sqrt(p.cov.xz * max(reach, 0.0)) * 1.0001 + 0.01;

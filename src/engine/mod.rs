@@ -135,6 +135,14 @@ impl Engine {
         self.sh_degree = sh_degree;
     }
 
+    /// Sets whether pictures are antialiased ([`Gaussians::antialiased`]).
+    pub(crate) fn set_antialiased(&mut self, antialiased: bool) {
+        if self.shape.antialiased != antialiased {
+            self.shape.antialiased = antialiased;
+            self.lists.clear();
+        }
+    }
+
     /// Sets the passes that [`ListKey::Extended`] adds; call it before the first such step. Steps with the variant
     /// `passes` count in predictions of memory; 0 for none.
     pub(crate) fn set_extension(&mut self, extension: Arc<dyn Extension>, passes: u32) {
@@ -151,6 +159,7 @@ impl Engine {
         model::upload(&mut self.sched, gaussians, self.size.labels.is_some())?;
         self.gaussian_count = gaussians.len() as u32;
         (self.sh_degree, self.origin) = (gaussians.sh_degree, gaussians.origin);
+        self.set_antialiased(gaussians.antialiased);
         Ok(())
     }
 
@@ -159,7 +168,7 @@ impl Engine {
         self.sched.wait_all()?;
         let labels = self.size.labels.is_some();
         let model = model::download(&mut self.sched, self.gaussian_count as usize, self.sh_degree, labels)?;
-        Ok(Gaussians { origin: self.origin, ..model })
+        Ok(Gaussians { origin: self.origin, antialiased: self.shape.antialiased, ..model })
     }
 
     /// Returns the camera's part of the uniforms for the model; all other fields are 0.

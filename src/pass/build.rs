@@ -65,7 +65,7 @@ impl Builder<'_> {
 /// Finds the variant with these macros and those of the shape. A kernel without texel reads or subgroup operations has
 /// no such variant.
 fn variant(kernel: &'static [ShaderDesc], mut macros: Vec<&str>, shape: &KernelShape) -> &'static ShaderDesc {
-    let of_shape = [("EMULATED", shape.emulated), ("TEXEL", shape.texel)];
+    let of_shape = [("ANTIALIASED", shape.antialiased), ("EMULATED", shape.emulated), ("TEXEL", shape.texel)];
     let known = |name| kernel.iter().any(|variant| variant.macros.contains(&name));
     macros.extend(of_shape.into_iter().filter(|&(name, on)| on && known(name)).map(|(name, _)| name));
     macros.sort_unstable();

@@ -93,6 +93,13 @@ pub(crate) fn regularise(b: &mut Builder) {
     } [], over_splats());
 }
 
+/// Keeps Gaussians from becoming finer than the photos can show.
+pub(crate) fn smooth(b: &mut Builder) {
+    b.list.stage = Stage::Optimise;
+    pass!(b, smooth { step: Buf::STEP, failure: Buf::FAILURE, means: Buf::MEANS, scales_in: Buf::SCALES, scales: Buf::SCALES } [],
+        over_gaussians());
+}
+
 /// Moves faint Gaussians at random.
 pub(crate) fn explore(b: &mut Builder) {
     b.list.stage = Stage::Optimise;

@@ -3,7 +3,7 @@
 use crate::error::{Error, Result};
 use crate::gpu::{Capabilities, SUBGROUP_MAX, SUBGROUP_MIN};
 
-/// Shape of the kernels, fixed for a device.
+/// Shape of the kernels: fixed for a device, but for what the model needs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct KernelShape {
     /// Invocations per subgroup: 4, 8, 16, 32 or 64.
@@ -22,6 +22,9 @@ pub struct KernelShape {
     pub lane_groups: u32,
     /// Splats per tile that one dispatch of a blend pass walks; a multiple of the subgroup size.
     pub segment_length: u32,
+    /// Blur takes opacity from splats, as the model on the device needs it
+    /// ([`Gaussians::antialiased`](crate::scene::Gaussians::antialiased)).
+    pub antialiased: bool,
 }
 
 /// Longest segment. Lavapipe ends all loops of an invocation after 65,535 rounds. A walk over n splats takes n rounds
@@ -56,6 +59,7 @@ impl KernelShape {
             digit_bits: if subgroup <= 16 { 8 } else { 4 },
             lane_groups: if cpu { 4 } else { 128 },
             segment_length: SEGMENT_LENGTH,
+            antialiased: false,
         }
     }
 

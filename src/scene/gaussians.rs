@@ -30,6 +30,9 @@ pub struct Gaussians {
     pub sh_rest: Vec<[f32; 3]>,
     /// Degree of the spherical harmonics, 0 to 3.
     pub sh_degree: u32,
+    /// The dilation of a splat takes opacity, so that its light stays the same (2-D filter of Mip-Splatting). A picture
+    /// without that has too much of small and distant Gaussians.
+    pub antialiased: bool,
     /// Object ids, `[N]`, 0 = unlabelled; `None` in a scene without labels.
     pub labels: Option<Vec<u32>>,
     /// Confidence of each label, `[N]`, 0 to 1: its share of the votes; `None` without votes.
@@ -108,6 +111,7 @@ impl Gaussians {
             sh0: rows.iter().map(|&r| self.sh0[r]).collect(),
             sh_rest: rows.iter().flat_map(|&r| self.sh_rest[r * rest..(r + 1) * rest].iter().copied()).collect(),
             sh_degree: self.sh_degree,
+            antialiased: self.antialiased,
             labels: self.labels.as_ref().map(|labels| rows.iter().map(|&r| labels[r]).collect()),
             label_confidence: self.label_confidence.as_ref().map(|shares| rows.iter().map(|&r| shares[r]).collect()),
         }

@@ -220,6 +220,14 @@ crate::options::options! {
             /// 0.2 (3DGS); the rest is L1.
             lambda_dssim <"SHARE">: f32 = 0.2, up_to(1.0);
 
+            /// Trains a model without aliasing, on or off.
+            ///
+            /// Smaller pictures of such a model do not shimmer, and views from nearby show no needles: blur takes opacity, and
+            /// no Gaussian is finer than the pixels of its nearest photo (Mip-Splatting). At the size of the photos it gains
+            /// nothing. Viewers that do not know the flag in the model show its fine parts too bold.
+            #[cfg_attr(feature = "cli", arg(value_parser = switch, action = clap::ArgAction::Set))]
+            antialias <"SWITCH">: bool = false, fixed;
+
             /// Degree of the spherical harmonics, 0 to 3.
             ///
             /// 3 (3DGS). Lower degrees save memory and lose highlights.

@@ -45,6 +45,7 @@ pub(crate) fn go_on_from(mut model: Gaussians, dataset: &Dataset, config: &Train
     let config = TrainConfig {
         start_size: config.start_size.or(Some(1.0)),
         sh_degree_interval: config.sh_degree_interval.or(Some(1)),
+        antialias: config.antialias || model.antialiased,
         ..config.clone()
     };
     (model, config)

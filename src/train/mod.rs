@@ -129,6 +129,7 @@ impl Trainer {
         trainer.engine.set_shared(&trainer.shared.start(trainer.views.len())?)?;
         // Colour bands that the model lacks start at 0.
         trainer.engine.set_sh_degree(trainer.config.sh_degree);
+        trainer.engine.set_antialiased(trainer.config.antialias);
         Ok(trainer)
     }
 
@@ -150,6 +151,7 @@ impl Trainer {
         let size = size.with_shared_rows(shared.rows(views.len()));
         let mut engine = Engine::with_shape(gpu, shape, size, scheduler)?;
         engine.set_sh_degree(config.sh_degree);
+        engine.set_antialiased(config.antialias);
         let passes = shared.passes(strategy.passes(At { step: 1, config: &config, extent: fixed.extent }));
         engine.set_extension(shared.extended(strategy.extension()), passes);
         let order = ViewOrder::new(config.seed, views.len());

@@ -84,9 +84,9 @@ pub(super) fn train_view(view: &View, border: u32) -> Result<TrainView> {
     let valid_pixels = step_input::valid_pixels(&photo);
     let mask = view.mask.clone();
     let objects = mask.as_deref().map(LabelMap::objects).unwrap_or_default();
-    let (name, camera) = (view.name.clone(), view.camera.clone());
+    let (name, camera, finest) = (view.name.clone(), view.camera.clone(), step_input::finest(&view.camera));
     let view_labels = mask.as_ref().map(|mask| step_input::view_labels(mask, border)).unwrap_or_default();
     let shown = step_input::shown_objects(&photo, &view_labels);
     let occluders = Default::default();
-    Ok(TrainView { name, camera, near: 0.0, photo, valid_pixels, mask, objects, view_labels, shown, occluders })
+    Ok(TrainView { name, camera, near: 0.0, finest, photo, valid_pixels, mask, objects, view_labels, shown, occluders })
 }

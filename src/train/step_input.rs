@@ -5,7 +5,7 @@ use super::TrainConfig;
 use crate::engine::{DisagreementInput, Engine, LayerInput, TrainInput};
 use crate::io::resample::shrink_photo;
 use crate::scene::{Camera, LabelMap, Occluders, Photo};
-use crate::shaders::constants::{ADAM_BETA1, ADAM_BETA2, LABEL_BORDER};
+use crate::shaders::constants::{ADAM_BETA1, ADAM_BETA2, FINEST, LABEL_BORDER};
 use crate::shaders::structs::StepUniforms;
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -22,6 +22,8 @@ pub struct TrainView {
     pub camera: Camera,
     /// Near plane, world units.
     pub near: f32,
+    /// Least standard deviation of Gaussians at depth 1, world units: a share of a pixel at full size.
+    pub finest: f32,
     /// Photo.
     pub photo: Arc<Photo>,
     /// Number of pixels of the photo that count.
@@ -46,6 +48,7 @@ impl TrainView {
         Self {
             name: self.name.clone(),
             near: self.near,
+            finest: self.finest,
             camera,
             valid_pixels: valid_pixels(&photo),
             photo: Arc::new(photo),
@@ -56,6 +59,11 @@ impl TrainView {
             occluders: Occluders::new(),
         }
     }
+}
+
+/// Returns the least standard deviation of Gaussians at depth 1 that a photo can show.
+pub(crate) fn finest(camera: &Camera) -> f32 {
+    (f64::from(FINEST) / camera.fx.max(camera.fy)) as f32
 }
 
 /// Returns the number of pixels of a photo that count.
@@ -172,6 +180,7 @@ pub(crate) fn uniforms(
     let correction = |beta: f32| (1.0 / (1.0 - f64::from(beta).powi(input.updates.max(1) as i32))) as f32;
     let labels = engine.size().labels.map_or(0, |room| room.max_label + 1);
     StepUniforms {
+        finest: view.finest,
         layer_count: input.layers.len() as u32,
         lambda_dssim: config.lambda_dssim,
         loss_scale: (1.0 / (3.0 * view.valid_pixels.max(1) as f64)) as f32,

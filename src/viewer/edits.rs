@@ -246,6 +246,7 @@ fn interleaved(kept: &Gaussians, removed: &Gaussians, rows: &[usize]) -> Gaussia
             .flat_map(|&(from, at)| from.sh_rest[at * rest..(at + 1) * rest].iter().copied())
             .collect(),
         sh_degree: kept.sh_degree,
+        antialiased: kept.antialiased,
         labels: column(|model| model.labels.as_ref()),
         label_confidence: shares,
     }

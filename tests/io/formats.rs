@@ -182,6 +182,19 @@ fn round_trips_stay_within_the_steps_and_keep_labels_and_names() {
     }
 }
 
+/// Each format says whether its model is antialiased.
+#[test]
+fn an_antialiased_model_stays_one() {
+    let scene = Scene::new();
+    for antialiased in [true, false] {
+        let before = Gaussians { antialiased, ..model(50, 1, true) };
+        for (file, options, _) in written() {
+            export_model(scene.at(file), &before, None, options).expect("written");
+            assert_eq!(read_model(scene.at(file)).expect("read").gaussians.antialiased, antialiased, "{file}");
+        }
+    }
+}
+
 /// Positions of a scene far away are relative to an origin beside the file.
 #[test]
 fn far_scenes_keep_their_place() {
@@ -326,6 +339,7 @@ fn in_order_of(model: &Gaussians, other: &Gaussians) -> Gaussians {
     let rows: Vec<usize> = other.means.iter().map(nearest).collect();
     let parts: Vec<Gaussians> = rows.iter().map(|&row| model.filtered(|own| own == row)).collect();
     Gaussians {
+        antialiased: false,
         origin: model.origin,
         means: parts.iter().flat_map(|part| part.means.clone()).collect(),
         quats: parts.iter().flat_map(|part| part.quats.clone()).collect(),

@@ -74,6 +74,7 @@ fn drawn(rows: &[Row], labels: Vec<u32>, width: u32, height: u32, label_map: Vec
     Scene {
         camera: plain_camera(width, height),
         gaussians: Gaussians {
+            antialiased: false,
             origin: glam::DVec3::ZERO,
             means: rows.iter().map(|r| r.mean.map(narrow)).collect(),
             quats: rows.iter().map(|r| r.quat.map(narrow)).collect(),

@@ -5,6 +5,7 @@
 //! time; `step` compares the whole chain. Tolerances are 1.5 times the largest error on lavapipe, which is written
 //! beside them.
 
+mod antialias;
 mod blend;
 mod disagreement;
 pub mod fixture;

@@ -55,6 +55,7 @@ fn the_command_line_refuses_before_a_device_is_needed() {
     let path = |name: &str| folder.path().join(name).to_str().expect("UTF-8").to_owned();
     let (model, truth, scene) = (path("model.ply"), path("truth"), path("scene"));
     let gaussians = Gaussians {
+        antialiased: false,
         origin: glam::DVec3::ZERO,
         means: vec![[0.0; 3]],
         quats: vec![[1.0, 0.0, 0.0, 0.0]],

@@ -26,6 +26,7 @@ mod steps;
 mod trained;
 mod training;
 mod view;
+mod zoom;
 
 use clap::{Parser, Subcommand};
 use labelgs::Result;
@@ -69,6 +70,8 @@ enum Command {
     CardModel(Common),
     /// Poses that are off, with and without refinement: what is left of the errors, and the quality.
     Poses(poses::Options),
+    /// Pictures larger and smaller than the photos, with and without antialiasing, against traced ones.
+    Zoom(zoom::Options),
     /// Predicted against measured memory of training.
     Memory(Common),
     /// From the start of the program to its first picture, with empty and with filled caches.
@@ -98,6 +101,7 @@ fn run() -> Result<()> {
         Command::Steps(common) => steps::run(&common),
         Command::Paper(options) => paper::run(&options),
         Command::Poses(options) => poses::run(&options),
+        Command::Zoom(options) => zoom::run(&options),
         Command::Training(options) => training::run(&options),
         Command::FirstStep(common) => training::first_step(&common),
         Command::Limits(common) => limits::run(&common),

@@ -13,6 +13,7 @@ pub(in crate::io) struct Elements {
     header_bytes: usize,
     encoding: Encoding,
     elements: Vec<ElementDef>,
+    comments: Vec<String>,
 }
 
 /// Columns of an element.
@@ -43,13 +44,19 @@ impl Elements {
     pub(in crate::io) fn open(path: &Path, if_property: &str) -> Result<Option<Self>> {
         let mut file = read::open(path)?;
         let (header, header_bytes) = read_header(path, &mut file)?;
+        let comments = header.comments;
         let elements: Vec<ElementDef> = header.elements.into_iter().map(|(_, element)| element).collect();
         if !elements.iter().any(|element| element.properties.contains_key(if_property)) {
             return Ok(None);
         }
         drop(file);
         let bytes = read::bytes(path)?;
-        Ok(Some(Self { path: path.to_owned(), bytes, header_bytes, encoding: header.encoding, elements }))
+        Ok(Some(Self { path: path.to_owned(), bytes, header_bytes, encoding: header.encoding, elements, comments }))
+    }
+
+    /// Returns the comments of the header.
+    pub(in crate::io) fn comments(&self) -> impl Iterator<Item = &str> {
+        self.comments.iter().map(String::as_str)
     }
 
     /// Returns true if an element has a property.

@@ -23,7 +23,7 @@ crate::buffers! {
     REPORT_FAILURE "report_failure": 4, Domain::One, Class::Report, None, "Failure word of the step, for the host.";
 
     MEANS "means": 16, Domain::Gaussians, Class::Model, VEC4, "Positions, `[N]`: x, y, z (world units), opacity logit.";
-    SCALES "scales": 16, Domain::Gaussians, Class::Model, VEC4, "ln of the standard deviations, `[N]`: x, y, z, 0.";
+    SCALES "scales": 16, Domain::Gaussians, Class::Model, VEC4, "ln of the standard deviations, `[N]`: x, y, z; and the least deviation (smooth), 0 without.";
     QUATS "quats": 16, Domain::Gaussians, Class::Model, VEC4, "Rotations, `[N]`: w, x, y, z.";
     SH0 "sh0": 16, Domain::Gaussians, Class::Model, VEC4, "Colour coefficients of degree 0, `[N]`: r, g, b, 0.";
     SH1 "sh1": 48, Domain::Gaussians, Class::Model, VEC4, "Colour coefficients of degree 1, `[N, 3 vec4]`: 9 floats, coefficient-major rgb, then 3 of padding.";

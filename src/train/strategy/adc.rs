@@ -1,11 +1,13 @@
 //! The strategy of 3DGS, adaptive density control: clones and splits Gaussians with large screen-space gradients,
 //! prunes faint or too large ones, and resets opacities if the settings say so.
 
-use super::{At, Population, Strategy};
+use super::{At, Population, Strategy, passes};
 use crate::error::Result;
+use crate::pass::Extension;
 use crate::scheduler::plan::Buf;
 use crate::shaders::structs::StepUniforms;
 use crate::train::TrainConfig;
+use std::sync::Arc;
 
 /// The strategy of 3DGS. It has no state: all decisions follow from the step and the configuration.
 #[derive(Clone, Copy, Debug, Default)]
@@ -39,6 +41,14 @@ impl Strategy for AdcStrategy {
 
     fn blurs_depth_after(&self, at: At) -> bool {
         resets_opacity_at(at.config, at.step)
+    }
+
+    fn extension(&self) -> Arc<dyn Extension> {
+        Arc::new(passes::Passes)
+    }
+
+    fn passes(&self, at: At) -> u32 {
+        passes::smooth(at)
     }
 
     fn planes(&self) -> &'static [Buf] {

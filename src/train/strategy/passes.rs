@@ -10,6 +10,8 @@ pub(crate) const FREE_SPACE: u32 = 1;
 pub(crate) const REGULARISE: u32 = 2;
 /// Moves faint Gaussians at random.
 pub(crate) const EXPLORE: u32 = 4;
+/// Keeps Gaussians from becoming finer than the photos can show.
+pub(crate) const SMOOTH: u32 = 8;
 
 /// The passes by their bits.
 #[derive(Debug)]
@@ -24,6 +26,9 @@ impl Extension for Passes {
         if hook == Hook::Updated && has(EXPLORE) {
             optimize::explore(b);
         }
+        if hook == Hook::Updated && has(SMOOTH) {
+            optimize::smooth(b);
+        }
         if hook == Hook::Updated && has(FREE_SPACE) {
             densify::mark_near(b);
         }
@@ -34,7 +39,12 @@ impl Extension for Passes {
 pub(super) fn of(at: At) -> u32 {
     let config = at.config;
     let regularises = config.opacity_weight() > 0.0 || config.scale_weight() > 0.0;
-    (u32::from(config.free_space) * FREE_SPACE) | (u32::from(regularises) * REGULARISE)
+    (u32::from(config.free_space) * FREE_SPACE) | (u32::from(regularises) * REGULARISE) | smooth(at)
+}
+
+/// Returns the bit of [`SMOOTH`] if the configuration asks for it.
+pub(super) fn smooth(at: At) -> u32 {
+    u32::from(at.config.antialias) * SMOOTH
 }
 
 /// Sets the weights of [`REGULARISE`]. The means are over all Gaussians.

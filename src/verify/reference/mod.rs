@@ -19,6 +19,7 @@ pub mod relocate;
 pub mod rules;
 pub mod scan;
 pub mod sh;
+pub mod smooth;
 pub mod sort;
 pub mod splat;
 pub mod step;

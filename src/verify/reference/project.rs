@@ -91,6 +91,10 @@ struct Chain {
     spread2d: [DVec3; 2],
     cov2d: [f64; 3],
     conic: [f64; 3],
+    /// Inverse of the covariance before dilation.
+    sharp: [f64; 3],
+    /// Factor of the opacity: the root of the determinant before dilation by that after it; 1 if not antialiased.
+    coverage: f64,
 }
 
 fn chain(rules: &Rules, camera: &Camera, row: &Row) -> Chain {
@@ -108,10 +112,13 @@ fn chain(rules: &Rules, camera: &Camera, row: &Row) -> Chain {
     let (xx, xy, yy) = (m[0].length_squared(), m[0].dot(m[1]), m[1].length_squared());
     let s = rules.dilation;
     // Cauchy-Binet: det(M M^T) = |m0 x m1|^2 avoids cancellation.
-    let det = m[0].cross(m[1]).length_squared() + s * (xx + yy) + s * s;
+    let before = m[0].cross(m[1]).length_squared();
+    let det = before + s * (xx + yy) + s * s;
     let cov2d = [xx + s, xy, yy + s];
     let conic = [cov2d[2] / det, -xy / det, cov2d[0] / det];
-    Chain { camera: p, slopes, screen_from_world, spread, spread2d: m, cov2d, conic }
+    let sharp = [yy / before, -xy / before, xx / before];
+    let coverage = if rules.antialiased { (before / det).sqrt() } else { 1.0 };
+    Chain { camera: p, slopes, screen_from_world, spread, spread2d: m, cov2d, conic, sharp, coverage }
 }
 
 /// Relative distance of a Gaussian to the near plane; negative behind it.
@@ -135,7 +142,7 @@ pub fn project_forward(rules: &Rules, camera: &Camera, model: &Model, gaussian: 
             depth: p.z,
             mean2d: [camera.fx * p.x / p.z + camera.cx, camera.fy * p.y / p.z + camera.cy],
             conic: chain.conic,
-            opacity: sigmoid(row.opacity),
+            opacity: sigmoid(row.opacity) * chain.coverage,
             colour: colour.rgb,
         },
         cov2d: chain.cov2d,
@@ -168,7 +175,9 @@ pub fn project_backward(rules: &Rules, camera: &Camera, model: &Model, gaussian:
     let p = chain.camera;
     let mean = DVec3::from(row.mean);
     let (v_sh, v_mean_colour) = sh::sh_backward(rules, model.sh_degree, &row.sh, (mean, camera.centre()), v.colour);
-    let (v_screen, v_spread) = covariance_backward(&chain, v.conic);
+    let o = sigmoid(row.opacity);
+    let v_coverage = if rules.antialiased { v.opacity * o } else { 0.0 };
+    let (v_screen, v_spread) = covariance_backward(&chain, v.conic, v_coverage);
 
     // Jacobian rows in camera axes: (f/z, 0, -f s/z) with s the clamped slope.
     let v_jacobian = v_screen.map(|b| camera.rotation * b);
@@ -192,25 +201,27 @@ pub fn project_backward(rules: &Rules, camera: &Camera, model: &Model, gaussian:
     let turn = rotation(normalised(row.quat).0);
     let v_scale = [0, 1, 2].map(|i| scales[i] * turn.col(i).dot(v_spread.col(i)));
     let v_turn = v_spread * DMat3::from_diagonal(DVec3::from(scales));
-    let o = sigmoid(row.opacity);
     Row {
         mean: (camera.rotation.transpose() * v_p + v_mean_colour).into(),
         quat: quat_backward(row.quat, v_turn),
         scale: v_scale,
-        opacity: v.opacity * o * (1.0 - o),
+        opacity: v.opacity * chain.coverage * o * (1.0 - o),
         sh: v_sh,
     }
 }
 
-/// Gradients of J W (two rows) and of R_q S, given the gradient of the conic.
-fn covariance_backward(chain: &Chain, v_conic: [f64; 3]) -> ([DVec3; 2], DMat3) {
+/// Gradients of J W (two rows) and of R_q S, given those of the conic and of the coverage.
+fn covariance_backward(chain: &Chain, v_conic: [f64; 3], v_coverage: f64) -> ([DVec3; 2], DMat3) {
     // conic = cov^-1, so d cov = -conic (d conic) conic; each off-diagonal entry has half of B's derivative.
     let [a, b, c] = chain.conic;
     let [ga, gb, gc] = [v_conic[0], 0.5 * v_conic[1], v_conic[2]];
     let left = [[a * ga + b * gb, a * gb + b * gc], [b * ga + c * gb, b * gb + c * gc]];
-    let v_xx = -(left[0][0] * a + left[0][1] * b);
-    let v_xy = -(left[0][0] * b + left[0][1] * c);
-    let v_yy = -(left[1][0] * b + left[1][1] * c);
+    // d ln coverage = (before^-1 - cov^-1) (d cov) / 2.
+    let half = 0.5 * v_coverage * chain.coverage;
+    let of_coverage = |at: usize| if half == 0.0 { 0.0 } else { half * (chain.sharp[at] - chain.conic[at]) };
+    let v_xx = of_coverage(0) - (left[0][0] * a + left[0][1] * b);
+    let v_xy = of_coverage(1) - (left[0][0] * b + left[0][1] * c);
+    let v_yy = of_coverage(2) - (left[1][0] * b + left[1][1] * c);
     // cov = M M^T + s I, so d M = 2 (d cov) M.
     let m = chain.spread2d;
     let v_m = [2.0 * (v_xx * m[0] + v_xy * m[1]), 2.0 * (v_xy * m[0] + v_yy * m[1])];

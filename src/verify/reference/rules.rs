@@ -10,6 +10,12 @@ pub struct Rules {
     pub near: f64,
     /// Added to the diagonal of the 2-D covariance, px^2.
     pub dilation: f64,
+    /// Opacity pays for the dilation, so that the light of a splat stays the same.
+    pub antialiased: bool,
+    /// Least standard deviation of a smooth Gaussian, pixels of its nearest view.
+    pub finest: f64,
+    /// Share of its size to which a view counts beyond its borders for that.
+    pub smooth_margin: f64,
     /// Limit of x/z and y/z in the Jacobian beyond the image, in units of tan(fov/2).
     pub jacobian_margin: f64,
     /// Smallest alpha that counts.
@@ -104,6 +110,9 @@ impl Default for Rules {
         Self {
             near: wide(0.2),
             dilation: wide(0.3),
+            antialiased: false,
+            finest: 0.2_f64.sqrt(),
+            smooth_margin: wide(0.15),
             jacobian_margin: wide(0.3),
             alpha_min: wide(1.0 / 255.0),
             alpha_max: wide(0.99),
@@ -169,6 +178,8 @@ impl Rules {
 pub enum Family {
     /// Splats of a view.
     Project,
+    /// Least size of a Gaussian.
+    Smooth,
     /// Colour of a splat.
     Sh,
     /// Image of a view.
@@ -206,11 +217,16 @@ pub struct Mutant {
 
 /// One mutant for each constant; most change it by a few per cent.
 pub fn mutants() -> Vec<Mutant> {
-    use Family::{Adam, Blend, Densify, Explore, FreeSpace, LabelMap, Lift, Loss, Project, Relocate, Reset, Sh};
+    use Family::{
+        Adam, Blend, Densify, Explore, FreeSpace, LabelMap, Lift, Loss, Project, Relocate, Reset, Sh, Smooth,
+    };
     type Change = fn(&mut Rules);
-    let changes: [(&'static str, Family, Change); 39] = [
+    let changes: [(&'static str, Family, Change); 42] = [
         ("near", Project, |r| r.near = 3.8),
         ("dilation", Project, |r| r.dilation *= 1.03),
+        ("antialiased", Project, |r| r.antialiased = true),
+        ("finest", Smooth, |r| r.finest *= 1.03),
+        ("smooth_margin", Smooth, |r| r.smooth_margin *= 2.0),
         ("jacobian_margin", Project, |r| r.jacobian_margin *= 0.97),
         ("alpha_min", Blend, |r| r.alpha_min *= 1.03),
         ("alpha_max", Blend, |r| r.alpha_max *= 0.97),
@@ -272,6 +288,8 @@ mod tests {
         let single = [
             (r.near, glsl::NEAR),
             (r.dilation, glsl::COV2D_BLUR),
+            (r.finest, glsl::FINEST),
+            (r.smooth_margin, glsl::SMOOTH_MARGIN),
             (r.jacobian_margin, glsl::JACOBIAN_MARGIN),
             (r.alpha_min, glsl::ALPHA_MIN),
             (r.alpha_max, glsl::ALPHA_MAX),

@@ -89,6 +89,7 @@ pub fn train_view(scene: &Scene) -> TrainView {
     TrainView {
         name: "the view".to_owned(),
         near: NEAR,
+        finest: step_input::finest(&camera),
         shown: step_input::shown_objects(&photo, &target.label_map),
         view_labels: target.label_map.clone(),
         photo: Arc::new(photo),

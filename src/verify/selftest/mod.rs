@@ -1,5 +1,6 @@
 //! Compares the device with the reference: `labelgs selftest` runs these checks, and the tests use them.
 
+pub mod antialias;
 mod checks;
 pub mod compare;
 pub mod exposure;
@@ -107,7 +108,7 @@ pub fn passes(
 /// Runs the checks of passes that change the model.
 pub fn changes(rules: &Rules, gpu: &Arc<Gpu>, kernels: KernelShape, mut done: impl FnMut(Check)) -> Result<()> {
     type Change = fn(&Rules, &Arc<Gpu>, KernelShape, f64) -> Result<Verdict>;
-    let changes: [(&str, Change); 9] = [
+    let changes: [(&str, Change); 11] = [
         ("densification", model::densification),
         ("densification along the longest axis", model::long_splits),
         ("marks of fog", model::fog_of_a_step),
@@ -116,6 +117,8 @@ pub fn changes(rules: &Rules, gpu: &Arc<Gpu>, kernels: KernelShape, mut done: im
         ("reset of opacities", model::reset),
         ("exposure of a photo", exposure::exposure_of_a_step),
         ("pose of a photo", pose::pose_of_a_step),
+        ("antialiased splats and their gradient", antialias::splats_of_a_step),
+        ("least sizes of Gaussians", antialias::sizes_of_a_step),
         ("lift of labels by the paper's rule", model::lift_of_a_step),
     ];
     for (name, change) in changes {

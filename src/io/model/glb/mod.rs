@@ -24,6 +24,8 @@ const OPACITY: &str = "KHR_gaussian_splatting:OPACITY";
 /// Rows of the table of labels; row 0 is no object.
 const FEATURE: &str = "_FEATURE_ID_0";
 const CONFIDENCE: &str = "_LABEL_CONFIDENCE";
+/// Key of the extras of a primitive: true for an antialiased model. The extension has none.
+const ANTIALIASED: &str = "antialiased";
 const FEATURES: &str = "EXT_mesh_features";
 const METADATA: &str = "EXT_structural_metadata";
 /// Accessor component type of 32-bit floats.

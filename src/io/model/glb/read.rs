@@ -1,7 +1,8 @@
 //! Reads GLB.
 
 use super::{
-    AXES, CONFIDENCE, FEATURE, FEATURES, FLOAT, METADATA, OPACITY, ROTATION, SCALE, SPLATS, file, harmonic, harmonics,
+    ANTIALIASED, AXES, CONFIDENCE, FEATURE, FEATURES, FLOAT, METADATA, OPACITY, ROTATION, SCALE, SPLATS, file,
+    harmonic, harmonics,
 };
 use crate::error::{Error, Result};
 use crate::io::label_table::{LabelEntry, LabelTable};
@@ -117,7 +118,8 @@ impl Glb<'_> {
                 confidence: shares.as_ref().map(|column| column.values[index]),
             });
         }
-        let read = rows.finish(self.path, None)?;
+        let mut read = rows.finish(self.path, None)?;
+        read.gaussians.antialiased = primitive["extras"][ANTIALIASED] == true;
         Ok(ReadModel { names: labels.and_then(|found| found.1), ..read })
     }
 

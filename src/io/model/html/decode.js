@@ -65,7 +65,7 @@ async function decode(text, rowOf, texelsMax) {
   const file = await unpacked(bytesOf(text), 'gzip');
   const view = new DataView(file.buffer);
   if (view.getUint32(0, true) !== MAGIC || view.getUint32(4, true) !== 3) throw new Error('The model in this page is damaged.');
-  const [count, degree, unit] = [view.getUint32(8, true), file[12], 2 ** -file[13]];
+  const [count, degree, unit, antialiased] = [view.getUint32(8, true), file[12], 2 ** -file[13], file[14] & 1];
   const bands = (degree + 1) ** 2 - 1;
   let end = 16;
   const [places, alphas, colours, scales, spins, harmonics] = [9, 1, 3, 3, 4, 3 * bands].map((width) => {
@@ -99,5 +99,5 @@ async function decode(text, rowOf, texelsMax) {
     octets[4 * base + 43] = file[alphas.start + row];
     octets.set(file.subarray(harmonics.start + row * harmonics.width, harmonics.start + (row + 1) * harmonics.width), 4 * base + 48);
   }
-  return { count, degree, stride, width, height, words, positions, rows };
+  return { count, degree, antialiased, stride, width, height, words, positions, rows };
 }

@@ -10,7 +10,7 @@ class Picture {
     if (!gl) throw new Error('This browser has no WebGL 2, which the picture needs.');
     this.gl = gl;
     this.program = this.linked();
-    const uniforms = ['data', 'looks', 'width', 'stride', 'degree', 'turn', 'shift', 'eye', 'lens', 'size'];
+    const uniforms = ['data', 'looks', 'width', 'stride', 'degree', 'antialiased', 'turn', 'shift', 'eye', 'lens', 'size'];
     this.place = Object.fromEntries(uniforms.map((name) => [name, gl.getUniformLocation(this.program, name)]));
     this.vertices = gl.createBuffer();
     gl.bindBuffer(gl.ARRAY_BUFFER, this.vertices);
@@ -66,7 +66,7 @@ class Picture {
     this.texture(0, 'data', gl.RGBA32UI, model.width, model.height, gl.RGBA_INTEGER, gl.UNSIGNED_INT, model.words);
     this.lookRows = Math.max(1, Math.ceil(labels / 256));
     this.texture(1, 'looks', gl.RGBA8UI, 256, this.lookRows, gl.RGBA_INTEGER, gl.UNSIGNED_BYTE, null);
-    for (const name of ['width', 'stride', 'degree']) gl.uniform1i(this.place[name], model[name]);
+    for (const name of ['width', 'stride', 'degree', 'antialiased']) gl.uniform1i(this.place[name], model[name]);
   }
 
   // Sets tint and state of each label.

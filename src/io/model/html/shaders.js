@@ -7,6 +7,7 @@ precision highp usampler2D;
 uniform usampler2D data;     // the model, as decode() makes it
 uniform usampler2D looks;    // a row of the list of labels: tint r, g, b, and 0 hidden, 1 shown, 2 tinted
 uniform int width, stride, degree;
+uniform bool antialiased;    // blur takes opacity
 uniform mat3 turn;           // camera from world: x right, y down, z forward
 uniform vec3 shift, eye;
 uniform vec4 lens;           // fx, fy, cx, cy
@@ -72,6 +73,7 @@ void main() {
   vec2 axis = abs(b) < 1e-9 ? (a >= d ? vec2(1.0, 0.0) : vec2(0.0, 1.0)) : normalize(vec2(b, large - a));
 
   vec4 bytes = vec4(third.z & 255u, (third.z >> 8) & 255u, (third.z >> 16) & 255u, third.z >> 24) / 255.0;
+  if (antialiased) bytes.a *= sqrt(max(determinant(flat2) / (a * d - b * b), 0.0));
   if (bytes.a < 1.0 / 255.0) return;
   float reach = sqrt(2.0 * log(255.0 * bytes.a));
   offset = corner * reach;

@@ -24,6 +24,11 @@ const SELECTED: u8 = 1;
 const DELETED: u8 = 4;
 /// Start of the comment with the world position of the file's (0, 0, 0).
 const ORIGIN: &str = "labelgs world_origin ";
+/// Start of the comment with how viewers draw the model (Brush, PlayCanvas), and its value for antialiased models.
+const MODE: &str = "SplatRenderMode: ";
+const ANTIALIASED: &str = "mip";
+/// The comment of Postshot's antialiased models.
+const ANTIALIASED_POSTSHOT: &str = "antialiased 1";
 /// Fewest Gaussians for the check for activated values; with fewer, chance may look like it.
 const ACTIVATED_MIN: usize = 16;
 
@@ -55,7 +60,7 @@ fn read(path: &Path) -> Result<ReadModel> {
     columns.extend(labelled.then_some("label"));
     columns.extend(confident.then_some("label_confidence"));
     columns.extend(edited.then_some("state"));
-    let origin = origin(path, &table)?;
+    let (origin, antialiased) = (origin(path, &table)?, is_antialiased(table.comments()));
     let mut rows = Rows::new(sh_degree, labelled || edited, confident);
     let mut triples = vec![[0.0; 3]; rest];
     let mut deleted = 0;
@@ -89,6 +94,7 @@ fn read(path: &Path) -> Result<ReadModel> {
         Ok(())
     })?;
     let mut read = rows.finish(path, origin)?;
+    read.gaussians.antialiased = antialiased;
     read.dropped += deleted;
     let deleted = edited.then_some(deleted);
     add_notes(&mut read, deleted, odd.extra_bytes);
@@ -110,6 +116,14 @@ fn add_notes(read: &mut ReadModel, deleted: Option<u64>, extra_bytes: u64) {
     if extra_bytes > 0 {
         read.notes.push(format!("{} bytes after the last Gaussian were ignored", extra_bytes));
     }
+}
+
+/// Returns true if the comments of a header say that the model is antialiased.
+fn is_antialiased<'a>(mut comments: impl Iterator<Item = &'a str>) -> bool {
+    comments.any(|comment| {
+        let comment = comment.trim();
+        comment.strip_prefix(MODE).is_some_and(|mode| mode.trim() == ANTIALIASED) || comment == ANTIALIASED_POSTSHOT
+    })
 }
 
 /// Returns the origin in the comments of the header.

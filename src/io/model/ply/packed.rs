@@ -79,7 +79,9 @@ pub(super) fn read(path: &Path) -> Result<Option<ReadModel>> {
             ..Row::default()
         });
     }
-    rows.finish(path, None).map(Some)
+    let mut read = rows.finish(path, None)?;
+    read.gaussians.antialiased = super::is_antialiased(elements.comments());
+    Ok(Some(read))
 }
 
 /// Number of values above degree 0.

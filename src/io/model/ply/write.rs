@@ -1,6 +1,6 @@
 //! Writes the standard 3DGS PLY.
 
-use super::ORIGIN;
+use super::{ANTIALIASED, MODE, ORIGIN};
 use crate::error::{Error, Result};
 use crate::io::model::format::{Export, LabelType, ModelWriter};
 use glam::DVec3;
@@ -57,6 +57,9 @@ fn header(export: &Export) -> Header {
     let origin = export.origin;
     if origin != DVec3::ZERO {
         header.comments.push(format!("{ORIGIN}{:?} {:?} {:?}", origin.x, origin.y, origin.z));
+    }
+    if export.model.antialiased {
+        header.comments.push(format!("{MODE}{ANTIALIASED}"));
     }
     header.elements.add(vertex);
     header

@@ -5,6 +5,8 @@ use serde::{Deserialize, Serialize};
 
 pub(super) const FILE: &str = "meta.json";
 pub(super) const VERSION: u32 = 2;
+/// [`Meta::model`] of an antialiased model.
+pub(super) const ANTIALIASED: &str = "antialiased";
 /// Version of our own part.
 pub(super) const EXTRAS_VERSION: u32 = 1;
 
@@ -15,6 +17,12 @@ pub(super) struct Meta {
     #[serde(default)]
     pub(super) asset: Asset,
     pub(super) count: usize,
+    /// `antialiased` or nothing.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) model: Option<String>,
+    /// The same in older files.
+    #[serde(default, skip_serializing)]
+    pub(super) antialias: bool,
     pub(super) means: Means,
     pub(super) scales: Coded,
     pub(super) quats: Files,

@@ -1,7 +1,7 @@
 //! Reads SOG.
 
 use super::archive::{Archive, Picture};
-use super::meta::{EXTRAS_VERSION, FILE, Labels, Meta, VERSION};
+use super::meta::{ANTIALIASED, EXTRAS_VERSION, FILE, Labels, Meta, VERSION};
 use super::{CODEBOOK, PALETTE_ROW, ROTATION, coefficients};
 use crate::error::{Error, Result};
 use crate::io::model::format::ReadModel;
@@ -65,7 +65,9 @@ pub(super) fn read(path: &Path) -> Result<ReadModel> {
     }
     let names = own.and_then(|own| own.names.as_ref());
     let names = names.map(|names| names.checked(path)).transpose()?;
-    Ok(ReadModel { names, ..rows.finish(path, None)? })
+    let mut read = rows.finish(path, None)?;
+    read.gaussians.antialiased = meta.antialias || meta.model.as_deref() == Some(ANTIALIASED);
+    Ok(ReadModel { names, ..read })
 }
 
 fn bad(path: &Path, place: &str, problem: String) -> Error {

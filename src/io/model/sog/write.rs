@@ -1,6 +1,8 @@
 //! Writes SOG.
 
-use super::meta::{Asset, Coded, EXTRAS_VERSION, Extras, FILE, Files, Labels, Means, Meta, Palette, VERSION};
+use super::meta::{
+    ANTIALIASED, Asset, Coded, EXTRAS_VERSION, Extras, FILE, Files, Labels, Means, Meta, Palette, VERSION,
+};
 use super::{CODEBOOK, LABELS, PALETTE_ROW, ROTATION, archive, cluster, coefficients};
 use crate::error::{Error, Result};
 use crate::io::model::format::{Export, ModelWriter};
@@ -108,7 +110,9 @@ fn write(export: &Export, out: &mut dyn Write) -> io::Result<()> {
     let rest = if g.sh_degree > 0 { Some(palette(export, &rows, (width, height), &mut add)?) } else { None };
     let extras = extras(export, &rows, (width, height), &mut add)?;
     let asset = Asset { generator: concat!("labelgs ", env!("CARGO_PKG_VERSION")).into() };
-    let meta = Meta { version: VERSION, asset, count: rows.len(), means, scales, quats, sh0, rest, extras };
+    let model = export.model.antialiased.then(|| ANTIALIASED.to_owned());
+    let (version, count) = (VERSION, rows.len());
+    let meta = Meta { version, asset, count, model, antialias: false, means, scales, quats, sh0, rest, extras };
     files.push((FILE.into(), serde_json::to_vec(&meta)?));
     out.write_all(&archive::pack(files)?)
 }

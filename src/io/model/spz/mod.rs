@@ -22,6 +22,8 @@ pub(super) const FORMAT: ModelFormat =
 const MAGIC: u32 = 0x5053_474E;
 /// Axes of the file: x right, y up, z back.
 pub(super) const AXES: HalfTurn = HalfTurn([1.0, -1.0, -1.0]);
+/// Bit of the header's flags: the model is antialiased.
+const ANTIALIASED: u8 = 1;
 /// Bit of the header's flags: records follow.
 const HAS_RECORDS: u8 = 2;
 /// Most fractional bits of a position: with more, 24 bits end below 1.

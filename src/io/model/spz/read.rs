@@ -1,7 +1,7 @@
 //! Reads SPZ.
 
 use super::record::{self, Records};
-use super::{AXES, BITS_MAX, HAS_RECORDS, MAGIC, pack, planes};
+use super::{ANTIALIASED, AXES, BITS_MAX, HAS_RECORDS, MAGIC, pack, planes};
 use crate::error::{Error, Result};
 use crate::io::model::format::ReadModel;
 use crate::io::model::rows::{Row, Rows};
@@ -100,7 +100,9 @@ fn decode(path: &Path, header: &Header, planes: &[Vec<u8>], records: &Records) -
             confidence: records.confidence.as_ref().map(|shares| shares[index]),
         });
     }
-    rows.finish(path, None)
+    let mut read = rows.finish(path, None)?;
+    read.gaussians.antialiased = header.flags & ANTIALIASED != 0;
+    Ok(read)
 }
 
 /// Reads the fields that all versions have in common.

@@ -1,6 +1,6 @@
 //! Writes SPZ.
 
-use super::{AXES, BITS_MAX, HAS_RECORDS, MAGIC, pack, planes, record};
+use super::{ANTIALIASED, AXES, BITS_MAX, HAS_RECORDS, MAGIC, pack, planes, record};
 use crate::error::{Error, Result};
 use crate::io::model::format::{Export, ModelWriter, SpzVersion};
 use crate::io::model::values::opacity_byte;
@@ -110,7 +110,8 @@ fn write_version(export: &Export, is_v4: bool, out: &mut dyn Write) -> io::Resul
     let mut header = MAGIC.to_le_bytes().to_vec();
     header.extend(if is_v4 { 4_u32 } else { 3 }.to_le_bytes());
     header.extend(count.to_le_bytes());
-    let flags = if records.is_empty() { 0 } else { HAS_RECORDS };
+    let antialiased = if export.model.antialiased { ANTIALIASED } else { 0 };
+    let flags = antialiased | if records.is_empty() { 0 } else { HAS_RECORDS };
     header.extend([export.model.sh_degree as u8, bits(extent(export)) as u8, flags]);
     if !is_v4 {
         header.push(0);

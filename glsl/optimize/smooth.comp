@@ -1,0 +1,37 @@
+#version 460
+#include "layout.glsl"
+#include "constants.glsl"
+#include "step.glsl"
+#include "dispatch.glsl"
+#include "gaussian.glsl"
+// smooth — keep Gaussians from becoming finer than the photos can show, or views from nearby would find needles and gaps.
+// Work:    64 Gaussians per workgroup.
+// Reads:   step, failure; means, scales_in [N]
+// Writes:  scales [N], the same buffer: w is the limit, the least over the views so far that see the centre; 0: none yet
+// Math:    3-D filter of Mip-Splatting as a lower limit: s >= FINEST z / f, f of the photo at full size; the update of
+//          Adam is projected to it.
+// Mirror:  src/verify/reference/smooth.rs::smooth
+
+layout(local_size_x = 64) in;
+READ1(0, StepUniforms, step);
+READ1(1, uint, failure);
+FETCH4(2, means);
+FETCH4(3, scales_in);
+WRITE(4, vec4, scales);
+
+void main() {
+    StepUniforms u = step;
+    uint i = linear_group_id() * 64u + gl_LocalInvocationID.x;
+    if (i >= u.gaussian_count || failure != 0u) {
+        return;
+    }
+    vec4 s = fetch4(scales_in, i);
+    vec3 p = to_view(u, fetch4(means, i).xyz);
+    vec2 size = vec2(u.width, u.height), margin = SMOOTH_MARGIN * size * p.z;
+    vec2 at = vec2(u.fx, u.fy) * p.xy + vec2(u.cx, u.cy) * p.z; // px times depth
+    bool seen = p.z > u.near && all(greaterThan(at, -margin)) && all(lessThan(at, size * p.z + margin));
+    float limit = u.finest * p.z;
+    s.w = !seen ? s.w : s.w > 0.0 ? min(s.w, limit) : limit;
+    s.xyz = s.w > 0.0 ? max(s.xyz, vec3(log(s.w))) : s.xyz;
+    scales[i] = s;
+}

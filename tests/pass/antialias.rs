@@ -1,0 +1,28 @@
+//! Antialiased models.
+
+use super::fixture::{prove, readable};
+use crate::support::device;
+use crate::support::device::Turn;
+use crate::support::scenes::Scene;
+use labelgs::internals::pass::KernelShape;
+use labelgs::internals::verify::selftest::antialias::{Antialiased, Smoothed, around, fine};
+use labelgs::internals::verify::selftest::fixture::Fixture;
+
+fn rig(turn: &Turn, scene: Scene) -> labelgs::Result<Fixture> {
+    Fixture::new(turn.gpu(), scene, false, KernelShape::of(turn.capabilities()), readable())
+}
+
+#[test]
+fn antialiased_splats_and_their_gradients_equal_their_mirrors() {
+    let Some(turn) = device() else { return };
+    let mut fixture = rig(&turn, fine(95)).expect("the engine starts");
+    let ran = Antialiased::new(&mut fixture).expect("it runs");
+    prove("antialiased", &["antialiased", "dilation"], |rules| ran.verdict(rules, 1.0));
+}
+
+#[test]
+fn least_sizes_equal_their_mirror() {
+    let Some(turn) = device() else { return };
+    let ran = Smoothed::new(|| rig(&turn, around(96))).expect("it runs");
+    prove("smooth", &["finest", "smooth_margin"], |rules| ran.verdict(rules, 1.0));
+}
