@@ -150,11 +150,11 @@ impl Engine {
     /// All lists are then recorded again.
     pub fn grow_image(&mut self, width: u32, height: u32) -> Result<()> {
         let image = (self.size.image.0.max(width), self.size.image.1.max(height));
-        if image == self.size.image {
+        let size = EngineSize { image, ..self.size }.in_bands(&self.shape);
+        if size == self.size {
             return Ok(());
         }
         self.check_idle()?;
-        let size = EngineSize { image, ..self.size };
         size.check(&self.shape)?;
         self.set_capacity(self.capacity_for(&size))?;
         self.size = size;

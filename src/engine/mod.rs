@@ -4,6 +4,7 @@
 //! above use the scheduler through this module: `Engine::run` runs a pass list and waits for it, `Engine::submit` and
 //! `Engine::retire` keep steps in flight, and transfers are typed.
 
+mod bands;
 mod data;
 pub(crate) mod growth;
 mod input;
@@ -75,6 +76,7 @@ impl Engine {
     #[doc(hidden)]
     pub fn with_shape(gpu: Arc<Gpu>, shape: KernelShape, size: EngineSize, options: SchedulerOptions) -> Result<Self> {
         shape.check()?;
+        let size = size.in_bands(&shape);
         size.check(&shape)?;
         Ok(Self {
             sched: Scheduler::new(gpu, TABLE, capacity(&shape, &size), options)?,

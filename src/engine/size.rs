@@ -60,17 +60,36 @@ impl EngineSize {
         Self { shared_rows, ..self }
     }
 
+    /// Returns the most tiles that the kernels of the device can walk; `None` without a limit.
+    fn most_tiles(&self, shape: &KernelShape) -> Option<u32> {
+        // A splat may touch every tile twice, with its object's layer; one loop walks them.
+        let times = if self.labels.is_some_and(|labels| labels.layers > 0) { 2 } else { 1 };
+        shape.loop_rounds.map(|rounds| rounds / times)
+    }
+
+    /// Returns the most rows of a picture that a list can draw; `None` without a limit.
+    pub(super) fn band(&self, shape: &KernelShape) -> Option<u32> {
+        let tiles_x = shape.tiles(self.image.0, 1).0.max(1);
+        self.most_tiles(shape).map(|most| (most / tiles_x).max(1) * shape.tile_height)
+    }
+
+    /// Limits the image of an engine for rendering to one band ([`Engine::bands`](super::Engine::bands)).
+    pub(super) fn in_bands(self, shape: &KernelShape) -> Self {
+        match self.band(shape) {
+            Some(most) if !self.trained => Self { image: (self.image.0, self.image.1.min(most)), ..self },
+            _ => self,
+        }
+    }
+
     /// Fails if the image has more tiles than the kernels can walk.
     pub(crate) fn check(&self, shape: &KernelShape) -> Result<()> {
         let (width, height) = self.image;
         let (tiles_x, tiles_y) = shape.tiles(width, height);
-        // A splat may touch every tile twice, with its object's layer. One loop of 65,535 rounds at most walks them.
-        let most = if self.labels.is_some_and(|labels| labels.layers > 0) { 32_500 } else { 65_000 };
-        if u64::from(tiles_x) * u64::from(tiles_y) <= most {
-            return Ok(());
-        }
+        let tiles = u64::from(tiles_x) * u64::from(tiles_y);
+        let Some(most) = self.most_tiles(shape).filter(|&most| tiles > u64::from(most)) else { return Ok(()) };
         let problem = format!(
-            "{width} x {height} px make {tiles_x} x {tiles_y} tiles, at most {most} are supported; choose a smaller size"
+            "{width} x {height} px make {tiles_x} x {tiles_y} tiles, at most {most} are supported on this device; choose a \
+             smaller size"
         );
         Err(Error::usage("max_resolution", problem))
     }

@@ -22,12 +22,17 @@ pub struct KernelShape {
     pub lane_groups: u32,
     /// Splats per tile that one dispatch of a blend pass walks; a multiple of the subgroup size.
     pub segment_length: u32,
+    /// Most rounds of a loop of an invocation, a little fewer; `None` without a limit.
+    pub loop_rounds: Option<u32>,
     /// Blur takes opacity from splats, as the model on the device needs it
     /// ([`Gaussians::antialiased`](crate::scene::Gaussians::antialiased)).
     pub antialiased: bool,
 }
 
-/// Longest segment. Lavapipe ends all loops of an invocation after 65,535 rounds. A walk over n splats takes n rounds
+/// Lavapipe ends all loops of an invocation after 65,535 rounds.
+const LOOP_ROUNDS: u32 = 65_000;
+
+/// Longest segment, for [`LOOP_ROUNDS`] on all devices. A walk over n splats takes n rounds
 /// and one more per load of a subgroup.
 const SEGMENT_LENGTH: u32 = 40_960;
 
@@ -59,6 +64,7 @@ impl KernelShape {
             digit_bits: if subgroup <= 16 { 8 } else { 4 },
             lane_groups: if cpu { 4 } else { 128 },
             segment_length: SEGMENT_LENGTH,
+            loop_rounds: cpu.then_some(LOOP_ROUNDS),
             antialiased: false,
         }
     }

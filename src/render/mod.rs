@@ -10,6 +10,7 @@ pub use pictures::{Format, Pictures, What, write_pictures, write_rgb};
 use crate::engine::{Engine, ListKey};
 use crate::error::{Error, Result};
 use crate::scene::{Camera, LabelMap, UNLABELLED};
+use crate::shaders::structs::StepUniforms;
 
 /// Default near plane, of 3DGS, world units.
 pub const NEAR: f32 = crate::shaders::constants::NEAR;
@@ -115,6 +116,18 @@ impl Rendered {
         Ok(self.depth.iter().zip(&self.alpha).map(mean).collect())
     }
 
+    /// Returns the picture with another one of the same width below it.
+    fn with_below(mut self, below: Self) -> Self {
+        self.height += below.height;
+        self.rgb.extend(below.rgb);
+        self.alpha.extend(below.alpha);
+        self.depth.extend(below.depth);
+        self.top_id.extend(below.top_id);
+        self.top_weight.extend(below.top_weight);
+        self.labels.extend(below.labels);
+        self
+    }
+
     fn check_part(&self, there: usize, part: &str) -> Result<()> {
         let is_there = there == self.rgb.len();
         is_there.then_some(()).ok_or_else(|| Error::Bug(format!("the picture was rendered without its {part}")))
@@ -124,22 +137,36 @@ impl Rendered {
 /// Renders the model in the engine; grows buffers as needed. The image of the camera must fit that of the engine
 /// ([`Engine::grow_image`]), and nothing may be in flight.
 pub fn render(engine: &mut Engine, camera: &Camera, options: &RenderOptions) -> Result<Rendered> {
-    let uniforms = engine.view_uniforms(camera, options.near, options.background);
+    let mut whole: Option<Rendered> = None;
+    for band in engine.bands(camera) {
+        let uniforms = engine.band_uniforms(camera, band, options.near, options.background);
+        let drawn = render_band(engine, &uniforms, options)?;
+        whole = Some(match whole {
+            Some(above) => above.with_below(drawn),
+            None => drawn,
+        });
+    }
+    whole.ok_or_else(|| Error::usage("camera", "has an image of 0 rows"))
+}
+
+/// Draws the rows of the uniforms.
+fn render_band(engine: &mut Engine, uniforms: &StepUniforms, options: &RenderOptions) -> Result<Rendered> {
     let sh_degree = options.sh_degree.unwrap_or(engine.sh_degree());
     let Parts { depth, main, labels } = options.parts;
     let has_labels = engine.size().labels.is_some();
     if labels && has_labels {
-        engine.run_labels(|label_rounds| ListKey::Render { sh_degree, label_rounds }, &uniforms)?;
+        engine.run_labels(|label_rounds| ListKey::Render { sh_degree, label_rounds }, uniforms)?;
     } else {
-        engine.run(ListKey::Render { sh_degree, label_rounds: 0 }, &uniforms)?;
+        engine.run(ListKey::Render { sh_degree, label_rounds: 0 }, uniforms)?;
     }
-    let pixels = camera.width as usize * camera.height as usize;
+    let (width, height) = (uniforms.width, uniforms.height);
+    let pixels = width as usize * height as usize;
     let image = engine.picture(pixels)?;
     let weight_depth = if depth || main { engine.weights_and_depths(pixels)? } else { Vec::new() };
     let pick = |asked: bool, part: usize| weight_depth.iter().filter(|_| asked).map(|pair| pair[part]).collect();
     Ok(Rendered {
-        width: camera.width,
-        height: camera.height,
+        width,
+        height,
         rgb: image.iter().map(|&[r, g, b, _]| [r, g, b]).collect(),
         alpha: image.iter().map(|pixel| 1.0 - pixel[3]).collect(),
         depth: pick(depth, 1),
@@ -157,12 +184,14 @@ pub fn render(engine: &mut Engine, camera: &Camera, options: &RenderOptions) -> 
 /// engine has the labels of [`Engine::upload_model`] or [`Engine::set_labels`]; without any, all are 0.
 pub fn label_map(engine: &mut Engine, camera: &Camera, near: f32) -> Result<LabelMap> {
     let pixels = camera.width as usize * camera.height as usize;
-    let ids = if engine.size().labels.is_some() {
-        let uniforms = engine.view_uniforms(camera, near, [0.0; 3]);
-        engine.run_labels(ListKey::LabelMap, &uniforms)?;
-        engine.label_map(pixels)?
-    } else {
-        vec![UNLABELLED as u16; pixels]
-    };
+    let mut ids = Vec::with_capacity(pixels);
+    if engine.size().labels.is_some() {
+        for band in engine.bands(camera) {
+            let uniforms = engine.band_uniforms(camera, band, near, [0.0; 3]);
+            engine.run_labels(ListKey::LabelMap, &uniforms)?;
+            ids.extend(engine.label_map(band.pixels(camera.width).len())?);
+        }
+    }
+    ids.resize(pixels, UNLABELLED as u16);
     Ok(LabelMap { width: camera.width, height: camera.height, ids })
 }

@@ -6,6 +6,7 @@
 //! beside them.
 
 mod antialias;
+mod bands;
 mod blend;
 mod disagreement;
 pub mod fixture;

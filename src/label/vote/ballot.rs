@@ -128,18 +128,22 @@ pub fn sweep(engine: &mut Engine, voters: &[Voter], how: Sweep) -> Result<Ballot
 
 /// Adds the votes of one view for the labels in `chunk`.
 fn vote(engine: &mut Engine, voter: &Voter, chunk: &[u16], how: Sweep) -> Result<()> {
-    let columns = columns_of(voter, chunk, how.border);
-    let rounds = most_labels(&columns, voter.mask.width, engine.shape().tile_width, engine.shape().tile_height)
-        .div_ceil(LABELS_PER_WALK) as u32;
-    if rounds == 0 {
-        return Ok(());
-    }
+    let all_columns = columns_of(voter, chunk, how.border);
     let trust = |label: &u16| voter.trust.and_then(|trust| trust.get(label)).copied().unwrap_or(1.0);
     let weights: Vec<f32> = chunk.iter().map(trust).collect();
-    let base = engine.view_uniforms(voter.camera, how.near, [0.0; 3]);
-    let uniforms = StepUniforms { vote_columns: chunk.len() as u32, ..base };
-    // Votes that do not fit are not counted, and the list runs again.
-    engine.run(ListKey::Vote(rounds, how.alone), &VoteInput { uniforms, columns: &columns, weights: &weights })?;
+    for band in engine.bands(voter.camera) {
+        let columns = &all_columns[band.pixels(voter.mask.width)];
+        let shape = engine.shape();
+        let labels = most_labels(columns, voter.mask.width, shape.tile_width, shape.tile_height);
+        let rounds = labels.div_ceil(LABELS_PER_WALK) as u32;
+        if rounds == 0 {
+            continue;
+        }
+        let base = engine.band_uniforms(voter.camera, band, how.near, [0.0; 3]);
+        let uniforms = StepUniforms { vote_columns: chunk.len() as u32, ..base };
+        // Votes that do not fit are not counted, and the list runs again.
+        engine.run(ListKey::Vote(rounds, how.alone), &VoteInput { uniforms, columns, weights: &weights })?;
+    }
     Ok(())
 }
 
