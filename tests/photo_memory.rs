@@ -68,8 +68,9 @@ fn photos_without_a_place_are_decoded_again() {
         let options = scene(folder.path(), lens);
         let whole = open(folder.path(), &options);
         let photo_folder = Some(folder.path().join("masks/000.png/no-folder"));
-        let few = open(folder.path(), &LoadOptions { photo_memory: 1, photo_folder, ..options });
+        let few = open(folder.path(), &LoadOptions { photo_memory: 1, photo_folder, ..options.clone() });
         equal(&whole, &few);
+        equal(&whole, &open(folder.path(), &LoadOptions { photo_memory: 1, photo_folder: None, ..options }));
         let image = |name: &str| folder.path().join("images").join(name);
         let [first, second] = ["000.png", "001.png"].map(image);
         std::fs::copy(&second, &first).expect("another photo");
@@ -141,4 +142,13 @@ fn a_disk_that_fails_costs_no_bit() {
         assert_eq!(text.contains("no space for what does not fit into memory"), is_told, "{fault}: {text}");
         assert!(place.model(fault, 8) == place.model("whole", 8), "{fault}: the models differ");
     }
+    // Reads after the scene was opened are those of the temporary file and of compiled pipelines.
+    let is_told = |nth: u32| {
+        let fault = format!("read:{nth}:IO");
+        let text = succeeded(&place.trained_with(Some(&fault), &fault, &few));
+        assert!(text.contains("a fault on purpose"), "{fault}: {text}");
+        assert!(place.model(&fault, 8) == place.model("whole", 8), "{fault}: the models differ");
+        text.contains("the temporary file of photos cannot be read")
+    };
+    assert!([160, 180, 200].into_iter().filter(|&nth| is_told(nth)).count() > 0);
 }

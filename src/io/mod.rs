@@ -91,7 +91,7 @@ pub struct LoadOptions {
     /// Most bytes of memory for photos and masks. In a larger scene some of them wait in a temporary file until they are
     /// asked for, with the same bits.
     pub photo_memory: u64,
-    /// Folder for that file; `None` is the temporary folder of the system.
+    /// Folder for that file; with `None` there is no file, and such photos are decoded again each time.
     pub photo_folder: Option<PathBuf>,
 }
 
@@ -114,7 +114,7 @@ impl Default for LoadOptions {
             allow_outside: false,
             undistort: true,
             photo_memory: PHOTO_MEMORY,
-            photo_folder: None,
+            photo_folder: Some(scratch::system_folder()),
         }
     }
 }

@@ -39,7 +39,8 @@ pub(super) struct PhotoStore {
 /// Where the others are.
 #[derive(Debug)]
 struct Files {
-    scratch: Scratch,
+    /// The temporary file; without it pixels are made again.
+    scratch: Option<Scratch>,
     at_once: usize,
     was_damaged: AtomicBool,
 }
@@ -53,24 +54,27 @@ impl PhotoStore {
             if photo + mask == 0 { 0 } else { stored.as_ref().map_or(0, |&size| recipe.pixels(size)) * (photo + mask) }
         };
         let costs: Vec<u64> = recipes.iter().zip(stored).map(cost).collect();
-        let folder = options.photo_folder.clone().unwrap_or_else(std::env::temp_dir);
         let holds = held(&costs, test, options.photo_memory);
         if holds.contains(&false) {
             let gib = |bytes: u64| bytes as f64 / f64::from(1 << 30);
             tracing::info!(
                 "photos and masks take {:.1} GiB, and `photo_memory` is {:.1} GiB: {} of {} photos stay in memory, the \
-                 others in a temporary file in {}",
+                 others {}",
                 gib(costs.iter().sum()),
                 gib(options.photo_memory),
                 holds.iter().filter(|&&holds| holds).count(),
                 holds.len(),
-                folder.display()
+                match &options.photo_folder {
+                    Some(folder) => format!("in a temporary file in {}", folder.display()),
+                    None => "are decoded again each time".to_owned(),
+                }
             );
         }
         let pixels = |size: &Result<Size>| size.as_ref().map_or(0, |size| size.map_or(0, area));
         let largest = stored.iter().map(pixels).max().unwrap_or(0) * MAKING_BYTES;
         let at_once = usize::try_from(options.photo_memory / 2 / largest.max(1)).unwrap_or(usize::MAX).max(1);
-        Self { holds, files: Arc::new(Files { scratch: Scratch::new(&folder), at_once, was_damaged: false.into() }) }
+        let scratch = options.photo_folder.as_deref().map(Scratch::new);
+        Self { holds, files: Arc::new(Files { scratch, at_once, was_damaged: false.into() }) }
     }
 
     /// Number of photos that may be decoded at the same time.
@@ -93,7 +97,7 @@ impl PhotoStore {
             return picture.into();
         }
         let (facts, size) = (picture.facts(), picture.size());
-        let place = self.files.scratch.put(picture.bytes(), AGAIN);
+        let place = self.files.scratch.as_ref().and_then(|scratch| scratch.put(picture.bytes(), AGAIN));
         let files = Arc::clone(&self.files);
         Pixels::made(Arc::new(Waiting { files, origin, place, size, crc: facts.crc, kind: PhantomData::<T> }), facts)
     }
@@ -206,13 +210,14 @@ impl<T: Kept> Source<T> for Waiting<T> {
 impl<T: Kept> Waiting<T> {
     /// Reads the temporary file. A disk that returns other bytes than it got costs time, not bits.
     fn read(&self, place: Place) -> Option<T> {
-        let found = T::filled(self.size, |bytes| self.files.scratch.read(place, bytes));
+        let scratch = self.files.scratch.as_ref()?;
+        let found = T::filled(self.size, |bytes| scratch.read(place, bytes));
         let problem = match found {
             Ok(picture) if picture.crc() == self.crc => return Some(picture),
             Ok(_) => "has other bytes than were written".to_owned(),
             Err(error) => format!("cannot be read: {error}"),
         };
-        if !self.files.scratch.is_given_up() && !self.files.was_damaged.swap(true, Relaxed) {
+        if !scratch.is_given_up() && !self.files.was_damaged.swap(true, Relaxed) {
             tracing::warn!("the temporary file of photos {problem}; such photos are decoded again");
         }
         None

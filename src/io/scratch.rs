@@ -72,6 +72,12 @@ impl Scratch {
     }
 }
 
+/// Returns the folder of the system for large temporary files: that of the environment, else the one on a disk.
+pub(crate) fn system_folder() -> PathBuf {
+    let on_disk = Path::new("/var/tmp");
+    if std::env::var_os("TMPDIR").is_none() && on_disk.is_dir() { on_disk.to_owned() } else { std::env::temp_dir() }
+}
+
 impl State {
     fn append(&mut self, folder: &Path, bytes: &[u8]) -> io::Result<Place> {
         let mut file = match self.file.take() {

@@ -1,7 +1,7 @@
 //! Arrays of one kind for all views, such as depth maps, within a budget of memory.
 
 use super::PHOTO_MEMORY;
-use super::scratch::{Place, Scratch};
+use super::scratch::{Place, Scratch, system_folder};
 use crate::error::{Error, Result};
 use crate::scene::Pixels;
 use crate::scene::pixels::Source;
@@ -20,7 +20,11 @@ pub(crate) struct Shelf {
 impl Shelf {
     /// Makes an empty one.
     pub(crate) fn new() -> Self {
-        Self { left: MEMORY, scratch: Arc::new(Scratch::new(&std::env::temp_dir())) }
+        Self::of(MEMORY)
+    }
+
+    fn of(memory: u64) -> Self {
+        Self { left: memory, scratch: Arc::new(Scratch::new(&system_folder())) }
     }
 
     /// Takes an array. Without space for the file it stays in memory.
@@ -53,11 +57,27 @@ impl Source<Vec<f32>> for Waiting {
     fn make(&self) -> Result<Arc<Vec<f32>>> {
         let mut values = vec![0.0; self.count];
         let read = self.scratch.read(self.place, bytemuck::cast_slice_mut(&mut values));
-        read.map_err(Error::read(std::env::temp_dir()))?;
+        read.map_err(Error::read(system_folder()))?;
         Ok(Arc::new(values))
     }
 
     fn at_once(&self) -> usize {
         1
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Shelf;
+
+    #[test]
+    fn arrays_that_do_not_fit_come_back_from_a_file() {
+        let mut shelf = Shelf::of(100);
+        let arrays: Vec<Vec<f32>> = (0..4).map(|index| vec![index as f32; 10 + index]).collect();
+        let kept: Vec<_> = arrays.iter().map(|array| shelf.put(array.clone())).collect();
+        assert_eq!(kept.iter().map(|array| array.is_held()).collect::<Vec<_>>(), [true, true, false, false]);
+        for (array, kept) in arrays.iter().zip(kept) {
+            assert_eq!(*kept.get().expect("read"), *array);
+        }
     }
 }

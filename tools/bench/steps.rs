@@ -101,7 +101,7 @@ fn divided(gpu: &Arc<Gpu>, dataset: &Dataset, model: &Gaussians, objects: usize)
     let mut dataset = dataset.clone();
     for view in &mut dataset.train {
         let seen = render(&mut engine, &view.camera, &RenderOptions::of_main(NEAR))?;
-        view.mask = Some(Arc::new(seen.main_label_map(&labels)?));
+        view.mask = Some(seen.main_label_map(&labels)?.into());
     }
     Ok(dataset)
 }
