@@ -5,7 +5,6 @@ use labelgs::io::capture::{Fault, Report, scan};
 use labelgs::io::{LoadOptions, open};
 use labelgs::scene::{Dataset, Photo};
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 
 /// A made scene of 16 photos.
 fn made(folder: &Path) -> PathBuf {
@@ -28,7 +27,7 @@ fn found(report: &Report) -> Vec<(Fault, Option<&str>)> {
 /// Scans a scene with one photo changed.
 fn with_photo(scene: &Path, index: usize, change: impl Fn(&mut Photo)) -> Report {
     let mut dataset = read(scene);
-    change(Arc::make_mut(dataset.train[index].photo.as_mut().expect("a photo")));
+    dataset.train[index].photo.as_mut().expect("a photo").edit(change).expect("in memory");
     scan(scene, &dataset).expect("a scan")
 }
 

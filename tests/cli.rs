@@ -180,7 +180,7 @@ fn a_flag_has_one_heading() {
 }
 
 /// A value other than the default for each setting; none for a flag that needs none.
-const TYPED: [(&str, &str); 61] = [
+const TYPED: [(&str, &str); 62] = [
     ("--iterations", "7"),
     ("--max-resolution", "99"),
     ("--start-size", "0.7"),
@@ -242,6 +242,7 @@ const TYPED: [(&str, &str); 61] = [
     ("--save-at", "2000,5000"),
     ("--preview-every", "6"),
     ("--checkpoint-every", "12"),
+    ("--photo-memory", "1.5G"),
 ];
 
 #[test]

@@ -58,7 +58,7 @@ fn coarse_steps_are_those_of_a_smaller_scene() {
     let mut small = dataset(&SCENE, 0);
     for view in &mut small.train {
         view.camera = view.camera.resized(48, 36);
-        view.photo = view.photo.as_deref().map(|photo| half(photo).into());
+        view.photo = Some(half(&view.photo().expect("a photo")).into());
         view.mask = None;
     }
     // The first of eight sizes lasts for an eighth of the steps below full size.

@@ -11,7 +11,6 @@ use labelgs::internals::train::{TrainState, Trainer};
 use labelgs::io::initial_gaussians;
 use labelgs::run::{ExposureMode, LabelRule, TrainConfig};
 use labelgs::scene::Dataset;
-use std::sync::Arc;
 
 /// The loss sum (c' - t)^2 / 2, which has no kink.
 fn loss(image: &[[f64; 3]], logs: [f64; 3], photo: &[[f64; 3]]) -> f64 {
@@ -39,9 +38,10 @@ fn the_mirror_has_the_gradient_of_its_loss() {
 fn uneven() -> Dataset {
     let mut scene = small();
     for view in scene.train.iter_mut().skip(1).step_by(2) {
-        let photo = Arc::make_mut(view.photo.as_mut().expect("a photo"));
         let dark = |value: &mut u8| *value = (f64::from(*value) * 0.6).round() as u8;
-        photo.rgba.iter_mut().for_each(|[r, g, b, _]| [r, g, b].into_iter().for_each(dark));
+        let darken = |[r, g, b, _]: &mut [u8; 4]| [r, g, b].into_iter().for_each(dark);
+        let photo = view.photo.as_mut().expect("a photo");
+        photo.edit(|photo| photo.rgba.iter_mut().for_each(darken)).expect("in memory");
     }
     scene
 }

@@ -128,7 +128,7 @@ fn read(folder: &Path, options: &SynthOptions) -> Dataset {
 /// PSNR of a view against the picture of a pinhole camera in its place, over the covered pixels; the share of equal
 /// ids; the number of covered pixels.
 fn compared(world: &World, view: &View) -> (f64, f64, usize) {
-    let (photo, mask) = (view.photo.as_ref().expect("a photo"), view.mask.as_ref().expect("a mask"));
+    let (photo, mask) = (view.photo().expect("a photo"), view.mask().expect("read").expect("a mask"));
     let made = picture(world, &view.camera, 0);
     let (mut error, mut same, mut count) = (0.0, 0, 0);
     for at in (0..photo.rgba.len()).filter(|&at| photo.rgba[at][3] == 255) {
@@ -194,10 +194,10 @@ fn ids_return_to_the_photo() {
         let dataset = read(folder.path(), &options);
         let stored = labelgs::io::read_mask(folder.path().join("masks/000.png")).expect("a mask");
         let windows = windows(folder.path()).expect("windows");
-        let mut views: Vec<(&Window, &LabelMap)> = Vec::new();
-        for view in dataset.train.iter().filter(|view| view.name.starts_with("000.")) {
-            views.push((&windows[&view.name], view.mask.as_deref().expect("a mask")));
-        }
+        let of_photo = dataset.train.iter().filter(|view| view.name.starts_with("000."));
+        let masks: Vec<_> =
+            of_photo.map(|view| (&windows[&view.name], view.mask().expect("read").expect("a mask"))).collect();
+        let views: Vec<(&Window, &LabelMap)> = masks.iter().map(|(window, mask)| (*window, &**mask)).collect();
         let back = ids_of_photo(&views).expect("ids");
         assert_eq!((back.width, back.height), (stored.width, stored.height));
         let covered = back.ids.iter().zip(&stored.ids).filter(|(_, id)| **id != 0).count();

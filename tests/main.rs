@@ -51,6 +51,7 @@ mod occlusion; // which object hides which
 mod output; // files of rendered pictures
 mod overflow; // a buffer that is too small costs a step and no bit
 mod pass; // each kernel against its mirror
+mod photo_memory; // photos and masks within a budget of memory give the same bits
 mod poses; // poses of photos are refined, found and resumed
 mod protocol; // scores of the published benchmarks
 mod registry; // every shader has a header, a mirror and a pass

@@ -9,7 +9,6 @@ use labelgs::internals::train::Trainer;
 use labelgs::render::{NEAR, Parts, RenderOptions, Rendered, render};
 use labelgs::run::TrainConfig;
 use labelgs::scene::{Camera, Dataset, Gaussians, Photo, Point, View};
-use std::sync::Arc;
 
 const SIZE: (u32, u32) = (96, 72);
 /// Depths of a wall and of a ball before it: most Gaussians belong to the wall.
@@ -92,7 +91,7 @@ fn a_thing_at_a_third_of_the_median_depth_is_drawn() {
         .map(|(i, (x, y))| {
             let camera = camera(x, y);
             let photo = photo(&draw(&mut of_truth, &camera));
-            View { name: format!("{i}.png"), camera, photo: Some(Arc::new(photo)), mask: None }
+            View { name: format!("{i}.png"), camera, photo: Some(photo.into()), mask: None }
         })
         .collect();
     // Every third Gaussian of the truth is a point of the reconstruction.

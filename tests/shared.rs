@@ -282,8 +282,9 @@ fn a_brightness_of_each_photo_is_found() {
     let Some(turn) = device() else { return };
     let mut scene = small();
     for view in scene.train.iter_mut().skip(1).step_by(2) {
-        let photo = Arc::make_mut(view.photo.as_mut().expect("a photo"));
-        photo.rgba.iter_mut().for_each(|[r, g, b, _]| [r, g, b].into_iter().for_each(|v| *v = v.saturating_sub(50)));
+        let darken = |[r, g, b, _]: &mut [u8; 4]| [r, g, b].into_iter().for_each(|v| *v = v.saturating_sub(50));
+        let photo = view.photo.as_mut().expect("a photo");
+        photo.edit(|photo| photo.rgba.iter_mut().for_each(darken)).expect("in memory");
     }
     let config = TrainConfig { iterations: 60, densify_from: Some(1000), ..TrainConfig::adc() };
     let mut trainer = trainer(&turn, scene, config, with(Brightness));

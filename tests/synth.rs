@@ -51,7 +51,7 @@ fn every_object_is_seen_often() {
     assert_eq!((dataset.train.len(), dataset.test.len()), (10, 2));
     let mut views = [0; 9];
     for view in dataset.all() {
-        let ids = &view.mask.as_ref().expect("mask").ids;
+        let ids = view.mask().expect("read").expect("a mask").ids.clone();
         assert!(ids.contains(&0));
         (1..=8_u16).for_each(|id| views[usize::from(id)] += usize::from(ids.contains(&id)));
     }
@@ -175,7 +175,8 @@ fn the_reader_finds_what_was_made() {
     let made = synth::dataset(&options, 8);
     assert_eq!((read.train.len(), read.test.len()), (7, 2));
     for (read, made) in read.all().into_iter().zip(made.all()) {
-        assert_eq!((&read.name, &read.photo, &read.mask), (&made.name, &made.photo, &made.mask));
+        assert_eq!((&read.name, read.photo().expect("read")), (&made.name, made.photo().expect("made")));
+        assert_eq!(read.mask().expect("read"), made.mask().expect("made"));
         let (a, b) = (&read.camera, &made.camera);
         assert!(a.rotation.abs_diff_eq(b.rotation, 1e-12) && a.translation.abs_diff_eq(b.translation, 1e-12));
         assert_eq!((a.fx, a.fy, a.cx, a.cy), (b.fx, b.fy, b.cx, b.cy));

@@ -27,7 +27,8 @@ pub struct CheckArgs {
 
 /// Prints what the scan finds. Fails if it finds a fault.
 pub(crate) fn run(args: &CheckArgs, context: &Context) -> Result<()> {
-    let options = LoadOptions { test_every: None, ..LoadOptions::default() };
+    // It looks at the photos in full size, few times: a file of their pixels would cost more than it saves.
+    let options = LoadOptions { test_every: None, photo_folder: None, ..LoadOptions::default() };
     let dataset = io::open_logged(&args.scene, &args.read.into_options(options))?;
     let report = scan(&args.scene, &dataset)?;
     let mut counts: BTreeMap<Fault, usize> = BTreeMap::new();

@@ -159,6 +159,6 @@ fn make_agree(
     let how = Agreement { near, per_view: true, min_views: MIN_VIEWS, make_missing: false };
     let (masks, _) = agree(&mut engine, model, &borrowed, how, &mut || ())?;
     let names = table(&args.masks, true, &borrowed, &masks)?;
-    views.iter_mut().zip(masks).for_each(|(view, mask)| view.mask = mask.map(Arc::new));
+    views.iter_mut().zip(masks).for_each(|(view, mask)| view.mask = mask.map(Into::into));
     Ok(names)
 }

@@ -6,7 +6,7 @@ use crate::scene::labels::LABEL_MAX;
 use glam::DVec3;
 use std::collections::BTreeMap;
 
-pub(crate) use crate::options::parse::{colour, count, switch};
+pub(crate) use crate::options::parse::{bytes, colour, count, switch};
 
 /// Labels by id and by name.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -174,19 +174,4 @@ pub(crate) fn size(text: &str) -> Result<Size, String> {
     let (width, height) = text.split_once(['x', 'X']).ok_or_else(wrong)?;
     let side = |text: &str| text.trim().parse().ok().filter(|side| (1..=16_384).contains(side)).ok_or_else(wrong);
     Ok(Size(side(width)?, side(height)?))
-}
-
-/// Parses a number of bytes such as `1500M` or `2G`, in powers of 1024.
-pub(crate) fn bytes(text: &str) -> Result<u64, String> {
-    let wrong =
-        || format!("`{text}` is not an amount of memory; expected a number followed by K, M or G, such as 1500M");
-    let (number, unit) = text.trim().split_at(text.trim().len().saturating_sub(1));
-    let shift = match unit.to_ascii_uppercase().as_str() {
-        "K" => 10,
-        "M" => 20,
-        "G" => 30,
-        _ => return Err(wrong()),
-    };
-    let value = number.parse().ok().filter(|value: &f64| value.is_finite() && *value > 0.0).ok_or_else(wrong)?;
-    Ok((value * f64::from(1_u32 << shift)) as u64)
 }

@@ -15,7 +15,7 @@ pub(crate) struct Band {
 
 impl Band {
     /// Returns the range of its pixels in a row-major picture.
-    pub fn pixels(self, width: u32) -> std::ops::Range<usize> {
+    pub(crate) fn pixels(self, width: u32) -> std::ops::Range<usize> {
         let (first, width) = (self.first as usize, width as usize);
         first * width..(first + self.rows as usize) * width
     }

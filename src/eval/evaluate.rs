@@ -6,10 +6,10 @@ use super::regions::{RegionScores, Witnesses};
 use super::scores::{ObjectRender, ObjectTruth, Scores, ViewScores};
 use crate::edit::select::extract;
 use crate::engine::Engine;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::label::occlusion::{Rule, by_contour};
 use crate::render::{Parts, RenderOptions, Rendered, render};
-use crate::scene::{Gaussians, LabelMap, View};
+use crate::scene::{Gaussians, LabelMap, Pixels, View};
 use std::collections::BTreeMap;
 
 /// The options of the renders.
@@ -71,16 +71,18 @@ pub fn evaluate(
             false => rendered.label_map(),
         });
         let map = map.transpose()?;
-        let mut score = ViewScores::new(&rendered.rgb, photo(view)?, map.as_ref(), view.mask.as_deref())?;
+        let (photo, mask) = (view.photo()?, view.mask()?);
+        let mask = mask.as_deref();
+        let mut score = ViewScores::new(&rendered.rgb, &photo, map.as_ref(), mask)?;
         if let Some(witnesses) = &witnesses {
             let seen = witnesses.see(&view.camera, &rendered)?;
-            score.regions = Some(RegionScores::new(&rendered.rgb, photo(view)?, view.mask.as_deref(), &seen));
+            score.regions = Some(RegionScores::new(&rendered.rgb, &photo, mask, &seen));
         }
         let numbers = vec![("PSNR", Some(score.psnr)), ("SSIM", Some(score.ssim))];
-        let (labels, truth) = (map.as_ref(), view.mask.as_deref());
-        watch.see(&Compared { numbers, labels, truth, ..Compared::new(&view.name, photo(view)?, &rendered.rgb) })?;
+        let (labels, truth) = (map.as_ref(), mask);
+        watch.see(&Compared { numbers, labels, truth, ..Compared::new(&view.name, &photo, &rendered.rgb) })?;
         scores.push(score);
-        hidden.push(hidden_by(view.mask.as_deref(), &rendered)?);
+        hidden.push(hidden_by(mask, &rendered)?);
     }
     for id in objects(views) {
         let there = labels.filter(|labels| labels.contains(&id));
@@ -95,10 +97,12 @@ pub fn evaluate(
             };
             let alone = rendered.as_ref().map(|r| ObjectRender { colour: &r.rgb, alpha: &r.alpha });
             let (whole, picture) = (wholes.outline(id, view)?, wholes.alone(id, view)?);
-            let unknown = pixels_of(view.mask.as_deref(), hidden[index].get(&(id as u16)));
+            let (photo, mask) = (view.photo()?, view.mask()?);
+            let mask = mask.as_deref();
+            let unknown = pixels_of(mask, hidden[index].get(&(id as u16)));
             let truth = ObjectTruth {
-                photo: photo(view)?,
-                mask: view.mask.as_deref(),
+                photo: &photo,
+                mask,
                 whole: whole.as_deref(),
                 hidden: unknown.as_deref(),
                 alone: picture.as_deref(),
@@ -140,12 +144,8 @@ pub(crate) fn picture_count(views: &[&View]) -> u64 {
 }
 
 fn objects(views: &[&View]) -> Vec<u32> {
-    let ids = views.iter().filter_map(|view| view.mask.as_deref()).flat_map(LabelMap::objects).map(u32::from);
+    let ids = views.iter().filter_map(|view| view.mask.as_ref()).flat_map(Pixels::objects).map(u32::from);
     ids.collect::<std::collections::BTreeSet<u32>>().into_iter().collect()
-}
-
-fn photo(view: &View) -> Result<&crate::scene::Photo> {
-    view.photo.as_deref().ok_or_else(|| Error::Bug(format!("{} came without its photo", view.name)))
 }
 
 fn hidden_by(mask: Option<&LabelMap>, rendered: &Rendered) -> Result<BTreeMap<u16, Vec<u16>>> {

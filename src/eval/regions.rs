@@ -5,8 +5,9 @@
 use crate::Result;
 use crate::engine::Engine;
 use crate::eval::metrics::{mean, psnr_over};
+use crate::io::shelf::Shelf;
 use crate::render::{Parts, RenderOptions, Rendered, render};
-use crate::scene::{Camera, LabelMap, Photo, View};
+use crate::scene::{Camera, LabelMap, Photo, Pixels, View};
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 use serde::Serialize;
@@ -72,16 +73,17 @@ impl RegionScores {
 
 /// What the training views see, by the depth of the model.
 pub(super) struct Witnesses {
-    cameras: Vec<(Camera, Vec<f32>)>,
+    cameras: Vec<(Camera, Pixels<Vec<f32>>)>,
 }
 
 impl Witnesses {
     /// Renders the depth of every training view; the model is in the engine.
     pub(super) fn new(engine: &mut Engine, train: &[View], options: RenderOptions) -> Result<Self> {
+        let mut shelf = Shelf::new();
         let depth = |view: &View| {
             let of_depth = RenderOptions { parts: Parts::DEPTH, sh_degree: Some(0), ..options };
             let depth = render(engine, &view.camera, &of_depth)?.mean_depth()?;
-            Ok((view.camera.clone(), depth))
+            Ok((view.camera.clone(), shelf.put(depth)))
         };
         Ok(Self { cameras: train.iter().map(depth).collect::<Result<_>>()? })
     }
@@ -91,16 +93,26 @@ impl Witnesses {
         let depths = rendered.mean_depth()?;
         let far = BEYOND * f64::from(depths.iter().copied().fold(1e-6_f32, f32::max));
         let to_world = camera.rotation.transpose();
-        let is_seen = |(index, &depth): (usize, &f32)| {
+        let place = |(index, &depth): (usize, &f32)| {
             let (x, y) = (index % camera.width as usize, index / camera.width as usize);
             let pixel = DVec2::new(x as f64 + 0.5, y as f64 + 0.5);
             let ray = DVec3::new((pixel.x - camera.cx) / camera.fx, (pixel.y - camera.cy) / camera.fy, 1.0);
             let depth = if depth > 0.0 { f64::from(depth) } else { far };
-            let world = to_world * (ray * depth - camera.translation);
-            let views = self.cameras.iter().filter(|(other, depths)| sees(other, depths, world));
-            views.take(VIEWS_MIN).count() == VIEWS_MIN
+            to_world * (ray * depth - camera.translation)
         };
-        Ok(depths.par_iter().enumerate().map(is_seen).collect())
+        // One witness after the other, because the depths of all of them may not fit into memory.
+        let mut open: Vec<(DVec3, usize)> = depths.par_iter().enumerate().map(place).map(|world| (world, 0)).collect();
+        for (other, depths) in &self.cameras {
+            let depths = depths.get()?;
+            let is_open = |(world, seen): &mut (DVec3, usize)| {
+                *seen += usize::from(*seen < VIEWS_MIN && sees(other, &depths, *world));
+                *seen < VIEWS_MIN
+            };
+            if open.par_iter_mut().filter_map(|pixel| is_open(pixel).then_some(())).count() == 0 {
+                break;
+            }
+        }
+        Ok(open.into_iter().map(|(_, seen)| seen == VIEWS_MIN).collect())
     }
 }
 

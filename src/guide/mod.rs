@@ -34,6 +34,7 @@ macro_rules! pages {
         /// [page labels]: labels
         /// [page outputs]: outputs
         /// [page formats]: formats
+        /// [page devices]: devices
         ///
         #[doc = include_str!(concat!(stringify!($name), ".md"))]
         pub mod $name {}

@@ -2,18 +2,15 @@
 
 use super::LoadOptions;
 use super::bad_photos::{self, LISTED_MAX};
-use super::image::{check_size, photo_size, read_photo};
-use super::lens::Lens;
-use super::listing::{Listed, Listing, check_camera};
-use super::mask::{MaskFolder, read_checked};
-use super::resample::{bounded_size, resample_ids, same_aspect, shrink_photo, undistort_photo};
-use super::window::Window;
+use super::listing::{Listed, Listing};
+use super::mask::MaskFolder;
+use super::photo_store::PhotoStore;
+use super::recipe::Recipe;
 use crate::error::{Error, Result};
-use crate::scene::{Camera, Dataset, LabelMap, Photo, View};
+use crate::scene::{Dataset, View, crew};
 use rayon::prelude::*;
 use std::path::Path;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 
 pub(crate) fn load(root: &Path, mut listing: Listing, options: &LoadOptions) -> Result<Dataset> {
     let mut notes = std::mem::take(&mut listing.notes);
@@ -27,10 +24,12 @@ pub(crate) fn load(root: &Path, mut listing: Listing, options: &LoadOptions) -> 
     if let Some(ignore) = ignore.as_ref().filter(|ignore| views.iter().all(|view| ignore.find(&view.name).is_none())) {
         return Err(ignore.nothing_found(&views[0].name));
     }
-    let resampled = AtomicUsize::new(0);
-    let folders = (masks.as_ref(), ignore.as_ref());
-    let read = |view| Ok(load_views(view, decode(view, options)?, options, folders, &resampled));
-    let read: Vec<Result<Result<Vec<View>>>> = views.par_iter().map(read).collect();
+    let recipe = |view: &Listed| {
+        let of = |folder: &Option<MaskFolder>| folder.as_ref().and_then(|folder| folder.find(&view.name));
+        Arc::new(Recipe::new(view.clone(), of(&masks), of(&ignore), options))
+    };
+    let recipes: Vec<Arc<Recipe>> = views.iter().map(recipe).collect();
+    let (read, resampled) = read_views(&recipes, &test, options);
     let mut undecodable = std::mem::take(&mut listing.bad);
     let total = views.len() + undecodable.len();
     let mut loaded = Vec::with_capacity(views.len());
@@ -52,9 +51,8 @@ pub(crate) fn load(root: &Path, mut listing: Listing, options: &LoadOptions) -> 
             notes.push(format!("{} of {} photos have no mask: {}", without.len(), views.len(), shortened(&without)));
         }
     }
-    if resampled.load(Relaxed) > 0 {
-        let count = resampled.load(Relaxed);
-        notes.push(format!("{count} masks differ in size from their photos and were scaled (nearest id)"));
+    if resampled > 0 {
+        notes.push(format!("{resampled} masks differ in size from their photos and were scaled (nearest id)"));
     }
     if options.undistort && views.iter().any(|view| !view.lens.is_pinhole()) {
         notes.push("photos and masks were undistorted to a pinhole camera; pixels without a source are ignored".into());
@@ -73,6 +71,34 @@ pub(crate) fn load(root: &Path, mut listing: Listing, options: &LoadOptions) -> 
     dataset.test.sort_by(|a, b| a.name.cmp(&b.name));
     require_unique(root, &dataset)?;
     Ok(dataset)
+}
+
+/// Makes the views of each photo. The outer error is that of an undecodable photo. Also returns the number of masks with
+/// another size than their photos.
+fn read_views(
+    recipes: &[Arc<Recipe>],
+    test: &[bool],
+    options: &LoadOptions,
+) -> (Vec<Result<Result<Vec<View>>>>, usize) {
+    let stored: Vec<_> = recipes.par_iter().map(|recipe| recipe.stored()).collect();
+    let store = PhotoStore::new(recipes, &stored, test, options);
+    let read = |index: usize| {
+        let (recipe, size) = (&recipes[index], *stored[index].as_ref().ok()?);
+        let made = recipe.decode(size).map(|photo| recipe.views(size, photo));
+        Some(made.map(|made| made.map(|made| (made.resampled, store.keep(index, recipe, size, made.views)))))
+    };
+    let read = crew::map(recipes.len(), store.at_once(), read);
+    let mut resampled = 0;
+    let mut count = |(masks, views)| {
+        resampled += masks;
+        views
+    };
+    let of_photo = |(size, made): (Result<_>, Option<Result<Result<_>>>)| match (size, made) {
+        (Err(error), _) => Err(error),
+        (Ok(_), Some(made)) => made.map(|made| made.map(&mut count)),
+        (Ok(_), None) => Err(Error::Bug("a photo of known size was not read".to_owned())),
+    };
+    (stored.into_iter().zip(read).map(of_photo).collect(), resampled)
 }
 
 /// Refuses a photo that is named as the face of another.
@@ -158,126 +184,4 @@ pub(crate) fn all_or_one_error<T>(root: &Path, loaded: Vec<Result<T>>) -> Result
             Err(Error::data(root, "", problem))
         }
     }
-}
-
-/// The size in a photo's file, and its pixels if they are wanted.
-type Decoded = (Option<(u32, u32)>, Option<Photo>);
-
-fn decode(listed: &Listed, options: &LoadOptions) -> Result<Decoded> {
-    let Some(path) = &listed.photo else { return Ok((None, None)) };
-    if !options.photos {
-        return Ok((Some(stored_size(path)?), None));
-    }
-    // Check the shape before the pixels take memory; the error comes later.
-    let size = stored_size(path)?;
-    let fits = same_aspect(size, (listed.camera.width, listed.camera.height));
-    let photo = if fits { Some(read_photo(path, options.background)?) } else { None };
-    Ok((Some(size), photo))
-}
-
-/// Makes the views of a photo, one or several.
-fn load_views(
-    listed: &Listed,
-    (stored, mut photo): Decoded,
-    options: &LoadOptions,
-    (masks, ignore): (Option<&MaskFolder>, Option<&MaskFolder>),
-    resampled: &AtomicUsize,
-) -> Result<Vec<View>> {
-    let original = at_size(listed, stored)?;
-    let mask = match masks.and_then(|masks| masks.find(&listed.name)) {
-        Some(path) => Some(load_mask(&path, (original.width, original.height), resampled)?),
-        None => None,
-    };
-    if let (Some(path), Some(photo)) = (ignore.and_then(|ignore| ignore.find(&listed.name)), &mut photo) {
-        leave_out(photo, &load_mask(&path, (original.width, original.height), resampled)?);
-    }
-    let windows = match options.undistort {
-        true => Window::all(&listed.name, &original, &listed.lens),
-        false => vec![Window::stored(&listed.name, &original)],
-    };
-    let photo_path = listed.photo.as_deref().unwrap_or(Path::new(&listed.name));
-    if windows.is_empty() {
-        return Err(Error::data(photo_path, "", NO_WINDOW));
-    }
-    // A lens of odd coefficients may have no scale at its axis.
-    for window in windows.iter().filter(|window| !window.is_photo()) {
-        check_camera(photo_path, &format!("view {}", window.name), &window.camera, &Lens::Pinhole)?;
-    }
-    let view = |window: Window| {
-        let size = bounded_size((window.camera.width, window.camera.height), options.max_resolution);
-        View {
-            camera: window.camera.resized(size.0, size.1),
-            photo: photo.as_ref().map(|photo| Arc::new(fitted(photo, &window, size))),
-            mask: mask.as_ref().map(|mask| Arc::new(resample_ids(mask, &window, size))),
-            name: window.name,
-        }
-    };
-    Ok(windows.into_iter().map(view).collect())
-}
-
-/// Takes the weight of the pixels where `ignored`, of any scale, is not 0.
-fn leave_out(photo: &mut Photo, ignored: &LabelMap) {
-    let nearest = |at: u32, side: u32, from: u32| {
-        (((f64::from(at) + 0.5) * f64::from(from) / f64::from(side)) as u32).min(from - 1)
-    };
-    let (width, height) = (photo.width, photo.height);
-    for (at, texel) in (0..).zip(&mut photo.rgba) {
-        let (x, y) = (at % width, at / width);
-        if ignored.at(nearest(x, width, ignored.width), nearest(y, height, ignored.height)) != 0 {
-            *texel = [0; 4];
-        }
-    }
-}
-
-const NO_WINDOW: &str = "the lens of its camera shows nothing of the photo; check focal lengths and coefficients";
-
-/// Returns the camera at the size of the photo's file, which may be a scaled version of the size in the data set.
-pub(crate) fn at_photo_size(listed: &Listed) -> Result<Camera> {
-    at_size(listed, listed.photo.as_deref().map(stored_size).transpose()?)
-}
-
-fn stored_size(path: &Path) -> Result<(u32, u32)> {
-    let size = photo_size(path)?;
-    check_size(path, size)?;
-    Ok(size)
-}
-
-fn at_size(listed: &Listed, stored: Option<(u32, u32)>) -> Result<Camera> {
-    let (Some(path), Some(size)) = (&listed.photo, stored) else { return Ok(listed.camera.clone()) };
-    let camera = &listed.camera;
-    if !same_aspect(size, (camera.width, camera.height)) {
-        let problem = format!(
-            "the photo has {} x {} px and its camera {} x {} px, which no scale explains; use the photos that the \
-             cameras were made for (an EXIF orientation is ignored, because poses belong to the stored pixels)",
-            size.0, size.1, camera.width, camera.height
-        );
-        return Err(Error::data(path, "", problem));
-    }
-    Ok(camera.resized(size.0, size.1))
-}
-
-/// Undistorts the photo and scales it to the final size.
-fn fitted(photo: &Photo, window: &Window, (width, height): (u32, u32)) -> Photo {
-    if window.is_photo() {
-        return shrink_photo(photo, width, height);
-    }
-    let whole = undistort_photo(photo, window);
-    if (width, height) == (whole.width, whole.height) { whole } else { shrink_photo(&whole, width, height) }
-}
-
-fn load_mask(path: &Path, photo: (u32, u32), resampled: &AtomicUsize) -> Result<LabelMap> {
-    let ids = read_checked(path, |found| {
-        if same_aspect(found, photo) {
-            return Ok(());
-        }
-        let problem = format!(
-            "the mask has {} x {} px and its photo {} x {} px, which no scale explains; make masks of the same photos",
-            found.0, found.1, photo.0, photo.1
-        );
-        Err(Error::data(path, "", problem))
-    })?;
-    if (ids.width, ids.height) != photo {
-        resampled.fetch_add(1, Relaxed);
-    }
-    Ok(ids)
 }

@@ -29,12 +29,16 @@ mod metashape;
 pub(crate) mod model;
 mod npy;
 pub(crate) mod occlusion_table;
+mod photo_store;
 pub(crate) mod pipeline_file;
 pub(crate) mod ply;
 pub(crate) mod read;
 mod read_options;
+mod recipe;
 pub(crate) mod resample;
 pub(crate) mod run_folder;
+mod scratch;
+pub(crate) mod shelf;
 mod transforms;
 pub(crate) mod truth;
 pub(crate) mod window;
@@ -84,7 +88,15 @@ pub struct LoadOptions {
     /// Turns photos into pinhole views. Without it a view has the pixels of the photo as stored, whatever its lens, and a
     /// camera that is right for pinholes only.
     pub undistort: bool,
+    /// Most bytes of memory for photos and masks. In a larger scene some of them wait in a temporary file until they are
+    /// asked for, with the same bits.
+    pub photo_memory: u64,
+    /// Folder for that file; with `None` there is no file, and such photos are decoded again each time.
+    pub photo_folder: Option<PathBuf>,
 }
+
+/// Default for the memory of photos and masks, bytes.
+pub const PHOTO_MEMORY: u64 = 4 << 30;
 
 /// Default for the largest share of undecodable photos.
 pub const MAX_BAD_PHOTOS: f32 = 0.1;
@@ -101,6 +113,8 @@ impl Default for LoadOptions {
             max_bad_photos: MAX_BAD_PHOTOS,
             allow_outside: false,
             undistort: true,
+            photo_memory: PHOTO_MEMORY,
+            photo_folder: Some(scratch::system_folder()),
         }
     }
 }

@@ -14,6 +14,11 @@ use std::path::{Path, PathBuf};
 pub(crate) struct Source(File);
 
 impl Source {
+    /// Reads a file that is open already.
+    pub(crate) fn of(file: File) -> Self {
+        Self(file)
+    }
+
     pub(crate) fn length(&self) -> io::Result<u64> {
         Ok(self.0.metadata()?.len())
     }

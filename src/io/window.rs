@@ -1,7 +1,7 @@
 //! The pinhole views of a photo: the photo itself, undistorted, or faces of a cube around its camera.
 
 use super::lens::{Lens, Optics};
-use super::load::at_photo_size;
+use super::recipe::at_photo_size;
 use crate::Result;
 use crate::scene::{Camera, LabelMap};
 use glam::{DMat3, DVec2, DVec3};

@@ -26,6 +26,35 @@ pub(crate) fn count(text: &str) -> Result<u64, String> {
     if !(0.0..9e15).contains(&value) { Err(wrong()) } else { Ok(value.round() as u64) }
 }
 
+/// Units of memory, as powers of 2.
+const UNITS: [(&str, u32); 3] = [("G", 30), ("M", 20), ("K", 10)];
+
+/// Parses a number of bytes such as `1500M` or `2G`, in powers of 1024.
+pub(crate) fn bytes(text: &str) -> Result<u64, String> {
+    let wrong =
+        || format!("`{text}` is not an amount of memory; expected a number followed by K, M or G, such as 1500M");
+    let (number, unit) = text.trim().split_at_checked(text.trim().len().saturating_sub(1)).ok_or_else(wrong)?;
+    let (_, shift) = UNITS.into_iter().find(|(name, _)| name.eq_ignore_ascii_case(unit)).ok_or_else(wrong)?;
+    let value = number.parse().ok().filter(|value: &f64| value.is_finite() && *value > 0.0).ok_or_else(wrong)?;
+    Ok((value * f64::from(1_u32 << shift)) as u64)
+}
+
+/// A number of bytes in a file, in the syntax of [`bytes`].
+pub(crate) mod as_bytes {
+    use super::{UNITS, bytes};
+    use serde::{Deserialize, Deserializer, Serializer, de::Error};
+
+    pub(crate) fn serialize<S: Serializer>(value: &u64, to: S) -> Result<S::Ok, S::Error> {
+        let even = UNITS.into_iter().find(|(_, shift)| value.trailing_zeros() >= *shift);
+        let (unit, shift) = even.unwrap_or(UNITS[UNITS.len() - 1]);
+        to.serialize_str(&format!("{}{unit}", *value as f64 / f64::from(1_u32 << shift)))
+    }
+
+    pub(crate) fn deserialize<'a, D: Deserializer<'a>>(from: D) -> Result<u64, D::Error> {
+        bytes(&String::deserialize(from)?).map_err(D::Error::custom)
+    }
+}
+
 /// Parses `on` or `off`.
 pub(crate) fn switch(text: &str) -> Result<bool, String> {
     match text {

@@ -101,6 +101,7 @@ fn read_scene(request: &Request, settings: &Settings, inputs: &Inputs) -> Result
     options.ignore = inputs.ignore.clone();
     options.max_bad_photos = inputs.max_bad_photos.unwrap_or(options.max_bad_photos);
     options.allow_outside = inputs.allow_outside;
+    options.photo_folder = Some(request.output.clone());
     let dataset = io::open_logged(&request.scene, &options)?;
     if dataset.train.is_empty() {
         let problem = "no view is left to train on; set `test_every` to 0 or to a larger number";

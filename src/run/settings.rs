@@ -2,6 +2,9 @@
 
 use crate::error::{Error, Result};
 use crate::io::{self, LoadOptions, ReadOptions, run_folder};
+use crate::options::parse::as_bytes;
+#[cfg(feature = "cli")]
+use crate::options::parse::bytes;
 use crate::options::{Key, Options};
 use crate::train::near::NEAR;
 use crate::train::{Preset, TrainConfig};
@@ -11,7 +14,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 crate::options::options! {
-    /// The files that a run writes before its end.
+    /// What a run writes before its end, and the memory that it takes: nothing of it changes a result.
     pub struct RunOptions {
         "Output" {
             /// Steps after which the model is saved too, separated by commas.
@@ -27,6 +30,15 @@ crate::options::options! {
             ///
             /// --resume continues from the newest checkpoint.
             checkpoint_every <"N">: u32 = 1000;
+        }
+        "Scene" {
+            /// Memory for photos and masks, such as 1500M or 4G.
+            ///
+            /// In a larger scene some of them wait in a temporary file in OUT, decoded and of the size for training; it is
+            /// gone with the process. The model has the same bits.
+            #[cfg_attr(feature = "cli", arg(value_parser = bytes))]
+            #[serde(with = "as_bytes")]
+            photo_memory <"SIZE">: u64 = io::PHOTO_MEMORY;
         }
     }
 }
@@ -126,6 +138,7 @@ impl Settings {
             test_every: some(self.read.test_every),
             background: self.train.background,
             photos: true,
+            photo_memory: self.run.photo_memory,
             ..LoadOptions::default()
         }
     }

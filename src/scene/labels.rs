@@ -52,20 +52,26 @@ impl LabelMap {
 
     /// Returns true for pixels with another id within `distance` px, in a square window.
     pub fn near_contour(&self, distance: u32) -> Vec<bool> {
-        let (width, height) = (self.width as usize, self.height as usize);
-        let distance = distance as usize;
+        let (width, height, distance) = (self.width as usize, self.height as usize, distance as usize);
         // Smallest and largest id over rows, then over columns: they differ near a contour.
-        let window = |at: usize, size: usize| at.saturating_sub(distance)..(at + distance + 1).min(size);
-        let over = |range: std::ops::Range<usize>, index: &dyn Fn(usize) -> usize, low: &[u16], high: &[u16]| {
-            let places = || range.clone().map(index);
-            let low = places().map(|place| low[place]).min().unwrap_or(0);
-            (low, places().map(|place| high[place]).max().unwrap_or(0))
-        };
-        let row = |at: usize| over(window(at % width, width), &|x| at / width * width + x, &self.ids, &self.ids);
-        let (low, high): (Vec<u16>, Vec<u16>) = (0..width * height).map(row).unzip();
-        let column = |at: usize| over(window(at / width, height), &|y| y * width + at % width, &low, &high);
-        (0..width * height).map(column).map(|(low, high)| low != high).collect()
+        let rows = || self.ids.chunks(width.max(1));
+        let (across, down) = (distance.min(width.saturating_sub(1)), distance.min(height.saturating_sub(1)));
+        let low: Vec<u16> = rows().flat_map(|row| widened(row, across, 1, u16::min)).collect();
+        let high: Vec<u16> = rows().flat_map(|row| widened(row, across, 1, u16::max)).collect();
+        let (low, high) = (widened(&low, down, width, u16::min), widened(&high, down, width, u16::max));
+        low.into_iter().zip(high).map(|(low, high)| low != high).collect()
     }
+}
+
+/// Returns for each value the one that `pick` takes of it and those up to `steps` before and after it, `stride` apart.
+#[inline]
+fn widened(values: &[u16], steps: usize, stride: usize, pick: impl Fn(u16, u16) -> u16) -> Vec<u16> {
+    let mut found = values.to_vec();
+    for shift in (1..=steps).map(|step| step * stride) {
+        found[shift..].iter_mut().zip(values).for_each(|(to, &before)| *to = pick(*to, before));
+        found.iter_mut().zip(&values[shift..]).for_each(|(to, &after)| *to = pick(*to, after));
+    }
+    found
 }
 
 /// Returns the display colours of ids.

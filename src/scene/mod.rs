@@ -1,16 +1,18 @@
 //! Plain host data of a scene; no Vulkan, no files.
 //!
-//! A [`Dataset`] has [`View`]s (a [`Camera`] with photo and mask) and [`Point`]s; [`Gaussians`] is the model. A
+//! A [`Dataset`] has [`View`]s (a [`Camera`] with [`Pixels`] of photo and mask) and [`Point`]s; [`Gaussians`] is the model. A
 //! [`LabelMap`] has an object id per pixel, a [`DepthMap`] a depth. [`path`] makes smooth paths through cameras, an [`Overview`] is what they look at.
 
 pub(crate) mod camera;
 pub(crate) mod colour;
+pub(crate) mod crew;
 pub(crate) mod depth;
 pub(crate) mod gaussians;
 pub(crate) mod labels;
 pub(crate) mod origin;
 pub(crate) mod overview;
 pub mod path;
+pub(crate) mod pixels;
 pub(crate) mod view;
 
 pub use camera::Camera;
@@ -18,5 +20,6 @@ pub use depth::{DepthKind, DepthMap};
 pub use gaussians::Gaussians;
 pub use labels::{LABEL_MAX, LabelMap, Occluders, UNLABELLED, label_colour};
 pub use overview::Overview;
+pub use pixels::Pixels;
 pub(crate) use view::stems;
 pub use view::{Dataset, Photo, Point, View};

@@ -1,6 +1,7 @@
 //! Posed photos with masks, and the scene that they form.
 
-use super::{Camera, LabelMap};
+use super::{Camera, LabelMap, Pixels};
+use crate::error::{Error, Result};
 use glam::DVec3;
 use std::collections::BTreeSet;
 use std::path::PathBuf;
@@ -33,12 +34,22 @@ pub struct View {
     /// Camera of the photo in memory (undistorted, resized).
     pub camera: Camera,
     /// The photo; `None` if photos were not requested.
-    pub photo: Option<Arc<Photo>>,
+    pub photo: Option<Pixels<Photo>>,
     /// Mask of the visible objects; `None` if masks were not requested or the view has none.
-    pub mask: Option<Arc<LabelMap>>,
+    pub mask: Option<Pixels<LabelMap>>,
 }
 
 impl View {
+    /// Returns the photo's pixels; a view without a photo is an error.
+    pub fn photo(&self) -> Result<Arc<Photo>> {
+        self.photo.as_ref().ok_or_else(|| Error::Bug(format!("{} came without its photo", self.name)))?.get()
+    }
+
+    /// Returns the mask's pixels; `None` if the view has no mask.
+    pub fn mask(&self) -> Result<Option<Arc<LabelMap>>> {
+        self.mask.as_ref().map(Pixels::get).transpose()
+    }
+
     /// Returns the name for output files: without extension, path separators replaced by `_`.
     pub fn stem(&self) -> String {
         let path = std::path::Path::new(&self.name).with_extension("");

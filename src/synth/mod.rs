@@ -27,7 +27,6 @@ use crate::io::lens::{Lens, Optics};
 use crate::scene::{Dataset, LabelMap, Photo, View};
 use cameras::ring_of_cameras;
 use serde::{Deserialize, Serialize};
-use std::sync::Arc;
 use trace::picture;
 
 /// The objects in the scene.
@@ -103,8 +102,8 @@ pub fn dataset(options: &SynthOptions, test_every: u32) -> Dataset {
         let view = View {
             name: view_name(index),
             camera: camera.clone(),
-            photo: Some(Arc::new(Photo { width, height, rgba })),
-            mask: Some(Arc::new(LabelMap { width, height, ids })),
+            photo: Some(Photo { width, height, rgba }.into()),
+            mask: Some(LabelMap { width, height, ids }.into()),
         };
         let held_out = test_every > 0 && (index as u32).is_multiple_of(test_every);
         if held_out { dataset.test.push(view) } else { dataset.train.push(view) }

@@ -25,7 +25,7 @@ pub fn first_model(dataset: &Dataset, config: &TrainConfig) -> Result<Gaussians>
         }
     };
     let mut model = init::initial_gaussians(dataset, config.seed, random as usize)?;
-    init::add_far_gaussians(&mut model, dataset, config.far_points);
+    init::add_far_gaussians(&mut model, dataset, config.far_points)?;
     if config.strategy == StrategyKind::Mcmc {
         model.opacities.fill((MCMC_OPACITY / (1.0 - MCMC_OPACITY)).ln());
         model.scales.iter_mut().flatten().for_each(|scale| *scale += MCMC_SIZE.ln());

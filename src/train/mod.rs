@@ -4,6 +4,7 @@
 //! number of Gaussians, and [`Shared`] parameters belong to the scene or to a photo. [`crate::run`] wraps a training
 //! with folder, checkpoints and scores.
 
+mod ahead;
 pub(crate) mod config;
 pub(crate) mod exposure;
 mod first;
@@ -144,9 +145,7 @@ impl Trainer {
         let shared = shared.or_of(&config, dataset);
         let strategy = strategy.unwrap_or_else(|| strategy::of(config.strategy));
         let most = if config.max_gaussians > 0 { config.max_gaussians } else { u64::from(u32::MAX) };
-        let views =
-            dataset.train.iter().map(|view| setup::train_view(view, config.mask_border)).collect::<Result<Vec<_>>>()?;
-        let views = Views::new(views, &config);
+        let views = Views::new(setup::train_views(dataset, config.mask_border)?, &config);
         let shape = shape.unwrap_or_else(|| KernelShape::of(gpu.capabilities()));
         let size = size.with_shared_rows(shared.rows(views.len()));
         let mut engine = Engine::with_shape(gpu, shape, size, scheduler)?;
@@ -259,7 +258,7 @@ impl Trainer {
             done.extend(self.drain()?);
             self.refresh_occluders()?;
         }
-        let input = self.input(step);
+        let input = self.input(step)?;
         if fault::at("nan").is_some() {
             self.engine.spoil()?;
         }
@@ -268,7 +267,7 @@ impl Trainer {
         if self.strategy.acts_after(self.at(step)) {
             done.extend(self.drain()?);
             self.refresh_poses()?;
-            let uniforms = self.uniforms(&input);
+            let uniforms = self.uniforms(&input)?;
             let mut population = Population::new(&mut self.engine, &mut self.bound, &self.views, uniforms, step);
             let at = At { step, config: &self.config, extent: self.fixed.extent };
             self.strategy.act(at, &mut population)?;
@@ -286,9 +285,10 @@ impl Trainer {
         Ok(done)
     }
 
-    fn input(&mut self, step: u32) -> StepInput {
+    fn input(&mut self, step: u32) -> Result<StepInput> {
         let view = self.order.draw();
-        self.views.prepare(step, view);
+        let next = self.order.upcoming(self.views.steps_ahead());
+        self.views.prepare(step, view, &next)?;
         let objects = &self.views[view].objects;
         // A view without a mask, or with an empty one, costs as much as in a scene without masks.
         let labels = self.config.labels_at(step) && !objects.is_empty();
@@ -299,7 +299,7 @@ impl Trainer {
         };
         let update = self.strategy.updates(self.at(step));
         self.updates += u32::from(update);
-        StepInput { step, view, layers, labels, update, updates: self.updates }
+        Ok(StepInput { step, view, layers, labels, update, updates: self.updates })
     }
 
     fn at(&self, step: u32) -> At<'_> {
@@ -311,8 +311,8 @@ impl Trainer {
         step > 1 && self.strategy.blurs_depth_after(self.at(step - 1))
     }
 
-    fn uniforms(&self, input: &StepInput) -> StepUniforms {
-        let view = self.views.of(input);
+    fn uniforms(&self, input: &StepInput) -> Result<StepUniforms> {
+        let view = self.views.of(input)?;
         let mut uniforms = step_input::uniforms(input, view, &self.config, self.fixed, &self.engine);
         if let Some((camera, near)) = self.views.partner(self.config.seed, input) {
             uniforms = self.engine.with_free_space(uniforms, camera, near);
@@ -321,7 +321,7 @@ impl Trainer {
             uniforms = self.engine.with_grow_box(uniforms, corners);
         }
         self.strategy.uniforms(self.at(input.step), &mut uniforms);
-        uniforms
+        Ok(uniforms)
     }
 
     /// Submits a step, and first waits for the oldest one if its frame is still in use.
@@ -332,7 +332,7 @@ impl Trainer {
     }
 
     fn submit(&mut self, input: StepInput) -> Result<()> {
-        let (key, view, uniforms) = (self.key(&input), self.views.of(&input), self.uniforms(&input));
+        let (key, view, uniforms) = (self.key(&input), self.views.of(&input)?, self.uniforms(&input)?);
         let shared = self.shared.of_step(self.at(input.step), input.view)?;
         let data = step_input::train_input(&input, view, &self.config, uniforms, &self.engine);
         let data = TrainInput { shared, ..data };
@@ -380,7 +380,7 @@ impl Trainer {
         }
         self.in_flight.pop_front();
         self.note_times(input.step, flight.recording)?;
-        let view = self.views.of(&input);
+        let view = self.views.of(&input)?;
         let scale = 1.0 / (3.0 * view.valid_pixels.max(1) as f64);
         let (counters, lambda) = (&report.counters, f64::from(self.config.lambda_dssim));
         let l1 = f64::from(counters.loss_l1) * scale;

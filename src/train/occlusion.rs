@@ -55,7 +55,7 @@ impl Trainer {
         for index in 0..self.views.len() {
             let Some(mask) = &self.views[index].mask else { continue };
             let rendered = render(&mut self.engine, self.views.camera(index), &options)?;
-            let found = by_contour(mask, &rendered.mean_depth()?, Rule::default());
+            let found = by_contour(&*mask.get()?, &rendered.mean_depth()?, Rule::default());
             self.views[index].occluders = found;
         }
         Ok(())

@@ -3,6 +3,7 @@
 use rand::SeedableRng;
 use rand::seq::SliceRandom;
 use rand_pcg::Pcg64Mcg;
+use std::collections::VecDeque;
 
 /// Random stream of the order of views. The other streams are the step numbers.
 const VIEW_STREAM: u64 = u64::MAX;
@@ -21,11 +22,13 @@ pub(super) struct ViewOrder {
     random: Pcg64Mcg,
     views: usize,
     stack: Vec<usize>,
+    /// Drawn ahead, the next one first.
+    next: VecDeque<usize>,
 }
 
 impl ViewOrder {
     pub(super) fn new(seed: u64, views: usize) -> Self {
-        Self { random: stream(seed, VIEW_STREAM), views, stack: Vec::new() }
+        Self { random: stream(seed, VIEW_STREAM), views, stack: Vec::new(), next: VecDeque::new() }
     }
 
     /// Returns the order after `draws` draws.
@@ -38,6 +41,19 @@ impl ViewOrder {
     }
 
     pub(super) fn draw(&mut self) -> usize {
+        self.next.pop_front().unwrap_or_else(|| self.draw_new())
+    }
+
+    /// Returns what the next `count` draws will be.
+    pub(super) fn upcoming(&mut self, count: usize) -> Vec<usize> {
+        while self.next.len() < count {
+            let view = self.draw_new();
+            self.next.push_back(view);
+        }
+        self.next.iter().take(count).copied().collect()
+    }
+
+    fn draw_new(&mut self) -> usize {
         if self.stack.is_empty() {
             self.stack = (0..self.views).collect();
             self.stack.shuffle(&mut self.random);
@@ -68,6 +84,18 @@ mod tests {
             let mut round: Vec<usize> = (0..5).map(|_| order.draw()).collect();
             round.sort_unstable();
             assert_eq!(round, [0, 1, 2, 3, 4]);
+        }
+    }
+
+    #[test]
+    fn looking_ahead_changes_no_draw() {
+        let (mut order, mut plain) = (ViewOrder::new(3, 4), ViewOrder::new(3, 4));
+        for ahead in [0, 3, 9, 1, 6, 0, 0, 12] {
+            let next = order.upcoming(ahead);
+            assert_eq!(next.len(), ahead);
+            let drawn = order.draw();
+            assert_eq!(drawn, plain.draw());
+            assert!(next.first().is_none_or(|&first| first == drawn));
         }
     }
 

@@ -9,9 +9,11 @@ use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::label::vote::ballot::columns_for;
 use crate::pass::KernelShape;
-use crate::scene::{Dataset, LabelMap, View};
+use crate::scene::pixels::Source;
+use crate::scene::{Dataset, LabelMap, Pixels, View, crew};
 use crate::scheduler::SchedulerOptions;
 use std::collections::BTreeSet;
+use std::sync::Arc;
 
 /// Options of a trainer besides its configuration.
 #[derive(Debug)]
@@ -43,9 +45,10 @@ pub fn engine_size(dataset: &Dataset, config: &TrainConfig, gaussians: u64) -> R
     let sizes = dataset.train.iter().chain(&dataset.test).map(|view| (view.camera.width, view.camera.height));
     let image = sizes.reduce(|a, b| (a.0.max(b.0), a.1.max(b.1)));
     let image = image.ok_or_else(|| Error::data(&dataset.root, "", "the scene has no view to train on"))?;
-    let objects: Vec<u16> =
-        dataset.train.iter().filter_map(|view| view.mask.as_ref()).flat_map(|m| m.objects()).collect();
-    let most = dataset.train.iter().filter_map(|view| view.mask.as_ref().map(|mask| mask.objects().len())).max();
+    let of_views: Vec<Vec<u16>> =
+        dataset.train.iter().filter_map(|view| view.mask.as_ref().map(Pixels::objects)).collect();
+    let most = of_views.iter().map(Vec::len).max();
+    let objects = of_views.concat();
     let labels = objects.iter().max().map(|&max_label| LabelSize {
         max_label: u32::from(max_label),
         layers: if config.layer_every() > 0 { config.label_samples.min(most.unwrap_or(0) as u32) } else { 0 },
@@ -79,14 +82,52 @@ pub(crate) fn start_size(
     }
 }
 
-pub(super) fn train_view(view: &View, border: u32) -> Result<TrainView> {
-    let photo = view.photo.clone().ok_or_else(|| Error::Bug(format!("{} came without its photo", view.name)))?;
-    let valid_pixels = step_input::valid_pixels(&photo);
-    let mask = view.mask.clone();
+/// Makes the training views of a data set.
+pub(super) fn train_views(dataset: &Dataset, border: u32) -> Result<Vec<TrainView>> {
+    let views: Vec<&View> = dataset.train.iter().collect();
+    crew::over_views(&views, |view| train_view(view, border)).into_iter().collect()
+}
+
+fn train_view(view: &View, border: u32) -> Result<TrainView> {
+    let (pixels, mask) = (view.photo()?, view.mask()?);
+    let photo = view.photo.clone().unwrap_or_else(|| pixels.clone().into());
     let objects = mask.as_deref().map(LabelMap::objects).unwrap_or_default();
-    let (name, camera, finest) = (view.name.clone(), view.camera.clone(), step_input::finest(&view.camera));
-    let view_labels = mask.as_ref().map(|mask| step_input::view_labels(mask, border)).unwrap_or_default();
-    let shown = step_input::shown_objects(&photo, &view_labels);
-    let occluders = Default::default();
-    Ok(TrainView { name, camera, near: 0.0, finest, photo, valid_pixels, mask, objects, view_labels, shown, occluders })
+    let labels = mask.as_ref().map(|mask| step_input::view_labels(mask, border)).unwrap_or_default();
+    let shown = step_input::shown_objects(&pixels, &labels);
+    let view_labels = match &view.mask {
+        Some(mask) if !mask.is_held() => {
+            Pixels::made(Arc::new(LabelsOf { mask: mask.clone(), border }), Default::default())
+        }
+        _ => labels.into(),
+    };
+    Ok(TrainView {
+        name: view.name.clone(),
+        camera: view.camera.clone(),
+        near: 0.0,
+        finest: step_input::finest(&view.camera),
+        photo,
+        valid_pixels: step_input::valid_pixels(&pixels),
+        mask: view.mask.clone(),
+        objects,
+        view_labels,
+        shown,
+        occluders: Default::default(),
+    })
+}
+
+/// The layout of the device of a mask that is not in memory.
+#[derive(Debug)]
+struct LabelsOf {
+    mask: Pixels<LabelMap>,
+    border: u32,
+}
+
+impl Source<Vec<u32>> for LabelsOf {
+    fn make(&self) -> Result<Arc<Vec<u32>>> {
+        Ok(Arc::new(step_input::view_labels(&*self.mask.get()?, self.border)))
+    }
+
+    fn at_once(&self) -> usize {
+        self.mask.at_once()
+    }
 }

@@ -12,7 +12,7 @@ use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::io::checkpoint::{Checkpoint, Plane};
 use crate::pass::SHARED_PLANES;
-use crate::scene::{Camera, Dataset, LabelMap, Occluders, Photo};
+use crate::scene::{Camera, Dataset, LabelMap, Occluders, Photo, Pixels};
 use crate::scheduler::plan::{Buf, TABLE};
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
@@ -85,7 +85,7 @@ pub struct ViewFingerprint {
 }
 
 impl ViewFingerprint {
-    fn new(name: &str, camera: &Camera, photo: Option<&Photo>, mask: Option<&LabelMap>) -> Self {
+    fn new(name: &str, camera: &Camera, photo: Option<&Pixels<Photo>>, mask: Option<&Pixels<LabelMap>>) -> Self {
         let intrinsics = [camera.fx, camera.fy, camera.cx, camera.cy];
         let pose = camera.rotation.to_cols_array().into_iter().chain(camera.translation.to_array());
         let numbers: Vec<u8> = pose.chain(intrinsics).flat_map(f64::to_le_bytes).collect();
@@ -93,8 +93,8 @@ impl ViewFingerprint {
             name: name.to_owned(),
             size: [camera.width, camera.height],
             camera: crc32fast::hash(&numbers),
-            photo: photo.map_or(0, |photo| crc32fast::hash(photo.rgba.as_flattened())),
-            mask: mask.map(|mask| crc32fast::hash(bytemuck::cast_slice(&mask.ids))),
+            photo: photo.map_or(0, Pixels::crc),
+            mask: mask.map(Pixels::crc),
         }
     }
 }
@@ -160,7 +160,7 @@ impl Trainer {
     pub fn state(&mut self) -> Result<TrainState> {
         self.drain()?;
         let print = |view: &super::TrainView| {
-            ViewFingerprint::new(&view.name, &view.camera, Some(&view.photo), view.mask.as_deref())
+            ViewFingerprint::new(&view.name, &view.camera, Some(&view.photo), view.mask.as_ref())
         };
         if self.fingerprints.is_empty() {
             self.fingerprints = self.views.iter().map(print).collect();
@@ -218,7 +218,7 @@ impl Trainer {
         state.config.check()?;
         let views = dataset.train.iter();
         let fingerprints: Vec<ViewFingerprint> =
-            views.map(|v| ViewFingerprint::new(&v.name, &v.camera, v.photo.as_deref(), v.mask.as_deref())).collect();
+            views.map(|v| ViewFingerprint::new(&v.name, &v.camera, v.photo.as_ref(), v.mask.as_ref())).collect();
         state.check_scene(&dataset.root, &fingerprints)?;
         let (now, version) = (device(&gpu), env!("CARGO_PKG_VERSION"));
         for (then, now) in [(&state.device, now.as_str()), (&state.labelgs, version)] {

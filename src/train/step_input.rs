@@ -3,12 +3,10 @@
 use super::LabelRule;
 use super::TrainConfig;
 use crate::engine::{DisagreementInput, Engine, LayerInput, TrainInput};
-use crate::io::resample::shrink_photo;
-use crate::scene::{Camera, LabelMap, Occluders, Photo};
+use crate::scene::{Camera, LabelMap, Occluders, Photo, Pixels};
 use crate::shaders::constants::{ADAM_BETA1, ADAM_BETA2, FINEST, LABEL_BORDER};
 use crate::shaders::structs::StepUniforms;
 use std::collections::BTreeMap;
-use std::sync::Arc;
 
 /// Largest weight of a small object relative to the mean.
 const WEIGHT_MAX: f64 = 10.0;
@@ -25,40 +23,40 @@ pub struct TrainView {
     /// Least standard deviation of Gaussians at depth 1, world units: a share of a pixel at full size.
     pub finest: f32,
     /// Photo.
-    pub photo: Arc<Photo>,
+    pub photo: Pixels<Photo>,
     /// Number of pixels of the photo that count.
     pub valid_pixels: u64,
     /// Mask, if the view has one.
-    pub mask: Option<Arc<LabelMap>>,
+    pub mask: Option<Pixels<LabelMap>>,
     /// Ids of the objects in the mask, sorted.
     pub objects: Vec<u16>,
     /// The mask in the layout of the device, one word per pixel, row-major; empty without a mask.
-    pub view_labels: Vec<u32>,
+    pub view_labels: Pixels<Vec<u32>>,
     /// Light and area of each object, by id.
     pub shown: BTreeMap<u16, Shown>,
     /// Occluders of each object in this view.
     pub occluders: Occluders,
 }
 
-impl TrainView {
-    /// Returns the view at a share of its size, without its mask.
-    pub fn shrunk(&self, share: f64) -> Self {
-        let camera = self.camera.shrunk(share);
-        let photo = shrink_photo(&self.photo, camera.width, camera.height);
-        Self {
-            name: self.name.clone(),
-            near: self.near,
-            finest: self.finest,
-            camera,
-            valid_pixels: valid_pixels(&photo),
-            photo: Arc::new(photo),
-            mask: None,
-            objects: Vec::new(),
-            view_labels: Vec::new(),
-            shown: BTreeMap::new(),
-            occluders: Occluders::new(),
-        }
-    }
+/// A view as a step uses it: at the size of the step.
+#[derive(Clone, Copy, Debug)]
+pub struct StepView<'a> {
+    /// Camera.
+    pub camera: &'a Camera,
+    /// Near plane, world units.
+    pub near: f32,
+    /// Least standard deviation of Gaussians at depth 1, world units.
+    pub finest: f32,
+    /// Photo.
+    pub photo: &'a Photo,
+    /// Number of pixels of the photo that count.
+    pub valid_pixels: u64,
+    /// The mask in the layout of the device; empty without a mask.
+    pub view_labels: &'a [u32],
+    /// Light and area of each object, by id.
+    pub shown: &'a BTreeMap<u16, Shown>,
+    /// Occluders of each object.
+    pub occluders: &'a Occluders,
 }
 
 /// Returns the least standard deviation of Gaussians at depth 1 that a photo can show.
@@ -104,7 +102,7 @@ pub(crate) fn shown_objects(photo: &Photo, view_labels: &[u32]) -> BTreeMap<u16,
 
 /// Returns the weights of the layers of a step: 1, or proportional to 1 / sqrt(area). An object of the mean area then
 /// has weight 1; [`WEIGHT_MAX`] is the upper bound.
-pub(crate) fn layer_weights(input: &StepInput, view: &TrainView, config: &TrainConfig) -> Vec<f32> {
+pub(crate) fn layer_weights(input: &StepInput, view: StepView, config: &TrainConfig) -> Vec<f32> {
     let areas: Vec<f64> =
         input.layers.iter().map(|label| view.shown.get(label).map_or(0.0, |shown| shown.pixels as f64)).collect();
     let mean = areas.iter().sum::<f64>() / areas.len().max(1) as f64;
@@ -113,7 +111,7 @@ pub(crate) fn layer_weights(input: &StepInput, view: &TrainView, config: &TrainC
 }
 
 /// Returns the weighted label loss of a step from the sums of the device.
-pub fn label_loss(input: &StepInput, view: &TrainView, config: &TrainConfig, loss_label: f32) -> f64 {
+pub fn label_loss(input: &StepInput, view: StepView, config: &TrainConfig, loss_label: f32) -> f64 {
     if input.layers.is_empty() {
         return f64::from(loss_label);
     }
@@ -169,12 +167,12 @@ pub struct SceneScale {
 
 pub(crate) fn uniforms(
     input: &StepInput,
-    view: &TrainView,
+    view: StepView,
     config: &TrainConfig,
     fixed: SceneScale,
     engine: &Engine,
 ) -> StepUniforms {
-    let base = engine.view_uniforms(&view.camera, view.near, config.background);
+    let base = engine.view_uniforms(view.camera, view.near, config.background);
     let rates = config.rates_at(input.step);
     let rate = (rates.position * fixed.extent) as f32;
     let correction = |beta: f32| (1.0 / (1.0 - f64::from(beta).powi(input.updates.max(1) as i32))) as f32;
@@ -204,7 +202,7 @@ pub(crate) fn uniforms(
 /// Returns the buffers of a step for the device.
 pub(crate) fn train_input<'a>(
     input: &StepInput,
-    view: &'a TrainView,
+    view: StepView<'a>,
     config: &TrainConfig,
     uniforms: StepUniforms,
     engine: &Engine,
@@ -213,7 +211,7 @@ pub(crate) fn train_input<'a>(
     let (disagrees, layered) = if input.layers.is_empty() { (room, None) } else { (None, room) };
     let disagreement = disagrees.map(|room| {
         let trust = vec![1.0; room.max_label as usize + 1];
-        DisagreementInput { view_labels: &view.view_labels, trust }
+        DisagreementInput { view_labels: view.view_labels, trust }
     });
     let layers = layered.map(|room| {
         let words = uniforms.occluder_words as usize;
@@ -230,7 +228,7 @@ pub(crate) fn train_input<'a>(
                 occluders[layer * words + usize::from(occluder / 32)] |= 1 << (occluder % 32);
             }
         }
-        LayerInput { view_labels: &view.view_labels, layer_from_label, label_from_layer, weights, occluders }
+        LayerInput { view_labels: view.view_labels, layer_from_label, label_from_layer, weights, occluders }
     });
     TrainInput { uniforms, photo: &view.photo.rgba, layers, disagreement, shared: Vec::new() }
 }

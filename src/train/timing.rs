@@ -48,7 +48,7 @@ impl Trainer {
         self.engine.time_items()?;
         self.keep_times();
         for step in self.step - count.min(self.step)..self.step {
-            let input = self.input(step + 1);
+            let input = self.input(step + 1)?;
             self.submit_next(input)?;
         }
         self.drain()?;

@@ -1,22 +1,33 @@
 //! The training views, at the size of each step.
 
-use super::step_input::{StepInput, TrainView};
+use super::ahead::{Ahead, Ready, Wanted};
+use super::step_input::{Shown, StepInput, StepView, TrainView};
 use super::{TrainConfig, free_space, poses};
-use crate::scene::Camera;
+use crate::error::{Error, Result};
 use crate::scene::camera::side_at;
+use crate::scene::{Camera, Occluders};
 use crate::scheduler::plan::FRAMES_IN_FLIGHT;
 use std::collections::BTreeMap;
 use std::ops::{Deref, DerefMut};
+use std::sync::Arc;
 
 /// Number of sizes below the full one.
 const SIZES: u32 = 8;
+
+/// A smaller view has no mask.
+static NOTHING_SHOWN: BTreeMap<u16, Shown> = BTreeMap::new();
+static NO_OCCLUDERS: Occluders = Occluders::new();
 
 /// The training views. As a slice, those at full size.
 #[derive(Debug)]
 pub(super) struct Views {
     whole: Vec<TrainView>,
-    /// Shrunk views that steps in flight use, by size and view.
-    shrunk: BTreeMap<(u32, usize), TrainView>,
+    /// Shrunk photos of those in memory, by size and view, until no step in flight uses the size.
+    shrunk: BTreeMap<(u32, usize), Arc<Ready>>,
+    /// Pixels of the steps in flight.
+    ready: BTreeMap<u32, Arc<Ready>>,
+    /// Pixels of the next steps, if they are not in memory.
+    ahead: Ahead,
     /// Other views of each view, with free space on the way; empty without pruning of fog.
     partners: Vec<Vec<usize>>,
     free_space: bool,
@@ -30,9 +41,12 @@ impl Views {
     /// Makes the views of a training.
     pub(super) fn new(whole: Vec<TrainView>, config: &TrainConfig) -> Self {
         let (start, full_from) = (f64::from(config.start_size.unwrap_or(1.0)), config.full_size_from());
+        let ahead = Ahead::new(&whole, config.iterations);
         Self {
             whole,
             shrunk: BTreeMap::new(),
+            ready: BTreeMap::new(),
+            ahead,
             partners: Vec::new(),
             free_space: config.free_space,
             refined: Vec::new(),
@@ -92,21 +106,72 @@ impl Views {
         (side_at(full.0, share), side_at(full.1, share))
     }
 
-    /// Makes the view of a step at the size of the step.
-    pub(super) fn prepare(&mut self, step: u32, view: usize) {
-        let size = self.size_at(step);
-        // Steps in flight still use their sizes.
-        let oldest = self.size_at(step.saturating_sub(FRAMES_IN_FLIGHT as u32));
-        self.shrunk.retain(|&(kept, _), _| kept >= oldest);
-        if size < SIZES && !self.shrunk.contains_key(&(size, view)) {
-            let shrunk = self.whole[view].shrunk(self.share_at(step));
-            self.shrunk.insert((size, view), shrunk);
+    /// Gets the pixels of a step at the size of the step, and has those of `next`, the views of the steps after it, made
+    /// meanwhile.
+    pub(super) fn prepare(&mut self, step: u32, view: usize, next: &[usize]) -> Result<()> {
+        // Steps in flight still use their pixels and sizes.
+        let oldest = step.saturating_sub(FRAMES_IN_FLIGHT as u32);
+        let oldest_size = self.size_at(oldest);
+        self.ready.retain(|&kept, _| kept >= oldest && kept < step);
+        self.shrunk.retain(|&(kept, _), _| kept >= oldest_size);
+        let key = (self.size_at(step), view);
+        let ready = match self.shrunk.get(&key) {
+            Some(ready) => Arc::clone(ready),
+            None => {
+                let wanted = self.wanted(step, view);
+                Arc::new(self.ahead.take(wanted)?)
+            }
+        };
+        if key.0 < SIZES && self.whole[view].photo.is_held() {
+            self.shrunk.insert(key, Arc::clone(&ready));
         }
+        self.ready.insert(step, ready);
+        for (step, &view) in (step + 1..).zip(next) {
+            if !self.whole[view].photo.is_held() {
+                let wanted = self.wanted(step, view);
+                self.ahead.begin(wanted);
+            }
+        }
+        Ok(())
+    }
+
+    /// Number of steps whose pixels are made ahead.
+    pub(super) fn steps_ahead(&self) -> usize {
+        self.ahead.steps()
+    }
+
+    fn wanted(&self, step: u32, view: usize) -> Wanted {
+        let share = (self.size_at(step) < SIZES).then(|| self.share_at(step));
+        Wanted::new(step, (view, &self.whole[view]), share)
     }
 
     /// Returns the view of a step at the size of the step, which [`Self::prepare`] has made.
-    pub(super) fn of(&self, input: &StepInput) -> &TrainView {
-        self.shrunk.get(&(self.size_at(input.step), input.view)).unwrap_or(&self.whole[input.view])
+    pub(super) fn of(&self, input: &StepInput) -> Result<StepView<'_>> {
+        let missing = || Error::Bug(format!("step {} came without its pixels", input.step));
+        let (whole, ready) = (&self.whole[input.view], self.ready.get(&input.step).ok_or_else(missing)?);
+        let (photo, view_labels) = (&*ready.photo, ready.view_labels.as_slice());
+        Ok(match &ready.small {
+            Some((camera, valid_pixels)) => StepView {
+                camera,
+                near: whole.near,
+                finest: whole.finest,
+                photo,
+                valid_pixels: *valid_pixels,
+                view_labels,
+                shown: &NOTHING_SHOWN,
+                occluders: &NO_OCCLUDERS,
+            },
+            None => StepView {
+                camera: &whole.camera,
+                near: whole.near,
+                finest: whole.finest,
+                photo,
+                valid_pixels: whole.valid_pixels,
+                view_labels,
+                shown: &whole.shown,
+                occluders: &whole.occluders,
+            },
+        })
     }
 }
 

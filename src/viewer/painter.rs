@@ -1,14 +1,14 @@
 //! Draws frames and answers picks, for a finished model and for one in training alike.
 
 use super::hub::{ClientId, Hub};
-use super::message::{Frame, Look, PIXELS_MAX, Viewpoint};
+use super::message::{Frame, Look, PIXELS_MAX, Pane, Viewpoint};
 use super::pace::Pace;
 use super::pictures::{self, Beside};
 use super::views::{Posed, Score, Views};
 use crate::error::{Error, Result};
 use crate::io::camera_json::camera_of;
 use crate::render::{Parts, Rendered};
-use crate::scene::{Camera, View};
+use crate::scene::{Camera, Pixels, View};
 use serde_json::json;
 use std::path::Path;
 use std::sync::Arc;
@@ -73,8 +73,9 @@ impl Painter {
         let mut parts = pictures::parts(&look.panes);
         parts.labels |= !look.mark.is_empty();
         let rendered = source.render(&camera, parts)?;
-        let photo = posed.and_then(|posed| posed.photo.as_deref());
-        let beside = Beside { confidence: source.confidence(), photo };
+        let compares = look.panes.contains(&Pane::Error);
+        let photo = posed.and_then(|posed| posed.photo.as_ref()).filter(|_| compares).map(Pixels::get).transpose()?;
+        let beside = Beside { confidence: source.confidence(), photo: photo.as_deref() };
         let encode = |&pane| pictures::encode(pane, &rendered, beside, is_lossy);
         let mut encoded = look.panes.iter().map(encode).collect::<Result<Vec<_>>>()?;
         if !look.mark.is_empty() {
@@ -144,7 +145,7 @@ impl Painter {
     pub(super) fn score(&self, index: usize, source: &mut dyn Source) -> Result<Score> {
         let posed: &Posed = self.views.get(index)?;
         let parts = if posed.view.mask.is_some() { Parts::LABELS } else { Parts::COLOUR };
-        Ok(Score::new(posed, &source.render(&posed.view.camera, parts)?))
+        Score::new(posed, &source.render(&posed.view.camera, parts)?)
     }
 }
 

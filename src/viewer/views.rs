@@ -6,7 +6,7 @@ use crate::io::camera_json::CameraFile;
 use crate::io::image::{jpeg_rgb8, png_rgb8};
 use crate::io::resample::{bounded_size, shrink_photo};
 use crate::render::Rendered;
-use crate::scene::{Dataset, Overview, View};
+use crate::scene::{Dataset, Overview, Pixels, View};
 use serde_json::{Value, json};
 
 /// Longest side of a thumbnail, px.
@@ -69,28 +69,29 @@ impl Views {
 
     /// Returns the photo of a view, or its thumbnail, with the type of the file.
     pub(super) fn picture(&self, index: usize, is_small: bool) -> Option<(&'static str, Vec<u8>)> {
-        let photo = self.list.get(index)?.view.photo.as_ref()?;
+        let photo = self.list.get(index)?.view.photo.as_ref()?.get();
+        let photo = photo.inspect_err(|error| tracing::warn!("{error}")).ok()?;
         let size = (photo.width, photo.height);
         if !is_small {
             return Some(("image/png", png_rgb8(size, &photo.rgb()).ok()?));
         }
         let small = bounded_size(size, Some(THUMB));
-        let pixels = shrink_photo(photo, small.0, small.1).rgb();
+        let pixels = shrink_photo(&photo, small.0, small.1).rgb();
         Some(("image/jpeg", jpeg_rgb8(small, &pixels, THUMB_QUALITY).ok()?))
     }
 }
 
 impl Score {
     /// Scores a render of a view in full size: PSNR, and the mean IoU of the objects of its mask.
-    pub(super) fn new(posed: &Posed, rendered: &Rendered) -> Self {
-        let photo = posed.view.photo.as_deref();
+    pub(super) fn new(posed: &Posed, rendered: &Rendered) -> Result<Self> {
+        let photo = posed.view.photo.as_ref().map(Pixels::get).transpose()?;
         // Before the first labels of a training there is nothing to compare.
         let is_labelled = rendered.labels.iter().any(|&id| id != 0);
-        let mask = posed.view.mask.as_deref().filter(|mask| is_labelled && mask.ids.len() == rendered.labels.len());
-        Self {
-            psnr: photo.map(|photo| psnr(&rendered.rgb, photo)).filter(|value| value.is_finite()),
-            iou: mask.and_then(|mask| label_iou(&rendered.labels, mask)),
-        }
+        let mask = posed.view.mask()?.filter(|mask| is_labelled && mask.ids.len() == rendered.labels.len());
+        Ok(Self {
+            psnr: photo.map(|photo| psnr(&rendered.rgb, &photo)).filter(|value| value.is_finite()),
+            iou: mask.and_then(|mask| label_iou(&rendered.labels, &mask)),
+        })
     }
 }
 

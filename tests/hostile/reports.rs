@@ -84,7 +84,7 @@ fn a_photo_a_pixel_off_its_camera_is_used() {
         let options = LoadOptions { masks, test_every: None, ..LoadOptions::default() };
         let dataset = io::open(scene.path(), &options).expect("a scene");
         let view = &dataset.train[0];
-        let (camera, mask) = (&view.camera, view.mask.as_ref().expect("a mask"));
+        let (camera, mask) = (&view.camera, view.mask().expect("read").expect("a mask"));
         assert_eq!((camera.width, camera.height, mask.width, mask.height), (width, height, width, height));
         assert!((camera.fx - 900.0 * f64::from(width) / 1039.0).abs() < 1e-9);
         assert!(mask.ids.iter().all(|&id| id == 7));

@@ -9,7 +9,6 @@ use labelgs::run::TrainConfig;
 use labelgs::scene::{Camera, Dataset, LabelMap, Photo, View};
 use labelgs::synth::{Preset, SynthOptions, dataset};
 use std::path::Path;
-use std::sync::Arc;
 
 /// Four views of 40 x 30 px with masks.
 fn scene() -> Dataset {
@@ -127,7 +126,10 @@ fn masks_of_every_kind_train() {
     let with = |change: &dyn Fn(usize, &mut LabelMap)| {
         let mut scene = scene();
         let masks = scene.train.iter_mut().enumerate();
-        masks.for_each(|(index, view)| change(index, Arc::make_mut(view.mask.as_mut().expect("a mask"))));
+        masks.for_each(|(index, view)| {
+            let mask = view.mask.as_mut().expect("a mask");
+            mask.edit(|mask| change(index, mask)).expect("in memory");
+        });
         scene
     };
     trains(
@@ -154,7 +156,7 @@ fn tiny(width: u32, height: u32) -> Dataset {
         let photo = Photo { width, height, rgba: vec![[90, 120, 30, 255]; pixels] };
         let mask = LabelMap { width, height, ids: (0..pixels).map(|pixel| (pixel % 3) as u16).collect() };
         assert!(camera.cx > 0.0 && old.width > width);
-        *view = View { name: view.name.clone(), camera, photo: Some(Arc::new(photo)), mask: Some(Arc::new(mask)) };
+        *view = View { name: view.name.clone(), camera, photo: Some(photo.into()), mask: Some(mask.into()) };
     }
     scene
 }

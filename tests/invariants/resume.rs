@@ -14,7 +14,6 @@ use labelgs::io::write_model;
 use labelgs::run::{LabelRule, StrategyKind, TrainConfig};
 use labelgs::scene::Dataset;
 use std::path::Path;
-use std::sync::Arc;
 
 /// Densification, opacity resets, votes and occluder updates before and after step 30, all at different steps.
 fn long(rule: LabelRule) -> TrainConfig {
@@ -165,12 +164,18 @@ fn another_scene_is_refused_with_what_differs() {
     refusal(&|dataset| dataset.train[1].name = "other.png".into(), 3, &["other.png", "in the place of"]);
     refusal(&|dataset| dataset.train[2].camera.fx += 1e-9, 3, &["another camera"]);
     refusal(
-        &|dataset| Arc::make_mut(dataset.train[3].photo.as_mut().expect("a photo")).rgba[5][1] ^= 1,
+        &|dataset| {
+            let photo = dataset.train[3].photo.as_mut().expect("a photo");
+            photo.edit(|photo| photo.rgba[5][1] ^= 1).expect("in memory");
+        },
         3,
         &["another photo"],
     );
     refusal(
-        &|dataset| Arc::make_mut(dataset.train[4].mask.as_mut().expect("a mask")).ids[9] ^= 1,
+        &|dataset| {
+            let mask = dataset.train[4].mask.as_mut().expect("a mask");
+            mask.edit(|mask| mask.ids[9] ^= 1).expect("in memory");
+        },
         3,
         &["another mask"],
     );

@@ -171,12 +171,12 @@ fn maps_are_undistorted_as_masks_are() {
     let masks = Some(scene.path().join("masks"));
     let options = LoadOptions { masks, test_every: None, ..LoadOptions::default() };
     let dataset = io::open(scene.path(), &options).expect("a scene");
-    let ids = &dataset.train[0].mask.as_ref().expect("a mask").ids;
+    let ids = dataset.train[0].mask().expect("read").expect("a mask").ids.clone();
     let found = read(&scene).expect("a map").values;
     assert!(found.iter().any(|depth| depth.is_nan()), "the lens leaves pixels without a source");
     let moved = |(index, depth): (usize, &f32)| !depth.is_nan() && *depth != value(index);
     assert!(found.iter().enumerate().any(moved), "the lens moves pixels");
-    for (&depth, &id) in found.iter().zip(ids) {
+    for (&depth, &id) in found.iter().zip(&ids) {
         assert!(if id == 0 { depth.is_nan() } else { depth == f32::from(id) }, "{depth} and {id}");
     }
 }

@@ -197,7 +197,7 @@ fn far_gaussians_stand_where_photos_look_past_the_points() {
     scene.points = grid(0.05).chain(grid(0.2)).collect();
     let first = initial_gaussians(&scene, 0, 10).expect("Gaussians");
     let mut model = first.clone();
-    add_far_gaussians(&mut model, &scene, 2000);
+    add_far_gaussians(&mut model, &scene, 2000).expect("photos");
     let added = model.len() - first.len();
     assert!(added > 20 && model.means[..first.len()] == first.means[..], "{added} far Gaussians");
     model.check().expect("a sound model");
@@ -209,6 +209,6 @@ fn far_gaussians_stand_where_photos_look_past_the_points() {
         assert!((colour[2] - 200.0 / 255.0).abs() < 0.01 && colour[0] < 0.2, "{colour:?}");
     }
     let mut none = first.clone();
-    add_far_gaussians(&mut none, &scene, 0);
+    add_far_gaussians(&mut none, &scene, 0).expect("photos");
     assert_eq!(none, first);
 }

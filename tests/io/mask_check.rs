@@ -29,7 +29,7 @@ static MADE: LazyLock<Dataset> = LazyLock::new(|| {
 fn made() -> (TempDir, &'static Dataset) {
     let folder = tempfile::tempdir().expect("folder");
     for view in MADE.all() {
-        let map = view.mask.as_ref().expect("a mask");
+        let map = view.mask().expect("read").expect("a mask");
         let ids: Vec<u8> = map.ids.iter().map(|&id| id as u8).collect();
         write_png_grey8(folder.path().join("masks").join(&view.name), map.width, map.height, &ids).expect("written");
     }

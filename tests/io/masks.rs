@@ -78,7 +78,9 @@ fn masks_are_found_by_every_naming() {
         );
     }
     let dataset = open(&scene, None).expect("a scene");
-    let id = |name: &str| dataset.train.iter().find(|v| v.name == name).and_then(|v| v.mask.as_ref()).map(|m| m.ids[0]);
+    let id = |name: &str| {
+        dataset.train.iter().find(|v| v.name == name).and_then(|v| v.mask().expect("read")).map(|m| m.ids[0])
+    };
     assert_eq!(names.map(id), [Some(1), Some(2), Some(3), Some(4), Some(5), None]);
     assert!(dataset.notes.iter().any(|note| note.contains("1 of 6 photos have no mask: right/e.png")));
     fs::remove_dir_all(scene.path().join("masks")).expect("removed");
@@ -95,7 +97,7 @@ fn other_sizes_are_scaled_by_nearest_id() {
     png(&path, (24, 16), png::ColorType::Grayscale, png::BitDepth::Eight, &ids);
     for (bound, size) in [(None, (12, 8)), (Some(6), (6, 4)), (Some(5), (5, 3))] {
         let dataset = open(&scene, bound).expect("a scene");
-        let mask = dataset.train[0].mask.as_ref().expect("a mask");
+        let mask = dataset.train[0].mask().expect("read").expect("a mask");
         assert_eq!((mask.width, mask.height), size);
         assert_eq!(mask.objects(), [7, 200]);
         assert!((0..size.1).all(|y| mask.at(0, y) == 7 && mask.at(size.0 - 1, y) == 200));
@@ -111,7 +113,7 @@ fn ids_shrink_with_the_photo() {
     let ids: Vec<u8> = (0..96).map(|index| (index % 12) as u8).collect();
     png(&scene.at("masks/00.png"), (12, 8), png::ColorType::Grayscale, png::BitDepth::Eight, &ids);
     let dataset = open(&scene, Some(4)).expect("a scene");
-    let mask = dataset.train[0].mask.as_ref().expect("a mask");
+    let mask = dataset.train[0].mask().expect("read").expect("a mask");
     // The pixel under the centre of each target pixel: 1.5, 4.5, 7.5 and 10.5 px from the left.
     assert_eq!(mask.ids[..4], [1, 4, 7, 10]);
 }
@@ -127,7 +129,7 @@ fn ignored_pixels_have_no_weight() {
     };
     let dataset = open(&scene).expect("a scene");
     let alphas = |view: usize| {
-        let photo = dataset.train[view].photo.as_ref().expect("a photo");
+        let photo = dataset.train[view].photo().expect("a photo");
         photo.rgba.iter().map(|texel| texel[3]).collect::<Vec<u8>>()
     };
     assert!(alphas(0).iter().enumerate().all(|(at, &alpha)| alpha == if at % 12 < 6 { 0 } else { 255 }));
@@ -136,7 +138,7 @@ fn ignored_pixels_have_no_weight() {
     let fisheye = ColmapCamera { model: 15, name: "FISHEYE", size: (12, 8), parameters: vec![10.0, 10.0, 6.0, 4.0] };
     scene.colmap_bin("sparse/0", &[fisheye], &["00.png", "01.png"]);
     let bent = open(&scene).expect("a scene");
-    let photo = bent.train[0].photo.as_ref().expect("a photo");
+    let photo = bent.train[0].photo().expect("a photo");
     let left = photo.rgba.iter().enumerate().filter(|(at, _)| (at % photo.width as usize) < photo.width as usize / 2);
     assert!(left.into_iter().all(|(_, texel)| *texel == [0; 4]) && photo.rgba.iter().any(|texel| texel[3] == 255));
     png(&scene.at("ignore/00.png"), (6, 8), png::ColorType::Grayscale, png::BitDepth::Eight, &[0; 48]);

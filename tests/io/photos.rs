@@ -67,7 +67,7 @@ fn the_longest_side_is_bounded_by_one_rounding_rule() {
         scene.colmap_bin("sparse/0", &[camera], &["a.png"]);
         scene.photo("images/a.png", width, height);
         let dataset = open(&scene, Some(bound)).expect("a scene");
-        let (camera, photo) = (&dataset.train[0].camera, dataset.train[0].photo.as_ref().expect("a photo"));
+        let (camera, photo) = (&dataset.train[0].camera, dataset.train[0].photo().expect("a photo"));
         assert_eq!((camera.width, camera.height), expected);
         assert_eq!((photo.width, photo.height), expected);
         assert_eq!(photo.rgba.len() as u32, expected.0 * expected.1);
@@ -99,7 +99,7 @@ fn shrinking_averages_the_exact_box() {
     let full = read_photo(scene.path().join("images/00.png"), [0.0; 3]).expect("a photo");
     for bound in [11, 7, 5, 1] {
         let dataset = open(&scene, Some(bound)).expect("a scene");
-        let photo = dataset.train[0].photo.as_ref().expect("a photo");
+        let photo = dataset.train[0].photo().expect("a photo");
         for y in 0..photo.height {
             for x in 0..photo.width {
                 let expected = box_mean(&full, x, y, (photo.width, photo.height));
@@ -159,8 +159,8 @@ fn undistortion_samples_where_the_model_says() {
         let dataset = io::open(scene.path(), &LoadOptions { masks, test_every: None, ..LoadOptions::default() })
             .expect("a scene");
         let view = &dataset.train[0];
-        let (camera, photo) = (&view.camera, view.photo.as_ref().expect("a photo"));
-        let mask = view.mask.as_ref().expect("a mask");
+        let (camera, photo) = (&view.camera, view.photo().expect("a photo"));
+        let mask = view.mask().expect("read").expect("a mask");
         let lens = Polynomial {
             numerator: [k[0], k[1], 0.0, 0.0],
             denominator: [0.0; 3],
@@ -199,7 +199,7 @@ fn undistortion_samples_where_the_model_says() {
 fn pixels_without_source_stay_out_when_shrunk() {
     let scene = distorted([0.3, 0.0, 0.0, 0.0], (200, 150));
     let dataset = open(&scene, Some(50)).expect("a scene");
-    let photo = dataset.train[0].photo.as_ref().expect("a photo");
+    let photo = dataset.train[0].photo().expect("a photo");
     let alphas: Vec<u8> = photo.rgba.iter().map(|texel| texel[3]).collect();
     assert_eq!((alphas[0], alphas[25 * 50 / 2 + 18 * 50]), (0, 255));
     // No black of missing sources is mixed into the colours: blue is 200 wherever there is any.

@@ -37,7 +37,7 @@ fn blender_uses_the_given_split_and_blends_alpha() {
     let focal = 2.0 / 0.5f64.tan();
     assert!((view.camera.fx - focal).abs() < 1e-12 && (view.camera.fy - focal).abs() < 1e-12);
     assert_eq!((view.camera.cx, view.camera.cy), (2.0, 2.0));
-    let photo = view.photo.as_ref().expect("a photo");
+    let photo = view.photo().expect("a photo");
     assert_eq!(photo.rgba[0], [255, 255, 0, 255]);
     let half = |c: f64, b: f64| (c * 128.0 / 255.0 + b * 127.0 / 255.0).round() as u8;
     assert_eq!(photo.rgba[1], [half(200.0, 255.0), half(100.0, 255.0), half(50.0, 0.0), 255]);

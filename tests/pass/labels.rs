@@ -36,7 +36,7 @@ fn label_loss_of_a_step_equals_its_mirror() {
     let (splats, size, labels, slots) = (fixture.splats(), fixture.size(), fixture.model().labels, fixture.slots());
     let target = fixture.scene.target.clone();
     assert!(target.slots.iter().any(|slot| !slot.occluders.is_empty()));
-    let actual = step_input::label_loss(&fixture.input, &fixture.view, &fixture.config, counters.loss_label);
+    let actual = step_input::label_loss(&fixture.input, fixture.view.of_step(), &fixture.config, counters.loss_label);
     assert!(target.slots.iter().any(|slot| slot.weight != 1.0), "objects of different sizes weigh differently");
     prove("label loss", &["label_weight", "label_alpha"], |rules| {
         let layers = blend_layers_forward(rules, &splats, &labels, &slots, size, target.background);
@@ -202,7 +202,7 @@ fn label_loss_of_an_empty_object_is_its_masked_photo_without_gradient() {
     fixture.config.label_alpha = 0.0;
     let counters = fixture.train().counters;
     assert_eq!((counters.loss_label, counters.layer_tile_count), (0.0, 0));
-    let loss = step_input::label_loss(&fixture.input, &fixture.view, &fixture.config, counters.loss_label);
+    let loss = step_input::label_loss(&fixture.input, fixture.view.of_step(), &fixture.config, counters.loss_label);
     check("loss", close(&[loss], &[expected], Tolerance { absolute: 1e-7, relative: 0.0 }));
     let with: Vec<u32> = fixture.get(Buf::V_SPLATS, 12);
     fixture.config.label_weight = 1e6;
@@ -222,7 +222,7 @@ fn label_loss_of_a_correct_object_is_0() {
     let mut fixture = Fixture::new(turn, drawn(&[row], vec![7], SIDE, SIDE, vec![7; 289]), true);
     fixture.config.label_alpha = 0.0; // it is half transparent
     let counters = fixture.train().counters;
-    let loss = step_input::label_loss(&fixture.input, &fixture.view, &fixture.config, counters.loss_label);
+    let loss = step_input::label_loss(&fixture.input, fixture.view.of_step(), &fixture.config, counters.loss_label);
     check("loss", close(&[loss], &[0.0], Tolerance { absolute: 1e-5, relative: 0.0 }));
 }
 

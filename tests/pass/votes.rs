@@ -36,10 +36,11 @@ fn vote_sums_equal_the_mirror() {
     fixture.render();
     let (splats, size, count) = (fixture.splats(), fixture.size(), fixture.scene.gaussians.len());
     let mask = mask_of(&fixture.scene);
-    let photo: Photo = (*fixture.view.photo).clone();
+    let photo: Photo = fixture.view.photo.clone();
     let camera = fixture.scene.camera.clone();
     let trust = BTreeMap::from([(3_u16, 0.25_f32), (8, 0.0)]);
-    let voter = Voter { camera: &camera, mask: &mask, photo: Some(&photo), trust: Some(&trust) };
+    let voter =
+        Voter { camera: &camera, mask: &mask.clone().into(), photo: Some(&photo.clone().into()), trust: Some(&trust) };
     // Three views that are the same: thrice the votes.
     let how = Sweep { near: fixture.config.near, border: 0, alone: false };
     let ballot = sweep(&mut fixture.engine, &[voter, voter, voter], how).expect("votes");
@@ -66,7 +67,7 @@ fn votes_alone_equal_the_mirror() {
     fixture.render();
     let (splats, size, count) = (fixture.splats(), fixture.size(), fixture.scene.gaussians.len());
     let (mask, camera) = (mask_of(&fixture.scene), fixture.scene.camera.clone());
-    let voter = Voter { camera: &camera, mask: &mask, photo: None, trust: None };
+    let voter = Voter { camera: &camera, mask: &mask.clone().into(), photo: None, trust: None };
     let how = Sweep { near: fixture.config.near, border: 0, alone: true };
     let ballot = sweep(&mut fixture.engine, &[voter], how).expect("votes");
     let column = |id: &u16| ballot.labels.iter().position(|label| label == id);
@@ -112,7 +113,7 @@ fn pixels_near_a_contour_do_not_vote() {
     let width = mask.width as usize;
     mask.ids.iter_mut().enumerate().for_each(|(index, id)| *id = if index % width < 20 { 2 } else { 0 });
     let camera = fixture.scene.camera.clone();
-    let voter = Voter { camera: &camera, mask: &mask, photo: None, trust: None };
+    let voter = Voter { camera: &camera, mask: &mask.clone().into(), photo: None, trust: None };
     let how = Sweep { near: fixture.config.near, border: 2, alone: false };
     let ballot = sweep(&mut fixture.engine, &[voter], how).expect("votes");
     let actual = ballot.weights();
@@ -139,7 +140,7 @@ fn one_sweep_of_many_labels_equals_many_sweeps() {
     let how = Sweep { near: 0.2, border: 0, alone: false };
     let [few, many] = [3, 400].map(|columns| {
         let mut engine = vote_engine(turn.gpu(), &scene.gaussians, &[&view], columns).expect("the engine starts");
-        sweep(&mut engine, &[Voter::of(&view, &mask)], how).expect("votes")
+        sweep(&mut engine, &[Voter::of(&view, &mask.clone().into())], how).expect("votes")
     });
     assert!(many.labels.len() > 150, "{} labels", many.labels.len());
     assert!((0..many.len()).any(|row| many.row(row).len() > 64), "a Gaussian meets many labels");

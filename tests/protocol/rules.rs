@@ -108,7 +108,7 @@ fn the_page_shows_each_picture_and_needs_no_network() {
     let folder = tempdir().expect("folder");
     let place = folder.path().join("page");
     let view = view("a.jpg");
-    let photo = view.photo.as_ref().expect("a photo");
+    let photo = view.photo().expect("a photo");
     let mut page = Page::new(&place).expect("a folder");
     let (found, truth) =
         ([[true; 32], [false; 32]].concat(), [[true; 16], [false; 16], [true; 16], [false; 16]].concat());
@@ -118,10 +118,10 @@ fn the_page_shows_each_picture_and_needs_no_network() {
         masks: Some((&found, &truth)),
         numbers: vec![("iou", Some(0.25)), ("psnr", None)],
         note: "nothing \"chosen\"".into(),
-        ..Compared::new("a", photo, &rgb)
+        ..Compared::new("a", &photo, &rgb)
     };
     page.see(&picture).expect("written");
-    page.see(&Compared::new("b", photo, &rgb)).expect("written");
+    page.see(&Compared::new("b", &photo, &rgb)).expect("written");
     let index = page.finish("mean <1>").expect("written");
     let html = std::fs::read_to_string(index).expect("HTML");
     assert!(

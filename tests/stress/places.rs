@@ -38,7 +38,7 @@ fn scene(scale: f64, offset: DVec3) -> Dataset {
 
 fn psnr(engine: &mut Engine, near: f32, view: &View) -> f64 {
     let rendered = render(engine, &view.camera, &RenderOptions::new(near, Parts::COLOUR)).expect("a picture");
-    let photo = view.photo.as_ref().expect("a photo");
+    let photo = view.photo().expect("a photo");
     let squares = rendered.rgb.iter().zip(&photo.rgba).flat_map(|(found, photo)| {
         (0..3).map(|c| (f64::from(found[c]).clamp(0.0, 1.0) - f64::from(photo[c]) / 255.0).powi(2)).collect::<Vec<_>>()
     });

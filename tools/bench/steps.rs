@@ -52,13 +52,12 @@ pub fn run(common: &Common) -> Result<()> {
 /// Compares the made masks with masks that cover every pixel.
 fn by_area(gpu: &Arc<Gpu>, options: &SynthOptions, model: &Gaussians, timed: usize) -> Result<Vec<Value>> {
     let made = synth::dataset(options, TEST_EVERY);
-    let share = covered(&made);
+    let share = covered(&made)?;
     let mut whole = made.clone();
     let ground =
         1 + made.train.iter().filter_map(|view| view.mask.as_ref()).flat_map(|m| m.objects()).max().unwrap_or(0);
     for mask in whole.train.iter_mut().filter_map(|view| view.mask.as_mut()) {
-        let mask = Arc::make_mut(mask);
-        mask.ids.iter_mut().filter(|id| **id == 0).for_each(|id| *id = ground);
+        mask.edit(|mask| mask.ids.iter_mut().filter(|id| **id == 0).for_each(|id| *id = ground))?;
     }
     let paces = vec![
         Pace::new("no masks", gpu, without_masks(&made), model)?,
@@ -80,9 +79,14 @@ fn by_number(gpu: &Arc<Gpu>, options: &SynthOptions, model: &Gaussians, size: &S
 }
 
 /// Share of the pixels that belong to an object.
-fn covered(dataset: &Dataset) -> f64 {
-    let ids = || dataset.train.iter().filter_map(|view| view.mask.as_ref()).flat_map(|mask| &mask.ids);
-    ids().filter(|&&id| id != 0).count() as f64 / ids().count().max(1) as f64
+fn covered(dataset: &Dataset) -> Result<f64> {
+    let (mut of_objects, mut all) = (0, 0);
+    for mask in dataset.train.iter().filter_map(|view| view.mask.as_ref()) {
+        let mask = mask.get()?;
+        of_objects += mask.ids.iter().filter(|&&id| id != 0).count();
+        all += mask.ids.len();
+    }
+    Ok(of_objects as f64 / all.max(1) as f64)
 }
 
 /// Masks of `objects` regions of space, which together cover the model.
@@ -97,7 +101,7 @@ fn divided(gpu: &Arc<Gpu>, dataset: &Dataset, model: &Gaussians, objects: usize)
     let mut dataset = dataset.clone();
     for view in &mut dataset.train {
         let seen = render(&mut engine, &view.camera, &RenderOptions::of_main(NEAR))?;
-        view.mask = Some(Arc::new(seen.main_label_map(&labels)?));
+        view.mask = Some(seen.main_label_map(&labels)?.into());
     }
     Ok(dataset)
 }

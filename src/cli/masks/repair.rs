@@ -124,9 +124,11 @@ pub(in crate::cli) fn table(
     let known = LabelTable::of_folder(folder)?;
     let names = match &known {
         Some(known) if per_view => {
-            let pairs =
-                views.iter().zip(masks).filter_map(|(view, mask)| Some((view.mask.as_deref()?, mask.as_ref()?)));
-            carried(known, pairs)
+            let mut pairs = Vec::new();
+            for (view, mask) in views.iter().zip(masks) {
+                pairs.extend(view.mask()?.zip(mask.as_ref()));
+            }
+            carried(known, pairs.iter().map(|(before, after)| (&**before, *after)))
         }
         _ => BTreeMap::new(),
     };

@@ -17,6 +17,7 @@ use clap::Args;
 use serde_json::json;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// `labelgs occlusion`.
 #[derive(Args, Clone, Debug)]
@@ -94,7 +95,7 @@ fn from_model(path: &Path, views: &[&View], context: &Context) -> Result<BTreeMa
     let mut found = BTreeMap::new();
     for view in views {
         let rendered = render(&mut engine, &view.camera, &RenderOptions::new(near, Parts::DEPTH))?;
-        found.insert(view.name.clone(), by_contour(mask(view)?, &rendered.mean_depth()?, Rule::default()));
+        found.insert(view.name.clone(), by_contour(&*mask(view)?, &rendered.mean_depth()?, Rule::default()));
         progress.set(found.len() as u64, String::new);
     }
     Ok(found)
@@ -102,10 +103,10 @@ fn from_model(path: &Path, views: &[&View], context: &Context) -> Result<BTreeMa
 
 fn draw(folder: &Path, (view, stem): (&View, &str), table: &OcclusionTable) -> Result<()> {
     let (mask, none) = (mask(view)?, Occluders::new());
-    let pixels = picture(mask, table.views.get(&view.name).unwrap_or(&none));
+    let pixels = picture(&mask, table.views.get(&view.name).unwrap_or(&none));
     write_png_rgb8(folder.join(format!("{stem}.png")), mask.width, mask.height, &pixels)
 }
 
-fn mask(view: &View) -> Result<&LabelMap> {
-    view.mask.as_deref().ok_or_else(|| Error::Bug(format!("{} came without its mask", view.name)))
+fn mask(view: &View) -> Result<Arc<LabelMap>> {
+    view.mask()?.ok_or_else(|| Error::Bug(format!("{} came without its mask", view.name)))
 }

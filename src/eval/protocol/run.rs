@@ -6,7 +6,7 @@ use super::report::{Absent, Report};
 use super::score::{PairScores, score};
 use super::select::{Choice, choose};
 use super::{Layout, Protocol, Task, Truth};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::eval::compared::{Compared, Watch};
 use crate::eval::metrics::COVERED;
 use crate::io::truth::photo_at;
@@ -83,8 +83,8 @@ fn score_one(
     watch: &mut dyn Watch,
 ) -> Result<PairScores> {
     let mask = (bench.truth)(&truth.file, view)?;
-    let photo = view.photo.as_deref().ok_or_else(|| Error::Bug(format!("{} came without its photo", view.name)))?;
-    let photo = photo_at(photo, mask.width, mask.height);
+    let photo = view.photo()?;
+    let photo = photo_at(&photo, mask.width, mask.height);
     let drawn = painter.draw(labels, &view.camera.resized(mask.width, mask.height))?;
     let scores = score(&drawn, &mask, &photo, bench.compat, bench.lpips)?;
     let found: Vec<bool> = drawn.alpha.iter().map(|&alpha| alpha > COVERED).collect();
@@ -107,7 +107,8 @@ fn show_absent(
 ) -> Result<()> {
     let mask = (bench.truth)(&truth.file, view)?;
     let Some(photo) = &view.photo else { return watch.skip() };
-    let photo = photo_at(photo, mask.width, mask.height);
+    let photo = photo.get()?;
+    let photo = photo_at(&photo, mask.width, mask.height);
     let pixels = mask.inside.len();
     watch.see(&Compared {
         object: Some(task.object.clone()),

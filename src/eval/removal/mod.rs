@@ -12,9 +12,10 @@ use crate::label::vote::ballot::{Ballot, Sweep, Voter, sweep, weight};
 use crate::label::vote::lift::Lift;
 use crate::label::vote::model::label_by_lift;
 use crate::render::{Parts, RenderOptions, Rendered, render};
-use crate::scene::{Gaussians, LabelMap, Photo, View};
+use crate::scene::{Gaussians, Photo, Pixels, View};
 use score::{Compare, Holes, Region, Tally};
 use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
 
 /// Least weight with which the main Gaussian of a pixel takes its label by the rule of the paper.
 const LIFT: Lift = Lift { threshold: 0.6, gpf: true };
@@ -44,7 +45,7 @@ pub fn sights(engine: &mut Engine, views: &[&View], near: f32) -> Result<Vec<Sig
 
 /// Returns the number of pictures that [`removals`] shows.
 pub(crate) fn picture_count(views: &[&View]) -> u64 {
-    2 * views.iter().filter_map(|view| view.mask.as_deref()).map(|mask| mask.objects().len() as u64).sum::<u64>()
+    2 * views.iter().filter_map(|view| view.mask.as_ref()).map(|mask| mask.objects().len() as u64).sum::<u64>()
 }
 
 /// Removes each object of the masks from `model` and scores what is left in `views`: by the labels of the model, the same
@@ -66,7 +67,7 @@ pub fn removals(
     label_by_lift(engine, &mut paper, train, (options.near, LIFT, 0))?;
     let voters: Vec<Voter> = views.iter().filter_map(|view| Some(Voter::of(view, view.mask.as_ref()?))).collect();
     let ballot = sweep(engine, &voters, Sweep { near: options.near, border: 0, alone: false })?;
-    let ids: BTreeSet<u16> = views.iter().filter_map(|view| view.mask.as_deref()).flat_map(LabelMap::objects).collect();
+    let ids: BTreeSet<u16> = views.iter().filter_map(|view| view.mask.as_ref()).flat_map(Pixels::objects).collect();
     let mut objects = BTreeMap::new();
     for id in ids {
         let votes_left = |labels: &[u32]| weight_left(&ballot, id, labels);
@@ -128,7 +129,7 @@ fn weight_left(ballot: &Ballot, id: u16, labels: &[u32]) -> Option<f64> {
 /// Where a view shows an object, with the photos to compare a removal with.
 struct Place<'a> {
     view: &'a View,
-    photo: &'a Photo,
+    photo: Arc<Photo>,
     region: Region,
     without: Option<Photo>,
     shadowed: Option<Photo>,
@@ -136,7 +137,7 @@ struct Place<'a> {
 
 impl Place<'_> {
     fn compare<'b>(&'b self, rendered: &'b Rendered) -> Compare<'b> {
-        Compare { rendered, photo: self.photo, truth: self.without.as_ref(), shadowed: self.shadowed.as_ref() }
+        Compare { rendered, photo: &self.photo, truth: self.without.as_ref(), shadowed: self.shadowed.as_ref() }
     }
 }
 
@@ -144,8 +145,13 @@ impl Place<'_> {
 fn places<'a>(id: u32, views: &[&'a View], truth: &dyn RemovalTruth) -> Result<Vec<Place<'a>>> {
     let mut found = Vec::new();
     for &view in views {
+        // Masks are asked for their pixels only where they show the object.
         let (Some(mask), Some(photo)) = (&view.mask, &view.photo) else { continue };
-        let Some(region) = Region::new(mask, id as u16, photo) else { continue };
+        if !mask.objects().contains(&(id as u16)) {
+            continue;
+        }
+        let (mask, photo) = (mask.get()?, photo.get()?);
+        let Some(region) = Region::new(&mask, id as u16, &photo) else { continue };
         let (without, shadowed) = (truth.without(id, view)?, truth.shadowed(id, view)?);
         found.push(Place { view, photo, region, without, shadowed });
     }

@@ -4,7 +4,8 @@
 //! absolute differences of logarithms: a photo is compared with the mean exposure of all, not with whatever exposure its
 //! neighbours have.
 
-use crate::scene::{Point, View};
+use crate::error::Result;
+use crate::scene::{Point, View, crew};
 use glam::DVec2;
 use rayon::prelude::*;
 
@@ -32,8 +33,9 @@ pub(super) struct Gains {
 /// Logarithms of grey, red, green and blue of a point in a photo.
 type Sample = (usize, [f64; 4]);
 
-fn samples(view: &View, seen: &[(usize, DVec2)]) -> Vec<Sample> {
-    let Some(photo) = view.photo.as_deref() else { return Vec::new() };
+fn samples(view: &View, seen: &[(usize, DVec2)]) -> Result<Vec<Sample>> {
+    let Some(photo) = &view.photo else { return Ok(Vec::new()) };
+    let photo = photo.get()?;
     let sample = |&(point, pixel): &(usize, DVec2)| {
         let (x, y) = ((pixel.x as u32).min(photo.width - 1), (pixel.y as u32).min(photo.height - 1));
         let texel = photo.rgba[(y * photo.width + x) as usize];
@@ -42,19 +44,21 @@ fn samples(view: &View, seen: &[(usize, DVec2)]) -> Vec<Sample> {
         let tells = texel[3] == 255 && values.iter().all(|value| (DARK..=BRIGHT).contains(value));
         tells.then(|| (point, values.map(f64::ln)))
     };
-    seen.iter().filter_map(sample).collect()
+    Ok(seen.iter().filter_map(sample).collect())
 }
 
 /// Returns the gains of each photo; none with too few points that another photo shows too.
-pub(super) fn gains(views: &[&View], seen: &[Vec<(usize, DVec2)>], points: &[Point]) -> Vec<Option<Gains>> {
-    let samples: Vec<Vec<Sample>> = views.par_iter().zip(seen).map(|(view, seen)| samples(view, seen)).collect();
+pub(super) fn gains(views: &[&View], seen: &[Vec<(usize, DVec2)>], points: &[Point]) -> Result<Vec<Option<Gains>>> {
+    let of_photo = |index: usize| samples(views[index], &seen[index]);
+    let samples = crew::map(views.len(), crew::at_once(views.iter().copied()), of_photo);
+    let samples: Vec<Vec<Sample>> = samples.into_iter().collect::<Result<_>>()?;
     let channels: Vec<Vec<Option<f64>>> =
         (0..4).into_par_iter().map(|channel| relative(&samples, points.len(), channel)).collect();
     let of_view = |view: usize| {
         let [grey, red, green, blue] = [0, 1, 2, 3].map(|channel: usize| channels[channel][view]);
         Some(Gains { grey: grey?, channels: [red?, green?, blue?] })
     };
-    (0..views.len()).map(of_view).collect()
+    Ok((0..views.len()).map(of_view).collect())
 }
 
 /// A point in a photo: logarithm of its brightness, and its weight.

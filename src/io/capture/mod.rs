@@ -145,7 +145,7 @@ pub fn gains(scene: &Path, dataset: &Dataset) -> Result<Vec<Option<[f64; 3]>>> {
     let views: Vec<&View> = dataset.train.iter().collect();
     let observed: Vec<_> = views.iter().map(|view| observed.of(view)).collect();
     let seen = neighbours::seen(&views, &dataset.points, &observed);
-    let gains = gains::gains(&views, &seen, &dataset.points);
+    let gains = gains::gains(&views, &seen, &dataset.points)?;
     Ok(gains.into_iter().map(|of| of.map(|of| of.channels)).collect())
 }
 
@@ -157,8 +157,8 @@ pub fn scan(scene: &Path, dataset: &Dataset) -> Result<Report> {
     let seen = neighbours::seen(&views, &dataset.points, &observed);
     let shared = neighbours::shared(&seen, dataset.points.len());
     let errors: Vec<Option<f64>> = observed.iter().map(|of| of.and_then(poses::error)).collect();
-    let sharpness = photos::sharpness(&views);
-    let gains = gains::gains(&views, &seen, &dataset.points);
+    let sharpness = photos::sharpness(&views)?;
+    let gains = gains::gains(&views, &seen, &dataset.points)?;
     let reports: Vec<ViewReport> = (0..views.len())
         .map(|index| ViewReport {
             name: views[index].name.clone(),

@@ -1,9 +1,9 @@
 //! Sharpness of photos, and what is found of their brightness and white balance.
 
 use super::{Fault, Finding, ViewReport, median};
+use crate::error::Result;
 use crate::io::resample::{bounded_size, shrink_photo};
-use crate::scene::{Photo, View};
-use rayon::prelude::*;
+use crate::scene::{Photo, Pixels, View, crew};
 
 /// Longest side of the photos that are compared, px: noise of sensors is gone at this size.
 const LONGEST: u32 = 800;
@@ -39,9 +39,12 @@ fn detail(photo: &Photo) -> f64 {
 }
 
 /// Returns the sharpness of each photo relative to the photos beside it.
-pub(super) fn sharpness(views: &[&View]) -> Vec<Option<f64>> {
-    let details: Vec<Option<f64>> =
-        views.par_iter().map(|view| view.photo.as_deref().map(detail).filter(|value| value.is_finite())).collect();
+pub(super) fn sharpness(views: &[&View]) -> Result<Vec<Option<f64>>> {
+    let of_view = |view: &View| {
+        let photo = view.photo.as_ref().map(Pixels::get).transpose()?;
+        Ok(photo.map(|photo| detail(&photo)).filter(|value| value.is_finite()))
+    };
+    let details: Vec<Option<f64>> = crew::over_views(views, of_view).into_iter().collect::<Result<_>>()?;
     let relative = |(index, view): (usize, &&View)| {
         let mut near: Vec<(f64, f64)> = views
             .iter()
@@ -55,7 +58,7 @@ pub(super) fn sharpness(views: &[&View]) -> Vec<Option<f64>> {
         // The square root: half is half the contrast of fine detail.
         (usual > 0.0).then_some((details[index]? / usual).sqrt())
     };
-    views.iter().enumerate().map(relative).collect()
+    Ok(views.iter().enumerate().map(relative).collect())
 }
 
 /// Finds blurred photos, and photos with another exposure or white balance.

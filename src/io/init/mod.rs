@@ -57,11 +57,11 @@ pub(crate) fn has_points(dataset: &Dataset) -> bool {
 
 /// Adds far Gaussians to the initial ones where photos look past all points of the scene, such as at the sky:
 /// `directions` are tried. A scene without points has none, because its random points lie at all depths.
-pub fn add_far_gaussians(model: &mut Gaussians, dataset: &Dataset, directions: u32) {
+pub fn add_far_gaussians(model: &mut Gaussians, dataset: &Dataset, directions: u32) -> Result<()> {
     if !has_points(dataset) {
-        return;
+        return Ok(());
     }
-    let (points, deviation) = shell::points(dataset, directions as usize);
+    let (points, deviation) = shell::points(dataset, directions as usize)?;
     tracing::debug!("{} of {directions} directions look past all points", points.len());
     let distances2 = vec![deviation * deviation; points.len()];
     let mut far = from_points(&points, &distances2, dataset.extent());
@@ -73,6 +73,7 @@ pub fn add_far_gaussians(model: &mut Gaussians, dataset: &Dataset, directions: u
     model.opacities.append(&mut far.opacities);
     model.sh0.append(&mut far.sh0);
     model.sh_rest.append(&mut far.sh_rest);
+    Ok(())
 }
 
 /// Refuses a scene in which no camera sees a point: nothing would be drawn or learnt.

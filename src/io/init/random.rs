@@ -12,7 +12,7 @@ use super::region::{self, Region};
 use super::sweep::Sweep;
 use super::texel::texel;
 use crate::error::{Error, Result};
-use crate::scene::{Camera, Dataset, Point, View};
+use crate::scene::{Camera, Dataset, Photo, Pixels, Point, View};
 use glam::{DVec2, DVec3};
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
@@ -46,11 +46,11 @@ pub(super) fn points(dataset: &Dataset, seed: u64, count: usize) -> Result<Vec<P
         ));
     }
     let region = region::find(views, dataset.extent());
-    let mut test = Test { views, seen_by: views.len().min(3), backdrop: backdrop(views) };
+    let mut test = Test { views, seen_by: views.len().min(3), backdrop: backdrop(views)? };
     let mut random = Pcg64Mcg::seed_from_u64(seed);
     let mut points = Vec::with_capacity(count);
     if test.backdrop.is_none() {
-        let found = Sweep::new(views, region.depths()).points(&mut random, count);
+        let found = Sweep::new(views, region.depths())?.points(&mut random, count);
         points.extend(found.into_iter().take(((1.0 - ANYWHERE) * count as f64) as usize));
     }
     // Relax the tests until enough points pass: first free space, then two cameras, one, none.
@@ -63,8 +63,7 @@ pub(super) fn points(dataset: &Dataset, seed: u64, count: usize) -> Result<Vec<P
             let plain = test.backdrop.is_some();
             let drawn: Vec<Point> =
                 (0..count.max(1024)).map(|_| candidate(&mut random, views, region, plain)).collect();
-            let kept: Vec<Option<Point>> = drawn.par_iter().map(|point| test.judge(*point)).collect();
-            points.extend(kept.into_iter().flatten());
+            points.extend(test.passing(drawn)?);
         }
         if test.backdrop.take().is_none() {
             test.seen_by = test.seen_by.saturating_sub(1);
@@ -105,18 +104,40 @@ fn ahead(random: &mut Pcg64Mcg, camera: &Camera, (near, far): (f64, f64)) -> DVe
     region::unproject(camera, pixel, depth)
 }
 
+/// What the views show at a candidate.
+#[derive(Clone, Copy, Default)]
+struct Shown {
+    /// Views that see it.
+    seen: usize,
+    /// Photos with a colour there, the sum of these colours, and those that have the background's.
+    coloured: u32,
+    sum: [u32; 3],
+    free: u32,
+}
+
 impl Test<'_> {
-    /// Returns the point with its colour if it passes the test.
-    fn judge(&self, point: Point) -> Option<Point> {
-        let (mut seen, mut coloured, mut free, mut sum) = (0, 0u32, 0, [0u32; 3]);
+    /// Returns the points that pass the test, with their colours. The photos come one after the other, because not all of
+    /// them may be in memory.
+    fn passing(&self, drawn: Vec<Point>) -> Result<Vec<Point>> {
+        let mut shown = vec![Shown::default(); drawn.len()];
         for view in self.views {
-            let Some(pixel) = view.camera.sees(point.position) else { continue };
-            seen += 1;
-            let Some(texel) = view.photo.as_ref().and_then(|photo| texel(photo, pixel)) else { continue };
-            coloured += 1;
-            (0..3).for_each(|channel| sum[channel] += u32::from(texel[channel]));
-            free += u32::from(self.backdrop.is_some_and(|backdrop| near(texel, backdrop)));
+            let photo = view.photo.as_ref().map(Pixels::get).transpose()?;
+            shown.par_iter_mut().zip(&drawn).for_each(|(shown, point)| self.look(shown, point, view, photo.as_deref()));
         }
+        Ok(drawn.into_iter().zip(shown).filter_map(|(point, shown)| self.judge(point, shown)).collect())
+    }
+
+    fn look(&self, shown: &mut Shown, point: &Point, view: &View, photo: Option<&Photo>) {
+        let Some(pixel) = view.camera.sees(point.position) else { return };
+        shown.seen += 1;
+        let Some(texel) = photo.and_then(|photo| texel(photo, pixel)) else { return };
+        shown.coloured += 1;
+        (0..3).for_each(|channel| shown.sum[channel] += u32::from(texel[channel]));
+        shown.free += u32::from(self.backdrop.is_some_and(|backdrop| near(texel, backdrop)));
+    }
+
+    /// Returns the point with its colour if it passes the test.
+    fn judge(&self, point: Point, Shown { seen, coloured, sum, free }: Shown) -> Option<Point> {
         // Some pixels of a dark subject may have the colour of the background, so a few are accepted.
         if seen < self.seen_by || free * 10 > coloured {
             return None;
@@ -132,9 +153,10 @@ fn near(a: [u8; 3], b: [u8; 3]) -> bool {
 }
 
 /// Returns the colour of nine tenths of the border pixels of some views, if there is one.
-fn backdrop(views: &[View]) -> Option<[u8; 3]> {
+fn backdrop(views: &[View]) -> Result<Option<[u8; 3]>> {
     let mut border: Vec<[u8; 3]> = Vec::new();
     for photo in views.iter().step_by(views.len() / BORDER_VIEWS + 1).filter_map(|view| view.photo.as_ref()) {
+        let photo = photo.get()?;
         let (width, height) = (photo.width as usize, photo.height as usize);
         let rows = [0, height - 1].into_iter().flat_map(|y| (0..width).map(move |x| (x, y)));
         let columns = [0, width - 1].into_iter().flat_map(|x| (0..height).map(move |y| (x, y)));
@@ -142,7 +164,7 @@ fn backdrop(views: &[View]) -> Option<[u8; 3]> {
         border.extend(texels.filter(|texel| texel[3] == 255).map(|[r, g, b, _]| [r, g, b]));
     }
     border.sort_unstable();
-    let middle = *border.get(border.len() / 2)?;
+    let Some(&middle) = border.get(border.len() / 2) else { return Ok(None) };
     let same = border.iter().filter(|&&texel| near(texel, middle)).count();
-    (same * 10 >= border.len() * 9).then_some(middle)
+    Ok((same * 10 >= border.len() * 9).then_some(middle))
 }

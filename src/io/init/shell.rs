@@ -2,6 +2,7 @@
 //!
 //! Without them nothing stands for what is far away, and training puts Gaussians right before the cameras instead.
 
+use crate::error::Result;
 use crate::io::init::texel::texel;
 use crate::scene::{Camera, Dataset, Point, View};
 use glam::{DVec2, DVec3};
@@ -51,11 +52,11 @@ impl Covered {
 
 /// Returns the points of a sphere of `count` directions around the cameras at which most of the views that see them look
 /// past the points of the scene, in the median colour of the pixels there; and half their spacing, world units.
-pub(super) fn points(dataset: &Dataset, count: usize) -> (Vec<Point>, f64) {
+pub(super) fn points(dataset: &Dataset, count: usize) -> Result<(Vec<Point>, f64)> {
     let points = &dataset.points;
     let views: Vec<&View> = dataset.train.iter().filter(|view| view.photo.is_some()).collect();
     if views.is_empty() || count == 0 {
-        return (Vec::new(), 0.0);
+        return Ok((Vec::new(), 0.0));
     }
     let centre = views.iter().map(|view| view.camera.centre()).sum::<DVec3>() / views.len() as f64;
     let mut distances: Vec<f64> = points.iter().map(|point| point.position.distance(centre)).collect();
@@ -63,23 +64,30 @@ pub(super) fn points(dataset: &Dataset, count: usize) -> (Vec<Point>, f64) {
     let far = distances.get((FARTHEST * distances.len() as f64) as usize).copied().unwrap_or(0.0);
     let radius = (RADIUS * dataset.extent()).max(BEYOND * far);
     let covered: Vec<Covered> = views.par_iter().map(|view| Covered::new(&view.camera, points)).collect();
-    let point = |index: usize| {
+    let place = |index: usize| {
         // Even directions: a Fibonacci lattice.
         let height = 1.0 - (2.0 * index as f64 + 1.0) / count as f64;
         let (angle, width) = (TAU * index as f64 * 0.618_033_988_749_894_8, (1.0 - height * height).sqrt());
-        let position = centre + radius * DVec3::new(width * angle.cos(), height, width * angle.sin());
-        let (mut past, mut colours) = (0, Vec::new());
-        for (view, covered) in views.iter().zip(&covered) {
-            let Some(pixel) = view.camera.sees(position) else { continue };
-            let Some(colour) = view.photo.as_ref().and_then(|photo| texel(photo, pixel)) else { continue };
-            past += usize::from(!covered.is_covered(&view.camera, pixel));
+        centre + radius * DVec3::new(width * angle.cos(), height, width * angle.sin())
+    };
+    // The photos come one after the other, because not all of them may be in memory.
+    let mut shown: Vec<(usize, Vec<[u8; 3]>)> = vec![(0, Vec::new()); count];
+    for (view, covered) in views.iter().zip(&covered) {
+        let photo = view.photo()?;
+        shown.par_iter_mut().enumerate().for_each(|(index, (past, colours))| {
+            let Some(pixel) = view.camera.sees(place(index)) else { return };
+            let Some(colour) = texel(&photo, pixel) else { return };
+            *past += usize::from(!covered.is_covered(&view.camera, pixel));
             colours.push(colour);
-        }
+        });
+    }
+    let point = |(index, (past, colours)): (usize, (usize, Vec<[u8; 3]>))| {
         let seen = colours.len();
-        (seen >= VIEWS_MIN && 2 * past > seen).then(|| Point { position, colour: median(colours) })
+        let is_far = seen >= VIEWS_MIN && 2 * past > seen;
+        is_far.then(|| Point { position: place(index), colour: median(colours) })
     };
     let spacing = radius * (2.0 * TAU / count as f64).sqrt();
-    ((0..count).into_par_iter().filter_map(point).collect(), 0.5 * spacing)
+    Ok((shown.into_iter().enumerate().filter_map(point).collect(), 0.5 * spacing))
 }
 
 fn median(colours: Vec<[u8; 3]>) -> [u8; 3] {

@@ -5,8 +5,9 @@
 
 use super::region::unproject;
 use super::texel::texel;
+use crate::error::Result;
 use crate::io::resample::{bounded_size, shrink_photo};
-use crate::scene::{Camera, Photo, Point, View};
+use crate::scene::{Camera, Photo, Pixels, Point, View};
 use glam::DVec2;
 use rand::Rng;
 use rand_pcg::Pcg64Mcg;
@@ -31,13 +32,14 @@ pub(super) struct Sweep {
 
 impl Sweep {
     /// Makes the sweep; `depths` are the smallest and the largest depth.
-    pub(super) fn new(views: &[View], depths: (f64, f64)) -> Self {
-        let small = |view: &View| {
-            let photo = view.photo.as_ref()?;
+    pub(super) fn new(views: &[View], depths: (f64, f64)) -> Result<Self> {
+        let small = |photo: &Pixels<Photo>, camera: &Camera| {
+            let photo = photo.get()?;
             let (width, height) = bounded_size((photo.width, photo.height), Some(LONGEST));
-            Some((view.camera.resized(width, height), shrink_photo(photo, width, height)))
+            Ok((camera.resized(width, height), shrink_photo(&photo, width, height)))
         };
-        Self { photos: views.iter().filter_map(small).collect(), depths }
+        let photos = views.iter().filter_map(|view| Some(small(view.photo.as_ref()?, &view.camera)));
+        Ok(Self { photos: photos.collect::<Result<_>>()?, depths })
     }
 
     /// Returns at most `count` points: one behind each random pixel that three photos agree on.

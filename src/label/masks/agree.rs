@@ -7,7 +7,7 @@ use crate::error::Result;
 use crate::label::vote::ballot::{Sweep, Voter, sweep};
 use crate::label::vote::decide::count;
 use crate::render::label_map;
-use crate::scene::{Gaussians, LabelMap, View};
+use crate::scene::{Gaussians, LabelMap, Pixels, View};
 use std::collections::BTreeMap;
 
 /// Fewest views of an object where nothing else is asked for: what one view alone shows may be a mistake of the segmenter.
@@ -47,13 +47,13 @@ pub fn agree(
     let mut groups = associate(&owners);
     groups.retain(|group| group.len() >= how.min_views);
     let naming = if how.per_view { Naming::Fresh } else { Naming::Majority };
-    let names = name_groups(&groups, &areas(views), naming);
+    let names = name_groups(&groups, &areas(views)?, naming);
     let mut repairs = Repairs::default();
     let changed = names.iter().filter(|((_, old), new)| !how.per_view && old != *new);
     repairs.renamed.extend(changed.map(|(&segment, &new)| (segment, new)));
-    let renamed: Vec<Option<LabelMap>> = (views.iter().enumerate())
-        .map(|(index, view)| view.mask.as_ref().map(|mask| rename(index, mask, &names)))
-        .collect();
+    let renamed: Vec<Option<Pixels<LabelMap>>> = (views.iter().enumerate())
+        .map(|(index, view)| Ok(view.mask()?.map(|mask| rename(index, &mask, &names).into())))
+        .collect::<Result<_>>()?;
     // The labels that all renamed masks give the model decide the content of each mask.
     let voters = views.iter().zip(&renamed).filter_map(|(view, mask)| Some(Voter::of(view, mask.as_ref()?)));
     let decision = count(engine, &voters.collect::<Vec<_>>(), false, &model.means, counting, true)?;
@@ -62,7 +62,7 @@ pub fn agree(
     for (index, (view, mask)) in views.iter().zip(&renamed).enumerate() {
         let shown = label_map(engine, &view.camera, how.near)?;
         masks.push(match mask {
-            Some(mask) => Some(mend(index, mask, &shown, &mut repairs)),
+            Some(mask) => Some(mend(index, &*mask.get()?, &shown, &mut repairs)),
             None if how.make_missing => {
                 repairs.made.push(index);
                 Some(shown)
@@ -74,11 +74,12 @@ pub fn agree(
     Ok((masks, repairs))
 }
 
-fn areas(views: &[&View]) -> BTreeMap<Segment, u64> {
+fn areas(views: &[&View]) -> Result<BTreeMap<Segment, u64>> {
     let mut areas = BTreeMap::new();
     for (index, view) in views.iter().enumerate() {
-        let ids = view.mask.iter().flat_map(|mask| &mask.ids).filter(|id| **id != 0);
+        let mask = view.mask()?;
+        let ids = mask.iter().flat_map(|mask| &mask.ids).filter(|id| **id != 0);
         ids.for_each(|&id| *areas.entry((index, id)).or_default() += 1);
     }
-    areas
+    Ok(areas)
 }

@@ -3,8 +3,7 @@
 use super::{by_mean, distances};
 use crate::error::{Error, Result};
 use crate::io::depth::DepthFolder;
-use crate::scene::{DepthKind, Occluders, View};
-use rayon::prelude::*;
+use crate::scene::{DepthKind, Occluders, View, crew};
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -17,11 +16,11 @@ pub fn from_depths(
 ) -> Result<BTreeMap<String, Occluders>> {
     let folder = DepthFolder::open(depths, scene)?;
     folder.check_complete(views)?;
-    let of_view = |view: &&View| {
+    let of_view = |view: &View| {
         let map = folder.read(view)?;
-        let mask = view.mask.as_ref().ok_or_else(|| Error::Bug(format!("{} came without its mask", view.name)))?;
-        Ok((view.name.clone(), by_mean(mask, &distances(&map, kind))))
+        let mask = view.mask()?.ok_or_else(|| Error::Bug(format!("{} came without its mask", view.name)))?;
+        Ok((view.name.clone(), by_mean(&mask, &distances(&map, kind))))
     };
-    let found: Vec<Result<(String, Occluders)>> = views.par_iter().map(of_view).collect();
+    let found: Vec<Result<(String, Occluders)>> = crew::over_views(views, of_view);
     found.into_iter().collect()
 }

@@ -7,7 +7,7 @@
 
 use crate::engine::{Engine, ListKey, VoteInput};
 use crate::error::{Error, Result};
-use crate::scene::{Camera, LabelMap, Photo, UNLABELLED, View};
+use crate::scene::{Camera, LabelMap, Photo, Pixels, UNLABELLED, View};
 use crate::shaders::constants::{VOTE_NONE, VOTE_ONE};
 use crate::shaders::structs::StepUniforms;
 use rayon::prelude::*;
@@ -22,17 +22,17 @@ pub struct Voter<'a> {
     /// Camera.
     pub camera: &'a Camera,
     /// Mask of the view.
-    pub mask: &'a LabelMap,
+    pub mask: &'a Pixels<LabelMap>,
     /// Photo of the view; its invalid pixels do not vote.
-    pub photo: Option<&'a Photo>,
+    pub photo: Option<&'a Pixels<Photo>>,
     /// Weight of the votes of this view by label, 0 to 1; 1 for labels without an entry.
     pub trust: Option<&'a BTreeMap<u16, f32>>,
 }
 
 impl<'a> Voter<'a> {
     /// Makes a voter of a view and any mask of its size.
-    pub fn of(view: &'a View, mask: &'a LabelMap) -> Self {
-        Self { camera: &view.camera, mask, photo: view.photo.as_deref(), trust: None }
+    pub fn of(view: &'a View, mask: &'a Pixels<LabelMap>) -> Self {
+        Self { camera: &view.camera, mask, photo: view.photo.as_ref(), trust: None }
     }
 }
 
@@ -128,13 +128,14 @@ pub fn sweep(engine: &mut Engine, voters: &[Voter], how: Sweep) -> Result<Ballot
 
 /// Adds the votes of one view for the labels in `chunk`.
 fn vote(engine: &mut Engine, voter: &Voter, chunk: &[u16], how: Sweep) -> Result<()> {
-    let all_columns = columns_of(voter, chunk, how.border);
+    let mask = voter.mask.get()?;
+    let all_columns = columns_of(&mask, voter.photo.map(Pixels::get).transpose()?.as_deref(), chunk, how.border);
     let trust = |label: &u16| voter.trust.and_then(|trust| trust.get(label)).copied().unwrap_or(1.0);
     let weights: Vec<f32> = chunk.iter().map(trust).collect();
     for band in engine.bands(voter.camera) {
-        let columns = &all_columns[band.pixels(voter.mask.width)];
+        let columns = &all_columns[band.pixels(mask.width)];
         let shape = engine.shape();
-        let labels = most_labels(columns, voter.mask.width, shape.tile_width, shape.tile_height);
+        let labels = most_labels(columns, mask.width, shape.tile_width, shape.tile_height);
         let rounds = labels.div_ceil(LABELS_PER_WALK) as u32;
         if rounds == 0 {
             continue;
@@ -148,15 +149,15 @@ fn vote(engine: &mut Engine, voter: &Voter, chunk: &[u16], how: Sweep) -> Result
 }
 
 /// Returns the column of each pixel's label, or [`VOTE_NONE`].
-fn columns_of(voter: &Voter, chunk: &[u16], border: u32) -> Vec<u32> {
+fn columns_of(mask: &LabelMap, photo: Option<&Photo>, chunk: &[u16], border: u32) -> Vec<u32> {
     let mut column = vec![VOTE_NONE; 1 << 16];
     chunk.iter().zip(0..).for_each(|(&id, at)| column[usize::from(id)] = at);
-    let mut columns: Vec<u32> = voter.mask.ids.iter().map(|&id| column[usize::from(id)]).collect();
-    if let Some(photo) = voter.photo {
+    let mut columns: Vec<u32> = mask.ids.iter().map(|&id| column[usize::from(id)]).collect();
+    if let Some(photo) = photo {
         columns.iter_mut().zip(&photo.rgba).filter(|(_, pixel)| pixel[3] < 128).for_each(|(to, _)| *to = VOTE_NONE);
     }
     if border > 0 {
-        let near = voter.mask.near_contour(border);
+        let near = mask.near_contour(border);
         columns.iter_mut().zip(near).filter(|(_, near)| *near).for_each(|(to, _)| *to = VOTE_NONE);
     }
     columns

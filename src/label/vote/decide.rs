@@ -111,11 +111,11 @@ fn tree_of(means: &[[f32; 3]], totals: &[f64]) -> Result<Option<(ImmutableKdTree
 
 /// Returns camera and mask at the size at which masks are judged: half of the full one, but no less than
 /// [`JUDGED_PX`].
-fn judged(voter: &Voter) -> (Camera, LabelMap) {
+fn judged(voter: &Voter) -> Result<(Camera, LabelMap)> {
     let longest = voter.camera.width.max(voter.camera.height);
     let camera = voter.camera.shrunk((JUDGED_PX / f64::from(longest)).clamp(0.5, 1.0));
-    let mask = voter.mask.resized(camera.width, camera.height);
-    (camera, mask)
+    let mask = voter.mask.get()?.resized(camera.width, camera.height);
+    Ok((camera, mask))
 }
 
 /// For each label, the number of mask pixels where the model shows the same label, and of all its mask pixels.
@@ -171,7 +171,7 @@ pub(crate) fn count(
 ) -> Result<Decision> {
     let mut agreements = Vec::new();
     for voter in voters.iter().filter(|_| is_judged) {
-        let (camera, mask) = judged(voter);
+        let (camera, mask) = judged(voter)?;
         agreements.push(agreement(&mask, &label_map(engine, &camera, how.near)?));
     }
     let trusts = trust(&agreements);

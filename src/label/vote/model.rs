@@ -80,9 +80,9 @@ pub fn label_by_lift(
     order.shuffle(&mut Pcg64Mcg::seed_from_u64(seed));
     let mut labels = vec![UNLABELLED; model.len()];
     for view in order.into_iter().map(|index| views[index]) {
-        let Some(mask) = &view.mask else { continue };
+        let Some(mask) = view.mask()? else { continue };
         let rendered = render(engine, &view.camera, &RenderOptions::of_main(near))?;
-        lift(&mut labels, &model.means, &view.camera.relative_to(model.origin), &rendered, mask, how);
+        lift(&mut labels, &model.means, &view.camera.relative_to(model.origin), &rendered, &mask, how);
     }
     model.labels = Some(labels);
     model.label_confidence = None;

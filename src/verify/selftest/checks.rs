@@ -248,12 +248,14 @@ impl Ran {
         let (camera, target) = (self.fixture.scene.camera.clone(), &self.fixture.scene.target);
         let ids = target.label_map.iter().map(|&id| id as u16).collect();
         let mask = LabelMap { width: camera.width, height: camera.height, ids };
+        let columns_of = mask.ids.clone();
+        let mask = mask.into();
         let voter = Voter { camera: &camera, mask: &mask, photo: None, trust: None };
         let how = Sweep { near: self.fixture.config.near, border: 0, alone };
         let ballot = sweep(&mut self.fixture.engine, &[voter], how)?;
         let actual = ballot.weights();
         let column = |id: &u16| ballot.labels.iter().position(|label| label == id);
-        let columns: Vec<Option<usize>> = mask.ids.iter().map(column).collect();
+        let columns: Vec<Option<usize>> = columns_of.iter().map(column).collect();
         let labels = ballot.labels.len();
         let expected = if alone {
             vote_alone(&self.rules, &self.splats, size, count, (&columns, labels))

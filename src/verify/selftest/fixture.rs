@@ -5,12 +5,12 @@ use crate::engine::{Engine, EngineSize, Input, LabelSize, ListKey, Report, Share
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::pass::{KernelShape, Variant};
-use crate::scene::{Camera, LabelMap, Photo};
+use crate::scene::{Camera, Occluders, Photo};
 use crate::scheduler::SchedulerOptions;
 use crate::scheduler::plan::{Buf, PlanOptions};
 use crate::shaders::structs::StepUniforms;
 use crate::train::near::NEAR;
-use crate::train::step_input::{self, SceneScale, StepInput, TrainView};
+use crate::train::step_input::{self, SceneScale, Shown, StepInput, StepView};
 use crate::train::strategy::{self, At};
 use crate::train::{LabelRule, TrainConfig};
 use crate::verify::reference::loss::ObjectPixel;
@@ -18,6 +18,7 @@ use crate::verify::reference::model::ROW_FLOATS;
 use crate::verify::reference::splat::{Splat, SplatGradient};
 use crate::verify::reference::{Model, Row};
 use bytemuck::Pod;
+use std::collections::BTreeMap;
 use std::f64::consts::LN_2;
 use std::sync::Arc;
 
@@ -54,7 +55,7 @@ pub struct Fixture {
     /// The scene.
     pub scene: Scene,
     /// Host data of the view.
-    pub view: TrainView,
+    pub view: OwnView,
     /// Input of the step.
     pub input: StepInput,
     /// The settings.
@@ -73,8 +74,31 @@ pub fn readable() -> SchedulerOptions {
     SchedulerOptions { plan, poison_step: true, ..SchedulerOptions::default() }
 }
 
+/// A view with its pixels, as a step uses it.
+pub struct OwnView {
+    /// Near plane, world units.
+    pub near: f32,
+    /// Photo.
+    pub photo: Photo,
+    /// Occluders of each object.
+    pub occluders: Occluders,
+    camera: Camera,
+    valid_pixels: u64,
+    view_labels: Vec<u32>,
+    shown: BTreeMap<u16, Shown>,
+}
+
+impl OwnView {
+    /// Returns the view for a step.
+    pub fn of_step(&self) -> StepView<'_> {
+        let Self { near, photo, occluders, camera, valid_pixels, view_labels, shown } = self;
+        let (near, finest, valid_pixels) = (*near, step_input::finest(camera), *valid_pixels);
+        StepView { camera, near, finest, photo, valid_pixels, view_labels, shown, occluders }
+    }
+}
+
 /// The trainer's data of a scene's only view.
-pub fn train_view(scene: &Scene) -> TrainView {
+fn own_view(scene: &Scene) -> OwnView {
     let (target, camera) = (&scene.target, scene.camera.clone());
     let rgba = (target.photo.colours.iter().zip(&target.photo.valid))
         .map(|(c, &valid)| {
@@ -83,19 +107,14 @@ pub fn train_view(scene: &Scene) -> TrainView {
         })
         .collect();
     let (width, height) = (camera.width, camera.height);
-    let mask = LabelMap { width, height, ids: target.label_map.iter().map(|&id| id as u16).collect() };
     let occluders = |slot: &ObjectPixel| (slot.label as u16, slot.occluders.iter().map(|&id| id as u16).collect());
     let photo = Photo { width, height, rgba };
-    TrainView {
-        name: "the view".to_owned(),
+    OwnView {
         near: NEAR,
-        finest: step_input::finest(&camera),
         shown: step_input::shown_objects(&photo, &target.label_map),
         view_labels: target.label_map.clone(),
-        photo: Arc::new(photo),
+        photo,
         valid_pixels: target.photo.valid.iter().filter(|&&valid| valid).count() as u64,
-        objects: mask.objects(),
-        mask: Some(Arc::new(mask)),
         occluders: target.slots.iter().map(occluders).collect(),
         camera,
     }
@@ -145,17 +164,18 @@ impl Fixture {
         let layers =
             if labels { scene.target.slots.iter().map(|slot| slot.label as u16).collect() } else { Vec::new() };
         let input = StepInput { step: 1, view: 0, layers, labels, update: false, updates: 1 };
-        let view = train_view(&scene);
+        let view = own_view(&scene);
         let fixed = SceneScale { extent: 1.0 };
         let mut fixture = Self { view, engine, scene, input, config, fixed, free_space: None, shared: Vec::new() };
-        let weights = step_input::layer_weights(&fixture.input, &fixture.view, &fixture.config);
+        let weights = step_input::layer_weights(&fixture.input, fixture.view.of_step(), &fixture.config);
         fixture.scene.target.slots.iter_mut().zip(weights).for_each(|(slot, weight)| slot.weight = f64::from(weight));
         Ok(fixture)
     }
 
     /// The uniforms of the step.
     pub fn uniforms(&self) -> StepUniforms {
-        let mut uniforms = step_input::uniforms(&self.input, &self.view, &self.config, self.fixed, &self.engine);
+        let mut uniforms =
+            step_input::uniforms(&self.input, self.view.of_step(), &self.config, self.fixed, &self.engine);
         if let Some((camera, near)) = &self.free_space {
             uniforms = self.engine.with_free_space(uniforms, camera, *near);
         }
@@ -205,14 +225,14 @@ impl Fixture {
     /// Same as [`Fixture::train`], with another list.
     pub fn train_as(&mut self, key: ListKey) -> Result<Report> {
         let uniforms = self.uniforms();
-        let data = step_input::train_input(&self.input, &self.view, &self.config, uniforms, &self.engine);
+        let data = step_input::train_input(&self.input, self.view.of_step(), &self.config, uniforms, &self.engine);
         self.engine.run(key, &TrainInput { shared: self.shared.clone(), ..data })
     }
 
     /// Writes the host inputs of a step, for the caller's own lists.
     pub fn write(&mut self) -> Result<()> {
         let uniforms = self.uniforms();
-        let data = step_input::train_input(&self.input, &self.view, &self.config, uniforms, &self.engine);
+        let data = step_input::train_input(&self.input, self.view.of_step(), &self.config, uniforms, &self.engine);
         self.engine.write(0, Input::Train(&data))
     }
 
