@@ -96,7 +96,7 @@ pub struct LoadOptions {
 }
 
 /// Default for the memory of photos and masks, bytes.
-pub const PHOTO_MEMORY: u64 = 4 << 30;
+pub const PHOTO_MEMORY: u64 = 3 << 29;
 
 /// Default for the largest share of undecodable photos.
 pub const MAX_BAD_PHOTOS: f32 = 0.1;

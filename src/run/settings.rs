@@ -32,7 +32,7 @@ crate::options::options! {
             checkpoint_every <"N">: u32 = 1000;
         }
         "Scene" {
-            /// Memory for photos and masks, such as 1500M or 4G.
+            /// Memory for photos and masks, such as 800M or 4G.
             ///
             /// In a larger scene some of them wait in a temporary file in OUT, decoded and of the size for training; it is
             /// gone with the process. The model has the same bits.
