@@ -91,7 +91,8 @@ fn an_engine_that_has_grown_renders_as_one_made_so_large() {
     let error = trained.grow_image(1 << 15, 1 << 15).expect_err("more tiles than a loop walks");
     assert!(error.to_string().contains("tiles"), "{error}");
     trained.upload_model(&model).expect("the model");
-    assert_eq!(render(&mut trained, &camera, &RenderOptions::default()).expect("a picture"), before);
+    let after = render(&mut trained, &camera, &RenderOptions::default()).expect("a picture");
+    assert_eq!((after.rgb, after.depth), (before.rgb, before.depth));
 }
 
 /// A render between two steps, larger than any photo, changes no bit of the training.
