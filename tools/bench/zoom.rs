@@ -79,7 +79,8 @@ pub fn run(options: &Options) -> Result<()> {
     }
     for (scene, size) in scenes.iter().zip(SIZES) {
         let path = options.common.output.join(format!("zoom_{size}_photo.png"));
-        if let Some((view, photo)) = scene.test.first().and_then(|view| Some((view, view.photo.as_ref()?))) {
+        if let Some(view) = scene.test.first() {
+            let photo = view.photo()?;
             let rgb: Vec<[f32; 3]> =
                 photo.rgba.iter().map(|&[r, g, b, _]| [r, g, b].map(|byte| f32::from(byte) / 255.0)).collect();
             write_rgb(&path, (view.camera.width, view.camera.height), &rgb, Format::Png)?;
