@@ -46,7 +46,7 @@ pub fn run(options: &Options) -> Result<()> {
     let scenes = SIZES.map(|size| {
         let side = |pixels: u32| (f64::from(pixels) * size).round() as u32;
         without_masks(&synth::dataset(
-            &SynthOptions { width: side(made.width), height: side(made.height), ..made.clone() },
+            &SynthOptions { width: side(made.width), height: side(made.height), ..made },
             TEST_EVERY,
         ))
     });
