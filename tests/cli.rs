@@ -242,7 +242,7 @@ const TYPED: [(&str, &str); 62] = [
     ("--save-at", "2000,5000"),
     ("--preview-every", "6"),
     ("--checkpoint-every", "12"),
-    ("--photo-memory", "1.5G"),
+    ("--photo-memory", "2.5G"),
 ];
 
 #[test]
