@@ -11,7 +11,7 @@ const float ALPHA_MAX = 0.99;                // upper limit of a pair's opacity 
 const float TRANSMITTANCE_MIN = 1e-4;        // a pixel stops before a splat that would go below this (3DGS)
 #endif
 const float COV2D_BLUR = 0.3;                // px^2 on the diagonal of the projected covariance (3DGS)
-const float COVERAGE_MIN = 1e-6;           // least ratio of determinants before and after blur; no pixel sees such a splat
+const float COVERAGE_MIN = 1e-6;             // least ratio of determinants before and after blur; no pixel sees such a splat
 const float FINEST = 0.44721359549995794;    // least deviation of a smooth Gaussian, pixels of its nearest view (Mip-Splatting)
 const float SMOOTH_MARGIN = 0.15;            // views count to this share of their size beyond their borders (Mip-Splatting)
 const float SSIM_C1 = 0.01 * 0.01;

@@ -13,8 +13,8 @@
 //          v_sh3 [V,6]; counters.nonfinite_* (integer atomics): Gaussians with a nonfinite gradient, which becomes 0;
 //          variant object: adds to the gradients of the scene's splats (splat_from_gaussian)
 // Math:    dSigma = -Q dQ Q through the inverse; dM = 2 G M; Jacobian, view direction and mean2d paths reach the mean;
-//          a clamped x/z or y/z has gradient 0; so does a colour clamped at 0; variant
-//          antialiased: the opacity reaches M through the coverage.
+//          a clamped x/z or y/z has gradient 0; so does a colour clamped at 0;
+//          variant antialiased: the opacity reaches M through the coverage.
 // Mirror:  src/verify/reference/project.rs::project_backward
 
 layout(constant_id = 11) const uint SH_DEGREE = 3;

@@ -14,8 +14,8 @@
 //          variant labels: labels [N], layer_from_label
 // Writes:  splats [V,3] (record.glsl); tiles_touched [V] over all layers; splat_from_gaussian [N]; counters.unprojected_*
 //          (integer atomics): nonfinite splats, which touch no tile
-// Math:    EWA splatting with Cauchy-Binet determinant; SH colour, clamped at 0; ellipse.glsl for the tiles; variant
-//          antialiased: opacity times the root of the coverage (Mip-Splatting).
+// Math:    EWA splatting with Cauchy-Binet determinant; SH colour, clamped at 0; ellipse.glsl for the tiles;
+//          variant antialiased: opacity times the root of the coverage (Mip-Splatting).
 // Mirror:  src/verify/reference/project.rs::project_forward
 
 layout(constant_id = 11) const uint SH_DEGREE = 3;

@@ -104,7 +104,6 @@ fn train_view(view: &View, border: u32) -> Result<TrainView> {
         name: view.name.clone(),
         camera: view.camera.clone(),
         near: 0.0,
-        finest: step_input::finest(&view.camera),
         photo,
         valid_pixels: step_input::valid_pixels(&pixels),
         mask: view.mask.clone(),

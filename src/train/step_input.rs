@@ -20,8 +20,6 @@ pub struct TrainView {
     pub camera: Camera,
     /// Near plane, world units.
     pub near: f32,
-    /// Least standard deviation of Gaussians at depth 1, world units: a share of a pixel at full size.
-    pub finest: f32,
     /// Photo.
     pub photo: Pixels<Photo>,
     /// Number of pixels of the photo that count.

@@ -1,7 +1,7 @@
 //! The training views, at the size of each step.
 
 use super::ahead::{Ahead, Ready, Wanted};
-use super::step_input::{Shown, StepInput, StepView, TrainView};
+use super::step_input::{self, Shown, StepInput, StepView, TrainView};
 use super::{TrainConfig, free_space, poses};
 use crate::error::{Error, Result};
 use crate::scene::camera::side_at;
@@ -150,11 +150,13 @@ impl Views {
         let missing = || Error::Bug(format!("step {} came without its pixels", input.step));
         let (whole, ready) = (&self.whole[input.view], self.ready.get(&input.step).ok_or_else(missing)?);
         let (photo, view_labels) = (&*ready.photo, ready.view_labels.as_slice());
+        // Of the whole photo, whatever the size of the step.
+        let finest = step_input::finest(&whole.camera);
         Ok(match &ready.small {
             Some((camera, valid_pixels)) => StepView {
                 camera,
                 near: whole.near,
-                finest: whole.finest,
+                finest,
                 photo,
                 valid_pixels: *valid_pixels,
                 view_labels,
@@ -164,7 +166,7 @@ impl Views {
             None => StepView {
                 camera: &whole.camera,
                 near: whole.near,
-                finest: whole.finest,
+                finest,
                 photo,
                 valid_pixels: whole.valid_pixels,
                 view_labels,

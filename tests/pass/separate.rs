@@ -28,8 +28,7 @@ const BOUNDS: GradientBounds = GradientBounds {
 
 /// The step with objects one by one.
 fn separate(fixture: &Fixture) -> ListKey {
-    let ListKey::Train(variant) = fixture.key() else { unreachable!("the fixture trains") };
-    ListKey::Separate(variant, fixture.input.layers.len() as u32)
+    ListKey::Separate(fixture.variant(), fixture.input.layers.len() as u32)
 }
 
 /// Runs a list on the model as it was first.

@@ -2,7 +2,7 @@
 //! from held-out cameras.
 
 use super::measure::write_json;
-use super::trained::{Judge, TEST_EVERY, small_scene, start, trainer, without_masks};
+use super::trained::{Judge, TEST_EVERY, Trainings, trained, without_masks};
 use super::{Common, device};
 use glam::{DMat3, DVec3};
 use labelgs::Result;
@@ -10,7 +10,6 @@ use labelgs::gpu::Gpu;
 use labelgs::internals::synth;
 use labelgs::run::TrainConfig;
 use labelgs::scene::{Camera, Dataset};
-use labelgs::synth::SynthOptions;
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
 use serde_json::json;
@@ -21,15 +20,8 @@ use std::sync::Arc;
 pub struct Options {
     #[command(flatten)]
     common: Common,
-    /// Steps of a training.
-    #[arg(long, default_value_t = 1700)]
-    steps: u32,
-    /// Seeds, of the errors and of the trainings.
-    #[arg(long, value_delimiter = ',', default_values_t = [0_u64, 1, 2])]
-    seeds: Vec<u64>,
-    /// Width of the photos, px.
-    #[arg(long, default_value_t = 320)]
-    width: u32,
+    #[command(flatten)]
+    trainings: Trainings,
     /// Error of a camera's direction, degrees.
     #[arg(long, default_value_t = 0.5)]
     degrees: f64,
@@ -48,18 +40,12 @@ struct Errors {
 /// Runs it.
 pub fn run(options: &Options) -> Result<()> {
     let gpu = device::open()?;
-    let small = options.common.small;
-    let made = if small {
-        small_scene()
-    } else {
-        SynthOptions { width: options.width, height: options.width * 3 / 4, ..SynthOptions::default() }
-    };
-    let steps = if small { 30 } else { options.steps };
+    let (made, steps, seeds) = options.trainings.plan(options.common.small);
     let truth = without_masks(&synth::dataset(&made, TEST_EVERY));
     println!("| seed | poses | degrees off | distance off | PSNR |");
     println!("| --- | --- | --- | --- | --- |");
     let mut rows = Vec::new();
-    for &seed in &options.seeds[..if small { 1 } else { options.seeds.len() }] {
+    for &seed in seeds {
         let spoilt = disturbed(&truth, seed, (options.degrees, options.distance));
         for (name, dataset, refine_poses) in [
             ("exact", &truth, false),
@@ -68,7 +54,7 @@ pub fn run(options: &Options) -> Result<()> {
             ("off, refined", &spoilt, true),
         ] {
             let config = TrainConfig { iterations: steps, seed, refine_poses, ..TrainConfig::default() };
-            let (errors, psnr) = trained(&gpu, (dataset, &truth), config)?;
+            let (errors, psnr) = scored(&gpu, (dataset, &truth), config)?;
             println!("| {seed} | {name} | {:.3} | {:.5} | {psnr:.2} |", errors.degrees, errors.distance);
             rows.push(json!({ "seed": seed, "poses": name, "degrees": errors.degrees, "distance": errors.distance,
                 "psnr": psnr, "steps": steps }));
@@ -102,11 +88,8 @@ fn middle(dataset: &Dataset) -> DVec3 {
 }
 
 /// Trains, and scores the model from the held-out cameras as the trained ones see them.
-fn trained(gpu: &Arc<Gpu>, (dataset, truth): (&Dataset, &Dataset), config: TrainConfig) -> Result<(Errors, f64)> {
-    let mut trainer = trainer(gpu, dataset, &start(dataset, &config)?, config.clone())?;
-    for _ in 0..config.iterations {
-        trainer.step()?;
-    }
+fn scored(gpu: &Arc<Gpu>, (dataset, truth): (&Dataset, &Dataset), config: TrainConfig) -> Result<(Errors, f64)> {
+    let mut trainer = trained(gpu, dataset, config.clone())?;
     let model = trainer.model()?;
     let refined = trainer.poses()?;
     let config = TrainConfig { near: trainer.config().near, ..config };

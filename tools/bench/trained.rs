@@ -16,6 +16,33 @@ use labelgs::scene::{Dataset, Gaussians, View};
 use labelgs::synth::{Preset, SynthOptions};
 use std::sync::Arc;
 
+/// Trainings on the built-in scene: options of several benchmarks.
+#[derive(clap::Args, Clone, Debug)]
+pub struct Trainings {
+    /// Steps of a training.
+    #[arg(long, default_value_t = 1700)]
+    steps: u32,
+    /// Seeds of the trainings.
+    #[arg(long, value_delimiter = ',', default_values_t = [0_u64, 1, 2])]
+    seeds: Vec<u64>,
+    /// Width of the photos, px.
+    #[arg(long, default_value_t = 320)]
+    width: u32,
+}
+
+impl Trainings {
+    /// The scene, the steps of a training, and the seeds.
+    pub fn plan(&self, small: bool) -> (SynthOptions, u32, &[u64]) {
+        match small {
+            true => (small_scene(), 30, &self.seeds[..1]),
+            false => {
+                let made = SynthOptions { width: self.width, height: self.width * 3 / 4, ..SynthOptions::default() };
+                (made, self.steps, &self.seeds)
+            }
+        }
+    }
+}
+
 /// One view in this many of a made scene is held out.
 pub const TEST_EVERY: u32 = 8;
 
@@ -55,11 +82,17 @@ pub fn timed_step(trainer: &mut Trainer) -> Result<(Vec<StepReport>, Cost)> {
 pub fn plain_model(gpu: &Arc<Gpu>, options: &SynthOptions, steps: u32) -> Result<Gaussians> {
     let dataset = without_masks(&synth::dataset(options, TEST_EVERY));
     let config = TrainConfig { iterations: steps, ..TrainConfig::default() };
-    let mut trainer = trainer(gpu, &dataset, &start(&dataset, &config)?, config)?;
+    trained(gpu, &dataset, config)?.model()
+}
+
+/// A trainer after all of its steps.
+pub fn trained(gpu: &Arc<Gpu>, dataset: &Dataset, config: TrainConfig) -> Result<Trainer> {
+    let steps = config.iterations;
+    let mut trainer = trainer(gpu, dataset, &start(dataset, &config)?, config)?;
     for _ in 0..steps {
         trainer.step()?;
     }
-    trainer.model()
+    Ok(trainer)
 }
 
 /// A labelled model after a number of steps.

@@ -1,7 +1,7 @@
 //! A scene seen at other sizes than it was trained at, with and without antialiasing, against traced photos of each size.
 
 use super::measure::write_json;
-use super::trained::{Judge, TEST_EVERY, small_scene, start, trainer, without_masks};
+use super::trained::{Judge, TEST_EVERY, Trainings, trained, without_masks};
 use super::{Common, device};
 use labelgs::Result;
 use labelgs::engine::Engine;
@@ -22,27 +22,14 @@ const SIZES: [f64; 5] = [0.25, 0.5, 1.0, 2.0, 4.0];
 pub struct Options {
     #[command(flatten)]
     common: Common,
-    /// Steps of a training.
-    #[arg(long, default_value_t = 1700)]
-    steps: u32,
-    /// Seeds of the trainings.
-    #[arg(long, value_delimiter = ',', default_values_t = [0_u64, 1, 2])]
-    seeds: Vec<u64>,
-    /// Width of the photos, px.
-    #[arg(long, default_value_t = 320)]
-    width: u32,
+    #[command(flatten)]
+    trainings: Trainings,
 }
 
 /// Runs it.
 pub fn run(options: &Options) -> Result<()> {
     let gpu = device::open()?;
-    let small = options.common.small;
-    let made = if small {
-        small_scene()
-    } else {
-        SynthOptions { width: options.width, height: options.width * 3 / 4, ..SynthOptions::default() }
-    };
-    let (steps, seeds) = if small { (30, &options.seeds[..1]) } else { (options.steps, options.seeds.as_slice()) };
+    let (made, steps, seeds) = options.trainings.plan(options.common.small);
     let scenes = SIZES.map(|size| {
         let side = |pixels: u32| (f64::from(pixels) * size).round() as u32;
         without_masks(&synth::dataset(
@@ -57,10 +44,7 @@ pub fn run(options: &Options) -> Result<()> {
     for &seed in seeds {
         for antialias in [false, true] {
             let config = TrainConfig { iterations: steps, seed, antialias, ..TrainConfig::default() };
-            let mut trainer = trainer(&gpu, photos, &start(photos, &config)?, config.clone())?;
-            for _ in 0..steps {
-                trainer.step()?;
-            }
+            let mut trainer = trained(&gpu, photos, config.clone())?;
             let (model, config) = (trainer.model()?, TrainConfig { near: trainer.config().near, ..config });
             let mut found = Vec::new();
             for (scene, size) in scenes.iter().zip(SIZES) {

@@ -6,8 +6,7 @@ use super::fixture::{Fixture, GRADIENTS, PARAMETERS};
 use super::judge;
 use super::model::rig_of;
 use super::scenes::{Scene, Shape, scene};
-use crate::engine::ListKey;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::pass::KernelShape;
 use crate::scheduler::plan::Buf;
@@ -90,11 +89,7 @@ impl Smoothed {
             fixture.input.update = true;
             fixture.config.antialias = true;
             fixture.engine.set_extension(BudgetStrategy::default().extension(), SMOOTH);
-            let ListKey::Train(variant) = fixture.key() else {
-                return Err(Error::Bug("the key of a step is that of another list".to_owned()));
-            };
-            let key = if passes == 0 { ListKey::Train(variant) } else { ListKey::Extended(variant, passes) };
-            fixture.train_as(key)?;
+            fixture.train_with(passes)?;
             let after = fixture.get::<[f32; 4]>(Buf::SCALES, count)?;
             Ok((fixture.rows(PARAMETERS, count)?, before, after, fixture.scene))
         };

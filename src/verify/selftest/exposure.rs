@@ -5,8 +5,8 @@ use super::compare::{Tolerance, Verdict, close, gradients};
 use super::fixture::{Fixture, readable};
 use super::judge;
 use super::scenes::{Scene, Shape, scene};
-use crate::engine::{ListKey, SharedRow};
-use crate::error::{Error, Result};
+use crate::engine::SharedRow;
+use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::pass::KernelShape;
 use crate::scheduler::plan::Buf;
@@ -47,10 +47,7 @@ impl Exposed {
         fixture.engine.set_extension(Exposure::default().extension(place), 1);
         fixture.engine.set_shared(&LOGS)?;
         fixture.shared = vec![SharedRow { row: PHOTO as u32, rates: [0.0; 4] }];
-        let ListKey::Train(variant) = fixture.key() else {
-            return Err(Error::Bug("the key of a step is that of another list".to_owned()));
-        };
-        fixture.train_as(ListKey::Extended(variant, 1))?;
+        fixture.train_with(1)?;
         Ok(Self {
             image,
             v_image: wide(fixture.get(Buf::V_IMAGE, pixels)?),

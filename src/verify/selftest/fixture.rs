@@ -186,12 +186,17 @@ impl Fixture {
 
     /// Key of the training step's list.
     pub fn key(&self) -> ListKey {
+        ListKey::Train(self.variant())
+    }
+
+    /// Variant of the training step.
+    pub fn variant(&self) -> Variant {
         let (labels, update) = (self.input.labels, self.input.update);
         let size = (self.scene.camera.width, self.scene.camera.height);
         let lift = self.input.lifts(&self.config);
         let disagreement = labels && self.input.layers.is_empty();
         let (labels, sh_degree) = (labels && !disagreement, self.config.sh_degree);
-        ListKey::Train(Variant { labels, disagreement, lift, sh_degree, size, update, counts: false })
+        Variant { labels, disagreement, lift, sh_degree, size, update, counts: false }
     }
 
     /// Sorted pairs of the device: keys, and positions before the sort.
@@ -220,6 +225,14 @@ impl Fixture {
     /// Runs a training step; no pass may write outside of its buffers.
     pub fn train(&mut self) -> Result<Report> {
         self.train_as(self.key())
+    }
+
+    /// Same as [`Fixture::train`], with the passes of a variant of the extension; 0 for none.
+    pub fn train_with(&mut self, passes: u32) -> Result<Report> {
+        match passes {
+            0 => self.train(),
+            passes => self.train_as(ListKey::Extended(self.variant(), passes)),
+        }
     }
 
     /// Same as [`Fixture::train`], with another list.

@@ -4,7 +4,7 @@ use super::compare::{Tolerance, Verdict, close, exact};
 use super::fixture::{Fixture, MOMENTS_1, MOMENTS_2, PARAMETERS, readable};
 use super::scenes::{Scene, Shape, population, scene};
 use crate::engine::ListKey;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::pass::KernelShape;
 use crate::scene::{Camera, Gaussians};
@@ -258,10 +258,7 @@ impl Fog {
         fixture.free_space = Some((other_camera(&fixture.scene.camera), Self::OTHER_NEAR));
         fixture.input.update = true;
         fixture.engine.set_extension(BudgetStrategy::default().extension(), FREE_SPACE);
-        let ListKey::Train(variant) = fixture.key() else {
-            return Err(Error::Bug("the key of a step is that of another list".to_owned()));
-        };
-        fixture.train_as(ListKey::Extended(variant, FREE_SPACE))?;
+        fixture.train_with(FREE_SPACE)?;
         let stats = fixture.get::<[f32; 2]>(Buf::DENSIFY_STATS, count)?;
         let rows = fixture.rows(PARAMETERS, count)?;
         Ok(Self { scene: fixture.scene.clone(), rows, counts: stats.iter().map(|pair| pair[1]).collect() })

@@ -4,8 +4,8 @@ use super::compare::{Tolerance, Verdict, close};
 use super::fixture::{Fixture, readable};
 use super::judge;
 use super::scenes::{Scene, Shape, scene};
-use crate::engine::{ListKey, SharedRow};
-use crate::error::{Error, Result};
+use crate::engine::SharedRow;
+use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::pass::KernelShape;
 use crate::scene::Camera;
@@ -47,10 +47,7 @@ impl Posed {
         fixture.engine.set_shared(&ROWS)?;
         let row = |k: usize| SharedRow { row: (FIRST + k) as u32, rates: [0.0; 4] };
         fixture.shared = vec![row(0), row(1)];
-        let ListKey::Train(variant) = fixture.key() else {
-            return Err(Error::Bug("the key of a step is that of another list".to_owned()));
-        };
-        fixture.train_as(ListKey::Extended(variant, 1))?;
+        fixture.train_with(1)?;
         Ok(Self {
             camera,
             splats: fixture.splats()?,

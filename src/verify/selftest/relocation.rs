@@ -6,7 +6,7 @@ use super::judge;
 use super::model::{GROW, SEED, holding, rig_of, scene_of};
 use super::scenes::{Shape, population, scene};
 use crate::engine::ListKey;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::pass::KernelShape;
 use crate::scheduler::plan::Buf;
@@ -106,14 +106,7 @@ impl Explored {
             let strategy = of(StrategyKind::Mcmc);
             let all = strategy.passes(At { step: 1, config: &fixture.config, extent: fixture.fixed.extent });
             fixture.engine.set_extension(strategy.extension(), all);
-            let ListKey::Train(variant) = fixture.key() else {
-                return Err(Error::Bug("the key of a step is that of another list".to_owned()));
-            };
-            let key = match all & !without {
-                0 => ListKey::Train(variant),
-                passes => ListKey::Extended(variant, passes),
-            };
-            fixture.train_as(key)?;
+            fixture.train_with(all & !without)?;
             let splats = fixture.get::<u32>(Buf::SPLAT_FROM_GAUSSIAN, count)?;
             visible = splats.into_iter().map(|splat| splat != NO_SPLAT).collect();
             uniforms = fixture.uniforms();
