@@ -4,10 +4,11 @@
 #include "step.glsl"
 #include "count.glsl"
 // radix_count — histogram of one digit of the keys, one histogram per lane.
-// Work:    LANES lanes over all workgroups; lane i owns keys [i c, (i+1) c). Each lane has its own column of the
-//          table: this needs no atomics and no barriers, and equal keys keep their order.
+// Work:    LANES lanes over all workgroups of one subgroup; lane i owns keys [i c, (i+1) c). Each lane has its own column
+//          of the table: this needs no atomics, and equal keys keep their order.
 // Reads:   step, counters, failure; keys_in [n]
-// Writes:  histogram [2^DIGIT_BITS, LANES]
+// Writes:  histogram [2^DIGIT_BITS, LANES]: sums over the lanes before in the workgroup; totals [2^DIGIT_BITS,
+//          workgroups]
 // Order:   exact integers, equal in every run.
 // Mirror:  src/verify/reference/sort.rs::radix_sort
 
@@ -23,6 +24,7 @@ READ1(1, Counters, counters);
 READ1(2, uint, failure);
 FETCHU(3, keys_in);
 WRITE(4, uint, histogram);
+WRITE(5, uint, totals);
 
 void main() {
     uint n = item_count(step, counters, failure);
@@ -36,6 +38,17 @@ void main() {
         uint digit = bitfieldExtract(fetchu(keys_in, i), int(SHIFT), int(DIGIT_BITS));
         table[digit * SUBGROUP_SIZE + column] += 1u;
     }
+    barrier();
+    for (uint d = column; d < DIGITS; d += SUBGROUP_SIZE) {
+        uint sum = 0u;
+        for (uint at = d * SUBGROUP_SIZE; at < (d + 1u) * SUBGROUP_SIZE; at++) {
+            uint count = table[at];
+            table[at] = sum;
+            sum += count;
+        }
+        totals[d * (LANES / SUBGROUP_SIZE) + gl_WorkGroupID.x] = sum;
+    }
+    barrier();
     for (uint d = 0u; d < DIGITS; d++) {
         histogram[d * LANES + lane] = table[d * SUBGROUP_SIZE + column];
     }

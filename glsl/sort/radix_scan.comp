@@ -1,33 +1,46 @@
 #version 460
 #include "layout.glsl"
-// radix_scan — exclusive scan of the whole histogram, digit-major, in place.
-// Work:    one workgroup of one subgroup; lane i owns a contiguous share, a multiple of four cells, and adds four per
-//          round: lavapipe ends both loops after 65,535 rounds in total.
-// Reads:   histogram [CELLS]
-// Writes:  histogram [CELLS]
+// radix_scan — exclusive scan of the workgroups' totals, digit-major, in place.
+// Work:    one workgroup of one subgroup; lane i owns a contiguous share. A round has several words under way, because
+//          nothing else hides the wait for memory.
+// Reads:   totals [CELLS]
+// Writes:  totals [CELLS]
 // Order:   exact integers, equal in every run.
 // Mirror:  src/verify/reference/sort.rs::radix_sort
 
 #include "subgroup.glsl"
-layout(constant_id = 6) const uint CELLS = 8192;
+layout(constant_id = 6) const uint CELLS = 1024;
 layout(local_size_x_id = 0) in;
-INOUT(0, uint, histogram);
+INOUT(0, uint, totals);
+
+const uint ROUND = 8u;
+
+uint word(uint i, uint end) {
+    uint v = totals[min(i, CELLS - 1u)];
+    return i < end ? v : 0u;
+}
 
 void main() {
     uint lane = gl_LocalInvocationID.x;
-    uint share = CELLS / SUBGROUP_SIZE;
-    uint begin = lane * share, end = begin + share;
+    uint share = (CELLS + SUBGROUP_SIZE - 1u) / SUBGROUP_SIZE;
+    uint begin = min(lane * share, CELLS), end = min(begin + share, CELLS);
     uint sum = 0u;
-    for (uint i = begin; i < end; i += 4u) {
-        sum += histogram[i] + histogram[i + 1u] + histogram[i + 2u] + histogram[i + 3u];
+    for (uint i = begin; i < end; i += ROUND) {
+        [[unroll]] for (uint k = 0u; k < ROUND; k++) {
+            sum += word(i + k, end);
+        }
     }
     uint running = subgroup_exclusive_add(sum);
-    for (uint i = begin; i < end; i += 4u) {
-        uvec4 v = uvec4(histogram[i], histogram[i + 1u], histogram[i + 2u], histogram[i + 3u]);
-        histogram[i] = running;
-        histogram[i + 1u] = running + v.x;
-        histogram[i + 2u] = running + v.x + v.y;
-        histogram[i + 3u] = running + v.x + v.y + v.z;
-        running += v.x + v.y + v.z + v.w;
+    for (uint i = begin; i < end; i += ROUND) {
+        uint v[ROUND];
+        [[unroll]] for (uint k = 0u; k < ROUND; k++) {
+            v[k] = word(i + k, end);
+        }
+        [[unroll]] for (uint k = 0u; k < ROUND; k++) {
+            if (i + k < end) {
+                totals[i + k] = running;
+            }
+            running += v[k];
+        }
     }
 }

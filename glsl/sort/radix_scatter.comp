@@ -5,7 +5,8 @@
 #include "count.glsl"
 // radix_scatter — move keys and values to their sorted positions for one digit; stable.
 // Work:    as radix_count.
-// Reads:   step, counters, failure; keys_in [n], values_in [n] (IDENTITY: the value is the index); histogram (scanned)
+// Reads:   step, counters, failure; keys_in [n], values_in [n] (IDENTITY: the value is the index); histogram,
+//          totals (scanned)
 // Writes:  keys_out [n], values_out [n]
 // Order:   exact integers, equal in every run.
 // Mirror:  src/verify/reference/sort.rs::radix_sort
@@ -24,8 +25,9 @@ READ1(2, uint, failure);
 FETCHU(3, keys_in);
 FETCHU(4, values_in);
 FETCHU(5, histogram);
-WRITE(6, uint, keys_out);
-WRITE(7, uint, values_out);
+FETCHU(6, totals);
+WRITE(7, uint, keys_out);
+WRITE(8, uint, values_out);
 
 void main() {
     uint n = item_count(step, counters, failure);
@@ -33,7 +35,8 @@ void main() {
     uint share = (n + LANES - 1u) / LANES;
     uint begin = min(lane * share, n), end = min(begin + share, n);
     for (uint d = 0u; d < DIGITS; d++) {
-        table[d * SUBGROUP_SIZE + column] = fetchu(histogram, d * LANES + lane);
+        table[d * SUBGROUP_SIZE + column] =
+            fetchu(totals, d * (LANES / SUBGROUP_SIZE) + gl_WorkGroupID.x) + fetchu(histogram, d * LANES + lane);
     }
     for (uint i = begin; i < end; i++) {
         uint key = fetchu(keys_in, i);

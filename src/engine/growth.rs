@@ -78,6 +78,7 @@ fn derive(shape: &KernelShape, capacity: &mut Capacity, instances: u64, trained:
     capacity.segment_pixels = if capacity.segments > 1 { jobs * u64::from(shape.tile_pixels()) } else { 0 };
     capacity.sort_lanes = u64::from(shape.lanes(instances.max(capacity.gaussians)));
     capacity.sort_cells = capacity.sort_lanes << shape.digit_bits;
+    capacity.sort_totals = capacity.sort_cells / u64::from(shape.subgroup);
     capacity.scan_lanes = 2 * u64::from(shape.lanes(capacity.gaussians.max(capacity.virtual_tiles)));
 }
 

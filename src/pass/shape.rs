@@ -53,6 +53,8 @@ impl KernelShape {
             ..=4 => (4, 8),
             8 => (8, 8),
             16 => (16, 8),
+            // A card waits for the subgroup of the fullest tile; a processor saves the loads of splats.
+            32 if !cpu => (16, 8),
             _ => (16, 16),
         };
         Self {

@@ -46,14 +46,13 @@ pub fn sort(b: &mut Builder, buffers: SortBuffers, bits: u32, count: Count, by: 
         let values_in = if identity_now { buffers.keys[from] } else { buffers.values[from] };
         pass!(b, radix_count {
             step: Buf::STEP, counters: Buf::COUNTERS, failure: Buf::FAILURE, keys_in: buffers.keys[from],
-            histogram: Buf::SORT_HISTOGRAM,
+            histogram: Buf::SORT_HISTOGRAM, totals: Buf::SORT_TOTALS,
         } [count_source: count as u32, lanes: lanes, shift: shift, digit_bits: digit_bits], groups);
-        pass!(b, radix_scan { histogram: Buf::SORT_HISTOGRAM }
-            [cells: lanes << digit_bits], ONE);
+        pass!(b, radix_scan { totals: Buf::SORT_TOTALS } [cells: (lanes / b.shape.subgroup) << digit_bits], ONE);
         pass!(b, radix_scatter {
             step: Buf::STEP, counters: Buf::COUNTERS, failure: Buf::FAILURE, keys_in: buffers.keys[from],
-            values_in: values_in, histogram: Buf::SORT_HISTOGRAM, keys_out: buffers.keys[to],
-            values_out: buffers.values[to],
+            values_in: values_in, histogram: Buf::SORT_HISTOGRAM, totals: Buf::SORT_TOTALS,
+            keys_out: buffers.keys[to], values_out: buffers.values[to],
         } [count_source: count as u32, lanes: lanes, shift: shift, digit_bits: digit_bits,
             identity: u32::from(identity_now)], groups);
     }

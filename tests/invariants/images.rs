@@ -88,8 +88,10 @@ fn an_engine_that_has_grown_renders_as_one_made_so_large() {
     // Only pictures can be drawn in bands.
     let size = EngineSize::new(60, (64, 48)).for_training();
     let mut trained = Engine::new(turn.gpu(), size, guarded()).expect("an engine");
-    let error = trained.grow_image(1 << 15, 1 << 15).expect_err("more tiles than a loop walks");
-    assert!(error.to_string().contains("tiles"), "{error}");
+    if trained.shape().loop_rounds.is_some() {
+        let error = trained.grow_image(1 << 15, 1 << 15).expect_err("more tiles than a loop walks");
+        assert!(error.to_string().contains("tiles"), "{error}");
+    }
     trained.upload_model(&model).expect("the model");
     let after = render(&mut trained, &camera, &RenderOptions::default()).expect("a picture");
     assert_eq!((after.rgb, after.depth), (before.rgb, before.depth));

@@ -146,7 +146,12 @@ fn sort_with_the_lanes_of_a_large_scene_is_exact() {
     let mut engine = engine(turn.gpu());
     let (subgroup, digit_bits) = (u64::from(engine.shape().subgroup), engine.shape().digit_bits);
     let lanes = 140 * subgroup;
-    let large = Capacity { sort_lanes: lanes, sort_cells: lanes << digit_bits, ..*engine.raw().capacity() };
+    let large = Capacity {
+        sort_lanes: lanes,
+        sort_cells: lanes << digit_bits,
+        sort_totals: 140 << digit_bits,
+        ..*engine.raw().capacity()
+    };
     engine.raw_mut().set_capacity(large).expect("room");
     sort_exactly(&mut engine, &[(ITEMS, u32::MAX), (ITEMS, 3)]);
 }

@@ -105,6 +105,8 @@ domains! { Domain, Capacity;
         "Words of occluder bits of all layers.";
     SortCells sort_cells: "sort cells", cures::PAIRS,
         "Cells of the histogram of the sort.";
+    SortTotals sort_totals: "sort totals", cures::PAIRS,
+        "Cells of the totals of the sort.";
     ScanLanes scan_lanes: "scan lanes", cures::PAIRS,
         "Lanes of the scan.";
     LossPartials loss_partials: "loss partials", cures::IMAGE,

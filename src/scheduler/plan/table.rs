@@ -70,7 +70,8 @@ crate::buffers! {
     DEPTH_VALUES_A "gaussian_from_splat": 4, Domain::Gaussians, Class::Step, WORD, "Gaussian of each splat, `[V]`; in depth order after the sort.";
     DEPTH_VALUES_B "depth_values_b": 4, Domain::Gaussians, Class::Step, WORD, "Gaussians between two passes of the sort, `[V]`.";
     SCAN_PARTIALS "scan_partials": 4, Domain::ScanLanes, Class::Step, None, "Sum of each lane's share in a scan.";
-    SORT_HISTOGRAM "sort_histogram": 4, Domain::SortCells, Class::Step, WORD, "Digit counts of the sort, by digit and lane.";
+    SORT_HISTOGRAM "sort_histogram": 4, Domain::SortCells, Class::Step, WORD, "Digit counts of the sort in the lanes before of a workgroup, by digit and lane.";
+    SORT_TOTALS "sort_totals": 4, Domain::SortTotals, Class::Step, WORD, "Digit counts of the sort, by digit and workgroup.";
     SPLATS "splats": 48, Domain::Gaussians, Class::Step, VEC4, "Projected Gaussians in depth order, `[V, 3 vec4]` (glsl/include/record.glsl).";
     TILES_TOUCHED "tiles_touched": 4, Domain::Gaussians, Class::Step, WORD, "Number of tiles of each splat over all layers, `[V]`.";
     INSTANCE_OFFSETS "instance_offsets": 4, Domain::Gaussians, Class::Step, WORD, "First instance of each splat, `[V]`.";

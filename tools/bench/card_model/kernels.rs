@@ -53,6 +53,8 @@ pub fn work(item: &Item, c: &Counts, compiler: &Compiler) -> Result<(Work, Vec<T
 
 /// Lanes of a subgroup.
 const LANES: f64 = 32.0;
+/// Words of a round of radix_scan.
+const SCAN_ROUND: f64 = 8.0;
 
 /// A pass of a step with these counts.
 struct Kernel<'a> {
@@ -176,8 +178,10 @@ impl Kernel<'_> {
             ("scan_apply", "offsets") => written(all(n, 4.0)),
             ("radix_count" | "radix_scatter", "keys_in") => read(all(n, 4.0)),
             ("radix_count", "histogram") => written(all(cells, 4.0)),
-            ("radix_scan", "histogram") => both(all(self.constant("CELLS"), 4.0)),
+            ("radix_count", "totals") => written(all(cells / LANES, 4.0)),
+            ("radix_scan", "totals") => both(all(self.constant("CELLS"), 4.0)),
             ("radix_scatter", "histogram") => read(all(cells, 4.0)),
+            ("radix_scatter", "totals") => read(all(cells / LANES, 4.0)),
             ("radix_scatter", "values_in") if self.constant("IDENTITY") != 0.0 => read(0.0),
             ("radix_scatter", "values_in") => read(all(n, 4.0)),
             ("radix_scatter", "keys_out" | "values_out") => written(all(n, 4.0)),
@@ -298,7 +302,7 @@ impl Kernel<'_> {
             "emit_instances" | "project_forward" => vec![splat_waves * most_tiles / doubled],
             "gather" => vec![splat_waves * most_tiles],
             "radix_count" | "radix_scatter" | "scan_reduce" | "scan_apply" => vec![shares],
-            "radix_scan" => vec![self.constant("CELLS") / LANES / 4.0; 2],
+            "radix_scan" => vec![self.constant("CELLS") / LANES / SCAN_ROUND; 2],
             "scan_spine" => vec![self.constant("LANES") / LANES; 2],
             "tile_ranges" => vec![c.virtual_tiles() / LANES * c.instances.max(2.0).log2(); 2],
             "loss_reduce" => {
@@ -329,7 +333,7 @@ impl Kernel<'_> {
             },
             // One subgroup; every round waits for words that the passes before have just written.
             "radix_scan" => {
-                let rounds = self.constant("CELLS") / LANES / 4.0;
+                let rounds = self.constant("CELLS") / LANES / SCAN_ROUND;
                 Chain { far: 2.0 * rounds, instructions: rounds * (body(0) + body(1)), ..Chain::default() }
             }
             "scan_spine" => {
