@@ -20,8 +20,13 @@ impl Band {
         first * width..(first + self.rows as usize) * width
     }
 
+    /// Returns the camera of its rows of a picture.
+    pub(crate) fn camera(self, whole: &Camera) -> Camera {
+        Camera { cy: whole.cy - f64::from(self.first), height: self.rows, ..whole.clone() }
+    }
+
     /// Returns the bands of a picture, all but the last with `most` rows.
-    fn all(height: u32, most: u32) -> Vec<Self> {
+    pub(crate) fn all(height: u32, most: u32) -> Vec<Self> {
         let most = most.max(1);
         (0..height.div_ceil(most)).map(|at| Self { first: at * most, rows: most.min(height - at * most) }).collect()
     }
@@ -30,20 +35,27 @@ impl Band {
 impl Engine {
     /// Returns the bands in which a picture of the camera is drawn: one, unless the device cannot walk its tiles at once.
     pub(crate) fn bands(&self, camera: &Camera) -> Vec<Band> {
-        let most = self.size.band(&self.shape).unwrap_or(camera.height);
-        Band::all(camera.height, if self.size.trained { camera.height } else { most })
+        Band::all(camera.height, self.size.band(&self.shape).unwrap_or(camera.height))
     }
 
     /// Returns the camera's part of the uniforms for a band. Slopes keep the limits of the whole picture, so that bands fit
     /// together.
     pub(crate) fn band_uniforms(&self, camera: &Camera, band: Band, near: f32, background: [f32; 3]) -> StepUniforms {
-        let part = Camera { cy: camera.cy - f64::from(band.first), height: band.rows, ..camera.clone() };
-        let whole = self.view_uniforms(camera, near, background);
-        StepUniforms {
-            clamp_y_min: whole.clamp_y_min,
-            clamp_y_max: whole.clamp_y_max,
-            ..self.view_uniforms(&part, near, background)
-        }
+        self.part_uniforms(&band.camera(camera), Some(camera), near, background)
+    }
+
+    /// Returns the camera's part of the uniforms; for a part of a picture, with the limits of slopes of the `whole` one.
+    pub(crate) fn part_uniforms(
+        &self,
+        camera: &Camera,
+        whole: Option<&Camera>,
+        near: f32,
+        background: [f32; 3],
+    ) -> StepUniforms {
+        let part = self.view_uniforms(camera, near, background);
+        let Some(whole) = whole else { return part };
+        let StepUniforms { clamp_y_min, clamp_y_max, .. } = self.view_uniforms(whole, near, background);
+        StepUniforms { clamp_y_min, clamp_y_max, ..part }
     }
 }
 

@@ -100,6 +100,7 @@ impl Engine {
     #[doc(hidden)]
     pub fn predict(gpu: &Gpu, size: &EngineSize, options: SchedulerOptions) -> Result<MemoryReport> {
         let shape = KernelShape::of(gpu.capabilities());
+        let size = &size.in_bands(&shape);
         let capacity = capacity(&shape, size);
         let lists = Self::lists_of(&shape, &capacity, size);
         Scheduler::predict(TABLE, &capacity, &lists, &options.limits(gpu))

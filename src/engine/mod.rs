@@ -14,6 +14,7 @@ mod size;
 pub(crate) mod state;
 pub(crate) mod uniforms;
 
+pub(crate) use bands::Band;
 pub(crate) use growth::{GrownSizes, capacity};
 pub(crate) use input::{DisagreementInput, Input, LayerInput, SharedRow, TrainInput, VoteInput};
 pub(crate) use run::{InFlight, ListKey, Recording, Report};

@@ -68,17 +68,15 @@ impl EngineSize {
     }
 
     /// Returns the most rows of a picture that a list can draw; `None` without a limit.
-    pub(super) fn band(&self, shape: &KernelShape) -> Option<u32> {
+    pub(crate) fn band(&self, shape: &KernelShape) -> Option<u32> {
         let tiles_x = shape.tiles(self.image.0, 1).0.max(1);
         self.most_tiles(shape).map(|most| (most / tiles_x).max(1) * shape.tile_height)
     }
 
-    /// Limits the image of an engine for rendering to one band ([`Engine::bands`](super::Engine::bands)).
-    pub(super) fn in_bands(self, shape: &KernelShape) -> Self {
-        match self.band(shape) {
-            Some(most) if !self.trained => Self { image: (self.image.0, self.image.1.min(most)), ..self },
-            _ => self,
-        }
+    /// Limits the image to one band ([`Engine::bands`](super::Engine::bands)).
+    pub(crate) fn in_bands(self, shape: &KernelShape) -> Self {
+        let most = self.band(shape).unwrap_or(u32::MAX);
+        Self { image: (self.image.0, self.image.1.min(most)), ..self }
     }
 
     /// Fails if the image has more tiles than the kernels can walk.

@@ -3,6 +3,7 @@
 //! The order of views is known ahead. What a thread makes depends on step and view alone, so that a step has the same bits
 //! whether its pixels were made ahead or are made when it begins.
 
+use super::parts::Part;
 use super::step_input::{TrainView, valid_pixels};
 use crate::error::{Error, Result};
 use crate::io::resample::shrink_photo;
@@ -27,8 +28,9 @@ pub(super) struct Ready {
 /// What a step needs.
 pub(super) struct Wanted {
     step: u32,
-    /// Index of the view.
+    /// Index of the part.
     index: usize,
+    part: Part,
     photo: Pixels<Photo>,
     view_labels: Pixels<Vec<u32>>,
     /// Camera of a smaller size.
@@ -36,25 +38,25 @@ pub(super) struct Wanted {
 }
 
 impl Wanted {
-    /// Asks for a view, the one with this index, at a share of its size.
-    pub(super) fn new(step: u32, (index, view): (usize, &TrainView), share: Option<f64>) -> Self {
-        let TrainView { camera, photo, view_labels, .. } = view;
-        let small = share.map(|share| camera.shrunk(share));
-        Self { step, index, photo: photo.clone(), view_labels: view_labels.clone(), small }
+    /// Asks for a part, the one with this index, of a view at a share of its size.
+    pub(super) fn new(step: u32, (index, part): (usize, &Part), view: &TrainView, share: Option<f64>) -> Self {
+        let small = share.map(|share| part.camera.shrunk(share));
+        let (photo, view_labels) = (view.photo.clone(), view.view_labels.clone());
+        Self { step, index, part: part.clone(), photo, view_labels, small }
     }
 
     fn make(self) -> Result<Ready> {
-        let photo = self.photo.get()?;
+        let photo = self.part.photo(self.photo.get()?);
         let Some(camera) = self.small else {
-            return Ok(Ready { photo, view_labels: self.view_labels.get()?, small: None });
+            return Ok(Ready { photo, view_labels: self.part.labels(self.view_labels.get()?), small: None });
         };
         let photo = Arc::new(shrink_photo(&photo, camera.width, camera.height));
-        let valid = valid_pixels(&photo);
+        let valid = valid_pixels(&photo.rgba);
         Ok(Ready { photo, view_labels: Arc::default(), small: Some((camera, valid)) })
     }
 }
 
-/// The threads, by step: index of the view, and its pixels.
+/// The threads, by step: index of the part, and its pixels.
 #[derive(Debug)]
 pub(super) struct Ahead {
     running: BTreeMap<u32, (usize, JoinHandle<Result<Ready>>)>,

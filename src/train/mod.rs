@@ -12,6 +12,7 @@ pub(crate) mod free_space;
 pub(crate) mod kinds;
 pub(crate) mod near;
 mod occlusion;
+mod parts;
 mod photo_rows;
 pub(crate) mod poses;
 mod presets;
@@ -79,7 +80,7 @@ pub struct Trainer {
     views: Views,
     fixed: SceneScale,
     order: ViewOrder,
-    /// Size of the largest photo, px. The image of the engine may be larger, because it grows.
+    /// Size of the largest part of a photo, px. The image of the engine may be larger, because it grows.
     image: (u32, u32),
     /// Submitted steps that are not retired yet, at most one per frame.
     in_flight: VecDeque<(StepInput, InFlight)>,
@@ -145,22 +146,23 @@ impl Trainer {
         let shared = shared.or_of(&config, dataset);
         let strategy = strategy.unwrap_or_else(|| strategy::of(config.strategy));
         let most = if config.max_gaussians > 0 { config.max_gaussians } else { u64::from(u32::MAX) };
-        let views = Views::new(setup::train_views(dataset, config.mask_border)?, &config);
         let shape = shape.unwrap_or_else(|| KernelShape::of(gpu.capabilities()));
+        let views = Views::new(setup::train_views(dataset, config.mask_border, size.band(&shape))?, &config);
         let size = size.with_shared_rows(shared.rows(views.len()));
         let mut engine = Engine::with_shape(gpu, shape, size, scheduler)?;
         engine.set_sh_degree(config.sh_degree);
         engine.set_antialiased(config.antialias);
+        let image = engine.size().image;
         let passes = shared.passes(strategy.passes(At { step: 1, config: &config, extent: fixed.extent }));
         engine.set_extension(shared.extended(strategy.extension()), passes);
-        let order = ViewOrder::new(config.seed, views.len());
+        let order = ViewOrder::new(config.seed, views.parts().len());
         Ok(Self {
             engine,
             config,
             views,
             fixed,
             order,
-            image: size.image,
+            image,
             in_flight: VecDeque::new(),
             step: 0,
             updates: 0,
@@ -286,10 +288,10 @@ impl Trainer {
     }
 
     fn input(&mut self, step: u32) -> Result<StepInput> {
-        let view = self.order.draw();
+        let part = self.order.draw();
         let next = self.order.upcoming(self.views.steps_ahead());
-        self.views.prepare(step, view, &next)?;
-        let objects = &self.views[view].objects;
+        self.views.prepare(step, part, &next)?;
+        let objects = &self.views.parts()[part].objects;
         // A view without a mask, or with an empty one, costs as much as in a scene without masks.
         let labels = self.config.labels_at(step) && !objects.is_empty();
         let layers = if labels && self.config.has_layers_at(step) {
@@ -299,7 +301,7 @@ impl Trainer {
         };
         let update = self.strategy.updates(self.at(step));
         self.updates += u32::from(update);
-        Ok(StepInput { step, view, layers, labels, update, updates: self.updates })
+        Ok(StepInput { step, part, layers, labels, update, updates: self.updates })
     }
 
     fn at(&self, step: u32) -> At<'_> {
@@ -333,7 +335,7 @@ impl Trainer {
 
     fn submit(&mut self, input: StepInput) -> Result<()> {
         let (key, view, uniforms) = (self.key(&input), self.views.of(&input)?, self.uniforms(&input)?);
-        let shared = self.shared.of_step(self.at(input.step), input.view)?;
+        let shared = self.shared.of_step(self.at(input.step), self.views.index(&input))?;
         let data = step_input::train_input(&input, view, &self.config, uniforms, &self.engine);
         let data = TrainInput { shared, ..data };
         let flight = self.engine.submit(key, &data)?;

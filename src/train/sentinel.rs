@@ -30,7 +30,7 @@ pub(super) struct Seen {
 impl Trainer {
     pub(super) fn watch(&mut self, input: &StepInput, report: &Report, losses: [f64; 2]) -> Result<()> {
         let counters = &report.counters;
-        let view = &self.views[input.view].name;
+        let view = &self.views[self.views.index(input)].name;
         let failure = |quantity: String| Error::Numeric { quantity, step: u64::from(input.step), view: view.clone() };
         for (pass, what, count, first) in [
             ("cull", "positions, opacities or scales", counters.broken_count, counters.broken_first),

@@ -1,5 +1,6 @@
 //! The inputs of a training: options, sizes, views.
 
+use super::parts::Part;
 use super::shared::Shared;
 use super::step_input::{self, TrainView};
 use super::strategy::Strategy;
@@ -82,36 +83,41 @@ pub(crate) fn start_size(
     }
 }
 
-/// Makes the training views of a data set.
-pub(super) fn train_views(dataset: &Dataset, border: u32) -> Result<Vec<TrainView>> {
+/// Makes the training views of a data set, and their parts of at most `most` rows.
+pub(super) fn train_views(dataset: &Dataset, border: u32, most: Option<u32>) -> Result<(Vec<TrainView>, Vec<Part>)> {
     let views: Vec<&View> = dataset.train.iter().collect();
-    crew::over_views(&views, |view| train_view(view, border)).into_iter().collect()
+    let (mut whole, mut parts) = (Vec::new(), Vec::new());
+    for (index, found) in crew::over_views(&views, |view| train_view(view, border, most)).into_iter().enumerate() {
+        let (view, of_view) = found?;
+        whole.push(view);
+        parts.extend(of_view.into_iter().map(|part| Part { view: index, ..part }));
+    }
+    Ok((whole, parts))
 }
 
-fn train_view(view: &View, border: u32) -> Result<TrainView> {
+fn train_view(view: &View, border: u32, most: Option<u32>) -> Result<(TrainView, Vec<Part>)> {
     let (pixels, mask) = (view.photo()?, view.mask()?);
     let photo = view.photo.clone().unwrap_or_else(|| pixels.clone().into());
     let objects = mask.as_deref().map(LabelMap::objects).unwrap_or_default();
     let labels = mask.as_ref().map(|mask| step_input::view_labels(mask, border)).unwrap_or_default();
-    let shown = step_input::shown_objects(&pixels, &labels);
+    let parts = Part::all(&view.camera, &pixels, mask.as_deref(), &labels, most);
     let view_labels = match &view.mask {
         Some(mask) if !mask.is_held() => {
             Pixels::made(Arc::new(LabelsOf { mask: mask.clone(), border }), Default::default())
         }
         _ => labels.into(),
     };
-    Ok(TrainView {
+    let view = TrainView {
         name: view.name.clone(),
         camera: view.camera.clone(),
         near: 0.0,
         photo,
-        valid_pixels: step_input::valid_pixels(&pixels),
         mask: view.mask.clone(),
         objects,
         view_labels,
-        shown,
         occluders: Default::default(),
-    })
+    };
+    Ok((view, parts))
 }
 
 /// The layout of the device of a mask that is not in memory.

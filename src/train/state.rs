@@ -267,7 +267,7 @@ impl Trainer {
         }
         self.engine.upload_state(state.gaussians, DVec3::from_array(state.origin), &state.planes)?;
         self.set_occluders(&state.occluders);
-        self.order = ViewOrder::after(self.config.seed, self.views.len(), state.step);
+        self.order = ViewOrder::after(self.config.seed, self.views.parts().len(), state.step);
         (self.step, self.updates) = (state.step, state.updates);
         (self.labelled_once, self.bound.by_memory) = (state.labelled_once, state.memory_bounds);
         self.seen = Default::default();

@@ -22,16 +22,12 @@ pub struct TrainView {
     pub near: f32,
     /// Photo.
     pub photo: Pixels<Photo>,
-    /// Number of pixels of the photo that count.
-    pub valid_pixels: u64,
     /// Mask, if the view has one.
     pub mask: Option<Pixels<LabelMap>>,
     /// Ids of the objects in the mask, sorted.
     pub objects: Vec<u16>,
     /// The mask in the layout of the device, one word per pixel, row-major; empty without a mask.
     pub view_labels: Pixels<Vec<u32>>,
-    /// Light and area of each object, by id.
-    pub shown: BTreeMap<u16, Shown>,
     /// Occluders of each object in this view.
     pub occluders: Occluders,
 }
@@ -41,6 +37,8 @@ pub struct TrainView {
 pub struct StepView<'a> {
     /// Camera.
     pub camera: &'a Camera,
+    /// Camera of the whole photo, if this is a part of it.
+    pub whole: Option<&'a Camera>,
     /// Near plane, world units.
     pub near: f32,
     /// Least standard deviation of Gaussians at depth 1, world units.
@@ -63,8 +61,8 @@ pub(crate) fn finest(camera: &Camera) -> f32 {
 }
 
 /// Returns the number of pixels of a photo that count.
-pub(crate) fn valid_pixels(photo: &Photo) -> u64 {
-    photo.rgba.iter().filter(|pixel| pixel[3] > 127).count() as u64
+pub(crate) fn valid_pixels(photo: &[[u8; 4]]) -> u64 {
+    photo.iter().filter(|pixel| pixel[3] > 127).count() as u64
 }
 
 /// The pixels of an object in a view that the label loss uses.
@@ -86,9 +84,9 @@ pub(crate) fn view_labels(mask: &LabelMap, border: u32) -> Vec<u32> {
 }
 
 /// Sums light and area of each object. The label loss of an empty layer follows from them.
-pub(crate) fn shown_objects(photo: &Photo, view_labels: &[u32]) -> BTreeMap<u16, Shown> {
+pub(crate) fn shown_objects(photo: &[[u8; 4]], view_labels: &[u32]) -> BTreeMap<u16, Shown> {
     let mut objects: BTreeMap<u16, Shown> = BTreeMap::new();
-    for (&id, &[r, g, b, valid]) in view_labels.iter().zip(&photo.rgba) {
+    for (&id, &[r, g, b, valid]) in view_labels.iter().zip(photo) {
         if id != 0 && id & LABEL_BORDER == 0 && valid > 127 {
             let shown = objects.entry(id as u16).or_default();
             shown.light += (f64::from(r) + f64::from(g) + f64::from(b)) / 255.0;
@@ -137,8 +135,8 @@ fn alpha_weight(config: &TrainConfig) -> f32 {
 pub struct StepInput {
     /// Step, from 1.
     pub step: u32,
-    /// Index of the training view.
-    pub view: usize,
+    /// Index of the part of a photo; without bands, that of the training view.
+    pub part: usize,
     /// Ids of the sampled objects; layer `j` of the render is `layers[j - 1]`. Empty in a step without layers.
     pub layers: Vec<u16>,
     /// The step has the label passes.
@@ -170,7 +168,7 @@ pub(crate) fn uniforms(
     fixed: SceneScale,
     engine: &Engine,
 ) -> StepUniforms {
-    let base = engine.view_uniforms(view.camera, view.near, config.background);
+    let base = engine.part_uniforms(view.camera, view.whole, view.near, config.background);
     let rates = config.rates_at(input.step);
     let rate = (rates.position * fixed.extent) as f32;
     let correction = |beta: f32| (1.0 / (1.0 - f64::from(beta).powi(input.updates.max(1) as i32))) as f32;

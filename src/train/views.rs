@@ -1,6 +1,7 @@
 //! The training views, at the size of each step.
 
 use super::ahead::{Ahead, Ready, Wanted};
+use super::parts::Part;
 use super::step_input::{self, Shown, StepInput, StepView, TrainView};
 use super::{TrainConfig, free_space, poses};
 use crate::error::{Error, Result};
@@ -22,7 +23,9 @@ static NO_OCCLUDERS: Occluders = Occluders::new();
 #[derive(Debug)]
 pub(super) struct Views {
     whole: Vec<TrainView>,
-    /// Shrunk photos of those in memory, by size and view, until no step in flight uses the size.
+    /// What steps train on.
+    parts: Vec<Part>,
+    /// Shrunk photos of those in memory, by size and part, until no step in flight uses the size.
     shrunk: BTreeMap<(u32, usize), Arc<Ready>>,
     /// Pixels of the steps in flight.
     ready: BTreeMap<u32, Arc<Ready>>,
@@ -39,11 +42,12 @@ pub(super) struct Views {
 
 impl Views {
     /// Makes the views of a training.
-    pub(super) fn new(whole: Vec<TrainView>, config: &TrainConfig) -> Self {
+    pub(super) fn new((whole, parts): (Vec<TrainView>, Vec<Part>), config: &TrainConfig) -> Self {
         let (start, full_from) = (f64::from(config.start_size.unwrap_or(1.0)), config.full_size_from());
         let ahead = Ahead::new(&whole, config.iterations);
         Self {
             whole,
+            parts,
             shrunk: BTreeMap::new(),
             ready: BTreeMap::new(),
             ahead,
@@ -80,10 +84,21 @@ impl Views {
         self.refined.get(view).unwrap_or(&self.whole[view].camera)
     }
 
+    /// Returns the parts of the views, each for a step.
+    pub(super) fn parts(&self) -> &[Part] {
+        &self.parts
+    }
+
+    /// Returns the index of the view of a step.
+    pub(super) fn index(&self, input: &StepInput) -> usize {
+        self.parts[input.part].view
+    }
+
     /// Returns the camera to which the space is free in a step, and the near plane of all cameras on the way.
     pub(super) fn partner(&self, seed: u64, input: &StepInput) -> Option<(&Camera, f32)> {
-        let partner = free_space::partner(seed, input.step, self.partners.get(input.view)?)?;
-        Some((&self.whole[partner].camera, self.whole[partner].near.min(self.whole[input.view].near)))
+        let view = self.index(input);
+        let partner = free_space::partner(seed, input.step, self.partners.get(view)?)?;
+        Some((&self.whole[partner].camera, self.whole[partner].near.min(self.whole[view].near)))
     }
 
     /// Returns the number of the size of `step`, from 0; [`SIZES`] is the full one.
@@ -106,31 +121,32 @@ impl Views {
         (side_at(full.0, share), side_at(full.1, share))
     }
 
-    /// Gets the pixels of a step at the size of the step, and has those of `next`, the views of the steps after it, made
+    /// Gets the pixels of a step at the size of the step, and has those of `next`, the parts of the steps after it, made
     /// meanwhile.
-    pub(super) fn prepare(&mut self, step: u32, view: usize, next: &[usize]) -> Result<()> {
+    pub(super) fn prepare(&mut self, step: u32, part: usize, next: &[usize]) -> Result<()> {
         // Steps in flight still use their pixels and sizes.
         let oldest = step.saturating_sub(FRAMES_IN_FLIGHT as u32);
         let oldest_size = self.size_at(oldest);
         self.ready.retain(|&kept, _| kept >= oldest && kept < step);
         self.shrunk.retain(|&(kept, _), _| kept >= oldest_size);
-        let key = (self.size_at(step), view);
+        let key = (self.size_at(step), part);
         let ready = match self.shrunk.get(&key) {
             Some(ready) => Arc::clone(ready),
             None => {
-                let wanted = self.wanted(step, view);
+                let wanted = self.wanted(step, part);
                 Arc::new(self.ahead.take(wanted)?)
             }
         };
-        if key.0 < SIZES && self.whole[view].photo.is_held() {
+        let is_held = |part: usize| self.whole[self.parts[part].view].photo.is_held();
+        if key.0 < SIZES && is_held(part) {
             self.shrunk.insert(key, Arc::clone(&ready));
         }
         self.ready.insert(step, ready);
-        for (step, &view) in (step + 1..).zip(next) {
-            if !self.whole[view].photo.is_held() {
-                let wanted = self.wanted(step, view);
-                self.ahead.begin(wanted);
-            }
+        let waiting: Vec<(u32, usize)> =
+            (step + 1..).zip(next.iter().copied()).filter(|&(_, part)| !is_held(part)).collect();
+        for (step, part) in waiting {
+            let wanted = self.wanted(step, part);
+            self.ahead.begin(wanted);
         }
         Ok(())
     }
@@ -140,39 +156,38 @@ impl Views {
         self.ahead.steps()
     }
 
-    fn wanted(&self, step: u32, view: usize) -> Wanted {
+    fn wanted(&self, step: u32, index: usize) -> Wanted {
         let share = (self.size_at(step) < SIZES).then(|| self.share_at(step));
-        Wanted::new(step, (view, &self.whole[view]), share)
+        let part = &self.parts[index];
+        Wanted::new(step, (index, part), &self.whole[part.view], share)
     }
 
-    /// Returns the view of a step at the size of the step, which [`Self::prepare`] has made.
+    /// Returns the part of a step at the size of the step, which [`Self::prepare`] has made.
     pub(super) fn of(&self, input: &StepInput) -> Result<StepView<'_>> {
         let missing = || Error::Bug(format!("step {} came without its pixels", input.step));
-        let (whole, ready) = (&self.whole[input.view], self.ready.get(&input.step).ok_or_else(missing)?);
-        let (photo, view_labels) = (&*ready.photo, ready.view_labels.as_slice());
-        // Of the whole photo, whatever the size of the step.
-        let finest = step_input::finest(&whole.camera);
+        let (part, ready) = (&self.parts[input.part], self.ready.get(&input.step).ok_or_else(missing)?);
+        let view = &self.whole[part.view];
+        let at_full_size = StepView {
+            camera: &part.camera,
+            whole: part.whole.as_ref(),
+            near: view.near,
+            // Of the whole photo, whatever the size of the step.
+            finest: step_input::finest(&view.camera),
+            photo: &ready.photo,
+            valid_pixels: part.valid_pixels,
+            view_labels: &ready.view_labels,
+            shown: &part.shown,
+            occluders: &view.occluders,
+        };
         Ok(match &ready.small {
             Some((camera, valid_pixels)) => StepView {
                 camera,
-                near: whole.near,
-                finest,
-                photo,
                 valid_pixels: *valid_pixels,
-                view_labels,
                 shown: &NOTHING_SHOWN,
                 occluders: &NO_OCCLUDERS,
+                ..at_full_size
             },
-            None => StepView {
-                camera: &whole.camera,
-                near: whole.near,
-                finest,
-                photo,
-                valid_pixels: whole.valid_pixels,
-                view_labels,
-                shown: &whole.shown,
-                occluders: &whole.occluders,
-            },
+            None => at_full_size,
         })
     }
 }

@@ -9,8 +9,10 @@ use crate::scene::Camera;
 pub fn weights<'a>(engine: &mut Engine, views: impl Iterator<Item = (&'a Camera, f32)>) -> Result<Vec<f32>> {
     engine.set_densify_stats(&vec![[0.0; 2]; engine.gaussian_count() as usize])?;
     for (camera, near) in views {
-        let uniforms = engine.view_uniforms(camera, near, [0.0; 3]);
-        engine.run(ListKey::Weigh, &uniforms)?;
+        for band in engine.bands(camera) {
+            let uniforms = engine.band_uniforms(camera, band, near, [0.0; 3]);
+            engine.run(ListKey::Weigh, &uniforms)?;
+        }
     }
     Ok(engine.densify_stats()?.into_iter().map(|[weight, _]| weight).collect())
 }

@@ -93,7 +93,7 @@ impl OwnView {
     pub fn of_step(&self) -> StepView<'_> {
         let Self { near, photo, occluders, camera, valid_pixels, view_labels, shown } = self;
         let (near, finest, valid_pixels) = (*near, step_input::finest(camera), *valid_pixels);
-        StepView { camera, near, finest, photo, valid_pixels, view_labels, shown, occluders }
+        StepView { camera, whole: None, near, finest, photo, valid_pixels, view_labels, shown, occluders }
     }
 }
 
@@ -111,7 +111,7 @@ fn own_view(scene: &Scene) -> OwnView {
     let photo = Photo { width, height, rgba };
     OwnView {
         near: NEAR,
-        shown: step_input::shown_objects(&photo, &target.label_map),
+        shown: step_input::shown_objects(&photo.rgba, &target.label_map),
         view_labels: target.label_map.clone(),
         photo,
         valid_pixels: target.photo.valid.iter().filter(|&&valid| valid).count() as u64,
@@ -163,7 +163,7 @@ impl Fixture {
         };
         let layers =
             if labels { scene.target.slots.iter().map(|slot| slot.label as u16).collect() } else { Vec::new() };
-        let input = StepInput { step: 1, view: 0, layers, labels, update: false, updates: 1 };
+        let input = StepInput { step: 1, part: 0, layers, labels, update: false, updates: 1 };
         let view = own_view(&scene);
         let fixed = SceneScale { extent: 1.0 };
         let mut fixture = Self { view, engine, scene, input, config, fixed, free_space: None, shared: Vec::new() };

@@ -1,0 +1,80 @@
+//! Parts of the photos, one for a step: whole photos, or bands of rows where the device cannot walk the tiles of a whole
+//! one.
+//!
+//! Only steps know parts. What a photo owns, such as its exposure, its pose and its occluders, belongs to all of it, and
+//! votes and renders between steps are those of whole photos.
+
+use super::step_input::{self, Shown};
+use crate::engine::Band;
+use crate::scene::{Camera, LabelMap, Photo};
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
+
+/// What a step trains on.
+#[derive(Clone, Debug)]
+pub(super) struct Part {
+    /// Index of the training view.
+    pub(super) view: usize,
+    /// Its rows.
+    pub(super) band: Band,
+    /// Camera of these rows.
+    pub(super) camera: Camera,
+    /// Camera of the photo, if the part does not have all rows.
+    pub(super) whole: Option<Camera>,
+    /// Number of its pixels that count.
+    pub(super) valid_pixels: u64,
+    /// Ids of the objects in its mask, sorted.
+    pub(super) objects: Vec<u16>,
+    /// Light and area of each object, by id.
+    pub(super) shown: BTreeMap<u16, Shown>,
+}
+
+impl Part {
+    /// Returns the parts of view 0, of at most `most` rows. `labels` is the mask in the layout of the device.
+    pub(super) fn all(
+        camera: &Camera,
+        photo: &Photo,
+        mask: Option<&LabelMap>,
+        labels: &[u32],
+        most: Option<u32>,
+    ) -> Vec<Self> {
+        let bands = Band::all(camera.height, most.unwrap_or(camera.height));
+        let is_whole = bands.len() == 1;
+        let of = |band: Band| {
+            let pixels = band.pixels(camera.width);
+            let rgba = &photo.rgba[pixels.clone()];
+            let ids = mask.map_or(&[][..], |mask| &mask.ids[pixels.clone()]);
+            let objects: BTreeSet<u16> = ids.iter().copied().filter(|&id| id != 0).collect();
+            let labels = if labels.is_empty() { labels } else { &labels[pixels] };
+            Self {
+                view: 0,
+                band,
+                camera: band.camera(camera),
+                whole: (!is_whole).then(|| camera.clone()),
+                valid_pixels: step_input::valid_pixels(rgba),
+                objects: objects.into_iter().collect(),
+                shown: step_input::shown_objects(rgba, labels),
+            }
+        };
+        bands.into_iter().map(of).collect()
+    }
+
+    /// Returns the part's rows of a photo.
+    pub(super) fn photo(&self, photo: Arc<Photo>) -> Arc<Photo> {
+        match &self.whole {
+            None => photo,
+            Some(whole) => {
+                let rgba = photo.rgba[self.band.pixels(whole.width)].to_vec();
+                Arc::new(Photo { width: whole.width, height: self.band.rows, rgba })
+            }
+        }
+    }
+
+    /// Returns the part's rows of the mask in the layout of the device, which is empty without a mask.
+    pub(super) fn labels(&self, labels: Arc<Vec<u32>>) -> Arc<Vec<u32>> {
+        match &self.whole {
+            Some(whole) if !labels.is_empty() => Arc::new(labels[self.band.pixels(whole.width)].to_vec()),
+            _ => labels,
+        }
+    }
+}
