@@ -210,7 +210,7 @@ pub mod synth {
 pub mod train {
     pub use crate::train::setup::{TrainerOptions, engine_size};
     pub use crate::train::state::TrainState;
-    pub use crate::train::{StepReport, Trainer, first_model};
+    pub use crate::train::{StepReport, Trainer, aligned, first_model};
     pub mod poses {
         pub use crate::train::poses::Poses;
     }

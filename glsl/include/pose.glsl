@@ -1,5 +1,13 @@
-// Correction of a camera's pose by two rows of a photo: a Rodrigues vector in camera space, and a move in camera space in
-// units of the depth of the scene there.
+// Correction of a camera's pose by the rows of a photo, ROW and those after it: six trained numbers in two rows; the
+// first one's fourth number is free, the second one's is the depth of the scene in this view. Then the six rows of the
+// photo's preconditioner, two words each. The preconditioner times the numbers is a Rodrigues vector in camera space, and
+// a move in camera space in units of that depth. step_rows and shared_parameters are declared before.
+
+float correction(uint k) {
+    uint row = ROW + 2u * (k + 1u);
+    return dot(shared_parameters[step_rows[row]].xyz, shared_parameters[step_rows[ROW]].xyz)
+        + dot(shared_parameters[step_rows[row + 1u]].xyz, shared_parameters[step_rows[ROW + 1u]].xyz);
+}
 
 // A vector turned by twice the angle whose tangent is the length of w, half the Rodrigues vector.
 vec3 turned(vec3 w, vec3 x) {

@@ -2,13 +2,13 @@
 #include "layout.glsl"
 #include "constants.glsl"
 #include "step.glsl"
-#include "pose.glsl"
 // pose_reduce — gradient of the correction of the pose of the step's photo.
 // Work:    one workgroup.
-// Reads:   step, with the corrected camera; counters; step_rows [ROW], [ROW + 1]; shared_parameters [S]; pose_partials
+// Reads:   step, with the corrected camera; counters; step_rows from [ROW] on; shared_parameters [S]; pose_partials
 // Writes:  v_shared [2 rows]
 // Math:    the torque t in camera axes is the gradient of a turn on top; that of its vector is g = (t + t x w) / (1 + w w).
-//          That of the move is -d R force, with the rotation R before the turn. POSE_PRIOR pulls both to 0.
+//          That of the move is -d R force, with the rotation R before the turn. POSE_PRIOR pulls both to 0. The
+//          transposed preconditioner carries both to the trained numbers.
 // Order:   fixed, bitwise reproducible.
 // Mirror:  src/verify/reference/pose.rs::backward
 
@@ -20,6 +20,8 @@ READ(2, uint, step_rows);
 READ(3, vec4, shared_parameters);
 READ(4, vec4, pose_partials);
 WRITE(5, vec4, v_shared);
+
+#include "pose.glsl"
 
 shared vec3 forces[64];
 shared vec3 torques[64];
@@ -42,13 +44,21 @@ void main() {
     }
     if (lane == 0u) {
         uint turn = step_rows[ROW], move = step_rows[ROW + 1u];
-        vec3 angle = shared_parameters[turn].xyz;
-        vec4 shift = shared_parameters[move];
+        vec3 angle = vec3(correction(0u), correction(1u), correction(2u));
+        vec3 shift = vec3(correction(3u), correction(4u), correction(5u));
         vec3 w = 0.5 * angle;
         mat3 world_from_camera = mat3(step.view_row0, step.view_row1, step.view_row2);
         vec3 t = torques[0] * world_from_camera, f = turned(-w, forces[0] * world_from_camera);
         vec3 g = (t + cross(t, w)) / (1.0 + dot(w, w));
-        v_shared[turn] = vec4(g + POSE_PRIOR * angle, 0.0);
-        v_shared[move] = vec4(POSE_PRIOR * shift.xyz - shift.w * f, 0.0);
+        vec3 v_angle = g + POSE_PRIOR * angle, v_shift = POSE_PRIOR * shift - shared_parameters[move].w * f;
+        vec3 v_turn = vec3(0.0), v_move = vec3(0.0);
+        for (uint k = 0u; k < 6u; k++) {
+            float v = k < 3u ? v_angle[k] : v_shift[k - 3u];
+            uint row = ROW + 2u * (k + 1u);
+            v_turn += v * shared_parameters[step_rows[row]].xyz;
+            v_move += v * shared_parameters[step_rows[row + 1u]].xyz;
+        }
+        v_shared[turn] = vec4(v_turn, 0.0);
+        v_shared[move] = vec4(v_move, 0.0);
     }
 }

@@ -222,6 +222,9 @@ pub struct Scores {
     pub objects: BTreeMap<u32, ObjectScores>,
     /// Scores of the views by name.
     pub views: BTreeMap<String, ViewScores>,
+    /// The poses of the views were refined by the model before.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub refined_poses: bool,
     /// Scores at other near planes, if asked for.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub near: Option<NearSweep>,
@@ -282,6 +285,7 @@ impl Scores {
             objects: by_object.iter().map(|(&id, scores)| (id, average(scores))).collect(),
             views,
             near: None,
+            refined_poses: false,
             removal: None,
         }
     }

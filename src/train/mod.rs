@@ -5,6 +5,7 @@
 //! with folder, checkpoints and scores.
 
 mod ahead;
+pub(crate) mod align;
 pub(crate) mod config;
 pub(crate) mod exposure;
 mod first;
@@ -15,6 +16,7 @@ mod occlusion;
 mod parts;
 mod photo_rows;
 pub(crate) mod poses;
+mod precondition;
 mod presets;
 mod sampler;
 mod schedule;
@@ -29,6 +31,7 @@ mod timing;
 mod views;
 mod votes;
 
+pub use align::aligned;
 pub use config::TrainConfig;
 pub use first::first_model;
 pub(crate) use first::go_on_from;

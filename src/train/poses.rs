@@ -2,8 +2,9 @@
 //!
 //! Poses of a reconstruction may be off by pixels, which blurs the model. The camera of a step is turned and moved by the
 //! correction of its photo. Photos together leave place and turn of the whole open, and hardly tell slow bends of a path of
-//! cameras; a weak pull to 0 holds both.
+//! cameras; a weak pull to 0 holds both. Trained are six numbers of each photo; its preconditioner makes a pose of them.
 
+use super::precondition::{self, Matrix};
 use super::shared::{Place, SharedLayout, SharedParameters};
 use super::strategy::At;
 use crate::pass::{Builder, Extension, Hook, project};
@@ -13,9 +14,11 @@ use std::sync::Arc;
 
 /// Name of the parameters.
 pub(super) const NAME: &str = "poses";
-/// Learning rate of turns, radians, and of moves, depths of the scene, in the beginning. The updates of a short run, some
+/// Rows of a photo (glsl/include/pose.glsl): two of trained numbers, twelve of the preconditioner.
+pub(crate) const ROWS: usize = 14;
+/// Learning rate in the beginning, focal lengths that points move in the photo. The updates of a short run, some
 /// dozens a photo, reach a degree and a fiftieth of the depth. The rate falls to the share [`FALL`] of itself.
-const RATE: f64 = 1.5e-3;
+const RATE: f64 = 2e-3;
 const FALL: f64 = 0.02;
 /// Share of the run before the first update: Gaussians have no colours of their own yet.
 const FROM: f64 = 0.08;
@@ -23,7 +26,8 @@ const FROM: f64 = 0.08;
 /// Corrections of the poses, 0 in the beginning.
 #[derive(Clone, Debug, Default)]
 pub struct Poses {
-    depths: Vec<f32>,
+    /// Depth of the scene and preconditioner of each view.
+    of_views: Vec<(f32, Matrix)>,
 }
 
 impl Poses {
@@ -36,15 +40,20 @@ impl Poses {
             depths.sort_by(f64::total_cmp);
             depths.get(depths.len() / 2).copied().unwrap_or(dataset.extent()) as f32
         };
-        Self { depths: dataset.train.iter().map(depth).collect() }
+        let of_view = |view: &View| {
+            let depth = depth(view);
+            (depth, precondition::of_view(&view.camera, &dataset.points, depth.into()))
+        };
+        Self { of_views: dataset.train.iter().map(of_view).collect() }
     }
 }
 
-/// Returns a camera with the correction of its two rows (glsl/include/pose.glsl).
-pub(crate) fn corrected(camera: &Camera, [turn, shift]: [[f32; 4]; 2]) -> Camera {
-    let wide = |[x, y, z, _]: [f32; 4]| DVec3::new(x.into(), y.into(), z.into());
-    let ([turn, by], unit) = ([turn, shift].map(wide), f64::from(shift[3]));
-    camera.corrected(turn, camera.rotation.transpose() * (unit * by))
+/// Returns a camera with the correction of its rows (glsl/include/pose.glsl).
+pub(crate) fn corrected(camera: &Camera, rows: &[[f32; 4]]) -> Camera {
+    let three = |row: usize| DVec3::new(rows[row][0].into(), rows[row][1].into(), rows[row][2].into());
+    let of = |k: usize| three(2 * k + 2).dot(three(0)) + three(2 * k + 3).dot(three(1));
+    let (turn, shift) = (DVec3::new(of(0), of(1), of(2)), DVec3::new(of(3), of(4), of(5)));
+    camera.corrected(turn, camera.rotation.transpose() * (f64::from(rows[1][3]) * shift))
 }
 
 impl SharedParameters for Poses {
@@ -53,17 +62,22 @@ impl SharedParameters for Poses {
     }
 
     fn layout(&self) -> SharedLayout {
-        SharedLayout { scene: 0, photo: 2 }
+        SharedLayout { scene: 0, photo: ROWS as u32 }
     }
 
     fn start(&self, view: Option<usize>) -> Vec<[f32; 4]> {
-        view.map_or(Vec::new(), |view| vec![[0.0; 4], [0.0, 0.0, 0.0, self.depths[view]]])
+        let Some((depth, matrix)) = view.map(|view| &self.of_views[view]) else { return Vec::new() };
+        let numbers = matrix.as_flattened().chunks_exact(3);
+        let matrix = numbers.map(|of| [of[0] as f32, of[1] as f32, of[2] as f32, 0.0]);
+        [[0.0; 4], [0.0, 0.0, 0.0, *depth]].into_iter().chain(matrix).collect()
     }
 
     fn rates(&self, at: At) -> Vec<[f32; 4]> {
         let part = f64::from(at.step) / f64::from(at.config.iterations);
         let rate = if part > FROM { (RATE * FALL.powf(part)) as f32 } else { 0.0 };
-        vec![[rate, rate, rate, 0.0]; 2]
+        let mut rates = vec![[0.0; 4]; ROWS];
+        rates[..2].fill([rate, rate, rate, 0.0]);
+        rates
     }
 
     fn extension(&self, place: Place) -> Arc<dyn Extension> {

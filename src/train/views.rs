@@ -70,7 +70,7 @@ impl Views {
 
     /// Sets the refined cameras by the rows of their photos.
     pub(super) fn refine(&mut self, rows: &[Vec<[f32; 4]>]) {
-        let refined = |(view, rows): (&TrainView, &Vec<_>)| poses::corrected(&view.camera, [rows[0], rows[1]]);
+        let refined = |(view, rows): (&TrainView, &Vec<_>)| poses::corrected(&view.camera, rows);
         self.refined = self.whole.iter().zip(rows).map(refined).collect();
     }
 

@@ -31,6 +31,10 @@ pub struct EvalArgs {
     /// SCENE/shadowed/ID/NAME.png; without any, only the weight of Gaussians that stay is given.
     #[arg(long, requires = "masks", help_heading = "Labels")]
     pub removal: bool,
+    /// Refine the pose of each view by the model before it is scored, for models of --refine-poses: they bend with their
+    /// photos, and held-out views keep the poses of the reconstruction.
+    #[arg(long, help_heading = "Rendering")]
+    pub refine_poses: bool,
     /// Colour behind the scene: black, white, or R,G,B from 0 to 1.
     #[arg(long, value_name = "COLOUR", value_parser = colour, default_value = "black", help_heading = "Rendering")]
     pub background: [f32; 3],
@@ -45,7 +49,7 @@ pub struct EvalArgs {
     /// Score by a published benchmark instead, with its masks, its choice of objects and its averages.
     #[arg(
         long, value_name = "NAME", value_enum, requires = "truth", help_heading = "Benchmarks",
-        conflicts_with_all = ["masks", "amodal", "removal", "views", "background"]
+        conflicts_with_all = ["masks", "amodal", "removal", "refine_poses", "views", "background"]
     )]
     pub protocol: Option<Protocol>,
     /// Folder with the benchmark's masks of this scene.
@@ -95,6 +99,7 @@ impl EvalArgs {
             masks: None,
             amodal: None,
             removal: false,
+            refine_poses: false,
             background: [0.0; 3],
             near: Vec::new(),
             sure: MinConfidenceArg { min_confidence: MIN_LABEL_CONFIDENCE },

@@ -14,6 +14,8 @@ use crate::io::mask::read_mask;
 use crate::label::vote::model::{columns_of, vote_engine};
 use crate::render::RenderOptions;
 use crate::scene::{Dataset, Gaussians, Photo, View};
+use crate::scheduler::SchedulerOptions;
+use crate::train::aligned;
 use crate::{Error, Result};
 use std::path::{Path, PathBuf};
 
@@ -35,16 +37,24 @@ pub(in crate::cli) fn score(args: &EvalArgs, context: &Context) -> Result<Scores
     let pictures = picture_count(&views) + removing.as_ref().map_or(0, |_| removal::picture_count(&views));
     let mut watcher = Watcher::new(pictures, args.page.as_deref(), context)?;
     let gpu = open_gpu(context)?;
+    let near = near_plane(&args.model, args.near.first().copied().filter(|_| args.near.len() == 1))?;
+    let refined = match args.refine_poses {
+        true => aligned(&gpu, &model, &views, (near, args.background), SchedulerOptions::default())?,
+        false => Vec::new(),
+    };
+    let views = if args.refine_poses { refined.iter().collect() } else { views };
     let sizes = views.iter().map(|view| (view.camera.width, view.camera.height));
     let mut engine = render_engine(gpu.clone(), &model, sizes)?;
-    let near = near_plane(&args.model, args.near.first().copied().filter(|_| args.near.len() == 1))?;
     let how = Rendering {
         options: RenderOptions { near, background: args.background, ..RenderOptions::default() },
         min_confidence: args.sure.min_confidence,
         train: &dataset.train,
         by_main: args.compat,
     };
-    let mut scores = evaluate(&mut engine, &model, &views, how, &wholes, &mut watcher)?;
+    let mut scores = Scores {
+        refined_poses: args.refine_poses,
+        ..evaluate(&mut engine, &model, &views, how, &wholes, &mut watcher)?
+    };
     if args.near.len() > 1 {
         scores.near = Some(compare_planes(&mut engine, &model, &views, how.options, (&args.near, &scores))?);
     }

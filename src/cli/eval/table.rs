@@ -10,7 +10,8 @@ fn number(value: Option<f64>, digits: usize) -> String {
 
 /// Returns the table of views, then of objects.
 pub(super) fn own_table(scores: &Scores) -> String {
-    let mut text = format!("{:>10} {:>8} {:>9} {:>8}\n", "view", "PSNR", "corrected", "SSIM");
+    let mut text = if scores.refined_poses { "poses refined by the model\n".to_owned() } else { String::new() };
+    text += &format!("{:>10} {:>8} {:>9} {:>8}\n", "view", "PSNR", "corrected", "SSIM");
     for (name, view) in &scores.views {
         text += &format!("{name:>10} {:>8.2} {:>9.2} {:>8.4}\n", view.psnr, view.psnr_corrected, view.ssim);
     }

@@ -4,31 +4,37 @@ use super::{Model, Row, Rules, sh};
 use crate::scene::Camera;
 use glam::DVec3;
 
-/// The rows: a turn, and a move in camera space in units of its fourth number.
-pub type PoseRows = [[f64; 4]; 2];
+/// The rows of a photo: six trained numbers, of which the last row's fourth number is the unit of the move, and the six
+/// rows of the preconditioner, in two rows each.
+pub type PoseRows = [[f64; 4]; 14];
 
-/// The turn (Rodrigues vector in camera space) and the move of the centre (world units) of two rows.
-fn correction(camera: &Camera, [turn, [x, y, z, unit]]: PoseRows) -> (DVec3, DVec3) {
-    let turn = DVec3::new(turn[0], turn[1], turn[2]);
-    (turn, camera.rotation.transpose() * (unit * DVec3::new(x, y, z)))
+fn three([x, y, z, _]: [f64; 4]) -> DVec3 {
+    DVec3::new(x, y, z)
+}
+
+/// The turn (Rodrigues vector in camera space) and the move (camera space, in its unit): the preconditioner times the
+/// numbers.
+fn correction(rows: &PoseRows) -> (DVec3, DVec3) {
+    let of = |k: usize| three(rows[2 * k + 2]).dot(three(rows[0])) + three(rows[2 * k + 3]).dot(three(rows[1]));
+    (DVec3::new(of(0), of(1), of(2)), DVec3::new(of(3), of(4), of(5)))
 }
 
 /// The corrected camera.
-pub fn corrected(camera: &Camera, rows: PoseRows) -> Camera {
-    let (turn, shift) = correction(camera, rows);
-    camera.corrected(turn, shift)
+pub fn corrected(camera: &Camera, rows: &PoseRows) -> Camera {
+    let (turn, shift) = correction(rows);
+    camera.corrected(turn, camera.rotation.transpose() * (rows[1][3] * shift))
 }
 
-/// Gradient of the rows. `camera` is the camera before the correction; `v_rows` are the gradients of the Gaussians with the
+/// Gradient of the trained numbers. `camera` is the camera before the correction; `v_rows` are the gradients of the Gaussians with the
 /// corrected one; `prior` pulls turn and move to 0.
 pub fn backward(
     rules: &Rules,
     camera: &Camera,
-    rows: PoseRows,
+    rows: &PoseRows,
     (model, v_rows): (&Model, &[Row]),
     prior: f64,
 ) -> [[f64; 3]; 2] {
-    let (turn, _) = correction(camera, rows);
+    let (turn, shift) = correction(rows);
     let posed = corrected(camera, rows);
     let (mut force, mut torque) = (DVec3::ZERO, DVec3::ZERO);
     for (row, v) in model.rows.iter().zip(v_rows) {
@@ -46,8 +52,9 @@ pub fn backward(
     }
     // Angular velocity of a Rodrigues vector w = turn / 2: 2 (w' + w x w') / (1 + w w).
     let (half, torque) = (0.5 * turn, posed.rotation * torque);
-    let v_turn = (torque + torque.cross(half)) / (1.0 + half.length_squared());
-    let [of_turn, of_move] = rows.map(|[x, y, z, _]| prior * DVec3::new(x, y, z));
-    let v_move = -rows[1][3] * (camera.rotation * force);
-    [(v_turn + of_turn).to_array(), (v_move + of_move).to_array()]
+    let v_turn = (torque + torque.cross(half)) / (1.0 + half.length_squared()) + prior * turn;
+    let v_move = -rows[1][3] * (camera.rotation * force) + prior * shift;
+    let v = [v_turn.to_array(), v_move.to_array()].concat();
+    let through = |column: usize| (0..6).map(|k| v[k] * three(rows[2 * k + 2 + column])).sum::<DVec3>().to_array();
+    [through(0), through(1)]
 }

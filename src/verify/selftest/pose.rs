@@ -11,19 +11,31 @@ use crate::pass::KernelShape;
 use crate::scene::Camera;
 use crate::scheduler::plan::Buf;
 use crate::shaders::constants::POSE_PRIOR;
-use crate::train::poses::Poses;
+use crate::train::poses::{self, Poses};
 use crate::train::shared::{Place, SharedLayout, SharedParameters};
-use crate::verify::reference::pose::{backward, corrected};
+use crate::verify::reference::pose::{PoseRows, backward, corrected};
 use crate::verify::reference::project::project_forward;
 use crate::verify::reference::splat::Splat;
 use crate::verify::reference::{Row, Rules};
 use glam::DVec3;
 use std::sync::Arc;
 
-/// Turns and moves of two photos; the step is on the second one. Moves are in units of their last number.
-const ROWS: [[f32; 4]; 4] =
-    [[0.1, 0.2, 0.3, 0.0], [0.1, 0.0, 0.0, 2.0], [0.06, -0.11, 0.08, 0.0], [-0.02, 0.03, 0.05, 2.0]];
-const FIRST: usize = 2;
+/// The trained numbers of two photos; the step is on the second one. The last is the unit of moves.
+const NUMBERS: [[[f32; 4]; 2]; 2] =
+    [[[0.1, 0.2, 0.3, 0.0], [0.1, 0.0, 0.0, 2.0]], [[0.06, -0.11, 0.08, 0.0], [-0.02, 0.03, 0.05, 2.0]]];
+const FIRST: usize = poses::ROWS;
+
+/// The rows of both photos, with preconditioners that mix all numbers.
+fn rows() -> Vec<[f32; 4]> {
+    let mixed = |k: usize| if k.is_multiple_of(7) { 1.1 } else { 0.02 * (k % 5) as f32 - 0.03 };
+    let matrix = (0..12).map(|row| [mixed(3 * row), mixed(3 * row + 1), mixed(3 * row + 2), 0.0]);
+    NUMBERS.iter().flat_map(|numbers| numbers.iter().copied().chain(matrix.clone())).collect()
+}
+
+/// Those of the second photo.
+fn of_step() -> PoseRows {
+    std::array::from_fn(|k| rows()[FIRST + k].map(f64::from))
+}
 
 /// A finished step.
 pub struct Posed {
@@ -39,20 +51,18 @@ impl Posed {
     pub fn new(gpu: &Arc<Gpu>, kernels: KernelShape) -> Result<Self> {
         let shape = Shape { gaussians: 150, width: 61, height: 45, ..Shape::default() };
         let scene = scene(92, &shape);
-        let camera = corrected(&scene.camera, [ROWS[FIRST], ROWS[FIRST + 1]].map(|row| row.map(f64::from)));
-        let rows = ROWS.len() as u32;
-        let mut fixture = Fixture::with_rows(Arc::clone(gpu), scene, false, (kernels, readable()), rows)?;
-        let place = Place { all: SharedLayout { scene: 0, photo: 2 }, ..Place::default() };
+        let (camera, rows) = (corrected(&scene.camera, &of_step()), rows());
+        let mut fixture = Fixture::with_rows(Arc::clone(gpu), scene, false, (kernels, readable()), rows.len() as u32)?;
+        let place = Place { all: SharedLayout { scene: 0, photo: FIRST as u32 }, ..Place::default() };
         fixture.engine.set_extension(Poses::default().extension(place), 1);
-        fixture.engine.set_shared(&ROWS)?;
-        let row = |k: usize| SharedRow { row: (FIRST + k) as u32, rates: [0.0; 4] };
-        fixture.shared = vec![row(0), row(1)];
+        fixture.engine.set_shared(&rows)?;
+        fixture.shared = (FIRST..rows.len()).map(|row| SharedRow { row: row as u32, rates: [0.0; 4] }).collect();
         fixture.train_with(1)?;
         Ok(Self {
             camera,
             splats: fixture.splats()?,
             rows: fixture.gradient_rows()?,
-            v_shared: fixture.get(Buf::V_SHARED, ROWS.len())?,
+            v_shared: fixture.get(Buf::V_SHARED, rows.len())?,
             scene: fixture.scene,
         })
     }
@@ -65,9 +75,9 @@ impl Posed {
         let splats: Vec<Splat> = self.splats.iter().map(expected).collect();
         // As for the projection, and the rounding errors of the corrected pose.
         let of_splats = judge::splats(&self.splats, &splats, Tolerance { absolute: 6e-5 * leeway, relative: 0.0 });
-        let rows = [ROWS[FIRST], ROWS[FIRST + 1]].map(|row| row.map(f64::from));
-        let [v_turn, v_move] = backward(rules, &self.scene.camera, rows, (&model, &self.rows), f64::from(POSE_PRIOR));
-        let mut found = vec![[0.0; 4]; ROWS.len()];
+        let rows = of_step();
+        let [v_turn, v_move] = backward(rules, &self.scene.camera, &rows, (&model, &self.rows), f64::from(POSE_PRIOR));
+        let mut found = vec![[0.0; 4]; self.v_shared.len()];
         found[FIRST][..3].copy_from_slice(&v_turn);
         found[FIRST + 1][..3].copy_from_slice(&v_move);
         let device: Vec<f64> = self.v_shared.as_flattened().iter().map(|&value| f64::from(value)).collect();
