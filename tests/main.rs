@@ -54,6 +54,7 @@ mod output; // files of rendered pictures
 mod overflow; // a buffer that is too small costs a step and no bit
 mod pass; // each kernel against its mirror
 mod photo_memory; // photos and masks within a budget of memory give the same bits
+mod photos; // what tools/photos refuses
 mod poses; // poses of photos are refined, found and resumed
 mod protocol; // scores of the published benchmarks
 mod registry; // every shader has a header, a mirror and a pass
