@@ -33,7 +33,8 @@ fn passes(shape: &KernelShape, bits: u32) -> u32 {
 pub fn sort(b: &mut Builder, buffers: SortBuffers, bits: u32, count: Count, by: &str, identity: bool) -> (Buf, Buf) {
     let (first, around) = (b.list.work.len(), std::mem::replace(&mut b.list.stage, Stage::Sort));
     let lanes = b.capacity.sort_lanes as u32;
-    let groups = Grid::Groups(lanes / b.shape.subgroup, 1, 1);
+    let workgroups = lanes / b.shape.subgroup;
+    let groups = Grid::Groups(workgroups, 1, 1);
     let digit_bits = b.shape.digit_bits;
     let passes = passes(b.shape, bits);
     for pass in 0..passes {
@@ -48,7 +49,7 @@ pub fn sort(b: &mut Builder, buffers: SortBuffers, bits: u32, count: Count, by: 
             step: Buf::STEP, counters: Buf::COUNTERS, failure: Buf::FAILURE, keys_in: buffers.keys[from],
             histogram: Buf::SORT_HISTOGRAM, totals: Buf::SORT_TOTALS,
         } [count_source: count as u32, lanes: lanes, shift: shift, digit_bits: digit_bits], groups);
-        pass!(b, radix_scan { totals: Buf::SORT_TOTALS } [cells: (lanes / b.shape.subgroup) << digit_bits], ONE);
+        pass!(b, radix_scan { totals: Buf::SORT_TOTALS } [cells: workgroups << digit_bits], ONE);
         pass!(b, radix_scatter {
             step: Buf::STEP, counters: Buf::COUNTERS, failure: Buf::FAILURE, keys_in: buffers.keys[from],
             values_in: values_in, histogram: Buf::SORT_HISTOGRAM, totals: Buf::SORT_TOTALS,

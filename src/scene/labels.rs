@@ -33,13 +33,7 @@ impl LabelMap {
 
     /// Returns the ids in the map, sorted, without 0.
     pub fn objects(&self) -> Vec<u16> {
-        // One bit per id.
-        let mut seen = [0_u64; 1024];
-        self.ids.iter().for_each(|&id| seen[usize::from(id / 64)] |= 1 << (id % 64));
-        seen[0] &= !1;
-        let of_word =
-            |(at, &word): (u16, &u64)| (0..64).filter(move |bit| word >> bit & 1 == 1).map(move |bit| at * 64 + bit);
-        (0..).zip(&seen).filter(|(_, word)| **word != 0).flat_map(of_word).collect()
+        objects_of(&self.ids)
     }
 
     /// Returns the map at a size of at least 1 x 1 px, by the id at the middle of each pixel.
@@ -92,4 +86,15 @@ pub fn label_colour(id: u32) -> [u8; 3] {
         (value * 255.0).round() as u8
     };
     [channel(5.0), channel(3.0), channel(1.0)]
+}
+
+/// Returns the ids of some pixels, sorted, without 0.
+pub(crate) fn objects_of(ids: &[u16]) -> Vec<u16> {
+    // One bit per id.
+    let mut seen = [0_u64; 1024];
+    ids.iter().for_each(|&id| seen[usize::from(id / 64)] |= 1 << (id % 64));
+    seen[0] &= !1;
+    let of_word =
+        |(at, &word): (u16, &u64)| (0..64).filter(move |bit| word >> bit & 1 == 1).map(move |bit| at * 64 + bit);
+    (0..).zip(&seen).filter(|(_, word)| **word != 0).flat_map(of_word).collect()
 }

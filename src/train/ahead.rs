@@ -3,8 +3,9 @@
 //! The order of views is known ahead. What a thread makes depends on step and view alone, so that a step has the same bits
 //! whether its pixels were made ahead or are made when it begins.
 
-use super::parts::Part;
+use super::parts::{Part, labels_of, photo_of};
 use super::step_input::{TrainView, valid_pixels};
+use crate::engine::Band;
 use crate::error::{Error, Result};
 use crate::io::resample::shrink_photo;
 use crate::scene::{Camera, Photo, Pixels};
@@ -30,7 +31,7 @@ pub(super) struct Wanted {
     step: u32,
     /// Index of the part.
     index: usize,
-    part: Part,
+    band: Band,
     photo: Pixels<Photo>,
     view_labels: Pixels<Vec<u32>>,
     /// Camera of a smaller size.
@@ -42,13 +43,14 @@ impl Wanted {
     pub(super) fn new(step: u32, (index, part): (usize, &Part), view: &TrainView, share: Option<f64>) -> Self {
         let small = share.map(|share| part.camera.shrunk(share));
         let (photo, view_labels) = (view.photo.clone(), view.view_labels.clone());
-        Self { step, index, part: part.clone(), photo, view_labels, small }
+        Self { step, index, band: part.band, photo, view_labels, small }
     }
 
     fn make(self) -> Result<Ready> {
-        let photo = self.part.photo(self.photo.get()?);
+        let photo = photo_of(self.band, self.photo.get()?);
         let Some(camera) = self.small else {
-            return Ok(Ready { photo, view_labels: self.part.labels(self.view_labels.get()?), small: None });
+            let view_labels = labels_of(self.band, photo.width, self.view_labels.get()?);
+            return Ok(Ready { photo, view_labels, small: None });
         };
         let photo = Arc::new(shrink_photo(&photo, camera.width, camera.height));
         let valid = valid_pixels(&photo.rgba);

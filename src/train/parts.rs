@@ -6,12 +6,13 @@
 
 use super::step_input::{self, Shown};
 use crate::engine::Band;
+use crate::scene::labels::objects_of;
 use crate::scene::{Camera, LabelMap, Photo};
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 /// What a step trains on.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub(super) struct Part {
     /// Index of the training view.
     pub(super) view: usize,
@@ -30,9 +31,9 @@ pub(super) struct Part {
 }
 
 impl Part {
-    /// Returns the parts of view 0, of at most `most` rows. `labels` is the mask in the layout of the device.
+    /// Returns the parts of a view, of at most `most` rows. `labels` is the mask in the layout of the device.
     pub(super) fn all(
-        camera: &Camera,
+        (view, camera): (usize, &Camera),
         photo: &Photo,
         mask: Option<&LabelMap>,
         labels: &[u32],
@@ -44,37 +45,35 @@ impl Part {
             let pixels = band.pixels(camera.width);
             let rgba = &photo.rgba[pixels.clone()];
             let ids = mask.map_or(&[][..], |mask| &mask.ids[pixels.clone()]);
-            let objects: BTreeSet<u16> = ids.iter().copied().filter(|&id| id != 0).collect();
             let labels = if labels.is_empty() { labels } else { &labels[pixels] };
             Self {
-                view: 0,
+                view,
                 band,
                 camera: band.camera(camera),
                 whole: (!is_whole).then(|| camera.clone()),
                 valid_pixels: step_input::valid_pixels(rgba),
-                objects: objects.into_iter().collect(),
+                objects: objects_of(ids),
                 shown: step_input::shown_objects(rgba, labels),
             }
         };
         bands.into_iter().map(of).collect()
     }
+}
 
-    /// Returns the part's rows of a photo.
-    pub(super) fn photo(&self, photo: Arc<Photo>) -> Arc<Photo> {
-        match &self.whole {
-            None => photo,
-            Some(whole) => {
-                let rgba = photo.rgba[self.band.pixels(whole.width)].to_vec();
-                Arc::new(Photo { width: whole.width, height: self.band.rows, rgba })
-            }
-        }
+/// Returns the band's rows of a photo.
+pub(super) fn photo_of(band: Band, photo: Arc<Photo>) -> Arc<Photo> {
+    if band.rows == photo.height {
+        return photo;
     }
+    let rgba = photo.rgba[band.pixels(photo.width)].to_vec();
+    Arc::new(Photo { width: photo.width, height: band.rows, rgba })
+}
 
-    /// Returns the part's rows of the mask in the layout of the device, which is empty without a mask.
-    pub(super) fn labels(&self, labels: Arc<Vec<u32>>) -> Arc<Vec<u32>> {
-        match &self.whole {
-            Some(whole) if !labels.is_empty() => Arc::new(labels[self.band.pixels(whole.width)].to_vec()),
-            _ => labels,
-        }
+/// Returns the band's rows of the mask in the layout of the device, which is empty without a mask.
+pub(super) fn labels_of(band: Band, width: u32, labels: Arc<Vec<u32>>) -> Arc<Vec<u32>> {
+    let pixels = band.pixels(width);
+    if labels.is_empty() || pixels.len() == labels.len() {
+        return labels;
     }
+    Arc::new(labels[pixels].to_vec())
 }

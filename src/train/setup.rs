@@ -85,22 +85,23 @@ pub(crate) fn start_size(
 
 /// Makes the training views of a data set, and their parts of at most `most` rows.
 pub(super) fn train_views(dataset: &Dataset, border: u32, most: Option<u32>) -> Result<(Vec<TrainView>, Vec<Part>)> {
-    let views: Vec<&View> = dataset.train.iter().collect();
+    let views = &dataset.train;
+    let of = |index: usize| train_view((index, &views[index]), border, most);
     let (mut whole, mut parts) = (Vec::new(), Vec::new());
-    for (index, found) in crew::over_views(&views, |view| train_view(view, border, most)).into_iter().enumerate() {
+    for found in crew::map(views.len(), crew::at_once(views.iter()), of) {
         let (view, of_view) = found?;
         whole.push(view);
-        parts.extend(of_view.into_iter().map(|part| Part { view: index, ..part }));
+        parts.extend(of_view);
     }
     Ok((whole, parts))
 }
 
-fn train_view(view: &View, border: u32, most: Option<u32>) -> Result<(TrainView, Vec<Part>)> {
+fn train_view((index, view): (usize, &View), border: u32, most: Option<u32>) -> Result<(TrainView, Vec<Part>)> {
     let (pixels, mask) = (view.photo()?, view.mask()?);
     let photo = view.photo.clone().unwrap_or_else(|| pixels.clone().into());
     let objects = mask.as_deref().map(LabelMap::objects).unwrap_or_default();
     let labels = mask.as_ref().map(|mask| step_input::view_labels(mask, border)).unwrap_or_default();
-    let parts = Part::all(&view.camera, &pixels, mask.as_deref(), &labels, most);
+    let parts = Part::all((index, &view.camera), &pixels, mask.as_deref(), &labels, most);
     let view_labels = match &view.mask {
         Some(mask) if !mask.is_held() => {
             Pixels::made(Arc::new(LabelsOf { mask: mask.clone(), border }), Default::default())
