@@ -80,6 +80,9 @@ pub mod io {
     pub mod atomic {
         pub use crate::io::atomic::{remove_stale, write};
     }
+    pub mod block_file {
+        pub use crate::io::block_file::{BlockFile, BlocksFile};
+    }
     pub mod camera_json {
         pub use crate::io::camera_json::{CameraFile, read_camera, write_cameras};
     }
@@ -211,6 +214,9 @@ pub mod train {
     pub use crate::train::setup::{TrainerOptions, engine_size};
     pub use crate::train::state::TrainState;
     pub use crate::train::{StepReport, Trainer, aligned, first_model};
+    pub mod region {
+        pub use crate::train::region::Region;
+    }
     pub mod poses {
         pub use crate::train::poses::Poses;
     }

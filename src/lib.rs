@@ -65,6 +65,7 @@
     allow(dead_code, unused_imports, reason = "what only the commands use is left out by the linker")
 )]
 
+pub mod blocks;
 #[cfg(feature = "cli")]
 mod cli;
 pub mod edit;

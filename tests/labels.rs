@@ -162,6 +162,7 @@ fn population() -> Population {
         u: moments,
         gradient_sum: vec![3e-4, 9e-4, 9e-4, 0.0, 9e-4, 9e-4],
         gradient_count: vec![3.0, 3.0, 3.0, 0.0, 3.0, 3.0],
+        frozen: 0,
     }
 }
 

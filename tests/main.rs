@@ -17,6 +17,7 @@ mod antialias; // least sizes of Gaussians, resumed trainings
 mod architecture; // layers of the crate, file lengths, places of unsafe code
 mod associate; // masks of one object in different views get one id
 mod bands; // photos with more tiles than the device can walk
+mod blocks; // a scene in blocks: frozen Gaussians, split, trained, merged
 mod capture; // faults of photos and poses are found before training
 mod cards; // kernels compile for cards that are not there
 mod cli; // flags, defaults, streams and exit statuses

@@ -7,7 +7,8 @@
 // densify_copy — copy one attribute, or one moment, to the densified model.
 // Work:    one vec4 of one old Gaussian per invocation; STRIDE vec4 per Gaussian.
 // Reads:   step; old_values [N,STRIDE]; densify_actions [N]; child_offsets [N]
-// Writes:  values [new N,STRIDE]. MOMENTS: those of all Gaussians start at 0, except of kept ones and of cloned parents.
+// Writes:  values [new N,STRIDE]. MOMENTS: those of all Gaussians start at 0, except of kept ones and of cloned
+//          parents; frozen ones have none.
 // Mirror:  src/verify/reference/densify.rs::densify
 
 layout(constant_id = 14) const uint STRIDE = 1;
@@ -22,7 +23,7 @@ WRITE(4, vec4, values);
 void main() {
     uint e = linear_group_id() * 64u + gl_LocalInvocationID.x;
     uint i = e / STRIDE;
-    if (i >= step.gaussian_count) {
+    if (i >= (MOMENTS == 0u ? step.gaussian_count : step.trained_count)) {
         return;
     }
     uint action = fetchu(densify_actions, i), to = fetchu(child_offsets, i) * STRIDE + (e - i * STRIDE);

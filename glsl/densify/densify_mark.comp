@@ -4,9 +4,9 @@
 #include "step.glsl"
 #include "dispatch.glsl"
 #include "densify_rules.glsl"
-// densify_mark — decide how many Gaussians each one becomes: 0 pruned, 1 kept, 2 cloned or split.
+// densify_mark — decide how many Gaussians each one becomes: 0 pruned, 1 kept, 2 cloned or split. Frozen ones are kept.
 // Work:    64 Gaussians per workgroup.
-// Reads:   step; means, scales [N]; densify_stats [N] (sum, count)
+// Reads:   step; means, scales [N]; densify_stats [trained] (sum, count)
 // Writes:  densify_actions [N]; children_counts [N]; counters.cloned_count, split_count, pruned_count (integer add)
 // Math:    method of 3DGS; the size test for children uses their size after the split.
 // Mirror:  src/verify/reference/densify.rs::mark
@@ -26,7 +26,10 @@ void main() {
     if (i >= u.gaussian_count) {
         return;
     }
-    uint action = densify_action(u, fetch4(means, i), fetch4(scales, i).xyz, densify_stats[i]);
+    uint action = ACTION_KEEP;
+    if (i < u.trained_count) {
+        action = densify_action(u, fetch4(means, i), fetch4(scales, i).xyz, densify_stats[i]);
+    }
     densify_actions[i] = action;
     children_counts[i] = children(action);
     if (action == ACTION_CLONE) {

@@ -42,7 +42,7 @@ bool fogs(StepUniforms u, vec3 from, vec3 to, float near) {
 void main() {
     StepUniforms u = step;
     uint i = linear_group_id() * 64u + gl_LocalInvocationID.x;
-    if (i >= u.gaussian_count || failure != 0u) {
+    if (i >= u.trained_count || failure != 0u) {
         return;
     }
     vec3 mean = fetch4(means, i).xyz, s = fetch4(scales, i).xyz, d = mean - u.free_centre;

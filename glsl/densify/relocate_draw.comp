@@ -10,7 +10,7 @@
 // Reads:   step; means [N]; child_offsets [N]: sums of the weights before each Gaussian
 // Writes:  densify_actions [N]; children_counts [N]: from weights to numbers of copies; counters.cloned_count
 // Math:    systematic sampling: even steps through the sum of the weights, from a random start. With the Gaussian itself
-//          a stack has at most RELOCATE_MOST copies (3DGS-MCMC). Draws where nothing grows are void.
+//          a stack has at most RELOCATE_MOST copies (3DGS-MCMC). Draws where nothing grows and of frozen ones are void.
 // Mirror:  src/verify/reference/relocate.rs::copies
 
 layout(local_size_x = 64) in;
@@ -33,7 +33,7 @@ void main() {
     precise float from = float(before) * u.draws_per_weight + phase;
     precise float to = float(before + weight) * u.draws_per_weight + phase;
     uint drawn = min(uint(floor(to)), u.draws) - min(uint(floor(from)), u.draws);
-    drawn = grows_at(u, fetch4(means, i).xyz) ? drawn : 0u;
+    drawn = i < u.trained_count && grows_at(u, fetch4(means, i).xyz) ? drawn : 0u;
     uint copies = weight == 0u ? 0u : 1u + min(drawn, RELOCATE_MOST - 1u);
     children_counts[i] = copies;
     densify_actions[i] = copies == 0u ? ACTION_PRUNE : copies == 1u ? ACTION_KEEP : ACTION_STACK + copies;

@@ -9,7 +9,7 @@
 // Work:    64 Gaussians per workgroup.
 // Reads:   step; means [N]; densify_stats [N]
 // Writes:  children_counts [N]: the weight in steps of 1 / RELOCATE_ONE, at least 1 step, and
-//          no more where nothing grows; counters.pruned_count
+//          no more where nothing grows and for frozen ones; counters.pruned_count
 // Math:    3DGS-MCMC: an opacity below prune_opacity is dead, the others are drawn in proportion to their opacity.
 //          Whole weights have an exact prefix sum.
 // Mirror:  src/verify/reference/relocate.rs::weights
@@ -25,6 +25,10 @@ void main() {
     StepUniforms u = step;
     uint i = linear_group_id() * 64u + gl_LocalInvocationID.x;
     if (i >= u.gaussian_count) {
+        return;
+    }
+    if (i >= u.trained_count) {
+        children_counts[i] = 1u;
         return;
     }
     vec4 mean = fetch4(means, i);

@@ -9,7 +9,7 @@
 // Reads:   step, counters, failure; tiles_touched, instance_offsets [V]; v_instances_a, _b, _c [I];
 //          gaussian_from_splat [V], except in variant object; variant labels: labels [N], layer_from_label
 // Writes:  v_splats [V,3]: v_mean2d (px), v_conic xy..; v_conic z, v_log_opacity, v_colour rg; v_colour b
-//          densify_stats [N] += (|scene v_mean2d| in NDC units, 1), except in variant object
+//          densify_stats [N] += (|scene v_mean2d| in NDC units, 1) of trained ones, except in variant object
 // Math:    the statistic uses the scene layer only, without the label loss.
 // Order:   fixed, bitwise reproducible; no atomics.
 // Mirror:  src/verify/reference/blend.rs::blend_backward, densify.rs::accumulate
@@ -64,7 +64,7 @@ void main() {
     v_splats[3u * s + 1u] = b;
     v_splats[3u * s + 2u] = vec4(c, 0.0, 0.0, 0.0);
 #ifndef OBJECT
-    if (total > 0u) {
+    if (total > 0u && gaussian < step.trained_count) {
         float size = length(scene_mean * vec2(0.5 * float(step.width), 0.5 * float(step.height)));
         // As in project_backward, which drops the gradients of such a splat: an infinity would stay in the sum.
         if (finite(size) && size < GRADIENT_MAX) {

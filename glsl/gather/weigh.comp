@@ -35,5 +35,8 @@ void main() {
         bool current = floatBitsToUint(fetch4(v_instances_c, at).y) == step.stamp;
         weight += current ? fetch4(v_instances_b, at).z : 0.0;
     }
-    densify_stats[fetchu(gaussian_from_splat, s)].x += weight;
+    uint i = fetchu(gaussian_from_splat, s);
+    if (i < step.trained_count) {
+        densify_stats[i].x += weight;
+    }
 }

@@ -8,7 +8,8 @@ const uint ACTION_STACK = 4u; // plus the number of copies, 2 to RELOCATE_MOST
 
 // True where new Gaussians are wanted.
 bool grows_at(StepUniforms u, vec3 mean) {
-    return u.grow_low == u.grow_high || (all(greaterThanEqual(mean, u.grow_low)) && all(lessThan(mean, u.grow_high)));
+    vec3 at = vec3(dot(u.grow_axis0, mean), dot(u.grow_axis1, mean), dot(u.grow_axis2, mean));
+    return u.grow_low == u.grow_high || (all(greaterThanEqual(at, u.grow_low)) && all(lessThan(at, u.grow_high)));
 }
 
 uint densify_action(StepUniforms u, vec4 mean, vec3 log_scale, vec2 stats) {

@@ -11,6 +11,7 @@ struct StepUniforms {
     uint width, height;     // px
     uint tiles_x, tile_count;
     uint gaussian_count;
+    uint trained_count;     // the Gaussians from this row on are frozen: no pass changes them
     uint layer_count;       // sampled objects of this step: layers 1..layer_count
     vec3 background;
     float lambda_dssim;
@@ -30,7 +31,8 @@ struct StepUniforms {
     uint sum_absolute;      // 1: the statistic sums absolute gradients over tiles
     vec3 free_centre;       // space before all cameras between this one and another one is free (mark_near): its centre,
     float free_near;        // and the near plane on the way; 0: there is none
-    vec3 grow_low, grow_high; // Gaussians grow at low <= mean < high; everywhere if both are equal
+    vec3 grow_axis0, grow_axis1, grow_axis2; // Gaussians grow at low <= mean < high along these unit vectors;
+    vec3 grow_low, grow_high; // everywhere if both are equal
     uint draws;             // Gaussians to draw for relocation
     float draws_per_weight; // draws over the sum of all weights
     float opacity_weight, scale_weight; // of a Gaussian's opacity and standard deviations in the loss

@@ -24,7 +24,7 @@ void main() {
     uint key = label_keys[i];
     if (key != 0u) {
         label_keys[i] = 0u;
-        if (failure == 0u) {
+        if (failure == 0u && i < step.trained_count) {
             labels[i] = key & 0xffffu;
         }
     }

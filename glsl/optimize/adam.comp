@@ -3,7 +3,7 @@
 #include "constants.glsl"
 #include "step.glsl"
 #include "dispatch.glsl"
-// adam — one Adam update of one attribute of all Gaussians. An invisible Gaussian has gradient 0; with SEEN_ONLY it
+// adam — one Adam update of one attribute of all trained Gaussians. An invisible Gaussian has gradient 0; with SEEN_ONLY it
 //        stays unchanged. SHARED: one update of the step's shared rows with a rate above 0; all other rows stay
 //        unchanged, and the number of updates of each row corrects its moments.
 // Work:    one vec4 of one Gaussian per invocation; STRIDE vec4 per Gaussian. SHARED: one row of the step.
@@ -58,7 +58,7 @@ void main() {
     StepUniforms u = step;
     uint e = linear_group_id() * 64u + gl_LocalInvocationID.x;
     uint i = e / STRIDE;
-    if (i >= u.gaussian_count || failure != 0u) {
+    if (i >= u.trained_count || failure != 0u) {
         return;
     }
     uint s = fetchu(splat_from_gaussian, i);

@@ -23,7 +23,7 @@ WRITE(5, vec4, means);
 void main() {
     StepUniforms u = step;
     uint i = linear_group_id() * 64u + gl_LocalInvocationID.x;
-    if (i >= u.gaussian_count || failure != 0u) {
+    if (i >= u.trained_count || failure != 0u) {
         return;
     }
     vec4 mean = fetch4(means_in, i);

@@ -17,7 +17,7 @@ INOUT(3, vec4, u_means);
 
 void main() {
     uint i = linear_group_id() * 64u + gl_LocalInvocationID.x;
-    if (i < step.gaussian_count) {
+    if (i < step.trained_count) {
         means[i].w = min(means[i].w, OPACITY_RESET_LOGIT);
         m_means[i].w = 0.0;
         u_means[i].w = 0.0;

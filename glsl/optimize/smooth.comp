@@ -22,7 +22,7 @@ WRITE(4, vec4, scales);
 void main() {
     StepUniforms u = step;
     uint i = linear_group_id() * 64u + gl_LocalInvocationID.x;
-    if (i >= u.gaussian_count || failure != 0u) {
+    if (i >= u.trained_count || failure != 0u) {
         return;
     }
     vec4 s = fetch4(scales_in, i);

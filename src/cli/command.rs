@@ -2,6 +2,7 @@
 
 use super::ablate::AblateArgs;
 use super::args::GlobalArgs;
+use super::blocks::BlocksArgs;
 use super::check::CheckArgs;
 use super::clean::CleanArgs;
 use super::convert::ConvertArgs;
@@ -154,6 +155,10 @@ pub enum Command {
     ///
     /// Example: labelgs ablate scene --masks scene/masks -o ablation -- --iterations 3000
     Ablate(Box<AblateArgs>),
+    /// Train a scene that no one card holds: plan and split it into blocks, merge their models.
+    ///
+    /// Example: labelgs blocks plan scene --model out --card 24G
+    Blocks(Box<BlocksArgs>),
     /// Show each Vulkan device and whether it meets the requirements.
     ///
     /// Example: labelgs devices

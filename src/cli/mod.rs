@@ -2,6 +2,7 @@
 
 pub(crate) mod ablate;
 pub(crate) mod args;
+mod blocks;
 pub(crate) mod check;
 pub(crate) mod choose;
 pub(crate) mod clean;
@@ -111,6 +112,7 @@ fn run(args: Vec<OsString>) -> Result<(), Exit> {
     let context = Context::new(cli.global, cli.json);
     match cli.command {
         Command::Ablate(args) => ablate::run(&args, &context),
+        Command::Blocks(args) => blocks::run(&args, &context),
         Command::Check(args) => check::run(&args, &context),
         Command::Train(args) => train::run(&args, &context),
         Command::Render(args) => render::run(&args, &context),

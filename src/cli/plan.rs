@@ -5,7 +5,7 @@ use super::context::Context;
 use super::devices::{shape_json, shape_of, shape_text};
 use super::values::{Size, bytes, count, size};
 use super::{stdout, wording};
-use crate::engine::{Engine, EngineSize, LabelSize, capacity};
+use crate::engine::{Engine, EngineSize, LabelSize, capacity, card};
 use crate::gpu::{self, GpuOptions};
 use crate::pass::{KernelShape, Variant, training_step};
 use crate::scheduler::plan::{
@@ -68,7 +68,10 @@ pub(crate) fn run(args: &PlanArgs, context: &Context) -> Result<()> {
 
 fn subject(args: &PlanArgs, context: &Context) -> Result<Subject> {
     let (device, shape, limits) = match args.card {
-        Some(memory) => card(memory),
+        Some(memory) => {
+            let (shape, limits) = card(memory);
+            (Some(format!("a graphics card with {:.1} GiB", memory as f64 / f64::from(1 << 30))), shape, limits)
+        }
         None => device(context)?,
     };
     let labels = (args.label_samples > 0).then(|| LabelSize {
@@ -90,14 +93,6 @@ fn subject(args: &PlanArgs, context: &Context) -> Result<Subject> {
     };
     let list = training_step(&shape, &capacity, variant);
     Ok(Subject { device, shape, limits, room, capacity, list })
-}
-
-/// Returns a typical graphics card: subgroups of 32, bindings and allocations of 4 GiB.
-fn card(memory: u64) -> (Option<String>, KernelShape, Limits) {
-    const RANGE: u64 = u32::MAX as u64 & !0xffff;
-    let limits = Limits { max_storage_range: RANGE, max_allocation: RANGE, max_memory: memory, ..Limits::default() };
-    let name = format!("a graphics card with {:.1} GiB", memory as f64 / f64::from(1 << 30));
-    (Some(name), KernelShape::new(32, false), limits)
 }
 
 /// Returns the name, kernels and limits of the device, or those of a software device if there is none.

@@ -59,6 +59,10 @@ pub struct TrainFlags {
     /// run. All bands of colour and the full size of the photos count from the first step.
     #[arg(long, value_name = "MODEL", help_heading = "Training")]
     pub init: Option<PathBuf>,
+    /// Train this block of the scene alone: a folder that `labelgs blocks split` wrote. It decides the views, the first
+    /// model, steps, seed and number of Gaussians. Flags override what it decides.
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["init", "grow_box", "no_test", "test_every"], help_heading = "Training")]
+    pub block: Option<PathBuf>,
     /// Folder of pictures named as masks: pixels above 0 are left out of the loss and of votes.
     #[arg(long, value_name = "DIR", help_heading = "Scene")]
     pub ignore: Option<PathBuf>,
@@ -103,6 +107,9 @@ impl TrainFlags {
             (None, Some(found)) => found.clone(),
             (None, None) => self.preset.map(Settings::preset).unwrap_or_default(),
         };
+        if let (Some(block), None) = (&self.block, checkpoint) {
+            settings.for_block(block)?;
+        }
         let applied = self.read.apply(&mut settings.read);
         let applied = applied.and_then(|()| self.train.apply(&mut settings.train));
         let applied = applied.and_then(|()| self.run.apply(&mut settings.run));
@@ -140,7 +147,7 @@ impl TrainFlags {
             max_bad_photos: self.trust.max_bad_photos,
             allow_outside: self.trust.allow_outside,
         };
-        let init = self.init.clone();
-        Ok(Request { start, inputs, init, occluders, restart: self.restart, ..Request::new(scene, output) })
+        let (init, block) = (self.init.clone(), self.block.clone());
+        Ok(Request { start, inputs, init, block, occluders, restart: self.restart, ..Request::new(scene, output) })
     }
 }

@@ -43,14 +43,14 @@ impl Engine {
         self.sched.upload(Buf::SHARED, 0, 0, rows)
     }
 
-    /// Sets the densification statistic: a sum and a number of views for each Gaussian.
+    /// Sets the densification statistic: a sum and a number of views for each trained Gaussian.
     pub(crate) fn set_densify_stats(&mut self, stats: &[[f32; 2]]) -> Result<()> {
         self.sched.upload(Buf::DENSIFY_STATS, 0, 0, stats)
     }
 
-    /// The densification statistic, `[N]`.
+    /// The densification statistic of the trained Gaussians.
     pub(crate) fn densify_stats(&mut self) -> Result<Vec<[f32; 2]>> {
-        self.sched.download(Buf::DENSIFY_STATS, 0, 0, self.gaussian_count as usize)
+        self.sched.download(Buf::DENSIFY_STATS, 0, 0, self.trained_count() as usize)
     }
 
     /// Sets all votes to 0.

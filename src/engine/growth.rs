@@ -41,7 +41,7 @@ pub fn capacity(shape: &KernelShape, size: &EngineSize) -> Capacity {
     let instances = (gaussians * 6).max(tiles * 16);
     let mut capacity = Capacity {
         gaussians,
-        trained: if size.trained { gaussians } else { 0 },
+        trained: if size.trained { gaussians.saturating_sub(u64::from(size.frozen)) } else { 0 },
         labelled: if labels > 0 { gaussians } else { 0 },
         virtual_tiles: tiles * (layers + 1),
         layer_tiles: if layers > 0 { tiles } else { 0 },

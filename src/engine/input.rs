@@ -108,8 +108,11 @@ impl Engine {
         if let Input::Train(train) = input {
             self.write_shared(frame, &train.shared)?;
         }
+        let (gaussian_count, trained_count) = (self.gaussian_count, self.trained_count());
         let sched = &mut self.sched;
-        sched.upload(Buf::STEP, frame, 0, &[StepUniforms { stamp: self.stamp, ..*uniforms }])?;
+        // Uniforms of a step may be older than a densification after it.
+        let counts = StepUniforms { gaussian_count, trained_count, stamp: self.stamp, ..*uniforms };
+        sched.upload(Buf::STEP, frame, 0, &[counts])?;
         match input {
             Input::Uniforms(_) => Ok(()),
             Input::Train(train) => {

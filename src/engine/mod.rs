@@ -5,6 +5,7 @@
 //! `Engine::retire` keep steps in flight, and transfers are typed.
 
 mod bands;
+mod card;
 mod data;
 pub(crate) mod growth;
 mod input;
@@ -15,6 +16,7 @@ pub(crate) mod state;
 pub(crate) mod uniforms;
 
 pub(crate) use bands::Band;
+pub(crate) use card::{card, predict_for};
 pub(crate) use growth::{GrownSizes, capacity};
 pub(crate) use input::{DisagreementInput, Input, LayerInput, SharedRow, TrainInput, VoteInput};
 pub(crate) use run::{InFlight, ListKey, Recording, Report};
@@ -23,7 +25,7 @@ pub use size::{EngineSize, LabelSize};
 use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::pass::{Extension, KernelShape};
-use crate::scene::{Camera, Gaussians};
+use crate::scene::{Camera, Gaussians, Zone};
 use crate::scheduler::plan::{FRAMES_IN_FLIGHT, TABLE};
 use crate::scheduler::{ListId, Scheduler, SchedulerOptions};
 use crate::shaders::structs::StepUniforms;
@@ -118,6 +120,11 @@ impl Engine {
         self.gaussian_count
     }
 
+    /// Number of Gaussians that are trained; the others follow them and are frozen.
+    pub fn trained_count(&self) -> u32 {
+        self.gaussian_count.saturating_sub(self.size.frozen)
+    }
+
     /// Sets the number of Gaussians that the device holds, after a densification.
     pub(crate) fn set_gaussian_count(&mut self, count: u32) {
         self.gaussian_count = count;
@@ -179,10 +186,14 @@ impl Engine {
         uniforms::view_uniforms(camera, self.origin, &self.shape, near, background, self.gaussian_count)
     }
 
-    /// Adds the box in which Gaussians grow, world units.
-    pub(crate) fn with_grow_box(&self, uniforms: StepUniforms, [x0, y0, z0, x1, y1, z1]: [f64; 6]) -> StepUniforms {
-        let corner = |x, y, z| (DVec3::new(x, y, z) - self.origin).as_vec3().to_array();
-        StepUniforms { grow_low: corner(x0, y0, z0), grow_high: corner(x1, y1, z1), ..uniforms }
+    /// Adds the box in which Gaussians grow.
+    pub(crate) fn with_grow_box(&self, uniforms: StepUniforms, zone: &Zone) -> StepUniforms {
+        let [grow_axis0, grow_axis1, grow_axis2] = zone.axes.map(|axis| axis.as_vec3().to_array());
+        let origin = zone.place(self.origin);
+        // An open side stays so.
+        let corner = |at: DVec3| (at - origin).clamp(DVec3::splat(f32::MIN.into()), DVec3::splat(f32::MAX.into()));
+        let (grow_low, grow_high) = (corner(zone.low).as_vec3().to_array(), corner(zone.high).as_vec3().to_array());
+        StepUniforms { grow_axis0, grow_axis1, grow_axis2, grow_low, grow_high, ..uniforms }
     }
 
     /// Adds free space on the way to another camera.

@@ -29,12 +29,14 @@ pub struct EngineSize {
     pub labels: Option<LabelSize>,
     /// Rows of four shared parameters.
     pub shared_rows: u32,
+    /// Gaussians at the end of the model that are drawn and not trained; they have no optimiser state.
+    pub frozen: u32,
 }
 
 impl EngineSize {
     /// Sizes for rendering this many Gaussians in images of up to `image` px.
     pub const fn new(gaussians: u64, image: (u32, u32)) -> Self {
-        Self { gaussians, image, trained: false, labels: None, shared_rows: 0 }
+        Self { gaussians, image, trained: false, labels: None, shared_rows: 0, frozen: 0 }
     }
 
     /// Sizes for rendering a model, and its labels if it has some, in images of up to the largest of `sizes`, px.
@@ -58,6 +60,12 @@ impl EngineSize {
     #[doc(hidden)]
     pub const fn with_shared_rows(self, shared_rows: u32) -> Self {
         Self { shared_rows, ..self }
+    }
+
+    /// Sets the number of Gaussians at the end that are not trained.
+    #[doc(hidden)]
+    pub const fn with_frozen(self, frozen: u32) -> Self {
+        Self { frozen, ..self }
     }
 
     /// Returns the most tiles that the kernels of the device can walk; `None` without a limit.

@@ -5,17 +5,38 @@ use super::Engine;
 use crate::error::Result;
 use crate::io::checkpoint::Plane;
 use crate::pass::{ATTRIBUTES, SHARED_PLANES};
-use crate::scheduler::plan::{Buf, TABLE};
+use crate::scheduler::plan::{Buf, Domain, TABLE};
 use glam::DVec3;
 use std::collections::BTreeMap;
 
+/// Numbers of rows of a training's state.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Counts {
+    /// Gaussians.
+    pub gaussians: u32,
+    /// Gaussians at the end without optimiser state.
+    pub frozen: u32,
+    /// Shared rows.
+    pub shared: u32,
+}
+
+impl Counts {
+    fn of(&self, buf: Buf) -> u32 {
+        match TABLE[buf.index()].domain {
+            Domain::Trained => self.gaussians.saturating_sub(self.frozen),
+            Domain::SharedRows => self.shared,
+            _ => self.gaussians,
+        }
+    }
+}
+
 /// Buffers of a training's state, with row counts; `kept` are the buffers that its strategy keeps.
-fn buffers(sh_degree: u32, labels: bool, kept: &[Buf], [count, shared_rows]: [u32; 2]) -> Vec<(Buf, u32)> {
+fn buffers(sh_degree: u32, labels: bool, kept: &[Buf], counts: Counts) -> Vec<(Buf, u32)> {
     let attributes = ATTRIBUTES.iter().filter(|a| a.from_degree <= sh_degree).flat_map(|a| a.planes);
     let labels = labels.then_some(Buf::LABELS);
-    let of_gaussians = attributes.chain(kept.iter().copied()).chain(labels).map(|buf| (buf, count));
-    let shared = SHARED_PLANES.into_iter().filter(|_| shared_rows > 0).map(|buf| (buf, shared_rows));
-    of_gaussians.chain(shared).collect()
+    let shared = SHARED_PLANES.into_iter().filter(|_| counts.shared > 0);
+    let all = attributes.chain(kept.iter().copied()).chain(labels).chain(shared);
+    all.map(|buf| (buf, counts.of(buf))).collect()
 }
 
 fn named(name: &str) -> Option<Buf> {
@@ -26,11 +47,11 @@ fn words(buf: Buf) -> u32 {
     TABLE[buf.index()].element_bytes / 4
 }
 
-/// Checks that planes form the state of `counts` Gaussians and shared rows. `labels` is true with masks; `kept` names
+/// Checks that planes form a state of `counts` rows. `labels` is true with masks; `kept` names
 /// the buffers that the strategy keeps. The error says what is wrong.
 pub(crate) fn check(
     planes: &[Plane],
-    counts: [u32; 2],
+    counts: Counts,
     sh_degree: u32,
     labels: bool,
     kept: &[String],
@@ -57,7 +78,8 @@ pub(crate) fn check(
 impl Engine {
     /// Downloads the state, including the buffers that the strategy keeps. No list may be in flight.
     pub(crate) fn download_state(&mut self, kept: &[Buf]) -> Result<Vec<Plane>> {
-        let counts = [self.gaussian_count, self.size.shared_rows];
+        let (gaussians, frozen) = (self.gaussian_count, self.size.frozen);
+        let counts = Counts { gaussians, frozen, shared: self.size.shared_rows };
         let planes =
             buffers(self.sh_degree, self.size.labels.is_some(), kept, counts).into_iter().map(|(buf, count)| {
                 let data = self.sched.download(buf, 0, 0, count as usize * words(buf) as usize)?;

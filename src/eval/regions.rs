@@ -90,18 +90,9 @@ impl Witnesses {
 
     /// Returns the pixels of a rendered view that enough training views see.
     pub(super) fn see(&self, camera: &Camera, rendered: &Rendered) -> Result<Vec<bool>> {
-        let depths = rendered.mean_depth()?;
-        let far = BEYOND * f64::from(depths.iter().copied().fold(1e-6_f32, f32::max));
-        let to_world = camera.rotation.transpose();
-        let place = |(index, &depth): (usize, &f32)| {
-            let (x, y) = (index % camera.width as usize, index / camera.width as usize);
-            let pixel = DVec2::new(x as f64 + 0.5, y as f64 + 0.5);
-            let ray = DVec3::new((pixel.x - camera.cx) / camera.fx, (pixel.y - camera.cy) / camera.fy, 1.0);
-            let depth = if depth > 0.0 { f64::from(depth) } else { far };
-            to_world * (ray * depth - camera.translation)
-        };
         // One witness after the other, because the depths of all of them may not fit into memory.
-        let mut open: Vec<(DVec3, usize)> = depths.par_iter().enumerate().map(place).map(|world| (world, 0)).collect();
+        let world = world_points(camera, &rendered.mean_depth()?);
+        let mut open: Vec<(DVec3, usize)> = world.into_iter().map(|world| (world, 0)).collect();
         for (other, depths) in &self.cameras {
             let depths = depths.get()?;
             let is_open = |(world, seen): &mut (DVec3, usize)| {
@@ -114,6 +105,20 @@ impl Witnesses {
         }
         Ok(open.into_iter().map(|(_, seen)| seen == VIEWS_MIN).collect())
     }
+}
+
+/// Returns the world point that each pixel shows, by the mean depth there; what has none is far away.
+pub(super) fn world_points(camera: &Camera, depths: &[f32]) -> Vec<DVec3> {
+    let far = BEYOND * f64::from(depths.iter().copied().fold(1e-6_f32, f32::max));
+    let to_world = camera.rotation.transpose();
+    let place = |(index, &depth): (usize, &f32)| {
+        let (x, y) = (index % camera.width as usize, index / camera.width as usize);
+        let pixel = DVec2::new(x as f64 + 0.5, y as f64 + 0.5);
+        let ray = DVec3::new((pixel.x - camera.cx) / camera.fx, (pixel.y - camera.cy) / camera.fy, 1.0);
+        let depth = if depth > 0.0 { f64::from(depth) } else { far };
+        to_world * (ray * depth - camera.translation)
+    };
+    depths.par_iter().enumerate().map(place).collect()
 }
 
 /// Returns true if the point is in the picture and nothing of the model is in front of it.

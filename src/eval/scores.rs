@@ -6,6 +6,7 @@ use super::boundary::boundary_iou;
 use super::corrected::psnr_corrected;
 use super::crop::Crop;
 use super::metrics::{COVERED, Overlap, byte_value, mean, paper_score, psnr, psnr_of};
+use super::places::PlaceScore;
 use super::regions::RegionScores;
 use super::removal::RemovalScores;
 use super::ssim::ssim;
@@ -231,6 +232,9 @@ pub struct Scores {
     /// Scores of removals, if asked for.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub removal: Option<RemovalScores>,
+    /// Scores by place, such as by block of a merged model.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub places: BTreeMap<String, PlaceScore>,
 }
 
 /// The scene at several near planes. Gaussians before the cameras fog pictures unless a near plane hides them.
@@ -287,6 +291,7 @@ impl Scores {
             near: None,
             refined_poses: false,
             removal: None,
+            places: BTreeMap::new(),
         }
     }
 

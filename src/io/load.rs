@@ -16,7 +16,16 @@ pub(crate) fn load(root: &Path, mut listing: Listing, options: &LoadOptions) -> 
     let mut notes = std::mem::take(&mut listing.notes);
     let mut views = existing(&listing, options, &mut notes)?;
     views.sort_by(|a, b| a.name.cmp(&b.name));
-    let test = split(&views, options.test_every, &mut notes)?;
+    let mut test = split(&views, options.test_every, &mut notes)?;
+    if let Some(only) = &options.only {
+        // Photos of wide lenses have their views below their names.
+        let kept: Vec<bool> = views.iter().map(|view| only.contains(&view.name) || !view.lens.is_pinhole()).collect();
+        retain(&mut views, &kept);
+        retain(&mut test, &kept);
+        if views.is_empty() {
+            return Err(Error::data(root, "photos", "none of the asked ones is in the scene"));
+        }
+    }
     let masks = options.masks.as_deref().map(|folder| MaskFolder::new(folder, views.iter().map(|v| v.name.as_str())));
     let masks = masks.transpose()?;
     let ignore = options.ignore.as_deref().map(|folder| MaskFolder::new(folder, views.iter().map(|v| v.name.as_str())));
@@ -66,11 +75,21 @@ pub(crate) fn load(root: &Path, mut listing: Listing, options: &LoadOptions) -> 
     for (views, test) in loaded {
         if test { dataset.test.extend(views) } else { dataset.train.extend(views) }
     }
+    if let Some(only) = &options.only {
+        dataset.train.retain(|view| only.contains(&view.name));
+        dataset.test.retain(|view| only.contains(&view.name));
+    }
     // Faces of a photo are not in the order of their names.
     dataset.train.sort_by(|a, b| a.name.cmp(&b.name));
     dataset.test.sort_by(|a, b| a.name.cmp(&b.name));
     require_unique(root, &dataset)?;
     Ok(dataset)
+}
+
+/// Keeps the items whose flag is set.
+fn retain<T>(items: &mut Vec<T>, kept: &[bool]) {
+    let mut flags = kept.iter();
+    items.retain(|_| flags.next() == Some(&true));
 }
 
 /// Makes the views of each photo. The outer error is that of an undecodable photo. Also returns the number of masks with

@@ -7,6 +7,7 @@
 pub(crate) mod append;
 pub(crate) mod atomic;
 mod bad_photos;
+pub(crate) mod block_file;
 pub(crate) mod camera_json;
 pub mod capture;
 pub(crate) mod checkpoint;
@@ -47,7 +48,9 @@ use crate::error::{Error, Result};
 use crate::scene::Dataset;
 use listed_path::Place;
 use listing::Listing;
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 pub use camera_json::{read_camera, write_cameras};
 pub use depth::DepthFolder;
@@ -56,6 +59,7 @@ pub use image::read_photo;
 pub use init::initial_gaussians;
 pub use label_table::{LabelEntry, LabelTable};
 pub use mask::read_mask;
+pub(crate) use model::write_joined;
 pub use model::{
     Export, FirstView, LabelType, ModelFormat, ModelWriter, ReadModel, SpzVersion, WriteOptions, export_model,
     read_model, register, write_model,
@@ -91,6 +95,8 @@ pub struct LoadOptions {
     /// Most bytes of memory for photos and masks. In a larger scene some of them wait in a temporary file until they are
     /// asked for, with the same bits.
     pub photo_memory: u64,
+    /// Names of the views to read, of those that are in the scene; `None` reads all. The split is that of all views.
+    pub only: Option<Arc<BTreeSet<String>>>,
     /// Folder for that file; with `None` there is no file, and such photos are decoded again each time.
     pub photo_folder: Option<PathBuf>,
 }
@@ -114,6 +120,7 @@ impl Default for LoadOptions {
             allow_outside: false,
             undistort: true,
             photo_memory: PHOTO_MEMORY,
+            only: None,
             photo_folder: Some(scratch::system_folder()),
         }
     }

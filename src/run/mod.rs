@@ -4,6 +4,7 @@
 //! [`Settings`] and whether to resume ([`Start`]). An [`Observer`] follows the run and may pause, save or stop it. The
 //! result is a [`Summary`]; [`guide::outputs`](crate::guide::outputs) lists the files of the folder.
 
+mod block;
 mod checkpoints;
 mod finish;
 pub(crate) mod history;
@@ -87,6 +88,9 @@ pub struct Request<'a> {
     pub inputs: Inputs,
     /// Model to start from in place of the scene's points: a file of any format, of any trainer, or the folder of a run.
     pub init: Option<PathBuf>,
+    /// Folder of a block of the scene ([`crate::blocks`]): only this part is trained, from the first model of the block. The
+    /// settings are those of [`Settings::for_block`].
+    pub block: Option<PathBuf>,
     /// Files with occluders, for [`Occlusion::Depth`] and [`Occlusion::File`].
     pub occluders: Option<OccluderFiles>,
     /// Opens a lost device again and continues from the newest checkpoint, as long as each loss has a new one. The
@@ -110,6 +114,7 @@ impl<'a> Request<'a> {
             start: Start::New(Settings::default()),
             inputs: Inputs::default(),
             init: None,
+            block: None,
             occluders: None,
             restart: false,
             command: None,

@@ -66,12 +66,19 @@ impl Models {
         Ok(Self { out: out.to_owned(), earlier })
     }
 
+    /// Writes the model of a step.
     pub(crate) fn save(&mut self, step: u32, model: &Gaussians) -> Result<PathBuf> {
         let path = model_path(&self.out, step);
         let left_out = write_model(&path, model)?;
         if left_out > 0 {
             tracing::warn!("{}: {left_out} Gaussians are not finite and were left out", path.display());
         }
+        self.note_saved(step);
+        Ok(path)
+    }
+
+    /// Moves the models of an earlier run, after that of a step was written.
+    pub(crate) fn note_saved(&mut self, step: u32) {
         for old in self.earlier.drain(..).filter(|&old| old != step) {
             let (from, to) = (model_path(&self.out, old), model_path(&self.out.join(EARLIER), old));
             let moved = to.parent().map_or(Ok(()), std::fs::create_dir_all).and_then(|()| std::fs::rename(&from, &to));
@@ -81,7 +88,6 @@ impl Models {
             // This fails, as it should, if the folder holds other files.
             let _ = from.parent().map(std::fs::remove_dir);
         }
-        Ok(path)
     }
 }
 

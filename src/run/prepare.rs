@@ -1,5 +1,6 @@
 //! Everything before the first step: the folder, the settings, the scene, the initial model.
 
+use super::block::{self, Block};
 use super::checkpoints::Checkpoints;
 use super::history::{Recorder, Sums};
 use super::info::Info;
@@ -35,6 +36,7 @@ pub(super) struct Prepared {
     table: Option<OcclusionTable>,
     /// The model to start from, if there is one.
     first: Option<Gaussians>,
+    block: Option<Block>,
 }
 
 /// Locks the folder, decides the settings and reads the scene. `is_again` continues from the newest checkpoint.
@@ -64,16 +66,18 @@ pub(super) fn prepare(request: &Request, is_again: bool) -> Result<Prepared> {
     if request.restart && settings.run.checkpoint_every == 0 {
         return Err(Error::usage("restart", "goes on from checkpoints, and `checkpoint_every` is 0"));
     }
-    let first = read_first(request, resumed.is_some())?;
+    let block = request.block.as_deref().map(Block::read).transpose()?;
+    let first = read_first(request, block.as_ref(), resumed.is_some())?;
     clear(out, &settings)?;
+    block::settle(block.as_ref(), resumed.as_ref(), out)?;
     let models = Models::new(out, resumed.as_ref().map_or(0, |resumed| resumed.state.step))?;
     let mut inputs = resumed.as_ref().map_or(request.inputs.clone(), |resumed| resumed.record.inputs.clone());
     inputs.masks = request.inputs.masks.clone().or(inputs.masks);
     inputs.ignore = request.inputs.ignore.clone().or(inputs.ignore);
     let names = inputs.masks.as_deref().map(LabelTable::of_folder).transpose()?.flatten();
-    let dataset = read_scene(request, &settings, &inputs)?;
+    let dataset = read_scene(request, &settings, &inputs, block.as_ref())?;
     let table = if resumed.is_none() { occluders::table(request, &dataset)? } else { None };
-    Ok(Prepared { lock, settings, resumed, inputs, models, names, dataset, table, first })
+    Ok(Prepared { lock, settings, resumed, inputs, models, names, dataset, table, first, block })
 }
 
 fn check_new(settings: &Settings, request: &Request) -> Result<()> {
@@ -96,13 +100,17 @@ fn clear(out: &Path, settings: &Settings) -> Result<()> {
     Ok(())
 }
 
-fn read_scene(request: &Request, settings: &Settings, inputs: &Inputs) -> Result<Dataset> {
+fn read_scene(request: &Request, settings: &Settings, inputs: &Inputs, block: Option<&Block>) -> Result<Dataset> {
     let mut options = settings.load_options(inputs.masks.clone());
     options.ignore = inputs.ignore.clone();
     options.max_bad_photos = inputs.max_bad_photos.unwrap_or(options.max_bad_photos);
     options.allow_outside = inputs.allow_outside;
     options.photo_folder = Some(request.output.clone());
+    if let Some(block) = block {
+        block.limit(&mut options);
+    }
     let dataset = io::open_logged(&request.scene, &options)?;
+    block.map_or(Ok(()), |block| block.check_scene(&dataset))?;
     if dataset.train.is_empty() {
         let problem = "no view is left to train on; set `test_every` to 0 or to a larger number";
         return Err(Error::data(&request.scene, "", problem));
@@ -117,7 +125,7 @@ pub(super) fn begin<'a>(
     gpu: Arc<Gpu>,
     observer: &'a mut dyn Observer,
 ) -> Result<Run<'a>> {
-    let Prepared { lock, settings, resumed, inputs, models, names, dataset, table, first } = prepared;
+    let Prepared { lock, settings, resumed, inputs, models, names, dataset, table, first, block } = prepared;
     let out = request.output.as_path();
     let preview = dataset.test.first().or(dataset.train.first()).cloned();
     let options = SchedulerOptions {
@@ -125,6 +133,7 @@ pub(super) fn begin<'a>(
         crash_markers: request.restart,
         ..SchedulerOptions::default()
     };
+    let options = TrainerOptions { region: block.map(|block| block.region()), ..options.into() };
     let mut facts = facts(request, inputs.masks.as_deref(), &gpu);
     facts.extend(resumed.as_ref().map(|resumed| ("goes on after step", resumed.state.step.to_string())));
     let before = resumed.as_ref().and_then(|resumed| resumed.record.occlusion.clone());
@@ -181,14 +190,14 @@ fn start(
     (config, first): (&TrainConfig, Option<Gaussians>),
     (scene, dataset): (&Path, &Dataset),
     occluders: Option<&OcclusionTable>,
-    options: SchedulerOptions,
+    mut options: TrainerOptions,
 ) -> Result<Trainer> {
     let (model, config) = match first {
         Some(model) => train::go_on_from(model, dataset, config),
         None => (train::first_model(dataset, config)?, config.clone()),
     };
-    let size = train::start_size(&gpu, dataset, &config, model.len(), options)?;
-    let memory = Engine::predict(&gpu, &size, options)?;
+    let size = train::start_size(&gpu, dataset, &config, (&model, options.region.as_ref()), options.scheduler)?;
+    let memory = Engine::predict(&gpu, &size, options.scheduler)?;
     tracing::info!(
         "memory to start with: {:.1} MiB on the device for {} Gaussians and {} x {} px; it grows with the model",
         memory.total as f64 / f64::from(1 << 20),
@@ -197,12 +206,12 @@ fn start(
         size.image.1
     );
     let gains = match config.exposure {
+        _ if options.region.is_some() => Vec::new(),
         ExposureMode::Off => Vec::new(),
         ExposureMode::Auto | ExposureMode::On => capture::gains(scene, dataset)?,
     };
     let config = exposure::decided(&config, &gains);
-    let mut options = TrainerOptions::from(options);
-    options.shared = Shared::of(&config, &gains, dataset);
+    options.shared = Shared::of(&config, &gains, dataset, options.region.as_ref());
     let mut trainer = Trainer::new(gpu, config, dataset, &model, options)?;
     if let Some(table) = occluders {
         let without = trainer.set_occluders(&table.views);
@@ -217,8 +226,11 @@ fn start(
 }
 
 /// Reads the model that a new run starts from, if the request names one.
-fn read_first(request: &Request, is_resumed: bool) -> Result<Option<Gaussians>> {
-    let Some(path) = &request.init else { return Ok(None) };
+fn read_first(request: &Request, block: Option<&Block>, is_resumed: bool) -> Result<Option<Gaussians>> {
+    if request.init.is_some() && block.is_some() {
+        return Err(Error::usage("init", "cannot be given with a block, which has a first model of its own"));
+    }
+    let Some(path) = &request.init.clone().or(block.map(Block::init)) else { return Ok(None) };
     if is_resumed {
         tracing::info!("the model comes from the checkpoint; {} is not read again", path.display());
         return Ok(None);

@@ -98,9 +98,28 @@ impl Gaussians {
             && self.opacities[row].is_finite()
     }
 
+    /// Raises the degree of the spherical harmonics; new coefficients are 0. A lower degree changes nothing.
+    pub fn raise_degree(&mut self, sh_degree: u32) {
+        let before = self.rest_per_gaussian();
+        self.sh_degree = self.sh_degree.max(sh_degree);
+        let after = self.rest_per_gaussian();
+        if after == before {
+            return;
+        }
+        let mut rest = vec![[0.0; 3]; self.len() * after];
+        for row in 0..self.len() {
+            rest[row * after..][..before].copy_from_slice(&self.sh_rest[row * before..][..before]);
+        }
+        self.sh_rest = rest;
+    }
+
     /// Returns the rows for which `keep` holds, in order.
     pub fn filtered(&self, mut keep: impl FnMut(usize) -> bool) -> Self {
-        let rows: Vec<usize> = (0..self.len()).filter(|&row| keep(row)).collect();
+        self.picked(&(0..self.len()).filter(|&row| keep(row)).collect::<Vec<_>>())
+    }
+
+    /// Returns some rows, in their order.
+    pub fn picked(&self, rows: &[usize]) -> Self {
         let rest = self.rest_per_gaussian();
         Self {
             origin: self.origin,

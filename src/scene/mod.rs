@@ -2,6 +2,7 @@
 //!
 //! A [`Dataset`] has [`View`]s (a [`Camera`] with [`Pixels`] of photo and mask) and [`Point`]s; [`Gaussians`] is the model. A
 //! [`LabelMap`] has an object id per pixel, a [`DepthMap`] a depth. [`path`] makes smooth paths through cameras, an [`Overview`] is what they look at.
+//! A [`Zone`] is a box.
 
 pub(crate) mod camera;
 pub(crate) mod colour;
@@ -14,6 +15,7 @@ pub(crate) mod overview;
 pub mod path;
 pub(crate) mod pixels;
 pub(crate) mod view;
+pub(crate) mod zone;
 
 pub use camera::Camera;
 pub use depth::{DepthKind, DepthMap};
@@ -23,3 +25,4 @@ pub use overview::Overview;
 pub use pixels::Pixels;
 pub(crate) use view::stems;
 pub use view::{Dataset, Photo, Point, View};
+pub use zone::Zone;

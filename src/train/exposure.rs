@@ -28,6 +28,7 @@ pub(crate) type Gains = Option<[f64; 3]>;
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Exposure {
     start: Vec<[f32; 3]>,
+    is_fixed: bool,
 }
 
 impl Exposure {
@@ -35,7 +36,13 @@ impl Exposure {
     pub fn new(first: &[Gains]) -> Self {
         let logs: Vec<[f64; 3]> = first.iter().map(|gains| gains.map_or([0.0; 3], |of| of.map(f64::ln))).collect();
         let mean = [0, 1, 2].map(|c| logs.iter().map(|of| of[c]).sum::<f64>() / logs.len().max(1) as f64);
-        Self { start: logs.iter().map(|of| [0, 1, 2].map(|c| (of[c] - mean[c]) as f32)).collect() }
+        let start = logs.iter().map(|of| [0, 1, 2].map(|c| (of[c] - mean[c]) as f32)).collect();
+        Self { start, is_fixed: false }
+    }
+
+    /// Makes gains that stay as they are; 1 where none are given.
+    pub fn fixed<'a>(gains: impl Iterator<Item = Option<&'a [f32; 3]>>) -> Self {
+        Self { start: gains.map(|gains| gains.map_or([0.0; 3], |of| of.map(f32::ln))).collect(), is_fixed: true }
     }
 }
 
@@ -82,7 +89,7 @@ impl SharedParameters for Exposure {
     }
 
     fn rates(&self, at: At) -> Vec<[f32; 4]> {
-        let rate = (RATE * at.config.rate_fall(at.step)) as f32;
+        let rate = if self.is_fixed { 0.0 } else { (RATE * at.config.rate_fall(at.step)) as f32 };
         vec![[rate, rate, rate, 0.0]]
     }
 

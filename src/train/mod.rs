@@ -18,6 +18,7 @@ mod photo_rows;
 pub(crate) mod poses;
 mod precondition;
 mod presets;
+pub(crate) mod region;
 mod sampler;
 mod schedule;
 mod sentinel;
@@ -51,6 +52,7 @@ use crate::render::RenderOptions;
 use crate::scene::{Dataset, Gaussians};
 use crate::scheduler::plan::FRAMES_IN_FLIGHT;
 use crate::shaders::structs::StepUniforms;
+use region::Region;
 use sampler::ViewOrder;
 use shared::Shared;
 use std::collections::VecDeque;
@@ -82,6 +84,7 @@ pub struct Trainer {
     config: TrainConfig,
     views: Views,
     fixed: SceneScale,
+    region: Option<Region>,
     order: ViewOrder,
     /// Size of the largest part of a photo, px. The image of the engine may be larger, because it grows.
     image: (u32, u32),
@@ -117,7 +120,7 @@ impl Trainer {
     ) -> Result<Self> {
         config.check()?;
         let options = options.into();
-        let size = start_size(&gpu, dataset, &config, model.len(), options.scheduler)?;
+        let size = start_size(&gpu, dataset, &config, (model, options.region.as_ref()), options.scheduler)?;
         let near = match config.near {
             0.0 => near::near_plane(dataset.train.iter().map(|view| &view.camera), model),
             near => near,
@@ -130,7 +133,7 @@ impl Trainer {
         } else {
             vec![near; trainer.views.len()]
         };
-        trainer.set_near_planes(&planes);
+        trainer.views.set_near_planes(&planes);
         trainer.engine.set_shared(&trainer.shared.start(trainer.views.len())?)?;
         // Colour bands that the model lacks start at 0.
         trainer.engine.set_sh_degree(trainer.config.sh_degree);
@@ -143,10 +146,10 @@ impl Trainer {
         config: TrainConfig,
         dataset: &Dataset,
         size: EngineSize,
-        TrainerOptions { shape, scheduler, strategy, shared }: TrainerOptions,
+        TrainerOptions { shape, scheduler, strategy, shared, region }: TrainerOptions,
     ) -> Result<Self> {
-        let fixed = SceneScale { extent: dataset.extent() };
-        let shared = shared.or_of(&config, dataset);
+        let fixed = Region::scale(region.as_ref(), dataset);
+        let shared = shared.or_of(&config, dataset, region.as_ref());
         let strategy = strategy.unwrap_or_else(|| strategy::of(config.strategy));
         let most = if config.max_gaussians > 0 { config.max_gaussians } else { u64::from(u32::MAX) };
         let shape = shape.unwrap_or_else(|| KernelShape::of(gpu.capabilities()));
@@ -164,6 +167,7 @@ impl Trainer {
             config,
             views,
             fixed,
+            region,
             order,
             image,
             in_flight: VecDeque::new(),
@@ -181,10 +185,6 @@ impl Trainer {
             newest: None,
             densified: None,
         })
-    }
-
-    fn set_near_planes(&mut self, planes: &[f32]) {
-        self.views.set_near_planes(planes);
     }
 
     /// Returns the engine, for renders between steps. Nothing may be in flight ([`Trainer::drain`]).
@@ -322,8 +322,8 @@ impl Trainer {
         if let Some((camera, near)) = self.views.partner(self.config.seed, input) {
             uniforms = self.engine.with_free_space(uniforms, camera, near);
         }
-        if let Some(corners) = self.config.grow_box {
-            uniforms = self.engine.with_grow_box(uniforms, corners);
+        if let Some(zone) = Region::grow_zone(self.region.as_ref(), &self.config) {
+            uniforms = self.engine.with_grow_box(uniforms, &zone);
         }
         self.strategy.uniforms(self.at(input.step), &mut uniforms);
         Ok(uniforms)

@@ -1,6 +1,7 @@
 //! The inputs of a training: options, sizes, views.
 
 use super::parts::Part;
+use super::region::Region;
 use super::shared::Shared;
 use super::step_input::{self, TrainView};
 use super::strategy::Strategy;
@@ -11,7 +12,7 @@ use crate::gpu::Gpu;
 use crate::label::vote::ballot::columns_for;
 use crate::pass::KernelShape;
 use crate::scene::pixels::Source;
-use crate::scene::{Dataset, LabelMap, Pixels, View, crew};
+use crate::scene::{Dataset, Gaussians, LabelMap, Pixels, View, crew};
 use crate::scheduler::SchedulerOptions;
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -27,6 +28,8 @@ pub struct TrainerOptions {
     pub strategy: Option<Box<dyn Strategy>>,
     /// Parameters of the scene or of photos.
     pub shared: Shared,
+    /// The part of the scene that is trained; none for all of it.
+    pub region: Option<Region>,
 }
 
 impl Default for TrainerOptions {
@@ -37,7 +40,7 @@ impl Default for TrainerOptions {
 
 impl From<SchedulerOptions> for TrainerOptions {
     fn from(scheduler: SchedulerOptions) -> Self {
-        Self { shape: None, scheduler, strategy: None, shared: Shared::default() }
+        Self { shape: None, scheduler, strategy: None, shared: Shared::default(), region: None }
     }
 }
 
@@ -66,17 +69,19 @@ pub(super) fn for_photos(config: &TrainConfig, dataset: &Dataset) -> Result<Trai
     Ok(config.for_size(engine_size(dataset, config, 0)?.image))
 }
 
-/// Makes the initial sizes: for twice the number of Gaussians, or for that number if memory is short.
+/// Makes the initial sizes: for twice the number of Gaussians of the first model, or for that number if memory is short.
 pub(crate) fn start_size(
     gpu: &Gpu,
     dataset: &Dataset,
     config: &TrainConfig,
-    gaussians: usize,
+    (model, region): (&Gaussians, Option<&Region>),
     options: SchedulerOptions,
 ) -> Result<EngineSize> {
-    let gaussians = gaussians as u64;
+    region.map_or(Ok(()), |region| region.check(model))?;
+    let gaussians = model.len() as u64;
     let most = if config.max_gaussians > 0 { config.max_gaussians } else { u64::MAX };
-    let roomy = engine_size(dataset, config, (gaussians * 2).min(most).max(gaussians))?;
+    let roomy =
+        engine_size(dataset, config, (gaussians * 2).min(most).max(gaussians))?.with_frozen(Region::frozen(region));
     match Engine::predict(gpu, &roomy, options) {
         Err(Error::OutOfMemory { .. }) => Ok(EngineSize { gaussians, ..roomy }),
         other => other.map(|_| roomy),

@@ -8,6 +8,7 @@
 
 use super::exposure::{Exposure, Gains};
 use super::poses::Poses;
+use super::region::Region;
 use super::strategy::At;
 use super::{ExposureMode, TrainConfig};
 use crate::engine::SharedRow;
@@ -94,10 +95,14 @@ impl<P: SharedParameters + 'static> From<P> for Shared {
 
 impl Shared {
     /// Returns the parameters that the configuration asks for. `gains` are the first gains of each photo.
-    pub(crate) fn of(config: &TrainConfig, gains: &[Gains], dataset: &Dataset) -> Self {
+    /// Those of a region stay.
+    pub(crate) fn of(config: &TrainConfig, gains: &[Gains], dataset: &Dataset, region: Option<&Region>) -> Self {
         let mut all: Vec<Box<dyn SharedParameters>> = Vec::new();
         if config.exposure == ExposureMode::On {
-            all.push(Box::new(Exposure::new(gains)));
+            all.push(Box::new(match region {
+                Some(region) => Exposure::fixed(dataset.train.iter().map(|view| region.gains.get(&view.name))),
+                None => Exposure::new(gains),
+            }));
         }
         if config.refine_poses {
             all.push(Box::new(Poses::new(dataset)));
@@ -106,8 +111,8 @@ impl Shared {
     }
 
     /// Returns the parameters, or those that the configuration asks for.
-    pub(super) fn or_of(self, config: &TrainConfig, dataset: &Dataset) -> Self {
-        if self.0.is_empty() { Self::of(config, &[], dataset) } else { self }
+    pub(super) fn or_of(self, config: &TrainConfig, dataset: &Dataset, region: Option<&Region>) -> Self {
+        if self.0.is_empty() { Self::of(config, &[], dataset, region) } else { self }
     }
 
     fn layout(&self) -> SharedLayout {

@@ -3,10 +3,12 @@
 //! The file leaves out derived values: learning rates and degrees follow from the step, the order of views and the
 //! sampled objects from seed and step, gradients and votes from the passes of the next step.
 
+use super::region::Region;
 use super::sampler::ViewOrder;
 use super::shared::KeptShared;
 use super::strategy::Kept;
 use super::{TrainConfig, Trainer, TrainerOptions, engine_size};
+use crate::engine::state::Counts;
 use crate::engine::{GrownSizes, state};
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
@@ -34,6 +36,9 @@ pub struct TrainState {
     pub updates: u32,
     /// Number of Gaussians.
     pub gaussians: u32,
+    /// Number of Gaussians at the end that are not trained.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub frozen: u32,
     /// World position of the origin of the positions.
     #[serde(default)]
     pub origin: [f64; 3],
@@ -120,7 +125,8 @@ impl TrainState {
         }
         // Masks may be given and show no object.
         let labels = state.planes.iter().any(|plane| plane.name == TABLE[Buf::LABELS.index()].name);
-        let counts = [state.gaussians, state.shared.as_ref().map_or(0, |kept| kept.layout.count(state.views.len()))];
+        let shared = state.shared.as_ref().map_or(0, |kept| kept.layout.count(state.views.len()));
+        let counts = Counts { gaussians: state.gaussians, frozen: state.frozen, shared };
         state::check(&state.planes, counts, state.config.sh_degree, labels, &state.strategy.planes).map_err(odd)?;
         Ok(state)
     }
@@ -171,6 +177,7 @@ impl Trainer {
             step: self.step,
             updates: self.updates,
             gaussians: self.gaussian_count(),
+            frozen: self.engine.size().frozen,
             origin: self.engine.origin().to_array(),
             labelled_once: self.labelled_once,
             memory_bounds: self.bound.by_memory,
@@ -226,7 +233,17 @@ impl Trainer {
                 tracing::warn!("{} was made with {then}, this is {now}: bits may differ", state.path.display());
             }
         }
-        let size = engine_size(dataset, &state.config, u64::from(state.gaussians))?;
+        let options = options.into();
+        let frozen = Region::frozen(options.region.as_ref());
+        if frozen != state.frozen {
+            let problem = format!("{frozen} frozen Gaussians, {} are in {}", state.frozen, state.path.display());
+            return Err(Error::data(
+                &dataset.root,
+                "",
+                format!("the part of the scene has {problem}; start a new run"),
+            ));
+        }
+        let size = engine_size(dataset, &state.config, u64::from(state.gaussians))?.with_frozen(frozen);
         if let Some(labels) = size.labels
             && let Some(plane) = state.planes.iter().find(|plane| plane.name == "labels")
             && let Some(label) = plane.data.iter().find(|&&label| label > labels.max_label)
@@ -234,7 +251,7 @@ impl Trainer {
             let problem = format!("is {label}, the masks have ids up to {}", labels.max_label);
             return Err(Error::data(&state.path, "a label", problem));
         }
-        let mut trainer = Self::without_model(gpu, state.config.clone(), dataset, size, options.into())?;
+        let mut trainer = Self::without_model(gpu, state.config.clone(), dataset, size, options)?;
         trainer.fingerprints = fingerprints;
         trainer.put(&state)?;
         Ok(trainer)
@@ -254,7 +271,7 @@ impl Trainer {
 
     fn put(&mut self, state: &TrainState) -> Result<()> {
         let same = vec![state.config.near; self.views.len()];
-        self.set_near_planes(if state.near_planes.is_empty() { &same } else { &state.near_planes });
+        self.views.set_near_planes(if state.near_planes.is_empty() { &same } else { &state.near_planes });
         let odd = |problem| Error::data(&state.path, "strategy", problem);
         state.strategy.restore(&mut *self.strategy).map_err(odd)?;
         self.shared
@@ -273,6 +290,10 @@ impl Trainer {
         self.seen = Default::default();
         Ok(())
     }
+}
+
+fn is_zero(number: &u32) -> bool {
+    *number == 0
 }
 
 /// Settings that a checkpoint lacks were not there when it was written: its training has the schedule of 3DGS, and

@@ -38,7 +38,13 @@ impl Trainer {
         });
         let voters: Vec<Voter> = voters.collect();
         let is_judged = self.config.vote_trust && self.labelled_once;
-        decide::count(&mut self.engine, &voters, is_judged, &means, how, true)
+        let mut decision = decide::count(&mut self.engine, &voters, is_judged, &means, how, true)?;
+        let trained = self.engine.trained_count() as usize;
+        if trained < decision.labels.len() {
+            // The views of a part of a scene know little of what is frozen.
+            decision.labels[trained..].copy_from_slice(&self.engine.labels()?[trained..]);
+        }
+        Ok(decision)
     }
 
     /// Returns the model with its final labels. With [`LabelRule::Votes`](super::LabelRule::Votes) it counts them again

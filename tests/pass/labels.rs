@@ -72,6 +72,7 @@ fn drawn(rows: &[Row], labels: Vec<u32>, width: u32, height: u32, label_map: Vec
     let objects: std::collections::BTreeSet<u32> =
         label_map.iter().chain(&labels).copied().filter(|&id| id > 0).collect();
     Scene {
+        frozen: 0,
         camera: plain_camera(width, height),
         gaussians: Gaussians {
             antialiased: false,

@@ -8,15 +8,16 @@ use crate::reference::random::normal_draw;
 use crate::reference::step::{Target, splats_of, step};
 use crate::support::compare::{Tolerance, close};
 use crate::support::device;
-use crate::support::scenes::{Shape, population, scene};
+use crate::support::scenes::{Scene, Shape, population, scene};
 use labelgs::internals::scheduler::plan::Buf;
 use labelgs::internals::train::step_input::SceneScale;
 use labelgs::internals::verify::selftest::judge;
 use labelgs::internals::verify::selftest::model::{Densified, Fog, Reset, large, scene_of};
 use labelgs::run::StrategyKind;
 
+/// Parameters and moments of the trained Gaussians.
 fn states(fixture: &mut Fixture) -> Vec<Optimised> {
-    let count = fixture.scene.gaussians.len();
+    let count = fixture.scene.gaussians.len() - fixture.scene.frozen as usize;
     let (rows, m, u) =
         (fixture.rows(PARAMETERS, count), fixture.rows(MOMENTS_1, count), fixture.rows(MOMENTS_2, count));
     (0..count).map(|i| Optimised { row: rows[i], m: m[i], u: u[i] }).collect()
@@ -26,7 +27,10 @@ fn states(fixture: &mut Fixture) -> Vec<Optimised> {
 #[test]
 fn adam_of_every_attribute_equals_its_mirror() {
     let Some(turn) = device() else { return };
-    let mut fixture = Fixture::new(turn, scene(101, &Shape { gaussians: 60, ..Shape::default() }), true);
+    let scene = Scene { frozen: 20, ..scene(101, &Shape { gaussians: 60, ..Shape::default() }) };
+    let mut fixture = Fixture::new(turn, scene, true);
+    let frozen = |fixture: &mut Fixture| fixture.rows(PARAMETERS, 60)[40..].to_vec();
+    let stays = frozen(&mut fixture);
     fixture.fixed = SceneScale { extent: 4.0 };
     fixture.input.update = true;
     let mut steps = Vec::new();
@@ -36,6 +40,9 @@ fn adam_of_every_attribute_equals_its_mirror() {
         fixture.train();
         steps.push((step, fixture.uniforms(), before, fixture.gradient_rows(), states(&mut fixture)));
     }
+    let gradients = &steps[4].3[40..];
+    assert!(gradients.iter().any(|row| row.mean != [0.0; 3]), "frozen Gaussians are seen");
+    assert_eq!(frozen(&mut fixture), stays);
     prove("adam", &["adam_beta1", "adam_beta2", "adam_eps"], |rules| {
         judge::all(steps.iter().map(|(step, u, before, gradients, after)| {
             let [means, opacity] = [u.rate_means[0], u.rate_means[3]];

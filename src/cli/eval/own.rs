@@ -3,17 +3,19 @@
 use super::table::own_table;
 use super::watch::Watcher;
 use super::{EvalArgs, put_out};
+use crate::blocks::Seams;
 use crate::cli::context::{Context, open_model};
 use crate::cli::scene::{near_plane, open_gpu, open_scene, pick_views, render_engine};
 use crate::engine::Engine;
+use crate::eval::by_place;
 use crate::eval::evaluate::{AmodalTruth, Rendering, evaluate, picture_count};
 use crate::eval::removal::{self, RemovalTruth, removals};
 use crate::eval::scores::{NearScores, NearSweep, Scores};
 use crate::io::image::read_rgba;
 use crate::io::mask::read_mask;
 use crate::label::vote::model::{columns_of, vote_engine};
-use crate::render::RenderOptions;
-use crate::scene::{Dataset, Gaussians, Photo, View};
+use crate::render::{RenderOptions, render};
+use crate::scene::{Camera, Dataset, Gaussians, Photo, View};
 use crate::scheduler::SchedulerOptions;
 use crate::train::aligned;
 use crate::{Error, Result};
@@ -55,6 +57,11 @@ pub(in crate::cli) fn score(args: &EvalArgs, context: &Context) -> Result<Scores
         refined_poses: args.refine_poses,
         ..evaluate(&mut engine, &model, &views, how, &wholes, &mut watcher)?
     };
+    if let Some(seams) = Seams::of_model(&args.model)? {
+        engine.upload_model(&model)?;
+        let draw = &mut |camera: &Camera, options: &RenderOptions| render(&mut engine, camera, options);
+        scores.places = by_place(draw, &views, how.options, &seams)?;
+    }
     if args.near.len() > 1 {
         scores.near = Some(compare_planes(&mut engine, &model, &views, how.options, (&args.near, &scores))?);
     }

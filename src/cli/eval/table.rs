@@ -19,6 +19,7 @@ pub(super) fn own_table(scores: &Scores) -> String {
     let cells = (number(mean.psnr, 2), number(mean.psnr_corrected, 2), number(mean.ssim, 4));
     text += &format!("{:>10} {:>8} {:>9} {:>8}\n", "mean", cells.0, cells.1, cells.2);
     text += &regions(scores);
+    text += &places(scores);
     if scores.objects.is_empty() {
         return text;
     }
@@ -49,6 +50,18 @@ pub(super) fn own_table(scores: &Scores) -> String {
         );
     }
     text + &removals(scores)
+}
+
+/// Returns the table of places.
+fn places(scores: &Scores) -> String {
+    if scores.places.is_empty() {
+        return String::new();
+    }
+    let mut text = format!("\n{:>14} {:>8} {:>10}\n", "place", "PSNR", "pixels");
+    for (name, score) in &scores.places {
+        text += &format!("{name:>14} {:>8} {:>10}\n", number(Some(score.psnr), 2), score.pixels);
+    }
+    text
 }
 
 /// Returns the table of removals.

@@ -23,6 +23,8 @@ use crate::scene::Gaussians;
 use std::path::Path;
 use std::sync::{PoisonError, RwLock};
 
+pub(crate) use ply::write_joined;
+
 pub use format::{Export, FirstView, LabelType, ModelFormat, ModelWriter, ReadModel, SpzVersion, WriteOptions};
 
 /// Formats of labelgs. The first one also serves unknown extensions, such as `/dev/stdout`.

@@ -72,7 +72,7 @@ domains! { Domain, Capacity;
     Gaussians gaussians: "gaussians", cures::MODEL,
         "Rows of the model; also the maximum number of visible splats.";
     Trained trained: "trained", cures::MODEL,
-        "Rows with optimiser state: equal to Gaussians, or 0 without training.";
+        "Rows with optimiser state: Gaussians without the frozen ones at the end, or 0 without training.";
     Labelled labelled: "labelled", cures::MODEL,
         "Rows with labels: equal to Gaussians, or 0 in a scene without masks.";
     Instances instances: "instances", cures::PAIRS,

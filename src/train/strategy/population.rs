@@ -144,8 +144,7 @@ impl<'a> Population<'a> {
 
     /// Lowers all opacities to at most 0.01.
     pub fn reset_opacity(&mut self) -> Result<()> {
-        let uniforms = StepUniforms { gaussian_count: self.count(), ..self.uniforms };
-        self.engine.run(ListKey::OpacityReset, &uniforms).map(drop)
+        self.engine.run(ListKey::OpacityReset, &self.uniforms).map(drop)
     }
 
     fn count_densified(&mut self, uniforms: StepUniforms) -> Result<Counters> {

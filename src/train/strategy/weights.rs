@@ -4,10 +4,10 @@ use crate::engine::{Engine, ListKey};
 use crate::error::Result;
 use crate::scene::Camera;
 
-/// Returns the blending weight of each Gaussian over all pixels of some views, given with their near planes, px. The
+/// Returns the blending weight of each trained Gaussian over all pixels of some views, given with their near planes, px. The
 /// densification statistic becomes that weight. Nothing may be in flight.
 pub fn weights<'a>(engine: &mut Engine, views: impl Iterator<Item = (&'a Camera, f32)>) -> Result<Vec<f32>> {
-    engine.set_densify_stats(&vec![[0.0; 2]; engine.gaussian_count() as usize])?;
+    engine.set_densify_stats(&vec![[0.0; 2]; engine.trained_count() as usize])?;
     for (camera, near) in views {
         for band in engine.bands(camera) {
             let uniforms = engine.band_uniforms(camera, band, near, [0.0; 3]);

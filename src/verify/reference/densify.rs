@@ -22,6 +22,15 @@ pub struct Population {
     pub gradient_sum: Vec<f64>,
     /// Number of views that saw the Gaussian, `[N]`.
     pub gradient_count: Vec<f64>,
+    /// Number of rows at the end that stay as they are; their moments and statistics mean nothing.
+    pub frozen: usize,
+}
+
+impl Population {
+    /// Returns true for a row that stays as it is.
+    pub fn is_frozen(&self, index: usize) -> bool {
+        index + self.frozen >= self.model.rows.len()
+    }
 }
 
 /// Origin of a row.
@@ -123,6 +132,10 @@ pub fn densify(
     let mut out = Densified { margins: vec![f64::INFINITY; before.model.rows.len()], ..Densified::default() };
     out.model.sh_degree = before.model.sh_degree;
     for (index, row) in before.model.rows.iter().enumerate() {
+        if before.is_frozen(index) {
+            out.push(before, index, (*row, (Row::default(), Row::default()), Origin::Kept));
+            continue;
+        }
         let count = before.gradient_count[index];
         if count >= rules.stat_near {
             continue;
@@ -132,7 +145,6 @@ pub fn densify(
         out.note(index, mean / gradient);
         let zero = Row::default();
         let moments = (before.m[index], before.u[index]);
-        let label = before.model.labels[index];
         let rows = if mean < gradient || !rules.grows_at(row.mean) {
             vec![(*row, moments, Origin::Kept)]
         } else if scale <= limit {
@@ -151,13 +163,9 @@ pub fn densify(
             };
             vec![child(0), child(1)]
         };
-        for (row, moments, origin) in rows {
-            if out.survives(rules, index, &row, extent, step) {
-                out.model.rows.push(row);
-                out.model.labels.push(label);
-                out.m.push(moments.0);
-                out.u.push(moments.1);
-                out.origins.push((index, origin));
+        for after in rows {
+            if out.survives(rules, index, &after.0, extent, step) {
+                out.push(before, index, after);
             }
         }
     }
@@ -208,6 +216,14 @@ pub fn accumulate(population: &mut Population, gradient2d: &[f64], visible: &[bo
 }
 
 impl Densified {
+    fn push(&mut self, before: &Population, index: usize, (row, (m, u), origin): (Row, (Row, Row), Origin)) {
+        self.model.rows.push(row);
+        self.model.labels.push(before.model.labels[index]);
+        self.m.push(m);
+        self.u.push(u);
+        self.origins.push((index, origin));
+    }
+
     fn note(&mut self, index: usize, ratio: f64) {
         self.margins[index] = self.margins[index].min((ratio - 1.0).abs());
     }

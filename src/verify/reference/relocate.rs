@@ -7,14 +7,17 @@ use glam::DVec3;
 
 /// Weight of each row in the draw, in whole steps, and the distance of its nearest decision. Dead rows have 0.
 pub fn weights(rules: &Rules, before: &Population) -> Vec<(u32, f64)> {
-    let weight = |(row, &views): (&Row, &f64)| {
+    let weight = |(index, (row, &views)): (usize, (&Row, &f64))| {
+        if before.is_frozen(index) {
+            return (1, f64::INFINITY);
+        }
         let opacity = sigmoid(row.opacity);
         let steps = if rules.grows_at(row.mean) { opacity * rules.relocate_one + 0.5 } else { 1.25 };
         let margin = (opacity / rules.prune_opacity - 1.0).abs().min((steps - steps.round()).abs() / steps);
         let dead = opacity < rules.prune_opacity || views >= rules.stat_near;
         (if dead { 0 } else { (steps.floor() as u32).max(1) }, margin)
     };
-    before.model.rows.iter().zip(&before.gradient_count).map(weight).collect()
+    before.model.rows.iter().zip(&before.gradient_count).enumerate().map(weight).collect()
 }
 
 /// Number of copies of each row, itself included, after `draws` draws from a start `phase` in 0 to 1, and the distance
@@ -51,11 +54,12 @@ pub fn stacked(rules: &Rules, row: &Row, count: u32) -> Row {
 pub fn relocate(rules: &Rules, before: &Population, draws: u32, phase: f64) -> Densified {
     let weights = weights(rules, before);
     let counts = copies(rules, &weights.iter().map(|&(weight, _)| weight).collect::<Vec<_>>(), draws, phase);
-    let count_of = |(row, (count, margin)): (&Row, (u32, f64))| {
+    let count_of = |(index, (row, (count, margin))): (usize, (&Row, (u32, f64)))| {
         // Draws where nothing grows are void.
-        (if rules.grows_at(row.mean) { count } else { count.min(1) }, margin)
+        let grows = rules.grows_at(row.mean) && !before.is_frozen(index);
+        (if grows { count } else { count.min(1) }, margin)
     };
-    let counts: Vec<(u32, f64)> = before.model.rows.iter().zip(counts).map(count_of).collect();
+    let counts: Vec<(u32, f64)> = before.model.rows.iter().zip(counts).enumerate().map(count_of).collect();
     let margin = |(weight, count): (&(u32, f64), &(u32, f64))| weight.1.min(count.1);
     let mut out = Densified { margins: weights.iter().zip(&counts).map(margin).collect(), ..Densified::default() };
     out.model.sh_degree = before.model.sh_degree;

@@ -3,6 +3,9 @@
 //! This is an independent copy, so that an error in the shaders' constants does not enter the mirrors; the test below
 //! compares the two.
 
+use crate::scene::Zone;
+use glam::DVec3;
+
 /// Constants of all passes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Rules {
@@ -62,8 +65,8 @@ pub struct Rules {
     pub percent_dense: f64,
     /// Divisor of the scale: a split child has its parent's scale divided by this.
     pub split_shrink: f64,
-    /// Box in which Gaussians grow, the upper corner not included; `None`: everywhere.
-    pub grow_box: Option<[[f64; 3]; 2]>,
+    /// Box in which Gaussians grow; `None`: everywhere.
+    pub grow_box: Option<Zone>,
     /// Splits go along the longest axis instead of to random places.
     pub splits_long: bool,
     /// Distance of the children of such a split from their parent, standard deviations.
@@ -168,8 +171,7 @@ impl Rules {
 
     /// Returns true where Gaussians grow.
     pub fn grows_at(&self, mean: [f64; 3]) -> bool {
-        let inside = |[low, high]: [[f64; 3]; 2]| (0..3).all(|axis| (low[axis]..high[axis]).contains(&mean[axis]));
-        self.grow_box.is_none_or(inside)
+        self.grow_box.is_none_or(|zone| zone.contains(DVec3::from(mean)))
     }
 }
 

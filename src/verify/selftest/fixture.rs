@@ -147,7 +147,7 @@ impl Fixture {
             vote_columns: VOTE_COLUMNS,
         });
         let room = EngineSize::new(scene.gaussians.len().max(1) as u64, (scene.camera.width, scene.camera.height));
-        let room = room.for_training().with_labels(labels_size).with_shared_rows(rows);
+        let room = room.for_training().with_labels(labels_size).with_shared_rows(rows).with_frozen(scene.frozen);
         let mut engine = Engine::with_shape(gpu, shape, room, options)?;
         engine.upload_model(&scene.gaussians)?;
         let config = TrainConfig {

@@ -7,7 +7,7 @@ use crate::engine::ListKey;
 use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::pass::KernelShape;
-use crate::scene::{Camera, Gaussians};
+use crate::scene::{Camera, Gaussians, Zone};
 use crate::scheduler::plan::Buf;
 use crate::shaders::structs::{Counters, StepUniforms};
 use crate::train::TrainConfig;
@@ -26,8 +26,12 @@ use glam::DVec3;
 use std::sync::Arc;
 
 pub(super) const SEED: u32 = 0x1234_5678;
-/// Box in which Gaussians of the strategies budget and mcmc grow: a half of the populations.
-pub(super) const GROW: [[f64; 3]; 2] = [[0.0, -64.0, -64.0], [64.0; 3]];
+/// Box in which Gaussians of the strategies budget and mcmc grow, turned against the world: a half of the populations.
+pub(super) const GROW: Zone = Zone {
+    axes: [DVec3::new(0.6, 0.8, 0.0), DVec3::new(-0.8, 0.6, 0.0), DVec3::Z],
+    low: DVec3::new(0.0, f64::NEG_INFINITY, -64.0),
+    high: DVec3::new(64.0, f64::INFINITY, 64.0),
+};
 
 /// Uploads a population with moments and statistics to a fixture; returns the uniforms that change it at `step` in a
 /// scene of extent 1.
@@ -35,33 +39,32 @@ pub(super) fn holding(
     fixture: &mut Fixture,
     before: &Population,
     step: u32,
-    (splits_long, grow_box): (bool, Option<[[f64; 3]; 2]>),
+    (splits_long, grow_box): (bool, Option<&Zone>),
 ) -> Result<StepUniforms> {
-    fixture.put_rows(MOMENTS_1, &before.m)?;
-    fixture.put_rows(MOMENTS_2, &before.u)?;
-    let stats: Vec<[f32; 2]> =
-        before.gradient_sum.iter().zip(&before.gradient_count).map(|(&s, &n)| [s as f32, n as f32]).collect();
+    let trained = before.model.rows.len() - before.frozen;
+    fixture.put_rows(MOMENTS_1, &before.m[..trained])?;
+    fixture.put_rows(MOMENTS_2, &before.u[..trained])?;
+    let stats = before.gradient_sum.iter().zip(&before.gradient_count).map(|(&s, &n)| [s as f32, n as f32]);
+    let stats: Vec<[f32; 2]> = stats.take(trained).collect();
     fixture.engine.raw_mut().upload(Buf::DENSIFY_STATS, 0, 0, &stats)?;
-    let corner = |at: usize| grow_box.map_or([0.0; 3], |corners| corners[at].map(|value| value as f32));
     let (config, with_resets) = (&fixture.config, TrainConfig::paper());
-    Ok(StepUniforms {
+    let uniforms = StepUniforms {
         densify_threshold: config.densify_grad_threshold,
         densify_scale: config.percent_dense,
         prune_scale: config.max_scale,
         prune_opacity: config.min_opacity,
         prune_big: u32::from(prunes_large_at(&with_resets, step)),
         split_long: u32::from(splits_long),
-        grow_low: corner(0),
-        grow_high: corner(1),
         seed: SEED,
         ..fixture.uniforms()
-    })
+    };
+    Ok(grow_box.map_or(uniforms, |zone| fixture.engine.with_grow_box(uniforms, zone)))
 }
 
 /// A scene for a population; its picture does not matter.
 pub fn scene_of(population: &Population) -> Scene {
     let template = scene(1, &Shape { gaussians: 1, ..Shape::default() });
-    Scene { gaussians: gaussians(population), ..template }
+    Scene { gaussians: gaussians(population), frozen: population.frozen as u32, ..template }
 }
 
 fn gaussians(population: &Population) -> Gaussians {
@@ -99,14 +102,15 @@ impl Densified {
     pub fn new(fixture: &mut Fixture, before: Population, step: u32, splits_long: bool) -> Result<Self> {
         let rows = before.model.rows.len();
         fixture.engine.make_room_for_gaussians(2 * rows as u64 + 1)?;
-        let uniforms = holding(fixture, &before, step, (splits_long, splits_long.then_some(GROW)))?;
+        let uniforms = holding(fixture, &before, step, (splits_long, splits_long.then_some(&GROW)))?;
         let counted = fixture.engine.run(ListKey::DensifyCount, &uniforms)?.counters;
         let marks = fixture.get::<u32>(Buf::CHILDREN_COUNTS, rows)?;
         let applied = fixture.engine.run(ListKey::DensifyApply, &uniforms)?.counters;
         let count = counted.densified_count as usize;
+        let trained = count - before.frozen;
         let after =
-            [fixture.rows(PARAMETERS, count)?, fixture.rows(MOMENTS_1, count)?, fixture.rows(MOMENTS_2, count)?];
-        let (labels, stats) = (fixture.get(Buf::LABELS, count)?, fixture.get(Buf::DENSIFY_STATS, 2 * count)?);
+            [fixture.rows(PARAMETERS, count)?, fixture.rows(MOMENTS_1, trained)?, fixture.rows(MOMENTS_2, trained)?];
+        let (labels, stats) = (fixture.get(Buf::LABELS, count)?, fixture.get(Buf::DENSIFY_STATS, 2 * trained)?);
         Ok(Self { step, splits_long, before, counted, applied, marks, after, labels, stats })
     }
 
@@ -131,8 +135,9 @@ impl Densified {
         let counts = [self.counted.cloned_count, self.counted.split_count];
         exact(&counts, &[of(Origin::Clone), of(Origin::Child(1))])?;
         let floats = |rows: &[Row]| -> Vec<f64> { rows.iter().flat_map(Row::floats).collect() };
-        exact(&floats(&self.after[1]), &floats(&expected.m))?;
-        exact(&floats(&self.after[2]), &floats(&expected.u))?;
+        let trained = expected.m.len() - self.before.frozen;
+        exact(&floats(&self.after[1]), &floats(&expected.m[..trained]))?;
+        exact(&floats(&self.after[2]), &floats(&expected.u[..trained]))?;
         close(&floats(&self.after[0]), &floats(&expected.model.rows), tolerance)
     }
 }
@@ -150,15 +155,18 @@ impl Reset {
         let uniforms = holding(fixture, &before, 3000, (false, None))?;
         fixture.engine.run(ListKey::OpacityReset, &uniforms)?;
         let count = before.model.rows.len();
+        let trained = count - before.frozen;
         let planes =
-            [fixture.rows(PARAMETERS, count)?, fixture.rows(MOMENTS_1, count)?, fixture.rows(MOMENTS_2, count)?];
+            [fixture.rows(PARAMETERS, count)?, fixture.rows(MOMENTS_1, trained)?, fixture.rows(MOMENTS_2, trained)?];
         let after = planes.iter().flatten().flat_map(Row::floats).collect();
         Ok(Self { before, after, labels: fixture.get(Buf::LABELS, count)? })
     }
 
     /// Compares with the reference under `rules`.
     pub fn verdict(&self, rules: &Rules, tolerance: Tolerance) -> Verdict {
-        let mut planes = [self.before.model.rows.clone(), self.before.m.clone(), self.before.u.clone()];
+        let trained = self.before.model.rows.len() - self.before.frozen;
+        let of_trained = |rows: &[Row]| rows[..trained].to_vec();
+        let mut planes = [self.before.model.rows.clone(), of_trained(&self.before.m), of_trained(&self.before.u)];
         let [rows, m, u] = &mut planes;
         for ((row, m), u) in rows.iter_mut().zip(m).zip(u) {
             opacity_reset(rules, row, m, u);

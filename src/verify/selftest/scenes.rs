@@ -51,6 +51,8 @@ pub struct Scene {
     pub gaussians: Gaussians,
     /// Photo, masks and sampled objects.
     pub target: Target,
+    /// Number of Gaussians at the end that are not trained.
+    pub frozen: u32,
 }
 
 impl Scene {
@@ -155,7 +157,7 @@ pub fn scene(seed: u64, shape: &Shape) -> Scene {
     let camera = camera(&mut random, shape.width, shape.height);
     let gaussians = gaussians(&mut random, shape);
     let target = target(&mut random, shape);
-    Scene { camera, gaussians, target }
+    Scene { camera, gaussians, target, frozen: 0 }
 }
 
 /// A camera at the origin that looks along z: focal length 100 px, principal point in the middle.
@@ -184,7 +186,8 @@ pub fn dot(camera: &Camera, at: [f64; 2], depth: f64, deviation: f64, opacity: f
     }
 }
 
-/// Rows for densification in a scene of extent 1: some below and some above each threshold, all with labels.
+/// Rows for densification in a scene of extent 1: some below and some above each threshold, all with labels; the last
+/// tenth is frozen.
 pub fn population(seed: u64, count: usize) -> Population {
     let mut random = generator(seed);
     let shape = Shape { gaussians: count, scales: (0.002, 0.4), opacities: (-7.0, 3.0), ..Shape::default() };
@@ -199,5 +202,5 @@ pub fn population(seed: u64, count: usize) -> Population {
     let gradient_count =
         gradient_count.iter().enumerate().map(|(row, &n)| if row % 23 == 7 { 1e9 } else { n }).collect();
     let model = Model::from_gaussians(&gaussians(&mut random, &shape));
-    Population { model, m, u, gradient_sum, gradient_count }
+    Population { model, m, u, gradient_sum, gradient_count, frozen: count / 10 }
 }

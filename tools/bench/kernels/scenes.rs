@@ -81,7 +81,7 @@ pub fn build(plan: &Plan) -> Scene {
         Photo { size: (width, height), colours: vec![[0.0; 3]; width * height], valid: vec![true; width * height] };
     let background = [0.2, 0.4, 0.6].map(round);
     let target = Target { photo, label_map: vec![0; width * height], slots: Vec::new(), background };
-    Scene { camera, gaussians, target }
+    Scene { camera, gaussians, target, frozen: 0 }
 }
 
 /// Gives a scene a photo that differs from its picture by 0.3 or more in every channel: then no kink of the L1 loss is

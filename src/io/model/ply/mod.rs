@@ -1,8 +1,11 @@
 //! The standard 3DGS PLY. If the scene has labels, the last column is `label`. If votes were counted, `property float
 //! label_confidence` precedes it.
 
+mod joined;
 mod packed;
 mod write;
+
+pub(crate) use joined::write_joined;
 
 use super::format::{ModelFormat, ReadModel};
 use super::rows::{Row, Rows};

@@ -28,15 +28,25 @@ fn losses(export: &Export) -> Result<Vec<String>> {
 /// `label_confidence` precedes it if known. Positions are 32-bit floats, because some readers take nothing else; those
 /// that would be rounded are relative to the origin in a comment.
 fn write(export: &Export, out: &mut dyn Write) -> io::Result<()> {
+    write_header(export, export.rows.len(), out)?;
+    write_rows(export, out)
+}
+
+/// Writes the header of a file with `count` rows like those of an export.
+pub(super) fn write_header(export: &Export, count: usize, out: &mut dyn Write) -> io::Result<()> {
     // The crate needs a sized writer for the header.
     let mut text = Vec::new();
-    Writer::<DefaultElement>::new().write_header(&mut text, &header(export))?;
-    out.write_all(&text)?;
+    Writer::<DefaultElement>::new().write_header(&mut text, &header(export, count))?;
+    out.write_all(&text)
+}
+
+/// Writes the rows of an export.
+pub(super) fn write_rows(export: &Export, out: &mut dyn Write) -> io::Result<()> {
     let mut bytes = Vec::with_capacity((19 + export.model.rest_per_gaussian() * 3) * 4);
     export.rows.iter().try_for_each(|&row| write_row(export, row, &mut bytes, out))
 }
 
-fn header(export: &Export) -> Header {
+fn header(export: &Export, count: usize) -> Header {
     let mut names: Vec<String> = ["x", "y", "z", "nx", "ny", "nz"].map(String::from).to_vec();
     names.extend((0..3).map(|k| format!("f_dc_{k}")));
     names.extend((0..export.model.rest_per_gaussian() * 3).map(|k| format!("f_rest_{k}")));
@@ -45,7 +55,7 @@ fn header(export: &Export) -> Header {
     names.extend((0..4).map(|k| format!("rot_{k}")));
     names.extend(export.label_confidence().map(|_| "label_confidence".into()));
     let mut vertex = ElementDef::new("vertex".into());
-    vertex.count = export.rows.len();
+    vertex.count = count;
     let mut add = |name, scalar| vertex.properties.add(PropertyDef::new(name, PropertyType::Scalar(scalar)));
     names.into_iter().for_each(|name| add(name, ScalarType::Float));
     if export.labels().is_some() {

@@ -1,0 +1,148 @@
+//! The photos of each block: one render of the coarse model for each photo.
+
+use super::cells::Cell;
+use super::coarse::Coarse;
+use super::frame::Frame;
+use crate::engine::Engine;
+use crate::error::Result;
+use crate::io::block_file::Bounds;
+use crate::scene::{Camera, View, Zone};
+use crate::train::strategy::weights::weights;
+use glam::DVec3;
+
+/// Share of a photo's weight that the core has, for the photo to be taken.
+const CORE_SHARE: f64 = 0.02;
+/// Share that the zone has, if the camera stands in it.
+const ZONE_SHARE: f64 = 0.01;
+/// Share of the picture in which the core's box is seen, from the ground to the top: what floats in its air would be seen
+/// there.
+const AIR_SHARE: f64 = 0.25;
+/// Rays of a picture along its longer side that are followed for that.
+const RAYS: u32 = 24;
+
+/// The photos of a block and what they show.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Chosen {
+    /// Indices of training views with the share of the core, in the order of the views.
+    pub train: Vec<(usize, f64)>,
+    /// Indices of held-out views.
+    pub test: Vec<usize>,
+    /// Coarse Gaussians with a weight in one of the training views.
+    pub is_seen: Vec<bool>,
+}
+
+/// A block in the frame of the ground.
+struct Block<'a> {
+    cell: &'a Cell,
+    zone: Zone,
+    /// The box of most of its Gaussians.
+    inside: Zone,
+    /// Rows in the zone, besides those of the core.
+    margin: Vec<usize>,
+}
+
+/// Chooses the photos of some cells.
+pub(super) fn choose(engine: &mut Engine, coarse: &Coarse, frame: &Frame, cells: &[Cell]) -> Result<Vec<Chosen>> {
+    let blocks: Vec<Block> = cells.iter().map(|cell| Block::new(cell, frame, coarse)).collect();
+    let count = coarse.model.len();
+    let mut chosen = vec![Chosen { is_seen: vec![false; count], ..Chosen::default() }; cells.len()];
+    let (train, test) = (&coarse.dataset.train, &coarse.dataset.test);
+    for (index, view) in train.iter().chain(test).enumerate() {
+        let found = weights(engine, std::iter::once((&view.camera, coarse.near)))?;
+        for (block, chosen) in blocks.iter().zip(&mut chosen) {
+            let Some(share) = block.takes(view, &found) else { continue };
+            if index >= train.len() {
+                chosen.test.push(index - train.len());
+                continue;
+            }
+            chosen.train.push((index, share));
+            chosen.is_seen.iter_mut().zip(&found).for_each(|(seen, &weight)| *seen |= weight > 0.0);
+        }
+    }
+    Ok(chosen)
+}
+
+impl<'a> Block<'a> {
+    fn new(cell: &'a Cell, frame: &Frame, coarse: &Coarse) -> Self {
+        let zone = frame.zone(&cell.zone());
+        let sides = |end: usize| cell.inside[end].to_array().map(Some);
+        let inside = frame.zone(&Bounds { low: sides(0), high: sides(1) });
+        let is_core = |row: usize| cell.rows.binary_search(&row).is_ok();
+        let margin =
+            coarse.near_rows.iter().copied().filter(|&row| !is_core(row) && zone.contains(coarse.model.world(row)));
+        Self { cell, zone, inside, margin: margin.collect() }
+    }
+
+    /// Returns the share of the core in a photo that is taken; `weights` are those of all coarse Gaussians.
+    fn takes(&self, view: &View, weights: &[f32]) -> Option<f64> {
+        let sum = |rows: &mut dyn Iterator<Item = f32>| rows.map(f64::from).sum::<f64>();
+        let all = sum(&mut weights.iter().copied());
+        if all <= 0.0 {
+            return None;
+        }
+        let core = sum(&mut self.cell.rows.iter().map(|&row| weights[row])) / all;
+        let zone = core + sum(&mut self.margin.iter().map(|&row| weights[row])) / all;
+        let stands_in = self.zone.contains(view.camera.centre());
+        let is_taken = core >= CORE_SHARE
+            || (stands_in && zone >= ZONE_SHARE)
+            || seen_share(&view.camera, &self.inside) >= AIR_SHARE;
+        is_taken.then_some(core)
+    }
+}
+
+/// Returns the share of a picture whose rays pass through a box.
+fn seen_share(camera: &Camera, zone: &Zone) -> f64 {
+    let longest = camera.width.max(camera.height);
+    let count = |side: u32| (side * RAYS).div_ceil(longest).max(1);
+    let (columns, rows) = (count(camera.width), count(camera.height));
+    let from = zone.place(camera.centre());
+    let hits = (0..rows * columns).filter(|at| {
+        let share = |index: u32, count: u32, side: u32| (f64::from(index) + 0.5) / f64::from(count) * f64::from(side);
+        let (x, y) = (share(at % columns, columns, camera.width), share(at / columns, rows, camera.height));
+        let ray = DVec3::new((x - camera.cx) / camera.fx, (y - camera.cy) / camera.fy, 1.0);
+        passes(from, zone.place(camera.rotation.transpose() * ray), zone)
+    });
+    hits.count() as f64 / f64::from(rows * columns)
+}
+
+/// Returns true if a ray along the axes of a box meets it.
+fn passes(from: DVec3, along: DVec3, zone: &Zone) -> bool {
+    let (mut enter, mut leave) = (0.0_f64, f64::INFINITY);
+    for axis in 0..3 {
+        if along[axis] == 0.0 {
+            if !(zone.low[axis]..zone.high[axis]).contains(&from[axis]) {
+                return false;
+            }
+            continue;
+        }
+        let ends = [zone.low[axis], zone.high[axis]].map(|side| (side - from[axis]) / along[axis]);
+        enter = enter.max(ends[0].min(ends[1]));
+        leave = leave.min(ends[0].max(ends[1]));
+    }
+    enter < leave
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::DMat3;
+
+    #[test]
+    fn the_share_of_a_box_in_a_picture() {
+        let camera = Camera {
+            rotation: DMat3::IDENTITY,
+            translation: DVec3::ZERO,
+            fx: 100.0,
+            fy: 100.0,
+            cx: 50.0,
+            cy: 50.0,
+            width: 100,
+            height: 100,
+        };
+        let share = |corners| seen_share(&camera, &Zone::along_world(corners));
+        assert_eq!(share([-9.0, -9.0, 1.0, 9.0, 9.0, 2.0]), 1.0, "before the camera");
+        assert_eq!(share([-9.0, -9.0, -2.0, 9.0, 9.0, -1.0]), 0.0, "behind it");
+        assert_eq!(share([0.0, -9.0, 2.0, 9.0, 9.0, 3.0]), 0.5, "the right half");
+        assert_eq!(share([-1.0, -1.0, -1.0, 1.0, 1.0, 1.0]), 1.0, "the camera stands in it");
+    }
+}

@@ -1,0 +1,91 @@
+//! The coarse training of a scene, from which the blocks start.
+
+use super::frame::Frame;
+use crate::error::{Error, Result};
+use crate::io::label_table::LabelTable;
+use crate::io::{LoadOptions, read, run_folder};
+use crate::run::{Settings, latest_model, models};
+use crate::scene::{Dataset, Gaussians};
+use serde_json::Value;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+/// A scene with its coarse model.
+pub(super) struct Coarse {
+    pub dataset: Dataset,
+    pub model: Gaussians,
+    /// Rows of the model that are near, ascending.
+    pub near_rows: Vec<usize>,
+    /// CRC-32 of the file of the model.
+    pub crc: u32,
+    /// Near plane, world units.
+    pub near: f32,
+    /// Settings of its training.
+    pub settings: Settings,
+    /// Names of the labels.
+    pub names: Option<LabelTable>,
+    /// Gains of the photos, if they were trained.
+    pub gains: BTreeMap<String, [f32; 3]>,
+    /// Seconds of a step, if the training has noted them.
+    pub pace: Option<f64>,
+}
+
+impl Coarse {
+    /// Reads the cameras of a scene and its coarse model: the folder of a run.
+    ///
+    /// # Errors
+    ///
+    /// A model that is not in the folder of a finished run, or of another scene.
+    pub(super) fn open(scene: &Path, model: &Path, options: LoadOptions) -> Result<Self> {
+        let path = latest_model(model)?;
+        let Some(settings) = Settings::of_model(&path)? else {
+            let problem = "has no config.toml; the coarse model is a folder that a training wrote";
+            return Err(Error::data(model, "", problem));
+        };
+        let metrics: Value = read::json(&model.join("metrics.json"), "expected the folder of a finished training")?;
+        let (seconds, steps) = (metrics["seconds"].as_f64(), metrics["steps"].as_f64().unwrap_or(0.0));
+        let options = LoadOptions {
+            max_resolution: (settings.read.max_resolution > 0).then_some(settings.read.max_resolution),
+            test_every: (settings.read.test_every > 0).then_some(settings.read.test_every),
+            photos: false,
+            ..options
+        };
+        let dataset = crate::io::open_logged(scene, &options)?;
+        let found = models::open(&path)?.gaussians;
+        if found.is_empty() || dataset.train.is_empty() {
+            return Err(Error::data(&path, "", "the model has no Gaussians, or the scene no view to train on"));
+        }
+        Ok(Self {
+            dataset,
+            near_rows: Vec::new(),
+            crc: crc32fast::hash(&read::bytes(&path)?),
+            near: settings.train.near,
+            names: LabelTable::find_for_model(&path).map(|table| LabelTable::read(&table)).transpose()?,
+            gains: gains(model)?,
+            pace: seconds.filter(|_| steps > 0.0).map(|seconds| seconds / steps),
+            model: found,
+            settings,
+        })
+    }
+
+    /// Notes which rows are near; returns their places.
+    pub(super) fn settle(&mut self, frame: &Frame) -> Vec<(usize, glam::DVec3)> {
+        let near = frame.near(&self.model);
+        self.near_rows = near.iter().map(|(row, _)| *row).collect();
+        near
+    }
+
+    /// Returns the largest label; `None` without labels.
+    pub(super) fn max_label(&self) -> Option<u32> {
+        self.model.labels.as_ref().map(|labels| labels.iter().copied().max().unwrap_or(0).max(1))
+    }
+}
+
+fn gains(folder: &Path) -> Result<BTreeMap<String, [f32; 3]>> {
+    let path: PathBuf = folder.join(run_folder::EXPOSURES);
+    if !path.is_file() {
+        return Ok(BTreeMap::new());
+    }
+    let file: Value = read::json(&path, "expected the gains that a training wrote")?;
+    serde_json::from_value(file["gains"].clone()).map_err(|error| Error::data(&path, "gains", error.to_string()))
+}

@@ -1,0 +1,272 @@
+//! One id for an object whose masks were made for each block on its own.
+
+use super::trained::Trained;
+use crate::engine::Engine;
+use crate::error::{Error, Result};
+use crate::gpu::Gpu;
+use crate::io::block_file::BlockFile;
+use crate::io::label_table::{LabelEntry, LabelTable, unique_name};
+use crate::io::{LoadOptions, open_logged};
+use crate::render::{RenderOptions, render};
+use crate::run::models;
+use crate::scene::{LabelMap, View, Zone};
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// Fewest pixels that two ids share, over all photos of both blocks.
+const PIXELS_MIN: u64 = 200;
+/// Least share of these in the pixels of the id that has fewer.
+const SHARE_MIN: f64 = 0.5;
+
+/// Masks that agree within a block only.
+#[derive(Clone, Copy)]
+pub struct BlockMasks<'a> {
+    /// The scene.
+    pub scene: &'a Path,
+    /// A folder of id masks for each block, with its name.
+    pub masks: &'a Path,
+    /// Opens the device that draws what two blocks share.
+    pub open: &'a dyn Fn() -> Result<Arc<Gpu>>,
+}
+
+/// An id of a block: its place in the list of blocks, and the id in its masks.
+type Node = (usize, u32);
+
+/// Pixels that two ids of two blocks share.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Shared {
+    nodes: [Node; 2],
+    pixels: u64,
+}
+
+/// The ids of the merged model.
+pub(super) struct Joined {
+    /// The new id of each id, by block.
+    pub of: Vec<BTreeMap<u32, u32>>,
+    /// Names of the new ids.
+    pub names: LabelTable,
+}
+
+/// Finds which ids of blocks are one object, in the photos that two blocks share: where the nearest Gaussian is in both
+/// zones, the masks of both show it.
+///
+/// # Errors
+///
+/// A block without masks; what cannot be read or drawn.
+pub(super) fn join(blocks: &Path, trained: &[&Trained], how: &BlockMasks) -> Result<Joined> {
+    let mut found = Vec::new();
+    let mut gpu = None;
+    for (first, block) in trained.iter().enumerate() {
+        let others: Vec<usize> =
+            (first + 1..trained.len()).filter(|&at| !common(block, trained[at]).is_empty()).collect();
+        if others.is_empty() {
+            continue;
+        }
+        let gpu = match &gpu {
+            Some(gpu) => Arc::clone(gpu),
+            None => Arc::clone(gpu.insert((how.open)()?)),
+        };
+        found.extend(of_block(gpu, blocks, (first, &others), trained, how)?);
+    }
+    let ids = ids_of(trained, how)?;
+    Ok(numbered(&ids, &unions(found), trained))
+}
+
+/// Returns the names of the photos of two blocks.
+fn common(a: &Trained, b: &Trained) -> BTreeSet<String> {
+    let own: BTreeSet<&String> = a.block.views.iter().collect();
+    b.block.views.iter().filter(|name| own.contains(name)).cloned().collect()
+}
+
+fn views(trained: &Trained, only: BTreeSet<String>, how: &BlockMasks) -> Result<Vec<View>> {
+    let folder = how.masks.join(&trained.block.id);
+    let read = &trained.settings.read;
+    let options = LoadOptions {
+        masks: Some(folder),
+        only: Some(Arc::new(only)),
+        max_resolution: (read.max_resolution > 0).then_some(read.max_resolution),
+        test_every: (read.test_every > 0).then_some(read.test_every),
+        photos: false,
+        ..LoadOptions::default()
+    };
+    Ok(open_logged(how.scene, &options)?.train)
+}
+
+/// Compares a block with others that share photos with it.
+fn of_block(
+    gpu: Arc<Gpu>,
+    blocks: &Path,
+    (first, others): (usize, &[usize]),
+    trained: &[&Trained],
+    how: &BlockMasks,
+) -> Result<Vec<Shared>> {
+    let block = &trained[first].block;
+    let model = models::open(&BlockFile::init(&blocks.join(&block.id)))?.gaussians;
+    let zone = |of: &BlockFile| -> Zone { of.zone.zone(of.axes) };
+    let mut engine = None;
+    let mut found = Vec::new();
+    for &other in others {
+        let names = common(trained[first], trained[other]);
+        let (own, theirs) = (views(trained[first], names.clone(), how)?, views(trained[other], names, how)?);
+        let zones = [zone(block), zone(&trained[other].block)];
+        let is_common: Vec<bool> =
+            (0..model.len()).map(|row| zones.iter().all(|zone| zone.contains(model.world(row)))).collect();
+        let mut counts = BTreeMap::new();
+        for (own, theirs) in own.iter().zip(&theirs) {
+            let (Some(a), Some(b)) = (own.mask()?, theirs.mask()?) else { continue };
+            let engine = match &mut engine {
+                Some(engine) => engine,
+                None => {
+                    engine.insert(Engine::of_model(Arc::clone(&gpu), &model, [(own.camera.width, own.camera.height)])?)
+                }
+            };
+            engine.grow_image(own.camera.width, own.camera.height)?;
+            let drawn = render(engine, &own.camera, &RenderOptions::of_main(block.near as f32))?;
+            count(&mut counts, &drawn.top_id, &is_common, [&a, &b]);
+        }
+        found.extend(best(&counts, [first, other]));
+    }
+    Ok(found)
+}
+
+/// Adds the pixels of two masks whose main Gaussian is common.
+fn count(counts: &mut BTreeMap<[u32; 2], u64>, tops: &[i32], is_common: &[bool], [a, b]: [&LabelMap; 2]) {
+    for ((&top, &a), &b) in tops.iter().zip(&a.ids).zip(&b.ids) {
+        if usize::try_from(top).is_ok_and(|row| is_common[row]) {
+            *counts.entry([a.into(), b.into()]).or_default() += 1;
+        }
+    }
+}
+
+/// Returns the pairs of ids of which each is the other's best and that share enough; 0 is no id.
+fn best(counts: &BTreeMap<[u32; 2], u64>, blocks: [usize; 2]) -> Vec<Shared> {
+    let mut totals = [BTreeMap::<u32, u64>::new(), BTreeMap::new()];
+    let mut best = [BTreeMap::<u32, (u64, u32)>::new(), BTreeMap::new()];
+    for (ids, &pixels) in counts {
+        for side in 0..2 {
+            *totals[side].entry(ids[side]).or_default() += pixels;
+            // The smaller id of equals comes first.
+            let most = best[side].entry(ids[side]).or_insert((0, 0));
+            if pixels > most.0 {
+                *most = (pixels, ids[1 - side]);
+            }
+        }
+    }
+    let is_one = |(&[a, b], &pixels): (&[u32; 2], &u64)| {
+        let less = totals[0][&a].min(totals[1][&b]);
+        let enough = pixels >= PIXELS_MIN && pixels as f64 >= SHARE_MIN * less as f64;
+        let mutual = best[0][&a].1 == b && best[1][&b].1 == a;
+        (a != 0 && b != 0 && enough && mutual).then_some(Shared { nodes: [(blocks[0], a), (blocks[1], b)], pixels })
+    };
+    counts.iter().filter_map(is_one).collect()
+}
+
+/// Joins pairs, those that share most first, but never two ids of one block: a wrong pair would make a chain of objects.
+/// Returns the first id of the group of each id that is in one.
+fn unions(mut found: Vec<Shared>) -> BTreeMap<Node, Node> {
+    found.sort_by(|a, b| b.pixels.cmp(&a.pixels).then(a.nodes.cmp(&b.nodes)));
+    let mut groups: Vec<BTreeSet<Node>> = Vec::new();
+    for Shared { nodes, .. } in found {
+        let at = nodes.map(|node| groups.iter().position(|group| group.contains(&node)));
+        let joint: BTreeSet<Node> =
+            at.into_iter().flatten().flat_map(|at| groups[at].iter().copied()).chain(nodes).collect();
+        let blocks: BTreeSet<usize> = joint.iter().map(|(block, _)| *block).collect();
+        if blocks.len() < joint.len() {
+            tracing::warn!(
+                "ids {} and {} overlap, but their groups have other ids of one block",
+                nodes[0].1,
+                nodes[1].1
+            );
+            continue;
+        }
+        let others = groups.into_iter().enumerate().filter(|(index, _)| !at.contains(&Some(*index)));
+        groups = others.map(|(_, group)| group).chain([joint]).collect();
+    }
+    let of =
+        |group: &BTreeSet<Node>| group.iter().map(|&node| (node, *group.first().unwrap_or(&node))).collect::<Vec<_>>();
+    groups.iter().flat_map(of).collect()
+}
+
+/// Returns the ids in the masks of each block.
+fn ids_of(trained: &[&Trained], how: &BlockMasks) -> Result<Vec<BTreeSet<u32>>> {
+    let of = |trained: &&Trained| {
+        let views = views(trained, trained.block.views.iter().cloned().collect(), how)?;
+        let masks: Vec<_> = views.iter().filter_map(|view| view.mask.as_ref()).collect();
+        if masks.is_empty() {
+            let path: PathBuf = how.masks.join(&trained.block.id);
+            return Err(Error::data(path, "", format!("has no mask for a photo of block {}", trained.block.id)));
+        }
+        Ok(masks.into_iter().flat_map(|mask| mask.objects()).map(u32::from).collect())
+    };
+    trained.iter().map(of).collect()
+}
+
+/// Numbers the groups by their first block and id, from 1.
+fn numbered(ids: &[BTreeSet<u32>], groups: &BTreeMap<Node, Node>, trained: &[&Trained]) -> Joined {
+    let mut numbers: BTreeMap<Node, u32> = BTreeMap::new();
+    let (mut entries, mut taken) = (Vec::new(), BTreeSet::new());
+    let mut of = Vec::new();
+    for (block, ids) in ids.iter().enumerate() {
+        let mut map = BTreeMap::new();
+        for &id in ids {
+            let first = *groups.get(&(block, id)).unwrap_or(&(block, id));
+            let next = numbers.len() as u32 + 1;
+            let number = *numbers.entry(first).or_insert(next);
+            if number == next {
+                let name = trained[block].names.as_ref().and_then(|table| table.name(id)).map(str::to_owned);
+                entries.push(LabelEntry {
+                    name: name.map(|name| unique_name(name, &mut taken)),
+                    ..LabelEntry::new(number)
+                });
+            }
+            map.insert(id, number);
+        }
+        of.push(map);
+    }
+    Joined { of, names: LabelTable::new(entries) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn pair(nodes: [Node; 2], pixels: u64) -> Shared {
+        Shared { nodes, pixels }
+    }
+
+    #[test]
+    fn only_mutual_best_pairs_with_enough_pixels_count() {
+        let counts = [
+            ([1, 7], 900),
+            // 2 is best with 7, which is best with 1.
+            ([2, 7], 500),
+            ([2, 8], 100),
+            // Too few, and less than half of the smaller.
+            ([3, 9], 150),
+            ([4, 10], 300),
+            ([4, 0], 200),
+            ([0, 10], 500),
+            ([5, 11], 250),
+        ];
+        let counts: BTreeMap<[u32; 2], u64> = counts.into_iter().collect();
+        assert_eq!(best(&counts, [0, 1]), [pair([(0, 1), (1, 7)], 900), pair([(0, 5), (1, 11)], 250)]);
+    }
+
+    #[test]
+    fn groups_span_blocks_and_never_hold_two_ids_of_one() {
+        // One object through four blocks, and a bad pair that would chain two of them.
+        let found = vec![
+            pair([(0, 1), (1, 5)], 800),
+            pair([(1, 5), (2, 3)], 700),
+            pair([(2, 3), (3, 9)], 600),
+            pair([(0, 2), (3, 8)], 900),
+            pair([(0, 2), (3, 9)], 300),
+        ];
+        let groups = unions(found);
+        for node in [(0, 1), (1, 5), (2, 3), (3, 9)] {
+            assert_eq!(groups[&node], (0, 1));
+        }
+        assert_eq!((groups[&(0, 2)], groups[&(3, 8)]), ((0, 2), (0, 2)));
+    }
+}

@@ -1,0 +1,266 @@
+//! Joins the models of the blocks into one.
+
+use super::join::{BlockMasks, Joined, join};
+use super::trained::{Trained, compare};
+use crate::error::{Error, Result};
+use crate::io::block_file::{self, BlockFile, BlocksFile, REST};
+use crate::io::label_table::{self, LabelTable};
+use crate::io::run_folder::{self, Lock};
+use crate::io::{atomic, write_joined};
+use crate::run::models::{self, Models, model_path};
+use crate::scene::{Gaussians, UNLABELLED};
+use serde_json::json;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+/// Name of the file with the result, which is written last.
+const FILE: &str = "merge.json";
+
+/// How blocks are merged.
+#[derive(Clone, Copy, Default)]
+pub struct MergeOptions<'a> {
+    /// Takes the coarse Gaussians where a block has no finished training.
+    pub allow_missing: bool,
+    /// Masks whose ids agree within a block only: objects get new ids, and coarse Gaussians none.
+    pub masks: Option<BlockMasks<'a>>,
+}
+
+/// The result of a merge.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Merged {
+    /// The model.
+    pub model: PathBuf,
+    /// Gaussians of each block in the model, by name.
+    pub blocks: Vec<(String, u64)>,
+    /// Coarse Gaussians in it.
+    pub coarse: u64,
+    /// Names of blocks without a finished training.
+    pub missing: Vec<String>,
+    /// Devices that trained the blocks.
+    pub devices: Vec<String>,
+}
+
+impl Merged {
+    /// Returns the number of Gaussians in the model.
+    pub fn gaussians(&self) -> u64 {
+        self.coarse + self.blocks.iter().map(|(_, count)| count).sum::<u64>()
+    }
+}
+
+/// Rows of the merged model from one file.
+enum Part {
+    /// All rows of a file: what is coarse everywhere.
+    Rest(PathBuf),
+    /// The rows of a training whose means are in the core, and the new ids of its labels.
+    Trained(Trained, Option<BTreeMap<u32, u32>>),
+    /// The coarse rows in the core, from the first model of a block.
+    Coarse(BlockFile, PathBuf),
+}
+
+/// Joins the models that were trained in `models`, a folder for each block of the folder `blocks`, into the folder `out`:
+/// from each the Gaussians of its core, then the coarse ones. It holds one model at a time.
+///
+/// # Errors
+///
+/// Blocks without a finished training, with one of another split, of other settings, another version of labelgs or other
+/// names of labels: one error lists all.
+pub fn merge(blocks: &Path, models: &Path, out: &Path, options: &MergeOptions) -> Result<Merged> {
+    let (file, crc) = BlocksFile::read(blocks)?;
+    let mut problems = Vec::new();
+    let mut merged = Merged::default();
+    let mut parts = Vec::new();
+    for row in file.blocks.iter().filter(|row| row.trained) {
+        let folder = blocks.join(&row.id);
+        let block = BlockFile::read(&folder)?;
+        if block.blocks != crc {
+            problems.push(format!("{}: is of another split than {}", folder.display(), block_file::BLOCKS));
+            continue;
+        }
+        match Trained::open(&block, &models.join(&row.id)) {
+            Ok(trained) => parts.push(Part::Trained(trained, None)),
+            Err(problem) if problem.is_missing && options.allow_missing => {
+                tracing::warn!("{}; its core stays coarse", problem.text);
+                merged.missing.push(row.id.clone());
+                let init = BlockFile::init(&folder);
+                parts.push(Part::Coarse(block, init));
+            }
+            Err(problem) => problems.push(problem.text),
+        }
+    }
+    let trained: Vec<&Trained> = parts.iter().filter_map(Part::trained).collect();
+    problems.extend(compare(&trained));
+    let names = if options.masks.is_some() { None } else { names(blocks, &trained, &mut problems)? };
+    refuse(models, problems)?;
+    merged.devices = devices(&trained);
+    let joined = options.masks.map(|masks| join(blocks, &trained, &masks)).transpose()?;
+    let names = joined.as_ref().map(|joined| joined.names.clone()).or(names);
+    give_ids(&mut parts, joined);
+    parts.push(Part::Rest(blocks.join(REST)));
+    let has_ids = options.masks.is_some();
+    write(&file, &parts, (names.as_ref(), has_ids), out, merged)
+}
+
+/// Gives their new ids to the trainings.
+fn give_ids(parts: &mut [Part], joined: Option<Joined>) {
+    let trained = parts.iter_mut().filter_map(|part| match part {
+        Part::Trained(_, ids) => Some(ids),
+        Part::Rest(_) | Part::Coarse(..) => None,
+    });
+    trained.zip(joined.into_iter().flat_map(|joined| joined.of)).for_each(|(ids, of)| *ids = Some(of));
+}
+
+/// Returns one error for all problems.
+fn refuse(models: &Path, problems: Vec<String>) -> Result<()> {
+    match problems.len() {
+        0 => Ok(()),
+        1 => Err(Error::data(models, "", problems[0].clone())),
+        count => {
+            let problem = format!("{count} problems:\n  {}", problems.join("\n  "));
+            Err(Error::data(models, "", problem))
+        }
+    }
+}
+
+fn devices(trained: &[&Trained]) -> Vec<String> {
+    let mut devices: Vec<String> = trained.iter().map(|trained| trained.device.clone()).collect();
+    devices.sort();
+    devices.dedup();
+    devices
+}
+
+/// Returns the union of the tables of names; a name with two ids or an id with two names is a problem.
+fn names(blocks: &Path, trained: &[&Trained], problems: &mut Vec<String>) -> Result<Option<LabelTable>> {
+    let coarse = LabelTable::of_folder(blocks)?;
+    let mut of_id = BTreeMap::new();
+    let mut of_name: BTreeMap<String, u32> = BTreeMap::new();
+    let from = |folder: &Path| folder.join(label_table::FILE).display().to_string();
+    let tables = trained.iter().filter_map(|trained| Some((from(&trained.folder), trained.names.as_ref()?)));
+    for (path, table) in tables.chain(coarse.as_ref().map(|table| (from(blocks), table))) {
+        for entry in &table.labels {
+            let known = of_id.entry(entry.id).or_insert_with(|| entry.clone());
+            if known.name != entry.name {
+                let name = |name: &Option<String>| name.clone().unwrap_or_else(|| "nameless".to_owned());
+                let (here, there) = (name(&entry.name), name(&known.name));
+                problems.push(format!("{path}: label {} is {here}, elsewhere {there}", entry.id));
+            }
+            let Some(name) = &entry.name else { continue };
+            let id = *of_name.entry(name.clone()).or_insert(entry.id);
+            if id != entry.id {
+                problems.push(format!("{path}: {name} is label {}, elsewhere {id}", entry.id));
+            }
+        }
+    }
+    Ok((!of_id.is_empty()).then(|| LabelTable::new(of_id.into_values().collect())))
+}
+
+impl Part {
+    fn trained(&self) -> Option<&Trained> {
+        match self {
+            Self::Trained(trained, _) => Some(trained),
+            Self::Rest(_) | Self::Coarse(..) => None,
+        }
+    }
+
+    /// Reads the rows. Where trainings have new ids, the labels of coarse Gaussians mean nothing.
+    fn read(&self, file: &BlocksFile, has_ids: bool) -> Result<Gaussians> {
+        let unlabelled = |model: Gaussians| Gaussians { labels: None, label_confidence: None, ..model };
+        let coarse = |model| if has_ids { unlabelled(model) } else { model };
+        // Frozen rows come last; far ones of them may be in the core.
+        let of_core = |path: &Path, block: &BlockFile| {
+            let (model, core) = (models::open(path)?.gaussians, block.core.zone(file.axes));
+            let count = model.len().saturating_sub(block.frozen as usize);
+            Ok(model.filtered(|row| row < count && core.contains(model.world(row))))
+        };
+        match self {
+            Self::Rest(path) => Ok(coarse(models::open(path)?.gaussians)),
+            Self::Trained(trained, ids) => {
+                let mut model = of_core(&trained.model, &trained.block)?;
+                if let (Some(ids), Some(labels)) = (ids, &mut model.labels) {
+                    labels.iter_mut().for_each(|label| *label = ids.get(label).copied().unwrap_or(UNLABELLED));
+                }
+                Ok(model)
+            }
+            Self::Coarse(block, init) => of_core(init, block).map(coarse),
+        }
+    }
+}
+
+fn write(
+    file: &BlocksFile,
+    parts: &[Part],
+    (names, has_ids): (Option<&LabelTable>, bool),
+    out: &Path,
+    mut merged: Merged,
+) -> Result<Merged> {
+    std::fs::create_dir_all(out).map_err(Error::write(out))?;
+    let _lock = Lock::take(out)?;
+    let result = out.join(FILE);
+    if result.is_file() {
+        std::fs::remove_file(&result).map_err(Error::write(&result))?;
+    }
+    let steps = parts.iter().filter_map(Part::trained).map(|trained| trained.steps).max().unwrap_or(0);
+    // The header has the number of rows, so that all parts are read twice.
+    let mut like = None;
+    for part in parts {
+        let rows = part.read(file, has_ids)?;
+        let count = rows.len() as u64;
+        match part {
+            Part::Trained(trained, _) => merged.blocks.push((trained.block.id.clone(), count)),
+            Part::Rest(_) | Part::Coarse(..) => merged.coarse += count,
+        }
+        like = Some(joint(like, &rows));
+    }
+    let like = like.unwrap_or_default();
+    let expected = file.rest;
+    let count = merged.gaussians();
+    merged.model = model_path(out, steps);
+    let mut to = Models::new(out, 0)?;
+    write_joined(&merged.model, &like, count as usize, parts.iter().map(|part| part.read(file, has_ids)))?;
+    to.note_saved(steps);
+    if merged.missing.is_empty() && merged.coarse != expected {
+        let problem = format!("has {} coarse Gaussians, {expected} were split off", merged.coarse);
+        return Err(Error::data(&merged.model, "", problem));
+    }
+    write_records(file, parts, names, out)?;
+    atomic::write_json(&result, &merged.to_json())?;
+    Ok(merged)
+}
+
+/// Returns a model without rows that has the columns of another and of a part.
+fn joint(like: Option<Gaussians>, part: &Gaussians) -> Gaussians {
+    let like = like.unwrap_or_else(|| part.picked(&[]));
+    let (labels, confidence) = (part.labels.is_some(), part.label_confidence.is_some());
+    Gaussians {
+        sh_degree: like.sh_degree.max(part.sh_degree),
+        labels: (like.labels.is_some() || labels).then(Vec::new),
+        label_confidence: (like.label_confidence.is_some() || confidence).then(Vec::new),
+        ..like
+    }
+}
+
+/// Writes settings, names and blocks beside the model, so that other commands find them.
+fn write_records(file: &BlocksFile, parts: &[Part], names: Option<&LabelTable>, out: &Path) -> Result<()> {
+    if let Some(first) = parts.iter().find_map(Part::trained) {
+        let from = first.folder.join(run_folder::CONFIG);
+        let text = crate::io::read::text(&from)?;
+        atomic::write(out.join(run_folder::CONFIG), |to| to.write_all(text.as_bytes()))?;
+    }
+    LabelTable::put(names, &out.join(label_table::FILE))?;
+    let text = file.text()?;
+    atomic::write(out.join(block_file::BLOCKS), |to| to.write_all(&text))
+}
+
+impl Merged {
+    /// Returns the content of `merge.json`.
+    pub fn to_json(&self) -> serde_json::Value {
+        json!({
+            "schema_version": 1,
+            "model": self.model.display().to_string(),
+            "gaussians": self.gaussians(),
+            "blocks": self.blocks.iter().map(|(id, count)| json!({ "id": id, "gaussians": count })).collect::<Vec<_>>(),
+            "coarse": self.coarse,
+            "missing": self.missing,
+            "devices": self.devices,
+        })
+    }
+}

@@ -1,0 +1,78 @@
+//! Memory and time that a block needs.
+
+use crate::engine::{EngineSize, LabelSize, predict_for};
+use crate::error::{Error, Result};
+use crate::gpu::limits::PlanLimits;
+use crate::pass::KernelShape;
+
+/// Share of a card's memory that the plan may take: pairs of splats and tiles grow beyond the plan where views are full.
+const SHARE: f64 = 0.8;
+/// Steps of a block with up to this many views; more views have more steps in proportion.
+const VIEWS_PER_RUN: f64 = 300.0;
+/// Objects of a step with object layers.
+const LAYERS: u32 = 10;
+
+/// The card that trains the blocks.
+#[derive(Clone, Debug)]
+pub(super) struct Card {
+    pub shape: KernelShape,
+    pub limits: PlanLimits,
+    /// Memory, bytes.
+    pub memory: u64,
+}
+
+/// What all blocks have in common.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Common {
+    /// Largest photo, px.
+    pub image: (u32, u32),
+    /// Largest label; `None` for a scene without.
+    pub max_label: Option<u32>,
+    /// Seconds of a step of the coarse training.
+    pub pace: Option<f64>,
+    /// Pixels and Gaussians of the coarse training.
+    pub coarse: (u64, u64),
+}
+
+/// What a block needs.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Need {
+    /// Bytes on the device.
+    pub device: u64,
+    /// Bytes on the host.
+    pub host: u64,
+    pub steps: u32,
+    /// Minutes; infinite if the pace is not known.
+    pub minutes: f64,
+}
+
+impl Card {
+    /// Returns true if the need fits.
+    pub(super) fn fits(&self, need: &Need) -> bool {
+        need.device as f64 <= SHARE * self.memory as f64
+    }
+}
+
+impl Common {
+    /// Predicts the need of a block with this many Gaussians at the end of growth, frozen ones and views, and `steps` for
+    /// a run of few views.
+    pub(super) fn need(&self, card: &Card, (gaussians, frozen): (u64, u64), views: usize, steps: u32) -> Result<Need> {
+        let all = gaussians + frozen;
+        let labels =
+            self.max_label.map(|max_label| LabelSize { max_label, layers: LAYERS, vote_columns: max_label + 1 });
+        let frozen = u32::try_from(frozen).unwrap_or(u32::MAX);
+        let size = EngineSize::new(all, self.image).for_training().with_labels(labels).with_frozen(frozen);
+        let device = match predict_for(&card.shape, &card.limits, &size) {
+            // A buffer beyond the largest binding.
+            Err(Error::OutOfMemory { .. }) => u64::MAX,
+            other => other?.total,
+        };
+        let steps = (f64::from(steps) * (views as f64 / VIEWS_PER_RUN).max(1.0)).round() as u32;
+        let pixels = u64::from(self.image.0) * u64::from(self.image.1);
+        let larger = (pixels as f64 / self.coarse.0.max(1) as f64).max(all as f64 / self.coarse.1.max(1) as f64);
+        let pace = self.pace.map_or(f64::INFINITY, |seconds| seconds * larger.max(1.0));
+        // A photo has 4 bytes a pixel and a mask 2; a checkpoint is written from a copy.
+        let host = (views as u64 * pixels * 6).min(crate::io::PHOTO_MEMORY) + 800 * gaussians;
+        Ok(Need { device, host, steps, minutes: f64::from(steps) * pace / 60.0 })
+    }
+}

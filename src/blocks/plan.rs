@@ -1,0 +1,280 @@
+//! Decides on the blocks of a scene: as few as the card allows.
+
+use super::cells::Cell;
+use super::choose::{Chosen, choose};
+use super::coarse::Coarse;
+use super::frame::Frame;
+use super::need::{Card, Common, Need};
+use crate::engine::{Engine, EngineSize, card};
+use crate::error::{Error, Result};
+use crate::gpu::Gpu;
+use crate::io::LoadOptions;
+use crate::scheduler::SchedulerOptions;
+use glam::DVec3;
+use std::path::Path;
+use std::sync::Arc;
+
+/// Fewest views of a block: this many, or this share of all if that is less.
+const VIEWS_MIN: usize = 32;
+const VIEWS_MIN_SHARE: f64 = 0.25;
+/// Gaussians of the whole scene by default, in those of the coarse model.
+const FINER: u64 = 4;
+/// Share of the coarse Gaussians outside of a zone that its photos are first expected to show.
+const CONTEXT: f64 = 0.25;
+/// Most rounds of the division; each renders every photo once.
+const ROUNDS: usize = 6;
+/// Most blocks: their names have three digits.
+const BLOCKS_MAX: usize = 1000;
+
+/// How a scene is divided.
+#[derive(Clone, Debug)]
+pub struct PlanOptions {
+    /// Memory of the card that trains the blocks, bytes.
+    pub card: u64,
+    /// Gaussians of the whole scene at the end of growth; 0 takes four times those of the coarse model.
+    pub gaussians: u64,
+    /// Fewest blocks.
+    pub blocks: usize,
+    /// Most views of a block; those with the largest shares of it are taken.
+    pub max_views: usize,
+    /// Longest side of the photos in the training of the blocks, px; 0 for their full size.
+    pub max_resolution: u32,
+    /// Steps of a block of up to 300 views; 0 for those of the coarse training. More views have more in proportion.
+    pub steps: u32,
+    /// Direction of up in the world; `None` finds it by the cameras.
+    pub up: Option<DVec3>,
+    /// How the scene is read. Size and split of its views are those of the coarse training.
+    pub load: LoadOptions,
+}
+
+impl Default for PlanOptions {
+    fn default() -> Self {
+        Self {
+            card: 24 << 30,
+            gaussians: 0,
+            blocks: 1,
+            max_views: 1500,
+            max_resolution: 0,
+            steps: 0,
+            up: None,
+            load: LoadOptions::default(),
+        }
+    }
+}
+
+/// A block to be.
+#[derive(Clone, Debug)]
+pub struct PlannedBlock {
+    /// False if too few photos see it.
+    pub trained: bool,
+    /// Coarse Gaussians in its zone.
+    pub start: u64,
+    /// Gaussians at the end of growth.
+    pub gaussians: u64,
+    /// Gaussians of the surroundings.
+    pub frozen: u64,
+    /// Number of views to train on.
+    pub views: usize,
+    pub(super) cell: Cell,
+    pub(super) zone_rows: Vec<usize>,
+    pub(super) frozen_rows: Vec<usize>,
+    pub(super) train: Vec<usize>,
+    pub(super) test: Vec<usize>,
+    pub(super) need: Need,
+}
+
+impl PlannedBlock {
+    /// Predicted memory of the device, bytes.
+    pub fn device_bytes(&self) -> u64 {
+        self.need.device
+    }
+
+    /// Predicted memory of the host, bytes.
+    pub fn host_bytes(&self) -> u64 {
+        self.need.host
+    }
+
+    /// Steps.
+    pub fn steps(&self) -> u32 {
+        self.need.steps
+    }
+
+    /// Predicted time, minutes; `None` if the coarse training has not noted its pace.
+    pub fn minutes(&self) -> Option<f64> {
+        Some(self.need.minutes).filter(|minutes| minutes.is_finite())
+    }
+}
+
+/// The blocks of a scene.
+pub struct Plan {
+    /// The blocks.
+    pub blocks: Vec<PlannedBlock>,
+    /// Gaussians of the coarse model that no block has in its core: far ones.
+    pub far: u64,
+    pub(super) coarse: Coarse,
+    pub(super) frame: Frame,
+    pub(super) extent: f64,
+}
+
+/// Divides the scene at `scene` by its coarse model in the folder `model`: into the fewest blocks that fit the card. `open`
+/// opens the device that renders the coarse model.
+///
+/// # Errors
+///
+/// A model that is not that of a finished training of this scene; a card too small for what the photos show; a device
+/// too small for the coarse model.
+pub fn plan(scene: &Path, model: &Path, options: &PlanOptions, open: &dyn Fn() -> Result<Arc<Gpu>>) -> Result<Plan> {
+    if options.blocks == 0 || options.blocks > BLOCKS_MAX {
+        return Err(Error::usage("blocks", format!("is {}, needs 1 to {BLOCKS_MAX}", options.blocks)));
+    }
+    let mut coarse = Coarse::open(scene, model, options.load.clone())?;
+    let cameras: Vec<_> = coarse.dataset.train.iter().map(|view| &view.camera).collect();
+    let extent = coarse.dataset.extent();
+    let frame = Frame::of(&cameras, extent, options.up);
+    let places = coarse.settle(&frame);
+    if places.is_empty() {
+        let problem = format!("has no Gaussian within {:.3} of the cameras, in world units", frame.far);
+        return Err(Error::data(model, "", problem));
+    }
+    let (shape, limits) = card(options.card);
+    let card = Card { shape, limits, memory: options.card };
+    let planner = Planner { common: common(&coarse, options)?, card, options, coarse: &coarse, frame: &frame };
+    let mut engine = engine(open()?, &coarse)?;
+    let blocks = planner.blocks(&mut engine, &places)?;
+    let far = (coarse.model.len() - places.len()) as u64;
+    Ok(Plan { blocks, far, coarse, frame, extent })
+}
+
+fn engine(gpu: Arc<Gpu>, coarse: &Coarse) -> Result<Engine> {
+    let sizes = coarse.dataset.all().into_iter().map(|view| (view.camera.width, view.camera.height));
+    let size = EngineSize::of_model(&coarse.model, sizes).with_labels(None).for_training();
+    let mut engine = Engine::new(gpu, size, SchedulerOptions::default())?;
+    engine.upload_model(&coarse.model)?;
+    Ok(engine)
+}
+
+fn common(coarse: &Coarse, options: &PlanOptions) -> Result<Common> {
+    let area = |views: &[(u32, u32)]| views.iter().map(|&(w, h)| u64::from(w) * u64::from(h)).max().unwrap_or(1);
+    let sizes: Vec<(u32, u32)> =
+        coarse.dataset.all().into_iter().map(|view| (view.camera.width, view.camera.height)).collect();
+    let coarse_side = coarse.settings.read.max_resolution;
+    let image = if options.max_resolution == coarse_side {
+        sizes.clone()
+    } else {
+        let max_resolution = (options.max_resolution > 0).then_some(options.max_resolution);
+        let load = LoadOptions { max_resolution, photos: false, masks: None, ..options.load.clone() };
+        let full = crate::io::open(&coarse.dataset.root, &load)?;
+        full.all().into_iter().map(|view| (view.camera.width, view.camera.height)).collect()
+    };
+    let largest = image.iter().fold((1, 1), |a, b| (a.0.max(b.0), a.1.max(b.1)));
+    Ok(Common {
+        image: largest,
+        max_label: coarse.max_label(),
+        pace: coarse.pace,
+        coarse: (area(&sizes), coarse.model.len() as u64),
+    })
+}
+
+struct Planner<'a> {
+    common: Common,
+    card: Card,
+    options: &'a PlanOptions,
+    coarse: &'a Coarse,
+    frame: &'a Frame,
+}
+
+impl Planner<'_> {
+    /// Divides until all blocks fit, first by an estimate of what their photos show, then by what these do show.
+    fn blocks(&self, engine: &mut Engine, places: &[(usize, DVec3)]) -> Result<Vec<PlannedBlock>> {
+        let mut cells = vec![Cell::whole(places)];
+        loop {
+            let guess = |cell: &Cell| {
+                let zone = self.zone_rows(cell).len();
+                let outside = self.coarse.model.len() - zone;
+                let views = self.coarse.dataset.train.len();
+                self.need(zone, (CONTEXT * outside as f64) as u64, views).map(|need| !self.card.fits(&need))
+            };
+            let too_large = cells.iter().map(guess).collect::<Result<Vec<bool>>>()?;
+            let Some(at) = self.next_to_halve(&cells, &too_large) else { break };
+            self.halve(&mut cells, at)?;
+        }
+        for _ in 0..ROUNDS {
+            let chosen = choose(engine, self.coarse, self.frame, &cells)?;
+            let blocks: Vec<PlannedBlock> =
+                cells.iter().zip(chosen).map(|(cell, chosen)| self.block(cell, chosen)).collect::<Result<_>>()?;
+            let too_large: Vec<usize> =
+                (0..blocks.len()).filter(|&at| blocks[at].trained && !self.card.fits(&blocks[at].need)).collect();
+            if too_large.is_empty() {
+                return Ok(blocks);
+            }
+            too_large.into_iter().rev().try_for_each(|at| self.halve(&mut cells, at))?;
+        }
+        let problem = format!(
+            "is {} bytes, too little for what the photos of a block show around it; name a larger card, fewer `gaussians` or \
+             a smaller coarse model",
+            self.options.card
+        );
+        Err(Error::usage("card", problem))
+    }
+
+    /// Returns the largest cell of those that do not fit, or of all while they are too few.
+    fn next_to_halve(&self, cells: &[Cell], too_large: &[bool]) -> Option<usize> {
+        let few = cells.len() < self.options.blocks;
+        let candidates = (0..cells.len()).filter(|&at| too_large[at] || few);
+        candidates.min_by_key(|&at| (!too_large[at], std::cmp::Reverse(cells[at].rows.len()), at))
+    }
+
+    fn halve(&self, cells: &mut Vec<Cell>, at: usize) -> Result<()> {
+        if cells.len() >= BLOCKS_MAX {
+            let problem = format!("is too small: more than {BLOCKS_MAX} blocks would be needed");
+            return Err(Error::usage("card", problem));
+        }
+        let halves = cells[at].halves(|row| self.frame.place(self.coarse.model.world(row)))?;
+        cells.splice(at..=at, halves);
+        Ok(())
+    }
+
+    /// Returns the rows of the near Gaussians in the zone of a cell.
+    fn zone_rows(&self, cell: &Cell) -> Vec<usize> {
+        let zone = self.frame.zone(&cell.zone());
+        self.coarse.near_rows.iter().copied().filter(|&row| zone.contains(self.coarse.model.world(row))).collect()
+    }
+
+    /// Returns the number of Gaussians at the end of growth for this many coarse ones.
+    fn grown(&self, start: usize) -> u64 {
+        let all = self.coarse.model.len() as f64;
+        let total = if self.options.gaussians > 0 { self.options.gaussians as f64 } else { FINER as f64 * all };
+        ((total * start as f64 / all).round() as u64).max(start as u64)
+    }
+
+    fn need(&self, start: usize, frozen: u64, views: usize) -> Result<Need> {
+        let steps = if self.options.steps > 0 { self.options.steps } else { self.coarse.settings.train.iterations };
+        self.common.need(&self.card, (self.grown(start), frozen), views, steps)
+    }
+
+    fn block(&self, cell: &Cell, mut chosen: Chosen) -> Result<PlannedBlock> {
+        chosen.train.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
+        chosen.train.truncate(self.options.max_views);
+        let mut train: Vec<usize> = chosen.train.iter().map(|(index, _)| *index).collect();
+        train.sort_unstable();
+        let zone_rows = self.zone_rows(cell);
+        let mut in_zone = vec![false; self.coarse.model.len()];
+        zone_rows.iter().for_each(|&row| in_zone[row] = true);
+        let frozen_rows: Vec<usize> = (0..in_zone.len()).filter(|&row| chosen.is_seen[row] && !in_zone[row]).collect();
+        let least = VIEWS_MIN.min((VIEWS_MIN_SHARE * self.coarse.dataset.train.len() as f64).ceil() as usize);
+        let (start, frozen) = (zone_rows.len(), frozen_rows.len() as u64);
+        Ok(PlannedBlock {
+            trained: train.len() >= least,
+            start: start as u64,
+            gaussians: self.grown(start),
+            frozen,
+            views: train.len(),
+            need: self.need(start, frozen, train.len())?,
+            cell: cell.clone(),
+            zone_rows,
+            frozen_rows,
+            train,
+            test: chosen.test,
+        })
+    }
+}

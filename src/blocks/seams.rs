@@ -1,0 +1,51 @@
+//! The places of a merged model: its blocks, and the seams between them.
+
+use crate::error::Result;
+use crate::eval::Places;
+use crate::io::block_file::{BLOCKS, BlocksFile};
+use crate::scene::Zone;
+use glam::DVec3;
+use std::path::Path;
+
+/// Groups besides the blocks: what is coarse everywhere, where zones of blocks overlap, and all else.
+const OTHERS: [&str; 3] = ["far", "seams", "off the seams"];
+
+/// The blocks of a merged model, as groups of places.
+pub struct Seams {
+    file: BlocksFile,
+    cores: Vec<Zone>,
+    zones: Vec<Zone>,
+}
+
+impl Seams {
+    /// Finds the blocks of the model in a folder; none if it was not merged.
+    ///
+    /// # Errors
+    ///
+    /// A file of blocks that cannot be read.
+    pub fn of_model(folder: &Path) -> Result<Option<Self>> {
+        if !folder.join(BLOCKS).is_file() {
+            return Ok(None);
+        }
+        let (file, _) = BlocksFile::read(folder)?;
+        let cores = file.blocks.iter().map(|block| block.core.zone(file.axes)).collect();
+        let zones = file.blocks.iter().map(|block| block.zone.zone(file.axes)).collect();
+        Ok(Some(Self { file, cores, zones }))
+    }
+}
+
+impl Places for Seams {
+    fn names(&self) -> Vec<String> {
+        self.file.blocks.iter().map(|block| block.id.clone()).chain(OTHERS.map(str::to_owned)).collect()
+    }
+
+    fn of(&self, world: DVec3) -> Vec<usize> {
+        let first = self.cores.len();
+        if self.file.is_far(world) {
+            return vec![first];
+        }
+        let is_seam = self.zones.iter().filter(|zone| zone.contains(world)).count() > 1;
+        let block = self.cores.iter().position(|core| core.contains(world));
+        block.into_iter().chain([first + if is_seam { 1 } else { 2 }]).collect()
+    }
+}

@@ -1,0 +1,119 @@
+//! Writes the folders of the blocks.
+
+use super::plan::{Plan, PlannedBlock};
+use crate::error::Result;
+use crate::io::block_file::{BlockFile, BlockRow, BlocksFile, REST, poses_crc};
+use crate::io::label_table::LabelTable;
+use crate::io::{atomic, write_model};
+use crate::scene::View;
+use std::path::Path;
+
+/// Factors of the learning rates of positions and of scales: a block goes on from the coarse model (CityGaussian).
+const RATE_FACTORS: [f64; 2] = [0.4, 0.8];
+const MIB: u64 = 1 << 20;
+
+/// Writes a folder for each block into the new folder `out`, then what no block trains, and the list of all last.
+///
+/// # Errors
+///
+/// A folder that is not empty; a file that cannot be written.
+pub fn split(plan: &Plan, out: &Path) -> Result<()> {
+    atomic::require_empty("output", out)?;
+    let train = &plan.coarse.dataset.train;
+    let (frame, is_rest) = (&plan.frame, plan.is_rest());
+    let rest = plan.coarse.model.filtered(|row| is_rest[row]);
+    let file = BlocksFile {
+        model: plan.coarse.crc,
+        poses: poses_crc(train.iter().map(|view| &view.camera)),
+        axes: frame.axes.map(|axis| axis.to_array()),
+        centre: frame.centre.to_array(),
+        far: frame.far,
+        extent: plan.extent,
+        near: plan.coarse.near.into(),
+        test_every: plan.coarse.settings.read.test_every,
+        rest: rest.len() as u64,
+        blocks: plan.blocks.iter().enumerate().map(|(index, block)| row(index, block)).collect(),
+        ..BlocksFile::new()
+    };
+    let text = file.text()?;
+    let crc = crc32fast::hash(&text);
+    for (index, block) in plan.blocks.iter().enumerate().filter(|(_, block)| block.trained) {
+        let folder = out.join(name(index));
+        // Trained rows first: only they have moments.
+        let rows: Vec<usize> = block.zone_rows.iter().chain(&block.frozen_rows).copied().collect();
+        write_model(BlockFile::init(&folder), &plan.coarse.model.picked(&rows))?;
+        plan.file(index, block, crc).write(&folder)?;
+    }
+    write_model(out.join(REST), &rest)?;
+    LabelTable::put(plan.coarse.names.as_ref(), &out.join(crate::io::label_table::FILE))?;
+    atomic::write(out.join(crate::io::block_file::BLOCKS), |to| to.write_all(&text))
+}
+
+/// Returns the name of a block.
+fn name(index: usize) -> String {
+    format!("b{index:03}")
+}
+
+fn row(index: usize, block: &PlannedBlock) -> BlockRow {
+    BlockRow {
+        id: name(index),
+        trained: block.trained,
+        core: block.cell.core,
+        zone: block.cell.zone(),
+        views: block.views as u64,
+        start: block.start,
+        gaussians: block.gaussians,
+        frozen: block.frozen,
+        device_mib: block.need.device.div_ceil(MIB),
+        host_mib: block.need.host.div_ceil(MIB),
+        steps: block.need.steps,
+        minutes: block.minutes(),
+    }
+}
+
+impl Plan {
+    /// Returns which coarse Gaussians the merged model has: far ones, and those in cores that are not trained.
+    fn is_rest(&self) -> Vec<bool> {
+        let mut is_rest = vec![true; self.coarse.model.len()];
+        for block in self.blocks.iter().filter(|block| block.trained) {
+            block.cell.rows.iter().for_each(|&row| is_rest[row] = false);
+        }
+        is_rest
+    }
+
+    fn file(&self, index: usize, block: &PlannedBlock, blocks: u32) -> BlockFile {
+        let pick = |of: &[usize], views: &[View]| of.iter().map(|&at| views[at].clone()).collect::<Vec<View>>();
+        let (train, test) = (&self.coarse.dataset.train, &self.coarse.dataset.test);
+        let (train, test) = (pick(&block.train, train), pick(&block.test, test));
+        let names = |views: &[View]| views.iter().map(|view| view.name.clone()).collect::<Vec<_>>();
+        let gain = |view: &View| Some((view.name.clone(), *self.coarse.gains.get(&view.name)?));
+        BlockFile {
+            schema_version: BlockFile::VERSION,
+            id: name(index),
+            blocks,
+            axes: self.frame.axes.map(|axis| axis.to_array()),
+            core: block.cell.core,
+            zone: block.cell.zone(),
+            extent: self.extent,
+            near: self.coarse.near.into(),
+            views: names(&train),
+            test: names(&test),
+            test_every: self.coarse.settings.read.test_every,
+            poses: poses_crc(train.iter().chain(&test).map(|view| &view.camera)),
+            gains: train.iter().filter_map(gain).collect(),
+            seed: seed(self.coarse.settings.train.seed, index),
+            steps: block.need.steps,
+            gaussians: block.gaussians,
+            frozen: block.frozen as u32,
+            rate_factors: RATE_FACTORS,
+        }
+    }
+}
+
+/// Returns the seed of a block: TOML holds 63 bits.
+fn seed(run: u64, index: usize) -> u64 {
+    let mut hasher = crc32fast::Hasher::new();
+    hasher.update(&run.to_le_bytes());
+    hasher.update(name(index).as_bytes());
+    u64::from(hasher.finalize())
+}

@@ -1,0 +1,112 @@
+//! The finished training of a block.
+
+use crate::io::block_file::{self, BlockFile};
+use crate::io::label_table::LabelTable;
+use crate::io::{read, run_folder};
+use crate::run::Settings;
+use crate::run::models::model_path;
+use serde_json::Value;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+/// Settings that a block decides, or that change no Gaussian.
+const OWN: [&str; 9] = [
+    "seed",
+    "iterations",
+    "budget",
+    "max_gaussians",
+    "full_size_from",
+    "save_at",
+    "preview_every",
+    "checkpoint_every",
+    "photo_memory",
+];
+
+/// A training that can be merged.
+pub(super) struct Trained {
+    pub block: BlockFile,
+    pub folder: PathBuf,
+    pub model: PathBuf,
+    pub steps: u32,
+    pub device: String,
+    pub names: Option<LabelTable>,
+    pub settings: Settings,
+    labelgs: String,
+}
+
+/// Why a training cannot be merged.
+pub(super) struct Problem {
+    pub text: String,
+    /// There is no finished training, rather than a wrong one.
+    pub is_missing: bool,
+}
+
+impl Trained {
+    /// Looks at the folder of a training.
+    pub(super) fn open(block: &BlockFile, folder: &Path) -> Result<Self, Problem> {
+        let problem = |text: String, is_missing| Problem { text: format!("{}: {text}", folder.display()), is_missing };
+        let missing = |what: &str| problem(format!("{what}; train block {} into it", block.id), true);
+        let odd = |error: crate::Error| problem(error.to_string(), false);
+        if !folder.join(block_file::BLOCK).is_file() {
+            return Err(missing("no training of a block is there"));
+        }
+        if BlockFile::read(folder).map_err(odd)? != *block {
+            let text = "was trained for another block or split; train it anew in an empty folder";
+            return Err(problem(text.to_owned(), false));
+        }
+        let (metrics, config) = (folder.join("metrics.json"), folder.join(run_folder::CONFIG));
+        if !metrics.is_file() || !config.is_file() {
+            return Err(missing("the training is not finished"));
+        }
+        let json = |path: &Path| read::json::<Value>(path, "expected a file that a training wrote");
+        let steps = json(&metrics).map_err(odd)?["steps"].as_u64().unwrap_or(0) as u32;
+        let settings = Settings::read(&config).map_err(odd)?;
+        if steps < settings.train.iterations {
+            let text = format!("the training was stopped after {steps} of {} steps", settings.train.iterations);
+            return Err(missing(&text));
+        }
+        let model = model_path(folder, steps);
+        if !model.is_file() {
+            return Err(missing(&format!("its model of step {steps} is gone")));
+        }
+        let run = json(&folder.join("run.json")).map_err(odd)?;
+        let last = run["parts"].as_array().and_then(|parts| parts.last()).cloned().unwrap_or_default();
+        let text = |key: &str| last[key].as_str().unwrap_or("unknown").to_owned();
+        Ok(Self {
+            block: block.clone(),
+            folder: folder.to_owned(),
+            model,
+            steps,
+            device: text("device"),
+            names: LabelTable::of_folder(folder).map_err(odd)?,
+            // The version alone: any commit of it may have written a part.
+            labelgs: text("labelgs").split(' ').next().unwrap_or_default().to_owned(),
+            settings,
+        })
+    }
+}
+
+/// Returns in what trainings differ from the first that must be equal.
+pub(super) fn compare(trained: &[&Trained]) -> Vec<String> {
+    let Some((first, others)) = trained.split_first() else { return Vec::new() };
+    let mut problems = Vec::new();
+    let wanted = first.settings.texts();
+    for other in others {
+        let own = other.settings.texts();
+        let mut note = |what: &str, then: &str, now: &str| {
+            let (here, there) = (other.folder.display(), first.folder.display());
+            problems.push(format!("{here}: {what} is {now}, and {then} in {there}"));
+        };
+        if first.labelgs != other.labelgs {
+            note("labelgs", &first.labelgs, &other.labelgs);
+        }
+        for key in Settings::keys().filter(|key| !OWN.contains(&key.name)) {
+            let value = |of: &BTreeMap<String, String>| of.get(key.name).map_or("not set", String::as_str).to_owned();
+            let (then, now) = (value(&wanted), value(&own));
+            if then != now {
+                note(&format!("`{}`", key.name), &then, &now);
+            }
+        }
+    }
+    problems
+}

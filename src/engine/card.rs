@@ -1,0 +1,28 @@
+//! Predictions of memory for a device that is not here.
+
+use super::{Engine, EngineSize, capacity};
+use crate::error::Result;
+use crate::gpu::limits::PlanLimits;
+use crate::pass::KernelShape;
+use crate::scheduler::plan::{MemoryReport, PlanOptions, TABLE};
+
+/// Returns kernels and limits of a typical graphics card with some bytes of memory: subgroups of 32, bindings and
+/// allocations of 4 GiB.
+pub(crate) fn card(memory: u64) -> (KernelShape, PlanLimits) {
+    const RANGE: u64 = u32::MAX as u64 & !0xffff;
+    let limits =
+        PlanLimits { max_storage_range: RANGE, max_allocation: RANGE, max_memory: memory, ..PlanLimits::default() };
+    (KernelShape::new(32, false), limits)
+}
+
+/// Predicts the memory of an engine of this size on a device with these kernels and limits.
+///
+/// # Errors
+///
+/// A buffer or the whole beyond the limits.
+pub(crate) fn predict_for(shape: &KernelShape, limits: &PlanLimits, size: &EngineSize) -> Result<MemoryReport> {
+    let size = &size.in_bands(shape);
+    let capacity = capacity(shape, size);
+    let lists = Engine::lists_of(shape, &capacity, size);
+    MemoryReport::predict(TABLE, &capacity, &lists, limits, PlanOptions::default())
+}

@@ -1,0 +1,55 @@
+//! Scores by place in the world, such as those of each block of a scene and of the seams between them.
+
+use super::metrics::{byte_value, psnr_of};
+use super::regions::world_points;
+use crate::error::Result;
+use crate::render::{Parts, RenderOptions, Rendered};
+use crate::scene::{Camera, View};
+use glam::DVec3;
+use serde::Serialize;
+use std::collections::BTreeMap;
+
+/// Groups of places, by which pixels are scored.
+pub trait Places: Sync {
+    /// Returns the names of the groups.
+    fn names(&self) -> Vec<String>;
+
+    /// Returns the groups of a world point, by index.
+    fn of(&self, world: DVec3) -> Vec<usize>;
+}
+
+/// The score of a group.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct PlaceScore {
+    /// Number of pixels of all views.
+    pub pixels: u64,
+    /// PSNR over these pixels, dB.
+    pub psnr: f64,
+}
+
+/// Scores the pixels of each group over some views, which have photos: a pixel is where the model's depth puts it. `draw`
+/// renders the model. Groups without a pixel are absent.
+pub fn by_place(
+    draw: &mut dyn FnMut(&Camera, &RenderOptions) -> Result<Rendered>,
+    views: &[&View],
+    options: RenderOptions,
+    places: &dyn Places,
+) -> Result<BTreeMap<String, PlaceScore>> {
+    let names = places.names();
+    let mut sums = vec![(0.0, 0_u64); names.len()];
+    for view in views {
+        let rendered = draw(&view.camera, &RenderOptions { parts: Parts::DEPTH, ..options })?;
+        let (photo, world) = (view.photo()?, world_points(&view.camera, &rendered.mean_depth()?));
+        let pixels = world.iter().zip(&rendered.rgb).zip(&photo.rgba).filter(|(_, pixel)| pixel[3] > 0);
+        for ((&world, render), pixel) in pixels {
+            let error = |c: usize| f64::from(render[c].clamp(0.0, 1.0)) - byte_value(pixel[c]);
+            let squared = (0..3).map(|c| error(c).powi(2)).sum::<f64>() / 3.0;
+            for group in places.of(world) {
+                sums[group].0 += squared;
+                sums[group].1 += 1;
+            }
+        }
+    }
+    let scored = names.into_iter().zip(sums).filter(|(_, (_, pixels))| *pixels > 0);
+    Ok(scored.map(|(name, (sum, pixels))| (name, PlaceScore { pixels, psnr: psnr_of(sum / pixels as f64) })).collect())
+}

@@ -1,0 +1,115 @@
+//! A block of a larger scene, as the part that a run trains.
+
+use super::Settings;
+use super::resume::Resumed;
+use crate::error::{Error, Result};
+use crate::io::LoadOptions;
+use crate::io::block_file::{self, BlockFile, poses_crc};
+use crate::scene::{Dataset, View};
+use crate::train::ExposureMode;
+use crate::train::region::Region;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// The folder of a block with its file.
+#[derive(Debug)]
+pub(super) struct Block {
+    folder: PathBuf,
+    file: BlockFile,
+}
+
+impl Block {
+    /// Reads a block.
+    pub(super) fn read(folder: &Path) -> Result<Self> {
+        Ok(Self { folder: folder.to_owned(), file: BlockFile::read(folder)? })
+    }
+
+    /// Returns the path of its first model.
+    pub(super) fn init(&self) -> PathBuf {
+        BlockFile::init(&self.folder)
+    }
+
+    /// Limits what is read of the scene to its views.
+    pub(super) fn limit(&self, options: &mut LoadOptions) {
+        options.only = Some(Arc::new(self.file.names()));
+    }
+
+    /// Refuses a scene that is not the one that was split.
+    pub(super) fn check_scene(&self, dataset: &Dataset) -> Result<()> {
+        let path = self.folder.join(block_file::BLOCK);
+        for (which, wanted, found) in
+            [("views", &self.file.views, &dataset.train), ("test", &self.file.test, &dataset.test)]
+        {
+            let missing = wanted.iter().find(|name| !found.iter().any(|view| view.name == **name));
+            if let Some(name) = missing {
+                let problem = format!("lists {name}, which is not there in {}", dataset.root.display());
+                return Err(Error::data(&path, which, format!("{problem}; split the scene again")));
+            }
+        }
+        let all: Vec<&View> = dataset.train.iter().chain(&dataset.test).collect();
+        if poses_crc(all.iter().map(|view| &view.camera)) != self.file.poses {
+            let problem = format!("{} has other poses than the scene that was split", dataset.root.display());
+            return Err(Error::data(&path, "poses", format!("{problem}; split it again")));
+        }
+        Ok(())
+    }
+
+    /// Returns the part of the scene.
+    pub(super) fn region(&self) -> Region {
+        Region {
+            frozen: self.file.frozen,
+            zone: self.file.zone.zone(self.file.axes),
+            extent: self.file.extent,
+            gains: self.file.gains.clone(),
+        }
+    }
+
+    fn apply(&self, settings: &mut Settings) {
+        let (file, train) = (&self.file, &mut settings.train);
+        settings.read.test_every = file.test_every;
+        train.iterations = file.steps;
+        train.seed = file.seed;
+        train.near = file.near as f32;
+        train.max_gaussians = 0;
+        train.budget = file.gaussians + u64::from(file.frozen);
+        train.position_lr_init *= file.rate_factors[0];
+        train.position_lr_final *= file.rate_factors[0];
+        train.scaling_lr *= file.rate_factors[1];
+        train.exposure = if file.gains.is_empty() { ExposureMode::Off } else { ExposureMode::On };
+    }
+}
+
+/// Decides on the block of a run in `out`, and leaves its file there.
+///
+/// # Errors
+///
+/// A run that goes on with another block than before, or without one.
+pub(super) fn settle(block: Option<&Block>, resumed: Option<&Resumed>, out: &Path) -> Result<()> {
+    let path = out.join(block_file::BLOCK);
+    let before = if path.is_file() { Some(BlockFile::read(out)?) } else { None };
+    if resumed.is_some() && before.as_ref() != block.map(|block| &block.file) {
+        let name = |file: Option<&BlockFile>| file.map_or("no block".to_owned(), |file| format!("block {}", file.id));
+        let (then, now) = (name(before.as_ref()), name(block.map(|block| &block.file)));
+        let problem =
+            if then == now { format!("{then} was split anew meanwhile") } else { format!("now {now} is given") };
+        let problem = format!("holds a training of {then}, and {problem}; go on as before, or name a new folder");
+        return Err(Error::data(out, "", problem));
+    }
+    match block {
+        Some(block) => block.file.write(out),
+        None if before.is_some() => std::fs::remove_file(&path).map_err(Error::write(&path)),
+        None => Ok(()),
+    }
+}
+
+impl Settings {
+    /// Sets what a block decides: seed, steps, number of Gaussians, near plane, learning rates, held-out views.
+    ///
+    /// # Errors
+    ///
+    /// A folder that is not that of a block.
+    pub fn for_block(&mut self, folder: &Path) -> Result<()> {
+        Block::read(folder)?.apply(self);
+        Ok(())
+    }
+}
