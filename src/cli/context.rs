@@ -1,7 +1,8 @@
 //! The context of every command, and how a command opens a model.
 
 use super::args::GlobalArgs;
-use crate::gpu::{Gpu, MessageLog};
+use crate::gpu::{Gpu, GpuOptions, MessageLog};
+use crate::io::PipelineFolder;
 use crate::run::models;
 use crate::scene::Gaussians;
 use crate::{Error, Result};
@@ -23,6 +24,13 @@ impl Context {
     /// Returns a context without devices.
     pub fn new(global: GlobalArgs, json: bool) -> Self {
         Self { global, json, messages: RefCell::default() }
+    }
+
+    /// Returns the options of the device that the user chose.
+    pub fn gpu_options(&self) -> Result<GpuOptions> {
+        let options = GpuOptions::from_env()?;
+        let device = self.global.device.clone().or(options.device);
+        Ok(GpuOptions { device, locks: Some(PipelineFolder::of_locks()), ..options })
     }
 
     /// Collects the messages of the validation layer about a device.
