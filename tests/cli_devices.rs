@@ -124,7 +124,8 @@ fn a_list_of_devices_means_the_first_that_is_free() {
         let mut command = Command::cargo_bin("labelgs").expect("the tool is built");
         command.env("LABELGS_VALIDATION", "off").env("LABELGS_CACHE", place.path("cache"));
         command.env("VK_DRIVER_FILES", &drivers).env("VK_ICD_FILENAMES", &drivers);
-        let output = command.args(["devices", "--device", &format!("{kind},SwiftShader"), "--json"]).output().expect("it runs");
+        let output =
+            command.args(["devices", "--device", &format!("{kind},SwiftShader"), "--json"]).output().expect("it runs");
         let found = json(&text(&output.stdout));
         let picked = found["devices"].as_array().expect("a list").iter().find(|row| row["picked"] == true);
         assert!(picked.is_some_and(|row| row["name"].as_str().is_some_and(|name| name.contains("SwiftShader"))));

@@ -89,6 +89,7 @@ pub(crate) fn render_engine(
     gpu: Arc<Gpu>,
     model: &Gaussians,
     sizes: impl Iterator<Item = (u32, u32)>,
+    options: SchedulerOptions,
 ) -> Result<Engine> {
-    Engine::new(gpu, EngineSize::of_model(model, sizes), SchedulerOptions::default())
+    Engine::new(gpu, EngineSize::of_model(model, sizes), options)
 }
