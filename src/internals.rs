@@ -118,7 +118,7 @@ pub mod io {
         }
     }
     pub mod model {
-        pub use crate::io::model::{read_model, write_model};
+        pub use crate::io::model::{LazyModel, ModelRef, StoredModel, read_model, write_model};
     }
     pub mod ply {
         pub use crate::io::ply::read_points;
@@ -176,6 +176,11 @@ pub mod pass {
     }
     pub mod stage {
         pub use crate::pass::stage::stages;
+    }
+}
+pub mod render {
+    pub mod large {
+        pub use crate::render::large::{Index, Painter, fits};
     }
 }
 pub mod run {

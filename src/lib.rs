@@ -48,7 +48,7 @@
 //!
 //! World units are the data set's. Camera axes are OpenCV's (x right, y down, z forward); pixel (0, 0) has its centre at
 //! (0.5, 0.5). Quaternions are (w, x, y, z). Opacity and scale are stored before their sigmoid and exponential. Labels
-//! are ids from 1 to 65535; 0 is none. Functions return [`Result`] with one [`Error`] type and print nothing; progress and
+//! are ids from 1 to 65535, in models to 2^31 - 1; 0 is none. Functions return [`Result`] with one [`Error`] type and print nothing; progress and
 //! warnings go to `tracing`.
 //!
 //! # Features

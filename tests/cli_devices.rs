@@ -1,6 +1,7 @@
 //! The command line without a device, or with features of the device hidden.
 
 use crate::support::device;
+use crate::support::runs::{Place, succeeded};
 use assert_cmd::Command;
 use serde_json::Value;
 
@@ -84,6 +85,55 @@ fn subgroups_that_do_not_serve_are_emulated() {
         assert_eq!(json(&run(&["devices", "--json"]))["devices"][0]["kernels"]["emulated"], true, "{width} {hidden}");
         run(&["profile", "--synthetic", "--steps", "1"]);
     }
+}
+
+/// Driver files of the usual device and of SwiftShader together, where both are known.
+fn two_drivers() -> Option<String> {
+    let set = |name: &str| std::env::var(name).ok().filter(|file| file != "none");
+    Some(format!("{}:{}", set("VK_DRIVER_FILES")?, set("LABELGS_SWIFTSHADER")?))
+}
+
+/// Processes with lists of devices share these out, also after one is killed.
+#[test]
+fn a_list_of_devices_means_the_first_that_is_free() {
+    let Some(_turn) = device() else { return };
+    let place = Place::new();
+    let devices = |list: &str| place.labelgs(&["devices", "--device", list, "--json"]);
+    assert_eq!(devices("0,").status.code(), Some(0));
+    let long = ["--device", "0,", "--iterations", "100000", "--checkpoint-every", "4"];
+    let mut holder = place.spawned(&place.train("out", &long));
+    while place.checkpoints("out").is_empty() {
+        assert!(holder.try_wait().expect("a child").is_none(), "it trains");
+        std::thread::sleep(std::time::Duration::from_millis(20));
+    }
+    let name = json(&text(&devices("0").stdout))["devices"][0]["name"].as_str().expect("text").to_owned();
+    let kind = name.split(' ').next().expect("a word");
+    for list in ["0,", "0,0", &format!(" 0 , {kind},")] {
+        let output = devices(list);
+        assert_eq!(output.status.code(), Some(4), "{list}");
+        let said = text(&output.stderr);
+        assert!(said.contains("other labelgs processes hold") && said.contains(&format!("0: {name}")), "{said}");
+    }
+    let second = ["--device", "0,", "--iterations", "4"];
+    assert_eq!(place.trained("second", &second).status.code(), Some(4));
+    // Without a list nobody looks at locks; another device is free.
+    assert_eq!(devices("0").status.code(), Some(0));
+    let output = devices("0,no such device");
+    assert!(text(&output.stderr).contains("none matches no such device"), "{}", text(&output.stderr));
+    if let Some(drivers) = two_drivers() {
+        let mut command = Command::cargo_bin("labelgs").expect("the tool is built");
+        command.env("LABELGS_VALIDATION", "off").env("LABELGS_CACHE", place.path("cache"));
+        command.env("VK_DRIVER_FILES", &drivers).env("VK_ICD_FILENAMES", &drivers);
+        let output =
+            command.args(["devices", "--device", &format!("{kind},SwiftShader"), "--json"]).output().expect("it runs");
+        let found = json(&text(&output.stdout));
+        let picked = found["devices"].as_array().expect("a list").iter().find(|row| row["picked"] == true);
+        assert!(picked.is_some_and(|row| row["name"].as_str().is_some_and(|name| name.contains("SwiftShader"))));
+    }
+    holder.kill().expect("a kill");
+    holder.wait().expect("its end");
+    assert_eq!(devices("0,").status.code(), Some(0));
+    succeeded(&place.trained("second", &second));
 }
 
 #[test]

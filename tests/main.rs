@@ -44,6 +44,7 @@ mod invariants; // results do not depend on kernel shape, threads or a resume
 mod io; // formats of scenes, masks, models and checkpoints
 mod known; // failures that users of other trainers reported
 mod labels; // label rules of the paper, on the mirrors
+mod large; // models larger than the memory of the device, ids beyond those of masks
 mod lenses; // formulas of lenses, and a scene through each of them
 mod metrics; // PSNR, SSIM, IoU and boundary scores
 mod mirror_mutants; // a wrong constant in a mirror fails its checks

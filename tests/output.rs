@@ -2,7 +2,6 @@
 
 use exr::prelude::read_first_flat_layer_from_file;
 use labelgs::render::{Format, Pictures, write_pictures};
-use labelgs::scene::LabelMap;
 use std::path::Path;
 
 /// All samples of an EXR, channels by name.
@@ -15,14 +14,14 @@ fn exr(path: &Path) -> Vec<(String, Vec<f32>)> {
 #[test]
 fn each_kind_of_picture_has_its_file() {
     let folder = tempfile::tempdir().expect("folder");
-    let labels = LabelMap { width: 2, height: 1, ids: vec![0, 60_000] };
     let pictures = Pictures {
         width: 2,
         height: 1,
         rgb: Some(&[[0.0, 0.5, 1.5], [-1.0, 0.25, f32::NAN]]),
         depth: Some(&[2.0, 0.0]),
         alpha: Some(&[1.0, 0.5]),
-        labels: Some(&labels),
+        labels: Some(&[0, 60_000]),
+        wide_labels: false,
         top_id: Some(&[16_777_215, -1]),
         top_weight: Some(&[0.75, 0.0]),
     };
@@ -45,6 +44,33 @@ fn each_kind_of_picture_has_its_file() {
     let rgb = exr(&folder.path().join("left_00.rgb.exr"));
     assert_eq!(rgb.iter().map(|channel| channel.0.as_str()).collect::<Vec<_>>(), ["B", "G", "R"]);
     assert_eq!((rgb[0].1[0], rgb[2].1[1]), (1.5, -1.0), "an EXR is not clamped");
+}
+
+/// 32-bit ids are exact in an EXR, as rows beyond the whole numbers of floats are; a 16-bit PNG is refused.
+#[test]
+fn large_ids_and_rows_are_whole_numbers_of_32_bits() {
+    let folder = tempfile::tempdir().expect("folder");
+    let (labels, rows) = ([2_147_483_647, 16_777_217, 0], [16_777_217, -1, 2_147_483_647]);
+    let pictures = Pictures {
+        width: 3,
+        height: 1,
+        labels: Some(&labels),
+        wide_labels: true,
+        top_id: Some(&rows),
+        ..Pictures::default()
+    };
+    let error = write_pictures(folder.path(), "a", &pictures, Format::Png).expect_err("16 bits").to_string();
+    assert!(error.contains("above 65535") && error.contains("exr"), "{error}");
+    write_pictures(folder.path(), "a", &pictures, Format::Exr).expect("written");
+    let words = |name: &str| {
+        let image = read_first_flat_layer_from_file(folder.path().join(name)).expect("EXR");
+        match &image.layer_data.channel_data.list[0].sample_data {
+            exr::prelude::FlatSamples::U32(words) => words.clone(),
+            other => panic!("{name}: {other:?}"),
+        }
+    };
+    assert_eq!(words("a.labels.exr"), labels);
+    assert_eq!(words("a.top-id.exr"), [16_777_217, u32::MAX, 2_147_483_647]);
 }
 
 #[test]

@@ -16,8 +16,9 @@ pub struct GlobalArgs {
     /// Print more messages; give it twice for all of them. RUST_LOG overrides it.
     #[arg(short, long, global = true, help_heading = "Output", action = clap::ArgAction::Count)]
     pub verbose: u8,
-    /// Vulkan device: its number or UUID from `labelgs devices`, or a part of its name. Default: LABELGS_DEVICE if set,
-    /// else the fastest kind of device.
+    /// Vulkan device: its number or UUID from `labelgs devices`, GPU-UUID from `nvidia-smi -L`, or a part of its name. A
+    /// list of these, with commas between, means the first that no other labelgs with a list uses. Default: LABELGS_DEVICE
+    /// if set, else the fastest kind of device.
     #[arg(long, value_name = "DEVICE", global = true, help_heading = "Device")]
     pub device: Option<String>,
 }

@@ -2,14 +2,15 @@
 
 use super::args::{ReadArgs, SceneArgs};
 use super::context::Context;
+use super::drawer::Drawer;
 use super::labelled::TableArg;
 use super::scene::{find_view, near_plane, open_gpu, open_scene};
 use super::values::{At, BoxAt, Picks, at, box_at, near, picks};
 use crate::edit::catalogue::{Catalogue, Pick};
 use crate::edit::prompt::{Place, Prompt, choose};
-use crate::engine::Engine;
-use crate::render::label_map;
-use crate::scene::{Camera, Gaussians, LabelMap};
+use crate::io::model::ModelRef;
+use crate::scene::{Camera, LabelMap};
+use crate::scheduler::SchedulerOptions;
 use crate::{Error, Result};
 use clap::Args;
 use std::collections::{BTreeMap, BTreeSet};
@@ -73,11 +74,11 @@ pub struct ChooseArgs {
 }
 
 /// A model and the scene of its views.
-pub struct Asked<'a> {
+pub(crate) struct Asked<'a> {
     /// Path of the model.
     pub path: &'a Path,
     /// The model.
-    pub model: &'a Gaussians,
+    pub model: ModelRef<'a>,
     /// Its labels.
     pub known: &'a Catalogue,
     /// Scene of the views.
@@ -86,13 +87,22 @@ pub struct Asked<'a> {
     pub max_resolution: Option<u32>,
     /// Tolerance for the scene.
     pub read: ReadArgs,
+    /// Memory for label maps.
+    pub memory: SchedulerOptions,
 }
 
 impl ChooseArgs {
     /// Returns the chosen labels.
-    pub fn labels(&self, path: &Path, model: &Gaussians, known: &Catalogue, to: &Context) -> Result<BTreeSet<u32>> {
-        let (scene, max_resolution) = (self.scene.as_deref(), self.max_resolution);
-        let asked = Asked { path, model, known, scene, max_resolution, read: self.read };
+    pub(crate) fn labels<'a>(
+        &'a self,
+        path: &'a Path,
+        model: impl Into<ModelRef<'a>>,
+        known: &'a Catalogue,
+        to: &Context,
+    ) -> Result<BTreeSet<u32>> {
+        let (scene, max_resolution, model) = (self.scene.as_deref(), self.max_resolution, model.into());
+        let memory = SchedulerOptions::default();
+        let asked = Asked { path, model, known, scene, max_resolution, read: self.read, memory };
         self.prompts.labels("--labels", self.labels.as_ref(), &asked, to)
     }
 }
@@ -108,7 +118,7 @@ impl PromptArgs {
     }
 
     /// Returns the chosen labels and those of `listed`, the value of the flag `argument`.
-    pub fn labels(
+    pub(crate) fn labels(
         &self,
         argument: &str,
         listed: Option<&Picks>,
@@ -160,7 +170,7 @@ impl PromptArgs {
         let Some(scene) = asked.scene else {
             return Err(Error::usage(prompts[0].argument, "needs the scene of the view: --scene SCENE"));
         };
-        if asked.model.labels.is_none() {
+        if !asked.model.has_labels() {
             return Err(Error::data(asked.path, "", "the model has no labels; train it with --masks"));
         }
         let reading = SceneArgs { max_resolution: asked.max_resolution, read: asked.read, ..SceneArgs::default() };
@@ -173,8 +183,8 @@ impl PromptArgs {
         }
         let near = near_plane(asked.path, self.near)?;
         let sizes = cameras.values().map(|camera| (camera.width, camera.height));
-        let mut engine = Engine::of_model(open_gpu(context)?, asked.model, sizes)?;
-        let mut map = |(key, camera): (Key, Camera)| Ok((key, label_map(&mut engine, &camera, near)?));
+        let mut drawer = Drawer::new(open_gpu(context)?, asked.model, sizes, asked.memory)?;
+        let mut map = |(key, camera): (Key, Camera)| Ok((key, drawer.label_map(&camera, near)?));
         cameras.into_iter().map(&mut map).collect()
     }
 }

@@ -16,9 +16,9 @@ use serde_json::{Value, json};
 
 /// Returns the report. `error` ended the checks. What cannot be measured stands in the report as an error of its own.
 pub(super) fn report(checks: &[Check], error: Option<&Error>, context: &Context) -> Result<Value> {
-    let mut options = GpuOptions::from_env()?;
-    options.device = context.global.device.clone().or(options.device);
+    let options = context.gpu_options()?;
     let (found, picked) = gpu::devices(&options)?;
+    let picked = picked.ok();
     let listed = found.iter().map(|device| {
         let mut row = devices::to_json(device, picked);
         // It tells two cards of the same kind apart.

@@ -4,7 +4,7 @@ use super::args::JsonFlag;
 use super::context::Context;
 use super::kernels;
 use super::stdout;
-use crate::gpu::{self, Capabilities, GpuOptions, Need};
+use crate::gpu::{self, Capabilities, Need};
 use crate::pass::KernelShape;
 use crate::{Error, Result};
 use clap::Args;
@@ -23,29 +23,27 @@ pub struct DevicesArgs {
 
 /// Prints the devices. Fails if none is usable.
 pub(crate) fn run(args: &DevicesArgs, context: &Context) -> Result<()> {
-    let mut options = GpuOptions::from_env()?;
-    options.device = context.global.device.clone().or(options.device);
+    let options = context.gpu_options()?;
     if args.kernels {
         return kernels::run(options, context.json || args.json.json, context);
     }
-    let (devices, picked) = gpu::devices(&options)?;
+    let (devices, chosen) = gpu::devices(&options)?;
+    let picked = chosen.as_ref().ok().copied();
     if context.json || args.json.json {
         let rows: Vec<Value> = devices.iter().map(|device| to_json(device, picked)).collect();
         stdout::print_json(&json!({ "schema_version": 1, "devices": rows }))?;
     } else {
         devices.iter().try_for_each(|device| stdout::print(&to_text(device, picked)))?;
     }
-    match (picked, devices.is_empty()) {
-        (Some(_), _) => Ok(()),
-        (None, true) => Err(Error::NoDevice(
+    match (chosen, devices.is_empty()) {
+        (Ok(_), _) => Ok(()),
+        (Err(_), true) => Err(Error::NoDevice(
             "the Vulkan loader knows no device; install a Vulkan 1.2 driver, such as Mesa's".into(),
         )),
-        (None, false) => Err(Error::NoDevice(match &options.device {
-            Some(wanted) => {
-                format!("`{wanted}` names none of the {} listed that meets the requirements", devices.len())
-            }
-            None => "none of those listed meets the requirements; lines marked MISSING say why".into(),
-        })),
+        (Err(error), false) if options.device.is_some() => Err(error),
+        (Err(_), false) => {
+            Err(Error::NoDevice("none of those listed meets the requirements; lines marked MISSING say why".into()))
+        }
     }
 }
 

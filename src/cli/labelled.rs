@@ -6,13 +6,15 @@ use super::output::WriteArgs;
 use super::stdout;
 use super::values::share;
 use crate::edit::catalogue::Catalogue;
-use crate::edit::select::{MIN_LABEL_CONFIDENCE, extract};
+use crate::edit::select::{MIN_LABEL_CONFIDENCE, Tally, extract};
 use crate::io::label_table::LabelTable;
-use crate::io::model::export_model;
+use crate::io::model::{LazyModel, ModelRef, export_model};
 use crate::run::models;
-use crate::scene::Gaussians;
+use crate::scene::gaussians::opacity_of;
+use crate::scene::{Gaussians, UNLABELLED};
 use crate::{Error, Result};
 use clap::Args;
+use glam::DVec3;
 use serde_json::json;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -106,12 +108,30 @@ pub struct MinConfidenceArg {
 impl MinConfidenceArg {
     /// Returns the Gaussians of some labels with enough confidence. Fails if there is none.
     pub fn extract(&self, model: &Gaussians, labels: &[u32]) -> Result<Gaussians> {
-        let part = extract(model, labels, self.min_confidence)?;
-        if part.is_empty() {
-            let problem = format!("no Gaussian of the labels has a confidence of {}; lower it", self.min_confidence);
-            return Err(Error::usage("--min-confidence", problem));
-        }
-        Ok(part)
+        self.check(extract(model, labels, self.min_confidence)?)
+    }
+
+    /// The same from a model that may stay in its file; the labels occur in it.
+    pub(crate) fn extract_seen(&self, path: &Path, model: ModelRef, labels: &BTreeSet<u32>) -> Result<Gaussians> {
+        let mut numbers = Vec::new();
+        models::scan(path, model, |number, row| {
+            if labels.contains(&row.label.unwrap_or(UNLABELLED))
+                && row.confidence.is_none_or(|share| share >= self.min_confidence)
+            {
+                numbers.push(number);
+            }
+        })?;
+        self.check(model.rows(numbers.into_iter(), DVec3::ZERO)?)
+    }
+
+    fn check(&self, part: Gaussians) -> Result<Gaussians> {
+        if part.is_empty() { Err(self.nothing()) } else { Ok(part) }
+    }
+
+    /// The error of a confidence that no Gaussian of the labels has.
+    pub(crate) fn nothing(&self) -> Error {
+        let problem = format!("no Gaussian of the labels has a confidence of {}; lower it", self.min_confidence);
+        Error::usage("--min-confidence", problem)
     }
 }
 
@@ -120,6 +140,28 @@ pub(crate) fn open(model: &Path, table: &TableArg) -> Result<(Gaussians, Catalog
     let read = models::open(model)?;
     let known = Catalogue::new(&read.gaussians, table.open(model, read.names)?);
     Ok((read.gaussians, known))
+}
+
+/// A model that may stay in its file, with its labels.
+pub(crate) struct Seen {
+    /// The model.
+    pub model: LazyModel,
+    /// The Gaussians of each label.
+    pub tally: Tally,
+    /// The labels.
+    pub known: Catalogue,
+}
+
+/// Looks through a model for its labels.
+pub(crate) fn look(path: &Path, table: &TableArg) -> Result<Seen> {
+    let model = models::open_lazily(path)?;
+    let (view, mut tally) = (model.view(), Tally::default());
+    models::scan(path, view, |_, row| {
+        let place = view.origin() + DVec3::from_array(row.position);
+        tally.add(row.label.unwrap_or(UNLABELLED), place, opacity_of(row.opacity));
+    })?;
+    let known = Catalogue { gaussians: tally.counts(), table: table.open(path, model.names().cloned())? };
+    Ok(Seen { model, tally, known })
 }
 
 /// The result of an edit.

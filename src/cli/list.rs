@@ -2,10 +2,10 @@
 
 use super::args::JsonFlag;
 use super::context::Context;
-use super::labelled::{TableArg, open};
+use super::labelled::{Seen, TableArg, look};
 use super::stdout;
 use crate::Result;
-use crate::edit::select::{LabelSummary, summarise};
+use crate::edit::select::LabelSummary;
 use clap::Args;
 use serde::Serialize;
 use serde_json::json;
@@ -35,15 +35,15 @@ struct Row<'a> {
 
 /// Prints a row per label.
 pub(crate) fn run(args: &ListArgs, context: &Context) -> Result<()> {
-    let (model, known) = open(&args.model, &args.table)?;
-    let rows: Vec<Row> =
-        summarise(&model).into_iter().map(|summary| Row { name: known.name(summary.label), summary }).collect();
+    let Seen { model, tally, known } = look(&args.model, &args.table)?;
+    let row = |summary: LabelSummary| Row { name: known.name(summary.label), summary };
+    let rows: Vec<Row> = tally.summaries().into_iter().map(row).collect();
     if context.json || args.json.json {
         return stdout::print_json(&json!({
             "schema_version": 1,
             "model": args.model.display().to_string(),
-            "gaussians": model.len(),
-            "sh_degree": model.sh_degree,
+            "gaussians": known.gaussians.values().sum::<u64>(),
+            "sh_degree": model.view().sh_degree(),
             "labels": rows,
         }));
     }

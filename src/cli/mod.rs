@@ -12,6 +12,7 @@ pub(crate) mod convert;
 pub(crate) mod densify;
 mod device_report;
 pub(crate) mod devices;
+mod drawer;
 pub(crate) mod eval;
 pub(crate) mod interrupt;
 mod kernels;

@@ -6,7 +6,7 @@ use super::devices::{shape_json, shape_of, shape_text};
 use super::values::{Size, bytes, count, size};
 use super::{stdout, wording};
 use crate::engine::{Engine, EngineSize, LabelSize, capacity, card};
-use crate::gpu::{self, GpuOptions};
+use crate::gpu;
 use crate::pass::{KernelShape, Variant, training_step};
 use crate::scheduler::plan::{
     Capacity, Grid, Limits, MemoryReport, Page, PassList, Plan, PlanOptions, TABLE, Touch, Work,
@@ -97,18 +97,14 @@ fn subject(args: &PlanArgs, context: &Context) -> Result<Subject> {
 
 /// Returns the name, kernels and limits of the device, or those of a software device if there is none.
 fn device(context: &Context) -> Result<(Option<String>, KernelShape, Limits)> {
-    let mut options = GpuOptions::from_env()?;
-    options.device = context.global.device.clone().or(options.device);
+    let options = context.gpu_options()?;
     match gpu::devices(&options) {
-        Ok((devices, Some(picked))) => {
+        Ok((devices, Ok(picked))) => {
             let device = &devices[picked];
             Ok((Some(device.name.clone()), shape_of(device), device.limits.plan))
         }
-        Ok((_, None)) if options.device.is_some() => {
-            Err(Error::NoDevice("the chosen device is not usable; `labelgs devices` says why".into()))
-        }
-        Err(error) if options.device.is_some() => Err(error),
-        Ok((_, None)) | Err(Error::NoDevice(_)) => {
+        Ok((_, Err(error))) | Err(error) if options.device.is_some() => Err(error),
+        Ok((_, Err(_))) | Err(Error::NoDevice(_)) => {
             tracing::warn!("no usable Vulkan device; the plan is for a software device with modest limits");
             Ok((None, KernelShape::new(8, true), Limits::default()))
         }

@@ -3,16 +3,20 @@
 use super::args::{JsonFlag, SceneArgs};
 use super::choose::{Asked, PromptArgs};
 use super::context::{Context, open_model};
+use super::drawer::{Drawer, MemoryArg, largest};
 use super::labelled::MinConfidenceArg;
 use super::scene::{near_plane, open_gpu, open_scene, pick_views};
 use super::values::{Picks, colour, picks};
 use super::{labelled, stdout};
-use crate::edit::select::remove;
-use crate::engine::Engine;
+use crate::edit::catalogue::Catalogue;
+use crate::edit::select::{nothing_left, remove};
 use crate::io::camera_json::read_camera;
+use crate::io::model::ModelRef;
+use crate::render::large::{Index, fits};
 use crate::render::pictures::{Format, Pictures, What, write_pictures};
-use crate::render::{Parts, RenderOptions, Rendered, render};
-use crate::scene::{Camera, Gaussians, stems};
+use crate::render::{Parts, RenderOptions, Rendered};
+use crate::run::models;
+use crate::scene::{Camera, Gaussians, LABEL_MAX, stems};
 use crate::{Error, Result};
 use clap::Args;
 use serde_json::json;
@@ -58,6 +62,9 @@ pub struct RenderArgs {
     /// Colour behind the scene: black, white, or R,G,B from 0 to 1.
     #[arg(long, value_name = "COLOUR", value_parser = colour, default_value = "black", help_heading = "Rendering")]
     pub background: [f32; 3],
+    /// Memory.
+    #[command(flatten)]
+    pub memory: MemoryArg,
     /// How the scene is read.
     #[command(flatten)]
     pub reading: SceneArgs,
@@ -72,11 +79,20 @@ pub(crate) fn run(args: &RenderArgs, context: &Context) -> Result<()> {
     if args.format == Format::Png && exr_only.is_some() {
         return Err(Error::usage("--what", "top-id and top-weight are 32-bit values; use --format exr"));
     }
-    let shown = shown(args, context)?;
+    let source = models::open_lazily(&args.model)?;
     let near = near_plane(&args.model, args.prompts.near)?;
     let cameras = cameras(args)?;
-    let gpu = open_gpu(context)?;
-    let mut engine = Engine::of_model(gpu, &shown, cameras.iter().map(|(_, camera)| (camera.width, camera.height)))?;
+    let sizes = || cameras.iter().map(|(_, camera)| (camera.width, camera.height));
+    let (gpu, options) = (open_gpu(context)?, args.memory.options());
+    let shown;
+    let mut drawer = if fits(&gpu, source.view(), largest(sizes()), options)? {
+        shown = self::shown(args, context)?;
+        Drawer::new(gpu, (&shown).into(), sizes(), options)?
+    } else {
+        let index = index(args, source.view(), context)?;
+        Drawer::parts(gpu, source.view(), index, options)
+    };
+    let wide = wide_labels(args, drawer.largest_label())?;
     let asked = |of: &[What]| args.what.iter().any(|what| of.contains(what));
     let parts = Parts {
         depth: asked(&[What::Depth]),
@@ -86,8 +102,8 @@ pub(crate) fn run(args: &RenderArgs, context: &Context) -> Result<()> {
     let options = RenderOptions { background: args.background, ..RenderOptions::new(near, parts) };
     let mut files = Vec::new();
     for (stem, camera) in &cameras {
-        let rendered = render(&mut engine, camera, &options)?;
-        files.extend(write(args, stem, &rendered)?);
+        let rendered = drawer.render(camera, &options)?;
+        files.extend(write(args, stem, &rendered, wide)?);
     }
     let files: Vec<String> = files.iter().map(|file| file.display().to_string()).collect();
     if context.json || args.json.json {
@@ -96,30 +112,68 @@ pub(crate) fn run(args: &RenderArgs, context: &Context) -> Result<()> {
     files.iter().try_for_each(|file| stdout::print(&format!("{file}\n")))
 }
 
+/// Returns true if ids of label maps need 32 bits; fails if a PNG was asked for, which has 16.
+fn wide_labels(args: &RenderArgs, largest: Option<u32>) -> Result<bool> {
+    let Some(label) = largest.filter(|&label| label > LABEL_MAX) else { return Ok(false) };
+    if args.format == Format::Png && args.what.contains(&What::Labels) {
+        let problem = format!(
+            "the model has label {label}, and a 16-bit PNG has no place for ids above {LABEL_MAX}; use --format exr, which \
+             writes 32-bit ids, or give the labels smaller ids with `labelgs relabel`"
+        );
+        return Err(Error::usage("--format", problem));
+    }
+    Ok(true)
+}
+
 /// Returns the visible part of the model.
 fn shown(args: &RenderArgs, context: &Context) -> Result<Gaussians> {
-    let (flag, picks) = match (&args.only, &args.without) {
-        (Some(picks), _) => ("--only", picks),
-        (None, Some(picks)) => ("--without", picks),
-        (None, None) if args.prompts.is_empty() => return open_model(&args.model),
+    let Some((flag, picks)) = chosen(args)? else { return open_model(&args.model) };
+    let (model, known) = labelled::open(&args.model, &args.prompts.table)?;
+    let labels = args.prompts.labels(flag, picks, &asked(args, (&model).into(), &known), context)?;
+    let labels: Vec<u32> = labels.into_iter().collect();
+    if args.only.is_some() { args.sure.extract(&model, &labels) } else { remove(&model, &labels) }
+}
+
+/// Returns the visible part of a model that is not read.
+fn index(args: &RenderArgs, model: ModelRef, context: &Context) -> Result<Index> {
+    let least = args.sure.min_confidence;
+    let Some((flag, picks)) = chosen(args)? else {
+        let (index, notes) = Index::of(model, least, |_, _| true)?;
+        models::log_notes(&args.model, &notes);
+        return Ok(index);
+    };
+    let known = labelled::look(&args.model, &args.prompts.table)?.known;
+    let labels = args.prompts.labels(flag, picks, &asked(args, model, &known), context)?;
+    let is_sure = |share: Option<f32>| share.is_none_or(|share| share >= least);
+    let keep = |label: u32, share: Option<f32>| match args.only {
+        Some(_) => labels.contains(&label) && is_sure(share),
+        None => !labels.contains(&label),
+    };
+    let index = Index::of(model, least, keep)?.0;
+    match (index.is_empty(), &args.only) {
+        (true, Some(_)) => Err(args.sure.nothing()),
+        (true, None) => Err(nothing_left()),
+        _ => Ok(index),
+    }
+}
+
+/// Returns the flag of a choice of labels, and the labels in it.
+fn chosen(args: &RenderArgs) -> Result<Option<(&'static str, Option<&Picks>)>> {
+    match (&args.only, &args.without) {
+        (Some(picks), _) => Ok(Some(("--only", picks.as_ref()))),
+        (None, Some(picks)) => Ok(Some(("--without", picks.as_ref()))),
+        (None, None) if args.prompts.is_empty() => Ok(None),
         (None, None) => {
             let problem = "or --without is needed: it says what to do with the labels that --name, --at, --box or \
                            --mask choose";
-            return Err(Error::usage("--only", problem));
+            Err(Error::usage("--only", problem))
         }
-    };
-    let (model, known) = labelled::open(&args.model, &args.prompts.table)?;
-    let asked = Asked {
-        path: &args.model,
-        model: &model,
-        known: &known,
-        scene: args.scene.as_deref(),
-        max_resolution: args.reading.max_resolution,
-        read: args.reading.read,
-    };
-    let labels = args.prompts.labels(flag, picks.as_ref(), &asked, context)?;
-    let labels: Vec<u32> = labels.into_iter().collect();
-    if args.only.is_some() { args.sure.extract(&model, &labels) } else { remove(&model, &labels) }
+    }
+}
+
+fn asked<'a>(args: &'a RenderArgs, model: ModelRef<'a>, known: &'a Catalogue) -> Asked<'a> {
+    let (max_resolution, read, memory) = (args.reading.max_resolution, args.reading.read, args.memory.options());
+    Asked { path: &args.model, model, known, scene: args.scene.as_deref(), max_resolution, read, memory }
 }
 
 fn cameras(args: &RenderArgs) -> Result<Vec<(String, Camera)>> {
@@ -133,16 +187,16 @@ fn cameras(args: &RenderArgs) -> Result<Vec<(String, Camera)>> {
     Ok(stems(&views).into_iter().zip(&views).map(|(stem, view)| (stem, view.camera.clone())).collect())
 }
 
-fn write(args: &RenderArgs, stem: &str, rendered: &Rendered) -> Result<Vec<PathBuf>> {
+fn write(args: &RenderArgs, stem: &str, rendered: &Rendered, wide: bool) -> Result<Vec<PathBuf>> {
     let asked = |what| args.what.contains(&what);
-    let map = if asked(What::Labels) { Some(rendered.label_map()?) } else { None };
     let pictures = Pictures {
         width: rendered.width,
         height: rendered.height,
         rgb: asked(What::Rgb).then_some(&rendered.rgb),
         depth: asked(What::Depth).then_some(&rendered.depth),
         alpha: asked(What::Alpha).then_some(&rendered.alpha),
-        labels: map.as_ref(),
+        labels: asked(What::Labels).then_some(&rendered.labels),
+        wide_labels: wide,
         top_id: asked(What::TopId).then_some(&rendered.top_id),
         top_weight: asked(What::TopWeight).then_some(&rendered.top_weight),
     };

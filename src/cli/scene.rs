@@ -25,12 +25,8 @@ pub fn near_plane(model: &Path, typed: Option<f32>) -> Result<f32> {
 
 /// Opens the chosen device and logs its name.
 pub(crate) fn open_gpu(context: &Context) -> Result<Arc<Gpu>> {
-    let mut options = GpuOptions::from_env()?;
-    if let Some(device) = &context.global.device {
-        options.device = Some(device.clone());
-    }
-    options.pipelines = PipelineFolder::of_user().map(|folder| Arc::new(folder) as Arc<dyn PipelineStore>);
-    let gpu = Gpu::new(&options)?;
+    let pipelines = PipelineFolder::of_user().map(|folder| Arc::new(folder) as Arc<dyn PipelineStore>);
+    let gpu = Gpu::new(&GpuOptions { pipelines, ..context.gpu_options()? })?;
     context.listen(&gpu);
     let found = gpu.capabilities();
     let cpu = if gpu.is_cpu() { ", a processor: expect it to be slower than a graphics card" } else { "" };
@@ -93,6 +89,7 @@ pub(crate) fn render_engine(
     gpu: Arc<Gpu>,
     model: &Gaussians,
     sizes: impl Iterator<Item = (u32, u32)>,
+    options: SchedulerOptions,
 ) -> Result<Engine> {
-    Engine::new(gpu, EngineSize::of_model(model, sizes), SchedulerOptions::default())
+    Engine::new(gpu, EngineSize::of_model(model, sizes), options)
 }

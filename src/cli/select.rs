@@ -3,7 +3,7 @@
 use super::args::{JsonFlag, SceneArgs};
 use super::choose::ChooseArgs;
 use super::context::Context;
-use super::labelled::{Edited, MinConfidenceArg, Target, open, wants_json};
+use super::labelled::{Edited, MinConfidenceArg, Seen, Target, look, open, wants_json};
 use super::output::WriteArgs;
 use super::scene::{near_plane, open_gpu, open_scene};
 use super::values::{distance, share};
@@ -99,14 +99,14 @@ impl GroupingArgs {
 /// Writes the Gaussians of the chosen labels.
 pub(crate) fn run_extract(args: &ExtractArgs, context: &Context) -> Result<()> {
     let select = &args.select;
-    let (model, known) = open(&select.model, &select.choice.prompts.table)?;
-    let labels = select.choice.labels(&select.model, &model, &known, context)?;
-    let whole = args.sure.extract(&model, &listed(&labels))?;
+    let Seen { model, known, .. } = look(&select.model, &select.choice.prompts.table)?;
+    let labels = select.choice.labels(&select.model, model.view(), &known, context)?;
+    let whole = args.sure.extract_seen(&select.model, model.view(), &labels)?;
     let part = if args.drop_specks { without_specks(&whole, args.grouping.grouping())? } else { whole.clone() };
     let edited = Edited {
         model: &part,
         table: known.table.as_ref().map(|table| keep(table, |id| labels.contains(&id))),
-        of: model.len(),
+        of: known.gaussians.values().sum::<u64>() as usize,
         labels: &labels,
     };
     edited.finish(&select.target(context), json!({ "specks": whole.len() - part.len() }))

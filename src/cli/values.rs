@@ -2,7 +2,7 @@
 
 use crate::edit::catalogue::Pick;
 use crate::options::parse;
-use crate::scene::labels::LABEL_MAX;
+use crate::scene::MODEL_LABEL_MAX;
 use glam::DVec3;
 use std::collections::BTreeMap;
 
@@ -60,8 +60,10 @@ pub(crate) fn picks(text: &str) -> Result<Picks, String> {
 
 /// Parses a label; 0 means no label.
 pub(crate) fn label(text: &str) -> Result<u32, String> {
-    let id = text.trim().parse().ok().filter(|&id| id <= LABEL_MAX);
-    id.ok_or_else(|| format!("`{text}` is not a label; labels are whole numbers from 0 to {LABEL_MAX}, such as 1,4-6"))
+    let id = text.trim().parse().ok().filter(|&id| id <= MODEL_LABEL_MAX);
+    id.ok_or_else(|| {
+        format!("`{text}` is not a label; labels are whole numbers from 0 to {MODEL_LABEL_MAX}, such as 1,4-6")
+    })
 }
 
 /// Parses old and new labels such as `3=7,4=0`.

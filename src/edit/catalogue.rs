@@ -43,7 +43,10 @@ impl Catalogue {
         let mut ids = BTreeSet::new();
         for pick in picks {
             match pick {
-                Pick::Ids(first, last) => ids.extend(*first..=*last),
+                // Of a long range, as many ids as there are labels, and those that a message lists.
+                Pick::Ids(first, last) => {
+                    ids.extend((*first..=*last).take(self.gaussians.len() + LISTED_MAX + 1));
+                }
                 Pick::Name(name) => {
                     let found = self.table.as_ref().and_then(|table| table.by_name(name));
                     let unknown = || Error::usage(argument, format!("no label is named {name}; {}", self.there_is()));

@@ -1,8 +1,7 @@
 //! Changes of the colours or labels of a model.
 
 use super::components::{Grouping, components};
-use crate::scene::labels::LABEL_MAX;
-use crate::scene::{Gaussians, UNLABELLED};
+use crate::scene::{Gaussians, LABEL_MAX, MODEL_LABEL_MAX, UNLABELLED};
 use crate::shaders::constants::exact::SH_C0;
 use crate::{Error, Result};
 use std::collections::{BTreeMap, BTreeSet};
@@ -71,8 +70,9 @@ pub fn split_components(
     let old = new.clone();
     let used: BTreeSet<u32> = taken.iter().copied().chain(old.iter().copied()).collect();
     let last = used.last().copied().unwrap_or(UNLABELLED);
-    // Ids after the last one, then gaps.
-    let mut free = (last + 1..=LABEL_MAX).chain((1..last).filter(|id| !used.contains(id)));
+    // Ids after the last one, then gaps. Ids of masks are kept to, if the model does.
+    let most = if last > LABEL_MAX { MODEL_LABEL_MAX } else { LABEL_MAX };
+    let mut free = (last + 1..=most).chain((1..last).filter(|id| !used.contains(id)));
     let (mut ids, mut small) = (BTreeMap::new(), BTreeSet::new());
     for &label in labels {
         let found = components(model, &rows_of(&old, label), how)?;

@@ -28,37 +28,58 @@ pub struct LabelSummary {
     pub centre: [f64; 3],
 }
 
-/// Returns one row per label, sorted, 0 (unlabelled) included. Without labels all Gaussians have label 0.
-pub fn summarise(model: &Gaussians) -> Vec<LabelSummary> {
-    struct Sum {
-        count: u64,
-        mass: f64,
-        min: DVec3,
-        max: DVec3,
-        weighted: DVec3,
-    }
-    let mut sums: BTreeMap<u32, Sum> = BTreeMap::new();
-    for row in 0..model.len() {
+/// The Gaussians of a label so far.
+#[derive(Clone, Debug)]
+struct Sum {
+    count: u64,
+    mass: f64,
+    min: DVec3,
+    max: DVec3,
+    weighted: DVec3,
+}
+
+/// Adds up the Gaussians of each label, one after the other.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Tally(BTreeMap<u32, Sum>);
+
+impl Tally {
+    /// Adds a Gaussian: its label, its place in the world, and its opacity after the sigmoid.
+    pub(crate) fn add(&mut self, label: u32, mean: DVec3, opacity: f64) {
         let start = Sum { count: 0, mass: 0.0, min: DVec3::INFINITY, max: DVec3::NEG_INFINITY, weighted: DVec3::ZERO };
-        let sum = sums.entry(model.label(row)).or_insert(start);
-        let mean = model.world(row);
+        let sum = self.0.entry(label).or_insert(start);
         // Never 0, so that invisible Gaussians have a centre too.
-        let opacity = model.opacity(row).max(1e-200);
+        let opacity = opacity.max(1e-200);
         sum.count += 1;
         sum.mass += opacity;
         sum.min = sum.min.min(mean);
         sum.max = sum.max.max(mean);
         sum.weighted += mean * opacity;
     }
-    let row = |(label, sum): (u32, Sum)| LabelSummary {
-        label,
-        count: sum.count,
-        opacity_mass: sum.mass,
-        min: sum.min.to_array(),
-        max: sum.max.to_array(),
-        centre: (sum.weighted / sum.mass).to_array(),
-    };
-    sums.into_iter().map(row).collect()
+
+    /// Returns the number of Gaussians per label.
+    pub(crate) fn counts(&self) -> BTreeMap<u32, u64> {
+        self.0.iter().map(|(&label, sum)| (label, sum.count)).collect()
+    }
+
+    /// Returns one row per label, sorted.
+    pub(crate) fn summaries(&self) -> Vec<LabelSummary> {
+        let row = |(&label, sum): (&u32, &Sum)| LabelSummary {
+            label,
+            count: sum.count,
+            opacity_mass: sum.mass,
+            min: sum.min.to_array(),
+            max: sum.max.to_array(),
+            centre: (sum.weighted / sum.mass).to_array(),
+        };
+        self.0.iter().map(row).collect()
+    }
+}
+
+/// Returns one row per label, sorted, 0 (unlabelled) included. Without labels all Gaussians have label 0.
+pub fn summarise(model: &Gaussians) -> Vec<LabelSummary> {
+    let mut tally = Tally::default();
+    (0..model.len()).for_each(|row| tally.add(model.label(row), model.world(row), model.opacity(row)));
+    tally.summaries()
 }
 
 /// Returns the mean confidence of each label that occurs; nothing without confidences.
@@ -84,9 +105,14 @@ pub fn remove(model: &Gaussians, labels: &[u32]) -> Result<Gaussians> {
     let wanted = check_labels(model, labels)?;
     let rest = model.filtered(|row| !wanted.contains(&model.label(row)));
     if rest.is_empty() {
-        return Err(Error::usage("labels", "names every label of the model; no Gaussian would be left"));
+        return Err(nothing_left());
     }
     Ok(rest)
+}
+
+/// The error of a choice that leaves nothing.
+pub(crate) fn nothing_left() -> Error {
+    Error::usage("labels", "names every label of the model; no Gaussian would be left")
 }
 
 fn check_labels(model: &Gaussians, labels: &[u32]) -> Result<BTreeSet<u32>> {

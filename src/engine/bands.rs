@@ -1,6 +1,7 @@
 //! Pictures with more tiles than a device can walk, in bands of rows.
 
 use super::Engine;
+use super::uniforms::with_slopes_of;
 use crate::scene::Camera;
 use crate::shaders::structs::StepUniforms;
 
@@ -38,8 +39,7 @@ impl Engine {
         Band::all(camera.height, self.size.band(&self.shape).unwrap_or(camera.height))
     }
 
-    /// Returns the camera's part of the uniforms for a band. Slopes keep the limits of the whole picture, so that bands fit
-    /// together.
+    /// Returns the camera's part of the uniforms for a band. Slopes keep the limits of the whole picture.
     pub(crate) fn band_uniforms(&self, camera: &Camera, band: Band, near: f32, background: [f32; 3]) -> StepUniforms {
         self.part_uniforms(&band.camera(camera), Some(camera), near, background)
     }
@@ -54,8 +54,7 @@ impl Engine {
     ) -> StepUniforms {
         let part = self.view_uniforms(camera, near, background);
         let Some(whole) = whole else { return part };
-        let StepUniforms { clamp_y_min, clamp_y_max, .. } = self.view_uniforms(whole, near, background);
-        StepUniforms { clamp_y_min, clamp_y_max, ..part }
+        with_slopes_of(part, &self.view_uniforms(whole, near, background))
     }
 }
 

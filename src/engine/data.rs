@@ -1,6 +1,6 @@
 //! Typed access to the buffers on the device. No list may be in flight.
 
-use super::Engine;
+use super::{Engine, model};
 use crate::error::Result;
 use crate::pass::SHARED_PLANES;
 use crate::scheduler::Scheduler;
@@ -21,12 +21,15 @@ impl Engine {
 
     /// Labels of the Gaussians; only for an engine with labels.
     pub fn labels(&mut self) -> Result<Vec<u32>> {
-        self.sched.download(Buf::LABELS, 0, 0, self.gaussian_count as usize)
+        let mut labels = self.sched.download(Buf::LABELS, 0, 0, self.gaussian_count as usize)?;
+        self.ids.unpack(&mut labels);
+        Ok(labels)
     }
 
     /// Replaces the labels.
     pub fn set_labels(&mut self, labels: &[u32]) -> Result<()> {
-        self.sched.upload(Buf::LABELS, 0, 0, labels)
+        self.ids = model::upload_labels(&mut self.sched, labels, &self.size)?;
+        Ok(())
     }
 
     /// The shared parameters; empty if the engine has none.
@@ -83,9 +86,11 @@ impl Engine {
     }
 
     /// Label of each pixel of the last list with a label map.
-    pub(crate) fn label_map(&mut self, pixels: usize) -> Result<Vec<u16>> {
-        let words = self.sched.download::<u32>(Buf::LABEL_MAP, 0, 0, pixels)?;
-        Ok(words.into_iter().map(|word| (word & LABEL_MASK) as u16).collect())
+    pub(crate) fn label_map(&mut self, pixels: usize) -> Result<Vec<u32>> {
+        let mut labels = self.sched.download::<u32>(Buf::LABEL_MAP, 0, 0, pixels)?;
+        labels.iter_mut().for_each(|word| *word &= LABEL_MASK);
+        self.ids.unpack(&mut labels);
+        Ok(labels)
     }
 
     /// Sets a coordinate of the first position to NaN, as a faulty device would.

@@ -9,6 +9,7 @@ mod card;
 mod data;
 pub(crate) mod growth;
 mod input;
+mod label_ids;
 pub(crate) mod model;
 pub(crate) mod run;
 mod size;
@@ -19,6 +20,7 @@ pub(crate) use bands::Band;
 pub(crate) use card::{card, predict_for};
 pub(crate) use growth::{GrownSizes, capacity};
 pub(crate) use input::{DisagreementInput, Input, LayerInput, SharedRow, TrainInput, VoteInput};
+pub(crate) use label_ids::tell_apart;
 pub(crate) use run::{InFlight, ListKey, Recording, Report};
 pub use size::{EngineSize, LabelSize};
 
@@ -30,6 +32,7 @@ use crate::scheduler::plan::{FRAMES_IN_FLIGHT, TABLE};
 use crate::scheduler::{ListId, Scheduler, SchedulerOptions};
 use crate::shaders::structs::StepUniforms;
 use glam::DVec3;
+use label_ids::LabelIds;
 use std::collections::HashMap;
 use std::sync::Arc;
 
@@ -41,6 +44,7 @@ pub struct Engine {
     lists: HashMap<ListKey, ListId>,
     gaussian_count: u32,
     sh_degree: u32,
+    ids: LabelIds,
     /// World position of the model's local origin.
     origin: DVec3,
     /// Passes that extended steps add.
@@ -88,6 +92,7 @@ impl Engine {
             lists: HashMap::new(),
             gaussian_count: 0,
             sh_degree: 0,
+            ids: LabelIds::default(),
             origin: DVec3::ZERO,
             extension: Arc::new(()),
             passes: 0,
@@ -160,13 +165,14 @@ impl Engine {
     }
 
     /// Copies a model into the device's memory; moments and statistics become 0. An engine for rendering gets memory for
-    /// labels with the first model that has some.
+    /// labels with the first model that has some. Labels above [`LABEL_MAX`](crate::scene::LABEL_MAX) are for rendering
+    /// only.
     pub fn upload_model(&mut self, gaussians: &Gaussians) -> Result<()> {
         if gaussians.labels.is_some() && self.size.labels.is_none() && !self.size.trained {
             self.make_room_for_labels()?;
         }
         self.make_room_for_gaussians(gaussians.len() as u64)?;
-        model::upload(&mut self.sched, gaussians, self.size.labels.is_some())?;
+        self.ids = model::upload(&mut self.sched, gaussians, &self.size)?;
         self.gaussian_count = gaussians.len() as u32;
         (self.sh_degree, self.origin) = (gaussians.sh_degree, gaussians.origin);
         self.set_antialiased(gaussians.antialiased);
@@ -176,9 +182,9 @@ impl Engine {
     /// Reads the model back.
     pub fn download_model(&mut self) -> Result<Gaussians> {
         self.sched.wait_all()?;
-        let labels = self.size.labels.is_some();
-        let model = model::download(&mut self.sched, self.gaussian_count as usize, self.sh_degree, labels)?;
-        Ok(Gaussians { origin: self.origin, antialiased: self.shape.antialiased, ..model })
+        let model = model::download(&mut self.sched, self.gaussian_count as usize, self.sh_degree)?;
+        let labels = if self.size.labels.is_some() { Some(self.labels()?) } else { None };
+        Ok(Gaussians { labels, origin: self.origin, antialiased: self.shape.antialiased, ..model })
     }
 
     /// Returns the camera's part of the uniforms for the model; all other fields are 0.

@@ -1,16 +1,18 @@
 //! Converts the model between its host form and the planes of vec4 on the device.
 
-use crate::error::Result;
+use super::EngineSize;
+use super::label_ids::LabelIds;
+use crate::error::{Error, Result};
 use crate::pass::ATTRIBUTES;
-use crate::scene::Gaussians;
+use crate::scene::{Gaussians, LABEL_MAX, UNLABELLED};
 use crate::scheduler::Scheduler;
 use crate::scheduler::plan::Buf;
 
 /// Bands above degree 0: plane, vec4 per Gaussian, first coefficient (without degree 0), number of coefficients.
 const BANDS: [(Buf, usize, usize, usize); 3] = [(Buf::SH1, 3, 0, 3), (Buf::SH2, 4, 3, 5), (Buf::SH3, 6, 8, 7)];
 
-/// Writes the planes; sets the optimiser state to 0.
-pub(crate) fn upload(sched: &mut Scheduler, model: &Gaussians, labels: bool) -> Result<()> {
+/// Writes the planes; sets the optimiser state to 0. Returns the ids of the labels on the device.
+pub(super) fn upload(sched: &mut Scheduler, model: &Gaussians, size: &EngineSize) -> Result<LabelIds> {
     model.check()?;
     let with = |rows: &[[f32; 3]], last: &dyn Fn(usize) -> f32| -> Vec<[f32; 4]> {
         rows.iter().enumerate().map(|(i, &[x, y, z])| [x, y, z, last(i)]).collect()
@@ -33,22 +35,30 @@ pub(crate) fn upload(sched: &mut Scheduler, model: &Gaussians, labels: bool) -> 
     for plane in ATTRIBUTES.iter().flat_map(|a| [a.planes[1], a.planes[2]]).chain([Buf::DENSIFY_STATS]) {
         sched.fill(plane, 0)?;
     }
-    if labels {
-        let zeros;
-        let ids = match &model.labels {
-            Some(ids) => ids,
-            None => {
-                zeros = vec![0; model.len()];
-                &zeros
-            }
-        };
-        sched.upload(Buf::LABELS, 0, 0, ids)?;
+    match (size.labels, &model.labels) {
+        (None, _) => Ok(LabelIds::default()),
+        (Some(_), None) => {
+            sched.upload(Buf::LABELS, 0, 0, &vec![UNLABELLED; model.len()])?;
+            Ok(LabelIds::default())
+        }
+        (Some(_), Some(labels)) => upload_labels(sched, labels, size),
     }
-    Ok(())
 }
 
-/// Reads the planes of `count` Gaussians.
-pub(crate) fn download(sched: &mut Scheduler, count: usize, sh_degree: u32, labels: bool) -> Result<Gaussians> {
+/// Writes the labels.
+pub(super) fn upload_labels(sched: &mut Scheduler, labels: &[u32], size: &EngineSize) -> Result<LabelIds> {
+    let (ids, labels) = LabelIds::pack(labels)?;
+    if ids.are_packed() && size.trained {
+        let problem =
+            format!("a label of the model is above {LABEL_MAX}, the largest id of masks; give it a smaller one");
+        return Err(Error::usage("labels", problem));
+    }
+    sched.upload(Buf::LABELS, 0, 0, &labels)?;
+    Ok(ids)
+}
+
+/// Reads the planes of `count` Gaussians; without labels.
+pub(super) fn download(sched: &mut Scheduler, count: usize, sh_degree: u32) -> Result<Gaussians> {
     let xyz = |rows: &[[f32; 4]]| rows.iter().map(|&[x, y, z, _]| [x, y, z]).collect::<Vec<_>>();
     let means = sched.download::<[f32; 4]>(Buf::MEANS, 0, 0, count)?;
     let mut model = Gaussians {
@@ -68,9 +78,6 @@ pub(crate) fn download(sched: &mut Scheduler, count: usize, sh_degree: u32, labe
             let to = row * rest + first;
             model.sh_rest[to..to + coefficients].as_flattened_mut().copy_from_slice(&words[..coefficients * 3]);
         }
-    }
-    if labels {
-        model.labels = Some(sched.download::<u32>(Buf::LABELS, 0, 0, count)?);
     }
     Ok(model)
 }

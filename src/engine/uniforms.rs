@@ -7,6 +7,12 @@ use crate::shaders::structs::StepUniforms;
 use bytemuck::Zeroable;
 use glam::DVec3;
 
+/// Returns the uniforms of a part of a picture with the limits of slopes of the whole one, so that parts fit together.
+pub(crate) fn with_slopes_of(part: StepUniforms, whole: &StepUniforms) -> StepUniforms {
+    let &StepUniforms { clamp_y_min, clamp_y_max, .. } = whole;
+    StepUniforms { clamp_y_min, clamp_y_max, ..part }
+}
+
 /// Returns the camera's part of the uniforms; all other fields are 0. Positions on the device are relative to `origin`.
 pub(crate) fn view_uniforms(
     camera: &Camera,

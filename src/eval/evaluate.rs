@@ -4,11 +4,11 @@ use super::compared::{Compared, Watch};
 use super::metrics::COVERED;
 use super::regions::{RegionScores, Witnesses};
 use super::scores::{ObjectRender, ObjectTruth, Scores, ViewScores};
-use crate::edit::select::extract;
+use super::subject::{Subject, Whole};
 use crate::engine::Engine;
 use crate::error::Result;
 use crate::label::occlusion::{Rule, by_contour};
-use crate::render::{Parts, RenderOptions, Rendered, render};
+use crate::render::{Parts, RenderOptions, Rendered};
 use crate::scene::{Gaussians, LabelMap, Pixels, View};
 use std::collections::BTreeMap;
 
@@ -53,48 +53,34 @@ pub fn evaluate(
     wholes: &dyn AmodalTruth,
     watch: &mut dyn Watch,
 ) -> Result<Scores> {
-    engine.upload_model(model)?;
+    let mut whole = Whole { engine, model, min_confidence: how.min_confidence };
+    evaluate_subject(&mut whole, views, how, wholes, watch)
+}
+
+/// Like [`evaluate`], of a model that need not fit into the memory of the device.
+pub(crate) fn evaluate_subject(
+    subject: &mut dyn Subject,
+    views: &[&View],
+    how: Rendering,
+    wholes: &dyn AmodalTruth,
+    watch: &mut dyn Watch,
+) -> Result<Scores> {
+    subject.show(None)?;
     let witnesses = match how.train {
         [] => None,
-        train => Some(Witnesses::new(engine, train, how.options)?),
+        train => Some(Witnesses::new(subject, train, how.options)?),
     };
-    let labels = model.labels.as_deref();
-    let parts = Parts { main: how.by_main, labels: labels.is_some() && !how.by_main, ..Parts::DEPTH };
-    let of_scene = RenderOptions { parts, ..how.options };
-    let of_object = RenderOptions { background: [0.0; 3], parts: Parts::COLOUR, ..how.options };
-    let mut scores = Vec::new();
-    let mut hidden = Vec::new();
+    let (mut scores, mut hidden) = (Vec::new(), Vec::new());
     for view in views {
-        let rendered = render(engine, &view.camera, &of_scene)?;
-        let map = labels.map(|labels| match how.by_main {
-            true => rendered.main_label_map(labels),
-            false => rendered.label_map(),
-        });
-        let map = map.transpose()?;
-        let (photo, mask) = (view.photo()?, view.mask()?);
-        let mask = mask.as_deref();
-        let mut score = ViewScores::new(&rendered.rgb, &photo, map.as_ref(), mask)?;
-        if let Some(witnesses) = &witnesses {
-            let seen = witnesses.see(&view.camera, &rendered)?;
-            score.regions = Some(RegionScores::new(&rendered.rgb, &photo, mask, &seen));
-        }
-        let numbers = vec![("PSNR", Some(score.psnr)), ("SSIM", Some(score.ssim))];
-        let (labels, truth) = (map.as_ref(), mask);
-        watch.see(&Compared { numbers, labels, truth, ..Compared::new(&view.name, &photo, &rendered.rgb) })?;
+        let (score, occluded) = score_scene(subject, view, how, witnesses.as_ref(), watch)?;
         scores.push(score);
-        hidden.push(hidden_by(mask, &rendered)?);
+        hidden.push(occluded);
     }
+    let of_object = RenderOptions { background: [0.0; 3], parts: Parts::COLOUR, ..how.options };
     for id in objects(views) {
-        let there = labels.filter(|labels| labels.contains(&id));
-        let part = there.map(|_| extract(model, &[id], how.min_confidence)).transpose()?.filter(|p| !p.is_empty());
-        if let Some(part) = &part {
-            engine.upload_model(part)?;
-        }
+        let is_there = subject.show(Some(id))?;
         for (index, view) in views.iter().enumerate() {
-            let rendered = match &part {
-                Some(_) => Some(render(engine, &view.camera, &of_object)?),
-                None => None,
-            };
+            let rendered = if is_there { Some(subject.render(&view.camera, &of_object)?) } else { None };
             let alone = rendered.as_ref().map(|r| ObjectRender { colour: &r.rgb, alpha: &r.alpha });
             let (whole, picture) = (wholes.outline(id, view)?, wholes.alone(id, view)?);
             let (photo, mask) = (view.photo()?, view.mask()?);
@@ -112,6 +98,35 @@ pub fn evaluate(
         }
     }
     Ok(Scores::new(views.iter().map(|view| view.name.clone()).zip(scores).collect()))
+}
+
+/// Scores the scene in a view; returns the objects that hide others there too.
+fn score_scene(
+    subject: &mut dyn Subject,
+    view: &View,
+    how: Rendering,
+    witnesses: Option<&Witnesses>,
+    watch: &mut dyn Watch,
+) -> Result<(ViewScores, BTreeMap<u16, Vec<u16>>)> {
+    let labelled = subject.labels().is_some();
+    let parts = Parts { main: how.by_main, labels: labelled && !how.by_main, ..Parts::DEPTH };
+    let rendered = subject.render(&view.camera, &RenderOptions { parts, ..how.options })?;
+    let map = subject.labels().map(|labels| match how.by_main {
+        true => rendered.main_label_map(labels),
+        false => rendered.label_map(),
+    });
+    let map = map.transpose()?;
+    let (photo, mask) = (view.photo()?, view.mask()?);
+    let mask = mask.as_deref();
+    let mut score = ViewScores::new(&rendered.rgb, &photo, map.as_ref(), mask)?;
+    if let Some(witnesses) = witnesses {
+        let seen = witnesses.see(&view.camera, &rendered)?;
+        score.regions = Some(RegionScores::new(&rendered.rgb, &photo, mask, &seen));
+    }
+    let numbers = vec![("PSNR", Some(score.psnr)), ("SSIM", Some(score.ssim))];
+    let (labels, truth) = (map.as_ref(), mask);
+    watch.see(&Compared { numbers, labels, truth, ..Compared::new(&view.name, &photo, &rendered.rgb) })?;
+    Ok((score, hidden_by(mask, &rendered)?))
 }
 
 /// Passes an object of a view to `watch`, if it has ground truth there.

@@ -89,8 +89,8 @@ pub fn paper_score(object: &[[f32; 3]], photo: &Photo, inside: &[bool]) -> Paper
 }
 
 /// Returns the mean IoU of a label map over the objects of a mask of the same size.
-pub(crate) fn label_iou(found: &[u16], truth: &LabelMap) -> Option<f64> {
-    let pairs = |id: u16| found.iter().zip(&truth.ids).map(move |(&a, &b)| (a == id, b == id));
+pub(crate) fn label_iou<T: Copy + Into<u32>>(found: &[T], truth: &LabelMap) -> Option<f64> {
+    let pairs = |id: u16| found.iter().zip(&truth.ids).map(move |(&a, &b)| (a.into() == u32::from(id), b == id));
     mean(truth.objects().into_iter().filter_map(|id| Overlap::count(pairs(id)).iou()))
 }
 

@@ -19,6 +19,7 @@ pub(crate) mod removal;
 pub(crate) mod scores;
 pub(crate) mod ssim;
 pub(crate) mod ssim8;
+pub(crate) mod subject;
 
 pub use compared::{Compared, Watch};
 pub use evaluate::{AmodalTruth, Rendering, evaluate};

@@ -2,11 +2,11 @@
 //!
 //! A score over whole views mixes pixels that training can know with pixels that it has to make up.
 
+use super::subject::Subject;
 use crate::Result;
-use crate::engine::Engine;
 use crate::eval::metrics::{mean, psnr_over};
 use crate::io::shelf::Shelf;
-use crate::render::{Parts, RenderOptions, Rendered, render};
+use crate::render::{Parts, RenderOptions, Rendered};
 use crate::scene::{Camera, LabelMap, Photo, Pixels, View};
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
@@ -77,12 +77,12 @@ pub(super) struct Witnesses {
 }
 
 impl Witnesses {
-    /// Renders the depth of every training view; the model is in the engine.
-    pub(super) fn new(engine: &mut Engine, train: &[View], options: RenderOptions) -> Result<Self> {
+    /// Renders the depth of every training view.
+    pub(super) fn new(subject: &mut dyn Subject, train: &[View], options: RenderOptions) -> Result<Self> {
         let mut shelf = Shelf::new();
         let depth = |view: &View| {
             let of_depth = RenderOptions { parts: Parts::DEPTH, sh_degree: Some(0), ..options };
-            let depth = render(engine, &view.camera, &of_depth)?.mean_depth()?;
+            let depth = subject.render(&view.camera, &of_depth)?.mean_depth()?;
             Ok((view.camera.clone(), shelf.put(depth)))
         };
         Ok(Self { cameras: train.iter().map(depth).collect::<Result<_>>()? })

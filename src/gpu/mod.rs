@@ -16,6 +16,7 @@ mod devices;
 mod hidden;
 mod instance;
 pub(crate) mod limits;
+mod lock;
 mod memory;
 mod pipeline;
 mod probe;
@@ -46,14 +47,20 @@ use crate::lab;
 use ash::vk;
 use gpu_allocator::vulkan::{Allocator, AllocatorCreateDesc};
 use instance::Instance;
+use select::Picked;
 use std::collections::HashMap;
+use std::path::PathBuf;
 use std::sync::{Arc, Mutex, MutexGuard};
 
 /// Options for opening a device.
 #[derive(Clone, Debug, Default)]
 pub struct GpuOptions {
-    /// Index, part of the name, or UUID of the device; `None` for the most capable one.
+    /// Index, part of the name, or UUID of the device, or a list of these with commas between; `None` for the most capable
+    /// one. A list means the first of its devices that no other process has opened from a list.
     pub device: Option<String>,
+    /// Folder for the locks on devices of a list, made if it is not there; processes with the same folder share devices
+    /// out. The lock goes with the [`Gpu`], or with the process.
+    pub locks: Option<PathBuf>,
     /// Validation layer.
     pub validation: Validation,
     /// Bounds checks of the driver on every buffer access.
@@ -95,6 +102,7 @@ pub struct Gpu {
     cache: Mutex<cache::PipelineCache>,
     device: ash::Device,
     capabilities: Capabilities,
+    _lock: Option<lock::DeviceLock>,
     // Declared last: fields are dropped in this order, and `Drop` destroys the device before them.
     instance: Instance,
 }
@@ -103,7 +111,7 @@ impl Gpu {
     /// Opens a device. The error lists all devices and the missing features of each.
     pub fn new(options: &GpuOptions) -> Result<Arc<Self>> {
         let instance = Instance::new(options.validation)?;
-        let (physical, mut capabilities) = select::pick(&instance, options)?;
+        let Picked { physical, mut capabilities, lock } = select::pick(&instance, options)?;
         capabilities.choose_subgroup(options)?;
         let device = select::open(&instance, physical, &capabilities, options)?;
         // SAFETY: the device has this family and was created with one queue of it.
@@ -134,6 +142,7 @@ impl Gpu {
             statistics,
             device,
             capabilities,
+            _lock: lock,
             instance,
         }))
     }

@@ -4,42 +4,96 @@ use super::GpuOptions;
 use super::call::vk_call;
 use super::capabilities::{Capabilities, MEMORY};
 use super::instance::Instance;
+use super::lock::{self, DeviceLock};
 use super::statistics;
 use crate::error::{Error, Result};
 use ash::vk;
 
+/// A device with what it is capable of.
+type Found = (vk::PhysicalDevice, Capabilities);
+
 /// All devices, in the loader's order.
-pub(super) fn all(instance: &Instance) -> Result<Vec<(vk::PhysicalDevice, Capabilities)>> {
+pub(super) fn all(instance: &Instance) -> Result<Vec<Found>> {
     // SAFETY: the instance is alive.
     let devices = vk_call("vkEnumeratePhysicalDevices", || unsafe { instance.raw().enumerate_physical_devices() })?;
     let probe = |(index, device)| Ok((device, Capabilities::probe(instance.raw(), index, device)?));
     devices.into_iter().enumerate().map(probe).collect()
 }
 
-/// Picks a device by index, UUID or part of its name; by default the best that meets the requirements.
-pub(super) fn pick(instance: &Instance, options: &GpuOptions) -> Result<(vk::PhysicalDevice, Capabilities)> {
-    let wanted = options.device.as_deref();
-    let mut devices = all(instance)?;
-    let listing = devices.iter().map(|(_, device)| line(device)).collect::<Vec<_>>().join("; ");
+/// A device, and the lock on it if it came from a list.
+pub(super) struct Picked {
+    pub(super) physical: vk::PhysicalDevice,
+    pub(super) capabilities: Capabilities,
+    pub(super) lock: Option<DeviceLock>,
+}
+
+/// Picks a device by index, UUID or part of its name, or the first free one of a list of these; by default the best that
+/// meets the requirements.
+pub(super) fn pick(instance: &Instance, options: &GpuOptions) -> Result<Picked> {
+    let devices = all(instance)?;
     if devices.is_empty() {
         return Err(Error::NoDevice("the Vulkan loader found no device; install a Vulkan driver".to_owned()));
     }
+    let Some(wanted) = options.device.as_deref() else { return best(usable(&devices, None, options)?) };
+    // A comma may be part of a name.
+    if !wanted.contains(',') || devices.iter().any(|(_, device)| matches(device, wanted)) {
+        return best(usable(&devices, Some(wanted), options)?);
+    }
+    let names = wanted.split(',').map(str::trim).filter(|name| !name.is_empty());
+    let listed = names.map(|name| usable(&devices, Some(name), options)).collect::<Result<Vec<_>>>()?.concat();
+    first_free(&listed, options)
+}
+
+/// Devices that meet the requirements, the best first; those that match `wanted`, if it is given.
+fn usable(devices: &[Found], wanted: Option<&str>, options: &GpuOptions) -> Result<Vec<Found>> {
+    let listing = || devices.iter().map(|(_, device)| line(device)).collect::<Vec<_>>().join("; ");
+    let mut found = devices.to_vec();
     if let Some(wanted) = wanted {
-        devices.retain(|(_, device)| matches(device, wanted));
-        if devices.is_empty() {
-            return Err(Error::NoDevice(format!("none matches {wanted}; found: {listing}")));
+        found.retain(|(_, device)| matches(device, wanted));
+        if found.is_empty() {
+            return Err(Error::NoDevice(format!("none matches {wanted}; found: {}", listing())));
         }
     }
-    devices.retain(|(_, device)| device.missing().iter().all(|need| options.statistics && need.what == MEMORY));
-    let best = devices.into_iter().min_by_key(|(_, device)| (device.kind, device.index));
-    best.ok_or_else(|| Error::NoDevice(format!("none meets the requirements: {listing}")))
+    found.retain(|(_, device)| device.missing().iter().all(|need| options.statistics && need.what == MEMORY));
+    if found.is_empty() {
+        return Err(Error::NoDevice(format!("none meets the requirements: {}", listing())));
+    }
+    found.sort_by_key(|(_, device)| (device.kind, device.index));
+    Ok(found)
+}
+
+fn best(usable: Vec<Found>) -> Result<Picked> {
+    let best = usable.into_iter().next().ok_or_else(|| Error::Bug("no device is left".to_owned()))?;
+    Ok(Picked { physical: best.0, capabilities: best.1, lock: None })
+}
+
+/// Locks the first device that no other process holds.
+fn first_free(listed: &[Found], options: &GpuOptions) -> Result<Picked> {
+    let Some(folder) = &options.locks else {
+        return Err(Error::usage("device", "a list of devices needs a folder for the locks on them: set `locks`"));
+    };
+    for (physical, device) in listed {
+        if let Some(lock) = lock::take(folder, device)? {
+            return Ok(Picked { physical: *physical, capabilities: device.clone(), lock: Some(lock) });
+        }
+    }
+    let names = listed.iter().map(|(_, device)| format!("{}: {}", device.index, device.name)).collect::<Vec<_>>();
+    Err(Error::NoDevice(match names.is_empty() {
+        true => "the list of devices is empty; name at least one".to_owned(),
+        false => format!(
+            "other labelgs processes hold all that are listed ({}); wait for one of them, or list further devices",
+            names.join("; ")
+        ),
+    }))
 }
 
 fn matches(device: &Capabilities, wanted: &str) -> bool {
-    let uuid = wanted.replace('-', "").to_lowercase();
+    let lower = wanted.to_lowercase();
+    // The tools of NVIDIA write GPU-8f2ea41c-...
+    let uuid = lower.strip_prefix("gpu-").unwrap_or(&lower).replace('-', "");
     match wanted.parse::<usize>() {
         Ok(index) if wanted.len() < 4 => device.index == index,
-        _ => device.name.to_lowercase().contains(&wanted.to_lowercase()) || device.uuid_text() == uuid,
+        _ => device.name.to_lowercase().contains(&lower) || device.uuid_text() == uuid,
     }
 }
 

@@ -225,21 +225,27 @@ pub(crate) fn jpeg_rgb8((width, height): (u32, u32), pixels: &[[u8; 3]], quality
 
 /// Writes an EXR with 32-bit floats in the channels R, G and B; `pixels` is row-major.
 pub fn write_exr_rgb(path: impl AsRef<Path>, width: u32, height: u32, pixels: &[[f32; 3]]) -> Result<()> {
-    let channel = |name: &'static str, index: usize| (name, pixels.iter().map(|pixel| pixel[index]).collect());
+    let channel =
+        |name: &'static str, index: usize| (name, FlatSamples::F32(pixels.iter().map(|pixel| pixel[index]).collect()));
     write_exr(path.as_ref(), (width, height), vec![channel("R", 0), channel("G", 1), channel("B", 2)])
 }
 
 /// Writes an EXR with 32-bit floats in the single channel Y; `pixels` is row-major.
 pub fn write_exr_y(path: impl AsRef<Path>, width: u32, height: u32, pixels: &[f32]) -> Result<()> {
-    write_exr(path.as_ref(), (width, height), vec![("Y", pixels.to_vec())])
+    write_exr(path.as_ref(), (width, height), vec![("Y", FlatSamples::F32(pixels.to_vec()))])
 }
 
-fn write_exr(path: &Path, (width, height): (u32, u32), channels: Vec<(&'static str, Vec<f32>)>) -> Result<()> {
+/// Writes 32-bit unsigned integers as an EXR with one channel `Y`.
+pub(crate) fn write_exr_uint(path: impl AsRef<Path>, width: u32, height: u32, pixels: &[u32]) -> Result<()> {
+    write_exr(path.as_ref(), (width, height), vec![("Y", FlatSamples::U32(pixels.to_vec()))])
+}
+
+fn write_exr(path: &Path, (width, height): (u32, u32), channels: Vec<(&'static str, FlatSamples)>) -> Result<()> {
     let expected = u64::from(width) * u64::from(height);
     if channels.iter().any(|(_, samples)| samples.len() as u64 != expected) {
         return Err(Error::Bug(format!("{} does not get {width} x {height} pixels", path.display())));
     }
-    let channels = channels.into_iter().map(|(name, samples)| AnyChannel::new(name, FlatSamples::F32(samples)));
+    let channels = channels.into_iter().map(|(name, samples)| AnyChannel::new(name, samples));
     let layer = Layer::new(
         (width as usize, height as usize),
         LayerAttributes::default(),

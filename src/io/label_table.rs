@@ -5,7 +5,7 @@
 use super::{atomic, run_folder};
 use crate::error::{Error, Result};
 use crate::io::read;
-use crate::scene::labels::{LABEL_MAX, label_colour};
+use crate::scene::labels::{LABEL_MAX, MODEL_LABEL_MAX, label_colour};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -26,7 +26,7 @@ pub(crate) fn unique_name(name: String, taken: &mut BTreeSet<String>) -> String 
 /// One object.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct LabelEntry {
-    /// Id in masks and models, 1 to 65535.
+    /// Id in masks, 1 to 65535, or in models, 1 to 2147483647.
     pub id: u32,
     /// Display name; unique.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -87,8 +87,8 @@ impl LabelTable {
         let (mut ids, mut names) = (BTreeSet::new(), BTreeSet::new());
         for entry in &self.labels {
             let place = format!("label {}", entry.id);
-            if entry.id == 0 || entry.id > LABEL_MAX {
-                return Err(Error::data(path, place, format!("labels are from 1 to {LABEL_MAX}")));
+            if entry.id == 0 || entry.id > MODEL_LABEL_MAX {
+                return Err(Error::data(path, place, format!("labels are from 1 to {MODEL_LABEL_MAX}")));
             }
             if !ids.insert(entry.id) {
                 return Err(Error::data(path, place, "occurs twice; ids must be unique"));
@@ -103,7 +103,17 @@ impl LabelTable {
     /// Reads the table in a folder of masks, if there is one.
     pub fn of_folder(folder: &Path) -> Result<Option<Self>> {
         let path = folder.join(FILE);
-        path.is_file().then(|| Self::read(&path)).transpose()
+        if !path.is_file() {
+            return Ok(None);
+        }
+        let table = Self::read(&path)?;
+        match table.labels.iter().find(|entry| entry.id > LABEL_MAX) {
+            Some(entry) => {
+                let problem = format!("labels of masks are from 1 to {LABEL_MAX}");
+                Err(Error::data(&path, format!("label {}", entry.id), problem))
+            }
+            None => Ok(Some(table)),
+        }
     }
 
     /// Writes the table, atomically.

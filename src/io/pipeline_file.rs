@@ -33,6 +33,11 @@ impl PipelineFolder {
         }
     }
 
+    /// Returns the folder for locks of the user's processes: that of the caches, else the system's for temporary files.
+    pub fn of_locks() -> PathBuf {
+        Self::of_user().map_or_else(|| std::env::temp_dir().join("labelgs"), |cache| cache.folder)
+    }
+
     fn path(&self, device: &str) -> PathBuf {
         self.folder.join(format!("pipelines-{device}.bin"))
     }

@@ -3,13 +3,14 @@
 //! [`render()`] draws the model of an [`Engine`] from a [`Camera`]. [`RenderOptions`] has near plane, background and
 //! the [`Parts`] to read back. The result is a [`Rendered`]; [`write_pictures`] writes it as PNG or EXR.
 
+pub(crate) mod large;
 pub(crate) mod pictures;
 
 pub use pictures::{Format, Pictures, What, write_pictures, write_rgb};
 
 use crate::engine::{Engine, ListKey};
 use crate::error::{Error, Result};
-use crate::scene::{Camera, LabelMap, UNLABELLED};
+use crate::scene::{Camera, LABEL_MAX, LabelMap, UNLABELLED};
 use crate::shaders::structs::StepUniforms;
 
 /// Default near plane, of 3DGS, world units.
@@ -89,23 +90,23 @@ pub struct Rendered {
     pub top_weight: Vec<f32>,
     /// Label with the largest sum of blending weights, the smaller of equals; 0 is a label like others, and that of
     /// pixels without a Gaussian, `[H, W]`.
-    pub labels: Vec<u16>,
+    pub labels: Vec<u32>,
 }
 
 impl Rendered {
     /// Returns the label of each pixel: of all labels, the one with the largest sum of blending weights. Returns an error
-    /// without [`Parts::labels`].
+    /// without [`Parts::labels`], or for a label above [`LABEL_MAX`].
     pub fn label_map(&self) -> Result<LabelMap> {
         self.check_part(self.labels.len(), "labels")?;
-        Ok(LabelMap { width: self.width, height: self.height, ids: self.labels.clone() })
+        as_mask((self.width, self.height), self.labels.iter().copied())
     }
 
     /// Returns the label of the main Gaussian of each pixel (LabelGS, inference), 0 without any. `labels` has one label
-    /// per Gaussian. Returns an error without [`Parts::main`].
+    /// per Gaussian. Returns an error without [`Parts::main`], or for a label above [`LABEL_MAX`].
     pub fn main_label_map(&self, labels: &[u32]) -> Result<LabelMap> {
         self.check_part(self.top_id.len(), "main Gaussians")?;
-        let id = |&top: &i32| usize::try_from(top).map_or(0, |index| labels[index] as u16);
-        Ok(LabelMap { width: self.width, height: self.height, ids: self.top_id.iter().map(id).collect() })
+        let id = |&top: &i32| usize::try_from(top).map_or(UNLABELLED, |index| labels[index]);
+        as_mask((self.width, self.height), self.top_id.iter().map(id))
     }
 
     /// Returns depth divided by alpha, world units; 0 where alpha is below one half. Returns an error without
@@ -175,13 +176,27 @@ fn render_band(engine: &mut Engine, uniforms: &StepUniforms, options: &RenderOpt
         labels: match (labels, has_labels) {
             (false, _) => Vec::new(),
             (true, true) => engine.label_map(pixels)?,
-            (true, false) => vec![UNLABELLED as u16; pixels],
+            (true, false) => vec![UNLABELLED; pixels],
         },
     })
 }
 
-/// Renders the label of each pixel of the model in the engine, without a picture, which takes about half the time. The
-/// engine has the labels of [`Engine::upload_model`] or [`Engine::set_labels`]; without any, all are 0.
+/// Returns labels as a map like those of masks.
+fn as_mask((width, height): (u32, u32), labels: impl Iterator<Item = u32>) -> Result<LabelMap> {
+    let id = |label| {
+        let problem = || {
+            format!(
+                "the picture shows label {label}, and masks, with which it is compared, have ids up to {LABEL_MAX}; give the \
+                 label a smaller id, or choose labels by id or name"
+            )
+        };
+        u16::try_from(label).map_err(|_| Error::usage("labels", problem()))
+    };
+    Ok(LabelMap { width, height, ids: labels.map(id).collect::<Result<_>>()? })
+}
+
+/// Renders the label of each pixel of the model in the engine, without a picture, which takes about half the time. Fails if
+/// one is above [`LABEL_MAX`]. The engine has the labels of [`Engine::upload_model`] or [`Engine::set_labels`]; without any, all are 0.
 pub fn label_map(engine: &mut Engine, camera: &Camera, near: f32) -> Result<LabelMap> {
     let pixels = camera.width as usize * camera.height as usize;
     let mut ids = Vec::with_capacity(pixels);
@@ -192,6 +207,6 @@ pub fn label_map(engine: &mut Engine, camera: &Camera, near: f32) -> Result<Labe
             ids.extend(engine.label_map(band.pixels(camera.width).len())?);
         }
     }
-    ids.resize(pixels, UNLABELLED as u16);
-    Ok(LabelMap { width: camera.width, height: camera.height, ids })
+    ids.resize(pixels, UNLABELLED);
+    as_mask((camera.width, camera.height), ids.into_iter())
 }

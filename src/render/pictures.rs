@@ -1,11 +1,14 @@
 //! Writes pictures of a view as NAME.WHAT.png or NAME.WHAT.exr.
 
-use crate::io::image::{write_exr_rgb, write_exr_y, write_png_grey16, write_png_rgb8};
-use crate::scene::LabelMap;
+use crate::io::image::{write_exr_rgb, write_exr_uint, write_exr_y, write_png_grey16, write_png_rgb8};
+use crate::scene::LABEL_MAX;
 use crate::scene::colour::to_byte;
 use crate::scene::labels::label_colours;
 use crate::{Error, Result};
 use std::path::{Path, PathBuf};
+
+/// Largest whole number up to which a 32-bit float holds all of them.
+const FLOAT_EXACT: i32 = 1 << 24;
 
 /// A kind of picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -17,9 +20,10 @@ pub enum What {
     Depth,
     /// Opacity, 0 to 1.
     Alpha,
-    /// Object ids as 16-bit PNG, and in colours.
+    /// Object ids as 16-bit PNG, and in colours; ids of a model with one above 65535 as 32-bit EXR.
     Labels,
-    /// Row of the Gaussian with the largest weight, -1 for none; EXR only.
+    /// Row of the Gaussian with the largest weight, -1 for none; EXR only. A picture with a row above 16777216 has
+    /// unsigned integers, 4294967295 for none.
     TopId,
     /// Weight of that Gaussian; EXR only.
     TopWeight,
@@ -50,7 +54,9 @@ pub struct Pictures<'a> {
     /// Opacity, 0 to 1.
     pub alpha: Option<&'a [f32]>,
     /// Object ids.
-    pub labels: Option<&'a LabelMap>,
+    pub labels: Option<&'a [u32]>,
+    /// Ids are written with 32 bits, in an EXR: for models with an id above [`LABEL_MAX`].
+    pub wide_labels: bool,
     /// Row of the Gaussian with the largest weight, -1 for none.
     pub top_id: Option<&'a [i32]>,
     /// Weight of that Gaussian.
@@ -87,17 +93,45 @@ pub fn write_pictures(folder: &Path, stem: &str, pictures: &Pictures, format: Fo
         }
     }
     if let Some(labels) = pictures.labels {
-        write_png_grey16(path("labels", "png"), width, height, &labels.ids)?;
-        write_png_rgb8(path("labels-colour", "png"), width, height, &label_colours(&labels.ids))?;
+        match narrow(labels, pictures.wide_labels, format)? {
+            Some(ids) => write_png_grey16(path("labels", "png"), width, height, &ids)?,
+            None => write_exr_uint(path("labels", "exr"), width, height, labels)?,
+        }
+        write_png_rgb8(path("labels-colour", "png"), width, height, &label_colours(labels))?;
     }
     if let Some(ids) = pictures.top_id {
-        let values: Vec<f32> = ids.iter().map(|&id| id as f32).collect();
-        write_exr_y(path("top-id", "exr"), width, height, &values)?;
+        write_rows(&path("top-id", "exr"), (width, height), ids)?;
     }
     if let Some(weights) = pictures.top_weight {
         write_exr_y(path("top-weight", "exr"), width, height, weights)?;
     }
     Ok(written)
+}
+
+/// Returns ids for a 16-bit PNG, or `None` if they are for an EXR.
+fn narrow(labels: &[u32], wide: bool, format: Format) -> Result<Option<Vec<u16>>> {
+    match (wide, format) {
+        (true, Format::Exr) => Ok(None),
+        (true, Format::Png) => {
+            let problem = format!(
+                "a 16-bit PNG has no place for labels above {LABEL_MAX}; choose `exr`, or give them smaller ids"
+            );
+            Err(Error::usage("format", problem))
+        }
+        (false, _) => {
+            let id = |&id: &u32| u16::try_from(id).map_err(|_| Error::Bug(format!("label {id} in a 16-bit picture")));
+            labels.iter().map(id).collect::<Result<_>>().map(Some)
+        }
+    }
+}
+
+/// Writes rows, as floats where these hold them, else as unsigned integers with 4294967295 for none.
+fn write_rows(path: &Path, (width, height): (u32, u32), rows: &[i32]) -> Result<()> {
+    if rows.iter().all(|&row| row <= FLOAT_EXACT) {
+        let values: Vec<f32> = rows.iter().map(|&row| row as f32).collect();
+        return write_exr_y(path, width, height, &values);
+    }
+    write_exr_uint(path, width, height, bytemuck::cast_slice(rows))
 }
 
 /// Writes colours, row-major; a PNG clamps them to 0..1.
@@ -117,7 +151,7 @@ fn check_sizes(stem: &str, pictures: &Pictures) -> Result<()> {
         pictures.rgb.map(<[_]>::len),
         pictures.depth.map(<[_]>::len),
         pictures.alpha.map(<[_]>::len),
-        pictures.labels.map(|labels| labels.ids.len()),
+        pictures.labels.map(<[_]>::len),
         pictures.top_id.map(<[_]>::len),
         pictures.top_weight.map(<[_]>::len),
     ];

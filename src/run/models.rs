@@ -1,7 +1,7 @@
 //! Files of a run: models, cameras and previews. Each write is atomic.
 
 use crate::error::{Error, Result};
-use crate::io::model::{ReadModel, read_model, write_model};
+use crate::io::model::{LazyModel, ModelRef, ReadModel, Row, read_model, write_model};
 use crate::io::read;
 use crate::io::{camera_json, image};
 use crate::render::Rendered;
@@ -39,10 +39,35 @@ pub fn latest_model(out: &Path) -> Result<PathBuf> {
 
 /// Reads a model, or the latest one in the folder of a run, with the names in the file. Logs the notes of the reader.
 pub(crate) fn open(path: &Path) -> Result<ReadModel> {
-    let path = &if path.is_dir() { latest_model(path)? } else { path.to_owned() };
+    let path = &file_of(path)?;
     let read = read_model(path)?;
-    read.notes.iter().for_each(|note| tracing::warn!("{}: {note}", path.display()));
+    log_notes(path, &read.notes);
     Ok(read)
+}
+
+/// Opens a model as [`open`] does, without reading it if it can stay in its file.
+pub(crate) fn open_lazily(path: &Path) -> Result<LazyModel> {
+    let path = &file_of(path)?;
+    let model = LazyModel::open(path)?;
+    if let LazyModel::Whole(read) = &model {
+        log_notes(path, &read.notes);
+    }
+    Ok(model)
+}
+
+/// Looks at each row of a model that was opened from `path`, and logs the notes of the reader.
+pub(crate) fn scan(path: &Path, model: ModelRef, see: impl FnMut(u64, &Row)) -> Result<()> {
+    log_notes(&file_of(path)?, &model.scan(see)?);
+    Ok(())
+}
+
+pub(crate) fn log_notes(path: &Path, notes: &[String]) {
+    notes.iter().for_each(|note| tracing::warn!("{}: {note}", path.display()));
+}
+
+/// Returns the file of a model, or of the latest one in the folder of a run.
+fn file_of(path: &Path) -> Result<PathBuf> {
+    if path.is_dir() { latest_model(path) } else { Ok(path.to_owned()) }
 }
 
 /// The models that a run writes. Other commands take the model of the latest step. So the first model of this run moves
@@ -109,7 +134,7 @@ pub(crate) fn save_preview(path: &Path, photo: &Photo, rendered: &Rendered) -> R
             row[x] = [r, g, b];
             row[width + x] = rendered.rgb[at].map(to_byte);
             if let Some(&label) = labels.get(at) {
-                row[2 * width + x] = label_colour(u32::from(label));
+                row[2 * width + x] = label_colour(label);
             }
         }
     }

@@ -10,6 +10,11 @@ pub(crate) fn axes_of(quat: [f32; 4]) -> DMat3 {
     DMat3::from_quat(DQuat::from_xyzw(x, y, z, w).normalize())
 }
 
+/// Returns an opacity after the sigmoid.
+pub(crate) fn opacity_of(logit: f32) -> f64 {
+    1.0 / (1.0 + (-f64::from(logit)).exp())
+}
+
 /// The Gaussians of a scene. Parameters are stored before activation, as in the standard 3DGS PLY.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Gaussians {
@@ -52,7 +57,7 @@ impl Gaussians {
 
     /// Returns the opacity of a Gaussian, after the sigmoid.
     pub fn opacity(&self, row: usize) -> f64 {
-        1.0 / (1.0 + (-f64::from(self.opacities[row])).exp())
+        opacity_of(self.opacities[row])
     }
 
     /// Returns the label of a Gaussian; 0 in a model without labels.

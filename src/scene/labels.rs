@@ -1,4 +1,4 @@
-//! Object ids: 0 is unlabelled, 1 to 65535 are objects.
+//! Object ids: 0 is unlabelled; objects are from 1 to 65535 in masks, and to 2^31 - 1 in models.
 
 /// Id of the background, in masks and in models.
 pub const UNLABELLED: u32 = 0;
@@ -6,8 +6,11 @@ pub const UNLABELLED: u32 = 0;
 /// Occluders of each object in a view: the objects that hide a part of it. Keys and lists are sorted.
 pub type Occluders = std::collections::BTreeMap<u16, Vec<u16>>;
 
-/// Largest id in masks and models.
+/// Largest id in masks.
 pub const LABEL_MAX: u32 = 65_535;
+
+/// Largest id in models: signed 32-bit columns hold it.
+pub const MODEL_LABEL_MAX: u32 = i32::MAX as u32;
 
 /// A map of ids, row-major.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -69,8 +72,8 @@ fn widened(values: &[u16], steps: usize, stride: usize, pick: impl Fn(u16, u16) 
 }
 
 /// Returns the display colours of ids.
-pub(crate) fn label_colours(ids: &[u16]) -> Vec<[u8; 3]> {
-    ids.iter().map(|&id| label_colour(u32::from(id))).collect()
+pub(crate) fn label_colours<T: Copy + Into<u32>>(ids: &[T]) -> Vec<[u8; 3]> {
+    ids.iter().map(|&id| label_colour(id.into())).collect()
 }
 
 /// Returns the display colour of an id: hues a golden ratio apart; 0 is black.

@@ -20,7 +20,7 @@ pub(crate) mod zone;
 pub use camera::Camera;
 pub use depth::{DepthKind, DepthMap};
 pub use gaussians::Gaussians;
-pub use labels::{LABEL_MAX, LabelMap, Occluders, UNLABELLED, label_colour};
+pub use labels::{LABEL_MAX, LabelMap, MODEL_LABEL_MAX, Occluders, UNLABELLED, label_colour};
 pub use overview::Overview;
 pub use pixels::Pixels;
 pub(crate) use view::stems;

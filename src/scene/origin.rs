@@ -10,13 +10,14 @@ const SIZE_OF_A_POINT: f64 = 10.0;
 
 /// Returns the best origin for positions: 0 unless the scene is far away. Its coordinates are multiples of a power of
 /// two above the size of the scene, so that the subtraction loses little.
-pub(crate) fn far_origin(positions: &[DVec3]) -> DVec3 {
+pub(crate) fn far_origin<P: Copy + Into<DVec3>>(positions: &[P]) -> DVec3 {
     if positions.is_empty() {
         return DVec3::ZERO;
     }
+    let along = |axis: usize| positions.iter().map(move |&position| position.into()[axis]);
     // Medians, because outliers may be anywhere.
-    let middle = by_axis(|axis| median(positions.iter().map(|p| p[axis]).collect()));
-    let size = by_axis(|axis| median(positions.iter().map(|p| (p[axis] - middle[axis]).abs()).collect())).length();
+    let middle = by_axis(|axis| median(along(axis).collect()));
+    let size = by_axis(|axis| median(along(axis).map(|value| (value - middle[axis]).abs()).collect())).length();
     // Positions at one place have no size.
     let size = if size > 0.0 { size } else { SIZE_OF_A_POINT };
     if !(middle.length() > FAR * size) || !middle.is_finite() {
@@ -47,7 +48,7 @@ mod tests {
 
     #[test]
     fn near_scenes_stay_where_they_are() {
-        assert_eq!(far_origin(&[]), DVec3::ZERO);
+        assert_eq!(far_origin::<DVec3>(&[]), DVec3::ZERO);
         assert_eq!(far_origin(&[DVec3::ZERO]), DVec3::ZERO);
         assert_eq!(far_origin(&[DVec3::splat(300.1)]), DVec3::ZERO);
         assert_ne!(far_origin(&[DVec3::splat(5e6)]), DVec3::ZERO);

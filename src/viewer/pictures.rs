@@ -68,7 +68,7 @@ pub(super) fn encode(pane: Pane, rendered: &Rendered, beside: Beside, is_lossy: 
 pub(super) fn outline(rendered: &Rendered, labels: &[u32]) -> Result<Vec<u8>> {
     let (width, height) = (rendered.width as usize, rendered.height as usize);
     let marked: BTreeSet<u32> = labels.iter().copied().collect();
-    let inside: Vec<bool> = rendered.labels.iter().map(|&id| marked.contains(&u32::from(id))).collect();
+    let inside: Vec<bool> = rendered.labels.iter().map(|&id| marked.contains(&id)).collect();
     let thickness = (rendered.width / 500).max(1) as usize;
     let is_out = |x: usize, y: usize| x >= width || y >= height || !inside[y * width + x];
     let pixel = |index: usize| {
@@ -84,11 +84,11 @@ pub(super) fn outline(rendered: &Rendered, labels: &[u32]) -> Result<Vec<u8>> {
     png_rgba8((rendered.width, rendered.height), &pixels)
 }
 
-fn tinted((colour, &id): (&[f32; 3], &u16)) -> [u8; 3] {
-    if u32::from(id) == UNLABELLED {
+fn tinted((colour, &id): (&[f32; 3], &u32)) -> [u8; 3] {
+    if id == UNLABELLED {
         return colour.map(to_byte);
     }
-    let label = label_colour(u32::from(id)).map(|byte| f32::from(byte) / 255.0);
+    let label = label_colour(id).map(|byte| f32::from(byte) / 255.0);
     [0, 1, 2].map(|c| to_byte(colour[c].clamp(0.0, 1.0) * (1.0 - TINT) + label[c] * TINT))
 }
 

@@ -265,7 +265,7 @@ fn labels_beside_a_file_hold_for_the_same_gaussians_only() {
     // The table of names beside it is the usual one.
     assert_eq!(LabelTable::read(&scene.at("a.labels.json")).expect("a table"), names());
     let text = fs::read_to_string(scene.at("a.labels.json")).expect("text");
-    for (from, to) in [("\"ids\"", "\"id\""), ("700", "70000"), ("\"count\": 60", "\"count\": \"many\"")] {
+    for (from, to) in [("\"ids\"", "\"id\""), ("700", "2147483700"), ("\"count\": 60", "\"count\": \"many\"")] {
         scene.write("a.labels.json", text.replace(from, to));
         let error = refusal(read_model(scene.at("a.spz")));
         assert!(error.contains("a.labels.json: "), "{error}");

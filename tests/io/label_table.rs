@@ -44,7 +44,7 @@ fn an_invalid_table_is_refused_with_its_place() {
     let entry = |id: u32, name: &str| format!(r#"{{"id": {id}, "name": "{name}", "colour": [1, 2, 3]}}"#);
     let cases = [
         (1, vec![entry(0, "a")], "labels are from 1"),
-        (1, vec![entry(65_536, "a")], "labels are from 1"),
+        (1, vec![entry(2_147_483_648, "a")], "labels are from 1"),
         (1, vec![entry(3, "a"), entry(3, "b")], "label 3"),
         (1, vec![entry(3, "a"), entry(4, "a")], "name of another label"),
         (2, vec![], "has version 2"),

@@ -248,7 +248,7 @@ fn unusable_rows_are_dropped_and_counted() {
 }
 
 #[test]
-fn labels_of_any_type_are_whole_numbers_up_to_65535() {
+fn labels_of_any_type_are_whole_numbers_below_two_to_the_31() {
     let scene = Scene::new();
     let text = String::from_utf8(foreign("ascii", "\n")).expect("text");
     for kind in ["uchar", "int", "uint", "float", "double"] {
@@ -257,9 +257,11 @@ fn labels_of_any_type_are_whole_numbers_up_to_65535() {
         assert_eq!(read.gaussians.labels, Some(vec![7]));
     }
     let typed = text.replace("property ushort label", "property double label");
-    for bad in ["65536", "-1", "1.5", "nan", "1e99"] {
+    let read = read_model(scene.write("a.ply", typed.replace("65535", "2147483647"))).expect("read");
+    assert_eq!(read.gaussians.labels, Some(vec![2_147_483_647]));
+    for bad in ["2147483648", "-1", "1.5", "nan", "1e99"] {
         let error = refusal(read_model(scene.write("a.ply", typed.replace("65535", bad))));
-        assert!(error.contains("vertex 0") && error.contains("65535"), "{error}");
+        assert!(error.contains("vertex 0") && error.contains("2147483647"), "{error}");
     }
 }
 

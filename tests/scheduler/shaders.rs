@@ -103,7 +103,10 @@ fn devices_are_chosen_by_name_index_and_uuid() {
     let found = gpu.capabilities().clone();
     drop(gpu);
     let open = |device: &str| Gpu::new(&GpuOptions { device: Some(device.to_owned()), ..GpuOptions::default() });
-    for wanted in [found.index.to_string(), found.uuid_text(), found.name.to_uppercase()] {
+    let uuid = found.uuid_text();
+    let dashed = [&uuid[..8], &uuid[8..12], &uuid[12..16], &uuid[16..20], &uuid[20..]].join("-");
+    let of_tools = format!("GPU-{}", dashed.to_uppercase());
+    for wanted in [found.index.to_string(), uuid, dashed, of_tools, found.name.to_uppercase()] {
         assert_eq!(open(&wanted).unwrap().capabilities().name, found.name, "{wanted}");
     }
     let error = open("no such device").unwrap_err();
@@ -112,7 +115,7 @@ fn devices_are_chosen_by_name_index_and_uuid() {
     let odd = GpuOptions { subgroup_size: Some(3), ..GpuOptions::default() };
     assert_eq!(exit_status(&Gpu::new(&odd).unwrap_err()), 2);
     let (devices, picked) = labelgs::gpu::devices(&GpuOptions::default()).unwrap();
-    assert!(picked.is_some_and(|index| devices[index].missing().is_empty()));
+    assert!(picked.is_ok_and(|index| devices[index].missing().is_empty()));
     let listed = devices.iter().find(|device| device.uuid == found.uuid).unwrap();
     assert_eq!(listed.needs, found.needs);
 }

@@ -12,6 +12,7 @@ mod card_model;
 mod compiler;
 mod device;
 mod kernels;
+mod large;
 mod limits;
 mod measure;
 mod memory;
@@ -76,6 +77,8 @@ enum Command {
     Memory(Common),
     /// From the start of the program to its first picture, with empty and with filled caches.
     Start(Common),
+    /// A city that is larger than the memory of the device: its pictures, its list, one object of it.
+    Large(large::Options),
     /// The viewer: from a camera to its picture, what watching costs a training, bytes of page and program.
     View(Common),
     /// One measurement of `memory`, in a process of its own.
@@ -109,6 +112,7 @@ fn run() -> Result<()> {
         Command::Memory(common) => memory::run(&common),
         Command::Start(common) => start::run(&common),
         Command::View(common) => view::run(&common),
+        Command::Large(options) => large::run(&options),
         Command::MemoryOf { gaussians, width, height } => memory::measure(gaussians, width, height),
     }
 }

@@ -27,6 +27,6 @@ fn main() -> labelgs::Result<()> {
     let rendered = render(&mut engine, camera, &RenderOptions { parts: Parts::LABELS, ..RenderOptions::default() })?;
     write_rgb(Path::new(out), size, &rendered.rgb, Format::Png)?;
 
-    let colours = rendered.labels.iter().map(|&id| label_colour(id.into()).map(|byte| f32::from(byte) / 255.0));
+    let colours = rendered.labels.iter().map(|&id| label_colour(id).map(|byte| f32::from(byte) / 255.0));
     write_rgb(Path::new(labels_out), size, &colours.collect::<Vec<_>>(), Format::Png)
 }

@@ -1,6 +1,7 @@
 //! Arguments of `labelgs eval`.
 
 use crate::cli::args::SceneArgs;
+use crate::cli::drawer::MemoryArg;
 use crate::cli::labelled::MinConfidenceArg;
 use crate::cli::values::{colour, near};
 use crate::edit::select::MIN_LABEL_CONFIDENCE;
@@ -81,6 +82,9 @@ pub struct EvalArgs {
     /// Least mean IoU of the label maps, or of the benchmark. Exit status 1 if it is lower.
     #[arg(long, value_name = "IOU", help_heading = "Checks")]
     pub min_iou: Option<f64>,
+    /// Memory.
+    #[command(flatten)]
+    pub memory: MemoryArg,
     /// How the scene is read.
     #[command(flatten)]
     pub reading: SceneArgs,
@@ -113,6 +117,7 @@ impl EvalArgs {
             page: None,
             min_psnr: None,
             min_iou: None,
+            memory: MemoryArg::default(),
             reading: SceneArgs::default(),
             json: None,
         }

@@ -54,7 +54,7 @@ pub(super) fn run(protocol: Protocol, args: &EvalArgs, context: &Context) -> Res
     bench.check(&layout, &root)?;
     let mut watcher = Watcher::new(picture_count(&layout), args.page.as_deref(), context)?;
     let sizes = views.iter().map(|view| (view.camera.width, view.camera.height));
-    let mut engine = render_engine(open_gpu(context)?, &model, sizes)?;
+    let mut engine = render_engine(open_gpu(context)?, &model, sizes, args.memory.options())?;
     let mut painter = EnginePainter::new(
         &mut engine,
         &model,

@@ -5,21 +5,27 @@ use super::watch::Watcher;
 use super::{EvalArgs, put_out};
 use crate::blocks::Seams;
 use crate::cli::context::{Context, open_model};
+use crate::cli::drawer::largest;
 use crate::cli::scene::{near_plane, open_gpu, open_scene, pick_views, render_engine};
-use crate::engine::Engine;
 use crate::eval::by_place;
-use crate::eval::evaluate::{AmodalTruth, Rendering, evaluate, picture_count};
+use crate::eval::evaluate::{AmodalTruth, Rendering, evaluate_subject, picture_count};
 use crate::eval::removal::{self, RemovalTruth, removals};
 use crate::eval::scores::{NearScores, NearSweep, Scores};
+use crate::eval::subject::{Subject, Whole};
+use crate::gpu::Gpu;
 use crate::io::image::read_rgba;
 use crate::io::mask::read_mask;
-use crate::label::vote::model::{columns_of, vote_engine};
-use crate::render::{RenderOptions, render};
+use crate::io::model::ModelRef;
+use crate::label::vote::model::{columns_of, limited_vote_engine};
+use crate::render::RenderOptions;
+use crate::render::large::{Index, Painter, fits};
+use crate::run::models;
 use crate::scene::{Camera, Dataset, Gaussians, Photo, View};
 use crate::scheduler::SchedulerOptions;
 use crate::train::aligned;
 use crate::{Error, Result};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// Scores a model and prints the scores.
 pub(super) fn run(args: &EvalArgs, context: &Context) -> Result<()> {
@@ -30,51 +36,96 @@ pub(super) fn run(args: &EvalArgs, context: &Context) -> Result<()> {
 
 /// Scores a model.
 pub(in crate::cli) fn score(args: &EvalArgs, context: &Context) -> Result<Scores> {
-    let model = open_model(&args.model)?;
+    let source = models::open_lazily(&args.model)?;
     let reading = args.reading.of_run(&args.model)?;
     let dataset = open_scene(&args.scene, &reading, args.masks.clone(), args.background, true)?;
     let views = pick_views(&dataset, &args.views)?;
-    let wholes = Folders::find(args)?;
-    let removing = if args.removal { Some(Removing::new(args, &model, &dataset)?) } else { None };
-    let pictures = picture_count(&views) + removing.as_ref().map_or(0, |_| removal::picture_count(&views));
-    let mut watcher = Watcher::new(pictures, args.page.as_deref(), context)?;
-    let gpu = open_gpu(context)?;
     let near = near_plane(&args.model, args.near.first().copied().filter(|_| args.near.len() == 1))?;
-    let refined = match args.refine_poses {
-        true => aligned(&gpu, &model, &views, (near, args.background), SchedulerOptions::default())?,
-        false => Vec::new(),
-    };
-    let views = if args.refine_poses { refined.iter().collect() } else { views };
-    let sizes = views.iter().map(|view| (view.camera.width, view.camera.height));
-    let mut engine = render_engine(gpu.clone(), &model, sizes)?;
     let how = Rendering {
         options: RenderOptions { near, background: args.background, ..RenderOptions::default() },
         min_confidence: args.sure.min_confidence,
         train: &dataset.train,
         by_main: args.compat,
     };
-    let mut scores = Scores {
-        refined_poses: args.refine_poses,
-        ..evaluate(&mut engine, &model, &views, how, &wholes, &mut watcher)?
+    let job = Job { args, context, wholes: Folders::find(args)?, dataset: &dataset, how };
+    let (gpu, memory) = (open_gpu(context)?, args.memory.options());
+    let image = largest(views.iter().map(|view| (view.camera.width, view.camera.height)));
+    let scores = if fits(&gpu, source.view(), image, memory)? {
+        job.of_whole(&gpu, views, memory)?
+    } else {
+        job.of_parts(&gpu, source.view(), &views, memory)?
     };
-    if let Some(seams) = Seams::of_model(&args.model)? {
-        engine.upload_model(&model)?;
-        let draw = &mut |camera: &Camera, options: &RenderOptions| render(&mut engine, camera, options);
-        scores.places = by_place(draw, &views, how.options, &seams)?;
-    }
-    if args.near.len() > 1 {
-        scores.near = Some(compare_planes(&mut engine, &model, &views, how.options, (&args.near, &scores))?);
-    }
-    if let Some(removing) = removing {
-        drop(engine);
-        let all: Vec<&View> = views.iter().copied().chain(removing.train.iter().copied()).collect();
-        let mut engine = vote_engine(gpu, &model, &all, columns_of(&all))?;
-        let (train, truth) = (&removing.train, &removing.truth);
-        scores.removal = Some(removals(&mut engine, &model, &views, train, how.options, truth, &mut watcher)?);
-    }
-    watcher.finish(&own_table(&scores))?;
     scores.warn_of_odd_view(near);
     Ok(scores)
+}
+
+/// What is scored, and how.
+struct Job<'a> {
+    args: &'a EvalArgs,
+    context: &'a Context,
+    wholes: Folders,
+    dataset: &'a Dataset,
+    how: Rendering<'a>,
+}
+
+impl Job<'_> {
+    /// Scores a model that fits into the memory of the device.
+    fn of_whole(&self, gpu: &Arc<Gpu>, views: Vec<&View>, memory: SchedulerOptions) -> Result<Scores> {
+        let (args, how) = (self.args, self.how);
+        let model = open_model(&args.model)?;
+        let removing = if args.removal { Some(Removing::new(args, &model, self.dataset)?) } else { None };
+        let pictures = picture_count(&views) + removing.as_ref().map_or(0, |_| removal::picture_count(&views));
+        let mut watcher = Watcher::new(pictures, args.page.as_deref(), self.context)?;
+        let refined = match args.refine_poses {
+            true => aligned(gpu, &model, &views, (how.options.near, args.background), memory)?,
+            false => Vec::new(),
+        };
+        let views = if args.refine_poses { refined.iter().collect() } else { views };
+        let sizes = views.iter().map(|view| (view.camera.width, view.camera.height));
+        let mut engine = render_engine(gpu.clone(), &model, sizes, memory)?;
+        let mut whole = Whole { engine: &mut engine, model: &model, min_confidence: how.min_confidence };
+        let mut scores = Scores { refined_poses: args.refine_poses, ..self.of(&mut whole, &views, &mut watcher)? };
+        if let Some(removing) = removing {
+            drop(engine);
+            let all: Vec<&View> = views.iter().copied().chain(removing.train.iter().copied()).collect();
+            let mut engine = limited_vote_engine(gpu.clone(), &model, &all, columns_of(&all), memory)?;
+            let (train, truth) = (&removing.train, &removing.truth);
+            scores.removal = Some(removals(&mut engine, &model, &views, train, how.options, truth, &mut watcher)?);
+        }
+        watcher.finish(&own_table(&scores))?;
+        Ok(scores)
+    }
+
+    /// Scores a model of which each picture takes a part.
+    fn of_parts(&self, gpu: &Arc<Gpu>, model: ModelRef, views: &[&View], memory: SchedulerOptions) -> Result<Scores> {
+        let args = self.args;
+        for (flag, typed) in [("--removal", args.removal), ("--refine-poses", args.refine_poses)] {
+            if typed {
+                let problem = "needs the whole model in the memory of the device, and it does not fit; leave it out";
+                return Err(Error::usage(flag, problem));
+            }
+        }
+        let mut watcher = Watcher::new(picture_count(views), args.page.as_deref(), self.context)?;
+        let (index, notes) = Index::of(model, self.how.min_confidence, |_, _| true)?;
+        models::log_notes(&args.model, &notes);
+        let mut painter = Painter::new(Arc::clone(gpu), model, index, memory);
+        let scores = self.of(&mut painter, views, &mut watcher)?;
+        watcher.finish(&own_table(&scores))?;
+        Ok(scores)
+    }
+
+    fn of(&self, subject: &mut dyn Subject, views: &[&View], watcher: &mut Watcher) -> Result<Scores> {
+        let mut scores = evaluate_subject(subject, views, self.how, &self.wholes, watcher)?;
+        if let Some(seams) = Seams::of_model(&self.args.model)? {
+            subject.show(None)?;
+            let draw = &mut |camera: &Camera, options: &RenderOptions| subject.render(camera, options);
+            scores.places = by_place(draw, views, self.how.options, &seams)?;
+        }
+        if self.args.near.len() > 1 {
+            scores.near = Some(compare_planes(subject, views, self.how.options, (&self.args.near, &scores))?);
+        }
+        Ok(scores)
+    }
 }
 
 /// What scores of removals need besides the views.
@@ -132,8 +183,7 @@ impl Without {
 
 /// Scores the scene at every near plane.
 fn compare_planes(
-    engine: &mut Engine,
-    model: &Gaussians,
+    subject: &mut dyn Subject,
     views: &[&View],
     options: RenderOptions,
     (planes, own): (&[f32], &Scores),
@@ -144,7 +194,7 @@ fn compare_planes(
     for &near in planes {
         let options = RenderOptions { near, ..options };
         let how = Rendering { options, min_confidence: 0.0, train: &[], by_main: false };
-        let scores = evaluate(engine, model, &scenes, how, &(), &mut ())?;
+        let scores = evaluate_subject(subject, &scenes, how, &(), &mut ())?;
         let worst = scores.views.values().map(|view| view.psnr).fold(f64::INFINITY, f64::min);
         found.push(NearScores { near, psnr: scores.mean.psnr.unwrap_or(f64::NAN), worst });
     }

@@ -6,6 +6,7 @@
 mod format;
 mod glb;
 mod html;
+mod lazy;
 mod origin;
 mod ply;
 mod rows;
@@ -23,7 +24,10 @@ use crate::scene::Gaussians;
 use std::path::Path;
 use std::sync::{PoisonError, RwLock};
 
+pub use lazy::{LazyModel, ModelRef};
+pub use ply::StoredModel;
 pub(crate) use ply::write_joined;
+pub(crate) use rows::Row;
 
 pub use format::{Export, FirstView, LabelType, ModelFormat, ModelWriter, ReadModel, SpzVersion, WriteOptions};
 
@@ -66,6 +70,16 @@ pub fn read_model(path: impl AsRef<Path>) -> Result<ReadModel> {
     let read = (format.read)(path)?;
     read.gaussians.check()?;
     Ok(read)
+}
+
+/// Opens a model that can stay in its file, or returns `None` for one that is read whole.
+fn open_stored(path: &Path) -> Result<Option<StoredModel>> {
+    match by_ending(path) {
+        Some(format) if format.name == SHIPPED[0].name => StoredModel::open(path),
+        Some(_) => Ok(None),
+        // Reading it whole tells what is wrong with a file of an unknown ending.
+        None => StoredModel::open(path).or(Ok(None)),
+    }
 }
 
 /// Adds the known extensions to the error of a file that was read as the first format by default.

@@ -5,7 +5,7 @@ use super::format::Export;
 use crate::error::{Error, Result};
 use crate::io::label_table::{LabelEntry, LabelTable};
 use crate::io::{atomic, read as file};
-use crate::scene::labels::LABEL_MAX;
+use crate::scene::MODEL_LABEL_MAX;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -63,8 +63,8 @@ pub(super) fn read(path: &Path, count: usize, checksum: u32, notes: &mut Vec<Str
         return Ok(None);
     }
     let total = own.ids.iter().try_fold(0_u64, |sum, run| sum.checked_add(run.1));
-    if total != Some(own.count) || own.ids.iter().any(|run| run.0 > LABEL_MAX) {
-        let problem = format!("expected runs of labels from 0 to {LABEL_MAX} whose lengths add up to {count}");
+    if total != Some(own.count) || own.ids.iter().any(|run| run.0 > MODEL_LABEL_MAX) {
+        let problem = format!("expected runs of labels from 0 to {MODEL_LABEL_MAX} whose lengths add up to {count}");
         return Err(Error::data(&beside, "gaussians.ids", problem));
     }
     let run = |&(id, length): &(u32, u64)| std::iter::repeat_n(id, length as usize);

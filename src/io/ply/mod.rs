@@ -6,6 +6,7 @@
 
 mod elements;
 mod points;
+mod stored;
 mod table;
 
 pub(super) use elements::Elements;

@@ -1,5 +1,6 @@
 //! The `vertex` element of a PLY file as rows of selected columns.
 
+use super::stored::StoredRows;
 use crate::error::{Error, Result};
 use crate::io::read::{self, Source};
 use ply_rs_bw::parser::{Parser, Reader};
@@ -27,10 +28,17 @@ pub(in crate::io) struct Table {
 }
 
 /// A column: its offset in a row and its type.
-struct Column {
+pub(super) struct Column {
     index: usize,
     offset: usize,
     scalar: ScalarType,
+}
+
+impl Column {
+    /// Returns the value in a row.
+    pub(super) fn value(&self, row: &[u8], big_endian: bool) -> f64 {
+        decode(&self.scalar, &row[self.offset..], big_endian)
+    }
 }
 
 fn size_of(scalar: &ScalarType) -> usize {
@@ -151,14 +159,30 @@ impl Table {
         big_endian: bool,
         row: &mut impl FnMut(u64, &[f64]) -> Result<()>,
     ) -> Result<Notes> {
-        let mut needed = u128::from(self.header_bytes);
+        let (skip, stride) = self.places()?;
+        self.file.seek_relative(skip as i64).map_err(Error::read(&self.path))?;
+        let mut bytes = vec![0u8; stride];
+        let mut values = vec![0.0; columns.len()];
+        for index in 0..self.vertex.count as u64 {
+            self.file.read_exact(&mut bytes).map_err(Error::read(&self.path))?;
+            for (value, column) in values.iter_mut().zip(columns) {
+                *value = column.value(&bytes, big_endian);
+            }
+            row(index, &values)?;
+        }
+        let needed = self.header_bytes + skip + stride as u64 * self.vertex.count as u64;
+        Ok(Notes { extra_bytes: if self.after { 0 } else { self.file_bytes - needed } })
+    }
+
+    /// Returns the bytes between the header and the first row of a binary file, and the bytes of a row. Fails if the file is
+    /// too short for its rows.
+    fn places(&self) -> Result<(u64, usize)> {
         let mut skip = 0u128;
         for element in &self.before {
             skip += stride_of(&layout_of(&self.path, element)?) as u128 * element.count as u128;
         }
-        let layout = layout_of(&self.path, &self.vertex)?;
-        let stride = stride_of(&layout);
-        needed += skip + stride as u128 * self.vertex.count as u128;
+        let stride = stride_of(&layout_of(&self.path, &self.vertex)?);
+        let needed = u128::from(self.header_bytes) + skip + stride as u128 * self.vertex.count as u128;
         if needed > u128::from(self.file_bytes) {
             let problem = format!(
                 "the header promises {} vertices of {stride} bytes, which takes {needed} bytes; the file has {}; \
@@ -167,18 +191,33 @@ impl Table {
             );
             return Err(Error::data(&self.path, "header", problem));
         }
-        self.file.seek_relative(skip as i64).map_err(Error::read(&self.path))?;
-        let mut bytes = vec![0u8; stride];
-        let mut values = vec![0.0; columns.len()];
-        for index in 0..self.vertex.count as u64 {
-            self.file.read_exact(&mut bytes).map_err(Error::read(&self.path))?;
-            for (value, column) in values.iter_mut().zip(columns) {
-                *value = decode(&column.scalar, &bytes[column.offset..], big_endian);
-            }
-            row(index, &values)?;
-        }
-        let extra = u128::from(self.file_bytes) - needed;
-        Ok(Notes { extra_bytes: if self.after { 0 } else { extra as u64 } })
+        Ok((skip as u64, stride))
+    }
+
+    /// Returns access to the rows in any order, with the values of `columns`; `None` for text, whose rows have no fixed
+    /// places.
+    pub(in crate::io) fn places_of_rows(self, columns: &[&str]) -> Result<Option<StoredRows>> {
+        let big_endian = match self.encoding {
+            Encoding::Ascii => return Ok(None),
+            Encoding::BinaryBigEndian => true,
+            Encoding::BinaryLittleEndian => false,
+        };
+        let (columns, (skip, stride)) = (self.locate(columns)?, self.places()?);
+        let first = self.header_bytes + skip;
+        Ok(Some(StoredRows { path: self.path, file: self.file, first, stride, columns, big_endian }))
+    }
+
+    /// Returns the number of rows that the header promises.
+    pub(in crate::io) fn count(&self) -> u64 {
+        self.vertex.count as u64
+    }
+
+    /// Returns true if the property exists and is `float`.
+    pub(in crate::io) fn is_single(&self, name: &str) -> bool {
+        self.vertex
+            .properties
+            .get(name)
+            .is_some_and(|property| matches!(property.data_type, PropertyType::Scalar(ScalarType::Float)))
     }
 
     fn ascii_rows(&mut self, columns: &[Column], row: &mut impl FnMut(u64, &[f64]) -> Result<()>) -> Result<Notes> {

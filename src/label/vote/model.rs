@@ -32,10 +32,21 @@ pub struct Counting {
 
 /// Makes an engine with a model and memory for `columns` vote columns ([`columns_of`]).
 pub fn vote_engine(gpu: Arc<Gpu>, model: &Gaussians, views: &[&View], columns: u32) -> Result<Engine> {
+    limited_vote_engine(gpu, model, views, columns, SchedulerOptions::default())
+}
+
+/// The same with options, such as a limit of the memory.
+pub(crate) fn limited_vote_engine(
+    gpu: Arc<Gpu>,
+    model: &Gaussians,
+    views: &[&View],
+    columns: u32,
+    options: SchedulerOptions,
+) -> Result<Engine> {
     let sizes = views.iter().map(|view| (view.camera.width, view.camera.height));
     let labels = LabelSize { vote_columns: columns, ..LabelSize::default() };
     let size = EngineSize::of_model(model, sizes).with_labels(Some(labels));
-    let mut engine = Engine::new(gpu, size, SchedulerOptions::default())?;
+    let mut engine = Engine::new(gpu, size, options)?;
     engine.upload_model(model)?;
     Ok(engine)
 }

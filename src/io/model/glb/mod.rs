@@ -23,6 +23,8 @@ const SCALE: &str = "KHR_gaussian_splatting:SCALE";
 const OPACITY: &str = "KHR_gaussian_splatting:OPACITY";
 /// Rows of the table of labels; row 0 is no object.
 const FEATURE: &str = "_FEATURE_ID_0";
+/// Largest value of it: floats hold all whole numbers up to it.
+const FEATURE_MAX: f32 = 16_777_215.0;
 const CONFIDENCE: &str = "_LABEL_CONFIDENCE";
 /// Key of the extras of a primitive: true for an antialiased model. The extension has none.
 const ANTIALIASED: &str = "antialiased";

@@ -1,8 +1,8 @@
 //! Reads GLB.
 
 use super::{
-    ANTIALIASED, AXES, CONFIDENCE, FEATURE, FEATURES, FLOAT, METADATA, OPACITY, ROTATION, SCALE, SPLATS, file,
-    harmonic, harmonics,
+    ANTIALIASED, AXES, CONFIDENCE, FEATURE, FEATURE_MAX, FEATURES, FLOAT, METADATA, OPACITY, ROTATION, SCALE, SPLATS,
+    file, harmonic, harmonics,
 };
 use crate::error::{Error, Result};
 use crate::io::label_table::{LabelEntry, LabelTable};
@@ -10,7 +10,7 @@ use crate::io::model::format::ReadModel;
 use crate::io::model::rows::{Row, Rows};
 use crate::io::model::values::log_scale;
 use crate::io::read as bytes_of;
-use crate::scene::labels::LABEL_MAX;
+use crate::scene::MODEL_LABEL_MAX;
 use serde_json::Value;
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -202,9 +202,11 @@ impl Glb<'_> {
         let mut labels = Vec::with_capacity(count);
         for (index, &feature) in column.values.iter().enumerate() {
             let place = format!("{FEATURE} {index}");
-            if feature.fract() != 0.0 || !(0.0..=LABEL_MAX as f32).contains(&feature) {
-                return Err(self
-                    .bad(&place, format!("is {feature}, no whole number from 0 to {LABEL_MAX}; renumber the labels")));
+            if feature.fract() != 0.0 || !(0.0..=FEATURE_MAX).contains(&feature) {
+                return Err(self.bad(
+                    &place,
+                    format!("is {feature}, no whole number from 0 to {FEATURE_MAX}; renumber the labels"),
+                ));
             }
             let id = match &rows {
                 _ if nothing == Some(feature as u64) => 0,
@@ -234,8 +236,8 @@ impl Glb<'_> {
         let bad = |problem: String| self.bad(&place, format!("{problem}; export the file again"));
         let table = &self.root["extensions"][METADATA]["propertyTables"][usize::try_from(index).unwrap_or(usize::MAX)];
         let count = table["count"].as_u64().and_then(|count| usize::try_from(count).ok()).unwrap_or(0);
-        if count == 0 || count > LABEL_MAX as usize + 1 {
-            return Err(bad(format!("has {count} rows, expected 1 to {}", LABEL_MAX + 1)));
+        if count == 0 || count > FEATURE_MAX as usize {
+            return Err(bad(format!("has {count} rows, expected 1 to {FEATURE_MAX}")));
         }
         let words = |view: &Value, count: usize| -> Result<Vec<u32>> {
             let (bytes, _) = self.view(&place, view)?;
@@ -260,8 +262,8 @@ impl Glb<'_> {
         }
         let (mut seen, mut known) = (BTreeSet::new(), BTreeSet::new());
         for (&id, name) in ids.iter().zip(&names) {
-            if id > LABEL_MAX || !seen.insert(id) || name.as_ref().is_some_and(|name| !known.insert(name)) {
-                return Err(bad(format!("the id {id} or its name is there twice, or above {LABEL_MAX}")));
+            if id > MODEL_LABEL_MAX || !seen.insert(id) || name.as_ref().is_some_and(|name| !known.insert(name)) {
+                return Err(bad(format!("the id {id} or its name is there twice, or above {MODEL_LABEL_MAX}")));
             }
         }
         Ok(ids.into_iter().zip(names).collect())

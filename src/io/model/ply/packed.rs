@@ -31,6 +31,11 @@ const BOUNDS: [&str; 12] = [
 const COLOURS: [&str; 6] = ["min_r", "min_g", "min_b", "max_r", "max_g", "max_b"];
 const PACKED: [&str; 4] = ["packed_position", "packed_rotation", "packed_scale", "packed_color"];
 
+/// Returns true for a file that is compressed.
+pub(super) fn is_packed(path: &Path) -> Result<bool> {
+    Ok(Elements::open(path, PACKED[0])?.is_some())
+}
+
 /// Reads a file that is compressed; `None` for any other PLY.
 pub(super) fn read(path: &Path) -> Result<Option<ReadModel>> {
     let Some(elements) = Elements::open(path, PACKED[0])? else { return Ok(None) };

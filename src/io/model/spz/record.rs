@@ -4,7 +4,7 @@
 use crate::error::{Error, Result};
 use crate::io::label_table::LabelTable;
 use crate::io::model::format::Export;
-use crate::scene::labels::LABEL_MAX;
+use crate::scene::MODEL_LABEL_MAX;
 use flate2::Compression;
 use flate2::read::ZlibDecoder;
 use flate2::write::ZlibEncoder;
@@ -114,8 +114,8 @@ fn labels(path: &Path, payload: &[u8], count: usize, to: &mut Records) -> Result
     let (ids, shares) = plain.split_at(count * usize::from(width));
     let id = |bytes: &[u8]| bytes.iter().rev().fold(0, |id, &byte| id << 8 | u32::from(byte));
     let ids: Vec<u32> = ids.chunks_exact(usize::from(width)).map(id).collect();
-    if let Some(id) = ids.iter().find(|&&id| id > LABEL_MAX) {
-        return Err(bad(format!("has the label {id}; labels are from 0 to {LABEL_MAX}")));
+    if let Some(id) = ids.iter().find(|&&id| id > MODEL_LABEL_MAX) {
+        return Err(bad(format!("has the label {id}; labels are from 0 to {MODEL_LABEL_MAX}")));
     }
     to.labels = Some(ids);
     to.confidence = (confident == 1).then(|| shares.iter().map(|&share| f32::from(share) / 255.0).collect());

@@ -1,0 +1,7 @@
+//! Pictures of models that are larger than the memory of the device: each view takes the Gaussians that it may show.
+
+mod index;
+mod painter;
+
+pub use index::Index;
+pub use painter::{Painter, fits};

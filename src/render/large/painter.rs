@@ -1,0 +1,168 @@
+//! Draws a large model: reads the Gaussians that a picture may show, and halves the picture until they fit.
+
+use super::Index;
+use crate::engine::{Band, Engine, EngineSize, LabelSize, tell_apart, uniforms};
+use crate::error::{Error, Result};
+use crate::gpu::Gpu;
+use crate::io::model::ModelRef;
+use crate::pass::KernelShape;
+use crate::render::{RenderOptions, Rendered, render_band};
+use crate::scene::{Camera, Gaussians};
+use crate::scheduler::SchedulerOptions;
+use std::sync::Arc;
+
+/// Returns true if the device has the memory to draw `count` Gaussians at once in images of up to `image` px.
+pub fn fits(gpu: &Gpu, model: ModelRef, image: (u32, u32), options: SchedulerOptions) -> Result<bool> {
+    let size = EngineSize::new(model.count().max(1), image).with_labels(labels_of(model));
+    Ok(prediction(gpu, size, options)?.is_none())
+}
+
+fn labels_of(model: ModelRef) -> Option<LabelSize> {
+    model.has_labels().then(LabelSize::default)
+}
+
+/// Returns the error with which an engine of a size does not fit, or `None` if it does.
+fn prediction(gpu: &Gpu, size: EngineSize, options: SchedulerOptions) -> Result<Option<Error>> {
+    match Engine::predict(gpu, &size, options) {
+        Ok(_) => Ok(None),
+        Err(error @ Error::OutOfMemory { .. }) => Ok(Some(error)),
+        Err(other) => Err(other),
+    }
+}
+
+/// Draws a model, or an object of it alone.
+pub struct Painter<'a> {
+    gpu: Arc<Gpu>,
+    model: ModelRef<'a>,
+    index: Index,
+    only: Option<u32>,
+    engine: Option<Engine>,
+    shape: KernelShape,
+    options: SchedulerOptions,
+}
+
+impl<'a> Painter<'a> {
+    /// Makes a painter of the Gaussians in an index of `model`.
+    pub fn new(gpu: Arc<Gpu>, model: ModelRef<'a>, index: Index, options: SchedulerOptions) -> Self {
+        let shape = KernelShape::of(gpu.capabilities());
+        Self { gpu, model, index, only: None, engine: None, shape, options }
+    }
+
+    /// Labels of the Gaussians.
+    pub(crate) fn labels(&self) -> Option<&[u32]> {
+        self.index.labels()
+    }
+
+    /// Draws an object alone from now on, or everything. Returns false if there is no such object.
+    pub fn show(&mut self, only: Option<u32>) -> bool {
+        self.only = only;
+        only.is_none_or(|label| self.index.has_object(label))
+    }
+
+    /// Draws a picture like [`render`](crate::render::render()). Main Gaussians have their places in the index.
+    pub fn render(&mut self, camera: &Camera, options: &RenderOptions) -> Result<Rendered> {
+        let size = EngineSize::new(1, (camera.width, camera.height));
+        let mut open = Band::all(camera.height, size.band(&self.shape).unwrap_or(camera.height));
+        // The next band is the last one of the list.
+        open.reverse();
+        let mut whole: Option<Rendered> = None;
+        while let Some(band) = open.pop() {
+            match self.band(camera, band, options)? {
+                Drawn::Picture(drawn) => {
+                    whole = Some(match whole {
+                        Some(above) => above.with_below(drawn),
+                        None => drawn,
+                    });
+                }
+                Drawn::TooLarge(error) => {
+                    let rows = (band.rows / 2).next_multiple_of(self.shape.tile_height);
+                    if rows >= band.rows {
+                        return Err(error);
+                    }
+                    open.push(Band { first: band.first + rows, rows: band.rows - rows });
+                    open.push(Band { first: band.first, rows });
+                }
+            }
+        }
+        whole.ok_or_else(|| Error::usage("camera", "has an image of 0 rows"))
+    }
+
+    /// Draws some rows of a picture, if the Gaussians that they may show fit.
+    fn band(&mut self, camera: &Camera, band: Band, options: &RenderOptions) -> Result<Drawn> {
+        let of =
+            |part: &Camera| uniforms::view_uniforms(part, self.index.origin, &self.shape, options.near, [0.0; 3], 0);
+        let seen = self.index.seen(&uniforms::with_slopes_of(of(&band.camera(camera)), &of(camera)), self.only);
+        let part = |error| Drawn::TooLarge(of_part(error, (camera.width, band.rows), seen.len()));
+        if let Some(error) = self.labels().and_then(|labels| tell_apart(seen.iter().map(|&at| labels[at as usize]))) {
+            return Ok(part(error));
+        }
+        let size = EngineSize::new((seen.len() as u64).max(1), (camera.width, band.rows));
+        if let Some(error) = self.make_engine(size.with_labels(labels_of(self.model)))? {
+            return Ok(part(error));
+        }
+        let model = self.model.rows(self.index.numbers(&seen), self.index.far)?;
+        match self.draw(&model, camera, band, options) {
+            // Counted on the device, the tiles of the Gaussians are more than was assumed.
+            Err(error @ Error::OutOfMemory { .. }) => {
+                self.engine = None;
+                Ok(part(error))
+            }
+            drawn => {
+                let mut drawn = drawn?;
+                let place = |row: i32| usize::try_from(row).map_or(row, |row| seen[row] as i32);
+                drawn.top_id.iter_mut().for_each(|row| *row = place(*row));
+                Ok(Drawn::Picture(drawn))
+            }
+        }
+    }
+
+    fn draw(&mut self, model: &Gaussians, camera: &Camera, band: Band, options: &RenderOptions) -> Result<Rendered> {
+        let engine = self.engine.as_mut().ok_or_else(|| Error::Bug("there is no engine".to_owned()))?;
+        engine.upload_model(model)?;
+        let uniforms = engine.band_uniforms(camera, band, options.near, options.background);
+        render_band(engine, &uniforms, options)
+    }
+
+    /// Makes an engine of at least this size, unless there is one. Returns the error of one that does not fit.
+    fn make_engine(&mut self, size: EngineSize) -> Result<Option<Error>> {
+        let mut wanted = size;
+        if let Some(engine) = &self.engine {
+            let old = engine.size();
+            wanted.gaussians = size.gaussians.max(old.gaussians);
+            wanted.image = (size.image.0.max(old.image.0), size.image.1.max(old.image.1));
+            if wanted == *old {
+                return Ok(None);
+            }
+        }
+        if wanted != size && prediction(&self.gpu, wanted, self.options)?.is_some() {
+            wanted = size;
+        }
+        if let Some(error) = prediction(&self.gpu, wanted, self.options)? {
+            return Ok(Some(error));
+        }
+        // The memory of the old one first.
+        self.engine = None;
+        self.engine = Some(Engine::new(Arc::clone(&self.gpu), wanted, self.options)?);
+        Ok(None)
+    }
+}
+
+/// A part of a picture, or why it is too large.
+enum Drawn {
+    Picture(Rendered),
+    TooLarge(Error),
+}
+
+/// Says which part of a picture does not fit.
+fn of_part(error: Error, (width, height): (u32, u32), count: usize) -> Error {
+    match error {
+        Error::OutOfMemory { what, needed, limit_name, limit, .. } => Error::OutOfMemory {
+            what: format!("{what}, for {width} x {height} px that may show {count} Gaussians,"),
+            needed,
+            limit_name,
+            limit,
+            cure: "give more memory, draw smaller pictures, or a part of the model".to_owned(),
+        },
+        other => other,
+    }
+}
