@@ -210,7 +210,7 @@ pub mod shaders {
     }
 }
 pub mod synth {
-    pub use crate::synth::cameras::ring_of_cameras;
+    pub use crate::synth::cameras::{cameras, ring_of_cameras};
     pub use crate::synth::trace::{Picture, alone, photograph, picture};
     pub use crate::synth::world::World;
     pub use crate::synth::{dataset, write};

@@ -20,6 +20,7 @@ mod bands; // photos with more tiles than the device can walk
 mod blocks; // a scene in blocks: frozen Gaussians, split, trained, merged
 mod capture; // faults of photos and poses are found before training
 mod cards; // kernels compile for cards that are not there
+mod city; // the made city is seen by several photos everywhere
 mod cli; // flags, defaults, streams and exit statuses
 mod cli_devices; // a missing or poorer device is refused by name
 mod cli_edit; // labels are chosen and edited from the command line

@@ -23,12 +23,12 @@ pub struct SynthArgs {
     /// Size of a picture, px.
     #[arg(long, value_name = "WxH", value_parser = size, default_value = "320x240")]
     pub size: Size,
-    /// Number of views.
-    #[arg(long, value_name = "N", default_value_t = 40)]
-    pub views: u32,
-    /// Number of 3D points.
-    #[arg(long, value_name = "N", default_value_t = 4000)]
-    pub points: u32,
+    /// Number of views. Default: 40; 200 of a city.
+    #[arg(long, value_name = "N")]
+    pub views: Option<u32>,
+    /// Number of 3D points. Default: 4000; 20000 of a city.
+    #[arg(long, value_name = "N")]
+    pub points: Option<u32>,
     /// Seed of colours, camera jitter and points.
     #[arg(long, value_name = "SEED", default_value_t = 0)]
     pub seed: u64,
@@ -49,12 +49,13 @@ pub struct SynthArgs {
 
 /// Writes the scene.
 pub(crate) fn run(args: &SynthArgs, context: &Context) -> Result<()> {
+    let of_preset = SynthOptions::of(args.preset);
     let options = SynthOptions {
         preset: args.preset,
         width: args.size.0,
         height: args.size.1,
-        views: args.views,
-        points: args.points,
+        views: args.views.unwrap_or(of_preset.views),
+        points: args.points.unwrap_or(of_preset.points),
         seed: args.seed,
         lens: args.lens,
         fov: args.fov,

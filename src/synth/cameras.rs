@@ -1,6 +1,6 @@
-//! Cameras on a dome around the scene, facing inwards.
+//! The cameras of a scene: on a dome around it, facing inwards, or on a flight over a city.
 
-use super::{SynthOptions, hash01};
+use super::{Preset, SynthOptions, flight, hash01};
 use crate::scene::Camera;
 use glam::{DMat3, DQuat, DVec3};
 use std::f64::consts::TAU;
@@ -10,20 +10,31 @@ const DISTANCE: f64 = 4.0;
 /// Elevations of the three rings, degrees.
 const ELEVATIONS: [f64; 3] = [16.0, 33.0, 52.0];
 
+/// Returns one camera per view.
+pub fn cameras(options: &SynthOptions) -> Vec<Camera> {
+    match options.preset {
+        Preset::City => (0..options.views).map(|view| looking(options, flight::pose(options, view))).collect(),
+        _ => ring_of_cameras(options),
+    }
+}
+
 /// Returns one camera per view, once around the scene. Every third camera has the same height, so that a held-out view
 /// has close neighbours.
 pub fn ring_of_cameras(options: &SynthOptions) -> Vec<Camera> {
-    (0..options.views).map(|view| camera(options, view)).collect()
+    (0..options.views).map(|view| looking(options, on_ring(options, view))).collect()
 }
 
-fn camera(options: &SynthOptions, view: u32) -> Camera {
+/// Returns the position of a view and the unit vector along its optical axis.
+fn on_ring(options: &SynthOptions, view: u32) -> (DVec3, DVec3) {
     let random = |what: u64| hash01(options.seed, 3, u64::from(view), what) - 0.5;
     let azimuth = TAU * (f64::from(view) + 0.3 * random(0)) / f64::from(options.views);
     let elevation = (ELEVATIONS[(view % 3) as usize] + 4.0 * random(1)).to_radians();
     let target = DVec3::new(0.1 * random(2), 0.1 * random(3), 0.42);
     let outward = DVec3::new(azimuth.cos() * elevation.cos(), azimuth.sin() * elevation.cos(), elevation.sin());
-    let centre = target + outward * (DISTANCE * (1.0 + 0.1 * random(4)));
-    let forward = -outward;
+    (target + outward * (DISTANCE * (1.0 + 0.1 * random(4))), -outward)
+}
+
+fn looking(options: &SynthOptions, (centre, forward): (DVec3, DVec3)) -> Camera {
     let right = forward.cross(DVec3::Z).normalize();
     let down = forward.cross(right);
     // Through the quaternion, because the files store that.

@@ -5,8 +5,11 @@
 //! Gaussians, so a score on them does not compare the engine with itself.
 
 pub(crate) mod cameras;
+mod city;
 mod exposure;
+mod flight;
 mod hard;
+mod land;
 mod lens;
 mod material;
 mod object;
@@ -25,7 +28,7 @@ pub use write::{Summary, write};
 
 use crate::io::lens::{Lens, Optics};
 use crate::scene::{Dataset, LabelMap, Photo, View};
-use cameras::ring_of_cameras;
+use cameras::cameras;
 use serde::{Deserialize, Serialize};
 use trace::picture;
 
@@ -42,6 +45,9 @@ pub enum Preset {
     /// Objects that are hard to label: thin parts, the ground's colours, black, inside another, cut by the border,
     /// touching.
     Hard,
+    /// A city of sixty houses, trees, vehicles and lamps over 24 x 16 world units, seen from above and from its streets:
+    /// a scene to train in blocks.
+    City,
 }
 
 /// The options of a made scene.
@@ -69,12 +75,20 @@ pub struct SynthOptions {
 
 impl Default for SynthOptions {
     fn default() -> Self {
+        Self::of(Preset::Default)
+    }
+}
+
+impl SynthOptions {
+    /// Returns the options of a preset, with as many views and points as it needs.
+    pub fn of(preset: Preset) -> Self {
+        let (views, points) = if preset == Preset::City { (200, 20_000) } else { (40, 4000) };
         Self {
-            preset: Preset::Default,
+            preset,
             width: 320,
             height: 240,
-            views: 40,
-            points: 4000,
+            views,
+            points,
             seed: 0,
             lens: SynthLens::default(),
             fov: None,
@@ -87,7 +101,7 @@ impl Default for SynthOptions {
 /// none.
 pub fn dataset(options: &SynthOptions, test_every: u32) -> Dataset {
     let world = World::new(options.preset, options.seed);
-    let cameras = ring_of_cameras(options);
+    let cameras = cameras(options);
     let optics: Vec<Optics> = cameras.iter().map(|camera| Optics::new(camera.clone(), Lens::Pinhole)).collect();
     let mut dataset = Dataset {
         points: points::sample(&world, &optics, options).into_iter().map(|seen| seen.point).collect(),

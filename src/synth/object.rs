@@ -31,8 +31,20 @@ impl Object {
         (back * (origin - self.position), back * direction)
     }
 
+    /// Returns false for most rays that miss the object, from a sphere around it.
+    pub(super) fn may_meet(&self, origin: DVec3, direction: DVec3) -> bool {
+        let to = self.position - origin;
+        let along = to.dot(direction);
+        // Wider than the sphere of the shape itself, which then decides.
+        let bound = self.shape.bound() * 1.001;
+        to.length_squared() - along * along <= bound * bound && along > -bound
+    }
+
     /// Returns the distance at which a ray hits the object alone.
     pub fn distance(&self, origin: DVec3, direction: DVec3) -> Option<f64> {
+        if !self.may_meet(origin, direction) {
+            return None;
+        }
         let (origin, direction) = self.to_own(origin, direction);
         self.shape.enter(origin, direction).map(|entry| entry.distance)
     }

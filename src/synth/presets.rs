@@ -3,7 +3,7 @@
 use super::material::{Material, Pattern, hsv};
 use super::object::{Object, Row};
 use super::shape::Shape;
-use super::{Preset, hard, hash01};
+use super::{Preset, city, hard, hash01};
 use glam::{DQuat, DVec3};
 
 /// Returns the objects of a preset, with ids 1, 2, ... in order.
@@ -12,6 +12,7 @@ pub(super) fn objects(preset: Preset, seed: u64) -> Vec<Object> {
         Preset::Default => default_rows(),
         Preset::Simple => simple_rows(),
         Preset::Hard => hard::rows(),
+        Preset::City => city::rows(),
     };
     rows.into_iter().enumerate().map(|(index, row)| object(index, row, seed)).collect()
 }

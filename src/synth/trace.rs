@@ -7,6 +7,7 @@ use crate::io::lens::{Lens, Optics};
 use crate::scene::Camera;
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
+use std::collections::BTreeSet;
 
 /// Number of samples along each side of a pixel.
 const SIDE: u32 = 3;
@@ -73,10 +74,27 @@ fn pinhole(camera: &Camera) -> Optics {
     Optics::new(camera.clone(), Lens::Pinhole)
 }
 
-/// Renders the photo of view number `view` alone.
-pub(super) fn photo(world: &World, camera: &Camera, view: u32) -> Vec<[u8; 3]> {
-    let (width, pixels, optics) = (camera.width, camera.width * camera.height, pinhole(camera));
-    (0..pixels).into_par_iter().map(|index| colour(world, &optics, view, (index % width, index / width))).collect()
+/// Returns, for each object of the world in order, the pixels of view number `view` whose colour may be another without
+/// it: those that show it or its shadow.
+pub(super) fn involved(world: &World, camera: &Camera, view: u32) -> Vec<Vec<u32>> {
+    let (width, optics) = (camera.width, pinhole(camera));
+    let parts = |index: u32| {
+        let mut found = BTreeSet::new();
+        colour(world, &optics, view, (index % width, index / width), &mut |object| _ = found.insert(object));
+        found
+    };
+    let parts: Vec<BTreeSet<usize>> = (0..width * camera.height).into_par_iter().map(parts).collect();
+    let mut pixels = vec![Vec::new(); world.objects.len()];
+    (0..).zip(&parts).for_each(|(index, found)| found.iter().for_each(|&object| pixels[object].push(index)));
+    pixels
+}
+
+/// Renders some pixels of the photo of view number `view` anew.
+pub(super) fn repaint(world: &World, camera: &Camera, view: u32, photo: &mut [[u8; 3]], pixels: &[u32]) {
+    let (width, optics) = (camera.width, pinhole(camera));
+    let of = |&index: &u32| colour(world, &optics, view, (index % width, index / width), &mut |_| ());
+    let colours: Vec<[u8; 3]> = pixels.par_iter().map(of).collect();
+    pixels.iter().zip(colours).for_each(|(&index, colour)| photo[index as usize] = colour);
 }
 
 /// Returns the unit direction, world, of the ray through an image position; `None` if the lens shows nothing there.
@@ -137,17 +155,17 @@ fn pixel(world: &World, optics: &Optics, view: u32, x: u32, y: u32) -> Pixel {
     let camera = &optics.camera;
     let centre = middle(optics, x, y).map(|ray| world.hit(camera.centre(), ray));
     Pixel {
-        rgb: colour(world, optics, view, (x, y)),
+        rgb: colour(world, optics, view, (x, y), &mut |_| ()),
         id: centre.as_ref().map_or(0, |hit| world.id(hit)),
         depth: centre.map_or(f32::NAN, |hit| camera.to_camera(hit.place).z as f32),
     }
 }
 
-/// Returns the mean colour over a pixel.
-fn colour(world: &World, optics: &Optics, view: u32, (x, y): (u32, u32)) -> [u8; 3] {
+/// Returns the mean colour over a pixel. `note` receives the objects without which it may be another.
+fn colour(world: &World, optics: &Optics, view: u32, (x, y): (u32, u32), note: &mut impl FnMut(usize)) -> [u8; 3] {
     let origin = optics.camera.centre();
     let (sum, count) = samples(optics, view, x, y)
-        .map(|(direction, spot)| world.colour(&world.hit(origin, direction), spot))
+        .map(|(direction, spot)| world.colour_by(&world.hit(origin, direction), spot, note))
         .fold((DVec3::ZERO, 0), |(sum, count), colour| (sum + colour, count + 1));
     bytes(sum / f64::from(count.max(1)))
 }

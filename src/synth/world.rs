@@ -1,14 +1,9 @@
 //! The world: objects on a textured ground under a sky.
 
-use super::material::ground_albedo;
+use super::land::Land;
 use super::object::Object;
 use super::{Preset, hash01, presets};
 use glam::DVec3;
-
-/// Radius of the sky, a real surface around the scene, so that its distance can be learnt.
-const SKY_RADIUS: f64 = 9.0;
-/// Radii between which the ground fades to the colour of the horizon.
-const HAZE: (f64, f64) = (2.2, 6.5);
 
 /// The surface that a ray hits first.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -41,6 +36,7 @@ pub struct World {
     pub objects: Vec<Object>,
     /// Objects of which only the shadow is there.
     shadows: Vec<Object>,
+    land: Land,
     /// Unit vector to the light.
     light: DVec3,
     /// Two unit vectors across the light's direction.
@@ -57,6 +53,7 @@ impl World {
         Self {
             objects: presets::objects(preset, seed),
             shadows: Vec::new(),
+            land: Land::new(preset),
             light,
             light_sides: [side, light.cross(side)],
             seed,
@@ -80,7 +77,7 @@ impl World {
 
     /// Returns the first hit of a ray. `origin` is above the ground and inside the sky.
     pub fn hit(&self, origin: DVec3, direction: DVec3) -> Hit {
-        let mut best = ground_or_sky(origin, direction);
+        let mut best = self.ground_or_sky(origin, direction);
         best.place = origin + direction * best.distance;
         for index in 0..self.objects.len() {
             if let Some(hit) = self.hit_object(index, origin, direction)
@@ -95,6 +92,9 @@ impl World {
     /// Returns the hit of a ray with the object of this index, ignoring all others.
     pub fn hit_object(&self, index: usize, origin: DVec3, direction: DVec3) -> Option<Hit> {
         let object = &self.objects[index];
+        if !object.may_meet(origin, direction) {
+            return None;
+        }
         let (own_origin, own_direction) = object.to_own(origin, direction);
         let entry = object.shape.enter(own_origin, own_direction)?;
         let (distance, normal) = (entry.distance, object.rotation * entry.normal);
@@ -104,10 +104,16 @@ impl World {
     /// Returns the colour of a surface point, the same in every direction, 0 to 1. `spot` (-1 to 1) picks a position on
     /// the light; a mean over spots gives soft shadows.
     pub fn colour(&self, hit: &Hit, spot: [f64; 2]) -> DVec3 {
+        self.colour_by(hit, spot, &mut |_| ())
+    }
+
+    /// The same. `note` receives the indices of the objects without which the colour may be another.
+    pub(super) fn colour_by(&self, hit: &Hit, spot: [f64; 2], note: &mut impl FnMut(usize)) -> DVec3 {
         let albedo = match hit.surface {
-            Surface::Sky => return sky_colour(hit.place),
-            Surface::Ground => ground_albedo(hit.place, self.seed),
+            Surface::Sky => return self.sky_colour(hit.place),
+            Surface::Ground => self.land.albedo(hit.place, self.seed),
             Surface::Object(index) => {
+                note(index);
                 let object = &self.objects[index];
                 object.material.albedo(object.to_own(hit.place, hit.normal).0)
             }
@@ -115,40 +121,44 @@ impl World {
         let to_light =
             (self.light + (self.light_sides[0] * spot[0] + self.light_sides[1] * spot[1]) * 0.09).normalize();
         let facing = hit.normal.dot(to_light).max(0.0);
-        let start = hit.place + hit.normal * 1e-4;
-        let is_lit = || {
-            // What only throws a shadow may have the point inside, where a ray meets nothing on its way out. So this one
-            // comes from the light.
-            let outside = start + to_light * (2.0 * SKY_RADIUS);
-            let before = |object: &Object| object.distance(outside, -to_light).is_some_and(|at| at < 2.0 * SKY_RADIUS);
-            !self.objects.iter().any(|object| object.distance(start, to_light).is_some())
-                && !self.shadows.iter().any(before)
-        };
-        let lit = facing > 0.0 && is_lit();
+        let lit = facing > 0.0 && self.is_lit(hit.place + hit.normal * 1e-4, to_light, note);
         let ambient = 0.42 * (0.8 + 0.2 * hit.normal.z);
         let shaded = albedo * (ambient + if lit { 0.62 * facing } else { 0.0 });
         let haze = match hit.surface {
-            Surface::Ground => smooth(HAZE.0, HAZE.1, hit.place.truncate().length()),
+            Surface::Ground => smooth(self.land.haze.0, self.land.haze.1, hit.place.truncate().length()),
             _ => 0.0,
         };
-        shaded.lerp(sky_colour(DVec3::X), haze).clamp(DVec3::ZERO, DVec3::ONE)
+        shaded.lerp(self.sky_colour(DVec3::X), haze).clamp(DVec3::ZERO, DVec3::ONE)
     }
-}
 
-fn ground_or_sky(origin: DVec3, direction: DVec3) -> Hit {
-    let b = origin.dot(direction);
-    let sky = -b + (b * b - origin.length_squared() + SKY_RADIUS * SKY_RADIUS).max(0.0).sqrt();
-    let ground = -origin.z / direction.z;
-    if direction.z < 0.0 && ground < sky {
-        return Hit { distance: ground, place: DVec3::ZERO, normal: DVec3::Z, surface: Surface::Ground };
+    /// Whether nothing is between a point and the light. `note` receives the first object that is.
+    fn is_lit(&self, start: DVec3, to_light: DVec3, note: &mut impl FnMut(usize)) -> bool {
+        if let Some(index) = self.objects.iter().position(|object| object.distance(start, to_light).is_some()) {
+            note(index);
+            return false;
+        }
+        // What only throws a shadow may have the point inside, where a ray meets nothing on its way out. So this one
+        // comes from the light.
+        let far = 2.0 * self.land.sky;
+        let outside = start + to_light * far;
+        !self.shadows.iter().any(|object| object.distance(outside, -to_light).is_some_and(|at| at < far))
     }
-    Hit { distance: sky, place: DVec3::ZERO, normal: -direction, surface: Surface::Sky }
-}
 
-/// Returns the sky colour, from haze at the horizon to a blue zenith.
-fn sky_colour(place: DVec3) -> DVec3 {
-    let height = (place.z / SKY_RADIUS).clamp(0.0, 1.0);
-    DVec3::new(0.78, 0.82, 0.86).lerp(DVec3::new(0.36, 0.55, 0.82), height.powf(0.6))
+    fn ground_or_sky(&self, origin: DVec3, direction: DVec3) -> Hit {
+        let b = origin.dot(direction);
+        let sky = -b + (b * b - origin.length_squared() + self.land.sky * self.land.sky).max(0.0).sqrt();
+        let ground = -origin.z / direction.z;
+        if direction.z < 0.0 && ground < sky {
+            return Hit { distance: ground, place: DVec3::ZERO, normal: DVec3::Z, surface: Surface::Ground };
+        }
+        Hit { distance: sky, place: DVec3::ZERO, normal: -direction, surface: Surface::Sky }
+    }
+
+    /// Returns the sky colour, from haze at the horizon to a blue zenith.
+    fn sky_colour(&self, place: DVec3) -> DVec3 {
+        let height = (place.z / self.land.sky).clamp(0.0, 1.0);
+        DVec3::new(0.78, 0.82, 0.86).lerp(DVec3::new(0.36, 0.55, 0.82), height.powf(0.6))
+    }
 }
 
 fn smooth(low: f64, high: f64, value: f64) -> f64 {

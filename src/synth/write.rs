@@ -3,8 +3,8 @@
 use super::object::Object;
 use super::points::Seen;
 
-use super::cameras::ring_of_cameras;
-use super::trace::{Picture, alone, photo, photograph, picture};
+use super::cameras::cameras;
+use super::trace::{Picture, alone, involved, photograph, picture, repaint};
 use super::world::World;
 use super::{SynthLens, SynthOptions, exposure, lens, points, view_name};
 use crate::io::label_table::{self, LabelEntry, LabelTable};
@@ -13,6 +13,7 @@ use crate::io::{ReadOptions, atomic, image};
 use crate::scene::Camera;
 use crate::{Error, Result};
 use glam::DQuat;
+use rayon::prelude::*;
 use serde::Serialize;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -41,7 +42,7 @@ pub fn write(options: &SynthOptions, folder: &Path, after_view: &dyn Fn(u32) -> 
     }
     let world = World::new(options.preset, options.seed);
     lens::check(options)?;
-    let optics: Vec<Optics> = ring_of_cameras(options).iter().map(|camera| lens::mounted(options, camera)).collect();
+    let optics: Vec<Optics> = cameras(options).iter().map(|camera| lens::mounted(options, camera)).collect();
     create_folders(folder, &world, optics.iter().all(|optics| optics.lens.is_pinhole()))?;
     let entry = |object: &Object| LabelEntry { name: Some(object.name.into()), ..LabelEntry::new(object.id.into()) };
     let mut table = LabelTable::new(world.objects.iter().map(entry).collect());
@@ -50,12 +51,12 @@ pub fn write(options: &SynthOptions, folder: &Path, after_view: &dyn Fn(u32) -> 
     for (index, optics) in optics.iter().enumerate() {
         let camera = &optics.camera;
         if optics.lens.is_pinhole() {
-            let mut made = picture(&world, camera, index as u32);
-            let rgb = exposure::exposed(options, index as u32, std::mem::take(&mut made.rgb));
+            let made = picture(&world, camera, index as u32);
+            let rgb = exposure::exposed(options, index as u32, made.rgb.clone());
             write_photo(folder, index, camera, &rgb, &made.ids)?;
             write_truth(folder, index, &world, camera, &made)?;
             if index.is_multiple_of(ReadOptions::default().test_every as usize) {
-                write_without(folder, index, &world, camera)?;
+                write_without(folder, index, &world, camera, &made.rgb)?;
             }
             count(&mut table, &made.ids);
         } else {
@@ -99,27 +100,29 @@ fn write_photo(folder: &Path, index: usize, camera: &Camera, rgb: &[[u8; 3]], id
 fn write_truth(folder: &Path, index: usize, world: &World, camera: &Camera, made: &Picture) -> Result<()> {
     let name = view_name(index);
     let (width, height) = (made.width, made.height);
-    for (place, (object, whole)) in world.objects.iter().zip(&made.whole).enumerate() {
+    world.objects.par_iter().zip(&made.whole).enumerate().try_for_each(|(place, (object, whole))| {
         let path = folder.join("amodal").join(object.id.to_string()).join(&name);
         let bytes: Vec<u8> = whole.iter().map(|&covered| if covered { 255 } else { 0 }).collect();
         image::write_png_grey8(&path, width, height, &bytes)?;
         let path = folder.join("objects").join(object.id.to_string()).join(&name);
-        image::write_png_rgba8(&path, width, height, &alone(world, camera, index as u32, place))?;
-    }
+        image::write_png_rgba8(&path, width, height, &alone(world, camera, index as u32, place))
+    })?;
     image::write_exr_y(folder.join("depth").join(format!("{index:03}.exr")), width, height, &made.depth)
 }
 
 /// Writes the photo of the view in the world without each object: `without/ID/NAME.png`, and `shadowed/ID/NAME.png` where
 /// its shadow stays. Only views that are held out by default have them, because removals are scored there.
-fn write_without(folder: &Path, index: usize, world: &World, camera: &Camera) -> Result<()> {
-    for object in &world.objects {
+fn write_without(folder: &Path, index: usize, world: &World, camera: &Camera, photo: &[[u8; 3]]) -> Result<()> {
+    let involved = involved(world, camera, index as u32);
+    world.objects.par_iter().zip(&involved).try_for_each(|(object, pixels)| {
         for (kind, shadow) in [("without", false), ("shadowed", true)] {
             let path = folder.join(kind).join(object.id.to_string()).join(view_name(index));
-            let rgb = photo(&world.without(object.id, shadow), camera, index as u32);
+            let mut rgb = photo.to_vec();
+            repaint(&world.without(object.id, shadow), camera, index as u32, &mut rgb, pixels);
             image::write_png_rgb8(&path, camera.width, camera.height, &rgb)?;
         }
-    }
-    Ok(())
+        Ok(())
+    })
 }
 
 fn save(path: &Path, bytes: &[u8]) -> Result<()> {

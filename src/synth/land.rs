@@ -1,0 +1,57 @@
+//! What objects stand on, and the sky above them.
+
+use super::Preset;
+use super::material::{ground_albedo, noise};
+use glam::DVec3;
+
+/// Plots of the city along x and along y; the world's origin is in the middle.
+pub(super) const COLUMNS: u32 = 6;
+pub(super) const ROWS: u32 = 4;
+/// Distance between the middles of neighbouring streets, world units.
+pub(super) const PLOT: f64 = 4.0;
+/// Half the width of a street, world units.
+pub(super) const STREET: f64 = 0.65;
+
+/// Ground and sky of a scene. Lengths are world units.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Land {
+    /// Radius of the sky, a real surface around the scene, so that its distance can be learnt.
+    pub(super) sky: f64,
+    /// Radii between which the ground fades to the colour of the horizon.
+    pub(super) haze: (f64, f64),
+    has_streets: bool,
+}
+
+impl Land {
+    /// Returns the land of a preset.
+    pub(super) fn new(preset: Preset) -> Self {
+        match preset {
+            Preset::City => Self { sky: 36.0, haze: (15.0, 28.0), has_streets: true },
+            _ => Self { sky: 9.0, haze: (2.2, 6.5), has_streets: false },
+        }
+    }
+
+    /// Returns the albedo of the ground at a world position.
+    pub(super) fn albedo(&self, place: DVec3, seed: u64) -> DVec3 {
+        let street = if self.has_streets { street(place, seed) } else { None };
+        street.unwrap_or_else(|| ground_albedo(place, seed))
+    }
+}
+
+/// Returns the albedo of a street with a dashed line in its middle; `None` beside it.
+fn street(place: DVec3, seed: u64) -> Option<DVec3> {
+    let reach = |count: u32| f64::from(count) / 2.0 * PLOT + STREET;
+    if place.x.abs() > reach(COLUMNS) || place.y.abs() > reach(ROWS) {
+        return None;
+    }
+    let from_middle = |at: f64| (at - (at / PLOT).round() * PLOT).abs();
+    let (x, y) = (from_middle(place.x), from_middle(place.y));
+    if x.min(y) > STREET {
+        return None;
+    }
+    let is_crossing = x.max(y) < STREET;
+    let along = if x < y { place.y } else { place.x };
+    let is_line = !is_crossing && x.min(y) < 0.04 && (along / 0.4).floor().rem_euclid(2.0) < 1.0;
+    let base = if is_line { DVec3::splat(0.8) } else { DVec3::new(0.3, 0.31, 0.34) };
+    Some(base * (0.7 + 0.6 * noise(place / 0.3, seed + 78)))
+}
