@@ -7,6 +7,7 @@
 //! | [data] | Which scenes, photos, cameras and depth maps are read? |
 //! | [masks] | Where do masks come from, and how are they checked and repaired? |
 //! | [labels] | How are objects chosen, taken out, renamed and drawn? |
+//! | [city] | How is a scene trained that no one card holds? |
 //! | [viewer] | How is a model, or a training, seen and changed in a browser? |
 //! | [formats] | Which formats of models are read and written, and what does each keep? |
 //! | [benchmarks] | How is a model scored, on its own views and by published benchmarks? |
@@ -47,6 +48,7 @@ pages! {
     data: "Scenes, photos, cameras and depth maps that are read.";
     masks: "Masks: their form, trackers, checks and repair.";
     labels: "Objects chosen, taken out, renamed and drawn.";
+    city: "Scenes beyond one card: blocks, many cards, clusters.";
     viewer: "A model or a training in a browser.";
     formats: "Formats of models: what each keeps, labels in other programs, axes.";
     benchmarks: "Scores: held-out views and published benchmarks.";

@@ -83,7 +83,7 @@ fn yards() -> impl Iterator<Item = Row> {
 
 /// Vehicles stand at the sides of the streets, so that a camera can pass between them.
 fn vehicle(name: &'static str, index: u32) -> Row {
-    let is_long = index % 3 == 0;
+    let is_long = index.is_multiple_of(3);
     let half = if is_long { DVec3::new(0.42, 0.08, 0.14) } else { DVec3::new(0.24, 0.08, 0.07) };
     let height = half.z + 0.08;
     let side = if index.is_multiple_of(2) { 0.43 } else { -0.43 };

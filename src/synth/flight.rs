@@ -54,7 +54,7 @@ fn in_street(options: &SynthOptions, view: u32, share: f64) -> (DVec3, DVec3) {
     // Near the end of a street the camera looks back into it.
     let turn = view / STREETS_EVERY;
     let is_back = at > 0.65 * length || (at > 0.35 * length && turn % 2 == 1);
-    let yaw = (if turn / 2 % 2 == 0 { 32.0_f64 } else { -32.0 } + 20.0 * jitter(2)).to_radians();
+    let yaw = (if (turn / 2).is_multiple_of(2) { 32.0_f64 } else { -32.0 } + 20.0 * jitter(2)).to_radians();
     let level = (along * yaw.cos() + aside * yaw.sin()) * if is_back { -1.0 } else { 1.0 };
     let pitch = (-9.0 + 6.0 * jitter(3)).to_radians();
     (position, level * pitch.cos() + DVec3::Z * pitch.sin())
