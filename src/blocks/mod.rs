@@ -12,6 +12,7 @@
 mod cells;
 mod choose;
 mod coarse;
+mod estimate;
 mod frame;
 mod join;
 mod merge;
@@ -21,6 +22,7 @@ mod seams;
 mod split;
 mod trained;
 
+pub use estimate::{Estimate, Sketch, estimate};
 pub use join::BlockMasks;
 pub use merge::{MergeOptions, Merged, merge};
 pub use plan::{Plan, PlanOptions, PlannedBlock, plan};

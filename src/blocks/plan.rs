@@ -24,7 +24,7 @@ const CONTEXT: f64 = 0.25;
 /// Most rounds of the division; each renders every photo once.
 const ROUNDS: usize = 6;
 /// Most blocks: their names have three digits.
-const BLOCKS_MAX: usize = 1000;
+pub(super) const BLOCKS_MAX: usize = 1000;
 
 /// How a scene is divided.
 #[derive(Clone, Debug)]

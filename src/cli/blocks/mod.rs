@@ -1,6 +1,7 @@
 //! `labelgs blocks`: a scene larger than a card.
 
 mod divide;
+mod estimate;
 mod merge;
 
 use super::context::Context;
@@ -22,6 +23,10 @@ pub enum BlocksVerb {
     ///
     /// Example: labelgs blocks plan scene --model coarse --card 24G
     Plan(divide::DivideArgs),
+    /// Show on paper how many blocks a scene takes, before anything is trained.
+    ///
+    /// Example: labelgs blocks estimate --gaussians 100M --views 5000 --card 24G
+    Estimate(estimate::EstimateArgs),
     /// Write a folder for each block, for `labelgs train --block`.
     ///
     /// Example: labelgs blocks split scene --model coarse --card 24G -o blocks
@@ -36,6 +41,7 @@ pub enum BlocksVerb {
 pub(crate) fn run(args: &BlocksArgs, context: &Context) -> Result<()> {
     match &args.verb {
         BlocksVerb::Plan(args) => divide::plan(args, context),
+        BlocksVerb::Estimate(args) => estimate::run(args, context),
         BlocksVerb::Split(args) => divide::split(args, context),
         BlocksVerb::Merge(args) => merge::run(args, context),
     }

@@ -1,0 +1,124 @@
+//! Blocks on paper: how many, how large and how long, of a scene that is not there yet.
+
+use super::need::{Card, Common, Need};
+use super::plan::BLOCKS_MAX;
+use crate::engine::card;
+use crate::error::{Error, Result};
+
+/// Gaussians in the zone of a block, in those of its core: a margin of a tenth on all four sides.
+const ZONE: f64 = 1.44;
+/// Views of all blocks together, in those of the scene: the photos at a border are in the blocks on both sides.
+const SHARED_VIEWS: f64 = 2.0;
+
+/// A scene on paper.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sketch {
+    /// Memory of a card, bytes.
+    pub card: u64,
+    /// Gaussians of the whole scene.
+    pub gaussians: u64,
+    /// Gaussians of its coarse model.
+    pub coarse: u64,
+    /// Number of photos.
+    pub views: u64,
+    /// Size of a photo, px.
+    pub image: (u32, u32),
+    /// Largest label; `None` without labels.
+    pub max_label: Option<u32>,
+    /// Steps of a block of up to 300 views.
+    pub steps: u32,
+    /// Measured time of a step, s, with this many Gaussians, on photos of this size.
+    pub pace: Option<(f64, u64)>,
+}
+
+/// Its blocks, all alike.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Estimate {
+    /// Number of blocks.
+    pub blocks: usize,
+    /// Gaussians that a block trains.
+    pub gaussians: u64,
+    /// Gaussians of the surroundings.
+    pub frozen: u64,
+    /// Views of a block.
+    pub views: u64,
+    /// Memory of the device, bytes.
+    pub device: u64,
+    /// Memory of the host, bytes.
+    pub host: u64,
+    /// Steps of a block.
+    pub steps: u32,
+    /// Minutes of a block, if the pace is known.
+    pub minutes: Option<f64>,
+}
+
+/// Divides a scene on paper into the fewest equal blocks that fit the card. Half of the coarse Gaussians outside of a block
+/// are expected in its photos, or all of three blocks around it if that is less.
+///
+/// # Errors
+///
+/// A card too small for any number of blocks.
+pub fn estimate(sketch: &Sketch) -> Result<Estimate> {
+    let (shape, limits) = card(sketch.card);
+    let device = Card { shape, limits, memory: sketch.card };
+    let pixels = u64::from(sketch.image.0) * u64::from(sketch.image.1);
+    let measured = sketch.pace.map_or(sketch.gaussians, |(_, gaussians)| gaussians);
+    let common = Common {
+        image: sketch.image,
+        max_label: sketch.max_label,
+        pace: sketch.pace.map(|(seconds, _)| seconds),
+        coarse: (pixels, measured),
+    };
+    for blocks in 1..=BLOCKS_MAX {
+        let share = 1.0 / blocks as f64;
+        let zone = if blocks == 1 { 1.0 } else { (ZONE * share).min(1.0) };
+        let gaussians = (sketch.gaussians as f64 * zone).round() as u64;
+        let outside = (0.5 * (1.0 - zone)).min(3.0 * share);
+        let frozen = (sketch.coarse as f64 * outside).round() as u64;
+        let shared = if blocks == 1 { 1.0 } else { SHARED_VIEWS };
+        let views = ((sketch.views as f64 * shared * share).ceil() as u64).min(sketch.views);
+        let need = common.need(&device, (gaussians, frozen), views as usize, sketch.steps)?;
+        if device.fits(&need) {
+            let Need { device, host, steps, minutes } = need;
+            let minutes = Some(minutes).filter(|minutes| minutes.is_finite());
+            return Ok(Estimate { blocks, gaussians, frozen, views, device, host, steps, minutes });
+        }
+    }
+    Err(Error::usage("card", format!("is {} bytes, too small for {BLOCKS_MAX} blocks of this scene", sketch.card)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const CITY: Sketch = Sketch {
+        card: 24 << 30,
+        gaussians: 100_000_000,
+        coarse: 10_000_000,
+        views: 5000,
+        image: (1600, 1064),
+        max_label: Some(500),
+        steps: 30_000,
+        pace: Some((0.02, 1_000_000)),
+    };
+
+    #[test]
+    fn a_larger_card_takes_fewer_blocks() {
+        let of = |card: u64| estimate(&Sketch { card: card << 30, ..CITY }).expect("blocks");
+        let [small, usual, large] = [12, 24, 80].map(of);
+        assert!(small.blocks > usual.blocks && usual.blocks > large.blocks, "{small:?} {usual:?} {large:?}");
+        for found in [small, usual, large] {
+            assert!(found.gaussians * found.blocks as u64 >= CITY.gaussians, "{found:?}");
+            assert!(found.views * found.blocks as u64 >= CITY.views && found.minutes.is_some(), "{found:?}");
+        }
+        // One fewer would not fit.
+        assert!(usual.device as f64 <= 0.8 * f64::from(24 << 20) * 1024.0, "{usual:?}");
+    }
+
+    #[test]
+    fn a_small_scene_is_one_block_and_a_tiny_card_none() {
+        let one = estimate(&Sketch { gaussians: 1_000_000, ..CITY }).expect("a block");
+        assert_eq!((one.blocks, one.frozen, one.views), (1, 0, 5000));
+        assert!(estimate(&Sketch { card: 1 << 20, ..CITY }).is_err());
+    }
+}
