@@ -172,12 +172,17 @@ fn a_scene_is_split_trained_and_merged() {
     let rest = read_model(place.path("blocks/rest.ply")).expect("a model").gaussians;
     expected.extend((0..rest.len()).map(|row| rest.world(row)));
     assert_eq!((0..city.len()).map(|row| city.world(row)).collect::<Vec<_>>(), expected);
-    let scores = place.text("scores.json");
-    succeeded(&place.labelgs(&["eval", &place.text("city"), "--scene", &scene, "--json", &scores]));
-    let psnr = |scores: &Value| scores["psnr"].as_f64().expect("a score");
-    let (merged, before) = (json(Path::new(&scores)), json(&place.path("coarse/metrics.json")));
-    assert!(psnr(&merged["mean"]) > psnr(&before["test"]) - 0.5, "{merged} after {before}");
-    assert!(merged["places"]["seams"]["pixels"].as_u64() > Some(0), "{merged}");
+    // The only held-out view of so small a scene says little.
+    let scored = |model: &str| {
+        let scores = place.text("scores.json");
+        let typed = ["eval", &place.text(model), "--scene", &scene, "--views", "train", "--json", &scores];
+        succeeded(&place.labelgs(&typed));
+        json(Path::new(&scores))
+    };
+    let (merged, before) = (scored("city"), scored("coarse"));
+    let psnr = |scores: &Value| scores["mean"]["psnr"].as_f64().expect("a score");
+    assert!(psnr(&merged) > psnr(&before) + 1.0, "{} after {}", psnr(&merged), psnr(&before));
+    assert!(merged["places"]["seams"]["pixels"].as_u64() > Some(0) && before["places"].is_null());
     let before = std::fs::read(labelgs::run::latest_model(&place.path("city")).expect("a model")).expect("bytes");
     succeeded(&merge(&place, &[]));
     assert_eq!(

@@ -52,9 +52,9 @@ enum Part {
     /// All rows of a file: what is coarse everywhere.
     Rest(PathBuf),
     /// The rows of a training whose means are in the core, and the new ids of its labels.
-    Trained(Trained, Option<BTreeMap<u32, u32>>),
+    Trained(Box<Trained>, Option<BTreeMap<u32, u32>>),
     /// The coarse rows in the core, from the first model of a block.
-    Coarse(BlockFile, PathBuf),
+    Coarse(Box<BlockFile>, PathBuf),
 }
 
 /// Joins the models that were trained in `models`, a folder for each block of the folder `blocks`, into the folder `out`:
@@ -77,12 +77,12 @@ pub fn merge(blocks: &Path, models: &Path, out: &Path, options: &MergeOptions) -
             continue;
         }
         match Trained::open(&block, &models.join(&row.id)) {
-            Ok(trained) => parts.push(Part::Trained(trained, None)),
+            Ok(trained) => parts.push(Part::Trained(Box::new(trained), None)),
             Err(problem) if problem.is_missing && options.allow_missing => {
                 tracing::warn!("{}; its core stays coarse", problem.text);
                 merged.missing.push(row.id.clone());
                 let init = BlockFile::init(&folder);
-                parts.push(Part::Coarse(block, init));
+                parts.push(Part::Coarse(Box::new(block), init));
             }
             Err(problem) => problems.push(problem.text),
         }

@@ -7,7 +7,7 @@ use crate::scene::Zone;
 use glam::DVec3;
 use std::path::Path;
 
-/// Groups besides the blocks: what is coarse everywhere, where zones of blocks overlap, and all else.
+/// Groups besides the blocks: what is coarse everywhere, or empty; where zones of blocks overlap; and all else.
 const OTHERS: [&str; 3] = ["far", "seams", "off the seams"];
 
 /// The blocks of a merged model, as groups of places.

@@ -9,6 +9,7 @@ use super::recipe::Recipe;
 use crate::error::{Error, Result};
 use crate::scene::{Dataset, View, crew};
 use rayon::prelude::*;
+use std::collections::BTreeSet;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -18,13 +19,7 @@ pub(crate) fn load(root: &Path, mut listing: Listing, options: &LoadOptions) -> 
     views.sort_by(|a, b| a.name.cmp(&b.name));
     let mut test = split(&views, options.test_every, &mut notes)?;
     if let Some(only) = &options.only {
-        // Photos of wide lenses have their views below their names.
-        let kept: Vec<bool> = views.iter().map(|view| only.contains(&view.name) || !view.lens.is_pinhole()).collect();
-        retain(&mut views, &kept);
-        retain(&mut test, &kept);
-        if views.is_empty() {
-            return Err(Error::data(root, "photos", "none of the asked ones is in the scene"));
-        }
+        limit(root, &mut views, &mut test, only)?;
     }
     let masks = options.masks.as_deref().map(|folder| MaskFolder::new(folder, views.iter().map(|v| v.name.as_str())));
     let masks = masks.transpose()?;
@@ -51,14 +46,7 @@ pub(crate) fn load(root: &Path, mut listing: Listing, options: &LoadOptions) -> 
     bad_photos::skip(root, undecodable, total, options, &mut notes)?;
     let loaded: Vec<(Vec<View>, bool)> = all_or_one_error(root, loaded)?;
     if let Some(masks) = &masks {
-        let without = views.iter().filter(|view| masks.find(&view.name).is_none()).map(|view| view.name.as_str());
-        let without: Vec<&str> = without.collect();
-        if without.len() == views.len() {
-            return Err(masks.nothing_found(&views[0].name));
-        }
-        if !without.is_empty() {
-            notes.push(format!("{} of {} photos have no mask: {}", without.len(), views.len(), shortened(&without)));
-        }
+        note_missing(masks, &views, &mut notes)?;
     }
     if resampled > 0 {
         notes.push(format!("{resampled} masks differ in size from their photos and were scaled (nearest id)"));
@@ -84,6 +72,31 @@ pub(crate) fn load(root: &Path, mut listing: Listing, options: &LoadOptions) -> 
     dataset.test.sort_by(|a, b| a.name.cmp(&b.name));
     require_unique(root, &dataset)?;
     Ok(dataset)
+}
+
+/// Notes the photos without a mask; refuses a folder without any.
+fn note_missing(masks: &MaskFolder, views: &[Listed], notes: &mut Vec<String>) -> Result<()> {
+    let without = views.iter().filter(|view| masks.find(&view.name).is_none()).map(|view| view.name.as_str());
+    let without: Vec<&str> = without.collect();
+    if without.len() == views.len() {
+        return Err(masks.nothing_found(&views[0].name));
+    }
+    if !without.is_empty() {
+        notes.push(format!("{} of {} photos have no mask: {}", without.len(), views.len(), shortened(&without)));
+    }
+    Ok(())
+}
+
+/// Keeps the views that are asked for, and which of them are held out.
+fn limit(root: &Path, views: &mut Vec<Listed>, test: &mut Vec<bool>, only: &BTreeSet<String>) -> Result<()> {
+    // Photos of wide lenses have their views below their names.
+    let kept: Vec<bool> = views.iter().map(|view| only.contains(&view.name) || !view.lens.is_pinhole()).collect();
+    retain(views, &kept);
+    retain(test, &kept);
+    if views.is_empty() {
+        return Err(Error::data(root, "photos", "none of the asked ones is in the scene"));
+    }
+    Ok(())
 }
 
 /// Keeps the items whose flag is set.
