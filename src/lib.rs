@@ -41,6 +41,7 @@
 //! | draw pictures, depth, label maps | [`engine::Engine::of_model`], [`render::render`] |
 //! | choose, take out, change objects | [`edit`] |
 //! | label a finished model, repair masks | [`label`] |
+//! | train a scene that no card holds | [`blocks`] |
 //! | score | [`eval`] |
 //! | read the manual | [`guide`] |
 //!

@@ -9,6 +9,8 @@ use crate::pass::KernelShape;
 const SHARE: f64 = 0.8;
 /// Steps of a block with up to this many views; more views have more steps in proportion.
 const VIEWS_PER_RUN: f64 = 300.0;
+/// Memory of the program itself and of the driver, bytes: 236 MiB measured with a small block on lavapipe.
+const PROGRAM: u64 = 256 << 20;
 /// Objects of a step with object layers.
 const LAYERS: u32 = 10;
 
@@ -72,7 +74,7 @@ impl Common {
         let larger = (pixels as f64 / self.coarse.0.max(1) as f64).max(all as f64 / self.coarse.1.max(1) as f64);
         let pace = self.pace.map_or(f64::INFINITY, |seconds| seconds * larger.max(1.0));
         // A photo has 4 bytes a pixel and a mask 2; a checkpoint is written from a copy.
-        let host = (views as u64 * pixels * 6).min(crate::io::PHOTO_MEMORY) + 800 * gaussians;
+        let host = PROGRAM + (views as u64 * pixels * 6).min(crate::io::PHOTO_MEMORY) + 800 * gaussians;
         Ok(Need { device, host, steps, minutes: f64::from(steps) * pace / 60.0 })
     }
 }
