@@ -172,6 +172,21 @@ fn a_scene_is_split_trained_and_merged() {
     let rest = read_model(place.path("blocks/rest.ply")).expect("a model").gaussians;
     expected.extend((0..rest.len()).map(|row| rest.world(row)));
     assert_eq!((0..city.len()).map(|row| city.world(row)).collect::<Vec<_>>(), expected);
+    // Masks of each block alone: objects that both blocks have get one id.
+    let masks = place.path("block-masks");
+    for id in ["b000", "b001"] {
+        copy(&place.path("scene/masks"), &masks.join(id));
+    }
+    let masks = masks.to_str().expect("UTF-8").to_owned();
+    succeeded(&merge(&place, &["--block-masks", &masks, "--scene", &scene]));
+    let joined = model_of(&place, "city");
+    let mut pairs: Vec<(u32, u32)> = (0..city.len()).map(|row| (city.label(row), joined.label(row))).collect();
+    pairs.sort_unstable();
+    pairs.dedup();
+    let rest = |(_, id): &(u32, u32)| *id > 0;
+    let objects: Vec<u32> = pairs.iter().filter(|pair| rest(pair)).map(|(old, _)| *old).collect();
+    assert_eq!(objects, [1, 2, 3], "each object has one id: {pairs:?}");
+    succeeded(&merge(&place, &[]));
     // The only held-out view of so small a scene says little.
     let scored = |model: &str| {
         let scores = place.text("scores.json");

@@ -2,16 +2,16 @@
 
 use super::trained::Trained;
 use crate::engine::Engine;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::io::block_file::BlockFile;
 use crate::io::label_table::{LabelEntry, LabelTable, unique_name};
 use crate::io::{LoadOptions, open_logged};
 use crate::render::{RenderOptions, render};
 use crate::run::models;
-use crate::scene::{LabelMap, View, Zone};
+use crate::scene::{LabelMap, UNLABELLED, View, Zone};
 use std::collections::{BTreeMap, BTreeSet};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Arc;
 
 /// Fewest pixels that two ids share, over all photos of both blocks.
@@ -53,7 +53,7 @@ pub(super) struct Joined {
 ///
 /// # Errors
 ///
-/// A block without masks; what cannot be read or drawn.
+/// Blocks that share photos without masks; what cannot be read or drawn.
 pub(super) fn join(blocks: &Path, trained: &[&Trained], how: &BlockMasks) -> Result<Joined> {
     let mut found = Vec::new();
     let mut gpu = None;
@@ -69,7 +69,7 @@ pub(super) fn join(blocks: &Path, trained: &[&Trained], how: &BlockMasks) -> Res
         };
         found.extend(of_block(gpu, blocks, (first, &others), trained, how)?);
     }
-    let ids = ids_of(trained, how)?;
+    let ids = ids_of(trained)?;
     Ok(numbered(&ids, &unions(found), trained))
 }
 
@@ -188,16 +188,11 @@ fn unions(mut found: Vec<Shared>) -> BTreeMap<Node, Node> {
     groups.iter().flat_map(of).collect()
 }
 
-/// Returns the ids in the masks of each block.
-fn ids_of(trained: &[&Trained], how: &BlockMasks) -> Result<Vec<BTreeSet<u32>>> {
+/// Returns the ids of the Gaussians that the merged model takes from each block.
+fn ids_of(trained: &[&Trained]) -> Result<Vec<BTreeSet<u32>>> {
     let of = |trained: &&Trained| {
-        let views = views(trained, trained.block.views.iter().cloned().collect(), how)?;
-        let masks: Vec<_> = views.iter().filter_map(|view| view.mask.as_ref()).collect();
-        if masks.is_empty() {
-            let path: PathBuf = how.masks.join(&trained.block.id);
-            return Err(Error::data(path, "", format!("has no mask for a photo of block {}", trained.block.id)));
-        }
-        Ok(masks.into_iter().flat_map(|mask| mask.objects()).map(u32::from).collect())
+        let labels = trained.core()?.labels.unwrap_or_default();
+        Ok(labels.into_iter().filter(|&label| label != UNLABELLED).collect())
     };
     trained.iter().map(of).collect()
 }

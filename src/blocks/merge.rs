@@ -1,7 +1,7 @@
 //! Joins the models of the blocks into one.
 
 use super::join::{BlockMasks, Joined, join};
-use super::trained::{Trained, compare};
+use super::trained::{Trained, compare, core};
 use crate::error::{Error, Result};
 use crate::io::block_file::{self, BlockFile, BlocksFile, REST};
 use crate::io::label_table::{self, LabelTable};
@@ -162,25 +162,19 @@ impl Part {
     }
 
     /// Reads the rows. Where trainings have new ids, the labels of coarse Gaussians mean nothing.
-    fn read(&self, file: &BlocksFile, has_ids: bool) -> Result<Gaussians> {
+    fn read(&self, has_ids: bool) -> Result<Gaussians> {
         let unlabelled = |model: Gaussians| Gaussians { labels: None, label_confidence: None, ..model };
         let coarse = |model| if has_ids { unlabelled(model) } else { model };
-        // Frozen rows come last; far ones of them may be in the core.
-        let of_core = |path: &Path, block: &BlockFile| {
-            let (model, core) = (models::open(path)?.gaussians, block.core.zone(file.axes));
-            let count = model.len().saturating_sub(block.frozen as usize);
-            Ok(model.filtered(|row| row < count && core.contains(model.world(row))))
-        };
         match self {
             Self::Rest(path) => Ok(coarse(models::open(path)?.gaussians)),
             Self::Trained(trained, ids) => {
-                let mut model = of_core(&trained.model, &trained.block)?;
+                let mut model = trained.core()?;
                 if let (Some(ids), Some(labels)) = (ids, &mut model.labels) {
                     labels.iter_mut().for_each(|label| *label = ids.get(label).copied().unwrap_or(UNLABELLED));
                 }
                 Ok(model)
             }
-            Self::Coarse(block, init) => of_core(init, block).map(coarse),
+            Self::Coarse(block, init) => core(block, init).map(coarse),
         }
     }
 }
@@ -202,7 +196,7 @@ fn write(
     // The header has the number of rows, so that all parts are read twice.
     let mut like = None;
     for part in parts {
-        let rows = part.read(file, has_ids)?;
+        let rows = part.read(has_ids)?;
         let count = rows.len() as u64;
         match part {
             Part::Trained(trained, _) => merged.blocks.push((trained.block.id.clone(), count)),
@@ -215,7 +209,7 @@ fn write(
     let count = merged.gaussians();
     merged.model = model_path(out, steps);
     let mut to = Models::new(out, 0)?;
-    write_joined(&merged.model, &like, count as usize, parts.iter().map(|part| part.read(file, has_ids)))?;
+    write_joined(&merged.model, &like, count as usize, parts.iter().map(|part| part.read(has_ids)))?;
     to.note_saved(steps);
     if merged.missing.is_empty() && merged.coarse != expected {
         let problem = format!("has {} coarse Gaussians, {expected} were split off", merged.coarse);

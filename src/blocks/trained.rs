@@ -4,7 +4,8 @@ use crate::io::block_file::{self, BlockFile};
 use crate::io::label_table::LabelTable;
 use crate::io::{read, run_folder};
 use crate::run::Settings;
-use crate::run::models::model_path;
+use crate::run::models::{self, model_path};
+use crate::scene::Gaussians;
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -42,6 +43,11 @@ pub(super) struct Problem {
 }
 
 impl Trained {
+    /// Reads the Gaussians of its core.
+    pub(super) fn core(&self) -> crate::Result<Gaussians> {
+        core(&self.block, &self.model)
+    }
+
     /// Looks at the folder of a training.
     pub(super) fn open(block: &BlockFile, folder: &Path) -> Result<Self, Problem> {
         let problem = |text: String, is_missing| Problem { text: format!("{}: {text}", folder.display()), is_missing };
@@ -84,6 +90,14 @@ impl Trained {
             settings,
         })
     }
+}
+
+/// Returns the Gaussians of the model at `path` that are in the core of a block.
+pub(super) fn core(block: &BlockFile, path: &Path) -> crate::Result<Gaussians> {
+    let (model, core) = (models::open(path)?.gaussians, block.core.zone(block.axes));
+    // Frozen rows come last; far ones of them may be in the core.
+    let count = model.len().saturating_sub(block.frozen as usize);
+    Ok(model.filtered(|row| row < count && core.contains(model.world(row))))
 }
 
 /// Returns in what trainings differ from the first that must be equal.
