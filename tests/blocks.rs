@@ -237,6 +237,12 @@ fn a_merge_lists_all_that_is_wrong() {
     succeeded(&train_block(&place, "b001", &["--sh-degree", "1"]));
     let text = stderr(&merge(&place, &[]));
     assert!(text.contains("--sh-degree is 1, and 3 in"), "{text}");
+    // One label with two names.
+    let table = place.path("models/b000/labels.json");
+    let renamed = std::fs::read_to_string(&table).expect("text").replace("\"ball\"", "\"globe\"");
+    std::fs::write(&table, renamed).expect("written");
+    let text = stderr(&merge(&place, &[]));
+    assert!(text.contains("label 2 is ball, elsewhere globe") && text.contains("problems"), "{text}");
     // Stopped before its end: the metrics of a run tell.
     let metrics = place.path("models/b000/metrics.json");
     let changed = std::fs::read_to_string(&metrics).expect("text").replace("\"steps\": 120", "\"steps\": 7");

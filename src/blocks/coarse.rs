@@ -4,7 +4,7 @@ use super::frame::Frame;
 use crate::error::{Error, Result};
 use crate::io::label_table::LabelTable;
 use crate::io::{LoadOptions, read, run_folder};
-use crate::run::{Settings, latest_model, models};
+use crate::run::{Settings, latest_model, models, summary};
 use crate::scene::{Dataset, Gaussians};
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -42,7 +42,7 @@ impl Coarse {
             let problem = "has no config.toml; the coarse model is a folder that a training wrote";
             return Err(Error::data(model, "", problem));
         };
-        let metrics: Value = read::json(&model.join("metrics.json"), "expected the folder of a finished training")?;
+        let metrics: Value = read::json(&model.join(summary::FILE), "expected the folder of a finished training")?;
         let (seconds, steps) = (metrics["seconds"].as_f64(), metrics["steps"].as_f64().unwrap_or(0.0));
         let options = LoadOptions {
             max_resolution: (settings.read.max_resolution > 0).then_some(settings.read.max_resolution),

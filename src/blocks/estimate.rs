@@ -80,7 +80,6 @@ pub fn estimate(sketch: &Sketch) -> Result<Estimate> {
         let need = common.need(&device, (gaussians, frozen), views as usize, sketch.steps)?;
         if device.fits(&need) {
             let Need { device, host, steps, minutes } = need;
-            let minutes = Some(minutes).filter(|minutes| minutes.is_finite());
             return Ok(Estimate { blocks, gaussians, frozen, views, device, host, steps, minutes });
         }
     }

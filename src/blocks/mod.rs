@@ -22,9 +22,10 @@ mod seams;
 mod split;
 mod trained;
 
+pub use crate::io::block_file::{BlockRow, Bounds};
 pub use estimate::{Estimate, Sketch, estimate};
 pub use join::BlockMasks;
 pub use merge::{MergeOptions, Merged, merge};
-pub use plan::{Plan, PlanOptions, PlannedBlock, plan};
+pub use plan::{Plan, PlanOptions, plan};
 pub use seams::Seams;
 pub use split::split;

@@ -44,8 +44,8 @@ pub(super) struct Need {
     /// Bytes on the host.
     pub host: u64,
     pub steps: u32,
-    /// Minutes; infinite if the pace is not known.
-    pub minutes: f64,
+    /// Minutes, if the pace is known.
+    pub minutes: Option<f64>,
 }
 
 impl Card {
@@ -72,9 +72,9 @@ impl Common {
         let steps = (f64::from(steps) * (views as f64 / VIEWS_PER_RUN).max(1.0)).round() as u32;
         let pixels = u64::from(self.image.0) * u64::from(self.image.1);
         let larger = (pixels as f64 / self.coarse.0.max(1) as f64).max(all as f64 / self.coarse.1.max(1) as f64);
-        let pace = self.pace.map_or(f64::INFINITY, |seconds| seconds * larger.max(1.0));
+        let minutes = self.pace.map(|seconds| f64::from(steps) * (seconds * larger.max(1.0)) / 60.0);
         // A photo has 4 bytes a pixel and a mask 2; a checkpoint is written from a copy.
         let host = PROGRAM + (views as u64 * pixels * 6).min(crate::io::PHOTO_MEMORY) + 800 * gaussians;
-        Ok(Need { device, host, steps, minutes: f64::from(steps) * pace / 60.0 })
+        Ok(Need { device, host, steps, minutes })
     }
 }

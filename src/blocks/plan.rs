@@ -64,53 +64,26 @@ impl Default for PlanOptions {
 
 /// A block to be.
 #[derive(Clone, Debug)]
-pub struct PlannedBlock {
+pub(super) struct PlannedBlock {
     /// False if too few photos see it.
     pub trained: bool,
-    /// Coarse Gaussians in its zone.
-    pub start: u64,
     /// Gaussians at the end of growth.
     pub gaussians: u64,
-    /// Gaussians of the surroundings.
-    pub frozen: u64,
-    /// Number of views to train on.
-    pub views: usize,
-    pub(super) cell: Cell,
-    pub(super) zone_rows: Vec<usize>,
-    pub(super) frozen_rows: Vec<usize>,
-    pub(super) train: Vec<usize>,
-    pub(super) test: Vec<usize>,
-    pub(super) need: Need,
-}
-
-impl PlannedBlock {
-    /// Predicted memory of the device, bytes.
-    pub fn device_bytes(&self) -> u64 {
-        self.need.device
-    }
-
-    /// Predicted memory of the host, bytes.
-    pub fn host_bytes(&self) -> u64 {
-        self.need.host
-    }
-
-    /// Steps.
-    pub fn steps(&self) -> u32 {
-        self.need.steps
-    }
-
-    /// Predicted time, minutes; `None` if the coarse training has not noted its pace.
-    pub fn minutes(&self) -> Option<f64> {
-        Some(self.need.minutes).filter(|minutes| minutes.is_finite())
-    }
+    pub cell: Cell,
+    /// Coarse Gaussians in the zone, and those of the surroundings.
+    pub zone_rows: Vec<usize>,
+    pub frozen_rows: Vec<usize>,
+    /// Indices of its training views and held-out views.
+    pub train: Vec<usize>,
+    pub test: Vec<usize>,
+    pub need: Need,
 }
 
 /// The blocks of a scene.
 pub struct Plan {
-    /// The blocks.
-    pub blocks: Vec<PlannedBlock>,
     /// Gaussians of the coarse model that no block has in its core: far ones.
     pub far: u64,
+    pub(super) blocks: Vec<PlannedBlock>,
     pub(super) coarse: Coarse,
     pub(super) frame: Frame,
     pub(super) extent: f64,
@@ -186,18 +159,12 @@ struct Planner<'a> {
 impl Planner<'_> {
     /// Divides until all blocks fit, first by an estimate of what their photos show, then by what these do show.
     fn blocks(&self, engine: &mut Engine, places: &[(usize, DVec3)]) -> Result<Vec<PlannedBlock>> {
-        let mut cells = vec![Cell::whole(places)];
-        loop {
-            let guess = |cell: &Cell| {
-                let zone = self.zone_rows(cell).len();
-                let outside = self.coarse.model.len() - zone;
-                let views = self.coarse.dataset.train.len();
-                self.need(zone, (CONTEXT * outside as f64) as u64, views).map(|need| !self.card.fits(&need))
-            };
-            let too_large = cells.iter().map(guess).collect::<Result<Vec<bool>>>()?;
-            let Some(at) = self.next_to_halve(&cells, &too_large) else { break };
-            self.halve(&mut cells, at)?;
+        let mut guessed = vec![self.guessed(Cell::whole(places))?];
+        while let Some(at) = self.next_to_halve(&guessed) {
+            let [low, high] = self.halves(&guessed[at].0, guessed.len())?;
+            guessed.splice(at..=at, [self.guessed(low)?, self.guessed(high)?]);
         }
+        let mut cells: Vec<Cell> = guessed.into_iter().map(|(cell, _)| cell).collect();
         for _ in 0..ROUNDS {
             let chosen = choose(engine, self.coarse, self.frame, &cells)?;
             let blocks: Vec<PlannedBlock> =
@@ -207,7 +174,10 @@ impl Planner<'_> {
             if too_large.is_empty() {
                 return Ok(blocks);
             }
-            too_large.into_iter().rev().try_for_each(|at| self.halve(&mut cells, at))?;
+            for at in too_large.into_iter().rev() {
+                let halves = self.halves(&cells[at], cells.len())?;
+                cells.splice(at..=at, halves);
+            }
         }
         let problem = format!(
             "is {} bytes, too little for what the photos of a block show around it; name a larger card, fewer `gaussians` or \
@@ -217,21 +187,28 @@ impl Planner<'_> {
         Err(Error::usage("card", problem))
     }
 
-    /// Returns the largest cell of those that do not fit, or of all while they are too few.
-    fn next_to_halve(&self, cells: &[Cell], too_large: &[bool]) -> Option<usize> {
-        let few = cells.len() < self.options.blocks;
-        let candidates = (0..cells.len()).filter(|&at| too_large[at] || few);
-        candidates.min_by_key(|&at| (!too_large[at], std::cmp::Reverse(cells[at].rows.len()), at))
+    /// Returns a cell, and whether it would not fit by an estimate of what its photos show.
+    fn guessed(&self, cell: Cell) -> Result<(Cell, bool)> {
+        let zone = self.zone_rows(&cell).len();
+        let outside = self.coarse.model.len() - zone;
+        let need = self.need(zone, (CONTEXT * outside as f64) as u64, self.coarse.dataset.train.len())?;
+        Ok((cell, !self.card.fits(&need)))
     }
 
-    fn halve(&self, cells: &mut Vec<Cell>, at: usize) -> Result<()> {
-        if cells.len() >= BLOCKS_MAX {
+    /// Returns the largest cell of those that do not fit, or of all while they are too few.
+    fn next_to_halve(&self, cells: &[(Cell, bool)]) -> Option<usize> {
+        let few = cells.len() < self.options.blocks;
+        let candidates = (0..cells.len()).filter(|&at| cells[at].1 || few);
+        candidates.min_by_key(|&at| (!cells[at].1, std::cmp::Reverse(cells[at].0.rows.len()), at))
+    }
+
+    /// Halves one of `count` cells.
+    fn halves(&self, cell: &Cell, count: usize) -> Result<[Cell; 2]> {
+        if count >= BLOCKS_MAX {
             let problem = format!("is too small: more than {BLOCKS_MAX} blocks would be needed");
             return Err(Error::usage("card", problem));
         }
-        let halves = cells[at].halves(|row| self.frame.place(self.coarse.model.world(row)))?;
-        cells.splice(at..=at, halves);
-        Ok(())
+        cell.halves(|row| self.frame.place(self.coarse.model.world(row)))
     }
 
     /// Returns the rows of the near Gaussians in the zone of a cell.
@@ -265,10 +242,7 @@ impl Planner<'_> {
         let (start, frozen) = (zone_rows.len(), frozen_rows.len() as u64);
         Ok(PlannedBlock {
             trained: train.len() >= least,
-            start: start as u64,
             gaussians: self.grown(start),
-            frozen,
-            views: train.len(),
             need: self.need(start, frozen, train.len())?,
             cell: cell.clone(),
             zone_rows,

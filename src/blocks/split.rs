@@ -32,7 +32,7 @@ pub fn split(plan: &Plan, out: &Path) -> Result<()> {
         near: plan.coarse.near.into(),
         test_every: plan.coarse.settings.read.test_every,
         rest: rest.len() as u64,
-        blocks: plan.blocks.iter().enumerate().map(|(index, block)| row(index, block)).collect(),
+        blocks: plan.rows(),
         ..BlocksFile::new()
     };
     let text = file.text()?;
@@ -54,24 +54,29 @@ fn name(index: usize) -> String {
     format!("b{index:03}")
 }
 
-fn row(index: usize, block: &PlannedBlock) -> BlockRow {
+fn row((index, block): (usize, &PlannedBlock)) -> BlockRow {
     BlockRow {
         id: name(index),
         trained: block.trained,
         core: block.cell.core,
         zone: block.cell.zone(),
-        views: block.views as u64,
-        start: block.start,
+        views: block.train.len() as u64,
+        start: block.zone_rows.len() as u64,
         gaussians: block.gaussians,
-        frozen: block.frozen,
+        frozen: block.frozen_rows.len() as u64,
         device_mib: block.need.device.div_ceil(MIB),
         host_mib: block.need.host.div_ceil(MIB),
         steps: block.need.steps,
-        minutes: block.minutes(),
+        minutes: block.need.minutes,
     }
 }
 
 impl Plan {
+    /// Returns the blocks, as [`split`] lists them.
+    pub fn rows(&self) -> Vec<BlockRow> {
+        self.blocks.iter().enumerate().map(row).collect()
+    }
+
     /// Returns which coarse Gaussians the merged model has: far ones, and those in cores that are not trained.
     fn is_rest(&self) -> Vec<bool> {
         let mut is_rest = vec![true; self.coarse.model.len()];
@@ -104,7 +109,7 @@ impl Plan {
             seed: seed(self.coarse.settings.train.seed, index),
             steps: block.need.steps,
             gaussians: block.gaussians,
-            frozen: block.frozen as u32,
+            frozen: block.frozen_rows.len() as u32,
             rate_factors: RATE_FACTORS,
         }
     }

@@ -3,8 +3,9 @@
 use crate::io::block_file::{self, BlockFile};
 use crate::io::label_table::LabelTable;
 use crate::io::{read, run_folder};
-use crate::run::Settings;
+use crate::run::info::{self, Info};
 use crate::run::models::{self, model_path};
+use crate::run::{Settings, summary};
 use crate::scene::Gaussians;
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -60,12 +61,12 @@ impl Trained {
             let text = "was trained for another block or split; train it anew in an empty folder";
             return Err(problem(text.to_owned(), false));
         }
-        let (metrics, config) = (folder.join("metrics.json"), folder.join(run_folder::CONFIG));
+        let (metrics, config) = (folder.join(summary::FILE), folder.join(run_folder::CONFIG));
         if !metrics.is_file() || !config.is_file() {
             return Err(missing("the training is not finished"));
         }
-        let json = |path: &Path| read::json::<Value>(path, "expected a file that a training wrote");
-        let steps = json(&metrics).map_err(odd)?["steps"].as_u64().unwrap_or(0) as u32;
+        let expected = "expected a file that a training wrote";
+        let steps = read::json::<Value>(&metrics, expected).map_err(odd)?["steps"].as_u64().unwrap_or(0) as u32;
         let settings = Settings::read(&config).map_err(odd)?;
         if steps < settings.train.iterations {
             let text = format!("the training was stopped after {steps} of {} steps", settings.train.iterations);
@@ -75,18 +76,17 @@ impl Trained {
         if !model.is_file() {
             return Err(missing(&format!("its model of step {steps} is gone")));
         }
-        let run = json(&folder.join("run.json")).map_err(odd)?;
-        let last = run["parts"].as_array().and_then(|parts| parts.last()).cloned().unwrap_or_default();
-        let text = |key: &str| last[key].as_str().unwrap_or("unknown").to_owned();
+        let run: Info = read::json(&folder.join(info::FILE), expected).map_err(odd)?;
+        let last = run.parts.last().cloned().unwrap_or_default();
         Ok(Self {
             block: block.clone(),
             folder: folder.to_owned(),
             model,
             steps,
-            device: text("device"),
+            device: last.device,
             names: LabelTable::of_folder(folder).map_err(odd)?,
             // The version alone: any commit of it may have written a part.
-            labelgs: text("labelgs").split(' ').next().unwrap_or_default().to_owned(),
+            labelgs: last.labelgs.split(' ').next().unwrap_or_default().to_owned(),
             settings,
         })
     }

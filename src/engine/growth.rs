@@ -1,11 +1,11 @@
 //! Memory of an engine: initial capacities from known sizes, then growth to what the scene needs.
 
-use super::{Engine, EngineSize, LabelSize, Report};
+use super::{Engine, EngineSize, LabelSize, Report, predict_for};
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::pass::{self, KernelShape, Variant, loss};
-use crate::scheduler::plan::{Buf, Capacity, MemoryReport, PassList, TABLE};
-use crate::scheduler::{Scheduler, SchedulerOptions};
+use crate::scheduler::SchedulerOptions;
+use crate::scheduler::plan::{Buf, Capacity, MemoryReport, PassList};
 use crate::shaders::constants::LABEL_ROUNDS;
 use crate::shaders::structs::Counters;
 use serde::{Deserialize, Serialize};
@@ -99,11 +99,7 @@ impl Engine {
     /// Predicts the memory of an engine of this size, without allocating.
     #[doc(hidden)]
     pub fn predict(gpu: &Gpu, size: &EngineSize, options: SchedulerOptions) -> Result<MemoryReport> {
-        let shape = KernelShape::of(gpu.capabilities());
-        let size = &size.in_bands(&shape);
-        let capacity = capacity(&shape, size);
-        let lists = Self::lists_of(&shape, &capacity, size);
-        Scheduler::predict(TABLE, &capacity, &lists, &options.limits(gpu))
+        predict_for(&KernelShape::of(gpu.capabilities()), &options.limits(gpu), size)
     }
 
     /// Returns the lists that decide the amount of scratch memory.

@@ -22,7 +22,7 @@ pub(crate) mod report;
 mod resume;
 pub(crate) mod settings;
 mod steps;
-mod summary;
+pub(crate) mod summary;
 
 pub use models::latest_model;
 pub use objects::ObjectSummary;

@@ -7,7 +7,8 @@ use crate::io::atomic;
 use serde_json::json;
 use std::path::{Path, PathBuf};
 
-pub(super) const FILE: &str = "metrics.json";
+/// Name of the file.
+pub(crate) const FILE: &str = "metrics.json";
 
 /// The result of a run.
 #[derive(Clone, Debug)]

@@ -1,7 +1,7 @@
 //! `labelgs blocks plan` and `labelgs blocks split`.
 
 use crate::Result;
-use crate::blocks::{self, Plan, PlanOptions, PlannedBlock};
+use crate::blocks::{self, Plan, PlanOptions};
 use crate::cli::args::{JsonFlag, ReadArgs};
 use crate::cli::context::Context;
 use crate::cli::scene::open_gpu;
@@ -12,8 +12,6 @@ use clap::Args;
 use glam::DVec3;
 use serde_json::{Value, json};
 use std::path::PathBuf;
-
-const MIB: f64 = (1 << 20) as f64;
 
 /// `labelgs blocks plan`.
 #[derive(Args, Clone, Debug)]
@@ -103,23 +101,24 @@ fn to_text(plan: &Plan) -> String {
         "{:<6} {:>6} {:>10} {:>10} {:>10} {:>8} {:>8} {:>7} {:>8}\n",
         "block", "views", "start", "Gaussians", "frozen", "MiB", "host MiB", "steps", "minutes"
     );
-    for (index, block) in plan.blocks.iter().enumerate() {
-        let minutes = block.minutes().map_or("unknown".to_owned(), |minutes| format!("{minutes:.1}"));
+    let rows = plan.rows();
+    for block in &rows {
+        let minutes = block.minutes.map_or("unknown".to_owned(), |minutes| format!("{minutes:.1}"));
         let note = if block.trained { "" } else { "  too few views: stays coarse" };
         text += &format!(
-            "b{index:03}   {:>6} {:>10} {:>10} {:>10} {:>8.0} {:>8.0} {:>7} {:>8}{note}\n",
+            "{:<6} {:>6} {:>10} {:>10} {:>10} {:>8} {:>8} {:>7} {minutes:>8}{note}\n",
+            block.id,
             block.views,
             block.start,
             block.gaussians,
             block.frozen,
-            block.device_bytes() as f64 / MIB,
-            block.host_bytes() as f64 / MIB,
-            block.steps(),
-            minutes,
+            block.device_mib,
+            block.host_mib,
+            block.steps,
         );
     }
-    let trained = || plan.blocks.iter().filter(|block| block.trained);
-    let hours = trained().map(PlannedBlock::minutes).sum::<Option<f64>>().map(|minutes| minutes / 60.0);
+    let trained = || rows.iter().filter(|block| block.trained);
+    let hours = trained().map(|block| block.minutes).sum::<Option<f64>>().map(|minutes| minutes / 60.0);
     let hours = hours.map_or("an unknown time".to_owned(), |hours| format!("{hours:.2} card hours"));
     text + &format!(
         "{} blocks, {hours} at the pace of the coarse training; {} far Gaussians stay coarse\n",
@@ -129,24 +128,5 @@ fn to_text(plan: &Plan) -> String {
 }
 
 fn to_json(args: &DivideArgs, plan: &Plan) -> Value {
-    let block = |(index, block): (usize, &PlannedBlock)| {
-        json!({
-            "id": format!("b{index:03}"),
-            "trained": block.trained,
-            "views": block.views,
-            "start": block.start,
-            "gaussians": block.gaussians,
-            "frozen": block.frozen,
-            "device_mib": (block.device_bytes() as f64 / MIB).ceil(),
-            "host_mib": (block.host_bytes() as f64 / MIB).ceil(),
-            "steps": block.steps(),
-            "minutes": block.minutes(),
-        })
-    };
-    json!({
-        "schema_version": 1,
-        "card": args.card,
-        "far": plan.far,
-        "blocks": plan.blocks.iter().enumerate().map(block).collect::<Vec<_>>(),
-    })
+    json!({ "schema_version": 1, "card": args.card, "far": plan.far, "blocks": plan.rows() })
 }
