@@ -16,6 +16,7 @@ static MEMORY: support::memory::Counting = support::memory::Counting;
 mod antialias; // least sizes of Gaussians, resumed trainings
 mod architecture; // layers of the crate, file lengths, places of unsafe code
 mod associate; // masks of one object in different views get one id
+mod backdrop; // transparent photos, random colours behind the scene
 mod bands; // photos with more tiles than the device can walk
 mod blocks; // a scene in blocks: frozen Gaussians, split, trained, merged
 mod capture; // faults of photos and poses are found before training

@@ -5,6 +5,7 @@ use crate::error::{Error, Result};
 use crate::scheduler::plan::Buf;
 use crate::shaders::constants::NO_ROW;
 use crate::shaders::structs::StepUniforms;
+use std::borrow::Cow;
 
 /// The input of a list besides the model.
 #[derive(Clone, Copy, Debug)]
@@ -23,7 +24,7 @@ pub(crate) struct TrainInput<'a> {
     /// Uniforms.
     pub uniforms: StepUniforms,
     /// The photo, `[P]`, RGBA8; pixels with alpha 0 are ignored.
-    pub photo: &'a [[u8; 4]],
+    pub photo: Cow<'a, [[u8; 4]]>,
     /// Labels, in a step with object layers.
     pub layers: Option<LayerInput<'a>>,
     /// Labels, in a step that compares them with the view's mask.
@@ -116,7 +117,7 @@ impl Engine {
         match input {
             Input::Uniforms(_) => Ok(()),
             Input::Train(train) => {
-                sched.upload(Buf::TARGET, frame, 0, train.photo)?;
+                sched.upload(Buf::TARGET, frame, 0, &train.photo)?;
                 if let Some(labels) = &train.disagreement {
                     sched.upload(Buf::VIEW_LABELS, frame, 0, labels.view_labels)?;
                     sched.upload(Buf::LABEL_TRUST, frame, 0, &labels.trust)?;

@@ -4,6 +4,7 @@ use super::atomic;
 use crate::error::{Error, Result};
 use crate::io::read;
 use crate::scene::Photo;
+use crate::scene::view::alpha_of;
 use exr::prelude::{AnyChannel, AnyChannels, Encoding, FlatSamples, Image, Layer, LayerAttributes, WritableImage};
 use image::{ImageDecoder, ImageReader};
 use std::io::{BufRead, Cursor, ErrorKind, Seek};
@@ -91,6 +92,17 @@ pub fn read_photo(path: impl AsRef<Path>, background: [f32; 3]) -> Result<Photo>
     if transparent {
         let background = background.map(|value| f64::from(value) * 255.0);
         photo.rgba.iter_mut().for_each(|texel| *texel = over(*texel, background));
+    }
+    Ok(photo)
+}
+
+/// Like [`read_photo`] over black, and keeps the opacity of transparent photos.
+pub(crate) fn read_open_photo(path: &Path) -> Result<Photo> {
+    let mut photo = as_rgba(decode(path)?);
+    for texel in &mut photo.rgba {
+        let opacity = f64::from(texel[3]) / 255.0;
+        *texel = over(*texel, [0.0; 3]);
+        texel[3] = alpha_of(opacity);
     }
     Ok(photo)
 }

@@ -28,11 +28,11 @@ pub(crate) fn load(root: &Path, mut listing: Listing, options: &LoadOptions) -> 
     if let Some(ignore) = ignore.as_ref().filter(|ignore| views.iter().all(|view| ignore.find(&view.name).is_none())) {
         return Err(ignore.nothing_found(&views[0].name));
     }
-    let recipe = |view: &Listed| {
+    let recipe = |(view, &test): (&Listed, &bool)| {
         let of = |folder: &Option<MaskFolder>| folder.as_ref().and_then(|folder| folder.find(&view.name));
-        Arc::new(Recipe::new(view.clone(), of(&masks), of(&ignore), options))
+        Arc::new(Recipe::new(view.clone(), [of(&masks), of(&ignore)], test, options))
     };
-    let recipes: Vec<Arc<Recipe>> = views.iter().map(recipe).collect();
+    let recipes: Vec<Arc<Recipe>> = views.iter().zip(&test).map(recipe).collect();
     let (read, resampled) = read_views(&recipes, &test, options);
     let mut undecodable = std::mem::take(&mut listing.bad);
     let total = views.len() + undecodable.len();

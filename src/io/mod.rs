@@ -83,6 +83,8 @@ pub struct LoadOptions {
     pub test_every: Option<u32>,
     /// Colour behind transparent photos, R, G, B, 0 to 1.
     pub background: [f32; 3],
+    /// Keeps the opacity of transparent photos that are not held out, over black, instead.
+    pub keep_opacity: bool,
     /// Decodes the photos. Their sizes are read in any case.
     pub photos: bool,
     /// Largest share of undecodable photos, 0 to 1. They are skipped with a note.
@@ -115,6 +117,7 @@ impl Default for LoadOptions {
             max_resolution: None,
             test_every: Some(8),
             background: [0.0; 3],
+            keep_opacity: false,
             photos: true,
             max_bad_photos: MAX_BAD_PHOTOS,
             allow_outside: false,

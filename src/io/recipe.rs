@@ -1,7 +1,7 @@
 //! The views of one photo, made from its files: decoded, without ignored pixels, undistorted, resized.
 
 use super::LoadOptions;
-use super::image::{check_size, photo_size, read_photo};
+use super::image::{check_size, photo_size, read_open_photo, read_photo};
 use super::lens::Lens;
 use super::listing::{Listed, check_camera};
 use super::mask::read_checked;
@@ -19,7 +19,8 @@ pub(crate) struct Recipe {
     pub(crate) ignore: Option<PathBuf>,
     /// Decodes the photo.
     pub(crate) photos: bool,
-    pub(crate) background: [f32; 3],
+    /// Colour behind a transparent photo; `None` keeps its opacity.
+    pub(crate) background: Option<[f32; 3]>,
     pub(crate) max_resolution: Option<u32>,
     pub(crate) undistort: bool,
 }
@@ -40,8 +41,10 @@ pub(crate) struct MadeViews {
 }
 
 impl Recipe {
-    pub(crate) fn new(listed: Listed, mask: Option<PathBuf>, ignore: Option<PathBuf>, options: &LoadOptions) -> Self {
-        let LoadOptions { photos, background, max_resolution, undistort, .. } = *options;
+    /// `[mask, ignore]` are files of the photo, which is held out if `test`.
+    pub(crate) fn new(listed: Listed, [mask, ignore]: [Option<PathBuf>; 2], test: bool, options: &LoadOptions) -> Self {
+        let LoadOptions { photos, max_resolution, undistort, .. } = *options;
+        let background = (test || !options.keep_opacity).then_some(options.background);
         Self { listed, mask, ignore, photos, background, max_resolution, undistort }
     }
 
@@ -56,7 +59,8 @@ impl Recipe {
         // Check the shape before the pixels take memory; the error comes later.
         match (&self.listed.photo, stored) {
             (Some(path), Some(size)) if self.photos && same_aspect(size, (camera.width, camera.height)) => {
-                read_photo(path, self.background).map(Some)
+                let read = |colour| read_photo(path, colour);
+                self.background.map_or_else(|| read_open_photo(path), read).map(Some)
             }
             _ => Ok(None),
         }

@@ -41,8 +41,8 @@ pub(crate) fn undistort_photo(photo: &Photo, view: &Window) -> Photo {
     Photo { width, height, rgba }
 }
 
-/// Interpolates between the four nearest pixel centres; without weight where one of them is. The colours at the border
-/// continue outwards by half a pixel.
+/// Interpolates between the four nearest pixel centres, opacity too; without weight where one of them is. What is at the border
+/// continues outwards by half a pixel.
 fn bilinear(photo: &Photo, at: DVec2) -> [u8; 4] {
     let split = |value: f64, side: u32| {
         let value = (value - 0.5).clamp(0.0, f64::from(side - 1));
@@ -52,11 +52,11 @@ fn bilinear(photo: &Photo, at: DVec2) -> [u8; 4] {
     let ((x0, x1, fx), (y0, y1, fy)) = (split(at.x, photo.width), split(at.y, photo.height));
     let texel = |x: u32, y: u32| photo.rgba[y as usize * photo.width as usize + x as usize];
     let (a, b, c, d) = (texel(x0, y0), texel(x1, y0), texel(x0, y1), texel(x1, y1));
-    if [a, b, c, d].iter().any(|texel| texel[3] != 255) {
+    if [a, b, c, d].iter().any(|texel| texel[3] < 128) {
         return [0; 4];
     }
-    let mut colour = [255u8; 4];
-    for channel in 0..3 {
+    let mut colour = [0u8; 4];
+    for channel in 0..4 {
         let [a, b, c, d] = [a, b, c, d].map(|texel| f64::from(texel[channel]));
         let (top, bottom) = (a + (b - a) * fx, c + (d - c) * fx);
         colour[channel] = (top + (bottom - top) * fy).round() as u8;
@@ -78,7 +78,7 @@ fn spans(from: u32, to: u32) -> Vec<(usize, Vec<f64>)> {
 }
 
 /// Shrinks the photo to `width` x `height` px. Each target pixel is the exact area mean over the source pixels with
-/// alpha 255. Its alpha is 255 if they cover at least half of its area.
+/// weight. It has weight if they cover at least half of its area.
 pub(crate) fn shrink_photo(photo: &Photo, width: u32, height: u32) -> Photo {
     if (width, height) == (photo.width, photo.height) {
         return photo.clone();
@@ -92,20 +92,19 @@ pub(crate) fn shrink_photo(photo: &Photo, width: u32, height: u32) -> Photo {
 }
 
 fn mean(photo: &Photo, (left, across): (usize, &[f64]), (top, down): (usize, &[f64])) -> [u8; 4] {
-    let (mut sum, mut covered) = ([0.0f64; 3], 0.0);
+    let (mut sum, mut covered) = ([0.0f64; 4], 0.0);
     for (y, weight_y) in down.iter().enumerate() {
         let start = (top + y) * photo.width as usize + left;
         for (texel, weight_x) in photo.rgba[start..start + across.len()].iter().zip(across) {
-            let weight = if texel[3] == 255 { weight_x * weight_y } else { 0.0 };
+            let weight = if texel[3] >= 128 { weight_x * weight_y } else { 0.0 };
             covered += weight;
-            (0..3).for_each(|channel| sum[channel] += weight * f64::from(texel[channel]));
+            (0..4).for_each(|channel| sum[channel] += weight * f64::from(texel[channel]));
         }
     }
     if covered < 0.5 - 1e-9 {
         return [0; 4];
     }
-    let [r, g, b] = sum.map(|value| (value / covered).round().clamp(0.0, 255.0) as u8);
-    [r, g, b, 255]
+    sum.map(|value| (value / covered).round().clamp(0.0, 255.0) as u8)
 }
 
 /// Makes the id map of a view with `width` x `height` px from a map of its photo at any scale. Pixels outside of the

@@ -137,6 +137,7 @@ impl Settings {
             max_resolution: some(self.read.max_resolution),
             test_every: some(self.read.test_every),
             background: self.train.background,
+            keep_opacity: self.train.random_background,
             photos: true,
             photo_memory: self.run.photo_memory,
             ..LoadOptions::default()

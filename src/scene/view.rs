@@ -9,6 +9,9 @@ use std::sync::Arc;
 
 /// A decoded photo, row-major RGBA8. Alpha is 255 for valid pixels, and 0 for pixels outside of the original image
 /// after undistortion. Pixels with alpha 0 do not count in any loss or score.
+///
+/// A transparent photo that came without a colour behind it has its colours over black, and in alpha also its opacity o:
+/// 128 + 127 o in valid pixels.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Photo {
     /// Width, px.
@@ -19,7 +22,29 @@ pub struct Photo {
     pub rgba: Vec<[u8; 4]>,
 }
 
+/// Alpha of a valid pixel that shows nothing but what is behind it.
+const CLEAR: u8 = 128;
+
+/// Returns the alpha of a valid pixel of an opacity from 0 to 1.
+pub(crate) fn alpha_of(opacity: f64) -> u8 {
+    CLEAR + (f64::from(u8::MAX - CLEAR) * opacity).round() as u8
+}
+
 impl Photo {
+    /// Returns the colours over a colour of r, g, b from 0 to 1; none if the photo is opaque.
+    pub(crate) fn over(&self, behind: [f32; 3]) -> Option<Vec<[u8; 4]>> {
+        let shows = |alpha: u8| (CLEAR..u8::MAX).contains(&alpha);
+        let over = |&[r, g, b, alpha]: &[u8; 4]| {
+            if !shows(alpha) {
+                return [r, g, b, alpha];
+            }
+            let through = 255.0 * f32::from(u8::MAX - alpha) / f32::from(u8::MAX - CLEAR);
+            let mix = |colour: u8, behind: f32| (f32::from(colour) + through * behind).round() as u8;
+            [mix(r, behind[0]), mix(g, behind[1]), mix(b, behind[2]), u8::MAX]
+        };
+        self.rgba.iter().any(|texel| shows(texel[3])).then(|| self.rgba.iter().map(over).collect())
+    }
+
     /// Returns the colours without validity, `[height, width]`.
     pub fn rgb(&self) -> Vec<[u8; 3]> {
         self.rgba.iter().map(|&[r, g, b, _]| [r, g, b]).collect()

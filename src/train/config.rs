@@ -54,6 +54,14 @@ crate::options::options! {
             #[cfg_attr(feature = "cli", arg(value_parser = colour))]
             background <"COLOUR">: [f32; 3] = [0.0; 3], up_to(1.0), fixed;
 
+            /// Gives each step a colour of its own behind the scene, on or off.
+            ///
+            /// What no Gaussian covers then never looks right, so that nothing is left to the background. Transparent photos
+            /// are compared over the same colour. Renders and scores have --background. Off (3DGS, which has the choice).
+            #[cfg_attr(feature = "cli", arg(value_parser = switch, action = clap::ArgAction::Set, num_args = 0..=1,
+                default_missing_value = "on"))]
+            random_background <"SWITCH">: bool = false, fixed;
+
             /// Trains the exposure and white balance of each photo.
             ///
             /// The picture is multiplied by gains of its photo before it is compared; the model has the mean exposure.
@@ -365,6 +373,10 @@ impl TrainConfig {
             && !(x0 < x1 && y0 < y1 && z0 < z1)
         {
             return Err(Error::usage("grow_box", "is empty; it needs the smaller corner first, then the larger one"));
+        }
+        if self.random_background && self.exposure == ExposureMode::On {
+            let problem = "is on, which needs `exposure = \"off\"`: gains of a photo are not those of a random colour";
+            return Err(Error::usage("random_background", problem));
         }
         Ok(())
     }

@@ -59,6 +59,7 @@ pub fn decided(config: &TrainConfig, gains: &[Gains]) -> TrainConfig {
         return config.clone();
     }
     let exposure = match spread(gains) {
+        _ if config.random_background => ExposureMode::Off,
         Some(spread) if spread >= DIFFERS => {
             tracing::info!(
                 "exposure: on, because the photos' brightness differs by {:.0} %; set `exposure` to off to train without",

@@ -6,6 +6,7 @@
 
 mod ahead;
 pub(crate) mod align;
+mod backdrop;
 pub(crate) mod config;
 pub(crate) mod exposure;
 mod first;

@@ -1,7 +1,6 @@
 //! The input of one step: uniforms, photo, masks.
 
-use super::LabelRule;
-use super::TrainConfig;
+use super::{LabelRule, TrainConfig, backdrop};
 use crate::engine::{DisagreementInput, Engine, LayerInput, TrainInput};
 use crate::scene::{Camera, LabelMap, Occluders, Photo, Pixels};
 use crate::shaders::constants::{ADAM_BETA1, ADAM_BETA2, FINEST, LABEL_BORDER};
@@ -168,7 +167,7 @@ pub(crate) fn uniforms(
     fixed: SceneScale,
     engine: &Engine,
 ) -> StepUniforms {
-    let base = engine.part_uniforms(view.camera, view.whole, view.near, config.background);
+    let base = engine.part_uniforms(view.camera, view.whole, view.near, backdrop::colour(config, input.step));
     let rates = config.rates_at(input.step);
     let rate = (rates.position * fixed.extent) as f32;
     let correction = |beta: f32| (1.0 / (1.0 - f64::from(beta).powi(input.updates.max(1) as i32))) as f32;
@@ -226,5 +225,11 @@ pub(crate) fn train_input<'a>(
         }
         LayerInput { view_labels: view.view_labels, layer_from_label, label_from_layer, weights, occluders }
     });
-    TrainInput { uniforms, photo: &view.photo.rgba, layers, disagreement, shared: Vec::new() }
+    TrainInput {
+        uniforms,
+        photo: backdrop::photo(view.photo, config, input.step),
+        layers,
+        disagreement,
+        shared: Vec::new(),
+    }
 }

@@ -161,7 +161,7 @@ fn backdrop(views: &[View]) -> Result<Option<[u8; 3]>> {
         let rows = [0, height - 1].into_iter().flat_map(|y| (0..width).map(move |x| (x, y)));
         let columns = [0, width - 1].into_iter().flat_map(|x| (0..height).map(move |y| (x, y)));
         let texels = rows.chain(columns).map(|(x, y)| photo.rgba[y * width + x]);
-        border.extend(texels.filter(|texel| texel[3] == 255).map(|[r, g, b, _]| [r, g, b]));
+        border.extend(texels.filter(|texel| texel[3] >= 128).map(|[r, g, b, _]| [r, g, b]));
     }
     border.sort_unstable();
     let Some(&middle) = border.get(border.len() / 2) else { return Ok(None) };
