@@ -4,7 +4,7 @@
 //! chosen so that this holds, and the tests refuse other scenes.
 
 use crate::reference::blend::{Upstream, blend_backward, blend_forward, centre, trace};
-use crate::reference::disagreement::disagreement;
+use crate::reference::disagreement::{depth_error, disagreement};
 use crate::reference::loss::{label_loss, photo_loss};
 use crate::reference::model::ROW_FLOATS;
 use crate::reference::project::{project_backward, project_forward};
@@ -164,6 +164,23 @@ fn disagreement_gradient_equals_central_differences() {
         of(&moved).value
     });
     agree("disagreement", &of(&splats).v_opacities, &numeric);
+}
+
+#[test]
+fn gradient_of_depth_errors_equals_central_differences() {
+    let rules = Rules::default();
+    let s = safe_scene(&rules, 200, &small());
+    let size = (s.camera.width as usize, s.camera.height as usize);
+    let splats = splats_of(&project::project_all(&rules, &s.camera, &s.model()));
+    // Before and behind, and some unknown.
+    let inverse: Vec<f64> = (0..size.0 * size.1).map(|at| [0.0, 0.2, 0.3, 1.0][at % 4]).collect();
+    let of = |splats: &[Splat]| depth_error(&rules, splats, size, &inverse, 1.7);
+    let opacities: Vec<f64> = splats.iter().map(|splat| splat.opacity).collect();
+    let numeric = differences(&opacities, |moved| {
+        let moved: Vec<Splat> = splats.iter().zip(moved).map(|(s, &opacity)| Splat { opacity, ..*s }).collect();
+        of(&moved).value
+    });
+    agree("depth errors", &of(&splats).v_opacities, &numeric);
 }
 
 #[test]

@@ -45,6 +45,7 @@ mod hostile; // damaged and hostile files are refused in bounded memory
 mod invariants; // results do not depend on kernel shape, threads or a resume
 mod io; // formats of scenes, masks, models and checkpoints
 mod known; // failures that users of other trainers reported
+mod known_depths; // depths of points and maps in the loss, resumed trainings
 mod labels; // label rules of the paper, on the mirrors
 mod large; // models larger than the memory of the device, ids beyond those of masks
 mod lenses; // formulas of lenses, and a scene through each of them

@@ -52,15 +52,16 @@ fn lists() -> Vec<(Capacity, PassList)> {
             capacity.segment_pixels = if segments > 1 { 100_000 } else { 0 };
             let size = ROOM.image;
             let mut add = |list| all.push((capacity, list));
-            for (labels, lift, disagreement, sh_degree, update) in [
-                (true, true, false, 3, true),
-                (true, false, false, 3, true),
-                (true, true, false, 0, false),
-                (false, false, true, 3, true),
-                (false, false, false, 3, true),
-                (false, false, false, 1, false),
+            for (labels, lift, disagreement, depth, sh_degree, update) in [
+                (true, true, false, false, 3, true),
+                (true, false, false, false, 3, true),
+                (true, true, false, false, 0, false),
+                (false, false, true, false, 3, true),
+                (false, false, false, true, 3, true),
+                (false, false, false, false, 3, true),
+                (false, false, false, false, 1, false),
             ] {
-                let variant = Variant { labels, disagreement, lift, sh_degree, size, update, counts: false };
+                let variant = Variant { labels, disagreement, depth, lift, sh_degree, size, update, counts: false };
                 add(pass::training_step(&shape, &capacity, variant));
             }
             #[cfg(feature = "lab")]
@@ -75,6 +76,7 @@ fn lists() -> Vec<(Capacity, PassList)> {
                     update: true,
                     counts: false,
                     disagreement: false,
+                    depth: false,
                 },
                 2,
             ));
@@ -89,6 +91,7 @@ fn lists() -> Vec<(Capacity, PassList)> {
                 update: true,
                 counts: false,
                 disagreement: false,
+                depth: false,
             };
             let extension = strategy::of(StrategyKind::Mcmc).extension();
             let all_passes = 15;

@@ -307,6 +307,7 @@ fn a_training_without_shared_rows_pays_nothing_for_them() {
         update: true,
         counts: false,
         disagreement: false,
+        depth: false,
     };
     let work = |room: &EngineSize| {
         let list = training_step(&shape, &capacity(&shape, room), variant);

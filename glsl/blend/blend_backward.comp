@@ -10,6 +10,7 @@
 // Reads:   step; tile_starts [layers * T]; instance_from_sorted, splat_from_instance [I]; splats [V,3]; image [P] (w = transmittance),
 //          last [P]; v_image [P]; variant labels: counters, layer_tiles, layer_state, layer_weights
 //          variant disagreement: target [P]; view_labels [P]; labels [N]; gaussian_from_splat [V]; label_trust [labels]
+//          variant depth: depths [P]
 // Writes:  v_instances_a, _b, _c [I] by instance: v_mean2d (px), v_conic xy; v_conic z, v_log_opacity, v_colour rg;
 //          v_colour b, stamp of the step
 //          (records without the current stamp were not walked; they count as 0)
@@ -17,9 +18,10 @@
 // Math:    p = dL/d ln alpha = w (u - s), where u = colour . g, and s is the colour behind, times g; geometry and
 //          opacity gradients are linear in six moments of p about the tile's centre. T by division. Clamped alpha: p = 0.
 //          Disagreement of pixel v with label L: E = sum of w d + T_end [L != 0], with d = [the splat's label is not L].
-//          It is one more channel with the colour d, a background of [L != 0], and gradients of opacities only.
+//          It is one more channel with the colour d, a background of [L != 0], and gradients of opacities only. A known depth D: the same with d = min(|z / D - 1|, 1) and a
+//          background of 1.
 // Order:   fixed, bitwise reproducible.
-// Mirror:  src/verify/reference/blend.rs::blend_backward, disagreement.rs::disagreement
+// Mirror:  src/verify/reference/blend.rs::blend_backward, disagreement.rs::disagreement, disagreement.rs::depth_error
 
 READ1(0, StepUniforms, step);
 FETCHU(1, tile_starts);
@@ -47,9 +49,16 @@ FETCHU(14, gaussian_from_splat);
 READ(15, float, label_trust);
 WRITE(16, float, disagreement);
 #endif
+#ifdef DEPTH
+READ(11, float, depths);
+#endif
+#if defined(DISAGREEMENT) || defined(DEPTH)
+#define CHANNEL
+#include "channel.glsl"
+#endif
 #ifdef SEGMENTED
 INOUT(30, vec2, segment_back); // [jobs, pixels of a tile] (transmittance, light from behind)
-#ifdef DISAGREEMENT
+#ifdef CHANNEL
 INOUT(31, uvec4, segment_rest); // x: disagreement behind
 #endif
 #endif
@@ -82,9 +91,9 @@ void main() {
 #endif
     float T[ROWS], behind[ROWS], g0[ROWS], g1[ROWS], g2[ROWS];
     uint final_[ROWS];
-#ifdef DISAGREEMENT
-    uint own[ROWS];                    // label of the pixel
-    float differs[ROWS], wrong[ROWS];  // weight of the pixel; disagreement behind, times that weight
+#ifdef CHANNEL
+    uint own[ROWS];                  // what the pixel has
+    float weight[ROWS], wrong[ROWS]; // weight of the pixel; disagreement behind, times that weight
 #endif
     uint deepest = 0u;
     [[unroll]] for (uint k = 0u; k < ROWS; k++) {
@@ -110,19 +119,15 @@ void main() {
             g = fetch4(v_image, p).xyz;
             behind[k] = dot(u.background, g);
         }
-#ifdef DISAGREEMENT
-        uint here = fetchu(view_labels, p);
-        bool counts = inside && fetchc(target, p).w > 0.5 && (here & LABEL_BORDER) == 0u;
-        own[k] = here & LABEL_MASK;
-        differs[k] = counts ? u.label_weight * u.loss_scale * label_trust[own[k]] : 0.0;
-        wrong[k] = own[k] != 0u ? differs[k] : 0.0;
+#ifdef CHANNEL
+        own[k] = channel_of_pixel(p, inside, u, weight[k], wrong[k]);
 #endif
 #ifdef SEGMENTED
         if (SEGMENT + 1u < SEGMENTS) {
             vec2 state = segment_back[kept + k * SUBGROUP_SIZE];
             T[k] = state.x;
             behind[k] = state.y;
-#ifdef DISAGREEMENT
+#ifdef CHANNEL
             wrong[k] = uintBitsToFloat(segment_rest[kept + k * SUBGROUP_SIZE].x);
 #endif
         }
@@ -150,8 +155,8 @@ void main() {
         uint instance = fetchu(instance_from_sorted, at), index = fetchu(splat_from_instance, instance);
         vec4 r0 = fetch4(splats, 3u * index), r1 = fetch4(splats, 3u * index + 1u), r2 = fetch4(splats, 3u * index + 2u);
         TileSplat mine = TileSplat(r0.x - corner.x, r0.y - corner.y, r0.z, r0.w, r1.x, r1.y, vec3(r1.zw, r2.x), 0.0);
-#ifdef DISAGREEMENT
-        uint label = fetchu(labels, fetchu(gaussian_from_splat, index));
+#ifdef CHANNEL
+        uint carried = channel_of_splat(index, r2.y);
         float ol = 0.0;
 #endif
         float o0 = 0.0, ox = 0.0, oy = 0.0, oxx = 0.0, oxy = 0.0, oyy = 0.0, or_ = 0.0, og = 0.0, ob = 0.0;
@@ -163,8 +168,8 @@ void main() {
             float ax = s.lo + s.a * dx * dx, bx = s.b * dx;
             float dy0 = s.y - t.row0;
             float m0 = 0.0, m1 = 0.0, m2 = 0.0, vr = 0.0, vg = 0.0, vb = 0.0;
-#ifdef DISAGREEMENT
-            uint label_j = subgroup_shuffle(label, j);
+#ifdef CHANNEL
+            uint carried_j = subgroup_shuffle(carried, j);
             float ml = 0.0;
 #endif
             [[unroll]] for (uint k = 0u; k < ROWS; k++) {
@@ -186,8 +191,8 @@ void main() {
                 vr += w * g0[k];
                 vg += w * g1[k];
                 vb += w * g2[k];
-#ifdef DISAGREEMENT
-                float more = (label_j == own[k] ? 0.0 : differs[k]) - wrong[k];
+#ifdef CHANNEL
+                float more = differs(own[k], carried_j, weight[k]) - wrong[k];
                 ml += raw >= ALPHA_MAX ? 0.0 : w * more;
                 wrong[k] += alpha * more;
 #endif
@@ -205,9 +210,9 @@ void main() {
             or_ = me ? colour.x : or_;
             og = me ? colour.y : og;
             ob = me ? colour.z : ob;
-#ifdef DISAGREEMENT
-            float of_label = subgroup_sum(ml);
-            ol = me ? of_label : ol;
+#ifdef CHANNEL
+            float of_channel = subgroup_sum(ml);
+            ol = me ? of_channel : ol;
 #endif
         }
         // convert moments about the tile's centre to gradients of the lane's own splat
@@ -219,7 +224,7 @@ void main() {
         float Syy = d.y * (d.y * o0 - 2.0 * oy) + oyy;
         if (lane < count) {
             v_instances_a[instance] = vec4(-(conic.x * Sx + conic.y * Sy), -(conic.y * Sx + conic.z * Sy), -0.5 * Sxx, -Sxy);
-#ifdef DISAGREEMENT
+#ifdef CHANNEL
             o0 += ol; // not in the moments above: shapes and places follow the photo
 #endif
             v_instances_b[instance] = vec4(-0.5 * Syy, o0, or_, og);
@@ -230,7 +235,7 @@ void main() {
     if (SEGMENT > 0u) {
         [[unroll]] for (uint k = 0u; k < ROWS; k++) {
             segment_back[kept + k * SUBGROUP_SIZE] = vec2(T[k], behind[k]);
-#ifdef DISAGREEMENT
+#ifdef CHANNEL
             segment_rest[kept + k * SUBGROUP_SIZE] = uvec4(floatBitsToUint(wrong[k]), 0u, 0u, 0u);
 #endif
         }
@@ -238,13 +243,6 @@ void main() {
     }
 #endif
 #ifdef DISAGREEMENT
-    float sum = 0.0;
-    [[unroll]] for (uint k = 0u; k < ROWS; k++) {
-        sum += wrong[k];
-    }
-    sum = subgroup_sum(sum);
-    if (lane == 0u) {
-        disagreement[t.tile] = sum;
-    }
+    write_sum(t.tile, wrong);
 #endif
 }

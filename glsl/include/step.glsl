@@ -18,6 +18,7 @@ struct StepUniforms {
     float loss_scale;       // 1 / (3 valid pixels)
     float label_weight;     // lambda_2
     float label_alpha;      // weight of the alpha term within the label loss
+    float depth_weight;     // of a pixel with a known depth
     float label_threshold;  // the lift needs at least this main weight
     uint gpf;               // 1: projection filter on
     uint occluder_words;    // words of occluder bits per layer

@@ -90,6 +90,7 @@ fn subject(args: &PlanArgs, context: &Context) -> Result<Subject> {
         update: true,
         counts: false,
         disagreement: false,
+        depth: false,
     };
     let list = training_step(&shape, &capacity, variant);
     Ok(Subject { device, shape, limits, room, capacity, list })

@@ -66,6 +66,10 @@ pub struct TrainFlags {
     /// Folder of pictures named as masks: pixels above 0 are left out of the loss and of votes.
     #[arg(long, value_name = "DIR", help_heading = "Scene")]
     pub ignore: Option<PathBuf>,
+    /// Folder of depth maps for --depth-weight, one per photo by name, world units along the axis of the camera: EXR, NPY or
+    /// PFM. Default: the points of the reconstruction.
+    #[arg(long, value_name = "DIR", help_heading = "Training")]
+    pub known_depths: Option<PathBuf>,
     /// Settings in TOML, such as config.toml of an earlier run. Flags override them.
     #[arg(long, value_name = "FILE.toml", help_heading = "Training")]
     pub config: Option<PathBuf>,
@@ -143,6 +147,7 @@ impl TrainFlags {
         let inputs = Inputs {
             masks,
             ignore: self.ignore.clone(),
+            known_depths: self.known_depths.clone(),
             memory_limit: self.memory_limit,
             max_bad_photos: self.trust.max_bad_photos,
             allow_outside: self.trust.allow_outside,

@@ -48,6 +48,7 @@ pub fn capacity(shape: &KernelShape, size: &EngineSize) -> Capacity {
         pixels: u64::from(width) * u64::from(height),
         labelled_pixels: if labels > 0 { u64::from(width) * u64::from(height) } else { 0 },
         labelled_tiles: if labels > 0 { tiles } else { 0 },
+        known_depths: if size.depths { u64::from(width) * u64::from(height) } else { 0 },
         label_tables: if labels > 0 { tiles * u64::from(LABEL_ROUNDS) } else { 0 },
         labels,
         vote_columns: vote_columns(size),
@@ -87,7 +88,9 @@ fn widest(size: &EngineSize) -> Variant {
     // Layers need more memory than a disagreement; a size without layers has none.
     let layers = size.labels.is_some_and(|labels| labels.layers > 0);
     let disagreement = size.labels.is_some() && !layers;
-    Variant { labels: layers, disagreement, lift: layers, sh_degree: 3, size: size.image, update: true, counts: false }
+    let depth = size.depths && size.labels.is_none();
+    let (sh_degree, size) = (3, size.image);
+    Variant { labels: layers, disagreement, depth, lift: layers, sh_degree, size, update: true, counts: false }
 }
 
 impl Engine {

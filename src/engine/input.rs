@@ -29,6 +29,8 @@ pub(crate) struct TrainInput<'a> {
     pub layers: Option<LayerInput<'a>>,
     /// Labels, in a step that compares them with the view's mask.
     pub disagreement: Option<DisagreementInput<'a>>,
+    /// 1 / depth of each pixel that the photo is known to have, `[P]`, 0 for unknown, in a step that compares them.
+    pub depths: Option<&'a [f32]>,
     /// Rows of shared parameters that the step uses; its passes refer to them by index in this order.
     pub shared: Vec<SharedRow>,
 }
@@ -118,6 +120,7 @@ impl Engine {
             Input::Uniforms(_) => Ok(()),
             Input::Train(train) => {
                 sched.upload(Buf::TARGET, frame, 0, &train.photo)?;
+                train.depths.map_or(Ok(()), |depths| sched.upload(Buf::DEPTHS, frame, 0, depths))?;
                 if let Some(labels) = &train.disagreement {
                     sched.upload(Buf::VIEW_LABELS, frame, 0, labels.view_labels)?;
                     sched.upload(Buf::LABEL_TRUST, frame, 0, &labels.trust)?;

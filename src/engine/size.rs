@@ -31,12 +31,14 @@ pub struct EngineSize {
     pub shared_rows: u32,
     /// Gaussians at the end of the model that are drawn and not trained; they have no optimiser state.
     pub frozen: u32,
+    /// True with room for depths that photos are known to have.
+    pub depths: bool,
 }
 
 impl EngineSize {
     /// Sizes for rendering this many Gaussians in images of up to `image` px.
     pub const fn new(gaussians: u64, image: (u32, u32)) -> Self {
-        Self { gaussians, image, trained: false, labels: None, shared_rows: 0, frozen: 0 }
+        Self { gaussians, image, trained: false, labels: None, shared_rows: 0, frozen: 0, depths: false }
     }
 
     /// Sizes for rendering a model, and its labels if it has some, in images of up to the largest of `sizes`, px.
@@ -66,6 +68,11 @@ impl EngineSize {
     #[doc(hidden)]
     pub const fn with_frozen(self, frozen: u32) -> Self {
         Self { frozen, ..self }
+    }
+
+    /// Sets whether there is room for known depths.
+    pub(crate) const fn with_depths(self, depths: bool) -> Self {
+        Self { depths, ..self }
     }
 
     /// Returns the most tiles that the kernels of the device can walk; `None` without a limit.

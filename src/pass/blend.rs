@@ -38,7 +38,7 @@ pub(super) fn blend_backward(b: &mut Builder, pairs: Buf) {
     let segments = b.segments();
     b.list.stage = Stage::BlendBackward;
     for segment in (0..segments).rev() {
-        pass!(b, blend_backward(labels: b.labels, disagreement: b.disagreement, segmented: segments > 1) {
+        pass!(b, blend_backward(labels: b.labels, disagreement: b.disagreement, depth: b.depth, segmented: segments > 1) {
             step: Buf::STEP, tile_starts: Buf::TILE_STARTS, instance_from_sorted: pairs,
             splat_from_instance: Buf::SPLAT_FROM_INSTANCE, splats: Buf::SPLATS, image: Buf::IMAGE, last: Buf::LAST, v_image: Buf::V_IMAGE,
             v_instances_a: Buf::V_INSTANCES_A, v_instances_b: Buf::V_INSTANCES_B, v_instances_c: Buf::V_INSTANCES_C,
@@ -46,6 +46,7 @@ pub(super) fn blend_backward(b: &mut Builder, pairs: Buf) {
             layer_weights: Buf::LAYER_WEIGHTS, segment_back: Buf::SEGMENT_BACK, target: Buf::TARGET,
             view_labels: Buf::VIEW_LABELS, labels: Buf::LABELS, gaussian_from_splat: GAUSSIAN_FROM_SPLAT,
             label_trust: Buf::LABEL_TRUST, disagreement: Buf::DISAGREEMENT, segment_rest: Buf::SEGMENT_REST,
+            depths: Buf::DEPTHS,
         } [segment: segment, segments: segments], args(constants::ARGS_BLEND));
     }
 }

@@ -14,6 +14,8 @@ pub struct Builder<'a> {
     pub labels: bool,
     /// True if the labels of the splats are compared with the view's mask.
     pub disagreement: bool,
+    /// True if the depths of the splats are compared with those that the photo is known to have.
+    pub depth: bool,
     /// Active degree of the spherical harmonics.
     pub sh_degree: u32,
     /// True if the blend passes count the pairs with a weight.

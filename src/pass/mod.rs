@@ -38,6 +38,8 @@ pub struct Variant {
     pub labels: bool,
     /// The step compares the labels of the splats with the view's mask; not together with `labels`.
     pub disagreement: bool,
+    /// The step compares the depths of the splats with known ones; with neither of the above.
+    pub depth: bool,
     /// The step lifts labels from the view's mask, as in the paper; needs `labels`.
     pub lift: bool,
     /// Active degree of the spherical harmonics.
@@ -84,7 +86,7 @@ impl Extension for () {}
 
 fn begin<'a>(name: &str, shape: &'a KernelShape, capacity: &'a Capacity, labels: bool, sh_degree: u32) -> Builder<'a> {
     let list = PassList::new(name);
-    let mut b = Builder { shape, capacity, labels, disagreement: false, sh_degree, counts: false, list };
+    let mut b = Builder { shape, capacity, labels, disagreement: false, depth: false, sh_degree, counts: false, list };
     pass!(b, step_begin { step: Buf::STEP, counters: Buf::COUNTERS, dispatch_args: Buf::DISPATCH_ARGS } [],
         build::ONE);
     b
@@ -110,7 +112,7 @@ pub fn extended_step(
     (extension, passes): (&dyn Extension, u32),
 ) -> PassList {
     let mut b = begin("training step", shape, capacity, variant.labels, variant.sh_degree);
-    (b.counts, b.disagreement) = (variant.counts, variant.disagreement);
+    (b.counts, b.disagreement, b.depth) = (variant.counts, variant.disagreement, variant.depth);
     extension.extend(passes, Hook::Camera, &mut b);
     project::visible_splats(&mut b);
     let pairs = tile::bin_splats(&mut b);

@@ -67,8 +67,16 @@ fn object_passes(shape: &KernelShape, capacity: &Capacity, sh_degree: u32) -> Ve
     let tiles = capacity.virtual_tiles / capacity.layers.max(1);
     let capacity = Capacity { virtual_tiles: 2 * tiles, ..*capacity };
     let list = PassList::new("object");
-    let mut b =
-        Builder { shape, capacity: &capacity, labels: false, sh_degree, disagreement: false, counts: false, list };
+    let mut b = Builder {
+        shape,
+        capacity: &capacity,
+        labels: false,
+        sh_degree,
+        disagreement: false,
+        depth: false,
+        counts: false,
+        list,
+    };
     project::visible_splats_of_object(&mut b);
     b.labels = true;
     let pairs = tile::bin_object(&mut b);
@@ -84,8 +92,16 @@ fn object_passes(shape: &KernelShape, capacity: &Capacity, sh_degree: u32) -> Ve
     }
     // The gradients stay indexed by the scene's splats.
     let list = PassList { work, ..PassList::default() };
-    let mut b =
-        Builder { shape, capacity: &capacity, labels: true, sh_degree, disagreement: false, counts: false, list };
+    let mut b = Builder {
+        shape,
+        capacity: &capacity,
+        labels: true,
+        sh_degree,
+        disagreement: false,
+        depth: false,
+        counts: false,
+        list,
+    };
     project::project_backward_of_object(&mut b, Buf::SPLAT_FROM_GAUSSIAN);
     b.list.work
 }

@@ -29,6 +29,7 @@ mod tests {
             update: true,
             counts: false,
             disagreement: false,
+            depth: false,
         };
         let named = stages(&training_step(&shape, &capacity, variant));
         for stage in Stage::ALL {

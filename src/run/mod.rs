@@ -6,6 +6,7 @@
 
 mod block;
 mod checkpoints;
+mod depths;
 mod finish;
 pub(crate) mod history;
 pub(crate) mod info;
@@ -68,6 +69,10 @@ pub struct Inputs {
     /// Folder of pictures, named as masks, whose pixels above 0 leave the photo out. See [`crate::io::LoadOptions::ignore`].
     #[serde(default)]
     pub ignore: Option<PathBuf>,
+    /// Folder of depth maps in world units, in place of the points of the reconstruction, for
+    /// [`TrainConfig::depth_weight`].
+    #[serde(default)]
+    pub known_depths: Option<PathBuf>,
     /// Limit on the device memory, bytes.
     pub memory_limit: Option<u64>,
     /// Largest share of damaged photos that is accepted, 0 to 1.

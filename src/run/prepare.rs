@@ -6,7 +6,7 @@ use super::history::{Recorder, Sums};
 use super::info::Info;
 use super::models::{Models, open};
 use super::resume::{self, Record, Resumed, absolute};
-use super::{Inputs, Observer, OccluderFiles, Request, Run, Settings, Start, occluders, pictures};
+use super::{Inputs, Observer, OccluderFiles, Request, Run, Settings, Start, depths, occluders, pictures};
 use crate::engine::Engine;
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
@@ -74,6 +74,7 @@ pub(super) fn prepare(request: &Request, is_again: bool) -> Result<Prepared> {
     let mut inputs = resumed.as_ref().map_or(request.inputs.clone(), |resumed| resumed.record.inputs.clone());
     inputs.masks = request.inputs.masks.clone().or(inputs.masks);
     inputs.ignore = request.inputs.ignore.clone().or(inputs.ignore);
+    inputs.known_depths = request.inputs.known_depths.clone().or(inputs.known_depths);
     let names = inputs.masks.as_deref().map(LabelTable::of_folder).transpose()?.flatten();
     let dataset = read_scene(request, &settings, &inputs, block.as_ref())?;
     let table = if resumed.is_none() { occluders::table(request, &dataset)? } else { None };
@@ -133,7 +134,8 @@ pub(super) fn begin<'a>(
         crash_markers: request.restart,
         ..SchedulerOptions::default()
     };
-    let options = TrainerOptions { region: block.map(|block| block.region()), ..options.into() };
+    let depths = depths::known((&request.scene, &dataset), &settings.train, inputs.known_depths.as_deref())?;
+    let options = TrainerOptions { region: block.map(|block| block.region()), depths, ..options.into() };
     let mut facts = facts(request, inputs.masks.as_deref(), &gpu);
     facts.extend(resumed.as_ref().map(|resumed| ("goes on after step", resumed.state.step.to_string())));
     let before = resumed.as_ref().and_then(|resumed| resumed.record.occlusion.clone());
@@ -142,6 +144,7 @@ pub(super) fn begin<'a>(
         inputs: Inputs {
             masks: recorded(inputs.masks.as_deref()),
             ignore: recorded(inputs.ignore.as_deref()),
+            known_depths: recorded(inputs.known_depths.as_deref()),
             ..inputs.clone()
         },
         occlusion: occlusion.clone(),

@@ -3,6 +3,7 @@
 //! The order of views is known ahead. What a thread makes depends on step and view alone, so that a step has the same bits
 //! whether its pixels were made ahead or are made when it begins.
 
+use super::depths::KnownDepths;
 use super::parts::{Part, labels_of, photo_of};
 use super::step_input::{TrainView, valid_pixels};
 use crate::engine::Band;
@@ -22,6 +23,8 @@ pub(super) struct Ready {
     pub(super) photo: Arc<Photo>,
     /// The mask in the layout of the device; empty without a mask and in smaller sizes.
     pub(super) view_labels: Arc<Vec<u32>>,
+    /// 1 / known depth of each pixel, 0 for unknown; empty in a step without.
+    pub(super) depths: Vec<f32>,
     /// Camera and number of pixels that count, if the photo is smaller than the view.
     pub(super) small: Option<(Camera, u64)>,
 }
@@ -34,27 +37,39 @@ pub(super) struct Wanted {
     band: Band,
     photo: Pixels<Photo>,
     view_labels: Pixels<Vec<u32>>,
+    /// Depths that the photo is known to have, in a step that compares them.
+    depths: Option<KnownDepths>,
     /// Camera of a smaller size.
     small: Option<Camera>,
 }
 
 impl Wanted {
     /// Asks for a part, the one with this index, of a view at a share of its size.
-    pub(super) fn new(step: u32, (index, part): (usize, &Part), view: &TrainView, share: Option<f64>) -> Self {
+    pub(super) fn new(
+        step: u32,
+        (index, part): (usize, &Part),
+        view: &TrainView,
+        (share, depths): (Option<f64>, bool),
+    ) -> Self {
         let small = share.map(|share| part.camera.shrunk(share));
+        let depths = depths.then(|| view.depths.clone());
         let (photo, view_labels) = (view.photo.clone(), view.view_labels.clone());
-        Self { step, index, band: part.band, photo, view_labels, small }
+        Self { step, index, band: part.band, photo, view_labels, depths, small }
     }
 
     fn make(self) -> Result<Ready> {
-        let photo = photo_of(self.band, self.photo.get()?);
+        let whole = self.photo.get()?;
+        let full = (whole.width, whole.height);
+        let photo = photo_of(self.band, whole);
+        let drawn = |size| self.depths.as_ref().map_or(Vec::new(), |known| known.drawn(full, self.band, size));
         let Some(camera) = self.small else {
             let view_labels = labels_of(self.band, photo.width, self.view_labels.get()?);
-            return Ok(Ready { photo, view_labels, small: None });
+            return Ok(Ready { depths: drawn((photo.width, photo.height)), photo, view_labels, small: None });
         };
         let photo = Arc::new(shrink_photo(&photo, camera.width, camera.height));
         let valid = valid_pixels(&photo.rgba);
-        Ok(Ready { photo, view_labels: Arc::default(), small: Some((camera, valid)) })
+        let depths = drawn((photo.width, photo.height));
+        Ok(Ready { photo, view_labels: Arc::default(), depths, small: Some((camera, valid)) })
     }
 }
 

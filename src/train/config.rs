@@ -228,6 +228,13 @@ crate::options::options! {
             /// 0.2 (3DGS); the rest is L1.
             lambda_dssim <"SHARE">: f32 = 0.2, up_to(1.0);
 
+            /// Weight of known depths in the loss.
+            ///
+            /// 0 leaves them out. Where the reconstruction has a point that the photo shows, or --known-depths a value, light from
+            /// Gaussians at another depth costs by its relative error, at most 1; a mean over these pixels. It falls
+            /// linearly until the first step with labels, and moves opacities only.
+            depth_weight <"WEIGHT">: f64 = 0.0, not_negative, fixed;
+
             /// Trains a model without aliasing, on or off.
             ///
             /// Smaller pictures of such a model do not shimmer, and views from nearby show no needles: blur takes opacity, and

@@ -8,6 +8,7 @@ mod ahead;
 pub(crate) mod align;
 mod backdrop;
 pub(crate) mod config;
+pub(crate) mod depths;
 pub(crate) mod exposure;
 mod first;
 pub(crate) mod free_space;
@@ -147,14 +148,15 @@ impl Trainer {
         config: TrainConfig,
         dataset: &Dataset,
         size: EngineSize,
-        TrainerOptions { shape, scheduler, strategy, shared, region }: TrainerOptions,
+        TrainerOptions { shape, scheduler, strategy, shared, region, depths }: TrainerOptions,
     ) -> Result<Self> {
         let fixed = Region::scale(region.as_ref(), dataset);
         let shared = shared.or_of(&config, dataset, region.as_ref());
         let strategy = strategy.unwrap_or_else(|| strategy::of(config.strategy));
         let most = if config.max_gaussians > 0 { config.max_gaussians } else { u64::from(u32::MAX) };
         let shape = shape.unwrap_or_else(|| KernelShape::of(gpu.capabilities()));
-        let views = Views::new(setup::train_views(dataset, config.mask_border, size.band(&shape))?, &config);
+        let views = setup::train_views(dataset, depths, config.mask_border, size.band(&shape))?;
+        let views = Views::new(views, &config);
         let size = size.with_shared_rows(shared.rows(views.len()));
         let mut engine = Engine::with_shape(gpu, shape, size, scheduler)?;
         engine.set_sh_degree(config.sh_degree);
@@ -196,11 +198,6 @@ impl Trainer {
     /// Returns the configuration.
     pub fn config(&self) -> &TrainConfig {
         &self.config
-    }
-
-    /// Halves all learning rates for the rest of the run.
-    pub fn halve_rates(&mut self) {
-        self.config.halve_rates();
     }
 
     /// Returns the training views.
@@ -351,6 +348,7 @@ impl Trainer {
         let variant = Variant {
             labels: !input.layers.is_empty(),
             disagreement: input.labels && input.layers.is_empty(),
+            depth: self.config.depth_weight_at(input.step) > 0.0,
             lift: input.lifts(&self.config),
             sh_degree: self.config.sh_degree_at(input.step),
             size: self.views.largest_at(input.step, self.image),

@@ -27,6 +27,8 @@ const PRUNE_AT: f64 = 0.55;
 const LAYER_EVERY: u32 = 8;
 /// Shares of the run between two counts of votes, and between two searches for occluders. Both walk all views, so a run
 /// of default settings has one of each when labels start, and votes at the end.
+/// Share of a run after which known depths have no weight.
+const DEPTHS_UNTIL: f64 = 0.6;
 const VOTE_EVERY: f64 = 0.5;
 const OCCLUSION_EVERY: f64 = 0.5;
 
@@ -140,6 +142,16 @@ impl TrainConfig {
 
     fn is_label_turn(&self, step: u32, every: u32) -> bool {
         self.labels_at(step) && (step - self.labels_from()).is_multiple_of(every.max(1))
+    }
+
+    /// Returns the first step without known depths.
+    pub(super) fn depths_until(&self) -> u32 {
+        if self.depth_weight > 0.0 { self.labels_from().min(self.share(DEPTHS_UNTIL)) } else { 0 }
+    }
+
+    /// Returns the weight of known depths at `step`.
+    pub fn depth_weight_at(&self, step: u32) -> f64 {
+        self.depth_weight * (1.0 - f64::from(step) / f64::from(self.depths_until().max(1))).max(0.0)
     }
 
     /// Returns the step after which densification starts.

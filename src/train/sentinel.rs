@@ -28,6 +28,11 @@ pub(super) struct Seen {
 }
 
 impl Trainer {
+    /// Halves all learning rates for the rest of the run.
+    pub fn halve_rates(&mut self) {
+        self.config.halve_rates();
+    }
+
     pub(super) fn watch(&mut self, input: &StepInput, report: &Report, losses: [f64; 2]) -> Result<()> {
         let counters = &report.counters;
         let view = &self.views[self.views.index(input)].name;

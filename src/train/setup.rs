@@ -1,5 +1,6 @@
 //! The inputs of a training: options, sizes, views.
 
+use super::depths::KnownDepths;
 use super::parts::Part;
 use super::region::Region;
 use super::shared::Shared;
@@ -30,6 +31,8 @@ pub struct TrainerOptions {
     pub shared: Shared,
     /// The part of the scene that is trained; none for all of it.
     pub region: Option<Region>,
+    /// Depths that each training photo is known to have; none with a weight of 0.
+    pub depths: Vec<KnownDepths>,
 }
 
 impl Default for TrainerOptions {
@@ -40,7 +43,7 @@ impl Default for TrainerOptions {
 
 impl From<SchedulerOptions> for TrainerOptions {
     fn from(scheduler: SchedulerOptions) -> Self {
-        Self { shape: None, scheduler, strategy: None, shared: Shared::default(), region: None }
+        Self { shape: None, scheduler, strategy: None, shared: Shared::default(), region: None, depths: Vec::new() }
     }
 }
 
@@ -61,7 +64,7 @@ pub fn engine_size(dataset: &Dataset, config: &TrainConfig, gaussians: u64) -> R
             LabelRule::Main => 0,
         },
     });
-    Ok(EngineSize::new(gaussians, image).for_training().with_labels(labels))
+    Ok(EngineSize::new(gaussians, image).for_training().with_labels(labels).with_depths(config.depth_weight > 0.0))
 }
 
 /// Sets what the settings leave to the photos.
@@ -88,8 +91,14 @@ pub(crate) fn start_size(
     }
 }
 
-/// Makes the training views of a data set, and their parts of at most `most` rows.
-pub(super) fn train_views(dataset: &Dataset, border: u32, most: Option<u32>) -> Result<(Vec<TrainView>, Vec<Part>)> {
+/// Makes the training views of a data set, and their parts of at most `most` rows. `depths` are known depths of each view, or
+/// none.
+pub(super) fn train_views(
+    dataset: &Dataset,
+    depths: Vec<KnownDepths>,
+    border: u32,
+    most: Option<u32>,
+) -> Result<(Vec<TrainView>, Vec<Part>)> {
     let views = &dataset.train;
     let of = |index: usize| train_view((index, &views[index]), border, most);
     let (mut whole, mut parts) = (Vec::new(), Vec::new());
@@ -98,6 +107,7 @@ pub(super) fn train_views(dataset: &Dataset, border: u32, most: Option<u32>) -> 
         whole.push(view);
         parts.extend(of_view);
     }
+    whole.iter_mut().zip(depths).for_each(|(view, depths)| view.depths = depths);
     Ok((whole, parts))
 }
 
@@ -121,6 +131,7 @@ fn train_view((index, view): (usize, &View), border: u32, most: Option<u32>) -> 
         mask: view.mask.clone(),
         objects,
         view_labels,
+        depths: KnownDepths::default(),
         occluders: Default::default(),
     };
     Ok((view, parts))

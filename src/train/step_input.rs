@@ -1,5 +1,6 @@
 //! The input of one step: uniforms, photo, masks.
 
+use super::depths::{self, KnownDepths};
 use super::{LabelRule, TrainConfig, backdrop};
 use crate::engine::{DisagreementInput, Engine, LayerInput, TrainInput};
 use crate::scene::{Camera, LabelMap, Occluders, Photo, Pixels};
@@ -27,6 +28,8 @@ pub struct TrainView {
     pub objects: Vec<u16>,
     /// The mask in the layout of the device, one word per pixel, row-major; empty without a mask.
     pub view_labels: Pixels<Vec<u32>>,
+    /// Depths that the photo is known to have.
+    pub depths: KnownDepths,
     /// Occluders of each object in this view.
     pub occluders: Occluders,
 }
@@ -48,6 +51,8 @@ pub struct StepView<'a> {
     pub valid_pixels: u64,
     /// The mask in the layout of the device; empty without a mask.
     pub view_labels: &'a [u32],
+    /// 1 / known depth of each pixel, 0 for unknown; empty in a step without.
+    pub depths: &'a [f32],
     /// Light and area of each object, by id.
     pub shown: &'a BTreeMap<u16, Shown>,
     /// Occluders of each object.
@@ -179,6 +184,7 @@ pub(crate) fn uniforms(
         loss_scale: (1.0 / (3.0 * view.valid_pixels.max(1) as f64)) as f32,
         label_weight: label_weight(input, config),
         label_alpha: alpha_weight(config),
+        depth_weight: depths::weight(view.depths, config.depth_weight_at(input.step)),
         label_threshold: config.label_threshold,
         gpf: u32::from(config.gpf),
         occluder_words: labels.div_ceil(32),
@@ -225,11 +231,7 @@ pub(crate) fn train_input<'a>(
         }
         LayerInput { view_labels: view.view_labels, layer_from_label, label_from_layer, weights, occluders }
     });
-    TrainInput {
-        uniforms,
-        photo: backdrop::photo(view.photo, config, input.step),
-        layers,
-        disagreement,
-        shared: Vec::new(),
-    }
+    let photo = backdrop::photo(view.photo, config, input.step);
+    let depths = (config.depth_weight_at(input.step) > 0.0).then_some(view.depths);
+    TrainInput { uniforms, photo, layers, disagreement, depths, shared: Vec::new() }
 }

@@ -38,6 +38,8 @@ pub(super) struct Views {
     refined: Vec<Camera>,
     start: f64,
     full_from: u32,
+    /// First step without known depths.
+    depths_until: u32,
 }
 
 impl Views {
@@ -56,6 +58,7 @@ impl Views {
             refined: Vec::new(),
             start,
             full_from,
+            depths_until: config.depths_until(),
         }
     }
 
@@ -159,7 +162,7 @@ impl Views {
     fn wanted(&self, step: u32, index: usize) -> Wanted {
         let share = (self.size_at(step) < SIZES).then(|| self.share_at(step));
         let part = &self.parts[index];
-        Wanted::new(step, (index, part), &self.whole[part.view], share)
+        Wanted::new(step, (index, part), &self.whole[part.view], (share, step < self.depths_until))
     }
 
     /// Returns the part of a step at the size of the step, which [`Self::prepare`] has made.
@@ -176,6 +179,7 @@ impl Views {
             photo: &ready.photo,
             valid_pixels: part.valid_pixels,
             view_labels: &ready.view_labels,
+            depths: &ready.depths,
             shown: &part.shown,
             occluders: &view.occluders,
         };

@@ -8,6 +8,7 @@
 mod antialias;
 mod bands;
 mod blend;
+mod depth_prior;
 mod disagreement;
 pub mod fixture;
 mod label_map;

@@ -36,6 +36,7 @@ fn list(engine: &mut Engine, declare: impl FnOnce(&mut Builder)) -> ListId {
         capacity: &capacity,
         labels: false,
         disagreement: false,
+        depth: false,
         sh_degree: 0,
         counts: false,
         list,

@@ -13,6 +13,7 @@ use super::window::{Window, windows};
 use super::{colmap, folder_of};
 use crate::error::Result;
 use crate::scene::{Dataset, View};
+use glam::{DVec2, DVec3};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -147,6 +148,21 @@ pub fn gains(scene: &Path, dataset: &Dataset) -> Result<Vec<Option<[f64; 3]>>> {
     let seen = neighbours::seen(&views, &dataset.points, &observed);
     let gains = gains::gains(&views, &seen, &dataset.points)?;
     Ok(gains.into_iter().map(|of| of.map(|of| of.channels)).collect())
+}
+
+/// Returns the points of the reconstruction that each training photo shows: pixel and place. There are none where the
+/// reconstruction does not say which photo shows which point.
+pub(crate) fn observed_points(scene: &Path, dataset: &Dataset) -> Result<Vec<Vec<(DVec2, DVec3)>>> {
+    let looked = Observed::read(scene)?;
+    let views: Vec<&View> = dataset.train.iter().collect();
+    let observed: Vec<_> = views.iter().map(|view| looked.of(view)).collect();
+    let place = |&(index, at): &(usize, DVec2)| (at, dataset.points[index].position);
+    let of_view = |(seen, observed): (Vec<(usize, DVec2)>, &Option<&(Listed, Vec<Seen>)>)| match observed {
+        Some((_, shown)) if !shown.is_empty() => seen.iter().map(place).collect(),
+        _ => Vec::new(),
+    };
+    let seen = neighbours::seen(&views, &dataset.points, &observed);
+    Ok(seen.into_iter().zip(&observed).map(of_view).collect())
 }
 
 /// Scans a scene that was read with its photos.

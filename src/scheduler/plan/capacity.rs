@@ -91,6 +91,8 @@ domains! { Domain, Capacity;
         "Pixels with labels: equal to Pixels, or 0 in a scene without masks.";
     LabelledTiles labelled_tiles: "labelled tiles", cures::IMAGE,
         "Tiles of one image, or 0 in a scene without masks.";
+    KnownDepths known_depths: "known depths", cures::IMAGE,
+        "Pixels with room for a known depth: equal to Pixels, or 0 in a training without them.";
     LabelTables label_tables: "label tables", cures::IMAGE,
         "Tiles times walks for the label map, or 0 in a scene without masks.";
     Labels labels: "labels", cures::LAYERS,

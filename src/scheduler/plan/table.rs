@@ -11,6 +11,7 @@ crate::buffers! {
     STEP "step": size_of::<StepUniforms>() as u32, Domain::One, Class::PerFrame, None, "Uniforms of the step (glsl/include/step.glsl).";
     TARGET "target": 4, Domain::Pixels, Class::PerFrame, WORD, "Photo, `[P]`, RGBA8; pixels with alpha 0 are ignored.";
     VIEW_LABELS "view_labels": 4, Domain::LabelledPixels, Class::PerFrame, WORD, "Visible object of each pixel, `[P]`, with LABEL_BORDER near a contour; in a sweep of votes, the column of each pixel.";
+    DEPTHS "depths": 4, Domain::KnownDepths, Class::PerFrame, None, "1 / known depth of each pixel, `[P]`, 1 / world units; 0 where it is not known.";
     LAYER_FROM_LABEL "layer_from_label": 4, Domain::Labels, Class::PerFrame, WORD, "Layer of each label id; 0 if the step does not sample the label.";
     LABEL_FROM_LAYER "label_from_layer": 4, Domain::Layers, Class::PerFrame, WORD, "Label id of each layer; layer 0 is the scene.";
     LAYER_WEIGHTS "layer_weights": 4, Domain::Layers, Class::PerFrame, None, "Weight of each layer's label loss.";

@@ -41,6 +41,31 @@ pub fn disagreement(
     out
 }
 
+/// Sums E(v) = sum_i w_i min(|z_i / z - 1|, 1) + T over the pixels v with a known depth z. `inverse` has 1 / z, or 0 where it
+/// is not known, `[height, width]`; `weight` is that of a pixel.
+pub fn depth_error(
+    rules: &Rules,
+    splats: &[Splat],
+    size: (usize, usize),
+    inverse: &[f64],
+    weight: f64,
+) -> Disagreement {
+    let count = splats.len();
+    let mut out = Disagreement { value: 0.0, v_opacities: vec![0.0; count], margins: vec![f64::INFINITY; count] };
+    for (index, &inverse) in inverse.iter().enumerate() {
+        let ray = trace(rules, splats.iter().enumerate(), centre(index, size.0));
+        for contribution in &ray.contributions {
+            let least = &mut out.margins[contribution.splat];
+            *least = least.min(ray.margins.gradient());
+        }
+        if inverse > 0.0 {
+            let off = |splat: &Splat| (splat.depth * inverse - 1.0).abs().min(1.0);
+            add_ray(&mut out, splats, &ray, off, (1.0, weight));
+        }
+    }
+    out
+}
+
 /// Adds a ray: dE/d alpha_i = T_i d_i - (everything behind i) / (1 - alpha_i).
 fn add_ray(
     out: &mut Disagreement,

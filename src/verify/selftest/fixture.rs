@@ -85,15 +85,17 @@ pub struct OwnView {
     camera: Camera,
     valid_pixels: u64,
     view_labels: Vec<u32>,
+    /// 1 / known depth of each pixel; empty without.
+    pub depths: Vec<f32>,
     shown: BTreeMap<u16, Shown>,
 }
 
 impl OwnView {
     /// Returns the view for a step.
     pub fn of_step(&self) -> StepView<'_> {
-        let Self { near, photo, occluders, camera, valid_pixels, view_labels, shown } = self;
+        let Self { near, photo, occluders, camera, valid_pixels, view_labels, depths, shown } = self;
         let (near, finest, valid_pixels) = (*near, step_input::finest(camera), *valid_pixels);
-        StepView { camera, whole: None, near, finest, photo, valid_pixels, view_labels, shown, occluders }
+        StepView { camera, whole: None, near, finest, photo, valid_pixels, view_labels, depths, shown, occluders }
     }
 }
 
@@ -113,6 +115,7 @@ fn own_view(scene: &Scene) -> OwnView {
         near: NEAR,
         shown: step_input::shown_objects(&photo.rgba, &target.label_map),
         view_labels: target.label_map.clone(),
+        depths: Vec::new(),
         photo,
         valid_pixels: target.photo.valid.iter().filter(|&&valid| valid).count() as u64,
         occluders: target.slots.iter().map(occluders).collect(),
@@ -147,7 +150,12 @@ impl Fixture {
             vote_columns: VOTE_COLUMNS,
         });
         let room = EngineSize::new(scene.gaussians.len().max(1) as u64, (scene.camera.width, scene.camera.height));
-        let room = room.for_training().with_labels(labels_size).with_shared_rows(rows).with_frozen(scene.frozen);
+        let room = room
+            .for_training()
+            .with_labels(labels_size)
+            .with_shared_rows(rows)
+            .with_frozen(scene.frozen)
+            .with_depths(true);
         let mut engine = Engine::with_shape(gpu, shape, room, options)?;
         engine.upload_model(&scene.gaussians)?;
         let config = TrainConfig {
@@ -195,8 +203,9 @@ impl Fixture {
         let size = (self.scene.camera.width, self.scene.camera.height);
         let lift = self.input.lifts(&self.config);
         let disagreement = labels && self.input.layers.is_empty();
+        let depth = !labels && !self.view.depths.is_empty();
         let (labels, sh_degree) = (labels && !disagreement, self.config.sh_degree);
-        Variant { labels, disagreement, lift, sh_degree, size, update, counts: false }
+        Variant { labels, disagreement, depth, lift, sh_degree, size, update, counts: false }
     }
 
     /// Sorted pairs of the device: keys, and positions before the sort.

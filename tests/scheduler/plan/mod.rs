@@ -106,6 +106,7 @@ pub fn engine_lists(shape: KernelShape) -> (Capacity, Vec<PassList>) {
         pixels: 65_536,
         labelled_pixels: 65_536,
         labelled_tiles: 1024,
+        known_depths: 65_536,
         label_tables: 4096,
         labels: 16,
         vote_columns: 9,
@@ -128,6 +129,7 @@ pub fn engine_lists(shape: KernelShape) -> (Capacity, Vec<PassList>) {
         update: true,
         counts: false,
         disagreement: false,
+        depth: false,
     };
     let lists = vec![
         pass::training_step(&shape, &capacity, variant),

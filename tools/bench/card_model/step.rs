@@ -53,6 +53,7 @@ impl Subject {
             update: true,
             counts: false,
             disagreement: false,
+            depth: false,
         };
         // Of an ideal card: what fits is the matter of `labelgs plan`.
         let much = 1 << 60;

@@ -87,6 +87,7 @@ fn compile(gpu: &Gpu, args: &KernelArgs) -> Result<Vec<(Mode, Replacements)>> {
         update: false,
         counts: false,
         disagreement: false,
+        depth: false,
     };
     let list = pass::training_step(&shape, &capacity(&shape, &room), variant);
     let wanted = |number: usize| number == 0 || args.modes.is_empty() || args.modes.contains(&number);

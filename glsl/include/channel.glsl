@@ -1,0 +1,47 @@
+// One more channel of the backward walk, of opacities only: what each splat carries differs from what the pixel has.
+
+#ifdef DISAGREEMENT
+// Labels: the mask's against the splat's; no label behind all splats.
+uint channel_of_pixel(uint p, bool inside, StepUniforms u, out float weight, out float behind) {
+    uint here = fetchu(view_labels, p), own = here & LABEL_MASK;
+    bool counts = inside && fetchc(target, p).w > 0.5 && (here & LABEL_BORDER) == 0u;
+    weight = counts ? u.label_weight * u.loss_scale * label_trust[own] : 0.0;
+    behind = own != 0u ? weight : 0.0;
+    return own;
+}
+
+uint channel_of_splat(uint index, float z) {
+    return fetchu(labels, fetchu(gaussian_from_splat, index));
+}
+
+float differs(uint pixel, uint splat, float weight) {
+    return splat == pixel ? 0.0 : weight;
+}
+
+void write_sum(uint tile, float wrong[ROWS]) {
+    float sum = 0.0;
+    [[unroll]] for (uint k = 0u; k < ROWS; k++) {
+        sum += wrong[k];
+    }
+    sum = subgroup_sum(sum);
+    if (gl_LocalInvocationID.x == 0u) {
+        disagreement[tile] = sum;
+    }
+}
+#else
+// Depths: 1 / known depth of the pixel, 0 for unknown, against the splat's; behind all splats nothing is right.
+uint channel_of_pixel(uint p, bool inside, StepUniforms u, out float weight, out float behind) {
+    float inverse = inside ? depths[p] : 0.0;
+    weight = inverse > 0.0 ? u.depth_weight : 0.0;
+    behind = weight;
+    return floatBitsToUint(inverse);
+}
+
+uint channel_of_splat(uint index, float z) {
+    return floatBitsToUint(z);
+}
+
+float differs(uint pixel, uint splat, float weight) {
+    return weight * min(abs(uintBitsToFloat(splat) * uintBitsToFloat(pixel) - 1.0), 1.0);
+}
+#endif

@@ -1,0 +1,47 @@
+//! Depths that photos are known to have: points of the reconstruction, and maps.
+
+use crate::support::runs::{Place, stderr, succeeded};
+use std::fs;
+
+const FLAGS: [&str; 6] = ["--iterations", "60", "--checkpoint-every", "20", "--depth-weight", "0.5"];
+
+fn with<'a>(more: &[&'a str]) -> Vec<&'a str> {
+    FLAGS.iter().copied().chain(more.iter().copied()).collect()
+}
+
+/// A stopped training goes on with the same depths, and without them the model is another one.
+#[test]
+fn a_training_with_known_depths_goes_on_from_a_checkpoint() {
+    let place = Place::new();
+    let maps = place.text("scene/depth");
+    for (name, more) in [("points", &[][..]), ("maps", &["--known-depths", maps.as_str()])] {
+        succeeded(&place.trained(name, &with(more)));
+        let again = format!("{name}-again");
+        let broken = place.trained_with(Some("vkQueueSubmit:160:DEVICE_LOST"), &again, &with(more));
+        assert!(!broken.status.success() && place.checkpoints(&again)[0].step < 60);
+        succeeded(&place.trained(&again, &["--resume"]));
+        assert!(place.model(&again, 60) == place.model(name, 60), "{name}: the same bits");
+    }
+    succeeded(&place.trained("without", &[&FLAGS[..4], &["--depth-weight", "0"]].concat()));
+    let models = ["points", "maps", "without"].map(|name| place.model(name, 60));
+    assert!(models[0] != models[1] && models[0] != models[2] && models[1] != models[2]);
+}
+
+#[test]
+fn depths_that_are_not_there_are_an_error() {
+    let place = Place::new();
+    let (maps, masks) = (place.text("scene/depth"), place.text("scene/masks"));
+    let refused = |flags: &[&str], expected: &[&str]| {
+        let message = stderr(&place.trained("out", flags));
+        expected.iter().for_each(|part| assert!(message.contains(part), "{part:?} in {message}"));
+    };
+    refused(&["--known-depths", &maps], &["--known-depths", "--depth-weight above 0"]);
+    refused(&with(&["--known-depths", &place.text("nowhere")]), &["nowhere", "there is no such folder"]);
+    refused(&with(&["--known-depths", &masks]), &["masks", "depth needs 16-bit grey"]);
+    fs::remove_file(place.path("scene/depth/001.exr")).expect("a map");
+    refused(&with(&["--known-depths", &maps]), &["depth", "have no depth map", "001"]);
+    refused(&["--depth-weight=-1"], &["depth"]);
+    // A reconstruction without points.
+    fs::write(place.path("scene/sparse/0/points3D.bin"), 0_u64.to_le_bytes()).expect("written");
+    refused(&FLAGS, &["what photo shows them", "--known-depths"]);
+}
