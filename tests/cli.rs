@@ -180,7 +180,7 @@ fn a_flag_has_one_heading() {
 }
 
 /// A value other than the default for each setting; none for a flag that needs none.
-const TYPED: [(&str, &str); 62] = [
+const TYPED: [(&str, &str); 64] = [
     ("--iterations", "7"),
     ("--max-resolution", "99"),
     ("--start-size", "0.7"),
@@ -190,7 +190,9 @@ const TYPED: [(&str, &str); 62] = [
     ("--prune-share", "0.2"),
     ("--free-space", "off"),
     ("--far-points", "30"),
-    ("--exposure", "on"),
+    ("--exposure", "off"),
+    ("--random-background", "on"),
+    ("--depth-weight", "0.1"),
     ("--antialias", "on"),
     ("--refine-poses", ""),
     ("--grow-box", "-1,-2,0,1,2,3.5"),

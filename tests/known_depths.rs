@@ -35,11 +35,11 @@ fn depths_that_are_not_there_are_an_error() {
         let message = stderr(&place.trained("out", flags));
         expected.iter().for_each(|part| assert!(message.contains(part), "{part:?} in {message}"));
     };
-    refused(&["--known-depths", &maps], &["--known-depths", "--depth-weight above 0"]);
+    refused(&["--known-depths", &maps, "--depth-weight", "0"], &["--known-depths", "--depth-weight above 0"]);
     refused(&with(&["--known-depths", &place.text("nowhere")]), &["nowhere", "there is no such folder"]);
     refused(&with(&["--known-depths", &masks]), &["masks", "depth needs 16-bit grey"]);
     fs::remove_file(place.path("scene/depth/001.exr")).expect("a map");
-    refused(&with(&["--known-depths", &maps]), &["depth", "have no depth map", "001"]);
+    refused(&with(&["--known-depths", &maps]), &["depth", "have none", "001"]);
     refused(&["--depth-weight=-1"], &["depth"]);
     // A reconstruction without points.
     fs::write(place.path("scene/sparse/0/points3D.bin"), 0_u64.to_le_bytes()).expect("written");

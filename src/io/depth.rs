@@ -44,7 +44,7 @@ impl DepthFolder {
             return Ok(());
         }
         let problem = format!(
-            "{} of {} photos with masks have no depth map: {}; expected files named like the photos, ending in .{}",
+            "{} of {} photos that need a depth map have none: {}; expected files named like the photos, ending in .{}",
             without.len(),
             views.len(),
             shortened(&without),

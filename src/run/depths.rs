@@ -7,24 +7,26 @@ use crate::train::TrainConfig;
 use crate::train::depths::KnownDepths;
 use std::path::Path;
 
-/// Returns those of each training photo; none with a weight of 0. `folder` has depth maps in place of the points of the
-/// reconstruction.
-pub(super) fn known(
+/// Weight of known depths if nothing else is set.
+const WEIGHT: f64 = 0.3;
+
+/// Returns the settings with the weight of known depths decided, and these depths of each training photo, none with a
+/// weight of 0. Only a new run decides. `folder` has depth maps in place of the points of the reconstruction.
+pub(super) fn decided(
     (scene, dataset): (&Path, &Dataset),
-    config: &TrainConfig,
+    (config, is_new): (&TrainConfig, bool),
     folder: Option<&Path>,
-) -> Result<Vec<KnownDepths>> {
-    if config.depth_weight == 0.0 {
+) -> Result<(TrainConfig, Vec<KnownDepths>)> {
+    // Points are where poses have them, which are about to move.
+    let is_open = is_new && (folder.is_some() || !config.refine_poses);
+    let weight = config.depth_weight.unwrap_or(if is_open { WEIGHT } else { 0.0 });
+    let with = |weight: f64| TrainConfig { depth_weight: Some(weight), ..config.clone() };
+    if weight == 0.0 {
         let unread = || Err(Error::usage("known_depths", "is only read with a `depth_weight` above 0"));
-        return folder.map_or(Ok(Vec::new()), |_| unread());
+        return folder.map_or(Ok((with(0.0), Vec::new())), |_| unread());
     }
-    let known: Vec<KnownDepths> = match folder {
-        Some(folder) => {
-            let maps = DepthFolder::open(folder, scene)?;
-            let views: Vec<&View> = dataset.train.iter().collect();
-            maps.check_complete(&views)?;
-            views.into_iter().map(|view| maps.read(view).map(|map| KnownDepths::of_map(&map))).collect::<Result<_>>()?
-        }
+    let known = match folder {
+        Some(folder) => of_maps(folder, (scene, dataset))?,
         None => {
             let points = capture::observed_points(scene, dataset)?;
             let of_view = |(view, points): (&View, Vec<_>)| KnownDepths::of_points(view, points.into_iter());
@@ -32,11 +34,21 @@ pub(super) fn known(
         }
     };
     let all: usize = known.iter().map(KnownDepths::len).sum();
-    if all == 0 {
-        let problem = "has no points of which it is known what photo shows them; name a folder of depth maps in \
-                       `known_depths`, or set `depth_weight` to 0";
-        return Err(Error::data(scene, "points", problem));
+    if all > 0 {
+        tracing::info!("{} known depths in a photo, on average", all / known.len().max(1));
+        return Ok((with(weight), known));
     }
-    tracing::info!("{} known depths in a photo, on average", all / known.len().max(1));
-    Ok(known)
+    if config.depth_weight.is_none() {
+        return Ok((with(0.0), Vec::new()));
+    }
+    let problem = "has no points of which it is known what photo shows them; name a folder of depth maps in \
+                   `known_depths`, or set `depth_weight` to 0";
+    Err(Error::data(scene, "points", problem))
+}
+
+fn of_maps(folder: &Path, (scene, dataset): (&Path, &Dataset)) -> Result<Vec<KnownDepths>> {
+    let maps = DepthFolder::open(folder, scene)?;
+    let views: Vec<&View> = dataset.train.iter().collect();
+    maps.check_complete(&views)?;
+    views.into_iter().map(|view| maps.read(view).map(|map| KnownDepths::of_map(&map))).collect()
 }

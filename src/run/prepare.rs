@@ -74,7 +74,6 @@ pub(super) fn prepare(request: &Request, is_again: bool) -> Result<Prepared> {
     let mut inputs = resumed.as_ref().map_or(request.inputs.clone(), |resumed| resumed.record.inputs.clone());
     inputs.masks = request.inputs.masks.clone().or(inputs.masks);
     inputs.ignore = request.inputs.ignore.clone().or(inputs.ignore);
-    inputs.known_depths = request.inputs.known_depths.clone().or(inputs.known_depths);
     let names = inputs.masks.as_deref().map(LabelTable::of_folder).transpose()?.flatten();
     let dataset = read_scene(request, &settings, &inputs, block.as_ref())?;
     let table = if resumed.is_none() { occluders::table(request, &dataset)? } else { None };
@@ -134,7 +133,9 @@ pub(super) fn begin<'a>(
         crash_markers: request.restart,
         ..SchedulerOptions::default()
     };
-    let depths = depths::known((&request.scene, &dataset), &settings.train, inputs.known_depths.as_deref())?;
+    let is_new = resumed.is_none();
+    let (train, depths) =
+        depths::decided((&request.scene, &dataset), (&settings.train, is_new), inputs.known_depths.as_deref())?;
     let options = TrainerOptions { region: block.map(|block| block.region()), depths, ..options.into() };
     let mut facts = facts(request, inputs.masks.as_deref(), &gpu);
     facts.extend(resumed.as_ref().map(|resumed| ("goes on after step", resumed.state.step.to_string())));
@@ -159,7 +160,7 @@ pub(super) fn begin<'a>(
     let checkpoints = Checkpoints::new(out, lock, record, resumed.as_ref().map(|resumed| &resumed.state))?;
     let mut trainer = match resumed {
         Some(resumed) => Trainer::resume(gpu, &dataset, resumed.state, options)?,
-        None => start(gpu, (&settings.train, first), (&request.scene, &dataset), table.as_ref(), options)?,
+        None => start(gpu, (&train, first), (&request.scene, &dataset), table.as_ref(), options)?,
     };
     info.plan(&mut trainer);
     // The near plane is decided now.

@@ -126,6 +126,9 @@ fn merge(then: &mut Inputs, now: &Inputs) {
     if let Some(ignore) = &now.ignore {
         then.ignore = Some(absolute(ignore));
     }
+    if let Some(depths) = &now.known_depths {
+        then.known_depths = Some(absolute(depths));
+    }
     then.max_bad_photos = now.max_bad_photos.or(then.max_bad_photos);
     then.allow_outside |= now.allow_outside;
 }

@@ -228,12 +228,14 @@ crate::options::options! {
             /// 0.2 (3DGS); the rest is L1.
             lambda_dssim <"SHARE">: f32 = 0.2, up_to(1.0);
 
-            /// Weight of known depths in the loss.
+            /// Weight of known depths in the loss [default: 0.3 where the reconstruction says which photo shows which point, else
+            /// 0].
             ///
-            /// 0 leaves them out. Where the reconstruction has a point that the photo shows, or --known-depths a value, light from
-            /// Gaussians at another depth costs by its relative error, at most 1; a mean over these pixels. It falls
-            /// linearly until the first step with labels, and moves opacities only.
-            depth_weight <"WEIGHT">: f64 = 0.0, not_negative, fixed;
+            /// Where the photo shows a point, or --known-depths has a value, light from Gaussians at another depth costs by its
+            /// relative error, at most 1; a mean over these pixels. It falls linearly until the first step with labels, and
+            /// moves opacities only. 0 with --refine-poses.
+            #[serde(skip_serializing_if = "Option::is_none")]
+            depth_weight <"WEIGHT">: Option<f64> = None, not_negative, fixed;
 
             /// Trains a model without aliasing, on or off.
             ///

@@ -42,6 +42,7 @@ impl TrainConfig {
             iterations: 15_000,
             strategy: StrategyKind::Adc,
             exposure: ExposureMode::Off,
+            depth_weight: Some(0.0),
             layer_every: Some(1),
             start_size: Some(1.0),
             free_space: false,

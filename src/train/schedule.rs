@@ -144,14 +144,19 @@ impl TrainConfig {
         self.labels_at(step) && (step - self.labels_from()).is_multiple_of(every.max(1))
     }
 
+    /// Returns true if known depths have a weight.
+    pub(super) fn has_depths(&self) -> bool {
+        self.depth_weight.is_some_and(|weight| weight > 0.0)
+    }
+
     /// Returns the first step without known depths.
     pub(super) fn depths_until(&self) -> u32 {
-        if self.depth_weight > 0.0 { self.labels_from().min(self.share(DEPTHS_UNTIL)) } else { 0 }
+        if self.has_depths() { self.labels_from().min(self.share(DEPTHS_UNTIL)) } else { 0 }
     }
 
     /// Returns the weight of known depths at `step`.
     pub fn depth_weight_at(&self, step: u32) -> f64 {
-        self.depth_weight * (1.0 - f64::from(step) / f64::from(self.depths_until().max(1))).max(0.0)
+        self.depth_weight.unwrap_or(0.0) * (1.0 - f64::from(step) / f64::from(self.depths_until().max(1))).max(0.0)
     }
 
     /// Returns the step after which densification starts.
@@ -179,6 +184,7 @@ impl TrainConfig {
         self.near = if self.near == 0.0 { then.near } else { self.near };
         self.budget = if self.budget == 0 { then.budget } else { self.budget };
         self.exposure = if self.exposure == ExposureMode::Auto { then.exposure } else { self.exposure };
+        self.depth_weight = self.depth_weight.or(then.depth_weight);
         self.start_size = self.start_size.or(then.start_size);
         self.full_size_from = self.full_size_from.or(then.full_size_from);
         self.layer_every = self.layer_every.or(then.layer_every);

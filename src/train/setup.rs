@@ -64,7 +64,7 @@ pub fn engine_size(dataset: &Dataset, config: &TrainConfig, gaussians: u64) -> R
             LabelRule::Main => 0,
         },
     });
-    Ok(EngineSize::new(gaussians, image).for_training().with_labels(labels).with_depths(config.depth_weight > 0.0))
+    Ok(EngineSize::new(gaussians, image).for_training().with_labels(labels).with_depths(config.has_depths()))
 }
 
 /// Sets what the settings leave to the photos.

@@ -26,7 +26,7 @@ fn known_depths_move_opacities_as_their_mirror_says_and_nothing_else() {
     let mut fixture = Fixture::new(turn, scene(64, &shape), false);
     // Constant over the first step of many.
     (fixture.config.iterations, fixture.config.label_from) = (1_000_000_000, None);
-    fixture.config.depth_weight = WEIGHT;
+    fixture.config.depth_weight = Some(WEIGHT);
     fixture.train();
     let splats = fixture.splats();
     let count = splats.len();
