@@ -8,6 +8,7 @@ use labelgs::internals::synth::{World, photograph, picture};
 use labelgs::io::LoadOptions;
 use labelgs::scene::{Camera, Dataset, LabelMap, View};
 use labelgs::synth::{Preset, SynthLens, SynthOptions};
+use std::collections::BTreeSet;
 use std::f64::consts::FRAC_PI_2;
 use std::path::Path;
 
@@ -216,6 +217,9 @@ fn observed_points_are_where_the_lens_shows_them() {
         let error = report.reprojection.expect("observations");
         // Points have an error of 0.15 % of their distance.
         assert!(error < 1.0, "{name}: {error} px");
+        let photos: BTreeSet<_> = report.views.iter().map(|view| view.name.split('.').next()).collect();
+        assert_eq!(report.photos, photos.len(), "{name}: faces of a photo are one");
+        assert_eq!(report.views.len() > report.photos, name == "EQUIRECTANGULAR", "{name}");
     }
 }
 

@@ -48,9 +48,11 @@ pub(crate) fn run(args: &CheckArgs, context: &Context) -> Result<()> {
 
 fn table(report: &Report) -> String {
     let number = |value: Option<f64>| value.map_or("unknown".to_owned(), |value| format!("{value:.2}"));
+    let views = report.views.len();
+    let in_views = if views == report.photos { String::new() } else { format!(" in {views} views") };
     let mut text = format!(
-        "{} photos, {} points, extent {:.3}; reprojection error {} px, brightest photo / darkest {}\n",
-        report.views.len(),
+        "{} photos{in_views}, {} points, extent {:.3}; reprojection error {} px, brightest photo / darkest {}\n",
+        report.photos,
         report.points,
         report.extent,
         number(report.reprojection),

@@ -15,7 +15,7 @@ use crate::error::Result;
 use crate::scene::{Dataset, View};
 use glam::{DVec2, DVec3};
 use serde::Serialize;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 /// A kind of fault in a capture.
@@ -106,13 +106,15 @@ pub struct ViewReport {
 pub struct Report {
     /// Radius of the cameras around their mean, times 1.1, world units.
     pub extent: f64,
+    /// Number of photos. Those of wide lenses have several views.
+    pub photos: usize,
     /// Points of the reconstruction.
     pub points: usize,
     /// Median of the photos' reprojection errors, px.
     pub reprojection: Option<f64>,
     /// Largest gain of a photo over the smallest.
     pub gain_spread: Option<f64>,
-    /// All photos, by name.
+    /// All views, by name.
     pub views: Vec<ViewReport>,
     /// Faults, by kind and photo.
     pub findings: Vec<Finding>,
@@ -196,8 +198,10 @@ pub fn scan(scene: &Path, dataset: &Dataset) -> Result<Report> {
     findings.sort_by(|a, b| (a.fault, &a.view).cmp(&(b.fault, &b.view)));
     let known = || reports.iter().filter_map(|view| view.gain);
     let (least, most) = (known().fold(f64::INFINITY, f64::min), known().fold(0.0, f64::max));
+    let photo_of = |view: &&View| looked.windows.get(&view.name).map_or(&view.name, |window| &window.photo).clone();
     Ok(Report {
         extent: dataset.extent(),
+        photos: views.iter().map(photo_of).collect::<BTreeSet<_>>().len(),
         points: dataset.points.len(),
         reprojection: median(errors.into_iter().flatten()),
         gain_spread: (most > 0.0).then(|| most / least),
