@@ -1,20 +1,12 @@
 //! Known depths in a step: the gradient against the mirror.
 
+use super::disagreement::BOUNDS;
 use super::fixture::{Fixture, prove};
 use crate::reference::disagreement::depth_error;
-use crate::support::compare::{GradientBounds, Tolerance, check, exact, gradients};
+use crate::support::compare::{check, exact, gradients};
 use crate::support::device;
 use crate::support::scenes::{Shape, scene};
 use labelgs::internals::scheduler::plan::Buf;
-
-/// As for the disagreement of labels: gradients of the photo are far smaller, and both are sums in f32.
-const BOUNDS: GradientBounds = GradientBounds {
-    element: Tolerance { absolute: 4e-6, relative: 4e-5 },
-    outliers: 0.0,
-    norm: 4e-6,
-    angle: 4e-6,
-    bias: 4e-6,
-};
 
 /// Weight of the depths, far above that of the photo.
 const WEIGHT: f64 = 1e5;

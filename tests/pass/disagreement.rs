@@ -9,7 +9,7 @@ use labelgs::internals::scheduler::plan::Buf;
 use labelgs::run::LabelRule;
 
 /// Gradients of the photo are 1e-5 of those of the labels, and both are sums in f32; 0.6 of it seen.
-const BOUNDS: GradientBounds = GradientBounds {
+pub(super) const BOUNDS: GradientBounds = GradientBounds {
     element: Tolerance { absolute: 4e-6, relative: 4e-5 },
     outliers: 0.0,
     norm: 4e-6,
