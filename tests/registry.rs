@@ -61,38 +61,20 @@ fn lists() -> Vec<(Capacity, PassList)> {
                 (false, false, false, false, 3, true),
                 (false, false, false, false, 1, false),
             ] {
-                let variant = Variant { labels, disagreement, depth, lift, sh_degree, size, update, counts: false };
+                let variant = Variant { labels, disagreement, depth, lift, sh_degree, update, ..Variant::plain(size) };
                 add(pass::training_step(&shape, &capacity, variant));
             }
             #[cfg(feature = "lab")]
             add(pass::separate_step(
                 &shape,
                 &capacity,
-                Variant {
-                    labels: true,
-                    lift: true,
-                    sh_degree: 3,
-                    size,
-                    update: true,
-                    counts: false,
-                    disagreement: false,
-                    depth: false,
-                },
+                Variant { labels: true, lift: true, ..Variant::plain(size) },
                 2,
             ));
             add(pass::render_view(&shape, &capacity, 3, 2));
             add(pass::label_view(&shape, &capacity, 2));
             add(pass::vote_view(&shape, &capacity, 2, false));
-            let variant = Variant {
-                labels: false,
-                lift: false,
-                sh_degree: 3,
-                size,
-                update: true,
-                counts: false,
-                disagreement: false,
-                depth: false,
-            };
+            let variant = Variant::plain(size);
             let extension = strategy::of(StrategyKind::Mcmc).extension();
             let all_passes = 15;
             add(pass::extended_step(&shape, &capacity, variant, (&*extension, all_passes)));

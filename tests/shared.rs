@@ -299,16 +299,7 @@ fn a_brightness_of_each_photo_is_found() {
 fn a_training_without_shared_rows_pays_nothing_for_them() {
     let shape = KernelShape::new(8, true);
     let room = EngineSize::new(1000, (64, 48)).for_training();
-    let variant = Variant {
-        labels: false,
-        lift: false,
-        sh_degree: 3,
-        size: room.image,
-        update: true,
-        counts: false,
-        disagreement: false,
-        depth: false,
-    };
+    let variant = Variant::plain(room.image);
     let work = |room: &EngineSize| {
         let list = training_step(&shape, &capacity(&shape, room), variant);
         let text = |work: &Work| match work {

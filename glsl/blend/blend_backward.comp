@@ -18,8 +18,8 @@
 // Math:    p = dL/d ln alpha = w (u - s), where u = colour . g, and s is the colour behind, times g; geometry and
 //          opacity gradients are linear in six moments of p about the tile's centre. T by division. Clamped alpha: p = 0.
 //          Disagreement of pixel v with label L: E = sum of w d + T_end [L != 0], with d = [the splat's label is not L].
-//          It is one more channel with the colour d, a background of [L != 0], and gradients of opacities only. A known depth D: the same with d = min(|z / D - 1|, 1) and a
-//          background of 1.
+//          It is one more channel with the colour d, a background of [L != 0], and gradients of opacities only.
+//          A known depth D has the same sum, with d = min(|z / D - 1|, 1) and a background of 1.
 // Order:   fixed, bitwise reproducible.
 // Mirror:  src/verify/reference/blend.rs::blend_backward, disagreement.rs::disagreement, disagreement.rs::depth_error
 

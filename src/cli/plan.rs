@@ -82,16 +82,7 @@ fn subject(args: &PlanArgs, context: &Context) -> Result<Subject> {
     let size = (args.size.0, args.size.1);
     let room = EngineSize::new(args.gaussians.max(1), size).for_training().with_labels(labels);
     let capacity = capacity(&shape, &room);
-    let variant = Variant {
-        labels: labels.is_some(),
-        lift: false,
-        sh_degree: args.sh_degree,
-        size,
-        update: true,
-        counts: false,
-        disagreement: false,
-        depth: false,
-    };
+    let variant = Variant { labels: labels.is_some(), sh_degree: args.sh_degree, ..Variant::plain(size) };
     let list = training_step(&shape, &capacity, variant);
     Ok(Subject { device, shape, limits, room, capacity, list })
 }

@@ -52,6 +52,22 @@ pub struct Variant {
     pub counts: bool,
 }
 
+impl Variant {
+    /// A step of the scene alone with an update, of full degree.
+    pub const fn plain(size: (u32, u32)) -> Self {
+        Self {
+            labels: false,
+            disagreement: false,
+            depth: false,
+            lift: false,
+            sh_degree: 3,
+            size,
+            update: true,
+            counts: false,
+        }
+    }
+}
+
 /// Points where an extension can add passes to a training step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Hook {

@@ -21,16 +21,7 @@ mod tests {
     #[test]
     fn every_item_of_a_step_has_its_stage() {
         let (shape, capacity) = (KernelShape::new(8, true), Capacity { virtual_tiles: 100, ..Capacity::default() });
-        let variant = Variant {
-            labels: true,
-            lift: true,
-            sh_degree: 3,
-            size: (64, 48),
-            update: true,
-            counts: false,
-            disagreement: false,
-            depth: false,
-        };
+        let variant = Variant { labels: true, lift: true, ..Variant::plain((64, 48)) };
         let named = stages(&training_step(&shape, &capacity, variant));
         for stage in Stage::ALL {
             assert!(named.iter().any(|(found, _)| *found == stage), "{stage:?} is empty");

@@ -27,10 +27,10 @@ const PRUNE_AT: f64 = 0.55;
 const LAYER_EVERY: u32 = 8;
 /// Shares of the run between two counts of votes, and between two searches for occluders. Both walk all views, so a run
 /// of default settings has one of each when labels start, and votes at the end.
-/// Share of a run after which known depths have no weight.
-const DEPTHS_UNTIL: f64 = 0.6;
 const VOTE_EVERY: f64 = 0.5;
 const OCCLUSION_EVERY: f64 = 0.5;
+/// Share of a run after which known depths have no weight.
+const DEPTHS_UNTIL: f64 = 0.6;
 
 /// Learning rates of a step.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -220,16 +220,7 @@ fn median_pairs(reports: &[StepReport]) -> f64 {
 fn lists(trainer: &mut Trainer, objects: u32) -> [usize; 3] {
     let engine = trainer.engine_mut();
     let (shape, capacity, size) = (engine.shape(), engine.raw().capacity(), engine.size().image);
-    let variant = Variant {
-        labels: true,
-        lift: false,
-        sh_degree: 3,
-        size,
-        update: true,
-        counts: false,
-        disagreement: false,
-        depth: false,
-    };
+    let variant = Variant { labels: true, ..Variant::plain(size) };
     let plain = pass::training_step(shape, capacity, Variant { labels: false, ..variant });
     let together = pass::training_step(shape, capacity, variant);
     let apart = pass::separate_step(shape, capacity, variant, objects);

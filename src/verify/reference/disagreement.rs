@@ -24,21 +24,13 @@ pub fn disagreement(
     size: (usize, usize),
     pixels: &[Option<(u32, f64)>],
 ) -> Disagreement {
-    let count = splats.len();
-    let mut out = Disagreement { value: 0.0, v_opacities: vec![0.0; count], margins: vec![f64::INFINITY; count] };
-    for (index, pixel) in pixels.iter().enumerate() {
-        let ray = trace(rules, splats.iter().enumerate(), centre(index, size.0));
-        for contribution in &ray.contributions {
-            let least = &mut out.margins[contribution.splat];
-            *least = least.min(ray.margins.gradient());
-        }
-        if let Some((own, weight)) = *pixel {
+    summed(rules, splats, size, |index, ray, out| {
+        if let Some((own, weight)) = pixels[index] {
             let differs = |splat: &Splat| f64::from(u8::from(labels[splat.gaussian] != own));
             let open = f64::from(u8::from(own != 0));
-            add_ray(&mut out, splats, &ray, differs, (open, rules.label_weight * weight));
+            add_ray(out, splats, ray, differs, (open, rules.label_weight * weight));
         }
-    }
-    out
+    })
 }
 
 /// Sums E(v) = sum_i w_i min(|z_i / z - 1|, 1) + T over the pixels v with a known depth z. `inverse` has 1 / z, or 0 where it
@@ -50,18 +42,31 @@ pub fn depth_error(
     inverse: &[f64],
     weight: f64,
 ) -> Disagreement {
+    summed(rules, splats, size, |index, ray, out| {
+        let inverse = inverse[index];
+        if inverse > 0.0 {
+            let off = |splat: &Splat| (splat.depth * inverse - 1.0).abs().min(1.0);
+            add_ray(out, splats, ray, off, (1.0, weight));
+        }
+    })
+}
+
+/// Sums over all pixels of a picture what `add` adds for the ray of each.
+fn summed(
+    rules: &Rules,
+    splats: &[Splat],
+    (width, height): (usize, usize),
+    add: impl Fn(usize, &Trace, &mut Disagreement),
+) -> Disagreement {
     let count = splats.len();
     let mut out = Disagreement { value: 0.0, v_opacities: vec![0.0; count], margins: vec![f64::INFINITY; count] };
-    for (index, &inverse) in inverse.iter().enumerate() {
-        let ray = trace(rules, splats.iter().enumerate(), centre(index, size.0));
+    for index in 0..width * height {
+        let ray = trace(rules, splats.iter().enumerate(), centre(index, width));
         for contribution in &ray.contributions {
             let least = &mut out.margins[contribution.splat];
             *least = least.min(ray.margins.gradient());
         }
-        if inverse > 0.0 {
-            let off = |splat: &Splat| (splat.depth * inverse - 1.0).abs().min(1.0);
-            add_ray(&mut out, splats, &ray, off, (1.0, weight));
-        }
+        add(index, &ray, &mut out);
     }
     out
 }

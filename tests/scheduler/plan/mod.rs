@@ -121,16 +121,7 @@ pub fn engine_lists(shape: KernelShape) -> (Capacity, Vec<PassList>) {
         shared_rows: 70,
         segments: 2,
     };
-    let variant = Variant {
-        labels: true,
-        lift: true,
-        sh_degree: 3,
-        size: (256, 256),
-        update: true,
-        counts: false,
-        disagreement: false,
-        depth: false,
-    };
+    let variant = Variant { labels: true, lift: true, ..Variant::plain((256, 256)) };
     let lists = vec![
         pass::training_step(&shape, &capacity, variant),
         pass::training_step(&shape, &capacity, Variant { labels: false, lift: false, sh_degree: 0, ..variant }),

@@ -145,16 +145,7 @@ fn measure(common: &Common, labels: bool) -> Result<Measured> {
     let engine = trainer.engine_mut();
     let capacity = *engine.raw().capacity();
     let size = (scene.width, scene.height);
-    let variant = Variant {
-        labels,
-        lift: false,
-        sh_degree: 3,
-        size,
-        update: true,
-        counts: false,
-        disagreement: false,
-        depth: false,
-    };
+    let variant = Variant { labels, ..Variant::plain(size) };
     let list = training_step(&shape, &capacity, variant);
     let plan_options = PlanOptions { alias: false, ..PlanOptions::default() };
     let limits = SchedulerOptions::default().limits(&gpu);

@@ -45,16 +45,7 @@ impl Subject {
         let labels = (self.layers > 0).then_some(LabelSize { max_label: 255, layers: self.layers, vote_columns: 16 });
         let room = EngineSize::new(self.gaussians, self.size).for_training().with_labels(labels);
         let capacity = capacity(&shape, &room);
-        let variant = Variant {
-            labels: self.layers > 0,
-            lift: false,
-            sh_degree: self.sh_degree,
-            size: self.size,
-            update: true,
-            counts: false,
-            disagreement: false,
-            depth: false,
-        };
+        let variant = Variant { labels: self.layers > 0, sh_degree: self.sh_degree, ..Variant::plain(self.size) };
         // Of an ideal card: what fits is the matter of `labelgs plan`.
         let much = 1 << 60;
         let limits = Limits { max_storage_range: much, max_allocation: much, max_memory: much, ..Limits::default() };

@@ -56,16 +56,7 @@ impl<'a> Bed<'a> {
     fn variant(&self) -> Variant {
         let size = (self.fixture.scene.camera.width, self.fixture.scene.camera.height);
         let sh_degree = self.fixture.config.sh_degree;
-        Variant {
-            labels: false,
-            lift: false,
-            sh_degree,
-            size,
-            update: false,
-            counts: false,
-            disagreement: false,
-            depth: false,
-        }
+        Variant { sh_degree, update: false, ..Variant::plain(size) }
     }
 
     fn prepare(&mut self) -> Result<()> {

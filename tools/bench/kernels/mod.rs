@@ -79,16 +79,7 @@ pub fn run(args: &KernelArgs) -> Result<()> {
 fn compile(gpu: &Gpu, args: &KernelArgs) -> Result<Vec<(Mode, Replacements)>> {
     let shape = KernelShape::of(gpu.capabilities());
     let room = EngineSize::new(1, (64, 64)).for_training();
-    let variant = Variant {
-        labels: false,
-        lift: false,
-        sh_degree: 3,
-        size: room.image,
-        update: false,
-        counts: false,
-        disagreement: false,
-        depth: false,
-    };
+    let variant = Variant { update: false, ..Variant::plain(room.image) };
     let list = pass::training_step(&shape, &capacity(&shape, &room), variant);
     let wanted = |number: usize| number == 0 || args.modes.is_empty() || args.modes.contains(&number);
     let modes = MODES.iter().enumerate().filter(|(number, _)| wanted(*number));
