@@ -4,7 +4,7 @@ use assert_cmd::Command;
 use glam::{DMat3, DQuat, DVec3};
 use labelgs::internals::synth::ring_of_cameras;
 use labelgs::io::read_mask;
-use labelgs::io::{Frame, Frames};
+use labelgs::io::{Frame, Frames, LoadOptions};
 use labelgs::scene::Camera;
 use labelgs::scene::path::{Between, between, short_order, video};
 use labelgs::synth::SynthOptions;
@@ -136,9 +136,10 @@ fn tracked(folder: &Path) -> (String, String, String) {
     let frame = |index: usize| Frame {
         file: format!("frames/{index:05}.png"),
         photo: [Some("b.jpg"), None, Some("left/a.png"), None, Some("c.d.jpg")][index].map(str::to_owned),
+        size: None,
         camera: (&at).into(),
     };
-    Frames::new((0..5).map(frame).collect()).write(Path::new(&path("video/frames.json"))).expect("written");
+    Frames::new((0..5).map(frame).collect(), false).write(Path::new(&path("video/frames.json"))).expect("written");
     for index in 0..5_u16 {
         let ids: Vec<u16> = (0..64 * 48).map(|i| if i % 64 < 30 { 300 * index + 1 } else { 0 }).collect();
         let file = folder.join(format!("tracked/{index:05}.png"));
@@ -231,6 +232,45 @@ fn masks_of_a_rendered_video_return_to_their_photos() {
     let named = Frames::read(&Path::new(&path("all")).join("frames.json")).expect("frames");
     let names: Vec<&str> = named.frames.iter().filter_map(|frame| frame.photo.as_deref()).collect();
     assert!(names.len() == 12 && names.is_sorted(), "{names:?}");
+}
+
+/// The faces of a fisheye photo have sizes of their own; a frame has that of the largest.
+#[test]
+fn masks_of_faces_become_those_of_their_photos() {
+    let Some(_gpu) = crate::support::device() else { return };
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = |name: &str| folder.path().join(name).to_str().expect("UTF-8").to_owned();
+    let (scene, out, video, masks) = (path("scene"), path("out"), path("video"), path("masks"));
+    let lens = ["--lens", "OPENCV_FISHEYE", "--fov", "150", "--size", "160x120", "--views", "2"];
+    succeeds(&[&["synth", &scene, "--preset", "simple"], &lens[..]].concat());
+    succeeds(&["train", &scene, "-o", &out, "--iterations", "2", "--no-test"]);
+    let densify = ["densify", &out, "--scene", &scene, "-o", &video, "--between", "0", "--include-test"];
+    succeeds(&densify);
+    let load = LoadOptions { masks: Some(format!("{scene}/masks").into()), ..LoadOptions::default() };
+    let dataset = labelgs::io::open(Path::new(&scene), &load).expect("read");
+    let frames = Frames::read(&Path::new(&video).join("frames.json")).expect("frames");
+    assert!(frames.lenses && frames.frames.len() > 6 && frames.frames.iter().any(|frame| frame.size.is_some()));
+    let tracked = path("tracked");
+    for frame in &frames.frames {
+        let view = dataset.all().into_iter().find(|view| Some(&view.name) == frame.photo.as_ref()).expect("a face");
+        let ids = view.mask().expect("read").expect("a mask");
+        let (width, height) = (frame.camera.width, frame.camera.height);
+        assert_eq!(frame.size.unwrap_or([width, height]), [ids.width, ids.height]);
+        // What lies beside the face is not of its photo.
+        let padded: Vec<u16> = (0..width * height).map(|at| ids.get(at % width, at / width).unwrap_or(77)).collect();
+        let file = Path::new(&tracked).join(Path::new(&frame.file).file_name().expect("a name"));
+        labelgs::internals::io::image::write_png_grey16(file, width, height, &padded).expect("written");
+    }
+    let collect = ["masks", "collect", &tracked, "--frames", &format!("{video}/frames.json"), "-o", &masks];
+    fails(2, "is needed: the photos of this video", &collect);
+    succeeds(&[&collect[..], &["--scene", &scene]].concat());
+    for photo in ["000.png", "001.png"] {
+        let truth = read_mask(Path::new(&scene).join("masks").join(photo)).expect("truth");
+        let found = read_mask(Path::new(&masks).join(photo)).expect("a mask");
+        let same = truth.ids.iter().zip(&found.ids).filter(|(a, b)| a == b).count();
+        assert_eq!((found.width, found.height), (160, 120));
+        assert!(truth.objects() == found.objects() && same > 160 * 120 * 98 / 100, "{photo}: {same}");
+    }
 }
 
 #[test]

@@ -8,6 +8,7 @@ use super::stdout;
 use super::values::{colour, near};
 use crate::engine::Engine;
 use crate::io::frames::{self, Frame, Frames};
+use crate::io::window::windows;
 use crate::render::pictures::{Format, write_rgb};
 use crate::render::{Parts, RenderOptions, render};
 use crate::scene::path::{Between, short_order, video};
@@ -15,7 +16,7 @@ use crate::scene::{Camera, Dataset, View};
 use crate::{Error, Result};
 use clap::{Args, ValueEnum};
 use serde_json::json;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// Order of the photos in the video.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
@@ -71,11 +72,14 @@ pub(crate) fn run(args: &DensifyArgs, context: &Context) -> Result<()> {
     let (model, near) = (open_model(&args.model)?, near_plane(&args.model, args.near)?);
     let dataset = open_scene(&args.scene, &args.reading, None, args.background, false)?;
     let views = ordered_views(args, &dataset)?;
-    let cameras: Vec<&Camera> = views.iter().map(|view| &view.camera).collect();
+    let lenses = windows(&args.scene)?.values().any(|window| !window.is_photo());
+    let size = size_of_all(&views);
+    let wide: Vec<Camera> =
+        views.iter().map(|view| Camera { width: size.0, height: size.1, ..view.camera.clone() }).collect();
+    let cameras: Vec<&Camera> = wide.iter().collect();
     let how = if args.compat { Between::Translations } else { Between::Centres };
     let stops = video(&cameras, args.between, how);
     let gpu = open_gpu(context)?;
-    let size = (cameras[0].width, cameras[0].height);
     let mut engine = Engine::of_model(gpu, &model, std::iter::once(size))?;
     let options = RenderOptions { background: args.background, ..RenderOptions::new(near, Parts::COLOUR) };
     let mut progress = Progress::new(stops.len() as u64, "frames", &context.global);
@@ -84,14 +88,20 @@ pub(crate) fn run(args: &DensifyArgs, context: &Context) -> Result<()> {
         let rendered = render(&mut engine, &stop.camera, &options)?;
         let file = format!("frames/{index:05}.png");
         write_rgb(&args.output.join(&file), size, &rendered.rgb, Format::Png)?;
-        let photo = stop.camera_index.map(|view| views[view].name.clone());
-        written.push(Frame { file, photo, camera: (&stop.camera).into() });
+        let shown = stop.camera_index.map(|view| views[view]);
+        let of_photo = shown.map(|view| [view.camera.width, view.camera.height]);
+        written.push(Frame {
+            file,
+            photo: shown.map(|view| view.name.clone()),
+            size: of_photo.filter(|&[width, height]| (width, height) != size),
+            camera: (&stop.camera).into(),
+        });
         progress.set(index as u64 + 1, String::new);
     }
     drop(progress);
     let path = args.output.join(frames::FILE);
     // Written last: its presence means that the video is complete.
-    Frames::new(written).write(&path)?;
+    Frames::new(written, lenses).write(&path)?;
     if context.json || args.json.json {
         return stdout::print_json(&json!({
             "schema_version": 1,
@@ -103,16 +113,12 @@ pub(crate) fn run(args: &DensifyArgs, context: &Context) -> Result<()> {
     stdout::print(&format!("{}: {} frames through {} photos\n", path.display(), stops.len(), views.len()))
 }
 
-/// Returns the views in the order of the video. Fails if their sizes differ, because a tracker needs one size.
+/// Returns the views in the order of the video.
 fn ordered_views<'a>(args: &DensifyArgs, dataset: &'a Dataset) -> Result<Vec<&'a View>> {
     let views: Vec<&View> = if args.include_test { dataset.all() } else { dataset.train.iter().collect() };
-    let Some(first) = views.first() else {
+    if views.is_empty() {
         let cure = "no view is left; use a larger --test-every or --include-test";
         return Err(Error::data(&args.scene, "", cure));
-    };
-    let size = |view: &View| (view.camera.width, view.camera.height);
-    if let Some(other) = views.iter().find(|view| size(view) != size(first)) {
-        return Err(unequal(&args.scene, first, other));
     }
     if args.compat || args.order == Order::Name {
         return Ok(views);
@@ -121,11 +127,9 @@ fn ordered_views<'a>(args: &DensifyArgs, dataset: &'a Dataset) -> Result<Vec<&'a
     Ok(short_order(&cameras).into_iter().map(|index| views[index]).collect())
 }
 
-fn unequal(scene: &Path, a: &View, b: &View) -> Error {
-    let problem = format!(
-        "{} has {} x {} px and {} has {} x {} px; all frames of a video need one size: scale the photos to one \
-         size, or make a scene of each size",
-        a.name, a.camera.width, a.camera.height, b.name, b.camera.width, b.camera.height
-    );
-    Error::data(scene, "photos", problem)
+/// Returns the size of all frames, because a tracker needs one. Smaller photos lie in the upper left of their frames,
+/// and the model goes on around them.
+fn size_of_all(views: &[&View]) -> (u32, u32) {
+    let largest = |side: fn(&Camera) -> u32| views.iter().map(|view| side(&view.camera)).max().unwrap_or(1);
+    (largest(|camera| camera.width), largest(|camera| camera.height))
 }

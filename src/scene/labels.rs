@@ -47,6 +47,13 @@ impl LabelMap {
         Self { width, height, ids: (0..height).flat_map(row).collect() }
     }
 
+    /// Returns the upper left part, of at most the size of the map.
+    pub fn upper_left(&self, width: u32, height: u32) -> Self {
+        let (width, height) = (width.min(self.width), height.min(self.height));
+        let rows = self.ids.chunks(self.width.max(1) as usize).take(height as usize);
+        Self { width, height, ids: rows.flat_map(|row| &row[..width as usize]).copied().collect() }
+    }
+
     /// Returns true for pixels with another id within `distance` px, in a square window.
     pub fn near_contour(&self, distance: u32) -> Vec<bool> {
         let (width, height, distance) = (self.width as usize, self.height as usize, distance as usize);

@@ -1,16 +1,19 @@
 //! `labelgs masks collect`: from the masks of all frames to those of the photos (E in the paper).
 
+use super::{files_of_photos, write_mask};
 use crate::cli::args::JsonFlag;
 use crate::cli::context::Context;
 use crate::cli::stdout;
 use crate::io::frames::{Frame, Frames};
-use crate::io::image::write_png_grey16;
 use crate::io::mask::{mask_size_fits, read_mask};
+use crate::io::window::{Window, ids_of_photo, windows};
+use crate::scene::LabelMap;
 use crate::{Error, Result};
 use clap::Args;
 use rayon::prelude::*;
 use serde_json::json;
-use std::path::{Component, Path, PathBuf};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
 
 /// `labelgs masks collect`.
 #[derive(Args, Clone, Debug)]
@@ -24,6 +27,9 @@ pub struct CollectArgs {
     /// Folder for the masks, named as the photos.
     #[arg(short, long, value_name = "MASKS")]
     pub output: PathBuf,
+    /// Scene of the photos; needed if they were taken through lenses: masks are bent like their photos.
+    #[arg(long, value_name = "SCENE")]
+    pub scene: Option<PathBuf>,
     /// JSON.
     #[command(flatten)]
     pub json: JsonFlag,
@@ -35,35 +41,38 @@ pub(crate) fn run(args: &CollectArgs, context: &Context) -> Result<()> {
     if !args.tracked.is_dir() {
         return Err(Error::data(&args.tracked, "", "this folder of tracked masks does not exist"));
     }
-    let photos: Vec<(&Frame, &str)> =
-        video.frames.iter().filter_map(|frame| Some((frame, frame.photo.as_deref()?))).collect();
-    let sources: Vec<PathBuf> = photos.iter().map(|(frame, _)| tracked_file(&args.tracked, frame)).collect();
+    let frames: Vec<&Frame> = video.frames.iter().filter(|frame| frame.photo.is_some()).collect();
+    let sources: Vec<PathBuf> = frames.iter().map(|frame| tracked_file(&args.tracked, frame)).collect();
     let missing: Vec<&PathBuf> = sources.iter().filter(|path| !path.is_file()).collect();
     if let Some(first) = missing.first() {
         let problem = format!(
             "{} of {} photos have no tracked mask, such as {}; run the tracker on all frames and keep their names",
             missing.len(),
-            photos.len(),
+            frames.len(),
             first.display()
         );
         return Err(Error::data(&args.tracked, "", problem));
     }
-    let targets: Vec<PathBuf> = photos.iter().map(|(_, name)| target(args, name)).collect::<Result<_>>()?;
-    if let Some(twice) = targets.iter().enumerate().find(|(at, path)| targets[..*at].contains(path)) {
-        let problem =
-            format!("two photos would have the mask {}; their names differ in the extension only", twice.1.display());
-        return Err(Error::data(&args.frames, "photos", problem));
-    }
-    let written: Vec<Result<()>> = (0..photos.len())
-        .into_par_iter()
-        .map(|index| collect(&sources[index], photos[index].0, &targets[index]))
+    let windows = windows_of(args, &video)?;
+    let names = frames.iter().filter_map(|frame| frame.photo.as_deref());
+    let photos = files_of_photos(names, &windows, &args.frames)?;
+    let written: Vec<Result<()>> = photos
+        .par_iter()
+        .map(|(file, views)| {
+            let maps = views.iter().map(|&at| ids_of(&sources[at], frames[at])).collect::<Result<Vec<_>>>()?;
+            let shown = views.iter().filter_map(|&at| windows.get(frames[at].photo.as_ref()?));
+            let parts: Vec<(&Window, &LabelMap)> = shown.zip(&maps).collect();
+            // Without windows each photo is its only view.
+            let bent = ids_of_photo(&parts);
+            bent.as_ref().or(maps.first()).map_or(Ok(()), |mask| write_mask(&args.output.join(file), mask))
+        })
         .collect();
     written.into_iter().collect::<Result<()>>()?;
     if context.json || args.json.json {
-        let masks: Vec<String> = targets.iter().map(|path| path.display().to_string()).collect();
+        let masks: Vec<String> = photos.keys().map(|file| args.output.join(file).display().to_string()).collect();
         return stdout::print_json(&json!({ "schema_version": 1, "masks": masks }));
     }
-    stdout::print(&format!("{}: {} masks\n", args.output.display(), targets.len()))
+    stdout::print(&format!("{}: {} masks\n", args.output.display(), photos.len()))
 }
 
 fn tracked_file(folder: &Path, frame: &Frame) -> PathBuf {
@@ -71,16 +80,24 @@ fn tracked_file(folder: &Path, frame: &Frame) -> PathBuf {
     folder.join(format!("{stem}.png"))
 }
 
-/// Returns the path of a photo's mask: the photo's name, ending in `.png`.
-fn target(args: &CollectArgs, name: &str) -> Result<PathBuf> {
-    let path = Path::new(name).with_extension("png");
-    if path.components().all(|part| matches!(part, Component::Normal(_))) {
-        return Ok(args.output.join(path));
+/// Returns how the views lie in photos through lenses; nothing if all photos are those of pinhole cameras.
+fn windows_of(args: &CollectArgs, video: &Frames) -> Result<BTreeMap<String, Window>> {
+    let found = match &args.scene {
+        Some(scene) => windows(scene)?,
+        None if video.lenses => {
+            return Err(Error::usage("--scene", "is needed: the photos of this video were taken through lenses"));
+        }
+        None => return Ok(BTreeMap::new()),
+    };
+    let mut names = video.frames.iter().filter_map(|frame| frame.photo.as_ref());
+    match names.find(|&name| !found.contains_key(name)) {
+        Some(name) => Err(Error::data(&args.frames, format!("photo {name}"), "is not in the scene of `--scene`")),
+        None => Ok(found),
     }
-    Err(Error::data(&args.frames, format!("photo {name}"), "would lie outside the folder of masks"))
 }
 
-fn collect(source: &Path, frame: &Frame, target: &Path) -> Result<()> {
+/// Returns the ids of the photo, or of the face of a photo, that a frame shows.
+fn ids_of(source: &Path, frame: &Frame) -> Result<LabelMap> {
     let ids = read_mask(source)?;
     let (found, expected) = ((ids.width, ids.height), (frame.camera.width, frame.camera.height));
     if !mask_size_fits(found, expected) {
@@ -90,5 +107,8 @@ fn collect(source: &Path, frame: &Frame, target: &Path) -> Result<()> {
         );
         return Err(Error::data(source, "", problem));
     }
-    write_png_grey16(target, ids.width, ids.height, &ids.ids)
+    let [width, height] = frame.size.unwrap_or([expected.0, expected.1]);
+    let scaled = |side: u32, found: u32, whole: u32| (f64::from(side) * f64::from(found) / f64::from(whole)).round();
+    let (width, height) = (scaled(width, found.0, expected.0) as u32, scaled(height, found.1, expected.1) as u32);
+    Ok(ids.upper_left(width.max(1), height.max(1)))
 }

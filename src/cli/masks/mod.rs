@@ -9,14 +9,15 @@ pub(crate) mod track;
 
 use super::context::Context;
 use crate::cli::args::ReadArgs;
-
 use crate::io::image::{write_png_grey8, write_png_grey16};
 use crate::io::read;
+use crate::io::window::Window;
 use crate::io::{self, LoadOptions};
 use crate::scene::{Dataset, LabelMap};
 use crate::{Error, Result};
 use clap::{Args, Subcommand};
-use std::path::Path;
+use std::collections::BTreeMap;
+use std::path::{Component, Path, PathBuf};
 
 /// `labelgs masks`.
 #[derive(Args, Clone, Debug)]
@@ -72,6 +73,34 @@ pub(crate) fn run(args: &MasksArgs, context: &Context) -> Result<()> {
 fn open_photos(scene: &Path, read: ReadArgs) -> Result<Dataset> {
     let options = LoadOptions { photos: false, test_every: None, undistort: false, ..LoadOptions::default() };
     io::open_logged(scene, &read.into_options(options))
+}
+
+/// Returns the mask file of each photo, relative to the folder of masks, and the indices of its views. A view without a
+/// window is a photo as it is stored. Two photos with one file are an error in `file`.
+fn files_of_photos<'a>(
+    names: impl Iterator<Item = &'a str>,
+    windows: &BTreeMap<String, Window>,
+    file: &Path,
+) -> Result<BTreeMap<PathBuf, Vec<usize>>> {
+    let mut found: BTreeMap<PathBuf, (&str, Vec<usize>)> = BTreeMap::new();
+    for (index, name) in names.enumerate() {
+        let photo = windows.get(name).map_or(name, |window| &window.photo);
+        let path = Path::new(photo).with_extension("png");
+        if !path.components().all(|part| matches!(part, Component::Normal(_))) {
+            return Err(Error::data(
+                file,
+                format!("photo {photo}"),
+                "would have its mask outside of the folder of masks",
+            ));
+        }
+        let (other, views) = found.entry(path).or_insert((photo, Vec::new()));
+        if *other != photo {
+            let problem = format!("would have the same mask file as {other}; rename one of the photos");
+            return Err(Error::data(file, format!("photo {photo}"), problem));
+        }
+        views.push(index);
+    }
+    Ok(found.into_iter().map(|(path, (_, views))| (path, views)).collect())
 }
 
 /// Writes ids as a grey PNG of 8 bits, or of 16 bits if an id needs them.

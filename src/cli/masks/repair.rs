@@ -1,6 +1,6 @@
 //! `labelgs masks repair`.
 
-use super::write_mask;
+use super::{files_of_photos, write_mask};
 use crate::cli::args::{JsonFlag, SceneArgs};
 use crate::cli::context::{Context, open_model};
 use crate::cli::log::Progress;
@@ -70,16 +70,7 @@ pub(crate) fn run(args: &RepairArgs, context: &Context) -> Result<()> {
         ));
     }
     let windows = windows(&args.scene)?;
-    let mut photos: BTreeMap<PathBuf, Vec<usize>> = BTreeMap::new();
-    for (at, view) in views.iter().enumerate() {
-        let window = |at: usize| windows.get(&views[at].name).map(|window| window.photo.as_str());
-        let of_file = photos.entry(file_of(window(at).unwrap_or(&view.name))).or_default();
-        if let Some(&other) = of_file.first().filter(|&&other| window(other).is_none() || window(other) != window(at)) {
-            let problem = format!("{} would have the same mask file; rename one of the photos", views[other].name);
-            return Err(Error::data(&args.scene, &view.name, problem));
-        }
-        of_file.push(at);
-    }
+    let photos = files_of_photos(views.iter().map(|view| view.name.as_str()), &windows, &args.scene)?;
     let mut engine = vote_engine(open_gpu(context)?, &model, &views, columns_of(&views))?;
     let mut progress = Progress::new(2 * views.len() as u64, "views", &context.global);
     let mut done = 0;
@@ -105,11 +96,6 @@ pub(crate) fn run(args: &RepairArgs, context: &Context) -> Result<()> {
     }
     table.write(&args.output.join(FILE))?;
     report(&views, &masks, &repairs, args, context)
-}
-
-/// Returns the path of a photo's mask inside the folder.
-fn file_of(photo: &str) -> PathBuf {
-    Path::new(photo).with_extension("png")
 }
 
 /// Makes the table of masks that were repaired, from that of their folder. Where each view had ids of its own, an object
