@@ -1,7 +1,8 @@
 //! Depths that photos are known to have, from files or from the reconstruction.
 
 use crate::error::{Error, Result};
-use crate::io::{DepthFolder, capture};
+use crate::io::DepthFolder;
+use crate::io::capture::Sightings;
 use crate::scene::{Dataset, View};
 use crate::train::TrainConfig;
 use crate::train::depths::KnownDepths;
@@ -15,7 +16,7 @@ const WEIGHT: f64 = 0.3;
 pub(super) fn decided(
     (scene, dataset): (&Path, &Dataset),
     (config, is_new): (&TrainConfig, bool),
-    folder: Option<&Path>,
+    (folder, sightings): (Option<&Path>, &Sightings),
 ) -> Result<(TrainConfig, Vec<KnownDepths>)> {
     // Points are where poses have them, which are about to move.
     let is_open = is_new && (folder.is_some() || !config.refine_poses);
@@ -28,7 +29,7 @@ pub(super) fn decided(
     let known = match folder {
         Some(folder) => of_maps(folder, (scene, dataset))?,
         None => {
-            let points = capture::observed_points(scene, dataset)?;
+            let points = sightings.points()?;
             let of_view = |(view, points): (&View, Vec<_>)| KnownDepths::of_points(view, points.into_iter());
             dataset.train.iter().zip(points).map(of_view).collect()
         }

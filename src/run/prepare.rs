@@ -10,10 +10,11 @@ use super::{Inputs, Observer, OccluderFiles, Request, Run, Settings, Start, dept
 use crate::engine::Engine;
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
+use crate::io::capture::Sightings;
 use crate::io::label_table::LabelTable;
 use crate::io::occlusion_table::OcclusionTable;
 use crate::io::run_folder::Lock;
-use crate::io::{self, atomic, capture, checkpoint_folder};
+use crate::io::{self, atomic, checkpoint_folder};
 use crate::scene::{Dataset, Gaussians};
 use crate::scheduler::SchedulerOptions;
 use crate::train::exposure;
@@ -134,8 +135,9 @@ pub(super) fn begin<'a>(
         ..SchedulerOptions::default()
     };
     let is_new = resumed.is_none();
-    let (train, depths) =
-        depths::decided((&request.scene, &dataset), (&settings.train, is_new), inputs.known_depths.as_deref())?;
+    let sightings = Sightings::new(&request.scene, &dataset);
+    let files = (inputs.known_depths.as_deref(), &sightings);
+    let (train, depths) = depths::decided((&request.scene, &dataset), (&settings.train, is_new), files)?;
     let options = TrainerOptions { region: block.map(|block| block.region()), depths, ..options.into() };
     let mut facts = facts(request, inputs.masks.as_deref(), &gpu);
     facts.extend(resumed.as_ref().map(|resumed| ("goes on after step", resumed.state.step.to_string())));
@@ -160,7 +162,7 @@ pub(super) fn begin<'a>(
     let checkpoints = Checkpoints::new(out, lock, record, resumed.as_ref().map(|resumed| &resumed.state))?;
     let mut trainer = match resumed {
         Some(resumed) => Trainer::resume(gpu, &dataset, resumed.state, options)?,
-        None => start(gpu, (&train, first), (&request.scene, &dataset), table.as_ref(), options)?,
+        None => start(gpu, (&train, first), (&sightings, &dataset), table.as_ref(), options)?,
     };
     info.plan(&mut trainer);
     // The near plane is decided now.
@@ -192,7 +194,7 @@ fn recorded(masks: Option<&Path>) -> Option<PathBuf> {
 fn start(
     gpu: Arc<Gpu>,
     (config, first): (&TrainConfig, Option<Gaussians>),
-    (scene, dataset): (&Path, &Dataset),
+    (sightings, dataset): (&Sightings, &Dataset),
     occluders: Option<&OcclusionTable>,
     mut options: TrainerOptions,
 ) -> Result<Trainer> {
@@ -212,7 +214,7 @@ fn start(
     let gains = match config.exposure {
         _ if options.region.is_some() => Vec::new(),
         ExposureMode::Off => Vec::new(),
-        ExposureMode::Auto | ExposureMode::On => capture::gains(scene, dataset)?,
+        ExposureMode::Auto | ExposureMode::On => sightings.gains()?,
     };
     let config = exposure::decided(&config, &gains);
     options.shared = Shared::of(&config, &gains, dataset, options.region.as_ref());

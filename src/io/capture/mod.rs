@@ -9,12 +9,14 @@ mod poses;
 use super::colmap::Seen;
 use super::listed_path::Place;
 use super::listing::Listed;
+use super::recipe::at_photo_size;
 use super::window::{Window, windows};
 use super::{colmap, folder_of};
 use crate::error::Result;
 use crate::scene::{Dataset, View};
 use glam::{DVec2, DVec3};
 use serde::Serialize;
+use std::cell::OnceCell;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
@@ -123,48 +125,83 @@ pub struct Report {
 /// What the reconstruction says of each photo: which points it shows.
 struct Observed {
     photos: BTreeMap<String, (Listed, Vec<Seen>)>,
-    windows: BTreeMap<String, Window>,
+    /// Photo of each face of a photo through a wide lens.
+    faces: BTreeMap<String, String>,
 }
 
 impl Observed {
     fn read(scene: &Path) -> Result<Self> {
         // Opening the scene has checked its paths.
         let photos = colmap::observations(&Place::new(folder_of(scene), true))?.unwrap_or_default();
-        Ok(Self { photos, windows: windows(scene)? })
+        let mut faces = BTreeMap::new();
+        for (listed, _) in photos.values().filter(|(listed, _)| !listed.lens.is_pinhole()) {
+            // It has left out unreadable photos too.
+            let Ok(camera) = at_photo_size(listed) else { continue };
+            let views = Window::all(&listed.name, &camera, &listed.lens);
+            faces.extend(views.into_iter().map(|view| (view.name, view.photo)));
+        }
+        Ok(Self { photos, faces })
     }
 
     fn of(&self, view: &View) -> Option<&(Listed, Vec<Seen>)> {
-        self.photos.get(self.windows.get(&view.name).map_or(&view.name, |window| &window.photo))
+        self.photos.get(self.faces.get(&view.name).unwrap_or(&view.name))
     }
 }
 
-/// Returns how bright each training photo is relative to the mean of all, by the points that they share: factors of red,
-/// green and blue, or `None` with too few such points.
-pub fn gains(scene: &Path, dataset: &Dataset) -> Result<Vec<Option<[f64; 3]>>> {
-    if dataset.points.is_empty() {
-        return Ok(vec![None; dataset.train.len()]);
-    }
-    let observed = Observed::read(scene)?;
-    let views: Vec<&View> = dataset.train.iter().collect();
-    let observed: Vec<_> = views.iter().map(|view| observed.of(view)).collect();
-    let seen = neighbours::seen(&views, &dataset.points, &observed);
-    let gains = gains::gains(&views, &seen, &dataset.points)?;
-    Ok(gains.into_iter().map(|of| of.map(|of| of.channels)).collect())
+/// Which points of the reconstruction each training photo shows. They are read when something asks for them, and once.
+pub(crate) struct Sightings<'a> {
+    scene: &'a Path,
+    dataset: &'a Dataset,
+    read: OnceCell<Sighted>,
 }
 
-/// Returns the points of the reconstruction that each training photo shows: pixel and place. There are none where the
-/// reconstruction does not say which photo shows which point.
-pub(crate) fn observed_points(scene: &Path, dataset: &Dataset) -> Result<Vec<Vec<(DVec2, DVec3)>>> {
-    let looked = Observed::read(scene)?;
-    let views: Vec<&View> = dataset.train.iter().collect();
-    let observed: Vec<_> = views.iter().map(|view| looked.of(view)).collect();
-    let place = |&(index, at): &(usize, DVec2)| (at, dataset.points[index].position);
-    let of_view = |(seen, observed): (Vec<(usize, DVec2)>, &Option<&(Listed, Vec<Seen>)>)| match observed {
-        Some((_, shown)) if !shown.is_empty() => seen.iter().map(place).collect(),
-        _ => Vec::new(),
-    };
-    let seen = neighbours::seen(&views, &dataset.points, &observed);
-    Ok(seen.into_iter().zip(&observed).map(of_view).collect())
+struct Sighted {
+    /// Index of the point and pixel, for each view.
+    seen: Vec<Vec<(usize, DVec2)>>,
+    /// The reconstruction says so; else they are all points in the picture.
+    is_observed: Vec<bool>,
+}
+
+impl<'a> Sightings<'a> {
+    /// Those of a scene that was read.
+    pub(crate) fn new(scene: &'a Path, dataset: &'a Dataset) -> Self {
+        Self { scene, dataset, read: OnceCell::new() }
+    }
+
+    fn sighted(&self) -> Result<&Sighted> {
+        if let Some(read) = self.read.get() {
+            return Ok(read);
+        }
+        let looked = Observed::read(self.scene)?;
+        let views: Vec<&View> = self.dataset.train.iter().collect();
+        let observed: Vec<_> = views.iter().map(|view| looked.of(view)).collect();
+        let seen = neighbours::seen(&views, &self.dataset.points, &observed);
+        let is_observed = observed.iter().map(|of| of.is_some_and(|(_, shown)| !shown.is_empty())).collect();
+        Ok(self.read.get_or_init(|| Sighted { seen, is_observed }))
+    }
+
+    /// Returns how bright each training photo is relative to the mean of all, by the points that they share: factors of
+    /// red, green and blue, or `None` with too few such points.
+    pub(crate) fn gains(&self) -> Result<Vec<Option<[f64; 3]>>> {
+        if self.dataset.points.is_empty() {
+            return Ok(vec![None; self.dataset.train.len()]);
+        }
+        let views: Vec<&View> = self.dataset.train.iter().collect();
+        let gains = gains::gains(&views, &self.sighted()?.seen, &self.dataset.points)?;
+        Ok(gains.into_iter().map(|of| of.map(|of| of.channels)).collect())
+    }
+
+    /// Returns pixel and place of the points that each training photo shows. There are none where the reconstruction does
+    /// not say which photo shows which point.
+    pub(crate) fn points(&self) -> Result<Vec<Vec<(DVec2, DVec3)>>> {
+        let Sighted { seen, is_observed } = self.sighted()?;
+        let place = |&(index, at): &(usize, DVec2)| (at, self.dataset.points[index].position);
+        let of_view = |(seen, &is_observed): (&Vec<_>, &bool)| match is_observed {
+            true => seen.iter().map(place).collect(),
+            false => Vec::new(),
+        };
+        Ok(seen.iter().zip(is_observed).map(of_view).collect())
+    }
 }
 
 /// Scans a scene that was read with its photos.
@@ -193,12 +230,13 @@ pub fn scan(scene: &Path, dataset: &Dataset) -> Result<Report> {
     findings.extend(neighbours::findings(&reports, dataset.points.len()));
     findings.extend(poses::scale(dataset));
     // The faces of a wide photo look at other things than their neighbours: sky is smooth, and no other photo shows it.
-    let is_face = |name: &String| looked.windows.get(name).is_some_and(|window| window.photo != window.name);
+    let windows = windows(scene)?;
+    let is_face = |name: &String| windows.get(name).is_some_and(|window| window.photo != window.name);
     findings.retain(|of| !matches!(of.fault, Fault::Blur | Fault::Alone) || !of.view.as_ref().is_some_and(is_face));
     findings.sort_by(|a, b| (a.fault, &a.view).cmp(&(b.fault, &b.view)));
     let known = || reports.iter().filter_map(|view| view.gain);
     let (least, most) = (known().fold(f64::INFINITY, f64::min), known().fold(0.0, f64::max));
-    let photo_of = |view: &&View| looked.windows.get(&view.name).map_or(&view.name, |window| &window.photo).clone();
+    let photo_of = |view: &&View| windows.get(&view.name).map_or(&view.name, |window| &window.photo).clone();
     Ok(Report {
         extent: dataset.extent(),
         photos: views.iter().map(photo_of).collect::<BTreeSet<_>>().len(),
