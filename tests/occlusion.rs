@@ -173,6 +173,27 @@ fn holes_do_not_vote() {
     assert!(by_contour(&labels, &depth, Rule::default()).values().all(Vec::is_empty));
 }
 
+/// A thing without a label stands before an object that has ground and wall, without labels too, around the rest of it.
+#[test]
+fn what_has_no_label_may_hide_too() {
+    let rows = 10;
+    let labels = map(6, &[0, 0, 1, 1, 0, 0].repeat(rows));
+    let depth = |near: usize| -> Vec<f32> {
+        (0..6 * rows)
+            .map(|at| if at % 6 < 2 && at / 6 < near { 1.0 } else { [3.0, 2.0][usize::from(at % 6 / 2 == 1)] })
+            .collect()
+    };
+    let found = |near: usize, rule: Rule| by_contour(&labels, &depth(near), rule);
+    let (hidden, free) = (lists(&[(1, &[0])]), lists(&[(1, &[])]));
+    // Half and a tenth of the contour.
+    assert_eq!(found(rows, Rule::default()), hidden);
+    assert_eq!(found(2, Rule::default()), free, "too little of it");
+    assert_eq!(found(2, Rule { unlabelled: Some(0.05), least: 0.05, ..Rule::default() }), hidden);
+    assert_eq!(found(rows, Rule { unlabelled: None, ..Rule::default() }), free);
+    let mean: Vec<f64> = depth(rows).iter().map(|&z| f64::from(z)).collect();
+    assert_eq!(by_mean(&labels, &mean), free, "the rule of the paper");
+}
+
 /// Wall 3 around table 2 around cup 1, the table's depth that at its outer and at its inner contour.
 fn nested(wall: f32, table: (f32, f32), cup: f32) -> Occluders {
     let ring = |i: usize| (i % 9).min(8 - i % 9).min((i / 9).min(8 - i / 9));
@@ -272,7 +293,6 @@ fn a_table_is_read_back_and_an_invalid_one_refused() {
     let lists = |text: &str| format!(r#"{{"schema_version": 1, "kind": "depth", "views": {{"0.png": {text}}}}}"#);
     for (text, problem) in [
         (lists(r#"{"1": [1]}"#), "hides itself"),
-        (lists(r#"{"1": [0]}"#), "0 is no object"),
         (lists(r#"{"0": [1]}"#), "0 is no object"),
         (lists(r#"{"x": [1]}"#), "expected"),
         (lists(r#"{"1": [70000]}"#), "expected"),
@@ -283,6 +303,6 @@ fn a_table_is_read_back_and_an_invalid_one_refused() {
         let error = OcclusionTable::read(&path).expect_err(&text);
         assert!(error.to_string().contains(problem) && exit_status(&error) == 3, "{error}");
     }
-    std::fs::write(&path, lists(r#"{"2": [9, 4, 9]}"#)).expect("written");
-    assert_eq!(OcclusionTable::read(&path).expect("read").views["0.png"][&2], [4, 9]);
+    std::fs::write(&path, lists(r#"{"2": [9, 0, 4, 9]}"#)).expect("written");
+    assert_eq!(OcclusionTable::read(&path).expect("read").views["0.png"][&2], [0, 4, 9]);
 }

@@ -165,7 +165,8 @@ fn objects(views: &[&View]) -> Vec<u32> {
 
 fn hidden_by(mask: Option<&LabelMap>, rendered: &Rendered) -> Result<BTreeMap<u16, Vec<u16>>> {
     let Some(mask) = mask else { return Ok(BTreeMap::new()) };
-    Ok(by_contour(mask, &rendered.mean_depth()?, Rule::default()))
+    // All pixels without a label count, whatever may stand in some of them.
+    Ok(by_contour(mask, &rendered.mean_depth()?, Rule { unlabelled: None, ..Rule::default() }))
 }
 
 /// Returns the pixels at which the mask shows one of `ids`.

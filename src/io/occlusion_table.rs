@@ -19,7 +19,7 @@ pub struct OcclusionTable {
     pub schema_version: u32,
     /// Source of the lists: `none`, `depth` or `rendered`.
     pub kind: String,
-    /// By name of the view and by object: the objects that hide a part of it.
+    /// By name of the view and by object: the objects that hide a part of it, 0 for what has no label.
     pub views: BTreeMap<String, Occluders>,
 }
 
@@ -29,7 +29,7 @@ impl OcclusionTable {
         Self { schema_version: SCHEMA_VERSION, kind: kind.to_owned(), views }
     }
 
-    /// Reads a table and sorts its lists. Another version, the id 0 and an object that hides itself are errors.
+    /// Reads a table and sorts its lists. Another version, 0 as an object and an object that hides itself are errors.
     pub fn read(path: &Path) -> Result<Self> {
         let expected = r#"expected {"schema_version": 1, "kind": "depth", "views": {"00.png": {"1": [], "2": [1]}}}"#;
         let mut table: Self = read::json(path, expected)?;
@@ -40,7 +40,7 @@ impl OcclusionTable {
         for (name, objects) in &mut table.views {
             for (&label, hidden_by) in objects {
                 let place = || format!("view {name}, object {label}");
-                if label == 0 || hidden_by.contains(&0) {
+                if label == 0 {
                     return Err(Error::data(path, place(), "0 is no object; objects are from 1 to 65535"));
                 }
                 if hidden_by.contains(&label) {

@@ -3,7 +3,8 @@
 /// Id of the background, in masks and in models.
 pub const UNLABELLED: u32 = 0;
 
-/// Occluders of each object in a view: the objects that hide a part of it. Keys and lists are sorted.
+/// Occluders of each object in a view: the objects that hide a part of it, 0 for what has no label. Keys and lists are
+/// sorted.
 pub type Occluders = std::collections::BTreeMap<u16, Vec<u16>>;
 
 /// Largest id in masks.

@@ -18,7 +18,7 @@ impl Trainer {
             match found.get(&view.name) {
                 Some(lists) => {
                     let lists = lists.iter().filter(|(label, _)| shown(label));
-                    let kept = |by: &Vec<u16>| by.iter().copied().filter(|label| shown(label)).collect();
+                    let kept = |by: &Vec<u16>| by.iter().copied().filter(|label| *label == 0 || shown(label)).collect();
                     view.occluders = lists.map(|(&label, by)| (label, kept(by))).collect();
                 }
                 None => without.push(view.name.clone()),

@@ -16,11 +16,14 @@ pub struct Rule {
     pub majority: f64,
     /// Share of all pixels of the contour that must agree. 0.1: less is noise.
     pub least: f64,
+    /// Share of the votes along the contour with what has no label that must agree for it to hide the object; without a
+    /// value it never does. 0.25: it is all that is left of the picture, most of it ground and wall behind the object.
+    pub unlabelled: Option<f64>,
 }
 
 impl Default for Rule {
     fn default() -> Self {
-        Self { margin: 0.02, majority: 0.5, least: 0.1 }
+        Self { margin: 0.02, majority: 0.5, least: 0.1, unlabelled: Some(0.25) }
     }
 }
 
@@ -62,10 +65,11 @@ pub fn by_contour(labels: &LabelMap, depth: &[f32], rule: Rule) -> Occluders {
     let sides = sides(labels, depth, rule.margin);
     let mut direct: Occluders = labels.objects().into_iter().map(|label| (label, Vec::new())).collect();
     for (&(label, other), own) in &sides {
-        let Some(theirs) = sides.get(&(other, label)) else { continue };
+        let Some(theirs) = sides.get(&(other, label)).filter(|_| label != 0) else { continue };
         let (agree, against) = (own.other_nearer + theirs.self_nearer, own.self_nearer + theirs.other_nearer);
         let enough = agree as f64 >= rule.least * (own.votes + theirs.votes) as f64;
-        if enough && agree as f64 > rule.majority * (agree + against) as f64 {
+        let share = if other == 0 { rule.unlabelled } else { Some(rule.majority) };
+        if enough && share.is_some_and(|share| agree as f64 > share * (agree + against) as f64) {
             direct.entry(label).or_default().push(other);
         }
     }

@@ -9,7 +9,8 @@ const BEHIND: [u8; 3] = [0; 3];
 const NEITHER: [u8; 3] = [128; 3];
 
 /// Draws the objects in their colours, darkened by a third, with a line of two pixels along each contour: white in
-/// front and black behind, or grey if neither object hides the other. Chains have no contour and no line.
+/// front and black behind, or grey if neither object hides the other; what has no label has a line where it hides an
+/// object. Chains have no contour and no line.
 pub fn picture(labels: &LabelMap, occluders: &Occluders) -> Vec<[u8; 3]> {
     let fill = |&id: &u16| label_colour(u32::from(id)).map(|channel| (u16::from(channel) * 2 / 3) as u8);
     let mut pixels: Vec<[u8; 3]> = labels.ids.iter().map(fill).collect();
@@ -20,6 +21,7 @@ pub fn picture(labels: &LabelMap, occluders: &Occluders) -> Vec<[u8; 3]> {
         let (rank, colour) = match (hides(own, other), hides(other, own)) {
             (true, _) => (3, IN_FRONT),
             (_, true) => (2, BEHIND),
+            _ if own == 0 || other == 0 => return,
             _ => (1, NEITHER),
         };
         if rank > drawn[pixel] {

@@ -34,11 +34,14 @@ impl Band {
 }
 
 /// Returns the occluders of each object (LabelGS, occlusion analysis). k' hides k if they touch and the mean distance
-/// of the contour of k' with k is smaller than that of k with k'. There is no margin, because the scale of the
-/// distances is unknown.
+/// of the contour of k' with k is smaller than that of k with k'. What has no label hides nothing. There is no margin,
+/// because the scale of the distances is unknown.
 pub fn by_mean(labels: &LabelMap, distance: &[f64]) -> Occluders {
     let mut bands: BTreeMap<(u16, u16), Band> = BTreeMap::new();
     walk(labels, |own, other, pixel, _| {
+        if own == 0 || other == 0 {
+            return;
+        }
         let (band, z) = (bands.entry((own, other)).or_default(), distance[pixel]);
         if z.is_finite() && z > 0.0 {
             *band = Band { sum: band.sum + z, count: band.count + 1 };

@@ -3,7 +3,8 @@
 //!
 //! [`by_mean`] is the rule of the paper, for monocular depth of a network. [`by_contour`] needs consistent depth, such
 //! as that of the model. Both use the contours between objects: a pixel is on the contour of k with k' if its label is
-//! k and one of its 8 neighbours is k'. The background (0) neither hides nor is hidden.
+//! k and one of its 8 neighbours is k'. What has no label (0) is not hidden; [`by_contour`] lets it hide, because masks
+//! seldom cover everything that stands before an object.
 
 mod contour;
 mod depths;
@@ -21,21 +22,18 @@ use crate::scene::LabelMap;
 use std::collections::BTreeMap;
 
 /// Calls `visit(own label, other label, pixel, neighbours)` for each pixel on a contour and each label on the other
-/// side, sorted. `neighbours` are the ones of its 8 neighbours with the other label.
+/// side, sorted, the background included. `neighbours` are the ones of its 8 neighbours with the other label.
 fn walk(labels: &LabelMap, mut visit: impl FnMut(u16, u16, usize, &[usize])) {
     let (width, height) = (i64::from(labels.width), i64::from(labels.height));
     let mut others: BTreeMap<u16, Vec<usize>> = BTreeMap::new();
     for (index, &own) in labels.ids.iter().enumerate() {
-        if own == 0 {
-            continue;
-        }
         let (x, y) = (index as i64 % width, index as i64 / width);
         others.clear();
         for row in (y - 1).max(0)..=(y + 1).min(height - 1) {
             for column in (x - 1).max(0)..=(x + 1).min(width - 1) {
                 let at = (row * width + column) as usize;
                 let other = labels.ids[at];
-                if other != own && other != 0 {
+                if other != own {
                     others.entry(other).or_default().push(at);
                 }
             }

@@ -143,7 +143,8 @@ pub fn target(random: &mut Pcg32, shape: &Shape) -> Target {
     let slots = (1..=shape.objects)
         .map(|label| ObjectPixel {
             label,
-            occluders: if label % 2 == 0 { vec![label - 1] } else { Vec::new() },
+            // Among them what has no label.
+            occluders: [vec![label - 1], Vec::new(), vec![label - 1], vec![0]][label as usize % 4].clone(),
             weight: 1.0,
         })
         .collect();
