@@ -300,6 +300,7 @@ impl Trainer {
         } else {
             Vec::new()
         };
+        let labels = labels && (!layers.is_empty() || self.config.has_disagreement_at(step));
         let update = self.strategy.updates(self.at(step));
         self.updates += u32::from(update);
         Ok(StepInput { step, part, layers, labels, update, updates: self.updates })

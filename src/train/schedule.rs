@@ -25,6 +25,8 @@ const PRUNE_AT: f64 = 0.55;
 
 /// Steps between two with object layers. Only these see the hidden parts of objects, and they cost up to twice as much.
 const LAYER_EVERY: u32 = 8;
+/// Steps between two with the disagreement of labels, which counts for those between.
+const DISAGREEMENT_EVERY: u32 = 2;
 /// Shares of the run between two counts of votes, and between two searches for occluders. Both walk all views, so a run
 /// of default settings has one of each when labels start, and votes at the end.
 const VOTE_EVERY: f64 = 0.5;
@@ -128,6 +130,17 @@ impl TrainConfig {
     /// Returns true for steps with labels that render objects alone.
     pub fn has_layers_at(&self, step: u32) -> bool {
         self.layer_every() > 0 && self.is_label_turn(step, self.layer_every())
+    }
+
+    /// Returns the steps between two with the disagreement of labels; the paper's rule lifts labels in each step.
+    pub fn disagreement_every(&self) -> u32 {
+        if self.label_rule == LabelRule::Main { 1 } else { DISAGREEMENT_EVERY }
+    }
+
+    /// Returns true for steps with labels that have their disagreement, if they have no object layers.
+    pub fn has_disagreement_at(&self, step: u32) -> bool {
+        // From the second one on, because the first has layers.
+        self.labels_at(step) && (step - self.labels_from() + 1).is_multiple_of(self.disagreement_every())
     }
 
     /// Returns true if the votes are counted before `step`.

@@ -123,10 +123,10 @@ pub fn label_loss(input: &StepInput, view: StepView, config: &TrainConfig, loss_
     (f64::from(loss_label) + empty) / (3.0 * view.valid_pixels.max(1) as f64) * f64::from(label_weight(input, config))
 }
 
-/// Weight of the label loss of a step. Layers stand for all steps from one turn to the next.
+/// Weight of the label loss of a step, which stands for all steps from one turn to the next.
 fn label_weight(input: &StepInput, config: &TrainConfig) -> f32 {
-    let times = if input.layers.is_empty() { 1 } else { config.layer_every().max(1) };
-    config.label_weight * times as f32
+    let every = if input.layers.is_empty() { config.disagreement_every() } else { config.layer_every() };
+    config.label_weight * every.max(1) as f32
 }
 
 /// The alpha term is a mean over pixels; the other terms are means over pixels and channels.

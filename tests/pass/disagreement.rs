@@ -42,7 +42,8 @@ fn disagreement_of_a_step_equals_its_mirror_and_moves_opacities_only() {
 
     let (model, target) = (fixture.model(), fixture.scene.target.clone());
     assert!(model.labels.contains(&0) && model.labels.iter().any(|&label| label > 0));
-    let weight = f64::from(LABEL_WEIGHT) / target.photo.elements();
+    let steps = f64::from(fixture.config.disagreement_every());
+    let weight = steps * f64::from(LABEL_WEIGHT) / target.photo.elements();
     let pixels: Vec<Option<(u32, f64)>> = (target.label_map.iter().zip(&target.photo.valid))
         .map(|(&here, &valid)| (valid && here <= 0xffff).then_some((here, weight)))
         .collect();

@@ -187,7 +187,8 @@ impl Ran {
         (self.fixture.input.labels, self.fixture.input.layers) = (true, layers);
         self.fixture.config.label_weight = label_weight;
         let (model, target) = (self.fixture.model(), &self.fixture.scene.target);
-        let weight = f64::from(WEIGHT) / target.photo.elements();
+        let steps = f64::from(self.fixture.config.disagreement_every());
+        let weight = steps * f64::from(WEIGHT) / target.photo.elements();
         let pixels: Vec<Option<(u32, f64)>> = (target.label_map.iter().zip(&target.photo.valid))
             .map(|(&here, &valid)| (valid && here <= LABEL_MASK).then_some((here, weight)))
             .collect();
