@@ -242,7 +242,9 @@ fn label_loss_of_an_empty_object_is_its_masked_photo_without_gradient() {
     let inside = |i: &usize| photo.valid[*i] && target.label_map[*i] == slot.label;
     let sum: f64 = (0..photo.valid.len()).filter(inside).map(|i| photo.colours[i].iter().sum::<f64>()).sum();
     let pixels = (0..photo.valid.len()).filter(inside).count() as f64;
-    let expected = (sum + 3.0 * Rules::default().label_alpha * pixels) / photo.elements() * slot.weight;
+    let rules = Rules::default();
+    let opacity = 3.0 * rules.label_alpha * (1.0 - rules.alpha_slack) * pixels;
+    let expected = (sum + opacity) / photo.elements() * slot.weight;
     assert!(sum > 0.0 && (out.objects[0].value - expected).abs() < 1e-12);
     let without = step(&Rules::default(), &s.camera, &model, &Target { slots: Vec::new(), ..target });
     assert_eq!(out.rows, without.rows);
@@ -254,10 +256,10 @@ fn occluded_and_invalid_pixels_are_ignored() {
     let slot = ObjectPixel { label: 1, occluders: vec![2], weight: 1.0 };
     let rules = Rules { label_alpha: 0.5, ..Rules::default() };
     let loss = label_loss(&rules, (&[[0.8; 3]; 4], &[0.8; 4]), &photo, &[1, 2, 0, 1], &slot);
-    // Mask: 0.3 off; occluder: left out; elsewhere 0.8 off; invalid: left out of the count, too. Opacity: 0.2 and 0.8
-    // off.
-    assert!((loss.value - (0.3 + 0.8 + 0.5 * (0.2 + 0.8)) / 3.0).abs() < 1e-12);
-    assert_eq!(loss.v_alpha, [-0.5 / 3.0, 0.0, 0.5 / 3.0, 0.0]);
+    // Mask: 0.3 off; occluder: left out; elsewhere 0.8 off; invalid: left out of the count, too. Opacity: 0.2 off, within
+    // the slack, and 0.8.
+    assert!((loss.value - (0.3 + 0.8 + 0.5 * (0.8 - 0.5)) / 3.0).abs() < 1e-12);
+    assert_eq!(loss.v_alpha, [0.0, 0.0, 0.5 / 3.0, 0.0]);
     let v = 1.0 / 9.0;
     assert_eq!(loss.v_image, [[v; 3], BLACK, [v; 3], BLACK]);
 }

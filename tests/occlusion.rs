@@ -134,17 +134,19 @@ fn a_vote_needs_the_margin_and_the_majority() {
     assert_eq!(found(&[1.0, 1.01]), nobody, "1 % is within the margin of 2 %");
     let (labels, depth) = strips(&[1.0, 1.01]);
     assert_eq!(by_contour(&labels, &depth, Rule { margin: 0.005, ..rule })[&2], [1]);
+    let rule = Rule { share: 0.5, ..rule };
     // Half of the votes is no majority.
     let (labels, mut depth) = strips(&[1.0, 2.0]);
     (2..4).for_each(|row| depth[row * 4..row * 4 + 4].copy_from_slice(&[2.0, 2.0, 1.0, 1.0]));
     assert_eq!(by_contour(&labels, &depth, rule), nobody);
+    assert_eq!(by_contour(&labels, &depth, Rule::default()), lists(&[(1, &[2]), (2, &[1])]), "each hides a part");
     // Pixels of equal depth do not vote. Two rows of four decide; at a higher majority, two against one do not.
     let (labels, mut depth) = strips(&[1.0, 1.0]);
     (0..2).for_each(|row| depth[row * 4..row * 4 + 2].fill(0.5));
     assert_eq!(by_contour(&labels, &depth, rule), lists(&[(1, &[]), (2, &[1])]));
     depth[3 * 4 + 2..].fill(0.5);
     assert_eq!(by_contour(&labels, &depth, rule), lists(&[(1, &[]), (2, &[1])]));
-    assert_eq!(by_contour(&labels, &depth, Rule { majority: 0.7, ..rule }), nobody);
+    assert_eq!(by_contour(&labels, &depth, Rule { share: 0.7, ..rule }), nobody);
 }
 
 #[test]
@@ -188,8 +190,8 @@ fn what_has_no_label_may_hide_too() {
     // Half and a tenth of the contour.
     assert_eq!(found(rows, Rule::default()), hidden);
     assert_eq!(found(2, Rule::default()), free, "too little of it");
-    assert_eq!(found(2, Rule { unlabelled: Some(0.05), least: 0.05, ..Rule::default() }), hidden);
-    assert_eq!(found(rows, Rule { unlabelled: None, ..Rule::default() }), free);
+    assert_eq!(found(2, Rule { share: 0.05, least: 0.05, ..Rule::default() }), hidden);
+    assert_eq!(found(rows, Rule { unlabelled: false, ..Rule::default() }), free);
     let mean: Vec<f64> = depth(rows).iter().map(|&z| f64::from(z)).collect();
     assert_eq!(by_mean(&labels, &mean), free, "the rule of the paper");
 }

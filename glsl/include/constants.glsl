@@ -44,6 +44,7 @@ const uint NO_SPLAT = 0xffffffffu;
 const uint NO_ROW = 0xffffffffu;
 const uint LABEL_MASK = 0xffffu;             // object id in a pixel of view_labels; the next bit is a flag:
 const uint LABEL_BORDER = 0x10000u;          // pixel near a contour of the mask; ignored
+const float ALPHA_SLACK = 0.5;               // opacity of an object alone may be off by this: half of a pixel at its outline
 const uint LABEL_OPEN = 0x10000u;            // pixel of label_map in which a label without a sum may win
 const uint LABEL_ROUNDS = 8u;                // most walks of a tile for its label map: 32 labels
 const uint VOTE_NONE = 0xffffffffu;         // column of a pixel without votes

@@ -48,7 +48,11 @@ void finish_layer(TileJob t, float T[ROWS], float cr[ROWS], float cg[ROWS], floa
         bool counts = inside && photo.w > 0.5 && !left_out(t.layer, here, u);
         vec4 difference = counts ? vec4(cr[k], cg[k], cb[k], 1.0 - abs(T[k])) - wanted : vec4(0.0);
         vec4 change = counts ? abs(difference) - wanted : vec4(0.0); // wanted >= 0
-        loss += change.x + change.y + change.z + u.label_alpha * change.w;
+        // Opacity costs what it is off beyond the slack, but not where another object may be before this one. Without any
+        // opacity that is 1 - slack inside the mask, 0 outside.
+        float off = here == label || here == 0u ? max(abs(difference.w) - ALPHA_SLACK, 0.0) : 0.0;
+        loss += change.x + change.y + change.z + u.label_alpha * (off - (counts ? (1.0 - ALPHA_SLACK) * wanted.w : 0.0));
+        difference.w = off > 0.0 ? difference.w : 0.0;
         layer_state[layer_pixel(t, k)] = uvec2(floatBitsToUint(abs(T[k])), final_[k] | pack_signs(difference));
     }
     loss = subgroup_sum(loss);

@@ -165,8 +165,9 @@ fn objects(views: &[&View]) -> Vec<u32> {
 
 fn hidden_by(mask: Option<&LabelMap>, rendered: &Rendered) -> Result<BTreeMap<u16, Vec<u16>>> {
     let Some(mask) = mask else { return Ok(BTreeMap::new()) };
-    // All pixels without a label count, whatever may stand in some of them.
-    Ok(by_contour(mask, &rendered.mean_depth()?, Rule { unlabelled: None, ..Rule::default() }))
+    // Few pixels are left out, whatever may stand in some of the others: a score must not excuse what is wrong.
+    let rule = Rule { share: 0.5, unlabelled: false, ..Rule::default() };
+    Ok(by_contour(mask, &rendered.mean_depth()?, rule))
 }
 
 /// Returns the pixels at which the mask shows one of `ids`.

@@ -208,9 +208,10 @@ crate::options::options! {
 
             /// Weight of the alpha term in the label loss.
             ///
-            /// 0 (LabelGS has none). The term compares the object's opacity with its mask. It helps objects that are as
-            /// dark as the black behind them, which otherwise may vanish at no cost.
-            label_alpha <"WEIGHT">: f32 = 0.0, not_negative;
+            /// 1; LabelGS has none. The term compares the opacity of an object alone with its mask, where that is off by
+            /// more than a half, and not in pixels of other objects. Without it what hides behind other things turns black
+            /// rather than clear, and shows when the object is taken out. Higher weights lower the quality of the picture.
+            label_alpha <"WEIGHT">: f32 = 1.0, not_negative;
 
             /// Source of the occluders.
             ///

@@ -30,6 +30,7 @@ impl TrainConfig {
         Self {
             label_rule: LabelRule::Main,
             label_weight: 1.0,
+            label_alpha: 0.0,
             densify_until: Some(40_000),
             opacity_reset_interval: 3000,
             ..Self::adc()

@@ -4,7 +4,7 @@ use super::depths::{self, KnownDepths};
 use super::{LabelRule, TrainConfig, backdrop};
 use crate::engine::{DisagreementInput, Engine, LayerInput, TrainInput};
 use crate::scene::{Camera, LabelMap, Occluders, Photo, Pixels};
-use crate::shaders::constants::{ADAM_BETA1, ADAM_BETA2, FINEST, LABEL_BORDER};
+use crate::shaders::constants::{ADAM_BETA1, ADAM_BETA2, ALPHA_SLACK, FINEST, LABEL_BORDER};
 use crate::shaders::structs::StepUniforms;
 use std::collections::BTreeMap;
 
@@ -117,7 +117,8 @@ pub fn label_loss(input: &StepInput, view: StepView, config: &TrainConfig, loss_
     }
     let empty = |(label, weight): (&u16, f32)| {
         let shown = view.shown.get(label).copied().unwrap_or_default();
-        f64::from(weight) * (shown.light + f64::from(alpha_weight(config)) * shown.pixels as f64)
+        let opacity = f64::from(1.0 - ALPHA_SLACK) * shown.pixels as f64;
+        f64::from(weight) * (shown.light + f64::from(alpha_weight(config)) * opacity)
     };
     let empty: f64 = input.layers.iter().zip(layer_weights(input, view, config)).map(empty).sum();
     (f64::from(loss_label) + empty) / (3.0 * view.valid_pixels.max(1) as f64) * f64::from(label_weight(input, config))

@@ -153,7 +153,7 @@ fn object_layers_equal_filtered_renders() {
     let actual = fixture.splat_gradients(&splats);
     let (labels, slots, size, target) =
         (fixture.model().labels, fixture.slots(), fixture.size(), fixture.scene.target.clone());
-    prove("object layers", &["alpha_min", "alpha_max", "label_weight", "label_alpha"], |rules| {
+    prove("object layers", &["alpha_min", "alpha_max", "label_weight", "label_alpha", "alpha_slack"], |rules| {
         let (v_layers, kinks) = v_layers(rules, &fixture, &splats, &v_scene);
         // Separate renders: each object's splats alone, over black.
         let mut expected = blend_backward(rules, &splats, size, target.background, &v_scene);

@@ -38,7 +38,7 @@ fn label_loss_of_a_step_equals_its_mirror() {
     assert!(target.slots.iter().any(|slot| !slot.occluders.is_empty()));
     let actual = step_input::label_loss(&fixture.input, fixture.view.of_step(), &fixture.config, counters.loss_label);
     assert!(target.slots.iter().any(|slot| slot.weight != 1.0), "objects of different sizes weigh differently");
-    prove("label loss", &["label_weight", "label_alpha"], |rules| {
+    prove("label loss", &["label_weight", "label_alpha", "alpha_slack"], |rules| {
         let layers = blend_layers_forward(rules, &splats, &labels, &slots, size, target.background);
         let losses = target.slots.iter().zip(&layers[1..]).map(|(slot, layer)| {
             label_loss(rules, (&layer.colours(), &layer.alphas()), &target.photo, &target.label_map, slot)

@@ -53,7 +53,7 @@ const ALL: [Family; 4] = [Family::Project, Family::Sh, Family::Blend, Family::Lo
 #[test]
 fn gradients_of_a_step_equal_the_mirror() {
     // No splat is near the clamp of the Jacobian, and label weights have no effect without labels.
-    let bearing = named(&ALL, &["label_weight", "label_alpha", "jacobian_margin"]);
+    let bearing = named(&ALL, &["label_weight", "label_alpha", "alpha_slack", "jacobian_margin"]);
     case("whole step", 61, &Shape { gaussians: 120, ..Shape::default() }, false, &bearing);
 }
 

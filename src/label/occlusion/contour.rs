@@ -11,19 +11,18 @@ pub struct Rule {
     /// Relative difference of depth from which a pixel votes. 0.02: a floor seen at 15 degrees in an image of 320 px
     /// changes by 1 % from one pixel to the next, and is not in front of the things on it.
     pub margin: f64,
-    /// Share of the votes that must agree, at least 0.5. 0.5: a thing on top of another is in front of it along most of
-    /// its contour; where the two touch, no pixel votes.
-    pub majority: f64,
+    /// Share of the votes that must agree. 0.25: a bin stands before a thing in it along the nearer part of their contour
+    /// and behind it along the rest. Below 0.5 each of two may hide a part of the other.
+    pub share: f64,
     /// Share of all pixels of the contour that must agree. 0.1: less is noise.
     pub least: f64,
-    /// Share of the votes along the contour with what has no label that must agree for it to hide the object; without a
-    /// value it never does. 0.25: it is all that is left of the picture, most of it ground and wall behind the object.
-    pub unlabelled: Option<f64>,
+    /// What has no label may hide objects too.
+    pub unlabelled: bool,
 }
 
 impl Default for Rule {
     fn default() -> Self {
-        Self { margin: 0.02, majority: 0.5, least: 0.1, unlabelled: Some(0.25) }
+        Self { margin: 0.02, share: 0.25, least: 0.1, unlabelled: true }
     }
 }
 
@@ -68,8 +67,8 @@ pub fn by_contour(labels: &LabelMap, depth: &[f32], rule: Rule) -> Occluders {
         let Some(theirs) = sides.get(&(other, label)).filter(|_| label != 0) else { continue };
         let (agree, against) = (own.other_nearer + theirs.self_nearer, own.self_nearer + theirs.other_nearer);
         let enough = agree as f64 >= rule.least * (own.votes + theirs.votes) as f64;
-        let share = if other == 0 { rule.unlabelled } else { Some(rule.majority) };
-        if enough && share.is_some_and(|share| agree as f64 > share * (agree + against) as f64) {
+        let may_hide = other != 0 || rule.unlabelled;
+        if may_hide && enough && agree as f64 > rule.share * (agree + against) as f64 {
             direct.entry(label).or_default().push(other);
         }
     }

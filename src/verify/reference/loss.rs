@@ -198,7 +198,8 @@ pub struct ObjectPixel {
     pub weight: f64,
 }
 
-/// |U_k (R_k - M_k I)|, and |U_k (alpha_k - M_k)| with its weight, over the valid pixels, times the label weight.
+/// |U_k (R_k - M_k I)|, and what |U_k (alpha_k - M_k)| is beyond a slack with its weight, over the valid pixels, times the
+/// label weight.
 /// `picture` is R_k over black and alpha_k.
 pub fn label_loss(
     rules: &Rules,
@@ -223,10 +224,19 @@ pub fn label_loss(
                 loss.margins[i] = loss.margins[i].min(difference.abs());
             }
         }
-        // Opacity is between 0 and 1, so the sign never changes.
+        if !inside && label_map[i] != 0 {
+            continue;
+        }
+        // Opacity is between 0 and 1, so the sign of the difference never changes.
         let difference = alphas[i] - f64::from(u8::from(inside));
-        loss.l1 += 3.0 * rules.label_alpha * difference.abs();
-        loss.v_alpha[i] = 3.0 * rules.label_alpha * pixel_weight * sign(difference);
+        let off = (difference.abs() - rules.alpha_slack).max(0.0);
+        loss.l1 += 3.0 * rules.label_alpha * off;
+        if off > 0.0 {
+            loss.v_alpha[i] = 3.0 * rules.label_alpha * pixel_weight * sign(difference);
+        }
+        if rules.label_alpha > 0.0 {
+            loss.margins[i] = loss.margins[i].min((difference.abs() - rules.alpha_slack).abs());
+        }
     }
     loss.value = pixel_weight * loss.l1;
     loss

@@ -45,6 +45,8 @@ pub struct Rules {
     pub label_weight: f64,
     /// Weight of the alpha term within the label loss.
     pub label_alpha: f64,
+    /// What the opacity of an object alone may be off without a loss.
+    pub alpha_slack: f64,
     /// Standard deviation of the SSIM window, px.
     pub ssim_sigma: f64,
     /// Radius of the SSIM window, px (window = 2 reach + 1).
@@ -130,6 +132,7 @@ impl Default for Rules {
             dssim_weight: wide(0.2),
             label_weight: 1.0,
             label_alpha: 0.1,
+            alpha_slack: 0.5,
             ssim_sigma: 1.5,
             ssim_reach: 5,
             ssim_c1: wide(0.01 * 0.01),
@@ -223,7 +226,7 @@ pub fn mutants() -> Vec<Mutant> {
         Adam, Blend, Densify, Explore, FreeSpace, LabelMap, Lift, Loss, Project, Relocate, Reset, Sh, Smooth,
     };
     type Change = fn(&mut Rules);
-    let changes: [(&'static str, Family, Change); 42] = [
+    let changes: [(&'static str, Family, Change); 43] = [
         ("near", Project, |r| r.near = 3.8),
         ("dilation", Project, |r| r.dilation *= 1.03),
         ("antialiased", Project, |r| r.antialiased = true),
@@ -242,6 +245,7 @@ pub fn mutants() -> Vec<Mutant> {
         ("dssim_weight", Loss, |r| r.dssim_weight *= 1.03),
         ("label_weight", Loss, |r| r.label_weight *= 1.03),
         ("label_alpha", Loss, |r| r.label_alpha *= 1.03),
+        ("alpha_slack", Loss, |r| r.alpha_slack *= 1.1),
         ("ssim_sigma", Loss, |r| r.ssim_sigma *= 1.03),
         ("ssim_reach", Loss, |r| r.ssim_reach -= 1),
         ("ssim_c1", Loss, |r| r.ssim_c1 *= 1.3),
@@ -291,6 +295,7 @@ mod tests {
             (r.near, glsl::NEAR),
             (r.dilation, glsl::COV2D_BLUR),
             (r.finest, glsl::FINEST),
+            (r.alpha_slack, glsl::ALPHA_SLACK),
             (r.smooth_margin, glsl::SMOOTH_MARGIN),
             (r.jacobian_margin, glsl::JACOBIAN_MARGIN),
             (r.alpha_min, glsl::ALPHA_MIN),
