@@ -80,7 +80,9 @@ fn photos_grow_to_their_full_size() {
     let walked = |report: &StepReport| report.report.counters.walked_splats();
     assert!(walked(&reports[COARSE as usize]) > 4 * walked(&reports[0]), "the first pictures are small");
     for (report, step) in reports.iter().zip(1..) {
-        assert_eq!(report.label_loss > 0.0, step >= COARSE, "labels in step {step}");
+        // The first step with labels has object layers, and every second one the disagreement of labels.
+        let has_labels = step == COARSE || (step > COARSE && (step - COARSE) % 2 == 1);
+        assert_eq!(report.label_loss > 0.0, has_labels, "labels in step {step}");
         assert!(report.loss.is_finite());
     }
 }

@@ -17,9 +17,10 @@ use labelgs::run::{LabelRule, TrainConfig};
 use labelgs::synth::{Preset, SynthOptions, dataset};
 
 /// Both are f32 sums of the same terms in different order, so they differ by rounding, more so for large terms of
-/// opposite sign. 0.67 of the bounds seen, by element and as a whole.
+/// opposite sign: over 48 scenes of one to five objects, with and without alpha term, at most 0.9 of the bound of an
+/// element, the turn of one nearly round Gaussian. 0.67 of the bounds as a whole seen here.
 const BOUNDS: GradientBounds = GradientBounds {
-    element: Tolerance { absolute: 3e-7, relative: 6e-6 },
+    element: Tolerance { absolute: 8e-7, relative: 6e-6 },
     outliers: 0.0,
     norm: 6.5e-7,
     angle: 1e-12,
