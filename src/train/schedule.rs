@@ -140,7 +140,7 @@ impl TrainConfig {
     /// Returns true for steps with labels that have their disagreement, if they have no object layers.
     pub fn has_disagreement_at(&self, step: u32) -> bool {
         // From the second one on, because the first has layers.
-        self.labels_at(step) && (step - self.labels_from() + 1).is_multiple_of(self.disagreement_every())
+        self.labels_at(step) && self.is_label_turn(step + 1, self.disagreement_every())
     }
 
     /// Returns true if the votes are counted before `step`.

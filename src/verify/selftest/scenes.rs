@@ -143,8 +143,12 @@ pub fn target(random: &mut Pcg32, shape: &Shape) -> Target {
     let slots = (1..=shape.objects)
         .map(|label| ObjectPixel {
             label,
-            // Among them what has no label.
-            occluders: [vec![label - 1], Vec::new(), vec![label - 1], vec![0]][label as usize % 4].clone(),
+            occluders: match label % 4 {
+                1 => Vec::new(),
+                // What has no label.
+                3 => vec![0],
+                _ => vec![label - 1],
+            },
             weight: 1.0,
         })
         .collect();
