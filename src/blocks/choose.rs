@@ -8,7 +8,7 @@ use crate::error::Result;
 use crate::io::block_file::Bounds;
 use crate::scene::{Camera, View, Zone};
 use crate::train::strategy::weights::weights;
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 
 /// Share of a photo's weight that the core has, for the photo to be taken.
 const CORE_SHARE: f64 = 0.02;
@@ -98,9 +98,8 @@ fn seen_share(camera: &Camera, zone: &Zone) -> f64 {
     let from = zone.place(camera.centre());
     let hits = (0..rows * columns).filter(|at| {
         let share = |index: u32, count: u32, side: u32| (f64::from(index) + 0.5) / f64::from(count) * f64::from(side);
-        let (x, y) = (share(at % columns, columns, camera.width), share(at / columns, rows, camera.height));
-        let ray = DVec3::new((x - camera.cx) / camera.fx, (y - camera.cy) / camera.fy, 1.0);
-        passes(from, zone.place(camera.rotation.transpose() * ray), zone)
+        let pixel = DVec2::new(share(at % columns, columns, camera.width), share(at / columns, rows, camera.height));
+        passes(from, zone.place(camera.rotation.transpose() * camera.ray(pixel)), zone)
     });
     hits.count() as f64 / f64::from(rows * columns)
 }

@@ -8,7 +8,7 @@ use crate::eval::metrics::{mean, psnr_over};
 use crate::io::shelf::Shelf;
 use crate::render::{Parts, RenderOptions, Rendered};
 use crate::scene::{Camera, LabelMap, Photo, Pixels, View};
-use glam::{DVec2, DVec3};
+use glam::DVec3;
 use rayon::prelude::*;
 use serde::Serialize;
 
@@ -110,13 +110,9 @@ impl Witnesses {
 /// Returns the world point that each pixel shows, by the mean depth there; what has none is far away.
 pub(super) fn world_points(camera: &Camera, depths: &[f32]) -> Vec<DVec3> {
     let far = BEYOND * f64::from(depths.iter().copied().fold(1e-6_f32, f32::max));
-    let to_world = camera.rotation.transpose();
     let place = |(index, &depth): (usize, &f32)| {
-        let (x, y) = (index % camera.width as usize, index / camera.width as usize);
-        let pixel = DVec2::new(x as f64 + 0.5, y as f64 + 0.5);
-        let ray = DVec3::new((pixel.x - camera.cx) / camera.fx, (pixel.y - camera.cy) / camera.fy, 1.0);
         let depth = if depth > 0.0 { f64::from(depth) } else { far };
-        to_world * (ray * depth - camera.translation)
+        camera.unproject(camera.pixel_centre(index), depth)
     };
     depths.par_iter().enumerate().map(place).collect()
 }

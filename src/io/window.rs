@@ -82,9 +82,7 @@ impl Window {
         if self.is_photo() {
             return Some(pixel);
         }
-        let Camera { fx, fy, cx, cy, .. } = self.camera;
-        let ray = DVec3::new((pixel.x - cx) / fx, (pixel.y - cy) / fy, 1.0);
-        self.optics.pixel(self.turn * ray).filter(|&at| self.optics.holds(at))
+        self.optics.pixel(self.turn * self.camera.ray(pixel)).filter(|&at| self.optics.holds(at))
     }
 
     /// Returns the place in the view of a direction in axes of the photo, px; `None` outside of the view.

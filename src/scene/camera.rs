@@ -52,6 +52,22 @@ impl Camera {
         DVec2::new(self.fx * camera.x / camera.z + self.cx, self.fy * camera.y / camera.z + self.cy)
     }
 
+    /// Returns the direction of the ray through a place in the image, px: camera space, z is 1.
+    pub fn ray(&self, pixel: DVec2) -> DVec3 {
+        DVec3::new((pixel.x - self.cx) / self.fx, (pixel.y - self.cy) / self.fy, 1.0)
+    }
+
+    /// Returns the world point at a depth, world units along the optical axis, of a place in the image, px.
+    pub fn unproject(&self, pixel: DVec2, depth: f64) -> DVec3 {
+        self.rotation.transpose() * (self.ray(pixel) * depth - self.translation)
+    }
+
+    /// Returns the centre of a pixel, px, from its index in rows from the top.
+    pub fn pixel_centre(&self, index: usize) -> DVec2 {
+        let width = self.width as usize;
+        DVec2::new((index % width) as f64 + 0.5, (index / width) as f64 + 0.5)
+    }
+
     /// Returns the position of a world point in the image, px, if it is in the image.
     pub fn sees(&self, world: DVec3) -> Option<DVec2> {
         let at = self.to_camera(world);

@@ -100,9 +100,10 @@ pub(super) fn repaint(world: &World, camera: &Camera, view: u32, photo: &mut [[u
 /// Returns the unit direction, world, of the ray through an image position; `None` if the lens shows nothing there.
 pub(super) fn ray(optics: &Optics, x: f64, y: f64) -> Option<DVec3> {
     let camera = &optics.camera;
+    let pixel = DVec2::new(x, y);
     let own = match optics.lens.is_pinhole() {
-        true => DVec3::new((x - camera.cx) / camera.fx, (y - camera.cy) / camera.fy, 1.0),
-        false => optics.direction(DVec2::new(x, y))?,
+        true => camera.ray(pixel),
+        false => optics.direction(pixel)?,
     };
     Some((camera.rotation.transpose() * own).normalize())
 }

@@ -65,7 +65,7 @@ impl Evidence {
         let camera = &sight.camera;
         let pixel = camera.sees(world)?;
         let index = pixel.y as usize * camera.width as usize + pixel.x as usize;
-        let ray = camera.rotation.transpose() * sight.ray(index);
+        let ray = camera.rotation.transpose() * camera.ray(camera.pixel_centre(index));
         let depth = -plane.height(camera.centre()) / ray.dot(plane.normal);
         if ray.normalize().dot(plane.normal).abs() < STEEP || !(depth > 0.0 && depth.is_finite()) {
             return None;

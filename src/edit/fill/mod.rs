@@ -16,7 +16,7 @@ use super::select::{MIN_LABEL_CONFIDENCE, remove};
 use crate::scene::{Camera, Gaussians, LabelMap};
 use crate::shaders::constants::exact::SH_C0;
 use crate::{Error, Result};
-use glam::{DMat3, DQuat, DVec2, DVec3};
+use glam::{DMat3, DQuat, DVec3};
 use kiddo::{ImmutableKdTree, SquaredEuclidean};
 use plane::{Plane, planes};
 use sheet::Sheet;
@@ -173,14 +173,6 @@ impl Place {
 }
 
 impl Sight {
-    /// Returns the direction of the ray through the centre of a pixel, with z 1, in camera space.
-    fn ray(&self, index: usize) -> DVec3 {
-        let width = self.camera.width as usize;
-        let pixel = DVec2::new((index % width) as f64 + 0.5, (index / width) as f64 + 0.5);
-        let camera = &self.camera;
-        DVec3::new((pixel.x - camera.cx) / camera.fx, (pixel.y - camera.cy) / camera.fy, 1.0)
-    }
-
     /// Returns true for a pixel beside one of these labels.
     fn is_beside(&self, index: usize, labels: &[u32]) -> bool {
         let (x, y) = (index as u32 % self.labels.width, index as u32 / self.labels.width);
@@ -190,7 +182,7 @@ impl Sight {
 
     /// Returns the world position at a depth of a pixel.
     fn at(&self, index: usize, depth: f64) -> DVec3 {
-        self.camera.rotation.transpose() * (self.ray(index) * depth - self.camera.translation)
+        self.camera.unproject(self.camera.pixel_centre(index), depth)
     }
 }
 

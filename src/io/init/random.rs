@@ -101,7 +101,7 @@ fn ahead(random: &mut Pcg64Mcg, camera: &Camera, (near, far): (f64, f64)) -> DVe
         random.random_range(0.0..f64::from(camera.height)),
     );
     let depth = 1.0 / random.random_range(1.0 / far..1.0 / near);
-    region::unproject(camera, pixel, depth)
+    camera.unproject(pixel, depth)
 }
 
 /// What the views show at a candidate.

@@ -45,12 +45,6 @@ pub(super) fn image_side(views: &[View], point: DVec3) -> f64 {
     views.iter().filter_map(|view| side(&view.camera)).fold(f64::INFINITY, f64::min)
 }
 
-/// Returns the world point at `depth` behind `pixel`.
-pub(super) fn unproject(camera: &Camera, pixel: DVec2, depth: f64) -> DVec3 {
-    let ray = DVec3::new((pixel.x - camera.cx) / camera.fx, (pixel.y - camera.cy) / camera.fy, 1.0);
-    camera.rotation.transpose() * (ray * depth - camera.translation)
-}
-
 /// Returns the sine of the angle from the optical axis to the nearest edge of the image.
 fn narrow_sine(camera: &Camera) -> f64 {
     let side = |f: f64, c: f64, size: u32| c.min(f64::from(size) - c).max(0.0) / f;

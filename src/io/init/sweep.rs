@@ -3,7 +3,6 @@
 //! It is a plane sweep without windows or smoothing. Most points end up near a surface, which is enough for the first
 //! Gaussians: training moves or removes the others.
 
-use super::region::unproject;
 use super::texel::texel;
 use crate::error::Result;
 use crate::io::resample::{bounded_size, shrink_photo};
@@ -78,7 +77,7 @@ impl Sweep {
         };
         let others = (self.photos.len() - 2).min(1) + 1;
         let costs = (0..DEPTHS).filter_map(|step| {
-            let position = unproject(camera, pixel, depth(step));
+            let position = camera.unproject(pixel, depth(step));
             let point = Point { position, colour };
             self.difference(index, &point, others).map(|cost| (cost, point))
         });
