@@ -23,7 +23,7 @@ const ROW: f64 = 4.0 * 59.0;
 const ARRAYS: [u32; 6] = [12, 12, 16, 4, 12, 180];
 
 /// Lists of 3DGS against exact lists: squares of 3 sigma made a step 1.40 times as long, of which 0.77 grows with the
-/// pairs (`kernels` and `profile` in tools/bench/README.md).
+/// pairs (`kernels` and `profile` in tools/bench/speed.md).
 const SQUARES: f64 = 1.0 + 0.40 / 0.77;
 
 /// Bytes of a picture's state that both trainers keep for each pixel of a tile and 32 pairs of its list: colour and
