@@ -117,16 +117,17 @@ impl Rendered {
         Ok(self.depth.iter().zip(&self.alpha).map(mean).collect())
     }
 
-    /// Returns the picture with another one of the same width below it.
-    fn with_below(mut self, below: Self) -> Self {
-        self.height += below.height;
-        self.rgb.extend(below.rgb);
-        self.alpha.extend(below.alpha);
-        self.depth.extend(below.depth);
-        self.top_id.extend(below.top_id);
-        self.top_weight.extend(below.top_weight);
-        self.labels.extend(below.labels);
-        self
+    /// Returns the picture below another one of the same width, if there is one.
+    fn below(self, above: Option<Self>) -> Self {
+        let Some(mut whole) = above else { return self };
+        whole.height += self.height;
+        whole.rgb.extend(self.rgb);
+        whole.alpha.extend(self.alpha);
+        whole.depth.extend(self.depth);
+        whole.top_id.extend(self.top_id);
+        whole.top_weight.extend(self.top_weight);
+        whole.labels.extend(self.labels);
+        whole
     }
 
     fn check_part(&self, there: usize, part: &str) -> Result<()> {
@@ -141,11 +142,7 @@ pub fn render(engine: &mut Engine, camera: &Camera, options: &RenderOptions) -> 
     let mut whole: Option<Rendered> = None;
     for band in engine.bands(camera) {
         let uniforms = engine.band_uniforms(camera, band, options.near, options.background);
-        let drawn = render_band(engine, &uniforms, options)?;
-        whole = Some(match whole {
-            Some(above) => above.with_below(drawn),
-            None => drawn,
-        });
+        whole = Some(render_band(engine, &uniforms, options)?.below(whole));
     }
     whole.ok_or_else(|| Error::usage("camera", "has an image of 0 rows"))
 }

@@ -68,12 +68,7 @@ impl<'a> Painter<'a> {
         let mut whole: Option<Rendered> = None;
         while let Some(band) = open.pop() {
             match self.band(camera, band, options)? {
-                Drawn::Picture(drawn) => {
-                    whole = Some(match whole {
-                        Some(above) => above.with_below(drawn),
-                        None => drawn,
-                    });
-                }
+                Drawn::Picture(drawn) => whole = Some(drawn.below(whole)),
                 Drawn::TooLarge(error) => {
                     let rows = (band.rows / 2).next_multiple_of(self.shape.tile_height);
                     if rows >= band.rows {
