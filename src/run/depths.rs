@@ -18,9 +18,7 @@ pub(super) fn decided(
     (config, is_new): (&TrainConfig, bool),
     (folder, sightings): (Option<&Path>, &Sightings),
 ) -> Result<(TrainConfig, Vec<KnownDepths>)> {
-    // Points are where poses have them, which are about to move.
-    let is_open = is_new && (folder.is_some() || !config.refine_poses);
-    let weight = config.depth_weight.unwrap_or(if is_open { WEIGHT } else { 0.0 });
+    let weight = config.depth_weight.unwrap_or(if is_new { WEIGHT } else { 0.0 });
     let with = |weight: f64| TrainConfig { depth_weight: Some(weight), ..config.clone() };
     if weight == 0.0 {
         let unread = || Err(Error::usage("known_depths", "is only read with a `depth_weight` above 0"));

@@ -234,7 +234,7 @@ crate::options::options! {
             ///
             /// Where the photo shows a point, or --known-depths has a value, light from Gaussians at another depth costs by its
             /// relative error, at most 1; a mean over these pixels. It falls linearly until the first step with labels, and
-            /// moves opacities only. 0 with --refine-poses.
+            /// moves opacities only.
             #[serde(skip_serializing_if = "Option::is_none")]
             depth_weight <"WEIGHT">: Option<f64> = None, not_negative, fixed;
 
