@@ -104,6 +104,8 @@ fn refined_poses_are_a_reconstruction_of_their_own() {
     let Some(_turn) = device() else { return };
     let place = Place::new();
     succeeded(&place.trained("out", &["--refine-poses", "--iterations", "40"]));
+    let config = std::fs::read_to_string(place.path("out").join("config.toml")).expect("settings");
+    assert!(config.contains("depth_weight = 0.3"), "points and poses are of one reconstruction: {config}");
     let (scene, again) = (place.path("scene"), place.path("again"));
     copy(&scene, &again);
     std::fs::remove_dir_all(again.join("sparse")).expect("a reconstruction");
