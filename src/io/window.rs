@@ -168,7 +168,8 @@ pub fn ids_of_photo(views: &[(&Window, &LabelMap)]) -> Option<LabelMap> {
     if first.is_photo() {
         return Some(map.clone());
     }
-    let Camera { width, height, .. } = first.optics.camera;
+    let camera = &first.optics.camera;
+    let (width, height) = (camera.width, camera.height);
     let id = |direction: DVec3| {
         let found = views.iter().find_map(|(view, map)| Some((view, map, view.target(direction)?)));
         found.map_or(0, |(view, map, at)| {
@@ -176,11 +177,9 @@ pub fn ids_of_photo(views: &[(&Window, &LabelMap)]) -> Option<LabelMap> {
             map.at(scale(at.x, map.width, view.camera.width), scale(at.y, map.height, view.camera.height))
         })
     };
-    let pixel = |index: u32| {
-        let at = DVec2::new(f64::from(index % width) + 0.5, f64::from(index / width) + 0.5);
-        first.optics.direction(at).map_or(0, id)
-    };
-    Some(LabelMap { width, height, ids: (0..width * height).into_par_iter().map(pixel).collect() })
+    let pixel = |index: usize| first.optics.direction(camera.pixel_centre(index)).map_or(0, id);
+    let ids = (0..width as usize * height as usize).into_par_iter().map(pixel).collect();
+    Some(LabelMap { width, height, ids })
 }
 
 /// Returns the angles from the axis, radians, of the middles of the left, top, right and bottom edge.
