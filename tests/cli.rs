@@ -180,7 +180,7 @@ fn a_flag_has_one_heading() {
 }
 
 /// A value other than the default for each setting; none for a flag that needs none.
-const TYPED: [(&str, &str); 64] = [
+const TYPED: [(&str, &str); 65] = [
     ("--iterations", "7"),
     ("--max-resolution", "99"),
     ("--start-size", "0.7"),
@@ -188,6 +188,7 @@ const TYPED: [(&str, &str); 64] = [
     ("--strategy", "adc"),
     ("--budget", "9k"),
     ("--prune-share", "0.2"),
+    ("--contour-share", "0.1"),
     ("--free-space", "off"),
     ("--far-points", "30"),
     ("--exposure", "off"),

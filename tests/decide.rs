@@ -26,6 +26,14 @@ fn most_votes_win_and_the_background_may() {
     assert_eq!(decision.confidence, [0.625, 0.5625, 0.5, 0.5]);
 }
 
+/// What splits those across contours of masks.
+#[test]
+fn weight_on_other_labels_than_the_main_one() {
+    let rows: [&[u64]; 4] = [&[1, 5, 2], &[0, 0, 8], &[0, 0, 0], &[4, 0, 4]];
+    let ballot = ballot(&[0, 7, 9], &rows);
+    assert_eq!([0, 1, 2, 3].map(|row| ballot.spread(row)), [(8.0, 3.0), (8.0, 0.0), (0.0, 0.0), (8.0, 4.0)]);
+}
+
 #[test]
 fn unseen_gaussians_take_the_label_of_their_neighbours() {
     // The last two rows have no votes: one inside the object, one on the background's side.

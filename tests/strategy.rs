@@ -1,6 +1,6 @@
 //! Strategies other than the default: what they may change, and that a checkpoint records them.
 
-use crate::invariants::training::{config, small};
+use crate::invariants::training::{budgeted, config, small};
 use crate::support::device;
 use crate::support::device::Turn;
 use labelgs::Result;
@@ -11,8 +11,8 @@ use labelgs::internals::shaders::structs::StepUniforms;
 use labelgs::internals::train::strategy::{At, Population, Strategy};
 use labelgs::internals::train::{TrainState, Trainer, TrainerOptions};
 use labelgs::io::initial_gaussians;
-use labelgs::run::{LabelRule, StrategyKind, TrainConfig};
-use labelgs::scene::Gaussians;
+use labelgs::run::{Densified, LabelRule, StrategyKind, TrainConfig};
+use labelgs::scene::{Dataset, Gaussians};
 use serde_json::{Value, json};
 use std::sync::Arc;
 
@@ -202,4 +202,31 @@ fn gaussians_grow_in_the_box_only() {
         let none = grown(strategy, Some([50.0, 50.0, 50.0, 51.0, 51.0, 51.0]));
         assert!(none <= before, "{strategy:?}: {before} became {none}, and the box is empty");
     }
+}
+
+/// Soon after growth: with masks, Gaussians with little weight make room for parts of those across contours.
+#[test]
+fn gaussians_across_contours_split_in_place_of_others() {
+    let Some(turn) = device() else { return };
+    let exchanged = |contour_share: f64, scene: &Dataset| {
+        let config = TrainConfig { contour_share, ..budgeted() };
+        let mut trainer = Trainer::new(turn.gpu(), config, scene, &start(), SchedulerOptions::default()).expect("one");
+        let before = go_on(&mut trainer, 24).gaussians;
+        trainer.take_densified();
+        let after = go_on(&mut trainer, 25).gaussians;
+        (before, trainer.take_densified().expect("counts"), after)
+    };
+    let masked = small();
+    let (before, plain, left) = exchanged(0.0, &masked);
+    let pruned = (0.3 * f64::from(before)) as u32;
+    assert_eq!((plain, left), (Densified { cloned: 0, split: 0, pruned }, before - pruned));
+    let (same, split, as_many) = exchanged(0.05, &masked);
+    assert_eq!((same, as_many), (before, left), "the numbers of Gaussians do not change");
+    assert!(split.split > 0 && f64::from(split.split) <= 0.05 * 0.7 * f64::from(before), "{split:?} of {before}");
+    assert_eq!(split.pruned, pruned + split.split);
+    let more = exchanged(0.5, &masked).1;
+    assert!(more.split > split.split, "{more:?}, and {split:?}");
+    let mut bare = masked;
+    bare.train.iter_mut().for_each(|view| view.mask = None);
+    assert_eq!(exchanged(0.05, &bare).1.split, 0, "no masks, no contours");
 }

@@ -133,6 +133,11 @@ crate::options::options! {
             /// They cost time and show little. With 0 none are pruned.
             prune_share <"SHARE">: f64 = 0.3, up_to(0.9);
 
+            /// Share of the Gaussians that split then, given masks: those most across contours, for others with little weight.
+            ///
+            /// Pictures and objects get sharper outlines. With 0 none split. LabelGS has no such rule.
+            contour_share <"SHARE">: f64 = 0.05, up_to(0.5);
+
             /// Gaussians for each pixel of the largest photo, for --budget 0.
             ///
             /// More make finer detail and cost time.

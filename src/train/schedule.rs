@@ -20,8 +20,9 @@ const FULL_FROM_LATEST: f64 = 0.9;
 /// Weights of opacity and size in the loss, and the share of the run in which Gaussians relocate (3DGS-MCMC).
 const REGULAR: f64 = 0.01;
 const RELOCATE_UNTIL: f64 = 25.0 / 30.0;
-/// Share of the run after which Gaussians with little weight are pruned: soon after growth, so that the others adapt.
-const PRUNE_AT: f64 = 0.55;
+/// Share of the run after which Gaussians with little weight are pruned, and those across contours split: soon after
+/// growth, so that the others adapt.
+const EXCHANGE_AT: f64 = 0.55;
 
 /// Steps between two with object layers. Only these see the hidden parts of objects, and they cost up to twice as much.
 const LAYER_EVERY: u32 = 8;
@@ -247,9 +248,9 @@ impl TrainConfig {
         step >= self.densify_until() && step.is_multiple_of(2 * self.densify_interval())
     }
 
-    /// Returns true for the step that ends with pruning by weight.
-    pub fn prunes_least_at(&self, step: u32) -> bool {
-        step == self.share(PRUNE_AT) && self.prune_share > 0.0
+    /// Returns true for the step after which Gaussians with little weight make room for others.
+    pub fn exchanges_at(&self, step: u32) -> bool {
+        step == self.share(EXCHANGE_AT) && (self.prune_share > 0.0 || self.contour_share > 0.0)
     }
 
     /// Returns true for steps that end with a densification.

@@ -297,10 +297,11 @@ fn is_zero(number: &u32) -> bool {
 }
 
 /// Settings that a checkpoint lacks were not there when it was written: its training has the schedule of 3DGS, and
-/// object layers in every step with labels.
+/// object layers in every step with labels, and no splits at contours.
 fn complete(config: &mut serde_json::Value) -> serde_json::Result<()> {
-    if let Some(found) = config.as_object_mut().filter(|found| !found.contains_key("layer_every")) {
-        found.insert("layer_every".to_owned(), 1.into());
+    if let Some(found) = config.as_object_mut() {
+        found.entry("layer_every").or_insert(1.into());
+        found.entry("contour_share").or_insert(0.into());
     }
     if let Some(found) = config.as_object_mut().filter(|found| !found.contains_key("strategy")) {
         let serde_json::Value::Object(mut earlier) = serde_json::to_value(TrainConfig::adc())? else { return Ok(()) };

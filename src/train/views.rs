@@ -5,6 +5,7 @@ use super::parts::Part;
 use super::step_input::{self, Shown, StepInput, StepView, TrainView};
 use super::{TrainConfig, free_space, poses};
 use crate::error::{Error, Result};
+use crate::label::vote::ballot::Voter;
 use crate::scene::camera::side_at;
 use crate::scene::{Camera, Occluders};
 use crate::scheduler::plan::FRAMES_IN_FLIGHT;
@@ -85,6 +86,15 @@ impl Views {
     /// Returns the camera of a view for work between steps.
     pub(super) fn camera(&self, view: usize) -> &Camera {
         self.refined.get(view).unwrap_or(&self.whole[view].camera)
+    }
+
+    /// Returns the views with masks, for votes between steps.
+    pub(super) fn voters(&self) -> Vec<Voter<'_>> {
+        let voters = self.whole.iter().enumerate().filter_map(|(index, view)| {
+            let mask = view.mask.as_ref()?;
+            Some(Voter { camera: self.camera(index), mask, photo: Some(&view.photo), trust: None })
+        });
+        voters.collect()
     }
 
     /// Returns the parts of the views, each for a step.

@@ -2,7 +2,7 @@
 
 use super::{LabelRule, Trainer};
 use crate::error::Result;
-use crate::label::vote::ballot::{Sweep, Voter};
+use crate::label::vote::ballot::Sweep;
 use crate::label::vote::decide::{self, Decision};
 use crate::scene::Gaussians;
 
@@ -29,14 +29,10 @@ impl Trainer {
     }
 
     fn count_votes(&mut self) -> Result<Decision> {
-        let how = Sweep { near: self.config.near, border: self.config.mask_border, alone: false };
+        let how = Sweep::new(self.config.near, self.config.mask_border);
         let means = self.engine.means()?;
         self.refresh_poses()?;
-        let voters = self.views.iter().enumerate().filter_map(|(index, view)| {
-            let (camera, mask) = (self.views.camera(index), view.mask.as_ref()?);
-            Some(Voter { camera, mask, photo: Some(&view.photo), trust: None })
-        });
-        let voters: Vec<Voter> = voters.collect();
+        let voters = self.views.voters();
         let is_judged = self.config.vote_trust && self.labelled_once;
         let mut decision = decide::count(&mut self.engine, &voters, is_judged, &means, how, true)?;
         let trained = self.engine.trained_count() as usize;

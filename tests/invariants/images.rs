@@ -44,7 +44,7 @@ fn a_camera_that_is_too_large_is_refused() {
     refused(render(&mut engine, &tall, &RenderOptions::default()));
     let mask = LabelMap { width: 64, height: 49, ids: vec![1; 64 * 49] };
     let voter = Voter { camera: &tall, mask: &mask.into(), photo: None, trust: None };
-    refused(sweep(&mut engine, &[voter], Sweep { near: 0.2, border: 0, alone: false }));
+    refused(sweep(&mut engine, &[voter], Sweep::new(0.2, 0)));
     render(&mut engine, &camera, &RenderOptions::default()).expect("what fits is rendered as ever");
 }
 

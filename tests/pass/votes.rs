@@ -42,7 +42,7 @@ fn vote_sums_equal_the_mirror() {
     let voter =
         Voter { camera: &camera, mask: &mask.clone().into(), photo: Some(&photo.clone().into()), trust: Some(&trust) };
     // Three views that are the same: thrice the votes.
-    let how = Sweep { near: fixture.config.near, border: 0, alone: false };
+    let how = Sweep::new(fixture.config.near, 0);
     let ballot = sweep(&mut fixture.engine, &[voter, voter, voter], how).expect("votes");
     assert_eq!(ballot.labels, [0, 2, 3, 5, 7, 8, 11]);
     assert!(ballot.labels.len() > 2 * VOTE_COLUMNS as usize, "the sweep takes several rounds");
@@ -68,7 +68,7 @@ fn votes_alone_equal_the_mirror() {
     let (splats, size, count) = (fixture.splats(), fixture.size(), fixture.scene.gaussians.len());
     let (mask, camera) = (mask_of(&fixture.scene), fixture.scene.camera.clone());
     let voter = Voter { camera: &camera, mask: &mask.clone().into(), photo: None, trust: None };
-    let how = Sweep { near: fixture.config.near, border: 0, alone: true };
+    let how = Sweep { alone: true, ..Sweep::new(fixture.config.near, 0) };
     let ballot = sweep(&mut fixture.engine, &[voter], how).expect("votes");
     let column = |id: &u16| ballot.labels.iter().position(|label| label == id);
     let columns: Vec<Option<usize>> = mask.ids.iter().map(column).collect();
@@ -114,7 +114,7 @@ fn pixels_near_a_contour_do_not_vote() {
     mask.ids.iter_mut().enumerate().for_each(|(index, id)| *id = if index % width < 20 { 2 } else { 0 });
     let camera = fixture.scene.camera.clone();
     let voter = Voter { camera: &camera, mask: &mask.clone().into(), photo: None, trust: None };
-    let how = Sweep { near: fixture.config.near, border: 2, alone: false };
+    let how = Sweep::new(fixture.config.near, 2);
     let ballot = sweep(&mut fixture.engine, &[voter], how).expect("votes");
     let actual = ballot.weights();
     let column = |index: usize| match index % width {
@@ -137,7 +137,7 @@ fn one_sweep_of_many_labels_equals_many_sweeps() {
     let patch = |index: usize| (index % width / 3 + 15 * (index / width / 3)) as u16;
     mask.ids.iter_mut().enumerate().for_each(|(index, id)| *id = 7 * patch(index));
     let view = View { name: "0.png".into(), camera: scene.camera.clone(), photo: None, mask: None };
-    let how = Sweep { near: 0.2, border: 0, alone: false };
+    let how = Sweep::new(0.2, 0);
     let [few, many] = [3, 400].map(|columns| {
         let mut engine = vote_engine(turn.gpu(), &scene.gaussians, &[&view], columns).expect("the engine starts");
         sweep(&mut engine, &[Voter::of(&view, &mask.clone().into())], how).expect("votes")

@@ -66,7 +66,7 @@ pub fn removals(
     let mut paper = model.clone();
     label_by_lift(engine, &mut paper, train, (options.near, LIFT, 0))?;
     let voters: Vec<Voter> = views.iter().filter_map(|view| Some(Voter::of(view, view.mask.as_ref()?))).collect();
-    let ballot = sweep(engine, &voters, Sweep { near: options.near, border: 0, alone: false })?;
+    let ballot = sweep(engine, &voters, Sweep::new(options.near, 0))?;
     let ids: BTreeSet<u16> = views.iter().filter_map(|view| view.mask.as_ref()).flat_map(Pixels::objects).collect();
     let mut objects = BTreeMap::new();
     for id in ids {

@@ -35,7 +35,7 @@ pub fn agree(
     how: Agreement,
     tick: &mut dyn FnMut(),
 ) -> Result<(Vec<Option<LabelMap>>, Repairs)> {
-    let counting = Sweep { near: how.near, border: 0, alone: false };
+    let counting = Sweep::new(how.near, 0);
     let mut owners = Vec::with_capacity(views.len());
     for view in views {
         owners.push(match &view.mask {

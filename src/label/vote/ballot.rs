@@ -47,6 +47,13 @@ pub struct Sweep {
     pub alone: bool,
 }
 
+impl Sweep {
+    /// Takes votes by blending weight.
+    pub fn new(near: f32, border: u32) -> Self {
+        Self { near, border, alone: false }
+    }
+}
+
 /// The votes for one Gaussian: column and sum of blending weights, in the order of columns; a pixel of weight 1 is
 /// [`VOTE_ONE`]. Columns without votes are absent, because a Gaussian meets only a few of thousands of objects.
 pub(crate) type Row = [(u16, u64)];
@@ -84,6 +91,13 @@ impl Ballot {
     /// Returns the votes for Gaussian `row`.
     pub fn row(&self, row: usize) -> &Row {
         &self.cells[self.starts[row]..self.starts[row + 1]]
+    }
+
+    /// Returns the weight of Gaussian `row` on all labels, and on other ones than its main one, px.
+    pub fn spread(&self, row: usize) -> (f64, f64) {
+        let votes = || self.row(row).iter().map(|&(_, votes)| votes);
+        let all: u64 = votes().sum();
+        (weight(all), weight(all - votes().max().unwrap_or(0)))
     }
 
     /// Returns the blending weights of all columns, px, `[N, columns]`, in the layout of the mirrors.

@@ -12,7 +12,7 @@ use std::num::NonZero;
 
 /// Weight over all views up to which neighbours vote too, px. A Gaussian with less than one pixel in all views is
 /// inside or behind an object, and its own votes mean little.
-const EVIDENCE: f64 = 1.0;
+pub(crate) const EVIDENCE: f64 = 1.0;
 /// Number of these neighbours.
 const NEIGHBOURS: usize = 8;
 /// Least longest side at which masks are compared with the labels of the model, px. An agreement is a ratio over many

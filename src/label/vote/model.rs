@@ -66,7 +66,7 @@ pub fn label_by_votes(
     tick: &mut dyn FnMut(u32),
 ) -> Result<()> {
     let voters: Vec<Voter> = views.iter().filter_map(|view| Some(Voter::of(view, view.mask.as_ref()?))).collect();
-    let sweep = Sweep { near: how.near, border: how.mask_border, alone: false };
+    let sweep = Sweep::new(how.near, how.mask_border);
     for round in 0..how.rounds {
         let mut decision = count(engine, &voters, round > 0, &model.means, sweep, how.complete)?;
         if round + 1 == how.rounds {

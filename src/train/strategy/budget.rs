@@ -1,9 +1,10 @@
 //! Growth within a budget: the Gaussians with the largest gradients split along their longest axis (Improved-GS).
 //!
 //! The statistic adds absolute gradients of tiles, because those of a Gaussian's two sides cancel (AbsGS, by pixel). The
-//! budget rises linearly to its end. After it, densifications go on without growth, to prune. A pass of its own
-//! marks Gaussians that fog the cameras.
+//! budget rises linearly to its end. After it, densifications go on without growth, to prune; once, Gaussians that show little
+//! make room for parts of those across contours of masks. A pass of its own marks Gaussians that fog the cameras.
 
+use super::exchange::exchange;
 use super::{At, FirstCount, Population, Strategy, passes};
 use crate::error::Result;
 use crate::pass::Extension;
@@ -25,7 +26,7 @@ impl Strategy for BudgetStrategy {
 
     fn acts_after(&self, at: At) -> bool {
         !at.is_last()
-            && (at.config.densifies_at(at.step) || at.config.prunes_at(at.step) || at.config.prunes_least_at(at.step))
+            && (at.config.densifies_at(at.step) || at.config.prunes_at(at.step) || at.config.exchanges_at(at.step))
     }
 
     fn act(&mut self, at: At, population: &mut Population) -> Result<()> {
@@ -41,9 +42,10 @@ impl Strategy for BudgetStrategy {
             ..population.uniforms()
         };
         let mut what = population.densify(uniforms, config.budget_at(at.step, start))?;
-        if config.prunes_least_at(at.step) {
-            let least = population.prune_least(config.prune_share)?;
-            what.pruned += least.pruned;
+        if config.exchanges_at(at.step) {
+            let changed = exchange(population, config)?;
+            what.pruned += changed.pruned;
+            what.split += changed.split;
         }
         tracing::debug!("step {}: {what:?}, {} Gaussians", at.step, population.count());
         Ok(())

@@ -3,6 +3,7 @@
 
 pub(crate) mod adc;
 pub(crate) mod budget;
+pub(crate) mod exchange;
 pub(crate) mod frozen;
 pub(crate) mod mcmc;
 pub(crate) mod passes;

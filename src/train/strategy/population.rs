@@ -4,7 +4,6 @@ use crate::engine::{Engine, ListKey};
 use crate::error::{Error, Result};
 use crate::shaders::constants::STAT_NEAR;
 use crate::shaders::structs::{Counters, StepUniforms};
-use crate::train::strategy::weights::weights;
 use crate::train::views::Views;
 
 /// Counts of a densification.
@@ -53,6 +52,11 @@ impl<'a> Population<'a> {
         self.engine.gaussian_count()
     }
 
+    /// Returns the number of Gaussians that are trained, the first ones.
+    pub(crate) fn trained_count(&self) -> usize {
+        self.engine.trained_count() as usize
+    }
+
     /// Returns the counts of the densification since the step.
     pub fn densified(&self) -> Option<Densified> {
         self.densified
@@ -61,6 +65,11 @@ impl<'a> Population<'a> {
     /// Returns the uniforms of the step, with a seed of its own.
     pub fn uniforms(&self) -> StepUniforms {
         self.uniforms
+    }
+
+    /// Returns the training views.
+    pub(in crate::train) fn views(&self) -> &'a Views {
+        self.views
     }
 
     /// Returns the engine.
@@ -92,20 +101,21 @@ impl<'a> Population<'a> {
         Ok(done)
     }
 
-    /// Removes the `share` of the Gaussians with the least blending weight over all pixels of all views. Statistics start
-    /// over.
-    pub fn prune_least(&mut self, share: f64) -> Result<Densified> {
-        let weights = weights(
-            self.engine,
-            self.views.iter().enumerate().map(|(index, view)| (self.views.camera(index), view.near)),
-        )?;
-        let mut order: Vec<usize> = (0..weights.len()).collect();
-        order.sort_by(|&a, &b| weights[a].total_cmp(&weights[b]));
-        let mut marks = vec![[0.0; 2]; weights.len()];
-        let least = (share * weights.len() as f64) as usize;
-        order[..least].iter().for_each(|&row| marks[row][1] = STAT_NEAR);
+    /// Removes some of the trained Gaussians and splits some others. Statistics start over.
+    pub fn replace(&mut self, remove: &[usize], split: &[usize]) -> Result<Densified> {
+        let mut marks = vec![[0.0; 2]; self.trained_count()];
+        remove.iter().for_each(|&row| marks[row][1] = STAT_NEAR);
+        split.iter().for_each(|&row| marks[row] = [1.0; 2]);
         self.engine.set_densify_stats(&marks)?;
-        let uniforms = StepUniforms { densify_threshold: 0.0, prune_opacity: 0.0, prune_big: 0, ..self.uniforms };
+        let uniforms = StepUniforms {
+            densify_threshold: if split.is_empty() { 0.0 } else { 1.0 },
+            // All that grow split.
+            densify_scale: 0.0,
+            split_long: 1,
+            prune_opacity: 0.0,
+            prune_big: 0,
+            ..self.uniforms
+        };
         self.densify(uniforms, u64::MAX)
     }
 

@@ -252,7 +252,7 @@ impl Ran {
         let columns_of = mask.ids.clone();
         let mask = mask.into();
         let voter = Voter { camera: &camera, mask: &mask, photo: None, trust: None };
-        let how = Sweep { near: self.fixture.config.near, border: 0, alone };
+        let how = Sweep { alone, ..Sweep::new(self.fixture.config.near, 0) };
         let ballot = sweep(&mut self.fixture.engine, &[voter], how)?;
         let actual = ballot.weights();
         let column = |id: &u16| ballot.labels.iter().position(|label| label == id);
