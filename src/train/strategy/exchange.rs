@@ -47,12 +47,17 @@ fn weights_of_all(population: &mut Population) -> Result<Vec<f64>> {
     Ok(weights(population.engine(), cameras)?.into_iter().map(f64::from).collect())
 }
 
-/// Returns those of the first `count` Gaussians with the most weight on other labels than their main one, sorted, at least
-/// [`EVIDENCE`] each and at most `most` of them.
+/// Returns up to `most` of the first `count` Gaussians, sorted: those across contours, with at least [`EVIDENCE`] of weight on
+/// other labels than their main one. The share of that weight counts too: of a large Gaussian behind an object, a little
+/// shows beside the contour.
 fn across(ballot: &Ballot, count: usize, most: usize) -> Vec<usize> {
-    let astray: Vec<f64> = (0..count).map(|row| ballot.spread(row).1).collect();
-    let mut rows: Vec<usize> = (0..count).filter(|&row| astray[row] >= EVIDENCE).collect();
-    rows.sort_by(|&a, &b| astray[b].total_cmp(&astray[a]));
+    let score = |row: usize| {
+        let (all, astray) = ballot.spread(row);
+        if astray >= EVIDENCE { astray * astray / all } else { 0.0 }
+    };
+    let scores: Vec<f64> = (0..count).map(score).collect();
+    let mut rows: Vec<usize> = (0..count).filter(|&row| scores[row] > 0.0).collect();
+    rows.sort_by(|&a, &b| scores[b].total_cmp(&scores[a]));
     rows.truncate(most);
     rows.sort_unstable();
     rows
