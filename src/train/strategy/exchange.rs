@@ -47,9 +47,9 @@ fn weights_of_all(population: &mut Population) -> Result<Vec<f64>> {
     Ok(weights(population.engine(), cameras)?.into_iter().map(f64::from).collect())
 }
 
-/// Returns up to `most` of the first `count` Gaussians, sorted: those across contours, with at least [`EVIDENCE`] of weight on
-/// other labels than their main one. The share of that weight counts too: of a large Gaussian behind an object, a little
-/// shows beside the contour.
+/// Returns up to `most` of the first `count` Gaussians, sorted: those with the most weight on other labels than their main
+/// one, at least [`EVIDENCE`], times its share of all their weight. Without the share, large Gaussians behind an object would come
+/// first, of which a little shows beside its contour.
 fn across(ballot: &Ballot, count: usize, most: usize) -> Vec<usize> {
     let score = |row: usize| {
         let (all, astray) = ballot.spread(row);

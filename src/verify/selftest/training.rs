@@ -10,9 +10,9 @@ use crate::synth::{self, Preset, SynthOptions};
 use crate::train::{TrainConfig, Trainer, TrainerOptions};
 use std::sync::Arc;
 
-const STEPS: u32 = 60;
+const STEPS: u32 = 80;
 
-/// Checks that 60 steps with votes and two densifications give the same bits twice, and a smaller loss.
+/// Checks that 80 steps with votes and three densifications give the same bits twice, and a smaller loss.
 pub(super) fn twice(gpu: &Arc<Gpu>, kernels: KernelShape) -> Result<Verdict> {
     let (first, loss) = train(gpu, kernels)?;
     let (second, _) = train(gpu, kernels)?;
