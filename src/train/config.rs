@@ -133,9 +133,9 @@ crate::options::options! {
             /// They cost time and show little. With 0 none are pruned.
             prune_share <"SHARE">: f64 = 0.3, up_to(0.9);
 
-            /// Share of the Gaussians that split then, given masks: those most across contours, for others with little weight.
+            /// Share of the Gaussians left by --prune-share that split, given masks: those most across contours.
             ///
-            /// Pictures and objects get sharper outlines. With 0 none split. LabelGS has no such rule.
+            /// As many more are pruned. Outlines get sharper. With 0, or --prune-share 0, none split, as in LabelGS.
             contour_share <"SHARE">: f64 = 0.05, up_to(0.5);
 
             /// Gaussians for each pixel of the largest photo, for --budget 0.

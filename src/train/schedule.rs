@@ -250,7 +250,7 @@ impl TrainConfig {
 
     /// Returns true for the step after which Gaussians with little weight make room for others.
     pub fn exchanges_at(&self, step: u32) -> bool {
-        step == self.share(EXCHANGE_AT) && (self.prune_share > 0.0 || self.contour_share > 0.0)
+        step == self.share(EXCHANGE_AT) && self.prune_share > 0.0
     }
 
     /// Returns true for steps that end with a densification.

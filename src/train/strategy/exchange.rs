@@ -13,9 +13,6 @@ use crate::train::TrainConfig;
 /// start over.
 pub(super) fn exchange(population: &mut Population, config: &TrainConfig) -> Result<Densified> {
     let ballot = ballot(population, config)?;
-    if config.prune_share == 0.0 && ballot.is_none() {
-        return Ok(Densified::default());
-    }
     let weights = match &ballot {
         Some(ballot) if config.mask_border == 0 && population.views().iter().all(|view| view.mask.is_some()) => {
             (0..population.trained_count()).map(|row| ballot.spread(row).0).collect()
