@@ -59,3 +59,49 @@ fn across(ballot: &Ballot, count: usize, most: usize) -> Vec<usize> {
     rows.sort_unstable();
     rows
 }
+
+#[cfg(test)]
+mod tests {
+    use super::across;
+    use crate::label::vote::ballot::Ballot;
+    use crate::shaders::constants::VOTE_ONE;
+
+    /// Votes in px of (row, column) for six Gaussians and two labels.
+    fn ballot(votes: &[(u32, u16, u64)]) -> Ballot {
+        let votes = votes.iter().map(|&(row, column, weight)| (row, column, weight * VOTE_ONE as u64)).collect();
+        Ballot::new(vec![0, 4], 6, votes)
+    }
+
+    #[test]
+    fn those_with_the_largest_share_and_weight_astray_are_across() {
+        let votes = [
+            // 30 of 100 px astray: 9.
+            (0, 0, 70),
+            (0, 1, 30),
+            // All on one label.
+            (1, 1, 500),
+            // 40 of 2000 px astray, a little beside the contour of a large thing: 0.8.
+            (2, 0, 1960),
+            (2, 1, 40),
+            // Half of 20 px: 5.
+            (3, 0, 10),
+            (3, 1, 10),
+            // 36 of 90 px: 14.4.
+            (5, 0, 36),
+            (5, 1, 54),
+        ];
+        let ballot = ballot(&votes);
+        assert_eq!(across(&ballot, 6, 3), [0, 3, 5]);
+        assert_eq!(across(&ballot, 6, 2), [0, 5]);
+        assert_eq!(across(&ballot, 5, 2), [0, 3], "the last one is not trained");
+        assert_eq!(across(&ballot, 6, 9), [0, 2, 3, 5], "neither without votes nor with one label");
+    }
+
+    #[test]
+    fn a_trace_of_votes_is_no_evidence() {
+        let mut votes = vec![(0, 0, VOTE_ONE as u64), (0, 1, VOTE_ONE as u64 / 1000)];
+        assert!(across(&Ballot::new(vec![0, 4], 1, votes.clone()), 1, 1).is_empty());
+        votes[1].2 = VOTE_ONE as u64;
+        assert_eq!(across(&Ballot::new(vec![0, 4], 1, votes), 1, 1), [0]);
+    }
+}
