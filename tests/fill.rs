@@ -1,7 +1,7 @@
 //! Closing the place of a removed object: surfaces are continued where no view looked, and nowhere else.
 
 use glam::{DMat3, DVec3};
-use labelgs::edit::{Filled, Sight, fill};
+use labelgs::edit::{Filled, Light, Sight, fill};
 use labelgs::internals::shaders::constants::exact::SH_C0;
 use labelgs::scene::{Camera, Gaussians, LabelMap};
 
@@ -26,6 +26,20 @@ fn gradient(place: DVec3) -> [f64; 3] {
     [0.5 + 0.3 * place.x, 0.5 + 0.3 * place.y, 0.4]
 }
 
+/// Share of its colour that the plane has in the shadow of the dome.
+const SHADE: f64 = 0.45;
+
+fn sun() -> DVec3 {
+    DVec3::new(0.75, 0.35, 0.55).normalize()
+}
+
+/// True for places of the plane in the shadow of the dome.
+fn is_in_shadow(place: DVec3) -> bool {
+    let along = place.dot(sun());
+    let root = along * along - place.length_squared() + RADIUS * RADIUS;
+    root > 0.0 && root.sqrt() > along
+}
+
 /// Eight cameras in a ring that look at the origin.
 fn cameras() -> Vec<Camera> {
     let camera = |index: u32| {
@@ -40,8 +54,12 @@ fn cameras() -> Vec<Camera> {
     (0..8).map(camera).collect()
 }
 
-/// The view of a camera, by its rays.
 fn sight(camera: Camera, under: Under) -> Sight {
+    sight_of(camera, under, gradient)
+}
+
+/// The view of a camera, by its rays, with the colours of the plane.
+fn sight_of(camera: Camera, under: Under, plane: impl Fn(DVec3) -> [f64; 3]) -> Sight {
     let (mut rgb, mut depth, mut ids) = (Vec::new(), Vec::new(), Vec::new());
     let centre = camera.centre();
     for index in 0..SIDE * SIDE {
@@ -58,7 +76,7 @@ fn sight(camera: Camera, under: Under) -> Sight {
         let (t, label, colour) = match dome {
             Some(t) if !in_pit => (t, 1, [0.9, 0.1, 0.9]),
             _ if in_pit => (-(centre.z + 1.0) / ray.z, 0, [0.1; 3]),
-            _ if ray.z < 0.0 => (ground, 0, gradient(floor)),
+            _ if ray.z < 0.0 => (ground, 0, plane(floor)),
             _ => (0.0, 0, [0.0; 3]),
         };
         depth.push(t as f32);
@@ -72,8 +90,8 @@ fn sight(camera: Camera, under: Under) -> Sight {
 fn model(origin: DVec3) -> Gaussians {
     let mut means = Vec::new();
     let mut labels = Vec::new();
-    for (turn, height) in (0..40).flat_map(|turn| (0..10).map(move |height| (turn, height))) {
-        let (angle, up) = (f64::from(turn) * 0.157, f64::from(height) * 0.15);
+    for (turn, height) in (0..100).flat_map(|turn| (0..26).map(move |height| (turn, height))) {
+        let (angle, up) = (f64::from(turn) * 0.0629, f64::from(height) * 0.06);
         means.push(RADIUS * DVec3::new(angle.cos() * up.cos(), angle.sin() * up.cos(), up.sin()));
         labels.push(1);
     }
@@ -85,12 +103,13 @@ fn model(origin: DVec3) -> Gaussians {
         }
     }
     let count = means.len();
+    let scale = |&label: &u32| [if label == 1 { -4.2 } else { -3.5 }; 3];
     Gaussians {
         antialiased: false,
         origin,
         means: means.iter().map(|mean| mean.as_vec3().to_array()).collect(),
         quats: vec![[1.0, 0.0, 0.0, 0.0]; count],
-        scales: vec![[-3.5; 3]; count],
+        scales: labels.iter().map(scale).collect(),
         opacities: vec![3.0; count],
         sh0: vec![[0.0; 3]; count],
         sh_rest: vec![[0.1; 3]; count * 3],
@@ -104,7 +123,7 @@ fn filled(under: Under) -> (Filled, usize) {
     let sights: Vec<Sight> = cameras().into_iter().map(|camera| sight(camera, under)).collect();
     let model = model(DVec3::ZERO);
     let rest = labelgs::edit::remove(&model, &[1]).expect("rest").len();
-    (fill(&model, &[1], &sights).expect("filled"), rest)
+    (fill(&model, &[1], &sights, None).expect("filled"), rest)
 }
 
 /// Size of a pixel at the dome, the spacing of new Gaussians.
@@ -112,7 +131,7 @@ const CELL: f64 = FAR / FOCAL;
 
 #[test]
 fn a_missing_disc_is_closed_in_the_colours_around_it() {
-    let (Filled { model, added, hidden }, rest) = filled(Under::Hidden);
+    let (Filled { model, added, hidden, .. }, rest) = filled(Under::Hidden);
     assert_eq!(hidden, 0);
     model.check().expect("all columns have the same length");
     let new: Vec<usize> = (rest..model.len()).collect();
@@ -175,7 +194,7 @@ fn what_the_object_hid_goes_with_it() {
     }
     for (under, hidden) in [(Under::Hidden, 2), (Under::Pit, 1)] {
         let sights: Vec<Sight> = cameras().into_iter().map(|camera| sight(camera, under)).collect();
-        let filled = fill(&model, &[1], &sights).expect("filled");
+        let filled = fill(&model, &[1], &sights, None).expect("filled");
         assert_eq!(filled.hidden, hidden, "a pit shows what is above it");
         let kept = (0..filled.model.len()).filter(|&row| filled.model.scales[row] == [-5.0; 3]).count();
         assert_eq!(kept as u64, 2 - hidden);
@@ -191,10 +210,91 @@ fn without_surroundings_nothing_is_made_up() {
         let labels = &sight.labels.ids;
         sight.depth.iter_mut().zip(labels).filter(|(_, label)| **label == 0).for_each(|(depth, _)| *depth = 0.0);
     }
-    let filled = fill(&model(DVec3::ZERO), &[1], &sights).expect("filled");
+    let filled = fill(&model(DVec3::ZERO), &[1], &sights, None).expect("filled");
     assert!(filled.added.is_empty(), "{:?}", filled.added);
-    let error = fill(&model(DVec3::ZERO), &[1], &[]).expect_err("no view");
+    let error = fill(&model(DVec3::ZERO), &[1], &[], None).expect_err("no view");
     assert!(error.to_string().contains("needs at least one view"), "{error}");
-    let error = fill(&model(DVec3::ZERO), &[7], &sights).expect_err("no such label");
+    let error = fill(&model(DVec3::ZERO), &[7], &sights, None).expect_err("no such label");
     assert!(error.to_string().contains("no Gaussian has label 7"), "{error}");
+}
+
+/// Views of the dome in the sun.
+fn in_the_sun() -> Vec<Sight> {
+    let shaded = |place: DVec3| gradient(place).map(|value| if is_in_shadow(place) { SHADE * value } else { value });
+    cameras().into_iter().map(|camera| sight_of(camera, Under::Hidden, shaded)).collect()
+}
+
+#[test]
+fn shadows_tell_the_light() {
+    let light = Light::of(&model(DVec3::ZERO), &in_the_sun()).expect("searched").expect("a light");
+    let off = light.towards.angle_between(sun()).to_degrees();
+    // What throws the shadow is 1.5 cells wider than the dome, 3 degrees at its height.
+    assert!(off < 3.0, "{off} degrees from the sun");
+    for share in light.shade.to_array() {
+        // The plane is a gradient, which differs by a tenth between the two sides of an edge.
+        assert!((share - SHADE).abs() < 0.05, "{}", light.shade);
+    }
+    let flat: Vec<Sight> = cameras().into_iter().map(|camera| sight(camera, Under::Hidden)).collect();
+    assert_eq!(Light::of(&model(DVec3::ZERO), &flat).expect("searched"), None, "colours without a shadow tell none");
+}
+
+#[test]
+fn the_shadow_goes_with_its_object() {
+    let (sights, whole) = (in_the_sun(), model(DVec3::ZERO));
+    let light = Light { towards: sun(), shade: DVec3::splat(SHADE) };
+    let rest = labelgs::edit::remove(&whole, &[1]).expect("rest");
+    let dark = fill(&whole, &[1], &sights, None).expect("filled");
+    let filled = fill(&whole, &[1], &sights, Some(&light)).expect("filled");
+    assert_eq!(dark.lit, 0);
+    // The grid of new Gaussians begins elsewhere, as far as the shadow goes; its cells at the rim are others.
+    let count = filled.added[&0] as f64 / dark.added[&0] as f64;
+    assert!((0.98..1.02).contains(&count), "{count} of the new Gaussians: light changes colours alone");
+    let shown = |model: &Gaussians, row: usize| 0.5 + f64::from(model.sh0[row][0]) * SH_C0;
+    let (mut lit, mut kept) = (0, 0);
+    for row in 0..rest.len() {
+        let (before, after) = (shown(&rest, row), shown(&filled.model, row));
+        let world = rest.world(row);
+        let around = [0.0, 0.8, 1.6, 2.4, 3.1, 3.9, 4.7, 5.5]
+            .map(|turn| world + 0.15 * DVec3::new(f64::cos(turn), f64::sin(turn), 0.0));
+        // Off the soft edge: 0.06 of the way from the dome's top to its shadow, twice as long along the shadow.
+        if around.into_iter().all(is_in_shadow) {
+            assert!((after / before - 1.0 / SHADE).abs() < 1e-4, "{world}: {after} in the shadow");
+            let band = filled.model.sh_rest[row * 3][1] / rest.sh_rest[row * 3][1];
+            assert!((f64::from(band) - 1.0 / SHADE).abs() < 1e-4, "{band}");
+            lit += 1;
+        } else if !around.into_iter().any(is_in_shadow) {
+            assert_eq!(after, before, "in the light");
+            kept += 1;
+        }
+    }
+    assert!(lit > 10 && kept > 500, "{lit} in the shadow, {kept} in the light");
+    assert!(filled.lit >= lit, "{} are lit", filled.lit);
+    // The disc under the dome has the colours of the plane in the light.
+    let off = |row: usize| (shown(&filled.model, row) - gradient(filled.model.world(row))[0]).abs();
+    let mean = (rest.len()..filled.model.len()).map(off).sum::<f64>() / (filled.model.len() - rest.len()) as f64;
+    let dark = (rest.len()..dark.model.len())
+        .map(|row| (shown(&dark.model, row) - gradient(dark.model.world(row))[0]).abs())
+        .sum::<f64>()
+        / (dark.model.len() - rest.len()) as f64;
+    assert!(mean < 0.01 && dark > 0.05, "off by {mean}, and by {dark} with the shadow");
+}
+
+/// What another object shades stays dark: a roof over the dome's shadow keeps the light away with or without the dome.
+#[test]
+fn the_shadow_of_the_rest_stays() {
+    let mut whole = model(DVec3::ZERO);
+    for (x, y) in (-15..=15).flat_map(|x| (-15..=15).map(move |y| (x, y))) {
+        let place = DVec3::new(f64::from(x), f64::from(y), 0.0) * 0.06 + 1.0 * sun() / sun().z;
+        whole.means.push(place.as_vec3().to_array());
+        whole.quats.push([1.0, 0.0, 0.0, 0.0]);
+        whole.scales.push([-3.0; 3]);
+        whole.opacities.push(3.0);
+        whole.sh0.push([0.0; 3]);
+        whole.sh_rest.extend([[0.0; 3]; 3]);
+        whole.labels.as_mut().expect("labels").push(2);
+        whole.label_confidence.as_mut().expect("shares").push(0.9);
+    }
+    let light = Light { towards: sun(), shade: DVec3::splat(SHADE) };
+    let filled = fill(&whole, &[1], &in_the_sun(), Some(&light)).expect("filled");
+    assert_eq!(filled.lit, 0);
 }

@@ -39,14 +39,15 @@ fn removals_are_scored_and_filled() {
     }
     let objects = (1..=3).map(|id| number(&format!("/objects/{id}/filled/psnr"))).sum::<f64>() / 3.0;
     assert!((number("/mean/filled/psnr") - objects).abs() < 1e-9);
-    // Against the world without the object. Its shadow is not in that truth, and the fill does not try to draw one.
+    // Against the world without the object. Its shadow is not in that truth, and the fill does not draw one.
     assert!(number("/mean/filled/psnr") > number("/mean/votes/psnr") + 1.0, "filling gains: {scores}");
     assert!(number("/mean/hole_filled") < 0.6 * number("/mean/hole"), "holes close: {scores}");
 
     let (plain, closed) = (folder.path().join("plain.ply"), folder.path().join("closed.ply"));
     succeeds(&["remove", &run, "--labels", "1", "-o", text(&plain)]);
-    let args = ["remove", &run, "--labels", "1", "--fill", "--scene", &scene, "-o", text(&closed)];
+    let args = ["remove", &run, "--labels", "1", "--fill", "--keep-shadow", "--scene", &scene, "-o", text(&closed)];
     let result = succeeds(&args);
+    assert_eq!(result["lit"], 0);
     let (plain, filled) = (read_model(&plain).expect("PLY").gaussians, read_model(&closed).expect("PLY").gaussians);
     let added: u64 = result["added"].as_object().expect("labels").values().filter_map(Value::as_u64).sum();
     assert!(added > 0, "the block leaves a hole: {result}");
@@ -61,6 +62,8 @@ fn removals_are_scored_and_filled() {
     let first = std::fs::read(&closed).expect("PLY");
     succeeds(&args);
     assert!(std::fs::read(&closed).expect("PLY") == first, "two runs differ");
+    let lit = succeeds(&args.iter().filter(|&&word| word != "--keep-shadow").copied().collect::<Vec<_>>());
+    assert!(lit["lit"].is_u64() && lit["hidden"] == result["hidden"], "{lit}");
 
     // A scene without truth has the weight that is left and no more; a truth of another size is refused.
     std::fs::remove_dir_all(Path::new(&scene).join("shadowed")).expect("removed");
@@ -80,6 +83,8 @@ fn what_is_missing_is_named() {
     let out = folder.path().join("out.ply");
     let fill = ["remove", &run, "--labels", "1", "--fill", "-o", text(&out)];
     assert!(refused(&fill, 2).contains("--scene <SCENE>"));
+    let keep = ["remove", &run, "--labels", "1", "--keep-shadow", "-o", text(&out)];
+    assert!(refused(&keep, 2).contains("--fill"));
     let all = ["remove", &run, "--labels", "0-3", "--fill", "--scene", &scene, "-o", text(&out)];
     assert!(refused(&all, 2).contains("no Gaussian would be left"));
     assert!(!out.exists());

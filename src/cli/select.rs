@@ -9,7 +9,7 @@ use super::scene::{near_plane, open_gpu, open_scene};
 use super::values::{distance, share};
 use crate::edit::change::without_specks;
 use crate::edit::components::Grouping;
-use crate::edit::fill::{Filled, fill};
+use crate::edit::fill::{Filled, Light, fill};
 use crate::edit::rename::keep;
 use crate::edit::select::remove;
 use crate::engine::Engine;
@@ -56,8 +56,14 @@ pub struct RemoveArgs {
     pub select: SelectArgs,
     /// Close what no view ever saw, under and behind the objects: the surfaces around them are continued. Needs --scene,
     /// whose training views tell what was seen.
+    ///
+    /// If shadows of labelled objects tell where one strong light is, the shadow of the removed ones goes from planes
+    /// around them too.
     #[arg(long, requires = "scene")]
     pub fill: bool,
+    /// With --fill, leave the shadow of the removed objects.
+    #[arg(long, requires = "fill")]
+    pub keep_shadow: bool,
 }
 
 /// `labelgs extract`.
@@ -120,10 +126,11 @@ pub(crate) fn run_remove(args: &RemoveArgs, context: &Context) -> Result<()> {
     let (part, more) = match select.choice.scene.as_deref().filter(|_| args.fill) {
         None => (remove(&model, &listed(&labels))?, json!({})),
         Some(scene) => {
-            let filled = filled(select, scene, &model, &listed(&labels), context)?;
+            let filled = filled(args, scene, &model, &listed(&labels), context)?;
             let added: u64 = filled.added.values().sum();
-            tracing::info!("filled: {added} new Gaussians; {} that nobody saw are gone", filled.hidden);
-            (filled.model, json!({ "added": filled.added, "hidden": filled.hidden }))
+            let (hidden, lit) = (filled.hidden, filled.lit);
+            tracing::info!("filled: {added} new Gaussians; {hidden} that nobody saw are gone; {lit} lost a shadow");
+            (filled.model, json!({ "added": filled.added, "hidden": hidden, "lit": lit }))
         }
     };
     let edited = Edited {
@@ -136,7 +143,8 @@ pub(crate) fn run_remove(args: &RemoveArgs, context: &Context) -> Result<()> {
 }
 
 /// Removes labels and closes their place by what the training views of a scene show.
-fn filled(args: &SelectArgs, scene: &Path, model: &Gaussians, labels: &[u32], context: &Context) -> Result<Filled> {
+fn filled(args: &RemoveArgs, scene: &Path, model: &Gaussians, labels: &[u32], context: &Context) -> Result<Filled> {
+    let RemoveArgs { select: args, keep_shadow, .. } = args;
     let (max_resolution, read) = (args.choice.max_resolution, args.choice.read);
     let reading = SceneArgs { max_resolution, read, ..SceneArgs::default() }.of_run(&args.model)?;
     let dataset = open_scene(scene, &reading, None, [0.0; 3], false)?;
@@ -149,7 +157,18 @@ fn filled(args: &SelectArgs, scene: &Path, model: &Gaussians, labels: &[u32], co
     let near = near_plane(&args.model, args.choice.prompts.near)?;
     let sizes = views.iter().map(|view| (view.camera.width, view.camera.height));
     let mut engine = Engine::of_model(open_gpu(context)?, model, sizes)?;
-    fill(model, labels, &sights(&mut engine, &views, near)?)
+    let sights = sights(&mut engine, &views, near)?;
+    let light = if *keep_shadow { None } else { Light::of(model, &sights)? };
+    if let Some(Light { towards, shade }) = light {
+        tracing::info!(
+            "a light at ({:.2}, {:.2}, {:.2}); {:.2} of the colours in its shadow",
+            towards.x,
+            towards.y,
+            towards.z,
+            shade.element_sum() / 3.0
+        );
+    }
+    fill(model, labels, &sights, light.as_ref())
 }
 
 fn listed(labels: &BTreeSet<u32>) -> Vec<u32> {

@@ -22,7 +22,7 @@ pub use catalogue::{Catalogue, Pick};
 pub use change::{Specks, Split, recolour, relabel, split_components, without_specks};
 pub use clean::{Cleaned, Cleaning, clean};
 pub use components::Grouping;
-pub use fill::{Filled, SIGHT_SIDE, Sight, fill};
+pub use fill::{Filled, Light, SIGHT_SIDE, Sight, fill};
 pub use merge::{Merged, merge};
 pub use prompt::{Place, Prompt, choose};
 pub use select::{LabelSummary, MIN_LABEL_CONFIDENCE, extract, remove, summarise};

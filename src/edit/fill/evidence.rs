@@ -5,10 +5,10 @@ use super::plane::Plane;
 use glam::DVec3;
 
 /// Tolerance of depths, in cells.
-const DEPTH: f64 = 2.5;
+pub(super) const DEPTH: f64 = 2.5;
 /// Distance from the surface in question, and depth below any, that still counts as that surface, in tolerances: where
 /// little is seen, as in shadows and corners, surfaces of a model are uneven.
-const OWN: f64 = 3.0;
+pub(super) const OWN: f64 = 3.0;
 /// Least sine of the angle between a view and the plane: a flatter one cannot tell its places apart.
 const STEEP: f64 = 0.15;
 /// Views that have to show the removed object before a hole, and the share of them that may show something else: at

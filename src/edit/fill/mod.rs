@@ -5,12 +5,17 @@
 //! looks through it, and a *hole* if it lies at or behind the removed object in the views that tell (a tenth of them may
 //! err, as they do at contours). Planes are fitted
 //! to what the views show around the object. New flat Gaussians stand on these planes, only in holes between seen
-//! ones, so that they cover nothing that a view has seen. Their colours continue those around them.
+//! ones, so that they cover nothing that a view has seen. Their colours continue those around them. Where the scene has
+//! one strong [`Light`], the shadow of the object on these planes goes with it.
 
 mod evidence;
 mod hidden;
+mod light;
 mod plane;
+mod shadow;
 mod sheet;
+
+pub use light::Light;
 
 use super::select::{MIN_LABEL_CONFIDENCE, remove};
 use crate::scene::{Camera, Gaussians, LabelMap};
@@ -19,6 +24,7 @@ use crate::{Error, Result};
 use glam::{DMat3, DQuat, DVec3};
 use kiddo::{ImmutableKdTree, SquaredEuclidean};
 use plane::{Plane, planes};
+use shadow::{Disc, Shadows};
 use sheet::Sheet;
 use std::collections::BTreeMap;
 
@@ -27,6 +33,8 @@ pub const SIGHT_SIDE: u32 = 640;
 /// Width of the ring around the object from which surfaces are continued, as a share of the object's diagonal, and its
 /// least width, in cells.
 const RING: (f64, f64) = (0.25, 8.0);
+/// Radius of the largest Gaussian that throws a shadow, as a share of the object's diagonal.
+const LARGE: f64 = 0.25;
 /// Most points that one surface is looked for among.
 const POINTS_MAX: usize = 20_000;
 /// Standard deviation of a new Gaussian in and across its surface, in cells: neighbours overlap without gaps.
@@ -56,11 +64,14 @@ pub struct Filled {
     pub hidden: u64,
     /// Number of new Gaussians by the label of the surface that they continue.
     pub added: BTreeMap<u32, u64>,
+    /// Number of Gaussians of the rest that were in the shadow of the objects and are in the light now.
+    pub lit: u64,
 }
 
 /// Removes the Gaussians of `labels`, as [`remove`] does, and continues the surfaces around them where `sights`, views of
-/// the whole `model`, show nothing but the removed. Errors as in [`remove`], or without a sight.
-pub fn fill(model: &Gaussians, labels: &[u32], sights: &[Sight]) -> Result<Filled> {
+/// the whole `model`, show nothing but the removed. With a `light`, these surfaces lose the shadow of the removed. Errors as
+/// in [`remove`], or without a sight.
+pub fn fill(model: &Gaussians, labels: &[u32], sights: &[Sight], light: Option<&Light>) -> Result<Filled> {
     let rest = remove(model, labels)?;
     if sights.is_empty() {
         return Err(Error::usage("fill", "needs at least one view of the scene"));
@@ -73,12 +84,21 @@ pub fn fill(model: &Gaussians, labels: &[u32], sights: &[Sight]) -> Result<Fille
         is_hidden.iter_mut().zip(found).for_each(|(all, one)| *all |= one);
     }
     let hidden = is_hidden.iter().filter(|&&hidden| hidden).count() as u64;
-    let mut filled = Filled { model: rest.filtered(|row| !is_hidden[row]), hidden, added: BTreeMap::new() };
+    let mut filled = Filled { model: rest.filtered(|row| !is_hidden[row]), hidden, added: BTreeMap::new(), lit: 0 };
+    let mut is_lit = vec![false; filled.model.len()];
+    let removed: Vec<Disc> = places.iter().flat_map(|place| &place.discs).copied().collect();
+    let kept: Vec<Disc> = shadow::discs(&filled.model);
     // Each label is an object of its own: two far from each other have no common surroundings.
     for place in &places {
         for (label, points) in place.ring(labels, sights) {
             for plane in planes(&points, place.cell) {
-                let sheet = Sheet::new((plane, label), place, labels, sights);
+                let plane = plane.facing(place.middle());
+                let mut sheet = Sheet::new((plane, label), place, (light, place.cell), labels, sights);
+                if let Some(light) = light {
+                    let shadows = Shadows::of(&sheet, light, &removed, &shadow::above(&kept, place, &plane));
+                    shadows.lift(&sheet, &mut filled.model, &mut is_lit);
+                    sheet.shadows = Some(shadows);
+                }
                 let added = sheet.holes();
                 if !added.is_empty() {
                     *filled.added.entry(label).or_default() += added.len() as u64;
@@ -87,12 +107,15 @@ pub fn fill(model: &Gaussians, labels: &[u32], sights: &[Sight]) -> Result<Fille
             }
         }
     }
+    filled.lit = is_lit.into_iter().filter(|&lit| lit).count() as u64;
     Ok(filled)
 }
 
 /// Where a removed object was.
 struct Place {
     tree: ImmutableKdTree<f64, 3>,
+    /// Its Gaussians.
+    discs: Vec<Disc>,
     /// Corners of the object.
     low: DVec3,
     high: DVec3,
@@ -112,8 +135,8 @@ impl Place {
         };
         let all: Vec<usize> = (0..model.len()).filter(of_label).filter(|&row| model.is_finite(row)).collect();
         let sure: Vec<usize> = all.iter().copied().filter(is_sure).collect();
-        let points: Vec<DVec3> =
-            if sure.is_empty() { &all } else { &sure }.iter().map(|&row| model.world(row)).collect();
+        let rows = if sure.is_empty() { all } else { sure };
+        let points: Vec<DVec3> = rows.iter().map(|&row| model.world(row)).collect();
         if points.is_empty() {
             return Ok(None);
         }
@@ -136,7 +159,19 @@ impl Place {
         let tree = ImmutableKdTree::new_from_slice(&places)
             .map_err(|error| Error::Bug(format!("the k-d tree of the Gaussians failed: {error:?}")))?;
         let ring = (RING.0 * (high - low).length()).max(RING.1 * cell);
-        Ok(Some(Self { tree, low, high, cell, ring }))
+        let place = Self { tree, discs: Vec::new(), low, high, cell, ring };
+        let discs = rows.iter().map(|&row| Disc::of(model, row)).filter(|disc| place.has(disc, ring)).collect();
+        Ok(Some(Self { discs, ..place }))
+    }
+
+    /// Returns true for what is within a margin of the object and not larger than a part of it: haze and sky throw no
+    /// shadow.
+    fn has(&self, disc: &Disc, margin: f64) -> bool {
+        self.is_near(disc.middle, margin) && disc.radius < LARGE * (self.high - self.low).length()
+    }
+
+    fn middle(&self) -> DVec3 {
+        0.5 * (self.low + self.high)
     }
 
     /// Returns the points that views show around the object, by label.

@@ -38,6 +38,11 @@ impl Plane {
         Self { origin, normal, u, v: normal.cross(u) }
     }
 
+    /// Returns the same plane with a normal to the side of a point.
+    pub(super) fn facing(self, point: DVec3) -> Self {
+        if self.height(point) >= 0.0 { self } else { Self::new(self.origin, -self.normal) }
+    }
+
     /// Returns the distance of a point, with a sign.
     pub(super) fn height(&self, point: DVec3) -> f64 {
         (point - self.origin).dot(self.normal)

@@ -2,7 +2,8 @@
 
 use super::evidence::{Evidence, Shown, State};
 use super::plane::Plane;
-use super::{Place, Sight};
+use super::shadow::Shadows;
+use super::{Light, Place, Sight};
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -17,22 +18,35 @@ const RELAXATION: f64 = 1.9;
 /// The cells of a plane around a removed object, row-major.
 pub(super) struct Sheet {
     pub plane: Plane,
-    cell: f64,
+    pub cell: f64,
     /// Position of cell (0, 0) along the axes of the plane, world units.
     corner: [f64; 2],
-    width: usize,
-    height: usize,
+    pub width: usize,
+    pub height: usize,
+    /// Label of the surface.
+    pub label: u32,
     states: Vec<State>,
     /// Mean colour over the views that show it; `None` where none does.
-    colours: Vec<Option<DVec3>>,
+    pub colours: Vec<Option<DVec3>>,
+    /// Shadows on it, if the colours of holes go by them.
+    pub shadows: Option<Shadows>,
 }
 
 impl Sheet {
-    /// Looks at the cells of a plane, the surface of a label, in every view.
-    pub(super) fn new((plane, label): (Plane, u32), place: &Place, removed: &[u32], sights: &[Sight]) -> Self {
-        let corners = (0..8).map(|bits: u32| {
+    /// Looks at the cells of a plane, the surface of a label, in every view: at those around the object, and those in its
+    /// shadow.
+    pub(super) fn new(
+        (plane, label): (Plane, u32),
+        place: &Place,
+        (light, cell): (Option<&Light>, f64),
+        removed: &[u32],
+        sights: &[Sight],
+    ) -> Self {
+        let corners = (0..8).flat_map(|bits: u32| {
             let side = |axis: usize| if bits >> axis & 1 == 0 { place.low[axis] } else { place.high[axis] };
-            DVec3::new(side(0), side(1), side(2)) - plane.origin
+            let corner = DVec3::new(side(0), side(1), side(2));
+            let shadow = light.and_then(|light| light.shadow(&plane, corner)).unwrap_or(corner);
+            [corner - plane.origin, shadow - plane.origin]
         });
         let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
         for from in corners {
@@ -41,10 +55,10 @@ impl Sheet {
                 high[axis] = high[axis].max(at + place.ring);
             }
         }
-        let cells = |axis: usize| (((high[axis] - low[axis]) / place.cell).ceil() as usize).clamp(1, SIDE_MAX);
+        let cells = |axis: usize| (((high[axis] - low[axis]) / cell).ceil() as usize).clamp(1, SIDE_MAX);
         let (width, height) = (cells(0), cells(1));
-        let mut sheet =
-            Self { plane, cell: place.cell, corner: low, width, height, states: Vec::new(), colours: Vec::new() };
+        let (states, colours) = (Vec::new(), Vec::new());
+        let mut sheet = Self { plane, cell, corner: low, width, height, label, states, colours, shadows: None };
         let look = |index: usize| sheet.look(sheet.place(index), label, removed, sights);
         (sheet.states, sheet.colours) = (0..width * height).into_par_iter().map(look).unzip();
         sheet
@@ -55,6 +69,20 @@ impl Sheet {
         let (x, y) = ((index % self.width) as f64 + 0.5, (index / self.width) as f64 + 0.5);
         let plane = &self.plane;
         plane.origin + (self.corner[0] + x * self.cell) * plane.u + (self.corner[1] + y * self.cell) * plane.v
+    }
+
+    /// Returns the cell coordinates of a world position.
+    pub(super) fn at(&self, world: DVec3) -> [f64; 2] {
+        let from = world - self.plane.origin;
+        let [x, y] = [self.plane.u, self.plane.v].map(|axis| from.dot(axis));
+        [(x - self.corner[0]) / self.cell, (y - self.corner[1]) / self.cell]
+    }
+
+    /// Returns the index of the cell of a world position; `None` outside.
+    pub(super) fn index(&self, world: DVec3) -> Option<usize> {
+        let [x, y] = self.at(world);
+        let is_inside = x >= 0.0 && y >= 0.0 && x < self.width as f64 && y < self.height as f64;
+        is_inside.then(|| y as usize * self.width + x as usize)
     }
 
     /// Returns the state of a place on the surface of a label, and its colour.
@@ -123,19 +151,32 @@ impl Sheet {
         directions.iter().filter(|direction| meets(direction)).count() >= BOUNDED_MIN
     }
 
+    /// Returns the colours without any shadow, but for those at edges of shadows if there are others.
+    fn lit(&self) -> Vec<Option<DVec3>> {
+        let Some(shadows) = &self.shadows else { return self.colours.clone() };
+        let lit: Vec<Option<DVec3>> = (0..self.colours.len())
+            .map(|index| self.colours[index].map(|colour| colour / shadows.before(index)))
+            .collect();
+        let sure: Vec<Option<DVec3>> =
+            lit.iter().enumerate().map(|(index, colour)| colour.filter(|_| !shadows.is_unsure(index))).collect();
+        if sure.iter().any(Option::is_some) { sure } else { lit }
+    }
+
     /// Returns a colour for each cell: where none is known, the smoothest continuation (each the mean of its four
-    /// neighbours, free cells left out). `None` without any known colour.
+    /// neighbours, free cells left out). `None` without any known colour. What has a shadow continues as if it had none, and
+    /// has that of the rest in the end.
     fn continued(&self) -> Option<Vec<DVec3>> {
-        let known: Vec<DVec3> = self.colours.iter().flatten().copied().collect();
+        let lit = self.lit();
+        let known: Vec<DVec3> = lit.iter().flatten().copied().collect();
         if known.is_empty() {
             return None;
         }
         let mean = known.iter().sum::<DVec3>() / known.len() as f64;
-        let mut colours: Vec<DVec3> = self.colours.iter().map(|colour| colour.unwrap_or(mean)).collect();
+        let mut colours: Vec<DVec3> = lit.iter().map(|colour| colour.unwrap_or(mean)).collect();
         let (width, height) = (self.width, self.height);
         let is_there = |index: usize| self.states[index] != State::Free;
         let unknown: Vec<(usize, Vec<usize>)> = (0..colours.len())
-            .filter(|&index| self.colours[index].is_none() && is_there(index))
+            .filter(|&index| lit[index].is_none() && is_there(index))
             .map(|index| {
                 let (x, y) = (index % width, index / width);
                 let around = [
@@ -155,6 +196,8 @@ impl Sheet {
                 colours[*index] = old + RELAXATION * (goal - old);
             }
         }
-        Some(colours.into_iter().map(|colour| colour.clamp(DVec3::ZERO, DVec3::ONE)).collect())
+        let after = |index: usize| self.shadows.as_ref().map_or(DVec3::ONE, |shadows| shadows.after(index));
+        let shaded = |(index, colour): (usize, DVec3)| (colour * after(index)).clamp(DVec3::ZERO, DVec3::ONE);
+        Some(colours.into_iter().enumerate().map(shaded).collect())
     }
 }

@@ -5,7 +5,7 @@ mod score;
 pub use score::{HoleScores, ObjectRemoval, RemovalScores, RuleScores};
 
 use super::compared::{Compared, Watch};
-use crate::edit::fill::{Filled, SIGHT_SIDE, Sight, fill};
+use crate::edit::fill::{Filled, Light, SIGHT_SIDE, Sight, fill};
 use crate::engine::Engine;
 use crate::error::Result;
 use crate::label::vote::ballot::{Ballot, Sweep, Voter, sweep, weight};
@@ -63,6 +63,7 @@ pub fn removals(
     engine.upload_model(model)?;
     let own = model.labels.clone().unwrap_or_else(|| vec![0; model.len()]);
     let sights = sights(engine, train, options.near)?;
+    let light = Light::of(model, &sights)?;
     let mut paper = model.clone();
     label_by_lift(engine, &mut paper, train, (options.near, LIFT, 0))?;
     let voters: Vec<Voter> = views.iter().filter_map(|view| Some(Voter::of(view, view.mask.as_ref()?))).collect();
@@ -91,7 +92,11 @@ pub fn removals(
         };
         let without = rest(&own);
         draw(&without, &mut plain, "removed", watch)?;
-        let closed = if own.contains(&id) && !without.is_empty() { Some(fill(model, &[id], &sights)?) } else { None };
+        let closed = if own.contains(&id) && !without.is_empty() {
+            Some(fill(model, &[id], &sights, light.as_ref())?)
+        } else {
+            None
+        };
         let added: u64 = closed.as_ref().map_or(0, |closed| closed.added.values().sum());
         draw(closed.as_ref().map_or(&without, |closed| &closed.model), &mut filled, "filled", watch)?;
         let labels = paper.labels.as_deref().unwrap_or(&own);
@@ -103,7 +108,8 @@ pub fn removals(
         let scores = ObjectRemoval {
             votes: plain.scores(votes_left(&own)),
             main: main.scores(votes_left(labels)),
-            filled: filled.scores(None),
+            // Its places in the light would count as left over.
+            filled: RuleScores { leftover: None, ..filled.scores(None) },
             mean_colour: plain.mean_colour(),
             holes: holes.scores(),
             hole: plain.hole(),

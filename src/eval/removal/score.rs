@@ -53,7 +53,7 @@ pub struct ObjectRemoval {
     /// By labels of the paper's rule for the same Gaussians: each has the label of the last view in which it is the main
     /// Gaussian of a pixel.
     pub main: RuleScores,
-    /// By the labels of the model, and filled.
+    /// By the labels of the model, and filled, without [`leftover`](RuleScores::leftover).
     pub filled: RuleScores,
     /// By the labels of the model, with holes painted in the mean colour of a ring around the object in the picture.
     pub mean_colour: RuleScores,

@@ -1,0 +1,192 @@
+//! The light of a scene, by the shadows of its objects: if it comes from a direction, colours change where the shadows that
+//! the objects would throw from there end.
+
+use super::plane::{Plane, planes};
+use super::shadow::{Disc, hard, soft, thrown};
+use super::sheet::Sheet;
+use super::{Place, Sight};
+use crate::Result;
+use crate::scene::Gaussians;
+use glam::DVec3;
+use rayon::prelude::*;
+use std::collections::BTreeMap;
+
+/// Least sine of the angle between the light and a plane with shadows.
+pub(super) const FLAT: f64 = 0.25;
+/// Most objects that are asked, those with most Gaussians first, and Gaussians of each.
+const OBJECTS: usize = 32;
+const DISCS: usize = 4000;
+/// Most cells along an object and as much again on either side of it.
+const SIDE: f64 = 320.0;
+/// Directions that are tried, and rounds of 5 x 5 finer ones around the best, with half the step each.
+const DIRECTIONS: usize = 800;
+const ROUNDS: i32 = 4;
+const STEP: f64 = 0.06;
+/// Score from which a light is one, and brightest shadow that it may throw. Where light comes from all sides, the best
+/// direction has a score of chance, and what is inside of its shadows is about as bright as what is outside. Windows of
+/// a room have scores up to 9.5.
+const SURE: f64 = 10.0;
+const BRIGHTEST: f64 = 0.7;
+/// Distance of two colours from the edge of a shadow, in cells.
+const APART: isize = 3;
+/// Largest change of the logarithm of a colour that counts, and what is added to the colour before.
+const MOST: f64 = 1.0;
+const DARK: f64 = 0.02;
+/// Depth behind its edge at which a shadow is as dark as it gets, in cells, and its widest soft edge.
+const DEEP: isize = 4;
+const WIDE: isize = 16;
+/// Darkest shadow.
+const DARKEST: f64 = 0.1;
+
+/// A light far away in one direction, such as the sun.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Light {
+    /// Unit vector to it.
+    pub towards: DVec3,
+    /// Colour in its shadow, as a share of that beside it: r, g, b.
+    pub shade: DVec3,
+}
+
+impl Light {
+    /// Finds the light of a labelled model by `sights`, views of the whole model; `None` where no shadows tell it. Errors if an
+    /// object cannot be searched.
+    pub fn of(model: &Gaussians, sights: &[Sight]) -> Result<Option<Self>> {
+        let stands = stands(model, sights)?;
+        let best = |tried: Vec<DVec3>| {
+            let scored: Vec<(f64, DVec3)> = tried.into_par_iter().map(|at| (score(&stands, at), at)).collect();
+            scored.into_iter().max_by(|a, b| a.0.total_cmp(&b.0)).unwrap_or_default()
+        };
+        let mut found = best(directions());
+        for round in 0..ROUNDS {
+            let (towards, step) = (found.1, STEP * 0.5_f64.powi(round));
+            let (u, v) = towards.any_orthonormal_pair();
+            let near = |k: i32| (towards + step * (f64::from(k % 5 - 2) * u + f64::from(k / 5 - 2) * v)).normalize();
+            found = best((0..25).map(near).collect());
+        }
+        let (score, towards) = found;
+        let light = (score >= SURE).then(|| Self { towards, shade: shade(&stands, towards) });
+        Ok(light.filter(|light| light.shade.element_sum() <= 3.0 * BRIGHTEST))
+    }
+
+    /// Returns where the shadow of a point falls on a plane.
+    pub(super) fn shadow(&self, plane: &Plane, point: DVec3) -> Option<DVec3> {
+        thrown(plane, self.towards, point)
+    }
+}
+
+/// An object and a plane beside it.
+struct Stand {
+    sheet: Sheet,
+    discs: Vec<Disc>,
+}
+
+/// Returns the objects of the model with the planes around them.
+fn stands(model: &Gaussians, sights: &[Sight]) -> Result<Vec<Stand>> {
+    let mut counts: BTreeMap<u32, usize> = BTreeMap::new();
+    (0..model.len()).for_each(|row| *counts.entry(model.label(row)).or_default() += 1);
+    counts.remove(&0);
+    let mut labels: Vec<(u32, usize)> = counts.into_iter().collect();
+    labels.sort_by_key(|&(label, count)| (std::cmp::Reverse(count), label));
+    let mut stands = Vec::new();
+    for (label, _) in labels.into_iter().take(OBJECTS) {
+        let Some(place) = Place::new(model, label, sights)? else { continue };
+        let step = place.discs.len().div_ceil(DISCS).max(1);
+        let discs: Vec<Disc> = place.discs.iter().copied().step_by(step).collect();
+        let size = (place.high - place.low).length();
+        let wide = Place { ring: size, ..place };
+        let cell = wide.cell.max(3.0 * size / SIDE);
+        for (surface, points) in wide.ring(&[label], sights) {
+            if let Some(plane) = planes(&points, wide.cell).first() {
+                let plane = plane.facing(wide.middle());
+                let sheet = Sheet::new((plane, surface), &wide, (None, cell), &[label], sights);
+                stands.push(Stand { sheet, discs: discs.clone() });
+            }
+        }
+    }
+    Ok(stands)
+}
+
+/// Returns directions all over the sphere, about equally far from each other: a spiral by the golden angle.
+fn directions() -> Vec<DVec3> {
+    let golden = std::f64::consts::PI * (3.0 - 5.0_f64.sqrt());
+    let direction = |k: usize| {
+        let z = 1.0 - (2 * k + 1) as f64 / DIRECTIONS as f64;
+        let (sin, cos) = (golden * k as f64).sin_cos();
+        let side = (1.0 - z * z).sqrt();
+        DVec3::new(side * cos, side * sin, z)
+    };
+    (0..DIRECTIONS).map(direction).collect()
+}
+
+/// Returns how far the mean change of colours is from 0 where shadows would end, in standard errors.
+fn score(stands: &[Stand], towards: DVec3) -> f64 {
+    let grey = |colour: DVec3| (colour.element_sum() / 3.0 + DARK).ln();
+    let (mut sum, mut squares) = (0.0, 1.0);
+    for Stand { sheet, discs } in stands.iter().filter(|stand| is_steep(stand, towards)) {
+        let mask = hard(sheet, towards, discs);
+        for edge in edges(sheet, &mask) {
+            let (Some(inside), Some(outside)) = (edge.cell(-APART), edge.cell(APART)) else { continue };
+            let (Some(dark), Some(bright)) = (sheet.colours[inside], sheet.colours[outside]) else { continue };
+            if mask[inside] && !mask[outside] {
+                let change = (grey(bright) - grey(dark)).clamp(-MOST, MOST);
+                sum += change;
+                squares += change * change;
+            }
+        }
+    }
+    sum / squares.sqrt()
+}
+
+/// Returns how dark shadows are: the median over the edges of what is deep inside against what is wholly outside.
+fn shade(stands: &[Stand], towards: DVec3) -> DVec3 {
+    let mut shares: [Vec<f64>; 3] = Default::default();
+    for (own, Stand { sheet, discs }) in stands.iter().enumerate().filter(|(_, stand)| is_steep(stand, towards)) {
+        let others = stands.iter().enumerate().filter(|(index, _)| *index != own).flat_map(|(_, of)| &of.discs);
+        let others = soft(sheet, towards, &others.copied().collect::<Vec<_>>());
+        let shadow = soft(sheet, towards, discs);
+        let whole: Vec<bool> = shadow.iter().map(|&share| share == 1.0).collect();
+        for edge in edges(sheet, &whole) {
+            // Thin things throw no whole shadow in a model.
+            let is_deep = (1..2 * DEEP).all(|k| edge.cell(-k).is_some_and(|at| whole[at]));
+            let dark = edge.cell(-DEEP).filter(|_| is_deep).and_then(|at| sheet.colours[at]);
+            // The second cell beyond the soft edge.
+            let out = (1..WIDE).map_while(|k| edge.cell(k)).skip_while(|&at| shadow[at] > 0.0).nth(1);
+            let bright = out.filter(|&at| others[at] == 0.0).and_then(|at| sheet.colours[at]);
+            if let (Some(dark), Some(bright)) = (dark, bright) {
+                (0..3).for_each(|channel| shares[channel].push(dark[channel] / bright[channel].max(DARK)));
+            }
+        }
+    }
+    let median = |mut shares: Vec<f64>| {
+        shares.sort_unstable_by(f64::total_cmp);
+        shares.get(shares.len() / 2).map_or(1.0, |share| share.clamp(DARKEST, 1.0))
+    };
+    DVec3::from_array(shares.map(median))
+}
+
+fn is_steep(stand: &Stand, towards: DVec3) -> bool {
+    towards.dot(stand.sheet.plane.normal) > FLAT
+}
+
+/// A cell of a mask beside one out of it, and the way there.
+struct Edge<'a> {
+    sheet: &'a Sheet,
+    at: [usize; 2],
+    out: [isize; 2],
+}
+
+impl Edge<'_> {
+    /// Returns the index of the cell that is so many further out.
+    fn cell(&self, further: isize) -> Option<usize> {
+        let [x, y] = [0, 1].map(|axis| self.at[axis].checked_add_signed(further * self.out[axis]));
+        let (x, y) = (x.filter(|&x| x < self.sheet.width)?, y.filter(|&y| y < self.sheet.height)?);
+        Some(y * self.sheet.width + x)
+    }
+}
+
+/// Returns all edges of a mask.
+fn edges<'a>(sheet: &'a Sheet, mask: &'a [bool]) -> impl Iterator<Item = Edge<'a>> {
+    let inside = (0..mask.len()).filter(|&index| mask[index]).map(|index| [index % sheet.width, index / sheet.width]);
+    let all = inside.flat_map(move |at| [[1, 0], [0, 1], [-1, 0], [0, -1]].map(|out| Edge { sheet, at, out }));
+    all.filter(|edge| edge.cell(1).is_some_and(|beside| !mask[beside]))
+}
