@@ -160,13 +160,8 @@ fn filled(args: &RemoveArgs, scene: &Path, model: &Gaussians, labels: &[u32], co
     let sights = sights(&mut engine, &views, near)?;
     let light = if *keep_shadow { None } else { Light::of(model, &sights)? };
     if let Some(Light { towards, shade }) = light {
-        tracing::info!(
-            "a light at ({:.2}, {:.2}, {:.2}); {:.2} of the colours in its shadow",
-            towards.x,
-            towards.y,
-            towards.z,
-            shade.element_sum() / 3.0
-        );
+        let share = shade.element_sum() / 3.0;
+        tracing::info!("light from {towards:.2}; shadows have {share:.2} of the colours beside them");
     }
     fill(model, labels, &sights, light.as_ref())
 }

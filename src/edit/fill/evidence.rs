@@ -5,15 +5,20 @@ use super::plane::Plane;
 use glam::DVec3;
 
 /// Tolerance of depths, in cells.
-pub(super) const DEPTH: f64 = 2.5;
+const DEPTH: f64 = 2.5;
 /// Distance from the surface in question, and depth below any, that still counts as that surface, in tolerances: where
 /// little is seen, as in shadows and corners, surfaces of a model are uneven.
-pub(super) const OWN: f64 = 3.0;
+const OWN: f64 = 3.0;
 /// Least sine of the angle between a view and the plane: a flatter one cannot tell its places apart.
 const STEEP: f64 = 0.15;
 /// Views that have to show the removed object before a hole, and the share of them that may show something else: at
 /// contours a pixel is decided by chance.
 const HIDING: (u32, f64) = (2, 0.1);
+
+/// Returns the distance up to which something is on a surface, world units.
+pub(super) fn on_surface(cell: f64) -> f64 {
+    OWN * DEPTH * cell
+}
 
 /// What a view shows at a place.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -77,13 +82,13 @@ impl Evidence {
         let slack = DEPTH * cell;
         let label = u32::from(sight.labels.ids[index]);
         let is_removed = removed.contains(&label);
-        let (shown, count) = if is_removed && (behind >= -slack || off <= OWN * slack) {
+        let (shown, count) = if is_removed && (behind >= -slack || off <= on_surface(cell)) {
             (Shown::Removed, Some(&mut self.removed))
-        } else if !is_removed && off <= if label == own { OWN * slack } else { slack } {
+        } else if !is_removed && off <= if label == own { on_surface(cell) } else { slack } {
             (Shown::Surface, Some(&mut self.surface))
         } else if behind < -slack {
             (Shown::Through, Some(&mut self.through))
-        } else if !is_removed && behind <= OWN * slack {
+        } else if !is_removed && behind <= on_surface(cell) {
             (Shown::Hidden, Some(&mut self.surface))
         } else {
             (Shown::Hidden, None)
@@ -107,7 +112,7 @@ impl Evidence {
             self.through += 1;
         } else if removed.contains(&u32::from(sight.labels.ids[index])) {
             self.removed += 1;
-        } else if behind <= OWN * slack {
+        } else if behind <= on_surface(cell) {
             self.surface += 1;
         }
     }

@@ -1,18 +1,17 @@
 //! The light of a scene, by the shadows of its objects: if it comes from a direction, colours change where the shadows that
 //! the objects would throw from there end.
 
-use super::plane::{Plane, planes};
-use super::shadow::{Disc, hard, soft, thrown};
-use super::sheet::Sheet;
+use super::plane::planes;
+use super::shadow::{Disc, FLAT, hard, soft};
+use super::sheet::{BESIDE, Sheet};
 use super::{Place, Sight};
 use crate::Result;
-use crate::scene::Gaussians;
+use crate::edit::select::summarise;
+use crate::scene::{Gaussians, UNLABELLED};
 use glam::DVec3;
 use rayon::prelude::*;
-use std::collections::BTreeMap;
+use std::cmp::Reverse;
 
-/// Least sine of the angle between the light and a plane with shadows.
-pub(super) const FLAT: f64 = 0.25;
 /// Most objects that are asked, those with most Gaussians first, and Gaussians of each.
 const OBJECTS: usize = 32;
 const DISCS: usize = 4000;
@@ -64,13 +63,10 @@ impl Light {
             found = best((0..25).map(near).collect());
         }
         let (score, towards) = found;
-        let light = (score >= SURE).then(|| Self { towards, shade: shade(&stands, towards) });
-        Ok(light.filter(|light| light.shade.element_sum() <= 3.0 * BRIGHTEST))
-    }
-
-    /// Returns where the shadow of a point falls on a plane.
-    pub(super) fn shadow(&self, plane: &Plane, point: DVec3) -> Option<DVec3> {
-        thrown(plane, self.towards, point)
+        let shade = shade(&stands, towards);
+        let mean = shade.element_sum() / 3.0;
+        tracing::debug!("light: score {score:.1} from {towards:.3}, shadows have {mean:.2} of the colours beside them");
+        Ok((score >= SURE && mean <= BRIGHTEST).then_some(Self { towards, shade }))
     }
 }
 
@@ -82,17 +78,15 @@ struct Stand {
 
 /// Returns the objects of the model with the planes around them.
 fn stands(model: &Gaussians, sights: &[Sight]) -> Result<Vec<Stand>> {
-    let mut counts: BTreeMap<u32, usize> = BTreeMap::new();
-    (0..model.len()).for_each(|row| *counts.entry(model.label(row)).or_default() += 1);
-    counts.remove(&0);
-    let mut labels: Vec<(u32, usize)> = counts.into_iter().collect();
-    labels.sort_by_key(|&(label, count)| (std::cmp::Reverse(count), label));
+    let mut objects = summarise(model);
+    objects.retain(|object| object.label != UNLABELLED);
+    objects.sort_by_key(|object| Reverse(object.count));
     let mut stands = Vec::new();
-    for (label, _) in labels.into_iter().take(OBJECTS) {
+    for label in objects.iter().take(OBJECTS).map(|object| object.label) {
         let Some(place) = Place::new(model, label, sights)? else { continue };
         let step = place.discs.len().div_ceil(DISCS).max(1);
         let discs: Vec<Disc> = place.discs.iter().copied().step_by(step).collect();
-        let size = (place.high - place.low).length();
+        let size = place.size();
         let wide = Place { ring: size, ..place };
         let cell = wide.cell.max(3.0 * size / SIDE);
         for (surface, points) in wide.ring(&[label], sights) {
@@ -140,10 +134,9 @@ fn score(stands: &[Stand], towards: DVec3) -> f64 {
 /// Returns how dark shadows are: the median over the edges of what is deep inside against what is wholly outside.
 fn shade(stands: &[Stand], towards: DVec3) -> DVec3 {
     let mut shares: [Vec<f64>; 3] = Default::default();
-    for (own, Stand { sheet, discs }) in stands.iter().enumerate().filter(|(_, stand)| is_steep(stand, towards)) {
-        let others = stands.iter().enumerate().filter(|(index, _)| *index != own).flat_map(|(_, of)| &of.discs);
-        let others = soft(sheet, towards, &others.copied().collect::<Vec<_>>());
-        let shadow = soft(sheet, towards, discs);
+    let all: Vec<Disc> = stands.iter().flat_map(|stand| &stand.discs).copied().collect();
+    for Stand { sheet, discs } in stands.iter().filter(|stand| is_steep(stand, towards)) {
+        let (shadow, any) = (soft(sheet, towards, discs), soft(sheet, towards, &all));
         let whole: Vec<bool> = shadow.iter().map(|&share| share == 1.0).collect();
         for edge in edges(sheet, &whole) {
             // Thin things throw no whole shadow in a model.
@@ -151,7 +144,7 @@ fn shade(stands: &[Stand], towards: DVec3) -> DVec3 {
             let dark = edge.cell(-DEEP).filter(|_| is_deep).and_then(|at| sheet.colours[at]);
             // The second cell beyond the soft edge.
             let out = (1..WIDE).map_while(|k| edge.cell(k)).skip_while(|&at| shadow[at] > 0.0).nth(1);
-            let bright = out.filter(|&at| others[at] == 0.0).and_then(|at| sheet.colours[at]);
+            let bright = out.filter(|&at| any[at] == 0.0).and_then(|at| sheet.colours[at]);
             if let (Some(dark), Some(bright)) = (dark, bright) {
                 (0..3).for_each(|channel| shares[channel].push(dark[channel] / bright[channel].max(DARK)));
             }
@@ -171,22 +164,20 @@ fn is_steep(stand: &Stand, towards: DVec3) -> bool {
 /// A cell of a mask beside one out of it, and the way there.
 struct Edge<'a> {
     sheet: &'a Sheet,
-    at: [usize; 2],
+    index: usize,
     out: [isize; 2],
 }
 
 impl Edge<'_> {
     /// Returns the index of the cell that is so many further out.
     fn cell(&self, further: isize) -> Option<usize> {
-        let [x, y] = [0, 1].map(|axis| self.at[axis].checked_add_signed(further * self.out[axis]));
-        let (x, y) = (x.filter(|&x| x < self.sheet.width)?, y.filter(|&y| y < self.sheet.height)?);
-        Some(y * self.sheet.width + x)
+        self.sheet.step(self.index, self.out.map(|step| further * step))
     }
 }
 
 /// Returns all edges of a mask.
 fn edges<'a>(sheet: &'a Sheet, mask: &'a [bool]) -> impl Iterator<Item = Edge<'a>> {
-    let inside = (0..mask.len()).filter(|&index| mask[index]).map(|index| [index % sheet.width, index / sheet.width]);
-    let all = inside.flat_map(move |at| [[1, 0], [0, 1], [-1, 0], [0, -1]].map(|out| Edge { sheet, at, out }));
+    let inside = (0..mask.len()).filter(|&index| mask[index]);
+    let all = inside.flat_map(move |index| BESIDE.map(|out| Edge { sheet, index, out }));
     all.filter(|edge| edge.cell(1).is_some_and(|beside| !mask[beside]))
 }

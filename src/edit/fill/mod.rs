@@ -86,20 +86,25 @@ pub fn fill(model: &Gaussians, labels: &[u32], sights: &[Sight], light: Option<&
     let hidden = is_hidden.iter().filter(|&&hidden| hidden).count() as u64;
     let mut filled = Filled { model: rest.filtered(|row| !is_hidden[row]), hidden, added: BTreeMap::new(), lit: 0 };
     let mut is_lit = vec![false; filled.model.len()];
-    let removed: Vec<Disc> = places.iter().flat_map(|place| &place.discs).copied().collect();
-    let kept: Vec<Disc> = shadow::discs(&filled.model);
+    // What stands in the light: the removed, and the rest.
+    let blockers = light.map(|light| {
+        let removed: Vec<Disc> = places.iter().flat_map(|place| &place.discs).copied().collect();
+        (light, removed, shadow::discs(&filled.model))
+    });
     // Each label is an object of its own: two far from each other have no common surroundings.
     for place in &places {
         for (label, points) in place.ring(labels, sights) {
             for plane in planes(&points, place.cell) {
                 let plane = plane.facing(place.middle());
-                let mut sheet = Sheet::new((plane, label), place, (light, place.cell), labels, sights);
-                if let Some(light) = light {
-                    let shadows = Shadows::of(&sheet, light, &removed, &shadow::above(&kept, place, &plane));
+                let towards = light.map(|light| light.towards);
+                let sheet = Sheet::new((plane, label), place, (towards, place.cell), labels, sights);
+                let shadows = blockers.as_ref().map(|(light, removed, kept)| {
+                    Shadows::of(&sheet, light, removed, &shadow::above(kept, place, &plane))
+                });
+                if let Some(shadows) = &shadows {
                     shadows.lift(&sheet, &mut filled.model, &mut is_lit);
-                    sheet.shadows = Some(shadows);
                 }
-                let added = sheet.holes();
+                let added = sheet.holes(shadows.as_ref());
                 if !added.is_empty() {
                     *filled.added.entry(label).or_default() += added.len() as u64;
                     append(&mut filled.model, (&sheet.plane, place.cell), &added, label);
@@ -158,16 +163,21 @@ impl Place {
         let places: Vec<[f64; 3]> = points.iter().map(DVec3::to_array).collect();
         let tree = ImmutableKdTree::new_from_slice(&places)
             .map_err(|error| Error::Bug(format!("the k-d tree of the Gaussians failed: {error:?}")))?;
-        let ring = (RING.0 * (high - low).length()).max(RING.1 * cell);
-        let place = Self { tree, discs: Vec::new(), low, high, cell, ring };
-        let discs = rows.iter().map(|&row| Disc::of(model, row)).filter(|disc| place.has(disc, ring)).collect();
-        Ok(Some(Self { discs, ..place }))
+        let mut place = Self { tree, discs: Vec::new(), low, high, cell, ring: 0.0 };
+        place.ring = (RING.0 * place.size()).max(RING.1 * cell);
+        place.discs = rows.iter().map(|&row| Disc::of(model, row)).filter(|disc| place.has(disc, place.ring)).collect();
+        Ok(Some(place))
     }
 
     /// Returns true for what is within a margin of the object and not larger than a part of it: haze and sky throw no
     /// shadow.
     fn has(&self, disc: &Disc, margin: f64) -> bool {
-        self.is_near(disc.middle, margin) && disc.radius < LARGE * (self.high - self.low).length()
+        self.is_near(disc.middle, margin) && disc.radius < LARGE * self.size()
+    }
+
+    /// Returns the diagonal of the object.
+    fn size(&self) -> f64 {
+        (self.high - self.low).length()
     }
 
     fn middle(&self) -> DVec3 {
@@ -221,6 +231,11 @@ impl Sight {
     }
 }
 
+/// Returns the coefficient of degree 0 that shows a value, 0 to 1.
+fn constant(value: f64) -> f32 {
+    ((value - 0.5) / SH_C0) as f32
+}
+
 /// Adds flat Gaussians on a plane.
 fn append(model: &mut Gaussians, (plane, cell): (&Plane, f64), places: &[(DVec3, DVec3)], label: u32) {
     let turn = DQuat::from_mat3(&DMat3::from_cols(plane.u, plane.v, plane.normal)).normalize();
@@ -232,7 +247,7 @@ fn append(model: &mut Gaussians, (plane, cell): (&Plane, f64), places: &[(DVec3,
         model.quats.push(quat);
         model.scales.push(scale);
         model.opacities.push(OPACITY);
-        model.sh0.push(colour.to_array().map(|value| ((value - 0.5) / SH_C0) as f32));
+        model.sh0.push(colour.to_array().map(constant));
         model.sh_rest.extend(std::iter::repeat_n([0.0; 3], rest));
         if let Some(labels) = &mut model.labels {
             labels.push(label);

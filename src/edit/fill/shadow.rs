@@ -1,15 +1,17 @@
 //! Shadows on a plane: those of the removed objects, which go, and those of the rest, which stay.
 
-use super::Place;
-use super::evidence::{DEPTH, OWN};
+use super::evidence::on_surface;
 use super::light::Light;
 use super::plane::Plane;
-use super::sheet::Sheet;
+use super::sheet::{BESIDE, Sheet};
+use super::{Place, constant};
 use crate::scene::Gaussians;
 use crate::shaders::constants::exact::SH_C0;
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
+/// Least sine of the angle between the light and a plane with shadows.
+pub(super) const FLAT: f64 = 0.25;
 /// Least radius of what throws a shadow, in cells: Gaussians of one surface leave no light between them.
 const LEAST: f64 = 1.5;
 /// Spots of the light: one in the middle and a ring around it, and its radius as the tangent of the angle. A shadow has soft
@@ -45,8 +47,8 @@ pub(super) fn discs(model: &Gaussians) -> Vec<Disc> {
 
 /// Returns those that stand above a plane around an object.
 pub(super) fn above(discs: &[Disc], place: &Place, plane: &Plane) -> Vec<Disc> {
-    let around = AROUND * (place.high - place.low).length();
-    let stands = |disc: &Disc| plane.height(disc.middle) > OWN * DEPTH * place.cell && place.has(disc, around);
+    let around = AROUND * place.size();
+    let stands = |disc: &Disc| plane.height(disc.middle) > on_surface(place.cell) && place.has(disc, around);
     discs.iter().copied().filter(stands).collect()
 }
 
@@ -91,17 +93,16 @@ impl Shadows {
         let rest = model.rest_per_gaussian();
         for row in 0..is_lit.len() {
             let world = model.world(row);
-            let is_on = model.label(row) == sheet.label && sheet.plane.height(world).abs() <= OWN * DEPTH * sheet.cell;
+            let is_on = model.label(row) == sheet.label && sheet.plane.height(world).abs() <= on_surface(sheet.cell);
             let Some(index) = sheet.index(world).filter(|_| is_on && !is_lit[row]) else { continue };
             let gain = self.after(index) / self.before(index);
             if gain.max_element() < 1.0 + 1e-3 {
                 continue;
             }
             is_lit[row] = true;
-            let gain = gain.to_array();
-            for (channel, gain) in gain.into_iter().enumerate() {
+            for (channel, gain) in gain.to_array().into_iter().enumerate() {
                 let shown = 0.5 + SH_C0 * f64::from(model.sh0[row][channel]);
-                model.sh0[row][channel] = ((gain * shown - 0.5) / SH_C0) as f32;
+                model.sh0[row][channel] = constant(gain * shown);
                 for band in &mut model.sh_rest[row * rest..][..rest] {
                     band[channel] *= gain as f32;
                 }
@@ -134,15 +135,9 @@ pub(super) fn soft(sheet: &Sheet, towards: DVec3, discs: &[Disc]) -> Vec<f64> {
 /// Returns the cells in the shadow of discs above the sheet, without those at its edge: discs are drawn too large for it.
 pub(super) fn hard(sheet: &Sheet, towards: DVec3, discs: &[Disc]) -> Vec<bool> {
     let wide = drawn(sheet, towards, discs);
-    let (width, height) = (sheet.width, sheet.height);
-    let is_inside = |index: usize| {
-        let (x, y) = (index % width, index / width);
-        wide[index]
-            && (x == 0 || wide[index - 1])
-            && (x + 1 == width || wide[index + 1])
-            && (y == 0 || wide[index - width])
-            && (y + 1 == height || wide[index + width])
-    };
+    let is_wide = |at: usize| wide[at];
+    let is_inside =
+        |index: usize| wide[index] && BESIDE.iter().all(|&step| sheet.step(index, step).is_none_or(is_wide));
     (0..wide.len()).map(is_inside).collect()
 }
 
@@ -166,5 +161,5 @@ fn drawn(sheet: &Sheet, towards: DVec3, discs: &[Disc]) -> Vec<bool> {
 /// Returns where the shadow of a point falls on a plane; `None` where it is below, or the light almost in the plane.
 pub(super) fn thrown(plane: &Plane, towards: DVec3, point: DVec3) -> Option<DVec3> {
     let (height, slope) = (plane.height(point), towards.dot(plane.normal));
-    (height > 0.0 && slope > super::light::FLAT).then(|| point - towards * (height / slope))
+    (height > 0.0 && slope > FLAT).then(|| point - towards * (height / slope))
 }

@@ -2,8 +2,8 @@
 
 use super::evidence::{Evidence, Shown, State};
 use super::plane::Plane;
-use super::shadow::Shadows;
-use super::{Light, Place, Sight};
+use super::shadow::{Shadows, thrown};
+use super::{Place, Sight};
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -28,24 +28,27 @@ pub(super) struct Sheet {
     states: Vec<State>,
     /// Mean colour over the views that show it; `None` where none does.
     pub colours: Vec<Option<DVec3>>,
-    /// Shadows on it, if the colours of holes go by them.
-    pub shadows: Option<Shadows>,
 }
+
+/// Steps to the cells beside one.
+pub(super) const BESIDE: [[isize; 2]; 4] = [[-1, 0], [1, 0], [0, -1], [0, 1]];
+/// Steps in all directions.
+const AROUND: [[isize; 2]; 8] = [[1, 0], [1, 1], [0, 1], [-1, 1], [-1, 0], [-1, -1], [0, -1], [1, -1]];
 
 impl Sheet {
     /// Looks at the cells of a plane, the surface of a label, in every view: at those around the object, and those in its
-    /// shadow.
+    /// shadow if light comes from a direction.
     pub(super) fn new(
         (plane, label): (Plane, u32),
         place: &Place,
-        (light, cell): (Option<&Light>, f64),
+        (towards, cell): (Option<DVec3>, f64),
         removed: &[u32],
         sights: &[Sight],
     ) -> Self {
         let corners = (0..8).flat_map(|bits: u32| {
             let side = |axis: usize| if bits >> axis & 1 == 0 { place.low[axis] } else { place.high[axis] };
             let corner = DVec3::new(side(0), side(1), side(2));
-            let shadow = light.and_then(|light| light.shadow(&plane, corner)).unwrap_or(corner);
+            let shadow = towards.and_then(|towards| thrown(&plane, towards, corner)).unwrap_or(corner);
             [corner - plane.origin, shadow - plane.origin]
         });
         let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
@@ -58,7 +61,7 @@ impl Sheet {
         let cells = |axis: usize| (((high[axis] - low[axis]) / cell).ceil() as usize).clamp(1, SIDE_MAX);
         let (width, height) = (cells(0), cells(1));
         let (states, colours) = (Vec::new(), Vec::new());
-        let mut sheet = Self { plane, cell, corner: low, width, height, label, states, colours, shadows: None };
+        let mut sheet = Self { plane, cell, corner: low, width, height, label, states, colours };
         let look = |index: usize| sheet.look(sheet.place(index), label, removed, sights);
         (sheet.states, sheet.colours) = (0..width * height).into_par_iter().map(look).unzip();
         sheet
@@ -69,6 +72,13 @@ impl Sheet {
         let (x, y) = ((index % self.width) as f64 + 0.5, (index / self.width) as f64 + 0.5);
         let plane = &self.plane;
         plane.origin + (self.corner[0] + x * self.cell) * plane.u + (self.corner[1] + y * self.cell) * plane.v
+    }
+
+    /// Returns the index of the cell so many cells further along both axes; `None` outside.
+    pub(super) fn step(&self, index: usize, [dx, dy]: [isize; 2]) -> Option<usize> {
+        let x = (index % self.width).checked_add_signed(dx).filter(|&x| x < self.width)?;
+        let y = (index / self.width).checked_add_signed(dy).filter(|&y| y < self.height)?;
+        Some(y * self.width + x)
     }
 
     /// Returns the cell coordinates of a world position.
@@ -108,8 +118,8 @@ impl Sheet {
     }
 
     /// Returns positions and colours of the holes that seen surface surrounds. What was closed bounds the next ones: a hole
-    /// beside another that nothing bounds is closed up to it.
-    pub(super) fn holes(&self) -> Vec<(DVec3, DVec3)> {
+    /// beside another that nothing bounds is closed up to it. `shadows` on the sheet change the colours.
+    pub(super) fn holes(&self, shadows: Option<&Shadows>) -> Vec<(DVec3, DVec3)> {
         let mut states = self.states.clone();
         let mut open: Vec<usize> = (0..states.len()).filter(|&index| states[index] == State::Hole).collect();
         let mut closed = Vec::new();
@@ -127,66 +137,44 @@ impl Sheet {
             return Vec::new();
         }
         closed.sort_unstable();
-        let Some(colours) = self.continued() else { return Vec::new() };
+        let Some(colours) = self.continued(shadows) else { return Vec::new() };
         closed.into_iter().map(|index| (self.place(index), colours[index])).collect()
     }
 
     /// Returns true if there is seen surface in most directions, before anything free.
     fn is_bounded(&self, states: &[State], index: usize) -> bool {
-        let directions = [(1, 0), (1, 1), (0, 1), (-1, 1), (-1, 0), (-1, -1), (0, -1), (1, -1)];
-        let meets = |&(dx, dy): &(isize, isize)| {
-            let (mut x, mut y) = ((index % self.width) as isize, (index / self.width) as isize);
-            loop {
-                (x, y) = (x + dx, y + dy);
-                if x < 0 || y < 0 || x >= self.width as isize || y >= self.height as isize {
-                    return false;
-                }
-                match states[y as usize * self.width + x as usize] {
-                    State::Seen => return true,
-                    State::Free => return false,
-                    State::Hole | State::Unknown => {}
-                }
-            }
+        let meets = |&&direction: &&[isize; 2]| {
+            let way = std::iter::successors(self.step(index, direction), |&at| self.step(at, direction));
+            way.map(|at| states[at]).find(|state| matches!(state, State::Seen | State::Free)) == Some(State::Seen)
         };
-        directions.iter().filter(|direction| meets(direction)).count() >= BOUNDED_MIN
+        AROUND.iter().filter(meets).count() >= BOUNDED_MIN
     }
 
     /// Returns the colours without any shadow, but for those at edges of shadows if there are others.
-    fn lit(&self) -> Vec<Option<DVec3>> {
-        let Some(shadows) = &self.shadows else { return self.colours.clone() };
-        let lit: Vec<Option<DVec3>> = (0..self.colours.len())
-            .map(|index| self.colours[index].map(|colour| colour / shadows.before(index)))
-            .collect();
-        let sure: Vec<Option<DVec3>> =
-            lit.iter().enumerate().map(|(index, colour)| colour.filter(|_| !shadows.is_unsure(index))).collect();
-        if sure.iter().any(Option::is_some) { sure } else { lit }
+    fn lit(&self, shadows: &Shadows) -> Vec<Option<DVec3>> {
+        let lit = |index: usize| self.colours[index].map(|colour| colour / shadows.before(index));
+        let sure = |index: usize| lit(index).filter(|_| !shadows.is_unsure(index));
+        let cells = 0..self.colours.len();
+        let found: Vec<Option<DVec3>> = cells.clone().map(sure).collect();
+        if found.iter().any(Option::is_some) { found } else { cells.map(lit).collect() }
     }
 
     /// Returns a colour for each cell: where none is known, the smoothest continuation (each the mean of its four
     /// neighbours, free cells left out). `None` without any known colour. What has a shadow continues as if it had none, and
     /// has that of the rest in the end.
-    fn continued(&self) -> Option<Vec<DVec3>> {
-        let lit = self.lit();
+    fn continued(&self, shadows: Option<&Shadows>) -> Option<Vec<DVec3>> {
+        let lit = shadows.map_or_else(|| self.colours.clone(), |shadows| self.lit(shadows));
         let known: Vec<DVec3> = lit.iter().flatten().copied().collect();
         if known.is_empty() {
             return None;
         }
         let mean = known.iter().sum::<DVec3>() / known.len() as f64;
         let mut colours: Vec<DVec3> = lit.iter().map(|colour| colour.unwrap_or(mean)).collect();
-        let (width, height) = (self.width, self.height);
         let is_there = |index: usize| self.states[index] != State::Free;
+        let beside = |index: usize| BESIDE.iter().filter_map(move |&step| self.step(index, step));
         let unknown: Vec<(usize, Vec<usize>)> = (0..colours.len())
             .filter(|&index| lit[index].is_none() && is_there(index))
-            .map(|index| {
-                let (x, y) = (index % width, index / width);
-                let around = [
-                    (x > 0).then(|| index - 1),
-                    (x + 1 < width).then(|| index + 1),
-                    (y > 0).then(|| index - width),
-                    (y + 1 < height).then(|| index + width),
-                ];
-                (index, around.into_iter().flatten().filter(|&at| is_there(at)).collect())
-            })
+            .map(|index| (index, beside(index).filter(|&at| is_there(at)).collect()))
             .filter(|(_, around): &(usize, Vec<usize>)| !around.is_empty())
             .collect();
         for _ in 0..ROUNDS {
@@ -196,7 +184,7 @@ impl Sheet {
                 colours[*index] = old + RELAXATION * (goal - old);
             }
         }
-        let after = |index: usize| self.shadows.as_ref().map_or(DVec3::ONE, |shadows| shadows.after(index));
+        let after = |index: usize| shadows.map_or(DVec3::ONE, |shadows| shadows.after(index));
         let shaded = |(index, colour): (usize, DVec3)| (colour * after(index)).clamp(DVec3::ZERO, DVec3::ONE);
         Some(colours.into_iter().enumerate().map(shaded).collect())
     }
