@@ -8,6 +8,7 @@ pub(crate) mod camera;
 pub(crate) mod colour;
 pub(crate) mod crew;
 pub(crate) mod depth;
+pub(crate) mod direction;
 pub(crate) mod gaussians;
 pub(crate) mod labels;
 pub(crate) mod origin;

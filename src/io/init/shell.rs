@@ -4,6 +4,7 @@
 
 use crate::error::Result;
 use crate::io::init::texel::texel;
+use crate::scene::direction::even_direction;
 use crate::scene::{Camera, Dataset, Point, View};
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
@@ -64,12 +65,7 @@ pub(super) fn points(dataset: &Dataset, count: usize) -> Result<(Vec<Point>, f64
     let far = distances.get((FARTHEST * distances.len() as f64) as usize).copied().unwrap_or(0.0);
     let radius = (RADIUS * dataset.extent()).max(BEYOND * far);
     let covered: Vec<Covered> = views.par_iter().map(|view| Covered::new(&view.camera, points)).collect();
-    let place = |index: usize| {
-        // Even directions: a Fibonacci lattice.
-        let height = 1.0 - (2.0 * index as f64 + 1.0) / count as f64;
-        let (angle, width) = (TAU * index as f64 * 0.618_033_988_749_894_8, (1.0 - height * height).sqrt());
-        centre + radius * DVec3::new(width * angle.cos(), height, width * angle.sin())
-    };
+    let place = |index: usize| centre + radius * even_direction(index, count);
     // The photos come one after the other, because not all of them may be in memory.
     let mut shown: Vec<(usize, Vec<[u8; 3]>)> = vec![(0, Vec::new()); count];
     for (view, covered) in views.iter().zip(&covered) {
