@@ -105,6 +105,11 @@ impl ChooseArgs {
         let asked = Asked { path, model, known, scene, max_resolution, read: self.read, memory };
         self.prompts.labels("--labels", self.labels.as_ref(), &asked, to)
     }
+
+    /// Returns how the scene of a model is read: as its run did.
+    pub(crate) fn reading(&self, model: &Path) -> Result<SceneArgs> {
+        SceneArgs { max_resolution: self.max_resolution, read: self.read, ..SceneArgs::default() }.of_run(model)
+    }
 }
 
 impl PromptArgs {

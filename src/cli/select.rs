@@ -1,6 +1,6 @@
 //! `labelgs extract` and `labelgs remove`.
 
-use super::args::{JsonFlag, SceneArgs};
+use super::args::JsonFlag;
 use super::choose::ChooseArgs;
 use super::context::Context;
 use super::labelled::{Edited, MinConfidenceArg, Seen, Target, look, open, wants_json};
@@ -145,9 +145,7 @@ pub(crate) fn run_remove(args: &RemoveArgs, context: &Context) -> Result<()> {
 /// Removes labels and closes their place by what the training views of a scene show.
 fn filled(args: &RemoveArgs, scene: &Path, model: &Gaussians, labels: &[u32], context: &Context) -> Result<Filled> {
     let RemoveArgs { select: args, keep_shadow, .. } = args;
-    let (max_resolution, read) = (args.choice.max_resolution, args.choice.read);
-    let reading = SceneArgs { max_resolution, read, ..SceneArgs::default() }.of_run(&args.model)?;
-    let dataset = open_scene(scene, &reading, None, [0.0; 3], false)?;
+    let dataset = open_scene(scene, &args.choice.reading(&args.model)?, None, [0.0; 3], false)?;
     let views: Vec<&View> = dataset.train.iter().collect();
     if views.is_empty() {
         return Err(Error::data(scene, "", "has no training view to fill from; with --fill a scene needs some"));

@@ -6,12 +6,13 @@ use super::log::Progress;
 use super::scene::{near_plane, open_gpu};
 use super::stdout;
 use crate::engine::Engine;
+use crate::gpu::Gpu;
 use crate::io::image::write_png_rgb8;
 use crate::io::occlusion_table::OcclusionTable;
 use crate::io::{self, LoadOptions};
 use crate::label::occlusion::{Rule, by_contour, from_depths, picture};
 use crate::render::{Parts, RenderOptions, render};
-use crate::scene::{DepthKind, LabelMap, Occluders, View, stems};
+use crate::scene::{DepthKind, Gaussians, LabelMap, Occluders, View, stems};
 use crate::{Error, Result};
 use clap::Args;
 use serde_json::json;
@@ -67,7 +68,10 @@ pub(crate) fn run(args: &OcclusionArgs, context: &Context) -> Result<()> {
     let views: Vec<&View> = dataset.all().into_iter().filter(|view| view.mask.is_some()).collect();
     let table = match (&args.depths, args.depth_kind, &args.model) {
         (Some(depths), Some(kind), _) => OcclusionTable::new("depth", from_depths(&args.scene, depths, kind, &views)?),
-        (_, _, Some(model)) => OcclusionTable::new("rendered", from_model(model, &views, context)?),
+        (_, _, Some(path)) => {
+            let (model, near) = (open_model(path)?, near_plane(path, None)?);
+            OcclusionTable::new("rendered", from_model(open_gpu(context)?, (&model, near), &views, context)?)
+        }
         _ => return Err(Error::usage("--depths", "needs --depth-kind, or use --model instead")),
     };
     if let Some(folder) = &args.pictures {
@@ -87,10 +91,14 @@ pub(crate) fn run(args: &OcclusionArgs, context: &Context) -> Result<()> {
     stdout::print(&format!("{output}: {pairs} pairs of an object and its occluder in {} views\n", table.views.len()))
 }
 
-fn from_model(path: &Path, views: &[&View], context: &Context) -> Result<BTreeMap<String, Occluders>> {
-    let (model, near) = (open_model(path)?, near_plane(path, None)?);
-    let gpu = open_gpu(context)?;
-    let mut engine = Engine::of_model(gpu, &model, views.iter().map(|view| (view.camera.width, view.camera.height)))?;
+/// Returns the occluders in views with masks, by the depth of a model.
+pub(super) fn from_model(
+    gpu: Arc<Gpu>,
+    (model, near): (&Gaussians, f32),
+    views: &[&View],
+    context: &Context,
+) -> Result<BTreeMap<String, Occluders>> {
+    let mut engine = Engine::of_model(gpu, model, views.iter().map(|view| (view.camera.width, view.camera.height)))?;
     let mut progress = Progress::new(views.len() as u64, "views", &context.global);
     let mut found = BTreeMap::new();
     for view in views {
