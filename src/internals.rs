@@ -218,7 +218,7 @@ pub mod synth {
 pub mod train {
     pub use crate::train::setup::{TrainerOptions, engine_size};
     pub use crate::train::state::TrainState;
-    pub use crate::train::{StepReport, Trainer, aligned, first_model};
+    pub use crate::train::{REFIT_STEPS, StepReport, Trainer, aligned, first_model, refitted};
     pub mod region {
         pub use crate::train::region::Region;
     }

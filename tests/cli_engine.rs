@@ -241,7 +241,14 @@ fn a_made_scene_is_trained_scored_edited_and_rendered() {
     let (object_model, rest_model) =
         (read_model(&object).expect("PLY").gaussians, read_model(&rest).expect("PLY").gaussians);
     assert_eq!(object_model.len() + rest_model.len(), trained["gaussians"].as_u64().expect("a number") as usize);
-    assert!(object_model.labels.is_some_and(|labels| labels.iter().all(|&label| label == 2)));
+    assert!(object_model.labels.as_ref().is_some_and(|labels| labels.iter().all(|&label| label == 2)));
+    let whole = ["extract", &out, "--labels", "2", "--min-confidence", "0", "-o", &object];
+    succeeds(&[&whole[..], &["--refit", "--scene", &scene, "--masks", &masks]].concat());
+    let alone = read_model(&object).expect("PLY").gaussians;
+    assert!(alone.opacities != object_model.opacities, "opacities of its own");
+    assert_eq!(labelgs::scene::Gaussians { opacities: object_model.opacities.clone(), ..alone }, object_model);
+    let lacks = labelgs(&[&whole[..], &["--refit", "--scene", &scene]].concat());
+    assert!(lacks.status.code() == Some(2) && text(&lacks.stderr).contains("--masks"), "{}", text(&lacks.stderr));
     let unknown = labelgs(&["extract", &out, "--labels", "77", "-o", &object]);
     assert_eq!(unknown.status.code(), Some(2), "{}", text(&unknown.stderr));
 

@@ -13,6 +13,7 @@ mod support;
 #[global_allocator]
 static MEMORY: support::memory::Counting = support::memory::Counting;
 
+mod alone; // an object outside of its scene has opacities of its own
 mod antialias; // least sizes of Gaussians, resumed trainings
 mod architecture; // layers of the crate, file lengths, places of unsafe code
 mod associate; // masks of one object in different views get one id

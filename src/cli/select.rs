@@ -2,8 +2,10 @@
 
 use super::args::JsonFlag;
 use super::choose::ChooseArgs;
-use super::context::Context;
+use super::context::{Context, open_model};
 use super::labelled::{Edited, MinConfidenceArg, Seen, Target, look, open, wants_json};
+use super::log::Progress;
+use super::occlusion::from_model;
 use super::output::WriteArgs;
 use super::scene::{near_plane, open_gpu, open_scene};
 use super::values::{distance, share};
@@ -15,11 +17,14 @@ use crate::edit::select::remove;
 use crate::engine::Engine;
 use crate::eval::removal::sights;
 use crate::scene::{Gaussians, View};
+use crate::scheduler::SchedulerOptions;
+use crate::train::{REFIT_STEPS, refitted};
 use crate::{Error, Result};
 use clap::Args;
 use serde_json::json;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// What `labelgs extract` and `labelgs remove` have in common.
 #[derive(Args, Clone, Debug)]
@@ -75,6 +80,13 @@ pub struct ExtractArgs {
     /// Which Gaussians of the labels.
     #[command(flatten)]
     pub sure: MinConfidenceArg,
+    /// Give the copy opacities of its own, fitted to the photos of --scene and to --masks: haze around the object goes, of which
+    /// little shows in the scene.
+    #[arg(long, requires = "scene", requires = "masks")]
+    pub refit: bool,
+    /// With --refit, the folder of id masks with which the labels were made.
+    #[arg(long, value_name = "DIR", requires = "refit")]
+    pub masks: Option<PathBuf>,
     /// Leave out specks: connected parts of a label that are smaller than --min-share.
     #[arg(long)]
     pub drop_specks: bool,
@@ -109,6 +121,10 @@ pub(crate) fn run_extract(args: &ExtractArgs, context: &Context) -> Result<()> {
     let labels = select.choice.labels(&select.model, model.view(), &known, context)?;
     let whole = args.sure.extract_seen(&select.model, model.view(), &labels)?;
     let part = if args.drop_specks { without_specks(&whole, args.grouping.grouping())? } else { whole.clone() };
+    let part = match (select.choice.scene.as_deref(), &args.masks) {
+        (Some(scene), Some(masks)) => alone(select, (scene, masks), &part, context)?,
+        _ => part,
+    };
     let edited = Edited {
         model: &part,
         table: known.table.as_ref().map(|table| keep(table, |id| labels.contains(&id))),
@@ -116,6 +132,19 @@ pub(crate) fn run_extract(args: &ExtractArgs, context: &Context) -> Result<()> {
         labels: &labels,
     };
     edited.finish(&select.target(context), json!({ "specks": whole.len() - part.len() }))
+}
+
+/// Fits the opacities of objects that stand alone.
+fn alone(select: &SelectArgs, (scene, masks): (&Path, &Path), objects: &Gaussians, to: &Context) -> Result<Gaussians> {
+    let (model, near) = (open_model(&select.model)?, near_plane(&select.model, select.choice.prompts.near)?);
+    let dataset = open_scene(scene, &select.choice.reading(&select.model)?, Some(masks.to_owned()), [0.0; 3], true)?;
+    let views: Vec<&View> = dataset.train.iter().filter(|view| view.mask.is_some()).collect();
+    let gpu = open_gpu(to)?;
+    let occluders = from_model(Arc::clone(&gpu), (&model, near), &views, to)?;
+    drop(model);
+    let mut progress = Progress::new(u64::from(REFIT_STEPS), "steps", &to.global);
+    let mut watch = |step| progress.set(u64::from(step), String::new);
+    refitted(&gpu, objects, (&views, &occluders), near, SchedulerOptions::default(), &mut watch)
 }
 
 /// Writes the Gaussians of all other labels.

@@ -1,11 +1,11 @@
 //! Training: the loop over steps, and the work between steps.
 //!
 //! [`Trainer`] owns the model on the device. [`TrainConfig`] has every hyper-parameter; a [`Strategy`] changes the
-//! number of Gaussians, and [`Shared`] parameters belong to the scene or to a photo. [`crate::run`] wraps a training
-//! with folder, checkpoints and scores.
+//! number of Gaussians, [`Shared`] parameters belong to the scene or to a photo. [`crate::run`] adds files and scores.
 
 mod ahead;
 pub(crate) mod align;
+mod alone;
 mod backdrop;
 pub(crate) mod config;
 pub(crate) mod depths;
@@ -35,6 +35,7 @@ mod views;
 mod votes;
 
 pub use align::aligned;
+pub use alone::{REFIT_STEPS, refitted};
 pub use config::TrainConfig;
 pub use first::first_model;
 pub(crate) use first::go_on_from;

@@ -102,6 +102,11 @@ impl Views {
         &self.parts
     }
 
+    /// Makes steps draw no other objects alone.
+    pub(super) fn show_only(&mut self, is_meant: impl Fn(&u16) -> bool) {
+        self.parts.iter_mut().for_each(|part| part.objects.retain(&is_meant));
+    }
+
     /// Returns the index of the view of a step.
     pub(super) fn index(&self, input: &StepInput) -> usize {
         self.parts[input.part].view

@@ -1,0 +1,98 @@
+//! Opacities of objects outside of their scene.
+//!
+//! In its scene, an object shares opacities with what is around it: haze behind other things and Gaussians across a contour
+//! cost little there, and show when the object stands alone. A copy has opacities of its own. The object layers of LabelGS fit
+//! them: its colours and opacity alone against photos and masks, without the pixels in which something hides it.
+
+use super::strategy::{At, Population, Strategy};
+use super::{ExposureMode, Occlusion, TrainConfig, Trainer, TrainerOptions};
+use crate::error::{Error, Result};
+use crate::gpu::Gpu;
+use crate::scene::{Dataset, Gaussians, Occluders, View};
+use crate::scheduler::SchedulerOptions;
+use crate::shaders::structs::StepUniforms;
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
+
+/// Steps of [`refitted`], each of one view.
+pub const REFIT_STEPS: u32 = 600;
+/// Weight of the opacity: nothing else has a claim on it.
+const LABEL_ALPHA: f32 = 3.0;
+/// Weight of the photo as a whole, which shows more than the objects: Adam drops what is that small.
+const PHOTO: f32 = 1.0 / (1_u64 << 60) as f32;
+
+/// Trains opacities only, by the label loss only.
+#[derive(Debug)]
+struct Alone;
+
+impl Strategy for Alone {
+    fn name(&self) -> &'static str {
+        "alone"
+    }
+
+    fn acts_after(&self, _at: At) -> bool {
+        false
+    }
+
+    fn act(&mut self, _at: At, _population: &mut Population) -> Result<()> {
+        Ok(())
+    }
+
+    fn uniforms(&self, _at: At, to: &mut StepUniforms) {
+        to.rate_means[..3].fill(0.0);
+        (to.rate_scales, to.rate_quats, to.rate_sh0, to.rate_sh_rest) = (0.0, 0.0, 0.0, 0.0);
+        (to.loss_scale, to.label_weight) = (to.loss_scale * PHOTO, to.label_weight / PHOTO);
+    }
+}
+
+/// Returns labelled Gaussians, those of whole objects, with opacities for a picture of these objects alone.
+///
+/// `views` are training views with photos, and masks with the labels of the Gaussians as ids. `occluders` are those of the scene,
+/// by name of the view ([`by_contour`](crate::label::occlusion::by_contour)). `watch` is told the number of each step. Labels
+/// that no mask has are an error.
+pub fn refitted(
+    gpu: &Arc<Gpu>,
+    objects: &Gaussians,
+    (views, occluders): (&[&View], &BTreeMap<String, Occluders>),
+    near: f32,
+    scheduler: SchedulerOptions,
+    watch: &mut dyn FnMut(u32),
+) -> Result<Gaussians> {
+    let labels: BTreeSet<u32> = objects.labels.iter().flatten().copied().collect();
+    let shown = |view: &View| view.mask.as_ref().map(|mask| mask.objects()).unwrap_or_default();
+    let is_chosen = |id: &u16| labels.contains(&u32::from(*id));
+    let train: Vec<View> =
+        views.iter().filter(|view| shown(view).iter().any(is_chosen)).map(|&view| view.clone()).collect();
+    let known: BTreeSet<u32> = train.iter().flat_map(shown).map(u32::from).collect();
+    if let Some(label) = labels.difference(&known).next() {
+        let problem = format!("label {label} is in no mask of a training view, so nothing tells its opacity");
+        return Err(Error::usage("masks", problem));
+    }
+    let config = TrainConfig {
+        iterations: REFIT_STEPS,
+        near,
+        sh_degree: objects.sh_degree,
+        sh_degree_interval: Some(1),
+        antialias: objects.antialiased,
+        start_size: Some(1.0),
+        exposure: ExposureMode::Off,
+        free_space: false,
+        // Turns of labels are counted from here, so no step counts votes.
+        label_from: Some(0),
+        vote_every: Some(REFIT_STEPS + 1),
+        layer_every: Some(1),
+        label_alpha: LABEL_ALPHA,
+        occlusion: Occlusion::None,
+        ..TrainConfig::default()
+    };
+    let dataset = Dataset { train, ..Dataset::default() };
+    let options = TrainerOptions { strategy: Some(Box::new(Alone)), ..scheduler.into() };
+    let mut trainer = Trainer::new(Arc::clone(gpu), config, &dataset, objects, options)?;
+    trainer.set_occluders(occluders);
+    trainer.views.show_only(is_chosen);
+    for step in 1..=REFIT_STEPS {
+        trainer.step()?;
+        watch(step);
+    }
+    Ok(Gaussians { opacities: trainer.model()?.opacities, ..objects.clone() })
+}
