@@ -1,8 +1,8 @@
 //! Changes of the colours or labels of a model.
 
 use super::components::{Grouping, components};
+use crate::io::model::values::sh0_of;
 use crate::scene::{Gaussians, LABEL_MAX, MODEL_LABEL_MAX, UNLABELLED};
-use crate::shaders::constants::exact::SH_C0;
 use crate::{Error, Result};
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -29,7 +29,7 @@ fn labels_of(model: &Gaussians) -> Vec<u32> {
 pub fn recolour(model: &Gaussians, labels: &BTreeSet<u32>, colour: [f32; 3], mix: f32) -> Gaussians {
     let mut out = model.clone();
     let rest = model.rest_per_gaussian();
-    let target = colour.map(|value| ((f64::from(value) - 0.5) / SH_C0) as f32);
+    let target = colour.map(|value| sh0_of(f64::from(value)));
     for (row, label) in labels_of(model).into_iter().enumerate() {
         if labels.contains(&label) {
             let old = model.sh0[row];

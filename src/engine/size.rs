@@ -12,7 +12,7 @@ pub struct LabelSize {
     /// Maximum number of objects sampled in one step.
     pub layers: u32,
     /// Labels that votes are counted for, the background included; 0 without votes. Many labels of many Gaussians take
-    /// several sweeps ([`Engine::vote_columns`](super::Engine::vote_columns)).
+    /// several sweeps (`Engine::vote_columns`).
     pub vote_columns: u32,
 }
 

@@ -1,5 +1,6 @@
 //! Scenes far from the origin, such as in UTM coordinates: f32 positions are relative to a point near their middle.
 
+use super::median::median;
 use glam::DVec3;
 
 /// Ratio of distance from the origin to size above which a scene counts as far. At this ratio f32 rounds positions to
@@ -16,8 +17,8 @@ pub(crate) fn far_origin<P: Copy + Into<DVec3>>(positions: &[P]) -> DVec3 {
     }
     let along = |axis: usize| positions.iter().map(move |&position| position.into()[axis]);
     // Medians, because outliers may be anywhere.
-    let middle = by_axis(|axis| median(along(axis).collect()));
-    let size = by_axis(|axis| median(along(axis).map(|value| (value - middle[axis]).abs()).collect())).length();
+    let middle = by_axis(|axis| median(along(axis)).unwrap_or(0.0));
+    let size = by_axis(|axis| median(along(axis).map(|value| (value - middle[axis]).abs())).unwrap_or(0.0)).length();
     // Positions at one place have no size.
     let size = if size > 0.0 { size } else { SIZE_OF_A_POINT };
     if !(middle.length() > FAR * size) || !middle.is_finite() {
@@ -29,11 +30,6 @@ pub(crate) fn far_origin<P: Copy + Into<DVec3>>(positions: &[P]) -> DVec3 {
 
 fn by_axis(value: impl Fn(usize) -> f64) -> DVec3 {
     DVec3::new(value(0), value(1), value(2))
-}
-
-fn median(mut values: Vec<f64>) -> f64 {
-    let middle = values.len() / 2;
-    *values.select_nth_unstable_by(middle, f64::total_cmp).1
 }
 
 #[cfg(test)]

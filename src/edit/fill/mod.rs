@@ -18,8 +18,8 @@ mod sheet;
 pub use light::Light;
 
 use super::select::{MIN_LABEL_CONFIDENCE, remove};
+use crate::io::model::values::sh0_of;
 use crate::scene::{Camera, Gaussians, LabelMap};
-use crate::shaders::constants::exact::SH_C0;
 use crate::{Error, Result};
 use glam::{DMat3, DQuat, DVec3};
 use kiddo::{ImmutableKdTree, SquaredEuclidean};
@@ -231,11 +231,6 @@ impl Sight {
     }
 }
 
-/// Returns the coefficient of degree 0 that shows a value, 0 to 1.
-fn constant(value: f64) -> f32 {
-    ((value - 0.5) / SH_C0) as f32
-}
-
 /// Adds flat Gaussians on a plane.
 fn append(model: &mut Gaussians, (plane, cell): (&Plane, f64), places: &[(DVec3, DVec3)], label: u32) {
     let turn = DQuat::from_mat3(&DMat3::from_cols(plane.u, plane.v, plane.normal)).normalize();
@@ -247,7 +242,7 @@ fn append(model: &mut Gaussians, (plane, cell): (&Plane, f64), places: &[(DVec3,
         model.quats.push(quat);
         model.scales.push(scale);
         model.opacities.push(OPACITY);
-        model.sh0.push(colour.to_array().map(constant));
+        model.sh0.push(colour.to_array().map(sh0_of));
         model.sh_rest.extend(std::iter::repeat_n([0.0; 3], rest));
         if let Some(labels) = &mut model.labels {
             labels.push(label);

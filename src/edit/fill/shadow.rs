@@ -1,12 +1,12 @@
 //! Shadows on a plane: those of the removed objects, which go, and those of the rest, which stay.
 
+use super::Place;
 use super::evidence::on_surface;
 use super::light::Light;
 use super::plane::Plane;
 use super::sheet::{BESIDE, Sheet};
-use super::{Place, constant};
+use crate::io::model::values::{sh0_of, shown};
 use crate::scene::Gaussians;
-use crate::shaders::constants::exact::SH_C0;
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
@@ -101,8 +101,8 @@ impl Shadows {
             }
             is_lit[row] = true;
             for (channel, gain) in gain.to_array().into_iter().enumerate() {
-                let shown = 0.5 + SH_C0 * f64::from(model.sh0[row][channel]);
-                model.sh0[row][channel] = constant(gain * shown);
+                let sh0 = &mut model.sh0[row][channel];
+                *sh0 = sh0_of(gain * shown(*sh0));
                 for band in &mut model.sh_rest[row * rest..][..rest] {
                     band[channel] *= gain as f32;
                 }

@@ -13,6 +13,7 @@ use super::recipe::at_photo_size;
 use super::window::{Window, windows};
 use super::{colmap, folder_of};
 use crate::error::Result;
+use crate::scene::median::median;
 use crate::scene::{Dataset, View};
 use glam::{DVec2, DVec3};
 use serde::Serialize;
@@ -246,10 +247,4 @@ pub fn scan(scene: &Path, dataset: &Dataset) -> Result<Report> {
         views: reports,
         findings,
     })
-}
-
-fn median(values: impl Iterator<Item = f64>) -> Option<f64> {
-    let mut sorted: Vec<f64> = values.filter(|value| value.is_finite()).collect();
-    sorted.sort_by(f64::total_cmp);
-    sorted.get(sorted.len() / 2).copied()
 }

@@ -1,8 +1,9 @@
 //! Sharpness of photos, and what is found of their brightness and white balance.
 
-use super::{Fault, Finding, ViewReport, median};
+use super::{Fault, Finding, ViewReport};
 use crate::error::Result;
 use crate::io::resample::{bounded_size, shrink_photo};
+use crate::scene::median::median;
 use crate::scene::{Photo, Pixels, View, crew};
 
 /// Longest side of the photos that are compared, px: noise of sensors is gone at this size.

@@ -1,10 +1,11 @@
 //! Reprojection errors of points, and the scale of the scene.
 
-use super::{Fault, Finding, ViewReport, median};
+use super::{Fault, Finding, ViewReport};
 use crate::io::colmap::Seen;
 use crate::io::lens::Optics;
 use crate::io::listing::Listed;
 use crate::scene::Dataset;
+use crate::scene::median::median;
 
 /// Reprojection error from which a photo is odd: in px, and relative to the median over photos. Reconstructions of sharp
 /// photos have 0.3 to 1 px.

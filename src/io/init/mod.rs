@@ -7,9 +7,9 @@ mod sweep;
 mod texel;
 
 use crate::error::{Error, Result};
+use crate::io::model::values::sh0_of;
 use crate::scene::origin::far_origin;
 use crate::scene::{Dataset, Gaussians, Point};
-use crate::shaders::constants::exact::SH_C0;
 use glam::DVec3;
 use kiddo::{ImmutableKdTree, SquaredEuclidean};
 use rayon::prelude::*;
@@ -98,7 +98,7 @@ fn from_points(points: &[Point], distances2: &[f64], extent: f64) -> Gaussians {
     let logit = (OPACITY / (1.0 - OPACITY)).ln() as f32;
     let count = points.len();
     let scale = |&distance2: &f64| [(0.5 * distance2.max(least).ln()) as f32; 3];
-    let constant = |value: u8| ((f64::from(value) / 255.0 - 0.5) / SH_C0) as f32;
+    let constant = |value: u8| sh0_of(f64::from(value) / 255.0);
     let origin = far_origin(&points.iter().map(|point| point.position).collect::<Vec<_>>());
     let mut gaussians = Gaussians {
         origin,

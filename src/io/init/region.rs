@@ -1,5 +1,6 @@
 //! The region that the cameras of a scene see.
 
+use crate::scene::median::median;
 use crate::scene::{Camera, View, overview};
 use glam::{DVec2, DVec3};
 
@@ -52,18 +53,13 @@ fn narrow_sine(camera: &Camera) -> f64 {
     tangent / (1.0 + tangent * tangent).sqrt()
 }
 
-fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied().unwrap_or(0.0)
-}
-
 /// Finds the region of `views`; `extent` is the radius of their cameras.
 pub(super) fn find(views: &[View], extent: f64) -> Region {
     let cameras: Vec<&Camera> = views.iter().map(|view| &view.camera).collect();
     if let Some(centre) = nearest_to_axes(&cameras) {
         let inward = cameras.iter().filter(|camera| camera.sees(centre).is_some()).count();
-        let radius = median(cameras.iter().map(|c| c.centre().distance(centre) * narrow_sine(c)).collect());
-        let distance = median(cameras.iter().map(|c| c.centre().distance(centre)).collect());
+        let radius = median(cameras.iter().map(|c| c.centre().distance(centre) * narrow_sine(c))).unwrap_or(0.0);
+        let distance = median(cameras.iter().map(|c| c.centre().distance(centre))).unwrap_or(0.0);
         // Rotating cameras at one place differ only by rounding errors, which give no distance.
         if inward * 4 >= cameras.len() * 3 && radius > 1e-6 * extent {
             return Region::Ball { centre, radius, distance };

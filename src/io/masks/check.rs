@@ -1,5 +1,6 @@
 //! Checks of masks, by comparison with the masks of the other photos. This module reads no files.
 
+use crate::scene::median::median;
 use crate::scene::{Camera, LabelMap, Point};
 use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
@@ -156,11 +157,6 @@ fn finding(problem: Problem, view: &str, id: Option<u16>, text: String) -> Findi
     Finding { problem, view: Some(view.to_owned()), id: id.map(u32::from), text }
 }
 
-fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied().unwrap_or(0.0)
-}
-
 fn percent(share: f64) -> String {
     format!("{:.2} %", share * 100.0)
 }
@@ -172,8 +168,7 @@ fn inverted(masks: &[(&str, &Look)], id: u16, only: bool) -> Vec<Finding> {
     let surrounds = |look: &Look| look.border_share(id) >= INVERTED_BORDER && look.share(id) >= INVERTED_SHARE;
     let elsewhere = |own: &str| {
         let others = with.iter().filter(|(name, _)| *name != own).map(|(_, look)| look.border_share(id));
-        let others: Vec<f64> = others.collect();
-        !others.is_empty() && median(others) <= INVERTED_ELSEWHERE
+        median(others).is_some_and(|share| share <= INVERTED_ELSEWHERE)
     };
     let found = with.iter().filter(|(name, look)| surrounds(look) && (only || elsewhere(name)));
     let text = |look: &Look| {
@@ -187,7 +182,7 @@ fn inverted(masks: &[(&str, &Look)], id: u16, only: bool) -> Vec<Finding> {
 }
 
 fn nearly_empty_masks(masks: &[(&str, &Look)]) -> Vec<Finding> {
-    let usual = median(masks.iter().map(|(_, look)| look.labelled()).collect());
+    let usual = median(masks.iter().map(|(_, look)| look.labelled())).unwrap_or(0.0);
     let few = |look: &Look| look.labelled() < usual * EMPTY_MASK;
     let text = |look: &Look| {
         format!("{} of the picture is labelled, in the median mask {}", percent(look.labelled()), percent(usual))
@@ -202,7 +197,7 @@ fn nearly_empty_objects(masks: &[(&str, &Look)], id: u16) -> Vec<Finding> {
     if with.len() < VIEWS_FOR_MEDIAN {
         return Vec::new();
     }
-    let usual = median(with.iter().map(|(_, share)| *share).collect());
+    let usual = median(with.iter().map(|(_, share)| *share)).unwrap_or(0.0);
     let few = with.into_iter().filter(|(_, share)| *share < usual * EMPTY_OBJECT);
     let text = |share| format!("covers {} of the picture, in the median mask {}", percent(share), percent(usual));
     few.map(|(name, share)| finding(Problem::NearlyEmpty, name, Some(id), text(share))).collect()

@@ -15,7 +15,7 @@ mod sog;
 mod splat;
 mod spz;
 mod turn;
-mod values;
+pub(crate) mod values;
 
 use crate::error::{Error, Result};
 use crate::io::atomic;

@@ -3,10 +3,9 @@
 
 use super::format::{ModelFormat, ReadModel};
 use super::rows::{Row, Rows};
-use super::values::{log_scale, logit_of_byte};
+use super::values::{log_scale, logit_of_byte, sh0_of};
 use crate::error::{Error, Result};
 use crate::io::read as file;
-use crate::shaders::constants::exact::SH_C0;
 use std::path::Path;
 
 /// The format by its ending.
@@ -31,7 +30,7 @@ fn read(path: &Path) -> Result<ReadModel> {
         to.push(&Row {
             position: [0, 4, 8].map(|at| f64::from(float(at))),
             scale: [12, 16, 20].map(|at| log_scale(float(at))),
-            sh0: [24, 25, 26].map(|at| (f32::from(row[at]) / 255.0 - 0.5) / SH_C0 as f32),
+            sh0: [24, 25, 26].map(|at| sh0_of(f64::from(row[at]) / 255.0)),
             opacity: logit_of_byte(row[27]),
             quat: [28, 29, 30, 31].map(|at| (f64::from(row[at]) - 128.0) / 128.0),
             ..Row::default()

@@ -7,9 +7,8 @@ use super::{
 use crate::error::{Error, Result};
 use crate::io::label_table::LabelTable;
 use crate::io::model::format::{Export, ModelWriter};
-use crate::io::model::values::sigmoid;
+use crate::io::model::values::{shown as shown_value, sigmoid};
 use crate::scene::UNLABELLED;
-use crate::shaders::constants::exact::SH_C0;
 use serde_json::{Map, Value, json};
 use std::collections::BTreeSet;
 use std::io::{self, Write};
@@ -132,7 +131,7 @@ fn attributes(export: &Export, to: &mut Binary) -> Value {
     add("POSITION".into(), to.attribute(true, rows().map(|row| AXES.position(export.position(row)))));
     // For viewers that draw points.
     let shown = |row: usize| {
-        let [r, g, b] = export.model.sh0[row].map(|value| (0.5 + SH_C0 as f32 * value).clamp(0.0, 1.0));
+        let [r, g, b] = export.model.sh0[row].map(|sh0| shown_value(sh0).clamp(0.0, 1.0) as f32);
         [r, g, b, sigmoid(export.model.opacities[row])]
     };
     add("COLOR_0".into(), to.attribute(false, rows().map(shown)));

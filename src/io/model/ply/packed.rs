@@ -4,9 +4,8 @@
 use crate::error::{Error, Result};
 use crate::io::model::format::ReadModel;
 use crate::io::model::rows::{Row, Rows};
-use crate::io::model::values::logit_of_byte;
+use crate::io::model::values::{logit_of_byte, sh0_of};
 use crate::io::ply::Elements;
-use crate::shaders::constants::exact::SH_C0;
 use std::f64::consts::SQRT_2;
 use std::path::Path;
 
@@ -79,7 +78,7 @@ pub(super) fn read(path: &Path) -> Result<Option<ReadModel>> {
             scale: within(thirds(size), 6).map(|value| value as f32),
             quat: quat(spin),
             opacity: logit_of_byte(alpha),
-            sh0: [0, 1, 2].map(|c| ((shade[c] + tint[c] * (shade[3 + c] - shade[c]) - 0.5) / SH_C0) as f32),
+            sh0: [0, 1, 2].map(|c| sh0_of(shade[c] + tint[c] * (shade[3 + c] - shade[c]))),
             rest: &rest,
             ..Row::default()
         });
