@@ -45,6 +45,9 @@ pub mod eval {
     pub mod crop {
         pub use crate::eval::crop::Crop;
     }
+    pub mod specks {
+        pub use crate::eval::specks::specks;
+    }
     pub mod lpips {
         pub use crate::eval::lpips::{CHANNELS, STAGES, Weights};
         pub mod convolution {

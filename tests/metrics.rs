@@ -11,6 +11,7 @@ use labelgs::internals::eval::boundary::{boundary_iou, rim, rim_width};
 use labelgs::internals::eval::crop::Crop;
 use labelgs::internals::eval::metrics::{Overlap, paper_score};
 use labelgs::internals::eval::scores::{ObjectRender, ObjectTruth};
+use labelgs::internals::eval::specks::specks;
 use labelgs::internals::eval::ssim::{ssim_map, window};
 use labelgs::internals::eval::ssim8::{ssim8, to_bytes};
 use labelgs::scene::{Gaussians, LabelMap, Photo};
@@ -139,6 +140,29 @@ fn a_rim_is_the_mask_less_its_repeated_erosion() {
             assert_eq!(rim(&mask, width, height, reach), expected, "seed {seed} reach {reach}");
         }
     }
+}
+
+#[test]
+fn specks_by_hand() {
+    #[rustfmt::skip]
+    let found = map(10, &[
+        1, 1, 1, 1, 1, 0, 0, 0, 0, 0,
+        1, 5, 1, 1, 1, 0, 7, 7, 0, 0,
+        1, 1, 1, 1, 1, 0, 0, 0, 0, 0,
+        1, 1, 6, 1, 1, 0, 0, 0, 0, 9,
+        1, 6, 1, 1, 4, 0, 3, 3, 0, 0,
+        1, 1, 1, 1, 1, 0, 0, 2, 0, 0,
+    ]);
+    let none = map(10, &[0; 60]);
+    // 5, 7, 9 and both 6, which share a corner only; 4 lies between two others, and 2 and 3 touch.
+    assert_eq!(specks(&found, &none), 5);
+    let truth = map(10, &found.ids.iter().map(|&id| if id == 7 { 7 } else { 0 }).collect::<Vec<_>>());
+    assert_eq!(specks(&found, &truth), 4, "what is there is none");
+    assert_eq!(specks(&none, &truth), 0);
+    // 12 pixels are an object.
+    let block = |rows: usize| map(8, &(0..64).map(|i| u16::from(i % 8 < 4 && i / 8 < rows)).collect::<Vec<_>>());
+    let empty = map(8, &[0; 64]);
+    assert_eq!((specks(&block(2), &empty), specks(&block(3), &empty)), (1, 0));
 }
 
 #[test]
@@ -323,6 +347,7 @@ fn scores_are_averaged_over_pairs() {
     assert_eq!(scores.objects[&1].iou_map, Some(0.5));
     assert_eq!(scores.objects[&2].iou_map, Some(0.8));
     assert_eq!(scores.mean.objects.iou_map, Some(0.65));
+    assert_eq!(scores.mean.specks, Some(1.0), "the 7");
     // In two rows every pixel is on a rim.
     assert_eq!((scores.objects[&1].boundary_iou, scores.mean.objects.boundary_iou), (Some(0.5), Some(0.65)));
     assert_eq!((scores.objects[&1].iou_object, scores.objects[&2].iou_object), (Some(0.5), Some(0.0)));

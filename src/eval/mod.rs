@@ -17,6 +17,7 @@ pub mod protocol;
 pub(crate) mod regions;
 pub(crate) mod removal;
 pub(crate) mod scores;
+pub(crate) mod specks;
 pub(crate) mod ssim;
 pub(crate) mod ssim8;
 pub(crate) mod subject;

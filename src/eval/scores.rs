@@ -9,6 +9,7 @@ use super::metrics::{COVERED, Overlap, byte_value, mean, paper_score, psnr, psnr
 use super::places::PlaceScore;
 use super::regions::RegionScores;
 use super::removal::RemovalScores;
+use super::specks::specks;
 use super::ssim::ssim;
 use crate::scene::{LabelMap, Photo};
 use crate::{Error, Result};
@@ -56,6 +57,9 @@ pub struct ViewScores {
     /// PSNR by region, if the training views are known.
     #[serde(flatten)]
     pub regions: Option<RegionScores>,
+    /// Specks of the label map that the mask does not have; `None` without both.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub specks: Option<u64>,
     /// Scores of the objects by id.
     pub objects: BTreeMap<u32, ObjectScores>,
 }
@@ -115,6 +119,7 @@ impl ViewScores {
             psnr: psnr(render, photo),
             psnr_corrected: psnr_corrected(render, photo),
             ssim: ssim(render, photo),
+            specks: map.zip(mask).map(|(map, mask)| specks(map, mask)),
             ..Self::default()
         };
         let valid = |index: usize| photo.rgba[index][3] > 0;
@@ -206,6 +211,9 @@ pub struct MeanScores {
     /// Means over views by region, if the training views are known.
     #[serde(flatten)]
     pub regions: Option<RegionScores>,
+    /// Mean number of specks over views with masks.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub specks: Option<f64>,
     /// Means over pairs of view and object.
     #[serde(flatten)]
     pub objects: ObjectScores,
@@ -284,6 +292,7 @@ impl Scores {
                 psnr_corrected: mean(views.values().map(|view| view.psnr_corrected)),
                 ssim: mean(views.values().map(|view| view.ssim)),
                 regions: RegionScores::mean(views.values().filter_map(|view| view.regions.as_ref())),
+                specks: mean(views.values().filter_map(|view| view.specks).map(|count| count as f64)),
                 objects: average(&pairs),
             },
             objects: by_object.iter().map(|(&id, scores)| (id, average(scores))).collect(),

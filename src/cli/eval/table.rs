@@ -49,6 +49,9 @@ pub(super) fn own_table(scores: &Scores) -> String {
             number(row.psnr_hidden, 2)
         );
     }
+    if mean.specks.is_some() {
+        text += &format!("specks of the label map that masks do not have: {} in a view\n", number(mean.specks, 1));
+    }
     text + &removals(scores)
 }
 
