@@ -4,7 +4,7 @@
 //! cost little there, and show when the object stands alone. A copy has opacities of its own. The object layers of LabelGS fit
 //! them: its colours and opacity alone against photos and masks, without the pixels in which something hides it.
 
-use super::strategy::{At, Population, Strategy};
+use super::strategy::{At, Strategy};
 use super::{ExposureMode, Occlusion, TrainConfig, Trainer, TrainerOptions};
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
@@ -28,14 +28,6 @@ struct Alone;
 impl Strategy for Alone {
     fn name(&self) -> &'static str {
         "alone"
-    }
-
-    fn acts_after(&self, _at: At) -> bool {
-        false
-    }
-
-    fn act(&mut self, _at: At, _population: &mut Population) -> Result<()> {
-        Ok(())
     }
 
     fn uniforms(&self, _at: At, to: &mut StepUniforms) {

@@ -1,7 +1,6 @@
 //! No change of any Gaussian: only parameters of the scene and of photos are trained.
 
-use super::{At, Population, Strategy};
-use crate::error::Result;
+use super::{At, Strategy};
 use crate::shaders::structs::StepUniforms;
 
 /// The strategy.
@@ -11,14 +10,6 @@ pub(crate) struct Frozen;
 impl Strategy for Frozen {
     fn name(&self) -> &'static str {
         "frozen"
-    }
-
-    fn acts_after(&self, _at: At) -> bool {
-        false
-    }
-
-    fn act(&mut self, _at: At, _population: &mut Population) -> Result<()> {
-        Ok(())
     }
 
     fn uniforms(&self, _at: At, to: &mut StepUniforms) {

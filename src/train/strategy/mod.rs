@@ -60,10 +60,14 @@ pub trait Strategy: Debug + Send {
     fn name(&self) -> &'static str;
 
     /// Returns true if it acts after this step. The trainer then waits for the steps in flight.
-    fn acts_after(&self, at: At) -> bool;
+    fn acts_after(&self, _at: At) -> bool {
+        false
+    }
 
     /// Acts after such a step.
-    fn act(&mut self, at: At, population: &mut Population) -> Result<()>;
+    fn act(&mut self, _at: At, _population: &mut Population) -> Result<()> {
+        Ok(())
+    }
 
     /// Returns true if the step updates the parameters.
     fn updates(&self, _at: At) -> bool {
