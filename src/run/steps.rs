@@ -95,6 +95,8 @@ impl Run<'_> {
     fn save_due(&mut self) -> Result<Option<PathBuf>> {
         self.history.drain(&mut self.trainer)?;
         let saved = self.checkpoints.save_due(&mut self.trainer, &mut self.history)?;
+        // A checkpoint takes long enough for another run to come between.
+        self.hold_folder()?;
         let written = self.write_info();
         tolerate(self, written)?;
         Ok(saved)
