@@ -73,6 +73,8 @@ impl Run<'_> {
         self.tell(Event::Model { step, path: &summary.model })?;
         if !self.stopped {
             summary.scores = self.score(model)?;
+            // Scores take long enough for another run to come between.
+            self.hold_folder()?;
         }
         summary.stopped = self.stopped;
         summary.objects = objects::of(model, self.names.as_ref(), summary.scores.as_ref());
