@@ -80,8 +80,8 @@ pub struct ExtractArgs {
     /// Which Gaussians of the labels.
     #[command(flatten)]
     pub sure: MinConfidenceArg,
-    /// Give the copy opacities of its own, fitted to the photos of --scene and to --masks: haze around the object goes, of which
-    /// little shows in the scene.
+    /// Give the copy opacities of its own, fitted to the photos of --scene and to --masks. This takes away haze around the object
+    /// that hides in the scene.
     #[arg(long, requires = "scene", requires = "masks")]
     pub refit: bool,
     /// With --refit, the folder of id masks with which the labels were made.

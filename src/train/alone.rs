@@ -18,7 +18,8 @@ use std::sync::Arc;
 pub const REFIT_STEPS: u32 = 600;
 /// Weight of the opacity: nothing else has a claim on it.
 const LABEL_ALPHA: f32 = 3.0;
-/// Weight of the photo as a whole, which shows more than the objects: Adam drops what is that small.
+/// Factor of the loss over the whole photo, which shows more than the objects: gradients far below Adam's epsilon change
+/// nothing.
 const PHOTO: f32 = 1.0 / (1_u64 << 60) as f32;
 
 /// Trains opacities only, by the label loss only.

@@ -102,7 +102,7 @@ impl Views {
         &self.parts
     }
 
-    /// Makes steps draw no other objects alone.
+    /// Leaves only these objects to the object layers of the steps.
     pub(super) fn show_only(&mut self, is_meant: impl Fn(&u16) -> bool) {
         self.parts.iter_mut().for_each(|part| part.objects.retain(&is_meant));
     }
