@@ -8,7 +8,7 @@
 // Writes:  v_shared [2 rows]
 // Math:    the torque t in camera axes is the gradient of a turn on top; that of its vector is g = (t + t x w) / (1 + w w).
 //          That of the move is -d R force, with the rotation R before the turn. POSE_PRIOR pulls both to 0. The
-//          transposed preconditioner carries both to the trained numbers.
+//          transposed preconditioner carries both to the trained numbers. A settled pose has none.
 // Order:   fixed, bitwise reproducible.
 // Mirror:  src/verify/reference/pose.rs::backward
 
@@ -58,7 +58,8 @@ void main() {
             v_turn += v * shared_parameters[step_rows[row]].xyz;
             v_move += v * shared_parameters[step_rows[row + 1u]].xyz;
         }
-        v_shared[turn] = vec4(v_turn, 0.0);
-        v_shared[move] = vec4(v_move, 0.0);
+        float open = 1.0 - shared_parameters[turn].w;
+        v_shared[turn] = vec4(open * v_turn, 0.0);
+        v_shared[move] = vec4(open * v_move, 0.0);
     }
 }

@@ -3,10 +3,12 @@
 //! [`Trainer`] owns the model on the device. [`TrainConfig`] has every hyper-parameter; a [`Strategy`] changes the
 //! number of Gaussians, [`Shared`] parameters belong to the scene or to a photo. [`crate::run`] adds files and scores.
 
+mod adjust;
 mod ahead;
 pub(crate) mod align;
 mod alone;
 mod backdrop;
+mod between;
 pub(crate) mod config;
 pub(crate) mod depths;
 pub(crate) mod exposure;
@@ -253,15 +255,7 @@ impl Trainer {
     /// because two steps are in flight.
     pub fn step(&mut self) -> Result<Vec<StepReport>> {
         let step = self.step + 1;
-        let mut done = Vec::new();
-        if self.counts_votes(step) {
-            done.extend(self.drain()?);
-            self.refresh_labels()?;
-        }
-        if self.refreshes_occluders(step) {
-            done.extend(self.drain()?);
-            self.refresh_occluders()?;
-        }
+        let mut done = self.work_before(step)?;
         let input = self.input(step)?;
         if fault::at("nan").is_some() {
             self.engine.spoil()?;

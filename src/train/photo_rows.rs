@@ -1,7 +1,9 @@
 //! What the shared rows of the photos say in the middle of a training: exposures and poses.
 
+use super::adjust::{self, Frame, adjusted};
 use super::{Trainer, exposure, poses};
 use crate::error::Result;
+use crate::render::{Parts, RenderOptions, render};
 use crate::scene::Camera;
 use std::collections::BTreeMap;
 
@@ -33,5 +35,50 @@ impl Trainer {
         let rows = self.photo_rows(poses::NAME)?;
         self.views.refine(&rows);
         Ok(())
+    }
+
+    /// Returns true before the steps at which poses are adjusted by a comparison of the photos.
+    pub(super) fn adjusts_poses(&self, step: u32) -> bool {
+        self.shared.compares_photos(self.at(step)) && !self.blurs_depth_before(step)
+    }
+
+    /// Adjusts the poses of all photos by a comparison of these. Nothing may be in flight.
+    pub(super) fn adjust_poses(&mut self) -> Result<()> {
+        let Some(range) = self.shared.photo_rows(poses::NAME) else { return Ok(()) };
+        if self.views.len() > adjust::MOST {
+            tracing::warn!("the model alone tells the poses of more than {} photos", adjust::MOST);
+            return Ok(());
+        }
+        self.refresh_poses()?;
+        // Depth has no colour.
+        let options = RenderOptions { sh_degree: Some(0), ..RenderOptions::new(self.config.near, Parts::DEPTH) };
+        let mut frames = Vec::with_capacity(self.views.len());
+        for index in 0..self.views.len() {
+            let camera = Frame::camera_of(self.views.camera(index), self.views.len());
+            let model = render(&mut self.engine, &camera, &options)?;
+            frames.push(Frame::new(camera, &*self.views[index].photo.get()?, &model));
+        }
+        let found = adjusted(frames);
+        let mut rows = self.engine.shared()?;
+        let mut unknown = Vec::new();
+        for (index, found) in found.iter().enumerate() {
+            let view = &self.views[index];
+            match found {
+                Some(found) => poses::set(&mut rows[self.shared.of_view(index)][range.clone()], &view.camera, found),
+                None => unknown.push(view.name.as_str()),
+            }
+        }
+        let (count, all) = (found.len() - unknown.len(), found.len());
+        tracing::info!("poses of {count} of {all} photos adjusted by comparing them with each other");
+        if !unknown.is_empty() {
+            tracing::warn!(
+                "photos that share too little with others get their poses from the model alone: {}",
+                unknown.join(", ")
+            );
+        }
+        if count > 0 {
+            self.engine.set_shared(&rows)?;
+        }
+        self.refresh_poses()
     }
 }

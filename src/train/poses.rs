@@ -4,12 +4,13 @@
 //! correction of its photo. Photos together leave place and turn of the whole open, and hardly tell slow bends of a path of
 //! cameras; a weak pull to 0 holds both. Trained are six numbers of each photo; its preconditioner makes a pose of them.
 
+use super::adjust;
 use super::precondition::{self, Matrix};
 use super::shared::{Place, SharedLayout, SharedParameters};
 use super::strategy::At;
 use crate::pass::{Builder, Extension, Hook, project};
 use crate::scene::{Camera, Dataset, Point, View};
-use glam::DVec3;
+use glam::{DQuat, DVec3};
 use std::sync::Arc;
 
 /// Name of the parameters.
@@ -22,12 +23,16 @@ const RATE: f64 = 2e-3;
 const FALL: f64 = 0.02;
 /// Share of the run before the first update: Gaussians have no colours of their own yet.
 const FROM: f64 = 0.08;
+/// Shares of the run after which photos are compared with each other. A pose that this settles has no gradient any more.
+const COMPARED: [f64; 3] = [0.2, 0.35, 0.5];
 
 /// Corrections of the poses, 0 in the beginning.
 #[derive(Clone, Debug, Default)]
 pub struct Poses {
     /// Depth of the scene and preconditioner of each view.
     of_views: Vec<(f32, Matrix)>,
+    /// The model alone tells the poses, to the end.
+    by_model: bool,
 }
 
 impl Poses {
@@ -44,7 +49,12 @@ impl Poses {
             let depth = depth(view);
             (depth, precondition::of_view(&view.camera, &dataset.points, depth.into()))
         };
-        Self { of_views: dataset.train.iter().map(of_view).collect() }
+        Self { of_views: dataset.train.iter().map(of_view).collect(), by_model: false }
+    }
+
+    /// Makes those of photos whose poses follow a finished model.
+    pub(super) fn by_model(dataset: &Dataset) -> Self {
+        Self { by_model: true, ..Self::new(dataset) }
     }
 }
 
@@ -54,6 +64,21 @@ pub(crate) fn corrected(camera: &Camera, rows: &[[f32; 4]]) -> Camera {
     let of = |k: usize| three(2 * k + 2).dot(three(0)) + three(2 * k + 3).dot(three(1));
     let (turn, shift) = (DVec3::new(of(0), of(1), of(2)), DVec3::new(of(3), of(4), of(5)));
     camera.corrected(turn, camera.rotation.transpose() * (f64::from(rows[1][3]) * shift))
+}
+
+/// Settles the pose of a photo: sets its rows so that the corrected camera is `to`.
+pub(super) fn set(rows: &mut [[f32; 4]], from: &Camera, to: &Camera) {
+    let turn = DQuat::from_mat3(&(to.rotation * from.rotation.transpose()));
+    let turn = 2.0 / turn.w * turn.xyz();
+    let shift = from.rotation * (to.centre() - from.centre()) / f64::from(rows[1][3]);
+    let mut numbers = [turn.x, turn.y, turn.z, shift.x, shift.y, shift.z];
+    let mut matrix: Vec<f64> = rows[2..ROWS].iter().flat_map(|row| [row[0], row[1], row[2]].map(f64::from)).collect();
+    if adjust::solve(&mut matrix, &mut numbers).is_some() {
+        for (row, three) in rows.iter_mut().zip(numbers.chunks_exact(3)) {
+            row[..3].iter_mut().zip(three).for_each(|(to, &number)| *to = number as f32);
+        }
+        rows[0][3] = 1.0;
+    }
 }
 
 impl SharedParameters for Poses {
@@ -78,6 +103,11 @@ impl SharedParameters for Poses {
         let mut rates = vec![[0.0; 4]; ROWS];
         rates[..2].fill([rate, rate, rate, 0.0]);
         rates
+    }
+
+    fn compares_photos(&self, at: At) -> bool {
+        let after = |share: f64| (share * f64::from(at.config.iterations)).round() as u32 + 1;
+        !self.by_model && COMPARED.iter().any(|&share| at.step == after(share))
     }
 
     fn extension(&self, place: Place) -> Arc<dyn Extension> {

@@ -78,6 +78,11 @@ pub trait SharedParameters: Debug + Send {
     /// of 0 keeps its values and moments in this step.
     fn rates(&self, at: At) -> Vec<[f32; 4]>;
 
+    /// Returns true if a comparison of all photos sets rows before this step.
+    fn compares_photos(&self, _at: At) -> bool {
+        false
+    }
+
     /// Returns the passes of every step; called once. `Buf::STEP_ROWS` has the rows of the step and `Buf::SHARED` their
     /// values. The passes write the gradients to the same rows of `Buf::V_SHARED`, which are 0 before.
     fn extension(&self, place: Place) -> Arc<dyn Extension>;
@@ -186,6 +191,11 @@ impl Shared {
     /// Returns the pass number of [`Joined`] for the number of the strategy.
     pub(super) fn passes(&self, of_strategy: u32) -> u32 {
         of_strategy + u32::from(!self.0.is_empty())
+    }
+
+    /// Returns true if a comparison of all photos sets rows before this step.
+    pub(super) fn compares_photos(&self, at: At) -> bool {
+        self.0.iter().any(|of| of.compares_photos(at))
     }
 
     pub(super) fn kept(&self) -> Option<KeptShared> {

@@ -4,8 +4,8 @@ use super::{Model, Row, Rules, sh};
 use crate::scene::Camera;
 use glam::DVec3;
 
-/// The rows of a photo: six trained numbers, of which the last row's fourth number is the unit of the move, and the six
-/// rows of the preconditioner, in two rows each.
+/// The rows of a photo: six trained numbers in two rows, whose fourth numbers are 1 once the pose is settled, and the unit of
+/// the move; and the six rows of the preconditioner, in two rows each.
 pub type PoseRows = [[f64; 4]; 14];
 
 fn three([x, y, z, _]: [f64; 4]) -> DVec3 {
@@ -54,7 +54,8 @@ pub fn backward(
     let (half, torque) = (0.5 * turn, posed.rotation * torque);
     let v_turn = (torque + torque.cross(half)) / (1.0 + half.length_squared()) + prior * turn;
     let v_move = -rows[1][3] * (camera.rotation * force) + prior * shift;
-    let v = [v_turn.to_array(), v_move.to_array()].concat();
+    let open = 1.0 - rows[0][3];
+    let v = [(open * v_turn).to_array(), (open * v_move).to_array()].concat();
     let through = |column: usize| (0..6).map(|k| v[k] * three(rows[2 * k + 2 + column])).sum::<DVec3>().to_array();
     [through(0), through(1)]
 }

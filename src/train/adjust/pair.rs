@@ -1,0 +1,179 @@
+//! Comparison of a patch with another photo.
+
+use super::Frame;
+use super::patch::{MIDDLE, PIXELS, Patch, without_mean};
+use crate::scene::Camera;
+use glam::{DMat3, DQuat, DVec2, DVec3};
+
+/// Numbers of a pose: a turn and a move in camera space.
+pub(super) const POSE: usize = 6;
+/// Numbers that a comparison depends on: the pose of the other photo, that of the patch's own, the logarithm of its depth.
+pub(super) const NUMBERS: usize = 2 * POSE + 1;
+/// Most photos with which the patches of one are compared.
+const PARTNERS: usize = 12;
+/// Least cosine of the angle between the axes of two of them: 60 degrees.
+const SAME_SIDE: f64 = 0.5;
+/// Least share of the patches of a photo that a partner shows.
+const SHARED: f64 = 0.25;
+/// About this many patches tell which photos are partners.
+const SAMPLE: usize = 100;
+/// Largest difference of the depth of a patch and that of the model in its place, as a share.
+const SAME_DEPTH: f64 = 0.03;
+/// Least correlation of the colours of a patch and those in its place. With more, just the patches that are off most are left
+/// out in the first rounds.
+const ALIKE: f64 = 0.5;
+/// Difference of colours from which a patch counts less.
+const NOISE: f64 = 0.02;
+
+/// Returns a camera after a step of its pose: a place y in camera space comes to y + w x y + s, for a small turn w and move s.
+pub(super) fn moved(camera: &Camera, step: &[f64; POSE]) -> Camera {
+    let turn = DMat3::from_quat(DQuat::from_scaled_axis(DVec3::from_slice(&step[..3])));
+    let translation = turn * camera.translation + DVec3::from_slice(&step[3..]);
+    Camera { rotation: turn * camera.rotation, translation, ..camera.clone() }
+}
+
+/// Returns the frames with which the patches of each frame are compared. They see a good part of the same things, from near
+/// and far: two photos from almost one place tell no depth.
+pub(super) fn partners(frames: &[Frame], patches: &[Vec<Patch>]) -> Vec<Vec<usize>> {
+    let of = |host: usize| {
+        let every = patches[host].len().div_ceil(SAMPLE).max(1);
+        let sample: Vec<DVec3> = patches[host].iter().step_by(every).map(|patch| patch.places[MIDDLE]).collect();
+        let axis = frames[host].camera.axis();
+        let mut found: Vec<(usize, usize)> = Vec::new();
+        for (other, frame) in frames.iter().enumerate() {
+            if other != host && axis.dot(frame.camera.axis()) > SAME_SIDE {
+                let way = Way::new(&frames[host].camera, &frame.camera);
+                let shown = sample.iter().filter(|&&place| shows(frame, way.there(place))).count();
+                found.push((shown, other));
+            }
+        }
+        found.retain(|&(shown, _)| shown > 0 && shown as f64 >= SHARED * sample.len() as f64);
+        found.sort_unstable_by(|a, b| b.0.cmp(&a.0).then(a.1.cmp(&b.1)));
+        let chosen = found.len().min(PARTNERS);
+        (0..chosen).map(|k| found[k * found.len() / chosen].1).collect()
+    };
+    (0..frames.len()).map(of).collect()
+}
+
+/// Returns true if a frame shows a place of its camera space.
+fn shows(frame: &Frame, place: DVec3) -> bool {
+    let at = frame.camera.project(place);
+    place.z > 0.0 && (frame.depth_at(at.x, at.y) - place.z).abs() <= SAME_DEPTH * place.z
+}
+
+/// The way from one camera space to another.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Way {
+    turn: DMat3,
+    shift: DVec3,
+}
+
+impl Way {
+    pub(super) fn new(from: &Camera, to: &Camera) -> Self {
+        let turn = to.rotation * from.rotation.transpose();
+        Self { turn, shift: to.translation - turn * from.translation }
+    }
+
+    fn there(&self, place: DVec3) -> DVec3 {
+        self.turn * place + self.shift
+    }
+}
+
+/// What a comparison adds to the equations: second moments of the derivatives of the difference by place, their product
+/// with the difference, and the derivatives of the place.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Compared {
+    /// Of xx, xy and yy, 1 / px^2.
+    pub(super) moments: [f64; 3],
+    /// Of x and y, 1 / px.
+    pub(super) pull: [f64; 2],
+    /// Derivatives of x and y, px, by the numbers.
+    pub(super) places: [[f64; NUMBERS]; 2],
+}
+
+/// Compares a patch with a frame. `None` if the frame does not show it, `Some(None)` if it shows something else there.
+pub(super) fn compare(way: &Way, patch: &Patch, frame: &Frame) -> Option<Option<Compared>> {
+    let middle = way.there(patch.places[MIDDLE]);
+    if !shows(frame, middle) {
+        return None;
+    }
+    let (mut colours, mut by_x, mut by_y) = ([[0.0; 3]; PIXELS], [[0.0; 3]; PIXELS], [[0.0; 3]; PIXELS]);
+    for (k, &place) in patch.places.iter().enumerate() {
+        let place = way.there(place);
+        let at: DVec2 = frame.camera.project(place);
+        if place.z <= 0.0 {
+            return None;
+        }
+        [colours[k], by_x[k], by_y[k]] = frame.colours(at.x, at.y)?;
+    }
+    [&mut colours, &mut by_x, &mut by_y].into_iter().for_each(without_mean);
+    let product = |a: &[[f64; 3]; PIXELS], b: &[[f64; 3]; PIXELS]| -> f64 {
+        a.as_flattened().iter().zip(b.as_flattened()).map(|(a, b)| a * b).sum()
+    };
+    let (own, there) = (product(&patch.colours, &patch.colours), product(&colours, &colours));
+    if product(&patch.colours, &colours) <= ALIKE * (own * there).sqrt() {
+        return Some(None);
+    }
+    // Photos may differ in exposure.
+    let gain = (there / own).sqrt();
+    let mut difference = patch.colours;
+    for (own, there) in difference.as_flattened_mut().iter_mut().zip(colours.as_flattened()) {
+        *own = gain * *own - there;
+    }
+    let count = (3 * PIXELS) as f64;
+    let square = product(&difference, &difference) / count;
+    let weight = 1.0 / (count * (1.0 + square / (NOISE * NOISE)));
+    Some(Some(Compared {
+        moments: [product(&by_x, &by_x), product(&by_x, &by_y), product(&by_y, &by_y)].map(|sum| weight * sum),
+        pull: [product(&by_x, &difference), product(&by_y, &difference)].map(|sum| weight * sum),
+        places: derivatives(way, &frame.camera, patch.places[MIDDLE]),
+    }))
+}
+
+/// Returns the derivatives of the place of a patch in the other photo.
+fn derivatives(way: &Way, other: &Camera, own: DVec3) -> [[f64; NUMBERS]; 2] {
+    let there = way.there(own);
+    let mut found = [[0.0; NUMBERS]; 2];
+    for k in 0..NUMBERS {
+        let axis = DVec3::AXES[k % 3];
+        let d = match k / 3 {
+            0 => axis.cross(there),
+            1 => axis,
+            2 => -(way.turn * axis.cross(own)),
+            3 => -(way.turn * axis),
+            _ => way.turn * own,
+        };
+        found[0][k] = other.fx * (d.x - there.x / there.z * d.z) / there.z;
+        found[1][k] = other.fy * (d.y - there.y / there.z * d.z) / there.z;
+    }
+    found
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{NUMBERS, POSE, Way, derivatives, moved};
+    use crate::scene::Camera;
+    use glam::{DMat3, DVec3};
+
+    fn camera(turn: f64) -> Camera {
+        let (rotation, translation) = (DMat3::from_rotation_y(turn), DVec3::new(0.1, -0.2, 0.3 + turn));
+        Camera { rotation, translation, fx: 90.0, fy: 80.0, cx: 50.0, cy: 40.0, width: 100, height: 80 }
+    }
+
+    #[test]
+    fn derivatives_are_those_of_differences() {
+        let (host, other, place) = (camera(0.1), camera(-0.2), DVec3::new(0.4, -0.3, 2.5));
+        let at = |numbers: [f64; NUMBERS]| {
+            let step = |of: &[f64]| -> [f64; POSE] { std::array::from_fn(|k| of[k]) };
+            let (there, own) = (moved(&other, &step(&numbers)), moved(&host, &step(&numbers[POSE..])));
+            there.project(Way::new(&own, &there).there(place * numbers[NUMBERS - 1].exp()))
+        };
+        let found = derivatives(&Way::new(&host, &other), &other, place);
+        for k in 0..NUMBERS {
+            let by = |step: f64| at(std::array::from_fn(|of| if of == k { step } else { 0.0 }));
+            let expected = (by(1e-5) - by(-1e-5)) / 2e-5;
+            let error = (expected.x - found[0][k]).abs().max((expected.y - found[1][k]).abs());
+            assert!(error < 1e-6 * (1.0 + expected.length()), "{k}: {expected} and {:?}", found.map(|row| row[k]));
+        }
+    }
+}
