@@ -69,13 +69,8 @@ impl Trainer {
             }
         }
         let (count, all) = (found.len() - unknown.len(), found.len());
-        tracing::info!("poses of {count} of {all} photos adjusted by comparing them with each other");
-        if !unknown.is_empty() {
-            tracing::warn!(
-                "photos that share too little with others get their poses from the model alone: {}",
-                unknown.join(", ")
-            );
-        }
+        tracing::info!("poses of {count} of {all} photos adjusted by a comparison of the photos");
+        tracing::debug!("poses by the model alone: {}", unknown.join(", "));
         if count > 0 {
             self.engine.set_shared(&rows)?;
         }
