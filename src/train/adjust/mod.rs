@@ -1,7 +1,7 @@
 //! Bundle adjustment of poses by the photos themselves.
 //!
 //! The gradient of the photo loss moves a camera until the picture of the model fits its photo. That picture is not quite where
-//! the things are, and all cameras of a ring turn down by up to a third of a pixel, although their poses were exact: probably
+//! the things are, and all cameras of a ring turn down by up to half a pixel, although their poses were exact: probably
 //! because splats in front cover parts of those behind, so that what lies aslant seems to be farther away. Photos compared with
 //! each other do not have this error, and need only depths from the model. As in direct sparse odometry (Engel et al. 2018), small patches
 //! of a photo are looked up in other photos, through the poses and the depth of the patch, and all poses and depths are solved
