@@ -70,7 +70,9 @@ impl Trainer {
         }
         let (count, all) = (found.len() - unknown.len(), found.len());
         tracing::info!("poses of {count} of {all} photos adjusted by a comparison of the photos");
-        tracing::debug!("poses by the model alone: {}", unknown.join(", "));
+        if !unknown.is_empty() {
+            tracing::debug!("poses by the model alone: {}", unknown.join(", "));
+        }
         if count > 0 {
             self.engine.set_shared(&rows)?;
         }
