@@ -69,6 +69,11 @@ impl RenderOptions {
     pub fn of_main(near: f32) -> Self {
         Self { sh_degree: Some(0), ..Self::new(near, Parts::MAIN) }
     }
+
+    /// Makes options for depth only, which needs no colours either.
+    pub fn of_depth(near: f32) -> Self {
+        Self { sh_degree: Some(0), ..Self::new(near, Parts::DEPTH) }
+    }
 }
 
 /// A rendered view, row-major. Parts that were not requested are empty.

@@ -4,7 +4,7 @@
 use super::{Occlusion, Trainer};
 use crate::error::Result;
 use crate::label::occlusion::{Rule, by_contour};
-use crate::render::{Parts, RenderOptions, render};
+use crate::render::{RenderOptions, render};
 use crate::scene::Occluders;
 use std::collections::BTreeMap;
 
@@ -49,8 +49,7 @@ impl Trainer {
 
     /// Updates the occluders from the rendered depth of every view with masks. Nothing may be in flight.
     pub fn refresh_occluders(&mut self) -> Result<()> {
-        // Depth has no colour.
-        let options = RenderOptions { sh_degree: Some(0), ..RenderOptions::new(self.config.near, Parts::DEPTH) };
+        let options = RenderOptions::of_depth(self.config.near);
         self.refresh_poses()?;
         for index in 0..self.views.len() {
             let Some(mask) = &self.views[index].mask else { continue };

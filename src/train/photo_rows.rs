@@ -3,7 +3,7 @@
 use super::adjust::{self, Frame, adjusted};
 use super::{Trainer, exposure, poses};
 use crate::error::Result;
-use crate::render::{Parts, RenderOptions, render};
+use crate::render::{RenderOptions, render};
 use crate::scene::Camera;
 use std::collections::BTreeMap;
 
@@ -50,8 +50,7 @@ impl Trainer {
             return Ok(());
         }
         self.refresh_poses()?;
-        // Depth has no colour.
-        let options = RenderOptions { sh_degree: Some(0), ..RenderOptions::new(self.config.near, Parts::DEPTH) };
+        let options = RenderOptions::of_depth(self.config.near);
         let mut frames = Vec::with_capacity(self.views.len());
         for index in 0..self.views.len() {
             let camera = Frame::camera_of(self.views.camera(index), self.views.len());
@@ -62,10 +61,9 @@ impl Trainer {
         let mut rows = self.engine.shared()?;
         let mut unknown = Vec::new();
         for (index, found) in found.iter().enumerate() {
-            let view = &self.views[index];
-            match found {
-                Some(found) => poses::set(&mut rows[self.shared.of_view(index)][range.clone()], &view.camera, found),
-                None => unknown.push(view.name.as_str()),
+            let (view, of_view) = (&self.views[index], &mut rows[self.shared.of_view(index)][range.clone()]);
+            if found.as_ref().and_then(|found| poses::settle(of_view, &view.camera, found)).is_none() {
+                unknown.push(view.name.as_str());
             }
         }
         let (count, all) = (found.len() - unknown.len(), found.len());
@@ -75,7 +73,8 @@ impl Trainer {
         }
         if count > 0 {
             self.engine.set_shared(&rows)?;
+            self.refresh_poses()?;
         }
-        self.refresh_poses()
+        Ok(())
     }
 }

@@ -66,19 +66,19 @@ pub(crate) fn corrected(camera: &Camera, rows: &[[f32; 4]]) -> Camera {
     camera.corrected(turn, camera.rotation.transpose() * (f64::from(rows[1][3]) * shift))
 }
 
-/// Settles the pose of a photo: sets its rows so that the corrected camera is `to`.
-pub(super) fn set(rows: &mut [[f32; 4]], from: &Camera, to: &Camera) {
+/// Settles the pose of a photo: sets its rows so that the corrected camera is `to`. `None` if no rows do that.
+pub(super) fn settle(rows: &mut [[f32; 4]], from: &Camera, to: &Camera) -> Option<()> {
     let turn = DQuat::from_mat3(&(to.rotation * from.rotation.transpose()));
     let turn = 2.0 / turn.w * turn.xyz();
     let shift = from.rotation * (to.centre() - from.centre()) / f64::from(rows[1][3]);
     let mut numbers = [turn.x, turn.y, turn.z, shift.x, shift.y, shift.z];
     let mut matrix: Vec<f64> = rows[2..ROWS].iter().flat_map(|row| [row[0], row[1], row[2]].map(f64::from)).collect();
-    if adjust::solve(&mut matrix, &mut numbers).is_some() {
-        for (row, three) in rows.iter_mut().zip(numbers.chunks_exact(3)) {
-            row[..3].iter_mut().zip(three).for_each(|(to, &number)| *to = number as f32);
-        }
-        rows[0][3] = 1.0;
+    adjust::solve(&mut matrix, &mut numbers)?;
+    for (row, three) in rows.iter_mut().zip(numbers.chunks_exact(3)) {
+        row[..3].iter_mut().zip(three).for_each(|(to, &number)| *to = number as f32);
     }
+    rows[0][3] = 1.0;
+    Some(())
 }
 
 impl SharedParameters for Poses {
@@ -125,5 +125,32 @@ impl Extension for Passes {
             Hook::Gradients => project::pose_backward(b, self.0.photo),
             Hook::Picture | Hook::Loss | Hook::Updated => {}
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Poses, ROWS, corrected, settle};
+    use crate::scene::{Camera, Dataset, Point};
+    use crate::train::shared::SharedParameters;
+    use glam::{DMat3, DVec3};
+
+    /// A settled pose is the one that was found, with a preconditioner that mixes all numbers.
+    #[test]
+    fn a_settled_pose_is_the_one_found() {
+        let (rotation, translation) = (DMat3::from_rotation_y(0.3), DVec3::new(0.1, -0.2, 5.0));
+        let camera = Camera { rotation, translation, fx: 90.0, fy: 90.0, cx: 50.0, cy: 40.0, width: 100, height: 80 };
+        let place = |k: usize| DVec3::new((k % 5) as f64 - 2.0, (k % 7) as f64 * 0.5 - 1.5, (k % 3) as f64 * 0.8);
+        let points: Vec<Point> = (0..60).map(|k| Point { position: place(k), colour: [0; 3] }).collect();
+        let matrix = super::precondition::of_view(&camera, &points, 4.0);
+        let poses = Poses { of_views: vec![(4.0, matrix)], ..Poses::new(&Dataset::default()) };
+        let mut rows = poses.start(Some(0));
+        assert_eq!((rows.len(), rows[0][3]), (ROWS, 0.0));
+        let to = camera.corrected(DVec3::new(0.02, -0.01, 0.03), DVec3::new(0.05, 0.1, -0.04));
+        settle(&mut rows, &camera, &to).expect("rows");
+        let found = corrected(&camera, &rows);
+        assert!(found.centre().distance(to.centre()) < 1e-5, "{} and {}", found.centre(), to.centre());
+        assert!(found.axis().distance(to.axis()) < 1e-5 && found.rotation.row(0).distance(to.rotation.row(0)) < 1e-5);
+        assert_eq!(rows[0][3], 1.0, "has no gradient any more");
     }
 }

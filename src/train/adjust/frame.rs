@@ -66,16 +66,10 @@ impl Frame {
 
     /// Returns the frame at half the size: means of two by two pixels, without a last odd row or column.
     pub(super) fn halved(&self) -> Self {
-        let Camera { width, height, fx, fy, cx, cy, .. } = self.camera;
-        let camera = Camera {
-            width: width / 2,
-            height: height / 2,
-            fx: fx / 2.0,
-            fy: fy / 2.0,
-            cx: cx / 2.0,
-            cy: cy / 2.0,
-            ..self.camera.clone()
-        };
+        let Camera { width, height, .. } = self.camera;
+        let (columns, rows) = (width / 2, height / 2);
+        let even = Camera { width: 2 * columns, height: 2 * rows, ..self.camera.clone() };
+        let camera = even.resized(columns, rows);
         let four = |index: u32| {
             let (x, y) = (2 * (index % camera.width), 2 * (index / camera.width));
             [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(right, down)| ((y + down) * width + x + right) as usize)

@@ -37,8 +37,8 @@ const FOUND: f64 = 0.4;
 /// Least share of all comparisons. Where things shine, move or have detail finer than pixels, poses by the photos would be worse
 /// than those of a good reconstruction: 0.85 in the made scene, 0.5 in a photo set of 260 px with fine detail.
 const AGREED: f64 = 0.7;
-/// Least share of the comparisons before that is still possible: with poses that leave the model, its surfaces hide patches. 0.97
-/// in the made scene, 0.68 in a photo set of smooth things, where a bend of all cameras hardly shows.
+/// Least share of the comparisons before that is still possible: with poses that leave the model, its surfaces hide patches. 0.94
+/// and more in the made scene, 0.68 in a photo set of smooth things, where a bend of all cameras hardly shows.
 const KEPT: f64 = 0.85;
 
 /// Returns the camera of each frame with its pose adjusted; `None` for a frame that shares too little with others, and for all
