@@ -62,7 +62,7 @@ fn bands_have_the_loss_of_the_photo() {
     check("l1", close(&[nearest], &whole, Tolerance { absolute: 2e-6, relative: 0.0 }));
 }
 
-/// Labels, gains of exposures and refined poses belong to photos; a resumed training has the same bits.
+/// Labels, exposures and refined poses belong to photos; a resumed training has the same bits.
 #[test]
 fn a_training_in_bands_goes_on_from_a_checkpoint() {
     let Some(turn) = device() else { return };
@@ -92,7 +92,7 @@ fn a_training_in_bands_goes_on_from_a_checkpoint() {
     let views = dataset.train.len();
     let mut whole = fresh(None);
     assert_eq!(expected.shared, go_on(&mut whole, 120).shared, "the same rows, those of photos");
-    assert_eq!((straight.exposures().expect("gains").len(), straight.poses().expect("poses").len()), (views, views));
+    assert_eq!((straight.exposures().expect("matrices").len(), straight.poses().expect("poses").len()), (views, views));
     assert_eq!(straight.occluders().len(), views);
     let labelled = |trainer: &mut Trainer| {
         let labels = trainer.labelled_model().expect("a model").labels.expect("labels");

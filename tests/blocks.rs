@@ -20,7 +20,7 @@ const FROZEN: u32 = 40;
 fn region() -> Region {
     let zone =
         Zone { low: DVec3::splat(f64::NEG_INFINITY), high: DVec3::splat(f64::INFINITY), ..Zone::along_world([0.0; 6]) };
-    Region { frozen: FROZEN, zone, extent: 3.0, gains: BTreeMap::new() }
+    Region { frozen: FROZEN, zone, extent: 3.0, exposures: BTreeMap::new() }
 }
 
 fn options() -> TrainerOptions {
@@ -262,17 +262,23 @@ fn a_block_is_trained_with_its_scene_only() {
     let other = place.text("blocks/b001");
     let again = place.trained("models/b000", &["--block", &other, "--resume", "--iterations", "130"]);
     assert!(stderr(&again).contains("holds a training of block b000"), "{}", stderr(&again));
-    // Gains of the coarse training stay as they are.
+    // Exposures of the coarse training stay as they are.
     let folder = place.path("blocks/b001");
     let file = BlockFile::read(&folder).expect("a block");
-    let gains = BTreeMap::from([(file.views[0].clone(), [1.25, 1.0, 0.8])]);
-    BlockFile { gains, ..file.clone() }.write(&folder).expect("written");
+    let with = |matrix: [[f32; 3]; 3]| {
+        let exposures = BTreeMap::from([(file.views[0].clone(), matrix)]);
+        BlockFile { exposures, ..file.clone() }.write(&folder).expect("written");
+    };
+    with([[-1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]);
+    assert!(stderr(&train_block(&place, "b001", &[])).contains("is not the matrix of a photo"));
+    let matrix = [[1.25, 0.0, 0.05], [0.1, 0.9, 0.0], [0.0, 0.0, 0.8]];
+    with(matrix);
     succeeded(&train_block(&place, "b001", &[]));
-    let found = &json(&place.path("models/b001/exposures.json"))["gains"];
-    let of =
-        |name: &str| -> Vec<f64> { found[name].as_array().expect("gains").iter().filter_map(Value::as_f64).collect() };
-    assert!(of(&file.views[0]).iter().zip([1.25, 1.0, 0.8]).all(|(a, b)| (a - b).abs() < 1e-6));
-    assert_eq!(of(&file.views[1]), [1.0; 3]);
+    let found = &json(&place.path("models/b001/exposures.json"))["matrices"];
+    let of = |name: &str| serde_json::from_value::<[[f32; 3]; 3]>(found[name].clone()).expect("a matrix");
+    let found = of(&file.views[0]);
+    assert!(found.as_flattened().iter().zip(matrix.as_flattened()).all(|(a, b)| (a - b).abs() < 1e-6), "{found:?}");
+    assert_eq!(of(&file.views[1]), [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]);
     // A scene whose camera moved.
     let poses = place.path("scene/sparse/0/images.bin");
     let mut bytes = std::fs::read(&poses).expect("poses");

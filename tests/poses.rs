@@ -7,7 +7,7 @@ use crate::reference::pose::{PoseRows, backward, corrected};
 use crate::reference::step::step;
 use crate::support::device;
 use crate::support::scenes::{Shape, scene};
-use glam::DVec3;
+use glam::{DQuat, DVec3};
 use labelgs::internals::scheduler::SchedulerOptions;
 use labelgs::internals::synth::dataset;
 use labelgs::internals::train::{TrainState, Trainer, aligned};
@@ -110,4 +110,38 @@ fn a_wrong_pose_is_found_and_goes_on_from_a_checkpoint() {
     let state = TrainState::read(&file).expect("a state");
     let mut resumed = Trainer::resume(turn.gpu(), &scene, state, SchedulerOptions::default()).expect("it goes on");
     assert_eq!(go_on(&mut resumed, 700).planes, expected.planes);
+}
+
+/// All poses of a ring are off. The trainer compares photos with each other, by the depths of a model that covers the
+/// surfaces: hardly a step has been made, so that the gradient by the model cannot have found the poses.
+#[test]
+fn photos_compared_with_each_other_settle_all_poses() {
+    let Some(turn) = device() else { return };
+    let options = SynthOptions { width: 320, height: 240, views: 24, points: 40_000, ..SynthOptions::default() };
+    let mut scene = dataset(&options, 0);
+    let truth: Vec<Camera> = scene.train.iter().map(|view| view.camera.clone()).collect();
+    for (k, view) in scene.train.iter_mut().enumerate() {
+        let side = |by: usize| if (k / by).is_multiple_of(2) { 0.002 } else { -0.002 };
+        view.camera = view.camera.corrected(DVec3::new(side(1), side(2), side(3)), DVec3::ZERO);
+        view.mask = None;
+    }
+    let mut start = initial_gaussians(&scene, 0, 0).expect("points");
+    start.opacities.fill(4.0);
+    let settings = TrainConfig { iterations: 20, refine_poses: true, ..TrainConfig::default() };
+    let mut trainer =
+        Trainer::new(turn.gpu(), settings, &scene, &start, SchedulerOptions::default()).expect("a trainer");
+    go_on(&mut trainer, 5);
+    let found = trainer.poses().expect("poses");
+    // Turns between neighbours, because a turn of all is open.
+    let between = |a: &Camera, b: &Camera| b.rotation * a.rotation.transpose();
+    let off = |of: &[Camera]| {
+        let apart = |k: usize| {
+            let (found, truth) = (between(&of[k], &of[k + 1]), between(&truth[k], &truth[k + 1]));
+            DQuat::from_mat3(&(found * truth.transpose())).xyz().length()
+        };
+        (0..of.len() - 1).map(apart).sum::<f64>()
+    };
+    let before: Vec<Camera> = scene.train.iter().map(|view| view.camera.clone()).collect();
+    let after: Vec<Camera> = scene.train.iter().map(|view| found[&view.name].clone()).collect();
+    assert!(off(&after) < 0.1 * off(&before), "{} of {}", off(&after), off(&before));
 }

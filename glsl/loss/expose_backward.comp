@@ -3,12 +3,11 @@
 #include "constants.glsl"
 #include "step.glsl"
 #include "dispatch.glsl"
-// expose_backward — gradient of the picture before its exposure; sum the gradient of the gains.
+// expose_backward — gradient of the picture before its exposure; sum the gradient of the exposure.
 // Work:    64 invocations per workgroup, EXPOSED pixels.
-// Reads:   step; step_rows [ROW], the row of the photo; shared_parameters [S]; image [P]; target [P]
-// Writes:  v_image [P] rgb, in place; exposure_partials [ceil(P / EXPOSED)]: r, g, b, 0
-// Math:    dL/dc = exp(g) dL/dc', dL/dg = sum over pixels of dL/dc' c'; without the channels that are above 1 where the
-//          photo is saturated
+// Reads:   step; step_rows [ROW], the first row of the photo; shared_parameters [S]; image [P], exposed; target [P]
+// Writes:  v_image [P] rgb, in place; exposure_partials [ceil(P / EXPOSED)], EXPOSURE_ROWS each: r, g, b, 0
+// Math:    of exposure.glsl; without the channels that are above 1 where the photo is saturated
 // Order:   fixed, bitwise reproducible.
 // Mirror:  src/verify/reference/exposure.rs::backward
 
@@ -22,29 +21,41 @@ INOUT(4, vec4, v_image);
 WRITE(5, vec4, exposure_partials);
 FETCHC(6, target);
 
-shared vec3 sums[64];
+#include "exposure.glsl"
+
+shared vec3 sums[EXPOSURE_ROWS][64];
 
 void main() {
     uint group = linear_group_id(), lane = gl_LocalInvocationID.x, pixels = step.width * step.height;
-    vec3 gain = exp(shared_parameters[step_rows[ROW]].rgb), sum = vec3(0.0);
+    Exposure of = exposure(ROW);
+    mat3 to_photo = colours(of), to_scene = inverse(to_photo);
+    vec3 sum[EXPOSURE_ROWS] = vec3[](vec3(0.0), vec3(0.0), vec3(0.0));
     for (uint k = 0u; k < EXPOSED; k += 64u) {
         uint p = group * EXPOSED + k + lane;
         if (p < pixels) {
-            vec3 c = image[p].rgb, v = v_image[p].rgb;
+            vec3 lit = image[p].rgb, v = v_image[p].rgb;
             // A saturated photo does not tell how much brighter the scene is.
-            v = mix(v, vec3(0.0), bvec3(vec3(greaterThan(c, vec3(1.0))) * vec3(equal(fetchc(target, p).rgb, vec3(1.0)))));
-            sum += v * c;
-            v_image[p].rgb = v * gain;
+            v = mix(v, vec3(0.0), bvec3(vec3(greaterThan(lit, vec3(1.0))) * vec3(equal(fetchc(target, p).rgb, vec3(1.0)))));
+            vec3 c = to_scene * lit, w = v * of.gain;
+            sum[0] += v * lit;
+            sum[1] += w * of.next_slope * (c.gbr - c);
+            sum[2] += w * of.last_slope * (c.brg - c);
+            v_image[p].rgb = v * to_photo;
         }
     }
-    sums[lane] = sum;
+    for (uint i = 0u; i < EXPOSURE_ROWS; ++i) {
+        sums[i][lane] = sum[i];
+    }
     for (uint half_ = 32u; half_ > 0u; half_ /= 2u) {
         barrier();
         if (lane < half_) {
-            sums[lane] += sums[lane + half_];
+            for (uint i = 0u; i < EXPOSURE_ROWS; ++i) {
+                sums[i][lane] += sums[i][lane + half_];
+            }
         }
     }
-    if (lane == 0u && group * EXPOSED < pixels) {
-        exposure_partials[group] = vec4(sums[0], 0.0);
+    barrier();
+    if (lane < EXPOSURE_ROWS && group * EXPOSED < pixels) {
+        exposure_partials[EXPOSURE_ROWS * group + lane] = vec4(sums[lane][0], 0.0);
     }
 }

@@ -2,11 +2,11 @@
 #include "layout.glsl"
 #include "constants.glsl"
 #include "step.glsl"
-// expose_reduce — gradient of the gains of the step's photo.
+// expose_reduce — gradient of the exposure of the step's photo.
 // Work:    one workgroup.
-// Reads:   step; step_rows [ROW], the row of the photo; exposure_partials; shared_parameters [ROWS], STRIDE a photo
-// Writes:  v_shared [row]
-// Math:    the sum of the partials, and EXPOSURE_PRIOR times the mean of ln gain over all photos: the model can be
+// Reads:   step; step_rows [ROW], the first row of the photo; exposure_partials; shared_parameters [ROWS], STRIDE a photo
+// Writes:  v_shared [row] and those after it
+// Math:    the sum of the partials, and EXPOSURE_PRIOR times the mean of each number over all photos: the model can be
 //          brighter and all photos darker, so that the data leave this mean open. It stays near 0.
 // Order:   fixed, bitwise reproducible.
 // Mirror:  src/verify/reference/exposure.rs::backward
@@ -21,28 +21,35 @@ READ(2, vec4, shared_parameters);
 READ(3, vec4, exposure_partials);
 WRITE(4, vec4, v_shared);
 
-shared vec3 sums[64];
-shared vec3 means[64];
+#include "exposure.glsl"
+
+shared vec3 sums[EXPOSURE_ROWS][64];
+shared vec3 means[EXPOSURE_ROWS][64];
 
 void main() {
     uint lane = gl_LocalInvocationID.x, partials = (step.width * step.height + EXPOSED - 1u) / EXPOSED;
-    vec3 sum = vec3(0.0), mean = vec3(0.0);
-    for (uint i = lane; i < partials; i += 64u) {
-        sum += exposure_partials[i].rgb;
+    for (uint i = 0u; i < EXPOSURE_ROWS; ++i) {
+        vec3 sum = vec3(0.0), mean = vec3(0.0);
+        for (uint k = lane; k < partials; k += 64u) {
+            sum += exposure_partials[EXPOSURE_ROWS * k + i].rgb;
+        }
+        for (uint row = ROW + i + lane * STRIDE; row < ROWS; row += 64u * STRIDE) {
+            mean += shared_parameters[row].rgb;
+        }
+        sums[i][lane] = sum;
+        means[i][lane] = mean;
     }
-    for (uint row = ROW + lane * STRIDE; row < ROWS; row += 64u * STRIDE) {
-        mean += shared_parameters[row].rgb;
-    }
-    sums[lane] = sum;
-    means[lane] = mean;
     for (uint half_ = 32u; half_ > 0u; half_ /= 2u) {
         barrier();
         if (lane < half_) {
-            sums[lane] += sums[lane + half_];
-            means[lane] += means[lane + half_];
+            for (uint i = 0u; i < EXPOSURE_ROWS; ++i) {
+                sums[i][lane] += sums[i][lane + half_];
+                means[i][lane] += means[i][lane + half_];
+            }
         }
     }
-    if (lane == 0u) {
-        v_shared[step_rows[ROW]] = vec4(sums[0] + EXPOSURE_PRIOR / float(ROWS / STRIDE) * means[0], 0.0);
+    barrier();
+    if (lane < EXPOSURE_ROWS) {
+        v_shared[step_rows[ROW] + lane] = vec4(sums[lane][0] + EXPOSURE_PRIOR / float(ROWS / STRIDE) * means[lane][0], 0.0);
     }
 }

@@ -5,7 +5,7 @@ use crate::error::{Error, Result};
 use crate::io::label_table::LabelTable;
 use crate::io::{LoadOptions, read, run_folder};
 use crate::run::{Settings, latest_model, models, summary};
-use crate::scene::{Dataset, Gaussians};
+use crate::scene::{ColourMatrix, Dataset, Gaussians};
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -24,8 +24,8 @@ pub(super) struct Coarse {
     pub settings: Settings,
     /// Names of the labels.
     pub names: Option<LabelTable>,
-    /// Gains of the photos, if they were trained.
-    pub gains: BTreeMap<String, [f32; 3]>,
+    /// Matrices of the photos' colours, if they were trained.
+    pub exposures: BTreeMap<String, ColourMatrix>,
     /// Seconds of a step, if the training has noted them.
     pub pace: Option<f64>,
 }
@@ -61,7 +61,7 @@ impl Coarse {
             crc: crc32fast::hash(&read::bytes(&path)?),
             near: settings.train.near,
             names: LabelTable::find_for_model(&path).map(|table| LabelTable::read(&table)).transpose()?,
-            gains: gains(model)?,
+            exposures: exposures(model)?,
             pace: seconds.filter(|_| steps > 0.0).map(|seconds| seconds / steps),
             model: found,
             settings,
@@ -81,11 +81,14 @@ impl Coarse {
     }
 }
 
-fn gains(folder: &Path) -> Result<BTreeMap<String, [f32; 3]>> {
+fn exposures(folder: &Path) -> Result<BTreeMap<String, ColourMatrix>> {
     let path: PathBuf = folder.join(run_folder::EXPOSURES);
     if !path.is_file() {
         return Ok(BTreeMap::new());
     }
-    let file: Value = read::json(&path, "expected the gains that a training wrote")?;
-    serde_json::from_value(file["gains"].clone()).map_err(|error| Error::data(&path, "gains", error.to_string()))
+    let file: Value = read::json(&path, "expected the exposures that a training wrote")?;
+    serde_json::from_value(file["matrices"].clone()).map_err(|error| {
+        let problem = format!("expected the exposures that a training of this version wrote: {error}");
+        Error::data(&path, "matrices", problem)
+    })
 }

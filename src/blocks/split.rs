@@ -91,7 +91,7 @@ impl Plan {
         let (train, test) = (&self.coarse.dataset.train, &self.coarse.dataset.test);
         let (train, test) = (pick(&block.train, train), pick(&block.test, test));
         let names = |views: &[View]| views.iter().map(|view| view.name.clone()).collect::<Vec<_>>();
-        let gain = |view: &View| Some((view.name.clone(), *self.coarse.gains.get(&view.name)?));
+        let exposure = |view: &View| Some((view.name.clone(), *self.coarse.exposures.get(&view.name)?));
         BlockFile {
             schema_version: BlockFile::VERSION,
             id: name(index),
@@ -105,7 +105,7 @@ impl Plan {
             test: names(&test),
             test_every: self.coarse.settings.read.test_every,
             poses: poses_crc(train.iter().chain(&test).map(|view| &view.camera)),
-            gains: train.iter().filter_map(gain).collect(),
+            exposures: train.iter().filter_map(exposure).collect(),
             seed: seed(self.coarse.settings.train.seed, index),
             steps: block.need.steps,
             gaussians: block.gaussians,

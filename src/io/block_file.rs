@@ -2,7 +2,7 @@
 
 use super::{atomic, read};
 use crate::error::{Error, Result};
-use crate::scene::{Camera, Zone};
+use crate::scene::{Camera, ColourMatrix, Zone};
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
@@ -68,9 +68,9 @@ pub struct BlockFile {
     pub test_every: u32,
     /// CRC-32 of the poses of all these views.
     pub poses: u32,
-    /// Gains of photos, r, g, b, that stay as they are.
+    /// Matrices of the colours of photos that stay as they are.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
-    pub gains: BTreeMap<String, [f32; 3]>,
+    pub exposures: BTreeMap<String, ColourMatrix>,
     /// Seed of all random numbers.
     pub seed: u64,
     /// Number of steps.

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 /// File with the settings of the run, in TOML.
 pub const CONFIG: &str = "config.toml";
-/// Name of the file with the gains of the photos.
+/// Name of the file with the exposures of the photos.
 pub(crate) const EXPOSURES: &str = "exposures.json";
 /// Name of the folder with the reconstruction of refined poses.
 pub(crate) const REFINED: &str = "refined";

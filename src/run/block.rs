@@ -60,7 +60,7 @@ impl Block {
             frozen: self.file.frozen,
             zone: self.file.zone.zone(self.file.axes),
             extent: self.file.extent,
-            gains: self.file.gains.clone(),
+            exposures: self.file.exposures.clone(),
         }
     }
 
@@ -75,7 +75,7 @@ impl Block {
         train.position_lr_init *= file.rate_factors[0];
         train.position_lr_final *= file.rate_factors[0];
         train.scaling_lr *= file.rate_factors[1];
-        train.exposure = if file.gains.is_empty() { ExposureMode::Off } else { ExposureMode::On };
+        train.exposure = if file.exposures.is_empty() { ExposureMode::Off } else { ExposureMode::On };
     }
 }
 

@@ -127,13 +127,13 @@ impl Run<'_> {
         OcclusionTable::new(kind, views).write(&self.request.output.join(occlusion_table::FILE))
     }
 
-    /// Writes the gains of the photos, if they were trained.
+    /// Writes the matrices of the photos' colours, if they were trained.
     fn save_exposures(&mut self) -> Result<()> {
-        let gains = self.trainer.exposures()?;
-        if gains.is_empty() {
+        let matrices = self.trainer.exposures()?;
+        if matrices.is_empty() {
             return Ok(());
         }
-        let found = serde_json::json!({ "schema_version": 1, "gains": gains });
+        let found = serde_json::json!({ "schema_version": 2, "matrices": matrices });
         atomic::write_json(&self.request.output.join(run_folder::EXPOSURES), &found)
     }
 

@@ -217,7 +217,7 @@ fn start(
         ExposureMode::Auto | ExposureMode::On => sightings.gains()?,
     };
     let config = exposure::decided(&config, &gains);
-    options.shared = Shared::of(&config, &gains, dataset, options.region.as_ref());
+    options.shared = Shared::of(&config, &gains, dataset, options.region.as_ref())?;
     let mut trainer = Trainer::new(gpu, config, dataset, &model, options)?;
     if let Some(table) = occluders {
         let without = trainer.set_occluders(&table.views);

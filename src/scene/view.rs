@@ -7,6 +7,9 @@ use std::collections::BTreeSet;
 use std::path::PathBuf;
 use std::sync::Arc;
 
+/// Red, green and blue of a photo, each from red, green and blue of the scene: its exposure and white balance.
+pub type ColourMatrix = [[f32; 3]; 3];
+
 /// A decoded photo, row-major RGBA8. Alpha is 255 for valid pixels, and 0 for pixels outside of the original image
 /// after undistortion. Pixels with alpha 0 do not count in any loss or score.
 ///

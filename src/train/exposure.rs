@@ -1,16 +1,22 @@
-//! Exposure and white balance of each photo: gains of red, green and blue, trained beside the Gaussians.
+//! Exposure and white balance of each photo: a matrix of colours, trained beside the Gaussians.
 //!
-//! A camera that chooses its exposure shows the same surface brighter in one photo than in another. Without gains, Gaussians
-//! near the cameras make up for it, which spoils other views. The picture of a step is multiplied by the gains of its
-//! photo before the loss. The mean of their logarithms stays near 0, so that the model has the mean exposure.
+//! A camera that chooses its exposure shows the same surface brighter in one photo than in another, and other light gives it
+//! other colours. Without a matrix, Gaussians near the cameras make up for it, which spoils other views. The colours of
+//! the picture of a step are multiplied by the matrix of its photo before the loss: gains of red, green and blue, after each
+//! has taken a share of the other two. The mean of all numbers over the photos stays near 0, so that the model has the
+//! mean exposure.
 
 use super::shared::{Place, SharedLayout, SharedParameters};
 use super::strategy::At;
 use super::{ExposureMode, TrainConfig};
+use crate::error::{Error, Result};
 use crate::pass::{Builder, Extension, Hook, loss};
+use crate::scene::{ColourMatrix, View};
+use crate::shaders::constants::{EXPOSURE_ROWS, EXPOSURE_SHARE};
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// Learning rate of ln gain. A photo has one update for each of its turns, some dozens in a short run.
+/// Learning rate of ln gain and of shares. A photo has one update for each of its turns, some dozens in a short run.
 const RATE: f64 = 0.01;
 /// Root mean square of ln gain over the photos from which their exposures differ. Captures with a fixed exposure have up to
 /// 0.04, by what shines and by noise.
@@ -24,10 +30,47 @@ pub(super) const NAME: &str = "exposure";
 /// Gains of a photo, r, g, b; `None` where nothing tells them.
 pub(crate) type Gains = Option<[f64; 3]>;
 
-/// Gains of each training photo, as logarithms.
+/// Rows of a photo (glsl/include/exposure.glsl).
+type Rows = [[f32; 4]; EXPOSURE_ROWS as usize];
+
+/// Returns the matrix of the rows of a photo.
+pub(super) fn matrix_of(rows: &[[f32; 4]]) -> ColourMatrix {
+    let mut matrix = [[0.0; 3]; 3];
+    for (k, of) in matrix.iter_mut().enumerate() {
+        let gain = f64::from(rows[0][k]).exp();
+        let [next, last] = [1, 2].map(|row| {
+            let x = f64::from(rows[row][k]);
+            x / (1.0 + x.abs() / f64::from(EXPOSURE_SHARE))
+        });
+        of[k] = (gain * (1.0 - next - last)) as f32;
+        of[(k + 1) % 3] = (gain * next) as f32;
+        of[(k + 2) % 3] = (gain * last) as f32;
+    }
+    matrix
+}
+
+/// Returns the rows of a photo that have a matrix; `None` for one that no training writes.
+fn rows_of(matrix: &ColourMatrix) -> Option<Rows> {
+    let mut rows = Rows::default();
+    for (k, of) in matrix.iter().enumerate() {
+        let of = of.map(f64::from);
+        let gain = of.iter().sum::<f64>();
+        rows[0][k] = gain.ln() as f32;
+        for row in [1, 2] {
+            let share = of[(k + row) % 3] / gain;
+            rows[row][k] = (share / (1.0 - share.abs() / f64::from(EXPOSURE_SHARE))) as f32;
+            if !(gain > 0.0 && share.abs() < f64::from(EXPOSURE_SHARE)) {
+                return None;
+            }
+        }
+    }
+    Some(rows)
+}
+
+/// First rows of each training photo.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Exposure {
-    start: Vec<[f32; 3]>,
+    start: Vec<Rows>,
     is_fixed: bool,
 }
 
@@ -36,13 +79,28 @@ impl Exposure {
     pub fn new(first: &[Gains]) -> Self {
         let logs: Vec<[f64; 3]> = first.iter().map(|gains| gains.map_or([0.0; 3], |of| of.map(f64::ln))).collect();
         let mean = [0, 1, 2].map(|c| logs.iter().map(|of| of[c]).sum::<f64>() / logs.len().max(1) as f64);
-        let start = logs.iter().map(|of| [0, 1, 2].map(|c| (of[c] - mean[c]) as f32)).collect();
-        Self { start, is_fixed: false }
+        let row = |of: &[f64; 3]| {
+            let [r, g, b] = [0, 1, 2].map(|c| (of[c] - mean[c]) as f32);
+            [[r, g, b, 0.0], [0.0; 4], [0.0; 4]]
+        };
+        Self { start: logs.iter().map(row).collect(), is_fixed: false }
     }
 
-    /// Makes gains that stay as they are; 1 where none are given.
-    pub fn fixed<'a>(gains: impl Iterator<Item = Option<&'a [f32; 3]>>) -> Self {
-        Self { start: gains.map(|gains| gains.map_or([0.0; 3], |of| of.map(f32::ln))).collect(), is_fixed: true }
+    /// Makes matrices that stay as they are; photos without one have the colours of the scene.
+    ///
+    /// # Errors
+    ///
+    /// A matrix that no training writes.
+    pub fn fixed(photos: &[View], matrices: &BTreeMap<String, ColourMatrix>) -> Result<Self> {
+        let rows = |photo: &View| {
+            let Some(matrix) = matrices.get(&photo.name) else { return Ok(Rows::default()) };
+            rows_of(matrix).ok_or_else(|| {
+                let limit =
+                    format!("a channel takes less than {EXPOSURE_SHARE} of each other one, and has a positive sum");
+                Error::usage("exposures", format!("{}: {matrix:?} is not the matrix of a photo: {limit}", photo.name))
+            })
+        };
+        Ok(Self { start: photos.iter().map(rows).collect::<Result<_>>()?, is_fixed: true })
     }
 }
 
@@ -78,20 +136,16 @@ impl SharedParameters for Exposure {
     }
 
     fn layout(&self) -> SharedLayout {
-        SharedLayout { scene: 0, photo: 1 }
+        SharedLayout { scene: 0, photo: EXPOSURE_ROWS }
     }
 
     fn start(&self, view: Option<usize>) -> Vec<[f32; 4]> {
-        let row = |view: usize| {
-            let [r, g, b] = self.start.get(view).copied().unwrap_or_default();
-            [r, g, b, 0.0]
-        };
-        view.into_iter().map(row).collect()
+        view.into_iter().flat_map(|view| self.start.get(view).copied().unwrap_or_default()).collect()
     }
 
     fn rates(&self, at: At) -> Vec<[f32; 4]> {
         let rate = if self.is_fixed { 0.0 } else { (RATE * at.config.rate_fall(at.step)) as f32 };
-        vec![[rate, rate, rate, 0.0]]
+        vec![[rate, rate, rate, 0.0]; EXPOSURE_ROWS as usize]
     }
 
     fn extension(&self, place: Place) -> Arc<dyn Extension> {
@@ -109,5 +163,27 @@ impl Extension for Passes {
             Hook::Loss => loss::expose_backward(b, self.0.photo, self.0.all.photo),
             Hook::Camera | Hook::Gradients | Hook::Updated => {}
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{matrix_of, rows_of};
+
+    #[test]
+    fn rows_and_matrices_of_a_photo_are_the_same() {
+        let rows = [[0.3, -0.2, 0.1, 0.0], [0.2, -0.1, 0.5, 0.0], [-0.3, 0.4, 0.05, 0.0]];
+        let matrix = matrix_of(&rows);
+        for (k, of) in matrix.iter().enumerate() {
+            let gain = rows[0][k].exp();
+            assert!((of.iter().sum::<f32>() - gain).abs() < 1e-6, "grey keeps the gain alone");
+            assert!((of[(k + 1) % 3] - gain * rows[1][k] / (1.0 + rows[1][k].abs() / 0.24)).abs() < 1e-6);
+        }
+        let again = rows_of(&matrix).expect("rows");
+        for (of, expected) in again.as_flattened().iter().zip(rows.as_flattened()) {
+            assert!((of - expected).abs() < 1e-5, "{again:?}");
+        }
+        assert_eq!(rows_of(&[[0.5, 0.5, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]), None, "too much of green");
+        assert_eq!(rows_of(&[[-1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]), None);
     }
 }

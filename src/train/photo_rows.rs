@@ -4,15 +4,15 @@ use super::adjust::{self, Frame, adjusted};
 use super::{Trainer, exposure, poses};
 use crate::error::Result;
 use crate::render::{RenderOptions, render};
-use crate::scene::Camera;
+use crate::scene::{Camera, ColourMatrix};
 use std::collections::BTreeMap;
 
 impl Trainer {
-    /// Returns the gains of each training photo, r, g, b, by name; none without exposure. Nothing may be in flight.
-    pub fn exposures(&mut self) -> Result<BTreeMap<String, [f32; 3]>> {
+    /// Returns the matrix of colours of each training photo, by name; none without exposure. Nothing may be in flight.
+    pub fn exposures(&mut self) -> Result<BTreeMap<String, ColourMatrix>> {
         let rows = self.photo_rows(exposure::NAME)?;
-        let gains = rows.iter().map(|of| [0, 1, 2].map(|channel| of[0][channel].exp()));
-        Ok(self.views.iter().map(|view| view.name.clone()).zip(gains).collect())
+        let matrices = rows.iter().map(|of| exposure::matrix_of(of));
+        Ok(self.views.iter().map(|view| view.name.clone()).zip(matrices).collect())
     }
 
     /// Returns the refined camera of each training view, by name; none without refinement. Nothing may be in flight.

@@ -1,23 +1,53 @@
-//! Exposure of a photo: the picture that the loss sees, and its gradient.
+//! Exposure of a photo: the picture that the loss sees, and its gradient (glsl/include/exposure.glsl).
 
-/// Multiplies a picture by the gains of its photo, given as logarithms.
-pub fn exposed(image: &[[f64; 3]], log_gains: [f64; 3]) -> Vec<[f64; 3]> {
-    let gains = log_gains.map(f64::exp);
-    image.iter().map(|colour| [0, 1, 2].map(|c| gains[c] * colour[c])).collect()
+/// The rows of a photo: ln of the gains, two of shares.
+pub type ExposureRows = [[f64; 3]; 3];
+
+/// Limit of what a channel takes of another one.
+const SHARE: f64 = 0.24;
+
+/// Returns gains and shares of a channel.
+fn of_channel(rows: &ExposureRows, k: usize) -> (f64, [f64; 2]) {
+    (rows[0][k].exp(), [rows[1][k], rows[2][k]].map(|x| x / (1.0 + x.abs() / SHARE)))
 }
 
-/// Gradients with respect to picture and ln gain. `v` is that with respect to the exposed picture, `photo` the photo: a
+/// Gives a picture the exposure of its photo.
+pub fn exposed(image: &[[f64; 3]], rows: &ExposureRows) -> Vec<[f64; 3]> {
+    let pixel = |c: &[f64; 3]| {
+        [0, 1, 2].map(|k| {
+            let (gain, [next, last]) = of_channel(rows, k);
+            gain * (c[k] + next * (c[(k + 1) % 3] - c[k]) + last * (c[(k + 2) % 3] - c[k]))
+        })
+    };
+    image.iter().map(pixel).collect()
+}
+
+/// Gradients with respect to picture and rows. `v` is that with respect to the exposed picture, `photo` the photo: a
 /// channel above 1 where the photo is saturated does not count. `prior` pulls the mean over all photos, `mean`, to 0.
 pub fn backward(
     image: &[[f64; 3]],
-    log_gains: [f64; 3],
+    rows: &ExposureRows,
     (v, photo): (&[[f64; 3]], &[[f64; 3]]),
-    (prior, mean): (f64, [f64; 3]),
-) -> (Vec<[f64; 3]>, [f64; 3]) {
-    let exposed = exposed(image, log_gains);
-    let counts = |p: usize, c: usize| !(exposed[p][c] > 1.0 && photo[p][c] == 1.0);
-    let v: Vec<[f64; 3]> = (0..v.len()).map(|p| [0, 1, 2].map(|c| if counts(p, c) { v[p][c] } else { 0.0 })).collect();
-    let sum = |c: usize| v.iter().zip(&exposed).map(|(v, colour)| v[c] * colour[c]).sum::<f64>();
-    let of_gains = [0, 1, 2].map(|c| sum(c) + prior * mean[c]);
-    (v.iter().map(|v| [0, 1, 2].map(|c| log_gains[c].exp() * v[c])).collect(), of_gains)
+    (prior, mean): (f64, &ExposureRows),
+) -> (Vec<[f64; 3]>, ExposureRows) {
+    let exposed = exposed(image, rows);
+    let mut v_rows = mean.map(|of| of.map(|mean| prior * mean));
+    let mut v_image = vec![[0.0; 3]; v.len()];
+    for (p, c) in image.iter().enumerate() {
+        for k in 0..3 {
+            if exposed[p][k] > 1.0 && photo[p][k] == 1.0 {
+                continue;
+            }
+            let (gain, shares) = of_channel(rows, k);
+            v_rows[0][k] += v[p][k] * exposed[p][k];
+            v_image[p][k] += v[p][k] * gain * (1.0 - shares[0] - shares[1]);
+            for (row, share) in [1, 2].into_iter().zip(shares) {
+                let other = (k + row) % 3;
+                let slope = (1.0 + rows[row][k].abs() / SHARE).powi(-2);
+                v_rows[row][k] += v[p][k] * gain * slope * (c[other] - c[k]);
+                v_image[p][other] += v[p][k] * gain * share;
+            }
+        }
+    }
+    (v_image, v_rows)
 }
