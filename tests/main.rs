@@ -38,7 +38,7 @@ mod decide; // labels from votes
 mod densify; // the video for a tracker, and its masks on the photos
 mod drivers; // every subgroup size, and drivers other than the usual one
 mod edits; // labels by name, pixel and box; parts, specks and colours of a model
-mod exposure; // gains of photos are trained, found and resumed
+mod exposure; // exposures of photos are trained, found and resumed
 mod fill; // the place of a removed object is closed
 mod gradient; // gradients of the f64 mirrors, which the kernels are compared with
 mod guide; // every command of README.md and of the guide runs

@@ -28,16 +28,20 @@ shared vec3 means[EXPOSURE_ROWS][64];
 
 void main() {
     uint lane = gl_LocalInvocationID.x, partials = (step.width * step.height + EXPOSED - 1u) / EXPOSED;
+    vec3 sum[EXPOSURE_ROWS] = vec3[](vec3(0.0), vec3(0.0), vec3(0.0)), mean[EXPOSURE_ROWS] = sum;
+    for (uint k = lane; k < partials; k += 64u) {
+        for (uint i = 0u; i < EXPOSURE_ROWS; ++i) {
+            sum[i] += exposure_partials[EXPOSURE_ROWS * k + i].rgb;
+        }
+    }
+    for (uint row = ROW + lane * STRIDE; row < ROWS; row += 64u * STRIDE) {
+        for (uint i = 0u; i < EXPOSURE_ROWS; ++i) {
+            mean[i] += shared_parameters[row + i].rgb;
+        }
+    }
     for (uint i = 0u; i < EXPOSURE_ROWS; ++i) {
-        vec3 sum = vec3(0.0), mean = vec3(0.0);
-        for (uint k = lane; k < partials; k += 64u) {
-            sum += exposure_partials[EXPOSURE_ROWS * k + i].rgb;
-        }
-        for (uint row = ROW + i + lane * STRIDE; row < ROWS; row += 64u * STRIDE) {
-            mean += shared_parameters[row].rgb;
-        }
-        sums[i][lane] = sum;
-        means[i][lane] = mean;
+        sums[i][lane] = sum[i];
+        means[i][lane] = mean[i];
     }
     for (uint half_ = 32u; half_ > 0u; half_ /= 2u) {
         barrier();
