@@ -88,7 +88,7 @@ fn exposures(folder: &Path) -> Result<BTreeMap<String, ColourMatrix>> {
     }
     let file: Value = read::json(&path, "expected the exposures that a training wrote")?;
     serde_json::from_value(file["matrices"].clone()).map_err(|error| {
-        let problem = format!("expected the exposures that a training of this version wrote: {error}");
+        let problem = format!("expected the exposures that a training of this version wrote, train again: {error}");
         Error::data(&path, "matrices", problem)
     })
 }

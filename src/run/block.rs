@@ -5,9 +5,9 @@ use super::resume::Resumed;
 use crate::error::{Error, Result};
 use crate::io::LoadOptions;
 use crate::io::block_file::{self, BlockFile, poses_crc};
-use crate::scene::{Dataset, View};
-use crate::train::ExposureMode;
+use crate::scene::{ColourMatrix, Dataset, View};
 use crate::train::region::Region;
+use crate::train::{ExposureMode, exposure};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -55,13 +55,18 @@ impl Block {
     }
 
     /// Returns the part of the scene.
-    pub(super) fn region(&self) -> Region {
-        Region {
+    pub(super) fn region(&self) -> Result<Region> {
+        let rows = |(name, matrix): (&String, &ColourMatrix)| {
+            let problem = || format!("{matrix:?} of {name} is not the matrix of a photo; split the scene again");
+            let error = || Error::data(self.folder.join(block_file::BLOCK), "exposures", problem());
+            Ok((name.clone(), exposure::rows_of(matrix).ok_or_else(error)?))
+        };
+        Ok(Region {
             frozen: self.file.frozen,
             zone: self.file.zone.zone(self.file.axes),
             extent: self.file.extent,
-            exposures: self.file.exposures.clone(),
-        }
+            exposures: self.file.exposures.iter().map(rows).collect::<Result<_>>()?,
+        })
     }
 
     fn apply(&self, settings: &mut Settings) {

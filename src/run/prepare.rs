@@ -138,7 +138,7 @@ pub(super) fn begin<'a>(
     let sightings = Sightings::new(&request.scene, &dataset);
     let files = (inputs.known_depths.as_deref(), &sightings);
     let (train, depths) = depths::decided((&request.scene, &dataset), (&settings.train, is_new), files)?;
-    let options = TrainerOptions { region: block.map(|block| block.region()), depths, ..options.into() };
+    let options = TrainerOptions { region: block.map(|block| block.region()).transpose()?, depths, ..options.into() };
     let mut facts = facts(request, inputs.masks.as_deref(), &gpu);
     facts.extend(resumed.as_ref().map(|resumed| ("goes on after step", resumed.state.step.to_string())));
     let before = resumed.as_ref().and_then(|resumed| resumed.record.occlusion.clone());
@@ -217,7 +217,7 @@ fn start(
         ExposureMode::Auto | ExposureMode::On => sightings.gains()?,
     };
     let config = exposure::decided(&config, &gains);
-    options.shared = Shared::of(&config, &gains, dataset, options.region.as_ref())?;
+    options.shared = Shared::of(&config, &gains, dataset, options.region.as_ref());
     let mut trainer = Trainer::new(gpu, config, dataset, &model, options)?;
     if let Some(table) = occluders {
         let without = trainer.set_occluders(&table.views);

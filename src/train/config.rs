@@ -64,7 +64,7 @@ crate::options::options! {
 
             /// Trains the exposure and white balance of each photo.
             ///
-            /// The colours of the picture are multiplied by a matrix of its photo before they are compared; the model has the mean exposure.
+            /// The colours of the picture are multiplied by a matrix of its photo; the model has the mean exposure.
             exposure <"MODE">: ExposureMode = ExposureMode::Auto, fixed;
 
             /// Refines the poses of the photos: each is turned and moved while the Gaussians are trained.
@@ -390,8 +390,7 @@ impl TrainConfig {
             return Err(Error::usage("grow_box", "is empty; it needs the smaller corner first, then the larger one"));
         }
         if self.random_background && self.exposure == ExposureMode::On {
-            let problem =
-                "is on, which needs `exposure = \"off\"`: the exposure of a photo is not that of a random colour";
+            let problem = "is on, which needs `exposure = \"off\"`: a random colour has no exposure of a photo";
             return Err(Error::usage("random_background", problem));
         }
         Ok(())

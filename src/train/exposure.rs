@@ -9,11 +9,9 @@
 use super::shared::{Place, SharedLayout, SharedParameters};
 use super::strategy::At;
 use super::{ExposureMode, TrainConfig};
-use crate::error::{Error, Result};
 use crate::pass::{Builder, Extension, Hook, loss};
-use crate::scene::{ColourMatrix, View};
+use crate::scene::ColourMatrix;
 use crate::shaders::constants::{EXPOSURE_ROWS, EXPOSURE_SHARE};
-use std::collections::BTreeMap;
 use std::sync::Arc;
 
 /// Learning rate of ln gain and of shares. A photo has one update for each of its turns, some dozens in a short run.
@@ -31,7 +29,7 @@ pub(super) const NAME: &str = "exposure";
 pub(crate) type Gains = Option<[f64; 3]>;
 
 /// Rows of a photo (glsl/include/exposure.glsl).
-type Rows = [[f32; 4]; EXPOSURE_ROWS as usize];
+pub(crate) type Rows = [[f32; 4]; EXPOSURE_ROWS as usize];
 
 /// Returns the matrix of the rows of a photo.
 pub(super) fn matrix_of(rows: &[[f32; 4]]) -> ColourMatrix {
@@ -49,8 +47,9 @@ pub(super) fn matrix_of(rows: &[[f32; 4]]) -> ColourMatrix {
     matrix
 }
 
-/// Returns the rows of a photo that have a matrix; `None` for one that no training writes.
-fn rows_of(matrix: &ColourMatrix) -> Option<Rows> {
+/// Returns the rows of a photo that have a matrix; `None` for one that no training writes: each channel takes less than
+/// [`EXPOSURE_SHARE`] of each other one, and its numbers have a positive sum.
+pub(crate) fn rows_of(matrix: &ColourMatrix) -> Option<Rows> {
     let mut rows = Rows::default();
     for (k, of) in matrix.iter().enumerate() {
         let of = of.map(f64::from);
@@ -86,21 +85,9 @@ impl Exposure {
         Self { start: logs.iter().map(row).collect(), is_fixed: false }
     }
 
-    /// Makes matrices that stay as they are; photos without one have the colours of the scene.
-    ///
-    /// # Errors
-    ///
-    /// A matrix that no training writes.
-    pub fn fixed(photos: &[View], matrices: &BTreeMap<String, ColourMatrix>) -> Result<Self> {
-        let rows = |photo: &View| {
-            let Some(matrix) = matrices.get(&photo.name) else { return Ok(Rows::default()) };
-            rows_of(matrix).ok_or_else(|| {
-                let limit =
-                    format!("a channel takes less than {EXPOSURE_SHARE} of each other one, and has a positive sum");
-                Error::usage("exposures", format!("{}: {matrix:?} is not the matrix of a photo: {limit}", photo.name))
-            })
-        };
-        Ok(Self { start: photos.iter().map(rows).collect::<Result<_>>()?, is_fixed: true })
+    /// Makes rows that stay as they are; a photo without them has the colours of the scene.
+    pub fn fixed<'a>(rows: impl Iterator<Item = Option<&'a Rows>>) -> Self {
+        Self { start: rows.map(|rows| rows.copied().unwrap_or_default()).collect(), is_fixed: true }
     }
 }
 

@@ -154,7 +154,7 @@ impl Trainer {
         TrainerOptions { shape, scheduler, strategy, shared, region, depths }: TrainerOptions,
     ) -> Result<Self> {
         let fixed = Region::scale(region.as_ref(), dataset);
-        let shared = shared.or_of(&config, dataset, region.as_ref())?;
+        let shared = shared.or_of(&config, dataset, region.as_ref());
         let strategy = strategy.unwrap_or_else(|| strategy::of(config.strategy));
         let most = if config.max_gaussians > 0 { config.max_gaussians } else { u64::from(u32::MAX) };
         let shape = shape.unwrap_or_else(|| KernelShape::of(gpu.capabilities()));

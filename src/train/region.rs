@@ -1,9 +1,9 @@
 //! A part of a scene that is trained alone, in the light of the rest.
 
-use super::TrainConfig;
 use super::step_input::SceneScale;
+use super::{TrainConfig, exposure};
 use crate::error::{Error, Result};
-use crate::scene::{ColourMatrix, Dataset, Gaussians, Zone};
+use crate::scene::{Dataset, Gaussians, Zone};
 use std::collections::BTreeMap;
 
 /// A part of a larger scene. Its first model has the Gaussians of the part, then others that are drawn and not trained.
@@ -15,8 +15,8 @@ pub struct Region {
     pub zone: Zone,
     /// Extent of the whole scene, world units: learning rates and limits of size follow from it.
     pub extent: f64,
-    /// Matrices of colours of photos, by name, that stay as they are; empty for none.
-    pub exposures: BTreeMap<String, ColourMatrix>,
+    /// Exposures of photos, by name, that stay as they are; empty for none.
+    pub exposures: BTreeMap<String, exposure::Rows>,
 }
 
 impl Region {

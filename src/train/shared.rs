@@ -101,28 +101,23 @@ impl<P: SharedParameters + 'static> From<P> for Shared {
 impl Shared {
     /// Returns the parameters that the configuration asks for. `gains` are the first gains of each photo.
     /// Those of a region stay.
-    pub(crate) fn of(
-        config: &TrainConfig,
-        gains: &[Gains],
-        dataset: &Dataset,
-        region: Option<&Region>,
-    ) -> Result<Self> {
+    pub(crate) fn of(config: &TrainConfig, gains: &[Gains], dataset: &Dataset, region: Option<&Region>) -> Self {
         let mut all: Vec<Box<dyn SharedParameters>> = Vec::new();
         if config.exposure == ExposureMode::On {
             all.push(Box::new(match region {
-                Some(region) => Exposure::fixed(&dataset.train, &region.exposures)?,
+                Some(region) => Exposure::fixed(dataset.train.iter().map(|view| region.exposures.get(&view.name))),
                 None => Exposure::new(gains),
             }));
         }
         if config.refine_poses {
             all.push(Box::new(Poses::new(dataset)));
         }
-        Ok(Self(all))
+        Self(all)
     }
 
     /// Returns the parameters, or those that the configuration asks for.
-    pub(super) fn or_of(self, config: &TrainConfig, dataset: &Dataset, region: Option<&Region>) -> Result<Self> {
-        if self.0.is_empty() { Self::of(config, &[], dataset, region) } else { Ok(self) }
+    pub(super) fn or_of(self, config: &TrainConfig, dataset: &Dataset, region: Option<&Region>) -> Self {
+        if self.0.is_empty() { Self::of(config, &[], dataset, region) } else { self }
     }
 
     fn layout(&self) -> SharedLayout {
