@@ -78,7 +78,7 @@ fn a_channel_that_takes_of_another_one_is_found() {
         let config = settings(ExposureMode::On);
         let mut trainer =
             Trainer::new(turn.gpu(), config, &scene, &start, SchedulerOptions::default()).expect("a trainer");
-        go_on(&mut trainer, 60);
+        go_on(&mut trainer, 120);
         halves(&mut trainer, |matrix| matrix[0][2] / matrix[0].iter().sum::<f32>())
     };
     let (plain, mixed) = (taken(|colour| colour), taken(|[r, g, b]| [0.7 * r + 0.3 * b, g, b]));
