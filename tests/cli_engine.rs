@@ -175,6 +175,10 @@ fn scores_by_region_and_near_plane(out: &str, scene: &str, masks: &str) {
             let all = share * error("psnr_seen") + (1.0 - share) * error("psnr_unseen");
             assert!((all / error("psnr") - 1.0).abs() < 1e-6, "the regions make up the view: {view}");
         }
+        assert!(
+            number(&view["psnr_seen_corrected"]) + 1e-3 > number(&view["psnr_seen"]),
+            "the identity is a map: {view}"
+        );
         assert!(number(&view["psnr_objects"]) > 5.0 && number(&view["psnr_contours"]) > 5.0);
     }
     let planes = scores["near"]["planes"].as_array().expect("planes");

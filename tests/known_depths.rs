@@ -27,6 +27,32 @@ fn a_training_with_known_depths_goes_on_from_a_checkpoint() {
     assert!(models[0] != models[1] && models[0] != models[2] && models[1] != models[2]);
 }
 
+/// Writes PFM maps of 64 x 48 px: 3 units, and `left` in the left half.
+fn written(place: &Place, name: &str, left: f32) -> String {
+    fs::create_dir(place.path(name)).expect("a folder");
+    let row = (0..64).flat_map(|x| if x < 32 { left } else { 3.0 }.to_le_bytes()).collect::<Vec<u8>>();
+    let bytes = [b"Pf\n64 48\n-1.0\n".to_vec(), row.repeat(48)].concat();
+    (0..6).for_each(|view| fs::write(place.path(name).join(format!("{view:03}.pfm")), &bytes).expect("a map"));
+    place.text(name)
+}
+
+/// What is left out of the loss has no depth either: a point on somebody who walks through is no prior.
+#[test]
+fn ignored_pixels_have_no_known_depth() {
+    let place = Place::new();
+    fs::create_dir(place.path("ignore")).expect("a folder");
+    let half = image::GrayImage::from_fn(64, 48, |x, _| image::Luma([if x < 32 { 255 } else { 0 }]));
+    (0..6).for_each(|view| half.save(place.path("ignore").join(format!("{view:03}.png"))).expect("a picture"));
+    let (near, far, ignore) = (written(&place, "near", 2.0), written(&place, "far", 9.0), place.text("ignore"));
+    let trained = |name: &str, known: &str, more: &[&str]| {
+        let whole = ["--iterations", "20", "--start-size", "1", "--full-size-from", "0", "--depth-weight", "1"];
+        succeeded(&place.trained(name, &[&whole[..], &["--known-depths", known], more].concat()));
+        place.model(name, 20)
+    };
+    assert!(trained("a", &near, &[]) != trained("b", &far, &[]), "they count elsewhere");
+    assert!(trained("c", &near, &["--ignore", &ignore]) == trained("d", &far, &["--ignore", &ignore]), "the same bits");
+}
+
 #[test]
 fn depths_that_are_not_there_are_an_error() {
     let place = Place::new();
@@ -38,6 +64,11 @@ fn depths_that_are_not_there_are_an_error() {
     refused(&["--known-depths", &maps, "--depth-weight", "0"], &["--known-depths", "--depth-weight above 0"]);
     refused(&with(&["--known-depths", &place.text("nowhere")]), &["nowhere", "there is no such folder"]);
     refused(&with(&["--known-depths", &masks]), &["masks", "depth needs 16-bit grey"]);
+    let holes = written(&place, "holes", 0.0);
+    let empty = [b"Pf\n64 48\n-1.0\n".to_vec(), vec![0; 4 * 64 * 48]].concat();
+    (0..6).for_each(|view| fs::write(place.path("holes").join(format!("{view:03}.pfm")), &empty).expect("a map"));
+    refused(&["--iterations", "60", "--known-depths", &holes], &["holes", "maps without a depth"]);
+    refused(&with(&["--known-depths", &holes]), &["holes", "maps without a depth"]);
     fs::remove_file(place.path("scene/depth/001.exr")).expect("a map");
     refused(&with(&["--known-depths", &maps]), &["depth", "have none", "001"]);
     refused(&["--depth-weight=-1"], &["depth"]);

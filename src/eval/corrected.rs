@@ -10,11 +10,13 @@ use glam::{DMat4, DVec4};
 /// Keeps the equations of a picture with few colours solvable; much less than a pixel's rounding.
 const RIDGE: f64 = 1e-6;
 
-/// Returns the PSNR of the corrected render over the photo's valid pixels, dB. `render` has the photo's pixels.
-pub(super) fn psnr_corrected(render: &[[f32; 3]], photo: &Photo) -> f64 {
+/// Returns the PSNR of the corrected render over the photo's valid pixels that count, dB; `None` without any. The map
+/// is that of the same pixels. `render` has the photo's pixels.
+pub(super) fn psnr_corrected(render: &[[f32; 3]], photo: &Photo, counts: impl Fn(usize) -> bool) -> Option<f64> {
     let pairs = || {
-        let valid = render.iter().zip(&photo.rgba).filter(|(_, texel)| texel[3] > 0);
-        valid.map(|(colour, &[r, g, b, _])| {
+        let pixels = render.iter().zip(&photo.rgba).enumerate();
+        let valid = pixels.filter(|&(index, (_, texel))| texel[3] > 0 && counts(index));
+        valid.map(|(_, (colour, &[r, g, b, _]))| {
             let [x, y, z] = colour.map(|value| f64::from(value.clamp(0.0, 1.0)));
             (DVec4::new(x, y, z, 1.0), [r, g, b].map(byte_value))
         })
@@ -33,7 +35,7 @@ pub(super) fn psnr_corrected(render: &[[f32; 3]], photo: &Photo) -> f64 {
     let square = |(colour, truth): (DVec4, [f64; 3])| {
         (0..3).map(|c| (maps[c].dot(colour).clamp(0.0, 1.0) - truth[c]).powi(2)).sum::<f64>() / 3.0
     };
-    mean(pairs().map(square)).map_or(f64::NAN, psnr_of)
+    mean(pairs().map(square)).map(psnr_of)
 }
 
 #[cfg(test)]
@@ -54,11 +56,16 @@ mod tests {
         let photo = Photo { width: 16, height: 16, rgba };
         let render: Vec<[f32; 3]> = (0..256).map(at).collect();
         // Rounding to bytes is left.
-        assert!(psnr_corrected(&render, &photo) > 55.0);
+        let corrected = |render: &[[f32; 3]]| psnr_corrected(render, &photo, |_| true).unwrap();
+        assert!(corrected(&render) > 55.0);
         let mut shuffled = render.clone();
         shuffled.rotate_left(5);
-        assert!(psnr_corrected(&shuffled, &photo) < 30.0);
-        let grey = vec![[0.5; 3]; 256];
-        assert!(psnr_corrected(&grey, &photo).is_finite());
+        assert!(corrected(&shuffled) < 30.0);
+        assert!(corrected(&vec![[0.5; 3]; 256]).is_finite());
+        // A hole that does not count does not bend the map either.
+        let holed: Vec<[f32; 3]> = (0..256).map(|i| if i < 100 { [0.0; 3] } else { at(i) }).collect();
+        assert!(corrected(&holed) < 30.0);
+        assert!(psnr_corrected(&holed, &photo, |index| index >= 100).unwrap() > 55.0);
+        assert_eq!(psnr_corrected(&holed, &photo, |_| false), None);
     }
 }

@@ -2,6 +2,7 @@
 //!
 //! A score over whole views mixes pixels that training can know with pixels that it has to make up.
 
+use super::corrected::psnr_corrected;
 use super::subject::Subject;
 use crate::Result;
 use crate::eval::metrics::{mean, psnr_over};
@@ -28,6 +29,8 @@ pub struct RegionScores {
     pub seen_share: f64,
     /// Over these pixels.
     pub psnr_seen: Option<f64>,
+    /// Over the same pixels after a correction of their colours: neither exposure nor what no photo shows counts.
+    pub psnr_seen_corrected: Option<f64>,
     /// Over all others.
     pub psnr_unseen: Option<f64>,
     /// Over the objects of the mask, without their contours.
@@ -50,6 +53,7 @@ impl RegionScores {
         Self {
             seen_share: seen.iter().filter(|&&seen| seen).count() as f64 / seen.len().max(1) as f64,
             psnr_seen: over(&|index| seen[index]),
+            psnr_seen_corrected: psnr_corrected(rgb, photo, |index| seen[index]),
             psnr_unseen: over(&|index| !seen[index]),
             psnr_objects: labelled(&|object, near| object && !near),
             psnr_contours: labelled(&|_, near| near),
@@ -63,6 +67,7 @@ impl RegionScores {
         Some(Self {
             seen_share: mean(of.clone().map(|scores| scores.seen_share))?,
             psnr_seen: over(|scores| scores.psnr_seen),
+            psnr_seen_corrected: over(|scores| scores.psnr_seen_corrected),
             psnr_unseen: over(|scores| scores.psnr_unseen),
             psnr_objects: over(|scores| scores.psnr_objects),
             psnr_contours: over(|scores| scores.psnr_contours),

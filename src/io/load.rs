@@ -5,9 +5,9 @@ use super::bad_photos::{self, LISTED_MAX};
 use super::listing::{Listed, Listing};
 use super::mask::MaskFolder;
 use super::photo_store::PhotoStore;
-use super::recipe::Recipe;
+use super::recipe::{MadeView, MadeViews, Recipe};
 use crate::error::{Error, Result};
-use crate::scene::{Dataset, View, crew};
+use crate::scene::{Dataset, Photo, View, crew};
 use rayon::prelude::*;
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -21,24 +21,23 @@ pub(crate) fn load(root: &Path, mut listing: Listing, options: &LoadOptions) -> 
     if let Some(only) = &options.only {
         limit(root, &mut views, &mut test, only)?;
     }
-    let masks = options.masks.as_deref().map(|folder| MaskFolder::new(folder, views.iter().map(|v| v.name.as_str())));
-    let masks = masks.transpose()?;
-    let ignore = options.ignore.as_deref().map(|folder| MaskFolder::new(folder, views.iter().map(|v| v.name.as_str())));
-    let ignore = ignore.transpose()?;
-    if let Some(ignore) = ignore.as_ref().filter(|ignore| views.iter().all(|view| ignore.find(&view.name).is_none())) {
-        return Err(ignore.nothing_found(&views[0].name));
+    let open = |folder: &Path| MaskFolder::new(folder, views.iter().map(|view| view.name.as_str()));
+    let masks = options.masks.as_deref().map(open).transpose()?;
+    let ignore = options.ignore.as_deref().map(open).transpose()?;
+    if let Some(ignore) = &ignore {
+        note_missing(ignore, &views, "picture of what to ignore", &mut notes)?;
     }
     let recipe = |(view, &test): (&Listed, &bool)| {
         let of = |folder: &Option<MaskFolder>| folder.as_ref().and_then(|folder| folder.find(&view.name));
         Arc::new(Recipe::new(view.clone(), [of(&masks), of(&ignore)], test, options))
     };
     let recipes: Vec<Arc<Recipe>> = views.iter().zip(&test).map(recipe).collect();
-    let (read, resampled) = read_views(&recipes, &test, options);
+    let Read { photos, resampled, blank } = read_views(&recipes, &test, options);
     let mut undecodable = std::mem::take(&mut listing.bad);
     let total = views.len() + undecodable.len();
     let mut loaded = Vec::with_capacity(views.len());
-    for (view, test) in read.into_iter().zip(test) {
-        match view {
+    for (views, test) in photos.into_iter().zip(test) {
+        match views {
             Ok(views) => loaded.push(views.map(|views| (views, test))),
             Err(error) => undecodable.push(error),
         }
@@ -46,8 +45,9 @@ pub(crate) fn load(root: &Path, mut listing: Listing, options: &LoadOptions) -> 
     bad_photos::skip(root, undecodable, total, options, &mut notes)?;
     let loaded: Vec<(Vec<View>, bool)> = all_or_one_error(root, loaded)?;
     if let Some(masks) = &masks {
-        note_missing(masks, &views, &mut notes)?;
+        note_missing(masks, &views, "mask", &mut notes)?;
     }
+    note_blank(root, &blank, loaded.iter().all(|(views, _)| views.is_empty()), &mut notes)?;
     if resampled > 0 {
         notes.push(format!("{resampled} masks differ in size from their photos and were scaled (nearest id)"));
     }
@@ -74,16 +74,30 @@ pub(crate) fn load(root: &Path, mut listing: Listing, options: &LoadOptions) -> 
     Ok(dataset)
 }
 
-/// Notes the photos without a mask; refuses a folder without any.
-fn note_missing(masks: &MaskFolder, views: &[Listed], notes: &mut Vec<String>) -> Result<()> {
+/// Notes the photos without a picture in the folder; refuses one without any.
+fn note_missing(masks: &MaskFolder, views: &[Listed], what: &str, notes: &mut Vec<String>) -> Result<()> {
     let without = views.iter().filter(|view| masks.find(&view.name).is_none()).map(|view| view.name.as_str());
     let without: Vec<&str> = without.collect();
     if without.len() == views.len() {
         return Err(masks.nothing_found(&views[0].name));
     }
     if !without.is_empty() {
-        notes.push(format!("{} of {} photos have no mask: {}", without.len(), views.len(), shortened(&without)));
+        notes.push(format!("{} of {} photos have no {what}: {}", without.len(), views.len(), shortened(&without)));
     }
+    Ok(())
+}
+
+/// Notes the views without a pixel that counts; refuses a scene of nothing else.
+fn note_blank(root: &Path, blank: &[String], is_all: bool, notes: &mut Vec<String>) -> Result<()> {
+    if blank.is_empty() {
+        return Ok(());
+    }
+    let names: Vec<&str> = blank.iter().map(String::as_str).collect();
+    let problem = format!("{} have no pixel that counts: all are ignored, or outside of the lens", shortened(&names));
+    if is_all {
+        return Err(Error::data(root, "photos", problem + "; check what is ignored and the coefficients of the lens"));
+    }
+    notes.push(format!("{} views are skipped, because {problem}", names.len()));
     Ok(())
 }
 
@@ -105,32 +119,45 @@ fn retain<T>(items: &mut Vec<T>, kept: &[bool]) {
     items.retain(|_| flags.next() == Some(&true));
 }
 
-/// Makes the views of each photo. The outer error is that of an undecodable photo. Also returns the number of masks with
-/// another size than their photos.
-fn read_views(
-    recipes: &[Arc<Recipe>],
-    test: &[bool],
-    options: &LoadOptions,
-) -> (Vec<Result<Result<Vec<View>>>>, usize) {
+/// What is read of all photos.
+struct Read {
+    /// Views of each. The outer error is that of an undecodable photo.
+    photos: Vec<Result<Result<Vec<View>>>>,
+    /// Number of masks with another size than their photos.
+    resampled: usize,
+    /// Names of the views without a valid pixel, which are left out: nothing can be learned or scored there.
+    blank: Vec<String>,
+}
+
+/// Makes the views of each photo.
+fn read_views(recipes: &[Arc<Recipe>], test: &[bool], options: &LoadOptions) -> Read {
     let stored: Vec<_> = recipes.par_iter().map(|recipe| recipe.stored()).collect();
     let store = PhotoStore::new(recipes, &stored, test, options);
     let read = |index: usize| {
         let (recipe, size) = (&recipes[index], *stored[index].as_ref().ok()?);
         let made = recipe.decode(size).map(|photo| recipe.views(size, photo));
-        Some(made.map(|made| made.map(|made| (made.resampled, store.keep(index, recipe, size, made.views)))))
+        let kept = |made: MadeViews| {
+            let counts = |view: &MadeView| view.photo.as_ref().is_none_or(Photo::has_valid);
+            let counts: Vec<bool> = made.views.iter().map(counts).collect();
+            (made.resampled, store.keep(index, recipe, size, made.views).into_iter().zip(counts).collect())
+        };
+        Some(made.map(|made| made.map(kept)))
     };
     let read = crew::map(recipes.len(), store.at_once(), read);
-    let mut resampled = 0;
-    let mut count = |(masks, views)| {
+    let (mut resampled, mut blank) = (0, Vec::new());
+    let mut count = |(masks, views): (usize, Vec<(View, bool)>)| {
         resampled += masks;
-        views
+        let (views, left_out): (Vec<_>, Vec<_>) = views.into_iter().partition(|&(_, counts)| counts);
+        blank.extend(left_out.into_iter().map(|(view, _)| view.name));
+        views.into_iter().map(|(view, _)| view).collect()
     };
     let of_photo = |(size, made): (Result<_>, Option<Result<Result<_>>>)| match (size, made) {
         (Err(error), _) => Err(error),
         (Ok(_), Some(made)) => made.map(|made| made.map(&mut count)),
         (Ok(_), None) => Err(Error::Bug("a photo of known size was not read".to_owned())),
     };
-    (stored.into_iter().zip(read).map(of_photo).collect(), resampled)
+    let photos = stored.into_iter().zip(read).map(of_photo).collect();
+    Read { photos, resampled, blank }
 }
 
 /// Refuses a photo that is named as the face of another.
@@ -154,7 +181,12 @@ pub(crate) fn shortened(names: &[&str]) -> String {
 fn existing(listing: &Listing, options: &LoadOptions, notes: &mut Vec<String>) -> Result<Vec<Listed>> {
     let total = listing.views.len() + listing.missing.len();
     if total + listing.bad.len() == 0 {
-        return Err(Error::data(&listing.source, "", "lists no photo"));
+        let why = notes.iter().map(|note| format!("; {note}")).collect::<String>();
+        return Err(Error::data(
+            &listing.source,
+            "",
+            format!("lists no photo with a pose; align the photos first{why}"),
+        ));
     }
     let found = listing.views.iter().filter(|view| view.photo.is_some()).count();
     if found == 0 && !options.photos && !listing.views.is_empty() {

@@ -24,7 +24,7 @@ fn unreadable(path: &Path, error: DecodingError) -> Error {
 }
 
 fn problem(path: &Path, problem: impl std::fmt::Display) -> Error {
-    Error::data(path, "", format!("is no readable PNG mask: {problem}"))
+    Error::data(path, "", format!("is no readable PNG: {problem}; write the file again"))
 }
 
 /// The header of a PNG.
@@ -102,6 +102,17 @@ pub(crate) fn read_checked(path: &Path, accept: impl FnOnce((u32, u32)) -> Resul
     })?;
     let (width, height) = raw.header.size;
     Ok(LabelMap { width, height, ids: raw.samples() })
+}
+
+/// Reads a picture of what to ignore, a PNG of any kind: 1 where a colour or a palette index is not 0, which black is.
+/// `accept` checks the size before decoding.
+pub(crate) fn read_ignored(path: &Path, accept: impl FnOnce((u32, u32)) -> Result<()>) -> Result<LabelMap> {
+    let raw = read_raw(path, |header| accept(header.size))?;
+    let Header { size: (width, height), colour, .. } = raw.header;
+    // Opacity, the last of two or four channels, says nothing.
+    let colours = colour.samples() - usize::from(colour.samples() % 2 == 0);
+    let is_ignored = |pixel: &[u16]| u16::from(pixel[..colours].iter().any(|&value| value != 0));
+    Ok(LabelMap { width, height, ids: raw.samples().chunks_exact(colour.samples()).map(is_ignored).collect() })
 }
 
 fn unpack(line: &[u8], depth: png::BitDepth, width: usize) -> Vec<u16> {
@@ -194,7 +205,7 @@ impl MaskFolder {
     /// Opens the folder; `names` are those of all photos of the scene.
     pub(crate) fn new<'a>(folder: &Path, names: impl Iterator<Item = &'a str>) -> Result<Self> {
         if !folder.is_dir() {
-            return Err(Error::data(folder, "", "there is no such folder of masks"));
+            return Err(Error::data(folder, "", "there is no such folder"));
         }
         Ok(Self { folder: folder.to_owned(), names: PhotoNames::new(names) })
     }
@@ -207,9 +218,9 @@ impl MaskFolder {
     /// Makes the error for a folder without a mask for any photo.
     pub(crate) fn nothing_found(&self, name: &str) -> Error {
         let expected = Path::new(name).with_extension("png");
-        let mut text = format!("no photo of the scene has a mask here; expected for example {}", expected.display());
+        let mut text = format!("has a PNG for no photo of the scene; expected for example {}", expected.display());
         if ["jpg", "jpeg", "JPG"].iter().any(|ext| self.folder.join(expected.with_extension(ext)).is_file()) {
-            text.push_str("; JPEG masks are refused because compression changes ids, write PNG");
+            text.push_str("; JPEG is refused because compression changes ids, write PNG");
         }
         Error::data(&self.folder, "", text)
     }

@@ -57,11 +57,9 @@ pub(crate) fn list_file(scene: &Place, path: &Path) -> Result<Listing> {
     if chunks.next().is_some() {
         listing.notes.push(format!("only the first chunk of {} is used", path.display()));
     }
-    let sensors = file.by_id(chunk, "sensor", |sensor| file.sensor(sensor))?;
-    let components = file.by_id(chunk, "component", |component| file.similarity(component))?;
-    let chunk_to_world = file.similarity(chunk)?;
+    let mut chunk = Chunk::new(&file, chunk)?;
     let (mut without, mut names) = (0, BTreeSet::new());
-    for camera in chunk.descendants().filter(|node| node.has_tag_name("camera") && node.has_attribute("label")) {
+    for camera in chunk.node.descendants().filter(|node| node.has_tag_name("camera") && node.has_attribute("label")) {
         let disabled = matches!(camera.attribute("enabled"), Some("0" | "false"));
         let Some(transform) = child(camera, "transform").filter(|_| !disabled) else {
             without += 1;
@@ -69,31 +67,22 @@ pub(crate) fn list_file(scene: &Place, path: &Path) -> Result<Listing> {
         };
         let label = camera.attribute("label").unwrap_or_default();
         let place = format!("{}, camera `{label}`", file.line(camera));
-        let of_sensor = camera.attribute("sensor_id").and_then(|id| sensors.get(id));
-        let Some((intrinsics, lens)) = of_sensor else {
-            return Err(Error::data(path, place, "names no sensor of the chunk; export the cameras again"));
-        };
-        // A component's transform takes the place of the chunk's.
-        let of_component = camera.attribute("component_id").and_then(|id| components.get(id)).copied().flatten();
-        let to_world = of_component.or(chunk_to_world).unwrap_or(DAffine3::IDENTITY);
-        let pose = to_world * file.matrix(transform)?;
-        let Some(rotation) = rotation_of(pose.matrix3) else {
-            return Err(Error::data(
-                path,
-                place,
-                "the transform is no rotation with a scale; export the cameras again",
-            ));
-        };
+        let refuse = |problem: &str| Error::data(path, place.as_str(), problem);
+        let (intrinsics, lens) = chunk.lens(camera, &refuse)?;
+        let pose = chunk.to_world(camera, &refuse)? * file.matrix(transform)?;
+        let rotation = rotation_of(pose.matrix3);
+        let rotation =
+            rotation.ok_or_else(|| refuse("the transform is no rotation with a scale; export the cameras again"))?;
         let (rotation, translation) = invert_pose(rotation, pose.translation);
-        let own = Camera { rotation, translation, ..intrinsics.clone() };
-        check_camera(path, &place, &own, lens)?;
+        let own = Camera { rotation, translation, ..intrinsics };
+        check_camera(path, &place, &own, &lens)?;
         let resolved = scene.resolve(path, label)?;
         let photo = find_file(scene.root, &["images", "."], &resolved.path, &EXTENSIONS);
         let name = with_extension(resolved.name, photo.as_deref());
         if !names.insert(name.clone()) {
-            return Err(Error::data(path, place, "another camera has this label too; rename one of the photos"));
+            return Err(refuse("another camera has this label too; rename one of the photos"));
         }
-        listing.views.push(Listed { name, photo, camera: own, lens: *lens, test: None });
+        listing.views.push(Listed { name, photo, camera: own, lens, test: None });
     }
     if without > 0 {
         listing.notes.push(format!("{without} cameras of {} are disabled or not aligned and skipped", path.display()));
@@ -142,6 +131,52 @@ fn child<'a>(node: Node<'a, 'a>, name: &str) -> Option<Node<'a, 'a>> {
     node.children().find(|child| child.has_tag_name(name))
 }
 
+/// Finds all elements of a name below a node, by their ids.
+fn by_id<'a>(chunk: Node<'a, 'a>, name: &str) -> BTreeMap<&'a str, Node<'a, 'a>> {
+    let nodes = chunk.descendants().filter(|node| node.has_tag_name(name));
+    nodes.filter_map(|node| Some((node.attribute("id")?, node))).collect()
+}
+
+/// A chunk: what its cameras refer to by id.
+struct Chunk<'a> {
+    file: &'a File<'a>,
+    node: Node<'a, 'a>,
+    sensors: BTreeMap<&'a str, Node<'a, 'a>>,
+    components: BTreeMap<&'a str, Node<'a, 'a>>,
+    to_world: Option<DAffine3>,
+    /// Of the sensors so far. One whose photos are not aligned may have no calibration.
+    lenses: BTreeMap<&'a str, (Camera, Lens)>,
+}
+
+impl<'a> Chunk<'a> {
+    fn new(file: &'a File<'a>, node: Node<'a, 'a>) -> Result<Self> {
+        let (sensors, components) = (by_id(node, "sensor"), by_id(node, "component"));
+        Ok(Self { file, node, sensors, components, to_world: file.similarity(node)?, lenses: BTreeMap::new() })
+    }
+
+    /// Returns intrinsics at an identity pose, and the lens.
+    fn lens(&mut self, camera: Node<'a, 'a>, refuse: &dyn Fn(&str) -> Error) -> Result<(Camera, Lens)> {
+        let sensor = camera.attribute("sensor_id").and_then(|id| self.sensors.get_key_value(id));
+        let (&id, &sensor) = sensor.ok_or_else(|| refuse("names no sensor of the chunk; export the cameras again"))?;
+        if !self.lenses.contains_key(id) {
+            self.lenses.insert(id, self.file.sensor(sensor)?);
+        }
+        Ok(self.lenses[id].clone())
+    }
+
+    /// Returns the transform of a camera's component, which takes the place of the chunk's. A file may have no components.
+    fn to_world(&self, camera: Node, refuse: &dyn Fn(&str) -> Error) -> Result<DAffine3> {
+        let own = match camera.attribute("component_id") {
+            Some(id) if !self.components.is_empty() => match self.components.get(id) {
+                Some(&component) => self.file.similarity(component)?,
+                None => return Err(refuse("names no component of the chunk; export the cameras again")),
+            },
+            _ => None,
+        };
+        Ok(own.or(self.to_world).unwrap_or(DAffine3::IDENTITY))
+    }
+}
+
 /// A parsed file, for messages.
 struct File<'a> {
     path: &'a Path,
@@ -155,17 +190,6 @@ impl<'a> File<'a> {
 
     fn refuse<T>(&self, node: Node, problem: impl Into<String>) -> Result<T> {
         Err(Error::data(self.path, self.line(node), problem))
-    }
-
-    /// Reads all elements of a name below a node, by their ids.
-    fn by_id<T>(
-        &self,
-        chunk: Node<'a, 'a>,
-        name: &str,
-        read: impl Fn(Node<'a, 'a>) -> Result<T>,
-    ) -> Result<BTreeMap<&'a str, T>> {
-        let nodes = chunk.descendants().filter(|node| node.has_tag_name(name));
-        nodes.filter_map(|node| Some((node.attribute("id")?, node))).map(|(id, node)| Ok((id, read(node)?))).collect()
     }
 
     fn numbers<const N: usize>(&self, node: Node) -> Result<[f64; N]> {
@@ -221,6 +245,7 @@ impl<'a> File<'a> {
         let (rotation, translation) = (DMat3::IDENTITY, DVec3::ZERO);
         let kind = sensor.attribute("type").unwrap_or("frame");
         if kind == "spherical" {
+            // Pixels are square: what lacks above and below was cut off.
             let f = w / (2.0 * PI);
             let (cx, cy) = (w / 2.0, h / 2.0);
             let camera = Camera { rotation, translation, fx: f, fy: f, cx, cy, width, height };
@@ -229,7 +254,17 @@ impl<'a> File<'a> {
         let Some(calibration) = calibration else {
             return self.refuse(sensor, "the sensor has no `calibration`; export the cameras of aligned photos");
         };
+        if let Some(other) = calibration.attribute("type").filter(|&other| other != kind) {
+            let problem =
+                format!("the sensor is of type {kind} and its calibration of type {other}; export the cameras again");
+            return Err(Error::data(self.path, place, problem));
+        }
         let value = |name: &str| self.number(calibration, name);
+        if let Some(name) = ["p3", "p4"].into_iter().find(|name| value(name).is_ok_and(|value| value != 0.0)) {
+            let problem =
+                format!("the calibration has {name}, which is not supported; optimize the cameras without it");
+            return Err(Error::data(self.path, place, problem));
+        }
         let f = value("f")?;
         let (fx, cx, cy) = (f + value("b1")?, w / 2.0 + value("cx")?, h / 2.0 + value("cy")?);
         let radial = [value("k1")?, value("k2")?, value("k3")?, value("k4")?];

@@ -4,7 +4,7 @@ use super::LoadOptions;
 use super::image::{check_size, photo_size, read_open_photo, read_photo};
 use super::lens::Lens;
 use super::listing::{Listed, check_camera};
-use super::mask::read_checked;
+use super::mask::{read_checked, read_ignored};
 use super::resample::{bounded_size, resample_ids, same_aspect, shrink_photo, undistort_photo};
 use super::window::Window;
 use crate::error::{Error, Result};
@@ -70,11 +70,12 @@ impl Recipe {
     pub(crate) fn views(&self, stored: Option<(u32, u32)>, mut photo: Option<Photo>) -> Result<MadeViews> {
         let original = at_size(&self.listed, stored)?;
         let size = (original.width, original.height);
-        let mask = self.mask.as_deref().map(|path| load_mask(path, size)).transpose()?;
+        let mask = self.mask.as_deref().map(|path| read_checked(path, |found| fits_photo(path, found, size)));
+        let mask = mask.transpose()?;
         let is_other = |mask: &LabelMap| usize::from((mask.width, mask.height) != size);
         let mut resampled = mask.as_ref().map_or(0, is_other);
         if let (Some(path), Some(photo)) = (&self.ignore, &mut photo) {
-            let ignored = load_mask(path, size)?;
+            let ignored = read_ignored(path, |found| fits_photo(path, found, size))?;
             resampled += is_other(&ignored);
             leave_out(photo, &ignored);
         }
@@ -169,15 +170,13 @@ fn fitted(photo: &Photo, window: &Window, (width, height): (u32, u32)) -> Photo 
     if (width, height) == (whole.width, whole.height) { whole } else { shrink_photo(&whole, width, height) }
 }
 
-fn load_mask(path: &Path, photo: (u32, u32)) -> Result<LabelMap> {
-    read_checked(path, |found| {
-        if same_aspect(found, photo) {
-            return Ok(());
-        }
-        let problem = format!(
-            "the mask has {} x {} px and its photo {} x {} px, which no scale explains; make masks of the same photos",
-            found.0, found.1, photo.0, photo.1
-        );
-        Err(Error::data(path, "", problem))
-    })
+fn fits_photo(path: &Path, found: (u32, u32), photo: (u32, u32)) -> Result<()> {
+    if same_aspect(found, photo) {
+        return Ok(());
+    }
+    let problem = format!(
+        "the mask has {} x {} px and its photo {} x {} px, which no scale explains; make masks of the same photos",
+        found.0, found.1, photo.0, photo.1
+    );
+    Err(Error::data(path, "", problem))
 }

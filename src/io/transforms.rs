@@ -34,6 +34,10 @@ struct Intrinsics {
     k4: Option<f64>,
     p1: Option<f64>,
     p2: Option<f64>,
+    sx1: Option<f64>,
+    sy1: Option<f64>,
+    /// k1, k2, k3, k4, p1 and p2, which nerfstudio reads before those of their names.
+    distortion_params: Option<Vec<f64>>,
     camera_model: Option<String>,
     is_fisheye: Option<bool>,
 }
@@ -44,7 +48,8 @@ impl Intrinsics {
         macro_rules! merged {
             ($($field:ident)*) => { Self { $($field: self.$field.clone().or(file.$field.clone())),* } };
         }
-        merged!(camera_angle_x camera_angle_y fl_x fl_y cx cy w h k1 k2 k3 k4 p1 p2 camera_model is_fisheye)
+        merged!(camera_angle_x camera_angle_y fl_x fl_y cx cy w h k1 k2 k3 k4 p1 p2 sx1 sy1 distortion_params
+            camera_model is_fisheye)
     }
 }
 
@@ -94,8 +99,7 @@ pub(crate) fn list_file(scene: &Place, path: &Path) -> Result<Listing> {
 
 fn read(scene: &Place, path: &Path, test: Option<bool>, listing: &mut Listing) -> Result<()> {
     let text = read::text(path)?;
-    let transforms: Transforms = serde_json::from_str(&text)
-        .map_err(|error| Error::data(path, format!("line {}", error.line()), error.to_string()))?;
+    let transforms: Transforms = serde_json::from_str(&text).map_err(|error| unreadable(path, &error))?;
     let mut seen: HashMap<String, Option<PathBuf>> = HashMap::new();
     let mut repeated = 0;
     let first = listing.views.len();
@@ -146,6 +150,16 @@ fn read(scene: &Place, path: &Path, test: Option<bool>, listing: &mut Listing) -
     Ok(())
 }
 
+fn unreadable(path: &Path, error: &serde_json::Error) -> Error {
+    let text = error.to_string();
+    let (problem, _) = text.rsplit_once(" at line ").unwrap_or((&text, ""));
+    // What the parser quotes is a key of the file, not a setting.
+    let problem = problem.replace('`', "\"").replace("struct Transforms", "an object");
+    let expected = "expected an object with \"frames\", each with \"file_path\" and \"transform_matrix\", as Blender, \
+                    instant-ngp and nerfstudio write it";
+    Error::data(path, format!("line {}, column {}", error.line(), error.column()), format!("{problem}; {expected}"))
+}
+
 /// The result for a frame.
 enum Found {
     View(Box<Listed>),
@@ -184,6 +198,10 @@ fn lens(path: &Path, place: &str, i: &Intrinsics) -> Result<Lens> {
     let named = match (i.is_fisheye, i.camera_model.as_deref()) {
         // instant-ngp's flag.
         (Some(true), None) => "OPENCV_FISHEYE",
+        (Some(true), Some(other)) if !other.contains("FISHEYE") => {
+            let problem = format!("camera_model is {other} and is_fisheye true; remove the one that is wrong");
+            return Err(Error::data(path, place, problem));
+        }
         (_, Some("PERSPECTIVE")) => "PINHOLE",
         (_, named) => named.unwrap_or("OPENCV"),
     };
@@ -195,7 +213,23 @@ fn lens(path: &Path, place: &str, i: &Intrinsics) -> Result<Lens> {
         );
         return Err(Error::data(path, place, problem));
     };
-    let all = [("k1", i.k1), ("k2", i.k2), ("k3", i.k3), ("k4", i.k4), ("p1", i.p1), ("p2", i.p2)];
+    let mut all = [
+        ("k1", i.k1),
+        ("k2", i.k2),
+        ("k3", i.k3),
+        ("k4", i.k4),
+        ("p1", i.p1),
+        ("p2", i.p2),
+        ("sx1", i.sx1),
+        ("sy1", i.sy1),
+    ];
+    if let Some(listed) = &i.distortion_params {
+        if listed.len() != 6 {
+            let problem = format!("distortion_params has {} numbers; expected k1, k2, k3, k4, p1, p2", listed.len());
+            return Err(Error::data(path, place, problem));
+        }
+        all.iter_mut().zip(listed).for_each(|(known, &value)| known.1 = Some(value));
+    }
     Ok(of_names(&|name| all.iter().find(|known| known.0 == name).and_then(|known| known.1).unwrap_or(0.0)))
 }
 

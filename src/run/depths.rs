@@ -37,6 +37,9 @@ pub(super) fn decided(
         tracing::info!("{} known depths in a photo, on average", all / known.len().max(1));
         return Ok((with(weight), known));
     }
+    if let Some(folder) = folder {
+        return Err(Error::data(folder, "", "has maps without a depth; expected positive numbers, in world units"));
+    }
     if config.depth_weight.is_none() {
         return Ok((with(0.0), Vec::new()));
     }

@@ -48,6 +48,11 @@ impl Photo {
         self.rgba.iter().any(|texel| shows(texel[3])).then(|| self.rgba.iter().map(over).collect())
     }
 
+    /// Returns true if any pixel counts.
+    pub(crate) fn has_valid(&self) -> bool {
+        self.rgba.iter().any(|texel| texel[3] > 0)
+    }
+
     /// Returns the colours without validity, `[height, width]`.
     pub fn rgb(&self) -> Vec<[u8; 3]> {
         self.rgba.iter().map(|&[r, g, b, _]| [r, g, b]).collect()

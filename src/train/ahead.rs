@@ -61,14 +61,14 @@ impl Wanted {
         let whole = self.photo.get()?;
         let full = (whole.width, whole.height);
         let photo = photo_of(self.band, whole);
-        let drawn = |size| self.depths.as_ref().map_or(Vec::new(), |known| known.drawn(full, self.band, size));
+        let drawn = |photo: &Photo| self.depths.as_ref().map_or(Vec::new(), |of| of.drawn(full, self.band, photo));
         let Some(camera) = self.small else {
             let view_labels = labels_of(self.band, photo.width, self.view_labels.get()?);
-            return Ok(Ready { depths: drawn((photo.width, photo.height)), photo, view_labels, small: None });
+            return Ok(Ready { depths: drawn(&photo), photo, view_labels, small: None });
         };
         let photo = Arc::new(shrink_photo(&photo, camera.width, camera.height));
         let valid = valid_pixels(&photo.rgba);
-        let depths = drawn((photo.width, photo.height));
+        let depths = drawn(&photo);
         Ok(Ready { photo, view_labels: Arc::default(), depths, small: Some((camera, valid)) })
     }
 }

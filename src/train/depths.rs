@@ -1,7 +1,7 @@
 //! Depths that photos are known to have: a prior for what is opaque.
 
 use crate::engine::Band;
-use crate::scene::{DepthMap, View};
+use crate::scene::{DepthMap, Photo, View};
 use glam::{DVec2, DVec3};
 use std::sync::Arc;
 
@@ -48,15 +48,18 @@ impl KnownDepths {
     }
 
     /// Draws the band of a photo of `full` px at the size of a step: 1 / depth, 0 where it is not known. The nearest of a
-    /// pixel counts.
-    pub(super) fn drawn(&self, full: (u32, u32), band: Band, (width, height): (u32, u32)) -> Vec<f32> {
+    /// pixel counts. Pixels of `photo`, the band at that size, that are left out of the loss have none.
+    pub(super) fn drawn(&self, full: (u32, u32), band: Band, photo: &Photo) -> Vec<f32> {
+        let (width, height) = (photo.width, photo.height);
         let mut drawn = vec![0.0_f32; width as usize * height as usize];
         let scale = [width as f32 / full.0 as f32, height as f32 / band.rows as f32];
         for known in self.0.iter() {
             let (x, y) = (known.at[0] * scale[0], (known.at[1] - band.first as f32) * scale[1]);
             if (0.0..width as f32).contains(&x) && (0.0..height as f32).contains(&y) {
-                let to = &mut drawn[y as usize * width as usize + x as usize];
-                *to = to.max(known.inverse);
+                let pixel = y as usize * width as usize + x as usize;
+                if photo.rgba[pixel][3] > 0 {
+                    drawn[pixel] = drawn[pixel].max(known.inverse);
+                }
             }
         }
         drawn

@@ -134,6 +134,22 @@ fn ignored_pixels_have_no_weight() {
     };
     assert!(alphas(0).iter().enumerate().all(|(at, &alpha)| alpha == if at % 12 < 6 { 0 } else { 255 }));
     assert!(alphas(1).iter().all(|&alpha| alpha == 255), "a photo without a picture counts as a whole");
+    let note = "1 of 2 photos have no picture of what to ignore: 01.png";
+    assert!(dataset.notes.iter().any(|found| found == note), "{:?}", dataset.notes);
+    // Colours serve too; opacity says nothing.
+    let colours: Vec<u8> = half.iter().flat_map(|&value| [0, value, 0, 255]).collect();
+    png(&scene.at("ignore/00.png"), (6, 4), png::ColorType::Rgba, png::BitDepth::Eight, &colours);
+    let photo = |dataset: &Dataset| dataset.train[0].photo().expect("a photo");
+    assert_eq!(*photo(&open(&scene).expect("a scene")), *photo(&dataset));
+    // Nothing is left of a photo, or of all.
+    png(&scene.at("ignore/00.png"), (6, 4), png::ColorType::Grayscale, png::BitDepth::Eight, &[255; 24]);
+    let rest = open(&scene).expect("a scene");
+    assert_eq!(rest.train.iter().map(|view| view.name.as_str()).collect::<Vec<_>>(), ["01.png"]);
+    assert!(rest.notes.iter().any(|note| note.contains("1 views are skipped, because 00.png have no pixel")));
+    png(&scene.at("ignore/01.png"), (6, 4), png::ColorType::Grayscale, png::BitDepth::Eight, &[1; 24]);
+    assert!(refusal(open(&scene)).contains("no pixel that counts"));
+    fs::remove_file(scene.at("ignore/01.png")).expect("removed");
+    png(&scene.at("ignore/00.png"), (6, 4), png::ColorType::Grayscale, png::BitDepth::Eight, &half);
     // The same through a lens: no colour of an ignored pixel is mixed in.
     let fisheye = ColmapCamera { model: 15, name: "FISHEYE", size: (12, 8), parameters: vec![10.0, 10.0, 6.0, 4.0] };
     scene.colmap_bin("sparse/0", &[fisheye], &["00.png", "01.png"]);

@@ -152,6 +152,19 @@ fn metashape_has_fisheyes_and_panoramas() {
     assert_eq!(dataset.train.len(), 6);
 }
 
+/// A second camera whose photos are not aligned has no calibration.
+#[test]
+fn sensors_that_no_pose_uses_do_not_matter() {
+    let unused = r#"<sensor id="1" type="frame"><resolution width="12" height="8"/></sensor>"#;
+    let other = r#"<camera id="7" sensor_id="1" label="c"/>"#;
+    let scene = metashape(&[SENSOR, unused].concat(), &[&of_camera("a", POSE), other].concat(), "");
+    assert_eq!(open(scene.path()).expect("a scene").train.len(), 1);
+    let used =
+        [&of_camera("a", POSE), r#"<camera id="7" sensor_id="1" label="c"><transform>"#, POSE, "</transform></camera>"];
+    let scene = metashape(&[SENSOR, unused].concat(), &used.concat(), "");
+    assert!(refusal(open(scene.path())).contains("no `calibration`"));
+}
+
 #[test]
 fn broken_xml_names_the_line() {
     let one = |sensor: &str, camera: &str| refusal(open(metashape(sensor, camera, "").path()));
@@ -169,6 +182,13 @@ fn broken_xml_names_the_line() {
     assert!(one(SENSOR, &of_camera("../a", POSE)).contains("outside"));
     assert!(one(SENSOR, &[good.clone(), good.clone()].concat()).contains("label too"));
     assert!(one(SENSOR, "").contains("lists no photo"));
+    let unaligned = one(SENSOR, r#"<camera id="7" sensor_id="0" label="c"/>"#);
+    assert!(unaligned.contains("lists no photo") && unaligned.contains("1 cameras"), "{unaligned}");
+    assert!(one(&SENSOR.replace("<f>10</f>", "<f>10</f><p3>0.1</p3>"), &good).contains("p3"));
+    let typed = SENSOR.replace("calibration type=\"frame\"", "calibration type=\"fisheye\"");
+    assert!(one(&typed, &good).contains("of type frame and its calibration of type fisheye"));
+    let other = format!(r#"<components><component id="3">{CHUNK}</component></components>"#);
+    assert!(refusal(open(metashape(SENSOR, &good, &other).path())).contains("names no component"));
     let of_text = |text: &str| {
         let scene = Scene::new();
         scene.write("x.xml", text);

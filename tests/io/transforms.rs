@@ -137,6 +137,16 @@ fn lenses_have_the_names_of_nerfstudio_and_instant_ngp() {
     let names: Vec<&str> = faces.iter().map(|view| view.name.as_str()).collect();
     assert_eq!(names, ["a.back.png", "a.down.png", "a.front.png", "a.left.png", "a.right.png", "a.up.png"]);
     assert!(faces.iter().all(|view| view.camera.width == view.camera.height));
+    // Each coefficient bends the view.
+    let width = |more: &str| views(&format!(r#""fl_x": 10, {more}"#))[0].camera.width;
+    let listed = r#""camera_model": "OPENCV_FISHEYE", "distortion_params": [0.5, 0, 0, 0, 0, 0],"#;
+    let named = r#""camera_model": "OPENCV_FISHEYE", "k1": 0.5,"#;
+    assert!(width(listed) == width(named) && width(named) != width(r#""camera_model": "OPENCV_FISHEYE","#));
+    let thin = r#""camera_model": "THIN_PRISM_FISHEYE","#;
+    for name in ["sx1", "sy1"] {
+        let shifted = views(&format!(r#""fl_x": 10, {thin} "{name}": 0.5,"#))[0].camera.clone();
+        assert!(shifted != views(&format!(r#""fl_x": 10, {thin}"#))[0].camera, "{name}: {shifted:?}");
+    }
 }
 
 #[test]
@@ -167,4 +177,8 @@ fn invalid_values_are_refused_with_their_place() {
     assert!(broken(r#"{"frames": []}"#.into()).contains("lists no photo"));
     assert!(broken("[".repeat(100_000)).contains("line 1"));
     assert!(broken(r#"{"frames": [{"file_path": "a"}]}"#.into()).contains("transform_matrix"));
+    let without = broken(r#"{"fl_x": 9}"#.into());
+    assert!(without.contains("missing field \"frames\"; expected an object"), "{without}");
+    assert!(one(r#""fl_x": 9, "is_fisheye": true, "camera_model": "OPENCV","#, IDENTITY).contains("is_fisheye true"));
+    assert!(one(r#""fl_x": 9, "distortion_params": [0.1],"#, IDENTITY).contains("1 numbers"));
 }

@@ -121,8 +121,9 @@ fn regions(scores: &Scores) -> String {
     let mut text = String::new();
     if let Some(mean) = &scores.mean.regions {
         text += &format!(
-            "\nPSNR by region: {} where three training views see ({:.0} % of the pixels), {} elsewhere",
+            "\nPSNR by region: {} ({} corrected) where three training views see ({:.0} % of the pixels), {} elsewhere",
             number(mean.psnr_seen, 2),
+            number(mean.psnr_seen_corrected, 2),
             100.0 * mean.seen_share,
             number(mean.psnr_unseen, 2)
         );

@@ -93,8 +93,10 @@ pub fn show(rows: &[Row], output: &Path) -> Result<()> {
 }
 
 fn line(row: &Row) -> String {
+    let number = |value: Option<f64>| value.unwrap_or(f64::NAN);
     format!(
-        "{} {} steps, {}, seed {}: {:.1} CPU s, {} Gaussians, PSNR {:.2}, seen {:.2}, worst {:.2}, fog {:.2}",
+        "{} {} steps, {}, seed {}: {:.1} CPU s, {} Gaussians, PSNR {:.2} ({:.2} corrected), seen {:.2} ({:.2} corrected), \
+         worst {:.2}, fog {:.2}",
         row.program,
         row.steps,
         row.scene,
@@ -102,7 +104,9 @@ fn line(row: &Row) -> String {
         row.cpu,
         row.gaussians,
         row.psnr,
-        row.psnr_seen.unwrap_or(f64::NAN),
+        number(row.psnr_corrected),
+        number(row.psnr_seen),
+        number(row.psnr_seen_corrected),
         row.worst,
         row.fog
     )

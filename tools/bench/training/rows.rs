@@ -48,9 +48,13 @@ pub struct Row {
     pub gaussians: u64,
     /// Mean PSNR of the held-out views, dB.
     pub psnr: f64,
-    /// The same over pixels that three training views see.
+    /// The same after a correction of the colours of each view; rows of earlier programs have none.
+    pub psnr_corrected: Option<f64>,
+    /// The PSNR over pixels that three training views see.
     pub psnr_seen: Option<f64>,
-    /// The same over the others.
+    /// The same after a correction of these pixels.
+    pub psnr_seen_corrected: Option<f64>,
+    /// The PSNR over the others.
     pub psnr_unseen: Option<f64>,
     /// Share of the pixels that three training views see.
     pub seen_share: f64,
@@ -169,7 +173,9 @@ fn measure(plan: &Plan, build: u32, judge: &Path) -> Result<Row> {
         cpu,
         gaussians: summary["gaussians"].as_u64().unwrap_or(0),
         psnr: needed(mean("psnr"), "psnr")?,
+        psnr_corrected: mean("psnr_corrected"),
         psnr_seen: mean("psnr_seen"),
+        psnr_seen_corrected: mean("psnr_seen_corrected"),
         psnr_unseen: mean("psnr_unseen"),
         seen_share: needed(mean("seen_share"), "seen_share")?,
         worst: worst.fold(f64::INFINITY, f64::min),
