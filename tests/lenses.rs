@@ -186,6 +186,25 @@ fn a_wide_photo_becomes_the_faces_that_it_covers() {
     assert!(split.test.len() == 5 && split.test.iter().all(|view| view.name.starts_with("000.")));
 }
 
+/// A pinhole view with the focal lengths of the photo would end at 51 degrees from the axis.
+#[test]
+fn a_wide_polynomial_shows_all_that_the_photo_has() {
+    let world = World::new(Preset::Simple, 0);
+    for (fov, views) in [(40, 1), (105, 1), (130, 5)] {
+        let folder = tempfile::tempdir().expect("a folder");
+        let dataset = read(folder.path(), &options("OPENCV".parse().expect("a lens"), Some(fov)));
+        let of_first: Vec<_> = dataset.train.iter().filter(|view| view.name.starts_with("000.")).collect();
+        assert_eq!(of_first.len(), views, "{fov} degrees");
+        let Camera { fx, width, .. } = of_first[0].camera;
+        let shown = 2.0 * (f64::from(width) / 2.0 / fx).atan().to_degrees();
+        assert!(views > 1 || shown > 0.95 * f64::from(fov), "{shown} of {fov} degrees");
+        for view in of_first {
+            let (psnr, same, _) = compared(&world, view);
+            assert!(psnr > 34.0 && same > 0.99, "{fov} degrees, {}: {psnr} dB, {same}", view.name);
+        }
+    }
+}
+
 /// Masks that were made for views go back to the photos that they came from.
 #[test]
 fn ids_return_to_the_photo() {

@@ -12,6 +12,8 @@ use std::path::Path;
 /// Field of view up to which a photo becomes one view, radians: 110 degrees, where the border of a pinhole picture is
 /// stretched three times as much as its middle.
 const ONE_VIEW: f64 = 110.0 / 180.0 * std::f64::consts::PI;
+/// Share of the fitted field of view that a polynomial's own intrinsics have to show, which programs that undistort keep.
+const KEPT: f64 = 0.9;
 /// Most pixels of a view, relative to the photo.
 const PIXELS: f64 = 2.0;
 /// Cells along a side of a face in which its covered part is searched.
@@ -57,17 +59,19 @@ impl Window {
 
     /// Returns the views of a photo, whose camera has the size of its file.
     ///
-    /// A polynomial keeps focal lengths and principal point. Other lenses up to [`ONE_VIEW`] get the scale of the middle
-    /// of the photo and the field of view between the middles of its edges; wider ones and panoramas become faces of 90
-    /// degrees at that scale, without what the photo does not cover.
+    /// A lens up to [`ONE_VIEW`] becomes one view with the scale of the middle of the photo and the field of view between
+    /// the middles of its edges. A polynomial keeps focal lengths, principal point and size where these show [`KEPT`] of
+    /// that. Wider lenses and panoramas become faces of 90 degrees at that scale, without what the photo does not cover.
     pub fn all(name: &str, camera: &Camera, lens: &Lens) -> Vec<Self> {
         let optics = Optics::new(camera.clone(), *lens);
-        if matches!(lens, Lens::Pinhole | Lens::Polynomial(_)) {
+        if *lens == Lens::Pinhole {
             return vec![Self::whole(name, &optics, camera.clone())];
         }
         let edges = edges(&optics);
         if 2.0 * edges.into_iter().fold(0.0, f64::max) < ONE_VIEW {
-            return vec![Self::whole(name, &optics, fitted(&optics, edges))];
+            let fitted = fitted(&optics, edges);
+            let keeps = matches!(lens, Lens::Polynomial(_)) && shows(camera).cmpge(KEPT * shows(&fitted)).all();
+            return vec![Self::whole(name, &optics, if keeps { camera.clone() } else { fitted })];
         }
         FACES.iter().filter_map(|&(face, axes)| Self::face(name, &optics, face, axes)).collect()
     }
@@ -191,6 +195,11 @@ fn edges(optics: &Optics) -> [f64; 4] {
         None => optics.reach(),
     };
     [angle(0.0, cy), angle(cx, 0.0), angle(f64::from(width), cy), angle(cx, f64::from(height))]
+}
+
+/// Returns the width and height of the picture in the plane z = 1.
+fn shows(camera: &Camera) -> DVec2 {
+    DVec2::new(f64::from(camera.width) / camera.fx, f64::from(camera.height) / camera.fy)
 }
 
 /// Returns the px per radian at the axis, in x and y.
