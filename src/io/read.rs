@@ -80,8 +80,13 @@ pub(crate) fn json<T: DeserializeOwned>(path: &Path, expected: &str) -> Result<T
 
 /// The same from the bytes of a file.
 pub(crate) fn parse_json<T: DeserializeOwned>(path: &Path, text: &[u8], expected: &str) -> Result<T> {
-    serde_json::from_slice(text)
-        .map_err(|error| Error::data(path, format!("line {}", error.line()), format!("{error}; {expected}")))
+    serde_json::from_slice(text).map_err(|error| {
+        let text = error.to_string();
+        let (problem, _) = text.rsplit_once(" at line ").unwrap_or((&text, ""));
+        // What the parser quotes is a key of the file, not a setting.
+        let problem = format!("{}; {expected}", problem.replace('`', "\""));
+        Error::data(path, format!("line {}", error.line()), problem)
+    })
 }
 
 /// Lists the paths in a folder, in no particular order.

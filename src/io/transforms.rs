@@ -17,6 +17,9 @@ use serde::Deserialize;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
+const EXPECTED: &str = "expected an object with \"frames\", each with \"file_path\" and \"transform_matrix\", as Blender, \
+                        instant-ngp and nerfstudio write it";
+
 /// Intrinsics of the whole file or of one frame.
 #[derive(Clone, Debug, Default, Deserialize)]
 struct Intrinsics {
@@ -63,6 +66,7 @@ struct Frame {
 }
 
 #[derive(Debug, Deserialize)]
+#[serde(expecting = "an object")]
 struct Transforms {
     frames: Vec<Frame>,
     ply_file_path: Option<String>,
@@ -98,8 +102,7 @@ pub(crate) fn list_file(scene: &Place, path: &Path) -> Result<Listing> {
 }
 
 fn read(scene: &Place, path: &Path, test: Option<bool>, listing: &mut Listing) -> Result<()> {
-    let text = read::text(path)?;
-    let transforms: Transforms = serde_json::from_str(&text).map_err(|error| unreadable(path, &error))?;
+    let transforms: Transforms = read::json(path, EXPECTED)?;
     let mut seen: HashMap<String, Option<PathBuf>> = HashMap::new();
     let mut repeated = 0;
     let first = listing.views.len();
@@ -148,16 +151,6 @@ fn read(scene: &Place, path: &Path, test: Option<bool>, listing: &mut Listing) -
         }
     }
     Ok(())
-}
-
-fn unreadable(path: &Path, error: &serde_json::Error) -> Error {
-    let text = error.to_string();
-    let (problem, _) = text.rsplit_once(" at line ").unwrap_or((&text, ""));
-    // What the parser quotes is a key of the file, not a setting.
-    let problem = problem.replace('`', "\"").replace("struct Transforms", "an object");
-    let expected = "expected an object with \"frames\", each with \"file_path\" and \"transform_matrix\", as Blender, \
-                    instant-ngp and nerfstudio write it";
-    Error::data(path, format!("line {}, column {}", error.line(), error.column()), format!("{problem}; {expected}"))
 }
 
 /// The result for a frame.
