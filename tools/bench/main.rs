@@ -11,6 +11,7 @@
 mod card_model;
 mod compiler;
 mod device;
+mod exposures;
 mod kernels;
 mod large;
 mod limits;
@@ -71,6 +72,8 @@ enum Command {
     CardModel(Common),
     /// Poses that are off, with and without refinement: what is left of the errors, and the quality.
     Poses(poses::Options),
+    /// What the exposures of a capture cost, and what their matrices take back.
+    Exposures(exposures::Options),
     /// Pictures larger and smaller than the photos, with and without antialiasing, against traced ones.
     Zoom(zoom::Options),
     /// Predicted against measured memory of training.
@@ -104,6 +107,7 @@ fn run() -> Result<()> {
         Command::Steps(common) => steps::run(&common),
         Command::Paper(options) => paper::run(&options),
         Command::Poses(options) => poses::run(&options),
+        Command::Exposures(options) => exposures::run(&options),
         Command::Zoom(options) => zoom::run(&options),
         Command::Training(options) => training::run(&options),
         Command::FirstStep(common) => training::first_step(&common),

@@ -68,7 +68,7 @@ pub fn run(other: &Path, options: &Against, seeds: &[u64], common: &Common) -> R
     }
     let made = tempfile::tempdir().map_err(Error::write("a folder for scenes"))?;
     let scenes =
-        options.scenes.iter().map(|text| scene(text, made.path(), common.small)).collect::<Result<Vec<_>>>()?;
+        options.scenes.iter().map(|text| scene_of(text, made.path(), common.small)).collect::<Result<Vec<_>>>()?;
     let mut rows = Rows::open(&common.output.join("against.jsonl"))?;
     let mut found = Vec::new();
     for scene in &scenes {
@@ -113,7 +113,7 @@ fn line(row: &Row) -> String {
 }
 
 /// Parses a scene; writes a built-in one into `folder`.
-fn scene(text: &str, folder: &Path, small: bool) -> Result<SceneOf> {
+pub fn scene_of(text: &str, folder: &Path, small: bool) -> Result<SceneOf> {
     let (place, masks) = text.split_once('+').map_or((text, None), |(place, masks)| (place, Some(masks)));
     let (place, size) = place.split_once('@').map_or((place, "0"), |(place, size)| (place, size));
     let max_resolution =

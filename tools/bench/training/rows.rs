@@ -135,7 +135,8 @@ fn children() -> Result<f64> {
     Ok((used.user_time().num_microseconds() + used.system_time().num_microseconds()) as f64 * 1e-6)
 }
 
-fn run(program: &Path, args: &[&str]) -> Result<String> {
+/// Runs a program; returns what it prints.
+pub fn program(program: &Path, args: &[&str]) -> Result<String> {
     let output = Command::new(program).args(args).output().map_err(Error::read(program))?;
     if !output.status.success() {
         let problem = String::from_utf8_lossy(&output.stderr);
@@ -155,11 +156,11 @@ fn measure(plan: &Plan, build: u32, judge: &Path) -> Result<Row> {
     args.extend(masks.iter().flat_map(|masks| ["--masks", masks.as_str()]));
     args.extend(plan.flags.iter().map(String::as_str));
     let before = children()?;
-    let summary: Value = parse(&run(plan.program, &args)?)?;
+    let summary: Value = parse(&program(plan.program, &args)?)?;
     let cpu = children()? - before;
     let mut args = vec!["eval", &out, "--scene", &scene, "--quiet", "--json", "--near", PLANES];
     args.extend(masks.iter().flat_map(|masks| ["--masks", masks.as_str()]));
-    let scores = parse(&run(judge, &args)?)?;
+    let scores = parse(&program(judge, &args)?)?;
     let mean = |key: &str| scores["mean"][key].as_f64();
     let needed = |found: Option<f64>, key: &str| found.ok_or_else(|| Error::Check(format!("eval gives no {key}")));
     let worst = scores["views"].as_object().into_iter().flatten().filter_map(|(_, view)| view["psnr"].as_f64());
