@@ -29,7 +29,7 @@ pub(crate) fn load(root: &Path, mut listing: Listing, options: &LoadOptions) -> 
     }
     let recipe = |(view, &test): (&Listed, &bool)| {
         let of = |folder: &Option<MaskFolder>| folder.as_ref().and_then(|folder| folder.find(&view.name));
-        Arc::new(Recipe::new(view.clone(), [of(&masks), of(&ignore)], test, options))
+        Arc::new(Recipe::new((view.clone(), listing.source.clone()), [of(&masks), of(&ignore)], test, options))
     };
     let recipes: Vec<Arc<Recipe>> = views.iter().zip(&test).map(recipe).collect();
     let Read { photos, resampled, blank } = read_views(&recipes, &test, options);

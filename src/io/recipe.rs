@@ -15,6 +15,8 @@ use std::path::{Path, PathBuf};
 #[derive(Clone, Debug)]
 pub(crate) struct Recipe {
     pub(crate) listed: Listed,
+    /// The file that lists the photo, for messages.
+    pub(crate) source: PathBuf,
     pub(crate) mask: Option<PathBuf>,
     pub(crate) ignore: Option<PathBuf>,
     /// Decodes the photo.
@@ -41,11 +43,16 @@ pub(crate) struct MadeViews {
 }
 
 impl Recipe {
-    /// `[mask, ignore]` are files of the photo, which is held out if `test`.
-    pub(crate) fn new(listed: Listed, [mask, ignore]: [Option<PathBuf>; 2], test: bool, options: &LoadOptions) -> Self {
+    /// `source` lists the photo. `[mask, ignore]` are files of the photo, which is held out if `test`.
+    pub(crate) fn new(
+        (listed, source): (Listed, PathBuf),
+        [mask, ignore]: [Option<PathBuf>; 2],
+        test: bool,
+        options: &LoadOptions,
+    ) -> Self {
         let LoadOptions { photos, max_resolution, undistort, .. } = *options;
         let background = (test || !options.keep_opacity).then_some(options.background);
-        Self { listed, mask, ignore, photos, background, max_resolution, undistort }
+        Self { listed, source, mask, ignore, photos, background, max_resolution, undistort }
     }
 
     /// Reads the size in the photo's file; `None` without a file.
@@ -80,9 +87,12 @@ impl Recipe {
             leave_out(photo, &ignored);
         }
         let windows = self.windows(&original);
-        let path = self.listed.photo.as_deref().unwrap_or(Path::new(&self.listed.name));
+        let (path, place) = match &self.listed.photo {
+            Some(photo) => (photo, String::new()),
+            None => (&self.source, format!("photo {}", self.listed.name)),
+        };
         if windows.is_empty() {
-            return Err(Error::data(path, "", NO_WINDOW));
+            return Err(Error::data(path, place, NO_WINDOW));
         }
         // A lens of odd coefficients may have no scale at its axis.
         for window in windows.iter().filter(|window| !window.is_photo()) {
