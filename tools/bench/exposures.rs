@@ -55,8 +55,11 @@ pub fn run(options: &Options) -> Result<()> {
     let [model, pictures] = ["model", "pictures"].map(|name| folder.path().join(name));
     photographed(&own, (&capture, model_steps), (&model, &pictures))?;
     let matrices = matrices(&model)?;
-    let one = written(&capture, &pictures, &folder.path().join("one"), &BTreeMap::new())?;
-    let varied = written(&capture, &pictures, &folder.path().join("varied"), &matrices)?;
+    // Rows are found again by this name.
+    let named =
+        |what: &str| SceneOf { name: format!("{} after {model_steps}, {what}", capture.name), ..capture.clone() };
+    let one = written(&named("one exposure"), &pictures, &folder.path().join("one"), &BTreeMap::new())?;
+    let varied = written(&named("its exposures"), &pictures, &folder.path().join("varied"), &matrices)?;
 
     let mut rows = Rows::open(&options.common.output.join("exposures-rows.jsonl"))?;
     println!("| seed | pictures | exposure | PSNR | corrected | seen | seen, corrected |");
@@ -141,8 +144,7 @@ fn written(
         };
         written.map_err(|error| Error::data(&path, "", error.to_string()))?;
     }
-    let name = if matrices.is_empty() { "one exposure" } else { "exposures of the photos" };
-    Ok(SceneOf { name: name.to_owned(), path: to.to_owned(), ..capture.clone() })
+    Ok(SceneOf { path: to.to_owned(), ..capture.clone() })
 }
 
 fn expose(picture: &mut RgbImage, rows: &ColourMatrix) {
