@@ -27,10 +27,10 @@ fn a_training_with_known_depths_goes_on_from_a_checkpoint() {
     assert!(models[0] != models[1] && models[0] != models[2] && models[1] != models[2]);
 }
 
-/// Writes PFM maps of 64 x 48 px: 3 units, and `left` in the left half.
-fn written(place: &Place, name: &str, left: f32) -> String {
+/// Writes PFM maps of 64 x 48 px with a depth in each half.
+fn written(place: &Place, name: &str, [left, right]: [f32; 2]) -> String {
     fs::create_dir(place.path(name)).expect("a folder");
-    let row = (0..64).flat_map(|x| if x < 32 { left } else { 3.0 }.to_le_bytes()).collect::<Vec<u8>>();
+    let row = (0..64).flat_map(|x| if x < 32 { left } else { right }.to_le_bytes()).collect::<Vec<u8>>();
     let bytes = [b"Pf\n64 48\n-1.0\n".to_vec(), row.repeat(48)].concat();
     (0..6).for_each(|view| fs::write(place.path(name).join(format!("{view:03}.pfm")), &bytes).expect("a map"));
     place.text(name)
@@ -43,7 +43,8 @@ fn ignored_pixels_have_no_known_depth() {
     fs::create_dir(place.path("ignore")).expect("a folder");
     let half = image::GrayImage::from_fn(64, 48, |x, _| image::Luma([if x < 32 { 255 } else { 0 }]));
     (0..6).for_each(|view| half.save(place.path("ignore").join(format!("{view:03}.png"))).expect("a picture"));
-    let (near, far, ignore) = (written(&place, "near", 2.0), written(&place, "far", 9.0), place.text("ignore"));
+    let (near, far, ignore) =
+        (written(&place, "near", [2.0, 3.0]), written(&place, "far", [9.0, 3.0]), place.text("ignore"));
     let trained = |name: &str, known: &str, more: &[&str]| {
         let whole = ["--iterations", "20", "--start-size", "1", "--full-size-from", "0", "--depth-weight", "1"];
         succeeded(&place.trained(name, &[&whole[..], &["--known-depths", known], more].concat()));
@@ -64,9 +65,7 @@ fn depths_that_are_not_there_are_an_error() {
     refused(&["--known-depths", &maps, "--depth-weight", "0"], &["--known-depths", "--depth-weight above 0"]);
     refused(&with(&["--known-depths", &place.text("nowhere")]), &["nowhere", "there is no such folder"]);
     refused(&with(&["--known-depths", &masks]), &["masks", "depth needs 16-bit grey"]);
-    let holes = written(&place, "holes", 0.0);
-    let empty = [b"Pf\n64 48\n-1.0\n".to_vec(), vec![0; 4 * 64 * 48]].concat();
-    (0..6).for_each(|view| fs::write(place.path("holes").join(format!("{view:03}.pfm")), &empty).expect("a map"));
+    let holes = written(&place, "holes", [0.0; 2]);
     refused(&["--iterations", "60", "--known-depths", &holes], &["holes", "maps without a depth"]);
     refused(&with(&["--known-depths", &holes]), &["holes", "maps without a depth"]);
     fs::remove_file(place.path("scene/depth/001.exr")).expect("a map");

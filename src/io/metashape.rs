@@ -57,7 +57,7 @@ pub(crate) fn list_file(scene: &Place, path: &Path) -> Result<Listing> {
     if chunks.next().is_some() {
         listing.notes.push(format!("only the first chunk of {} is used", path.display()));
     }
-    let mut chunk = Chunk::new(&file, chunk)?;
+    let chunk = Chunk::new(&file, chunk)?;
     let (mut without, mut names) = (0, BTreeSet::new());
     for camera in chunk.node.descendants().filter(|node| node.has_tag_name("camera") && node.has_attribute("label")) {
         let disabled = matches!(camera.attribute("enabled"), Some("0" | "false"));
@@ -144,24 +144,19 @@ struct Chunk<'a> {
     sensors: BTreeMap<&'a str, Node<'a, 'a>>,
     components: BTreeMap<&'a str, Node<'a, 'a>>,
     to_world: Option<DAffine3>,
-    /// Of the sensors so far. One whose photos are not aligned may have no calibration.
-    lenses: BTreeMap<&'a str, (Camera, Lens)>,
 }
 
 impl<'a> Chunk<'a> {
     fn new(file: &'a File<'a>, node: Node<'a, 'a>) -> Result<Self> {
         let (sensors, components) = (by_id(node, "sensor"), by_id(node, "component"));
-        Ok(Self { file, node, sensors, components, to_world: file.similarity(node)?, lenses: BTreeMap::new() })
+        Ok(Self { file, node, sensors, components, to_world: file.similarity(node)? })
     }
 
-    /// Returns intrinsics at an identity pose, and the lens.
-    fn lens(&mut self, camera: Node<'a, 'a>, refuse: &dyn Fn(&str) -> Error) -> Result<(Camera, Lens)> {
-        let sensor = camera.attribute("sensor_id").and_then(|id| self.sensors.get_key_value(id));
-        let (&id, &sensor) = sensor.ok_or_else(|| refuse("names no sensor of the chunk; export the cameras again"))?;
-        if !self.lenses.contains_key(id) {
-            self.lenses.insert(id, self.file.sensor(sensor)?);
-        }
-        Ok(self.lenses[id].clone())
+    /// Returns intrinsics at an identity pose, and the lens. A sensor that no pose uses may have no calibration.
+    fn lens(&self, camera: Node, refuse: &dyn Fn(&str) -> Error) -> Result<(Camera, Lens)> {
+        let sensor = camera.attribute("sensor_id").and_then(|id| self.sensors.get(id));
+        let sensor = sensor.ok_or_else(|| refuse("names no sensor of the chunk; export the cameras again"))?;
+        self.file.sensor(*sensor)
     }
 
     /// Returns the transform of a camera's component, which takes the place of the chunk's. A file may have no components.

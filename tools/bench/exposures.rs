@@ -5,6 +5,7 @@
 
 use super::Common;
 use super::measure::write_json;
+use super::trained::small_scene;
 use super::training::{Plan, Row, Rows, SceneOf, program, scene_of};
 use glam::Vec3;
 use image::RgbImage;
@@ -87,9 +88,8 @@ pub fn run(options: &Options) -> Result<()> {
 
 /// The built-in scene with photos of exposures that vary.
 fn made(path: &Path, small: bool) -> Result<SceneOf> {
-    let options = SynthOptions { vary_exposure: true, ..SynthOptions::default() };
-    let tiny = SynthOptions { width: 64, height: 48, views: 9, points: 300, ..options };
-    synth::write(if small { &tiny } else { &options }, path, &|_| Ok(()))?;
+    let options = if small { small_scene() } else { SynthOptions::default() };
+    synth::write(&SynthOptions { vary_exposure: true, ..options }, path, &|_| Ok(()))?;
     Ok(SceneOf { name: "made".to_owned(), path: path.to_owned(), max_resolution: 0, masks: None })
 }
 
