@@ -3,7 +3,7 @@
 use super::frame::Frame;
 use crate::error::{Error, Result};
 use crate::io::label_table::LabelTable;
-use crate::io::{LoadOptions, read, run_folder};
+use crate::io::{LoadOptions, Lookup, read, run_folder};
 use crate::run::{Settings, latest_model, models, summary};
 use crate::scene::{ColourMatrix, Dataset, Gaussians};
 use serde_json::Value;
@@ -48,6 +48,7 @@ impl Coarse {
             max_resolution: (settings.read.max_resolution > 0).then_some(settings.read.max_resolution),
             test_every: (settings.read.test_every > 0).then_some(settings.read.test_every),
             photos: false,
+            lookup: Lookup { poses: settings.read.poses, ..options.lookup },
             ..options
         };
         let dataset = crate::io::open_logged(scene, &options)?;

@@ -6,7 +6,7 @@ use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::io::block_file::BlockFile;
 use crate::io::label_table::{LabelEntry, LabelTable, unique_name};
-use crate::io::{LoadOptions, open_logged};
+use crate::io::{LoadOptions, Lookup, open_logged};
 use crate::render::{RenderOptions, render};
 use crate::run::models;
 use crate::scene::{LabelMap, UNLABELLED, View, Zone};
@@ -88,6 +88,7 @@ fn views(trained: &Trained, only: BTreeSet<String>, how: &BlockMasks) -> Result<
         max_resolution: (read.max_resolution > 0).then_some(read.max_resolution),
         test_every: (read.test_every > 0).then_some(read.test_every),
         photos: false,
+        lookup: Lookup { poses: read.poses, ..Lookup::default() },
         ..LoadOptions::default()
     };
     Ok(open_logged(how.scene, &options)?.train)

@@ -2,7 +2,7 @@
 
 use super::values::share;
 use crate::Result;
-use crate::io::{LoadOptions, ReadOptions};
+use crate::io::{LoadOptions, Lookup, PoseConvention, ReadOptions};
 use crate::run::Settings;
 use clap::Args;
 use std::path::{Path, PathBuf};
@@ -31,11 +31,14 @@ pub struct JsonFlag {
     pub json: bool,
 }
 
-/// Tolerance for damaged photos and for files outside the scene folder.
-#[derive(Args, Clone, Copy, Debug, Default)]
+/// Where the files of a scene are, and how much of it may be damaged.
+#[derive(Args, Clone, Debug, Default)]
 #[command(next_help_heading = "Scene")]
-pub struct ReadArgs {
-    /// Largest share of damaged photos, from 0 to 1. They are skipped with a warning. Default: 0.1.
+pub struct FileArgs {
+    /// Folder of the photos, where they are not where the scene lists them: a path, or a folder of the scene.
+    #[arg(long, value_name = "DIR")]
+    pub images: Option<PathBuf>,
+    /// Largest share of missing or damaged photos, from 0 to 1. They are skipped with a warning. Default: 0.1.
     #[arg(long, value_name = "SHARE", value_parser = share)]
     pub max_bad_photos: Option<f32>,
     /// Read photos and points that the scene lists outside its folder.
@@ -43,11 +46,32 @@ pub struct ReadArgs {
     pub allow_outside: bool,
 }
 
+/// How a scene is read.
+#[derive(Args, Clone, Debug, Default)]
+pub struct ReadArgs {
+    /// Its files.
+    #[command(flatten)]
+    pub files: FileArgs,
+    /// What the scene's file means by its poses, where it is not the convention of its format: words of c2w or w2c, opencv
+    /// or opengl, and xyzw, with commas between. Default: the format's; commands with a model use that of its run.
+    #[arg(long, value_name = "WORDS", help_heading = "Scene")]
+    pub poses: Option<PoseConvention>,
+}
+
 impl ReadArgs {
+    /// Returns where the files of the scene are.
+    pub fn lookup(&self) -> Lookup {
+        Lookup {
+            allow_outside: self.files.allow_outside,
+            images: self.files.images.clone(),
+            poses: self.poses.unwrap_or_default(),
+        }
+    }
+
     /// Puts the typed values into `options`.
-    pub fn into_options(self, options: LoadOptions) -> LoadOptions {
-        let max_bad_photos = self.max_bad_photos.unwrap_or(options.max_bad_photos);
-        LoadOptions { max_bad_photos, allow_outside: self.allow_outside || options.allow_outside, ..options }
+    pub fn into_options(&self, options: LoadOptions) -> LoadOptions {
+        let max_bad_photos = self.files.max_bad_photos.unwrap_or(options.max_bad_photos);
+        LoadOptions { max_bad_photos, lookup: self.lookup(), ..options }
     }
 }
 
@@ -73,13 +97,15 @@ pub struct SceneArgs {
 impl SceneArgs {
     /// Returns these arguments; values that were not typed come from the run of `model`, if it has one.
     pub fn of_run(&self, model: &Path) -> Result<Self> {
-        let Some(ReadOptions { max_resolution, test_every }) = Settings::of_model(model)?.map(|run| run.read) else {
+        let Some(ReadOptions { max_resolution, test_every, poses }) = Settings::of_model(model)?.map(|run| run.read)
+        else {
             return Ok(self.clone());
         };
         let longest = (max_resolution > 0).then_some(max_resolution);
         Ok(Self {
             test_every: self.test_every.or(Some(test_every)),
             max_resolution: self.max_resolution.or(longest),
+            read: ReadArgs { poses: self.read.poses.or(Some(poses)), ..self.read.clone() },
             ..self.clone()
         })
     }

@@ -30,7 +30,7 @@ pub(crate) fn run(args: &CheckArgs, context: &Context) -> Result<()> {
     // It looks at the photos in full size, few times: a file of their pixels would cost more than it saves.
     let options = LoadOptions { test_every: None, photo_folder: None, ..LoadOptions::default() };
     let dataset = io::open_logged(&args.scene, &args.read.into_options(options))?;
-    let report = scan(&args.scene, &dataset)?;
+    let report = scan(&args.scene, &args.read.lookup(), &dataset)?;
     let mut counts: BTreeMap<Fault, usize> = BTreeMap::new();
     report.findings.iter().for_each(|finding| *counts.entry(finding.fault).or_default() += 1);
     if context.json || args.json.json {

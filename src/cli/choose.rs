@@ -86,7 +86,7 @@ pub(crate) struct Asked<'a> {
     /// Longest side of a view, px.
     pub max_resolution: Option<u32>,
     /// Tolerance for the scene.
-    pub read: ReadArgs,
+    pub read: &'a ReadArgs,
     /// Memory for label maps.
     pub memory: SchedulerOptions,
 }
@@ -102,13 +102,13 @@ impl ChooseArgs {
     ) -> Result<BTreeSet<u32>> {
         let (scene, max_resolution, model) = (self.scene.as_deref(), self.max_resolution, model.into());
         let memory = SchedulerOptions::default();
-        let asked = Asked { path, model, known, scene, max_resolution, read: self.read, memory };
+        let asked = Asked { path, model, known, scene, max_resolution, read: &self.read, memory };
         self.prompts.labels("--labels", self.labels.as_ref(), &asked, to)
     }
 
     /// Returns how the scene of a model is read: as its run did.
     pub(crate) fn reading(&self, model: &Path) -> Result<SceneArgs> {
-        SceneArgs { max_resolution: self.max_resolution, read: self.read, ..SceneArgs::default() }.of_run(model)
+        SceneArgs { max_resolution: self.max_resolution, read: self.read.clone(), ..SceneArgs::default() }.of_run(model)
     }
 }
 
@@ -178,7 +178,8 @@ impl PromptArgs {
         if !asked.model.has_labels() {
             return Err(Error::data(asked.path, "", "the model has no labels; train it with --masks"));
         }
-        let reading = SceneArgs { max_resolution: asked.max_resolution, read: asked.read, ..SceneArgs::default() };
+        let reading =
+            SceneArgs { max_resolution: asked.max_resolution, read: asked.read.clone(), ..SceneArgs::default() };
         let dataset = open_scene(scene, &reading, None, [0.0; 3], false)?;
         let mut cameras: BTreeMap<Key, Camera> = BTreeMap::new();
         for prompt in prompts {

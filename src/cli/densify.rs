@@ -72,7 +72,7 @@ pub(crate) fn run(args: &DensifyArgs, context: &Context) -> Result<()> {
     let (model, near) = (open_model(&args.model)?, near_plane(&args.model, args.near)?);
     let dataset = open_scene(&args.scene, &args.reading, None, args.background, false)?;
     let views = ordered_views(args, &dataset)?;
-    let lenses = windows(&args.scene)?.values().any(|window| !window.is_photo());
+    let lenses = windows(&args.scene, &args.reading.read.lookup())?.values().any(|window| !window.is_photo());
     let size = size_of_all(&views);
     let wide: Vec<Camera> =
         views.iter().map(|view| Camera { width: size.0, height: size.1, ..view.camera.clone() }).collect();

@@ -4,6 +4,7 @@ use super::args::{JsonFlag, SceneArgs};
 use super::context::{Context, open_model};
 use super::log::Progress;
 use super::masks::repair::table;
+use super::model_fit::warn_of_misfit;
 use super::output::WriteArgs;
 use super::scene::{near_plane, open_gpu, open_scene};
 use super::stdout;
@@ -97,6 +98,7 @@ pub(crate) fn run(args: &LabelArgs, context: &Context) -> Result<()> {
             "no training view has a mask here; check the names of the masks and --test-every",
         ));
     }
+    warn_of_misfit(&args.model, &model, &dataset)?;
     let gpu = open_gpu(context)?;
     let start = Instant::now();
     let names = match args.per_view {

@@ -22,6 +22,7 @@ pub(crate) mod list;
 pub(crate) mod log;
 pub(crate) mod masks;
 pub(crate) mod merge;
+mod model_fit;
 pub(crate) mod occlusion;
 pub(crate) mod output;
 pub(crate) mod plan;

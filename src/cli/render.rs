@@ -5,6 +5,7 @@ use super::choose::{Asked, PromptArgs};
 use super::context::{Context, open_model};
 use super::drawer::{Drawer, MemoryArg, largest};
 use super::labelled::MinConfidenceArg;
+use super::model_fit::warn_of_misfit_with;
 use super::scene::{near_plane, open_gpu, open_scene, pick_views};
 use super::values::{Picks, colour, picks};
 use super::{labelled, stdout};
@@ -16,7 +17,7 @@ use crate::render::large::{Index, fits};
 use crate::render::pictures::{Format, Pictures, What, write_pictures};
 use crate::render::{Parts, RenderOptions, Rendered};
 use crate::run::models;
-use crate::scene::{Camera, Gaussians, LABEL_MAX, stems};
+use crate::scene::{Camera, Dataset, Gaussians, LABEL_MAX, stems};
 use crate::{Error, Result};
 use clap::Args;
 use serde_json::json;
@@ -81,12 +82,15 @@ pub(crate) fn run(args: &RenderArgs, context: &Context) -> Result<()> {
     }
     let source = models::open_lazily(&args.model)?;
     let near = near_plane(&args.model, args.prompts.near)?;
-    let cameras = cameras(args)?;
+    let (cameras, dataset) = cameras(args)?;
     let sizes = || cameras.iter().map(|(_, camera)| (camera.width, camera.height));
     let (gpu, options) = (open_gpu(context)?, args.memory.options());
     let shown;
     let mut drawer = if fits(&gpu, source.view(), largest(sizes()), options)? {
         shown = self::shown(args, context)?;
+        if let (Some(scene), Some(dataset)) = (&args.scene, &dataset) {
+            warn_of_misfit_with(&args.model, &shown, (scene, &args.reading.of_run(&args.model)?), dataset)?;
+        }
         Drawer::new(gpu, (&shown).into(), sizes(), options)?
     } else {
         let index = index(args, source.view(), context)?;
@@ -172,19 +176,21 @@ fn chosen(args: &RenderArgs) -> Result<Option<(&'static str, Option<&Picks>)>> {
 }
 
 fn asked<'a>(args: &'a RenderArgs, model: ModelRef<'a>, known: &'a Catalogue) -> Asked<'a> {
-    let (max_resolution, read, memory) = (args.reading.max_resolution, args.reading.read, args.memory.options());
+    let (max_resolution, read, memory) = (args.reading.max_resolution, &args.reading.read, args.memory.options());
     Asked { path: &args.model, model, known, scene: args.scene.as_deref(), max_resolution, read, memory }
 }
 
-fn cameras(args: &RenderArgs) -> Result<Vec<(String, Camera)>> {
+/// Returns the cameras to draw for, and the scene that has them.
+fn cameras(args: &RenderArgs) -> Result<(Vec<(String, Camera)>, Option<Dataset>)> {
     if let Some(path) = &args.camera {
         let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-        return Ok(vec![(stem, read_camera(path)?)]);
+        return Ok((vec![(stem, read_camera(path)?)], None));
     }
     let Some(scene) = &args.scene else { return Err(Error::usage("--scene", "--scene or --camera is needed")) };
     let dataset = open_scene(scene, &args.reading.of_run(&args.model)?, None, args.background, false)?;
     let views = pick_views(&dataset, &args.views)?;
-    Ok(stems(&views).into_iter().zip(&views).map(|(stem, view)| (stem, view.camera.clone())).collect())
+    let cameras = stems(&views).into_iter().zip(&views).map(|(stem, view)| (stem, view.camera.clone())).collect();
+    Ok((cameras, Some(dataset)))
 }
 
 fn write(args: &RenderArgs, stem: &str, rendered: &Rendered, wide: bool) -> Result<Vec<PathBuf>> {

@@ -5,6 +5,7 @@ use super::choose::ChooseArgs;
 use super::context::{Context, open_model};
 use super::labelled::{Edited, MinConfidenceArg, Seen, Target, look, open, wants_json};
 use super::log::Progress;
+use super::model_fit::warn_of_misfit;
 use super::occlusion::from_model;
 use super::output::WriteArgs;
 use super::scene::{near_plane, open_gpu, open_scene};
@@ -138,6 +139,7 @@ pub(crate) fn run_extract(args: &ExtractArgs, context: &Context) -> Result<()> {
 fn alone(select: &SelectArgs, (scene, masks): (&Path, &Path), objects: &Gaussians, to: &Context) -> Result<Gaussians> {
     let (model, near) = (open_model(&select.model)?, near_plane(&select.model, select.choice.prompts.near)?);
     let dataset = open_scene(scene, &select.choice.reading(&select.model)?, Some(masks.to_owned()), [0.0; 3], true)?;
+    warn_of_misfit(&select.model, &model, &dataset)?;
     let views: Vec<&View> = dataset.train.iter().filter(|view| view.mask.is_some()).collect();
     let gpu = open_gpu(to)?;
     let occluders = from_model(Arc::clone(&gpu), (&model, near), &views, to)?;

@@ -1,7 +1,7 @@
 //! Arguments of `labelgs train`. The settings are fields of the run's own structs; see
 //! [`crate::options`](mod@crate::options).
 
-use super::args::{JsonFlag, ReadArgs};
+use super::args::{FileArgs, JsonFlag};
 use super::values::bytes;
 use super::view::WatchArgs;
 use crate::io::ReadOptions;
@@ -76,9 +76,9 @@ pub struct TrainFlags {
     /// Limit of device memory, such as 1500M or 2G. It bounds the number of Gaussians.
     #[arg(long, value_name = "SIZE", value_parser = bytes, help_heading = "Device")]
     pub memory_limit: Option<u64>,
-    /// Tolerance for the scene. `--resume` needs the same flags again.
+    /// Files of the scene.
     #[command(flatten)]
-    pub trust: ReadArgs,
+    pub files: FileArgs,
     /// Start from settings for a length and a level of detail: draft for a first look, standard, or best.
     ///
     /// Flags override them.
@@ -149,8 +149,9 @@ impl TrainFlags {
             ignore: self.ignore.clone(),
             known_depths: self.known_depths.clone(),
             memory_limit: self.memory_limit,
-            max_bad_photos: self.trust.max_bad_photos,
-            allow_outside: self.trust.allow_outside,
+            max_bad_photos: self.files.max_bad_photos,
+            images: self.files.images.clone(),
+            allow_outside: self.files.allow_outside,
         };
         let (init, block) = (self.init.clone(), self.block.clone());
         Ok(Request { start, inputs, init, block, occluders, restart: self.restart, ..Request::new(scene, output) })

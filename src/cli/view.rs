@@ -3,6 +3,7 @@
 use super::args::SceneArgs;
 use super::context::Context;
 use super::labelled::{TableArg, open};
+use super::model_fit::warn_of_misfit;
 use super::scene::{near_plane, open_gpu, open_scene};
 use super::shell::quoted;
 use super::stdout;
@@ -97,6 +98,9 @@ pub(crate) fn run(args: &ViewArgs, context: &Context) -> Result<()> {
         // Without their photos.
         None => Dataset { train: views_of_model(&args.model)?, ..Dataset::default() },
     };
+    if args.scene.is_some() {
+        warn_of_misfit(&args.model, &model, &dataset)?;
+    }
     let options = RenderOptions::new(near_plane(&args.model, args.near)?, Parts::COLOUR);
     let gpu = open_gpu(context)?;
     let viewer = args.server.start(1.0)?;

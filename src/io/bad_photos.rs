@@ -7,6 +7,12 @@ use std::path::Path;
 /// Most problems that one message lists.
 pub(crate) const LISTED_MAX: usize = 20;
 
+/// Returns how many of `total` photos may be left out.
+pub(super) fn allowed(max_share: f32, total: usize) -> usize {
+    // In floating point, 0.29 of 100 is a little less than 29.
+    ((f64::from(max_share) * total as f64 + 1e-3) as usize).min(total.saturating_sub(1))
+}
+
 /// Notes the skipped photos. If they are more than the options allow, refuses the scene with a list. `bad` has one
 /// error per undecodable photo; `total` is the number of photos with a file.
 pub(crate) fn skip(
@@ -26,17 +32,16 @@ pub(crate) fn skip(
     let count = bad.len();
     let listed = || bad.iter().take(LISTED_MAX).map(|error| format!("\n  {error}")).collect::<String>();
     let more = if count > LISTED_MAX { format!("\n  and {} more", count - LISTED_MAX) } else { String::new() };
-    // In floating point, 0.29 of 100 is a little less than 29.
-    let allowed = ((f64::from(options.max_bad_photos) * total as f64 + 1e-3) as usize).min(total.saturating_sub(1));
+    let allowed = allowed(options.max_bad_photos, total);
     if count <= allowed {
-        notes.push(format!("{count} of {total} photos cannot be decoded and are skipped:{}{more}", listed()));
+        notes.push(format!("{count} of {total} photos cannot be read and are skipped:{}{more}", listed()));
         return Ok(());
     }
     if count == 1 && total == 1 {
         return Err(bad.remove(0));
     }
     let problem = format!(
-        "{count} of {total} photos cannot be decoded, `max_bad_photos = {}` allows {allowed}; write them anew, take them out \
+        "{count} of {total} photos cannot be read, `max_bad_photos = {}` allows {allowed}; write them anew, take them out \
          of the scene, or allow more:{}{more}",
         options.max_bad_photos,
         listed()

@@ -4,6 +4,7 @@
 
 use super::depth_file::{EXTENSIONS, read_depth};
 use super::load::shortened;
+use super::lookup::Lookup;
 use super::resample::{resample_nearest, same_aspect};
 use super::window::{Window, windows};
 use crate::error::{Error, Result};
@@ -25,11 +26,11 @@ fn stem(name: &str) -> PathBuf {
 
 impl DepthFolder {
     /// Opens the maps in `folder` for the photos of `scene`. The scene must have been opened before.
-    pub fn open(folder: &Path, scene: &Path) -> Result<Self> {
+    pub fn open(folder: &Path, scene: &Path, lookup: &Lookup) -> Result<Self> {
         if !folder.is_dir() {
             return Err(Error::data(folder, "", "there is no such folder of depth maps"));
         }
-        let windows = windows(scene)?;
+        let windows = windows(scene, lookup)?;
         let photos: BTreeSet<&str> = windows.values().map(|window| window.photo.as_str()).collect();
         let mut stems = HashMap::new();
         photos.into_iter().for_each(|name| *stems.entry(stem(name)).or_insert(0) += 1);

@@ -3,14 +3,16 @@
 //! A scene is untrusted input. Its paths are opened for reading and, as names of views, used for writing. A path
 //! outside of the scene's folder is refused, unless the user allows it.
 
+use super::lookup::Lookup;
+use super::photo_finder::PhotoFinder;
 use crate::error::{Error, Result};
 use std::path::{Component, Path, PathBuf};
 
-/// The folder of a scene, and the permission for files elsewhere.
+/// The folder of a scene, and how its files are found.
 pub(crate) struct Place<'a> {
     pub(crate) root: &'a Path,
-    /// Paths may leave the folder.
-    allow_outside: bool,
+    lookup: &'a Lookup,
+    pub(crate) photos: PhotoFinder,
 }
 
 /// A file in the list of a scene.
@@ -23,8 +25,8 @@ pub(crate) struct ListedPath {
 }
 
 impl<'a> Place<'a> {
-    pub(crate) fn new(root: &'a Path, allow_outside: bool) -> Self {
-        Self { root, allow_outside }
+    pub(crate) fn new(root: &'a Path, lookup: &'a Lookup) -> Self {
+        Self { root, lookup, photos: PhotoFinder::new(root, lookup.images_of(root)) }
     }
 
     /// Resolves the path `listed` in the file `source`. Backslashes also separate folders, as in files from Windows.
@@ -40,7 +42,7 @@ impl<'a> Place<'a> {
             return refuse("is no path of a file; list photos by paths relative to the scene folder");
         }
         let inside = path.components().all(|part| matches!(part, Component::Normal(_) | Component::CurDir));
-        if !self.allow_outside && (!inside || has_drive(&text)) {
+        if !self.lookup.allow_outside && (!inside || has_drive(&text)) {
             return refuse(
                 "lies outside the scene folder; list photos by paths relative to it, without `..`, or set \
                  `allow_outside` if the scene may read them there",

@@ -1,6 +1,7 @@
 //! The content of a scene before its pixels, and the checks that all formats share.
 
 use super::lens::Lens;
+pub(crate) use super::photo_finder::EXTENSIONS;
 use crate::error::{Error, Result};
 use crate::scene::{Camera, Point};
 use glam::{DMat3, DQuat, DVec3};
@@ -38,6 +39,8 @@ pub(crate) struct Listing {
     pub(crate) bad: Vec<Error>,
     pub(crate) points: Vec<Point>,
     pub(crate) notes: Vec<String>,
+    /// Where photos were looked for, if some were not found.
+    pub(crate) hint: String,
 }
 
 /// Refuses cameras that cannot make an image. `place` names the camera in `path`.
@@ -98,9 +101,6 @@ pub(crate) fn invert_pose(rotation: DMat3, centre: DVec3) -> (DMat3, DVec3) {
     (inverse, -(inverse * centre))
 }
 
-/// Extensions to try for a photo that is listed without one.
-pub(crate) const EXTENSIONS: [&str; 7] = ["", ".png", ".jpg", ".jpeg", ".PNG", ".JPG", ".JPEG"];
-
 /// Returns the name of a view: a photo listed without extension gets that of its file. Otherwise `frame.0001` would later
 /// lose its number.
 pub(crate) fn with_extension(mut name: String, photo: Option<&Path>) -> String {
@@ -116,17 +116,4 @@ pub(crate) fn side(path: &Path, place: &str, value: f64) -> Result<u32> {
         return Ok(value as u32);
     }
     Err(Error::data(path, place, format!("image side {value} is not a positive whole number")))
-}
-
-/// Finds `relative` with one of `extensions` appended in the first of `folders` below `root` that has it.
-pub(crate) fn find_file(root: &Path, folders: &[&str], relative: &Path, extensions: &[&str]) -> Option<PathBuf> {
-    folders.iter().find_map(|folder| {
-        let path = root.join(folder).join(relative);
-        extensions.iter().find_map(|extension| {
-            let mut candidate = path.clone().into_os_string();
-            candidate.push(extension);
-            let candidate = PathBuf::from(candidate);
-            candidate.is_file().then_some(candidate)
-        })
-    })
 }

@@ -6,8 +6,9 @@
 
 use super::lens::Lens;
 use super::listed_path::Place;
-use super::listing::{EXTENSIONS, Listed, Listing, check_camera, invert_pose, rotation_of, side};
+use super::listing::{Listed, Listing, check_camera, invert_pose, rotation_of, side};
 use super::npy;
+use super::photo_finder::is_readable;
 use crate::error::{Error, Result};
 use crate::io::read;
 use crate::scene::Camera;
@@ -31,11 +32,12 @@ pub(crate) fn list_file(scene: &Place, path: &Path) -> Result<Listing> {
         let problem = format!("is ({rows}, {columns}); expected (photos, {ROW}): 3 x 5 numbers and two depths");
         return Err(Error::data(path, "shape", problem));
     }
-    let photos = photos(scene.root)?;
+    let photos = photos(&scene.photos.folder("images"))?;
     if photos.len() != rows {
         let problem = format!(
-            "has poses of {rows} photos, and `images` holds {} PNG or JPEG files; a row belongs to each of them, in the \
+            "has poses of {rows} photos, and {} holds {} PNG or JPEG files; a row belongs to each of them, in the \
              order of their names",
+            scene.photos.folder("images").display(),
             photos.len()
         );
         return Err(Error::data(path, "", problem));
@@ -49,17 +51,16 @@ pub(crate) fn list_file(scene: &Place, path: &Path) -> Result<Listing> {
     Ok(Listing { source: path.to_owned(), views: views.collect::<Result<_>>()?, ..Listing::default() })
 }
 
-/// Lists the photos in `images`, sorted by name.
-fn photos(root: &Path) -> Result<Vec<PathBuf>> {
-    let folder = root.join("images");
+/// Lists the photos in a folder, sorted by name.
+fn photos(folder: &Path) -> Result<Vec<PathBuf>> {
     if !folder.is_dir() {
-        return Err(Error::data(&folder, "", format!("there is no such folder; {FILE} belongs to the photos in it")));
+        return Err(Error::data(folder, "", format!("there is no such folder; {FILE} belongs to the photos in it")));
     }
     let is_photo = |path: &PathBuf| {
-        let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        EXTENSIONS.iter().any(|ext| !ext.is_empty() && name.ends_with(ext)) && !name.starts_with('.') && path.is_file()
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        is_readable(path) && !name.starts_with('.') && path.is_file()
     };
-    let mut photos: Vec<PathBuf> = read::folder(&folder)?.into_iter().filter(is_photo).collect();
+    let mut photos: Vec<PathBuf> = read::folder(folder)?.into_iter().filter(is_photo).collect();
     photos.sort();
     Ok(photos)
 }

@@ -1,11 +1,12 @@
 //! Loads a data set from a listing: split, decode, undistort, resize, masks.
 
-use super::LoadOptions;
 use super::bad_photos::{self, LISTED_MAX};
 use super::listing::{Listed, Listing};
 use super::mask::MaskFolder;
 use super::photo_store::PhotoStore;
+use super::pose_convention::Native;
 use super::recipe::{MadeView, MadeViews, Recipe};
+use super::{LoadOptions, frame_check, missing, stray};
 use crate::error::{Error, Result};
 use crate::scene::{Dataset, Photo, View, crew};
 use rayon::prelude::*;
@@ -15,7 +16,9 @@ use std::sync::Arc;
 
 pub(crate) fn load(root: &Path, mut listing: Listing, options: &LoadOptions) -> Result<Dataset> {
     let mut notes = std::mem::take(&mut listing.notes);
-    let mut views = existing(&listing, options, &mut notes)?;
+    let mut faults = Vec::new();
+    let mut views = missing::existing(&listing, options, &mut notes, &mut faults)?;
+    stray::remove(&mut views, &listing.points, options.max_bad_photos, &mut faults);
     views.sort_by(|a, b| a.name.cmp(&b.name));
     let mut test = split(&views, options.test_every, &mut notes)?;
     if let Some(only) = &options.only {
@@ -42,7 +45,7 @@ pub(crate) fn load(root: &Path, mut listing: Listing, options: &LoadOptions) -> 
             Err(error) => undecodable.push(error),
         }
     }
-    bad_photos::skip(root, undecodable, total, options, &mut notes)?;
+    bad_photos::skip(root, undecodable, total, options, &mut faults)?;
     let loaded: Vec<(Vec<View>, bool)> = all_or_one_error(root, loaded)?;
     if let Some(masks) = &masks {
         note_missing(masks, &views, "mask", &mut notes)?;
@@ -59,7 +62,8 @@ pub(crate) fn load(root: &Path, mut listing: Listing, options: &LoadOptions) -> 
         let faces: usize = wide.iter().map(|views| views.len()).sum();
         notes.push(format!("{} photos are wider than a pinhole picture and became {faces} faces of cubes", wide.len()));
     }
-    let mut dataset = Dataset { root: root.to_owned(), points: listing.points, notes, ..Dataset::default() };
+    notes.extend(faults.iter().cloned());
+    let mut dataset = Dataset { root: root.to_owned(), points: listing.points, notes, faults, ..Dataset::default() };
     for (views, test) in loaded {
         if test { dataset.test.extend(views) } else { dataset.train.extend(views) }
     }
@@ -71,6 +75,12 @@ pub(crate) fn load(root: &Path, mut listing: Listing, options: &LoadOptions) -> 
     dataset.train.sort_by(|a, b| a.name.cmp(&b.name));
     dataset.test.sort_by(|a, b| a.name.cmp(&b.name));
     require_unique(root, &dataset)?;
+    // Faces of wide photos are turned against them.
+    let is_turned = dataset.all().len() != views.len() || !options.lookup.poses.is_native();
+    let native = (!is_turned).then(|| Native::of_file(&listing.source));
+    let found = frame_check::check(&dataset, native, options.lookup.poses)?;
+    dataset.notes.extend(found.faults.iter().cloned().chain(found.notes));
+    dataset.faults.extend(found.faults);
     Ok(dataset)
 }
 
@@ -175,40 +185,6 @@ fn require_unique(root: &Path, dataset: &Dataset) -> Result<()> {
 pub(crate) fn shortened(names: &[&str]) -> String {
     let shown = names.iter().take(3).copied().collect::<Vec<_>>().join(", ");
     if names.len() > 3 { format!("{shown}, ...") } else { shown }
-}
-
-/// Returns the views whose photos exist; if photos are not requested and none exists, all views with a known size.
-fn existing(listing: &Listing, options: &LoadOptions, notes: &mut Vec<String>) -> Result<Vec<Listed>> {
-    let total = listing.views.len() + listing.missing.len();
-    if total + listing.bad.len() == 0 {
-        let why = notes.iter().map(|note| format!("; {note}")).collect::<String>();
-        return Err(Error::data(
-            &listing.source,
-            "",
-            format!("lists no photo with a pose; align the photos first{why}"),
-        ));
-    }
-    let found = listing.views.iter().filter(|view| view.photo.is_some()).count();
-    if found == 0 && !options.photos && !listing.views.is_empty() {
-        notes.push("no listed photo exists; cameras have the sizes that the data set states".into());
-        return Ok(listing.views.clone());
-    }
-    let absent = listing.views.iter().filter(|view| view.photo.is_none()).map(|view| view.name.as_str());
-    let absent: Vec<&str> = absent.chain(listing.missing.iter().map(String::as_str)).collect();
-    if absent.len() * 2 > total {
-        let problem = format!(
-            "{} of {total} listed photos do not exist (such as {}); expected in `images` or at the listed path below \
-             the scene",
-            absent.len(),
-            shortened(&absent)
-        );
-        return Err(Error::data(&listing.source, "photos", problem));
-    }
-    if !absent.is_empty() {
-        let (count, names) = (absent.len(), shortened(&absent));
-        notes.push(format!("{count} of {total} listed photos do not exist and are skipped: {names}"));
-    }
-    Ok(listing.views.iter().filter(|view| view.photo.is_some()).cloned().collect())
 }
 
 /// Returns which of the views, sorted by name, are held out.

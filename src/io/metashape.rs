@@ -6,9 +6,7 @@
 
 use super::lens::{Fisheye, Lens, Polynomial};
 use super::listed_path::Place;
-use super::listing::{
-    EXTENSIONS, Listed, Listing, check_camera, find_file, invert_pose, rotation_of, side, with_extension,
-};
+use super::listing::{Listed, Listing, check_camera, invert_pose, rotation_of, side, with_extension};
 use crate::error::{Error, Result};
 use crate::io::read;
 use crate::scene::Camera;
@@ -77,7 +75,7 @@ pub(crate) fn list_file(scene: &Place, path: &Path) -> Result<Listing> {
         let own = Camera { rotation, translation, ..intrinsics };
         check_camera(path, &place, &own, &lens)?;
         let resolved = scene.resolve(path, label)?;
-        let photo = find_file(scene.root, &["images", "."], &resolved.path, &EXTENSIONS);
+        let photo = scene.photos.find(&["images", "."], &resolved.path);
         let name = with_extension(resolved.name, photo.as_deref());
         if !names.insert(name.clone()) {
             return Err(refuse("another camera has this label too; rename one of the photos"));

@@ -15,6 +15,7 @@ pub(crate) mod checkpoint_folder;
 pub(crate) mod colmap;
 pub(crate) mod depth;
 mod depth_file;
+mod frame_check;
 pub(crate) mod frames;
 pub(crate) mod image;
 pub(crate) mod init;
@@ -24,16 +25,20 @@ mod listed_path;
 mod listing;
 mod llff;
 mod load;
+mod lookup;
 pub(crate) mod mask;
 pub mod masks;
 mod metashape;
+mod missing;
 pub(crate) mod model;
 pub(crate) mod names;
 mod npy;
 pub(crate) mod occlusion_table;
+mod photo_finder;
 mod photo_store;
 pub(crate) mod pipeline_file;
 pub(crate) mod ply;
+mod pose_convention;
 pub(crate) mod read;
 mod read_options;
 mod recipe;
@@ -41,6 +46,7 @@ pub(crate) mod resample;
 pub(crate) mod run_folder;
 mod scratch;
 pub(crate) mod shelf;
+mod stray;
 mod transforms;
 pub(crate) mod truth;
 pub(crate) mod window;
@@ -49,6 +55,7 @@ use crate::error::{Error, Result};
 use crate::scene::Dataset;
 use listed_path::Place;
 use listing::Listing;
+use pose_convention::Native;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -59,6 +66,7 @@ pub use frames::{Frame, Frames};
 pub use image::read_photo;
 pub use init::initial_gaussians;
 pub use label_table::{LabelEntry, LabelTable};
+pub use lookup::Lookup;
 pub use mask::read_mask;
 pub(crate) use model::write_joined;
 pub use model::{
@@ -67,6 +75,7 @@ pub use model::{
 };
 pub use occlusion_table::OcclusionTable;
 pub use pipeline_file::PipelineFolder;
+pub use pose_convention::PoseConvention;
 pub use read_options::ReadOptions;
 
 /// The options for reading a scene.
@@ -90,8 +99,8 @@ pub struct LoadOptions {
     pub photos: bool,
     /// Largest share of undecodable photos, 0 to 1. They are skipped with a note.
     pub max_bad_photos: f32,
-    /// Accepts files outside of the scene's folder, by absolute paths or `..`.
-    pub allow_outside: bool,
+    /// Where the scene's files are and how its poses are meant, where the scene itself does not say it right.
+    pub lookup: Lookup,
     /// Turns photos into pinhole views. Without it a view has the pixels of the photo as stored, whatever its lens, and a
     /// camera that is right for pinholes only.
     pub undistort: bool,
@@ -121,7 +130,7 @@ impl Default for LoadOptions {
             keep_opacity: false,
             photos: true,
             max_bad_photos: MAX_BAD_PHOTOS,
-            allow_outside: false,
+            lookup: Lookup::default(),
             undistort: true,
             photo_memory: PHOTO_MEMORY,
             only: None,
@@ -147,7 +156,7 @@ pub fn open(scene: &Path, options: &LoadOptions) -> Result<Dataset> {
         let problem = format!("{} is no share; expected a number from 0 to 1", options.max_bad_photos);
         return Err(Error::usage("max_bad_photos", problem));
     }
-    load::load(folder_of(scene), list(scene, options.allow_outside)?, options)
+    load::load(folder_of(scene), list(scene, &options.lookup)?, options)
 }
 
 /// Like [`open`]; logs a summary and the notes.
@@ -167,23 +176,41 @@ fn folder_of(scene: &Path) -> &Path {
     scene.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
-/// Lists a scene. Files outside of its folder need `allow_outside`.
-fn list(scene: &Path, allow_outside: bool) -> Result<Listing> {
+/// Lists a scene.
+fn list(scene: &Path, lookup: &Lookup) -> Result<Listing> {
+    if let Some(images) = lookup.images_of(folder_of(scene))
+        && !images.is_dir()
+    {
+        return Err(Error::usage(
+            "images",
+            format!("{} is no folder; expected the folder of the photos", images.display()),
+        ));
+    }
+    let place = Place::new(folder_of(scene), lookup);
+    let mut listing = list_in(&place, scene)?;
+    listing.notes.extend(place.photos.note());
+    if listing.views.iter().any(|view| view.photo.is_none()) || !listing.missing.is_empty() {
+        listing.hint = place.photos.hint();
+    }
+    let native = Native::of_file(&listing.source);
+    listing.views.iter_mut().for_each(|view| lookup.poses.apply(native, &mut view.camera));
+    Ok(listing)
+}
+
+fn list_in(place: &Place, scene: &Path) -> Result<Listing> {
     if scene.is_file() {
-        let place = Place::new(folder_of(scene), allow_outside);
         let extension = scene.extension().map(|extension| extension.to_string_lossy().to_lowercase());
         return match extension.as_deref() {
-            Some("npy") => llff::list_file(&place, scene),
-            Some("xml") => metashape::list_file(&place, scene),
-            _ => transforms::list_file(&place, scene),
+            Some("npy") => llff::list_file(place, scene),
+            Some("xml") => metashape::list_file(place, scene),
+            _ => transforms::list_file(place, scene),
         };
     }
     if !scene.is_dir() {
         return Err(Error::data(scene, "", "there is no such folder; expected the folder of a scene"));
     }
-    let place = Place::new(scene, allow_outside);
     for list in [colmap::list, transforms::list, llff::list, metashape::list] {
-        if let Some(listing) = list(&place)? {
+        if let Some(listing) = list(place)? {
             return Ok(listing);
         }
     }

@@ -1,5 +1,6 @@
 //! Settings for reading the scene of a run.
 
+use super::pose_convention::PoseConvention;
 use crate::error::{Error, Result};
 use crate::options::Options;
 
@@ -16,6 +17,12 @@ crate::options::options! {
             ///
             /// 8 (LabelGS, 3DGS); 0 trains on all views. A scene with its own split keeps it.
             test_every <"N">: u32 = 8, fixed;
+
+            /// What the scene's file means by its poses, where it is not the convention of its format.
+            ///
+            /// Words of c2w or w2c (camera-to-world, world-to-camera), opencv or opengl (axes of the camera: y down and looking
+            /// along z, or y up and looking along -z), and xyzw (quaternions whose real part is last), with commas between.
+            poses <"WORDS">: PoseConvention = PoseConvention::default(), fixed;
         }
     }
 }

@@ -5,9 +5,7 @@
 
 use super::lens::{self, Equirectangular, Lens};
 use super::listed_path::Place;
-use super::listing::{
-    EXTENSIONS, FAR, Listed, Listing, check_camera, find_file, invert_pose, rotation_of, side, with_extension,
-};
+use super::listing::{FAR, Listed, Listing, check_camera, invert_pose, rotation_of, side, with_extension};
 use super::{image, ply};
 use crate::error::{Error, Result};
 use crate::io::read;
@@ -165,7 +163,7 @@ enum Found {
 /// Makes the view of a frame.
 fn listed(scene: &Place, path: &Path, place: &str, frame: &Frame, file: &Intrinsics) -> Result<Found> {
     let resolved = scene.resolve(path, &frame.file_path)?;
-    let photo = find_file(scene.root, &[".", "images"], &resolved.path, &EXTENSIONS);
+    let photo = scene.photos.find(&[".", "images"], &resolved.path);
     let intrinsics = frame.intrinsics.or(file);
     let lens = lens(path, place, &intrinsics)?;
     let size = match (intrinsics.w, intrinsics.h, &photo) {

@@ -1,6 +1,7 @@
 //! The pinhole views of a photo: the photo itself, undistorted, or faces of a cube around its camera.
 
 use super::lens::{Lens, Optics};
+use super::lookup::Lookup;
 use super::recipe::at_photo_size;
 use crate::Result;
 use crate::scene::{Camera, LabelMap};
@@ -155,9 +156,9 @@ impl Window {
 
 /// Returns how the views of `scene` (as in [`super::open`]) lie in their photos, by name of the view. Accepts photos anywhere and
 /// leaves out unreadable ones, because opening the scene has checked them.
-pub fn windows(scene: &Path) -> Result<BTreeMap<String, Window>> {
+pub fn windows(scene: &Path, lookup: &Lookup) -> Result<BTreeMap<String, Window>> {
     let mut found = BTreeMap::new();
-    for listed in super::list(scene, true)?.views {
+    for listed in super::list(scene, &Lookup { allow_outside: true, ..lookup.clone() })?.views {
         if let Ok(camera) = at_photo_size(&listed) {
             let views = Window::all(&listed.name, &camera, &listed.lens);
             found.extend(views.into_iter().map(|view| (view.name.clone(), view)));

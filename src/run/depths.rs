@@ -1,8 +1,8 @@
 //! Depths that photos are known to have, from files or from the reconstruction.
 
 use crate::error::{Error, Result};
-use crate::io::DepthFolder;
 use crate::io::capture::Sightings;
+use crate::io::{DepthFolder, Lookup};
 use crate::scene::{Dataset, View};
 use crate::train::TrainConfig;
 use crate::train::depths::KnownDepths;
@@ -14,7 +14,7 @@ const WEIGHT: f64 = 0.3;
 /// Returns the settings with the weight of known depths decided, and these depths of each training photo, none with a
 /// weight of 0. Only a new run decides. `folder` has depth maps in place of the points of the reconstruction.
 pub(super) fn decided(
-    (scene, dataset): (&Path, &Dataset),
+    (scene, lookup, dataset): (&Path, &Lookup, &Dataset),
     (config, is_new): (&TrainConfig, bool),
     (folder, sightings): (Option<&Path>, &Sightings),
 ) -> Result<(TrainConfig, Vec<KnownDepths>)> {
@@ -25,7 +25,7 @@ pub(super) fn decided(
         return folder.map_or(Ok((with(0.0), Vec::new())), |_| unread());
     }
     let known = match folder {
-        Some(folder) => of_maps(folder, (scene, dataset))?,
+        Some(folder) => of_maps(folder, (scene, lookup, dataset))?,
         None => {
             let points = sightings.points()?;
             let of_view = |(view, points): (&View, Vec<_>)| KnownDepths::of_points(view, points.into_iter());
@@ -48,8 +48,8 @@ pub(super) fn decided(
     Err(Error::data(scene, "points", problem))
 }
 
-fn of_maps(folder: &Path, (scene, dataset): (&Path, &Dataset)) -> Result<Vec<KnownDepths>> {
-    let maps = DepthFolder::open(folder, scene)?;
+fn of_maps(folder: &Path, (scene, lookup, dataset): (&Path, &Lookup, &Dataset)) -> Result<Vec<KnownDepths>> {
+    let maps = DepthFolder::open(folder, scene, lookup)?;
     let views: Vec<&View> = dataset.train.iter().collect();
     maps.check_complete(&views)?;
     views.into_iter().map(|view| maps.read(view).map(|map| KnownDepths::of_map(&map))).collect()

@@ -79,6 +79,9 @@ pub struct Inputs {
     pub max_bad_photos: Option<f32>,
     /// Accepts photos and points outside of the scene's folder.
     pub allow_outside: bool,
+    /// Folder of the photos, where they are not where the scene lists them. See [`crate::io::Lookup::images`].
+    #[serde(default)]
+    pub images: Option<PathBuf>,
 }
 
 /// The description of a run.

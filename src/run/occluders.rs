@@ -2,6 +2,7 @@
 
 use super::Request;
 use crate::error::{Error, Result};
+use crate::io::Lookup;
 use crate::io::occlusion_table::OcclusionTable;
 use crate::label::occlusion::from_depths;
 use crate::scene::{Dataset, DepthKind, View};
@@ -44,12 +45,12 @@ pub(super) fn check(config: &TrainConfig, files: Option<&OccluderFiles>) -> Resu
 }
 
 /// Reads the given occluders. Returns none if the run finds its own.
-pub(super) fn table(request: &Request, dataset: &Dataset) -> Result<Option<OcclusionTable>> {
+pub(super) fn table(request: &Request, lookup: &Lookup, dataset: &Dataset) -> Result<Option<OcclusionTable>> {
     let views: Vec<&View> = dataset.train.iter().filter(|view| view.mask.is_some()).collect();
     let path = match &request.occluders {
         None => return Ok(None),
         Some(OccluderFiles::Depths { folder, kind }) => {
-            let found = from_depths(&request.scene, folder, *kind, &views)?;
+            let found = from_depths((&request.scene, lookup), folder, *kind, &views)?;
             return Ok(Some(OcclusionTable::new("depth", found)));
         }
         Some(OccluderFiles::Lists(path)) => path,

@@ -14,7 +14,7 @@ use crate::io::capture::Sightings;
 use crate::io::label_table::LabelTable;
 use crate::io::occlusion_table::OcclusionTable;
 use crate::io::run_folder::Lock;
-use crate::io::{self, atomic, checkpoint_folder};
+use crate::io::{self, Lookup, atomic, checkpoint_folder};
 use crate::scene::{Dataset, Gaussians};
 use crate::scheduler::SchedulerOptions;
 use crate::train::exposure;
@@ -75,9 +75,11 @@ pub(super) fn prepare(request: &Request, is_again: bool) -> Result<Prepared> {
     let mut inputs = resumed.as_ref().map_or(request.inputs.clone(), |resumed| resumed.record.inputs.clone());
     inputs.masks = request.inputs.masks.clone().or(inputs.masks);
     inputs.ignore = request.inputs.ignore.clone().or(inputs.ignore);
+    inputs.images = request.inputs.images.clone().or(inputs.images);
     let names = inputs.masks.as_deref().map(LabelTable::of_folder).transpose()?.flatten();
     let dataset = read_scene(request, &settings, &inputs, block.as_ref())?;
-    let table = if resumed.is_none() { occluders::table(request, &dataset)? } else { None };
+    let table =
+        if resumed.is_none() { occluders::table(request, &lookup(&settings, &inputs), &dataset)? } else { None };
     Ok(Prepared { lock, settings, resumed, inputs, models, names, dataset, table, first, block })
 }
 
@@ -101,11 +103,16 @@ fn clear(out: &Path, settings: &Settings) -> Result<()> {
     Ok(())
 }
 
+/// Returns where the files of the scene are and how its poses are meant.
+fn lookup(settings: &Settings, inputs: &Inputs) -> Lookup {
+    Lookup { allow_outside: inputs.allow_outside, images: inputs.images.clone(), poses: settings.read.poses }
+}
+
 fn read_scene(request: &Request, settings: &Settings, inputs: &Inputs, block: Option<&Block>) -> Result<Dataset> {
     let mut options = settings.load_options(inputs.masks.clone());
     options.ignore = inputs.ignore.clone();
     options.max_bad_photos = inputs.max_bad_photos.unwrap_or(options.max_bad_photos);
-    options.allow_outside = inputs.allow_outside;
+    options.lookup = lookup(settings, inputs);
     options.photo_folder = Some(request.output.clone());
     if let Some(block) = block {
         block.limit(&mut options);
@@ -135,9 +142,10 @@ pub(super) fn begin<'a>(
         ..SchedulerOptions::default()
     };
     let is_new = resumed.is_none();
-    let sightings = Sightings::new(&request.scene, &dataset);
+    let lookup = lookup(&settings, &inputs);
+    let sightings = Sightings::new((&request.scene, &lookup), &dataset);
     let files = (inputs.known_depths.as_deref(), &sightings);
-    let (train, depths) = depths::decided((&request.scene, &dataset), (&settings.train, is_new), files)?;
+    let (train, depths) = depths::decided((&request.scene, &lookup, &dataset), (&settings.train, is_new), files)?;
     let options = TrainerOptions { region: block.map(|block| block.region()).transpose()?, depths, ..options.into() };
     let mut facts = facts(request, inputs.masks.as_deref(), &gpu);
     facts.extend(resumed.as_ref().map(|resumed| ("goes on after step", resumed.state.step.to_string())));
@@ -148,6 +156,10 @@ pub(super) fn begin<'a>(
             masks: recorded(inputs.masks.as_deref()),
             ignore: recorded(inputs.ignore.as_deref()),
             known_depths: recorded(inputs.known_depths.as_deref()),
+            images: inputs
+                .images
+                .as_deref()
+                .map(|images| if images.is_dir() { absolute(images) } else { images.into() }),
             ..inputs.clone()
         },
         occlusion: occlusion.clone(),

@@ -131,6 +131,10 @@ fn merge(then: &mut Inputs, now: &Inputs) {
     }
     then.max_bad_photos = now.max_bad_photos.or(then.max_bad_photos);
     then.allow_outside |= now.allow_outside;
+    if let Some(images) = &now.images {
+        // A folder of the scene keeps its name.
+        then.images = Some(if images.is_dir() { absolute(images) } else { images.clone() });
+    }
 }
 
 /// Returns an absolute path, independent of the working directory.

@@ -4,6 +4,7 @@
 //! [`LabelMap`] has an object id per pixel, a [`DepthMap`] a depth. [`path`] makes smooth paths through cameras, an [`Overview`] is what they look at.
 //! A [`Zone`] is a box.
 
+pub(crate) mod agreement;
 pub(crate) mod camera;
 pub(crate) mod colour;
 pub(crate) mod crew;
@@ -16,6 +17,7 @@ pub(crate) mod origin;
 pub(crate) mod overview;
 pub mod path;
 pub(crate) mod pixels;
+pub(crate) mod spread;
 pub(crate) mod view;
 pub(crate) mod zone;
 

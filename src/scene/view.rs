@@ -1,5 +1,6 @@
 //! Posed photos with masks, and the scene that they form.
 
+use super::spread::Spread;
 use super::{Camera, LabelMap, Pixels};
 use crate::error::{Error, Result};
 use glam::DVec3;
@@ -126,7 +127,13 @@ pub struct Dataset {
     pub points: Vec<Point>,
     /// Notes for the user about reading, a line each.
     pub notes: Vec<String>,
+    /// Those of them that say which photos were left out, and other faults of the scene.
+    pub faults: Vec<String>,
 }
+
+/// Radii of the spread of the cameras within which they count for the extent: a few wrong poses would change learning
+/// rates and limits of size for the whole scene.
+const EXTENT_RADII: f64 = 5.0;
 
 impl Dataset {
     /// Returns all views, sorted by name.
@@ -137,9 +144,12 @@ impl Dataset {
     }
 
     /// Returns the radius of the training cameras around their mean, times 1.1 (as in 3DGS), world units; 1 if it is
-    /// only rounding errors.
+    /// only rounding errors. Cameras beyond [`EXTENT_RADII`] do not count.
     pub fn extent(&self) -> f64 {
-        let centres: Vec<DVec3> = self.train.iter().map(|view| view.camera.centre()).collect();
+        let all = self.train.iter().map(|view| view.camera.centre());
+        let spread = Spread::of(all.clone());
+        let is_usual = |centre: &DVec3| spread.is_none_or(|spread| spread.distance(*centre) <= EXTENT_RADII);
+        let centres: Vec<DVec3> = all.filter(is_usual).collect();
         if centres.is_empty() {
             return 1.0;
         }

@@ -39,7 +39,7 @@ pub(super) fn run(protocol: Protocol, args: &EvalArgs, context: &Context) -> Res
     let dataset = open_scene(&args.scene, &args.reading, None, [0.0; 3], true)?;
     let (views, test) = (dataset.all(), test_views(protocol, &dataset, &args.scene));
     let labels: BTreeSet<u32> = model.labels.iter().flatten().copied().filter(|&label| label != UNLABELLED).collect();
-    let windows = crate::io::window::windows(&args.scene)?;
+    let windows = crate::io::window::windows(&args.scene, &args.reading.read.lookup())?;
     let truth = |file: &Path, view: &View| read_truth(&root.join(file), view, &windows);
     let bench = Bench {
         protocol,

@@ -6,6 +6,7 @@ use super::{EvalArgs, put_out};
 use crate::blocks::Seams;
 use crate::cli::context::{Context, open_model};
 use crate::cli::drawer::largest;
+use crate::cli::model_fit::warn_of_misfit;
 use crate::cli::scene::{near_plane, open_gpu, open_scene, pick_views, render_engine};
 use crate::eval::by_place;
 use crate::eval::evaluate::{AmodalTruth, Rendering, evaluate_subject, picture_count};
@@ -73,6 +74,7 @@ impl Job<'_> {
     fn of_whole(&self, gpu: &Arc<Gpu>, views: Vec<&View>, memory: SchedulerOptions) -> Result<Scores> {
         let (args, how) = (self.args, self.how);
         let model = open_model(&args.model)?;
+        warn_of_misfit(&args.model, &model, self.dataset)?;
         let removing = if args.removal { Some(Removing::new(args, &model, self.dataset)?) } else { None };
         let pictures = picture_count(&views) + removing.as_ref().map_or(0, |_| removal::picture_count(&views));
         let mut watcher = Watcher::new(pictures, args.page.as_deref(), self.context)?;

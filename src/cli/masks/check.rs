@@ -31,7 +31,7 @@ pub struct CheckArgs {
 
 /// Prints the findings. Fails if there are any.
 pub(crate) fn run(args: &CheckArgs, context: &Context) -> Result<()> {
-    let dataset = open_photos(&args.scene, args.read)?;
+    let dataset = open_photos(&args.scene, &args.read)?;
     let report = inspect(&dataset, &args.masks)?;
     let mut counts: BTreeMap<Problem, usize> = BTreeMap::new();
     report.findings.iter().for_each(|finding| *counts.entry(finding.problem).or_default() += 1);

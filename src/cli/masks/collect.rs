@@ -1,7 +1,7 @@
 //! `labelgs masks collect`: from the masks of all frames to those of the photos (E in the paper).
 
 use super::{files_of_photos, write_mask};
-use crate::cli::args::JsonFlag;
+use crate::cli::args::{JsonFlag, ReadArgs};
 use crate::cli::context::Context;
 use crate::cli::stdout;
 use crate::io::frames::{Frame, Frames};
@@ -30,6 +30,9 @@ pub struct CollectArgs {
     /// Scene of the photos; needed if they were taken through lenses: masks are bent like their photos.
     #[arg(long, value_name = "SCENE")]
     pub scene: Option<PathBuf>,
+    /// How the scene is read.
+    #[command(flatten)]
+    pub read: ReadArgs,
     /// JSON.
     #[command(flatten)]
     pub json: JsonFlag,
@@ -83,7 +86,7 @@ fn tracked_file(folder: &Path, frame: &Frame) -> PathBuf {
 /// Returns how the views lie in photos through lenses; nothing if all photos are those of pinhole cameras.
 fn windows_of(args: &CollectArgs, video: &Frames) -> Result<BTreeMap<String, Window>> {
     let found = match &args.scene {
-        Some(scene) => windows(scene)?,
+        Some(scene) => windows(scene, &args.read.lookup())?,
         None if video.lenses => {
             return Err(Error::usage("--scene", "is needed: the photos of this video were taken through lenses"));
         }

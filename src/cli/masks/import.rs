@@ -46,7 +46,7 @@ pub struct ImportArgs {
 
 /// Imports the masks.
 pub(crate) fn run(args: &ImportArgs, context: &Context) -> Result<()> {
-    let dataset = open_photos(&args.scene, args.read)?;
+    let dataset = open_photos(&args.scene, &args.read)?;
     let options = ImportOptions {
         folder: args.folder.clone(),
         format: args.format,

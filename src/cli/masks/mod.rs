@@ -70,7 +70,7 @@ pub(crate) fn run(args: &MasksArgs, context: &Context) -> Result<()> {
 }
 
 /// Reads the scene that masks belong to: names, sizes and cameras of its photos, and its points.
-fn open_photos(scene: &Path, read: ReadArgs) -> Result<Dataset> {
+fn open_photos(scene: &Path, read: &ReadArgs) -> Result<Dataset> {
     let options = LoadOptions { photos: false, test_every: None, undistort: false, ..LoadOptions::default() };
     io::open_logged(scene, &read.into_options(options))
 }

@@ -4,6 +4,7 @@ use super::{files_of_photos, write_mask};
 use crate::cli::args::{JsonFlag, SceneArgs};
 use crate::cli::context::{Context, open_model};
 use crate::cli::log::Progress;
+use crate::cli::model_fit::warn_of_misfit;
 use crate::cli::scene::{near_plane, open_gpu, open_scene};
 use crate::cli::stdout;
 use crate::cli::values::near;
@@ -69,7 +70,8 @@ pub(crate) fn run(args: &RepairArgs, context: &Context) -> Result<()> {
             "no training view has a mask here; check the names of the masks and --test-every",
         ));
     }
-    let windows = windows(&args.scene)?;
+    warn_of_misfit(&args.model, &model, &dataset)?;
+    let windows = windows(&args.scene, &args.reading.read.lookup())?;
     let photos = files_of_photos(views.iter().map(|view| view.name.as_str()), &windows, &args.scene)?;
     let mut engine = vote_engine(open_gpu(context)?, &model, &views, columns_of(&views))?;
     let mut progress = Progress::new(2 * views.len() as u64, "views", &context.global);

@@ -67,7 +67,10 @@ pub(crate) fn run(args: &OcclusionArgs, context: &Context) -> Result<()> {
     let dataset = io::open_logged(&args.scene, &args.read.into_options(options))?;
     let views: Vec<&View> = dataset.all().into_iter().filter(|view| view.mask.is_some()).collect();
     let table = match (&args.depths, args.depth_kind, &args.model) {
-        (Some(depths), Some(kind), _) => OcclusionTable::new("depth", from_depths(&args.scene, depths, kind, &views)?),
+        (Some(depths), Some(kind), _) => {
+            let scene = (args.scene.as_path(), &args.read.lookup());
+            OcclusionTable::new("depth", from_depths(scene, depths, kind, &views)?)
+        }
         (_, _, Some(path)) => {
             let (model, near) = (open_model(path)?, near_plane(path, None)?);
             OcclusionTable::new("rendered", from_model(open_gpu(context)?, (&model, near), &views, context)?)

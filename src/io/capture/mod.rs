@@ -9,6 +9,7 @@ mod poses;
 use super::colmap::Seen;
 use super::listed_path::Place;
 use super::listing::Listed;
+use super::lookup::Lookup;
 use super::recipe::at_photo_size;
 use super::window::{Window, windows};
 use super::{colmap, folder_of};
@@ -131,9 +132,10 @@ struct Observed {
 }
 
 impl Observed {
-    fn read(scene: &Path) -> Result<Self> {
+    fn read(scene: &Path, lookup: &Lookup) -> Result<Self> {
         // Opening the scene has checked its paths.
-        let photos = colmap::observations(&Place::new(folder_of(scene), true))?.unwrap_or_default();
+        let lookup = Lookup { allow_outside: true, ..lookup.clone() };
+        let photos = colmap::observations(&Place::new(folder_of(scene), &lookup))?.unwrap_or_default();
         let mut faces = BTreeMap::new();
         for (listed, _) in photos.values().filter(|(listed, _)| !listed.lens.is_pinhole()) {
             // It has left out unreadable photos too.
@@ -152,6 +154,7 @@ impl Observed {
 /// Which points of the reconstruction each training photo shows. They are read when something asks for them, and once.
 pub(crate) struct Sightings<'a> {
     scene: &'a Path,
+    lookup: &'a Lookup,
     dataset: &'a Dataset,
     read: OnceCell<Sighted>,
 }
@@ -165,15 +168,15 @@ struct Sighted {
 
 impl<'a> Sightings<'a> {
     /// Those of a scene that was read.
-    pub(crate) fn new(scene: &'a Path, dataset: &'a Dataset) -> Self {
-        Self { scene, dataset, read: OnceCell::new() }
+    pub(crate) fn new((scene, lookup): (&'a Path, &'a Lookup), dataset: &'a Dataset) -> Self {
+        Self { scene, lookup, dataset, read: OnceCell::new() }
     }
 
     fn sighted(&self) -> Result<&Sighted> {
         if let Some(read) = self.read.get() {
             return Ok(read);
         }
-        let looked = Observed::read(self.scene)?;
+        let looked = Observed::read(self.scene, self.lookup)?;
         let views: Vec<&View> = self.dataset.train.iter().collect();
         let observed: Vec<_> = views.iter().map(|view| looked.of(view)).collect();
         let seen = neighbours::seen(&views, &self.dataset.points, &observed);
@@ -206,8 +209,8 @@ impl<'a> Sightings<'a> {
 }
 
 /// Scans a scene that was read with its photos.
-pub fn scan(scene: &Path, dataset: &Dataset) -> Result<Report> {
-    let looked = Observed::read(scene)?;
+pub fn scan(scene: &Path, lookup: &Lookup, dataset: &Dataset) -> Result<Report> {
+    let looked = Observed::read(scene, lookup)?;
     let views: Vec<&View> = dataset.all();
     let observed: Vec<_> = views.iter().map(|view| looked.of(view)).collect();
     let seen = neighbours::seen(&views, &dataset.points, &observed);
@@ -231,7 +234,7 @@ pub fn scan(scene: &Path, dataset: &Dataset) -> Result<Report> {
     findings.extend(neighbours::findings(&reports, dataset.points.len()));
     findings.extend(poses::scale(dataset));
     // The faces of a wide photo look at other things than their neighbours: sky is smooth, and no other photo shows it.
-    let windows = windows(scene)?;
+    let windows = windows(scene, lookup)?;
     let is_face = |name: &String| windows.get(name).is_some_and(|window| window.photo != window.name);
     findings.retain(|of| !matches!(of.fault, Fault::Blur | Fault::Alone) || !of.view.as_ref().is_some_and(is_face));
     findings.sort_by(|a, b| (a.fault, &a.view).cmp(&(b.fault, &b.view)));

@@ -9,7 +9,7 @@ mod text;
 pub(crate) mod write;
 
 use super::listed_path::Place;
-use super::listing::{FAR, Listed, Listing, check_camera, find_file};
+use super::listing::{FAR, Listed, Listing, check_camera};
 use crate::error::{Error, Result};
 use crate::scene::{Camera, Point};
 use glam::{DMat3, DQuat, DVec2, DVec3};
@@ -154,6 +154,6 @@ fn listed(
     )?;
     check_camera(images_path, place, &camera, &lens)?;
     let file = scene.resolve(images_path, &image.name)?;
-    let photo = find_file(scene.root, &["images", "."], &file.path, &[""]);
+    let photo = scene.photos.find(&["images", "."], &file.path);
     Ok(Listed { name: file.name, photo, camera, lens, test: None })
 }

@@ -2,6 +2,7 @@
 
 use super::{by_mean, distances};
 use crate::error::{Error, Result};
+use crate::io::Lookup;
 use crate::io::depth::DepthFolder;
 use crate::scene::{DepthKind, Occluders, View, crew};
 use std::collections::BTreeMap;
@@ -9,12 +10,12 @@ use std::path::Path;
 
 /// Returns the occluders of `views`, which have masks, by name of the view. Each thread keeps one depth map in memory.
 pub fn from_depths(
-    scene: &Path,
+    (scene, lookup): (&Path, &Lookup),
     depths: &Path,
     kind: DepthKind,
     views: &[&View],
 ) -> Result<BTreeMap<String, Occluders>> {
-    let folder = DepthFolder::open(depths, scene)?;
+    let folder = DepthFolder::open(depths, scene, lookup)?;
     folder.check_complete(views)?;
     let of_view = |view: &View| {
         let map = folder.read(view)?;

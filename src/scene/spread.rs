@@ -1,0 +1,56 @@
+//! Where the bulk of a scene's positions lies, whatever a few stray ones say.
+
+use super::median::median;
+use glam::DVec3;
+
+/// Share of the positions within the radius.
+const WITHIN: f64 = 0.8;
+/// Fewest positions of which one can be called stray.
+const COUNT_MIN: usize = 5;
+
+/// The middle of most positions, and how far they are from it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Spread {
+    /// Medians of the coordinates.
+    pub(crate) middle: DVec3,
+    /// Distance from the middle within which [`WITHIN`] of the positions lie.
+    pub(crate) radius: f64,
+}
+
+impl Spread {
+    /// Measures positions; `None` if they are too few or all at one place.
+    pub(crate) fn of(positions: impl Iterator<Item = DVec3> + Clone) -> Option<Self> {
+        let along = |axis: usize| median(positions.clone().map(move |position| position[axis]));
+        let middle = DVec3::new(along(0)?, along(1)?, along(2)?);
+        let mut distances: Vec<f64> = positions.map(|position| position.distance(middle)).collect();
+        if distances.len() < COUNT_MIN {
+            return None;
+        }
+        let within = (WITHIN * (distances.len() - 1) as f64) as usize;
+        let radius = *distances.select_nth_unstable_by(within, f64::total_cmp).1;
+        (radius > 1e-9 * middle.length().max(1.0)).then_some(Self { middle, radius })
+    }
+
+    /// Returns the distance from the middle, in radii.
+    pub(crate) fn distance(&self, position: DVec3) -> f64 {
+        position.distance(self.middle) / self.radius
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn stray_positions_move_nothing() {
+        let ring = (0..12).map(|i| DVec3::new(f64::from(i).cos(), f64::from(i).sin(), 0.0));
+        let usual = Spread::of(ring.clone()).expect("a spread");
+        for far in [1e3, 1e9] {
+            let found = Spread::of(ring.clone().chain([DVec3::new(far, -far, far)])).expect("a spread");
+            assert!(found.middle.distance(usual.middle) < 0.5, "{found:?}");
+            assert!(found.radius < 1.5 && found.distance(DVec3::splat(far)) > 100.0, "{found:?}");
+        }
+        assert_eq!(Spread::of(ring.take(4)), None, "too few");
+        assert_eq!(Spread::of([DVec3::ONE; 9].into_iter()), None, "all at one place");
+    }
+}
