@@ -41,8 +41,8 @@ pub(crate) fn skip(
         return Err(bad.remove(0));
     }
     let problem = format!(
-        "{count} of {total} photos cannot be read, `max_bad_photos = {}` allows {allowed}; write them anew, take them out \
-         of the scene, or allow more:{}{more}",
+        "{count} of {total} photos cannot be read, `max_bad_photos = {}` allows {allowed}; mend them, take them out of the \
+         scene, or allow more:{}{more}",
         options.max_bad_photos,
         listed()
     );

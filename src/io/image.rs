@@ -1,6 +1,7 @@
 //! Image files: reads photos, writes PNG and EXR.
 
 use super::atomic;
+use super::kind;
 use crate::error::{Error, Result};
 use crate::io::read;
 use crate::scene::Photo;
@@ -78,8 +79,18 @@ pub fn photo_size(path: impl AsRef<Path>) -> Result<(u32, u32)> {
     reader(path, read::open(path)?)?.into_dimensions().map_err(|error| match error {
         // A truncated file ends early. A failing disk reports another error.
         image::ImageError::IoError(cause) if cause.kind() != ErrorKind::UnexpectedEof => Error::read(path)(cause),
-        other => Error::data(path, "", format!("cannot be decoded: {other}")),
+        other => undecodable(path, &other),
     })
+}
+
+/// Says what a file is that cannot be decoded, and what to do.
+fn undecodable(path: &Path, error: &image::ImageError) -> Error {
+    let problem = match kind::of_file(path).ok().flatten() {
+        Some(content) if !["a PNG", "a JPEG"].contains(&content.what) => content.told("a PNG or JPEG"),
+        Some(_) => format!("cannot be decoded: {error}; copy it again, or leave it out of the scene"),
+        None => format!("cannot be decoded: it is neither PNG nor JPEG ({error}); convert it, or leave it out"),
+    };
+    Error::data(path, "", problem)
 }
 
 /// Reads a PNG or JPEG as 8-bit RGB with alpha 255. Transparency is blended over `background` (R, G, B, 0 to 1). Grey
@@ -119,7 +130,7 @@ pub fn read_grey(path: impl AsRef<Path>) -> Result<(u32, u32, Vec<u8>)> {
 }
 
 fn decode(path: &Path) -> Result<image::DynamicImage> {
-    let undecodable = |error: image::ImageError| Error::data(path, "", format!("cannot be decoded: {error}"));
+    let undecodable = |error: image::ImageError| undecodable(path, &error);
     let bytes = read::bytes(path)?;
     let reader = reader(path, Cursor::new(&bytes))?;
     let png = reader.format() == Some(image::ImageFormat::Png);

@@ -204,7 +204,10 @@ fn list_in(place: &Place, scene: &Path) -> Result<Listing> {
         return match extension.as_deref() {
             Some("npy") => llff::list_file(place, scene),
             Some("xml") => metashape::list_file(place, scene),
-            _ => transforms::list_file(place, scene),
+            _ => match kind::of_file(scene)? {
+                Some(content) => Err(Error::data(scene, "", no_scene(content))),
+                None => transforms::list_file(place, scene),
+            },
         };
     }
     if !scene.is_dir() {
@@ -215,8 +218,25 @@ fn list_in(place: &Place, scene: &Path) -> Result<Listing> {
             return Ok(listing);
         }
     }
-    let problem = "holds no scene: expected a COLMAP model (cameras and images, .bin or .txt, in sparse/0, sparse \
-                   or colmap/sparse/0), transforms.json or transforms_train.json, poses_bounds.npy, or the cameras of \
-                   Metashape as .xml";
+    let mut problem = "holds no scene: expected a COLMAP model (cameras and images, .bin or .txt, in sparse/0, sparse \
+                       or colmap/sparse/0), transforms.json or transforms_train.json, poses_bounds.npy, or the cameras of \
+                       Metashape as .xml"
+        .to_owned();
+    if let Some((folder, count)) = place.photos.most_photos() {
+        problem += &format!(
+            ". {} holds {count} photos without poses: `tools/photos {} -o SCENE` finds the poses with COLMAP",
+            folder.display(),
+            folder.display()
+        );
+    }
     Err(Error::data(scene, "", problem))
+}
+
+/// Says of a file that is no list of photos what it is and what to do.
+fn no_scene(content: kind::Content) -> String {
+    let kind::Content { what, .. } = content;
+    if what.starts_with("a video") {
+        return format!("is {what}, not a scene: `tools/photos VIDEO -o SCENE` makes one of it with COLMAP");
+    }
+    format!("is {what}, not a scene; name the folder of a scene, or its transforms.json, poses_bounds.npy or .xml")
 }

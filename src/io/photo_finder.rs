@@ -126,11 +126,7 @@ impl PhotoFinder {
             let count = count_photos(images);
             return format!("the named folder {} holds {count} PNG or JPEG files", images.display());
         }
-        let mut counts: Vec<(usize, PathBuf)> = Vec::new();
-        let mut below = vec![self.root.clone()];
-        below.extend(read::folder(&self.root).unwrap_or_default().into_iter().filter(|path| path.is_dir()));
-        counts.extend(below.into_iter().map(|path| (count_photos(&path), path)).filter(|&(count, _)| count > 0));
-        counts.sort_by(|a, b| b.0.cmp(&a.0).then_with(|| a.1.cmp(&b.1)));
+        let counts = self.counts();
         if counts.is_empty() {
             return "no folder of the scene holds PNG or JPEG files: name the folder of the photos with `images`"
                 .into();
@@ -138,6 +134,21 @@ impl PhotoFinder {
         let list: Vec<String> =
             counts.iter().take(3).map(|(count, path)| format!("{} ({count})", path.display())).collect();
         format!("PNG and JPEG files are in {}; name the folder of the photos with `images`", list.join(", "))
+    }
+
+    /// Returns the folder of the scene with the most photos, and their number.
+    pub(crate) fn most_photos(&self) -> Option<(PathBuf, usize)> {
+        self.counts().into_iter().next().map(|(count, folder)| (folder, count))
+    }
+
+    /// Numbers of photos in the scene's folder and those in it, the largest first.
+    fn counts(&self) -> Vec<(usize, PathBuf)> {
+        let below = read::folder(&self.root).unwrap_or_default().into_iter().filter(|path| path.is_dir());
+        let folders = std::iter::once(self.root.clone()).chain(below);
+        let mut counts: Vec<(usize, PathBuf)> =
+            folders.map(|path| (count_photos(&path), path)).filter(|&(count, _)| count > 0).collect();
+        counts.sort_by(|a, b| b.0.cmp(&a.0).then_with(|| a.1.cmp(&b.1)));
+        counts
     }
 
     /// Folders that may hold the photos: those of photos, with the full sizes first, then the scene's own.
