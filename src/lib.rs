@@ -88,6 +88,7 @@ pub mod run;
 pub mod scene;
 mod scheduler;
 mod shaders;
+mod stage;
 pub mod synth;
 mod train;
 mod verify;

@@ -17,6 +17,7 @@ use crate::label::masks::agree::{Agreement, MIN_VIEWS, agree};
 use crate::label::vote::lift::Lift;
 use crate::label::vote::model::{Counting, columns_of, label_by_lift, label_by_votes, vote_engine};
 use crate::scene::{Gaussians, View};
+use crate::stage::Stage;
 use crate::train::LabelRule;
 use crate::{Error, Result};
 use clap::Args;
@@ -159,7 +160,8 @@ fn make_agree(
     let borrowed: Vec<&View> = views.iter().collect();
     let mut engine = vote_engine(Arc::clone(gpu), model, &borrowed, columns_of(&borrowed))?;
     let how = Agreement { near, per_view: true, min_views: MIN_VIEWS, make_missing: false };
-    let (masks, _) = agree(&mut engine, model, &borrowed, how, &mut || ())?;
+    let stage = Stage::new("comparing masks", 2 * borrowed.len());
+    let (masks, _) = agree(&mut engine, model, &borrowed, how, &mut || stage.count())?;
     let names = table(&args.masks, true, &borrowed, &masks)?;
     views.iter_mut().zip(masks).for_each(|(view, mask)| view.mask = mask.map(Into::into));
     Ok(names)

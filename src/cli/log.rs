@@ -1,8 +1,10 @@
 //! Messages on standard error, printed above the progress bars.
 
 use super::args::GlobalArgs;
+use super::stages::{self, Stages};
 use super::wording;
 use crate::Error;
+use crate::stage::TARGET;
 use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::{IsTerminal, Write};
 use std::sync::{LazyLock, Mutex};
@@ -18,8 +20,9 @@ use tracing_subscriber::{EnvFilter, Layer};
 static BARS: LazyLock<MultiProgress> =
     LazyLock::new(|| MultiProgress::with_draw_target(ProgressDrawTarget::stderr_with_hz(10)));
 
-/// Time between two plain progress lines.
-const PLAIN_EVERY: Duration = Duration::from_secs(10);
+/// Time before the first plain progress line, and between two.
+pub(super) const PLAIN_AFTER: Duration = Duration::from_secs(2);
+pub(super) const PLAIN_EVERY: Duration = Duration::from_secs(10);
 
 /// Standard error. The bars are hidden during a write. Names of settings become flags.
 struct AboveBars;
@@ -75,8 +78,8 @@ impl<S: tracing::Subscriber> Layer<S> for Keep {
 pub(crate) fn start(args: &GlobalArgs) {
     let level = match (args.quiet, args.verbose) {
         (true, _) => "error",
-        (_, 0) => "warn,labelgs=info",
-        (_, 1) => "warn,labelgs=debug",
+        (_, 0) => "warn,labelgs=info,labelgs::stage=off",
+        (_, 1) => "warn,labelgs=debug,labelgs::stage=off",
         _ => "trace",
     };
     let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new(level));
@@ -86,9 +89,12 @@ pub(crate) fn start(args: &GlobalArgs) {
     let started = tracing_subscriber::registry()
         .with(shown.without_time().with_filter(filter))
         .with(Keep.with_filter(own))
+        .with((!args.quiet).then(|| Stages.with_filter(Targets::new().with_target(TARGET, Level::INFO))))
         .try_init();
     // A second start in one process, as in tests, keeps the first logger.
-    drop(started);
+    if started.is_ok() && !args.quiet {
+        stages::watch();
+    }
 }
 
 /// Prints the error that ends the process, even with `--quiet`.
@@ -100,25 +106,33 @@ pub(crate) fn final_error(error: &Error) {
     });
 }
 
-/// Progress of long work: a bar on a terminal, otherwise a log line every [`PLAIN_EVERY`].
+/// Adds a bar over `total` items called `what`; one that only turns if their number is not known.
+pub(super) fn bar(total: u64, what: String) -> ProgressBar {
+    let template = match total {
+        0 => "{spinner} {msg} {elapsed}",
+        _ => "{bar:30} {pos}/{len} {msg} {per_sec} {eta} left",
+    };
+    let style = ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar());
+    BARS.add(ProgressBar::new(total).with_style(style).with_message(what))
+}
+
+/// Progress of long work: a bar on a terminal, otherwise log lines, from [`PLAIN_AFTER`] on.
 pub(crate) struct Progress {
     bar: Option<ProgressBar>,
     what: &'static str,
     total: u64,
     start: Instant,
     last: Instant,
+    /// Time until the next line.
+    wait: Duration,
 }
 
 impl Progress {
     /// Starts progress over `total` items called `what`, such as `steps`.
     pub(crate) fn new(total: u64, what: &'static str, args: &GlobalArgs) -> Self {
-        let bar = (!args.quiet && std::io::stderr().is_terminal()).then(|| {
-            let template = "{bar:30} {pos}/{len} {msg} {per_sec} {eta} left";
-            let style = ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar());
-            BARS.add(ProgressBar::new(total).with_style(style).with_message(what))
-        });
+        let bar = (!args.quiet && std::io::stderr().is_terminal()).then(|| bar(total, what.to_owned()));
         let now = Instant::now();
-        Self { bar, what, total, start: now, last: now }
+        Self { bar, what, total, start: now, last: now, wait: PLAIN_AFTER }
     }
 
     /// Shows that `done` items are done. `message` adds details, such as the loss; it is only called when shown.
@@ -129,8 +143,8 @@ impl Progress {
                 self.last = Instant::now();
                 bar.set_message(format!("{} {}", self.what, message()));
             }
-        } else if self.last.elapsed() > PLAIN_EVERY {
-            self.last = Instant::now();
+        } else if self.last.elapsed() > self.wait {
+            (self.last, self.wait) = (Instant::now(), PLAIN_EVERY);
             let rate = done as f64 / self.start.elapsed().as_secs_f64();
             tracing::info!("{done} of {} {} ({rate:.1}/s) {}", self.total, self.what, message());
         }

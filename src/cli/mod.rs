@@ -39,6 +39,7 @@ pub(crate) mod selftest;
 mod shell;
 mod simplify;
 pub(crate) mod split_components;
+mod stages;
 pub(crate) mod status;
 pub(crate) mod stdout;
 pub(crate) mod synth;

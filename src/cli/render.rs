@@ -18,6 +18,7 @@ use crate::render::pictures::{Format, Pictures, What, write_pictures};
 use crate::render::{Parts, RenderOptions, Rendered};
 use crate::run::models;
 use crate::scene::{Camera, Dataset, Gaussians, LABEL_MAX, stems};
+use crate::stage::Stage;
 use crate::{Error, Result};
 use clap::Args;
 use serde_json::json;
@@ -105,10 +106,13 @@ pub(crate) fn run(args: &RenderArgs, context: &Context) -> Result<()> {
     };
     let options = RenderOptions { background: args.background, ..RenderOptions::new(near, parts) };
     let mut files = Vec::new();
+    let stage = Stage::new("rendering", cameras.len());
     for (stem, camera) in &cameras {
         let rendered = drawer.render(camera, &options)?;
         files.extend(write(args, stem, &rendered, wide)?);
+        stage.count();
     }
+    drop(stage);
     let files: Vec<String> = files.iter().map(|file| file.display().to_string()).collect();
     if context.json || args.json.json {
         return stdout::print_json(&json!({ "schema_version": 1, "files": files }));

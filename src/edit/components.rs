@@ -5,6 +5,7 @@
 
 use crate::scene::Gaussians;
 use crate::scene::gaussians::axes_of;
+use crate::stage::Stage;
 use crate::{Error, Result};
 use glam::{DMat3, DVec3};
 use kiddo::{ImmutableKdTree, SquaredEuclidean};
@@ -40,6 +41,7 @@ pub struct Parts {
 
 /// Divides `rows` of a model into connected parts.
 pub fn components(model: &Gaussians, rows: &[usize], how: Grouping) -> Result<Parts> {
+    let _stage = Stage::new("finding connected parts", 0);
     let bodies: Vec<Body> = rows.iter().map(|&row| Body::new(model, row, how.gap)).collect();
     let mut groups: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
     let joined = join(&bodies)?;

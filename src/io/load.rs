@@ -153,7 +153,7 @@ fn read_views(recipes: &[Arc<Recipe>], test: &[bool], options: &LoadOptions) -> 
         };
         Some(made.map(|made| made.map(kept)))
     };
-    let read = crew::map(recipes.len(), store.at_once(), read);
+    let read = crew::map("reading photos", recipes.len(), store.at_once(), read);
     let (mut resampled, mut blank) = (0, Vec::new());
     let mut count = |(masks, views): (usize, Vec<(View, bool)>)| {
         resampled += masks;

@@ -54,6 +54,7 @@ pub(crate) mod window;
 
 use crate::error::{Error, Result};
 use crate::scene::Dataset;
+use crate::stage::Stage;
 use listed_path::Place;
 use listing::Listing;
 use pose_convention::Native;
@@ -157,7 +158,10 @@ pub fn open(scene: &Path, options: &LoadOptions) -> Result<Dataset> {
         let problem = format!("{} is no share; expected a number from 0 to 1", options.max_bad_photos);
         return Err(Error::usage("max_bad_photos", problem));
     }
-    load::load(folder_of(scene), list(scene, &options.lookup)?, options)
+    let stage = Stage::new("reading poses and points", 0);
+    let listing = list(scene, &options.lookup)?;
+    drop(stage);
+    load::load(folder_of(scene), listing, options)
 }
 
 /// Like [`open`]; logs a summary and the notes.

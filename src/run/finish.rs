@@ -11,6 +11,7 @@ use crate::io::label_table::{self, LabelTable};
 use crate::io::occlusion_table::{self, OcclusionTable};
 use crate::io::{atomic, colmap, run_folder};
 use crate::scene::{Camera, Gaussians, View};
+use crate::stage::Stage;
 use crate::train::Occlusion;
 use std::path::PathBuf;
 use std::time::Duration;
@@ -167,6 +168,7 @@ impl Run<'_> {
         }
         let options = self.trainer.render_options();
         let how = Rendering { options, min_confidence: MIN_LABEL_CONFIDENCE, train: &[], by_main: false };
+        let _stage = Stage::new("scoring the held-out views", 0);
         let mut worst = Worst::default();
         let scores = evaluate(self.trainer.engine_mut(), model, &views, how, &(), &mut worst)?;
         scores.warn_of_odd_view(self.settings.train.near);

@@ -3,12 +3,16 @@
 //! A pool that steals work, such as that of rayon, may begin a second picture while it waits for a part of the first.
 
 use super::View;
+use crate::stage::Stage;
 use std::panic::resume_unwind;
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 use std::thread;
 
-/// Returns `of` of the numbers below `count`, in order, from at most `workers` threads.
-pub(crate) fn map<T: Send>(count: usize, workers: usize, of: impl Fn(usize) -> T + Sync) -> Vec<T> {
+/// Returns `of` of the numbers below `count`, in order, from at most `workers` threads; `what` names the work for who shows its
+/// progress.
+pub(crate) fn map<T: Send>(what: &str, count: usize, workers: usize, of: impl Fn(usize) -> T + Sync) -> Vec<T> {
+    let stage = Stage::new(what, count);
+    let of = |index| stage.counted(|| of(index));
     let workers = workers.min(count).min(rayon::current_num_threads());
     if workers < 2 {
         return (0..count).map(of).collect();
@@ -33,9 +37,9 @@ pub(crate) fn map<T: Send>(count: usize, workers: usize, of: impl Fn(usize) -> T
     all.into_iter().map(|(_, done)| done).collect()
 }
 
-/// Returns `of` of each view, in order. As many views at a time have their pixels in memory as there is memory for.
-pub(crate) fn over_views<T: Send>(views: &[&View], of: impl Fn(&View) -> T + Sync) -> Vec<T> {
-    map(views.len(), at_once(views.iter().copied()), |index| of(views[index]))
+/// Returns `of` of each view, in order, as [`map`] does. As many views at a time have their pixels in memory as there is memory for.
+pub(crate) fn over_views<T: Send>(what: &str, views: &[&View], of: impl Fn(&View) -> T + Sync) -> Vec<T> {
+    map(what, views.len(), at_once(views.iter().copied()), |index| of(views[index]))
 }
 
 /// Number of views whose pixels may be asked for at the same time.
@@ -54,8 +58,8 @@ mod tests {
     #[test]
     fn results_are_in_order_for_any_number_of_threads() {
         for workers in [0, 1, 2, 7, usize::MAX] {
-            assert_eq!(map(5, workers, |index| index * index), [0, 1, 4, 9, 16]);
+            assert_eq!(map("", 5, workers, |index| index * index), [0, 1, 4, 9, 16]);
         }
-        assert_eq!(map(0, 4, |index| index), [0_usize; 0]);
+        assert_eq!(map("", 0, 4, |index| index), [0_usize; 0]);
     }
 }

@@ -18,6 +18,7 @@ use crate::gpu::{CommandBuffer, Gpu, Timeline};
 use crate::scheduler::plan::{
     Barrier, Buf, BufferDecl, Capacity, FRAMES_IN_FLIGHT, Limits, MemoryReport, PassList, Plan, PlanOptions, memory,
 };
+use crate::stage::Stage;
 use recorder::Recorder;
 use recording::Recording;
 use std::sync::Arc;
@@ -153,6 +154,8 @@ impl Scheduler {
         if self.options.poison_step {
             self.poison()?;
         }
+        // On first use, which may take long on a new driver.
+        let _stage = Stage::new("compiling kernels", 0);
         let mut ids = Vec::new();
         for plan in plans {
             let recordings = self.record(&plan)?;

@@ -10,6 +10,7 @@ use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::scene::{Dataset, Gaussians, Point, View};
 use crate::scheduler::SchedulerOptions;
+use crate::stage::Stage;
 use std::sync::Arc;
 
 /// Steps of each view.
@@ -53,8 +54,10 @@ pub fn aligned(
         ..scheduler.into()
     };
     let mut trainer = Trainer::new(Arc::clone(gpu), config, &dataset, &model, options)?;
+    let stage = Stage::new("refining poses", trainer.config().iterations as usize);
     for _ in 0..trainer.config().iterations {
         trainer.step()?;
+        stage.count();
     }
     trainer.drain()?;
     let refined = trainer.poses()?;

@@ -102,7 +102,7 @@ pub(super) fn train_views(
     let views = &dataset.train;
     let of = |index: usize| train_view((index, &views[index]), border, most);
     let (mut whole, mut parts) = (Vec::new(), Vec::new());
-    for found in crew::map(views.len(), crew::at_once(views.iter()), of) {
+    for found in crew::map("preparing photos", views.len(), crew::at_once(views.iter()), of) {
         let (view, of_view) = found?;
         whole.push(view);
         parts.extend(of_view);

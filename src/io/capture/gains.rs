@@ -50,7 +50,12 @@ fn samples(view: &View, seen: &[(usize, DVec2)]) -> Result<Vec<Sample>> {
 /// Returns the gains of each photo; none with too few points that another photo shows too.
 pub(super) fn gains(views: &[&View], seen: &[Vec<(usize, DVec2)>], points: &[Point]) -> Result<Vec<Option<Gains>>> {
     let of_photo = |index: usize| samples(views[index], &seen[index]);
-    let samples = crew::map(views.len(), crew::at_once(views.iter().copied()), of_photo);
+    let samples = crew::map(
+        "comparing the brightness of photos",
+        views.len(),
+        crew::at_once(views.iter().copied()),
+        of_photo,
+    );
     let samples: Vec<Vec<Sample>> = samples.into_iter().collect::<Result<_>>()?;
     let channels: Vec<Vec<Option<f64>>> =
         (0..4).into_par_iter().map(|channel| relative(&samples, points.len(), channel)).collect();

@@ -45,7 +45,8 @@ pub(super) fn sharpness(views: &[&View]) -> Result<Vec<Option<f64>>> {
         let photo = view.photo.as_ref().map(Pixels::get).transpose()?;
         Ok(photo.map(|photo| detail(&photo)).filter(|value| value.is_finite()))
     };
-    let details: Vec<Option<f64>> = crew::over_views(views, of_view).into_iter().collect::<Result<_>>()?;
+    let details: Vec<Option<f64>> =
+        crew::over_views("measuring the sharpness of photos", views, of_view).into_iter().collect::<Result<_>>()?;
     let relative = |(index, view): (usize, &&View)| {
         let mut near: Vec<(f64, f64)> = views
             .iter()

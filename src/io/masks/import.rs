@@ -12,6 +12,7 @@ use crate::io::mask::with_png;
 use crate::io::{atomic, image};
 use crate::scene::Dataset;
 use crate::scene::labels::LABEL_MAX;
+use crate::stage::Stage;
 use rayon::prelude::*;
 use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet, HashMap};
@@ -84,14 +85,15 @@ pub fn import(dataset: &Dataset, options: &ImportOptions, output: &Path) -> Resu
     let reading = detect(&views, options)?;
     let decode = |photo: usize| decode(&reading, photo, views[photo]);
     let with_mask: Vec<usize> = (0..views.len()).filter(|&at| reading.has_mask(at)).collect();
-    let surveys = with_mask.par_iter().map(|&photo| decode(photo).and_then(|decoded| survey(&reading, decoded)));
-    let surveys = all_or_one_error(&reading.root, surveys.collect())?;
+    let stage = Stage::new("reading and writing masks", 2 * with_mask.len());
+    let look = |&photo: &usize| stage.counted(|| decode(photo).and_then(|decoded| survey(&reading, decoded)));
+    let surveys = all_or_one_error(&reading.root, with_mask.par_iter().map(look).collect())?;
     let overlaps = overlaps(&reading, &surveys, |at| names[with_mask[at]])?;
     let (labels, new_ids) = labels(&reading, &surveys)?;
 
     let bits = if labels.len() > 255 { 16 } else { 8 };
     let files = output_names(&names);
-    let written = with_mask.par_iter().map(|&photo| {
+    let write = |&photo: &usize| {
         let decoded = decode(photo)?;
         // The first pass found every id; other pixels become 0.
         let ids = decoded.ids.iter().map(|id| new_ids.get(id).copied().unwrap_or(0));
@@ -100,7 +102,8 @@ pub fn import(dataset: &Dataset, options: &ImportOptions, output: &Path) -> Resu
             8 => image::write_png_grey8(path, width, height, &ids.map(|id| id as u8).collect::<Vec<_>>()),
             _ => image::write_png_grey16(path, width, height, &ids.collect::<Vec<_>>()),
         }
-    });
+    };
+    let written = with_mask.par_iter().map(|photo| stage.counted(|| write(photo)));
     written.collect::<Vec<Result<()>>>().into_iter().collect::<Result<()>>()?;
     let table = LabelTable::new(labels);
     table.write(&output.join(FILE))?;

@@ -21,6 +21,7 @@ use crate::error::{Error, Result};
 use crate::io::atomic;
 use crate::io::label_table::LabelTable;
 use crate::scene::Gaussians;
+use crate::stage::Stage;
 use std::path::Path;
 use std::sync::{PoisonError, RwLock};
 
@@ -64,6 +65,7 @@ pub(crate) fn is_page(path: &Path) -> bool {
 /// error lists the known extensions.
 pub fn read_model(path: impl AsRef<Path>) -> Result<ReadModel> {
     let path = path.as_ref();
+    let _stage = Stage::new(format_args!("reading {}", path.display()), 0);
     let Some(format) = by_ending(path) else {
         return (SHIPPED[0].read)(path).map_err(|error| with_endings(path, error));
     };
@@ -120,6 +122,7 @@ fn write(
     options: WriteOptions,
     with_table: bool,
 ) -> Result<u64> {
+    let _stage = Stage::new(format_args!("writing {}", path.display()), 0);
     model.check()?;
     let format = by_ending(path).unwrap_or(SHIPPED[0]);
     let Some(writer) = format.write else {

@@ -22,6 +22,6 @@ pub fn from_depths(
         let mask = view.mask()?.ok_or_else(|| Error::Bug(format!("{} came without its mask", view.name)))?;
         Ok((view.name.clone(), by_mean(&mask, &distances(&map, kind))))
     };
-    let found: Vec<Result<(String, Occluders)>> = crew::over_views(views, of_view);
+    let found: Vec<Result<(String, Occluders)>> = crew::over_views("reading depth maps", views, of_view);
     found.into_iter().collect()
 }

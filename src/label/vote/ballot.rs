@@ -10,6 +10,7 @@ use crate::error::{Error, Result};
 use crate::scene::{Camera, LabelMap, Photo, Pixels, UNLABELLED, View};
 use crate::shaders::constants::{VOTE_NONE, VOTE_ONE};
 use crate::shaders::structs::StepUniforms;
+use crate::stage::Stage;
 use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -126,13 +127,14 @@ pub fn sweep(engine: &mut Engine, voters: &[Voter], how: Sweep) -> Result<Ballot
     let objects: BTreeSet<u16> = voters.iter().flat_map(|voter| voter.mask.objects()).collect();
     let labels: Vec<u16> = std::iter::once(UNLABELLED as u16).chain(objects).collect();
     let count = engine.gaussian_count() as usize;
+    let stage = Stage::new("counting votes", voters.len() * labels.len().div_ceil(room));
     let mut votes = Vec::new();
     for first in (0..labels.len()).step_by(room) {
         let columns = room.min(labels.len() - first);
         let chunk = labels[first..][..columns].to_vec();
         engine.clear_votes()?;
         for voter in voters {
-            vote(engine, voter, &chunk, how)?;
+            stage.counted(|| vote(engine, voter, &chunk, how))?;
         }
         let cells = engine.votes(columns)?.into_iter().enumerate().filter(|(_, sum)| *sum > 0);
         votes.extend(cells.map(|(cell, sum)| ((cell / columns) as u32, (first + cell % columns) as u16, sum)));

@@ -9,6 +9,7 @@ use crate::gpu::Gpu;
 use crate::render::{RenderOptions, render};
 use crate::scene::{Gaussians, UNLABELLED, View};
 use crate::scheduler::SchedulerOptions;
+use crate::stage::Stage;
 use rand::SeedableRng;
 use rand::seq::SliceRandom;
 use rand_pcg::Pcg64Mcg;
@@ -90,7 +91,9 @@ pub fn label_by_lift(
     let mut order: Vec<usize> = (0..views.len()).collect();
     order.shuffle(&mut Pcg64Mcg::seed_from_u64(seed));
     let mut labels = vec![UNLABELLED; model.len()];
+    let stage = Stage::new("lifting labels", views.len());
     for view in order.into_iter().map(|index| views[index]) {
+        stage.count();
         let Some(mask) = view.mask()? else { continue };
         let rendered = render(engine, &view.camera, &RenderOptions::of_main(near))?;
         lift(&mut labels, &model.means, &view.camera.relative_to(model.origin), &rendered, &mask, how);

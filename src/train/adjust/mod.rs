@@ -19,6 +19,7 @@ pub(super) use frame::Frame;
 pub(super) use system::solve;
 
 use crate::scene::Camera;
+use crate::stage::Stage;
 use patch::Patch;
 use system::{Counts, Sums, System};
 
@@ -45,6 +46,7 @@ const KEPT: f64 = 0.85;
 /// Returns the camera of each frame with its pose adjusted; `None` for a frame that shares too little with others, and for all
 /// if they agree too little.
 pub(super) fn adjusted(frames: Vec<Frame>) -> Vec<Option<Camera>> {
+    let _stage = Stage::new("comparing photos for their poses", 0);
     let mut sizes = vec![frames];
     while let Some(smaller) = sizes.last().filter(|of| of.iter().any(|frame| frame.side() > COARSEST)) {
         let smaller = smaller.iter().map(Frame::halved).collect();
