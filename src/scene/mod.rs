@@ -17,6 +17,7 @@ pub(crate) mod origin;
 pub(crate) mod overview;
 pub mod path;
 pub(crate) mod pixels;
+pub(crate) mod sampling;
 pub(crate) mod spread;
 pub(crate) mod view;
 pub(crate) mod zone;

@@ -4,9 +4,9 @@
 //! absolute differences of logarithms: a photo is compared with the mean exposure of all, not with whatever exposure its
 //! neighbours have.
 
+use super::shown::{Mark, Shown};
 use crate::error::Result;
-use crate::scene::{Point, View, crew};
-use glam::DVec2;
+use crate::scene::{View, crew};
 use rayon::prelude::*;
 
 /// Fewest shared points for a gain.
@@ -33,10 +33,10 @@ pub(super) struct Gains {
 /// Logarithms of grey, red, green and blue of a point in a photo.
 type Sample = (usize, [f64; 4]);
 
-fn samples(view: &View, seen: &[(usize, DVec2)]) -> Result<Vec<Sample>> {
+fn samples(view: &View, marks: &[Mark]) -> Result<Vec<Sample>> {
     let Some(photo) = &view.photo else { return Ok(Vec::new()) };
     let photo = photo.get()?;
-    let sample = |&(point, pixel): &(usize, DVec2)| {
+    let sample = |&(point, pixel): &Mark| {
         let (x, y) = ((pixel.x as u32).min(photo.width - 1), (pixel.y as u32).min(photo.height - 1));
         let texel = photo.rgba[(y * photo.width + x) as usize];
         let [r, g, b] = [texel[0], texel[1], texel[2]].map(|value| f64::from(value) / 255.0);
@@ -44,21 +44,18 @@ fn samples(view: &View, seen: &[(usize, DVec2)]) -> Result<Vec<Sample>> {
         let tells = texel[3] == 255 && values.iter().all(|value| (DARK..=BRIGHT).contains(value));
         tells.then(|| (point, values.map(f64::ln)))
     };
-    Ok(seen.iter().filter_map(sample).collect())
+    Ok(marks.iter().filter_map(sample).collect())
 }
 
-/// Returns the gains of each photo; none with too few points that another photo shows too.
-pub(super) fn gains(views: &[&View], seen: &[Vec<(usize, DVec2)>], points: &[Point]) -> Result<Vec<Option<Gains>>> {
-    let of_photo = |index: usize| samples(views[index], &seen[index]);
-    let samples = crew::map(
-        "comparing the brightness of photos",
-        views.len(),
-        crew::at_once(views.iter().copied()),
-        of_photo,
-    );
+/// Returns the gains of each photo; none with too few points that another photo shows too. A sample of the points tells them.
+pub(super) fn gains(views: &[&View], shown: &Shown) -> Result<Vec<Option<Gains>>> {
+    let (points, marks) = shown.sample();
+    let of_photo = |index: usize| samples(views[index], &marks[index]);
+    let samples =
+        crew::map("comparing the brightness of photos", views.len(), crew::at_once(views.iter().copied()), of_photo);
     let samples: Vec<Vec<Sample>> = samples.into_iter().collect::<Result<_>>()?;
     let channels: Vec<Vec<Option<f64>>> =
-        (0..4).into_par_iter().map(|channel| relative(&samples, points.len(), channel)).collect();
+        (0..4).into_par_iter().map(|channel| relative(&samples, points, channel)).collect();
     let of_view = |view: usize| {
         let [grey, red, green, blue] = [0, 1, 2, 3].map(|channel: usize| channels[channel][view]);
         Some(Gains { grey: grey?, channels: [red?, green?, blue?] })

@@ -6,7 +6,9 @@ use crate::error::{Error, Result};
 use crate::io::label_table::FILE;
 use crate::io::mask::{MaskFolder, read_header, read_mask};
 use crate::io::resample::same_aspect;
-use crate::scene::{Dataset, View};
+use crate::scene::sampling::every;
+use crate::scene::{Dataset, Point, View};
+use crate::stage::Stage;
 use rayon::prelude::*;
 use serde::Serialize;
 use std::collections::BTreeSet;
@@ -30,8 +32,16 @@ pub fn inspect(dataset: &Dataset, folder: &Path) -> Result<Report> {
     let views = dataset.all();
     let masks = MaskFolder::new(folder, views.iter().map(|view| view.name.as_str()))?;
     let paths: Vec<Option<PathBuf>> = views.iter().map(|view| masks.find(&view.name)).collect();
-    let looks: Vec<Result<Look, Finding>> =
-        views.par_iter().zip(&paths).map(|(view, path)| look(dataset, view, path.as_deref())).collect();
+    // A look remembers what is at each point.
+    let points = dataset.points.iter().step_by(every(dataset.points.len(), views.len()));
+    let points: Vec<Point> = points.copied().collect();
+    let stage = Stage::new("checking masks", views.len());
+    let looks: Vec<Result<Look, Finding>> = views
+        .par_iter()
+        .zip(&paths)
+        .map(|(view, path)| stage.counted(|| look(&points, view, path.as_deref())))
+        .collect();
+    drop(stage);
 
     let mut found = misnamed(folder, &paths)?;
     let mut usable = Vec::new();
@@ -47,7 +57,7 @@ pub fn inspect(dataset: &Dataset, folder: &Path) -> Result<Report> {
     Ok(Report { photos: views.len(), masks: usable.len(), ids: ids.into_iter().collect(), findings: found })
 }
 
-fn look(dataset: &Dataset, view: &View, path: Option<&Path>) -> Result<Look, Finding> {
+fn look(points: &[Point], view: &View, path: Option<&Path>) -> Result<Look, Finding> {
     let finding = |problem, text: String| Finding { problem, view: Some(view.name.clone()), id: None, text };
     let Some(path) = path else { return Err(finding(Problem::Missing, "has no mask".into())) };
     let unreadable = |error: Error| finding(Problem::Unreadable, error.to_string());
@@ -59,7 +69,7 @@ fn look(dataset: &Dataset, view: &View, path: Option<&Path>) -> Result<Look, Fin
         return Err(finding(Problem::Missized, text));
     }
     let map = read_mask(path).map_err(unreadable)?;
-    Ok(Look::new(&map, &view.camera, &dataset.points))
+    Ok(Look::new(&map, &view.camera, points))
 }
 
 fn misnamed(folder: &Path, used: &[Option<PathBuf>]) -> Result<Vec<Finding>> {

@@ -1,0 +1,43 @@
+//! Samples of points that are very many.
+
+/// Most tests of points against views, for one purpose: about a second.
+pub(crate) const TESTS_MAX: usize = 50_000_000;
+
+/// Returns n: each n-th of `points`, tested against each of `views`, makes up to [`TESTS_MAX`] tests.
+pub(crate) fn every(points: usize, views: usize) -> usize {
+    points.saturating_mul(views) / TESTS_MAX + 1
+}
+
+/// Returns the numbers below `count` by rank, in an order for samples: each once. Those of the first ranks, however many, are spread evenly; the same
+/// count has the same order.
+pub(crate) fn spread_order(count: usize) -> impl Fn(usize) -> usize + Sync {
+    let divisor = |mut a: usize, mut b: usize| {
+        while b > 0 {
+            (a, b) = (b, a % b);
+        }
+        a
+    };
+    // Multiples of the golden ratio fall into the largest gaps; a step without a common divisor reaches every number.
+    let step = (count as f64 * 0.618_033_988_75) as usize;
+    let step = (step.max(1)..).find(|&step| divisor(step, count) <= 1).unwrap_or(1);
+    move |rank| (rank as u128 * step as u128 % count.max(1) as u128) as usize
+}
+
+#[cfg(test)]
+mod tests {
+    use super::spread_order;
+
+    #[test]
+    fn every_number_has_a_rank_and_the_first_ones_are_spread() {
+        for count in [0, 1, 2, 3, 10, 610, 1000, 4096, 99_991] {
+            let order = spread_order(count);
+            let mut all: Vec<usize> = (0..count).map(&order).collect();
+            all.sort_unstable();
+            assert_eq!(all, (0..count).collect::<Vec<_>>(), "{count}");
+        }
+        let order = spread_order(100_000);
+        let mut first: Vec<usize> = (0..100).map(order).collect();
+        first.sort_unstable();
+        assert!(first.windows(2).all(|pair| (300..3000).contains(&(pair[1] - pair[0]))), "{first:?}");
+    }
+}
