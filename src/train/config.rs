@@ -42,7 +42,8 @@ crate::options::options! {
 
             /// Most Gaussians, such as 500k or 2M; 0 leaves the bound to the memory of the device.
             ///
-            /// 0. At the bound only the Gaussians with the largest gradients grow.
+            /// 0. At the bound only the Gaussians with the largest gradients grow. More points are thinned to half of it, and
+            /// without it to four times the budget.
             #[cfg_attr(feature = "cli", arg(value_parser = count))]
             max_gaussians <"N">: u64 = 0;
         }

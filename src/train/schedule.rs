@@ -178,10 +178,21 @@ impl TrainConfig {
         self.densify_from.unwrap_or(self.share(0.05).min(500))
     }
 
+    /// Returns the Gaussians that photos of a size ask for, however long the run is.
+    fn by_pixels(&self, (width, height): (u32, u32)) -> f64 {
+        self.detail * f64::from(width) * f64::from(height)
+    }
+
+    /// Returns the budget for photos of a size of a run that is long enough; none with a strategy that has no budget.
+    pub(super) fn full_budget(&self, size: (u32, u32)) -> Option<u64> {
+        let budget = if self.budget > 0 { self.budget } else { self.by_pixels(size).max(1.0) as u64 };
+        (self.strategy != StrategyKind::Adc).then_some(budget)
+    }
+
     /// Returns the settings with what they leave open: by the size of the photos budget, first size and first step at
     /// full size; and the steps between two with object layers.
     pub fn for_size(&self, (width, height): (u32, u32)) -> Self {
-        let by_pixels = self.detail * f64::from(width) * f64::from(height);
+        let by_pixels = self.by_pixels((width, height));
         let by_steps = BUDGET_PER_STEP * f64::from(self.iterations);
         let budget = if self.budget > 0 { self.budget } else { by_pixels.min(by_steps).max(1.0) as u64 };
         let start_size = self.start_size.unwrap_or(START_SIZE.min(START_PX / width.max(height).max(1) as f32));

@@ -5,15 +5,19 @@ mod region;
 mod shell;
 mod sweep;
 mod texel;
+mod thin;
 
 use crate::error::{Error, Result};
 use crate::io::model::values::sh0_of;
 use crate::scene::origin::far_origin;
 use crate::scene::{Dataset, Gaussians, Point};
+use crate::stage::Stage;
 use glam::DVec3;
 use kiddo::{ImmutableKdTree, SquaredEuclidean};
 use rayon::prelude::*;
 use std::num::NonZero;
+
+pub(crate) use thin::thinned;
 
 /// Opacity of a new Gaussian.
 const OPACITY: f64 = 0.1;
@@ -36,11 +40,22 @@ const POINTS_MIN: usize = 16;
 /// in the space that the training cameras see, if possible where the photos agree on a colour; none is then larger than
 /// a fiftieth of a picture.
 pub fn initial_gaussians(dataset: &Dataset, seed: u64, count_if_no_points: usize) -> Result<Gaussians> {
+    first_gaussians(dataset, &dataset.points, seed, count_if_no_points)
+}
+
+/// Makes the initial Gaussians at some of the points of the scene, as [`initial_gaussians`] does at all of them.
+pub(crate) fn first_gaussians(
+    dataset: &Dataset,
+    points: &[Point],
+    seed: u64,
+    count_if_no_points: usize,
+) -> Result<Gaussians> {
     if has_points(dataset) {
         check_seen(dataset)?;
-        let distances2 = neighbour_distances2(&dataset.points, dataset.extent())?;
-        return Ok(from_points(&dataset.points, &distances2, dataset.extent()));
+        let distances2 = neighbour_distances2(points, dataset.extent())?;
+        return Ok(from_points(points, &distances2, dataset.extent()));
     }
+    let _stage = Stage::new("finding places for the first Gaussians", 0);
     let mut points = random::points(dataset, seed, count_if_no_points)?;
     points.extend_from_slice(&dataset.points);
     let mut distances2 = neighbour_distances2(&points, dataset.extent())?;
@@ -117,6 +132,7 @@ fn from_points(points: &[Point], distances2: &[f64], extent: f64) -> Gaussians {
 /// Returns the mean squared distance of each point to its three nearest neighbours, or to all others if there are
 /// fewer. A single point gets a hundredth of the scene extent.
 fn neighbour_distances2(points: &[Point], extent: f64) -> Result<Vec<f64>> {
+    let _stage = Stage::new(format_args!("measuring the distances of {} points", points.len()), 0);
     let positions: Vec<[f64; 3]> = points.iter().map(|point| point.position.to_array()).collect();
     let nearest = NEIGHBOURS.min(positions.len().saturating_sub(1));
     // One more neighbour, because each point finds itself.

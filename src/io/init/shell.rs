@@ -5,7 +5,9 @@
 use crate::error::Result;
 use crate::io::init::texel::texel;
 use crate::scene::direction::even_direction;
+use crate::scene::spread::every;
 use crate::scene::{Camera, Dataset, Point, View};
+use crate::stage::Stage;
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 use std::f64::consts::TAU;
@@ -27,12 +29,13 @@ struct Covered {
 }
 
 impl Covered {
-    fn new(camera: &Camera, points: &[Point]) -> Self {
+    fn new(camera: &Camera, points: &[Point], views: usize) -> Self {
         let longest = camera.width.max(camera.height);
         let count = |side: u32| (side * CELLS).div_ceil(longest).max(1);
         let (columns, rows) = (count(camera.width), count(camera.height));
         let mut covered = Self { columns, rows, cells: vec![false; (columns * rows) as usize] };
-        for pixel in points.iter().filter_map(|point| camera.sees(point.position)) {
+        // Every n-th point tells as much where points and photos are very many.
+        for pixel in points.iter().step_by(every(points.len(), views)).filter_map(|point| camera.sees(point.position)) {
             let (x, y) = covered.cell(camera, pixel);
             covered.cells[(y * columns + x) as usize] = true;
         }
@@ -54,6 +57,7 @@ impl Covered {
 /// Returns the points of a sphere of `count` directions around the cameras at which most of the views that see them look
 /// past the points of the scene, in the median colour of the pixels there; and half their spacing, world units.
 pub(super) fn points(dataset: &Dataset, count: usize) -> Result<(Vec<Point>, f64)> {
+    let _stage = Stage::new("looking for what lies behind all points", 0);
     let points = &dataset.points;
     let views: Vec<&View> = dataset.train.iter().filter(|view| view.photo.is_some()).collect();
     if views.is_empty() || count == 0 {
@@ -61,10 +65,10 @@ pub(super) fn points(dataset: &Dataset, count: usize) -> Result<(Vec<Point>, f64
     }
     let centre = views.iter().map(|view| view.camera.centre()).sum::<DVec3>() / views.len() as f64;
     let mut distances: Vec<f64> = points.iter().map(|point| point.position.distance(centre)).collect();
-    distances.sort_by(f64::total_cmp);
-    let far = distances.get((FARTHEST * distances.len() as f64) as usize).copied().unwrap_or(0.0);
+    let at = (FARTHEST * distances.len() as f64) as usize;
+    let far = if at < distances.len() { *distances.select_nth_unstable_by(at, f64::total_cmp).1 } else { 0.0 };
     let radius = (RADIUS * dataset.extent()).max(BEYOND * far);
-    let covered: Vec<Covered> = views.par_iter().map(|view| Covered::new(&view.camera, points)).collect();
+    let covered: Vec<Covered> = views.par_iter().map(|view| Covered::new(&view.camera, points, views.len())).collect();
     let place = |index: usize| centre + radius * even_direction(index, count);
     // The photos come one after the other, because not all of them may be in memory.
     let mut shown: Vec<(usize, Vec<[u8; 3]>)> = vec![(0, Vec::new()); count];
