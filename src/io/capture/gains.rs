@@ -7,6 +7,7 @@
 use super::shown::{Mark, Shown};
 use crate::error::Result;
 use crate::scene::{View, crew};
+use crate::stage::Stage;
 use rayon::prelude::*;
 
 /// Fewest shared points for a gain.
@@ -54,6 +55,7 @@ pub(super) fn gains(views: &[&View], shown: &Shown) -> Result<Vec<Option<Gains>>
     let samples =
         crew::map("comparing the brightness of photos", views.len(), crew::at_once(views.iter().copied()), of_photo);
     let samples: Vec<Vec<Sample>> = samples.into_iter().collect::<Result<_>>()?;
+    let _stage = Stage::new("finding the exposures of photos", 0);
     let channels: Vec<Vec<Option<f64>>> =
         (0..4).into_par_iter().map(|channel| relative(&samples, points, channel)).collect();
     let of_view = |view: usize| {

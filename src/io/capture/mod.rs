@@ -18,6 +18,7 @@ use super::{colmap, folder_of};
 use crate::error::Result;
 use crate::scene::median::median;
 use crate::scene::{Dataset, View};
+use crate::stage::Stage;
 use glam::{DVec2, DVec3};
 use poses::Places;
 use serde::Serialize;
@@ -78,6 +79,7 @@ struct Observed {
 
 impl Observed {
     fn read(scene: &Path, lookup: &Lookup) -> Result<Self> {
+        let _stage = Stage::new("reading which photo shows which point", 0);
         // Opening the scene has checked its paths.
         let lookup = Lookup { allow_outside: true, ..lookup.clone() };
         let photos = colmap::observations(&Place::new(folder_of(scene), &lookup))?.unwrap_or_default();

@@ -1,8 +1,9 @@
 //! Which points of the reconstruction each photo shows.
 
 use super::Observed;
-use crate::scene::spread::{TESTS_MAX, every, spread_order};
+use crate::scene::sampling::{TESTS_MAX, every, spread_order};
 use crate::scene::{Point, View};
+use crate::stage::Stage;
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 use std::collections::HashMap;
@@ -59,6 +60,7 @@ impl<'a> Shown<'a> {
     /// Returns how many points each view shows, and how many of these at least two others show too. Every n-th point is
     /// counted, n times, where points and views are very many.
     pub(super) fn counts(&self) -> Vec<(usize, usize)> {
+        let _stage = Stage::new("counting the points of photos", 0);
         let unlisted = self.unlisted();
         let every = every(self.points.len(), unlisted.len());
         let mut times = vec![0_usize; self.points.len()];
@@ -88,6 +90,7 @@ impl<'a> Shown<'a> {
     /// Returns a sample of the points that several views show, and which of them each view shows: of every view all, or
     /// [`SHARED_ENOUGH`].
     pub(super) fn sample(&self) -> (usize, Vec<Vec<Mark>>) {
+        let _stage = Stage::new("choosing points that photos share", 0);
         let kept = self.shared();
         let mut place = vec![None; self.points.len()];
         kept.iter().enumerate().for_each(|(at, &point)| place[point] = Some(at));
