@@ -5,7 +5,7 @@
 use crate::error::Result;
 use crate::io::init::texel::texel;
 use crate::scene::direction::even_direction;
-use crate::scene::spread::every;
+use crate::scene::sampling::every;
 use crate::scene::{Camera, Dataset, Point, View};
 use crate::stage::Stage;
 use glam::{DVec2, DVec3};
