@@ -75,5 +75,6 @@ mod shared; // parameters of the scene and of photos, trained beside the Gaussia
 mod strategy; // strategies of densification other than the default
 mod stress; // error bounds on adversarial scenes
 mod synth; // the made scene is consistent ground truth
+mod tools; // help of scripts, arguments that they have not
 mod track; // ids from frame to frame
 mod viewer; // the server of the viewer, and its page in a browser
