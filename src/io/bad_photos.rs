@@ -1,7 +1,7 @@
 //! Undecodable photos: a training can skip a few; many mean a damaged data set.
 
 use super::LoadOptions;
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, Setting};
 use std::path::Path;
 
 /// Most problems that one message lists.
@@ -36,9 +36,9 @@ pub(crate) fn skip(
         return Err(bad.remove(0));
     }
     let problem = format!(
-        "{count} of {total} photos cannot be decoded, `max_bad_photos = {}` allows {allowed}; write them anew, take them out \
+        "{count} of {total} photos cannot be decoded, {} allows {allowed}; write them anew, take them out \
          of the scene, or allow more:{}{more}",
-        options.max_bad_photos,
+        Setting("max_bad_photos").to(options.max_bad_photos),
         listed()
     );
     Err(Error::data(root, "photos", problem))

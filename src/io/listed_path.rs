@@ -3,7 +3,7 @@
 //! A scene is untrusted input. Its paths are opened for reading and, as names of views, used for writing. A path
 //! outside of the scene's folder is refused, unless the user allows it.
 
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, Setting};
 use std::path::{Component, Path, PathBuf};
 
 /// The folder of a scene, and the permission for files elsewhere.
@@ -41,10 +41,11 @@ impl<'a> Place<'a> {
         }
         let inside = path.components().all(|part| matches!(part, Component::Normal(_) | Component::CurDir));
         if !self.allow_outside && (!inside || has_drive(&text)) {
-            return refuse(
-                "lies outside the scene folder; list photos by paths relative to it, without `..`, or set \
-                 `allow_outside` if the scene may read them there",
-            );
+            return refuse(&format!(
+                "lies outside the scene folder; list photos by paths relative to it, without `..`, or set {} if the scene \
+                 may read them there",
+                Setting("allow_outside")
+            ));
         }
         Ok(ListedPath { path: if inside { PathBuf::from(&name) } else { path }, name })
     }

@@ -6,7 +6,7 @@ use super::listing::{Listed, Listing};
 use super::mask::MaskFolder;
 use super::photo_store::PhotoStore;
 use super::recipe::{MadeView, MadeViews, Recipe};
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, Setting};
 use crate::scene::{Dataset, Photo, View, crew};
 use rayon::prelude::*;
 use std::collections::BTreeSet;
@@ -218,7 +218,7 @@ fn split(views: &[Listed], every: Option<u32>, notes: &mut Vec<String>) -> Resul
     }
     let Some(every) = every else { return Ok(vec![false; views.len()]) };
     if every == 0 {
-        return Err(Error::usage("test_every", "0 holds out nothing and everything; expected 1 or more"));
+        return Err(Error::usage(Setting("test_every"), "0 holds out nothing and everything; expected 1 or more"));
     }
     if views.len() == 1 && every > 1 {
         notes.push("the only photo is used for training; nothing is held out".into());

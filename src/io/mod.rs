@@ -44,7 +44,7 @@ mod transforms;
 pub(crate) mod truth;
 pub(crate) mod window;
 
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, Setting};
 use crate::scene::Dataset;
 use listed_path::Place;
 use listing::Listing;
@@ -140,11 +140,11 @@ impl Default for LoadOptions {
 /// Photos without a file are skipped before the split, undecodable ones after it.
 pub fn open(scene: &Path, options: &LoadOptions) -> Result<Dataset> {
     if options.max_resolution == Some(0) {
-        return Err(Error::usage("max_resolution", "0 px leaves no image; expected 1 or more"));
+        return Err(Error::usage(Setting("max_resolution"), "0 px leaves no image; expected 1 or more"));
     }
     if !(0.0..=1.0).contains(&options.max_bad_photos) {
         let problem = format!("{} is no share; expected a number from 0 to 1", options.max_bad_photos);
-        return Err(Error::usage("max_bad_photos", problem));
+        return Err(Error::usage(Setting("max_bad_photos"), problem));
     }
     load::load(folder_of(scene), list(scene, options.allow_outside)?, options)
 }

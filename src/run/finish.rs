@@ -166,7 +166,7 @@ impl Run<'_> {
             return Ok(None);
         }
         let options = self.trainer.render_options();
-        let how = Rendering { options, min_confidence: MIN_LABEL_CONFIDENCE, train: &[], by_main: false };
+        let how = Rendering { options, min_confidence: MIN_LABEL_CONFIDENCE, train: &[], by_main: false, lpips: None };
         let mut worst = Worst::default();
         let scores = evaluate(self.trainer.engine_mut(), model, &views, how, &(), &mut worst)?;
         scores.warn_of_odd_view(self.settings.train.near);

@@ -2,6 +2,7 @@
 
 use super::setup::for_photos;
 use super::{StrategyKind, TrainConfig};
+use crate::Setting;
 use crate::error::Result;
 use crate::io::init;
 use crate::scene::{Dataset, Gaussians};
@@ -55,7 +56,8 @@ fn thin(model: &mut Gaussians, bound: u64) {
     let count = model.len() as u64;
     if bound > 0 && count > bound {
         tracing::warn!(
-            "{count} initial Gaussians, and `max_gaussians` is {bound}: every {:.1}-th is used",
+            "{count} initial Gaussians, and {} is {bound}: every {:.1}-th is used",
+            Setting("max_gaussians"),
             count as f64 / bound as f64
         );
         // Keep row i if `i * bound / count` steps up there.
