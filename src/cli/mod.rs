@@ -29,6 +29,7 @@ pub(crate) mod plan;
 pub(crate) mod profile;
 pub(crate) mod profile_compare;
 mod profile_report;
+mod profile_timed;
 pub(crate) mod recolour;
 pub(crate) mod relabel;
 pub(crate) mod render;
