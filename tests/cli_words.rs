@@ -67,13 +67,13 @@ fn a_message_names_a_flag_only_if_the_command_has_it() {
 
     // The flags of the training.
     let out = folder.path().join("out");
-    let train = said(&["train", text(&scene), "-o", text(&out), "--label-rule", "main"], 2);
-    assert!(train.starts_with("error: --label-rule: is main, which needs --layer-every 1"), "{train}");
+    let train = said(&["train", text(&scene), "-o", text(&out), "--label-rule", "main", "--layer-every", "2"], 2);
+    assert!(train.contains("error: --label-rule: is main, which needs --layer-every 1"), "{train}");
     let train = said(&["train", text(&scene), "-o", text(&out), "--random-background", "on", "--exposure", "on"], 2);
-    assert!(train.starts_with("error: --random-background: is on, which needs --exposure off"), "{train}");
+    assert!(train.contains("error: --random-background: is on, which needs --exposure off"), "{train}");
     let row = ["ablate", text(&scene), "--masks", text(&scene), "-o", text(&out), "--row", "x=--iterations 0"];
     let ablate = said(&row, 2);
-    assert!(ablate.starts_with("error: --row: x: --iterations: is 0, needs at least 1"), "{ablate}");
+    assert!(ablate.contains("error: --row: x: --iterations: is 0, needs at least 1"), "{ablate}");
 }
 
 #[test]

@@ -46,6 +46,7 @@ pub(crate) mod window;
 
 use crate::error::{Error, Result, Setting};
 use crate::scene::Dataset;
+use crate::words::counted;
 use listed_path::Place;
 use listing::Listing;
 use std::collections::BTreeSet;
@@ -154,7 +155,8 @@ pub(crate) fn open_logged(scene: &Path, options: &LoadOptions) -> Result<Dataset
     let dataset = open(scene, options)?;
     dataset.notes.iter().for_each(|note| tracing::warn!("{note}"));
     let (train, test, points) = (dataset.train.len(), dataset.test.len(), dataset.points.len());
-    tracing::info!("scene: {train} training views, {test} test views, {points} points");
+    let (train, test) = (counted(train, "training view"), counted(test, "test view"));
+    tracing::info!("scene: {train}, {test}, {}", counted(points, "point"));
     Ok(dataset)
 }
 
