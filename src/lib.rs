@@ -95,8 +95,9 @@ mod verify;
 mod version;
 #[cfg(feature = "viewer")]
 pub mod viewer;
+mod words;
 
-pub use error::{Error, Result};
+pub use error::{Error, Result, Setting};
 
 /// The programs of README.md compile.
 #[cfg(doctest)]

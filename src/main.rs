@@ -41,8 +41,8 @@ fn given(memory: *mut u8, bytes: usize) -> *mut u8 {
         // Standard error is unbuffered, so this allocates no memory.
         let _ = writeln!(
             std::io::stderr(),
-            "error: this computer has no memory left for {bytes} more bytes; use smaller images (--max-resolution), \
-             lower --max-gaussians, or free memory"
+            "error: this computer has no memory left for {bytes} more bytes; use smaller images or \
+             fewer Gaussians, or free memory"
         );
         signal_hook::low_level::exit(5);
     }

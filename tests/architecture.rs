@@ -156,7 +156,7 @@ fn the_scheduler_is_the_engines_own() {
     assert_eq!(found.map(|(path, _)| path).collect::<Vec<_>>(), Vec::<PathBuf>::new());
 }
 
-/// The command line alone knows flags and commands; a message of the library names a field in backticks.
+/// The command line alone knows flags and commands; a message of the library has a [`labelgs::Setting`].
 #[test]
 fn the_library_speaks_of_no_flags() {
     let root = labelgs::internals::cli::command::command();
@@ -183,4 +183,33 @@ fn the_library_speaks_of_no_flags() {
         found.extend(wrong.map(|(at, line)| format!("{}:{}: {}", path.display(), at + 1, line.trim())));
     }
     assert_eq!(found, Vec::<String>::new());
+}
+
+/// Words of messages that name keys of files or data, although a flag of some command has the same name.
+const PLAIN: [&str; 8] = ["camera", "images", "labels", "model", "name", "scene", "size", "view"];
+
+/// A message gets a flag by a [`labelgs::Setting`] only; each of these has a flag somewhere.
+#[test]
+fn settings_in_messages_are_typed() {
+    fn fields(command: &clap::Command, found: &mut std::collections::BTreeSet<String>) {
+        found.extend(command.get_arguments().filter_map(|arg| arg.get_long()).map(|long| long.replace('-', "_")));
+        command.get_subcommands().for_each(|command| fields(command, found));
+    }
+    let mut flags = std::collections::BTreeSet::new();
+    fields(&labelgs::internals::cli::command::command(), &mut flags);
+    let mut wrong = Vec::new();
+    for (path, text) in files("src", &["rs"]) {
+        let code = text.split("#[cfg(test)]").next().unwrap_or_default();
+        let lines = code.lines().enumerate().filter(|(_, line)| !line.trim_start().starts_with("//"));
+        for (at, line) in lines {
+            let place = |what: &str| format!("{}:{}: {what}", path.display(), at + 1);
+            let typed = line.split("Setting(\"").skip(1).filter_map(|rest| rest.split('"').next());
+            wrong.extend(typed.filter(|name| !flags.contains(*name)).map(|name| place(&format!("no flag is {name}"))));
+            let plain = line.split("usage(\"").skip(1).filter_map(|rest| rest.split('"').next());
+            let quoted = line.split('`').skip(1).step_by(2).map(|words| words.split(" = ").next().unwrap_or_default());
+            let plain = plain.chain(quoted).filter(|name| flags.contains(*name) && !PLAIN.contains(name));
+            wrong.extend(plain.map(|name| place(&format!("{name} is a setting: Setting(\"{name}\")"))));
+        }
+    }
+    assert_eq!(wrong, Vec::<String>::new());
 }

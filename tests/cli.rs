@@ -400,7 +400,7 @@ fn extract_and_remove_write_the_two_parts() {
     assert_eq!(output.status.code(), Some(2));
     let message = text(&output.stderr);
     assert!(
-        message.starts_with("error: --labels: no Gaussian has label 2; the model has 1 (2 Gaussians), 3"),
+        message.starts_with("error: --labels: no Gaussian has label 2; the model has 1, 3, and 0 for the unlabelled"),
         "{message}"
     );
     assert_eq!(std::fs::read(&part).expect("file"), before, "a failed run leaves the old file");

@@ -95,6 +95,13 @@ fn scene(folder: &Path) -> String {
     scene
 }
 
+/// Width and height of the photos of a made scene.
+fn image_size(scene: &str) -> Value {
+    let first = Path::new(scene).join("images/000.png");
+    let (width, height) = labelgs::internals::io::image::photo_size(&first).expect("a photo");
+    serde_json::json!([width, height])
+}
+
 #[test]
 fn profile_times_every_stage() {
     let Some(_gpu) = turn() else { return };
@@ -143,6 +150,16 @@ fn profile_times_every_stage() {
     assert!(number("/host_ms/mean") >= 0.5 * number("/passes_ms/median"), "the host waits for the passes");
     assert_eq!(found["steps"].as_array().map(Vec::len), Some(6));
     assert_eq!(found.pointer("/steps/0/step"), Some(&8.into()));
+    // Steps as at the end of a run, and told as what they are.
+    let photo = image_size(&scene);
+    assert_eq!((&found["size"], &found["sh_degree"], &found["labels"]), (&photo, &3.into(), &true.into()));
+    assert!(found["steps"].as_array().expect("steps").iter().all(|step| step["size"] == photo));
+    assert!(
+        found["steps_with_layers"].as_u64() > Some(0) && table.contains(" px, degree 3, object layers in "),
+        "{table}"
+    );
+    let early = json(&succeeds(&["profile", &scene, "--steps", "2", "--warm-up", "1", "--as-scheduled", "--json"]));
+    assert!(early["sh_degree"] == 0 && early["labels"] == false && early["size"] != photo, "{early}");
     let file = file.to_str().expect("UTF-8");
     let same = succeeds(&["profile", "--compare", file, file]);
     assert!(same.contains("blend backward") && same.contains("pairs_walked") && !same.contains("slower"), "{same}");

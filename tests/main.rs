@@ -31,6 +31,7 @@ mod cli_labels; // labels of a model from masks, and masks from labels
 mod cli_long; // bit-identical results over 1,000 steps
 mod cli_masks; // import, check and spoil masks from the command line
 mod cli_surroundings; // odd names, locales, closed streams, links, little memory
+mod cli_words; // flags as they are typed, messages with flags of the command
 mod coarse; // steps on small photos equal those of a smaller scene
 mod compare_self; // the comparisons of all other tests do fail
 mod config; // schedules and ranges of the settings
@@ -75,5 +76,6 @@ mod shared; // parameters of the scene and of photos, trained beside the Gaussia
 mod strategy; // strategies of densification other than the default
 mod stress; // error bounds on adversarial scenes
 mod synth; // the made scene is consistent ground truth
+mod tools; // help of scripts, arguments that they have not
 mod track; // ids from frame to frame
 mod viewer; // the server of the viewer, and its page in a browser

@@ -1,6 +1,6 @@
 //! The cores of the blocks: a tree of halves along the ground.
 
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, Setting};
 use crate::io::block_file::Bounds;
 use glam::DVec3;
 
@@ -76,7 +76,10 @@ impl Cell {
             return Ok([Self::new(before, low), Self::new(after, high)]);
         }
         let problem = format!("{} Gaussians of a block are at one place and cannot be halved", self.rows.len());
-        Err(Error::usage("blocks", format!("{problem}; ask for fewer blocks, or train the coarse model better")))
+        Err(Error::usage(
+            Setting("blocks"),
+            format!("{problem}; ask for fewer blocks, or train the coarse model better"),
+        ))
     }
 }
 

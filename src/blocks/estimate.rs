@@ -3,7 +3,7 @@
 use super::need::{Card, Common, Need};
 use super::plan::BLOCKS_MAX;
 use crate::engine::card;
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, Setting};
 
 /// Gaussians in the zone of a block, in those of its core: a margin of a tenth on all four sides.
 const ZONE: f64 = 1.44;
@@ -83,7 +83,10 @@ pub fn estimate(sketch: &Sketch) -> Result<Estimate> {
             return Ok(Estimate { blocks, gaussians, frozen, views, device, host, steps, minutes });
         }
     }
-    Err(Error::usage("card", format!("is {} bytes, too small for {BLOCKS_MAX} blocks of this scene", sketch.card)))
+    Err(Error::usage(
+        Setting("card"),
+        format!("is {} bytes, too small for {BLOCKS_MAX} blocks of this scene", sketch.card),
+    ))
 }
 
 #[cfg(test)]

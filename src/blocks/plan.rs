@@ -6,7 +6,7 @@ use super::coarse::Coarse;
 use super::frame::Frame;
 use super::need::{Card, Common, Need};
 use crate::engine::{Engine, EngineSize, card};
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, Setting};
 use crate::gpu::Gpu;
 use crate::io::LoadOptions;
 use crate::scheduler::SchedulerOptions;
@@ -98,7 +98,7 @@ pub struct Plan {
 /// too small for the coarse model.
 pub fn plan(scene: &Path, model: &Path, options: &PlanOptions, open: &dyn Fn() -> Result<Arc<Gpu>>) -> Result<Plan> {
     if options.blocks == 0 || options.blocks > BLOCKS_MAX {
-        return Err(Error::usage("blocks", format!("is {}, needs 1 to {BLOCKS_MAX}", options.blocks)));
+        return Err(Error::usage(Setting("blocks"), format!("is {}, needs 1 to {BLOCKS_MAX}", options.blocks)));
     }
     let mut coarse = Coarse::open(scene, model, options.load.clone())?;
     let cameras: Vec<_> = coarse.dataset.train.iter().map(|view| &view.camera).collect();
@@ -180,11 +180,12 @@ impl Planner<'_> {
             }
         }
         let problem = format!(
-            "is {} bytes, too little for what the photos of a block show around it; name a larger card, fewer `gaussians` or \
-             a smaller coarse model",
-            self.options.card
+            "is {} bytes, too little for what the photos of a block show around it; name a larger card, a lower {}, or a \
+             smaller coarse model",
+            self.options.card,
+            Setting("gaussians")
         );
-        Err(Error::usage("card", problem))
+        Err(Error::usage(Setting("card"), problem))
     }
 
     /// Returns a cell, and whether it would not fit by an estimate of what its photos show.
@@ -206,7 +207,7 @@ impl Planner<'_> {
     fn halves(&self, cell: &Cell, count: usize) -> Result<[Cell; 2]> {
         if count >= BLOCKS_MAX {
             let problem = format!("is too small: more than {BLOCKS_MAX} blocks would be needed");
-            return Err(Error::usage("card", problem));
+            return Err(Error::usage(Setting("card"), problem));
         }
         cell.halves(|row| self.frame.place(self.coarse.model.world(row)))
     }

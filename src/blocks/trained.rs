@@ -1,5 +1,6 @@
 //! The finished training of a block.
 
+use crate::Setting;
 use crate::io::block_file::{self, BlockFile};
 use crate::io::label_table::LabelTable;
 use crate::io::{read, run_folder};
@@ -118,7 +119,7 @@ pub(super) fn compare(trained: &[&Trained]) -> Vec<String> {
             let value = |of: &BTreeMap<String, String>| of.get(key.name).map_or("not set", String::as_str).to_owned();
             let (then, now) = (value(&wanted), value(&own));
             if then != now {
-                note(&format!("`{}`", key.name), &then, &now);
+                note(&Setting(key.name).to_string(), &then, &now);
             }
         }
     }

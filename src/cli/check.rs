@@ -5,6 +5,7 @@ use super::context::Context;
 use super::stdout;
 use crate::io::capture::{Fault, Report, scan};
 use crate::io::{self, LoadOptions};
+use crate::words::counted;
 use crate::{Error, Result};
 use clap::Args;
 use serde_json::json;
@@ -49,11 +50,11 @@ pub(crate) fn run(args: &CheckArgs, context: &Context) -> Result<()> {
 fn table(report: &Report) -> String {
     let number = |value: Option<f64>| value.map_or("unknown".to_owned(), |value| format!("{value:.2}"));
     let views = report.views.len();
-    let in_views = if views == report.photos { String::new() } else { format!(" in {views} views") };
+    let in_views = if views == report.photos { String::new() } else { format!(" in {}", counted(views, "view")) };
     let mut text = format!(
-        "{} photos{in_views}, {} points, extent {:.3}; reprojection error {} px, brightest photo / darkest {}\n",
-        report.photos,
-        report.points,
+        "{}{in_views}, {}, extent {:.3}; reprojection error {} px, brightest photo / darkest {}\n",
+        counted(report.photos, "photo"),
+        counted(report.points, "point"),
         report.extent,
         number(report.reprojection),
         number(report.gain_spread)

@@ -3,7 +3,7 @@
 use super::args::{ReadArgs, SceneArgs};
 use super::context::Context;
 use super::drawer::Drawer;
-use super::labelled::TableArg;
+use super::labelled::{TableArg, or_list};
 use super::scene::{find_view, near_plane, open_gpu, open_scene};
 use super::values::{At, BoxAt, Picks, at, box_at, near, picks};
 use crate::edit::catalogue::{Catalogue, Pick};
@@ -11,7 +11,7 @@ use crate::edit::prompt::{Place, Prompt, choose};
 use crate::io::model::ModelRef;
 use crate::scene::{Camera, LabelMap};
 use crate::scheduler::SchedulerOptions;
-use crate::{Error, Result};
+use crate::{Error, Result, Setting};
 use clap::Args;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -134,11 +134,15 @@ impl PromptArgs {
         let lists = [(argument, listed.map_or(&[][..], |picks| &picks.0)), ("--name", &names)];
         let mut chosen = BTreeSet::new();
         for (argument, picks) in lists.into_iter().filter(|(_, picks)| !picks.is_empty()) {
-            chosen.extend(asked.known.resolve(argument, picks)?);
+            chosen.extend(or_list(asked.known.resolve(argument, picks), asked.path)?);
         }
         let prompts = self.prompts()?;
         if prompts.is_empty() {
-            return if chosen.is_empty() { asked.known.check(argument, &chosen).map(|()| chosen) } else { Ok(chosen) };
+            return if chosen.is_empty() {
+                or_list(asked.known.check(argument, &chosen), asked.path).map(|()| chosen)
+            } else {
+                Ok(chosen)
+            };
         }
         let maps = self.label_maps(&prompts, asked, context)?;
         let map_of = |prompt: &Prompt| maps.get(&key(prompt)).cloned().ok_or_else(|| Error::Bug("no map".into()));
@@ -173,10 +177,17 @@ impl PromptArgs {
     /// Renders the label map of each view and size among the prompts, each once.
     fn label_maps(&self, prompts: &[Prompt], asked: &Asked, context: &Context) -> Result<BTreeMap<Key, LabelMap>> {
         let Some(scene) = asked.scene else {
-            return Err(Error::usage(prompts[0].argument, "needs the scene of the view: --scene SCENE"));
+            return Err(Error::usage(
+                prompts[0].argument,
+                format!("needs the scene of the view: {}", Setting("scene").to("SCENE")),
+            ));
         };
         if !asked.model.has_labels() {
-            return Err(Error::data(asked.path, "", "the model has no labels; train it with --masks"));
+            return Err(Error::data(
+                asked.path,
+                "",
+                "the model has no labels; train it with masks, or give it some with labelgs label",
+            ));
         }
         let reading =
             SceneArgs { max_resolution: asked.max_resolution, read: asked.read.clone(), ..SceneArgs::default() };

@@ -100,6 +100,7 @@ pub enum Command {
     /// Write a model with the chosen objects in another colour.
     ///
     /// Example: labelgs recolour out --labels barrel --colour 0.9,0.1,0.1 --mix 0.7 -o red.ply
+    #[command(alias = "recolor")]
     Recolour(RecolourArgs),
     /// Write a model with other label ids.
     ///

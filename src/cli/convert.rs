@@ -10,6 +10,7 @@ use crate::edit::catalogue::Catalogue;
 use crate::edit::rename::keep;
 use crate::io::model::export_model;
 use crate::scene::{Gaussians, UNLABELLED};
+use crate::words::counted;
 use clap::Args;
 use serde_json::json;
 use std::collections::BTreeSet;
@@ -72,8 +73,9 @@ fn per_object(args: &ConvertArgs, model: &Gaussians, known: &Catalogue, print_js
             "files": rows.collect::<Vec<_>>(),
         }));
     }
-    let lines =
-        files.iter().map(|(path, _, _, count)| format!("{}: {count} of {} Gaussians\n", path.display(), model.len()));
+    let lines = files
+        .iter()
+        .map(|(path, _, _, count)| format!("{}: {count} of {}\n", path.display(), counted(model.len(), "Gaussian")));
     stdout::print(&lines.collect::<String>())
 }
 

@@ -13,6 +13,7 @@ use crate::render::pictures::{Format, write_rgb};
 use crate::render::{Parts, RenderOptions, render};
 use crate::scene::path::{Between, short_order, video};
 use crate::scene::{Camera, Dataset, View};
+use crate::words::counted;
 use crate::{Error, Result};
 use clap::{Args, ValueEnum};
 use serde_json::json;
@@ -56,7 +57,7 @@ pub struct DensifyArgs {
     /// Include the test views in the video. The tracked masks then depend on them.
     #[arg(long)]
     pub include_test: bool,
-    /// Colour behind the scene: black, white, or R,G,B from 0 to 1.
+    /// Colour behind the scene: a name such as white, #rrggbb, or R,G,B from 0 to 1.
     #[arg(long, value_name = "COLOUR", value_parser = colour, default_value = "black", help_heading = "Rendering")]
     pub background: [f32; 3],
     /// How the scene is read.
@@ -110,7 +111,12 @@ pub(crate) fn run(args: &DensifyArgs, context: &Context) -> Result<()> {
             "photos": views.len(),
         }));
     }
-    stdout::print(&format!("{}: {} frames through {} photos\n", path.display(), stops.len(), views.len()))
+    stdout::print(&format!(
+        "{}: {} through {}\n",
+        path.display(),
+        counted(stops.len(), "frame"),
+        counted(views.len(), "photo")
+    ))
 }
 
 /// Returns the views in the order of the video.

@@ -2,7 +2,7 @@
 
 use super::context::Context;
 use super::kernels::kernels_json;
-use super::profile::profile;
+use super::profile::{finished_from, profile};
 use super::profile_report::Window;
 use super::scene::open_gpu;
 use super::{devices, selftest};
@@ -63,7 +63,7 @@ fn steps(context: &Context) -> Result<Value> {
         SynthOptions { width: 1600, height: 1064, points: 1_000_000, ..scene }
     };
     let dataset = synth::dataset(&scene, 0);
-    let config = TrainConfig { label_from: Some(1), start_size: Some(1.0), ..TrainConfig::default() };
+    let config = finished_from(0, TrainConfig::default());
     let model = first_model(&dataset, &config)?;
     let window = Window { overlap: true, from_step: 0, warm_up: 10, steps: 20 };
     Ok(profile(&gpu, (&dataset, &model, config), window, |_| (), context)?.to_json())

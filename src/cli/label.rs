@@ -19,6 +19,7 @@ use crate::label::vote::model::{Counting, columns_of, label_by_lift, label_by_vo
 use crate::scene::{Gaussians, View};
 use crate::stage::Stage;
 use crate::train::LabelRule;
+use crate::words::counted;
 use crate::{Error, Result};
 use clap::Args;
 use serde_json::json;
@@ -141,11 +142,11 @@ pub(crate) fn run(args: &LabelArgs, context: &Context) -> Result<()> {
     }
     let labelled: u64 = rows.iter().filter(|row| row.label != 0).map(|row| row.count).sum();
     stdout::print(&format!(
-        "{}: {labelled} of {} Gaussians belong to {} objects, by {} views in {seconds:.1} s\n",
+        "{}: {labelled} of {} belong to {}, by {} in {seconds:.1} s\n",
         args.output.display(),
-        model.len(),
-        rows.iter().filter(|row| row.label != 0).count(),
-        views.len()
+        counted(model.len(), "Gaussian"),
+        counted(rows.iter().filter(|row| row.label != 0).count(), "object"),
+        counted(views.len(), "view")
     ))
 }
 

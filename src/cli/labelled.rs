@@ -3,6 +3,7 @@
 use super::args::JsonFlag;
 use super::context::Context;
 use super::output::WriteArgs;
+use super::shell::quoted;
 use super::stdout;
 use super::values::share;
 use crate::edit::catalogue::Catalogue;
@@ -12,6 +13,7 @@ use crate::io::model::{LazyModel, ModelRef, export_model};
 use crate::run::models;
 use crate::scene::gaussians::opacity_of;
 use crate::scene::{Gaussians, UNLABELLED};
+use crate::words::counted;
 use crate::{Error, Result};
 use clap::Args;
 use glam::DVec3;
@@ -135,6 +137,17 @@ impl MinConfidenceArg {
     }
 }
 
+/// Adds to an error about the labels of a model how to list them.
+pub(crate) fn or_list<T>(found: Result<T>, model: &Path) -> Result<T> {
+    found.map_err(|error| match error {
+        Error::Usage { argument, problem } => Error::usage(
+            argument,
+            format!("{problem} (labelgs list {} shows all)", quoted(&model.display().to_string())),
+        ),
+        other => other,
+    })
+}
+
 /// Opens a model and counts its labels.
 pub(crate) fn open(model: &Path, table: &TableArg) -> Result<(Gaussians, Catalogue)> {
     let read = models::open(model)?;
@@ -197,7 +210,13 @@ impl Edited<'_> {
             }
             return stdout::print_json(&result);
         }
-        stdout::print(&format!("{}: {written} of {} Gaussians\n", to.output.display(), self.of))
+        let of = self.of as u64;
+        // A filled place can make a model larger.
+        let share = match written <= of {
+            true => format!("{written} of {}", counted(of, "Gaussian")),
+            false => format!("{}, of {of} before", counted(written, "Gaussian")),
+        };
+        stdout::print(&format!("{}: {share}\n", to.output.display()))
     }
 }
 

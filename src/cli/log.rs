@@ -2,7 +2,6 @@
 
 use super::args::GlobalArgs;
 use super::stages::{self, Stages};
-use super::wording;
 use crate::Error;
 use crate::stage::TARGET;
 use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget, ProgressStyle};
@@ -24,14 +23,13 @@ static BARS: LazyLock<MultiProgress> =
 pub(super) const PLAIN_AFTER: Duration = Duration::from_secs(2);
 pub(super) const PLAIN_EVERY: Duration = Duration::from_secs(10);
 
-/// Standard error. The bars are hidden during a write. Names of settings become flags.
+/// Standard error. The bars are hidden during a write.
 struct AboveBars;
 
 impl Write for AboveBars {
     fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
         // A closed standard error must not end the work, and the logger would panic on an error.
-        let text = wording::message(&String::from_utf8_lossy(bytes));
-        let _ = BARS.suspend(|| std::io::stderr().write_all(text.as_bytes()));
+        let _ = BARS.suspend(|| std::io::stderr().write_all(bytes));
         Ok(bytes.len())
     }
 
@@ -69,7 +67,7 @@ impl<S: tracing::Subscriber> Layer<S> for Keep {
         if let Ok(mut kept) = WARNINGS.lock()
             && kept.len() < WARNINGS_MAX
         {
-            kept.push(wording::message(&message.0));
+            kept.push(message.0);
         }
     }
 }
@@ -99,7 +97,6 @@ pub(crate) fn start(args: &GlobalArgs) {
 
 /// Prints the error that ends the process, even with `--quiet`.
 pub(crate) fn final_error(error: &Error) {
-    let error = wording::error(error);
     BARS.suspend(|| {
         // A closed standard error cannot be reported.
         let _ = writeln!(std::io::stderr(), "error: {error}");

@@ -1,7 +1,7 @@
 //! `labelgs merge`.
 
 use super::context::Context;
-use super::labelled::{EditArgs, Edited, open};
+use super::labelled::{EditArgs, Edited, open, or_list};
 use super::values::{Picks, label, picks};
 use crate::Result;
 use crate::edit::merge::{Merged, merge};
@@ -29,7 +29,7 @@ pub struct MergeArgs {
 /// Writes the model with several labels merged into one.
 pub(crate) fn run(args: &MergeArgs, context: &Context) -> Result<()> {
     let (model, known) = open(&args.edit.model, &args.edit.table)?;
-    let labels = known.resolve("--labels", &args.labels.0)?;
+    let labels = or_list(known.resolve("--labels", &args.labels.0), &args.edit.model)?;
     let Merged { model: merged, table, into } = merge(&model, &known, &labels, args.into, args.name.as_deref())?;
     let into = BTreeSet::from([into]);
     let edited = Edited { model: &merged, table, of: model.len(), labels: &into };

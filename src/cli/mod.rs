@@ -22,6 +22,7 @@ pub(crate) mod list;
 pub(crate) mod log;
 pub(crate) mod masks;
 pub(crate) mod merge;
+mod mistyped;
 mod model_fit;
 pub(crate) mod occlusion;
 pub(crate) mod output;
@@ -29,6 +30,7 @@ pub(crate) mod plan;
 pub(crate) mod profile;
 pub(crate) mod profile_compare;
 mod profile_report;
+mod profile_timed;
 pub(crate) mod recolour;
 pub(crate) mod relabel;
 pub(crate) mod render;
@@ -50,6 +52,7 @@ pub(crate) mod values;
 pub(crate) mod view;
 pub(crate) mod wording;
 
+use crate::error::speak_of;
 use crate::{Error, version};
 use clap::FromArgMatches;
 use command::{Cli, Command, command};
@@ -109,7 +112,10 @@ impl From<clap::Error> for Exit {
 }
 
 fn run(args: Vec<OsString>) -> Result<(), Exit> {
-    let cli = Cli::from_arg_matches(&command().try_get_matches_from(args)?)?;
+    let mut command = command();
+    let typed = command.try_get_matches_from_mut(args).map_err(mistyped::in_words)?;
+    speak_of(wording::flags(&command, &typed));
+    let cli = Cli::from_arg_matches(&typed)?;
     log::start(&cli.global);
     interrupt::install()?;
     let context = Context::new(cli.global, cli.json);

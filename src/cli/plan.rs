@@ -3,14 +3,15 @@
 use super::args::JsonFlag;
 use super::context::Context;
 use super::devices::{shape_json, shape_of, shape_text};
+use super::stdout;
 use super::values::{Size, bytes, count, size};
-use super::{stdout, wording};
 use crate::engine::{Engine, EngineSize, LabelSize, capacity, card};
 use crate::gpu;
 use crate::pass::{KernelShape, Variant, training_step};
 use crate::scheduler::plan::{
     Capacity, Grid, Limits, MemoryReport, Page, PassList, Plan, PlanOptions, TABLE, Touch, Work,
 };
+use crate::words::counted;
 use crate::{Error, Result};
 use clap::Args;
 use serde_json::{Value, json};
@@ -19,10 +20,10 @@ use serde_json::{Value, json};
 #[derive(Args, Clone, Debug)]
 pub struct PlanArgs {
     /// Number of Gaussians to plan for, such as 500k or 2M.
-    #[arg(long, value_name = "N", value_parser = count, default_value = "1M")]
+    #[arg(long, alias = "max-gaussians", value_name = "N", value_parser = count, default_value = "1M")]
     pub gaussians: u64,
     /// Size of a picture, px.
-    #[arg(long, value_name = "WxH", value_parser = size, default_value = "1600x1064")]
+    #[arg(long, alias = "max-resolution", value_name = "WxH", value_parser = size, default_value = "1600x1064")]
     pub size: Size,
     /// Objects per step; 0 plans without labels.
     #[arg(long, value_name = "N", default_value_t = 10)]
@@ -121,14 +122,15 @@ fn to_text(subject: &Subject, (memory, plan): &(MemoryReport, Plan)) -> String {
     let (room, capacity) = (&subject.room, &subject.capacity);
     let objects = room.labels.map_or(0, |labels| labels.layers);
     format!(
-        "Training {} Gaussians on pictures of {} x {} px with {objects} objects per step\n\
+        "Training {} on pictures of {} x {} px with {} per step\n\
          device:  {}\nkernels: {}\nroom for {} (splat, tile) pairs, {} tiles of object layers\n\n\
          MEMORY at the start; pairs and tiles of object layers grow when a view needs more\n{}\n\
          SCRATCH ARENA of the step; buffers whose items do not overlap share bytes\n{}\n\
          PASSES\n{}",
-        room.gaussians,
+        counted(room.gaussians, "Gaussian"),
         room.image.0,
         room.image.1,
+        counted(objects, "object"),
         subject.device.as_deref().unwrap_or("none found, limits assumed"),
         shape_text(&subject.shape),
         capacity.instances,
@@ -158,7 +160,7 @@ fn to_json(subject: &Subject, (memory, plan): &(MemoryReport, Plan), problem: Op
         "instances": subject.capacity.instances,
         "layer_tiles": subject.capacity.layer_tiles,
         "fits": problem.is_none(),
-        "problem": problem.map(wording::error),
+        "problem": problem.map(Error::to_string),
         "memory": {
             "buffers": buffers.collect::<Vec<_>>(),
             "scratch_pages": memory.step_pages,

@@ -14,7 +14,7 @@ use crate::scheduler::SchedulerOptions;
 use crate::scheduler::plan::PlanOptions;
 use crate::synth::{self, SynthOptions};
 use crate::train::{StepReport, TrainConfig, Trainer, first_model};
-use crate::{Error, Result};
+use crate::{Error, Result, Setting};
 use clap::Args;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -42,13 +42,18 @@ pub struct ProfileArgs {
     /// Steps before the clock starts.
     #[arg(long, value_name = "N", default_value_t = 20)]
     pub warm_up: u32,
-    /// Train this many steps first, to measure a trained scene.
+    /// Train this many steps first, to measure a trained scene. The steps after them, which are timed, have photos of full
+    /// size, all bands of colour and, with masks, labels, as at the end of a run.
     #[arg(long, value_name = "S", default_value_t = 0)]
     pub from_step: u32,
     /// Start from this model, a PLY or the folder of a `labelgs train` run, instead of the scene's points.
     #[arg(long, value_name = "MODEL")]
     pub model: Option<PathBuf>,
-    /// Settings in TOML, such as config.toml of an earlier run. Labels start at --from-step at the latest.
+    /// Time steps as the schedule of a run has them: the first ones are of small photos without labels and without bands
+    /// of colour.
+    #[arg(long)]
+    pub as_scheduled: bool,
+    /// Settings in TOML, such as config.toml of an earlier run.
     #[arg(long, value_name = "FILE.toml", help_heading = "Training")]
     pub config: Option<PathBuf>,
     /// Let passes overlap as in training. Wall-clock times are then those of training; the time of a pass is what it
@@ -109,20 +114,34 @@ pub(crate) fn run(args: &ProfileArgs, context: &Context) -> Result<()> {
     if context.json || matches!(args.json, Some(None)) { Ok(()) } else { stdout::print(&profile.to_text()) }
 }
 
-/// Returns the configuration: every timed step has labels, and none is the last step.
+/// Returns the settings of a run whose steps after `from_step` are those of its end: photos of full size, all bands of
+/// colour, labels.
+pub(super) fn finished_from(from_step: u32, settings: TrainConfig) -> TrainConfig {
+    let first = from_step.saturating_add(1);
+    TrainConfig {
+        full_size_from: Some(settings.full_size_from().min(first)),
+        label_from: Some(settings.label_from.unwrap_or(first).min(first)),
+        sh_degree_interval: Some(settings.sh_interval().min(first / settings.sh_degree.max(1)).max(1)),
+        ..settings
+    }
+}
+
+/// Returns the settings: no timed step is the last step.
 fn decide(args: &ProfileArgs) -> Result<TrainConfig> {
     let mut decided = match &args.config {
         Some(path) => Settings::read(path)?.train,
         None => TrainConfig::default(),
     };
-    decided.label_from = Some(decided.labels_from().min(args.from_step.saturating_add(1)));
     #[cfg(feature = "lab")]
     if args.separate_objects {
         decided.layer_every = Some(1);
     }
     let steps = u64::from(args.from_step) + u64::from(args.warm_up) + u64::from(args.steps.saturating_add(COUNTED)) + 1;
-    let steps = u32::try_from(steps).map_err(|_| Error::usage("--steps", "there are too many steps in all"))?;
+    let steps = u32::try_from(steps).map_err(|_| Error::usage(Setting("steps"), "there are too many steps in all"))?;
     decided.iterations = decided.iterations.max(steps);
+    if !args.as_scheduled {
+        decided = finished_from(args.from_step, decided);
+    }
     decided.check()?;
     Ok(decided)
 }
@@ -190,7 +209,6 @@ fn measure(trainer: &mut Trainer, window: Window, context: &Context, profile: &m
     let reports: Vec<StepReport> = reports.into_iter().filter(|report| timed(report.step)).collect();
     let times = trainer.take_times().into_iter().filter(|times| timed(times.step)).collect();
     profile.gaussians = trainer.gaussian_count();
-    profile.size = *trainer.engine_mut().size();
     profile.fill(clocks, &reports, times);
     trainer.count_pairs(true);
     let mut counted = Vec::new();

@@ -1,11 +1,12 @@
 //! The result of `labelgs profile`, as a table and as JSON.
 
 use super::devices::{shape_json, shape_of, shape_text};
-use crate::engine::EngineSize;
+use super::profile_timed::Timed;
 use crate::gpu::Gpu;
 use crate::pass::{KernelShape, Stage};
 use crate::scheduler::{PassTime, Profiler};
-use crate::train::{StepReport, StepTimes};
+use crate::train::{LabelWork, StepReport, StepTimes};
+use crate::words::counted;
 use serde_json::{Value, json};
 use std::collections::{HashMap, HashSet};
 use std::time::Duration;
@@ -64,8 +65,7 @@ pub(super) struct Profile {
     pub views: usize,
     /// Gaussians at the end.
     pub gaussians: u32,
-    /// Sizes that the memory was planned for.
-    pub size: EngineSize,
+    timed: Timed,
     clocks: Clocks,
     passes: Vec<(Stage, PassTime)>,
     stages: Vec<(Stage, PassTime)>,
@@ -94,7 +94,7 @@ impl Profile {
             warm_up: window.warm_up,
             views: 0,
             gaussians: 0,
-            size: EngineSize::default().for_training(),
+            timed: Timed::default(),
             clocks: Clocks::default(),
             passes: Vec::new(),
             stages: Vec::new(),
@@ -117,6 +117,7 @@ impl Profile {
         times.retain(|times| !times.is_first);
         self.left_out = all - times.len();
         self.clocks = clocks;
+        self.timed = Timed::new(reports);
         self.passes = rows(&times, |name| name);
         self.stages = rows(&times, |_| "");
         let sums = times.iter().map(|times| times.items.iter().map(|item| item.2 as f64 / 1e6).sum());
@@ -179,14 +180,13 @@ impl Profile {
             Some(Workers { count, source }) => format!("times {count} worker threads ({source})"),
             None => "of the whole device".to_owned(),
         };
-        let (width, height) = self.size.image;
         let walked =
             self.counters.iter().find(|(name, _, _)| *name == "pairs_walked").map_or(f64::NAN, |(_, _, v)| v.mean);
         format!(
             "per (pixel, splat) pair walked, ns: blend forward {forward:.3}, blend backward {backward:.3}, {whose}\n\
              pairs walked per pixel: {:.1}, of which {:.1} % have a weight; the fuller half of the tiles walks {:.3} of \
              the mean\n",
-            walked / (f64::from(width) * f64::from(height)),
+            walked / self.timed.pixels,
             self.contributing * 100.0,
             self.balance
         )
@@ -196,19 +196,18 @@ impl Profile {
     pub(super) fn to_text(&self) -> String {
         let (first, last) =
             (self.from_step + self.warm_up + 1, self.from_step + self.warm_up + self.steps.len() as u32);
-        let labels = if self.size.labels.is_some() { "with labels" } else { "without labels" };
         let mode = if self.overlap { "passes overlap" } else { "a barrier before each pass" };
-        let (width, height) = self.size.image;
         let mut text = format!(
-            "device:  {} ({})\nkernels: {}\nsteps {first} to {last} of training {labels}, {} views of up to {width} x \
-             {height} px, {} Gaussians at the end\n{} steps count for the passes, {} first runs of a recording do not; \
+            "device:  {} ({})\nkernels: {}\nsteps {first} to {last} of a training: {}\n{}, {} at the end; \
+             {} count for the passes, {} first runs of a recording do not; \
              {mode}\n\n",
             self.device,
             self.driver,
             shape_text(&self.shape),
-            self.views,
-            self.gaussians,
-            self.counted(),
+            self.timed.to_text(),
+            counted(self.views, "view"),
+            counted(self.gaussians, "Gaussian"),
+            counted(self.counted(), "step"),
             self.left_out
         );
         text +=
@@ -248,9 +247,12 @@ impl Profile {
             "barrier_before_each_pass": !self.overlap,
             "from_step": self.from_step,
             "warm_up": self.warm_up,
-            "labels": self.size.labels.is_some(),
+            "labels": self.timed.layers + self.timed.disagreement > 0,
             "views": self.views,
-            "size": [self.size.image.0, self.size.image.1],
+            "size": self.timed.size(),
+            "sh_degree": self.timed.degrees.last(),
+            "steps_with_layers": self.timed.layers,
+            "steps_with_disagreement": self.timed.disagreement,
             "gaussians": self.gaussians,
             "steps_counted": self.counted(),
             "stages": self.stages.iter().map(row).collect::<Vec<_>>(),
@@ -275,6 +277,13 @@ impl Profile {
         }
         json!({
             "step": report.step,
+            "size": report.kind.size,
+            "sh_degree": report.kind.sh_degree,
+            "labels": match report.kind.labels {
+                LabelWork::None => "none",
+                LabelWork::Disagreement => "disagreement",
+                LabelWork::Layers => "layers",
+            },
             "loss": report.loss,
             "label_loss": report.label_loss,
             "visible": counters.visible_count,

@@ -15,8 +15,8 @@ pub struct RecolourArgs {
     /// Model, choice and output.
     #[command(flatten)]
     pub select: SelectArgs,
-    /// Colour of the labels: black, white, or R,G,B from 0 to 1.
-    #[arg(long, value_name = "COLOUR", value_parser = colour)]
+    /// Colour of the labels: a name such as red, #rrggbb, or R,G,B from 0 to 1.
+    #[arg(long, alias = "color", value_name = "COLOUR", value_parser = colour)]
     pub colour: [f32; 3],
     /// Share of the new colour, 0 to 1; the rest is the old colour, which keeps light and shade.
     #[arg(long, value_name = "SHARE", value_parser = share, default_value_t = 1.0)]

@@ -1,7 +1,7 @@
 //! `labelgs relabel`.
 
 use super::context::Context;
-use super::labelled::{EditArgs, Edited, open};
+use super::labelled::{EditArgs, Edited, open, or_list};
 use super::values::{Renumbering, renumbering};
 use crate::Result;
 use crate::edit::change::relabel;
@@ -25,7 +25,7 @@ pub struct RelabelArgs {
 pub(crate) fn run(args: &RelabelArgs, context: &Context) -> Result<()> {
     let (model, known) = open(&args.edit.model, &args.edit.table)?;
     let map = &args.map.0;
-    known.check("--map", &map.keys().copied().collect())?;
+    or_list(known.check("--map", &map.keys().copied().collect()), &args.edit.model)?;
     let edited = Edited {
         model: &relabel(&model, map),
         table: known.table.as_ref().map(|table| renumber(table, map)),

@@ -61,7 +61,7 @@ pub struct RenderArgs {
     /// File format.
     #[arg(long, value_name = "FORMAT", value_enum, default_value = "png", help_heading = "Output")]
     pub format: Format,
-    /// Colour behind the scene: black, white, or R,G,B from 0 to 1.
+    /// Colour behind the scene: a name such as white, #rrggbb, or R,G,B from 0 to 1.
     #[arg(long, value_name = "COLOUR", value_parser = colour, default_value = "black", help_heading = "Rendering")]
     pub background: [f32; 3],
     /// Memory.

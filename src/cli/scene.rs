@@ -3,7 +3,7 @@
 use super::args::SceneArgs;
 use super::context::Context;
 use crate::engine::{Engine, EngineSize};
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, Setting};
 use crate::gpu::{Gpu, GpuOptions, PipelineStore};
 use crate::io::pipeline_file::PipelineFolder;
 use crate::io::{self, LoadOptions};
@@ -11,6 +11,7 @@ use crate::run::Settings;
 use crate::scene::{Dataset, Gaussians, View};
 use crate::scheduler::SchedulerOptions;
 use crate::train::near::NEAR;
+use crate::words::{counted, did_you_mean};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -59,12 +60,19 @@ pub(crate) fn pick_views<'a>(dataset: &'a Dataset, which: &str) -> Result<Vec<&'
     };
     if views.is_empty() {
         return Err(Error::usage(
-            "--views",
-            format!("the scene has no {which} views; use --views all, or change --test-every"),
+            Setting("views"),
+            format!(
+                "the scene has no {which} views; use {}, or change {}",
+                Setting("views").to("all"),
+                Setting("test_every")
+            ),
         ));
     }
     Ok(views)
 }
+
+/// Most views that a message names.
+const NAMED_MAX: usize = 4;
 
 /// Returns the view with a name, with or without its extension.
 pub(crate) fn find_view<'a>(dataset: &'a Dataset, name: &str) -> Result<&'a View> {
@@ -72,11 +80,11 @@ pub(crate) fn find_view<'a>(dataset: &'a Dataset, name: &str) -> Result<&'a View
     let found =
         all.iter().find(|view| view.name == name || view.stem() == name || without_extension(&view.name) == name);
     found.copied().ok_or_else(|| {
-        let some: Vec<&str> = all.iter().take(8).map(|view| view.name.as_str()).collect();
-        Error::usage(
-            "name of a view",
-            format!("no view is called {name}; the scene has {} ... ({} in all)", some.join(", "), all.len()),
-        )
+        let names = || all.iter().map(|view| view.name.as_str());
+        let some = || names().take(NAMED_MAX).collect::<Vec<_>>().join(", ");
+        let cure = did_you_mean(name, names()).unwrap_or_else(|| format!("they are {} ...", some()));
+        let problem = format!("no view is called {name}; the scene has {}, {cure}", counted(all.len(), "view"));
+        Error::usage("name of a view", problem)
     })
 }
 

@@ -20,6 +20,7 @@ use crate::eval::removal::sights;
 use crate::scene::{Gaussians, View};
 use crate::scheduler::SchedulerOptions;
 use crate::train::{REFIT_STEPS, refitted};
+use crate::words::counted;
 use crate::{Error, Result};
 use clap::Args;
 use serde_json::json;
@@ -160,7 +161,10 @@ pub(crate) fn run_remove(args: &RemoveArgs, context: &Context) -> Result<()> {
             let filled = filled(args, scene, &model, &listed(&labels), context)?;
             let added: u64 = filled.added.values().sum();
             let (hidden, lit) = (filled.hidden, filled.lit);
-            tracing::info!("filled: {added} new Gaussians; {hidden} that nobody saw are gone; {lit} lost a shadow");
+            tracing::info!(
+                "filled: {}; {hidden} that nobody saw are gone; {lit} lost a shadow",
+                counted(added, "new Gaussian")
+            );
             (filled.model, json!({ "added": filled.added, "hidden": hidden, "lit": lit }))
         }
     };

@@ -170,7 +170,13 @@ impl Row {
 
 impl Scorer<'_> {
     fn score(&mut self, model: &Gaussians) -> Result<Row> {
-        let how = Rendering { options: self.options, min_confidence: MIN_LABEL_CONFIDENCE, train: &[], by_main: false };
+        let how = Rendering {
+            options: self.options,
+            min_confidence: MIN_LABEL_CONFIDENCE,
+            train: &[],
+            by_main: false,
+            lpips: None,
+        };
         let mean = evaluate(&mut self.engine, model, &self.views, how, &(), &mut ())?.mean;
         let number = |value: Option<f64>| value.unwrap_or(f64::NAN);
         Ok(Row {

@@ -1,12 +1,13 @@
 //! `labelgs split-components`.
 
 use super::context::Context;
-use super::labelled::{EditArgs, Edited, open};
+use super::labelled::{EditArgs, Edited, open, or_list};
 use super::select::GroupingArgs;
 use super::values::{Picks, picks};
 use crate::Result;
 use crate::edit::change::{Specks, split_components};
 use crate::edit::rename::split;
+use crate::words::counted;
 use clap::Args;
 use serde_json::json;
 
@@ -30,11 +31,11 @@ pub struct SplitArgs {
 /// Writes the model with a label for each part.
 pub(crate) fn run(args: &SplitArgs, context: &Context) -> Result<()> {
     let (model, known) = open(&args.edit.model, &args.edit.table)?;
-    let labels = known.resolve("--labels", &args.labels.0)?;
+    let labels = or_list(known.resolve("--labels", &args.labels.0), &args.edit.model)?;
     let named = known.table.iter().flat_map(|table| &table.labels).map(|entry| entry.id).collect();
     let found = split_components(&model, &labels, &named, args.grouping.grouping(), args.specks)?;
     for (&label, ids) in &found.ids {
-        tracing::info!("{}: {} parts: {ids:?}", known.title(label), ids.len());
+        tracing::info!("{}: {}: {ids:?}", known.title(label), counted(ids.len(), "part"));
     }
     let edited = Edited {
         model: &found.model,

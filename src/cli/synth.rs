@@ -7,6 +7,7 @@ use super::values::{Size, size};
 use super::{interrupt, stdout};
 use crate::Result;
 use crate::synth::{Preset, SynthLens, SynthOptions, write};
+use crate::words::counted;
 use clap::Args;
 use std::cell::RefCell;
 use std::path::PathBuf;
@@ -78,12 +79,12 @@ pub(crate) fn run(args: &SynthArgs, context: &Context) -> Result<()> {
         .map(|object| format!("{} {}", object.id, object.name.as_deref().unwrap_or_default()))
         .collect();
     stdout::print(&format!(
-        "{}: {} views of {} x {} px, {} points; objects: {}\n",
+        "{}: {} of {} x {} px, {}; objects: {}\n",
         summary.scene.display(),
-        summary.views,
+        counted(summary.views, "view"),
         options.width,
         options.height,
-        summary.points,
+        counted(summary.points, "point"),
         objects.join(", ")
     ))
 }

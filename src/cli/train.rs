@@ -10,6 +10,7 @@ use super::{interrupt, stdout};
 use crate::Result;
 use crate::run::{self, Event, Flow, Live, Observer, Request, Settings, Summary};
 use crate::viewer::Watched;
+use crate::words::counted;
 
 /// Trains a model and prints a summary.
 pub(crate) fn run(args: &TrainArgs, context: &Context) -> Result<()> {
@@ -68,7 +69,7 @@ impl Observer for Terminal<'_> {
                     progress.set(u64::from(step), || {
                         let (loss, label) = report.map_or((f64::NAN, 0.0), |report| (report.loss, report.label_loss));
                         let label = if label > 0.0 { format!(" label loss {label:.4}") } else { String::new() };
-                        format!("loss {loss:.4}{label} {} Gaussians", live.gaussian_count())
+                        format!("loss {loss:.4}{label} {}", counted(live.gaussian_count(), "Gaussian"))
                     });
                 }
                 if is_last {
@@ -83,7 +84,12 @@ impl Observer for Terminal<'_> {
 
 fn sentence(summary: &Summary) -> String {
     let Summary { model, gaussians, steps, seconds, .. } = summary;
-    let mut text = format!("{}: {gaussians} Gaussians after {steps} steps in {seconds:.1} s", model.display());
+    let mut text = format!(
+        "{}: {} after {} in {seconds:.1} s",
+        model.display(),
+        counted(gaussians, "Gaussian"),
+        counted(steps, "step")
+    );
     if let Some(mean) = summary.scores.as_ref().map(|scores| &scores.mean) {
         text += &format!(
             "; test views: PSNR {:.2} dB, SSIM {:.4}",

@@ -2,11 +2,12 @@
 
 use crate::io::label_table::LabelTable;
 use crate::scene::{Gaussians, UNLABELLED};
+use crate::words::did_you_mean;
 use crate::{Error, Result};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Most labels in a message.
-const LISTED_MAX: usize = 24;
+const LISTED_MAX: usize = 6;
 
 /// A choice of labels on the command line.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -49,8 +50,7 @@ impl Catalogue {
                 }
                 Pick::Name(name) => {
                     let found = self.table.as_ref().and_then(|table| table.by_name(name));
-                    let unknown = || Error::usage(argument, format!("no label is named {name}; {}", self.there_is()));
-                    ids.insert(found.ok_or_else(unknown)?);
+                    ids.insert(found.ok_or_else(|| Error::usage(argument, self.unknown(name)))?);
                 }
             }
         }
@@ -82,16 +82,17 @@ impl Catalogue {
         self.name(id).map_or_else(|| id.to_string(), |name| format!("{id} {name}"))
     }
 
-    /// Returns a list of the labels for messages: "the model has 1 cup (80 Gaussians, 2400 px in the masks), 3 (5
-    /// Gaussians)".
+    /// Returns what is wrong with the name of no label.
+    fn unknown(&self, name: &str) -> String {
+        let names = self.table.iter().flat_map(|table| &table.labels).filter_map(|entry| entry.name.as_deref());
+        let cure = did_you_mean(name, names).unwrap_or_else(|| self.there_is());
+        format!("no label is named {name}; {cure}")
+    }
+
+    /// Returns a few of the labels for messages: "the model has 1 cup, 3, 4 barrel and 12 more".
     pub fn there_is(&self) -> String {
-        let text = |(&id, &count): (&u32, &u64)| {
-            let pixels = self.table.as_ref().and_then(|table| table.entry(id)).map_or(0, |entry| entry.pixels);
-            let pixels = if pixels > 0 { format!(", {pixels} px in the masks") } else { String::new() };
-            format!("{} ({count} Gaussians{pixels})", self.title(id))
-        };
-        let objects = self.gaussians.iter().filter(|row| *row.0 != UNLABELLED);
-        let texts: Vec<String> = objects.clone().take(LISTED_MAX).map(text).collect();
+        let objects = self.gaussians.keys().filter(|id| **id != UNLABELLED);
+        let texts: Vec<String> = objects.clone().take(LISTED_MAX).map(|&id| self.title(id)).collect();
         if texts.is_empty() {
             return "the model has no labelled Gaussian; train it with masks".to_owned();
         }

@@ -3,7 +3,7 @@
 use super::components::{Grouping, components};
 use crate::io::model::values::sh0_of;
 use crate::scene::{Gaussians, LABEL_MAX, MODEL_LABEL_MAX, UNLABELLED};
-use crate::{Error, Result};
+use crate::{Error, Result, Setting};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// The treatment of parts that are too small.
@@ -78,7 +78,7 @@ pub fn split_components(
         let found = components(model, &rows_of(&old, label), how)?;
         let mut own = vec![label];
         for part in found.parts.iter().skip(1) {
-            let none = || Error::usage("labels", format!("{} parts, and no id is free", found.parts.len()));
+            let none = || Error::usage(Setting("labels"), format!("{} parts, and no id is free", found.parts.len()));
             let id = free.next().ok_or_else(none)?;
             part.iter().for_each(|&row| new[row] = id);
             own.push(id);

@@ -64,7 +64,7 @@ pub fn require_labels(argument: &str, map: &LabelMap, mask: &[bool], known: &Cat
     } else {
         format!(
             "selects nothing, because no label has more than half of its pixels inside; it touches {}; \
-             widen it or name one in `labels`",
+             widen it or name one of them",
             near.join(", ")
         )
     };

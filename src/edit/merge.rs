@@ -5,7 +5,7 @@ use super::change::relabel;
 use super::rename::{give_name, renumber};
 use crate::io::label_table::LabelTable;
 use crate::scene::{Gaussians, UNLABELLED};
-use crate::{Error, Result};
+use crate::{Error, Result, Setting};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// The result of [`merge`].
@@ -30,12 +30,15 @@ pub fn merge(
 ) -> Result<Merged> {
     let smallest = labels.iter().copied().find(|&label| label != UNLABELLED);
     let into = match into.or(smallest) {
-        Some(UNLABELLED) | None => return Err(Error::usage("into", "0 means no label; relabelling removes labels")),
+        Some(UNLABELLED) | None => {
+            return Err(Error::usage(Setting("into"), "0 means no label; relabelling removes labels"));
+        }
         Some(into) => into,
     };
     if known.gaussians.contains_key(&into) && !labels.contains(&into) {
-        let problem = format!("label {} is another one; add it to `labels`, or choose a free id", known.title(into));
-        return Err(Error::usage("into", problem));
+        let problem =
+            format!("label {} is another one; add it to {}, or choose a free id", known.title(into), Setting("labels"));
+        return Err(Error::usage(Setting("into"), problem));
     }
     let map: BTreeMap<u32, u32> = labels.iter().map(|&label| (label, into)).collect();
     let merged = relabel(model, &map);

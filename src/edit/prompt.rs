@@ -3,7 +3,7 @@
 use super::catalogue::Catalogue;
 use super::choose::{candidates, require_labels};
 use crate::scene::{LabelMap, UNLABELLED};
-use crate::{Error, Result};
+use crate::{Error, Result, Setting};
 use std::collections::BTreeSet;
 
 /// A place in a view. Pixels count from 0 at the top left, at the size of the label map.
@@ -54,7 +54,7 @@ pub fn choose(
     if rest.is_empty() {
         let lost: Vec<String> = chosen.iter().map(|&id| known.title(id)).collect();
         let lost = if lost.is_empty() { "nothing was chosen".into() } else { format!("it takes {}", lost.join(", ")) };
-        return Err(Error::usage("not_at", format!("leaves no label: {lost}; {}", known.there_is())));
+        return Err(Error::usage(Setting("not_at"), format!("leaves no label: {lost}; {}", known.there_is())));
     }
     Ok(rest)
 }

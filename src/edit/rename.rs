@@ -3,7 +3,7 @@
 use super::catalogue::Catalogue;
 use crate::io::label_table::{LabelEntry, LabelTable};
 use crate::scene::UNLABELLED;
-use crate::{Error, Result};
+use crate::{Error, Result, Setting};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Returns the entries whose id is wanted.
@@ -56,7 +56,10 @@ pub fn give_name(known: &Catalogue, table: Option<LabelTable>, id: u32, name: &s
     let made = || known.gaussians.keys().filter(|&&id| id != UNLABELLED).map(|&id| LabelEntry::new(id)).collect();
     let mut labels = table.map_or_else(made, |table| table.labels);
     if let Some(other) = labels.iter().find(|entry| entry.id != id && entry.name.as_deref() == Some(name)) {
-        return Err(Error::usage("name", format!("{name} is the name of label {}; names are unique", other.id)));
+        return Err(Error::usage(
+            Setting("name"),
+            format!("{name} is the name of label {}; names are unique", other.id),
+        ));
     }
     match labels.iter_mut().find(|entry| entry.id == id) {
         Some(entry) => entry.name = Some(name.to_owned()),

@@ -2,7 +2,7 @@
 
 use super::catalogue::Catalogue;
 use crate::scene::Gaussians;
-use crate::{Error, Result};
+use crate::{Error, Result, Setting};
 use glam::DVec3;
 use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
@@ -112,7 +112,7 @@ pub fn remove(model: &Gaussians, labels: &[u32]) -> Result<Gaussians> {
 
 /// The error of a choice that leaves nothing.
 pub(crate) fn nothing_left() -> Error {
-    Error::usage("labels", "names every label of the model; no Gaussian would be left")
+    Error::usage(Setting("labels"), "names every label of the model; no Gaussian would be left")
 }
 
 fn check_labels(model: &Gaussians, labels: &[u32]) -> Result<BTreeSet<u32>> {

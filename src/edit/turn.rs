@@ -1,6 +1,6 @@
 //! Moves, turns and scales a model. Colours that depend on the direction are turned along.
 
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, Setting};
 use crate::scene::Gaussians;
 use crate::scene::origin::far_origin;
 use crate::shaders::constants::exact::{SH_C1, SH_C2_0, SH_C2_2, SH_C2_4, SH_C3_0, SH_C3_1, SH_C3_2, SH_C3_3, SH_C3_5};
@@ -42,7 +42,8 @@ impl Transform {
     /// Returns the shortest turn that makes a direction of the model the upward one of 3DGS files, -y.
     pub fn upright(up: DVec3) -> Result<DQuat> {
         let up = up.try_normalize();
-        let up = up.ok_or_else(|| Error::usage("up", "is no direction; expected one with a length, such as 0,0,1"))?;
+        let up = up
+            .ok_or_else(|| Error::usage(Setting("up"), "is no direction; expected one with a length, such as 0,0,1"))?;
         Ok(DQuat::from_rotation_arc(up, DVec3::NEG_Y))
     }
 

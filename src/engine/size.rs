@@ -1,6 +1,6 @@
 //! Sizes that the memory of an engine is made for.
 
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, Setting};
 use crate::pass::KernelShape;
 use crate::scene::Gaussians;
 
@@ -104,7 +104,7 @@ impl EngineSize {
             "{width} x {height} px make {tiles_x} x {tiles_y} tiles, at most {most} are supported on this device; choose a \
              smaller size"
         );
-        Err(Error::usage("max_resolution", problem))
+        Err(Error::usage(Setting("max_resolution"), problem))
     }
 
     /// Fails if the image is larger than the buffers.

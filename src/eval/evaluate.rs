@@ -2,6 +2,7 @@
 
 use super::compared::{Compared, Watch};
 use super::metrics::COVERED;
+use super::protocol::score::Distance;
 use super::regions::{RegionScores, Witnesses};
 use super::scores::{ObjectRender, ObjectTruth, Scores, ViewScores};
 use super::subject::{Subject, Whole};
@@ -9,7 +10,7 @@ use crate::engine::Engine;
 use crate::error::Result;
 use crate::label::occlusion::{Rule, by_contour};
 use crate::render::{Parts, RenderOptions, Rendered};
-use crate::scene::{Gaussians, LabelMap, Pixels, View};
+use crate::scene::{Gaussians, LabelMap, Photo, Pixels, View};
 use std::collections::BTreeMap;
 
 /// The options of the renders.
@@ -24,6 +25,8 @@ pub struct Rendering<'a> {
     /// The label of a pixel is that of its main Gaussian, as in LabelGS, instead of the one with the largest sum of
     /// weights.
     pub by_main: bool,
+    /// A perceptual distance of each view to its photo, such as LPIPS.
+    pub lpips: Option<&'a dyn Distance>,
 }
 
 /// Ground truth of objects including their hidden parts.
@@ -123,10 +126,23 @@ fn score_scene(
         let seen = witnesses.see(&view.camera, &rendered)?;
         score.regions = Some(RegionScores::new(&rendered.rgb, &photo, mask, &seen));
     }
-    let numbers = vec![("PSNR", Some(score.psnr)), ("SSIM", Some(score.ssim))];
+    score.lpips = how.lpips.map(|lpips| distance(lpips, &rendered.rgb, &photo)).transpose()?;
+    let numbers = vec![("PSNR", Some(score.psnr)), ("SSIM", Some(score.ssim)), ("LPIPS", score.lpips)];
+    let numbers = numbers.into_iter().filter(|(_, value)| value.is_some()).collect();
     let (labels, truth) = (map.as_ref(), mask);
     watch.see(&Compared { numbers, labels, truth, ..Compared::new(&view.name, &photo, &rendered.rgb) })?;
     Ok((score, hidden_by(mask, &rendered)?))
+}
+
+/// Returns the distance of a render to the photo. Invalid pixels of the photo look like the render's.
+fn distance(lpips: &dyn Distance, render: &[[f32; 3]], photo: &Photo) -> Result<f64> {
+    let render: Vec<[f32; 3]> = render.iter().map(|colour| colour.map(|value| value.clamp(0.0, 1.0))).collect();
+    let truth = |(&[r, g, b, valid], &own): (&[u8; 4], &[f32; 3])| match valid {
+        0 => own,
+        _ => [r, g, b].map(|byte| f32::from(byte) / 255.0),
+    };
+    let truth: Vec<[f32; 3]> = photo.rgba.iter().zip(&render).map(truth).collect();
+    lpips.distance(&render, &truth, photo.width as usize, photo.height as usize)
 }
 
 /// Passes an object of a view to `watch`, if it has ground truth there.

@@ -24,8 +24,10 @@ pub(crate) mod subject;
 
 pub use compared::{Compared, Watch};
 pub use evaluate::{AmodalTruth, Rendering, evaluate};
+pub use lpips::Weights as LpipsWeights;
 pub use metrics::psnr;
 pub use places::{PlaceScore, Places, by_place};
+pub use protocol::score::Distance;
 pub use regions::RegionScores;
 pub use removal::{HoleScores, ObjectRemoval, RemovalScores, RemovalTruth, RuleScores, removals, sights};
 pub use scores::{MeanScores, ObjectScores, Scores, ViewScores};

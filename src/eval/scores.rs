@@ -12,7 +12,7 @@ use super::removal::RemovalScores;
 use super::specks::specks;
 use super::ssim::ssim;
 use crate::scene::{LabelMap, Photo};
-use crate::{Error, Result};
+use crate::{Error, Result, Setting};
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -54,6 +54,9 @@ pub struct ViewScores {
     pub psnr_corrected: f64,
     /// SSIM over the photo's valid pixels.
     pub ssim: f64,
+    /// LPIPS of the clamped render, if weights are given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub lpips: Option<f64>,
     /// PSNR by region, if the training views are known.
     #[serde(flatten)]
     pub regions: Option<RegionScores>,
@@ -208,6 +211,9 @@ pub struct MeanScores {
     pub psnr_corrected: Option<f64>,
     /// Mean SSIM over views.
     pub ssim: Option<f64>,
+    /// Mean LPIPS over views, if weights are given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub lpips: Option<f64>,
     /// Means over views by region, if the training views are known.
     #[serde(flatten)]
     pub regions: Option<RegionScores>,
@@ -291,6 +297,7 @@ impl Scores {
                 psnr: mean(views.values().map(|view| view.psnr)),
                 psnr_corrected: mean(views.values().map(|view| view.psnr_corrected)),
                 ssim: mean(views.values().map(|view| view.ssim)),
+                lpips: mean(views.values().filter_map(|view| view.lpips)),
                 regions: RegionScores::mean(views.values().filter_map(|view| view.regions.as_ref())),
                 specks: mean(views.values().filter_map(|view| view.specks).map(|count| count as f64)),
                 objects: average(&pairs),
@@ -309,8 +316,9 @@ impl Scores {
     pub fn warn_of_odd_view(&self, near: f32) {
         if let Some((name, found, median)) = self.odd_view() {
             tracing::warn!(
-                "view {name} has {found:.1} dB, the one in the middle {median:.1}: if it is foggy, set `near` to a tenth of the \
-                 distance to the scene (it is {near})"
+                "view {name} has {found:.1} dB, the median is {median:.1} dB: if it looks foggy, set {} to a tenth of the \
+                 distance to the scene (it is {near})",
+                Setting("near")
             );
         }
     }

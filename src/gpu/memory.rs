@@ -2,7 +2,7 @@
 
 use super::call::{fault, vk_call};
 use super::{Gpu, lock};
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, Setting};
 use ash::vk;
 use gpu_allocator::vulkan::{Allocation, AllocationCreateDesc, AllocationScheme};
 use gpu_allocator::{AllocationError, MemoryLocation};
@@ -104,7 +104,7 @@ impl Buffer {
                 needed: self.bytes,
                 limit_name: "the largest heap of this device (of which that much is no longer free)".to_owned(),
                 limit: self.gpu.limits().heap,
-                cure: "lower `max_gaussians`, use smaller images or free memory of the device".to_owned(),
+                cure: format!("lower {}, use smaller images or free memory of the device", Setting("max_gaussians")),
             },
             // The allocator reports some failures only by name.
             AllocationError::Internal(text) if text.contains("DEVICE_LOST") => {

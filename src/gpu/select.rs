@@ -6,7 +6,7 @@ use super::capabilities::{Capabilities, MEMORY};
 use super::instance::Instance;
 use super::lock::{self, DeviceLock};
 use super::statistics;
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, Setting};
 use ash::vk;
 
 /// A device with what it is capable of.
@@ -70,7 +70,10 @@ fn best(usable: Vec<Found>) -> Result<Picked> {
 /// Locks the first device that no other process holds.
 fn first_free(listed: &[Found], options: &GpuOptions) -> Result<Picked> {
     let Some(folder) = &options.locks else {
-        return Err(Error::usage("device", "a list of devices needs a folder for the locks on them: set `locks`"));
+        return Err(Error::usage(
+            Setting("device"),
+            "a list of devices needs a folder for the locks on them: set `locks`",
+        ));
     };
     for (physical, device) in listed {
         if let Some(lock) = lock::take(folder, device)? {

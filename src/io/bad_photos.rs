@@ -1,7 +1,7 @@
 //! Undecodable photos: a training can skip a few; many mean a damaged data set.
 
 use super::LoadOptions;
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, Setting};
 use std::path::Path;
 
 /// Most problems that one message lists.
@@ -41,9 +41,9 @@ pub(crate) fn skip(
         return Err(bad.remove(0));
     }
     let problem = format!(
-        "{count} of {total} photos cannot be read, `max_bad_photos = {}` allows {allowed}; mend them, take them out of the \
-         scene, or allow more:{}{more}",
-        options.max_bad_photos,
+        "{count} of {total} photos cannot be read, {} allows {allowed}; mend them, take them out \
+         of the scene, or allow more:{}{more}",
+        Setting("max_bad_photos").to(options.max_bad_photos),
         listed()
     );
     Err(Error::data(root, "photos", problem))

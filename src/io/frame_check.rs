@@ -5,7 +5,7 @@
 
 use super::load::shortened;
 use super::pose_convention::{Native, PoseConvention};
-use crate::error::Result;
+use crate::error::{Result, Setting};
 use crate::scene::agreement::{Agreement, Sample};
 use crate::scene::{Dataset, View};
 
@@ -53,18 +53,20 @@ pub(super) fn check(dataset: &Dataset, native: Option<Native>, given: PoseConven
     let shown = format!("a photo shows {percent:.1} % of the {count} points on average");
     if let Some((other, with)) = best {
         found.faults.push(format!(
-            "poses and points do not fit: {shown}{}; with {} it shows {:.1} %{}. Read the scene with `poses = {other}`",
+            "poses and points do not fit: {shown}{}; with {} it shows {:.1} %{}. Read the scene with {}",
             colours(&as_is),
             other.text(),
             100.0 * with.in_picture,
-            colours(&with)
+            colours(&with),
+            Setting("poses").to(other)
         ));
     } else if as_is.in_median_picture * sample.len() as f64 <= 1.0 {
-        let hint = if given.is_native() { "" } else { " with the given `poses`" };
+        let hint = if given.is_native() { "" } else { " as they are said to be" };
         found.faults.push(format!(
             "poses and points do not fit{hint}: {shown}, and {:.1} % are in front of its camera. They are in different \
-             frames, or the poses have another convention (see `poses`)",
-            100.0 * as_is.in_front
+             frames, or the poses have another convention (see {})",
+            100.0 * as_is.in_front,
+            Setting("poses")
         ));
     } else if let Some(colour) = as_is.colour {
         found.notes.push(format!(

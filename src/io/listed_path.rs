@@ -5,7 +5,7 @@
 
 use super::lookup::Lookup;
 use super::photo_finder::PhotoFinder;
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, Setting};
 use std::path::{Component, Path, PathBuf};
 
 /// The folder of a scene, and how its files are found.
@@ -43,10 +43,11 @@ impl<'a> Place<'a> {
         }
         let inside = path.components().all(|part| matches!(part, Component::Normal(_) | Component::CurDir));
         if !self.lookup.allow_outside && (!inside || has_drive(&text)) {
-            return refuse(
-                "lies outside the scene folder; list photos by paths relative to it, without `..`, or set \
-                 `allow_outside` if the scene may read them there",
-            );
+            return refuse(&format!(
+                "lies outside the scene folder; list photos by paths relative to it, without `..`, or set {} if the scene \
+                 may read them there",
+                Setting("allow_outside")
+            ));
         }
         Ok(ListedPath { path: if inside { PathBuf::from(&name) } else { path }, name })
     }

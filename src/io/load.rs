@@ -7,7 +7,7 @@ use super::photo_store::PhotoStore;
 use super::pose_convention::Native;
 use super::recipe::{MadeView, MadeViews, Recipe};
 use super::{LoadOptions, frame_check, missing, stray};
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, Setting};
 use crate::scene::{Dataset, Photo, View, crew};
 use rayon::prelude::*;
 use std::collections::BTreeSet;
@@ -194,7 +194,7 @@ fn split(views: &[Listed], every: Option<u32>, notes: &mut Vec<String>) -> Resul
     }
     let Some(every) = every else { return Ok(vec![false; views.len()]) };
     if every == 0 {
-        return Err(Error::usage("test_every", "0 holds out nothing and everything; expected 1 or more"));
+        return Err(Error::usage(Setting("test_every"), "0 holds out nothing and everything; expected 1 or more"));
     }
     if views.len() == 1 && every > 1 {
         notes.push("the only photo is used for training; nothing is held out".into());

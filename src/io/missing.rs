@@ -4,7 +4,7 @@ use super::LoadOptions;
 use super::bad_photos::allowed;
 use super::listing::{Listed, Listing};
 use super::load::shortened;
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, Setting};
 
 /// One of this many photos may lack: published scenes list photos that were left out of them.
 const SHARE: usize = 3;
@@ -45,7 +45,7 @@ pub(super) fn existing(
         let limit = if found.is_empty() {
             String::new()
         } else {
-            format!("; up to {allowed} may lack: bring them back, or allow more with `max_bad_photos`")
+            format!("; up to {allowed} may lack: bring them back, or allow more with {}", Setting("max_bad_photos"))
         };
         return Err(Error::data(&listing.source, "photos", format!("{missing}; {}{limit}", listing.hint)));
     }
@@ -59,8 +59,12 @@ fn one_file_each(listing: &Listing, found: Vec<Listed>) -> Result<Vec<Listed>> {
     files.sort_by(|a, b| a.photo.cmp(&b.photo));
     if let Some([a, b]) = files.array_windows().find(|[a, b]| a.photo == b.photo) {
         let file = a.photo.as_deref().unwrap_or(std::path::Path::new("")).display();
-        let problem =
-            format!("is the only file for {} and {}; name the folder of the photos with `images`", a.name, b.name);
+        let problem = format!(
+            "is the only file for {} and {}; name the folder of the photos with {}",
+            a.name,
+            b.name,
+            Setting("images")
+        );
         return Err(Error::data(&listing.source, format!("{file}"), problem));
     }
     Ok(found)

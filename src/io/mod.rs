@@ -52,9 +52,10 @@ mod transforms;
 pub(crate) mod truth;
 pub(crate) mod window;
 
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, Setting};
 use crate::scene::Dataset;
 use crate::stage::Stage;
+use crate::words::counted;
 use listed_path::Place;
 use listing::Listing;
 use pose_convention::Native;
@@ -152,11 +153,11 @@ impl Default for LoadOptions {
 /// Photos without a file are skipped before the split, undecodable ones after it.
 pub fn open(scene: &Path, options: &LoadOptions) -> Result<Dataset> {
     if options.max_resolution == Some(0) {
-        return Err(Error::usage("max_resolution", "0 px leaves no image; expected 1 or more"));
+        return Err(Error::usage(Setting("max_resolution"), "0 px leaves no image; expected 1 or more"));
     }
     if !(0.0..=1.0).contains(&options.max_bad_photos) {
         let problem = format!("{} is no share; expected a number from 0 to 1", options.max_bad_photos);
-        return Err(Error::usage("max_bad_photos", problem));
+        return Err(Error::usage(Setting("max_bad_photos"), problem));
     }
     let stage = Stage::new("reading poses and points", 0);
     let listing = list(scene, &options.lookup)?;
@@ -169,7 +170,8 @@ pub(crate) fn open_logged(scene: &Path, options: &LoadOptions) -> Result<Dataset
     let dataset = open(scene, options)?;
     dataset.notes.iter().for_each(|note| tracing::warn!("{note}"));
     let (train, test, points) = (dataset.train.len(), dataset.test.len(), dataset.points.len());
-    tracing::info!("scene: {train} training views, {test} test views, {points} points");
+    let (train, test) = (counted(train, "training view"), counted(test, "test view"));
+    tracing::info!("scene: {train}, {test}, {}", counted(points, "point"));
     Ok(dataset)
 }
 
@@ -187,7 +189,7 @@ fn list(scene: &Path, lookup: &Lookup) -> Result<Listing> {
         && !images.is_dir()
     {
         return Err(Error::usage(
-            "images",
+            Setting("images"),
             format!("{} is no folder; expected the folder of the photos", images.display()),
         ));
     }

@@ -5,6 +5,7 @@
 //! under the same name with another extension. Only a single match counts.
 
 use super::names::folded;
+use crate::error::Setting;
 use crate::io::read;
 use std::cell::RefCell;
 use std::collections::HashMap;
@@ -128,12 +129,18 @@ impl PhotoFinder {
         }
         let counts = self.counts();
         if counts.is_empty() {
-            return "no folder of the scene holds PNG or JPEG files: name the folder of the photos with `images`"
-                .into();
+            return format!(
+                "no folder of the scene holds PNG or JPEG files: name the folder of the photos with {}",
+                Setting("images")
+            );
         }
         let list: Vec<String> =
             counts.iter().take(3).map(|(count, path)| format!("{} ({count})", path.display())).collect();
-        format!("PNG and JPEG files are in {}; name the folder of the photos with `images`", list.join(", "))
+        format!(
+            "PNG and JPEG files are in {}; name the folder of the photos with {}",
+            list.join(", "),
+            Setting("images")
+        )
     }
 
     /// Returns the folder of the scene with the most photos, and their number.

@@ -7,7 +7,7 @@
 use super::LoadOptions;
 use super::recipe::{MadeView, Recipe};
 use super::scratch::{Place, Scratch};
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, Setting};
 use crate::scene::pixels::{Picture, Source};
 use crate::scene::{LabelMap, Photo, Pixels, View};
 use std::marker::PhantomData;
@@ -58,9 +58,10 @@ impl PhotoStore {
         if holds.contains(&false) {
             let gib = |bytes: u64| bytes as f64 / f64::from(1 << 30);
             tracing::info!(
-                "photos and masks take {:.1} GiB, and `photo_memory` is {:.1} GiB: {} of {} photos stay in memory, the \
+                "photos and masks take {:.1} GiB, and {} is {:.1} GiB: {} of {} photos stay in memory, the \
                  others {}",
                 gib(costs.iter().sum()),
+                Setting("photo_memory"),
                 gib(options.photo_memory),
                 holds.iter().filter(|&&holds| holds).count(),
                 holds.len(),

@@ -1,7 +1,7 @@
 //! Settings for reading the scene of a run.
 
 use super::pose_convention::PoseConvention;
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, Setting};
 use crate::options::Options;
 
 crate::options::options! {
@@ -32,7 +32,7 @@ impl ReadOptions {
     pub fn check(&self) -> Result<()> {
         if self.test_every == 1 {
             let problem = "is 1, which leaves no view to train on; expected 2 or more, or 0 to hold out none";
-            return Err(Error::usage("test_every", problem));
+            return Err(Error::usage(Setting("test_every"), problem));
         }
         self.check_ranges()
     }

@@ -8,7 +8,7 @@ pub(crate) mod parse;
 #[cfg(feature = "cli")]
 pub(crate) mod typed;
 
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, Setting};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use std::collections::BTreeMap;
@@ -90,7 +90,7 @@ impl Key {
             Range::UpTo(most) => format!("0 to {most}"),
             Range::PositiveUpTo(most) => format!("more than 0, at most {most}"),
         };
-        Err(Error::usage(self.name, format!("is {wrong}, needs {needed}")))
+        Err(Error::usage(Setting(self.name), format!("is {wrong}, needs {needed}")))
     }
 }
 

@@ -1,16 +1,55 @@
 //! Parsers for the values of flags.
 
-/// Parses a colour: a name, or three numbers from 0 to 1.
+/// Colours by name, as on web pages.
+const COLOURS: [(&str, u32); 18] = [
+    ("black", 0x000000),
+    ("white", 0xffffff),
+    ("red", 0xff0000),
+    ("green", 0x008000),
+    ("blue", 0x0000ff),
+    ("yellow", 0xffff00),
+    ("cyan", 0x00ffff),
+    ("magenta", 0xff00ff),
+    ("orange", 0xffa500),
+    ("purple", 0x800080),
+    ("pink", 0xffc0cb),
+    ("brown", 0xa52a2a),
+    ("grey", 0x808080),
+    ("gray", 0x808080),
+    ("silver", 0xc0c0c0),
+    ("gold", 0xffd700),
+    ("lime", 0x00ff00),
+    ("navy", 0x000080),
+];
+
+/// Parses a colour: a name, a web page's number such as `#ff0000`, or three numbers from 0 to 1.
 pub(crate) fn colour(text: &str) -> Result<[f32; 3], String> {
-    match text {
-        "black" => return Ok([0.0; 3]),
-        "white" => return Ok([1.0; 3]),
-        _ => {}
+    let name = text.trim().to_lowercase();
+    let named = COLOURS.iter().find(|(known, _)| *known == name).map(|&(_, bytes)| bytes);
+    if let Some(bytes) = named.or_else(|| hexadecimal(&name)) {
+        return Ok([16, 8, 0].map(|shift| f32::from((bytes >> shift) as u8) / 255.0));
     }
-    let wrong = || format!("`{text}` is not a colour; expected black, white, or R,G,B from 0 to 1 each");
+    let wrong = || {
+        format!(
+            "`{text}` is not a colour; expected a name such as red, #ff0000, or R,G,B from 0 to 1 each, such as 1,0,0"
+        )
+    };
     let parts = text.split(',').map(|part| part.trim().parse::<f32>().ok().filter(|value| (0.0..=1.0).contains(value)));
     let parts: Vec<f32> = parts.collect::<Option<_>>().ok_or_else(wrong)?;
     parts.try_into().map_err(|_| wrong())
+}
+
+/// Returns the bytes of `#rrggbb` or `#rgb`; the sign may lack.
+fn hexadecimal(text: &str) -> Option<u32> {
+    let digits = text.strip_prefix('#').unwrap_or(text);
+    let twice = |digits: &str| digits.chars().flat_map(|digit| [digit, digit]).collect::<String>();
+    let digits = match digits.len() {
+        3 => twice(digits),
+        6 => digits.to_owned(),
+        _ => return None,
+    };
+    // `from_str_radix` accepts a sign.
+    if digits.chars().all(|digit| digit.is_ascii_hexdigit()) { u32::from_str_radix(&digits, 16).ok() } else { None }
 }
 
 /// Parses a count such as `1500`, `500k` or `2M`.
@@ -87,5 +126,24 @@ pub(super) fn as_typed(value: &str) -> String {
         "true" => "on".into(),
         "false" => "off".into(),
         _ => value.trim_matches('"').to_owned(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::colour;
+
+    #[test]
+    fn a_colour_is_a_name_a_number_or_three() {
+        let red = Ok([1.0, 0.0, 0.0]);
+        for text in ["red", "Red", " red ", "#ff0000", "ff0000", "#F00", "f00", "1,0,0", "1.0, 0, 0"] {
+            assert_eq!(colour(text), red, "{text}");
+        }
+        assert_eq!(colour("#336699"), Ok([0.2, 0.4, 0.6]));
+        assert_eq!(colour("grey"), colour("gray"));
+        for text in ["", "#", "reddish", "#ff00", "+ff000", "255,0,0", "1,0", "#ff00zz", "ä00"] {
+            let message = colour(text).expect_err(text);
+            assert!(message.contains(text) && message.contains("such as red, #ff0000"), "{message}");
+        }
     }
 }

@@ -4,7 +4,7 @@ use crate::io::image::{write_exr_rgb, write_exr_uint, write_exr_y, write_png_gre
 use crate::scene::LABEL_MAX;
 use crate::scene::colour::to_byte;
 use crate::scene::labels::label_colours;
-use crate::{Error, Result};
+use crate::{Error, Result, Setting};
 use std::path::{Path, PathBuf};
 
 /// Largest whole number up to which a 32-bit float holds all of them.
@@ -113,10 +113,9 @@ fn narrow(labels: &[u32], wide: bool, format: Format) -> Result<Option<Vec<u16>>
     match (wide, format) {
         (true, Format::Exr) => Ok(None),
         (true, Format::Png) => {
-            let problem = format!(
-                "a 16-bit PNG has no place for labels above {LABEL_MAX}; choose `exr`, or give them smaller ids"
-            );
-            Err(Error::usage("format", problem))
+            let problem =
+                format!("a 16-bit PNG has no place for labels above {LABEL_MAX}; choose exr, or give them smaller ids");
+            Err(Error::usage(Setting("format"), problem))
         }
         (false, _) => {
             let id = |&id: &u32| u16::try_from(id).map_err(|_| Error::Bug(format!("label {id} in a 16-bit picture")));

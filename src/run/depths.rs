@@ -1,6 +1,6 @@
 //! Depths that photos are known to have, from files or from the reconstruction.
 
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, Setting};
 use crate::io::capture::Sightings;
 use crate::io::{DepthFolder, Lookup};
 use crate::scene::{Dataset, View};
@@ -21,7 +21,8 @@ pub(super) fn decided(
     let weight = config.depth_weight.unwrap_or(if is_new { WEIGHT } else { 0.0 });
     let with = |weight: f64| TrainConfig { depth_weight: Some(weight), ..config.clone() };
     if weight == 0.0 {
-        let unread = || Err(Error::usage("known_depths", "is only read with a `depth_weight` above 0"));
+        let problem = || format!("is only read with a {} above 0", Setting("depth_weight"));
+        let unread = || Err(Error::usage(Setting("known_depths"), problem()));
         return folder.map_or(Ok((with(0.0), Vec::new())), |_| unread());
     }
     let known = match folder {
@@ -43,8 +44,11 @@ pub(super) fn decided(
     if config.depth_weight.is_none() {
         return Ok((with(0.0), Vec::new()));
     }
-    let problem = "has no points of which it is known what photo shows them; name a folder of depth maps in \
-                   `known_depths`, or set `depth_weight` to 0";
+    let problem = format!(
+        "has no points of which it is known what photo shows them; name a folder of depth maps in {}, or set {}",
+        Setting("known_depths"),
+        Setting("depth_weight").to(0)
+    );
     Err(Error::data(scene, "points", problem))
 }
 

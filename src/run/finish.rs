@@ -167,7 +167,7 @@ impl Run<'_> {
             return Ok(None);
         }
         let options = self.trainer.render_options();
-        let how = Rendering { options, min_confidence: MIN_LABEL_CONFIDENCE, train: &[], by_main: false };
+        let how = Rendering { options, min_confidence: MIN_LABEL_CONFIDENCE, train: &[], by_main: false, lpips: None };
         let _stage = Stage::new("scoring the held-out views", 0);
         let mut worst = Worst::default();
         let scores = evaluate(self.trainer.engine_mut(), model, &views, how, &(), &mut worst)?;

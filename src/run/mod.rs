@@ -33,7 +33,7 @@ pub use report::write as write_report;
 pub use settings::{RunOptions, Settings};
 pub use summary::Summary;
 
-pub use crate::train::{Densified, LabelRule, Occlusion, StepReport, TrainConfig};
+pub use crate::train::{Densified, LabelRule, LabelWork, Occlusion, StepKind, StepReport, TrainConfig};
 pub use crate::train::{ExposureMode, Preset, StrategyKind};
 
 use crate::error::Result;

@@ -1,7 +1,7 @@
 //! Occluders from files.
 
 use super::Request;
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, Setting};
 use crate::io::Lookup;
 use crate::io::occlusion_table::OcclusionTable;
 use crate::label::occlusion::from_depths;
@@ -27,19 +27,19 @@ pub enum OccluderFiles {
 pub(super) fn check(config: &TrainConfig, files: Option<&OccluderFiles>) -> Result<()> {
     if config.layer_every() == 0 && files.is_some() {
         return Err(Error::usage(
-            "layer_every",
+            Setting("layer_every"),
             "is 0, and only steps with object layers read occluders; choose 1 or more",
         ));
     }
+    let needs = |files: Setting, problem: &str| Error::usage(Setting("occlusion"), format!("{problem} {files}"));
     match (config.occlusion, files) {
         (Occlusion::Depth, Some(OccluderFiles::Depths { .. })) => Ok(()),
-        (Occlusion::Depth, _) => {
-            Err(Error::usage("occlusion", "is depth, which needs a folder of depth maps in `depths`"))
+        (Occlusion::Depth, _) => Err(needs(Setting("depths"), "is depth, which needs a folder of depth maps in")),
+        (_, Some(OccluderFiles::Depths { .. })) => {
+            let problem = format!("is only read with {}", Setting("occlusion").to("depth"));
+            Err(Error::usage(Setting("depths"), problem))
         }
-        (_, Some(OccluderFiles::Depths { .. })) => Err(Error::usage("depths", "is only read with `occlusion = depth`")),
-        (Occlusion::File, None) => {
-            Err(Error::usage("occlusion", "is file, and no file was named; name it in `occlusion_file`"))
-        }
+        (Occlusion::File, None) => Err(needs(Setting("occlusion_file"), "is file, and no file was named; name it in")),
         _ => Ok(()),
     }
 }

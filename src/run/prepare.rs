@@ -8,7 +8,7 @@ use super::models::{Models, open};
 use super::resume::{self, Record, Resumed, absolute};
 use super::{Inputs, Observer, OccluderFiles, Request, Run, Settings, Start, depths, occluders, pictures};
 use crate::engine::Engine;
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, Setting};
 use crate::gpu::Gpu;
 use crate::io::capture::Sightings;
 use crate::io::label_table::LabelTable;
@@ -65,7 +65,10 @@ pub(super) fn prepare(request: &Request, is_again: bool) -> Result<Prepared> {
         }
     };
     if request.restart && settings.run.checkpoint_every == 0 {
-        return Err(Error::usage("restart", "goes on from checkpoints, and `checkpoint_every` is 0"));
+        return Err(Error::usage(
+            Setting("restart"),
+            format!("goes on from checkpoints, and {} is 0", Setting("checkpoint_every")),
+        ));
     }
     let block = request.block.as_deref().map(Block::read).transpose()?;
     let first = read_first(request, block.as_ref(), resumed.is_some())?;
@@ -120,7 +123,7 @@ fn read_scene(request: &Request, settings: &Settings, inputs: &Inputs, block: Op
     let dataset = io::open_logged(&request.scene, &options)?;
     block.map_or(Ok(()), |block| block.check_scene(&dataset))?;
     if dataset.train.is_empty() {
-        let problem = "no view is left to train on; set `test_every` to 0 or to a larger number";
+        let problem = format!("no view is left to train on; set {} to 0 or to a larger number", Setting("test_every"));
         return Err(Error::data(&request.scene, "", problem));
     }
     Ok(dataset)
@@ -246,7 +249,7 @@ fn start(
 /// Reads the model that a new run starts from, if the request names one.
 fn read_first(request: &Request, block: Option<&Block>, is_resumed: bool) -> Result<Option<Gaussians>> {
     if request.init.is_some() && block.is_some() {
-        return Err(Error::usage("init", "cannot be given with a block, which has a first model of its own"));
+        return Err(Error::usage(Setting("init"), "cannot be given with a block, which has a first model of its own"));
     }
     let Some(path) = &request.init.clone().or(block.map(Block::init)) else { return Ok(None) };
     if is_resumed {

@@ -2,7 +2,7 @@
 
 use super::history::Sums;
 use super::{Changed, Inputs, Request, Settings};
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, Setting};
 use crate::io::{ReadOptions, checkpoint_folder};
 use crate::run::RunOptions;
 use crate::train::TrainState;
@@ -81,7 +81,7 @@ fn decide(request: &Request, changed: &Changed, mut resumed: Resumed) -> Result<
     if wanted.train.iterations < resumed.state.step {
         let (path, steps) = (resumed.state.path.display(), resumed.state.step);
         let problem = format!("is {}, and {path} has {steps} steps", wanted.train.iterations);
-        return Err(Error::usage("iterations", problem));
+        return Err(Error::usage(Setting("iterations"), problem));
     }
     resumed.state.config = wanted.train.clone();
     resumed.settings = wanted;
@@ -104,9 +104,9 @@ fn compare(then: &Settings, now: &Settings) -> Result<()> {
         let change = format!("{} in the checkpoint, now {}", text(then), text(now));
         if key.is_fixed {
             let problem = format!("{change}; it cannot change within a run: keep the old value, or start a new run");
-            return Err(Error::usage(key.name, problem));
+            return Err(Error::usage(Setting(key.name), problem));
         }
-        tracing::warn!("`{}`: {change}", key.name);
+        tracing::warn!("{}: {change}", Setting(key.name));
     }
     Ok(())
 }
@@ -117,7 +117,7 @@ fn merge(then: &mut Inputs, now: &Inputs) {
         && then.memory_limit != Some(bytes)
     {
         let text = then.memory_limit.map_or("not set".to_owned(), |bytes| bytes.to_string());
-        tracing::warn!("`memory_limit`: {text} in the checkpoint, now {bytes}");
+        tracing::warn!("{}: {text} in the checkpoint, now {bytes}", Setting("memory_limit"));
         then.memory_limit = Some(bytes);
     }
     if let Some(masks) = &now.masks {

@@ -1,6 +1,6 @@
 //! All settings of a run, and the file that stores them.
 
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, Setting};
 use crate::io::{self, LoadOptions, ReadOptions, run_folder};
 use crate::options::parse::as_bytes;
 #[cfg(feature = "cli")]
@@ -111,7 +111,8 @@ impl Settings {
             *near = NEAR;
         }
         if !near.is_finite() || *near < 0.0 {
-            return Err(Error::data(&file, "near", format!("is {near}, needs more than 0; correct it or set `near`")));
+            let problem = format!("is {near}, needs more than 0; correct it or set {}", Setting("near"));
+            return Err(Error::data(&file, "near", problem));
         }
         Ok(Some(settings))
     }

@@ -13,7 +13,7 @@ mod transfer;
 
 pub(crate) use profiler::{PassTime, Profiler};
 
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, Setting};
 use crate::gpu::{CommandBuffer, Gpu, Timeline};
 use crate::scheduler::plan::{
     Barrier, Buf, BufferDecl, Capacity, FRAMES_IN_FLIGHT, Limits, MemoryReport, PassList, Plan, PlanOptions, memory,
@@ -339,7 +339,7 @@ impl Scheduler {
             Some((busy, pass)) if busy == self.submitted => pass,
             Some((_, pass)) => format!("{pass}, or an item after it"),
             None if self.options.crash_markers => "none; memory was being set up".to_owned(),
-            None => "unknown: crash markers are off (`restart` turns them on)".to_owned(),
+            None => format!("unknown: crash markers are off (a training with {} has them)", Setting("restart")),
         };
         Error::DeviceLost { pass }
     }

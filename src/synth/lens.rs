@@ -3,7 +3,7 @@
 use super::SynthOptions;
 use crate::io::lens::{self, CameraModel, Lens, MODELS, Optics};
 use crate::scene::Camera;
-use crate::{Error, Result};
+use crate::{Error, Result, Setting};
 use std::fmt::{self, Display};
 use std::str::FromStr;
 
@@ -117,7 +117,7 @@ pub(super) fn check(options: &SynthOptions) -> Result<()> {
     let reach = lens.projection().map_or(80.0, |lens| lens.reach().to_degrees());
     if degrees == 0 || f64::from(degrees) >= 2.0 * reach {
         let problem = format!("{degrees} degrees; {} shows 1 to {:.0}", options.lens, 2.0 * reach - 1.0);
-        return Err(Error::usage("fov", problem));
+        return Err(Error::usage(Setting("fov"), problem));
     }
     Ok(())
 }

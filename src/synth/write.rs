@@ -11,7 +11,7 @@ use crate::io::label_table::{self, LabelEntry, LabelTable};
 use crate::io::lens::Optics;
 use crate::io::{ReadOptions, atomic, image};
 use crate::scene::Camera;
-use crate::{Error, Result};
+use crate::{Error, Result, Setting};
 use glam::DQuat;
 use rayon::prelude::*;
 use serde::Serialize;
@@ -38,7 +38,7 @@ pub fn write(options: &SynthOptions, folder: &Path, after_view: &dyn Fn(u32) -> 
         return Err(Error::usage("width, height", "need 1 to 16384 px each"));
     }
     if options.views == 0 || options.views > 10_000 {
-        return Err(Error::usage("views", "needs 1 to 10000"));
+        return Err(Error::usage(Setting("views"), "needs 1 to 10000"));
     }
     let world = World::new(options.preset, options.seed);
     lens::check(options)?;

@@ -6,7 +6,7 @@
 
 use super::strategy::{At, Strategy};
 use super::{ExposureMode, Occlusion, TrainConfig, Trainer, TrainerOptions};
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, Setting};
 use crate::gpu::Gpu;
 use crate::scene::{Dataset, Gaussians, Occluders, View};
 use crate::scheduler::SchedulerOptions;
@@ -59,7 +59,7 @@ pub fn refitted(
     let known: BTreeSet<u32> = train.iter().flat_map(shown).map(u32::from).collect();
     if let Some(label) = labels.difference(&known).next() {
         let problem = format!("label {label} is in no mask of a training view, so nothing tells its opacity");
-        return Err(Error::usage("masks", problem));
+        return Err(Error::usage(Setting("masks"), problem));
     }
     let config = TrainConfig {
         iterations: REFIT_STEPS,

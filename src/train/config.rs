@@ -7,7 +7,7 @@ use super::kinds::{ExposureMode, LabelRule, Occlusion, StrategyKind};
 use crate::options::Options;
 #[cfg(feature = "cli")]
 use crate::options::parse::{colour, corners, count, samples, switch};
-use crate::{Error, Result};
+use crate::{Error, Result, Setting};
 
 crate::options::options! {
     /// The settings of a training. `Default` follows the paper except where measurements favour other
@@ -19,6 +19,7 @@ crate::options::options! {
             /// Number of steps, one view each.
             ///
             /// 7000, as in the short runs of 3DGS; LabelGS has 15000. Schedules and learning rates follow the length.
+            #[cfg_attr(feature = "cli", arg(aliases = ["steps", "iters"]))]
             iterations <"N">: u32 = 7_000, at_least(1);
 
             /// Size of the photos in the first steps, as a share of their full size; 1 has all steps at full size
@@ -49,7 +50,7 @@ crate::options::options! {
         }
 
         "Rendering" {
-            /// Colour behind the scene: black, white, or R,G,B from 0 to 1.
+            /// Colour behind the scene: a name such as white, #rrggbb, or R,G,B from 0 to 1.
             ///
             /// Black (LabelGS, 3DGS). The label loss always uses black.
             #[cfg_attr(feature = "cli", arg(value_parser = colour))]
@@ -383,16 +384,25 @@ impl TrainConfig {
     pub fn check(&self) -> Result<()> {
         self.check_ranges()?;
         if self.label_rule == LabelRule::Main && self.layer_every() != 1 {
-            return Err(Error::usage("label_rule", "is main, which needs `layer_every = 1`"));
+            return Err(Error::usage(
+                Setting("label_rule"),
+                format!("is main, which needs {}", Setting("layer_every").to(1)),
+            ));
         }
         if let Some([x0, y0, z0, x1, y1, z1]) = self.grow_box
             && !(x0 < x1 && y0 < y1 && z0 < z1)
         {
-            return Err(Error::usage("grow_box", "is empty; it needs the smaller corner first, then the larger one"));
+            return Err(Error::usage(
+                Setting("grow_box"),
+                "is empty; it needs the smaller corner first, then the larger one",
+            ));
         }
         if self.random_background && self.exposure == ExposureMode::On {
-            let problem = "is on, which needs `exposure = \"off\"`: a random colour has no exposure of a photo";
-            return Err(Error::usage("random_background", problem));
+            let problem = format!(
+                "is on, which needs {}: a random colour has no exposure of a photo",
+                Setting("exposure").to("off")
+            );
+            return Err(Error::usage(Setting("random_background"), problem));
         }
         Ok(())
     }

@@ -9,6 +9,7 @@
 use super::shared::{Place, SharedLayout, SharedParameters};
 use super::strategy::At;
 use super::{ExposureMode, TrainConfig};
+use crate::Setting;
 use crate::pass::{Builder, Extension, Hook, loss};
 use crate::scene::ColourMatrix;
 use crate::shaders::constants::{EXPOSURE_ROWS, EXPOSURE_SHARE};
@@ -107,8 +108,9 @@ pub fn decided(config: &TrainConfig, gains: &[Gains]) -> TrainConfig {
         _ if config.random_background => ExposureMode::Off,
         Some(spread) if spread >= DIFFERS => {
             tracing::info!(
-                "exposure: on, because the photos' brightness differs by {:.0} %; set `exposure` to off to train without",
-                100.0 * spread
+                "exposure: on, because the photos' brightness differs by {:.0} %; set {} to train without",
+                100.0 * spread,
+                Setting("exposure").to("off")
             );
             ExposureMode::On
         }

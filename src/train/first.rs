@@ -2,7 +2,7 @@
 
 use super::setup::{engine_size, for_photos};
 use super::{StrategyKind, TrainConfig};
-use crate::error::Result;
+use crate::error::{Result, Setting};
 use crate::io::init;
 use crate::scene::{Dataset, Gaussians, Point};
 use std::borrow::Cow;
@@ -54,7 +54,7 @@ fn points<'a>(dataset: &'a Dataset, config: &TrainConfig) -> Result<Cow<'a, [Poi
         (bound, budget) => {
             // Without growth, far ones alone need room.
             let room = if budget.is_some_and(|budget| budget < bound) { far.min(bound / 2) } else { bound / 2 };
-            (bound - room, format!("`max_gaussians` is {bound}"))
+            (bound - room, format!("{} is {bound}", Setting("max_gaussians")))
         }
     };
     if all <= most {
@@ -62,7 +62,8 @@ fn points<'a>(dataset: &'a Dataset, config: &TrainConfig) -> Result<Cow<'a, [Poi
     }
     let enough = all + far;
     tracing::warn!(
-        "{all} points, and {why}: {most} of them are used, spread evenly; `max_gaussians` {enough} uses all"
+        "{all} points, and {why}: {most} of them are used, spread evenly; {} uses all",
+        Setting("max_gaussians").to(enough)
     );
     Ok(Cow::Owned(init::thinned(&dataset.points, most as usize)))
 }
@@ -88,7 +89,8 @@ fn thin(model: &mut Gaussians, bound: u64) {
     let count = model.len() as u64;
     if bound > 0 && count > bound {
         tracing::warn!(
-            "{count} initial Gaussians, and `max_gaussians` is {bound}: every {:.1}-th is used",
+            "{count} initial Gaussians, and {} is {bound}: every {:.1}-th is used",
+            Setting("max_gaussians"),
             count as f64 / bound as f64
         );
         // Keep row i if `i * bound / count` steps up there.

@@ -31,6 +31,7 @@ pub(crate) mod setup;
 pub(crate) mod shared;
 pub(crate) mod state;
 pub(crate) mod step_input;
+mod step_kind;
 pub(crate) mod strategy;
 mod timing;
 mod views;
@@ -45,6 +46,7 @@ pub use kinds::{ExposureMode, LabelRule, Occlusion, StrategyKind};
 pub use presets::Preset;
 pub(crate) use setup::{TrainerOptions, engine_size, start_size};
 pub(crate) use state::{TrainState, ViewFingerprint};
+pub use step_kind::{LabelWork, StepKind};
 pub use strategy::Densified;
 pub(crate) use timing::StepTimes;
 
@@ -79,6 +81,8 @@ pub struct StepReport {
     pub ssim: f64,
     /// Weighted label loss.
     pub label_loss: f64,
+    /// What it worked on.
+    pub kind: StepKind,
     /// Counters of the device.
     pub report: Report,
 }
@@ -387,8 +391,9 @@ impl Trainer {
         let ssim = f64::from(counters.loss_ssim) * scale;
         let loss = (1.0 - lambda) * l1 + lambda * (1.0 - ssim);
         let label_loss = step_input::label_loss(&input, view, &self.config, counters.loss_label);
+        let kind = StepKind::new(&input, &view, &self.config);
         self.watch(&input, &report, [loss, label_loss])?;
-        self.newest = Some(StepReport { step: input.step, loss, l1, ssim, label_loss, report });
+        self.newest = Some(StepReport { step: input.step, loss, l1, ssim, label_loss, kind, report });
         Ok(self.newest)
     }
 }

@@ -104,8 +104,12 @@ impl TrainConfig {
 
     /// Returns the degree of the spherical harmonics at `step`.
     pub fn sh_degree_at(&self, step: u32) -> u32 {
-        let interval = self.sh_degree_interval.unwrap_or(self.share(0.1).min(1000)).max(1);
-        (step / interval).min(self.sh_degree)
+        (step / self.sh_interval()).min(self.sh_degree)
+    }
+
+    /// Returns the steps between two degrees.
+    pub(crate) fn sh_interval(&self) -> u32 {
+        self.sh_degree_interval.unwrap_or(self.share(0.1).min(1000)).max(1)
     }
 
     /// Returns the first step at full size.

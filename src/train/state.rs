@@ -10,7 +10,7 @@ use super::strategy::Kept;
 use super::{TrainConfig, Trainer, TrainerOptions, engine_size};
 use crate::engine::state::Counts;
 use crate::engine::{GrownSizes, state};
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, Setting};
 use crate::gpu::Gpu;
 use crate::io::checkpoint::{Checkpoint, Plane};
 use crate::pass::SHARED_PLANES;
@@ -138,7 +138,7 @@ impl TrainState {
         if then != now {
             let had = |masks| if masks { "masks" } else { "no masks" };
             let problem = format!("{} was made with {}, now there are {}", self.path.display(), had(then), had(now));
-            return Err(Error::usage("masks", problem));
+            return Err(Error::usage(Setting("masks"), problem));
         }
         let refuse = |view: &str, what: &str| {
             let cure = "go on with the scene as it was, or start a new run";

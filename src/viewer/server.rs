@@ -4,7 +4,7 @@ use super::guard::Guard;
 use super::http::{self, Head, NoHead, WRITE_TIME, answer, say};
 use super::hub::Hub;
 use super::{page, socket};
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, Setting};
 use std::io::Write;
 use std::net::{TcpListener, TcpStream, ToSocketAddrs};
 use std::sync::Arc;
@@ -16,13 +16,13 @@ const CONNECTIONS_MAX: usize = 64;
 /// Opens the port and starts to serve. Returns the rules, which know the address.
 pub(super) fn start(host: &str, port: u16, has_token: bool, hub: &Arc<Hub>) -> Result<Guard> {
     let failed = |error: &dyn std::fmt::Display| {
-        Error::usage("view_host", format!("cannot listen on {host}, port {port}: {error}; choose another one"))
+        Error::usage(Setting("view_host"), format!("cannot listen on {host}, port {port}: {error}; choose another one"))
     };
     let address = (host, port).to_socket_addrs().map_err(|error| failed(&error))?.next();
     let address = address.ok_or_else(|| failed(&"the name has no address"))?;
     if !has_token && !address.ip().is_loopback() {
         let problem = format!("without it anyone who reaches {host} could watch and change the model; leave it on");
-        return Err(Error::usage("view_no_token", problem));
+        return Err(Error::usage(Setting("view_no_token"), problem));
     }
     let listener = TcpListener::bind(address).map_err(|error| failed(&error))?;
     let address = listener.local_addr().map_err(|error| failed(&error))?;

@@ -1,9 +1,14 @@
 //! LPIPS with weights for which the distance is known.
 
+use labelgs::engine::Engine;
+use labelgs::eval::{Distance, Rendering, evaluate};
 use labelgs::internals::cli::status::exit_status;
 use labelgs::internals::eval::lpips::convolution::{Layer, Planes, convolve, halve};
 use labelgs::internals::eval::lpips::{CHANNELS, STAGES, Weights};
-use labelgs::internals::eval::protocol::score::Distance;
+use labelgs::internals::io::init::initial_gaussians;
+use labelgs::render::RenderOptions;
+use labelgs::scene::Photo;
+use labelgs::synth::{Preset, SynthOptions, dataset};
 use std::io::Write;
 use std::path::Path;
 use tempfile::tempdir;
@@ -100,4 +105,42 @@ fn missing_weights_are_named() {
     assert!(text.contains("features.14.bias") && text.contains("torchvision"), "{text}");
     std::fs::write(&file, "not weights").expect("written");
     assert!(super::message(Weights::read(&file)).contains("no readable safetensors"));
+}
+
+/// The mean difference of the red channel, in place of LPIPS.
+#[derive(Debug)]
+struct Red;
+
+impl Distance for Red {
+    fn distance(&self, a: &[[f32; 3]], b: &[[f32; 3]], width: usize, height: usize) -> labelgs::Result<f64> {
+        assert_eq!((a.len(), b.len()), (width * height, width * height));
+        Ok(a.iter().zip(b).map(|(a, b)| f64::from((a[0] - b[0]).abs())).sum::<f64>() / a.len() as f64)
+    }
+}
+
+/// Each view has a distance of its valid pixels, if one is asked for, and the mean is over views.
+#[test]
+fn held_out_views_have_a_perceptual_distance() {
+    let Some(gpu) = crate::support::device() else { return };
+    let scene =
+        SynthOptions { preset: Preset::Simple, width: 32, height: 24, views: 3, points: 60, ..SynthOptions::default() };
+    let data = dataset(&scene, 0);
+    let model = initial_gaussians(&data, 0, 60).expect("a model");
+    let mut views = data.train.clone();
+    let white = |valid| Photo { width: 32, height: 24, rgba: vec![[255, 255, 255, valid]; 32 * 24] };
+    (views[0].photo, views[1].photo) = (Some(white(255).into()), Some(white(0).into()));
+    views.iter_mut().for_each(|view| view.mask = None);
+    let views: Vec<_> = views.iter().take(2).collect();
+    let mut engine = Engine::of_model(std::sync::Arc::clone(&gpu), &model, [(32, 24)]).expect("an engine");
+    let options = RenderOptions { background: [0.25; 3], ..RenderOptions::default() };
+    let mut scores = |lpips: Option<&dyn Distance>| {
+        let how = Rendering { options, min_confidence: 0.0, train: &[], by_main: false, lpips };
+        evaluate(&mut engine, &model, &views, how, &(), &mut ()).expect("scores")
+    };
+    let found = scores(Some(&Red));
+    let own: Vec<f64> = views.iter().map(|view| found.views[&view.name].lpips.expect("a distance")).collect();
+    assert!(own[0] > 0.1 && own[0] <= 0.75 + 1e-6 && own[1] == 0.0, "{own:?}");
+    assert_eq!(found.mean.lpips, Some((own[0] + own[1]) / 2.0));
+    let without = scores(None);
+    assert!(without.mean.lpips.is_none() && !serde_json::to_string(&without).expect("JSON").contains("lpips"));
 }

@@ -153,7 +153,7 @@ impl Judge {
         let views: Vec<&View> = dataset.test.iter().collect();
         let near = if config.near > 0.0 { config.near } else { NEAR };
         let options = RenderOptions { near, background: config.background, ..RenderOptions::default() };
-        let how = Rendering { options, min_confidence: MIN_LABEL_CONFIDENCE, train: &[], by_main: false };
+        let how = Rendering { options, min_confidence: MIN_LABEL_CONFIDENCE, train: &[], by_main: false, lpips: None };
         Ok(evaluate(&mut self.engine, model, &views, how, &(), &mut ())?.mean)
     }
 }

@@ -8,7 +8,7 @@ use super::args::JsonFlag;
 use super::context::Context;
 use super::eval::EvalArgs;
 use super::train_args::TrainFlags;
-use super::{eval, interrupt, stdout, train, wording};
+use super::{eval, interrupt, stdout, train};
 use crate::eval::scores::{MeanScores, Scores};
 use crate::io::atomic;
 use crate::run::{Settings, report};
@@ -117,7 +117,7 @@ fn flags(row: &Row, args: &AblateArgs) -> Result<TrainFlags> {
     if flags.train.is_typed("seed") {
         return Err(wrong("the runs of a variant differ in --seed; use --seeds N instead"));
     }
-    flags.settings(None).map_err(|error| wrong(&wording::error(&error)))?;
+    flags.settings(None).map_err(|error| wrong(&error.to_string()))?;
     Ok(flags)
 }
 

@@ -8,6 +8,7 @@ use crate::cli::scene::open_gpu;
 use crate::cli::stdout;
 use crate::cli::values::{bytes, count, direction};
 use crate::io::{LoadOptions, atomic};
+use crate::words::counted;
 use clap::Args;
 use glam::DVec3;
 use serde_json::{Value, json};
@@ -121,9 +122,9 @@ fn to_text(plan: &Plan) -> String {
     let hours = trained().map(|block| block.minutes).sum::<Option<f64>>().map(|minutes| minutes / 60.0);
     let hours = hours.map_or("an unknown time".to_owned(), |hours| format!("{hours:.2} card hours"));
     text + &format!(
-        "{} blocks, {hours} at the pace of the coarse training; {} far Gaussians stay coarse\n",
-        trained().count(),
-        plan.far
+        "{}, {hours} at the pace of the coarse training; {} coarse\n",
+        counted(trained().count(), "block"),
+        if plan.far == 1 { "1 far Gaussian stays".to_owned() } else { format!("{} far Gaussians stay", plan.far) }
     )
 }
 

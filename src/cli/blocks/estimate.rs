@@ -6,6 +6,7 @@ use crate::cli::args::JsonFlag;
 use crate::cli::context::Context;
 use crate::cli::stdout;
 use crate::cli::values::{Size, bytes, count, size};
+use crate::words::counted;
 use clap::Args;
 use serde_json::json;
 
@@ -74,15 +75,15 @@ fn to_text(found: &Estimate) -> String {
         None => "an unknown time: give --step-ms".to_owned(),
     };
     format!(
-        "{} blocks, each of {} Gaussians, {} frozen ones around it and {} views\n{} MiB on the card, {} MiB on the host\n\
-         {} steps, {time}\n",
-        found.blocks,
-        found.gaussians,
+        "{}, each of {}, {} frozen ones around it and {}\n{} MiB on the card, {} MiB on the host\n\
+         {}, {time}\n",
+        counted(found.blocks, "block"),
+        counted(found.gaussians, "Gaussian"),
         found.frozen,
-        found.views,
+        counted(found.views, "view"),
         found.device.div_ceil(MIB),
         found.host.div_ceil(MIB),
-        found.steps
+        counted(found.steps, "step")
     )
 }
 

@@ -36,7 +36,7 @@ pub struct EvalArgs {
     /// photos, and held-out views keep the poses of the reconstruction.
     #[arg(long, help_heading = "Rendering")]
     pub refine_poses: bool,
-    /// Colour behind the scene: black, white, or R,G,B from 0 to 1.
+    /// Colour behind the scene: a name such as white, #rrggbb, or R,G,B from 0 to 1.
     #[arg(long, value_name = "COLOUR", value_parser = colour, default_value = "black", help_heading = "Rendering")]
     pub background: [f32; 3],
     /// Near plane, world units: nearer Gaussians are not drawn. Default: the value of the model's run, else 0.2. Several
@@ -70,8 +70,9 @@ pub struct EvalArgs {
     /// labelgs and lerf-mask.
     #[arg(long, help_heading = "Benchmarks")]
     pub compat: bool,
-    /// Weights of LPIPS v0.1 with VGG16, safetensors. Without weights LPIPS is left out.
-    #[arg(long, value_name = "WEIGHTS", requires = "protocol", help_heading = "Benchmarks")]
+    /// Weights of LPIPS v0.1 with VGG16, safetensors (guide, page benchmarks): adds the LPIPS of each view, or with
+    /// --protocol of each object. It takes seconds to minutes for a view.
+    #[arg(long, value_name = "WEIGHTS", help_heading = "Scores")]
     pub lpips: Option<PathBuf>,
     /// New folder for a web page with ground truth, prediction and difference of every picture.
     #[arg(long, value_name = "DIR", help_heading = "Output")]

@@ -15,6 +15,7 @@ use crate::io::label_table::LabelTable;
 use crate::io::read;
 use crate::io::truth::{files_below, read_truth};
 use crate::scene::{Dataset, UNLABELLED, View};
+use crate::words::did_you_mean;
 use crate::{Error, Result};
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -34,7 +35,11 @@ pub(super) fn run(protocol: Protocol, args: &EvalArgs, context: &Context) -> Res
     let weights = args.lpips.as_deref().map(Weights::read).transpose()?;
     let model = open_model(&args.model)?;
     if model.labels.is_none() {
-        return Err(Error::data(&args.model, "", "the model has no labels; train it with --masks"));
+        return Err(Error::data(
+            &args.model,
+            "",
+            "the model has no labels; train it with masks, or give it some with labelgs label",
+        ));
     }
     let dataset = open_scene(&args.scene, &args.reading, None, [0.0; 3], true)?;
     let (views, test) = (dataset.all(), test_views(protocol, &dataset, &args.scene));
@@ -86,7 +91,9 @@ fn keep_objects(layout: &mut Layout, wanted: &[String]) -> Result<()> {
     }
     let there: Vec<String> = layout.tasks.iter().map(|task| task.object.clone()).collect();
     if let Some(unknown) = wanted.iter().find(|name| !there.contains(name)) {
-        let problem = format!("the truth has no object {unknown}; it has {}", there.join(", "));
+        let cure = did_you_mean(unknown, there.iter().map(String::as_str));
+        let cure = cure.unwrap_or_else(|| format!("it has {}", there.join(", ")));
+        let problem = format!("the truth has no object {unknown}; {cure}");
         return Err(Error::usage("--objects", problem));
     }
     layout.tasks.retain(|task| wanted.contains(&task.object));

@@ -10,6 +10,8 @@ use crate::cli::model_fit::warn_of_misfit;
 use crate::cli::scene::{near_plane, open_gpu, open_scene, pick_views, render_engine};
 use crate::eval::by_place;
 use crate::eval::evaluate::{AmodalTruth, Rendering, evaluate_subject, picture_count};
+use crate::eval::lpips::Weights;
+use crate::eval::protocol::score::Distance;
 use crate::eval::removal::{self, RemovalTruth, removals};
 use crate::eval::scores::{NearScores, NearSweep, Scores};
 use crate::eval::subject::{Subject, Whole};
@@ -42,13 +44,18 @@ pub(in crate::cli) fn score(args: &EvalArgs, context: &Context) -> Result<Scores
     let dataset = open_scene(&args.scene, &reading, args.masks.clone(), args.background, true)?;
     let views = pick_views(&dataset, &args.views)?;
     let near = near_plane(&args.model, args.near.first().copied().filter(|_| args.near.len() == 1))?;
+    let weights = args.lpips.as_deref().map(Weights::read).transpose()?;
     let how = Rendering {
         options: RenderOptions { near, background: args.background, ..RenderOptions::default() },
         min_confidence: args.sure.min_confidence,
         train: &dataset.train,
         by_main: args.compat,
+        lpips: weights.as_ref().map(|weights| weights as &dyn Distance),
     };
     let job = Job { args, context, wholes: Folders::find(args)?, dataset: &dataset, how };
+    if args.masks.is_some() {
+        job.wholes.tell();
+    }
     let (gpu, memory) = (open_gpu(context)?, args.memory.options());
     let image = largest(views.iter().map(|view| (view.camera.width, view.camera.height)));
     let scores = if fits(&gpu, source.view(), image, memory)? {
@@ -140,7 +147,11 @@ struct Removing<'a> {
 impl<'a> Removing<'a> {
     fn new(args: &EvalArgs, model: &Gaussians, dataset: &'a Dataset) -> Result<Self> {
         if model.labels.is_none() {
-            return Err(Error::data(&args.model, "", "has no labels to remove objects by; train it with --masks"));
+            return Err(Error::data(
+                &args.model,
+                "",
+                "has no labels to remove objects by; train it with masks, or give it some with labelgs label",
+            ));
         }
         let train: Vec<&View> = dataset.train.iter().filter(|view| view.mask.is_some()).collect();
         if train.is_empty() {
@@ -195,7 +206,7 @@ fn compare_planes(
     let mut found = Vec::new();
     for &near in planes {
         let options = RenderOptions { near, ..options };
-        let how = Rendering { options, min_confidence: 0.0, train: &[], by_main: false };
+        let how = Rendering { options, min_confidence: 0.0, train: &[], by_main: false, lpips: None };
         let scores = evaluate_subject(subject, &scenes, how, &(), &mut ())?;
         let worst = scores.views.values().map(|view| view.psnr).fold(f64::INFINITY, f64::min);
         found.push(NearScores { near, psnr: scores.mean.psnr.unwrap_or(f64::NAN), worst });
@@ -218,6 +229,14 @@ impl Folders {
         }
         let inside = |name: &str| Some(args.scene.join(name)).filter(|folder| folder.is_dir());
         Ok(Self { amodal: args.amodal.clone().or_else(|| inside("amodal")), objects: inside("objects") })
+    }
+
+    /// Logs what objects are compared with: hidden parts cost a score that counts them.
+    fn tell(&self) {
+        match &self.amodal {
+            Some(folder) => tracing::info!("iou_object compares with whole outlines: {}", folder.display()),
+            None => tracing::info!("iou_object compares with the visible masks; --amodal DIR has whole outlines"),
+        }
     }
 }
 

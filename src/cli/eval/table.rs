@@ -11,13 +11,17 @@ fn number(value: Option<f64>, digits: usize) -> String {
 /// Returns the table of views, then of objects.
 pub(super) fn own_table(scores: &Scores) -> String {
     let mut text = if scores.refined_poses { "poses refined by the model\n".to_owned() } else { String::new() };
-    text += &format!("{:>10} {:>8} {:>9} {:>8}\n", "view", "PSNR", "corrected", "SSIM");
-    for (name, view) in &scores.views {
-        text += &format!("{name:>10} {:>8.2} {:>9.2} {:>8.4}\n", view.psnr, view.psnr_corrected, view.ssim);
-    }
     let mean = &scores.mean;
+    // A column for LPIPS only where it was asked for.
+    let lpips = |cell: String| mean.lpips.map_or(String::new(), |_| format!(" {cell:>8}"));
+    text += &format!("{:>10} {:>8} {:>9} {:>8}{}\n", "view", "PSNR", "corrected", "SSIM", lpips("LPIPS".to_owned()));
+    for (name, view) in &scores.views {
+        let (psnr, corrected, ssim) = (view.psnr, view.psnr_corrected, view.ssim);
+        text += &format!("{name:>10} {psnr:>8.2} {corrected:>9.2} {ssim:>8.4}{}\n", lpips(number(view.lpips, 4)));
+    }
     let cells = (number(mean.psnr, 2), number(mean.psnr_corrected, 2), number(mean.ssim, 4));
-    text += &format!("{:>10} {:>8} {:>9} {:>8}\n", "mean", cells.0, cells.1, cells.2);
+    let last = lpips(number(mean.lpips, 4));
+    text += &format!("{:>10} {:>8} {:>9} {:>8}{last}\n", "mean", cells.0, cells.1, cells.2);
     text += &regions(scores);
     text += &places(scores);
     if scores.objects.is_empty() {

@@ -13,6 +13,7 @@ use crate::io::{self, LoadOptions};
 use crate::label::occlusion::{Rule, by_contour, from_depths, picture};
 use crate::render::{Parts, RenderOptions, render};
 use crate::scene::{DepthKind, Gaussians, LabelMap, Occluders, View, stems};
+use crate::words::counted;
 use crate::{Error, Result};
 use clap::Args;
 use serde_json::json;
@@ -91,7 +92,11 @@ pub(crate) fn run(args: &OcclusionArgs, context: &Context) -> Result<()> {
             "pairs": pairs,
         }));
     }
-    stdout::print(&format!("{output}: {pairs} pairs of an object and its occluder in {} views\n", table.views.len()))
+    stdout::print(&format!(
+        "{output}: {} of an object and its occluder in {}\n",
+        counted(pairs, "pair"),
+        counted(table.views.len(), "view")
+    ))
 }
 
 /// Returns the occluders in views with masks, by the depth of a model.

@@ -20,7 +20,7 @@ pub use light::Light;
 use super::select::{MIN_LABEL_CONFIDENCE, remove};
 use crate::io::model::values::sh0_of;
 use crate::scene::{Camera, Gaussians, LabelMap};
-use crate::{Error, Result};
+use crate::{Error, Result, Setting};
 use glam::{DMat3, DQuat, DVec3};
 use kiddo::{ImmutableKdTree, SquaredEuclidean};
 use plane::{Plane, planes};
@@ -74,7 +74,7 @@ pub struct Filled {
 pub fn fill(model: &Gaussians, labels: &[u32], sights: &[Sight], light: Option<&Light>) -> Result<Filled> {
     let rest = remove(model, labels)?;
     if sights.is_empty() {
-        return Err(Error::usage("fill", "needs at least one view of the scene"));
+        return Err(Error::usage(Setting("fill"), "needs at least one view of the scene"));
     }
     let places = labels.iter().map(|&label| Place::new(model, label, sights)).collect::<Result<Vec<_>>>()?;
     let places: Vec<Place> = places.into_iter().flatten().collect();

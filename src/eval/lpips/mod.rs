@@ -7,7 +7,7 @@
 pub(crate) mod convolution;
 pub(crate) mod weights;
 
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, Setting};
 use crate::eval::protocol::score::Distance;
 use convolution::{Planes, convolve, halve};
 pub use weights::Weights;
@@ -29,7 +29,7 @@ impl Distance for Weights {
     fn distance(&self, a: &[[f32; 3]], b: &[[f32; 3]], width: usize, height: usize) -> Result<f64> {
         if width < SIDE_MIN || height < SIDE_MIN {
             let problem = format!("needs pictures of {SIDE_MIN} x {SIDE_MIN} px or more, one has {width} x {height}");
-            return Err(Error::usage("lpips", problem));
+            return Err(Error::usage(Setting("lpips"), problem));
         }
         let (mut a, mut b) = (input(a, width, height), input(b, width, height));
         let mut total = 0.0;

@@ -6,6 +6,7 @@
 //! replaces the strokes.
 
 use super::{Ask, By, Layout, Prompt, Task, Truth, folders, is_png, stem};
+use crate::Setting;
 use std::collections::BTreeSet;
 use std::path::PathBuf;
 
@@ -64,7 +65,7 @@ fn prompt(scene: &str, references: &[PathBuf], scribbles: &[PathBuf]) -> Result<
     match references.first() {
         None => Err(format!("reference_image/{scene} holds no photo; it names the view of the strokes")),
         Some(_) if on.is_empty() => {
-            Err(format!("scribbles/{scene} holds no pos_*.png; `by = name` chooses without strokes"))
+            Err(format!("scribbles/{scene} holds no pos_*.png; {} chooses without strokes", Setting("by").to("name")))
         }
         Some(photo) => Ok(Prompt::Scribbles { frame: stem(photo), on, off }),
     }

@@ -9,7 +9,7 @@ use crate::scene::Photo;
 use serde::Serialize;
 
 /// A perceptual distance of two pictures with colours from 0 to 1.
-pub trait Distance {
+pub trait Distance: std::fmt::Debug {
     /// Returns the distance; 0 for equal pictures.
     fn distance(&self, a: &[[f32; 3]], b: &[[f32; 3]], width: usize, height: usize) -> crate::Result<f64>;
 }

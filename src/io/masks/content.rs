@@ -1,6 +1,6 @@
 //! Converts the samples of a PNG to source ids, or to black and white.
 
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, Setting};
 use crate::io::mask::{Header, Raw, read_raw};
 use png::{BitDepth, ColorType};
 use std::collections::BTreeSet;
@@ -58,9 +58,10 @@ pub(super) fn read_ids(
             return accept(header.size);
         }
         let problem = format!(
-            "is a {} picture where {} is expected; set `format` to what the folder holds",
+            "is a {} picture where {} is expected; set {} to what the folder holds",
             found.text(),
-            expected.text()
+            expected.text(),
+            Setting("format")
         );
         Err(Error::data(path, "", problem))
     })?;

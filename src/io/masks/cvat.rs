@@ -4,7 +4,7 @@
 use super::folder::{claim, photo_keys, png_key};
 use super::marks::{Found, Mark, Shape};
 use super::spans::Spans;
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, Setting};
 use crate::io::mask::read_raw;
 use crate::io::read;
 use png::{BitDepth, ColorType};
@@ -97,7 +97,10 @@ fn colours(path: &Path) -> Result<((u32, u32), Vec<Colour>)> {
     let raw = read_raw(path, |header| match (header.colour, header.depth) {
         (ColorType::Rgb, BitDepth::Eight) => Ok(()),
         (ColorType::Indexed, _) => {
-            let problem = "is a palette picture, and CVAT writes RGB; import its folder with `format = palette`";
+            let problem = format!(
+                "is a palette picture, and CVAT writes RGB; import its folder with {}",
+                Setting("format").to("palette")
+            );
             Err(Error::data(path, "", problem))
         }
         (colour, depth) => {

@@ -6,7 +6,7 @@ use super::marks::{Found, Mark, Numbering, Object, Shape, number};
 use super::pred::Pred;
 use super::tools;
 use super::{Format, ImportOptions, ObjectPer, Overlap, shortened};
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, Setting};
 use crate::io::mask::read_header;
 use crate::io::read;
 use crate::scene::View;
@@ -64,8 +64,15 @@ impl Reading {
     }
 }
 
-const NESTED_FORMATS: &str = "`format = binary-folders` if a folder is an object (OBJECT/NAME.png), \
-                              `format = photo-folders` if a folder is a photo (NAME/OBJECT.png)";
+/// What to set for pictures in folders.
+fn nested_formats() -> String {
+    let format = |name| Setting("format").to(name);
+    format!(
+        "{} if a folder is an object (OBJECT/NAME.png), {} if a folder is a photo (NAME/OBJECT.png)",
+        format("binary-folders"),
+        format("photo-folders")
+    )
+}
 
 /// Detects the format for these photos.
 pub(super) fn detect(views: &[&View], options: &ImportOptions) -> Result<Reading> {
@@ -113,7 +120,7 @@ fn folders(photos: &[&str], options: &ImportOptions) -> Result<Reading> {
     };
     if options.object_per != ObjectPer::Auto {
         let problem = "belongs to masks of one object each, and these are id pictures; leave it out";
-        return Err(Error::usage("object_per", problem));
+        return Err(Error::usage(Setting("object_per"), problem));
     }
     let of_photo = claims.of_photo.into_iter().map(|files| files.into_iter().next().map(|(_, file)| file)).collect();
     let content = Content::Ids { kind, of_photo, pred };
@@ -142,7 +149,7 @@ fn of_marks(
 ) -> Result<Reading> {
     if options.pred.is_some() {
         let problem = "belongs to id pictures, and here are masks of one object each; leave it out";
-        return Err(Error::usage("pred", problem));
+        return Err(Error::usage(Setting("pred"), problem));
     }
     let numbering = number(&root, photos, &mut found, options.object_per)?;
     let overlap = tools::overlap(format, options.overlap);
@@ -176,8 +183,9 @@ fn recognise(root: &Path, layouts: &Layouts, pred: Option<&Pred>, photos: &[&str
             Some(file) => {
                 let problem = format!(
                     "pictures in folders must be black and white to be recognised, with one value besides 0, and \
-                     {file} is not. If it has soft edges, set {NESTED_FORMATS}: values in the upper half are then the \
-                     object. Id pictures belong into one folder, named like the photos"
+                     {file} is not. If it has soft edges, set {}: values in the upper half are then the object. Id \
+                     pictures belong into one folder, named like the photos",
+                    nested_formats()
                 );
                 Error::data(root, "", problem)
             }
@@ -192,9 +200,11 @@ fn recognise(root: &Path, layouts: &Layouts, pred: Option<&Pred>, photos: &[&str
             let fits = readings.iter().filter(|(fits, ..)| *fits);
             let fits = fits.map(|(_, text, claims)| format!("{text} ({} photos)", claims.photos()));
             let problem = format!(
-                "can be read in more than one way: {}. Set {NESTED_FORMATS}, or for id pictures `format` to one of \
-                 deva-short, deva-long, palette and grey16",
-                fits.collect::<Vec<_>>().join(", ")
+                "can be read in more than one way: {}. Set {}, or for id pictures {} to one of deva-short, deva-long, \
+                 palette and grey16",
+                fits.collect::<Vec<_>>().join(", "),
+                nested_formats(),
+                Setting("format")
             );
             Err(Error::data(root, "", problem))
         }
@@ -238,10 +248,13 @@ fn flat_format(root: &Path, claims: &Claims, pred: Option<&Pred>) -> Result<(For
         Kind::Palette => Format::Palette,
         Kind::Rgb if pred.is_some() => Format::DevaLong,
         Kind::Rgb => {
-            let problem = "holds RGB pictures and no pred.json, so they may be ids as of DEVA or colours for looking \
-                           at. Set `format = deva-long` if R + 256 G + 65536 B is the id, or `pred` to the pred.json of \
-                           the run; colours for looking at cannot be read, import the id pictures that they were made \
-                           from";
+            let problem = format!(
+                "holds RGB pictures and no pred.json, so they may be ids as of DEVA or colours for looking at. Set {} if \
+                 R + 256 G + 65536 B is the id, or {} to the pred.json of the run; colours for looking at cannot be read, \
+                 import the id pictures that they were made from",
+                Setting("format").to("deva-long"),
+                Setting("pred")
+            );
             return Err(Error::data(root, "", problem));
         }
         Kind::Other => {

@@ -1,7 +1,7 @@
 //! The files in a folder of masks, and the photo of each.
 
 use super::Format;
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, Setting};
 use crate::io::mask::PhotoNames;
 use crate::io::read;
 use std::collections::{BTreeMap, BTreeSet};
@@ -67,8 +67,7 @@ pub(super) fn root(folder: &Path, format: Format) -> Result<PathBuf> {
         [(name, _)] => Ok(folder.join(name)),
         ref several => {
             let names: Vec<&str> = several.iter().map(|(name, _)| *name).collect();
-            let formats: Vec<String> =
-                several.iter().map(|(_, format)| format!("`format = {}`", format.name())).collect();
+            let formats: Vec<String> = several.iter().map(|(_, format)| Setting("format").to(format.name())).collect();
             let problem = format!(
                 "holds more than one kind of masks ({}); name one of these folders, or set {}",
                 names.join(", "),

@@ -5,7 +5,7 @@
 use super::decode::{Decoded, Shared, decode};
 use super::detect::{Content, Reading, detect};
 use super::{Format, ImportOptions, ObjectPer, Overlap, shortened};
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, Setting};
 use crate::io::label_table::{FILE, LabelEntry, LabelTable, unique_name};
 use crate::io::load::all_or_one_error;
 use crate::io::mask::with_png;
@@ -166,11 +166,13 @@ fn overlaps<'a>(reading: &Reading, surveys: &[Survey], name: impl Fn(usize) -> &
         };
         let problem = format!(
             "{pixels} pixels in {photos} photos belong to more than one object, most of them in {}: {count} of {} and \
-             {}. Set `overlap = smaller` if the object with fewer pixels in the photo has them, or `overlap = later` if the \
+             {}. Set {} if the object with fewer pixels in the photo has them, or {} if the \
              later one has",
             name(at),
             object(a),
-            object(b)
+            object(b),
+            Setting("overlap").to("smaller"),
+            Setting("overlap").to("later")
         );
         return Err(Error::data(&reading.root, "", problem));
     }

@@ -3,7 +3,7 @@
 use super::polygon::Polygons;
 use super::rle::Rle;
 use super::{ObjectPer, shortened};
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, Setting};
 use crate::io::label_table::unique_name;
 use crate::io::resample::same_aspect;
 use crate::scene::View;
@@ -123,13 +123,14 @@ fn rule(source: &Path, photos: &[&str], found: &Found, asked: ObjectPer) -> Resu
         let name = marks.iter().filter_map(|mark| mark.name.as_ref()).find(|name| !seen.insert(*name))?;
         Some(format!("{} has more than one {name}", photos.get(photo).copied().unwrap_or_default()))
     });
-    let without = |count: usize, what: &str, others: &str| {
+    let without = |count: usize, what: &str, others: &[&str]| {
+        let others = others.iter().map(|other| Setting("object_per").to(other)).collect::<Vec<_>>().join(" or ");
         let problem = format!("{count} of {} masks have no {what}; set {others}", all().count());
         Err(Error::data(source, "", problem))
     };
     match asked {
-        ObjectPer::Track if trackless > 0 => without(trackless, "track", "`object_per = name` or `object_per = mask`"),
-        ObjectPer::Name if nameless > 0 => without(nameless, "name", "`object_per = mask`"),
+        ObjectPer::Track if trackless > 0 => without(trackless, "track", &["name", "mask"]),
+        ObjectPer::Name if nameless > 0 => without(nameless, "name", &["mask"]),
         ObjectPer::Auto if trackless == 0 => Ok((ObjectPer::Track, "every mask has a track".to_owned())),
         ObjectPer::Auto if nameless > 0 => {
             Ok((ObjectPer::Mask, format!("{nameless} of {} masks have no name", all().count())))

@@ -1,7 +1,7 @@
 //! `pred.json` of DEVA: the ids of a run and their categories.
 
 use super::shortened;
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, Setting};
 use crate::io::read;
 use serde::Deserialize;
 use serde_json::Value;
@@ -83,11 +83,13 @@ impl Pred {
         }
         let problem = format!(
             "{} of {} ids in the pictures are not in {} (such as {}): the pictures are display colours or of another \
-             run; name the right file in `pred`, or move the wrong one away and set `format`",
+             run; name the right file in {}, or move the wrong one away and set {}",
             unknown.len(),
             found.len(),
             self.path.display(),
-            shortened(&unknown)
+            shortened(&unknown),
+            Setting("pred"),
+            Setting("format")
         );
         Err(Error::data(root, "", problem))
     }

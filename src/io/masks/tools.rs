@@ -3,7 +3,7 @@
 use super::folder::files;
 use super::marks::Found;
 use super::{Format, Overlap, coco, cvat, label_studio, sam};
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, Setting};
 use crate::scene::View;
 use std::path::{Path, PathBuf};
 
@@ -37,10 +37,11 @@ pub(super) fn recognise(path: &Path, photos: &[&str]) -> Result<Option<(Format, 
     }
     if fits.len() > 1 {
         let all: Vec<String> =
-            fits.iter().map(|(format, why)| format!("{why} (`format = {}`)", format.name())).collect();
+            fits.iter().map(|(format, why)| format!("{why} ({})", Setting("format").to(format.name()))).collect();
         let problem = format!(
-            "can be read in more than one way: {}. Set `format`, or name the folder or file of one",
-            all.join("; ")
+            "can be read in more than one way: {}. Set {}, or name the folder or file of one",
+            all.join("; "),
+            Setting("format")
         );
         return Err(Error::data(path, "", problem));
     }
@@ -56,7 +57,7 @@ pub(super) fn read(path: &Path, format: Format, views: &[&View]) -> Result<Optio
         return Err(Error::data(
             path,
             "",
-            format!("is a file, and `format = {}` is a folder; name the folder", format.name()),
+            format!("is a file, and {} is a folder; name the folder", Setting("format").to(format.name())),
         ));
     }
     let own = || path.to_owned();

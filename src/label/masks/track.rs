@@ -5,7 +5,7 @@
 
 use crate::scene::LabelMap;
 use crate::scene::labels::LABEL_MAX;
-use crate::{Error, Result};
+use crate::{Error, Result, Setting};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// The rule for the same object in two frames.
@@ -39,8 +39,8 @@ pub fn track(frames: &[LabelMap], how: Overlap) -> Result<Vec<LabelMap>> {
             if let std::collections::btree_map::Entry::Vacant(unknown) = found.entry(region) {
                 next += 1;
                 if next > LABEL_MAX {
-                    let problem = format!("more than {LABEL_MAX} objects appear; lower `min_overlap`");
-                    return Err(Error::usage("min_overlap", problem));
+                    let problem = format!("more than {LABEL_MAX} objects appear; lower it");
+                    return Err(Error::usage(Setting("min_overlap"), problem));
                 }
                 unknown.insert(next as u16);
             }

@@ -1,14 +1,38 @@
 //! Domains (the things that buffers count) and capacities (their maximum numbers): one table, with a row per domain.
 
-/// Cures by the cause of a domain's size. `{fits}` stands for the number that fits, `{name}` for the domain's name.
+/// Cures by the cause of a domain's size, given the number that fits and the domain's name.
 mod cures {
-    pub(super) const MODEL: &str = "lower `max_gaussians` to {fits} or use another device";
-    pub(super) const VOTES: &str = "at most {fits} {name} fit; lower `max_gaussians` or use another device";
-    pub(super) const PAIRS: &str =
-        "at most {fits} {name} fit; lower `max_gaussians` or `max_resolution`, or use another device";
-    pub(super) const IMAGE: &str = "at most {fits} {name} fit; lower `max_resolution` or use another device";
-    pub(super) const LAYERS: &str = "at most {fits} {name} fit; lower `label_samples` or use another device";
-    pub(super) const NONE: &str = "use another device";
+    use crate::error::Setting;
+
+    fn at_most(fits: u64, name: &str, settings: &[&'static str]) -> String {
+        let settings: Vec<String> = settings.iter().map(|&field| Setting(field).to_string()).collect();
+        let others = if settings.len() > 1 { "," } else { "" };
+        format!("at most {fits} {name} fit; lower {}{others} or use another device", settings.join(" or "))
+    }
+
+    pub(super) fn model(fits: u64, _: &str) -> String {
+        format!("lower {} to {fits} or use another device", Setting("max_gaussians"))
+    }
+
+    pub(super) fn votes(fits: u64, name: &str) -> String {
+        at_most(fits, name, &["max_gaussians"])
+    }
+
+    pub(super) fn pairs(fits: u64, name: &str) -> String {
+        at_most(fits, name, &["max_gaussians", "max_resolution"])
+    }
+
+    pub(super) fn image(fits: u64, name: &str) -> String {
+        at_most(fits, name, &["max_resolution"])
+    }
+
+    pub(super) fn layers(fits: u64, name: &str) -> String {
+        at_most(fits, name, &["label_samples"])
+    }
+
+    pub(super) fn none(_: u64, _: &str) -> String {
+        "use another device".to_owned()
+    }
 }
 
 /// Declares a table of domains and the capacities that count them.
@@ -40,11 +64,10 @@ macro_rules! domains {
 
             /// Advice to the user if at most `fits` elements fit.
             pub fn cure(self, fits: u64) -> String {
-                let cure = match self {
-                    Self::One | Self::Fixed(_) => cures::NONE,
-                    $(Self::$row => $cure,)*
-                };
-                cure.replace("{fits}", &fits.to_string()).replace("{name}", self.name())
+                match self {
+                    Self::One | Self::Fixed(_) => cures::none(fits, self.name()),
+                    $(Self::$row => $cure(fits, self.name()),)*
+                }
             }
         }
 
@@ -69,53 +92,53 @@ macro_rules! domains {
 }
 
 domains! { Domain, Capacity;
-    Gaussians gaussians: "gaussians", cures::MODEL,
+    Gaussians gaussians: "gaussians", cures::model,
         "Rows of the model; also the maximum number of visible splats.";
-    Trained trained: "trained", cures::MODEL,
+    Trained trained: "trained", cures::model,
         "Rows with optimiser state: Gaussians without the frozen ones at the end, or 0 without training.";
-    Labelled labelled: "labelled", cures::MODEL,
+    Labelled labelled: "labelled", cures::model,
         "Rows with labels: equal to Gaussians, or 0 in a scene without masks.";
-    Instances instances: "instances", cures::PAIRS,
+    Instances instances: "instances", cures::pairs,
         "(splat, tile) pairs.";
-    TrainedInstances trained_instances: "trained instances", cures::PAIRS,
+    TrainedInstances trained_instances: "trained instances", cures::pairs,
         "Pairs with a gradient record: equal to Instances, or 0 without training.";
-    VirtualTiles virtual_tiles: "virtual tiles", cures::IMAGE,
+    VirtualTiles virtual_tiles: "virtual tiles", cures::image,
         "Tiles of all layers: the scene and each sampled object.";
-    LayerTiles layer_tiles: "layer tiles", cures::LAYERS,
+    LayerTiles layer_tiles: "layer tiles", cures::layers,
         "Tiles of object layers with at least one splat.";
-    LayerPixels layer_pixels: "layer pixels", cures::LAYERS,
+    LayerPixels layer_pixels: "layer pixels", cures::layers,
         "Pixels of the layer tiles.";
-    Pixels pixels: "pixels", cures::IMAGE,
+    Pixels pixels: "pixels", cures::image,
         "Pixels of one image.";
-    LabelledPixels labelled_pixels: "labelled pixels", cures::IMAGE,
+    LabelledPixels labelled_pixels: "labelled pixels", cures::image,
         "Pixels with labels: equal to Pixels, or 0 in a scene without masks.";
-    LabelledTiles labelled_tiles: "labelled tiles", cures::IMAGE,
+    LabelledTiles labelled_tiles: "labelled tiles", cures::image,
         "Tiles of one image, or 0 in a scene without masks.";
-    KnownDepths known_depths: "known depths", cures::IMAGE,
+    KnownDepths known_depths: "known depths", cures::image,
         "Pixels with room for a known depth: equal to Pixels, or 0 in a training without them.";
-    LabelTables label_tables: "label tables", cures::IMAGE,
+    LabelTables label_tables: "label tables", cures::image,
         "Tiles times walks for the label map, or 0 in a scene without masks.";
-    Labels labels: "labels", cures::LAYERS,
+    Labels labels: "labels", cures::layers,
         "Label ids, including 0.";
-    VoteColumns vote_columns: "vote columns", cures::VOTES,
+    VoteColumns vote_columns: "vote columns", cures::votes,
         "Labels that a sweep of votes counts at once.";
-    VoteCells vote_cells: "vote cells", cures::VOTES,
+    VoteCells vote_cells: "vote cells", cures::votes,
         "Gaussians times vote columns.";
-    Layers layers: "layers", cures::LAYERS,
+    Layers layers: "layers", cures::layers,
         "Layers, including the scene.";
-    OccluderWords occluder_words: "occluder words", cures::LAYERS,
+    OccluderWords occluder_words: "occluder words", cures::layers,
         "Words of occluder bits of all layers.";
-    SortCells sort_cells: "sort cells", cures::PAIRS,
+    SortCells sort_cells: "sort cells", cures::pairs,
         "Cells of the histogram of the sort.";
-    SortTotals sort_totals: "sort totals", cures::PAIRS,
+    SortTotals sort_totals: "sort totals", cures::pairs,
         "Cells of the totals of the sort.";
-    ScanLanes scan_lanes: "scan lanes", cures::PAIRS,
+    ScanLanes scan_lanes: "scan lanes", cures::pairs,
         "Lanes of the scan.";
-    LossPartials loss_partials: "loss partials", cures::IMAGE,
+    LossPartials loss_partials: "loss partials", cures::image,
         "Partial sums of the loss.";
-    SegmentPixels segment_pixels: "segment pixels", cures::IMAGE,
+    SegmentPixels segment_pixels: "segment pixels", cures::image,
         "Pixels of all jobs of the blend passes, or 0 while one dispatch can walk each tile's list.";
-    SharedRows shared_rows: "shared rows", cures::NONE,
+    SharedRows shared_rows: "shared rows", cures::none,
         "Rows of four shared parameters, or 0 without any.";
     .. sort_lanes: "Lanes of the sort.";
     segments: "Maximum number of dispatches for one walk of a tile's list.";
@@ -139,7 +162,7 @@ mod tests {
         use super::super::cures;
 
         domains! { Shelved, Shelves;
-            Books books: "books", "sell all but {fits} {name}", "Books on all shelves.";
+            Books books: "books", |fits, name| format!("sell all but {fits} {name}"), "Books on all shelves.";
             .. ladders: "Nothing is sized by them.";
         }
     }

@@ -5,7 +5,7 @@ use super::buffers::{BufferDecl, Class};
 use super::capacity::{Capacity, Domain};
 use super::pass::PassList;
 use super::{GUARD_BYTES, Plan, PlanOptions};
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, Setting};
 
 /// Bytes of the staging memory for transfers to and from device memory: one half for each direction.
 pub(crate) const STAGING_BYTES: u64 = 8 << 20;
@@ -142,7 +142,7 @@ impl MemoryReport {
             needed: self.total,
             limit_name: "the memory of this device that may be used".to_owned(),
             limit: limits.max_memory,
-            cure: "lower `max_gaussians`, use smaller images or use another device".to_owned(),
+            cure: format!("lower {}, use smaller images or use another device", Setting("max_gaussians")),
         })
     }
 }

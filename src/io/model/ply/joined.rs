@@ -1,7 +1,7 @@
 //! Writes a file of many models, one after the other, so that no more than one is in memory.
 
 use super::write::{write_header, write_rows};
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, Setting};
 use crate::io::atomic;
 use crate::io::model::format::{Export, WriteOptions};
 use crate::scene::Gaussians;
@@ -54,7 +54,7 @@ fn export<'a>(model: &'a Gaussians, rows: &'a [usize], like: &Gaussians) -> Expo
 fn fitting(mut part: Gaussians, like: &Gaussians) -> Result<Gaussians> {
     if part.antialiased != like.antialiased {
         let problem = "is on for some of the models and off for others; train all alike, the coarse one too";
-        return Err(Error::usage("antialias", problem));
+        return Err(Error::usage(Setting("antialias"), problem));
     }
     part.raise_degree(like.sh_degree);
     if part.origin != like.origin {

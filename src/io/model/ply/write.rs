@@ -1,7 +1,7 @@
 //! Writes the standard 3DGS PLY.
 
 use super::{ANTIALIASED, MODE, ORIGIN};
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, Setting};
 use crate::io::model::format::{Export, LabelType, ModelWriter};
 use glam::DVec3;
 use ply_rs_bw::ply::{Addable, DefaultElement, ElementDef, Encoding, Header, PropertyDef, PropertyType, ScalarType};
@@ -19,9 +19,9 @@ fn losses(export: &Export) -> Result<Vec<String>> {
     let Some(label) = labels.iter().find(|&&label| label > FLOAT_EXACT) else { return Ok(Vec::new()) };
     let problem = format!(
         "label {label} is above {FLOAT_EXACT}, up to which 32-bit floats hold whole numbers; give it a smaller id, or \
-         write labels as `uint`"
+         write labels as uint"
     );
-    Err(Error::usage("label_type", problem))
+    Err(Error::usage(Setting("label_type"), problem))
 }
 
 /// Writes a little-endian PLY with zero normals. If the scene has labels, `label` is the last column, and

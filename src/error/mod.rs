@@ -1,4 +1,10 @@
-//! One error type for the whole engine. A message names a setting by its field in backticks, such as `max_gaussians`.
+//! One error type for the whole engine. A message names a setting by a [`Setting`], never by a flag.
+
+mod setting;
+
+pub use setting::Setting;
+#[cfg(feature = "cli")]
+pub(crate) use setting::speak_of;
 
 use std::path::{Path, PathBuf};
 
@@ -12,7 +18,7 @@ pub enum Error {
     /// An argument, setting or environment variable has an invalid value.
     #[error("{argument}: {problem}")]
     Usage {
-        /// Name of the argument, field or variable.
+        /// Name of the argument, setting or variable.
         argument: String,
         /// What is wrong and what is expected.
         problem: String,
@@ -89,8 +95,9 @@ pub enum Error {
     },
     /// Densification pruned every Gaussian.
     #[error(
-        "every Gaussian was pruned after step {step}: the poses do not fit the photos, or the limits `min_opacity` and \
-         `max_scale` are too strict"
+        "every Gaussian was pruned after step {step}: the poses do not fit the photos, or the limits {} and {} are too strict",
+        Setting("min_opacity"),
+        Setting("max_scale")
     )]
     Pruned {
         /// The step.
@@ -153,7 +160,7 @@ impl Error {
         Self::Data { path: path.as_ref().to_owned(), place: place.into(), problem: problem.into() }
     }
 
-    /// Returns an [`Error::Usage`].
+    /// Returns an [`Error::Usage`]. `argument` is a [`Setting`] or the name of something else.
     pub fn usage(argument: impl Into<String>, problem: impl Into<String>) -> Self {
         Self::Usage { argument: argument.into(), problem: problem.into() }
     }
