@@ -28,6 +28,7 @@ pub(crate) mod mask;
 pub mod masks;
 mod metashape;
 pub(crate) mod model;
+pub(crate) mod names;
 mod npy;
 pub(crate) mod occlusion_table;
 mod photo_store;
