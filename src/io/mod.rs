@@ -4,6 +4,7 @@
 //! [`read_photo`] and [`read_mask`] for single images, [`read_camera`] for a camera. [`initial_gaussians`] makes the
 //! first Gaussians of a scene. [`capture`] looks for faults of photos and poses. [`masks`] imports and checks whole folders of masks. All writes are atomic.
 
+mod all;
 pub(crate) mod append;
 pub(crate) mod atomic;
 mod bad_photos;
@@ -25,6 +26,8 @@ mod listing;
 mod llff;
 mod load;
 pub(crate) mod mask;
+pub(crate) mod mask_folder;
+mod mask_notes;
 pub mod masks;
 mod metashape;
 pub(crate) mod model;
@@ -41,6 +44,7 @@ pub(crate) mod resample;
 pub(crate) mod run_folder;
 mod scratch;
 pub(crate) mod shelf;
+pub(crate) mod soft_edges;
 mod transforms;
 pub(crate) mod truth;
 pub(crate) mod window;
