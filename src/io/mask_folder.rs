@@ -91,7 +91,7 @@ impl MaskFolder {
     pub(crate) fn new<'a>(folder: &Path, names: impl Iterator<Item = &'a str>) -> Result<Self> {
         if folder.is_file() {
             let problem = "is a file, expected a folder of id masks; masks in one file, such as COCO's, become one by \
-                           `labelgs masks import FILE --scene SCENE -o MASKS`";
+                           `masks import` with the scene";
             return Err(Error::data(folder, "", problem));
         }
         if !folder.is_dir() {

@@ -105,8 +105,8 @@ pub(crate) fn problem(masks: &[(&str, &Edges)]) -> Option<String> {
     Some(format!(
         "{} of {} masks looked at have soft edges, such as that of {first}: values between those of two areas lie at their \
          edges, and each counts as an object. A blur, a filter that resizes, and JPEG make them. Make the masks again and \
-         resize them with the nearest pixel, or cut them at half of the range: `labelgs masks import MASKS --format binary \
-         --scene SCENE -o SHARP` does that for masks of one object",
+         resize them with the nearest pixel; `masks import` with `format = binary` cuts masks of one object at half of the \
+         range",
         soft.len(),
         masks.len()
     ))

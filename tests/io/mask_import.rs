@@ -220,7 +220,7 @@ fn soft_id_pictures_are_imported_only_as_told() {
     (0..PHOTOS).for_each(|photo| grey8(&scene.path().join(format!("m/{}.png", name(photo))), &row.repeat(8)));
     let message = refusal(auto(&scene, "m"));
     assert!(
-        message.contains("5 of 5 masks looked at have soft edges") && message.contains("--format binary"),
+        message.contains("5 of 5 masks looked at have soft edges") && message.contains("`format = binary`"),
         "{message}"
     );
     let told = run(&scene, "m", |options| options.format = Format::DevaShort).expect("imported");

@@ -154,13 +154,13 @@ fn soft_masks_are_noted_once() {
     });
     let notes = open(&scene, None).expect("a scene").notes;
     assert!(notes.len() == 1 && notes[0].contains("3 of 3 masks looked at have soft edges"), "{notes:?}");
-    assert!(notes[0].contains("--format binary"), "{notes:?}");
+    assert!(notes[0].contains("`format = binary`"), "{notes:?}");
 }
 
 #[test]
 fn a_folder_of_another_form_names_the_import() {
     let scene = simple(2);
-    let cure = format!("labelgs masks import {} --scene", scene.path().join("masks").display());
+    let cure = format!("by `masks import {}` with the scene", scene.path().join("masks").display());
     let refused = |file: &str, text: &str| {
         let _ = fs::remove_dir_all(scene.path().join("masks"));
         flat(&scene, "masks/00/0.png", 255);
@@ -175,7 +175,7 @@ fn a_folder_of_another_form_names_the_import() {
     refused("masks/00/readme.txt", "");
     let file = Some(scene.write("coco.json", "{}"));
     let message = refusal(io::open(scene.path(), &LoadOptions { masks: file, ..LoadOptions::default() }));
-    assert!(message.contains("is a file") && message.contains("labelgs masks import"), "{message}");
+    assert!(message.contains("is a file") && message.contains("masks import"), "{message}");
     fs::remove_dir_all(scene.path().join("masks")).expect("removed");
     flat(&scene, "masks/other.png", 1);
     let message = refusal(open(&scene, None));

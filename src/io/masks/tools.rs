@@ -103,7 +103,7 @@ pub(crate) fn nothing_found(masks: &MaskFolder, scene: &Path, photos: &[&str]) -
     };
     let Some(why) = why else { return masks.nothing_found(photos.first().copied().unwrap_or_default()) };
     let problem = format!(
-        "holds masks of another form ({why}); make id pictures of them first: `labelgs masks import {} --scene {} -o MASKS`",
+        "holds masks of another form ({why}); make id pictures of them first, by `masks import {}` with the scene {}",
         folder.display(),
         scene.display()
     );
