@@ -145,7 +145,7 @@ pub mod label {
             pub use crate::label::masks::associate::{Owners, Segment, associate};
         }
         pub mod repair {
-            pub use crate::label::masks::repair::{mend, name_groups, rename};
+            pub use crate::label::masks::repair::{adopt, mend, name_groups, rename};
         }
     }
     pub mod occlusion {

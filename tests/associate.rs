@@ -1,10 +1,10 @@
 //! Masks of different views that show one object, and their repair, on models of a few Gaussians.
 
 use labelgs::internals::label::masks::associate::{Owners, Segment, associate};
-use labelgs::internals::label::masks::repair::{mend, name_groups, rename};
+use labelgs::internals::label::masks::repair::{adopt, mend, name_groups, rename};
 use labelgs::label::masks::{Naming, Repairs};
 use labelgs::scene::LabelMap;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// A view that sees each Gaussian with weight 2 in the mask of the given id; `None`: not seen.
 fn view(rows: &[Option<u16>]) -> Owners {
@@ -104,4 +104,15 @@ fn an_object_that_was_missed_is_filled_in_but_no_border() {
     let shown = runs(&[(1, 30), (0, 15), (2, 50), (0, 5)]);
     assert_eq!(mend(5, &mask, &shown, &mut repairs), runs(&[(1, 30), (0, 20), (2, 40), (0, 10)]));
     assert_eq!(repairs.filled, [(5, 1)]);
+}
+
+#[test]
+fn a_mask_that_decided_nothing_gets_the_ids_of_objects_and_keeps_its_outlines() {
+    let mut repairs = Repairs::default();
+    let mask = runs(&[(7, 40), (0, 20), (9, 30), (4, 10)]);
+    let shown = runs(&[(0, 25), (1, 45), (2, 20), (0, 10)]);
+    assert_eq!(adopt(6, &mask, &shown, &BTreeSet::new(), &mut repairs), runs(&[(1, 40), (0, 20), (2, 30), (0, 10)]));
+    assert_eq!((repairs.renamed, repairs.left_out), (vec![((6, 7), 1), ((6, 9), 2)], vec![(6, 4)]));
+    let kept = adopt(6, &mask, &shown, &BTreeSet::from([1, 2, 4]), &mut Repairs::default());
+    assert_eq!(kept.ids[95], 4, "an id that agrees stays where the model shows nothing");
 }

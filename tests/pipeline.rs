@@ -163,7 +163,13 @@ fn names_of_imported_instances_survive_a_repair() {
     let next = "labelgs masks repair imported --per-view --model plain --scene scene -o repaired";
     assert!(said.contains("ids of each photo are its own") && said.contains(next), "{said}");
     labelgs(folder, "train scene --iterations 100 -o plain");
-    labelgs(folder, next.strip_prefix("labelgs ").expect("a command"));
+    let said = labelgs(folder, next.strip_prefix("labelgs ").expect("a command"));
+    // Held-out photos have masks too, with the same ids.
+    assert!(said.contains("in 12 masks") && !said.contains(" 0 masks renamed"), "{said}");
+    labelgs(folder, "label plain --scene scene --masks repaired -o repaired.ply");
+    let scores = labelgs(folder, "eval repaired.ply --scene scene --masks repaired --json");
+    let scores: serde_json::Value = serde_json::from_str(&scores).expect("JSON");
+    assert!(scores["mean"]["iou_map"].as_f64().is_some_and(|iou| iou > 0.5), "{scores}");
     let table = LabelTable::read(&folder.join("repaired/labels.json")).expect("a table");
     let mut found: Vec<&str> = table.labels.iter().filter_map(|entry| entry.name.as_deref()).collect();
     found.sort_unstable();
@@ -171,6 +177,14 @@ fn names_of_imported_instances_survive_a_repair() {
         (1..names.labels.len()).map(|number| if number == 1 { "thing".to_owned() } else { format!("thing {number}") });
     let expected: Vec<String> = std::iter::once("first thing".to_owned()).chain(things).collect();
     assert_eq!(found, expected);
+}
+
+#[test]
+fn the_help_of_the_segmenter_needs_no_packages() {
+    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tools/segment.py");
+    let Ok(output) = std::process::Command::new("python3").arg("-S").arg(script).arg("--help").output() else { return };
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    assert!(text(&output.stdout).contains("--weights"), "{}", text(&output.stdout));
 }
 
 #[test]

@@ -33,10 +33,6 @@ def package(name, remedy):
         fail(f"the Python package {name} cannot be imported ({error}); {remedy}")
 
 
-numpy = package("numpy", "install python3-numpy, or with pip: numpy")
-Image = package("PIL.Image", "install python3-pil, or with pip: Pillow")
-
-
 def photos(scene):
     """Paths of the photos, with the names that their masks have."""
     frames = scene / "transforms.json"
@@ -126,6 +122,10 @@ def main():
     smallest = "smallest mask, as a share of the photo (default: %(default)s)"
     parser.add_argument("--min-area", type=float, default=0.0005, help=smallest)
     args = parser.parse_args()
+    # Only now, so that --help works without them.
+    global numpy, Image
+    numpy = package("numpy", "install python3-numpy, or with pip: numpy")
+    Image = package("PIL.Image", "install python3-pil, or with pip: Pillow")
     todo = photos(args.scene)
     names = [name for _, name in todo]
     twice = [name for name in names if names.count(name) > 1]

@@ -28,6 +28,7 @@ pub fn renumber(table: &LabelTable, map: &BTreeMap<u32, u32>) -> LabelTable {
             source: group.iter().find_map(|entry| entry.source.clone()),
             pixels: group.iter().map(|entry| entry.pixels).sum(),
             views: group.iter().map(|entry| entry.views).max().unwrap_or_default(),
+            others: group[0].others.clone(),
         }
     };
     LabelTable::new(groups.into_iter().map(merged).collect())

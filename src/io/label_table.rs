@@ -7,13 +7,18 @@ use crate::error::{Error, Result};
 use crate::io::read;
 use crate::scene::labels::{LABEL_MAX, MODEL_LABEL_MAX, label_colour};
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeSet;
+use serde_json::Value;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 /// Name of the file in a folder.
 pub const FILE: &str = "labels.json";
 /// Version of the layout.
 const SCHEMA_VERSION: u32 = 1;
+
+fn schema_version() -> u32 {
+    SCHEMA_VERSION
+}
 
 /// Returns `name`, with the first number appended that makes it unique.
 pub(crate) fn unique_name(name: String, taken: &mut BTreeSet<String>) -> String {
@@ -23,38 +28,67 @@ pub(crate) fn unique_name(name: String, taken: &mut BTreeSet<String>) -> String 
     free
 }
 
-/// One object.
+/// One object. A file needs the id only; the colour of an entry without one is that of [`LabelEntry::new`].
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(from = "Listed")]
 pub struct LabelEntry {
     /// Id in masks, 1 to 65535, or in models, 1 to 2147483647.
     pub id: u32,
     /// Display name; unique.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub name: Option<String>,
     /// Display colour, sRGB bytes.
     pub colour: [u8; 3],
     /// Id, colour or folder of the object in the source of the masks.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub source: Option<String>,
     /// Number of pixels over all masks; 0 without masks.
-    #[serde(default)]
     pub pixels: u64,
     /// Number of masks that show it.
-    #[serde(default)]
     pub views: u32,
+    /// Keys that labelgs does not know. They are kept.
+    #[serde(flatten)]
+    pub others: BTreeMap<String, Value>,
+}
+
+/// An entry as a file has it.
+#[derive(Deserialize)]
+struct Listed {
+    id: u32,
+    #[serde(default)]
+    name: Option<String>,
+    #[serde(default, alias = "color")]
+    colour: Option<[u8; 3]>,
+    #[serde(default)]
+    source: Option<String>,
+    #[serde(default)]
+    pixels: u64,
+    #[serde(default)]
+    views: u32,
+    #[serde(flatten)]
+    others: BTreeMap<String, Value>,
+}
+
+impl From<Listed> for LabelEntry {
+    fn from(listed: Listed) -> Self {
+        let Listed { id, name, colour, source, pixels, views, others } = listed;
+        let colour = colour.unwrap_or_else(|| label_colour(id));
+        Self { id, name, colour, source, pixels, views, others }
+    }
 }
 
 impl LabelEntry {
     /// Makes an entry with only an id.
     pub fn new(id: u32) -> Self {
-        Self { id, name: None, colour: label_colour(id), source: None, pixels: 0, views: 0 }
+        Self { id, name: None, colour: label_colour(id), source: None, pixels: 0, views: 0, others: BTreeMap::new() }
     }
 }
 
 /// A table of objects, sorted by id.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct LabelTable {
-    /// Version of the layout.
+    /// Version of the layout; 1 in a file without it.
+    #[serde(default = "schema_version")]
     pub schema_version: u32,
     /// One entry per id.
     pub labels: Vec<LabelEntry>,
@@ -74,7 +108,8 @@ impl LabelTable {
 
     /// Like [`Self::read`], from bytes of the file `path`.
     pub(crate) fn parse(path: &Path, text: &[u8]) -> Result<Self> {
-        let expected = r#"expected {"schema_version": 1, "labels": [{"id": 1, "name": "cup", "colour": [r, g, b]}]}"#;
+        let expected =
+            r#"expected {"labels": [{"id": 1, "name": "cup"}]}, where "colour": [r, g, b] from 0 to 255 may be added"#;
         read::parse_json::<Self>(path, text, expected)?.checked(path)
     }
 
@@ -112,7 +147,20 @@ impl LabelTable {
                 let problem = format!("labels of masks are from 1 to {LABEL_MAX}");
                 Err(Error::data(&path, format!("label {}", entry.id), problem))
             }
-            None => Ok(Some(table)),
+            None => {
+                table.warn_of_others(&path);
+                Ok(Some(table))
+            }
+        }
+    }
+
+    /// Names keys without a meaning, which may be misspelt ones.
+    fn warn_of_others(&self, path: &Path) {
+        let keys: BTreeSet<&str> =
+            self.labels.iter().flat_map(|entry| entry.others.keys()).map(String::as_str).collect();
+        if !keys.is_empty() {
+            let keys = keys.into_iter().collect::<Vec<_>>().join(", ");
+            tracing::warn!("{}: keeps keys that labelgs does not know and does not use: {keys}", path.display());
         }
     }
 

@@ -1,13 +1,14 @@
 //! Loads a data set from a listing: split, decode, undistort, resize, masks.
 
-use super::bad_photos::{self, LISTED_MAX};
+use super::all::all_or_one_error;
+use super::bad_photos;
 use super::listing::{Listed, Listing};
-use super::mask::MaskFolder;
+use super::mask_folder::MaskFolder;
 use super::photo_store::PhotoStore;
 use super::pose_convention::Native;
 use super::recipe::{MadeView, MadeViews, Recipe};
-use super::{LoadOptions, frame_check, missing, stray};
 use crate::error::{Error, Result, Setting};
+use super::{LoadOptions, frame_check, mask_notes, masks, missing, stray};
 use crate::scene::{Dataset, Photo, View, crew};
 use rayon::prelude::*;
 use std::collections::BTreeSet;
@@ -28,7 +29,7 @@ pub(crate) fn load(root: &Path, mut listing: Listing, options: &LoadOptions) -> 
     let masks = options.masks.as_deref().map(open).transpose()?;
     let ignore = options.ignore.as_deref().map(open).transpose()?;
     if let Some(ignore) = &ignore {
-        note_missing(ignore, &views, "picture of what to ignore", &mut notes)?;
+        note_missing(root, ignore, &views, "picture of what to ignore", &mut notes)?;
     }
     let recipe = |(view, &test): (&Listed, &bool)| {
         let of = |folder: &Option<MaskFolder>| folder.as_ref().and_then(|folder| folder.find(&view.name));
@@ -48,7 +49,7 @@ pub(crate) fn load(root: &Path, mut listing: Listing, options: &LoadOptions) -> 
     bad_photos::skip(root, undecodable, total, options, &mut faults)?;
     let loaded: Vec<(Vec<View>, bool)> = all_or_one_error(root, loaded)?;
     if let Some(masks) = &masks {
-        note_missing(masks, &views, "mask", &mut notes)?;
+        note_missing(root, masks, &views, "mask", &mut notes)?;
     }
     note_blank(root, &blank, loaded.iter().all(|(views, _)| views.is_empty()), &mut notes)?;
     if resampled > 0 {
@@ -74,6 +75,10 @@ pub(crate) fn load(root: &Path, mut listing: Listing, options: &LoadOptions) -> 
     // Faces of a photo are not in the order of their names.
     dataset.train.sort_by(|a, b| a.name.cmp(&b.name));
     dataset.test.sort_by(|a, b| a.name.cmp(&b.name));
+    // Some of the views say nothing about all masks.
+    if let (Some(masks), None) = (&masks, &options.only) {
+        dataset.notes.extend(mask_notes::notes(masks, &dataset));
+    }
     require_unique(root, &dataset)?;
     // Faces of wide photos are turned against them.
     let is_turned = dataset.all().len() != views.len() || !options.lookup.poses.is_native();
@@ -85,11 +90,12 @@ pub(crate) fn load(root: &Path, mut listing: Listing, options: &LoadOptions) -> 
 }
 
 /// Notes the photos without a picture in the folder; refuses one without any.
-fn note_missing(masks: &MaskFolder, views: &[Listed], what: &str, notes: &mut Vec<String>) -> Result<()> {
+fn note_missing(root: &Path, masks: &MaskFolder, views: &[Listed], what: &str, notes: &mut Vec<String>) -> Result<()> {
     let without = views.iter().filter(|view| masks.find(&view.name).is_none()).map(|view| view.name.as_str());
     let without: Vec<&str> = without.collect();
     if without.len() == views.len() {
-        return Err(masks.nothing_found(&views[0].name));
+        let photos: Vec<&str> = views.iter().map(|view| view.name.as_str()).collect();
+        return Err(masks::tools::nothing_found(masks, root, &photos));
     }
     if !without.is_empty() {
         notes.push(format!("{} of {} photos have no {what}: {}", without.len(), views.len(), shortened(&without)));
@@ -201,27 +207,4 @@ fn split(views: &[Listed], every: Option<u32>, notes: &mut Vec<String>) -> Resul
         return Ok(vec![false]);
     }
     Ok((0..views.len()).map(|index| index % every as usize == 0).collect())
-}
-
-/// Returns the loaded views, or one error that lists all failures.
-pub(crate) fn all_or_one_error<T>(root: &Path, loaded: Vec<Result<T>>) -> Result<Vec<T>> {
-    let total = loaded.len();
-    let mut views = Vec::with_capacity(total);
-    let mut errors = Vec::new();
-    for view in loaded {
-        match view {
-            Ok(view) => views.push(view),
-            Err(error) => errors.push(error),
-        }
-    }
-    match errors.len() {
-        0 => Ok(views),
-        1 => Err(errors.remove(0)),
-        count => {
-            let shown: Vec<String> = errors.iter().take(LISTED_MAX).map(ToString::to_string).collect();
-            let more = if count > LISTED_MAX { format!("\n  and {} more", count - LISTED_MAX) } else { String::new() };
-            let problem = format!("{count} of {total} views cannot be used:\n  {}{more}", shown.join("\n  "));
-            Err(Error::data(root, "", problem))
-        }
-    }
 }

@@ -1,7 +1,8 @@
 //! Id masks: the object at each pixel of a photo.
 //!
-//! The pixel value is the id, and 0 is unlabelled. The file is a grey PNG of any depth, or a palette PNG, whose *index*
-//! is the id. Colours never become ids: two palette entries may share a colour, and a colour code needs its legend.
+//! The pixel value is the id, and 0 is unlabelled. The file is a grey PNG of any depth, also one that is stored as colour,
+//! or a palette PNG, whose *index* is the id. Colours never become ids: two palette entries may share a colour, and a
+//! colour code needs its legend.
 
 use super::image::{check_png_length, check_size};
 use super::resample::same_aspect;
@@ -9,9 +10,11 @@ use crate::error::{Error, Result};
 use crate::io::read;
 use crate::scene::LabelMap;
 use png::DecodingError;
-use std::collections::HashMap;
-use std::io::{BufReader, ErrorKind};
-use std::path::{Path, PathBuf};
+use std::io::{BufRead, BufReader, ErrorKind};
+use std::path::Path;
+
+/// How a JPEG begins.
+const JPEG: &[u8] = &[0xff, 0xd8, 0xff];
 
 type Reader = png::Reader<BufReader<read::Source>>;
 
@@ -52,10 +55,55 @@ impl Raw {
         let lines = self.bytes.chunks_exact(self.line_size).take(size.1 as usize);
         lines.flat_map(|line| unpack(line, depth, per_line)).collect()
     }
+
+    /// Returns all samples without opacity, and the number of channels. Pixels that are not black must be opaque: they may
+    /// or may not belong to the object.
+    pub(crate) fn opaque(&self, path: &Path) -> Result<(Vec<u16>, usize)> {
+        let (mut samples, channels) = (self.samples(), self.header.colour.samples());
+        if channels % 2 == 1 {
+            return Ok((samples, channels));
+        }
+        let full = ((1_u32 << (self.header.depth as u32)) - 1) as u16;
+        let pixels = || samples.chunks_exact(channels).map(|pixel| pixel.split_at(channels - 1));
+        let is_black = |colour: &[u16]| colour.iter().all(|&value| value == 0);
+        if pixels().any(|(colour, alpha)| alpha[0] != full && !is_black(colour)) {
+            let problem = "has transparent pixels that are not black, which may or may not belong to an object; write the \
+                           mask without transparency";
+            return Err(Error::data(path, "", problem));
+        }
+        let is_hidden = pixels().all(|(colour, _)| is_black(colour))
+            && pixels().any(|(_, alpha)| alpha[0] != samples[channels - 1]);
+        if is_hidden {
+            let problem = "is black everywhere and only its opacity differs; write the opacity as a grey picture";
+            return Err(Error::data(path, "", problem));
+        }
+        let mut at = 0;
+        samples.retain(|_| {
+            at += 1;
+            at % channels != 0
+        });
+        Ok((samples, channels - 1))
+    }
+
+    /// Returns the one value of each pixel: grey, palette index, or colours that are equal. `None` for other colours.
+    pub(crate) fn values(&self, path: &Path) -> Result<Option<Vec<u16>>> {
+        let (samples, channels) = self.opaque(path)?;
+        if channels == 1 {
+            return Ok(Some(samples));
+        }
+        let mut pixels = samples.chunks_exact(channels);
+        let is_grey = pixels.clone().all(|pixel| pixel.iter().all(|value| *value == pixel[0]));
+        Ok(is_grey.then(|| pixels.by_ref().map(|pixel| pixel[0]).collect()))
+    }
 }
 
 fn open(path: &Path) -> Result<(Reader, Header)> {
-    let mut decoder = png::Decoder::new(read::open(path)?);
+    let mut file = read::open(path)?;
+    if file.fill_buf().map_err(Error::read(path))?.starts_with(JPEG) {
+        let problem = "is a JPEG, whose compression changes ids; make the masks again as PNG";
+        return Err(Error::data(path, "", problem));
+    }
+    let mut decoder = png::Decoder::new(file);
     // Other settings expand a palette to colours or drop the low byte of 16-bit ids.
     decoder.set_transformations(png::Transformations::IDENTITY);
     let reader = decoder.read_info().map_err(|error| unreadable(path, error))?;
@@ -81,27 +129,26 @@ pub(crate) fn read_raw(path: &Path, accept: impl FnOnce(&Header) -> Result<()>) 
     Ok(Raw { header, bytes, line_size: frame.line_size })
 }
 
-/// Reads an id image: 8- or 16-bit grey, palette indices, or either with 1, 2 or 4 bits.
+/// Reads an id image: grey of 8 or 16 bits, palette indices, either with 1, 2 or 4 bits, or colours with the same value in
+/// all channels. Opacity must say nothing.
 pub fn read_mask(path: impl AsRef<Path>) -> Result<LabelMap> {
     read_checked(path.as_ref(), |_| Ok(()))
 }
 
 /// Like [`read_mask`]; `accept` checks the size before decoding.
 pub(crate) fn read_checked(path: &Path, accept: impl FnOnce((u32, u32)) -> Result<()>) -> Result<LabelMap> {
-    let raw = read_raw(path, |header| {
-        if !matches!(header.colour, png::ColorType::Grayscale | png::ColorType::Indexed) {
-            let text = format!(
-                "a mask holds one id per pixel as grey value or palette index; this PNG is {:?}. Import the \
-                 folder first: the import reads ids coded as R + 256 G + 65536 B; for display colours use \
-                 the id image they were made from",
-                header.colour
-            );
-            return Err(Error::data(path, "", text));
-        }
-        accept(header.size)
-    })?;
+    let raw = read_raw(path, |header| accept(header.size))?;
+    let Some(ids) = raw.values(path)? else {
+        let text = format!(
+            "a mask holds one id per pixel as grey value or palette index; this PNG is {:?} with colours. Import the \
+             folder first: the import reads ids coded as R + 256 G + 65536 B; for display colours use \
+             the id image they were made from",
+            raw.header.colour
+        );
+        return Err(Error::data(path, "", text));
+    };
     let (width, height) = raw.header.size;
-    Ok(LabelMap { width, height, ids: raw.samples() })
+    Ok(LabelMap { width, height, ids })
 }
 
 /// Reads a picture of what to ignore, a PNG of any kind: 1 where a colour or a palette index is not 0, which black is.
@@ -138,90 +185,4 @@ fn unpack(line: &[u8], depth: png::BitDepth, width: usize) -> Vec<u16> {
 /// Returns true if a mask of size `found` can serve a photo of size `photo`: they differ by a scale only.
 pub(crate) fn mask_size_fits(found: (u32, u32), photo: (u32, u32)) -> bool {
     same_aspect(found, photo)
-}
-
-/// The possible names for the mask of a photo.
-pub(crate) struct PhotoNames {
-    /// Number of photos per file stem. A flat folder serves only unique stems.
-    stems: HashMap<String, usize>,
-    /// Number of photos per path cut at the first dot of the file name, for the same reason.
-    cut: HashMap<PathBuf, usize>,
-}
-
-fn stem(name: &str) -> String {
-    Path::new(name).file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default()
-}
-
-/// Cuts the file name of a path at its first dot, as Gaussian Grouping does.
-fn cut_at_first_dot(name: &str) -> PathBuf {
-    let path = Path::new(name);
-    let file = path.file_name().map(|file| file.to_string_lossy().into_owned()).unwrap_or_default();
-    path.with_file_name(file.split('.').next().unwrap_or_default())
-}
-
-impl PhotoNames {
-    /// Makes it from the names of all photos of the scene.
-    pub(crate) fn new<'a>(names: impl Iterator<Item = &'a str>) -> Self {
-        let (mut stems, mut cut) = (HashMap::new(), HashMap::new());
-        for name in names {
-            *stems.entry(stem(name)).or_insert(0) += 1;
-            *cut.entry(cut_at_first_dot(name)).or_insert(0) += 1;
-        }
-        Self { stems, cut }
-    }
-
-    /// Returns the possible names for the mask of `name`, without `.png`, in order of preference: the photo's name
-    /// without its extension, with it, cut at the first dot of the file name, and the first two without folders. The
-    /// last three need a name that no other photo shares.
-    pub(crate) fn keys(&self, name: &str) -> Vec<PathBuf> {
-        let path = Path::new(name);
-        let mut found = vec![path.with_extension(""), path.to_owned()];
-        let cut = cut_at_first_dot(name);
-        if self.cut.get(&cut) == Some(&1) {
-            found.push(cut);
-        }
-        if self.stems.get(&stem(name)) == Some(&1) {
-            found.push(stem(name).into());
-            found.extend(path.file_name().map(PathBuf::from));
-        }
-        found
-    }
-}
-
-/// Appends `.png` to `key`, which may contain dots.
-pub(crate) fn with_png(key: &Path) -> PathBuf {
-    let mut name = key.as_os_str().to_owned();
-    name.push(".png");
-    name.into()
-}
-
-/// A folder of masks that are found by the name of the photo.
-pub(crate) struct MaskFolder {
-    folder: PathBuf,
-    names: PhotoNames,
-}
-
-impl MaskFolder {
-    /// Opens the folder; `names` are those of all photos of the scene.
-    pub(crate) fn new<'a>(folder: &Path, names: impl Iterator<Item = &'a str>) -> Result<Self> {
-        if !folder.is_dir() {
-            return Err(Error::data(folder, "", "there is no such folder"));
-        }
-        Ok(Self { folder: folder.to_owned(), names: PhotoNames::new(names) })
-    }
-
-    /// Returns the mask file of `name`, if there is one.
-    pub(crate) fn find(&self, name: &str) -> Option<PathBuf> {
-        self.names.keys(name).iter().map(|key| self.folder.join(with_png(key))).find(|path| path.is_file())
-    }
-
-    /// Makes the error for a folder without a mask for any photo.
-    pub(crate) fn nothing_found(&self, name: &str) -> Error {
-        let expected = Path::new(name).with_extension("png");
-        let mut text = format!("has a PNG for no photo of the scene; expected for example {}", expected.display());
-        if ["jpg", "jpeg", "JPG"].iter().any(|ext| self.folder.join(expected.with_extension(ext)).is_file()) {
-            text.push_str("; JPEG is refused because compression changes ids, write PNG");
-        }
-        Error::data(&self.folder, "", text)
-    }
 }

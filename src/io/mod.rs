@@ -4,6 +4,7 @@
 //! [`read_photo`] and [`read_mask`] for single images, [`read_camera`] for a camera. [`initial_gaussians`] makes the
 //! first Gaussians of a scene. [`capture`] looks for faults of photos and poses. [`masks`] imports and checks whole folders of masks. All writes are atomic.
 
+mod all;
 pub(crate) mod append;
 pub(crate) mod atomic;
 mod bad_photos;
@@ -28,6 +29,8 @@ mod llff;
 mod load;
 mod lookup;
 pub(crate) mod mask;
+pub(crate) mod mask_folder;
+mod mask_notes;
 pub mod masks;
 mod metashape;
 mod missing;
@@ -48,6 +51,7 @@ pub(crate) mod run_folder;
 mod scratch;
 pub(crate) mod shelf;
 mod stray;
+pub(crate) mod soft_edges;
 mod transforms;
 pub(crate) mod truth;
 pub(crate) mod window;

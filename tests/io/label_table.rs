@@ -58,3 +58,19 @@ fn an_invalid_table_is_refused_with_its_place() {
     fs::write(&path, "{\"labels\": 3}").expect("written");
     assert!(LabelTable::read(&path).expect_err("refused").to_string().contains("line 1"));
 }
+
+#[test]
+fn a_table_by_hand_needs_ids_and_names_only() {
+    let folder = tempfile::tempdir().expect("folder");
+    let path = folder.path().join(FILE);
+    fs::write(&path, r#"{"labels": [{"id": 3, "name": "cup"}, {"id": 1, "color": [1, 2, 3], "score": 0.5}]}"#)
+        .expect("ok");
+    let table = LabelTable::of_folder(folder.path()).expect("read").expect("a table");
+    assert_eq!(table.name(3), Some("cup"));
+    let colour = |id| table.entry(id).expect("an entry").colour;
+    assert_eq!((colour(3), colour(1)), (LabelEntry::new(3).colour, [1, 2, 3]));
+    // Keys of others come back.
+    table.write(&path).expect("written");
+    assert!(fs::read_to_string(&path).expect("text").contains(r#""score": 0.5"#));
+    assert_eq!(LabelTable::read(&path).expect("read"), table);
+}

@@ -131,6 +131,72 @@ fn nearly_empty_masks_and_objects_are_found() {
     assert_eq!(findings(&masks), []);
 }
 
+/// Replaces all masks by those that `change` makes of their ids.
+fn replace(folder: &TempDir, change: impl Fn(&LabelMap) -> LabelMap) {
+    for view in MADE.all() {
+        let map = change(&view.mask().expect("read").expect("a mask"));
+        let ids: Vec<u8> = map.ids.iter().map(|&id| id as u8).collect();
+        write_png_grey8(folder.path().join("masks").join(&view.name), map.width, map.height, &ids).expect("written");
+    }
+}
+
+/// Half of the size, by a function of the four pixels.
+fn halved(map: &LabelMap, of: impl Fn([u16; 4]) -> u16) -> LabelMap {
+    let pixel = |at: u32| {
+        let (x, y) = (at % (WIDTH / 2) * 2, at / (WIDTH / 2) * 2);
+        of([map.at(x, y), map.at(x + 1, y), map.at(x, y + 1), map.at(x + 1, y + 1)])
+    };
+    let ids = (0..WIDTH * HEIGHT / 4).map(pixel).collect();
+    LabelMap { width: WIDTH / 2, height: HEIGHT / 2, ids }
+}
+
+#[test]
+fn soft_masks_are_one_finding() {
+    let (folder, dataset) = made();
+    let mean = |four: [u16; 4]| (four.iter().sum::<u16>() + 2) / 4;
+    let scaled =
+        |by: u16| move |map: &LabelMap| LabelMap { ids: map.ids.iter().map(|id| id * by).collect(), ..map.clone() };
+    let one =
+        |map: &LabelMap| LabelMap { ids: map.ids.iter().map(|&id| u16::from(id == 1) * 255).collect(), ..map.clone() };
+    let soft: [&dyn Fn(&LabelMap) -> LabelMap; 3] =
+        [&|map| halved(map, mean), &|map| halved(&scaled(30)(map), mean), &|map| halved(&one(map), mean)];
+    for (at, change) in soft.iter().enumerate() {
+        replace(&folder, change);
+        let found = report(&folder, dataset).findings;
+        assert_eq!(short(&found), [(Problem::SoftEdges, None, None)], "{at}: {found:?}");
+    }
+    // The nearest pixel keeps ids.
+    for by in [1, 30] {
+        replace(&folder, |map| halved(&scaled(by)(map), |four| four[0]));
+        let found = report(&folder, dataset).findings;
+        assert!(found.iter().all(|finding| finding.problem != Problem::SoftEdges), "{found:?}");
+    }
+}
+
+#[test]
+fn masks_of_nothing_and_of_everything_are_one_finding() {
+    let (folder, dataset) = made();
+    let filled = |id: u16| move |map: &LabelMap| LabelMap { ids: vec![id; map.ids.len()], ..map.clone() };
+    for (id, problem) in [(0, Problem::NoObject), (255, Problem::OneArea)] {
+        replace(&folder, filled(id));
+        let found = report(&folder, dataset).findings;
+        assert_eq!(short(&found), [(problem, None, None)]);
+        assert!(found[0].text.contains(&format!("every pixel of all 24 masks is {id}")), "{found:?}");
+    }
+}
+
+#[test]
+fn masks_of_held_out_photos_only_are_found() {
+    let (folder, dataset) = made();
+    assert!(!dataset.test.is_empty());
+    for view in &dataset.train {
+        fs::remove_file(folder.path().join("masks").join(&view.name)).expect("removed");
+    }
+    let found = report(&folder, dataset).findings;
+    let held_out = found.iter().filter(|finding| finding.problem == Problem::HeldOut).count();
+    assert_eq!(held_out, 1, "{found:?}");
+}
+
 #[test]
 fn an_id_in_one_view_is_found() {
     let (folder, dataset) = made();
@@ -195,7 +261,7 @@ fn pictures_of_one_pixel_and_one_line_are_measured() {
     for (width, height) in [(1, 1), (5, 1), (1, 5), (2, 2)] {
         let look = Look::new(&map(width, height, |_| 1), &camera(width, height), &[]);
         let found = findings(&[("a", &look), ("b", &look)]);
-        assert!(found.iter().all(|finding| finding.problem == Problem::Inverted) && found.len() == 2, "{found:?}");
+        assert_eq!(short(&found), [(Problem::OneArea, None, None)], "{found:?}");
     }
     assert_eq!(findings(&[]), []);
 }

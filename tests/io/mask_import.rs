@@ -214,6 +214,50 @@ fn soft_edges_are_cut_only_when_asked() {
 }
 
 #[test]
+fn soft_id_pictures_are_imported_only_as_told() {
+    let scene = scene();
+    let row = [0, 0, 0, 60, 190, 255, 255, 255, 120, 30, 0, 0];
+    (0..PHOTOS).for_each(|photo| grey8(&scene.path().join(format!("m/{}.png", name(photo))), &row.repeat(8)));
+    let message = refusal(auto(&scene, "m"));
+    assert!(
+        message.contains("5 of 5 masks looked at have soft edges") && message.contains("`format = binary`"),
+        "{message}"
+    );
+    let told = run(&scene, "m", |options| options.format = Format::DevaShort).expect("imported");
+    assert!(told.labels.len() == 5 && told.notes.iter().any(|note| note.contains("soft edges")), "{:?}", told.notes);
+    let sharp = run(&scene, "m", |options| options.format = Format::Binary).expect("imported");
+    assert_eq!((sharp.labels.len(), names(&sharp)), (1, vec![Some("object")]));
+    let ids = read_mask(scene.path().join("out/00.png")).expect("a mask").ids;
+    assert_eq!(ids[..12], [0, 0, 0, 0, 1, 1, 1, 1, 0, 0, 0, 0]);
+}
+
+#[test]
+fn grey_that_is_stored_as_colours_is_read_as_grey() {
+    let scene = scene();
+    let write = |photo: usize, ids: [u8; 3], colour: ColorType| {
+        let value = |id: u16| if id == 0 { 0 } else { ids[usize::from(id) - 1] };
+        let pixel = |id: u16| match colour {
+            ColorType::Rgba => vec![value(id), value(id), value(id), 255],
+            ColorType::Rgb => vec![value(id); 3],
+            ColorType::GrayscaleAlpha => vec![value(id), 255],
+            _ => vec![value(id)],
+        };
+        let bytes: Vec<u8> = truth(photo).into_iter().flat_map(pixel).collect();
+        png(&scene.path().join(format!("m/{}.PNG", name(photo))), SIZE, colour, BitDepth::Eight, &bytes);
+    };
+    let kinds = [ColorType::Rgba, ColorType::Rgb, ColorType::GrayscaleAlpha, ColorType::Grayscale, ColorType::Rgba];
+    kinds.into_iter().enumerate().for_each(|(photo, colour)| write(photo, [200, 7, 255], colour));
+    let done = auto(&scene, "m").expect("imported");
+    assert_eq!(done.format, Format::DevaShort);
+    same_as_truth(&scene, &done, [2, 1, 3]);
+    // One picture with colours, and the black frame of a tracker is of the same kind.
+    id_pictures(&scene.path().join("long"), ColorType::Rgb, BitDepth::Eight, [300, 256, 70_000]);
+    png(&scene.path().join("long/03.png"), SIZE, ColorType::Rgb, BitDepth::Eight, &[0; 288]);
+    scene.write("long/pred.json", pred([300, 256, 70_000]));
+    assert_eq!(auto(&scene, "long").expect("imported").format, Format::DevaLong);
+}
+
+#[test]
 fn ambiguous_masks_are_refused_with_the_flags_that_decide() {
     // A mirrored folder of black and white id pictures, or the object `left`.
     let scene = Scene::new();
@@ -291,12 +335,21 @@ fn each_broken_folder_has_its_message() {
     );
     refused(
         &|folder| (0..PHOTOS).for_each(|photo| grey8(&folder.join(name(photo)).with_extension("png"), &[0; 96])),
-        "no object is marked",
+        "no mask marks an object",
     );
     refused(
         &|folder| {
             for photo in 0..PHOTOS {
                 png(&folder.join(name(photo)).with_extension("png"), SIZE, ColorType::Rgba, BitDepth::Eight, &[1; 384]);
+            }
+        },
+        "transparent pixels",
+    );
+    refused(
+        &|folder| {
+            for photo in 0..PHOTOS {
+                let bytes: Vec<u8> = [0, 1, 0, 2, 0, 3].repeat(96);
+                png(&folder.join(name(photo)).with_extension("png"), SIZE, ColorType::Rgb, BitDepth::Sixteen, &bytes);
             }
         },
         "holds no ids",

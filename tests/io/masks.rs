@@ -50,8 +50,13 @@ fn colours_jpegs_and_bombs_are_refused() {
     let path = scene.at("m.png");
     for (colour, samples) in [(png::ColorType::Rgb, 3), (png::ColorType::Rgba, 4), (png::ColorType::GrayscaleAlpha, 2)]
     {
-        png(&path, (2, 2), colour, png::BitDepth::Eight, &vec![1; 4 * samples]);
-        assert!(refusal(read_mask(&path)).contains("Import the folder"));
+        let mut bytes = vec![255; 4 * samples];
+        bytes[0] = 1;
+        // The last of two channels is opacity.
+        bytes[samples - 1] = if samples == 2 { 9 } else { 255 };
+        png(&path, (2, 2), colour, png::BitDepth::Eight, &bytes);
+        let expected = if samples == 2 { "transparent pixels" } else { "Import the folder" };
+        assert!(refusal(read_mask(&path)).contains(expected));
     }
     png(&path, (40_000, 40_000), png::ColorType::Grayscale, png::BitDepth::One, &vec![0; 5000 * 40_000]);
     assert!(refusal(read_mask(&path)).contains("40000 x 40000"));
@@ -59,6 +64,122 @@ fn colours_jpegs_and_bombs_are_refused() {
     assert!(refusal(read_mask(&path)).contains("PNG"));
     fs::write(&path, b"").expect("written");
     refusal(read_mask(&path));
+    fs::write(&path, [0xff, 0xd8, 0xff, 0xe0, 0, 16]).expect("written");
+    assert!(refusal(read_mask(&path)).contains("is a JPEG"));
+}
+
+#[test]
+fn equal_channels_are_ids_where_opacity_says_nothing() {
+    let scene = Scene::new();
+    let path = scene.at("m.png");
+    let ids = [0_u16, 1, 200, 255];
+    for (colour, colours, alpha) in [
+        (png::ColorType::Rgb, 3, None),
+        (png::ColorType::Rgba, 3, Some(255)),
+        (png::ColorType::GrayscaleAlpha, 1, Some(255)),
+        (png::ColorType::Grayscale, 1, None),
+    ] {
+        let pixel = |id: &u16| std::iter::repeat_n(*id as u8, colours).chain(alpha).collect::<Vec<u8>>();
+        png(&path, (2, 2), colour, png::BitDepth::Eight, &ids.iter().flat_map(pixel).collect::<Vec<_>>());
+        assert_eq!(read_mask(&path).expect("a mask").ids, ids, "{colour:?}");
+        let wide = |id: &u16| std::iter::repeat_n(id * 257, colours).chain(alpha.map(|_| u16::MAX)).collect::<Vec<_>>();
+        let bytes: Vec<u8> = ids.iter().flat_map(wide).flat_map(u16::to_be_bytes).collect();
+        png(&path, (2, 2), colour, png::BitDepth::Sixteen, &bytes);
+        assert_eq!(read_mask(&path).expect("a mask").ids, ids.map(|id| id * 257), "{colour:?}");
+    }
+    let with_alpha = |bytes: &[u8]| {
+        png(&path, (2, 2), png::ColorType::GrayscaleAlpha, png::BitDepth::Eight, bytes);
+        read_mask(&path)
+    };
+    // Nothing is behind a transparent background.
+    assert_eq!(with_alpha(&[0, 0, 7, 255, 0, 9, 0, 255]).expect("a mask").ids, [0, 7, 0, 0]);
+    assert!(refusal(with_alpha(&[7, 254, 7, 255, 0, 0, 0, 0])).contains("transparent pixels that are not black"));
+    assert!(refusal(with_alpha(&[0, 0, 0, 255, 0, 255, 0, 0])).contains("only its opacity differs"));
+}
+
+/// Writes a mask of one id.
+fn flat(scene: &Scene, file: &str, id: u8) {
+    png(&scene.at(file), (12, 8), png::ColorType::Grayscale, png::BitDepth::Eight, &[id; 96]);
+}
+
+#[test]
+fn masks_are_found_across_case_and_composition() {
+    let names = ["\u{c9}t\u{e9}.jpg", "B.JPG", "c.jpg", "d.jpg", "D.jpg", "f.jpg"];
+    let scene = Scene::new();
+    scene.colmap_bin("sparse/0", &[pinhole()], &names);
+    names.iter().for_each(|name| scene.photo(&format!("images/{name}"), 12, 8));
+    for (id, file) in (1..).zip(["E\u{301}te\u{301}.png", "b.png", "C.PNG", "d.PNG", "F.png", "f.Png"]) {
+        flat(&scene, &format!("masks/{file}"), id);
+    }
+    let dataset = open(&scene, None).expect("a scene");
+    let id = |name: &str| {
+        let view = dataset.train.iter().find(|view| view.name == name).expect("a view");
+        view.mask().expect("read").map(|mask| mask.ids[0])
+    };
+    // Two photos match d.PNG, which is spelt as one of them; two files match f.jpg, and one is spelt as it.
+    assert_eq!(names.map(id), [Some(1), Some(2), Some(3), Some(4), None, Some(6)]);
+}
+
+#[test]
+fn masks_without_objects_are_noted() {
+    let scene = simple(10);
+    let notes = || {
+        let masks = Some(scene.path().join("masks"));
+        io::open(scene.path(), &LoadOptions { masks, ..LoadOptions::default() }).expect("a scene").notes
+    };
+    let has = |text: &str| {
+        let notes = notes();
+        assert!(notes.iter().any(|note| note.contains(text)), "{text}: {notes:?}");
+    };
+    let files: Vec<String> = (0..10).map(|at| format!("masks/{at:02}.png")).collect();
+    // The first and the ninth are held out.
+    flat(&scene, &files[0], 1);
+    flat(&scene, &files[8], 1);
+    has("only photos that are held out for scores have masks, and nothing learns from these: 00.png, 08.png");
+    files.iter().for_each(|file| flat(&scene, file, 0));
+    has("every pixel of all 8 masks is 0");
+    files.iter().for_each(|file| flat(&scene, file, 255));
+    has("every pixel of all 8 masks is 255");
+    flat(&scene, &files[3], 0);
+    assert_eq!(notes(), Vec::<String>::new());
+}
+
+#[test]
+fn soft_masks_are_noted_once() {
+    let scene = simple(3);
+    let row = [0, 0, 0, 40, 90, 200, 255, 255, 255, 160, 0, 0];
+    (0..3).for_each(|at| {
+        let path = scene.at(&format!("masks/{at:02}.png"));
+        png(&path, (12, 8), png::ColorType::Grayscale, png::BitDepth::Eight, &row.repeat(8));
+    });
+    let notes = open(&scene, None).expect("a scene").notes;
+    assert!(notes.len() == 1 && notes[0].contains("3 of 3 masks looked at have soft edges"), "{notes:?}");
+    assert!(notes[0].contains("`format = binary`"), "{notes:?}");
+}
+
+#[test]
+fn a_folder_of_another_form_names_the_import() {
+    let scene = simple(2);
+    let cure = format!("by `masks import {}` with the scene", scene.path().join("masks").display());
+    let refused = |file: &str, text: &str| {
+        let _ = fs::remove_dir_all(scene.path().join("masks"));
+        flat(&scene, "masks/00/0.png", 255);
+        scene.write(file, text);
+        let message = refusal(open(&scene, None));
+        assert!(message.contains(&cure), "{message}");
+    };
+    refused("masks/00/metadata.csv", "id,area\n0,96\n");
+    refused("masks/SegmentationObject/x.txt", "");
+    refused("masks/00.json", r#"[{"segmentation": {"size": [8, 12], "counts": "0"}}]"#);
+    refused("masks/coco.json", r#"{"images": [], "annotations": [{"image_id": 1}]}"#);
+    refused("masks/00/readme.txt", "");
+    let file = Some(scene.write("coco.json", "{}"));
+    let message = refusal(io::open(scene.path(), &LoadOptions { masks: file, ..LoadOptions::default() }));
+    assert!(message.contains("is a file") && message.contains("masks import"), "{message}");
+    fs::remove_dir_all(scene.path().join("masks")).expect("removed");
+    flat(&scene, "masks/other.png", 1);
+    let message = refusal(open(&scene, None));
+    assert!(message.contains("expected for example 00.png; it holds other.png"), "{message}");
 }
 
 #[test]

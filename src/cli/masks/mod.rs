@@ -10,6 +10,7 @@ pub(crate) mod track;
 use super::context::Context;
 use crate::cli::args::ReadArgs;
 use crate::io::image::{write_png_grey8, write_png_grey16};
+use crate::io::mask_folder::png_key;
 use crate::io::read;
 use crate::io::window::Window;
 use crate::io::{self, LoadOptions};
@@ -71,7 +72,7 @@ pub(crate) fn run(args: &MasksArgs, context: &Context) -> Result<()> {
 
 /// Reads the scene that masks belong to: names, sizes and cameras of its photos, and its points.
 fn open_photos(scene: &Path, read: &ReadArgs) -> Result<Dataset> {
-    let options = LoadOptions { photos: false, test_every: None, undistort: false, ..LoadOptions::default() };
+    let options = LoadOptions { photos: false, undistort: false, ..LoadOptions::default() };
     io::open_logged(scene, &read.into_options(options))
 }
 
@@ -116,7 +117,7 @@ fn write_mask(path: &Path, mask: &LabelMap) -> Result<()> {
 fn pngs(folder: &Path) -> Result<Vec<String>> {
     let entries = read::folder(folder)?;
     let names = entries.iter().filter_map(|path| path.file_name()?.to_str().map(str::to_owned));
-    let mut names: Vec<String> = names.filter(|name| name.ends_with(".png")).collect();
+    let mut names: Vec<String> = names.filter(|name| png_key(name).is_some()).collect();
     names.sort();
     if names.is_empty() {
         return Err(Error::data(folder, "", "holds no PNG; expected a folder of id masks"));

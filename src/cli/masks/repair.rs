@@ -11,7 +11,7 @@ use crate::cli::values::near;
 use crate::io::atomic;
 use crate::io::label_table::{FILE, LabelEntry, LabelTable};
 use crate::io::window::{ids_of_photo, windows};
-use crate::label::masks::agree::{Agreement, MIN_VIEWS, agree};
+use crate::label::masks::agree::{Agreement, MIN_VIEWS, agree, follow};
 use crate::label::masks::names::carried;
 use crate::label::masks::repair::Repairs;
 use crate::label::vote::model::{columns_of, vote_engine};
@@ -43,13 +43,13 @@ pub struct RepairArgs {
     /// Least number of views that show an object; objects in fewer views are left out.
     #[arg(long, value_name = "N", default_value_t = MIN_VIEWS)]
     pub min_views: usize,
-    /// Make masks for photos without one.
+    /// Make masks for photos without one, except those that are held out.
     #[arg(long)]
     pub make_missing: bool,
     /// Near plane, world units: nearer Gaussians are not seen. Default: the value of the model's run, else 0.2.
     #[arg(long, value_name = "Z", value_parser = near, help_heading = "Rendering")]
     pub near: Option<f32>,
-    /// How the scene is read. Masks of test views are left out.
+    /// How the scene is read. Masks of test views decide nothing; they get the ids of the objects and keep their outlines.
     #[command(flatten)]
     pub reading: SceneArgs,
     /// JSON.
@@ -71,10 +71,12 @@ pub(crate) fn run(args: &RepairArgs, context: &Context) -> Result<()> {
         ));
     }
     warn_of_misfit(&args.model, &model, &dataset)?;
+    let held_out: Vec<&View> = dataset.test.iter().collect();
+    let all: Vec<&View> = views.iter().chain(&held_out).copied().collect();
     let windows = windows(&args.scene, &args.reading.read.lookup())?;
-    let photos = files_of_photos(views.iter().map(|view| view.name.as_str()), &windows, &args.scene)?;
-    let mut engine = vote_engine(open_gpu(context)?, &model, &views, columns_of(&views))?;
-    let mut progress = Progress::new(2 * views.len() as u64, "views", &context.global);
+    let photos = files_of_photos(all.iter().map(|view| view.name.as_str()), &windows, &args.scene)?;
+    let mut engine = vote_engine(open_gpu(context)?, &model, &all, columns_of(&views))?;
+    let mut progress = Progress::new((2 * views.len() + held_out.len()) as u64, "views", &context.global);
     let mut done = 0;
     let mut tick = || {
         done += 1;
@@ -86,18 +88,20 @@ pub(crate) fn run(args: &RepairArgs, context: &Context) -> Result<()> {
         min_views: args.min_views,
         make_missing: args.make_missing,
     };
-    let (masks, repairs) = agree(&mut engine, &model, &views, how, &mut tick)?;
+    let (mut masks, mut repairs) = agree(&mut engine, &model, &views, how, &mut tick)?;
+    let others = follow(&mut engine, &held_out, how, (&masks, &mut repairs), &mut tick)?;
+    masks.extend(others);
     drop(progress);
-    let table = table(&args.masks, args.per_view, &views, &masks)?;
+    let table = table(&args.masks, args.per_view, &all, &masks)?;
     // Masks belong to the photos as they are stored, whatever their lenses.
     for (file, views_of) in &photos {
-        let parts = views_of.iter().filter_map(|&at| Some((windows.get(&views[at].name)?, masks[at].as_ref()?)));
+        let parts = views_of.iter().filter_map(|&at| Some((windows.get(&all[at].name)?, masks[at].as_ref()?)));
         if let Some(mask) = ids_of_photo(&parts.collect::<Vec<_>>()) {
             write_mask(&args.output.join(file), &mask)?;
         }
     }
     table.write(&args.output.join(FILE))?;
-    report(&views, &masks, &repairs, args, context)
+    report(&all, &masks, &repairs, args, context)
 }
 
 /// Makes the table of masks that were repaired, from that of their folder. Where each view had ids of its own, an object
@@ -154,28 +158,34 @@ fn report(
             "objects": objects,
             "renamed": renamed.collect::<Vec<_>>(),
             "divided": divided.collect::<Vec<_>>(),
+            "left_out": repairs.left_out.iter().map(|&(view, id)| json!({"view": name(view), "id": id})).collect::<Vec<_>>(),
             "filled": filled.collect::<Vec<_>>(),
             "made": repairs.made.iter().map(|&view| name(view)).collect::<Vec<_>>(),
         }));
     }
     let mut text = String::new();
-    for &((view, id), new) in &repairs.renamed {
+    // Ids of single views mean nothing, so that nearly all of them change.
+    for &((view, id), new) in repairs.renamed.iter().filter(|_| !args.per_view) {
         text += &format!("{}: {id} is {new}\n", name(view));
     }
     for ((view, id), parts) in &repairs.divided {
         let parts: Vec<String> = parts.iter().map(u16::to_string).collect();
         text += &format!("{}: {id} is {}\n", name(*view), parts.join(" and "));
     }
+    for &(view, id) in repairs.left_out.iter().filter(|_| !args.per_view) {
+        text += &format!("{}: {id} is left out, fewer than {} views show the object\n", name(view), args.min_views);
+    }
     for &(view, id) in &repairs.filled {
         text += &format!("{}: {id} was missing\n", name(view));
     }
     text += &format!(
-        "{}: {} objects in {} masks; {} masks renamed, {} divided, {} objects filled in, {} masks made\n",
+        "{}: {} objects in {} masks; {} masks renamed, {} divided, {} left out, {} objects filled in, {} masks made\n",
         args.output.display(),
         objects.len(),
         masks.iter().flatten().count(),
         repairs.renamed.len(),
         repairs.divided.len(),
+        repairs.left_out.len(),
         repairs.filled.len(),
         repairs.made.len()
     );

@@ -1,5 +1,7 @@
 //! Checks of masks, by comparison with the masks of the other photos. This module reads no files.
 
+use super::shortened;
+use crate::io::soft_edges::{self, Edges};
 use crate::scene::median::median;
 use crate::scene::{Camera, LabelMap, Point};
 use serde::Serialize;
@@ -35,6 +37,14 @@ pub enum Problem {
     Missized,
     /// The file is no id mask.
     Unreadable,
+    /// Only photos that are held out have masks.
+    HeldOut,
+    /// No mask marks an object.
+    NoObject,
+    /// Every mask is one area of one id.
+    OneArea,
+    /// Values of areas mix at their edges.
+    SoftEdges,
     /// Object and background look swapped.
     Inverted,
     /// Much less is labelled than in the other masks.
@@ -53,6 +63,10 @@ impl Problem {
             Self::Misnamed => "misnamed",
             Self::Missized => "missized",
             Self::Unreadable => "unreadable",
+            Self::HeldOut => "held-out",
+            Self::NoObject => "no-object",
+            Self::OneArea => "one-area",
+            Self::SoftEdges => "soft-edges",
             Self::Inverted => "inverted",
             Self::NearlyEmpty => "nearly-empty",
             Self::SingleView => "single-view",
@@ -86,6 +100,7 @@ pub struct Look {
     pixels: u64,
     border: u64,
     objects: BTreeMap<u16, Area>,
+    edges: Edges,
     /// Id at the projection of each point of the scene; `None` outside the image.
     at_points: Vec<Option<u16>>,
 }
@@ -118,7 +133,8 @@ impl Look {
             let inside = own.z > 0.0 && x >= 0.0 && y >= 0.0 && x < f64::from(width) && y < f64::from(height);
             inside.then(|| map.at(x as u32, y as u32))
         };
-        Self { pixels: map.ids.len() as u64, border, objects, at_points: points.iter().map(at).collect() }
+        let at_points = points.iter().map(at).collect();
+        Self { pixels: map.ids.len() as u64, border, objects, edges: Edges::of(&map.ids, width, height), at_points }
     }
 
     /// Returns the ids in the mask.
@@ -139,8 +155,12 @@ impl Look {
     }
 }
 
-/// Checks masks, given with the names of their photos and sorted by name.
+/// Checks masks, given with the names of their photos and sorted by name. A problem of all masks stands alone, because it
+/// makes many others.
 pub fn findings(masks: &[(&str, &Look)]) -> Vec<Finding> {
+    if let Some((problem, text)) = problem_of_all(masks) {
+        return vec![Finding { problem, view: None, id: None, text }];
+    }
     let ids: BTreeSet<u16> = masks.iter().flat_map(|(_, look)| look.objects.keys().copied()).collect();
     let mut found = nearly_empty_masks(masks);
     for &id in &ids {
@@ -151,6 +171,45 @@ pub fn findings(masks: &[(&str, &Look)]) -> Vec<Finding> {
     }
     found.sort();
     found
+}
+
+fn problem_of_all(masks: &[(&str, &Look)]) -> Option<(Problem, String)> {
+    let (_, first) = masks.first()?;
+    if masks.iter().all(|(_, look)| look.objects.is_empty()) {
+        return Some((Problem::NoObject, no_object(masks.len())));
+    }
+    if let Some((&id, _)) = first.objects.first_key_value()
+        && masks.iter().all(|(_, look)| look.objects.get(&id).is_some_and(|area| area.pixels == look.pixels))
+    {
+        return Some((Problem::OneArea, one_area(masks.len(), id)));
+    }
+    let edges: Vec<(&str, &Edges)> = masks.iter().map(|(name, look)| (*name, &look.edges)).collect();
+    soft_edges::problem(&edges).map(|text| (Problem::SoftEdges, text))
+}
+
+/// What is wrong with masks of which none marks an object.
+pub(crate) fn no_object(masks: usize) -> String {
+    format!(
+        "no mask marks an object: every pixel of all {masks} masks is 0. Make the masks again with an id above 0 for each \
+         object, and look whether the program that wrote them found anything, or wrote ids that were divided by 255"
+    )
+}
+
+/// What is wrong with masks of one area.
+pub(crate) fn one_area(masks: usize, id: u16) -> String {
+    format!(
+        "no mask tells an object from what is around it: every pixel of all {masks} masks is {id}. Make the masks again \
+         with 0 where no object is"
+    )
+}
+
+/// What is wrong with masks of photos that are held out.
+pub(crate) fn held_out(photos: &[&str]) -> String {
+    format!(
+        "only photos that are held out for scores have masks, and nothing learns from these: {}. Add masks of other \
+         photos, or hold out others by `test_every` of the training",
+        shortened(photos)
+    )
 }
 
 fn finding(problem: Problem, view: &str, id: Option<u16>, text: String) -> Finding {

@@ -13,18 +13,28 @@ pub(super) enum Kind {
     Grey16,
     Palette,
     Rgb,
-    /// Transparency or 16-bit colours: no ids.
-    Other,
+    /// 16-bit colours: no ids.
+    Rgb16,
 }
 
 impl Kind {
+    /// Opacity makes no other kind. Colours with the same value in all channels are grey, which only pixels show.
     pub(super) fn of(header: &Header) -> Self {
         match (header.colour, header.depth) {
-            (ColorType::Grayscale, BitDepth::Sixteen) => Self::Grey16,
-            (ColorType::Grayscale, _) => Self::Grey8,
             (ColorType::Indexed, _) => Self::Palette,
-            (ColorType::Rgb, BitDepth::Eight) => Self::Rgb,
-            _ => Self::Other,
+            (ColorType::Rgb | ColorType::Rgba, BitDepth::Sixteen) => Self::Rgb16,
+            (ColorType::Rgb | ColorType::Rgba, _) => Self::Rgb,
+            (_, BitDepth::Sixteen) => Self::Grey16,
+            _ => Self::Grey8,
+        }
+    }
+
+    /// Returns the kind of a picture of colours whose channels have the same values.
+    pub(super) fn as_grey(self) -> Self {
+        match self {
+            Self::Rgb => Self::Grey8,
+            Self::Rgb16 => Self::Grey16,
+            other => other,
         }
     }
 
@@ -34,7 +44,7 @@ impl Kind {
             Self::Grey16 => "16-bit grey",
             Self::Palette => "palette",
             Self::Rgb => "RGB",
-            Self::Other => "transparent or 16-bit colour",
+            Self::Rgb16 => "16-bit RGB",
         }
     }
 }
@@ -46,32 +56,36 @@ pub(super) struct SourceIds {
     pub(super) ids: Vec<u32>,
 }
 
+/// Returns true if the picture has one value per pixel, in whatever channels.
+pub(super) fn is_grey(path: &Path) -> Result<bool> {
+    Ok(read_raw(path, |_| Ok(()))?.values(path)?.is_some())
+}
+
 /// Reads ids from a PNG of the kind `expected`: value, index, or R + 256 G + 65536 B.
 pub(super) fn read_ids(
     path: &Path,
     expected: Kind,
     accept: impl FnOnce((u32, u32)) -> Result<()>,
 ) -> Result<SourceIds> {
-    let raw = read_raw(path, |header| {
-        let found = Kind::of(header);
-        if found == expected {
-            return accept(header.size);
-        }
+    let wrong = |found: Kind| {
         let problem = format!(
             "is a {} picture where {} is expected; set {} to what the folder holds",
             found.text(),
             expected.text(),
             Setting("format")
         );
-        Err(Error::data(path, "", problem))
+        Error::data(path, "", problem)
+    };
+    let raw = read_raw(path, |header| match Kind::of(header) {
+        found if found == expected || found.as_grey() == expected => accept(header.size),
+        found => Err(wrong(found)),
     })?;
-    let samples = raw.samples();
-    let ids = match expected {
-        Kind::Rgb => {
-            let id = |rgb: &[u16]| u32::from(rgb[0]) + (u32::from(rgb[1]) << 8) + (u32::from(rgb[2]) << 16);
-            samples.chunks_exact(3).map(id).collect()
-        }
-        _ => samples.into_iter().map(u32::from).collect(),
+    let ids = if expected == Kind::Rgb {
+        let id = |rgb: &[u16]| u32::from(rgb[0]) + (u32::from(rgb[1]) << 8) + (u32::from(rgb[2]) << 16);
+        raw.opaque(path)?.0.chunks_exact(3).map(id).collect()
+    } else {
+        let values = raw.values(path)?.ok_or_else(|| wrong(Kind::of(&raw.header)))?;
+        values.into_iter().map(u32::from).collect()
     };
     Ok(SourceIds { size: raw.header.size, ids })
 }
@@ -106,16 +120,6 @@ pub(super) fn read_binary(path: &Path, accept: impl FnOnce((u32, u32)) -> Result
 
 /// Returns the value of each pixel: grey, index, or the largest of its colours.
 fn brightness(path: &Path, raw: &Raw) -> Result<Vec<u16>> {
-    let samples = raw.samples();
-    let opaque = ((1_u32 << (raw.header.depth as u32)) - 1) as u16;
-    let channels = raw.header.colour.samples();
-    let alpha = matches!(raw.header.colour, ColorType::GrayscaleAlpha | ColorType::Rgba);
-    let pixels = samples.chunks_exact(channels);
-    if alpha && pixels.clone().any(|pixel| pixel[channels - 1] != opaque) {
-        let problem = "has transparent pixels, which may or may not belong to the object; write black \
-                       and white without transparency";
-        return Err(Error::data(path, "", problem));
-    }
-    let colours = channels - usize::from(alpha);
-    Ok(pixels.map(|pixel| pixel[..colours].iter().copied().max().unwrap_or(0)).collect())
+    let (samples, channels) = raw.opaque(path)?;
+    Ok(samples.chunks_exact(channels).map(|pixel| pixel.iter().copied().max().unwrap_or(0)).collect())
 }

@@ -1,15 +1,16 @@
 //! "Segmentation mask 1.1" of CVAT: `SegmentationObject/NAME.png` with a colour per object of the photo,
 //! `SegmentationClass/NAME.png` with a colour per label, and `labelmap.txt` with the labels of colours.
 
-use super::folder::{claim, photo_keys, png_key};
 use super::marks::{Found, Mark, Shape};
 use super::spans::Spans;
 use crate::error::{Error, Result, Setting};
 use crate::io::mask::read_raw;
+use crate::io::mask_folder::{photo_keys, png_key};
+use crate::io::names::{below, claim};
 use crate::io::read;
 use png::{BitDepth, ColorType};
 use rayon::prelude::*;
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 const OBJECTS: &str = "SegmentationObject";
@@ -40,7 +41,7 @@ pub(super) fn read(root: &Path, photos: &[&str]) -> Result<Found> {
         _ => Ok(Vec::new()),
     };
     let all: Vec<Result<Vec<Mark>>> = (0..photos.len()).into_par_iter().map(marks).collect();
-    found.of_photo = crate::io::load::all_or_one_error(root, all)?;
+    found.of_photo = crate::io::all::all_or_one_error(root, all)?;
     found.strays = if objects.1.is_empty() { classes.1 } else { objects.1 };
     super::marks::require_photo(root, photos, &found, &found.strays)?;
     Ok(found)
@@ -52,12 +53,13 @@ fn pictures(root: &Path, folder: &str, photos: &[&str]) -> Result<(Vec<Option<St
     if !path.is_dir() {
         return Ok((vec![None; photos.len()], Vec::new()));
     }
-    let files = super::folder::files(&path)?;
-    let there: BTreeSet<&str> = files.iter().filter_map(|file| png_key(file)).collect();
-    let own = claim(&photo_keys(photos), &there);
-    let used: BTreeSet<&str> = own.iter().flatten().map(String::as_str).collect();
-    let strays = there.difference(&used).map(|name| format!("{folder}/{name}.png")).collect();
-    Ok((own.into_iter().map(|key| key.map(|key| format!("{folder}/{key}.png"))).collect(), strays))
+    let files = below(&path)?;
+    let mut there: BTreeMap<&str, &String> =
+        files.iter().filter_map(|file| png_key(file).map(|key| (key, file))).collect();
+    let own = claim(&photo_keys(photos), &there.keys().copied().collect());
+    let file = |key: Option<String>| there.remove(key?.as_str()).map(|file| format!("{folder}/{file}"));
+    let own = own.into_iter().map(file).collect();
+    Ok((own, there.values().map(|file| format!("{folder}/{file}")).collect()))
 }
 
 /// Reads the labels of colours, in the order of the file. A label `background` marks no object.

@@ -1,13 +1,14 @@
 //! Detects the format of a folder of masks. Two formats that both fit are an error.
 
-use super::content::{Kind, read_binary};
-use super::folder::{Claims, Layouts, files, layouts, root};
+use super::content::{Kind, is_grey, read_binary};
+use super::folder::{Claims, Layouts, layouts, root};
 use super::marks::{Found, Mark, Numbering, Object, Shape, number};
 use super::pred::Pred;
 use super::tools;
 use super::{Format, ImportOptions, ObjectPer, Overlap, shortened};
 use crate::error::{Error, Result, Setting};
 use crate::io::mask::read_header;
+use crate::io::names::below;
 use crate::io::read;
 use crate::scene::View;
 use rayon::prelude::*;
@@ -95,7 +96,7 @@ pub(super) fn detect(views: &[&View], options: &ImportOptions) -> Result<Reading
 /// Detects the format of masks that no tool marks as its own.
 fn folders(photos: &[&str], options: &ImportOptions) -> Result<Reading> {
     let root = root(&options.folder, options.format)?;
-    let files = files(&root)?;
+    let files = below(&root)?;
     let layouts = layouts(photos, &files);
     let pred = options.pred.clone().or_else(|| Pred::find(&root));
     let pred = pred.as_deref().map(Pred::read).transpose()?;
@@ -107,6 +108,7 @@ fn folders(photos: &[&str], options: &ImportOptions) -> Result<Reading> {
         Format::DevaLong => (layouts.flat, Some(Kind::Rgb)),
         Format::Palette => (layouts.flat, Some(Kind::Palette)),
         Format::Grey16 => (layouts.flat, Some(Kind::Grey16)),
+        Format::Binary => (layouts.flat, None),
         Format::BinaryFolders => (layouts.by_object, None),
         Format::PhotoFolders | Format::LerfMask | Format::ThreeDOvs => (layouts.by_photo, None),
         _ => (layouts.flat, Some(Kind::Grey8)),
@@ -114,6 +116,7 @@ fn folders(photos: &[&str], options: &ImportOptions) -> Result<Reading> {
     if claims.photos() == 0 {
         return Err(nothing_found(&root, &files, photos));
     }
+    let claims = if format == Format::Binary { claims.as_one_object() } else { claims };
     let Some(kind) = ids else {
         let notes = if format == Format::ThreeDOvs { classes_without_mask(&root, &claims)? } else { Vec::new() };
         return of_marks(root, photos, Found { notes, ..of_claims(claims) }, format, why, options);
@@ -189,7 +192,7 @@ fn recognise(root: &Path, layouts: &Layouts, pred: Option<&Pred>, photos: &[&str
                 );
                 Error::data(root, "", problem)
             }
-            None => nothing_found(root, &files(root)?, photos),
+            None => nothing_found(root, &below(root)?, photos),
         }),
         (flat_fits, object_fits, photo_fits) => {
             let readings = [
@@ -218,12 +221,28 @@ fn first_grey(root: &Path, claims: &Claims) -> Option<String> {
     grey.map(|file| (*file).to_owned())
 }
 
-/// Detects the format of id images from their headers.
-fn flat_format(root: &Path, claims: &Claims, pred: Option<&Pred>) -> Result<(Format, String)> {
+/// Returns the files of each kind. Pictures of colours are grey if all of them are: a single one may be black.
+fn kinds<'a>(root: &Path, claims: &'a Claims) -> Result<BTreeMap<Kind, Vec<&'a str>>> {
     let mut kinds: BTreeMap<Kind, Vec<&str>> = BTreeMap::new();
     for file in claims.files() {
         kinds.entry(Kind::of(&read_header(&root.join(file))?)).or_default().push(file);
     }
+    let colours = kinds.iter().filter(|(kind, _)| kind.as_grey() != **kind);
+    let colours: Vec<&str> = colours.flat_map(|(_, files)| files.iter().copied()).collect();
+    let other = |file: &&str| is_grey(&root.join(file)).map(|grey| !grey);
+    match colours.par_iter().map(other).find_any(|found| !matches!(found, Ok(false))) {
+        Some(Err(error)) => return Err(error),
+        Some(Ok(_)) => return Ok(kinds),
+        None => {}
+    }
+    let mut grey: BTreeMap<Kind, Vec<&str>> = BTreeMap::new();
+    kinds.into_iter().for_each(|(kind, files)| grey.entry(kind.as_grey()).or_default().extend(files));
+    Ok(grey)
+}
+
+/// Detects the format of id images from their kind.
+fn flat_format(root: &Path, claims: &Claims, pred: Option<&Pred>) -> Result<(Format, String)> {
+    let kinds = kinds(root, claims)?;
     if kinds.len() > 1 {
         let counts = kinds.iter().map(|(kind, files)| format!("{} {} ({})", files.len(), kind.text(), files[0]));
         let problem = format!(
@@ -257,7 +276,7 @@ fn flat_format(root: &Path, claims: &Claims, pred: Option<&Pred>) -> Result<(For
             );
             return Err(Error::data(root, "", problem));
         }
-        Kind::Other => {
+        Kind::Rgb16 => {
             let problem = format!("{} is {}, which holds no ids; import the id pictures", files[0], kind.text());
             return Err(Error::data(root, "", problem));
         }

@@ -2,13 +2,11 @@
 
 use super::Format;
 use crate::error::{Error, Result, Setting};
-use crate::io::mask::PhotoNames;
+use crate::io::mask_folder::{photo_keys, png_key};
+use crate::io::names::claim;
 use crate::io::read;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
-
-/// Largest depth of folders; it also ends links to a parent.
-const DEPTH_MAX: usize = 8;
 
 /// Folders in which data sets and trackers keep masks, with their formats.
 const KNOWN: [(&str, &[Format]); 4] = [
@@ -17,35 +15,6 @@ const KNOWN: [(&str, &[Format]); 4] = [
     ("test_mask", &[Format::LerfMask]),
     ("segmentations", &[Format::ThreeDOvs]),
 ];
-
-/// Lists the files below a folder, sorted, by relative path with `/`. Hidden files are left out.
-pub(super) fn files(root: &Path) -> Result<Vec<String>> {
-    let mut found = Vec::new();
-    walk(root, "", 0, &mut found)?;
-    found.sort();
-    Ok(found)
-}
-
-fn walk(folder: &Path, prefix: &str, depth: usize, found: &mut Vec<String>) -> Result<()> {
-    for path in read::folder(folder)? {
-        let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
-        if name.starts_with('.') {
-            continue;
-        }
-        if !path.is_dir() {
-            found.push(format!("{prefix}{name}"));
-        } else if depth < DEPTH_MAX {
-            walk(&path, &format!("{prefix}{name}/"), depth + 1, found)?;
-        }
-    }
-    Ok(())
-}
-
-/// Returns `name` without `.png` (any case), or `None` for other files.
-pub(super) fn png_key(name: &str) -> Option<&str> {
-    let at = name.len().checked_sub(4)?;
-    name.get(at..)?.eq_ignore_ascii_case(".png").then(|| &name[..at])
-}
 
 /// Returns the folder of the masks: `folder`, or a known subfolder.
 pub(super) fn root(folder: &Path, format: Format) -> Result<PathBuf> {
@@ -78,24 +47,6 @@ pub(super) fn root(folder: &Path, format: Format) -> Result<PathBuf> {
     }
 }
 
-/// Returns the possible mask names of each photo, without `.png`.
-pub(super) fn photo_keys(photos: &[&str]) -> Vec<Vec<String>> {
-    let names = PhotoNames::new(photos.iter().copied());
-    let keys = |photo: &&str| {
-        let keys = names.keys(photo).into_iter();
-        let mut keys: Vec<String> = keys.map(|key| key.to_string_lossy().replace('\\', "/")).collect();
-        // DEVA removes the last four characters, whatever the extension is: `a.jpeg` becomes `a..png`.
-        keys.extend(photo.len().checked_sub(4).and_then(|at| photo.get(..at)).map(str::to_owned));
-        keys
-    };
-    photos.iter().map(keys).collect()
-}
-
-/// Returns the first key of each photo that is in `there`.
-pub(super) fn claim(keys: &[Vec<String>], there: &BTreeSet<&str>) -> Vec<Option<String>> {
-    keys.iter().map(|keys| keys.iter().find(|key| there.contains(key.as_str())).cloned()).collect()
-}
-
 /// The files of each photo in one layout.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Claims {
@@ -112,6 +63,12 @@ impl Claims {
 
     pub(super) fn files(&self) -> impl Iterator<Item = &str> {
         self.of_photo.iter().flatten().map(|(_, file)| file.as_str())
+    }
+
+    /// Gives the object of files that show all a name.
+    pub(super) fn as_one_object(mut self) -> Self {
+        self.of_photo.iter_mut().flatten().for_each(|(object, _)| *object = "object".to_owned());
+        self
     }
 
     /// Returns the names of the objects: in numeric order if all are numbers, else in alphabetical order.

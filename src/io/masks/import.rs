@@ -2,13 +2,15 @@
 //!
 //! It reads and checks everything before it writes the first file.
 
+use super::check::no_object;
 use super::decode::{Decoded, Shared, decode};
 use super::detect::{Content, Reading, detect};
 use super::{Format, ImportOptions, ObjectPer, Overlap, shortened};
 use crate::error::{Error, Result, Setting};
+use crate::io::all::all_or_one_error;
 use crate::io::label_table::{FILE, LabelEntry, LabelTable, unique_name};
-use crate::io::load::all_or_one_error;
-use crate::io::mask::with_png;
+use crate::io::mask_folder::with_png;
+use crate::io::soft_edges::{self, Edges};
 use crate::io::{atomic, image};
 use crate::scene::Dataset;
 use crate::scene::labels::LABEL_MAX;
@@ -75,6 +77,8 @@ struct Survey {
     shared: Shared,
     shared_pixels: u64,
     cut: usize,
+    /// Those of id pictures.
+    edges: Edges,
 }
 
 /// Imports the masks of the photos of `dataset` into the folder `output`, which must be new or empty.
@@ -88,6 +92,13 @@ pub fn import(dataset: &Dataset, options: &ImportOptions, output: &Path) -> Resu
     let stage = Stage::new("reading and writing masks", 2 * with_mask.len());
     let look = |&photo: &usize| stage.counted(|| decode(photo).and_then(|decoded| survey(&reading, decoded)));
     let surveys = all_or_one_error(&reading.root, with_mask.par_iter().map(look).collect())?;
+    let edges = with_mask.iter().zip(&surveys).map(|(&photo, survey)| (names[photo], &survey.edges));
+    let soft = soft_edges::problem(&edges.collect::<Vec<_>>());
+    if let (Some(problem), Format::Auto) = (&soft, options.format) {
+        let problem =
+            format!("{problem}. To import every value as an object, set {}", Setting("format").to(reading.format.name()));
+        return Err(Error::data(&reading.root, "", problem));
+    }
     let overlaps = overlaps(&reading, &surveys, |at| names[with_mask[at]])?;
     let (labels, new_ids) = labels(&reading, &surveys)?;
 
@@ -109,7 +120,8 @@ pub fn import(dataset: &Dataset, options: &ImportOptions, output: &Path) -> Resu
     table.write(&output.join(FILE))?;
 
     let without = (0..views.len()).filter(|&at| !reading.has_mask(at));
-    let notes = notes(&reading, &surveys, &table);
+    let mut notes = notes(&reading, &surveys, &table);
+    notes.extend(soft);
     let objects = match &reading.content {
         Content::Ids { .. } => None,
         Content::Marks { numbering, .. } => Some(Objects { per: numbering.per, why: numbering.why.clone() }),
@@ -141,7 +153,12 @@ fn survey(reading: &Reading, decoded: Decoded) -> Result<Survey> {
     if pixels.len() > LABEL_MAX as usize {
         return Err(too_many(&reading.root, pixels.len()));
     }
-    Ok(Survey { pixels, shared: decoded.shared, shared_pixels: decoded.shared_pixels, cut: decoded.cut })
+    let Decoded { size: (width, height), ids, shared, shared_pixels, cut } = decoded;
+    let edges = match reading.content {
+        Content::Ids { .. } => Edges::of(&ids, width, height),
+        Content::Marks { .. } => Edges::default(),
+    };
+    Ok(Survey { pixels, shared, shared_pixels, cut, edges })
 }
 
 fn too_many(root: &Path, count: usize) -> Error {
@@ -194,7 +211,7 @@ fn labels(reading: &Reading, surveys: &[Survey]) -> Result<(Vec<LabelEntry>, Has
         return Err(too_many(&reading.root, found.len()));
     }
     if found.values().all(|&(pixels, _)| pixels == 0) {
-        return Err(Error::data(&reading.root, "", "every pixel of every mask is 0, so no object is marked"));
+        return Err(Error::data(&reading.root, "", no_object(surveys.len())));
     }
     if let Some(pred) = reading.pred() {
         pred.check(&reading.root, &found.keys().copied().collect())?;

@@ -1,10 +1,11 @@
 //! Checks a folder of masks against its scene.
 
-use super::check::{Finding, Look, Problem, findings};
-use super::folder::files;
+use super::check::{Finding, Look, Problem, findings, held_out};
 use crate::error::{Error, Result};
 use crate::io::label_table::FILE;
-use crate::io::mask::{MaskFolder, read_header, read_mask};
+use crate::io::mask::{read_header, read_mask};
+use crate::io::mask_folder::MaskFolder;
+use crate::io::names::below;
 use crate::io::resample::same_aspect;
 use crate::scene::sampling::every;
 use crate::scene::{Dataset, Point, View};
@@ -51,6 +52,14 @@ pub fn inspect(dataset: &Dataset, folder: &Path) -> Result<Report> {
             Err(finding) => found.push(finding.clone()),
         }
     }
+    let named = |views: &[View]| {
+        views.iter().map(|view| view.name.clone()).filter(|name| masks.find(name).is_some()).collect::<Vec<_>>()
+    };
+    let (train, test) = (named(&dataset.train), named(&dataset.test));
+    if train.is_empty() && !test.is_empty() {
+        let text = held_out(&test.iter().map(String::as_str).collect::<Vec<_>>());
+        found.push(Finding { problem: Problem::HeldOut, view: None, id: None, text });
+    }
     found.extend(findings(&usable));
     found.sort();
     let ids: BTreeSet<u32> = usable.iter().flat_map(|(_, look)| look.ids()).collect();
@@ -74,7 +83,7 @@ fn look(points: &[Point], view: &View, path: Option<&Path>) -> Result<Look, Find
 
 fn misnamed(folder: &Path, used: &[Option<PathBuf>]) -> Result<Vec<Finding>> {
     let used: BTreeSet<&Path> = used.iter().flatten().map(PathBuf::as_path).collect();
-    let unused = files(folder)?.into_iter().filter(|file| file != FILE && !used.contains(folder.join(file).as_path()));
+    let unused = below(folder)?.into_iter().filter(|file| file != FILE && !used.contains(folder.join(file).as_path()));
     let text = |file: String| format!("{file} belongs to no photo");
     let finding = |file| Finding { problem: Problem::Misnamed, view: None, id: None, text: text(file) };
     Ok(unused.map(finding).collect())

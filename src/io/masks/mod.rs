@@ -21,12 +21,13 @@ mod pred;
 mod rle;
 mod sam;
 mod spans;
-mod tools;
+pub(crate) mod tools;
 
 pub use check::{Finding, Problem};
 pub use import::{Imported, Objects, Overlaps, import};
 pub use inspect::{Report, inspect};
 
+use super::names::shortened;
 use serde::Serialize;
 use std::path::PathBuf;
 
@@ -46,6 +47,8 @@ pub enum Format {
     Palette,
     /// 16-bit grey, the value is the id.
     Grey16,
+    /// A black and white image per photo, of one object: NAME.png.
+    Binary,
     /// A folder per object with a black and white image per photo: OBJECT/NAME.png.
     BinaryFolders,
     /// A folder per photo with a black and white image per object: NAME/OBJECT.png.
@@ -79,6 +82,7 @@ impl Format {
             Self::DevaLong => "deva-long",
             Self::Palette => "palette",
             Self::Grey16 => "grey16",
+            Self::Binary => "binary",
             Self::BinaryFolders => "binary-folders",
             Self::PhotoFolders => "photo-folders",
             Self::ObjectMask => "object-mask",
@@ -138,10 +142,4 @@ pub struct ImportOptions {
     pub overlap: Overlap,
     /// Rule for objects, where masks show one object each.
     pub object_per: ObjectPer,
-}
-
-/// Returns the first few names, for messages.
-fn shortened(names: &[impl AsRef<str>]) -> String {
-    let shown = names.iter().take(5).map(AsRef::as_ref).collect::<Vec<&str>>().join(", ");
-    if names.len() > 5 { format!("{shown}, ...") } else { shown }
 }

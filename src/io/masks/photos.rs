@@ -1,10 +1,16 @@
 //! The photo that a file of an annotation tool names, whatever folder or server it had the photo in.
 
+use crate::io::names::folded;
 use std::collections::HashMap;
 use std::path::Path;
 
-/// Photos by the ends of their paths.
+/// Photos by the ends of their paths, as they are spelt and folded.
 pub(super) struct PhotoIndex {
+    spelt: Paths,
+    folded: Paths,
+}
+
+struct Paths {
     /// Whole names, with extension and without.
     whole: HashMap<String, Vec<usize>>,
     /// The same without one or more of the first folders.
@@ -21,11 +27,10 @@ fn tails(name: &str) -> impl Iterator<Item = &str> {
     name.match_indices('/').map(|(at, _)| &name[at + 1..])
 }
 
-impl PhotoIndex {
-    /// Makes it from the names of all photos.
-    pub(super) fn new(photos: &[&str]) -> Self {
+impl Paths {
+    fn new(photos: impl Iterator<Item = String>) -> Self {
         let mut index = Self { whole: HashMap::new(), ends: HashMap::new() };
-        for (photo, name) in photos.iter().enumerate() {
+        for (photo, name) in photos.enumerate() {
             let add = |map: &mut HashMap<String, Vec<usize>>, name: &str| {
                 for key in forms(name) {
                     let photos = map.entry(key).or_default();
@@ -34,11 +39,31 @@ impl PhotoIndex {
                     }
                 }
             };
-            let name = name.replace('\\', "/");
             add(&mut index.whole, &name);
             tails(&name).for_each(|tail| add(&mut index.ends, tail));
         }
         index
+    }
+
+    fn find(&self, name: &str) -> Option<usize> {
+        for name in std::iter::once(name).chain(tails(name)) {
+            for map in [&self.whole, &self.ends] {
+                for key in forms(name) {
+                    if let Some([photo]) = map.get(&key).map(Vec::as_slice) {
+                        return Some(*photo);
+                    }
+                }
+            }
+        }
+        None
+    }
+}
+
+impl PhotoIndex {
+    /// Makes it from the names of all photos.
+    pub(super) fn new(photos: &[&str]) -> Self {
+        let names = photos.iter().map(|name| name.replace('\\', "/"));
+        Self { spelt: Paths::new(names.clone()), folded: Paths::new(names.map(|name| folded(&name))) }
     }
 
     /// Returns the photo of a path or address: the one with the whole name, else the only one with the same end. Without
@@ -56,16 +81,7 @@ impl PhotoIndex {
     }
 
     fn find_plain(&self, name: &str) -> Option<usize> {
-        for name in std::iter::once(name).chain(tails(name)) {
-            for map in [&self.whole, &self.ends] {
-                for key in forms(name) {
-                    if let Some([photo]) = map.get(&key).map(Vec::as_slice) {
-                        return Some(*photo);
-                    }
-                }
-            }
-        }
-        None
+        self.spelt.find(name).or_else(|| self.folded.find(&folded(name)))
     }
 }
 
@@ -110,6 +126,7 @@ mod tests {
             ("12345678-c.jpg", Some(3)),
             ("images/12345678-12345678-c.jpg", Some(3)),
             ("d.e.png", Some(4)),
+            ("LEFT/A.PNG", Some(0)),
             ("12345678-", None),
             ("100%.png", None),
             ("", None),

@@ -1,16 +1,17 @@
 //! What the script `amg.py` of Segment Anything writes: for each photo a folder `NAME` with `0.png`, `1.png`, ... and
 //! `metadata.csv`, or `NAME.json` with run lengths.
 
-use super::folder::{claim, photo_keys, png_key};
 use super::marks::{Found, Mark, Shape, require_aspect};
 use super::rle::Rle;
 use crate::error::{Error, Result};
+use crate::io::mask_folder::{photo_keys, png_key};
+use crate::io::names::claim;
 use crate::io::read;
 use crate::scene::View;
 use rayon::prelude::*;
 use serde::Deserialize;
 use serde_json::Value;
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 const TABLE: &str = "metadata.csv";
@@ -52,7 +53,7 @@ pub(super) fn read_folders(root: &Path, photos: &[&str], files: &[String]) -> Re
 }
 
 /// Returns the pictures that the table of a photo lists.
-fn pictures(root: &Path, folder: &str, files: &[String]) -> Result<Vec<Mark>> {
+fn pictures<'a>(root: &Path, folder: &str, files: &'a [String]) -> Result<Vec<Mark>> {
     let path = root.join(folder).join(TABLE);
     let text = read::text(&path)?;
     let mut lines = text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty());
@@ -63,8 +64,8 @@ fn pictures(root: &Path, folder: &str, files: &[String]) -> Result<Vec<Mark>> {
             "does not begin with `id,area`; expected the table that amg.py writes",
         ));
     }
-    let there: BTreeSet<&str> =
-        files.iter().filter_map(|file| png_key(file)?.strip_prefix(folder)?.strip_prefix('/')).collect();
+    let key = |file: &'a String| Some((png_key(file)?.strip_prefix(folder)?.strip_prefix('/')?, file));
+    let there: BTreeMap<&str, &String> = files.iter().filter_map(key).collect();
     let mut marks = Vec::new();
     let mut listed = BTreeSet::new();
     for (at, line) in lines {
@@ -75,13 +76,13 @@ fn pictures(root: &Path, folder: &str, files: &[String]) -> Result<Vec<Mark>> {
                 format!("begins with `{}`, expected the number of a picture that no other line has", id.escape_debug());
             return Err(Error::data(&path, place(), problem));
         }
-        if !there.contains(id) {
+        let Some(&file) = there.get(id) else {
             let problem = format!("lists the mask {id}, and {folder}/{id}.png is not there; copy the whole folder");
             return Err(Error::data(&path, place(), problem));
-        }
-        marks.push(Mark::new(None, Shape::Png(format!("{folder}/{id}.png"))));
+        };
+        marks.push(Mark::new(None, Shape::Png(file.clone())));
     }
-    if let Some(other) = there.iter().find(|name| name.parse::<u32>().is_ok() && !listed.contains(*name)) {
+    if let Some(other) = there.keys().find(|name| name.parse::<u32>().is_ok() && !listed.contains(*name)) {
         let problem = format!("does not list {folder}/{other}.png: pictures of another run? Segment the photo again");
         return Err(Error::data(&path, "", problem));
     }

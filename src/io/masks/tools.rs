@@ -1,9 +1,11 @@
 //! Formats of tools for annotation and segmentation, which the files beside the masks show.
 
-use super::folder::files;
+use super::folder::{layouts, root};
 use super::marks::Found;
 use super::{Format, Overlap, coco, cvat, label_studio, sam};
 use crate::error::{Error, Result, Setting};
+use crate::io::mask_folder::MaskFolder;
+use crate::io::names::below;
 use crate::scene::View;
 use std::path::{Path, PathBuf};
 
@@ -16,7 +18,7 @@ pub(super) fn recognise(path: &Path, photos: &[&str]) -> Result<Option<(Format, 
     if let Some(root) = cvat::find(path) {
         fits.push((Format::Cvat, format!("{} has the folders that CVAT exports", root.display())));
     }
-    let files = files(path)?;
+    let files = below(path)?;
     let with = |list: &[Option<String>]| list.iter().flatten().count();
     let folders = with(&sam::folders(photos, &files));
     if folders > 0 {
@@ -75,9 +77,9 @@ pub(super) fn read(path: &Path, format: Format, views: &[&View]) -> Result<Optio
             let found = cvat::read(&root, &photos)?;
             (root, found)
         }
-        Format::SamFolders => (own(), sam::read_folders(path, &photos, &files(path)?)?),
-        Format::SamJson => (own(), sam::read_lists(path, views, &files(path)?)?),
-        Format::LabelStudio => (own(), label_studio::read(path, &photos, &files(path)?)?),
+        Format::SamFolders => (own(), sam::read_folders(path, &photos, &below(path)?)?),
+        Format::SamJson => (own(), sam::read_lists(path, views, &below(path)?)?),
+        Format::LabelStudio => (own(), label_studio::read(path, &photos, &below(path)?)?),
         _ => return Ok(None),
     }))
 }
@@ -90,4 +92,32 @@ pub(super) fn overlap(format: Format, asked: Overlap) -> Overlap {
         (Overlap::Auto, _) => Overlap::Error,
         (asked, _) => asked,
     }
+}
+
+/// Makes the error for a folder without a mask for any photo. If the import knows its form, that is the cure.
+pub(crate) fn nothing_found(masks: &MaskFolder, scene: &Path, photos: &[&str]) -> Error {
+    let folder = &masks.folder;
+    let why = match recognise(folder, photos) {
+        Ok(tool) => tool.map(|(_, why)| why).or_else(|| nested(folder, photos)),
+        // Two forms fit; the import says which.
+        Err(_) => Some("the files of a segmenter or tool are in it".to_owned()),
+    };
+    let Some(why) = why else { return masks.nothing_found(photos.first().copied().unwrap_or_default()) };
+    let problem = format!(
+        "holds masks of another form ({why}); make id pictures of them first, by `masks import {}` with the scene {}",
+        folder.display(),
+        scene.display()
+    );
+    Error::data(folder, "", problem)
+}
+
+/// Returns why the pictures in folders of a folder are masks, if they are named after photos.
+fn nested(folder: &Path, photos: &[&str]) -> Option<String> {
+    let inside = root(folder, Format::Auto).ok()?;
+    let layouts = layouts(photos, &below(&inside).ok()?);
+    let flat = layouts.flat.photos();
+    let both = [(layouts.by_object, "OBJECT/NAME.png"), (layouts.by_photo, "NAME/OBJECT.png")];
+    let found = both.iter().find(|(claims, _)| claims.photos() > 0).map(|(claims, form)| (claims.photos(), *form));
+    let (count, form) = (flat > 0).then_some((flat, "NAME.png")).or(found)?;
+    Some(format!("{count} photos have pictures {form} in {}", inside.display()))
 }

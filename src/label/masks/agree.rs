@@ -1,7 +1,7 @@
 //! Makes the masks of all views agree, through the Gaussians of a model.
 
 use super::associate::{Owners, Segment, associate};
-use super::repair::{Naming, Repairs, mend, name_groups, rename};
+use super::repair::{Naming, Repairs, adopt, mend, name_groups, rename};
 use crate::engine::Engine;
 use crate::error::Result;
 use crate::label::vote::ballot::{Sweep, Voter, sweep};
@@ -47,10 +47,9 @@ pub fn agree(
     let mut groups = associate(&owners);
     groups.retain(|group| group.len() >= how.min_views);
     let naming = if how.per_view { Naming::Fresh } else { Naming::Majority };
-    let names = name_groups(&groups, &areas(views)?, naming);
+    let areas = areas(views)?;
+    let names = name_groups(&groups, &areas, naming);
     let mut repairs = Repairs::default();
-    let changed = names.iter().filter(|((_, old), new)| !how.per_view && old != *new);
-    repairs.renamed.extend(changed.map(|(&segment, &new)| (segment, new)));
     let renamed: Vec<Option<Pixels<LabelMap>>> = (views.iter().enumerate())
         .map(|(index, view)| Ok(view.mask()?.map(|mask| rename(index, &mask, &names).into())))
         .collect::<Result<_>>()?;
@@ -71,7 +70,31 @@ pub fn agree(
         });
         tick();
     }
+    repairs.trace(&names, areas.into_keys());
     Ok((masks, repairs))
+}
+
+/// Returns the masks of views that told the model nothing, such as those that are held out, with the ids of its objects.
+/// `before` is what [`agree`] made with the same engine; views are numbered after its views. Outlines stay, so that a
+/// score compares the model with the masks and not with itself. `tick` is called once per view.
+pub fn follow(
+    engine: &mut Engine,
+    views: &[&View],
+    how: Agreement,
+    before: (&[Option<LabelMap>], &mut Repairs),
+    tick: &mut dyn FnMut(),
+) -> Result<Vec<Option<LabelMap>>> {
+    let (trained, repairs) = before;
+    let objects = trained.iter().flatten().filter(|_| !how.per_view).flat_map(LabelMap::objects).collect();
+    let mut masks = Vec::with_capacity(views.len());
+    for (index, view) in (trained.len()..).zip(views) {
+        masks.push(match view.mask()? {
+            Some(mask) => Some(adopt(index, &mask, &label_map(engine, &view.camera, how.near)?, &objects, repairs)),
+            None => None,
+        });
+        tick();
+    }
+    Ok(masks)
 }
 
 fn areas(views: &[&View]) -> Result<BTreeMap<Segment, u64>> {

@@ -7,6 +7,6 @@ pub(crate) mod names;
 pub(crate) mod repair;
 pub(crate) mod track;
 
-pub use agree::{Agreement, agree};
+pub use agree::{Agreement, agree, follow};
 pub use repair::{Naming, Repairs};
 pub use track::{Overlap, track};

@@ -1,6 +1,6 @@
 //! Repairs inconsistent masks by the model that all of them made.
 
-use super::associate::Segment;
+use super::associate::{SAME_OBJECT, Segment};
 use crate::scene::LabelMap;
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -28,12 +28,30 @@ pub enum Naming {
 pub struct Repairs {
     /// Masks with a new id: view, old id, new id.
     pub renamed: Vec<(Segment, u16)>,
+    /// Masks of objects that too few views show; they are 0 now.
+    pub left_out: Vec<Segment>,
     /// Divided masks, with the ids of their parts.
     pub divided: Vec<(Segment, Vec<u16>)>,
     /// Objects that were missing in a view: view and id.
     pub filled: Vec<Segment>,
     /// Views that got their mask from the model.
     pub made: Vec<usize>,
+}
+
+impl Repairs {
+    /// Turns ids that masks had after they were renamed by `names` into those that they had at first; `all` are the masks.
+    pub(super) fn trace(&mut self, names: &BTreeMap<Segment, u16>, all: impl Iterator<Item = Segment>) {
+        let first: BTreeMap<Segment, u16> = names.iter().map(|(&(view, old), &new)| ((view, new), old)).collect();
+        let old = |(view, id): Segment| (view, first.get(&(view, id)).copied().unwrap_or(id));
+        let mut renamed = names.clone();
+        renamed.extend(self.renamed.drain(..).map(|(segment, new)| (old(segment), new)));
+        for (segment, _) in &mut self.divided {
+            *segment = old(*segment);
+            renamed.remove(segment);
+        }
+        self.renamed = renamed.into_iter().filter(|((_, old), new)| old != new).collect();
+        self.left_out = all.filter(|segment| !names.contains_key(segment)).collect();
+    }
 }
 
 /// Returns the id of each mask from its group.
@@ -123,9 +141,61 @@ pub fn mend(view: usize, mask: &LabelMap, shown: &LabelMap, repairs: &mut Repair
     out
 }
 
+/// Gives the masks of a view the ids of the objects that the model shows there; outlines stay. A mask where it shows none
+/// keeps its id if that is one of `objects`.
+pub fn adopt(
+    view: usize,
+    mask: &LabelMap,
+    shown: &LabelMap,
+    objects: &BTreeSet<u16>,
+    repairs: &mut Repairs,
+) -> LabelMap {
+    let mut counts: BTreeMap<u16, BTreeMap<u16, u64>> = BTreeMap::new();
+    for (&id, &seen) in mask.ids.iter().zip(&shown.ids).filter(|(id, _)| **id != 0) {
+        *counts.entry(id).or_default().entry(seen).or_default() += 1;
+    }
+    let mut out = mask.clone();
+    for (&id, seen) in &counts {
+        let total: u64 = seen.values().sum();
+        let seen = seen.iter().filter(|(object, _)| **object != 0);
+        let most = seen.max_by_key(|&(&object, &pixels)| (pixels, std::cmp::Reverse(object)));
+        let new = match most {
+            Some((&object, &pixels)) if pixels as f64 >= SAME_OBJECT * total as f64 => object,
+            _ if objects.contains(&id) => id,
+            _ => 0,
+        };
+        if new == 0 {
+            repairs.left_out.push((view, id));
+        } else if new != id {
+            repairs.renamed.push(((view, id), new));
+        }
+        recolour(&mut out, mask, id, |_| new);
+    }
+    out
+}
+
 /// Sets the pixels of `id` to the new id at their index.
 fn recolour(out: &mut LabelMap, mask: &LabelMap, id: u16, new: impl Fn(usize) -> u16) {
     for (at, to) in out.ids.iter_mut().enumerate().filter(|(at, _)| mask.ids[*at] == id) {
         *to = new(at);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn repairs_are_told_by_the_ids_that_masks_had() {
+        let names = BTreeMap::from([((0, 3), 1), ((0, 1), 3), ((0, 5), 5), ((1, 2), 4)]);
+        let mut repairs = Repairs {
+            // After they were renamed: 3 was 1, 5 is as it was, 4 was 2.
+            renamed: vec![((0, 3), 1), ((0, 5), 6)],
+            divided: vec![((1, 4), vec![4, 7])],
+            ..Repairs::default()
+        };
+        repairs.trace(&names, [(0, 1), (0, 3), (0, 5), (0, 8), (1, 2)].into_iter());
+        assert_eq!(repairs.renamed, [((0, 3), 1), ((0, 5), 6)], "1 became 3 and 1 again");
+        assert_eq!((repairs.divided, repairs.left_out), (vec![((1, 2), vec![4, 7])], vec![(0, 8)]));
     }
 }
