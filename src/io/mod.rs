@@ -18,6 +18,7 @@ mod depth_file;
 pub(crate) mod frames;
 pub(crate) mod image;
 pub(crate) mod init;
+pub(crate) mod kind;
 pub(crate) mod label_table;
 pub(crate) mod lens;
 mod listed_path;

@@ -2,6 +2,7 @@
 
 use super::stored::StoredRows;
 use crate::error::{Error, Result};
+use crate::io::kind::name_of_content;
 use crate::io::read::{self, Source};
 use ply_rs_bw::parser::{Parser, Reader};
 use ply_rs_bw::ply::{DefaultElement, ElementDef, Encoding, Header, PropertyType, ScalarType};
@@ -276,6 +277,7 @@ pub(super) fn read_header(path: &Path, file: &mut impl BufRead) -> Result<(Heade
 
 /// Reads the header including the `end_header` line, at most [`HEADER_MAX`] bytes.
 fn header_bytes(path: &Path, file: &mut impl BufRead) -> Result<Vec<u8>> {
+    let content = name_of_content(file.fill_buf().map_err(Error::read(path))?);
     let mut text = Vec::new();
     let mut limited = file.take(HEADER_MAX);
     loop {
@@ -283,7 +285,8 @@ fn header_bytes(path: &Path, file: &mut impl BufRead) -> Result<Vec<u8>> {
         let read = limited.read_until(b'\n', &mut text).map_err(Error::read(path))?;
         let line = text[start..].trim_ascii_end();
         if start == 0 && line != b"ply" {
-            return Err(Error::data(path, "byte 0", "does not start with `ply`; this is not a PLY file"));
+            let unknown = || "does not start with `ply`; this is not a PLY file".to_owned();
+            return Err(Error::data(path, "byte 0", content.map_or_else(unknown, |content| content.told("a PLY"))));
         }
         if line == b"end_header" && text.ends_with(b"\n") {
             return Ok(text);
