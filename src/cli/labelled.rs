@@ -4,7 +4,7 @@ use super::args::JsonFlag;
 use super::context::Context;
 use super::output::WriteArgs;
 use super::stdout;
-use super::values::share;
+use super::values::{model_file, share};
 use crate::edit::catalogue::Catalogue;
 use crate::edit::select::{MIN_LABEL_CONFIDENCE, Tally, extract};
 use crate::io::label_table::LabelTable;
@@ -43,7 +43,7 @@ pub struct EditArgs {
     #[arg(value_name = "MODEL")]
     pub model: PathBuf,
     /// File to write; its ending is the format. Names of its labels go to OUT.labels.json beside it.
-    #[arg(short, long, value_name = "OUT.ply")]
+    #[arg(short, long, value_name = "OUT.ply", value_parser = model_file())]
     pub output: PathBuf,
     /// How it is written.
     #[command(flatten)]
@@ -71,7 +71,7 @@ impl EditArgs {
         more: serde_json::Value,
     ) -> Result<()> {
         let labels: BTreeSet<u32> = model.labels.iter().flatten().copied().collect();
-        Edited { model, table: known.table, of, labels: &labels }.finish(&self.target(context), more)
+        Edited { model, table: known.table, of, added: 0, labels: &labels }.finish(&self.target(context), more)
     }
 }
 
@@ -172,6 +172,8 @@ pub(crate) struct Edited<'a> {
     pub table: Option<LabelTable>,
     /// Number of Gaussians of the source.
     pub of: usize,
+    /// Number of Gaussians that the source has not.
+    pub added: u64,
     /// Labels that were chosen or made.
     pub labels: &'a BTreeSet<u32>,
 }
@@ -197,7 +199,13 @@ impl Edited<'_> {
             }
             return stdout::print_json(&result);
         }
-        stdout::print(&format!("{}: {written} of {} Gaussians\n", to.output.display(), self.of))
+        let (output, of, added) = (to.output.display(), self.of, self.added);
+        match (of as u64 + added).checked_sub(written).filter(|_| added > 0) {
+            Some(removed) => stdout::print(&format!(
+                "{output}: {written} Gaussians: of {of} before, {removed} removed; {added} added\n"
+            )),
+            None => stdout::print(&format!("{output}: {written} of {of} Gaussians\n")),
+        }
     }
 }
 

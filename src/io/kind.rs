@@ -1,5 +1,13 @@
 //! What a file is, by its first bytes: for messages on files that hold something else than their name says.
 
+use crate::error::{Error, Result};
+use crate::io::read;
+use std::io::Read;
+use std::path::Path;
+
+/// First bytes that tell what a file is.
+const FIRST: u64 = 512;
+
 /// What a file is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Content {
@@ -10,7 +18,6 @@ pub(crate) struct Content {
 }
 
 const PHOTO: &str = "";
-const MODEL: &str = "";
 const CONVERT: &str = "convert it to JPEG or PNG";
 const VIDEO: &str = "extract its frames as photos first, as with ffmpeg";
 const UNPACK: &str = "unpack it first";
@@ -80,10 +87,10 @@ const MAGIC: [Magic; 57] = [
     (0, b"BZh", "a file packed by bzip2", UNPACK),
     (0, b"\x28\xB5\x2F\xFD", "a file packed by Zstandard", UNPACK),
     (0, b"\x93NUMPY", "a NumPy array", OTHER),
-    (0, b"ply\n", "a PLY", MODEL),
-    (0, b"ply\r", "a PLY", MODEL),
-    (0, b"NGSP", "an SPZ", MODEL),
-    (0, b"glTF", "a GLB", MODEL),
+    (0, b"ply\n", "a PLY", "name it *.ply"),
+    (0, b"ply\r", "a PLY", "name it *.ply"),
+    (0, b"NGSP", "an SPZ", "name it *.spz"),
+    (0, b"glTF", "a GLB", "name it *.glb"),
     (0, b"\x80\x02", "a pickle of Python", OTHER),
 ];
 
@@ -117,6 +124,13 @@ pub(crate) fn name_of_content(first: &[u8]) -> Option<Content> {
     let text = first.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(first).trim_ascii_start().to_ascii_lowercase();
     let word = TEXT.iter().find(|(word, ..)| text.starts_with(word.as_bytes()));
     word.map(|&(_, what, cure)| Content { what, cure })
+}
+
+/// Returns what the file at `path` is, if its first bytes tell.
+pub(crate) fn of_file(path: &Path) -> Result<Option<Content>> {
+    let mut first = Vec::new();
+    read::open(path)?.take(FIRST).read_to_end(&mut first).map_err(Error::read(path))?;
+    Ok(name_of_content(&first))
 }
 
 impl Content {
