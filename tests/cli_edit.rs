@@ -310,3 +310,34 @@ fn models_are_cleaned_and_transformed_with_their_names() {
     }
     refused(&["clean", &source, "--inside", "0,0,0,-1,1,1", "-o", &to]);
 }
+
+/// A wrong extension is refused before anything is read: the model here does not exist.
+#[test]
+fn nothing_is_written_under_a_wrong_extension() {
+    let folder = tempfile::tempdir().expect("folder");
+    let at = |name: &str| folder.path().join(name).to_str().expect("UTF-8").to_owned();
+    let (none, out) = (at("none.ply"), at("x.obj"));
+    let labels = ["--labels", "1", "-o", &out];
+    let commands: [&[&str]; 11] = [
+        &[&["extract", none.as_str()] as &[&str], &labels].concat(),
+        &[&["remove", none.as_str()] as &[&str], &labels].concat(),
+        &[&["merge", none.as_str()] as &[&str], &labels].concat(),
+        &[&["split-components", none.as_str()] as &[&str], &labels].concat(),
+        &[&["recolour", none.as_str(), "--colour", "black"] as &[&str], &labels].concat(),
+        &["relabel", &none, "--map", "1=2", "-o", &out],
+        &["clean", &none, "--max-size", "1", "-o", &out],
+        &["transform", &none, "--up", "z", "-o", &out],
+        &["convert", &none, &out],
+        &["simplify", &none, "--scene", &none, "--gaussians", "5", "-o", &out],
+        &["label", &none, "--scene", &none, "--masks", &none, "-o", &out],
+    ];
+    for args in commands {
+        let message = refused(args);
+        assert!(message.contains(".obj is no extension of a model") && message.contains(".ply, .spz"), "{message}");
+    }
+    assert!(refused(&["convert", &none, &at("x.splat")]).contains("only read"));
+    let message = refused(&["occlusion", &none, "--masks", &none, "--model", &none, "-o", &at("x.ply")]);
+    assert!(message.contains("ends in .json"), "{message}");
+    assert!(refused(&["report", &none, "-o", &at("x.png")]).contains("ends in .html"));
+    assert_eq!(std::fs::read_dir(folder.path()).expect("a folder").count(), 0);
+}

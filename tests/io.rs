@@ -1,9 +1,11 @@
 //! Readers and writers of all file formats, on files that the tests write.
 
+mod axes;
 mod checkpoint;
 mod colmap;
 mod depths;
 pub mod fixtures;
+mod foreign;
 mod formats;
 mod init;
 mod label_table;

@@ -1,6 +1,6 @@
 //! `eval --removal` and `remove --fill` on a made scene, and their bad inputs.
 
-use crate::cli_edit::{refused_with as refused, succeeds};
+use crate::cli_edit::{labelgs, refused_with as refused, succeeds};
 use labelgs::io::{read_model, write_model};
 use serde_json::Value;
 use std::path::Path;
@@ -60,7 +60,11 @@ fn removals_are_scored_and_filled() {
         |row: usize| rows.next_if(|&(mean, colour)| (*mean, *colour) == (plain.means[row], plain.sh0[row])).is_some();
     assert_eq!(plain.filtered(is_kept), kept);
     let first = std::fs::read(&closed).expect("PLY");
-    succeeds(&args);
+    let told = String::from_utf8(labelgs(&args).stdout).expect("text");
+    let of = result["of"].as_u64().expect("a number");
+    let removed = of + added - filled.len() as u64;
+    let expected = format!("{} Gaussians: of {of} before, {removed} removed; {added} added\n", filled.len());
+    assert!(told.ends_with(&expected), "{told}");
     assert!(std::fs::read(&closed).expect("PLY") == first, "two runs differ");
     let lit = succeeds(&args.iter().filter(|&&word| word != "--keep-shadow").copied().collect::<Vec<_>>());
     assert!(lit["lit"].is_u64() && lit["hidden"] == result["hidden"], "{lit}");

@@ -5,6 +5,7 @@ use super::context::Context;
 use super::labelled::{Edited, TableArg, Target, open, wants_json};
 use super::output::WriteArgs;
 use super::stdout;
+use super::values::model_file;
 use crate::Result;
 use crate::edit::catalogue::Catalogue;
 use crate::edit::rename::keep;
@@ -23,7 +24,7 @@ pub struct ConvertArgs {
     #[arg(value_name = "MODEL")]
     pub model: PathBuf,
     /// File to write; its ending is the format. Names of its labels go to OUT.labels.json beside it.
-    #[arg(value_name = "OUT")]
+    #[arg(value_name = "OUT", value_parser = model_file())]
     pub output: PathBuf,
     /// Write a file for each label instead, such as OUT_003_cup.spz: the way to keep objects apart in programs without
     /// labels. Gaussians without a label go to OUT_000_none.spz.
@@ -48,7 +49,7 @@ pub(crate) fn run(args: &ConvertArgs, context: &Context) -> Result<()> {
     if args.per_object {
         return per_object(args, &model, &known, print_json);
     }
-    let edited = Edited { model: &model, table: known.table, of: model.len(), labels: &labels };
+    let edited = Edited { model: &model, table: known.table, of: model.len(), added: 0, labels: &labels };
     edited.finish(&Target::new((&args.model, &args.output), args.write, print_json), json!({}))
 }
 

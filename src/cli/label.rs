@@ -8,7 +8,7 @@ use super::model_fit::warn_of_misfit;
 use super::output::WriteArgs;
 use super::scene::{near_plane, open_gpu, open_scene};
 use super::stdout;
-use super::values::{near, switch};
+use super::values::{model_file, near, switch};
 use crate::edit::select::summarise;
 use crate::gpu::Gpu;
 use crate::io::label_table::LabelTable;
@@ -44,7 +44,7 @@ pub struct LabelArgs {
     #[arg(long)]
     pub per_view: bool,
     /// File to write.
-    #[arg(short, long, value_name = "OUT.ply")]
+    #[arg(short, long, value_name = "OUT.ply", value_parser = model_file())]
     pub output: PathBuf,
     /// How it is written.
     #[command(flatten)]

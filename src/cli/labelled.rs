@@ -5,7 +5,7 @@ use super::context::Context;
 use super::output::WriteArgs;
 use super::shell::quoted;
 use super::stdout;
-use super::values::share;
+use super::values::{model_file, share};
 use crate::edit::catalogue::Catalogue;
 use crate::edit::select::{MIN_LABEL_CONFIDENCE, Tally, extract};
 use crate::io::label_table::LabelTable;
@@ -45,7 +45,7 @@ pub struct EditArgs {
     #[arg(value_name = "MODEL")]
     pub model: PathBuf,
     /// File to write; its ending is the format. Names of its labels go to OUT.labels.json beside it.
-    #[arg(short, long, value_name = "OUT.ply")]
+    #[arg(short, long, value_name = "OUT.ply", value_parser = model_file())]
     pub output: PathBuf,
     /// How it is written.
     #[command(flatten)]
@@ -73,7 +73,7 @@ impl EditArgs {
         more: serde_json::Value,
     ) -> Result<()> {
         let labels: BTreeSet<u32> = model.labels.iter().flatten().copied().collect();
-        Edited { model, table: known.table, of, labels: &labels }.finish(&self.target(context), more)
+        Edited { model, table: known.table, of, added: 0, labels: &labels }.finish(&self.target(context), more)
     }
 }
 
@@ -185,6 +185,8 @@ pub(crate) struct Edited<'a> {
     pub table: Option<LabelTable>,
     /// Number of Gaussians of the source.
     pub of: usize,
+    /// Number of Gaussians that the source has not.
+    pub added: u64,
     /// Labels that were chosen or made.
     pub labels: &'a BTreeSet<u32>,
 }
@@ -210,13 +212,14 @@ impl Edited<'_> {
             }
             return stdout::print_json(&result);
         }
-        let of = self.of as u64;
-        // A filled place can make a model larger.
-        let share = match written <= of {
-            true => format!("{written} of {}", counted(of, "Gaussian")),
-            false => format!("{}, of {of} before", counted(written, "Gaussian")),
-        };
-        stdout::print(&format!("{}: {share}\n", to.output.display()))
+        let (output, of, added) = (to.output.display(), self.of, self.added);
+        match (of as u64 + added).checked_sub(written).filter(|_| added > 0) {
+            Some(removed) => stdout::print(&format!(
+                "{output}: {}: of {of} before, {removed} removed; {added} added\n",
+                counted(written, "Gaussian")
+            )),
+            None => stdout::print(&format!("{output}: {written} of {}\n", counted(of as u64, "Gaussian"))),
+        }
     }
 }
 

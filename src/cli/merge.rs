@@ -32,6 +32,6 @@ pub(crate) fn run(args: &MergeArgs, context: &Context) -> Result<()> {
     let labels = or_list(known.resolve("--labels", &args.labels.0), &args.edit.model)?;
     let Merged { model: merged, table, into } = merge(&model, &known, &labels, args.into, args.name.as_deref())?;
     let into = BTreeSet::from([into]);
-    let edited = Edited { model: &merged, table, of: model.len(), labels: &into };
+    let edited = Edited { model: &merged, table, of: model.len(), added: 0, labels: &into };
     edited.finish(&args.edit.target(context), json!({ "merged": labels }))
 }

@@ -30,7 +30,7 @@ pub(crate) fn run(args: &RecolourArgs, context: &Context) -> Result<()> {
     let labels = select.choice.labels(&select.model, &model, &known, context)?;
     let painted = recolour(&model, &labels, args.colour, args.mix);
     let table = known.table.clone();
-    let edited = Edited { model: &painted, table, of: model.len(), labels: &labels };
+    let edited = Edited { model: &painted, table, of: model.len(), added: 0, labels: &labels };
     let count: u64 = labels.iter().filter_map(|label| known.gaussians.get(label)).sum();
     edited.finish(&select.target(context), json!({ "recoloured": count }))
 }

@@ -30,6 +30,7 @@ pub(crate) fn run(args: &RelabelArgs, context: &Context) -> Result<()> {
         model: &relabel(&model, map),
         table: known.table.as_ref().map(|table| renumber(table, map)),
         of: model.len(),
+        added: 0,
         labels: &map.values().copied().collect(),
     };
     edited.finish(&args.edit.target(context), json!({ "map": map }))

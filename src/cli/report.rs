@@ -2,6 +2,7 @@
 
 use super::context::Context;
 use super::stdout;
+use super::values::page_file;
 use crate::Result;
 use crate::run::report::{FILE, write};
 use clap::Args;
@@ -15,7 +16,7 @@ pub struct ReportArgs {
     #[arg(value_name = "RUN", required = true)]
     pub runs: Vec<PathBuf>,
     /// The page. Default: report.html in RUN, or here if there are several runs.
-    #[arg(short, long, value_name = "FILE")]
+    #[arg(short, long, value_name = "FILE", value_parser = page_file())]
     pub output: Option<PathBuf>,
 }
 

@@ -9,7 +9,7 @@ use super::model_fit::warn_of_misfit;
 use super::occlusion::from_model;
 use super::output::WriteArgs;
 use super::scene::{near_plane, open_gpu, open_scene};
-use super::values::{distance, share};
+use super::values::{distance, model_file, share};
 use crate::edit::change::without_specks;
 use crate::edit::components::Grouping;
 use crate::edit::fill::{Filled, Light, fill};
@@ -35,7 +35,7 @@ pub struct SelectArgs {
     #[arg(value_name = "MODEL")]
     pub model: PathBuf,
     /// File to write; its ending is the format. Names of its labels go to OUT.labels.json beside it.
-    #[arg(short, long, value_name = "OUT.ply")]
+    #[arg(short, long, value_name = "OUT.ply", value_parser = model_file())]
     pub output: PathBuf,
     /// How it is written.
     #[command(flatten)]
@@ -131,6 +131,7 @@ pub(crate) fn run_extract(args: &ExtractArgs, context: &Context) -> Result<()> {
         model: &part,
         table: known.table.as_ref().map(|table| keep(table, |id| labels.contains(&id))),
         of: known.gaussians.values().sum::<u64>() as usize,
+        added: 0,
         labels: &labels,
     };
     edited.finish(&select.target(context), json!({ "specks": whole.len() - part.len() }))
@@ -155,8 +156,8 @@ pub(crate) fn run_remove(args: &RemoveArgs, context: &Context) -> Result<()> {
     let select = &args.select;
     let (model, known) = open(&select.model, &select.choice.prompts.table)?;
     let labels = select.choice.labels(&select.model, &model, &known, context)?;
-    let (part, more) = match select.choice.scene.as_deref().filter(|_| args.fill) {
-        None => (remove(&model, &listed(&labels))?, json!({})),
+    let (part, added, more) = match select.choice.scene.as_deref().filter(|_| args.fill) {
+        None => (remove(&model, &listed(&labels))?, 0, json!({})),
         Some(scene) => {
             let filled = filled(args, scene, &model, &listed(&labels), context)?;
             let added: u64 = filled.added.values().sum();
@@ -165,13 +166,14 @@ pub(crate) fn run_remove(args: &RemoveArgs, context: &Context) -> Result<()> {
                 "filled: {}; {hidden} that nobody saw are gone; {lit} lost a shadow",
                 counted(added, "new Gaussian")
             );
-            (filled.model, json!({ "added": filled.added, "hidden": hidden, "lit": lit }))
+            (filled.model, added, json!({ "added": filled.added, "hidden": hidden, "lit": lit }))
         }
     };
     let edited = Edited {
         model: &part,
         table: known.table.as_ref().map(|table| keep(table, |id| !labels.contains(&id))),
         of: model.len(),
+        added,
         labels: &labels,
     };
     edited.finish(&select.target(context), more)

@@ -41,6 +41,7 @@ pub(crate) fn run(args: &SplitArgs, context: &Context) -> Result<()> {
         model: &found.model,
         table: known.table.as_ref().map(|table| split(table, &found.ids)),
         of: model.len(),
+        added: 0,
         labels: &found.ids.values().flatten().copied().collect(),
     };
     edited.finish(&args.edit.target(context), json!({ "parts": found.ids, "specks": found.specks }))

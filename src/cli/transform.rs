@@ -4,7 +4,7 @@ use super::context::Context;
 use super::labelled::{EditArgs, open};
 use super::values::{direction, factor, place};
 use crate::Result;
-use crate::edit::turn::Transform;
+use crate::edit::Transform;
 use clap::Args;
 use glam::{DQuat, DVec3};
 use serde_json::json;

@@ -1,10 +1,14 @@
 //! Parsers of single values.
 
+use crate::Error;
 use crate::edit::catalogue::Pick;
+use crate::io::model::check_output;
 use crate::options::parse;
 use crate::scene::MODEL_LABEL_MAX;
+use clap::builder::{PathBufValueParser, TypedValueParser};
 use glam::DVec3;
 use std::collections::BTreeMap;
+use std::path::PathBuf;
 
 pub(crate) use crate::options::parse::{bytes, colour, count, switch};
 
@@ -37,6 +41,35 @@ pub struct Renumbering(pub BTreeMap<u32, u32>);
 /// Width and height, px.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Size(pub u32, pub u32);
+
+/// Parses the path of a model to write: a wrong extension is refused before any work.
+pub(crate) fn model_file() -> impl TypedValueParser<Value = PathBuf> {
+    PathBufValueParser::new().try_map(|path| match check_output(&path) {
+        Err(Error::Usage { problem, .. }) => Err(problem),
+        Err(other) => Err(other.to_string()),
+        Ok(()) => Ok(path),
+    })
+}
+
+/// Parses the path of a file of JSON to write.
+pub(crate) fn json_file() -> impl TypedValueParser<Value = PathBuf> {
+    file_of("json", "JSON")
+}
+
+/// Parses the path of a page to write.
+pub(crate) fn page_file() -> impl TypedValueParser<Value = PathBuf> {
+    file_of("html", "a page of HTML")
+}
+
+/// Parses a path whose extension, if it has one, is that of what is written.
+fn file_of(ending: &'static str, what: &'static str) -> impl TypedValueParser<Value = PathBuf> {
+    PathBufValueParser::new().try_map(move |path| match path.extension() {
+        Some(other) if !other.eq_ignore_ascii_case(ending) => {
+            Err(format!("this is {what}; expected a name that ends in .{ending}"))
+        }
+        _ => Ok(path),
+    })
+}
 
 /// Parses labels such as `1,4-6,cup`. Digits and dashes alone are an id or a range of ids.
 pub(crate) fn picks(text: &str) -> Result<Picks, String> {

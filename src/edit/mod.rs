@@ -16,8 +16,8 @@ pub(crate) mod prompt;
 pub(crate) mod rename;
 pub(crate) mod select;
 pub(crate) mod simplify;
-pub(crate) mod turn;
 
+pub use crate::io::model::Transform;
 pub use catalogue::{Catalogue, Pick};
 pub use change::{Specks, Split, recolour, relabel, split_components, without_specks};
 pub use clean::{Cleaned, Cleaning, clean};
@@ -27,4 +27,3 @@ pub use merge::{Merged, merge};
 pub use prompt::{Place, Prompt, choose};
 pub use select::{LabelSummary, MIN_LABEL_CONFIDENCE, extract, remove, summarise};
 pub use simplify::Simplifier;
-pub use turn::Transform;

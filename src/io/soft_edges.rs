@@ -3,6 +3,7 @@
 //! A blur, a filter that resizes, and JPEG make such pixels. Each of their values counts as an object, and those of masks
 //! with many ids belong to others.
 
+use crate::Setting;
 use std::collections::BTreeMap;
 
 /// Shortest run of one value that counts as an area, px.
@@ -105,10 +106,10 @@ pub(crate) fn problem(masks: &[(&str, &Edges)]) -> Option<String> {
     Some(format!(
         "{} of {} masks looked at have soft edges, such as that of {first}: values between those of two areas lie at their \
          edges, and each counts as an object. A blur, a filter that resizes, and JPEG make them. Make the masks again and \
-         resize them with the nearest pixel; `masks import` with `format = binary` cuts masks of one object at half of the \
-         range",
+         resize them with the nearest pixel; `masks import` with {} cuts masks of one object at half of the range",
         soft.len(),
-        masks.len()
+        masks.len(),
+        Setting("format").to("binary")
     ))
 }
 

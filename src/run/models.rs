@@ -8,7 +8,9 @@ use crate::render::Rendered;
 use crate::scene::colour::to_byte;
 use crate::scene::labels::label_colour;
 use crate::scene::{Camera, Gaussians, Photo};
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
 
 /// Folder for the models of earlier runs.
 const EARLIER: &str = "earlier";
@@ -61,8 +63,15 @@ pub(crate) fn scan(path: &Path, model: ModelRef, see: impl FnMut(u64, &Row)) -> 
     Ok(())
 }
 
+/// Logs notes of a reader, each once: some commands read a model twice.
 pub(crate) fn log_notes(path: &Path, notes: &[String]) {
-    notes.iter().for_each(|note| tracing::warn!("{}: {note}", path.display()));
+    static TOLD: Mutex<BTreeSet<String>> = Mutex::new(BTreeSet::new());
+    for note in notes {
+        let note = format!("{}: {note}", path.display());
+        if TOLD.lock().unwrap_or_else(PoisonError::into_inner).insert(note.clone()) {
+            tracing::warn!("{note}");
+        }
+    }
 }
 
 /// Returns the file of a model, or of the latest one in the folder of a run.

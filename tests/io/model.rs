@@ -73,25 +73,37 @@ fn a_format_that_is_added_is_read_and_written_by_its_endings() {
     write_model(scene.at("a.ply"), &balls()).expect("written");
     assert!(std::fs::read(scene.at("a.ply")).expect("bytes").starts_with(b"ply\n"));
     let refused = refusal(read_model(scene.write("a.cloud", "1 2 3\n")));
-    assert!(refused.contains(".cloud was read as PLY, known endings of models are .balls, .balls.txt, .ply"));
+    assert!(refused.contains(".cloud is no extension of a model; .balls, .balls.txt, .ply"), "{refused}");
 }
 
+/// Nothing is written under a wrong extension, nor read under one. A file without an extension is known by its content.
 #[test]
-fn any_other_ending_may_be_a_ply() {
+fn an_unknown_extension_is_refused() {
     let scene = Scene::new();
-    for name in ["a.PLY", "a.points", "a", "a.ply.bak"] {
-        write_model(scene.at(name), &balls()).expect("written");
-        assert!(std::fs::read(scene.at(name)).expect("bytes").starts_with(b"ply\n"), "{name}");
-        assert_eq!(read_model(scene.at(name)).expect("read").gaussians, balls(), "{name}");
+    write_model(scene.at("a.PLY"), &balls()).expect("written");
+    let bytes = std::fs::read(scene.at("a.PLY")).expect("bytes");
+    for name in ["a.obj", "a.ply.bak", "a.usdz", "a.gltf", "a.ksplat", "a"] {
+        let error = write_model(scene.at(name), &balls()).expect_err("no format");
+        assert_eq!(labelgs::internals::cli::status::exit_status(&error), 2, "{error}");
+        let error = error.to_string();
+        assert!(error.contains(".ply, .spz, .glb, .sog, .html") && !scene.path().join(name).exists(), "{error}");
+        let read = read_model(scene.write(name, &bytes));
+        if name == "a" {
+            assert_eq!(read.expect("read by its content").gaussians, balls());
+        } else {
+            let refused = refusal(read);
+            assert!(refused.contains("is no extension of a model") && refused.contains(".ply"), "{refused}");
+        }
     }
-    let problem = |name: &str| {
-        let path = scene.write(name, "no header\n");
-        refusal(read_model(&path)).replace(&path.display().to_string(), "")
-    };
-    let (ply, none, other) = (problem("b.ply"), problem("b"), problem("b.cloud"));
-    assert_eq!(ply, none);
-    assert!(other.starts_with(&format!("{ply}; .cloud was read as PLY, known endings of models are ")), "{other}");
-    assert!(other.contains(".ply"), "{other}");
+    for format in ["spz", "glb", "sog"] {
+        write_model(scene.at(&format!("b.{format}")), &balls()).expect("written");
+        std::fs::rename(scene.at(&format!("b.{format}")), scene.at("b")).expect("renamed");
+        assert_eq!(read_model(scene.at("b")).expect("read by its content").gaussians.len(), balls().len());
+    }
+    let refused = refusal(read_model(scene.write("video.mp4", b"\0\0\0\x20ftypisom\0\0\0\0")));
+    assert!(refused.contains("is a video (MP4), not a model"), "{refused}");
+    assert!(refusal(read_model(scene.write("c", "no model\n"))).contains("it has no extension"));
+    assert!(refusal(read_model(scene.at("missing"))).contains("no such file"));
 }
 
 #[test]

@@ -259,7 +259,7 @@ fn labels_of_any_type_are_whole_numbers_below_two_to_the_31() {
     let typed = text.replace("property ushort label", "property double label");
     let read = read_model(scene.write("a.ply", typed.replace("65535", "2147483647"))).expect("read");
     assert_eq!(read.gaussians.labels, Some(vec![2_147_483_647]));
-    for bad in ["2147483648", "-1", "1.5", "nan", "1e99"] {
+    for bad in ["2147483648", "-2", "1.5", "nan", "1e99"] {
         let error = refusal(read_model(scene.write("a.ply", typed.replace("65535", bad))));
         assert!(error.contains("vertex 0") && error.contains("2147483647"), "{error}");
     }

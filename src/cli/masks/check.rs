@@ -3,7 +3,7 @@
 use super::open_photos;
 use crate::cli::args::{JsonFlag, ReadArgs};
 use crate::cli::context::Context;
-use crate::cli::{stdout, wording};
+use crate::cli::stdout;
 use crate::io::masks::check::{Finding, Problem};
 use crate::io::masks::{Report, inspect};
 use crate::{Error, Result};
@@ -67,5 +67,5 @@ fn table(args: &CheckArgs, report: &Report) -> String {
 fn line(finding: &Finding) -> String {
     let view = finding.view.as_deref().unwrap_or("-");
     let id = finding.id.map_or("-".to_owned(), |id| id.to_string());
-    format!("{:>12} {view:>16} {id:>6}  {}\n", finding.problem.text(), wording::message(&finding.text))
+    format!("{:>12} {view:>16} {id:>6}  {}\n", finding.problem.text(), finding.text)
 }

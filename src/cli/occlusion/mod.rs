@@ -5,6 +5,7 @@ use super::context::{Context, open_model};
 use super::log::Progress;
 use super::scene::{near_plane, open_gpu};
 use super::stdout;
+use super::values::json_file;
 use crate::engine::Engine;
 use crate::gpu::Gpu;
 use crate::io::image::write_png_rgb8;
@@ -41,7 +42,7 @@ pub struct OcclusionArgs {
     #[arg(long, value_name = "MODEL")]
     pub model: Option<PathBuf>,
     /// File to write.
-    #[arg(short, long, value_name = "FILE.json")]
+    #[arg(short, long, value_name = "FILE.json", value_parser = json_file())]
     pub output: PathBuf,
     /// Folder for a picture of each view, NAME.png: contours are white in front, black behind, grey if undecided.
     #[arg(long, value_name = "DIR")]

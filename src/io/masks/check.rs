@@ -1,6 +1,7 @@
 //! Checks of masks, by comparison with the masks of the other photos. This module reads no files.
 
 use super::shortened;
+use crate::Setting;
 use crate::io::soft_edges::{self, Edges};
 use crate::scene::median::median;
 use crate::scene::{Camera, LabelMap, Point};
@@ -207,8 +208,9 @@ pub(crate) fn one_area(masks: usize, id: u16) -> String {
 pub(crate) fn held_out(photos: &[&str]) -> String {
     format!(
         "only photos that are held out for scores have masks, and nothing learns from these: {}. Add masks of other \
-         photos, or hold out others by `test_every` of the training",
-        shortened(photos)
+         photos, or hold out others by {} of the training",
+        shortened(photos),
+        Setting("test_every")
     )
 }
 

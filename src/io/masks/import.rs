@@ -95,8 +95,10 @@ pub fn import(dataset: &Dataset, options: &ImportOptions, output: &Path) -> Resu
     let edges = with_mask.iter().zip(&surveys).map(|(&photo, survey)| (names[photo], &survey.edges));
     let soft = soft_edges::problem(&edges.collect::<Vec<_>>());
     if let (Some(problem), Format::Auto) = (&soft, options.format) {
-        let problem =
-            format!("{problem}. To import every value as an object, set {}", Setting("format").to(reading.format.name()));
+        let problem = format!(
+            "{problem}. To import every value as an object, set {}",
+            Setting("format").to(reading.format.name())
+        );
         return Err(Error::data(&reading.root, "", problem));
     }
     let overlaps = overlaps(&reading, &surveys, |at| names[with_mask[at]])?;

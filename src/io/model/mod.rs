@@ -14,12 +14,13 @@ mod side_labels;
 mod sog;
 mod splat;
 mod spz;
+mod transform;
 mod turn;
 pub(crate) mod values;
 
 use crate::error::{Error, Result};
-use crate::io::atomic;
 use crate::io::label_table::LabelTable;
+use crate::io::{atomic, kind};
 use crate::scene::Gaussians;
 use crate::stage::Stage;
 use std::path::Path;
@@ -29,10 +30,11 @@ pub use lazy::{LazyModel, ModelRef};
 pub use ply::StoredModel;
 pub(crate) use ply::write_joined;
 pub(crate) use rows::Row;
+pub use transform::Transform;
 
 pub use format::{Export, FirstView, LabelType, ModelFormat, ModelWriter, ReadModel, SpzVersion, WriteOptions};
 
-/// Formats of labelgs. The first one also serves unknown extensions, such as `/dev/stdout`.
+/// Formats of labelgs. The first one also serves pipes and devices, such as `/dev/stdout`.
 const SHIPPED: [&ModelFormat; 6] =
     [&ply::FORMAT, &spz::FORMAT, &glb::FORMAT, &sog::FORMAT, &splat::FORMAT, &html::FORMAT];
 
@@ -61,43 +63,100 @@ pub(crate) fn is_page(path: &Path) -> bool {
     by_ending(path).is_some_and(|format| format.name == html::FORMAT.name)
 }
 
-/// Reads a model in the format of its extension. A file with an unknown extension is read as PLY; if that fails, the
-/// error lists the known extensions.
+/// Returns all known extensions of formats that are `chosen`.
+fn endings(chosen: impl Fn(&ModelFormat) -> bool) -> String {
+    let all = formats().into_iter().filter(|format| chosen(format));
+    all.flat_map(|format| format.endings).copied().collect::<Vec<_>>().join(", ")
+}
+
+/// What is wrong with the extension of a path, for a message.
+fn unknown_ending(path: &Path) -> String {
+    let ending = path.extension().map(|ending| format!(".{}", ending.display()));
+    ending.map_or("it has no extension".to_owned(), |ending| format!("{ending} is no extension of a model"))
+}
+
+/// Returns the format in which a path is read: that of its extension. A file without one is known by its first bytes, and a
+/// pipe is a PLY.
+fn format_to_read(path: &Path) -> Result<&'static ModelFormat> {
+    if let Some(format) = by_ending(path) {
+        return Ok(format);
+    }
+    if !path.exists() {
+        return Err(Error::data(path, "", "there is no such file"));
+    }
+    if !path.is_file() {
+        return Ok(SHIPPED[0]);
+    }
+    let content = kind::of_file(path)?;
+    let own = |format: &&'static ModelFormat| content.is_some_and(|content| contents(format).contains(&content.what));
+    if let Some(format) = SHIPPED.into_iter().find(own).filter(|_| path.extension().is_none()) {
+        return Ok(format);
+    }
+    let problem = unknown_ending(path);
+    let what = content.map_or(String::new(), |content| format!(" and the file {}", content.told("a model")));
+    let cure = "give the file the extension of its format, or export it in one of these";
+    Err(Error::data(path, "", format!("{problem}{what}; {} are read: {cure}", endings(|_| true))))
+}
+
+/// What the first bytes of a format say that it is.
+fn contents(format: &ModelFormat) -> &'static [&'static str] {
+    match format.name {
+        "PLY" => &["a PLY"],
+        "SPZ" => &["an SPZ", "a file packed by gzip"],
+        "GLB" => &["a GLB"],
+        "SOG" => &["a zip archive"],
+        "HTML" => &["a web page", "a page of HTML or XML"],
+        _ => &[],
+    }
+}
+
+/// Returns the error of a reader, or what the file is instead if its first bytes tell.
+fn explained(path: &Path, format: &ModelFormat, error: Error) -> Error {
+    let content = if path.is_file() { kind::of_file(path).ok().flatten() } else { None };
+    match content.filter(|content| !contents(format).contains(&content.what)) {
+        Some(content) => Error::data(path, "byte 0", content.told(&format!("a file of the format {}", format.name))),
+        None => error,
+    }
+}
+
+/// Reads a model in the format of its extension; an unknown one is an error.
 pub fn read_model(path: impl AsRef<Path>) -> Result<ReadModel> {
     let path = path.as_ref();
     let _stage = Stage::new(format_args!("reading {}", path.display()), 0);
-    let Some(format) = by_ending(path) else {
-        return (SHIPPED[0].read)(path).map_err(|error| with_endings(path, error));
-    };
-    let read = (format.read)(path)?;
+    let format = format_to_read(path)?;
+    let read = (format.read)(path).map_err(|error| match error {
+        Error::Data { .. } => explained(path, format, error),
+        other => other,
+    })?;
     read.gaussians.check()?;
     Ok(read)
 }
 
 /// Opens a model that can stay in its file, or returns `None` for one that is read whole.
 fn open_stored(path: &Path) -> Result<Option<StoredModel>> {
-    match by_ending(path) {
-        Some(format) if format.name == SHIPPED[0].name => StoredModel::open(path),
-        Some(_) => Ok(None),
-        // Reading it whole tells what is wrong with a file of an unknown ending.
-        None => StoredModel::open(path).or(Ok(None)),
-    }
+    if format_to_read(path)?.name == SHIPPED[0].name { StoredModel::open(path) } else { Ok(None) }
 }
 
-/// Adds the known extensions to the error of a file that was read as the first format by default.
-fn with_endings(path: &Path, error: Error) -> Error {
-    match (error, path.extension()) {
-        (Error::Data { path, place, problem }, Some(ending)) => {
-            let known: Vec<&str> = formats().into_iter().flat_map(|format| format.endings).copied().collect();
-            let (ending, name, known) = (ending.display(), SHIPPED[0].name, known.join(", "));
-            let problem = format!("{problem}; .{ending} was read as {name}, known endings of models are {known}");
-            Error::Data { path, place, problem }
-        }
-        (error, _) => error,
-    }
+/// Returns how a model is written at a path: by its extension. An unknown one is an error; a pipe or a device without one
+/// gets a PLY.
+fn writer_for(path: &Path) -> Result<ModelWriter> {
+    let is_pipe = || path.extension().is_none() && path.exists() && !path.is_file() && !path.is_dir();
+    let format = by_ending(path).or_else(|| is_pipe().then_some(SHIPPED[0]));
+    let problem = match format {
+        Some(ModelFormat { write: Some(writer), .. }) => return Ok(*writer),
+        Some(format) => format!("{} files are only read", format.name),
+        None => unknown_ending(path),
+    };
+    let known = endings(|format| format.write.is_some());
+    Err(Error::usage(path.display().to_string(), format!("{problem}; models are written as {known}")))
 }
 
-/// Writes a model in the format of its extension; PLY if it is unknown. Leaves out rows that are not finite and returns
+/// Refuses a path at which no model can be written because of its extension.
+pub(crate) fn check_output(path: &Path) -> Result<()> {
+    writer_for(path).map(drop)
+}
+
+/// Writes a model in the format of its extension; an unknown one is an error. Leaves out rows that are not finite and returns
 /// their number. The write is atomic. What the format cannot hold is logged as a warning.
 pub fn write_model(path: impl AsRef<Path>, model: &Gaussians) -> Result<u64> {
     write(path.as_ref(), model, None, WriteOptions::default(), false)
@@ -124,14 +183,7 @@ fn write(
 ) -> Result<u64> {
     let _stage = Stage::new(format_args!("writing {}", path.display()), 0);
     model.check()?;
-    let format = by_ending(path).unwrap_or(SHIPPED[0]);
-    let Some(writer) = format.write else {
-        let all = formats().into_iter().filter(|format| format.write.is_some());
-        let known: Vec<&str> = all.flat_map(|format| format.endings).copied().collect();
-        let problem =
-            format!("{} files are only read; formats that are written end in {}", format.name, known.join(", "));
-        return Err(Error::usage(path.display().to_string(), problem));
-    };
+    let writer = writer_for(path)?;
     let rows: Vec<usize> = (0..model.len()).filter(|&row| model.is_finite(row)).collect();
     let export = Export::new(model, &rows, names, options);
     (writer.losses)(&export)?.iter().for_each(|loss| tracing::warn!("{}: {loss}", path.display()));

@@ -1,17 +1,17 @@
-//! Half turns between the axes of file formats. Ours are those of COLMAP and of the 3DGS PLY: x right, y down, z forward.
+//! Signs between the axes of file formats. Ours are those of COLMAP and of the 3DGS PLY: x right, y down, z forward.
 
-/// A half turn, as the signs of the axes x, y, z; two of them are negative. It is its own inverse.
+/// The signs of the axes x, y, z: a half turn, or a mirror if their product is negative. Its own inverse.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct HalfTurn(pub(super) [f32; 3]);
+pub(super) struct Signs(pub(super) [f32; 3]);
 
-impl HalfTurn {
+impl Signs {
     /// Turns a position.
     pub(super) fn position(self, at: [f32; 3]) -> [f32; 3] {
         let Self([x, y, z]) = self;
         [x * at[0], y * at[1], z * at[2]]
     }
 
-    /// Turns a rotation (w, x, y, z) along.
+    /// Turns a rotation (w, x, y, z) along. A mirror turns its axis and its sense, and leaves the ellipsoid right.
     pub(super) fn quat(self, quat: [f32; 4]) -> [f32; 4] {
         let Self([x, y, z]) = self;
         [quat[0], y * z * quat[1], x * z * quat[2], x * y * quat[3]]

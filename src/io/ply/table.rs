@@ -11,6 +11,8 @@ use std::path::{Path, PathBuf};
 
 /// Most bytes of a header; that of a 3DGS file has about 1.5 KiB.
 const HEADER_MAX: u64 = 64 * 1024;
+/// The byte order mark that some editors of text write first.
+const BOM: &[u8] = b"\xEF\xBB\xBF";
 /// Most bytes in a line of an ascii row.
 const LINE_MAX: u64 = 64 * 1024;
 
@@ -284,7 +286,11 @@ fn header_bytes(path: &Path, file: &mut impl BufRead) -> Result<Vec<u8>> {
         let start = text.len();
         let read = limited.read_until(b'\n', &mut text).map_err(Error::read(path))?;
         let line = text[start..].trim_ascii_end();
-        if start == 0 && line != b"ply" {
+        if start == 0 && line.strip_prefix(BOM).unwrap_or(line) != b"ply" {
+            if line.starts_with(b"ply\r") {
+                let problem = "its lines end with CR alone, as on old Macs; export it again with LF";
+                return Err(Error::data(path, "header", problem));
+            }
             let unknown = || "does not start with `ply`; this is not a PLY file".to_owned();
             return Err(Error::data(path, "byte 0", content.map_or_else(unknown, |content| content.told("a PLY"))));
         }
@@ -298,19 +304,35 @@ fn header_bytes(path: &Path, file: &mut impl BufRead) -> Result<Vec<u8>> {
     }
 }
 
+/// Returns the header with one space between words and without the byte order mark. Comments are free: bytes that are no
+/// UTF-8, as in names of users and folders, are replaced.
+fn plain(text: &[u8]) -> Option<String> {
+    let mut to = String::with_capacity(text.len());
+    for line in text.strip_prefix(BOM).unwrap_or(text).split(|&byte| byte == b'\n') {
+        let line = line.trim_ascii();
+        if line.starts_with(b"comment") || line.starts_with(b"obj_info") {
+            to += &String::from_utf8_lossy(line).replace(['\0', '\r'], " ");
+        } else {
+            let line = str::from_utf8(line).ok().filter(|line| !line.contains('\0'))?;
+            to += &line.split_ascii_whitespace().collect::<Vec<_>>().join(" ");
+        }
+        if !to.ends_with('\n') {
+            to.push('\n');
+        }
+    }
+    Some(to)
+}
+
 fn parse_header(path: &Path, text: &[u8]) -> Result<Header> {
     let problem = |problem: String| Error::data(path, "header", problem);
-    if text.contains(&0) || str::from_utf8(text).is_err() {
-        return Err(problem("is not text".into()));
-    }
+    let text = plain(text).ok_or_else(|| problem("a name of an element or a property is not text".into()))?;
     let header = Parser::<DefaultElement>::new()
-        .read_header(&mut Reader::new(text))
+        .read_header(&mut Reader::new(text.as_bytes()))
         .map_err(|error| problem(error.to_string().split_whitespace().collect::<Vec<_>>().join(" ")))?;
     // The crate keeps the last of two properties with the same name, which would move the later columns.
-    let declared = text.split(|&byte| byte == b'\n').filter(|line| line.trim_ascii().starts_with(b"property")).count();
+    let lines = |word: &str| text.lines().filter(|line| line.split(' ').next() == Some(word)).count();
     let kept: usize = header.elements.values().map(|element| element.properties.len()).sum();
-    let elements = text.split(|&byte| byte == b'\n').filter(|line| line.trim_ascii().starts_with(b"element")).count();
-    if declared != kept || elements != header.elements.len() {
+    if lines("property") != kept || lines("element") != header.elements.len() {
         return Err(problem("declares an element or a property twice".into()));
     }
     Ok(header)

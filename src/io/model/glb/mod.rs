@@ -4,18 +4,19 @@
 //! A GLB is a header of 12 bytes, a chunk of JSON and a chunk of numbers, on which accessors in the JSON are views.
 
 mod file;
+mod nodes;
 mod read;
 mod write;
 
 use super::format::ModelFormat;
-use super::turn::HalfTurn;
+use super::turn::Signs;
 
 /// The format by its ending.
 pub(super) const FORMAT: ModelFormat =
     ModelFormat { name: "GLB", endings: &[".glb"], read: read::read, write: Some(write::WRITER) };
 
 /// Axes of glTF as its viewers show a model of COLMAP's axes: turned about z, so that y is up.
-const AXES: HalfTurn = HalfTurn([-1.0, -1.0, 1.0]);
+const AXES: Signs = Signs([-1.0, -1.0, 1.0]);
 /// The extension of a primitive.
 const SPLATS: &str = "KHR_gaussian_splatting";
 const ROTATION: &str = "KHR_gaussian_splatting:ROTATION";

@@ -1,5 +1,6 @@
 //! Reads GLB.
 
+use super::nodes::{self, Placed};
 use super::{
     ANTIALIASED, AXES, CONFIDENCE, FEATURE, FEATURE_MAX, FEATURES, FLOAT, METADATA, OPACITY, ROTATION, SCALE, SPLATS,
     file, harmonic, harmonics,
@@ -7,12 +8,14 @@ use super::{
 use crate::error::{Error, Result};
 use crate::io::label_table::{LabelEntry, LabelTable};
 use crate::io::model::format::ReadModel;
+use crate::io::model::ply::fitting;
 use crate::io::model::rows::{Row, Rows};
+use crate::io::model::transform::Transform;
 use crate::io::model::values::log_scale;
 use crate::io::read as bytes_of;
-use crate::scene::MODEL_LABEL_MAX;
+use crate::scene::{Gaussians, MODEL_LABEL_MAX};
 use serde_json::Value;
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 /// Opacities at which the logit is still finite in 32 bits.
@@ -37,40 +40,105 @@ impl Column {
     }
 }
 
-/// Reads the first primitive with Gaussians. Nodes are not applied, as this program and others write none with a turn.
+/// Reads all primitives with Gaussians at the places of their nodes.
 pub(super) fn read(path: &Path) -> Result<ReadModel> {
     let bytes = bytes_of::bytes(path)?;
     let (root, binary) = file::split(path, &bytes)?;
     let glb = Glb { path, root, binary };
-    let mut primitives = Vec::new();
-    for mesh in glb.root["meshes"].as_array().into_iter().flatten() {
-        let all = mesh["primitives"].as_array().into_iter().flatten();
-        primitives.extend(all.filter(|primitive| primitive["extensions"][SPLATS].is_object()));
-    }
-    let Some(&primitive) = primitives.first() else {
+    let placed = nodes::placed(&glb.root).map_err(|node| {
+        let problem = "mirrors, shears or scales by another factor along each axis, which is not read; apply its transform \
+                       in the program that wrote the file, and export it again";
+        glb.bad(&format!("node {node}"), problem)
+    })?;
+    if placed.is_empty() {
         return Err(glb.bad("meshes", format!("no primitive has the extension {SPLATS}; this file has no Gaussians")));
-    };
-    let packed = primitive["extensions"][SPLATS]["extensions"].as_object().and_then(|inner| inner.keys().next());
-    if let Some(packed) = packed {
-        return Err(glb
-            .bad("meshes", format!("the Gaussians are compressed by {packed}, which is not read; export without it")));
     }
-    let mut read = glb.gaussians(primitive)?;
-    if primitives.len() > 1 {
-        let more = primitives.len() - 1;
-        read.notes.push(format!("{more} more primitives with Gaussians were left out; labelgs reads the first"));
+    let (mut read, mut parts) = (ReadModel::default(), Vec::new());
+    let mut names: BTreeMap<u32, LabelEntry> = BTreeMap::new();
+    for Placed { primitive, place } in &placed {
+        let splats = &primitive["extensions"][SPLATS];
+        if let Some(packed) = splats["extensions"].as_object().and_then(|inner| inner.keys().next()) {
+            let problem = format!("the Gaussians are compressed by {packed}, which is not read; export without it");
+            return Err(glb.bad("meshes", problem));
+        }
+        let part = glb.gaussians(primitive)?;
+        let is_moved = *place != Transform::default();
+        parts.push(if is_moved { place.apply(&part.gaussians)? } else { part.gaussians });
+        for entry in part.names.into_iter().flat_map(|table| table.labels) {
+            names.entry(entry.id).or_insert(entry);
+        }
+        read.dropped += part.dropped;
+        read.notes.extend(part.notes);
+        read.notes.extend(unread(splats));
     }
-    let moved = |node: &Value| ["matrix", "rotation", "scale", "translation"].iter().any(|key| node.get(key).is_some());
-    if glb.root["nodes"].as_array().is_some_and(|nodes| nodes.iter().any(moved)) {
-        read.notes.push("the turns and moves of its nodes were not applied".into());
-    }
-    if primitive["extensions"][SPLATS]["colorSpace"] == "lin_rec709_display" {
-        read.notes.push("its colours are linear, and are taken for sRGB: the pictures are too dark".into());
-    }
+    read.notes.extend(glb.unread());
+    read.notes.dedup();
+    read.names = (!names.is_empty()).then(|| LabelTable::new(names.into_values().collect()));
+    read.gaussians = joined(parts)?;
     Ok(read)
 }
 
+/// What changes the picture of a primitive and is not read.
+fn unread(splats: &Value) -> Vec<String> {
+    let mut notes = Vec::new();
+    if splats["colorSpace"] == "lin_rec709_display" {
+        notes.push("its colours are linear, and are taken for sRGB: the pictures are too dark".into());
+    }
+    for (key, usual) in [("kernel", "ellipse"), ("projection", "perspective")] {
+        if let Some(other) = splats[key].as_str().filter(|&other| other != usual) {
+            notes.push(format!("its {key} is {other}, and it is drawn as {usual}"));
+        }
+    }
+    notes
+}
+
+/// Makes one model of all parts.
+fn joined(mut parts: Vec<Gaussians>) -> Result<Gaussians> {
+    if parts.len() == 1 {
+        return Ok(parts.remove(0));
+    }
+    let mut all = Gaussians {
+        sh_degree: parts.iter().map(|part| part.sh_degree).max().unwrap_or_default(),
+        origin: parts.first().map(|part| part.origin).unwrap_or_default(),
+        antialiased: parts.iter().any(|part| part.antialiased),
+        labels: parts.iter().any(|part| part.labels.is_some()).then(Vec::new),
+        label_confidence: parts.iter().any(|part| part.label_confidence.is_some()).then(Vec::new),
+        ..Gaussians::default()
+    };
+    for part in parts {
+        let part = fitting(part, &all)?;
+        all.means.extend(part.means);
+        all.quats.extend(part.quats);
+        all.scales.extend(part.scales);
+        all.opacities.extend(part.opacities);
+        all.sh0.extend(part.sh0);
+        all.sh_rest.extend(part.sh_rest);
+        all.labels.iter_mut().for_each(|to| to.extend(part.labels.iter().flatten()));
+        all.label_confidence.iter_mut().for_each(|to| to.extend(part.label_confidence.iter().flatten()));
+    }
+    Ok(all)
+}
+
 impl Glb<'_> {
+    /// What changes the picture of the whole file and is not read.
+    fn unread(&self) -> Vec<String> {
+        let some = |key: &str| self.root[key].as_array().is_some_and(|all| !all.is_empty());
+        let instanced = |node: &Value| node["extensions"]["EXT_mesh_gpu_instancing"].is_object();
+        let primitives = |mesh: &Value| mesh["primitives"].as_array().cloned().unwrap_or_default();
+        let all = self.root["meshes"].as_array().into_iter().flatten().flat_map(primitives);
+        let others = all.filter(|primitive| !primitive["extensions"][SPLATS].is_object()).count();
+        let meshes = format!("{others} meshes without Gaussians");
+        let left_out = [
+            (others > 0, meshes.as_str()),
+            (some("animations"), "animations"),
+            (
+                self.root["nodes"].as_array().is_some_and(|nodes| nodes.iter().any(instanced)),
+                "copies of instanced nodes",
+            ),
+        ];
+        left_out.iter().filter(|(there, _)| *there).map(|(_, what)| format!("its {what} were left out")).collect()
+    }
+
     fn bad(&self, place: &str, problem: impl Into<String>) -> Error {
         Error::data(self.path, place, problem)
     }

@@ -51,7 +51,7 @@ fn export<'a>(model: &'a Gaussians, rows: &'a [usize], like: &Gaussians) -> Expo
 }
 
 /// Returns a part with the columns and the origin of `like`.
-fn fitting(mut part: Gaussians, like: &Gaussians) -> Result<Gaussians> {
+pub(in crate::io::model) fn fitting(mut part: Gaussians, like: &Gaussians) -> Result<Gaussians> {
     if part.antialiased != like.antialiased {
         let problem = "is on for some of the models and off for others; train all alike, the coarse one too";
         return Err(Error::usage(Setting("antialias"), problem));

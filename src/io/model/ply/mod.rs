@@ -2,17 +2,20 @@
 //! label_confidence` precedes it.
 
 mod columns;
+mod decode;
 mod joined;
 mod packed;
 mod stored;
 mod write;
 
+pub(super) use joined::fitting;
 pub(crate) use joined::write_joined;
 
 use super::format::{ModelFormat, ReadModel};
 use crate::error::{Error, Result};
 use crate::io::ply::Table;
 use columns::Columns;
+use decode::Decoder;
 use glam::DVec3;
 use std::path::Path;
 
@@ -30,11 +33,12 @@ const ANTIALIASED_POSTSHOT: &str = "antialiased 1";
 pub(super) const FORMAT: ModelFormat =
     ModelFormat { name: "PLY", endings: &[".ply"], read, write: Some(write::WRITER) };
 
-/// Reads a 3DGS PLY: little-endian, big-endian or ascii, columns by name in any order and of any scalar type. The
-/// number of `f_rest_*` (0, 9, 24 or 45, channel-major) gives the SH degree; `label` is optional; other columns are
-/// ignored. Without `label`, the selection in the `state` of an editor is label 1. Rows that cannot be rendered are
-/// dropped and counted. A compressed PLY is read too. A label that is no whole number from 0 to [`MODEL_LABEL_MAX`] is an
-/// error.
+/// Reads a 3DGS PLY: little-endian, big-endian or ascii, columns by name in any order and of any scalar type, with or
+/// without the prefixes of CloudCompare. The number of `f_rest_*` (0, 9, 24, 45 or 72, channel-major) gives the SH degree, of
+/// which 3 are kept; `label` is optional. The filter of Mip-Splatting is applied, discs of 2DGS get a thin third axis; other
+/// columns that may change the picture are named in a note. Without `label`, the selection in the `state` of an editor is
+/// label 1. Rows that cannot be rendered are dropped and counted. A compressed PLY is read too. A label of -1 is none; one
+/// that is no whole number up to [`MODEL_LABEL_MAX`] is an error.
 ///
 /// [`MODEL_LABEL_MAX`]: crate::scene::MODEL_LABEL_MAX
 fn read(path: &Path) -> Result<ReadModel> {
@@ -44,30 +48,24 @@ fn read(path: &Path) -> Result<ReadModel> {
     let table = Table::open(path)?;
     let columns = Columns::of(path, &table)?;
     let (origin, antialiased) = (origin(path, &table)?, is_antialiased(table.comments()));
-    let (mut rows, mut triples, mut deleted) = (columns.rows(), columns.triples(), 0);
+    let (mut rows, mut decoder) = (columns.rows(), Decoder::new(path, &columns));
     let odd = table.for_each(&columns.names(), |index, values| {
-        match columns.row((path, index), values, &mut triples)? {
-            Some(row) => rows.push(&row),
-            None => deleted += 1,
+        if let Some(row) = decoder.row(index, values)? {
+            rows.push(&row);
         }
         Ok(())
     })?;
     let activated = rows.look_activated();
     let mut read = rows.finish(path, origin)?;
     read.gaussians.antialiased = antialiased;
-    read.dropped += deleted;
-    let deleted = columns.is_edited().then_some(deleted);
-    add_notes(&mut read.notes, deleted, activated, odd.extra_bytes);
+    read.dropped += decoder.deleted;
+    read.notes.extend(decoder.notes());
+    add_notes(&mut read.notes, activated, odd.extra_bytes);
     Ok(read)
 }
 
-/// Adds what the user should know; `deleted` is the number of Gaussians that an editor has deleted, if it was one.
-fn add_notes(notes: &mut Vec<String>, deleted: Option<u64>, activated: bool, extra_bytes: u64) {
-    if let Some(deleted) = deleted {
-        let note = "the selection in the column `state` became label 1";
-        let more = if deleted > 0 { format!("; {deleted} deleted Gaussians were left out") } else { String::new() };
-        notes.push(format!("{note}{more}"));
-    }
+/// Adds what the user should know of the values and the length of a file.
+fn add_notes(notes: &mut Vec<String>, activated: bool, extra_bytes: u64) {
     if activated {
         let note = "every opacity is from 0 to 1 and every scale positive: they seem to be written after their sigmoid \
                     and exponential, but a 3DGS PLY has the values before; such a model looks like fog";

@@ -1,6 +1,7 @@
 //! A model that stays in its file: its rows are seen one after the other, and some of them are read when they are asked for.
 
 use super::columns::Columns;
+use super::decode::Decoder;
 use super::{add_notes, is_antialiased, origin, packed};
 use crate::error::{Error, Result};
 use crate::io::model::rows::{Row, Sieve};
@@ -31,7 +32,7 @@ impl StoredModel {
         }
         let table = Table::open(path)?;
         let columns = Columns::of(path, &table)?;
-        if columns.is_edited() || !["x", "y", "z"].iter().all(|name| table.is_single(name)) {
+        if columns.edited || !["x", "y", "z"].iter().all(|name| table.is_single(name)) {
             return Ok(None);
         }
         let (count, antialiased, mut notes) = (table.count(), is_antialiased(table.comments()), Vec::new());
@@ -71,28 +72,28 @@ impl StoredModel {
     /// Calls `see` with the number and the values of each row that can be rendered, in order. Returns notes for the user.
     pub(crate) fn scan(&self, mut see: impl FnMut(u64, &Row) -> Result<()>) -> Result<Vec<String>> {
         let (path, columns) = (&self.path, &self.columns);
-        let (mut triples, mut sieve) = (columns.triples(), Sieve::default());
-        let odd = Table::open(path)?.for_each(&columns.names(), |index, values| {
-            match columns.row((path, index), values, &mut triples)? {
+        let (mut decoder, mut sieve) = (Decoder::new(path, columns), Sieve::default());
+        let odd =
+            Table::open(path)?.for_each(&columns.names(), |index, values| match decoder.row(index, values)? {
                 Some(row) if sieve.rotation_of(&row).is_some() => see(index, &row),
                 _ => Ok(()),
-            }
-        })?;
+            })?;
         let mut notes = self.notes.clone();
         notes.extend(sieve.note());
-        add_notes(&mut notes, None, sieve.looks_activated(), odd.extra_bytes);
+        notes.extend(decoder.notes());
+        add_notes(&mut notes, sieve.looks_activated(), odd.extra_bytes);
         Ok(notes)
     }
 
     /// Reads some rows, sorted, as a model about a place `far` from the origin of the file.
     pub(crate) fn rows(&self, numbers: impl Iterator<Item = u64>, far: DVec3) -> Result<Gaussians> {
         let (path, columns) = (&self.path, &self.columns);
-        let (mut rows, mut triples) = (columns.rows(), columns.triples());
+        let (mut rows, mut decoder) = (columns.rows(), Decoder::new(path, columns));
         let Some(mut places) = Table::open(path)?.places_of_rows(&columns.names())? else {
             return Err(Error::data(path, "header", "another file took the place of the model; start again"));
         };
         places.for_some(numbers, |index, values| {
-            if let Some(row) = columns.row((path, index), values, &mut triples)? {
+            if let Some(row) = decoder.row(index, values)? {
                 rows.push(&row);
             }
             Ok(())

@@ -4,13 +4,14 @@
 //! a header of 32 bytes, records, a table of sizes, and a Zstandard frame for each plane. A record is a type, a length
 //! and bytes; readers skip types that they do not know, and labels are such a record ([`record`]).
 
+mod axes;
 mod pack;
 mod read;
 mod record;
 mod write;
 
 use super::format::ModelFormat;
-use super::turn::HalfTurn;
+use super::turn::Signs;
 pub(super) use read::read_bytes;
 pub(super) use write::{losses, write_v3};
 
@@ -20,8 +21,8 @@ pub(super) const FORMAT: ModelFormat =
 
 /// First bytes of a header: `NGSP`.
 const MAGIC: u32 = 0x5053_474E;
-/// Axes of the file: x right, y up, z back.
-pub(super) const AXES: HalfTurn = HalfTurn([1.0, -1.0, -1.0]);
+/// Axes of a file without a record of them: x right, y up, z back.
+pub(super) const AXES: Signs = Signs([1.0, -1.0, -1.0]);
 /// Bit of the header's flags: the model is antialiased.
 const ANTIALIASED: u8 = 1;
 /// Bit of the header's flags: records follow.

@@ -1,7 +1,7 @@
 //! Reads SPZ.
 
 use super::record::{self, Records};
-use super::{ANTIALIASED, AXES, BITS_MAX, HAS_RECORDS, MAGIC, pack, planes};
+use super::{ANTIALIASED, BITS_MAX, HAS_RECORDS, MAGIC, pack, planes};
 use crate::error::{Error, Result};
 use crate::io::model::format::ReadModel;
 use crate::io::model::rows::{Row, Rows};
@@ -71,6 +71,7 @@ fn decode(path: &Path, header: &Header, planes: &[Vec<u8>], records: &Records) -
     let widths = super::planes(header.version, header.sh_degree);
     let degree = header.sh_degree.min(3);
     let kept = ((degree + 1) * (degree + 1) - 1) as usize;
+    let axes = records.axes.signs;
     let mut rows = Rows::new(degree, records.labels.is_some(), records.confidence.is_some());
     let mut rest = vec![[0.0; 3]; kept];
     for index in 0..header.count {
@@ -87,11 +88,11 @@ fn decode(path: &Path, header: &Header, planes: &[Vec<u8>], records: &Records) -
         for (triple, bytes) in rest.iter_mut().zip(harmonics.chunks_exact(3)) {
             *triple = [bytes[0], bytes[1], bytes[2]].map(pack::rest);
         }
-        AXES.rest(&mut rest);
+        axes.rest(&mut rest);
         let triple = |plane: usize, value: fn(u8) -> f32| [at(plane)[0], at(plane)[1], at(plane)[2]].map(value);
         rows.push(&Row {
-            position: AXES.position(position.map(|value| value as f32)).map(f64::from),
-            quat: AXES.quat(quat.map(|value| value as f32)).map(f64::from),
+            position: axes.position(position.map(|value| value as f32)).map(f64::from),
+            quat: axes.quat(quat.map(|value| value as f32)).map(f64::from),
             scale: triple(3, pack::scale),
             opacity: logit_of_byte(at(1)[0]),
             sh0: triple(2, pack::sh0),
@@ -101,6 +102,9 @@ fn decode(path: &Path, header: &Header, planes: &[Vec<u8>], records: &Records) -
         });
     }
     let mut read = rows.finish(path, None)?;
+    if let Some(turn) = records.axes.turn() {
+        read.gaussians = turn.apply(&read.gaussians)?;
+    }
     read.gaussians.antialiased = header.flags & ANTIALIASED != 0;
     Ok(read)
 }

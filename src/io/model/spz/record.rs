@@ -1,6 +1,7 @@
 //! The record of labels in an SPZ: version, count, bytes per id, whether confidences follow, the packed ids and
 //! confidences in the order of the Gaussians, then the names as JSON.
 
+use super::axes::FileAxes;
 use crate::error::{Error, Result};
 use crate::io::label_table::LabelTable;
 use crate::io::model::format::Export;
@@ -13,9 +14,10 @@ use std::path::Path;
 
 /// Type of the record: the vendor `LG` in the upper half.
 const LABELS: u32 = 0x4C47_0001;
-/// Type of the record that names the axes of the file, and its value for the usual ones.
+/// Type of the record that names the axes of the file.
 const AXES: u32 = 0xADBE_0003;
-const RIGHT_UP_BACK: u32 = 4;
+/// Type of the record with limits for the camera of a viewer.
+const ORBIT: u32 = 0xADBE_0002;
 const VERSION: u32 = 1;
 /// Bytes before the packed ids.
 const HEAD: usize = 16;
@@ -26,6 +28,7 @@ pub(super) struct Records {
     pub(super) labels: Option<Vec<u32>>,
     pub(super) confidence: Option<Vec<f32>>,
     pub(super) names: Option<LabelTable>,
+    pub(super) axes: FileAxes,
     pub(super) notes: Vec<String>,
 }
 
@@ -61,7 +64,7 @@ pub(super) fn write(export: &Export) -> io::Result<Vec<u8>> {
     Ok(record)
 }
 
-/// Reads the records of a file of `count` Gaussians; unknown ones are skipped.
+/// Reads the records of a file of `count` Gaussians; unknown ones are named.
 pub(super) fn read(path: &Path, mut bytes: &[u8], count: usize) -> Result<Records> {
     let mut records = Records::default();
     while let Some((head, rest)) = bytes.split_first_chunk::<8>() {
@@ -73,11 +76,16 @@ pub(super) fn read(path: &Path, mut bytes: &[u8], count: usize) -> Result<Record
         };
         match kind {
             LABELS => labels(path, payload, count, &mut records)?,
-            AXES if payload != RIGHT_UP_BACK.to_le_bytes() => records.notes.push(
-                "a record says that its axes are not the usual ones of the format; turn the model if it lies wrong"
-                    .into(),
-            ),
-            _ => {}
+            AXES => match payload.try_into().ok().map(u32::from_le_bytes).and_then(FileAxes::of_record) {
+                Some(axes) => records.axes = axes,
+                None => records.notes.push(
+                    "its record of axes is unknown, and they were taken for right, up, back; turn the model by \
+                     `labelgs transform` if it lies wrong"
+                        .into(),
+                ),
+            },
+            ORBIT => {}
+            _ => records.notes.push(format!("its record {kind:#010x} is unknown and was not read")),
         }
         bytes = rest;
     }
