@@ -3,7 +3,7 @@
 use assert_cmd::Command;
 use glam::DVec3;
 use labelgs::io::capture::{Fault, Report, scan};
-use labelgs::io::{LoadOptions, open};
+use labelgs::io::{LoadOptions, Lookup, open};
 use labelgs::scene::{Dataset, Photo, Point};
 use std::path::{Path, PathBuf};
 
@@ -29,14 +29,14 @@ fn found(report: &Report) -> Vec<(Fault, Option<&str>)> {
 fn with_photo(scene: &Path, index: usize, change: impl Fn(&mut Photo)) -> Report {
     let mut dataset = read(scene);
     dataset.train[index].photo.as_mut().expect("a photo").edit(change).expect("in memory");
-    scan(scene, &dataset).expect("a scan")
+    scan(scene, &Lookup::default(), &dataset).expect("a scan")
 }
 
 #[test]
 fn each_fault_is_found_in_its_photo() {
     let folder = tempfile::tempdir().expect("a folder");
     let scene = made(folder.path());
-    let sound = scan(&scene, &read(&scene)).expect("a scan");
+    let sound = scan(&scene, &Lookup::default(), &read(&scene)).expect("a scan");
     assert_eq!(found(&sound), [], "{sound:?}");
     assert!(sound.reprojection.expect("observations") < 1.0 && sound.gain_spread.expect("gains") < 1.1, "{sound:?}");
 
@@ -77,7 +77,7 @@ fn each_fault_is_found_in_its_photo() {
 
     let mut stray = read(&scene);
     stray.points[7].position *= 1e5;
-    assert_eq!(found(&scan(&scene, &stray).expect("a scan")), [(Fault::Scale, None)]);
+    assert_eq!(found(&scan(&scene, &Lookup::default(), &stray).expect("a scan")), [(Fault::Scale, None)]);
 }
 
 /// Places of the parts of `images.bin`: of each image its pose, and the number of its points with what follows them.
@@ -116,9 +116,9 @@ fn turn(scene: &Path, which: impl Fn(usize) -> bool) {
 fn points_behind_the_cameras_are_a_finding_of_the_photo_or_of_the_scene() {
     let folder = tempfile::tempdir().expect("a folder");
     let scene = made(folder.path());
-    let sound = scan(&scene, &read(&scene)).expect("a scan");
+    let sound = scan(&scene, &Lookup::default(), &read(&scene)).expect("a scan");
     turn(&scene, |index| index < 3);
-    let few = scan(&scene, &read(&scene)).expect("a scan");
+    let few = scan(&scene, &Lookup::default(), &read(&scene)).expect("a scan");
     let photos = ["000.png", "001.png", "002.png"];
     assert_eq!(found(&few), photos.map(|name| (Fault::Behind, Some(name))), "{:?}", few.findings);
     let (view, points) = (&few.views[1], sound.views[1].points);
@@ -128,7 +128,7 @@ fn points_behind_the_cameras_are_a_finding_of_the_photo_or_of_the_scene() {
     assert!(few.reprojection.is_some_and(|error| error < 1.0));
 
     turn(&scene, |index| (3..15).contains(&index));
-    let most = scan(&scene, &read(&scene)).expect("a scan");
+    let most = scan(&scene, &Lookup::default(), &read(&scene)).expect("a scan");
     assert_eq!(found(&most), [(Fault::Behind, None)], "{:?}", most.findings);
     let finding = &most.findings[0];
     assert!(finding.text.starts_with("15 of 16 photos, such as 000.png: "), "{finding:?}");
@@ -149,7 +149,7 @@ fn photos_that_all_share_nothing_are_one_finding() {
     for view in &mut dataset.train {
         view.camera.translation.z = -view.camera.translation.z;
     }
-    let report = scan(&scene, &dataset).expect("a scan");
+    let report = scan(&scene, &Lookup::default(), &dataset).expect("a scan");
     let alone: Vec<_> = report.findings.iter().filter(|finding| finding.fault == Fault::Alone).collect();
     assert!(matches!(alone[..], [one] if one.view.is_none() && one.text.starts_with("16 of 16 photos")), "{alone:?}");
     assert!(!alone[0].cure.contains("leave"), "{alone:?}");
@@ -162,9 +162,9 @@ fn a_camera_far_away_does_not_hide_a_stray_point() {
     let scene = made(folder.path());
     let mut dataset = read(&scene);
     dataset.train[0].camera.translation.z += 2e4;
-    assert!(!found(&scan(&scene, &dataset).expect("a scan")).contains(&(Fault::Scale, None)));
+    assert!(!found(&scan(&scene, &Lookup::default(), &dataset).expect("a scan")).contains(&(Fault::Scale, None)));
     dataset.points[7].position *= 1e5;
-    assert!(found(&scan(&scene, &dataset).expect("a scan")).contains(&(Fault::Scale, None)));
+    assert!(found(&scan(&scene, &Lookup::default(), &dataset).expect("a scan")).contains(&(Fault::Scale, None)));
 }
 
 /// A laser scan has many points, and nothing says which photo shows which: a sample of them tells how bright photos are, and
@@ -192,7 +192,7 @@ fn dense_points_tell_the_exposure_by_a_sample() {
             photo.rgba.iter_mut().flat_map(|texel| &mut texel[..3]).for_each(|value| *value = *value / 10 * 7)
         })
         .expect("in memory");
-    let report = scan(&scene, &dataset).expect("a scan");
+    let report = scan(&scene, &Lookup::default(), &dataset).expect("a scan");
     assert_eq!(found(&report), [(Fault::Exposure, Some("003.png"))], "{:?}", report.findings);
     let view = &report.views[3];
     assert!(view.points > 5000 && view.reprojection.is_none(), "{view:?}");
@@ -229,6 +229,6 @@ fn wrong_poses_and_lonely_photos_are_reported() {
     let mut alone = read(&scene);
     let camera = &mut alone.train[9].camera;
     camera.translation.z -= 50.0;
-    let report = scan(&scene, &alone).expect("a scan");
+    let report = scan(&scene, &Lookup::default(), &alone).expect("a scan");
     assert!(found(&report).contains(&(Fault::Alone, Some("009.png"))), "{:?}", report.findings);
 }

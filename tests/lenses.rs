@@ -213,7 +213,7 @@ fn ids_return_to_the_photo() {
         let options = options(name.parse().expect("a lens"), Some(fov));
         let dataset = read(folder.path(), &options);
         let stored = labelgs::io::read_mask(folder.path().join("masks/000.png")).expect("a mask");
-        let windows = windows(folder.path()).expect("windows");
+        let windows = windows(folder.path(), &labelgs::io::Lookup::default()).expect("windows");
         let of_photo = dataset.train.iter().filter(|view| view.name.starts_with("000."));
         let masks: Vec<_> =
             of_photo.map(|view| (&windows[&view.name], view.mask().expect("read").expect("a mask"))).collect();
@@ -232,7 +232,8 @@ fn observed_points_are_where_the_lens_shows_them() {
     for name in ["THIN_PRISM_FISHEYE", "EQUIRECTANGULAR", "OPENCV"] {
         let folder = tempfile::tempdir().expect("a folder");
         let dataset = read(folder.path(), &options(name.parse().expect("a lens"), None));
-        let report = labelgs::io::capture::scan(folder.path(), &dataset).expect("scanned");
+        let report =
+            labelgs::io::capture::scan(folder.path(), &labelgs::io::Lookup::default(), &dataset).expect("scanned");
         let error = report.reprojection.expect("observations");
         // Points have an error of 0.15 % of their distance.
         assert!(error < 1.0, "{name}: {error} px");

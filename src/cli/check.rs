@@ -29,8 +29,11 @@ pub struct CheckArgs {
 /// Prints what the scan finds. Fails if it finds a fault.
 pub(crate) fn run(args: &CheckArgs, context: &Context) -> Result<()> {
     // It looks at the photos in full size, few times: a file of their pixels would cost more than it saves.
-    let options = LoadOptions { test_every: None, photo_folder: None, ..LoadOptions::default() };
-    let dataset = io::open_logged(&args.scene, &args.read.into_options(options))?;
+    // What is missing or damaged is a finding.
+    let options = LoadOptions { test_every: None, photo_folder: None, max_bad_photos: 1.0, ..LoadOptions::default() };
+    let dataset = io::open(&args.scene, &args.read.into_options(options))?;
+    let is_found = |note: &&String| dataset.flaws.iter().any(|flaw| flaw.text() == *note);
+    dataset.notes.iter().filter(|note| !is_found(note)).for_each(|note| tracing::warn!("{note}"));
     let report = scan(&args.scene, &args.read.lookup(), &dataset)?;
     let mut counts: BTreeMap<Fault, usize> = BTreeMap::new();
     report.findings.iter().for_each(|finding| *counts.entry(finding.fault).or_default() += 1);

@@ -24,8 +24,8 @@ const SHARE_TIMES: f64 = 4.0;
 /// What is found.
 #[derive(Default)]
 pub(super) struct Found {
-    /// Faults of the scene.
-    pub(super) faults: Vec<String>,
+    /// What does not fit.
+    pub(super) flaws: Vec<String>,
     /// What may be wrong.
     pub(super) notes: Vec<String>,
 }
@@ -40,8 +40,9 @@ pub(super) fn check(dataset: &Dataset, native: Option<Native>, given: PoseConven
         return Ok(found);
     }
     let as_is = sample.agreement(|_| ());
-    if !is_doubtful(&as_is) {
-        found.faults.extend(blind(&sample, &views, &as_is));
+    let is_empty = as_is.in_median_picture * sample.len() as f64 <= 1.0;
+    if !is_doubtful(&as_is, is_empty) {
+        found.notes.extend(blind(&sample, &views, &as_is));
         return Ok(found);
     }
     let others = native.into_iter().flat_map(|native| native.others().into_iter().map(move |other| (native, other)));
@@ -52,7 +53,7 @@ pub(super) fn check(dataset: &Dataset, native: Option<Native>, given: PoseConven
     let (percent, count) = (100.0 * as_is.in_picture, dataset.points.len());
     let shown = format!("a photo shows {percent:.1} % of the {count} points on average");
     if let Some((other, with)) = best {
-        found.faults.push(format!(
+        found.flaws.push(format!(
             "poses and points do not fit: {shown}{}; with {} it shows {:.1} %{}. Read the scene with {}",
             colours(&as_is),
             other.text(),
@@ -60,9 +61,9 @@ pub(super) fn check(dataset: &Dataset, native: Option<Native>, given: PoseConven
             colours(&with),
             Setting("poses").to(other)
         ));
-    } else if as_is.in_median_picture * sample.len() as f64 <= 1.0 {
+    } else if is_empty {
         let hint = if given.is_native() { "" } else { " as they are said to be" };
-        found.faults.push(format!(
+        found.flaws.push(format!(
             "poses and points do not fit{hint}: {shown}, and {:.1} % are in front of its camera. They are in different \
              frames, or the poses have another convention (see {})",
             100.0 * as_is.in_front,
@@ -77,8 +78,9 @@ pub(super) fn check(dataset: &Dataset, native: Option<Native>, given: PoseConven
     Ok(found)
 }
 
-fn is_doubtful(as_is: &Agreement) -> bool {
-    as_is.colour.map_or(as_is.in_picture < SHARE_WRONG, |colour| colour < COLOUR_WRONG)
+/// `is_empty` if most photos show none of the points.
+fn is_doubtful(as_is: &Agreement, is_empty: bool) -> bool {
+    as_is.colour.map_or(is_empty || as_is.in_picture < SHARE_WRONG, |colour| colour < COLOUR_WRONG)
 }
 
 fn convinces(other: &Agreement, as_is: &Agreement) -> bool {

@@ -9,7 +9,7 @@ use super::pose_convention::Native;
 use super::recipe::{MadeView, MadeViews, Recipe};
 use super::{LoadOptions, frame_check, mask_notes, masks, missing, stray};
 use crate::error::{Error, Result, Setting};
-use crate::scene::{Dataset, Photo, View, crew};
+use crate::scene::{Dataset, Flaw, Photo, View, crew};
 use rayon::prelude::*;
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -64,7 +64,8 @@ pub(crate) fn load(root: &Path, mut listing: Listing, options: &LoadOptions) -> 
         notes.push(format!("{} photos are wider than a pinhole picture and became {faces} faces of cubes", wide.len()));
     }
     notes.extend(faults.iter().cloned());
-    let mut dataset = Dataset { root: root.to_owned(), points: listing.points, notes, faults, ..Dataset::default() };
+    let flaws = faults.into_iter().map(Flaw::LeftOut).collect();
+    let mut dataset = Dataset { root: root.to_owned(), points: listing.points, notes, flaws, ..Dataset::default() };
     for (views, test) in loaded {
         if test { dataset.test.extend(views) } else { dataset.train.extend(views) }
     }
@@ -84,8 +85,8 @@ pub(crate) fn load(root: &Path, mut listing: Listing, options: &LoadOptions) -> 
     let is_turned = dataset.all().len() != views.len() || !options.lookup.poses.is_native();
     let native = (!is_turned).then(|| Native::of_file(&listing.source));
     let found = frame_check::check(&dataset, native, options.lookup.poses)?;
-    dataset.notes.extend(found.faults.iter().cloned().chain(found.notes));
-    dataset.faults.extend(found.faults);
+    dataset.notes.extend(found.flaws.iter().cloned().chain(found.notes));
+    dataset.flaws.extend(found.flaws.into_iter().map(Flaw::Frame));
     Ok(dataset)
 }
 

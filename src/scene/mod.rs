@@ -29,5 +29,5 @@ pub use labels::{LABEL_MAX, LabelMap, MODEL_LABEL_MAX, Occluders, UNLABELLED, la
 pub use overview::Overview;
 pub use pixels::Pixels;
 pub(crate) use view::stems;
-pub use view::{ColourMatrix, Dataset, Photo, Point, View};
+pub use view::{ColourMatrix, Dataset, Flaw, Photo, Point, View};
 pub use zone::Zone;

@@ -114,6 +114,23 @@ pub struct Point {
     pub colour: [u8; 3],
 }
 
+/// What is wrong with a scene as it was read.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Flaw {
+    /// Photos were left out: missing, damaged, or with a stray pose.
+    LeftOut(String),
+    /// Poses and points are not in one frame.
+    Frame(String),
+}
+
+impl Flaw {
+    /// Returns it in words.
+    pub fn text(&self) -> &str {
+        let (Self::LeftOut(text) | Self::Frame(text)) = self;
+        text
+    }
+}
+
 /// A scene in memory.
 #[derive(Clone, Debug, Default)]
 pub struct Dataset {
@@ -127,8 +144,8 @@ pub struct Dataset {
     pub points: Vec<Point>,
     /// Notes for the user about reading, a line each.
     pub notes: Vec<String>,
-    /// Those of them that say which photos were left out, and other faults of the scene.
-    pub faults: Vec<String>,
+    /// What of the scene was left out or does not fit. Notes say it too.
+    pub flaws: Vec<Flaw>,
 }
 
 /// Radii of the spread of the cameras within which they count for the extent: a few wrong poses would change learning

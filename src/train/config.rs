@@ -383,26 +383,21 @@ impl TrainConfig {
     /// Refuses invalid values; messages name the option.
     pub fn check(&self) -> Result<()> {
         self.check_ranges()?;
+        let refuse = |setting: Setting, problem: String| Err(Error::usage(setting, problem));
         if self.label_rule == LabelRule::Main && self.layer_every() != 1 {
-            return Err(Error::usage(
-                Setting("label_rule"),
-                format!("is main, which needs {}", Setting("layer_every").to(1)),
-            ));
+            let needed = Setting("layer_every").to(1);
+            return refuse(Setting("label_rule"), format!("is main, which needs {needed}"));
         }
         if let Some([x0, y0, z0, x1, y1, z1]) = self.grow_box
             && !(x0 < x1 && y0 < y1 && z0 < z1)
         {
-            return Err(Error::usage(
-                Setting("grow_box"),
-                "is empty; it needs the smaller corner first, then the larger one",
-            ));
+            let problem = "is empty; it needs the smaller corner first, then the larger one";
+            return refuse(Setting("grow_box"), problem.to_owned());
         }
         if self.random_background && self.exposure == ExposureMode::On {
-            let problem = format!(
-                "is on, which needs {}: a random colour has no exposure of a photo",
-                Setting("exposure").to("off")
-            );
-            return Err(Error::usage(Setting("random_background"), problem));
+            let needed = Setting("exposure").to("off");
+            let problem = format!("is on, which needs {needed}: a random colour has no exposure of a photo");
+            return refuse(Setting("random_background"), problem);
         }
         Ok(())
     }

@@ -45,7 +45,9 @@ fn points<'a>(dataset: &'a Dataset, config: &TrainConfig) -> Result<Cow<'a, [Poi
     let budget = config.full_budget((width, height));
     let (most, why) = match (config.max_gaussians, budget) {
         (0, None) => return Ok(Cow::Borrowed(&dataset.points)),
-        (0, Some(budget)) if config.budget > 0 => (budget.saturating_mul(BEYOND), format!("`budget` is {budget}")),
+        (0, Some(budget)) if config.budget > 0 => {
+            (budget.saturating_mul(BEYOND), format!("{} is {budget}", Setting("budget")))
+        }
         (0, Some(budget)) => {
             let why = format!("photos of {width} x {height} px ask for {budget} Gaussians");
             (budget.saturating_mul(BEYOND), why)

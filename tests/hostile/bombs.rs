@@ -97,7 +97,8 @@ fn depth(bytes: &[u8]) -> Result<DepthMap> {
     scene.write("depths/00.exr", bytes);
     let options = LoadOptions { test_every: None, photos: false, ..LoadOptions::default() };
     let dataset = io::open(scene.path(), &options).expect("a scene");
-    DepthFolder::open(&scene.path().join("depths"), scene.path())?.read(&dataset.train[0])
+    DepthFolder::open(&scene.path().join("depths"), scene.path(), &labelgs::io::Lookup::default())?
+        .read(&dataset.train[0])
 }
 
 #[test]

@@ -10,7 +10,14 @@ use std::path::Path;
 const IDENTITY: &str = "[[1,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]]";
 
 fn open(scene: &Path, allow_outside: bool) -> Result<Dataset> {
-    io::open(scene, &LoadOptions { test_every: None, allow_outside, ..LoadOptions::default() })
+    io::open(
+        scene,
+        &LoadOptions {
+            test_every: None,
+            lookup: labelgs::io::Lookup { allow_outside, ..Default::default() },
+            ..LoadOptions::default()
+        },
+    )
 }
 
 fn names(dataset: &Dataset) -> Vec<&str> {

@@ -25,7 +25,8 @@ fn open(scene: &Scene, max_resolution: Option<u32>) -> Dataset {
 
 fn read(scene: &Scene) -> labelgs::Result<DepthMap> {
     let dataset = open(scene, None);
-    DepthFolder::open(&scene.path().join("depths"), scene.path())?.read(&dataset.train[0])
+    DepthFolder::open(&scene.path().join("depths"), scene.path(), &labelgs::io::Lookup::default())?
+        .read(&dataset.train[0])
 }
 
 fn npy(descr: &str, order: &str, shape: &str, data: &[u8]) -> Vec<u8> {
@@ -134,9 +135,11 @@ fn a_folder_must_have_all_maps() {
     let dataset = open(&scene, None);
     let views: Vec<&View> = dataset.train.iter().collect();
     let folder = scene.path().join("depths");
-    assert!(refusal(DepthFolder::open(&folder, scene.path())).contains("no such folder"));
+    assert!(
+        refusal(DepthFolder::open(&folder, scene.path(), &labelgs::io::Lookup::default())).contains("no such folder")
+    );
     scene.write("depths/01.pfm", pfm("-1", f32::to_le_bytes));
-    let depths = DepthFolder::open(&folder, scene.path()).expect("a folder");
+    let depths = DepthFolder::open(&folder, scene.path(), &labelgs::io::Lookup::default()).expect("a folder");
     let message = refusal(depths.check_complete(&views));
     assert!(message.contains("2 of 3 photos") && message.contains("00.png, 02.png"), "{message}");
     depths.check_complete(&views[1..2]).expect("01 is there");
@@ -151,7 +154,8 @@ fn maps_follow_the_size_of_the_view() {
     io::image::write_exr_y(scene.at("depths/00.exr"), 24, 16, &large).expect("written");
     assert_eq!(read(&scene).expect("a map").values, values());
     let dataset = open(&scene, Some(6));
-    let folder = DepthFolder::open(&scene.path().join("depths"), scene.path()).expect("a folder");
+    let folder = DepthFolder::open(&scene.path().join("depths"), scene.path(), &labelgs::io::Lookup::default())
+        .expect("a folder");
     let half = folder.read(&dataset.train[0]).expect("a map");
     // The centre of a pixel of half size is a corner of four; the lower right one of them is taken.
     let expected: Vec<f32> = (0..24).map(|i| value((i / 6 * 2 + 1) * 12 + i % 6 * 2 + 1)).collect();

@@ -148,7 +148,8 @@ pub fn imported(folder: &Path, format: Format) -> Result<()> {
 
 pub fn depth(folder: &Path, _: &Path) -> Result<()> {
     let dataset = open(folder)?;
-    let map = DepthFolder::open(&folder.join("depths"), folder)?.read(&dataset.train[0])?;
+    let map =
+        DepthFolder::open(&folder.join("depths"), folder, &labelgs::io::Lookup::default())?.read(&dataset.train[0])?;
     assert_eq!(map.values.len(), map.width as usize * map.height as usize);
     Ok(())
 }

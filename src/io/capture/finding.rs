@@ -1,5 +1,6 @@
 //! What a scan finds: kinds, texts, cures.
 
+use crate::scene::Flaw;
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -7,6 +8,10 @@ use std::collections::BTreeMap;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Fault {
+    /// Photos that the scene lists were left out.
+    LeftOut,
+    /// Poses and points are not in one frame.
+    Frame,
     /// Most points that the photo is said to show lie behind its camera.
     Behind,
     /// Points are far from where the photo shows them.
@@ -27,6 +32,8 @@ impl Fault {
     /// Returns the display name.
     pub fn text(self) -> &'static str {
         match self {
+            Self::LeftOut => "left out",
+            Self::Frame => "frame",
             Self::Behind => "behind",
             Self::Reprojection => "reprojection",
             Self::Blur => "blur",
@@ -40,6 +47,8 @@ impl Fault {
     /// Returns what to do about it.
     pub fn cure(self) -> &'static str {
         match self {
+            Self::LeftOut => "bring them back or mend them, or take them off the list",
+            Self::Frame => "say what the poses mean, or export poses and points in the convention of their format",
             Self::Behind | Self::Reprojection => "leave the photo out, or adjust the reconstruction again",
             Self::Blur => "leave the photo out",
             Self::Exposure | Self::WhiteBalance => {
@@ -84,6 +93,15 @@ impl Finding {
     pub(super) fn new(fault: Fault, view: Option<&str>, text: String) -> Self {
         Self { fault, view: view.map(str::to_owned), text, cure: fault.cure() }
     }
+}
+
+/// Returns a flaw of the scene as a finding.
+pub(super) fn of_flaw(flaw: &Flaw) -> Finding {
+    let fault = match flaw {
+        Flaw::LeftOut(_) => Fault::LeftOut,
+        Flaw::Frame(_) => Fault::Frame,
+    };
+    Finding::new(fault, None, flaw.text().to_owned())
 }
 
 /// Returns findings by kind and photo. One for the scene replaces those of the same kind in most of its `views`: they have one

@@ -177,7 +177,14 @@ pub fn scan(scene: &Path, lookup: &Lookup, dataset: &Dataset) -> Result<Report> 
     let windows = windows(scene, lookup)?;
     let is_face = |name: &String| windows.get(name).is_some_and(|window| window.photo != window.name);
     findings.retain(|of| !matches!(of.fault, Fault::Blur | Fault::Alone) || !of.view.as_ref().is_some_and(is_face));
-    let findings = finding::joined(findings, views.len());
+    let mut findings = finding::joined(findings, views.len());
+    findings.extend(dataset.flaws.iter().map(finding::of_flaw));
+    // Points that most photos do not show are one fault with a frame that does not fit.
+    let has_frame = findings.iter().any(|of| of.fault == Fault::Frame);
+    let follows =
+        |of: &Finding| of.view.is_none() && matches!(of.fault, Fault::Behind | Fault::Alone | Fault::Reprojection);
+    findings.retain(|of| !(has_frame && follows(of)));
+    findings.sort_by_key(|of| of.fault);
     let known = || reports.iter().filter_map(|view| view.gain);
     let (least, most) = (known().fold(f64::INFINITY, f64::min), known().fold(0.0, f64::max));
     let photo_of = |view: &&View| windows.get(&view.name).map_or(&view.name, |window| &window.photo).clone();

@@ -79,8 +79,8 @@ pub(super) fn read(path: &Path, mut bytes: &[u8], count: usize) -> Result<Record
             AXES => match payload.try_into().ok().map(u32::from_le_bytes).and_then(FileAxes::of_record) {
                 Some(axes) => records.axes = axes,
                 None => records.notes.push(
-                    "its record of axes is unknown, and they were taken for right, up, back; turn the model by \
-                     `labelgs transform` if it lies wrong"
+                    "its record of axes is unknown, and they were taken for right, up, back; turn the model if \
+                     it lies wrong"
                         .into(),
                 ),
             },
