@@ -180,7 +180,7 @@ fn a_flag_has_one_heading() {
 }
 
 /// A value other than the default for each setting; none for a flag that needs none.
-const TYPED: [(&str, &str); 65] = [
+const TYPED: [(&str, &str); 66] = [
     ("--iterations", "7"),
     ("--max-resolution", "99"),
     ("--start-size", "0.7"),
@@ -243,6 +243,7 @@ const TYPED: [(&str, &str); 65] = [
     ("--opacity-reset-interval", "8"),
     ("--opacity-reset-margin", "9"),
     ("--save-at", "2000,5000"),
+    ("--poses", "opengl"),
     ("--preview-every", "6"),
     ("--checkpoint-every", "12"),
     ("--photo-memory", "2.5G"),

@@ -7,7 +7,7 @@
 use super::names::folded;
 use crate::error::Setting;
 use crate::io::read;
-use std::cell::RefCell;
+use std::cell::{OnceCell, RefCell};
 use std::collections::HashMap;
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
@@ -69,6 +69,7 @@ pub(crate) struct PhotoFinder {
     /// The folder that the user named.
     images: Option<PathBuf>,
     folders: RefCell<HashMap<PathBuf, Entries>>,
+    bases: OnceCell<Vec<PathBuf>>,
     /// Number of photos that are not at their listed paths, and the first of them with its file.
     elsewhere: RefCell<Option<(usize, PathBuf, PathBuf)>>,
 }
@@ -76,7 +77,13 @@ pub(crate) struct PhotoFinder {
 impl PhotoFinder {
     /// Makes one for the scene in `root`; `images` replaces all folders.
     pub(crate) fn new(root: &Path, images: Option<PathBuf>) -> Self {
-        Self { root: root.to_owned(), images, folders: RefCell::default(), elsewhere: RefCell::default() }
+        Self {
+            root: root.to_owned(),
+            images,
+            folders: RefCell::default(),
+            bases: OnceCell::new(),
+            elsewhere: RefCell::default(),
+        }
     }
 
     /// Returns the folder of photos: the one that the user named, or this one of the scene.
@@ -160,6 +167,10 @@ impl PhotoFinder {
 
     /// Folders that may hold the photos: those of photos, with the full sizes first, then the scene's own.
     fn bases(&self) -> Vec<PathBuf> {
+        self.bases.get_or_init(|| self.look_for_bases()).clone()
+    }
+
+    fn look_for_bases(&self) -> Vec<PathBuf> {
         let entries = read::folder(&self.root).unwrap_or_default();
         let name = |path: &PathBuf| path.file_name().and_then(OsStr::to_str).unwrap_or_default().to_owned();
         let mut found: Vec<String> =

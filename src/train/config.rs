@@ -43,8 +43,7 @@ crate::options::options! {
 
             /// Most Gaussians, such as 500k or 2M; 0 leaves the bound to the memory of the device.
             ///
-            /// 0. At the bound only the Gaussians with the largest gradients grow. More points are thinned to half of it, and
-            /// without it to four times the budget.
+            /// 0. At the bound only the largest gradients grow. Points are thinned to half of it, else to 4 x the budget.
             #[cfg_attr(feature = "cli", arg(value_parser = count))]
             max_gaussians <"N">: u64 = 0;
         }
@@ -385,18 +384,15 @@ impl TrainConfig {
         self.check_ranges()?;
         let refuse = |setting: Setting, problem: String| Err(Error::usage(setting, problem));
         if self.label_rule == LabelRule::Main && self.layer_every() != 1 {
-            let needed = Setting("layer_every").to(1);
-            return refuse(Setting("label_rule"), format!("is main, which needs {needed}"));
+            return refuse(Setting("label_rule"), format!("is main, which needs {}", Setting("layer_every").to(1)));
         }
         if let Some([x0, y0, z0, x1, y1, z1]) = self.grow_box
             && !(x0 < x1 && y0 < y1 && z0 < z1)
         {
-            let problem = "is empty; it needs the smaller corner first, then the larger one";
-            return refuse(Setting("grow_box"), problem.to_owned());
+            return refuse(Setting("grow_box"), "is empty; the smaller corner comes first".into());
         }
         if self.random_background && self.exposure == ExposureMode::On {
-            let needed = Setting("exposure").to("off");
-            let problem = format!("is on, which needs {needed}: a random colour has no exposure of a photo");
+            let problem = format!("is on, which needs {}: no photo exposed it", Setting("exposure").to("off"));
             return refuse(Setting("random_background"), problem);
         }
         Ok(())

@@ -116,7 +116,7 @@ fn points_of_something_else_are_noticed() {
     let moved: String = points()
         .iter()
         .enumerate()
-        .map(|(id, (at, _))| (format!("{id} {} {} {} 9 9 9 0\n", at.x + 500.0, at.y, at.z)))
+        .map(|(id, (at, _))| format!("{id} {} {} {} 9 9 9 0\n", at.x + 500.0, at.y, at.z))
         .collect();
     scene.write("sparse/0/points3D.txt", moved);
     let dataset = open(&scene, "");

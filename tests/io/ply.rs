@@ -88,7 +88,7 @@ fn labels_are_written_as_floats_integers_or_not_at_all() {
     let mut large = g;
     large.labels = Some(vec![1, 1 << 24, (1 << 24) + 1]);
     let error = write_model(scene.at("a.ply"), &large).expect_err("too large").to_string();
-    assert!(error.contains("16777217") && error.contains("`uint`"), "{error}");
+    assert!(error.contains("16777217") && error.contains("uint"), "{error}");
     assert_eq!(fs::read(scene.at("a.ply")).expect("bytes"), bytes);
 }
 
@@ -101,7 +101,7 @@ fn the_selection_of_an_editor_becomes_labels() {
         let read = read_model(scene.write("a.ply", text.replace("65535", &state.to_string()))).expect("read");
         let labels: Vec<u32> = label.into_iter().collect();
         assert_eq!((read.gaussians.labels, read.dropped), (Some(labels), u64::from(label.is_none())), "state {state}");
-        assert!(read.notes[0].contains("`state`"), "{:?}", read.notes);
+        assert!(read.notes.iter().any(|note| note.contains("`state`")), "{:?}", read.notes);
     }
     // A column of labels wins.
     let both = text.replace("char opacity", "uchar label").replace("int8 tail", "char opacity").replace(" -5 ", " 7 ");
@@ -310,7 +310,7 @@ fn a_file_cut_anywhere_is_refused() {
     }
     let mut longer = foreign("binary_little_endian", "\n");
     longer.extend([0; 5]);
-    assert!(read_model(scene.write("a.ply", longer)).expect("read").notes[0].contains("5 bytes"));
+    assert!(read_model(scene.write("a.ply", longer)).expect("read").notes.iter().any(|note| note.contains("5 bytes")));
 }
 
 #[test]

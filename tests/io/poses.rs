@@ -62,7 +62,7 @@ fn broken_poses_of_llff_name_the_row() {
         row[at] = value;
         npy("(1, 17)", &row)
     };
-    assert!(broken(&npy("(1, 17)", &LLFF), 3).contains("poses of 1 photos, and `images` holds 3"));
+    assert!(broken(&npy("(1, 17)", &LLFF), 3).contains("holds 3 PNG or JPEG files"));
     assert!(broken(&npy("(1, 15)", &LLFF[..15]), 1).contains("(photos, 17)"));
     assert!(broken(&npy("(17,)", &LLFF), 1).contains("(photos, 17)"));
     assert!(broken(&npy("(1, 17)", &LLFF[..16]), 1).contains("136 bytes"));
