@@ -67,10 +67,21 @@ pub(crate) fn bytes(path: &Path) -> Result<Vec<u8>> {
     all().map_err(Error::read(path))
 }
 
-/// Reads a file of UTF-8 text.
+/// The mark that editors of Windows write before UTF-8 text.
+pub(crate) const BOM: &[u8] = b"\xEF\xBB\xBF";
+
+/// Reads a file of UTF-8 text. A byte order mark is left out.
 pub fn text(path: &Path) -> Result<String> {
-    String::from_utf8(bytes(path)?)
-        .map_err(|error| Error::data(path, format!("byte {}", error.utf8_error().valid_up_to()), "is not UTF-8 text"))
+    let mut bytes = bytes(path)?;
+    if bytes.starts_with(b"\xFF\xFE") || bytes.starts_with(b"\xFE\xFF") {
+        return Err(Error::data(path, "", "is UTF-16 text; save it as UTF-8"));
+    }
+    if bytes.starts_with(BOM) {
+        bytes.drain(..BOM.len());
+    }
+    String::from_utf8(bytes).map_err(|error| {
+        Error::data(path, format!("byte {}", error.utf8_error().valid_up_to()), "is not UTF-8 text; save it as UTF-8")
+    })
 }
 
 /// Reads a file of JSON. `expected` says in errors what it should hold.

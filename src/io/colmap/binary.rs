@@ -109,6 +109,11 @@ pub(super) fn cameras(path: &Path) -> Result<Vec<CameraRecord>> {
     })
 }
 
+/// Returns the number of records of a file.
+pub(super) fn count(path: &Path) -> Result<u64> {
+    Source::open(path)?.u64()
+}
+
 /// Reads `images.bin`, with the observations of points if they are asked for.
 pub(super) fn images(path: &Path, with_observations: bool) -> Result<Vec<ImageRecord>> {
     Source::open(path)?.records("image", |source| {

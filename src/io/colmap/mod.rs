@@ -8,8 +8,10 @@ mod model;
 mod text;
 pub(crate) mod write;
 
+use super::lens::Lens;
 use super::listed_path::Place;
 use super::listing::{FAR, Listed, Listing, check_camera};
+use super::ply;
 use crate::error::{Error, Result};
 use crate::scene::{Camera, Point};
 use glam::{DMat3, DQuat, DVec2, DVec3};
@@ -20,42 +22,98 @@ use std::path::{Path, PathBuf};
 /// Folders below the scene that may hold the model, in order of preference.
 const FOLDERS: [&str; 4] = ["sparse/0", "sparse", "colmap/sparse/0", "."];
 
+/// The files of a model, each in its own form.
 struct Files {
     folder: PathBuf,
-    extension: &'static str,
 }
 
-/// Finds a model below `root`. Binary wins over text.
-fn find(root: &Path) -> Option<Files> {
-    FOLDERS.iter().find_map(|folder| {
-        let folder = root.join(folder);
-        ["bin", "txt"].into_iter().find_map(|extension| {
-            let both = ["cameras", "images"].iter().all(|stem| folder.join(stem).with_extension(extension).is_file());
-            both.then(|| Files { folder: folder.clone(), extension })
-        })
-    })
+impl Files {
+    /// Finds a model below `root`.
+    fn find(root: &Path) -> Option<Self> {
+        let files = FOLDERS.iter().map(|folder| Self { folder: root.join(folder) });
+        files.into_iter().find(|files| files.path("cameras").is_some() && files.path("images").is_some())
+    }
+
+    /// Returns a file and whether it is binary. Binary wins over text.
+    fn path(&self, stem: &str) -> Option<(PathBuf, bool)> {
+        let file =
+            |extension: &str| Some(self.folder.join(stem).with_extension(extension)).filter(|path| path.is_file());
+        file("bin").map(|path| (path, true)).or_else(|| file("txt").map(|path| (path, false)))
+    }
+
+    fn needed(&self, stem: &str) -> Result<(PathBuf, bool)> {
+        self.path(stem).ok_or_else(|| Error::data(self.folder.join(stem), "", "is gone"))
+    }
+
+    /// Reads the images, with the cameras that took them.
+    fn views(&self, scene: &Place, with_observations: bool) -> Result<Views> {
+        let (cameras_path, is_binary) = self.needed("cameras")?;
+        let cameras = if is_binary { binary::cameras(&cameras_path) } else { text::cameras(&cameras_path) }?;
+        let (source, is_binary) = self.needed("images")?;
+        let images = match is_binary {
+            true => binary::images(&source, with_observations)?.into_iter().map(Ok).collect(),
+            false => text::images(&source, with_observations)?,
+        };
+        join(scene, (&cameras_path, &cameras), &source, images)
+    }
+
+    /// Reads the points with their ids; `None` without a list.
+    fn points(&self) -> Result<Option<Vec<(u64, Point)>>> {
+        self.path("points3D")
+            .map(|(path, is_binary)| if is_binary { binary::points(&path) } else { text::points(&path) })
+            .transpose()
+    }
+}
+
+/// The photos of a model.
+struct Views {
+    /// Each with its row.
+    views: Vec<(Listed, ImageRecord)>,
+    /// Photos whose poses cannot be used.
+    bad: Vec<Error>,
 }
 
 /// Reads the model of the scene, if there is one.
 pub(crate) fn list(scene: &Place) -> Result<Option<Listing>> {
-    let Some(files) = find(scene.root) else { return Ok(None) };
-    let path = |stem: &str| files.folder.join(stem).with_extension(files.extension);
-    let binary = files.extension == "bin";
-    let (cameras_path, images_path, points_path) = (path("cameras"), path("images"), path("points3D"));
-    let cameras = if binary { binary::cameras(&cameras_path) } else { text::cameras(&cameras_path) }?;
-    let images = if binary { binary::images(&images_path, false) } else { text::images(&images_path, false) }?;
+    let Some(files) = Files::find(scene.root) else { return Ok(None) };
+    let Views { views, bad } = files.views(scene, false)?;
     let mut notes = Vec::new();
-    let points = match (points_path.is_file(), binary) {
-        (false, _) => Vec::new(),
-        (true, true) => binary::points(&points_path)?,
-        (true, false) => text::points(&points_path)?,
+    let points = match files.points()? {
+        Some(points) => points.into_iter().map(|(_, point)| point).collect(),
+        None => points_of_ply(&files.folder, &mut notes)?,
     };
-    let points = finite(points.into_iter().map(|(_, point)| point).collect(), &mut notes);
-    if files.folder.ends_with("sparse/0") && files.folder.with_file_name("1").is_dir() {
-        notes.push(format!("only the model {} is used; its neighbours are ignored", files.folder.display()));
+    let points = finite(points, &mut notes);
+    notes.extend(neighbours(&files.folder, views.len() + bad.len()));
+    let views = views.into_iter().map(|(listed, _)| listed).collect();
+    Ok(Some(Listing { source: files.needed("images")?.0, views, points, notes, bad, ..Listing::default() }))
+}
+
+/// Reads the points that a trainer wrote beside the model, where the model has none.
+fn points_of_ply(folder: &Path, notes: &mut Vec<String>) -> Result<Vec<Point>> {
+    let path = folder.join("points3D.ply");
+    if !path.is_file() {
+        return Ok(Vec::new());
     }
-    let views = join(scene, &cameras_path, &cameras, &images_path, &images)?;
-    Ok(Some(Listing { source: images_path, views, points, notes, ..Listing::default() }))
+    notes.push(format!("the points come from {}, because there is no points3D.bin or .txt", path.display()));
+    ply::read_points(&path)
+}
+
+/// Says what other models lie beside that in `sparse/0`, which has `count` photos.
+fn neighbours(folder: &Path, count: usize) -> Option<String> {
+    let others = (1..10).map(|number| folder.with_file_name(number.to_string()));
+    let others = others.filter(|other| folder.ends_with("sparse/0") && other.is_dir()).filter_map(|folder| {
+        let (path, is_binary) = Files { folder: folder.clone() }.path("images")?;
+        // A damaged neighbour is not this scene's concern.
+        let images =
+            if is_binary { binary::count(&path) } else { text::images(&path, false).map(|all| all.len() as u64) };
+        Some((folder, images.ok()?))
+    });
+    let (largest, images) = others.max_by_key(|(_, images)| *images)?;
+    Some(format!(
+        "only the model {} is used, with {count} photos; {} has {images}: name that folder as the scene to use it",
+        folder.display(),
+        largest.display()
+    ))
 }
 
 /// A point in a photo, and the same point in the world.
@@ -63,24 +121,15 @@ pub(crate) type Seen = (DVec2, DVec3);
 
 /// Reads which points each photo of a COLMAP model shows, by name of the view; none without a model.
 pub(crate) fn observations(scene: &Place) -> Result<Option<BTreeMap<String, (Listed, Vec<Seen>)>>> {
-    let Some(files) = find(scene.root) else { return Ok(None) };
-    let path = |stem: &str| files.folder.join(stem).with_extension(files.extension);
-    let (cameras_path, images_path, points_path) = (path("cameras"), path("images"), path("points3D"));
-    if !points_path.is_file() {
-        return Ok(None);
-    }
-    let (cameras, images, points) = match files.extension {
-        "bin" => (binary::cameras(&cameras_path)?, binary::images(&images_path, true)?, binary::points(&points_path)?),
-        _ => (text::cameras(&cameras_path)?, text::images(&images_path, true)?, text::points(&points_path)?),
-    };
+    let Some(files) = Files::find(scene.root) else { return Ok(None) };
+    let Some(points) = files.points()? else { return Ok(None) };
     let places: HashMap<u64, DVec3> = points.into_iter().map(|(id, point)| (id, point.position)).collect();
-    let views = join(scene, &cameras_path, &cameras, &images_path, &images)?;
     let seen = |(listed, image): (Listed, ImageRecord)| {
         let points = image.observed.points.into_iter();
         let points = points.filter_map(|(pixel, id)| Some((pixel, *places.get(&id)?))).collect();
         (listed.name.clone(), (listed, points))
     };
-    Ok(Some(views.into_iter().zip(images).map(seen).collect()))
+    Ok(Some(files.views(scene, true)?.views.into_iter().map(seen).collect()))
 }
 
 fn finite(mut points: Vec<Point>, notes: &mut Vec<String>) -> Vec<Point> {
@@ -97,11 +146,10 @@ fn finite(mut points: Vec<Point>, notes: &mut Vec<String>) -> Vec<Point> {
 
 fn join(
     scene: &Place,
-    cameras_path: &Path,
-    cameras: &[CameraRecord],
+    (cameras_path, cameras): (&Path, &[CameraRecord]),
     images_path: &Path,
-    images: &[ImageRecord],
-) -> Result<Vec<Listed>> {
+    images: Vec<Result<ImageRecord>>,
+) -> Result<Views> {
     let mut by_id = HashMap::new();
     for camera in cameras {
         if by_id.insert(camera.id, camera).is_some() {
@@ -109,8 +157,15 @@ fn join(
         }
     }
     let (mut ids, mut names) = (HashSet::new(), HashSet::new());
-    let mut views = Vec::with_capacity(images.len());
+    let mut found = Views { views: Vec::with_capacity(images.len()), bad: Vec::new() };
     for image in images {
+        let image = match image {
+            Ok(image) => image,
+            Err(error) => {
+                found.bad.push(error);
+                continue;
+            }
+        };
         let place = format!("image {} (`{}`)", image.id, image.name);
         let twice = || Error::data(images_path, place.as_str(), "has an id or a name that was listed before");
         if !ids.insert(image.id) {
@@ -120,40 +175,48 @@ fn join(
             let problem = format!("uses camera {}, which {} does not list", image.camera, cameras_path.display());
             return Err(Error::data(images_path, place.as_str(), problem));
         };
-        let view = listed(scene, images_path, &place, image, cameras_path, camera)?;
-        if !names.insert(view.name.clone()) {
+        let (camera, lens) = intrinsics(cameras_path, camera)?;
+        let file = scene.resolve(images_path, &image.name)?;
+        let camera = match posed(camera, &image) {
+            Ok(camera) => camera,
+            Err(problem) => {
+                found.bad.push(Error::data(
+                    images_path,
+                    place,
+                    format!("{problem}; adjust it again, or remove the image"),
+                ));
+                continue;
+            }
+        };
+        if !names.insert(file.name.clone()) {
             return Err(twice());
         }
-        views.push(view);
+        let photo = scene.photos.find(&["images", "."], &file.path);
+        found.views.push((Listed { name: file.name, photo, camera, lens, test: None }, image));
     }
-    Ok(views)
+    Ok(found)
 }
 
-fn listed(
-    scene: &Place,
-    images_path: &Path,
-    place: &str,
-    image: &ImageRecord,
-    cameras_path: &Path,
-    record: &CameraRecord,
-) -> Result<Listed> {
+/// Returns the camera of a record, without a pose, and its lens.
+fn intrinsics(path: &Path, record: &CameraRecord) -> Result<(Camera, Lens)> {
+    let (camera, lens) = record.intrinsics(path)?;
+    check_camera(path, &format!("camera {}", record.id), &camera, &lens)?;
+    Ok((camera, lens))
+}
+
+/// Returns the camera with the pose of an image, or what is wrong with the pose.
+fn posed(camera: Camera, image: &ImageRecord) -> Result<Camera, String> {
     let [w, x, y, z] = image.quaternion;
     let quaternion = DQuat::from_xyzw(x, y, z, w);
-    let length = quaternion.length();
+    let (length, translation) = (quaternion.length(), DVec3::from_array(image.translation));
     if !(length.is_finite() && length > 1e-9) {
-        return Err(Error::data(images_path, place, "has a rotation that is zero or not finite"));
+        return Err("has a rotation that is zero or not finite".to_owned());
     }
-    let (mut camera, lens) = record.intrinsics(cameras_path)?;
-    camera.rotation = DMat3::from_quat(quaternion.normalize());
-    camera.translation = DVec3::from_array(image.translation);
-    check_camera(
-        cameras_path,
-        &format!("camera {}", record.id),
-        &Camera { translation: DVec3::ZERO, ..camera.clone() },
-        &lens,
-    )?;
-    check_camera(images_path, place, &camera, &lens)?;
-    let file = scene.resolve(images_path, &image.name)?;
-    let photo = scene.photos.find(&["images", "."], &file.path);
-    Ok(Listed { name: file.name, photo, camera, lens, test: None })
+    if !translation.is_finite() {
+        return Err("the pose is not finite".to_owned());
+    }
+    if translation.length() > FAR {
+        return Err(format!("the camera is farther than {FAR:e} from the origin"));
+    }
+    Ok(Camera { rotation: DMat3::from_quat(quaternion.normalize()), translation, ..camera })
 }

@@ -15,9 +15,14 @@ fn lines(path: &Path) -> Result<impl Iterator<Item = Result<(usize, String)>>> {
     let path = path.to_owned();
     let line = move |(index, line): (usize, std::io::Result<Vec<u8>>)| {
         let place = || format!("line {}", index + 1);
-        let text = String::from_utf8(line.map_err(Error::read(&path))?);
-        let text =
-            text.map_err(|_| Error::data(&path, place(), "is not UTF-8 text; export the model as text again"))?;
+        let mut line = line.map_err(Error::read(&path))?;
+        if index == 0 && line.starts_with(read::BOM) {
+            line.drain(..read::BOM.len());
+        }
+        let text = String::from_utf8(line);
+        let text = text.map_err(|_| {
+            Error::data(&path, place(), "is not UTF-8 text; save it as UTF-8, or export the model as text again")
+        })?;
         Ok((index + 1, text))
     };
     Ok(file.split(b'\n').enumerate().map(line))
@@ -90,38 +95,60 @@ pub(super) fn cameras(path: &Path) -> Result<Vec<CameraRecord>> {
     })
 }
 
-/// Reads `images.txt`: two lines per image, the second with its observations, possibly empty.
-pub(super) fn images(path: &Path, with_observations: bool) -> Result<Vec<ImageRecord>> {
+/// True for a line of an image, whatever stands before it: an id, seven numbers of a pose, the id of a camera, a name.
+/// A line of observations has threes of numbers.
+fn is_image(line: &str) -> bool {
+    let words: Vec<&str> = line.split_ascii_whitespace().take(32).collect();
+    let is_number = |word: &&str| word.parse::<f64>().is_ok();
+    words.len() > 9
+        && words[0].parse::<u32>().is_ok()
+        && words[1..8].iter().all(is_number)
+        && words[8].parse::<u32>().is_ok()
+        && (words.len() == 10 || !words[9..].iter().all(is_number))
+}
+
+/// Reads `images.txt`: two lines per image, the second with its observations, possibly empty. Programs that write poses
+/// alone leave the second one out. Rows that cannot be read are errors of their own.
+pub(super) fn images(path: &Path, with_observations: bool) -> Result<Vec<Result<ImageRecord>>> {
     let mut all = Vec::new();
-    let mut lines = lines(path)?;
+    let mut lines = lines(path)?.peekable();
     while let Some(line) = lines.next() {
         let (number, line) = line?;
         if !is_record(&line) {
             continue;
         }
-        let mut words = Words { path, number, rest: line.trim() };
-        let id = words.number("image id")?;
-        let (quaternion, translation) = (words.numbers("rotation")?, words.numbers("translation")?);
-        let camera = words.number("camera id")?;
-        // The name is the rest of the line, because it may contain spaces.
-        let name = words.rest.trim().to_owned();
-        if name.is_empty() {
-            return Err(words.error("the line ends where the image name is expected"));
-        }
-        let mut observed = Observed { points: Vec::new() };
-        if let Some(observations) = lines.next() {
-            let (number, line) = observations?;
-            let mut words = Words { path, number, rest: line.trim() };
-            while with_observations && !words.rest.trim().is_empty() {
-                let pixel = DVec2::from_array(words.numbers("position in the photo")?);
-                let point: i64 = words.number("point id")?;
-                // -1: an image feature without a point.
-                observed.points.extend(u64::try_from(point).ok().map(|point| (pixel, point)));
-            }
-        }
-        all.push(ImageRecord { id, quaternion, translation, camera, name, observed });
+        let second = match lines.peek() {
+            Some(Ok((_, second))) if !is_image(second) => lines.next().transpose()?,
+            Some(Err(_)) => lines.next().transpose()?,
+            _ => None,
+        };
+        all.push(image(path, (number, line), second.filter(|_| with_observations)));
     }
     Ok(all)
+}
+
+/// Reads the image in a line, and its observations in the next one.
+fn image(path: &Path, (number, line): (usize, String), observations: Option<(usize, String)>) -> Result<ImageRecord> {
+    let mut words = Words { path, number, rest: line.trim() };
+    let id = words.number("image id")?;
+    let (quaternion, translation) = (words.numbers("rotation")?, words.numbers("translation")?);
+    let camera = words.number("camera id")?;
+    // The name is the rest of the line, because it may contain spaces.
+    let name = words.rest.trim().to_owned();
+    if name.is_empty() {
+        return Err(words.error("the line ends where the image name is expected"));
+    }
+    let mut observed = Observed { points: Vec::new() };
+    if let Some((number, line)) = observations {
+        let mut words = Words { path, number, rest: line.trim() };
+        while !words.rest.trim().is_empty() {
+            let pixel = DVec2::from_array(words.numbers("position in the photo")?);
+            let point: i64 = words.number("point id")?;
+            // -1: an image feature without a point.
+            observed.points.extend(u64::try_from(point).ok().map(|point| (pixel, point)));
+        }
+    }
+    Ok(ImageRecord { id, quaternion, translation, camera, name, observed })
 }
 
 /// Reads `points3D.txt` with the ids, without the tracks.
