@@ -236,7 +236,7 @@ fn a_merge_lists_all_that_is_wrong() {
     std::fs::remove_dir_all(place.path("models/b001")).expect("removed");
     succeeded(&train_block(&place, "b001", &["--sh-degree", "1"]));
     let text = stderr(&merge(&place, &[]));
-    assert!(text.contains("--sh-degree is 1, and 3 in"), "{text}");
+    assert!(text.contains("sh degree is 1, and 3 in"), "{text}");
     // One label with two names.
     let table = place.path("models/b000/labels.json");
     let renamed = std::fs::read_to_string(&table).expect("text").replace("\"ball\"", "\"globe\"");

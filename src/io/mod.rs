@@ -202,6 +202,10 @@ fn list(scene: &Path, lookup: &Lookup) -> Result<Listing> {
     listing.notes.extend(place.photos.note());
     if listing.views.iter().any(|view| view.photo.is_none()) || !listing.missing.is_empty() {
         listing.hint = place.photos.hint();
+        let other = folder_of(scene).join("transforms.json");
+        if scene.is_dir() && other.is_file() && listing.source != other {
+            listing.hint += &format!("; or name {} as the scene, which lies there too", other.display());
+        }
     }
     let native = Native::of_file(&listing.source);
     listing.views.iter_mut().for_each(|view| lookup.poses.apply(native, &mut view.camera));
@@ -223,8 +227,13 @@ fn list_in(place: &Place, scene: &Path) -> Result<Listing> {
     if !scene.is_dir() {
         return Err(Error::data(scene, "", "there is no such folder; expected the folder of a scene"));
     }
-    for list in [colmap::list, transforms::list, llff::list, metashape::list] {
-        if let Some(listing) = list(place)? {
+    let other = scene.join("transforms.json");
+    for (at, list) in [colmap::list, transforms::list, llff::list, metashape::list].into_iter().enumerate() {
+        if let Some(mut listing) = list(place)? {
+            if at == 0 && other.is_file() {
+                let (used, other) = (listing.source.display(), other.display());
+                listing.notes.push(format!("poses come from {used}; name {other} as the scene to use that instead"));
+            }
             return Ok(listing);
         }
     }

@@ -97,7 +97,7 @@ impl PhotoFinder {
         let given = self.images.as_deref();
         let bases: Vec<PathBuf> = match given {
             Some(images) => vec![images.to_owned()],
-            None => folders.iter().map(|folder| self.root.join(folder)).collect(),
+            None => folders.iter().map(|folder| self.root.join(folder)).chain(self.above()).collect(),
         };
         let paths = shortened(relative, given.is_some());
         let listed = if given.is_some() { paths.as_slice() } else { &paths[..1] };
@@ -115,6 +115,17 @@ impl PhotoFinder {
             None => *elsewhere = Some((1, relative.to_owned(), found.clone())),
         }
         Some(found)
+    }
+
+    /// The folder of photos of a scene of which this is one of the models, as `sparse/1` is.
+    fn above(&self) -> Option<PathBuf> {
+        let root = std::path::absolute(&self.root).ok()?;
+        let scene = root
+            .ancestors()
+            .skip(1)
+            .take(3)
+            .find(|above| above.join("sparse").is_dir() && root.starts_with(above.join("sparse")))?;
+        Some(scene.join("images")).filter(|images| images.is_dir())
     }
 
     /// Returns a note on the photos that were found elsewhere.

@@ -67,18 +67,22 @@ pub(crate) fn bytes(path: &Path) -> Result<Vec<u8>> {
     all().map_err(Error::read(path))
 }
 
-/// The mark that editors of Windows write before UTF-8 text.
-pub(crate) const BOM: &[u8] = b"\xEF\xBB\xBF";
+/// Removes the mark that editors of Windows write before UTF-8 text; refuses that of UTF-16.
+pub(crate) fn without_mark(path: &Path, text: &mut Vec<u8>) -> Result<()> {
+    const MARK: &[u8] = b"\xEF\xBB\xBF";
+    if text.starts_with(b"\xFF\xFE") || text.starts_with(b"\xFE\xFF") {
+        return Err(Error::data(path, "", "is UTF-16 text; save it as UTF-8"));
+    }
+    if text.starts_with(MARK) {
+        text.drain(..MARK.len());
+    }
+    Ok(())
+}
 
 /// Reads a file of UTF-8 text. A byte order mark is left out.
 pub fn text(path: &Path) -> Result<String> {
     let mut bytes = bytes(path)?;
-    if bytes.starts_with(b"\xFF\xFE") || bytes.starts_with(b"\xFE\xFF") {
-        return Err(Error::data(path, "", "is UTF-16 text; save it as UTF-8"));
-    }
-    if bytes.starts_with(BOM) {
-        bytes.drain(..BOM.len());
-    }
+    without_mark(path, &mut bytes)?;
     String::from_utf8(bytes).map_err(|error| {
         Error::data(path, format!("byte {}", error.utf8_error().valid_up_to()), "is not UTF-8 text; save it as UTF-8")
     })

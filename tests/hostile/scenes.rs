@@ -19,7 +19,7 @@ fn a_few_undecodable_photos_are_skipped_and_listed() {
     let dataset = open(&scene, 0.1).expect("2 of 20 are allowed");
     assert_eq!(dataset.train.len(), 18);
     assert!(dataset.train.iter().all(|view| view.name != "03.png" && view.name != "11.png"));
-    let note = dataset.notes.iter().find(|note| note.contains("cannot be decoded")).expect("a note");
+    let note = dataset.notes.iter().find(|note| note.contains("photos cannot be read")).expect("a note");
     assert!(note.contains("2 of 20") && note.contains("03.png") && note.contains("11.png"), "{note}");
     // The split into training and test views does not depend on skipped photos.
     let split = LoadOptions { test_every: Some(4), ..LoadOptions::default() };
@@ -29,7 +29,7 @@ fn a_few_undecodable_photos_are_skipped_and_listed() {
     assert!(refusal(open(&scene, 0.0)).contains("`max_bad_photos = 0` allows 0"));
     scene.write("images/12.png", b"no picture");
     let text = refusal(open(&scene, 0.1));
-    let parts = ["3 of 20 photos cannot be decoded", "allows 2", "03.png", "11.png", "12.png"];
+    let parts = ["3 of 20 photos cannot be read", "allows 2", "03.png", "11.png", "12.png"];
     assert!(parts.iter().all(|part| text.contains(part)), "{text}");
     open(&scene, 0.15).expect("3 of 20 are allowed");
 }

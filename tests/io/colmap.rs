@@ -278,3 +278,83 @@ fn a_folder_without_scene_says_what_was_expected() {
     assert!(text.contains("sparse/0") && text.contains("transforms.json"));
     assert!(refusal(io::open(&scene.path().join("nowhere"), &LoadOptions::default())).contains("no such folder"));
 }
+
+#[test]
+fn poses_without_second_lines_lose_no_photo() {
+    let scene = simple(6);
+    scene.colmap_txt("sparse/0", &[pinhole()], &["00.png", "01.png", "02.png", "03.png", "04 a.png", "05.png"]);
+    scene.photo("images/04 a.png", 12, 8);
+    ["cameras", "images", "points3D"].iter().for_each(|stem| {
+        fs::remove_file(scene.path().join(format!("sparse/0/{stem}.bin"))).expect("removed");
+    });
+    let path = scene.path().join("sparse/0/images.txt");
+    let text = fs::read_to_string(&path).expect("text");
+    let poses = |line: &&str| line.ends_with(".png") || line.starts_with('#');
+    let alone = text.lines().filter(poses).map(|line| format!("{line}\r\n")).collect::<String>();
+    let blank = text.replace("1.5 2.5 -1 3.0 4.0 7", "");
+    for text in [text.clone(), alone, blank, format!("\u{feff}{text}")] {
+        fs::write(&path, &text).expect("written");
+        assert_eq!(open(&scene).unwrap_or_else(|error| panic!("{text:?}: {error}")).train.len(), 6, "{text:?}");
+    }
+}
+
+#[test]
+fn files_of_a_model_may_have_different_forms() {
+    let scene = simple(2);
+    scene.colmap_txt("other", &[pinhole()], &["00.png", "01.png"]);
+    let (binary, text) = (scene.path().join("sparse/0"), scene.path().join("other"));
+    for stem in ["cameras", "points3D"] {
+        fs::remove_file(binary.join(format!("{stem}.bin"))).expect("removed");
+        fs::copy(text.join(format!("{stem}.txt")), binary.join(format!("{stem}.txt"))).expect("copied");
+    }
+    let dataset = open(&scene).expect("a scene");
+    assert_eq!((dataset.train.len(), dataset.points.len()), (2, POINTS.len()));
+    // Points of a trainer, if the model has none.
+    fs::remove_file(binary.join("points3D.txt")).expect("removed");
+    scene.write("sparse/0/points3D.ply", "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\n\
+                 property float z\nproperty uchar red\nproperty uchar green\nproperty uchar blue\nend_header\n1 2 3 4 5 6\n");
+    let dataset = open(&scene).expect("a scene");
+    assert_eq!((dataset.points.len(), dataset.points[0].colour), (1, [4, 5, 6]));
+    assert!(dataset.notes.iter().any(|note| note.contains("points3D.ply")), "{:?}", dataset.notes);
+}
+
+#[test]
+fn one_broken_pose_leaves_its_photo_out() {
+    let scene = simple(12);
+    let path = scene.path().join("sparse/0/images.bin");
+    let mut bytes = fs::read(&path).expect("bytes");
+    // The first number of the first rotation.
+    bytes[12..20].copy_from_slice(&f64::NAN.to_le_bytes());
+    fs::write(&path, bytes).expect("written");
+    let dataset = open(&scene).expect("a scene");
+    assert_eq!(dataset.train.len(), 11);
+    assert!(
+        dataset.notes.iter().any(|note| note.contains("1 of 12") && note.contains("00.png")),
+        "{:?}",
+        dataset.notes
+    );
+    let none = LoadOptions { max_bad_photos: 0.0, ..LoadOptions::default() };
+    assert!(refusal(io::open(scene.path(), &none)).contains("remove the image"));
+}
+
+#[test]
+fn another_model_is_named_with_its_photos_and_can_be_the_scene() {
+    let scene = simple(5);
+    scene.colmap_bin("sparse/0", &[pinhole()], &["00.png"]);
+    scene.colmap_bin("sparse/1", &[pinhole()], &["01.png", "02.png", "03.png", "04.png"]);
+    let notes = open(&scene).expect("a scene").notes;
+    assert!(notes.iter().any(|note| note.contains("with 1 photos") && note.contains("has 4")), "{notes:?}");
+    let other = io::open(&scene.path().join("sparse/1"), &LoadOptions::default()).expect("a scene");
+    assert_eq!(other.all().len(), 4);
+}
+
+#[test]
+fn a_second_kind_of_scene_is_named() {
+    let scene = simple(2);
+    let json = r#"{"fl_x": 10, "frames": [{"file_path": "images/00.png", "transform_matrix": [[1,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]]}]}"#;
+    scene.write("transforms.json", json);
+    let notes = open(&scene).expect("a scene").notes;
+    assert!(notes.iter().any(|note| note.contains("images.bin") && note.contains("transforms.json")), "{notes:?}");
+    fs::remove_dir_all(scene.path().join("images")).expect("removed");
+    assert!(refusal(open(&scene)).contains("or name"));
+}

@@ -34,11 +34,15 @@ impl Files {
         files.into_iter().find(|files| files.path("cameras").is_some() && files.path("images").is_some())
     }
 
-    /// Returns a file and whether it is binary. Binary wins over text.
+    /// Returns a file and whether it is binary. Files of one form belong together: binary wins over text where cameras and
+    /// images have it.
     fn path(&self, stem: &str) -> Option<(PathBuf, bool)> {
-        let file =
-            |extension: &str| Some(self.folder.join(stem).with_extension(extension)).filter(|path| path.is_file());
-        file("bin").map(|path| (path, true)).or_else(|| file("txt").map(|path| (path, false)))
+        let file = |stem: &str, extension: &str| Some(self.folder.join(stem).with_extension(extension));
+        let is_there = |stem: &str, extension: &str| file(stem, extension).is_some_and(|path| path.is_file());
+        let is_whole = |extension: &str| is_there("cameras", extension) && is_there("images", extension);
+        let forms = if !is_whole("bin") && is_whole("txt") { ["txt", "bin"] } else { ["bin", "txt"] };
+        let form = forms.into_iter().find(|form| is_there(stem, form))?;
+        file(stem, form).map(|path| (path, form == "bin"))
     }
 
     fn needed(&self, stem: &str) -> Result<(PathBuf, bool)> {
@@ -175,16 +179,18 @@ fn join(
             let problem = format!("uses camera {}, which {} does not list", image.camera, cameras_path.display());
             return Err(Error::data(images_path, place.as_str(), problem));
         };
-        let (camera, lens) = intrinsics(cameras_path, camera)?;
         let file = scene.resolve(images_path, &image.name)?;
-        let camera = match posed(camera, &image) {
-            Ok(camera) => camera,
+        let posed = |(camera, lens): (Camera, Lens)| match posed(camera, &image) {
+            Ok(camera) => Ok((camera, lens)),
             Err(problem) => {
-                found.bad.push(Error::data(
-                    images_path,
-                    place,
-                    format!("{problem}; adjust it again, or remove the image"),
-                ));
+                let problem = format!("{problem}; adjust it again, or remove the image");
+                Err(Error::data(images_path, place.as_str(), problem))
+            }
+        };
+        let (camera, lens) = match intrinsics(cameras_path, camera).and_then(posed) {
+            Ok(found) => found,
+            Err(error) => {
+                found.bad.push(error);
                 continue;
             }
         };

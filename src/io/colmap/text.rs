@@ -16,8 +16,8 @@ fn lines(path: &Path) -> Result<impl Iterator<Item = Result<(usize, String)>>> {
     let line = move |(index, line): (usize, std::io::Result<Vec<u8>>)| {
         let place = || format!("line {}", index + 1);
         let mut line = line.map_err(Error::read(&path))?;
-        if index == 0 && line.starts_with(read::BOM) {
-            line.drain(..read::BOM.len());
+        if index == 0 {
+            read::without_mark(&path, &mut line)?;
         }
         let text = String::from_utf8(line);
         let text = text.map_err(|_| {
@@ -95,16 +95,14 @@ pub(super) fn cameras(path: &Path) -> Result<Vec<CameraRecord>> {
     })
 }
 
-/// True for a line of an image, whatever stands before it: an id, seven numbers of a pose, the id of a camera, a name.
-/// A line of observations has threes of numbers.
-fn is_image(line: &str) -> bool {
-    let words: Vec<&str> = line.split_ascii_whitespace().take(32).collect();
-    let is_number = |word: &&str| word.parse::<f64>().is_ok();
-    words.len() > 9
-        && words[0].parse::<u32>().is_ok()
-        && words[1..8].iter().all(is_number)
-        && words[8].parse::<u32>().is_ok()
-        && (words.len() == 10 || !words[9..].iter().all(is_number))
+/// True for the second line of an image: threes of numbers, or nothing.
+fn is_observations(line: &str) -> bool {
+    let mut count = 0;
+    let is_number = |word: &str| {
+        count += 1;
+        word.parse::<f64>().is_ok()
+    };
+    line.split_ascii_whitespace().all(is_number) && count % 3 == 0
 }
 
 /// Reads `images.txt`: two lines per image, the second with its observations, possibly empty. Programs that write poses
@@ -118,9 +116,8 @@ pub(super) fn images(path: &Path, with_observations: bool) -> Result<Vec<Result<
             continue;
         }
         let second = match lines.peek() {
-            Some(Ok((_, second))) if !is_image(second) => lines.next().transpose()?,
-            Some(Err(_)) => lines.next().transpose()?,
-            _ => None,
+            Some(Ok((_, second))) if !is_observations(second) => None,
+            _ => lines.next().transpose()?,
         };
         all.push(image(path, (number, line), second.filter(|_| with_observations)));
     }
