@@ -15,6 +15,7 @@ use crate::scene::Dataset;
 use crate::viewer::{Edit, Finished, Viewer, ViewerOptions, Words, show};
 use clap::Args;
 use serde_json::json;
+use std::net::IpAddr;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
@@ -83,6 +84,11 @@ impl ServerArgs {
         let options =
             ViewerOptions { host: self.view_host.clone(), port: self.view_port, has_token: !self.view_no_token, share };
         let viewer = Viewer::start(&options)?;
+        if self.view_host.parse::<IpAddr>().is_ok_and(|ip| ip.is_unspecified()) {
+            tracing::info!(
+                "other machines open this address with the name of this machine in place of the loopback one"
+            );
+        }
         if self.open {
             open_browser(&viewer.address());
         }

@@ -34,14 +34,19 @@ for (const chart of document.querySelectorAll("figure.chart")) {
     colour: line.getAttribute("class"),
     points: line.getAttribute("points").split(" ").map((point) => point.split(",").map(Number)),
   }));
+  // Half the narrowest spacing of a curve: points closer than that are of the same step.
+  const gaps = curves.flatMap(({ points }) => points.slice(1).map((point, index) => point[0] - points[index][0]));
+  const reach = Math.min(2, ...gaps.filter((gap) => gap > 0).map((gap) => gap / 2));
   const digits = Math.min(8, Math.max(0, Math.ceil(3 - Math.log10(Math.max(y1 - y0, 1e-9)))));
   const show = (event) => {
     const box = plot.getBoundingClientRect();
     const at = (1000 * (event.clientX - box.left)) / box.width;
-    let step = null;
-    const rows = curves.map((curve) => {
-      const nearest = curve.points.reduce((a, b) => (Math.abs(b[0] - at) < Math.abs(a[0] - at) ? b : a));
-      step ??= nearest[0];
+    const nearestTo = (x, points) => points.reduce((a, b) => (Math.abs(b[0] - x) < Math.abs(a[0] - x) ? b : a));
+    const step = nearestTo(at, curves.flatMap((curve) => curve.points))[0];
+    // A curve without a point at this step has no value to show.
+    const rows = curves.flatMap((curve) => {
+      const nearest = nearestTo(step, curve.points);
+      if (Math.abs(nearest[0] - step) > reach) return [];
       const row = document.createElement("div");
       const swatch = document.createElement("i");
       swatch.className = curve.colour;

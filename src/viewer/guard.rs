@@ -1,7 +1,9 @@
 //! Who may talk to the server: the checks of Host, Origin and token.
 //!
-//! A web page of any site can send requests to loopback, and a name of its owner can point there. So a request has to
-//! name this server in `Host`, may come only from its own page (`Origin`), and has to know the token.
+//! A web page of any site can send requests to loopback, and a name of its owner can point there. Such a page does not
+//! know the token, and the cookie with it goes only to the name under which it was set. So a request with the token may
+//! name the server as it likes (a tunnel from another port does); any other has to name this server in `Host`. Either
+//! way it may come only from the page of the name that it asks (`Origin`).
 
 use crate::error::{Error, Result};
 use rand::TryRngCore;
@@ -24,8 +26,13 @@ impl Guard {
     /// Makes the rules of a server at `address`, which the user named `host`.
     pub(super) fn new(address: SocketAddr, host: &str, has_token: bool) -> Result<Self> {
         let port = address.port();
-        let mut names = vec![host.to_owned(), address.ip().to_string()];
-        if address.ip().is_loopback() {
+        // Every address of the machine is no address to open; loopback is one of them.
+        let mut names = match address.ip() {
+            IpAddr::V4(ip) if ip.is_unspecified() => vec!["127.0.0.1".to_owned()],
+            IpAddr::V6(ip) if ip.is_unspecified() => vec!["::1".to_owned()],
+            ip => vec![host.to_owned(), ip.to_string()],
+        };
+        if address.ip().is_loopback() || address.ip().is_unspecified() {
             names.push("localhost".to_owned());
         }
         let bracketed = |name: &String| match name.parse() {
@@ -48,13 +55,21 @@ impl Guard {
         host.is_some_and(|host| self.hosts.iter().any(|own| own.eq_ignore_ascii_case(host)))
     }
 
-    /// Returns true if the page that asks is one of this server. Browsers leave `Origin` out when a user opens a page;
-    /// `is_needed` says that it may not be missing.
-    pub(super) fn knows_origin(&self, origin: Option<&str>, is_needed: bool) -> bool {
-        match origin {
-            Some(origin) => origin.strip_prefix("http://").is_some_and(|host| self.knows_host(Some(host))),
-            None => !is_needed,
+    /// Returns true if a request to `host` comes from the page of that host. Browsers leave `Origin` out when a user opens
+    /// a page; `is_needed` says that it may not be missing.
+    pub(super) fn is_same_origin(origin: Option<&str>, host: Option<&str>, is_needed: bool) -> bool {
+        match (origin, host) {
+            (Some(origin), Some(host)) => {
+                origin.strip_prefix("http://").is_some_and(|from| from.eq_ignore_ascii_case(host))
+            }
+            (Some(_), None) => false,
+            (None, _) => !is_needed,
         }
+    }
+
+    /// Returns true if this server has a token and the request knows it, by its address or its cookies.
+    pub(super) fn is_proven(&self, given: Option<&str>, cookies: Option<&str>) -> bool {
+        self.token.is_some() && (given.is_some_and(|_| self.knows_token(given)) || self.knows_cookie(cookies))
     }
 
     /// Returns true if no token is needed, or `given` is it.
@@ -115,12 +130,34 @@ mod tests {
 
     #[test]
     fn another_origin_is_refused() {
-        let guard = guard(true);
-        assert!(guard.knows_origin(Some("http://127.0.0.1:4321"), true) && guard.knows_origin(None, false));
+        let host = Some("127.0.0.1:4321");
+        let is_same = |origin, is_needed| Guard::is_same_origin(origin, host, is_needed);
+        assert!(is_same(Some("http://127.0.0.1:4321"), true) && is_same(None, false));
         for origin in ["http://evil.test", "https://127.0.0.1:4321", "http://127.0.0.1:4322", "null", ""] {
-            assert!(!guard.knows_origin(Some(origin), false), "{origin}");
+            assert!(!is_same(Some(origin), false), "{origin}");
         }
-        assert!(!guard.knows_origin(None, true));
+        assert!(!is_same(None, true) && !Guard::is_same_origin(Some("http://a"), None, false));
+    }
+
+    #[test]
+    fn a_token_proves_a_request_and_its_absence_does_not() {
+        let guard = guard(true);
+        let address = guard.address();
+        let token = address.split("token=").nth(1).expect("a token");
+        assert!(guard.is_proven(Some(token), None));
+        assert!(guard.is_proven(None, Some(&format!("labelgs-4321={token}"))));
+        assert!(!guard.is_proven(None, None) && !guard.is_proven(Some("0"), Some("labelgs-4321=0")));
+        assert!(!self::guard(false).is_proven(Some("0"), None), "without a token nothing proves a request");
+    }
+
+    #[test]
+    fn every_address_of_the_machine_is_printed_as_loopback() {
+        for (address, host, printed) in
+            [("0.0.0.0:80", "0.0.0.0", "http://127.0.0.1:80/?token="), ("[::]:80", "::", "http://[::1]:80/?token=")]
+        {
+            let guard = Guard::new(address.parse().expect("an address"), host, true).expect("rules");
+            assert!(guard.address().starts_with(printed), "{}", guard.address());
+        }
     }
 
     #[test]

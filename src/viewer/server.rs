@@ -5,7 +5,7 @@ use super::http::{self, Head, NoHead, WRITE_TIME, answer, say};
 use super::hub::Hub;
 use super::{page, socket};
 use crate::error::{Error, Result, Setting};
-use std::io::Write;
+use std::io::{ErrorKind, Write};
 use std::net::{TcpListener, TcpStream, ToSocketAddrs};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -24,7 +24,13 @@ pub(super) fn start(host: &str, port: u16, has_token: bool, hub: &Arc<Hub>) -> R
         let problem = format!("without it anyone who reaches {host} could watch and change the model; leave it on");
         return Err(Error::usage(Setting("view_no_token"), problem));
     }
-    let listener = TcpListener::bind(address).map_err(|error| failed(&error))?;
+    let listener = TcpListener::bind(address).map_err(|error| match error.kind() {
+        ErrorKind::AddrInUse => {
+            let problem = format!("{port} is in use on {host}; choose another port, or 0 for a free one");
+            Error::usage(Setting("view_port"), problem)
+        }
+        _ => failed(&error),
+    })?;
     let address = listener.local_addr().map_err(|error| failed(&error))?;
     let guard = Guard::new(address, host, has_token)?;
     let (rules, hub) = (guard.clone(), Arc::clone(hub));
@@ -78,11 +84,15 @@ fn connection(mut stream: TcpStream, guard: &Guard, hub: &Arc<Hub>) {
         Err(NoHead::Gone) => return,
         Err(NoHead::Status(status)) => return say(&mut stream, status, status),
     };
-    if !guard.knows_host(head.header("Host")) {
-        return say(&mut stream, "403 Forbidden", "This server does not have that name. Use the printed address.");
+    let host = head.header("Host");
+    let is_named = host.is_some_and(|host| !host.is_empty());
+    let is_proven = is_named && guard.is_proven(head.value("token"), head.header("Cookie"));
+    if !is_proven && !guard.knows_host(host) {
+        let text = "This server does not have that name. Open the printed address, with its token.";
+        return say(&mut stream, "403 Forbidden", text);
     }
     let is_socket = head.path == "/socket";
-    if !guard.knows_origin(head.header("Origin"), is_socket) {
+    if !Guard::is_same_origin(head.header("Origin"), host, is_socket) {
         return say(&mut stream, "403 Forbidden", "Another page may not ask this server.");
     }
     if head.method != "GET" {

@@ -27,10 +27,19 @@ fn requests_of_strangers_are_refused() {
     assert_eq!(status(&server.get("/", &[with])), "200");
     assert_eq!(status(&server.get("/main.js", &[with, ("Origin", &own)])), "200");
 
-    // A name that points at loopback, and pages of other origins, with the cookie and without.
+    // Another name or port, as of a tunnel, needs the token; a page that points its name at loopback has none. The page
+    // of such a name is its own origin, and no other page is.
     let port = server.port();
     for host in [format!("rebind.test:{port}"), "127.0.0.1".into(), format!("127.0.0.1:{}", port ^ 1), String::new()] {
-        assert_eq!(status(&server.get("/", &[with, ("Host", &host)])), "403", "{host}");
+        assert_eq!(status(&server.get("/", &[("Host", &host)])), "403", "{host}");
+        assert_eq!(status(&server.get("/", &[("Host", &host), ("Cookie", "labelgs=0")])), "403", "{host}");
+        let expected = if host.is_empty() { "403" } else { "200" };
+        assert_eq!(status(&server.get("/", &[with, ("Host", &host)])), expected, "{host}");
+        let pages = [(format!("http://{host}"), expected), (own.clone(), "403"), ("http://evil.test".into(), "403")];
+        for (origin, expected) in pages {
+            let headers = [with, ("Host", host.as_str()), ("Origin", origin.as_str())];
+            assert_eq!(status(&server.get("/main.js", &headers)), expected, "{host} from {origin}");
+        }
     }
     assert_eq!(status(&server.raw(format!("GET / HTTP/1.1\r\nCookie: {cookie}\r\n\r\n").as_bytes())), "403");
     for origin in ["http://evil.test", "null", "http://127.0.0.1:1", "https://127.0.0.1"] {
@@ -69,6 +78,25 @@ fn requests_of_strangers_are_refused() {
     let open = place.run(&["view", "model.ply", "--view-no-token", "--view-host", "0.0.0.0"]);
     assert_eq!(open.status.code(), Some(2), "{}", String::from_utf8_lossy(&open.stderr));
     assert!(String::from_utf8_lossy(&open.stderr).contains("--view-no-token"));
+}
+
+#[test]
+fn a_server_on_every_address_prints_one_that_opens() {
+    if device().is_none() {
+        return;
+    }
+    let place = Place::new();
+    let server = place.view(&["--view-host", "0.0.0.0"]);
+    assert!(server.address.starts_with("http://127.0.0.1:"), "{}", server.address);
+    let cookie = server.cookie();
+    let name = format!("machine.test:{}", server.port());
+    assert_eq!(status(&server.get("/", &[("Host", &name), ("Cookie", &cookie)])), "200");
+    assert_eq!(status(&server.get("/", &[("Host", &name)])), "403");
+
+    let taken = place.run(&["view", "model.ply", "--view-port", &server.port().to_string(), "--view-host", "0.0.0.0"]);
+    let text = String::from_utf8_lossy(&taken.stderr);
+    assert_eq!(taken.status.code(), Some(2), "{text}");
+    assert!(text.contains("--view-port") && text.contains("in use") && text.contains("0 for a free one"), "{text}");
 }
 
 #[test]

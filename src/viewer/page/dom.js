@@ -87,6 +87,9 @@ const plain = new Intl.NumberFormat("en", { maximumFractionDigits: 0 });
 /** A whole number with separators. */
 export const number = (value) => plain.format(value);
 
+/** A number with its noun, such as "1 object" or "8 objects". */
+export const counted = (count, noun) => `${number(count)} ${noun}${count === 1 ? "" : "s"}`;
+
 /** Bytes in a fitting unit. */
 export function bytes(value) {
   const units = ["B", "KiB", "MiB", "GiB"];

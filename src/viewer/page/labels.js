@@ -1,6 +1,6 @@
 // The panel of labels, and the selection.
 
-import { $, el, icon, number, toast } from "./dom.js";
+import { $, counted, el, icon, number, toast } from "./dom.js";
 
 const EYE = ["M1.5 8S4 3.5 8 3.5 14.5 8 14.5 8 12 12.5 8 12.5 1.5 8 1.5 8Z", "M8 6a2 2 0 1 0 0 4 2 2 0 0 0 0-4Z"];
 const SHUT = ["M1.5 8S4 12.5 8 12.5 14.5 8 14.5 8", "M4 11.2 3 13", "M8 12.5v2", "M12 11.2l1 1.8"];
@@ -81,7 +81,7 @@ export class Labels {
     if (item) item.tabIndex = 0;
     if (hadFocus) item?.focus({ preventScroll: true });
     const objects = this.rows.filter((row) => row.id !== 0).length;
-    $("label-count").textContent = this.rows.length === 0 ? "" : rows.length === this.rows.length ? `${number(this.all > this.rows.length ? this.all : objects)} objects` : `${rows.length} found`;
+    $("label-count").textContent = this.rows.length === 0 ? "" : rows.length === this.rows.length ? counted(this.all > this.rows.length ? this.all : objects, "object") : `${rows.length} found`;
     const empty = this.rows.length === 0 && this.isFixed ? "No labels yet. A training with masks gives them when growth has ended."
       : this.rows.length === 0 ? "This model has no labels. Train it with masks, or label it afterwards with labelgs label."
       : rows.length === 0 ? "No label has this name or id." : "";
