@@ -69,7 +69,7 @@ impl ReadArgs {
     }
 
     /// Puts the typed values into `options`.
-    pub fn into_options(&self, options: LoadOptions) -> LoadOptions {
+    pub fn options(&self, options: LoadOptions) -> LoadOptions {
         let max_bad_photos = self.files.max_bad_photos.unwrap_or(options.max_bad_photos);
         LoadOptions { max_bad_photos, lookup: self.lookup(), ..options }
     }

@@ -31,7 +31,7 @@ pub(crate) fn run(args: &CheckArgs, context: &Context) -> Result<()> {
     // It looks at the photos in full size, few times: a file of their pixels would cost more than it saves.
     // What is missing or damaged is a finding.
     let options = LoadOptions { test_every: None, photo_folder: None, max_bad_photos: 1.0, ..LoadOptions::default() };
-    let dataset = io::open(&args.scene, &args.read.into_options(options))?;
+    let dataset = io::open(&args.scene, &args.read.options(options))?;
     let is_found = |note: &&String| dataset.flaws.iter().any(|flaw| flaw.text() == *note);
     dataset.notes.iter().filter(|note| !is_found(note)).for_each(|note| tracing::warn!("{note}"));
     let report = scan(&args.scene, &args.read.lookup(), &dataset)?;

@@ -62,7 +62,7 @@ pub(crate) fn warn_of_misfit_with(
         only: Some(Arc::new(only)),
         max_resolution: Some(SIDE),
         photo_folder: None,
-        ..reading.read.into_options(LoadOptions::default())
+        ..reading.read.options(LoadOptions::default())
     };
     // The command does not need the photos, so that nothing is said of those that are missing or damaged.
     match io::open(scene, &options) {

@@ -47,7 +47,7 @@ pub(crate) fn open_scene(
     let (max_resolution, base) = (reading.max_resolution, LoadOptions::default());
     let ignore = reading.ignore.clone();
     let options = LoadOptions { masks, ignore, max_resolution, test_every, background, photos, ..base };
-    io::open_logged(path, &reading.read.into_options(options))
+    io::open_logged(path, &reading.read.options(options))
 }
 
 /// Returns the views for `test`, `train`, `all` or a list of names.

@@ -7,7 +7,7 @@ use super::load::shortened;
 use super::pose_convention::{Native, PoseConvention};
 use crate::error::{Result, Setting};
 use crate::scene::agreement::{Agreement, Sample};
-use crate::scene::{Dataset, View};
+use crate::scene::{Dataset, Flaw, View};
 
 /// Fewest points that can judge a scene.
 const POINTS_MIN: usize = 50;
@@ -23,16 +23,23 @@ const SHARE_TIMES: f64 = 4.0;
 
 /// What is found.
 #[derive(Default)]
-pub(super) struct Found {
+struct Found {
     /// What does not fit.
-    pub(super) flaws: Vec<String>,
+    flaws: Vec<String>,
     /// What may be wrong.
-    pub(super) notes: Vec<String>,
+    notes: Vec<String>,
 }
 
-/// Compares the points of a scene with its views. `native` is the convention of its file, `None` if its views are turned
+/// Compares the points of a scene with its views, and says what it finds. `native` is the convention of its file, `None` if its views are turned
 /// against their photos or `given` is in its place.
-pub(super) fn check(dataset: &Dataset, native: Option<Native>, given: PoseConvention) -> Result<Found> {
+pub(super) fn check(dataset: &mut Dataset, native: Option<Native>, given: PoseConvention) -> Result<()> {
+    let found = find(dataset, native, given)?;
+    dataset.notes.extend(found.flaws.iter().cloned().chain(found.notes));
+    dataset.flaws.extend(found.flaws.into_iter().map(Flaw::Frame));
+    Ok(())
+}
+
+fn find(dataset: &Dataset, native: Option<Native>, given: PoseConvention) -> Result<Found> {
     let views = dataset.all();
     let mut found = Found::default();
     let sample = Sample::new(&views, dataset.points.iter().copied())?;

@@ -58,36 +58,37 @@ pub(crate) fn load(root: &Path, mut listing: Listing, options: &LoadOptions) -> 
     if options.undistort && views.iter().any(|view| !view.lens.is_pinhole()) {
         notes.push("photos and masks were undistorted to a pinhole camera; pixels without a source are ignored".into());
     }
-    let wide: Vec<&Vec<View>> = loaded.iter().map(|(views, _)| views).filter(|views| views.len() > 1).collect();
-    if !wide.is_empty() {
-        let faces: usize = wide.iter().map(|views| views.len()).sum();
-        notes.push(format!("{} photos are wider than a pinhole picture and became {faces} faces of cubes", wide.len()));
-    }
+    let is_wide = note_wide(&loaded, &mut notes);
     notes.extend(faults.iter().cloned());
     let flaws = faults.into_iter().map(Flaw::LeftOut).collect();
     let mut dataset = Dataset { root: root.to_owned(), points: listing.points, notes, flaws, ..Dataset::default() };
     for (views, test) in loaded {
         if test { dataset.test.extend(views) } else { dataset.train.extend(views) }
     }
-    if let Some(only) = &options.only {
-        dataset.train.retain(|view| only.contains(&view.name));
-        dataset.test.retain(|view| only.contains(&view.name));
+    for views in [&mut dataset.train, &mut dataset.test] {
+        views.retain(|view| options.only.as_ref().is_none_or(|only| only.contains(&view.name)));
+        // Faces of a photo are not in the order of their names.
+        views.sort_by(|a, b| a.name.cmp(&b.name));
     }
-    // Faces of a photo are not in the order of their names.
-    dataset.train.sort_by(|a, b| a.name.cmp(&b.name));
-    dataset.test.sort_by(|a, b| a.name.cmp(&b.name));
     // Some of the views say nothing about all masks.
     if let (Some(masks), None) = (&masks, &options.only) {
         dataset.notes.extend(mask_notes::notes(masks, &dataset));
     }
     require_unique(root, &dataset)?;
     // Faces of wide photos are turned against them.
-    let is_turned = dataset.all().len() != views.len() || !options.lookup.poses.is_native();
-    let native = (!is_turned).then(|| Native::of_file(&listing.source));
-    let found = frame_check::check(&dataset, native, options.lookup.poses)?;
-    dataset.notes.extend(found.flaws.iter().cloned().chain(found.notes));
-    dataset.flaws.extend(found.flaws.into_iter().map(Flaw::Frame));
+    let native = Some(Native::of_file(&listing.source)).filter(|_| !is_wide && options.lookup.poses.is_native());
+    frame_check::check(&mut dataset, native, options.lookup.poses)?;
     Ok(dataset)
+}
+
+/// Notes the photos of which there are several views; returns whether there are any.
+fn note_wide(loaded: &[(Vec<View>, bool)], notes: &mut Vec<String>) -> bool {
+    let wide: Vec<&Vec<View>> = loaded.iter().map(|(views, _)| views).filter(|views| views.len() > 1).collect();
+    if !wide.is_empty() {
+        let faces: usize = wide.iter().map(|views| views.len()).sum();
+        notes.push(format!("{} photos are wider than a pinhole picture and became {faces} faces of cubes", wide.len()));
+    }
+    !wide.is_empty()
 }
 
 /// Notes the photos without a picture in the folder; refuses one without any.

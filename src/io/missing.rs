@@ -57,7 +57,7 @@ pub(super) fn existing(
 fn one_file_each(listing: &Listing, found: Vec<Listed>) -> Result<Vec<Listed>> {
     let mut files: Vec<&Listed> = found.iter().collect();
     files.sort_by(|a, b| a.photo.cmp(&b.photo));
-    if let Some([a, b]) = files.array_windows().find(|[a, b]| a.photo == b.photo) {
+    if let Some([a, b]) = files.windows(2).find(|pair| pair[0].photo == pair[1].photo) {
         let file = a.photo.as_deref().unwrap_or(std::path::Path::new("")).display();
         let problem = format!(
             "is the only file for {} and {}; name the folder of the photos with {}",

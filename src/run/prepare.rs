@@ -159,10 +159,7 @@ pub(super) fn begin<'a>(
             masks: recorded(inputs.masks.as_deref()),
             ignore: recorded(inputs.ignore.as_deref()),
             known_depths: recorded(inputs.known_depths.as_deref()),
-            images: inputs
-                .images
-                .as_deref()
-                .map(|images| if images.is_dir() { absolute(images) } else { images.into() }),
+            images: inputs.images.as_deref().map(resume::place_of_photos),
             ..inputs.clone()
         },
         occlusion: occlusion.clone(),

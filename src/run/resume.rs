@@ -132,9 +132,13 @@ fn merge(then: &mut Inputs, now: &Inputs) {
     then.max_bad_photos = now.max_bad_photos.or(then.max_bad_photos);
     then.allow_outside |= now.allow_outside;
     if let Some(images) = &now.images {
-        // A folder of the scene keeps its name.
-        then.images = Some(if images.is_dir() { absolute(images) } else { images.clone() });
+        then.images = Some(place_of_photos(images));
     }
+}
+
+/// Returns a folder of photos as a checkpoint stores it: one of the scene keeps its name.
+pub(super) fn place_of_photos(images: &Path) -> PathBuf {
+    if images.is_dir() { absolute(images) } else { images.to_owned() }
 }
 
 /// Returns an absolute path, independent of the working directory.

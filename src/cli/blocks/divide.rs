@@ -85,7 +85,7 @@ fn planned(args: &DivideArgs, context: &Context) -> Result<Plan> {
         max_resolution: args.max_resolution,
         steps: args.iterations.unwrap_or(0),
         up: args.up,
-        load: args.read.into_options(LoadOptions::default()),
+        load: args.read.options(LoadOptions::default()),
     };
     blocks::plan(&args.scene, &args.model, &options, &|| open_gpu(context))
 }

@@ -73,7 +73,7 @@ pub(crate) fn run(args: &MasksArgs, context: &Context) -> Result<()> {
 /// Reads the scene that masks belong to: names, sizes and cameras of its photos, and its points.
 fn open_photos(scene: &Path, read: &ReadArgs) -> Result<Dataset> {
     let options = LoadOptions { photos: false, undistort: false, ..LoadOptions::default() };
-    io::open_logged(scene, &read.into_options(options))
+    io::open_logged(scene, &read.options(options))
 }
 
 /// Returns the mask file of each photo, relative to the folder of masks, and the indices of its views. A view without a

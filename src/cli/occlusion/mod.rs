@@ -66,7 +66,7 @@ pub(crate) fn run(args: &OcclusionArgs, context: &Context) -> Result<()> {
         photos: false,
         ..LoadOptions::default()
     };
-    let dataset = io::open_logged(&args.scene, &args.read.into_options(options))?;
+    let dataset = io::open_logged(&args.scene, &args.read.options(options))?;
     let views: Vec<&View> = dataset.all().into_iter().filter(|view| view.mask.is_some()).collect();
     let table = match (&args.depths, args.depth_kind, &args.model) {
         (Some(depths), Some(kind), _) => {

@@ -116,7 +116,7 @@ fn folders(photos: &[&str], options: &ImportOptions) -> Result<Reading> {
     if claims.photos() == 0 {
         return Err(nothing_found(&root, &files, photos));
     }
-    let claims = if format == Format::Binary { claims.as_one_object() } else { claims };
+    let claims = if format == Format::Binary { claims.into_one_object() } else { claims };
     let Some(kind) = ids else {
         let notes = if format == Format::ThreeDOvs { classes_without_mask(&root, &claims)? } else { Vec::new() };
         return of_marks(root, photos, Found { notes, ..of_claims(claims) }, format, why, options);

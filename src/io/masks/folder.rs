@@ -66,7 +66,7 @@ impl Claims {
     }
 
     /// Gives the object of files that show all a name.
-    pub(super) fn as_one_object(mut self) -> Self {
+    pub(super) fn into_one_object(mut self) -> Self {
         self.of_photo.iter_mut().flatten().for_each(|(object, _)| *object = "object".to_owned());
         self
     }
