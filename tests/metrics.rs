@@ -301,7 +301,7 @@ fn extract_and_remove_divide_the_model() {
     assert_eq!((object.labels, rest.labels), (Some(vec![2, 2]), Some(vec![5, 0])));
     let message = extract(&model(), &[2, 7, 9], MIN_LABEL_CONFIDENCE).expect_err("no 7").to_string();
     assert!(
-        message.contains("label 7, 9;") && message.contains("2 (2 Gaussians), 5 (1 Gaussians), and 0 for the"),
+        message.contains("label 7, 9;") && message.contains("the model has 2, 5, and 0 for the unlabelled"),
         "{message}"
     );
     let doubtful = Gaussians { label_confidence: Some(vec![0.59, 0.6, 0.5, 0.4]), ..model() };

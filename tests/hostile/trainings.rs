@@ -205,7 +205,7 @@ fn a_damaged_scene_trains_with_warnings_or_says_what_is_wrong() {
     let (status, text) = train(&["--masks", &masks]);
     assert_eq!(status, Some(0), "{text}");
     let name = damaged.file_name().expect("a name").to_string_lossy().into_owned();
-    assert!(text.contains("1 of 10 photos cannot be decoded") && text.contains(&name), "{text}");
+    assert!(text.contains("1 of 10 photos cannot be read") && text.contains(&name), "{text}");
     assert!(text.contains("differ in size from their photos"), "{text}");
     let (status, text) = train(&["--max-bad-photos", "0"]);
     assert_eq!(status, Some(3), "{text}");
