@@ -1,7 +1,8 @@
 //! The content of a scene before its pixels, and the checks that all formats share.
 
 use super::lens::Lens;
-pub(crate) use super::photo_finder::EXTENSIONS;
+use super::photo_finder::EXTENSIONS;
+use super::pose_convention::Native;
 use crate::error::{Error, Result};
 use crate::scene::{Camera, Point};
 use glam::{DMat3, DQuat, DVec3};
@@ -12,6 +13,10 @@ const SIDE_MAX: u32 = 1 << 17;
 
 /// Largest distance of a camera or a point from the origin, world units: squares still fit into f32.
 pub(crate) const FAR: f64 = 1e12;
+
+/// Largest side of a photo in focal lengths. A pinhole of 179 degrees has 115, and no lens has more than 2 pi of its own
+/// focal lengths.
+const WIDEST: f64 = 115.0;
 
 /// A photo in the listing of a scene.
 #[derive(Clone, Debug)]
@@ -28,19 +33,37 @@ pub(crate) struct Listed {
 }
 
 /// A scene before its pixels are read.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub(crate) struct Listing {
-    /// The file that lists the photos, for messages.
+    /// The file that lists the photos.
     pub(crate) source: PathBuf,
+    /// What its format means by a pose.
+    pub(crate) native: Native,
     pub(crate) views: Vec<Listed>,
     /// Names of photos without a file and without a known size.
     pub(crate) missing: Vec<String>,
-    /// Errors of photos that exist but give no size.
+    /// What is wrong with photos or poses that cannot be used.
     pub(crate) bad: Vec<Error>,
     pub(crate) points: Vec<Point>,
     pub(crate) notes: Vec<String>,
     /// Where photos were looked for, if some were not found.
     pub(crate) hint: String,
+}
+
+impl Listing {
+    /// Makes an empty one for a file.
+    pub(crate) fn new(source: &Path, native: Native) -> Self {
+        Self {
+            source: source.to_owned(),
+            native,
+            views: Vec::new(),
+            missing: Vec::new(),
+            bad: Vec::new(),
+            points: Vec::new(),
+            notes: Vec::new(),
+            hint: String::new(),
+        }
+    }
 }
 
 /// Refuses cameras that cannot make an image. `place` names the camera in `path`.
@@ -55,9 +78,10 @@ pub(crate) fn check_camera(path: &Path, place: &str, camera: &Camera, lens: &Len
     }
     // Half of the side over the focal length is the tangent of half the field of view.
     let widest = (f64::from(width) / fx).max(f64::from(height) / fy);
-    if widest > 1e4 {
+    if widest > WIDEST {
+        let hint = if fx < 10.0 { "; if it is a share of the photo's size, multiply it by that" } else { "" };
         return refuse(format!(
-            "focal lengths {fx} and {fy} px make a field of view of 180 degrees; a pinhole ends before"
+            "focal lengths {fx} and {fy} px make a field of view of 180 degrees; a pinhole ends before{hint}"
         ));
     }
     let narrowest = (f64::from(width) / fx).min(f64::from(height) / fy);

@@ -9,6 +9,7 @@ use super::listed_path::Place;
 use super::listing::{Listed, Listing, check_camera, invert_pose, rotation_of, side};
 use super::npy;
 use super::photo_finder::is_readable;
+use super::pose_convention::Native;
 use crate::error::{Error, Result};
 use crate::io::read;
 use crate::scene::Camera;
@@ -48,7 +49,7 @@ pub(crate) fn list_file(scene: &Place, path: &Path) -> Result<Listing> {
         let camera = camera(path, &place, row)?;
         Ok(Listed { name, photo: Some(photo), camera, lens: Lens::Pinhole, test: None })
     });
-    Ok(Listing { source: path.to_owned(), views: views.collect::<Result<_>>()?, ..Listing::default() })
+    Ok(Listing { views: views.collect::<Result<_>>()?, ..Listing::new(path, Native::CAMERA_TO_WORLD) })
 }
 
 /// Lists the photos in a folder, sorted by name.

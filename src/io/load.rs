@@ -5,7 +5,6 @@ use super::bad_photos;
 use super::listing::{Listed, Listing};
 use super::mask_folder::MaskFolder;
 use super::photo_store::PhotoStore;
-use super::pose_convention::Native;
 use super::recipe::{MadeView, MadeViews, Recipe};
 use super::{LoadOptions, frame_check, mask_notes, masks, missing, stray};
 use crate::error::{Error, Result, Setting};
@@ -61,7 +60,14 @@ pub(crate) fn load(root: &Path, mut listing: Listing, options: &LoadOptions) -> 
     let is_wide = note_wide(&loaded, &mut notes);
     notes.extend(faults.iter().cloned());
     let flaws = faults.into_iter().map(Flaw::LeftOut).collect();
-    let mut dataset = Dataset { root: root.to_owned(), points: listing.points, notes, flaws, ..Dataset::default() };
+    let mut dataset = Dataset {
+        root: root.to_owned(),
+        source: listing.source,
+        points: listing.points,
+        notes,
+        flaws,
+        ..Dataset::default()
+    };
     for (views, test) in loaded {
         if test { dataset.test.extend(views) } else { dataset.train.extend(views) }
     }
@@ -76,7 +82,7 @@ pub(crate) fn load(root: &Path, mut listing: Listing, options: &LoadOptions) -> 
     }
     require_unique(root, &dataset)?;
     // Faces of wide photos are turned against them.
-    let native = Some(Native::of_file(&listing.source)).filter(|_| !is_wide && options.lookup.poses.is_native());
+    let native = Some(listing.native).filter(|_| !is_wide && options.lookup.poses.is_native());
     frame_check::check(&mut dataset, native, options.lookup.poses)?;
     Ok(dataset)
 }
@@ -197,10 +203,10 @@ pub(crate) fn shortened(names: &[&str]) -> String {
 
 /// Returns which of the views, sorted by name, are held out.
 fn split(views: &[Listed], every: Option<u32>, notes: &mut Vec<String>) -> Result<Vec<bool>> {
+    let Some(every) = every else { return Ok(vec![false; views.len()]) };
     if views.iter().all(|view| view.test.is_some()) {
         return Ok(views.iter().map(|view| view.test == Some(true)).collect());
     }
-    let Some(every) = every else { return Ok(vec![false; views.len()]) };
     if every == 0 {
         return Err(Error::usage(Setting("test_every"), "0 holds out nothing and everything; expected 1 or more"));
     }

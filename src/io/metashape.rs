@@ -2,14 +2,17 @@
 //!
 //! A camera's `transform` is camera-to-component with axes x right, y down, z forward; that of its component, or of the
 //! chunk, goes on to the world. Lenses follow appendix D of Metashape's manual, where the focal length is in px, the
-//! principal point relative to the middle of the photo, and p1 and p2 the other way round than in OpenCV.
+//! principal point relative to the middle of the photo, and p1 and p2 the other way round than in OpenCV. In a rig, slaves
+//! have no transform but that of their sensor in the master's frame.
 
 use super::lens::{Fisheye, Lens, Polynomial};
 use super::listed_path::Place;
 use super::listing::{Listed, Listing, check_camera, invert_pose, rotation_of, side, with_extension};
+use super::pose_convention::Native;
 use crate::error::{Error, Result};
 use crate::io::read;
 use crate::scene::Camera;
+use crate::words::counted;
 use glam::{DAffine3, DMat3, DVec3};
 use roxmltree::{Document, Node, ParsingOptions};
 use std::collections::{BTreeMap, BTreeSet};
@@ -51,29 +54,41 @@ pub(crate) fn list_file(scene: &Place, path: &Path) -> Result<Listing> {
     let Some(chunk) = chunks.next() else {
         return Err(Error::data(path, "", "has no `chunk`; expected the XML of Metashape's \"Export Cameras\""));
     };
-    let mut listing = Listing { source: path.to_owned(), ..Listing::default() };
+    let mut listing = Listing::new(path, Native::CAMERA_TO_WORLD);
     if chunks.next().is_some() {
         listing.notes.push(format!("only the first chunk of {} is used", path.display()));
     }
     let chunk = Chunk::new(&file, chunk)?;
-    let (mut without, mut names) = (0, BTreeSet::new());
+    let (mut total, mut disabled, mut lost, mut slaves) = (0, 0, 0, 0);
+    let (mut names, mut refused) = (BTreeSet::new(), Vec::new());
     for camera in chunk.node.descendants().filter(|node| node.has_tag_name("camera") && node.has_attribute("label")) {
-        let disabled = matches!(camera.attribute("enabled"), Some("0" | "false"));
-        let Some(transform) = child(camera, "transform").filter(|_| !disabled) else {
-            without += 1;
+        if matches!(camera.attribute("enabled"), Some("0" | "false")) {
+            disabled += 1;
             continue;
-        };
+        }
         let label = camera.attribute("label").unwrap_or_default();
         let place = format!("{}, camera `{label}`", file.line(camera));
         let refuse = |problem: &str| Error::data(path, place.as_str(), problem);
-        let (intrinsics, lens) = chunk.lens(camera, &refuse)?;
-        let pose = chunk.to_world(camera, &refuse)? * file.matrix(transform)?;
-        let rotation = rotation_of(pose.matrix3);
-        let rotation =
-            rotation.ok_or_else(|| refuse("the transform is no rotation with a scale; export the cameras again"))?;
-        let (rotation, translation) = invert_pose(rotation, pose.translation);
-        let own = Camera { rotation, translation, ..intrinsics };
-        check_camera(path, &place, &own, &lens)?;
+        let pose = match chunk.pose(camera, &refuse) {
+            Ok(Some(pose)) => Ok(pose),
+            Ok(None) => {
+                lost += 1;
+                continue;
+            }
+            Err(error) => Err(error),
+        };
+        total += 1;
+        let view = pose.and_then(|pose| Ok((pose.is_slave, chunk.view(camera, &pose, &refuse)?)));
+        let (own, lens) = match view {
+            Ok((is_slave, view)) => {
+                slaves += usize::from(is_slave);
+                view
+            }
+            Err(error) => {
+                refused.push(error);
+                continue;
+            }
+        };
         let resolved = scene.resolve(path, label)?;
         let photo = scene.photos.find(&["images", "."], &resolved.path);
         let name = with_extension(resolved.name, photo.as_deref());
@@ -82,9 +97,24 @@ pub(crate) fn list_file(scene: &Place, path: &Path) -> Result<Listing> {
         }
         listing.views.push(Listed { name, photo, camera: own, lens, test: None });
     }
-    if without > 0 {
-        listing.notes.push(format!("{without} cameras of {} are disabled or not aligned and skipped", path.display()));
+    // What is wrong with all is wrong with the file.
+    if !refused.is_empty() && refused.len() == total {
+        return Err(refused.swap_remove(0));
     }
+    listing.bad = refused;
+    let file = path.display();
+    let mut note = |count: usize, what: &str| {
+        if count > 0 {
+            listing.notes.push(format!("{} of {file} {what}", counted(count, "camera")));
+        }
+    };
+    note(disabled, "disabled in Metashape and left out");
+    note(lost, "without a pose and left out: not aligned, or exported without it");
+    note(
+        slaves,
+        "posed as slaves of a rig: by the master's pose, then rotation and location of the sensor. If they are displaced, \
+         export the cameras without the rig",
+    );
     Ok(listing)
 }
 
@@ -141,20 +171,56 @@ struct Chunk<'a> {
     node: Node<'a, 'a>,
     sensors: BTreeMap<&'a str, Node<'a, 'a>>,
     components: BTreeMap<&'a str, Node<'a, 'a>>,
+    cameras: BTreeMap<&'a str, Node<'a, 'a>>,
     to_world: Option<DAffine3>,
+}
+
+/// The pose of a camera in the world, with axes x right, y down, z forward.
+struct Pose {
+    to_world: DAffine3,
+    /// It follows from another camera of the rig.
+    is_slave: bool,
 }
 
 impl<'a> Chunk<'a> {
     fn new(file: &'a File<'a>, node: Node<'a, 'a>) -> Result<Self> {
-        let (sensors, components) = (by_id(node, "sensor"), by_id(node, "component"));
-        Ok(Self { file, node, sensors, components, to_world: file.similarity(node)? })
+        let [sensors, components, cameras] = ["sensor", "component", "camera"].map(|name| by_id(node, name));
+        Ok(Self { file, node, sensors, components, cameras, to_world: file.similarity(node)? })
     }
 
-    /// Returns intrinsics at an identity pose, and the lens. A sensor that no pose uses may have no calibration.
-    fn lens(&self, camera: Node, refuse: &dyn Fn(&str) -> Error) -> Result<(Camera, Lens)> {
-        let sensor = camera.attribute("sensor_id").and_then(|id| self.sensors.get(id));
-        let sensor = sensor.ok_or_else(|| refuse("names no sensor of the chunk; export the cameras again"))?;
-        self.file.sensor(*sensor)
+    /// Returns the pose of a camera; `None` if it is not aligned. A slave of a rig without a pose of its own has that of its
+    /// sensor in the master's frame.
+    fn pose(&self, camera: Node<'a, 'a>, refuse: &dyn Fn(&str) -> Error) -> Result<Option<Pose>> {
+        if let Some(transform) = child(camera, "transform") {
+            let to_world = self.to_world(camera, refuse)? * self.file.matrix(transform)?;
+            return Ok(Some(Pose { to_world, is_slave: false }));
+        }
+        let master = camera.attribute("master_id").and_then(|id| self.cameras.get(id));
+        let Some((&master, transform)) = master.and_then(|master| Some((master, child(*master, "transform")?))) else {
+            return Ok(None);
+        };
+        let of_master = self.to_world(master, refuse)? * self.file.matrix(transform)?;
+        let in_master = self.file.mounting(self.sensor(camera, refuse)?)?.ok_or_else(|| {
+            refuse("is a slave of a rig, and its sensor has no `rotation` and `location`; export the cameras without the rig")
+        })?;
+        Ok(Some(Pose { to_world: of_master * in_master, is_slave: true }))
+    }
+
+    /// Returns the camera at its pose, and its lens.
+    fn view(&self, camera: Node<'a, 'a>, pose: &Pose, refuse: &dyn Fn(&str) -> Error) -> Result<(Camera, Lens)> {
+        let (intrinsics, lens) = self.file.sensor(self.sensor(camera, refuse)?)?;
+        let rotation = rotation_of(pose.to_world.matrix3)
+            .ok_or_else(|| refuse("the transform is no rotation with a scale; export the cameras again"))?;
+        let (rotation, translation) = invert_pose(rotation, pose.to_world.translation);
+        let own = Camera { rotation, translation, ..intrinsics };
+        let place = format!("{}, camera `{}`", self.file.line(camera), camera.attribute("label").unwrap_or_default());
+        check_camera(self.file.path, &place, &own, &lens)?;
+        Ok((own, lens))
+    }
+
+    fn sensor(&self, camera: Node, refuse: &dyn Fn(&str) -> Error) -> Result<Node<'a, 'a>> {
+        let sensor = camera.attribute("sensor_id").and_then(|id| self.sensors.get(id)).copied();
+        sensor.ok_or_else(|| refuse("names no sensor of the chunk; export the cameras again"))
     }
 
     /// Returns the transform of a camera's component, which takes the place of the chunk's. A file may have no components.
@@ -217,6 +283,21 @@ impl<'a> File<'a> {
         let scale = child(transform, "scale").map_or(Ok(1.0), |node| self.numbers::<1>(node).map(|[scale]| scale))?;
         let translation = translation.map_or(DVec3::ZERO, DVec3::from_array);
         Ok(Some(DAffine3 { matrix3: rotation * scale, translation }))
+    }
+
+    /// Reads how a sensor is mounted in a rig: from its axes to those of the master, with its centre there, in units of the
+    /// chunk. `None` if the sensor does not say.
+    fn mounting(&self, sensor: Node<'a, 'a>) -> Result<Option<DAffine3>> {
+        let with_text =
+            |name: &str| child(sensor, name).filter(|node| node.text().is_some_and(|text| !text.trim().is_empty()));
+        let (rotation, location) = (with_text("rotation"), with_text("location"));
+        if rotation.or(location).is_none() {
+            return Ok(None);
+        }
+        let rotation = rotation.map(|node| self.numbers::<9>(node)).transpose()?;
+        let matrix3 = rotation.map_or(DMat3::IDENTITY, |rows| DMat3::from_cols_array(&rows).transpose());
+        let location = location.map(|node| self.numbers::<3>(node)).transpose()?;
+        Ok(Some(DAffine3 { matrix3, translation: location.map_or(DVec3::ZERO, DVec3::from_array) }))
     }
 
     /// Reads a sensor: intrinsics at an identity pose, and the lens.

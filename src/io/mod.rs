@@ -51,6 +51,7 @@ pub(crate) mod run_folder;
 mod scratch;
 pub(crate) mod shelf;
 pub(crate) mod soft_edges;
+mod split;
 mod stray;
 mod transforms;
 pub(crate) mod truth;
@@ -62,7 +63,7 @@ use crate::stage::Stage;
 use crate::words::counted;
 use listed_path::Place;
 use listing::Listing;
-use pose_convention::Native;
+use split::Split;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -95,8 +96,8 @@ pub struct LoadOptions {
     pub ignore: Option<PathBuf>,
     /// Limit on the longest side of photos, px.
     pub max_resolution: Option<u32>,
-    /// Every N-th view by name is held out, starting with the first; `None` holds out nothing. A scene with its own
-    /// split keeps it.
+    /// Every N-th view by name is held out, starting with the first; `None` holds out nothing. Another N than `None` leaves
+    /// a scene its own split.
     pub test_every: Option<u32>,
     /// Colour behind transparent photos, R, G, B, 0 to 1.
     pub background: [f32; 3],
@@ -147,7 +148,7 @@ impl Default for LoadOptions {
 }
 
 /// Reads the scene in the folder `scene`: a COLMAP model (in `sparse/0`, `sparse`, `colmap/sparse/0` or the folder
-/// itself), else `transforms_train.json` with `transforms_test.json`, else `transforms.json`, else `poses_bounds.npy` of
+/// itself), else `transforms_train.json` with `transforms_test.json` or `transforms_val.json`, else `transforms.json`, else `poses_bounds.npy` of
 /// LLFF, else an `.xml` of Metashape. A path to one of the last three reads that file.
 ///
 /// Views are undistorted and resized, each with a pinhole camera of its own size; see [`LoadOptions`] and the notes of
@@ -207,7 +208,12 @@ fn list(scene: &Path, lookup: &Lookup) -> Result<Listing> {
             listing.hint += &format!("; or name {} as the scene, which lies there too", other.display());
         }
     }
-    let native = Native::of_file(&listing.source);
+    if listing.views.iter().all(|view| view.test.is_none())
+        && let Some(split) = Split::find(&place, &listing.source)?
+    {
+        split.apply(&mut listing);
+    }
+    let native = listing.native;
     listing.views.iter_mut().for_each(|view| lookup.poses.apply(native, &mut view.camera));
     Ok(listing)
 }

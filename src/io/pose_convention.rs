@@ -8,7 +8,6 @@ use crate::scene::Camera;
 use glam::{DMat3, DQuat, DVec3};
 use serde::{Deserialize, Serialize};
 use std::fmt::{self, Display};
-use std::path::Path;
 use std::str::FromStr;
 
 /// Which way a pose leads.
@@ -42,16 +41,12 @@ pub struct PoseConvention {
 pub(crate) struct Native(Direction, Axes);
 
 impl Native {
-    /// Returns that of the file that lists the photos: the transforms of nerfstudio, COLMAP's images, or another one,
-    /// whose camera-to-world poses have OpenCV's axes once they are read.
-    pub(crate) fn of_file(path: &Path) -> Self {
-        let extension = path.extension().and_then(|extension| extension.to_str()).unwrap_or_default().to_lowercase();
-        match extension.as_str() {
-            "bin" | "txt" => Self(Direction::WorldToCamera, Axes::OpenCv),
-            "npy" | "xml" => Self(Direction::CameraToWorld, Axes::OpenCv),
-            _ => Self(Direction::CameraToWorld, Axes::OpenGl),
-        }
-    }
+    /// COLMAP's images.
+    pub(crate) const COLMAP: Self = Self(Direction::WorldToCamera, Axes::OpenCv);
+    /// The transforms of Blender, instant-ngp and nerfstudio.
+    pub(crate) const TRANSFORMS: Self = Self(Direction::CameraToWorld, Axes::OpenGl);
+    /// Metashape's transforms, and the poses of LLFF as its reader turns them.
+    pub(crate) const CAMERA_TO_WORLD: Self = Self(Direction::CameraToWorld, Axes::OpenCv);
 
     /// Returns the other conventions that the file may mean, those of fewer differences first.
     pub(crate) fn others(self) -> Vec<PoseConvention> {
@@ -204,7 +199,7 @@ mod tests {
         let (rotation, translation) = (DMat3::from_quat(right), DVec3::new(0.4, -2.0, 3.0));
         for text in ["", "opengl", "c2w", "c2w,opengl"] {
             let convention: PoseConvention = text.parse().expect("words");
-            let (mut stored, native) = ((rotation, translation), Native::of_file(Path::new("images.txt")));
+            let (mut stored, native) = ((rotation, translation), Native::COLMAP);
             if text.contains("opengl") {
                 stored = (SWAP * stored.0, SWAP * stored.1);
             }
@@ -219,13 +214,13 @@ mod tests {
         // What COLMAP's order makes of (x, y, z, w).
         let wrong = DQuat::from_xyzw(right.y, right.z, right.w, right.x);
         let mut read = camera(DMat3::from_quat(wrong), translation);
-        "xyzw".parse::<PoseConvention>().expect("words").apply(Native::of_file(Path::new("images.bin")), &mut read);
+        "xyzw".parse::<PoseConvention>().expect("words").apply(Native::COLMAP, &mut read);
         assert!(read.rotation.abs_diff_eq(rotation, 1e-12));
     }
 
     #[test]
     fn transforms_may_mean_other_poses() {
-        let native = Native::of_file(Path::new("transforms.json"));
+        let native = Native::TRANSFORMS;
         let (rotation, translation) = (DMat3::from_rotation_y(0.3), DVec3::new(0.4, -2.0, 3.0));
         let world_from_camera = inverse((rotation, translation));
         // The reader takes the matrix of the file for camera-to-world with OpenGL's axes.

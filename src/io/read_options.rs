@@ -15,7 +15,7 @@ crate::options::options! {
 
             /// Every N-th view by name is held out.
             ///
-            /// 8 (LabelGS, 3DGS); 0 trains on all views. A scene with its own split keeps it.
+            /// 8 (LabelGS, 3DGS); 0 trains on all views. A scene with its own split keeps it, but for 0.
             test_every <"N">: u32 = 8, fixed;
 
             /// What the scene's file means by its poses, where it is not the convention of its format.

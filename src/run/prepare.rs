@@ -146,7 +146,7 @@ pub(super) fn begin<'a>(
     };
     let is_new = resumed.is_none();
     let lookup = lookup(&settings, &inputs);
-    let sightings = Sightings::new((&request.scene, &lookup), &dataset);
+    let sightings = Sightings::new(&lookup, &dataset);
     let files = (inputs.known_depths.as_deref(), &sightings);
     let (train, depths) = depths::decided((&request.scene, &lookup, &dataset), (&settings.train, is_new), files)?;
     let options = TrainerOptions { region: block.map(|block| block.region()).transpose()?, depths, ..options.into() };

@@ -136,6 +136,8 @@ impl Flaw {
 pub struct Dataset {
     /// Folder of the scene.
     pub root: PathBuf,
+    /// The file that lists its photos.
+    pub source: PathBuf,
     /// Views to train on, sorted by name.
     pub train: Vec<View>,
     /// Held-out views, sorted by name.

@@ -8,13 +8,13 @@ mod photos;
 mod poses;
 mod shown;
 
-use super::colmap::Seen;
+use super::colmap::{self, Seen};
 use super::listed_path::Place;
 use super::listing::Listed;
 use super::lookup::Lookup;
+use super::pose_convention::Native;
 use super::recipe::at_photo_size;
 use super::window::{Window, windows};
-use super::{colmap, folder_of};
 use crate::error::Result;
 use crate::scene::median::median;
 use crate::scene::{Dataset, View};
@@ -78,11 +78,12 @@ struct Observed {
 }
 
 impl Observed {
-    fn read(scene: &Path, lookup: &Lookup) -> Result<Self> {
+    fn read(dataset: &Dataset, lookup: &Lookup) -> Result<Self> {
         let _stage = Stage::new("reading which photo shows which point", 0);
         // Opening the scene has checked its paths.
         let lookup = Lookup { allow_outside: true, ..lookup.clone() };
-        let photos = colmap::observations(&Place::new(folder_of(scene), &lookup))?.unwrap_or_default();
+        let mut photos = colmap::observations(&Place::new(&dataset.root, &lookup), &dataset.source)?;
+        photos.values_mut().for_each(|(listed, _)| lookup.poses.apply(Native::COLMAP, &mut listed.camera));
         let mut faces = BTreeMap::new();
         for (listed, _) in photos.values().filter(|(listed, _)| !listed.lens.is_pinhole()) {
             // It has left out unreadable photos too.
@@ -100,7 +101,6 @@ impl Observed {
 
 /// Which points of the reconstruction each training photo shows. They are read when something asks for them, and once.
 pub(crate) struct Sightings<'a> {
-    scene: &'a Path,
     lookup: &'a Lookup,
     dataset: &'a Dataset,
     shown: OnceCell<Shown<'a>>,
@@ -108,15 +108,15 @@ pub(crate) struct Sightings<'a> {
 
 impl<'a> Sightings<'a> {
     /// Those of a scene that was read.
-    pub(crate) fn new((scene, lookup): (&'a Path, &'a Lookup), dataset: &'a Dataset) -> Self {
-        Self { scene, lookup, dataset, shown: OnceCell::new() }
+    pub(crate) fn new(lookup: &'a Lookup, dataset: &'a Dataset) -> Self {
+        Self { lookup, dataset, shown: OnceCell::new() }
     }
 
     fn shown(&self) -> Result<&Shown<'a>> {
         if let Some(shown) = self.shown.get() {
             return Ok(shown);
         }
-        let looked = Observed::read(self.scene, self.lookup)?;
+        let looked = Observed::read(self.dataset, self.lookup)?;
         let shown = Shown::new(self.dataset.train.iter().collect(), &self.dataset.points, &looked);
         Ok(self.shown.get_or_init(|| shown))
     }
@@ -143,7 +143,7 @@ impl<'a> Sightings<'a> {
 
 /// Scans a scene that was read with its photos.
 pub fn scan(scene: &Path, lookup: &Lookup, dataset: &Dataset) -> Result<Report> {
-    let looked = Observed::read(scene, lookup)?;
+    let looked = Observed::read(dataset, lookup)?;
     let views: Vec<&View> = dataset.all();
     let shown = Shown::new(views.clone(), &dataset.points, &looked);
     let counts = shown.counts();

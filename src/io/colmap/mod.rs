@@ -12,6 +12,7 @@ use super::lens::Lens;
 use super::listed_path::Place;
 use super::listing::{FAR, Listed, Listing, check_camera};
 use super::ply;
+use super::pose_convention::Native;
 use crate::error::{Error, Result};
 use crate::scene::{Camera, Point};
 use glam::{DMat3, DQuat, DVec2, DVec3};
@@ -89,7 +90,7 @@ pub(crate) fn list(scene: &Place) -> Result<Option<Listing>> {
     let points = finite(points, &mut notes);
     notes.extend(neighbours(&files.folder, views.len() + bad.len()));
     let views = views.into_iter().map(|(listed, _)| listed).collect();
-    Ok(Some(Listing { source: files.needed("images")?.0, views, points, notes, bad, ..Listing::default() }))
+    Ok(Some(Listing { views, points, notes, bad, ..Listing::new(&files.needed("images")?.0, Native::COLMAP) }))
 }
 
 /// Reads the points that a trainer wrote beside the model, where the model has none.
@@ -123,17 +124,21 @@ fn neighbours(folder: &Path, count: usize) -> Option<String> {
 /// A point in a photo, and the same point in the world.
 pub(crate) type Seen = (DVec2, DVec3);
 
-/// Reads which points each photo of a COLMAP model shows, by name of the view; none without a model.
-pub(crate) fn observations(scene: &Place) -> Result<Option<BTreeMap<String, (Listed, Vec<Seen>)>>> {
-    let Some(files) = Files::find(scene.root) else { return Ok(None) };
-    let Some(points) = files.points()? else { return Ok(None) };
+/// Reads which points each photo of the COLMAP model with the images `source` shows, by name of the view; none if that is
+/// no model.
+pub(crate) fn observations(scene: &Place, source: &Path) -> Result<BTreeMap<String, (Listed, Vec<Seen>)>> {
+    let files = Files { folder: source.parent().unwrap_or(scene.root).to_owned() };
+    if files.path("images").is_none_or(|(path, _)| path != source) {
+        return Ok(BTreeMap::new());
+    }
+    let Some(points) = files.points()? else { return Ok(BTreeMap::new()) };
     let places: HashMap<u64, DVec3> = points.into_iter().map(|(id, point)| (id, point.position)).collect();
     let seen = |(listed, image): (Listed, ImageRecord)| {
         let points = image.observed.points.into_iter();
         let points = points.filter_map(|(pixel, id)| Some((pixel, *places.get(&id)?))).collect();
         (listed.name.clone(), (listed, points))
     };
-    Ok(Some(files.views(scene, true)?.views.into_iter().map(seen).collect()))
+    Ok(files.views(scene, true)?.views.into_iter().map(seen).collect())
 }
 
 fn finite(mut points: Vec<Point>, notes: &mut Vec<String>) -> Vec<Point> {

@@ -67,7 +67,7 @@ pub(crate) const MODELS: [CameraModel; 18] = [
     polynomial("RADIAL", 1, 2),
     polynomial("OPENCV", 2, 4),
     fisheye("OPENCV_FISHEYE", 2, 4),
-    CameraModel { of_names: None, ..polynomial("FULL_OPENCV", 2, 8) },
+    CameraModel { of_names: Some(full), ..polynomial("FULL_OPENCV", 2, 8) },
     other("FOV", 2, 1, |list| Lens::Fov(Fov { angle: list[0] })),
     fisheye("SIMPLE_RADIAL_FISHEYE", 1, 1),
     fisheye("RADIAL_FISHEYE", 1, 2),
@@ -86,6 +86,10 @@ pub(crate) const MODELS: [CameraModel; 18] = [
         ..other("EQUIRECTANGULAR", 0, 0, |_| Lens::Equirectangular)
     },
 ];
+
+fn full(value: &dyn Fn(&str) -> f64) -> Lens {
+    Polynomial::of_list(&["k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"].map(value)).into()
+}
 
 fn thin_prism(value: &dyn Fn(&str) -> f64) -> Lens {
     let (radial, tangential) = (["k1", "k2", "k3", "k4"].map(value), ["p1", "p2"].map(value));

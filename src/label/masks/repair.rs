@@ -142,7 +142,7 @@ pub fn mend(view: usize, mask: &LabelMap, shown: &LabelMap, repairs: &mut Repair
 }
 
 /// Gives the masks of a view the ids of the objects that the model shows there; outlines stay. A mask where it shows none
-/// keeps its id if that is one of `objects`.
+/// keeps its id if that is one of `objects`. A model may show less of an object than its mask has.
 pub fn adopt(
     view: usize,
     mask: &LabelMap,
@@ -154,13 +154,15 @@ pub fn adopt(
     for (&id, &seen) in mask.ids.iter().zip(&shown.ids).filter(|(id, _)| **id != 0) {
         *counts.entry(id).or_default().entry(seen).or_default() += 1;
     }
+    let mut areas: BTreeMap<u16, u64> = BTreeMap::new();
+    shown.ids.iter().for_each(|&object| *areas.entry(object).or_default() += 1);
     let mut out = mask.clone();
     for (&id, seen) in &counts {
         let total: u64 = seen.values().sum();
         let seen = seen.iter().filter(|(object, _)| **object != 0);
         let most = seen.max_by_key(|&(&object, &pixels)| (pixels, std::cmp::Reverse(object)));
         let new = match most {
-            Some((&object, &pixels)) if pixels as f64 >= SAME_OBJECT * total as f64 => object,
+            Some((object, &pixels)) if pixels as f64 >= SAME_OBJECT * total.min(areas[object]) as f64 => *object,
             _ if objects.contains(&id) => id,
             _ => 0,
         };
@@ -184,6 +186,20 @@ fn recolour(out: &mut LabelMap, mask: &LabelMap, id: u16, new: impl Fn(usize) ->
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_mask_of_which_the_model_shows_a_part_is_its_object() {
+        let map = |ids: &[u16]| LabelMap { width: ids.len() as u32, height: 1, ids: ids.to_vec() };
+        let mask = map(&[7, 7, 7, 7, 7, 7, 7, 7, 7, 7, 8, 8, 8, 8, 9, 9, 0, 0, 0, 0]);
+        // A tenth of the first is seen, and all that is seen of that object; of the second a row of its neighbour.
+        let shown = map(&[3, 0, 0, 0, 0, 0, 0, 0, 0, 0, 4, 0, 0, 0, 4, 4, 4, 4, 4, 0]);
+        let mut repairs = Repairs::default();
+        let found = adopt(5, &mask, &shown, &BTreeSet::new(), &mut repairs);
+        assert_eq!(found.ids, [3, 3, 3, 3, 3, 3, 3, 3, 3, 3, 4, 4, 4, 4, 4, 4, 0, 0, 0, 0]);
+        assert_eq!(repairs.renamed, [((5, 7), 3), ((5, 8), 4), ((5, 9), 4)]);
+        let found = adopt(5, &mask, &map(&[0; 20]), &BTreeSet::from([8]), &mut Repairs::default());
+        assert_eq!(found.ids, [0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 8, 8, 8, 8, 0, 0, 0, 0, 0, 0]);
+    }
 
     #[test]
     fn repairs_are_told_by_the_ids_that_masks_had() {
