@@ -120,12 +120,14 @@ impl Table {
         self.comments.iter().map(String::as_str)
     }
 
-    /// Returns true if the property exists and is `float` or `double`.
-    pub(in crate::io) fn is_float(&self, name: &str) -> bool {
-        self.vertex
-            .properties
-            .get(name)
-            .is_some_and(|p| matches!(p.data_type, PropertyType::Scalar(ScalarType::Float | ScalarType::Double)))
+    /// Returns the largest value of a property of integers, and `None` for one of floats or lists.
+    pub(in crate::io) fn integer_max(&self, name: &str) -> Option<f64> {
+        match self.vertex.properties.get(name)?.data_type {
+            PropertyType::Scalar(ScalarType::UShort) => Some(f64::from(u16::MAX)),
+            PropertyType::Scalar(ScalarType::Float | ScalarType::Double) | PropertyType::List(..) => None,
+            // Wider integers hold bytes too.
+            PropertyType::Scalar(_) => Some(255.0),
+        }
     }
 
     /// Calls `row` with the values of `columns` for each vertex, as f64, in order.

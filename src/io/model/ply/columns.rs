@@ -118,7 +118,7 @@ impl Columns {
             notes.push("harmonics of degree 4 were left out; labelgs has 3 degrees".into());
         }
         notes.extend(unknown(by_name.keys().copied().filter(|name| !wanted.iter().any(|own| own == name))));
-        let full_colour = coloured.then(|| if table.is_float(by_name["red"]) { 1.0 } else { 255.0 });
+        let full_colour = coloured.then(|| table.integer_max(by_name["red"]).unwrap_or(1.0));
         let names = wanted.iter().map(|name| by_name[name.as_str()].to_owned()).collect();
         Ok(Self { sh_degree: kept, names, flat, full_colour, filtered, labelled, confident, edited, notes })
     }
