@@ -22,4 +22,5 @@ mod photos;
 mod pipeline_file;
 mod ply;
 mod poses;
+mod splits;
 mod transforms;

@@ -43,13 +43,21 @@ pub(crate) fn list_file(scene: &Place, path: &Path) -> Result<Listing> {
         );
         return Err(Error::data(path, "", problem));
     }
-    let views = photos.into_iter().zip(values.chunks_exact(ROW)).enumerate().map(|(index, (photo, row))| {
+    let mut listing = Listing::new(path, Native::CAMERA_TO_WORLD);
+    for (index, (photo, row)) in photos.into_iter().zip(values.chunks_exact(ROW)).enumerate() {
         let name = photo.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        let place = format!("row {index} (`{name}`)");
-        let camera = camera(path, &place, row)?;
-        Ok(Listed { name, photo: Some(photo), camera, lens: Lens::Pinhole, test: None })
-    });
-    Ok(Listing { views: views.collect::<Result<_>>()?, ..Listing::new(path, Native::CAMERA_TO_WORLD) })
+        match camera(path, &format!("row {index} (`{name}`)"), row) {
+            Ok(camera) => {
+                listing.views.push(Listed { name, photo: Some(photo), camera, lens: Lens::Pinhole, test: None });
+            }
+            Err(error) => listing.bad.push(error),
+        }
+    }
+    // What is wrong with all is wrong with the file.
+    if listing.views.is_empty() && !listing.bad.is_empty() {
+        return Err(listing.bad.swap_remove(0));
+    }
+    Ok(listing)
 }
 
 /// Lists the photos in a folder, sorted by name.

@@ -338,6 +338,39 @@ fn one_broken_pose_leaves_its_photo_out() {
 }
 
 #[test]
+fn one_broken_row_leaves_its_photo_or_point_out() {
+    let all: Vec<String> = (0..12).map(|index| format!("{index:02}.png")).collect();
+    let names: Vec<&str> = all.iter().map(String::as_str).collect();
+    let scene = Scene::new();
+    scene.colmap_txt("sparse/0", &[pinhole()], &names);
+    names.iter().for_each(|name| scene.photo(&format!("images/{name}"), 12, 8));
+    let path = scene.path().join("sparse/0/images.txt");
+    let text = fs::read_to_string(&path).expect("text");
+    let of_last =
+        |row: &str| format!("{}\n{row}\n\n", text[..text.find("\n12 ").expect("the last")].trim_end_matches('\n'));
+    for row in ["12 0.9 0 0 0 1 2 -nan(ind) 1 11.png", "12 0.9 0 0 0 1 2 3 7 11.png"] {
+        fs::write(&path, of_last(row)).expect("written");
+        let dataset = open(&scene).expect("a scene");
+        assert_eq!(dataset.all().len(), 11, "{row}");
+        assert!(dataset.notes.iter().any(|note| note.contains("1 of 12")), "{:?}", dataset.notes);
+    }
+    // A file that ends within a row was cut short, and more may be lost than that row.
+    fs::write(&path, of_last("12 0.9 0 0 0 1 2").trim_end()).expect("written");
+    assert!(refusal(open(&scene)).contains("the line ends where"));
+    fs::write(&path, &text).expect("written");
+    let path = scene.path().join("sparse/0/points3D.txt");
+    let text = fs::read_to_string(&path).expect("text");
+    fs::write(&path, format!("{text}9 1 2 x 0 0 0\n")).expect("written");
+    let dataset = open(&scene).expect("a scene");
+    assert_eq!(dataset.points.len(), POINTS.len());
+    assert!(
+        dataset.notes.iter().any(|note| note.contains("1 point left out") && note.contains("`x`")),
+        "{:?}",
+        dataset.notes
+    );
+}
+
+#[test]
 fn another_model_is_named_with_its_photos_and_can_be_the_scene() {
     let scene = simple(5);
     scene.colmap_bin("sparse/0", &[pinhole()], &["00.png"]);

@@ -118,7 +118,9 @@ fn cameras_of_metashape_are_read_with_their_lens() {
             let dataset = open(&place).expect("a scene");
             let names: Vec<&str> = dataset.train.iter().map(|view| view.name.as_str()).collect();
             assert_eq!(names, ["a.png", "b.png"]);
-            assert!(dataset.notes.iter().any(|note| note.contains("2 cameras")), "{:?}", dataset.notes);
+            for what in ["1 camera of", "disabled", "without a pose"] {
+                assert!(dataset.notes.iter().any(|note| note.contains(what)), "{:?}", dataset.notes);
+            }
             let camera = &dataset.train[0].camera;
             check_pose(camera);
             assert_eq!((camera.fx, camera.fy, camera.cx, camera.cy), (10.5, 10.0, 6.5, 3.75));
@@ -158,6 +160,41 @@ fn metashape_has_fisheyes_and_panoramas() {
     assert_eq!(dataset.train.len(), 6);
 }
 
+/// A slave stands where its sensor is mounted, in the master's frame, unless it has a pose of its own.
+#[test]
+fn slaves_of_a_rig_follow_their_master() {
+    // Turned by a quarter about y, so that it looks along x of the master; half a unit of the chunk to the right of it.
+    let mounting = "<rotation>0 0 1 0 1 0 -1 0 0</rotation><location>0.5 0 0</location>";
+    let slave_sensor = |mounting: &str| {
+        SENSOR.replace("id=\"0\"", "id=\"1\" master_id=\"0\"").replace("</sensor>", &format!("{mounting}</sensor>"))
+    };
+    let slave = r#"<camera id="1" sensor_id="1" master_id="0" component_id="0" label="b"/>"#;
+    let cameras = [&of_camera("a", POSE), slave].concat();
+    let dataset =
+        open(metashape(&[SENSOR, &slave_sensor(mounting)].concat(), &cameras, CHUNK).path()).expect("a scene");
+    let [master, slave_view] = &dataset.train[..] else { panic!("two views") };
+    check_pose(&master.camera);
+    // A point in the slave's frame is this one in the master's, in units of the world, which are half those of the chunk.
+    for point in [DVec3::new(0.3, -0.2, 2.0), DVec3::new(-1.0, 0.5, 4.0)] {
+        let in_master = DVec3::new(point.z + 1.0, point.y, -point.x);
+        let (rotation, translation) = (master.camera.rotation, master.camera.translation);
+        let world = rotation.transpose() * (in_master - translation);
+        assert!(slave_view.camera.to_camera(world).distance(point) < 1e-9, "{point}");
+    }
+    assert!(
+        dataset.notes.iter().any(|note| note.contains("1 camera of") && note.contains("rig")),
+        "{:?}",
+        dataset.notes
+    );
+    // What is not mounted is named; a pose of its own counts.
+    let unmounted = [SENSOR, &slave_sensor(r#"<rotation fixed="true"/><location fixed="true"/>"#)].concat();
+    let text = refusal(open(metashape(&unmounted, &cameras, "").path()));
+    assert!(text.contains("slave of a rig") && text.contains("without the rig"), "{text}");
+    let own = slave.replace("/>", &format!("><transform>{POSE}</transform></camera>"));
+    let dataset = open(metashape(&unmounted, &[of_camera("a", POSE), own].concat(), CHUNK).path()).expect("a scene");
+    check_pose(&dataset.train[1].camera);
+}
+
 /// A second camera whose photos are not aligned has no calibration.
 #[test]
 fn sensors_that_no_pose_uses_do_not_matter() {
@@ -189,7 +226,7 @@ fn broken_xml_names_the_line() {
     assert!(one(SENSOR, &[good.clone(), good.clone()].concat()).contains("label too"));
     assert!(one(SENSOR, "").contains("lists no photo"));
     let unaligned = one(SENSOR, r#"<camera id="7" sensor_id="0" label="c"/>"#);
-    assert!(unaligned.contains("lists no photo") && unaligned.contains("1 cameras"), "{unaligned}");
+    assert!(unaligned.contains("lists no photo") && unaligned.contains("1 camera of"), "{unaligned}");
     assert!(one(&SENSOR.replace("<f>10</f>", "<f>10</f><p3>0.1</p3>"), &good).contains("p3"));
     let typed = SENSOR.replace("calibration type=\"frame\"", "calibration type=\"fisheye\"");
     assert!(one(&typed, &good).contains("of type frame and its calibration of type fisheye"));

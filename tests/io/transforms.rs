@@ -182,3 +182,91 @@ fn invalid_values_are_refused_with_their_place() {
     assert!(one(r#""fl_x": 9, "is_fisheye": true, "camera_model": "OPENCV","#, IDENTITY).contains("is_fisheye true"));
     assert!(one(r#""fl_x": 9, "distortion_params": [0.1],"#, IDENTITY).contains("1 numbers"));
 }
+
+/// One frame of many that cannot be used is a photo less; what is wrong with all of them is an error.
+#[test]
+fn a_broken_frame_leaves_its_photo_out() {
+    let open = |broken: &str| {
+        let scene = Scene::new();
+        (0..12).for_each(|index| scene.photo(&format!("images/{index}.png"), 12, 8));
+        let mut frames: Vec<String> = (0..12).map(|index| frame(&format!("images/{index}.png"), "")).collect();
+        frames[3] = broken.to_owned();
+        scene.write("transforms.json", format!(r#"{{"fl_x": 10, "frames": [{}]}}"#, frames.join(",")));
+        let all = LoadOptions { test_every: None, ..LoadOptions::default() };
+        io::open(scene.path(), &all).expect("a scene")
+    };
+    let nan = frame("images/3.png", "").replace("[0,0,1,0]", "[0,0,NaN,-Infinity]");
+    let zero = frame("images/3.png", "").replace("[0,0,1,0]", "[0,0,0,0]");
+    let without = r#"{"file_path": "images/3.png"}"#;
+    let text = r#"{"file_path": "images/3.png", "transform_matrix": "eye"}"#;
+    for broken in [&nan, &zero, without, text, &frame("images/3.png", r#", "fl_x": -3"#)] {
+        let dataset = open(broken);
+        assert_eq!(dataset.train.len(), 11, "{broken}");
+        let names = |note: &&String| note.contains("1 of 12") && note.contains("frame 3 (`images/3.png`)");
+        assert!(dataset.notes.iter().any(|note| names(&note)), "{:?}", dataset.notes);
+        assert_eq!(dataset.flaws.len(), 1);
+    }
+}
+
+#[test]
+fn keys_of_other_programs_are_used_or_named() {
+    let open = |more: &str, frame: &str| {
+        let scene = Scene::new();
+        scene.photo("images/a.png", 12, 8);
+        scene.write("transforms.json", format!(r#"{{{more} "frames": [{frame}]}}"#));
+        open(&scene).expect("a scene")
+    };
+    let a = |more: &str| frame("images/a.png", more);
+    let camera = |dataset: Dataset| dataset.train[0].camera.clone();
+    // An angle of the frame against a length of the file.
+    let own = camera(open(r#""fl_x": 100, "fl_y": 100,"#, &a(r#", "camera_angle_x": 1.0"#)));
+    assert!((own.fx - 6.0 / 0.5f64.tan()).abs() < 1e-12 && own.fx == own.fy, "{own:?}");
+    // Columns instead of rows.
+    let usual = r#"[[0,0,1,5],[1,0,0,6],[0,1,0,7],[0,0,0,1]]"#;
+    let turned = r#"[[0,1,0,0],[0,0,1,0],[1,0,0,0],[5,6,7,1]]"#;
+    let of = |matrix: &str| open(r#""fl_x": 10,"#, &a("").replace(IDENTITY, matrix));
+    let transposed = of(turned);
+    assert!(transposed.notes.iter().any(|note| note.contains("transposed")), "{:?}", transposed.notes);
+    assert_eq!(camera(transposed), camera(of(usual)));
+    // Mitsuba's cameras look along z, with x to the left.
+    let mitsuba = camera(open(r#""fl_x": 10, "from_mitsuba": true,"#, &a("")));
+    assert!(mitsuba.to_camera(DVec3::new(1.0, 2.0, 3.0)).distance(DVec3::new(-1.0, -2.0, 3.0)) < 1e-12);
+    // OpenCV's full model, by its name or by coefficients that only it has.
+    let wide =
+        |more: &str| open(&format!(r#""fl_x": 10, "k1": 0.2, {more}"#), &a("")).train[0].photo().expect("one").rgba.clone();
+    let full = wide(r#""camera_model": "FULL_OPENCV", "k4": 0.5, "k6": 0.1,"#);
+    assert!(full == wide(r#""k4": 0.5, "k6": 0.1,"#) && full != wide(r#""k4": 0.5,"#));
+    assert_eq!(open(r#""latlong": true,"#, &a("")).train.len(), 6);
+    for (key, value) in [("rolling_shutter", "[0, 0, 0, 0.1]"), ("white_transparent", "true"), ("time", "0.5")] {
+        let notes = open(&format!(r#""fl_x": 10, "{key}": {value},"#), &a("")).notes;
+        assert!(notes.iter().any(|note| note.contains(&format!("\"{key}\""))), "{notes:?}");
+    }
+    let quiet =
+        open(r#""fl_x": 10, "rolling_shutter": [0, 0, 0], "white_transparent": false, "aabb_scale": 4,"#, &a(""));
+    assert!(quiet.notes.iter().all(|note| !note.contains("is not used")), "{:?}", quiet.notes);
+}
+
+#[test]
+fn intrinsics_that_are_shares_of_the_photo_are_named() {
+    let scene = Scene::new();
+    scene.photo("images/a.png", 1200, 800);
+    let text =
+        format!(r#"{{"fl_x": 0.9, "fl_y": 1.2, "cx": 0.5, "cy": 0.5, "frames": [{}]}}"#, frame("images/a.png", ""));
+    scene.write("transforms.json", text);
+    let text = refusal(open(&scene));
+    assert!(text.contains("share of the photo's size"), "{text}");
+}
+
+#[test]
+fn points_that_no_key_names_are_used_and_named() {
+    let scene = Scene::new();
+    scene.photo("images/a.png", 12, 8);
+    scene.write("transforms.json", format!(r#"{{"fl_x": 10, "frames": [{}]}}"#, frame("images/a.png", "")));
+    let points = "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\n\
+                  property ushort diffuse_red\nproperty ushort diffuse_green\nproperty ushort diffuse_blue\nend_header\n\
+                  1 2 3 65535 257 0\n";
+    scene.write("sparse_pc.ply", points);
+    let dataset = open(&scene).expect("a scene");
+    assert_eq!(dataset.points[0].colour, [255, 1, 0]);
+    assert!(dataset.notes.iter().any(|note| note.contains("sparse_pc.ply")), "{:?}", dataset.notes);
+}

@@ -14,9 +14,12 @@ use super::listing::{FAR, Listed, Listing, check_camera};
 use super::ply;
 use super::pose_convention::Native;
 use crate::error::{Error, Result};
+use crate::io::read;
 use crate::scene::{Camera, Point};
+use crate::words::counted;
 use glam::{DMat3, DQuat, DVec2, DVec3};
 use model::{CameraRecord, ImageRecord};
+use std::cmp::Reverse;
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::path::{Path, PathBuf};
 
@@ -62,11 +65,26 @@ impl Files {
         join(scene, (&cameras_path, &cameras), &source, images)
     }
 
-    /// Reads the points with their ids; `None` without a list.
-    fn points(&self) -> Result<Option<Vec<(u64, Point)>>> {
-        self.path("points3D")
-            .map(|(path, is_binary)| if is_binary { binary::points(&path) } else { text::points(&path) })
-            .transpose()
+    /// Reads the points with their ids; `None` without a list. Notes rows that cannot be read; most of them must be.
+    fn points(&self, notes: &mut Vec<String>) -> Result<Option<Vec<(u64, Point)>>> {
+        let Some((path, is_binary)) = self.path("points3D") else { return Ok(None) };
+        if is_binary {
+            return binary::points(&path).map(Some);
+        }
+        let (mut points, mut refused) = (Vec::new(), Vec::new());
+        for row in text::points(&path)? {
+            match row {
+                Ok(point) => points.push(point),
+                Err(error) => refused.push(error),
+            }
+        }
+        if refused.len() > points.len() {
+            return Err(refused.swap_remove(0));
+        }
+        if let Some(first) = refused.first() {
+            notes.push(format!("{} left out that cannot be read, the first: {first}", counted(refused.len(), "point")));
+        }
+        Ok(Some(points))
     }
 }
 
@@ -83,7 +101,7 @@ pub(crate) fn list(scene: &Place) -> Result<Option<Listing>> {
     let Some(files) = Files::find(scene.root) else { return Ok(None) };
     let Views { views, bad } = files.views(scene, false)?;
     let mut notes = Vec::new();
-    let points = match files.points()? {
+    let points = match files.points(&mut notes)? {
         Some(points) => points.into_iter().map(|(_, point)| point).collect(),
         None => points_of_ply(&files.folder, &mut notes)?,
     };
@@ -105,15 +123,16 @@ fn points_of_ply(folder: &Path, notes: &mut Vec<String>) -> Result<Vec<Point>> {
 
 /// Says what other models lie beside that in `sparse/0`, which has `count` photos.
 fn neighbours(folder: &Path, count: usize) -> Option<String> {
-    let others = (1..10).map(|number| folder.with_file_name(number.to_string()));
-    let others = others.filter(|other| folder.ends_with("sparse/0") && other.is_dir()).filter_map(|folder| {
+    let siblings = folder.parent().filter(|_| folder.ends_with("sparse/0")).map(read::folder);
+    let others = siblings.and_then(Result::ok).unwrap_or_default().into_iter().filter(|other| other != folder);
+    let others = others.filter(|other| other.is_dir()).filter_map(|folder| {
         let (path, is_binary) = Files { folder: folder.clone() }.path("images")?;
         // A damaged neighbour is not this scene's concern.
         let images =
             if is_binary { binary::count(&path) } else { text::images(&path, false).map(|all| all.len() as u64) };
         Some((folder, images.ok()?))
     });
-    let (largest, images) = others.max_by_key(|(_, images)| *images)?;
+    let (largest, images) = others.max_by_key(|(folder, images)| (*images, Reverse(folder.clone())))?;
     Some(format!(
         "only the model {} is used, with {count} photos; {} has {images}: name that folder as the scene to use it",
         folder.display(),
@@ -131,7 +150,8 @@ pub(crate) fn observations(scene: &Place, source: &Path) -> Result<BTreeMap<Stri
     if files.path("images").is_none_or(|(path, _)| path != source) {
         return Ok(BTreeMap::new());
     }
-    let Some(points) = files.points()? else { return Ok(BTreeMap::new()) };
+    // What is left out was told when the scene was read.
+    let Some(points) = files.points(&mut Vec::new())? else { return Ok(BTreeMap::new()) };
     let places: HashMap<u64, DVec3> = points.into_iter().map(|(id, point)| (id, point.position)).collect();
     let seen = |(listed, image): (Listed, ImageRecord)| {
         let points = image.observed.points.into_iter();
@@ -182,7 +202,8 @@ fn join(
         }
         let Some(camera) = by_id.get(&image.camera) else {
             let problem = format!("uses camera {}, which {} does not list", image.camera, cameras_path.display());
-            return Err(Error::data(images_path, place.as_str(), problem));
+            found.bad.push(Error::data(images_path, place.as_str(), problem));
+            continue;
         };
         let file = scene.resolve(images_path, &image.name)?;
         let posed = |(camera, lens): (Camera, Lens)| match posed(camera, &image) {
@@ -204,6 +225,10 @@ fn join(
         }
         let photo = scene.photos.find(&["images", "."], &file.path);
         found.views.push((Listed { name: file.name, photo, camera, lens, test: None }, image));
+    }
+    // What is wrong with all is wrong with the model.
+    if found.views.is_empty() && !found.bad.is_empty() {
+        return Err(found.bad.swap_remove(0));
     }
     Ok(found)
 }

@@ -5,7 +5,7 @@ use crate::error::{Error, Result};
 use crate::io::{lens, read};
 use crate::scene::Point;
 use glam::{DVec2, DVec3};
-use std::io::BufRead;
+use std::io::{BufRead, Read, Seek, SeekFrom};
 use std::path::Path;
 use std::str::FromStr;
 
@@ -69,20 +69,20 @@ impl<'a> Words<'a> {
     }
 }
 
-/// Reads a file with one record per line.
-fn records<T>(path: &Path, read: impl Fn(Words) -> Result<T>) -> Result<Vec<T>> {
+/// Reads a file with one record per line. A line that is no record is an error of its own.
+fn records<T>(path: &Path, read: impl Fn(Words) -> Result<T>) -> Result<Vec<Result<T>>> {
     let mut all = Vec::new();
     for line in lines(path)? {
         let (number, line) = line?;
         if is_record(&line) {
-            all.push(read(Words { path, number, rest: line.trim() })?);
+            all.push(read(Words { path, number, rest: line.trim() }));
         }
     }
     Ok(all)
 }
 
 pub(super) fn cameras(path: &Path) -> Result<Vec<CameraRecord>> {
-    records(path, |mut words| {
+    let all = records(path, |mut words| {
         let (id, name): (u32, _) = (words.number("camera id")?, words.word("a camera model")?);
         let unknown = || unknown_model(path, format!("line {}, camera {id}", words.number), &name);
         let model = lens::model(name).ok_or_else(unknown)?;
@@ -92,7 +92,8 @@ pub(super) fn cameras(path: &Path) -> Result<Vec<CameraRecord>> {
             parameters.push(words.number("camera parameter")?);
         }
         Ok(CameraRecord { id, model, width, height, parameters })
-    })
+    })?;
+    all.into_iter().collect()
 }
 
 /// True for the second line of an image: threes of numbers, or nothing.
@@ -105,8 +106,17 @@ fn is_observations(line: &str) -> bool {
     line.split_ascii_whitespace().all(is_number) && count % 3 == 0
 }
 
+/// True if the last line of a file is ended as the others are.
+fn is_terminated(path: &Path) -> Result<bool> {
+    let mut last = [0];
+    let mut file = read::open(path)?;
+    file.seek(SeekFrom::End(-1)).and_then(|_| file.read_exact(&mut last)).map_err(Error::read(path))?;
+    Ok(last == *b"\n")
+}
+
 /// Reads `images.txt`: two lines per image, the second with its observations, possibly empty. Programs that write poses
-/// alone leave the second one out. Rows that cannot be read are errors of their own.
+/// alone leave the second one out. Rows that cannot be read are errors of their own, but for the last one
+/// of a file that was cut short.
 pub(super) fn images(path: &Path, with_observations: bool) -> Result<Vec<Result<ImageRecord>>> {
     let mut all = Vec::new();
     let mut lines = lines(path)?.peekable();
@@ -120,6 +130,10 @@ pub(super) fn images(path: &Path, with_observations: bool) -> Result<Vec<Result<
             _ => lines.next().transpose()?,
         };
         all.push(image(path, (number, line), second.filter(|_| with_observations)));
+    }
+    match all.pop() {
+        Some(Err(error)) if !is_terminated(path)? => return Err(error),
+        last => all.extend(last),
     }
     Ok(all)
 }
@@ -149,7 +163,7 @@ fn image(path: &Path, (number, line): (usize, String), observations: Option<(usi
 }
 
 /// Reads `points3D.txt` with the ids, without the tracks.
-pub(super) fn points(path: &Path) -> Result<Vec<(u64, Point)>> {
+pub(super) fn points(path: &Path) -> Result<Vec<Result<(u64, Point)>>> {
     records(path, |mut words| {
         let id = words.number("point id")?;
         let position = DVec3::from_array(words.numbers("coordinate")?);
