@@ -2,22 +2,26 @@
 
 use super::args::SceneArgs;
 use super::context::Context;
+use super::interrupt;
 use super::labelled::{TableArg, open};
 use super::model_fit::warn_of_misfit;
 use super::scene::{near_plane, open_gpu, open_scene};
 use super::shell::quoted;
 use super::stdout;
 use super::values::{near, share};
-use crate::Result;
 use crate::io::camera_json::views_of_model;
 use crate::render::{Parts, RenderOptions};
 use crate::scene::Dataset;
-use crate::viewer::{Edit, Finished, Viewer, ViewerOptions, Words, show};
+use crate::viewer::{Edit, Finished, Token, Viewer, ViewerOptions, Words, show};
+use crate::{Error, Result};
 use clap::Args;
 use serde_json::json;
 use std::net::IpAddr;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
+
+/// Variable with the token to ask for instead of a new one.
+const TOKEN: &str = "LABELGS_VIEW_TOKEN";
 
 /// `labelgs view`.
 #[derive(Args, Clone, Debug)]
@@ -55,7 +59,8 @@ pub struct ServerArgs {
     /// Address or name to listen on. On another than loopback, who reaches it and has the token sees the scene.
     #[arg(long, value_name = "HOST", default_value = "127.0.0.1")]
     pub view_host: String,
-    /// Port to listen on; 0 takes a free one.
+    /// Port to listen on; 0 takes a free one. With a port and a token in LABELGS_VIEW_TOKEN, an open page comes back when
+    /// the program is started again.
     #[arg(long, value_name = "PORT", default_value_t = 0)]
     pub view_port: u16,
     /// Ask for no token. Other users of this machine may then see the scene; only on loopback.
@@ -81,8 +86,13 @@ pub struct WatchArgs {
 impl ServerArgs {
     /// Starts the server, and the browser if that was asked for.
     pub(super) fn start(&self, share: f32) -> Result<Viewer> {
-        let options =
-            ViewerOptions { host: self.view_host.clone(), port: self.view_port, has_token: !self.view_no_token, share };
+        let given = std::env::var(TOKEN).ok().filter(|token| !token.is_empty());
+        let token = match given {
+            _ if self.view_no_token => Token::Off,
+            Some(token) => Token::Given(token),
+            None => Token::New,
+        };
+        let options = ViewerOptions { host: self.view_host.clone(), port: self.view_port, token, share };
         let viewer = Viewer::start(&options)?;
         if self.view_host.parse::<IpAddr>().is_ok_and(|ip| ip.is_unspecified()) {
             tracing::info!(
@@ -96,7 +106,7 @@ impl ServerArgs {
     }
 }
 
-/// Shows a model until a signal comes.
+/// Shows a model until a signal comes. Changes that are in no file are saved then.
 pub(crate) fn run(args: &ViewArgs, context: &Context) -> Result<()> {
     let (model, known) = open(&args.model, &args.table)?;
     let dataset = match &args.scene {
@@ -117,8 +127,12 @@ pub(crate) fn run(args: &ViewArgs, context: &Context) -> Result<()> {
     }
     let words = Typed { scene: args.scene.clone(), masks: args.masks.clone() };
     let finished = Finished { path: &args.model, model, table: known.table, dataset: &dataset, options, words: &words };
-    // A signal ends the process.
-    show(&viewer, finished, gpu, &|| true)
+    interrupt::note_only();
+    let saved = show(&viewer, finished, gpu, &|| !interrupt::is_noted())?;
+    if let Some(saved) = saved {
+        tracing::warn!("unsaved changes are in {} now; go on with: {}", saved.display(), words.view(&saved));
+    }
+    Err(Error::Interrupted)
 }
 
 /// Opens an address in the browser of the desktop. Without one the printed address is left.

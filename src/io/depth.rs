@@ -3,8 +3,8 @@
 //! A map belongs to the photo file. It is undistorted and resized in the same way as the mask of the photo.
 
 use super::depth_file::{EXTENSIONS, read_depth};
-use super::load::shortened;
 use super::lookup::Lookup;
+use super::names::shortened;
 use super::resample::{resample_nearest, same_aspect};
 use super::window::{Window, windows};
 use crate::error::{Error, Result};

@@ -3,7 +3,7 @@
 //! Poses with other axes, or inverted ones, read without an error: the cameras then look at nothing, and a training
 //! makes fog.
 
-use super::load::shortened;
+use super::names::shortened;
 use super::pose_convention::{Native, PoseConvention};
 use crate::error::{Result, Setting};
 use crate::scene::agreement::{Agreement, Sample};

@@ -64,6 +64,11 @@ impl Listing {
             hint: String::new(),
         }
     }
+
+    /// Returns true if photos of it do not exist.
+    pub(crate) fn is_incomplete(&self) -> bool {
+        !self.missing.is_empty() || self.views.iter().any(|view| view.photo.is_none())
+    }
 }
 
 /// Refuses cameras that cannot make an image. `place` names the camera in `path`.

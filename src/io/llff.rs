@@ -27,6 +27,11 @@ pub(crate) fn list(scene: &Place) -> Result<Option<Listing>> {
     if path.is_file() { list_file(scene, &path).map(Some) } else { Ok(None) }
 }
 
+/// Returns the number of photos that a file has poses for; `None` if it cannot be read.
+pub(crate) fn count(path: &Path) -> Option<usize> {
+    npy::read::<2>(path, "table of poses", "(photos, 17)").ok().map(|([rows, _], _)| rows)
+}
+
 pub(crate) fn list_file(scene: &Place, path: &Path) -> Result<Listing> {
     let ([rows, columns], values) = npy::read::<2>(path, "table of poses", "(photos, 17)")?;
     if columns != ROW {

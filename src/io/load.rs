@@ -4,6 +4,7 @@ use super::all::all_or_one_error;
 use super::bad_photos;
 use super::listing::{Listed, Listing};
 use super::mask_folder::MaskFolder;
+use super::names::shortened;
 use super::photo_store::PhotoStore;
 use super::recipe::{MadeView, MadeViews, Recipe};
 use super::{LoadOptions, frame_check, mask_notes, masks, missing, stray};
@@ -194,11 +195,6 @@ fn require_unique(root: &Path, dataset: &Dataset) -> Result<()> {
         }
         None => Ok(()),
     }
-}
-
-pub(crate) fn shortened(names: &[&str]) -> String {
-    let shown = names.iter().take(3).copied().collect::<Vec<_>>().join(", ");
-    if names.len() > 3 { format!("{shown}, ...") } else { shown }
 }
 
 /// Returns which of the views, sorted by name, are held out.

@@ -3,7 +3,7 @@
 use super::LoadOptions;
 use super::bad_photos::allowed;
 use super::listing::{Listed, Listing};
-use super::load::shortened;
+use super::names::shortened;
 use crate::error::{Error, Result, Setting};
 
 /// One of this many photos may lack: published scenes list photos that were left out of them.

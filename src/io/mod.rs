@@ -23,6 +23,7 @@ pub(crate) mod init;
 pub(crate) mod kind;
 pub(crate) mod label_table;
 pub(crate) mod lens;
+mod list;
 mod listed_path;
 mod listing;
 mod llff;
@@ -61,9 +62,7 @@ use crate::error::{Error, Result, Setting};
 use crate::scene::Dataset;
 use crate::stage::Stage;
 use crate::words::counted;
-use listed_path::Place;
-use listing::Listing;
-use split::Split;
+use list::{folder_of, list};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -178,90 +177,4 @@ pub(crate) fn open_logged(scene: &Path, options: &LoadOptions) -> Result<Dataset
     let (train, test) = (counted(train, "training view"), counted(test, "test view"));
     tracing::info!("scene: {train}, {test}, {}", counted(points, "point"));
     Ok(dataset)
-}
-
-/// Returns the folder of a scene, given the folder or one file in it.
-fn folder_of(scene: &Path) -> &Path {
-    if !scene.is_file() {
-        return scene;
-    }
-    scene.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."))
-}
-
-/// Lists a scene.
-fn list(scene: &Path, lookup: &Lookup) -> Result<Listing> {
-    if let Some(images) = lookup.images_of(folder_of(scene))
-        && !images.is_dir()
-    {
-        return Err(Error::usage(
-            Setting("images"),
-            format!("{} is no folder; expected the folder of the photos", images.display()),
-        ));
-    }
-    let place = Place::new(folder_of(scene), lookup);
-    let mut listing = list_in(&place, scene)?;
-    listing.notes.extend(place.photos.note());
-    if listing.views.iter().any(|view| view.photo.is_none()) || !listing.missing.is_empty() {
-        listing.hint = place.photos.hint();
-        let other = folder_of(scene).join("transforms.json");
-        if scene.is_dir() && other.is_file() && listing.source != other {
-            listing.hint += &format!("; or name {} as the scene, which lies there too", other.display());
-        }
-    }
-    if listing.views.iter().all(|view| view.test.is_none())
-        && let Some(split) = Split::find(&place, &listing.source)?
-    {
-        split.apply(&mut listing);
-    }
-    let native = listing.native;
-    listing.views.iter_mut().for_each(|view| lookup.poses.apply(native, &mut view.camera));
-    Ok(listing)
-}
-
-fn list_in(place: &Place, scene: &Path) -> Result<Listing> {
-    if scene.is_file() {
-        let extension = scene.extension().map(|extension| extension.to_string_lossy().to_lowercase());
-        return match extension.as_deref() {
-            Some("npy") => llff::list_file(place, scene),
-            Some("xml") => metashape::list_file(place, scene),
-            _ => match kind::of_file(scene)? {
-                Some(content) => Err(Error::data(scene, "", no_scene(content))),
-                None => transforms::list_file(place, scene),
-            },
-        };
-    }
-    if !scene.is_dir() {
-        return Err(Error::data(scene, "", "there is no such folder; expected the folder of a scene"));
-    }
-    let other = scene.join("transforms.json");
-    for (at, list) in [colmap::list, transforms::list, llff::list, metashape::list].into_iter().enumerate() {
-        if let Some(mut listing) = list(place)? {
-            if at == 0 && other.is_file() {
-                let (used, other) = (listing.source.display(), other.display());
-                listing.notes.push(format!("poses come from {used}; name {other} as the scene to use that instead"));
-            }
-            return Ok(listing);
-        }
-    }
-    let mut problem = "holds no scene: expected a COLMAP model (cameras and images, .bin or .txt, in sparse/0, sparse \
-                       or colmap/sparse/0), transforms.json or transforms_train.json, poses_bounds.npy, or the cameras of \
-                       Metashape as .xml"
-        .to_owned();
-    if let Some((folder, count)) = place.photos.most_photos() {
-        problem += &format!(
-            ". {} holds {count} photos without poses: `tools/photos {} -o SCENE` finds the poses with COLMAP",
-            folder.display(),
-            folder.display()
-        );
-    }
-    Err(Error::data(scene, "", problem))
-}
-
-/// Says of a file that is no list of photos what it is and what to do.
-fn no_scene(content: kind::Content) -> String {
-    let kind::Content { what, .. } = content;
-    if what.starts_with("a video") {
-        return format!("is {what}, not a scene: `tools/photos VIDEO -o SCENE` makes one of it with COLMAP");
-    }
-    format!("is {what}, not a scene; name the folder of a scene, or its transforms.json, poses_bounds.npy or .xml")
 }

@@ -12,6 +12,9 @@ use unicode_normalization::UnicodeNormalization;
 /// Largest depth of folders; it also ends links to a parent.
 const DEPTH_MAX: usize = 8;
 
+/// Most names in a message; `-v` prints all.
+const SHOWN_MAX: usize = 4;
+
 /// Returns the key by which two spellings of one name match: composed, in lower case.
 pub(crate) fn folded(name: &str) -> String {
     name.nfc().collect::<String>().to_lowercase()
@@ -19,8 +22,8 @@ pub(crate) fn folded(name: &str) -> String {
 
 /// Returns the first few names, for messages.
 pub(crate) fn shortened(names: &[impl AsRef<str>]) -> String {
-    let shown = names.iter().take(5).map(AsRef::as_ref).collect::<Vec<&str>>().join(", ");
-    if names.len() > 5 { format!("{shown}, ...") } else { shown }
+    let shown = names.iter().take(SHOWN_MAX).map(AsRef::as_ref).collect::<Vec<&str>>().join(", ");
+    if names.len() > SHOWN_MAX { format!("{shown}, ...") } else { shown }
 }
 
 /// Lists the files below a folder, sorted, by relative path with `/`. Hidden files are left out.

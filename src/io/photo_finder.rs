@@ -7,6 +7,7 @@
 use super::names::folded;
 use crate::error::Setting;
 use crate::io::read;
+use crate::words::counted;
 use std::cell::{OnceCell, RefCell};
 use std::collections::HashMap;
 use std::ffi::OsStr;
@@ -70,6 +71,8 @@ pub(crate) struct PhotoFinder {
     images: Option<PathBuf>,
     folders: RefCell<HashMap<PathBuf, Entries>>,
     bases: OnceCell<Vec<PathBuf>>,
+    /// The folder of photos of a scene of which this is one of the models.
+    above: OnceCell<Option<PathBuf>>,
     /// Number of photos that are not at their listed paths, and the first of them with its file.
     elsewhere: RefCell<Option<(usize, PathBuf, PathBuf)>>,
 }
@@ -82,6 +85,7 @@ impl PhotoFinder {
             images,
             folders: RefCell::default(),
             bases: OnceCell::new(),
+            above: OnceCell::new(),
             elsewhere: RefCell::default(),
         }
     }
@@ -99,7 +103,7 @@ impl PhotoFinder {
             Some(images) => vec![images.to_owned()],
             None => folders.iter().map(|folder| self.root.join(folder)).chain(self.above()).collect(),
         };
-        let paths = shortened(relative, given.is_some());
+        let paths = trimmed(relative, given.is_some());
         let listed = if given.is_some() { paths.as_slice() } else { &paths[..1] };
         let exact = bases.iter().flat_map(|base| listed.iter().map(move |path| base.join(path)));
         if let Some(found) = exact.clone().find_map(|path| with_any(&path)) {
@@ -119,6 +123,10 @@ impl PhotoFinder {
 
     /// The folder of photos of a scene of which this is one of the models, as `sparse/1` is.
     fn above(&self) -> Option<PathBuf> {
+        self.above.get_or_init(|| self.look_above()).clone()
+    }
+
+    fn look_above(&self) -> Option<PathBuf> {
         let root = std::path::absolute(&self.root).ok()?;
         let scene = root
             .ancestors()
@@ -133,7 +141,8 @@ impl PhotoFinder {
         let elsewhere = self.elsewhere.borrow();
         let (count, listed, found) = elsewhere.as_ref()?;
         Some(format!(
-            "{count} photos are not at their listed paths and were found by their names: {} is {}",
+            "{} not at the listed path and found by name: {} is {}",
+            counted(count, "photo"),
             listed.display(),
             found.strip_prefix(&self.root).unwrap_or(found).display()
         ))
@@ -236,7 +245,7 @@ impl PhotoFinder {
 }
 
 /// Returns the path, then without its leading folders of photos; with `any`, then its name alone.
-fn shortened(relative: &Path, any: bool) -> Vec<PathBuf> {
+fn trimmed(relative: &Path, any: bool) -> Vec<PathBuf> {
     let parts: Vec<&OsStr> = relative.iter().filter(|part| *part != "." && *part != "/").collect();
     let leading = parts.iter().take_while(|part| part.to_str().is_some_and(is_folder_of_photos)).count();
     let mut starts = vec![0];
@@ -263,6 +272,7 @@ fn with_any(path: &Path) -> Option<PathBuf> {
     })
 }
 
-fn count_photos(folder: &Path) -> usize {
+/// Returns the number of photos in a folder that can be read.
+pub(crate) fn count_photos(folder: &Path) -> usize {
     read::folder(folder).unwrap_or_default().iter().filter(|path| is_readable(path) && path.is_file()).count()
 }

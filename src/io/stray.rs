@@ -2,7 +2,7 @@
 
 use super::bad_photos::allowed;
 use super::listing::Listed;
-use super::load::shortened;
+use super::names::shortened;
 use crate::scene::Point;
 use crate::scene::spread::Spread;
 

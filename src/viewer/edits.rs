@@ -178,16 +178,28 @@ impl<'a> Work<'a> {
         Ok(text)
     }
 
+    fn is_saved(&self) -> bool {
+        self.written.as_deref() == Some(self.present()) || !self.is_changed()
+    }
+
+    /// Writes changes that are in no file yet, and returns their file; `None` without any.
+    pub(super) fn save(&mut self) -> Result<Option<PathBuf>> {
+        if self.is_saved() {
+            return Ok(None);
+        }
+        self.write()?;
+        Ok(self.written.clone())
+    }
+
     /// Returns the changes for a page.
     pub(super) fn describe(&self) -> Value {
         let settled = self.settled.iter().map(|(command, _)| command);
         let commands: Vec<_> = settled.chain(self.done.iter().map(|done| &done.command)).collect();
-        let is_saved = self.written.as_deref() == Some(self.present()) || !self.is_changed();
         json!({
             "kind": "edits",
             "commands": commands,
             "undo": !self.done.is_empty(),
-            "saved": is_saved,
+            "saved": self.is_saved(),
             "file": self.present().display().to_string(),
         })
     }

@@ -15,7 +15,7 @@ use crate::render::{Parts, RenderOptions, Rendered, render};
 use crate::scene::{Camera, Dataset, Gaussians, Overview};
 use glam::DVec3;
 use serde_json::json;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -38,12 +38,13 @@ pub struct Finished<'a> {
     pub words: &'a dyn Words,
 }
 
-/// Serves a finished model until `goes_on` says no.
+/// Serves a finished model until `goes_on` says no. Changes that are in no file yet are saved then; returns their file. As
+/// long as that fails, it says why and goes on, so that they can be saved from the page.
 ///
 /// # Errors
 ///
 /// A device that fails. What a page asks for wrongly is told to the page.
-pub fn show(viewer: &Viewer, finished: Finished, gpu: Arc<Gpu>, goes_on: &dyn Fn() -> bool) -> Result<()> {
+pub fn show(viewer: &Viewer, finished: Finished, gpu: Arc<Gpu>, goes_on: &dyn Fn() -> bool) -> Result<Option<PathBuf>> {
     let views = Arc::new(Views::new(finished.dataset));
     let sizes = views.list.iter().map(|posed| (posed.view.camera.width, posed.view.camera.height));
     let (hub, is_cpu) = (&*viewer.hub, gpu.is_cpu());
@@ -68,14 +69,26 @@ pub fn show(viewer: &Viewer, finished: Finished, gpu: Arc<Gpu>, goes_on: &dyn Fn
     };
     hub.publish("scene", &scene);
     session.publish();
-    while goes_on() {
+    let mut is_refused = false;
+    loop {
+        if !goes_on() {
+            match session.work.save() {
+                Ok(file) => return Ok(file),
+                Err(error) if !is_refused => {
+                    is_refused = true;
+                    tracing::error!(
+                        "the changes cannot be saved: {error}. The page is still there; a second signal ends it"
+                    );
+                }
+                Err(_) => {}
+            }
+        }
         match hub.next(TURN) {
             Some((id, Task::Look(look))) => session.painter.look(hub, id, &look, &mut session.drawing)?,
             Some((id, Task::Message(message))) => session.hear(id, message)?,
             None => session.score_one()?,
         }
     }
-    Ok(())
 }
 
 /// Returns what a page has to know of the scene.

@@ -5,6 +5,7 @@
 //! name the server as it likes (a tunnel from another port does); any other has to name this server in `Host`. Either
 //! way it may come only from the page of the name that it asks (`Origin`).
 
+use super::{TOKEN_MIN, Token};
 use crate::error::{Error, Result};
 use rand::TryRngCore;
 use rand::rngs::OsRng;
@@ -24,7 +25,7 @@ pub(super) struct Guard {
 
 impl Guard {
     /// Makes the rules of a server at `address`, which the user named `host`.
-    pub(super) fn new(address: SocketAddr, host: &str, has_token: bool) -> Result<Self> {
+    pub(super) fn new(address: SocketAddr, host: &str, token: &Token) -> Result<Self> {
         let port = address.port();
         // Every address of the machine is no address to open; loopback is one of them.
         let mut names = match address.ip() {
@@ -39,7 +40,11 @@ impl Guard {
             Ok(IpAddr::V6(_)) => format!("[{name}]:{port}"),
             _ => format!("{}:{port}", name.to_ascii_lowercase()),
         };
-        let token = if has_token { Some(token()?) } else { None };
+        let token = match token {
+            Token::New => Some(new_token()?),
+            Token::Given(token) => Some(checked(token)?),
+            Token::Off => None,
+        };
         // A browser shares cookies between the ports of a host.
         Ok(Self { hosts: names.iter().map(bracketed).collect(), token, cookie: format!("labelgs-{port}") })
     }
@@ -99,7 +104,18 @@ fn is_equal(a: &[u8], b: &[u8]) -> bool {
     a.len() == b.len() && a.iter().zip(b).fold(0, |different, (a, b)| different | (a ^ b)) == 0
 }
 
-fn token() -> Result<String> {
+/// Returns a token that was given, if it can stand in an address and is hard to guess.
+fn checked(token: &str) -> Result<String> {
+    let is_plain = token.bytes().all(|byte| byte.is_ascii_alphanumeric() || matches!(byte, b'-' | b'_'));
+    if is_plain && token.len() >= TOKEN_MIN {
+        return Ok(token.to_owned());
+    }
+    let problem =
+        format!("expected at least {TOKEN_MIN} letters, digits, - and _, such as what `openssl rand -hex 16` prints");
+    Err(Error::usage("the token of the viewer", problem))
+}
+
+fn new_token() -> Result<String> {
     let mut bytes = [0_u8; TOKEN_BYTES];
     let failed = |error| Error::Bug(format!("the system has no random numbers: {error}"));
     OsRng.try_fill_bytes(&mut bytes).map_err(failed)?;
@@ -111,7 +127,23 @@ mod tests {
     use super::*;
 
     fn guard(has_token: bool) -> Guard {
-        Guard::new("127.0.0.1:4321".parse().expect("an address"), "127.0.0.1", has_token).expect("rules")
+        let token = if has_token { Token::New } else { Token::Off };
+        Guard::new("127.0.0.1:4321".parse().expect("an address"), "127.0.0.1", &token).expect("rules")
+    }
+
+    #[test]
+    fn a_given_token_is_long_and_plain() {
+        let with = |token: &str| {
+            Guard::new("127.0.0.1:80".parse().expect("an address"), "127.0.0.1", &Token::Given(token.to_owned()))
+        };
+        let guard = with("0123456789-abc_DEF").expect("rules");
+        assert!(
+            guard.address().ends_with("?token=0123456789-abc_DEF") && guard.knows_token(Some("0123456789-abc_DEF"))
+        );
+        for token in ["", "0123456789abcde", "0123456789abcdef&x", "0123456789abcdef\r\nX: y"] {
+            let error = with(token).expect_err("refused").to_string();
+            assert!(error.contains("at least 16"), "{error}");
+        }
     }
 
     #[test]
@@ -124,7 +156,7 @@ mod tests {
             assert!(!guard.knows_host(Some(host)), "{host}");
         }
         assert!(!guard.knows_host(None));
-        let six = Guard::new("[::1]:80".parse().expect("an address"), "::1", false).expect("rules");
+        let six = Guard::new("[::1]:80".parse().expect("an address"), "::1", &Token::Off).expect("rules");
         assert!(six.knows_host(Some("[::1]:80")) && six.address() == "http://[::1]:80/");
     }
 
@@ -155,7 +187,7 @@ mod tests {
         for (address, host, printed) in
             [("0.0.0.0:80", "0.0.0.0", "http://127.0.0.1:80/?token="), ("[::]:80", "::", "http://[::1]:80/?token=")]
         {
-            let guard = Guard::new(address.parse().expect("an address"), host, true).expect("rules");
+            let guard = Guard::new(address.parse().expect("an address"), host, &Token::New).expect("rules");
             assert!(guard.address().starts_with(printed), "{}", guard.address());
         }
     }

@@ -44,11 +44,26 @@ pub struct ViewerOptions {
     pub host: String,
     /// Port; 0 takes a free one.
     pub port: u16,
-    /// A token is needed, which the printed address has.
-    pub has_token: bool,
+    /// What a page has to know.
+    pub token: Token,
     /// Share of the time of a training that viewing may take, 0 to 1.
     pub share: f32,
 }
+
+/// The token of the printed address, without which nobody sees anything.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Token {
+    /// A new one.
+    New,
+    /// This one, so that a page comes back when its server does: letters, digits, `-` and `_`, at least
+    /// [`TOKEN_MIN`] of them.
+    Given(String),
+    /// None is needed; only on loopback.
+    Off,
+}
+
+/// Fewest characters of a token that is given.
+pub const TOKEN_MIN: usize = 16;
 
 /// The commands of the program, for the page to show.
 pub trait Words: Sync {
@@ -70,10 +85,10 @@ impl Viewer {
     ///
     /// # Errors
     ///
-    /// A host that cannot be listened on; no token on a host that is not loopback.
+    /// A host that cannot be listened on; no token on a host that is not loopback; a token that is too short.
     pub fn start(options: &ViewerOptions) -> Result<Self> {
         let hub = Arc::new(Hub::default());
-        let guard = server::start(&options.host, options.port, options.has_token, &hub)?;
+        let guard = server::start(&options.host, options.port, &options.token, &hub)?;
         Ok(Self { hub, guard, options: options.clone() })
     }
 

@@ -3,7 +3,7 @@
 use super::guard::Guard;
 use super::http::{self, Head, NoHead, WRITE_TIME, answer, say};
 use super::hub::Hub;
-use super::{page, socket};
+use super::{Token, page, socket};
 use crate::error::{Error, Result, Setting};
 use std::io::{ErrorKind, Write};
 use std::net::{TcpListener, TcpStream, ToSocketAddrs};
@@ -14,13 +14,13 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 const CONNECTIONS_MAX: usize = 64;
 
 /// Opens the port and starts to serve. Returns the rules, which know the address.
-pub(super) fn start(host: &str, port: u16, has_token: bool, hub: &Arc<Hub>) -> Result<Guard> {
+pub(super) fn start(host: &str, port: u16, token: &Token, hub: &Arc<Hub>) -> Result<Guard> {
     let failed = |error: &dyn std::fmt::Display| {
         Error::usage(Setting("view_host"), format!("cannot listen on {host}, port {port}: {error}; choose another one"))
     };
     let address = (host, port).to_socket_addrs().map_err(|error| failed(&error))?.next();
     let address = address.ok_or_else(|| failed(&"the name has no address"))?;
-    if !has_token && !address.ip().is_loopback() {
+    if *token == Token::Off && !address.ip().is_loopback() {
         let problem = format!("without it anyone who reaches {host} could watch and change the model; leave it on");
         return Err(Error::usage(Setting("view_no_token"), problem));
     }
@@ -32,7 +32,7 @@ pub(super) fn start(host: &str, port: u16, has_token: bool, hub: &Arc<Hub>) -> R
         _ => failed(&error),
     })?;
     let address = listener.local_addr().map_err(|error| failed(&error))?;
-    let guard = Guard::new(address, host, has_token)?;
+    let guard = Guard::new(address, host, token)?;
     let (rules, hub) = (guard.clone(), Arc::clone(hub));
     let spawned = std::thread::Builder::new().name("viewer".into()).spawn(move || accept(&listener, &rules, &hub));
     spawned.map_err(|error| Error::Bug(format!("no thread for the viewer: {error}")))?;

@@ -387,7 +387,10 @@ fn a_second_kind_of_scene_is_named() {
     let json = r#"{"fl_x": 10, "frames": [{"file_path": "images/00.png", "transform_matrix": [[1,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]]}]}"#;
     scene.write("transforms.json", json);
     let notes = open(&scene).expect("a scene").notes;
-    assert!(notes.iter().any(|note| note.contains("images.bin") && note.contains("transforms.json")), "{notes:?}");
+    assert!(
+        notes.iter().any(|note| note.contains("2 photos come") && note.contains("transforms.json with 1 photo")),
+        "{notes:?}"
+    );
     fs::remove_dir_all(scene.path().join("images")).expect("removed");
     assert!(refusal(open(&scene)).contains("or name"));
 }

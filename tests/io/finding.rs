@@ -42,7 +42,7 @@ fn photos_are_found_where_programs_put_them() {
         assert!(dataset.train.iter().all(|view| view.photo.is_some()));
     }
     let dataset = open(&moved(&["a.png", "b.png"], &["input/a.png", "input/b.png"])).expect("a scene");
-    let notes: Vec<_> = dataset.notes.iter().filter(|note| note.contains("found by their names")).collect();
+    let notes: Vec<_> = dataset.notes.iter().filter(|note| note.contains("found by name")).collect();
     assert!(notes.len() == 1 && notes[0].contains("a.png is input/a.png"), "{notes:?}");
 }
 

@@ -232,8 +232,9 @@ fn keys_of_other_programs_are_used_or_named() {
     let mitsuba = camera(open(r#""fl_x": 10, "from_mitsuba": true,"#, &a("")));
     assert!(mitsuba.to_camera(DVec3::new(1.0, 2.0, 3.0)).distance(DVec3::new(-1.0, -2.0, 3.0)) < 1e-12);
     // OpenCV's full model, by its name or by coefficients that only it has.
-    let wide =
-        |more: &str| open(&format!(r#""fl_x": 10, "k1": 0.2, {more}"#), &a("")).train[0].photo().expect("one").rgba.clone();
+    let wide = |more: &str| {
+        open(&format!(r#""fl_x": 10, "k1": 0.2, {more}"#), &a("")).train[0].photo().expect("one").rgba.clone()
+    };
     let full = wide(r#""camera_model": "FULL_OPENCV", "k4": 0.5, "k6": 0.1,"#);
     assert!(full == wide(r#""k4": 0.5, "k6": 0.1,"#) && full != wide(r#""k4": 0.5,"#));
     assert_eq!(open(r#""latlong": true,"#, &a("")).train.len(), 6);

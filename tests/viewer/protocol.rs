@@ -342,6 +342,53 @@ fn edits_are_the_commands_that_are_shown() {
     }
 }
 
+/// What was not saved is in a file after Ctrl-C, which the program names; a second start has the same token if it is given.
+#[test]
+fn an_interrupted_viewer_loses_no_change() {
+    if device().is_none() {
+        return;
+    }
+    let place = Place::new();
+    let view = || {
+        let mut command = place.command(&["view", "model.ply"]);
+        command.env("LABELGS_VIEW_TOKEN", "a-token_of-22-letters");
+        Server::start(command)
+    };
+    let server = view();
+    assert!(server.address.ends_with("/?token=a-token_of-22-letters"), "{}", server.address);
+    let mut page = server.page();
+    page.hear("labels");
+    page.edit(&json!({ "edit": "rename", "label": 1, "name": "mug" }));
+    page.until("edits", |edits| edits["undo"] == true);
+    let (status, said) = server.interrupt();
+    assert_eq!(status, Some(130), "{said}");
+    let line = said.lines().find(|line| line.contains("unsaved changes are in")).expect("a line");
+    assert!(line.contains("model-edits/001.ply") && line.contains("labelgs view model-edits/001.ply"), "{line}");
+    let table = std::fs::read_to_string(place.path("model-edits/001.labels.json")).expect("a table");
+    assert!(table.contains("mug"), "{table}");
+    // Nothing to save: nothing is said, and nothing is written.
+    let server = view();
+    server.page().hear("labels");
+    let (status, said) = server.interrupt();
+    assert!(status == Some(130) && !said.contains("unsaved"), "{said}");
+    assert!(!place.path("model-edits/002.ply").exists());
+    // Changes that cannot be saved keep the server up, until they can.
+    let mut server = view();
+    let mut page = server.page();
+    page.hear("labels");
+    page.edit(&json!({ "edit": "rename", "label": 1, "name": "mug" }));
+    page.until("edits", |edits| edits["undo"] == true);
+    std::fs::rename(place.path("model-edits"), place.path("kept")).expect("moved");
+    std::fs::write(place.path("model-edits"), "no folder").expect("written");
+    server.signal();
+    std::thread::sleep(std::time::Duration::from_secs(1));
+    assert!(server.child.try_wait().expect("a status").is_none(), "it waits for the change to be saved");
+    std::fs::remove_file(place.path("model-edits")).expect("removed");
+    let (status, said) = server.ended();
+    assert!(status == Some(130) && said.contains("cannot be saved"), "{said}");
+    assert!(place.path("model-edits/002.ply").is_file(), "{said}");
+}
+
 /// Takes what the viewer wrote away, runs the commands that it showed, and compares the bytes.
 fn same_by_commands(place: &Place, commands: &[&str], stem: &str) {
     let read = |ending: &str| std::fs::read(place.path(&format!("{stem}.{ending}"))).expect("a file");

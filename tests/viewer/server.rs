@@ -7,6 +7,7 @@ use std::io::{BufRead, BufReader, Read, Write};
 use std::net::TcpStream;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
+use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 use tungstenite::{Message, WebSocket};
 
@@ -111,6 +112,8 @@ pub fn decode(bytes: &[u8]) -> Picture {
 pub struct Server {
     pub child: Child,
     pub address: String,
+    /// What it says on standard error until it ends.
+    said: Option<JoinHandle<String>>,
 }
 
 impl Drop for Server {
@@ -133,8 +136,27 @@ impl Server {
             child.stderr.take().expect("a pipe").read_to_string(&mut said).expect("text");
             panic!("the viewer did not start: {said}");
         }
-        drain(&mut child);
-        Self { child, address }
+        let said = drain(&mut child);
+        Self { child, address, said }
+    }
+
+    /// Does what Ctrl-C does.
+    pub fn signal(&self) {
+        let sent = Command::new("kill").args(["-INT", &self.child.id().to_string()]).status();
+        assert!(sent.is_ok_and(|status| status.success()));
+    }
+
+    /// Waits for its end. Returns its status and what it said on standard error.
+    pub fn ended(mut self) -> (Option<i32>, String) {
+        let status = self.child.wait().expect("it ends");
+        let said = self.said.take().map(|said| said.join().expect("it is read")).unwrap_or_default();
+        (status.code(), said)
+    }
+
+    /// Ends it as Ctrl-C does.
+    pub fn interrupt(self) -> (Option<i32>, String) {
+        self.signal();
+        self.ended()
     }
 
     /// Starts a training with a viewer, whose address is on standard error.
@@ -142,7 +164,7 @@ impl Server {
         command.stdout(Stdio::null()).stderr(Stdio::piped());
         let mut child = command.spawn().expect("it starts");
         let address = address_of(&mut child, "http://");
-        Self { child, address }
+        Self { child, address, said: None }
     }
 
     /// Name and port, as in `Host`.
@@ -207,11 +229,14 @@ impl Server {
     }
 }
 
-/// Reads and forgets what a process says, so that it never waits.
-fn drain(child: &mut Child) {
-    if let Some(mut pipe) = child.stderr.take() {
-        std::thread::spawn(move || std::io::copy(&mut pipe, &mut std::io::sink()));
-    }
+/// Reads what a process says, so that it never waits.
+fn drain(child: &mut Child) -> Option<JoinHandle<String>> {
+    let mut pipe = child.stderr.take()?;
+    Some(std::thread::spawn(move || {
+        let mut said = Vec::new();
+        let _ = pipe.read_to_end(&mut said);
+        String::from_utf8_lossy(&said).into_owned()
+    }))
 }
 
 /// A frame as a page gets it.

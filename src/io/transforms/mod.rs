@@ -43,6 +43,12 @@ pub(crate) fn list(scene: &Place) -> Result<Option<Listing>> {
     Ok(Some(listing))
 }
 
+/// Returns the number of photos that a file lists; `None` if it cannot be read.
+pub(crate) fn count(path: &Path) -> Option<usize> {
+    let transforms = file::read(path).ok()?;
+    Some(transforms.frames.len() + transforms.test_frames.map_or(0, |frames| frames.len()))
+}
+
 pub(crate) fn list_file(scene: &Place, path: &Path) -> Result<Listing> {
     let mut listing = Listing::new(path, Native::TRANSFORMS);
     read(scene, path, None, &mut listing)?;

@@ -72,7 +72,7 @@ function connection(state) {
   $("state-link").textContent = words[state];
   $("state-link").className = state === "on" ? "dot on" : "dot off";
   if (state === "on") return stage.change();
-  if (state === "off") return veil("The server is gone", "The program has ended or is not reachable. This page comes back when it does.");
+  if (state === "off") return veil("The server is gone", "The program has ended or is not reachable. Changes that were not saved are saved when it is ended by Ctrl-C; it prints their file. Started again with the same --view-port and token (LABELGS_VIEW_TOKEN), it has this page back; otherwise open the address that it prints.");
   if (state === "token") return veil("The server is another one", "It was started anew and asks for its own token. Open the address that labelgs printed last.");
   return undefined;
 }
