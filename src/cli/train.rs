@@ -8,6 +8,7 @@ use super::train_args::TrainArgs;
 use super::view::Typed;
 use super::{interrupt, stdout};
 use crate::Result;
+use crate::report::text::duration;
 use crate::run::{self, Event, Flow, Live, Observer, Request, Settings, Summary};
 use crate::viewer::Watched;
 use crate::words::counted;
@@ -85,10 +86,11 @@ impl Observer for Terminal<'_> {
 fn sentence(summary: &Summary) -> String {
     let Summary { model, gaussians, steps, seconds, .. } = summary;
     let mut text = format!(
-        "{}: {} after {} in {seconds:.1} s",
+        "{}: {} after {} in {}",
         model.display(),
         counted(gaussians, "Gaussian"),
-        counted(steps, "step")
+        counted(steps, "step"),
+        duration(*seconds)
     );
     if let Some(mean) = summary.scores.as_ref().map(|scores| &scores.mean) {
         text += &format!(

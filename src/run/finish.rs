@@ -14,7 +14,6 @@ use crate::scene::{Camera, Gaussians, View};
 use crate::stage::Stage;
 use crate::train::Occlusion;
 use std::path::PathBuf;
-use std::time::Duration;
 
 impl Run<'_> {
     /// Writes the settings, the names of the labels and the cameras.
@@ -46,11 +45,11 @@ impl Run<'_> {
     }
 
     /// Returns the result of the training, without scores.
-    pub(super) fn summary(&self, model: PathBuf, spent: Duration) -> Summary {
+    pub(super) fn summary(&self, model: PathBuf) -> Summary {
         let last = self.trainer.newest_report();
         Summary {
             steps: self.trainer.steps_done(),
-            seconds: spent.as_secs_f64(),
+            seconds: self.history.seconds(),
             gaussians: self.trainer.gaussian_count(),
             loss: last.map(|report| report.loss),
             label_loss: last.map(|report| report.label_loss),
@@ -106,7 +105,7 @@ impl Run<'_> {
         if !self.stopped {
             self.time_passes(model);
         }
-        info::end(&mut self.info, self.stopped, &self.history);
+        info::end(&mut self.info, summary);
         self.write_info()?;
         let out = &self.request.output;
         let path = report::write(std::slice::from_ref(out), &out.join(report::FILE))?;

@@ -1,8 +1,8 @@
 //! `run.json`: what was run, on what, and what it said. The report is made from it.
 
-use super::history::{Entry, Recorder};
+use super::history::Entry;
 use super::passes::Pass;
-use super::{Request, Run};
+use super::{Request, Run, Summary};
 use crate::engine::Engine;
 use crate::error::Result;
 use crate::gpu::Gpu;
@@ -189,8 +189,8 @@ impl Run<'_> {
 }
 
 /// Ends the record of a run.
-pub(super) fn end(info: &mut Info, stopped: bool, history: &Recorder) {
-    info.ended = Some(Ended { stopped, seconds: history.seconds() });
+pub(super) fn end(info: &mut Info, &Summary { stopped, seconds, .. }: &Summary) {
+    info.ended = Some(Ended { stopped, seconds });
 }
 
 /// Returns the most memory that this process had, where Linux tells.

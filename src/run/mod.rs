@@ -47,7 +47,6 @@ use models::Models;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 use std::sync::Arc;
-use std::time::Instant;
 
 /// Makes the settings of a resumed run from those of its checkpoint. The argument is `None` if there is no checkpoint.
 pub type Changed<'a> = dyn Fn(Option<&Settings>) -> Result<Settings> + 'a;
@@ -151,14 +150,13 @@ fn train_once(request: &Request, is_again: bool, open: &Open, observer: &mut dyn
     run.write_records()?;
     run.write_info()?;
     run.tell(Event::Started { after: run.trainer.steps_done(), steps: run.settings.train.iterations })?;
-    let start = Instant::now();
     run.history.start();
     recovery::over_numeric_failures(&mut run).map_err(|error| run.keep_model(error))?;
     run.hold_records()?;
     // Save the model in either case.
     let kept = run.keep_if_stopped();
     let (path, model) = run.save_labelled()?;
-    let mut summary = run.summary(path, start.elapsed());
+    let mut summary = run.summary(path);
     run.finish(&mut summary, &model, kept)?;
     Ok(summary)
 }

@@ -15,7 +15,7 @@ pub(crate) const FILE: &str = "metrics.json";
 pub struct Summary {
     /// Number of finished steps.
     pub steps: u32,
-    /// Time of the training without reading and scoring, s.
+    /// Time of the training without reading and scoring, with earlier parts of an interrupted run, s.
     pub seconds: f64,
     /// Number of Gaussians in the model.
     pub gaussians: u32,

@@ -29,7 +29,7 @@ pub(super) fn numbers(runs: &[Ran]) -> Markup {
         row(runs, "PSNR", |run| run.test()?.psnr.map(|value| number(Some(value), 2) + " dB")),
         row(runs, "SSIM", |run| run.test()?.ssim.map(|value| number(Some(value), 4))),
         row(runs, "IoU of labels", |run| run.test()?.iou_map.map(|value| number(Some(value), 4))),
-        row(runs, "IoU of objects", |run| run.test()?.iou_object.map(|value| number(Some(value), 4))),
+        row(runs, "IoU of objects, visible parts", |run| run.test()?.iou_object.map(|value| number(Some(value), 4))),
         row(runs, "Gaussians", |run| run.gaussians().map(count)),
         row(runs, "Time", |run| run.seconds().map(duration)),
         row(runs, "Device memory", |run| run.info.memory.device_peak.map(bytes)),
