@@ -10,6 +10,7 @@ use super::photo_finder::count_photos;
 use super::split::Split;
 use super::{llff, metashape, transforms};
 use crate::error::{Error, Result, Setting};
+use crate::scene::Flaw;
 use crate::words::counted;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -73,7 +74,8 @@ fn list_folder(place: &Place, scene: &Path) -> Result<Listing> {
             Ok(Some(mut listing)) => {
                 name_others(scene, at, &mut listing);
                 if at == 0 {
-                    listing.notes.extend(without_pose(&listing));
+                    let unposed = without_pose(&listing).map(Flaw::Unposed);
+                    listing.flaws.extend(unposed);
                 }
                 return Ok(listing);
             }

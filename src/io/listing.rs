@@ -4,7 +4,7 @@ use super::lens::Lens;
 use super::photo_finder::EXTENSIONS;
 use super::pose_convention::Native;
 use crate::error::{Error, Result};
-use crate::scene::{Camera, Point};
+use crate::scene::{Camera, Flaw, Point};
 use glam::{DMat3, DQuat, DVec3};
 use std::path::{Path, PathBuf};
 
@@ -46,6 +46,8 @@ pub(crate) struct Listing {
     pub(crate) bad: Vec<Error>,
     pub(crate) points: Vec<Point>,
     pub(crate) notes: Vec<String>,
+    /// What is wrong with the list. Notes do not say it.
+    pub(crate) flaws: Vec<Flaw>,
     /// Where photos were looked for, if some were not found.
     pub(crate) hint: String,
 }
@@ -61,6 +63,7 @@ impl Listing {
             bad: Vec::new(),
             points: Vec::new(),
             notes: Vec::new(),
+            flaws: Vec::new(),
             hint: String::new(),
         }
     }

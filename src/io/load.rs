@@ -59,8 +59,8 @@ pub(crate) fn load(root: &Path, mut listing: Listing, options: &LoadOptions) -> 
         notes.push("photos and masks were undistorted to a pinhole camera; pixels without a source are ignored".into());
     }
     let is_wide = note_wide(&loaded, &mut notes);
-    notes.extend(faults.iter().cloned());
-    let flaws = faults.into_iter().map(Flaw::LeftOut).collect();
+    let flaws: Vec<Flaw> = listing.flaws.into_iter().chain(faults.into_iter().map(Flaw::LeftOut)).collect();
+    notes.extend(flaws.iter().map(|flaw| flaw.text().to_owned()));
     let mut dataset = Dataset {
         root: root.to_owned(),
         source: listing.source,

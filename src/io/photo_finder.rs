@@ -92,7 +92,8 @@ impl PhotoFinder {
 
     /// Returns the folder of photos: the one that the user named, or this one of the scene.
     pub(crate) fn folder(&self, usual: &str) -> PathBuf {
-        self.images.clone().unwrap_or_else(|| self.root.join(usual))
+        let below = || if usual == "." { self.root.clone() } else { self.root.join(usual) };
+        self.images.clone().unwrap_or_else(below)
     }
 
     /// Finds the photo listed as `relative`: at this path below one of `folders` of the scene, also with an extension
@@ -101,7 +102,7 @@ impl PhotoFinder {
         let given = self.images.as_deref();
         let bases: Vec<PathBuf> = match given {
             Some(images) => vec![images.to_owned()],
-            None => folders.iter().map(|folder| self.root.join(folder)).chain(self.above()).collect(),
+            None => folders.iter().map(|folder| self.folder(folder)).chain(self.above()).collect(),
         };
         let paths = trimmed(relative, given.is_some());
         let listed = if given.is_some() { paths.as_slice() } else { &paths[..1] };

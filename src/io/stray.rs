@@ -32,7 +32,7 @@ pub(super) fn remove(views: &mut Vec<Listed>, points: &[Point], max_share: f32, 
     }
     tracing::debug!("photos with stray poses: {}", stray.join(", "));
     faults.push(format!(
-        "{} of {} photos are left out, because their poses are more than {limit:.3} units away from the others, most of \
+        "{} of {} photos left out, because their poses are more than {limit:.3} units away from the others, most of \
          which lie within {:.3}: {}",
         stray.len(),
         views.len(),

@@ -119,6 +119,8 @@ pub struct Point {
 pub enum Flaw {
     /// Photos were left out: missing, damaged, or with a stray pose.
     LeftOut(String),
+    /// Many photos beside those of the scene have no pose.
+    Unposed(String),
     /// Poses and points are not in one frame.
     Frame(String),
 }
@@ -126,7 +128,7 @@ pub enum Flaw {
 impl Flaw {
     /// Returns it in words.
     pub fn text(&self) -> &str {
-        let (Self::LeftOut(text) | Self::Frame(text)) = self;
+        let (Self::LeftOut(text) | Self::Unposed(text) | Self::Frame(text)) = self;
         text
     }
 }

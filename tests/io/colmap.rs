@@ -375,8 +375,11 @@ fn another_model_is_named_with_its_photos_and_can_be_the_scene() {
     let scene = simple(5);
     scene.colmap_bin("sparse/0", &[pinhole()], &["00.png"]);
     scene.colmap_bin("sparse/1", &[pinhole()], &["01.png", "02.png", "03.png", "04.png"]);
-    let notes = open(&scene).expect("a scene").notes;
-    assert!(notes.iter().any(|note| note.contains("with 1 photos") && note.contains("has 4")), "{notes:?}");
+    let dataset = open(&scene).expect("a scene");
+    assert_eq!(dataset.flaws.len(), 2, "{:?}", dataset.flaws);
+    let notes = dataset.notes;
+    assert!(notes.iter().any(|note| note.contains("4 of 5 photos") && note.contains("have no pose")), "{notes:?}");
+    assert!(notes.iter().any(|note| note.contains("with 1 photo;") && note.contains("has 4")), "{notes:?}");
     let other = io::open(&scene.path().join("sparse/1"), &LoadOptions::default()).expect("a scene");
     assert_eq!(other.all().len(), 4);
 }

@@ -10,6 +10,8 @@ use std::collections::BTreeMap;
 pub enum Fault {
     /// Photos that the scene lists were left out.
     LeftOut,
+    /// Photos of the capture have no pose.
+    Unposed,
     /// Poses and points are not in one frame.
     Frame,
     /// Most points that the photo is said to show lie behind its camera.
@@ -33,6 +35,7 @@ impl Fault {
     pub fn text(self) -> &'static str {
         match self {
             Self::LeftOut => "left out",
+            Self::Unposed => "unposed",
             Self::Frame => "frame",
             Self::Behind => "behind",
             Self::Reprojection => "reprojection",
@@ -48,6 +51,7 @@ impl Fault {
     pub fn cure(self) -> &'static str {
         match self {
             Self::LeftOut => "bring them back or mend them, or take them off the list",
+            Self::Unposed => "find the poses of all photos in one model, with more overlap, or take the larger model",
             Self::Frame => "say what the poses mean, or export poses and points in the convention of their format",
             Self::Behind | Self::Reprojection => "leave the photo out, or adjust the reconstruction again",
             Self::Blur => "leave the photo out",
@@ -99,6 +103,7 @@ impl Finding {
 pub(super) fn of_flaw(flaw: &Flaw) -> Finding {
     let fault = match flaw {
         Flaw::LeftOut(_) => Fault::LeftOut,
+        Flaw::Unposed(_) => Fault::Unposed,
         Flaw::Frame(_) => Fault::Frame,
     };
     Finding::new(fault, None, flaw.text().to_owned())

@@ -15,7 +15,7 @@ use super::ply;
 use super::pose_convention::Native;
 use crate::error::{Error, Result};
 use crate::io::read;
-use crate::scene::{Camera, Point};
+use crate::scene::{Camera, Flaw, Point};
 use crate::words::counted;
 use glam::{DMat3, DQuat, DVec2, DVec3};
 use model::{CameraRecord, ImageRecord};
@@ -106,9 +106,13 @@ pub(crate) fn list(scene: &Place) -> Result<Option<Listing>> {
         None => points_of_ply(&files.folder, &mut notes)?,
     };
     let points = finite(points, &mut notes);
-    notes.extend(neighbours(&files.folder, views.len() + bad.len()));
+    let mut flaws = Vec::new();
+    match neighbours(&files.folder, views.len() + bad.len()) {
+        Some((is_larger, text)) if is_larger => flaws.push(Flaw::Unposed(text)),
+        other => notes.extend(other.map(|(_, text)| text)),
+    }
     let views = views.into_iter().map(|(listed, _)| listed).collect();
-    Ok(Some(Listing { views, points, notes, bad, ..Listing::new(&files.needed("images")?.0, Native::COLMAP) }))
+    Ok(Some(Listing { views, points, notes, flaws, bad, ..Listing::new(&files.needed("images")?.0, Native::COLMAP) }))
 }
 
 /// Reads the points that a trainer wrote beside the model, where the model has none.
@@ -121,8 +125,8 @@ fn points_of_ply(folder: &Path, notes: &mut Vec<String>) -> Result<Vec<Point>> {
     ply::read_points(&path)
 }
 
-/// Says what other models lie beside that in `sparse/0`, which has `count` photos.
-fn neighbours(folder: &Path, count: usize) -> Option<String> {
+/// Says what other models lie beside that in `sparse/0`, which has `count` photos, and whether one of them is larger.
+fn neighbours(folder: &Path, count: usize) -> Option<(bool, String)> {
     let siblings = folder.parent().filter(|_| folder.ends_with("sparse/0")).map(read::folder);
     let others = siblings.and_then(Result::ok).unwrap_or_default().into_iter().filter(|other| other != folder);
     let others = others.filter(|other| other.is_dir()).filter_map(|folder| {
@@ -133,11 +137,13 @@ fn neighbours(folder: &Path, count: usize) -> Option<String> {
         Some((folder, images.ok()?))
     });
     let (largest, images) = others.max_by_key(|(folder, images)| (*images, Reverse(folder.clone())))?;
-    Some(format!(
-        "only the model {} is used, with {count} photos; {} has {images}: name that folder as the scene to use it",
+    let text = format!(
+        "only the model {} is used, with {}; {} has {images}: name that folder as the scene to use it",
         folder.display(),
+        counted(count, "photo"),
         largest.display()
-    ))
+    );
+    Some((images > count as u64, text))
 }
 
 /// A point in a photo, and the same point in the world.
