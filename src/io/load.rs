@@ -10,6 +10,7 @@ use super::recipe::{MadeView, MadeViews, Recipe};
 use super::{LoadOptions, frame_check, mask_notes, masks, missing, stray};
 use crate::error::{Error, Result, Setting};
 use crate::scene::{Dataset, Flaw, Photo, View, crew};
+use crate::words::counted;
 use rayon::prelude::*;
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -53,39 +54,42 @@ pub(crate) fn load(root: &Path, mut listing: Listing, options: &LoadOptions) -> 
     }
     note_blank(root, &blank, loaded.iter().all(|(views, _)| views.is_empty()), &mut notes)?;
     if resampled > 0 {
-        notes.push(format!("{resampled} masks differ in size from their photos and were scaled (nearest id)"));
+        let masks = counted(resampled, "mask");
+        notes.push(format!("{masks} of another size than their photos were scaled (nearest id)"));
     }
     if options.undistort && views.iter().any(|view| !view.lens.is_pinhole()) {
         notes.push("photos and masks were undistorted to a pinhole camera; pixels without a source are ignored".into());
     }
     let is_wide = note_wide(&loaded, &mut notes);
-    let flaws: Vec<Flaw> = listing.flaws.into_iter().chain(faults.into_iter().map(Flaw::LeftOut)).collect();
+    let flaws: Vec<Flaw> =
+        std::mem::take(&mut listing.flaws).into_iter().chain(faults.into_iter().map(Flaw::LeftOut)).collect();
     notes.extend(flaws.iter().map(|flaw| flaw.text().to_owned()));
-    let mut dataset = Dataset {
-        root: root.to_owned(),
-        source: listing.source,
-        points: listing.points,
-        notes,
-        flaws,
-        ..Dataset::default()
-    };
-    for (views, test) in loaded {
-        if test { dataset.test.extend(views) } else { dataset.train.extend(views) }
-    }
-    for views in [&mut dataset.train, &mut dataset.test] {
-        views.retain(|view| options.only.as_ref().is_none_or(|only| only.contains(&view.name)));
-        // Faces of a photo are not in the order of their names.
-        views.sort_by(|a, b| a.name.cmp(&b.name));
-    }
+    let (train, test) = divided(loaded, options.only.as_deref());
+    let Listing { source, native, points, .. } = listing;
+    let mut dataset = Dataset { root: root.to_owned(), source, train, test, points, notes, flaws };
     // Some of the views say nothing about all masks.
     if let (Some(masks), None) = (&masks, &options.only) {
         dataset.notes.extend(mask_notes::notes(masks, &dataset));
     }
     require_unique(root, &dataset)?;
     // Faces of wide photos are turned against them.
-    let native = Some(listing.native).filter(|_| !is_wide && options.lookup.poses.is_native());
+    let native = Some(native).filter(|_| !is_wide && options.lookup.poses.is_native());
     frame_check::check(&mut dataset, native, options.lookup.poses)?;
     Ok(dataset)
+}
+
+/// Divides the views into those to train on and those held out, each sorted by name.
+fn divided(loaded: Vec<(Vec<View>, bool)>, only: Option<&BTreeSet<String>>) -> (Vec<View>, Vec<View>) {
+    let (mut train, mut test) = (Vec::new(), Vec::new());
+    for (views, is_test) in loaded {
+        if is_test { test.extend(views) } else { train.extend(views) }
+    }
+    for views in [&mut train, &mut test] {
+        views.retain(|view| only.is_none_or(|only| only.contains(&view.name)));
+        // Faces of a photo are not in the order of their names.
+        views.sort_by(|a, b| a.name.cmp(&b.name));
+    }
+    (train, test)
 }
 
 /// Notes the photos of which there are several views; returns whether there are any.

@@ -59,63 +59,84 @@ pub(crate) fn list_file(scene: &Place, path: &Path) -> Result<Listing> {
         listing.notes.push(format!("only the first chunk of {} is used", path.display()));
     }
     let chunk = Chunk::new(&file, chunk)?;
-    let (mut total, mut disabled, mut lost, mut slaves) = (0, 0, 0, 0);
-    let (mut names, mut refused) = (BTreeSet::new(), Vec::new());
+    let mut reader = Reader { scene, chunk: &chunk, listing, names: BTreeSet::new(), counts: Counts::default() };
     for camera in chunk.node.descendants().filter(|node| node.has_tag_name("camera") && node.has_attribute("label")) {
+        reader.read(camera)?;
+    }
+    let Reader { mut listing, counts, .. } = reader;
+    // What is wrong with all is wrong with the file.
+    if listing.views.is_empty() && !listing.bad.is_empty() {
+        return Err(listing.bad.swap_remove(0));
+    }
+    let told = [
+        (counts.disabled, "disabled in Metashape and left out"),
+        (counts.lost, "without a pose and left out: not aligned, or exported without it"),
+        (
+            counts.slaves,
+            "posed as slaves of a rig: by the master's pose, then rotation and location of the sensor. If they are \
+             displaced, export the cameras without the rig",
+        ),
+    ];
+    let told = told.into_iter().filter(|(count, _)| *count > 0);
+    listing
+        .notes
+        .extend(told.map(|(count, what)| format!("{} of {} {what}", counted(count, "camera"), path.display())));
+    Ok(listing)
+}
+
+/// Numbers of cameras for notes.
+#[derive(Default)]
+struct Counts {
+    disabled: usize,
+    /// Without a pose.
+    lost: usize,
+    /// Posed by the master of their rig.
+    slaves: usize,
+}
+
+/// The cameras of a chunk while they are read.
+struct Reader<'a> {
+    scene: &'a Place<'a>,
+    chunk: &'a Chunk<'a>,
+    listing: Listing,
+    names: BTreeSet<String>,
+    counts: Counts,
+}
+
+impl<'a> Reader<'a> {
+    /// Adds a camera to the listing. One that cannot be used is a photo less.
+    fn read(&mut self, camera: Node<'a, 'a>) -> Result<()> {
         if matches!(camera.attribute("enabled"), Some("0" | "false")) {
-            disabled += 1;
-            continue;
+            self.counts.disabled += 1;
+            return Ok(());
         }
+        let file = self.chunk.file;
         let label = camera.attribute("label").unwrap_or_default();
         let place = format!("{}, camera `{label}`", file.line(camera));
-        let refuse = |problem: &str| Error::data(path, place.as_str(), problem);
-        let pose = match chunk.pose(camera, &refuse) {
-            Ok(Some(pose)) => Ok(pose),
+        let refuse = |problem: &str| Error::data(file.path, place.as_str(), problem);
+        let posed = self.chunk.pose(camera, &refuse);
+        let posed = posed.and_then(|pose| pose.map(|pose| self.chunk.view(camera, pose, &refuse)).transpose());
+        let (own, lens, is_slave) = match posed {
+            Ok(Some(view)) => view,
             Ok(None) => {
-                lost += 1;
-                continue;
-            }
-            Err(error) => Err(error),
-        };
-        total += 1;
-        let view = pose.and_then(|pose| Ok((pose.is_slave, chunk.view(camera, &pose, &refuse)?)));
-        let (own, lens) = match view {
-            Ok((is_slave, view)) => {
-                slaves += usize::from(is_slave);
-                view
+                self.counts.lost += 1;
+                return Ok(());
             }
             Err(error) => {
-                refused.push(error);
-                continue;
+                self.listing.bad.push(error);
+                return Ok(());
             }
         };
-        let resolved = scene.resolve(path, label)?;
-        let photo = scene.photos.find(&["images", "."], &resolved.path);
+        self.counts.slaves += usize::from(is_slave);
+        let resolved = self.scene.resolve(file.path, label)?;
+        let photo = self.scene.photos.find(&["images", "."], &resolved.path);
         let name = with_extension(resolved.name, photo.as_deref());
-        if !names.insert(name.clone()) {
+        if !self.names.insert(name.clone()) {
             return Err(refuse("another camera has this label too; rename one of the photos"));
         }
-        listing.views.push(Listed { name, photo, camera: own, lens, test: None });
+        self.listing.views.push(Listed { name, photo, camera: own, lens, test: None });
+        Ok(())
     }
-    // What is wrong with all is wrong with the file.
-    if !refused.is_empty() && refused.len() == total {
-        return Err(refused.swap_remove(0));
-    }
-    listing.bad = refused;
-    let file = path.display();
-    let mut note = |count: usize, what: &str| {
-        if count > 0 {
-            listing.notes.push(format!("{} of {file} {what}", counted(count, "camera")));
-        }
-    };
-    note(disabled, "disabled in Metashape and left out");
-    note(lost, "without a pose and left out: not aligned, or exported without it");
-    note(
-        slaves,
-        "posed as slaves of a rig: by the master's pose, then rotation and location of the sensor. If they are displaced, \
-         export the cameras without the rig",
-    );
-    Ok(listing)
 }
 
 /// Returns the line in which elements are nested deeper than [`DEPTH_MAX`]. Markup that is not well formed may count more;
@@ -206,8 +227,8 @@ impl<'a> Chunk<'a> {
         Ok(Some(Pose { to_world: of_master * in_master, is_slave: true }))
     }
 
-    /// Returns the camera at its pose, and its lens.
-    fn view(&self, camera: Node<'a, 'a>, pose: &Pose, refuse: &dyn Fn(&str) -> Error) -> Result<(Camera, Lens)> {
+    /// Returns the camera at its pose, its lens, and whether it is a slave.
+    fn view(&self, camera: Node<'a, 'a>, pose: Pose, refuse: &dyn Fn(&str) -> Error) -> Result<(Camera, Lens, bool)> {
         let (intrinsics, lens) = self.file.sensor(self.sensor(camera, refuse)?)?;
         let rotation = rotation_of(pose.to_world.matrix3)
             .ok_or_else(|| refuse("the transform is no rotation with a scale; export the cameras again"))?;
@@ -215,7 +236,7 @@ impl<'a> Chunk<'a> {
         let own = Camera { rotation, translation, ..intrinsics };
         let place = format!("{}, camera `{}`", self.file.line(camera), camera.attribute("label").unwrap_or_default());
         check_camera(self.file.path, &place, &own, &lens)?;
-        Ok((own, lens))
+        Ok((own, lens, pose.is_slave))
     }
 
     fn sensor(&self, camera: Node, refuse: &dyn Fn(&str) -> Error) -> Result<Node<'a, 'a>> {

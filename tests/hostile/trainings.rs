@@ -206,7 +206,7 @@ fn a_damaged_scene_trains_with_warnings_or_says_what_is_wrong() {
     assert_eq!(status, Some(0), "{text}");
     let name = damaged.file_name().expect("a name").to_string_lossy().into_owned();
     assert!(text.contains("1 of 10 photos cannot be read") && text.contains(&name), "{text}");
-    assert!(text.contains("differ in size from their photos"), "{text}");
+    assert!(text.contains("of another size than their photos"), "{text}");
     let (status, text) = train(&["--max-bad-photos", "0"]);
     assert_eq!(status, Some(3), "{text}");
     assert!(text.contains("--max-bad-photos 0 allows 0") && text.contains(&name), "{text}");
