@@ -48,6 +48,7 @@ fn the_page_works_in_a_browser() {
     many_labels_and_none(&mut browser, &place);
     a_server_goes_away_and_comes_back(&mut browser, &place);
     a_training_in_the_page(&mut browser, &place);
+    a_report_tells_the_values_of_the_step(&mut browser, &place);
 }
 
 /// The pixels of the last frame.
@@ -322,6 +323,15 @@ fn many_labels_and_none(browser: &mut Browser, place: &Place) {
     browser.until(&tab, SETTLED);
     assert_eq!(browser.js(&tab, "document.querySelectorAll('li.label').length"), 201);
     browser.kill(&tab);
+    drop(server);
+    many.labels = Some(vec![7; many.len()]);
+    write_model(place.path("one.ply"), &many).expect("a model");
+    let server = Server::start(place.command(&["view", "one.ply"]));
+    let tab = browser.open(&server.address, WIDE);
+    browser.until(&tab, SETTLED);
+    assert_eq!(browser.js(&tab, "document.querySelector('#label-count').textContent"), "1 object");
+    assert_eq!(browser.js(&tab, "document.querySelector('li.label').parentElement.getAttribute('role')"), "listbox");
+    browser.kill(&tab);
     many.labels = None;
     many.label_confidence = None;
     write_model(place.path("none.ply"), &many).expect("a model");
@@ -331,6 +341,34 @@ fn many_labels_and_none(browser: &mut Browser, place: &Place) {
     browser.until(&tab, "document.querySelector('#label-empty').textContent.includes('no labels')");
     browser.kill(&tab);
     assert_eq!(browser.complaints, Vec::<String>::new(), "complaints on the console");
+}
+
+/// Points at each step of each chart: the values are those of the curves that have one at that step.
+fn a_report_tells_the_values_of_the_step(browser: &mut Browser, place: &Place) {
+    place.succeeds(&["train", "scene", "--iterations", "12", "--preview-every", "4", "-o", "reported"]);
+    let tab = browser.open(&format!("file://{}", place.path("reported/report.html").display()), WIDE);
+    browser.until(&tab, "document.readyState === 'complete' && document.querySelector('figure.chart polyline')");
+    let found = browser.js(
+        &tab,
+        "(() => { let partial = 0; const wrong = [];
+            for (const chart of document.querySelectorAll('figure.chart')) {
+              const plot = chart.querySelector('.plot');
+              const box = plot.getBoundingClientRect();
+              const xs = (line) => line.getAttribute('points').split(' ').map((point) => Number(point.split(',')[0]));
+              const curves = [...chart.querySelectorAll('polyline')].map(xs);
+              for (const x of new Set(curves.flat())) {
+                plot.dispatchEvent(new PointerEvent('pointermove', { clientX: box.left + (x * box.width) / 1000 }));
+                const shown = chart.querySelector('.readout').children.length - 1;
+                const there = curves.filter((curve) => curve.includes(x)).length;
+                partial += there < curves.length;
+                if (shown !== there) wrong.push([chart.textContent.slice(0, 80), x, shown, there]);
+              }
+            }
+            return { partial, wrong }; })()",
+    );
+    assert_eq!(found["wrong"], serde_json::json!([]), "{found}");
+    assert!(found["partial"].as_u64().is_some_and(|count| count > 0), "a curve without a point at some step: {found}");
+    browser.kill(&tab);
 }
 
 fn a_server_goes_away_and_comes_back(browser: &mut Browser, place: &Place) {
