@@ -8,7 +8,6 @@
     reason = "the rules of files and lengths are those of the library"
 )]
 
-mod card_model;
 mod compiler;
 mod device;
 mod exposures;
@@ -68,8 +67,6 @@ enum Command {
     Training(training::Options),
     /// How near each stage of a step comes to the limit of the device, measured in the same run.
     Limits(Common),
-    /// A model of a step on graphics cards, checked against counted accesses and published times.
-    CardModel(Common),
     /// Poses that are off, with and without refinement: what is left of the errors, and the quality.
     Poses(poses::Options),
     /// What the exposures of a capture cost, and what their matrices take back.
@@ -112,7 +109,6 @@ fn run() -> Result<()> {
         Command::Training(options) => training::run(&options),
         Command::FirstStep(common) => training::first_step(&common),
         Command::Limits(common) => limits::run(&common),
-        Command::CardModel(common) => card_model::run(&common),
         Command::Memory(common) => memory::run(&common),
         Command::Start(common) => start::run(&common),
         Command::View(common) => view::run(&common),
