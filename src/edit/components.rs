@@ -9,7 +9,6 @@ use crate::stage::Stage;
 use crate::{Error, Result};
 use glam::{DMat3, DVec3};
 use kiddo::{ImmutableKdTree, SquaredEuclidean};
-use petgraph::unionfind::UnionFind;
 use std::collections::BTreeMap;
 
 /// Half axes of an ellipsoid in standard deviations: at its surface an eighth of the opacity is left.
@@ -58,7 +57,7 @@ pub fn components(model: &Gaussians, rows: &[usize], how: Grouping) -> Result<Pa
 
 /// Returns the representative of each body's group.
 fn join(bodies: &[Body]) -> Result<Vec<usize>> {
-    let mut groups = UnionFind::new(bodies.len());
+    let mut groups = Sets::new(bodies.len());
     let centres: Vec<[f64; 3]> = bodies.iter().map(|body| body.centre.to_array()).collect();
     if !centres.is_empty() {
         let tree: ImmutableKdTree<f64, 3> = ImmutableKdTree::new_from_slice(&centres)
@@ -69,13 +68,37 @@ fn join(bodies: &[Body]) -> Result<Vec<usize>> {
             for found in tree.query(&centres[index]).within::<SquaredEuclidean<f64>>(reach).unsorted().execute() {
                 let other = found.item as usize;
                 let is_larger = (body.radius, index) > (bodies[other].radius, other);
-                if is_larger && !groups.equiv(index, other) && body.meets(&bodies[other]) {
-                    groups.union(index, other);
+                if is_larger && groups.root(index) != groups.root(other) && body.meets(&bodies[other]) {
+                    groups.join(index, other);
                 }
             }
         }
     }
-    Ok(groups.into_labeling())
+    Ok((0..bodies.len()).map(|index| groups.root(index)).collect())
+}
+
+/// Disjoint sets of numbers, each a tree: a number points at another one of its set, the root at itself.
+struct Sets(Vec<usize>);
+
+impl Sets {
+    /// Puts each of the numbers below `count` into a set of its own.
+    fn new(count: usize) -> Self {
+        Self((0..count).collect())
+    }
+
+    /// Returns the root of a number's set, and shortens the way to it.
+    fn root(&mut self, mut index: usize) -> usize {
+        while self.0[index] != index {
+            self.0[index] = self.0[self.0[index]];
+            index = self.0[index];
+        }
+        index
+    }
+
+    fn join(&mut self, a: usize, b: usize) {
+        let (a, b) = (self.root(a), self.root(b));
+        self.0[a.max(b)] = a.min(b);
+    }
 }
 
 struct Body {
