@@ -77,8 +77,7 @@ pub use lookup::Lookup;
 pub use mask::read_mask;
 pub(crate) use model::write_joined;
 pub use model::{
-    Export, FirstView, LabelType, ModelFormat, ModelWriter, ReadModel, SpzVersion, WriteOptions, export_model,
-    read_model, register, write_model,
+    Export, FirstView, LabelType, ReadModel, SpzVersion, WriteOptions, export_model, read_model, write_model,
 };
 pub use occlusion_table::OcclusionTable;
 pub use pipeline_file::PipelineFolder;

@@ -1,45 +1,8 @@
-//! Model formats by file extension, and a format that a program adds.
+//! Model formats by file extension.
 
 use super::fixtures::*;
-use labelgs::internals::cli::context::open_model;
-use labelgs::io::{Export, ModelFormat, ModelWriter, ReadModel, read_model, register, write_model};
+use labelgs::io::{read_model, write_model};
 use labelgs::scene::Gaussians;
-use labelgs::{Error, Result};
-use std::io::{self, Write};
-use std::path::Path;
-
-/// A Gaussian of SH degree 0 a line: place, size, colour, opacity; all are round.
-const BALLS: ModelFormat = ModelFormat {
-    name: "balls",
-    endings: &[".balls", ".balls.txt"],
-    read: read_balls,
-    write: Some(ModelWriter { losses: |_| Ok(Vec::new()), write, checksum: None }),
-};
-
-fn read_balls(path: &Path) -> Result<ReadModel> {
-    let mut read = ReadModel::default();
-    for (line, text) in labelgs::internals::io::read::text(path)?.lines().enumerate() {
-        let row: Vec<f32> = text.split(' ').map_while(|word| word.parse().ok()).collect();
-        let &[x, y, z, size, r, g, b, opacity] = row.as_slice() else {
-            return Err(Error::data(path, format!("line {}", line + 1), "is no row of 8 numbers"));
-        };
-        let to = &mut read.gaussians;
-        to.means.push([x, y, z]);
-        to.scales.push([size; 3]);
-        to.sh0.push([r, g, b]);
-        to.opacities.push(opacity);
-        to.quats.push([1.0, 0.0, 0.0, 0.0]);
-    }
-    Ok(read)
-}
-
-fn write(export: &Export, out: &mut dyn Write) -> io::Result<()> {
-    let model = export.model;
-    export.rows.iter().try_for_each(|&row| {
-        let ([x, y, z], size, [r, g, b]) = (model.means[row], model.scales[row][0], model.sh0[row]);
-        writeln!(out, "{x} {y} {z} {size} {r} {g} {b} {}", model.opacities[row])
-    })
-}
 
 fn balls() -> Gaussians {
     Gaussians {
@@ -50,30 +13,6 @@ fn balls() -> Gaussians {
         sh0: vec![[0.25, 0.5, 0.75], [0.125, 1.0, -1.0]],
         ..Gaussians::default()
     }
-}
-
-#[test]
-fn a_format_that_is_added_is_read_and_written_by_its_endings() {
-    static FORMAT: ModelFormat = BALLS;
-    register(&FORMAT);
-    let scene = Scene::new();
-    let mut model = balls();
-    for name in ["a.balls", "b.BALLS", "c.balls.txt"] {
-        assert_eq!(write_model(scene.at(name), &model).expect("written"), 0);
-        assert_eq!(std::fs::read(scene.at(name)).expect("bytes")[..9], *b"1 2 3 -2 ", "{name}");
-        assert_eq!(read_model(scene.at(name)).expect("read").gaussians, model);
-        assert_eq!(open_model(&scene.at(name)).expect("read"), model, "as commands read it");
-    }
-    model.opacities[0] = f32::NAN;
-    assert_eq!(write_model(scene.at("a.balls"), &model).expect("written"), 1);
-    assert_eq!(read_model(scene.at("a.balls")).expect("read").gaussians.means, model.means[1..]);
-    let refused = refusal(read_model(scene.write("a.balls", "1 2 3\n")));
-    assert!(refused.ends_with("a.balls: line 1: is no row of 8 numbers"), "{refused}");
-    // The other formats are unchanged, apart from one more known extension in messages.
-    write_model(scene.at("a.ply"), &balls()).expect("written");
-    assert!(std::fs::read(scene.at("a.ply")).expect("bytes").starts_with(b"ply\n"));
-    let refused = refusal(read_model(scene.write("a.cloud", "1 2 3\n")));
-    assert!(refused.contains(".cloud is no extension of a model; .balls, .balls.txt, .ply"), "{refused}");
 }
 
 /// Nothing is written under a wrong extension, nor read under one. A file without an extension is known by its content.

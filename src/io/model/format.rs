@@ -122,7 +122,7 @@ impl<'a> Export<'a> {
 
 /// A model file format.
 #[derive(Clone, Copy, Debug)]
-pub struct ModelFormat {
+pub(crate) struct ModelFormat {
     /// Display name.
     pub name: &'static str,
     /// Extensions of its files: lower case, with the dot.
@@ -135,7 +135,7 @@ pub struct ModelFormat {
 
 /// How a format writes files.
 #[derive(Clone, Copy, Debug)]
-pub struct ModelWriter {
+pub(crate) struct ModelWriter {
     /// Returns what the file cannot hold, a line each; an error if it cannot hold the model at all. It runs before the
     /// file is opened.
     pub losses: fn(&Export) -> Result<Vec<String>>,

@@ -1,7 +1,6 @@
 //! Model files, by extension. Every command reads and writes models here.
 //!
-//! To add a format, add a file beside `ply` with a `ModelFormat`, and an entry in `SHIPPED`. Other crates call
-//! [`register`].
+//! To add a format, add a file beside `ply` with a `ModelFormat`, and an entry in `FORMATS`.
 
 mod format;
 mod glb;
@@ -24,7 +23,6 @@ use crate::io::{atomic, kind};
 use crate::scene::Gaussians;
 use crate::stage::Stage;
 use std::path::Path;
-use std::sync::{PoisonError, RwLock};
 
 pub use lazy::{LazyModel, ModelRef};
 pub use ply::StoredModel;
@@ -32,30 +30,17 @@ pub(crate) use ply::write_joined;
 pub(crate) use rows::Row;
 pub use transform::Transform;
 
-pub use format::{Export, FirstView, LabelType, ModelFormat, ModelWriter, ReadModel, SpzVersion, WriteOptions};
+pub use format::{Export, FirstView, LabelType, ReadModel, SpzVersion, WriteOptions};
+pub(crate) use format::{ModelFormat, ModelWriter};
 
-/// Formats of labelgs. The first one also serves pipes and devices, such as `/dev/stdout`.
-const SHIPPED: [&ModelFormat; 6] =
+/// All formats. The first one also serves pipes and devices, such as `/dev/stdout`.
+const FORMATS: [&ModelFormat; 6] =
     [&ply::FORMAT, &spz::FORMAT, &glb::FORMAT, &sog::FORMAT, &splat::FORMAT, &html::FORMAT];
-
-/// Formats that other crates have registered.
-static REGISTERED: RwLock<Vec<&'static ModelFormat>> = RwLock::new(Vec::new());
-
-/// Registers a format for all models from now on. It wins over earlier ones with the same extensions.
-pub fn register(format: &'static ModelFormat) {
-    REGISTERED.write().unwrap_or_else(PoisonError::into_inner).insert(0, format);
-}
-
-fn formats() -> Vec<&'static ModelFormat> {
-    let mut all = REGISTERED.read().unwrap_or_else(PoisonError::into_inner).clone();
-    all.extend(SHIPPED);
-    all
-}
 
 /// Returns the format for the extension of a path, ignoring case.
 fn by_ending(path: &Path) -> Option<&'static ModelFormat> {
     let name = path.file_name()?.to_string_lossy().to_lowercase();
-    formats().into_iter().find(|format| format.endings.iter().any(|ending| name.ends_with(ending)))
+    FORMATS.into_iter().find(|format| format.endings.iter().any(|ending| name.ends_with(ending)))
 }
 
 /// Returns true if a model at this path is written as a page, which shows it from somewhere at first.
@@ -65,7 +50,7 @@ pub(crate) fn is_page(path: &Path) -> bool {
 
 /// Returns all known extensions of formats that are `chosen`.
 fn endings(chosen: impl Fn(&ModelFormat) -> bool) -> String {
-    let all = formats().into_iter().filter(|format| chosen(format));
+    let all = FORMATS.into_iter().filter(|format| chosen(format));
     all.flat_map(|format| format.endings).copied().collect::<Vec<_>>().join(", ")
 }
 
@@ -85,11 +70,11 @@ fn format_to_read(path: &Path) -> Result<&'static ModelFormat> {
         return Err(Error::data(path, "", "there is no such file"));
     }
     if !path.is_file() {
-        return Ok(SHIPPED[0]);
+        return Ok(FORMATS[0]);
     }
     let content = kind::of_file(path)?;
     let own = |format: &&'static ModelFormat| content.is_some_and(|content| contents(format).contains(&content.what));
-    if let Some(format) = SHIPPED.into_iter().find(own).filter(|_| path.extension().is_none()) {
+    if let Some(format) = FORMATS.into_iter().find(own).filter(|_| path.extension().is_none()) {
         return Ok(format);
     }
     let problem = unknown_ending(path);
@@ -134,14 +119,14 @@ pub fn read_model(path: impl AsRef<Path>) -> Result<ReadModel> {
 
 /// Opens a model that can stay in its file, or returns `None` for one that is read whole.
 fn open_stored(path: &Path) -> Result<Option<StoredModel>> {
-    if format_to_read(path)?.name == SHIPPED[0].name { StoredModel::open(path) } else { Ok(None) }
+    if format_to_read(path)?.name == FORMATS[0].name { StoredModel::open(path) } else { Ok(None) }
 }
 
 /// Returns how a model is written at a path: by its extension. An unknown one is an error; a pipe or a device without one
 /// gets a PLY.
 fn writer_for(path: &Path) -> Result<ModelWriter> {
     let is_pipe = || path.extension().is_none() && path.exists() && !path.is_file() && !path.is_dir();
-    let format = by_ending(path).or_else(|| is_pipe().then_some(SHIPPED[0]));
+    let format = by_ending(path).or_else(|| is_pipe().then_some(FORMATS[0]));
     let problem = match format {
         Some(ModelFormat { write: Some(writer), .. }) => return Ok(*writer),
         Some(format) => format!("{} files are only read", format.name),
