@@ -240,47 +240,12 @@ pub struct Scores {
     /// The poses of the views were refined by the model before.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub refined_poses: bool,
-    /// Scores at other near planes, if asked for.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub near: Option<NearSweep>,
     /// Scores of removals, if asked for.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub removal: Option<RemovalScores>,
     /// Scores by place, such as by block of a merged model.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub places: BTreeMap<String, PlaceScore>,
-}
-
-/// The scene at several near planes. Gaussians before the cameras fog pictures unless a near plane hides them.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
-pub struct NearSweep {
-    /// Mean PSNR by near plane, in the order of the planes.
-    pub planes: Vec<NearScores>,
-    /// Best mean PSNR of all planes minus that of the nearest plane, dB.
-    pub fog: f64,
-    /// Best mean PSNR of all planes minus that of the model's own plane, dB.
-    pub fog_default: f64,
-}
-
-/// The scene at one near plane.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
-pub struct NearScores {
-    /// Near plane, world units.
-    pub near: f32,
-    /// Mean PSNR over views, dB.
-    pub psnr: f64,
-    /// PSNR of the worst view, dB.
-    pub worst: f64,
-}
-
-impl NearSweep {
-    /// Compares the planes; `own` is the mean PSNR at the model's own.
-    pub fn new(mut planes: Vec<NearScores>, own: f64) -> Self {
-        planes.sort_by(|a, b| a.near.total_cmp(&b.near));
-        let best = planes.iter().map(|scores| scores.psnr).fold(own, f64::max);
-        let nearest = planes.first().map_or(own, |scores| scores.psnr);
-        Self { planes, fog: best - nearest, fog_default: best - own }
-    }
 }
 
 impl Scores {
@@ -304,7 +269,6 @@ impl Scores {
             },
             objects: by_object.iter().map(|(&id, scores)| (id, average(scores))).collect(),
             views,
-            near: None,
             refined_poses: false,
             removal: None,
             places: BTreeMap::new(),

@@ -39,11 +39,10 @@ pub struct EvalArgs {
     /// Colour behind the scene: a name such as white, #rrggbb, or R,G,B from 0 to 1.
     #[arg(long, value_name = "COLOUR", value_parser = colour, default_value = "black", help_heading = "Rendering")]
     pub background: [f32; 3],
-    /// Near plane, world units: nearer Gaussians are not drawn. Default: the value of the model's run, else 0.2. Several
-    /// planes with commas between are compared with the default, which shows whether Gaussians before the cameras fog
-    /// the pictures; other viewers often draw from 0.01 on.
-    #[arg(long, value_name = "Z,Z", value_parser = near, value_delimiter = ',', help_heading = "Rendering")]
-    pub near: Vec<f32>,
+    /// Near plane, world units: nearer Gaussians are not drawn. Default: the value of the model's run, else 0.2. Other
+    /// viewers often draw from 0.01 on; a worse score there shows Gaussians before the cameras that fog the pictures.
+    #[arg(long, value_name = "Z", value_parser = near, help_heading = "Rendering")]
+    pub near: Option<f32>,
     /// Gaussians of an object that is rendered alone.
     #[command(flatten)]
     pub sure: MinConfidenceArg,
@@ -106,7 +105,7 @@ impl EvalArgs {
             removal: false,
             refine_poses: false,
             background: [0.0; 3],
-            near: Vec::new(),
+            near: None,
             sure: MinConfidenceArg { min_confidence: MIN_LABEL_CONFIDENCE },
             protocol: None,
             truth: None,

@@ -63,7 +63,7 @@ pub(super) fn run(protocol: Protocol, args: &EvalArgs, context: &Context) -> Res
     let mut painter = EnginePainter::new(
         &mut engine,
         &model,
-        near_plane(&args.model, args.near.first().copied())?,
+        near_plane(&args.model, args.near)?,
         args.sure.min_confidence,
         args.compat,
     );

@@ -13,7 +13,7 @@ use crate::eval::evaluate::{AmodalTruth, Rendering, evaluate_subject, picture_co
 use crate::eval::lpips::Weights;
 use crate::eval::protocol::score::Distance;
 use crate::eval::removal::{self, RemovalTruth, removals};
-use crate::eval::scores::{NearScores, NearSweep, Scores};
+use crate::eval::scores::Scores;
 use crate::eval::subject::{Subject, Whole};
 use crate::gpu::Gpu;
 use crate::io::image::read_rgba;
@@ -43,7 +43,7 @@ pub(in crate::cli) fn score(args: &EvalArgs, context: &Context) -> Result<Scores
     let reading = args.reading.of_run(&args.model)?;
     let dataset = open_scene(&args.scene, &reading, args.masks.clone(), args.background, true)?;
     let views = pick_views(&dataset, &args.views)?;
-    let near = near_plane(&args.model, args.near.first().copied().filter(|_| args.near.len() == 1))?;
+    let near = near_plane(&args.model, args.near)?;
     let weights = args.lpips.as_deref().map(Weights::read).transpose()?;
     let how = Rendering {
         options: RenderOptions { near, background: args.background, ..RenderOptions::default() },
@@ -130,9 +130,6 @@ impl Job<'_> {
             let draw = &mut |camera: &Camera, options: &RenderOptions| subject.render(camera, options);
             scores.places = by_place(draw, views, self.how.options, &seams)?;
         }
-        if self.args.near.len() > 1 {
-            scores.near = Some(compare_planes(subject, views, self.how.options, (&self.args.near, &scores))?);
-        }
         Ok(scores)
     }
 }
@@ -192,26 +189,6 @@ impl Without {
         }
         Ok(Some(picture))
     }
-}
-
-/// Scores the scene at every near plane.
-fn compare_planes(
-    subject: &mut dyn Subject,
-    views: &[&View],
-    options: RenderOptions,
-    (planes, own): (&[f32], &Scores),
-) -> Result<NearSweep> {
-    let scenes: Vec<View> = views.iter().map(|&view| View { mask: None, ..view.clone() }).collect();
-    let scenes: Vec<&View> = scenes.iter().collect();
-    let mut found = Vec::new();
-    for &near in planes {
-        let options = RenderOptions { near, ..options };
-        let how = Rendering { options, min_confidence: 0.0, train: &[], by_main: false, lpips: None };
-        let scores = evaluate_subject(subject, &scenes, how, &(), &mut ())?;
-        let worst = scores.views.values().map(|view| view.psnr).fold(f64::INFINITY, f64::min);
-        found.push(NearScores { near, psnr: scores.mean.psnr.unwrap_or(f64::NAN), worst });
-    }
-    Ok(NearSweep::new(found, own.mean.psnr.unwrap_or(f64::NAN)))
 }
 
 /// Folders of ground truth about whole objects, `ID/NAME.png` in each.

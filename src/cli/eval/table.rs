@@ -120,7 +120,7 @@ fn removals(scores: &Scores) -> String {
     text
 }
 
-/// Returns the PSNR by region, and by near plane.
+/// Returns the PSNR by region.
 fn regions(scores: &Scores) -> String {
     let mut text = String::new();
     if let Some(mean) = &scores.mean.regions {
@@ -140,13 +140,6 @@ fn regions(scores: &Scores) -> String {
             );
         }
         text += "\n";
-    }
-    if let Some(sweep) = &scores.near {
-        text += &format!("\n{:>10} {:>8} {:>8}\n", "near plane", "PSNR", "worst");
-        for plane in &sweep.planes {
-            text += &format!("{:>10} {:>8.2} {:>8.2}\n", plane.near, plane.psnr, plane.worst);
-        }
-        text += &format!("fog: {:.2} dB at the nearest plane, {:.2} dB at the default\n", sweep.fog, sweep.fog_default);
     }
     text
 }

@@ -96,7 +96,7 @@ fn line(row: &Row) -> String {
     let number = |value: Option<f64>| value.unwrap_or(f64::NAN);
     format!(
         "{} {} steps, {}, seed {}: {:.1} CPU s, {} Gaussians, PSNR {:.2} ({:.2} corrected), seen {:.2} ({:.2} corrected), \
-         worst {:.2}, fog {:.2}",
+         worst {:.2}",
         row.program,
         row.steps,
         row.scene,
@@ -107,8 +107,7 @@ fn line(row: &Row) -> String {
         number(row.psnr_corrected),
         number(row.psnr_seen),
         number(row.psnr_seen_corrected),
-        row.worst,
-        row.fog
+        row.worst
     )
 }
 

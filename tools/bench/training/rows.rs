@@ -11,9 +11,6 @@ use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// Near planes of the scores, world units: what other viewers use, the default of 3DGS, and a far one.
-const PLANES: &str = "0.01,0.2,0.6";
-
 /// A scene to train on.
 #[derive(Clone, Debug)]
 pub struct SceneOf {
@@ -62,8 +59,6 @@ pub struct Row {
     pub worst: f64,
     /// Mean SSIM.
     pub ssim: f64,
-    /// Best PSNR over near planes minus that of 0.01, dB.
-    pub fog: f64,
     /// Mean IoU of the label map.
     pub iou_map: Option<f64>,
     /// Mean IoU of objects alone.
@@ -158,7 +153,7 @@ fn measure(plan: &Plan, build: u32, judge: &Path) -> Result<Row> {
     let before = children()?;
     let summary: Value = parse(&program(plan.program, &args)?)?;
     let cpu = children()? - before;
-    let mut args = vec!["eval", &out, "--scene", &scene, "--quiet", "--json", "--near", PLANES];
+    let mut args = vec!["eval", &out, "--scene", &scene, "--quiet", "--json"];
     args.extend(masks.iter().flat_map(|masks| ["--masks", masks.as_str()]));
     let scores = parse(&program(judge, &args)?)?;
     let mean = |key: &str| scores["mean"][key].as_f64();
@@ -181,7 +176,6 @@ fn measure(plan: &Plan, build: u32, judge: &Path) -> Result<Row> {
         seen_share: needed(mean("seen_share"), "seen_share")?,
         worst: worst.fold(f64::INFINITY, f64::min),
         ssim: needed(mean("ssim"), "ssim")?,
-        fog: needed(scores["near"]["fog"].as_f64(), "fog")?,
         iou_map: mean("iou_map"),
         iou_object: mean("iou_object"),
     })
