@@ -20,34 +20,6 @@ fn per(done: &Imported) -> ObjectPer {
     done.objects.as_ref().expect("masks of one object each").per
 }
 
-/// RGB pictures with a colour for each true id.
-fn colours(folder: &Path, colours: [[u8; 3]; 4]) {
-    for photo in 0..PHOTOS {
-        let bytes: Vec<u8> = truth(photo).into_iter().flat_map(|id| colours[usize::from(id)]).collect();
-        png(&folder.join(name(photo)).with_extension("png"), SIZE, ColorType::Rgb, BitDepth::Eight, &bytes);
-    }
-}
-
-/// Colours of labels, as in `labelmap.txt`, and of objects, as Pascal VOC numbers them.
-const LABELS: [[u8; 3]; 4] = [[0; 3], [255, 204, 51], [51, 221, 255], [250, 50, 83]];
-const OBJECTS: [[u8; 3]; 4] = [[0; 3], [128, 0, 0], [0, 128, 0], [128, 128, 0]];
-
-fn cvat(scene: &Scene) {
-    colours(&scene.path().join("m/SegmentationClass"), LABELS);
-    colours(&scene.path().join("m/SegmentationObject"), OBJECTS);
-    scene.write("m/labelmap.txt", golden("labelmap.txt"));
-    scene.write("m/ImageSets/Segmentation/default.txt", "00\n01\n02\n03\n04\n");
-}
-
-/// The pictures of brush strokes; a task is no photo.
-fn brushes(scene: &Scene) {
-    let labels = ["", "cup", "bottle", "big bowl"];
-    binary(255, &[1, 2, 3], |object, photo| {
-        let (task, annotation, label) = (41 + photo, 7 + photo, labels[usize::from(object)]);
-        scene.path().join(format!("m/task-{task}-annotation-{annotation}-by-a@b.org-tag-{label}-0.png"))
-    });
-}
-
 /// The folders of `amg.py`; the first mask is around the objects 1 and 2.
 fn sam_folders(scene: &Scene) {
     for photo in 0..PHOTOS {
@@ -139,38 +111,18 @@ fn masks_of_segment_anything_come_back_small_over_large() {
     assert_eq!(auto(&scene, "m").expect("imported").masks, 1);
 }
 
+/// Forms that only one tool writes are named with the export that is read.
 #[test]
-fn colours_of_cvat_come_back_with_their_labels() {
-    let expected = [Some("big bowl"), Some("bottle"), Some("cup")];
-    let scene = scene();
-    cvat(&scene);
-    for folder in ["m", "m/SegmentationObject", "m/SegmentationClass"] {
-        let done = auto(&scene, folder).expect("imported");
-        assert_eq!((done.format, per(&done), names(&done)), (Format::Cvat, ObjectPer::Name, expected.to_vec()));
-        same_as_truth(&scene, &done, [3, 2, 1]);
-    }
-    // Two objects of one label: each photo has its own ids, or they are one object.
-    colours(&scene.path().join("m/SegmentationClass"), [LABELS[0], LABELS[1], LABELS[1], LABELS[3]]);
-    let done = auto(&scene, "m").expect("imported");
-    assert_eq!((per(&done), names(&done)), (ObjectPer::Mask, vec![Some("big bowl"), Some("cup"), Some("cup 2")]));
-    same_as_truth(&scene, &done, [2, 3, 1]);
-    let one = run(&scene, "m", |options| options.object_per = ObjectPer::Name).expect("imported");
-    assert_eq!(names(&one), [Some("big bowl"), Some("cup")]);
-    // Without objects, labels are the objects.
-    fs::remove_dir_all(scene.path().join("m/SegmentationObject")).expect("removed");
-    assert_eq!(names(&auto(&scene, "m").expect("imported")), [Some("big bowl"), Some("cup")]);
-}
-
-#[test]
-fn brushes_of_label_studio_come_back() {
-    for tasks in ["label-studio.json", "label-studio-min.json"] {
+fn other_exports_of_tools_are_named_with_a_cure() {
+    for (file, tool) in [
+        ("m/labelmap.txt", "CVAT"),
+        ("m/SegmentationObject/00.png", "CVAT"),
+        ("m/task-41-annotation-7-by-a@b.org-tag-cup-0.png", "Label Studio"),
+    ] {
         let scene = scene();
-        brushes(&scene);
-        scene.write("m/project-2.json", golden(tasks));
-        let done = auto(&scene, "m").expect("imported");
-        assert_eq!((done.format, per(&done)), (Format::LabelStudio, ObjectPer::Name));
-        assert_eq!(names(&done), [Some("big bowl"), Some("bottle"), Some("cup")]);
-        same_as_truth(&scene, &done, [3, 2, 1]);
+        scene.photo(file, 12, 8);
+        let message = refusal(auto(&scene, "m"));
+        assert!(message.contains(tool) && message.contains("as COCO 1.0"), "{message}");
     }
 }
 
@@ -267,8 +219,7 @@ fn files_that_are_no_coco_or_several_are_refused() {
     at("none/readme.txt", b"x");
     let coco = |options: &mut ImportOptions| options.format = Format::Coco;
     assert!(refusal(run(&scene, "none", coco)).contains("has no JSON with images and annotations"));
-    assert!(refusal(run(&scene, "a.json", |o| o.format = Format::Cvat)).contains("name the folder"));
-    assert!(refusal(run(&scene, "none", |o| o.format = Format::Cvat)).contains("SegmentationObject or"));
+    assert!(refusal(run(&scene, "a.json", |o| o.format = Format::SamJson)).contains("name the folder"));
     // Files of two tools.
     at("both/a.json", &golden("coco.json"));
     at("both/00.json", &golden("sam/00.json"));
@@ -301,32 +252,6 @@ fn each_broken_folder_of_a_tool_has_its_message() {
     refused(sam_lists, &put("m/01.json", cut), &["01.json: mask 0", "add up to 5"]);
     let other = "[{\"segmentation\": {\"size\": [8, 8], \"counts\": [64]}}]";
     refused(sam_lists, &put("m/01.json", other), &["01.json: mask 0", "its photo 01.png 12 x 8 px"]);
-    refused(cvat, &gone("m/labelmap.txt"), &["labelmap.txt: is not there"]);
-    refused(cvat, &put("m/labelmap.txt", "cup\n"), &["labelmap.txt: line 1", "label:red,green,blue"]);
-    refused(cvat, &put("m/labelmap.txt", "a:1,2,3::\nb:1,2,3::\n"), &["line 2", "the colour of a"]);
-    refused(cvat, &put("m/labelmap.txt", "# nothing\n"), &["has no label"]);
-    refused(
-        cvat,
-        &put("m/labelmap.txt", "cup:255,204,51::\n"),
-        &["SegmentationClass/00.png", "which labelmap.txt does not list"],
-    );
-    refused(cvat, &gone("m/SegmentationClass/02.png"), &["SegmentationObject/02.png", "no counterpart"]);
-    let grey = |scene: &Scene| grey8(&scene.path().join("m/SegmentationObject/00.png"), &[1; 96]);
-    refused(cvat, &grey, &["SegmentationObject/00.png", "CVAT writes RGB"]);
-    let size = |scene: &Scene| {
-        png(&scene.path().join("m/SegmentationClass/00.png"), (6, 4), ColorType::Rgb, BitDepth::Eight, &[0; 72]);
-    };
-    refused(cvat, &size, &["12 x 8 px and", "6 x 4 px"]);
-    refused(brushes, &|_| (), &["tell tasks and no photos", "as JSON"]);
-    refused(brushes, &put("m/a.json", "{}"), &["a.json: line 1", "expected a list of tasks"]);
-    refused(brushes, &put("m/a.json", "[{}]"), &["a.json: task at place 1", "no `id`"]);
-    refused(brushes, &put("m/a.json", "[]"), &["is of task 41"]);
-    let elsewhere = r#"[{"id":41,"image":"x.png"},{"id":42},{"id":43},{"id":44},{"id":45}]"#;
-    refused(brushes, &put("m/a.json", elsewhere), &["no mask belongs to a photo", "x.png"]);
-    let same = r#"[{"id":41,"image":"00.png"},{"id":42,"image":"00.png"},{"id":43},{"id":44},{"id":45}]"#;
-    refused(brushes, &put("m/a.json", same), &["the tasks 41 and 42 are both the photo 00.png"]);
-    let twice = |scene: &Scene| grey8(&scene.path().join("m/task-41-annotation-99-by-2-tag-cup-0.png"), &[1; 96]);
-    refused(brushes, &twice, &["task 41 has the annotations 7 and 99"]);
 }
 
 #[test]

@@ -222,7 +222,7 @@ fn other_sizes_are_scaled_by_nearest_id() {
         assert_eq!((mask.width, mask.height), size);
         assert_eq!(mask.objects(), [7, 200]);
         assert!((0..size.1).all(|y| mask.at(0, y) == 7 && mask.at(size.0 - 1, y) == 200));
-        assert!(dataset.notes.iter().any(|note| note.contains("1 masks differ in size")));
+        assert!(dataset.notes.iter().any(|note| note.contains("1 mask of another size")));
     }
     png(&path, (12, 12), png::ColorType::Grayscale, png::BitDepth::Eight, &[1; 144]);
     assert!(refusal(open(&scene, None)).contains("12 x 12"));

@@ -55,18 +55,6 @@ pub fn sam_pictures(folder: &Path) {
     (0..3).for_each(|mask| put(folder, &format!("in/00/{mask}.png"), &seeds::mask_binary()[0]));
 }
 
-pub fn cvat(folder: &Path) {
-    colmap_bin(folder);
-    put(folder, "in/labelmap.txt", seeds::golden_mask("labelmap.txt"));
-    put(folder, "in/SegmentationClass/00.png", seeds::cvat_class());
-    put(folder, "in/SegmentationObject/00.png", seeds::cvat_object());
-}
-
-pub fn brushes(folder: &Path) {
-    colmap_bin(folder);
-    put(folder, "in/task-41-annotation-7-by-1-tag-cup-0.png", &seeds::mask_binary()[0]);
-}
-
 pub fn open(folder: &Path) -> Result<Dataset> {
     io::open(folder, &LoadOptions { photos: false, test_every: None, ..LoadOptions::default() })
 }

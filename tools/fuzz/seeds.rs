@@ -333,21 +333,6 @@ pub fn coco() -> Vec<Vec<u8>> {
     ["coco.json", "cvat-tracks.json", "label-studio-coco.json"].map(golden_mask).to_vec()
 }
 
-/// A photo of CVAT with this colour on a black ground.
-fn cvat(colour: [u8; 3]) -> Vec<u8> {
-    png(Rgb, Eight, |i| if i / 36 % 2 == 0 { colour[i % 3] } else { 0 })
-}
-
-/// Colours of labels, in the legend of CVAT.
-pub fn cvat_class() -> Vec<u8> {
-    cvat([255, 204, 51])
-}
-
-/// Colours of objects of CVAT.
-pub fn cvat_object() -> Vec<u8> {
-    cvat([128, 0, 0])
-}
-
 /// A run of DEVA.
 pub fn pred_json() -> Vec<u8> {
     let text = r#"{"annotations": [{"file_name": "00.jpg", "segments_info": [{"id": 65793, "category_id": 0, "score": 0.9},

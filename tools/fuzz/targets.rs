@@ -47,7 +47,7 @@ const PLAIN: Target = Target {
 const PIXELS: Target = Target { per_byte: 8192 * 4 * 2, ..PLAIN };
 
 /// All readers.
-pub const TARGETS: [Target; 46] = [
+pub const TARGETS: [Target; 43] = [
     Target {
         name: "colmap_cameras_bin",
         file: "sparse/0/cameras.bin",
@@ -202,31 +202,6 @@ pub const TARGETS: [Target; 46] = [
         prepare: sam_pictures,
         read: |folder, _| imported(folder, Format::SamFolders),
         seeds: || vec![seeds::golden_mask("sam/00.csv")],
-        ..PLAIN
-    },
-    Target {
-        name: "mask_cvat",
-        file: "in/SegmentationObject/00.png",
-        prepare: cvat,
-        read: |folder, _| imported(folder, Format::Cvat),
-        seeds: || vec![seeds::cvat_object()],
-        dress: png_sums,
-        ..PIXELS
-    },
-    Target {
-        name: "mask_cvat_legend",
-        file: "in/labelmap.txt",
-        prepare: cvat,
-        read: |folder, _| imported(folder, Format::Cvat),
-        seeds: || vec![seeds::golden_mask("labelmap.txt")],
-        ..PLAIN
-    },
-    Target {
-        name: "mask_brushes",
-        file: "in/tasks.json",
-        prepare: brushes,
-        read: |folder, _| imported(folder, Format::LabelStudio),
-        seeds: || ["label-studio.json", "label-studio-min.json"].map(seeds::golden_mask).to_vec(),
         ..PLAIN
     },
     Target {

@@ -2,7 +2,6 @@
 
 use super::Overlap;
 use super::content::{read_binary, read_ids};
-use super::cvat;
 use super::detect::{Content, Reading};
 use super::marks::{Mark, Shape, require_aspect};
 use super::spans::Spans;
@@ -47,8 +46,6 @@ fn fits(path: &Path, found: (u32, u32), view: &View) -> Result<()> {
 fn blend(root: &Path, marks: &[Mark], view: &View, rule: Overlap) -> Result<Decoded> {
     let mut layers = Vec::with_capacity(marks.len());
     let (mut size, mut cut) = (None, 0);
-    // Masks of colours come from one picture.
-    let mut picture: Option<(&str, (u32, u32), BTreeMap<[u8; 3], Spans>)> = None;
     let photo = (view.camera.width, view.camera.height);
     for (at, mark) in marks.iter().enumerate() {
         let (own, spans) = match &mark.shape {
@@ -57,18 +54,6 @@ fn blend(root: &Path, marks: &[Mark], view: &View, rule: Overlap) -> Result<Deco
                 let mask = read_binary(&path, |found| fits(&path, found, view))?;
                 cut += usize::from(!mask.sharp);
                 (mask.size, Spans::of(&mask.inside))
-            }
-            Shape::Colour(file, colour) => {
-                let (_, size, regions) = match picture.take().filter(|(known, ..)| *known == file.as_str()) {
-                    Some(known) => picture.insert(known),
-                    None => {
-                        let path = root.join(file);
-                        let (size, regions) = cvat::regions(&path)?;
-                        fits(&path, size, view)?;
-                        picture.insert((file.as_str(), size, regions))
-                    }
-                };
-                (*size, regions.remove(colour).unwrap_or_default())
             }
             // Shapes without pixels of their own get those of the photo.
             Shape::Rle(rle) => (photo, check_size(root, photo).map(|()| rle.spans(photo))?),

@@ -15,8 +15,6 @@ use std::path::Path;
 pub(super) enum Shape {
     /// A black and white PNG.
     Png(String),
-    /// Pixels of a colour in an RGB PNG.
-    Colour(String, [u8; 3]),
     Rle(Rle),
     Polygons(Polygons),
 }

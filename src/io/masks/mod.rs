@@ -7,13 +7,11 @@
 pub(crate) mod check;
 mod coco;
 mod content;
-mod cvat;
 mod decode;
 mod detect;
 mod folder;
 mod import;
 mod inspect;
-mod label_studio;
 mod marks;
 mod photos;
 mod polygon;
@@ -67,10 +65,6 @@ pub enum Format {
     SamFolders,
     /// Run lengths of Segment Anything's amg.py: NAME.json.
     SamJson,
-    /// "Segmentation mask 1.1" of CVAT: SegmentationObject, SegmentationClass, labelmap.txt.
-    Cvat,
-    /// "Brush labels to PNG" of Label Studio: task-1-annotation-2-by-3-tag-NAME-0.png, with a JSON export.
-    LabelStudio,
 }
 
 impl Format {
@@ -91,8 +85,6 @@ impl Format {
             Self::Coco => "coco",
             Self::SamFolders => "sam-folders",
             Self::SamJson => "sam-json",
-            Self::Cvat => "cvat",
-            Self::LabelStudio => "label-studio",
         }
     }
 }

@@ -20,11 +20,6 @@ impl Spans {
         Self { runs }
     }
 
-    /// Appends a run; runs come in order.
-    pub(super) fn push(&mut self, start: usize, end: usize) {
-        self.runs.push((start as u32, end as u32));
-    }
-
     /// Returns the number of pixels.
     pub(super) fn area(&self) -> u64 {
         self.runs.iter().map(|(start, end)| u64::from(end - start)).sum()

@@ -2,7 +2,7 @@
 
 use super::folder::{layouts, root};
 use super::marks::Found;
-use super::{Format, Overlap, coco, cvat, label_studio, sam};
+use super::{Format, Overlap, coco, sam};
 use crate::error::{Error, Result, Setting};
 use crate::io::mask_folder::MaskFolder;
 use crate::io::names::below;
@@ -15,10 +15,11 @@ pub(super) fn recognise(path: &Path, photos: &[&str]) -> Result<Option<(Format, 
     if path.is_file() {
         return Ok(Some((Format::Coco, "a file is read as instances of COCO".to_owned())));
     }
-    if let Some(root) = cvat::find(path) {
-        fits.push((Format::Cvat, format!("{} has the folders that CVAT exports", root.display())));
-    }
     let files = below(path)?;
+    if let Some(tool) = other_export(&files) {
+        let problem = format!("holds an export of {tool} that is not read; export the project as COCO 1.0 instead");
+        return Err(Error::data(path, "", problem));
+    }
     let with = |list: &[Option<String>]| list.iter().flatten().count();
     let folders = with(&sam::folders(photos, &files));
     if folders > 0 {
@@ -30,9 +31,6 @@ pub(super) fn recognise(path: &Path, photos: &[&str]) -> Result<Option<(Format, 
         && sam::is_list(&path.join(format!("{first}.json")))?
     {
         fits.push((Format::SamJson, format!("{} files named after photos are lists of masks", with(&lists))));
-    }
-    if label_studio::is_it(&files) {
-        fits.push((Format::LabelStudio, "pictures have the names that Label Studio gives".to_owned()));
     }
     if let Some(file) = coco::files(path)?.first() {
         fits.push((Format::Coco, format!("{} has images and annotations", file.display())));
@@ -50,12 +48,21 @@ pub(super) fn recognise(path: &Path, photos: &[&str]) -> Result<Option<(Format, 
     Ok(fits.pop())
 }
 
+/// Returns the tool that wrote a folder of masks in a form of its own: colours with a legend, or names without a photo. These
+/// tools export COCO too.
+fn other_export(files: &[String]) -> Option<&'static str> {
+    let is_of_cvat = |file: &String| file.ends_with("labelmap.txt") || file.contains("SegmentationObject/");
+    let is_of_label_studio = |file: &String| file.contains("task-") && file.contains("-annotation-");
+    if files.iter().any(is_of_cvat) {
+        return Some("CVAT (\"Segmentation mask\")");
+    }
+    files.iter().any(is_of_label_studio).then_some("Label Studio (\"Brush labels\")")
+}
+
 /// Reads the masks of a tool. Returns the folder or file that they are in, and none for formats of other kinds.
 pub(super) fn read(path: &Path, format: Format, views: &[&View]) -> Result<Option<(PathBuf, Found)>> {
     let photos: Vec<&str> = views.iter().map(|view| view.name.as_str()).collect();
-    let is_tool =
-        matches!(format, Format::Coco | Format::Cvat | Format::SamFolders | Format::SamJson | Format::LabelStudio);
-    if is_tool && format != Format::Coco && path.is_file() {
+    if matches!(format, Format::SamFolders | Format::SamJson) && path.is_file() {
         return Err(Error::data(
             path,
             "",
@@ -69,17 +76,8 @@ pub(super) fn read(path: &Path, format: Format, views: &[&View]) -> Result<Optio
             let found = coco::read(&file, views)?;
             (file, found)
         }
-        Format::Cvat => {
-            let Some(root) = cvat::find(path) else {
-                let problem = "has no folder SegmentationObject or SegmentationClass; export \"Segmentation mask 1.1\"";
-                return Err(Error::data(path, "", problem));
-            };
-            let found = cvat::read(&root, &photos)?;
-            (root, found)
-        }
         Format::SamFolders => (own(), sam::read_folders(path, &photos, &below(path)?)?),
         Format::SamJson => (own(), sam::read_lists(path, views, &below(path)?)?),
-        Format::LabelStudio => (own(), label_studio::read(path, &photos, &below(path)?)?),
         _ => return Ok(None),
     }))
 }
