@@ -74,6 +74,11 @@ impl Listing {
     }
 }
 
+/// Refuses a list of which no photo can be used: what is wrong with all is wrong with the file.
+pub(crate) fn require_some(views: usize, bad: &mut Vec<Error>) -> Result<()> {
+    if views == 0 && !bad.is_empty() { Err(bad.swap_remove(0)) } else { Ok(()) }
+}
+
 /// Refuses cameras that cannot make an image. `place` names the camera in `path`.
 pub(crate) fn check_camera(path: &Path, place: &str, camera: &Camera, lens: &Lens) -> Result<()> {
     let refuse = |problem: String| Err(Error::data(path, place, problem));

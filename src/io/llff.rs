@@ -6,7 +6,7 @@
 
 use super::lens::Lens;
 use super::listed_path::Place;
-use super::listing::{Listed, Listing, check_camera, invert_pose, rotation_of, side};
+use super::listing::{Listed, Listing, check_camera, invert_pose, require_some, rotation_of, side};
 use super::npy;
 use super::photo_finder::is_readable;
 use super::pose_convention::Native;
@@ -58,10 +58,7 @@ pub(crate) fn list_file(scene: &Place, path: &Path) -> Result<Listing> {
             Err(error) => listing.bad.push(error),
         }
     }
-    // What is wrong with all is wrong with the file.
-    if listing.views.is_empty() && !listing.bad.is_empty() {
-        return Err(listing.bad.swap_remove(0));
-    }
+    require_some(listing.views.len(), &mut listing.bad)?;
     Ok(listing)
 }
 

@@ -7,7 +7,7 @@
 
 use super::lens::{Fisheye, Lens, Polynomial};
 use super::listed_path::Place;
-use super::listing::{Listed, Listing, check_camera, invert_pose, rotation_of, side, with_extension};
+use super::listing::{Listed, Listing, check_camera, invert_pose, require_some, rotation_of, side, with_extension};
 use super::pose_convention::Native;
 use crate::error::{Error, Result};
 use crate::io::read;
@@ -64,10 +64,7 @@ pub(crate) fn list_file(scene: &Place, path: &Path) -> Result<Listing> {
         reader.read(camera)?;
     }
     let Reader { mut listing, counts, .. } = reader;
-    // What is wrong with all is wrong with the file.
-    if listing.views.is_empty() && !listing.bad.is_empty() {
-        return Err(listing.bad.swap_remove(0));
-    }
+    require_some(listing.views.len(), &mut listing.bad)?;
     let told = [
         (counts.disabled, "disabled in Metashape and left out"),
         (counts.lost, "without a pose and left out: not aligned, or exported without it"),

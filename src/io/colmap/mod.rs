@@ -10,7 +10,7 @@ pub(crate) mod write;
 
 use super::lens::Lens;
 use super::listed_path::Place;
-use super::listing::{FAR, Listed, Listing, check_camera};
+use super::listing::{FAR, Listed, Listing, check_camera, require_some};
 use super::ply;
 use super::pose_convention::Native;
 use crate::error::{Error, Result};
@@ -232,10 +232,7 @@ fn join(
         let photo = scene.photos.find(&["images", "."], &file.path);
         found.views.push((Listed { name: file.name, photo, camera, lens, test: None }, image));
     }
-    // What is wrong with all is wrong with the model.
-    if found.views.is_empty() && !found.bad.is_empty() {
-        return Err(found.bad.swap_remove(0));
-    }
+    require_some(found.views.len(), &mut found.bad)?;
     Ok(found)
 }
 

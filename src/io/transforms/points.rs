@@ -69,12 +69,6 @@ fn in_the_frame_of(
 fn seen(views: &[Listed], points: &[Point]) -> usize {
     let some_views: Vec<&Camera> = views.iter().step_by(views.len() / 50 + 1).map(|view| &view.camera).collect();
     let some_points = points.iter().step_by(points.len() / 2000 + 1);
-    let inside = |camera: &&&Camera, point: &Point| {
-        let at = camera.to_camera(point.position);
-        let pixel = camera.project(at);
-        at.z > 0.0
-            && (0.0..f64::from(camera.width)).contains(&pixel.x)
-            && (0.0..f64::from(camera.height)).contains(&pixel.y)
-    };
-    some_points.map(|point| some_views.iter().filter(|camera| inside(camera, point)).count()).sum()
+    let count = |point: &Point| some_views.iter().filter(|camera| camera.sees(point.position).is_some()).count();
+    some_points.map(count).sum()
 }
