@@ -32,6 +32,25 @@ fn with_photo(scene: &Path, index: usize, change: impl Fn(&mut Photo)) -> Report
     scan(scene, &Lookup::default(), &dataset).expect("a scan")
 }
 
+/// A list of poses beside a COLMAP model is of a world of its own: what the model observed says nothing about it.
+#[test]
+fn observations_are_those_of_the_list_that_was_read() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let scene = made(folder.path());
+    let frame = |index: usize| {
+        let matrix = format!("[[1,0,0,{index}],[0,1,0,0],[0,0,1,0],[0,0,0,1]]");
+        format!(r#"{{"file_path": "images/{index:03}.png", "transform_matrix": {matrix}}}"#)
+    };
+    let frames = (0..16).map(frame).collect::<Vec<_>>().join(",");
+    let list = scene.join("transforms.json");
+    std::fs::write(&list, format!(r#"{{"fl_x": 120, "frames": [{frames}]}}"#)).expect("written");
+    let report = |named: &Path| scan(named, &Lookup::default(), &read(named)).expect("a scan");
+    assert!(report(&scene).reprojection.is_some());
+    let other = report(&list);
+    assert_eq!(other.reprojection, None, "{other:?}");
+    assert!(other.findings.iter().all(|finding| finding.fault != Fault::Reprojection), "{other:?}");
+}
+
 #[test]
 fn each_fault_is_found_in_its_photo() {
     let folder = tempfile::tempdir().expect("a folder");
