@@ -18,8 +18,7 @@ fn main() {
     let (root, out) = (folder("CARGO_MANIFEST_DIR"), folder("OUT_DIR"));
     std::fs::write(out.join("pictures.md"), pictures(&root.join(PICTURES))).expect("cargo's folder is writable");
     std::fs::write(out.join("commit.rs"), commit(&root)).expect("cargo's folder is writable");
-    let lab = std::env::var_os("CARGO_FEATURE_LAB").is_some();
-    if let Err(findings) = shadergen::run(&root.join("glsl"), &out, lab) {
+    if let Err(findings) = shadergen::run(&root.join("glsl"), &out) {
         for finding in findings {
             for line in finding.to_string().lines() {
                 println!("cargo::error={line}");

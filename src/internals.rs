@@ -162,8 +162,6 @@ pub mod label {
     }
 }
 pub mod pass {
-    #[cfg(feature = "lab")]
-    pub use crate::pass::separate_step;
     pub use crate::pass::{
         Builder, Extension, Hook, KernelShape, Stage, Variant, densify_apply, densify_count, extended_step, label_view,
         opacity_reset, relocate_apply, relocate_count, render_view, training_step, vote_view, weigh_view,

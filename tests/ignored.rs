@@ -30,10 +30,3 @@ fn no_variable_makes_faults_or_hides_what_a_device_has() {
     succeeded(&place.trained_with(Some(fault), "with", &flags));
     assert!(place.model("with", 4) == place.model("without", 4));
 }
-
-#[test]
-fn no_flag_gives_objects_passes_of_their_own() {
-    let mut command = Command::cargo_bin("labelgs").expect("the tool is built");
-    let output = command.args(["profile", "--synthetic", "--separate-objects"]).output().expect("it runs");
-    assert_eq!(output.status.code(), Some(2), "{}", stderr(&output));
-}

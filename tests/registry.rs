@@ -64,13 +64,6 @@ fn lists() -> Vec<(Capacity, PassList)> {
                 let variant = Variant { labels, disagreement, depth, lift, sh_degree, update, ..Variant::plain(size) };
                 add(pass::training_step(&shape, &capacity, variant));
             }
-            #[cfg(feature = "lab")]
-            add(pass::separate_step(
-                &shape,
-                &capacity,
-                Variant { labels: true, lift: true, ..Variant::plain(size) },
-                2,
-            ));
             add(pass::render_view(&shape, &capacity, 3, 2));
             add(pass::label_view(&shape, &capacity, 2));
             add(pass::vote_view(&shape, &capacity, 2, false));

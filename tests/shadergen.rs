@@ -62,7 +62,7 @@ fn folder(files: &[(&str, &str)]) -> TempDir {
 }
 
 fn generate(files: &[(&str, &str)]) -> Result<Generated, Vec<Finding>> {
-    tool::generate(folder(files).path(), true)
+    tool::generate(folder(files).path())
 }
 
 /// The findings of these files, one text each.
@@ -148,7 +148,7 @@ fn the_same_input_gives_the_same_files() {
     let folder = folder(&[("test/good.comp", GOOD), ("test/probe.comp", &small("", ""))]);
     let written = || {
         let out = tempfile::tempdir().expect("temporary folder");
-        tool::run(folder.path(), out.path(), true).expect("no finding");
+        tool::run(folder.path(), out.path()).expect("no finding");
         ["shaders.rs", "good.spv", "probe.spv"].map(|name| fs::read(out.path().join(name)).expect("file written"))
     };
     assert_eq!(written(), written());
@@ -365,18 +365,4 @@ fn siblings_have_an_interface_of_their_own_and_a_star_reaches_all_callers() {
         &["already"],
     );
     one_finding(&[("variants.txt", "wide = gone: A")], &["variants.txt:1", "there is no shader `gone`"]);
-}
-
-#[test]
-fn some_shaders_are_in_builds_for_tests_only() {
-    let (plain, other) = (small("", ""), small("", "").replace("probe", "other"));
-    let lines = "twin = probe: A\nlab: other twin # for tests\n";
-    let folder = folder(&[("test/probe.comp", &plain), ("test/other.comp", &other), ("variants.txt", lines)]);
-    let stems = |lab: bool| -> Vec<String> {
-        let generated = tool::generate(folder.path(), lab).expect("no finding");
-        generated.shaders.into_iter().filter(|shader| shader.is_in).map(|shader| shader.stem).collect()
-    };
-    assert_eq!(stems(true), ["other", "probe", "twin"]);
-    assert_eq!(stems(false), ["probe"]);
-    one_finding(&[("variants.txt", "lab: gone")], &["variants.txt:1", "there is no shader `gone`"]);
 }

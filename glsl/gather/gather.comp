@@ -7,9 +7,9 @@
 // gather — sum the gradient records of each splat, in the order of instances; update the densification statistic.
 // Work:    64 splats per workgroup.
 // Reads:   step, counters, failure; tiles_touched, instance_offsets [V]; v_instances_a, _b, _c [I];
-//          gaussian_from_splat [V], except in variant object; variant labels: labels [N], layer_from_label
+//          gaussian_from_splat [V]; variant labels: labels [N], layer_from_label
 // Writes:  v_splats [V,3]: v_mean2d (px), v_conic xy..; v_conic z, v_log_opacity, v_colour rg; v_colour b
-//          densify_stats [N] += (|scene v_mean2d| in NDC units, 1) of trained ones, except in variant object
+//          densify_stats [N] += (|scene v_mean2d| in NDC units, 1) of trained ones
 // Math:    the statistic uses the scene layer only, without the label loss.
 // Order:   fixed, bitwise reproducible; no atomics.
 // Mirror:  src/verify/reference/blend.rs::blend_backward, densify.rs::accumulate
@@ -24,10 +24,8 @@ FETCH4(5, v_instances_a);
 FETCH4(6, v_instances_b);
 FETCH4(7, v_instances_c);
 WRITE(9, vec4, v_splats);
-#ifndef OBJECT
 FETCHU(8, gaussian_from_splat);
 INOUT(10, vec2, densify_stats);
-#endif
 #ifdef LABELS
 FETCHU(11, labels);
 FETCHU(12, layer_from_label);
@@ -41,9 +39,7 @@ void main() {
     uint stamp = step.stamp;
     uint total = fetchu(tiles_touched, s), first = fetchu(instance_offsets, s);
     uint scene = total;
-#ifndef OBJECT
     uint gaussian = fetchu(gaussian_from_splat, s);
-#endif
 #ifdef LABELS
     scene = fetchu(layer_from_label, fetchu(labels, gaussian)) != 0u ? total / 2u : total;
 #endif
@@ -63,7 +59,6 @@ void main() {
     v_splats[3u * s] = a;
     v_splats[3u * s + 1u] = b;
     v_splats[3u * s + 2u] = vec4(c, 0.0, 0.0, 0.0);
-#ifndef OBJECT
     if (total > 0u && gaussian < step.trained_count) {
         float size = length(scene_mean * vec2(0.5 * float(step.width), 0.5 * float(step.height)));
         // As in project_backward, which drops the gradients of such a splat: an infinity would stay in the sum.
@@ -71,5 +66,4 @@ void main() {
             densify_stats[gaussian] += vec2(size, 1.0);
         }
     }
-#endif
 }

@@ -6,11 +6,11 @@
 #include "gaussian.glsl"
 // cull — drop Gaussians that count at no pixel: behind the near plane, too transparent, or certainly outside the image.
 // Work:    64 Gaussians per workgroup.
-// Reads:   step; means [N] (xyz world, w opacity logit); scales [N] (ln); variant object: labels [N], label_from_layer
+// Reads:   step; means [N] (xyz world, w opacity logit); scales [N] (ln)
 // Writes:  depth_keys [N]: bits of z, or KEY_INVISIBLE; splat_from_gaussian [N] = NO_SPLAT; counters.broken_* (integer
 //          atomics): nonfinite positions, scales and opacities
 // Math:    |cov2d| <= |J|^2 max(s)^2 + blur; radius where alpha falls to ALPHA_MIN. Conservative: never drops a splat
-//          with a tile in project_forward. Variant object: keeps only Gaussians of layer 1's object.
+//          with a tile in project_forward.
 // Mirror:  src/verify/reference/project.rs::cull
 
 layout(local_size_x = 64) in;
@@ -20,10 +20,6 @@ FETCH4(2, scales);
 WRITE(3, uint, depth_keys);
 WRITE(4, uint, splat_from_gaussian);
 INOUT1(5, Counters, counters);
-#ifdef OBJECT
-FETCHU(6, labels);
-READ(7, uint, label_from_layer);
-#endif
 
 void main() {
     StepUniforms u = step;
@@ -47,9 +43,6 @@ void main() {
     bool inside = all(greaterThanEqual(centre + radius, vec2(0.0)))
         && all(lessThanEqual(centre - radius, vec2(float(u.width), float(u.height))));
     bool visible = view.z > u.near && reach > 0.0 && inside && finite(view.z);
-#ifdef OBJECT
-    visible = visible && fetchu(labels, i) == label_from_layer[1];
-#endif
     if (!finite(mean.x + mean.y + mean.z + mean.w + s.x + s.y + s.z)) {
         atomicAdd(counters.broken_count, 1u);
         atomicMin(counters.broken_first, i);

@@ -10,8 +10,7 @@
 // Work:    64 splats per workgroup.
 // Reads:   step, failure; gaussian_from_splat [V]; means, scales, quats, sh0..sh3 [N]; v_splats [V,3]
 // Writes:  v_means [V] (xyz world, w opacity logit), v_scales [V] (ln), v_quats [V], v_sh0 [V], v_sh1 [V,3], v_sh2 [V,4],
-//          v_sh3 [V,6]; counters.nonfinite_* (integer atomics): Gaussians with a nonfinite gradient, which becomes 0;
-//          variant object: adds to the gradients of the scene's splats (splat_from_gaussian)
+//          v_sh3 [V,6]; counters.nonfinite_* (integer atomics): Gaussians with a nonfinite gradient, which becomes 0
 // Math:    dSigma = -Q dQ Q through the inverse; dM = 2 G M; Jacobian, view direction and mean2d paths reach the mean;
 //          a clamped x/z or y/z has gradient 0; so does a colour clamped at 0;
 //          variant antialiased: the opacity reaches M through the coverage.
@@ -30,24 +29,14 @@ FETCH4(7, sh1);
 FETCH4(8, sh2);
 FETCH4(9, sh3);
 FETCH4(10, v_splats);
-#ifdef OBJECT
-#define GRADIENT(number, name) INOUT(number, vec4, name)
-#define PUT(to, value) to += value
-#else
-#define GRADIENT(number, name) WRITE(number, vec4, name)
-#define PUT(to, value) to = value
-#endif
-GRADIENT(11, v_means);
-GRADIENT(12, v_scales);
-GRADIENT(13, v_quats);
-GRADIENT(14, v_sh0);
-GRADIENT(15, v_sh1);
-GRADIENT(16, v_sh2);
-GRADIENT(17, v_sh3);
+WRITE(11, vec4, v_means);
+WRITE(12, vec4, v_scales);
+WRITE(13, vec4, v_quats);
+WRITE(14, vec4, v_sh0);
+WRITE(15, vec4, v_sh1);
+WRITE(16, vec4, v_sh2);
+WRITE(17, vec4, v_sh3);
 INOUT1(18, Counters, counters);
-#ifdef OBJECT
-FETCHU(19, splat_from_gaussian);
-#endif
 
 #include "sh_fetch.glsl"
 #include "sh_colour.glsl"
@@ -122,12 +111,8 @@ void main() {
         atomicAdd(counters.nonfinite_count, 1u);
         atomicMin(counters.nonfinite_first, i);
     }
-    uint to = s;
-#ifdef OBJECT
-    to = fetchu(splat_from_gaussian, i);
-#endif
-    PUT(v_means[to], sane ? vec4(v_mean, v_logit) : vec4(0.0));
-    PUT(v_scales[to], sane ? vec4(v_log_scale, 0.0) : vec4(0.0));
-    PUT(v_quats[to], sane ? v_quat : vec4(0.0));
-    store_sh_gradient(to, basis, sane ? v_colour : vec3(0.0));
+    v_means[s] = sane ? vec4(v_mean, v_logit) : vec4(0.0);
+    v_scales[s] = sane ? vec4(v_log_scale, 0.0) : vec4(0.0);
+    v_quats[s] = sane ? v_quat : vec4(0.0);
+    store_sh_gradient(s, basis, sane ? v_colour : vec3(0.0));
 }

@@ -13,7 +13,6 @@
 // Writes:  tile_keys [I]; splat_from_instance [I]
 // Mirror:  src/verify/reference/tile.rs::emit_instances
 
-layout(constant_id = 18) const uint LAYER = 0; // layer of the pairs outside of object layers
 layout(local_size_x = 64) in;
 READ1(0, StepUniforms, step);
 READ1(1, Counters, counters);
@@ -51,7 +50,7 @@ void main() {
     uint written = 0u, tx = rect.x_min, ty = rect.y_min;
     for (uint k = 0u; k < rect.count; k++) {
         if (written < count && tile_touched(u, tx, ty, r0.xy, q, r1.y)) {
-            uint tile = LAYER * u.tile_count + ty * u.tiles_x + tx;
+            uint tile = ty * u.tiles_x + tx;
             tile_keys[first + written] = tile;
             splat_from_instance[first + written] = s;
 #ifdef LABELS

@@ -66,5 +66,5 @@ fn steps(context: &Context) -> Result<Value> {
     let config = finished_from(0, TrainConfig::default());
     let model = first_model(&dataset, &config)?;
     let window = Window { overlap: true, from_step: 0, warm_up: 10, steps: 20 };
-    Ok(profile(&gpu, (&dataset, &model, config), window, |_| (), context)?.to_json())
+    Ok(profile(&gpu, (&dataset, &model, config), window, context)?.to_json())
 }

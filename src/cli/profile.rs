@@ -60,10 +60,6 @@ pub struct ProfileArgs {
     /// adds.
     #[arg(long)]
     pub overlap: bool,
-    /// Run separate passes for each sampled object, as in the paper's code, to measure the gain of one traversal.
-    #[cfg(feature = "lab")]
-    #[arg(long, conflicts_with = "compare")]
-    pub separate_objects: bool,
     /// How the scene is read.
     #[command(flatten)]
     pub reading: SceneArgs,
@@ -100,11 +96,7 @@ pub(crate) fn run(args: &ProfileArgs, context: &Context) -> Result<()> {
         None => first_model(&dataset, &config)?,
     };
     let window = Window { overlap: args.overlap, from_step: args.from_step, warm_up: args.warm_up, steps: args.steps };
-    #[cfg(feature = "lab")]
-    let change = |trainer: &mut Trainer| trainer.separate_objects(args.separate_objects);
-    #[cfg(not(feature = "lab"))]
-    let change = |_: &mut Trainer| ();
-    let profile = profile(&gpu, (&dataset, &model, config), window, change, context)?;
+    let profile = profile(&gpu, (&dataset, &model, config), window, context)?;
     match &args.json {
         Some(Some(file)) => crate::io::atomic::write_json(file, &profile.to_json())?,
         Some(None) => stdout::print_json(&profile.to_json())?,
@@ -132,10 +124,6 @@ fn decide(args: &ProfileArgs) -> Result<TrainConfig> {
         Some(path) => Settings::read(path)?.train,
         None => TrainConfig::default(),
     };
-    #[cfg(feature = "lab")]
-    if args.separate_objects {
-        decided.layer_every = Some(1);
-    }
     let steps = u64::from(args.from_step) + u64::from(args.warm_up) + u64::from(args.steps.saturating_add(COUNTED)) + 1;
     let steps = u32::try_from(steps).map_err(|_| Error::usage(Setting("steps"), "there are too many steps in all"))?;
     decided.iterations = decided.iterations.max(steps);
@@ -161,12 +149,11 @@ fn open(args: &ProfileArgs, config: &TrainConfig) -> Result<Dataset> {
     Ok(dataset)
 }
 
-/// Times steps of a training of `model` on a dataset; `change` is applied to the trainer first.
+/// Times steps of a training of `model` on a dataset.
 pub(super) fn profile(
     gpu: &Arc<Gpu>,
     (dataset, model, config): (&Dataset, &Gaussians, TrainConfig),
     window: Window,
-    change: impl FnOnce(&mut Trainer),
     context: &Context,
 ) -> Result<Profile> {
     if gpu.limits().timestamp_bits == 0 {
@@ -177,7 +164,6 @@ pub(super) fn profile(
     let plan = PlanOptions { barrier_everywhere: !window.overlap, ..PlanOptions::default() };
     let options = SchedulerOptions { plan, timestamps: true, ..SchedulerOptions::default() };
     let mut trainer = Trainer::new(Arc::clone(gpu), config, dataset, model, options)?;
-    change(&mut trainer);
     measure(&mut trainer, window, context, &mut profile)?;
     Ok(profile)
 }

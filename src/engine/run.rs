@@ -15,9 +15,6 @@ pub enum ListKey {
     Train(Variant),
     /// One optimiser step with the passes of a numbered variant of the [`pass::Extension`].
     Extended(Variant, u32),
-    /// One optimiser step with separate passes for this many sampled objects, see [`pass::separate_step`].
-    #[cfg(feature = "lab")]
-    Separate(Variant, u32),
     /// One picture.
     Render {
         /// Active degree of the spherical harmonics.
@@ -81,8 +78,6 @@ impl Engine {
             ListKey::Extended(variant, passes) => {
                 pass::extended_step(shape, capacity, variant, (&*self.extension, passes))
             }
-            #[cfg(feature = "lab")]
-            ListKey::Separate(variant, objects) => pass::separate_step(shape, capacity, variant, objects),
             ListKey::Render { sh_degree, label_rounds } => pass::render_view(shape, capacity, sh_degree, label_rounds),
             ListKey::LabelMap(rounds) => pass::label_view(shape, capacity, rounds),
             ListKey::Vote(rounds, alone) => pass::vote_view(shape, capacity, rounds, alone),

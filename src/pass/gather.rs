@@ -7,7 +7,13 @@ use crate::scheduler::plan::{Buf, Stage};
 
 /// Sums the records and updates the densification statistic.
 pub(super) fn gather(b: &mut Builder) {
-    records(b, b.labels, false);
+    b.list.stage = Stage::Gather;
+    pass!(b, gather(labels: b.labels) {
+        step: Buf::STEP, counters: Buf::COUNTERS, failure: Buf::FAILURE, tiles_touched: Buf::TILES_TOUCHED,
+        instance_offsets: Buf::INSTANCE_OFFSETS, v_instances_a: Buf::V_INSTANCES_A, v_instances_b: Buf::V_INSTANCES_B,
+        v_instances_c: Buf::V_INSTANCES_C, gaussian_from_splat: GAUSSIAN_FROM_SPLAT, v_splats: Buf::V_SPLATS,
+        densify_stats: Buf::DENSIFY_STATS, labels: Buf::LABELS, layer_from_label: Buf::LAYER_FROM_LABEL,
+    } [], over_splats());
 }
 
 /// Adds the blending weights of the view to those of the Gaussians, if every pixel has a gradient of 1.
@@ -17,21 +23,5 @@ pub(super) fn weigh(b: &mut Builder) {
         step: Buf::STEP, counters: Buf::COUNTERS, failure: Buf::FAILURE, tiles_touched: Buf::TILES_TOUCHED,
         instance_offsets: Buf::INSTANCE_OFFSETS, gaussian_from_splat: GAUSSIAN_FROM_SPLAT,
         v_instances_b: Buf::V_INSTANCES_B, v_instances_c: Buf::V_INSTANCES_C, densify_stats: Buf::DENSIFY_STATS,
-    } [], over_splats());
-}
-
-/// Sums the records of one object's splats; the densification statistic ignores them.
-#[cfg(feature = "lab")]
-pub(super) fn gather_object(b: &mut Builder) {
-    records(b, false, true);
-}
-
-fn records(b: &mut Builder, labels: bool, object: bool) {
-    b.list.stage = Stage::Gather;
-    pass!(b, gather(labels: labels, object: object) {
-        step: Buf::STEP, counters: Buf::COUNTERS, failure: Buf::FAILURE, tiles_touched: Buf::TILES_TOUCHED,
-        instance_offsets: Buf::INSTANCE_OFFSETS, v_instances_a: Buf::V_INSTANCES_A, v_instances_b: Buf::V_INSTANCES_B,
-        v_instances_c: Buf::V_INSTANCES_C, gaussian_from_splat: GAUSSIAN_FROM_SPLAT, v_splats: Buf::V_SPLATS,
-        densify_stats: Buf::DENSIFY_STATS, labels: Buf::LABELS, layer_from_label: Buf::LAYER_FROM_LABEL,
     } [], over_splats());
 }

@@ -64,13 +64,6 @@ fn over_pixels(b: &Builder, each: u64) -> Grid {
     Grid::Groups(groups.min(constants::FOLD), groups.div_ceil(constants::FOLD), 1)
 }
 
-/// Sums the label loss of the layers, without the photo loss.
-#[cfg(feature = "lab")]
-pub(crate) fn label_loss(b: &mut Builder) {
-    b.list.stage = Stage::Loss;
-    reduce(b, 0);
-}
-
 fn reduce(b: &mut Builder, partials: u32) {
     let layer_tiles = b.capacity.layer_tiles as u32;
     pass!(b, loss_reduce(labels: b.labels, disagreement: b.disagreement) {

@@ -12,8 +12,6 @@ pub(crate) mod loss;
 pub(crate) mod optimize;
 pub(crate) mod project;
 pub(crate) mod scan;
-#[cfg(feature = "lab")]
-mod separate;
 pub(crate) mod shape;
 pub(crate) mod sort;
 pub(crate) mod stage;
@@ -22,8 +20,6 @@ mod tile;
 pub use build::Builder;
 pub(crate) use kernels::{CompiledKernel, FIGURES, compiled_kernels};
 pub(crate) use optimize::{ATTRIBUTES, SHARED_PLANES};
-#[cfg(feature = "lab")]
-pub use separate::separate_step;
 pub use shape::KernelShape;
 
 use crate::pass::build::pass;

@@ -15,27 +15,10 @@ const DEPTH_BITS: u32 = 32;
 /// Lists the visible Gaussians in depth order and projects them.
 pub(super) fn visible_splats(b: &mut Builder) {
     b.list.stage = Stage::Project;
-    cull(b, false);
-    order_and_project(b);
-}
-
-/// Same as [`visible_splats`], for the object of layer 1 only.
-#[cfg(feature = "lab")]
-pub(super) fn visible_splats_of_object(b: &mut Builder) {
-    b.list.stage = Stage::Project;
-    cull(b, true);
-    order_and_project(b);
-}
-
-fn cull(b: &mut Builder, object: bool) {
-    pass!(b, cull(object: object) {
+    pass!(b, cull {
         step: Buf::STEP, means: Buf::MEANS, scales: Buf::SCALES, depth_keys: Buf::DEPTH_KEYS,
-        splat_from_gaussian: Buf::SPLAT_FROM_GAUSSIAN, counters: Buf::COUNTERS, labels: Buf::LABELS,
-        label_from_layer: Buf::LABEL_FROM_LAYER,
+        splat_from_gaussian: Buf::SPLAT_FROM_GAUSSIAN, counters: Buf::COUNTERS,
     } [], over_gaussians());
-}
-
-fn order_and_project(b: &mut Builder) {
     let buffers = SortBuffers {
         keys: [Buf::DEPTH_KEYS_A, Buf::DEPTH_KEYS_B],
         values: [GAUSSIAN_FROM_SPLAT, Buf::DEPTH_VALUES_B],
@@ -86,24 +69,13 @@ pub(crate) fn pose_backward(b: &mut Builder, row: u32) {
 
 /// Carries the gradients of splats back to the parameters of their Gaussians.
 pub(super) fn project_backward(b: &mut Builder) {
-    backward(b, false, Buf::SPLAT_FROM_GAUSSIAN);
-}
-
-/// Same as [`project_backward`] for the splats of one object; adds to the gradients of `scene_splats`.
-#[cfg(feature = "lab")]
-pub(super) fn project_backward_of_object(b: &mut Builder, scene_splats: Buf) {
-    backward(b, true, scene_splats);
-}
-
-fn backward(b: &mut Builder, object: bool, scene_splats: Buf) {
     let sh_degree = b.sh_degree;
     b.list.stage = Stage::ProjectBackward;
-    pass!(b, project_backward(object: object) {
+    pass!(b, project_backward {
         step: Buf::STEP, failure: Buf::FAILURE, gaussian_from_splat: GAUSSIAN_FROM_SPLAT, means: Buf::MEANS,
         scales: Buf::SCALES, quats: Buf::QUATS, sh0: Buf::SH0, sh1: Buf::SH1, sh2: Buf::SH2, sh3: Buf::SH3,
         v_splats: Buf::V_SPLATS, v_means: Buf::V_MEANS, v_scales: Buf::V_SCALES, v_quats: Buf::V_QUATS,
         v_sh0: Buf::V_SH0, v_sh1: Buf::V_SH1, v_sh2: Buf::V_SH2, v_sh3: Buf::V_SH3, counters: Buf::COUNTERS,
-        splat_from_gaussian: scene_splats,
     } [sh_degree: sh_degree], over_splats());
 }
 

@@ -11,34 +11,17 @@ use crate::shaders::constants;
 /// Lists the (splat, tile) pairs, sorts them by layer and tile, and finds each tile's range. Returns the buffer with
 /// each sorted pair's position before the sort.
 pub(super) fn bin_splats(b: &mut Builder) -> Buf {
-    bin(b, b.labels, 0)
-}
-
-/// Bins the scene's splats only, into the first layer of the list.
-#[cfg(feature = "lab")]
-pub(super) fn bin_scene(b: &mut Builder) -> Buf {
-    bin(b, false, 0)
-}
-
-/// Bins an object's splats, into layer 1 only.
-#[cfg(feature = "lab")]
-pub(super) fn bin_object(b: &mut Builder) -> Buf {
-    bin(b, false, 1)
-}
-
-/// Bins each splat into the scene and, with `layers`, into its object's layer; else into `layer` only.
-fn bin(b: &mut Builder, layers: bool, layer: u32) -> Buf {
     let instances = b.capacity.instances as u32;
     b.list.stage = Stage::Tile;
     pass!(b, prepare_instances {
         counters: Buf::COUNTERS, dispatch_args: Buf::DISPATCH_ARGS, failure: Buf::FAILURE,
     } [instance_capacity: instances], ONE);
-    pass!(b, emit_instances(labels: layers) {
+    pass!(b, emit_instances(labels: b.labels) {
         step: Buf::STEP, counters: Buf::COUNTERS, failure: Buf::FAILURE, splats: Buf::SPLATS,
         tiles_touched: Buf::TILES_TOUCHED, instance_offsets: Buf::INSTANCE_OFFSETS, tile_keys: Buf::TILE_KEYS_A,
         splat_from_instance: Buf::SPLAT_FROM_INSTANCE, gaussian_from_splat: GAUSSIAN_FROM_SPLAT,
         labels: Buf::LABELS, layer_from_label: Buf::LAYER_FROM_LABEL,
-    } [layer: layer], over_splats());
+    } [], over_splats());
     let buffers =
         SortBuffers { keys: [Buf::TILE_KEYS_A, Buf::TILE_KEYS_B], values: [Buf::TILE_VALUES_A, Buf::TILE_VALUES_B] };
     let bits = 64 - b.capacity.virtual_tiles.saturating_sub(1).leading_zeros();

@@ -26,7 +26,6 @@ pub(crate) mod region;
 mod sampler;
 mod schedule;
 mod sentinel;
-mod separate;
 pub(crate) mod setup;
 pub(crate) mod shared;
 pub(crate) mod state;
@@ -106,7 +105,6 @@ pub struct Trainer {
     shared: Shared,
     /// Votes were counted before, so that masks can be compared with the labels.
     labelled_once: bool,
-    separate: separate::Separate,
     timing: Option<timing::Timing>,
     /// The blend passes count the pairs with a weight.
     counts_pairs: bool,
@@ -187,7 +185,6 @@ impl Trainer {
             strategy,
             shared,
             labelled_once: false,
-            separate: separate::Separate::default(),
             timing: None,
             counts_pairs: false,
             seen: sentinel::Seen::default(),
@@ -355,9 +352,6 @@ impl Trainer {
             update: input.update,
             counts: self.counts_pairs,
         };
-        if let Some(key) = self.separate.key(variant, input) {
-            return key;
-        }
         match self.shared.passes(self.strategy.passes(self.at(input.step))) {
             0 => ListKey::Train(variant),
             passes => ListKey::Extended(variant, passes),

@@ -18,7 +18,6 @@ mod optimize;
 mod orders;
 mod project;
 mod relocate;
-mod separate;
 mod step;
 mod tile;
 mod votes;

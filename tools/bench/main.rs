@@ -17,7 +17,6 @@ mod limits;
 mod measure;
 mod memory;
 mod pace;
-mod paper;
 mod poses;
 #[allow(dead_code, reason = "what the build does with shaders; benchmarks generate nothing")]
 #[path = "../shadergen/mod.rs"]
@@ -61,8 +60,6 @@ enum Command {
     Kernels(kernels::KernelArgs),
     /// Cost of a step with labels relative to one without, by covered area and number of objects.
     Steps(Common),
-    /// One traversal for all objects against a pass for each, as in the paper's reference code.
-    Paper(paper::Options),
     /// Quality against seconds of training, with and without labels, and the time to the first step.
     Training(training::Options),
     /// How near each stage of a step comes to the limit of the device, measured in the same run.
@@ -102,7 +99,6 @@ fn run() -> Result<()> {
     match Arguments::parse().command {
         Command::Kernels(args) => kernels::run(&args),
         Command::Steps(common) => steps::run(&common),
-        Command::Paper(options) => paper::run(&options),
         Command::Poses(options) => poses::run(&options),
         Command::Exposures(options) => exposures::run(&options),
         Command::Zoom(options) => zoom::run(&options),

@@ -48,11 +48,6 @@ pub fn median(values: impl IntoIterator<Item = f64>) -> f64 {
     }
 }
 
-/// Medians of wall clock and processor time.
-pub fn median_cost(costs: &[Cost]) -> Cost {
-    Cost { wall: median(costs.iter().map(|cost| cost.wall)), cpu: median(costs.iter().map(|cost| cost.cpu)) }
-}
-
 /// Returns a quantile, 0 without values. Reorders them.
 pub fn quantile(values: &mut [f64], share: f64) -> f64 {
     if values.is_empty() {

@@ -95,22 +95,6 @@ pub fn trained(gpu: &Arc<Gpu>, dataset: &Dataset, config: TrainConfig) -> Result
     Ok(trainer)
 }
 
-/// A labelled model after a number of steps.
-pub fn labelled_model(gpu: &Arc<Gpu>, dataset: &Dataset, steps: u32) -> Result<Gaussians> {
-    let steps = steps.max(1);
-    let config = TrainConfig {
-        iterations: steps + 1,
-        label_from: Some(steps.div_ceil(2)),
-        start_size: Some(1.0),
-        ..TrainConfig::default()
-    };
-    let mut trainer = trainer(gpu, dataset, &start(dataset, &config)?, config)?;
-    for _ in 0..steps {
-        trainer.step()?;
-    }
-    trainer.labelled_model()
-}
-
 /// Settings for timing: all bands of colour and labels from the first step, and nothing between the steps after it.
 pub fn timing_config() -> TrainConfig {
     TrainConfig {

@@ -95,13 +95,11 @@ fn emit_struct(out: &mut String, body: &Struct, doc: &str) {
     put!(out, "    const _: () = assert!(size_of::<{name}>() == {});", body.bytes);
 }
 
-/// Writes one module for a file, with each name of its siblings once. Returns the number of variants in this build; a
-/// file without variants has no module.
+/// Writes one module for a file, with each name of its siblings once. Returns the number of variants.
 fn emit_file(out: &mut String, file: &str, siblings: &[&Shader]) -> usize {
-    let here = siblings.iter().filter(|shader| shader.is_in);
     let variants: Vec<_> =
-        here.flat_map(|shader| shader.variants.iter().map(move |variant| (shader, variant))).collect();
-    let (false, Some(base)) = (variants.is_empty(), siblings.first()) else { return 0 };
+        siblings.iter().flat_map(|shader| shader.variants.iter().map(move |variant| (shader, variant))).collect();
+    let Some(base) = siblings.first() else { return 0 };
     put!(out, "\n/// `{}`: {}", base.path, base.summary().unwrap_or_default());
     put!(out, "#[allow(clippy::all)]\npub mod {file} {{");
     emit_macros(out, siblings);

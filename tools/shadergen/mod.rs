@@ -56,8 +56,6 @@ pub struct Shader {
     pub source: String,
     /// Base first.
     pub variants: Vec<Variant>,
-    /// Whether it is in this build. A sibling outside of it still adds its binding names to the module.
-    pub is_in: bool,
 }
 
 impl Shader {
@@ -114,24 +112,24 @@ pub struct Generated {
 }
 
 /// Generates from the folder `glsl` and writes `shaders.rs` and the `.spv` files into `out`.
-pub fn run(glsl: &Path, out: &Path, lab: bool) -> Result<(), Vec<Finding>> {
-    let generated = generate(glsl, lab)?;
+pub fn run(glsl: &Path, out: &Path) -> Result<(), Vec<Finding>> {
+    let generated = generate(glsl)?;
     let save = |file: PathBuf, bytes: &[u8]| {
         fs::write(&file, bytes).map_err(|error| vec![Finding::new(file.display().to_string(), error.to_string())])
     };
-    for variant in generated.shaders.iter().filter(|shader| shader.is_in).flat_map(|shader| &shader.variants) {
+    for variant in generated.shaders.iter().flat_map(|shader| &shader.variants) {
         let bytes: Vec<u8> = variant.words.iter().flat_map(|word| word.to_le_bytes()).collect();
         save(out.join(format!("{}.spv", variant.name)), &bytes)?;
     }
     save(out.join("shaders.rs"), generated.rust.as_bytes())
 }
 
-/// Everything but the writing; with `lab` also the shaders of that feature. All findings of a stage come together.
-pub fn generate(glsl: &Path, lab: bool) -> Result<Generated, Vec<Finding>> {
+/// Everything but the writing. All findings of a stage come together.
+pub fn generate(glsl: &Path) -> Result<Generated, Vec<Finding>> {
     let include = glsl.join("include");
     let compiler = GlslCompiler::new(&include).map_err(|error| vec![Finding::new("", error)])?;
     let mut shaders = find(glsl)?;
-    declare_variants(glsl, &mut shaders, lab)?;
+    declare_variants(glsl, &mut shaders)?;
     compile_all(&include, &mut shaders)?;
     let mut findings: Vec<Finding> = shaders.iter().flat_map(check::shader).collect();
     findings.extend(check::shared_structs(&shaders));
@@ -197,13 +195,13 @@ fn find(glsl: &Path) -> Result<Vec<Shader>, Vec<Finding>> {
             findings.push(Finding::new(path.clone(), format!("{} has the same stem", twin.path)));
         }
         let variants = vec![Variant { name: stem.clone(), ..Variant::default() }];
-        shaders.push(Shader { file_stem: stem.clone(), stem, path, source: read(&file)?, variants, is_in: true });
+        shaders.push(Shader { file_stem: stem.clone(), stem, path, source: read(&file)?, variants });
     }
     shaders.sort_by(|a, b| a.stem.cmp(&b.stem));
     if findings.is_empty() { Ok(shaders) } else { Err(findings) }
 }
 
-fn declare_variants(glsl: &Path, shaders: &mut Vec<Shader>, lab: bool) -> Result<(), Vec<Finding>> {
+fn declare_variants(glsl: &Path, shaders: &mut Vec<Shader>) -> Result<(), Vec<Finding>> {
     let file = glsl.join("variants.txt");
     if !file.exists() {
         return Ok(());
@@ -233,12 +231,6 @@ fn declare_variants(glsl: &Path, shaders: &mut Vec<Shader>, lab: bool) -> Result
                     shader.variants.push(Variant { name, defines, ..Variant::default() });
                 }
             });
-        }
-    }
-    for (place, stem) in variants::of_lab(&name, &text) {
-        match shaders.iter().position(|shader| shader.stem == stem) {
-            None => findings.push(Finding::new(place, format!("there is no shader `{stem}`"))),
-            Some(index) => shaders[index].is_in = lab,
         }
     }
     shaders.sort_by(|a, b| a.stem.cmp(&b.stem));

@@ -3,15 +3,12 @@
 //! `stem + suffix: DEFINE OTHER=4` compiles `stem.comp` once more as `stem_suffix`, with the same interface.
 //! `call* + suffix: DEFINE` does so for every shader that calls a function of this prefix, and for its variants so far.
 //! `sibling = stem: DEFINE` makes a shader of its own, with an interface of its own, from the same file.
-//! `lab: STEM STEM` leaves these shaders out of builds without the feature `lab`.
 //! Every stem has its base variant without macros; it needs no line. Lines work in order: a `*` reaches the siblings
 //! above it. `#` begins a comment.
 
 use super::compile::Define;
 use super::{Finding, is_snake_case};
 use std::collections::BTreeSet;
-
-const LAB: &str = "lab:";
 
 /// One line of the file.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -48,7 +45,7 @@ pub fn parse(name: &str, text: &str) -> Result<Vec<VariantLine>, Vec<Finding>> {
     let mut seen = BTreeSet::new();
     for (index, raw) in text.lines().enumerate() {
         let content = content(raw);
-        if content.is_empty() || content.starts_with(LAB) {
+        if content.is_empty() {
             continue;
         }
         let place = format!("{name}:{}", index + 1);
@@ -63,15 +60,6 @@ pub fn parse(name: &str, text: &str) -> Result<Vec<VariantLine>, Vec<Finding>> {
         }
     }
     if findings.is_empty() { Ok(lines) } else { Err(findings) }
-}
-
-/// Place and stem of the shaders that only builds with the feature `lab` have.
-pub fn of_lab<'a>(name: &str, text: &'a str) -> Vec<(String, &'a str)> {
-    let of_line = |(index, raw): (usize, &'a str)| {
-        let stems = content(raw).strip_prefix(LAB).unwrap_or_default().split_whitespace();
-        stems.map(|stem| (format!("{name}:{}", index + 1), stem)).collect::<Vec<_>>()
-    };
-    text.lines().enumerate().flat_map(of_line).collect()
 }
 
 /// Whether a text calls a function whose name begins with `prefix`.

@@ -117,18 +117,4 @@ crate::buffers! {
     OLD_QUATS "old_quats": 16, Domain::Gaussians, Class::Step, VEC4, "Quats before densification.";
     OLD_VALUES "old_values": 96, Domain::Gaussians, Class::Step, VEC4, "One attribute before densification.";
     OLD_LABELS "old_labels": 4, Domain::Labelled, Class::Step, WORD, "Labels before densification.";
-    #[cfg(feature = "lab")]
-    OBJECT "object": 4, Domain::One, Class::Step, None, "Layer of the object whose passes run, in a step with separate passes for each object.";
-    #[cfg(feature = "lab")]
-    OBJECT_COUNTERS "object_counters": size_of::<Counters>() as u32, Domain::One, Class::Step, None, "Counters of the passes before those of that object.";
-    #[cfg(feature = "lab")]
-    OBJECT_STEP "object_step": size_of::<StepUniforms>() as u32, Domain::One, Class::Step, None, "Uniforms of the step with that object as the only layer.";
-    #[cfg(feature = "lab")]
-    OBJECT_LABEL "object_label": 4, Domain::Fixed(2), Class::Step, None, "label_from_layer of that object's layer.";
-    #[cfg(feature = "lab")]
-    OBJECT_WEIGHT "object_weight": 4, Domain::Fixed(2), Class::Step, None, "layer_weights of that object's layer.";
-    #[cfg(feature = "lab")]
-    OBJECT_OCCLUDERS "object_occluders": 4, Domain::OccluderWords, Class::Step, None, "layer_occluders of that object's layer.";
-    #[cfg(feature = "lab")]
-    OBJECT_SPLATS "object_splats": 4, Domain::Gaussians, Class::Step, None, "splat_from_gaussian among that object's splats, `[N]`.";
 }

@@ -125,8 +125,6 @@ pub fn engine_lists(shape: KernelShape) -> (Capacity, Vec<PassList>) {
     let lists = vec![
         pass::training_step(&shape, &capacity, variant),
         pass::training_step(&shape, &capacity, Variant { labels: false, lift: false, sh_degree: 0, ..variant }),
-        #[cfg(feature = "lab")]
-        pass::separate_step(&shape, &capacity, variant, 2),
         pass::render_view(&shape, &capacity, 3, 2),
         pass::label_view(&shape, &capacity, 2),
         pass::densify_count(&shape, &capacity),

@@ -1,5 +1,4 @@
-//! Quality against seconds of training: plain, with our labels, with the paper's settings, and with the paper's
-//! settings and a pass for each object.
+//! Quality against seconds of training: plain, with our labels, and with the paper's settings.
 //!
 //! The clock starts with the scene in memory and an open device, before the model is on it, and stands still while
 //! models are scored. What a driver compiles is in it; the time to the first step is measured on its own, in new
@@ -53,14 +52,12 @@ struct Kind {
     name: &'static str,
     labels: bool,
     paper: bool,
-    separate: bool,
 }
 
-const KINDS: [Kind; 4] = [
-    Kind { name: "no labels", labels: false, paper: false, separate: false },
-    Kind { name: "labels", labels: true, paper: false, separate: false },
-    Kind { name: "paper's settings", labels: true, paper: true, separate: false },
-    Kind { name: "paper's, a pass for each object", labels: true, paper: true, separate: true },
+const KINDS: [Kind; 3] = [
+    Kind { name: "no labels", labels: false, paper: false },
+    Kind { name: "labels", labels: true, paper: false },
+    Kind { name: "paper's settings", labels: true, paper: true },
 ];
 
 /// Seconds from the start of a process to its first finished step.
@@ -153,7 +150,6 @@ fn train(gpu: &Arc<Gpu>, dataset: &Dataset, kind: Kind, iterations: u32, seed: u
     let mut mark = marks.next();
     let (mut before, mut now) = (0.0, Instant::now());
     let mut trainer = trainer(gpu, &scene, &start(&scene, &config)?, config.clone())?;
-    trainer.separate_objects(kind.separate);
     for step in 1..=iterations {
         trainer.step()?;
         let due = mark.is_some_and(|mark| before + now.elapsed().as_secs_f64() >= mark);
