@@ -45,7 +45,7 @@ pub(super) fn blend_backward(b: &mut Builder, pairs: Buf) {
             counters: Buf::COUNTERS, layer_tiles: Buf::LAYER_TILES, layer_state: Buf::LAYER_STATE,
             layer_weights: Buf::LAYER_WEIGHTS, segment_back: Buf::SEGMENT_BACK, target: Buf::TARGET,
             view_labels: Buf::VIEW_LABELS, labels: Buf::LABELS, gaussian_from_splat: GAUSSIAN_FROM_SPLAT,
-            label_trust: Buf::LABEL_TRUST, disagreement: Buf::DISAGREEMENT, segment_rest: Buf::SEGMENT_REST,
+            disagreement: Buf::DISAGREEMENT, segment_rest: Buf::SEGMENT_REST,
             depths: Buf::DEPTHS,
         } [segment: segment, segments: segments], args(constants::ARGS_BLEND));
     }

@@ -2,7 +2,7 @@
 
 use super::depths::{self, KnownDepths};
 use super::{LabelRule, TrainConfig, backdrop};
-use crate::engine::{DisagreementInput, Engine, LayerInput, TrainInput};
+use crate::engine::{Engine, LayerInput, TrainInput};
 use crate::scene::{Camera, LabelMap, Occluders, Photo, Pixels};
 use crate::shaders::constants::{ADAM_BETA1, ADAM_BETA2, ALPHA_SLACK, FINEST, LABEL_BORDER};
 use crate::shaders::structs::StepUniforms;
@@ -211,10 +211,7 @@ pub(crate) fn train_input<'a>(
 ) -> TrainInput<'a> {
     let room = engine.size().labels.filter(|_| input.labels);
     let (disagrees, layered) = if input.layers.is_empty() { (room, None) } else { (None, room) };
-    let disagreement = disagrees.map(|room| {
-        let trust = vec![1.0; room.max_label as usize + 1];
-        DisagreementInput { view_labels: view.view_labels, trust }
-    });
+    let disagreement = disagrees.map(|_| view.view_labels);
     let layers = layered.map(|room| {
         let words = uniforms.occluder_words as usize;
         let mut layer_from_label = vec![0_u32; room.max_label as usize + 1];
