@@ -3,6 +3,7 @@
 use super::depths::{self, KnownDepths};
 use super::{LabelRule, TrainConfig, backdrop};
 use crate::engine::{Engine, LayerInput, TrainInput};
+use crate::pass::Supervision;
 use crate::scene::{Camera, LabelMap, Occluders, Photo, Pixels};
 use crate::shaders::constants::{ADAM_BETA1, ADAM_BETA2, ALPHA_SLACK, FINEST, LABEL_BORDER};
 use crate::shaders::structs::StepUniforms;
@@ -153,9 +154,14 @@ pub struct StepInput {
 }
 
 impl StepInput {
-    /// Returns true if the step lifts labels by the rule of the paper.
-    pub fn lifts(&self, config: &TrainConfig) -> bool {
-        self.labels && config.label_rule == LabelRule::Main
+    /// Returns what the step compares with the view. Known depths end before labels start.
+    pub fn supervision(&self, config: &TrainConfig) -> Supervision {
+        match (self.labels, self.layers.is_empty()) {
+            (true, false) => Supervision::Layers { lift: config.label_rule == LabelRule::Main },
+            (true, true) => Supervision::Disagreement,
+            (false, _) if config.depth_weight_at(self.step) > 0.0 => Supervision::Depth,
+            (false, _) => Supervision::Photo,
+        }
     }
 }
 
