@@ -5,7 +5,7 @@ use std::io::Write;
 
 /// Bytes (64 TiB) above which a request comes from a number in a damaged file, not from a lack of memory: no computer
 /// has as much. It fails like any other, and the reader of the file reports it.
-const PLAUSIBLE_BYTES_MAX: usize = 1 << 46;
+const ALLOCATION_PLAUSIBLE_MAX: usize = 1 << 46;
 
 /// The system's allocator. If memory runs out, the process ends with status 5 and a message, as for device memory; by
 /// default Rust aborts.
@@ -39,7 +39,7 @@ unsafe impl GlobalAlloc for Host {
 
 /// Returns what the allocator returned; ends the process if that is none of a plausible number of bytes.
 fn checked(memory: *mut u8, bytes: usize) -> *mut u8 {
-    if memory.is_null() && bytes < PLAUSIBLE_BYTES_MAX {
+    if memory.is_null() && bytes < ALLOCATION_PLAUSIBLE_MAX {
         // Standard error is unbuffered, so this allocates no memory.
         let _ = writeln!(
             std::io::stderr(),

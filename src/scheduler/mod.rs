@@ -90,7 +90,7 @@ pub struct Scheduler {
 }
 
 impl Scheduler {
-    /// Allocates everything except scratch memory; Model and Kept buffers start as zeros.
+    /// Allocates everything except scratch memory; model and persistent buffers start as zeros.
     pub fn new(
         gpu: Arc<Gpu>,
         table: &'static [BufferDecl],

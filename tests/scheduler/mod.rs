@@ -15,7 +15,7 @@ use labelgs::internals::shaders::{Access, BindingKind, ShaderDesc};
 
 /// Buffers of the toy passes.
 mod table {
-    use labelgs::internals::scheduler::plan::{Class, Domain, TexelFormat};
+    use labelgs::internals::scheduler::plan::{Buf, BufferDecl, Class, Domain, TexelFormat};
     labelgs::buffers! { consts;
         MODEL "model": 4, Domain::Gaussians, Class::Model, Some(TexelFormat::R32Uint), "Kept.";
         PLANES "planes": 16, Domain::Gaussians, Class::Model, Some(TexelFormat::Rgba32Sfloat), "Kept vectors.";

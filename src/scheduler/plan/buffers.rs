@@ -44,9 +44,9 @@ impl Class {
     pub fn name(self) -> &'static str {
         match self {
             Self::Model => "model",
-            Self::Persistent => "kept",
+            Self::Persistent => "persistent",
             Self::Step => "step",
-            Self::PerFrame => "slot",
+            Self::PerFrame => "frame",
             Self::Report => "report",
         }
     }
@@ -90,31 +90,29 @@ pub struct BufferDecl {
     pub doc: &'static str,
 }
 
-/// Declares a table of buffers.
+/// Declares a table of buffers: `pub static TABLE: &[BufferDecl]`, and a constant for each row.
 ///
-/// Each row is `NAME "name": element_bytes, domain, class, texel, "doc";` and may have a `#[cfg]`. The plain form
-/// defines the constants `Buf::NAME` and `pub static TABLE: &[BufferDecl]`; only this crate can use it, because `Buf`
-/// is its type. The form that starts with `consts;` defines free constants `NAME` instead, for tables of tests.
+/// Each row is `NAME "name": element_bytes, domain, class, texel, "doc";`. The constants are `Buf::NAME`; with `consts;`
+/// before the rows they are free, for tables of tests. `Buf` and `BufferDecl` have to be in scope.
 #[doc(hidden)]
 #[macro_export]
 macro_rules! buffers {
-    (consts; $($(#[$gate:meta])? $ident:ident $name:literal : $bytes:expr, $domain:expr, $class:expr, $texel:expr, $doc:literal;)*) => {
-        $crate::buffers!(@table $($(#[$gate])? $ident $name : $bytes, $domain, $class, $texel, $doc;)*);
-        $($(#[$gate])? #[doc = $doc] #[allow(dead_code)]
-        pub const $ident: $crate::internals::scheduler::plan::Buf = $crate::internals::scheduler::plan::Buf(BufferIndex::$ident as u16);)*
+    (consts; $($ident:ident $name:literal : $bytes:expr, $domain:expr, $class:expr, $texel:expr, $doc:literal;)*) => {
+        $crate::buffers!(@table $($ident $name : $bytes, $domain, $class, $texel, $doc;)*);
+        $(#[doc = $doc] #[allow(dead_code)] pub const $ident: Buf = Buf(BufferIndex::$ident as u16);)*
     };
-    (@table $($(#[$gate:meta])? $ident:ident $name:literal : $bytes:expr, $domain:expr, $class:expr, $texel:expr, $doc:literal;)*) => {
+    (@table $($ident:ident $name:literal : $bytes:expr, $domain:expr, $class:expr, $texel:expr, $doc:literal;)*) => {
         #[allow(non_camel_case_types, clippy::upper_case_acronyms, dead_code)]
-        enum BufferIndex { $($(#[$gate])? $ident),* }
+        enum BufferIndex { $($ident),* }
         /// All rows of the table of buffers, in the order of their declaration.
-        pub static TABLE: &[$crate::internals::scheduler::plan::BufferDecl] = &[$($(#[$gate])? $crate::internals::scheduler::plan::BufferDecl {
+        pub static TABLE: &[BufferDecl] = &[$(BufferDecl {
             name: $name, element_bytes: $bytes, domain: $domain, class: $class, texel: $texel, doc: $doc,
         }),*];
     };
-    ($($(#[$gate:meta])? $ident:ident $name:literal : $bytes:expr, $domain:expr, $class:expr, $texel:expr, $doc:literal;)*) => {
-        $crate::buffers!(@table $($(#[$gate])? $ident $name : $bytes, $domain, $class, $texel, $doc;)*);
-        impl $crate::internals::scheduler::plan::Buf {
-            $($(#[$gate])? #[doc = $doc] pub const $ident: $crate::internals::scheduler::plan::Buf = $crate::internals::scheduler::plan::Buf(BufferIndex::$ident as u16);)*
+    ($($ident:ident $name:literal : $bytes:expr, $domain:expr, $class:expr, $texel:expr, $doc:literal;)*) => {
+        $crate::buffers!(@table $($ident $name : $bytes, $domain, $class, $texel, $doc;)*);
+        impl Buf {
+            $(#[doc = $doc] pub const $ident: Self = Self(BufferIndex::$ident as u16);)*
         }
     };
 }

@@ -18,21 +18,21 @@ impl MemoryReport {
     /// Formats a table of all buffers with their sizes, and sums by class.
     pub fn report(&self) -> String {
         let mut text = String::new();
-        let _ = writeln!(text, "{:<24} {:<6} {:>12} {:>5} {:>12}", "buffer", "class", "elements", "B/el", "bytes");
+        let _ = writeln!(text, "{:<24} {:<10} {:>12} {:>5} {:>12}", "buffer", "class", "elements", "B/el", "bytes");
         for row in &self.rows {
             let (class, bytes) = (row.class.name(), human(row.bytes));
             let _ =
-                writeln!(text, "{:<24} {class:<6} {:>12} {:>5} {bytes:>12}", row.name, row.count, row.element_bytes);
+                writeln!(text, "{:<24} {class:<10} {:>12} {:>5} {bytes:>12}", row.name, row.count, row.element_bytes);
         }
         for class in [Class::Model, Class::Persistent, Class::PerFrame, Class::Report] {
             let sum = self.rows.iter().filter(|row| row.class == class).map(|row| row.bytes).sum();
-            let _ = writeln!(text, "{:<52} {:>11}", format!("all of class {}", class.name()), human(sum));
+            let _ = writeln!(text, "{:<56} {:>11}", format!("all of class {}", class.name()), human(sum));
         }
         let arena = self.step_pages.iter().sum();
         let alone = format!("scratch arena (largest list unaliased: {})", human(self.step_unaliased));
-        let _ = writeln!(text, "{alone:<52} {:>11}", human(arena));
-        let _ = writeln!(text, "{:<52} {:>11}", "staging", human(self.staging));
-        let _ = writeln!(text, "{:<52} {:>11}", "total", human(self.total));
+        let _ = writeln!(text, "{alone:<56} {:>11}", human(arena));
+        let _ = writeln!(text, "{:<56} {:>11}", "staging", human(self.staging));
+        let _ = writeln!(text, "{:<56} {:>11}", "total", human(self.total));
         text
     }
 }

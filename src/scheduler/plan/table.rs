@@ -1,6 +1,6 @@
 //! The table of all buffers of the engine: element, length, lifetime and description.
 
-use super::buffers::{Class, TexelFormat};
+use super::buffers::{Buf, BufferDecl, Class, TexelFormat};
 use super::capacity::Domain;
 use crate::shaders::structs::{Counters, StepUniforms};
 

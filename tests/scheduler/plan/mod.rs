@@ -13,7 +13,7 @@ use labelgs::internals::shaders::{Access, BindingDesc, BindingKind, LocalSize, S
 
 /// Buffers of the random lists: all classes, and sizes that do not divide each other.
 mod table {
-    use labelgs::internals::scheduler::plan::{Class, Domain, TexelFormat};
+    use labelgs::internals::scheduler::plan::{Buf, BufferDecl, Class, Domain, TexelFormat};
     labelgs::buffers! { consts;
         MODEL "model": 16, Domain::Gaussians, Class::Model, Some(TexelFormat::Rgba32Sfloat), "Kept.";
         LABELS "labels": 4, Domain::Gaussians, Class::Model, None, "Kept.";
