@@ -3,9 +3,7 @@
 //! A model whose photos had their poses refined bends with them, and held-out views keep the poses of the reconstruction.
 //! Scores of such views tell quality only after their poses were refined by the model too (as in BARF, Lin et al. 2021).
 
-use super::poses::Poses;
-use super::strategy::frozen::Frozen;
-use super::{ExposureMode, TrainConfig, Trainer, TrainerOptions};
+use super::{ExposureMode, Objective, TrainConfig, Trainer, TrainerOptions};
 use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::scene::{Dataset, Gaussians, Point, View};
@@ -48,11 +46,7 @@ pub fn aligned(
     let train = found.iter().map(|view| View { mask: None, ..view.clone() }).collect();
     let dataset = Dataset { train, points, ..Dataset::default() };
     let model = Gaussians { labels: None, label_confidence: None, ..model.clone() };
-    let options = TrainerOptions {
-        strategy: Some(Box::new(Frozen)),
-        shared: Poses::by_model(&dataset).into(),
-        ..scheduler.into()
-    };
+    let options = TrainerOptions { objective: Objective::SHARED, ..scheduler.into() };
     let mut trainer = Trainer::new(Arc::clone(gpu), config, &dataset, &model, options)?;
     let stage = Stage::new("refining poses", trainer.config().iterations as usize);
     for _ in 0..trainer.config().iterations {

@@ -4,39 +4,18 @@
 //! cost little there, and show when the object stands alone. A copy has opacities of its own. The object layers of LabelGS fit
 //! them: its colours and opacity alone against photos and masks, without the pixels in which something hides it.
 
-use super::strategy::{At, Strategy};
-use super::{ExposureMode, Occlusion, TrainConfig, Trainer, TrainerOptions};
+use super::{ExposureMode, Objective, Occlusion, TrainConfig, Trainer, TrainerOptions};
 use crate::error::{Error, Result, Setting};
 use crate::gpu::Gpu;
 use crate::scene::{Dataset, Gaussians, Occluders, View};
 use crate::scheduler::SchedulerOptions;
-use crate::shaders::structs::StepUniforms;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 /// Steps of [`refitted`], each of one view.
 pub const REFIT_STEPS: u32 = 600;
-/// Weight of the opacity: nothing else has a claim on it.
-const LABEL_ALPHA: f32 = 3.0;
-/// Factor of the loss over the whole photo, which shows more than the objects: gradients far below Adam's epsilon change
-/// nothing.
-const PHOTO: f32 = 1.0 / (1_u64 << 60) as f32;
-
-/// Trains opacities only, by the label loss only.
-#[derive(Debug)]
-struct Alone;
-
-impl Strategy for Alone {
-    fn name(&self) -> &'static str {
-        "alone"
-    }
-
-    fn uniforms(&self, _at: At, to: &mut StepUniforms) {
-        to.rate_means[..3].fill(0.0);
-        (to.rate_scales, to.rate_quats, to.rate_sh0, to.rate_sh_rest) = (0.0, 0.0, 0.0, 0.0);
-        (to.loss_scale, to.label_weight) = (to.loss_scale * PHOTO, to.label_weight / PHOTO);
-    }
-}
+/// Weight of the alpha term. It is higher than in a scene, because a copy need not look right in the picture of the scene.
+const ALPHA_WEIGHT: f32 = 3.0;
 
 /// Returns labelled Gaussians, those of whole objects, with opacities for a picture of these objects alone.
 ///
@@ -70,16 +49,14 @@ pub fn refitted(
         start_size: Some(1.0),
         exposure: ExposureMode::Off,
         free_space: false,
-        // Turns of labels are counted from here, so no step counts votes.
         label_from: Some(0),
-        vote_every: Some(REFIT_STEPS + 1),
         layer_every: Some(1),
-        label_alpha: LABEL_ALPHA,
+        label_alpha: ALPHA_WEIGHT,
         occlusion: Occlusion::None,
         ..TrainConfig::default()
     };
     let dataset = Dataset { train, ..Dataset::default() };
-    let options = TrainerOptions { strategy: Some(Box::new(Alone)), ..scheduler.into() };
+    let options = TrainerOptions { objective: Objective::OBJECT_OPACITIES, ..scheduler.into() };
     let mut trainer = Trainer::new(Arc::clone(gpu), config, &dataset, objects, options)?;
     trainer.set_occluders(occluders);
     trainer.views.show_only(is_chosen);

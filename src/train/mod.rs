@@ -12,10 +12,12 @@ mod between;
 pub(crate) mod config;
 pub(crate) mod depths;
 pub(crate) mod exposure;
+mod extension;
 mod first;
 pub(crate) mod free_space;
 pub(crate) mod kinds;
 pub(crate) mod near;
+pub(crate) mod objective;
 mod occlusion;
 mod parts;
 mod photo_rows;
@@ -42,6 +44,7 @@ pub use config::TrainConfig;
 pub use first::first_model;
 pub(crate) use first::go_on_from;
 pub use kinds::{ExposureMode, LabelRule, Occlusion, StrategyKind};
+pub(crate) use objective::{Loss, Objective, Parameter};
 pub use presets::Preset;
 pub(crate) use setup::{TrainerOptions, engine_size, start_size};
 pub(crate) use state::{TrainState, ViewFingerprint};
@@ -58,6 +61,7 @@ use crate::render::RenderOptions;
 use crate::scene::{Dataset, Gaussians};
 use crate::scheduler::plan::FRAMES_IN_FLIGHT;
 use crate::shaders::structs::StepUniforms;
+use extension::Joined;
 use region::Region;
 use sampler::ViewOrder;
 use shared::Shared;
@@ -90,6 +94,7 @@ pub struct StepReport {
 pub struct Trainer {
     engine: Engine,
     config: TrainConfig,
+    objective: Objective,
     views: Views,
     fixed: SceneScale,
     region: Option<Region>,
@@ -103,6 +108,8 @@ pub struct Trainer {
     bound: Bound,
     strategy: Box<dyn Strategy>,
     shared: Shared,
+    /// 1 if every step has passes of shared parameters or of the objective.
+    always_passes: u32,
     /// Votes were counted before, so that masks can be compared with the labels.
     labelled_once: bool,
     timing: Option<timing::Timing>,
@@ -127,6 +134,7 @@ impl Trainer {
     ) -> Result<Self> {
         config.check()?;
         let options = options.into();
+        let config = options.objective.limit_weights(config);
         let size = start_size(&gpu, dataset, &config, (model, options.region.as_ref()), options.scheduler)?;
         let near = match config.near {
             0.0 => near::near_plane(dataset.train.iter().map(|view| &view.camera), model),
@@ -153,11 +161,11 @@ impl Trainer {
         config: TrainConfig,
         dataset: &Dataset,
         size: EngineSize,
-        TrainerOptions { shape, scheduler, strategy, shared, region, depths }: TrainerOptions,
+        TrainerOptions { shape, scheduler, objective, strategy, shared, region, depths }: TrainerOptions,
     ) -> Result<Self> {
         let fixed = Region::scale(region.as_ref(), dataset);
         let shared = shared.or_of(&config, dataset, region.as_ref());
-        let strategy = strategy.unwrap_or_else(|| strategy::of(config.strategy));
+        let strategy = strategy.unwrap_or_else(|| objective.strategy(config.strategy));
         let most = if config.max_gaussians > 0 { config.max_gaussians } else { u64::from(u32::MAX) };
         let shape = shape.unwrap_or_else(|| KernelShape::of(gpu.capabilities()));
         let views = setup::train_views(dataset, depths, config.mask_border, size.band(&shape))?;
@@ -167,12 +175,15 @@ impl Trainer {
         engine.set_sh_degree(config.sh_degree);
         engine.set_antialiased(config.antialias);
         let image = engine.size().image;
-        let passes = shared.passes(strategy.passes(At { step: 1, config: &config, extent: fixed.extent }));
-        engine.set_extension(shared.extended(strategy.extension()), passes);
+        let always: Vec<_> = objective.extension().into_iter().chain(shared.extensions()).collect();
+        let always_passes = u32::from(!always.is_empty());
+        let passes = strategy.passes(At { step: 1, config: &config, extent: fixed.extent }) + always_passes;
+        engine.set_extension(Joined::of(strategy.extension(), always), passes);
         let order = ViewOrder::new(config.seed, views.parts().len());
         Ok(Self {
             engine,
             config,
+            objective,
             views,
             fixed,
             region,
@@ -184,6 +195,7 @@ impl Trainer {
             bound: Bound { most, by_memory: false },
             strategy,
             shared,
+            always_passes,
             labelled_once: false,
             timing: None,
             counts_pairs: false,
@@ -291,12 +303,13 @@ impl Trainer {
         let objects = &self.views.parts()[part].objects;
         // A view without a mask, or with an empty one, costs as much as in a scene without masks.
         let labels = self.config.labels_at(step) && !objects.is_empty();
-        let layers = if labels && self.config.has_layers_at(step) {
+        let layers = if labels && self.objective.has(Loss::Layers) && self.config.has_layers_at(step) {
             sampler::sample_objects(self.config.seed, step, objects, self.config.label_samples as usize)
         } else {
             Vec::new()
         };
-        let labels = labels && (!layers.is_empty() || self.config.has_disagreement_at(step));
+        let disagrees = self.objective.has(Loss::Disagreement) && self.config.has_disagreement_at(step);
+        let labels = labels && (!layers.is_empty() || disagrees);
         let update = self.strategy.updates(self.at(step));
         self.updates += u32::from(update);
         Ok(StepInput { step, part, layers, labels, update, updates: self.updates })
@@ -321,6 +334,7 @@ impl Trainer {
             uniforms = self.engine.with_grow_box(uniforms, &zone);
         }
         self.strategy.uniforms(self.at(input.step), &mut uniforms);
+        self.objective.limit_rates(&mut uniforms);
         Ok(uniforms)
     }
 
@@ -346,13 +360,13 @@ impl Trainer {
             labels: !input.layers.is_empty(),
             disagreement: input.labels && input.layers.is_empty(),
             depth: self.config.depth_weight_at(input.step) > 0.0,
-            lift: input.lifts(&self.config),
+            lift: self.objective.trains(Parameter::Labels) && input.lifts(&self.config),
             sh_degree: self.config.sh_degree_at(input.step),
             size: self.views.largest_at(input.step, self.image),
             update: input.update,
             counts: self.counts_pairs,
         };
-        match self.shared.passes(self.strategy.passes(self.at(input.step))) {
+        match self.strategy.passes(self.at(input.step)) + self.always_passes {
             0 => ListKey::Train(variant),
             passes => ListKey::Extended(variant, passes),
         }

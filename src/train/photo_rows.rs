@@ -1,7 +1,7 @@
 //! What the shared rows of the photos say in the middle of a training: exposures and poses.
 
 use super::adjust::{self, Frame, adjusted};
-use super::{Trainer, exposure, poses};
+use super::{Parameter, Trainer, exposure, poses};
 use crate::error::Result;
 use crate::render::{RenderOptions, render};
 use crate::scene::{Camera, ColourMatrix};
@@ -39,7 +39,11 @@ impl Trainer {
 
     /// Returns true before the steps at which poses are adjusted by a comparison of the photos.
     pub(super) fn adjusts_poses(&self, step: u32) -> bool {
-        self.shared.compares_photos(self.at(step)) && !self.blurs_depth_before(step)
+        // A finished model tells the poses itself.
+        self.objective.trains(Parameter::Positions)
+            && self.shared.photo_rows(poses::NAME).is_some()
+            && poses::are_compared_before(self.at(step))
+            && !self.blurs_depth_before(step)
     }
 
     /// Adjusts the poses of all photos by a comparison of these. Nothing may be in flight.

@@ -31,8 +31,6 @@ const COMPARED: [f64; 3] = [0.2, 0.35, 0.5];
 pub struct Poses {
     /// Depth of the scene and preconditioner of each view.
     of_views: Vec<(f32, Matrix)>,
-    /// The model alone tells the poses, to the end.
-    by_model: bool,
 }
 
 impl Poses {
@@ -49,13 +47,14 @@ impl Poses {
             let depth = depth(view);
             (depth, precondition::of_view(&view.camera, &dataset.points, depth.into()))
         };
-        Self { of_views: dataset.train.iter().map(of_view).collect(), by_model: false }
+        Self { of_views: dataset.train.iter().map(of_view).collect() }
     }
+}
 
-    /// Makes those of photos whose poses follow a finished model.
-    pub(super) fn by_model(dataset: &Dataset) -> Self {
-        Self { by_model: true, ..Self::new(dataset) }
-    }
+/// Returns true if a comparison of all photos settles poses before this step.
+pub(super) fn are_compared_before(at: At) -> bool {
+    let after = |share: f64| (share * f64::from(at.config.iterations)).round() as u32 + 1;
+    COMPARED.iter().any(|&share| at.step == after(share))
 }
 
 /// Returns a camera with the correction of its rows (glsl/include/pose.glsl).
@@ -105,11 +104,6 @@ impl SharedParameters for Poses {
         rates
     }
 
-    fn compares_photos(&self, at: At) -> bool {
-        let after = |share: f64| (share * f64::from(at.config.iterations)).round() as u32 + 1;
-        !self.by_model && COMPARED.iter().any(|&share| at.step == after(share))
-    }
-
     fn extension(&self, place: Place) -> Arc<dyn Extension> {
         Arc::new(Passes(place))
     }
@@ -131,7 +125,7 @@ impl Extension for Passes {
 #[cfg(test)]
 mod tests {
     use super::{Poses, ROWS, corrected, settle};
-    use crate::scene::{Camera, Dataset, Point};
+    use crate::scene::{Camera, Point};
     use crate::train::shared::SharedParameters;
     use glam::{DMat3, DVec3};
 
@@ -143,7 +137,7 @@ mod tests {
         let place = |k: usize| DVec3::new((k % 5) as f64 - 2.0, (k % 7) as f64 * 0.5 - 1.5, (k % 3) as f64 * 0.8);
         let points: Vec<Point> = (0..60).map(|k| Point { position: place(k), colour: [0; 3] }).collect();
         let matrix = super::precondition::of_view(&camera, &points, 4.0);
-        let poses = Poses { of_views: vec![(4.0, matrix)], ..Poses::new(&Dataset::default()) };
+        let poses = Poses { of_views: vec![(4.0, matrix)] };
         let mut rows = poses.start(Some(0));
         assert_eq!((rows.len(), rows[0][3]), (ROWS, 0.0));
         let to = camera.corrected(DVec3::new(0.02, -0.01, 0.03), DVec3::new(0.05, 0.1, -0.04));

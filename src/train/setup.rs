@@ -6,7 +6,7 @@ use super::region::Region;
 use super::shared::Shared;
 use super::step_input::{self, TrainView};
 use super::strategy::Strategy;
-use super::{LabelRule, TrainConfig};
+use super::{LabelRule, Objective, TrainConfig};
 use crate::engine::{Engine, EngineSize, LabelSize};
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
@@ -25,7 +25,9 @@ pub struct TrainerOptions {
     pub shape: Option<KernelShape>,
     /// Options of the engine.
     pub scheduler: SchedulerOptions,
-    /// The strategy for the number of Gaussians; none takes that of the configuration.
+    /// What is trained, by which losses.
+    pub objective: Objective,
+    /// The strategy for the number of Gaussians; none takes that of the objective and the configuration.
     pub strategy: Option<Box<dyn Strategy>>,
     /// Parameters of the scene or of photos.
     pub shared: Shared,
@@ -43,7 +45,15 @@ impl Default for TrainerOptions {
 
 impl From<SchedulerOptions> for TrainerOptions {
     fn from(scheduler: SchedulerOptions) -> Self {
-        Self { shape: None, scheduler, strategy: None, shared: Shared::default(), region: None, depths: Vec::new() }
+        Self {
+            shape: None,
+            scheduler,
+            objective: Objective::SCENE,
+            strategy: None,
+            shared: Shared::default(),
+            region: None,
+            depths: Vec::new(),
+        }
     }
 }
 

@@ -13,7 +13,7 @@ use super::strategy::At;
 use super::{ExposureMode, TrainConfig};
 use crate::engine::SharedRow;
 use crate::error::{Error, Result};
-use crate::pass::{Builder, Extension, Hook};
+use crate::pass::Extension;
 use crate::scene::Dataset;
 use serde::{Deserialize, Serialize};
 use std::fmt::Debug;
@@ -77,11 +77,6 @@ pub trait SharedParameters: Debug + Send {
     /// Returns the learning rates of the rows of a step: those of the scene, then those of its photo. A row with rates
     /// of 0 keeps its values and moments in this step.
     fn rates(&self, at: At) -> Vec<[f32; 4]>;
-
-    /// Returns true if a comparison of all photos sets rows before this step.
-    fn compares_photos(&self, _at: At) -> bool {
-        false
-    }
 
     /// Returns the passes of every step; called once. `Buf::STEP_ROWS` has the rows of the step and `Buf::SHARED` their
     /// values. The passes write the gradients to the same rows of `Buf::V_SHARED`, which are 0 before.
@@ -179,23 +174,9 @@ impl Shared {
         Ok(self.layout().of_step(view).zip(rates).map(|(row, rates)| SharedRow { row, rates }).collect())
     }
 
-    /// Joins the passes of a strategy and of the parameters.
-    pub(super) fn extended(&self, strategy: Arc<dyn Extension>) -> Arc<dyn Extension> {
-        if self.0.is_empty() {
-            return strategy;
-        }
-        let shared = self.placed().map(|(of, place)| of.extension(place)).collect();
-        Arc::new(Joined { strategy, shared })
-    }
-
-    /// Returns the pass number of [`Joined`] for the number of the strategy.
-    pub(super) fn passes(&self, of_strategy: u32) -> u32 {
-        of_strategy + u32::from(!self.0.is_empty())
-    }
-
-    /// Returns true if a comparison of all photos sets rows before this step.
-    pub(super) fn compares_photos(&self, at: At) -> bool {
-        self.0.iter().any(|of| of.compares_photos(at))
+    /// Returns the passes of the parameters.
+    pub(super) fn extensions(&self) -> Vec<Arc<dyn Extension>> {
+        self.placed().map(|(of, place)| of.extension(place)).collect()
     }
 
     pub(super) fn kept(&self) -> Option<KeptShared> {
@@ -233,25 +214,5 @@ pub struct KeptShared {
 impl std::fmt::Display for KeptShared {
     fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
         write!(f, "{} ({} rows of the scene, {} of each photo)", self.name, self.layout.scene, self.layout.photo)
-    }
-}
-
-/// The passes of a strategy, under a number that is one higher, and the passes of the shared parameters.
-#[derive(Debug)]
-struct Joined {
-    strategy: Arc<dyn Extension>,
-    shared: Vec<Arc<dyn Extension>>,
-}
-
-impl Extension for Joined {
-    fn extend(&self, passes: u32, hook: Hook, b: &mut Builder) {
-        if passes > 1 {
-            self.strategy.extend(passes - 1, hook, b);
-        }
-        self.shared.iter().for_each(|of| of.extend(1, hook, b));
-    }
-
-    fn updates_unseen(&self, passes: u32) -> bool {
-        passes <= 1 || self.strategy.updates_unseen(passes - 1)
     }
 }

@@ -1,6 +1,6 @@
 //! Labels by votes, counted over all training views at intervals and at the end.
 
-use super::{LabelRule, Trainer};
+use super::{LabelRule, Parameter, Trainer};
 use crate::error::Result;
 use crate::label::vote::ballot::Sweep;
 use crate::label::vote::decide::{self, Decision};
@@ -8,7 +8,9 @@ use crate::scene::Gaussians;
 
 impl Trainer {
     fn votes(&self) -> bool {
-        self.engine.size().labels.is_some() && self.config.label_rule == LabelRule::Votes
+        self.objective.trains(Parameter::Labels)
+            && self.engine.size().labels.is_some()
+            && self.config.label_rule == LabelRule::Votes
     }
 
     pub(super) fn counts_votes(&self, step: u32) -> bool {
