@@ -59,7 +59,7 @@ pub fn refitted(
     let options = TrainerOptions { objective: Objective::OBJECT_OPACITIES, ..scheduler.into() };
     let mut trainer = Trainer::new(Arc::clone(gpu), config, &dataset, objects, options)?;
     trainer.set_occluders(occluders);
-    trainer.views.show_only(is_chosen);
+    trainer.show_only(is_chosen);
     for step in 1..=REFIT_STEPS {
         trainer.step()?;
         watch(step);

@@ -7,9 +7,7 @@
 //!   input, not of such a step. The first one that cull or project_forward finds ends the training, and so does a loss
 //!   of NaN. The caller can go back to a saved state ([`Trainer::restore`](super::Trainer::restore)).
 
-use super::Trainer;
-use super::step_input::StepInput;
-use crate::engine::Report;
+use super::report::StepReport;
 use crate::error::{Error, Result};
 
 /// Share of the splats whose gradients may be dropped; [`COUNT_MAX`] are always accepted.
@@ -18,8 +16,9 @@ const COUNT_MAX: u32 = 10;
 /// Number of successive steps above that share which ends a training.
 const STEPS_MAX: u32 = 3;
 
+/// Gradients that were dropped.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Seen {
+pub(super) struct Sentinel {
     /// Number of dropped gradients so far, and the number for the next log message.
     dropped: u64,
     next_word: u64,
@@ -27,16 +26,11 @@ pub(super) struct Seen {
     bad_steps: u32,
 }
 
-impl Trainer {
-    /// Halves all learning rates for the rest of the run.
-    pub fn halve_rates(&mut self) {
-        self.config.halve_rates();
-    }
-
-    pub(super) fn watch(&mut self, input: &StepInput, report: &Report, losses: [f64; 2]) -> Result<()> {
-        let counters = &report.counters;
-        let view = &self.views[self.views.index(input)].name;
-        let failure = |quantity: String| Error::Numeric { quantity, step: u64::from(input.step), view: view.clone() };
+impl Sentinel {
+    /// Refuses a finished step on a view that has broken the model.
+    pub(super) fn check(&mut self, of: &StepReport, view: &str) -> Result<()> {
+        let (counters, losses) = (&of.report.counters, [of.loss, of.label_loss]);
+        let failure = |quantity| Error::Numeric { quantity, step: u64::from(of.step), view: view.to_owned() };
         for (pass, what, count, first) in [
             ("cull", "positions, opacities or scales", counters.broken_count, counters.broken_first),
             ("project_forward", "projections or colours", counters.unprojected_count, counters.unprojected_first),
@@ -50,23 +44,23 @@ impl Trainer {
         if !losses.iter().all(|loss| loss.is_finite()) {
             return Err(failure(format!("loss_reduce: the loss is {} and the label loss {}", losses[0], losses[1])));
         }
-        let (count, seen) = (counters.nonfinite_count, &mut self.seen);
+        let count = counters.nonfinite_count;
         let most = COUNT_MAX.max((SHARE_MAX * f64::from(counters.visible_count)) as u32);
-        seen.bad_steps = if count > most { seen.bad_steps + 1 } else { 0 };
+        self.bad_steps = if count > most { self.bad_steps + 1 } else { 0 };
         if count > 0 {
-            seen.dropped += u64::from(count);
-            if seen.dropped >= seen.next_word {
-                seen.next_word = seen.dropped * 10;
+            self.dropped += u64::from(count);
+            if self.dropped >= self.next_word {
+                self.next_word = self.dropped * 10;
                 tracing::warn!(
                     "step {}, view {view}: project_backward dropped the gradients of {count} Gaussians that are not \
                      finite, the first is that of Gaussian {}; {} so far",
-                    input.step,
+                    of.step,
                     counters.nonfinite_first,
-                    seen.dropped
+                    self.dropped
                 );
             }
         }
-        if seen.bad_steps >= STEPS_MAX {
+        if self.bad_steps >= STEPS_MAX {
             return Err(failure(format!(
                 "project_backward dropped the gradients of {count} of {} Gaussians, the first is {}, and of more than \
                  {most} in each of {STEPS_MAX} steps",

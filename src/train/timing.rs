@@ -1,10 +1,8 @@
 //! Times of the passes of each step, for `labelgs profile` and the report of a run.
 
-use super::Trainer;
-use crate::engine::Recording;
+use crate::engine::{Engine, Recording};
 use crate::error::Result;
 use crate::pass::Stage;
-use crate::scene::Gaussians;
 use std::collections::HashSet;
 
 /// Times of the passes of a step.
@@ -18,49 +16,23 @@ pub struct StepTimes {
     pub items: Vec<(Stage, String, u64)>,
 }
 
+/// Times that nobody has taken yet.
 #[derive(Debug, Default)]
 pub(super) struct Timing {
     seen: HashSet<Recording>,
     times: Vec<StepTimes>,
 }
 
-impl Trainer {
-    /// Collects the times of steps from now on. The scheduler needs timestamps.
-    pub fn keep_times(&mut self) {
-        self.timing.get_or_insert_default();
-    }
-
-    /// Sets whether the next steps count the (pixel, splat) pairs with a weight. Counting slows them down.
-    pub fn count_pairs(&mut self, on: bool) {
-        self.counts_pairs = on;
-    }
-
-    /// Takes the times of the steps that ended since the last call.
-    pub fn take_times(&mut self) -> Vec<StepTimes> {
-        self.timing.as_mut().map(|timing| std::mem::take(&mut timing.times)).unwrap_or_default()
-    }
-
-    /// Runs the last `count` steps again on `model` and returns their times, each with a barrier before every pass. All
-    /// steps are done; the engine's model and the trainer are of no use after this.
-    pub(crate) fn times_of_last(&mut self, count: u32, model: &Gaussians) -> Result<Vec<StepTimes>> {
-        self.drain()?;
-        self.engine.upload_model(model)?;
-        self.engine.time_items()?;
-        self.keep_times();
-        for step in self.step - count.min(self.step)..self.step {
-            let input = self.input(step + 1)?;
-            self.submit_next(input)?;
-        }
-        self.drain()?;
-        Ok(self.take_times())
-    }
-
+impl Timing {
     /// Reads the times of a finished step whose frame was not used again.
-    pub(super) fn note_times(&mut self, step: u32, recording: Recording) -> Result<()> {
-        if let Some(timing) = &mut self.timing {
-            let items = self.engine.times(recording)?;
-            timing.times.push(StepTimes { step, is_first: timing.seen.insert(recording), items });
-        }
+    pub(super) fn note(&mut self, engine: &mut Engine, step: u32, recording: Recording) -> Result<()> {
+        let items = engine.times(recording)?;
+        self.times.push(StepTimes { step, is_first: self.seen.insert(recording), items });
         Ok(())
+    }
+
+    /// Takes the times.
+    pub(super) fn take(&mut self) -> Vec<StepTimes> {
+        std::mem::take(&mut self.times)
     }
 }
