@@ -233,7 +233,7 @@ pub mod train {
         pub use crate::train::shared::{Place, SharedLayout, SharedParameters};
     }
     pub mod step_input {
-        pub use crate::train::step_input::{SceneScale, label_loss};
+        pub use crate::train::input::step_input::{SceneScale, label_loss};
     }
     pub mod strategy {
         pub use crate::train::strategy::population::Population;

@@ -1,20 +1,21 @@
 //! What the steps of a training use, and the work between them.
 
-use super::extension::Joined;
-use super::objective::{Objective, Parameter};
-use super::region::Region;
-use super::setup::{self, TrainerOptions};
-use super::shared::Shared;
-use super::step_input::{self, SceneScale, StepInput};
-use super::strategy::{At, Strategy};
-use super::views::Views;
-use super::{TrainConfig, poses};
 use crate::engine::{Engine, EngineSize, InFlight, ListKey, TrainInput};
 use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::pass::{KernelShape, Variant};
 use crate::scene::{Dataset, Zone};
 use crate::shaders::structs::StepUniforms;
+use crate::train::extension::Joined;
+use crate::train::input::step_input;
+use crate::train::input::step_input::{SceneScale, StepInput};
+use crate::train::input::views::Views;
+use crate::train::objective::{Objective, Parameter};
+use crate::train::region::Region;
+use crate::train::setup::{self, TrainerOptions};
+use crate::train::shared::Shared;
+use crate::train::strategy::{At, Strategy};
+use crate::train::{TrainConfig, poses};
 use std::sync::Arc;
 
 /// The model on the device, and what it is trained by.

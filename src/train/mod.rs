@@ -4,38 +4,31 @@
 //! number of Gaussians, [`Shared`] parameters belong to the scene or to a photo. [`crate::run`] adds files and scores.
 
 mod adjust;
-mod ahead;
 pub(crate) mod align;
 mod alone;
-mod backdrop;
 pub(crate) mod between;
 pub(crate) mod config;
 mod context;
-pub(crate) mod depths;
 pub(crate) mod exposure;
 mod extension;
 mod first;
-pub(crate) mod free_space;
+pub(crate) mod input;
 pub(crate) mod kinds;
 pub(crate) mod near;
 pub(crate) mod objective;
-mod parts;
 pub(crate) mod poses;
 mod precondition;
 mod presets;
 pub(crate) mod region;
 mod report;
-mod sampler;
 mod schedule;
 mod sentinel;
 pub(crate) mod setup;
 pub(crate) mod shared;
 pub(crate) mod state;
-pub(crate) mod step_input;
 pub(crate) mod strategy;
 mod timing;
 mod trainer;
-mod views;
 
 pub use align::aligned;
 pub use alone::{REFIT_STEPS, refitted};

@@ -1,9 +1,9 @@
 //! A part of a scene that is trained alone, in the light of the rest.
 
-use super::step_input::SceneScale;
-use super::{TrainConfig, exposure};
 use crate::error::{Error, Result};
 use crate::scene::{Dataset, Gaussians, Zone};
+use crate::train::input::step_input::SceneScale;
+use crate::train::{TrainConfig, exposure};
 use std::collections::BTreeMap;
 
 /// A part of a larger scene. Its first model has the Gaussians of the part, then others that are drawn and not trained.

@@ -1,8 +1,9 @@
 //! What a step did, and its numbers.
 
-use super::TrainConfig;
-use super::step_input::{self, StepInput, StepView};
 use crate::engine::Report;
+use crate::train::TrainConfig;
+use crate::train::input::step_input;
+use crate::train::input::step_input::{StepInput, StepView};
 
 /// The numbers of a finished step.
 #[derive(Clone, Copy, Debug)]

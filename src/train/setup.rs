@@ -1,12 +1,5 @@
 //! The inputs of a training: options, sizes, views.
 
-use super::depths::KnownDepths;
-use super::parts::Part;
-use super::region::Region;
-use super::shared::Shared;
-use super::step_input::{self, TrainView};
-use super::strategy::Strategy;
-use super::{LabelRule, Objective, TrainConfig};
 use crate::engine::{Engine, EngineSize, LabelSize};
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
@@ -15,6 +8,14 @@ use crate::pass::KernelShape;
 use crate::scene::pixels::Source;
 use crate::scene::{Dataset, Gaussians, LabelMap, Pixels, View, crew};
 use crate::scheduler::SchedulerOptions;
+use crate::train::input::known_depths::KnownDepths;
+use crate::train::input::part::Part;
+use crate::train::input::step_input;
+use crate::train::input::step_input::TrainView;
+use crate::train::region::Region;
+use crate::train::shared::Shared;
+use crate::train::strategy::Strategy;
+use crate::train::{LabelRule, Objective, TrainConfig};
 use std::collections::BTreeSet;
 use std::sync::Arc;
 

@@ -8,7 +8,7 @@ use crate::render::{RenderOptions, render};
 use crate::scene;
 use crate::train::Occlusion;
 use crate::train::context::Context;
-use crate::train::step_input::TrainView;
+use crate::train::input::step_input::TrainView;
 use std::collections::BTreeMap;
 
 /// Sets the occluders by name of the view. Drops ids without pixels in the mask of the view. Returns the names of views with

@@ -3,9 +3,9 @@
 //! Gaussians there stand for nothing that was photographed. Training cannot tell when they are before no training camera,
 //! but they fog views between those cameras.
 
-use super::sampler::stream;
 use crate::io::init;
 use crate::scene::{Camera, Dataset, Gaussians};
+use crate::train::input::sampler::stream;
 use glam::DVec3;
 use rand::Rng;
 
@@ -21,7 +21,7 @@ const NEIGHBOURS: usize = 5;
 
 /// Returns the near plane of each camera, at least `least`. Up to there space is taken as free: no Gaussian stands for
 /// anything so much nearer than all that the camera sees of the initial `model`.
-pub(super) fn view_planes(dataset: &Dataset, model: &Gaussians, least: f32) -> Vec<f32> {
+pub(in crate::train) fn view_planes(dataset: &Dataset, model: &Gaussians, least: f32) -> Vec<f32> {
     let cameras = dataset.train.iter().map(|view| &view.camera);
     let quantile = if init::has_points(dataset) { NEAREST } else { NEAREST_RANDOM };
     let every = model.len().div_ceil(SAMPLE).max(1);
@@ -55,7 +55,7 @@ const STREAM: u64 = 1 << 40;
 
 /// Returns for each camera the nearest ones that look in a similar direction, none of them farther away than the first
 /// thing that the camera sees: nothing stands between such two.
-pub(super) fn partners(cameras: &[&Camera], planes: &[f32]) -> Vec<Vec<usize>> {
+pub(in crate::train) fn partners(cameras: &[&Camera], planes: &[f32]) -> Vec<Vec<usize>> {
     let places: Vec<(DVec3, DVec3)> = cameras.iter().map(|camera| (camera.centre(), camera.axis())).collect();
     let of = |index: usize| {
         let distance = |other: usize| places[index].0.distance(places[other].0);
@@ -72,7 +72,7 @@ pub(super) fn partners(cameras: &[&Camera], planes: &[f32]) -> Vec<Vec<usize>> {
 }
 
 /// Returns the partner of a step, one of `partners`.
-pub(super) fn partner(seed: u64, step: u32, partners: &[usize]) -> Option<usize> {
+pub(in crate::train) fn partner(seed: u64, step: u32, partners: &[usize]) -> Option<usize> {
     let index = stream(seed, STREAM + u64::from(step)).random_range(0..partners.len().max(1));
     partners.get(index).copied()
 }

@@ -49,7 +49,7 @@ impl KnownDepths {
 
     /// Draws the band of a photo of `full` px at the size of a step: 1 / depth, 0 where it is not known. The nearest of a
     /// pixel counts. Pixels of `photo`, the band at that size, that are left out of the loss have none.
-    pub(super) fn drawn(&self, full: (u32, u32), band: Band, photo: &Photo) -> Vec<f32> {
+    pub(in crate::train) fn drawn(&self, full: (u32, u32), band: Band, photo: &Photo) -> Vec<f32> {
         let (width, height) = (photo.width, photo.height);
         let mut drawn = vec![0.0_f32; width as usize * height as usize];
         let scale = [width as f32 / full.0 as f32, height as f32 / band.rows as f32];
@@ -67,7 +67,7 @@ impl KnownDepths {
 }
 
 /// Returns the weight of a pixel with a known depth, given that of all of them.
-pub(super) fn weight(inverse: &[f32], all: f64) -> f32 {
+pub(in crate::train) fn weight(inverse: &[f32], all: f64) -> f32 {
     let count = inverse.iter().filter(|&&inverse| inverse > 0.0).count();
     (all / count.max(1) as f64) as f32
 }

@@ -1,8 +1,8 @@
 //! What is behind the scene in a step.
 
-use super::TrainConfig;
-use super::sampler::stream;
 use crate::scene::Photo;
+use crate::train::TrainConfig;
+use crate::train::input::sampler::stream;
 use rand::Rng;
 use std::borrow::Cow;
 
@@ -10,7 +10,7 @@ use std::borrow::Cow;
 const STREAM: u64 = 5 << 32;
 
 /// Returns the colour behind the scene in a step: r, g, b, 0 to 1.
-pub(super) fn colour(config: &TrainConfig, step: u32) -> [f32; 3] {
+pub(in crate::train) fn colour(config: &TrainConfig, step: u32) -> [f32; 3] {
     if !config.random_background {
         return config.background;
     }
@@ -19,7 +19,7 @@ pub(super) fn colour(config: &TrainConfig, step: u32) -> [f32; 3] {
 }
 
 /// Returns the photo over that colour, as the device compares it.
-pub(super) fn photo<'a>(photo: &'a Photo, config: &TrainConfig, step: u32) -> Cow<'a, [[u8; 4]]> {
+pub(in crate::train) fn photo<'a>(photo: &'a Photo, config: &TrainConfig, step: u32) -> Cow<'a, [[u8; 4]]> {
     // Photos have their opacity with random colours only.
     let over = config.random_background.then(|| photo.over(colour(config, step))).flatten();
     over.map_or(Cow::Borrowed(&photo.rgba), Cow::Owned)

@@ -1,11 +1,13 @@
 //! The input of one step: uniforms, photo, masks.
 
-use super::depths::{self, KnownDepths};
-use super::{LabelRule, TrainConfig, backdrop};
 use crate::engine::{DisagreementInput, Engine, LayerInput, TrainInput};
 use crate::scene::{Camera, LabelMap, Occluders, Photo, Pixels};
 use crate::shaders::constants::{ADAM_BETA1, ADAM_BETA2, ALPHA_SLACK, FINEST, LABEL_BORDER};
 use crate::shaders::structs::StepUniforms;
+use crate::train::input::backdrop;
+use crate::train::input::known_depths;
+use crate::train::input::known_depths::KnownDepths;
+use crate::train::{LabelRule, TrainConfig};
 use std::collections::BTreeMap;
 
 /// Largest weight of a small object relative to the mean.
@@ -185,7 +187,7 @@ pub(crate) fn uniforms(
         loss_scale: (1.0 / (3.0 * view.valid_pixels.max(1) as f64)) as f32,
         label_weight: label_weight(input, config),
         label_alpha: alpha_weight(config),
-        depth_weight: depths::weight(view.depths, config.depth_weight_at(input.step)),
+        depth_weight: known_depths::weight(view.depths, config.depth_weight_at(input.step)),
         label_threshold: config.label_threshold,
         gpf: u32::from(config.gpf),
         occluder_words: labels.div_ceil(32),

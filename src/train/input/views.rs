@@ -1,14 +1,16 @@
 //! The training views, at the size of each step.
 
-use super::ahead::{Ahead, Ready, Wanted};
-use super::parts::Part;
-use super::step_input::{self, Shown, StepInput, StepView, TrainView};
-use super::{TrainConfig, free_space, poses};
 use crate::error::{Error, Result};
 use crate::label::vote::ballot::Voter;
 use crate::scene::camera::side_at;
 use crate::scene::{Camera, Occluders};
 use crate::scheduler::plan::FRAMES_IN_FLIGHT;
+use crate::train::input::free_space;
+use crate::train::input::part::Part;
+use crate::train::input::prefetch::{Ahead, Ready, Wanted};
+use crate::train::input::step_input;
+use crate::train::input::step_input::{Shown, StepInput, StepView, TrainView};
+use crate::train::{TrainConfig, poses};
 use std::collections::BTreeMap;
 use std::ops::{Deref, DerefMut};
 use std::sync::Arc;
@@ -22,7 +24,7 @@ static NO_OCCLUDERS: Occluders = Occluders::new();
 
 /// The training views. As a slice, those at full size.
 #[derive(Debug)]
-pub(super) struct Views {
+pub(in crate::train) struct Views {
     whole: Vec<TrainView>,
     /// What steps train on.
     parts: Vec<Part>,
@@ -45,7 +47,7 @@ pub(super) struct Views {
 
 impl Views {
     /// Makes the views of a training.
-    pub(super) fn new((whole, parts): (Vec<TrainView>, Vec<Part>), config: &TrainConfig) -> Self {
+    pub(in crate::train) fn new((whole, parts): (Vec<TrainView>, Vec<Part>), config: &TrainConfig) -> Self {
         let (start, full_from) = (f64::from(config.start_size.unwrap_or(1.0)), config.full_size_from());
         let ahead = Ahead::new(&whole, config.iterations);
         Self {
@@ -64,7 +66,7 @@ impl Views {
     }
 
     /// Sets the near plane of each view.
-    pub(super) fn set_near_planes(&mut self, planes: &[f32]) {
+    pub(in crate::train) fn set_near_planes(&mut self, planes: &[f32]) {
         self.whole.iter_mut().zip(planes).for_each(|(view, &near)| view.near = near);
         if self.free_space {
             let cameras: Vec<&Camera> = self.whole.iter().map(|view| &view.camera).collect();
@@ -73,23 +75,23 @@ impl Views {
     }
 
     /// Sets the refined cameras by the rows of their photos.
-    pub(super) fn refine(&mut self, rows: &[Vec<[f32; 4]>]) {
+    pub(in crate::train) fn refine(&mut self, rows: &[Vec<[f32; 4]>]) {
         let refined = |(view, rows): (&TrainView, &Vec<_>)| poses::corrected(&view.camera, rows);
         self.refined = self.whole.iter().zip(rows).map(refined).collect();
     }
 
     /// Returns the refined cameras; none without refinement.
-    pub(super) fn refined(&self) -> &[Camera] {
+    pub(in crate::train) fn refined(&self) -> &[Camera] {
         &self.refined
     }
 
     /// Returns the camera of a view for work between steps.
-    pub(super) fn camera(&self, view: usize) -> &Camera {
+    pub(in crate::train) fn camera(&self, view: usize) -> &Camera {
         self.refined.get(view).unwrap_or(&self.whole[view].camera)
     }
 
     /// Returns the views with masks, for votes between steps.
-    pub(super) fn voters(&self) -> Vec<Voter<'_>> {
+    pub(in crate::train) fn voters(&self) -> Vec<Voter<'_>> {
         let voters = self.whole.iter().enumerate().filter_map(|(index, view)| {
             let mask = view.mask.as_ref()?;
             Some(Voter { camera: self.camera(index), mask, photo: Some(&view.photo), trust: None })
@@ -98,22 +100,22 @@ impl Views {
     }
 
     /// Returns the parts of the views, each for a step.
-    pub(super) fn parts(&self) -> &[Part] {
+    pub(in crate::train) fn parts(&self) -> &[Part] {
         &self.parts
     }
 
     /// Leaves only these objects to the object layers of the steps.
-    pub(super) fn show_only(&mut self, is_meant: impl Fn(&u16) -> bool) {
+    pub(in crate::train) fn show_only(&mut self, is_meant: impl Fn(&u16) -> bool) {
         self.parts.iter_mut().for_each(|part| part.objects.retain(&is_meant));
     }
 
     /// Returns the index of the view of a step.
-    pub(super) fn index(&self, input: &StepInput) -> usize {
+    pub(in crate::train) fn index(&self, input: &StepInput) -> usize {
         self.parts[input.part].view
     }
 
     /// Returns the camera to which the space is free in a step, and the near plane of all cameras on the way.
-    pub(super) fn partner(&self, seed: u64, input: &StepInput) -> Option<(&Camera, f32)> {
+    pub(in crate::train) fn partner(&self, seed: u64, input: &StepInput) -> Option<(&Camera, f32)> {
         let view = self.index(input);
         let partner = free_space::partner(seed, input.step, self.partners.get(view)?)?;
         Some((&self.whole[partner].camera, self.whole[partner].near.min(self.whole[view].near)))
@@ -129,19 +131,19 @@ impl Views {
     }
 
     /// Returns the share of the full size of `step`. Sizes grow in equal ratios.
-    pub(super) fn share_at(&self, step: u32) -> f64 {
+    pub(in crate::train) fn share_at(&self, step: u32) -> f64 {
         self.start.powf(1.0 - f64::from(self.size_at(step)) / f64::from(SIZES))
     }
 
     /// Returns an upper bound of the image size at `step`, given that of full size.
-    pub(super) fn largest_at(&self, step: u32, full: (u32, u32)) -> (u32, u32) {
+    pub(in crate::train) fn largest_at(&self, step: u32, full: (u32, u32)) -> (u32, u32) {
         let share = self.share_at(step);
         (side_at(full.0, share), side_at(full.1, share))
     }
 
     /// Gets the pixels of a step at the size of the step, and has those of `next`, the parts of the steps after it, made
     /// meanwhile.
-    pub(super) fn prepare(&mut self, step: u32, part: usize, next: &[usize]) -> Result<()> {
+    pub(in crate::train) fn prepare(&mut self, step: u32, part: usize, next: &[usize]) -> Result<()> {
         // Steps in flight still use their pixels and sizes.
         let oldest = step.saturating_sub(FRAMES_IN_FLIGHT as u32);
         let oldest_size = self.size_at(oldest);
@@ -170,7 +172,7 @@ impl Views {
     }
 
     /// Number of steps whose pixels are made ahead.
-    pub(super) fn steps_ahead(&self) -> usize {
+    pub(in crate::train) fn steps_ahead(&self) -> usize {
         self.ahead.steps()
     }
 
@@ -181,7 +183,7 @@ impl Views {
     }
 
     /// Returns the part of a step at the size of the step, which [`Self::prepare`] has made.
-    pub(super) fn of(&self, input: &StepInput) -> Result<StepView<'_>> {
+    pub(in crate::train) fn of(&self, input: &StepInput) -> Result<StepView<'_>> {
         let missing = || Error::Bug(format!("step {} came without its pixels", input.step));
         let (part, ready) = (&self.parts[input.part], self.ready.get(&input.step).ok_or_else(missing)?);
         let view = &self.whole[part.view];

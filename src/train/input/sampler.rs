@@ -8,7 +8,7 @@ use std::collections::VecDeque;
 /// Random stream of the order of views. The other streams are the step numbers.
 const VIEW_STREAM: u64 = u64::MAX;
 
-pub(super) fn stream(seed: u64, stream: u64) -> Pcg64Mcg {
+pub(in crate::train) fn stream(seed: u64, stream: u64) -> Pcg64Mcg {
     // The state is two words: different pairs (seed, stream) give unrelated numbers.
     let mut state = [0; 16];
     state[..8].copy_from_slice(&seed.wrapping_mul(0x9e37_79b9_7f4a_7c15).to_le_bytes());
@@ -18,7 +18,7 @@ pub(super) fn stream(seed: u64, stream: u64) -> Pcg64Mcg {
 
 /// Draws views without replacement until all are drawn, then starts over (3DGS).
 #[derive(Debug)]
-pub(super) struct ViewOrder {
+pub(in crate::train) struct ViewOrder {
     random: Pcg64Mcg,
     views: usize,
     stack: Vec<usize>,
@@ -27,12 +27,12 @@ pub(super) struct ViewOrder {
 }
 
 impl ViewOrder {
-    pub(super) fn new(seed: u64, views: usize) -> Self {
+    pub(in crate::train) fn new(seed: u64, views: usize) -> Self {
         Self { random: stream(seed, VIEW_STREAM), views, stack: Vec::new(), next: VecDeque::new() }
     }
 
     /// Returns the order after `draws` draws.
-    pub(super) fn after(seed: u64, views: usize, draws: u32) -> Self {
+    pub(in crate::train) fn after(seed: u64, views: usize, draws: u32) -> Self {
         let mut order = Self::new(seed, views);
         (0..draws).for_each(|_| {
             order.draw();
@@ -40,12 +40,12 @@ impl ViewOrder {
         order
     }
 
-    pub(super) fn draw(&mut self) -> usize {
+    pub(in crate::train) fn draw(&mut self) -> usize {
         self.next.pop_front().unwrap_or_else(|| self.draw_new())
     }
 
     /// Returns what the next `count` draws will be.
-    pub(super) fn upcoming(&mut self, count: usize) -> Vec<usize> {
+    pub(in crate::train) fn upcoming(&mut self, count: usize) -> Vec<usize> {
         while self.next.len() < count {
             let view = self.draw_new();
             self.next.push_back(view);
@@ -63,7 +63,7 @@ impl ViewOrder {
 }
 
 /// Samples at most `count` of the objects of a view, sorted.
-pub(super) fn sample_objects(seed: u64, step: u32, objects: &[u16], count: usize) -> Vec<u16> {
+pub(in crate::train) fn sample_objects(seed: u64, step: u32, objects: &[u16], count: usize) -> Vec<u16> {
     let mut chosen = objects.to_vec();
     if chosen.len() > count {
         chosen.shuffle(&mut stream(seed, u64::from(step)));

@@ -3,13 +3,13 @@
 //! The order of views is known ahead. What a thread makes depends on step and view alone, so that a step has the same bits
 //! whether its pixels were made ahead or are made when it begins.
 
-use super::depths::KnownDepths;
-use super::parts::{Part, labels_of, photo_of};
-use super::step_input::{TrainView, valid_pixels};
 use crate::engine::Band;
 use crate::error::{Error, Result};
 use crate::io::resample::shrink_photo;
 use crate::scene::{Camera, Photo, Pixels};
+use crate::train::input::known_depths::KnownDepths;
+use crate::train::input::part::{Part, labels_of, photo_of};
+use crate::train::input::step_input::{TrainView, valid_pixels};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::thread::{self, JoinHandle};
@@ -19,18 +19,18 @@ const STEPS_MAX: usize = 8;
 
 /// The pixels of a step.
 #[derive(Debug)]
-pub(super) struct Ready {
-    pub(super) photo: Arc<Photo>,
+pub(in crate::train) struct Ready {
+    pub(in crate::train) photo: Arc<Photo>,
     /// The mask in the layout of the device; empty without a mask and in smaller sizes.
-    pub(super) view_labels: Arc<Vec<u32>>,
+    pub(in crate::train) view_labels: Arc<Vec<u32>>,
     /// 1 / known depth of each pixel, 0 for unknown; empty in a step without.
-    pub(super) depths: Vec<f32>,
+    pub(in crate::train) depths: Vec<f32>,
     /// Camera and number of pixels that count, if the photo is smaller than the view.
-    pub(super) small: Option<(Camera, u64)>,
+    pub(in crate::train) small: Option<(Camera, u64)>,
 }
 
 /// What a step needs.
-pub(super) struct Wanted {
+pub(in crate::train) struct Wanted {
     step: u32,
     /// Index of the part.
     index: usize,
@@ -45,7 +45,7 @@ pub(super) struct Wanted {
 
 impl Wanted {
     /// Asks for a part, the one with this index, of a view at a share of its size.
-    pub(super) fn new(
+    pub(in crate::train) fn new(
         step: u32,
         (index, part): (usize, &Part),
         view: &TrainView,
@@ -75,7 +75,7 @@ impl Wanted {
 
 /// The threads, by step: index of the part, and its pixels.
 #[derive(Debug)]
-pub(super) struct Ahead {
+pub(in crate::train) struct Ahead {
     running: BTreeMap<u32, (usize, JoinHandle<Result<Ready>>)>,
     steps: usize,
     last: u32,
@@ -83,19 +83,19 @@ pub(super) struct Ahead {
 
 impl Ahead {
     /// Makes one for the steps up to `last`.
-    pub(super) fn new(views: &[TrainView], last: u32) -> Self {
+    pub(in crate::train) fn new(views: &[TrainView], last: u32) -> Self {
         let waits = views.iter().map(|view| &view.photo).filter(|photo| !photo.is_held());
         let steps = waits.map(Pixels::at_once).min().map_or(0, |most| most.min(STEPS_MAX));
         Self { running: BTreeMap::new(), steps, last }
     }
 
     /// Number of steps whose pixels are made ahead; 0 if all are in memory.
-    pub(super) fn steps(&self) -> usize {
+    pub(in crate::train) fn steps(&self) -> usize {
         self.steps
     }
 
     /// Begins to make the pixels of a step, unless that was done before.
-    pub(super) fn begin(&mut self, wanted: Wanted) {
+    pub(in crate::train) fn begin(&mut self, wanted: Wanted) {
         let is_running = self.running.get(&wanted.step).is_some_and(|(index, _)| *index == wanted.index);
         if is_running || wanted.step > self.last {
             return;
@@ -108,7 +108,7 @@ impl Ahead {
     }
 
     /// Returns the pixels of a step. Those of other steps than the next ones are dropped: a training may go back.
-    pub(super) fn take(&mut self, wanted: Wanted) -> Result<Ready> {
+    pub(in crate::train) fn take(&mut self, wanted: Wanted) -> Result<Ready> {
         let found = self.running.remove(&wanted.step).filter(|(index, _)| *index == wanted.index);
         let next = wanted.step..=wanted.step.saturating_add(self.steps as u32);
         self.running.retain(|step, _| next.contains(step));

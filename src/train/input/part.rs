@@ -4,35 +4,36 @@
 //! Only steps know parts. What a photo owns, such as its exposure, its pose and its occluders, belongs to all of it, and
 //! votes and renders between steps are those of whole photos.
 
-use super::step_input::{self, Shown};
 use crate::engine::Band;
 use crate::scene::labels::objects_of;
 use crate::scene::{Camera, LabelMap, Photo};
+use crate::train::input::step_input;
+use crate::train::input::step_input::Shown;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
 /// What a step trains on.
 #[derive(Debug)]
-pub(super) struct Part {
+pub(in crate::train) struct Part {
     /// Index of the training view.
-    pub(super) view: usize,
+    pub(in crate::train) view: usize,
     /// Its rows.
-    pub(super) band: Band,
+    pub(in crate::train) band: Band,
     /// Camera of these rows.
-    pub(super) camera: Camera,
+    pub(in crate::train) camera: Camera,
     /// Camera of the photo, if the part does not have all rows.
-    pub(super) whole: Option<Camera>,
+    pub(in crate::train) whole: Option<Camera>,
     /// Number of its pixels that count.
-    pub(super) valid_pixels: u64,
+    pub(in crate::train) valid_pixels: u64,
     /// Ids of the objects in its mask, sorted.
-    pub(super) objects: Vec<u16>,
+    pub(in crate::train) objects: Vec<u16>,
     /// Light and area of each object, by id.
-    pub(super) shown: BTreeMap<u16, Shown>,
+    pub(in crate::train) shown: BTreeMap<u16, Shown>,
 }
 
 impl Part {
     /// Returns the parts of a view, of at most `most` rows. `labels` is the mask in the layout of the device.
-    pub(super) fn all(
+    pub(in crate::train) fn all(
         (view, camera): (usize, &Camera),
         photo: &Photo,
         mask: Option<&LabelMap>,
@@ -61,7 +62,7 @@ impl Part {
 }
 
 /// Returns the band's rows of a photo.
-pub(super) fn photo_of(band: Band, photo: Arc<Photo>) -> Arc<Photo> {
+pub(in crate::train) fn photo_of(band: Band, photo: Arc<Photo>) -> Arc<Photo> {
     if band.rows == photo.height {
         return photo;
     }
@@ -70,7 +71,7 @@ pub(super) fn photo_of(band: Band, photo: Arc<Photo>) -> Arc<Photo> {
 }
 
 /// Returns the band's rows of the mask in the layout of the device, which is empty without a mask.
-pub(super) fn labels_of(band: Band, width: u32, labels: Arc<Vec<u32>>) -> Arc<Vec<u32>> {
+pub(in crate::train) fn labels_of(band: Band, width: u32, labels: Arc<Vec<u32>>) -> Arc<Vec<u32>> {
     let pixels = band.pixels(width);
     if labels.is_empty() || pixels.len() == labels.len() {
         return labels;
