@@ -224,10 +224,10 @@ pub mod train {
         pub use crate::train::region::Region;
     }
     pub mod poses {
-        pub use crate::train::poses::Poses;
+        pub use crate::train::shared::poses::Poses;
     }
     pub mod exposure {
-        pub use crate::train::exposure::{Exposure, decided};
+        pub use crate::train::shared::exposure::{Exposure, decided};
     }
     pub mod shared {
         pub use crate::train::shared::{Place, SharedLayout, SharedParameters};

@@ -6,6 +6,7 @@ use crate::gpu::Gpu;
 use crate::pass::{KernelShape, Variant};
 use crate::scene::{Dataset, Zone};
 use crate::shaders::structs::StepUniforms;
+use crate::train::TrainConfig;
 use crate::train::extension::Joined;
 use crate::train::input::step_input;
 use crate::train::input::step_input::{SceneScale, StepInput};
@@ -14,8 +15,8 @@ use crate::train::objective::{Objective, Parameter};
 use crate::train::region::Region;
 use crate::train::setup::{self, TrainerOptions};
 use crate::train::shared::Shared;
+use crate::train::shared::poses;
 use crate::train::strategy::{At, Strategy};
-use crate::train::{TrainConfig, poses};
 use std::sync::Arc;
 
 /// The model on the device, and what it is trained by.

@@ -2,8 +2,9 @@
 
 use crate::error::{Error, Result};
 use crate::scene::{Dataset, Gaussians, Zone};
+use crate::train::TrainConfig;
 use crate::train::input::step_input::SceneScale;
-use crate::train::{TrainConfig, exposure};
+use crate::train::shared::exposure;
 use std::collections::BTreeMap;
 
 /// A part of a larger scene. Its first model has the Gaussians of the part, then others that are drawn and not trained.

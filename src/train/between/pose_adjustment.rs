@@ -6,7 +6,7 @@ use crate::render::{RenderOptions, render};
 use crate::train::adjust::{self, Frame, adjusted};
 use crate::train::context::Context;
 use crate::train::objective::Parameter;
-use crate::train::poses;
+use crate::train::shared::poses;
 
 /// Settles the poses of all photos that others show enough of.
 #[derive(Clone, Copy, Debug, Default)]

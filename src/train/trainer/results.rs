@@ -5,7 +5,7 @@ use crate::error::Result;
 use crate::label::vote::decide;
 use crate::scene::{Camera, ColourMatrix, Gaussians, Occluders};
 use crate::train::between::{Between, occluders_of, set_occluders};
-use crate::train::exposure;
+use crate::train::shared::exposure;
 use std::collections::BTreeMap;
 
 impl Trainer {

@@ -4,17 +4,18 @@
 //! correction of its photo. Photos together leave place and turn of the whole open, and hardly tell slow bends of a path of
 //! cameras; a weak pull to 0 holds both. Trained are six numbers of each photo; its preconditioner makes a pose of them.
 
-use super::adjust;
-use super::precondition::{self, Matrix};
-use super::shared::{Place, SharedLayout, SharedParameters};
-use super::strategy::At;
 use crate::pass::{Builder, Extension, Hook, project};
 use crate::scene::{Camera, Dataset, Point, View};
+use crate::train::adjust;
+use crate::train::shared::preconditioner;
+use crate::train::shared::preconditioner::Matrix;
+use crate::train::shared::{Place, SharedLayout, SharedParameters};
+use crate::train::strategy::At;
 use glam::{DQuat, DVec3};
 use std::sync::Arc;
 
 /// Name of the parameters.
-pub(super) const NAME: &str = "poses";
+pub(in crate::train) const NAME: &str = "poses";
 /// Rows of a photo (glsl/include/pose.glsl): two of trained numbers, twelve of the preconditioner.
 pub(crate) const ROWS: usize = 14;
 /// Learning rate in the beginning, focal lengths that points move in the photo. The updates of a short run, some
@@ -45,14 +46,14 @@ impl Poses {
         };
         let of_view = |view: &View| {
             let depth = depth(view);
-            (depth, precondition::of_view(&view.camera, &dataset.points, depth.into()))
+            (depth, preconditioner::of_view(&view.camera, &dataset.points, depth.into()))
         };
         Self { of_views: dataset.train.iter().map(of_view).collect() }
     }
 }
 
 /// Returns true if a comparison of all photos settles poses before this step.
-pub(super) fn are_compared_before(at: At) -> bool {
+pub(in crate::train) fn are_compared_before(at: At) -> bool {
     let after = |share: f64| (share * f64::from(at.config.iterations)).round() as u32 + 1;
     COMPARED.iter().any(|&share| at.step == after(share))
 }
@@ -66,7 +67,7 @@ pub(crate) fn corrected(camera: &Camera, rows: &[[f32; 4]]) -> Camera {
 }
 
 /// Settles the pose of a photo: sets its rows so that the corrected camera is `to`. `None` if no rows do that.
-pub(super) fn settle(rows: &mut [[f32; 4]], from: &Camera, to: &Camera) -> Option<()> {
+pub(in crate::train) fn settle(rows: &mut [[f32; 4]], from: &Camera, to: &Camera) -> Option<()> {
     let turn = DQuat::from_mat3(&(to.rotation * from.rotation.transpose()));
     let turn = 2.0 / turn.w * turn.xyz();
     let shift = from.rotation * (to.centre() - from.centre()) / f64::from(rows[1][3]);
@@ -136,7 +137,7 @@ mod tests {
         let camera = Camera { rotation, translation, fx: 90.0, fy: 90.0, cx: 50.0, cy: 40.0, width: 100, height: 80 };
         let place = |k: usize| DVec3::new((k % 5) as f64 - 2.0, (k % 7) as f64 * 0.5 - 1.5, (k % 3) as f64 * 0.8);
         let points: Vec<Point> = (0..60).map(|k| Point { position: place(k), colour: [0; 3] }).collect();
-        let matrix = super::precondition::of_view(&camera, &points, 4.0);
+        let matrix = crate::train::shared::preconditioner::of_view(&camera, &points, 4.0);
         let poses = Poses { of_views: vec![(4.0, matrix)] };
         let mut rows = poses.start(Some(0));
         assert_eq!((rows.len(), rows[0][3]), (ROWS, 0.0));

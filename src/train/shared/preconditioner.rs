@@ -8,7 +8,7 @@ use crate::scene::{Camera, Point};
 use glam::DVec3;
 
 /// A matrix of the six numbers of a pose: the turn, then the move.
-pub(super) type Matrix = [[f64; 6]; 6];
+pub(in crate::train) type Matrix = [[f64; 6]; 6];
 
 /// Share of its diagonal that is added to the second moments: a number that hardly shows takes steps up to its inverse root
 /// longer.
@@ -30,7 +30,7 @@ const IDENTITY: Matrix = {
 
 /// Returns the preconditioner of a view: the inverse root of the second moments of the derivatives of points in the photo,
 /// focal lengths. Moves are in units of `unit`, world units. A view of few points has the identity.
-pub(super) fn of_view(camera: &Camera, points: &[Point], unit: f64) -> Matrix {
+pub(in crate::train) fn of_view(camera: &Camera, points: &[Point], unit: f64) -> Matrix {
     let seen: Vec<DVec3> =
         points.iter().filter(|point| camera.sees(point.position).is_some()).map(|p| p.position).collect();
     if seen.len() < POINTS {

@@ -6,15 +6,19 @@
 //! correction of a row counts its own updates, so that the first update of a photo has the right length however late it
 //! comes.
 
-use super::exposure::{Exposure, Gains};
-use super::poses::Poses;
-use super::region::Region;
-use super::strategy::At;
-use super::{ExposureMode, TrainConfig};
+pub(crate) mod exposure;
+pub(crate) mod poses;
+mod preconditioner;
+
 use crate::engine::SharedRow;
 use crate::error::{Error, Result};
 use crate::pass::Extension;
 use crate::scene::Dataset;
+use crate::train::region::Region;
+use crate::train::shared::exposure::{Exposure, Gains};
+use crate::train::shared::poses::Poses;
+use crate::train::strategy::At;
+use crate::train::{ExposureMode, TrainConfig};
 use serde::{Deserialize, Serialize};
 use std::fmt::Debug;
 use std::ops::Range;
@@ -111,7 +115,7 @@ impl Shared {
     }
 
     /// Returns the parameters, or those that the configuration asks for.
-    pub(super) fn or_of(self, config: &TrainConfig, dataset: &Dataset, region: Option<&Region>) -> Self {
+    pub(in crate::train) fn or_of(self, config: &TrainConfig, dataset: &Dataset, region: Option<&Region>) -> Self {
         if self.0.is_empty() { Self::of(config, &[], dataset, region) } else { self }
     }
 
@@ -131,25 +135,25 @@ impl Shared {
     }
 
     /// Returns the rows of an owner among those of a photo.
-    pub(super) fn photo_rows(&self, name: &str) -> Option<Range<usize>> {
+    pub(in crate::train) fn photo_rows(&self, name: &str) -> Option<Range<usize>> {
         let (of, place) = self.placed().find(|(of, _)| of.name() == name)?;
         let first = (place.photo - place.all.scene) as usize;
         Some(first..first + of.layout().photo as usize)
     }
 
     /// Returns the rows of a view among all rows.
-    pub(super) fn of_view(&self, view: usize) -> Range<usize> {
+    pub(in crate::train) fn of_view(&self, view: usize) -> Range<usize> {
         let rows = self.layout().of_view(view);
         rows.start as usize..rows.end as usize
     }
 
     /// Returns the total number of rows.
-    pub(super) fn rows(&self, views: usize) -> u32 {
+    pub(in crate::train) fn rows(&self, views: usize) -> u32 {
         self.layout().count(views)
     }
 
     /// Returns the initial rows.
-    pub(super) fn start(&self, views: usize) -> Result<Vec<[f32; 4]>> {
+    pub(in crate::train) fn start(&self, views: usize) -> Result<Vec<[f32; 4]>> {
         let mut rows = Vec::new();
         for of_view in std::iter::once(None).chain((0..views).map(Some)) {
             for of in &self.0 {
@@ -161,7 +165,7 @@ impl Shared {
         Ok(rows)
     }
 
-    pub(super) fn of_step(&self, at: At, view: usize) -> Result<Vec<SharedRow>> {
+    pub(in crate::train) fn of_step(&self, at: At, view: usize) -> Result<Vec<SharedRow>> {
         let (mut rates, mut of_photo) = (Vec::new(), Vec::new());
         for of in &self.0 {
             let SharedLayout { scene, photo } = of.layout();
@@ -175,16 +179,16 @@ impl Shared {
     }
 
     /// Returns the passes of the parameters.
-    pub(super) fn extensions(&self) -> Vec<Arc<dyn Extension>> {
+    pub(in crate::train) fn extensions(&self) -> Vec<Arc<dyn Extension>> {
         self.placed().map(|(of, place)| of.extension(place)).collect()
     }
 
-    pub(super) fn kept(&self) -> Option<KeptShared> {
+    pub(in crate::train) fn kept(&self) -> Option<KeptShared> {
         let names: Vec<&str> = self.0.iter().map(|of| of.name()).collect();
         (!names.is_empty()).then(|| KeptShared { name: names.join(" and "), layout: self.layout() })
     }
 
-    pub(super) fn check(&self, kept: Option<&KeptShared>) -> Result<(), String> {
+    pub(in crate::train) fn check(&self, kept: Option<&KeptShared>) -> Result<(), String> {
         let own = self.kept();
         let text = |kept: Option<&KeptShared>| kept.map_or("none".to_owned(), ToString::to_string);
         if own.as_ref() == kept {

@@ -6,13 +6,13 @@
 //! has taken a share of the other two. The mean of all numbers over the photos stays near 0, so that the model has the
 //! mean exposure.
 
-use super::shared::{Place, SharedLayout, SharedParameters};
-use super::strategy::At;
-use super::{ExposureMode, TrainConfig};
 use crate::Setting;
 use crate::pass::{Builder, Extension, Hook, loss};
 use crate::scene::ColourMatrix;
 use crate::shaders::constants::{EXPOSURE_ROWS, EXPOSURE_SHARE};
+use crate::train::shared::{Place, SharedLayout, SharedParameters};
+use crate::train::strategy::At;
+use crate::train::{ExposureMode, TrainConfig};
 use std::sync::Arc;
 
 /// Learning rate of ln gain and of shares. A photo has one update for each of its turns, some dozens in a short run.
@@ -24,7 +24,7 @@ const DIFFERS: f64 = 0.07;
 const KNOWN: f64 = 0.5;
 
 /// Name of the parameters.
-pub(super) const NAME: &str = "exposure";
+pub(in crate::train) const NAME: &str = "exposure";
 
 /// Gains of a photo, r, g, b; `None` where nothing tells them.
 pub(crate) type Gains = Option<[f64; 3]>;
@@ -33,7 +33,7 @@ pub(crate) type Gains = Option<[f64; 3]>;
 pub(crate) type Rows = [[f32; 4]; EXPOSURE_ROWS as usize];
 
 /// Returns the matrix of the rows of a photo.
-pub(super) fn matrix_of(rows: &[[f32; 4]]) -> ColourMatrix {
+pub(in crate::train) fn matrix_of(rows: &[[f32; 4]]) -> ColourMatrix {
     let mut matrix = [[0.0; 3]; 3];
     for (k, of) in matrix.iter_mut().enumerate() {
         let gain = f64::from(rows[0][k]).exp();
