@@ -221,7 +221,7 @@ pub mod train {
     pub use crate::train::state::TrainState;
     pub use crate::train::{REFIT_STEPS, StepReport, Trainer, aligned, first_model, refitted};
     pub mod region {
-        pub use crate::train::region::Region;
+        pub use crate::train::setup::region::Region;
     }
     pub mod poses {
         pub use crate::train::shared::poses::Poses;

@@ -7,7 +7,7 @@ use crate::io::LoadOptions;
 use crate::io::block_file::{self, BlockFile, poses_crc};
 use crate::scene::{ColourMatrix, Dataset, View};
 use crate::train::ExposureMode;
-use crate::train::region::Region;
+use crate::train::setup::region::Region;
 use crate::train::shared::exposure;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;

@@ -12,7 +12,7 @@ use crate::train::input::step_input;
 use crate::train::input::step_input::{SceneScale, StepInput};
 use crate::train::input::views::Views;
 use crate::train::objective::{Objective, Parameter};
-use crate::train::region::Region;
+use crate::train::setup::region::Region;
 use crate::train::setup::{self, TrainerOptions};
 use crate::train::shared::Shared;
 use crate::train::shared::poses;

@@ -14,7 +14,7 @@ use crate::engine::SharedRow;
 use crate::error::{Error, Result};
 use crate::pass::Extension;
 use crate::scene::Dataset;
-use crate::train::region::Region;
+use crate::train::setup::region::Region;
 use crate::train::shared::exposure::{Exposure, Gains};
 use crate::train::shared::poses::Poses;
 use crate::train::strategy::At;

@@ -9,7 +9,7 @@ use crate::scene::Dataset;
 use crate::scheduler::plan::{Buf, TABLE};
 use crate::train::input::sampler::ViewOrder;
 use crate::train::input::step_input::TrainView;
-use crate::train::region::Region;
+use crate::train::setup::region::Region;
 use crate::train::setup::{TrainerOptions, engine_size};
 use crate::train::state::{TrainState, ViewFingerprint};
 use crate::train::strategy::Kept;

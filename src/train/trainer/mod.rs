@@ -10,6 +10,7 @@ use crate::lab::fault;
 use crate::render::RenderOptions;
 use crate::scene::{Dataset, Gaussians};
 use crate::scheduler::plan::FRAMES_IN_FLIGHT;
+use crate::train::TrainConfig;
 use crate::train::between::{Growth, Jobs, Occluders, PoseAdjustment, Votes, When};
 use crate::train::context::Context;
 use crate::train::input::free_space;
@@ -19,11 +20,11 @@ use crate::train::input::step_input::{StepInput, TrainView};
 use crate::train::objective::Loss;
 use crate::train::report::StepReport;
 use crate::train::sentinel::Sentinel;
+use crate::train::setup::near_plane;
 use crate::train::setup::{self, TrainerOptions, start_size};
 use crate::train::state::ViewFingerprint;
 use crate::train::strategy::Densified;
 use crate::train::timing::{StepTimes, Timing};
-use crate::train::{TrainConfig, near};
 use std::collections::VecDeque;
 use std::sync::Arc;
 
@@ -57,7 +58,7 @@ impl Trainer {
         let config = options.objective.limit_weights(config);
         let size = start_size(&gpu, dataset, &config, (model, options.region.as_ref()), options.scheduler)?;
         let near = match config.near {
-            0.0 => near::near_plane(dataset.train.iter().map(|view| &view.camera), model),
+            0.0 => near_plane::near_plane(dataset.train.iter().map(|view| &view.camera), model),
             near => near,
         };
         let config = TrainConfig { near, ..setup::for_photos(&config, dataset)? };

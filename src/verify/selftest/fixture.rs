@@ -11,7 +11,7 @@ use crate::scheduler::plan::{Buf, PlanOptions};
 use crate::shaders::structs::StepUniforms;
 use crate::train::input::step_input;
 use crate::train::input::step_input::{SceneScale, Shown, StepInput, StepView};
-use crate::train::near::NEAR;
+use crate::train::setup::near_plane::NEAR;
 use crate::train::strategy::{self, At};
 use crate::train::{LabelRule, TrainConfig};
 use crate::verify::reference::loss::ObjectPixel;

@@ -1,5 +1,9 @@
 //! The inputs of a training: options, sizes, views.
 
+pub(in crate::train) mod first_model;
+pub(crate) mod near_plane;
+pub(crate) mod region;
+
 use crate::engine::{Engine, EngineSize, LabelSize};
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
@@ -12,7 +16,7 @@ use crate::train::input::known_depths::KnownDepths;
 use crate::train::input::part::Part;
 use crate::train::input::step_input;
 use crate::train::input::step_input::TrainView;
-use crate::train::region::Region;
+use crate::train::setup::region::Region;
 use crate::train::shared::Shared;
 use crate::train::strategy::Strategy;
 use crate::train::{LabelRule, Objective, TrainConfig};
@@ -79,7 +83,7 @@ pub fn engine_size(dataset: &Dataset, config: &TrainConfig, gaussians: u64) -> R
 }
 
 /// Sets what the settings leave to the photos.
-pub(super) fn for_photos(config: &TrainConfig, dataset: &Dataset) -> Result<TrainConfig> {
+pub(in crate::train) fn for_photos(config: &TrainConfig, dataset: &Dataset) -> Result<TrainConfig> {
     Ok(config.for_size(engine_size(dataset, config, 0)?.image))
 }
 
@@ -104,7 +108,7 @@ pub(crate) fn start_size(
 
 /// Makes the training views of a data set, and their parts of at most `most` rows. `depths` are known depths of each view, or
 /// none.
-pub(super) fn train_views(
+pub(in crate::train) fn train_views(
     dataset: &Dataset,
     depths: Vec<KnownDepths>,
     border: u32,

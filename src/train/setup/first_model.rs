@@ -1,10 +1,10 @@
 //! The model that a training starts from.
 
-use super::setup::{engine_size, for_photos};
-use super::{StrategyKind, TrainConfig};
 use crate::error::{Result, Setting};
 use crate::io::init;
 use crate::scene::{Dataset, Gaussians, Point};
+use crate::train::setup::{engine_size, for_photos};
+use crate::train::{StrategyKind, TrainConfig};
 use std::borrow::Cow;
 
 /// Random Gaussians for a scene without points: at most this many, and this share of the budget, so that growth chooses

@@ -22,22 +22,22 @@ pub struct Region {
 
 impl Region {
     /// Returns the frozen Gaussians of a training.
-    pub(super) fn frozen(region: Option<&Self>) -> u32 {
+    pub(in crate::train) fn frozen(region: Option<&Self>) -> u32 {
         region.map_or(0, |region| region.frozen)
     }
 
     /// Returns where Gaussians grow; `None`: everywhere.
-    pub(super) fn grow_zone(region: Option<&Self>, config: &TrainConfig) -> Option<Zone> {
+    pub(in crate::train) fn grow_zone(region: Option<&Self>, config: &TrainConfig) -> Option<Zone> {
         region.map(|region| region.zone).or(config.grow_box.map(Zone::along_world))
     }
 
     /// Returns the scale of a training.
-    pub(super) fn scale(region: Option<&Self>, dataset: &Dataset) -> SceneScale {
+    pub(in crate::train) fn scale(region: Option<&Self>, dataset: &Dataset) -> SceneScale {
         SceneScale { extent: region.map_or_else(|| dataset.extent(), |region| region.extent) }
     }
 
     /// Refuses a first model without a Gaussian to train.
-    pub(super) fn check(&self, model: &Gaussians) -> Result<()> {
+    pub(in crate::train) fn check(&self, model: &Gaussians) -> Result<()> {
         let (all, frozen) = (model.len(), self.frozen);
         if (frozen as usize) < all {
             return Ok(());
