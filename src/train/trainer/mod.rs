@@ -19,12 +19,12 @@ use crate::train::input::sampler::ViewOrder;
 use crate::train::input::step_input::{StepInput, TrainView};
 use crate::train::objective::Loss;
 use crate::train::report::StepReport;
-use crate::train::sentinel::Sentinel;
 use crate::train::setup::near_plane;
 use crate::train::setup::{self, TrainerOptions, start_size};
 use crate::train::state::ViewFingerprint;
 use crate::train::strategy::Densified;
-use crate::train::timing::{StepTimes, Timing};
+use crate::train::trainer::sentinel::Sentinel;
+use crate::train::trainer::timing::{StepTimes, Timing};
 use std::collections::VecDeque;
 use std::sync::Arc;
 

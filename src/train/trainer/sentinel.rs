@@ -5,9 +5,9 @@
 //!   [`SHARE_MAX`] of the splats have such gradients.
 //! * A *parameter* that is not finite, or so large that its projection is not, is the fault of the device or of its
 //!   input, not of such a step. The first one that cull or project_forward finds ends the training, and so does a loss
-//!   of NaN. The caller can go back to a saved state ([`Trainer::restore`](super::Trainer::restore)).
+//!   of NaN. The caller can go back to a saved state ([`Trainer::restore`](crate::train::Trainer::restore)).
 
-use super::report::StepReport;
+use crate::train::report::StepReport;
 use crate::error::{Error, Result};
 
 /// Share of the splats whose gradients may be dropped; [`COUNT_MAX`] are always accepted.
@@ -18,7 +18,7 @@ const STEPS_MAX: u32 = 3;
 
 /// Gradients that were dropped.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Sentinel {
+pub(in crate::train) struct Sentinel {
     /// Number of dropped gradients so far, and the number for the next log message.
     dropped: u64,
     next_word: u64,
@@ -28,7 +28,7 @@ pub(super) struct Sentinel {
 
 impl Sentinel {
     /// Refuses a finished step on a view that has broken the model.
-    pub(super) fn check(&mut self, of: &StepReport, view: &str) -> Result<()> {
+    pub(in crate::train) fn check(&mut self, of: &StepReport, view: &str) -> Result<()> {
         let (counters, losses) = (&of.report.counters, [of.loss, of.label_loss]);
         let failure = |quantity| Error::Numeric { quantity, step: u64::from(of.step), view: view.to_owned() };
         for (pass, what, count, first) in [
