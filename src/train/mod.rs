@@ -4,8 +4,8 @@
 //! number of Gaussians, [`Shared`] parameters belong to the scene or to a photo. [`crate::run`] adds files and scores.
 
 mod adjust;
-pub(crate) mod align;
-mod alone;
+mod alignment;
+
 pub(crate) mod between;
 pub(crate) mod config;
 mod context;
@@ -14,6 +14,7 @@ pub(crate) mod input;
 pub(crate) mod kinds;
 pub(crate) mod objective;
 mod presets;
+mod refit;
 mod report;
 mod schedule;
 pub(crate) mod setup;
@@ -22,12 +23,12 @@ pub(crate) mod state;
 pub(crate) mod strategy;
 mod trainer;
 
-pub use align::aligned;
-pub use alone::{REFIT_STEPS, refitted};
+pub use alignment::aligned;
 pub use config::TrainConfig;
 pub use kinds::{ExposureMode, LabelRule, Occlusion, StrategyKind};
 pub(crate) use objective::Objective;
 pub use presets::Preset;
+pub use refit::{REFIT_STEPS, refitted};
 pub use report::{LabelWork, StepKind, StepReport};
 pub use setup::first_model::first_model;
 pub(crate) use setup::first_model::go_on_from;

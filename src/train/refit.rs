@@ -4,11 +4,11 @@
 //! cost little there, and show when the object stands alone. A copy has opacities of its own. The object layers of LabelGS fit
 //! them: its colours and opacity alone against photos and masks, without the pixels in which something hides it.
 
-use super::{ExposureMode, Objective, Occlusion, TrainConfig, Trainer, TrainerOptions};
 use crate::error::{Error, Result, Setting};
 use crate::gpu::Gpu;
 use crate::scene::{Dataset, Gaussians, Occluders, View};
 use crate::scheduler::SchedulerOptions;
+use crate::train::{ExposureMode, Objective, Occlusion, TrainConfig, Trainer, TrainerOptions};
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 

@@ -3,12 +3,12 @@
 //! A model whose photos had their poses refined bends with them, and held-out views keep the poses of the reconstruction.
 //! Scores of such views tell quality only after their poses were refined by the model too (as in BARF, Lin et al. 2021).
 
-use super::{ExposureMode, Objective, TrainConfig, Trainer, TrainerOptions};
 use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::scene::{Dataset, Gaussians, Point, View};
 use crate::scheduler::SchedulerOptions;
 use crate::stage::Stage;
+use crate::train::{ExposureMode, Objective, TrainConfig, Trainer, TrainerOptions};
 use std::sync::Arc;
 
 /// Steps of each view.
