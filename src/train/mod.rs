@@ -5,7 +5,6 @@
 
 mod adjust;
 mod alignment;
-
 pub(crate) mod between;
 pub(crate) mod config;
 mod context;

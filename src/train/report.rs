@@ -2,8 +2,7 @@
 
 use crate::engine::Report;
 use crate::train::TrainConfig;
-use crate::train::input::step_input;
-use crate::train::input::step_input::{StepInput, StepView};
+use crate::train::input::step_input::{self, StepInput, StepView};
 
 /// The numbers of a finished step.
 #[derive(Clone, Copy, Debug)]

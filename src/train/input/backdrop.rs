@@ -1,8 +1,8 @@
 //! What is behind the scene in a step.
 
+use super::sampler::stream;
 use crate::scene::Photo;
 use crate::train::TrainConfig;
-use crate::train::input::sampler::stream;
 use rand::Rng;
 use std::borrow::Cow;
 

@@ -3,9 +3,9 @@
 //! Gaussians there stand for nothing that was photographed. Training cannot tell when they are before no training camera,
 //! but they fog views between those cameras.
 
+use super::sampler::stream;
 use crate::io::init;
 use crate::scene::{Camera, Dataset, Gaussians};
-use crate::train::input::sampler::stream;
 use glam::DVec3;
 use rand::Rng;
 

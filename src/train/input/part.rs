@@ -4,11 +4,10 @@
 //! Only steps know parts. What a photo owns, such as its exposure, its pose and its occluders, belongs to all of it, and
 //! votes and renders between steps are those of whole photos.
 
+use super::step_input::{self, Shown};
 use crate::engine::Band;
 use crate::scene::labels::objects_of;
 use crate::scene::{Camera, LabelMap, Photo};
-use crate::train::input::step_input;
-use crate::train::input::step_input::Shown;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 

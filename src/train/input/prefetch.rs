@@ -3,13 +3,13 @@
 //! The order of views is known ahead. What a thread makes depends on step and view alone, so that a step has the same bits
 //! whether its pixels were made ahead or are made when it begins.
 
+use super::known_depths::KnownDepths;
+use super::part::{Part, labels_of, photo_of};
+use super::step_input::{TrainView, valid_pixels};
 use crate::engine::Band;
 use crate::error::{Error, Result};
 use crate::io::resample::shrink_photo;
 use crate::scene::{Camera, Photo, Pixels};
-use crate::train::input::known_depths::KnownDepths;
-use crate::train::input::part::{Part, labels_of, photo_of};
-use crate::train::input::step_input::{TrainView, valid_pixels};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::thread::{self, JoinHandle};

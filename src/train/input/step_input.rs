@@ -1,12 +1,11 @@
 //! The input of one step: uniforms, photo, masks.
 
+use super::backdrop;
+use super::known_depths::{self, KnownDepths};
 use crate::engine::{DisagreementInput, Engine, LayerInput, TrainInput};
 use crate::scene::{Camera, LabelMap, Occluders, Photo, Pixels};
 use crate::shaders::constants::{ADAM_BETA1, ADAM_BETA2, ALPHA_SLACK, FINEST, LABEL_BORDER};
 use crate::shaders::structs::StepUniforms;
-use crate::train::input::backdrop;
-use crate::train::input::known_depths;
-use crate::train::input::known_depths::KnownDepths;
 use crate::train::{LabelRule, TrainConfig};
 use std::collections::BTreeMap;
 

@@ -1,16 +1,15 @@
 //! The training views, at the size of each step.
 
+use super::free_space;
+use super::part::Part;
+use super::prefetch::{Ahead, Ready, Wanted};
+use super::step_input::{self, Shown, StepInput, StepView, TrainView};
 use crate::error::{Error, Result};
 use crate::label::vote::ballot::Voter;
 use crate::scene::camera::side_at;
 use crate::scene::{Camera, Occluders};
 use crate::scheduler::plan::FRAMES_IN_FLIGHT;
 use crate::train::TrainConfig;
-use crate::train::input::free_space;
-use crate::train::input::part::Part;
-use crate::train::input::prefetch::{Ahead, Ready, Wanted};
-use crate::train::input::step_input;
-use crate::train::input::step_input::{Shown, StepInput, StepView, TrainView};
 use crate::train::shared::poses;
 use std::collections::BTreeMap;
 use std::ops::{Deref, DerefMut};

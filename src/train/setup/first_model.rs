@@ -1,9 +1,9 @@
 //! The model that a training starts from.
 
+use super::{engine_size, for_photos};
 use crate::error::{Result, Setting};
 use crate::io::init;
 use crate::scene::{Dataset, Gaussians, Point};
-use crate::train::setup::{engine_size, for_photos};
 use crate::train::{StrategyKind, TrainConfig};
 use std::borrow::Cow;
 

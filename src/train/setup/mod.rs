@@ -14,12 +14,11 @@ use crate::scene::{Dataset, Gaussians, LabelMap, Pixels, View, crew};
 use crate::scheduler::SchedulerOptions;
 use crate::train::input::known_depths::KnownDepths;
 use crate::train::input::part::Part;
-use crate::train::input::step_input;
-use crate::train::input::step_input::TrainView;
-use crate::train::setup::region::Region;
+use crate::train::input::step_input::{self, TrainView};
 use crate::train::shared::Shared;
 use crate::train::strategy::Strategy;
 use crate::train::{LabelRule, Objective, TrainConfig};
+use region::Region;
 use std::collections::BTreeSet;
 use std::sync::Arc;
 

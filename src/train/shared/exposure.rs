@@ -6,11 +6,11 @@
 //! has taken a share of the other two. The mean of all numbers over the photos stays near 0, so that the model has the
 //! mean exposure.
 
+use super::{Place, SharedLayout, SharedParameters};
 use crate::Setting;
 use crate::pass::{Builder, Extension, Hook, loss};
 use crate::scene::ColourMatrix;
 use crate::shaders::constants::{EXPOSURE_ROWS, EXPOSURE_SHARE};
-use crate::train::shared::{Place, SharedLayout, SharedParameters};
 use crate::train::strategy::At;
 use crate::train::{ExposureMode, TrainConfig};
 use std::sync::Arc;

@@ -4,12 +4,11 @@
 //! correction of its photo. Photos together leave place and turn of the whole open, and hardly tell slow bends of a path of
 //! cameras; a weak pull to 0 holds both. Trained are six numbers of each photo; its preconditioner makes a pose of them.
 
+use super::preconditioner::{self, Matrix};
+use super::{Place, SharedLayout, SharedParameters};
 use crate::pass::{Builder, Extension, Hook, project};
 use crate::scene::{Camera, Dataset, Point, View};
 use crate::train::adjust;
-use crate::train::shared::preconditioner;
-use crate::train::shared::preconditioner::Matrix;
-use crate::train::shared::{Place, SharedLayout, SharedParameters};
 use crate::train::strategy::At;
 use glam::{DQuat, DVec3};
 use std::sync::Arc;

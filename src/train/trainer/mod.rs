@@ -2,6 +2,10 @@
 
 mod checkpoint;
 mod results;
+mod sentinel;
+mod timing;
+
+pub(crate) use timing::StepTimes;
 
 use crate::engine::{Engine, EngineSize, InFlight};
 use crate::error::Result;
@@ -14,8 +18,7 @@ use crate::train::TrainConfig;
 use crate::train::between::{Growth, Jobs, Occluders, PoseAdjustment, Votes, When};
 use crate::train::context::Context;
 use crate::train::input::free_space;
-use crate::train::input::sampler;
-use crate::train::input::sampler::ViewOrder;
+use crate::train::input::sampler::{self, ViewOrder};
 use crate::train::input::step_input::{StepInput, TrainView};
 use crate::train::objective::Loss;
 use crate::train::report::StepReport;
@@ -23,10 +26,10 @@ use crate::train::setup::near_plane;
 use crate::train::setup::{self, TrainerOptions, start_size};
 use crate::train::state::ViewFingerprint;
 use crate::train::strategy::Densified;
-use crate::train::trainer::sentinel::Sentinel;
-use crate::train::trainer::timing::{StepTimes, Timing};
+use sentinel::Sentinel;
 use std::collections::VecDeque;
 use std::sync::Arc;
+use timing::Timing;
 
 /// A model in training.
 pub struct Trainer {

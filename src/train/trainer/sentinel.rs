@@ -7,8 +7,8 @@
 //!   input, not of such a step. The first one that cull or project_forward finds ends the training, and so does a loss
 //!   of NaN. The caller can go back to a saved state ([`Trainer::restore`](crate::train::Trainer::restore)).
 
-use crate::train::report::StepReport;
 use crate::error::{Error, Result};
+use crate::train::report::StepReport;
 
 /// Share of the splats whose gradients may be dropped; [`COUNT_MAX`] are always accepted.
 const SHARE_MAX: f64 = 1e-3;
@@ -18,7 +18,7 @@ const STEPS_MAX: u32 = 3;
 
 /// Gradients that were dropped.
 #[derive(Clone, Copy, Debug, Default)]
-pub(in crate::train) struct Sentinel {
+pub(super) struct Sentinel {
     /// Number of dropped gradients so far, and the number for the next log message.
     dropped: u64,
     next_word: u64,
@@ -28,7 +28,7 @@ pub(in crate::train) struct Sentinel {
 
 impl Sentinel {
     /// Refuses a finished step on a view that has broken the model.
-    pub(in crate::train) fn check(&mut self, of: &StepReport, view: &str) -> Result<()> {
+    pub(super) fn check(&mut self, of: &StepReport, view: &str) -> Result<()> {
         let (counters, losses) = (&of.report.counters, [of.loss, of.label_loss]);
         let failure = |quantity| Error::Numeric { quantity, step: u64::from(of.step), view: view.to_owned() };
         for (pass, what, count, first) in [

@@ -18,21 +18,21 @@ pub struct StepTimes {
 
 /// Times that nobody has taken yet.
 #[derive(Debug, Default)]
-pub(in crate::train) struct Timing {
+pub(super) struct Timing {
     seen: HashSet<Recording>,
     times: Vec<StepTimes>,
 }
 
 impl Timing {
     /// Reads the times of a finished step whose frame was not used again.
-    pub(in crate::train) fn note(&mut self, engine: &mut Engine, step: u32, recording: Recording) -> Result<()> {
+    pub(super) fn note(&mut self, engine: &mut Engine, step: u32, recording: Recording) -> Result<()> {
         let items = engine.times(recording)?;
         self.times.push(StepTimes { step, is_first: self.seen.insert(recording), items });
         Ok(())
     }
 
     /// Takes the times.
-    pub(in crate::train) fn take(&mut self) -> Vec<StepTimes> {
+    pub(super) fn take(&mut self) -> Vec<StepTimes> {
         std::mem::take(&mut self.times)
     }
 }
