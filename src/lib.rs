@@ -67,6 +67,7 @@
 )]
 
 pub mod blocks;
+mod bundle_adjustment;
 #[cfg(feature = "cli")]
 mod cli;
 pub mod edit;

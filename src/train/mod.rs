@@ -3,7 +3,6 @@
 //! [`Trainer`] owns the model on the device. [`TrainConfig`] has every hyper-parameter; a [`Strategy`] changes the
 //! number of Gaussians, [`Shared`] parameters belong to the scene or to a photo. [`crate::run`] adds files and scores.
 
-mod adjust;
 mod alignment;
 pub(crate) mod between;
 pub(crate) mod config;

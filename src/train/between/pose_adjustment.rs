@@ -1,9 +1,9 @@
 //! Poses of the photos by a comparison of these with each other.
 
 use super::Between;
+use crate::bundle_adjustment::{Frame, PHOTOS_MAX, adjusted};
 use crate::error::Result;
 use crate::render::{RenderOptions, render};
-use crate::train::adjust::{self, Frame, adjusted};
 use crate::train::context::Context;
 use crate::train::objective::Parameter;
 use crate::train::shared::poses;
@@ -23,8 +23,8 @@ impl Between<Context> for PoseAdjustment {
 
     fn run(&mut self, _step: u32, context: &mut Context) -> Result<()> {
         let Some(range) = context.shared.photo_rows(poses::NAME) else { return Ok(()) };
-        if context.views.len() > adjust::MOST {
-            tracing::warn!("the model alone tells the poses of more than {} photos", adjust::MOST);
+        if context.views.len() > PHOTOS_MAX {
+            tracing::warn!("the model alone tells the poses of more than {PHOTOS_MAX} photos");
             return Ok(());
         }
         context.refresh_poses()?;
@@ -59,7 +59,7 @@ fn frames(context: &mut Context) -> Result<Vec<Frame>> {
     for (index, view) in views.iter().enumerate() {
         let camera = Frame::camera_of(views.camera(index), views.len());
         let model = render(engine, &camera, &options)?;
-        frames.push(Frame::new(camera, &*view.photo.get()?, &model));
+        frames.push(Frame::new(camera, &*view.photo.get()?, &model.depth, &model.alpha));
     }
     Ok(frames)
 }

@@ -6,9 +6,9 @@
 
 use super::preconditioner::{self, Matrix};
 use super::{Place, SharedLayout, SharedParameters};
+use crate::bundle_adjustment;
 use crate::pass::{Builder, Extension, Hook, project};
 use crate::scene::{Camera, Dataset, Point, View};
-use crate::train::adjust;
 use crate::train::strategy::At;
 use glam::{DQuat, DVec3};
 use std::sync::Arc;
@@ -72,7 +72,7 @@ pub(in crate::train) fn settle(rows: &mut [[f32; 4]], from: &Camera, to: &Camera
     let shift = from.rotation * (to.centre() - from.centre()) / f64::from(rows[1][3]);
     let mut numbers = [turn.x, turn.y, turn.z, shift.x, shift.y, shift.z];
     let mut matrix: Vec<f64> = rows[2..ROWS].iter().flat_map(|row| [row[0], row[1], row[2]].map(f64::from)).collect();
-    adjust::solve(&mut matrix, &mut numbers)?;
+    bundle_adjustment::solve(&mut matrix, &mut numbers)?;
     for (row, three) in rows.iter_mut().zip(numbers.chunks_exact(3)) {
         row[..3].iter_mut().zip(three).for_each(|(to, &number)| *to = number as f32);
     }

@@ -1,17 +1,16 @@
 //! A photo with the depths of the model.
 
 use crate::io::resample::shrink_photo;
-use crate::render::Rendered;
 use crate::scene::{Camera, Photo};
 
 /// Longest side of a frame, px: places in it are known to a hundredth of a pixel.
-const SIDE: u32 = 640;
+const SIDE_MAX: u32 = 640;
 /// Most bytes of all frames; those of many photos are smaller.
-const BYTES: f64 = (1_u64 << 30) as f64;
+const BYTES_MAX: f64 = (1_u64 << 30) as f64;
 /// Bytes of a pixel: its colour with derivatives, and its depth.
-const PIXEL: f64 = 40.0;
+const PIXEL_BYTES: f64 = 40.0;
 /// Least opacity of the model where its depth is that of a surface.
-const OPAQUE: f32 = 0.98;
+const ALPHA_MIN: f32 = 0.98;
 
 /// A photo with the depths of the model, row-major.
 #[derive(Clone, Debug)]
@@ -29,20 +28,21 @@ impl Frame {
     /// Returns the camera of a frame, one of `count`, of a photo.
     pub(crate) fn camera_of(photo: &Camera, count: usize) -> Camera {
         let pixels = f64::from(photo.width) * f64::from(photo.height);
-        let by_side = f64::from(SIDE) / f64::from(photo.width.max(photo.height));
-        let by_bytes = (BYTES / (PIXEL * count as f64) / pixels).sqrt();
+        let by_side = f64::from(SIDE_MAX) / f64::from(photo.width.max(photo.height));
+        let by_bytes = (BYTES_MAX / (PIXEL_BYTES * count as f64) / pixels).sqrt();
         photo.shrunk(by_side.min(by_bytes).min(1.0))
     }
 
-    /// Makes the frame of a camera, from [`Self::camera_of`], of a photo and of the depths that the model has there.
-    pub(crate) fn new(camera: Camera, photo: &Photo, model: &Rendered) -> Self {
+    /// Makes the frame of a camera, from [`Self::camera_of`], of a photo and of a picture of the model: the sums of depth and of
+    /// opacity along each pixel's ray.
+    pub(crate) fn new(camera: Camera, photo: &Photo, depth: &[f32], alpha: &[f32]) -> Self {
         let photo = shrink_photo(photo, camera.width, camera.height);
         let rgb: Vec<_> =
             photo.rgba.iter().map(|&[r, g, b, _]| [r, g, b].map(|value| f32::from(value) / 255.0)).collect();
-        let depth = |((pixel, &depth), &alpha): ((&[u8; 4], &f32), &f32)| {
-            if pixel[3] == u8::MAX && alpha >= OPAQUE { depth / alpha } else { f32::NAN }
+        let known = |((pixel, &depth), &alpha): ((&[u8; 4], &f32), &f32)| {
+            if pixel[3] == u8::MAX && alpha >= ALPHA_MIN { depth / alpha } else { f32::NAN }
         };
-        let depth = photo.rgba.iter().zip(&model.depth).zip(&model.alpha).map(depth).collect();
+        let depth = photo.rgba.iter().zip(depth).zip(alpha).map(known).collect();
         Self::of(camera, &rgb, depth)
     }
 

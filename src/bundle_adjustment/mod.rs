@@ -15,40 +15,41 @@ mod pair;
 mod patch;
 mod system;
 
-pub(super) use frame::Frame;
-pub(super) use system::solve;
+pub(crate) use frame::Frame;
+pub(crate) use system::solve;
 
 use crate::scene::Camera;
 use crate::stage::Stage;
 use patch::Patch;
 use system::{Counts, Sums, System};
 
-/// Most photos: the equations of more need gigabytes.
-pub(super) const MOST: usize = 1000;
+/// Largest number of photos: the equations of more need gigabytes.
+pub(crate) const PHOTOS_MAX: usize = 1000;
 /// Photos are halved until the longer side has at most this many pixels. Smaller ones have too few patches.
-const COARSEST: u32 = 400;
-/// Most iterations at each size.
-const ROUNDS: usize = 16;
-/// Root mean square of the turns of a step, radians, after which poses hardly change.
-const STILL: f64 = 5e-5;
-/// Fewest comparisons of patches that tell the pose of a photo. Photos of 160 px have 200 to 350 at first, and steps of
-/// a tenth of a degree to and fro; those of 320 px have 2,000.
-const ENOUGH: usize = 400;
-/// Least share of them that find something alike: where poses are off by more than a patch, few do.
-const FOUND: f64 = 0.4;
-/// Least share of all comparisons. Where things shine, move or have detail finer than pixels, poses by the photos would be worse
-/// than those of a good reconstruction: 0.85 in the made scene, 0.5 in a photo set of 260 px with fine detail.
-const AGREED: f64 = 0.7;
-/// Least share of the comparisons before that is still possible: with poses that leave the model, its surfaces hide patches. 0.94
-/// and more in the made scene, 0.68 in a photo set of smooth things, where a bend of all cameras hardly shows.
-const KEPT: f64 = 0.85;
+const COARSEST_SIDE_MAX: u32 = 400;
+/// Largest number of iterations at each size.
+const ROUNDS_MAX: usize = 16;
+/// Converged: the root mean square of the turns of an iteration is below this, radians.
+const TURN_MIN: f64 = 5e-5;
+/// A photo with fewer patches that match in other photos keeps its pose. Photos of 160 px have 200 to 350 at first, and
+/// iterate to and fro by a tenth of a degree; those of 320 px have 2,000.
+const MATCHES_MIN: usize = 400;
+/// A photo of whose comparisons a smaller share matches keeps its pose: it is off by more than a patch.
+const PHOTO_MATCHES_MIN: f64 = 0.4;
+/// All poses stay if a smaller share of all comparisons matches. Where things shine, move or have detail finer than pixels, the
+/// result would be worse than a good reconstruction. The made scene has 0.85, a photo set of 260 px with fine detail 0.5.
+const ALL_MATCHES_MIN: f64 = 0.7;
+/// All poses stay if fewer comparisons are possible than this share of those at first: the poses have drifted off the model,
+/// whose surfaces then hide patches. The made scene has 0.94 and more, a photo set of smooth things, where a bend of all
+/// cameras hardly shows, 0.68.
+const COMPARABLE_MIN: f64 = 0.85;
 
 /// Returns the camera of each frame with its pose adjusted; `None` for a frame that shares too little with others, and for all
 /// if they agree too little.
-pub(super) fn adjusted(frames: Vec<Frame>) -> Vec<Option<Camera>> {
+pub(crate) fn adjusted(frames: Vec<Frame>) -> Vec<Option<Camera>> {
     let _stage = Stage::new("comparing photos for their poses", 0);
     let mut sizes = vec![frames];
-    while let Some(smaller) = sizes.last().filter(|of| of.iter().any(|frame| frame.side() > COARSEST)) {
+    while let Some(smaller) = sizes.last().filter(|of| of.iter().any(|frame| frame.side() > COARSEST_SIDE_MAX)) {
         let smaller = smaller.iter().map(Frame::halved).collect();
         sizes.push(smaller);
     }
@@ -74,11 +75,11 @@ fn solved(frames: &mut [Frame]) -> Vec<bool> {
     let partners = pair::partners(frames, &patches);
     let mut is_known = vec![false; frames.len()];
     let (mut before, mut last) = (Counts::default(), Counts::default());
-    for round in 0..ROUNDS {
+    for round in 0..ROUNDS_MAX {
         let sums: Vec<Sums> = system::sums(frames, &patches, &partners);
         let system = System::of(&sums, &partners, frames.len());
-        let is_told: Vec<bool> = system.counts.iter().map(|counts| counts.alike >= ENOUGH).collect();
-        let is_found = |counts: &Counts| counts.alike as f64 >= FOUND * counts.looked as f64;
+        let is_told: Vec<bool> = system.counts.iter().map(|counts| counts.alike >= MATCHES_MIN).collect();
+        let is_found = |counts: &Counts| counts.alike as f64 >= PHOTO_MATCHES_MIN * counts.looked as f64;
         is_known = system.counts.iter().zip(&is_told).map(|(counts, is_told)| *is_told && is_found(counts)).collect();
         let all = system.counts.iter().fold(Counts::default(), |sum, of| sum + *of);
         before = if round == 0 { all } else { before };
@@ -97,7 +98,7 @@ fn solved(frames: &mut [Frame]) -> Vec<bool> {
             all.looked / 2,
             turn.to_degrees()
         );
-        if turn < STILL {
+        if turn < TURN_MIN {
             break;
         }
     }
@@ -107,7 +108,7 @@ fn solved(frames: &mut [Frame]) -> Vec<bool> {
 /// Returns true if all comparisons, and their number `before` the first step, tell poses.
 fn is_sound(all: Counts, before: usize) -> bool {
     let (looked, alike) = (all.looked as f64, all.alike as f64);
-    let is_sound = alike >= AGREED * looked && looked >= KEPT * before as f64;
+    let is_sound = alike >= ALL_MATCHES_MIN * looked && looked >= COMPARABLE_MIN * before as f64;
     if !is_sound {
         let numbers = format!("{} of {} comparisons of photos agree", all.alike / 2, all.looked / 2);
         tracing::info!("poses: {numbers}, {} were possible before; too few", before / 2);

@@ -211,7 +211,7 @@ impl System {
 
 /// Solves symmetric positive equations (Cholesky). The matrix becomes the lower factor, the right side the solution. `None` if
 /// there is none.
-pub(in crate::train) fn solve(matrix: &mut [f64], right: &mut [f64]) -> Option<()> {
+pub(crate) fn solve(matrix: &mut [f64], right: &mut [f64]) -> Option<()> {
     let side = right.len();
     for column in 0..side {
         let (above, below) = matrix.split_at_mut((column + 1) * side);
