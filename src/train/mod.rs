@@ -5,16 +5,13 @@
 
 mod alignment;
 pub(crate) mod between;
-pub(crate) mod config;
 mod context;
 mod extension;
 pub(crate) mod input;
-pub(crate) mod kinds;
 pub(crate) mod objective;
-mod presets;
 mod refit;
 mod report;
-mod schedule;
+pub(crate) mod settings;
 pub(crate) mod setup;
 pub(crate) mod shared;
 pub(crate) mod state;
@@ -22,10 +19,7 @@ pub(crate) mod strategy;
 mod trainer;
 
 pub use alignment::aligned;
-pub use config::TrainConfig;
-pub use kinds::{ExposureMode, LabelRule, Occlusion, StrategyKind};
 pub(crate) use objective::Objective;
-pub use presets::Preset;
 pub use refit::{REFIT_STEPS, refitted};
 pub use report::{LabelWork, StepKind, StepReport};
 pub use setup::first_model::first_model;
@@ -33,5 +27,6 @@ pub(crate) use setup::first_model::go_on_from;
 pub(crate) use setup::{TrainerOptions, start_size};
 pub(crate) use state::TrainState;
 pub use strategy::Densified;
+pub use settings::{ExposureMode, LabelRule, Occlusion, Preset, StrategyKind, TrainConfig};
 pub(crate) use trainer::StepTimes;
 pub use trainer::Trainer;

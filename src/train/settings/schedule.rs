@@ -1,6 +1,6 @@
 //! The settings of a step: schedules in steps, given or as fractions of the run, and learning rates.
 
-use super::{ExposureMode, LabelRule, StrategyKind, TrainConfig};
+use crate::train::{ExposureMode, LabelRule, StrategyKind, TrainConfig};
 
 /// Length of the runs that the learning rates of 3DGS are made for, steps.
 const LONG_RUN: f64 = 30_000.0;
@@ -59,13 +59,13 @@ impl TrainConfig {
     }
 
     /// Returns the factor of the learning rates.
-    pub(super) fn rate_factor(&self) -> f64 {
+    pub(in crate::train) fn rate_factor(&self) -> f64 {
         let derived = (LONG_RUN / f64::from(self.iterations)).powf(RATE_POWER).clamp(1.0, RATE_MOST);
         self.rate_factor.unwrap_or(derived)
     }
 
     /// Returns the factor by which all rates have fallen at `step`.
-    pub(super) fn rate_fall(&self, step: u32) -> f64 {
+    pub(in crate::train) fn rate_fall(&self, step: u32) -> f64 {
         let from = self.rate_fall_from.unwrap_or(self.share(0.6)).min(self.iterations);
         let late = f64::from(step.saturating_sub(from)) / f64::from((self.iterations - from).max(1));
         self.rate_final.powf(late.min(1.0))
@@ -86,7 +86,7 @@ impl TrainConfig {
         }
     }
 
-    pub(super) fn halve_rates(&mut self) {
+    pub(in crate::train) fn halve_rates(&mut self) {
         for rate in [
             &mut self.position_lr_init,
             &mut self.position_lr_final,
@@ -163,12 +163,12 @@ impl TrainConfig {
     }
 
     /// Returns true if known depths have a weight.
-    pub(super) fn has_depths(&self) -> bool {
+    pub(in crate::train) fn has_depths(&self) -> bool {
         self.depth_weight.is_some_and(|weight| weight > 0.0)
     }
 
     /// Returns the first step without known depths.
-    pub(super) fn depths_until(&self) -> u32 {
+    pub(in crate::train) fn depths_until(&self) -> u32 {
         if self.has_depths() { self.labels_from().min(self.share(DEPTHS_UNTIL)) } else { 0 }
     }
 
@@ -188,7 +188,7 @@ impl TrainConfig {
     }
 
     /// Returns the budget for photos of a size of a run that is long enough; none with a strategy that has no budget.
-    pub(super) fn full_budget(&self, size: (u32, u32)) -> Option<u64> {
+    pub(in crate::train) fn full_budget(&self, size: (u32, u32)) -> Option<u64> {
         let budget = if self.budget > 0 { self.budget } else { self.by_pixels(size).max(1.0) as u64 };
         (self.strategy != StrategyKind::Adc).then_some(budget)
     }
@@ -239,12 +239,12 @@ impl TrainConfig {
     }
 
     /// Returns the weight of the mean opacity in the loss.
-    pub(super) fn opacity_weight(&self) -> f64 {
+    pub(in crate::train) fn opacity_weight(&self) -> f64 {
         self.opacity_weight.unwrap_or(self.regular())
     }
 
     /// Returns the weight of the mean standard deviation in the loss.
-    pub(super) fn scale_weight(&self) -> f64 {
+    pub(in crate::train) fn scale_weight(&self) -> f64 {
         self.scale_weight.unwrap_or(self.regular())
     }
 

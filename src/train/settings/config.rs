@@ -3,7 +3,7 @@
 //! Most defaults are those of LabelGS and 3DGS, from the paper or the code. "LabelGS" below is the paper (arXiv
 //! 2508.19699) with its authors' code, "3DGS" is Kerbl et al. 2023 with its code.
 
-use super::kinds::{ExposureMode, LabelRule, Occlusion, StrategyKind};
+use super::choices::{ExposureMode, LabelRule, Occlusion, StrategyKind};
 use crate::options::Options;
 #[cfg(feature = "cli")]
 use crate::options::parse::{colour, corners, count, samples, switch};

@@ -1,6 +1,6 @@
 //! Whole sets of settings: presets for a newcomer, the schedule of 3DGS, the paper.
 
-use super::{ExposureMode, LabelRule, StrategyKind, TrainConfig};
+use crate::train::{ExposureMode, LabelRule, StrategyKind, TrainConfig};
 
 /// How long and how fine a training is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
