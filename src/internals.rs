@@ -217,9 +217,11 @@ pub mod synth {
     pub use crate::synth::{dataset, write};
 }
 pub mod train {
+    pub use crate::train::alignment::aligned;
+    pub use crate::train::refit::{REFIT_STEPS, refitted};
     pub use crate::train::setup::{TrainerOptions, engine_size};
     pub use crate::train::state::TrainState;
-    pub use crate::train::{REFIT_STEPS, StepReport, Trainer, aligned, first_model, refitted};
+    pub use crate::train::{StepReport, Trainer, first_model};
     pub mod region {
         pub use crate::train::setup::region::Region;
     }

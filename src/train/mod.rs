@@ -1,15 +1,26 @@
 //! Training: the loop over steps, and the work between steps.
 //!
-//! [`Trainer`] owns the model on the device. [`TrainConfig`] has every hyper-parameter; a [`Strategy`] changes the
-//! number of Gaussians, [`Shared`] parameters belong to the scene or to a photo. [`crate::run`] adds files and scores.
+//! [`run::train`](crate::run::train()) trains a folder of photos. This module is for changes of the training itself. A [`Trainer`]
+//! is a model in training; [`TrainConfig`] has every hyper-parameter, [`TrainerOptions`] what is below.
+//!
+//! | to change | set or implement | example |
+//! | --- | --- | --- |
+//! | what is trained, by which losses | [`Objective`] | |
+//! | when Gaussians are added and removed | [`Strategy`], by a [`Population`] | `tools/examples/strategy.rs` |
+//! | passes of a step | [`Extension`], at a [`Hook`] | `tools/examples/strategy.rs` |
+//! | parameters of the scene or of photos | [`SharedParameters`] | `tools/examples/shared.rs` |
+//!
+//! The files, in the order of a training: `settings` and `objective`; `setup` with the first model; `trainer`, the loop, with
+//! `context`, what a step uses; `input`, photos and masks of a step; `strategy` and `shared`; `between`, the work between steps;
+//! `report` and `state`. `refit` and `alignment` are trainings of their own.
 
-mod alignment;
+pub(crate) mod alignment;
 pub(crate) mod between;
 mod context;
 mod extension;
 pub(crate) mod input;
 pub(crate) mod objective;
-mod refit;
+pub(crate) mod refit;
 mod report;
 pub(crate) mod settings;
 pub(crate) mod setup;
@@ -18,15 +29,23 @@ pub(crate) mod state;
 pub(crate) mod strategy;
 mod trainer;
 
-pub use alignment::aligned;
-pub(crate) use objective::Objective;
-pub use refit::{REFIT_STEPS, refitted};
+pub use crate::pass::{Builder, Extension, Hook};
+pub use crate::scheduler::plan::Buf;
+pub use crate::shaders::structs::StepUniforms;
+pub use objective::{Loss, Objective, Parameter};
 pub use report::{LabelWork, StepKind, StepReport};
-pub use setup::first_model::first_model;
-pub(crate) use setup::first_model::go_on_from;
-pub(crate) use setup::{TrainerOptions, start_size};
-pub(crate) use state::TrainState;
-pub use strategy::Densified;
 pub use settings::{ExposureMode, LabelRule, Occlusion, Preset, StrategyKind, TrainConfig};
-pub(crate) use trainer::StepTimes;
+pub use setup::TrainerOptions;
+pub use setup::first_model::first_model;
+pub use shared::exposure::Exposure;
+pub use shared::poses::Poses;
+pub use shared::{Place, Shared, SharedLayout, SharedParameters};
+pub use state::TrainState;
+pub use strategy::{At, Densified, Population, Strategy};
 pub use trainer::Trainer;
+
+pub(crate) use alignment::aligned;
+pub(crate) use refit::{REFIT_STEPS, refitted};
+pub(crate) use setup::first_model::go_on_from;
+pub(crate) use setup::start_size;
+pub(crate) use trainer::StepTimes;

@@ -12,8 +12,8 @@ pub(crate) mod weights;
 use adc::AdcStrategy;
 use budget::BudgetStrategy;
 use mcmc::McmcStrategy;
-pub use population::Densified;
-pub(crate) use population::{Bound, Population};
+pub(crate) use population::Bound;
+pub use population::{Densified, Population};
 
 use super::{StrategyKind, TrainConfig};
 use crate::error::Result;
