@@ -1,4 +1,4 @@
-//! Compiles the shaders and generates their Rust side, see `tools/shadergen`; finds the commit and the guide's pictures.
+//! Compiles the shaders and generates their Rust side, see `tools/shadergen`; embeds the guide's pictures.
 #![allow(clippy::disallowed_methods, reason = "the rules of files are those of the library")]
 
 #[path = "tools/shadergen/mod.rs"]
@@ -17,7 +17,6 @@ fn main() {
     let folder = |variable| std::env::var_os(variable).map(PathBuf::from).expect("cargo sets it");
     let (root, out) = (folder("CARGO_MANIFEST_DIR"), folder("OUT_DIR"));
     std::fs::write(out.join("pictures.md"), pictures(&root.join(PICTURES))).expect("cargo's folder is writable");
-    std::fs::write(out.join("commit.rs"), commit(&root)).expect("cargo's folder is writable");
     if let Err(findings) = shadergen::run(&root.join("glsl"), &out) {
         for finding in findings {
             for line in finding.to_string().lines() {
@@ -25,27 +24,6 @@ fn main() {
             }
         }
     }
-}
-
-/// Where `main.rs` finds its commit. In a working copy that is git's log of HEAD: the compiler watches the file, so a commit
-/// compiles `main.rs` anew, and neither shaders nor library. Cargo leaves a note in packages that it makes.
-fn commit(root: &Path) -> String {
-    let git = root.join(".git");
-    // In a second working tree it is a file that names the folder.
-    let named = std::fs::read_to_string(&git).ok();
-    let folder = named.as_ref().map_or(git.clone(), |text| root.join(text.trim_start_matches("gitdir:").trim()));
-    let log = folder.join("logs/HEAD");
-    if let Some(path) = log.to_str().filter(|_| log.is_file()) {
-        // It does not change with commits, and is gone when the log is gone or elsewhere.
-        let stays = if named.is_some() { git } else { git.join("description") };
-        if stays.exists() {
-            println!("cargo::rerun-if-changed={}", stays.display());
-        }
-        return format!("const LOG: &[u8] = include_bytes!({path:?});\n");
-    }
-    let note = std::fs::read_to_string(root.join(".cargo_vcs_info.json")).unwrap_or_default();
-    let commit = note.split("\"sha1\"").nth(1).and_then(|rest| rest.split('"').nth(1)).unwrap_or_default();
-    format!("const LOG: &[u8] = b\"- {commit} \";\n")
 }
 
 /// The pictures of the guide as Markdown link definitions with the bytes inside, because rustdoc copies no files:

@@ -163,8 +163,9 @@ pub mod label {
 }
 pub mod pass {
     pub use crate::pass::{
-        Builder, Extension, Hook, KernelShape, Stage, Variant, densify_apply, densify_count, extended_step, label_view,
-        opacity_reset, relocate_apply, relocate_count, render_view, training_step, vote_view, weigh_view,
+        Builder, Extension, Hook, KernelShape, Stage, Supervision, Variant, densify_apply, densify_count,
+        extended_step, label_view, opacity_reset, relocate_apply, relocate_count, render_view, training_step,
+        vote_view, weigh_view,
     };
     pub mod build {
         pub use crate::pass::build::Count;

@@ -3,7 +3,7 @@
 use labelgs::engine::{Engine, EngineSize, LabelSize};
 use labelgs::internals::engine::capacity;
 use labelgs::internals::pass;
-use labelgs::internals::pass::{KernelShape, Variant};
+use labelgs::internals::pass::{KernelShape, Supervision, Variant};
 use labelgs::internals::scheduler::plan::{Capacity, Grid, Limits, PassList, Plan, PlanOptions, TABLE, Work};
 use labelgs::internals::shaders;
 use labelgs::internals::train::exposure::Exposure;
@@ -52,16 +52,16 @@ fn lists() -> Vec<(Capacity, PassList)> {
             capacity.segment_pixels = if segments > 1 { 100_000 } else { 0 };
             let size = ROOM.image;
             let mut add = |list| all.push((capacity, list));
-            for (labels, lift, disagreement, depth, sh_degree, update) in [
-                (true, true, false, false, 3, true),
-                (true, false, false, false, 3, true),
-                (true, true, false, false, 0, false),
-                (false, false, true, false, 3, true),
-                (false, false, false, true, 3, true),
-                (false, false, false, false, 3, true),
-                (false, false, false, false, 1, false),
+            for (supervision, sh_degree, update) in [
+                (Supervision::Layers { lift: true }, 3, true),
+                (Supervision::Layers { lift: false }, 3, true),
+                (Supervision::Layers { lift: true }, 0, false),
+                (Supervision::Disagreement, 3, true),
+                (Supervision::Depth, 3, true),
+                (Supervision::Photo, 3, true),
+                (Supervision::Photo, 1, false),
             ] {
-                let variant = Variant { labels, disagreement, depth, lift, sh_degree, update, ..Variant::plain(size) };
+                let variant = Variant { supervision, sh_degree, update, ..Variant::plain(size) };
                 add(pass::training_step(&shape, &capacity, variant));
             }
             add(pass::render_view(&shape, &capacity, 3, 2));

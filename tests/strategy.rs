@@ -144,19 +144,6 @@ fn a_strategy_goes_on_from_a_checkpoint_of_its_own() {
     assert!(error.contains("thinning") && error.contains("adc"), "{error}");
 }
 
-/// The strategy of 3DGS adds nothing to a checkpoint.
-#[test]
-fn checkpoints_do_not_mention_the_strategy_of_3dgs() {
-    let Some(turn) = device() else { return };
-    let config = TrainConfig { strategy: StrategyKind::Adc, ..settings() };
-    let mut trainer =
-        Trainer::new(turn.gpu(), config, &small(), &start(), SchedulerOptions::default()).expect("a trainer");
-    let state = go_on(&mut trainer, 3);
-    let json = serde_json::to_value(&state).expect("JSON");
-    assert!(json.get("strategy").is_none() && json.get("step").is_some());
-    assert!(plane(&state, "densify_stats").is_some());
-}
-
 /// An unseen Gaussian has gradient 0. Its momentum still moves it, unless the strategy skips unseen Gaussians.
 #[test]
 fn unseen_gaussians_move_or_rest() {

@@ -9,7 +9,7 @@
 // Work:    one subgroup (= workgroup) per tile, jobs as in blend_forward.
 // Reads:   step; tile_starts [layers * T]; instance_from_sorted, splat_from_instance [I]; splats [V,3]; image [P] (w = transmittance),
 //          last [P]; v_image [P]; variant labels: counters, layer_tiles, layer_state, layer_weights
-//          variant disagreement: target [P]; view_labels [P]; labels [N]; gaussian_from_splat [V]; label_trust [labels]
+//          variant disagreement: target [P]; view_labels [P]; labels [N]; gaussian_from_splat [V]
 //          variant depth: depths [P]
 // Writes:  v_instances_a, _b, _c [I] by instance: v_mean2d (px), v_conic xy; v_conic z, v_log_opacity, v_colour rg;
 //          v_colour b, stamp of the step
@@ -46,8 +46,7 @@ FETCHC(11, target);
 FETCHU(12, view_labels);
 FETCHU(13, labels);
 FETCHU(14, gaussian_from_splat);
-READ(15, float, label_trust);
-WRITE(16, float, disagreement);
+WRITE(15, float, disagreement);
 #endif
 #ifdef DEPTH
 READ(11, float, depths);

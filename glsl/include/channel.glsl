@@ -5,7 +5,7 @@
 uint channel_of_pixel(uint p, bool inside, StepUniforms u, out float weight, out float behind) {
     uint here = fetchu(view_labels, p), own = here & LABEL_MASK;
     bool counts = inside && fetchc(target, p).w > 0.5 && (here & LABEL_BORDER) == 0u;
-    weight = counts ? u.label_weight * u.loss_scale * label_trust[own] : 0.0;
+    weight = counts ? u.label_weight * u.loss_scale : 0.0;
     behind = own != 0u ? weight : 0.0;
     return own;
 }

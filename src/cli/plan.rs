@@ -7,7 +7,7 @@ use super::stdout;
 use super::values::{Size, bytes, count, size};
 use crate::engine::{Engine, EngineSize, LabelSize, capacity, card};
 use crate::gpu;
-use crate::pass::{KernelShape, Variant, training_step};
+use crate::pass::{KernelShape, Supervision, Variant, training_step};
 use crate::scheduler::plan::{
     Capacity, Grid, Limits, MemoryReport, Page, PassList, Plan, PlanOptions, TABLE, Touch, Work,
 };
@@ -83,7 +83,8 @@ fn subject(args: &PlanArgs, context: &Context) -> Result<Subject> {
     let size = (args.size.0, args.size.1);
     let room = EngineSize::new(args.gaussians.max(1), size).for_training().with_labels(labels);
     let capacity = capacity(&shape, &room);
-    let variant = Variant { labels: labels.is_some(), sh_degree: args.sh_degree, ..Variant::plain(size) };
+    let supervision = labels.map_or(Supervision::Photo, |_| Supervision::Layers { lift: false });
+    let variant = Variant { supervision, sh_degree: args.sh_degree, ..Variant::plain(size) };
     let list = training_step(&shape, &capacity, variant);
     Ok(Subject { device, shape, limits, room, capacity, list })
 }

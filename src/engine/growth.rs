@@ -3,7 +3,7 @@
 use super::{Engine, EngineSize, LabelSize, Report, predict_for};
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
-use crate::pass::{self, KernelShape, Variant, loss};
+use crate::pass::{self, KernelShape, Supervision, Variant, loss};
 use crate::scheduler::SchedulerOptions;
 use crate::scheduler::plan::{Buf, Capacity, MemoryReport, PassList};
 use crate::shaders::constants::LABEL_ROUNDS;
@@ -86,11 +86,13 @@ fn derive(shape: &KernelShape, capacity: &mut Capacity, instances: u64, trained:
 /// The training step with the most buffers.
 fn widest(size: &EngineSize) -> Variant {
     // Layers need more memory than a disagreement; a size without layers has none.
-    let layers = size.labels.is_some_and(|labels| labels.layers > 0);
-    let disagreement = size.labels.is_some() && !layers;
-    let depth = size.depths && size.labels.is_none();
-    let (sh_degree, size) = (3, size.image);
-    Variant { labels: layers, disagreement, depth, lift: layers, sh_degree, size, update: true, counts: false }
+    let supervision = match size.labels {
+        Some(labels) if labels.layers > 0 => Supervision::Layers { lift: true },
+        Some(_) => Supervision::Disagreement,
+        None if size.depths => Supervision::Depth,
+        None => Supervision::Photo,
+    };
+    Variant { supervision, ..Variant::plain(size.image) }
 }
 
 impl Engine {

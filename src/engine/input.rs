@@ -27,8 +27,8 @@ pub(crate) struct TrainInput<'a> {
     pub photo: Cow<'a, [[u8; 4]]>,
     /// Labels, in a step with object layers.
     pub layers: Option<LayerInput<'a>>,
-    /// Labels, in a step that compares them with the view's mask.
-    pub disagreement: Option<DisagreementInput<'a>>,
+    /// Visible object of each pixel, `[P]`, in a step that compares it with the labels of the splats.
+    pub disagreement: Option<&'a [u32]>,
     /// 1 / depth of each pixel that the photo is known to have, `[P]`, 0 for unknown, in a step that compares them.
     pub depths: Option<&'a [f32]>,
     /// Rows of shared parameters that the step uses; its passes refer to them by index in this order.
@@ -57,15 +57,6 @@ pub(crate) struct LayerInput<'a> {
     pub weights: Vec<f32>,
     /// A bit per label id for each layer; set if that object hides the layer's object.
     pub occluders: Vec<u32>,
-}
-
-/// Label input of a step that compares labels with the view's mask.
-#[derive(Clone, Debug)]
-pub(crate) struct DisagreementInput<'a> {
-    /// Visible object of each pixel, `[P]`.
-    pub view_labels: &'a [u32],
-    /// Weight of the pixels of each label id.
-    pub trust: Vec<f32>,
 }
 
 /// Input of a vote on a view.
@@ -121,10 +112,7 @@ impl Engine {
             Input::Train(train) => {
                 sched.upload(Buf::TARGET, frame, 0, &train.photo)?;
                 train.depths.map_or(Ok(()), |depths| sched.upload(Buf::DEPTHS, frame, 0, depths))?;
-                if let Some(labels) = &train.disagreement {
-                    sched.upload(Buf::VIEW_LABELS, frame, 0, labels.view_labels)?;
-                    sched.upload(Buf::LABEL_TRUST, frame, 0, &labels.trust)?;
-                }
+                train.disagreement.map_or(Ok(()), |labels| sched.upload(Buf::VIEW_LABELS, frame, 0, labels))?;
                 let Some(layers) = &train.layers else { return Ok(()) };
                 sched.upload(Buf::VIEW_LABELS, frame, 0, layers.view_labels)?;
                 sched.upload(Buf::LAYER_FROM_LABEL, frame, 0, &layers.layer_from_label)?;

@@ -19,7 +19,7 @@ pub(crate) mod uniforms;
 pub(crate) use bands::Band;
 pub(crate) use card::{card, predict_for};
 pub(crate) use growth::{GrownSizes, capacity};
-pub(crate) use input::{DisagreementInput, Input, LayerInput, SharedRow, TrainInput, VoteInput};
+pub(crate) use input::{Input, LayerInput, SharedRow, TrainInput, VoteInput};
 pub(crate) use label_ids::tell_apart;
 pub(crate) use run::{InFlight, ListKey, Recording, Report};
 pub use size::{EngineSize, LabelSize};

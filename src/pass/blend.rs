@@ -1,26 +1,28 @@
 //! Blends the tiles, forward and backward. A list that is too long for one dispatch is walked in segments.
 
+use super::Supervision;
 use super::build::{Builder, args};
 use super::project::GAUSSIAN_FROM_SPLAT;
 use crate::pass::build::pass;
 use crate::scheduler::plan::{Buf, Stage};
 use crate::shaders::constants;
 
-/// Blends all tiles front to back; with labels also the object layers and their loss; with `lift` also the labels.
-pub(super) fn blend_forward(b: &mut Builder, pairs: Buf, lift: bool) {
-    forward(b, pairs, false, lift);
+/// Blends all tiles front to back; with object layers these too, with their loss and the lift of labels.
+pub(super) fn blend_forward(b: &mut Builder, pairs: Buf) {
+    forward(b, pairs, false);
 }
 
 /// Blends all tiles of the scene; writes the main Gaussian of each pixel, its weight, and the depth.
 pub(super) fn blend_forward_main(b: &mut Builder, pairs: Buf) {
-    forward(b, pairs, true, false);
+    forward(b, pairs, true);
 }
 
-fn forward(b: &mut Builder, pairs: Buf, main: bool, lift: bool) {
+fn forward(b: &mut Builder, pairs: Buf, main: bool) {
     let (segments, counts) = (b.segments(), b.counts);
+    let (labels, lift) = (b.supervision.has_layers(), b.supervision.lifts());
     b.list.stage = Stage::BlendForward;
     for segment in 0..segments {
-        pass!(b, blend_forward(labels: b.labels, main: main, segmented: segments > 1) {
+        pass!(b, blend_forward(labels: labels, main: main, segmented: segments > 1) {
             step: Buf::STEP, counters: Buf::COUNTERS, tile_starts: Buf::TILE_STARTS, tile_ends: Buf::TILE_ENDS,
             instance_from_sorted: pairs, splat_from_instance: Buf::SPLAT_FROM_INSTANCE, splats: Buf::SPLATS,
             image: Buf::IMAGE, last: Buf::LAST, gaussian_from_splat: GAUSSIAN_FROM_SPLAT, main_gaussian: Buf::MAIN_GAUSSIAN,
@@ -35,17 +37,19 @@ fn forward(b: &mut Builder, pairs: Buf, main: bool, lift: bool) {
 
 /// Walks all tiles back to front and writes one gradient record per (splat, tile) pair.
 pub(super) fn blend_backward(b: &mut Builder, pairs: Buf) {
-    let segments = b.segments();
+    let (segments, supervision) = (b.segments(), b.supervision);
+    let (labels, disagreement) = (supervision.has_layers(), supervision == Supervision::Disagreement);
+    let depth = supervision == Supervision::Depth;
     b.list.stage = Stage::BlendBackward;
     for segment in (0..segments).rev() {
-        pass!(b, blend_backward(labels: b.labels, disagreement: b.disagreement, depth: b.depth, segmented: segments > 1) {
+        pass!(b, blend_backward(labels: labels, disagreement: disagreement, depth: depth, segmented: segments > 1) {
             step: Buf::STEP, tile_starts: Buf::TILE_STARTS, instance_from_sorted: pairs,
             splat_from_instance: Buf::SPLAT_FROM_INSTANCE, splats: Buf::SPLATS, image: Buf::IMAGE, last: Buf::LAST, v_image: Buf::V_IMAGE,
             v_instances_a: Buf::V_INSTANCES_A, v_instances_b: Buf::V_INSTANCES_B, v_instances_c: Buf::V_INSTANCES_C,
             counters: Buf::COUNTERS, layer_tiles: Buf::LAYER_TILES, layer_state: Buf::LAYER_STATE,
             layer_weights: Buf::LAYER_WEIGHTS, segment_back: Buf::SEGMENT_BACK, target: Buf::TARGET,
             view_labels: Buf::VIEW_LABELS, labels: Buf::LABELS, gaussian_from_splat: GAUSSIAN_FROM_SPLAT,
-            label_trust: Buf::LABEL_TRUST, disagreement: Buf::DISAGREEMENT, segment_rest: Buf::SEGMENT_REST,
+            disagreement: Buf::DISAGREEMENT, segment_rest: Buf::SEGMENT_REST,
             depths: Buf::DEPTHS,
         } [segment: segment, segments: segments], args(constants::ARGS_BLEND));
     }

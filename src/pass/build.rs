@@ -1,6 +1,6 @@
 //! Builds a pass list; all pass families use it.
 
-use super::KernelShape;
+use super::{KernelShape, Supervision};
 use crate::scheduler::plan::{Buf, Capacity, Grid, PassDecl, PassList};
 use crate::shaders::{ShaderDesc, constants};
 
@@ -10,12 +10,8 @@ pub struct Builder<'a> {
     pub shape: &'a KernelShape,
     /// Capacities; recorded grids and limits follow from them.
     pub capacity: &'a Capacity,
-    /// True if object layers exist.
-    pub labels: bool,
-    /// True if the labels of the splats are compared with the view's mask.
-    pub disagreement: bool,
-    /// True if the depths of the splats are compared with those that the photo is known to have.
-    pub depth: bool,
+    /// What is compared with the view.
+    pub supervision: Supervision,
     /// Active degree of the spherical harmonics.
     pub sh_degree: u32,
     /// True if the blend passes count the pairs with a weight.
@@ -37,7 +33,13 @@ pub enum Count {
     VirtualTiles = 3,
 }
 
-impl Builder<'_> {
+impl<'a> Builder<'a> {
+    /// An empty list, without bands of colour.
+    pub fn new(name: &str, shape: &'a KernelShape, capacity: &'a Capacity) -> Self {
+        let (supervision, list) = (Supervision::Photo, PassList::new(name));
+        Self { shape, capacity, supervision, sh_degree: 0, counts: false, list }
+    }
+
     /// Number of dispatches that walk the longest list of a tile, at least 1.
     pub fn segments(&self) -> u32 {
         self.capacity.segments.max(1) as u32

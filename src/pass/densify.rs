@@ -43,8 +43,8 @@ pub(super) fn relocate(b: &mut Builder) {
     scan::scan(b, Buf::CHILDREN_COUNTS, Buf::CHILD_OFFSETS, Count::Gaussians, Total::Densified);
 }
 
-/// Rewrites the model; needs [`mark`] or [`relocate`] before it in the same list.
-pub(super) fn apply(b: &mut Builder) {
+/// Rewrites the model, with `labels` also its labels; needs [`mark`] or [`relocate`] before it in the same list.
+pub(super) fn apply(b: &mut Builder, labels: bool) {
     b.list.copy(Buf::MEANS, Buf::OLD_MEANS, 0);
     b.list.copy(Buf::SCALES, Buf::OLD_SCALES, 0);
     b.list.copy(Buf::QUATS, Buf::OLD_QUATS, 0);
@@ -63,7 +63,7 @@ pub(super) fn apply(b: &mut Builder) {
             } [stride: a.stride, moments: u32::from(index > 0)], args(a.args));
         }
     }
-    if b.labels {
+    if labels {
         b.list.copy(Buf::LABELS, Buf::OLD_LABELS, 0);
         pass!(b, densify_labels {
             step: Buf::STEP, old_labels: Buf::OLD_LABELS, densify_actions: Buf::DENSIFY_ACTIONS,

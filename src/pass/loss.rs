@@ -1,5 +1,6 @@
 //! L1 and D-SSIM against the photo: value and gradient. The filter is separable and needs no barriers.
 
+use super::Supervision;
 use super::build::{Builder, ONE};
 use crate::pass::build::pass;
 use crate::scheduler::plan::{Buf, Grid, Stage};
@@ -22,7 +23,7 @@ pub(crate) fn photo_loss(b: &mut Builder, width: u32, height: u32) {
         step: Buf::STEP, v_rows: Buf::SSIM_A, image: Buf::IMAGE, target: Buf::TARGET, v_image: Buf::V_IMAGE,
         loss_partials: Buf::LOSS_PARTIALS,
     } [], columns(1));
-    if !b.disagreement {
+    if b.supervision != Supervision::Disagreement {
         reduce(b, partials(b.shape.subgroup, width, height));
     }
 }
@@ -66,7 +67,7 @@ fn over_pixels(b: &Builder, each: u64) -> Grid {
 
 fn reduce(b: &mut Builder, partials: u32) {
     let layer_tiles = b.capacity.layer_tiles as u32;
-    pass!(b, loss_reduce(labels: b.labels, disagreement: b.disagreement) {
+    pass!(b, loss_reduce(labels: b.supervision.has_layers(), disagreement: b.supervision == Supervision::Disagreement) {
         loss_partials: Buf::LOSS_PARTIALS, counters: Buf::COUNTERS, layer_loss: Buf::LAYER_LOSS, step: Buf::STEP,
         disagreement: Buf::DISAGREEMENT,
     } [layer_tile_capacity: layer_tiles, partials: partials], ONE);

@@ -27,17 +27,39 @@ use crate::scheduler::plan::{Buf, Capacity, PassList};
 
 pub use crate::scheduler::plan::Stage;
 
+/// What a training step compares with the view, besides the picture with the photo.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Supervision {
+    /// Nothing more.
+    Photo,
+    /// The depths of the splats with known ones.
+    Depth,
+    /// The labels of the splats with the mask.
+    Disagreement,
+    /// Object layers with the photo inside the mask.
+    Layers {
+        /// The step lifts labels from the mask, as in the paper.
+        lift: bool,
+    },
+}
+
+impl Supervision {
+    /// Returns true if the step has object layers.
+    pub fn has_layers(self) -> bool {
+        matches!(self, Self::Layers { .. })
+    }
+
+    /// Returns true if the step lifts labels.
+    pub fn lifts(self) -> bool {
+        self == Self::Layers { lift: true }
+    }
+}
+
 /// Options of a training step; each combination has its own recording.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Variant {
-    /// The step has object layers.
-    pub labels: bool,
-    /// The step compares the labels of the splats with the view's mask; not together with `labels`.
-    pub disagreement: bool,
-    /// The step compares the depths of the splats with known ones; with neither of the above.
-    pub depth: bool,
-    /// The step lifts labels from the view's mask, as in the paper; needs `labels`.
-    pub lift: bool,
+    /// What the step compares with the view.
+    pub supervision: Supervision,
     /// Active degree of the spherical harmonics.
     pub sh_degree: u32,
     /// Largest image, px; the grids of the loss cover it.
@@ -51,16 +73,7 @@ pub struct Variant {
 impl Variant {
     /// A step of the scene alone with an update, of full degree.
     pub const fn plain(size: (u32, u32)) -> Self {
-        Self {
-            labels: false,
-            disagreement: false,
-            depth: false,
-            lift: false,
-            sh_degree: 3,
-            size,
-            update: true,
-            counts: false,
-        }
+        Self { supervision: Supervision::Photo, sh_degree: 3, size, update: true, counts: false }
     }
 }
 
@@ -96,9 +109,8 @@ pub trait Extension: std::fmt::Debug + Send + Sync {
 /// Changes nothing.
 impl Extension for () {}
 
-fn begin<'a>(name: &str, shape: &'a KernelShape, capacity: &'a Capacity, labels: bool, sh_degree: u32) -> Builder<'a> {
-    let list = PassList::new(name);
-    let mut b = Builder { shape, capacity, labels, disagreement: false, depth: false, sh_degree, counts: false, list };
+fn begin<'a>(name: &str, shape: &'a KernelShape, capacity: &'a Capacity, sh_degree: u32) -> Builder<'a> {
+    let mut b = Builder { sh_degree, ..Builder::new(name, shape, capacity) };
     pass!(b, step_begin { step: Buf::STEP, counters: Buf::COUNTERS, dispatch_args: Buf::DISPATCH_ARGS } [],
         build::ONE);
     b
@@ -123,18 +135,18 @@ pub fn extended_step(
     variant: Variant,
     (extension, passes): (&dyn Extension, u32),
 ) -> PassList {
-    let mut b = begin("training step", shape, capacity, variant.labels, variant.sh_degree);
-    (b.counts, b.disagreement, b.depth) = (variant.counts, variant.disagreement, variant.depth);
+    let mut b = begin("training step", shape, capacity, variant.sh_degree);
+    (b.supervision, b.counts) = (variant.supervision, variant.counts);
     extension.extend(passes, Hook::Camera, &mut b);
     project::visible_splats(&mut b);
     let pairs = tile::bin_splats(&mut b);
-    blend::blend_forward(&mut b, pairs, variant.lift);
+    blend::blend_forward(&mut b, pairs);
     optimize::clear_shared(&mut b);
     extension.extend(passes, Hook::Picture, &mut b);
     loss::photo_loss(&mut b, variant.size.0, variant.size.1);
     extension.extend(passes, Hook::Loss, &mut b);
     blend::blend_backward(&mut b, pairs);
-    if variant.disagreement {
+    if variant.supervision == Supervision::Disagreement {
         loss::reduce_last(&mut b, variant.size.0, variant.size.1);
     }
     gather::gather(&mut b);
@@ -145,7 +157,7 @@ pub fn extended_step(
         optimize::adam_shared(&mut b);
         extension.extend(passes, Hook::Updated, &mut b);
     }
-    if variant.lift {
+    if variant.supervision.lifts() {
         lift::resolve(&mut b);
     }
     end(b)
@@ -154,7 +166,7 @@ pub fn extended_step(
 /// One picture of the scene: colour, transmittance, main Gaussian and its weight, depth. With `label_rounds` above 0 it
 /// has a label map too, of up to so many walks of each tile.
 pub fn render_view(shape: &KernelShape, capacity: &Capacity, sh_degree: u32, label_rounds: u32) -> PassList {
-    let mut b = begin("render", shape, capacity, false, sh_degree);
+    let mut b = begin("render", shape, capacity, sh_degree);
     project::visible_splats(&mut b);
     let pairs = tile::bin_splats(&mut b);
     // The picture comes last, because it is read from scratch memory.
@@ -165,7 +177,7 @@ pub fn render_view(shape: &KernelShape, capacity: &Capacity, sh_degree: u32, lab
 
 /// The label map of one view. Each tile is walked up to `rounds` times, for four labels each time.
 pub fn label_view(shape: &KernelShape, capacity: &Capacity, rounds: u32) -> PassList {
-    let mut b = begin("label map", shape, capacity, false, 0);
+    let mut b = begin("label map", shape, capacity, 0);
     project::visible_splats(&mut b);
     let pairs = tile::bin_splats(&mut b);
     lift::label_map(&mut b, pairs, rounds);
@@ -175,7 +187,7 @@ pub fn label_view(shape: &KernelShape, capacity: &Capacity, rounds: u32) -> Pass
 /// Votes of one view for the label of every Gaussian. Each tile is walked `rounds` times, for four labels each time. With
 /// `alone`, Gaussians vote as if nothing were in front of them.
 pub fn vote_view(shape: &KernelShape, capacity: &Capacity, rounds: u32, alone: bool) -> PassList {
-    let mut b = begin("votes", shape, capacity, false, 0);
+    let mut b = begin("votes", shape, capacity, 0);
     project::visible_splats(&mut b);
     let pairs = tile::bin_splats(&mut b);
     lift::vote(&mut b, pairs, rounds, alone);
@@ -184,10 +196,10 @@ pub fn vote_view(shape: &KernelShape, capacity: &Capacity, rounds: u32, alone: b
 
 /// Adds the blending weights of one view to the x of the densification statistic.
 pub fn weigh_view(shape: &KernelShape, capacity: &Capacity) -> PassList {
-    let mut b = begin("weights", shape, capacity, false, 0);
+    let mut b = begin("weights", shape, capacity, 0);
     project::visible_splats(&mut b);
     let pairs = tile::bin_splats(&mut b);
-    blend::blend_forward(&mut b, pairs, false);
+    blend::blend_forward(&mut b, pairs);
     b.list.fill(Buf::V_IMAGE, 1.0_f32.to_bits());
     blend::blend_backward(&mut b, pairs);
     gather::weigh(&mut b);
@@ -196,37 +208,37 @@ pub fn weigh_view(shape: &KernelShape, capacity: &Capacity) -> PassList {
 
 /// Counts the Gaussians that densification would leave.
 pub fn densify_count(shape: &KernelShape, capacity: &Capacity) -> PassList {
-    let mut b = begin("densify: count", shape, capacity, false, 0);
+    let mut b = begin("densify: count", shape, capacity, 0);
     densify::mark(&mut b);
     end(b)
 }
 
 /// Densifies the model; it must have room for the count from [`densify_count`].
 pub fn densify_apply(shape: &KernelShape, capacity: &Capacity, labels: bool) -> PassList {
-    let mut b = begin("densify", shape, capacity, labels, 0);
+    let mut b = begin("densify", shape, capacity, 0);
     densify::mark(&mut b);
-    densify::apply(&mut b);
+    densify::apply(&mut b, labels);
     end(b)
 }
 
 /// Sums the weights of the Gaussians that a relocation draws from, and counts those that it removes.
 pub fn relocate_count(shape: &KernelShape, capacity: &Capacity) -> PassList {
-    let mut b = begin("relocation: count", shape, capacity, false, 0);
+    let mut b = begin("relocation: count", shape, capacity, 0);
     densify::weigh(&mut b);
     end(b)
 }
 
 /// Removes Gaussians and draws others to copy; the model must have room for them.
 pub fn relocate_apply(shape: &KernelShape, capacity: &Capacity, labels: bool) -> PassList {
-    let mut b = begin("relocation", shape, capacity, labels, 0);
+    let mut b = begin("relocation", shape, capacity, 0);
     densify::relocate(&mut b);
-    densify::apply(&mut b);
+    densify::apply(&mut b, labels);
     end(b)
 }
 
 /// Opacity reset.
 pub fn opacity_reset(shape: &KernelShape, capacity: &Capacity) -> PassList {
-    let mut b = begin("opacity reset", shape, capacity, false, 0);
+    let mut b = begin("opacity reset", shape, capacity, 0);
     optimize::opacity_reset(&mut b);
     end(b)
 }

@@ -15,13 +15,13 @@ pub fn stages(list: &PassList) -> Vec<(Stage, String)> {
 #[cfg(test)]
 mod tests {
     use super::stages;
-    use crate::pass::{KernelShape, Variant, training_step};
+    use crate::pass::{KernelShape, Supervision, Variant, training_step};
     use crate::scheduler::plan::{Capacity, Stage};
 
     #[test]
     fn every_item_of_a_step_has_its_stage() {
         let (shape, capacity) = (KernelShape::new(8, true), Capacity { virtual_tiles: 100, ..Capacity::default() });
-        let variant = Variant { labels: true, lift: true, ..Variant::plain((64, 48)) };
+        let variant = Variant { supervision: Supervision::Layers { lift: true }, ..Variant::plain((64, 48)) };
         let named = stages(&training_step(&shape, &capacity, variant));
         for stage in Stage::ALL {
             assert!(named.iter().any(|(found, _)| *found == stage), "{stage:?} is empty");

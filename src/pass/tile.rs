@@ -16,7 +16,7 @@ pub(super) fn bin_splats(b: &mut Builder) -> Buf {
     pass!(b, prepare_instances {
         counters: Buf::COUNTERS, dispatch_args: Buf::DISPATCH_ARGS, failure: Buf::FAILURE,
     } [instance_capacity: instances], ONE);
-    pass!(b, emit_instances(labels: b.labels) {
+    pass!(b, emit_instances(labels: b.supervision.has_layers()) {
         step: Buf::STEP, counters: Buf::COUNTERS, failure: Buf::FAILURE, splats: Buf::SPLATS,
         tiles_touched: Buf::TILES_TOUCHED, instance_offsets: Buf::INSTANCE_OFFSETS, tile_keys: Buf::TILE_KEYS_A,
         splat_from_instance: Buf::SPLAT_FROM_INSTANCE, gaussian_from_splat: GAUSSIAN_FROM_SPLAT,
@@ -37,11 +37,11 @@ pub(super) fn bin_splats(b: &mut Builder) -> Buf {
 
 fn tile_ranges(b: &mut Builder, keys: Buf) {
     let groups = args(constants::ARGS_TILES);
-    pass!(b, tile_ranges(labels: b.labels) {
+    pass!(b, tile_ranges(labels: b.supervision.has_layers()) {
         step: Buf::STEP, failure: Buf::FAILURE, counters: Buf::COUNTERS, tile_keys: keys,
         tile_starts: Buf::TILE_STARTS, tile_ends: Buf::TILE_ENDS, layer_occupied: Buf::LAYER_OCCUPIED,
     } [], groups);
-    if !b.labels {
+    if !b.supervision.has_layers() {
         return;
     }
     scan::scan(b, Buf::LAYER_OCCUPIED, Buf::LAYER_OFFSETS, Count::VirtualTiles, Total::LayerTiles);

@@ -16,7 +16,7 @@ const STEPS_EACH: u32 = 200;
 pub(crate) struct Pass {
     pub stage: String,
     pub name: String,
-    /// Time of all its items in a step, ms.
+    /// Time of all its items in a step, ms; `labelgs profile --json` writes a median.
     #[serde(alias = "median_ms")]
     pub ms: f64,
     /// Share of the step, 0 to 1.

@@ -122,10 +122,7 @@ impl Context {
 
     fn key(&self, input: &StepInput) -> ListKey {
         let variant = Variant {
-            labels: !input.layers.is_empty(),
-            disagreement: input.labels && input.layers.is_empty(),
-            depth: self.config.depth_weight_at(input.step) > 0.0,
-            lift: self.objective.trains(Parameter::Labels) && input.lifts(&self.config),
+            supervision: input.supervision(&self.config),
             sh_degree: self.config.sh_degree_at(input.step),
             size: self.views.largest_at(input.step, self.image),
             update: input.update,

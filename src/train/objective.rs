@@ -1,7 +1,7 @@
 //! What a training trains, and by which losses.
 
 use super::strategy::{self, Strategy};
-use super::{StrategyKind, TrainConfig};
+use super::{LabelRule, StrategyKind, TrainConfig};
 use crate::pass::{Builder, Extension, Hook};
 use crate::scheduler::plan::Buf;
 use crate::shaders::structs::StepUniforms;
@@ -73,10 +73,12 @@ impl Objective {
         self.losses.contains(&loss)
     }
 
-    /// Returns the configuration with a weight of 0 for losses that the training has not.
-    pub(super) fn limit_weights(&self, config: TrainConfig) -> TrainConfig {
+    /// Returns the configuration without what the training has not: weights of losses that only they decide, and the rule of
+    /// the paper, by which steps set labels.
+    pub(super) fn limit_config(&self, config: TrainConfig) -> TrainConfig {
         let depth_weight = if self.has(Loss::Depth) { config.depth_weight } else { Some(0.0) };
-        TrainConfig { depth_weight, ..config }
+        let label_rule = if self.trains(Parameter::Labels) { config.label_rule } else { LabelRule::Votes };
+        TrainConfig { depth_weight, label_rule, ..config }
     }
 
     /// Sets the learning rates of a step to 0 for what the training does not change.

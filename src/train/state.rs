@@ -31,10 +31,8 @@ pub struct TrainState {
     /// Number of Gaussians.
     pub gaussians: u32,
     /// Number of Gaussians at the end that are not trained.
-    #[serde(default, skip_serializing_if = "is_zero")]
     pub frozen: u32,
     /// World position of the origin of the positions.
-    #[serde(default)]
     pub origin: [f64; 3],
     /// Votes were counted at least once.
     pub labelled_once: bool,
@@ -44,8 +42,7 @@ pub struct TrainState {
     pub sizes: GrownSizes,
     /// The configuration.
     pub config: TrainConfig,
-    /// Near planes of the training views, world units; empty if all have that of the configuration.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    /// Near planes of the training views, world units, in their order.
     pub near_planes: Vec<f32>,
     /// Fingerprints of the training views, in their order.
     pub views: Vec<ViewFingerprint>,
@@ -53,11 +50,9 @@ pub struct TrainState {
     pub occluders: BTreeMap<String, Occluders>,
     /// Data of the caller; null for none.
     pub run: serde_json::Value,
-    /// State of the strategy; the default strategy has no entry.
-    #[serde(default, skip_serializing_if = "Kept::is_default")]
+    /// State of the strategy.
     pub strategy: Kept,
     /// Entry of the shared parameters, if there are any.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub shared: Option<KeptShared>,
     /// Parameters, moments, statistics and labels.
     #[serde(skip)]
@@ -114,13 +109,14 @@ impl TrainState {
     pub fn read(path: &Path) -> Result<Self> {
         let file = Checkpoint::read(path)?;
         let odd = |problem: String| Error::data(path, "contents", problem);
-        let mut meta = file.meta;
-        complete(&mut meta["config"]).map_err(|error| odd(error.to_string()))?;
-        let state: Self = serde_json::from_value(meta).map_err(|error| odd(error.to_string()))?;
+        let state: Self = serde_json::from_value(file.meta).map_err(|error| odd(error.to_string()))?;
         let state = Self { planes: file.planes, path: path.to_owned(), ..state };
         state.config.check().map_err(|error| odd(error.to_string()))?;
         if state.updates > state.step {
             return Err(odd(format!("{} updates in {} steps", state.updates, state.step)));
+        }
+        if state.near_planes.len() != state.views.len() {
+            return Err(odd(format!("{} near planes of {} views", state.near_planes.len(), state.views.len())));
         }
         // Masks may be given and show no object.
         let labels = state.planes.iter().any(|plane| plane.name == TABLE[Buf::LABELS.index()].name);
@@ -157,48 +153,5 @@ impl TrainState {
             return refuse(&now.name, what);
         }
         Ok(())
-    }
-}
-
-fn is_zero(number: &u32) -> bool {
-    *number == 0
-}
-
-/// Settings that a checkpoint lacks were not there when it was written: its training has the schedule of 3DGS, and
-/// object layers in every step with labels, and no splits at contours.
-fn complete(config: &mut serde_json::Value) -> serde_json::Result<()> {
-    if let Some(found) = config.as_object_mut() {
-        found.entry("layer_every").or_insert(1.into());
-        found.entry("contour_share").or_insert(0.into());
-    }
-    if let Some(found) = config.as_object_mut().filter(|found| !found.contains_key("strategy")) {
-        let serde_json::Value::Object(mut earlier) = serde_json::to_value(TrainConfig::adc())? else { return Ok(()) };
-        earlier.append(found);
-        *found = earlier;
-    }
-    Ok(())
-}
-
-#[cfg(test)]
-mod tests {
-    use super::complete;
-    use crate::train::TrainConfig;
-
-    /// What came later is off in trainings that began before it.
-    #[test]
-    fn settings_of_older_checkpoints_are_those_they_were_written_with() {
-        let set = TrainConfig { layer_every: Some(8), ..TrainConfig::default() };
-        let mut config = serde_json::to_value(set).expect("json");
-        let fields = config.as_object_mut().expect("an object");
-        fields.remove("contour_share").expect("a setting");
-        fields.remove("layer_every").expect("a setting");
-        complete(&mut config).expect("completed");
-        let completed: TrainConfig = serde_json::from_value(config.clone()).expect("settings");
-        assert_eq!((completed.contour_share, completed.layer_every), (0.0, Some(1)));
-        assert_eq!(completed.strategy, TrainConfig::default().strategy);
-        config.as_object_mut().expect("an object").remove("strategy");
-        complete(&mut config).expect("completed");
-        let earliest: TrainConfig = serde_json::from_value(config).expect("settings");
-        assert_eq!(earliest.strategy, TrainConfig::adc().strategy);
     }
 }

@@ -15,7 +15,7 @@ use labelgs::internals::pass::sort;
 use labelgs::internals::pass::sort::SortBuffers;
 use labelgs::internals::pass::{Builder, KernelShape};
 use labelgs::internals::scheduler::ListId;
-use labelgs::internals::scheduler::plan::{Buf, Capacity, PassList};
+use labelgs::internals::scheduler::plan::{Buf, Capacity};
 use labelgs::internals::shaders::constants::KEY_INVISIBLE;
 use labelgs::internals::shaders::structs::{Counters, StepUniforms};
 use rand::Rng;
@@ -30,17 +30,7 @@ fn engine(gpu: std::sync::Arc<labelgs::gpu::Gpu>) -> Engine {
 /// Records the passes that `declare` adds.
 fn list(engine: &mut Engine, declare: impl FnOnce(&mut Builder)) -> ListId {
     let (shape, capacity): (KernelShape, Capacity) = (*engine.shape(), *engine.raw().capacity());
-    let list = PassList::new("test");
-    let mut builder = Builder {
-        shape: &shape,
-        capacity: &capacity,
-        labels: false,
-        disagreement: false,
-        depth: false,
-        sh_degree: 0,
-        counts: false,
-        list,
-    };
+    let mut builder = Builder::new("test", &shape, &capacity);
     declare(&mut builder);
     let list = builder.list;
     engine.raw_mut().prepare(&list).expect("the list is planned")

@@ -16,7 +16,6 @@ crate::buffers! {
     LABEL_FROM_LAYER "label_from_layer": 4, Domain::Layers, Class::PerFrame, WORD, "Label id of each layer; layer 0 is the scene.";
     LAYER_WEIGHTS "layer_weights": 4, Domain::Layers, Class::PerFrame, None, "Weight of each layer's label loss.";
     LAYER_OCCLUDERS "layer_occluders": 4, Domain::OccluderWords, Class::PerFrame, WORD, "A bit per label id for each layer; set if that object hides the layer's object.";
-    LABEL_TRUST "label_trust": 4, Domain::Labels, Class::PerFrame, None, "Weight of the disagreement of pixels with each label id in this view.";
     VOTE_WEIGHTS "vote_weights": 4, Domain::VoteColumns, Class::PerFrame, None, "Weight of the votes for each label in this view.";
     STEP_ROWS "step_rows": 4, Domain::SharedRows, Class::PerFrame, WORD, "Shared rows of the step: the scene's, then the photo's, then NO_ROW.";
     STEP_RATES "step_rates": 16, Domain::SharedRows, Class::PerFrame, None, "Learning rates of these rows; rows with rates of 0 stay unchanged.";

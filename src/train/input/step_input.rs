@@ -2,7 +2,8 @@
 
 use super::backdrop;
 use super::known_depths::{self, KnownDepths};
-use crate::engine::{DisagreementInput, Engine, LayerInput, TrainInput};
+use crate::engine::{Engine, LayerInput, TrainInput};
+use crate::pass::Supervision;
 use crate::scene::{Camera, LabelMap, Occluders, Photo, Pixels};
 use crate::shaders::constants::{ADAM_BETA1, ADAM_BETA2, ALPHA_SLACK, FINEST, LABEL_BORDER};
 use crate::shaders::structs::StepUniforms;
@@ -154,9 +155,14 @@ pub struct StepInput {
 }
 
 impl StepInput {
-    /// Returns true if the step lifts labels by the rule of the paper.
-    pub fn lifts(&self, config: &TrainConfig) -> bool {
-        self.labels && config.label_rule == LabelRule::Main
+    /// Returns what the step compares with the view. Known depths end before labels start.
+    pub fn supervision(&self, config: &TrainConfig) -> Supervision {
+        match (self.labels, self.layers.is_empty()) {
+            (true, false) => Supervision::Layers { lift: config.label_rule == LabelRule::Main },
+            (true, true) => Supervision::Disagreement,
+            (false, _) if config.depth_weight_at(self.step) > 0.0 => Supervision::Depth,
+            (false, _) => Supervision::Photo,
+        }
     }
 }
 
@@ -212,10 +218,7 @@ pub(crate) fn train_input<'a>(
 ) -> TrainInput<'a> {
     let room = engine.size().labels.filter(|_| input.labels);
     let (disagrees, layered) = if input.layers.is_empty() { (room, None) } else { (None, room) };
-    let disagreement = disagrees.map(|room| {
-        let trust = vec![1.0; room.max_label as usize + 1];
-        DisagreementInput { view_labels: view.view_labels, trust }
-    });
+    let disagreement = disagrees.map(|_| view.view_labels);
     let layers = layered.map(|room| {
         let words = uniforms.occluder_words as usize;
         let mut layer_from_label = vec![0_u32; room.max_label as usize + 1];

@@ -147,22 +147,11 @@ pub struct Kept {
     pub value: Value,
 }
 
-impl Default for Kept {
-    fn default() -> Self {
-        Self::of(&AdcStrategy)
-    }
-}
-
 impl Kept {
     /// Returns the state of a strategy.
     pub fn of(strategy: &dyn Strategy) -> Self {
         let planes = strategy.planes().iter().map(|buf| TABLE[buf.index()].name.to_owned()).collect();
         Self { name: strategy.name().to_owned(), planes, value: strategy.keep() }
-    }
-
-    /// Returns true for [`AdcStrategy`], which has no entry in checkpoints.
-    pub fn is_default(&self) -> bool {
-        *self == Self::default()
     }
 
     /// Restores a strategy of the same name and planes.

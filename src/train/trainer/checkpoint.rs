@@ -38,7 +38,7 @@ impl Trainer {
             memory_bounds: self.jobs.growth.bound.by_memory,
             sizes: self.context.engine.sizes(),
             config: self.context.config.clone(),
-            near_planes: self.near_planes(),
+            near_planes: self.context.views.iter().map(|view| view.near).collect(),
             views: self.fingerprints.clone(),
             occluders: self.occluders(),
             run: serde_json::Value::Null,
@@ -119,14 +119,8 @@ impl Trainer {
         self.put(state)
     }
 
-    fn near_planes(&self) -> Vec<f32> {
-        let planes: Vec<f32> = self.context.views.iter().map(|view| view.near).collect();
-        if planes.iter().all(|&near| near == self.context.config.near) { Vec::new() } else { planes }
-    }
-
     fn put(&mut self, state: &TrainState) -> Result<()> {
-        let same = vec![state.config.near; self.context.views.len()];
-        self.context.views.set_near_planes(if state.near_planes.is_empty() { &same } else { &state.near_planes });
+        self.context.views.set_near_planes(&state.near_planes);
         let odd = |problem| Error::data(&state.path, "strategy", problem);
         state.strategy.restore(&mut *self.context.strategy).map_err(odd)?;
         self.context

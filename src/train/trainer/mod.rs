@@ -58,7 +58,7 @@ impl Trainer {
     ) -> Result<Self> {
         config.check()?;
         let options = options.into();
-        let config = options.objective.limit_weights(config);
+        let config = options.objective.limit_config(config);
         let size = start_size(&gpu, dataset, &config, (model, options.region.as_ref()), options.scheduler)?;
         let near = match config.near {
             0.0 => near_plane::near_plane(dataset.train.iter().map(|view| &view.camera), model),

@@ -199,13 +199,13 @@ impl Fixture {
 
     /// Variant of the training step.
     pub fn variant(&self) -> Variant {
-        let (labels, update) = (self.input.labels, self.input.update);
         let size = (self.scene.camera.width, self.scene.camera.height);
-        let lift = self.input.lifts(&self.config);
-        let disagreement = labels && self.input.layers.is_empty();
-        let depth = !labels && !self.view.depths.is_empty();
-        let (labels, sh_degree) = (labels && !disagreement, self.config.sh_degree);
-        Variant { labels, disagreement, depth, lift, sh_degree, size, update, counts: false }
+        Variant {
+            supervision: self.input.supervision(&self.config),
+            sh_degree: self.config.sh_degree,
+            update: self.input.update,
+            ..Variant::plain(size)
+        }
     }
 
     /// Sorted pairs of the device: keys, and positions before the sort.

@@ -5,7 +5,7 @@ mod limits;
 
 use checker::Random;
 use labelgs::internals::pass;
-use labelgs::internals::pass::{KernelShape, Variant};
+use labelgs::internals::pass::{KernelShape, Supervision, Variant};
 use labelgs::internals::scheduler::plan::{
     Buf, Capacity, Grid, Limits, MemoryReport, Page, PassDecl, PassList, Plan, PlanOptions, TABLE, Work,
 };
@@ -121,10 +121,10 @@ pub fn engine_lists(shape: KernelShape) -> (Capacity, Vec<PassList>) {
         shared_rows: 70,
         segments: 2,
     };
-    let variant = Variant { labels: true, lift: true, ..Variant::plain((256, 256)) };
+    let variant = Variant { supervision: Supervision::Layers { lift: true }, ..Variant::plain((256, 256)) };
     let lists = vec![
         pass::training_step(&shape, &capacity, variant),
-        pass::training_step(&shape, &capacity, Variant { labels: false, lift: false, sh_degree: 0, ..variant }),
+        pass::training_step(&shape, &capacity, Variant { supervision: Supervision::Photo, sh_degree: 0, ..variant }),
         pass::render_view(&shape, &capacity, 3, 2),
         pass::label_view(&shape, &capacity, 2),
         pass::densify_count(&shape, &capacity),
