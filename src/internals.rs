@@ -218,23 +218,25 @@ pub mod synth {
     pub use crate::synth::{dataset, write};
 }
 pub mod train {
+    pub use crate::train::alignment::aligned;
+    pub use crate::train::refit::{REFIT_STEPS, refitted};
     pub use crate::train::setup::{TrainerOptions, engine_size};
     pub use crate::train::state::TrainState;
-    pub use crate::train::{REFIT_STEPS, StepReport, Trainer, aligned, first_model, refitted};
+    pub use crate::train::{StepReport, Trainer, first_model};
     pub mod region {
-        pub use crate::train::region::Region;
+        pub use crate::train::setup::region::Region;
     }
     pub mod poses {
-        pub use crate::train::poses::Poses;
+        pub use crate::train::shared::poses::Poses;
     }
     pub mod exposure {
-        pub use crate::train::exposure::{Exposure, decided};
+        pub use crate::train::shared::exposure::{Exposure, decided};
     }
     pub mod shared {
         pub use crate::train::shared::{Place, SharedLayout, SharedParameters};
     }
     pub mod step_input {
-        pub use crate::train::step_input::{SceneScale, label_loss};
+        pub use crate::train::input::step_input::{SceneScale, label_loss};
     }
     pub mod strategy {
         pub use crate::train::strategy::population::Population;

@@ -37,6 +37,7 @@
 //! | to | start at |
 //! | --- | --- |
 //! | train, watch, pause, resume | [`run::train`], [`run::Observer`] |
+//! | change the training itself | [`train`] |
 //! | read and write scenes, masks, models | [`io::open`], [`io::masks`], [`io::read_model`] |
 //! | draw pictures, depth, label maps | [`engine::Engine::of_model`], [`render::render`] |
 //! | choose, take out, change objects | [`edit`] |
@@ -67,6 +68,7 @@
 )]
 
 pub mod blocks;
+mod bundle_adjustment;
 #[cfg(feature = "cli")]
 mod cli;
 pub mod edit;
@@ -90,7 +92,7 @@ mod scheduler;
 mod shaders;
 mod stage;
 pub mod synth;
-mod train;
+pub mod train;
 mod verify;
 mod version;
 #[cfg(feature = "viewer")]

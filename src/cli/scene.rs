@@ -10,7 +10,7 @@ use crate::io::{self, LoadOptions};
 use crate::run::Settings;
 use crate::scene::{Dataset, Gaussians, View};
 use crate::scheduler::SchedulerOptions;
-use crate::train::near::NEAR;
+use crate::train::setup::near_plane::NEAR;
 use crate::words::{counted, did_you_mean};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;

@@ -6,8 +6,9 @@ use crate::error::{Error, Result};
 use crate::io::LoadOptions;
 use crate::io::block_file::{self, BlockFile, poses_crc};
 use crate::scene::{ColourMatrix, Dataset, View};
-use crate::train::region::Region;
-use crate::train::{ExposureMode, exposure};
+use crate::train::ExposureMode;
+use crate::train::setup::region::Region;
+use crate::train::shared::exposure;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 

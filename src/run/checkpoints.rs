@@ -2,9 +2,11 @@
 
 use super::history::{Recorder, Sums};
 use super::resume::Record;
+use super::{Event, Run};
 use crate::error::{Error, Result};
 use crate::io::checkpoint_folder;
 use crate::io::run_folder::Lock;
+use crate::train::between::Between;
 use crate::train::{TrainState, Trainer};
 use std::path::{Path, PathBuf};
 
@@ -42,7 +44,7 @@ impl Checkpoints {
     }
 
     /// Returns true if the schedule has a checkpoint at `step`.
-    pub(super) fn due(&self, step: u32, last: u32) -> bool {
+    fn is_due(&self, step: u32, last: u32) -> bool {
         let every = self.record.run.checkpoint_every;
         every > 0 && (step.is_multiple_of(every) || step == last)
     }
@@ -66,7 +68,7 @@ impl Checkpoints {
     }
 
     /// Writes the checkpoint that is due. A failed write or listing is only a warning: the next one may succeed.
-    pub(super) fn save_due(&mut self, trainer: &mut Trainer, history: &mut Recorder) -> Result<Option<PathBuf>> {
+    fn save_due(&mut self, trainer: &mut Trainer, history: &mut Recorder) -> Result<Option<PathBuf>> {
         self.hold_folder()?;
         match self.save(trainer, history) {
             Err(error @ (Error::Write { .. } | Error::Read { .. })) => {
@@ -105,5 +107,49 @@ impl Checkpoints {
     fn keep(&mut self, most: usize) -> Result<()> {
         self.kept.drain(..self.kept.len().saturating_sub(most));
         checkpoint_folder::keep(&self.out, &self.kept)
+    }
+}
+
+/// Writes a checkpoint.
+pub(super) struct CheckpointJob;
+
+impl Between<Run<'_>> for CheckpointJob {
+    fn is_due(&self, step: u32, run: &Run) -> bool {
+        run.checkpoints.is_due(step, run.settings.train.iterations)
+    }
+
+    fn run(&mut self, step: u32, run: &mut Run) -> Result<()> {
+        match run.save_due()? {
+            Some(path) => run.tell(Event::Checkpoint { step, path: &path }),
+            // If the observer answers Save again, the step has its checkpoint already: no endless loop.
+            None => Ok(()),
+        }
+    }
+}
+
+impl Run<'_> {
+    /// Writes a checkpoint outside of the schedule.
+    pub(super) fn save_checkpoint(&mut self) -> Result<()> {
+        self.hold_folder()?;
+        CheckpointJob.run(self.trainer.steps_done(), self)
+    }
+
+    /// Writes the checkpoint of a stopped run. Returns whether there is one.
+    pub(super) fn keep_if_stopped(&mut self) -> Result<bool> {
+        if !self.stopped {
+            return Ok(false);
+        }
+        self.checkpoints.save(&mut self.trainer, &mut self.history).map(|_| true)
+    }
+
+    /// Writes a checkpoint, and what a report of the run until then needs.
+    fn save_due(&mut self) -> Result<Option<PathBuf>> {
+        self.history.drain(&mut self.trainer)?;
+        let saved = self.checkpoints.save_due(&mut self.trainer, &mut self.history)?;
+        // A checkpoint takes long enough for another run to come between.
+        self.hold_folder()?;
+        let written = self.write_info();
+        self.tolerate(written)?;
+        Ok(saved)
     }
 }

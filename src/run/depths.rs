@@ -5,7 +5,7 @@ use crate::io::capture::Sightings;
 use crate::io::{DepthFolder, Lookup};
 use crate::scene::{Dataset, View};
 use crate::train::TrainConfig;
-use crate::train::depths::KnownDepths;
+use crate::train::input::known_depths::KnownDepths;
 use std::path::Path;
 
 /// Weight of known depths if nothing else is set.

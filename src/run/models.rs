@@ -1,5 +1,6 @@
 //! Files of a run: models, cameras and previews. Each write is atomic.
 
+use super::{Event, Run};
 use crate::error::{Error, Result};
 use crate::io::model::{LazyModel, ModelRef, ReadModel, Row, read_model, write_model};
 use crate::io::read;
@@ -8,6 +9,7 @@ use crate::render::Rendered;
 use crate::scene::colour::to_byte;
 use crate::scene::labels::label_colour;
 use crate::scene::{Camera, Gaussians, Photo};
+use crate::train::between::Between;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
@@ -121,6 +123,24 @@ impl Models {
             }
             // This fails, as it should, if the folder holds other files.
             let _ = from.parent().map(std::fs::remove_dir);
+        }
+    }
+}
+
+/// Writes the model in the middle of a run.
+pub(super) struct ModelJob;
+
+impl Between<Run<'_>> for ModelJob {
+    fn is_due(&self, step: u32, run: &Run) -> bool {
+        step < run.settings.train.iterations && run.settings.run.save_at.contains(&step)
+    }
+
+    fn run(&mut self, step: u32, run: &mut Run) -> Result<()> {
+        let model = run.trainer.labelled_model()?;
+        let saved = run.models.save(step, &model);
+        match run.tolerate(saved)? {
+            Some(path) => run.tell(Event::Model { step, path: &path }),
+            None => Ok(()),
         }
     }
 }

@@ -1,11 +1,30 @@
 //! Preview pictures: photo, render and label map side by side.
 
 use super::history::{Entry, Scored};
-use super::{Live, Run, models};
+use super::{Event, Live, Run, models};
 use crate::error::Result;
 use crate::eval::metrics::{label_iou, psnr};
 use crate::render::Parts;
+use crate::train::between::Between;
 use std::path::PathBuf;
+
+/// Writes a preview.
+pub(super) struct PreviewJob;
+
+impl Between<Run<'_>> for PreviewJob {
+    fn is_due(&self, step: u32, run: &Run) -> bool {
+        let every = run.settings.run.preview_every;
+        step < run.settings.train.iterations && every > 0 && step.is_multiple_of(every)
+    }
+
+    fn run(&mut self, step: u32, run: &mut Run) -> Result<()> {
+        let written = write(run);
+        match run.tolerate(written)?.flatten() {
+            Some(path) => run.tell(Event::Preview { step, path: &path }),
+            None => Ok(()),
+        }
+    }
+}
 
 /// Writes a preview of the current scene. Returns none without a photo.
 pub(super) fn write(run: &mut Run) -> Result<Option<PathBuf>> {

@@ -6,7 +6,7 @@ use crate::options::parse::as_bytes;
 #[cfg(feature = "cli")]
 use crate::options::parse::bytes;
 use crate::options::{Key, Options};
-use crate::train::near::NEAR;
+use crate::train::setup::near_plane::NEAR;
 use crate::train::{Preset, TrainConfig};
 use serde::de::{DeserializeOwned, IgnoredAny};
 use serde::{Deserialize, Serialize};

@@ -1,26 +1,20 @@
-//! The complete state of a training, and its file. A resumed training gives the same bits as an uninterrupted one.
+//! The complete state of a training, and its file.
 //!
 //! The file leaves out derived values: learning rates and degrees follow from the step, the order of views and the
 //! sampled objects from seed and step, gradients and votes from the passes of the next step.
 
-use super::region::Region;
-use super::sampler::ViewOrder;
+use super::TrainConfig;
 use super::shared::KeptShared;
 use super::strategy::Kept;
-use super::{TrainConfig, Trainer, TrainerOptions, engine_size};
 use crate::engine::state::Counts;
 use crate::engine::{GrownSizes, state};
 use crate::error::{Error, Result, Setting};
-use crate::gpu::Gpu;
 use crate::io::checkpoint::{Checkpoint, Plane};
-use crate::pass::SHARED_PLANES;
-use crate::scene::{Camera, Dataset, LabelMap, Occluders, Photo, Pixels};
+use crate::scene::{Camera, LabelMap, Occluders, Photo, Pixels};
 use crate::scheduler::plan::{Buf, TABLE};
-use glam::DVec3;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 
 /// The state of a training between two steps.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -85,7 +79,12 @@ pub struct ViewFingerprint {
 }
 
 impl ViewFingerprint {
-    fn new(name: &str, camera: &Camera, photo: Option<&Pixels<Photo>>, mask: Option<&Pixels<LabelMap>>) -> Self {
+    pub(super) fn new(
+        name: &str,
+        camera: &Camera,
+        photo: Option<&Pixels<Photo>>,
+        mask: Option<&Pixels<LabelMap>>,
+    ) -> Self {
         let intrinsics = [camera.fx, camera.fy, camera.cx, camera.cy];
         let pose = camera.rotation.to_cols_array().into_iter().chain(camera.translation.to_array());
         let numbers: Vec<u8> = pose.chain(intrinsics).flat_map(f64::to_le_bytes).collect();
@@ -128,7 +127,7 @@ impl TrainState {
     }
 
     /// Refuses a scene that differs from that of the checkpoint; the error names the first difference.
-    fn check_scene(&self, scene: &Path, views: &[ViewFingerprint]) -> Result<()> {
+    pub(super) fn check_scene(&self, scene: &Path, views: &[ViewFingerprint]) -> Result<()> {
         let masks = |views: &[ViewFingerprint]| views.iter().any(|view| view.mask.is_some());
         let (then, now) = (masks(&self.views), masks(views));
         if then != now {
@@ -155,136 +154,4 @@ impl TrainState {
         }
         Ok(())
     }
-}
-
-impl Trainer {
-    /// Waits for the steps in flight and returns the state of the training.
-    pub fn state(&mut self) -> Result<TrainState> {
-        self.drain()?;
-        let print = |view: &super::TrainView| {
-            ViewFingerprint::new(&view.name, &view.camera, Some(&view.photo), view.mask.as_ref())
-        };
-        if self.fingerprints.is_empty() {
-            self.fingerprints = self.views.iter().map(print).collect();
-        }
-        Ok(TrainState {
-            labelgs: env!("CARGO_PKG_VERSION").to_owned(),
-            device: device(self.engine.gpu()),
-            step: self.step,
-            updates: self.updates,
-            gaussians: self.gaussian_count(),
-            frozen: self.engine.size().frozen,
-            origin: self.engine.origin().to_array(),
-            labelled_once: self.labelled_once,
-            memory_bounds: self.bound.by_memory,
-            sizes: self.engine.sizes(),
-            config: self.config.clone(),
-            near_planes: self.views.iter().map(|view| view.near).collect(),
-            views: self.fingerprints.clone(),
-            occluders: self.occluders(),
-            run: serde_json::Value::Null,
-            strategy: Kept::of(&*self.strategy),
-            shared: self.shared.kept(),
-            planes: self.finite_planes()?,
-            path: PathBuf::new(),
-        })
-    }
-
-    /// Reads the planes of the state. A NaN or infinity is an error: the checkpoint would be useless. No pass has
-    /// checked the result of the last step yet.
-    fn finite_planes(&mut self) -> Result<Vec<Plane>> {
-        let planes = self.engine.download_state(self.strategy.planes())?;
-        let is_finite = |word: &u32| f32::from_bits(*word).is_finite();
-        for plane in planes.iter().filter(|plane| plane.name != TABLE[Buf::LABELS.index()].name) {
-            if let Some(at) = plane.data.iter().position(|word| !is_finite(word)) {
-                let row = at / plane.words.max(1) as usize;
-                let is_shared = SHARED_PLANES.iter().any(|buf| TABLE[buf.index()].name == plane.name);
-                let of = if is_shared { "row" } else { "Gaussian" };
-                return Err(Error::Numeric {
-                    quantity: format!("{} of {of} {row} is not finite, so there is no checkpoint", plane.name),
-                    step: u64::from(self.step),
-                    view: "of this step or one before".to_owned(),
-                });
-            }
-        }
-        Ok(planes)
-    }
-
-    /// Resumes a training from `state`, with the same bits on the same device as without the interruption. `dataset`
-    /// must be the data set of the state.
-    pub fn resume(
-        gpu: Arc<Gpu>,
-        dataset: &Dataset,
-        state: TrainState,
-        options: impl Into<TrainerOptions>,
-    ) -> Result<Self> {
-        state.config.check()?;
-        let views = dataset.train.iter();
-        let fingerprints: Vec<ViewFingerprint> =
-            views.map(|v| ViewFingerprint::new(&v.name, &v.camera, v.photo.as_ref(), v.mask.as_ref())).collect();
-        state.check_scene(&dataset.root, &fingerprints)?;
-        let (now, version) = (device(&gpu), env!("CARGO_PKG_VERSION"));
-        for (then, now) in [(&state.device, now.as_str()), (&state.labelgs, version)] {
-            if then != now {
-                tracing::warn!("{} was made with {then}, this is {now}: bits may differ", state.path.display());
-            }
-        }
-        let options = options.into();
-        let frozen = Region::frozen(options.region.as_ref());
-        if frozen != state.frozen {
-            let problem = format!("{frozen} frozen Gaussians, {} are in {}", state.frozen, state.path.display());
-            return Err(Error::data(
-                &dataset.root,
-                "",
-                format!("the part of the scene has {problem}; start a new run"),
-            ));
-        }
-        let size = engine_size(dataset, &state.config, u64::from(state.gaussians))?.with_frozen(frozen);
-        if let Some(labels) = size.labels
-            && let Some(plane) = state.planes.iter().find(|plane| plane.name == "labels")
-            && let Some(label) = plane.data.iter().find(|&&label| label > labels.max_label)
-        {
-            let problem = format!("is {label}, the masks have ids up to {}", labels.max_label);
-            return Err(Error::data(&state.path, "a label", problem));
-        }
-        let mut trainer = Self::without_model(gpu, state.config.clone(), dataset, size, options)?;
-        trainer.fingerprints = fingerprints;
-        trainer.put(&state)?;
-        Ok(trainer)
-    }
-
-    /// Restores an earlier state of the same training.
-    pub fn restore(&mut self, state: &TrainState) -> Result<()> {
-        self.engine.abandon()?;
-        self.in_flight.clear();
-        self.put(state)
-    }
-
-    fn put(&mut self, state: &TrainState) -> Result<()> {
-        self.views.set_near_planes(&state.near_planes);
-        let odd = |problem| Error::data(&state.path, "strategy", problem);
-        state.strategy.restore(&mut *self.strategy).map_err(odd)?;
-        self.shared
-            .check(state.shared.as_ref())
-            .map_err(|problem| Error::data(&state.path, "shared parameters", problem))?;
-        match self.engine.grow_to(state.sizes) {
-            // A smaller device has less room to grow.
-            Err(Error::OutOfMemory { .. }) => {}
-            other => other?,
-        }
-        self.engine.upload_state(state.gaussians, DVec3::from_array(state.origin), &state.planes)?;
-        self.set_occluders(&state.occluders);
-        self.order = ViewOrder::after(self.config.seed, self.views.parts().len(), state.step);
-        (self.step, self.updates) = (state.step, state.updates);
-        (self.labelled_once, self.bound.by_memory) = (state.labelled_once, state.memory_bounds);
-        self.seen = Default::default();
-        Ok(())
-    }
-}
-
-/// Returns the description of the device: equal descriptions give equal bits.
-fn device(gpu: &Gpu) -> String {
-    let found = gpu.capabilities();
-    let driver = format!("{} {}", found.driver_name, found.driver_info);
-    format!("{} ({driver}, {})", found.name, found.subgroup)
 }

@@ -4,7 +4,6 @@
 pub(crate) mod adc;
 pub(crate) mod budget;
 pub(crate) mod exchange;
-pub(crate) mod frozen;
 pub(crate) mod mcmc;
 pub(crate) mod passes;
 pub(crate) mod population;
@@ -13,8 +12,8 @@ pub(crate) mod weights;
 use adc::AdcStrategy;
 use budget::BudgetStrategy;
 use mcmc::McmcStrategy;
-pub use population::Densified;
-pub(crate) use population::{Bound, Population};
+pub(crate) use population::Bound;
+pub use population::{Densified, Population};
 
 use super::{StrategyKind, TrainConfig};
 use crate::error::Result;
@@ -106,6 +105,13 @@ pub trait Strategy: Debug + Send {
     /// Restores the stored state, or returns what is wrong with it.
     fn restore(&mut self, _kept: &Value) -> Result<(), String> {
         Ok(())
+    }
+}
+
+/// Changes nothing.
+impl Strategy for () {
+    fn name(&self) -> &'static str {
+        "none"
     }
 }
 

@@ -1,8 +1,8 @@
 //! The passes that strategies add to training steps. The number of a variant has a bit for each.
 
+use super::At;
 use crate::pass::{Builder, Extension, Hook, densify, optimize};
 use crate::shaders::structs::StepUniforms;
-use crate::train::strategy::At;
 
 /// Marks Gaussians that fog the camera of the step.
 pub(crate) const FREE_SPACE: u32 = 1;

@@ -4,7 +4,7 @@ use crate::engine::{Engine, ListKey};
 use crate::error::{Error, Result};
 use crate::shaders::constants::STAT_NEAR;
 use crate::shaders::structs::{Counters, StepUniforms};
-use crate::train::views::Views;
+use crate::train::input::views::Views;
 
 /// Counts of a densification.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

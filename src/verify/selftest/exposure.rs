@@ -11,7 +11,7 @@ use crate::gpu::Gpu;
 use crate::pass::KernelShape;
 use crate::scheduler::plan::Buf;
 use crate::shaders::constants::{EXPOSURE_PRIOR, EXPOSURE_ROWS};
-use crate::train::exposure::Exposure;
+use crate::train::shared::exposure::Exposure;
 use crate::train::shared::{Place, SharedLayout, SharedParameters};
 use crate::verify::reference::Rules;
 use crate::verify::reference::exposure::{ExposureRows, backward, exposed};

@@ -11,7 +11,7 @@ use crate::pass::KernelShape;
 use crate::scene::Camera;
 use crate::scheduler::plan::Buf;
 use crate::shaders::constants::POSE_PRIOR;
-use crate::train::poses::{self, Poses};
+use crate::train::shared::poses::{self, Poses};
 use crate::train::shared::{Place, SharedLayout, SharedParameters};
 use crate::verify::reference::pose::{PoseRows, backward, corrected};
 use crate::verify::reference::project::project_forward;

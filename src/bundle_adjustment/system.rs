@@ -1,0 +1,240 @@
+//! The equations of all poses, and their solution.
+
+use super::Frame;
+use super::pair::{Compared, NUMBERS, POSE, Way, compare};
+use super::patch::Patch;
+use rayon::prelude::*;
+
+/// Share of its diagonal that is added to the equations of poses: place, turn and size of the whole are open.
+const DAMPING: f64 = 1e-7;
+/// The same for depths.
+const DEPTH_DAMPING: f64 = 1e-3;
+/// Largest step of the logarithm of a depth.
+const DEPTH_STEP: f64 = 0.02;
+/// Fewest rows of a matrix that are worth another thread.
+const ROWS: usize = 64;
+
+/// Comparisons of a frame.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Counts {
+    /// Patches that were looked up in places that show them by their depth.
+    pub(super) looked: usize,
+    /// Those that found something alike.
+    pub(super) alike: usize,
+}
+
+impl std::ops::Add for Counts {
+    type Output = Self;
+
+    fn add(self, other: Self) -> Self {
+        Self { looked: self.looked + other.looked, alike: self.alike + other.alike }
+    }
+}
+
+/// The equations of a patch's depth.
+#[derive(Clone, Debug)]
+struct Depth {
+    /// Second derivative.
+    curvature: f64,
+    /// First derivative, with its sign changed.
+    pull: f64,
+    /// Mixed derivatives by poses: the index of the frame among host and partners, and its six numbers.
+    mixed: Vec<(usize, [f64; POSE])>,
+}
+
+/// The equations of the patches of one frame, by the poses of the frame itself and its partners, in this order. Depths are
+/// eliminated.
+#[derive(Clone, Debug)]
+pub(super) struct Sums {
+    /// Row-major.
+    matrix: Vec<f64>,
+    right: Vec<f64>,
+    /// Comparisons of each frame.
+    counts: Vec<Counts>,
+    depths: Vec<Depth>,
+}
+
+/// Returns the equations of the patches of each frame.
+pub(super) fn sums(frames: &[Frame], patches: &[Vec<Patch>], partners: &[Vec<usize>]) -> Vec<Sums> {
+    let of = |host: usize| {
+        let ways: Vec<Way> =
+            partners[host].iter().map(|&other| Way::new(&frames[host].camera, &frames[other].camera)).collect();
+        let mut sums = Sums::new(1 + ways.len());
+        for patch in &patches[host] {
+            let each = ways.iter().zip(&partners[host]).map(|(way, &other)| compare(way, patch, &frames[other]));
+            sums.add(each);
+        }
+        sums
+    };
+    (0..frames.len()).into_par_iter().map(of).collect()
+}
+
+/// Returns the steps of a frame and its partners.
+pub(super) fn steps_of(host: usize, partners: &[usize], steps: &[[f64; POSE]]) -> Vec<[f64; POSE]> {
+    std::iter::once(&host).chain(partners).map(|&frame| steps[frame]).collect()
+}
+
+impl Sums {
+    fn new(frames: usize) -> Self {
+        let side = POSE * frames;
+        Self {
+            matrix: vec![0.0; side * side],
+            right: vec![0.0; side],
+            counts: vec![Counts::default(); frames],
+            depths: Vec::new(),
+        }
+    }
+
+    /// Adds a patch, by its comparison with each partner.
+    fn add(&mut self, each: impl Iterator<Item = Option<Option<Compared>>>) {
+        let mut own = [0.0; POSE];
+        let mut depth = Depth { curvature: 0.0, pull: 0.0, mixed: Vec::new() };
+        for (partner, compared) in each.enumerate().filter_map(|(k, compared)| Some((k + 1, compared?))) {
+            for frame in [0, partner] {
+                let counts = &mut self.counts[frame];
+                *counts = *counts + Counts { looked: 1, alike: compared.is_some().into() };
+            }
+            let Some(compared) = compared else { continue };
+            let (matrix, right) = products(&compared);
+            for i in 0..2 * POSE {
+                let row = index(partner, i);
+                self.right[row] += right[i];
+                for j in 0..2 * POSE {
+                    self.matrix[row * self.right.len() + index(partner, j)] += matrix[i][j];
+                }
+            }
+            let mixed = matrix[NUMBERS - 1];
+            depth.curvature += mixed[NUMBERS - 1];
+            depth.pull += right[NUMBERS - 1];
+            depth.mixed.push((partner, std::array::from_fn(|k| mixed[k])));
+            own.iter_mut().zip(&mixed[POSE..]).for_each(|(sum, mixed)| *sum += mixed);
+        }
+        depth.mixed.push((0, own));
+        depth.curvature *= 1.0 + DEPTH_DAMPING;
+        if depth.curvature > 0.0 {
+            self.eliminate(&depth);
+        }
+        self.depths.push(depth);
+    }
+
+    fn eliminate(&mut self, depth: &Depth) {
+        let side = self.right.len();
+        for (a, by_a) in &depth.mixed {
+            for i in 0..POSE {
+                let (row, share) = (POSE * a + i, by_a[i] / depth.curvature);
+                self.right[row] -= share * depth.pull;
+                for (b, by_b) in &depth.mixed {
+                    let at = row * side + POSE * b;
+                    self.matrix[at..at + POSE].iter_mut().zip(by_b).for_each(|(sum, by_b)| *sum -= share * by_b);
+                }
+            }
+        }
+    }
+
+    /// Moves the depths of the patches after the steps of the frame and its partners.
+    pub(super) fn move_depths(&self, patches: &mut [Patch], steps: &[[f64; POSE]]) {
+        for (patch, depth) in patches.iter_mut().zip(&self.depths).filter(|(_, depth)| depth.curvature > 0.0) {
+            let by_poses: f64 = depth.mixed.iter().map(|(frame, by)| dot(by, &steps[*frame])).sum();
+            let step = ((depth.pull - by_poses) / depth.curvature).clamp(-DEPTH_STEP, DEPTH_STEP);
+            patch.places.iter_mut().for_each(|place| *place *= step.exp());
+        }
+    }
+}
+
+/// Returns the place of a number of a comparison with a partner in [`Sums`].
+fn index(partner: usize, number: usize) -> usize {
+    if number < POSE { POSE * partner + number } else { number - POSE }
+}
+
+/// Returns the matrix and the right side of a comparison.
+fn products(compared: &Compared) -> ([[f64; NUMBERS]; NUMBERS], [f64; NUMBERS]) {
+    let ([xx, xy, yy], [x, y]) = (compared.moments, compared.places);
+    let matrix = std::array::from_fn(|i| {
+        let (by_x, by_y) = (xx * x[i] + xy * y[i], xy * x[i] + yy * y[i]);
+        std::array::from_fn(|j| by_x * x[j] + by_y * y[j])
+    });
+    (matrix, std::array::from_fn(|i| compared.pull[0] * x[i] + compared.pull[1] * y[i]))
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+/// The equations of all frames.
+#[derive(Clone, Debug)]
+pub(super) struct System {
+    /// Row-major, symmetric.
+    matrix: Vec<f64>,
+    right: Vec<f64>,
+    /// Comparisons of each frame.
+    pub(super) counts: Vec<Counts>,
+}
+
+impl System {
+    pub(super) fn of(sums: &[Sums], partners: &[Vec<usize>], frames: usize) -> Self {
+        let side = POSE * frames;
+        let mut all =
+            Self { matrix: vec![0.0; side * side], right: vec![0.0; side], counts: vec![Counts::default(); frames] };
+        for (host, (sums, partners)) in sums.iter().zip(partners).enumerate() {
+            let of: Vec<usize> = std::iter::once(host).chain(partners.iter().copied()).collect();
+            let row = |local: usize| POSE * of[local / POSE] + local % POSE;
+            for (i, right) in sums.right.iter().enumerate() {
+                all.right[row(i)] += right;
+                for j in 0..sums.right.len() {
+                    all.matrix[row(i) * side + row(j)] += sums.matrix[i * sums.right.len() + j];
+                }
+            }
+            of.iter().zip(&sums.counts).for_each(|(&frame, &counts)| all.counts[frame] = all.counts[frame] + counts);
+        }
+        all
+    }
+
+    /// Returns the step of each frame, 0 for those that are not told; `None` if the equations have no solution.
+    pub(super) fn solved(mut self, is_told: &[bool]) -> Option<Vec<[f64; POSE]>> {
+        let side = self.right.len();
+        for row in 0..side {
+            for column in 0..side {
+                if !is_told[row / POSE] || !is_told[column / POSE] {
+                    self.matrix[row * side + column] = if row == column { 1.0 } else { 0.0 };
+                }
+            }
+            if is_told[row / POSE] {
+                self.matrix[row * side + row] *= 1.0 + DAMPING;
+            } else {
+                self.right[row] = 0.0;
+            }
+        }
+        solve(&mut self.matrix, &mut self.right)?;
+        Some(self.right.as_chunks().0.to_vec())
+    }
+}
+
+/// Solves symmetric positive equations (Cholesky). The matrix becomes the lower factor, the right side the solution. `None` if
+/// there is none.
+pub(crate) fn solve(matrix: &mut [f64], right: &mut [f64]) -> Option<()> {
+    let side = right.len();
+    for column in 0..side {
+        let (above, below) = matrix.split_at_mut((column + 1) * side);
+        let pivot = &mut above[column * side..];
+        let square = pivot[column] - dot(&pivot[..column], &pivot[..column]);
+        if square.is_nan() || square <= 0.0 {
+            return None;
+        }
+        pivot[column] = square.sqrt();
+        let pivot = &*pivot;
+        below.par_chunks_mut(side).with_min_len(ROWS).for_each(|row| {
+            row[column] = (row[column] - dot(&row[..column], &pivot[..column])) / pivot[column];
+        });
+    }
+    for row in 0..side {
+        right[row] =
+            (right[row] - dot(&matrix[row * side..row * side + row], &right[..row])) / matrix[row * side + row];
+    }
+    for row in (0..side).rev() {
+        right[row] /= matrix[row * side + row];
+        for column in 0..row {
+            right[column] -= matrix[row * side + column] * right[row];
+        }
+    }
+    right.iter().all(|value| value.is_finite()).then_some(())
+}

@@ -1,0 +1,64 @@
+//! Poses of views by a finished model: the Gaussians stay, the cameras move.
+//!
+//! A model whose photos had their poses refined bends with them, and held-out views keep the poses of the reconstruction.
+//! Scores of such views tell quality only after their poses were refined by the model too (as in BARF, Lin et al. 2021).
+
+use crate::error::Result;
+use crate::gpu::Gpu;
+use crate::scene::{Dataset, Gaussians, Point, View};
+use crate::scheduler::SchedulerOptions;
+use crate::stage::Stage;
+use crate::train::{ExposureMode, Objective, TrainConfig, Trainer, TrainerOptions};
+use std::sync::Arc;
+
+/// Steps of each view.
+const STEPS: usize = 100;
+/// Most Gaussians that stand for the points of the scene.
+const POINTS: usize = 10_000;
+
+/// Returns the views with poses refined by a model, which is rendered from `near` on `background`.
+pub fn aligned(
+    gpu: &Arc<Gpu>,
+    model: &Gaussians,
+    views: &[&View],
+    (near, background): (f32, [f32; 3]),
+    scheduler: SchedulerOptions,
+) -> Result<Vec<View>> {
+    let mut found: Vec<View> = views.iter().map(|&view| view.clone()).collect();
+    if found.is_empty() || model.is_empty() {
+        return Ok(found);
+    }
+    let config = TrainConfig {
+        iterations: (STEPS * found.len()) as u32,
+        near,
+        background,
+        sh_degree: model.sh_degree,
+        sh_degree_interval: Some(1),
+        antialias: model.antialiased,
+        exposure: ExposureMode::Off,
+        refine_poses: true,
+        free_space: false,
+        ..TrainConfig::default()
+    };
+    let every = model.len().div_ceil(POINTS);
+    let points =
+        (0..model.len()).step_by(every).map(|row| Point { position: model.world(row), colour: [0; 3] }).collect();
+    let train = found.iter().map(|view| View { mask: None, ..view.clone() }).collect();
+    let dataset = Dataset { train, points, ..Dataset::default() };
+    let model = Gaussians { labels: None, label_confidence: None, ..model.clone() };
+    let options = TrainerOptions { objective: Objective::SHARED, ..scheduler.into() };
+    let mut trainer = Trainer::new(Arc::clone(gpu), config, &dataset, &model, options)?;
+    let stage = Stage::new("refining poses", trainer.config().iterations as usize);
+    for _ in 0..trainer.config().iterations {
+        trainer.step()?;
+        stage.count();
+    }
+    trainer.drain()?;
+    let refined = trainer.poses()?;
+    for view in &mut found {
+        if let Some(camera) = refined.get(&view.name) {
+            view.camera = camera.clone();
+        }
+    }
+    Ok(found)
+}

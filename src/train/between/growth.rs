@@ -1,0 +1,41 @@
+//! Changes of the set of Gaussians after a step, by the strategy.
+
+use super::Between;
+use crate::error::{Error, Result};
+use crate::train::TrainConfig;
+use crate::train::context::Context;
+use crate::train::strategy::{At, Bound, Densified, Population};
+
+/// Clones, splits and prunes Gaussians.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::train) struct Growth {
+    /// Limit on the number of Gaussians.
+    pub(in crate::train) bound: Bound,
+    /// Counts of the latest densification, cleared when the caller takes them.
+    pub(in crate::train) densified: Option<Densified>,
+}
+
+impl Growth {
+    pub(in crate::train) fn new(config: &TrainConfig) -> Self {
+        let most = if config.max_gaussians > 0 { config.max_gaussians } else { u64::from(u32::MAX) };
+        Self { bound: Bound { most, by_memory: false }, densified: None }
+    }
+}
+
+impl Between<Context> for Growth {
+    fn is_due(&self, step: u32, context: &Context) -> bool {
+        context.strategy.acts_after(context.at(step))
+    }
+
+    fn run(&mut self, step: u32, context: &mut Context) -> Result<()> {
+        context.refresh_poses()?;
+        let missing = || Error::Bug("the strategy acts before the first step".to_owned());
+        let uniforms = context.uniforms(context.newest.as_ref().ok_or_else(missing)?)?;
+        let extent = context.at(step).extent;
+        let Context { engine, config, strategy, views, .. } = context;
+        let mut population = Population::new(engine, &mut self.bound, views, uniforms, step);
+        strategy.act(At { step, config, extent }, &mut population)?;
+        self.densified = population.densified().or(self.densified);
+        Ok(())
+    }
+}

@@ -1,0 +1,65 @@
+//! Poses of the photos by a comparison of these with each other.
+
+use super::Between;
+use crate::bundle_adjustment::{Frame, PHOTOS_MAX, adjusted};
+use crate::error::Result;
+use crate::render::{RenderOptions, render};
+use crate::train::context::Context;
+use crate::train::objective::Parameter;
+use crate::train::shared::poses;
+
+/// Settles the poses of all photos that others show enough of.
+#[derive(Clone, Copy, Debug, Default)]
+pub(in crate::train) struct PoseAdjustment;
+
+impl Between<Context> for PoseAdjustment {
+    fn is_due(&self, step: u32, context: &Context) -> bool {
+        // A finished model tells the poses itself.
+        context.objective.trains(Parameter::Positions)
+            && context.shared.photo_rows(poses::NAME).is_some()
+            && poses::are_compared_before(context.at(step))
+            && !context.blurs_depth_before(step)
+    }
+
+    fn run(&mut self, _step: u32, context: &mut Context) -> Result<()> {
+        let Some(range) = context.shared.photo_rows(poses::NAME) else { return Ok(()) };
+        if context.views.len() > PHOTOS_MAX {
+            tracing::warn!("the model alone tells the poses of more than {PHOTOS_MAX} photos");
+            return Ok(());
+        }
+        context.refresh_poses()?;
+        let found = adjusted(frames(context)?);
+        let mut rows = context.engine.shared()?;
+        let mut unknown = Vec::new();
+        for (index, found) in found.iter().enumerate() {
+            let view = &context.views[index];
+            let of_view = &mut rows[context.shared.of_view(index)][range.clone()];
+            if found.as_ref().and_then(|found| poses::settle(of_view, &view.camera, found)).is_none() {
+                unknown.push(view.name.as_str());
+            }
+        }
+        let (count, all) = (found.len() - unknown.len(), found.len());
+        tracing::info!("poses of {count} of {all} photos adjusted by a comparison of the photos");
+        if !unknown.is_empty() {
+            tracing::debug!("poses by the model alone: {}", unknown.join(", "));
+        }
+        if count > 0 {
+            context.engine.set_shared(&rows)?;
+            context.refresh_poses()?;
+        }
+        Ok(())
+    }
+}
+
+/// Returns the photo of each view with the depths of the model.
+fn frames(context: &mut Context) -> Result<Vec<Frame>> {
+    let Context { engine, config, views, .. } = context;
+    let options = RenderOptions::of_depth(config.near);
+    let mut frames = Vec::with_capacity(views.len());
+    for (index, view) in views.iter().enumerate() {
+        let camera = Frame::camera_of(views.camera(index), views.len());
+        let model = render(engine, &camera, &options)?;
+        frames.push(Frame::new(camera, &*view.photo.get()?, &model.depth, &model.alpha));
+    }
+    Ok(frames)
+}

@@ -1,0 +1,57 @@
+//! Labels by votes, counted over all training views at intervals and at the end.
+
+use super::Between;
+use crate::error::Result;
+use crate::label::vote::ballot::Sweep;
+use crate::label::vote::decide::{self, Decision};
+use crate::train::context::Context;
+use crate::train::objective::Parameter;
+use crate::train::{LabelRule, TrainConfig};
+
+/// Counts votes and labels the Gaussians.
+#[derive(Clone, Copy, Debug, Default)]
+pub(in crate::train) struct Votes {
+    /// The Gaussians have labels of votes, with which masks can be compared.
+    pub(in crate::train) have_labelled: bool,
+}
+
+impl Votes {
+    /// Returns true if votes decide labels.
+    fn decide(context: &Context) -> bool {
+        let TrainConfig { label_rule, .. } = context.config;
+        context.has_labels() && context.objective.trains(Parameter::Labels) && label_rule == LabelRule::Votes
+    }
+
+    /// Counts the votes of all views; `None` where no votes decide labels. Nothing may be in flight.
+    pub(in crate::train) fn count(&self, context: &mut Context) -> Result<Option<Decision>> {
+        if !Self::decide(context) {
+            return Ok(None);
+        }
+        context.refresh_poses()?;
+        let Context { engine, config, views, .. } = context;
+        let how = Sweep::new(config.near, config.mask_border);
+        let (means, voters) = (engine.means()?, views.voters());
+        let is_judged = config.vote_trust && self.have_labelled;
+        let mut decision = decide::count(engine, &voters, is_judged, &means, how, true)?;
+        let trained = engine.trained_count() as usize;
+        if trained < decision.labels.len() {
+            // The views of a part of a scene know little of what is frozen.
+            decision.labels[trained..].copy_from_slice(&engine.labels()?[trained..]);
+        }
+        Ok(Some(decision))
+    }
+}
+
+impl Between<Context> for Votes {
+    fn is_due(&self, step: u32, context: &Context) -> bool {
+        Self::decide(context) && context.config.counts_votes_at(step) && !context.blurs_depth_before(step)
+    }
+
+    fn run(&mut self, _step: u32, context: &mut Context) -> Result<()> {
+        if let Some(decision) = self.count(context)? {
+            context.engine.set_labels(&decision.labels)?;
+            self.have_labelled = true;
+        }
+        Ok(())
+    }
+}

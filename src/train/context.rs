@@ -1,0 +1,152 @@
+//! What the steps of a training use, and the work between them.
+
+use crate::engine::{Engine, EngineSize, InFlight, ListKey, TrainInput};
+use crate::error::Result;
+use crate::gpu::Gpu;
+use crate::pass::{KernelShape, Variant};
+use crate::scene::{Dataset, Zone};
+use crate::shaders::structs::StepUniforms;
+use crate::train::TrainConfig;
+use crate::train::extension::Joined;
+use crate::train::input::step_input::{self, SceneScale, StepInput};
+use crate::train::input::views::Views;
+use crate::train::objective::{Objective, Parameter};
+use crate::train::setup::region::Region;
+use crate::train::setup::{self, TrainerOptions};
+use crate::train::shared::Shared;
+use crate::train::shared::poses;
+use crate::train::strategy::{At, Strategy};
+use std::sync::Arc;
+
+/// The model on the device, and what it is trained by.
+pub(super) struct Context {
+    pub(super) engine: Engine,
+    pub(super) config: TrainConfig,
+    pub(super) objective: Objective,
+    pub(super) strategy: Box<dyn Strategy>,
+    pub(super) shared: Shared,
+    pub(super) views: Views,
+    scale: SceneScale,
+    /// Where Gaussians grow; `None`: everywhere.
+    grow_zone: Option<Zone>,
+    /// Size of the largest part of a photo, px. The image of the engine may be larger, because it grows.
+    image: (u32, u32),
+    /// 1 if every step has passes of shared parameters or of the objective.
+    always_passes: u32,
+    /// The blend passes count the pairs with a weight.
+    pub(super) counts_pairs: bool,
+    /// Input of the newest step.
+    pub(super) newest: Option<StepInput>,
+}
+
+impl Context {
+    /// Opens an engine for the training of a data set. The model is not on the device yet.
+    pub(super) fn new(
+        gpu: Arc<Gpu>,
+        config: TrainConfig,
+        dataset: &Dataset,
+        size: EngineSize,
+        TrainerOptions { shape, scheduler, objective, strategy, shared, region, depths }: TrainerOptions,
+    ) -> Result<Self> {
+        let (scale, region) = (Region::scale(region.as_ref(), dataset), region.as_ref());
+        let shared = shared.or_of(&config, dataset, region);
+        let strategy = strategy.unwrap_or_else(|| objective.strategy(config.strategy));
+        let shape = shape.unwrap_or_else(|| KernelShape::of(gpu.capabilities()));
+        let views = setup::train_views(dataset, depths, config.mask_border, size.band(&shape))?;
+        let views = Views::new(views, &config);
+        let size = size.with_shared_rows(shared.rows(views.len()));
+        let mut engine = Engine::with_shape(gpu, shape, size, scheduler)?;
+        engine.set_sh_degree(config.sh_degree);
+        engine.set_antialiased(config.antialias);
+        let image = engine.size().image;
+        let always: Vec<_> = objective.extension().into_iter().chain(shared.extensions()).collect();
+        let always_passes = u32::from(!always.is_empty());
+        let passes = strategy.passes(At { step: 1, config: &config, extent: scale.extent }) + always_passes;
+        engine.set_extension(Joined::of(strategy.extension(), always), passes);
+        let grow_zone = Region::grow_zone(region, &config);
+        Ok(Self {
+            engine,
+            config,
+            objective,
+            strategy,
+            shared,
+            views,
+            scale,
+            grow_zone,
+            image,
+            always_passes,
+            counts_pairs: false,
+            newest: None,
+        })
+    }
+
+    /// Returns a step as strategies and shared parameters see it.
+    pub(super) fn at(&self, step: u32) -> At<'_> {
+        At { step, config: &self.config, extent: self.scale.extent }
+    }
+
+    /// Returns true if the depth of the model is unreliable before `step`.
+    pub(super) fn blurs_depth_before(&self, step: u32) -> bool {
+        step > 1 && self.strategy.blurs_depth_after(self.at(step - 1))
+    }
+
+    /// Returns true if Gaussians have labels: in a scene with masks.
+    pub(super) fn has_labels(&self) -> bool {
+        self.engine.size().labels.is_some()
+    }
+
+    /// Returns the uniforms of a step.
+    pub(super) fn uniforms(&self, input: &StepInput) -> Result<StepUniforms> {
+        let view = self.views.of(input)?;
+        let mut uniforms = step_input::uniforms(input, view, &self.config, self.scale, &self.engine);
+        if let Some((camera, near)) = self.views.partner(self.config.seed, input) {
+            uniforms = self.engine.with_free_space(uniforms, camera, near);
+        }
+        if let Some(zone) = &self.grow_zone {
+            uniforms = self.engine.with_grow_box(uniforms, zone);
+        }
+        self.strategy.uniforms(self.at(input.step), &mut uniforms);
+        self.objective.limit_rates(&mut uniforms);
+        Ok(uniforms)
+    }
+
+    /// Submits a step.
+    pub(super) fn submit(&mut self, input: &StepInput) -> Result<InFlight> {
+        let (key, view, uniforms) = (self.key(input), self.views.of(input)?, self.uniforms(input)?);
+        let shared = self.shared.of_step(self.at(input.step), self.views.index(input))?;
+        let data = step_input::train_input(input, view, &self.config, uniforms, &self.engine);
+        let flight = self.engine.submit(key, &TrainInput { shared, ..data })?;
+        self.newest = Some(input.clone());
+        Ok(flight)
+    }
+
+    fn key(&self, input: &StepInput) -> ListKey {
+        let variant = Variant {
+            supervision: input.supervision(&self.config),
+            sh_degree: self.config.sh_degree_at(input.step),
+            size: self.views.largest_at(input.step, self.image),
+            update: input.update,
+            counts: self.counts_pairs,
+        };
+        match self.strategy.passes(self.at(input.step)) + self.always_passes {
+            0 => ListKey::Train(variant),
+            passes => ListKey::Extended(variant, passes),
+        }
+    }
+
+    /// Returns the rows of each photo that belong to an owner of shared parameters; none without the owner. Nothing may be
+    /// in flight.
+    pub(super) fn photo_rows(&mut self, owner: &str) -> Result<Vec<Vec<[f32; 4]>>> {
+        let Some(range) = self.shared.photo_rows(owner) else { return Ok(Vec::new()) };
+        let rows = self.engine.shared()?;
+        let of = |view: usize| rows[self.shared.of_view(view)][range.clone()].to_vec();
+        Ok((0..self.views.len()).map(of).collect())
+    }
+
+    /// Takes over the refined poses, for work between steps. Nothing may be in flight.
+    pub(super) fn refresh_poses(&mut self) -> Result<()> {
+        let rows = self.photo_rows(poses::NAME)?;
+        self.views.refine(&rows);
+        Ok(())
+    }
+}

@@ -1,0 +1,31 @@
+//! The passes that a training adds to its steps: those of the strategy, of shared parameters and of the objective.
+
+use crate::pass::{Builder, Extension, Hook};
+use std::sync::Arc;
+
+/// The passes of a strategy, under a number that is one higher, and passes of every step.
+#[derive(Debug)]
+pub(super) struct Joined {
+    pub(super) strategy: Arc<dyn Extension>,
+    pub(super) always: Vec<Arc<dyn Extension>>,
+}
+
+impl Joined {
+    /// Returns the passes of all.
+    pub(super) fn of(strategy: Arc<dyn Extension>, always: Vec<Arc<dyn Extension>>) -> Arc<dyn Extension> {
+        if always.is_empty() { strategy } else { Arc::new(Self { strategy, always }) }
+    }
+}
+
+impl Extension for Joined {
+    fn extend(&self, passes: u32, hook: Hook, b: &mut Builder) {
+        if passes > 1 {
+            self.strategy.extend(passes - 1, hook, b);
+        }
+        self.always.iter().for_each(|of| of.extend(1, hook, b));
+    }
+
+    fn updates_unseen(&self, passes: u32) -> bool {
+        passes <= 1 || self.strategy.updates_unseen(passes - 1)
+    }
+}

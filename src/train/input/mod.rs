@@ -1,0 +1,10 @@
+//! What a step trains on: a view or a part of it, its photo, its masks, its known depths.
+
+pub(in crate::train) mod backdrop;
+pub(in crate::train) mod free_space;
+pub(crate) mod known_depths;
+pub(in crate::train) mod part;
+pub(in crate::train) mod prefetch;
+pub(in crate::train) mod sampler;
+pub(crate) mod step_input;
+pub(in crate::train) mod views;

@@ -1,0 +1,122 @@
+//! Pixels of the next steps, made on threads while the device works.
+//!
+//! The order of views is known ahead. What a thread makes depends on step and view alone, so that a step has the same bits
+//! whether its pixels were made ahead or are made when it begins.
+
+use super::known_depths::KnownDepths;
+use super::part::{Part, labels_of, photo_of};
+use super::step_input::{TrainView, valid_pixels};
+use crate::engine::Band;
+use crate::error::{Error, Result};
+use crate::io::resample::shrink_photo;
+use crate::scene::{Camera, Photo, Pixels};
+use std::collections::BTreeMap;
+use std::sync::Arc;
+use std::thread::{self, JoinHandle};
+
+/// Most steps ahead: more than the device needs to take the time of one.
+const STEPS_MAX: usize = 8;
+
+/// The pixels of a step.
+#[derive(Debug)]
+pub(in crate::train) struct Ready {
+    pub(in crate::train) photo: Arc<Photo>,
+    /// The mask in the layout of the device; empty without a mask and in smaller sizes.
+    pub(in crate::train) view_labels: Arc<Vec<u32>>,
+    /// 1 / known depth of each pixel, 0 for unknown; empty in a step without.
+    pub(in crate::train) depths: Vec<f32>,
+    /// Camera and number of pixels that count, if the photo is smaller than the view.
+    pub(in crate::train) small: Option<(Camera, u64)>,
+}
+
+/// What a step needs.
+pub(in crate::train) struct Wanted {
+    step: u32,
+    /// Index of the part.
+    index: usize,
+    band: Band,
+    photo: Pixels<Photo>,
+    view_labels: Pixels<Vec<u32>>,
+    /// Depths that the photo is known to have, in a step that compares them.
+    depths: Option<KnownDepths>,
+    /// Camera of a smaller size.
+    small: Option<Camera>,
+}
+
+impl Wanted {
+    /// Asks for a part, the one with this index, of a view at a share of its size.
+    pub(in crate::train) fn new(
+        step: u32,
+        (index, part): (usize, &Part),
+        view: &TrainView,
+        (share, depths): (Option<f64>, bool),
+    ) -> Self {
+        let small = share.map(|share| part.camera.shrunk(share));
+        let depths = depths.then(|| view.depths.clone());
+        let (photo, view_labels) = (view.photo.clone(), view.view_labels.clone());
+        Self { step, index, band: part.band, photo, view_labels, depths, small }
+    }
+
+    fn make(self) -> Result<Ready> {
+        let whole = self.photo.get()?;
+        let full = (whole.width, whole.height);
+        let photo = photo_of(self.band, whole);
+        let drawn = |photo: &Photo| self.depths.as_ref().map_or(Vec::new(), |of| of.drawn(full, self.band, photo));
+        let Some(camera) = self.small else {
+            let view_labels = labels_of(self.band, photo.width, self.view_labels.get()?);
+            return Ok(Ready { depths: drawn(&photo), photo, view_labels, small: None });
+        };
+        let photo = Arc::new(shrink_photo(&photo, camera.width, camera.height));
+        let valid = valid_pixels(&photo.rgba);
+        let depths = drawn(&photo);
+        Ok(Ready { photo, view_labels: Arc::default(), depths, small: Some((camera, valid)) })
+    }
+}
+
+/// The threads, by step: index of the part, and its pixels.
+#[derive(Debug)]
+pub(in crate::train) struct Ahead {
+    running: BTreeMap<u32, (usize, JoinHandle<Result<Ready>>)>,
+    steps: usize,
+    last: u32,
+}
+
+impl Ahead {
+    /// Makes one for the steps up to `last`.
+    pub(in crate::train) fn new(views: &[TrainView], last: u32) -> Self {
+        let waits = views.iter().map(|view| &view.photo).filter(|photo| !photo.is_held());
+        let steps = waits.map(Pixels::at_once).min().map_or(0, |most| most.min(STEPS_MAX));
+        Self { running: BTreeMap::new(), steps, last }
+    }
+
+    /// Number of steps whose pixels are made ahead; 0 if all are in memory.
+    pub(in crate::train) fn steps(&self) -> usize {
+        self.steps
+    }
+
+    /// Begins to make the pixels of a step, unless that was done before.
+    pub(in crate::train) fn begin(&mut self, wanted: Wanted) {
+        let is_running = self.running.get(&wanted.step).is_some_and(|(index, _)| *index == wanted.index);
+        if is_running || wanted.step > self.last {
+            return;
+        }
+        let (step, index) = (wanted.step, wanted.index);
+        // Without a thread, the step makes its pixels itself.
+        if let Ok(thread) = thread::Builder::new().name("photos".to_owned()).spawn(|| wanted.make()) {
+            self.running.insert(step, (index, thread));
+        }
+    }
+
+    /// Returns the pixels of a step. Those of other steps than the next ones are dropped: a training may go back.
+    pub(in crate::train) fn take(&mut self, wanted: Wanted) -> Result<Ready> {
+        let found = self.running.remove(&wanted.step).filter(|(index, _)| *index == wanted.index);
+        let next = wanted.step..=wanted.step.saturating_add(self.steps as u32);
+        self.running.retain(|step, _| next.contains(step));
+        match found {
+            Some((_, thread)) => {
+                thread.join().unwrap_or_else(|_| Err(Error::Bug("a thread that reads photos panicked".to_owned())))
+            }
+            None => wanted.make(),
+        }
+    }
+}

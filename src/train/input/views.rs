@@ -1,0 +1,228 @@
+//! The training views, at the size of each step.
+
+use super::free_space;
+use super::part::Part;
+use super::prefetch::{Ahead, Ready, Wanted};
+use super::step_input::{self, Shown, StepInput, StepView, TrainView};
+use crate::error::{Error, Result};
+use crate::label::vote::ballot::Voter;
+use crate::scene::camera::side_at;
+use crate::scene::{Camera, Occluders};
+use crate::scheduler::plan::FRAMES_IN_FLIGHT;
+use crate::train::TrainConfig;
+use crate::train::shared::poses;
+use std::collections::BTreeMap;
+use std::ops::{Deref, DerefMut};
+use std::sync::Arc;
+
+/// Number of sizes below the full one.
+const SIZES: u32 = 8;
+
+/// A smaller view has no mask.
+static NOTHING_SHOWN: BTreeMap<u16, Shown> = BTreeMap::new();
+static NO_OCCLUDERS: Occluders = Occluders::new();
+
+/// The training views. As a slice, those at full size.
+#[derive(Debug)]
+pub(in crate::train) struct Views {
+    whole: Vec<TrainView>,
+    /// What steps train on.
+    parts: Vec<Part>,
+    /// Shrunk photos of those in memory, by size and part, until no step in flight uses the size.
+    shrunk: BTreeMap<(u32, usize), Arc<Ready>>,
+    /// Pixels of the steps in flight.
+    ready: BTreeMap<u32, Arc<Ready>>,
+    /// Pixels of the next steps, if they are not in memory.
+    ahead: Ahead,
+    /// Other views of each view, with free space on the way; empty without pruning of fog.
+    partners: Vec<Vec<usize>>,
+    free_space: bool,
+    /// Refined camera of each view, for work between steps; empty without refinement.
+    refined: Vec<Camera>,
+    start: f64,
+    full_from: u32,
+    /// First step without known depths.
+    depths_until: u32,
+}
+
+impl Views {
+    /// Makes the views of a training.
+    pub(in crate::train) fn new((whole, parts): (Vec<TrainView>, Vec<Part>), config: &TrainConfig) -> Self {
+        let (start, full_from) = (f64::from(config.start_size.unwrap_or(1.0)), config.full_size_from());
+        let ahead = Ahead::new(&whole, config.iterations);
+        Self {
+            whole,
+            parts,
+            shrunk: BTreeMap::new(),
+            ready: BTreeMap::new(),
+            ahead,
+            partners: Vec::new(),
+            free_space: config.free_space,
+            refined: Vec::new(),
+            start,
+            full_from,
+            depths_until: config.depths_until(),
+        }
+    }
+
+    /// Sets the near plane of each view.
+    pub(in crate::train) fn set_near_planes(&mut self, planes: &[f32]) {
+        self.whole.iter_mut().zip(planes).for_each(|(view, &near)| view.near = near);
+        if self.free_space {
+            let cameras: Vec<&Camera> = self.whole.iter().map(|view| &view.camera).collect();
+            self.partners = free_space::partners(&cameras, planes);
+        }
+    }
+
+    /// Sets the refined cameras by the rows of their photos.
+    pub(in crate::train) fn refine(&mut self, rows: &[Vec<[f32; 4]>]) {
+        let refined = |(view, rows): (&TrainView, &Vec<_>)| poses::corrected(&view.camera, rows);
+        self.refined = self.whole.iter().zip(rows).map(refined).collect();
+    }
+
+    /// Returns the refined cameras; none without refinement.
+    pub(in crate::train) fn refined(&self) -> &[Camera] {
+        &self.refined
+    }
+
+    /// Returns the camera of a view for work between steps.
+    pub(in crate::train) fn camera(&self, view: usize) -> &Camera {
+        self.refined.get(view).unwrap_or(&self.whole[view].camera)
+    }
+
+    /// Returns the views with masks, for votes between steps.
+    pub(in crate::train) fn voters(&self) -> Vec<Voter<'_>> {
+        let voters = self.whole.iter().enumerate().filter_map(|(index, view)| {
+            let mask = view.mask.as_ref()?;
+            Some(Voter { camera: self.camera(index), mask, photo: Some(&view.photo), trust: None })
+        });
+        voters.collect()
+    }
+
+    /// Returns the parts of the views, each for a step.
+    pub(in crate::train) fn parts(&self) -> &[Part] {
+        &self.parts
+    }
+
+    /// Leaves only these objects to the object layers of the steps.
+    pub(in crate::train) fn show_only(&mut self, is_meant: impl Fn(&u16) -> bool) {
+        self.parts.iter_mut().for_each(|part| part.objects.retain(&is_meant));
+    }
+
+    /// Returns the index of the view of a step.
+    pub(in crate::train) fn index(&self, input: &StepInput) -> usize {
+        self.parts[input.part].view
+    }
+
+    /// Returns the camera to which the space is free in a step, and the near plane of all cameras on the way.
+    pub(in crate::train) fn partner(&self, seed: u64, input: &StepInput) -> Option<(&Camera, f32)> {
+        let view = self.index(input);
+        let partner = free_space::partner(seed, input.step, self.partners.get(view)?)?;
+        Some((&self.whole[partner].camera, self.whole[partner].near.min(self.whole[view].near)))
+    }
+
+    /// Returns the number of the size of `step`, from 0; [`SIZES`] is the full one.
+    fn size_at(&self, step: u32) -> u32 {
+        if step < self.full_from {
+            (u64::from(step) * u64::from(SIZES) / u64::from(self.full_from)) as u32
+        } else {
+            SIZES
+        }
+    }
+
+    /// Returns the share of the full size of `step`. Sizes grow in equal ratios.
+    pub(in crate::train) fn share_at(&self, step: u32) -> f64 {
+        self.start.powf(1.0 - f64::from(self.size_at(step)) / f64::from(SIZES))
+    }
+
+    /// Returns an upper bound of the image size at `step`, given that of full size.
+    pub(in crate::train) fn largest_at(&self, step: u32, full: (u32, u32)) -> (u32, u32) {
+        let share = self.share_at(step);
+        (side_at(full.0, share), side_at(full.1, share))
+    }
+
+    /// Gets the pixels of a step at the size of the step, and has those of `next`, the parts of the steps after it, made
+    /// meanwhile.
+    pub(in crate::train) fn prepare(&mut self, step: u32, part: usize, next: &[usize]) -> Result<()> {
+        // Steps in flight still use their pixels and sizes.
+        let oldest = step.saturating_sub(FRAMES_IN_FLIGHT as u32);
+        let oldest_size = self.size_at(oldest);
+        self.ready.retain(|&kept, _| kept >= oldest && kept < step);
+        self.shrunk.retain(|&(kept, _), _| kept >= oldest_size);
+        let key = (self.size_at(step), part);
+        let ready = match self.shrunk.get(&key) {
+            Some(ready) => Arc::clone(ready),
+            None => {
+                let wanted = self.wanted(step, part);
+                Arc::new(self.ahead.take(wanted)?)
+            }
+        };
+        let is_held = |part: usize| self.whole[self.parts[part].view].photo.is_held();
+        if key.0 < SIZES && is_held(part) {
+            self.shrunk.insert(key, Arc::clone(&ready));
+        }
+        self.ready.insert(step, ready);
+        let waiting: Vec<(u32, usize)> =
+            (step + 1..).zip(next.iter().copied()).filter(|&(_, part)| !is_held(part)).collect();
+        for (step, part) in waiting {
+            let wanted = self.wanted(step, part);
+            self.ahead.begin(wanted);
+        }
+        Ok(())
+    }
+
+    /// Number of steps whose pixels are made ahead.
+    pub(in crate::train) fn steps_ahead(&self) -> usize {
+        self.ahead.steps()
+    }
+
+    fn wanted(&self, step: u32, index: usize) -> Wanted {
+        let share = (self.size_at(step) < SIZES).then(|| self.share_at(step));
+        let part = &self.parts[index];
+        Wanted::new(step, (index, part), &self.whole[part.view], (share, step < self.depths_until))
+    }
+
+    /// Returns the part of a step at the size of the step, which [`Self::prepare`] has made.
+    pub(in crate::train) fn of(&self, input: &StepInput) -> Result<StepView<'_>> {
+        let missing = || Error::Bug(format!("step {} came without its pixels", input.step));
+        let (part, ready) = (&self.parts[input.part], self.ready.get(&input.step).ok_or_else(missing)?);
+        let view = &self.whole[part.view];
+        let at_full_size = StepView {
+            camera: &part.camera,
+            whole: part.whole.as_ref(),
+            near: view.near,
+            // Of the whole photo, whatever the size of the step.
+            finest: step_input::finest(&view.camera),
+            photo: &ready.photo,
+            valid_pixels: part.valid_pixels,
+            view_labels: &ready.view_labels,
+            depths: &ready.depths,
+            shown: &part.shown,
+            occluders: &view.occluders,
+        };
+        Ok(match &ready.small {
+            Some((camera, valid_pixels)) => StepView {
+                camera,
+                valid_pixels: *valid_pixels,
+                shown: &NOTHING_SHOWN,
+                occluders: &NO_OCCLUDERS,
+                ..at_full_size
+            },
+            None => at_full_size,
+        })
+    }
+}
+
+impl Deref for Views {
+    type Target = [TrainView];
+
+    fn deref(&self) -> &[TrainView] {
+        &self.whole
+    }
+}
+
+impl DerefMut for Views {
+    fn deref_mut(&mut self) -> &mut [TrainView] {
+        &mut self.whole
+    }
+}

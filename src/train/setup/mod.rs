@@ -1,0 +1,169 @@
+//! The inputs of a training: options, sizes, views.
+
+pub(in crate::train) mod first_model;
+pub(crate) mod near_plane;
+pub(crate) mod region;
+
+use crate::engine::{Engine, EngineSize, LabelSize};
+use crate::error::{Error, Result};
+use crate::gpu::Gpu;
+use crate::label::vote::ballot::columns_for;
+use crate::pass::KernelShape;
+use crate::scene::pixels::Source;
+use crate::scene::{Dataset, Gaussians, LabelMap, Pixels, View, crew};
+use crate::scheduler::SchedulerOptions;
+use crate::train::input::known_depths::KnownDepths;
+use crate::train::input::part::Part;
+use crate::train::input::step_input::{self, TrainView};
+use crate::train::shared::Shared;
+use crate::train::strategy::Strategy;
+use crate::train::{LabelRule, Objective, TrainConfig};
+use region::Region;
+use std::collections::BTreeSet;
+use std::sync::Arc;
+
+/// Options of a trainer besides its configuration.
+#[derive(Debug)]
+pub struct TrainerOptions {
+    /// Shape of the kernels; none takes the default of the device.
+    pub shape: Option<KernelShape>,
+    /// Options of the engine.
+    pub scheduler: SchedulerOptions,
+    /// What is trained, by which losses.
+    pub objective: Objective,
+    /// The strategy for the number of Gaussians; none takes that of the objective and the configuration.
+    pub strategy: Option<Box<dyn Strategy>>,
+    /// Parameters of the scene or of photos.
+    pub shared: Shared,
+    /// The part of the scene that is trained; none for all of it.
+    pub region: Option<Region>,
+    /// Depths that each training photo is known to have; none with a weight of 0.
+    pub depths: Vec<KnownDepths>,
+}
+
+impl Default for TrainerOptions {
+    fn default() -> Self {
+        SchedulerOptions::default().into()
+    }
+}
+
+impl From<SchedulerOptions> for TrainerOptions {
+    fn from(scheduler: SchedulerOptions) -> Self {
+        Self {
+            shape: None,
+            scheduler,
+            objective: Objective::SCENE,
+            strategy: None,
+            shared: Shared::default(),
+            region: None,
+            depths: Vec::new(),
+        }
+    }
+}
+
+/// Returns the sizes for training on a data set.
+pub fn engine_size(dataset: &Dataset, config: &TrainConfig, gaussians: u64) -> Result<EngineSize> {
+    let sizes = dataset.train.iter().chain(&dataset.test).map(|view| (view.camera.width, view.camera.height));
+    let image = sizes.reduce(|a, b| (a.0.max(b.0), a.1.max(b.1)));
+    let image = image.ok_or_else(|| Error::data(&dataset.root, "", "the scene has no view to train on"))?;
+    let of_views: Vec<Vec<u16>> =
+        dataset.train.iter().filter_map(|view| view.mask.as_ref().map(Pixels::objects)).collect();
+    let most = of_views.iter().map(Vec::len).max();
+    let objects = of_views.concat();
+    let labels = objects.iter().max().map(|&max_label| LabelSize {
+        max_label: u32::from(max_label),
+        layers: if config.layer_every() > 0 { config.label_samples.min(most.unwrap_or(0) as u32) } else { 0 },
+        vote_columns: match config.label_rule {
+            LabelRule::Votes => columns_for(objects.iter().collect::<BTreeSet<_>>().len()),
+            LabelRule::Main => 0,
+        },
+    });
+    Ok(EngineSize::new(gaussians, image).for_training().with_labels(labels).with_depths(config.has_depths()))
+}
+
+/// Sets what the settings leave to the photos.
+pub(in crate::train) fn for_photos(config: &TrainConfig, dataset: &Dataset) -> Result<TrainConfig> {
+    Ok(config.for_size(engine_size(dataset, config, 0)?.image))
+}
+
+/// Makes the initial sizes: for twice the number of Gaussians of the first model, or for that number if memory is short.
+pub(crate) fn start_size(
+    gpu: &Gpu,
+    dataset: &Dataset,
+    config: &TrainConfig,
+    (model, region): (&Gaussians, Option<&Region>),
+    options: SchedulerOptions,
+) -> Result<EngineSize> {
+    region.map_or(Ok(()), |region| region.check(model))?;
+    let gaussians = model.len() as u64;
+    let most = if config.max_gaussians > 0 { config.max_gaussians } else { u64::MAX };
+    let roomy =
+        engine_size(dataset, config, (gaussians * 2).min(most).max(gaussians))?.with_frozen(Region::frozen(region));
+    match Engine::predict(gpu, &roomy, options) {
+        Err(Error::OutOfMemory { .. }) => Ok(EngineSize { gaussians, ..roomy }),
+        other => other.map(|_| roomy),
+    }
+}
+
+/// Makes the training views of a data set, and their parts of at most `most` rows. `depths` are known depths of each view, or
+/// none.
+pub(in crate::train) fn train_views(
+    dataset: &Dataset,
+    depths: Vec<KnownDepths>,
+    border: u32,
+    most: Option<u32>,
+) -> Result<(Vec<TrainView>, Vec<Part>)> {
+    let views = &dataset.train;
+    let of = |index: usize| train_view((index, &views[index]), border, most);
+    let (mut whole, mut parts) = (Vec::new(), Vec::new());
+    for found in crew::map("preparing photos", views.len(), crew::at_once(views.iter()), of) {
+        let (view, of_view) = found?;
+        whole.push(view);
+        parts.extend(of_view);
+    }
+    whole.iter_mut().zip(depths).for_each(|(view, depths)| view.depths = depths);
+    Ok((whole, parts))
+}
+
+fn train_view((index, view): (usize, &View), border: u32, most: Option<u32>) -> Result<(TrainView, Vec<Part>)> {
+    let (pixels, mask) = (view.photo()?, view.mask()?);
+    let photo = view.photo.clone().unwrap_or_else(|| pixels.clone().into());
+    let objects = mask.as_deref().map(LabelMap::objects).unwrap_or_default();
+    let labels = mask.as_ref().map(|mask| step_input::view_labels(mask, border)).unwrap_or_default();
+    let parts = Part::all((index, &view.camera), &pixels, mask.as_deref(), &labels, most);
+    let view_labels = match &view.mask {
+        Some(mask) if !mask.is_held() => {
+            Pixels::made(Arc::new(LabelsOf { mask: mask.clone(), border }), Default::default())
+        }
+        _ => labels.into(),
+    };
+    let view = TrainView {
+        name: view.name.clone(),
+        camera: view.camera.clone(),
+        near: 0.0,
+        photo,
+        mask: view.mask.clone(),
+        objects,
+        view_labels,
+        depths: KnownDepths::default(),
+        occluders: Default::default(),
+    };
+    Ok((view, parts))
+}
+
+/// The layout of the device of a mask that is not in memory.
+#[derive(Debug)]
+struct LabelsOf {
+    mask: Pixels<LabelMap>,
+    border: u32,
+}
+
+impl Source<Vec<u32>> for LabelsOf {
+    fn make(&self) -> Result<Arc<Vec<u32>>> {
+        Ok(Arc::new(step_input::view_labels(&*self.mask.get()?, self.border)))
+    }
+
+    fn at_once(&self) -> usize {
+        self.mask.at_once()
+    }
+}

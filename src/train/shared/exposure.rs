@@ -1,0 +1,178 @@
+//! Exposure and white balance of each photo: a matrix of colours, trained beside the Gaussians.
+//!
+//! A camera that chooses its exposure shows the same surface brighter in one photo than in another, and other light gives it
+//! other colours. Without a matrix, Gaussians near the cameras make up for it, which spoils other views. The colours of
+//! the picture of a step are multiplied by the matrix of its photo before the loss: gains of red, green and blue, after each
+//! has taken a share of the other two. The mean of all numbers over the photos stays near 0, so that the model has the
+//! mean exposure.
+
+use super::{Place, SharedLayout, SharedParameters};
+use crate::Setting;
+use crate::pass::{Builder, Extension, Hook, loss};
+use crate::scene::ColourMatrix;
+use crate::shaders::constants::{EXPOSURE_ROWS, EXPOSURE_SHARE};
+use crate::train::strategy::At;
+use crate::train::{ExposureMode, TrainConfig};
+use std::sync::Arc;
+
+/// Learning rate of ln gain and of shares. A photo has one update for each of its turns, some dozens in a short run.
+const RATE: f64 = 0.01;
+/// Root mean square of ln gain over the photos from which their exposures differ. Captures with a fixed exposure have up to
+/// 0.04, by what shines and by noise.
+const DIFFERS: f64 = 0.07;
+/// Share of the photos whose gains must be known for a decision.
+const KNOWN: f64 = 0.5;
+
+/// Name of the parameters.
+pub(in crate::train) const NAME: &str = "exposure";
+
+/// Gains of a photo, r, g, b; `None` where nothing tells them.
+pub(crate) type Gains = Option<[f64; 3]>;
+
+/// Rows of a photo (glsl/include/exposure.glsl).
+pub(crate) type Rows = [[f32; 4]; EXPOSURE_ROWS as usize];
+
+/// Returns the matrix of the rows of a photo.
+pub(in crate::train) fn matrix_of(rows: &[[f32; 4]]) -> ColourMatrix {
+    let mut matrix = [[0.0; 3]; 3];
+    for (k, of) in matrix.iter_mut().enumerate() {
+        let gain = f64::from(rows[0][k]).exp();
+        let [next, last] = [1, 2].map(|row| {
+            let x = f64::from(rows[row][k]);
+            x / (1.0 + x.abs() / f64::from(EXPOSURE_SHARE))
+        });
+        of[k] = (gain * (1.0 - next - last)) as f32;
+        of[(k + 1) % 3] = (gain * next) as f32;
+        of[(k + 2) % 3] = (gain * last) as f32;
+    }
+    matrix
+}
+
+/// Returns the rows of a photo that have a matrix; `None` for one that no training writes: each channel takes less than
+/// [`EXPOSURE_SHARE`] of each other one, and its numbers have a positive sum.
+pub(crate) fn rows_of(matrix: &ColourMatrix) -> Option<Rows> {
+    let mut rows = Rows::default();
+    for (k, of) in matrix.iter().enumerate() {
+        let of = of.map(f64::from);
+        let gain = of.iter().sum::<f64>();
+        rows[0][k] = gain.ln() as f32;
+        for row in [1, 2] {
+            let share = of[(k + row) % 3] / gain;
+            rows[row][k] = (share / (1.0 - share.abs() / f64::from(EXPOSURE_SHARE))) as f32;
+            if !(gain > 0.0 && share.abs() < f64::from(EXPOSURE_SHARE)) {
+                return None;
+            }
+        }
+    }
+    Some(rows)
+}
+
+/// First rows of each training photo.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Exposure {
+    start: Vec<Rows>,
+    is_fixed: bool,
+}
+
+impl Exposure {
+    /// Makes the parameters from first gains of each photo. Their geometric mean becomes 1.
+    pub fn new(first: &[Gains]) -> Self {
+        let logs: Vec<[f64; 3]> = first.iter().map(|gains| gains.map_or([0.0; 3], |of| of.map(f64::ln))).collect();
+        let mean = [0, 1, 2].map(|c| logs.iter().map(|of| of[c]).sum::<f64>() / logs.len().max(1) as f64);
+        let row = |of: &[f64; 3]| {
+            let [r, g, b] = [0, 1, 2].map(|c| (of[c] - mean[c]) as f32);
+            [[r, g, b, 0.0], [0.0; 4], [0.0; 4]]
+        };
+        Self { start: logs.iter().map(row).collect(), is_fixed: false }
+    }
+
+    /// Makes rows that stay as they are; a photo without them has the colours of the scene.
+    pub fn fixed<'a>(rows: impl Iterator<Item = Option<&'a Rows>>) -> Self {
+        Self { start: rows.map(|rows| rows.copied().unwrap_or_default()).collect(), is_fixed: true }
+    }
+}
+
+/// Returns the root mean square of ln gain over photos and channels; `None` if too few gains are known.
+fn spread(gains: &[Gains]) -> Option<f64> {
+    let known: Vec<f64> = gains.iter().flatten().flatten().map(|gain| gain.ln().powi(2)).collect();
+    let enough = known.len() as f64 >= 3.0 * KNOWN * gains.len() as f64 && !known.is_empty();
+    enough.then(|| (known.iter().sum::<f64>() / known.len() as f64).sqrt())
+}
+
+/// Returns the settings with `auto` decided by the gains of the photos, and says why.
+pub fn decided(config: &TrainConfig, gains: &[Gains]) -> TrainConfig {
+    if config.exposure != ExposureMode::Auto {
+        return config.clone();
+    }
+    let exposure = match spread(gains) {
+        _ if config.random_background => ExposureMode::Off,
+        Some(spread) if spread >= DIFFERS => {
+            tracing::info!(
+                "exposure: on, because the photos' brightness differs by {:.0} %; set {} to train without",
+                100.0 * spread,
+                Setting("exposure").to("off")
+            );
+            ExposureMode::On
+        }
+        _ => ExposureMode::Off,
+    };
+    TrainConfig { exposure, ..config.clone() }
+}
+
+impl SharedParameters for Exposure {
+    fn name(&self) -> &'static str {
+        NAME
+    }
+
+    fn layout(&self) -> SharedLayout {
+        SharedLayout { scene: 0, photo: EXPOSURE_ROWS }
+    }
+
+    fn start(&self, view: Option<usize>) -> Vec<[f32; 4]> {
+        view.into_iter().flat_map(|view| self.start.get(view).copied().unwrap_or_default()).collect()
+    }
+
+    fn rates(&self, at: At) -> Vec<[f32; 4]> {
+        let rate = if self.is_fixed { 0.0 } else { (RATE * at.config.rate_fall(at.step)) as f32 };
+        vec![[rate, rate, rate, 0.0]; EXPOSURE_ROWS as usize]
+    }
+
+    fn extension(&self, place: Place) -> Arc<dyn Extension> {
+        Arc::new(Passes(place))
+    }
+}
+
+#[derive(Debug)]
+struct Passes(Place);
+
+impl Extension for Passes {
+    fn extend(&self, _passes: u32, hook: Hook, b: &mut Builder) {
+        match hook {
+            Hook::Picture => loss::expose(b, self.0.photo),
+            Hook::Loss => loss::expose_backward(b, self.0.photo, self.0.all.photo),
+            Hook::Camera | Hook::Gradients | Hook::Updated => {}
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{matrix_of, rows_of};
+
+    #[test]
+    fn rows_and_matrices_of_a_photo_are_the_same() {
+        let rows = [[0.3, -0.2, 0.1, 0.0], [0.2, -0.1, 0.5, 0.0], [-0.3, 0.4, 0.05, 0.0]];
+        let matrix = matrix_of(&rows);
+        for (k, of) in matrix.iter().enumerate() {
+            let gain = rows[0][k].exp();
+            assert!((of.iter().sum::<f32>() - gain).abs() < 1e-6, "grey keeps the gain alone");
+            assert!((of[(k + 1) % 3] - gain * rows[1][k] / (1.0 + rows[1][k].abs() / 0.24)).abs() < 1e-6);
+        }
+        let again = rows_of(&matrix).expect("rows");
+        for (of, expected) in again.as_flattened().iter().zip(rows.as_flattened()) {
+            assert!((of - expected).abs() < 1e-5, "{again:?}");
+        }
+        assert_eq!(rows_of(&[[0.5, 0.5, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]), None, "too much of green");
+        assert_eq!(rows_of(&[[-1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]), None);
+    }
+}

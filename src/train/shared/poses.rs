@@ -1,0 +1,150 @@
+//! Poses of the photos: a correction of each, trained beside the Gaussians.
+//!
+//! Poses of a reconstruction may be off by pixels, which blurs the model. The camera of a step is turned and moved by the
+//! correction of its photo. Photos together leave place and turn of the whole open, and hardly tell slow bends of a path of
+//! cameras; a weak pull to 0 holds both. Trained are six numbers of each photo; its preconditioner makes a pose of them.
+
+use super::preconditioner::{self, Matrix};
+use super::{Place, SharedLayout, SharedParameters};
+use crate::bundle_adjustment;
+use crate::pass::{Builder, Extension, Hook, project};
+use crate::scene::{Camera, Dataset, Point, View};
+use crate::train::strategy::At;
+use glam::{DQuat, DVec3};
+use std::sync::Arc;
+
+/// Name of the parameters.
+pub(in crate::train) const NAME: &str = "poses";
+/// Rows of a photo (glsl/include/pose.glsl): two of trained numbers, twelve of the preconditioner.
+pub(crate) const ROWS: usize = 14;
+/// Learning rate in the beginning, focal lengths that points move in the photo. The updates of a short run, some
+/// dozens a photo, reach a degree and a fiftieth of the depth. The rate falls to the share [`FALL`] of itself.
+const RATE: f64 = 2e-3;
+const FALL: f64 = 0.02;
+/// Share of the run before the first update: Gaussians have no colours of their own yet.
+const FROM: f64 = 0.08;
+/// Shares of the run after which photos are compared with each other. A pose that this settles has no gradient any more.
+const COMPARED: [f64; 3] = [0.2, 0.35, 0.5];
+
+/// Corrections of the poses, 0 in the beginning.
+#[derive(Clone, Debug, Default)]
+pub struct Poses {
+    /// Depth of the scene and preconditioner of each view.
+    of_views: Vec<(f32, Matrix)>,
+}
+
+impl Poses {
+    /// Makes the parameters of a scene.
+    pub fn new(dataset: &Dataset) -> Self {
+        let depth = |view: &View| {
+            let seen = |point: &&Point| view.camera.sees(point.position).is_some();
+            let depth = |point: &Point| view.camera.to_camera(point.position).z;
+            let mut depths: Vec<f64> = dataset.points.iter().filter(seen).map(depth).collect();
+            depths.sort_by(f64::total_cmp);
+            depths.get(depths.len() / 2).copied().unwrap_or(dataset.extent()) as f32
+        };
+        let of_view = |view: &View| {
+            let depth = depth(view);
+            (depth, preconditioner::of_view(&view.camera, &dataset.points, depth.into()))
+        };
+        Self { of_views: dataset.train.iter().map(of_view).collect() }
+    }
+}
+
+/// Returns true if a comparison of all photos settles poses before this step.
+pub(in crate::train) fn are_compared_before(at: At) -> bool {
+    let after = |share: f64| (share * f64::from(at.config.iterations)).round() as u32 + 1;
+    COMPARED.iter().any(|&share| at.step == after(share))
+}
+
+/// Returns a camera with the correction of its rows (glsl/include/pose.glsl).
+pub(crate) fn corrected(camera: &Camera, rows: &[[f32; 4]]) -> Camera {
+    let three = |row: usize| DVec3::new(rows[row][0].into(), rows[row][1].into(), rows[row][2].into());
+    let of = |k: usize| three(2 * k + 2).dot(three(0)) + three(2 * k + 3).dot(three(1));
+    let (turn, shift) = (DVec3::new(of(0), of(1), of(2)), DVec3::new(of(3), of(4), of(5)));
+    camera.corrected(turn, camera.rotation.transpose() * (f64::from(rows[1][3]) * shift))
+}
+
+/// Settles the pose of a photo: sets its rows so that the corrected camera is `to`. `None` if no rows do that.
+pub(in crate::train) fn settle(rows: &mut [[f32; 4]], from: &Camera, to: &Camera) -> Option<()> {
+    let turn = DQuat::from_mat3(&(to.rotation * from.rotation.transpose()));
+    let turn = 2.0 / turn.w * turn.xyz();
+    let shift = from.rotation * (to.centre() - from.centre()) / f64::from(rows[1][3]);
+    let mut numbers = [turn.x, turn.y, turn.z, shift.x, shift.y, shift.z];
+    let mut matrix: Vec<f64> = rows[2..ROWS].iter().flat_map(|row| [row[0], row[1], row[2]].map(f64::from)).collect();
+    bundle_adjustment::solve(&mut matrix, &mut numbers)?;
+    for (row, three) in rows.iter_mut().zip(numbers.chunks_exact(3)) {
+        row[..3].iter_mut().zip(three).for_each(|(to, &number)| *to = number as f32);
+    }
+    rows[0][3] = 1.0;
+    Some(())
+}
+
+impl SharedParameters for Poses {
+    fn name(&self) -> &'static str {
+        NAME
+    }
+
+    fn layout(&self) -> SharedLayout {
+        SharedLayout { scene: 0, photo: ROWS as u32 }
+    }
+
+    fn start(&self, view: Option<usize>) -> Vec<[f32; 4]> {
+        let Some((depth, matrix)) = view.map(|view| &self.of_views[view]) else { return Vec::new() };
+        let numbers = matrix.as_flattened().chunks_exact(3);
+        let matrix = numbers.map(|of| [of[0] as f32, of[1] as f32, of[2] as f32, 0.0]);
+        [[0.0; 4], [0.0, 0.0, 0.0, *depth]].into_iter().chain(matrix).collect()
+    }
+
+    fn rates(&self, at: At) -> Vec<[f32; 4]> {
+        let part = f64::from(at.step) / f64::from(at.config.iterations);
+        let rate = if part > FROM { (RATE * FALL.powf(part)) as f32 } else { 0.0 };
+        let mut rates = vec![[0.0; 4]; ROWS];
+        rates[..2].fill([rate, rate, rate, 0.0]);
+        rates
+    }
+
+    fn extension(&self, place: Place) -> Arc<dyn Extension> {
+        Arc::new(Passes(place))
+    }
+}
+
+#[derive(Debug)]
+struct Passes(Place);
+
+impl Extension for Passes {
+    fn extend(&self, _passes: u32, hook: Hook, b: &mut Builder) {
+        match hook {
+            Hook::Camera => project::pose(b, self.0.photo),
+            Hook::Gradients => project::pose_backward(b, self.0.photo),
+            Hook::Picture | Hook::Loss | Hook::Updated => {}
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Poses, ROWS, corrected, settle};
+    use crate::scene::{Camera, Point};
+    use crate::train::shared::SharedParameters;
+    use glam::{DMat3, DVec3};
+
+    /// A settled pose is the one that was found, with a preconditioner that mixes all numbers.
+    #[test]
+    fn a_settled_pose_is_the_one_found() {
+        let (rotation, translation) = (DMat3::from_rotation_y(0.3), DVec3::new(0.1, -0.2, 5.0));
+        let camera = Camera { rotation, translation, fx: 90.0, fy: 90.0, cx: 50.0, cy: 40.0, width: 100, height: 80 };
+        let place = |k: usize| DVec3::new((k % 5) as f64 - 2.0, (k % 7) as f64 * 0.5 - 1.5, (k % 3) as f64 * 0.8);
+        let points: Vec<Point> = (0..60).map(|k| Point { position: place(k), colour: [0; 3] }).collect();
+        let matrix = crate::train::shared::preconditioner::of_view(&camera, &points, 4.0);
+        let poses = Poses { of_views: vec![(4.0, matrix)] };
+        let mut rows = poses.start(Some(0));
+        assert_eq!((rows.len(), rows[0][3]), (ROWS, 0.0));
+        let to = camera.corrected(DVec3::new(0.02, -0.01, 0.03), DVec3::new(0.05, 0.1, -0.04));
+        settle(&mut rows, &camera, &to).expect("rows");
+        let found = corrected(&camera, &rows);
+        assert!(found.centre().distance(to.centre()) < 1e-5, "{} and {}", found.centre(), to.centre());
+        assert!(found.axis().distance(to.axis()) < 1e-5 && found.rotation.row(0).distance(to.rotation.row(0)) < 1e-5);
+        assert_eq!(rows[0][3], 1.0, "has no gradient any more");
+    }
+}

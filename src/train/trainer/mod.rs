@@ -1,0 +1,292 @@
+//! The loop over steps.
+
+mod checkpoint;
+mod results;
+mod sentinel;
+mod timing;
+
+pub(crate) use timing::StepTimes;
+
+use crate::engine::{Engine, EngineSize, InFlight};
+use crate::error::Result;
+use crate::gpu::Gpu;
+use crate::lab::fault;
+use crate::render::RenderOptions;
+use crate::scene::{Dataset, Gaussians};
+use crate::scheduler::plan::FRAMES_IN_FLIGHT;
+use crate::train::TrainConfig;
+use crate::train::between::{Growth, Jobs, Occluders, PoseAdjustment, Votes, When};
+use crate::train::context::Context;
+use crate::train::input::free_space;
+use crate::train::input::sampler::{self, ViewOrder};
+use crate::train::input::step_input::{StepInput, TrainView};
+use crate::train::objective::Loss;
+use crate::train::report::StepReport;
+use crate::train::setup::near_plane;
+use crate::train::setup::{self, TrainerOptions, start_size};
+use crate::train::state::ViewFingerprint;
+use crate::train::strategy::Densified;
+use sentinel::Sentinel;
+use std::collections::VecDeque;
+use std::sync::Arc;
+use timing::Timing;
+
+/// A model in training.
+pub struct Trainer {
+    context: Context,
+    jobs: Jobs,
+    order: ViewOrder,
+    /// Submitted steps that are not retired yet, at most one per frame.
+    in_flight: VecDeque<(StepInput, InFlight)>,
+    step: u32,
+    updates: u32,
+    sentinel: Sentinel,
+    timing: Option<Timing>,
+    /// Fingerprints of the views; empty until first used.
+    fingerprints: Vec<ViewFingerprint>,
+    newest: Option<StepReport>,
+}
+
+impl Trainer {
+    /// Puts the initial model on the device.
+    pub fn new(
+        gpu: Arc<Gpu>,
+        config: TrainConfig,
+        dataset: &Dataset,
+        model: &Gaussians,
+        options: impl Into<TrainerOptions>,
+    ) -> Result<Self> {
+        config.check()?;
+        let options = options.into();
+        let config = options.objective.limit_config(config);
+        let size = start_size(&gpu, dataset, &config, (model, options.region.as_ref()), options.scheduler)?;
+        let near = match config.near {
+            0.0 => near_plane::near_plane(dataset.train.iter().map(|view| &view.camera), model),
+            near => near,
+        };
+        let config = TrainConfig { near, ..setup::for_photos(&config, dataset)? };
+        let mut trainer = Self::without_model(gpu, config, dataset, size, options)?;
+        let Context { engine, config, views, shared, .. } = &mut trainer.context;
+        engine.upload_model(model)?;
+        let planes =
+            if config.free_space { free_space::view_planes(dataset, model, near) } else { vec![near; views.len()] };
+        views.set_near_planes(&planes);
+        engine.set_shared(&shared.start(views.len())?)?;
+        // Colour bands that the model lacks start at 0.
+        engine.set_sh_degree(config.sh_degree);
+        engine.set_antialiased(config.antialias);
+        Ok(trainer)
+    }
+
+    fn without_model(
+        gpu: Arc<Gpu>,
+        config: TrainConfig,
+        dataset: &Dataset,
+        size: EngineSize,
+        options: TrainerOptions,
+    ) -> Result<Self> {
+        let context = Context::new(gpu, config, dataset, size, options)?;
+        let jobs = Jobs {
+            poses: PoseAdjustment,
+            votes: Votes::default(),
+            occluders: Occluders,
+            growth: Growth::new(&context.config),
+        };
+        Ok(Self {
+            order: ViewOrder::new(context.config.seed, context.views.parts().len()),
+            context,
+            jobs,
+            in_flight: VecDeque::new(),
+            step: 0,
+            updates: 0,
+            sentinel: Sentinel::default(),
+            timing: None,
+            fingerprints: Vec::new(),
+            newest: None,
+        })
+    }
+
+    /// Returns the engine, for renders between steps. Nothing may be in flight ([`Trainer::drain`]).
+    pub fn engine_mut(&mut self) -> &mut Engine {
+        &mut self.context.engine
+    }
+
+    /// Returns the configuration.
+    pub fn config(&self) -> &TrainConfig {
+        &self.context.config
+    }
+
+    /// Returns the training views.
+    pub fn views(&self) -> &[TrainView] {
+        &self.context.views
+    }
+
+    /// Returns the number of submitted steps.
+    pub fn steps_done(&self) -> u32 {
+        self.step
+    }
+
+    /// Returns the report of the newest finished step.
+    pub fn newest_report(&self) -> Option<StepReport> {
+        self.newest
+    }
+
+    /// Takes the counts of the last densification; none if they were taken before.
+    pub fn take_densified(&mut self) -> Option<Densified> {
+        self.jobs.growth.densified.take()
+    }
+
+    /// Returns the number of Gaussians in the model.
+    pub fn gaussian_count(&self) -> u32 {
+        self.context.engine.gaussian_count()
+    }
+
+    /// Returns the current degree of the spherical harmonics.
+    pub fn sh_degree(&self) -> u32 {
+        self.config().sh_degree_at(self.step)
+    }
+
+    /// Returns the options of the steps, for previews.
+    pub fn render_options(&self) -> RenderOptions {
+        let &TrainConfig { near, background, .. } = self.config();
+        RenderOptions { near, background, sh_degree: Some(self.sh_degree()), ..RenderOptions::default() }
+    }
+
+    /// Halves all learning rates for the rest of the run.
+    pub fn halve_rates(&mut self) {
+        self.context.config.halve_rates();
+    }
+
+    /// Leaves only these objects to the object layers of the steps.
+    pub(super) fn show_only(&mut self, is_meant: impl Fn(&u16) -> bool) {
+        self.context.views.show_only(is_meant);
+    }
+
+    /// Submits a step, with the work that is due before and after it. Returns the reports of finished steps; they lag behind,
+    /// because two steps are in flight.
+    pub fn step(&mut self) -> Result<Vec<StepReport>> {
+        let step = self.step + 1;
+        let mut done = self.work(When::Before, step)?;
+        let input = self.input(step)?;
+        if fault::at("nan").is_some() {
+            self.context.engine.spoil()?;
+        }
+        done.extend(self.submit_next(input)?);
+        self.step = step;
+        done.extend(self.work(When::After, step)?);
+        Ok(done)
+    }
+
+    /// Does what is due before or after a step, after the steps in flight. Returns the reports of these.
+    fn work(&mut self, when: When, step: u32) -> Result<Vec<StepReport>> {
+        let due: Vec<bool> = self.jobs.list(when).iter().map(|job| job.is_due(step, &self.context)).collect();
+        let done = if due.contains(&true) { self.drain()? } else { Vec::new() };
+        for (job, _) in self.jobs.list(when).into_iter().zip(due).filter(|(_, is_due)| *is_due) {
+            job.run(step, &mut self.context)?;
+        }
+        Ok(done)
+    }
+
+    /// Waits for all steps in flight.
+    pub fn drain(&mut self) -> Result<Vec<StepReport>> {
+        let mut done = Vec::new();
+        while !self.in_flight.is_empty() {
+            done.extend(self.retire()?);
+        }
+        Ok(done)
+    }
+
+    /// Draws the view of a step and the objects of its layers.
+    fn input(&mut self, step: u32) -> Result<StepInput> {
+        let Context { config, objective, views, .. } = &mut self.context;
+        let part = self.order.draw();
+        let next = self.order.upcoming(views.steps_ahead());
+        views.prepare(step, part, &next)?;
+        let objects = &views.parts()[part].objects;
+        // A view without a mask, or with an empty one, costs as much as in a scene without masks.
+        let labels = config.labels_at(step) && !objects.is_empty();
+        let layers = if labels && objective.has(Loss::Layers) && config.has_layers_at(step) {
+            sampler::sample_objects(config.seed, step, objects, config.label_samples as usize)
+        } else {
+            Vec::new()
+        };
+        let disagrees = objective.has(Loss::Disagreement) && config.has_disagreement_at(step);
+        let labels = labels && (!layers.is_empty() || disagrees);
+        let update = self.context.strategy.updates(self.context.at(step));
+        self.updates += u32::from(update);
+        Ok(StepInput { step, part, layers, labels, update, updates: self.updates })
+    }
+
+    /// Submits a step, and first waits for the oldest one if its frame is still in use.
+    fn submit_next(&mut self, input: StepInput) -> Result<Option<StepReport>> {
+        let done = if self.in_flight.len() == FRAMES_IN_FLIGHT { self.retire()? } else { None };
+        self.submit(input)?;
+        Ok(done)
+    }
+
+    fn submit(&mut self, input: StepInput) -> Result<()> {
+        let flight = self.context.submit(&input)?;
+        self.in_flight.push_back((input, flight));
+        Ok(())
+    }
+
+    /// Waits for the oldest step in flight. If a buffer was too small, this step and those after it have changed
+    /// nothing: the buffer grows and they run again.
+    fn retire(&mut self) -> Result<Option<StepReport>> {
+        let Some((input, flight)) = self.in_flight.front().cloned() else { return Ok(None) };
+        let engine = &mut self.context.engine;
+        let report = engine.retire(&flight)?;
+        let recovered = engine.recover(&report);
+        if recovered.is_err() {
+            // These steps have no result and will get none.
+            self.in_flight.clear();
+            self.step = input.step - 1;
+        }
+        if recovered? {
+            let again: Vec<StepInput> = self.in_flight.drain(..).map(|(input, _)| input).collect();
+            for input in again {
+                self.submit(input)?;
+            }
+            return self.retire();
+        }
+        self.in_flight.pop_front();
+        if let Some(timing) = &mut self.timing {
+            timing.note(&mut self.context.engine, input.step, flight.recording)?;
+        }
+        let Context { config, views, .. } = &self.context;
+        let report = StepReport::new(&input, views.of(&input)?, config, report);
+        self.sentinel.check(&report, &views[views.index(&input)].name)?;
+        self.newest = Some(report);
+        Ok(self.newest)
+    }
+
+    /// Collects the times of steps from now on. The scheduler needs timestamps.
+    pub fn keep_times(&mut self) {
+        self.timing.get_or_insert_default();
+    }
+
+    /// Sets whether the next steps count the (pixel, splat) pairs with a weight. Counting slows them down.
+    pub fn count_pairs(&mut self, on: bool) {
+        self.context.counts_pairs = on;
+    }
+
+    /// Takes the times of the steps that ended since the last call.
+    pub fn take_times(&mut self) -> Vec<StepTimes> {
+        self.timing.as_mut().map(Timing::take).unwrap_or_default()
+    }
+
+    /// Runs the last `count` steps again on `model` and returns their times, each with a barrier before every pass. All
+    /// steps are done; the engine's model and the trainer are of no use after this.
+    pub(crate) fn times_of_last(&mut self, count: u32, model: &Gaussians) -> Result<Vec<StepTimes>> {
+        self.drain()?;
+        self.context.engine.upload_model(model)?;
+        self.context.engine.time_items()?;
+        self.keep_times();
+        for step in self.step - count.min(self.step)..self.step {
+            let input = self.input(step + 1)?;
+            self.submit_next(input)?;
+        }
+        self.drain()?;
+        Ok(self.take_times())
+    }
+}

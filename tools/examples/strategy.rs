@@ -1,0 +1,79 @@
+//! Trains by a strategy of its own: Gaussians never grow, faint ones go. A pass takes the momentum of positions.
+//!
+//! ```sh
+//! cargo run --release --example strategy -- SCENE STEPS OUT.ply
+//! ```
+
+use labelgs::gpu::{Gpu, GpuOptions};
+use labelgs::io::{self, LoadOptions};
+use labelgs::train::{
+    At, Buf, Builder, Extension, Hook, Population, StepUniforms, Strategy, TrainConfig, Trainer, TrainerOptions,
+    first_model,
+};
+use std::path::Path;
+use std::sync::Arc;
+
+/// Removes faint Gaussians after every hundredth step.
+#[derive(Debug)]
+struct Thinning;
+
+impl Strategy for Thinning {
+    fn name(&self) -> &'static str {
+        "thinning"
+    }
+
+    fn acts_after(&self, at: At) -> bool {
+        !at.is_last() && at.step.is_multiple_of(100)
+    }
+
+    fn act(&mut self, at: At, population: &mut Population) -> labelgs::Result<()> {
+        // Without a threshold nothing grows.
+        let uniforms = StepUniforms { densify_threshold: 0.0, prune_opacity: 0.02, ..population.uniforms() };
+        let counts = population.densify(uniforms, u64::MAX)?;
+        println!("step {}: {} Gaussians removed, {} left", at.step, counts.pruned, population.count());
+        Ok(())
+    }
+
+    fn extension(&self) -> Arc<dyn Extension> {
+        Arc::new(WithoutMomentum)
+    }
+
+    /// Each number is a variant of the step with its own recording; 0 has no passes of the extension.
+    fn passes(&self, at: At) -> u32 {
+        u32::from(at.step > at.config.iterations / 2)
+    }
+}
+
+/// Clears the first moments of positions after an update.
+#[derive(Debug)]
+struct WithoutMomentum;
+
+impl Extension for WithoutMomentum {
+    fn extend(&self, _passes: u32, hook: Hook, b: &mut Builder) {
+        if hook == Hook::Updated {
+            b.list.fill(Buf::M_MEANS, 0);
+        }
+    }
+}
+
+fn main() -> labelgs::Result<()> {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let [scene, steps, out] = &arguments[..] else {
+        return Err(labelgs::Error::usage("arguments", "expected: SCENE STEPS OUT.ply"));
+    };
+    let iterations = steps.parse().map_err(|error| labelgs::Error::usage("STEPS", format!("{error}")))?;
+    let scene = io::open(Path::new(scene), &LoadOptions::default())?;
+    let config = TrainConfig { iterations, ..TrainConfig::default() };
+    let model = first_model(&scene, &config)?;
+    let options = TrainerOptions { strategy: Some(Box::new(Thinning)), ..TrainerOptions::default() };
+    let mut trainer = Trainer::new(Gpu::new(&GpuOptions::default())?, config, &scene, &model, options)?;
+    while trainer.steps_done() < iterations {
+        trainer.step()?;
+    }
+    trainer.drain()?;
+    if let Some(report) = trainer.newest_report() {
+        println!("step {}: loss {:.4}", report.step, report.loss);
+    }
+    io::write_model(out, &trainer.model()?)?;
+    Ok(())
+}
