@@ -212,7 +212,8 @@ fn a_made_scene_is_trained_scored_edited_and_rendered() {
     let scene = scene(folder.path());
     let path = |name: &str| folder.path().join(name).to_str().expect("UTF-8").to_owned();
     let (out, masks, object, rest) = (path("out"), format!("{scene}/masks"), path("object.ply"), path("rest.ply"));
-    let train = ["train", &scene, "-o", &out, "--masks", &masks, "--iterations", "150", "--label-from", "60", "--json"];
+    let train =
+        ["train", &scene, "-o", &out, "--masks", &masks, "--iterations", "150", "--set", "label_from=60", "--json"];
     let trained = json(&succeeds(&train));
     assert_eq!((&trained["steps"], trained["model"].is_string()), (&150.into(), true));
     assert!(trained["test"]["psnr"].as_f64() > Some(12.0), "{trained}");

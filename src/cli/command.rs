@@ -22,17 +22,15 @@ use super::render::RenderArgs;
 use super::report::ReportArgs;
 use super::select::{ExtractArgs, RemoveArgs};
 use super::selftest::SelftestArgs;
+use super::settings;
 use super::simplify::SimplifyArgs;
 use super::split_components::SplitArgs;
 use super::synth::SynthArgs;
 use super::train_args::TrainArgs;
 use super::transform::TransformArgs;
 use super::view::ViewArgs;
-use super::wording::flag;
-use crate::run::Settings;
 use crate::version;
 use clap::{CommandFactory, Parser, Subcommand};
-use std::collections::BTreeMap;
 use std::sync::LazyLock;
 
 const EXIT_STATUSES: &str = "\
@@ -181,44 +179,7 @@ pub enum Command {
 /// What `--version` prints; clap wants it to last.
 static VERSION: LazyLock<String> = LazyLock::new(version::text);
 
-/// Settings of training that a newcomer needs: the help shows them with the flags that have no heading.
-const FIRST: [&str; 3] = ["iterations", "max_resolution", "preset"];
-
 /// Returns the command line with the defaults of training in its help, and commit and features in its `--version`.
 pub fn command() -> clap::Command {
-    let mut defaults = Settings::default().texts();
-    let paper = paper_flags(&defaults);
-    // Defaults whose values need words.
-    for (key, text) in [
-        ("background", "black"),
-        ("save_at", "none"),
-        ("near", "0.2, less in a small scene"),
-        ("feature_rest_lr", "--feature-lr / 20"),
-    ] {
-        defaults.insert(key.into(), text.into());
-    }
-    Cli::command().long_version(VERSION.as_str()).mut_subcommand("train", |train| {
-        train.mut_args(|arg| {
-            let arg = if FIRST.contains(&arg.get_id().as_str()) { arg.help_heading(None) } else { arg };
-            if arg.get_id() == "paper" {
-                let help = arg.get_help().map(ToString::to_string).unwrap_or_default();
-                return arg.help(format!("{help} {paper}"));
-            }
-            let Some(default) = defaults.get(arg.get_id().as_str()) else { return arg };
-            let with = |help: String| format!("{help} [default: {default}]");
-            let (short, long) = (arg.get_help().map(ToString::to_string), arg.get_long_help().map(ToString::to_string));
-            let arg = if let Some(help) = short { arg.help(with(help)) } else { arg };
-            if let Some(help) = long { arg.long_help(with(help)) } else { arg }
-        })
-    })
-}
-
-/// Returns the settings in which the paper differs from the defaults, as flags.
-fn paper_flags(defaults: &BTreeMap<String, String>) -> String {
-    let paper = Settings::paper().texts();
-    let changed = Settings::keys().filter_map(|key| {
-        let value = paper.get(key.name).filter(|value| defaults.get(key.name) != Some(value))?;
-        Some(format!("{} {value}", flag(key.name)))
-    });
-    changed.collect::<Vec<_>>().join(" ")
+    Cli::command().long_version(VERSION.as_str()).mut_subcommand("train", settings::in_help)
 }

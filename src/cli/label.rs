@@ -8,7 +8,7 @@ use super::model_fit::warn_of_misfit;
 use super::output::WriteArgs;
 use super::scene::{near_plane, open_gpu, open_scene};
 use super::stdout;
-use super::values::{model_file, near, switch};
+use super::values::{model_file, near};
 use crate::edit::select::summarise;
 use crate::gpu::Gpu;
 use crate::io::label_table::LabelTable;
@@ -59,9 +59,9 @@ pub struct LabelArgs {
     /// Least blending weight that gives a label. Only for the rule `main`.
     #[arg(long, value_name = "WEIGHT", default_value_t = 0.6, help_heading = "Labels")]
     pub label_threshold: f32,
-    /// Gaussian projection filter, on or off. Only for the rule `main`.
-    #[arg(long, value_name = "SWITCH", value_parser = switch, default_value = "on", help_heading = "Labels")]
-    pub gpf: bool,
+    /// Leave out the Gaussian projection filter. Only for the rule `main`.
+    #[arg(long, help_heading = "Labels")]
+    pub no_gpf: bool,
     /// Rounds of counting votes. From the second round on, masks that disagree with all others count less.
     #[arg(
         long, value_name = "N", default_value_t = 2, value_parser = clap::value_parser!(u32).range(1..=10),
@@ -111,7 +111,7 @@ pub(crate) fn run(args: &LabelArgs, context: &Context) -> Result<()> {
     let mut engine = vote_engine(gpu, &model, &views, columns_of(&views))?;
     let mut progress = Progress::new(u64::from(args.rounds), "rounds", &context.global);
     if args.rule == LabelRule::Main {
-        let how = Lift { threshold: args.label_threshold, gpf: args.gpf };
+        let how = Lift { threshold: args.label_threshold, gpf: !args.no_gpf };
         label_by_lift(&mut engine, &mut model, &views, (near, how, args.seed))?;
     } else {
         let how = Counting {

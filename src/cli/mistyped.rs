@@ -7,13 +7,7 @@ use std::num::{IntErrorKind, ParseFloatError, ParseIntError};
 
 /// Returns the error in words for those who typed the number; other errors stay.
 pub(super) fn in_words(error: Error) -> Error {
-    let Some(source) = error.source() else { return error };
-    let problem = match source.downcast_ref::<ParseIntError>().map(ParseIntError::kind) {
-        Some(IntErrorKind::PosOverflow | IntErrorKind::NegOverflow) => "is too large a number",
-        Some(_) => "is not a whole number",
-        None if source.is::<ParseFloatError>() => "is not a number",
-        None => return error,
-    };
+    let Some(problem) = number(&error) else { return error };
     let text = |kind| match error.get(kind) {
         Some(ContextValue::String(text)) => text.as_str(),
         _ => "",
@@ -21,4 +15,14 @@ pub(super) fn in_words(error: Error) -> Error {
     let (flag, value) = (text(ContextKind::InvalidArg), text(ContextKind::InvalidValue));
     let message = format!("{flag}: `{value}` {problem}\n\nFor more information, try '--help'.\n");
     Error::raw(ErrorKind::ValueValidation, message)
+}
+
+/// Returns what is wrong with a number that is none; nothing for other errors.
+pub(super) fn number(error: &Error) -> Option<&'static str> {
+    let source = error.source()?;
+    match source.downcast_ref::<ParseIntError>().map(ParseIntError::kind) {
+        Some(IntErrorKind::PosOverflow | IntErrorKind::NegOverflow) => Some("is too large a number"),
+        Some(_) => Some("is not a whole number"),
+        None => source.is::<ParseFloatError>().then_some("is not a number"),
+    }
 }

@@ -38,6 +38,7 @@ pub(crate) mod report;
 pub(crate) mod scene;
 pub(crate) mod select;
 pub(crate) mod selftest;
+pub(crate) mod settings;
 mod shell;
 mod simplify;
 pub(crate) mod split_components;
@@ -114,7 +115,12 @@ impl From<clap::Error> for Exit {
 fn run(args: Vec<OsString>) -> Result<(), Exit> {
     let mut command = command();
     let typed = command.try_get_matches_from_mut(args).map_err(mistyped::in_words)?;
-    speak_of(wording::flags(&command, &typed));
+    speak_of(wording::names(&command, &typed));
+    if let Some(("train", words)) = typed.subcommand()
+        && let Some(only) = settings::asked(words)
+    {
+        return Ok(stdout::print(&settings::list(only)?)?);
+    }
     let cli = Cli::from_arg_matches(&typed)?;
     log::start(&cli.global);
     interrupt::install()?;

@@ -10,7 +10,7 @@ use glam::DVec3;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-pub(crate) use crate::options::parse::{bytes, colour, count, switch};
+pub(crate) use crate::options::parse::{bytes, colour, count};
 
 /// Labels by id and by name.
 #[derive(Clone, Debug, PartialEq, Eq)]

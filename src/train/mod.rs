@@ -386,7 +386,7 @@ impl Trainer {
         self.note_times(input.step, flight.recording)?;
         let view = self.views.of(&input)?;
         let scale = 1.0 / (3.0 * view.valid_pixels.max(1) as f64);
-        let (counters, lambda) = (&report.counters, f64::from(self.config.lambda_dssim));
+        let (counters, lambda) = (&report.counters, f64::from(step_input::LAMBDA_DSSIM));
         let l1 = f64::from(counters.loss_l1) * scale;
         let ssim = f64::from(counters.loss_ssim) * scale;
         let loss = (1.0 - lambda) * l1 + lambda * (1.0 - ssim);

@@ -33,7 +33,8 @@ impl Trainer {
         let means = self.engine.means()?;
         self.refresh_poses()?;
         let voters = self.views.voters();
-        let is_judged = self.config.vote_trust && self.labelled_once;
+        // Masks that disagree with the labels of the model have less weight.
+        let is_judged = self.labelled_once;
         let mut decision = decide::count(&mut self.engine, &voters, is_judged, &means, how, true)?;
         let trained = self.engine.trained_count() as usize;
         if trained < decision.labels.len() {

@@ -114,7 +114,7 @@ fn flags(row: &Row, args: &AblateArgs) -> Result<TrainFlags> {
     let flags = command.try_get_matches_from(typed).and_then(|matches| TrainFlags::from_arg_matches(&matches));
     let wrong = |problem: &str| Error::usage("--row", format!("{}: {problem}", row.name));
     let flags = flags.map_err(|error| wrong(error.to_string().lines().next().unwrap_or_default()))?;
-    if flags.train.is_typed("seed") {
+    if flags.is_typed("seed") {
         return Err(wrong("the runs of a variant differ in --seed; use --seeds N instead"));
     }
     flags.settings(None).map_err(|error| wrong(&error.to_string()))?;

@@ -27,13 +27,13 @@ pub(super) struct Row {
 /// Name, masks and flags of the known variants, in the order of the table.
 const KNOWN: [(&str, Masks, &[&str]); 8] = [
     ("no-labels", Masks::None, &[]),
-    ("paper", Masks::Given, &["--paper"]),
-    ("paper-no-dov", Masks::WithoutDov, &["--paper"]),
-    ("paper-no-gpf", Masks::Given, &["--paper", "--gpf", "off"]),
-    ("paper-no-oam", Masks::Given, &["--paper", "--occlusion", "none"]),
-    ("paper-votes", Masks::Given, &["--paper", "--label-rule", "votes"]),
+    ("paper", Masks::Given, &["--preset", "paper"]),
+    ("paper-no-dov", Masks::WithoutDov, &["--preset", "paper"]),
+    ("paper-no-gpf", Masks::Given, &["--preset", "paper", "--set", "gpf=off"]),
+    ("paper-no-oam", Masks::Given, &["--preset", "paper", "--set", "occlusion=none"]),
+    ("paper-votes", Masks::Given, &["--preset", "paper", "--set", "label_rule=votes"]),
     ("ours", Masks::Given, &[]),
-    ("ours-no-oam", Masks::Given, &["--occlusion", "none"]),
+    ("ours-no-oam", Masks::Given, &["--set", "occlusion=none"]),
 ];
 
 /// Returns the variants of `names`, then those of `own`, each `NAME=FLAGS`. Without both, returns all that can run.
@@ -63,7 +63,7 @@ pub(super) fn rows(names: &[String], own: &[String], has_without_dov: bool) -> R
                 "--row",
                 format!(
                     "`{text}` is not a variant; expected NAME=FLAGS, such as \
-                                                      t03=--label-rule main --label-threshold 0.3"
+                                                      t03=--preset paper --set label_threshold=0.3"
                 ),
             )
         };
@@ -88,9 +88,10 @@ mod tests {
         let all = rows(&[], &[], false).expect("rows");
         assert!(names(&all).contains(&"ours".to_owned()) && !names(&all).contains(&"paper-no-dov".to_owned()));
         assert_eq!(rows(&[], &[], true).expect("rows").len(), KNOWN.len());
-        let own = rows(&["ours".into()], &["t03=--label-rule main --label-threshold 0.3".into()], false).expect("rows");
+        let own =
+            rows(&["ours".into()], &["t03=--preset paper --set label_threshold=0.3".into()], false).expect("rows");
         assert_eq!(names(&own), ["ours", "t03"]);
-        assert_eq!(own[1].flags, ["--label-rule", "main", "--label-threshold", "0.3"]);
+        assert_eq!(own[1].flags, ["--preset", "paper", "--set", "label_threshold=0.3"]);
         for (name, own) in [("theirs", ""), ("paper-no-dov", ""), ("", "=x"), ("", "../x=--y"), ("ours", "ours=--z")] {
             let list = |text: &str| if text.is_empty() { vec![] } else { vec![text.to_owned()] };
             let error = rows(&list(name), &list(own), false).expect_err("refused");
