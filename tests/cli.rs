@@ -121,8 +121,8 @@ fn every_setting_has_help_with_its_default_and_those_that_more_people_need_have_
 #[test]
 fn a_switch_with_a_flag_is_off_by_default() {
     let defaults = Settings::default().texts();
-    let is_on = |key: &&Key| key.is_flag && defaults.get(key.name).is_some_and(|text| text == "on");
-    assert_eq!(Settings::keys().filter(is_on).map(|key| key.name).collect::<Vec<_>>(), Vec::<&str>::new());
+    let on = Settings::keys().filter(|key| key.is_flag && defaults.get(key.name).is_some_and(|text| text == "on"));
+    assert_eq!(on.map(|key| key.name).collect::<Vec<_>>(), Vec::<&str>::new());
     assert!(train(&["--antialias"]).expect("decided").train.antialias);
     assert!(Cli::try_parse_from(["labelgs", "train", "scene", "-o", "out", "--antialias", "on"]).is_err());
     assert!(!train(&["--preset", "best", "--set", "antialias=off"]).expect("decided").train.antialias);

@@ -195,7 +195,7 @@ fn masks_of_a_rendered_video_return_to_their_photos() {
     let path = |name: &str| folder.path().join(name).to_str().expect("UTF-8").to_owned();
     let (there, video) = (path("pictures"), path("video"));
     let json = |text: String| serde_json::from_str::<Value>(&text).expect("JSON");
-    let made = json(succeeds(&["densify", &out, "--scene", &scene, "-o", &video, "--between", "2", "--json"]));
+    let made = json(succeeds(&["frames", &out, "--scene", &scene, "-o", &video, "--between", "2", "--json"]));
     // Views 000 and 008 are held out.
     assert_eq!((&made["photos"], &made["frames"]), (&10.into(), &28.into()));
     succeeds(&["render", &out, "--scene", &scene, "--views", "train", "-o", &there]);
@@ -227,7 +227,7 @@ fn masks_of_a_rendered_video_return_to_their_photos() {
     let camera = path("camera.json");
     std::fs::write(&camera, serde_json::to_string(&frames.frames[1].camera).expect("JSON")).expect("written");
     succeeds(&["render", &out, "--camera", &camera, "-o", &there]);
-    let all = ["densify", &out, "--scene", &scene, "-o", &path("all"), "--between", "0", "--compat", "--include-test"];
+    let all = ["frames", &out, "--scene", &scene, "-o", &path("all"), "--between", "0", "--compat", "--include-test"];
     assert!(succeeds(&all).contains("12 frames through 12 photos"));
     let named = Frames::read(&Path::new(&path("all")).join("frames.json")).expect("frames");
     let names: Vec<&str> = named.frames.iter().filter_map(|frame| frame.photo.as_deref()).collect();
@@ -244,7 +244,7 @@ fn masks_of_faces_become_those_of_their_photos() {
     let lens = ["--lens", "OPENCV_FISHEYE", "--fov", "150", "--size", "160x120", "--views", "2"];
     succeeds(&[&["synth", &scene, "--preset", "simple"], &lens[..]].concat());
     succeeds(&["train", &scene, "-o", &out, "--iterations", "2", "--test-every", "0"]);
-    let densify = ["densify", &out, "--scene", &scene, "-o", &video, "--between", "0", "--include-test"];
+    let densify = ["frames", &out, "--scene", &scene, "-o", &video, "--between", "0", "--include-test"];
     succeeds(&densify);
     let load = LoadOptions { masks: Some(format!("{scene}/masks").into()), ..LoadOptions::default() };
     let dataset = labelgs::io::open(Path::new(&scene), &load).expect("read");

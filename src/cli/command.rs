@@ -2,13 +2,15 @@
 
 use super::ablate::AblateArgs;
 use super::args::GlobalArgs;
+use super::benchmark::BenchmarkArgs;
 use super::blocks::BlocksArgs;
 use super::check::CheckArgs;
 use super::clean::CleanArgs;
 use super::convert::ConvertArgs;
-use super::densify::DensifyArgs;
 use super::devices::DevicesArgs;
 use super::eval::EvalArgs;
+use super::frames::FramesArgs;
+use super::kernels::KernelsArgs;
 use super::label::LabelArgs;
 use super::list::ListArgs;
 use super::masks::MasksArgs;
@@ -43,7 +45,7 @@ Results go to standard output, everything else to standard error.";
 ///
 /// Example: labelgs synth scene && labelgs train scene --masks scene/masks -o out && labelgs list out
 #[derive(Debug, Parser)]
-#[command(name = "labelgs", version, after_help = EXIT_STATUSES, propagate_version = true)]
+#[command(name = "labelgs", version, propagate_version = true)]
 pub struct Cli {
     /// Print the result as JSON.
     #[arg(long, help_heading = "Output")]
@@ -148,16 +150,20 @@ pub enum Command {
     Occlusion(OcclusionArgs),
     /// Render a smooth video through the photos of a scene, as input of an object tracker.
     ///
-    /// Example: labelgs densify out --scene scene -o video
-    Densify(DensifyArgs),
+    /// Example: labelgs frames out --scene scene -o video
+    Frames(FramesArgs),
     /// Train a scene in several ways and compare the scores in one table.
     ///
     /// Example: labelgs ablate scene --masks scene/masks -o ablation -- --iterations 3000
     Ablate(Box<AblateArgs>),
-    /// Train a scene that no one card holds: plan and split it into blocks, merge their models.
+    /// Train a scene that no one card holds: split it into blocks, join their models.
     ///
-    /// Example: labelgs blocks plan scene --model out --card 24G
+    /// Example: labelgs blocks split scene --model out --card 24G --dry-run
     Blocks(Box<BlocksArgs>),
+    /// Score a model by a published benchmark, with its masks, its choice of objects and its averages.
+    ///
+    /// Example: labelgs benchmark out --scene scene --protocol binary --truth scene/amodal --objects 3
+    Benchmark(Box<BenchmarkArgs>),
     /// Show each Vulkan device and whether it meets the requirements.
     ///
     /// Example: labelgs devices
@@ -170,16 +176,36 @@ pub enum Command {
     ///
     /// Example: labelgs plan --gaussians 500k --size 960x540 --label-samples 10
     Plan(PlanArgs),
+    /// Compile every kernel and show its registers, spills and instructions.
+    ///
+    /// They are what the driver tells. Status 1 if a kernel spills.
+    ///
+    /// Example: labelgs kernels
+    Kernels(KernelsArgs),
     /// Show how long each pass of a training step takes.
     ///
     /// Example: labelgs profile scene --masks scene/masks --steps 50
     Profile(ProfileArgs),
 }
 
+/// Commands for developers of the engine: the help lists them under a heading of their own.
+const DEVELOPERS: [&str; 4] = ["selftest", "plan", "kernels", "profile"];
+
 /// What `--version` prints; clap wants it to last.
 static VERSION: LazyLock<String> = LazyLock::new(version::text);
 
 /// Returns the command line with the defaults of training in its help, and commit and features in its `--version`.
 pub fn command() -> clap::Command {
-    Cli::command().long_version(VERSION.as_str()).mut_subcommand("train", settings::in_help)
+    Cli::command().after_help(EXIT_STATUSES).long_version(VERSION.as_str()).mut_subcommand("train", settings::in_help)
+}
+
+/// Returns the command line whose help has the developers' commands under a heading of their own.
+pub(crate) fn with_headings(root: clap::Command) -> clap::Command {
+    let mut list = "Commands for developers of the engine:\n".to_owned();
+    for command in DEVELOPERS.iter().filter_map(|name| root.find_subcommand(name)) {
+        let about = command.get_about().map(ToString::to_string).unwrap_or_default();
+        list += &format!("  {:<16}  {about}\n", command.get_name());
+    }
+    let root = DEVELOPERS.iter().fold(root, |root, name| root.mut_subcommand(name, |command| command.hide(true)));
+    root.after_help(format!("{list}\n{EXIT_STATUSES}"))
 }

@@ -2,7 +2,6 @@
 
 use super::args::JsonFlag;
 use super::context::Context;
-use super::kernels;
 use super::stdout;
 use crate::gpu::{self, Capabilities, Need};
 use crate::pass::KernelShape;
@@ -16,17 +15,11 @@ pub struct DevicesArgs {
     /// JSON.
     #[command(flatten)]
     pub json: JsonFlag,
-    /// Compile every kernel, and print what the driver tells of it: registers, spills, instructions. Fails if one spills.
-    #[arg(long)]
-    pub kernels: bool,
 }
 
 /// Prints the devices. Fails if none is usable.
 pub(crate) fn run(args: &DevicesArgs, context: &Context) -> Result<()> {
     let options = context.gpu_options()?;
-    if args.kernels {
-        return kernels::run(options, context.json || args.json.json, context);
-    }
     let (devices, chosen) = gpu::devices(&options)?;
     let picked = chosen.as_ref().ok().copied();
     if context.json || args.json.json {

@@ -1,18 +1,28 @@
-//! `labelgs devices --kernels`: what the driver's compiler makes of every kernel.
+//! `labelgs kernels`: what the driver's compiler makes of every kernel.
 
+use super::args::JsonFlag;
 use super::context::Context;
 use super::stdout;
 use crate::gpu::{Gpu, GpuOptions};
 use crate::pass::{CompiledKernel, FIGURES, compiled_kernels};
 use crate::{Error, Result};
+use clap::Args;
 use serde_json::{Map, Value, json};
 
+/// `labelgs kernels`.
+#[derive(Args, Clone, Debug)]
+pub struct KernelsArgs {
+    /// JSON.
+    #[command(flatten)]
+    pub json: JsonFlag,
+}
+
 /// Prints the table. Fails if a kernel spills registers.
-pub(crate) fn run(options: GpuOptions, as_json: bool, context: &Context) -> Result<()> {
-    let gpu = Gpu::new(&GpuOptions { statistics: true, ..options })?;
+pub(crate) fn run(args: &KernelsArgs, context: &Context) -> Result<()> {
+    let gpu = Gpu::new(&GpuOptions { statistics: true, ..context.gpu_options()? })?;
     context.listen(&gpu);
     let (found, kernels) = (gpu.capabilities(), compiled_kernels(&gpu)?);
-    if as_json {
+    if context.json || args.json.json {
         stdout::print_json(&json!({
             "schema_version": 1,
             "device": found.name,

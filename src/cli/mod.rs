@@ -2,6 +2,7 @@
 
 pub(crate) mod ablate;
 pub(crate) mod args;
+pub(crate) mod benchmark;
 mod blocks;
 pub(crate) mod check;
 pub(crate) mod choose;
@@ -9,13 +10,13 @@ pub(crate) mod clean;
 pub(crate) mod command;
 pub(crate) mod context;
 pub(crate) mod convert;
-pub(crate) mod densify;
 mod device_report;
 pub(crate) mod devices;
 mod drawer;
 pub(crate) mod eval;
+pub(crate) mod frames;
 pub(crate) mod interrupt;
-mod kernels;
+pub(crate) mod kernels;
 pub(crate) mod label;
 pub(crate) mod labelled;
 pub(crate) mod list;
@@ -36,6 +37,7 @@ pub(crate) mod relabel;
 pub(crate) mod render;
 pub(crate) mod report;
 pub(crate) mod scene;
+pub(crate) mod scored;
 pub(crate) mod select;
 pub(crate) mod selftest;
 pub(crate) mod settings;
@@ -56,7 +58,7 @@ pub(crate) mod wording;
 use crate::error::speak_of;
 use crate::{Error, version};
 use clap::FromArgMatches;
-use command::{Cli, Command, command};
+use command::{Cli, Command, command, with_headings};
 use context::Context;
 use std::ffi::OsString;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -113,7 +115,7 @@ impl From<clap::Error> for Exit {
 }
 
 fn run(args: Vec<OsString>) -> Result<(), Exit> {
-    let mut command = command();
+    let mut command = with_headings(command());
     let typed = command.try_get_matches_from_mut(args).map_err(mistyped::in_words)?;
     speak_of(wording::names(&command, &typed));
     if let Some(("train", words)) = typed.subcommand()
@@ -144,14 +146,16 @@ fn run(args: Vec<OsString>) -> Result<(), Exit> {
         Command::Transform(args) => transform::run(&args, &context),
         Command::Convert(args) => convert::run(&args, &context),
         Command::Eval(args) => eval::run(&args, &context),
+        Command::Benchmark(args) => benchmark::run(&args, &context),
         Command::Report(args) => report::run(&args, &context),
-        Command::Densify(args) => densify::run(&args, &context),
+        Command::Frames(args) => frames::run(&args, &context),
         Command::Occlusion(args) => occlusion::run(&args, &context),
         Command::Synth(args) => synth::run(&args, &context),
         Command::Devices(args) => devices::run(&args, &context),
         Command::Selftest(args) => selftest::run(&args, &context),
         Command::Simplify(args) => simplify::run(&args, &context),
         Command::Masks(args) => masks::run(&args, &context),
+        Command::Kernels(args) => kernels::run(&args, &context),
         Command::Plan(args) => plan::run(&args, &context),
         Command::Profile(args) => profile::run(&args, &context),
     }?;

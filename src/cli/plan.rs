@@ -5,7 +5,7 @@ use super::context::Context;
 use super::devices::{shape_json, shape_of, shape_text};
 use super::stdout;
 use super::values::{Size, bytes, count, size};
-use crate::engine::{Engine, EngineSize, LabelSize, capacity, card};
+use crate::engine::{Engine, EngineSize, LabelSize, capacity, card, predict_for};
 use crate::gpu;
 use crate::pass::{KernelShape, Variant, training_step};
 use crate::scheduler::plan::{
@@ -62,7 +62,7 @@ pub(crate) fn run(args: &PlanArgs, context: &Context) -> Result<()> {
     if context.json || args.json.json {
         stdout::print_json(&to_json(&subject, &planned, problem.as_ref()))?;
     } else {
-        stdout::print(&to_text(&subject, &planned))?;
+        stdout::print(&to_text(&subject, &planned)?)?;
     }
     problem.map_or(Ok(()), Err)
 }
@@ -118,15 +118,15 @@ fn without_sizes(limits: &Limits) -> Limits {
     Limits { max_storage_range: MUCH, max_texel_elements: MUCH, max_allocation: MUCH, max_memory: MUCH, ..*limits }
 }
 
-fn to_text(subject: &Subject, (memory, plan): &(MemoryReport, Plan)) -> String {
+fn to_text(subject: &Subject, (memory, plan): &(MemoryReport, Plan)) -> Result<String> {
     let (room, capacity) = (&subject.room, &subject.capacity);
     let objects = room.labels.map_or(0, |labels| labels.layers);
-    format!(
+    Ok(format!(
         "Training {} on pictures of {} x {} px with {} per step\n\
          device:  {}\nkernels: {}\nroom for {} (splat, tile) pairs, {} tiles of object layers\n\n\
          MEMORY at the start; pairs and tiles of object layers grow when a view needs more\n{}\n\
          SCRATCH ARENA of the step; buffers whose items do not overlap share bytes\n{}\n\
-         PASSES\n{}",
+         PASSES\n{}\n{}",
         counted(room.gaussians, "Gaussian"),
         room.image.0,
         room.image.1,
@@ -138,7 +138,57 @@ fn to_text(subject: &Subject, (memory, plan): &(MemoryReport, Plan)) -> String {
         memory.report(),
         plan.arena_report(),
         plan.report(),
-    )
+        summary(subject, memory)?
+    ))
+}
+
+const MIB: f64 = 1_048_576.0;
+
+/// Returns what to take from the plan: the memory, the Gaussians that fit, and what smaller values save.
+fn summary(subject: &Subject, memory: &MemoryReport) -> Result<String> {
+    let room = &subject.room;
+    let (needed, limit) = (memory.total as f64 / MIB, subject.limits.max_memory as f64 / MIB);
+    let mut text = format!("needed:  {needed:.0} MiB at the start, of {limit:.0} MiB that may be used\n");
+    text += &match most_gaussians(subject) {
+        0 => "fits:    no Gaussian on such pictures\n".to_owned(),
+        most => format!("fits:    up to {} with such pictures and objects\n", counted(most, "Gaussian")),
+    };
+    let half = |value: u32| (value / 2).max(1);
+    let image = (half(room.image.0), half(room.image.1));
+    let labels = room.labels.map(|labels| LabelSize { layers: half(labels.layers), ..labels });
+    let smaller = [
+        ("half of --gaussians", EngineSize { gaussians: (room.gaussians / 2).max(1), ..*room }),
+        ("half of both sides of --size", EngineSize { image, ..*room }),
+        ("half of --label-samples", EngineSize { labels, ..*room }),
+    ];
+    let mut savings = Vec::new();
+    for (what, room) in smaller.into_iter().filter(|(_, smaller)| smaller != room) {
+        let total = predict_for(&subject.shape, &without_sizes(&subject.limits), &room)?.total;
+        savings.push((memory.total.saturating_sub(total), what));
+    }
+    savings.sort_by(|a, b| b.cmp(a));
+    let shown = savings.iter().filter(|(bytes, _)| *bytes as f64 >= MIB);
+    let savings: Vec<String> =
+        shown.map(|(bytes, what)| format!("{what} saves {:.0} MiB", *bytes as f64 / MIB)).collect();
+    Ok(text + &format!("lower:   {}\n", savings.join(", ")))
+}
+
+/// Returns the most Gaussians that fit the device.
+fn most_gaussians(subject: &Subject) -> u64 {
+    let fits = |gaussians| {
+        let room = EngineSize { gaussians, ..subject.room };
+        predict_for(&subject.shape, &subject.limits, &room).is_ok()
+    };
+    let (mut fitting, mut tried) = (0, 1);
+    while tried <= u64::from(u32::MAX) && fits(tried) {
+        (fitting, tried) = (tried, 2 * tried);
+    }
+    // Three digits are enough.
+    while tried - fitting > (fitting / 1000).max(1) {
+        let middle = fitting.midpoint(tried);
+        if fits(middle) { fitting = middle } else { tried = middle }
+    }
+    fitting
 }
 
 fn to_json(subject: &Subject, (memory, plan): &(MemoryReport, Plan), problem: Option<&Error>) -> Value {

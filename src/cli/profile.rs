@@ -54,7 +54,7 @@ pub struct ProfileArgs {
     #[arg(long)]
     pub as_scheduled: bool,
     /// Settings in TOML, such as config.toml of an earlier run.
-    #[arg(long, value_name = "FILE.toml", help_heading = "Training")]
+    #[arg(long, value_name = "FILE.toml", help_heading = "Settings")]
     pub config: Option<PathBuf>,
     /// Let passes overlap as in training. Wall-clock times are then those of training; the time of a pass is what it
     /// adds.

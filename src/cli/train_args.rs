@@ -100,6 +100,10 @@ pub struct TrainFlags {
 impl TrainFlags {
     /// Returns the checked settings. What is typed overrides a file, a file a checkpoint, a checkpoint the default.
     pub fn settings(&self, checkpoint: Option<&Settings>) -> Result<Settings> {
+        let decided = |key: &&&str| self.block.is_some() && self.is_typed(key);
+        if let Some(key) = ["grow_box", "test_every"].iter().find(decided) {
+            return Err(Error::usage(Setting(key), "cannot be given with a block, which decides it; leave out one"));
+        }
         let mut settings = match (&self.config, checkpoint) {
             // A run that goes on compares the whole file with its checkpoint.
             (Some(path), _) => Settings::read(path)?,
@@ -114,10 +118,6 @@ impl TrainFlags {
         let applied = applied.and_then(|()| self.train.apply(&mut settings.train, &sets));
         let applied = applied.and_then(|()| self.run.apply(&mut settings.run, &sets));
         applied.map_err(|error| Error::Bug(format!("flags: {error}")))?;
-        let decided = |key: &&&str| self.block.is_some() && self.is_typed(key);
-        if let Some(key) = ["grow_box", "test_every"].iter().find(decided) {
-            return Err(Error::usage(Setting(key), "cannot be given with a block, which decides it; leave out one"));
-        }
         if self.occluders.is_some() {
             if self.is_typed("occlusion") {
                 return Err(Error::usage(Setting("occlusion"), "cannot be given with --occluders; leave out one"));

@@ -31,7 +31,8 @@ impl Setting {
         match flags.map(|flags| flags.get(field)) {
             None => format!("`{field}{value}`"),
             Some(Some(typed)) => {
-                let sign = if typed.starts_with("--set ") { "=" } else { " " };
+                // A name of two words takes KEY=VALUE.
+                let sign = if typed.contains(' ') { "=" } else { " " };
                 format!("{typed}{}", value.replacen(" = ", sign, 1))
             }
             Some(None) => format!("{}{value}", field.replace('_', " ")),

@@ -1,8 +1,8 @@
 //! `labelgs blocks`: a scene larger than a card.
 
-mod divide;
 mod estimate;
-mod merge;
+mod join;
+mod split;
 
 use super::context::Context;
 use crate::Result;
@@ -19,30 +19,25 @@ pub struct BlocksArgs {
 /// The commands for blocks.
 #[derive(Clone, Debug, Subcommand)]
 pub enum BlocksVerb {
-    /// Show into how many blocks a scene is split, and the Gaussians, memory and time of each.
-    ///
-    /// Example: labelgs blocks plan scene --model coarse --card 24G
-    Plan(divide::DivideArgs),
     /// Show on paper how many blocks a scene takes, before anything is trained.
     ///
     /// Example: labelgs blocks estimate --gaussians 100M --views 5000 --card 24G
     Estimate(estimate::EstimateArgs),
-    /// Write a folder for each block, for `labelgs train --block`.
+    /// Write a folder for each block, for `labelgs train --block`, and show Gaussians, memory and time of each.
     ///
     /// Example: labelgs blocks split scene --model coarse --card 24G -o blocks
-    Split(divide::SplitArgs),
+    Split(split::SplitArgs),
     /// Join the trained models of the blocks into one.
     ///
-    /// Example: labelgs blocks merge blocks --models models -o city
-    Merge(merge::MergeArgs),
+    /// Example: labelgs blocks join blocks --models models -o city
+    Join(join::JoinArgs),
 }
 
 /// Runs a command for blocks.
 pub(crate) fn run(args: &BlocksArgs, context: &Context) -> Result<()> {
     match &args.verb {
-        BlocksVerb::Plan(args) => divide::plan(args, context),
         BlocksVerb::Estimate(args) => estimate::run(args, context),
-        BlocksVerb::Split(args) => divide::split(args, context),
-        BlocksVerb::Merge(args) => merge::run(args, context),
+        BlocksVerb::Split(args) => split::run(args, context),
+        BlocksVerb::Join(args) => join::run(args, context),
     }
 }

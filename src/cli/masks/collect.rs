@@ -21,7 +21,7 @@ pub struct CollectArgs {
     /// Folder of id images, PNG, named as the frames: NNNNN.png.
     #[arg(value_name = "TRACKED")]
     pub tracked: PathBuf,
-    /// The frames.json of `labelgs densify`.
+    /// The frames.json of `labelgs frames`.
     #[arg(long, value_name = "FILE")]
     pub frames: PathBuf,
     /// Folder for the masks, named as the photos.

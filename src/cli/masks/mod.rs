@@ -48,7 +48,7 @@ pub enum MasksVerb {
     ///
     /// Example: labelgs masks track scene/masks -o tracked
     Track(track::TrackArgs),
-    /// Write the masks of the photos, from the output of a tracker on the video of `labelgs densify`.
+    /// Write the masks of the photos, from the output of a tracker on the video of `labelgs frames`.
     ///
     /// Example: labelgs masks collect tracked --frames video/frames.json -o collected
     Collect(collect::CollectArgs),

@@ -1,13 +1,13 @@
 //! Scores by the masks of the scene: photos, visible masks, whole outlines, objects without occluders.
 
-use super::table::own_table;
-use super::watch::Watcher;
-use super::{EvalArgs, put_out};
+use super::EvalArgs;
+use super::table::table;
 use crate::blocks::Seams;
 use crate::cli::context::{Context, open_model};
 use crate::cli::drawer::largest;
 use crate::cli::model_fit::warn_of_misfit;
 use crate::cli::scene::{near_plane, open_gpu, open_scene, pick_views, render_engine};
+use crate::cli::scored::Watcher;
 use crate::eval::by_place;
 use crate::eval::evaluate::{AmodalTruth, Rendering, evaluate_subject, picture_count};
 use crate::eval::lpips::Weights;
@@ -31,23 +31,23 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// Scores a model and prints the scores.
-pub(super) fn run(args: &EvalArgs, context: &Context) -> Result<()> {
+pub(crate) fn run(args: &EvalArgs, context: &Context) -> Result<()> {
     let scores = score(args, context)?;
-    put_out(&scores, &own_table(&scores), args, context)?;
-    scores.check(args.min_psnr, args.min_iou)
+    args.scoring.put_out(&scores, &table(&scores), context)?;
+    scores.check(args.scoring.min_psnr, args.scoring.min_iou)
 }
 
 /// Scores a model.
-pub(in crate::cli) fn score(args: &EvalArgs, context: &Context) -> Result<Scores> {
+pub(crate) fn score(args: &EvalArgs, context: &Context) -> Result<Scores> {
     let source = models::open_lazily(&args.model)?;
     let reading = args.reading.of_run(&args.model)?;
     let dataset = open_scene(&args.scene, &reading, args.masks.clone(), args.background, true)?;
     let views = pick_views(&dataset, &args.views)?;
-    let near = near_plane(&args.model, args.near)?;
-    let weights = args.lpips.as_deref().map(Weights::read).transpose()?;
+    let near = near_plane(&args.model, args.scoring.near)?;
+    let weights = args.scoring.lpips.as_deref().map(Weights::read).transpose()?;
     let how = Rendering {
         options: RenderOptions { near, background: args.background, ..RenderOptions::default() },
-        min_confidence: args.sure.min_confidence,
+        min_confidence: args.scoring.sure.min_confidence,
         train: &dataset.train,
         by_main: args.compat,
         lpips: weights.as_ref().map(|weights| weights as &dyn Distance),
@@ -56,7 +56,7 @@ pub(in crate::cli) fn score(args: &EvalArgs, context: &Context) -> Result<Scores
     if args.masks.is_some() {
         job.wholes.tell();
     }
-    let (gpu, memory) = (open_gpu(context)?, args.memory.options());
+    let (gpu, memory) = (open_gpu(context)?, args.scoring.memory.options());
     let image = largest(views.iter().map(|view| (view.camera.width, view.camera.height)));
     let scores = if fits(&gpu, source.view(), image, memory)? {
         job.of_whole(&gpu, views, memory)?
@@ -84,7 +84,7 @@ impl Job<'_> {
         warn_of_misfit(&args.model, &model, self.dataset)?;
         let removing = if args.removal { Some(Removing::new(args, &model, self.dataset)?) } else { None };
         let pictures = picture_count(&views) + removing.as_ref().map_or(0, |_| removal::picture_count(&views));
-        let mut watcher = Watcher::new(pictures, args.page.as_deref(), self.context)?;
+        let mut watcher = Watcher::new(pictures, args.scoring.page.as_deref(), self.context)?;
         let refined = match args.refine_poses {
             true => aligned(gpu, &model, &views, (how.options.near, args.background), memory)?,
             false => Vec::new(),
@@ -101,7 +101,7 @@ impl Job<'_> {
             let (train, truth) = (&removing.train, &removing.truth);
             scores.removal = Some(removals(&mut engine, &model, &views, train, how.options, truth, &mut watcher)?);
         }
-        watcher.finish(&own_table(&scores))?;
+        watcher.finish(&table(&scores))?;
         Ok(scores)
     }
 
@@ -114,12 +114,12 @@ impl Job<'_> {
                 return Err(Error::usage(flag, problem));
             }
         }
-        let mut watcher = Watcher::new(picture_count(views), args.page.as_deref(), self.context)?;
+        let mut watcher = Watcher::new(picture_count(views), args.scoring.page.as_deref(), self.context)?;
         let (index, notes) = Index::of(model, self.how.min_confidence, |_, _| true)?;
         models::log_notes(&args.model, &notes);
         let mut painter = Painter::new(Arc::clone(gpu), model, index, memory);
         let scores = self.of(&mut painter, views, &mut watcher)?;
-        watcher.finish(&own_table(&scores))?;
+        watcher.finish(&table(&scores))?;
         Ok(scores)
     }
 

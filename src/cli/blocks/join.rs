@@ -1,4 +1,4 @@
-//! `labelgs blocks merge`.
+//! `labelgs blocks join`.
 
 use crate::Result;
 use crate::blocks::{BlockMasks, MergeOptions, Merged, merge};
@@ -9,9 +9,9 @@ use crate::cli::stdout;
 use clap::Args;
 use std::path::PathBuf;
 
-/// `labelgs blocks merge`.
+/// `labelgs blocks join`.
 #[derive(Args, Clone, Debug)]
-pub struct MergeArgs {
+pub struct JoinArgs {
     /// Folder that `labelgs blocks split` wrote.
     #[arg(value_name = "BLOCKS")]
     pub blocks: PathBuf,
@@ -36,8 +36,8 @@ pub struct MergeArgs {
     pub json: JsonFlag,
 }
 
-/// Merges the blocks.
-pub(super) fn run(args: &MergeArgs, context: &Context) -> Result<()> {
+/// Joins the blocks.
+pub(super) fn run(args: &JoinArgs, context: &Context) -> Result<()> {
     let open = || open_gpu(context);
     let masks = args.scene.as_deref().zip(args.block_masks.as_deref());
     let masks = masks.map(|(scene, masks)| BlockMasks { scene, masks, open: &open });

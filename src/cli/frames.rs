@@ -1,4 +1,4 @@
-//! `labelgs densify`: a video through the photos. An object tracker loses fewer objects in it than between the photos.
+//! `labelgs frames`: a video through the photos. An object tracker loses fewer objects in it than between the photos.
 
 use super::args::{JsonFlag, SceneArgs};
 use super::context::{Context, open_model};
@@ -29,9 +29,9 @@ pub enum Order {
     Name,
 }
 
-/// `labelgs densify`.
+/// `labelgs frames`.
 #[derive(Args, Clone, Debug)]
-pub struct DensifyArgs {
+pub struct FramesArgs {
     /// The model: a PLY, SPZ, GLB, SOG or .splat, or the folder of a `labelgs train` run.
     #[arg(value_name = "MODEL")]
     pub model: PathBuf,
@@ -69,7 +69,7 @@ pub struct DensifyArgs {
 }
 
 /// Renders the video.
-pub(crate) fn run(args: &DensifyArgs, context: &Context) -> Result<()> {
+pub(crate) fn run(args: &FramesArgs, context: &Context) -> Result<()> {
     let (model, near) = (open_model(&args.model)?, near_plane(&args.model, args.near)?);
     let dataset = open_scene(&args.scene, &args.reading, None, args.background, false)?;
     let views = ordered_views(args, &dataset)?;
@@ -120,7 +120,7 @@ pub(crate) fn run(args: &DensifyArgs, context: &Context) -> Result<()> {
 }
 
 /// Returns the views in the order of the video.
-fn ordered_views<'a>(args: &DensifyArgs, dataset: &'a Dataset) -> Result<Vec<&'a View>> {
+fn ordered_views<'a>(args: &FramesArgs, dataset: &'a Dataset) -> Result<Vec<&'a View>> {
     let views: Vec<&View> = if args.include_test { dataset.all() } else { dataset.train.iter().collect() };
     if views.is_empty() {
         let cure = "no view is left; use a larger --test-every or --include-test";

@@ -1,4 +1,4 @@
-//! `labelgs blocks plan` and `labelgs blocks split`.
+//! `labelgs blocks split`.
 
 use crate::Result;
 use crate::blocks::{self, Plan, PlanOptions};
@@ -14,15 +14,21 @@ use glam::DVec3;
 use serde_json::{Value, json};
 use std::path::PathBuf;
 
-/// `labelgs blocks plan`.
+/// `labelgs blocks split`.
 #[derive(Args, Clone, Debug)]
-pub struct DivideArgs {
+pub struct SplitArgs {
     /// Folder or file of the scene.
     #[arg(value_name = "SCENE")]
     pub scene: PathBuf,
     /// Folder of a training of the whole scene, of low resolution or few Gaussians.
     #[arg(long, value_name = "COARSE")]
     pub model: PathBuf,
+    /// New folder for the blocks.
+    #[arg(short, long, value_name = "BLOCKS", required_unless_present = "dry_run")]
+    pub output: Option<PathBuf>,
+    /// Show the blocks, with Gaussians, memory and time of each, and write nothing.
+    #[arg(long, conflicts_with = "output")]
+    pub dry_run: bool,
     /// Memory of the card that trains the blocks, such as 24G.
     #[arg(long, value_name = "SIZE", value_parser = bytes)]
     pub card: u64,
@@ -52,31 +58,15 @@ pub struct DivideArgs {
     pub json: JsonFlag,
 }
 
-/// `labelgs blocks split`.
-#[derive(Args, Clone, Debug)]
-pub struct SplitArgs {
-    /// How it is divided.
-    #[command(flatten)]
-    pub divide: DivideArgs,
-    /// New folder for the blocks.
-    #[arg(short, long, value_name = "BLOCKS")]
-    pub output: PathBuf,
-}
-
-/// Shows the blocks.
-pub(super) fn plan(args: &DivideArgs, context: &Context) -> Result<()> {
-    show(args, context, &planned(args, context)?)
-}
-
 /// Writes the blocks and shows them.
-pub(super) fn split(args: &SplitArgs, context: &Context) -> Result<()> {
-    atomic::require_empty("--output", &args.output)?;
-    let plan = planned(&args.divide, context)?;
-    blocks::split(&plan, &args.output)?;
-    show(&args.divide, context, &plan)
+pub(super) fn run(args: &SplitArgs, context: &Context) -> Result<()> {
+    args.output.as_ref().map_or(Ok(()), |folder| atomic::require_empty("--output", folder))?;
+    let plan = planned(args, context)?;
+    args.output.as_ref().map_or(Ok(()), |folder| blocks::split(&plan, folder))?;
+    show(args, context, &plan)
 }
 
-fn planned(args: &DivideArgs, context: &Context) -> Result<Plan> {
+fn planned(args: &SplitArgs, context: &Context) -> Result<Plan> {
     let options = PlanOptions {
         card: args.card,
         gaussians: args.gaussians.unwrap_or(0),
@@ -90,7 +80,7 @@ fn planned(args: &DivideArgs, context: &Context) -> Result<Plan> {
     blocks::plan(&args.scene, &args.model, &options, &|| open_gpu(context))
 }
 
-fn show(args: &DivideArgs, context: &Context, plan: &Plan) -> Result<()> {
+fn show(args: &SplitArgs, context: &Context, plan: &Plan) -> Result<()> {
     if context.json || args.json.json {
         return stdout::print_json(&to_json(args, plan));
     }
@@ -128,6 +118,6 @@ fn to_text(plan: &Plan) -> String {
     )
 }
 
-fn to_json(args: &DivideArgs, plan: &Plan) -> Value {
+fn to_json(args: &SplitArgs, plan: &Plan) -> Value {
     json!({ "schema_version": 1, "card": args.card, "far": plan.far, "blocks": plan.rows() })
 }

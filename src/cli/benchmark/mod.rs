@@ -1,10 +1,12 @@
-//! `labelgs eval --protocol`: a published benchmark.
+//! `labelgs benchmark`: the scores of a published benchmark, with its masks, its choice of objects and its averages.
 
-use super::table::bench_table;
-use super::watch::Watcher;
-use super::{EvalArgs, put_out};
+mod table;
+
+use crate::cli::args::SceneArgs;
 use crate::cli::context::{Context, open_model};
+use crate::cli::labelled::TableArg;
 use crate::cli::scene::{near_plane, open_gpu, open_scene, render_engine};
+use crate::cli::scored::{ScoreArgs, Watcher};
 use crate::eval::lpips::Weights;
 use crate::eval::protocol::bench::Bench;
 use crate::eval::protocol::paint::EnginePainter;
@@ -17,22 +19,59 @@ use crate::io::truth::{files_below, read_truth};
 use crate::scene::{Dataset, UNLABELLED, View};
 use crate::words::did_you_mean;
 use crate::{Error, Result};
+use clap::Args;
 use std::collections::BTreeSet;
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use table::table;
+
+/// `labelgs benchmark`.
+#[derive(Args, Clone, Debug)]
+pub struct BenchmarkArgs {
+    /// The model: a PLY, SPZ, GLB, SOG or .splat, or the folder of a `labelgs train` run.
+    #[arg(value_name = "MODEL")]
+    pub model: PathBuf,
+    /// Scene of the benchmark.
+    #[arg(long, value_name = "SCENE")]
+    pub scene: PathBuf,
+    /// The benchmark.
+    #[arg(long, value_name = "NAME", value_enum)]
+    pub protocol: Protocol,
+    /// Folder with the benchmark's masks of this scene.
+    #[arg(long, value_name = "DIR")]
+    pub truth: PathBuf,
+    /// How objects are chosen. Default: the rule of the benchmark, which is by name for lerf-mask and 3d-ovs.
+    #[arg(long, value_name = "HOW", value_enum)]
+    pub by: Option<By>,
+    /// Score only these objects, names with commas between.
+    #[arg(long, value_name = "NAMES", value_delimiter = ',')]
+    pub objects: Vec<String>,
+    /// Follow the published scorer, mistakes included; only for labelgs and lerf-mask.
+    #[arg(long)]
+    pub compat: bool,
+    /// Names.
+    #[command(flatten)]
+    pub table: TableArg,
+    /// How it is scored.
+    #[command(flatten)]
+    pub scoring: ScoreArgs,
+    /// How the scene is read.
+    #[command(flatten)]
+    pub reading: SceneArgs,
+}
 
 /// Runs the benchmark.
-pub(super) fn run(protocol: Protocol, args: &EvalArgs, context: &Context) -> Result<()> {
+pub(crate) fn run(args: &BenchmarkArgs, context: &Context) -> Result<()> {
+    let protocol = args.protocol;
     if args.compat && !protocol.has_scorer() {
         let problem = format!("no published scorer of {} is known; it is for labelgs and lerf-mask", protocol.name());
         return Err(Error::usage("--compat", problem));
     }
-    let Some(folder) = &args.truth else { return Err(Error::usage("--truth", "is missing; --protocol needs it")) };
-    let root = protocol.root(folder);
+    let root = protocol.root(&args.truth);
     let by = args.by.unwrap_or(protocol.chooses_by());
     let mut layout = read_layout(protocol, &root, by, args)?;
     keep_objects(&mut layout, &args.objects)?;
     let names = read_names(args, &layout)?;
-    let weights = args.lpips.as_deref().map(Weights::read).transpose()?;
+    let weights = args.scoring.lpips.as_deref().map(Weights::read).transpose()?;
     let model = open_model(&args.model)?;
     if model.labels.is_none() {
         return Err(Error::data(
@@ -57,24 +96,24 @@ pub(super) fn run(protocol: Protocol, args: &EvalArgs, context: &Context) -> Res
         lpips: weights.as_ref().map(|weights| weights as &dyn Distance),
     };
     bench.check(&layout, &root)?;
-    let mut watcher = Watcher::new(picture_count(&layout), args.page.as_deref(), context)?;
+    let mut watcher = Watcher::new(picture_count(&layout), args.scoring.page.as_deref(), context)?;
     let sizes = views.iter().map(|view| (view.camera.width, view.camera.height));
-    let mut engine = render_engine(open_gpu(context)?, &model, sizes, args.memory.options())?;
+    let mut engine = render_engine(open_gpu(context)?, &model, sizes, args.scoring.memory.options())?;
     let mut painter = EnginePainter::new(
         &mut engine,
         &model,
-        near_plane(&args.model, args.near)?,
-        args.sure.min_confidence,
+        near_plane(&args.model, args.scoring.near)?,
+        args.scoring.sure.min_confidence,
         args.compat,
     );
     let report = run_bench(&layout, &bench, &mut painter, &mut watcher)?;
-    let table = bench_table(&report);
+    let table = table(&report);
     watcher.finish(&table)?;
-    put_out(&report, &table, args, context)?;
-    report.check(args.min_psnr, args.min_iou)
+    args.scoring.put_out(&report, &table, context)?;
+    report.check(args.scoring.min_psnr, args.scoring.min_iou)
 }
 
-fn read_layout(protocol: Protocol, root: &Path, by: By, args: &EvalArgs) -> Result<Layout> {
+fn read_layout(protocol: Protocol, root: &Path, by: By, args: &BenchmarkArgs) -> Result<Layout> {
     let files = files_below(root)?;
     let list = root.join("classes.txt");
     let classes = if list.is_file() { Some(read::text(&list)?) } else { None };
@@ -101,8 +140,8 @@ fn keep_objects(layout: &mut Layout, wanted: &[String]) -> Result<()> {
 }
 
 /// Reads the names of the labels. Fails if objects are chosen by name and no name is known.
-fn read_names(args: &EvalArgs, layout: &Layout) -> Result<Option<LabelTable>> {
-    let found = args.names.clone().or_else(|| LabelTable::find_for_model(&args.model));
+fn read_names(args: &BenchmarkArgs, layout: &Layout) -> Result<Option<LabelTable>> {
+    let found = args.table.label_table.clone().or_else(|| LabelTable::find_for_model(&args.model));
     let names = found.as_deref().map(LabelTable::read).transpose()?;
     let named: Vec<&str> =
         layout.tasks.iter().filter(|task| task.prompt == Prompt::Name).map(|task| task.object.as_str()).collect();
@@ -112,7 +151,7 @@ fn read_names(args: &EvalArgs, layout: &Layout) -> Result<Option<LabelTable>> {
         return Ok(names);
     }
     let Some((file, table)) = found.zip(names) else {
-        let problem = "the model has no labels.json, and objects are chosen by name; write one, use --names FILE, or \
+        let problem = "the model has no labels.json, and objects are chosen by name; write one, use --label-table FILE, or \
                        choose by masks with --by prompt";
         return Err(Error::data(&args.model, "", problem));
     };
