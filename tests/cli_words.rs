@@ -93,7 +93,9 @@ fn flags_and_commands_are_found_as_hands_type_them() {
     }
     // A score of its own.
     let line = ["labelgs", "eval", "out", "--scene", "scene", "--lpips", "vgg.safetensors"];
-    assert!(matches!(Cli::try_parse_from(line).expect("flags").command, Verb::Eval(args) if args.scoring.lpips.is_some()));
+    assert!(
+        matches!(Cli::try_parse_from(line).expect("flags").command, Verb::Eval(args) if args.scoring.lpips.is_some())
+    );
 }
 
 #[test]

@@ -14,8 +14,7 @@ use crate::gpu::Gpu;
 use crate::io::label_table::LabelTable;
 use crate::io::model::export_model;
 use crate::label::masks::agree::{Agreement, MIN_VIEWS, agree};
-use crate::label::vote::lift::Lift;
-use crate::label::vote::model::{Counting, columns_of, label_by_lift, label_by_votes, vote_engine};
+use crate::label::vote::model::{Counting, ROUNDS, columns_of, label_by_lift, label_by_votes, vote_engine};
 use crate::scene::{Gaussians, View};
 use crate::stage::Stage;
 use crate::train::LabelRule;
@@ -50,33 +49,15 @@ pub struct LabelArgs {
     #[command(flatten)]
     pub write: WriteArgs,
     /// How a Gaussian gets its label: by the votes of all views, or as in the paper's training, from the last view in
-    /// which it is the main Gaussian of a pixel. --seed draws the order of the views.
+    /// which it is the main Gaussian of a pixel.
     #[arg(long, value_name = "RULE", value_enum, default_value = "votes", help_heading = "Labels")]
     pub rule: LabelRule,
-    /// Seed of the order of the views. Only for the rule `main`.
-    #[arg(long, value_name = "SEED", default_value_t = 0, help_heading = "Labels")]
-    pub seed: u64,
-    /// Least blending weight that gives a label. Only for the rule `main`.
-    #[arg(long, value_name = "WEIGHT", default_value_t = 0.6, help_heading = "Labels")]
-    pub label_threshold: f32,
-    /// Leave out the Gaussian projection filter. Only for the rule `main`.
-    #[arg(long, help_heading = "Labels")]
-    pub no_gpf: bool,
-    /// Rounds of counting votes. From the second round on, masks that disagree with all others count less.
-    #[arg(
-        long, value_name = "N", default_value_t = 2, value_parser = clap::value_parser!(u32).range(1..=10),
-        help_heading = "Labels"
-    )]
-    pub rounds: u32,
     /// Ignore the votes of pixels within this distance of a mask's contour, px; 2 suits masks of trackers.
     #[arg(long, value_name = "PX", default_value_t = 0, help_heading = "Labels")]
     pub mask_border: u32,
     /// Least share of a Gaussian's votes that its label needs; below, the Gaussian gets no label.
     #[arg(long, value_name = "SHARE", default_value_t = 0.0, help_heading = "Labels")]
     pub min_confidence: f32,
-    /// Leave Gaussians without votes unlabelled. Otherwise they take the label of their neighbours.
-    #[arg(long, help_heading = "Labels")]
-    pub no_complete: bool,
     /// Near plane, world units: nearer Gaussians are not seen. Default: the value of the model's run, else 0.2.
     #[arg(long, value_name = "Z", value_parser = near, help_heading = "Rendering")]
     pub near: Option<f32>,
@@ -109,18 +90,11 @@ pub(crate) fn run(args: &LabelArgs, context: &Context) -> Result<()> {
     };
     let views: Vec<&View> = dataset.train.iter().collect();
     let mut engine = vote_engine(gpu, &model, &views, columns_of(&views))?;
-    let mut progress = Progress::new(u64::from(args.rounds), "rounds", &context.global);
+    let mut progress = Progress::new(u64::from(ROUNDS), "rounds", &context.global);
     if args.rule == LabelRule::Main {
-        let how = Lift { threshold: args.label_threshold, gpf: !args.no_gpf };
-        label_by_lift(&mut engine, &mut model, &views, (near, how, args.seed))?;
+        label_by_lift(&mut engine, &mut model, &views, near)?;
     } else {
-        let how = Counting {
-            near,
-            mask_border: args.mask_border,
-            rounds: args.rounds,
-            complete: !args.no_complete,
-            min_confidence: args.min_confidence,
-        };
+        let how = Counting { near, mask_border: args.mask_border, min_confidence: args.min_confidence };
         label_by_votes(&mut engine, &mut model, &views, &how, &mut |round| {
             progress.set(u64::from(round), String::new)
         })?;

@@ -35,7 +35,7 @@ impl Trainer {
         let voters = self.views.voters();
         // Masks that disagree with the labels of the model have less weight.
         let is_judged = self.labelled_once;
-        let mut decision = decide::count(&mut self.engine, &voters, is_judged, &means, how, true)?;
+        let mut decision = decide::count(&mut self.engine, &voters, is_judged, &means, how)?;
         let trained = self.engine.trained_count() as usize;
         if trained < decision.labels.len() {
             // The views of a part of a scene know little of what is frozen.
