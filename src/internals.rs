@@ -8,19 +8,19 @@ pub mod cli {
         pub use crate::cli::command::{Cli, Command, command};
     }
     pub mod context {
-        pub use crate::cli::context::open_model;
+        pub use crate::cli::support::context::open_model;
     }
     pub mod profile_compare {
-        pub use crate::cli::profile_compare::{Profile, compare};
+        pub use crate::cli::commands::profile::compare::{Profile, compare};
     }
     pub mod scene {
-        pub use crate::cli::scene::near_plane;
+        pub use crate::cli::support::scene::near_plane;
     }
     pub mod status {
-        pub use crate::cli::status::exit_status;
+        pub use crate::cli::support::exit_status::exit_status;
     }
     pub mod wording {
-        pub use crate::cli::wording::flag;
+        pub use crate::cli::support::setting_names::flag;
     }
 }
 pub mod edit {

@@ -197,6 +197,7 @@ fn settings_in_messages_are_typed() {
     }
     let mut flags = std::collections::BTreeSet::new();
     fields(&labelgs::internals::cli::command::command(), &mut flags);
+    flags.extend(labelgs::run::Settings::keys().map(|key| key.name.to_owned()));
     let mut wrong = Vec::new();
     for (path, text) in files("src", &["rs"]) {
         let code = text.split("#[cfg(test)]").next().unwrap_or_default();

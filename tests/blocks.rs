@@ -120,7 +120,7 @@ fn train_block(place: &Place, id: &str, flags: &[&str]) -> std::process::Output 
 
 fn merge(place: &Place, flags: &[&str]) -> std::process::Output {
     let (blocks, models, out) = (place.text("blocks"), place.text("models"), place.text("city"));
-    place.labelgs(&[&["blocks", "merge", &blocks, "-m", &models, "-o", &out], flags].concat())
+    place.labelgs(&[&["blocks", "join", &blocks, "-m", &models, "-o", &out], flags].concat())
 }
 
 fn model_of(place: &Place, folder: &str) -> Gaussians {
@@ -143,7 +143,7 @@ fn a_scene_is_split_trained_and_merged() {
         assert_eq!(cores, 1, "{at}");
     }
     let (scene, model) = (place.text("scene"), place.text("coarse"));
-    let typed = ["blocks", "plan", &scene, "--model", &model, "--card", "8G", "--blocks", "2", "--json"];
+    let typed = ["blocks", "split", &scene, "--model", &model, "--card", "8G", "--blocks", "2", "--dry-run", "--json"];
     let plan: Value = serde_json::from_slice(&place.labelgs(&typed).stdout).expect("JSON");
     assert_eq!(plan["blocks"][1]["frozen"].as_u64(), Some(file.blocks[1].frozen));
     for id in ids {

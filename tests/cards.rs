@@ -62,7 +62,7 @@ fn kernels_compile_for_cards_as_the_tables_say() {
     let out = Path::new("target/kernels");
     fs::create_dir_all(out).expect("a folder");
     for family in FAMILIES {
-        let output = on(&driver, family, &["devices", "--kernels"]);
+        let output = on(&driver, family, &["kernels"]);
         // The status is 1 if a kernel spills.
         assert_eq!(output.status.code(), Some(0), "{family}: {}", text(&output.stderr));
         let (new, file) = (text(&output.stdout), format!("{family}.txt"));
@@ -152,7 +152,7 @@ fn a_driver_without_statistics_is_named() {
     if !crate::support::device().is_some_and(|turn| turn.is_cpu()) {
         return;
     }
-    let output = Command::cargo_bin("labelgs").expect("the tool is built").args(["devices", "--kernels"]).output();
+    let output = Command::cargo_bin("labelgs").expect("the tool is built").args(["kernels"]).output();
     let output = output.expect("it runs");
     assert_eq!(output.status.code(), Some(4), "{}", text(&output.stderr));
     assert!(text(&output.stderr).contains("lacks VK_KHR_pipeline_executable_properties"), "{}", text(&output.stderr));

@@ -5,8 +5,7 @@ use clap::Parser;
 use labelgs::internals::cli::command::{Cli, Command as Verb, command};
 use labelgs::internals::cli::wording::flag;
 use labelgs::io::{read_model, write_model};
-use labelgs::run::Occlusion;
-use labelgs::run::Settings;
+use labelgs::run::{Occlusion, Settings, TrainConfig};
 use labelgs::scene::Gaussians;
 use serde_json::Value;
 use std::collections::BTreeSet;
@@ -71,47 +70,82 @@ fn every_flag_is_explained_once() {
 }
 
 #[test]
-fn every_setting_has_a_flag_with_its_default() {
+fn every_setting_has_help_with_its_default_and_those_that_more_people_need_have_a_flag() {
     let root = command();
     let verb = root.find_subcommand("train").expect("train");
+    let list = text(&labelgs(&["train", "--settings"]).stdout);
     for key in Settings::keys() {
-        let arg =
-            verb.get_arguments().find(|arg| arg.get_id() == key.name).unwrap_or_else(|| panic!("no {}", key.name));
-        assert_eq!(arg.get_long().map(|long| format!("--{long}")), Some(flag(key.name)));
-        for help in [arg.get_help(), arg.get_long_help()].into_iter().flatten().map(ToString::to_string) {
-            assert!(help.contains("[default: "), "{}: {help}", key.name);
+        let arg = verb.get_arguments().find(|arg| arg.get_id() == key.name);
+        assert_eq!(arg.is_some(), key.is_flag, "{}", key.name);
+        if let Some(arg) = arg {
+            assert_eq!(arg.get_long().map(|long| format!("--{long}")), Some(flag(key.name)));
+            for help in [arg.get_help(), arg.get_long_help()].into_iter().flatten().map(ToString::to_string) {
+                assert!(help.contains("[default: "), "{}: {help}", key.name);
+            }
         }
+        let name = if key.is_flag { flag(key.name) } else { format!("--set {}=", key.name) };
+        let line = list.lines().find(|line| line.trim_start().starts_with(&name));
+        assert!(line.is_some_and(|line| line.contains("[default: ")), "{name} is not in\n{list}");
     }
+    let flags = verb.get_arguments().filter(|arg| !arg.is_positional()).count();
+    assert!(flags + root.get_arguments().filter(|arg| arg.is_global_set()).count() <= 43, "{flags} flags");
     // Links of rustdoc must not appear in the help.
     for verb in root.get_subcommands() {
         let help = verb.clone().render_long_help().to_string();
         assert!(!help.contains("[`") && !help.contains("`]"), "{help}");
     }
-    let help = text(&labelgs(&["train", "--help"]).stdout);
     // Lines of the help are wrapped, so compare without line breaks.
-    let help = help.split_whitespace().collect::<Vec<_>>().join(" ");
-    for default in ["[default: 7000]", "[default: 0.6]", "[default: 0.00016]", "[default: rendered]", "[default: on]"] {
-        assert!(help.contains(default), "{default} is not in\n{help}");
-    }
+    let words = |text: &str| text.split_whitespace().collect::<Vec<_>>().join(" ");
+    let help = words(&text(&labelgs(&["train", "--help"]).stdout));
+    assert!(help.contains("[default: 7000]") && help.contains("[default: off]"), "{help}");
     assert!(
         help.contains(
-            "where ours differ: --iterations 15000 --start-size 1.0 --full-size-from 0 --exposure off --strategy adc --free-space off --far-points 0"
-        ) && help.contains("--label-rule main")
-            && help.contains("--densify-until 40000 --densify-interval 100 --opacity-reset-interval 3000"),
+            "where ours differ: --iterations 15000 --set start_size=1.0 --set full_size_from=0 --set depth_weight=0.0"
+        ) && help.contains("--set label_rule=main")
+            && help.contains("--exposure off --set strategy=adc --set free_space=off --set far_points=0")
+            && help.contains("--set densify_until=40000 --set densify_interval=100 --set opacity_reset_interval=3000"),
         "{help}"
     );
-    for heading in [
-        "Options:",
-        "Training:",
-        "Labels:",
-        "Densification:",
-        "Learning rates:",
-        "Rendering:",
-        "Scene:",
-        "Device:",
-        "Output:",
-    ] {
+    for heading in ["Options:", "Training:", "Labels:", "Densification:", "Rendering:", "Scene:", "Device:", "Output:"]
+    {
         assert!(help.contains(heading), "{heading} is not in\n{help}");
+    }
+    let one = words(&text(&labelgs(&["train", "--settings", "label_rule"]).stdout));
+    assert!(one.starts_with("--set label_rule=<RULE> main, votes cannot change within a run Rule that"), "{one}");
+    let unknown = labelgs(&["train", "--settings", "labl_rule"]);
+    assert_eq!(unknown.status.code(), Some(2));
+    assert!(text(&unknown.stderr).contains("no setting labl_rule; did you mean label_rule"), "{unknown:?}");
+}
+
+/// A switch that is a flag stands alone, so that it can only turn on.
+#[test]
+fn a_switch_with_a_flag_is_off_by_default() {
+    let defaults = Settings::default().texts();
+    let on = Settings::keys().filter(|key| key.is_flag && defaults.get(key.name).is_some_and(|text| text == "on"));
+    assert_eq!(on.map(|key| key.name).collect::<Vec<_>>(), Vec::<&str>::new());
+    assert!(train(&["--antialias"]).expect("decided").train.antialias);
+    assert!(Cli::try_parse_from(["labelgs", "train", "scene", "-o", "out", "--antialias", "on"]).is_err());
+    assert!(!train(&["--preset", "best", "--set", "antialias=off"]).expect("decided").train.antialias);
+}
+
+#[test]
+fn a_setting_is_given_once_and_by_a_known_name() {
+    for (typed, expected) in [
+        (&["--set", "seed=1", "--seed", "2"][..], "--set seed: --seed sets it too; leave out one"),
+        (&["--set", "seed=1", "--set", "seed=2"], "--set seed: is given twice; leave out one"),
+        (&["--set", "label_wait=1"], "there is no setting label_wait; did you mean label_weight"),
+        (&["--set", "label_weight"], "expected KEY=VALUE, such as label_weight=0.3"),
+        (&["--set", "label_rule=most"], "`most` is none of main, votes"),
+        (&["--set", "label_from=soon"], "`soon` is not a whole number"),
+        (&["--set", "rate_final=half"], "`half` is not a number"),
+        (&["--set", "sh_degree=4"], "--set sh_degree: is 4, needs 0 to 3"),
+        (&["--block", "b", "--set", "grow_box=0,0,0,1,1,1"], "grow-box: cannot be given with a block"),
+        (&["--occluders", "o.json", "--set", "occlusion=none"], "--set occlusion: cannot be given with --occluders"),
+    ] {
+        let output = labelgs(&[&["train", "scene", "-o", "out"], typed].concat());
+        let message = text(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{message}");
+        assert!(message.contains(expected), "{message}");
     }
 }
 
@@ -180,71 +214,63 @@ fn a_flag_has_one_heading() {
 }
 
 /// A value other than the default for each setting; none for a flag that needs none.
-const TYPED: [(&str, &str); 66] = [
+const TYPED: [(&str, &str); 58] = [
     ("--iterations", "7"),
     ("--max-resolution", "99"),
-    ("--start-size", "0.7"),
-    ("--full-size-from", "4"),
-    ("--strategy", "adc"),
+    ("--set", "start_size=0.7"),
+    ("--set", "full_size_from=4"),
+    ("--set", "strategy=adc"),
     ("--budget", "9k"),
-    ("--prune-share", "0.2"),
-    ("--contour-share", "0.1"),
-    ("--free-space", "off"),
-    ("--far-points", "30"),
+    ("--set", "prune_share=0.2"),
+    ("--set", "contour_share=0.1"),
+    ("--set", "free_space=off"),
+    ("--set", "far_points=30"),
     ("--exposure", "off"),
-    ("--random-background", "on"),
-    ("--depth-weight", "0.1"),
-    ("--antialias", "on"),
+    ("--random-background", ""),
+    ("--set", "depth_weight=0.1"),
+    ("--antialias", ""),
     ("--refine-poses", ""),
     ("--grow-box", "-1,-2,0,1,2,3.5"),
-    ("--rate-factor", "1.5"),
-    ("--rate-final", "0.5"),
-    ("--rate-fall-from", "6"),
+    ("--set", "rate_factor=1.5"),
+    ("--set", "rate_final=0.5"),
     ("--test-every", "5"),
     ("--seed", "11"),
     ("--max-gaussians", "2.5M"),
     ("--background", "0.1,0.2,1"),
-    ("--near", "0.1"),
-    ("--label-from", "3"),
-    ("--label-rule", "main"),
-    ("--vote-every", "70"),
-    ("--vote-trust", "off"),
+    ("--set", "near=0.1"),
+    ("--set", "label_from=3"),
+    ("--set", "label_rule=main"),
+    ("--set", "vote_every=70"),
     ("--mask-border", "3"),
-    ("--label-threshold", "0.7"),
-    ("--gpf", "off"),
-    ("--layer-every", "1"),
-    ("--label-samples", "4"),
-    ("--label-weight", "0.5"),
-    ("--label-balance", "on"),
-    ("--label-alpha", "0.2"),
-    ("--occlusion", "none"),
-    ("--occlusion-every", "10"),
-    ("--lambda-dssim", "0.3"),
-    ("--sh-degree", "1"),
-    ("--sh-degree-interval", "20"),
-    ("--position-lr-init", "1e-3"),
-    ("--position-lr-final", "1e-5"),
-    ("--position-lr-max-steps", "40"),
-    ("--feature-lr", "0.1"),
-    ("--feature-rest-lr", "0.2"),
-    ("--opacity-lr", "0.3"),
-    ("--scaling-lr", "0.4"),
-    ("--rotation-lr", "0.5"),
-    ("--opacity-weight", "0.02"),
-    ("--scale-weight", "0.03"),
-    ("--detail", "0.25"),
-    ("--densify-from", "1"),
-    ("--densify-until", "2"),
-    ("--densify-interval", "3"),
-    ("--densify-grad-threshold", "0.1"),
-    ("--percent-dense", "0.2"),
-    ("--min-opacity", "0.01"),
-    ("--max-scale", "0.3"),
-    ("--opacity-reset-interval", "8"),
-    ("--opacity-reset-margin", "9"),
-    ("--save-at", "2000,5000"),
+    ("--set", "label_threshold=0.7"),
+    ("--set", "gpf=off"),
+    ("--set", "layer_every=1"),
+    ("--set", "label_samples=4"),
+    ("--set", "label_weight=0.5"),
+    ("--set", "label_balance=on"),
+    ("--set", "label_alpha=0.2"),
+    ("--set", "occlusion=none"),
+    ("--set", "occlusion_every=10"),
+    ("--set", "sh_degree=1"),
+    ("--set", "sh_degree_interval=20"),
+    ("--set", "position_lr_init=1e-3"),
+    ("--set", "position_lr_final=1e-5"),
+    ("--set", "feature_lr=0.1"),
+    ("--set", "opacity_lr=0.3"),
+    ("--set", "scaling_lr=0.4"),
+    ("--set", "rotation_lr=0.5"),
+    ("--set", "opacity_weight=0.02"),
+    ("--set", "scale_weight=0.03"),
+    ("--set", "detail=0.25"),
+    ("--set", "densify_from=1"),
+    ("--set", "densify_until=2"),
+    ("--set", "densify_interval=3"),
+    ("--set", "densify_grad_threshold=0.1"),
+    ("--set", "opacity_reset_interval=8"),
+    ("--set", "opacity_reset_margin=9"),
+    ("--set", "save_at=2000,5000"),
     ("--poses", "opengl"),
-    ("--preview-every", "6"),
+    ("--set", "preview_every=6"),
     ("--checkpoint-every", "12"),
     ("--photo-memory", "2.5G"),
 ];
@@ -256,16 +282,17 @@ fn every_setting_follows_its_flag() {
     let changed = train(&all).expect("decided");
     let (texts, defaults) = (changed.texts(), Settings::default().texts());
     for key in Settings::keys() {
-        assert!(TYPED.iter().any(|(name, _)| *name == flag(key.name)), "{} is not tried", key.name);
+        let is_tried = |&(name, value): &(&str, &str)| match value.split_once('=').filter(|_| name == "--set") {
+            Some((name, _)) => !key.is_flag && name == key.name,
+            None => key.is_flag && name == flag(key.name),
+        };
+        assert!(TYPED.iter().any(is_tried), "{} is not tried", key.name);
         assert_ne!(texts.get(key.name), defaults.get(key.name), "{} is out of reach", key.name);
     }
     assert_eq!(changed.train.max_gaussians, 2_500_000);
     assert_eq!(changed.run.save_at, [2000, 5000]);
-    assert_eq!(train(&["--no-test"]).expect("decided").read.test_every, 0);
-    assert_eq!(
-        train(&["--box", "-1,0,0,1,2,3"]).expect("decided").train.grow_box,
-        Some([-1.0, 0.0, 0.0, 1.0, 2.0, 3.0])
-    );
+    assert_eq!(train(&["--set", "grow_box=-1,-2,0,1,2,3.5"]).expect("decided").train.grow_box, changed.train.grow_box);
+    assert_eq!(train(&["--set", "max-gaussians=2.5M"]).expect("decided").train.max_gaussians, 2_500_000, "as a flag");
     assert_eq!(train(&["--background", "white"]).expect("decided").train.background, [1.0; 3]);
     assert_eq!(train(&[]).expect("decided"), Settings::default());
 }
@@ -279,10 +306,9 @@ fn presets_decide_length_and_detail_and_flags_override_them() {
     let long = of(&["--preset", "best"]);
     assert!(long.iterations == 30_000 && long.detail > of(&[]).detail);
     assert_eq!(of(&["--preset", "best", "--iterations", "500"]).iterations, 500);
-    for other in [&["--paper"][..], &["--config", "settings.toml"]] {
-        let line = ["labelgs", "train", "scene", "-o", "out", "--preset", "draft"].iter().chain(other);
-        assert!(Cli::try_parse_from(line).is_err(), "{other:?}");
-    }
+    assert_eq!(of(&["--preset", "paper"]), TrainConfig::paper());
+    let line = ["labelgs", "train", "scene", "-o", "out", "--preset", "draft", "--config", "settings.toml"];
+    assert!(Cli::try_parse_from(line).is_err());
 }
 
 #[test]
@@ -300,11 +326,11 @@ fn every_setting_of_a_file_survives_flags_that_nobody_typed() {
     for key in Settings::keys().filter(|key| key.name != "save_at") {
         let Some(default) = defaults.get(key.name) else { continue };
         let value = default.replace(['[', ']', ' '], "");
-        let flag = flag(key.name);
-        let texts = train(&["--config", file, &flag, &value]).expect("decided").texts();
+        let set = format!("{}={value}", key.name);
+        let texts = train(&["--config", file, "--set", &set]).expect("decided").texts();
         let mut expected = written.texts();
         expected.insert(key.name.to_owned(), default.clone());
-        assert_eq!(texts, expected, "{flag} {value}");
+        assert_eq!(texts, expected, "{set}");
     }
 }
 
@@ -339,9 +365,9 @@ fn values_that_make_no_sense_are_usage_errors() {
         &["paint"],
         &["list"],
         &["train", "scene"],
-        &["train", "scene", "-o", "out", "--gpf", "maybe"],
-        &["train", "scene", "-o", "out", "--box", "1,0,0,0,1,1"],
-        &["train", "scene", "-o", "out", "--box", "0,0,0,1,1"],
+        &["train", "scene", "-o", "out", "--set", "gpf=maybe"],
+        &["train", "scene", "-o", "out", "--grow-box", "1,0,0,0,1,1"],
+        &["train", "scene", "-o", "out", "--grow-box", "0,0,0,1,1"],
         &["synth", "x", "--size", "320"],
         &["extract", "model.ply", "-o", "x.ply"],
         &["extract", "model.ply", "-o", "x.ply", "--labels", "3-1"],

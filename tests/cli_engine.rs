@@ -60,6 +60,10 @@ fn the_sizes_of_a_plan_add_up_to_its_total() {
     {
         assert!(table.contains(part), "{part} is not in\n{table}");
     }
+    let end: Vec<&str> = table.lines().rev().take(3).collect();
+    assert!(end[2].starts_with("needed: ") && end[2].contains(" MiB at the start, of "), "{end:?}");
+    assert!(end[1].starts_with("fits:    up to ") && end[1].contains(" Gaussians"), "{end:?}");
+    assert!(end[0].starts_with("lower:   half of "), "{end:?}");
     let plan = json(&succeeds(&[&args[..], &["--json"]].concat()));
     let sum = |key: &str| {
         let rows = plan["memory"]["buffers"].as_array().expect("buffers").iter();
@@ -86,6 +90,13 @@ fn a_plan_for_a_card_needs_no_card() {
     let total = plan["memory"]["total"].as_u64().expect("bytes");
     assert!((8 << 30..80 << 30).contains(&total), "{total} bytes");
     assert_eq!(labelgs(&args("8G")).status.code(), Some(5));
+    // The number that a plan says to fit does fit.
+    let plan = succeeds(&["plan", "--gaussians", "1M", "--card", "8G"]);
+    let most = plan.lines().find_map(|line| line.strip_prefix("fits:    up to ")).expect("a line");
+    let most = most.split(' ').next().expect("a number");
+    succeeds(&["plan", "--gaussians", most, "--card", "8G"]);
+    let more = format!("{}", most.parse::<u64>().expect("a number") * 101 / 100);
+    assert_eq!(labelgs(&["plan", "--gaussians", &more, "--card", "8G"]).status.code(), Some(5));
 }
 
 /// A scene of `labelgs synth`, 96 x 72 px.
@@ -212,7 +223,8 @@ fn a_made_scene_is_trained_scored_edited_and_rendered() {
     let scene = scene(folder.path());
     let path = |name: &str| folder.path().join(name).to_str().expect("UTF-8").to_owned();
     let (out, masks, object, rest) = (path("out"), format!("{scene}/masks"), path("object.ply"), path("rest.ply"));
-    let train = ["train", &scene, "-o", &out, "--masks", &masks, "--iterations", "150", "--label-from", "60", "--json"];
+    let train =
+        ["train", &scene, "-o", &out, "--masks", &masks, "--iterations", "150", "--set", "label_from=60", "--json"];
     let trained = json(&succeeds(&train));
     assert_eq!((&trained["steps"], trained["model"].is_string()), (&150.into(), true));
     assert!(trained["test"]["psnr"].as_f64() > Some(12.0), "{trained}");
@@ -241,12 +253,12 @@ fn a_made_scene_is_trained_scored_edited_and_rendered() {
         let file = format!("{truth}/{view}/{object}.png");
         labelgs::internals::io::image::write_png_grey8(file, mask.width, mask.height, &bytes).expect("written");
     }
-    let by_name = ["eval", &out, "--scene", &scene, "--protocol", "lerf-mask", "--truth", &truth, "--page", &page];
+    let by_name = ["benchmark", &out, "--scene", &scene, "--protocol", "lerf-mask", "--truth", &truth, "--page", &page];
     let found = json(&succeeds(&[&by_name[..], &["--json"]].concat()));
     assert_eq!((&found["mean"]["pair_count"], &found["missing"]), (&4.into(), &serde_json::json!([])), "{found}");
     assert!(found["objects"]["2"]["labels"][0] == 2 && found["objects"]["2"]["iou"].is_number(), "{found}");
     assert!(Path::new(&page).join("00004-difference.png").is_file() && Path::new(&page).join("index.html").is_file());
-    let by_mask = ["eval", &out, "--scene", &scene, "--protocol", "labelgs", "--truth", &truth];
+    let by_mask = ["benchmark", &out, "--scene", &scene, "--protocol", "labelgs", "--truth", &truth];
     let table = succeeds(&by_mask);
     assert!(table.contains("no weights") && table.contains("mean of objects"), "{table}");
 

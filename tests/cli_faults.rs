@@ -282,7 +282,7 @@ fn any_allocation_may_fail() {
     let Some(_turn) = device() else { return };
     let place = Place::new();
     let settings = place.settings();
-    let flags = ["--config", &settings, "--densify-grad-threshold", "1e-9"];
+    let flags = ["--config", &settings, "--set", "densify_grad_threshold=1e-9"];
     succeeded(&place.trained("right", &flags));
     let expected = place.model("right", 40);
     let (mut tried, mut went_on, mut bounded) = (0, 0, 0);
@@ -375,7 +375,7 @@ fn two_signals_end_a_slow_step_at_once() {
         let sent = Command::new("kill").args(["-INT", &child.id().to_string()]).status();
         assert!(sent.expect("kill").success());
     };
-    let long = ["--iterations", "5000", "--checkpoint-every", "0", "--save-at", "3", "--preview-every", "0"];
+    let long = ["--iterations", "5000", "--checkpoint-every", "0", "--set", "save_at=3", "--set", "preview_every=0"];
     let mut command = Command::new(env!("CARGO_BIN_EXE_labelgs"));
     command.env("LABELGS_VALIDATION", "off").env("LABELGS_CACHE", place.path("cache"));
     command.env("LABELGS_FAULT", "vkQueueSubmit:300:SLOW").args(place.train("twice", &long));

@@ -21,7 +21,7 @@ fn results(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
 fn exports_may_be_killed_at_any_moment() {
     let Some(_turn) = device() else { return };
     let place = Place::new();
-    succeeded(&place.trained("run", &["--iterations", "12", "--label-from", "2"]));
+    succeeded(&place.trained("run", &["--iterations", "12", "--set", "label_from=2"]));
     let (run, scene, masks) = (place.text("run"), place.text("scene"), place.text("scene/masks"));
     let model = place.text("run/point_cloud/iteration_12/point_cloud.ply");
     let out = place.text("out");

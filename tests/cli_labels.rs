@@ -35,7 +35,7 @@ fn a_model_without_labels_gets_them_and_mends_masks() {
     let path = |name: &str| folder.path().join(name).to_string_lossy().into_owned();
     let (scene, masks, plain, model) = (path("scene"), path("scene/masks"), path("plain"), path("labelled.ply"));
     labelgs(&["synth", &scene, "--preset", "simple", "--size", "96x72", "--views", "12", "--points", "1500", "-q"], 0);
-    labelgs(&["train", &scene, "--iterations", "250", "--preview-every", "0", "-o", &plain, "-q"], 0);
+    labelgs(&["train", &scene, "--iterations", "250", "--set", "preview_every=0", "-o", &plain, "-q"], 0);
 
     let found =
         json(&labelgs(&["label", &plain, "--scene", &scene, "--masks", &masks, "-o", &model, "--json", "-q"], 0));
@@ -88,9 +88,9 @@ fn an_ablation_compares_variants() {
     let path = |name: &str| folder.path().join(name).to_string_lossy().into_owned();
     let (scene, masks, out) = (path("scene"), path("scene/masks"), path("out"));
     labelgs(&["synth", &scene, "--preset", "simple", "--size", "64x48", "--views", "9", "--points", "500", "-q"], 0);
-    let common = ["--", "--iterations", "40", "--label-from", "10", "--preview-every", "0"];
+    let common = ["--", "--iterations", "40", "--set", "label_from=10", "--set", "preview_every=0"];
     let mut args = vec!["ablate", &scene, "--masks", &masks, "-o", &out, "--rows", "no-labels,ours", "-q"];
-    args.extend(["--row", "half=--label-weight 0.5"]);
+    args.extend(["--row", "half=--set label_weight=0.5"]);
     args.extend(common);
     let table = labelgs(&args, 0);
     for part in ["no-labels", "ours", "half", "iou_hidden", "quoted from the paper", "0.925 / 34.26"] {

@@ -84,7 +84,7 @@ fn kills_at_any_moment_cost_no_bit() {
 fn leftovers_of_killed_runs_go_from_every_folder() {
     let Some(_turn) = device() else { return };
     let place = Place::new();
-    succeeded(&place.trained("out", &["--iterations", "4", "--preview-every", "2", "--checkpoint-every", "2"]));
+    succeeded(&place.trained("out", &["--iterations", "4", "--set", "preview_every=2", "--checkpoint-every", "2"]));
     let whole: BTreeSet<PathBuf> = files(&place.path("out")).into_iter().collect();
     let folders: BTreeSet<&Path> = whole.iter().filter_map(|path| path.parent()).collect();
     for folder in &folders {
@@ -100,7 +100,7 @@ fn leftovers_of_killed_runs_go_from_every_folder() {
 fn a_signal_leaves_a_checkpoint() {
     let Some(_turn) = device() else { return };
     let place = Place::new();
-    let long = ["--iterations", "5000", "--checkpoint-every", "0", "--save-at", "3", "--preview-every", "0"];
+    let long = ["--iterations", "5000", "--checkpoint-every", "0", "--set", "save_at=3", "--set", "preview_every=0"];
     let send = |child: &Child, signal: &str| {
         let sent = std::process::Command::new("kill").args([signal, &child.id().to_string()]).status();
         assert!(sent.expect("kill").success());
@@ -149,14 +149,14 @@ fn a_resumed_run_says_what_changed_and_what_cannot() {
     };
     refused(&["--seed", "4"], 2, &["--seed: 0 in the checkpoint, now 4"]);
     refused(&["--sh-degree", "1"], 2, &["--sh-degree: 3 in the checkpoint, now 1"]);
-    refused(&["--label-rule", "main"], 2, &["--label-rule"]);
-    refused(&["--no-test"], 2, &["--test-every: 8 in the checkpoint, now 0"]);
+    refused(&["--set", "label_rule=main"], 2, &["--set label_rule"]);
+    refused(&["--test-every", "0"], 2, &["--test-every: 8 in the checkpoint, now 0"]);
     refused(&["--iterations", "5"], 2, &["--iterations", "6 steps"]);
     assert_eq!(place.model("out", 6), first);
 
     // The checkpoint records the folder of the masks.
     let args = ["train", &place.text("scene"), "-o", &place.text("out"), "--resume", "--iterations", "9"];
-    let text = succeeded(&place.labelgs(&[&args[..], &["--feature-lr", "0.003", "--memory-limit", "2G"]].concat()));
+    let text = succeeded(&place.labelgs(&[&args[..], &["--set", "feature_lr=0.003", "--memory-limit", "2G"]].concat()));
     for part in ["--iterations: 6 in the checkpoint, now 9", "--feature-lr: 0.0025 in", "--memory-limit: not set in"] {
         assert!(text.contains(part), "{part} is not in {text}");
     }
@@ -190,7 +190,7 @@ fn a_resumed_run_says_what_changed_and_what_cannot() {
 fn a_damaged_checkpoint_gives_way_to_the_one_before() {
     let Some(_turn) = device() else { return };
     let place = Place::new();
-    let flags = ["--iterations", "9", "--checkpoint-every", "3", "--save-at", "8"];
+    let flags = ["--iterations", "9", "--checkpoint-every", "3", "--set", "save_at=8"];
     succeeded(&place.trained("straight", &flags));
     let mut child = place.spawned(&place.train("out", &flags));
     wait_until(&mut child, || place.checkpoints("out").first().is_some_and(|found| found.step >= 6));
@@ -221,8 +221,9 @@ fn masks_without_objects_are_resumed_like_others() {
         image::GrayImage::new(64, 48).save(mask).expect("a mask");
     }
     // Schedules that do not depend on the length of the run.
-    let schedule = ["--strategy", "adc", "--start-size", "1", "--rate-final", "1", "--sh-degree-interval", "9"];
-    let flags = [&["--checkpoint-every", "2", "--label-from", "2"][..], &schedule].concat();
+    let schedule =
+        ["--set", "strategy=adc", "--set", "start_size=1", "--set", "rate_final=1", "--set", "sh_degree_interval=9"];
+    let flags = [&["--checkpoint-every", "2", "--set", "label_from=2"][..], &schedule].concat();
     succeeded(&place.trained("straight", &[&flags[..], &["--iterations", "8"]].concat()));
     succeeded(&place.trained("out", &[&flags[..], &["--iterations", "4"]].concat()));
     let text = succeeded(&place.trained("out", &["--resume", "--iterations", "8"]));
@@ -257,7 +258,7 @@ fn unwritable_folders_are_refused_and_lost_previews_warned_of() {
     // A file in the place of the folder of previews.
     std::fs::create_dir_all(place.path("out")).expect("a folder");
     std::fs::write(place.path("out/preview"), b"").expect("a file");
-    let output = place.trained("out", &["--iterations", "6", "--preview-every", "2", "--checkpoint-every", "2"]);
+    let output = place.trained("out", &["--iterations", "6", "--set", "preview_every=2", "--checkpoint-every", "2"]);
     let said = stderr(&output);
     assert!(said.matches("training goes on without it").count() == 2, "{said}");
     assert_eq!(output.status.code(), Some(7), "that of the end is missing: {said}");
@@ -270,7 +271,7 @@ fn unwritable_folders_are_refused_and_lost_previews_warned_of() {
 fn without_space_the_run_ends_and_the_last_checkpoint_stays() {
     let Some(_turn) = device() else { return };
     let place = Place::new();
-    let flags = ["--iterations", "4", "--checkpoint-every", "2", "--preview-every", "0"];
+    let flags = ["--iterations", "4", "--checkpoint-every", "2", "--set", "preview_every=0"];
     succeeded(&place.trained("out", &flags));
     let old = place.checkpoints("out");
     let mut args = place.train("out", &["--resume", "--iterations", "8"]);
@@ -299,7 +300,7 @@ fn without_space_the_run_ends_and_the_last_checkpoint_stays() {
 fn an_output_that_was_deleted_meanwhile_is_made_anew() {
     let Some(_turn) = device() else { return };
     let place = Place::new();
-    let flags = ["--iterations", "30", "--checkpoint-every", "3", "--preview-every", "0"];
+    let flags = ["--iterations", "30", "--checkpoint-every", "3", "--set", "preview_every=0"];
     let args = place.train("out", &flags);
     let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_labelgs"));
     command.env("LABELGS_VALIDATION", "off").env("LABELGS_CACHE", place.path("cache")).args(args);
@@ -320,7 +321,7 @@ fn an_output_that_was_deleted_meanwhile_is_made_anew() {
 fn a_deleted_folder_may_be_the_folder_of_another_run() {
     let Some(_turn) = device() else { return };
     let place = Place::new();
-    let args = place.train("out", &["--iterations", "100000", "--checkpoint-every", "5", "--preview-every", "0"]);
+    let args = place.train("out", &["--iterations", "100000", "--checkpoint-every", "5", "--set", "preview_every=0"]);
     let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_labelgs"));
     command.env("LABELGS_VALIDATION", "off").env("LABELGS_CACHE", place.path("cache")).args(args);
     let mut child = command.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().expect("it runs");
@@ -363,7 +364,7 @@ fn checkpoints_of_an_earlier_run_stay_until_there_are_new_ones() {
     assert!(text.contains("iteration_9/point_cloud.ply is of an earlier run"), "{text}");
     assert_eq!(models(), [Some("iteration_3".to_owned())], "what other commands take is of the last run");
     assert!(place.path("out/earlier/point_cloud/iteration_9/point_cloud.ply").exists(), "and nothing is lost");
-    succeeded(&place.trained("out", &["--iterations", "5", "--checkpoint-every", "2", "--save-at", "2"]));
+    succeeded(&place.trained("out", &["--iterations", "5", "--checkpoint-every", "2", "--set", "save_at=2"]));
     assert_eq!(models().len(), 2, "{:?}", models());
     let steps: Vec<u32> = place.checkpoints("out").iter().map(|found| found.step).collect();
     assert_eq!(steps, [5], "no checkpoint of the run of 9 steps remains");

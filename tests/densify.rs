@@ -183,7 +183,7 @@ fn model(folder: &Path) -> (String, String) {
     let path = |name: &str| folder.join(name).to_str().expect("UTF-8").to_owned();
     let (scene, out) = (path("scene"), path("out"));
     succeeds(&["synth", &scene, "--preset", "simple", "--size", "96x72", "--views", "12", "--points", "400"]);
-    succeeds(&["train", &scene, "-o", &out, "--iterations", "30", "--no-test"]);
+    succeeds(&["train", &scene, "-o", &out, "--iterations", "30", "--test-every", "0"]);
     (scene, out)
 }
 
@@ -195,7 +195,7 @@ fn masks_of_a_rendered_video_return_to_their_photos() {
     let path = |name: &str| folder.path().join(name).to_str().expect("UTF-8").to_owned();
     let (there, video) = (path("pictures"), path("video"));
     let json = |text: String| serde_json::from_str::<Value>(&text).expect("JSON");
-    let made = json(succeeds(&["densify", &out, "--scene", &scene, "-o", &video, "--between", "2", "--json"]));
+    let made = json(succeeds(&["frames", &out, "--scene", &scene, "-o", &video, "--between", "2", "--json"]));
     // Views 000 and 008 are held out.
     assert_eq!((&made["photos"], &made["frames"]), (&10.into(), &28.into()));
     succeeds(&["render", &out, "--scene", &scene, "--views", "train", "-o", &there]);
@@ -227,7 +227,7 @@ fn masks_of_a_rendered_video_return_to_their_photos() {
     let camera = path("camera.json");
     std::fs::write(&camera, serde_json::to_string(&frames.frames[1].camera).expect("JSON")).expect("written");
     succeeds(&["render", &out, "--camera", &camera, "-o", &there]);
-    let all = ["densify", &out, "--scene", &scene, "-o", &path("all"), "--between", "0", "--compat", "--include-test"];
+    let all = ["frames", &out, "--scene", &scene, "-o", &path("all"), "--between", "0", "--compat", "--include-test"];
     assert!(succeeds(&all).contains("12 frames through 12 photos"));
     let named = Frames::read(&Path::new(&path("all")).join("frames.json")).expect("frames");
     let names: Vec<&str> = named.frames.iter().filter_map(|frame| frame.photo.as_deref()).collect();
@@ -243,8 +243,8 @@ fn masks_of_faces_become_those_of_their_photos() {
     let (scene, out, video, masks) = (path("scene"), path("out"), path("video"), path("masks"));
     let lens = ["--lens", "OPENCV_FISHEYE", "--fov", "150", "--size", "160x120", "--views", "2"];
     succeeds(&[&["synth", &scene, "--preset", "simple"], &lens[..]].concat());
-    succeeds(&["train", &scene, "-o", &out, "--iterations", "2", "--no-test"]);
-    let densify = ["densify", &out, "--scene", &scene, "-o", &video, "--between", "0", "--include-test"];
+    succeeds(&["train", &scene, "-o", &out, "--iterations", "2", "--test-every", "0"]);
+    let densify = ["frames", &out, "--scene", &scene, "-o", &video, "--between", "0", "--include-test"];
     succeeds(&densify);
     let load = LoadOptions { masks: Some(format!("{scene}/masks").into()), ..LoadOptions::default() };
     let dataset = labelgs::io::open(Path::new(&scene), &load).expect("read");
@@ -295,18 +295,27 @@ fn occluders_go_from_the_verb_into_a_run() {
 
     let train = |name: &str, more: &[&str]| {
         let out = path(name);
-        let base =
-            ["train", &scene, "--masks", &masks, "--no-test", "--iterations", "4", "--label-from", "2", "-o", &out];
+        let base = [
+            "train",
+            &scene,
+            "--masks",
+            &masks,
+            "--test-every",
+            "0",
+            "--iterations",
+            "4",
+            "--set",
+            "label_from=2",
+            "-o",
+            &out,
+        ];
         succeeds(&[&base[..], more].concat());
         json(&format!("{out}/occlusion.json"))
     };
     // The verb and training agree, and a written list comes back as it was.
-    assert_eq!(train("a", &["--occlusion", "depth", "--depths", &depths, "--depth-kind", "metric"]), depth);
-    assert_eq!(train("b", &["--occlusion-file", &by_depth]), depth);
-    assert_eq!(train("c", &["--occlusion", "none"])["kind"], "none");
+    assert_eq!(train("b", &["--occluders", &by_depth]), depth);
+    assert_eq!(train("c", &["--set", "occlusion=none"])["kind"], "none");
     assert_eq!(train("d", &[])["kind"], "rendered");
     let bare = ["train", &scene, "-o", &path("e"), "--masks", &masks];
-    fails(2, "a folder of depth maps in --depths", &[&bare[..], &["--occlusion", "depth"]].concat());
-    fails(2, "only read with", &[&bare[..], &["--depths", &depths, "--depth-kind", "metric"]].concat());
-    fails(2, "cannot be used with", &[&bare[..], &["--occlusion-file", &by_depth, "--occlusion", "none"]].concat());
+    fails(2, "cannot be given with", &[&bare[..], &["--occluders", &by_depth, "--set", "occlusion=none"]].concat());
 }

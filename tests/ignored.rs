@@ -25,7 +25,7 @@ fn no_variable_makes_faults_or_hides_what_a_device_has() {
     }
     let place = Place::new();
     let fault = "write:1:IO:1000,read:1:IO:1000,nan:1:NUMBER:1000,vulkan:9:HOST_MEMORY:1000";
-    let flags = ["--iterations", "4", "--label-from", "2"];
+    let flags = ["--iterations", "4", "--set", "label_from=2"];
     succeeded(&place.trained("without", &flags));
     succeeded(&place.trained_with(Some(fault), "with", &flags));
     assert!(place.model("with", 4) == place.model("without", 4));

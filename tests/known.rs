@@ -92,7 +92,7 @@ fn labels_beyond_those_of_the_masks_are_handled() {
 fn a_training_stays_within_the_limits_of_a_device() {
     let Some(_turn) = device() else { return };
     let place = Place::new();
-    let flags = ["--config", &place.settings(), "--densify-grad-threshold", "1e-9"];
+    let flags = ["--config", &place.settings(), "--set", "densify_grad_threshold=1e-9"];
     let free = succeeded(&place.trained("free", &flags));
     let bound = "from here on only the best may grow";
     assert!(!free.contains(bound), "{free}");

@@ -3,7 +3,7 @@
 use crate::support::runs::{Place, stderr, succeeded};
 use std::fs;
 
-const FLAGS: [&str; 6] = ["--iterations", "60", "--checkpoint-every", "20", "--depth-weight", "0.5"];
+const FLAGS: [&str; 6] = ["--iterations", "60", "--checkpoint-every", "20", "--set", "depth_weight=0.5"];
 
 fn with<'a>(more: &[&'a str]) -> Vec<&'a str> {
     FLAGS.iter().copied().chain(more.iter().copied()).collect()
@@ -14,7 +14,7 @@ fn with<'a>(more: &[&'a str]) -> Vec<&'a str> {
 fn a_training_with_known_depths_goes_on_from_a_checkpoint() {
     let place = Place::new();
     let maps = place.text("scene/depth");
-    for (name, more) in [("points", &[][..]), ("maps", &["--known-depths", maps.as_str()])] {
+    for (name, more) in [("points", &[][..]), ("maps", &["--depths", maps.as_str()])] {
         succeeded(&place.trained(name, &with(more)));
         let again = format!("{name}-again");
         let broken = place.trained_with(Some("vkQueueSubmit:160:DEVICE_LOST"), &again, &with(more));
@@ -22,7 +22,7 @@ fn a_training_with_known_depths_goes_on_from_a_checkpoint() {
         succeeded(&place.trained(&again, &["--resume"]));
         assert!(place.model(&again, 60) == place.model(name, 60), "{name}: the same bits");
     }
-    succeeded(&place.trained("without", &[&FLAGS[..4], &["--depth-weight", "0"]].concat()));
+    succeeded(&place.trained("without", &[&FLAGS[..4], &["--set", "depth_weight=0"]].concat()));
     let models = ["points", "maps", "without"].map(|name| place.model(name, 60));
     assert!(models[0] != models[1] && models[0] != models[2] && models[1] != models[2]);
 }
@@ -46,8 +46,9 @@ fn ignored_pixels_have_no_known_depth() {
     let (near, far, ignore) =
         (written(&place, "near", [2.0, 3.0]), written(&place, "far", [9.0, 3.0]), place.text("ignore"));
     let trained = |name: &str, known: &str, more: &[&str]| {
-        let whole = ["--iterations", "20", "--start-size", "1", "--full-size-from", "0", "--depth-weight", "1"];
-        succeeded(&place.trained(name, &[&whole[..], &["--known-depths", known], more].concat()));
+        let whole =
+            ["--iterations", "20", "--set", "start_size=1", "--set", "full_size_from=0", "--set", "depth_weight=1"];
+        succeeded(&place.trained(name, &[&whole[..], &["--depths", known], more].concat()));
         place.model(name, 20)
     };
     assert!(trained("a", &near, &[]) != trained("b", &far, &[]), "they count elsewhere");
@@ -62,16 +63,16 @@ fn depths_that_are_not_there_are_an_error() {
         let message = stderr(&place.trained("out", flags));
         expected.iter().for_each(|part| assert!(message.contains(part), "{part:?} in {message}"));
     };
-    refused(&["--known-depths", &maps, "--depth-weight", "0"], &["--known-depths", "--depth-weight above 0"]);
-    refused(&with(&["--known-depths", &place.text("nowhere")]), &["nowhere", "there is no such folder"]);
-    refused(&with(&["--known-depths", &masks]), &["masks", "depth needs 16-bit grey"]);
+    refused(&["--depths", &maps, "--set", "depth_weight=0"], &["--depths", "--set depth_weight above 0"]);
+    refused(&with(&["--depths", &place.text("nowhere")]), &["nowhere", "there is no such folder"]);
+    refused(&with(&["--depths", &masks]), &["masks", "depth needs 16-bit grey"]);
     let holes = written(&place, "holes", [0.0; 2]);
-    refused(&["--iterations", "60", "--known-depths", &holes], &["holes", "maps without a depth"]);
-    refused(&with(&["--known-depths", &holes]), &["holes", "maps without a depth"]);
+    refused(&["--iterations", "60", "--depths", &holes], &["holes", "maps without a depth"]);
+    refused(&with(&["--depths", &holes]), &["holes", "maps without a depth"]);
     fs::remove_file(place.path("scene/depth/001.exr")).expect("a map");
-    refused(&with(&["--known-depths", &maps]), &["depth", "have none", "001"]);
-    refused(&["--depth-weight=-1"], &["depth"]);
+    refused(&with(&["--depths", &maps]), &["depth", "have none", "001"]);
+    refused(&["--set", "depth_weight=-1"], &["depth"]);
     // A reconstruction without points.
     fs::write(place.path("scene/sparse/0/points3D.bin"), 0_u64.to_le_bytes()).expect("written");
-    refused(&FLAGS, &["what photo shows them", "--known-depths"]);
+    refused(&FLAGS, &["what photo shows them", "--depths"]);
 }

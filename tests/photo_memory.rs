@@ -90,7 +90,7 @@ fn a_training_has_the_same_bits_for_any_budget() {
     let place = Place::new();
     let train = |out: &str, flags: &[&str]| {
         // Early steps are small, and each view comes at several sizes.
-        let config = ["--config", &place.settings(), "--start-size", "0.5", "--full-size-from", "20"];
+        let config = ["--config", &place.settings(), "--set", "start_size=0.5", "--set", "full_size_from=20"];
         let all = [&config[..], &["--exposure", "on"], flags].concat();
         succeeded(&place.trained(out, &[&all[..], &["--iterations", &STEPS.to_string()]].concat()))
     };
@@ -113,7 +113,7 @@ fn a_training_has_the_same_bits_for_any_budget() {
     }
     // A killed run goes on with another budget.
     let settings = place.settings();
-    let flags = ["--config", &settings, "--start-size", "0.5", "--full-size-from", "20", "--exposure", "on"];
+    let flags = ["--config", &settings, "--set", "start_size=0.5", "--set", "full_size_from=20", "--exposure", "on"];
     let mut child = place.spawned(&place.train("killed", &[&flags[..], &["--photo-memory", BUDGETS[0]]].concat()));
     while place.checkpoints("killed").is_empty() && child.try_wait().expect("a child").is_none() {
         std::thread::sleep(Duration::from_millis(2));
@@ -132,8 +132,8 @@ fn a_disk_that_fails_costs_no_bit() {
     let Some(_turn) = device() else { return };
     let place = Place::new();
     // Without what reads the points again after the scene was opened.
-    let flags = ["--iterations", "8", "--checkpoint-every", "0", "--preview-every", "0", "--start-size", "0.5"];
-    let flags = [&flags[..], &["--depth-weight", "0", "--exposure", "off"]].concat();
+    let flags = ["--iterations", "8", "--checkpoint-every", "0", "--set", "preview_every=0", "--set", "start_size=0.5"];
+    let flags = [&flags[..], &["--set", "depth_weight=0", "--exposure", "off"]].concat();
     succeeded(&place.trained("whole", &flags));
     let few = [&flags[..], &["--photo-memory", "1K"]].concat();
     for (fault, is_told) in

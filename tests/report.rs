@@ -32,7 +32,8 @@ fn a_report_is_made_anew_and_compares_runs() {
     table["labels"][0]["name"] = HOSTILE.into();
     std::fs::write(&names, table.to_string()).expect("names");
     let out = "<b>bold out";
-    let flags = ["--config", &place.settings(), "--iterations", "20", "--label-rule", "votes", "--densify-until", "15"];
+    let flags =
+        ["--config", &place.settings(), "--iterations", "20", "--set", "label_rule=votes", "--set", "densify_until=15"];
     succeeded(&place.trained(out, &flags));
     let page = read(&place.path(out).join("report.html"));
     is_harmless(&page);
@@ -57,7 +58,7 @@ fn a_report_is_made_anew_and_compares_runs() {
     assert!(read(Path::new(&again)) == page, "made anew, it is the same");
     std::fs::rename(place.path("elsewhere"), place.path("scene")).expect("moved back");
 
-    succeeded(&place.trained("other", &["--iterations", "10", "--label-rule", "votes"]));
+    succeeded(&place.trained("other", &["--iterations", "10", "--set", "label_rule=votes"]));
     succeeded(&place.labelgs(&["report", &place.text(out), &place.text("other"), "-o", &again]));
     let both = read(Path::new(&again));
     is_harmless(&both);

@@ -1,38 +1,38 @@
 //! The command line as a whole: its commands, each with an example that runs where `scene` and `out` are.
 
-use super::ablate::AblateArgs;
-use super::args::GlobalArgs;
-use super::blocks::BlocksArgs;
-use super::check::CheckArgs;
-use super::clean::CleanArgs;
-use super::convert::ConvertArgs;
-use super::densify::DensifyArgs;
-use super::devices::DevicesArgs;
-use super::eval::EvalArgs;
-use super::label::LabelArgs;
-use super::list::ListArgs;
-use super::masks::MasksArgs;
-use super::merge::MergeArgs;
-use super::occlusion::OcclusionArgs;
-use super::plan::PlanArgs;
-use super::profile::ProfileArgs;
-use super::recolour::RecolourArgs;
-use super::relabel::RelabelArgs;
-use super::render::RenderArgs;
-use super::report::ReportArgs;
-use super::select::{ExtractArgs, RemoveArgs};
-use super::selftest::SelftestArgs;
-use super::simplify::SimplifyArgs;
-use super::split_components::SplitArgs;
-use super::synth::SynthArgs;
-use super::train_args::TrainArgs;
-use super::transform::TransformArgs;
-use super::view::ViewArgs;
-use super::wording::flag;
-use crate::run::Settings;
+use crate::cli::commands::ablate::AblateArgs;
+use crate::cli::commands::benchmark::BenchmarkArgs;
+use crate::cli::commands::blocks::BlocksArgs;
+use crate::cli::commands::check::CheckArgs;
+use crate::cli::commands::clean::CleanArgs;
+use crate::cli::commands::convert::ConvertArgs;
+use crate::cli::commands::devices::DevicesArgs;
+use crate::cli::commands::eval::EvalArgs;
+use crate::cli::commands::extract_remove::{ExtractArgs, RemoveArgs};
+use crate::cli::commands::frames::FramesArgs;
+use crate::cli::commands::kernels::KernelsArgs;
+use crate::cli::commands::label::LabelArgs;
+use crate::cli::commands::list::ListArgs;
+use crate::cli::commands::masks::MasksArgs;
+use crate::cli::commands::merge::MergeArgs;
+use crate::cli::commands::occlusion::OcclusionArgs;
+use crate::cli::commands::plan::PlanArgs;
+use crate::cli::commands::profile::ProfileArgs;
+use crate::cli::commands::recolour::RecolourArgs;
+use crate::cli::commands::relabel::RelabelArgs;
+use crate::cli::commands::render::RenderArgs;
+use crate::cli::commands::report::ReportArgs;
+use crate::cli::commands::selftest::SelftestArgs;
+use crate::cli::commands::simplify::SimplifyArgs;
+use crate::cli::commands::split_components::SplitArgs;
+use crate::cli::commands::synth::SynthArgs;
+use crate::cli::commands::train::args::TrainArgs;
+use crate::cli::commands::transform::TransformArgs;
+use crate::cli::commands::view::ViewArgs;
+use crate::cli::support::args::GlobalArgs;
+use crate::cli::support::settings;
 use crate::version;
 use clap::{CommandFactory, Parser, Subcommand};
-use std::collections::BTreeMap;
 use std::sync::LazyLock;
 
 const EXIT_STATUSES: &str = "\
@@ -45,7 +45,7 @@ Results go to standard output, everything else to standard error.";
 ///
 /// Example: labelgs synth scene && labelgs train scene --masks scene/masks -o out && labelgs list out
 #[derive(Debug, Parser)]
-#[command(name = "labelgs", version, after_help = EXIT_STATUSES, propagate_version = true)]
+#[command(name = "labelgs", version, propagate_version = true)]
 pub struct Cli {
     /// Print the result as JSON.
     #[arg(long, help_heading = "Output")]
@@ -150,16 +150,20 @@ pub enum Command {
     Occlusion(OcclusionArgs),
     /// Render a smooth video through the photos of a scene, as input of an object tracker.
     ///
-    /// Example: labelgs densify out --scene scene -o video
-    Densify(DensifyArgs),
+    /// Example: labelgs frames out --scene scene -o video
+    Frames(FramesArgs),
     /// Train a scene in several ways and compare the scores in one table.
     ///
     /// Example: labelgs ablate scene --masks scene/masks -o ablation -- --iterations 3000
     Ablate(Box<AblateArgs>),
-    /// Train a scene that no one card holds: plan and split it into blocks, merge their models.
+    /// Train a scene that no one card holds: split it into blocks, join their models.
     ///
-    /// Example: labelgs blocks plan scene --model out --card 24G
+    /// Example: labelgs blocks split scene --model out --card 24G --dry-run
     Blocks(Box<BlocksArgs>),
+    /// Score a model by a published benchmark, with its masks, its choice of objects and its averages.
+    ///
+    /// Example: labelgs benchmark out --scene scene --protocol binary --truth scene/amodal --objects 3
+    Benchmark(Box<BenchmarkArgs>),
     /// Show each Vulkan device and whether it meets the requirements.
     ///
     /// Example: labelgs devices
@@ -172,53 +176,36 @@ pub enum Command {
     ///
     /// Example: labelgs plan --gaussians 500k --size 960x540 --label-samples 10
     Plan(PlanArgs),
+    /// Compile every kernel and show its registers, spills and instructions.
+    ///
+    /// They are what the driver tells. Status 1 if a kernel spills.
+    ///
+    /// Example: labelgs kernels
+    Kernels(KernelsArgs),
     /// Show how long each pass of a training step takes.
     ///
     /// Example: labelgs profile scene --masks scene/masks --steps 50
     Profile(ProfileArgs),
 }
 
+/// Commands for developers of the engine: the help lists them under a heading of their own.
+const DEVELOPERS: [&str; 4] = ["selftest", "plan", "kernels", "profile"];
+
 /// What `--version` prints; clap wants it to last.
 static VERSION: LazyLock<String> = LazyLock::new(version::text);
 
-/// Settings of training that a newcomer needs: the help shows them with the flags that have no heading.
-const FIRST: [&str; 3] = ["iterations", "max_resolution", "preset"];
-
 /// Returns the command line with the defaults of training in its help, and commit and features in its `--version`.
 pub fn command() -> clap::Command {
-    let mut defaults = Settings::default().texts();
-    let paper = paper_flags(&defaults);
-    // Defaults whose values need words.
-    for (key, text) in [
-        ("background", "black"),
-        ("save_at", "none"),
-        ("near", "0.2, less in a small scene"),
-        ("feature_rest_lr", "--feature-lr / 20"),
-    ] {
-        defaults.insert(key.into(), text.into());
-    }
-    Cli::command().long_version(VERSION.as_str()).mut_subcommand("train", |train| {
-        train.mut_args(|arg| {
-            let arg = if FIRST.contains(&arg.get_id().as_str()) { arg.help_heading(None) } else { arg };
-            if arg.get_id() == "paper" {
-                let help = arg.get_help().map(ToString::to_string).unwrap_or_default();
-                return arg.help(format!("{help} {paper}"));
-            }
-            let Some(default) = defaults.get(arg.get_id().as_str()) else { return arg };
-            let with = |help: String| format!("{help} [default: {default}]");
-            let (short, long) = (arg.get_help().map(ToString::to_string), arg.get_long_help().map(ToString::to_string));
-            let arg = if let Some(help) = short { arg.help(with(help)) } else { arg };
-            if let Some(help) = long { arg.long_help(with(help)) } else { arg }
-        })
-    })
+    Cli::command().after_help(EXIT_STATUSES).long_version(VERSION.as_str()).mut_subcommand("train", settings::in_help)
 }
 
-/// Returns the settings in which the paper differs from the defaults, as flags.
-fn paper_flags(defaults: &BTreeMap<String, String>) -> String {
-    let paper = Settings::paper().texts();
-    let changed = Settings::keys().filter_map(|key| {
-        let value = paper.get(key.name).filter(|value| defaults.get(key.name) != Some(value))?;
-        Some(format!("{} {value}", flag(key.name)))
-    });
-    changed.collect::<Vec<_>>().join(" ")
+/// Returns the command line whose help has the developers' commands under a heading of their own.
+pub(crate) fn with_headings(root: clap::Command) -> clap::Command {
+    let mut list = "Commands for developers of the engine:\n".to_owned();
+    for command in DEVELOPERS.iter().filter_map(|name| root.find_subcommand(name)) {
+        let about = command.get_about().map(ToString::to_string).unwrap_or_default();
+        list += &format!("  {:<16}  {about}\n", command.get_name());
+    }
+    let root = DEVELOPERS.iter().fold(root, |root, name| root.mut_subcommand(name, |command| command.hide(true)));
+    root.after_help(format!("{list}\n{EXIT_STATUSES}"))
 }

@@ -1,64 +1,22 @@
-//! The command line: arguments, exit statuses, messages, and a file per command.
+//! The command line: what is typed (`command`), a file per command (`commands`), and what they share (`support`).
 
-pub(crate) mod ablate;
-pub(crate) mod args;
-mod blocks;
-pub(crate) mod check;
-pub(crate) mod choose;
-pub(crate) mod clean;
 pub(crate) mod command;
-pub(crate) mod context;
-pub(crate) mod convert;
-pub(crate) mod densify;
-mod device_report;
-pub(crate) mod devices;
-mod drawer;
-pub(crate) mod eval;
-pub(crate) mod interrupt;
-mod kernels;
-pub(crate) mod label;
-pub(crate) mod labelled;
-pub(crate) mod list;
-pub(crate) mod log;
-pub(crate) mod masks;
-pub(crate) mod merge;
-mod mistyped;
-mod model_fit;
-pub(crate) mod occlusion;
-pub(crate) mod output;
-pub(crate) mod plan;
-pub(crate) mod profile;
-pub(crate) mod profile_compare;
-mod profile_report;
-mod profile_timed;
-pub(crate) mod recolour;
-pub(crate) mod relabel;
-pub(crate) mod render;
-pub(crate) mod report;
-pub(crate) mod scene;
-pub(crate) mod select;
-pub(crate) mod selftest;
-mod shell;
-mod simplify;
-pub(crate) mod split_components;
-mod stages;
-pub(crate) mod status;
-pub(crate) mod stdout;
-pub(crate) mod synth;
-pub(crate) mod train;
-pub(crate) mod train_args;
-pub(crate) mod transform;
-pub(crate) mod values;
-pub(crate) mod view;
-pub(crate) mod wording;
+pub(crate) mod commands;
+pub(crate) mod support;
 
 use crate::error::speak_of;
 use crate::{Error, version};
 use clap::FromArgMatches;
-use command::{Cli, Command, command};
-use context::Context;
+use command::{Cli, Command, command, with_headings};
+use commands::{
+    ablate, benchmark, blocks, check, clean, convert, devices, eval, extract_remove, frames, kernels, label, list,
+    masks, merge, occlusion, plan, profile, recolour, relabel, render, report, selftest, simplify, split_components,
+    synth, train, transform, view,
+};
 use std::ffi::OsString;
 use std::panic::{AssertUnwindSafe, catch_unwind};
+use support::context::Context;
+use support::{exit_status, log, number_errors, setting_names, settings, signals, stdout};
 
 /// Parses `args`, runs the command, reports an error and returns the exit status. `commit` is that of the program.
 pub fn main(args: impl IntoIterator<Item = OsString>, commit: Option<&'static str>) -> u8 {
@@ -86,9 +44,9 @@ pub fn main(args: impl IntoIterator<Item = OsString>, commit: Option<&'static st
         Ok(Err(Exit::Error(error))) if stdout::is_closed(&error) => 0,
         Ok(Err(Exit::Error(error))) => {
             log::final_error(&error);
-            status::exit_status(&error)
+            exit_status::exit_status(&error)
         }
-        Err(_) => status::BUG,
+        Err(_) => exit_status::BUG,
     };
     u8::try_from(status).unwrap_or(u8::MAX)
 }
@@ -112,12 +70,17 @@ impl From<clap::Error> for Exit {
 }
 
 fn run(args: Vec<OsString>) -> Result<(), Exit> {
-    let mut command = command();
-    let typed = command.try_get_matches_from_mut(args).map_err(mistyped::in_words)?;
-    speak_of(wording::flags(&command, &typed));
+    let mut command = with_headings(command());
+    let typed = command.try_get_matches_from_mut(args).map_err(number_errors::in_words)?;
+    speak_of(setting_names::names(&command, &typed));
+    if let Some(("train", words)) = typed.subcommand()
+        && let Some(only) = settings::asked(words)
+    {
+        return Ok(stdout::print(&settings::list(only)?)?);
+    }
     let cli = Cli::from_arg_matches(&typed)?;
     log::start(&cli.global);
-    interrupt::install()?;
+    signals::install()?;
     let context = Context::new(cli.global, cli.json);
     match cli.command {
         Command::Ablate(args) => ablate::run(&args, &context),
@@ -128,8 +91,8 @@ fn run(args: Vec<OsString>) -> Result<(), Exit> {
         Command::View(args) => view::run(&args, &context),
         Command::Label(args) => label::run(&args, &context),
         Command::List(args) => list::run(&args, &context),
-        Command::Extract(args) => select::run_extract(&args, &context),
-        Command::Remove(args) => select::run_remove(&args, &context),
+        Command::Extract(args) => extract_remove::run_extract(&args, &context),
+        Command::Remove(args) => extract_remove::run_remove(&args, &context),
         Command::Recolour(args) => recolour::run(&args, &context),
         Command::Relabel(args) => relabel::run(&args, &context),
         Command::Merge(args) => merge::run(&args, &context),
@@ -138,14 +101,16 @@ fn run(args: Vec<OsString>) -> Result<(), Exit> {
         Command::Transform(args) => transform::run(&args, &context),
         Command::Convert(args) => convert::run(&args, &context),
         Command::Eval(args) => eval::run(&args, &context),
+        Command::Benchmark(args) => benchmark::run(&args, &context),
         Command::Report(args) => report::run(&args, &context),
-        Command::Densify(args) => densify::run(&args, &context),
+        Command::Frames(args) => frames::run(&args, &context),
         Command::Occlusion(args) => occlusion::run(&args, &context),
         Command::Synth(args) => synth::run(&args, &context),
         Command::Devices(args) => devices::run(&args, &context),
         Command::Selftest(args) => selftest::run(&args, &context),
         Command::Simplify(args) => simplify::run(&args, &context),
         Command::Masks(args) => masks::run(&args, &context),
+        Command::Kernels(args) => kernels::run(&args, &context),
         Command::Plan(args) => plan::run(&args, &context),
         Command::Profile(args) => profile::run(&args, &context),
     }?;

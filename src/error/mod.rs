@@ -95,9 +95,7 @@ pub enum Error {
     },
     /// Densification pruned every Gaussian.
     #[error(
-        "every Gaussian was pruned after step {step}: the poses do not fit the photos, or the limits {} and {} are too strict",
-        Setting("min_opacity"),
-        Setting("max_scale")
+        "every Gaussian was pruned after step {step}: the poses do not fit the photos; look for faults of the capture first"
     )]
     Pruned {
         /// The step.

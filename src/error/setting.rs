@@ -4,17 +4,17 @@ use std::collections::BTreeMap;
 use std::fmt::{self, Display, Formatter};
 use std::sync::OnceLock;
 
-/// The flags of the running command, by the field that each sets; unset in a program of another.
+/// What the running command calls a setting, by its field: a flag, or `--set KEY`; unset in a program of another.
 static FLAGS: OnceLock<BTreeMap<String, String>> = OnceLock::new();
 
-/// Gives settings the names of these flags in all later messages. The first call counts.
+/// Gives settings these names in all later messages. The first call counts.
 pub(crate) fn speak_of(flags: BTreeMap<String, String>) {
     // A second start in one process, as in tests, keeps the first flags.
     let _ = FLAGS.set(flags);
 }
 
-/// A setting in a message, by the name of its field: `` `max_gaussians` ``. The command line prints `--max-gaussians` if
-/// the running command has that flag, and `max gaussians` if not.
+/// A setting in a message, by the name of its field: `` `max_gaussians` ``. The command line prints what can be typed, such
+/// as `--max-gaussians` or `--set label_from`, if the running command has that setting, and `max gaussians` if not.
 ///
 /// Only a value of this type becomes a flag, so that keys of files, which are text, never do.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -30,7 +30,11 @@ impl Setting {
         let Self(field) = self;
         match flags.map(|flags| flags.get(field)) {
             None => format!("`{field}{value}`"),
-            Some(Some(flag)) => format!("{flag}{}", value.replacen(" = ", " ", 1)),
+            Some(Some(typed)) => {
+                // A name of two words takes KEY=VALUE.
+                let sign = if typed.contains(' ') { "=" } else { " " };
+                format!("{typed}{}", value.replacen(" = ", sign, 1))
+            }
             Some(None) => format!("{}{value}", field.replace('_', " ")),
         }
     }
@@ -55,11 +59,14 @@ mod tests {
 
     #[test]
     fn a_setting_is_a_flag_where_the_command_has_it() {
-        let flags = BTreeMap::from([("max_gaussians".to_owned(), "--gaussians".to_owned())]);
+        let typed = [("max_gaussians", "--gaussians"), ("label_from", "--set label_from")];
+        let flags = BTreeMap::from(typed.map(|(field, typed)| (field.to_owned(), typed.to_owned())));
         let (known, unknown) = (Setting("max_gaussians"), Setting("label_samples"));
         let of = |setting: Setting, value: &str| [None, Some(&flags)].map(|flags| setting.named(flags, value));
         assert_eq!(of(known, ""), ["`max_gaussians`", "--gaussians"]);
         assert_eq!(of(known, " = 5"), ["`max_gaussians = 5`", "--gaussians 5"]);
+        assert_eq!(of(Setting("label_from"), "")[1], "--set label_from");
+        assert_eq!(of(Setting("label_from"), " = 5")[1], "--set label_from=5");
         assert_eq!(of(unknown, ""), ["`label_samples`", "label samples"]);
         assert_eq!(of(unknown, " = 5"), ["`label_samples = 5`", "label samples = 5"]);
         assert_eq!(String::from(known), "max_gaussians", "at the head of a message");

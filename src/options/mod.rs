@@ -1,8 +1,9 @@
 //! Options, each declared in one place: name, type, default, range, whether it may change within a run, and help.
 //!
 //! [`options!`](macro@crate::options) makes a struct from the declarations, with its `Default`, its check, its keys in
-//! `config.toml` and, with the feature `cli`, its flags. Flags have no default: only flags on the command line change a
-//! value. So a flag wins over a file, and a file over the default.
+//! `config.toml` and, with the feature `cli`, what is typed: a flag, or `--set KEY=VALUE` for an option with the rule
+//! `setting`. Flags have no default: only what is typed changes a value. So it wins over a file, and a file over the
+//! default.
 
 pub(crate) mod parse;
 #[cfg(feature = "cli")]
@@ -31,13 +32,20 @@ pub struct Key {
     pub name: &'static str,
     /// True if it cannot change within a run, because the scene was read with it or buffers depend on it.
     pub is_fixed: bool,
+    /// True if it has a flag; otherwise it is typed as `--set KEY=VALUE`.
+    pub is_flag: bool,
     range: Range,
 }
 
 impl Key {
     /// Makes an option without a range.
     pub const fn new(name: &'static str) -> Self {
-        Self { name, is_fixed: false, range: Range::Any }
+        Self { name, is_fixed: false, is_flag: true, range: Range::Any }
+    }
+
+    /// Leaves the flag to options that more people need.
+    pub const fn setting(self) -> Self {
+        Self { is_flag: false, ..self }
     }
 
     /// Forbids changes within a run.
@@ -82,15 +90,20 @@ impl Key {
             Range::PositiveUpTo(most) => !(f64::MIN_POSITIVE..=most).contains(&number),
         };
         let Some(wrong) = value.numbers().into_iter().find(is_wrong) else { return Ok(()) };
-        let needed = match self.range {
-            Range::Any => "a number".to_owned(),
-            Range::AtLeast(least) => format!("at least {least}"),
-            Range::NotNegative => "0 or more".to_owned(),
-            Range::Positive => "more than 0".to_owned(),
-            Range::UpTo(most) => format!("0 to {most}"),
-            Range::PositiveUpTo(most) => format!("more than 0, at most {most}"),
-        };
+        let needed = self.range().unwrap_or_default();
         Err(Error::usage(Setting(self.name), format!("is {wrong}, needs {needed}")))
+    }
+
+    /// Returns the range in words; none if all values of the type are valid.
+    pub fn range(&self) -> Option<String> {
+        match self.range {
+            Range::Any => None,
+            Range::AtLeast(least) => Some(format!("at least {least}")),
+            Range::NotNegative => Some("0 or more".to_owned()),
+            Range::Positive => Some("more than 0".to_owned()),
+            Range::UpTo(most) => Some(format!("0 to {most}")),
+            Range::PositiveUpTo(most) => Some(format!("more than 0, at most {most}")),
+        }
     }
 }
 
@@ -123,7 +136,7 @@ numbers! {
 }
 
 /// A struct made by [`options!`](macro@crate::options).
-pub(crate) trait Options: Serialize + DeserializeOwned + Default {
+pub trait Options: Serialize + DeserializeOwned + Default {
     /// The options, in order.
     const KEYS: &'static [Key];
 
@@ -140,7 +153,7 @@ pub(crate) trait Options: Serialize + DeserializeOwned + Default {
 }
 
 /// Declares a struct of options. A field is `NAME <"VALUE NAME">: TYPE = DEFAULT, RULES;` with rules of [`Key`] such as
-/// `at_least(1)` and `fixed`. Fields are grouped by the headings of their flags. The first paragraph of a field's doc
+/// `at_least(1)`, `fixed` and `setting`. Fields are grouped by the headings of their flags. The first paragraph of a field's doc
 /// is the short help; `--help` also shows the rest.
 macro_rules! options {
     ($(#[$outer:meta])* pub struct $name:ident {
@@ -178,7 +191,10 @@ macro_rules! options {
     };
     // An option without rules accepts all values.
     (@check $keys:ident, $value:expr) => { let _ = $keys.next(); };
-    (@check $keys:ident, $value:expr, fixed) => { let _ = $keys.next(); };
+    (@check $keys:ident, $value:expr, fixed $(, $rule:ident)*) => {
+        $crate::options::options!(@check $keys, $value $(, $rule)*);
+    };
+    (@check $keys:ident, $value:expr, setting) => { let _ = $keys.next(); };
     (@check $keys:ident, $value:expr, $($rule:ident),+) => {
         if let Some(key) = $keys.next() { key.check(&$value)?; }
     };

@@ -94,8 +94,9 @@ pub(crate) mod as_bytes {
     }
 }
 
-/// Parses `on` or `off`.
-pub(crate) fn switch(text: &str) -> Result<bool, String> {
+/// Parses the value of a switch that has no flag: `on` or `off`.
+#[cfg(feature = "cli")]
+pub(super) fn switch(text: &str) -> Result<bool, String> {
     match text {
         "on" | "true" | "yes" => Ok(true),
         "off" | "false" | "no" => Ok(false),

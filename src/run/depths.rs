@@ -22,7 +22,7 @@ pub(super) fn decided(
     let with = |weight: f64| TrainConfig { depth_weight: Some(weight), ..config.clone() };
     if weight == 0.0 {
         let problem = || format!("is only read with a {} above 0", Setting("depth_weight"));
-        let unread = || Err(Error::usage(Setting("known_depths"), problem()));
+        let unread = || Err(Error::usage(Setting("depths"), problem()));
         return folder.map_or(Ok((with(0.0), Vec::new())), |_| unread());
     }
     let known = match folder {
@@ -46,7 +46,7 @@ pub(super) fn decided(
     }
     let problem = format!(
         "has no points of which it is known what photo shows them; name a folder of depth maps in {}, or set {}",
-        Setting("known_depths"),
+        Setting("depths"),
         Setting("depth_weight").to(0)
     );
     Err(Error::data(scene, "points", problem))

@@ -28,7 +28,6 @@ pub(crate) mod summary;
 pub use models::latest_model;
 pub use objects::ObjectSummary;
 pub use observer::{Event, Flow, Live, Observer};
-pub use occluders::OccluderFiles;
 pub use report::write as write_report;
 pub use settings::{RunOptions, Settings};
 pub use summary::Summary;
@@ -98,8 +97,8 @@ pub struct Request<'a> {
     /// Folder of a block of the scene ([`crate::blocks`]): only this part is trained, from the first model of the block. The
     /// settings are those of [`Settings::for_block`].
     pub block: Option<PathBuf>,
-    /// Files with occluders, for [`Occlusion::Depth`] and [`Occlusion::File`].
-    pub occluders: Option<OccluderFiles>,
+    /// File of occluder lists, for [`Occlusion::File`].
+    pub occluders: Option<PathBuf>,
     /// Opens a lost device again and continues from the newest checkpoint, as long as each loss has a new one. The
     /// error names the pass that lost the device, at some cost in time.
     pub restart: bool,

@@ -6,7 +6,7 @@ use super::history::{Recorder, Sums};
 use super::info::Info;
 use super::models::{Models, open};
 use super::resume::{self, Record, Resumed, absolute};
-use super::{Inputs, Observer, OccluderFiles, Request, Run, Settings, Start, depths, occluders, pictures};
+use super::{Inputs, Observer, Request, Run, Settings, Start, depths, occluders, pictures};
 use crate::engine::Engine;
 use crate::error::{Error, Result, Setting};
 use crate::gpu::Gpu;
@@ -81,14 +81,13 @@ pub(super) fn prepare(request: &Request, is_again: bool) -> Result<Prepared> {
     inputs.images = request.inputs.images.clone().or(inputs.images);
     let names = inputs.masks.as_deref().map(LabelTable::of_folder).transpose()?.flatten();
     let dataset = read_scene(request, &settings, &inputs, block.as_ref())?;
-    let table =
-        if resumed.is_none() { occluders::table(request, &lookup(&settings, &inputs), &dataset)? } else { None };
+    let table = if resumed.is_none() { occluders::table(request, &dataset)? } else { None };
     Ok(Prepared { lock, settings, resumed, inputs, models, names, dataset, table, first, block })
 }
 
 fn check_new(settings: &Settings, request: &Request) -> Result<()> {
     settings.check()?;
-    occluders::check(&settings.train, request.occluders.as_ref())
+    occluders::check(&settings.train, request.occluders.as_deref())
 }
 
 /// Deletes temporary files of killed runs. Refuses an unusable folder before any work is done.
@@ -273,12 +272,8 @@ fn facts(request: &Request, masks: Option<&Path>, gpu: &Gpu) -> Vec<(&'static st
     if let Some(init) = &request.init {
         facts.push(("init", init.display().to_string()));
     }
-    match &request.occluders {
-        Some(OccluderFiles::Depths { folder, kind }) => {
-            facts.push(("depths", format!("{} ({kind:?})", folder.display())));
-        }
-        Some(OccluderFiles::Lists(file)) => facts.push(("occlusion file", file.display().to_string())),
-        None => {}
+    if let Some(file) = &request.occluders {
+        facts.push(("occluders", file.display().to_string()));
     }
     facts
 }

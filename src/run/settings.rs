@@ -8,6 +8,7 @@ use crate::options::parse::bytes;
 use crate::options::{Key, Options};
 use crate::train::setup::near_plane::NEAR;
 use crate::train::{Preset, TrainConfig};
+use crate::words::did_you_mean;
 use serde::de::{DeserializeOwned, IgnoredAny};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -19,12 +20,12 @@ crate::options::options! {
         "Output" {
             /// Steps after which the model is saved too, separated by commas.
             #[cfg_attr(feature = "cli", arg(value_delimiter = ','))]
-            save_at <"LIST">: Vec<u32> = Vec::new();
+            save_at <"LIST">: Vec<u32> = Vec::new(), setting;
 
             /// Steps between two preview pictures; 0 makes none.
             ///
             /// They show the first held-out view.
-            preview_every <"N">: u32 = 1000;
+            preview_every <"N">: u32 = 1000, setting;
 
             /// Steps between two checkpoints; 0 writes one only when the run is interrupted.
             ///
@@ -60,11 +61,6 @@ impl Settings {
         Self { train: TrainConfig::preset(preset), ..Self::default() }
     }
 
-    /// Returns the settings of the paper where they differ from the default.
-    pub fn paper() -> Self {
-        Self { train: TrainConfig::paper(), ..Self::default() }
-    }
-
     /// Returns every option, in the order of the file.
     pub fn keys() -> impl Iterator<Item = &'static Key> {
         ReadOptions::KEYS.iter().chain(TrainConfig::KEYS).chain(RunOptions::KEYS)
@@ -87,7 +83,9 @@ impl Settings {
         let text = io::read::text(path)?;
         let named: BTreeMap<toml::Spanned<String>, IgnoredAny> = parse(path, &text)?;
         if let Some(key) = named.keys().find(|key| !Self::keys().any(|known| known.name == key.get_ref())) {
-            let problem = format!("there is no setting {}; config.toml of any run lists all", key.get_ref());
+            let cure = did_you_mean(key.get_ref(), Self::keys().map(|known| known.name));
+            let cure = cure.unwrap_or_else(|| "config.toml of any run lists all".to_owned());
+            let problem = format!("there is no setting {}; {cure}", key.get_ref());
             return Err(Error::data(path, line(&text, key.span().start), problem));
         }
         Self::parse(path, &text)

@@ -45,7 +45,7 @@ fn eval(args: &[&str]) -> (i32, String) {
     let mut command = Command::cargo_bin("labelgs").expect("the tool is built");
     let nowhere = "/nonexistent/driver.json";
     command.env("VK_DRIVER_FILES", nowhere).env("VK_ICD_FILENAMES", nowhere).env_remove("LABELGS_DEVICE");
-    let output = command.arg("eval").args(args).output().expect("it runs");
+    let output = command.arg("benchmark").args(args).output().expect("it runs");
     (output.status.code().expect("a status"), String::from_utf8_lossy(&output.stderr).into_owned())
 }
 

@@ -345,7 +345,7 @@ fn many_labels_and_none(browser: &mut Browser, place: &Place) {
 
 /// Points at each step of each chart: the values are those of the curves that have one at that step.
 fn a_report_tells_the_values_of_the_step(browser: &mut Browser, place: &Place) {
-    place.succeeds(&["train", "scene", "--iterations", "12", "--preview-every", "4", "-o", "reported"]);
+    place.succeeds(&["train", "scene", "--iterations", "12", "--set", "preview_every=4", "-o", "reported"]);
     let tab = browser.open(&format!("file://{}", place.path("reported/report.html").display()), WIDE);
     browser.until(&tab, "document.readyState === 'complete' && document.querySelector('figure.chart polyline')");
     let found = browser.js(

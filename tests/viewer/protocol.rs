@@ -414,10 +414,10 @@ const TRAIN: [&str; 10] = [
     "scene/masks",
     "--checkpoint-every",
     "0",
-    "--preview-every",
-    "0",
-    "--label-from",
-    "20",
+    "--set",
+    "preview_every=0",
+    "--set",
+    "label_from=20",
 ];
 
 fn train(place: &Place, out: &str, flags: &[&str]) -> std::process::Command {

@@ -99,7 +99,7 @@ fn photographed(own: &Path, (capture, steps): (&SceneOf, u32), (model, pictures)
     let (scene, out, rendered) = (text(&capture.path), text(model), text(pictures));
     let (steps, size) = (steps.to_string(), capture.max_resolution.to_string());
     let train = ["train", &scene, "-o", &out, "--exposure", "on", "--iterations", &steps, "--max-resolution", &size];
-    program(own, &[&train[..], &["--preview-every", "0", "--checkpoint-every", "0", "--quiet"]].concat())?;
+    program(own, &[&train[..], &["--set", "preview_every=0", "--checkpoint-every", "0", "--quiet"]].concat())?;
     program(own, &["render", &out, "--scene", &scene, "--views", "all", "-o", &rendered, "--quiet"]).map(drop)
 }
 

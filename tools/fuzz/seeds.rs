@@ -5,7 +5,7 @@ use labelgs::internals::io::image as pixels;
 use labelgs::io::PipelineFolder;
 use labelgs::io::{LabelEntry, LabelTable};
 use labelgs::io::{SpzVersion, WriteOptions, export_model, write_model};
-use labelgs::run::Settings;
+use labelgs::run::{Preset, Settings};
 use labelgs::scene::Gaussians;
 use std::io::{Cursor, Read};
 use std::path::Path;
@@ -438,7 +438,7 @@ pub fn checkpoint() -> Vec<u8> {
 pub fn config_toml() -> Vec<Vec<u8>> {
     let dump = |settings: &Settings| settings.dump(&[("device", "x".into())]).expect("text").into_bytes();
     let own = b"iterations = 500\nbackground = [0.0, 0.5, 1.0]\nsave_at = [10, 20]\nnear = 0.1\n".to_vec();
-    vec![dump(&Settings::default()), dump(&Settings::paper()), own]
+    vec![dump(&Settings::default()), dump(&Settings::preset(Preset::Paper)), own]
 }
 
 /// A camera of `render --camera`.

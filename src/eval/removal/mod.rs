@@ -9,16 +9,12 @@ use crate::edit::fill::{Filled, Light, SIGHT_SIDE, Sight, fill};
 use crate::engine::Engine;
 use crate::error::Result;
 use crate::label::vote::ballot::{Ballot, Sweep, Voter, sweep, weight};
-use crate::label::vote::lift::Lift;
 use crate::label::vote::model::label_by_lift;
 use crate::render::{Parts, RenderOptions, Rendered, render};
 use crate::scene::{Gaussians, Photo, Pixels, View};
 use score::{Compare, Holes, Region, Tally};
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
-
-/// Least weight with which the main Gaussian of a pixel takes its label by the rule of the paper.
-const LIFT: Lift = Lift { threshold: 0.6, gpf: true };
 
 /// Photos of the scene without an object.
 pub trait RemovalTruth {
@@ -65,7 +61,7 @@ pub fn removals(
     let sights = sights(engine, train, options.near)?;
     let light = Light::of(model, &sights)?;
     let mut paper = model.clone();
-    label_by_lift(engine, &mut paper, train, (options.near, LIFT, 0))?;
+    label_by_lift(engine, &mut paper, train, options.near)?;
     let voters: Vec<Voter> = views.iter().filter_map(|view| Some(Voter::of(view, view.mask.as_ref()?))).collect();
     let ballot = sweep(engine, &voters, Sweep::new(options.near, 0))?;
     let ids: BTreeSet<u16> = views.iter().filter_map(|view| view.mask.as_ref()).flat_map(Pixels::objects).collect();

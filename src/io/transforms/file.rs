@@ -135,7 +135,7 @@ pub(super) fn note_unused(transforms: &Transforms, frames: &[Frame], notes: &mut
             "mask_path",
             format!("id masks come from the folder {}, what to leave out from {}", Setting("masks"), Setting("ignore")),
         ),
-        ("depth_file_path", format!("known depths come from the folder {}", Setting("known_depths"))),
+        ("depth_file_path", format!("known depths come from the folder {}", Setting("depths"))),
         ("time", "the scene is taken as one in which nothing moves".to_owned()),
         ("rolling_shutter", "a photo is taken as of one moment".to_owned()),
         ("white_transparent", "store the photos with their opacity".to_owned()),

@@ -55,7 +55,7 @@ pub fn agree(
         .collect::<Result<_>>()?;
     // The labels that all renamed masks give the model decide the content of each mask.
     let voters = views.iter().zip(&renamed).filter_map(|(view, mask)| Some(Voter::of(view, mask.as_ref()?)));
-    let decision = count(engine, &voters.collect::<Vec<_>>(), false, &model.means, counting, true)?;
+    let decision = count(engine, &voters.collect::<Vec<_>>(), false, &model.means, counting)?;
     engine.set_labels(&decision.labels)?;
     let mut masks = Vec::with_capacity(views.len());
     for (index, (view, mask)) in views.iter().zip(&renamed).enumerate() {

@@ -1,6 +1,6 @@
 //! A simple tracker: connects the masks of a single-image segmenter from frame to frame by overlap.
 //!
-//! It uses only outlines. So objects must hardly move between frames, as in the videos of `labelgs densify` (LabelGS,
+//! It uses only outlines. So objects must hardly move between frames, as in the videos of `labelgs frames` (LabelGS,
 //! densification of views).
 
 use crate::scene::LabelMap;

@@ -37,10 +37,10 @@ impl Decision {
     }
 }
 
-/// Decides for the label with the most votes; ties go to the smaller label. With `complete`, the nearest neighbours
-/// with enough weight vote too for a Gaussian with little weight. So the inside of an object gets its label and is
+/// Decides for the label with the most votes; ties go to the smaller label. The nearest neighbours with enough weight
+/// vote too for a Gaussian with little weight. So the inside of an object gets its label and is
 /// removed with it.
-pub fn decide(ballot: &Ballot, means: &[[f32; 3]], complete: bool) -> Result<Decision> {
+pub fn decide(ballot: &Ballot, means: &[[f32; 3]]) -> Result<Decision> {
     if ballot.len() != means.len() {
         return Err(Error::Bug(format!("{} rows of votes for {} Gaussians", ballot.len(), means.len())));
     }
@@ -49,7 +49,7 @@ pub fn decide(ballot: &Ballot, means: &[[f32; 3]], complete: bool) -> Result<Dec
         .into_par_iter()
         .map(|row| (own(row).map(|(_, share)| share).sum::<f64>(), winner(own(row))))
         .unzip();
-    let tree = if complete { tree_of(means, &totals)? } else { None };
+    let tree = tree_of(means, &totals)?;
     let decide_row = |row: usize| {
         let mut votes: BTreeMap<u16, f64> = own(row).collect();
         if let Some((tree, rows)) = tree.as_ref().filter(|_| totals[row] < EVIDENCE)
@@ -167,7 +167,6 @@ pub(crate) fn count(
     is_judged: bool,
     means: &[[f32; 3]],
     how: Sweep,
-    complete: bool,
 ) -> Result<Decision> {
     let mut agreements = Vec::new();
     for voter in voters.iter().filter(|_| is_judged) {
@@ -177,5 +176,5 @@ pub(crate) fn count(
     let trusts = trust(&agreements);
     let voters: Vec<Voter> =
         voters.iter().enumerate().map(|(index, voter)| Voter { trust: trusts.get(index), ..*voter }).collect();
-    decide(&sweep(engine, &voters, how)?, means, complete)
+    decide(&sweep(engine, &voters, how)?, means)
 }

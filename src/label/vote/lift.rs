@@ -4,35 +4,23 @@ use crate::render::Rendered;
 use crate::scene::{Camera, LabelMap, UNLABELLED};
 use glam::DVec3;
 
-/// The settings of the lift (LabelGS, equations 6 and 7).
-#[derive(Clone, Copy, Debug)]
-pub struct Lift {
-    /// Least blending weight of the main Gaussian of a pixel.
-    pub threshold: f32,
-    /// Gaussian projection filter: the centre of the Gaussian must project into the same mask.
-    pub gpf: bool,
-}
+/// Least blending weight with which the main Gaussian of a pixel takes its label (LabelGS, equation 6).
+const WEIGHT_MIN: f32 = 0.6;
 
 /// Writes the labels of one view's mask to the main Gaussians of its pixels, over previous labels. Within the view the
-/// larger weight wins, then the larger label. `camera` is [relative](Camera::relative_to) to the origin of `means`.
-pub(crate) fn lift(
-    labels: &mut [u32],
-    means: &[[f32; 3]],
-    camera: &Camera,
-    rendered: &Rendered,
-    mask: &LabelMap,
-    how: Lift,
-) {
+/// larger weight wins, then the larger label. The centre of the Gaussian must project into the same mask (equation 7).
+/// `camera` is [relative](Camera::relative_to) to the origin of `means`.
+pub(crate) fn lift(labels: &mut [u32], means: &[[f32; 3]], camera: &Camera, rendered: &Rendered, mask: &LabelMap) {
     let mut best = vec![(0.0_f32, UNLABELLED); labels.len()];
     for ((&top, &weight), &id) in rendered.top_id.iter().zip(&rendered.top_weight).zip(&mask.ids) {
         let Ok(row) = usize::try_from(top) else { continue };
         let vote = (weight, u32::from(id));
-        if id == 0 || weight < how.threshold || vote <= best[row] {
+        if id == 0 || weight < WEIGHT_MIN || vote <= best[row] {
             continue;
         }
         let at = camera.project(camera.to_camera(DVec3::from_array(means[row].map(f64::from)))).floor();
         let inside = at.x >= 0.0 && at.y >= 0.0 && at.x < f64::from(camera.width) && at.y < f64::from(camera.height);
-        if inside && (!how.gpf || mask.at(at.x as u32, at.y as u32) == id) {
+        if inside && mask.at(at.x as u32, at.y as u32) == id {
             best[row] = vote;
         }
     }

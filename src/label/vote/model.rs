@@ -2,7 +2,7 @@
 
 use super::ballot::{Sweep, Voter, columns_for};
 use super::decide::{apply, count, lower_outside};
-use super::lift::{Lift, lift};
+use super::lift::lift;
 use crate::engine::{Engine, EngineSize, LabelSize};
 use crate::error::Result;
 use crate::gpu::Gpu;
@@ -16,6 +16,11 @@ use rand_pcg::Pcg64Mcg;
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
+/// Counts of votes. In the second, masks that disagree with the result of the first count less.
+pub(crate) const ROUNDS: u32 = 2;
+/// Seed of the order of the views by the rule of the paper.
+const SEED: u64 = 0;
+
 /// The options for counting votes.
 #[derive(Clone, Copy, Debug)]
 pub struct Counting {
@@ -23,10 +28,6 @@ pub struct Counting {
     pub near: f32,
     /// Width of the band along mask contours without votes, px.
     pub mask_border: u32,
-    /// Number of counts. From the second on, masks that disagree with the previous result count less.
-    pub rounds: u32,
-    /// Gaussians that no pixel shows take the label of their neighbours.
-    pub complete: bool,
     /// Labels of less confidence become 0 at the end, 0 to 1.
     pub min_confidence: f32,
 }
@@ -68,9 +69,9 @@ pub fn label_by_votes(
 ) -> Result<()> {
     let voters: Vec<Voter> = views.iter().filter_map(|view| Some(Voter::of(view, view.mask.as_ref()?))).collect();
     let sweep = Sweep::new(how.near, how.mask_border);
-    for round in 0..how.rounds {
-        let mut decision = count(engine, &voters, round > 0, &model.means, sweep, how.complete)?;
-        if round + 1 == how.rounds {
+    for round in 0..ROUNDS {
+        let mut decision = count(engine, &voters, round > 0, &model.means, sweep)?;
+        if round + 1 == ROUNDS {
             lower_outside(engine, &voters, sweep, &mut decision)?;
             decision.drop_unsure(how.min_confidence);
         }
@@ -81,22 +82,17 @@ pub fn label_by_votes(
     Ok(())
 }
 
-/// Labels a model by the rule of the paper: every view writes its labels, in an order that `seed` decides.
-pub fn label_by_lift(
-    engine: &mut Engine,
-    model: &mut Gaussians,
-    views: &[&View],
-    (near, how, seed): (f32, Lift, u64),
-) -> Result<()> {
+/// Labels a model by the rule of the paper: every view writes its labels, in a random order.
+pub fn label_by_lift(engine: &mut Engine, model: &mut Gaussians, views: &[&View], near: f32) -> Result<()> {
     let mut order: Vec<usize> = (0..views.len()).collect();
-    order.shuffle(&mut Pcg64Mcg::seed_from_u64(seed));
+    order.shuffle(&mut Pcg64Mcg::seed_from_u64(SEED));
     let mut labels = vec![UNLABELLED; model.len()];
     let stage = Stage::new("lifting labels", views.len());
     for view in order.into_iter().map(|index| views[index]) {
         stage.count();
         let Some(mask) = view.mask()? else { continue };
         let rendered = render(engine, &view.camera, &RenderOptions::of_main(near))?;
-        lift(&mut labels, &model.means, &view.camera.relative_to(model.origin), &rendered, &mask, how);
+        lift(&mut labels, &model.means, &view.camera.relative_to(model.origin), &rendered, &mask);
     }
     model.labels = Some(labels);
     model.label_confidence = None;

@@ -31,8 +31,9 @@ impl Votes {
         let Context { engine, config, views, .. } = context;
         let how = Sweep::new(config.near, config.mask_border);
         let (means, voters) = (engine.means()?, views.voters());
-        let is_judged = config.vote_trust && self.have_labelled;
-        let mut decision = decide::count(engine, &voters, is_judged, &means, how, true)?;
+        // Masks that disagree with the labels of the model have less weight.
+        let is_judged = self.have_labelled;
+        let mut decision = decide::count(engine, &voters, is_judged, &means, how)?;
         let trained = engine.trained_count() as usize;
         if trained < decision.labels.len() {
             // The views of a part of a scene know little of what is frozen.

@@ -10,6 +10,8 @@ use crate::shaders::structs::StepUniforms;
 use crate::train::{LabelRule, TrainConfig};
 use std::collections::BTreeMap;
 
+/// Share of D-SSIM in the photometric loss; the rest is L1 (3DGS).
+pub(super) const LAMBDA_DSSIM: f32 = 0.2;
 /// Largest weight of a small object relative to the mean.
 const WEIGHT_MAX: f64 = 10.0;
 
@@ -188,7 +190,7 @@ pub(crate) fn uniforms(
     StepUniforms {
         finest: view.finest,
         layer_count: input.layers.len() as u32,
-        lambda_dssim: config.lambda_dssim,
+        lambda_dssim: LAMBDA_DSSIM,
         loss_scale: (1.0 / (3.0 * view.valid_pixels.max(1) as f64)) as f32,
         label_weight: label_weight(input, config),
         label_alpha: alpha_weight(config),

@@ -9,14 +9,11 @@ use serde::{Deserialize, Serialize};
 pub enum Occlusion {
     /// No occluders: every pixel outside an object's mask is expected to be black.
     None,
-    /// Monocular depth from files, --depths, by the paper's rule: the object with the smaller mean depth along the
-    /// contour is in front.
-    Depth,
-    /// Depth of the model itself, rendered every --occlusion-every steps. The paper uses monocular depth of a network
+    /// Depth of the model itself, rendered every `occlusion_every` steps. The paper uses monocular depth of a network
     /// instead.
     #[default]
     Rendered,
-    /// Lists from a file, --occlusion-file.
+    /// Lists from the file of --occluders.
     #[cfg_attr(feature = "cli", value(skip))]
     File,
 }
@@ -57,7 +54,7 @@ pub enum LabelRule {
     /// The label of the pixels in the step's view where the Gaussian has the largest weight; the last view wins
     /// (LabelGS).
     Main,
-    /// The label with the largest sum of weights over the pixels of all views, counted every --vote-every steps and at
+    /// The label with the largest sum of weights over the pixels of all views, counted every `vote_every` steps and at
     /// the end.
     #[default]
     Votes,

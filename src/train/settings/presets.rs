@@ -12,6 +12,8 @@ pub enum Preset {
     Standard,
     /// 30000 steps and up to twice as many Gaussians.
     Best,
+    /// The settings of the LabelGS paper, where the default differs.
+    Paper,
 }
 
 impl TrainConfig {
@@ -21,6 +23,7 @@ impl TrainConfig {
             Preset::Draft => (2000, 0.5),
             Preset::Standard => (7000, 0.5),
             Preset::Best => (30_000, 1.0),
+            Preset::Paper => return Self::paper(),
         };
         Self { iterations, detail, ..Self::default() }
     }

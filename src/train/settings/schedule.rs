@@ -7,6 +7,12 @@ const LONG_RUN: f64 = 30_000.0;
 /// Rates of a run of N steps are multiplied by (LONG_RUN / N)^RATE_POWER, at most by RATE_MOST.
 const RATE_POWER: f64 = 0.3;
 const RATE_MOST: f64 = 3.0;
+/// Share of the run after which the rates fall.
+const RATE_FALL_FROM: f64 = 0.6;
+/// Step with the final learning rate of positions: LabelGS keeps that of 3DGS for its 15000 steps.
+const POSITION_LR_STEPS: f64 = 30_000.0;
+/// Learning rate of the colours of higher degrees, by that of degree 0 (3DGS).
+const FEATURE_REST: f64 = 20.0;
 /// Fewest steps of densification with the strategy of 3DGS.
 const ADC_LEAST: u32 = 1000;
 /// Gaussians of a run by default: at most for each step.
@@ -66,14 +72,14 @@ impl TrainConfig {
 
     /// Returns the factor by which all rates have fallen at `step`.
     pub(in crate::train) fn rate_fall(&self, step: u32) -> f64 {
-        let from = self.rate_fall_from.unwrap_or(self.share(0.6)).min(self.iterations);
+        let from = self.share(RATE_FALL_FROM);
         let late = f64::from(step.saturating_sub(from)) / f64::from((self.iterations - from).max(1));
         self.rate_final.powf(late.min(1.0))
     }
 
     /// Returns the learning rates of `step`.
     pub fn rates_at(&self, step: u32) -> Rates {
-        let t = (f64::from(step) / f64::from(self.position_lr_max_steps)).clamp(0.0, 1.0);
+        let t = (f64::from(step) / POSITION_LR_STEPS).clamp(0.0, 1.0);
         let position = ((1.0 - t) * self.position_lr_init.ln() + t * self.position_lr_final.ln()).exp();
         let (fall, factor) = (self.rate_fall(step), self.rate_factor() * self.rate_fall(step));
         Rates {
@@ -82,7 +88,7 @@ impl TrainConfig {
             scale: factor * self.scaling_lr,
             rotation: factor * self.rotation_lr,
             colour: factor * self.feature_lr,
-            colour_rest: factor * self.feature_rest_lr.unwrap_or(self.feature_lr / 20.0),
+            colour_rest: factor * (self.feature_lr / FEATURE_REST),
         }
     }
 
@@ -94,10 +100,7 @@ impl TrainConfig {
             &mut self.opacity_lr,
             &mut self.scaling_lr,
             &mut self.rotation_lr,
-        ]
-        .into_iter()
-        .chain(&mut self.feature_rest_lr)
-        {
+        ] {
             *rate *= 0.5;
         }
     }

@@ -1,13 +1,18 @@
 //! The strategy of 3DGS, adaptive density control: clones and splits Gaussians with large screen-space gradients,
 //! prunes faint or too large ones, and resets opacities if the settings say so.
 
-use super::{At, Population, Strategy, passes};
+use super::{At, OPACITY_MIN, Population, Strategy, passes};
 use crate::error::Result;
 use crate::pass::Extension;
 use crate::scheduler::plan::Buf;
 use crate::shaders::structs::StepUniforms;
 use crate::train::TrainConfig;
 use std::sync::Arc;
+
+/// Largest Gaussian that is cloned instead of split, a standard deviation, scene extents (3DGS).
+pub(crate) const CLONED_MAX: f32 = 0.01;
+/// Largest standard deviation, scene extents; larger Gaussians are pruned after the first opacity reset (3DGS).
+pub(crate) const SCALE_MAX: f32 = 0.1;
 
 /// The strategy of 3DGS. It has no state: all decisions follow from the step and the configuration.
 #[derive(Clone, Copy, Debug, Default)]
@@ -60,9 +65,9 @@ fn uniforms(at: At, step: StepUniforms) -> StepUniforms {
     let config = at.config;
     StepUniforms {
         densify_threshold: config.densify_grad_threshold,
-        densify_scale: (f64::from(config.percent_dense) * at.extent) as f32,
-        prune_scale: (f64::from(config.max_scale) * at.extent) as f32,
-        prune_opacity: config.min_opacity,
+        densify_scale: (f64::from(CLONED_MAX) * at.extent) as f32,
+        prune_scale: (f64::from(SCALE_MAX) * at.extent) as f32,
+        prune_opacity: OPACITY_MIN,
         prune_big: u32::from(prunes_large_at(config, at.step)),
         ..step
     }

@@ -5,7 +5,7 @@
 //! make room for parts of those across contours of masks. A pass of its own marks Gaussians that fog the cameras.
 
 use super::exchange::exchange;
-use super::{At, FirstCount, Population, Strategy, passes};
+use super::{At, FirstCount, OPACITY_MIN, Population, Strategy, passes};
 use crate::error::Result;
 use crate::pass::Extension;
 use crate::scheduler::plan::Buf;
@@ -38,7 +38,7 @@ impl Strategy for BudgetStrategy {
             // All that grow split.
             densify_scale: 0.0,
             split_long: 1,
-            prune_opacity: config.min_opacity,
+            prune_opacity: OPACITY_MIN,
             ..population.uniforms()
         };
         let mut what = population.densify(uniforms, config.budget_at(at.step, start))?;

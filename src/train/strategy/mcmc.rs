@@ -5,7 +5,7 @@
 //! as many events as only long runs have. A stack of copies keeps the light of the one in a picture, not along a line. The
 //! factor of the learning rates for short runs does not apply to the moves.
 
-use super::{At, FirstCount, Population, Strategy, passes};
+use super::{At, FirstCount, OPACITY_MIN, Population, Strategy, passes};
 use crate::error::Result;
 use crate::pass::Extension;
 use crate::scheduler::plan::Buf;
@@ -35,7 +35,7 @@ impl Strategy for McmcStrategy {
         let config = at.config;
         let start = self.start.of(population);
         let wanted = if config.relocates_at(at.step) { config.budget_at(at.step, start) } else { 0 };
-        let uniforms = StepUniforms { prune_opacity: config.min_opacity, ..population.uniforms() };
+        let uniforms = StepUniforms { prune_opacity: OPACITY_MIN, ..population.uniforms() };
         let what = population.relocate(uniforms, wanted)?;
         tracing::debug!("step {}: {what:?}, {} Gaussians", at.step, population.count());
         Ok(())

@@ -25,6 +25,9 @@ use serde_json::Value;
 use std::fmt::Debug;
 use std::sync::Arc;
 
+/// Least opacity: fainter Gaussians are pruned, or relocated (3DGS, 3DGS-MCMC).
+pub(crate) const OPACITY_MIN: f32 = 0.005;
+
 /// Makes the strategy of a configuration.
 pub fn of(kind: StrategyKind) -> Box<dyn Strategy> {
     match kind {

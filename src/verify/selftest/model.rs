@@ -11,8 +11,9 @@ use crate::scene::{Camera, Gaussians, Zone};
 use crate::scheduler::plan::Buf;
 use crate::shaders::structs::{Counters, StepUniforms};
 use crate::train::TrainConfig;
+use crate::train::strategy::OPACITY_MIN;
 use crate::train::strategy::Strategy as _;
-use crate::train::strategy::adc::prunes_large_at;
+use crate::train::strategy::adc::{CLONED_MAX, SCALE_MAX, prunes_large_at};
 use crate::train::strategy::budget::BudgetStrategy;
 use crate::train::strategy::passes::FREE_SPACE;
 use crate::verify::reference::blend::blend_forward;
@@ -50,9 +51,9 @@ pub(super) fn holding(
     let (config, with_resets) = (&fixture.config, TrainConfig::paper());
     let uniforms = StepUniforms {
         densify_threshold: config.densify_grad_threshold,
-        densify_scale: config.percent_dense,
-        prune_scale: config.max_scale,
-        prune_opacity: config.min_opacity,
+        densify_scale: CLONED_MAX,
+        prune_scale: SCALE_MAX,
+        prune_opacity: OPACITY_MIN,
         prune_big: u32::from(prunes_large_at(&with_resets, step)),
         split_long: u32::from(splits_long),
         seed: SEED,

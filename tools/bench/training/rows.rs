@@ -146,7 +146,7 @@ fn measure(plan: &Plan, build: u32, judge: &Path) -> Result<Row> {
     let (scene, out) = (text(&plan.scene.path), text(&folder.path().join("run")));
     let (seed, steps, size) = (plan.seed.to_string(), plan.steps.to_string(), plan.scene.max_resolution.to_string());
     let masks = plan.scene.masks.as_deref().map(text);
-    let mut args = vec!["train", &scene, "-o", &out, "--quiet", "--json", "--preview-every", "0"];
+    let mut args = vec!["train", &scene, "-o", &out, "--quiet", "--json", "--set", "preview_every=0"];
     args.extend(["--checkpoint-every", "0", "--max-resolution", &size, "--seed", &seed, "--iterations", &steps]);
     args.extend(masks.iter().flat_map(|masks| ["--masks", masks.as_str()]));
     args.extend(plan.flags.iter().map(String::as_str));

@@ -1,0 +1,103 @@
+//! `labelgs blocks estimate`.
+
+use crate::Result;
+use crate::blocks::{Estimate, Sketch, estimate};
+use crate::cli::support::args::JsonFlag;
+use crate::cli::support::context::Context;
+use crate::cli::support::parsers::{Size, bytes, count, size};
+use crate::cli::support::stdout;
+use crate::words::counted;
+use clap::Args;
+use serde_json::json;
+
+const MIB: u64 = 1 << 20;
+
+/// `labelgs blocks estimate`.
+#[derive(Args, Clone, Debug)]
+pub struct EstimateArgs {
+    /// Gaussians of the whole scene, such as 100M.
+    #[arg(long, value_name = "N", value_parser = count)]
+    pub gaussians: u64,
+    /// Gaussians of its coarse model. Default: a quarter.
+    #[arg(long, value_name = "N", value_parser = count)]
+    pub coarse: Option<u64>,
+    /// Number of photos.
+    #[arg(long, value_name = "N")]
+    pub views: u64,
+    /// Size of a photo, px.
+    #[arg(long, value_name = "WxH", value_parser = size, default_value = "1600x1064")]
+    pub size: Size,
+    /// Memory of a card, such as 24G.
+    #[arg(long, value_name = "SIZE", value_parser = bytes)]
+    pub card: u64,
+    /// Largest label of the masks; 0 for a scene without masks.
+    #[arg(long, value_name = "ID", default_value_t = 255)]
+    pub labels: u32,
+    /// Steps of a block of up to 300 views; more views have more in proportion.
+    #[arg(long, value_name = "N", default_value_t = 30_000, value_parser = clap::value_parser!(u32).range(1..))]
+    pub iterations: u32,
+    /// Measured time of a step on photos of this size, ms, for the time that the blocks take.
+    #[arg(long, value_name = "MS", requires = "step_gaussians")]
+    pub step_ms: Option<f64>,
+    /// Gaussians with which it was measured.
+    #[arg(long, value_name = "N", value_parser = count, requires = "step_ms")]
+    pub step_gaussians: Option<u64>,
+    /// JSON.
+    #[command(flatten)]
+    pub json: JsonFlag,
+}
+
+/// Shows the blocks of a scene on paper.
+pub(super) fn run(args: &EstimateArgs, context: &Context) -> Result<()> {
+    let found = estimate(&Sketch {
+        card: args.card,
+        gaussians: args.gaussians,
+        coarse: args.coarse.unwrap_or(args.gaussians / 4),
+        views: args.views,
+        image: (args.size.0, args.size.1),
+        max_label: (args.labels > 0).then_some(args.labels),
+        steps: args.iterations,
+        pace: args.step_ms.map(|ms| ms / 1000.0).zip(args.step_gaussians),
+    })?;
+    if context.json || args.json.json {
+        return stdout::print_json(&to_json(&found));
+    }
+    stdout::print(&to_text(&found))
+}
+
+fn hours(found: &Estimate) -> Option<f64> {
+    found.minutes.map(|minutes| minutes / 60.0)
+}
+
+fn to_text(found: &Estimate) -> String {
+    let time = match hours(found) {
+        Some(hours) => format!("{hours:.1} hours a block, {:.0} card hours together", hours * found.blocks as f64),
+        None => "an unknown time: give --step-ms".to_owned(),
+    };
+    format!(
+        "{}, each of {}, {} frozen ones around it and {}\n{} MiB on the card, {} MiB on the host\n\
+         {}, {time}\n",
+        counted(found.blocks, "block"),
+        counted(found.gaussians, "Gaussian"),
+        found.frozen,
+        counted(found.views, "view"),
+        found.device.div_ceil(MIB),
+        found.host.div_ceil(MIB),
+        counted(found.steps, "step")
+    )
+}
+
+fn to_json(found: &Estimate) -> serde_json::Value {
+    json!({
+        "schema_version": 1,
+        "blocks": found.blocks,
+        "gaussians": found.gaussians,
+        "frozen": found.frozen,
+        "views": found.views,
+        "device_mib": found.device.div_ceil(MIB),
+        "host_mib": found.host.div_ceil(MIB),
+        "steps": found.steps,
+        "hours": hours(found),
+        "card_hours": hours(found).map(|hours| hours * found.blocks as f64),
+    })
+}

@@ -1,0 +1,47 @@
+//! `labelgs clean`.
+
+use crate::Result;
+use crate::cli::support::context::Context;
+use crate::cli::support::model_edit::{EditArgs, open};
+use crate::cli::support::parsers::{corners, distance, share};
+use crate::edit::clean::{Cleaning, clean};
+use clap::Args;
+use glam::DVec3;
+use serde_json::json;
+
+/// `labelgs clean`.
+#[derive(Args, Clone, Debug)]
+#[command(group(clap::ArgGroup::new("rule").required(true).multiple(true)
+    .args(["min_opacity", "max_size", "max_gap", "inside"])))]
+pub struct CleanArgs {
+    /// Model and output.
+    #[command(flatten)]
+    pub edit: EditArgs,
+    /// Drop Gaussians with a smaller opacity, 0 to 1.
+    #[arg(long, value_name = "SHARE", value_parser = share)]
+    pub min_opacity: Option<f32>,
+    /// Drop Gaussians with a larger standard deviation along any axis, world units.
+    #[arg(long, value_name = "SIZE", value_parser = distance)]
+    pub max_size: Option<f64>,
+    /// Drop lonely Gaussians: farther from their eighth neighbour than this many times the median.
+    #[arg(long, value_name = "FACTOR", value_parser = distance)]
+    pub max_gap: Option<f64>,
+    /// Drop Gaussians with a centre outside of this box, world units.
+    #[arg(long, value_name = "x0,y0,z0,x1,y1,z1", value_parser = corners, allow_hyphen_values = true)]
+    pub inside: Option<[DVec3; 2]>,
+}
+
+/// Writes the model without what disturbs.
+pub(crate) fn run(args: &CleanArgs, context: &Context) -> Result<()> {
+    let (model, known) = open(&args.edit.model, &args.edit.table)?;
+    let CleanArgs { min_opacity, max_size, max_gap, inside, .. } = *args;
+    let (cleaned, dropped) = clean(&model, &Cleaning { min_opacity, max_size, max_gap, inside })?;
+    tracing::info!(
+        "dropped {} faint, {} huge, {} outside, {} lonely Gaussians",
+        dropped.faint,
+        dropped.huge,
+        dropped.outside,
+        dropped.lonely
+    );
+    args.edit.finish(context, (&cleaned, known), model.len(), json!({ "dropped": dropped }))
+}

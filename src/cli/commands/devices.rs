@@ -1,0 +1,143 @@
+//! `labelgs devices`.
+
+use crate::cli::support::args::JsonFlag;
+use crate::cli::support::context::Context;
+use crate::cli::support::stdout;
+use crate::gpu::{self, Capabilities, Need};
+use crate::pass::KernelShape;
+use crate::{Error, Result};
+use clap::Args;
+use serde_json::{Value, json};
+
+/// `labelgs devices`.
+#[derive(Args, Clone, Debug)]
+pub struct DevicesArgs {
+    /// JSON.
+    #[command(flatten)]
+    pub json: JsonFlag,
+}
+
+/// Prints the devices. Fails if none is usable.
+pub(crate) fn run(args: &DevicesArgs, context: &Context) -> Result<()> {
+    let options = context.gpu_options()?;
+    let (devices, chosen) = gpu::devices(&options)?;
+    let picked = chosen.as_ref().ok().copied();
+    if context.json || args.json.json {
+        let rows: Vec<Value> = devices.iter().map(|device| to_json(device, picked)).collect();
+        stdout::print_json(&json!({ "schema_version": 1, "devices": rows }))?;
+    } else {
+        devices.iter().try_for_each(|device| stdout::print(&to_text(device, picked)))?;
+    }
+    match (chosen, devices.is_empty()) {
+        (Ok(_), _) => Ok(()),
+        (Err(_), true) => Err(Error::NoDevice(
+            "the Vulkan loader knows no device; install a Vulkan 1.2 driver, such as Mesa's".into(),
+        )),
+        (Err(error), false) if options.device.is_some() => Err(error),
+        (Err(_), false) => {
+            Err(Error::NoDevice("none of those listed meets the requirements; lines marked MISSING say why".into()))
+        }
+    }
+}
+
+/// Returns the kernel shape for a device.
+pub(crate) fn shape_of(device: &Capabilities) -> KernelShape {
+    KernelShape::of(device)
+}
+
+/// Returns the kernel shape as text.
+pub(crate) fn shape_text(shape: &KernelShape) -> String {
+    format!(
+        "{}subgroups of {}, tiles of {} x {} px, {} reads, sort digits of {} bits",
+        if shape.emulated { "emulated " } else { "" },
+        shape.subgroup,
+        shape.tile_width,
+        shape.tile_height,
+        reads(shape),
+        shape.digit_bits
+    )
+}
+
+/// Returns the kernel shape as JSON.
+pub(crate) fn shape_json(shape: &KernelShape) -> Value {
+    json!({
+        "subgroup_size": shape.subgroup,
+        "emulated": shape.emulated,
+        "tile": [shape.tile_width, shape.tile_height],
+        "reads": reads(shape),
+        "digit_bits": shape.digit_bits,
+    })
+}
+
+fn reads(shape: &KernelShape) -> &'static str {
+    if shape.texel { "texel" } else { "storage" }
+}
+
+fn to_text(device: &Capabilities, picked: Option<usize>) -> String {
+    let (major, minor, patch) = device.api_version;
+    let mark = if picked == Some(device.index) { ", used unless --device says otherwise" } else { "" };
+    let mut text =
+        format!("{}: {} ({}, Vulkan {major}.{minor}.{patch}{mark})\n", device.index, device.name, kind(device));
+    text += &format!("   driver  {} {}\n   uuid    {}\n", device.driver_name, device.driver_info, device.uuid_text());
+    let (heap, usable) = (device.limits.heap >> 20, device.limits.plan.max_memory >> 20);
+    text += &format!("   memory  {heap} MiB, {usable} MiB may be used\n");
+    text += &needs_text(device);
+    if device.missing().is_empty() {
+        text += &format!("   kernels {}\n", shape_text(&shape_of(device)));
+    } else {
+        text += "   cannot be used\n";
+    }
+    text
+}
+
+/// Returns the required and optional features of a device, a row each.
+pub(crate) fn needs_text(device: &Capabilities) -> String {
+    let row = |need: &Need| {
+        let (what, needed, found) = (need.what, &need.needed, &need.found);
+        format!("   {:<7} {what:<29} needed {needed:<7} found {found:<18} {}\n", state(need), need.reason)
+    };
+    device.needs.iter().map(row).collect()
+}
+
+/// Returns the same features as JSON.
+pub(crate) fn needs_json(device: &Capabilities) -> Vec<Value> {
+    let row = |need: &Need| {
+        json!({
+            "what": need.what, "required": need.is_required, "needed": need.needed, "found": need.found,
+            "met": need.is_met, "reason": need.reason,
+        })
+    };
+    device.needs.iter().map(row).collect()
+}
+
+/// Returns a device as JSON.
+pub(crate) fn to_json(device: &Capabilities, picked: Option<usize>) -> Value {
+    let (major, minor, patch) = device.api_version;
+    let usable = device.missing().is_empty();
+    json!({
+        "index": device.index,
+        "name": device.name,
+        "kind": kind(device),
+        "vulkan": format!("{major}.{minor}.{patch}"),
+        "driver": { "name": device.driver_name, "version": device.driver_info },
+        "uuid": device.uuid_text(),
+        "memory_bytes": device.limits.heap,
+        "usable_memory_bytes": device.limits.plan.max_memory,
+        "needs": needs_json(device),
+        "usable": usable,
+        "picked": picked == Some(device.index),
+        "kernels": usable.then(|| shape_json(&shape_of(device))),
+    })
+}
+
+fn kind(device: &Capabilities) -> String {
+    format!("{:?}", device.kind).to_lowercase()
+}
+
+fn state(need: &Need) -> &'static str {
+    match (need.is_met, need.is_required) {
+        (true, _) => "ok",
+        (false, true) => "MISSING",
+        (false, false) => "no",
+    }
+}

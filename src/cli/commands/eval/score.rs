@@ -1,0 +1,251 @@
+//! Scores by the masks of the scene: photos, visible masks, whole outlines, objects without occluders.
+
+use super::EvalArgs;
+use super::table::table;
+use crate::blocks::Seams;
+use crate::cli::support::context::{Context, open_model};
+use crate::cli::support::model_drawer::largest;
+use crate::cli::support::model_fit::warn_of_misfit;
+use crate::cli::support::scene::{near_plane, open_gpu, open_scene, pick_views, render_engine};
+use crate::cli::support::scoring::Watcher;
+use crate::eval::by_place;
+use crate::eval::evaluate::{AmodalTruth, Rendering, evaluate_subject, picture_count};
+use crate::eval::lpips::Weights;
+use crate::eval::protocol::score::Distance;
+use crate::eval::removal::{self, RemovalTruth, removals};
+use crate::eval::scores::Scores;
+use crate::eval::subject::{Subject, Whole};
+use crate::gpu::Gpu;
+use crate::io::image::read_rgba;
+use crate::io::mask::read_mask;
+use crate::io::model::ModelRef;
+use crate::label::vote::model::{columns_of, limited_vote_engine};
+use crate::render::RenderOptions;
+use crate::render::large::{Index, Painter, fits};
+use crate::run::models;
+use crate::scene::{Camera, Dataset, Gaussians, Photo, View};
+use crate::scheduler::SchedulerOptions;
+use crate::train::aligned;
+use crate::{Error, Result};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// Scores a model and prints the scores.
+pub(crate) fn run(args: &EvalArgs, context: &Context) -> Result<()> {
+    let scores = score(args, context)?;
+    args.scoring.put_out(&scores, &table(&scores), context)?;
+    scores.check(args.scoring.min_psnr, args.scoring.min_iou)
+}
+
+/// Scores a model.
+pub(crate) fn score(args: &EvalArgs, context: &Context) -> Result<Scores> {
+    let source = models::open_lazily(&args.model)?;
+    let reading = args.reading.of_run(&args.model)?;
+    let dataset = open_scene(&args.scene, &reading, args.masks.clone(), args.background, true)?;
+    let views = pick_views(&dataset, &args.views)?;
+    let near = near_plane(&args.model, args.scoring.near)?;
+    let weights = args.scoring.lpips.as_deref().map(Weights::read).transpose()?;
+    let how = Rendering {
+        options: RenderOptions { near, background: args.background, ..RenderOptions::default() },
+        min_confidence: args.scoring.sure.min_confidence,
+        train: &dataset.train,
+        by_main: args.compat,
+        lpips: weights.as_ref().map(|weights| weights as &dyn Distance),
+    };
+    let job = Job { args, context, wholes: Folders::find(args)?, dataset: &dataset, how };
+    if args.masks.is_some() {
+        job.wholes.tell();
+    }
+    let (gpu, memory) = (open_gpu(context)?, args.scoring.memory.options());
+    let image = largest(views.iter().map(|view| (view.camera.width, view.camera.height)));
+    let scores = if fits(&gpu, source.view(), image, memory)? {
+        job.of_whole(&gpu, views, memory)?
+    } else {
+        job.of_parts(&gpu, source.view(), &views, memory)?
+    };
+    scores.warn_of_odd_view(near);
+    Ok(scores)
+}
+
+/// What is scored, and how.
+struct Job<'a> {
+    args: &'a EvalArgs,
+    context: &'a Context,
+    wholes: Folders,
+    dataset: &'a Dataset,
+    how: Rendering<'a>,
+}
+
+impl Job<'_> {
+    /// Scores a model that fits into the memory of the device.
+    fn of_whole(&self, gpu: &Arc<Gpu>, views: Vec<&View>, memory: SchedulerOptions) -> Result<Scores> {
+        let (args, how) = (self.args, self.how);
+        let model = open_model(&args.model)?;
+        warn_of_misfit(&args.model, &model, self.dataset)?;
+        let removing = if args.removal { Some(Removing::new(args, &model, self.dataset)?) } else { None };
+        let pictures = picture_count(&views) + removing.as_ref().map_or(0, |_| removal::picture_count(&views));
+        let mut watcher = Watcher::new(pictures, args.scoring.page.as_deref(), self.context)?;
+        let refined = match args.refine_poses {
+            true => aligned(gpu, &model, &views, (how.options.near, args.background), memory)?,
+            false => Vec::new(),
+        };
+        let views = if args.refine_poses { refined.iter().collect() } else { views };
+        let sizes = views.iter().map(|view| (view.camera.width, view.camera.height));
+        let mut engine = render_engine(gpu.clone(), &model, sizes, memory)?;
+        let mut whole = Whole { engine: &mut engine, model: &model, min_confidence: how.min_confidence };
+        let mut scores = Scores { refined_poses: args.refine_poses, ..self.of(&mut whole, &views, &mut watcher)? };
+        if let Some(removing) = removing {
+            drop(engine);
+            let all: Vec<&View> = views.iter().copied().chain(removing.train.iter().copied()).collect();
+            let mut engine = limited_vote_engine(gpu.clone(), &model, &all, columns_of(&all), memory)?;
+            let (train, truth) = (&removing.train, &removing.truth);
+            scores.removal = Some(removals(&mut engine, &model, &views, train, how.options, truth, &mut watcher)?);
+        }
+        watcher.finish(&table(&scores))?;
+        Ok(scores)
+    }
+
+    /// Scores a model of which each picture takes a part.
+    fn of_parts(&self, gpu: &Arc<Gpu>, model: ModelRef, views: &[&View], memory: SchedulerOptions) -> Result<Scores> {
+        let args = self.args;
+        for (flag, typed) in [("--removal", args.removal), ("--refine-poses", args.refine_poses)] {
+            if typed {
+                let problem = "needs the whole model in the memory of the device, and it does not fit; leave it out";
+                return Err(Error::usage(flag, problem));
+            }
+        }
+        let mut watcher = Watcher::new(picture_count(views), args.scoring.page.as_deref(), self.context)?;
+        let (index, notes) = Index::of(model, self.how.min_confidence, |_, _| true)?;
+        models::log_notes(&args.model, &notes);
+        let mut painter = Painter::new(Arc::clone(gpu), model, index, memory);
+        let scores = self.of(&mut painter, views, &mut watcher)?;
+        watcher.finish(&table(&scores))?;
+        Ok(scores)
+    }
+
+    fn of(&self, subject: &mut dyn Subject, views: &[&View], watcher: &mut Watcher) -> Result<Scores> {
+        let mut scores = evaluate_subject(subject, views, self.how, &self.wholes, watcher)?;
+        if let Some(seams) = Seams::of_model(&self.args.model)? {
+            subject.show(None)?;
+            let draw = &mut |camera: &Camera, options: &RenderOptions| subject.render(camera, options);
+            scores.places = by_place(draw, views, self.how.options, &seams)?;
+        }
+        Ok(scores)
+    }
+}
+
+/// What scores of removals need besides the views.
+struct Removing<'a> {
+    /// Training views with masks.
+    train: Vec<&'a View>,
+    truth: Without,
+}
+
+impl<'a> Removing<'a> {
+    fn new(args: &EvalArgs, model: &Gaussians, dataset: &'a Dataset) -> Result<Self> {
+        if model.labels.is_none() {
+            return Err(Error::data(
+                &args.model,
+                "",
+                "has no labels to remove objects by; train it with masks, or give it some with labelgs label",
+            ));
+        }
+        let train: Vec<&View> = dataset.train.iter().filter(|view| view.mask.is_some()).collect();
+        if train.is_empty() {
+            let problem = "no training view has a mask; --removal shows the paper's rule, which needs some";
+            return Err(Error::data(args.masks.clone().unwrap_or_default(), "", problem));
+        }
+        Ok(Self { train, truth: Without { scene: args.scene.clone() } })
+    }
+}
+
+/// Photos without an object, `ID/NAME.png` in folders of a scene that need not exist.
+struct Without {
+    scene: PathBuf,
+}
+
+impl RemovalTruth for Without {
+    fn without(&self, id: u32, view: &View) -> Result<Option<Photo>> {
+        self.read("without", id, view)
+    }
+
+    fn shadowed(&self, id: u32, view: &View) -> Result<Option<Photo>> {
+        self.read("shadowed", id, view)
+    }
+}
+
+impl Without {
+    fn read(&self, kind: &str, id: u32, view: &View) -> Result<Option<Photo>> {
+        let Some(file) = file_of(&self.scene.join(kind), id, view) else { return Ok(None) };
+        let picture = read_rgba(&file)?;
+        let (width, height) = (view.camera.width, view.camera.height);
+        if (picture.width, picture.height) != (width, height) {
+            let problem = format!(
+                "has {} x {} px, and view {} has {width} x {height} px; a photo without an object has the pixels of the \
+                 view, so score without --max-resolution",
+                picture.width, picture.height, view.name
+            );
+            return Err(Error::data(file, "", problem));
+        }
+        Ok(Some(picture))
+    }
+}
+
+/// Folders of ground truth about whole objects, `ID/NAME.png` in each.
+struct Folders {
+    /// Outlines.
+    amodal: Option<PathBuf>,
+    /// Pictures without occluders.
+    objects: Option<PathBuf>,
+}
+
+impl Folders {
+    fn find(args: &EvalArgs) -> Result<Self> {
+        if let Some(folder) = args.amodal.as_ref().filter(|folder| !folder.is_dir()) {
+            return Err(Error::data(folder, "", "is not a folder; --amodal needs a folder with ID/NAME.png"));
+        }
+        let inside = |name: &str| Some(args.scene.join(name)).filter(|folder| folder.is_dir());
+        Ok(Self { amodal: args.amodal.clone().or_else(|| inside("amodal")), objects: inside("objects") })
+    }
+
+    /// Logs what objects are compared with: hidden parts cost a score that counts them.
+    fn tell(&self) {
+        match &self.amodal {
+            Some(folder) => tracing::info!("iou_object compares with whole outlines: {}", folder.display()),
+            None => tracing::info!("iou_object compares with the visible masks; --amodal DIR has whole outlines"),
+        }
+    }
+}
+
+impl AmodalTruth for Folders {
+    fn outline(&self, id: u32, view: &View) -> Result<Option<Vec<bool>>> {
+        self.amodal.as_deref().map_or(Ok(None), |folder| read_outline(folder, id, view))
+    }
+
+    fn alone(&self, id: u32, view: &View) -> Result<Option<Vec<[u8; 4]>>> {
+        let Some(file) = self.objects.as_deref().and_then(|folder| file_of(folder, id, view)) else { return Ok(None) };
+        let picture = read_rgba(&file)?;
+        Ok(Some(at_view(view, (picture.width, picture.height), |index| picture.rgba[index])))
+    }
+}
+
+/// Reads the whole outline of an object in a view from `ID/NAME.png`, scaled to the view by nearest pixels.
+pub(crate) fn read_outline(folder: &Path, id: u32, view: &View) -> Result<Option<Vec<bool>>> {
+    let Some(file) = file_of(folder, id, view) else { return Ok(None) };
+    let map = read_mask(&file)?;
+    Ok(Some(at_view(view, (map.width, map.height), |index| map.ids[index] != 0)))
+}
+
+/// Returns the path of `ID/NAME.png` if the file exists.
+fn file_of(folder: &Path, id: u32, view: &View) -> Option<PathBuf> {
+    let file = folder.join(id.to_string()).join(Path::new(&view.name).with_extension("png"));
+    file.is_file().then_some(file)
+}
+
+/// Scales a picture of `size` to the view by nearest pixels.
+fn at_view<T>(view: &View, size: (u32, u32), value: impl Fn(usize) -> T) -> Vec<T> {
+    let (width, height) = (view.camera.width, view.camera.height);
+    let nearest = |at: u32, side: u32, from: u32| ((f64::from(at) + 0.5) * f64::from(from) / f64::from(side)) as usize;
+    let pixel = |(x, y)| value(nearest(y, height, size.1) * size.0 as usize + nearest(x, width, size.0));
+    (0..height).flat_map(|y| (0..width).map(move |x| (x, y))).map(pixel).collect()
+}

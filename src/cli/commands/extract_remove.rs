@@ -1,0 +1,206 @@
+//! `labelgs extract` and `labelgs remove`.
+
+use crate::cli::commands::occlusion::from_model;
+use crate::cli::support::args::JsonFlag;
+use crate::cli::support::context::{Context, open_model};
+use crate::cli::support::label_choice::ChooseArgs;
+use crate::cli::support::log::Progress;
+use crate::cli::support::model_edit::{Edited, MinConfidenceArg, Seen, Target, look, open, wants_json};
+use crate::cli::support::model_fit::warn_of_misfit;
+use crate::cli::support::model_format::WriteArgs;
+use crate::cli::support::parsers::{distance, model_file, share};
+use crate::cli::support::scene::{near_plane, open_gpu, open_scene};
+use crate::edit::change::without_specks;
+use crate::edit::components::Grouping;
+use crate::edit::fill::{Filled, Light, fill};
+use crate::edit::rename::keep;
+use crate::edit::select::remove;
+use crate::engine::Engine;
+use crate::eval::removal::sights;
+use crate::scene::{Gaussians, View};
+use crate::scheduler::SchedulerOptions;
+use crate::train::{REFIT_STEPS, refitted};
+use crate::words::counted;
+use crate::{Error, Result};
+use clap::Args;
+use serde_json::json;
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// What `labelgs extract` and `labelgs remove` have in common.
+#[derive(Args, Clone, Debug)]
+pub struct SelectArgs {
+    /// The model: a PLY, SPZ, GLB, SOG or .splat, or the folder of a `labelgs train` run.
+    #[arg(value_name = "MODEL")]
+    pub model: PathBuf,
+    /// File to write; its ending is the format. Names of its labels go to OUT.labels.json beside it.
+    #[arg(short, long, value_name = "OUT.ply", value_parser = model_file())]
+    pub output: PathBuf,
+    /// How it is written.
+    #[command(flatten)]
+    pub write: WriteArgs,
+    /// Which labels.
+    #[command(flatten)]
+    pub choice: ChooseArgs,
+    /// JSON.
+    #[command(flatten)]
+    pub json: JsonFlag,
+}
+
+impl SelectArgs {
+    /// Returns where the result goes.
+    pub(crate) fn target(&self, context: &Context) -> Target<'_> {
+        Target::new((&self.model, &self.output), self.write, wants_json(context, &self.json))
+    }
+}
+
+/// `labelgs remove`.
+#[derive(Args, Clone, Debug)]
+pub struct RemoveArgs {
+    /// Model, choice and output.
+    #[command(flatten)]
+    pub select: SelectArgs,
+    /// Close what no view ever saw, under and behind the objects: the surfaces around them are continued. Needs --scene,
+    /// whose training views tell what was seen.
+    ///
+    /// If shadows of labelled objects tell where one strong light is, the shadow of the removed ones goes from planes
+    /// around them too.
+    #[arg(long, requires = "scene")]
+    pub fill: bool,
+    /// With --fill, leave the shadow of the removed objects.
+    #[arg(long, requires = "fill")]
+    pub keep_shadow: bool,
+}
+
+/// `labelgs extract`.
+#[derive(Args, Clone, Debug)]
+pub struct ExtractArgs {
+    /// Model, choice and output.
+    #[command(flatten)]
+    pub select: SelectArgs,
+    /// Which Gaussians of the labels.
+    #[command(flatten)]
+    pub sure: MinConfidenceArg,
+    /// Give the copy opacities of its own, fitted to the photos of --scene and to --masks. This takes away haze around the object
+    /// that hides in the scene.
+    #[arg(long, requires = "scene", requires = "masks")]
+    pub refit: bool,
+    /// With --refit, the folder of id masks with which the labels were made.
+    #[arg(long, value_name = "DIR", requires = "refit")]
+    pub masks: Option<PathBuf>,
+    /// Leave out specks: connected parts of a label that are smaller than --min-share.
+    #[arg(long)]
+    pub drop_specks: bool,
+    /// What a speck is.
+    #[command(flatten)]
+    pub grouping: GroupingArgs,
+}
+
+/// Definition of connected parts and specks.
+#[derive(Args, Clone, Debug)]
+#[command(next_help_heading = "Connected parts")]
+pub struct GroupingArgs {
+    /// Least share of the label's Gaussians; a smaller part is a speck. The largest part never is one.
+    #[arg(long, value_name = "SHARE", value_parser = share, default_value_t = 0.05)]
+    pub min_share: f32,
+    /// Largest gap between the ellipsoids (two standard deviations) of connected Gaussians, world units.
+    #[arg(long, value_name = "DISTANCE", value_parser = distance, default_value_t = 0.0)]
+    pub gap: f64,
+}
+
+impl GroupingArgs {
+    /// Returns the rule for connected parts.
+    pub fn grouping(&self) -> Grouping {
+        Grouping { gap: self.gap, min_share: f64::from(self.min_share) }
+    }
+}
+
+/// Writes the Gaussians of the chosen labels.
+pub(crate) fn run_extract(args: &ExtractArgs, context: &Context) -> Result<()> {
+    let select = &args.select;
+    let Seen { model, known, .. } = look(&select.model, &select.choice.prompts.table)?;
+    let labels = select.choice.labels(&select.model, model.view(), &known, context)?;
+    let whole = args.sure.extract_seen(&select.model, model.view(), &labels)?;
+    let part = if args.drop_specks { without_specks(&whole, args.grouping.grouping())? } else { whole.clone() };
+    let part = match (select.choice.scene.as_deref(), &args.masks) {
+        (Some(scene), Some(masks)) => alone(select, (scene, masks), &part, context)?,
+        _ => part,
+    };
+    let edited = Edited {
+        model: &part,
+        table: known.table.as_ref().map(|table| keep(table, |id| labels.contains(&id))),
+        of: known.gaussians.values().sum::<u64>() as usize,
+        added: 0,
+        labels: &labels,
+    };
+    edited.finish(&select.target(context), json!({ "specks": whole.len() - part.len() }))
+}
+
+/// Fits the opacities of objects that stand alone.
+fn alone(select: &SelectArgs, (scene, masks): (&Path, &Path), objects: &Gaussians, to: &Context) -> Result<Gaussians> {
+    let (model, near) = (open_model(&select.model)?, near_plane(&select.model, select.choice.prompts.near)?);
+    let dataset = open_scene(scene, &select.choice.reading(&select.model)?, Some(masks.to_owned()), [0.0; 3], true)?;
+    warn_of_misfit(&select.model, &model, &dataset)?;
+    let views: Vec<&View> = dataset.train.iter().filter(|view| view.mask.is_some()).collect();
+    let gpu = open_gpu(to)?;
+    let occluders = from_model(Arc::clone(&gpu), (&model, near), &views, to)?;
+    drop(model);
+    let mut progress = Progress::new(u64::from(REFIT_STEPS), "steps", &to.global);
+    let mut watch = |step| progress.set(u64::from(step), String::new);
+    refitted(&gpu, objects, (&views, &occluders), near, SchedulerOptions::default(), &mut watch)
+}
+
+/// Writes the Gaussians of all other labels.
+pub(crate) fn run_remove(args: &RemoveArgs, context: &Context) -> Result<()> {
+    let select = &args.select;
+    let (model, known) = open(&select.model, &select.choice.prompts.table)?;
+    let labels = select.choice.labels(&select.model, &model, &known, context)?;
+    let (part, added, more) = match select.choice.scene.as_deref().filter(|_| args.fill) {
+        None => (remove(&model, &listed(&labels))?, 0, json!({})),
+        Some(scene) => {
+            let filled = filled(args, scene, &model, &listed(&labels), context)?;
+            let added: u64 = filled.added.values().sum();
+            let (hidden, lit) = (filled.hidden, filled.lit);
+            tracing::info!(
+                "filled: {}; {hidden} that nobody saw are gone; {lit} lost a shadow",
+                counted(added, "new Gaussian")
+            );
+            (filled.model, added, json!({ "added": filled.added, "hidden": hidden, "lit": lit }))
+        }
+    };
+    let edited = Edited {
+        model: &part,
+        table: known.table.as_ref().map(|table| keep(table, |id| !labels.contains(&id))),
+        of: model.len(),
+        added,
+        labels: &labels,
+    };
+    edited.finish(&select.target(context), more)
+}
+
+/// Removes labels and closes their place by what the training views of a scene show.
+fn filled(args: &RemoveArgs, scene: &Path, model: &Gaussians, labels: &[u32], context: &Context) -> Result<Filled> {
+    let RemoveArgs { select: args, keep_shadow, .. } = args;
+    let dataset = open_scene(scene, &args.choice.reading(&args.model)?, None, [0.0; 3], false)?;
+    let views: Vec<&View> = dataset.train.iter().collect();
+    if views.is_empty() {
+        return Err(Error::data(scene, "", "has no training view to fill from; with --fill a scene needs some"));
+    }
+    // A choice of nothing or of everything is refused before any picture.
+    remove(model, labels)?;
+    let near = near_plane(&args.model, args.choice.prompts.near)?;
+    let sizes = views.iter().map(|view| (view.camera.width, view.camera.height));
+    let mut engine = Engine::of_model(open_gpu(context)?, model, sizes)?;
+    let sights = sights(&mut engine, &views, near)?;
+    let light = if *keep_shadow { None } else { Light::of(model, &sights)? };
+    if let Some(Light { towards, shade }) = light {
+        let share = shade.element_sum() / 3.0;
+        tracing::info!("light from {towards:.2}; shadows have {share:.2} of the colours beside them");
+    }
+    fill(model, labels, &sights, light.as_ref())
+}
+
+fn listed(labels: &BTreeSet<u32>) -> Vec<u32> {
+    labels.iter().copied().collect()
+}

@@ -1,0 +1,143 @@
+//! `labelgs label`.
+
+use crate::cli::commands::masks::repair::table;
+use crate::cli::support::args::{JsonFlag, SceneArgs};
+use crate::cli::support::context::{Context, open_model};
+use crate::cli::support::log::Progress;
+use crate::cli::support::model_fit::warn_of_misfit;
+use crate::cli::support::model_format::WriteArgs;
+use crate::cli::support::parsers::{model_file, near};
+use crate::cli::support::scene::{near_plane, open_gpu, open_scene};
+use crate::cli::support::stdout;
+use crate::edit::select::summarise;
+use crate::gpu::Gpu;
+use crate::io::label_table::LabelTable;
+use crate::io::model::export_model;
+use crate::label::masks::agree::{Agreement, MIN_VIEWS, agree};
+use crate::label::vote::model::{Counting, ROUNDS, columns_of, label_by_lift, label_by_votes, vote_engine};
+use crate::scene::{Gaussians, View};
+use crate::stage::Stage;
+use crate::train::LabelRule;
+use crate::words::counted;
+use crate::{Error, Result};
+use clap::Args;
+use serde_json::json;
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::time::Instant;
+
+/// `labelgs label`.
+#[derive(Args, Clone, Debug)]
+pub struct LabelArgs {
+    /// The model, of any trainer: a PLY, or the folder of a `labelgs train` run. Existing labels are replaced.
+    #[arg(value_name = "MODEL")]
+    pub model: PathBuf,
+    /// Scene with the cameras of the masks.
+    #[arg(long, value_name = "SCENE")]
+    pub scene: PathBuf,
+    /// Folder of id masks, one per view by name.
+    #[arg(long, value_name = "DIR")]
+    pub masks: PathBuf,
+    /// The ids of each view are its own, as from a segmenter of single photos: they are made to agree first, as by
+    /// `masks repair`.
+    #[arg(long)]
+    pub per_view: bool,
+    /// File to write.
+    #[arg(short, long, value_name = "OUT.ply", value_parser = model_file())]
+    pub output: PathBuf,
+    /// How it is written.
+    #[command(flatten)]
+    pub write: WriteArgs,
+    /// How a Gaussian gets its label: by the votes of all views, or as in the paper's training, from the last view in
+    /// which it is the main Gaussian of a pixel.
+    #[arg(long, value_name = "RULE", value_enum, default_value = "votes", help_heading = "Labels")]
+    pub rule: LabelRule,
+    /// Ignore the votes of pixels within this distance of a mask's contour, px; 2 suits masks of trackers.
+    #[arg(long, value_name = "PX", default_value_t = 0, help_heading = "Labels")]
+    pub mask_border: u32,
+    /// Least share of a Gaussian's votes that its label needs; below, the Gaussian gets no label.
+    #[arg(long, value_name = "SHARE", default_value_t = 0.0, help_heading = "Labels")]
+    pub min_confidence: f32,
+    /// Near plane, world units: nearer Gaussians are not seen. Default: the value of the model's run, else 0.2.
+    #[arg(long, value_name = "Z", value_parser = near, help_heading = "Rendering")]
+    pub near: Option<f32>,
+    /// How the scene is read. Test views have no votes.
+    #[command(flatten)]
+    pub reading: SceneArgs,
+    /// JSON.
+    #[command(flatten)]
+    pub json: JsonFlag,
+}
+
+/// Gives the Gaussians of a trained model their labels.
+pub(crate) fn run(args: &LabelArgs, context: &Context) -> Result<()> {
+    let (mut model, near) = (open_model(&args.model)?, near_plane(&args.model, args.near)?);
+    let mut dataset = open_scene(&args.scene, &args.reading, Some(args.masks.clone()), [0.0; 3], true)?;
+    dataset.train.retain(|view| view.mask.is_some());
+    if dataset.train.is_empty() {
+        return Err(Error::data(
+            &args.masks,
+            "",
+            "no training view has a mask here; check the names of the masks and --test-every",
+        ));
+    }
+    warn_of_misfit(&args.model, &model, &dataset)?;
+    let gpu = open_gpu(context)?;
+    let start = Instant::now();
+    let names = match args.per_view {
+        true => Some(make_agree(args, near, &gpu, &model, &mut dataset.train)?),
+        false => LabelTable::of_folder(&args.masks)?,
+    };
+    let views: Vec<&View> = dataset.train.iter().collect();
+    let mut engine = vote_engine(gpu, &model, &views, columns_of(&views))?;
+    let mut progress = Progress::new(u64::from(ROUNDS), "rounds", &context.global);
+    if args.rule == LabelRule::Main {
+        label_by_lift(&mut engine, &mut model, &views, near)?;
+    } else {
+        let how = Counting { near, mask_border: args.mask_border, min_confidence: args.min_confidence };
+        label_by_votes(&mut engine, &mut model, &views, &how, &mut |round| {
+            progress.set(u64::from(round), String::new)
+        })?;
+    }
+    drop(progress);
+    let seconds = start.elapsed().as_secs_f64();
+    let options = args.write.options(&args.model, &args.output)?;
+    export_model(&args.output, &model, names.as_ref(), options)?;
+    let rows = summarise(&model);
+    if context.json || args.json.json {
+        return stdout::print_json(&json!({
+            "schema_version": 1,
+            "output": args.output.display().to_string(),
+            "views": views.len(),
+            "seconds": seconds,
+            "gaussians": model.len(),
+            "labels": rows,
+        }));
+    }
+    let labelled: u64 = rows.iter().filter(|row| row.label != 0).map(|row| row.count).sum();
+    stdout::print(&format!(
+        "{}: {labelled} of {} belong to {}, by {} in {seconds:.1} s\n",
+        args.output.display(),
+        counted(model.len(), "Gaussian"),
+        counted(rows.iter().filter(|row| row.label != 0).count(), "object"),
+        counted(views.len(), "view")
+    ))
+}
+
+/// Replaces the masks of the views by those whose ids agree, and returns their names.
+fn make_agree(
+    args: &LabelArgs,
+    near: f32,
+    gpu: &Arc<Gpu>,
+    model: &Gaussians,
+    views: &mut [View],
+) -> Result<LabelTable> {
+    let borrowed: Vec<&View> = views.iter().collect();
+    let mut engine = vote_engine(Arc::clone(gpu), model, &borrowed, columns_of(&borrowed))?;
+    let how = Agreement { near, per_view: true, min_views: MIN_VIEWS, make_missing: false };
+    let stage = Stage::new("comparing masks", 2 * borrowed.len());
+    let (masks, _) = agree(&mut engine, model, &borrowed, how, &mut || stage.count())?;
+    let names = table(&args.masks, true, &borrowed, &masks)?;
+    views.iter_mut().zip(masks).for_each(|(view, mask)| view.mask = mask.map(Into::into));
+    Ok(names)
+}

@@ -1,0 +1,71 @@
+//! `labelgs masks check`.
+
+use super::open_photos;
+use crate::cli::support::args::{JsonFlag, ReadArgs};
+use crate::cli::support::context::Context;
+use crate::cli::support::stdout;
+use crate::io::masks::check::{Finding, Problem};
+use crate::io::masks::{Report, inspect};
+use crate::{Error, Result};
+use clap::Args;
+use serde_json::json;
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+/// `labelgs masks check`.
+#[derive(Args, Clone, Debug)]
+pub struct CheckArgs {
+    /// Folder of id masks.
+    #[arg(value_name = "MASKS")]
+    pub masks: PathBuf,
+    /// Scene whose photos the masks belong to.
+    #[arg(long, value_name = "SCENE")]
+    pub scene: PathBuf,
+    /// Tolerance for the scene.
+    #[command(flatten)]
+    pub read: ReadArgs,
+    /// JSON.
+    #[command(flatten)]
+    pub json: JsonFlag,
+}
+
+/// Prints the findings. Fails if there are any.
+pub(crate) fn run(args: &CheckArgs, context: &Context) -> Result<()> {
+    let dataset = open_photos(&args.scene, &args.read)?;
+    let report = inspect(&dataset, &args.masks)?;
+    let mut counts: BTreeMap<Problem, usize> = BTreeMap::new();
+    report.findings.iter().for_each(|finding| *counts.entry(finding.problem).or_default() += 1);
+    if context.json || args.json.json {
+        stdout::print_json(&json!({
+            "schema_version": 1,
+            "masks": args.masks.display().to_string(),
+            "scene": args.scene.display().to_string(),
+            "counts": counts,
+            "report": report,
+        }))?;
+    } else {
+        stdout::print(&table(args, &report))?;
+    }
+    if report.findings.is_empty() {
+        return Ok(());
+    }
+    let counts: Vec<String> = counts.iter().map(|(problem, count)| format!("{count} {}", problem.text())).collect();
+    Err(Error::Check(format!("{}: {}", args.masks.display(), counts.join(", "))))
+}
+
+fn table(args: &CheckArgs, report: &Report) -> String {
+    let (masks, photos, ids) = (report.masks, report.photos, report.ids.len());
+    let mut text = format!("{}: {masks} masks for {photos} photos, {ids} ids\n", args.masks.display());
+    if report.findings.is_empty() {
+        return text + "nothing found\n";
+    }
+    text += &format!("{:>12} {:>16} {:>6}  what\n", "problem", "photo", "id");
+    report.findings.iter().for_each(|finding| text += &line(finding));
+    text
+}
+
+fn line(finding: &Finding) -> String {
+    let view = finding.view.as_deref().unwrap_or("-");
+    let id = finding.id.map_or("-".to_owned(), |id| id.to_string());
+    format!("{:>12} {view:>16} {id:>6}  {}\n", finding.problem.text(), finding.text)
+}

@@ -1,0 +1,126 @@
+//! `labelgs masks import`.
+
+use super::open_photos;
+use crate::Result;
+use crate::cli::support::args::{JsonFlag, ReadArgs};
+use crate::cli::support::context::Context;
+use crate::cli::support::shell_words::quoted;
+use crate::cli::support::stdout;
+use crate::io::label_table::LabelEntry;
+use crate::io::masks::{Format, ImportOptions, Imported, ObjectPer, Objects, Overlap, import};
+use clap::Args;
+use serde_json::json;
+use std::path::PathBuf;
+
+/// `labelgs masks import`.
+#[derive(Args, Clone, Debug)]
+pub struct ImportArgs {
+    /// Folder with the masks, or the folder of a tool or data set that holds it; or a JSON of COCO.
+    #[arg(value_name = "MASKS")]
+    pub folder: PathBuf,
+    /// Scene whose photos the masks belong to.
+    #[arg(long, value_name = "SCENE")]
+    pub scene: PathBuf,
+    /// Folder to write; must be new or empty.
+    #[arg(short, long, value_name = "DIR")]
+    pub output: PathBuf,
+    /// Format of the masks; auto fails if two formats fit.
+    #[arg(long, value_name = "FORMAT", value_enum, default_value = "auto")]
+    pub format: Format,
+    /// The pred.json of DEVA. Default: pred.json in MASKS, if it exists.
+    #[arg(long, value_name = "FILE")]
+    pub pred: Option<PathBuf>,
+    /// Owner of pixels that two masks share, where masks show one object each.
+    #[arg(long, value_name = "RULE", value_enum, default_value = "auto")]
+    pub overlap: Overlap,
+    /// What makes two masks one object, where masks show one object each.
+    #[arg(long, value_name = "RULE", value_enum, default_value = "auto")]
+    pub object_per: ObjectPer,
+    /// Tolerance for the scene.
+    #[command(flatten)]
+    pub read: ReadArgs,
+    /// JSON.
+    #[command(flatten)]
+    pub json: JsonFlag,
+}
+
+/// Imports the masks.
+pub(crate) fn run(args: &ImportArgs, context: &Context) -> Result<()> {
+    let dataset = open_photos(&args.scene, &args.read)?;
+    let options = ImportOptions {
+        folder: args.folder.clone(),
+        format: args.format,
+        pred: args.pred.clone(),
+        overlap: args.overlap,
+        object_per: args.object_per,
+    };
+    let done = import(&dataset, &options, &args.output)?;
+    warn(&done);
+    if context.json || args.json.json {
+        return stdout::print_json(&json!({
+            "schema_version": 1,
+            "output": args.output.display().to_string(),
+            "import": done,
+        }));
+    }
+    let pred = done.pred.as_ref().map_or(String::new(), |pred| format!(", {}", pred.display()));
+    let mut text = format!("{}{pred}: {} ({})\n", done.source.display(), done.format.name(), done.why);
+    text += &format!(
+        "{}: {} masks for {} photos, {} labels, {} bits\n",
+        args.output.display(),
+        done.masks,
+        done.photos,
+        done.labels.len(),
+        done.bits
+    );
+    text += &format!("{:>6} {:>12} {:>6}  {:<24} source\n", "label", "pixels", "views", "name");
+    done.labels.iter().for_each(|entry| text += &line(entry));
+    text += &done.objects.as_ref().map_or(String::new(), |objects| meaning(objects, args));
+    stdout::print(&text)
+}
+
+fn line(entry: &LabelEntry) -> String {
+    let text = |value: &Option<String>| value.clone().unwrap_or_else(|| "-".to_owned());
+    let (name, source) = (text(&entry.name), text(&entry.source));
+    format!("{:>6} {:>12} {:>6}  {name:<24} {source}\n", entry.id, entry.pixels, entry.views)
+}
+
+fn warn(done: &Imported) {
+    let listed = |names: &[String]| names.join(", ");
+    if !done.masks_without_photo.is_empty() {
+        let names = &done.masks_without_photo;
+        tracing::warn!("{} masks belong to no photo and were left out: {}", names.len(), listed(names));
+    }
+    if !done.photos_without_mask.is_empty() {
+        let names = &done.photos_without_mask;
+        tracing::warn!("{} of {} photos have no mask: {}", names.len(), done.photos, listed(names));
+    }
+    if done.overlaps.pixels > 0 {
+        let (pixels, photos) = (done.overlaps.pixels, done.overlaps.photos);
+        let rule = match done.overlaps.rule {
+            Overlap::Smaller => "smaller",
+            _ => "later",
+        };
+        tracing::warn!(
+            "{pixels} pixels in {photos} photos belong to several masks and went to the {rule} one, see --overlap"
+        );
+    }
+    done.notes.iter().for_each(|note| tracing::warn!("{note}"));
+}
+
+/// Says what the ids mean and, if each photo has its own, how they come to agree.
+fn meaning(objects: &Objects, args: &ImportArgs) -> String {
+    let why = &objects.why;
+    match objects.per {
+        ObjectPer::Mask => {
+            let [scene, masks] = [&args.scene, &args.output].map(|path| quoted(&path.to_string_lossy()));
+            format!(
+                "ids of each photo are its own ({why}; --object-per). To make them agree:\n  \
+                 labelgs train {scene} -o plain\n  \
+                 labelgs masks repair {masks} --per-view --model plain --scene {scene} -o repaired\n"
+            )
+        }
+        ObjectPer::Track => format!("masks of one track are one object ({why})\n"),
+        _ => format!("masks of one name are one object ({why})\n"),
+    }
+}

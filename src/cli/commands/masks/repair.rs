@@ -1,0 +1,193 @@
+//! `labelgs masks repair`.
+
+use super::{files_of_photos, write_mask};
+use crate::cli::support::args::{JsonFlag, SceneArgs};
+use crate::cli::support::context::{Context, open_model};
+use crate::cli::support::log::Progress;
+use crate::cli::support::model_fit::warn_of_misfit;
+use crate::cli::support::parsers::near;
+use crate::cli::support::scene::{near_plane, open_gpu, open_scene};
+use crate::cli::support::stdout;
+use crate::io::atomic;
+use crate::io::label_table::{FILE, LabelEntry, LabelTable};
+use crate::io::window::{ids_of_photo, windows};
+use crate::label::masks::agree::{Agreement, MIN_VIEWS, agree, follow};
+use crate::label::masks::names::carried;
+use crate::label::masks::repair::Repairs;
+use crate::label::vote::model::{columns_of, vote_engine};
+use crate::scene::{LabelMap, View};
+use crate::{Error, Result};
+use clap::Args;
+use serde_json::json;
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+
+/// `labelgs masks repair`.
+#[derive(Args, Clone, Debug)]
+pub struct RepairArgs {
+    /// Folder of id masks.
+    #[arg(value_name = "MASKS")]
+    pub masks: PathBuf,
+    /// A model of the scene, of any trainer, with or without labels. It shows which masks belong to one object.
+    #[arg(long, value_name = "MODEL")]
+    pub model: PathBuf,
+    /// Scene of the masks.
+    #[arg(long, value_name = "SCENE")]
+    pub scene: PathBuf,
+    /// Folder to write; must be new or empty.
+    #[arg(short, long, value_name = "DIR")]
+    pub output: PathBuf,
+    /// The ids of each view are its own, as from a segmenter of single photos.
+    #[arg(long)]
+    pub per_view: bool,
+    /// Least number of views that show an object; objects in fewer views are left out.
+    #[arg(long, value_name = "N", default_value_t = MIN_VIEWS)]
+    pub min_views: usize,
+    /// Make masks for photos without one, except those that are held out.
+    #[arg(long)]
+    pub make_missing: bool,
+    /// Near plane, world units: nearer Gaussians are not seen. Default: the value of the model's run, else 0.2.
+    #[arg(long, value_name = "Z", value_parser = near, help_heading = "Rendering")]
+    pub near: Option<f32>,
+    /// How the scene is read. Masks of test views decide nothing; they get the ids of the objects and keep their outlines.
+    #[command(flatten)]
+    pub reading: SceneArgs,
+    /// JSON.
+    #[command(flatten)]
+    pub json: JsonFlag,
+}
+
+/// Writes masks whose ids agree in all views.
+pub(crate) fn run(args: &RepairArgs, context: &Context) -> Result<()> {
+    atomic::require_empty("--output", &args.output)?;
+    let model = open_model(&args.model)?;
+    let dataset = open_scene(&args.scene, &args.reading, Some(args.masks.clone()), [0.0; 3], true)?;
+    let views: Vec<&View> = dataset.train.iter().collect();
+    if views.iter().all(|view| view.mask.is_none()) {
+        return Err(Error::data(
+            &args.masks,
+            "",
+            "no training view has a mask here; check the names of the masks and --test-every",
+        ));
+    }
+    warn_of_misfit(&args.model, &model, &dataset)?;
+    let held_out: Vec<&View> = dataset.test.iter().collect();
+    let all: Vec<&View> = views.iter().chain(&held_out).copied().collect();
+    let windows = windows(&args.scene, &args.reading.read.lookup())?;
+    let photos = files_of_photos(all.iter().map(|view| view.name.as_str()), &windows, &args.scene)?;
+    let mut engine = vote_engine(open_gpu(context)?, &model, &all, columns_of(&views))?;
+    let mut progress = Progress::new((2 * views.len() + held_out.len()) as u64, "views", &context.global);
+    let mut done = 0;
+    let mut tick = || {
+        done += 1;
+        progress.set(done, String::new);
+    };
+    let how = Agreement {
+        near: near_plane(&args.model, args.near)?,
+        per_view: args.per_view,
+        min_views: args.min_views,
+        make_missing: args.make_missing,
+    };
+    let (mut masks, mut repairs) = agree(&mut engine, &model, &views, how, &mut tick)?;
+    let others = follow(&mut engine, &held_out, how, (&masks, &mut repairs), &mut tick)?;
+    masks.extend(others);
+    drop(progress);
+    let table = table(&args.masks, args.per_view, &all, &masks)?;
+    // Masks belong to the photos as they are stored, whatever their lenses.
+    for (file, views_of) in &photos {
+        let parts = views_of.iter().filter_map(|&at| Some((windows.get(&all[at].name)?, masks[at].as_ref()?)));
+        if let Some(mask) = ids_of_photo(&parts.collect::<Vec<_>>()) {
+            write_mask(&args.output.join(file), &mask)?;
+        }
+    }
+    table.write(&args.output.join(FILE))?;
+    report(&all, &masks, &repairs, args, context)
+}
+
+/// Makes the table of masks that were repaired, from that of their folder. Where each view had ids of its own, an object
+/// gets the name of most of its pixels; else its id keeps its entry.
+pub(in crate::cli) fn table(
+    folder: &Path,
+    per_view: bool,
+    views: &[&View],
+    masks: &[Option<LabelMap>],
+) -> Result<LabelTable> {
+    let mut entries: BTreeMap<u16, LabelEntry> = BTreeMap::new();
+    let known = LabelTable::of_folder(folder)?;
+    let names = match &known {
+        Some(known) if per_view => {
+            let mut pairs = Vec::new();
+            for (view, mask) in views.iter().zip(masks) {
+                pairs.extend(view.mask()?.zip(mask.as_ref()));
+            }
+            carried(known, pairs.iter().map(|(before, after)| (&**before, *after)))
+        }
+        _ => BTreeMap::new(),
+    };
+    for mask in masks.iter().flatten() {
+        for id in mask.objects() {
+            let new = LabelEntry { name: names.get(&id).cloned(), ..LabelEntry::new(u32::from(id)) };
+            let old = known.as_ref().filter(|_| !per_view).and_then(|table| table.entry(u32::from(id)).cloned());
+            let blank = || LabelEntry { pixels: 0, views: 0, ..old.unwrap_or(new) };
+            let entry = entries.entry(id).or_insert_with(blank);
+            entry.views += 1;
+            entry.pixels += mask.ids.iter().filter(|&&found| found == id).count() as u64;
+        }
+    }
+    Ok(LabelTable::new(entries.into_values().collect()))
+}
+
+fn report(
+    views: &[&View],
+    masks: &[Option<LabelMap>],
+    repairs: &Repairs,
+    args: &RepairArgs,
+    context: &Context,
+) -> Result<()> {
+    let name = |view: usize| views[view].name.as_str();
+    let objects: BTreeSet<u16> = masks.iter().flatten().flat_map(LabelMap::objects).collect();
+    if context.json || args.json.json {
+        let renamed =
+            repairs.renamed.iter().map(|&((view, id), new)| json!({"view": name(view), "id": id, "new": new}));
+        let divided =
+            repairs.divided.iter().map(|((view, id), parts)| json!({"view": name(*view), "id": id, "parts": parts}));
+        let filled = repairs.filled.iter().map(|&(view, id)| json!({"view": name(view), "id": id}));
+        return stdout::print_json(&json!({
+            "schema_version": 1,
+            "output": args.output.display().to_string(),
+            "objects": objects,
+            "renamed": renamed.collect::<Vec<_>>(),
+            "divided": divided.collect::<Vec<_>>(),
+            "left_out": repairs.left_out.iter().map(|&(view, id)| json!({"view": name(view), "id": id})).collect::<Vec<_>>(),
+            "filled": filled.collect::<Vec<_>>(),
+            "made": repairs.made.iter().map(|&view| name(view)).collect::<Vec<_>>(),
+        }));
+    }
+    let mut text = String::new();
+    // Ids of single views mean nothing, so that nearly all of them change.
+    for &((view, id), new) in repairs.renamed.iter().filter(|_| !args.per_view) {
+        text += &format!("{}: {id} is {new}\n", name(view));
+    }
+    for ((view, id), parts) in &repairs.divided {
+        let parts: Vec<String> = parts.iter().map(u16::to_string).collect();
+        text += &format!("{}: {id} is {}\n", name(*view), parts.join(" and "));
+    }
+    for &(view, id) in repairs.left_out.iter().filter(|_| !args.per_view) {
+        text += &format!("{}: {id} is left out, fewer than {} views show the object\n", name(view), args.min_views);
+    }
+    for &(view, id) in &repairs.filled {
+        text += &format!("{}: {id} was missing\n", name(view));
+    }
+    text += &format!(
+        "{}: {} objects in {} masks; {} masks renamed, {} divided, {} left out, {} objects filled in, {} masks made\n",
+        args.output.display(),
+        objects.len(),
+        masks.iter().flatten().count(),
+        repairs.renamed.len(),
+        repairs.divided.len(),
+        repairs.left_out.len(),
+        repairs.filled.len(),
+        repairs.made.len()
+    );
+    stdout::print(&text)
+}

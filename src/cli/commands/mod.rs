@@ -1,0 +1,31 @@
+//! The commands, a file or a folder each.
+
+pub(crate) mod ablate;
+pub(crate) mod benchmark;
+pub(crate) mod blocks;
+pub(crate) mod check;
+pub(crate) mod clean;
+pub(crate) mod convert;
+pub(crate) mod devices;
+pub(crate) mod eval;
+pub(crate) mod extract_remove;
+pub(crate) mod frames;
+pub(crate) mod kernels;
+pub(crate) mod label;
+pub(crate) mod list;
+pub(crate) mod masks;
+pub(crate) mod merge;
+pub(crate) mod occlusion;
+pub(crate) mod plan;
+pub(crate) mod profile;
+pub(crate) mod recolour;
+pub(crate) mod relabel;
+pub(crate) mod render;
+pub(crate) mod report;
+pub(crate) mod selftest;
+pub(crate) mod simplify;
+pub(crate) mod split_components;
+pub(crate) mod synth;
+pub(crate) mod train;
+pub(crate) mod transform;
+pub(crate) mod view;

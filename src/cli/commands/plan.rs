@@ -1,0 +1,276 @@
+//! `labelgs plan`.
+
+use crate::cli::commands::devices::{shape_json, shape_of, shape_text};
+use crate::cli::support::args::JsonFlag;
+use crate::cli::support::context::Context;
+use crate::cli::support::parsers::{Size, bytes, count, size};
+use crate::cli::support::stdout;
+use crate::engine::{Engine, EngineSize, LabelSize, capacity, card, predict_for};
+use crate::gpu;
+use crate::pass::{KernelShape, Supervision, Variant, training_step};
+use crate::scheduler::plan::{
+    Capacity, Grid, Limits, MemoryReport, Page, PassList, Plan, PlanOptions, TABLE, Touch, Work,
+};
+use crate::words::counted;
+use crate::{Error, Result};
+use clap::Args;
+use serde_json::{Value, json};
+
+/// `labelgs plan`.
+#[derive(Args, Clone, Debug)]
+pub struct PlanArgs {
+    /// Number of Gaussians to plan for, such as 500k or 2M.
+    #[arg(long, alias = "max-gaussians", value_name = "N", value_parser = count, default_value = "1M")]
+    pub gaussians: u64,
+    /// Size of a picture, px.
+    #[arg(long, alias = "max-resolution", value_name = "WxH", value_parser = size, default_value = "1600x1064")]
+    pub size: Size,
+    /// Objects per step; 0 plans without labels.
+    #[arg(long, value_name = "N", default_value_t = 10)]
+    pub label_samples: u32,
+    /// Degree of the spherical harmonics.
+    #[arg(long, value_name = "DEGREE", value_parser = clap::value_parser!(u32).range(0..=3), default_value_t = 3)]
+    pub sh_degree: u32,
+    /// Plan for a graphics card with this memory, such as 24G, instead of the device of this machine.
+    #[arg(long, value_name = "SIZE", value_parser = bytes)]
+    pub card: Option<u64>,
+    /// JSON.
+    #[command(flatten)]
+    pub json: JsonFlag,
+}
+
+/// Largest label id of the plan; a larger id costs a few bytes.
+const MAX_LABEL: u32 = 255;
+
+/// A step and its device.
+struct Subject {
+    device: Option<String>,
+    shape: KernelShape,
+    limits: Limits,
+    room: EngineSize,
+    capacity: Capacity,
+    list: PassList,
+}
+
+/// Prints the plan of a step. Fails afterwards if the plan exceeds the device.
+pub(crate) fn run(args: &PlanArgs, context: &Context) -> Result<()> {
+    let subject = subject(args, context)?;
+    let (planned, problem) = match planned(&subject, &subject.limits) {
+        Err(error @ Error::OutOfMemory { .. }) => (planned(&subject, &without_sizes(&subject.limits))?, Some(error)),
+        done => (done?, None),
+    };
+    if context.json || args.json.json {
+        stdout::print_json(&to_json(&subject, &planned, problem.as_ref()))?;
+    } else {
+        stdout::print(&to_text(&subject, &planned)?)?;
+    }
+    problem.map_or(Ok(()), Err)
+}
+
+fn subject(args: &PlanArgs, context: &Context) -> Result<Subject> {
+    let (device, shape, limits) = match args.card {
+        Some(memory) => {
+            let (shape, limits) = card(memory);
+            (Some(format!("a graphics card with {:.1} GiB", memory as f64 / f64::from(1 << 30))), shape, limits)
+        }
+        None => device(context)?,
+    };
+    let labels = (args.label_samples > 0).then(|| LabelSize {
+        max_label: MAX_LABEL.max(args.label_samples),
+        layers: args.label_samples,
+        vote_columns: MAX_LABEL.max(args.label_samples) + 1,
+    });
+    let size = (args.size.0, args.size.1);
+    let room = EngineSize::new(args.gaussians.max(1), size).for_training().with_labels(labels);
+    let capacity = capacity(&shape, &room);
+    let supervision = labels.map_or(Supervision::Photo, |_| Supervision::Layers { lift: false });
+    let variant = Variant { supervision, sh_degree: args.sh_degree, ..Variant::plain(size) };
+    let list = training_step(&shape, &capacity, variant);
+    Ok(Subject { device, shape, limits, room, capacity, list })
+}
+
+/// Returns the name, kernels and limits of the device, or those of a software device if there is none.
+fn device(context: &Context) -> Result<(Option<String>, KernelShape, Limits)> {
+    let options = context.gpu_options()?;
+    match gpu::devices(&options) {
+        Ok((devices, Ok(picked))) => {
+            let device = &devices[picked];
+            Ok((Some(device.name.clone()), shape_of(device), device.limits.plan))
+        }
+        Ok((_, Err(error))) | Err(error) if options.device.is_some() => Err(error),
+        Ok((_, Err(_))) | Err(Error::NoDevice(_)) => {
+            tracing::warn!("no usable Vulkan device; the plan is for a software device with modest limits");
+            Ok((None, KernelShape::new(8, true), Limits::default()))
+        }
+        Err(error) => Err(error),
+    }
+}
+
+fn planned(subject: &Subject, limits: &Limits) -> Result<(MemoryReport, Plan)> {
+    let lists = Engine::lists_of(&subject.shape, &subject.capacity, &subject.room);
+    let options = PlanOptions::default();
+    let memory = MemoryReport::predict(TABLE, &subject.capacity, &lists, limits, options)?;
+    Ok((memory, Plan::new(TABLE, &subject.capacity, &subject.list, limits, options)?))
+}
+
+/// Returns the limits with unlimited memory, for a report of the needed memory.
+fn without_sizes(limits: &Limits) -> Limits {
+    const MUCH: u64 = 1 << 60;
+    Limits { max_storage_range: MUCH, max_texel_elements: MUCH, max_allocation: MUCH, max_memory: MUCH, ..*limits }
+}
+
+fn to_text(subject: &Subject, (memory, plan): &(MemoryReport, Plan)) -> Result<String> {
+    let (room, capacity) = (&subject.room, &subject.capacity);
+    let objects = room.labels.map_or(0, |labels| labels.layers);
+    Ok(format!(
+        "Training {} on pictures of {} x {} px with {} per step\n\
+         device:  {}\nkernels: {}\nroom for {} (splat, tile) pairs, {} tiles of object layers\n\n\
+         MEMORY at the start; pairs and tiles of object layers grow when a view needs more\n{}\n\
+         SCRATCH ARENA of the step; buffers whose items do not overlap share bytes\n{}\n\
+         PASSES\n{}\n{}",
+        counted(room.gaussians, "Gaussian"),
+        room.image.0,
+        room.image.1,
+        counted(objects, "object"),
+        subject.device.as_deref().unwrap_or("none found, limits assumed"),
+        shape_text(&subject.shape),
+        capacity.instances,
+        capacity.layer_tiles,
+        memory.report(),
+        plan.arena_report(),
+        plan.report(),
+        summary(subject, memory)?
+    ))
+}
+
+const MIB: f64 = 1_048_576.0;
+
+/// Returns what to take from the plan: the memory, the Gaussians that fit, and what smaller values save.
+fn summary(subject: &Subject, memory: &MemoryReport) -> Result<String> {
+    let room = &subject.room;
+    let (needed, limit) = (memory.total as f64 / MIB, subject.limits.max_memory as f64 / MIB);
+    let mut text = format!("needed:  {needed:.0} MiB at the start, of {limit:.0} MiB that may be used\n");
+    text += &match most_gaussians(subject) {
+        0 => "fits:    no Gaussian on such pictures\n".to_owned(),
+        most => format!("fits:    up to {} with such pictures and objects\n", counted(most, "Gaussian")),
+    };
+    let half = |value: u32| (value / 2).max(1);
+    let image = (half(room.image.0), half(room.image.1));
+    let labels = room.labels.map(|labels| LabelSize { layers: half(labels.layers), ..labels });
+    let smaller = [
+        ("half of --gaussians", EngineSize { gaussians: (room.gaussians / 2).max(1), ..*room }),
+        ("half of both sides of --size", EngineSize { image, ..*room }),
+        ("half of --label-samples", EngineSize { labels, ..*room }),
+    ];
+    let mut savings = Vec::new();
+    for (what, room) in smaller.into_iter().filter(|(_, smaller)| smaller != room) {
+        let total = predict_for(&subject.shape, &without_sizes(&subject.limits), &room)?.total;
+        savings.push((memory.total.saturating_sub(total), what));
+    }
+    savings.sort_by(|a, b| b.cmp(a));
+    let shown = savings.iter().filter(|(bytes, _)| *bytes as f64 >= MIB);
+    let savings: Vec<String> =
+        shown.map(|(bytes, what)| format!("{what} saves {:.0} MiB", *bytes as f64 / MIB)).collect();
+    Ok(text + &format!("lower:   {}\n", savings.join(", ")))
+}
+
+/// Returns the most Gaussians that fit the device.
+fn most_gaussians(subject: &Subject) -> u64 {
+    let fits = |gaussians| {
+        let room = EngineSize { gaussians, ..subject.room };
+        predict_for(&subject.shape, &subject.limits, &room).is_ok()
+    };
+    let (mut fitting, mut tried) = (0, 1);
+    while tried <= u64::from(u32::MAX) && fits(tried) {
+        (fitting, tried) = (tried, 2 * tried);
+    }
+    // Three digits are enough.
+    while tried - fitting > (fitting / 1000).max(1) {
+        let middle = fitting.midpoint(tried);
+        if fits(middle) { fitting = middle } else { tried = middle }
+    }
+    fitting
+}
+
+fn to_json(subject: &Subject, (memory, plan): &(MemoryReport, Plan), problem: Option<&Error>) -> Value {
+    let room = &subject.room;
+    let docs = |name| TABLE.iter().find(|decl| decl.name == name).map(|decl| decl.doc);
+    let buffers = memory.rows.iter().map(|row| {
+        json!({
+            "name": row.name, "class": row.class.name(), "elements": row.count, "element_bytes": row.element_bytes,
+            "bytes": row.bytes, "doc": docs(row.name),
+        })
+    });
+    json!({
+        "schema_version": 1,
+        "device": subject.device,
+        "kernels": shape_json(&subject.shape),
+        "gaussians": room.gaussians,
+        "size": [room.image.0, room.image.1],
+        "label_samples": room.labels.map_or(0, |labels| labels.layers),
+        "instances": subject.capacity.instances,
+        "layer_tiles": subject.capacity.layer_tiles,
+        "fits": problem.is_none(),
+        "problem": problem.map(Error::to_string),
+        "memory": {
+            "buffers": buffers.collect::<Vec<_>>(),
+            "scratch_pages": memory.step_pages,
+            "scratch_without_sharing": memory.step_unaliased,
+            "staging": memory.staging,
+            "total": memory.total,
+        },
+        "scratch": scratch(plan),
+        "barriers": plan.barrier_count(),
+        "passes": passes(plan),
+    })
+}
+
+fn scratch(plan: &Plan) -> Vec<Value> {
+    let places = TABLE.iter().zip(plan.placements.iter().zip(&plan.lives));
+    let rows = places.filter_map(|(decl, (place, life))| {
+        let (place, life) = ((*place)?, (*life)?);
+        match place.page {
+            Page::Step(page) => Some(json!({
+                "name": decl.name, "page": page, "offset": place.offset, "bytes": place.bytes,
+                "first_pass": life.first, "last_pass": life.last,
+            })),
+            Page::Own(_) => None,
+        }
+    });
+    rows.collect()
+}
+
+fn passes(plan: &Plan) -> Vec<Value> {
+    let names = |touches: &[Touch], writes| {
+        let mut names: Vec<&str> = Vec::new();
+        for touch in touches.iter().filter(|touch| touch.kind.writes() == writes) {
+            let name = TABLE[touch.buf.index()].name;
+            if !names.contains(&name) {
+                names.push(name);
+            }
+        }
+        names
+    };
+    let rows = plan.items.iter().zip(&plan.list.work).enumerate().map(|(index, (item, work))| {
+        json!({
+            "index": index,
+            "name": item.label,
+            "groups": groups(work),
+            "reads": names(&item.touches, false),
+            "writes": names(&item.touches, true),
+            "barrier": item.barrier.as_ref().map(|barrier| &barrier.reason),
+        })
+    });
+    rows.collect()
+}
+
+/// Returns the workgroups by axis, `"indirect"` if the device decides, null for copies and fills.
+fn groups(work: &Work) -> Value {
+    match work {
+        Work::Pass(pass) => match pass.grid {
+            Grid::Groups(x, y, z) => json!([x, y, z]),
+            Grid::Indirect(..) => json!("indirect"),
+        },
+        Work::Fill { .. } | Work::Copy { .. } => Value::Null,
+    }
+}

@@ -1,0 +1,243 @@
+//! `labelgs profile`.
+
+pub(crate) mod compare;
+pub(crate) mod report;
+pub(crate) mod timed;
+
+use crate::cli::commands::profile::report::{Clocks, Profile, Window, Workers};
+use crate::cli::support::args::SceneArgs;
+use crate::cli::support::context::{Context, open_model};
+use crate::cli::support::log::Progress;
+use crate::cli::support::parsers::share;
+use crate::cli::support::scene::{open_gpu, open_scene};
+use crate::cli::support::stdout;
+use crate::gpu::Gpu;
+use crate::run::Settings;
+use crate::scene::{Dataset, Gaussians};
+use crate::scheduler::SchedulerOptions;
+use crate::scheduler::plan::PlanOptions;
+use crate::synth::{self, SynthOptions};
+use crate::train::{StepReport, TrainConfig, Trainer, first_model};
+use crate::{Error, Result, Setting};
+use clap::Args;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+/// `labelgs profile`.
+#[derive(Args, Clone, Debug)]
+#[command(group(clap::ArgGroup::new("input").required(true).args(["scene", "synthetic", "compare"])))]
+pub struct ProfileArgs {
+    /// Scene to time.
+    #[arg(value_name = "SCENE")]
+    pub scene: Option<PathBuf>,
+    /// Use the scene of `labelgs synth` and its masks instead of SCENE.
+    #[arg(long)]
+    pub synthetic: bool,
+    /// Folder of id masks.
+    #[arg(long, value_name = "DIR", conflicts_with = "synthetic")]
+    pub masks: Option<PathBuf>,
+    /// Use --synthetic without masks.
+    #[arg(long, requires = "synthetic")]
+    pub no_masks: bool,
+    /// Steps to time.
+    #[arg(long, value_name = "N", default_value_t = 100, value_parser = clap::value_parser!(u32).range(1..))]
+    pub steps: u32,
+    /// Steps before the clock starts.
+    #[arg(long, value_name = "N", default_value_t = 20)]
+    pub warm_up: u32,
+    /// Train this many steps first, to measure a trained scene. The steps after them, which are timed, have photos of full
+    /// size, all bands of colour and, with masks, labels, as at the end of a run.
+    #[arg(long, value_name = "S", default_value_t = 0)]
+    pub from_step: u32,
+    /// Start from this model, a PLY or the folder of a `labelgs train` run, instead of the scene's points.
+    #[arg(long, value_name = "MODEL")]
+    pub model: Option<PathBuf>,
+    /// Time steps as the schedule of a run has them: the first ones are of small photos without labels and without bands
+    /// of colour.
+    #[arg(long)]
+    pub as_scheduled: bool,
+    /// Settings in TOML, such as config.toml of an earlier run.
+    #[arg(long, value_name = "FILE.toml", help_heading = "Settings")]
+    pub config: Option<PathBuf>,
+    /// Let passes overlap as in training. Wall-clock times are then those of training; the time of a pass is what it
+    /// adds.
+    #[arg(long)]
+    pub overlap: bool,
+    /// How the scene is read.
+    #[command(flatten)]
+    pub reading: SceneArgs,
+    /// Compare two files of --json instead. Exit status 1 if a stage became slower beyond noise.
+    #[arg(
+        long, help_heading = "Comparison", value_names = ["OLD.json", "NEW.json"], num_args = 2,
+        conflicts_with_all = ["scene", "synthetic", "model"]
+    )]
+    pub compare: Option<Vec<PathBuf>>,
+    /// Share by which a median may grow in --compare.
+    #[arg(
+        long, value_name = "SHARE", value_parser = share, default_value_t = 0.05, requires = "compare",
+        help_heading = "Comparison"
+    )]
+    pub tolerance: f32,
+    /// Write the numbers as JSON to FILE, or to standard output without FILE.
+    #[arg(id = "json_file", long = "json", value_name = "FILE", num_args = 0..=1, help_heading = "Output")]
+    pub json: Option<Option<PathBuf>>,
+}
+
+/// Steps after the timed ones; they count pairs.
+const COUNTED: u32 = 10;
+
+/// Times steps of a real training.
+pub(crate) fn run(args: &ProfileArgs, context: &Context) -> Result<()> {
+    if let Some([old, new]) = args.compare.as_deref() {
+        return compare::run([old, new], args.tolerance.into(), context.json || args.json.is_some());
+    }
+    let config = decide(args)?;
+    let dataset = open(args, &config)?;
+    let gpu = open_gpu(context)?;
+    let model = match &args.model {
+        Some(path) => open_model(path)?,
+        None => first_model(&dataset, &config)?,
+    };
+    let window = Window { overlap: args.overlap, from_step: args.from_step, warm_up: args.warm_up, steps: args.steps };
+    let profile = profile(&gpu, (&dataset, &model, config), window, context)?;
+    match &args.json {
+        Some(Some(file)) => crate::io::atomic::write_json(file, &profile.to_json())?,
+        Some(None) => stdout::print_json(&profile.to_json())?,
+        None if context.json => stdout::print_json(&profile.to_json())?,
+        None => {}
+    }
+    if context.json || matches!(args.json, Some(None)) { Ok(()) } else { stdout::print(&profile.to_text()) }
+}
+
+/// Returns the settings of a run whose steps after `from_step` are those of its end: photos of full size, all bands of
+/// colour, labels.
+pub(crate) fn finished_from(from_step: u32, settings: TrainConfig) -> TrainConfig {
+    let first = from_step.saturating_add(1);
+    TrainConfig {
+        full_size_from: Some(settings.full_size_from().min(first)),
+        label_from: Some(settings.label_from.unwrap_or(first).min(first)),
+        sh_degree_interval: Some(settings.sh_interval().min(first / settings.sh_degree.max(1)).max(1)),
+        ..settings
+    }
+}
+
+/// Returns the settings: no timed step is the last step.
+fn decide(args: &ProfileArgs) -> Result<TrainConfig> {
+    let mut decided = match &args.config {
+        Some(path) => Settings::read(path)?.train,
+        None => TrainConfig::default(),
+    };
+    let steps = u64::from(args.from_step) + u64::from(args.warm_up) + u64::from(args.steps.saturating_add(COUNTED)) + 1;
+    let steps = u32::try_from(steps).map_err(|_| Error::usage(Setting("steps"), "there are too many steps in all"))?;
+    decided.iterations = decided.iterations.max(steps);
+    if !args.as_scheduled {
+        decided = finished_from(args.from_step, decided);
+    }
+    decided.check()?;
+    Ok(decided)
+}
+
+fn open(args: &ProfileArgs, config: &TrainConfig) -> Result<Dataset> {
+    let mut dataset = match &args.scene {
+        Some(scene) => open_scene(scene, &args.reading, args.masks.clone(), config.background, true)?,
+        None => synth::dataset(&SynthOptions::default(), args.reading.test_every()),
+    };
+    if args.no_masks {
+        dataset.train.iter_mut().for_each(|view| view.mask = None);
+    }
+    if dataset.train.is_empty() {
+        let scene = args.scene.as_deref().unwrap_or(Path::new("the built-in scene"));
+        return Err(Error::data(scene, "", "no view is left to train on; use a larger --test-every"));
+    }
+    Ok(dataset)
+}
+
+/// Times steps of a training of `model` on a dataset.
+pub(crate) fn profile(
+    gpu: &Arc<Gpu>,
+    (dataset, model, config): (&Dataset, &Gaussians, TrainConfig),
+    window: Window,
+    context: &Context,
+) -> Result<Profile> {
+    if gpu.limits().timestamp_bits == 0 {
+        return Err(Error::NoDevice("this device has no timestamps on its compute queue".into()));
+    }
+    let mut profile = Profile::new(gpu, workers(gpu)?, window);
+    profile.views = dataset.train.len();
+    let plan = PlanOptions { barrier_everywhere: !window.overlap, ..PlanOptions::default() };
+    let options = SchedulerOptions { plan, timestamps: true, ..SchedulerOptions::default() };
+    let mut trainer = Trainer::new(Arc::clone(gpu), config, dataset, model, options)?;
+    measure(&mut trainer, window, context, &mut profile)?;
+    Ok(profile)
+}
+
+fn measure(trainer: &mut Trainer, window: Window, context: &Context, profile: &mut Profile) -> Result<()> {
+    let before = window.from_step + window.warm_up;
+    let mut progress = Progress::new(u64::from(before + window.steps), "steps", &context.global);
+    for step in 1..=before {
+        if step == window.from_step + 1 {
+            trainer.keep_times();
+        }
+        trainer.step()?;
+        progress.set(u64::from(step), String::new);
+    }
+    trainer.keep_times();
+    let (wall, cpu) = (Instant::now(), cpu_time());
+    let mut steps = Vec::new();
+    let mut reports = Vec::new();
+    for step in 1..=window.steps {
+        let start = Instant::now();
+        reports.extend(trainer.step()?);
+        steps.push(start.elapsed());
+        progress.set(u64::from(before + step), String::new);
+    }
+    let cpu = cpu_time().zip(cpu).map(|(after, before)| after.saturating_sub(before));
+    let clocks = Clocks { wall: wall.elapsed(), steps, cpu };
+    reports.extend(trainer.drain()?);
+    let timed = |step: u32| step > before;
+    let reports: Vec<StepReport> = reports.into_iter().filter(|report| timed(report.step)).collect();
+    let times = trainer.take_times().into_iter().filter(|times| timed(times.step)).collect();
+    profile.gaussians = trainer.gaussian_count();
+    profile.fill(clocks, &reports, times);
+    trainer.count_pairs(true);
+    let mut counted = Vec::new();
+    for _ in 0..COUNTED.min(window.steps) {
+        counted.extend(trainer.step()?);
+    }
+    counted.extend(trainer.drain()?);
+    profile.fill_pairs(&counted);
+    Ok(())
+}
+
+/// Returns the host threads that run the passes; `None` on a graphics card.
+fn workers(gpu: &Gpu) -> Result<Option<Workers>> {
+    const NAME: &str = "LP_NUM_THREADS";
+    /// lavapipe starts at most this many threads.
+    const MOST: usize = 32;
+    if !gpu.is_cpu() {
+        return Ok(None);
+    }
+    let set = std::env::var(NAME).ok().filter(|text| !text.is_empty());
+    let (count, source) = match set {
+        // 0 runs everything on the submitting thread.
+        Some(text) => match text.parse::<usize>() {
+            Ok(count) => (count.max(1), NAME),
+            Err(_) => return Err(Error::usage(NAME, format!("is {text}, needs a whole number of threads"))),
+        },
+        None => (std::thread::available_parallelism().map_or(1, usize::from), "processors of this machine"),
+    };
+    Ok(Some(Workers { count: count.min(MOST), source }))
+}
+
+/// Returns the processor time of this process: user and system, all threads.
+#[cfg(unix)]
+fn cpu_time() -> Option<Duration> {
+    let time = rustix::time::clock_gettime(rustix::time::ClockId::ProcessCPUTime);
+    Some(Duration::new(time.tv_sec.try_into().ok()?, time.tv_nsec.try_into().ok()?))
+}
+
+#[cfg(not(unix))]
+fn cpu_time() -> Option<Duration> {
+    None
+}

@@ -1,0 +1,32 @@
+//! `labelgs report`: the pages of trainings, made anew from the files in their folders.
+
+use crate::Result;
+use crate::cli::support::context::Context;
+use crate::cli::support::parsers::page_file;
+use crate::cli::support::stdout;
+use crate::run::report::{FILE, write};
+use clap::Args;
+use serde_json::json;
+use std::path::{Path, PathBuf};
+
+/// `labelgs report`.
+#[derive(Args, Clone, Debug)]
+pub struct ReportArgs {
+    /// Folder of a `labelgs train` run. Several are compared: their numbers in columns, their curves in one picture.
+    #[arg(value_name = "RUN", required = true)]
+    pub runs: Vec<PathBuf>,
+    /// The page. Default: report.html in RUN, or here if there are several runs.
+    #[arg(short, long, value_name = "FILE", value_parser = page_file())]
+    pub output: Option<PathBuf>,
+}
+
+/// Writes the page and prints its path.
+pub(crate) fn run(args: &ReportArgs, context: &Context) -> Result<()> {
+    let usual = match args.runs.as_slice() {
+        [run] => run.join(FILE),
+        _ => Path::new(FILE).to_owned(),
+    };
+    let path = write(&args.runs, args.output.as_ref().unwrap_or(&usual))?;
+    let path = path.display().to_string();
+    if context.json { stdout::print_json(&json!({ "report": path })) } else { stdout::print(&format!("{path}\n")) }
+}

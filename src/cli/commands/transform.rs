@@ -1,0 +1,40 @@
+//! `labelgs transform`.
+
+use crate::Result;
+use crate::cli::support::context::Context;
+use crate::cli::support::model_edit::{EditArgs, open};
+use crate::cli::support::parsers::{direction, factor, place};
+use crate::edit::Transform;
+use clap::Args;
+use glam::{DQuat, DVec3};
+use serde_json::json;
+
+/// `labelgs transform`.
+#[derive(Args, Clone, Debug)]
+#[command(group(clap::ArgGroup::new("change").required(true).multiple(true).args(["up", "scale", "origin"])))]
+pub struct TransformArgs {
+    /// Model and output.
+    #[command(flatten)]
+    pub edit: EditArgs,
+    /// Direction of the model that points up: x, -x, y, -y, z, -z or X,Y,Z. It is turned to -y, which viewers of 3DGS
+    /// files show as up. Colours that depend on the direction are turned along.
+    #[arg(long, value_name = "DIRECTION", value_parser = direction, allow_hyphen_values = true)]
+    pub up: Option<DVec3>,
+    /// Factor of all lengths.
+    #[arg(long, value_name = "FACTOR", value_parser = factor)]
+    pub scale: Option<f64>,
+    /// Place that becomes 0,0,0, before the turn.
+    #[arg(long, value_name = "X,Y,Z", value_parser = place, allow_hyphen_values = true)]
+    pub origin: Option<DVec3>,
+}
+
+/// Writes the model at another place.
+pub(crate) fn run(args: &TransformArgs, context: &Context) -> Result<()> {
+    let (model, known) = open(&args.edit.model, &args.edit.table)?;
+    let turn = args.up.map_or(Ok(DQuat::IDENTITY), Transform::upright)?;
+    let change = Transform { origin: args.origin.unwrap_or_default(), turn, scale: args.scale.unwrap_or(1.0) };
+    let moved = change.apply(&model)?;
+    let turn = [turn.w, turn.x, turn.y, turn.z];
+    let more = json!({ "origin": change.origin.to_array(), "turn_wxyz": turn, "scale": change.scale });
+    args.edit.finish(context, (&moved, known), model.len(), more)
+}

@@ -1,0 +1,185 @@
+//! `labelgs view`, and the flags of `labelgs train --view`.
+
+use crate::cli::support::args::SceneArgs;
+use crate::cli::support::context::Context;
+use crate::cli::support::model_edit::{TableArg, open};
+use crate::cli::support::model_fit::warn_of_misfit;
+use crate::cli::support::parsers::{near, share};
+use crate::cli::support::scene::{near_plane, open_gpu, open_scene};
+use crate::cli::support::shell_words::quoted;
+use crate::cli::support::signals;
+use crate::cli::support::stdout;
+use crate::io::camera_json::views_of_model;
+use crate::render::{Parts, RenderOptions};
+use crate::scene::Dataset;
+use crate::viewer::{Edit, Finished, Token, Viewer, ViewerOptions, Words, show};
+use crate::{Error, Result};
+use clap::Args;
+use serde_json::json;
+use std::net::IpAddr;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+/// Variable with the token to ask for instead of a new one.
+const TOKEN: &str = "LABELGS_VIEW_TOKEN";
+
+/// `labelgs view`.
+#[derive(Args, Clone, Debug)]
+pub struct ViewArgs {
+    /// The model: a PLY, SPZ, GLB, SOG or .splat, or the folder of a `labelgs train` run.
+    #[arg(value_name = "MODEL")]
+    pub model: PathBuf,
+    /// Scene whose views to list and whose photos to compare with.
+    #[arg(long, value_name = "SCENE")]
+    pub scene: Option<PathBuf>,
+    /// Folder of id masks, to score the label maps with.
+    #[arg(long, value_name = "DIR", requires = "scene")]
+    pub masks: Option<PathBuf>,
+    /// Names.
+    #[command(flatten)]
+    pub table: TableArg,
+    /// Near plane, world units: nearer Gaussians are not drawn. Default: the value of the model's run, else 0.2.
+    #[arg(long, value_name = "Z", value_parser = near, help_heading = "Rendering")]
+    pub near: Option<f32>,
+    /// How the scene is read.
+    #[command(flatten)]
+    pub reading: SceneArgs,
+    /// The server.
+    #[command(flatten)]
+    pub server: ServerArgs,
+}
+
+/// Where the page of a viewer is.
+#[derive(Args, Clone, Debug)]
+#[command(next_help_heading = "Viewer")]
+pub struct ServerArgs {
+    /// Open the page in the browser of this desktop.
+    #[arg(long)]
+    pub open: bool,
+    /// Address or name to listen on. On another than loopback, who reaches it and has the token sees the scene.
+    #[arg(long, value_name = "HOST", default_value = "127.0.0.1")]
+    pub view_host: String,
+    /// Port to listen on; 0 takes a free one. With a port and a token in LABELGS_VIEW_TOKEN, an open page comes back when
+    /// the program is started again.
+    #[arg(long, value_name = "PORT", default_value_t = 0)]
+    pub view_port: u16,
+    /// Ask for no token. Other users of this machine may then see the scene; only on loopback.
+    #[arg(long)]
+    pub view_no_token: bool,
+}
+
+/// A viewer of a training.
+#[derive(Args, Clone, Debug)]
+#[command(next_help_heading = "Viewer")]
+pub struct WatchArgs {
+    /// Show the training in a browser: its address is printed. It can be paused, saved and stopped there.
+    #[arg(long)]
+    pub view: bool,
+    /// Largest share of the time that viewing may take, 0 to 1, while a page is open.
+    #[arg(long, value_name = "SHARE", value_parser = share, default_value_t = 0.2)]
+    pub view_share: f32,
+    /// The server.
+    #[command(flatten)]
+    pub server: ServerArgs,
+}
+
+impl ServerArgs {
+    /// Starts the server, and the browser if that was asked for.
+    pub(crate) fn start(&self, share: f32) -> Result<Viewer> {
+        let given = std::env::var(TOKEN).ok().filter(|token| !token.is_empty());
+        let token = match given {
+            _ if self.view_no_token => Token::Off,
+            Some(token) => Token::Given(token),
+            None => Token::New,
+        };
+        let options = ViewerOptions { host: self.view_host.clone(), port: self.view_port, token, share };
+        let viewer = Viewer::start(&options)?;
+        if self.view_host.parse::<IpAddr>().is_ok_and(|ip| ip.is_unspecified()) {
+            tracing::info!(
+                "other machines open this address with the name of this machine in place of the loopback one"
+            );
+        }
+        if self.open {
+            open_browser(&viewer.address());
+        }
+        Ok(viewer)
+    }
+}
+
+/// Shows a model until a signal comes. Changes that are in no file are saved then.
+pub(crate) fn run(args: &ViewArgs, context: &Context) -> Result<()> {
+    let (model, known) = open(&args.model, &args.table)?;
+    let dataset = match &args.scene {
+        Some(scene) => open_scene(scene, &args.reading.of_run(&args.model)?, args.masks.clone(), [0.0; 3], true)?,
+        // Without their photos.
+        None => Dataset { train: views_of_model(&args.model)?, ..Dataset::default() },
+    };
+    if args.scene.is_some() {
+        warn_of_misfit(&args.model, &model, &dataset)?;
+    }
+    let options = RenderOptions::new(near_plane(&args.model, args.near)?, Parts::COLOUR);
+    let gpu = open_gpu(context)?;
+    let viewer = args.server.start(1.0)?;
+    if context.json {
+        stdout::print_json(&json!({ "schema_version": 1, "address": viewer.address() }))?;
+    } else {
+        stdout::print(&format!("{}\n", viewer.address()))?;
+    }
+    let words = Typed { scene: args.scene.clone(), masks: args.masks.clone() };
+    let finished = Finished { path: &args.model, model, table: known.table, dataset: &dataset, options, words: &words };
+    signals::note_only();
+    let saved = show(&viewer, finished, gpu, &|| !signals::is_noted())?;
+    if let Some(saved) = saved {
+        tracing::warn!("unsaved changes are in {} now; go on with: {}", saved.display(), words.view(&saved));
+    }
+    Err(Error::Interrupted)
+}
+
+/// Opens an address in the browser of the desktop. Without one the printed address is left.
+fn open_browser(address: &str) {
+    let (opener, before): (_, &[&str]) = if cfg!(windows) {
+        ("rundll32", &["url.dll,FileProtocolHandler"])
+    } else {
+        (if cfg!(target_os = "macos") { "open" } else { "xdg-open" }, &[])
+    };
+    let mut command = Command::new(opener);
+    command.args(before).arg(address).stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
+    match command.spawn() {
+        // The opener ends by itself; waiting for it leaves no dead process behind.
+        Ok(mut child) => drop(std::thread::spawn(move || child.wait())),
+        Err(error) => tracing::warn!("no browser was opened ({opener}: {error}); open the printed address"),
+    }
+}
+
+/// The commands as a user would type them.
+pub(crate) struct Typed {
+    pub(crate) scene: Option<PathBuf>,
+    pub(crate) masks: Option<PathBuf>,
+}
+
+impl Words for Typed {
+    fn edit(&self, edit: &Edit, input: &Path, output: &Path) -> String {
+        let ids = |labels: &[u32]| labels.iter().map(u32::to_string).collect::<Vec<_>>().join(",");
+        let (verb, flags) = match edit {
+            Edit::Rename { label, name } => ("merge", format!("--labels {label} --name={}", quoted(name))),
+            Edit::Merge { labels } => ("merge", format!("--labels {}", ids(labels))),
+            Edit::Recolour { labels, colour: [r, g, b], mix } => {
+                ("recolour", format!("--labels {} --colour {r},{g},{b} --mix {mix}", ids(labels)))
+            }
+            Edit::Remove { labels } => ("remove", format!("--labels {}", ids(labels))),
+            Edit::Export { labels } => ("extract", format!("--labels {}", ids(labels))),
+        };
+        format!("labelgs {verb} {} {flags} -o {}", path(input), path(output))
+    }
+
+    fn view(&self, model: &Path) -> String {
+        let flag = |name: &str, value: &Option<PathBuf>| {
+            value.as_ref().map_or(String::new(), |value| format!(" --{name} {}", path(value)))
+        };
+        format!("labelgs view {}{}{}", path(model), flag("scene", &self.scene), flag("masks", &self.masks))
+    }
+}
+
+fn path(path: &Path) -> String {
+    quoted(&path.display().to_string())
+}

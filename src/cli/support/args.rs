@@ -1,0 +1,117 @@
+//! Arguments that several commands share. They hold typed values only; the commands decide on defaults.
+
+use crate::Result;
+use crate::cli::support::parsers::share;
+use crate::io::{LoadOptions, Lookup, PoseConvention, ReadOptions};
+use crate::run::Settings;
+use clap::Args;
+use std::path::{Path, PathBuf};
+
+/// Flags of every command.
+#[derive(Args, Clone, Debug, Default)]
+pub struct GlobalArgs {
+    /// Print errors only.
+    #[arg(short, long, global = true, help_heading = "Output", conflicts_with = "verbose")]
+    pub quiet: bool,
+    /// Print more messages; give it twice for all of them. RUST_LOG overrides it.
+    #[arg(short, long, global = true, help_heading = "Output", action = clap::ArgAction::Count)]
+    pub verbose: u8,
+    /// Vulkan device: its number or UUID from `labelgs devices`, GPU-UUID from `nvidia-smi -L`, or a part of its name. A
+    /// list of these, with commas between, means the first that no other labelgs with a list uses. Default: LABELGS_DEVICE
+    /// if set, else the fastest kind of device.
+    #[arg(long, value_name = "DEVICE", global = true, help_heading = "Device")]
+    pub device: Option<String>,
+}
+
+/// `--json` of a command that prints its result.
+#[derive(Args, Clone, Debug, Default)]
+pub struct JsonFlag {
+    /// Print the result as JSON.
+    #[arg(id = "json_here", long = "json", help_heading = "Output")]
+    pub json: bool,
+}
+
+/// Where the files of a scene are, and how much of it may be damaged.
+#[derive(Args, Clone, Debug, Default)]
+#[command(next_help_heading = "Scene")]
+pub struct FileArgs {
+    /// Folder of the photos, where they are not where the scene lists them: a path, or a folder of the scene.
+    #[arg(long, value_name = "DIR")]
+    pub images: Option<PathBuf>,
+    /// Largest share of missing or damaged photos, from 0 to 1. They are skipped with a warning. Default: 0.1.
+    #[arg(long, value_name = "SHARE", value_parser = share)]
+    pub max_bad_photos: Option<f32>,
+    /// Read photos and points that the scene lists outside its folder.
+    #[arg(long)]
+    pub allow_outside: bool,
+}
+
+/// How a scene is read.
+#[derive(Args, Clone, Debug, Default)]
+pub struct ReadArgs {
+    /// Its files.
+    #[command(flatten)]
+    pub files: FileArgs,
+    /// What the scene's file means by its poses, where it is not the convention of its format: words of c2w or w2c, opencv
+    /// or opengl, and xyzw, with commas between. Default: the format's; commands with a model use that of its run.
+    #[arg(long, value_name = "WORDS", help_heading = "Scene")]
+    pub poses: Option<PoseConvention>,
+}
+
+impl ReadArgs {
+    /// Returns where the files of the scene are.
+    pub fn lookup(&self) -> Lookup {
+        Lookup {
+            allow_outside: self.files.allow_outside,
+            images: self.files.images.clone(),
+            poses: self.poses.unwrap_or_default(),
+        }
+    }
+
+    /// Puts the typed values into `options`.
+    pub fn options(&self, options: LoadOptions) -> LoadOptions {
+        let max_bad_photos = self.files.max_bad_photos.unwrap_or(options.max_bad_photos);
+        LoadOptions { max_bad_photos, lookup: self.lookup(), ..options }
+    }
+}
+
+/// How a command other than `train` reads a scene.
+#[derive(Args, Clone, Debug, Default)]
+pub struct SceneArgs {
+    /// Hold out every N-th view by name for tests; 0 holds out none. Default: 8; `eval` and `render` use the value of
+    /// the model's run.
+    #[arg(long, value_name = "N", help_heading = "Scene")]
+    pub test_every: Option<u32>,
+    /// Longest side of a picture, px. Default: the size of the photo; `eval` and `render` use the value of the model's
+    /// run.
+    #[arg(long, value_name = "PX", value_parser = clap::value_parser!(u32).range(1..), help_heading = "Scene")]
+    pub max_resolution: Option<u32>,
+    /// Folder of pictures named as masks: pixels above 0 are left out of votes and scores.
+    #[arg(long, value_name = "DIR", help_heading = "Scene")]
+    pub ignore: Option<PathBuf>,
+    /// Tolerance.
+    #[command(flatten)]
+    pub read: ReadArgs,
+}
+
+impl SceneArgs {
+    /// Returns these arguments; values that were not typed come from the run of `model`, if it has one.
+    pub fn of_run(&self, model: &Path) -> Result<Self> {
+        let Some(ReadOptions { max_resolution, test_every, poses }) = Settings::of_model(model)?.map(|run| run.read)
+        else {
+            return Ok(self.clone());
+        };
+        let longest = (max_resolution > 0).then_some(max_resolution);
+        Ok(Self {
+            test_every: self.test_every.or(Some(test_every)),
+            max_resolution: self.max_resolution.or(longest),
+            read: ReadArgs { poses: self.read.poses.or(Some(poses)), ..self.read.clone() },
+            ..self.clone()
+        })
+    }
+
+    /// Returns N where every N-th view is a test view; 0 for none.
+    pub fn test_every(&self) -> u32 {
+        self.test_every.unwrap_or(ReadOptions::default().test_every)
+    }
+}

@@ -1,0 +1,103 @@
+//! What commands that render share: the device, the scene, its views.
+
+use crate::cli::support::args::SceneArgs;
+use crate::cli::support::context::Context;
+use crate::engine::{Engine, EngineSize};
+use crate::error::{Error, Result, Setting};
+use crate::gpu::{Gpu, GpuOptions, PipelineStore};
+use crate::io::pipeline_file::PipelineFolder;
+use crate::io::{self, LoadOptions};
+use crate::run::Settings;
+use crate::scene::{Dataset, Gaussians, View};
+use crate::scheduler::SchedulerOptions;
+use crate::train::setup::near_plane::NEAR;
+use crate::words::{counted, did_you_mean};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// Returns the near plane to render a model with, world units: the typed value, else that of the model's run (its
+/// config.toml), else 0.2 (3DGS).
+pub fn near_plane(model: &Path, typed: Option<f32>) -> Result<f32> {
+    match typed {
+        Some(near) => Ok(near),
+        None => Ok(Settings::of_model(model)?.map_or(NEAR, |settings| settings.train.near)),
+    }
+}
+
+/// Opens the chosen device and logs its name.
+pub(crate) fn open_gpu(context: &Context) -> Result<Arc<Gpu>> {
+    let pipelines = PipelineFolder::of_user().map(|folder| Arc::new(folder) as Arc<dyn PipelineStore>);
+    let gpu = Gpu::new(&GpuOptions { pipelines, ..context.gpu_options()? })?;
+    context.listen(&gpu);
+    let found = gpu.capabilities();
+    let cpu = if gpu.is_cpu() { ", a processor: expect it to be slower than a graphics card" } else { "" };
+    tracing::info!("device: {} ({}){cpu}", found.name, found.driver_info);
+    Ok(gpu)
+}
+
+/// Reads a scene and logs its notes.
+pub(crate) fn open_scene(
+    path: &Path,
+    reading: &SceneArgs,
+    masks: Option<PathBuf>,
+    background: [f32; 3],
+    photos: bool,
+) -> Result<Dataset> {
+    let test_every = Some(reading.test_every()).filter(|&every| every > 0);
+    let (max_resolution, base) = (reading.max_resolution, LoadOptions::default());
+    let ignore = reading.ignore.clone();
+    let options = LoadOptions { masks, ignore, max_resolution, test_every, background, photos, ..base };
+    io::open_logged(path, &reading.read.options(options))
+}
+
+/// Returns the views for `test`, `train`, `all` or a list of names.
+pub(crate) fn pick_views<'a>(dataset: &'a Dataset, which: &str) -> Result<Vec<&'a View>> {
+    let views: Vec<&View> = match which {
+        "test" => dataset.test.iter().collect(),
+        "train" => dataset.train.iter().collect(),
+        "all" => dataset.all(),
+        names => names.split(',').map(|name| find_view(dataset, name.trim())).collect::<Result<_>>()?,
+    };
+    if views.is_empty() {
+        return Err(Error::usage(
+            Setting("views"),
+            format!(
+                "the scene has no {which} views; use {}, or change {}",
+                Setting("views").to("all"),
+                Setting("test_every")
+            ),
+        ));
+    }
+    Ok(views)
+}
+
+/// Most views that a message names.
+const NAMED_MAX: usize = 4;
+
+/// Returns the view with a name, with or without its extension.
+pub(crate) fn find_view<'a>(dataset: &'a Dataset, name: &str) -> Result<&'a View> {
+    let all = dataset.all();
+    let found =
+        all.iter().find(|view| view.name == name || view.stem() == name || without_extension(&view.name) == name);
+    found.copied().ok_or_else(|| {
+        let names = || all.iter().map(|view| view.name.as_str());
+        let some = || names().take(NAMED_MAX).collect::<Vec<_>>().join(", ");
+        let cure = did_you_mean(name, names()).unwrap_or_else(|| format!("they are {} ...", some()));
+        let problem = format!("no view is called {name}; the scene has {}, {cure}", counted(all.len(), "view"));
+        Error::usage("name of a view", problem)
+    })
+}
+
+fn without_extension(name: &str) -> String {
+    Path::new(name).with_extension("").to_string_lossy().into_owned()
+}
+
+/// Returns an engine with memory for `model` and the largest of `sizes`; the model is not uploaded.
+pub(crate) fn render_engine(
+    gpu: Arc<Gpu>,
+    model: &Gaussians,
+    sizes: impl Iterator<Item = (u32, u32)>,
+    options: SchedulerOptions,
+) -> Result<Engine> {
+    Engine::new(gpu, EngineSize::of_model(model, sizes), options)
+}

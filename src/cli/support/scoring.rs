@@ -1,0 +1,116 @@
+//! What commands with scores share: how much is scored, progress, the page of `--page`, JSON, least scores.
+
+use crate::Result;
+use crate::cli::support::context::Context;
+use crate::cli::support::log::Progress;
+use crate::cli::support::model_drawer::MemoryArg;
+use crate::cli::support::model_edit::MinConfidenceArg;
+use crate::cli::support::parsers::near;
+use crate::cli::support::stdout;
+use crate::edit::select::MIN_LABEL_CONFIDENCE;
+use crate::eval::compared::{Compared, Watch};
+use crate::eval::page::Page;
+use crate::io::atomic::write_json;
+use clap::Args;
+use std::path::{Path, PathBuf};
+
+/// How a model is scored.
+#[derive(Args, Clone, Debug)]
+pub struct ScoreArgs {
+    /// Near plane, world units: nearer Gaussians are not drawn. Default: the value of the model's run, else 0.2. Other
+    /// viewers often draw from 0.01 on; a worse score there shows Gaussians before the cameras that fog the pictures.
+    #[arg(long, value_name = "Z", value_parser = near, help_heading = "Rendering")]
+    pub near: Option<f32>,
+    /// Gaussians of an object that is rendered alone.
+    #[command(flatten)]
+    pub sure: MinConfidenceArg,
+    /// Weights of LPIPS v0.1 with VGG16, safetensors (guide, page benchmarks): adds LPIPS. It takes seconds to minutes for a
+    /// picture.
+    #[arg(long, value_name = "WEIGHTS", help_heading = "Scores")]
+    pub lpips: Option<PathBuf>,
+    /// New folder for a web page with ground truth, prediction and difference of every picture.
+    #[arg(long, value_name = "DIR", help_heading = "Output")]
+    pub page: Option<PathBuf>,
+    /// Least mean PSNR, dB. Exit status 1 if it is lower.
+    #[arg(long, value_name = "DB", help_heading = "Checks")]
+    pub min_psnr: Option<f64>,
+    /// Least mean IoU. Exit status 1 if it is lower.
+    #[arg(long, value_name = "IOU", help_heading = "Checks")]
+    pub min_iou: Option<f64>,
+    /// Memory.
+    #[command(flatten)]
+    pub memory: MemoryArg,
+    /// Write all scores as JSON to FILE, or to standard output without FILE.
+    #[arg(id = "json_file", long = "json", value_name = "FILE", num_args = 0..=1, help_heading = "Output")]
+    pub json: Option<Option<PathBuf>>,
+}
+
+impl Default for ScoreArgs {
+    fn default() -> Self {
+        Self {
+            near: None,
+            sure: MinConfidenceArg { min_confidence: MIN_LABEL_CONFIDENCE },
+            lpips: None,
+            page: None,
+            min_psnr: None,
+            min_iou: None,
+            memory: MemoryArg::default(),
+            json: None,
+        }
+    }
+}
+
+impl ScoreArgs {
+    /// Writes or prints the scores as JSON if asked to. Prints the table unless JSON is printed.
+    pub(crate) fn put_out(&self, scores: &impl serde::Serialize, table: &str, context: &Context) -> Result<()> {
+        match &self.json {
+            Some(Some(file)) => write_json(file, scores)?,
+            Some(None) => return stdout::print_json(scores),
+            None => {}
+        }
+        if context.json { stdout::print_json(scores) } else { stdout::print(table) }
+    }
+}
+
+/// Returns a score as text.
+pub(crate) fn number(value: Option<f64>, digits: usize) -> String {
+    value.map_or("-".to_owned(), |value| format!("{value:.digits$}"))
+}
+
+/// Counts pictures and adds them to the page.
+pub(crate) struct Watcher {
+    progress: Progress,
+    done: u64,
+    page: Option<Page>,
+}
+
+impl Watcher {
+    /// Starts a watcher of `total` pictures with a page in `folder`.
+    pub(crate) fn new(total: u64, folder: Option<&Path>, context: &Context) -> Result<Self> {
+        let page = folder.map(Page::new).transpose()?;
+        Ok(Self { progress: Progress::new(total, "pictures", &context.global), done: 0, page })
+    }
+
+    /// Writes the page.
+    pub(crate) fn finish(self, summary: &str) -> Result<()> {
+        drop(self.progress);
+        if let Some(page) = self.page {
+            let path = page.finish(summary)?;
+            tracing::info!("page: {}", path.display());
+        }
+        Ok(())
+    }
+}
+
+impl Watch for Watcher {
+    fn see(&mut self, picture: &Compared) -> Result<()> {
+        self.skip()?;
+        self.page.as_mut().map_or(Ok(()), |page| page.see(picture))
+    }
+
+    fn skip(&mut self) -> Result<()> {
+        self.done += 1;
+        self.progress.set(self.done, String::new);
+        Ok(())
+    }
+}
