@@ -6,7 +6,6 @@
 //! without any cut-off, which is what those rules stand for.
 
 mod bed;
-mod chart;
 mod errors;
 mod knee;
 mod measure;
@@ -16,7 +15,7 @@ mod report;
 mod scenes;
 
 use super::Common;
-use super::measure::{write_json, write_text};
+use super::measure::write_json;
 use labelgs::engine::EngineSize;
 use labelgs::gpu::Gpu;
 use labelgs::internals::engine::capacity;
@@ -71,7 +70,6 @@ pub fn run(args: &KernelArgs) -> Result<()> {
         &json!({ "schema_version": 2, "small": args.common.small, "device": capabilities.name, "driver": driver,
             "threads": threads, "load_before": load_before, "scenes": scenes }),
     )?;
-    write_text(&args.common.output.join("kernels.svg"), &chart::svg(&scenes, &plain)?)?;
     if failures.is_empty() { Ok(()) } else { Err(Error::Check(failures.join("; "))) }
 }
 

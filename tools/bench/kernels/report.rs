@@ -18,7 +18,7 @@ const STAGES: [Stage; 7] = [
     Stage::ProjectBackward,
 ];
 
-/// Legend of the columns, and the modes behind the numbers of the charts.
+/// Legend of the columns, and the modes by number.
 pub fn legend(modes: &[Mode]) {
     println!(
         "times by those of the default, medians of the rounds' ratios: `passes` of all stages but loss and report, `CPU` \
