@@ -7,7 +7,6 @@
 
 mod bed;
 mod errors;
-mod knee;
 mod measure;
 mod mirror;
 mod modes;
@@ -67,7 +66,7 @@ pub fn run(args: &KernelArgs) -> Result<()> {
     let threads = std::thread::available_parallelism().map_or(1, usize::from);
     write_json(
         &args.common.output.join("kernels.json"),
-        &json!({ "schema_version": 2, "small": args.common.small, "device": capabilities.name, "driver": driver,
+        &json!({ "schema_version": 3, "small": args.common.small, "device": capabilities.name, "driver": driver,
             "threads": threads, "load_before": load_before, "scenes": scenes }),
     )?;
     if failures.is_empty() { Ok(()) } else { Err(Error::Check(failures.join("; "))) }

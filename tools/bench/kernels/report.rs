@@ -1,7 +1,6 @@
 //! Tables of the benchmark.
 
 use super::errors::Errors;
-use super::knee;
 use super::measure::SceneResult;
 use super::modes::Mode;
 use crate::measure::table;
@@ -66,12 +65,6 @@ pub fn scene(scene: &SceneResult) {
         "rounding: alone, in {} pixels and {} Gaussians with no decision near",
         scene.rounding.pixels, scene.rounding.rows
     );
-    // The other scenes test accuracy, not speed.
-    if scene.name.starts_with('S') {
-        for (name, knee) in knee::all(scene) {
-            println!("{name}: {knee}");
-        }
-    }
 }
 
 fn numbers(errors: &Errors) -> Vec<String> {
