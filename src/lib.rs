@@ -97,6 +97,7 @@ mod verify;
 mod version;
 #[cfg(feature = "viewer")]
 pub mod viewer;
+mod web;
 mod words;
 
 pub use error::{Error, Result, Setting};

@@ -98,7 +98,7 @@ fn trainings_survive_kills_on_other_drivers_and_models_look_the_same() {
     }
 }
 
-/// Pictures that two systems drew of one model: `LABELGS_PICTURES` names their folders, as `here:there`. tools/newer-mesa
+/// Pictures that two systems drew of one model: `LABELGS_PICTURES` names their folders, as `here:there`. tools/try-debian
 /// draws them on this machine's Mesa and on a newer one.
 #[test]
 fn pictures_of_two_systems_agree() {

@@ -20,7 +20,7 @@ fn is_harmless(page: &str) {
         }
     }
     assert!(!page.contains("<img src=x") && !page.contains("<b>bold"), "a name became markup");
-    assert_eq!(page.matches("<script>").count(), 1);
+    assert_eq!(page.matches("<script").count(), 1);
 }
 
 #[test]

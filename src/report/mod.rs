@@ -1,5 +1,4 @@
-//! HTML pages that open from disk: style and script are inside, and nothing is asked from the network. All text goes
-//! through `maud`, which escapes it.
+//! HTML pages of a training or of scores, in the frame of `web`.
 
 pub(crate) mod axis;
 pub(crate) mod chart;

@@ -1,4 +1,3 @@
-"use strict";
 // Sorts a table by the column of a clicked heading.
 for (const table of document.querySelectorAll("table.sortable")) {
   const heads = [...table.tHead.rows[0].cells];

@@ -1,5 +1,7 @@
 //! The files of the page, in the program.
 
+use crate::web;
+
 /// Path, type and bytes of each file.
 const FILES: &[(&str, &str, &[u8])] = &[
     ("/", "text/html; charset=utf-8", include_bytes!("page/index.html")),
@@ -7,9 +9,9 @@ const FILES: &[(&str, &str, &[u8])] = &[
     ("/panels.css", "text/css; charset=utf-8", include_bytes!("page/panels.css")),
     ("/main.js", SCRIPT, include_bytes!("page/main.js")),
     ("/link.js", SCRIPT, include_bytes!("page/link.js")),
-    ("/algebra.js", SCRIPT, include_bytes!("page/algebra.js")),
-    ("/camera.js", SCRIPT, include_bytes!("page/camera.js")),
-    ("/input.js", SCRIPT, include_bytes!("page/input.js")),
+    ("/algebra.js", SCRIPT, web::ALGEBRA.as_bytes()),
+    ("/camera.js", SCRIPT, web::CAMERA.as_bytes()),
+    ("/input.js", SCRIPT, web::INPUT.as_bytes()),
     ("/stage.js", SCRIPT, include_bytes!("page/stage.js")),
     ("/labels.js", SCRIPT, include_bytes!("page/labels.js")),
     ("/edits.js", SCRIPT, include_bytes!("page/edits.js")),

@@ -81,20 +81,10 @@ pub fn table(rows: &[Vec<String>]) -> String {
     text
 }
 
-/// Writes a value as JSON.
+/// Writes a value as JSON and creates the folder.
 pub fn write_json(path: &Path, value: &impl Serialize) -> Result<()> {
     let text = serde_json::to_string_pretty(value).map_err(|error| Error::Bug(format!("JSON: {error}")))?;
-    write_text(path, &format!("{text}\n"))
-}
-
-/// Writes a text file and creates its folder.
-pub fn write_text(path: &Path, text: &str) -> Result<()> {
-    atomic::write(path, |file| file.write_all(text.as_bytes()))?;
+    atomic::write(path, |file| writeln!(file, "{text}"))?;
     println!("wrote {}", path.display());
     Ok(())
-}
-
-/// Fails with a message unless a condition holds.
-pub fn require(holds: bool, otherwise: impl FnOnce() -> String) -> Result<()> {
-    if holds { Ok(()) } else { Err(Error::Check(otherwise())) }
 }

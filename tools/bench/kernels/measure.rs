@@ -24,9 +24,6 @@ const MARGIN: f64 = 2e-5;
 pub struct ModeResult {
     /// Name of the mode.
     pub name: &'static str,
-    /// What charts show as time: on a processor its time, `relative_cpu`, which other programs disturb least; on a
-    /// graphics card `relative_median`.
-    pub relative_time: f64,
     /// Time of the stages that modes touch by that of the default in the same round, median over the rounds.
     pub relative_median: f64,
     /// Processor time of the step by that of the default in the same round, median over the rounds.
@@ -91,7 +88,7 @@ pub fn scene(gpu: &Arc<Gpu>, plan: &Plan, modes: &[(Mode, Replacements)]) -> Res
     }
     let samples = time(&mut bed, modes.len(), plan.rounds)?;
     let results = modes.iter().zip(&samples).zip(errors);
-    let results = results.map(|(((mode, _), own), errors)| result(mode, own, &samples[0], errors, gpu.is_cpu()));
+    let results = results.map(|(((mode, _), own), errors)| result(mode, own, &samples[0], errors));
     let counters = samples[0][0].counters;
     Ok(SceneResult {
         name: plan.name,
@@ -112,7 +109,6 @@ fn result(
     own: &[Sample],
     of_default: &[Sample],
     (against_rules, against_no_cut_offs): (Errors, Errors),
-    is_cpu: bool,
 ) -> ModeResult {
     let touched = |sample: &Sample| {
         let touched = sample.stages.iter().filter(|(stage, _)| !UNTOUCHED.contains(stage));
@@ -123,7 +119,6 @@ fn result(
     let ms = |stage: &Stage| median(own.iter().map(|sample| sample.stages[stage]));
     ModeResult {
         name: mode.name,
-        relative_time: relative_cpu.filter(|_| is_cpu).unwrap_or(relative_median),
         relative_median,
         relative_cpu,
         stages: own[0].stages.keys().map(|stage| (stage.name(), ms(stage))).collect(),

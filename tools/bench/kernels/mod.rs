@@ -6,9 +6,7 @@
 //! without any cut-off, which is what those rules stand for.
 
 mod bed;
-mod chart;
 mod errors;
-mod knee;
 mod measure;
 mod mirror;
 mod modes;
@@ -16,7 +14,7 @@ mod report;
 mod scenes;
 
 use super::Common;
-use super::measure::{write_json, write_text};
+use super::measure::write_json;
 use labelgs::engine::EngineSize;
 use labelgs::gpu::Gpu;
 use labelgs::internals::engine::capacity;
@@ -68,10 +66,9 @@ pub fn run(args: &KernelArgs) -> Result<()> {
     let threads = std::thread::available_parallelism().map_or(1, usize::from);
     write_json(
         &args.common.output.join("kernels.json"),
-        &json!({ "schema_version": 2, "small": args.common.small, "device": capabilities.name, "driver": driver,
+        &json!({ "schema_version": 3, "small": args.common.small, "device": capabilities.name, "driver": driver,
             "threads": threads, "load_before": load_before, "scenes": scenes }),
     )?;
-    write_text(&args.common.output.join("kernels.svg"), &chart::svg(&scenes, &plain)?)?;
     if failures.is_empty() { Ok(()) } else { Err(Error::Check(failures.join("; "))) }
 }
 

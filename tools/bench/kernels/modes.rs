@@ -10,26 +10,11 @@ use std::collections::HashMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// The accuracy that a mode trades for time.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Family {
-    /// Nothing: the step as the engine runs it.
-    Default,
-    /// When a pixel stops.
-    Stop,
-    /// Which pairs count.
-    Cut,
-    /// Another formula for the same value.
-    Arithmetic,
-}
-
 /// One way to run a step.
 #[derive(Clone, Copy, Debug)]
 pub struct Mode {
-    /// Name in tables and charts.
+    /// Name in tables.
     pub name: &'static str,
-    /// The accuracy that it trades.
-    pub family: Family,
     /// The difference from the default, for the legend.
     pub about: &'static str,
     /// Macro and value that its kernels are compiled with.
@@ -40,13 +25,13 @@ pub struct Mode {
 
 const fn stop(name: &'static str, about: &'static str, value: &'static str) -> Mode {
     let define = Some(("TRANSMITTANCE_MIN", value));
-    Mode { name, family: Family::Stop, about, define, stems: &["blend_forward"] }
+    Mode { name, about, define, stems: &["blend_forward"] }
 }
 
 const fn cut(name: &'static str, about: &'static str, value: &'static str) -> Mode {
     let define = Some(("ALPHA_MIN", value));
     let stems = &["cull", "project_forward", "emit_instances", "blend_forward", "blend_backward"];
-    Mode { name, family: Family::Cut, about, define, stems }
+    Mode { name, about, define, stems }
 }
 
 /// 2^x for -126 <= x <= 0: the whole part goes into the exponent, of the rest a polynomial with the least largest
@@ -56,13 +41,7 @@ const CUBIC: &str = "(uintBitsToFloat(uint(int(floor(x)) + 127) << 23) * \
 
 /// Every mode, the default first.
 pub const MODES: &[Mode] = &[
-    Mode {
-        name: "default",
-        family: Family::Default,
-        about: "the step as the engine runs it",
-        define: None,
-        stems: &[],
-    },
+    Mode { name: "default", about: "the step as the engine runs it", define: None, stems: &[] },
     stop("stop 1e-2", "a pixel stops at T < 1e-2", "1e-2"),
     stop("stop 1e-3", "a pixel stops at T < 1e-3", "1e-3"),
     stop("stop 0", "no pixel stops", "0.0"),
@@ -70,7 +49,6 @@ pub const MODES: &[Mode] = &[
     cut("cut 1/1024", "pairs count from alpha 1/1024", "(1.0 / 1024.0)"),
     Mode {
         name: "exp2 cubic",
-        family: Family::Arithmetic,
         about: "exp2 by a polynomial of degree 3 (relative error 7.5e-5)",
         define: Some(("exp2(x)", CUBIC)),
         stems: &["blend_forward", "blend_backward"],

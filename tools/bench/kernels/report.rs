@@ -1,7 +1,6 @@
 //! Tables of the benchmark.
 
 use super::errors::Errors;
-use super::knee;
 use super::measure::SceneResult;
 use super::modes::Mode;
 use crate::measure::table;
@@ -18,7 +17,7 @@ const STAGES: [Stage; 7] = [
     Stage::ProjectBackward,
 ];
 
-/// Legend of the columns, and the modes behind the numbers of the charts.
+/// Legend of the columns, and the modes by number.
 pub fn legend(modes: &[Mode]) {
     println!(
         "times by those of the default, medians of the rounds' ratios: `passes` of all stages but loss and report, `CPU` \
@@ -66,12 +65,6 @@ pub fn scene(scene: &SceneResult) {
         "rounding: alone, in {} pixels and {} Gaussians with no decision near",
         scene.rounding.pixels, scene.rounding.rows
     );
-    // The other scenes test accuracy, not speed.
-    if scene.name.starts_with('S') {
-        for (name, knee) in knee::all(scene) {
-            println!("{name}: {knee}");
-        }
-    }
 }
 
 fn numbers(errors: &Errors) -> Vec<String> {

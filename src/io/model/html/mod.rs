@@ -7,10 +7,11 @@ use crate::error::{Error, Result};
 use crate::io::read as file;
 use crate::scene::UNLABELLED;
 use crate::scene::labels::label_colour;
+use crate::web;
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 use glam::DVec3;
-use maud::{DOCTYPE, Markup, PreEscaped, html};
+use maud::{Markup, PreEscaped, html};
 use serde_json::json;
 use std::collections::BTreeMap;
 use std::io::{self, Write};
@@ -21,17 +22,16 @@ pub(super) const FORMAT: ModelFormat = ModelFormat { name: "HTML", endings: &[".
 
 const WRITER: ModelWriter = ModelWriter { losses: spz::losses, write, checksum: None };
 
-const STYLE: &str = include_str!("style.css");
 /// One script, in this order.
-const SCRIPTS: [&str; 5] = [
+const SCRIPTS: [&str; 7] = [
+    web::ALGEBRA,
+    web::CAMERA,
+    web::INPUT,
     include_str!("decode.js"),
     include_str!("shaders.js"),
     include_str!("draw.js"),
-    include_str!("camera.js"),
     include_str!("page.js"),
 ];
-/// What the page may load: nothing.
-const POLICY: &str = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'";
 /// Start and end of the model in a page.
 const MODEL: [&str; 2] = ["<script type=\"text/plain\" id=\"model\">", "</script>"];
 
@@ -59,26 +59,13 @@ fn page(export: &Export, model: &str) -> String {
     // Nothing in a name may end the script.
     let about = about.to_string().replace('<', "\\u003c");
     let title = format!("{} Gaussians", export.rows.len());
-    let markup = html! {
-        (DOCTYPE)
-        html lang="en" {
-            head {
-                meta charset="utf-8";
-                meta name="viewport" content="width=device-width, initial-scale=1";
-                meta http-equiv="Content-Security-Policy" content=(POLICY);
-                title { (title) " – labelgs" }
-                style { (PreEscaped(STYLE)) }
-            }
-            body {
-                canvas id="picture" tabindex="0" aria-label="Picture of the model. Drag to turn, Shift and drag to move, scroll to come nearer." {}
-                (panels(&title))
-                script type="application/json" id="about" { (PreEscaped(about)) }
-                script type="text/plain" id="model" { (PreEscaped(model)) }
-                script { "'use strict';\n" (PreEscaped(SCRIPTS.concat())) }
-            }
-        }
+    let body = html! {
+        canvas id="picture" tabindex="0" aria-label="Picture of the model. Drag to turn, Shift and drag to move, scroll to come nearer." {}
+        (panels(&title))
+        script type="application/json" id="about" { (PreEscaped(about)) }
+        script type="text/plain" id="model" { (PreEscaped(model)) }
     };
-    markup.into_string() + "\n"
+    web::page(&title, include_str!("style.css"), &body, &web::joined(&SCRIPTS))
 }
 
 fn panels(title: &str) -> Markup {

@@ -1,4 +1,31 @@
-// The page: labels, mouse, keys and touch.
+// The page: labels and the first camera.
+
+const FLIP = [1, -1, -1]; // between the axes of scenes (x right, y down, z forward) and those of the SPZ
+const middle = (values) => values.sort()[values.length >> 1];
+
+// A camera that sees the model, upright: from where the first photo was taken, but no farther than a small model needs.
+function rigOf(positions, { view }, size) {
+  const count = positions.length / 3;
+  const step = Math.max(1, Math.floor(count / 20000));
+  const rows = Array.from({ length: Math.ceil(count / step) }, (_, at) => 3 * at * step);
+  const target = [0, 1, 2].map((axis) => middle(Float32Array.from(rows, (row) => positions[row + axis])));
+  const far = Float32Array.from(rows, (row) => length(sub(positions.subarray(row, row + 3), target))).sort();
+  const whole = 2.2 * Math.max(far[Math.floor(0.6 * far.length)], 1e-3);
+  const from = view ? sub(view.eye, target) : [0.45, 0.34, 0.82];
+  const rig = new Rig();
+  rig.size = size;
+  rig.reset({ views: [], target, distance: view ? Math.min(whole, length(from)) : whole, up: view?.up ?? [0, 1, 0], from });
+  return rig;
+}
+
+// A camera of `labelgs render --camera` in the axes of the model.
+function cameraOf(text) {
+  const { w2c, ...lens } = JSON.parse(text);
+  const rows = w2c.slice(0, 3).map((row) => [...FLIP.map((sign, axis) => sign * row[axis]), row[3] + dot(row, about.origin)]);
+  const numbers = [...rows.flat(), ...['fx', 'fy', 'cx', 'cy', 'W', 'H'].map((name) => lens[name])];
+  if (!numbers.every(Number.isFinite)) throw new Error('not a camera');
+  return { w2c: rows, ...lens };
+}
 
 const byId = (id) => document.getElementById(id);
 const about = JSON.parse(byId('about').textContent);
@@ -14,7 +41,9 @@ async function start() {
   const rowOf = new Map(about.labels.map(({ id }, row) => [id, row]));
   const model = await decode(byId('model').textContent, rowOf, picture.texelsMax);
   picture.hold(model, about.labels.length);
-  const camera = new Camera(model.positions, about);
+  const ratio = Math.min(2, window.devicePixelRatio || 1);
+  const size = () => [canvas.clientWidth, canvas.clientHeight].map((side) => Math.max(1, Math.round(side * ratio)));
+  const rig = rigOf(model.positions, about, size());
   const looks = about.labels.map(({ colour }) => [...colour, 1]);
   let asked = false, changed = true;
 
@@ -22,8 +51,10 @@ async function start() {
     asked = false;
     if (changed) picture.look(looks);
     changed = false;
-    const ratio = Math.min(2, window.devicePixelRatio || 1);
-    picture.draw(camera.at(Math.round(canvas.clientWidth * ratio), Math.round(canvas.clientHeight * ratio)));
+    rig.size = size();
+    const { w2c, fx, fy, cx, cy, W, H } = rig.file();
+    const rows = w2c.slice(0, 3);
+    picture.draw({ turn: rows.map((row) => row.slice(0, 3)), shift: rows.map((row) => row[3]), lens: [fx, fy, cx, cy], size: [W, H] });
   }
   function ask() {
     if (asked) return;
@@ -40,7 +71,8 @@ async function start() {
     const found = location.hash.match(/^#camera=(.*)$/);
     if (!found) return;
     try {
-      camera.take(JSON.parse(decodeURIComponent(found[1])));
+      rig.views = [{ camera: cameraOf(decodeURIComponent(found[1])) }];
+      rig.home();
     } catch {
       fail(new Error('The camera in the address is not one of “render --camera”.'));
     }
@@ -74,45 +106,11 @@ async function start() {
     buttons.filter((button) => (button.ariaPressed === 'true') !== on).forEach((button) => button.click());
   });
 
-  const touches = new Map();
-  canvas.addEventListener('pointerdown', (event) => {
-    canvas.setPointerCapture(event.pointerId);
-    touches.set(event.pointerId, event);
-  });
-  for (const kind of ['pointerup', 'pointercancel']) canvas.addEventListener(kind, (event) => touches.delete(event.pointerId));
-  canvas.addEventListener('pointermove', (event) => {
-    const before = touches.get(event.pointerId);
-    if (!before) return;
-    const side = Math.min(canvas.clientWidth, canvas.clientHeight);
-    const [x, y] = [(event.clientX - before.clientX) / side, (event.clientY - before.clientY) / side];
-    if (touches.size === 2) {
-      const [other] = [...touches.values()].filter((touch) => touch.pointerId !== event.pointerId);
-      const gap = (touch) => Math.hypot(touch.clientX - other.clientX, touch.clientY - other.clientY);
-      camera.zoom(Math.max(1, gap(before)) / Math.max(1, gap(event)));
-      camera.pan(x / 2, y / 2);
-    } else if (event.buttons & 6 || event.shiftKey) camera.pan(x, y);
-    else camera.orbit(3 * x, 3 * y);
-    touches.set(event.pointerId, event);
-    ask();
-  });
-  canvas.addEventListener('contextmenu', (event) => event.preventDefault());
-  canvas.addEventListener('wheel', (event) => {
-    event.preventDefault();
-    camera.zoom(Math.exp(0.0015 * event.deltaY));
-    ask();
-  }, { passive: false });
-  canvas.addEventListener('keydown', (event) => {
-    const keys = {
-      ArrowLeft: () => camera.orbit(0.1, 0), ArrowRight: () => camera.orbit(-0.1, 0),
-      ArrowUp: () => camera.orbit(0, 0.1), ArrowDown: () => camera.orbit(0, -0.1),
-      '+': () => camera.zoom(0.9), '-': () => camera.zoom(1.1), r: () => camera.reset(),
-    };
-    if (!keys[event.key]) return;
-    event.preventDefault();
-    keys[event.key]();
-    ask();
-  });
-  byId('reset').addEventListener('click', () => { camera.reset(); ask(); });
+  const zoom = (factor) => () => { rig.dolly(factor); ask(); };
+  const reset = () => { rig.home(); ask(); };
+  const keys = { KeyR: reset, Minus: zoom(1.1), Equal: zoom(0.9), 'Shift+Equal': zoom(0.9), NumpadAdd: zoom(0.9), NumpadSubtract: zoom(1.1) };
+  new Input({ box: canvas, change: ask }, rig, { keys, click() {}, pivot() {} });
+  byId('reset').addEventListener('click', reset);
   window.addEventListener('resize', ask);
   window.addEventListener('hashchange', fromAddress);
   fromAddress();

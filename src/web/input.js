@@ -15,7 +15,7 @@ const MOVES = {
 const TURNS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
 
 export class Input {
-  /** `actions` has what keys and clicks do besides moving the camera. */
+  /** `stage` has the element `box` and draws after `change`; `actions` has what keys and clicks do besides moving. */
   constructor(stage, rig, actions) {
     Object.assign(this, { stage, rig, actions, held: new Set(), pointers: new Map(), isFlight: false });
     this.moved = 0;

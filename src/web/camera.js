@@ -29,19 +29,21 @@ export class Rig {
     this.views = scene.views;
     this.target = scene.target;
     this.distance = scene.distance;
+    this.from = scene.from;
     if (keep) return;
     this.up = unit(scene.up, [0, -1, 0]);
     this.home();
   }
 
-  /** The first camera: the first test view, or one that sees the whole model. */
+  /** The first camera: the first test view, or one that sees the whole model, from where the scene says or from above. */
   home() {
     const first = this.views.findIndex((view) => view.test);
     if (this.views.length > 0) return this.snap(Math.max(first, 0));
     const side = unit(cross(this.up, Math.abs(this.up[0]) < 0.9 ? [1, 0, 0] : [0, 0, 1]));
-    const away = unit(add(add(side, scale(cross(side, this.up), 0.4)), scale(this.up, 0.35)));
+    const away = unit(this.from ?? add(add(side, scale(cross(side, this.up), 0.4)), scale(this.up, 0.35)));
+    const focal = FOCAL * Math.min(1, this.size[0] / this.size[1]);
     this.view = null;
-    this.focal = [FOCAL, FOCAL];
+    this.focal = [focal, focal];
     this.offset = [0, 0];
     this.pivot = this.target;
     this.centre = add(this.target, scale(away, this.distance));
