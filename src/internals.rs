@@ -204,9 +204,6 @@ pub mod shaders {
         pub use crate::shaders::constants::{
             ALPHA_MAX, ALPHA_MIN, KEY_INVISIBLE, LOG2_ALPHA_MIN, NO_SPLAT, TRANSMITTANCE_MIN,
         };
-        pub mod exact {
-            pub use crate::shaders::constants::exact::SH_C0;
-        }
     }
     pub mod structs {
         pub use crate::shaders::structs::{Counters, StepUniforms};

@@ -9,8 +9,8 @@ use labelgs::edit::{Specks, recolour, relabel, split_components, without_specks}
 use labelgs::internals::cli::status::exit_status;
 use labelgs::internals::edit::components::components;
 use labelgs::internals::edit::rename::{give_name, keep, renumber, split};
-use labelgs::internals::shaders::constants::exact::SH_C0;
 use labelgs::io::{LabelEntry, LabelTable};
+use labelgs::scene::harmonics::SH_C0;
 use labelgs::scene::{Gaussians, LabelMap};
 use std::collections::{BTreeMap, BTreeSet};
 

@@ -1,7 +1,7 @@
 //! Changes of the colours or labels of a model.
 
 use super::components::{Grouping, components};
-use crate::io::model::values::sh0_of;
+use crate::scene::harmonics::sh0_of;
 use crate::scene::{Gaussians, LABEL_MAX, MODEL_LABEL_MAX, UNLABELLED};
 use crate::{Error, Result, Setting};
 use std::collections::{BTreeMap, BTreeSet};

@@ -1,8 +1,10 @@
 //! One error for many files.
 
-use super::bad_photos::LISTED_MAX;
 use crate::error::{Error, Result};
 use std::path::Path;
+
+/// Most problems that one message lists.
+pub(crate) const LISTED_MAX: usize = 20;
 
 /// Returns the loaded views, or one error that lists all failures.
 pub(crate) fn all_or_one_error<T>(root: &Path, loaded: Vec<Result<T>>) -> Result<Vec<T>> {

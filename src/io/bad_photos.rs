@@ -1,11 +1,9 @@
 //! Undecodable photos: a training can skip a few; many mean a damaged data set.
 
 use super::LoadOptions;
+use super::all::LISTED_MAX;
 use crate::error::{Error, Result, Setting};
 use std::path::Path;
-
-/// Most problems that one message lists.
-pub(crate) const LISTED_MAX: usize = 20;
 
 /// Returns how many of `total` photos may be left out.
 pub(super) fn allowed(max_share: f32, total: usize) -> usize {

@@ -5,7 +5,8 @@
 use super::depth_file::{EXTENSIONS, read_depth};
 use super::lookup::Lookup;
 use super::names::shortened;
-use super::resample::{resample_nearest, same_aspect};
+use super::resample::resample_nearest;
+use super::resize::same_aspect;
 use super::window::{Window, windows};
 use crate::error::{Error, Result};
 use crate::scene::{DepthMap, View};

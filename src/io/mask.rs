@@ -5,7 +5,7 @@
 //! colour code needs its legend.
 
 use super::image::{check_png_length, check_size};
-use super::resample::same_aspect;
+use super::resize::same_aspect;
 use crate::error::{Error, Result};
 use crate::io::read;
 use crate::scene::LabelMap;

@@ -1,7 +1,8 @@
 //! Ground-truth masks of single objects, as benchmarks ship them: a black and white image per object and frame.
 
 use super::image::read_grey;
-use super::resample::{bounded_size, resample_ids, same_aspect, shrink_photo};
+use super::resample::resample_ids;
+use super::resize::{bounded_size, same_aspect, shrink_photo};
 use super::window::Window;
 use crate::error::{Error, Result};
 use crate::io::read;

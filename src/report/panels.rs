@@ -2,7 +2,7 @@
 
 use crate::error::{Error, Result};
 use crate::io::image::jpeg_rgb8;
-use crate::io::resample::bounded_size;
+use crate::io::resize::bounded_size;
 use crate::scene::Photo;
 use crate::scene::colour::to_byte;
 use image::imageops::{FilterType, resize};

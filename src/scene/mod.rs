@@ -11,6 +11,7 @@ pub(crate) mod crew;
 pub(crate) mod depth;
 pub(crate) mod direction;
 pub(crate) mod gaussians;
+pub mod harmonics;
 pub(crate) mod labels;
 pub(crate) mod median;
 pub(crate) mod origin;

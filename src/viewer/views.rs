@@ -4,7 +4,7 @@ use crate::error::{Error, Result};
 use crate::eval::metrics::{label_iou, psnr};
 use crate::io::camera_json::CameraFile;
 use crate::io::image::{jpeg_rgb8, png_rgb8};
-use crate::io::resample::{bounded_size, shrink_photo};
+use crate::io::resize::{bounded_size, shrink_photo};
 use crate::render::Rendered;
 use crate::scene::{Dataset, Overview, Pixels, View};
 use serde_json::{Value, json};

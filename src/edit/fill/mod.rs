@@ -18,7 +18,7 @@ mod sheet;
 pub use light::Light;
 
 use super::select::{MIN_LABEL_CONFIDENCE, remove};
-use crate::io::model::values::sh0_of;
+use crate::scene::harmonics::sh0_of;
 use crate::scene::{Camera, Gaussians, LabelMap};
 use crate::{Error, Result, Setting};
 use glam::{DMat3, DQuat, DVec3};

@@ -2,7 +2,7 @@
 
 use super::{Fault, Finding, ViewReport};
 use crate::error::Result;
-use crate::io::resample::{bounded_size, shrink_photo};
+use crate::io::resize::{bounded_size, shrink_photo};
 use crate::scene::median::median;
 use crate::scene::{Photo, Pixels, View, crew};
 

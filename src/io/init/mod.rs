@@ -8,7 +8,7 @@ mod texel;
 mod thin;
 
 use crate::error::{Error, Result};
-use crate::io::model::values::sh0_of;
+use crate::scene::harmonics::sh0_of;
 use crate::scene::origin::far_origin;
 use crate::scene::{Dataset, Gaussians, Point};
 use crate::stage::Stage;

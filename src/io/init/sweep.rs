@@ -5,7 +5,7 @@
 
 use super::texel::texel;
 use crate::error::Result;
-use crate::io::resample::{bounded_size, shrink_photo};
+use crate::io::resize::{bounded_size, shrink_photo};
 use crate::scene::{Camera, Photo, Pixels, Point, View};
 use glam::DVec2;
 use rand::Rng;

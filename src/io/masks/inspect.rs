@@ -6,7 +6,7 @@ use crate::io::label_table::FILE;
 use crate::io::mask::{read_header, read_mask};
 use crate::io::mask_folder::MaskFolder;
 use crate::io::names::below;
-use crate::io::resample::same_aspect;
+use crate::io::resize::same_aspect;
 use crate::scene::sampling::every;
 use crate::scene::{Dataset, Point, View};
 use crate::stage::Stage;

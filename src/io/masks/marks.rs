@@ -5,7 +5,7 @@ use super::rle::Rle;
 use super::{ObjectPer, shortened};
 use crate::error::{Error, Result, Setting};
 use crate::io::label_table::unique_name;
-use crate::io::resample::same_aspect;
+use crate::io::resize::same_aspect;
 use crate::scene::View;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;

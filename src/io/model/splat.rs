@@ -3,9 +3,10 @@
 
 use super::format::{ModelFormat, ReadModel};
 use super::rows::{Row, Rows};
-use super::values::{log_scale, logit_of_byte, sh0_of};
+use super::values::{log_scale, logit_of_byte};
 use crate::error::{Error, Result};
 use crate::io::read as file;
+use crate::scene::harmonics::sh0_of;
 use std::path::Path;
 
 /// The format by its ending.

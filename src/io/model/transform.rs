@@ -2,13 +2,11 @@
 
 use crate::error::{Error, Result, Setting};
 use crate::scene::Gaussians;
+use crate::scene::harmonics::{COEFFICIENTS, basis};
 use crate::scene::origin::far_origin;
-use crate::shaders::constants::exact::{SH_C1, SH_C2_0, SH_C2_2, SH_C2_4, SH_C3_0, SH_C3_1, SH_C3_2, SH_C3_3, SH_C3_5};
 use glam::{DQuat, DVec3};
 use std::f64::consts::TAU;
 
-/// Number of coefficients above degree 0, up to degree 3.
-const COEFFICIENTS: usize = 15;
 /// First coefficient of each degree above 0, and one past the last.
 const DEGREES: [usize; 4] = [0, 3, 8, COEFFICIENTS];
 /// Nodes and weights of Gauss and Legendre. Four are exact up to degree 7, two functions of degree 3 have 6.
@@ -103,26 +101,4 @@ fn harmonics(turn: DQuat) -> [[f64; COEFFICIENTS]; COEFFICIENTS] {
         }
     }
     matrix
-}
-
-/// The basis functions above degree 0, as in `glsl/include/sh.glsl`.
-fn basis(DVec3 { x, y, z }: DVec3) -> [f64; COEFFICIENTS] {
-    let (xx, yy, zz) = (x * x, y * y, z * z);
-    [
-        -SH_C1 * y,
-        SH_C1 * z,
-        -SH_C1 * x,
-        SH_C2_0 * x * y,
-        -SH_C2_0 * y * z,
-        SH_C2_2 * (2.0 * zz - xx - yy),
-        -SH_C2_0 * x * z,
-        SH_C2_4 * (xx - yy),
-        -SH_C3_0 * y * (3.0 * xx - yy),
-        SH_C3_1 * x * y * z,
-        -SH_C3_2 * y * (4.0 * zz - xx - yy),
-        SH_C3_3 * z * (2.0 * zz - 3.0 * xx - 3.0 * yy),
-        -SH_C3_2 * x * (4.0 * zz - xx - yy),
-        SH_C3_5 * z * (xx - yy),
-        -SH_C3_0 * x * (xx - 3.0 * yy),
-    ]
 }

@@ -1,7 +1,5 @@
 //! Values after activation, as other formats store them, before activation.
 
-use crate::shaders::constants::exact::SH_C0;
-
 /// A size of 0, which some formats allow, as one that has a logarithm.
 const SCALE_MIN: f32 = 1e-12;
 
@@ -29,14 +27,4 @@ pub(super) fn byte(value: f32) -> u8 {
 /// The byte of an opacity in steps of 1/255, without 0 and 255, of which other readers make infinite logits.
 pub(super) fn opacity_byte(logit: f32) -> u8 {
     byte(255.0 * sigmoid(logit)).clamp(1, 254)
-}
-
-/// The coefficient of degree 0 that shows a value, 0 to 1.
-pub(crate) fn sh0_of(value: f64) -> f32 {
-    ((value - 0.5) / SH_C0) as f32
-}
-
-/// The value that a coefficient of degree 0 shows.
-pub(crate) fn shown(sh0: f32) -> f64 {
-    0.5 + SH_C0 * f64::from(sh0)
 }

@@ -7,8 +7,9 @@ use super::{
 use crate::error::{Error, Result};
 use crate::io::label_table::LabelTable;
 use crate::io::model::format::{Export, ModelWriter};
-use crate::io::model::values::{shown as shown_value, sigmoid};
+use crate::io::model::values::sigmoid;
 use crate::scene::UNLABELLED;
+use crate::scene::harmonics::value_of;
 use serde_json::{Map, Value, json};
 use std::collections::BTreeSet;
 use std::io::{self, Write};
@@ -131,7 +132,7 @@ fn attributes(export: &Export, to: &mut Binary) -> Value {
     add("POSITION".into(), to.attribute(true, rows().map(|row| AXES.position(export.position(row)))));
     // For viewers that draw points.
     let shown = |row: usize| {
-        let [r, g, b] = export.model.sh0[row].map(|sh0| shown_value(sh0).clamp(0.0, 1.0) as f32);
+        let [r, g, b] = export.model.sh0[row].map(|sh0| value_of(sh0).clamp(0.0, 1.0) as f32);
         [r, g, b, sigmoid(export.model.opacities[row])]
     };
     add("COLOR_0".into(), to.attribute(false, rows().map(shown)));

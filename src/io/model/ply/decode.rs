@@ -3,8 +3,8 @@
 use super::columns::{Columns, coefficients};
 use crate::error::{Error, Result};
 use crate::io::model::rows::Row;
-use crate::io::model::values::sh0_of;
 use crate::scene::MODEL_LABEL_MAX;
+use crate::scene::harmonics::sh0_of;
 use std::path::Path;
 
 /// Values of a row before the harmonics.

@@ -4,8 +4,9 @@
 use crate::error::{Error, Result};
 use crate::io::model::format::ReadModel;
 use crate::io::model::rows::{Row, Rows};
-use crate::io::model::values::{logit_of_byte, sh0_of};
+use crate::io::model::values::logit_of_byte;
 use crate::io::ply::Elements;
+use crate::scene::harmonics::sh0_of;
 use std::f64::consts::SQRT_2;
 use std::path::Path;
 
