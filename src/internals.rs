@@ -78,65 +78,69 @@ pub mod eval {
         pub use crate::eval::ssim8::{ssim8, to_bytes};
     }
 }
-pub mod io {
-    pub use crate::io::{initial_gaussians, open};
+pub mod files {
     pub mod atomic {
-        pub use crate::io::atomic::{remove_stale, write};
-    }
-    pub mod block_file {
-        pub use crate::io::block_file::{BlockFile, BlocksFile};
-    }
-    pub mod camera_json {
-        pub use crate::io::camera_json::{CameraFile, read_camera, write_cameras};
-    }
-    pub mod checkpoint {
-        pub use crate::io::checkpoint::{Checkpoint, Plane, VERSION};
-    }
-    pub mod checkpoint_folder {
-        pub use crate::io::checkpoint_folder::{Found, keep, list, next};
+        pub use crate::files::atomic::{remove_stale, write};
     }
     pub mod image {
-        pub use crate::io::image::{
+        pub use crate::files::image::{
             photo_size, read_grey, read_photo, read_rgba, write_exr_rgb, write_exr_y, write_png_grey8,
             write_png_grey16, write_png_rgb8,
         };
     }
-    pub mod init {
-        pub use crate::io::init::{add_far_gaussians, initial_gaussians};
-    }
     pub mod label_table {
-        pub use crate::io::label_table::FILE;
+        pub use crate::files::label_table::FILE;
+    }
+    pub mod read {
+        pub use crate::files::read::text;
+    }
+    pub mod run_folder {
+        pub use crate::files::run_folder::{CONFIG, Lock, of_model};
+    }
+}
+pub mod formats {
+    pub use crate::formats::{LazyModel, ModelRef, StoredModel, read_model, write_model};
+}
+pub mod masks {
+    pub mod check {
+        pub use crate::masks::check::{Look, findings};
+    }
+    pub mod mask {
+        pub use crate::masks::mask::read_mask;
+    }
+}
+pub mod records {
+    pub mod block_file {
+        pub use crate::records::block_file::{BlockFile, BlocksFile};
+    }
+    pub mod checkpoint {
+        pub use crate::records::checkpoint::{Checkpoint, Plane, VERSION};
+    }
+    pub mod checkpoint_folder {
+        pub use crate::records::checkpoint_folder::{Found, keep, list, next};
+    }
+}
+pub mod scenes {
+    pub use crate::scenes::{initial_gaussians, open};
+    pub mod camera_json {
+        pub use crate::scenes::camera_json::{CameraFile, read_camera, write_cameras};
+    }
+    pub mod init {
+        pub use crate::scenes::init::{add_far_gaussians, initial_gaussians};
     }
     pub mod lens {
-        pub use crate::io::lens::{
+        pub use crate::scenes::lens::{
             Division, Equirectangular, Eucm, Fisheye, Fov, Lens, Optics, Polynomial, Projection, RadTan,
         };
     }
-    pub mod mask {
-        pub use crate::io::mask::read_mask;
-    }
-    pub mod masks {
-        pub mod check {
-            pub use crate::io::masks::check::{Look, findings};
-        }
-    }
-    pub mod model {
-        pub use crate::io::model::{LazyModel, ModelRef, StoredModel, read_model, write_model};
-    }
-    pub mod ply {
-        pub use crate::io::ply::read_points;
-    }
-    pub mod read {
-        pub use crate::io::read::text;
-    }
-    pub mod run_folder {
-        pub use crate::io::run_folder::{CONFIG, Lock, of_model};
+    pub mod points {
+        pub use crate::scenes::points::read_points;
     }
     pub mod truth {
-        pub use crate::io::truth::{files_below, read_truth};
+        pub use crate::scenes::truth::{files_below, read_truth};
     }
     pub mod window {
-        pub use crate::io::window::{Window, ids_of_photo, windows};
+        pub use crate::scenes::window::{Window, ids_of_photo, windows};
     }
 }
 pub mod label {

@@ -10,7 +10,7 @@
 //! ```no_run
 //! use labelgs::engine::Engine;
 //! use labelgs::gpu::{Gpu, GpuOptions};
-//! use labelgs::{edit, io, render, run, synth};
+//! use labelgs::{edit, formats, render, run, scenes, synth};
 //! use std::path::Path;
 //!
 //! fn main() -> labelgs::Result<()> {
@@ -21,12 +21,12 @@
 //!     request.inputs.masks = Some(scene.join("masks"));
 //!     let summary = run::train(&request, &|| Gpu::new(&GpuOptions::default()), &mut ())?;
 //!
-//!     let model = io::read_model(&summary.model)?.gaussians;
+//!     let model = formats::read_model(&summary.model)?.gaussians;
 //!     let barrel = edit::extract(&model, &[3], edit::MIN_LABEL_CONFIDENCE)?;
 //!     let rest = edit::remove(&model, &[3])?;
-//!     io::write_model("barrel.ply", &barrel)?;
+//!     formats::write_model("barrel.ply", &barrel)?;
 //!
-//!     let camera = io::open(scene, &io::LoadOptions::default())?.test[0].camera.clone();
+//!     let camera = scenes::open(scene, &scenes::LoadOptions::default())?.test[0].camera.clone();
 //!     let size = (camera.width, camera.height);
 //!     let mut engine = Engine::of_model(Gpu::new(&GpuOptions::default())?, &rest, [size])?;
 //!     let picture = render::render(&mut engine, &camera, &render::RenderOptions::default())?;
@@ -37,7 +37,7 @@
 //! | to | start at |
 //! | --- | --- |
 //! | train, watch, pause, resume | [`run::train`], [`run::Observer`] |
-//! | read and write scenes, masks, models | [`io::open`], [`io::masks`], [`io::read_model`] |
+//! | read scenes, masks, models; write models | [`scenes::open`], [`masks`], [`formats`] |
 //! | draw pictures, depth, label maps | [`engine::Engine::of_model`], [`render::render`] |
 //! | choose, take out, change objects | [`edit`] |
 //! | label a finished model, repair masks | [`label`] |
@@ -73,19 +73,23 @@ pub mod edit;
 pub mod engine;
 mod error;
 pub mod eval;
+pub mod files;
+pub mod formats;
 pub mod gpu;
 pub mod guide;
 #[doc(hidden)]
 pub mod internals;
-pub mod io;
 mod lab;
 pub mod label;
+pub mod masks;
 mod options;
 mod pass;
+pub mod records;
 pub mod render;
 mod report;
 pub mod run;
 pub mod scene;
+pub mod scenes;
 mod scheduler;
 mod shaders;
 mod stage;

@@ -1,7 +1,7 @@
 //! Steps on small photos.
 
 use crate::support::device;
-use labelgs::internals::io::init;
+use labelgs::internals::scenes::init;
 use labelgs::internals::scheduler::SchedulerOptions;
 use labelgs::internals::train::{StepReport, Trainer};
 use labelgs::run::TrainConfig;

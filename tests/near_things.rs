@@ -3,7 +3,7 @@
 use crate::support::device;
 use glam::{DMat3, DVec3};
 use labelgs::engine::Engine;
-use labelgs::internals::io::init;
+use labelgs::internals::scenes::init;
 use labelgs::internals::scheduler::SchedulerOptions;
 use labelgs::internals::train::Trainer;
 use labelgs::render::{NEAR, Parts, RenderOptions, Rendered, render};

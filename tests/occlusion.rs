@@ -3,8 +3,8 @@
 use labelgs::internals::cli::status::exit_status;
 use labelgs::internals::label::occlusion::{distances, picture};
 use labelgs::internals::synth::{World, ring_of_cameras};
-use labelgs::io::OcclusionTable;
 use labelgs::label::occlusion::{Rule, by_contour, by_mean};
+use labelgs::records::OcclusionTable;
 use labelgs::scene::{DepthKind, DepthMap, LabelMap, Occluders};
 use labelgs::synth::{Preset, SynthOptions};
 use std::collections::{BTreeMap, BTreeSet};

@@ -1,7 +1,7 @@
 //! A buffer that is too small costs a lost step, never a wrong update.
 
 use crate::support::device;
-use labelgs::internals::io::init;
+use labelgs::internals::scenes::init;
 use labelgs::internals::scheduler::SchedulerOptions;
 use labelgs::internals::train::Trainer;
 use labelgs::run::TrainConfig;

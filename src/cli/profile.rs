@@ -106,7 +106,7 @@ pub(crate) fn run(args: &ProfileArgs, context: &Context) -> Result<()> {
     let change = |_: &mut Trainer| ();
     let profile = profile(&gpu, (&dataset, &model, config), window, change, context)?;
     match &args.json {
-        Some(Some(file)) => crate::io::atomic::write_json(file, &profile.to_json())?,
+        Some(Some(file)) => crate::files::atomic::write_json(file, &profile.to_json())?,
         Some(None) => stdout::print_json(&profile.to_json())?,
         None if context.json => stdout::print_json(&profile.to_json())?,
         None => {}

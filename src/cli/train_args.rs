@@ -4,10 +4,10 @@
 use super::args::{FileArgs, JsonFlag};
 use super::values::bytes;
 use super::view::WatchArgs;
-use crate::io::ReadOptions;
 use crate::options::typed::Typed;
 use crate::run::{Changed, Inputs, OccluderFiles, Request, RunOptions, Settings, Start};
 use crate::scene::DepthKind;
+use crate::scenes::ReadOptions;
 use crate::train::{Occlusion, Preset, TrainConfig};
 use crate::{Error, Result};
 use clap::Args;

@@ -2,16 +2,15 @@
 
 use super::args::SceneArgs;
 use super::context::Context;
-use super::interrupt;
 use super::labelled::{TableArg, open};
 use super::model_fit::warn_of_misfit;
 use super::scene::{near_plane, open_gpu, open_scene};
 use super::shell::quoted;
-use super::stdout;
 use super::values::{near, share};
-use crate::io::camera_json::views_of_model;
+use super::{interrupt, stdout};
 use crate::render::{Parts, RenderOptions};
 use crate::scene::Dataset;
+use crate::scenes::camera_json::views_of_model;
 use crate::viewer::{Edit, Finished, Token, Viewer, ViewerOptions, Words, show};
 use crate::{Error, Result};
 use clap::Args;

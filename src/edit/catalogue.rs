@@ -1,6 +1,6 @@
 //! The labels of a model by id and by name, for command lines and messages.
 
-use crate::io::label_table::LabelTable;
+use crate::files::label_table::LabelTable;
 use crate::scene::{Gaussians, UNLABELLED};
 use crate::words::did_you_mean;
 use crate::{Error, Result};

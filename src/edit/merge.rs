@@ -3,7 +3,7 @@
 use super::catalogue::Catalogue;
 use super::change::relabel;
 use super::rename::{give_name, renumber};
-use crate::io::label_table::LabelTable;
+use crate::files::label_table::LabelTable;
 use crate::scene::{Gaussians, UNLABELLED};
 use crate::{Error, Result, Setting};
 use std::collections::{BTreeMap, BTreeSet};

@@ -17,7 +17,7 @@ pub(crate) mod rename;
 pub(crate) mod select;
 pub(crate) mod simplify;
 
-pub use crate::io::model::Transform;
+pub use crate::formats::Transform;
 pub use catalogue::{Catalogue, Pick};
 pub use change::{Specks, Split, recolour, relabel, split_components, without_specks};
 pub use clean::{Cleaned, Cleaning, clean};

@@ -1,7 +1,7 @@
 //! Updates the table of labels after an edit of the model.
 
 use super::catalogue::Catalogue;
-use crate::io::label_table::{LabelEntry, LabelTable};
+use crate::files::label_table::{LabelEntry, LabelTable};
 use crate::scene::UNLABELLED;
 use crate::{Error, Result, Setting};
 use std::collections::{BTreeMap, BTreeSet};

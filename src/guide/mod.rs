@@ -20,7 +20,7 @@
 //! Commands in boxes run one after the other, page after page, in an empty folder; a test runs them all, with fewer steps.
 
 #[allow(unused_imports, reason = "the pages link to them")]
-use crate::{Error, edit, engine, eval, gpu, io, label, render, run, scene, synth};
+use crate::{Error, edit, engine, eval, files, formats, gpu, label, masks, render, run, scene, scenes, synth};
 
 /// A module for each page, with the text of its file. Definitions of links come first and win over those at the end of a
 /// file, which serve readers of the file itself.

@@ -1,8 +1,8 @@
 //! Pixels of the pictures that pages show, and small encoded copies of them.
 
 use crate::error::{Error, Result};
-use crate::io::image::jpeg_rgb8;
-use crate::io::resize::bounded_size;
+use crate::files::image::jpeg_rgb8;
+use crate::files::resize::bounded_size;
 use crate::scene::Photo;
 use crate::scene::colour::to_byte;
 use image::imageops::{FilterType, resize};

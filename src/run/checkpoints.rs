@@ -3,8 +3,8 @@
 use super::history::{Recorder, Sums};
 use super::resume::Record;
 use crate::error::{Error, Result};
-use crate::io::checkpoint_folder;
-use crate::io::run_folder::Lock;
+use crate::files::run_folder::Lock;
+use crate::records::checkpoint_folder;
 use crate::train::{TrainState, Trainer};
 use std::path::{Path, PathBuf};
 

@@ -2,10 +2,10 @@
 
 use super::Request;
 use crate::error::{Error, Result, Setting};
-use crate::io::Lookup;
-use crate::io::occlusion_table::OcclusionTable;
 use crate::label::occlusion::from_depths;
+use crate::records::occlusion_table::OcclusionTable;
 use crate::scene::{Dataset, DepthKind, View};
+use crate::scenes::Lookup;
 use crate::train::{Occlusion, TrainConfig};
 use std::path::PathBuf;
 

@@ -26,8 +26,8 @@ pub use spoil::{Fault, spoil};
 pub(crate) use world::World;
 pub use write::{Summary, write};
 
-use crate::io::lens::{Lens, Optics};
 use crate::scene::{Dataset, LabelMap, Photo, View};
+use crate::scenes::lens::{Lens, Optics};
 use cameras::cameras;
 use serde::{Deserialize, Serialize};
 use trace::picture;

@@ -3,8 +3,8 @@
 use super::SynthOptions;
 use super::trace::ray;
 use super::world::World;
-use crate::io::lens::Optics;
 use crate::scene::Point;
+use crate::scenes::lens::Optics;
 use glam::{DVec2, DVec3};
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64;

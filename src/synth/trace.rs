@@ -3,8 +3,8 @@
 use super::hash01;
 use super::object::Object;
 use super::world::World;
-use crate::io::lens::{Lens, Optics};
 use crate::scene::Camera;
+use crate::scenes::lens::{Lens, Optics};
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 use std::collections::BTreeSet;

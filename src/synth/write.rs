@@ -1,16 +1,16 @@
 //! The files of a made scene: COLMAP model, photos, masks with names, objects alone, depth.
 
-use super::object::Object;
-use super::points::Seen;
-
 use super::cameras::cameras;
+use super::object::Object;
+use super::points::{self, Seen};
 use super::trace::{Picture, alone, involved, photograph, picture, repaint};
 use super::world::World;
-use super::{SynthLens, SynthOptions, exposure, lens, points, view_name};
-use crate::io::label_table::{self, LabelEntry, LabelTable};
-use crate::io::lens::Optics;
-use crate::io::{ReadOptions, atomic, image};
+use super::{SynthLens, SynthOptions, exposure, lens, view_name};
+use crate::files::label_table::{self, LabelEntry, LabelTable};
+use crate::files::{atomic, image};
 use crate::scene::Camera;
+use crate::scenes::ReadOptions;
+use crate::scenes::lens::Optics;
 use crate::{Error, Result, Setting};
 use glam::DQuat;
 use rayon::prelude::*;

@@ -3,8 +3,8 @@
 use super::setup::{engine_size, for_photos};
 use super::{StrategyKind, TrainConfig};
 use crate::error::{Result, Setting};
-use crate::io::init;
 use crate::scene::{Dataset, Gaussians, Point};
+use crate::scenes::init;
 use std::borrow::Cow;
 
 /// Random Gaussians for a scene without points: at most this many, and this share of the budget, so that growth chooses

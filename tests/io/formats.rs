@@ -3,7 +3,8 @@
 use super::fixtures::*;
 use crate::support::device::device;
 use labelgs::engine::Engine;
-use labelgs::io::{LabelEntry, LabelTable, LabelType, SpzVersion, WriteOptions, export_model, read_model, write_model};
+use labelgs::files::{LabelEntry, LabelTable};
+use labelgs::formats::{LabelType, SpzVersion, WriteOptions, export_model, read_model, write_model};
 use labelgs::render::{RenderOptions, render};
 use labelgs::scene::Gaussians;
 use std::fs;

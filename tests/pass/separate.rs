@@ -12,8 +12,8 @@ use labelgs::internals::scheduler::plan::Buf;
 use labelgs::internals::shaders::constants::NO_SPLAT;
 use labelgs::internals::train::{StepReport, Trainer};
 use labelgs::internals::verify::selftest::judge;
-use labelgs::io::initial_gaussians;
 use labelgs::run::{LabelRule, TrainConfig};
+use labelgs::scenes::initial_gaussians;
 use labelgs::synth::{Preset, SynthOptions, dataset};
 
 /// Both are f32 sums of the same terms in different order, so they differ by rounding, more so for large terms of

@@ -5,7 +5,7 @@ use labelgs::eval::{Distance, Rendering, evaluate};
 use labelgs::internals::cli::status::exit_status;
 use labelgs::internals::eval::lpips::convolution::{Layer, Planes, convolve, halve};
 use labelgs::internals::eval::lpips::{CHANNELS, STAGES, Weights};
-use labelgs::internals::io::init::initial_gaussians;
+use labelgs::internals::scenes::init::initial_gaussians;
 use labelgs::render::RenderOptions;
 use labelgs::scene::Photo;
 use labelgs::synth::{Preset, SynthOptions, dataset};

@@ -1,10 +1,9 @@
 //! Runs of the program on a small scene, and the files of such runs.
 
 use assert_cmd::Command;
-use labelgs::internals::io::checkpoint_folder;
-use labelgs::internals::io::checkpoint_folder::Found;
+use labelgs::formats::read_model;
+use labelgs::internals::records::checkpoint_folder::{self, Found};
 use labelgs::internals::train::TrainState;
-use labelgs::io::read_model;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Output, Stdio};

@@ -10,8 +10,8 @@ use super::training::{Plan, Row, Rows, SceneOf, program, scene_of};
 use glam::Vec3;
 use image::RgbImage;
 use image::codecs::jpeg::JpegEncoder;
-use labelgs::io::{self, LoadOptions};
 use labelgs::scene::ColourMatrix;
+use labelgs::scenes::{self, LoadOptions};
 use labelgs::synth::{self, SynthOptions};
 use labelgs::{Error, Result};
 use serde_json::json;
@@ -127,7 +127,7 @@ fn written(
         let file = file.ok_or_else(|| Error::data(&from, "", format!("has no {name}; expected a model of COLMAP")))?;
         fs::copy(&file, sparse.join(file.file_name().unwrap_or_default())).map_err(Error::read(&file))?;
     }
-    for view in io::open(&capture.path, &LoadOptions { photos: false, ..LoadOptions::default() })?.all() {
+    for view in scenes::open(&capture.path, &LoadOptions { photos: false, ..LoadOptions::default() })?.all() {
         let path = pictures.join(format!("{}.rgb.png", view.stem()));
         let mut picture = image::open(&path).map_err(|error| Error::data(&path, "", error.to_string()))?.to_rgb8();
         if let Some(matrix) = matrices.get(&view.name) {

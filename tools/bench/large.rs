@@ -3,9 +3,9 @@
 use super::Common;
 use super::measure::{table, write_json};
 use glam::{DMat3, DVec3};
-use labelgs::internals::io::atomic;
-use labelgs::internals::io::camera_json::CameraFile;
-use labelgs::io::write_model;
+use labelgs::formats::write_model;
+use labelgs::internals::files::atomic;
+use labelgs::internals::scenes::camera_json::CameraFile;
 use labelgs::scene::{Camera, Gaussians};
 use labelgs::{Error, Result};
 use rand::rngs::SmallRng;

@@ -1,11 +1,10 @@
 //! Time from the start of the program to its first picture, with empty and with filled caches.
 
-use super::measure::median;
-use super::measure::write_json;
+use super::measure::{median, write_json};
 use super::{Common, memory};
-use labelgs::internals::io::atomic;
-use labelgs::internals::io::camera_json::CameraFile;
-use labelgs::io::write_model;
+use labelgs::formats::write_model;
+use labelgs::internals::files::atomic;
+use labelgs::internals::scenes::camera_json::CameraFile;
 use labelgs::{Error, Result};
 use serde_json::json;
 use std::path::Path;

@@ -3,9 +3,9 @@
 use super::measure::{median, quantile, require, table, write_json};
 use super::trained::{TEST_EVERY, start, trainer, without_masks};
 use super::{Common, device};
-use labelgs::internals::io::camera_json::CameraFile;
+use labelgs::formats::write_model;
+use labelgs::internals::scenes::camera_json::CameraFile;
 use labelgs::internals::synth;
-use labelgs::io::write_model;
 use labelgs::run::TrainConfig;
 use labelgs::synth::SynthOptions;
 use labelgs::{Error, Result};
@@ -80,7 +80,7 @@ pub fn run(common: &Common) -> Result<()> {
 
 /// Cameras on a small arc around the first view of a scene, for pictures of a size.
 fn orbit(scene: &Path, (width, height): (u32, u32), count: u32) -> Result<Vec<Value>> {
-    let dataset = labelgs::io::open(scene, &labelgs::io::LoadOptions::default())?;
+    let dataset = labelgs::scenes::open(scene, &labelgs::scenes::LoadOptions::default())?;
     let view = dataset.train.first().ok_or_else(|| Error::Bug("the scene has no view".to_owned()))?;
     let mut whole = view.camera.clone();
     let scale = f64::from(width) / f64::from(whole.width);

@@ -6,11 +6,11 @@ mod table;
 
 use super::args::JsonFlag;
 use super::context::Context;
-use super::eval::EvalArgs;
+use super::eval::{self, EvalArgs};
 use super::train_args::TrainFlags;
-use super::{eval, interrupt, stdout, train};
+use super::{interrupt, stdout, train};
 use crate::eval::scores::{MeanScores, Scores};
-use crate::io::atomic;
+use crate::files::atomic;
 use crate::run::{Settings, report};
 use crate::{Error, Result};
 use clap::{Args, FromArgMatches};

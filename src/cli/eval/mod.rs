@@ -12,7 +12,7 @@ pub(super) use own::score;
 use super::context::Context;
 use super::stdout;
 use crate::Result;
-use crate::io::atomic::write_json;
+use crate::files::atomic::write_json;
 
 /// Scores a model.
 pub(crate) fn run(args: &EvalArgs, context: &Context) -> Result<()> {

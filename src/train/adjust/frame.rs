@@ -1,6 +1,6 @@
 //! A photo with the depths of the model.
 
-use crate::io::resize::shrink_photo;
+use crate::files::resize::shrink_photo;
 use crate::render::Rendered;
 use crate::scene::{Camera, Photo};
 

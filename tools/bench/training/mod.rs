@@ -18,7 +18,7 @@ pub use against::scene_of;
 use curve::{Curve, Sample, reached};
 use labelgs::gpu::{Gpu, GpuOptions, PipelineStore};
 use labelgs::internals::synth;
-use labelgs::io::PipelineFolder;
+use labelgs::records::PipelineFolder;
 use labelgs::run::TrainConfig;
 use labelgs::scene::Dataset;
 use labelgs::synth::SynthOptions;
