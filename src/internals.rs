@@ -23,17 +23,6 @@ pub mod cli {
         pub use crate::cli::wording::flag;
     }
 }
-pub mod edit {
-    pub mod choose {
-        pub use crate::edit::choose::{candidates, choose_labels, require_labels};
-    }
-    pub mod components {
-        pub use crate::edit::components::components;
-    }
-    pub mod rename {
-        pub use crate::edit::rename::{give_name, keep, renumber, split};
-    }
-}
 pub mod engine {
     pub use crate::engine::growth::capacity;
     pub use crate::engine::run::{ListKey, Report};
@@ -78,37 +67,6 @@ pub mod eval {
         pub use crate::eval::ssim8::{ssim8, to_bytes};
     }
 }
-pub mod files {
-    pub mod atomic {
-        pub use crate::files::atomic::{remove_stale, write};
-    }
-    pub mod image {
-        pub use crate::files::image::{
-            photo_size, read_grey, read_photo, read_rgba, write_exr_rgb, write_exr_y, write_png_grey8,
-            write_png_grey16, write_png_rgb8,
-        };
-    }
-    pub mod label_table {
-        pub use crate::files::label_table::FILE;
-    }
-    pub mod read {
-        pub use crate::files::read::text;
-    }
-    pub mod run_folder {
-        pub use crate::files::run_folder::{CONFIG, Lock, of_model};
-    }
-}
-pub mod formats {
-    pub use crate::formats::{LazyModel, ModelRef, StoredModel, read_model, write_model};
-}
-pub mod masks {
-    pub mod check {
-        pub use crate::masks::check::{Look, findings};
-    }
-    pub mod mask {
-        pub use crate::masks::mask::read_mask;
-    }
-}
 pub mod records {
     pub mod block_file {
         pub use crate::records::block_file::{BlockFile, BlocksFile};
@@ -118,29 +76,6 @@ pub mod records {
     }
     pub mod checkpoint_folder {
         pub use crate::records::checkpoint_folder::{Found, keep, list, next};
-    }
-}
-pub mod scenes {
-    pub use crate::scenes::{initial_gaussians, open};
-    pub mod camera_json {
-        pub use crate::scenes::camera_json::{CameraFile, read_camera, write_cameras};
-    }
-    pub mod init {
-        pub use crate::scenes::init::{add_far_gaussians, initial_gaussians};
-    }
-    pub mod lens {
-        pub use crate::scenes::lens::{
-            Division, Equirectangular, Eucm, Fisheye, Fov, Lens, Optics, Polynomial, Projection, RadTan,
-        };
-    }
-    pub mod points {
-        pub use crate::scenes::points::read_points;
-    }
-    pub mod truth {
-        pub use crate::scenes::truth::{files_below, read_truth};
-    }
-    pub mod window {
-        pub use crate::scenes::window::{Window, ids_of_photo, windows};
     }
 }
 pub mod label {
@@ -212,12 +147,6 @@ pub mod shaders {
     pub mod structs {
         pub use crate::shaders::structs::{Counters, StepUniforms};
     }
-}
-pub mod synth {
-    pub use crate::synth::cameras::{cameras, ring_of_cameras};
-    pub use crate::synth::trace::{Picture, alone, photograph, picture};
-    pub use crate::synth::world::World;
-    pub use crate::synth::{dataset, write};
 }
 pub mod train {
     pub use crate::train::setup::{TrainerOptions, engine_size};

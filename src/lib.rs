@@ -69,39 +69,35 @@
 pub mod blocks;
 #[cfg(feature = "cli")]
 mod cli;
-pub mod edit;
 pub mod engine;
-mod error;
 pub mod eval;
-pub mod files;
-pub mod formats;
 pub mod gpu;
 pub mod guide;
 #[doc(hidden)]
 pub mod internals;
-mod lab;
 pub mod label;
-pub mod masks;
-mod options;
 mod pass;
 pub mod records;
 pub mod render;
-mod report;
 pub mod run;
-pub mod scene;
-pub mod scenes;
 mod scheduler;
 mod shaders;
-mod stage;
-pub mod synth;
 mod train;
 mod verify;
 mod version;
 #[cfg(feature = "viewer")]
 pub mod viewer;
-mod words;
 
-pub use error::{Error, Result, Setting};
+pub use labelgs_edit as edit;
+pub use labelgs_files as files;
+pub use labelgs_formats as formats;
+pub use labelgs_masks as masks;
+pub use labelgs_scene::{self as scene, Error, Result, Setting};
+pub use labelgs_scenes as scenes;
+pub use labelgs_synth as synth;
+
+use labelgs_report as report;
+use labelgs_scene::{error, lab, options, stage, words};
 
 /// The programs of README.md compile.
 #[cfg(doctest)]

@@ -5,12 +5,12 @@ use crate::support::device::{Turn, device};
 use image::{Rgba, RgbaImage};
 use labelgs::engine::Engine;
 use labelgs::internals::scheduler::SchedulerOptions;
-use labelgs::internals::synth;
 use labelgs::internals::train::{TrainState, Trainer, first_model};
 use labelgs::render::{RenderOptions, render};
 use labelgs::run::{ExposureMode, TrainConfig};
 use labelgs::scene::{Dataset, Gaussians, Photo, View};
 use labelgs::scenes::{self, LoadOptions};
+use labelgs::synth;
 use labelgs::synth::{Preset, SynthOptions};
 use std::fs;
 

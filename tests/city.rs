@@ -1,8 +1,8 @@
 //! The made city: many objects, too large for one photo, and seen by several photos everywhere.
 
 use labelgs::files::LabelTable;
-use labelgs::internals::synth::{self, World, cameras, picture};
 use labelgs::scene::Camera;
+use labelgs::synth::{self, World, cameras, picture};
 use labelgs::synth::{Preset, SynthOptions};
 use std::collections::BTreeSet;
 

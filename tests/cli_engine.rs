@@ -98,7 +98,7 @@ fn scene(folder: &Path) -> String {
 /// Width and height of the photos of a made scene.
 fn image_size(scene: &str) -> Value {
     let first = Path::new(scene).join("images/000.png");
-    let (width, height) = labelgs::internals::files::image::photo_size(&first).expect("a photo");
+    let (width, height) = labelgs::files::image::photo_size(&first).expect("a photo");
     serde_json::json!([width, height])
 }
 
@@ -239,7 +239,7 @@ fn a_made_scene_is_trained_scored_edited_and_rendered() {
         let mask = labelgs::masks::read_mask(format!("{masks}/{view}.png")).expect("a mask");
         let bytes: Vec<u8> = mask.ids.iter().map(|&id| if id == object { 255 } else { 0 }).collect();
         let file = format!("{truth}/{view}/{object}.png");
-        labelgs::internals::files::image::write_png_grey8(file, mask.width, mask.height, &bytes).expect("written");
+        labelgs::files::image::write_png_grey8(file, mask.width, mask.height, &bytes).expect("written");
     }
     let by_name = ["eval", &out, "--scene", &scene, "--protocol", "lerf-mask", "--truth", &truth, "--page", &page];
     let found = json(&succeeds(&[&by_name[..], &["--json"]].concat()));

@@ -1,11 +1,11 @@
 //! Lenses: their formulas, and a made scene photographed through each of them.
 
 use glam::{DVec2, DVec3};
-use labelgs::internals::scenes::lens::{Division, Eucm, Fisheye, Fov, Lens, Optics, Polynomial, Projection, RadTan};
-use labelgs::internals::scenes::window::{Window, ids_of_photo, windows};
-use labelgs::internals::synth::{self, World, photograph, picture};
 use labelgs::scene::{Camera, Dataset, LabelMap, View};
 use labelgs::scenes::LoadOptions;
+use labelgs::scenes::lens::{Division, Eucm, Fisheye, Fov, Lens, Optics, Polynomial, Projection, RadTan};
+use labelgs::scenes::window::{Window, ids_of_photo, windows};
+use labelgs::synth::{self, World, photograph, picture};
 use labelgs::synth::{Preset, SynthLens, SynthOptions};
 use std::collections::BTreeSet;
 use std::f64::consts::FRAC_PI_2;

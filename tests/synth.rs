@@ -2,10 +2,10 @@
 
 use labelgs::files::LabelTable;
 use labelgs::internals::cli::status::exit_status;
-use labelgs::internals::synth::{self, Picture, World, alone, picture, ring_of_cameras};
 use labelgs::masks::read_mask;
 use labelgs::scene::Camera;
 use labelgs::scenes::LoadOptions;
+use labelgs::synth::{self, Picture, World, alone, picture, ring_of_cameras};
 use labelgs::synth::{Preset, SynthOptions};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};

@@ -1,13 +1,13 @@
 //! One error for many files.
 
-use crate::error::{Error, Result};
+use labelgs_scene::{Error, Result};
 use std::path::Path;
 
 /// Most problems that one message lists.
-pub(crate) const LISTED_MAX: usize = 20;
+pub const LISTED_MAX: usize = 20;
 
 /// Returns the loaded views, or one error that lists all failures.
-pub(crate) fn all_or_one_error<T>(root: &Path, loaded: Vec<Result<T>>) -> Result<Vec<T>> {
+pub fn all_or_one_error<T>(root: &Path, loaded: Vec<Result<T>>) -> Result<Vec<T>> {
     let total = loaded.len();
     let mut views = Vec::with_capacity(total);
     let mut errors = Vec::new();

@@ -2,15 +2,15 @@
 //! incomplete last line, which readers drop.
 
 use super::atomic::Fallible;
-use crate::error::{Error, Result};
-use crate::lab::fault;
+use labelgs_scene::lab::fault;
+use labelgs_scene::{Error, Result};
 use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
 /// The open file. Its writes end with whole lines, or leave it as it was.
 #[derive(Debug)]
-pub(crate) struct Lines {
+pub struct Lines {
     path: PathBuf,
     file: File,
     bytes: u64,
@@ -18,7 +18,7 @@ pub(crate) struct Lines {
 
 impl Lines {
     /// Opens or makes a file and keeps its first `bytes`.
-    pub(crate) fn open(path: &Path, bytes: u64) -> Result<Self> {
+    pub fn open(path: &Path, bytes: u64) -> Result<Self> {
         let open = || {
             fault::of_file("write")?;
             let file = File::options().create(true).truncate(false).read(true).write(true).open(path)?;
@@ -30,14 +30,14 @@ impl Lines {
     }
 
     /// Cuts the file to its first `bytes`.
-    pub(crate) fn cut(&mut self, bytes: u64) -> Result<()> {
+    pub fn cut(&mut self, bytes: u64) -> Result<()> {
         self.file.set_len(bytes).map_err(Error::write(&self.path))?;
         self.bytes = bytes;
         Ok(())
     }
 
     /// Adds a line with one write, so that other programs see it at once.
-    pub(crate) fn add(&mut self, line: &str) -> Result<()> {
+    pub fn add(&mut self, line: &str) -> Result<()> {
         let text = format!("{line}\n");
         let written = self.at_end().and_then(|()| Fallible(&self.file).write_all(text.as_bytes()));
         if let Err(error) = written {
@@ -50,7 +50,7 @@ impl Lines {
     }
 
     /// Waits until all lines are on the disk. If the file was deleted meanwhile, makes it again.
-    pub(crate) fn sync(&mut self) -> Result<()> {
+    pub fn sync(&mut self) -> Result<()> {
         let mut all = || {
             if !self.path.exists() {
                 self.file.seek(SeekFrom::Start(0))?;

@@ -2,8 +2,8 @@
 
 #![expect(clippy::disallowed_methods, reason = "the place that opens files for writing")]
 
-use crate::error::{Error, Result};
-use crate::lab::fault;
+use labelgs_scene::lab::fault;
+use labelgs_scene::{Error, Result};
 use std::collections::BTreeSet;
 use std::fs::{self, File};
 use std::io::{self, BufWriter, Write};
@@ -22,14 +22,15 @@ pub fn write(path: impl AsRef<Path>, body: impl FnOnce(&mut dyn Write) -> io::Re
     write_inner(path, body).map_err(Error::write(path))
 }
 
-pub(crate) fn write_json(path: &Path, value: &impl serde::Serialize) -> Result<()> {
+/// Writes a value as JSON with indentation, atomically.
+pub fn write_json(path: &Path, value: &impl serde::Serialize) -> Result<()> {
     let text = serde_json::to_string_pretty(value).map_err(|error| Error::Bug(format!("JSON: {error}")))?;
     write(path, |out| out.write_all(text.as_bytes()))
 }
 
 /// Refuses a folder that is not empty: a reader would take old and new files for one set. A missing folder is fine.
 /// `argument` is the flag that named it.
-pub(crate) fn require_empty(argument: &str, folder: &Path) -> Result<()> {
+pub fn require_empty(argument: &str, folder: &Path) -> Result<()> {
     match fs::read_dir(folder) {
         Ok(mut entries) => match entries.next() {
             Some(_) => Err(Error::usage(argument, format!("{} is not empty; name a new folder", folder.display()))),
@@ -103,7 +104,7 @@ fn fill(file: &File, body: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> io:
 }
 
 /// A file whose writes can be made to fail, for tests.
-pub(crate) struct Fallible<'a>(pub(crate) &'a File);
+pub struct Fallible<'a>(pub &'a File);
 
 impl Write for Fallible<'_> {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {

@@ -2,17 +2,16 @@
 
 use super::image::{PIXELS_MAX, check_length, check_png_length, check_size};
 use super::{npy, read};
-use crate::error::{Error, Result};
-use crate::scene::DepthMap;
 use exr::prelude::{MetaData, ReadChannels, ReadLayers};
+use labelgs_scene::{DepthMap, Error, Result};
 use std::io::Cursor;
 use std::path::Path;
 
 /// Extensions of depth files in order of preference. PNG is last, because it is often only a picture of the other file.
-pub(crate) const EXTENSIONS: [&str; 4] = ["exr", "npy", "pfm", "png"];
+pub const EXTENSIONS: [&str; 4] = ["exr", "npy", "pfm", "png"];
 
 /// Reads a depth map; the extension gives the format.
-pub(crate) fn read_depth(path: &Path) -> Result<DepthMap> {
+pub fn read_depth(path: &Path) -> Result<DepthMap> {
     let extension = path.extension().map(|extension| extension.to_string_lossy().to_lowercase()).unwrap_or_default();
     match extension.as_str() {
         "png" => read_png(path),

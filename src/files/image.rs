@@ -1,19 +1,18 @@
 //! Image files: reads photos, writes PNG and EXR.
 
 use super::{atomic, kind, read};
-use crate::error::{Error, Result};
-use crate::scene::Photo;
-use crate::scene::view::alpha_of;
 use exr::prelude::{AnyChannel, AnyChannels, Encoding, FlatSamples, Image, Layer, LayerAttributes, WritableImage};
 use image::{ImageDecoder, ImageReader};
+use labelgs_scene::view::alpha_of;
+use labelgs_scene::{Error, Photo, Result};
 use std::io::{BufRead, Cursor, ErrorKind, Seek};
 use std::path::Path;
 
 /// Most pixels of an image. Larger ones are refused before decoding.
-pub(crate) const PIXELS_MAX: u64 = 1 << 28;
+pub const PIXELS_MAX: u64 = 1 << 28;
 
 /// Refuses sizes of 0 or above [`PIXELS_MAX`].
-pub(crate) fn check_size(path: &Path, (width, height): (u32, u32)) -> Result<()> {
+pub fn check_size(path: &Path, (width, height): (u32, u32)) -> Result<()> {
     let pixels = u64::from(width) * u64::from(height);
     if pixels == 0 || pixels > PIXELS_MAX {
         let problem = format!("{width} x {height} px; between 1 and {PIXELS_MAX} pixels are supported");
@@ -29,13 +28,13 @@ const DEFLATE_MAX: u64 = 1032;
 const SAMPLES_MAX: u64 = 8192;
 
 /// Refuses a PNG with `bits` per pixel whose file is too short for its pixels, before memory is allocated.
-pub(crate) fn check_png_length(path: &Path, (width, height): (u32, u32), bits: u32) -> Result<()> {
+pub fn check_png_length(path: &Path, (width, height): (u32, u32), bits: u32) -> Result<()> {
     let bytes = (u64::from(width) * u64::from(bits)).div_ceil(8) * u64::from(height);
     if bytes <= (file_length(path)? + 64) * DEFLATE_MAX { Ok(()) } else { Err(too_short(path, (width, height))) }
 }
 
 /// Refuses a file that is too short for its pixels with `channels` samples each, whatever the compression.
-pub(crate) fn check_length(path: &Path, (width, height): (u32, u32), channels: u64) -> Result<()> {
+pub fn check_length(path: &Path, (width, height): (u32, u32), channels: u64) -> Result<()> {
     let samples = u64::from(width) * u64::from(height) * channels;
     if samples <= (file_length(path)? + 64) * SAMPLES_MAX { Ok(()) } else { Err(too_short(path, (width, height))) }
 }
@@ -106,7 +105,7 @@ pub fn read_photo(path: impl AsRef<Path>, background: [f32; 3]) -> Result<Photo>
 }
 
 /// Like [`read_photo`] over black, and keeps the opacity of transparent photos.
-pub(crate) fn read_open_photo(path: &Path) -> Result<Photo> {
+pub fn read_open_photo(path: &Path) -> Result<Photo> {
     let mut photo = as_rgba(decode(path)?);
     for texel in &mut photo.rgba {
         let opacity = f64::from(texel[3]) / 255.0;
@@ -166,7 +165,7 @@ pub fn write_png_rgb8(path: impl AsRef<Path>, width: u32, height: u32, pixels: &
 }
 
 /// Writes an 8-bit RGBA PNG with straight alpha; `pixels` is row-major.
-pub(crate) fn write_png_rgba8(path: impl AsRef<Path>, width: u32, height: u32, pixels: &[[u8; 4]]) -> Result<()> {
+pub fn write_png_rgba8(path: impl AsRef<Path>, width: u32, height: u32, pixels: &[[u8; 4]]) -> Result<()> {
     write_png(path.as_ref(), (width, height), png::ColorType::Rgba, png::BitDepth::Eight, bytemuck::cast_slice(pixels))
 }
 
@@ -199,17 +198,17 @@ fn write_png(
 }
 
 /// Returns 8-bit RGB as the bytes of a PNG, compressed as fast as possible.
-pub(crate) fn png_rgb8(size: (u32, u32), pixels: &[[u8; 3]]) -> Result<Vec<u8>> {
+pub fn png_rgb8(size: (u32, u32), pixels: &[[u8; 3]]) -> Result<Vec<u8>> {
     fast_png(size, png::ColorType::Rgb, png::BitDepth::Eight, pixels.as_flattened())
 }
 
 /// Returns 8-bit RGB with opacity as the bytes of a PNG, compressed as fast as possible.
-pub(crate) fn png_rgba8(size: (u32, u32), pixels: &[[u8; 4]]) -> Result<Vec<u8>> {
+pub fn png_rgba8(size: (u32, u32), pixels: &[[u8; 4]]) -> Result<Vec<u8>> {
     fast_png(size, png::ColorType::Rgba, png::BitDepth::Eight, pixels.as_flattened())
 }
 
 /// Returns 16-bit grey as the bytes of a PNG, compressed as fast as possible.
-pub(crate) fn png_grey16(size: (u32, u32), pixels: &[u16]) -> Result<Vec<u8>> {
+pub fn png_grey16(size: (u32, u32), pixels: &[u16]) -> Result<Vec<u8>> {
     let bytes: Vec<u8> = pixels.iter().flat_map(|value| value.to_be_bytes()).collect();
     fast_png(size, png::ColorType::Grayscale, png::BitDepth::Sixteen, &bytes)
 }
@@ -233,7 +232,7 @@ fn fast_png(
 }
 
 /// Returns 8-bit RGB as the bytes of a JPEG, for slow lines.
-pub(crate) fn jpeg_rgb8((width, height): (u32, u32), pixels: &[[u8; 3]], quality: u8) -> Result<Vec<u8>> {
+pub fn jpeg_rgb8((width, height): (u32, u32), pixels: &[[u8; 3]], quality: u8) -> Result<Vec<u8>> {
     let mut out = Vec::new();
     let written = image::codecs::jpeg::JpegEncoder::new_with_quality(&mut out, quality).encode(
         pixels.as_flattened(),
@@ -257,7 +256,7 @@ pub fn write_exr_y(path: impl AsRef<Path>, width: u32, height: u32, pixels: &[f3
 }
 
 /// Writes 32-bit unsigned integers as an EXR with one channel `Y`.
-pub(crate) fn write_exr_uint(path: impl AsRef<Path>, width: u32, height: u32, pixels: &[u32]) -> Result<()> {
+pub fn write_exr_uint(path: impl AsRef<Path>, width: u32, height: u32, pixels: &[u32]) -> Result<()> {
     write_exr(path.as_ref(), (width, height), vec![("Y", FlatSamples::U32(pixels.to_vec()))])
 }
 

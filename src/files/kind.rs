@@ -1,7 +1,7 @@
 //! What a file is, by its first bytes: for messages on files that hold something else than their name says.
 
 use super::read;
-use crate::error::{Error, Result};
+use labelgs_scene::{Error, Result};
 use std::io::Read;
 use std::path::Path;
 
@@ -10,11 +10,11 @@ const FIRST: u64 = 512;
 
 /// What a file is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Content {
+pub struct Content {
     /// With its article, as in "a Git LFS pointer".
-    pub(crate) what: &'static str,
+    pub what: &'static str,
     /// What to do to get a photo or a model from it. Empty for what is a photo or a model itself.
-    pub(crate) cure: &'static str,
+    pub cure: &'static str,
 }
 
 const PHOTO: &str = "";
@@ -105,7 +105,7 @@ const TEXT: [(&str, &str, &str); 6] = [
 ];
 
 /// Returns what a file with these first bytes is, if they tell; `first` is empty for an empty file only.
-pub(crate) fn name_of_content(first: &[u8]) -> Option<Content> {
+pub fn name_of_content(first: &[u8]) -> Option<Content> {
     if first.is_empty() {
         return Some(Content { what: "an empty file", cure: AGAIN });
     }
@@ -127,7 +127,7 @@ pub(crate) fn name_of_content(first: &[u8]) -> Option<Content> {
 }
 
 /// Returns what the file at `path` is, if its first bytes tell.
-pub(crate) fn of_file(path: &Path) -> Result<Option<Content>> {
+pub fn of_file(path: &Path) -> Result<Option<Content>> {
     let mut first = Vec::new();
     read::open(path)?.take(FIRST).read_to_end(&mut first).map_err(Error::read(path))?;
     Ok(name_of_content(&first))
@@ -135,7 +135,7 @@ pub(crate) fn of_file(path: &Path) -> Result<Option<Content>> {
 
 impl Content {
     /// The clause of an error on a file that should be something else, such as "a photo": what it is, and the cure.
-    pub(crate) fn told(self, expected: &str) -> String {
+    pub fn told(self, expected: &str) -> String {
         let Self { what, cure } = self;
         let cure = if cure.is_empty() { OTHER } else { cure };
         format!("is {what}, not {expected}; {cure}")

@@ -3,8 +3,8 @@
 //! It lies in a folder of masks, in the folder of a run, or beside a single PLY as `NAME.labels.json`.
 
 use super::{atomic, read, run_folder};
-use crate::error::{Error, Result};
-use crate::scene::labels::{LABEL_MAX, MODEL_LABEL_MAX, label_colour};
+use labelgs_scene::labels::{LABEL_MAX, MODEL_LABEL_MAX, label_colour};
+use labelgs_scene::{Error, Result};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::collections::{BTreeMap, BTreeSet};
@@ -20,7 +20,7 @@ fn schema_version() -> u32 {
 }
 
 /// Returns `name`, with the first number appended that makes it unique.
-pub(crate) fn unique_name(name: String, taken: &mut BTreeSet<String>) -> String {
+pub fn unique_name(name: String, taken: &mut BTreeSet<String>) -> String {
     let numbered = (2..).map(|number| format!("{name} {number}"));
     let free = std::iter::once(name.clone()).chain(numbered).find(|name| !taken.contains(name)).unwrap_or(name);
     taken.insert(free.clone());
@@ -106,14 +106,14 @@ impl LabelTable {
     }
 
     /// Like [`Self::read`], from bytes of the file `path`.
-    pub(crate) fn parse(path: &Path, text: &[u8]) -> Result<Self> {
+    pub fn parse(path: &Path, text: &[u8]) -> Result<Self> {
         let expected =
             r#"expected {"labels": [{"id": 1, "name": "cup"}]}, where "colour": [r, g, b] from 0 to 255 may be added"#;
         read::parse_json::<Self>(path, text, expected)?.checked(path)
     }
 
     /// Returns the table sorted, if it obeys the rules of [`Self::read`]; `path` is the file it is from.
-    pub(crate) fn checked(&self, path: &Path) -> Result<Self> {
+    pub fn checked(&self, path: &Path) -> Result<Self> {
         if self.schema_version != SCHEMA_VERSION {
             let problem = format!("has version {}, labelgs reads {SCHEMA_VERSION}", self.schema_version);
             return Err(Error::data(path, "schema_version", problem));

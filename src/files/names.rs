@@ -4,7 +4,7 @@
 //! the file has. A folder that was copied to Linux then has files that are there and are not found.
 
 use super::read;
-use crate::error::Result;
+use labelgs_scene::Result;
 use std::collections::{BTreeSet, HashMap};
 use std::path::Path;
 use unicode_normalization::UnicodeNormalization;
@@ -16,18 +16,18 @@ const DEPTH_MAX: usize = 8;
 const SHOWN_MAX: usize = 4;
 
 /// Returns the key by which two spellings of one name match: composed, in lower case.
-pub(crate) fn folded(name: &str) -> String {
+pub fn folded(name: &str) -> String {
     name.nfc().collect::<String>().to_lowercase()
 }
 
 /// Returns the first few names, for messages.
-pub(crate) fn shortened(names: &[impl AsRef<str>]) -> String {
+pub fn shortened(names: &[impl AsRef<str>]) -> String {
     let shown = names.iter().take(SHOWN_MAX).map(AsRef::as_ref).collect::<Vec<&str>>().join(", ");
     if names.len() > SHOWN_MAX { format!("{shown}, ...") } else { shown }
 }
 
 /// Lists the files below a folder, sorted, by relative path with `/`. Hidden files are left out.
-pub(crate) fn below(root: &Path) -> Result<Vec<String>> {
+pub fn below(root: &Path) -> Result<Vec<String>> {
     let mut found = Vec::new();
     walk(root, "", 0, &mut found)?;
     found.sort();
@@ -51,7 +51,7 @@ fn walk(folder: &Path, prefix: &str, depth: usize, found: &mut Vec<String>) -> R
 
 /// Returns for each owner the first of its keys that is in `there`; for an owner without one, the only name in `there`
 /// that matches a key of this owner alone.
-pub(crate) fn claim(keys: &[Vec<String>], there: &BTreeSet<&str>) -> Vec<Option<String>> {
+pub fn claim(keys: &[Vec<String>], there: &BTreeSet<&str>) -> Vec<Option<String>> {
     let exact = |keys: &Vec<String>| keys.iter().find(|key| there.contains(key.as_str())).cloned();
     let mut found: Vec<Option<String>> = keys.iter().map(exact).collect();
     if found.iter().all(Option::is_some) {
@@ -72,14 +72,14 @@ pub(crate) fn claim(keys: &[Vec<String>], there: &BTreeSet<&str>) -> Vec<Option<
 
 /// The files of a folder, found by their name or, if no file has it, by the only name that matches.
 #[derive(Debug, Default)]
-pub(crate) struct Names {
+pub struct Names {
     /// The name of each key; `None` if several files share the key.
     by_key: HashMap<String, Option<String>>,
 }
 
 impl Names {
     /// Returns the file that matches `name` alone.
-    pub(crate) fn only(&self, name: &str) -> Option<&str> {
+    pub fn only(&self, name: &str) -> Option<&str> {
         self.by_key.get(&folded(name))?.as_deref()
     }
 }

@@ -3,12 +3,12 @@
 
 use super::image::PIXELS_MAX;
 use super::read;
-use crate::error::{Error, Result};
+use labelgs_scene::{Error, Result};
 use std::path::Path;
 
 /// Reads an array of `N` dimensions: its shape and values. `what` names the content in messages, `axes` the shape that
 /// it should have.
-pub(crate) fn read<const N: usize>(path: &Path, what: &str, axes: &str) -> Result<([usize; N], Vec<f64>)> {
+pub fn read<const N: usize>(path: &Path, what: &str, axes: &str) -> Result<([usize; N], Vec<f64>)> {
     let refuse = |cause: &str| Error::data(path, "", format!("is not a readable NPY {what}: {cause}"));
     let bytes = read::bytes(path)?;
     let parts = || {

@@ -1,25 +1,27 @@
-//! File reading. Every reader opens and reads files through this module, so that [faults](crate::lab::fault) reach all
+//! File reading. Every reader opens and reads files through this module, so that [faults](labelgs_scene::lab::fault) reach all
 //! of them.
 
 #![expect(clippy::disallowed_methods, reason = "the place that opens files for reading")]
 
-use crate::error::{Error, Result};
-use crate::lab::fault;
+use labelgs_scene::lab::fault;
+use labelgs_scene::{Error, Result};
 use serde::de::DeserializeOwned;
 use std::fs::{self, File};
 use std::io::{self, BufReader, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
+/// An open file whose reads can be made to fail on purpose.
 #[derive(Debug)]
-pub(crate) struct Source(File);
+pub struct Source(File);
 
 impl Source {
     /// Reads a file that is open already.
-    pub(crate) fn of(file: File) -> Self {
+    pub fn of(file: File) -> Self {
         Self(file)
     }
 
-    pub(crate) fn length(&self) -> io::Result<u64> {
+    /// Returns the size of the file, bytes.
+    pub fn length(&self) -> io::Result<u64> {
         Ok(self.0.metadata()?.len())
     }
 }
@@ -52,12 +54,14 @@ fn source(path: &Path) -> io::Result<Source> {
     Ok(Source(File::open(path)?))
 }
 
-pub(crate) fn open(path: &Path) -> Result<BufReader<Source>> {
+/// Opens a file to read with a buffer.
+pub fn open(path: &Path) -> Result<BufReader<Source>> {
     let file = source(path).map_err(Error::read(path))?;
     Ok(BufReader::with_capacity(1 << 16, file))
 }
 
-pub(crate) fn bytes(path: &Path) -> Result<Vec<u8>> {
+/// Reads a whole file.
+pub fn bytes(path: &Path) -> Result<Vec<u8>> {
     let all = || {
         let mut file = source(path)?;
         let mut bytes = Vec::new();
@@ -68,7 +72,7 @@ pub(crate) fn bytes(path: &Path) -> Result<Vec<u8>> {
 }
 
 /// Removes the mark that editors of Windows write before UTF-8 text; refuses that of UTF-16.
-pub(crate) fn without_mark(path: &Path, text: &mut Vec<u8>) -> Result<()> {
+pub fn without_mark(path: &Path, text: &mut Vec<u8>) -> Result<()> {
     const MARK: &[u8] = b"\xEF\xBB\xBF";
     if text.starts_with(b"\xFF\xFE") || text.starts_with(b"\xFE\xFF") {
         return Err(Error::data(path, "", "is UTF-16 text; save it as UTF-8"));
@@ -89,12 +93,12 @@ pub fn text(path: &Path) -> Result<String> {
 }
 
 /// Reads a file of JSON. `expected` says in errors what it should hold.
-pub(crate) fn json<T: DeserializeOwned>(path: &Path, expected: &str) -> Result<T> {
+pub fn json<T: DeserializeOwned>(path: &Path, expected: &str) -> Result<T> {
     parse_json(path, text(path)?.as_bytes(), expected)
 }
 
 /// The same from the bytes of a file.
-pub(crate) fn parse_json<T: DeserializeOwned>(path: &Path, text: &[u8], expected: &str) -> Result<T> {
+pub fn parse_json<T: DeserializeOwned>(path: &Path, text: &[u8], expected: &str) -> Result<T> {
     serde_json::from_slice(text).map_err(|error| {
         let text = error.to_string();
         let (problem, _) = text.rsplit_once(" at line ").unwrap_or((&text, ""));
@@ -105,7 +109,7 @@ pub(crate) fn parse_json<T: DeserializeOwned>(path: &Path, text: &[u8], expected
 }
 
 /// Lists the paths in a folder, in no particular order.
-pub(crate) fn folder(path: &Path) -> Result<Vec<PathBuf>> {
+pub fn folder(path: &Path) -> Result<Vec<PathBuf>> {
     let all = || {
         fault::of_file("read")?;
         fs::read_dir(path)?.map(|entry| Ok(entry?.path())).collect::<io::Result<_>>()

@@ -1,11 +1,11 @@
 //! Photos at a smaller size: each pixel is an exact area mean.
 
-use crate::scene::Photo;
+use labelgs_scene::Photo;
 use rayon::prelude::*;
 
 /// Returns the size limited to `longest` px at the longest side. It is the only rounding rule for cameras, photos and
 /// masks.
-pub(crate) fn bounded_size((width, height): (u32, u32), longest: Option<u32>) -> (u32, u32) {
+pub fn bounded_size((width, height): (u32, u32), longest: Option<u32>) -> (u32, u32) {
     let Some(longest) = longest.filter(|&longest| longest < width.max(height)) else { return (width, height) };
     let scale = f64::from(longest) / f64::from(width.max(height));
     let side = |side: u32| ((f64::from(side) * scale).round() as u32).max(1);
@@ -13,7 +13,7 @@ pub(crate) fn bounded_size((width, height): (u32, u32), longest: Option<u32>) ->
 }
 
 /// Returns true if the sizes differ by a scale only: the larger one shrunk to the smaller agrees within 1 px.
-pub(crate) fn same_aspect(a: (u32, u32), b: (u32, u32)) -> bool {
+pub fn same_aspect(a: (u32, u32), b: (u32, u32)) -> bool {
     let along = |from: (u32, u32), to: (u32, u32)| {
         let height = f64::from(from.1) * f64::from(to.0) / f64::from(from.0);
         let width = f64::from(from.0) * f64::from(to.1) / f64::from(from.1);
@@ -38,7 +38,7 @@ fn spans(from: u32, to: u32) -> Vec<(usize, Vec<f64>)> {
 
 /// Shrinks the photo to `width` x `height` px. Each target pixel is the exact area mean over the source pixels with
 /// weight. It has weight if they cover at least half of its area.
-pub(crate) fn shrink_photo(photo: &Photo, width: u32, height: u32) -> Photo {
+pub fn shrink_photo(photo: &Photo, width: u32, height: u32) -> Photo {
     if (width, height) == (photo.width, photo.height) {
         return photo.clone();
     }

@@ -1,15 +1,15 @@
 //! The folder of a training run, found from its model, and its lock.
 
-use crate::error::{Error, Result};
+use labelgs_scene::{Error, Result};
 use std::fs::{File, TryLockError};
 use std::path::{Path, PathBuf};
 
 /// File with the settings of the run, in TOML.
 pub const CONFIG: &str = "config.toml";
 /// Name of the file with the exposures of the photos.
-pub(crate) const EXPOSURES: &str = "exposures.json";
+pub const EXPOSURES: &str = "exposures.json";
 /// Name of the folder with the reconstruction of refined poses.
-pub(crate) const REFINED: &str = "refined";
+pub const REFINED: &str = "refined";
 /// File that is locked while a run writes into the folder.
 const LOCK: &str = ".labelgs-lock";
 

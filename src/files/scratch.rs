@@ -4,7 +4,7 @@
 
 use super::atomic::Fallible;
 use super::read::Source;
-use crate::lab::fault;
+use labelgs_scene::lab::fault;
 use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
@@ -12,11 +12,11 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 
 /// Where bytes begin in the file.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Place(u64);
+pub struct Place(u64);
 
 /// The file; none before the first bytes, and none after a failed write.
 #[derive(Debug)]
-pub(crate) struct Scratch {
+pub struct Scratch {
     folder: PathBuf,
     state: Mutex<State>,
 }
@@ -30,13 +30,13 @@ struct State {
 
 impl Scratch {
     /// Makes one whose file will be in `folder`.
-    pub(crate) fn new(folder: &Path) -> Self {
+    pub fn new(folder: &Path) -> Self {
         Self { folder: folder.to_owned(), state: Mutex::default() }
     }
 
     /// Writes bytes at the end. `None` if the disk does not take them: then the file gives all of its space back, which the
     /// results of a run need more, and nothing is written any more. `otherwise` tells the user what happens then.
-    pub(crate) fn put(&self, bytes: &[u8], otherwise: &str) -> Option<Place> {
+    pub fn put(&self, bytes: &[u8], otherwise: &str) -> Option<Place> {
         let mut state = self.lock();
         if state.is_given_up {
             return None;
@@ -53,7 +53,7 @@ impl Scratch {
     }
 
     /// Reads what was put at a place.
-    pub(crate) fn read(&self, place: Place, into: &mut [u8]) -> io::Result<()> {
+    pub fn read(&self, place: Place, into: &mut [u8]) -> io::Result<()> {
         // Reads take turns, because the file has one position.
         let state = self.lock();
         let file = state.file.as_ref().ok_or_else(|| io::Error::other("there is no file"))?;
@@ -63,7 +63,7 @@ impl Scratch {
     }
 
     /// Returns true after a failed write.
-    pub(crate) fn is_given_up(&self) -> bool {
+    pub fn is_given_up(&self) -> bool {
         self.lock().is_given_up
     }
 
@@ -73,7 +73,7 @@ impl Scratch {
 }
 
 /// Returns the folder of the system for large temporary files: that of the environment, else the one on a disk.
-pub(crate) fn system_folder() -> PathBuf {
+pub fn system_folder() -> PathBuf {
     let on_disk = Path::new("/var/tmp");
     if std::env::var_os("TMPDIR").is_none() && on_disk.is_dir() { on_disk.to_owned() } else { std::env::temp_dir() }
 }

@@ -1,9 +1,8 @@
 //! The interface of model file formats.
 
-use crate::error::Result;
-use crate::files::label_table::LabelTable;
-use crate::scene::Gaussians;
 use glam::DVec3;
+use labelgs_files::label_table::LabelTable;
+use labelgs_scene::{Gaussians, Result};
 use serde::{Deserialize, Serialize};
 use std::io::{self, Write};
 use std::path::Path;
@@ -87,12 +86,7 @@ pub struct Export<'a> {
 
 impl<'a> Export<'a> {
     /// Makes an export of the finite rows.
-    pub(crate) fn new(
-        model: &'a Gaussians,
-        rows: &'a [usize],
-        names: Option<&'a LabelTable>,
-        options: WriteOptions,
-    ) -> Self {
+    pub fn new(model: &'a Gaussians, rows: &'a [usize], names: Option<&'a LabelTable>, options: WriteOptions) -> Self {
         let is_rounded = |&row: &usize| model.world(row) != model.world(row).as_vec3().as_dvec3();
         let is_far = model.origin != DVec3::ZERO && rows.iter().any(is_rounded);
         Self { model, rows, names, origin: if is_far { model.origin } else { DVec3::ZERO }, options }
@@ -122,12 +116,12 @@ impl<'a> Export<'a> {
 
 /// A model file format.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct ModelFormat {
+pub struct ModelFormat {
     /// Display name.
     pub name: &'static str,
     /// Extensions of its files: lower case, with the dot.
     pub endings: &'static [&'static str],
-    /// Reads a file, through `crate::files::read`.
+    /// Reads a file, through `labelgs_files::read`.
     pub read: fn(&Path) -> Result<ReadModel>,
     /// Writes a file; `None` if the format is only read.
     pub write: Option<ModelWriter>,
@@ -135,7 +129,7 @@ pub(crate) struct ModelFormat {
 
 /// How a format writes files.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct ModelWriter {
+pub struct ModelWriter {
     /// Returns what the file cannot hold, a line each; an error if it cannot hold the model at all. It runs before the
     /// file is opened.
     pub losses: fn(&Export) -> Result<Vec<String>>,

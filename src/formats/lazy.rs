@@ -1,10 +1,9 @@
 //! A model of which only a part may be in memory.
 
 use super::{ReadModel, Row, StoredModel, open_stored, read_model};
-use crate::error::Result;
-use crate::files::label_table::LabelTable;
-use crate::scene::Gaussians;
 use glam::DVec3;
+use labelgs_files::label_table::LabelTable;
+use labelgs_scene::{Gaussians, Result};
 use std::borrow::Cow;
 use std::path::Path;
 
@@ -27,7 +26,7 @@ impl LazyModel {
     }
 
     /// Names of the labels, if the file holds them.
-    pub(crate) fn names(&self) -> Option<&LabelTable> {
+    pub fn names(&self) -> Option<&LabelTable> {
         match self {
             Self::Stored(_) => None,
             Self::Whole(read) => read.names.as_ref(),
@@ -61,7 +60,7 @@ impl<'a> From<&'a Gaussians> for ModelRef<'a> {
 
 impl<'a> ModelRef<'a> {
     /// Reads all of it.
-    pub(crate) fn read(self) -> Result<Cow<'a, Gaussians>> {
+    pub fn read(self) -> Result<Cow<'a, Gaussians>> {
         match self {
             Self::Stored(stored) => Ok(Cow::Owned(read_model(stored.path())?.gaussians)),
             Self::Whole(model) => Ok(Cow::Borrowed(model)),
@@ -69,7 +68,7 @@ impl<'a> ModelRef<'a> {
     }
 
     /// Number of rows; of a file, those included that cannot be rendered.
-    pub(crate) fn count(self) -> u64 {
+    pub fn count(self) -> u64 {
         match self {
             Self::Stored(stored) => stored.count(),
             Self::Whole(model) => model.len() as u64,
@@ -77,7 +76,7 @@ impl<'a> ModelRef<'a> {
     }
 
     /// Degree of the spherical harmonics.
-    pub(crate) fn sh_degree(self) -> u32 {
+    pub fn sh_degree(self) -> u32 {
         match self {
             Self::Stored(stored) => stored.sh_degree(),
             Self::Whole(model) => model.sh_degree,
@@ -85,7 +84,7 @@ impl<'a> ModelRef<'a> {
     }
 
     /// Returns true if Gaussians have labels.
-    pub(crate) fn has_labels(self) -> bool {
+    pub fn has_labels(self) -> bool {
         match self {
             Self::Stored(stored) => stored.has_labels(),
             Self::Whole(model) => model.labels.is_some(),
@@ -93,7 +92,7 @@ impl<'a> ModelRef<'a> {
     }
 
     /// World position to which positions are relative.
-    pub(crate) fn origin(self) -> DVec3 {
+    pub fn origin(self) -> DVec3 {
         match self {
             Self::Stored(stored) => stored.origin(),
             Self::Whole(model) => model.origin,
@@ -101,7 +100,7 @@ impl<'a> ModelRef<'a> {
     }
 
     /// Calls `see` with number and values of each row that can be rendered, in order. Returns notes for the user.
-    pub(crate) fn scan(self, mut see: impl FnMut(u64, &Row)) -> Result<Vec<String>> {
+    pub fn scan(self, mut see: impl FnMut(u64, &Row)) -> Result<Vec<String>> {
         let model = match self {
             Self::Stored(stored) => {
                 return stored.scan(|number, row| {
@@ -131,7 +130,7 @@ impl<'a> ModelRef<'a> {
     }
 
     /// Returns rows by number, sorted, as a model about a place `far` from the origin; one in memory stays about its origin.
-    pub(crate) fn rows(self, numbers: impl Iterator<Item = u64>, far: DVec3) -> Result<Gaussians> {
+    pub fn rows(self, numbers: impl Iterator<Item = u64>, far: DVec3) -> Result<Gaussians> {
         match self {
             Self::Stored(stored) => stored.rows(numbers, far),
             Self::Whole(model) => Ok(model.picked(&numbers.map(|number| number as usize).collect::<Vec<_>>())),

@@ -1,9 +1,9 @@
 //! The origin of a scene far away, such as in UTM coordinates. Files hold 32-bit positions about it, so that no digit is
 //! lost; the origin itself is in `FILE.origin.json` beside it, and in the file if its format has a place.
 
-use crate::error::{Error, Result};
-use crate::files::{atomic, read};
 use glam::DVec3;
+use labelgs_files::{atomic, read};
+use labelgs_scene::{Error, Result};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 

@@ -1,10 +1,9 @@
 //! Rows of any model file: those that cannot be rendered are left out and counted.
 
 use super::format::ReadModel;
-use crate::error::Result;
-use crate::scene::Gaussians;
-use crate::scene::origin::far_origin;
 use glam::DVec3;
+use labelgs_scene::origin::far_origin;
+use labelgs_scene::{Gaussians, Result};
 use std::path::Path;
 
 /// Largest log-scale: the square of its exponential fits into f32, as covariances need it.
@@ -15,17 +14,21 @@ const ACTIVATED_MIN: u64 = 16;
 
 /// A row, before activation, as in [`Gaussians`].
 #[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Row<'a> {
-    pub(crate) position: [f64; 3],
+pub struct Row<'a> {
+    /// World position.
+    pub position: [f64; 3],
     /// (w, x, y, z), of any length but 0.
-    pub(crate) quat: [f64; 4],
-    pub(crate) scale: [f32; 3],
-    pub(crate) opacity: f32,
-    pub(crate) sh0: [f32; 3],
+    pub quat: [f64; 4],
+    /// Logarithms of the standard deviations.
+    pub scale: [f32; 3],
+    /// Opacity before the sigmoid.
+    pub opacity: f32,
+    /// Colour coefficients of degree 0.
+    pub sh0: [f32; 3],
     /// Triples (r, g, b) above degree 0.
-    pub(crate) rest: &'a [[f32; 3]],
-    pub(crate) label: Option<u32>,
-    pub(crate) confidence: Option<f32>,
+    pub rest: &'a [[f32; 3]],
+    pub label: Option<u32>,
+    pub confidence: Option<f32>,
 }
 
 /// Tells rows that can be rendered from others, which it counts.

@@ -2,10 +2,9 @@
 //! `NAME.labels.json`. It holds for the same Gaussians in the same order, which a checksum of their positions tells.
 
 use super::format::Export;
-use crate::error::{Error, Result};
-use crate::files::label_table::{LabelEntry, LabelTable};
-use crate::files::{atomic, read as file};
-use crate::scene::MODEL_LABEL_MAX;
+use labelgs_files::label_table::{LabelEntry, LabelTable};
+use labelgs_files::{atomic, read as file};
+use labelgs_scene::{Error, MODEL_LABEL_MAX, Result};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
 use std::path::Path;

@@ -4,9 +4,9 @@
 use super::format::{ModelFormat, ReadModel};
 use super::rows::{Row, Rows};
 use super::values::{log_scale, logit_of_byte};
-use crate::error::{Error, Result};
-use crate::files::read as file;
-use crate::scene::harmonics::sh0_of;
+use labelgs_files::read as file;
+use labelgs_scene::harmonics::sh0_of;
+use labelgs_scene::{Error, Result};
 use std::path::Path;
 
 /// The format by its ending.

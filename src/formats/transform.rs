@@ -1,10 +1,9 @@
 //! Moves, turns and scales a model. Colours that depend on the direction are turned along.
 
-use crate::error::{Error, Result, Setting};
-use crate::scene::Gaussians;
-use crate::scene::harmonics::{COEFFICIENTS, basis};
-use crate::scene::origin::far_origin;
 use glam::{DQuat, DVec3};
+use labelgs_scene::harmonics::{COEFFICIENTS, basis};
+use labelgs_scene::origin::far_origin;
+use labelgs_scene::{Error, Gaussians, Result, Setting};
 use std::f64::consts::TAU;
 
 /// First coefficient of each degree above 0, and one past the last.

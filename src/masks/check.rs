@@ -2,29 +2,28 @@
 
 use super::shortened;
 use super::soft_edges::{self, Edges};
-use crate::Setting;
-use crate::scene::median::median;
-use crate::scene::{Camera, LabelMap, Point};
+use labelgs_scene::median::median;
+use labelgs_scene::{Camera, LabelMap, Point, Setting};
 use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Share of the image border above which an object surrounds the image. It is a little below 1, because the true object
 /// may touch the border.
-pub(crate) const INVERTED_BORDER: f64 = 0.9;
+pub const INVERTED_BORDER: f64 = 0.9;
 /// Share of the image above which an object covers most of it. Objects of interest rarely do; backgrounds always do.
-pub(crate) const INVERTED_SHARE: f64 = 0.5;
+pub const INVERTED_SHARE: f64 = 0.5;
 /// Border share up to which an id in the other masks does not surround the image.
-pub(crate) const INVERTED_ELSEWHERE: f64 = 0.5;
+pub const INVERTED_ELSEWHERE: f64 = 0.5;
 /// Labelled area relative to the median below which a mask is nearly empty. Distance and image borders change areas by
 /// small factors; lost tracks leave nothing or specks.
-pub(crate) const EMPTY_MASK: f64 = 0.05;
+pub const EMPTY_MASK: f64 = 0.05;
 /// The same for one object. It is lower, because an object may really show a sliver behind another.
-pub(crate) const EMPTY_OBJECT: f64 = 0.005;
+pub const EMPTY_OBJECT: f64 = 0.005;
 /// Fewest masks with an object before one of them is compared with their median.
-pub(crate) const VIEWS_FOR_MEDIAN: usize = 4;
+pub const VIEWS_FOR_MEDIAN: usize = 4;
 /// Least share of the image that an object has in both neighbours for its absence between them to count. Smaller
 /// objects may really disappear.
-pub(crate) const BLINK_SHARE: f64 = 0.002;
+pub const BLINK_SHARE: f64 = 0.002;
 
 /// A kind of problem in masks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
@@ -189,7 +188,7 @@ fn problem_of_all(masks: &[(&str, &Look)]) -> Option<(Problem, String)> {
 }
 
 /// What is wrong with masks of which none marks an object.
-pub(crate) fn no_object(masks: usize) -> String {
+pub fn no_object(masks: usize) -> String {
     format!(
         "no mask marks an object: every pixel of all {masks} masks is 0. Make the masks again with an id above 0 for each \
          object, and look whether the program that wrote them found anything, or wrote ids that were divided by 255"
@@ -197,7 +196,7 @@ pub(crate) fn no_object(masks: usize) -> String {
 }
 
 /// What is wrong with masks of one area.
-pub(crate) fn one_area(masks: usize, id: u16) -> String {
+pub fn one_area(masks: usize, id: u16) -> String {
     format!(
         "no mask tells an object from what is around it: every pixel of all {masks} masks is {id}. Make the masks again \
          with 0 where no object is"
@@ -205,7 +204,7 @@ pub(crate) fn one_area(masks: usize, id: u16) -> String {
 }
 
 /// What is wrong with masks of photos that are held out.
-pub(crate) fn held_out(photos: &[&str]) -> String {
+pub fn held_out(photos: &[&str]) -> String {
     format!(
         "only photos that are held out for scores have masks, and nothing learns from these: {}. Add masks of other \
          photos, or hold out others by {} of the training",

@@ -1,7 +1,7 @@
 //! Converts the samples of a PNG to source ids, or to black and white.
 
 use super::mask::{Header, Raw, read_raw};
-use crate::error::{Error, Result, Setting};
+use labelgs_scene::{Error, Result, Setting};
 use png::{BitDepth, ColorType};
 use std::collections::BTreeSet;
 use std::path::Path;

@@ -2,9 +2,9 @@
 
 use super::Format;
 use super::mask_folder::{photo_keys, png_key};
-use crate::error::{Error, Result, Setting};
-use crate::files::names::claim;
-use crate::files::read;
+use labelgs_files::names::claim;
+use labelgs_files::read;
+use labelgs_scene::{Error, Result, Setting};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 

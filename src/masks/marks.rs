@@ -3,10 +3,9 @@
 use super::polygon::Polygons;
 use super::rle::Rle;
 use super::{ObjectPer, shortened};
-use crate::error::{Error, Result, Setting};
-use crate::files::label_table::unique_name;
-use crate::files::resize::same_aspect;
-use crate::scene::View;
+use labelgs_files::label_table::unique_name;
+use labelgs_files::resize::same_aspect;
+use labelgs_scene::{Error, Result, Setting, View};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 

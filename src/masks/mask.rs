@@ -4,11 +4,10 @@
 //! or a palette PNG, whose *index* is the id. Colours never become ids: two palette entries may share a colour, and a
 //! colour code needs its legend.
 
-use crate::error::{Error, Result};
-use crate::files::image::{check_png_length, check_size};
-use crate::files::read;
-use crate::files::resize::same_aspect;
-use crate::scene::LabelMap;
+use labelgs_files::image::{check_png_length, check_size};
+use labelgs_files::read;
+use labelgs_files::resize::same_aspect;
+use labelgs_scene::{Error, LabelMap, Result};
 use png::DecodingError;
 use std::io::{BufRead, BufReader, ErrorKind};
 use std::path::Path;
@@ -32,24 +31,26 @@ fn problem(path: &Path, problem: impl std::fmt::Display) -> Error {
 
 /// The header of a PNG.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Header {
+pub struct Header {
     /// Width and height, px.
-    pub(crate) size: (u32, u32),
-    pub(crate) colour: png::ColorType,
+    pub size: (u32, u32),
+    /// Channels.
+    pub colour: png::ColorType,
     /// Bits per sample.
-    pub(crate) depth: png::BitDepth,
+    pub depth: png::BitDepth,
 }
 
 /// A PNG with its samples as stored.
-pub(crate) struct Raw {
-    pub(crate) header: Header,
+pub struct Raw {
+    /// Size, channels and bits.
+    pub header: Header,
     bytes: Vec<u8>,
     line_size: usize,
 }
 
 impl Raw {
     /// Returns all samples, row-major, channels interleaved.
-    pub(crate) fn samples(&self) -> Vec<u16> {
+    pub fn samples(&self) -> Vec<u16> {
         let Header { size, colour, depth } = self.header;
         let per_line = size.0 as usize * colour.samples();
         let lines = self.bytes.chunks_exact(self.line_size).take(size.1 as usize);
@@ -58,7 +59,7 @@ impl Raw {
 
     /// Returns all samples without opacity, and the number of channels. Pixels that are not black must be opaque: they may
     /// or may not belong to the object.
-    pub(crate) fn opaque(&self, path: &Path) -> Result<(Vec<u16>, usize)> {
+    pub fn opaque(&self, path: &Path) -> Result<(Vec<u16>, usize)> {
         let (mut samples, channels) = (self.samples(), self.header.colour.samples());
         if channels % 2 == 1 {
             return Ok((samples, channels));
@@ -86,7 +87,7 @@ impl Raw {
     }
 
     /// Returns the one value of each pixel: grey, palette index, or colours that are equal. `None` for other colours.
-    pub(crate) fn values(&self, path: &Path) -> Result<Option<Vec<u16>>> {
+    pub fn values(&self, path: &Path) -> Result<Option<Vec<u16>>> {
         let (samples, channels) = self.opaque(path)?;
         if channels == 1 {
             return Ok(Some(samples));
@@ -115,12 +116,12 @@ fn open(path: &Path) -> Result<(Reader, Header)> {
 }
 
 /// Reads only the header of a PNG.
-pub(crate) fn read_header(path: &Path) -> Result<Header> {
+pub fn read_header(path: &Path) -> Result<Header> {
     open(path).map(|(_, header)| header)
 }
 
 /// Reads a PNG of any kind. `accept` checks the header before decoding.
-pub(crate) fn read_raw(path: &Path, accept: impl FnOnce(&Header) -> Result<()>) -> Result<Raw> {
+pub fn read_raw(path: &Path, accept: impl FnOnce(&Header) -> Result<()>) -> Result<Raw> {
     let (mut reader, header) = open(path)?;
     accept(&header)?;
     let length = reader.output_buffer_size().ok_or_else(|| problem(path, "too large"))?;
@@ -136,7 +137,7 @@ pub fn read_mask(path: impl AsRef<Path>) -> Result<LabelMap> {
 }
 
 /// Like [`read_mask`]; `accept` checks the size before decoding.
-pub(crate) fn read_checked(path: &Path, accept: impl FnOnce((u32, u32)) -> Result<()>) -> Result<LabelMap> {
+pub fn read_checked(path: &Path, accept: impl FnOnce((u32, u32)) -> Result<()>) -> Result<LabelMap> {
     let raw = read_raw(path, |header| accept(header.size))?;
     let Some(ids) = raw.values(path)? else {
         let text = format!(
@@ -153,7 +154,7 @@ pub(crate) fn read_checked(path: &Path, accept: impl FnOnce((u32, u32)) -> Resul
 
 /// Reads a picture of what to ignore, a PNG of any kind: 1 where a colour or a palette index is not 0, which black is.
 /// `accept` checks the size before decoding.
-pub(crate) fn read_ignored(path: &Path, accept: impl FnOnce((u32, u32)) -> Result<()>) -> Result<LabelMap> {
+pub fn read_ignored(path: &Path, accept: impl FnOnce((u32, u32)) -> Result<()>) -> Result<LabelMap> {
     let raw = read_raw(path, |header| accept(header.size))?;
     let Header { size: (width, height), colour, .. } = raw.header;
     // Opacity, the last of two or four channels, says nothing.
@@ -183,6 +184,6 @@ fn unpack(line: &[u8], depth: png::BitDepth, width: usize) -> Vec<u16> {
 }
 
 /// Returns true if a mask of size `found` can serve a photo of size `photo`: they differ by a scale only.
-pub(crate) fn mask_size_fits(found: (u32, u32), photo: (u32, u32)) -> bool {
+pub fn mask_size_fits(found: (u32, u32), photo: (u32, u32)) -> bool {
     same_aspect(found, photo)
 }

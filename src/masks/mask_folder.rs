@@ -1,7 +1,7 @@
 //! A folder of masks: the file of each photo.
 
-use crate::error::{Error, Result};
-use crate::files::names::{below, claim, shortened};
+use labelgs_files::names::{below, claim, shortened};
+use labelgs_scene::{Error, Result};
 use std::collections::{BTreeMap, HashMap};
 use std::path::{Path, PathBuf};
 
@@ -54,7 +54,7 @@ impl PhotoNames {
 }
 
 /// Returns the possible mask names of each photo, without `.png`, in order of preference.
-pub(crate) fn photo_keys(photos: &[&str]) -> Vec<Vec<String>> {
+pub fn photo_keys(photos: &[&str]) -> Vec<Vec<String>> {
     let names = PhotoNames::new(photos);
     let keys = |photo: &&str| {
         let keys = names.keys(photo).into_iter();
@@ -68,27 +68,28 @@ pub(crate) fn photo_keys(photos: &[&str]) -> Vec<Vec<String>> {
 }
 
 /// Returns `name` without `.png` (any case), or `None` for other files.
-pub(crate) fn png_key(name: &str) -> Option<&str> {
+pub fn png_key(name: &str) -> Option<&str> {
     let at = name.len().checked_sub(4)?;
     name.get(at..)?.eq_ignore_ascii_case(".png").then(|| &name[..at])
 }
 
 /// Appends `.png` to `key`, which may contain dots.
-pub(crate) fn with_png(key: &Path) -> PathBuf {
+pub fn with_png(key: &Path) -> PathBuf {
     let mut name = key.as_os_str().to_owned();
     name.push(".png");
     name.into()
 }
 
 /// A folder of masks that are found by the name of the photo.
-pub(crate) struct MaskFolder {
-    pub(crate) folder: PathBuf,
+pub struct MaskFolder {
+    /// The folder.
+    pub folder: PathBuf,
     of_photo: BTreeMap<String, PathBuf>,
 }
 
 impl MaskFolder {
     /// Finds the masks in the folder; `names` are those of all photos of the scene.
-    pub(crate) fn new<'a>(folder: &Path, names: impl Iterator<Item = &'a str>) -> Result<Self> {
+    pub fn new<'a>(folder: &Path, names: impl Iterator<Item = &'a str>) -> Result<Self> {
         if folder.is_file() {
             let problem = "is a file, expected a folder of id masks; masks in one file, such as COCO's, become one by \
                            `masks import` with the scene";
@@ -116,17 +117,17 @@ impl MaskFolder {
     }
 
     /// Returns the mask file of `name`, if there is one.
-    pub(crate) fn find(&self, name: &str) -> Option<PathBuf> {
+    pub fn find(&self, name: &str) -> Option<PathBuf> {
         self.of_photo.get(name).cloned()
     }
 
     /// Returns the mask files with the names of their photos, sorted by name.
-    pub(crate) fn files(&self) -> impl ExactSizeIterator<Item = (&str, &Path)> {
+    pub fn files(&self) -> impl ExactSizeIterator<Item = (&str, &Path)> {
         self.of_photo.iter().map(|(name, path)| (name.as_str(), path.as_path()))
     }
 
     /// Makes the error for a folder without a mask for any photo.
-    pub(crate) fn nothing_found(&self, name: &str) -> Error {
+    pub fn nothing_found(&self, name: &str) -> Error {
         let expected = Path::new(name).with_extension("png");
         let mut text = format!("has a PNG for no photo of the scene; expected for example {}", expected.display());
         if ["jpg", "jpeg", "JPG"].iter().any(|ext| self.folder.join(expected.with_extension(ext)).is_file()) {

@@ -1,6 +1,6 @@
 //! The photo that a file of an annotation tool names, whatever folder or server it had the photo in.
 
-use crate::files::names::folded;
+use labelgs_files::names::folded;
 use std::collections::HashMap;
 use std::path::Path;
 

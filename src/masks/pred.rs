@@ -1,8 +1,8 @@
 //! `pred.json` of DEVA: the ids of a run and their categories.
 
 use super::shortened;
-use crate::error::{Error, Result, Setting};
-use crate::files::read;
+use labelgs_files::read;
+use labelgs_scene::{Error, Result, Setting};
 use serde::Deserialize;
 use serde_json::Value;
 use std::collections::{BTreeMap, BTreeSet};

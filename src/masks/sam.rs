@@ -4,10 +4,9 @@
 use super::marks::{Found, Mark, Shape, require_aspect};
 use super::mask_folder::{photo_keys, png_key};
 use super::rle::Rle;
-use crate::error::{Error, Result};
-use crate::files::names::claim;
-use crate::files::read;
-use crate::scene::View;
+use labelgs_files::names::claim;
+use labelgs_files::read;
+use labelgs_scene::{Error, Result, View};
 use rayon::prelude::*;
 use serde::Deserialize;
 use serde_json::Value;

@@ -3,7 +3,7 @@
 //! A blur, a filter that resizes, and JPEG make such pixels. Each of their values counts as an object, and those of masks
 //! with many ids belong to others.
 
-use crate::Setting;
+use labelgs_scene::Setting;
 use std::collections::BTreeMap;
 
 /// Shortest run of one value that counts as an area, px.
@@ -23,7 +23,7 @@ const WAY: f64 = 1.5;
 
 /// The edges between the areas of a mask, along lines.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub(crate) struct Edges {
+pub struct Edges {
     /// Edges with room for a value between.
     all: u64,
     soft: u64,
@@ -33,7 +33,7 @@ pub(crate) struct Edges {
 
 impl Edges {
     /// Looks at some rows and columns of a mask.
-    pub(crate) fn of<T: Copy + Into<u32>>(ids: &[T], width: u32, height: u32) -> Self {
+    pub fn of<T: Copy + Into<u32>>(ids: &[T], width: u32, height: u32) -> Self {
         let mut edges = Self::default();
         let (width, height) = (width as usize, height as usize);
         let mut line: Vec<u32> = Vec::new();
@@ -96,7 +96,7 @@ impl Edges {
 }
 
 /// Says what is wrong if masks are soft, and what to do. `masks` are names and edges.
-pub(crate) fn problem(masks: &[(&str, &Edges)]) -> Option<String> {
+pub fn problem(masks: &[(&str, &Edges)]) -> Option<String> {
     let mut soft: Vec<&str> = masks.iter().filter(|(_, edges)| edges.are_soft()).map(|(name, _)| *name).collect();
     // A small mask has too few edges to tell alone.
     if masks.iter().fold(Edges::default(), |sum, (_, edges)| sum.add(edges)).are_soft() {

@@ -4,9 +4,8 @@ use super::folder::{layouts, root};
 use super::marks::Found;
 use super::mask_folder::MaskFolder;
 use super::{Format, Overlap, coco, sam};
-use crate::error::{Error, Result, Setting};
-use crate::files::names::below;
-use crate::scene::View;
+use labelgs_files::names::below;
+use labelgs_scene::{Error, Result, Setting, View};
 use std::path::{Path, PathBuf};
 
 /// Returns the tool whose files the folder or file holds, with the reason. Two of them are an error.
@@ -93,7 +92,7 @@ pub(super) fn overlap(format: Format, asked: Overlap) -> Overlap {
 }
 
 /// Makes the error for a folder without a mask for any photo. If the import knows its form, that is the cure.
-pub(crate) fn nothing_found(masks: &MaskFolder, scene: &Path, photos: &[&str]) -> Error {
+pub fn nothing_found(masks: &MaskFolder, scene: &Path, photos: &[&str]) -> Error {
     let folder = &masks.folder;
     let why = match recognise(folder, photos) {
         Ok(tool) => tool.map(|(_, why)| why).or_else(|| nested(folder, photos)),

@@ -10,7 +10,7 @@ const POLICY: &str =
     "default-src 'none'; img-src 'self' file: data:; style-src 'unsafe-inline'; script-src 'unsafe-inline'";
 
 /// Returns a whole page; `lead` stands below the title.
-pub(crate) fn page(title: &str, lead: &Markup, body: &Markup) -> String {
+pub fn page(title: &str, lead: &Markup, body: &Markup) -> String {
     let markup = html! {
         (DOCTYPE)
         html lang="en" {
@@ -33,6 +33,6 @@ pub(crate) fn page(title: &str, lead: &Markup, body: &Markup) -> String {
 }
 
 /// Returns a part of a page with a heading.
-pub(crate) fn section(title: &str, body: &Markup) -> Markup {
+pub fn section(title: &str, body: &Markup) -> Markup {
     html! { section { h2 { (title) } (body) } }
 }

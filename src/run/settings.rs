@@ -14,7 +14,7 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-crate::options::options! {
+crate::options! {
     /// What a run writes before its end, and the memory that it takes: nothing of it changes a result.
     pub struct RunOptions {
         "Output" {

@@ -1,8 +1,8 @@
 //! Undecodable photos: a training can skip a few; many mean a damaged data set.
 
 use super::LoadOptions;
-use crate::error::{Error, Result, Setting};
-use crate::files::all::LISTED_MAX;
+use labelgs_files::all::LISTED_MAX;
+use labelgs_scene::{Error, Result, Setting};
 use std::path::Path;
 
 /// Returns how many of `total` photos may be left out.
@@ -13,7 +13,7 @@ pub(super) fn allowed(max_share: f32, total: usize) -> usize {
 
 /// Notes the skipped photos. If they are more than the options allow, refuses the scene with a list. `bad` has one
 /// error per undecodable photo; `total` is the number of photos with a file.
-pub(crate) fn skip(
+pub fn skip(
     root: &Path,
     mut bad: Vec<Error>,
     total: usize,

@@ -3,16 +3,15 @@
 use super::lens::Lens;
 use super::listing::{check_camera, rotation_of};
 use super::transforms::affine;
-use crate::error::{Error, Result};
-use crate::files::{atomic, read, run_folder};
-use crate::scene::{Camera, View};
 use glam::{DMat3, DVec3};
+use labelgs_files::{atomic, read, run_folder};
+use labelgs_scene::{Camera, Error, Result, View};
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 use std::path::Path;
 
 /// Name of the file with the cameras of a run, as 3DGS has it.
-pub(crate) const CAMERAS: &str = "cameras.json";
+pub const CAMERAS: &str = "cameras.json";
 
 /// A camera in the JSON layout of `labelgs render --camera`.
 #[derive(Clone, Debug, Deserialize, Serialize)]
@@ -55,7 +54,7 @@ pub fn read_camera(path: impl AsRef<Path>) -> Result<Camera> {
 }
 
 /// Returns the camera, checked. Errors name `path`, where it came from.
-pub(crate) fn camera_of(path: &Path, file: &CameraFile) -> Result<Camera> {
+pub fn camera_of(path: &Path, file: &CameraFile) -> Result<Camera> {
     let refuse =
         || Error::data(path, "w2c", "is not a camera-from-world pose: 4 x 4 numbers, the upper left 3 x 3 a rotation");
     let pose = affine(&file.w2c).ok_or_else(refuse)?;
@@ -108,7 +107,7 @@ pub fn write_cameras<'a>(path: impl AsRef<Path>, cameras: &[(&'a str, &Camera)])
 
 /// Reads the views in the `cameras.json` of the run that a model belongs to, of any 3DGS trainer, without photos. Returns none
 /// if there is no such file.
-pub(crate) fn views_of_model(model: &Path) -> Result<Vec<View>> {
+pub fn views_of_model(model: &Path) -> Result<Vec<View>> {
     let path = run_folder::of_model(model).map(|run| run.join(CAMERAS)).filter(|path| path.is_file());
     let Some(path) = path else { return Ok(Vec::new()) };
     let expected = "expected a list of cameras, each with img_name, width, height, position, rotation, fx, fy; delete the file \
@@ -133,8 +132,8 @@ fn view(path: &Path, entry: &Entry) -> Result<View> {
 #[cfg(test)]
 mod tests {
     use super::{views_of_model, write_cameras};
-    use crate::scene::Camera;
     use glam::{DMat3, DVec3};
+    use labelgs_scene::Camera;
 
     #[test]
     fn cameras_of_a_run_are_read_back() {
@@ -161,12 +160,12 @@ mod tests {
         // As 3DGS writes it.
         let entry = r#"[{"id":0,"img_name":"b","width":64,"height":48,"position":[0,0,1],
             "rotation":[[1,0,0],[0,1,0],[0,0,1]],"fy":50.0,"fx":50.0}]"#;
-        crate::files::atomic::write(&file, |out| out.write_all(entry.as_bytes())).expect("written");
+        labelgs_files::atomic::write(&file, |out| out.write_all(entry.as_bytes())).expect("written");
         let found = views_of_model(folder.path()).expect("read");
         assert_eq!((found[0].camera.cx, found[0].camera.translation), (32.0, DVec3::new(0.0, 0.0, -1.0)));
 
         for (bad, part) in [("[{}]", "img_name"), (&entry.replace("[1,0,0]", "[9,0,0]"), "camera b")] {
-            crate::files::atomic::write(&file, |out| out.write_all(bad.as_bytes())).expect("written");
+            labelgs_files::atomic::write(&file, |out| out.write_all(bad.as_bytes())).expect("written");
             let error = views_of_model(folder.path()).expect_err("refused").to_string();
             assert!(error.contains(part) && error.contains("delete the file"), "{error}");
         }

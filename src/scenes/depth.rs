@@ -5,11 +5,10 @@
 use super::lookup::Lookup;
 use super::resample::resample_nearest;
 use super::window::{Window, windows};
-use crate::error::{Error, Result};
-use crate::files::depth_file::{EXTENSIONS, read_depth};
-use crate::files::names::shortened;
-use crate::files::resize::same_aspect;
-use crate::scene::{DepthMap, View};
+use labelgs_files::depth_file::{EXTENSIONS, read_depth};
+use labelgs_files::names::shortened;
+use labelgs_files::resize::same_aspect;
+use labelgs_scene::{DepthMap, Error, Result, View};
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::path::{Path, PathBuf};
 

@@ -4,10 +4,9 @@
 //! makes fog.
 
 use super::pose_convention::{Native, PoseConvention};
-use crate::error::{Result, Setting};
-use crate::files::names::shortened;
-use crate::scene::agreement::{Agreement, Sample};
-use crate::scene::{Dataset, Flaw, View};
+use labelgs_files::names::shortened;
+use labelgs_scene::agreement::{Agreement, Sample};
+use labelgs_scene::{Dataset, Flaw, Result, Setting, View};
 
 /// Fewest points that can judge a scene.
 const POINTS_MIN: usize = 50;

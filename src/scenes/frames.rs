@@ -1,14 +1,14 @@
 //! `frames.json`: the frames of a video through the photos of a scene, and the photo of some frames.
 
 use super::camera_json::CameraFile;
-use crate::error::{Error, Result};
-use crate::files::{atomic, read};
+use labelgs_files::{atomic, read};
+use labelgs_scene::{Error, Result};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
 use std::path::Path;
 
 /// Name of the file in the folder of the video.
-pub(crate) const FILE: &str = "frames.json";
+pub const FILE: &str = "frames.json";
 const SCHEMA_VERSION: u32 = 1;
 
 /// A frame of the video.

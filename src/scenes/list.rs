@@ -6,11 +6,10 @@ use super::lookup::Lookup;
 use super::photo_finder::count_photos;
 use super::split::Split;
 use super::{colmap, llff, metashape, transforms};
-use crate::error::{Error, Result, Setting};
-use crate::files::kind::{self, Content};
-use crate::files::names::shortened;
-use crate::scene::Flaw;
-use crate::words::counted;
+use labelgs_files::kind::{self, Content};
+use labelgs_files::names::shortened;
+use labelgs_scene::words::counted;
+use labelgs_scene::{Error, Flaw, Result, Setting};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 

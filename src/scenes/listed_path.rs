@@ -5,32 +5,32 @@
 
 use super::lookup::Lookup;
 use super::photo_finder::PhotoFinder;
-use crate::error::{Error, Result, Setting};
+use labelgs_scene::{Error, Result, Setting};
 use std::path::{Component, Path, PathBuf};
 
 /// The folder of a scene, and how its files are found.
-pub(crate) struct Place<'a> {
-    pub(crate) root: &'a Path,
+pub struct Place<'a> {
+    pub root: &'a Path,
     lookup: &'a Lookup,
-    pub(crate) photos: PhotoFinder,
+    pub photos: PhotoFinder,
 }
 
 /// A file in the list of a scene.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) struct ListedPath {
+pub struct ListedPath {
     /// Path below the folder of the scene. It is absolute or has `..` only if that is allowed.
-    pub(crate) path: PathBuf,
+    pub path: PathBuf,
     /// The same path as a name: separated by `/`, relative and without `..`, so that it is safe below any folder.
-    pub(crate) name: String,
+    pub name: String,
 }
 
 impl<'a> Place<'a> {
-    pub(crate) fn new(root: &'a Path, lookup: &'a Lookup) -> Self {
+    pub fn new(root: &'a Path, lookup: &'a Lookup) -> Self {
         Self { root, lookup, photos: PhotoFinder::new(root, lookup.images_of(root)) }
     }
 
     /// Resolves the path `listed` in the file `source`. Backslashes also separate folders, as in files from Windows.
-    pub(crate) fn resolve(&self, source: &Path, listed: &str) -> Result<ListedPath> {
+    pub fn resolve(&self, source: &Path, listed: &str) -> Result<ListedPath> {
         let refuse = |problem: &str| Err(Error::data(source, format!("photo `{}`", listed.escape_debug()), problem));
         let text = listed.replace('\\', "/");
         let mut path = PathBuf::from(&text);

@@ -3,16 +3,15 @@
 use super::lens::Lens;
 use super::photo_finder::EXTENSIONS;
 use super::pose_convention::Native;
-use crate::error::{Error, Result};
-use crate::scene::{Camera, Flaw, Point};
 use glam::{DMat3, DQuat, DVec3};
+use labelgs_scene::{Camera, Error, Flaw, Point, Result};
 use std::path::{Path, PathBuf};
 
 /// Largest side of a camera, px.
 const SIDE_MAX: u32 = 1 << 17;
 
 /// Largest distance of a camera or a point from the origin, world units: squares still fit into f32.
-pub(crate) const FAR: f64 = 1e12;
+pub const FAR: f64 = 1e12;
 
 /// Largest side of a photo in focal lengths. A pinhole of 179 degrees has 115, and no lens has more than 2 pi of its own
 /// focal lengths.
@@ -20,41 +19,41 @@ const WIDEST: f64 = 115.0;
 
 /// A photo in the listing of a scene.
 #[derive(Clone, Debug)]
-pub(crate) struct Listed {
+pub struct Listed {
     /// Name relative to the folder of photos.
-    pub(crate) name: String,
+    pub name: String,
     /// Its file; `None` if it does not exist.
-    pub(crate) photo: Option<PathBuf>,
+    pub photo: Option<PathBuf>,
     /// Camera at the size in the data set.
-    pub(crate) camera: Camera,
-    pub(crate) lens: Lens,
+    pub camera: Camera,
+    pub lens: Lens,
     /// Split of the data set itself: true for held-out.
-    pub(crate) test: Option<bool>,
+    pub test: Option<bool>,
 }
 
 /// A scene before its pixels are read.
 #[derive(Debug)]
-pub(crate) struct Listing {
+pub struct Listing {
     /// The file that lists the photos.
-    pub(crate) source: PathBuf,
+    pub source: PathBuf,
     /// What its format means by a pose.
-    pub(crate) native: Native,
-    pub(crate) views: Vec<Listed>,
+    pub native: Native,
+    pub views: Vec<Listed>,
     /// Names of photos without a file and without a known size.
-    pub(crate) missing: Vec<String>,
+    pub missing: Vec<String>,
     /// What is wrong with photos or poses that cannot be used.
-    pub(crate) bad: Vec<Error>,
-    pub(crate) points: Vec<Point>,
-    pub(crate) notes: Vec<String>,
+    pub bad: Vec<Error>,
+    pub points: Vec<Point>,
+    pub notes: Vec<String>,
     /// What is wrong with the list. Notes do not say it.
-    pub(crate) flaws: Vec<Flaw>,
+    pub flaws: Vec<Flaw>,
     /// Where photos were looked for, if some were not found.
-    pub(crate) hint: String,
+    pub hint: String,
 }
 
 impl Listing {
     /// Makes an empty one for a file.
-    pub(crate) fn new(source: &Path, native: Native) -> Self {
+    pub fn new(source: &Path, native: Native) -> Self {
         Self {
             source: source.to_owned(),
             native,
@@ -69,18 +68,18 @@ impl Listing {
     }
 
     /// Returns true if photos of it do not exist.
-    pub(crate) fn is_incomplete(&self) -> bool {
+    pub fn is_incomplete(&self) -> bool {
         !self.missing.is_empty() || self.views.iter().any(|view| view.photo.is_none())
     }
 }
 
 /// Refuses a list of which no photo can be used: what is wrong with all is wrong with the file.
-pub(crate) fn require_some(views: usize, bad: &mut Vec<Error>) -> Result<()> {
+pub fn require_some(views: usize, bad: &mut Vec<Error>) -> Result<()> {
     if views == 0 && !bad.is_empty() { Err(bad.swap_remove(0)) } else { Ok(()) }
 }
 
 /// Refuses cameras that cannot make an image. `place` names the camera in `path`.
-pub(crate) fn check_camera(path: &Path, place: &str, camera: &Camera, lens: &Lens) -> Result<()> {
+pub fn check_camera(path: &Path, place: &str, camera: &Camera, lens: &Lens) -> Result<()> {
     let refuse = |problem: String| Err(Error::data(path, place, problem));
     let Camera { fx, fy, cx, cy, width, height, .. } = *camera;
     if width == 0 || height == 0 || width > SIDE_MAX || height > SIDE_MAX {
@@ -119,7 +118,7 @@ pub(crate) fn check_camera(path: &Path, place: &str, camera: &Camera, lens: &Len
 }
 
 /// Returns the rotation nearest to `matrix`, which may have a uniform scale; `None` if it is no rotation.
-pub(crate) fn rotation_of(matrix: DMat3) -> Option<DMat3> {
+pub fn rotation_of(matrix: DMat3) -> Option<DMat3> {
     let determinant = matrix.determinant();
     if !(determinant.is_finite() && determinant > 0.0) {
         return None;
@@ -133,14 +132,14 @@ pub(crate) fn rotation_of(matrix: DMat3) -> Option<DMat3> {
 }
 
 /// Converts an OpenCV camera-to-world pose to camera-from-world.
-pub(crate) fn invert_pose(rotation: DMat3, centre: DVec3) -> (DMat3, DVec3) {
+pub fn invert_pose(rotation: DMat3, centre: DVec3) -> (DMat3, DVec3) {
     let inverse = rotation.transpose();
     (inverse, -(inverse * centre))
 }
 
 /// Returns the name of a view: a photo listed without extension gets that of its file. Otherwise `frame.0001` would later
 /// lose its number.
-pub(crate) fn with_extension(mut name: String, photo: Option<&Path>) -> String {
+pub fn with_extension(mut name: String, photo: Option<&Path>) -> String {
     if let Some(found) = photo.and_then(|photo| photo.to_str()) {
         name.push_str(EXTENSIONS.iter().rev().find(|ext| found.ends_with(&format!("{name}{ext}"))).unwrap_or(&""));
     }
@@ -148,7 +147,7 @@ pub(crate) fn with_extension(mut name: String, photo: Option<&Path>) -> String {
 }
 
 /// Returns a side of a photo, px, that is stored as a float.
-pub(crate) fn side(path: &Path, place: &str, value: f64) -> Result<u32> {
+pub fn side(path: &Path, place: &str, value: f64) -> Result<u32> {
     if value.fract() == 0.0 && (1.0..=f64::from(u32::MAX)).contains(&value) {
         return Ok(value as u32);
     }

@@ -9,10 +9,9 @@ use super::listed_path::Place;
 use super::listing::{Listed, Listing, check_camera, invert_pose, require_some, rotation_of, side};
 use super::photo_finder::is_readable;
 use super::pose_convention::Native;
-use crate::error::{Error, Result};
-use crate::files::{npy, read};
-use crate::scene::Camera;
 use glam::{DMat3, DVec3};
+use labelgs_files::{npy, read};
+use labelgs_scene::{Camera, Error, Result};
 use std::path::{Path, PathBuf};
 
 /// Name of the file.
@@ -21,17 +20,17 @@ const FILE: &str = "poses_bounds.npy";
 const ROW: usize = 17;
 
 /// Reads the scene, if it has the file.
-pub(crate) fn list(scene: &Place) -> Result<Option<Listing>> {
+pub fn list(scene: &Place) -> Result<Option<Listing>> {
     let path = scene.root.join(FILE);
     if path.is_file() { list_file(scene, &path).map(Some) } else { Ok(None) }
 }
 
 /// Returns the number of photos that a file has poses for; `None` if it cannot be read.
-pub(crate) fn count(path: &Path) -> Option<usize> {
+pub fn count(path: &Path) -> Option<usize> {
     npy::read::<2>(path, "table of poses", "(photos, 17)").ok().map(|([rows, _], _)| rows)
 }
 
-pub(crate) fn list_file(scene: &Place, path: &Path) -> Result<Listing> {
+pub fn list_file(scene: &Place, path: &Path) -> Result<Listing> {
     let ([rows, columns], values) = npy::read::<2>(path, "table of poses", "(photos, 17)")?;
     if columns != ROW {
         let problem = format!("is ({rows}, {columns}); expected (photos, {ROW}): 3 x 5 numbers and two depths");

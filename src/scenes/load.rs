@@ -4,19 +4,19 @@ use super::listing::{Listed, Listing};
 use super::photo_store::PhotoStore;
 use super::recipe::{MadeView, MadeViews, Recipe};
 use super::{LoadOptions, bad_photos, frame_check, mask_notes, missing, stray};
-use crate::error::{Error, Result, Setting};
-use crate::files::all::all_or_one_error;
-use crate::files::names::shortened;
-use crate::masks;
-use crate::masks::mask_folder::MaskFolder;
-use crate::scene::{Dataset, Flaw, Photo, View, crew};
-use crate::words::counted;
+use labelgs_files::all::all_or_one_error;
+use labelgs_files::names::shortened;
+use labelgs_masks as masks;
+use labelgs_masks::mask_folder::MaskFolder;
+use labelgs_scene::words::counted;
+use labelgs_scene::{Dataset, Flaw, Photo, View, crew};
+use labelgs_scene::{Error, Result, Setting};
 use rayon::prelude::*;
 use std::collections::BTreeSet;
 use std::path::Path;
 use std::sync::Arc;
 
-pub(crate) fn load(root: &Path, mut listing: Listing, options: &LoadOptions) -> Result<Dataset> {
+pub fn load(root: &Path, mut listing: Listing, options: &LoadOptions) -> Result<Dataset> {
     let mut notes = std::mem::take(&mut listing.notes);
     let mut faults = Vec::new();
     let mut views = missing::existing(&listing, options, &mut notes, &mut faults)?;

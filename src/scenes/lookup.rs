@@ -17,7 +17,7 @@ pub struct Lookup {
 
 impl Lookup {
     /// Returns the folder of photos, if one is named.
-    pub(crate) fn images_of(&self, root: &Path) -> Option<PathBuf> {
+    pub fn images_of(&self, root: &Path) -> Option<PathBuf> {
         let named = self.images.as_deref()?;
         let below = root.join(named);
         Some(if !named.is_dir() && below.is_dir() { below } else { named.to_owned() })

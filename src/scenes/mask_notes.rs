@@ -1,10 +1,10 @@
 //! What is odd about the masks of a scene as a whole, for a training.
 
-use crate::masks::check::{held_out, no_object, one_area};
-use crate::masks::mask::read_mask;
-use crate::masks::mask_folder::MaskFolder;
-use crate::masks::soft_edges::{self, Edges};
-use crate::scene::{Dataset, LabelMap, Pixels, View};
+use labelgs_masks::check::{held_out, no_object, one_area};
+use labelgs_masks::mask::read_mask;
+use labelgs_masks::mask_folder::MaskFolder;
+use labelgs_masks::soft_edges::{self, Edges};
+use labelgs_scene::{Dataset, LabelMap, Pixels, View};
 use rayon::prelude::*;
 use std::path::Path;
 

@@ -9,11 +9,10 @@ use super::lens::{Fisheye, Lens, Polynomial};
 use super::listed_path::Place;
 use super::listing::{Listed, Listing, check_camera, invert_pose, require_some, rotation_of, side, with_extension};
 use super::pose_convention::Native;
-use crate::error::{Error, Result};
-use crate::files::read;
-use crate::scene::Camera;
-use crate::words::counted;
 use glam::{DAffine3, DMat3, DVec3};
+use labelgs_files::read;
+use labelgs_scene::words::counted;
+use labelgs_scene::{Camera, Error, Result};
 use roxmltree::{Document, Node, ParsingOptions};
 use std::collections::{BTreeMap, BTreeSet};
 use std::f64::consts::PI;
@@ -25,7 +24,7 @@ const NODES_MAX: u32 = 1 << 24;
 const DEPTH_MAX: usize = 64;
 
 /// Reads the scene, if its folder has one XML file of Metashape.
-pub(crate) fn list(scene: &Place) -> Result<Option<Listing>> {
+pub fn list(scene: &Place) -> Result<Option<Listing>> {
     let is_xml = |path: &std::path::PathBuf| path.extension().is_some_and(|end| end.eq_ignore_ascii_case("xml"));
     let mut found: Vec<_> = read::folder(scene.root)?.into_iter().filter(is_xml).collect();
     found.sort();
@@ -39,7 +38,7 @@ pub(crate) fn list(scene: &Place) -> Result<Option<Listing>> {
     }
 }
 
-pub(crate) fn list_file(scene: &Place, path: &Path) -> Result<Listing> {
+pub fn list_file(scene: &Place, path: &Path) -> Result<Listing> {
     let text = read::text(path)?;
     if let Some(line) = too_deep(&text) {
         let problem = format!("elements are nested deeper than {DEPTH_MAX}; expected cameras of Metashape in XML");

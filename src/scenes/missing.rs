@@ -3,8 +3,8 @@
 use super::LoadOptions;
 use super::bad_photos::allowed;
 use super::listing::{Listed, Listing};
-use crate::error::{Error, Result, Setting};
-use crate::files::names::shortened;
+use labelgs_files::names::shortened;
+use labelgs_scene::{Error, Result, Setting};
 
 /// One of this many photos may lack: published scenes list photos that were left out of them.
 const SHARE: usize = 3;

@@ -4,10 +4,10 @@
 //! looked for in the folders in which programs put photos, under the same name in another case or composition, and then
 //! under the same name with another extension. Only a single match counts.
 
-use crate::error::Setting;
-use crate::files::names::folded;
-use crate::files::read;
-use crate::words::counted;
+use labelgs_files::names::folded;
+use labelgs_files::read;
+use labelgs_scene::Setting;
+use labelgs_scene::words::counted;
 use std::cell::{OnceCell, RefCell};
 use std::collections::HashMap;
 use std::ffi::OsStr;
@@ -22,10 +22,10 @@ const UNREADABLE: [&str; 13] =
 const FOLDERS: [&str; 6] = ["images", "input", "photos", "rgb", "frames", "imgs"];
 
 /// Extensions to try for a photo that is listed without one.
-pub(crate) const EXTENSIONS: [&str; 7] = ["", ".png", ".jpg", ".jpeg", ".PNG", ".JPG", ".JPEG"];
+pub const EXTENSIONS: [&str; 7] = ["", ".png", ".jpg", ".jpeg", ".PNG", ".JPG", ".JPEG"];
 
 /// Returns true for the name of a photo that can be read.
-pub(crate) fn is_readable(path: &Path) -> bool {
+pub fn is_readable(path: &Path) -> bool {
     extension_is_of(path, &READABLE)
 }
 
@@ -65,7 +65,7 @@ impl Entries {
 
 /// Finds the photos of one scene.
 #[derive(Debug)]
-pub(crate) struct PhotoFinder {
+pub struct PhotoFinder {
     root: PathBuf,
     /// The folder that the user named.
     images: Option<PathBuf>,
@@ -79,7 +79,7 @@ pub(crate) struct PhotoFinder {
 
 impl PhotoFinder {
     /// Makes one for the scene in `root`; `images` replaces all folders.
-    pub(crate) fn new(root: &Path, images: Option<PathBuf>) -> Self {
+    pub fn new(root: &Path, images: Option<PathBuf>) -> Self {
         Self {
             root: root.to_owned(),
             images,
@@ -91,14 +91,14 @@ impl PhotoFinder {
     }
 
     /// Returns the folder of photos: the one that the user named, or this one of the scene.
-    pub(crate) fn folder(&self, usual: &str) -> PathBuf {
+    pub fn folder(&self, usual: &str) -> PathBuf {
         let below = || if usual == "." { self.root.clone() } else { self.root.join(usual) };
         self.images.clone().unwrap_or_else(below)
     }
 
     /// Finds the photo listed as `relative`: at this path below one of `folders` of the scene, also with an extension
     /// if it is listed without one, or elsewhere.
-    pub(crate) fn find(&self, folders: &[&str], relative: &Path) -> Option<PathBuf> {
+    pub fn find(&self, folders: &[&str], relative: &Path) -> Option<PathBuf> {
         let given = self.images.as_deref();
         let bases: Vec<PathBuf> = match given {
             Some(images) => vec![images.to_owned()],
@@ -138,7 +138,7 @@ impl PhotoFinder {
     }
 
     /// Returns a note on the photos that were found elsewhere.
-    pub(crate) fn note(&self) -> Option<String> {
+    pub fn note(&self) -> Option<String> {
         let elsewhere = self.elsewhere.borrow();
         let (count, listed, found) = elsewhere.as_ref()?;
         Some(format!(
@@ -150,7 +150,7 @@ impl PhotoFinder {
     }
 
     /// Says where photos were looked for and what lies below the scene, for messages.
-    pub(crate) fn hint(&self) -> String {
+    pub fn hint(&self) -> String {
         if let Some(images) = &self.images {
             let count = count_photos(images);
             return format!("the named folder {} holds {count} PNG or JPEG files", images.display());
@@ -172,7 +172,7 @@ impl PhotoFinder {
     }
 
     /// Returns the folder of the scene with the most photos, and their number.
-    pub(crate) fn most_photos(&self) -> Option<(PathBuf, usize)> {
+    pub fn most_photos(&self) -> Option<(PathBuf, usize)> {
         self.counts().into_iter().next().map(|(count, folder)| (folder, count))
     }
 
@@ -274,6 +274,6 @@ fn with_any(path: &Path) -> Option<PathBuf> {
 }
 
 /// Returns the number of photos in a folder that can be read.
-pub(crate) fn count_photos(folder: &Path) -> usize {
+pub fn count_photos(folder: &Path) -> usize {
     read::folder(folder).unwrap_or_default().iter().filter(|path| is_readable(path) && path.is_file()).count()
 }

@@ -6,10 +6,9 @@
 
 use super::LoadOptions;
 use super::recipe::{MadeView, Recipe};
-use crate::error::{Error, Result, Setting};
-use crate::files::scratch::{Place, Scratch};
-use crate::scene::pixels::{Picture, Source};
-use crate::scene::{LabelMap, Photo, Pixels, View};
+use labelgs_files::scratch::{Place, Scratch};
+use labelgs_scene::pixels::{Picture, Source};
+use labelgs_scene::{Error, LabelMap, Photo, Pixels, Result, Setting, View};
 use std::marker::PhantomData;
 use std::path::PathBuf;
 use std::sync::Arc;

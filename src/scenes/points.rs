@@ -1,10 +1,9 @@
 //! Coloured points.
 
 use super::listing::FAR;
-use crate::error::{Error, Result};
-use crate::formats::table::Table;
-use crate::scene::Point;
 use glam::DVec3;
+use labelgs_formats::table::Table;
+use labelgs_scene::{Error, Point, Result};
 use std::path::Path;
 
 /// What programs call red, green and blue.

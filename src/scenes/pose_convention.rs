@@ -3,9 +3,9 @@
 //! A format says whether its poses are camera-to-world or world-to-camera, and whether cameras have the axes of OpenCV
 //! (y down, looking along z) or of OpenGL (y up, looking along -z). Programs that write it at times mean another one.
 
-use crate::options::Numbers;
-use crate::scene::Camera;
 use glam::{DMat3, DQuat, DVec3};
+use labelgs_scene::Camera;
+use labelgs_scene::options::Numbers;
 use serde::{Deserialize, Serialize};
 use std::fmt::{self, Display};
 use std::str::FromStr;
@@ -38,18 +38,18 @@ pub struct PoseConvention {
 
 /// The convention of a format.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Native(Direction, Axes);
+pub struct Native(Direction, Axes);
 
 impl Native {
     /// COLMAP's images.
-    pub(crate) const COLMAP: Self = Self(Direction::WorldToCamera, Axes::OpenCv);
+    pub const COLMAP: Self = Self(Direction::WorldToCamera, Axes::OpenCv);
     /// The transforms of Blender, instant-ngp and nerfstudio.
-    pub(crate) const TRANSFORMS: Self = Self(Direction::CameraToWorld, Axes::OpenGl);
+    pub const TRANSFORMS: Self = Self(Direction::CameraToWorld, Axes::OpenGl);
     /// Metashape's transforms, and the poses of LLFF as its reader turns them.
-    pub(crate) const CAMERA_TO_WORLD: Self = Self(Direction::CameraToWorld, Axes::OpenCv);
+    pub const CAMERA_TO_WORLD: Self = Self(Direction::CameraToWorld, Axes::OpenCv);
 
     /// Returns the other conventions that the file may mean, those of fewer differences first.
-    pub(crate) fn others(self) -> Vec<PoseConvention> {
+    pub fn others(self) -> Vec<PoseConvention> {
         let Self(direction, axes) = self;
         let turned = match direction {
             Direction::CameraToWorld => Direction::WorldToCamera,
@@ -81,12 +81,12 @@ const SWAP: DMat3 = DMat3::from_diagonal(DVec3::new(1.0, -1.0, -1.0));
 
 impl PoseConvention {
     /// Returns true if nothing differs from the format.
-    pub(crate) fn is_native(self) -> bool {
+    pub fn is_native(self) -> bool {
         self == Self::default()
     }
 
     /// Turns a camera that was read by the convention of its format into what the file means.
-    pub(crate) fn apply(self, native: Native, camera: &mut Camera) {
+    pub fn apply(self, native: Native, camera: &mut Camera) {
         if self.is_native() {
             return;
         }
@@ -114,7 +114,7 @@ impl PoseConvention {
     }
 
     /// Returns what the file means, in words.
-    pub(crate) fn text(self) -> String {
+    pub fn text(self) -> String {
         let direction = self.direction.map(|direction| match direction {
             Direction::CameraToWorld => "camera-to-world poses",
             Direction::WorldToCamera => "world-to-camera poses",

@@ -1,10 +1,10 @@
 //! Settings for reading the scene of a run.
 
 use super::pose_convention::PoseConvention;
-use crate::error::{Error, Result, Setting};
-use crate::options::Options;
+use labelgs_scene::options::Options;
+use labelgs_scene::{Error, Result, Setting};
 
-crate::options::options! {
+labelgs_scene::options! {
     /// The settings for the pixels that a run trains on and the views that it holds out.
     pub struct ReadOptions {
         "Scene" {

@@ -5,47 +5,46 @@ use super::lens::Lens;
 use super::listing::{Listed, check_camera};
 use super::resample::{resample_ids, undistort_photo};
 use super::window::Window;
-use crate::error::{Error, Result};
-use crate::files::image::{check_size, photo_size, read_open_photo, read_photo};
-use crate::files::resize::{bounded_size, same_aspect, shrink_photo};
-use crate::masks::mask::{read_checked, read_ignored};
-use crate::scene::{Camera, LabelMap, Photo};
+use labelgs_files::image::{check_size, photo_size, read_open_photo, read_photo};
+use labelgs_files::resize::{bounded_size, same_aspect, shrink_photo};
+use labelgs_masks::mask::{read_checked, read_ignored};
+use labelgs_scene::{Camera, Error, LabelMap, Photo, Result};
 use std::path::{Path, PathBuf};
 
 /// The files of a photo and how its views are made of them.
 #[derive(Clone, Debug)]
-pub(crate) struct Recipe {
-    pub(crate) listed: Listed,
+pub struct Recipe {
+    pub listed: Listed,
     /// The file that lists the photo, for messages.
-    pub(crate) source: PathBuf,
-    pub(crate) mask: Option<PathBuf>,
-    pub(crate) ignore: Option<PathBuf>,
+    pub source: PathBuf,
+    pub mask: Option<PathBuf>,
+    pub ignore: Option<PathBuf>,
     /// Decodes the photo.
-    pub(crate) photos: bool,
+    pub photos: bool,
     /// Colour behind a transparent photo; `None` keeps its opacity.
-    pub(crate) background: Option<[f32; 3]>,
-    pub(crate) max_resolution: Option<u32>,
-    pub(crate) undistort: bool,
+    pub background: Option<[f32; 3]>,
+    pub max_resolution: Option<u32>,
+    pub undistort: bool,
 }
 
 /// A view with its pixels.
-pub(crate) struct MadeView {
-    pub(crate) name: String,
-    pub(crate) camera: Camera,
-    pub(crate) photo: Option<Photo>,
-    pub(crate) mask: Option<LabelMap>,
+pub struct MadeView {
+    pub name: String,
+    pub camera: Camera,
+    pub photo: Option<Photo>,
+    pub mask: Option<LabelMap>,
 }
 
 /// All views of a photo.
-pub(crate) struct MadeViews {
-    pub(crate) views: Vec<MadeView>,
+pub struct MadeViews {
+    pub views: Vec<MadeView>,
     /// Number of masks with another size than the photo.
-    pub(crate) resampled: usize,
+    pub resampled: usize,
 }
 
 impl Recipe {
     /// `source` lists the photo. `[mask, ignore]` are files of the photo, which is held out if `test`.
-    pub(crate) fn new(
+    pub fn new(
         (listed, source): (Listed, PathBuf),
         [mask, ignore]: [Option<PathBuf>; 2],
         test: bool,
@@ -57,12 +56,12 @@ impl Recipe {
     }
 
     /// Reads the size in the photo's file; `None` without a file.
-    pub(crate) fn stored(&self) -> Result<Option<(u32, u32)>> {
+    pub fn stored(&self) -> Result<Option<(u32, u32)>> {
         self.listed.photo.as_deref().map(stored_size).transpose()
     }
 
     /// Decodes the photo, if photos are wanted. `stored` is the size in its file.
-    pub(crate) fn decode(&self, stored: Option<(u32, u32)>) -> Result<Option<Photo>> {
+    pub fn decode(&self, stored: Option<(u32, u32)>) -> Result<Option<Photo>> {
         let camera = &self.listed.camera;
         // Check the shape before the pixels take memory; the error comes later.
         match (&self.listed.photo, stored) {
@@ -75,7 +74,7 @@ impl Recipe {
     }
 
     /// Makes the views, one or several, of the decoded photo.
-    pub(crate) fn views(&self, stored: Option<(u32, u32)>, mut photo: Option<Photo>) -> Result<MadeViews> {
+    pub fn views(&self, stored: Option<(u32, u32)>, mut photo: Option<Photo>) -> Result<MadeViews> {
         let original = at_size(&self.listed, stored)?;
         let size = (original.width, original.height);
         let mask = self.mask.as_deref().map(|path| read_checked(path, |found| fits_photo(path, found, size)));
@@ -112,7 +111,7 @@ impl Recipe {
     }
 
     /// Returns the number of pixels of all views.
-    pub(crate) fn pixels(&self, stored: Option<(u32, u32)>) -> u64 {
+    pub fn pixels(&self, stored: Option<(u32, u32)>) -> u64 {
         // The error comes when the views are made.
         let Ok(original) = at_size(&self.listed, stored) else { return 0 };
         let sizes = self.windows(&original).into_iter().map(|window| self.size_of(&window));
@@ -148,7 +147,7 @@ fn leave_out(photo: &mut Photo, ignored: &LabelMap) {
 const NO_WINDOW: &str = "the lens of its camera shows nothing of the photo; check focal lengths and coefficients";
 
 /// Returns the camera at the size of the photo's file, which may be a scaled version of the size in the data set.
-pub(crate) fn at_photo_size(listed: &Listed) -> Result<Camera> {
+pub fn at_photo_size(listed: &Listed) -> Result<Camera> {
     at_size(listed, listed.photo.as_deref().map(stored_size).transpose()?)
 }
 

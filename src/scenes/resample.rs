@@ -1,15 +1,15 @@
 //! Photos and id maps through another lens.
 //!
-//! Photos are undistorted at their own size with bilinear interpolation, then shrunk by [`crate::files::resize`]. Ids are never
+//! Photos are undistorted at their own size with bilinear interpolation, then shrunk by [`labelgs_files::resize`]. Ids are never
 //! mixed: each target pixel takes the id at its centre, with size and lens in one step.
 
 use super::window::Window;
-use crate::scene::{Camera, LabelMap, Photo};
 use glam::DVec2;
+use labelgs_scene::{Camera, LabelMap, Photo};
 use rayon::prelude::*;
 
 /// Returns the photo through the pinhole view of it. Pixels outside of the photo are black with alpha 0.
-pub(crate) fn undistort_photo(photo: &Photo, view: &Window) -> Photo {
+pub fn undistort_photo(photo: &Photo, view: &Window) -> Photo {
     let Camera { width, height, .. } = view.camera;
     let row = |y: u32| {
         (0..width).map(move |x| {
@@ -46,13 +46,13 @@ fn bilinear(photo: &Photo, at: DVec2) -> [u8; 4] {
 
 /// Makes the id map of a view with `width` x `height` px from a map of its photo at any scale. Pixels outside of the
 /// photo get 0.
-pub(crate) fn resample_ids(ids: &LabelMap, view: &Window, (width, height): (u32, u32)) -> LabelMap {
+pub fn resample_ids(ids: &LabelMap, view: &Window, (width, height): (u32, u32)) -> LabelMap {
     let ids = resample_nearest(&ids.ids, (ids.width, ids.height), view, (width, height), 0);
     LabelMap { width, height, ids }
 }
 
 /// Like [`resample_ids`] for values of any kind; pixels outside of the photo get `nothing`.
-pub(crate) fn resample_nearest<T: Copy + Send + Sync>(
+pub fn resample_nearest<T: Copy + Send + Sync>(
     values: &[T],
     from: (u32, u32),
     view: &Window,

@@ -1,10 +1,9 @@
 //! Arrays of one kind for all views, such as depth maps, within a budget of memory.
 
 use super::PHOTO_MEMORY;
-use crate::error::{Error, Result};
-use crate::files::scratch::{Place, Scratch, system_folder};
-use crate::scene::Pixels;
-use crate::scene::pixels::Source;
+use labelgs_files::scratch::{Place, Scratch, system_folder};
+use labelgs_scene::pixels::Source;
+use labelgs_scene::{Error, Pixels, Result};
 use std::sync::Arc;
 
 /// Memory of a shelf, bytes. Photos have their own.
@@ -12,14 +11,14 @@ const MEMORY: u64 = PHOTO_MEMORY / 4;
 
 /// Takes arrays; from the first one on that does not fit, they wait in a temporary file.
 #[derive(Debug)]
-pub(crate) struct Shelf {
+pub struct Shelf {
     left: u64,
     scratch: Arc<Scratch>,
 }
 
 impl Shelf {
     /// Makes an empty one.
-    pub(crate) fn new() -> Self {
+    pub fn new() -> Self {
         Self::of(MEMORY)
     }
 
@@ -28,7 +27,7 @@ impl Shelf {
     }
 
     /// Takes an array. Without space for the file it stays in memory.
-    pub(crate) fn put(&mut self, values: Vec<f32>) -> Pixels<Vec<f32>> {
+    pub fn put(&mut self, values: Vec<f32>) -> Pixels<Vec<f32>> {
         let bytes = size_of_val(values.as_slice()) as u64;
         self.left = self.left.saturating_sub(bytes);
         let place = if self.left > 0 {

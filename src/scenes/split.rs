@@ -2,10 +2,10 @@
 
 use super::listed_path::Place;
 use super::listing::{Listed, Listing};
-use crate::error::{Result, Setting};
-use crate::files::names::shortened;
-use crate::files::read;
-use crate::words::counted;
+use labelgs_files::names::shortened;
+use labelgs_files::read;
+use labelgs_scene::words::counted;
+use labelgs_scene::{Result, Setting};
 use serde::Deserialize;
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};

@@ -2,9 +2,9 @@
 
 use super::bad_photos::allowed;
 use super::listing::Listed;
-use crate::files::names::shortened;
-use crate::scene::Point;
-use crate::scene::spread::Spread;
+use labelgs_files::names::shortened;
+use labelgs_scene::Point;
+use labelgs_scene::spread::Spread;
 
 /// Distance from which a camera is stray, in radii of cameras and points, whichever are wider.
 const RADII: f64 = 30.0;

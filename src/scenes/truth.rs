@@ -2,11 +2,10 @@
 
 use super::resample::resample_ids;
 use super::window::Window;
-use crate::error::{Error, Result};
-use crate::files::image::read_grey;
-use crate::files::read;
-use crate::files::resize::{bounded_size, same_aspect, shrink_photo};
-use crate::scene::{LabelMap, Photo, View};
+use labelgs_files::image::read_grey;
+use labelgs_files::read;
+use labelgs_files::resize::{bounded_size, same_aspect, shrink_photo};
+use labelgs_scene::{Error, LabelMap, Photo, Result, View};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -95,6 +94,6 @@ pub fn read_truth(path: &Path, view: &View, windows: &BTreeMap<String, Window>) 
 }
 
 /// Shrinks a photo to the size of a mask, which is not larger.
-pub(crate) fn photo_at(photo: &Photo, width: u32, height: u32) -> Photo {
+pub fn photo_at(photo: &Photo, width: u32, height: u32) -> Photo {
     shrink_photo(photo, width, height)
 }

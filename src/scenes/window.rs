@@ -3,9 +3,8 @@
 use super::lens::{Lens, Optics};
 use super::lookup::Lookup;
 use super::recipe::at_photo_size;
-use crate::Result;
-use crate::scene::{Camera, LabelMap};
 use glam::{DMat3, DVec2, DVec3};
+use labelgs_scene::{Camera, LabelMap, Result};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::path::Path;

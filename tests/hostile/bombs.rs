@@ -7,12 +7,12 @@ use exr::prelude::{
     Vec2, WritableImage,
 };
 use labelgs::Result;
+use labelgs::files::image::photo_size;
 use labelgs::files::read_photo;
 use labelgs::formats::read_model;
-use labelgs::internals::files::image::photo_size;
-use labelgs::internals::scenes::points::read_points;
 use labelgs::masks::read_mask;
 use labelgs::scene::DepthMap;
+use labelgs::scenes::points::read_points;
 use labelgs::scenes::{self, DepthFolder, LoadOptions};
 use std::path::Path;
 

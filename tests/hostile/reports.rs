@@ -1,9 +1,9 @@
 //! Reported failures of other programs, one test each.
 
 use crate::io::fixtures::{ColmapCamera, Scene, images_bin, pinhole, refusal, simple};
+use labelgs::files::image::{photo_size, write_png_grey16};
 use labelgs::files::read_photo;
 use labelgs::formats::{read_model, write_model};
-use labelgs::internals::files::image::{photo_size, write_png_grey16};
 use labelgs::masks::read_mask;
 use labelgs::scene::{Dataset, Gaussians};
 use labelgs::scenes::{self, LoadOptions};

@@ -197,7 +197,7 @@ fn a_damaged_scene_trains_with_warnings_or_says_what_is_wrong() {
         if mask.extension().is_some_and(|extension| extension == "png") {
             let whole = labelgs::masks::read_mask(&mask).expect("a mask");
             let ids: Vec<u16> = (0..24 * 18).map(|index| whole.at(index % 24 * 2, index / 24 * 2)).collect();
-            labelgs::internals::files::image::write_png_grey16(&mask, 24, 18, &ids).expect("a mask");
+            labelgs::files::image::write_png_grey16(&mask, 24, 18, &ids).expect("a mask");
         }
     }
     let (masks, out) = (at("scene/masks"), at("out"));

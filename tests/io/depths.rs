@@ -1,7 +1,7 @@
 //! Depth maps from every kind of file, brought to their photos.
 
 use super::fixtures::{ColmapCamera, Scene, refusal, simple};
-use labelgs::internals::files;
+use labelgs::files;
 use labelgs::scene::{Dataset, DepthMap, View};
 use labelgs::scenes::{self, DepthFolder, LoadOptions};
 use std::path::Path;

@@ -2,11 +2,11 @@
 
 use glam::{DMat3, DVec3};
 use labelgs::internals::cli::status::exit_status;
-use labelgs::internals::scenes::init::add_far_gaussians;
 use labelgs::internals::train::first_model;
 use labelgs::run::{StrategyKind, TrainConfig};
 use labelgs::scene::harmonics::SH_C0;
 use labelgs::scene::{Camera, Dataset, Photo, Point, View};
+use labelgs::scenes::init::add_far_gaussians;
 use labelgs::scenes::initial_gaussians;
 
 fn point(x: f64, y: f64, z: f64) -> Point {

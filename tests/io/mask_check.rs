@@ -1,12 +1,12 @@
 //! `masks check` finds each kind of planted fault, and nothing in clean masks.
 
 use super::mask_forms::*;
-use labelgs::internals::files::image::write_png_grey8;
-use labelgs::internals::masks::check::{Look, findings};
-use labelgs::internals::synth;
+use labelgs::files::image::write_png_grey8;
+use labelgs::masks::check::{Look, findings};
 use labelgs::masks::{Finding, Problem, Report, inspect};
 use labelgs::scene::{Camera, Dataset, LabelMap, Point};
 use labelgs::scenes::{self, LoadOptions};
+use labelgs::synth;
 use labelgs::synth::SynthOptions;
 use std::fs;
 use std::path::Path;

@@ -3,8 +3,8 @@
 use super::fixtures::*;
 use super::mask_forms::*;
 use labelgs::files::LabelTable;
+use labelgs::files::label_table::FILE;
 use labelgs::internals::cli::status::exit_status;
-use labelgs::internals::files::label_table::FILE;
 use labelgs::masks::{Format, ImportOptions, Imported, Overlap, import, read_mask};
 use labelgs::scene::Dataset;
 use labelgs::scenes::{self, LoadOptions};

@@ -2,10 +2,10 @@
 
 use super::fixtures::*;
 use glam::{DMat3, DVec3};
+use labelgs::files::{atomic, image as images};
 use labelgs::internals::cli::status::exit_status;
-use labelgs::internals::files::{atomic, image as images};
-use labelgs::internals::scenes::camera_json;
 use labelgs::scene::Camera;
+use labelgs::scenes::camera_json;
 use std::fs;
 use std::io::Error;
 use std::time::Duration;

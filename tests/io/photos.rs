@@ -2,11 +2,11 @@
 
 use super::fixtures::*;
 use glam::DVec2;
+use labelgs::files::image::{photo_size, write_png_grey16};
 use labelgs::files::read_photo;
 use labelgs::internals::cli::status::exit_status;
-use labelgs::internals::files::image::{photo_size, write_png_grey16};
-use labelgs::internals::scenes::lens::{Lens, Polynomial, Projection};
 use labelgs::scene::{Dataset, Photo};
+use labelgs::scenes::lens::{Lens, Polynomial, Projection};
 use labelgs::scenes::{self, LoadOptions};
 use std::fs;
 

@@ -2,8 +2,8 @@
 
 use super::fixtures::*;
 use labelgs::formats::{LabelType, WriteOptions, export_model, read_model, write_model};
-use labelgs::internals::scenes::points::read_points;
 use labelgs::scene::Gaussians;
+use labelgs::scenes::points::read_points;
 use std::fs;
 
 /// All values differ, so a swapped column is found.

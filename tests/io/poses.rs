@@ -2,8 +2,8 @@
 
 use super::fixtures::*;
 use glam::{DVec2, DVec3};
-use labelgs::internals::scenes::window::windows;
 use labelgs::scene::{Camera, Dataset};
+use labelgs::scenes::window::windows;
 use labelgs::scenes::{self, LoadOptions};
 use std::path::Path;
 

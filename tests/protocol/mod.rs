@@ -6,12 +6,12 @@ mod refusals;
 mod rules;
 
 use labelgs::eval::protocol::{Ask, Bench, By, Layout, Painter, Protocol, Report, run};
+use labelgs::files::image::write_png_grey8;
 use labelgs::files::{LabelEntry, LabelTable};
 use labelgs::internals::cli::status::exit_status;
 use labelgs::internals::eval::protocol::score::Drawn;
-use labelgs::internals::files::image::write_png_grey8;
-use labelgs::internals::scenes::truth::{files_below, read_truth};
 use labelgs::scene::{Camera, LabelMap, Photo, View};
+use labelgs::scenes::truth::{files_below, read_truth};
 use labelgs::{Error, Result};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;

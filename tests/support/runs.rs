@@ -62,7 +62,7 @@ impl Place {
         self.faulty(args, None)
     }
 
-    /// Runs the program with an injected fault (`src/lab/fault.rs`).
+    /// Runs the program with an injected fault (`src/scene/lab/fault.rs`).
     pub fn faulty(&self, args: &[&str], fault: Option<&str>) -> Output {
         let mut command = Command::cargo_bin("labelgs").expect("the tool is built");
         command.env("LABELGS_VALIDATION", "off").env("LABELGS_CACHE", self.path("cache"));

@@ -3,9 +3,9 @@
 use super::chromium::{Browser, Tab};
 use super::server::{HOSTILE, Picture, Place, model};
 use labelgs::formats::write_model;
-use labelgs::internals::scenes::camera_json::CameraFile;
 use labelgs::scene::Gaussians;
 use labelgs::scenes::LoadOptions;
+use labelgs::scenes::camera_json::CameraFile;
 use std::fmt::Write;
 
 /// Pictures of a page are blended in 8 bits: their error is a few steps of 1/256 where many Gaussians overlap.

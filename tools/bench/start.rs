@@ -2,9 +2,9 @@
 
 use super::measure::{median, write_json};
 use super::{Common, memory};
+use labelgs::files::atomic;
 use labelgs::formats::write_model;
-use labelgs::internals::files::atomic;
-use labelgs::internals::scenes::camera_json::CameraFile;
+use labelgs::scenes::camera_json::CameraFile;
 use labelgs::{Error, Result};
 use serde_json::json;
 use std::path::Path;

@@ -8,11 +8,11 @@ use labelgs::eval::MeanScores;
 use labelgs::eval::{Rendering, evaluate};
 use labelgs::gpu::Gpu;
 use labelgs::internals::scheduler::SchedulerOptions;
-use labelgs::internals::synth;
 use labelgs::internals::train::{StepReport, Trainer, first_model};
 use labelgs::render::{NEAR, RenderOptions};
 use labelgs::run::TrainConfig;
 use labelgs::scene::{Dataset, Gaussians, View};
+use labelgs::synth;
 use labelgs::synth::{Preset, SynthOptions};
 use std::sync::Arc;
 

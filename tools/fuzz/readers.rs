@@ -3,17 +3,17 @@
 use super::seeds;
 use labelgs::Result;
 use labelgs::files::LabelTable;
+use labelgs::files::image;
+use labelgs::formats;
 use labelgs::internals::cli::profile_compare::{Profile, compare};
 use labelgs::internals::eval::lpips::weights::read_tensors;
-use labelgs::internals::files::image;
-use labelgs::internals::formats;
-use labelgs::internals::masks::mask;
 use labelgs::internals::records::checkpoint::Checkpoint;
-use labelgs::internals::scenes::{camera_json, points};
+use labelgs::masks::mask;
 use labelgs::masks::{Format, ImportOptions, import};
 use labelgs::records::OcclusionTable;
 use labelgs::scene::{Camera, Dataset, Gaussians, Photo};
 use labelgs::scenes::{self, DepthFolder, Frames, LoadOptions};
+use labelgs::scenes::{camera_json, points};
 use std::path::Path;
 
 pub fn put(folder: &Path, name: &str, bytes: impl AsRef<[u8]>) {

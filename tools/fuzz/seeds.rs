@@ -1,9 +1,9 @@
 //! Small valid files of every kind, made by the program's own writers where they exist.
 
+use labelgs::files::image as pixels;
 use labelgs::files::{LabelEntry, LabelTable};
 use labelgs::formats::{SpzVersion, WriteOptions, export_model, write_model};
 use labelgs::gpu::PipelineStore;
-use labelgs::internals::files::image as pixels;
 use labelgs::records::PipelineFolder;
 use labelgs::run::Settings;
 use labelgs::scene::Gaussians;

@@ -5,9 +5,9 @@ use super::evidence::on_surface;
 use super::light::Light;
 use super::plane::Plane;
 use super::sheet::{BESIDE, Sheet};
-use crate::scene::Gaussians;
-use crate::scene::harmonics::{sh0_of, value_of};
 use glam::{DVec2, DVec3};
+use labelgs_scene::Gaussians;
+use labelgs_scene::harmonics::{sh0_of, value_of};
 use rayon::prelude::*;
 
 /// Least sine of the angle between the light and a plane with shadows.

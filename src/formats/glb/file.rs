@@ -1,7 +1,7 @@
 //! The chunks of a GLB.
 
-use crate::error::{Error, Result};
-use crate::formats::format::Export;
+use crate::format::Export;
+use labelgs_scene::{Error, Result};
 use serde_json::Value;
 use std::io::{self, Write};
 use std::path::Path;

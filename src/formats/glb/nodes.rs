@@ -1,7 +1,7 @@
 //! Where the nodes of a scene place the primitives with Gaussians.
 
 use super::{AXES, SPLATS};
-use crate::formats::transform::Transform;
+use crate::transform::Transform;
 use glam::{DMat3, DMat4, DQuat, DVec3};
 use serde_json::Value;
 

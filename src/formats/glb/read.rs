@@ -5,15 +5,15 @@ use super::{
     ANTIALIASED, AXES, CONFIDENCE, FEATURE, FEATURE_MAX, FEATURES, FLOAT, METADATA, OPACITY, ROTATION, SCALE, SPLATS,
     file, harmonic, harmonics,
 };
-use crate::error::{Error, Result};
-use crate::files::label_table::{LabelEntry, LabelTable};
-use crate::files::read as bytes_of;
-use crate::formats::format::ReadModel;
-use crate::formats::ply::fitting;
-use crate::formats::rows::{Row, Rows};
-use crate::formats::transform::Transform;
-use crate::formats::values::log_scale;
-use crate::scene::{Gaussians, MODEL_LABEL_MAX};
+use crate::format::ReadModel;
+use crate::ply::fitting;
+use crate::rows::{Row, Rows};
+use crate::transform::Transform;
+use crate::values::log_scale;
+use labelgs_files::label_table::{LabelEntry, LabelTable};
+use labelgs_files::read as bytes_of;
+use labelgs_scene::{Error, Result};
+use labelgs_scene::{Gaussians, MODEL_LABEL_MAX};
 use serde_json::Value;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;

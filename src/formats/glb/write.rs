@@ -4,12 +4,11 @@ use super::{
     ANTIALIASED, AXES, CONFIDENCE, FEATURE, FEATURES, FLOAT, METADATA, OPACITY, ROTATION, SCALE, SPLATS, file,
     harmonic, harmonics,
 };
-use crate::error::{Error, Result};
-use crate::files::label_table::LabelTable;
-use crate::formats::format::{Export, ModelWriter};
-use crate::formats::values::sigmoid;
-use crate::scene::UNLABELLED;
-use crate::scene::harmonics::value_of;
+use crate::format::{Export, ModelWriter};
+use crate::values::sigmoid;
+use labelgs_files::label_table::LabelTable;
+use labelgs_scene::harmonics::value_of;
+use labelgs_scene::{Error, Result, UNLABELLED};
 use serde_json::{Map, Value, json};
 use std::collections::BTreeSet;
 use std::io::{self, Write};

@@ -3,13 +3,13 @@
 
 use super::format::{Export, FirstView, ModelFormat, ModelWriter, ReadModel};
 use super::spz;
-use crate::error::{Error, Result};
-use crate::files::read as file;
-use crate::scene::UNLABELLED;
-use crate::scene::labels::label_colour;
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 use glam::DVec3;
+use labelgs_files::read as file;
+use labelgs_scene::UNLABELLED;
+use labelgs_scene::labels::label_colour;
+use labelgs_scene::{Error, Result};
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 use serde_json::json;
 use std::collections::BTreeMap;

@@ -1,8 +1,8 @@
 //! The columns of a 3DGS PLY: which of them are read, and which are named because they would change the picture.
 
-use crate::error::{Error, Result};
-use crate::formats::rows::Rows;
-use crate::formats::table::Table;
+use crate::rows::Rows;
+use crate::table::Table;
+use labelgs_scene::{Error, Result};
 use std::collections::BTreeMap;
 use std::path::Path;
 

@@ -1,10 +1,9 @@
 //! Rows of a 3DGS PLY.
 
 use super::columns::{Columns, coefficients};
-use crate::error::{Error, Result};
-use crate::formats::rows::Row;
-use crate::scene::MODEL_LABEL_MAX;
-use crate::scene::harmonics::sh0_of;
+use crate::rows::Row;
+use labelgs_scene::harmonics::sh0_of;
+use labelgs_scene::{Error, MODEL_LABEL_MAX, Result};
 use std::path::Path;
 
 /// Values of a row before the harmonics.

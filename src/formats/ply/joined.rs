@@ -1,10 +1,9 @@
 //! Writes a file of many models, one after the other, so that no more than one is in memory.
 
 use super::write::{write_header, write_rows};
-use crate::error::{Error, Result, Setting};
-use crate::files::atomic;
-use crate::formats::format::{Export, WriteOptions};
-use crate::scene::Gaussians;
+use crate::format::{Export, WriteOptions};
+use labelgs_files::atomic;
+use labelgs_scene::{Error, Gaussians, Result, Setting};
 use std::io;
 use std::path::Path;
 
@@ -14,7 +13,7 @@ use std::path::Path;
 /// # Errors
 ///
 /// Another number of rows, or a part with other columns; what a part cannot be read for.
-pub(crate) fn write_joined(
+pub fn write_joined(
     path: &Path,
     like: &Gaussians,
     count: usize,
@@ -51,7 +50,7 @@ fn export<'a>(model: &'a Gaussians, rows: &'a [usize], like: &Gaussians) -> Expo
 }
 
 /// Returns a part with the columns and the origin of `like`.
-pub(in crate::formats) fn fitting(mut part: Gaussians, like: &Gaussians) -> Result<Gaussians> {
+pub(crate) fn fitting(mut part: Gaussians, like: &Gaussians) -> Result<Gaussians> {
     if part.antialiased != like.antialiased {
         let problem = "is on for some of the models and off for others; train all alike, the coarse one too";
         return Err(Error::usage(Setting("antialias"), problem));

@@ -9,14 +9,14 @@ mod stored;
 mod write;
 
 pub(super) use joined::fitting;
-pub(crate) use joined::write_joined;
+pub use joined::write_joined;
 
 use super::format::{ModelFormat, ReadModel};
 use super::table::Table;
-use crate::error::{Error, Result};
 use columns::Columns;
 use decode::Decoder;
 use glam::DVec3;
+use labelgs_scene::{Error, Result};
 use std::path::Path;
 
 pub use stored::StoredModel;
@@ -40,7 +40,7 @@ pub(super) const FORMAT: ModelFormat =
 /// label 1. Rows that cannot be rendered are dropped and counted. A compressed PLY is read too. A label of -1 is none; one
 /// that is no whole number up to [`MODEL_LABEL_MAX`] is an error.
 ///
-/// [`MODEL_LABEL_MAX`]: crate::scene::MODEL_LABEL_MAX
+/// [`MODEL_LABEL_MAX`]: labelgs_scene::MODEL_LABEL_MAX
 fn read(path: &Path) -> Result<ReadModel> {
     if let Some(read) = packed::read(path)? {
         return Ok(read);

@@ -1,12 +1,12 @@
 //! The compressed PLY of PlayCanvas: chunks of 256 Gaussians with bounds, and values of 10 or 11 bits within them. It is
 //! only read: its readers refuse any further element, so labels have no place.
 
-use crate::error::{Error, Result};
-use crate::formats::format::ReadModel;
-use crate::formats::rows::{Row, Rows};
-use crate::formats::table::Elements;
-use crate::formats::values::logit_of_byte;
-use crate::scene::harmonics::sh0_of;
+use crate::format::ReadModel;
+use crate::rows::{Row, Rows};
+use crate::table::Elements;
+use crate::values::logit_of_byte;
+use labelgs_scene::harmonics::sh0_of;
+use labelgs_scene::{Error, Result};
 use std::f64::consts::SQRT_2;
 use std::path::Path;
 

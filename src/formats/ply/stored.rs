@@ -3,11 +3,10 @@
 use super::columns::Columns;
 use super::decode::Decoder;
 use super::{add_notes, is_antialiased, origin, packed};
-use crate::error::{Error, Result};
-use crate::formats::rows::{Row, Sieve};
-use crate::formats::table::Table;
-use crate::scene::Gaussians;
+use crate::rows::{Row, Sieve};
+use crate::table::Table;
 use glam::DVec3;
+use labelgs_scene::{Error, Gaussians, Result};
 use std::path::{Path, PathBuf};
 
 /// A 3DGS PLY whose rows have fixed places.
@@ -25,7 +24,7 @@ pub struct StoredModel {
 impl StoredModel {
     /// Opens a file; `None` for one that is read whole: of text, compressed, changed by an editor, or with positions of
     /// another type.
-    pub(in crate::formats) fn open(path: &Path) -> Result<Option<Self>> {
+    pub(crate) fn open(path: &Path) -> Result<Option<Self>> {
         // A pipe is read once.
         if !path.is_file() || packed::is_packed(path)? {
             return Ok(None);
@@ -38,39 +37,39 @@ impl StoredModel {
         let (count, antialiased, mut notes) = (table.count(), is_antialiased(table.comments()), Vec::new());
         let origin = match origin(path, &table)? {
             Some(origin) => origin,
-            None => crate::formats::origin::read(path, count, &mut notes)?,
+            None => crate::origin::read(path, count, &mut notes)?,
         };
         let has_places = table.places_of_rows(&columns.names())?.is_some();
         Ok(has_places.then(|| Self { path: path.to_owned(), columns, count, origin, notes, antialiased }))
     }
 
     /// The file.
-    pub(crate) fn path(&self) -> &Path {
+    pub fn path(&self) -> &Path {
         &self.path
     }
 
     /// Number of rows, those included that cannot be rendered.
-    pub(crate) fn count(&self) -> u64 {
+    pub fn count(&self) -> u64 {
         self.count
     }
 
     /// Degree of the spherical harmonics.
-    pub(crate) fn sh_degree(&self) -> u32 {
+    pub fn sh_degree(&self) -> u32 {
         self.columns.sh_degree
     }
 
     /// Returns true if rows have labels.
-    pub(crate) fn has_labels(&self) -> bool {
+    pub fn has_labels(&self) -> bool {
         self.columns.have_labels()
     }
 
     /// World position of the file's (0, 0, 0).
-    pub(crate) fn origin(&self) -> DVec3 {
+    pub fn origin(&self) -> DVec3 {
         self.origin
     }
 
     /// Calls `see` with the number and the values of each row that can be rendered, in order. Returns notes for the user.
-    pub(crate) fn scan(&self, mut see: impl FnMut(u64, &Row) -> Result<()>) -> Result<Vec<String>> {
+    pub fn scan(&self, mut see: impl FnMut(u64, &Row) -> Result<()>) -> Result<Vec<String>> {
         let (path, columns) = (&self.path, &self.columns);
         let (mut decoder, mut sieve) = (Decoder::new(path, columns), Sieve::default());
         let odd =
@@ -86,7 +85,7 @@ impl StoredModel {
     }
 
     /// Reads some rows, sorted, as a model about a place `far` from the origin of the file.
-    pub(crate) fn rows(&self, numbers: impl Iterator<Item = u64>, far: DVec3) -> Result<Gaussians> {
+    pub fn rows(&self, numbers: impl Iterator<Item = u64>, far: DVec3) -> Result<Gaussians> {
         let (path, columns) = (&self.path, &self.columns);
         let (mut rows, mut decoder) = (columns.rows(), Decoder::new(path, columns));
         let Some(mut places) = Table::open(path)?.places_of_rows(&columns.names())? else {

@@ -1,9 +1,9 @@
 //! Writes the standard 3DGS PLY.
 
 use super::{ANTIALIASED, MODE, ORIGIN};
-use crate::error::{Error, Result, Setting};
-use crate::formats::format::{Export, LabelType, ModelWriter};
+use crate::format::{Export, LabelType, ModelWriter};
 use glam::DVec3;
+use labelgs_scene::{Error, Result, Setting};
 use ply_rs_bw::ply::{Addable, DefaultElement, ElementDef, Encoding, Header, PropertyDef, PropertyType, ScalarType};
 use ply_rs_bw::writer::Writer;
 use std::io::{self, Write};

@@ -1,7 +1,7 @@
 //! The archive of a SOG and its pictures.
 
-use crate::error::{Error, Result};
 use image_webp::{ColorType, WebPDecoder, WebPEncoder};
+use labelgs_scene::{Error, Result};
 use std::io::{self, Cursor, Read, Write};
 use std::path::Path;
 use zip::write::SimpleFileOptions;

@@ -1,6 +1,6 @@
 //! `meta.json`.
 
-use crate::files::label_table::LabelTable;
+use labelgs_files::label_table::LabelTable;
 use serde::{Deserialize, Serialize};
 
 pub(super) const FILE: &str = "meta.json";

@@ -3,11 +3,11 @@
 use super::archive::{Archive, Picture};
 use super::meta::{ANTIALIASED, EXTRAS_VERSION, FILE, Labels, Meta, VERSION};
 use super::{CODEBOOK, PALETTE_ROW, ROTATION, coefficients};
-use crate::error::{Error, Result};
-use crate::files::read as file;
-use crate::formats::format::ReadModel;
-use crate::formats::rows::{Row, Rows};
-use crate::formats::values::logit_of_byte;
+use crate::format::ReadModel;
+use crate::rows::{Row, Rows};
+use crate::values::logit_of_byte;
+use labelgs_files::read as file;
+use labelgs_scene::{Error, Result};
 use std::f64::consts::SQRT_2;
 use std::path::Path;
 

@@ -4,9 +4,9 @@ use super::meta::{
     ANTIALIASED, Asset, Coded, EXTRAS_VERSION, Extras, FILE, Files, Labels, Means, Meta, Palette, VERSION,
 };
 use super::{CODEBOOK, LABELS, PALETTE_ROW, ROTATION, archive, cluster, coefficients};
-use crate::error::{Error, Result};
-use crate::formats::format::{Export, ModelWriter};
-use crate::formats::values::{byte, opacity_byte};
+use crate::format::{Export, ModelWriter};
+use crate::values::{byte, opacity_byte};
+use labelgs_scene::{Error, Result};
 use std::f32::consts::SQRT_2;
 use std::io::{self, Write};
 

@@ -1,7 +1,7 @@
 //! The axes of an SPZ: right, up, back, unless a record says others.
 
-use crate::formats::transform::Transform;
-use crate::formats::turn::Signs;
+use crate::transform::Transform;
+use crate::turn::Signs;
 use glam::DQuat;
 use std::f64::consts::FRAC_PI_2;
 

@@ -1,6 +1,6 @@
 //! The values of SPZ as bytes, and back.
 
-use crate::formats::values::byte;
+use crate::values::byte;
 
 /// Coefficients 1 to 3 keep 5 bits, higher ones 4, as other writers do: the rest compresses away.
 const SH_STEPS: [i32; 2] = [8, 16];

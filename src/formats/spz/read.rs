@@ -2,14 +2,14 @@
 
 use super::record::{self, Records};
 use super::{ANTIALIASED, BITS_MAX, HAS_RECORDS, MAGIC, pack, planes};
-use crate::error::{Error, Result};
-use crate::files::read as file;
-use crate::formats::format::ReadModel;
-use crate::formats::rows::{Row, Rows};
-use crate::formats::side_labels;
-use crate::formats::values::logit_of_byte;
+use crate::format::ReadModel;
+use crate::rows::{Row, Rows};
+use crate::side_labels;
+use crate::values::logit_of_byte;
 use flate2::read::GzDecoder;
 use half::f16;
+use labelgs_files::read as file;
+use labelgs_scene::{Error, Result};
 use std::io::Read;
 use std::path::Path;
 
@@ -46,7 +46,7 @@ pub(super) fn read(path: &Path) -> Result<ReadModel> {
 }
 
 /// Reads the bytes of an SPZ; `path` is where they come from.
-pub(in crate::formats) fn read_bytes(path: &Path, bytes: &[u8]) -> Result<ReadModel> {
+pub(crate) fn read_bytes(path: &Path, bytes: &[u8]) -> Result<ReadModel> {
     let Unpacked { header, planes, mut records, mut notes } = match bytes.first_chunk::<4>() {
         Some([0x1f, 0x8b, _, _]) => gzipped(path, bytes)?,
         Some(&magic) if u32::from_le_bytes(magic) == MAGIC => framed(path, bytes)?,

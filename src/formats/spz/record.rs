@@ -2,13 +2,12 @@
 //! confidences in the order of the Gaussians, then the names as JSON.
 
 use super::axes::FileAxes;
-use crate::error::{Error, Result};
-use crate::files::label_table::LabelTable;
-use crate::formats::format::Export;
-use crate::scene::MODEL_LABEL_MAX;
+use crate::format::Export;
 use flate2::Compression;
 use flate2::read::ZlibDecoder;
 use flate2::write::ZlibEncoder;
+use labelgs_files::label_table::LabelTable;
+use labelgs_scene::{Error, MODEL_LABEL_MAX, Result};
 use std::io::{self, Read, Write};
 use std::path::Path;
 

@@ -1,11 +1,11 @@
 //! Writes SPZ.
 
 use super::{ANTIALIASED, AXES, BITS_MAX, HAS_RECORDS, MAGIC, pack, planes, record};
-use crate::error::{Error, Result};
-use crate::formats::format::{Export, ModelWriter, SpzVersion};
-use crate::formats::values::opacity_byte;
+use crate::format::{Export, ModelWriter, SpzVersion};
+use crate::values::opacity_byte;
 use flate2::Compression;
 use flate2::write::GzEncoder;
+use labelgs_scene::{Error, Result};
 use std::io::{self, Write};
 
 pub(super) const WRITER: ModelWriter = ModelWriter { losses, write, checksum: Some(checksum) };
@@ -34,7 +34,7 @@ fn bits(extent: f32) -> u32 {
     most.min(least.max(BITS_USUAL))
 }
 
-pub(in crate::formats) fn losses(export: &Export) -> Result<Vec<String>> {
+pub(crate) fn losses(export: &Export) -> Result<Vec<String>> {
     let (g, extent) = (export.model, extent(export));
     if export.rows.is_empty() || export.rows.len() > i32::MAX as usize {
         let problem = format!("an SPZ holds 1 to {} Gaussians, not {}", i32::MAX, export.rows.len());
@@ -99,7 +99,7 @@ fn write(export: &Export, out: &mut dyn Write) -> io::Result<()> {
 }
 
 /// Writes version 3, whatever the options say.
-pub(in crate::formats) fn write_v3(export: &Export, out: &mut dyn Write) -> io::Result<()> {
+pub(crate) fn write_v3(export: &Export, out: &mut dyn Write) -> io::Result<()> {
     write_version(export, false, out)
 }
 

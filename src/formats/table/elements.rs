@@ -1,13 +1,13 @@
 //! All elements of a little-endian PLY, for formats with more than `vertex`.
 
 use super::table::{decode, layout_of, read_header, stride_of};
-use crate::error::{Error, Result};
-use crate::files::read;
+use labelgs_files::read;
+use labelgs_scene::{Error, Result};
 use ply_rs_bw::ply::{ElementDef, Encoding, ScalarType};
 use std::path::{Path, PathBuf};
 
 /// A PLY in memory.
-pub(crate) struct Elements {
+pub struct Elements {
     path: PathBuf,
     bytes: Vec<u8>,
     header_bytes: usize,
@@ -17,7 +17,7 @@ pub(crate) struct Elements {
 }
 
 /// Columns of an element.
-pub(crate) struct Scalars<'a> {
+pub struct Scalars<'a> {
     bytes: &'a [u8],
     stride: usize,
     rows: usize,
@@ -25,23 +25,23 @@ pub(crate) struct Scalars<'a> {
 }
 
 impl Scalars<'_> {
-    pub(crate) fn rows(&self) -> usize {
+    pub fn rows(&self) -> usize {
         self.rows
     }
 
-    pub(crate) fn value(&self, row: usize, column: usize) -> f64 {
+    pub fn value(&self, row: usize, column: usize) -> f64 {
         let (offset, scalar) = &self.columns[column];
         decode(scalar, &self.bytes[row * self.stride + offset..], false)
     }
 
-    pub(crate) fn row<const N: usize>(&self, row: usize) -> [f64; N] {
+    pub fn row<const N: usize>(&self, row: usize) -> [f64; N] {
         std::array::from_fn(|column| self.value(row, column))
     }
 }
 
 impl Elements {
     /// Reads the header; the rest is read only if some element has the property `if_property`.
-    pub(crate) fn open(path: &Path, if_property: &str) -> Result<Option<Self>> {
+    pub fn open(path: &Path, if_property: &str) -> Result<Option<Self>> {
         let mut file = read::open(path)?;
         let (header, header_bytes) = read_header(path, &mut file)?;
         let comments = header.comments;
@@ -55,18 +55,18 @@ impl Elements {
     }
 
     /// Returns the comments of the header.
-    pub(crate) fn comments(&self) -> impl Iterator<Item = &str> {
+    pub fn comments(&self) -> impl Iterator<Item = &str> {
         self.comments.iter().map(String::as_str)
     }
 
     /// Returns true if an element has a property.
-    pub(crate) fn has(&self, element: &str, property: &str) -> bool {
+    pub fn has(&self, element: &str, property: &str) -> bool {
         let mut elements = self.elements.iter();
         elements.any(|own| own.name == element && own.properties.contains_key(property))
     }
 
     /// Returns columns of an element.
-    pub(crate) fn columns(&self, element: &str, names: &[&str]) -> Result<Scalars<'_>> {
+    pub fn columns(&self, element: &str, names: &[&str]) -> Result<Scalars<'_>> {
         let bad = |problem: String| Error::data(&self.path, "header", problem);
         if self.encoding != Encoding::BinaryLittleEndian {
             return Err(bad("is not binary_little_endian, as a compressed PLY is; export it again".into()));

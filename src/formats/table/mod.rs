@@ -8,5 +8,5 @@ mod elements;
 mod stored;
 mod table;
 
-pub(crate) use elements::Elements;
-pub(crate) use table::Table;
+pub use elements::Elements;
+pub use table::Table;

@@ -1,13 +1,13 @@
 //! Rows of a binary PLY in any order.
 
 use super::table::Column;
-use crate::error::{Error, Result};
-use crate::files::read::Source;
+use labelgs_files::read::Source;
+use labelgs_scene::{Error, Result};
 use std::io::{BufReader, Read, Seek, SeekFrom};
 use std::path::PathBuf;
 
 /// The `vertex` rows of an open file.
-pub(crate) struct StoredRows {
+pub struct StoredRows {
     pub(super) path: PathBuf,
     pub(super) file: BufReader<Source>,
     /// First byte of the rows.
@@ -20,7 +20,7 @@ pub(crate) struct StoredRows {
 
 impl StoredRows {
     /// Calls `see` with number and values of some rows, sorted, as [`Table::for_each`](super::Table::for_each) does.
-    pub(crate) fn for_some(
+    pub fn for_some(
         &mut self,
         rows: impl Iterator<Item = u64>,
         mut see: impl FnMut(u64, &[f64]) -> Result<()>,

@@ -1,9 +1,9 @@
 //! The `vertex` element of a PLY file as rows of selected columns.
 
 use super::stored::StoredRows;
-use crate::error::{Error, Result};
-use crate::files::kind::name_of_content;
-use crate::files::read::{self, Source};
+use labelgs_files::kind::name_of_content;
+use labelgs_files::read::{self, Source};
+use labelgs_scene::{Error, Result};
 use ply_rs_bw::parser::{Parser, Reader};
 use ply_rs_bw::ply::{DefaultElement, ElementDef, Encoding, Header, PropertyType, ScalarType};
 use std::io::{BufRead, BufReader, Read};
@@ -17,7 +17,7 @@ const BOM: &[u8] = b"\xEF\xBB\xBF";
 const LINE_MAX: u64 = 64 * 1024;
 
 /// An open PLY file after its header, before its `vertex` rows.
-pub(crate) struct Table {
+pub struct Table {
     path: PathBuf,
     file: BufReader<Source>,
     encoding: Encoding,
@@ -77,7 +77,7 @@ pub(super) fn decode(scalar: &ScalarType, bytes: &[u8], big_endian: bool) -> f64
 
 impl Table {
     /// Opens `path` and reads its header.
-    pub(crate) fn open(path: &Path) -> Result<Self> {
+    pub fn open(path: &Path) -> Result<Self> {
         let mut file = read::open(path)?;
         let file_bytes = file.get_ref().length().map_err(Error::read(path))?;
         let (header, header_bytes) = read_header(path, &mut file)?;
@@ -111,17 +111,17 @@ impl Table {
     }
 
     /// Returns the names of the vertex properties in file order.
-    pub(crate) fn names(&self) -> impl Iterator<Item = &str> {
+    pub fn names(&self) -> impl Iterator<Item = &str> {
         self.vertex.properties.iter().map(|(_, property)| property.name.as_str())
     }
 
     /// Returns the comments of the header.
-    pub(crate) fn comments(&self) -> impl Iterator<Item = &str> {
+    pub fn comments(&self) -> impl Iterator<Item = &str> {
         self.comments.iter().map(String::as_str)
     }
 
     /// Returns the largest value of a property of integers, and `None` for one of floats or lists.
-    pub(crate) fn integer_max(&self, name: &str) -> Option<f64> {
+    pub fn integer_max(&self, name: &str) -> Option<f64> {
         match self.vertex.properties.get(name)?.data_type {
             PropertyType::Scalar(ScalarType::UShort) => Some(f64::from(u16::MAX)),
             PropertyType::Scalar(ScalarType::Float | ScalarType::Double) | PropertyType::List(..) => None,
@@ -131,11 +131,7 @@ impl Table {
     }
 
     /// Calls `row` with the values of `columns` for each vertex, as f64, in order.
-    pub(crate) fn for_each(
-        mut self,
-        columns: &[&str],
-        mut row: impl FnMut(u64, &[f64]) -> Result<()>,
-    ) -> Result<Notes> {
+    pub fn for_each(mut self, columns: &[&str], mut row: impl FnMut(u64, &[f64]) -> Result<()>) -> Result<Notes> {
         let located = self.locate(columns)?;
         match self.encoding {
             Encoding::Ascii => self.ascii_rows(&located, &mut row),
@@ -201,7 +197,7 @@ impl Table {
 
     /// Returns access to the rows in any order, with the values of `columns`; `None` for text, whose rows have no fixed
     /// places.
-    pub(crate) fn places_of_rows(self, columns: &[&str]) -> Result<Option<StoredRows>> {
+    pub fn places_of_rows(self, columns: &[&str]) -> Result<Option<StoredRows>> {
         let big_endian = match self.encoding {
             Encoding::Ascii => return Ok(None),
             Encoding::BinaryBigEndian => true,
@@ -213,12 +209,12 @@ impl Table {
     }
 
     /// Returns the number of rows that the header promises.
-    pub(crate) fn count(&self) -> u64 {
+    pub fn count(&self) -> u64 {
         self.vertex.count as u64
     }
 
     /// Returns true if the property exists and is `float`.
-    pub(crate) fn is_single(&self, name: &str) -> bool {
+    pub fn is_single(&self, name: &str) -> bool {
         self.vertex
             .properties
             .get(name)
@@ -268,9 +264,9 @@ impl Table {
     }
 }
 
-pub(crate) struct Notes {
+pub struct Notes {
     /// Number of bytes after the last declared element.
-    pub(crate) extra_bytes: u64,
+    pub extra_bytes: u64,
 }
 
 /// Reads and parses the header; returns its length too.

@@ -1,6 +1,6 @@
 //! What a scan finds: kinds, texts, cures.
 
-use crate::scene::Flaw;
+use labelgs_scene::Flaw;
 use serde::Serialize;
 use std::collections::BTreeMap;
 

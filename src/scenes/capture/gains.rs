@@ -5,9 +5,8 @@
 //! neighbours have.
 
 use super::shown::{Mark, Shown};
-use crate::error::Result;
-use crate::scene::{View, crew};
-use crate::stage::Stage;
+use labelgs_scene::stage::Stage;
+use labelgs_scene::{Result, View, crew};
 use rayon::prelude::*;
 
 /// Fewest shared points for a gain.

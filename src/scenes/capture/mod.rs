@@ -15,11 +15,10 @@ use super::lookup::Lookup;
 use super::pose_convention::Native;
 use super::recipe::at_photo_size;
 use super::window::{Window, windows};
-use crate::error::Result;
-use crate::scene::median::median;
-use crate::scene::{Dataset, View};
-use crate::stage::Stage;
 use glam::{DVec2, DVec3};
+use labelgs_scene::median::median;
+use labelgs_scene::stage::Stage;
+use labelgs_scene::{Dataset, Result, View};
 use poses::Places;
 use serde::Serialize;
 use shown::{Mark, Shown};
@@ -100,7 +99,7 @@ impl Observed {
 }
 
 /// Which points of the reconstruction each training photo shows. They are read when something asks for them, and once.
-pub(crate) struct Sightings<'a> {
+pub struct Sightings<'a> {
     lookup: &'a Lookup,
     dataset: &'a Dataset,
     shown: OnceCell<Shown<'a>>,
@@ -108,7 +107,7 @@ pub(crate) struct Sightings<'a> {
 
 impl<'a> Sightings<'a> {
     /// Those of a scene that was read.
-    pub(crate) fn new(lookup: &'a Lookup, dataset: &'a Dataset) -> Self {
+    pub fn new(lookup: &'a Lookup, dataset: &'a Dataset) -> Self {
         Self { lookup, dataset, shown: OnceCell::new() }
     }
 
@@ -123,7 +122,7 @@ impl<'a> Sightings<'a> {
 
     /// Returns how bright each training photo is relative to the mean of all, by the points that they share: factors of
     /// red, green and blue, or `None` with too few such points.
-    pub(crate) fn gains(&self) -> Result<Vec<Option<[f64; 3]>>> {
+    pub fn gains(&self) -> Result<Vec<Option<[f64; 3]>>> {
         if self.dataset.points.is_empty() {
             return Ok(vec![None; self.dataset.train.len()]);
         }
@@ -134,7 +133,7 @@ impl<'a> Sightings<'a> {
 
     /// Returns pixel and place of the points that each training photo shows. There are none where the reconstruction does
     /// not say which photo shows which point.
-    pub(crate) fn points(&self) -> Result<Vec<Vec<(DVec2, DVec3)>>> {
+    pub fn points(&self) -> Result<Vec<Vec<(DVec2, DVec3)>>> {
         let place = |&(index, at): &Mark| (at, self.dataset.points[index].position);
         let of_view = |marks: &Option<Vec<Mark>>| marks.iter().flatten().map(place).collect();
         Ok(self.shown()?.listed().iter().map(of_view).collect())

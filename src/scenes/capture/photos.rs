@@ -1,10 +1,9 @@
 //! Sharpness of photos, and what is found of their brightness and white balance.
 
 use super::{Fault, Finding, ViewReport};
-use crate::error::Result;
-use crate::files::resize::{bounded_size, shrink_photo};
-use crate::scene::median::median;
-use crate::scene::{Photo, Pixels, View, crew};
+use labelgs_files::resize::{bounded_size, shrink_photo};
+use labelgs_scene::median::median;
+use labelgs_scene::{Photo, Pixels, Result, View, crew};
 
 /// Longest side of the photos that are compared, px: noise of sensors is gone at this size.
 const LONGEST: u32 = 800;

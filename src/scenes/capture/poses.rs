@@ -1,12 +1,12 @@
 //! Reprojection errors of points, and the scale of the scene.
 
 use super::{Fault, Finding, ViewReport};
-use crate::scene::Dataset;
-use crate::scene::median::median;
-use crate::scenes::colmap::Seen;
-use crate::scenes::lens::Optics;
-use crate::scenes::listing::Listed;
+use crate::colmap::Seen;
+use crate::lens::Optics;
+use crate::listing::Listed;
 use glam::DVec3;
+use labelgs_scene::Dataset;
+use labelgs_scene::median::median;
 
 /// Reprojection error from which a photo is odd: in px, and relative to the median over photos. Reconstructions of sharp
 /// photos have 0.3 to 1 px.

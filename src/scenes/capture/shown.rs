@@ -1,10 +1,10 @@
 //! Which points of the reconstruction each photo shows.
 
 use super::Observed;
-use crate::scene::sampling::{TESTS_MAX, every, spread_order};
-use crate::scene::{Point, View};
-use crate::stage::Stage;
 use glam::{DVec2, DVec3};
+use labelgs_scene::sampling::{TESTS_MAX, every, spread_order};
+use labelgs_scene::stage::Stage;
+use labelgs_scene::{Point, View};
 use rayon::prelude::*;
 use std::collections::HashMap;
 
@@ -146,8 +146,8 @@ impl<'a> Shown<'a> {
 #[cfg(test)]
 mod tests {
     use super::{Observed, SHARED_ENOUGH, Shown};
-    use crate::scene::{Camera, Point, View};
     use glam::{DMat3, DVec3};
+    use labelgs_scene::{Camera, Point, View};
     use std::collections::BTreeMap;
 
     /// A camera at a place, which looks along z.

@@ -1,11 +1,10 @@
 //! The binary files: little-endian, fixed widths, a count in front. No memory is allocated by a count alone.
 
 use super::model::{CameraRecord, ImageRecord, Observed, unknown_model};
-use crate::error::{Error, Result};
-use crate::files::read;
-use crate::scene::Point;
-use crate::scenes::lens;
+use crate::lens;
 use glam::{DVec2, DVec3};
+use labelgs_files::read;
+use labelgs_scene::{Error, Point, Result};
 use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
 

@@ -6,18 +6,17 @@
 mod binary;
 mod model;
 mod text;
-pub(crate) mod write;
+pub mod write;
 
 use super::lens::Lens;
 use super::listed_path::Place;
 use super::listing::{FAR, Listed, Listing, check_camera, require_some};
 use super::pose_convention::Native;
-use crate::error::{Error, Result};
-use crate::files::read;
-use crate::scene::{Camera, Flaw, Point};
-use crate::scenes::points;
-use crate::words::counted;
+use crate::points;
 use glam::{DMat3, DQuat, DVec2, DVec3};
+use labelgs_files::read;
+use labelgs_scene::words::counted;
+use labelgs_scene::{Camera, Error, Flaw, Point, Result};
 use model::{CameraRecord, ImageRecord};
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, HashMap, HashSet};
@@ -97,7 +96,7 @@ struct Views {
 }
 
 /// Reads the model of the scene, if there is one.
-pub(crate) fn list(scene: &Place) -> Result<Option<Listing>> {
+pub fn list(scene: &Place) -> Result<Option<Listing>> {
     let Some(files) = Files::find(scene.root) else { return Ok(None) };
     let Views { views, bad } = files.views(scene, false)?;
     let mut notes = Vec::new();
@@ -147,11 +146,11 @@ fn neighbours(folder: &Path, count: usize) -> Option<(bool, String)> {
 }
 
 /// A point in a photo, and the same point in the world.
-pub(crate) type Seen = (DVec2, DVec3);
+pub type Seen = (DVec2, DVec3);
 
 /// Reads which points each photo of the COLMAP model with the images `source` shows, by name of the view; none if that is
 /// no model.
-pub(crate) fn observations(scene: &Place, source: &Path) -> Result<BTreeMap<String, (Listed, Vec<Seen>)>> {
+pub fn observations(scene: &Place, source: &Path) -> Result<BTreeMap<String, (Listed, Vec<Seen>)>> {
     let files = Files { folder: source.parent().unwrap_or(scene.root).to_owned() };
     if files.path("images").is_none_or(|(path, _)| path != source) {
         return Ok(BTreeMap::new());

@@ -1,9 +1,8 @@
 //! Records of a COLMAP model, and its camera models.
 
-use crate::error::{Error, Result};
-use crate::scene::Camera;
-use crate::scenes::lens::{self, CameraModel, Lens};
+use crate::lens::{self, CameraModel, Lens};
 use glam::{DMat3, DVec2, DVec3};
+use labelgs_scene::{Camera, Error, Result};
 use std::fmt::Display;
 use std::path::Path;
 
@@ -17,9 +16,9 @@ pub(super) struct CameraRecord {
 }
 
 /// Points of a reconstruction as its images show them.
-pub(crate) struct Observed {
+pub struct Observed {
     /// Position in the photo, px, and id of the point.
-    pub(crate) points: Vec<(DVec2, u64)>,
+    pub points: Vec<(DVec2, u64)>,
 }
 
 /// A line of `images`.

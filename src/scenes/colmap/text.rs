@@ -1,11 +1,10 @@
 //! The text files: one record per line; `#` starts a comment.
 
 use super::model::{CameraRecord, ImageRecord, Observed, unknown_model};
-use crate::error::{Error, Result};
-use crate::files::read;
-use crate::scene::Point;
-use crate::scenes::lens;
+use crate::lens;
 use glam::{DVec2, DVec3};
+use labelgs_files::read;
+use labelgs_scene::{Error, Point, Result};
 use std::io::{BufRead, Read, Seek, SeekFrom};
 use std::path::Path;
 use std::str::FromStr;

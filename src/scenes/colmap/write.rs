@@ -1,14 +1,13 @@
 //! Writes a reconstruction as COLMAP's text files, without the tracks of its points.
 
-use crate::error::{Error, Result};
-use crate::files::atomic;
-use crate::scene::{Camera, Point};
 use glam::DQuat;
+use labelgs_files::atomic;
+use labelgs_scene::{Camera, Error, Point, Result};
 use std::fmt::Write;
 use std::path::Path;
 
 /// Writes `cameras.txt`, `images.txt` and `points3D.txt` into a folder; each view has a pinhole camera of its own.
-pub(crate) fn model(folder: &Path, views: &[(&str, &Camera)], points: &[Point]) -> Result<()> {
+pub fn model(folder: &Path, views: &[(&str, &Camera)], points: &[Point]) -> Result<()> {
     std::fs::create_dir_all(folder).map_err(Error::write(folder))?;
     let (mut cameras, mut images, mut cloud) = (String::new(), String::new(), String::new());
     for (index, (name, camera)) in views.iter().enumerate() {

@@ -7,17 +7,16 @@ mod sweep;
 mod texel;
 mod thin;
 
-use crate::error::{Error, Result};
-use crate::scene::harmonics::sh0_of;
-use crate::scene::origin::far_origin;
-use crate::scene::{Dataset, Gaussians, Point};
-use crate::stage::Stage;
 use glam::DVec3;
 use kiddo::{ImmutableKdTree, SquaredEuclidean};
+use labelgs_scene::harmonics::sh0_of;
+use labelgs_scene::origin::far_origin;
+use labelgs_scene::stage::Stage;
+use labelgs_scene::{Dataset, Error, Gaussians, Point, Result};
 use rayon::prelude::*;
 use std::num::NonZero;
 
-pub(crate) use thin::thinned;
+pub use thin::thinned;
 
 /// Opacity of a new Gaussian.
 const OPACITY: f64 = 0.1;
@@ -44,12 +43,7 @@ pub fn initial_gaussians(dataset: &Dataset, seed: u64, count_if_no_points: usize
 }
 
 /// Makes the initial Gaussians at some of the points of the scene, as [`initial_gaussians`] does at all of them.
-pub(crate) fn first_gaussians(
-    dataset: &Dataset,
-    points: &[Point],
-    seed: u64,
-    count_if_no_points: usize,
-) -> Result<Gaussians> {
+pub fn first_gaussians(dataset: &Dataset, points: &[Point], seed: u64, count_if_no_points: usize) -> Result<Gaussians> {
     if has_points(dataset) {
         check_seen(dataset)?;
         let distances2 = neighbour_distances2(points, dataset.extent())?;
@@ -66,7 +60,7 @@ pub(crate) fn first_gaussians(
 }
 
 /// Returns true if the first Gaussians lie at the points of the scene, not at random places.
-pub(crate) fn has_points(dataset: &Dataset) -> bool {
+pub fn has_points(dataset: &Dataset) -> bool {
     dataset.points.len() >= POINTS_MIN
 }
 

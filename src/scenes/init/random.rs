@@ -11,9 +11,8 @@
 use super::region::{self, Region};
 use super::sweep::Sweep;
 use super::texel::texel;
-use crate::error::{Error, Result};
-use crate::scene::{Camera, Dataset, Photo, Pixels, Point, View};
 use glam::{DVec2, DVec3};
+use labelgs_scene::{Camera, Dataset, Error, Photo, Pixels, Point, Result, View};
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use rayon::prelude::*;

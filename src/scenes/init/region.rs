@@ -1,8 +1,8 @@
 //! The region that the cameras of a scene see.
 
-use crate::scene::median::median;
-use crate::scene::{Camera, View, overview};
 use glam::{DVec2, DVec3};
+use labelgs_scene::median::median;
+use labelgs_scene::{Camera, View, overview};
 
 /// The region to fill with Gaussians.
 #[derive(Clone, Copy, Debug, PartialEq)]

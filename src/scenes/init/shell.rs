@@ -3,12 +3,11 @@
 //! Without them nothing stands for what is far away, and training puts Gaussians right before the cameras instead.
 
 use super::texel::texel;
-use crate::error::Result;
-use crate::scene::direction::even_direction;
-use crate::scene::sampling::every;
-use crate::scene::{Camera, Dataset, Point, View};
-use crate::stage::Stage;
 use glam::{DVec2, DVec3};
+use labelgs_scene::direction::even_direction;
+use labelgs_scene::sampling::every;
+use labelgs_scene::stage::Stage;
+use labelgs_scene::{Camera, Dataset, Point, Result, View};
 use rayon::prelude::*;
 use std::f64::consts::TAU;
 

@@ -4,10 +4,9 @@
 //! Gaussians: training moves or removes the others.
 
 use super::texel::texel;
-use crate::error::Result;
-use crate::files::resize::{bounded_size, shrink_photo};
-use crate::scene::{Camera, Photo, Pixels, Point, View};
 use glam::DVec2;
+use labelgs_files::resize::{bounded_size, shrink_photo};
+use labelgs_scene::{Camera, Photo, Pixels, Point, Result, View};
 use rand::Rng;
 use rand_pcg::Pcg64Mcg;
 use rayon::prelude::*;

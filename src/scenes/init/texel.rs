@@ -1,7 +1,7 @@
 //! Colours of a photo at points.
 
-use crate::scene::Photo;
 use glam::DVec2;
+use labelgs_scene::Photo;
 
 /// Returns the colour of the pixel at a point (px), if the photo has one there.
 pub(super) fn texel(photo: &Photo, pixel: DVec2) -> Option<[u8; 3]> {

@@ -1,7 +1,7 @@
 //! Fewer points, spread as all of them are.
 
-use crate::scene::Point;
 use glam::DVec3;
+use labelgs_scene::Point;
 use rayon::prelude::*;
 
 /// Bits of an axis in a place on the curve.
@@ -9,7 +9,7 @@ const BITS: u32 = 21;
 
 /// Returns at most `count` of the points, in their order. They lie at even distances along a curve that goes through all points,
 /// from each to a near one: dense places stay denser than others, and no place loses all its points.
-pub(crate) fn thinned(points: &[Point], count: usize) -> Vec<Point> {
+pub fn thinned(points: &[Point], count: usize) -> Vec<Point> {
     if points.len() <= count {
         return points.to_vec();
     }

@@ -11,7 +11,7 @@ pub struct Equirectangular;
 
 impl Equirectangular {
     /// Returns fx, fy, cx and cy of a panorama, which follow from its width and height, px.
-    pub(crate) fn intrinsics(width: f64, height: f64) -> [f64; 4] {
+    pub fn intrinsics(width: f64, height: f64) -> [f64; 4] {
         [width / (2.0 * PI), height / PI, width / 2.0, height / 2.0]
     }
 }

@@ -22,7 +22,7 @@ pub use equirectangular::Equirectangular;
 pub use eucm::Eucm;
 pub use fisheye::Fisheye;
 pub use fov::Fov;
-pub(crate) use models::{CameraModel, MODELS, colmap_model, model};
+pub use models::{CameraModel, MODELS, colmap_model, model};
 pub use optics::Optics;
 pub use polynomial::Polynomial;
 pub use projection::Projection;

@@ -4,25 +4,25 @@ use super::{Division, Equirectangular, Eucm, Fisheye, Fov, Lens, Polynomial, Rad
 
 /// A camera model as files name it, with its parameters.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct CameraModel {
+pub struct CameraModel {
     /// Name in COLMAP.
-    pub(crate) name: &'static str,
+    pub name: &'static str,
     /// Number of focal lengths in COLMAP's list: 1, or 2 for x and y, and the principal point follows; 0 where the list
     /// starts with the size of the photo instead.
-    pub(crate) focals: usize,
+    pub focals: usize,
     /// Number of lens coefficients after them.
-    pub(crate) coefficients: usize,
+    pub coefficients: usize,
     /// Makes the lens from these.
-    pub(crate) of_list: fn(&[f64]) -> Lens,
+    pub of_list: fn(&[f64]) -> Lens,
     /// Makes the lens from the named coefficients of `transforms.json`, 0 for missing ones; `None` if that format lacks
     /// the model.
-    pub(crate) of_names: Option<fn(&dyn Fn(&str) -> f64) -> Lens>,
+    pub of_names: Option<fn(&dyn Fn(&str) -> f64) -> Lens>,
 }
 
 impl CameraModel {
     /// Returns fx, fy, cx and cy of a list with the right number of parameters. Those of a panorama follow from its
     /// size.
-    pub(crate) fn intrinsics(&self, list: &[f64]) -> [f64; 4] {
+    pub fn intrinsics(&self, list: &[f64]) -> [f64; 4] {
         match self.focals {
             0 => Equirectangular::intrinsics(list[0], list[1]),
             focals => [list[0], list[focals - 1], list[focals], list[focals + 1]],
@@ -30,7 +30,7 @@ impl CameraModel {
     }
 
     /// Returns the number of parameters before the coefficients: focal lengths and principal point, or the size.
-    pub(crate) fn before(&self) -> usize {
+    pub fn before(&self) -> usize {
         self.focals + 2
     }
 }
@@ -60,7 +60,7 @@ const fn division(name: &'static str, focals: usize) -> CameraModel {
 }
 
 /// COLMAP's camera models; the index is COLMAP's number.
-pub(crate) const MODELS: [CameraModel; 18] = [
+pub const MODELS: [CameraModel; 18] = [
     pinhole("SIMPLE_PINHOLE", 1),
     pinhole("PINHOLE", 2),
     polynomial("SIMPLE_RADIAL", 1, 1),
@@ -97,12 +97,12 @@ fn thin_prism(value: &dyn Fn(&str) -> f64) -> Lens {
 }
 
 /// Returns the model of a name.
-pub(crate) fn model(name: &str) -> Option<&'static CameraModel> {
+pub fn model(name: &str) -> Option<&'static CameraModel> {
     all().iter().find(|model| model.name == name)
 }
 
 /// Returns the model of COLMAP's number.
-pub(crate) fn colmap_model(number: usize) -> Option<&'static CameraModel> {
+pub fn colmap_model(number: usize) -> Option<&'static CameraModel> {
     all().get(number)
 }
 

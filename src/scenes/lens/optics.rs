@@ -1,8 +1,8 @@
 //! A lens with its focal lengths, principal point and picture size.
 
 use super::Lens;
-use crate::scene::Camera;
 use glam::{DVec2, DVec3};
+use labelgs_scene::Camera;
 use std::f64::consts::FRAC_PI_2;
 
 /// A camera with its lens: the intrinsics of [`Camera`] are those of the lens's image plane.

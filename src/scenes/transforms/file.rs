@@ -1,7 +1,7 @@
 //! What a file of transforms holds.
 
-use crate::error::{Error, Result, Setting};
-use crate::files::read;
+use labelgs_files::read;
+use labelgs_scene::{Error, Result, Setting};
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
 use serde_json::{Map, Value};

@@ -1,12 +1,11 @@
 //! The view of a frame: photo, lens, intrinsics, pose.
 
 use super::file::{Frame, Intrinsics};
-use crate::error::{Error, Result};
-use crate::files::image;
-use crate::scene::Camera;
-use crate::scenes::lens::{self, Equirectangular, Lens};
-use crate::scenes::listing::{Listed, check_camera, invert_pose, rotation_of, side, with_extension};
+use crate::lens::{self, Equirectangular, Lens};
+use crate::listing::{Listed, check_camera, invert_pose, rotation_of, side, with_extension};
 use glam::{DAffine3, DMat3, DVec3};
+use labelgs_files::image;
+use labelgs_scene::{Camera, Error, Result};
 use std::path::{Path, PathBuf};
 
 /// Makes the view of a frame, whose photo has `name` below the scene; `None` if it does not exist and its size is unknown.
@@ -112,7 +111,7 @@ fn camera(path: &Path, place: &str, i: &Intrinsics, (width, height): (u32, u32))
 }
 
 /// Converts the rows of a 3x4 or 4x4 matrix.
-pub(crate) fn affine(rows: &[Vec<f64>]) -> Option<DAffine3> {
+pub fn affine(rows: &[Vec<f64>]) -> Option<DAffine3> {
     if !(3..=4).contains(&rows.len()) || rows.iter().any(|row| row.len() != 4 || row.iter().any(|v| !v.is_finite())) {
         return None;
     }

@@ -11,9 +11,9 @@ use super::listed_path::Place;
 use super::listing::{Listed, Listing};
 use super::pose_convention::Native;
 use super::split::Split;
-use crate::error::{Error, Result};
-use crate::words::counted;
 use file::{Frame, Transforms};
+use labelgs_scene::words::counted;
+use labelgs_scene::{Error, Result};
 use serde_json::Value;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -22,7 +22,7 @@ pub(super) use frame::affine;
 
 /// Reads the scene, if it has transforms: `transforms_train.json` with `transforms_test.json` or, without that,
 /// `transforms_val.json` held out, else `transforms.json`, else `transforms_train.json` alone.
-pub(crate) fn list(scene: &Place) -> Result<Option<Listing>> {
+pub fn list(scene: &Place) -> Result<Option<Listing>> {
     let file = |name: &str| Some(scene.root.join(name)).filter(|path| path.is_file());
     let (train, val, test) = (file("transforms_train.json"), file("transforms_val.json"), file("transforms_test.json"));
     let unused = val.clone().filter(|_| test.is_some());
@@ -44,12 +44,12 @@ pub(crate) fn list(scene: &Place) -> Result<Option<Listing>> {
 }
 
 /// Returns the number of photos that a file lists; `None` if it cannot be read.
-pub(crate) fn count(path: &Path) -> Option<usize> {
+pub fn count(path: &Path) -> Option<usize> {
     let transforms = file::read(path).ok()?;
     Some(transforms.frames.len() + transforms.test_frames.map_or(0, |frames| frames.len()))
 }
 
-pub(crate) fn list_file(scene: &Place, path: &Path) -> Result<Listing> {
+pub fn list_file(scene: &Place, path: &Path) -> Result<Listing> {
     let mut listing = Listing::new(path, Native::TRANSFORMS);
     read(scene, path, None, &mut listing)?;
     strip_folder(&mut listing);

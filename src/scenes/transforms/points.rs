@@ -2,11 +2,10 @@
 
 use super::file::Transforms;
 use super::frame::affine;
-use crate::error::{Error, Result};
-use crate::scene::{Camera, Point};
-use crate::scenes::listed_path::Place;
-use crate::scenes::listing::{FAR, Listed};
-use crate::scenes::points;
+use crate::listed_path::Place;
+use crate::listing::{FAR, Listed};
+use crate::points;
+use labelgs_scene::{Camera, Error, Point, Result};
 use std::path::Path;
 
 /// Files in which nerfstudio and trainers put points that no key names.

@@ -6,7 +6,7 @@
 use super::super::measure::{table, write_text};
 use super::rows::{Plan, Row, Rows, SceneOf};
 use super::{Common, ladder};
-use labelgs::internals::synth;
+use labelgs::synth;
 use labelgs::synth::{Preset, SynthOptions};
 use labelgs::{Error, Result};
 use std::path::{Path, PathBuf};

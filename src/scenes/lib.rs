@@ -7,14 +7,14 @@
 //! To add a reader, add a file beside `llff` that returns a `Listing`, and a case in `list`.
 
 mod bad_photos;
-pub(crate) mod camera_json;
+pub mod camera_json;
 pub mod capture;
-pub(crate) mod colmap;
-pub(crate) mod depth;
+pub mod colmap;
+pub mod depth;
 mod frame_check;
-pub(crate) mod frames;
-pub(crate) mod init;
-pub(crate) mod lens;
+pub mod frames;
+pub mod init;
+pub mod lens;
 mod list;
 mod listed_path;
 mod listing;
@@ -26,23 +26,22 @@ mod metashape;
 mod missing;
 mod photo_finder;
 mod photo_store;
-pub(crate) mod points;
+pub mod points;
 mod pose_convention;
 mod read_options;
 mod recipe;
 mod resample;
-pub(crate) mod shelf;
+pub mod shelf;
 mod split;
 mod stray;
 mod transforms;
-pub(crate) mod truth;
-pub(crate) mod window;
+pub mod truth;
+pub mod window;
 
-use crate::error::{Error, Result, Setting};
-use crate::files::scratch;
-use crate::scene::Dataset;
-use crate::stage::Stage;
-use crate::words::counted;
+use labelgs_files::scratch;
+use labelgs_scene::stage::Stage;
+use labelgs_scene::words::counted;
+use labelgs_scene::{Dataset, Error, Result, Setting};
 use list::{folder_of, list};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -141,7 +140,7 @@ pub fn open(scene: &Path, options: &LoadOptions) -> Result<Dataset> {
 }
 
 /// Like [`open`]; logs a summary and the notes.
-pub(crate) fn open_logged(scene: &Path, options: &LoadOptions) -> Result<Dataset> {
+pub fn open_logged(scene: &Path, options: &LoadOptions) -> Result<Dataset> {
     let dataset = open(scene, options)?;
     dataset.notes.iter().for_each(|note| tracing::warn!("{note}"));
     let (train, test, points) = (dataset.train.len(), dataset.test.len(), dataset.points.len());

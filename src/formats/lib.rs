@@ -13,26 +13,25 @@ mod side_labels;
 mod sog;
 mod splat;
 mod spz;
-pub(crate) mod table;
+pub mod table;
 mod transform;
 mod turn;
-pub(crate) mod values;
+pub mod values;
 
-use crate::error::{Error, Result};
-use crate::files::label_table::LabelTable;
-use crate::files::{atomic, kind};
-use crate::scene::Gaussians;
-use crate::stage::Stage;
+use labelgs_files::label_table::LabelTable;
+use labelgs_files::{atomic, kind};
+use labelgs_scene::stage::Stage;
+use labelgs_scene::{Error, Gaussians, Result};
 use std::path::Path;
 
 pub use lazy::{LazyModel, ModelRef};
 pub use ply::StoredModel;
-pub(crate) use ply::write_joined;
-pub(crate) use rows::Row;
+pub use ply::write_joined;
+pub use rows::Row;
 pub use transform::Transform;
 
 pub use format::{Export, FirstView, LabelType, ReadModel, SpzVersion, WriteOptions};
-pub(crate) use format::{ModelFormat, ModelWriter};
+pub use format::{ModelFormat, ModelWriter};
 
 /// All formats. The first one also serves pipes and devices, such as `/dev/stdout`.
 const FORMATS: [&ModelFormat; 6] =
@@ -45,7 +44,7 @@ fn by_ending(path: &Path) -> Option<&'static ModelFormat> {
 }
 
 /// Returns true if a model at this path is written as a page, which shows it from somewhere at first.
-pub(crate) fn is_page(path: &Path) -> bool {
+pub fn is_page(path: &Path) -> bool {
     by_ending(path).is_some_and(|format| format.name == html::FORMAT.name)
 }
 
@@ -138,7 +137,7 @@ fn writer_for(path: &Path) -> Result<ModelWriter> {
 }
 
 /// Refuses a path at which no model can be written because of its extension.
-pub(crate) fn check_output(path: &Path) -> Result<()> {
+pub fn check_output(path: &Path) -> Result<()> {
     writer_for(path).map(drop)
 }
 

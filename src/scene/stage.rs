@@ -6,31 +6,31 @@ use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 use tracing::Span;
 
 /// Target of the spans.
-pub(crate) const TARGET: &str = "labelgs::stage";
+pub const TARGET: &str = "labelgs::stage";
 
 /// A stage, from its making until it is dropped.
 #[derive(Debug)]
-pub(crate) struct Stage {
+pub struct Stage {
     span: Span,
     done: AtomicU64,
 }
 
 impl Stage {
     /// Begins a stage, such as `reading photos`.
-    pub(crate) fn new(what: impl Display, total: usize) -> Self {
+    pub fn new(what: impl Display, total: usize) -> Self {
         let span = tracing::info_span!(target: TARGET, "stage", %what, total = total as u64, done = 0_u64);
         Self { span, done: AtomicU64::new(0) }
     }
 
     /// Makes an item and counts it.
-    pub(crate) fn counted<T>(&self, make: impl FnOnce() -> T) -> T {
+    pub fn counted<T>(&self, make: impl FnOnce() -> T) -> T {
         let made = make();
         self.count();
         made
     }
 
     /// One more item is done, on any thread.
-    pub(crate) fn count(&self) {
+    pub fn count(&self) {
         self.span.record("done", self.done.fetch_add(1, Relaxed) + 1);
     }
 }

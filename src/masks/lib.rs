@@ -2,9 +2,9 @@
 //! checks a folder.
 //!
 //! Our own format is one grey PNG per photo with the photo's name, whose pixel value is the id, and a `labels.json`
-//! ([`LabelTable`](crate::files::LabelTable)).
+//! ([`LabelTable`](labelgs_files::LabelTable)).
 
-pub(crate) mod check;
+pub mod check;
 mod coco;
 mod content;
 mod decode;
@@ -13,23 +13,23 @@ mod folder;
 mod import;
 mod inspect;
 mod marks;
-pub(crate) mod mask;
-pub(crate) mod mask_folder;
+pub mod mask;
+pub mod mask_folder;
 mod photos;
 mod polygon;
 mod pred;
 mod rle;
 mod sam;
-pub(crate) mod soft_edges;
+pub mod soft_edges;
 mod spans;
-pub(crate) mod tools;
+pub mod tools;
 
 pub use check::{Finding, Problem};
 pub use import::{Imported, Objects, Overlaps, import};
 pub use inspect::{Report, inspect};
 pub use mask::read_mask;
 
-use crate::files::names::shortened;
+use labelgs_files::names::shortened;
 use serde::Serialize;
 use std::path::PathBuf;
 

@@ -8,7 +8,7 @@ use std::sync::OnceLock;
 static FLAGS: OnceLock<BTreeMap<String, String>> = OnceLock::new();
 
 /// Gives settings the names of these flags in all later messages. The first call counts.
-pub(crate) fn speak_of(flags: BTreeMap<String, String>) {
+pub fn speak_of(flags: BTreeMap<String, String>) {
     // A second start in one process, as in tests, keeps the first flags.
     let _ = FLAGS.set(flags);
 }

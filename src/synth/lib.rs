@@ -4,7 +4,7 @@
 //! [`dataset`] keeps photos and masks in memory, and [`spoil`] puts faults into masks. The scenes are not made of
 //! Gaussians, so a score on them does not compare the engine with itself.
 
-pub(crate) mod cameras;
+pub mod cameras;
 mod city;
 mod exposure;
 mod flight;
@@ -16,21 +16,21 @@ mod object;
 mod points;
 mod presets;
 mod shape;
-pub(crate) mod spoil;
-pub(crate) mod trace;
-pub(crate) mod world;
+pub mod spoil;
+pub mod trace;
+pub mod world;
 mod write;
 
+pub use cameras::{cameras, ring_of_cameras};
 pub use lens::SynthLens;
 pub use spoil::{Fault, spoil};
-pub(crate) use world::World;
+pub use trace::{Picture, alone, photograph, picture};
+pub use world::World;
 pub use write::{Summary, write};
 
-use crate::scene::{Dataset, LabelMap, Photo, View};
-use crate::scenes::lens::{Lens, Optics};
-use cameras::cameras;
+use labelgs_scene::{Dataset, LabelMap, Photo, View};
+use labelgs_scenes::lens::{Lens, Optics};
 use serde::{Deserialize, Serialize};
-use trace::picture;
 
 /// The objects in the scene.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]

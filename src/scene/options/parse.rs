@@ -23,7 +23,7 @@ const COLOURS: [(&str, u32); 18] = [
 ];
 
 /// Parses a colour: a name, a web page's number such as `#ff0000`, or three numbers from 0 to 1.
-pub(crate) fn colour(text: &str) -> Result<[f32; 3], String> {
+pub fn colour(text: &str) -> Result<[f32; 3], String> {
     let name = text.trim().to_lowercase();
     let named = COLOURS.iter().find(|(known, _)| *known == name).map(|&(_, bytes)| bytes);
     if let Some(bytes) = named.or_else(|| hexadecimal(&name)) {
@@ -53,7 +53,7 @@ fn hexadecimal(text: &str) -> Option<u32> {
 }
 
 /// Parses a count such as `1500`, `500k` or `2M`.
-pub(crate) fn count(text: &str) -> Result<u64, String> {
+pub fn count(text: &str) -> Result<u64, String> {
     let wrong = || format!("`{text}` is not a count; expected for example 1500, 500k or 2.5M");
     let (digits, unit) = match text.char_indices().last() {
         Some((at, 'k' | 'K')) => (&text[..at], 1e3),
@@ -69,7 +69,7 @@ pub(crate) fn count(text: &str) -> Result<u64, String> {
 const UNITS: [(&str, u32); 3] = [("G", 30), ("M", 20), ("K", 10)];
 
 /// Parses a number of bytes such as `1500M` or `2G`, in powers of 1024.
-pub(crate) fn bytes(text: &str) -> Result<u64, String> {
+pub fn bytes(text: &str) -> Result<u64, String> {
     let wrong =
         || format!("`{text}` is not an amount of memory; expected a number followed by K, M or G, such as 1500M");
     let (number, unit) = text.trim().split_at_checked(text.trim().len().saturating_sub(1)).ok_or_else(wrong)?;
@@ -79,23 +79,25 @@ pub(crate) fn bytes(text: &str) -> Result<u64, String> {
 }
 
 /// A number of bytes in a file, in the syntax of [`bytes`].
-pub(crate) mod as_bytes {
+pub mod as_bytes {
     use super::{UNITS, bytes};
     use serde::{Deserialize, Deserializer, Serializer, de::Error};
 
-    pub(crate) fn serialize<S: Serializer>(value: &u64, to: S) -> Result<S::Ok, S::Error> {
+    /// Writes bytes with the largest unit that divides them.
+    pub fn serialize<S: Serializer>(value: &u64, to: S) -> Result<S::Ok, S::Error> {
         let even = UNITS.into_iter().find(|(_, shift)| value.trailing_zeros() >= *shift);
         let (unit, shift) = even.unwrap_or(UNITS[UNITS.len() - 1]);
         to.serialize_str(&format!("{}{unit}", *value as f64 / f64::from(1_u32 << shift)))
     }
 
-    pub(crate) fn deserialize<'a, D: Deserializer<'a>>(from: D) -> Result<u64, D::Error> {
+    /// Reads bytes with a unit.
+    pub fn deserialize<'a, D: Deserializer<'a>>(from: D) -> Result<u64, D::Error> {
         bytes(&String::deserialize(from)?).map_err(D::Error::custom)
     }
 }
 
 /// Parses `on` or `off`.
-pub(crate) fn switch(text: &str) -> Result<bool, String> {
+pub fn switch(text: &str) -> Result<bool, String> {
     match text {
         "on" | "true" | "yes" => Ok(true),
         "off" | "false" | "no" => Ok(false),
@@ -104,7 +106,7 @@ pub(crate) fn switch(text: &str) -> Result<bool, String> {
 }
 
 /// Parses two corners of a box in space, the smaller coordinates first.
-pub(crate) fn corners(text: &str) -> Result<[f64; 6], String> {
+pub fn corners(text: &str) -> Result<[f64; 6], String> {
     let wrong = || format!("`{text}` is not a box; expected x0,y0,z0,x1,y1,z1, the smaller corner first");
     let numbers = text.split(',').map(|part| part.trim().parse().ok().filter(|value: &f64| value.is_finite()));
     let numbers: Vec<f64> = numbers.collect::<Option<_>>().ok_or_else(wrong)?;
@@ -113,7 +115,7 @@ pub(crate) fn corners(text: &str) -> Result<[f64; 6], String> {
 }
 
 /// Parses a number of objects, or `all`.
-pub(crate) fn samples(text: &str) -> Result<u32, String> {
+pub fn samples(text: &str) -> Result<u32, String> {
     match text {
         "all" => Ok(u32::MAX),
         _ => text.parse().map_err(|_| format!("`{text}` is neither a number of objects nor all")),

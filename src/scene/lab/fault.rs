@@ -23,7 +23,7 @@ use std::time::Duration;
 
 /// Effect of a fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Kind {
+pub enum Kind {
     /// The device is lost.
     DeviceLost,
     /// The host is out of memory.
@@ -57,7 +57,7 @@ struct Fault {
 
 /// The fault that is set for this event of a site, if any.
 #[inline(always)]
-pub(crate) fn at(site: &str) -> Option<Kind> {
+pub fn at(site: &str) -> Option<Kind> {
     if super::ON { asked(site) } else { None }
 }
 
@@ -87,7 +87,7 @@ fn asked(site: &str) -> Option<Kind> {
 }
 
 /// Applies a fault to a transfer of bytes from or to a file. Returns true if only a part may be transferred.
-pub(crate) fn of_transfer(site: &str) -> io::Result<bool> {
+pub fn of_transfer(site: &str) -> io::Result<bool> {
     match at(site) {
         Some(Kind::NoSpace) => Err(io::ErrorKind::StorageFull.into()),
         Some(Kind::Interrupted) => Err(io::ErrorKind::Interrupted.into()),
@@ -98,7 +98,7 @@ pub(crate) fn of_transfer(site: &str) -> io::Result<bool> {
 }
 
 /// Applies a fault to any other file operation, which succeeds or fails as a whole.
-pub(crate) fn of_file(site: &str) -> io::Result<()> {
+pub fn of_file(site: &str) -> io::Result<()> {
     match of_transfer(site) {
         Err(error) if error.kind() == io::ErrorKind::Interrupted => Ok(()),
         other => other.map(|_| ()),

@@ -6,14 +6,14 @@ const OFFERED_MAX: usize = 3;
 const SIMILARITY_MIN: f64 = 0.75;
 
 /// Returns a count with its noun: `1 object`, `8 objects`.
-pub(crate) fn counted(count: impl std::fmt::Display, noun: &str) -> String {
+pub fn counted(count: impl std::fmt::Display, noun: &str) -> String {
     let count = count.to_string();
     let ending = if count == "1" { "" } else { "s" };
     format!("{count} {noun}{ending}")
 }
 
 /// Returns `did you mean barrel?` with the names that are spelt most like `name`; none if no name is like it.
-pub(crate) fn did_you_mean<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Option<String> {
+pub fn did_you_mean<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Option<String> {
     let typed = name.to_lowercase();
     let similarity = |known: &str| strsim::jaro_winkler(&typed, &known.to_lowercase());
     let rated = known.into_iter().map(|known| (similarity(known), known));

@@ -4,9 +4,9 @@
 //! `config.toml` and, with the feature `cli`, its flags. Flags have no default: only flags on the command line change a
 //! value. So a flag wins over a file, and a file over the default.
 
-pub(crate) mod parse;
+pub mod parse;
 #[cfg(feature = "cli")]
-pub(crate) mod typed;
+pub mod typed;
 
 use crate::error::{Error, Result, Setting};
 use serde::Serialize;
@@ -123,7 +123,7 @@ numbers! {
 }
 
 /// A struct made by [`options!`](macro@crate::options).
-pub(crate) trait Options: Serialize + DeserializeOwned + Default {
+pub trait Options: Serialize + DeserializeOwned + Default {
     /// The options, in order.
     const KEYS: &'static [Key];
 
@@ -142,6 +142,7 @@ pub(crate) trait Options: Serialize + DeserializeOwned + Default {
 /// Declares a struct of options. A field is `NAME <"VALUE NAME">: TYPE = DEFAULT, RULES;` with rules of [`Key`] such as
 /// `at_least(1)` and `fixed`. Fields are grouped by the headings of their flags. The first paragraph of a field's doc
 /// is the short help; `--help` also shows the rest.
+#[macro_export]
 macro_rules! options {
     ($(#[$outer:meta])* pub struct $name:ident {
         $($heading:literal { $(
@@ -170,7 +171,7 @@ macro_rules! options {
 
             fn check_ranges(&self) -> $crate::Result<()> {
                 let mut keys = Self::KEYS.iter();
-                $($( $crate::options::options!(@check keys, self.$key $(, $rule)*); )*)*
+                $($( $crate::options!(@check keys, self.$key $(, $rule)*); )*)*
                 let _ = keys;
                 Ok(())
             }
@@ -183,4 +184,3 @@ macro_rules! options {
         if let Some(key) = $keys.next() { key.check(&$value)?; }
     };
 }
-pub(crate) use options;

@@ -3,8 +3,7 @@
 mod setting;
 
 pub use setting::Setting;
-#[cfg(feature = "cli")]
-pub(crate) use setting::speak_of;
+pub use setting::speak_of;
 
 use std::path::{Path, PathBuf};
 
@@ -13,7 +12,6 @@ pub type Result<T, E = Error> = std::result::Result<T, E>;
 
 /// An error of the engine. Its message names the thing, the number and the cure in one line.
 #[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
 pub enum Error {
     /// An argument, setting or environment variable has an invalid value.
     #[error("{argument}: {problem}")]
